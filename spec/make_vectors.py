@@ -1,0 +1,192 @@
+"""Writes spec/vectors/*.json from the formulas of the spec's pages and nothing else. Deterministic; run by `make bless`."""
+
+import base64
+import json
+import math
+from pathlib import Path
+
+HERE = Path(__file__).parent / "vectors"
+EXACT = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)}
+HALF = {30: (None, 0.5), 150: (None, 0.5), 210: (None, -0.5), 330: (None, -0.5), 60: (0.5, None), 300: (0.5, None), 120: (-0.5, None), 240: (-0.5, None)}
+
+
+def cos_sin(deg):
+    deg %= 360
+    if deg in EXACT:
+        return EXACT[deg]
+    c, s = HALF.get(deg, (None, None))
+    rad = math.radians(deg)
+    return (math.cos(rad) if c is None else c, math.sin(rad) if s is None else s)
+
+
+def axes(look_at, pitch):
+    ca, sa = cos_sin(look_at)
+    cp, sp = cos_sin(pitch)
+    return (ca, sa, 0.0), (-sp * sa, sp * ca, cp), (-cp * sa, cp * ca, -sp)
+
+
+def dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def view_id(look_at, pitch):
+    def short(v):
+        return str(int(v)) if v == int(v) else repr(float(v))
+    return f"{short(look_at)}-{short(pitch)}"
+
+
+def pin(lo, hi, tile_px, res_m, views):
+    c = [(a + b) / 2 for a, b in zip(lo, hi)]
+    h = [(b - a) / 2 * 1.05 for a, b in zip(lo, hi)]
+    h[2] = max(h[2], (hi[2] - lo[2]) / 2 + 100.0)
+    flat = math.hypot(h[0], h[1])
+    extent = 2 * flat
+    for _, pitch in views:
+        cp, sp = cos_sin(pitch)
+        extent = max(extent, 2 * (sp * flat + cp * h[2]))
+    zmax = 0
+    while tile_px * res_m * 2**zmax < extent:
+        zmax += 1
+    size = tile_px * res_m * 2**zmax
+    half_diagonal = math.sqrt(h[0] ** 2 + h[1] ** 2 + h[2] ** 2)
+    out = []
+    for look_at, pitch in views:
+        r, u, d = axes(look_at, pitch)
+        out.append({"id": view_id(look_at, pitch), "look_at_deg": look_at, "pitch_deg": pitch, "u0_m": dot(r, c) - size / 2,
+                    "v0_m": dot(u, c) + size / 2, "d0_m": dot(d, c) - half_diagonal - 1000})
+    return {"zmax": zmax, "size_m": size, "views": out}
+
+
+def views_vectors():
+    rows = []
+    for a, p in [(0, 45), (45, 22.5), (90, 10), (180, 90), (270, 45), (37.5, 60), (330, 30), (359.9, 0.5)]:
+        r, u, d = axes(a, p)
+        points = []
+        for x in [(0, 0, 0), (100, 0, 0), (0, 100, 0), (0, 0, 100), (-1234.5, 678.25, 41.125)]:
+            points.append({"local": x, "uvd": [dot(r, x), dot(u, x), dot(d, x)]})
+        rows.append({"look_at_deg": a, "pitch_deg": p, "id": view_id(a, p), "right": r, "up": u, "forward": d, "points": points})
+    return rows
+
+
+def frames_vectors():
+    rows = []
+    for lo, hi, tile_px, res, views in [
+        ([-120, -80, 0], [130, 90, 22.5], 256, 0.2, [(0, 45), (90, 45), (180, 45), (270, 45)]),
+        ([0, 0, 0], [1, 1, 1], 512, 1.0, [(45, 22.5)]),
+        ([-3500, -3500, -5], [3500, 3500, 180], 256, 0.1, [(0, 10), (0, 90)]),
+    ]:
+        rows.append({"box": [lo, hi], "tile_px": tile_px, "res_m": res, "views_deg": views, "pinned": pin(lo, hi, tile_px, res, views)})
+    return rows
+
+
+def morton(x, y):
+    return sum(((x >> i) & 1) << 2 * i | ((y >> i) & 1) << 2 * i + 1 for i in range(26))
+
+
+def tiles_vectors():
+    frame = frames_vectors()[0]["pinned"]
+    rows = []
+    for z, x, y, i, j in [(0, 0, 0, 0, 0), (3, 1, 6, 255, 0), (frame["zmax"], 3, 2, 17, 200), (1, 1, 1, 128, 128)]:
+        px = frame["size_m"] / (256 * 2**z)
+        v = frame["views"][1]
+        rows.append({"tile": [z, x, y], "pixel": [i, j], "u": v["u0_m"] + (x * 256 + i + 0.5) * px, "v": v["v0_m"] - (y * 256 + j + 0.5) * px,
+                     "morton": morton(x, y), "parent": [z - 1, x // 2, y // 2] if z else None})
+    return {"frame": frame, "view": 1, "tile_px": 256, "rows": rows}
+
+
+def occupancy(zmax, base):
+    """base: set of occupied (x, y) at level zmax."""
+    levels = [set() for _ in range(zmax + 1)]
+    levels[zmax] = set(base)
+    for z in range(zmax, 0, -1):
+        levels[z - 1] = {(x // 2, y // 2) for x, y in levels[z]}
+    bits = [1 if levels[0] else 0]
+    for z in range(zmax):
+        for x, y in sorted(levels[z], key=lambda t: morton(*t)):
+            bits += [int((2 * x + dx, 2 * y + dy) in levels[z + 1]) for dy in (0, 1) for dx in (0, 1)]
+    data = bytearray((len(bits) + 7) // 8)
+    for k, bit in enumerate(bits):
+        data[k // 8] |= bit << (k % 8)
+    return base64.b64encode(bytes(data)).decode()
+
+
+def occupancy_vectors():
+    cases = [(0, []), (0, [(0, 0)]), (2, [(0, 0), (3, 3), (1, 2)]), (3, [(x, y) for x in range(8) for y in range(8) if (x * 7 + y * 3) % 5 == 0])]
+    return [{"zmax": z, "occupied": sorted(b, key=lambda t: morton(*t)), "base64": occupancy(z, b)} for z, b in cases]
+
+
+def data_vectors():
+    ids = [0, 1, 255, 256, 65536, 0x01020304, 0xFFFFFFFF]
+    normals = [(0, 0, 1), (1, 0, 0), (0, -1, 0), (-0.6, 0, 0.8)]
+    return {"uint32": [{"value": v, "rgba": list(v.to_bytes(4, "little"))} for v in ids],
+            "normal": [{"n": n, "rgb": [math.floor((c + 1) / 2 * 255 + 0.5) for c in n]} for n in normals]}
+
+
+def depth_key(bits):
+    return bits[3]
+
+
+def parent_pixel(children):
+    """children: four of (color4, normal3, id, depth) in order TL, TR, BL, BR; spec/pyramid.md §7."""
+    color = [(sum(c[0][k] for c in children) + 2) // 4 for k in range(4)]
+    ids = [c[2] for c in children]
+    if ids.count(0) >= 3:
+        return {"color": color, "normal": [0, 0, 0], "id": 0, "depth": 0xFFFFFFFF}
+    seen = [i for i in dict.fromkeys(ids) if i]
+    best = min(seen, key=lambda i: (-ids.count(i), min(c[3] for c in children if c[2] == i), ids.index(i)))
+    mine = [c for c in children if c[2] == best]
+    total = [sum(c[1][k] for c in mine) for k in range(3)]
+    length = math.sqrt(sum(v * v for v in total))
+    if length < 1e-6 * 32767 * len(mine):
+        normal = list(min(mine, key=depth_key)[1])
+    else:
+        normal = [math.floor(v / length * 32767 + 0.5) for v in total]
+    return {"color": color, "normal": normal, "id": best, "depth": min(c[3] for c in mine)}
+
+
+def parent_vectors():
+    none = ([0, 0, 0, 0], [0, 0, 0], 0, 0xFFFFFFFF)
+
+    def px(v, n, i, d):
+        return ([v, v // 2, v // 3, 65535], n, i, d)
+    up, east, down = [0, 0, 32767], [32767, 0, 0], [0, 0, -32767]
+    cases = [
+        [none] * 4,
+        [px(1000, up, 7, 50), none, none, none],
+        [px(1000, up, 7, 50), px(2001, up, 7, 40), none, none],
+        [px(1000, up, 7, 50), px(2000, east, 8, 40), px(3000, up, 7, 60), px(4000, east, 8, 45)],
+        [px(1000, up, 7, 50), px(2000, east, 8, 50), none, none],
+        [px(1, up, 9, 5), px(2, down, 9, 6), none, none],
+        [px(65535, up, 3, 1), px(65535, east, 3, 2), px(65534, up, 3, 3), px(65535, up, 4, 0)],
+    ]
+    return [{"children": [{"color": c, "normal": n, "id": i, "depth": d} for c, n, i, d in case], "parent": parent_pixel(case)} for case in cases]
+
+
+def blocks_vectors():
+    """Root levels of the blocks of a pyramid, deepest first: (root level, levels held)."""
+    rows = []
+    for zmax in range(0, 13):
+        root = max(zmax - 3, 0)
+        steps = [[root, zmax - root + 1, "base"]]
+        while root > 0:
+            above = max(root - 3, 0)
+            steps.append([above, root - above, "reduce"])
+            root = above
+        rows.append({"zmax": zmax, "blocks": steps})
+    return rows
+
+
+def write(name, value):
+    text = json.dumps(value, indent=1)
+    (HERE / f"{name}.json").write_text(text + "\n")
+
+
+def main():
+    HERE.mkdir(exist_ok=True)
+    for name, value in {"views": views_vectors(), "frames": frames_vectors(), "tiles": tiles_vectors(), "occupancy": occupancy_vectors(),
+                        "data": data_vectors(), "parents": parent_vectors(), "blocks": blocks_vectors()}.items():
+        write(name, value)
+
+
+if __name__ == "__main__":
+    main()
