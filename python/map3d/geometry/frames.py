@@ -1,0 +1,188 @@
+"""Pinned frames: which square of a view's plane the pyramid covers, and the way between pixels, view and local coordinates (spec/pyramid.md §2–3)."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from map3d.errors import BadRequest, LimitExceeded, OutsideFrame
+from map3d.geometry.views import Axes, axes, check_angles, cos_sin, dot, local_from_uvd, uvd_from_local, view_id
+from map3d.types import DEPTH_UNIT_M, MAX_LEVEL, Box, Layer, TileId, Vec3, ViewAngles
+
+GROWTH = 1.05
+MIN_GROWTH_Z_M = 100.0
+ROOM_IN_FRONT_M = 1000.0
+NO_DEPTH = 0xFFFFFFFF
+
+
+@dataclass(frozen=True)
+class PinnedFrame:
+    """The square [u0, u0 + size] × [v0 − size, v0] of a view's plane and the depth d0 from which depths count; metres. It never moves."""
+
+    angles: ViewAngles
+    u0_m: float
+    v0_m: float
+    d0_m: float
+    size_m: float
+    tile_px: int
+    zmax: int
+
+    @property
+    def id(self) -> str:
+        return view_id(self.angles)
+
+    @cached_property
+    def axes(self) -> Axes:
+        return axes(self.angles)
+
+    def pixel_m(self, z: int) -> float:
+        """Side of a pixel of level z."""
+        return self.size_m / (self.tile_px * 2.0**z)
+
+    def uv_from_pixel(self, tile: TileId, i: ArrayLike, j: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(U, V) of the centres of pixels (i, j) of a tile; i, j may be arrays, and real numbers: i + ½ is the pixel's right edge."""
+        pixel_m = self.pixel_m(tile.z)
+        u = self.u0_m + (tile.x * self.tile_px + np.asarray(i, dtype=np.float64) + 0.5) * pixel_m
+        v = self.v0_m - (tile.y * self.tile_px + np.asarray(j, dtype=np.float64) + 0.5) * pixel_m
+        return u, v
+
+    def level_pixel_from_uv(self, z: int, u: ArrayLike, v: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Real pixel coordinates of level z from its top left corner: [k, k + 1) is pixel k of the whole level."""
+        pixel_m = self.pixel_m(z)
+        return (np.asarray(u, dtype=np.float64) - self.u0_m) / pixel_m, (self.v0_m - np.asarray(v, dtype=np.float64)) / pixel_m
+
+    def pixel_from_uv(self, z: int, u: float, v: float) -> tuple[TileId, int, int]:
+        """The tile of level z and its pixel (i, j) that hold (U, V); raises OutsideFrame beyond the pinned square."""
+        px, py = self.level_pixel_from_uv(z, u, v)
+        column, row = math.floor(px), math.floor(py)
+        side = self.tile_px * 2**z
+        if not (0 <= column < side and 0 <= row < side):
+            raise OutsideFrame(f"view {self.id}: U {u:.3f}, V {v:.3f} m lies outside the pinned square of side {self.size_m:g} m")
+        return TileId(z, column // self.tile_px, row // self.tile_px), column % self.tile_px, row % self.tile_px
+
+    def local_from_pixel(self, tile: TileId, i: ArrayLike, j: ArrayLike, depth: ArrayLike) -> NDArray[np.float64]:
+        """(..., 3) local positions of pixels (i, j) with stored depths (units of 2^-10 m from D0); NaN where there is nothing."""
+        u, v = self.uv_from_pixel(tile, i, j)
+        units = np.asarray(depth, dtype=np.float64)
+        d = np.where(units == NO_DEPTH, np.nan, self.d0_m + units * DEPTH_UNIT_M)
+        return local_from_uvd(self.axes, np.stack(np.broadcast_arrays(u, v, d), axis=-1))
+
+    def level_pixel_from_local(self, z: int, local: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """(px, py) as of `level_pixel_from_uv` and the real depth from D0 in units of 2^-10 m, of (..., 3) local positions."""
+        uvd = uvd_from_local(self.axes, local)
+        px, py = self.level_pixel_from_uv(z, uvd[..., 0], uvd[..., 1])
+        return px, py, (uvd[..., 2] - self.d0_m) / DEPTH_UNIT_M
+
+    def check_holds(self, box: Box) -> None:
+        """Raises OutsideFrame unless the local box lies inside the square and in front of the farthest depth that can be stored."""
+        uvd = uvd_from_local(self.axes, corners(box))
+        low, high = uvd.min(axis=0), uvd.max(axis=0)
+        inside = low[0] >= self.u0_m and high[0] <= self.u0_m + self.size_m and low[1] >= self.v0_m - self.size_m and high[1] <= self.v0_m
+        if not (inside and low[2] >= self.d0_m and (high[2] - self.d0_m) / DEPTH_UNIT_M < NO_DEPTH):
+            raise OutsideFrame(
+                f"view {self.id}: content in the local box {box[0]} to {box[1]} leaves the pinned square of side {self.size_m:g} m; "
+                "give --regrid to pin the frame anew and render everything again"
+            )
+
+    def to_json(self, layers: Sequence[Layer] = ()) -> dict[str, Any]:
+        """The frame as the compiled core reads it."""
+        return {
+            "look_at_deg": self.angles.look_at_deg,
+            "pitch_deg": self.angles.pitch_deg,
+            "u0_m": self.u0_m,
+            "v0_m": self.v0_m,
+            "d0_m": self.d0_m,
+            "size_m": self.size_m,
+            "tile_px": self.tile_px,
+            "zmax": self.zmax,
+            "layers": [_layer_json(layer) for layer in layers],
+        }
+
+
+def pin(box: Box, tile_px: int, res_m: float, views: Iterable[ViewAngles]) -> list[PinnedFrame]:
+    """Frames for a scene's local box, one per view, all of one size; raises BadRequest, LimitExceeded.
+
+    `res_m` is the side of a pixel of the deepest level.
+    """
+    angles = [check_angles(view) for view in views]
+    _check_request(box, tile_px, res_m, angles)
+    _, half = _grown(box)
+    zmax = _least_level(_extent(half, angles), tile_px * res_m)
+    return [_frame(box, view, tile_px * res_m * 2.0**zmax, tile_px, zmax) for view in angles]
+
+
+def pin_beside(frame: PinnedFrame, box: Box, angles: ViewAngles) -> PinnedFrame:
+    """The frame of a view that joins a rendering: it takes over size, levels and tile size. `box` is the one of the rendering's creation."""
+    added = _frame(box, check_angles(angles), frame.size_m, frame.tile_px, frame.zmax)
+    added.check_holds(box)
+    return added
+
+
+def corners(box: Box) -> NDArray[np.float64]:
+    """(8, 3) corners."""
+    lo, hi = box
+    return np.array([(x, y, z) for x in (lo[0], hi[0]) for y in (lo[1], hi[1]) for z in (lo[2], hi[2])], dtype=np.float64)
+
+
+def _frame(box: Box, angles: ViewAngles, size_m: float, tile_px: int, zmax: int) -> PinnedFrame:
+    centre, half = _grown(box)
+    right, up, forward = axes(angles)
+    half_diagonal = math.sqrt(half[0] ** 2 + half[1] ** 2 + half[2] ** 2)
+    return PinnedFrame(
+        angles=angles,
+        u0_m=dot(right, centre) - size_m / 2,
+        v0_m=dot(up, centre) + size_m / 2,
+        d0_m=dot(forward, centre) - half_diagonal - ROOM_IN_FRONT_M,
+        size_m=size_m,
+        tile_px=tile_px,
+        zmax=zmax,
+    )
+
+
+def _grown(box: Box) -> tuple[Vec3, Vec3]:
+    """Centre and half extents of the grown box."""
+    lo, hi = box
+    x, y, z = ((high - low) / 2 * GROWTH for low, high in zip(lo, hi, strict=True))
+    centre = ((lo[0] + hi[0]) / 2, (lo[1] + hi[1]) / 2, (lo[2] + hi[2]) / 2)
+    return centre, (x, y, max(z, (hi[2] - lo[2]) / 2 + MIN_GROWTH_Z_M))
+
+
+def _extent(half: Vec3, views: Sequence[ViewAngles]) -> float:
+    """The largest extent of the projected grown box over all horizontal directions and the pitches given."""
+    flat = math.hypot(half[0], half[1])
+    extents = [2 * flat]
+    for view in views:
+        cos_p, sin_p = cos_sin(view.pitch_deg)
+        extents.append(2 * (sin_p * flat + cos_p * half[2]))
+    return max(extents)
+
+
+def _least_level(extent_m: float, tile_m: float) -> int:
+    for z in range(MAX_LEVEL + 1):
+        if tile_m * 2.0**z >= extent_m:
+            return z
+    raise LimitExceeded(
+        f"a square of {extent_m:g} m at tiles of {tile_m:g} m needs more than {MAX_LEVEL} levels, the most there are; choose a coarser resolution"
+    )
+
+
+def _check_request(box: Box, tile_px: int, res_m: float, angles: Sequence[ViewAngles]) -> None:
+    if not angles:
+        raise BadRequest("a rendering needs at least one view")
+    if len(set(angles)) != len(angles):
+        raise BadRequest("a view is named twice")
+    if tile_px not in (128, 256, 512, 1024, 2048):
+        raise BadRequest(f"tile size {tile_px} px: must be one of 128, 256, 512, 1024, 2048")
+    if not (math.isfinite(res_m) and res_m > 0):
+        raise BadRequest(f"resolution {res_m} m: must be a positive number of metres a pixel")
+    if not all(math.isfinite(low) and math.isfinite(high) and low <= high for low, high in zip(*box, strict=True)):
+        raise BadRequest(f"box {box[0]} to {box[1]}: not a box; the scene has no content?")
+
+
+def _layer_json(layer: Layer) -> dict[str, Any]:
+    row: dict[str, Any] = {"kind": layer.kind, "format": layer.format}
+    return row if layer.quality is None else {**row, "quality": layer.quality}

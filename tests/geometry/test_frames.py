@@ -1,0 +1,126 @@
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from map3d.errors import BadRequest, LimitExceeded, OutsideFrame
+from map3d.geometry.frames import NO_DEPTH, corners, pin, pin_beside
+from map3d.geometry.views import uvd_from_local
+from map3d.types import Layer, TileId, ViewAngles
+
+VECTORS = Path(__file__).parents[2] / "spec" / "vectors"
+FRAMES = json.loads((VECTORS / "frames.json").read_text())
+TILES = json.loads((VECTORS / "tiles.json").read_text())
+BOX = ((-120.0, -80.0, 0.0), (130.0, 90.0, 22.5))
+
+
+def pinned(row):
+    lo, hi = (tuple(corner) for corner in row["box"])
+    return pin((lo, hi), row["tile_px"], row["res_m"], [ViewAngles(*view) for view in row["views_deg"]])
+
+
+@pytest.mark.parametrize("row", FRAMES)
+def test_frames_follow_the_vectors(row):
+    for got, expected in zip(pinned(row), row["pinned"]["views"], strict=True):
+        assert (got.zmax, got.size_m) == (row["pinned"]["zmax"], row["pinned"]["size_m"])
+        assert got.id == expected["id"]
+        assert (got.u0_m, got.v0_m, got.d0_m) == (expected["u0_m"], expected["v0_m"], expected["d0_m"])
+
+
+@pytest.mark.parametrize("row", TILES["rows"])
+def test_pixel_centres_follow_the_vectors(row):
+    frame = pinned(FRAMES[0])[TILES["view"]]
+    u, v = frame.uv_from_pixel(TileId(*row["tile"]), *row["pixel"])
+    assert (float(u), float(v)) == (row["u"], row["v"])
+
+
+@pytest.mark.parametrize("row", TILES["rows"])
+def test_a_pixels_centre_lies_in_that_pixel(row):
+    frame = pinned(FRAMES[0])[TILES["view"]]
+    tile = TileId(*row["tile"])
+    u, v = frame.uv_from_pixel(tile, *row["pixel"])
+    assert frame.pixel_from_uv(tile.z, float(u), float(v)) == (tile, *row["pixel"])
+
+
+def test_a_pixel_and_its_depth_give_back_the_local_position():
+    frame = pin(BOX, 256, 0.2, [ViewAngles(37.5, 30)])[0]
+    local = np.random.default_rng(2).uniform(BOX[0], BOX[1], (100, 3))
+    px, py, depth = frame.level_pixel_from_local(frame.zmax, local)
+    back = frame.local_from_pixel(TileId(frame.zmax, 0, 0), px - 0.5, py - 0.5, depth)
+    np.testing.assert_allclose(back, local, atol=1e-8)
+
+
+def test_nothing_has_no_position():
+    frame = pin(BOX, 256, 0.2, [ViewAngles(0, 45)])[0]
+    assert np.isnan(frame.local_from_pixel(TileId(0, 0, 0), [3], [4], [NO_DEPTH])).all()
+
+
+@pytest.mark.parametrize("box", [((0.0,) * 3, (0.0,) * 3), ((-1e5, -2e5, -100.0), (1e5, 2e5, 5000.0)), ((5.0, 5.0, 700.0), (6.0, 5.0, 700.0))])
+def test_every_view_holds_the_box_with_a_kilometre_in_front(box):
+    for frame in pin(box, 256, 1.0, [ViewAngles(a, p) for a in (0, 33, 45, 200) for p in (5, 45, 90)]):
+        frame.check_holds(box)
+        nearest = uvd_from_local(frame.axes, corners(box))[:, 2].min()
+        assert nearest - frame.d0_m >= 1000
+
+
+def test_the_square_is_the_smallest_of_its_kind():
+    frame = pin(BOX, 256, 0.2, [ViewAngles(0, 45)])[0]
+    assert frame.size_m == 256 * 0.2 * 2**frame.zmax
+    flat = math.hypot(125 * 1.05, 85 * 1.05)
+    assert frame.size_m / 2 < max(2 * flat, 2 * (math.sin(math.pi / 4) * flat + math.cos(math.pi / 4) * 111.25)) <= frame.size_m
+
+
+def test_content_outside_names_regrid():
+    frame = pin(BOX, 256, 0.2, [ViewAngles(0, 45)])[0]
+    with pytest.raises(OutsideFrame, match="--regrid"):
+        frame.check_holds(((-120.0, -80.0, 0.0), (130.0, 9000.0, 22.5)))
+    with pytest.raises(OutsideFrame, match="pinned square"):
+        frame.pixel_from_uv(0, frame.u0_m - 1, frame.v0_m - 1)
+
+
+def test_content_nearer_than_depth_zero_is_outside():
+    frame = pin(BOX, 256, 100.0, [ViewAngles(0, 90)])[0]
+    with pytest.raises(OutsideFrame):
+        frame.check_holds(((0.0, 0.0, 0.0), (1.0, 1.0, 3000.0)))
+
+
+def test_a_view_that_joins_takes_over_the_size():
+    first = pin(BOX, 256, 0.2, [ViewAngles(0, 45)])[0]
+    both = pin(BOX, 256, 0.2, [ViewAngles(0, 45), ViewAngles(90, 45)])
+    assert pin_beside(first, BOX, ViewAngles(90, 45)) == both[1]
+
+
+@pytest.mark.parametrize(
+    ("tile_px", "res_m", "views"),
+    [
+        (256, 0.0, [(0, 45)]),
+        (256, math.nan, [(0, 45)]),
+        (0, 1.0, [(0, 45)]),
+        (300, 1.0, [(0, 45)]),
+        (256, 1.0, []),
+        (256, 1.0, [(0, 45), (0.0, 45.0)]),
+    ],
+)
+def test_requests_without_meaning_are_refused(tile_px, res_m, views):
+    with pytest.raises(BadRequest):
+        pin(BOX, tile_px, res_m, [ViewAngles(*view) for view in views])
+
+
+@pytest.mark.parametrize("box", [((0, 0, 0), (-1, 1, 1)), ((0, 0, math.nan), (1, 1, 1)), ((math.inf,) * 3, (-math.inf,) * 3)])
+def test_a_box_that_is_none_is_refused(box):
+    with pytest.raises(BadRequest):
+        pin(box, 256, 1.0, [ViewAngles(0, 45)])
+
+
+def test_more_than_26_levels_are_refused():
+    with pytest.raises(LimitExceeded, match="26"):
+        pin(((0, 0, 0), (1e8, 1e8, 1)), 256, 1e-3, [ViewAngles(0, 45)])
+
+
+def test_the_cores_frame_names_its_layers():
+    frame = pin(BOX, 256, 0.2, [ViewAngles(0, 45)])[0]
+    got = frame.to_json([Layer("color", "color", "webp", 80), Layer("id", "id", "png")])
+    assert got["layers"] == [{"kind": "color", "format": "webp", "quality": 80}, {"kind": "id", "format": "png"}]
+    assert (got["look_at_deg"], got["zmax"], got["size_m"]) == (0, frame.zmax, frame.size_m)
