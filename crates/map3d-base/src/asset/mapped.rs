@@ -1,0 +1,107 @@
+//! Reads `mesh.m3a` as it lies on disk.
+
+use std::path::{Path, PathBuf};
+
+use memmap2::Mmap;
+
+use crate::error::{Error, Result};
+use crate::file::{self, HEADER_BYTES, aligned};
+use crate::vec3::Vec3;
+
+pub(super) const MAGIC: &[u8; 4] = b"M3DA";
+pub(super) const VERSION: u32 = 1;
+pub(super) const FLAG_NORMALS: u32 = 1;
+pub(super) const SECTIONS: [&str; 8] = ["positions", "triangles", "uvs", "normals", "material", "object", "rank", "prototype"];
+
+/// A mapped asset mesh; every index has been checked.
+pub struct AssetMesh {
+    path: PathBuf,
+    map: Mmap,
+    vertices: usize,
+    triangles: usize,
+    /// Byte offset of each of `SECTIONS`; `normals` may be absent.
+    offsets: [Option<usize>; 8],
+}
+
+impl AssetMesh {
+    /// Maps and validates a `mesh.m3a`, its checksum too.
+    pub fn open(path: &Path) -> Result<Self> {
+        let map = file::map(path)?;
+        file::check_header(path, &map, MAGIC, VERSION, true)?;
+        let count = |at: usize| usize::try_from(u64::from_le_bytes(map[at..at + 8].try_into().expect("8 bytes")));
+        let (Ok(vertices), Ok(triangles)) = (count(16), count(24)) else {
+            return Err(Error::format(path, "counts are too large"));
+        };
+        let flags = u32::from_le_bytes(map[32..36].try_into().expect("4 bytes"));
+        let sizes = [24, 12, 24, 36, 4, 4, 1, 4];
+        let mut offsets = [None; 8];
+        let mut at = HEADER_BYTES;
+        for (k, size) in sizes.into_iter().enumerate() {
+            if k == 3 && flags & FLAG_NORMALS == 0 {
+                continue;
+            }
+            let n = if k == 0 { vertices } else { triangles };
+            let bytes = n.checked_mul(size).filter(|b| *b <= map.len()).ok_or_else(|| Error::format(path, "truncated"))?;
+            offsets[k] = Some(at);
+            at += aligned(bytes);
+        }
+        if at != map.len() {
+            return Err(Error::format(path, format!("{} bytes, expected {at}", map.len())));
+        }
+        let mesh = Self { path: path.to_path_buf(), map, vertices, triangles, offsets };
+        mesh.validate()?;
+        Ok(mesh)
+    }
+
+    fn validate(&self) -> Result<()> {
+        let bad = self.triangles().as_flattened().iter().find(|v| **v as usize >= self.vertices);
+        if let Some(v) = bad {
+            return Err(Error::format(&self.path, format!("vertex {v} of {}", self.vertices)));
+        }
+        if !self.positions().as_flattened().iter().all(|v| v.is_finite()) {
+            return Err(Error::format(&self.path, "a coordinate is not a finite number"));
+        }
+        Ok(())
+    }
+
+    fn part<T: bytemuck::Pod>(&self, k: usize, n: usize) -> &[T] {
+        match self.offsets[k] {
+            Some(at) => bytemuck::cast_slice(&self.map[at..at + n * size_of::<T>()]),
+            None => &[],
+        }
+    }
+
+    /// World coordinates (a prototype's vertices: its own frame).
+    pub fn positions(&self) -> &[Vec3] {
+        self.part(0, self.vertices)
+    }
+
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        self.part(1, self.triangles)
+    }
+
+    pub fn uvs(&self) -> &[[[f32; 2]; 3]] {
+        self.part(2, self.triangles)
+    }
+
+    /// Empty when the asset has none; zeros where a triangle has none.
+    pub fn normals(&self) -> &[[[f32; 3]; 3]] {
+        self.part(3, if self.offsets[3].is_some() { self.triangles } else { 0 })
+    }
+
+    pub fn materials(&self) -> &[u32] {
+        self.part(4, self.triangles)
+    }
+
+    pub fn objects(&self) -> &[u32] {
+        self.part(5, self.triangles)
+    }
+
+    pub fn ranks(&self) -> &[u8] {
+        self.part(6, self.triangles)
+    }
+
+    pub fn prototypes(&self) -> &[u32] {
+        self.part(7, self.triangles)
+    }
+}

@@ -1,0 +1,38 @@
+//! One error type for the whole core; each leaf says what, where, got and expected.
+
+use std::path::{Path, PathBuf};
+
+pub type Result<T> = std::result::Result<T, Error>;
+
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A file is not what it claims to be.
+    #[error("{path}: {what}")]
+    Format { path: PathBuf, what: String },
+    /// A limit was met; raise it by name if the data are honest.
+    #[error("{path}: {what} is {got}, over the limit {limit} = {value}")]
+    Limit { path: PathBuf, what: &'static str, got: u64, limit: &'static str, value: u64 },
+    /// A caller's misuse.
+    #[error("{0}")]
+    Argument(String),
+    /// Reading or writing failed.
+    #[error("{path}: {source}")]
+    Storage { path: PathBuf, source: std::io::Error },
+    /// A callback asked to stop; what is finished stays.
+    #[error("interrupted; what is finished stays")]
+    Interrupted,
+}
+
+impl Error {
+    pub fn format(path: impl AsRef<Path>, what: impl Into<String>) -> Self {
+        Self::Format { path: path.as_ref().to_path_buf(), what: what.into() }
+    }
+
+    pub fn storage(path: impl AsRef<Path>, source: std::io::Error) -> Self {
+        Self::Storage { path: path.as_ref().to_path_buf(), source }
+    }
+
+    pub fn argument(what: impl Into<String>) -> Self {
+        Self::Argument(what.into())
+    }
+}

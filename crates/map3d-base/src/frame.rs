@@ -1,0 +1,103 @@
+//! The pinned frame of a view (spec/pyramid.md §2) as the core receives it.
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Result};
+use crate::tile::{MAX_LEVEL, Tile};
+use crate::vec3::Vec3;
+use crate::view::ViewAxes;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LayerKind {
+    Color,
+    Normal,
+    Id,
+    Depth,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LayerFormat {
+    Webp,
+    Png,
+    Jpeg,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LayerSpec {
+    pub kind: LayerKind,
+    pub format: LayerFormat,
+    /// For lossy formats, 1..=100.
+    #[serde(default = "default_quality")]
+    pub quality: u8,
+}
+
+fn default_quality() -> u8 {
+    80
+}
+
+/// One view's square, pinned when the rendering was created. Local metres.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Frame {
+    pub look_at_deg: f64,
+    pub pitch_deg: f64,
+    pub u0_m: f64,
+    pub v0_m: f64,
+    pub d0_m: f64,
+    pub size_m: f64,
+    pub tile_px: u32,
+    pub zmax: u8,
+    #[serde(default)]
+    pub layers: Vec<LayerSpec>,
+}
+
+impl Frame {
+    /// Parses and checks a frame given as JSON.
+    pub fn from_json(text: &str) -> Result<Self> {
+        let frame: Self = serde_json::from_str(text).map_err(|e| Error::argument(format!("frame: {e}")))?;
+        frame.validate()?;
+        Ok(frame)
+    }
+
+    pub fn validate(&self) -> Result<()> {
+        let numbers = [self.look_at_deg, self.pitch_deg, self.u0_m, self.v0_m, self.d0_m, self.size_m];
+        if !numbers.iter().all(|v| v.is_finite()) || self.size_m <= 0.0 {
+            return Err(Error::argument("frame: numbers must be finite and size_m > 0"));
+        }
+        if !(self.pitch_deg > 0.0 && self.pitch_deg <= 90.0) {
+            return Err(Error::argument(format!("frame: pitch_deg is {}, expected 0 < pitch <= 90", self.pitch_deg)));
+        }
+        if !matches!(self.tile_px, 256 | 512) {
+            return Err(Error::argument(format!("frame: tile_px is {}, expected 256 or 512", self.tile_px)));
+        }
+        if self.zmax > MAX_LEVEL {
+            return Err(Error::argument(format!("frame: zmax is {}, at most {MAX_LEVEL}", self.zmax)));
+        }
+        Ok(())
+    }
+
+    pub fn axes(&self) -> ViewAxes {
+        ViewAxes::new(self.look_at_deg, self.pitch_deg)
+    }
+
+    /// Side of a pixel of a level in metres.
+    pub fn pixel_m(&self, z: u8) -> f64 {
+        self.size_m / (f64::from(self.tile_px) * f64::from(2u32.pow(u32::from(z))))
+    }
+
+    /// Pixel coordinates of level zmax (right, down, from the square's top left corner) and depth units from D0 of a local point.
+    pub fn pixel_from_local(&self, axes: &ViewAxes, p: Vec3) -> Vec3 {
+        let [u, v, d] = axes.uvd_from_local(p);
+        let pixel = self.pixel_m(self.zmax);
+        [(u - self.u0_m) / pixel, (self.v0_m - v) / pixel, (d - self.d0_m) * crate::DEPTH_UNITS_PER_M]
+    }
+
+    /// View coordinates (U, V) of the centre of pixel (i, j) of a tile.
+    pub fn uv_of_pixel(&self, tile: Tile, i: u32, j: u32) -> (f64, f64) {
+        let px = self.pixel_m(tile.z);
+        let column = f64::from(tile.x) * f64::from(self.tile_px) + f64::from(i) + 0.5;
+        let row = f64::from(tile.y) * f64::from(self.tile_px) + f64::from(j) + 0.5;
+        (self.u0_m + column * px, self.v0_m - row * px)
+    }
+}

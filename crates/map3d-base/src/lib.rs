@@ -1,0 +1,23 @@
+//! What every part of map3d agrees on: vectors, view frames, tile names, sample positions, asset files, errors.
+//! The pages of `spec/` are the source; this crate does no tracing and knows no image format.
+
+pub mod asset;
+pub mod error;
+pub mod file;
+pub mod frame;
+pub mod samples;
+pub mod tile;
+pub mod vec3;
+pub mod view;
+
+pub use error::{Error, Result};
+pub use frame::{Frame, LayerFormat, LayerKind, LayerSpec};
+pub use vec3::{Box3, Vec3};
+pub use view::ViewAxes;
+
+/// Depth units per metre: depth is stored in 2^-10 m.
+pub const DEPTH_UNITS_PER_M: f64 = 1024.0;
+/// Stored depth where there is nothing.
+pub const DEPTH_NOTHING: u32 = u32::MAX;
+/// Raised only when rendered bytes change.
+pub const RENDER_FORMAT: u32 = 1;

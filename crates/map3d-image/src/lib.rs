@@ -1,0 +1,1 @@
+//! Images: textures in mip pages, G-buffers, pyramid reduction, encoding.

@@ -1,0 +1,1 @@
+//! Readers: source documents to batches of triangles.

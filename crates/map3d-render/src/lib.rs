@@ -1,0 +1,1 @@
+//! Rendering: beams shaded to G-buffers, reduced and encoded as blocks.

@@ -1,0 +1,1 @@
+//! Scenes: assets to chunks with a BVH, memory-mapped.

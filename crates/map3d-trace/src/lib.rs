@@ -1,0 +1,1 @@
+//! Tracing: beams and rays through the chunks of a scene.

@@ -1,0 +1,42 @@
+/** What a listener gets: the event's own fields, its name and who fired it. */
+export type Fired<T> = T & { type: string; target: unknown };
+export type Listener<T> = (event: Fired<T>) => void;
+
+/** An event source. `E` maps event names to the fields of the event. Methods return `this`. */
+export class Evented<E extends object> {
+  readonly #listeners = new Map<keyof E, Map<unknown, Listener<never>>>();
+
+  on<K extends keyof E>(type: K, listener: Listener<E[K]>): this {
+    return this.#add(type, listener, listener);
+  }
+
+  once<K extends keyof E>(type: K, listener: Listener<E[K]>): this {
+    return this.#add(type, listener, (event: Fired<E[K]>) => {
+      this.off(type, listener);
+      listener(event);
+    });
+  }
+
+  /** Without a listener: all listeners of that type. */
+  off<K extends keyof E>(type: K, listener?: Listener<E[K]>): this {
+    if (listener) this.#listeners.get(type)?.delete(listener);
+    else this.#listeners.delete(type);
+    return this;
+  }
+
+  fire<K extends keyof E>(type: K, fields: E[K]): this {
+    const event = { ...fields, type: String(type), target: this };
+    for (const listener of [...(this.#listeners.get(type)?.values() ?? [])]) (listener as Listener<E[K]>)(event);
+    return this;
+  }
+
+  listens(type: keyof E): boolean {
+    return (this.#listeners.get(type)?.size ?? 0) > 0;
+  }
+
+  #add<K extends keyof E>(type: K, handle: unknown, call: Listener<E[K]>): this {
+    const listeners = this.#listeners.get(type) ?? new Map<unknown, Listener<never>>();
+    this.#listeners.set(type, listeners.set(handle, call as Listener<never>));
+    return this;
+  }
+}

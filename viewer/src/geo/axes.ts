@@ -1,0 +1,50 @@
+import { dot, type Vec3 } from "../core/vec";
+
+/** The axes of a view in local coordinates: right, up, forward (away from the viewer). Orthonormal. */
+export interface Axes {
+  readonly right: Vec3;
+  readonly up: Vec3;
+  readonly forward: Vec3;
+}
+
+const EXACT: Record<number, Vec2> = { 0: [1, 0], 90: [0, 1], 180: [-1, 0], 270: [0, -1] };
+const HALF_SIN: Record<number, number> = { 30: 0.5, 150: 0.5, 210: -0.5, 330: -0.5 };
+const HALF_COS: Record<number, number> = { 60: 0.5, 300: 0.5, 120: -0.5, 240: -0.5 };
+type Vec2 = readonly [number, number];
+
+/** (cos, sin) of degrees; exact at multiples of 90° and where one of them is one half. */
+export function cosSin(deg: number): Vec2 {
+  const turn = ((deg % 360) + 360) % 360;
+  const rad = (turn * Math.PI) / 180;
+  return EXACT[turn] ?? [HALF_COS[turn] ?? Math.cos(rad), HALF_SIN[turn] ?? Math.sin(rad)];
+}
+
+/** Axes of look-at angle (counter-clockwise from north) and pitch (below the horizon). spec/pyramid.md §1. */
+export function axesOf(lookAtDeg: number, pitchDeg: number): Axes {
+  const [ca, sa] = cosSin(lookAtDeg);
+  const [cp, sp] = cosSin(pitchDeg);
+  return { right: [ca, sa, 0], up: [-sp * sa, sp * ca, cp], forward: [-cp * sa, cp * ca, -sp] };
+}
+
+/** Shortest decimal form, e.g. `45-22.5`. */
+export function viewId(lookAtDeg: number, pitchDeg: number): string {
+  return `${String(lookAtDeg)}-${String(pitchDeg)}`;
+}
+
+/** View coordinates U, V, D (metres) of a local point. */
+export function uvdFromLocal({ right, up, forward }: Axes, local: Vec3): Vec3 {
+  return [dot(right, local), dot(up, local), dot(forward, local)];
+}
+
+export function localFromUvd({ right, up, forward }: Axes, [u, v, d]: Vec3): Vec3 {
+  return [
+    u * right[0] + v * up[0] + d * forward[0],
+    u * right[1] + v * up[1] + d * forward[1],
+    u * right[2] + v * up[2] + d * forward[2],
+  ];
+}
+
+/** D of the point with these U and V whose local height is z; null when the view is level. */
+export function depthAtHeight({ up, forward }: Axes, v: number, z: number): number | null {
+  return Math.abs(forward[2]) < 1e-9 ? null : (z - v * up[2]) / forward[2];
+}

@@ -1,0 +1,89 @@
+import type { Vec2 } from "../core/vec";
+import { axesOf, type Axes } from "./axes";
+
+export interface Tile {
+  readonly z: number;
+  readonly x: number;
+  readonly y: number;
+}
+
+/** The pinned square of a view and its division into tiles. Metres, local frame of the rendering. */
+export interface Frame {
+  readonly id: string;
+  readonly lookAtDeg: number;
+  readonly pitchDeg: number;
+  readonly axes: Axes;
+  readonly u0: number;
+  readonly v0: number;
+  readonly d0: number;
+  /** Side of the square. */
+  readonly size: number;
+  readonly tilePx: number;
+  readonly zmax: number;
+}
+
+export interface FrameNumbers {
+  id: string;
+  look_at_deg: number;
+  pitch_deg: number;
+  u0_m: number;
+  v0_m: number;
+  d0_m: number;
+}
+
+export function frameOf(view: FrameNumbers, size: number, tilePx: number, zmax: number): Frame {
+  const axes = axesOf(view.look_at_deg, view.pitch_deg);
+  const { id, look_at_deg: lookAtDeg, pitch_deg: pitchDeg, u0_m: u0, v0_m: v0, d0_m: d0 } = view;
+  return { id, lookAtDeg, pitchDeg, axes, u0, v0, d0, size, tilePx, zmax };
+}
+
+/** Metres a pixel at level z (which may be fractional). */
+export const pixelM = (frame: Frame, z: number): number => frame.size / (frame.tilePx * 2 ** z);
+
+/** U and V of the centre of pixel (i, j) of a tile. */
+export function uvOfPixel(frame: Frame, tile: Tile, i: number, j: number): Vec2 {
+  const px = pixelM(frame, tile.z);
+  return [frame.u0 + (tile.x * frame.tilePx + i + 0.5) * px, frame.v0 - (tile.y * frame.tilePx + j + 0.5) * px];
+}
+
+/** The tile of level z and the pixel in it that hold (U, V); null outside the square. */
+export function pixelAt(frame: Frame, z: number, u: number, v: number): { tile: Tile; i: number; j: number } | null {
+  const px = pixelM(frame, z);
+  const [column, row, side] = [Math.floor((u - frame.u0) / px), Math.floor((frame.v0 - v) / px), frame.tilePx * 2 ** z];
+  if (!(column >= 0 && row >= 0 && column < side && row < side)) return null;
+  const [x, y] = [Math.floor(column / frame.tilePx), Math.floor(row / frame.tilePx)];
+  return { tile: { z, x, y }, i: column - x * frame.tilePx, j: row - y * frame.tilePx };
+}
+
+/** The ancestor `up` levels above. */
+export const ancestor = ({ z, x, y }: Tile, up: number): Tile => ({ z: z - up, x: Math.floor(x / 2 ** up), y: Math.floor(y / 2 ** up) });
+
+/** In the order TL, TR, BL, BR. */
+export function childrenOf({ z, x, y }: Tile): [Tile, Tile, Tile, Tile] {
+  const [x2, y2] = [2 * x, 2 * y];
+  return [
+    { z: z + 1, x: x2, y: y2 },
+    { z: z + 1, x: x2 + 1, y: y2 },
+    { z: z + 1, x: x2, y: y2 + 1 },
+    { z: z + 1, x: x2 + 1, y: y2 + 1 },
+  ];
+}
+
+/** Bits of x and y interleaved, x in the even bits; exact up to level 26. */
+export function morton(x: number, y: number): number {
+  let code = 0;
+  for (let bit = 0, place = 1; bit < 26; bit++, place *= 4) code += place * (((x >> bit) & 1) + 2 * ((y >> bit) & 1));
+  return code;
+}
+
+/** Root level of the block that holds the tiles of level z. spec/pyramid.md §8. */
+export function blockLevel(z: number, zmax: number): number {
+  let root = Math.max(zmax - 3, 0);
+  while (z < root) root = Math.max(root - 3, 0);
+  return root;
+}
+
+/** The block's root tile. */
+export const blockOf = (tile: Tile, zmax: number): Tile => ancestor(tile, tile.z - blockLevel(tile.z, zmax));
+
+export const tileName = ({ z, x, y }: Tile): string => `${String(z)}/${String(x)}/${String(y)}`;

@@ -1,0 +1,120 @@
+import { ManifestError } from "../core/errors";
+import type { Box3, Vec3 } from "../core/vec";
+import { blockOf, frameOf, tileName, type Frame, type FrameNumbers, type Tile } from "./frame";
+import { Occupancy } from "./occupancy";
+
+export type LayerKind = "color" | "normal" | "id" | "depth";
+
+export interface LayerInfo {
+  readonly name: string;
+  readonly kind: string;
+  readonly format: string;
+  readonly media_type: string;
+  readonly unit_m?: number;
+}
+
+interface ViewJson extends FrameNumbers {
+  occupancy: string;
+  version: number;
+  versions?: Record<string, number>;
+  archives?: Record<string, string>;
+}
+
+/** rendering.json as sent: spec/manifest.md. */
+export interface ManifestJson {
+  map3d: string;
+  version: number;
+  name: string;
+  title: string;
+  attribution: string;
+  content_version: number;
+  complete: boolean;
+  crs: { epsg: number | null; wkt: string | null; name: string; vertical: string | null };
+  origin: Vec3;
+  box: Box3;
+  start?: { local: Vec3 };
+  tile_px: number;
+  zmax: number;
+  size_m: number;
+  layers: LayerInfo[];
+  views: ViewJson[];
+  objects?: { count: number; shard_size: number; shards: string; search: string };
+}
+
+/** A view of a rendering: its frame, what is occupied, versions of its blocks. */
+export interface View {
+  readonly id: string;
+  readonly frame: Frame;
+  readonly occupancy: Occupancy;
+  readonly archives: Readonly<Record<string, string>> | undefined;
+  /** The version of the block that holds the tile. */
+  versionOf(tile: Tile): number;
+}
+
+/** A manifest that has been checked. */
+export interface Rendering {
+  readonly json: ManifestJson;
+  readonly views: ReadonlyMap<string, View>;
+  /** First layer of each kind. */
+  readonly layers: ReadonlyMap<string, LayerInfo>;
+}
+
+const READS = 1;
+
+/** @throws ManifestError naming the file, what was expected and what came. */
+export function readManifest(value: unknown, where: string): Rendering {
+  const json = checked(value, where);
+  const views = new Map(json.views.map((view) => [view.id, viewOf(view, json)]));
+  const layers = new Map([...json.layers].reverse().map((layer) => [layer.kind, layer]));
+  return { json, views, layers };
+}
+
+function viewOf(view: ViewJson, json: ManifestJson): View {
+  const versions = view.versions ?? {};
+  return {
+    id: view.id,
+    frame: frameOf(view, json.size_m, json.tile_px, json.zmax),
+    occupancy: new Occupancy(view.occupancy, json.zmax),
+    archives: view.archives,
+    versionOf: (tile) => versions[tileName(blockOf(tile, json.zmax))] ?? view.version,
+  };
+}
+
+function checked(value: unknown, where: string): ManifestJson {
+  const json = value as Partial<ManifestJson> | null;
+  const refuse = (why: string): never => {
+    throw new ManifestError(`${where}: ${why}`);
+  };
+  if (!json || typeof json !== "object" || json.map3d !== "rendering") return refuse('is no rendering.json ("map3d": "rendering" is missing)');
+  if (json.version !== READS) return refuse(`has version ${String(json.version)}, this viewer reads version ${String(READS)}; take the viewer of the same release`);
+  const wrong = FIELDS.find(([name, ok]) => !ok(json[name]));
+  if (wrong) return refuse(`field "${wrong[0]}" is missing or malformed, got ${String(JSON.stringify(json[wrong[0]])).slice(0, 80)}`);
+  const full = json as ManifestJson;
+  const odd = full.views.find((view) => !viewOk(view));
+  if (odd) return refuse(`view ${String(JSON.stringify(odd.id))} lacks its frame or occupancy`);
+  return full;
+}
+
+const isNumber = (v: unknown): boolean => typeof v === "number" && Number.isFinite(v);
+const isPoint = (v: unknown): boolean => Array.isArray(v) && v.length === 3 && v.every(isNumber);
+const isLevel = (v: unknown): boolean => Number.isInteger(v) && Number(v) >= 0 && Number(v) <= 26;
+
+const FIELDS: [keyof ManifestJson, (v: unknown) => boolean][] = [
+  ["origin", isPoint],
+  ["box", (v) => Array.isArray(v) && v.length === 2 && v.every(isPoint)],
+  ["tile_px", (v) => Number.isInteger(v) && Number(v) > 0 && Number(v) <= 4096],
+  ["zmax", isLevel],
+  ["size_m", (v) => isNumber(v) && Number(v) > 0],
+  ["layers", (v) => Array.isArray(v) && v.length > 0 && v.every(layerOk)],
+  ["views", (v) => Array.isArray(v) && v.length > 0],
+];
+
+function layerOk(value: unknown): boolean {
+  const layer = value as Partial<LayerInfo> | null;
+  return typeof layer?.name === "string" && typeof layer.kind === "string" && typeof layer.format === "string";
+}
+
+function viewOk(view: Partial<ViewJson>): boolean {
+  const numbers = [view.look_at_deg, view.pitch_deg, view.u0_m, view.v0_m, view.d0_m, view.version];
+  return typeof view.id === "string" && typeof view.occupancy === "string" && numbers.every(isNumber);
+}
