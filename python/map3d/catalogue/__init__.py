@@ -1,0 +1,33 @@
+"""The catalogue: scenes, assets, renderings and jobs (spec/catalogue.md). One contract, homes beside it."""
+
+from map3d.catalogue.contract import HEARTBEAT_S, LEASE_S, Catalogue
+from map3d.catalogue.records import (
+    AssetRecord,
+    Job,
+    JobResult,
+    Lease,
+    PlannedJob,
+    PlanOutcome,
+    RenderingRecord,
+    SceneCrs,
+    SceneRecord,
+)
+from map3d.catalogue.states import State
+from map3d.catalogue.workspace import Workspace
+
+__all__ = [
+    "HEARTBEAT_S",
+    "LEASE_S",
+    "AssetRecord",
+    "Catalogue",
+    "Job",
+    "JobResult",
+    "Lease",
+    "PlanOutcome",
+    "PlannedJob",
+    "RenderingRecord",
+    "SceneCrs",
+    "SceneRecord",
+    "State",
+    "Workspace",
+]

@@ -1,0 +1,156 @@
+"""What the catalogue keeps, as plain values."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from map3d.catalogue.states import State
+from map3d.geometry.frames import PinnedFrame
+from map3d.types import BlockId, BlockKind, Box, Layer, Vec3
+
+LOCAL_CRS_NAME = "local metres"
+
+
+@dataclass(frozen=True)
+class SceneCrs:
+    """A scene's coordinate system as the manifest names it. A local one has neither code nor WKT."""
+
+    epsg: int | None
+    wkt: str | None
+    name: str
+    vertical: str | None = None
+
+    @property
+    def is_local(self) -> bool:
+        return self.wkt is None
+
+
+@dataclass(frozen=True)
+class SceneRecord:
+    """`crs` and `origin` are None until pinned by `create-scene --crs` or the first asset; then they never change.
+
+    `built` is the fingerprint of what the scene index was built from, None before the first build.
+    """
+
+    name: str
+    title: str = ""
+    attribution: str = ""
+    crs: SceneCrs | None = None
+    origin: Vec3 | None = None
+    options: Mapping[str, Any] = field(default_factory=dict)
+    built: str | None = None
+
+
+@dataclass(frozen=True)
+class AssetRecord:
+    """One source document after import. `digest` covers the imported asset, `source_digest` the files it was made from."""
+
+    scene: str
+    name: str
+    source: str
+    format: str
+    digest: str
+    source_digest: str
+    report: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class RenderingRecord:
+    """A scene seen. `box` is the scene's local box that the frames were pinned from. All frames share size, levels and tile size.
+
+    `content_version` is that of the next tiles to change; `announced_version` the last one that a manifest told clients of, 0 before the first.
+    """
+
+    name: str
+    scene: str
+    res_m: float
+    layers: tuple[Layer, ...]
+    frames: tuple[PinnedFrame, ...]
+    box: Box
+    title: str = ""
+    attribution: str = ""
+    options: Mapping[str, Any] = field(default_factory=dict)
+    content_version: int = 1
+    announced_version: int = 0
+
+    @property
+    def tile_px(self) -> int:
+        return self.frames[0].tile_px
+
+    @property
+    def zmax(self) -> int:
+        return self.frames[0].zmax
+
+    @property
+    def size_m(self) -> float:
+        return self.frames[0].size_m
+
+    def frame(self, view: str) -> PinnedFrame | None:
+        return next((frame for frame in self.frames if frame.id == view), None)
+
+
+@dataclass(frozen=True)
+class PlannedJob:
+    """A block that should be there. `parent` is the reduce block that takes its seam, None at the top. `key` says what its bytes depend on."""
+
+    view: str
+    block: BlockId
+    kind: BlockKind
+    key: str
+    parent: BlockId | None
+
+
+@dataclass(frozen=True)
+class PlanOutcome:
+    """Counts of jobs by what planning did to them."""
+
+    added: int = 0
+    changed: int = 0
+    kept: int = 0
+
+
+@dataclass(frozen=True)
+class JobResult:
+    """What a done job leaves in the catalogue. `version`: the content version in which the block's bytes last changed; `tiles`: per layer."""
+
+    version: int
+    empty: bool
+    tiles: int = 0
+    base_tiles: int = 0
+    bytes: int = 0
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True)
+class Job:
+    """A job as it stands. `expires_s` is on the database's clock; `result` only when done once."""
+
+    rendering: str
+    view: str
+    block: BlockId
+    kind: BlockKind
+    key: str
+    state: State
+    attempts: int
+    fence: int
+    worker: str | None
+    expires_s: float | None
+    reason: str | None
+    result: JobResult | None
+
+
+@dataclass(frozen=True)
+class Lease:
+    """A worker's claim. Every later word about the job carries `fence`; `content_version` is what changed tiles are to be stamped with."""
+
+    rendering: str
+    view: str
+    block: BlockId
+    kind: BlockKind
+    key: str
+    fence: int
+    attempt: int
+    worker: str
+    content_version: int
+    earlier_version: int | None
+    """Version of the block's tiles when it was done before, else None."""
