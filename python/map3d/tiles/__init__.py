@@ -1,0 +1,1 @@
+"""Names of tiles and blocks, the tile store, occupancy and the manifest. Knows no scene."""

@@ -1,0 +1,142 @@
+"""Names of tiles and blocks (spec/pyramid.md §3 and §8): parents, children, Morton order, which block holds a tile."""
+
+from collections.abc import Iterable, Iterator
+from typing import Final, NamedTuple
+
+from map3d.errors import BadRequest
+from map3d.types import MAX_LEVEL, BlockId, BlockKind, TileId
+
+BLOCK_LEVELS: Final = 3
+"""Levels between the root of a base block and zmax, and between the roots of reduce blocks."""
+
+
+class BlockLevel(NamedTuple):
+    """All blocks whose roots lie at level `root`; each holds `levels` levels of tiles, the root's first."""
+
+    root: int
+    levels: int
+    kind: BlockKind
+
+
+def check_tile(tile: TileId) -> TileId:
+    """`tile` if it exists in a pyramid of 26 levels; raises BadRequest."""
+    z, x, y = tile
+    if not (0 <= z <= MAX_LEVEL and 0 <= x < 2**z and 0 <= y < 2**z):
+        raise BadRequest(f"tile {z}/{x}/{y}: need 0 ≤ z ≤ {MAX_LEVEL} and 0 ≤ x, y < 2^z")
+    return tile
+
+
+def parse_tile(z: str, x: str, y: str) -> TileId | None:
+    """The tile of three plain ASCII numbers without sign or leading zeros; None for anything else, and for tiles that cannot exist."""
+    level = _parse_number(z, 2)
+    column, row = _parse_number(x, 8), _parse_number(y, 8)
+    if level is None or column is None or row is None or level > MAX_LEVEL:
+        return None
+    return TileId(level, column, row) if max(column, row) < 1 << level else None
+
+
+def parent(tile: TileId) -> TileId | None:
+    """None above level 0."""
+    return TileId(tile.z - 1, tile.x // 2, tile.y // 2) if tile.z > 0 else None
+
+
+def children(tile: TileId) -> tuple[TileId, TileId, TileId, TileId]:
+    """Top left, top right, bottom left, bottom right."""
+    z, x, y = tile.z + 1, 2 * tile.x, 2 * tile.y
+    return TileId(z, x, y), TileId(z, x + 1, y), TileId(z, x, y + 1), TileId(z, x + 1, y + 1)
+
+
+def ancestor(tile: TileId, z: int) -> TileId:
+    """The tile of level z ≤ tile.z that covers it."""
+    if not 0 <= z <= tile.z:
+        raise BadRequest(f"tile {tile.z}/{tile.x}/{tile.y} has no ancestor of level {z}")
+    return TileId(z, tile.x >> (tile.z - z), tile.y >> (tile.z - z))
+
+
+def morton(x: int, y: int) -> int:
+    """Bits of x and y interleaved, x in the even bits."""
+    return _spread(x) | _spread(y) << 1
+
+
+def from_morton(number: int) -> tuple[int, int]:
+    """(x, y)."""
+    return _gather(number), _gather(number >> 1)
+
+
+def in_morton_order(tiles: Iterable[TileId]) -> list[TileId]:
+    """By level, then Morton number."""
+    return sorted(tiles, key=lambda tile: (tile.z, morton(tile.x, tile.y)))
+
+
+def block_levels(zmax: int) -> list[BlockLevel]:
+    """Deepest first: the base blocks, then the reduce blocks up to the one rooted at level 0."""
+    root = max(zmax - BLOCK_LEVELS, 0)
+    levels = [BlockLevel(root, zmax - root + 1, "base")]
+    while root > 0:
+        above = max(root - BLOCK_LEVELS, 0)
+        levels.append(BlockLevel(above, root - above, "reduce"))
+        root = above
+    return levels
+
+
+def block_level(root: int, zmax: int) -> BlockLevel:
+    """The level of blocks rooted at level `root`; raises BadRequest when no block is rooted there."""
+    for level in block_levels(zmax):
+        if level.root == root:
+            return level
+    raise BadRequest(f"no block of a pyramid with zmax {zmax} is rooted at level {root}")
+
+
+def block_of(tile: TileId, zmax: int) -> BlockId:
+    """The one block that holds the tile; raises BadRequest below zmax."""
+    check_tile(tile)
+    for level in block_levels(zmax):
+        if level.root <= tile.z < level.root + level.levels:
+            return BlockId(*ancestor(tile, level.root))
+    raise BadRequest(f"tile {tile.z}/{tile.x}/{tile.y} lies below the deepest level, {zmax}")
+
+
+def tiles_of_block(block: BlockId, zmax: int) -> Iterator[TileId]:
+    """Every tile that the block may hold, by level, in Morton order."""
+    check_tile(TileId(*block))
+    levels = block_level(block.z, zmax).levels
+    for down in range(levels):
+        for number in range(4**down):
+            dx, dy = from_morton(number)
+            yield TileId(block.z + down, (block.x << down) + dx, (block.y << down) + dy)
+
+
+def blocks_below(block: BlockId, zmax: int) -> list[BlockId]:
+    """The blocks whose seams a reduce block takes, in Morton order; none for a base block."""
+    level = block_level(block.z, zmax)
+    if level.kind == "base":
+        return []
+    below = range(4**level.levels)
+    offsets = (from_morton(number) for number in below)
+    return [BlockId(block.z + level.levels, (block.x << level.levels) + dx, (block.y << level.levels) + dy) for dx, dy in offsets]
+
+
+def block_above(block: BlockId, zmax: int) -> BlockId | None:
+    """The reduce block that takes this block's seam; None for the one rooted at level 0."""
+    block_level(block.z, zmax)
+    return block_of(TileId(block.z - 1, block.x // 2, block.y // 2), zmax) if block.z > 0 else None
+
+
+def _parse_number(text: str, most_digits: int) -> int | None:
+    if not (0 < len(text) <= most_digits and text.isascii() and text.isdigit()) or (len(text) > 1 and text[0] == "0"):
+        return None
+    return int(text)
+
+
+def _spread(value: int) -> int:
+    spread = 0
+    for bit in range(value.bit_length()):
+        spread |= (value >> bit & 1) << (2 * bit)
+    return spread
+
+
+def _gather(value: int) -> int:
+    gathered = 0
+    for bit in range((value.bit_length() + 1) // 2):
+        gathered |= (value >> (2 * bit) & 1) << bit
+    return gathered

@@ -1,0 +1,270 @@
+"""The tile store in one SQLite file per rendering and view (spec/catalogue.md): WAL, synchronous=FULL, one transaction a block."""
+
+import json
+import os
+import sqlite3
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Self
+
+from map3d.errors import AlreadyExists, BadRequest, Corrupt, Map3dError, NotFound, StoreError, UnknownVersion
+from map3d.tiles.naming import block_level, morton
+from map3d.tiles.store import FORMAT_VERSION, StoredBlock, StoredTile, StoreShape, check_block, content_hash
+from map3d.types import BlockId, Layer, TileId
+
+BUSY_TIMEOUT_S: Final = 60.0
+APPLICATION_ID: Final = 0x4D334454  # "M3DT"
+
+_SCHEMA: Final = """
+CREATE TABLE blob(hash BLOB PRIMARY KEY, bytes BLOB NOT NULL);
+CREATE TABLE tile(layer INTEGER, z INTEGER, x INTEGER, y INTEGER, block TEXT NOT NULL, hash BLOB NOT NULL, PRIMARY KEY(layer, z, x, y)) WITHOUT ROWID;
+CREATE INDEX tile_hash ON tile(hash);
+CREATE TABLE block(id TEXT PRIMARY KEY, z INTEGER NOT NULL, x INTEGER NOT NULL, y INTEGER NOT NULL, key TEXT NOT NULL,
+  version INTEGER NOT NULL, tiles INTEGER NOT NULL, seam BLOB);
+CREATE TABLE meta(key TEXT PRIMARY KEY, value TEXT NOT NULL);
+"""
+
+
+class SqliteTileStore:
+    """A `TileStore`; safe to share between threads (a connection each) and to inherit by fork."""
+
+    def __init__(self, path: Path, *, read_only: bool = False) -> None:
+        """Opens an existing store; raises NotFound, UnknownVersion, Corrupt, StoreError."""
+        if not path.is_file():
+            raise NotFound(f"{path}: no tile store there; render the rendering first")
+        self.path = path
+        self._read_only = read_only
+        self._local = threading.local()
+        self._opened: list[tuple[int, sqlite3.Connection]] = []
+        self._lock = threading.Lock()
+        self._shape = self._read_shape()
+
+    @classmethod
+    def create(cls, path: Path, shape: StoreShape) -> Self:
+        """Makes a new, empty store; raises AlreadyExists. A half-made one is never seen under `path`."""
+        if path.exists():
+            raise AlreadyExists(f"{path}: there is a tile store already")
+        draft = path.with_name(f".{path.name}.{os.getpid()}.{threading.get_ident()}.new")
+        draft.unlink(missing_ok=True)
+        try:
+            _write_empty(draft, shape)
+            os.link(draft, path)
+        except FileExistsError as error:
+            raise AlreadyExists(f"{path}: there is a tile store already") from error
+        except (OSError, sqlite3.Error) as error:
+            raise StoreError(f"{path}: cannot make a tile store: {error}") from error
+        finally:
+            draft.unlink(missing_ok=True)
+        return cls(path)
+
+    @classmethod
+    def open_or_create(cls, path: Path, shape: StoreShape) -> Self:
+        """Opens the store, made if absent; raises BadRequest when an existing one has another shape."""
+        try:
+            return cls.create(path, shape)
+        except AlreadyExists:
+            store = cls(path)
+        if store.shape != shape:
+            store.close()
+            raise BadRequest(f"{path}: made for {store.shape}, asked for {shape}; use --regrid to render anew")
+        return store
+
+    @property
+    def shape(self) -> StoreShape:
+        return self._shape
+
+    def put_block(self, block: BlockId, key: str, version: int, tiles: Sequence[StoredTile], seam: bytes | None) -> StoredBlock:
+        check_block(self._shape, block, version, tiles)
+        hashed = [(tile, content_hash(tile.data)) for tile in tiles]
+        with self._transaction() as db:
+            old = _block_row(db, block)
+            before = _tiles_of(db, self._shape, block) if old else {}
+            now = {tuple(tile[:4]): digest for tile, digest in hashed}
+            if old and before == now and old["seam"] == seam:
+                version = old["version"]
+            else:
+                _forget_tiles(db, before)
+                _put_tiles(db, block, hashed)
+                _forget_blobs(db, set(before.values()) - set(now.values()))
+            db.execute("INSERT OR REPLACE INTO block VALUES (?, ?, ?, ?, ?, ?, ?, ?)", (str(block), *block, key, version, len(tiles), seam))
+        return StoredBlock(block, key, version, len(tiles))
+
+    def remove_block(self, block: BlockId) -> bool:
+        with self._transaction() as db:
+            if _block_row(db, block) is None:
+                return False
+            before = _tiles_of(db, self._shape, block)
+            _forget_tiles(db, before)
+            db.execute("DELETE FROM block WHERE id = ?", (str(block),))
+            _forget_blobs(db, set(before.values()))
+        return True
+
+    def get_tile(self, layer: int, z: int, x: int, y: int) -> bytes | None:
+        with self._reading() as db:
+            row = db.execute(
+                "SELECT blob.bytes FROM tile LEFT JOIN blob USING (hash) WHERE layer = ? AND z = ? AND x = ? AND y = ?", (layer, z, x, y)
+            ).fetchone()
+        if row is not None and row[0] is None:
+            raise Corrupt(f"{self.path}: tile {layer}: {z}/{x}/{y} is listed, its bytes are missing; remove the file and render again")
+        return None if row is None else bytes(row[0])
+
+    def get_seam(self, block: BlockId) -> bytes | None:
+        with self._reading() as db:
+            row = db.execute("SELECT seam FROM block WHERE id = ?", (str(block),)).fetchone()
+        return None if row is None or row[0] is None else bytes(row[0])
+
+    def get_block(self, block: BlockId) -> StoredBlock | None:
+        with self._reading() as db:
+            row = db.execute("SELECT key, version, tiles FROM block WHERE id = ?", (str(block),)).fetchone()
+        return None if row is None else StoredBlock(block, row[0], row[1], row[2])
+
+    def list_blocks(self) -> list[StoredBlock]:
+        with self._reading() as db:
+            rows = db.execute("SELECT z, x, y, key, version, tiles FROM block").fetchall()
+        blocks = [StoredBlock(BlockId(z, x, y), key, version, tiles) for z, x, y, key, version, tiles in rows]
+        return sorted(blocks, key=lambda block: (-block.id.z, morton(block.id.x, block.id.y)))
+
+    def list_tiles(self, layer: int) -> Iterator[TileId]:
+        with self._reading() as db:
+            cursor = db.execute("SELECT z, x, y FROM tile WHERE layer = ? ORDER BY z, x, y", (layer,))
+            for row in cursor:
+                yield TileId(*row)
+
+    def check(self) -> list[str]:
+        """What is wrong with the file, one line each; reads all of it."""
+        with self._reading() as db:
+            wrong = [row[0] for row in db.execute("PRAGMA integrity_check") if row[0] != "ok"]
+            lost = db.execute("SELECT count(*) FROM tile WHERE hash NOT IN (SELECT hash FROM blob)").fetchone()[0]
+            bad = sum(content_hash(data) != digest for digest, data in db.execute("SELECT hash, bytes FROM blob"))
+            sums = "SELECT block.id, block.tiles, count(tile.block) FROM block LEFT JOIN tile ON tile.block = block.id GROUP BY block.id"
+            miscounted = [row for row in db.execute(sums) if row[1] != row[2]]
+        wrong += [f"{lost} tiles without bytes"] if lost else []
+        wrong += [f"{bad} tiles whose bytes do not match their hash"] if bad else []
+        return wrong + [f"block {name}: {expected} tiles recorded, {got} there" for name, expected, got in miscounted]
+
+    def close(self) -> None:
+        """Closes the connections of all threads; the store can be used again afterwards."""
+        with self._lock:
+            opened, self._opened = self._opened, []
+            self._local = threading.local()
+        for process, connection in opened:
+            if process == os.getpid():
+                connection.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    @contextmanager
+    def _reading(self) -> Iterator[sqlite3.Connection]:
+        try:
+            yield self._connection()
+        except sqlite3.Error as error:
+            raise StoreError(f"{self.path}: cannot read: {error}") from error
+
+    @contextmanager
+    def _transaction(self) -> Iterator[sqlite3.Connection]:
+        if self._read_only:
+            raise BadRequest(f"{self.path}: opened for reading only")
+        try:
+            db = self._connection()
+            db.execute("BEGIN IMMEDIATE")
+            try:
+                yield db
+                db.execute("COMMIT")
+            except BaseException:
+                if db.in_transaction:
+                    db.execute("ROLLBACK")
+                raise
+        except sqlite3.Error as error:
+            raise StoreError(f"{self.path}: cannot write: {error}") from error
+
+    def _connection(self) -> sqlite3.Connection:
+        """This thread's own; a connection never crosses a fork."""
+        held: tuple[int, sqlite3.Connection] | None = getattr(self._local, "held", None)
+        if held is None or held[0] != os.getpid():
+            connection = _connect(self.path, self._read_only)
+            self._local.held = held = (os.getpid(), connection)
+            with self._lock:
+                self._opened.append(held)
+        return held[1]
+
+    def _read_shape(self) -> StoreShape:
+        try:
+            meta = dict(self._connection().execute("SELECT key, value FROM meta").fetchall())
+            version = int(meta["version"])
+        except sqlite3.OperationalError as error:
+            raise StoreError(f"{self.path}: cannot open: {error}") from error
+        except (sqlite3.DatabaseError, KeyError, ValueError) as error:
+            raise Corrupt(f"{self.path}: not a tile store: {error}") from error
+        if version != FORMAT_VERSION:
+            raise UnknownVersion(f"{self.path}: tile store of version {version}; this map3d reads version {FORMAT_VERSION}")
+        try:
+            layers = tuple(Layer(**row) for row in json.loads(meta["layers"]))
+            return StoreShape(int(meta["tile_px"]), int(meta["zmax"]), layers)
+        except (KeyError, ValueError, TypeError, Map3dError) as error:
+            raise Corrupt(f"{self.path}: the tile store does not say what it holds: {error}") from error
+
+
+def _connect(path: Path, read_only: bool) -> sqlite3.Connection:
+    mode = "ro" if read_only else "rw"
+    quoted = path.absolute().as_uri()
+    connection = sqlite3.connect(f"{quoted}?mode={mode}", uri=True, timeout=BUSY_TIMEOUT_S, isolation_level=None, check_same_thread=False)
+    connection.execute("PRAGMA synchronous = FULL")
+    return connection
+
+
+def _write_empty(path: Path, shape: StoreShape) -> None:
+    """The finished file has no WAL beside it, so that it can be linked to its name."""
+    layers = [{"name": layer.name, "kind": layer.kind, "format": layer.format, "quality": layer.quality} for layer in shape.layers]
+    meta = {"version": FORMAT_VERSION, "tile_px": shape.tile_px, "zmax": shape.zmax, "layers": json.dumps(layers)}
+    connection = sqlite3.connect(path, isolation_level=None)
+    try:
+        connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+        connection.execute("PRAGMA page_size = 8192")
+        connection.execute("PRAGMA journal_mode = WAL")
+        connection.execute("PRAGMA synchronous = FULL")
+        connection.executescript(f"BEGIN; {_SCHEMA} COMMIT;")
+        connection.executemany("INSERT INTO meta VALUES (?, ?)", ((key, str(value)) for key, value in meta.items()))
+        connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    finally:
+        connection.close()
+
+
+def _block_row(db: sqlite3.Connection, block: BlockId) -> dict[str, Any] | None:
+    row = db.execute("SELECT version, seam FROM block WHERE id = ?", (str(block),)).fetchone()
+    return None if row is None else {"version": row[0], "seam": row[1]}
+
+
+def _tiles_of(db: sqlite3.Connection, shape: StoreShape, block: BlockId) -> dict[tuple[int, ...], bytes]:
+    """(layer, z, x, y) → hash of the block's tiles, column by column through the primary key."""
+    query = "SELECT layer, z, x, y, hash FROM tile WHERE layer = ? AND z = ? AND x = ? AND y BETWEEN ? AND ?"
+    found: dict[tuple[int, ...], bytes] = {}
+    for layer in range(len(shape.layers)):
+        for down in range(block_level(block.z, shape.zmax).levels):
+            first_y = block.y << down
+            for x in range(block.x << down, (block.x + 1) << down):
+                rows = db.execute(query, (layer, block.z + down, x, first_y, first_y + (1 << down) - 1))
+                found.update(((row[0], row[1], row[2], row[3]), row[4]) for row in rows)
+    return found
+
+
+def _put_tiles(db: sqlite3.Connection, block: BlockId, hashed: Sequence[tuple[StoredTile, bytes]]) -> None:
+    db.executemany("INSERT OR IGNORE INTO blob VALUES (?, ?)", ((digest, tile.data) for tile, digest in hashed))
+    rows = ((tile.layer, tile.z, tile.x, tile.y, str(block), digest) for tile, digest in hashed)
+    db.executemany("INSERT INTO tile VALUES (?, ?, ?, ?, ?, ?)", rows)
+
+
+def _forget_tiles(db: sqlite3.Connection, tiles: dict[tuple[int, ...], bytes]) -> None:
+    db.executemany("DELETE FROM tile WHERE layer = ? AND z = ? AND x = ? AND y = ?", tiles)
+
+
+def _forget_blobs(db: sqlite3.Connection, hashes: set[bytes]) -> None:
+    """Those that no tile has any more."""
+    query = "DELETE FROM blob WHERE hash = ?1 AND NOT EXISTS (SELECT 1 FROM tile WHERE hash = ?1)"
+    db.executemany(query, ((digest,) for digest in sorted(hashes)))

@@ -1,0 +1,100 @@
+import base64
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from map3d.errors import BadRequest, Corrupt
+from map3d.tiles.naming import children, morton, parent
+from map3d.tiles.occupancy import Occupancy, morton_numbers, xy_from_morton
+from map3d.types import TileId
+
+VECTORS = json.loads((Path(__file__).parents[2] / "spec" / "vectors" / "occupancy.json").read_text())
+
+
+def random_occupancy(zmax, share, seed=3):
+    grid = np.random.default_rng(seed).random((2**zmax, 2**zmax)) < share
+    return grid, Occupancy.from_grid(grid)
+
+
+@pytest.mark.parametrize("row", VECTORS, ids=lambda row: row["base64"])
+def test_occupancy_follows_the_vectors(row):
+    occupancy = Occupancy.from_tiles(row["zmax"], map(tuple, row["occupied"]))
+    assert occupancy.encode() == row["base64"]
+    decoded = Occupancy.decode(row["zmax"], row["base64"])
+    assert decoded == occupancy
+    assert [[tile.x, tile.y] for tile in decoded.tiles(row["zmax"])] == row["occupied"]
+
+
+@pytest.mark.parametrize("zmax", range(7))
+@pytest.mark.parametrize("share", [0.0, 0.02, 0.5, 1.0])
+def test_decode_undoes_encode(zmax, share):
+    grid, occupancy = random_occupancy(zmax, share)
+    assert Occupancy.decode(zmax, occupancy.encode()) == occupancy
+    assert occupancy.count(zmax) == grid.sum()
+
+
+def test_a_tile_is_occupied_just_when_a_child_is():
+    _, occupancy = random_occupancy(5, 0.03)
+    for z in range(5):
+        for x in range(2**z):
+            for y in range(2**z):
+                assert (TileId(z, x, y) in occupancy) == any(child in occupancy for child in children(TileId(z, x, y)))
+
+
+def test_membership_agrees_with_the_grid():
+    grid, occupancy = random_occupancy(4, 0.3)
+    assert all((TileId(4, x, y) in occupancy) == grid[y, x] for x in range(16) for y in range(16))
+
+
+@pytest.mark.parametrize("tile", [(-1, 0, 0), (5, 0, 0), (4, 16, 0), (4, 0, -1)])
+def test_tiles_that_cannot_exist_are_not_occupied(tile):
+    assert TileId(*tile) not in Occupancy.from_grid(np.ones((16, 16), dtype=bool))
+
+
+def test_union_holds_the_tiles_of_both():
+    one, two = random_occupancy(4, 0.1, 1), random_occupancy(4, 0.1, 2)
+    assert one[1] | two[1] == Occupancy.from_grid(one[0] | two[0])
+
+
+def test_vectorised_morton_numbers_agree_with_those_of_names():
+    x, y = np.random.default_rng(0).integers(0, 2**26, (2, 200))
+    numbers = morton_numbers(x, y)
+    assert [int(n) for n in numbers] == [morton(int(a), int(b)) for a, b in zip(x, y, strict=True)]
+    back = xy_from_morton(numbers)
+    np.testing.assert_array_equal(back, (x, y))
+
+
+def test_deep_levels_stay_sparse():
+    occupancy = Occupancy.from_tiles(26, [(2**26 - 1, 2**26 - 1), (0, 0)])
+    assert Occupancy.decode(26, occupancy.encode()) == occupancy
+    assert occupancy.count() == 1 + 2 * 26
+    tile = TileId(26, 2**26 - 1, 2**26 - 1)
+    while tile:
+        assert tile in occupancy
+        tile = parent(tile)
+
+
+@pytest.mark.parametrize(
+    ("zmax", "text"),
+    [
+        (0, ""), (0, "AQ"), (0, "?!=="), (0, "é"), (0, "AQE="), (0, "Aw=="), (1, "AQ=="), (2, "AQ=="), (2, "OwQB" + "AAAA"), (2, "OwQ="),
+        (0, base64.b64encode(b"\x81").decode()), (3, "OwQB"),
+    ],
+)  # fmt: skip
+def test_what_is_no_occupancy_is_corrupt(zmax, text):
+    with pytest.raises(Corrupt):
+        Occupancy.decode(zmax, text)
+
+
+@pytest.mark.parametrize("tiles", [[(4, 0)], [(0, 4)], [(-1, 0)]])
+def test_tiles_outside_are_refused(tiles):
+    with pytest.raises(BadRequest):
+        Occupancy.from_tiles(2, tiles)
+
+
+def test_grids_that_are_none_are_refused():
+    for shape in [(3, 3), (2, 4), (4,)]:
+        with pytest.raises((BadRequest, ValueError)):
+            Occupancy.from_grid(np.ones(shape, dtype=bool))

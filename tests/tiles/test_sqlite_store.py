@@ -1,0 +1,156 @@
+"""What only the SQLite home promises."""
+
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+
+import pytest
+
+from map3d.errors import Corrupt, StoreError, UnknownVersion
+from map3d.tiles.sqlite_store import SqliteTileStore
+from map3d.tiles.store import StoredTile, StoreShape
+from map3d.types import BlockId, Layer
+
+SHAPE = StoreShape(256, 0, (Layer("color", "color", "png"),))
+BLOCK = BlockId(0, 0, 0)
+
+
+def tile(data):
+    return StoredTile(0, 0, 0, 0, data)
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "0-45.sqlite"
+
+
+@pytest.fixture
+def store(path):
+    with SqliteTileStore.create(path, SHAPE) as made:
+        yield made
+
+
+def rows(path, query):
+    with sqlite3.connect(path) as db:
+        found = db.execute(query).fetchall()
+    db.close()
+    return found
+
+
+def test_the_file_is_durable_and_concurrent(path, store):
+    assert rows(path, "PRAGMA journal_mode") == [("wal",)]
+    assert store._connection().execute("PRAGMA synchronous").fetchone() == (2,)
+
+
+def test_the_tables_are_those_of_the_specification(path, store):
+    columns = {name: [row[1] for row in rows(path, f"PRAGMA table_info({name})")] for name in ("blob", "tile", "block", "meta")}
+    assert columns["blob"] == ["hash", "bytes"]
+    assert columns["tile"] == ["layer", "z", "x", "y", "block", "hash"]
+    assert columns["block"] == ["id", "z", "x", "y", "key", "version", "tiles", "seam"]
+    assert columns["meta"] == ["key", "value"]
+
+
+def test_bytes_that_no_tile_has_are_removed(path, store):
+    store.put_block(BLOCK, "a", 1, [tile(b"old")], b"s")
+    store.put_block(BLOCK, "b", 2, [tile(b"new")], b"s")
+    assert rows(path, "SELECT bytes FROM blob") == [(b"new",)]
+
+
+def test_equal_tiles_are_stored_once(tmp_path):
+    shape = StoreShape(256, 2, SHAPE.layers)
+    path = tmp_path / "dedupe.sqlite"
+    with SqliteTileStore.create(path, shape) as store:
+        store.put_block(BLOCK, "a", 1, [StoredTile(0, 2, x, y, b"same") for x in range(4) for y in range(4)], b"s")
+    assert rows(path, "SELECT count(*) FROM blob") == [(1,)]
+    assert rows(path, "SELECT count(*) FROM tile") == [(16,)]
+
+
+def test_a_failed_put_leaves_all_as_it_was(store, monkeypatch):
+    store.put_block(BLOCK, "a", 1, [tile(b"old")], b"s")
+
+    def fail(*_):
+        raise sqlite3.OperationalError("disk I/O error")
+
+    monkeypatch.setattr("map3d.tiles.sqlite_store._put_tiles", fail)
+    with pytest.raises(StoreError, match="disk I/O error"):
+        store.put_block(BLOCK, "b", 2, [tile(b"new")], b"t")
+    assert store.get_tile(0, 0, 0, 0) == b"old"
+    assert store.get_block(BLOCK).key == "a"
+
+
+def test_a_writer_killed_within_a_put_leaves_the_old_block(path, store):
+    store.put_block(BLOCK, "a", 1, [tile(b"old")], b"s")
+    script = (
+        "import os, sys; from pathlib import Path; import map3d.tiles.sqlite_store as home\n"
+        "from map3d.tiles.store import StoredTile; from map3d.types import BlockId\n"
+        "home._forget_blobs = lambda *_: os.kill(os.getpid(), 9)\n"
+        "home.SqliteTileStore(Path(sys.argv[1])).put_block(BlockId(0, 0, 0), 'b', 2, [StoredTile(0, 0, 0, 0, b'new')], b't')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script, str(path)], check=False, env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)})
+    assert done.returncode == -signal.SIGKILL
+    assert store.get_tile(0, 0, 0, 0) == b"old"
+    assert store.get_seam(BLOCK) == b"s"
+    assert store.check() == []
+
+
+def test_a_full_disk_is_a_typed_error(store):
+    store._connection().execute("PRAGMA max_page_count = 20")
+    with pytest.raises(StoreError, match="full"):
+        store.put_block(BLOCK, "a", 1, [tile(bytes(1 << 20))], b"s")
+    assert store.get_block(BLOCK) is None
+
+
+def test_another_version_is_refused_with_both_numbers(path, store):
+    with sqlite3.connect(path) as db:
+        db.execute("UPDATE meta SET value = '99' WHERE key = 'version'")
+    db.close()
+    with pytest.raises(UnknownVersion, match=r"99.*1"):
+        SqliteTileStore(path)
+
+
+@pytest.mark.parametrize("data", [b"", b"not a database, but long enough to be taken for one" * 40])
+def test_a_file_that_is_no_store_is_corrupt(path, data):
+    path.write_bytes(data)
+    with pytest.raises((Corrupt, StoreError)):
+        SqliteTileStore(path)
+    assert path.read_bytes() == data
+
+
+@pytest.mark.parametrize("value", ["", "{}", '[{"name": "color"}]', '[{"name": "color", "kind": "color", "format": "gif"}]'])
+def test_a_store_that_does_not_say_its_layers_is_corrupt(path, store, value):
+    with sqlite3.connect(path) as db:
+        db.execute("UPDATE meta SET value = ? WHERE key = 'layers'", (value,))
+    db.close()
+    with pytest.raises(Corrupt):
+        SqliteTileStore(path).close()
+
+
+def test_check_finds_changed_and_lost_bytes(path, store):
+    store.put_block(BLOCK, "a", 1, [tile(b"tile")], b"s")
+    assert store.check() == []
+    with sqlite3.connect(path) as db:
+        db.execute("UPDATE blob SET bytes = x'00'")
+    assert store.check() == ["1 tiles whose bytes do not match their hash"]
+    with db:
+        db.execute("DELETE FROM blob")
+    assert store.check() == ["1 tiles without bytes"]
+    with pytest.raises(Corrupt, match="missing"):
+        store.get_tile(0, 0, 0, 0)
+    with db:
+        db.execute("DELETE FROM tile")
+    db.close()
+    assert store.check() == ["block 0/0/0: 1 tiles recorded, 0 there"]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+def test_a_forked_child_has_connections_of_its_own(store):
+    store.put_block(BLOCK, "a", 1, [tile(b"tile")], b"s")
+    mine = store._connection()
+    child = os.fork()
+    if child == 0:
+        own = store._connection() is not mine and store.get_tile(0, 0, 0, 0) == b"tile"
+        os._exit(0 if own else 1)
+    assert os.waitpid(child, 0)[1] == 0
+    assert store.get_tile(0, 0, 0, 0) == b"tile"

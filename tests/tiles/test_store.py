@@ -1,0 +1,225 @@
+"""The contract of a tile store; every home passes it."""
+
+import multiprocessing
+import threading
+
+import pytest
+
+from map3d.errors import AlreadyExists, BadRequest, NotFound
+from map3d.tiles.naming import tiles_of_block
+from map3d.tiles.sqlite_store import SqliteTileStore
+from map3d.tiles.store import StoredBlock, StoredTile, StoreShape
+from map3d.types import BlockId, Layer
+
+LAYERS = (Layer("color", "color", "webp", 80), Layer("normal", "normal", "png"), Layer("id", "id", "png"), Layer("depth", "depth", "png"))
+SHAPE = StoreShape(tile_px=256, zmax=4, layers=LAYERS)
+BLOCK = BlockId(1, 1, 0)
+HOMES = {"sqlite": SqliteTileStore}
+
+
+@pytest.fixture(params=sorted(HOMES))
+def home(request):
+    return HOMES[request.param]
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "0-45.store"
+
+
+@pytest.fixture
+def store(home, path):
+    with home.create(path, SHAPE) as made:
+        yield made
+
+
+def content(block, salt="", layers=range(4)):
+    return [StoredTile(n, *tile, f"{salt}{n}:{tile}".encode()) for n in layers for tile in tiles_of_block(block, SHAPE.zmax)]
+
+
+def read(store, tiles):
+    return [store.get_tile(*tile[:4]) for tile in tiles]
+
+
+def test_a_new_store_is_empty(store):
+    assert store.list_blocks() == []
+    assert list(store.list_tiles(0)) == []
+    assert store.get_tile(0, 0, 0, 0) is None
+    assert store.get_seam(BLOCK) is None
+    assert store.get_block(BLOCK) is None
+
+
+def test_what_was_put_is_got(store):
+    tiles = content(BLOCK)
+    assert store.put_block(BLOCK, "key", 1, tiles, b"seam") == StoredBlock(BLOCK, "key", 1, len(tiles))
+    assert read(store, tiles) == [tile.data for tile in tiles]
+    assert store.get_seam(BLOCK) == b"seam"
+    assert store.get_block(BLOCK) == StoredBlock(BLOCK, "key", 1, len(tiles))
+
+
+def test_tiles_that_were_not_put_are_none(store):
+    store.put_block(BLOCK, "key", 1, content(BLOCK, layers=[0]), b"seam")
+    assert store.get_tile(1, 1, 1, 0) is None
+    assert store.get_tile(0, 1, 0, 0) is None
+
+
+def test_a_block_without_content_is_known(store):
+    store.put_block(BLOCK, "key", 1, [], None)
+    assert store.get_block(BLOCK) == StoredBlock(BLOCK, "key", 1, 0)
+    assert store.get_seam(BLOCK) is None
+
+
+def test_replacing_a_block_removes_its_old_tiles(store):
+    other = BlockId(1, 0, 0)
+    store.put_block(other, "k", 1, content(other), b"s")
+    store.put_block(BLOCK, "old", 1, content(BLOCK), b"old")
+    new = content(BLOCK, "new")[:5]
+    store.put_block(BLOCK, "new", 2, new, b"new")
+    assert read(store, content(BLOCK)) == [tile.data for tile in new] + [None] * (len(content(BLOCK)) - 5)
+    assert read(store, content(other)) == [tile.data for tile in content(other)]
+    assert store.get_block(BLOCK) == StoredBlock(BLOCK, "new", 2, 5)
+    assert len(list(store.list_tiles(0))) == len(content(other, layers=[0])) + 5
+
+
+def test_equal_bytes_keep_their_version(store):
+    tiles = content(BLOCK)
+    store.put_block(BLOCK, "a", 1, tiles, b"seam")
+    assert store.put_block(BLOCK, "b", 2, list(reversed(tiles)), b"seam").version == 1
+    assert store.get_block(BLOCK).key == "b"
+    assert store.put_block(BLOCK, "c", 3, tiles, b"other seam").version == 3
+    assert store.put_block(BLOCK, "c", 4, tiles[1:], b"other seam").version == 4
+
+
+def test_equal_tiles_of_different_blocks_outlive_each_other(store):
+    other = BlockId(1, 0, 0)
+    one, two = StoredTile(0, 1, 1, 0, b"same"), StoredTile(0, 1, 0, 0, b"same")
+    store.put_block(BLOCK, "k", 1, [one], b"s")
+    store.put_block(other, "k", 1, [two], b"s")
+    store.put_block(BLOCK, "k", 2, [], None)
+    assert read(store, [one, two]) == [None, b"same"]
+
+
+def test_a_removed_block_is_gone(store):
+    store.put_block(BLOCK, "k", 1, content(BLOCK), b"s")
+    assert store.remove_block(BLOCK)
+    assert not store.remove_block(BLOCK)
+    assert store.list_blocks() == []
+    assert list(store.list_tiles(0)) == []
+
+
+def test_blocks_are_listed_deepest_first_in_morton_order(store):
+    ids = [BlockId(0, 0, 0), BlockId(1, 1, 1), BlockId(1, 0, 1), BlockId(1, 1, 0), BlockId(1, 0, 0)]
+    for block in ids:
+        store.put_block(block, "k", 1, content(block), b"s")
+    assert [block.id for block in store.list_blocks()] == [(1, 0, 0), (1, 1, 0), (1, 0, 1), (1, 1, 1), (0, 0, 0)]
+    assert list(store.list_tiles(2)) == sorted(tile[1:4] for block in ids for tile in content(block, layers=[2]))
+
+
+@pytest.mark.parametrize(
+    ("block", "version", "tiles"),
+    [
+        (BLOCK, 1, [StoredTile(0, 1, 0, 0, b"another block's")]),
+        (BLOCK, 1, [StoredTile(0, 0, 0, 0, b"of the level above")]),
+        (BLOCK, 1, [StoredTile(0, 5, 16, 0, b"below zmax")]),
+        (BLOCK, 1, [StoredTile(0, 1, 2, 0, b"cannot exist")]),
+        (BLOCK, 1, [StoredTile(4, 1, 1, 0, b"no such layer")]),
+        (BLOCK, 1, [StoredTile(-1, 1, 1, 0, b"no such layer")]),
+        (BLOCK, 1, [StoredTile(0, 1, 1, 0, b"")]),
+        (BLOCK, 1, [StoredTile(0, 1, 1, 0, b"twice"), StoredTile(0, 1, 1, 0, b"twice")]),
+        (BLOCK, 0, []),
+        (BlockId(2, 0, 0), 1, []),
+    ],
+)
+def test_what_is_not_the_blocks_is_refused_wholly(store, block, version, tiles):
+    store.put_block(BLOCK, "k", 1, content(BLOCK), b"s")
+    with pytest.raises(BadRequest):
+        store.put_block(block, "bad", version, tiles, b"bad")
+    assert read(store, content(BLOCK)) == [tile.data for tile in content(BLOCK)]
+
+
+def test_a_store_opened_again_has_its_shape_and_tiles(home, path, store):
+    store.put_block(BLOCK, "k", 7, content(BLOCK), b"s")
+    for again in (home(path), home(path, read_only=True), home.open_or_create(path, SHAPE)):
+        with again:
+            assert again.shape == SHAPE
+            assert read(again, content(BLOCK)) == [tile.data for tile in content(BLOCK)]
+
+
+def test_a_store_is_not_made_twice_nor_with_another_shape(home, path, store):
+    with pytest.raises(AlreadyExists):
+        home.create(path, SHAPE)
+    with pytest.raises(BadRequest, match="--regrid"):
+        home.open_or_create(path, StoreShape(512, 4, LAYERS))
+
+
+def test_an_absent_store_is_not_found(home, path):
+    with pytest.raises(NotFound):
+        home(path)
+    assert not path.exists()
+
+
+def test_reading_only_means_it(home, path, store):
+    with home(path, read_only=True) as reader, pytest.raises(BadRequest, match="reading only"):
+        reader.put_block(BLOCK, "k", 1, [], None)
+
+
+def test_a_closed_store_can_be_used_again(store):
+    store.put_block(BLOCK, "k", 1, content(BLOCK), b"s")
+    store.close()
+    assert store.get_seam(BLOCK) == b"s"
+
+
+def _write_versions(home, path, rounds):
+    with home(path) as store:
+        for version in range(1, rounds + 1):
+            store.put_block(BLOCK, str(version), version, content(BLOCK, f"{version}/"), str(version).encode())
+
+
+def test_readers_beside_a_writer_see_blocks_wholly(home, path, store):
+    store.put_block(BLOCK, "0", 1, content(BLOCK, "1/"), b"1")
+    writer = multiprocessing.get_context("spawn").Process(target=_write_versions, args=(home, path, 25))
+    writer.start()
+    probes = [tile[:4] for tile in content(BLOCK)[::37]]
+    with home(path, read_only=True) as reader:
+        while writer.is_alive():
+            before = int(reader.get_seam(BLOCK))
+            versions = {int(reader.get_tile(*probe).split(b"/")[0]) for probe in probes}
+            after = int(reader.get_seam(BLOCK))
+            assert versions <= set(range(before, after + 1))
+    writer.join()
+    assert writer.exitcode == 0
+    assert store.get_seam(BLOCK) == b"25"
+
+
+def test_writers_of_many_processes_lose_nothing(home, path, store):
+    spawn = multiprocessing.get_context("spawn")
+    blocks = [BlockId(1, x, y) for x in (0, 1) for y in (0, 1)]
+    writers = [spawn.Process(target=_write_one, args=(home, path, block)) for block in blocks]
+    for writer in writers:
+        writer.start()
+    for writer in writers:
+        writer.join()
+    assert [writer.exitcode for writer in writers] == [0] * 4
+    for block in blocks:
+        assert read(store, content(block)) == [tile.data for tile in content(block)]
+
+
+def _write_one(home, path, block):
+    with home(path) as store:
+        store.put_block(block, "k", 1, content(block), b"s")
+
+
+def test_threads_share_a_store(store):
+    tiles = content(BLOCK)
+    store.put_block(BLOCK, "k", 1, tiles, b"s")
+    wrong = []
+
+    def look():
+        wrong.extend(tile for tile in tiles if store.get_tile(*tile[:4]) != tile.data)
+
+    threads = [threading.Thread(target=look) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert wrong == []
