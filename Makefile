@@ -1,0 +1,115 @@
+# map3d: `make` lists the verbs.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DEFAULT_GOAL := help
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+CACHE := .cache
+RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
+VIEWER := $(shell find viewer/src viewer/page -type f 2>/dev/null) $(wildcard viewer/*.json viewer/*.ts viewer/*.js viewer/*.mjs)
+
+.PHONY: help demo test test-all test-rust test-python test-viewer test-browser check check-rust check-python check-viewer bench bless docs pictures build clean tools
+
+help: ## this list
+	@echo "map3d: 3D city models as oblique image tiles"; echo
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 20
+	@$(MAKE) --no-print-directory -s tools
+
+tools:
+	@missing=""; \
+	need() { command -v $$1 >/dev/null 2>&1 || missing="$$missing\n  $$1: $$2"; }; \
+	need cargo "Rust stable (rustup)"; need node "Node.js 20 or newer"; need npm "npm, with Node.js"; need cc "apt install build-essential"; \
+	need cmake "apt install cmake"; need nasm "apt install nasm"; need $(PYTHON) "Python 3.11 or newer"; \
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || missing="$$missing\n  python: 3.11 or newer (PYTHON=… names another)"; \
+	$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || missing="$$missing\n  venv: apt install python3-venv"; \
+	if [ -n "$$missing" ]; then echo; echo -e "Missing on this machine:$$missing"; exit 1; fi
+
+# -- build ---------------------------------------------------------------------------------------------------------------------------
+
+$(CACHE)/venv: requirements/dev.lock | $(CACHE)
+	@$(MAKE) --no-print-directory -s tools
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install -q --disable-pip-version-check -r requirements/dev.lock
+	@touch $@
+
+$(CACHE)/core: $(RUST) pyproject.toml $(CACHE)/venv
+	$(BIN)/maturin develop --release --locked -q
+	@touch $@
+
+$(CACHE)/npm: viewer/package-lock.json | $(CACHE)
+	cd viewer && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error
+	@touch $@
+
+$(CACHE)/viewer: $(VIEWER) $(CACHE)/npm
+	cd viewer && npm run --silent build
+	rm -rf python/map3d/viewer && cp -r viewer/dist python/map3d/viewer
+	@touch $@
+
+$(CACHE):
+	@mkdir -p $@
+
+build: $(CACHE)/core $(CACHE)/viewer ## compile the core and the viewer into .venv
+
+# -- use -----------------------------------------------------------------------------------------------------------------------------
+
+demo: build ## make a town, render it in 4 directions, serve it on a free port
+	$(BIN)/python -m map3d.demo demo
+
+# -- test ----------------------------------------------------------------------------------------------------------------------------
+
+test: test-rust test-python test-viewer test-browser ## all quick tests, also in a real browser
+
+test-rust:
+	cargo test --workspace --release --locked --exclude map3d-py
+
+test-python: build
+	$(BIN)/python -m pytest -q -m "not browser and not slow"
+
+test-viewer: $(CACHE)/npm
+	cd viewer && npm test --silent
+
+test-browser: build ## whole-way tests in Chromium
+	cd viewer && npm run --silent test:browser
+	$(BIN)/python -m pytest -q -m browser
+
+test-all: test ## also what takes long
+	$(BIN)/python -m pytest -q -m slow
+
+# -- check ---------------------------------------------------------------------------------------------------------------------------
+
+check: check-rust check-python check-viewer ## format, lint, types, sizes
+
+check-rust: $(CACHE)/venv
+	cargo fmt --all --check
+	PYO3_PYTHON=$(CURDIR)/$(BIN)/python cargo clippy --workspace --all-targets --release --locked -- -D warnings
+
+check-python: build
+	$(BIN)/ruff check python tests spec bench
+	$(BIN)/ruff format --check python tests spec bench
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/python tests/core/check_stubs.py
+
+check-viewer: $(CACHE)/viewer
+	cd viewer && npm run --silent lint && npm run --silent typecheck && npm run --silent size
+
+# -- keep --------------------------------------------------------------------------------------------------------------------------
+
+bench: build ## speed and memory, peers beside us
+	$(BIN)/python -m bench
+
+bless: build ## write vectors and golden pictures anew; say why in the commit
+	$(BIN)/python spec/make_vectors.py
+	$(BIN)/python -m pytest -q --bless -m "golden"
+
+pictures: build ## write docs/pictures anew
+	$(BIN)/python docs/make_pictures.py
+
+docs: build ## command reference, API reference
+	$(BIN)/python docs/make_reference.py
+
+clean: ## remove what was built
+	rm -rf $(VENV) $(CACHE) target viewer/node_modules viewer/dist python/map3d/viewer demo tests/.out
