@@ -1,12 +1,11 @@
 """The contract of catalogues: scenes, assets, renderings, jobs (spec/catalogue.md). The tests in tests/catalogue run on every home."""
 
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, Protocol
+from collections.abc import Iterable, Iterator
+from typing import Protocol
 
 from map3d.catalogue.records import AssetRecord, Job, JobResult, Lease, PlannedJob, PlanOutcome, RenderingRecord, SceneCrs, SceneRecord
 from map3d.catalogue.states import State
-from map3d.geometry.frames import PinnedFrame
-from map3d.types import BlockId, Box, Vec3
+from map3d.types import BlockId, Vec3
 
 LEASE_S = 60.0
 HEARTBEAT_S = 15.0
@@ -53,8 +52,8 @@ class Catalogue(Protocol):
     def renderings(self, scene: str | None = None) -> list[RenderingRecord]:
         """By name."""
 
-    def regrid(self, name: str, frames: Iterable[PinnedFrame], box: Box, options: Mapping[str, Any]) -> RenderingRecord:
-        """Pins the rendering anew: new frames, no jobs, content version one up."""
+    def regrid(self, rendering: RenderingRecord) -> RenderingRecord:
+        """Puts `rendering` (pinned anew) in place of the one of its name: no jobs, content version one up; returns it as kept."""
 
     def announce(self, name: str, version: int) -> None:
         """A manifest of this content version may have been seen by clients."""

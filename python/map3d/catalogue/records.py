@@ -91,11 +91,13 @@ class RenderingRecord:
 
 @dataclass(frozen=True)
 class PlannedJob:
-    """A block that should be there. `parent` is the reduce block that takes its seam, None at the top. `key` says what its bytes depend on."""
+    """A block that should be there. `order` is the root's Morton number, `parent` the reduce block that takes its seam (None at the top),
+    `key` says what its bytes depend on."""
 
     view: str
     block: BlockId
     kind: BlockKind
+    order: int
     key: str
     parent: BlockId | None
 
@@ -111,7 +113,8 @@ class PlanOutcome:
 
 @dataclass(frozen=True)
 class JobResult:
-    """What a done job leaves in the catalogue. `version`: the content version in which the block's bytes last changed; `tiles`: per layer."""
+    """What a done job leaves in the catalogue. `version`: the content version in which the block's bytes last changed; `tiles`: of all layers,
+    `base_tiles`: of one layer at level zmax; `bytes`: encoded; `seconds`: what the child needed."""
 
     version: int
     empty: bool
@@ -152,5 +155,3 @@ class Lease:
     attempt: int
     worker: str
     content_version: int
-    earlier_version: int | None
-    """Version of the block's tiles when it was done before, else None."""

@@ -1,0 +1,86 @@
+"""Records as rows and JSON text, and back. Shared by the homes."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from typing import Any
+
+from map3d.catalogue.records import AssetRecord, RenderingRecord, SceneCrs, SceneRecord
+from map3d.geometry.frames import PinnedFrame
+from map3d.types import Box, Layer, Vec3, ViewAngles
+
+RowLike = Mapping[str, Any] | Any
+"""Something indexed by column name."""
+
+
+def dump_crs(crs: SceneCrs | None) -> str | None:
+    return None if crs is None else json.dumps(asdict(crs))
+
+
+def load_scene(row: RowLike) -> SceneRecord:
+    return SceneRecord(
+        name=row["name"],
+        title=row["title"],
+        attribution=row["attribution"],
+        crs=None if row["crs"] is None else SceneCrs(**json.loads(row["crs"])),
+        origin=None if row["origin"] is None else load_vec3(json.loads(row["origin"])),
+        options=json.loads(row["options"]),
+        built=row["built"],
+    )
+
+
+def load_asset(row: RowLike) -> AssetRecord:
+    texts = {name: row[name] for name in ("scene", "name", "source", "format", "digest", "source_digest")}
+    return AssetRecord(**texts, report=json.loads(row["report"]))
+
+
+def dump_rendering(rendering: RenderingRecord) -> tuple[Any, ...]:
+    return (
+        rendering.name,
+        rendering.scene,
+        rendering.title,
+        rendering.attribution,
+        rendering.res_m,
+        json.dumps([asdict(layer) for layer in rendering.layers]),
+        json.dumps([frame.to_json() for frame in rendering.frames]),
+        json.dumps(rendering.box),
+        json.dumps(dict(rendering.options)),
+        rendering.content_version,
+        rendering.announced_version,
+    )
+
+
+def load_rendering(row: RowLike) -> RenderingRecord:
+    return RenderingRecord(
+        name=row["name"],
+        scene=row["scene"],
+        title=row["title"],
+        attribution=row["attribution"],
+        res_m=row["res_m"],
+        layers=tuple(Layer(**layer) for layer in json.loads(row["layers"])),
+        frames=tuple(load_frame(frame) for frame in json.loads(row["frames"])),
+        box=load_box(json.loads(row["box"])),
+        options=json.loads(row["options"]),
+        content_version=row["content_version"],
+        announced_version=row["announced_version"],
+    )
+
+
+def load_frame(value: Mapping[str, Any]) -> PinnedFrame:
+    """The inverse of `PinnedFrame.to_json`; its layers are the rendering's."""
+    numbers = {name: value[name] for name in ("u0_m", "v0_m", "d0_m", "size_m", "tile_px", "zmax")}
+    return PinnedFrame(angles=ViewAngles(value["look_at_deg"], value["pitch_deg"]), **numbers)
+
+
+def load_vec3(value: list[float]) -> Vec3:
+    x, y, z = (float(number) for number in value)
+    return (x, y, z)
+
+
+def load_box(value: list[list[float]]) -> Box:
+    low, high = value
+    return (load_vec3(low), load_vec3(high))
+
+
+def with_versions(rendering: RenderingRecord, content: int, announced: int) -> RenderingRecord:
+    return replace(rendering, content_version=content, announced_version=announced)

@@ -1,0 +1,138 @@
+"""The catalogue in one SQLite file: scenes, assets, renderings. Jobs are in sqlite_jobs.py."""
+
+import json
+import sqlite3
+from pathlib import Path
+from typing import Any, Final
+
+from map3d.catalogue import codec
+from map3d.catalogue.contract import LEASE_S
+from map3d.catalogue.database import Database
+from map3d.catalogue.records import AssetRecord, RenderingRecord, SceneCrs, SceneRecord
+from map3d.catalogue.sqlite_jobs import JOB_SCHEMA, SqliteJobs
+from map3d.errors import AlreadyExists, NotFound
+from map3d.types import Vec3, check_name
+
+VERSION: Final = 1
+
+_SCHEMA: Final = (
+    """
+CREATE TABLE scene(name TEXT PRIMARY KEY, title TEXT NOT NULL, attribution TEXT NOT NULL, crs TEXT, origin TEXT, options TEXT NOT NULL, built TEXT);
+CREATE TABLE asset(scene TEXT NOT NULL REFERENCES scene(name), name TEXT NOT NULL, source TEXT NOT NULL, format TEXT NOT NULL,
+  digest TEXT NOT NULL, source_digest TEXT NOT NULL, report TEXT NOT NULL, PRIMARY KEY(scene, name));
+CREATE TABLE rendering(name TEXT PRIMARY KEY, scene TEXT NOT NULL REFERENCES scene(name), title TEXT NOT NULL, attribution TEXT NOT NULL,
+  res_m REAL NOT NULL, layers TEXT NOT NULL, frames TEXT NOT NULL, box TEXT NOT NULL, options TEXT NOT NULL,
+  content_version INTEGER NOT NULL, announced_version INTEGER NOT NULL);
+"""
+    + JOB_SCHEMA
+)
+
+
+class SqliteCatalogue(SqliteJobs):
+    """A `Catalogue`; the file is made if it is not there."""
+
+    def __init__(self, path: Path, *, lease_s: float = LEASE_S) -> None:
+        super().__init__(Database(path, _SCHEMA, VERSION), lease_s)
+
+    def close(self) -> None:
+        self._database.close()
+
+    def create_scene(self, scene: SceneRecord) -> None:
+        check_name(scene.name, "scene")
+        row = (
+            scene.name,
+            scene.title,
+            scene.attribution,
+            codec.dump_crs(scene.crs),
+            _dump_or_none(scene.origin),
+            json.dumps(dict(scene.options)),
+            scene.built,
+        )
+        with self._database.transaction() as db:
+            if db.execute("INSERT OR IGNORE INTO scene VALUES (?, ?, ?, ?, ?, ?, ?)", row).rowcount == 0:
+                raise AlreadyExists(f"scene {scene.name}: exists already; choose another name, or add files to it with map3d add-files")
+
+    def scene(self, name: str) -> SceneRecord:
+        with self._database.reading() as db:
+            return _scene(db, name)
+
+    def scenes(self) -> list[SceneRecord]:
+        with self._database.reading() as db:
+            return [codec.load_scene(row) for row in db.execute("SELECT * FROM scene ORDER BY name")]
+
+    def pin_scene(self, name: str, crs: SceneCrs | None = None, origin: Vec3 | None = None) -> SceneRecord:
+        with self._database.transaction() as db:
+            db.execute(
+                "UPDATE scene SET crs = coalesce(crs, ?), origin = coalesce(origin, ?) WHERE name = ?",
+                (codec.dump_crs(crs), _dump_or_none(origin), name),
+            )
+            return _scene(db, name)
+
+    def set_built(self, name: str, fingerprint: str) -> None:
+        with self._database.transaction() as db:
+            db.execute("UPDATE scene SET built = ? WHERE name = ?", (fingerprint, name))
+
+    def put_asset(self, asset: AssetRecord) -> None:
+        check_name(asset.name, "asset")
+        row = (asset.scene, asset.name, asset.source, asset.format, asset.digest, asset.source_digest, json.dumps(dict(asset.report)))
+        with self._database.transaction() as db:
+            _scene(db, asset.scene)
+            db.execute("INSERT OR REPLACE INTO asset VALUES (?, ?, ?, ?, ?, ?, ?)", row)
+
+    def assets(self, scene: str) -> list[AssetRecord]:
+        with self._database.reading() as db:
+            _scene(db, scene)
+            return [codec.load_asset(row) for row in db.execute("SELECT * FROM asset WHERE scene = ? ORDER BY name", (scene,))]
+
+    def create_rendering(self, rendering: RenderingRecord) -> None:
+        check_name(rendering.name, "rendering")
+        with self._database.transaction() as db:
+            _scene(db, rendering.scene)
+            row = codec.dump_rendering(rendering)
+            if db.execute("INSERT OR IGNORE INTO rendering VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", row).rowcount == 0:
+                raise AlreadyExists(f"rendering {rendering.name}: exists already; choose another name, or give --regrid to pin it anew")
+
+    def rendering(self, name: str) -> RenderingRecord:
+        with self._database.reading() as db:
+            return _rendering(db, name)
+
+    def renderings(self, scene: str | None = None) -> list[RenderingRecord]:
+        with self._database.reading() as db:
+            rows = db.execute("SELECT * FROM rendering WHERE ?1 IS NULL OR scene = ?1 ORDER BY name", (scene,))
+            return [codec.load_rendering(row) for row in rows]
+
+    def regrid(self, rendering: RenderingRecord) -> RenderingRecord:
+        with self._database.transaction() as db:
+            before = _rendering(db, rendering.name)
+            db.execute("DELETE FROM job WHERE rendering = ?", (rendering.name,))
+            db.execute("DELETE FROM rendering WHERE name = ?", (rendering.name,))
+            after = codec.with_versions(rendering, before.content_version + 1, before.announced_version)
+            db.execute("INSERT INTO rendering VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", codec.dump_rendering(after))
+            return after
+
+    def announce(self, name: str, version: int) -> None:
+        with self._database.transaction() as db:
+            db.execute("UPDATE rendering SET announced_version = max(announced_version, ?) WHERE name = ?", (version, name))
+
+
+def _scene(db: sqlite3.Connection, name: str) -> SceneRecord:
+    row = db.execute("SELECT * FROM scene WHERE name = ?", (name,)).fetchone()
+    if row is None:
+        raise NotFound(f"no scene {name!r}; there is {_names(db, 'scene')}")
+    return codec.load_scene(row)
+
+
+def _rendering(db: sqlite3.Connection, name: str) -> RenderingRecord:
+    row = db.execute("SELECT * FROM rendering WHERE name = ?", (name,)).fetchone()
+    if row is None:
+        raise NotFound(f"no rendering {name!r}; there is {_names(db, 'rendering')}")
+    return codec.load_rendering(row)
+
+
+def _names(db: sqlite3.Connection, table: str) -> str:
+    names = [row[0] for row in db.execute(f"SELECT name FROM {table} ORDER BY name LIMIT 21")]
+    return ", ".join(names[:20]) + (", …" if len(names) > 20 else "") if names else "none yet"
+
+
+def _dump_or_none(value: Any) -> str | None:
+    return None if value is None else json.dumps(value)

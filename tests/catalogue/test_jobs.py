@@ -1,0 +1,236 @@
+"""Laws of jobs: states, leases, fences (spec/catalogue.md)."""
+
+import time
+from collections.abc import Callable
+
+import pytest
+
+from map3d.catalogue import Catalogue, Job, JobResult, Lease, PlannedJob, State
+from map3d.catalogue.states import MAX_ATTEMPTS, TRANSITIONS, Event
+from map3d.errors import StaleFence
+from map3d.types import BlockId
+from tests.catalogue.homes import LEASE_S
+
+TOP = BlockId(0, 0, 0)
+RESULT = JobResult(version=1, empty=False, tiles=3, base_tiles=1, bytes=100, seconds=0.5)
+
+
+def base(x: int = 0, key: str = "k", above: BlockId | None = TOP) -> PlannedJob:
+    return PlannedJob("0-45", BlockId(3, x, 0), "base", x, key, above)
+
+
+def reduce(key: str = "r") -> PlannedJob:
+    return PlannedJob("0-45", TOP, "reduce", 0, key, None)
+
+
+def take(catalogue: Catalogue) -> Lease:
+    lease = catalogue.lease("town-a", "w")
+    assert lease is not None
+    return lease
+
+
+def only(catalogue: Catalogue, state: State | None = None) -> Job:
+    (job,) = [job for job in catalogue.jobs("town-a") if job.kind == "base" and state in (None, job.state)]
+    return job
+
+
+def test_jobs_are_leased_in_morton_order_with_rising_fences(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [base(2), base(0), base(1)])
+    leases = [take(catalogue) for _ in range(3)]
+    assert [lease.block.x for lease in leases] == [0, 1, 2]
+    assert catalogue.lease("town-a", "w") is None
+    catalogue.release(leases[0])
+    again = take(catalogue)
+    assert again.fence > leases[0].fence
+    assert again.attempt == 1
+
+
+def test_a_reduce_job_waits_for_all_blocks_below(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [reduce(), base(0), base(1)])
+    first, second = take(catalogue), take(catalogue)
+    assert catalogue.lease("town-a", "w") is None
+    catalogue.done(first, RESULT)
+    assert catalogue.lease("town-a", "w") is None
+    catalogue.done(second, RESULT)
+    assert take(catalogue).block == TOP
+
+
+def test_a_quarantined_block_keeps_its_reduce_job_waiting(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [reduce(), base(0)])
+    for attempt in range(1, MAX_ATTEMPTS + 1):
+        lease = take(catalogue)
+        assert lease.attempt == attempt
+        state = catalogue.fail(lease, f"bad {attempt}")
+    assert state is State.QUARANTINED
+    assert only(catalogue).reason == "bad 3"
+    assert catalogue.lease("town-a", "w") is None
+    counts = catalogue.count_jobs("town-a")
+    assert (counts[State.WAITING], counts[State.QUARANTINED]) == (1, 1)
+
+
+def test_retry_gives_a_quarantined_job_three_new_attempts(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [base(0), base(1)])
+    while (lease := catalogue.lease("town-a", "w")) is not None:
+        catalogue.fail(lease, "bad")
+    assert catalogue.retry("town-a", [("0-45", BlockId(3, 1, 0))]) == 1
+    assert take(catalogue).attempt == 1
+    assert catalogue.retry("town-a") == 1
+    assert catalogue.retry("town-a") == 0
+
+
+def test_failed_jobs_go_to_the_end_of_the_queue(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [base(0), base(1)])
+    catalogue.fail(take(catalogue), "bad")
+    assert take(catalogue).block.x == 1
+    assert take(catalogue).block.x == 0
+
+
+def test_a_killed_workers_job_comes_back(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [base()])
+    first = take(catalogue)
+    assert catalogue.lease("town-a", "other") is None
+    time.sleep(LEASE_S + 0.1)
+    second = take(catalogue)
+    assert second.attempt == 2
+    assert second.fence > first.fence
+
+
+@pytest.mark.parametrize("word", ["heartbeat", "done", "fail", "release"])
+def test_a_stale_fence_is_refused(catalogue: Catalogue, word: str) -> None:
+    catalogue.plan("town-a", [base()])
+    stale = take(catalogue)
+    time.sleep(LEASE_S + 0.1)
+    fresh = take(catalogue)
+    with pytest.raises(StaleFence, match="no longer held"):
+        say(catalogue, word, stale)
+    catalogue.done(fresh, RESULT)
+    with pytest.raises(StaleFence):
+        say(catalogue, word, fresh)
+
+
+@pytest.mark.parametrize("word", ["heartbeat", "done", "fail", "release"])
+def test_a_lease_that_ran_out_is_refused_even_if_nobody_took_the_job(catalogue: Catalogue, word: str) -> None:
+    catalogue.plan("town-a", [base()])
+    lease = take(catalogue)
+    time.sleep(LEASE_S + 0.1)
+    with pytest.raises(StaleFence):
+        say(catalogue, word, lease)
+
+
+def test_heartbeats_hold_a_lease(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [base()])
+    lease = take(catalogue)
+    for _ in range(6):
+        time.sleep(LEASE_S / 4)
+        catalogue.heartbeat(lease)
+    catalogue.done(lease, RESULT)
+    assert only(catalogue).state is State.DONE
+
+
+def test_a_lease_that_runs_out_thrice_quarantines(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [base()])
+    for _ in range(MAX_ATTEMPTS):
+        take(catalogue)
+        time.sleep(LEASE_S + 0.1)
+    assert catalogue.lease("town-a", "w") is None
+    assert "lease expired" in (only(catalogue, State.QUARANTINED).reason or "")
+
+
+def test_what_a_done_job_left_is_kept(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [base()])
+    catalogue.done(take(catalogue), RESULT)
+    assert only(catalogue).result == RESULT
+
+
+def test_only_changed_keys_open_jobs_again(catalogue: Catalogue) -> None:
+    assert catalogue.plan("town-a", [base(0), base(1)]).added == 2
+    for _ in range(2):
+        catalogue.done(take(catalogue), RESULT)
+    assert catalogue.plan("town-a", [base(0), base(1)]).kept == 2
+    assert catalogue.lease("town-a", "w") is None
+    outcome = catalogue.plan("town-a", [base(0, "new"), base(1)])
+    assert (outcome.changed, outcome.kept) == (1, 1)
+    lease = take(catalogue)
+    assert (lease.block.x, lease.key, lease.attempt) == (0, "new", 1)
+
+
+def test_a_changed_key_makes_the_running_lease_stale(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [base(0)])
+    lease = take(catalogue)
+    catalogue.plan("town-a", [base(0, "new")])
+    with pytest.raises(StaleFence):
+        catalogue.done(lease, RESULT)
+
+
+def test_a_reduce_job_whose_key_changed_waits_again(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [reduce(), base(0), base(1)])
+    while (lease := catalogue.lease("town-a", "w")) is not None:
+        catalogue.done(lease, RESULT)
+    catalogue.plan("town-a", [reduce("r2"), base(0, "k2"), base(1)])
+    lease = take(catalogue)
+    assert lease.kind == "base"
+    assert catalogue.lease("town-a", "w") is None
+    catalogue.done(lease, RESULT)
+    assert take(catalogue).kind == "reduce"
+
+
+def test_a_reduce_job_over_done_blocks_opens_at_once(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [reduce(), base(0)])
+    while (lease := catalogue.lease("town-a", "w")) is not None:
+        catalogue.done(lease, RESULT)
+    catalogue.plan("town-a", [reduce("r2"), base(0)])
+    assert take(catalogue).kind == "reduce"
+
+
+def test_the_content_version_rises_once_it_was_announced(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [base(0)])
+    catalogue.plan("town-a", [base(0, "k2")])
+    assert catalogue.rendering("town-a").content_version == 1
+    catalogue.announce("town-a", 1)
+    catalogue.plan("town-a", [base(0, "k3")])
+    lease = take(catalogue)
+    assert lease.content_version == 2
+    catalogue.done(lease, RESULT)
+    catalogue.announce("town-a", 2)
+    catalogue.plan("town-a", [base(0, "k3")])
+    assert catalogue.rendering("town-a").content_version == 2
+
+
+def test_every_event_is_refused_in_the_states_the_table_does_not_list(open_home: Callable[..., Catalogue], catalogue: Catalogue) -> None:
+    """Brings a job into each state and says each word of a lease holder."""
+    words = {"heartbeat": Event.HEARTBEAT, "done": Event.DONE, "fail": Event.FAIL, "release": Event.RELEASE}
+    seen: dict[State, set[Event]] = {}
+    for x, state in enumerate((State.TODO, State.LEASED, State.DONE, State.QUARANTINED)):
+        seen[state] = {event for n, (word, event) in enumerate(words.items()) if accepted(catalogue, 10 * x + n, state, word)}
+    assert seen == {state: {event for event in words.values() if (state, event) in TRANSITIONS} for state in seen}
+
+
+def accepted(catalogue: Catalogue, x: int, state: State, word: str) -> bool:
+    catalogue.plan("town-a", [base(x)])
+    lease = take(catalogue)
+    if state is State.TODO:
+        catalogue.release(lease)
+    elif state is State.DONE:
+        catalogue.done(lease, RESULT)
+    elif state is State.QUARANTINED:
+        while catalogue.fail(lease, "bad") is not State.QUARANTINED:
+            lease = take(catalogue)
+    try:
+        say(catalogue, word, lease)
+    except StaleFence:
+        return False
+    finally:
+        while (left := catalogue.lease("town-a", "w")) is not None:
+            catalogue.done(left, RESULT)
+    return True
+
+
+def say(catalogue: Catalogue, word: str, lease: Lease) -> None:
+    if word == "done":
+        catalogue.done(lease, RESULT)
+    elif word == "fail":
+        catalogue.fail(lease, "bad")
+    elif word == "release":
+        catalogue.release(lease)
+    else:
+        catalogue.heartbeat(lease)

@@ -1,0 +1,106 @@
+"""Scenes, assets and renderings are kept as they were given."""
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from map3d.catalogue import AssetRecord, Catalogue, PlannedJob, SceneCrs, SceneRecord, State, Workspace
+from map3d.catalogue.sqlite import SqliteCatalogue
+from map3d.errors import AlreadyExists, BadName, NotFound, StoreError, UnknownVersion
+from map3d.types import BlockId
+from tests.catalogue.homes import rendering
+
+UTM = SceneCrs(25832, "PROJCRS[…]", "ETRS89 / UTM zone 32N", "DHHN2016 height")
+
+
+def test_what_is_kept_comes_back_equal(catalogue: Catalogue, open_home: Callable[..., Catalogue]) -> None:
+    scene = SceneRecord("b", "Title", "© someone", UTM, (691000.0, 5336000.125, 0.0), {"merge_faces": False}, "abc")
+    asset = AssetRecord("b", "x", "/data/x.gml", "citygml", "d", "s", {"triangles": 5})
+    catalogue.create_scene(scene)
+    catalogue.put_asset(asset)
+    again = open_home()
+    assert again.scene("b") == scene
+    assert again.assets("b") == [asset]
+    assert again.rendering("town-a") == rendering()
+    assert [kept.name for kept in again.scenes()] == ["b", "town"]
+    assert [kept.name for kept in again.renderings("b")] == []
+
+
+def test_names_are_taken_once(catalogue: Catalogue) -> None:
+    with pytest.raises(AlreadyExists, match="town"):
+        catalogue.create_scene(SceneRecord("town"))
+    with pytest.raises(AlreadyExists, match="--regrid"):
+        catalogue.create_rendering(rendering())
+
+
+def test_what_is_not_there_is_named_with_what_is(catalogue: Catalogue) -> None:
+    with pytest.raises(NotFound, match="'twon'; there is town"):
+        catalogue.scene("twon")
+    with pytest.raises(NotFound, match="'x'; there is town-a"):
+        catalogue.rendering("x")
+    with pytest.raises(NotFound):
+        catalogue.create_rendering(dataclasses.replace(rendering("other"), scene="nowhere"))
+    with pytest.raises(NotFound):
+        catalogue.put_asset(AssetRecord("nowhere", "x", "", "obj", "", ""))
+    with pytest.raises(NotFound):
+        catalogue.count_jobs("nowhere")
+
+
+@pytest.mark.parametrize("name", ["", "-a", "A", "a/b", "..", "a" * 65, "ä", "a\n"])
+def test_names_that_could_leave_the_workspace_are_refused(catalogue: Catalogue, name: str, tmp_path: Path) -> None:
+    with pytest.raises(BadName):
+        catalogue.create_scene(SceneRecord(name))
+    with pytest.raises(BadName):
+        Workspace(tmp_path).scene_folder(name)
+
+
+def test_the_first_to_pin_a_scene_wins(catalogue: Catalogue) -> None:
+    assert catalogue.pin_scene("town", crs=UTM).crs == UTM
+    assert catalogue.pin_scene("town", origin=(1.0, 2.0, 3.0)).origin == (1.0, 2.0, 3.0)
+    other = catalogue.pin_scene("town", crs=SceneCrs(None, None, "local metres"), origin=(0.0, 0.0, 0.0))
+    assert (other.crs, other.origin) == (UTM, (1.0, 2.0, 3.0))
+
+
+def test_an_asset_is_replaced_by_its_name(catalogue: Catalogue) -> None:
+    for digest in ("old", "new"):
+        catalogue.put_asset(AssetRecord("town", "x", "", "obj", digest, ""))
+    assert [asset.digest for asset in catalogue.assets("town")] == ["new"]
+
+
+def test_regrid_forgets_jobs_and_raises_the_version(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [PlannedJob("0-45", BlockId(0, 0, 0), "base", 0, "k", None)])
+    stale = catalogue.lease("town-a", "w")
+    assert stale is not None
+    after = catalogue.regrid(dataclasses.replace(rendering(), res_m=0.02))
+    assert (after.content_version, after.res_m) == (2, 0.02)
+    assert catalogue.rendering("town-a") == after
+    assert sum(catalogue.count_jobs("town-a").values()) == 0
+    catalogue.plan("town-a", [PlannedJob("0-45", BlockId(0, 0, 0), "base", 0, "k", None)])
+    fresh = catalogue.lease("town-a", "w")
+    assert fresh is not None
+    assert fresh.fence > stale.fence
+    assert catalogue.count_jobs("town-a")[State.LEASED] == 1
+
+
+def test_a_catalogue_of_another_version_is_refused_naming_both(tmp_path: Path) -> None:
+    path = tmp_path / "catalogue.sqlite"
+    home = SqliteCatalogue(path)
+    with home._database.transaction() as db:
+        db.execute("PRAGMA user_version = 7")
+    home.close()
+    with pytest.raises(UnknownVersion, match="version 7; this map3d reads version 1"):
+        SqliteCatalogue(path)
+
+
+def test_a_file_that_is_no_catalogue_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "catalogue.sqlite"
+    path.write_bytes(b"not a database at all" * 100)
+    with pytest.raises(StoreError, match=r"catalogue\.sqlite"):
+        SqliteCatalogue(path)
+
+
+def test_no_workspace_says_what_to_do(tmp_path: Path) -> None:
+    with pytest.raises(NotFound, match="create-scene"):
+        Workspace(tmp_path / "nowhere").open_catalogue()
