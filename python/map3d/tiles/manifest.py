@@ -1,0 +1,209 @@
+"""The manifest `rendering.json` (spec/manifest.md): built from given facts, written the same for the same facts, read with version refusal."""
+
+import json
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Final, Self
+
+from map3d.errors import BadRequest, Corrupt, Map3dError, UnknownVersion
+from map3d.geometry.frames import PinnedFrame
+from map3d.geometry.views import parse_view_id
+from map3d.tiles.naming import block_level, block_levels, block_of, parse_tile
+from map3d.tiles.occupancy import Occupancy
+from map3d.types import DEPTH_UNIT_M, BlockId, Box, Layer, TileId, Vec3, ViewAngles, check_name
+
+VERSION: Final = 1
+SHARD_SIZE: Final = 1024
+FILE_NAME: Final = "rendering.json"
+SHARDS: Final = "objects/{shard}.json"
+SEARCH: Final = "objects/search.json"
+
+
+@dataclass(frozen=True)
+class CrsFacts:
+    """The scene's CRS as clients see it; `epsg` and `vertical` None when unknown, `wkt` None for a local CRS."""
+
+    name: str
+    epsg: int | None = None
+    wkt: str | None = None
+    vertical: str | None = None
+
+
+@dataclass(frozen=True)
+class ViewFacts:
+    """A view's frame and content. `versions`: of every block that is in the store. `archives`: layer → path, published folders only."""
+
+    frame: PinnedFrame
+    occupancy: Occupancy
+    versions: Mapping[BlockId, int] = field(default_factory=dict)
+    archives: Mapping[str, str] | None = None
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """All facts that a client needs. `box`: local, of the content; `start`: local, None for the box's centre."""
+
+    name: str
+    content_version: int
+    complete: bool
+    crs: CrsFacts
+    origin: Vec3
+    box: Box
+    layers: tuple[Layer, ...]
+    views: tuple[ViewFacts, ...]
+    title: str = ""
+    attribution: str = ""
+    start: Vec3 | None = None
+    samples: int = 16
+    objects: int = 0
+
+    def __post_init__(self) -> None:
+        check_name(self.name, "rendering")
+        if not self.layers or not self.views:
+            raise BadRequest(f"rendering {self.name}: a manifest needs layers and views")
+        if len({(view.frame.size_m, view.frame.tile_px, view.frame.zmax, view.occupancy.zmax - view.frame.zmax) for view in self.views}) != 1:
+            raise BadRequest(f"rendering {self.name}: all views must have one size, tile size and depth")
+
+    @property
+    def zmax(self) -> int:
+        return self.views[0].frame.zmax
+
+    @property
+    def tile_px(self) -> int:
+        return self.views[0].frame.tile_px
+
+    def view(self, view_id: str) -> ViewFacts | None:
+        return next((view for view in self.views if view.frame.id == view_id), None)
+
+    def with_archives(self, archives: Mapping[str, Mapping[str, str]]) -> Self:
+        """The same for a published folder: view id → layer → path of its archive."""
+        return replace(self, views=tuple(replace(view, archives=archives[view.frame.id]) for view in self.views))
+
+    def to_json(self) -> dict[str, Any]:
+        frame = self.views[0].frame
+        start = self.start or tuple((low + high) / 2 for low, high in zip(*self.box, strict=True))
+        return {
+            "map3d": "rendering",
+            "version": VERSION,
+            "name": self.name,
+            "title": self.title,
+            "attribution": self.attribution,
+            "content_version": self.content_version,
+            "complete": self.complete,
+            "crs": {"epsg": self.crs.epsg, "wkt": self.crs.wkt, "name": self.crs.name, "vertical": self.crs.vertical},
+            "origin": list(self.origin),
+            "box": [list(corner) for corner in self.box],
+            "start": {"local": list(start)},
+            "tile_px": frame.tile_px,
+            "zmax": frame.zmax,
+            "size_m": frame.size_m,
+            "samples": self.samples,
+            "layers": [_layer_json(layer) for layer in self.layers],
+            "views": [_view_json(view) for view in self.views],
+            "objects": {"count": self.objects, "shard_size": SHARD_SIZE, "shards": SHARDS, "search": SEARCH},
+        }
+
+    def dump(self) -> bytes:
+        """UTF-8, the same bytes for the same facts."""
+        return (json.dumps(self.to_json(), ensure_ascii=False, indent=1, allow_nan=False) + "\n").encode()
+
+    @classmethod
+    def load(cls, data: bytes | str, where: str = FILE_NAME) -> Self:
+        """Reads a manifest; raises Corrupt, UnknownVersion. `where` is for the message."""
+        value = _document(data, where)
+        try:
+            layers = tuple(Layer(row["name"], row["kind"], row["format"]) for row in value["layers"])
+            shape = {"size_m": float(value["size_m"]), "tile_px": int(value["tile_px"]), "zmax": int(value["zmax"])}
+            return cls(
+                name=value["name"],
+                content_version=int(value["content_version"]),
+                complete=bool(value["complete"]),
+                crs=CrsFacts(**{key: value["crs"][key] for key in ("name", "epsg", "wkt", "vertical")}),
+                origin=_vec3(value["origin"]),
+                box=(_vec3(value["box"][0]), _vec3(value["box"][1])),
+                layers=layers,
+                views=tuple(_load_view(row, shape) for row in value["views"]),
+                title=value["title"],
+                attribution=value["attribution"],
+                start=_vec3(value["start"]["local"]),
+                samples=int(value["samples"]),
+                objects=int(value["objects"]["count"]),
+            )
+        except (KeyError, TypeError, ValueError, IndexError, AttributeError, Map3dError) as error:
+            raise Corrupt(f"{where}: not a manifest of map3d: {type(error).__name__}: {error}") from error
+
+
+def _document(data: bytes | str, where: str) -> dict[str, Any]:
+    try:
+        value = json.loads(data)
+    except (ValueError, RecursionError) as error:
+        raise Corrupt(f"{where}: not JSON: {error}") from error
+    if not isinstance(value, dict) or value.get("map3d") != "rendering":
+        raise Corrupt(f"{where}: not a rendering's manifest")
+    if value.get("version") != VERSION:
+        raise UnknownVersion(f"{where}: manifest of version {value.get('version')}; this map3d reads version {VERSION}")
+    return value
+
+
+def _layer_json(layer: Layer) -> dict[str, Any]:
+    row: dict[str, Any] = {"name": layer.name, "kind": layer.kind, "format": layer.format, "media_type": layer.media_type}
+    return {**row, "unit_m": DEPTH_UNIT_M} if layer.kind == "depth" else row
+
+
+def _view_json(view: ViewFacts) -> dict[str, Any]:
+    frame = view.frame
+    common = _commonest(view.versions)
+    others = {str(block): version for block, version in sorted(view.versions.items()) if version != common}
+    row = {
+        "id": frame.id,
+        "look_at_deg": frame.angles.look_at_deg,
+        "pitch_deg": frame.angles.pitch_deg,
+        "u0_m": frame.u0_m,
+        "v0_m": frame.v0_m,
+        "d0_m": frame.d0_m,
+        "occupancy": view.occupancy.encode(),
+        "version": common,
+        "versions": others,
+    }
+    return row if view.archives is None else {**row, "archives": dict(view.archives)}
+
+
+def _commonest(versions: Mapping[BlockId, int]) -> int:
+    """Of equally common ones the greatest; 1 when there are none."""
+    counts = Counter(versions.values())
+    return max(counts, key=lambda version: (counts[version], version), default=1)
+
+
+def _load_view(row: Mapping[str, Any], shape: Mapping[str, Any]) -> ViewFacts:
+    """Every block whose root tile is occupied gets a version; empty blocks that are not named are not told by a manifest."""
+    angles = ViewAngles(row["look_at_deg"], row["pitch_deg"])
+    if parse_view_id(row["id"]) != angles:
+        raise Corrupt(f"view {row['id']}: its angles are {angles.look_at_deg} and {angles.pitch_deg}")
+    frame = PinnedFrame(angles=angles, u0_m=float(row["u0_m"]), v0_m=float(row["v0_m"]), d0_m=float(row["d0_m"]), **shape)
+    occupancy = Occupancy.decode(frame.zmax, row["occupancy"])
+    named = {_block(text, frame.zmax): int(version) for text, version in row["versions"].items()}
+    versions = {**dict.fromkeys(_blocks(occupancy), int(row["version"])), **named}
+    return ViewFacts(frame, occupancy, versions, row.get("archives"))
+
+
+def _blocks(occupancy: Occupancy) -> list[BlockId]:
+    return [BlockId(*tile) for level in block_levels(occupancy.zmax) for tile in occupancy.tiles(level.root)]
+
+
+def _block(text: str, zmax: int) -> BlockId:
+    tile = parse_tile(*text.split("/"))
+    if tile is None:
+        raise Corrupt(f"versions: {text!r} is not the name of a block")
+    block_level(tile.z, zmax)
+    return BlockId(*tile)
+
+
+def _vec3(value: Any) -> Vec3:
+    x, y, z = (float(number) for number in value)
+    return (x, y, z)
+
+
+def block_version(view: ViewFacts, tile: TileId) -> int:
+    """The version to ask a tile's URL with."""
+    return view.versions.get(block_of(tile, view.frame.zmax), _commonest(view.versions))

@@ -1,0 +1,140 @@
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from map3d.errors import BadName, BadRequest, Corrupt, UnknownVersion
+from map3d.geometry.frames import pin
+from map3d.tiles.manifest import CrsFacts, Manifest, ViewFacts, block_version
+from map3d.tiles.occupancy import Occupancy
+from map3d.types import BlockId, Layer, TileId, ViewAngles
+
+SCHEMA = json.loads((Path(__file__).parents[2] / "spec" / "manifest.schema.json").read_text())
+BOX = ((-120.0, -80.0, 0.0), (130.0, 90.0, 22.5))
+LAYERS = (Layer("color", "color", "webp"), Layer("normal", "normal", "png"), Layer("id", "id", "png"), Layer("depth", "depth", "png"))
+
+
+@pytest.fixture
+def manifest():
+    frames = pin(BOX, 256, 0.1, [ViewAngles(0, 45), ViewAngles(45, 22.5)])
+    zmax = frames[0].zmax
+    occupancy = Occupancy.from_tiles(zmax, [(0, 0), (2**zmax - 1, 2**zmax - 1)])
+    versions = {BlockId(1, 0, 0): 3, BlockId(1, 1, 1): 2, BlockId(0, 0, 0): 3}
+    return Manifest(
+        name="teatime",
+        title="Tea “time” ☕",
+        attribution="© somebody",
+        content_version=3,
+        complete=True,
+        crs=CrsFacts("ETRS89 / UTM zone 32N", 25832, "PROJCRS[…]", "DHHN92 height"),
+        origin=(691000.0, 5336000.0, 500.0),
+        box=BOX,
+        layers=LAYERS,
+        views=tuple(ViewFacts(frame, occupancy, versions) for frame in frames),
+        objects=54,
+    )
+
+
+def test_a_manifest_reads_back(manifest):
+    again = Manifest.load(manifest.dump())
+    assert again == replace(manifest, start=(5.0, 5.0, 11.25))
+    assert again.dump() == manifest.dump()
+
+
+def test_the_document_is_that_of_the_specification(manifest):
+    value = json.loads(manifest.dump())
+    assert (value["map3d"], value["version"], value["size_m"]) == ("rendering", 1, 409.6)
+    assert value["start"] == {"local": [5.0, 5.0, 11.25]}
+    assert value["layers"][3] == {"name": "depth", "kind": "depth", "format": "png", "media_type": "image/png", "unit_m": 2**-10}
+    assert value["views"][1]["id"] == "45-22.5"
+    assert (value["views"][0]["version"], value["views"][0]["versions"]) == (3, {"1/1/1": 2})
+    assert "archives" not in value["views"][0]
+    assert value["objects"] == {"count": 54, "shard_size": 1024, "shards": "objects/{shard}.json", "search": "objects/search.json"}
+
+
+def test_the_schema_names_every_member(manifest):
+    archives = {view.frame.id: {"color": f"{view.frame.id}/color.pmtiles"} for view in manifest.views}
+    value = manifest.with_archives(archives).to_json()
+    schema = SCHEMA["properties"]
+    assert set(schema) == set(value) == set(SCHEMA["required"])
+    assert set(schema["views"]["items"]["properties"]) == set(value["views"][0])
+    assert set(schema["layers"]["items"]["properties"]) == set(value["layers"][3])
+    assert set(schema["crs"]["properties"]) == set(value["crs"])
+    assert set(schema["objects"]["properties"]) == set(value["objects"])
+
+
+def test_the_schema_accepts_it(manifest):
+    jsonschema = pytest.importorskip("jsonschema")
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+    jsonschema.validate(manifest.to_json(), SCHEMA)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate({**manifest.to_json(), "version": 2}, SCHEMA)
+
+
+def test_archives_are_told_of_published_folders_only(manifest):
+    archives = {view.frame.id: {"color": f"{view.frame.id}/color.pmtiles"} for view in manifest.views}
+    published = Manifest.load(manifest.with_archives(archives).dump())
+    assert published.view("45-22.5").archives == {"color": "45-22.5/color.pmtiles"}
+
+
+def test_a_tile_has_the_version_of_its_block(manifest):
+    view = manifest.views[0]
+    assert block_version(view, TileId(4, 15, 15)) == 2
+    assert block_version(view, TileId(4, 0, 15)) == 3
+    assert block_version(view, TileId(0, 0, 0)) == 3
+
+
+def test_a_rendering_without_tiles_has_a_manifest(manifest):
+    empty = replace(manifest, complete=False, objects=0, views=(ViewFacts(manifest.views[0].frame, Occupancy.from_tiles(4, [])),))
+    assert Manifest.load(empty.dump()).views[0].occupancy.count() == 0
+
+
+def test_another_version_is_refused_with_both_numbers(manifest):
+    with pytest.raises(UnknownVersion, match=r"7.*1"):
+        Manifest.load(json.dumps({**manifest.to_json(), "version": 7}))
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"{", b"[]", b"null", b'{"map3d": "search", "version": 1}', b'{"map3d": "rendering", "version": 1}', b"\xff", b"[" * 100000]
+)
+def test_what_is_no_manifest_is_corrupt(data):
+    with pytest.raises(Corrupt):
+        Manifest.load(data)
+
+
+@pytest.mark.parametrize(
+    ("where", "value"),
+    [
+        (("views", 0, "occupancy"), "AA"),
+        (("views", 0, "id"), "0-46"),
+        (("views", 0, "versions"), {"2/0/0": 1}),
+        (("views", 0, "versions"), {"x": 1}),
+        (("views", 0, "u0_m"), "zero"),
+        (("views",), []),
+        (("layers", 0, "format"), "bmp"),
+        (("layers",), None),
+        (("origin",), [1, 2]),
+        (("box",), [[0, 0, 0]]),
+        (("name",), "../x"),
+        (("zmax",), 3),
+        (("crs",), None),
+    ],
+)
+def test_a_manifest_with_a_wrong_member_is_corrupt(manifest, where, value):
+    document = manifest.to_json()
+    inner = document
+    for step in where[:-1]:
+        inner = inner[step]
+    inner[where[-1]] = value
+    with pytest.raises(Corrupt):
+        Manifest.load(json.dumps(document))
+
+
+def test_a_manifest_of_what_does_not_fit_is_not_built(manifest):
+    with pytest.raises(BadName):
+        replace(manifest, name="Tea Time")
+    with pytest.raises(BadRequest):
+        replace(manifest, views=())
+    with pytest.raises(BadRequest, match="one size"):
+        replace(manifest, views=(*manifest.views, ViewFacts(pin(BOX, 256, 0.3, [ViewAngles(90, 45)])[0], Occupancy.from_tiles(3, []))))
