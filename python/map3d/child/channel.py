@@ -1,0 +1,91 @@
+"""Messages between a parent and its child over pipes: a JSON object and any number of byte strings, each with its length before it.
+
+On the wire: u32 length of the JSON text, u64 length of all byte strings together (little-endian), the JSON, the byte strings. Their single lengths
+are in the JSON under "blobs".
+"""
+
+import json
+import os
+import select
+import struct
+import time
+from collections.abc import Sequence
+from typing import Any, Final, NamedTuple
+
+from map3d.errors import Corrupt
+
+_HEAD: Final = struct.Struct("<IQ")
+MAX_JSON_BYTES: Final = 64 << 20
+MAX_BLOBS_BYTES: Final = 4 << 30
+_READ_BYTES: Final = 1 << 20
+
+
+class Message(NamedTuple):
+    value: dict[str, Any]
+    blobs: list[bytes]
+
+
+class Channel:
+    """Both ends of a conversation. Not for several threads at once."""
+
+    def __init__(self, read_fd: int, write_fd: int) -> None:
+        """Takes over the two file descriptors."""
+        self._read_fd, self._write_fd = read_fd, write_fd
+        self._have = bytearray()
+
+    def send(self, value: dict[str, Any], blobs: Sequence[bytes] = ()) -> None:
+        """Blocks until all is written; raises BrokenPipeError when the other side is gone."""
+        text = json.dumps({**value, "blobs": [len(blob) for blob in blobs]}, ensure_ascii=False).encode("utf-8", "replace")
+        for part in (_HEAD.pack(len(text), sum(map(len, blobs))) + text, *blobs):
+            view = memoryview(part)
+            while view:
+                view = view[os.write(self._write_fd, view) :]
+
+    def receive(self, timeout_s: float | None = None) -> Message | None:
+        """The next message, None when none is complete within the time; raises EOFError when the other side is gone, Corrupt on nonsense."""
+        end = None if timeout_s is None else time.monotonic() + timeout_s
+        while True:
+            message = self._take()
+            if message is not None:
+                return message
+            left = None if end is None else max(end - time.monotonic(), 0.0)
+            if not select.select([self._read_fd], [], [], left)[0]:
+                return None
+            data = os.read(self._read_fd, _READ_BYTES)
+            if not data:
+                raise EOFError("the other side closed the pipe")
+            self._have += data
+
+    def close(self) -> None:
+        for fd in (self._read_fd, self._write_fd):
+            if fd >= 0:
+                os.close(fd)
+        self._read_fd = self._write_fd = -1
+
+    def _take(self) -> Message | None:
+        if len(self._have) < _HEAD.size:
+            return None
+        json_bytes, blobs_bytes = _HEAD.unpack_from(self._have)
+        if json_bytes > MAX_JSON_BYTES or blobs_bytes > MAX_BLOBS_BYTES:
+            raise Corrupt(f"message of {json_bytes} + {blobs_bytes} bytes; at most {MAX_JSON_BYTES} + {MAX_BLOBS_BYTES} are taken")
+        end = _HEAD.size + json_bytes + blobs_bytes
+        if len(self._have) < end:
+            return None
+        whole = bytes(memoryview(self._have)[_HEAD.size : end])
+        del self._have[:end]
+        return _parse(whole[:json_bytes], memoryview(whole)[json_bytes:])
+
+
+def _parse(text: bytes, rest: memoryview) -> Message:
+    try:
+        value = json.loads(text)
+        lengths = value.pop("blobs")
+        if sum(lengths) != len(rest) or any(length < 0 for length in lengths):
+            raise ValueError(f"byte strings of {lengths} in {len(rest)} bytes")
+    except (ValueError, AttributeError, KeyError, TypeError) as error:
+        raise Corrupt(f"message that is not one: {error}") from error
+    blobs, at = [], 0
+    for length in lengths:
+        blobs.append(bytes(rest[at : at + length]))
+        at += length
+    return Message(value, blobs)

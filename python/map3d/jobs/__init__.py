@@ -1,0 +1,1 @@
+"""Jobs: workers lease blocks, have them rendered in a child and commit them."""

@@ -1,0 +1,62 @@
+"""The task of rendering jobs: a block is rendered by a child of map3d.render.work and committed to the view's tile store."""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from map3d.catalogue import JobResult, Lease, RenderingRecord, Workspace
+from map3d.child import Child, Message
+from map3d.render.check import check_rendered
+from map3d.tiles.naming import block_level
+from map3d.tiles.sqlite_store import SqliteTileStore
+from map3d.tiles.store import StoredTile, StoreShape, TileStore
+
+RENDER_ENTRY: Final = "map3d.render.work:open_work"
+CACHE_BYTES: Final = 512 << 20
+
+
+class RenderTask:
+    """A `Task`. Holds the tile stores of the rendering's views, made if absent."""
+
+    def __init__(self, workspace: Workspace, rendering: RenderingRecord, *, cache_bytes: int = CACHE_BYTES, entry: str = RENDER_ENTRY) -> None:
+        workspace.rendering_folder(rendering.name).mkdir(parents=True, exist_ok=True)
+        self._zmax = rendering.zmax
+        self._entry = entry
+        self._setup = _setup(workspace, rendering, cache_bytes)
+        shape = StoreShape(rendering.tile_px, rendering.zmax, rendering.layers)
+        paths = {frame.id: workspace.store_path(rendering.name, frame.id) for frame in rendering.frames}
+        self._stores: Mapping[str, TileStore] = {view: SqliteTileStore.open_or_create(path, shape) for view, path in paths.items()}
+
+    def start_child(self) -> Child:
+        return Child(self._entry, self._setup)
+
+    def question(self, lease: Lease) -> dict[str, Any]:
+        return {"view": lease.view, "block": list(lease.block), "kind": lease.kind, "levels": block_level(lease.block.z, self._zmax).levels}
+
+    def commit(self, lease: Lease, answer: Message) -> JobResult:
+        store = self._stores[lease.view]
+        names: list[list[int]] = answer.value["tiles"]
+        tiles = [StoredTile(layer, z, x, y, data) for (layer, z, x, y), data in zip(names, answer.blobs, strict=False)]
+        seam = answer.blobs[len(names)] if answer.value["seam"] else None
+        check_rendered(store.shape, lease.block, tiles, seam)
+        stored = store.put_block(lease.block, lease.key, lease.content_version, tiles, seam)
+        return JobResult(
+            version=stored.version,
+            empty=not tiles,
+            tiles=len(tiles),
+            base_tiles=sum(tile.layer == 0 and tile.z == self._zmax for tile in tiles),
+            bytes=sum(len(tile.data) for tile in tiles),
+            seconds=float(answer.value["seconds"]),
+        )
+
+    def close(self) -> None:
+        for store in self._stores.values():
+            store.close()
+
+
+def _setup(workspace: Workspace, rendering: RenderingRecord, cache_bytes: int) -> dict[str, Any]:
+    return {
+        "scene": str(workspace.scene_folder(rendering.scene).absolute()),
+        "cache_bytes": cache_bytes,
+        "frames": {frame.id: frame.to_json(rendering.layers) for frame in rendering.frames},
+        "stores": {frame.id: str(workspace.store_path(rendering.name, frame.id).absolute()) for frame in rendering.frames},
+    }
