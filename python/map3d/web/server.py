@@ -1,0 +1,81 @@
+"""Runs the app under granian."""
+
+import socket
+import threading
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+from granian.constants import HTTPModes, Interfaces
+from granian.log import LogLevels
+from granian.server import Server
+
+from map3d.errors import BadRequest
+from map3d.web.app import App, create_app
+from map3d.web.tiles import DEFAULT_CACHE_BYTES
+
+START_TIMEOUT_S: Final = 60.0
+BACKLOG: Final = 2048
+
+
+def serve(
+    workspace: Path,
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    *,
+    workers: int = 1,
+    cache_bytes: int = DEFAULT_CACHE_BYTES,
+    on_ready: Callable[[str], Any] = print,
+) -> None:
+    """Serves until it is interrupted; from the main thread only. Port 0: a free one is chosen. `on_ready` is given the address once it answers.
+
+    Each of `workers` processes has a cache of its own of `cache_bytes`. Raises NotFound (no workspace), BadRequest (the port is taken).
+    """
+    create_app(workspace)
+    chosen = free_port(host, port)
+    server = Server(
+        target="map3d",
+        address=host,
+        port=chosen,
+        interface=Interfaces.ASGI,
+        workers=workers,
+        http=HTTPModes.http1,
+        websockets=False,
+        backlog=BACKLOG,
+        log_level=LogLevels.warning,
+        respawn_failed_workers=True,
+        workers_kill_timeout=5,
+    )
+    threading.Thread(target=_announce, args=(host, chosen, on_ready), daemon=True).start()
+    server.serve(target_loader=partial(_load, workspace.absolute(), cache_bytes), wrap_loader=False)
+
+
+def free_port(host: str, port: int) -> int:
+    """`port` if nobody listens there, a free one for 0; raises BadRequest. (Two servers on one port would share its requests unnoticed.)"""
+    try:
+        family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
+        with socket.socket(family) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind((host, port))
+            return int(probe.getsockname()[1])
+    except (OSError, OverflowError) as error:
+        raise BadRequest(f"cannot listen at {host} port {port}: {error}; choose another with --port, or 0 for a free one") from error
+
+
+def _load(workspace: Path, cache_bytes: int) -> App:
+    return create_app(workspace, cache_bytes=cache_bytes)
+
+
+def _announce(host: str, port: int, on_ready: Callable[[str], Any]) -> None:
+    deadline_s = time.monotonic() + START_TIMEOUT_S
+    name = f"[{host}]" if ":" in host else host
+    while time.monotonic() < deadline_s:
+        try:
+            socket.create_connection((host, port), timeout=1).close()
+        except OSError:
+            time.sleep(0.05)
+        else:
+            on_ready(f"http://{name}:{port}/")
+            return

@@ -1,0 +1,50 @@
+import asyncio
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+
+from map3d.catalogue import Workspace
+from map3d.web.app import App, create_app
+from tests.web.workspaces import make_workspace
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory) -> Workspace:
+    """Made once; for tests that change nothing in it."""
+    return make_workspace(tmp_path_factory.mktemp("finished") / "ws")
+
+
+@pytest.fixture
+def workspace(finished, tmp_path) -> Workspace:
+    return Workspace(Path(shutil.copytree(finished.root, tmp_path / "ws")))
+
+
+class Client:
+    """Asks the app without a network."""
+
+    def __init__(self, app: App) -> None:
+        self.app = app
+        self._loop = asyncio.new_event_loop()
+        self._client = httpx.AsyncClient(transport=httpx.ASGITransport(app=app), base_url="http://test")
+
+    def request(self, method: str, path: str, **options) -> httpx.Response:
+        return self._loop.run_until_complete(self._client.request(method, path, **options))
+
+    def get(self, path: str, **options) -> httpx.Response:
+        return self.request("GET", path, **options)
+
+    def close(self) -> None:
+        self._loop.run_until_complete(self._client.aclose())
+        self._loop.run_until_complete(self.app.tiles.close())
+        self._loop.run_until_complete(self._loop.shutdown_default_executor())
+        self._loop.close()
+
+
+@pytest.fixture
+def client(workspace) -> Iterator[Client]:
+    made = Client(create_app(workspace))
+    yield made
+    made.close()

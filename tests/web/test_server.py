@@ -1,0 +1,80 @@
+"""The service as it is run: granian, a real port, processes."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+
+import httpx
+import pytest
+
+from map3d.errors import BadRequest, NotFound
+from map3d.types import TileId
+from map3d.web.server import free_port, serve
+from tests.web.workspaces import every_tile, tile_bytes
+
+SCRIPT = """
+import sys
+from functools import partial
+from pathlib import Path
+from map3d.web import serve
+if __name__ == "__main__":
+    serve(Path(sys.argv[1]), port=0, workers=int(sys.argv[2]), on_ready=partial(print, flush=True))
+"""
+
+
+@pytest.fixture(params=[1, 2])
+def address(request, finished, tmp_path):
+    script = tmp_path / "serve.py"
+    script.write_text(SCRIPT)
+    command = [sys.executable, str(script), str(finished.root), str(request.param)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)})
+    try:
+        yield process.stdout.readline().strip()
+        process.send_signal(signal.SIGINT)
+        assert process.wait(20) == 0
+    finally:
+        process.kill()
+        process.stdout.close()
+
+
+def test_it_serves_all_there_is(address):
+    with httpx.Client(base_url=address) as client:
+        assert client.get("/healthz").text == "ok\n"
+        assert client.get("/tiles/tea/rendering.json").json()["name"] == "tea"
+        assert "Tea" in client.get("/").text
+        for tile in every_tile():
+            path = f"/tiles/tea/0-45/depth/{tile.z}/{tile.x}/{tile.y}"
+            assert client.get(path).content == client.get(f"{path}?v=1").content == tile_bytes("0-45", "depth", tile)
+        empty = client.get("/tiles/tea/0-45/id/4/15/0?v=1")
+        assert (empty.status_code, empty.content) == (204, b"")
+        head = client.head("/tiles/tea/0-45/id/0/0/0")
+        assert (head.status_code, head.content) == (200, b"")
+        assert int(head.headers["content-length"]) == len(tile_bytes("0-45", "id", TileId(0, 0, 0)))
+
+
+def test_a_taken_port_is_refused():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(BadRequest, match="--port"):
+            free_port("127.0.0.1", port)
+
+
+@pytest.mark.parametrize(("host", "port"), [("127.0.0.1", 70000), ("no-such-host.invalid", 0)])
+def test_an_address_that_is_none_is_refused(host, port):
+    with pytest.raises(BadRequest):
+        free_port(host, port)
+
+
+def test_a_free_port_is_free():
+    port = free_port("127.0.0.1", 0)
+    assert port > 0
+    assert free_port("127.0.0.1", port) == port
+
+
+def test_no_workspace_is_said_before_anything_starts(tmp_path):
+    with pytest.raises(NotFound):
+        serve(tmp_path / "none")

@@ -1,0 +1,146 @@
+import json
+import re
+
+import pytest
+
+from map3d.catalogue import SceneRecord
+from map3d.errors import AlreadyExists, BadRequest, Corrupt, LimitExceeded, Map3dError, NotFound, StoreError
+from map3d.tiles import viewer
+from map3d.web import create_app
+from map3d.web.errors import status_of
+from tests.web.workspaces import rendering_record
+
+
+@pytest.fixture
+def built_viewer(tmp_path, monkeypatch):
+    """Stands for the viewer's files, which a checkout may not have built."""
+    folder = tmp_path / "package" / "viewer"
+    (folder / "assets").mkdir(parents=True)
+    (folder / "index.html").write_text("<!doctype html><script src=map3d.js></script>")
+    (folder / "assets" / "worker.js").write_text("// worker")
+    monkeypatch.setattr(viewer, "files", lambda _: folder.parent)
+    return folder
+
+
+def test_only_get_and_head_exist(client):
+    rules = list(client.app.site.url_map.iter_rules())
+    assert {"pages.renderings", "pages.view", "pages.healthz", "documents.manifest", "static"} <= {rule.endpoint for rule in rules}
+    assert {method for rule in rules for method in rule.methods} == {"GET", "HEAD"}
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "PATCH", "OPTIONS", "TRACE"])
+def test_no_route_takes_another_method(client, method):
+    for rule in client.app.site.url_map.iter_rules():
+        answer = client.request(method, re.sub("<[^>]*>", "x", rule.rule))
+        assert answer.status_code == 405, rule
+        assert answer.headers["cache-control"] == "no-store"
+
+
+def test_the_manifest_is_that_of_the_rendering(client, workspace):
+    answer = client.get("/tiles/tea/rendering.json")
+    assert answer.content == workspace.manifest_path("tea").read_bytes()
+    assert answer.headers["content-type"] == "application/json"
+    assert answer.headers["cache-control"] == "no-cache"
+    assert answer.headers["access-control-allow-origin"] == "*"
+    assert client.get("/tiles/tea/rendering.json", headers={"if-none-match": answer.headers["etag"]}).status_code == 304
+    assert client.get("/view/tea/rendering.json").content == answer.content
+
+
+@pytest.mark.parametrize("path", ["/tiles/none/rendering.json", "/tiles/..%2f/rendering.json", "/tiles/A/rendering.json", "/nothing", "/view/none/"])
+def test_what_is_not_there_is_404_and_never_cached(client, path):
+    answer = client.get(path)
+    assert (answer.status_code, answer.headers["cache-control"]) == (404, "no-store")
+
+
+def test_the_list_shows_renderings_with_previews(client, workspace):
+    text = client.get("/").text
+    assert 'href="/view/tea/"' in text
+    assert 'src="/tiles/tea/0-45/color/0/0/0"' in text
+    assert "2 views, 12 tiles" in text
+
+
+def test_titles_are_text_and_never_html(client):
+    text = client.get("/").text
+    assert "Tea &lt;time&gt;" in text
+    assert "<time>" not in text
+
+
+def test_a_rendering_without_tiles_or_with_a_damaged_manifest_is_listed_too(client, workspace):
+    home = workspace.open_catalogue()
+    home.create_rendering(rendering_record("new"))
+    home.close()
+    workspace.manifest_path("tea").write_text("{")
+    text = client.get("/").text
+    assert "nothing rendered yet" in text
+    assert "cannot be read" in text
+
+
+def test_a_workspace_without_renderings_says_what_to_do(tmp_path):
+    from map3d.catalogue import Workspace
+
+    home = Workspace(tmp_path).create().open_catalogue()
+    home.create_scene(SceneRecord("town"))
+    home.close()
+    page = create_app(tmp_path).site.test_client().get("/")
+    assert "map3d create-rendering" in page.text
+
+
+def test_no_page_has_inline_script_or_style(client, built_viewer):
+    for path in ("/", "/view/tea/", "/healthz"):
+        policy = client.get(path).headers["content-security-policy"]
+        assert "default-src 'self'" in policy
+        assert "unsafe" not in policy
+        assert client.get(path).headers["x-content-type-options"] == "nosniff"
+    assert not re.search(r"<style|style=|<script(?![^>]*src)| on\w+=", client.get("/").text)
+
+
+def test_the_viewers_page_and_files_are_served(client, built_viewer):
+    assert client.get("/view/tea/").text.startswith("<!doctype html>")
+    assert client.get("/view/tea").status_code in (301, 308)
+    assert client.get("/view/tea/assets/worker.js").text == "// worker"
+
+
+@pytest.mark.parametrize("file", ["..%2f..%2fsecret", "..%2fsecret", "%2fetc%2fpasswd", "assets", "none.js", "assets%2f..%2f..%2fsecret", "%00"])
+def test_nothing_outside_the_viewer_is_served(client, built_viewer, file):
+    (built_viewer.parent / "secret").write_text("secret")
+    assert client.get(f"/view/tea/{file}").status_code == 404
+
+
+def test_a_viewer_that_is_not_built_is_said_clearly(client, tmp_path, monkeypatch):
+    monkeypatch.setattr(viewer, "files", lambda _: tmp_path / "nowhere")
+    answer = client.get("/view/tea/")
+    assert (answer.status_code, answer.headers["cache-control"]) == (503, "no-store")
+    assert "make build" in answer.text
+
+
+def test_it_is_alive(client):
+    answer = client.get("/healthz")
+    assert (answer.status_code, answer.text) == (200, "ok\n")
+
+
+def test_an_unexpected_error_is_500_without_its_text(client, monkeypatch):
+    monkeypatch.setattr("map3d.web.pages.catalogue", lambda: 1 / 0)
+    answer = client.get("/healthz")
+    assert (answer.status_code, answer.text) == (500, "internal error\n")
+
+
+@pytest.mark.parametrize(
+    ("error", "status"),
+    [
+        (NotFound("x"), 404), (BadRequest("x"), 400), (AlreadyExists("x"), 409), (LimitExceeded("x"), 413), (StoreError("/p"), 503),
+        (Corrupt("/p"), 500), (Map3dError("/p"), 500), (ValueError("/p"), 500),
+    ],
+)  # fmt: skip
+def test_the_table_of_statuses(error, status):
+    got, text = status_of(error)
+    assert got == status
+    assert "/p" not in text
+
+
+def test_no_workspace_is_not_found(tmp_path):
+    with pytest.raises(NotFound, match="create-scene"):
+        create_app(tmp_path / "none")
+
+
+def test_the_manifest_on_the_wire_is_json(client):
+    assert json.loads(client.get("/tiles/tea/rendering.json").text)["name"] == "tea"

@@ -1,0 +1,79 @@
+"""Small workspaces with tiles of made-up bytes, for tests of what hands tiles out."""
+
+from map3d.catalogue import RenderingRecord, SceneCrs, SceneRecord, Workspace
+from map3d.geometry.frames import pin
+from map3d.tiles.manifest import CrsFacts, Manifest, ViewFacts
+from map3d.tiles.naming import block_levels, block_of
+from map3d.tiles.occupancy import Occupancy
+from map3d.tiles.sqlite_store import SqliteTileStore
+from map3d.tiles.store import StoredTile, StoreShape
+from map3d.types import BlockId, Layer, TileId, ViewAngles
+
+BOX = ((-120.0, -80.0, 0.0), (130.0, 90.0, 22.5))
+LAYERS = (Layer("color", "color", "webp", 80), Layer("normal", "normal", "png"), Layer("id", "id", "png"), Layer("depth", "depth", "png"))
+VIEWS = (ViewAngles(0, 45), ViewAngles(45, 22.5))
+ZMAX = 4
+OCCUPIED = {(0, 0), (1, 0), (2, 3), (7, 7), (15, 15), (8, 3)}
+"""Base tiles with content; block 1/0/1 has none."""
+
+
+def rendering_record(name="tea"):
+    frames = tuple(pin(BOX, 256, 0.1, VIEWS))
+    return RenderingRecord(name, "town", 0.1, LAYERS, frames, BOX, title="Tea <time>", attribution="© somebody")
+
+
+def tile_bytes(view, layer, tile, salt=""):
+    """Some of them equal, as tiles of plain ground are."""
+    return f"{salt}{view}/{layer}/{tile.z}/{tile.x % 2}/{tile.y}".encode() * (1 + tile.x % 3)
+
+
+def store_shape(record):
+    return StoreShape(record.tile_px, record.zmax, record.layers)
+
+
+def put_block(store, view, block, occupancy, version=1, salt=""):
+    tiles = [tile for z in range(ZMAX + 1) for tile in occupancy.tiles(z) if block_of(tile, ZMAX) == block]
+    stored = [StoredTile(n, *tile, tile_bytes(view, layer.name, tile, salt)) for n, layer in enumerate(LAYERS) for tile in tiles]
+    return store.put_block(block, f"key{version}", version, stored, b"seam" if stored else None)
+
+
+def make_workspace(root, name="tea", version=1):
+    """A workspace with one finished rendering of two views."""
+    workspace = Workspace(root).create()
+    record = rendering_record(name)
+    catalogue = workspace.open_catalogue()
+    catalogue.create_scene(SceneRecord("town", crs=SceneCrs(25832, "PROJCRS[…]", "UTM 32N"), origin=(691000.0, 5336000.0, 500.0)))
+    catalogue.create_rendering(record)
+    catalogue.close()
+    workspace.rendering_folder(name).mkdir(parents=True)
+    occupancy = Occupancy.from_tiles(ZMAX, OCCUPIED)
+    for frame in record.frames:
+        with SqliteTileStore.create(workspace.store_path(name, frame.id), store_shape(record)) as store:
+            for level in block_levels(ZMAX):
+                for x in range(2**level.root):
+                    for y in range(2**level.root):
+                        put_block(store, frame.id, BlockId(level.root, x, y), occupancy, version)
+    workspace.manifest_path(name).write_bytes(manifest_of(record, occupancy, version).dump())
+    return workspace
+
+
+def manifest_of(record, occupancy, version=1):
+    blocks = [BlockId(*tile) for level in block_levels(ZMAX) for tile in occupancy.tiles(level.root)]
+    return Manifest(
+        name=record.name,
+        title=record.title,
+        attribution=record.attribution,
+        content_version=version,
+        complete=True,
+        crs=CrsFacts("UTM 32N", 25832),
+        origin=(691000.0, 5336000.0, 500.0),
+        box=BOX,
+        layers=record.layers,
+        views=tuple(ViewFacts(frame, occupancy, dict.fromkeys(blocks, version)) for frame in record.frames),
+        objects=3,
+    )
+
+
+def every_tile():
+    occupancy = Occupancy.from_tiles(ZMAX, OCCUPIED)
+    return [TileId(*tile) for z in range(ZMAX + 1) for tile in occupancy.tiles(z)]
