@@ -1,0 +1,102 @@
+"""Texture atlases: every paint gets an area of its own, what is left stays magenta."""
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from map3d.town.model import Face, Paint
+from map3d.town.paint import painted
+
+GUTTER_PX = 3
+MAGENTA = (255, 0, 255)
+QUALITY = 88
+SHRINK = 0.955
+MOST_PX_PER_M = 40.0
+
+
+@dataclass(frozen=True)
+class Atlas:
+    """The areas (x, y, width, height) in pixels from the upper left corner, by paint; gutters included."""
+
+    side_px: int
+    px_per_m: float
+    areas: dict[int, tuple[int, int, int, int]]
+    paints: tuple[Paint, ...]
+
+    def uv(self, face: Face) -> list[NDArray[np.float64]]:
+        """Texture coordinates of the face's rings, (0, 0) the lower left corner of the atlas."""
+        assert isinstance(face.paint, Paint)
+        x, y, _, _ = self.areas[id(face.paint)]
+        left, top = x + GUTTER_PX, y + GUTTER_PX
+        out = []
+        for st in face.st:
+            px = left + st[:, 0] * self.px_per_m
+            py = top + (face.paint.height_m - st[:, 1]) * self.px_per_m
+            out.append(np.stack([px / self.side_px, 1 - py / self.side_px], axis=1))
+        return out
+
+
+def pack(paints: Sequence[Paint], side_px: int) -> Atlas:
+    """The finest atlas that holds all paints: shelves, tallest first, at the largest scale that fits."""
+    total = sum((p.width_m + 0.2) * (p.height_m + 0.2) for p in paints)
+    longest = max(max(p.width_m, p.height_m) for p in paints)
+    fits = (side_px - 2 * GUTTER_PX - 2) / longest
+    scale = min(MOST_PX_PER_M, fits, side_px * 0.97 / np.sqrt(total))
+    while True:
+        scale = max(np.floor(scale * 4) / 4, 0.25) if scale > 4 else scale
+        areas = _shelves(paints, side_px, float(scale))
+        if areas is not None:
+            return Atlas(side_px, float(scale), areas, tuple(paints))
+        scale = min(scale * SHRINK, scale - 0.25 if scale > 4 else scale)
+
+
+def _shelves(paints: Sequence[Paint], side_px: int, scale: float) -> dict[int, tuple[int, int, int, int]] | None:
+    """Places of all paints at this scale, or None when they do not fit."""
+    sizes = [(_pixels(p.height_m, scale), _pixels(p.width_m, scale), i) for i, p in enumerate(paints)]
+    areas = {}
+    x = y = shelf = 0
+    for height, width, i in sorted(sizes, key=lambda s: (-s[0], -s[1], s[2])):
+        if x + width > side_px:
+            x, y, shelf = 0, y + shelf, 0
+        if x + width > side_px or y + height > side_px:
+            return None
+        areas[id(paints[i])] = (x, y, width, height)
+        x, shelf = x + width, max(shelf, height)
+    return areas
+
+
+def _pixels(length_m: float, scale: float) -> int:
+    return int(np.ceil(length_m * scale)) + 2 * GUTTER_PX
+
+
+def atlas_picture(atlas: Atlas, key: int) -> NDArray[np.uint8]:
+    """(side, side, 3): all paints in their places on magenta; the gutters repeat the paint's edge."""
+    picture = np.empty((atlas.side_px, atlas.side_px, 3), dtype=np.uint8)
+    picture[:] = MAGENTA
+    g = GUTTER_PX
+    for number, paint in enumerate(atlas.paints):
+        x, y, w, h = atlas.areas[id(paint)]
+        inner = painted(paint, w - 2 * g, h - 2 * g, atlas.px_per_m, key * 31 + number)
+        area = picture[y : y + h, x : x + w]
+        area[g : h - g, g : w - g] = inner
+        area[:g, g : w - g], area[h - g :, g : w - g] = inner[:1], inner[-1:]
+        area[:, :g], area[:, w - g :] = area[:, g : g + 1], area[:, w - g - 1 : w - g]
+    return picture
+
+
+def jpeg(picture: NDArray[np.uint8], quality: int = QUALITY) -> bytes:
+    """The picture as JPEG without chroma subsampling, so that magenta does not bleed far."""
+    buffer = io.BytesIO()
+    Image.fromarray(picture).save(buffer, "JPEG", quality=quality, subsampling=0)
+    return buffer.getvalue()
+
+
+def png(picture: NDArray[np.uint8]) -> bytes:
+    """The picture as PNG, RGB or RGBA."""
+    buffer = io.BytesIO()
+    Image.fromarray(picture).save(buffer, "PNG", compress_level=6)
+    return buffer.getvalue()

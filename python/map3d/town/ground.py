@@ -1,0 +1,52 @@
+"""The shape of the ground: heights above the vertical datum as a smooth function of town coordinates."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from map3d.town.seeds import rng
+
+WAVES = ((900.0, 5.0), (420.0, 2.2), (190.0, 0.8), (75.0, 0.16))
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Gently rolling ground around `level_m`, calmer in the middle, with an optional river bed along a line."""
+
+    level_m: float
+    waves: tuple[tuple[float, float, float, float], ...]
+    river: tuple[tuple[float, float], ...] = ()
+    river_half_m: float = 0.0
+
+    def height(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
+        """Heights in metres at points (x, y); any shape, broadcast."""
+        px, py = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+        total = np.zeros(px.shape)
+        for kx, ky, phase, size in self.waves:
+            total += size * np.sin(kx * px + ky * py + phase)
+        calm = 0.35 + 0.65 * np.clip(np.hypot(px, py) / 900.0, 0, 1)
+        total = self.level_m + total * calm
+        if self.river:
+            bank = np.clip((self.river_half_m + 7.0 - self.river_distance(px, py)) / 7.0, 0, 1)
+            total = total - 2.2 * bank * bank * (3 - 2 * bank)
+        return np.asarray(total)
+
+    def river_distance(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distance to the river's middle line; the line runs from west to east."""
+        line = np.array(self.river)
+        middle = np.interp(x, line[:, 0], line[:, 1])
+        slope = np.interp(x, line[:, 0], np.gradient(line[:, 1], line[:, 0]))
+        return np.asarray(np.abs(y - middle) / np.hypot(1.0, slope))
+
+
+def make_ground(seed: int, level_m: float, river: tuple[tuple[float, float], ...] = (), half_m: float = 0.0) -> Ground:
+    """The ground of a town, drawn from its seed."""
+    source = rng(seed, "ground")
+    waves = []
+    for length, size in WAVES:
+        for _ in range(2):
+            angle, phase = source.uniform(0, 2 * np.pi, 2)
+            k = 2 * np.pi / (length * source.uniform(0.8, 1.25))
+            waves.append((float(k * np.cos(angle)), float(k * np.sin(angle)), float(phase), size / 2))
+    return Ground(level_m, tuple(waves), river, half_m)

@@ -1,0 +1,16 @@
+"""From a spec to the plan of its town and the ground under it."""
+
+from map3d.town.ground import Ground, make_ground
+from map3d.town.layout import TownPlan
+from map3d.town.model import Plan
+from map3d.town.spec import TownSpec
+from map3d.town.streets import river_line
+
+
+def plan_town(spec: TownSpec) -> tuple[Plan, Ground]:
+    """The plan and the ground; the same for the same spec."""
+    drawn = TownPlan(spec.seed, spec.buildings)
+    plan = drawn.draw()
+    line = river_line(drawn.frame, drawn.reach_m)
+    river = tuple((float(x), float(y)) for x, y in line)
+    return plan, make_ground(spec.seed, spec.height_m, river, drawn.frame.river_half_m)

@@ -1,0 +1,130 @@
+"""Writes the ground: orthophoto and elevation as GeoTIFF, window by window, from the plan."""
+
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import rasterio
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+from rasterio.transform import from_origin
+from rasterio.windows import Window
+
+from map3d.town.ground import Ground
+from map3d.town.model import Plan
+from map3d.town.paint import blended, colored, courses, grain, repeated, tile_rows
+
+PATTERN_PX = 512
+STRIP_PX = 2048
+MATERIALS = (
+    "meadow", "lawn", "lawn_light", "garden", "forest", "field_green", "field_gold", "field_brown", "asphalt", "cobble", "sidewalk",
+    "plaza", "yard", "gravel", "concrete", "water", "bank", "mark", "roof_red", "roof_dark", "roof_flat", "roof_metal", "sand",
+)  # fmt: skip
+COLORS = {
+    "meadow": (126, 146, 84), "lawn": (106, 138, 70), "lawn_light": (122, 152, 82), "garden": (96, 126, 66), "forest": (58, 84, 48),
+    "field_green": (112, 142, 62), "field_gold": (200, 178, 104), "field_brown": (142, 116, 86), "asphalt": (104, 104, 106),
+    "cobble": (138, 130, 120), "sidewalk": (172, 168, 160), "plaza": (190, 178, 158), "yard": (158, 148, 132), "gravel": (188, 178, 156),
+    "concrete": (164, 162, 156), "water": (74, 108, 116), "bank": (110, 132, 80), "mark": (236, 234, 226), "roof_red": (168, 84, 56),
+    "roof_dark": (92, 84, 82), "roof_flat": (146, 144, 138), "roof_metal": (160, 166, 170), "sand": (206, 190, 152),
+}  # fmt: skip
+
+
+@lru_cache(maxsize=2)
+def patterns(px_per_m: float) -> NDArray[np.uint8]:
+    """(materials · 512 · 512, 3): a picture of each material, repeating."""
+    pictures = []
+    for number, name in enumerate(MATERIALS):
+        shade = grain(1024, 1024, 0)[::2, ::2]
+        shade = np.roll(shade, number * 37, axis=(0, 1))
+        if name in ("cobble", "plaza", "sidewalk", "concrete"):
+            size = {"cobble": 0.45, "plaza": 0.8, "sidewalk": 0.6, "concrete": 3.0}[name]
+            shade = blended(repeated(courses(px_per_m, size, size, -26, 9), PATTERN_PX, PATTERN_PX), shade)
+        elif name.startswith("roof_red") or name == "roof_dark":
+            shade = blended(repeated(tile_rows(px_per_m, 0.5, 0.4, 0.6), PATTERN_PX, PATTERN_PX), shade)
+        elif name.startswith("field"):
+            rows = (128 + 16 * np.sin(np.arange(PATTERN_PX) * 2 * np.pi / 16)).astype(np.uint8)
+            shade = blended(np.broadcast_to(rows[:, None], (PATTERN_PX, PATTERN_PX)), shade)
+        contrast = {"mark": 0.08, "water": 0.25, "asphalt": 0.35}.get(name, 0.7 if name in ("forest", "garden") else 0.5)
+        pictures.append(colored(np.asarray(shade, dtype=np.uint8), COLORS[name], contrast))
+    return np.concatenate(pictures).reshape(-1, 3)
+
+
+class Painter:
+    """Paints any window of the orthophoto; pixel (0, 0) is the north-western corner of the town's square."""
+
+    def __init__(self, plan: Plan, px_m: float) -> None:
+        self.px_m, self.radius_m = px_m, plan.radius_m
+        order = sorted(range(len(plan.patches)), key=lambda i: plan.patches[i].order)
+        self.patches = [plan.patches[i] for i in order]
+        corners = [(p.polygon.min(axis=0), p.polygon.max(axis=0)) for p in self.patches]
+        self.low = np.array([c[0] for c in corners]).reshape(-1, 2)
+        self.high = np.array([c[1] for c in corners]).reshape(-1, 2)
+        self.crowns = np.array([(t.x, t.y, t.height_m) for t in plan.trees]).reshape(-1, 3)
+
+    def window(self, x: int, y: int, width: int, height: int) -> NDArray[np.uint8]:
+        """(height, width, 3) of the window whose upper left pixel is (x, y)."""
+        west, north = -self.radius_m + x * self.px_m, self.radius_m - y * self.px_m
+        east, south = west + width * self.px_m, north - height * self.px_m
+        mask = Image.new("L", (width, height), 0)
+        draw = ImageDraw.Draw(mask)
+        hit = (self.low[:, 0] < east) & (self.high[:, 0] > west) & (self.low[:, 1] < north) & (self.high[:, 1] > south)
+        for i in np.flatnonzero(hit):
+            patch = self.patches[i]
+            px = ((patch.polygon - [west, north]) * [1 / self.px_m, -1 / self.px_m]).ravel().tolist()
+            draw.polygon(px, fill=MATERIALS.index(patch.material))
+        rows = (np.arange(y, y + height) % PATTERN_PX) * PATTERN_PX
+        columns = np.arange(x, x + width) % PATTERN_PX
+        index = np.asarray(mask).astype(np.int32) * (PATTERN_PX * PATTERN_PX) + (rows[:, None] + columns[None, :]).astype(np.int32)
+        picture = np.take(patterns(1 / self.px_m), index, axis=0)
+        self.shade(picture, west, north)
+        return picture
+
+    def shade(self, picture: NDArray[np.uint8], west: float, north: float) -> None:
+        """Darkens the ground under trees, softly."""
+        height, width = picture.shape[:2]
+        if not len(self.crowns):
+            return
+        x, y = (self.crowns[:, 0] - west) / self.px_m, (north - self.crowns[:, 1]) / self.px_m
+        r = self.crowns[:, 2] * 0.3 / self.px_m
+        for cx, cy, cr in np.stack([x, y, r], axis=1)[(x > -r) & (x < width + r) & (y > -r) & (y < height + r)]:
+            x0, x1, y0, y1 = max(0, int(cx - cr)), min(width, int(cx + cr) + 1), max(0, int(cy - cr)), min(height, int(cy + cr) + 1)
+            if x1 <= x0 or y1 <= y0:
+                continue
+            d2 = ((np.arange(y0, y1)[:, None] - cy) ** 2 + (np.arange(x0, x1)[None, :] - cx) ** 2) / (cr * cr)
+            light = 256 - (90 * np.clip(1.15 - d2, 0, 1)).astype(np.uint16)
+            piece = picture[y0:y1, x0:x1]
+            piece[:] = (piece.astype(np.uint16) * light[:, :, None]) >> 8
+
+
+def write_ortho(path: Path, plan: Plan, px_m: float, side_px: int, crs: str, east: float, north: float) -> None:
+    """The orthophoto: JPEG in a tiled GeoTIFF, written in strips, so that memory does not grow with its size."""
+    profile = {
+        "driver": "GTiff", "width": side_px, "height": side_px, "count": 3, "dtype": "uint8", "crs": crs, "compress": "JPEG",
+        "photometric": "YCBCR", "jpeg_quality": 88, "tiled": True, "blockxsize": 512, "blockysize": 512, "bigtiff": "IF_SAFER",
+        "transform": from_origin(east - plan.radius_m, north + plan.radius_m, px_m, px_m),
+    }  # fmt: skip
+    painter = Painter(plan, px_m)
+    with rasterio.open(path, "w", **profile) as out:
+        for y in range(0, side_px, STRIP_PX):
+            for x in range(0, side_px, STRIP_PX):
+                width, height = min(STRIP_PX, side_px - x), min(STRIP_PX, side_px - y)
+                picture = painter.window(x, y, width, height)
+                out.write(np.moveaxis(picture, 2, 0), window=Window(x, y, width, height))
+
+
+def write_dem(path: Path, ground: Ground, radius_m: float, px_m: float, crs: str, east: float, north: float) -> None:
+    """Heights at pixel centres, float32, nodata -9999 (not used)."""
+    side = round(2 * radius_m / px_m)
+    profile = {
+        "driver": "GTiff", "width": side, "height": side, "count": 1, "dtype": "float32", "crs": crs, "nodata": -9999.0,
+        "compress": "DEFLATE", "predictor": 3, "tiled": True, "blockxsize": 256, "blockysize": 256, "bigtiff": "IF_SAFER",
+        "transform": from_origin(east - radius_m, north + radius_m, px_m, px_m),
+    }  # fmt: skip
+    with rasterio.open(path, "w", **profile) as out:
+        for y in range(0, side, STRIP_PX):
+            for x in range(0, side, STRIP_PX):
+                width, height = min(STRIP_PX, side - x), min(STRIP_PX, side - y)
+                east_m = -radius_m + (np.arange(x, x + width) + 0.5) * px_m
+                north_m = radius_m - (np.arange(y, y + height) + 0.5) * px_m
+                heights = ground.height(east_m[None, :], north_m[:, None])
+                out.write(heights.astype(np.float32), 1, window=Window(x, y, width, height))
