@@ -33,6 +33,19 @@ fn what_is_written_is_read_back() {
 }
 
 #[test]
+fn texture_coordinates_of_a_reader_that_knows_the_wrap_mode_stay() {
+    let dir = folder("shifted");
+    let mut writer = AssetWriter::create(&dir).expect("writer");
+    let mut b = batch(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]]);
+    b.uvs = vec![[[1.25, -0.5], [1.5, 0.5], [1.75, -0.5]]];
+    b.uvs_shifted = true;
+    writer.append(&b).expect("append");
+    writer.finish(&Materials::default(), &[], AssetReport::default()).expect("finish");
+    assert_eq!(AssetMesh::open(&dir.join("mesh.m3a")).expect("open").uvs(), b.uvs);
+    std::fs::remove_dir_all(dir).expect("clean up");
+}
+
+#[test]
 fn unsound_triangles_stay_outside_and_are_counted() {
     let dir = folder("gate");
     let mut writer = AssetWriter::create(&dir).expect("writer");

@@ -27,4 +27,6 @@ pub struct Batch {
     pub ranks: Vec<Rank>,
     /// 0: placed as it is; k > 0: geometry of prototype k, in its own frame.
     pub prototype: u32,
+    /// Whoever made the batch has subtracted from `uvs` what each material's wrap mode allows: they are written as they are.
+    pub uvs_shifted: bool,
 }

@@ -145,6 +145,9 @@ impl AssetWriter {
             self.skips.bad_uv += 1;
             return [[0.0; 2]; 3];
         }
+        if batch.uvs_shifted {
+            return *uv;
+        }
         let shift = [0, 1].map(|k| uv.iter().map(|c| c[k]).fold(f32::INFINITY, f32::min).floor());
         uv.map(|c| [c[0] - shift[0], c[1] - shift[1]])
     }
