@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from map3d.catalogue import State
-from map3d.jobs.events import Done, Event, Failed, Left, Lost
+from map3d.jobs.events import Done, Event, Left
 from map3d.jobs.terms import Terms
 from tests.jobs.town import BLOCKS, LEASE_S, TERMS, Town, make_town
 
@@ -236,9 +236,7 @@ def test_a_long_block_is_held_by_heartbeats(town: Town, faults: Path) -> None:
 
     pool.run(on_event)
     town.task.close()
-    assert kinds == [Done, Left]
-    assert Lost not in kinds
-    assert Failed not in kinds
+    assert set(kinds) == {Done, Left}
 
 
 def children_of(pid: int) -> list[int]:

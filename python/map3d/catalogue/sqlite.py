@@ -7,9 +7,9 @@ from typing import Any, Final
 
 from map3d.catalogue import codec
 from map3d.catalogue.contract import LEASE_S
-from map3d.catalogue.database import Database
 from map3d.catalogue.records import AssetRecord, RenderingRecord, SceneCrs, SceneRecord
 from map3d.catalogue.sqlite_jobs import JOB_SCHEMA, SqliteJobs
+from map3d.database import Database
 from map3d.errors import AlreadyExists, NotFound
 from map3d.types import Vec3, check_name
 

@@ -4,9 +4,9 @@ import sqlite3
 from collections.abc import Iterable, Iterator
 from typing import Any, Final
 
-from map3d.catalogue.database import NOW, Database
 from map3d.catalogue.records import Job, JobResult, Lease, PlannedJob, PlanOutcome
 from map3d.catalogue.states import MAX_ATTEMPTS, OPEN, Event, State, next_state, sources
+from map3d.database import NOW, Database
 from map3d.errors import NotFound, StaleFence
 from map3d.types import BlockId
 

@@ -1,0 +1,67 @@
+"""Objects as the registry takes and gives them."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from map3d.types import Box
+
+Attribute = str | float | int | bool | None
+
+
+@dataclass(frozen=True)
+class NewObject:
+    """A line of objects.jsonl with its box. `parent`: position among the objects of the same import, None at the top. `box`: local, None without
+    geometry of its own."""
+
+    name: str
+    kind: str
+    parent: int | None = None
+    lod: str | None = None
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+    box: Box | None = None
+
+
+@dataclass(frozen=True)
+class RegisteredObject:
+    """`kind` is the object's class, `parent` its parent's id, `box` local and with all its parts, None when nothing of it has geometry."""
+
+    id: int
+    asset: str
+    name: str
+    kind: str
+    parent: int | None
+    lod: str | None
+    attributes: Mapping[str, Attribute]
+    box: Box | None
+
+    @property
+    def label(self) -> str:
+        """Name and address, for searching."""
+        address = self.attributes.get("address")
+        return f"{self.name}, {address}" if isinstance(address, str) and address.strip() else self.name
+
+    def to_json(self) -> dict[str, Any]:
+        """As in an attribute shard."""
+        return {
+            "name": self.name,
+            "class": self.kind,
+            "parent": self.parent,
+            "asset": self.asset,
+            "box": None if self.box is None else [list(corner) for corner in self.box],
+            "attributes": dict(self.attributes),
+        }
+
+
+def plain_attributes(attributes: Mapping[str, Any]) -> dict[str, Attribute]:
+    """Attributes as clients get them: string, number, boolean or null. Anything else becomes its JSON text; NaN and infinities become null."""
+    return {str(key): _plain(value) for key, value in attributes.items()}
+
+
+def _plain(value: Any) -> Attribute:
+    if value is None or isinstance(value, bool | str | int):
+        return value
+    if isinstance(value, float):
+        return value if value - value == 0 else None
+    return json.dumps(value, ensure_ascii=False, sort_keys=True)

@@ -1,0 +1,136 @@
+"""Laws of ids, shards and the search index."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from map3d.errors import LimitExceeded
+from map3d.registry import NewObject, Registry
+from map3d.registry.schema import MAX_ID
+from map3d.types import Box
+
+UNIT: Box = ((0.0, 0.0, 0.0), (2.0, 4.0, 6.0))
+
+
+@pytest.fixture
+def registry(tmp_path: Path) -> Iterator[Registry]:
+    with Registry(tmp_path / "registry.sqlite") as opened:
+        yield opened
+
+
+def things(*names: str) -> list[NewObject]:
+    return [NewObject(name, "building", box=UNIT) for name in names]
+
+
+def test_ids_are_positive_and_unique_over_assets(registry: Registry) -> None:
+    first = registry.put_asset("a", things("x", "y"))
+    second = registry.put_asset("b", things("x", "y"))
+    ids = [*first.tolist(), *second.tolist()]
+    assert len(set(ids)) == 4
+    assert min(ids) > 0
+    assert first.dtype == "uint32"
+
+
+def test_ids_stay_over_reimports_in_any_order(registry: Registry) -> None:
+    before = dict(zip("xyz", registry.put_asset("a", things("x", "y", "z")).tolist(), strict=True))
+    after = dict(zip("zwx", registry.put_asset("a", things("z", "w", "x")).tolist(), strict=True))
+    assert (after["x"], after["z"]) == (before["x"], before["z"])
+    assert after["w"] not in before.values()
+    assert registry.get(before["y"]) is None
+    assert registry.count() == 3
+
+
+def test_an_object_that_returns_gets_its_id_back(registry: Registry) -> None:
+    (first,) = registry.put_asset("a", things("x"))
+    registry.put_asset("a", [])
+    assert registry.count() == 0
+    (other,) = registry.put_asset("a", things("y"))
+    (again,) = registry.put_asset("a", things("x"))
+    assert first == again != other
+
+
+def test_objects_of_one_name_are_told_apart(registry: Registry) -> None:
+    ids = registry.put_asset("a", things("x", "x", "x"))
+    assert len(set(ids.tolist())) == 3
+    assert registry.put_asset("a", things("x", "x", "x")).tolist() == ids.tolist()
+
+
+def test_a_parents_box_holds_its_parts(registry: Registry) -> None:
+    parts = [
+        NewObject("part", "building", parent=1, box=((1.0, 1.0, 1.0), (9.0, 2.0, 2.0))),
+        NewObject("whole", "building"),
+        NewObject("door", "opening", parent=0, box=((-5.0, 1.0, 1.0), (0.0, 2.0, 2.0))),
+    ]
+    part, whole, _ = registry.put_asset("a", parts).tolist()
+    found = registry.get(whole)
+    assert found is not None
+    assert found.box == ((-5.0, 1.0, 1.0), (9.0, 2.0, 2.0))
+    inner = registry.get(part)
+    assert inner is not None
+    assert inner.parent == whole
+
+
+def test_a_ring_of_parents_ends(registry: Registry) -> None:
+    ring = [NewObject("a", "building", parent=1, box=UNIT), NewObject("b", "building", parent=0)]
+    ids = registry.put_asset("a", ring).tolist()
+    assert [registry.get(number) is not None for number in ids] == [True, True]
+
+
+def test_shards_hold_the_ids_of_their_thousand(registry: Registry) -> None:
+    registry.put_asset("a", [NewObject(f"n{k}", "tree") for k in range(2500)])
+    documents = list(registry.shards())
+    assert [document["shard"] for document in documents] == registry.shard_numbers() == [0, 1, 2]
+    assert all(int(key) // 1024 == document["shard"] for document in documents for key in document["objects"])
+    assert sum(len(document["objects"]) for document in documents) == 2500 == registry.count() == len(list(registry.objects()))
+    assert registry.shard(77) == {"map3d": "objects", "version": 1, "shard": 77, "objects": {}}
+
+
+def test_a_shard_says_what_the_spec_says(registry: Registry) -> None:
+    attributes = {"roofType": "1000", "height": 12.5, "storeys": 3, "new": True, "none": None, "bad": float("nan"), "list": [1, "é"]}
+    (number,) = registry.put_asset("a", [NewObject("x", "building", attributes=attributes, box=UNIT)]).tolist()
+    assert registry.shard(0)["objects"][str(number)] == {
+        "name": "x",
+        "class": "building",
+        "parent": None,
+        "asset": "a",
+        "box": [[0.0, 0.0, 0.0], [2.0, 4.0, 6.0]],
+        "attributes": {**attributes, "bad": None, "list": '[1, "é"]'},
+    }
+
+
+def test_the_search_index_is_sorted_by_label_then_id(registry: Registry) -> None:
+    objects = [
+        NewObject("b", "building", box=UNIT),
+        NewObject("a", "building", attributes={"address": "Street 5"}, box=UNIT),
+        NewObject("c", "building"),
+    ]
+    b, a, _ = registry.put_asset("x", objects).tolist()
+    (b2,) = registry.put_asset("y", things("b")).tolist()
+    top = [1.0, 2.0, 6.0]
+    assert registry.search() == {"map3d": "search", "version": 1, "entries": [[a, "a, Street 5", top], [b, "b", top], [b2, "b", top]]}
+
+
+def test_ids_are_not_given_beyond_the_last(registry: Registry) -> None:
+    with registry._database.transaction() as db:
+        db.execute("INSERT INTO object(id, asset, name, occurrence, class, attributes, present) VALUES (?, 'z', 'z', 0, 'z', '{}', 0)", (MAX_ID,))
+    with pytest.raises(LimitExceeded, match=str(MAX_ID)):
+        registry.put_asset("a", things("x"))
+    assert registry.count() == 0
+
+
+def test_a_failed_import_leaves_the_earlier_objects(registry: Registry) -> None:
+    registry.put_asset("a", things("x"))
+    with pytest.raises(IndexError):
+        registry.put_asset("a", [NewObject("y", "building", parent=5)])
+    assert list(registry.ids_of("a")) == ["x"]
+
+
+def test_the_scenes_own_object_is_there_when_told(registry: Registry) -> None:
+    ground = registry.scene_object("ground", "terrain")
+    assert registry.scene_object("ground", "terrain") == ground
+    assert registry.count() == 0
+    registry.set_scene_object(ground, UNIT)
+    assert registry.count() == 1
+    registry.set_scene_object(ground, None)
+    assert registry.get(ground) is None
