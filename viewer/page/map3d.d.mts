@@ -1,0 +1,1 @@
+export * from "../src/map3d";

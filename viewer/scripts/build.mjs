@@ -1,0 +1,43 @@
+// Builds dist/: map3d.js (a global), map3d.mjs (a module), the page that shows a rendering, and type declarations.
+import { execFileSync } from "node:child_process";
+import { cpSync, mkdirSync, rmSync, writeFileSync } from "node:fs";
+import { dirname, join, resolve } from "node:path";
+import { fileURLToPath } from "node:url";
+import * as esbuild from "esbuild";
+
+const root = resolve(dirname(fileURLToPath(import.meta.url)), "..");
+const dist = join(root, "dist");
+const shared = { bundle: true, minify: true, target: "es2022", legalComments: "none", logLevel: "warning" };
+const banner = { js: "/*! map3d, Apache-2.0 */" };
+
+/** `import code from "worker:./x.ts"`: the bundled source text of a worker. */
+export const workers = {
+  name: "workers",
+  setup(build) {
+    build.onResolve({ filter: /^worker:/ }, ({ path, resolveDir }) => ({ path: resolve(resolveDir, path.slice("worker:".length)), namespace: "worker" }));
+    build.onLoad({ filter: /.*/, namespace: "worker" }, async ({ path }) => {
+      const made = await esbuild.build({ ...shared, entryPoints: [path], format: "iife", write: false, metafile: true });
+      const watchFiles = Object.keys(made.metafile.inputs).map((file) => resolve(file));
+      return { contents: made.outputFiles[0].text, loader: "text", watchFiles };
+    });
+  },
+};
+
+async function bundle(entry, name, options) {
+  await esbuild.build({ ...shared, banner, entryPoints: [join(root, entry)], outfile: join(dist, name), plugins: [workers], ...options });
+}
+
+export async function build() {
+  rmSync(dist, { recursive: true, force: true });
+  mkdirSync(dist, { recursive: true });
+  await bundle("src/map3d.ts", "map3d.mjs", { format: "esm" });
+  await bundle("src/map3d.ts", "map3d.js", { format: "iife", globalName: "map3d" });
+  await bundle("page/page.ts", "page.js", { format: "esm", external: ["./map3d.mjs"] });
+  await esbuild.build({ ...shared, entryPoints: [join(root, "page/page.css")], outfile: join(dist, "page.css"), target: "chrome110" });
+  cpSync(join(root, "page/index.html"), join(dist, "index.html"));
+  const tsc = join(root, "node_modules/typescript/bin/tsc");
+  execFileSync(process.execPath, [tsc, "-p", join(root, "tsconfig.types.json")], { stdio: "inherit" });
+  writeFileSync(join(dist, "map3d.d.ts"), 'export * from "./types/map3d";\n');
+}
+
+if (process.argv[1] === fileURLToPath(import.meta.url)) await build();

@@ -1,0 +1,38 @@
+type Child = Node | string;
+
+/** An element with classes, attributes and children; strings become text, never HTML. */
+export function element<K extends keyof HTMLElementTagNameMap>(tag: K, classes: string, attributes: Record<string, string> = {}, ...children: Child[]): HTMLElementTagNameMap[K] {
+  const made = document.createElement(tag);
+  if (classes) made.className = classes;
+  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+  made.append(...children);
+  return made;
+}
+
+/** A button with an icon drawn as an SVG path (24 × 24, stroked) and a name that is read aloud. */
+export function iconButton(classes: string, label: string, path: string): HTMLButtonElement {
+  const button = element("button", classes, { type: "button", "aria-label": label, title: label });
+  button.append(icon(path));
+  return button;
+}
+
+export function icon(path: string): SVGSVGElement {
+  const ns = "http://www.w3.org/2000/svg";
+  const svg = document.createElementNS(ns, "svg");
+  for (const [name, value] of Object.entries({ viewBox: "0 0 24 24", "aria-hidden": "true", class: "map3d-icon" })) svg.setAttribute(name, value);
+  const line = document.createElementNS(ns, "path");
+  line.setAttribute("d", path);
+  svg.append(line);
+  return svg;
+}
+
+const adopted = new WeakSet<Document>();
+
+/** Adds the viewer's style sheet to a document, once. A constructed sheet, which a CSP without inline styles allows. */
+export function adoptStyles(document: Document, css: string): void {
+  if (adopted.has(document)) return;
+  adopted.add(document);
+  const sheet = new CSSStyleSheet();
+  sheet.replaceSync(css);
+  document.adoptedStyleSheets = [sheet, ...document.adoptedStyleSheets];
+}

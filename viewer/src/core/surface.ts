@@ -1,0 +1,29 @@
+import type { Evented } from "./events";
+import type { Vec2, Vec3 } from "./vec";
+
+export interface SurfaceEvents {
+  /** The picture has moved: places on the screen are others now. */
+  move: object;
+}
+
+/** What markers, popups and controls see of a map. */
+export interface Surface {
+  readonly container: HTMLElement;
+  /** Holds markers and popups; lies over the picture and lets pointers through. */
+  readonly overlayPane: HTMLElement;
+  /** CSS pixels from the container's top left corner; null while the map has no view yet. */
+  project(world: Vec3): Vec2 | null;
+  readonly moves: Pick<Evented<SurfaceEvents>, "on" | "off">;
+}
+
+/** Something that can be added to a map. */
+export interface Attachable<M> {
+  onAdd(map: M): void;
+  onRemove(map: M): void;
+}
+
+/** A map to which things are added. */
+export interface Holder<M> {
+  add(item: Attachable<M>): unknown;
+  discard(item: Attachable<M>): unknown;
+}

@@ -1,0 +1,78 @@
+import type { Tile } from "../geo/frame";
+import type { LayerKind } from "../geo/manifest";
+import type { Light } from "../geo/light";
+import type { TileData } from "../tiles/tileData";
+
+/** How a layer is shown: lit colour, colour as stored, or a data layer in false colours. */
+export type Mode = "lit" | "color" | "normal" | "id" | "depth";
+export const MODES: readonly Mode[] = ["lit", "color", "normal", "id", "depth"];
+
+/** sRGB, 0..1 each. */
+export type Rgb = readonly [number, number, number];
+
+/** A rectangle of the screen and the tile whose pixels fill it. Device pixels, y down; quads of a pass are disjoint. */
+export interface Quad {
+  readonly from: Tile;
+  /** Left, top, right, bottom. */
+  readonly rect: readonly [number, number, number, number];
+  /** Where the tile's own left top corner lies. */
+  readonly origin: readonly [number, number];
+  /** Texels a device pixel. */
+  readonly scale: number;
+}
+
+/** Access to the tiles in memory. */
+export interface TileAccess {
+  /** Unique name of the tile's data in the cache. */
+  key(kind: LayerKind, tile: Tile): string;
+  /** null: empty, or kept by the drawer; undefined: not in memory. */
+  data(kind: LayerKind, tile: Tile): TileData | null | undefined;
+  /** The drawer has its own copy: ours need not be kept. */
+  taken(kind: LayerKind, tile: Tile): void;
+}
+
+/** One image layer in a frame. */
+export interface Pass {
+  readonly mode: Mode;
+  readonly quads: readonly Quad[];
+  readonly tiles: TileAccess;
+  /** Colours by object id. */
+  readonly highlight: ReadonlyMap<number, Rgb>;
+  /** True when colour has no alpha, so that the id layer says what is covered. */
+  readonly masked: boolean;
+  readonly opacity: number;
+  /** Depth values that get the first and the last false colour. */
+  readonly depthRange: readonly [number, number];
+}
+
+export interface FrameSpec {
+  /** Device pixels. */
+  readonly width: number;
+  readonly height: number;
+  /** Device pixels a CSS pixel. */
+  readonly dpr: number;
+  readonly light: Readonly<Light>;
+  readonly passes: readonly Pass[];
+}
+
+export interface DrawerEvents {
+  /** All that was drawn is gone; what the drawer had taken must be fetched anew. */
+  lost(): void;
+  restored(): void;
+}
+
+/** What paints a frame. It never asks for frames or tiles itself. */
+export interface Drawer {
+  readonly name: string;
+  draw(frame: FrameSpec): void;
+  /** The tile has left the cache. */
+  release(key: string): void;
+  destroy(): void;
+}
+
+/** Layers without which a tile cannot be shown in a mode. */
+export function neededKinds(mode: Mode, masked: boolean): LayerKind[] {
+  if (mode === "lit") return masked ? ["color", "normal", "id"] : ["color", "normal"];
+  if (mode === "color") return masked ? ["color", "id"] : ["color"];
+  return [mode];
+}

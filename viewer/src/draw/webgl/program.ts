@@ -1,0 +1,67 @@
+import { DrawError } from "../../core/errors";
+import { fragment, VERTEX, variantName, type Variant } from "./shader";
+
+/** A linked program and where its uniforms are; those it does not use are null, which WebGL ignores. */
+export interface Program {
+  readonly handle: WebGLProgram;
+  at(uniform: string): WebGLUniformLocation | null;
+}
+
+const UNITS = ["u_color", "u_normal", "u_id", "u_depth", "u_table"] as const;
+
+/** Texture unit of a sampler. */
+export const unitOf = (sampler: (typeof UNITS)[number]): number => UNITS.indexOf(sampler);
+
+/** Programs by variant, compiled when first asked for. */
+export class Programs {
+  readonly #gl: WebGL2RenderingContext;
+  readonly #known = new Map<string, Program>();
+
+  constructor(gl: WebGL2RenderingContext) {
+    this.#gl = gl;
+  }
+
+  /** The program of a variant, in use from now on. @throws DrawError with the compiler's log */
+  use(variant: Variant): Program {
+    const name = variantName(variant);
+    const program = this.#known.get(name) ?? this.#link(variant, name);
+    this.#known.set(name, program);
+    this.#gl.useProgram(program.handle);
+    return program;
+  }
+
+  #link(variant: Variant, name: string): Program {
+    const gl = this.#gl;
+    const handle = gl.createProgram();
+    for (const [type, source] of [[gl.VERTEX_SHADER, VERTEX] as const, [gl.FRAGMENT_SHADER, fragment(variant)] as const]) {
+      const shader = gl.createShader(type);
+      if (!shader) throw new DrawError("the WebGL context is lost");
+      gl.shaderSource(shader, source);
+      gl.compileShader(shader);
+      gl.attachShader(handle, shader);
+    }
+    gl.linkProgram(handle);
+    if (!gl.getProgramParameter(handle, gl.LINK_STATUS) && !gl.isContextLost()) throw new DrawError(`shader ${name}: ${this.#log(handle)}`);
+    return this.#withUniforms(handle);
+  }
+
+  #log(handle: WebGLProgram): string {
+    const shaders = this.#gl.getAttachedShaders(handle) ?? [];
+    return [this.#gl.getProgramInfoLog(handle), ...shaders.map((shader) => this.#gl.getShaderInfoLog(shader))].join(" ").trim();
+  }
+
+  #withUniforms(handle: WebGLProgram): Program {
+    const gl = this.#gl;
+    const places = new Map<string, WebGLUniformLocation | null>();
+    const at = (uniform: string): WebGLUniformLocation | null => {
+      const known = places.get(uniform);
+      if (known !== undefined) return known;
+      const place = gl.getUniformLocation(handle, uniform);
+      places.set(uniform, place);
+      return place;
+    };
+    gl.useProgram(handle);
+    for (const sampler of UNITS) gl.uniform1i(at(sampler), unitOf(sampler));
+    return { handle, at };
+  }
+}

@@ -1,0 +1,164 @@
+import type { Mode } from "../drawer";
+
+/** What a program is made for; each combination is compiled when it is first drawn. */
+export interface Variant {
+  readonly mode: Mode;
+  readonly masked: boolean;
+  readonly highlight: boolean;
+}
+
+export const variantName = (v: Variant): string => `${v.mode}${v.masked ? "+masked" : ""}${v.highlight ? "+highlight" : ""}`;
+
+export const VERTEX = `#version 300 es
+uniform vec4 u_rect; // left, top, right, bottom in clip space
+void main() {
+  bool right = (gl_VertexID & 1) == 1, bottom = gl_VertexID > 1;
+  gl_Position = vec4(right ? u_rect.z : u_rect.x, bottom ? u_rect.w : u_rect.y, 0.0, 1.0);
+}`;
+
+export function fragment({ mode, masked, highlight }: Variant): string {
+  const defines = [`#define MODE_${mode.toUpperCase()}`, masked ? "#define MASKED" : "", highlight ? "#define HIGHLIGHT" : ""];
+  return ["#version 300 es", ...defines, HEAD, COLOR, FALSE_COLOR, HIGHLIGHT, MAIN].join("\n");
+}
+
+const HEAD = `
+precision highp float;
+precision highp int;
+precision highp usampler2D;
+precision highp sampler2D;
+uniform float u_height;   // of the screen
+uniform vec2 u_origin;    // of the tile
+uniform float u_scale;    // texels a pixel
+uniform ivec4 u_bounds;   // texels that may be read, the gutter's among them where it is filled
+uniform int u_size;       // texels a side
+uniform float u_opacity;
+uniform vec3 u_sun;       // unit, towards the light
+uniform vec2 u_light;     // ambient, diffuse
+uniform vec2 u_range;     // depth
+uniform sampler2D u_color;
+uniform sampler2D u_normal;
+uniform usampler2D u_id;
+uniform usampler2D u_depth;
+out vec4 o_color;
+
+vec3 linear(vec3 c) { return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), step(0.04045, c)); }
+vec3 srgb(vec3 c) { return mix(c * 12.92, 1.055 * pow(max(c, 0.0031308), vec3(1.0 / 2.4)) - 0.055, step(0.0031308, c)); }
+ivec2 inside(ivec2 at) { return clamp(at, ivec2(0), ivec2(u_size - 1)) + 1; }
+`;
+
+/** Colour is averaged premultiplied, and in linear light when it is lit: shade first, filter then. */
+const COLOR = `
+#if defined(MODE_LIT) || defined(MODE_COLOR)
+float lambert(ivec2 at) {
+  vec3 stored = texelFetch(u_normal, at, 0).rgb;
+  if (stored == vec3(0.0)) return u_light.x + 0.5 * u_light.y;
+  return u_light.x + u_light.y * max(0.0, dot(normalize(stored * 2.0 - 1.0), u_sun));
+}
+
+vec4 tap(ivec2 texel) {
+  ivec2 at = clamp(texel, u_bounds.xy, u_bounds.zw) + 1;
+  vec4 c = texelFetch(u_color, at, 0);
+#ifdef MASKED
+  c.a = texelFetch(u_id, at, 0).r == 0u ? 0.0 : 1.0;
+#endif
+#ifdef MODE_LIT
+  c.rgb = linear(c.rgb) * lambert(at);
+#endif
+  return vec4(c.rgb * c.a, c.a);
+}
+
+vec4 surface(vec2 texel) {
+  vec2 corner = floor(texel - 0.5), f = texel - 0.5 - corner;
+  ivec2 at = ivec2(corner);
+  f = mix(f, round(f), lessThan(abs(f - round(f)), vec2(0.004)));
+  vec4 c = f == vec2(0.0) ? tap(at)
+    : f == vec2(1.0) ? tap(at + 1)
+    : mix(mix(tap(at), tap(at + ivec2(1, 0)), f.x), mix(tap(at + ivec2(0, 1)), tap(at + 1), f.x), f.y);
+  if (c.a == 0.0) return vec4(0.0);
+#ifdef MODE_LIT
+  return vec4(srgb(clamp(c.rgb / c.a, 0.0, 1.0)), c.a);
+#else
+  return vec4(c.rgb / c.a, c.a);
+#endif
+}
+#endif
+`;
+
+const FALSE_COLOR = `
+#ifdef MODE_NORMAL
+vec4 surface(vec2 texel) {
+  vec3 n = texelFetch(u_normal, inside(ivec2(floor(texel))), 0).rgb;
+  return vec4(n, n == vec3(0.0) ? 0.0 : 1.0);
+}
+#endif
+#ifdef MODE_ID
+vec4 surface(vec2 texel) {
+  uint id = texelFetch(u_id, inside(ivec2(floor(texel))), 0).r;
+  uint h = id * 2654435769u;
+  h ^= h >> 15;
+  vec3 hue = 0.5 + 0.5 * cos(6.2831853 * (float(h & 1023u) / 1024.0 + vec3(0.0, 0.33, 0.67)));
+  return vec4(mix(vec3(0.55 + 0.35 * float(h >> 10 & 255u) / 255.0), hue, 0.45), id == 0u ? 0.0 : 1.0);
+}
+#endif
+#ifdef MODE_DEPTH
+vec4 surface(vec2 texel) {
+  uint d = texelFetch(u_depth, inside(ivec2(floor(texel))), 0).r;
+  float t = clamp((float(d) - u_range.x) / (u_range.y - u_range.x), 0.0, 1.0);
+  vec3 near = vec3(0.99, 0.91, 0.70), middle = vec3(0.36, 0.62, 0.62), far = vec3(0.16, 0.18, 0.36);
+  return vec4(t < 0.5 ? mix(near, middle, t * 2.0) : mix(middle, far, t * 2.0 - 1.0), d == 0xffffffffu ? 0.0 : 1.0);
+}
+#endif
+`;
+
+/** A table of ids with open addressing: R is the id, G its colour; an empty place ends the search. */
+const HIGHLIGHT = `
+#ifdef HIGHLIGHT
+uniform usampler2D u_table;
+uniform uint u_mask;      // places − 1
+uniform int u_probes;
+uniform uvec2 u_one;      // the only id and its colour; id 0: see the table
+uniform float u_rim;      // texels
+
+uint colorOf(uint id) {
+  if (id == 0u) return 0u;
+  if (u_one.x != 0u) return u_one.x == id ? u_one.y : 0u;
+  uint width = uint(textureSize(u_table, 0).x);
+  uint place = (id * 2654435769u >> 7) & u_mask;
+  for (int k = 0; k < u_probes; k++) {
+    uvec2 entry = texelFetch(u_table, ivec2(place % width, place / width), 0).rg;
+    if (entry.x == id) return entry.y;
+    if (entry.x == 0u) return 0u;
+    place = (place + 1u) & u_mask;
+  }
+  return 0u;
+}
+
+uint idAt(vec2 texel) {
+  ivec2 at = clamp(ivec2(floor(texel)), u_bounds.xy, u_bounds.zw);
+  return texelFetch(u_id, at + 1, 0).r;
+}
+
+vec4 highlighted(vec4 color, vec2 texel) {
+  uint id = texelFetch(u_id, inside(ivec2(floor(texel))), 0).r;
+  uint packed = colorOf(id);
+  if (packed == 0u) return color;
+  vec3 tint = vec3(uvec3(packed, packed >> 8, packed >> 16) & 255u) / 255.0;
+  float grey = dot(color.rgb, vec3(0.2126, 0.7152, 0.0722));
+  bool rim = idAt(texel + vec2(u_rim, 0.0)) != id || idAt(texel - vec2(u_rim, 0.0)) != id
+    || idAt(texel + vec2(0.0, u_rim)) != id || idAt(texel - vec2(0.0, u_rim)) != id;
+  vec3 body = mix(color.rgb, tint * (0.35 + 0.75 * grey), 0.72);
+  return vec4(clamp(rim ? tint : body, 0.0, 1.0), max(color.a, rim ? 0.9 : color.a));
+}
+#endif
+`;
+
+const MAIN = `
+void main() {
+  vec2 texel = (vec2(gl_FragCoord.x, u_height - gl_FragCoord.y) - u_origin) * u_scale;
+  vec4 color = surface(texel);
+#ifdef HIGHLIGHT
+  color = highlighted(color, texel);
+#endif
+  color.a *= u_opacity;
+  o_color = vec4(color.rgb * color.a, color.a);
+}`;

@@ -1,0 +1,128 @@
+import type { TileData } from "../../tiles/tileData";
+
+/** A tile on the GPU, with a gutter of one texel around it that holds its neighbours' pixels. */
+export interface TileTexture {
+  readonly texture: WebGLTexture;
+  readonly width: number;
+  readonly height: number;
+  /** Sides whose gutter is filled, at (dx + 1) + 3 (dy + 1). */
+  readonly filled: boolean[];
+}
+
+/** Name of the same layer's tile dx columns to the right and dy rows down. */
+export type Neighbour = (dx: number, dy: number) => string;
+
+/** Tile textures by the name of their data. */
+export class Textures {
+  readonly #gl: WebGL2RenderingContext;
+  readonly #known = new Map<string, TileTexture>();
+  readonly #reader: WebGLFramebuffer;
+
+  constructor(gl: WebGL2RenderingContext) {
+    this.#gl = gl;
+    this.#reader = gl.createFramebuffer();
+    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
+    gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, false);
+    gl.pixelStorei(gl.UNPACK_COLORSPACE_CONVERSION_WEBGL, gl.NONE);
+  }
+
+  get(key: string): TileTexture | undefined {
+    return this.#known.get(key);
+  }
+
+  /** Uploads a tile and exchanges edge pixels with those of its neighbours that are here. */
+  upload(key: string, data: TileData, neighbour: Neighbour): TileTexture {
+    const tile = this.#create(data);
+    this.#known.set(key, tile);
+    for (const [dx, dy] of AROUND) {
+      const other = this.#known.get(neighbour(dx, dy));
+      if (!other || other.width !== tile.width || other.height !== tile.height) continue;
+      this.#copyEdge(other, tile, dx, dy);
+      this.#copyEdge(tile, other, -dx, -dy);
+    }
+    return tile;
+  }
+
+  release(key: string): void {
+    const tile = this.#known.get(key);
+    if (!tile) return;
+    this.#known.delete(key);
+    this.#gl.deleteTexture(tile.texture);
+  }
+
+  clear(): void {
+    for (const key of [...this.#known.keys()]) this.release(key);
+    this.#gl.deleteFramebuffer(this.#reader);
+  }
+
+  #create(data: TileData): TileTexture {
+    const gl = this.#gl;
+    const { width, height } = data;
+    const texture = gl.createTexture();
+    gl.activeTexture(gl.TEXTURE0 + SPARE_UNIT);
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
+    const stored = data.kind === "color" ? gl.RGBA8 : data.kind === "normal" ? gl.RGB8 : gl.R32UI;
+    gl.texStorage2D(gl.TEXTURE_2D, 1, stored, width + 2, height + 2);
+    this.#fill(data);
+    return { texture, width, height, filled: new Array<boolean>(9).fill(false) };
+  }
+
+  #fill(data: TileData): void {
+    const gl = this.#gl;
+    const { width, height } = data;
+    if (data.kind === "color") gl.texSubImage2D(gl.TEXTURE_2D, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, data.bitmap);
+    else if (data.kind === "normal") gl.texSubImage2D(gl.TEXTURE_2D, 0, 1, 1, width, height, gl.RGB, gl.UNSIGNED_BYTE, data.values);
+    else gl.texSubImage2D(gl.TEXTURE_2D, 0, 1, 1, width, height, gl.RED_INTEGER, gl.UNSIGNED_INT, data.values);
+  }
+
+  /** Fills `to`'s gutter towards (dx, dy) with the nearest pixels of `from`, which lies there. */
+  #copyEdge(from: TileTexture, to: TileTexture, dx: number, dy: number): void {
+    const gl = this.#gl;
+    gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.#reader);
+    gl.framebufferTexture2D(gl.READ_FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, from.texture, 0);
+    gl.activeTexture(gl.TEXTURE0 + SPARE_UNIT);
+    gl.bindTexture(gl.TEXTURE_2D, to.texture);
+    const [toX, fromX, w] = along(dx, to.width);
+    const [toY, fromY, h] = along(dy, to.height);
+    gl.copyTexSubImage2D(gl.TEXTURE_2D, 0, toX, toY, fromX, fromY, w, h);
+    to.filled[side(dx, dy)] = true;
+    if (dx === 0 || dy === 0) this.#copyCorners(to, dx, dy, fromX, fromY);
+    gl.bindFramebuffer(gl.READ_FRAMEBUFFER, null);
+  }
+
+  /** Corners of the gutter come from the side's end pixels until the tile across the corner is here. */
+  #copyCorners(to: TileTexture, dx: number, dy: number, fromX: number, fromY: number): void {
+    for (const end of [-1, 1]) {
+      const [cx, cy] = dx === 0 ? [end, dy] : [dx, end];
+      if (to.filled[side(cx, cy)]) continue;
+      const [toX] = along(cx, to.width);
+      const [toY] = along(cy, to.height);
+      const sourceX = dx === 0 ? (end < 0 ? 1 : to.width) : fromX;
+      const sourceY = dy === 0 ? (end < 0 ? 1 : to.height) : fromY;
+      this.#gl.copyTexSubImage2D(this.#gl.TEXTURE_2D, 0, toX, toY, sourceX, sourceY, 1, 1);
+    }
+  }
+}
+
+/** A unit that no sampler uses. */
+export const SPARE_UNIT = 7;
+
+const AROUND = [-1, 0, 1].flatMap((dy) => [-1, 0, 1].map((dx) => [dx, dy] as const)).filter(([dx, dy]) => dx !== 0 || dy !== 0);
+
+const side = (dx: number, dy: number): number => dx + 1 + 3 * (dy + 1);
+
+/** First texel to write, first texel to read in the other tile, and how many, along one axis. */
+function along(step: number, size: number): [number, number, number] {
+  if (step < 0) return [0, size, 1];
+  if (step > 0) return [size + 1, 1, 1];
+  return [1, 1, size];
+}
+
+/** Texels that may be read, gutter included where it is filled: least x, least y, greatest x, greatest y; −1 and size are the gutter. */
+export function boundsOf({ filled, width, height }: TileTexture): [number, number, number, number] {
+  return [filled[3] ? -1 : 0, filled[1] ? -1 : 0, filled[5] ? width : width - 1, filled[7] ? height : height - 1];
+}

@@ -1,0 +1,133 @@
+import type { Vec2 } from "../core/vec";
+
+/** What gestures do to a map. Screen positions in CSS pixels from the container's top left corner. */
+export interface Steered {
+  readonly container: HTMLElement;
+  /** A hand is on the map: movements stop. */
+  grab(): void;
+  panBy(dx: number, dy: number): void;
+  glide(velocity: Vec2): void;
+  /** At once, without smoothing. */
+  pinch(factor: number, anchor: Vec2): void;
+  zoomBy(delta: number, anchor: Vec2): void;
+  tap(at: Vec2): void;
+  hover(at: Vec2): void;
+}
+
+interface Touch {
+  at: Vec2;
+  readonly start: Vec2;
+}
+
+const TAP_PX = 6;
+const DOUBLE_TAP_MS = 320;
+const DOUBLE_TAP_PX = 28;
+const VELOCITY_MS = 90;
+
+/** Mouse, touch and pen on the canvas: drag, pinch, wheel, tap, double tap. */
+export class Gestures {
+  readonly #map: Steered;
+  readonly #canvas: HTMLCanvasElement;
+  readonly #touches = new Map<number, Touch>();
+  readonly #listeners = new AbortController();
+  #trail: { at: Vec2; ms: number }[] = [];
+  #moved = false;
+  #lastTap: { at: Vec2; ms: number } | null = null;
+
+  constructor(map: Steered, canvas: HTMLCanvasElement) {
+    this.#map = map;
+    this.#canvas = canvas;
+    const { signal } = this.#listeners;
+    canvas.addEventListener("pointerdown", (event) => { this.#down(event); }, { signal });
+    canvas.addEventListener("pointermove", (event) => { this.#move(event); }, { signal });
+    canvas.addEventListener("pointerup", (event) => { this.#up(event, true); }, { signal });
+    canvas.addEventListener("pointercancel", (event) => { this.#up(event, false); }, { signal });
+    canvas.addEventListener("wheel", (event) => { this.#wheel(event); }, { signal, passive: false });
+  }
+
+  destroy(): void {
+    this.#listeners.abort();
+  }
+
+  #place(event: MouseEvent): Vec2 {
+    const box = this.#canvas.getBoundingClientRect();
+    return [event.clientX - box.left, event.clientY - box.top];
+  }
+
+  #down(event: PointerEvent): void {
+    if (event.pointerType === "mouse" && event.button !== 0) return;
+    const at = this.#place(event);
+    this.#canvas.setPointerCapture(event.pointerId);
+    this.#map.grab();
+    if (this.#touches.size === 0) this.#moved = false;
+    else this.#moved = true;
+    this.#touches.set(event.pointerId, { at, start: at });
+    this.#trail = [];
+  }
+
+  #move(event: PointerEvent): void {
+    const touch = this.#touches.get(event.pointerId);
+    const at = this.#place(event);
+    if (!touch) {
+      if (event.pointerType === "mouse") this.#map.hover(at);
+      return;
+    }
+    if (!this.#moved && Math.hypot(at[0] - touch.start[0], at[1] - touch.start[1]) < TAP_PX) return;
+    this.#moved = true;
+    this.#map.container.classList.add("map3d-dragging");
+    const other = [...this.#touches].find(([id]) => id !== event.pointerId)?.[1];
+    if (other) this.#pinch(touch, other, at);
+    else this.#drag(touch, at);
+    touch.at = at;
+  }
+
+  #drag(touch: Touch, at: Vec2): void {
+    this.#map.panBy(at[0] - touch.at[0], at[1] - touch.at[1]);
+    const now = performance.now();
+    this.#trail = [...this.#trail.filter(({ ms }) => now - ms < VELOCITY_MS), { at, ms: now }];
+  }
+
+  #pinch(touch: Touch, other: Touch, at: Vec2): void {
+    const before = Math.hypot(touch.at[0] - other.at[0], touch.at[1] - other.at[1]);
+    const after = Math.hypot(at[0] - other.at[0], at[1] - other.at[1]);
+    this.#map.panBy((at[0] - touch.at[0]) / 2, (at[1] - touch.at[1]) / 2);
+    if (before > 0 && after > 0) this.#map.pinch(after / before, [(at[0] + other.at[0]) / 2, (at[1] + other.at[1]) / 2]);
+  }
+
+  #up(event: PointerEvent, meant: boolean): void {
+    const touch = this.#touches.get(event.pointerId);
+    if (!touch) return;
+    this.#touches.delete(event.pointerId);
+    if (this.#touches.size > 0) return;
+    this.#map.container.classList.remove("map3d-dragging");
+    if (!meant) return;
+    if (this.#moved) this.#release();
+    else this.#tap(touch.at);
+  }
+
+  #release(): void {
+    const now = performance.now();
+    const recent = this.#trail.filter(({ ms }) => now - ms < VELOCITY_MS);
+    const [first, last] = [recent[0], recent.at(-1)];
+    const ms = first && last ? last.ms - first.ms : 0;
+    if (!first || !last || ms < 10) return;
+    const velocity: Vec2 = [(last.at[0] - first.at[0]) / ms, (last.at[1] - first.at[1]) / ms];
+    if (Math.hypot(...velocity) > 0.15) this.#map.glide(velocity);
+  }
+
+  #tap(at: Vec2): void {
+    const last = this.#lastTap;
+    const now = performance.now();
+    const double = last && now - last.ms < DOUBLE_TAP_MS && Math.hypot(at[0] - last.at[0], at[1] - last.at[1]) < DOUBLE_TAP_PX;
+    this.#lastTap = double ? null : { at, ms: now };
+    if (double) this.#map.zoomBy(1, at);
+    else this.#map.tap(at);
+  }
+
+  #wheel(event: WheelEvent): void {
+    event.preventDefault();
+    const lines = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 24 : event.deltaMode === WheelEvent.DOM_DELTA_PAGE ? 240 : 1;
+    const pixels = Math.max(-240, Math.min(240, event.deltaY * lines));
+    this.#map.zoomBy(-pixels / (event.ctrlKey ? 80 : 260), this.#place(event));
+  }
+}

@@ -1,0 +1,224 @@
+import { UsageError } from "../core/errors";
+import { Evented } from "../core/events";
+import type { Attachable } from "../core/surface";
+import { readColor } from "../draw/color";
+import { MODES, neededKinds, type Mode, type Pass, type Rgb, type TileAccess } from "../draw/drawer";
+import type { Tile } from "../geo/frame";
+import type { LayerKind, Rendering, View } from "../geo/manifest";
+import { Objects, type ObjectInfo, type SearchEntry } from "../tiles/objects";
+import { Source } from "../tiles/source";
+import { Store } from "../tiles/store";
+import { baseUrl } from "../tiles/url";
+import { depthRangeOf, planLayer, type LayerPlan } from "./layerPlan";
+import type { map } from "./map";
+import type { Sight, Stage } from "./stage";
+
+export interface ImageLayerOptions {
+  /** lit | color | normal | id | depth. Default "lit". */
+  mode?: Mode;
+  /** 0..1. Default 1. */
+  opacity?: number;
+  /** Colour of highlights that name none. Default "#e4572e". */
+  highlightColor?: string;
+  /** Overrides the manifest's. */
+  attribution?: string;
+}
+
+export interface ImageLayerEvents {
+  /** The manifest has been read. */
+  ready: { rendering: Rendering };
+  error: { error: Error };
+}
+
+/** A rendering on the map. Several base URLs are several hosts with the same tiles; requests are spread over them by tile. */
+export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<map> {
+  readonly options: Required<Omit<ImageLayerOptions, "attribution">> & Pick<ImageLayerOptions, "attribution">;
+  readonly #source: Source;
+  #mode: Mode;
+  #stage: Stage | undefined;
+  #map: map | undefined;
+  #store: Store | undefined;
+  #rendering: Rendering | undefined;
+  #objects: Objects | undefined;
+  #colors: ReadonlyMap<number, Rgb> = new Map();
+
+  constructor(urls: string | readonly string[], options: ImageLayerOptions = {}) {
+    super();
+    const list = typeof urls === "string" ? [urls] : urls;
+    if (list.length === 0) throw new UsageError("an imageLayer needs at least one base URL, e.g. \"https://host/tiles/teatime\"");
+    this.options = { mode: "lit", opacity: 1, highlightColor: "#e4572e", ...options };
+    this.#mode = checkedMode(this.options.mode);
+    this.#source = new Source(list.map((url) => baseUrl(url, document.baseURI)));
+  }
+
+  addTo(map: map): this {
+    map.add(this);
+    return this;
+  }
+
+  remove(): this {
+    this.#map?.discard(this);
+    return this;
+  }
+
+  /** The manifest; undefined until it has been read. */
+  get rendering(): Rendering | undefined {
+    return this.#rendering;
+  }
+
+  get attribution(): string {
+    return this.options.attribution ?? this.#rendering?.json.attribution ?? "";
+  }
+
+  get mode(): Mode {
+    return this.#mode;
+  }
+
+  setMode(mode: Mode): this {
+    this.#mode = checkedMode(mode);
+    this.#checkLayers();
+    return this.#redraw();
+  }
+
+  setOpacity(opacity: number): this {
+    this.options.opacity = Math.min(Math.max(opacity, 0), 1);
+    return this.#redraw();
+  }
+
+  /** Shows objects in a colour (#rrggbb), besides those that are highlighted already. */
+  highlight(ids: number | Iterable<number>, { color = this.options.highlightColor }: { color?: string } = {}): this {
+    const rgb = readColor(color);
+    const colors = new Map(this.#colors);
+    for (const id of typeof ids === "number" ? [ids] : ids) colors.set(id >>> 0, rgb);
+    this.#colors = colors;
+    return this.#redraw();
+  }
+
+  /** Without ids: all highlights. */
+  clearHighlight(ids?: number | Iterable<number>): this {
+    const gone = new Set(typeof ids === "number" ? [ids] : (ids ?? this.#colors.keys()));
+    this.#colors = new Map([...this.#colors].filter(([id]) => !gone.has(id)));
+    return this.#redraw();
+  }
+
+  /** Highlighted object ids. */
+  get highlighted(): number[] {
+    return [...this.#colors.keys()];
+  }
+
+  /** Name, class and attributes of an object; null when nothing is known of it. */
+  async object(id: number): Promise<ObjectInfo | null> {
+    return (await this.#objects?.get(id)) ?? null;
+  }
+
+  /** The search index: id, label, local position. */
+  async searchIndex(): Promise<readonly SearchEntry[]> {
+    return (await this.#objects?.search()) ?? [];
+  }
+
+  onAdd(map: map): void {
+    this.#map = map;
+    const stage = map.stage;
+    this.#stage = stage;
+    const failed = (error: Error): void => {
+      this.fire("error", { error });
+      stage.report(error);
+    };
+    this.#store = new Store(stage.nameLayer(), this.#source, stage.shared, (error) => {
+      if (error) failed(error);
+      stage.request();
+    });
+    this.#source.manifest().then((rendering) => {
+      if (this.#stage === stage) this.#begin(rendering, stage);
+    }, failed);
+  }
+
+  onRemove(): void {
+    this.#stage = this.#map = this.#store = this.#rendering = this.#objects = undefined;
+  }
+
+  /** @internal The layer's view of a direction. */
+  viewOf(direction: string): View | undefined {
+    return this.#rendering?.views.get(direction);
+  }
+
+  /** @internal */
+  get store(): Store | undefined {
+    return this.#store;
+  }
+
+  /** @internal What to paint and to fetch. */
+  plan(sight: Sight, hover: boolean): LayerPlan | null {
+    const view = this.viewOf(sight.camera.frame.id);
+    if (!view || !this.#rendering || !this.#store) return null;
+    const needed = neededKinds(this.#shownMode(this.#rendering), this.#masked(this.#rendering));
+    const extra: LayerKind[] = (this.#colors.size > 0 || hover) && !needed.includes("id") ? ["id"] : [];
+    return planLayer(sight, this.#rendering, view, this.#store, needed, extra);
+  }
+
+  /** @internal */
+  pass(plan: LayerPlan): Pass {
+    const rendering = this.#rendering as Rendering;
+    return {
+      mode: this.#shownMode(rendering),
+      quads: plan.quads,
+      tiles: this.#access(plan.view),
+      highlight: this.#colors,
+      masked: this.#masked(rendering),
+      opacity: this.options.opacity,
+      depthRange: depthRangeOf(rendering, plan.view),
+    };
+  }
+
+  #begin(rendering: Rendering, stage: Stage): void {
+    this.#rendering = rendering;
+    this.#objects = new Objects(this.#source.base, rendering.json);
+    stage.ready(rendering);
+    this.#checkLayers();
+    this.fire("ready", { rendering });
+  }
+
+  #checkLayers(): void {
+    const [rendering, stage] = [this.#rendering, this.#stage];
+    if (!rendering || !stage) return;
+    const missing = neededKinds(this.#shownMode(rendering), this.#masked(rendering)).filter((kind) => !rendering.layers.has(kind));
+    if (missing.length > 0) stage.report(new UsageError(`mode "${this.#mode}" needs the layer ${missing.join(", ")}, which rendering "${rendering.json.name}" does not have`));
+  }
+
+  /** Without normals nothing can be lit. */
+  #shownMode(rendering: Rendering): Mode {
+    return this.#mode === "lit" && !rendering.layers.has("normal") ? "color" : this.#mode;
+  }
+
+  #masked(rendering: Rendering): boolean {
+    return rendering.layers.get("color")?.format === "jpeg";
+  }
+
+  #access(view: View): TileAccess {
+    const [store, layers] = [this.#store as Store, (this.#rendering as Rendering).layers];
+    const stored = (kind: LayerKind, tile: Tile): ReturnType<Store["get"]> => {
+      const layer = layers.get(kind);
+      return layer && store.get(view, layer, tile);
+    };
+    return {
+      key: (kind, tile) => {
+        const layer = layers.get(kind);
+        return layer ? store.key(view, layer, tile) : "";
+      },
+      data: (kind, tile) => stored(kind, tile)?.data,
+      taken: (kind, tile) => {
+        if (kind === "color" || kind === "normal") store.surrender(view, layers.get(kind), tile);
+      },
+    };
+  }
+
+  #redraw(): this {
+    this.#stage?.request();
+    return this;
+  }
+}
+
+function checkedMode(mode: Mode): Mode {
+  if (!MODES.includes(mode)) throw new UsageError(`mode "${String(mode)}" is unknown; take one of ${MODES.join(", ")}`);
+  return mode;
+}

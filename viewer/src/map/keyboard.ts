@@ -1,0 +1,27 @@
+import type { Steered } from "./gestures";
+
+export interface Turned extends Steered {
+  /** +1: the next direction counter-clockwise. */
+  rotate(step: number): unknown;
+}
+
+const STEP_PX = 90;
+const PAN: Record<string, readonly [number, number]> = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+const ZOOM: Record<string, number> = { "+": 1, "=": 1, "-": -1, _: -1 };
+const TURN: Record<string, number> = { "[": 1, "]": -1, q: 1, e: -1 };
+
+/** Arrows move, + and − zoom, q and e (or [ and ]) turn. Keys count while the map itself has the focus. */
+export function listenToKeys(map: Turned, smooth: (dx: number, dy: number) => void, signal: AbortSignal): void {
+  const { container } = map;
+  container.tabIndex = 0;
+  const pressed = (event: KeyboardEvent): void => {
+    if (event.target !== container || event.ctrlKey || event.metaKey || event.altKey) return;
+    const [pan, zoom, turn] = [PAN[event.key], ZOOM[event.key], TURN[event.key]];
+    if (pan) smooth(pan[0] * STEP_PX, pan[1] * STEP_PX);
+    else if (zoom !== undefined) map.zoomBy(zoom, [container.clientWidth / 2, container.clientHeight / 2]);
+    else if (turn !== undefined) map.rotate(turn);
+    else return;
+    event.preventDefault();
+  };
+  container.addEventListener("keydown", pressed, { signal });
+}

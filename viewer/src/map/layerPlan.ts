@@ -1,0 +1,96 @@
+import { dot, sub, type Vec2 } from "../core/vec";
+import { uvdFromLocal } from "../geo/axes";
+import { cssPixelM, type Camera } from "../geo/camera";
+import { ancestor, type Frame, type Tile } from "../geo/frame";
+import type { LayerKind, Rendering, View } from "../geo/manifest";
+import { corners } from "../core/vec";
+import { placeQuads } from "../draw/plan";
+import type { Quad } from "../draw/drawer";
+import { coverOf, fromTheMiddle, levelFor, standsFor, type Rect } from "../tiles/cover";
+import type { Job } from "../tiles/queue";
+import type { Store } from "../tiles/store";
+import type { Sight } from "./stage";
+
+/** What a layer wants painted and fetched for a camera. */
+export interface LayerPlan {
+  readonly view: View;
+  readonly level: number;
+  readonly cover: readonly Tile[];
+  readonly quads: readonly Quad[];
+  readonly jobs: readonly Job[];
+  /** All of the view is here (or known not to come). */
+  readonly complete: boolean;
+}
+
+/** Levels above the shown one whose tiles are fetched first, so that something stands there soon. */
+const COARSE_STEPS = 3;
+
+/** U and V of the camera's middle in the layer's own frame. */
+export function middleIn(frame: Frame, { camera, origin }: Sight, rendering: Rendering): Vec2 {
+  const shift = sub(origin, rendering.json.origin);
+  return [camera.u + dot(frame.axes.right, shift), camera.v + dot(frame.axes.up, shift)];
+}
+
+/** @param needed kinds without which a tile is not shown  @param extra kinds that are fetched after them */
+export function planLayer(sight: Sight, rendering: Rendering, view: View, store: Store, needed: readonly LayerKind[], extra: readonly LayerKind[]): LayerPlan {
+  const { frame, occupancy } = view;
+  const { camera, dpr } = sight;
+  const [u, v] = middleIn(frame, sight, rendering);
+  const px = cssPixelM(camera);
+  const rect = rectAround(u, v, camera, px);
+  const level = levelFor(frame, px / dpr, dpr);
+  const occupied = (tile: Tile): boolean => occupancy.has(tile);
+  const cover = coverOf(frame, occupied, level, rect);
+  const here = (kind: LayerKind, tile: Tile): boolean => holds(rendering, store, view, kind, tile);
+  const ready = (tile: Tile): boolean => needed.every((kind) => here(kind, tile));
+  const screen = { left: rect[0][0], top: rect[1][1], px_m: px / dpr };
+  const quads = placeQuads(frame, screen, cover.flatMap((tile) => standsFor(tile, ready, occupied)), level);
+  const ordered = fromTheMiddle(frame, cover, rect);
+  const jobs = [
+    ...jobsFor(rendering, store, view, needed, ancestorsOf(ordered)),
+    ...jobsFor(rendering, store, view, needed, ordered),
+    ...jobsFor(rendering, store, view, extra, ordered),
+  ];
+  return { view, level, cover, quads, jobs, complete: jobs.length === 0 };
+}
+
+/** Least and greatest depth value that the rendering's box can have in a view. */
+export function depthRangeOf(rendering: Rendering, { frame }: View): Vec2 {
+  const unit = rendering.layers.get("depth")?.unit_m ?? 2 ** -10;
+  const depths = corners(rendering.json.box).map((corner) => (uvdFromLocal(frame.axes, corner)[2] - frame.d0) / unit);
+  return [Math.min(...depths), Math.max(...depths)];
+}
+
+function rectAround(u: number, v: number, { width, height }: Camera, px: number): Rect {
+  const [w, h] = [(width / 2) * px, (height / 2) * px];
+  return [
+    [u - w, v - h],
+    [u + w, v + h],
+  ];
+}
+
+function ancestorsOf(tiles: readonly Tile[]): Tile[] {
+  const found = new Map<string, Tile>();
+  for (const tile of tiles) {
+    const above = ancestor(tile, Math.min(COARSE_STEPS, tile.z));
+    found.set(`${String(above.x)}/${String(above.y)}`, above);
+  }
+  return [...found.values()];
+}
+
+function holds(rendering: Rendering, store: Store, view: View, kind: LayerKind, tile: Tile): boolean {
+  const layer = rendering.layers.get(kind);
+  return layer !== undefined && store.get(view, layer, tile) !== undefined;
+}
+
+/** Jobs for the tiles that are neither here nor known to have failed. */
+function jobsFor(rendering: Rendering, store: Store, view: View, kinds: readonly LayerKind[], tiles: readonly Tile[]): Job[] {
+  const jobs: Job[] = [];
+  for (const tile of tiles) {
+    for (const kind of kinds) {
+      const layer = rendering.layers.get(kind);
+      if (layer && !store.get(view, layer, tile) && !store.failed(view, layer, tile)) jobs.push(store.job(view, layer, tile));
+    }
+  }
+  return jobs;
+}

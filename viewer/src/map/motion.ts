@@ -1,0 +1,92 @@
+import { clamp, type Vec2 } from "../core/vec";
+import { cssPixelM, zoomedAt, type Camera } from "../geo/camera";
+
+/** A movement under way: gives the camera at a time, null when it has ended. */
+type Movement = (now_ms: number, camera: Camera) => Camera | null;
+
+const FRICTION_MS = 260;
+const WHEEL_MS = 70;
+
+/** Moves the camera over time: flights, wheel zoom, inertia. One movement at a time; a new one takes over. */
+export class Motion {
+  #movement: Movement | null = null;
+  #wheel: { zoom: number; anchor: Vec2 } | null = null;
+  readonly #changed: () => void;
+
+  /** @param changed called when frames are needed */
+  constructor(changed: () => void) {
+    this.#changed = changed;
+  }
+
+  get moving(): boolean {
+    return this.#movement !== null;
+  }
+
+  stop(): void {
+    this.#movement = null;
+    this.#wheel = null;
+  }
+
+  /** The camera for this moment. */
+  step(now_ms: number, camera: Camera): Camera {
+    const next = this.#movement?.(now_ms, camera);
+    if (this.#movement && !next) this.stop();
+    return next ?? camera;
+  }
+
+  /** Straight to another camera of the same view, slowing at both ends; a fixed point stays fixed. */
+  fly(from: Camera, to: Camera, duration_ms: number): void {
+    const steep = to.zoom - from.zoom;
+    this.#begin((share, camera) => {
+      const t = share * share * (3 - 2 * share);
+      const way = Math.abs(steep) < 1e-6 ? t : (1 - 2 ** (-steep * t)) / (1 - 2 ** -steep);
+      return { ...camera, u: from.u + (to.u - from.u) * way, v: from.v + (to.v - from.v) * way, zoom: from.zoom + steep * t };
+    }, duration_ms);
+  }
+
+  /** Zooms by `delta` levels about a point of the screen; calls in a row add up. */
+  zoomBy(camera: Camera, delta: number, anchor: Vec2, limits: readonly [number, number]): void {
+    const zoom = clamp((this.#wheel?.zoom ?? camera.zoom) + delta, ...limits);
+    this.#wheel = { zoom, anchor };
+    let last = performance.now();
+    this.#run((now, at) => {
+      const share = 1 - Math.exp(-Math.max(now - last, 4) / WHEEL_MS);
+      last = now;
+      const left = zoom - at.zoom;
+      if (Math.abs(left) < 0.002) return at.zoom === zoom ? null : zoomedAt(at, zoom, anchor);
+      return zoomedAt(at, at.zoom + left * share, anchor);
+    });
+  }
+
+  /** Lets the picture glide on after a drag. Velocity in CSS pixels a millisecond. */
+  glide(velocity: Vec2): void {
+    let last = performance.now();
+    let [vx, vy] = velocity;
+    this.#run((now, camera) => {
+      const dt = Math.min(Math.max(now - last, 1), 64);
+      last = now;
+      const px = cssPixelM(camera);
+      const next = { ...camera, u: camera.u - vx * dt * px, v: camera.v + vy * dt * px };
+      const slower = Math.exp(-dt / FRICTION_MS);
+      [vx, vy] = [vx * slower, vy * slower];
+      return Math.hypot(vx, vy) < 0.02 ? null : next;
+    });
+  }
+
+  #begin(at: (share: number, camera: Camera) => Camera, duration_ms: number): void {
+    const start = performance.now();
+    let ended = false;
+    this.#run((now, camera) => {
+      if (ended) return null;
+      const share = clamp((now - start) / Math.max(duration_ms, 1), 0, 1);
+      ended = share >= 1;
+      return at(share, camera);
+    });
+    this.#wheel = null;
+  }
+
+  #run(movement: Movement): void {
+    this.#movement = movement;
+    this.#changed();
+  }
+}

@@ -1,0 +1,86 @@
+import type { Light } from "../geo/light";
+import type { Vec3 } from "../core/vec";
+import type { Pick } from "./picker";
+import type { Attribute } from "../tiles/objects";
+import type { marker } from "../overlay/marker";
+
+export interface MapOptions {
+  /** Where to look first, world coordinates. Default: the rendering's start. */
+  center?: Vec3;
+  /** Default: everything fits. */
+  zoom?: number;
+  /** View id such as "45-22.5". Default: the manifest's first view. */
+  direction?: string;
+  /** Default: from the south-west, 48° high. */
+  light?: Partial<Light>;
+  /** CSS background behind the model. Default: the style sheet's paper, light or dark. */
+  background?: string;
+  /** Shows buttons and compass. Default true. */
+  controls?: boolean;
+  /** Shows the attribution. Default true. */
+  attribution?: boolean;
+  /** Fetches ids of what is seen, so that "mousemove" tells what lies under the pointer. Default false. */
+  hover?: boolean;
+  /** Bytes of decoded tiles to keep. Default 96 MB. */
+  cacheBytes?: number;
+  /** Tile requests at once. Default 12. */
+  concurrency?: number;
+  /** Decoding threads. Default 2. */
+  workers?: number;
+  /** Device pixels a CSS pixel are at most this. Default 3. */
+  maxPixelRatio?: number;
+  /** Keeps the picture readable between frames (screenshots, tests). Default false. */
+  preserveDrawingBuffer?: boolean;
+}
+
+export type FilledOptions = MapOptions & Required<Omit<MapOptions, "center" | "zoom" | "direction" | "light" | "background">>;
+
+export const DEFAULTS: Omit<FilledOptions, "center" | "zoom" | "direction" | "light" | "background"> = {
+  controls: true,
+  attribution: true,
+  hover: false,
+  cacheBytes: 96e6,
+  concurrency: 12,
+  workers: 2,
+  maxPixelRatio: 3,
+  preserveDrawingBuffer: false,
+};
+
+export interface ClickEvent extends Pick {
+  /** CSS pixels from the container's top left corner. */
+  readonly point: readonly [number, number];
+  readonly name?: string;
+  readonly class?: string;
+  /** Text, never HTML. */
+  readonly attributes?: Readonly<Record<string, Attribute>>;
+}
+
+export interface HoverEvent extends Pick {
+  readonly point: readonly [number, number];
+}
+
+export interface MapEvents {
+  /** The first layer's manifest is here: the map has a view. */
+  ready: object;
+  /** The first complete view has been drawn. Once. */
+  load: object;
+  /** Everything in view is drawn and nothing moves. */
+  idle: object;
+  move: object;
+  moveend: object;
+  zoom: { zoom: number };
+  directionchange: { direction: string };
+  lightchange: { light: Readonly<Light> };
+  /** At once after a click, from what is in memory. */
+  preclick: ClickEvent;
+  /** With exact values and attributes, once they are here. */
+  click: ClickEvent;
+  mousemove: HoverEvent;
+  /** A marker was selected. */
+  select: { marker: marker };
+  resize: { width: number; height: number };
+  error: { error: Error };
+  contextlost: object;
+  contextrestored: object;
+  remove: object;
+}

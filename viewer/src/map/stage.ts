@@ -1,0 +1,23 @@
+import type { Vec3 } from "../core/vec";
+import type { Camera } from "../geo/camera";
+import type { Rendering } from "../geo/manifest";
+import type { Shared } from "../tiles/store";
+
+/** What an image layer gets from the map it is on. */
+export interface Stage {
+  readonly shared: Shared;
+  /** A name for the layer's tiles that no other layer of the map has. */
+  nameLayer(): string;
+  /** The layer's manifest is here. */
+  ready(rendering: Rendering): void;
+  /** A frame is needed. */
+  request(): void;
+  report(error: Error): void;
+}
+
+/** The camera, and the origin (world) that its U and V refer to. */
+export interface Sight {
+  readonly camera: Camera;
+  readonly origin: Vec3;
+  readonly dpr: number;
+}

@@ -1,0 +1,19 @@
+/** map3d: shows renderings of 3D city models. See README.md. */
+export { map } from "./map/map";
+export { imageLayer, type ImageLayerEvents, type ImageLayerOptions } from "./map/imageLayer";
+export { marker, type MarkerEvents, type MarkerOptions } from "./overlay/marker";
+export { popup, type PopupEvents, type PopupOptions } from "./overlay/popup";
+export { Evented, type Fired, type Listener } from "./core/events";
+export { DecodeError, DrawError, FetchError, ManifestError, Map3dError, UsageError } from "./core/errors";
+export type { ClickEvent, HoverEvent, MapEvents, MapOptions } from "./map/options";
+export type { Pick } from "./map/picker";
+export type { Attachable, Holder, Surface } from "./core/surface";
+export type { Box3, Vec2, Vec3 } from "./core/vec";
+export type { Mode } from "./draw/drawer";
+export type { Light } from "./geo/light";
+export type { ManifestJson, Rendering } from "./geo/manifest";
+export type { Attribute, ObjectInfo, SearchEntry } from "./tiles/objects";
+export { windOf } from "./ui/controls";
+
+/** Of the viewer; manifests of version 1 are read. */
+export const version = "0.1.0";

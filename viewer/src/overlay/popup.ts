@@ -1,0 +1,96 @@
+import { element, iconButton } from "../core/dom";
+import { Evented } from "../core/events";
+import type { Attachable, Holder, Surface } from "../core/surface";
+import type { Vec3 } from "../core/vec";
+
+export interface PopupOptions {
+  /** Pixels above the position. Default 14. */
+  offset_px?: number;
+  /** Shows a button that closes it. Default true. */
+  closeButton?: boolean;
+}
+
+export interface PopupEvents {
+  open: object;
+  close: object;
+}
+
+const CLOSE = "M6 6l12 12M18 6L6 18";
+
+/** A box with text or DOM content that points at a position (world coordinates). */
+export class popup extends Evented<PopupEvents> implements Attachable<Surface> {
+  readonly options: Required<PopupOptions>;
+  readonly #box: HTMLElement;
+  readonly #body: HTMLElement;
+  #position: Vec3;
+  #map: (Surface & Partial<Holder<Surface>>) | undefined;
+  #place = (): void => {
+    this.#update();
+  };
+
+  constructor(content: string | Node, position: Vec3 = [0, 0, 0], options: PopupOptions = {}) {
+    super();
+    this.options = { offset_px: 14, closeButton: true, ...options };
+    this.#position = position;
+    this.#body = element("div", "map3d-popup-body");
+    this.#box = element("div", "map3d-popup", { role: "dialog", "aria-label": "Details" }, this.#body);
+    if (this.options.closeButton) this.#addCloseButton();
+    this.setContent(content);
+  }
+
+  addTo(map: Holder<Surface>): this {
+    map.add(this);
+    return this;
+  }
+
+  remove(): this {
+    this.#map?.discard?.(this);
+    return this;
+  }
+
+  get isOpen(): boolean {
+    return this.#map !== undefined;
+  }
+
+  /** Text is shown as text, never as HTML. */
+  setContent(content: string | Node): this {
+    this.#body.replaceChildren(content);
+    return this;
+  }
+
+  setPosition(position: Vec3): this {
+    this.#position = position;
+    this.#update();
+    return this;
+  }
+
+  onAdd(map: Surface): void {
+    this.#map = map;
+    map.overlayPane.append(this.#box);
+    map.moves.on("move", this.#place);
+    this.#update();
+    this.fire("open", {});
+  }
+
+  onRemove(map: Surface): void {
+    map.moves.off("move", this.#place);
+    this.#box.remove();
+    this.#map = undefined;
+    this.fire("close", {});
+  }
+
+  #addCloseButton(): void {
+    const button = iconButton("map3d-popup-close", "Close", CLOSE);
+    button.addEventListener("click", () => this.remove());
+    this.#box.append(button);
+    this.#box.addEventListener("keydown", (event) => {
+      if (event.key === "Escape") this.remove();
+    });
+  }
+
+  #update(): void {
+    const at = this.#map?.project(this.#position);
+    this.#box.hidden = !at;
+    if (at) this.#box.style.transform = `translate(${at[0].toFixed(1)}px, ${(at[1] - this.options.offset_px).toFixed(1)}px) translate(-50%, -100%)`;
+  }
+}

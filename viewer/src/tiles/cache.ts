@@ -1,0 +1,78 @@
+interface Held<V> {
+  readonly value: V;
+  readonly bytes: number;
+  /** Tick of the last use. */
+  used: number;
+}
+
+/** Keeps the most recently used values within a number of bytes. What was used in the current tick is never dropped. */
+export class Cache<V> {
+  readonly #held = new Map<string, Held<V>>();
+  readonly #limit_bytes: number;
+  readonly #dropped: (key: string, value: V) => void;
+  #tick = 0;
+  #bytes = 0;
+
+  constructor(limit_bytes: number, dropped: (key: string, value: V) => void) {
+    this.#limit_bytes = limit_bytes;
+    this.#dropped = dropped;
+  }
+
+  get bytes(): number {
+    return this.#bytes;
+  }
+
+  get size(): number {
+    return this.#held.size;
+  }
+
+  /** A new tick: what is used from now on is safe until the next. */
+  tick(): void {
+    this.#tick++;
+    this.#trim();
+  }
+
+  /** The value, which counts as use. */
+  get(key: string): V | undefined {
+    const held = this.#held.get(key);
+    if (!held) return undefined;
+    if (held.used !== this.#tick) {
+      held.used = this.#tick;
+      this.#held.delete(key);
+      this.#held.set(key, held);
+    }
+    return held.value;
+  }
+
+  /** The value, without counting as use. */
+  peek(key: string): V | undefined {
+    return this.#held.get(key)?.value;
+  }
+
+  set(key: string, value: V, bytes: number): void {
+    this.delete(key);
+    this.#held.set(key, { value, bytes, used: this.#tick });
+    this.#bytes += bytes;
+    this.#trim();
+  }
+
+  delete(key: string): void {
+    const held = this.#held.get(key);
+    if (!held) return;
+    this.#held.delete(key);
+    this.#bytes -= held.bytes;
+    this.#dropped(key, held.value);
+  }
+
+  /** Drops what the predicate names. */
+  prune(unwanted: (key: string, value: V) => boolean): void {
+    for (const [key, held] of [...this.#held]) if (unwanted(key, held.value)) this.delete(key);
+  }
+
+  #trim(): void {
+    for (const [key, held] of this.#held) {
+      if (this.#bytes <= this.#limit_bytes || held.used === this.#tick) return;
+      this.delete(key);
+    }
+  }
+}

@@ -1,0 +1,70 @@
+import type { Vec2 } from "../core/vec";
+import { clamp } from "../core/vec";
+import { ancestor, childrenOf, type Frame, type Tile } from "../geo/frame";
+
+/** [[least U, least V], [greatest U, greatest V]], metres. */
+export type Rect = readonly [Vec2, Vec2];
+
+/**
+ * The level to show when a device pixel is `devicePx_m` metres wide. On dense screens a tile pixel covers one to two
+ * device pixels, which nobody sees there and which saves bytes; else 0.7 to 1.4.
+ */
+export function levelFor(frame: Frame, devicePx_m: number, dpr: number): number {
+  const exact = Math.log2(frame.size / (frame.tilePx * devicePx_m));
+  return clamp(Math.floor(exact + (dpr >= 1.5 ? 0.001 : 0.5)), 0, frame.zmax);
+}
+
+/** Occupied tiles of a level that meet the rectangle, row by row. Together they partition what is occupied of it. */
+export function coverOf(frame: Frame, occupied: (tile: Tile) => boolean, level: number, [low, high]: Rect): Tile[] {
+  const tile_m = frame.size / 2 ** level;
+  const last = 2 ** level - 1;
+  const [x0, x1] = [Math.floor((low[0] - frame.u0) / tile_m), Math.ceil((high[0] - frame.u0) / tile_m) - 1];
+  const [y0, y1] = [Math.floor((frame.v0 - high[1]) / tile_m), Math.ceil((frame.v0 - low[1]) / tile_m) - 1];
+  const tiles: Tile[] = [];
+  for (let y = Math.max(y0, 0); y <= Math.min(y1, last); y++) {
+    for (let x = Math.max(x0, 0); x <= Math.min(x1, last); x++) {
+      const tile = { z: level, x, y };
+      if (occupied(tile)) tiles.push(tile);
+    }
+  }
+  return tiles;
+}
+
+/** Nearest to the rectangle's middle first. */
+export function fromTheMiddle(frame: Frame, tiles: readonly Tile[], [low, high]: Rect): Tile[] {
+  const [u, v] = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2];
+  const far = ({ z, x, y }: Tile): number => {
+    const tile_m = frame.size / 2 ** z;
+    return Math.hypot(frame.u0 + (x + 0.5) * tile_m - u, frame.v0 - (y + 0.5) * tile_m - v);
+  };
+  return [...tiles].sort((a, b) => far(a) - far(b));
+}
+
+/** Where a cover tile's pixels come from: `from` is the tile itself, an ancestor, or a descendant that covers `area`. */
+export interface Stand {
+  /** The square that is painted. */
+  readonly area: Tile;
+  /** The tile whose pixels are shown there. */
+  readonly from: Tile;
+}
+
+/**
+ * What to paint for one cover tile: itself when ready, else ready children, else the nearest ready ancestor. The
+ * areas are disjoint and lie in the tile, so nothing is blended twice.
+ */
+export function standsFor(tile: Tile, ready: (tile: Tile) => boolean, occupied: (tile: Tile) => boolean, down = 2): Stand[] {
+  if (ready(tile)) return [{ area: tile, from: tile }];
+  if (down > 0 && hasReadyBelow(tile, ready, occupied, down)) {
+    return childrenOf(tile).filter(occupied).flatMap((child) => standsFor(child, ready, occupied, down - 1));
+  }
+  for (let up = 1; up <= tile.z; up++) {
+    const from = ancestor(tile, up);
+    if (ready(from)) return [{ area: tile, from }];
+  }
+  return [];
+}
+
+function hasReadyBelow(tile: Tile, ready: (tile: Tile) => boolean, occupied: (tile: Tile) => boolean, down: number): boolean {
+  const children = childrenOf(tile).filter(occupied);
+  return children.some((child) => ready(child) || (down > 1 && hasReadyBelow(child, ready, occupied, down - 1)));
+}

@@ -1,0 +1,73 @@
+import { FetchError } from "../core/errors";
+
+export interface FetchOptions {
+  signal?: AbortSignal | undefined;
+  /** First byte and length. */
+  range?: readonly [number, number] | undefined;
+  /** Tries in all. */
+  attempts?: number | undefined;
+  /** Wait before the second try; doubled each time. */
+  backoff_ms?: number | undefined;
+}
+
+/**
+ * Fetches bytes; null when there is nothing (204). Network errors, 429 and 5xx are tried again, at the next of
+ * `urls` each time, with growing waits.
+ * @throws FetchError with the status; the signal's reason when aborted.
+ */
+export async function fetchBytes(urls: readonly string[], options: FetchOptions = {}): Promise<ArrayBuffer | null> {
+  const { attempts = 4, backoff_ms = 250 } = options;
+  for (let attempt = 0; ; attempt++) {
+    const url = urls[attempt % urls.length] ?? "";
+    try {
+      return await fetchOnce(url, options);
+    } catch (reason) {
+      options.signal?.throwIfAborted();
+      if (attempt + 1 >= attempts || !passing(reason)) throw reason;
+    }
+    await wait(backoff_ms * 2 ** attempt, options.signal);
+  }
+}
+
+export async function fetchJson(urls: readonly string[], options: FetchOptions = {}): Promise<unknown> {
+  const bytes = await fetchBytes(urls, options);
+  if (!bytes) return null;
+  try {
+    return JSON.parse(new TextDecoder().decode(bytes)) as unknown;
+  } catch {
+    throw new FetchError(`${urls[0] ?? ""}: expected JSON, got ${String(bytes.byteLength)} bytes that are not`, 200);
+  }
+}
+
+async function fetchOnce(url: string, { signal, range }: FetchOptions): Promise<ArrayBuffer | null> {
+  const headers = range ? { Range: `bytes=${String(range[0])}-${String(range[0] + range[1] - 1)}` } : undefined;
+  let answer: Response;
+  try {
+    answer = await fetch(url, { ...(signal && { signal }), ...(headers && { headers }) });
+  } catch (reason) {
+    throw new FetchError(`${url}: no answer (${reason instanceof Error ? reason.message : String(reason)})`);
+  }
+  if (answer.status === 204) return null;
+  if (!answer.ok) throw new FetchError(`${url}: HTTP ${String(answer.status)}`, answer.status);
+  if (range && answer.status !== 206) throw new FetchError(`${url}: the server ignores range requests (HTTP ${String(answer.status)}, expected 206)`, answer.status);
+  return answer.arrayBuffer();
+}
+
+function passing(reason: unknown): boolean {
+  const status = reason instanceof FetchError ? reason.status : 0;
+  return status === 0 || status === 429 || status >= 500;
+}
+
+function wait(ms: number, signal: AbortSignal | undefined): Promise<void> {
+  return new Promise((resolve, reject) => {
+    const stop = (): void => {
+      clearTimeout(timer);
+      reject(signal?.reason as Error);
+    };
+    const timer = setTimeout(() => {
+      signal?.removeEventListener("abort", stop);
+      resolve();
+    }, ms);
+    signal?.addEventListener("abort", stop, { once: true });
+  });
+}

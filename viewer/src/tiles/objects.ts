@@ -1,0 +1,76 @@
+import { FetchError } from "../core/errors";
+import type { Box3, Vec3 } from "../core/vec";
+import type { ManifestJson } from "../geo/manifest";
+import { fetchJson } from "./fetch";
+
+/** Attribute values are text, never HTML. */
+export type Attribute = string | number | boolean | null;
+
+/** What the registry says of an object. */
+export interface ObjectInfo {
+  readonly name: string;
+  readonly class: string;
+  readonly parent: number | null;
+  readonly asset?: string;
+  /** Local coordinates. */
+  readonly box?: Box3;
+  readonly attributes: Readonly<Record<string, Attribute>>;
+}
+
+/** id, label, local position. */
+export type SearchEntry = readonly [number, string, Vec3];
+
+type Shard = Readonly<Record<string, ObjectInfo>>;
+const SHARDS_KEPT = 64;
+
+/** Attributes of objects by id, fetched a shard at a time. */
+export class Objects {
+  readonly #base: string;
+  readonly #json: ManifestJson;
+  readonly #shards = new Map<number, Promise<Shard>>();
+  #search: Promise<readonly SearchEntry[]> | undefined;
+
+  constructor(base: string, json: ManifestJson) {
+    this.#base = base;
+    this.#json = json;
+  }
+
+  /** null when the rendering has no attributes of this object. */
+  async get(id: number): Promise<ObjectInfo | null> {
+    const { objects } = this.#json;
+    if (!objects || id <= 0) return null;
+    const shard = await this.#shard(Math.floor(id / objects.shard_size), objects.shards);
+    return Object.hasOwn(shard, String(id)) ? (shard[String(id)] ?? null) : null;
+  }
+
+  /** All entries of the search index, sorted by label; none when the rendering has no index. */
+  search(): Promise<readonly SearchEntry[]> {
+    const path = this.#json.objects?.search;
+    if (path === undefined) return Promise.resolve([]);
+    return (this.#search ??= this.#fetch<{ entries: SearchEntry[] }>(path, "search").then((file) => file?.entries ?? []));
+  }
+
+  #shard(number: number, template: string): Promise<Shard> {
+    const known = this.#shards.get(number);
+    if (known) return known;
+    const shard = this.#fetch<{ objects: Shard }>(template.replace("{shard}", String(number)), "objects").then((file) => file?.objects ?? {});
+    this.#shards.set(number, shard);
+    shard.catch(() => this.#shards.delete(number));
+    const oldest = this.#shards.keys().next();
+    if (this.#shards.size > SHARDS_KEPT && !oldest.done) this.#shards.delete(oldest.value);
+    return shard;
+  }
+
+  /** null when there is no such file. */
+  async #fetch<T>(path: string, what: string): Promise<T | null> {
+    const url = `${this.#base}/${path}`;
+    try {
+      const file = (await fetchJson([url])) as { map3d?: string; version?: number } | null;
+      if (file && (file.map3d !== what || file.version !== 1)) throw new FetchError(`${url}: expected map3d "${what}" of version 1, got ${String(file.map3d)} ${String(file.version)}`, 200);
+      return file as T | null;
+    } catch (reason) {
+      if (reason instanceof FetchError && reason.status === 404) return null;
+      throw reason;
+    }
+  }
+}

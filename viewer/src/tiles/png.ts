@@ -1,0 +1,141 @@
+import { DecodeError } from "../core/errors";
+
+/** Pixels row by row from the top; 3 or 4 bytes each. */
+export interface Pixels {
+  readonly width: number;
+  readonly height: number;
+  readonly channels: 3 | 4;
+  readonly data: Uint8Array<ArrayBuffer>;
+}
+
+interface Header {
+  width: number;
+  height: number;
+  channels: 3 | 4;
+}
+
+const SIGNATURE = [0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a];
+const SIDE_LIMIT = 4096;
+
+/**
+ * Decodes the PNGs that data layers are made of (8 bits, RGB or RGBA, not interlaced) bit for bit, which a browser's
+ * own decoder does not: it multiplies by alpha, manages colours, or perturbs them. The checksum of the zlib stream is
+ * verified, those of the chunks are not.
+ * @throws DecodeError
+ */
+export async function decodePng(bytes: Uint8Array<ArrayBuffer>): Promise<Pixels> {
+  const { header, parts } = readChunks(bytes);
+  const { width, height, channels } = header;
+  const stride = width * channels;
+  const raw = await inflate(parts, height * (stride + 1));
+  const data = new Uint8Array(height * stride);
+  for (let row = 0; row < height; row++) unfilter(raw, data, row, stride, channels);
+  return { width, height, channels, data };
+}
+
+function readChunks(bytes: Uint8Array<ArrayBuffer>): { header: Header; parts: Uint8Array<ArrayBuffer>[] } {
+  if (!SIGNATURE.every((byte, k) => bytes[k] === byte)) throw new DecodeError(`no PNG: ${String(bytes.length)} bytes without its signature`);
+  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+  const parts: Uint8Array<ArrayBuffer>[] = [];
+  let header: Header | undefined;
+  for (let at = 8; at + 12 <= bytes.length; ) {
+    const length = view.getUint32(at);
+    const name = String.fromCharCode(...bytes.subarray(at + 4, at + 8));
+    if (at + 12 + length > bytes.length) throw new DecodeError(`PNG ends within its ${name} chunk`);
+    if (name === "IHDR") header = readHeader(view, at + 8, length);
+    else if (name === "IDAT") parts.push(bytes.subarray(at + 8, at + 8 + length));
+    else if (name === "IEND") break;
+    at += 12 + length;
+  }
+  if (!header || parts.length === 0) throw new DecodeError("PNG without IHDR or IDAT");
+  return { header, parts };
+}
+
+function readHeader(view: DataView, at: number, length: number): Header {
+  if (length !== 13) throw new DecodeError(`IHDR of ${String(length)} bytes, expected 13`);
+  const [width, height] = [view.getUint32(at), view.getUint32(at + 4)];
+  const [depth, type, interlace] = [view.getUint8(at + 8), view.getUint8(at + 9), view.getUint8(at + 12)];
+  if (depth !== 8 || (type !== 2 && type !== 6) || interlace !== 0) {
+    throw new DecodeError(`PNG of ${String(depth)} bits, colour type ${String(type)}, interlace ${String(interlace)}; data layers have 8 bits, type 2 or 6, none`);
+  }
+  if (width < 1 || height < 1 || width > SIDE_LIMIT || height > SIDE_LIMIT) {
+    throw new DecodeError(`PNG of ${String(width)} × ${String(height)} pixels; tiles have 1 to ${String(SIDE_LIMIT)} a side`);
+  }
+  return { width, height, channels: type === 2 ? 3 : 4 };
+}
+
+/** Exactly `size` bytes, or an error: a longer stream is not read to its end. */
+async function inflate(parts: Uint8Array<ArrayBuffer>[], size: number): Promise<Uint8Array> {
+  const out = new Uint8Array(size);
+  const reader = new Blob(parts).stream().pipeThrough(new DecompressionStream("deflate")).getReader();
+  let at = 0;
+  try {
+    for (let step = await reader.read(); !step.done; step = await reader.read()) {
+      if (at + step.value.length > size) break;
+      out.set(step.value, at);
+      at += step.value.length;
+      if (at === size) at += (await reader.read()).value?.length ?? 0;
+    }
+  } catch (reason) {
+    throw new DecodeError(`PNG's zlib stream is broken: ${String(reason)}`);
+  }
+  if (at !== size) {
+    reader.cancel().catch(() => undefined);
+    throw new DecodeError(`PNG's pixels do not have the ${String(size)} bytes that its header asks for`);
+  }
+  return out;
+}
+
+function unfilter(raw: Uint8Array, out: Uint8Array, row: number, stride: number, channels: number): void {
+  const [from, to] = [row * (stride + 1) + 1, row * stride];
+  const filter = raw[from - 1] ?? 0;
+  const undo = FILTERS[filter];
+  if (!undo) throw new DecodeError(`PNG row ${String(row)} has filter ${String(filter)}, expected 0 to 4`);
+  undo(raw, from, out, to, stride, channels, row > 0);
+}
+
+/** Writes `n` bytes at out[to] from raw[from]; `c` bytes a pixel; the row above, if any, is `n` bytes before. */
+type Unfilter = (raw: Uint8Array, from: number, out: Uint8Array, to: number, n: number, c: number, above: boolean) => void;
+
+const plain: Unfilter = (raw, from, out, to, n) => {
+  out.set(raw.subarray(from, from + n), to);
+};
+
+const sub: Unfilter = (raw, from, out, to, n, c) => {
+  plain(raw, from, out, to, n, c, false);
+  for (let i = to + c; i < to + n; i++) out[i] = (out[i] as number) + (out[i - c] as number);
+};
+
+const up: Unfilter = (raw, from, out, to, n, c, above) => {
+  plain(raw, from, out, to, n, c, false);
+  if (above) for (let i = to; i < to + n; i++) out[i] = (out[i] as number) + (out[i - n] as number);
+};
+
+const average: Unfilter = (raw, from, out, to, n, c, above) => {
+  for (let i = 0; i < n; i++) {
+    const left = i < c ? 0 : (out[to + i - c] as number);
+    const over = above ? (out[to + i - n] as number) : 0;
+    out[to + i] = (raw[from + i] as number) + ((left + over) >> 1);
+  }
+};
+
+const paeth: Unfilter = (raw, from, out, to, n, c, above) => {
+  if (!above) {
+    sub(raw, from, out, to, n, c, false);
+    return;
+  }
+  for (let i = 0; i < c; i++) out[to + i] = (raw[from + i] as number) + (out[to + i - n] as number);
+  for (let i = c; i < n; i++) {
+    const at = to + i;
+    out[at] = (raw[from + i] as number) + nearest(out[at - c] as number, out[at - n] as number, out[at - n - c] as number);
+  }
+};
+
+function nearest(a: number, b: number, c: number): number {
+  const pa = Math.abs(b - c);
+  const pb = Math.abs(a - c);
+  const pc = Math.abs(a + b - 2 * c);
+  return pa <= pb && pa <= pc ? a : pb <= pc ? b : c;
+}
+
+const FILTERS: readonly Unfilter[] = [plain, sub, up, average, paeth];

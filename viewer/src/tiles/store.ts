@@ -1,0 +1,96 @@
+import { asError } from "../core/errors";
+import { tileName, type Tile } from "../geo/frame";
+import type { LayerInfo, View } from "../geo/manifest";
+import type { Cache } from "./cache";
+import type { Decoder } from "./decoder";
+import type { Job, Queue } from "./queue";
+import type { Source } from "./source";
+import { bytesOf, type TileData } from "./tileData";
+
+/** A tile in memory. `data` is null when the tile is empty, or when the drawer keeps it for us. */
+export interface Stored {
+  data: TileData | null;
+  readonly empty: boolean;
+}
+
+export interface Shared {
+  readonly cache: Cache<Stored>;
+  readonly queue: Queue;
+  readonly decoder: Decoder;
+}
+
+const RETRY_AFTER_MS = 15_000;
+
+/** The tiles of one rendering: fetched, decoded, kept. */
+export class Store {
+  readonly #name: string;
+  readonly #source: Source;
+  readonly #shared: Shared;
+  readonly #failed = new Map<string, number>();
+  readonly #arrived: (error: Error | null) => void;
+
+  /** @param name unique in the map  @param arrived called after each tile, with what went wrong */
+  constructor(name: string, source: Source, shared: Shared, arrived: (error: Error | null) => void) {
+    this.#name = name;
+    this.#source = source;
+    this.#shared = shared;
+    this.#arrived = arrived;
+  }
+
+  key(view: View, layer: LayerInfo, tile: Tile): string {
+    return `${this.#name}/${view.id}/${layer.name}/${tileName(tile)}`;
+  }
+
+  /** The tile if it is in memory, which counts as use. */
+  get(view: View, layer: LayerInfo, tile: Tile): Stored | undefined {
+    return this.#shared.cache.get(this.key(view, layer, tile));
+  }
+
+  /** The drawer has a copy of the tile; ours is let go. Ids and depths are to be kept: picks read them. */
+  surrender(view: View, layer: LayerInfo | undefined, tile: Tile): void {
+    const stored = layer && this.get(view, layer, tile);
+    if (!stored) return;
+    if (stored.data?.kind === "color") stored.data.bitmap.close();
+    stored.data = null;
+  }
+
+  /** True when a tile could not be had a short time ago. */
+  failed(view: View, layer: LayerInfo, tile: Tile): boolean {
+    const at = this.#failed.get(this.key(view, layer, tile));
+    return at !== undefined && performance.now() - at < RETRY_AFTER_MS;
+  }
+
+  /** Forgets failures, so that tiles are asked for again. */
+  forgive(): void {
+    this.#failed.clear();
+  }
+
+  job(view: View, layer: LayerInfo, tile: Tile): Job {
+    const key = this.key(view, layer, tile);
+    return { key, run: (signal) => this.#load(key, view, layer, tile, signal) };
+  }
+
+  /** The decoded tile, fetched unless in memory; null when it is empty. @throws what the fetch threw */
+  async need(view: View, layer: LayerInfo, tile: Tile): Promise<TileData | null> {
+    if (!view.occupancy.has(tile)) return null;
+    const held = this.get(view, layer, tile);
+    if (held && (held.data || held.empty)) return held.data;
+    await this.#shared.queue.need(this.job(view, layer, tile));
+    return this.get(view, layer, tile)?.data ?? null;
+  }
+
+  async #load(key: string, view: View, layer: LayerInfo, tile: Tile, signal: AbortSignal): Promise<void> {
+    try {
+      const bytes = await this.#source.tile(view, layer, tile, signal);
+      const data = bytes && (await this.#shared.decoder.decode(layer.kind, layer.media_type, bytes));
+      if (signal.aborted) return;
+      this.#shared.cache.set(key, { data, empty: !data }, data ? bytesOf(data) * (data.kind === "id" || data.kind === "depth" ? 2 : 1) : 64);
+      this.#failed.delete(key);
+      this.#arrived(null);
+    } catch (reason) {
+      if (signal.aborted) return;
+      this.#failed.set(key, performance.now());
+      this.#arrived(asError(reason));
+    }
+  }
+}

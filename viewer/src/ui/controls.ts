@@ -1,0 +1,72 @@
+import { element, iconButton } from "../core/dom";
+
+/** What the buttons need of a map. */
+export interface Steering {
+  readonly zoom: number;
+  readonly zoomLimits: readonly [number, number];
+  readonly lookAt_deg: number;
+  readonly directions: readonly { id: string; lookAtDeg: number }[];
+  zoomIn(): unknown;
+  zoomOut(): unknown;
+  rotate(step: number): unknown;
+  setDirection(id: string): unknown;
+  on(type: "zoom" | "directionchange", listener: () => void): unknown;
+}
+
+const PLUS = "M12 5v14M5 12h14";
+const MINUS = "M5 12h14";
+const LEFT = "M4 10a8 8 0 1 1 2.3 7.6M4 4v6h6";
+const RIGHT = "M20 10a8 8 0 1 0-2.3 7.6M20 4v6h-6";
+
+/** Zoom buttons, and a compass with buttons that turn the view when there are several. */
+export function controls(map: Steering): HTMLElement {
+  return element("div", "map3d-buttons", {}, turnGroup(map), zoomGroup(map));
+}
+
+function zoomGroup(map: Steering): HTMLElement {
+  const [inward, outward] = [iconButton("", "Zoom in", PLUS), iconButton("", "Zoom out", MINUS)];
+  inward.addEventListener("click", () => map.zoomIn());
+  outward.addEventListener("click", () => map.zoomOut());
+  map.on("zoom", () => {
+    const [least, greatest] = map.zoomLimits;
+    outward.disabled = map.zoom <= least + 1e-3;
+    inward.disabled = map.zoom >= greatest - 1e-3;
+  });
+  return element("div", "map3d-group", { role: "group", "aria-label": "Zoom" }, inward, outward);
+}
+
+function turnGroup(map: Steering): HTMLElement {
+  const [left, right, compass] = [iconButton("", "Turn view counter-clockwise", LEFT), iconButton("", "Turn view clockwise", RIGHT), compassButton()];
+  const group = element("div", "map3d-group", { role: "group", "aria-label": "Direction" }, compass, left, right);
+  left.addEventListener("click", () => map.rotate(1));
+  right.addEventListener("click", () => map.rotate(-1));
+  compass.addEventListener("click", () => {
+    const [northmost] = [...map.directions].sort((a, b) => fromNorth(a.lookAtDeg) - fromNorth(b.lookAtDeg));
+    if (northmost) map.setDirection(northmost.id);
+  });
+  map.on("directionchange", () => {
+    (compass.firstElementChild as SVGElement).style.transform = `rotate(${String(map.lookAt_deg)}deg)`;
+    compass.setAttribute("aria-label", `Looking ${windOf(map.lookAt_deg)}; look north`);
+    left.hidden = right.hidden = map.directions.length < 2;
+  });
+  return group;
+}
+
+/** A needle that points to where north is on the screen. */
+function compassButton(): HTMLButtonElement {
+  const button = iconButton("map3d-compass", "Look north", "M12 2l4 10h-8z");
+  const needle = button.querySelector("path");
+  needle?.classList.add("map3d-north");
+  const tail = needle?.cloneNode() as SVGPathElement;
+  tail.setAttribute("d", "M12 22l4-10h-8z");
+  tail.setAttribute("class", "map3d-south");
+  needle?.after(tail);
+  return button;
+}
+
+const WINDS = ["north", "north-west", "west", "south-west", "south", "south-east", "east", "north-east"];
+
+/** The wind of a look-at angle, which counts counter-clockwise. */
+export const windOf = (lookAtDeg: number): string => WINDS[Math.round((((lookAtDeg % 360) + 360) % 360) / 45) % 8] ?? "north";
+
+const fromNorth = (deg: number): number => Math.min(deg, 360 - deg);
