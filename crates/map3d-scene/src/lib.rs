@@ -1,1 +1,16 @@
-//! Scenes: assets to chunks with a BVH, memory-mapped.
+//! Scenes: assets to chunks with a BVH (`build`), and chunks memory-mapped for tracing (`SceneStore`). File formats: spec/scene.md.
+
+pub mod build;
+pub mod bvh;
+pub mod chunk;
+pub mod index;
+pub mod instances;
+pub mod lattice;
+pub mod records;
+pub mod store;
+pub mod top;
+
+pub use chunk::Chunk;
+pub use index::SceneIndex;
+pub use records::{ChunkObject, InstanceRecord, Leaf, MaterialRecord, Node, TriangleRecord};
+pub use store::{Part, SceneStore, StoreStats};
