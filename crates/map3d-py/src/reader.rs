@@ -1,0 +1,82 @@
+//! Source documents, parsed as they are iterated.
+
+use std::path::PathBuf;
+use std::sync::Mutex;
+
+use map3d_base::asset::{AssetReport, AssetWriter};
+use map3d_read::{DocumentReader, Format, ReadOptions, open, write_tables};
+use numpy::ndarray::Array2;
+use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2};
+use pyo3::prelude::*;
+
+use crate::asset::Batch;
+use crate::errors::{invalid, to_python};
+
+/// One source document, parsed as it is iterated.
+#[pyclass(module = "map3d._core", frozen)]
+pub struct Reader {
+    document: Mutex<Box<dyn DocumentReader + Send>>,
+}
+
+impl Reader {
+    /// Copies images and tables into the asset and closes it.
+    pub fn finish_into(&self, writer: AssetWriter) -> map3d_base::Result<AssetReport> {
+        write_tables(self.lock().as_ref(), writer)
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, Box<dyn DocumentReader + Send>> {
+        self.document.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+}
+
+#[pymethods]
+impl Reader {
+    /// `format`: "obj" or "citygml"; `options`: JSON.
+    #[new]
+    #[pyo3(signature = (path, format, options="{}"))]
+    fn new(py: Python<'_>, path: PathBuf, format: &str, options: &str) -> PyResult<Self> {
+        let format = match format {
+            "obj" => Format::Obj,
+            "citygml" => Format::CityGml,
+            other => return Err(invalid(format!("format: {other:?}, expected \"obj\" or \"citygml\""))),
+        };
+        let options = ReadOptions::from_json(options).map_err(to_python)?;
+        let document = py.detach(|| open(&path, format, &options)).map_err(to_python)?;
+        Ok(Self { document: Mutex::new(document) })
+    }
+
+    /// As the source writes it; known before the first batch when the source states one.
+    #[getter]
+    fn srs_name(&self) -> Option<String> {
+        self.lock().srs_name().map(str::to_owned)
+    }
+
+    fn __iter__(this: Py<Self>) -> Py<Self> {
+        this
+    }
+
+    fn __next__(&self, py: Python<'_>) -> PyResult<Option<Batch>> {
+        let batch = py.detach(|| self.lock().next_batch()).map_err(to_python)?;
+        Ok(batch.map(Batch))
+    }
+
+    /// (m, 12) transforms of the instances, row-major 3 × 4, prototype → source CRS; complete after the last batch.
+    fn instances<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let transforms: Vec<f64> = self.lock().instances().iter().flat_map(|i| i.transform).collect();
+        Array2::from_shape_vec((transforms.len() / 12, 12), transforms).expect("twelve numbers an instance").into_pyarray(py)
+    }
+
+    fn set_instances(&self, transforms: PyReadonlyArray2<f64>) -> PyResult<()> {
+        let array = transforms.as_array();
+        if array.ncols() != 12 {
+            return Err(invalid(format!("transforms: shape {:?}, expected (m, 12)", array.shape())));
+        }
+        let rows: Vec<[f64; 12]> = array.rows().into_iter().map(|r| std::array::from_fn(|k| r[k])).collect();
+        self.lock().set_instances(&rows).map_err(to_python)
+    }
+
+    /// report.json so far (spec/scene.md).
+    fn report(&self) -> String {
+        serde_json::to_string(self.lock().report()).expect("reports are plain data")
+    }
+}
