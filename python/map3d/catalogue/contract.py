@@ -31,7 +31,8 @@ class Catalogue(Protocol):
         """By name."""
 
     def pin_scene(self, name: str, crs: SceneCrs | None = None, origin: Vec3 | None = None) -> SceneRecord:
-        """Sets what is still None and returns what then holds: the first to pin wins."""
+        """Sets what is still None and returns what then holds: the first to pin wins. The same system with its vertical part named counts as new
+        as long as the scene has no asset."""
 
     def set_built(self, name: str, fingerprint: str) -> None: ...
 

@@ -62,10 +62,11 @@ class SqliteCatalogue(SqliteJobs):
 
     def pin_scene(self, name: str, crs: SceneCrs | None = None, origin: Vec3 | None = None) -> SceneRecord:
         with self._database.transaction() as db:
-            db.execute(
-                "UPDATE scene SET crs = coalesce(crs, ?), origin = coalesce(origin, ?) WHERE name = ?",
-                (codec.dump_crs(crs), _dump_or_none(origin), name),
-            )
+            before = _scene(db, name)
+            empty = db.execute("SELECT 1 FROM asset WHERE scene = ?", (name,)).fetchone() is None
+            pinned = crs if before.crs is None or (empty and _adds_heights(before.crs, crs)) else before.crs
+            values = (codec.dump_crs(pinned), _dump_or_none(before.origin or origin), name)
+            db.execute("UPDATE scene SET crs = ?, origin = ? WHERE name = ?", values)
             return _scene(db, name)
 
     def set_built(self, name: str, fingerprint: str) -> None:
@@ -132,6 +133,11 @@ def _rendering(db: sqlite3.Connection, name: str) -> RenderingRecord:
 def _names(db: sqlite3.Connection, table: str) -> str:
     names = [row[0] for row in db.execute(f"SELECT name FROM {table} ORDER BY name LIMIT 21")]
     return ", ".join(names[:20]) + (", …" if len(names) > 20 else "") if names else "none yet"
+
+
+def _adds_heights(before: SceneCrs, crs: SceneCrs | None) -> bool:
+    """Whether `crs` is the same system with its heights named."""
+    return crs is not None and before.vertical is None and crs.vertical is not None and (before.epsg, before.name) == (crs.epsg, crs.name)
 
 
 def _dump_or_none(value: Any) -> str | None:

@@ -1,0 +1,1 @@
+"""Import of source documents as assets of a scene."""

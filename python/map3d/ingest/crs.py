@@ -1,0 +1,140 @@
+"""Names of coordinate systems as they are found in files, and what they mean."""
+
+import re
+from functools import lru_cache
+from typing import Final
+
+from pyproj import CRS
+from pyproj.crs import CompoundCRS
+from pyproj.exceptions import CRSError
+from pyproj._network import set_network_enabled
+
+from map3d.catalogue import SceneCrs
+from map3d.catalogue.records import LOCAL_CRS_NAME
+from map3d.errors import CrsError
+
+LOCAL: Final = SceneCrs(None, None, LOCAL_CRS_NAME)
+
+set_network_enabled(False)
+
+_ADV_HORIZONTAL: Final = {
+    "ETRS89_UTM31": 25831,
+    "ETRS89_UTM32": 25832,
+    "ETRS89_UTM33": 25833,
+    "ETRS89_UTM34": 25834,
+    "ETRS89_LAT-LON": 4258,
+    "ETRS89_LAT-LON-H": 4937,
+    "DHDN_3GK2": 31466,
+    "DHDN_3GK3": 31467,
+    "DHDN_3GK4": 31468,
+    "DHDN_3GK5": 31469,
+    "PD83_3GK4": 3396,
+    "PD83_3GK5": 3397,
+    "RD83_3GK4": 3398,
+    "RD83_3GK5": 3399,
+    "42-83_3GK4": 2398,
+    "42-83_3GK5": 2399,
+}
+_ADV_VERTICAL: Final = {"DHHN85_NOH": 5784, "DHHN92_NH": 5783, "DHHN2016_NH": 7837, "DHHN12_NOH": 7699, "SNN76_NH": 5785, "HN76_NH": 5785}
+"""Of the German surveys (AdV), as in urn:adv:crs:ETRS89_UTM32*DE_DHHN2016_NH."""
+
+_EPSG_PART: Final = re.compile(r"(?:^|[:/#])EPSG(?::|/)(?:[0-9.]*[:/])?(?::)?([0-9]+)$", re.IGNORECASE)
+_GML_EPSG: Final = re.compile(r"epsg\.xml#([0-9]+)$", re.IGNORECASE)
+
+
+@lru_cache(maxsize=64)
+def parse_crs(name: str) -> CRS:
+    """EPSG codes, OGC URNs and URLs (also compound ones), the AdV's URNs, WKT, PROJ text; raises CrsError, saying what to do."""
+    text = name.strip()
+    try:
+        return _adv(text) or _compound(text) or _epsg(text) or CRS.from_user_input(text)
+    except (CRSError, ValueError) as error:
+        raise CrsError(f"coordinate system {name[:200]!r} is not known; name the right one with --crs, e.g. --crs EPSG:25832") from error
+
+
+def is_local(name: str) -> bool:
+    return name.strip().lower() == "local"
+
+
+def horizontal(crs: CRS) -> CRS:
+    """The two-dimensional part."""
+    part = crs.sub_crs_list[0] if crs.is_compound else crs
+    if part.is_bound and part.source_crs is not None:
+        part = part.source_crs
+    return part.to_2d() if len(part.axis_info) == 3 else part
+
+
+def vertical(crs: CRS) -> CRS | None:
+    """The vertical part of a compound system; None else (also for ellipsoidal heights)."""
+    return crs.sub_crs_list[1] if crs.is_compound else None
+
+
+def vertical_name(crs: CRS) -> str | None:
+    part = vertical(crs)
+    if part is not None:
+        return str(part.name)
+    return f"ellipsoidal height ({crs.geodetic_crs.name})" if len(crs.axis_info) == 3 and crs.geodetic_crs is not None else None
+
+
+def vertical_unit_m(crs: CRS) -> float:
+    """Metres in a unit of the third axis; 1 without one."""
+    axes = crs.axis_info
+    return float(axes[2].unit_conversion_factor) if len(axes) == 3 else 1.0
+
+
+def is_metric(crs: CRS) -> bool:
+    """Whether it can be a scene's: projected, metres."""
+    return bool(horizontal(crs).is_projected and all(abs(axis.unit_conversion_factor - 1.0) < 1e-12 for axis in horizontal(crs).axis_info))
+
+
+def scene_crs(crs: CRS) -> SceneCrs:
+    """As the catalogue keeps it; raises CrsError unless projected in metres."""
+    flat = horizontal(crs)
+    if not is_metric(crs):
+        raise CrsError(f"{crs.name}: a scene needs a projected coordinate system in metres; choose one with --crs, e.g. the UTM zone of the place")
+    whole = crs if crs.is_compound else flat
+    return SceneCrs(epsg=flat.to_epsg(min_confidence=100), wkt=whole.to_wkt("WKT2_2019"), name=str(flat.name), vertical=vertical_name(crs))
+
+
+def _adv(text: str) -> CRS | None:
+    if not text.lower().startswith("urn:adv:crs:"):
+        return None
+    parts = [part.upper().removeprefix("DE_") for part in text[len("urn:adv:crs:") :].split("*")]
+    code = _ADV_HORIZONTAL.get(parts[0])
+    if code is None or len(parts) > 2 or (len(parts) == 2 and parts[1] not in _ADV_VERTICAL):
+        raise ValueError(text)
+    return _join(code, _ADV_VERTICAL[parts[1]] if len(parts) == 2 else None)
+
+
+def _compound(text: str) -> CRS | None:
+    """`urn:ogc:def:crs,crs:EPSG::25832,crs:EPSG::5783`, `EPSG:25832+5783`, `…/crs-compound?1=…&2=…`, `EPSG::25832*EPSG::5783`."""
+    if "crs-compound?" in text:
+        parts = [part.partition("=")[2] for part in text.partition("?")[2].split("&")]
+    elif text.lower().startswith("urn:ogc:def:crs,"):
+        parts = text.split(",")[1:]
+    elif re.search(r"EPSG\S*[+*]", text, re.IGNORECASE):
+        parts = [part if "epsg" in part.lower() else f"EPSG:{part}" for part in re.split(r"[+*]", text)]
+    else:
+        return None
+    codes = [code for code in map(_code, parts) if code is not None]
+    if len(codes) != len(parts) or len(codes) not in (1, 2):
+        raise ValueError(text)
+    return _join(*codes)
+
+
+def _epsg(text: str) -> CRS | None:
+    code = _code(text)
+    return None if code is None else CRS.from_epsg(code)
+
+
+def _code(text: str) -> int | None:
+    match = _EPSG_PART.search(text) or _GML_EPSG.search(text)
+    return int(match[1]) if match else None
+
+
+def _join(flat: int, height: int | None = None) -> CRS:
+    below = CRS.from_epsg(flat)
+    if height is None:
+        return below
+    above = CRS.from_epsg(height)
+    return CompoundCRS(name=f"{below.name} + {above.name}", components=[below, above])

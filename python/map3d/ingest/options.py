@@ -1,0 +1,46 @@
+"""What a user may choose for an import, and the limits of the child that parses (all may be raised by name)."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from map3d.child import Limits
+
+GIB: Final = 1 << 30
+BIG_FILE_BYTES: Final = 100_000_000
+CPU_S_A_BIG_FILE: Final = 60
+OPEN_FILES: Final = 256
+
+
+@dataclass(frozen=True)
+class ImportOptions:
+    """`crs`: the file's system where the file does not say or says wrong, "local" for plain metres. `up`, `split`: OBJ; `theme`, `lod`: CityGML.
+    None for a limit: its default."""
+
+    crs: str | None = None
+    up: str = "z"
+    split: str = "file"
+    theme: str | None = None
+    lod: str | None = None
+    strict: bool = False
+    name: str | None = None
+    parse_memory_bytes: int | None = None
+    parse_cpu_s: int | None = None
+
+    def reader_options(self, format: str, limits: Limits) -> dict[str, Any]:
+        """As the core's Reader takes them."""
+        options: dict[str, Any] = {"strict": self.strict}
+        if format == "obj":
+            options |= {"up": self.up, "split": self.split}
+        else:
+            options |= {"theme": self.theme, "lod": self.lod}
+        if limits.address_space_bytes is not None:
+            options |= {"max_object_bytes": limits.address_space_bytes // 4, "max_appearance_bytes": limits.address_space_bytes // 4}
+        return options
+
+    def limits(self, source: Path) -> Limits:
+        """1 GiB, 2 GiB for big files; 60 s of processor time for every 100 MB begun; four times that on the clock."""
+        size = source.stat().st_size
+        cpu_s = self.parse_cpu_s or CPU_S_A_BIG_FILE * max(1, -(-size // BIG_FILE_BYTES))
+        memory = self.parse_memory_bytes or (GIB if size <= BIG_FILE_BYTES else 2 * GIB)
+        return Limits(address_space_bytes=memory, cpu_s=cpu_s, wall_s=4.0 * cpu_s, open_files=OPEN_FILES, network=False)

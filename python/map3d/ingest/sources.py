@@ -1,0 +1,106 @@
+"""Which files an import is asked for, what their assets are called, and whether they changed."""
+
+import hashlib
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from map3d.errors import NotFound, UnknownFormat
+from map3d.ingest.formats import KNOWN, Format, detect_format
+
+_PASSED_OVER = (".mtl", ".jpg", ".jpeg", ".png", ".bmp", ".gif", ".tga", ".txt", ".md", ".json", ".pdf", ".html", ".prj", ".tfw", ".xsd", ".sqlite")
+
+
+@dataclass(frozen=True)
+class Source:
+    """`paths`: the document; for terrain its rasters."""
+
+    name: str
+    format: Format
+    paths: tuple[Path, ...]
+
+
+def find_sources(paths: Iterable[Path], name: str | None = None) -> list[Source]:
+    """Files as named; of folders every file of a known format, however deep, in order of their names. Rasters are one terrain for each folder.
+
+    Raises UnknownFormat for a named file of unknown type and for a folder that has nothing to read; NotFound.
+    """
+    found: list[tuple[Path, Format]] = []
+    for path in paths:
+        if path.is_dir():
+            found += _in_folder(path)
+        elif path.exists():
+            found.append((path, detect_format(path)))
+        else:
+            raise NotFound(f"{path}: no such file or folder")
+    return _named(_grouped(found), name)
+
+
+def source_digest(source: Source) -> str:
+    """Over the document's bytes and the files beside it whose names begin with its stem, and an OBJ's material libraries."""
+    total = hashlib.sha256()
+    for path in source.paths:
+        for part in [path, *_companions(path)]:
+            total.update(part.name.encode())
+            with part.open("rb") as file:
+                total.update(hashlib.file_digest(file, "sha256").digest())
+    return total.hexdigest()[:32]
+
+
+def _in_folder(folder: Path) -> list[tuple[Path, Format]]:
+    found = []
+    for path in sorted(path for path in folder.rglob("*") if path.is_file() and not path.name.startswith(".")):
+        if path.suffix.lower() in _PASSED_OVER:
+            continue
+        try:
+            found.append((path, detect_format(path)))
+        except UnknownFormat:
+            continue
+    if not found:
+        raise UnknownFormat(f"{folder}: no file in it that map3d can read; it reads {KNOWN}")
+    return found
+
+
+def _grouped(found: Sequence[tuple[Path, Format]]) -> list[tuple[Format, tuple[Path, ...]]]:
+    rasters: dict[Path, list[Path]] = {}
+    groups: list[tuple[Format, tuple[Path, ...]]] = []
+    for path, format in found:
+        if format == "raster":
+            rasters.setdefault(path.parent, []).append(path)
+        else:
+            groups.append((format, (path,)))
+    return groups + [("raster", tuple(paths)) for paths in rasters.values()]
+
+
+def _named(groups: Sequence[tuple[Format, tuple[Path, ...]]], name: str | None) -> list[Source]:
+    """Names from the files', numbered where two would be the same."""
+    taken: set[str] = set()
+    sources = []
+    for format, paths in groups:
+        wanted = asset_name(name or (paths[0].stem if format != "raster" or len(paths) == 1 else paths[0].parent.name))
+        unique, number = wanted, 2
+        while unique in taken:
+            unique, number = f"{wanted[:58]}-{number}", number + 1
+        taken.add(unique)
+        sources.append(Source(unique, format, paths))
+    return sources
+
+
+def asset_name(text: str) -> str:
+    """The text as a name: lower case, other characters become dashes."""
+    plain = re.sub(r"[^a-z0-9_-]+", "-", text.lower()).strip("-_")
+    return plain[:64] or "asset"
+
+
+def _companions(path: Path) -> list[Path]:
+    beside = {other for other in path.parent.glob(f"{_escaped(path.stem)}.*") if other.is_file()} - {path}
+    if path.suffix.lower() == ".obj":
+        with path.open("rb") as lines:
+            names = [line.split(None, 1)[1].strip().decode("utf-8", "replace") for line in lines if line.startswith(b"mtllib ") and line.split()[1:]]
+        beside |= {path.parent / name for name in names if "/" not in name and (path.parent / name).is_file()}
+    return sorted(beside - {path})
+
+
+def _escaped(stem: str) -> str:
+    return re.sub(r"([\[\]*?])", r"[\1]", stem)

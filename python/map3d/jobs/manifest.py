@@ -1,0 +1,82 @@
+"""Writes `rendering.json` from the catalogue, the tile stores and the scene (spec/manifest.md)."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+from map3d.catalogue import Catalogue, RenderingRecord, SceneRecord, State, Workspace
+from map3d.catalogue.records import LOCAL_CRS_NAME
+from map3d.geometry.frames import PinnedFrame
+from map3d.registry import Registry
+from map3d.render.build import scene_origin
+from map3d.tiles.manifest import CrsFacts, Manifest, ViewFacts
+from map3d.tiles.occupancy import Occupancy
+from map3d.tiles.sqlite_store import SqliteTileStore
+from map3d.tiles.store import TileStore
+from map3d.types import Box
+
+Planned = Mapping[str, Occupancy]
+"""View → tiles of level zmax that open base blocks may yet fill."""
+
+
+def write_manifest(workspace: Workspace, catalogue: Catalogue, rendering: str, box: Box, planned: Planned | None = None) -> Manifest:
+    """Says what is in the stores now; what open blocks may yet hold is added from `planned`. The content version counts as announced from before
+    the file is seen. `box`: local, of the scene's content."""
+    record = catalogue.rendering(rendering)
+    manifest = current_manifest(workspace, catalogue, record, box, planned or {})
+    catalogue.announce(rendering, record.content_version)
+    _write(workspace.manifest_path(rendering), manifest.dump())
+    return manifest
+
+
+def current_manifest(workspace: Workspace, catalogue: Catalogue, record: RenderingRecord, box: Box, planned: Planned) -> Manifest:
+    scene = catalogue.scene(record.scene)
+    counts = catalogue.count_jobs(record.name)
+    with Registry(workspace.registry_path(record.scene)) as registry:
+        objects = registry.count()
+    return Manifest(
+        name=record.name,
+        title=record.title or scene.title,
+        attribution=record.attribution or scene.attribution,
+        content_version=record.content_version,
+        complete=counts[State.DONE] == sum(counts.values()) > 0,
+        crs=_crs(scene),
+        origin=scene_origin(scene),
+        box=box,
+        layers=record.layers,
+        views=tuple(_view(workspace, record, frame, planned.get(frame.id)) for frame in record.frames),
+        objects=objects,
+    )
+
+
+def stored_occupancy(store: TileStore) -> Occupancy:
+    """Exact: the tiles of level zmax that are in the store, whatever their layer."""
+    zmax = store.shape.zmax
+    tiles = {(tile.x, tile.y) for layer in range(len(store.shape.layers)) for tile in store.list_tiles(layer) if tile.z == zmax}
+    return Occupancy.from_tiles(zmax, tiles)
+
+
+def _view(workspace: Workspace, record: RenderingRecord, frame: PinnedFrame, planned: Occupancy | None) -> ViewFacts:
+    path = workspace.store_path(record.name, frame.id)
+    occupancy, versions = Occupancy.from_tiles(frame.zmax, ()), {}
+    if path.is_file():
+        with SqliteTileStore(path, read_only=True) as store:
+            occupancy = stored_occupancy(store)
+            versions = {block.id: block.version for block in store.list_blocks()}
+    return ViewFacts(frame, occupancy if planned is None else occupancy | planned, versions)
+
+
+def _crs(scene: SceneRecord) -> CrsFacts:
+    crs = scene.crs
+    return CrsFacts(LOCAL_CRS_NAME) if crs is None else CrsFacts(crs.name, crs.epsg, crs.wkt, crs.vertical)
+
+
+def _write(path: Path, data: bytes) -> None:
+    """Whole or not at all, and durably."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draft = path.with_name(f".{path.name}.{os.getpid()}.new")
+    with draft.open("wb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+    draft.replace(path)

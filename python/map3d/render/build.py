@@ -1,0 +1,83 @@
+"""Build: the assets of a scene become chunks, textures and the scene index (spec/scene.md)."""
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from map3d import _core
+from map3d.catalogue import Catalogue, SceneRecord, Workspace
+from map3d.errors import BadRequest
+from map3d.ingest.lock import scene_lock
+from map3d.registry import Registry
+from map3d.types import Box, Vec3
+
+BuildProgress = Callable[[str, int, int], bool]
+"""(stage, done, total) → False to stop."""
+
+OPTIONS: Mapping[str, Any] = {
+    "merge_vertices": True,
+    "merge_faces": True,
+    "drop_degenerate": True,
+    "merge_materials": True,
+    "drop_untextured": False,
+    "ground_plane": "auto",
+}
+GROUND = "ground"
+
+
+def is_stale(workspace: Workspace, catalogue: Catalogue, scene: str) -> bool:
+    """Whether the scene index is missing or older than the assets."""
+    record = catalogue.scene(scene)
+    return record.built != fingerprint(catalogue, record) or not (workspace.scene_folder(scene) / "scene.json").is_file()
+
+
+def build(
+    workspace: Workspace, catalogue: Catalogue, scene: str, *, threads: int, max_memory_bytes: int, progress: BuildProgress | None = None
+) -> dict[str, Any]:
+    """Builds what changed and returns the report: counts of each optimisation. Raises BadRequest for a scene without assets."""
+    with scene_lock(workspace, scene):
+        record = catalogue.scene(scene)
+        assets = catalogue.assets(scene)
+        if not assets or record.origin is None:
+            raise BadRequest(f"scene {scene} has no files yet; add some with map3d add-files {scene} FILE…")
+        mark = fingerprint(catalogue, record)
+        folder = workspace.scene_folder(scene)
+        with Registry(workspace.registry_path(scene)) as registry:
+            ground = registry.scene_object(GROUND, "terrain")
+            request = {
+                "assets": [asset.name for asset in assets],
+                "origin": record.origin,
+                "options": {**OPTIONS, **record.options},
+                "ground_id": ground,
+                "threads": threads,
+                "max_memory_bytes": max_memory_bytes,
+            }
+            report: dict[str, Any] = json.loads(_core.build_scene(str(folder), json.dumps(request), progress))
+            registry.set_scene_object(ground, _ground_box(report))
+        catalogue.set_built(scene, mark)
+        return report
+
+
+def fingerprint(catalogue: Catalogue, record: SceneRecord) -> str:
+    """Of all that a build depends on."""
+    assets = [(asset.name, asset.digest) for asset in catalogue.assets(record.name)]
+    text = json.dumps([assets, record.origin, {**OPTIONS, **record.options}, _core.__version__], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def open_scene(workspace: Workspace, scene: str, cache_bytes: int = 64 << 20) -> _core.Scene:
+    """The built scene, for planning and checking."""
+    return _core.Scene(str(workspace.scene_folder(scene)), cache_bytes=cache_bytes)
+
+
+def scene_origin(record: SceneRecord) -> Vec3:
+    """Raises BadRequest while nothing was imported."""
+    if record.origin is None:
+        raise BadRequest(f"scene {record.name} has no files yet; add some with map3d add-files {record.name} FILE…")
+    return record.origin
+
+
+def _ground_box(report: Mapping[str, Any]) -> Box | None:
+    box = report.get("ground_box")
+    return None if box is None else ((box[0][0], box[0][1], box[0][2]), (box[1][0], box[1][1], box[1][2]))

@@ -1,0 +1,98 @@
+"""Which blocks a rendering needs, with the keys that tell whether they changed (spec/pyramid.md §8, spec/catalogue.md)."""
+
+import hashlib
+import json
+from collections.abc import Callable, Collection, Iterable, Mapping
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from map3d.catalogue import PlannedJob, RenderingRecord
+from map3d.errors import LimitExceeded, OutsideFrame
+from map3d.geometry.frames import PinnedFrame
+from map3d.tiles.naming import block_above, block_level, block_levels, morton
+from map3d.tiles.occupancy import Occupancy
+from map3d.types import BlockId, Box
+
+MAX_PLAN_LEVEL: Final = 14
+"""Of a grid of flags; 2^14 squared are 268 MB."""
+
+
+class PlannedScene(Protocol):
+    """What planning asks of a built scene."""
+
+    @property
+    def box(self) -> Box: ...
+
+    def occupied(self, frame: str, level: int) -> NDArray[np.bool_]: ...
+
+    def block_key(self, frame: str, z: int, x: int, y: int) -> str: ...
+
+
+def plan_jobs(
+    scene: PlannedScene, rendering: RenderingRecord, known: Mapping[str, Collection[BlockId]], progress: Callable[[int, int], None] | None = None
+) -> list[PlannedJob]:
+    """Every block that has or had content, of all views. `known`: view → base blocks that were planned before.
+
+    Raises OutsideFrame when content has left the pinned square, LimitExceeded for a plan too large.
+    """
+    wanted = {frame.id: _base_blocks(scene, rendering, frame, known.get(frame.id, ())) for frame in rendering.frames}
+    total, done = sum(map(len, wanted.values())), 0
+    jobs: list[PlannedJob] = []
+    for frame in rendering.frames:
+        text = frame_text(rendering, frame)
+        keys: dict[BlockId, str] = {}
+        for block in wanted[frame.id]:
+            keys[block] = scene.block_key(text, *block)
+            done += 1
+            if progress is not None:
+                progress(done, total)
+        jobs += _with_reduces(frame, keys, settings_hash(rendering))
+    return jobs
+
+
+def frame_text(rendering: RenderingRecord, frame: PinnedFrame) -> str:
+    """The frame with its layers as the core takes it."""
+    return json.dumps(frame.to_json(rendering.layers))
+
+
+def planned_occupancy(scene: PlannedScene, rendering: RenderingRecord, frame: PinnedFrame, level: int | None = None) -> Occupancy:
+    """Conservative: every tile that may have content. `level`: the deepest to tell, zmax unless given."""
+    depth = frame.zmax if level is None else level
+    if depth > MAX_PLAN_LEVEL:
+        raise LimitExceeded(f"rendering {rendering.name}: level {depth} is too deep to plan at once, at most {MAX_PLAN_LEVEL}; use a coarser --res")
+    return Occupancy.from_grid(scene.occupied(frame_text(rendering, frame), depth))
+
+
+def settings_hash(rendering: RenderingRecord) -> str:
+    """Of what reduce blocks depend on besides the blocks below."""
+    layers = [[layer.kind, layer.format, layer.quality] for layer in rendering.layers]
+    return hashlib.sha256(json.dumps([layers, rendering.tile_px, rendering.zmax]).encode()).hexdigest()
+
+
+def _base_blocks(scene: PlannedScene, rendering: RenderingRecord, frame: PinnedFrame, known: Iterable[BlockId]) -> list[BlockId]:
+    """Occupied ones and those known from before, in Morton order."""
+    try:
+        frame.check_holds(scene.box)
+    except OutsideFrame as error:
+        raise OutsideFrame(f"rendering {rendering.name}: {error}") from error
+    root = block_levels(frame.zmax)[0].root
+    occupied = planned_occupancy(scene, rendering, frame, root)
+    blocks = {BlockId(*tile) for tile in occupied.tiles(root)} | set(known)
+    return sorted(blocks, key=lambda block: morton(block.x, block.y))
+
+
+def _with_reduces(frame: PinnedFrame, base: Mapping[BlockId, str], settings: str) -> list[PlannedJob]:
+    """The base blocks and all reduce blocks above them; a reduce block's key is made of those below it."""
+    jobs: list[PlannedJob] = []
+    keys = dict(base)
+    while keys:
+        above: dict[BlockId, list[tuple[BlockId, str]]] = {}
+        for block, key in sorted(keys.items(), key=lambda item: morton(item[0].x, item[0].y)):
+            parent = block_above(block, frame.zmax)
+            jobs.append(PlannedJob(frame.id, block, block_level(block.z, frame.zmax).kind, morton(block.x, block.y), key, parent))
+            if parent is not None:
+                above.setdefault(parent, []).append((block, key))
+        keys = {block: hashlib.sha256(json.dumps([settings, below]).encode()).hexdigest()[:32] for block, below in above.items()}
+    return jobs
