@@ -1,0 +1,190 @@
+"""Texture tiles cut from an orthophoto in windows: 8-bit RGB, painted in the ground's colour (or cut out) where the photo has nothing."""
+
+import io
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from rasterio.enums import ColorInterp, Resampling
+from rasterio.windows import Window
+
+from map3d.errors import ImportFailed
+
+MARGIN_PX: Final = 8
+ALIGN_PX: Final = 8
+REACH_PX: Final = MARGIN_PX + ALIGN_PX
+"""How far colours reach beyond what the photo shows, so that its rim keeps its own."""
+
+JPEG_QUALITY: Final = 90
+SAMPLE_PX: Final = 1024
+"""Side of the overview from which the range of values is taken."""
+
+
+Colours = NDArray[np.uint8]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class TextureTile:
+    """An image and where it lies: pixel (0, 0)'s corner at photo position (left, top); `scale` image pixels per photo pixel (across, down)."""
+
+    key: str
+    left: int
+    top: int
+    scale: tuple[float, float]
+    size_px: tuple[int, int]
+    cutout: bool
+
+    def uvs(self, columns: NDArray[np.float64], rows: NDArray[np.float64]) -> NDArray[np.float32]:
+        """(n, 2) of photo positions; (0, 0) is the image's lower left corner, texel centres lie at (i + ½)/size."""
+        u = (columns - self.left) * self.scale[0] / self.size_px[0]
+        v = 1.0 - (rows - self.top) * self.scale[1] / self.size_px[1]
+        return np.stack([u, v], axis=-1).astype(np.float32)
+
+
+class Orthophoto:
+    """The colours of an open raster. `stretch`: the values that become 0 and 255; None: found from the data type and the data."""
+
+    def __init__(self, dataset: Any, ground: tuple[int, int, int], max_side_px: int, stretch: tuple[float, float] | None = None) -> None:
+        self.dataset = dataset
+        self._ground = np.array(ground, dtype=np.uint8)
+        self._max_side_px = max_side_px
+        self._bands = _colour_bands(dataset)
+        self._palette = _palette(dataset) if len(self._bands) == 1 else None
+        self.stretch = (0.0, 255.0) if self._palette is not None else stretch or self._find_stretch()
+
+    def cut(self, box: tuple[float, float, float, float], folder: Path, *, cutout: bool) -> TextureTile | None:
+        """Writes the texture of photo positions (left, top, right, bottom) into `folder`; None where the photo has nothing at all.
+
+        `cutout`: what the photo does not show becomes transparent; else it takes the ground's colour. Next to what is shown it takes that one's.
+        """
+        left, top, right, bottom = _aligned(box)
+        width, height = self._image_side(right - left), self._image_side(bottom - top)
+        colour, shown, beyond = self._read(left, top, right - left, bottom - top, width, height)
+        if not shown.any():
+            return None
+        holed = cutout and not (shown | beyond).all()
+        colour = _spread(colour, shown, self._ground)
+        data = _png(colour, shown | beyond) if holed else _jpeg(colour)
+        key = sha256(data).hexdigest()[:32]
+        (folder / f"{key}.{'png' if holed else 'jpg'}").write_bytes(data)
+        return TextureTile(key, left, top, (width / (right - left), height / (bottom - top)), (width, height), holed)
+
+    def _image_side(self, pixels: int) -> int:
+        return min(pixels, self._max_side_px)
+
+    def _read(self, left: int, top: int, width: int, height: int, out_width: int, out_height: int) -> tuple[Colours, Mask, Mask]:
+        """(h, w, 3) colours of a window, (h, w) where the photo shows any, (h, w) where the window reaches beyond the photo."""
+        colour = np.zeros((out_height, out_width, 3), dtype=np.uint8)
+        shown, beyond = np.zeros((out_height, out_width), dtype=bool), np.ones((out_height, out_width), dtype=bool)
+        x0, y0 = max(left, 0), max(top, 0)
+        x1, y1 = min(left + width, self.dataset.width), min(top + height, self.dataset.height)
+        if x0 >= x1 or y0 >= y1:
+            return colour, shown, beyond
+        across, down = out_width / width, out_height / height
+        i0, j0 = min(round((x0 - left) * across), out_width - 1), min(round((y0 - top) * down), out_height - 1)
+        i1, j1 = max(round((x1 - left) * across), i0 + 1), max(round((y1 - top) * down), j0 + 1)
+        colour[j0:j1, i0:i1], shown[j0:j1, i0:i1] = self._read_inside(Window(x0, y0, x1 - x0, y1 - y0), j1 - j0, i1 - i0)
+        beyond[j0:j1, i0:i1] = False
+        return colour, shown, beyond
+
+    def _read_inside(self, window: Window, rows: int, columns: int) -> tuple[Colours, Mask]:
+        resampling = Resampling.nearest if self._palette is not None else Resampling.average
+        try:
+            data = self.dataset.read(self._bands, window=window, out_shape=(len(self._bands), rows, columns), resampling=resampling)
+            mask = self.dataset.dataset_mask(window=window, out_shape=(rows, columns), resampling=Resampling.nearest)
+        except Exception as error:
+            raise ImportFailed(f"{self.dataset.name}: cannot read {window}: {error}") from error
+        shown = (mask > 0) & np.isfinite(data).all(axis=0)
+        return np.moveaxis(self._to_bytes(data), 0, -1), shown
+
+    def _to_bytes(self, data: NDArray[Any]) -> Colours:
+        """(3, h, w)."""
+        if self._palette is not None:
+            return np.ascontiguousarray(np.moveaxis(self._palette[np.clip(data[0], 0, len(self._palette) - 1).astype(np.intp)], -1, 0))
+        low, high = self.stretch
+        if data.dtype != np.uint8 or (low, high) != (0.0, 255.0):
+            with np.errstate(invalid="ignore", over="ignore"):
+                scaled = (data.astype(np.float64) - low) * (255.0 / (high - low))
+            data = np.clip(np.nan_to_num(scaled, nan=0.0) + 0.5, 0, 255).astype(np.uint8)
+        return data if len(data) == 3 else np.repeat(data[:1], 3, axis=0)
+
+    def _find_stretch(self) -> tuple[float, float]:
+        """Bytes as they are; real numbers within [0, 1] or [0, 255] likewise; else from the 0.5th to the 99.5th percentile of all bands."""
+        if self.dataset.dtypes[self._bands[0] - 1] == "uint8":
+            return 0.0, 255.0
+        shape = (min(self.dataset.height, SAMPLE_PX), min(self.dataset.width, SAMPLE_PX))
+        data = self.dataset.read(self._bands, out_shape=(len(self._bands), *shape), masked=True).astype(np.float64)
+        values = np.ma.masked_invalid(data).compressed()
+        if not len(values):
+            return 0.0, 255.0
+        if values.min() >= 0 and values.max() <= 255:
+            return (0.0, 1.0) if values.max() <= 1.0 else (0.0, 255.0)
+        low, high = (float(value) for value in np.percentile(values, [0.5, 99.5]))
+        return (low, high) if high > low else (low, low + 1.0)
+
+
+def _colour_bands(dataset: Any) -> list[int]:
+    """Numbers of the red, green and blue band, by their declared meaning, else by order; or of the one grey band."""
+    meaning = list(dataset.colorinterp)
+    rgb = [meaning.index(band) + 1 for band in (ColorInterp.red, ColorInterp.green, ColorInterp.blue) if band in meaning]
+    if len(rgb) == 3:
+        return rgb
+    visible = [number for number, band in enumerate(meaning, 1) if band is not ColorInterp.alpha]
+    return visible[:3] if len(visible) >= 3 else visible[:1]
+
+
+def _palette(dataset: Any) -> Colours | None:
+    if dataset.colorinterp[0] is not ColorInterp.palette:
+        return None
+    entries = dataset.colormap(1)
+    return np.array([entries.get(number, (0, 0, 0, 0))[:3] for number in range(max(entries) + 1)], dtype=np.uint8)
+
+
+def _aligned(box: tuple[float, float, float, float]) -> tuple[int, int, int, int]:
+    """With a margin, so that filtering near a tile's border meets the neighbour's pixels; on whole blocks of a JPEG."""
+    left, top = (int((value - MARGIN_PX) // ALIGN_PX) * ALIGN_PX for value in box[:2])
+    right, bottom = (-int((-value - MARGIN_PX) // ALIGN_PX) * ALIGN_PX for value in box[2:])
+    return left, top, right, bottom
+
+
+def _spread(colour: Colours, shown: Mask, ground: Colours) -> Colours:
+    """Texels that are not shown take the colour of the nearest shown one in their row, else in their column, if it is near; else the ground's."""
+    if shown.all():
+        return colour
+    out, known = colour.copy(), shown.copy()
+    for flip in (False, True):
+        picture, have = (out.swapaxes(0, 1), known.swapaxes(0, 1)) if flip else (out, known)
+        nearest = _nearest_in_row(have)
+        take = ~have & (nearest >= 0)
+        picture[take] = picture[np.nonzero(take)[0], nearest[take]]
+        have |= take
+    out[~known] = ground
+    return out
+
+
+def _nearest_in_row(have: Mask) -> NDArray[np.int32]:
+    """(h, w) column of the nearest true of the row, -1 where it is farther than the reach."""
+    columns = np.arange(have.shape[1], dtype=np.int32)
+    far = np.int32(1 << 24)
+    before = np.maximum.accumulate(np.where(have, columns, -far), axis=1)
+    after = np.minimum.accumulate(np.where(have, columns, far)[:, ::-1], axis=1)[:, ::-1]
+    nearest = np.where(columns - before <= after - columns, before, after)
+    return np.where(np.abs(nearest - columns) <= REACH_PX, nearest, np.int32(-1)).astype(np.int32)
+
+
+def _jpeg(colour: Colours) -> bytes:
+    stream = io.BytesIO()
+    Image.fromarray(colour, "RGB").save(stream, "JPEG", quality=JPEG_QUALITY)
+    return stream.getvalue()
+
+
+def _png(colour: Colours, shown: Mask) -> bytes:
+    stream = io.BytesIO()
+    alpha = np.where(shown, 255, 0).astype(np.uint8)[..., None]
+    Image.fromarray(np.concatenate([colour, alpha], axis=-1), "RGBA").save(stream, "PNG", compress_level=6)
+    return stream.getvalue()
