@@ -1,0 +1,153 @@
+//! Source images to sRGB bytes. Sizes are checked in the header, before anything is decoded; a damaged image is an error, never a panic.
+
+use std::io::Cursor;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+use image::{DynamicImage, ImageFormat, ImageReader, Limits};
+use map3d_base::{Error, Result};
+
+use crate::raster::Raster;
+
+/// Limits of one image; the defaults are those of the specification.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ImageLimits {
+    pub max_image_side_px: u64,
+    pub max_image_px: u64,
+    pub max_decoded_bytes: u64,
+}
+
+impl Default for ImageLimits {
+    fn default() -> Self {
+        Self { max_image_side_px: 16_384, max_image_px: 128 << 20, max_decoded_bytes: 512 << 20 }
+    }
+}
+
+/// More scans than any honest progressive JPEG has.
+const MAX_JPEG_SCANS: u32 = 200;
+
+/// Width and height as the header states them; nothing is decoded. `path` is for messages.
+pub fn probe(path: &Path, bytes: &[u8], limits: &ImageLimits) -> Result<(u32, u32)> {
+    let (width, height) = guarded(path, || if is_jpeg(bytes) { jpeg_size(path, bytes) } else { other_size(path, bytes) })?;
+    check(path, width, height, limits)?;
+    Ok((width, height))
+}
+
+/// Decodes JPEG, PNG, GIF (first frame), BMP, TIFF, WebP or TGA, known by its first bytes.
+pub fn decode(path: &Path, bytes: &[u8], limits: &ImageLimits) -> Result<Raster> {
+    let (width, height) = probe(path, bytes, limits)?;
+    let raster = guarded(path, || if is_jpeg(bytes) { decode_jpeg(path, bytes, width, height) } else { decode_other(path, bytes, limits) })?;
+    if (raster.width, raster.height) != (width, height) {
+        return Err(Error::format(path, format!("decodes to {} × {} px, its header says {width} × {height}", raster.width, raster.height)));
+    }
+    Ok(raster)
+}
+
+fn check(path: &Path, width: u32, height: u32, limits: &ImageLimits) -> Result<()> {
+    let pixels = u64::from(width) * u64::from(height);
+    let rows = [
+        ("image side in px", u64::from(width.max(height)), "max_image_side_px", limits.max_image_side_px),
+        ("image size in px", pixels, "max_image_px", limits.max_image_px),
+        ("decoded image in bytes", pixels * 4, "max_decoded_bytes", limits.max_decoded_bytes),
+    ];
+    if pixels == 0 {
+        return Err(Error::format(path, format!("an image of {width} × {height} px")));
+    }
+    match rows.into_iter().find(|(_, got, _, value)| got > value) {
+        Some((what, got, limit, value)) => Err(Error::Limit { path: path.to_path_buf(), what, got, limit, value }),
+        None => Ok(()),
+    }
+}
+
+/// A decoder that panics on hostile bytes costs the image, not the program.
+fn guarded<T>(path: &Path, work: impl FnOnce() -> Result<T>) -> Result<T> {
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| Err(Error::format(path, "the image decoder gave up on damaged data")))
+}
+
+fn damaged(path: &Path, cause: impl std::fmt::Display) -> Error {
+    Error::format(path, format!("damaged or unknown image: {cause}"))
+}
+
+fn is_jpeg(bytes: &[u8]) -> bool {
+    bytes.starts_with(&[0xFF, 0xD8, 0xFF])
+}
+
+fn jpeg_size(path: &Path, bytes: &[u8]) -> Result<(u32, u32)> {
+    let mut decoder = zune_jpeg::JpegDecoder::new_with_options(Cursor::new(bytes), lenient());
+    decoder.decode_headers().map_err(|e| damaged(path, e))?;
+    let info = decoder.info().ok_or_else(|| damaged(path, "no frame header"))?;
+    Ok((u32::from(info.width), u32::from(info.height)))
+}
+
+/// libjpeg-turbo first; what it refuses (CMYK, a missing end) zune-jpeg may still read.
+fn decode_jpeg(path: &Path, bytes: &[u8], width: u32, height: u32) -> Result<Raster> {
+    match turbo(bytes, width, height) {
+        Some(raster) => Ok(raster),
+        None => zune(path, bytes),
+    }
+}
+
+fn turbo(bytes: &[u8], width: u32, height: u32) -> Option<Raster> {
+    let mut decoder = turbojpeg::Decompressor::new().ok()?;
+    decoder.set_scan_limit(MAX_JPEG_SCANS).ok()?;
+    let header = decoder.read_header(bytes).ok()?;
+    if (header.width, header.height) != (width as usize, height as usize) {
+        return None;
+    }
+    let mut pixels = vec![[0u8; 4]; header.width * header.height];
+    let output = turbojpeg::Image {
+        pixels: pixels.as_flattened_mut(),
+        width: header.width,
+        pitch: header.width * 4,
+        height: header.height,
+        format: turbojpeg::PixelFormat::RGBA,
+    };
+    decoder.decompress(bytes, output).ok()?;
+    Some(Raster::new(width, height, pixels))
+}
+
+fn zune(path: &Path, bytes: &[u8]) -> Result<Raster> {
+    let mut decoder = zune_jpeg::JpegDecoder::new_with_options(Cursor::new(bytes), lenient());
+    let rgba = decoder.decode().map_err(|e| damaged(path, e))?;
+    let info = decoder.info().ok_or_else(|| damaged(path, "no frame header"))?;
+    let (width, height) = (u32::from(info.width), u32::from(info.height));
+    if rgba.len() != width as usize * height as usize * 4 {
+        return Err(damaged(path, format!("{} bytes for {width} × {height} px", rgba.len())));
+    }
+    Ok(Raster::new(width, height, bytemuck::cast_slice(&rgba).to_vec()))
+}
+
+fn lenient() -> zune_jpeg::zune_core::options::DecoderOptions {
+    zune_jpeg::zune_core::options::DecoderOptions::default()
+        .set_strict_mode(false)
+        .set_max_width(65_535)
+        .set_max_height(65_535)
+        .jpeg_set_max_scans(MAX_JPEG_SCANS as usize)
+        .jpeg_set_out_colorspace(zune_jpeg::zune_core::colorspace::ColorSpace::RGBA)
+}
+
+/// TGA has no magic: it is what remains.
+fn reader<'a>(path: &Path, bytes: &'a [u8]) -> Result<ImageReader<Cursor<&'a [u8]>>> {
+    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| Error::storage(path, e))?;
+    if reader.format().is_none() {
+        reader.set_format(ImageFormat::Tga);
+    }
+    Ok(reader)
+}
+
+fn other_size(path: &Path, bytes: &[u8]) -> Result<(u32, u32)> {
+    reader(path, bytes)?.into_dimensions().map_err(|e| damaged(path, e))
+}
+
+fn decode_other(path: &Path, bytes: &[u8], limits: &ImageLimits) -> Result<Raster> {
+    let mut reader = reader(path, bytes)?;
+    let mut bounds = Limits::default();
+    bounds.max_image_width = u32::try_from(limits.max_image_side_px).ok();
+    bounds.max_image_height = bounds.max_image_width;
+    // A 16-bit or float image takes up to four times the bytes of the result on its way.
+    bounds.max_alloc = Some(limits.max_decoded_bytes.saturating_mul(4));
+    reader.limits(bounds);
+    let image: DynamicImage = reader.decode().map_err(|e| damaged(path, e))?;
+    let rgba = image.into_rgba8();
+    Ok(Raster::new(rgba.width(), rgba.height(), bytemuck::cast_slice(rgba.as_raw()).to_vec()))
+}

@@ -1,0 +1,98 @@
+//! Layers as sent (spec/pyramid.md §6): G-buffer arrays to image bytes. The same array gives the same bytes on every machine.
+
+mod color;
+mod data;
+mod deflate;
+mod jpeg;
+mod png;
+mod webp;
+
+use map3d_base::{Error, LayerFormat, LayerKind, LayerSpec, Result};
+
+pub use color::{color_from_linear, opaque};
+pub use data::{bytes_from_normals, bytes_from_u32};
+pub use jpeg::encode_jpeg;
+pub use png::{Deflate, Filter, PngImage, decode_png, encode_png};
+pub use webp::encode_webp;
+
+use crate::gbuffer::GBuffer;
+use crate::raster::Raster;
+
+/// Encodes layers one after another; keeps its buffers. One per thread.
+#[derive(Default)]
+pub struct Encoder {
+    png: png::PngWriter,
+}
+
+impl Encoder {
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// One layer of a G-buffer.
+    pub fn layer(&mut self, g: &GBuffer, spec: &LayerSpec) -> Result<Vec<u8>> {
+        let size = (g.width, g.height);
+        match spec.kind {
+            LayerKind::Color => self.color(size, &g.color, spec.format, spec.quality),
+            LayerKind::Normal => self.normal(size, &g.normal, spec.format),
+            LayerKind::Id => self.id(size, &g.id, spec.format),
+            LayerKind::Depth => self.depth(size, &g.depth, spec.format),
+        }
+    }
+
+    /// Linear premultiplied colour; `quality` 1..=100 for lossy formats.
+    pub fn color(&mut self, size: (u32, u32), color: &[[u16; 4]], format: LayerFormat, quality: u8) -> Result<Vec<u8>> {
+        if !(1..=100).contains(&quality) {
+            return Err(Error::argument(format!("quality is {quality}, expected 1 to 100")));
+        }
+        check_length(size, color.len())?;
+        let image = color_from_linear(size, color);
+        match format {
+            LayerFormat::Webp => encode_webp(&image, quality),
+            LayerFormat::Jpeg => encode_jpeg(&image, quality),
+            LayerFormat::Png => Ok(self.color_png(&image)),
+        }
+    }
+
+    /// Opaque tiles carry no alpha channel.
+    fn color_png(&mut self, image: &Raster) -> Vec<u8> {
+        let size = (image.width, image.height);
+        if image.has_alpha() {
+            return self.png.write(size, 4, image.pixels.as_flattened(), png::COLOR);
+        }
+        let rgb: Vec<u8> = image.pixels.iter().flat_map(|p| [p[0], p[1], p[2]]).collect();
+        self.png.write(size, 3, &rgb, png::COLOR)
+    }
+
+    pub fn normal(&mut self, size: (u32, u32), normals: &[[i16; 3]], format: LayerFormat) -> Result<Vec<u8>> {
+        only_png("normal", format)?;
+        check_length(size, normals.len())?;
+        Ok(self.png.write(size, 3, &bytes_from_normals(normals), png::NORMAL))
+    }
+
+    pub fn id(&mut self, size: (u32, u32), ids: &[u32], format: LayerFormat) -> Result<Vec<u8>> {
+        only_png("id", format)?;
+        check_length(size, ids.len())?;
+        Ok(self.png.write(size, 4, bytes_from_u32(ids), png::ID))
+    }
+
+    pub fn depth(&mut self, size: (u32, u32), depths: &[u32], format: LayerFormat) -> Result<Vec<u8>> {
+        only_png("depth", format)?;
+        check_length(size, depths.len())?;
+        Ok(self.png.write(size, 4, bytes_from_u32(depths), png::DEPTH))
+    }
+}
+
+fn only_png(layer: &str, format: LayerFormat) -> Result<()> {
+    match format {
+        LayerFormat::Png => Ok(()),
+        _ => Err(Error::argument(format!("layer {layer} is lossless: its format is png, not {format:?}"))),
+    }
+}
+
+fn check_length((width, height): (u32, u32), got: usize) -> Result<()> {
+    match width as usize * height as usize == got && got > 0 {
+        true => Ok(()),
+        false => Err(Error::argument(format!("{got} pixels for an image of {width} × {height}"))),
+    }
+}

@@ -1,0 +1,141 @@
+//! PNG, 8-bit, not interlaced, one IDAT, no ancillary chunks. One filter for the whole image and one deflate, chosen per layer by measurement
+//! (`examples/codecs.rs`).
+
+use std::io::Cursor;
+use std::path::Path;
+
+use map3d_base::{Error, Result};
+
+pub use crate::encode::deflate::Deflate;
+use crate::encode::deflate::Deflater;
+
+/// PNG's filters; one for all rows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Filter {
+    None = 0,
+    Sub = 1,
+    Up = 2,
+    Average = 3,
+    Paeth = 4,
+}
+
+/// How a layer is written.
+pub type Method = (Filter, Deflate);
+
+pub const COLOR: Method = (Filter::Up, Deflate::Fast);
+pub const NORMAL: Method = (Filter::Up, Deflate::Fast);
+pub const ID: Method = (Filter::Up, Deflate::Fast);
+pub const DEPTH: Method = (Filter::Up, Deflate::Matching);
+
+const SIGNATURE: [u8; 8] = [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1A, b'\n'];
+
+/// Writes PNGs; keeps its buffers.
+#[derive(Default)]
+pub struct PngWriter {
+    filtered: Vec<u8>,
+    deflater: Deflater,
+}
+
+impl PngWriter {
+    /// `pixels`: rows of `width · channels` bytes; 3 channels (RGB) or 4 (RGBA).
+    pub fn write(&mut self, size: (u32, u32), channels: usize, pixels: &[u8], (filter, deflate): Method) -> Vec<u8> {
+        let row = size.0 as usize * channels;
+        assert_eq!(pixels.len(), row * size.1 as usize, "{size:?} × {channels} bytes");
+        filter_rows(&mut self.filtered, pixels, row, channels, filter);
+        let body = self.deflater.zlib(&self.filtered, deflate);
+        let mut header = [0u8; 13];
+        header[..4].copy_from_slice(&size.0.to_be_bytes());
+        header[4..8].copy_from_slice(&size.1.to_be_bytes());
+        header[8..10].copy_from_slice(&[8, if channels == 3 { 2 } else { 6 }]);
+        let mut out = Vec::with_capacity(body.len() + 64);
+        out.extend_from_slice(&SIGNATURE);
+        chunk(&mut out, b"IHDR", &header);
+        chunk(&mut out, b"IDAT", body);
+        chunk(&mut out, b"IEND", &[]);
+        out
+    }
+}
+
+/// `PngWriter::write` for a single image.
+pub fn encode_png(size: (u32, u32), channels: usize, pixels: &[u8], filter: Filter, deflate: Deflate) -> Vec<u8> {
+    PngWriter::default().write(size, channels, pixels, (filter, deflate))
+}
+
+fn chunk(out: &mut Vec<u8>, name: &[u8; 4], body: &[u8]) {
+    out.extend_from_slice(&(body.len() as u32).to_be_bytes());
+    let from = out.len();
+    out.extend_from_slice(name);
+    out.extend_from_slice(body);
+    let crc = crc32fast::hash(&out[from..]);
+    out.extend_from_slice(&crc.to_be_bytes());
+}
+
+/// Each row behind its filter's number.
+fn filter_rows(out: &mut Vec<u8>, pixels: &[u8], row: usize, step: usize, filter: Filter) {
+    out.clear();
+    out.resize(pixels.len() + pixels.len() / row, 0);
+    let zeros = vec![0u8; row];
+    let mut above: &[u8] = &zeros;
+    for (to, from) in out.chunks_exact_mut(row + 1).zip(pixels.chunks_exact(row)) {
+        to[0] = filter as u8;
+        filter_row(&mut to[1..], from, above, step, filter);
+        above = from;
+    }
+}
+
+fn filter_row(to: &mut [u8], from: &[u8], above: &[u8], step: usize, filter: Filter) {
+    match filter {
+        Filter::None => to.copy_from_slice(from),
+        Filter::Up => to.iter_mut().zip(from.iter().zip(above)).for_each(|(t, (f, a))| *t = f.wrapping_sub(*a)),
+        Filter::Sub => {
+            to[..step].copy_from_slice(&from[..step]);
+            to[step..].iter_mut().zip(from[step..].iter().zip(from)).for_each(|(t, (f, l))| *t = f.wrapping_sub(*l));
+        }
+        Filter::Average | Filter::Paeth => {
+            for i in 0..from.len() {
+                let (left, corner) = if i < step { (0, 0) } else { (from[i - step], above[i - step]) };
+                let guess = if filter == Filter::Paeth { paeth(left, above[i], corner) } else { ((u16::from(left) + u16::from(above[i])) / 2) as u8 };
+                to[i] = from[i].wrapping_sub(guess);
+            }
+        }
+    }
+}
+
+fn paeth(left: u8, above: u8, corner: u8) -> u8 {
+    let (a, b, c) = (i16::from(left), i16::from(above), i16::from(corner));
+    let (pa, pb, pc) = ((b - c).abs(), (a - c).abs(), (a + b - 2 * c).abs());
+    if pa <= pb && pa <= pc {
+        left
+    } else if pb <= pc {
+        above
+    } else {
+        corner
+    }
+}
+
+/// A decoded PNG.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PngImage {
+    pub width: u32,
+    pub height: u32,
+    pub channels: usize,
+    /// Rows of `width · channels` bytes.
+    pub pixels: Vec<u8>,
+}
+
+/// Reads an 8-bit PNG, for checks; other depths and palettes are widened to 8-bit channels.
+pub fn decode_png(bytes: &[u8]) -> Result<PngImage> {
+    let refuse = |e: png::DecodingError| Error::format(Path::new("png"), e.to_string());
+    let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), png::Limits { bytes: 512 << 20 });
+    decoder.set_transformations(png::Transformations::EXPAND | png::Transformations::STRIP_16);
+    let mut reader = decoder.read_info().map_err(refuse)?;
+    let size = reader.output_buffer_size().ok_or_else(|| Error::format(Path::new("png"), "too large"))?;
+    if size > 512 << 20 {
+        return Err(Error::format(Path::new("png"), format!("{size} bytes, at most 512 MiB")));
+    }
+    let mut pixels = vec![0; size];
+    let info = reader.next_frame(&mut pixels).map_err(refuse)?;
+    pixels.truncate(info.buffer_size());
+    Ok(PngImage { width: info.width, height: info.height, channels: info.color_type.samples(), pixels })
+}

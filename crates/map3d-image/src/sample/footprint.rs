@@ -1,0 +1,169 @@
+//! Which level and which taps integrate a texture over a pixel's square.
+//!
+//! In parallel projection the square maps to one parallelogram of texels for all pixels of a surface. The exact filter is the box over it, of
+//! the texture interpolated bilinearly. Taps at a level of the pyramid blur by that level's texels; so they are laid out, shorter than the
+//! parallelogram, such that the second moments of the whole (layout + level's box + bilinear tent) are those of the exact filter:
+//!
+//! ```text
+//! A Aᵀ / 12 = J Jᵀ / 12 − (4^level − 1)/4 · I        J: texels of level 0 per pixel, A: the layout's axes
+//! ```
+
+/// Longest row of taps; beyond it a coarser level is taken.
+pub const MAX_TAPS: usize = 16;
+
+/// How the taps are chosen; the default was tuned against the exact integral (`examples/footprints.rs`).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tuning {
+    /// A level may be taken when the short axis of the footprint, squared, is at least this share of what its own blur needs.
+    pub level_share: f64,
+    /// Largest gap between taps in texels of the level.
+    pub max_gap: f64,
+    /// A layout shorter than this, in texels of the level, is one tap.
+    pub point_below: f64,
+}
+
+impl Default for Tuning {
+    fn default() -> Self {
+        Self { level_share: 1.0, max_gap: 1.25, point_below: 0.6 }
+    }
+}
+
+/// Level and tap offsets, in texels of that level, around a pixel's centre.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Footprint {
+    pub level: u32,
+    pub taps: Vec<[f64; 2]>,
+}
+
+/// `jacobian`: texels of level 0 (right, down) per pixel to the right, and per pixel down. `levels` of the texture, ≥ 1.
+pub fn footprint(jacobian: [[f64; 2]; 2], levels: u32, tuning: &Tuning) -> Footprint {
+    let [a, b] = jacobian;
+    if !jacobian.as_flattened().iter().all(|c| c.is_finite()) {
+        return Footprint { level: levels - 1, taps: vec![[0.0; 2]] };
+    }
+    let gram = [[dot(a, a), dot(a, b)], [dot(a, b), dot(b, b)]];
+    let eigen = Eigen::of(gram);
+    let mut level = (1..levels).rev().find(|l| eigen.small >= tuning.level_share * blur(*l)).unwrap_or(0);
+    loop {
+        let axes = layout_axes(jacobian, &eigen, level);
+        let counts = axes.map(|axis| tap_count(length(axis), tuning));
+        if counts.iter().all(|n| *n <= MAX_TAPS) || level + 1 >= levels {
+            return Footprint { level, taps: grid(axes, counts.map(|n| n.min(MAX_TAPS))) };
+        }
+        level += 1;
+    }
+}
+
+/// 12 × the second moment, in texels of level 0, that a level's own texels add.
+fn blur(level: u32) -> f64 {
+    3.0 * (4f64.powi(level as i32) - 1.0)
+}
+
+/// The layout's axes in texels of the level: along the pixel's axes, or along the footprint's own where that takes fewer taps.
+fn layout_axes([a, b]: [[f64; 2]; 2], eigen: &Eigen, level: u32) -> [[f64; 2]; 2] {
+    let root = |value: f64| (1.0 - blur(level) / value).max(0.0).sqrt();
+    let (major, minor) = (root(eigen.large), root(eigen.small));
+    let texels = 1.0 / f64::from(1u32 << level);
+    let image = |t: [f64; 2]| [texels * (a[0] * t[0] + b[0] * t[1]), texels * (a[1] * t[0] + b[1] * t[1])];
+    let e = eigen.direction;
+    let f = [-e[1], e[0]];
+    let along = |x: f64, y: f64| {
+        let (p, q) = (major * (e[0] * x + e[1] * y), minor * (f[0] * x + f[1] * y));
+        [p * e[0] + q * f[0], p * e[1] + q * f[1]]
+    };
+    let of_pixel = [image(along(1.0, 0.0)), image(along(0.0, 1.0))];
+    let own = [image([major * e[0], major * e[1]]), image([minor * f[0], minor * f[1]])];
+    let area = |axes: [[f64; 2]; 2]| length(axes[0]).max(1.0) * length(axes[1]).max(1.0);
+    if area(of_pixel) > 1.5 * area(own) { own } else { of_pixel }
+}
+
+fn tap_count(length: f64, tuning: &Tuning) -> usize {
+    if length < tuning.point_below {
+        return 1;
+    }
+    let ratio = length / tuning.max_gap;
+    ((ratio * ratio + 1.0).sqrt().ceil() as usize).max(2)
+}
+
+/// Taps at equal distances, their second moment that of a line as long as the axis.
+fn grid(axes: [[f64; 2]; 2], counts: [usize; 2]) -> Vec<[f64; 2]> {
+    let offsets = |n: usize| -> Vec<f64> {
+        let step = if n > 1 { 1.0 / ((n * n - 1) as f64).sqrt() } else { 0.0 };
+        (0..n).map(|i| (i as f64 - (n - 1) as f64 / 2.0) * step).collect()
+    };
+    let (along, across) = (offsets(counts[0]), offsets(counts[1]));
+    across.iter().flat_map(|t| along.iter().map(move |s| [0, 1].map(|c| axes[0][c] * s + axes[1][c] * t))).collect()
+}
+
+/// Eigenvalues of a symmetric 2 × 2 matrix, at least 1e-12, and the unit direction of the larger.
+struct Eigen {
+    large: f64,
+    small: f64,
+    direction: [f64; 2],
+}
+
+impl Eigen {
+    fn of([[p, q], [_, r]]: [[f64; 2]; 2]) -> Self {
+        let (mean, half) = ((p + r) / 2.0, (p - r) / 2.0);
+        let distance = half.hypot(q);
+        let direction = match half >= 0.0 {
+            true => [half + distance, q],
+            false => [q, distance - half],
+        };
+        let l = length(direction);
+        let direction = if l > 1e-9 * mean.max(1e-300) { [direction[0] / l, direction[1] / l] } else { [1.0, 0.0] };
+        Self { large: (mean + distance).max(1e-12), small: (mean - distance).max(1e-12), direction }
+    }
+}
+
+fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}
+
+fn length(a: [f64; 2]) -> f64 {
+    a[0].hypot(a[1])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Second moments of the taps with their level's box and tent, in texels of level 0.
+    fn moments(f: &Footprint) -> [f64; 3] {
+        let s = f64::from(1u32 << f.level);
+        let n = f.taps.len() as f64;
+        let sum = |g: &dyn Fn(&[f64; 2]) -> f64| f.taps.iter().map(g).sum::<f64>() / n * s * s;
+        let own = (s * s - 1.0) / 12.0 + s * s / 6.0;
+        [sum(&|t| t[0] * t[0]) + own, sum(&|t| t[0] * t[1]), sum(&|t| t[1] * t[1]) + own]
+    }
+
+    #[test]
+    fn second_moments_are_those_of_the_exact_filter() {
+        for [a, b] in
+            [[[4.0, 0.0], [0.0, 4.0]], [[3.0, 3.0], [-3.0, 3.0]], [[9.0, 1.0], [2.0, 4.0]], [[5.0, 0.0], [4.0, 6.0]], [[1.1, 0.0], [0.0, 9.0]]]
+        {
+            let f = footprint([a, b], 12, &Tuning::default());
+            let got = moments(&f);
+            let exact =
+                [(a[0] * a[0] + b[0] * b[0]) / 12.0 + 1.0 / 6.0, (a[0] * a[1] + b[0] * b[1]) / 12.0, (a[1] * a[1] + b[1] * b[1]) / 12.0 + 1.0 / 6.0];
+            assert!((0..3).all(|k| (got[k] - exact[k]).abs() < 1e-9 * exact[0].max(exact[2])), "{a:?} {b:?}: {got:?} {exact:?}");
+        }
+    }
+
+    #[test]
+    fn magnified_textures_take_one_tap_of_level_0() {
+        let f = footprint([[0.1, 0.02], [0.0, 0.2]], 11, &Tuning::default());
+        assert_eq!((f.level, f.taps), (0, vec![[0.0, 0.0]]));
+    }
+
+    #[test]
+    fn absurd_jacobians_stay_within_the_pyramid() {
+        for j in
+            [[[1e9, 0.0], [0.0, 1e9]], [[f64::NAN, 0.0], [0.0, 1.0]], [[f64::INFINITY, 0.0], [0.0, 1.0]], [[0.0; 2]; 2], [[1e6, 1.0], [1e6, 1.0]]]
+        {
+            let f = footprint(j, 11, &Tuning::default());
+            assert!(f.level < 11 && (1..=MAX_TAPS * MAX_TAPS).contains(&f.taps.len()));
+            assert!(f.taps.iter().flatten().all(|c| c.is_finite()));
+        }
+    }
+}

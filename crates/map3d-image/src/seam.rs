@@ -1,0 +1,85 @@
+//! Seams: the lossless G-buffer of a block's root tile as a file (spec/pyramid.md §8).
+
+use std::io::Read;
+
+use bytemuck::Pod;
+use map3d_base::{Error, Result};
+use twox_hash::XxHash3_64;
+
+use crate::gbuffer::GBuffer;
+
+const MAGIC: &[u8; 4] = b"M3DG";
+const VERSION: u32 = 1;
+const HEADER_BYTES: usize = 16;
+const MAX_SIDE_PX: u32 = 4_096;
+const ZSTD_LEVEL: i32 = 1;
+
+/// The file's bytes.
+pub fn write_seam(g: &GBuffer) -> Vec<u8> {
+    let mut out = Vec::new();
+    out.extend_from_slice(MAGIC);
+    for n in [VERSION, g.width, g.height] {
+        out.extend_from_slice(&n.to_le_bytes());
+    }
+    for bytes in [little_endian(&g.color), little_endian(&g.normal), little_endian(&g.id), little_endian(&g.depth)] {
+        let frame = zstd::bulk::compress(bytes, ZSTD_LEVEL).expect("memory to memory");
+        out.extend_from_slice(&(frame.len() as u32).to_le_bytes());
+        out.extend_from_slice(&frame);
+    }
+    let checksum = XxHash3_64::oneshot(&out);
+    out.extend_from_slice(&checksum.to_le_bytes());
+    out
+}
+
+/// Reads a seam back; `name` says in messages which it is. Damage, other versions and other sizes are refused.
+pub fn read_seam(name: &str, bytes: &[u8]) -> Result<GBuffer> {
+    let refuse = |what: String| Error::format(name, what);
+    if bytes.len() < HEADER_BYTES + 8 || &bytes[..4] != MAGIC {
+        return Err(refuse("not a M3DG seam".into()));
+    }
+    let number = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("4 bytes"));
+    if number(4) != VERSION {
+        return Err(refuse(format!("version {}, this program reads {VERSION}", number(4))));
+    }
+    let (body, tail) = bytes.split_at(bytes.len() - 8);
+    let (stored, actual) = (u64::from_le_bytes(tail.try_into().expect("8 bytes")), XxHash3_64::oneshot(body));
+    if stored != actual {
+        return Err(refuse(format!("checksum {actual:016x}, expected {stored:016x}: the seam is damaged")));
+    }
+    let (width, height) = (number(8), number(12));
+    if !(1..=MAX_SIDE_PX).contains(&width) || !(1..=MAX_SIDE_PX).contains(&height) {
+        return Err(refuse(format!("{width} × {height} px, at most {MAX_SIDE_PX}")));
+    }
+    let mut g = GBuffer::empty(width, height);
+    let mut rest = &body[HEADER_BYTES..];
+    fill(&mut g.color, &mut rest).map_err(&refuse)?;
+    fill(&mut g.normal, &mut rest).map_err(&refuse)?;
+    fill(&mut g.id, &mut rest).map_err(&refuse)?;
+    fill(&mut g.depth, &mut rest).map_err(&refuse)?;
+    if !rest.is_empty() {
+        return Err(refuse(format!("{} bytes too many", rest.len())));
+    }
+    Ok(g)
+}
+
+#[cfg(target_endian = "big")]
+compile_error!("seams and textures are written as they lie in memory: little-endian machines only");
+
+fn little_endian<T: Pod>(array: &[T]) -> &[u8] {
+    bytemuck::cast_slice(array)
+}
+
+/// One array: length, frame; it must hold exactly the array.
+fn fill<T: Pod>(array: &mut [T], rest: &mut &[u8]) -> std::result::Result<(), String> {
+    let (length, tail) = rest.split_first_chunk::<4>().ok_or("truncated")?;
+    let length = u32::from_le_bytes(*length) as usize;
+    let frame = tail.get(..length).ok_or("truncated")?;
+    *rest = &tail[length..];
+    let into: &mut [u8] = bytemuck::cast_slice_mut(array);
+    let mut decoder = zstd::stream::read::Decoder::with_buffer(frame).map_err(|e| e.to_string())?;
+    decoder.read_exact(into).map_err(|e| format!("array of {} bytes: {e}", into.len()))?;
+    match decoder.read(&mut [0]).map_err(|e| e.to_string())? {
+        0 => Ok(()),
+        _ => Err(format!("array is longer than {} bytes", into.len())),
+    }
+}

@@ -1,0 +1,261 @@
+//! Textures of a scene: every image that a material names, with the mask of what the scene uses of it, becomes one `.m3t`.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use map3d_base::asset::{AssetMesh, Material, Wrap};
+use map3d_base::{Error, Result};
+use rayon::prelude::*;
+
+use crate::decode::ImageLimits;
+use crate::texture::file::{self, TextureFile, TextureKey, texture_key, texture_path};
+use crate::texture::mask::UsageMask;
+use crate::texture::source;
+
+/// (stage, done, total) → false to stop.
+pub type Progress<'a> = dyn Fn(&str, u64, u64) -> bool + Sync + 'a;
+
+/// An asset as the build sees it. `folder` holds `textures/`.
+pub struct TextureAsset<'a> {
+    pub folder: &'a Path,
+    pub mesh: &'a AssetMesh,
+    pub materials: &'a [Material],
+}
+
+/// What a material names: keys of its image and of its alpha image, one of them at least.
+pub type TextureSource = (Option<String>, Option<String>);
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TextureInfo {
+    pub key: TextureKey,
+    pub width: u32,
+    pub height: u32,
+    pub has_alpha: bool,
+}
+
+/// The textures of a scene. A source that is absent has no sound image; `missing` counts why.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct TextureKeys {
+    pub by_source: BTreeMap<TextureSource, TextureInfo>,
+    /// Reason → (count, first example).
+    pub missing: BTreeMap<String, (u64, String)>,
+    /// Files that were there already.
+    pub kept: u64,
+    pub written: u64,
+}
+
+impl TextureKeys {
+    pub fn get(&self, material: &Material) -> Option<&TextureInfo> {
+        self.by_source.get(&source_of(material)?)
+    }
+}
+
+/// The texture that a material names, if any.
+pub fn source_of(material: &Material) -> Option<TextureSource> {
+    (material.texture.is_some() || material.alpha.is_some()).then(|| (material.texture.clone(), material.alpha.clone()))
+}
+
+/// Builds the textures that the assets use into `out_dir` (`<aa>/<key>.m3t`); a file that is there already is kept. `threads` = 0: as many as cores.
+/// Memory: one image per thread, and the runs of the masks of images that several assets share.
+pub fn build_textures(assets: &[TextureAsset], out_dir: &Path, threads: usize, progress: &Progress) -> Result<TextureKeys> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| Error::argument(format!("threads: {e}")))?;
+    let build = Build::plan(assets, out_dir, progress);
+    pool.install(|| {
+        for (number, asset) in assets.iter().enumerate() {
+            build.asset(number, asset)?;
+        }
+        Ok(build.result.into_inner().expect("no thread panicked"))
+    })
+}
+
+/// Removes texture files that no key names; returns how many.
+pub fn prune_textures(out_dir: &Path, keys: &TextureKeys) -> Result<u64> {
+    let wanted: BTreeSet<PathBuf> = keys.by_source.values().map(|info| texture_path(out_dir, &info.key)).collect();
+    let list = |folder: &Path| -> Result<Vec<PathBuf>> {
+        let entries = std::fs::read_dir(folder).map_err(|e| Error::storage(folder, e))?;
+        entries.map(|entry| entry.map(|e| e.path()).map_err(|e| Error::storage(folder, e))).collect()
+    };
+    let mut removed = 0;
+    if !out_dir.exists() {
+        return Ok(0);
+    }
+    for folder in list(out_dir)?.into_iter().filter(|p| p.is_dir()) {
+        for path in list(&folder)?.into_iter().filter(|p| !wanted.contains(p)) {
+            std::fs::remove_file(&path).map_err(|e| Error::storage(&path, e))?;
+            removed += 1;
+        }
+    }
+    Ok(removed)
+}
+
+struct Build<'a> {
+    out_dir: &'a Path,
+    progress: &'a Progress<'a>,
+    /// The last asset that uses each source: then its texture is made.
+    last_use: HashMap<TextureSource, usize>,
+    /// Runs of the masks of sources that a later asset uses too.
+    pending: Mutex<HashMap<TextureSource, Vec<u8>>>,
+    result: Mutex<TextureKeys>,
+    done: AtomicU64,
+    stopped: AtomicBool,
+}
+
+/// Triangles of one asset that use one source, each with its wrap mode.
+type Uses = Vec<(u32, Wrap)>;
+
+impl<'a> Build<'a> {
+    fn plan(assets: &[TextureAsset], out_dir: &'a Path, progress: &'a Progress<'a>) -> Self {
+        let mut last_use = HashMap::new();
+        for (number, asset) in assets.iter().enumerate() {
+            let used: BTreeSet<u32> = asset.mesh.materials().iter().copied().collect();
+            let materials = used.iter().filter_map(|m| asset.materials.get(*m as usize));
+            last_use.extend(materials.filter_map(source_of).map(|source| (source, number)));
+        }
+        Self {
+            out_dir,
+            progress,
+            last_use,
+            pending: Mutex::default(),
+            result: Mutex::default(),
+            done: AtomicU64::new(0),
+            stopped: AtomicBool::new(false),
+        }
+    }
+
+    fn asset(&self, number: usize, asset: &TextureAsset) -> Result<()> {
+        let images = image_files(asset.folder)?;
+        let uses = uses_by_source(asset);
+        uses.into_par_iter().try_for_each(|(source, triangles)| {
+            if self.stopped.load(Ordering::Relaxed) {
+                return Err(Error::Interrupted);
+            }
+            self.source(number, asset, &images, source, &triangles)
+        })
+    }
+
+    fn source(&self, number: usize, asset: &TextureAsset, images: &HashMap<String, PathBuf>, source: TextureSource, uses: &Uses) -> Result<()> {
+        let last = self.last_use[&source] == number;
+        match self.one(asset, images, &source, uses, last) {
+            Ok(None) => return Ok(()),
+            Ok(Some((info, written))) => {
+                let mut result = self.result.lock().expect("no thread panicked");
+                result.by_source.insert(source, info);
+                *(if written { &mut result.written } else { &mut result.kept }) += 1;
+            }
+            Err(Error::Storage { path, source: cause }) if path.starts_with(self.out_dir) => return Err(Error::Storage { path, source: cause }),
+            Err(cause) if last => self.miss(&source, &cause),
+            Err(_) => return Ok(()),
+        }
+        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+        if !(self.progress)("textures", done, self.last_use.len() as u64) {
+            self.stopped.store(true, Ordering::Relaxed);
+            return Err(Error::Interrupted);
+        }
+        Ok(())
+    }
+
+    /// Adds one asset's triangles to a source's mask; at its last asset makes the file: (info, written?).
+    fn one(
+        &self,
+        asset: &TextureAsset,
+        images: &HashMap<String, PathBuf>,
+        source: &TextureSource,
+        uses: &Uses,
+        last: bool,
+    ) -> Result<Option<(TextureInfo, bool)>> {
+        let limits = ImageLimits::default();
+        let (path, image) = read_image(asset.folder, images, source.0.as_deref())?;
+        let (alpha_path, alpha) = read_image(asset.folder, images, source.1.as_deref())?;
+        let path = if image.is_empty() { alpha_path } else { path };
+        let (width, height) = source::probe(&path, &image, &alpha, &limits)?;
+        let before = self.pending.lock().expect("no thread panicked").remove(source);
+        let mut mask = before.and_then(|runs| UsageMask::from_runs(width, height, &runs)).unwrap_or_else(|| UsageMask::empty(width, height));
+        let uvs = asset.mesh.uvs();
+        for (triangle, wrap) in uses {
+            if mask.is_full() {
+                break;
+            }
+            mask.add_triangle(uvs[*triangle as usize], *wrap);
+        }
+        if !last {
+            self.pending.lock().expect("no thread panicked").insert(source.clone(), mask.to_runs());
+            return Ok(None);
+        }
+        self.make(&path, &image, &alpha, &mask).map(Some)
+    }
+
+    fn make(&self, path: &Path, image: &[u8], alpha: &[u8], mask: &UsageMask) -> Result<(TextureInfo, bool)> {
+        let runs = if mask.is_full() { Vec::new() } else { mask.to_runs() };
+        let key = texture_key(image, alpha, &runs);
+        let target = texture_path(self.out_dir, &key);
+        let info = |f: &TextureFile| TextureInfo { key, width: f.width, height: f.height, has_alpha: f.has_alpha };
+        if let Ok(file) = TextureFile::open_header(&target) {
+            return Ok((info(&file), false));
+        }
+        let bytes = file::layout(path, image, alpha, mask, &ImageLimits::default())?;
+        file::write(&target, &bytes)?;
+        Ok((info(&TextureFile::open_header(&target)?), true))
+    }
+
+    fn miss(&self, source: &TextureSource, cause: &Error) {
+        let reason = match cause {
+            Error::Limit { .. } => "texture image over a limit",
+            Error::Storage { .. } => "texture image cannot be read",
+            _ => "texture image is missing or damaged",
+        };
+        let name = source.0.as_deref().or(source.1.as_deref()).unwrap_or_default();
+        let mut result = self.result.lock().expect("no thread panicked");
+        let entry = result.missing.entry(reason.to_owned()).or_insert((0, String::new()));
+        entry.0 += 1;
+        let example = format!("{name}: {cause}");
+        // The least of the messages, so that the report does not depend on the order of threads.
+        if entry.1.is_empty() || example < entry.1 {
+            entry.1 = example;
+        }
+    }
+}
+
+/// Triangles of an asset grouped by texture, in source order.
+fn uses_by_source(asset: &TextureAsset) -> Vec<(TextureSource, Uses)> {
+    let sources: Vec<Option<TextureSource>> = asset.materials.iter().map(source_of).collect();
+    let mut numbers: BTreeMap<&TextureSource, usize> = BTreeMap::new();
+    let slots: Vec<Option<usize>> = sources
+        .iter()
+        .map(|source| {
+            let next = numbers.len();
+            source.as_ref().map(|s| *numbers.entry(s).or_insert(next))
+        })
+        .collect();
+    let mut groups: Vec<Uses> = vec![Vec::new(); numbers.len()];
+    for (triangle, material) in asset.mesh.materials().iter().enumerate() {
+        if let Some(Some(slot)) = slots.get(*material as usize) {
+            groups[*slot].push((triangle as u32, asset.materials[*material as usize].wrap));
+        }
+    }
+    numbers.into_iter().map(|(source, slot)| (source.clone(), std::mem::take(&mut groups[slot]))).filter(|(_, uses)| !uses.is_empty()).collect()
+}
+
+/// Image files of an asset by key (their names without extension).
+fn image_files(folder: &Path) -> Result<HashMap<String, PathBuf>> {
+    let folder = folder.join("textures");
+    if !folder.exists() {
+        return Ok(HashMap::new());
+    }
+    let entries = std::fs::read_dir(&folder).map_err(|e| Error::storage(&folder, e))?;
+    let mut files: Vec<PathBuf> = entries.map(|e| e.map(|e| e.path()).map_err(|e| Error::storage(&folder, e))).collect::<Result<_>>()?;
+    files.sort_unstable_by(|a, b| b.cmp(a));
+    Ok(files.into_iter().filter_map(|p| Some((p.file_stem()?.to_str()?.to_owned(), p))).collect())
+}
+
+/// Path and bytes of an image of the asset; empty bytes where the material names none.
+fn read_image(folder: &Path, images: &HashMap<String, PathBuf>, key: Option<&str>) -> Result<(PathBuf, Vec<u8>)> {
+    let Some(key) = key else { return Ok((folder.to_path_buf(), Vec::new())) };
+    let path = images.get(key).ok_or_else(|| Error::format(folder.join("textures").join(key), "no such image in the asset"))?;
+    let bytes = std::fs::read(path).map_err(|e| Error::storage(path, e))?;
+    if bytes.is_empty() {
+        return Err(Error::format(path, "an empty file"));
+    }
+    Ok((path.clone(), bytes))
+}

@@ -1,0 +1,190 @@
+//! Levels ready to sample, under a cap of bytes. A surface asks once for its level and then holds it; no lock is taken per sample.
+
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, OnceLock};
+
+use map3d_base::{Error, Result};
+
+use crate::raster::Raster;
+use crate::srgb::{LINEAR15, UNIT15};
+use crate::texture::file::{TextureFile, TextureKey, texture_path};
+use crate::texture::mips::{LinearRaster, first_mip};
+
+/// A level in linear light, premultiplied, 15 bits a channel (`UNIT15` = 1); rows top to bottom.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Level {
+    pub width: u32,
+    pub height: u32,
+    pub texels: Vec<[u16; 4]>,
+}
+
+impl Level {
+    pub fn from_raster(raster: &Raster) -> Self {
+        let texel = |p: &[u8; 4]| {
+            let a = (u32::from(p[3]) * UNIT15 + 127) / 255;
+            let channel = |c: u8| match p[3] {
+                255 => LINEAR15[c as usize],
+                _ => ((u32::from(LINEAR15[c as usize]) * u32::from(p[3]) + 127) / 255) as u16,
+            };
+            [channel(p[0]), channel(p[1]), channel(p[2]), a as u16]
+        };
+        Self { width: raster.width, height: raster.height, texels: raster.pixels.iter().map(texel).collect() }
+    }
+
+    pub fn from_linear(linear: &LinearRaster) -> Self {
+        let texel = |p: &[u16; 4]| p.map(|c| ((u32::from(c) * UNIT15 + 32_767) / 65_535) as u16);
+        Self { width: linear.width, height: linear.height, texels: linear.pixels.iter().map(texel).collect() }
+    }
+
+    fn bytes(&self) -> u64 {
+        (self.texels.len() * 8) as u64
+    }
+}
+
+/// A texture of the store, opened and checked.
+#[derive(Debug)]
+pub struct Texture {
+    pub key: TextureKey,
+    pub file: TextureFile,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CacheStats {
+    pub hits: u64,
+    pub misses: u64,
+    pub bytes: u64,
+    pub levels: u64,
+    pub evicted: u64,
+    /// Times a source image was decoded (levels 0 and 1).
+    pub decoded: u64,
+}
+
+type Made<T> = Arc<OnceLock<std::result::Result<Arc<T>, String>>>;
+
+struct Entry {
+    made: Made<Level>,
+    bytes: u64,
+    used: u64,
+}
+
+#[derive(Default)]
+struct Levels {
+    entries: HashMap<(TextureKey, u32), Entry>,
+    bytes: u64,
+    clock: u64,
+}
+
+/// Shared by all threads of a scene. The cap is kept by dropping the least recently used levels; a level that is in use or alone stays.
+pub struct TextureCache {
+    folder: PathBuf,
+    cap_bytes: u64,
+    textures: Mutex<HashMap<TextureKey, Made<Texture>>>,
+    levels: Mutex<Levels>,
+    hits: AtomicU64,
+    misses: AtomicU64,
+    evicted: AtomicU64,
+    decoded: AtomicU64,
+}
+
+impl TextureCache {
+    /// `folder`: a scene's `textures/`.
+    pub fn new(folder: PathBuf, cap_bytes: u64) -> Self {
+        Self {
+            folder,
+            cap_bytes,
+            textures: Mutex::default(),
+            levels: Mutex::default(),
+            hits: AtomicU64::new(0),
+            misses: AtomicU64::new(0),
+            evicted: AtomicU64::new(0),
+            decoded: AtomicU64::new(0),
+        }
+    }
+
+    /// Opens a texture; its file is read and checked the first time. A damaged one stays an error.
+    pub fn texture(&self, key: &TextureKey) -> Result<Arc<Texture>> {
+        let made = self.textures.lock().expect("no thread panicked").entry(*key).or_default().clone();
+        let path = texture_path(&self.folder, key);
+        let texture = made.get_or_init(|| TextureFile::open(&path).map(|file| Arc::new(Texture { key: *key, file })).map_err(|e| e.to_string()));
+        texture.clone().map_err(|what| Error::Format { path, what })
+    }
+
+    /// A level of a texture; made once, however many threads ask.
+    pub fn level(&self, texture: &Texture, level: u32) -> Result<Arc<Level>> {
+        let name = (texture.key, level);
+        let made = self.slot(name);
+        let mut fresh = false;
+        let result = made.get_or_init(|| {
+            fresh = true;
+            self.make(texture, level).map(Arc::new).map_err(|e| e.to_string())
+        });
+        let counter = if fresh { &self.misses } else { &self.hits };
+        counter.fetch_add(1, Ordering::Relaxed);
+        let result = result.clone().map_err(|what| Error::Format { path: texture_path(&self.folder, &texture.key), what })?;
+        if fresh {
+            self.account(name, result.bytes());
+        }
+        Ok(result)
+    }
+
+    pub fn stats(&self) -> CacheStats {
+        let levels = self.levels.lock().expect("no thread panicked");
+        CacheStats {
+            hits: self.hits.load(Ordering::Relaxed),
+            misses: self.misses.load(Ordering::Relaxed),
+            bytes: levels.bytes,
+            levels: levels.entries.len() as u64,
+            evicted: self.evicted.load(Ordering::Relaxed),
+            decoded: self.decoded.load(Ordering::Relaxed),
+        }
+    }
+
+    fn slot(&self, name: (TextureKey, u32)) -> Made<Level> {
+        let mut levels = self.levels.lock().expect("no thread panicked");
+        levels.clock += 1;
+        let clock = levels.clock;
+        let entry = levels.entries.entry(name).or_insert_with(|| Entry { made: Made::default(), bytes: 0, used: 0 });
+        entry.used = clock;
+        entry.made.clone()
+    }
+
+    fn make(&self, texture: &Texture, level: u32) -> Result<Level> {
+        if level < 2 {
+            self.decoded.fetch_add(1, Ordering::Relaxed);
+        }
+        match level {
+            0 => Ok(Level::from_raster(&texture.file.level_0()?)),
+            1 => Ok(Level::from_linear(&first_mip(&texture.file.level_0()?))),
+            _ => Ok(Level::from_raster(&texture.file.stored_level(level)?)),
+        }
+    }
+
+    /// Books a new level and drops the least recently used ones while over the cap.
+    fn account(&self, name: (TextureKey, u32), bytes: u64) {
+        let mut levels = self.levels.lock().expect("no thread panicked");
+        if let Some(entry) = levels.entries.get_mut(&name) {
+            entry.bytes = bytes;
+            levels.bytes += bytes;
+        }
+        if levels.bytes > self.cap_bytes {
+            self.evict(&mut levels, name);
+        }
+    }
+
+    /// Down to nine tenths of the cap, so that a full cache does not sort at every miss.
+    fn evict(&self, levels: &mut Levels, keep: (TextureKey, u32)) {
+        let mut order: Vec<(u64, (TextureKey, u32))> =
+            levels.entries.iter().filter(|(name, e)| e.bytes > 0 && **name != keep).map(|(name, e)| (e.used, *name)).collect();
+        order.sort_unstable();
+        for (_, name) in order {
+            if levels.bytes <= self.cap_bytes / 10 * 9 {
+                break;
+            }
+            let entry = levels.entries.remove(&name).expect("listed above");
+            levels.bytes -= entry.bytes;
+            self.evicted.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! `.m3t` files (spec/scene.md, Texture): the source bytes, the usage mask, and levels ≥ 2 ready to sample.
+
+use std::fs::{self, File};
+use std::os::unix::fs::FileExt;
+use std::path::{Path, PathBuf};
+
+use map3d_base::file::{self, HEADER_BYTES, aligned};
+use map3d_base::{Error, Result};
+
+use crate::decode::ImageLimits;
+use crate::raster::Raster;
+use crate::texture::mask::UsageMask;
+use crate::texture::mips::{first_mip, level_count, level_size, next_mip};
+use crate::texture::source;
+
+const MAGIC: &[u8; 4] = b"M3DT";
+const VERSION: u32 = 1;
+const FLAG_ALPHA: u32 = 1;
+const FLAG_MASK: u32 = 2;
+const SECTIONS: usize = 16;
+const TABLE_BYTES: usize = SECTIONS * 16;
+/// The section of level 2.
+const FIRST_LEVEL_SECTION: usize = 3;
+
+/// Binary key of a texture: xxh3-128.
+pub type TextureKey = [u8; 16];
+
+/// Lower-case hex of a key, as in file names.
+pub fn hex(key: &TextureKey) -> String {
+    key.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// `<folder>/<aa>/<key>.m3t`.
+pub fn texture_path(folder: &Path, key: &TextureKey) -> PathBuf {
+    let name = hex(key);
+    folder.join(&name[..2]).join(format!("{name}.m3t"))
+}
+
+/// Key over image, alpha image and usage mask (its runs; none when every texel is used), each after its length as u64.
+pub fn texture_key(image: &[u8], alpha: &[u8], runs: &[u8]) -> TextureKey {
+    let mut hash = twox_hash::XxHash3_128::with_seed(0);
+    for part in [image, alpha, runs] {
+        hash.write(&(part.len() as u64).to_le_bytes());
+        hash.write(part);
+    }
+    hash.finish_128().to_be_bytes()
+}
+
+/// Decodes a texture and lays it out as a file's bytes.
+pub fn layout(path: &Path, image: &[u8], alpha: &[u8], mask: &UsageMask, limits: &ImageLimits) -> Result<Vec<u8>> {
+    let masked = !mask.is_full();
+    let level_0 = source::level_0(path, image, alpha, masked.then_some(mask), limits)?;
+    let levels = level_count(level_0.width, level_0.height);
+    let mut sections = vec![image.to_vec(), alpha.to_vec(), if masked { mask.to_runs() } else { Vec::new() }];
+    let mut mip = first_mip(&level_0);
+    for _ in 2..levels {
+        mip = next_mip(&mip);
+        sections.push(mip.to_raster().pixels.into_flattened());
+    }
+    let flags = u32::from(level_0.has_alpha()) * FLAG_ALPHA + u32::from(masked) * FLAG_MASK;
+    Ok(assemble([level_0.width, level_0.height, levels, flags], &sections))
+}
+
+fn assemble(numbers: [u32; 4], sections: &[Vec<u8>]) -> Vec<u8> {
+    let body = aligned(TABLE_BYTES) + sections.iter().map(|s| aligned(s.len())).sum::<usize>();
+    let mut out = Vec::with_capacity(HEADER_BYTES + body);
+    out.resize(HEADER_BYTES + aligned(TABLE_BYTES), 0);
+    for (k, section) in sections.iter().enumerate() {
+        let entry = HEADER_BYTES + k * 16;
+        let offset = out.len() as u64;
+        out[entry..entry + 8].copy_from_slice(&offset.to_le_bytes());
+        out[entry + 8..entry + 16].copy_from_slice(&(section.len() as u64).to_le_bytes());
+        out.extend_from_slice(section);
+        out.resize(out.len().next_multiple_of(file::ALIGN), 0);
+    }
+    let checksum = file::checksum(&out[HEADER_BYTES..]);
+    out[..16].copy_from_slice(&file::header_start(MAGIC, VERSION, checksum));
+    for (k, n) in numbers.into_iter().enumerate() {
+        out[16 + 4 * k..20 + 4 * k].copy_from_slice(&n.to_le_bytes());
+    }
+    out
+}
+
+/// Writes under another name, then renames: a reader never sees half a file.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    let folder = path.parent().expect("texture_path has a folder");
+    fs::create_dir_all(folder).map_err(|e| Error::storage(folder, e))?;
+    let part = path.with_extension("m3t.part");
+    fs::write(&part, bytes).map_err(|e| Error::storage(&part, e))?;
+    fs::rename(&part, path).map_err(|e| Error::storage(path, e))
+}
+
+/// An open texture file: header and table checked, sections read on demand.
+#[derive(Debug)]
+pub struct TextureFile {
+    path: PathBuf,
+    pub width: u32,
+    pub height: u32,
+    pub levels: u32,
+    pub has_alpha: bool,
+    masked: bool,
+    sections: [(u64, u64); SECTIONS],
+}
+
+impl TextureFile {
+    /// Opens and checks everything, the checksum too.
+    pub fn open(path: &Path) -> Result<Self> {
+        let bytes = fs::read(path).map_err(|e| Error::storage(path, e))?;
+        file::check_header(path, &bytes, MAGIC, VERSION, true)?;
+        Self::parse(path, &bytes, bytes.len() as u64)
+    }
+
+    /// Opens without reading the sections: for a file whose checksum need not be believed yet.
+    pub fn open_header(path: &Path) -> Result<Self> {
+        let file = File::open(path).map_err(|e| Error::storage(path, e))?;
+        let length = file.metadata().map_err(|e| Error::storage(path, e))?.len();
+        let mut head = vec![0; (HEADER_BYTES + TABLE_BYTES).min(length as usize)];
+        file.read_exact_at(&mut head, 0).map_err(|e| Error::storage(path, e))?;
+        file::check_header(path, &head, MAGIC, VERSION, false)?;
+        Self::parse(path, &head, length)
+    }
+
+    fn parse(path: &Path, head: &[u8], length: u64) -> Result<Self> {
+        if head.len() < HEADER_BYTES + TABLE_BYTES {
+            return Err(Error::format(path, format!("truncated: {length} bytes")));
+        }
+        let u32_at = |at: usize| u32::from_le_bytes(head[at..at + 4].try_into().expect("4 bytes"));
+        let [width, height, levels, flags] = [16, 20, 24, 28].map(u32_at);
+        if width == 0 || height == 0 || levels != level_count(width, height) || levels as usize > SECTIONS - FIRST_LEVEL_SECTION + 2 {
+            return Err(Error::format(path, format!("{width} × {height} px with {levels} levels")));
+        }
+        let u64_at = |at: usize| u64::from_le_bytes(head[at..at + 8].try_into().expect("8 bytes"));
+        let sections: [(u64, u64); SECTIONS] = std::array::from_fn(|k| (u64_at(HEADER_BYTES + 16 * k), u64_at(HEADER_BYTES + 16 * k + 8)));
+        let texture =
+            Self { path: path.to_path_buf(), width, height, levels, has_alpha: flags & FLAG_ALPHA != 0, masked: flags & FLAG_MASK != 0, sections };
+        texture.validate(length)?;
+        Ok(texture)
+    }
+
+    fn validate(&self, length: u64) -> Result<()> {
+        for (k, (offset, bytes)) in self.sections.iter().enumerate() {
+            if offset.checked_add(*bytes).is_none_or(|end| end > length) {
+                return Err(Error::format(&self.path, format!("section {k} ends after the file's {length} bytes")));
+            }
+        }
+        for level in 2..self.levels {
+            let (w, h) = level_size(self.width, self.height, level);
+            let (got, expected) = (self.sections[FIRST_LEVEL_SECTION + level as usize - 2].1, u64::from(w) * u64::from(h) * 4);
+            if got != expected {
+                return Err(Error::format(&self.path, format!("level {level} has {got} bytes, expected {expected}")));
+            }
+        }
+        Ok(())
+    }
+
+    /// A level ≥ 2 as it is stored.
+    pub fn stored_level(&self, level: u32) -> Result<Raster> {
+        assert!((2..self.levels).contains(&level), "level {level} is not stored");
+        let bytes = self.section(FIRST_LEVEL_SECTION + level as usize - 2)?;
+        let (w, h) = level_size(self.width, self.height, level);
+        Ok(Raster::new(w, h, bytemuck::cast_slice(&bytes).to_vec()))
+    }
+
+    /// Level 0: decoded and filled.
+    pub fn level_0(&self) -> Result<Raster> {
+        let (image, alpha) = (self.section(0)?, self.section(1)?);
+        let mask = if self.masked { Some(self.mask()?) } else { None };
+        let limits = ImageLimits::default();
+        if source::probe(&self.path, &image, &alpha, &limits)? != (self.width, self.height) {
+            return Err(Error::format(&self.path, "its image has another size than its header says"));
+        }
+        source::level_0(&self.path, &image, &alpha, mask.as_ref(), &limits)
+    }
+
+    /// Any level as sRGB bytes.
+    pub fn level(&self, level: u32) -> Result<Raster> {
+        match level {
+            l if l >= self.levels => Err(Error::argument(format!("level {l} of {}: it has {} levels", self.path.display(), self.levels))),
+            0 => self.level_0(),
+            1 => Ok(first_mip(&self.level_0()?).to_raster()),
+            _ => self.stored_level(level),
+        }
+    }
+
+    fn mask(&self) -> Result<UsageMask> {
+        let runs = self.section(2)?;
+        UsageMask::from_runs(self.width, self.height, &runs).ok_or_else(|| Error::format(&self.path, "the runs of its usage mask do not add up"))
+    }
+
+    fn section(&self, k: usize) -> Result<Vec<u8>> {
+        let (offset, length) = self.sections[k];
+        let mut bytes = vec![0; length as usize];
+        let file = File::open(&self.path).map_err(|e| Error::storage(&self.path, e))?;
+        file.read_exact_at(&mut bytes, offset).map_err(|e| Error::storage(&self.path, e))?;
+        Ok(bytes)
+    }
+}

@@ -1,0 +1,223 @@
+//! Which texels of an image the UV triangles of a scene touch (spec/scene.md, Texture).
+
+use map3d_base::asset::Wrap;
+
+/// UV coordinates that miss a texel's border by less than this (in texels) do not touch the neighbour: float32 noise.
+const TOUCH_TEXELS: f64 = 1.0 / 512.0;
+/// A triangle over more rows than this (before wrapping) uses every texel.
+const MAX_ROWS: f64 = 4_194_304.0;
+
+/// One bit a texel, rows top to bottom.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UsageMask {
+    width: u32,
+    height: u32,
+    words: Vec<u64>,
+    used: u64,
+}
+
+impl UsageMask {
+    pub fn empty(width: u32, height: u32) -> Self {
+        let texels = width as usize * height as usize;
+        Self { width, height, words: vec![0; texels.div_ceil(64)], used: 0 }
+    }
+
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    pub fn used(&self) -> u64 {
+        self.used
+    }
+
+    pub fn is_full(&self) -> bool {
+        self.used == u64::from(self.width) * u64::from(self.height)
+    }
+
+    pub fn get(&self, x: u32, y: u32) -> bool {
+        let i = y as usize * self.width as usize + x as usize;
+        self.words[i / 64] >> (i % 64) & 1 == 1
+    }
+
+    /// Marks the texels that a triangle touches. UVs: u right, v up, origin at the lower left corner of the image.
+    pub fn add_triangle(&mut self, uv: [[f32; 2]; 3], wrap: Wrap) {
+        if self.is_full() || !uv.as_flattened().iter().all(|c| c.is_finite()) {
+            return;
+        }
+        let (w, h) = (f64::from(self.width), f64::from(self.height));
+        let p = uv.map(|c| [f64::from(c[0]) * w, (1.0 - f64::from(c[1])) * h]);
+        let (lo, hi) = (min3(p.map(|c| c[1])), max3(p.map(|c| c[1])));
+        if hi - lo > MAX_ROWS || p.as_flattened().iter().any(|c| c.abs() > 1e12) {
+            return self.fill_all();
+        }
+        let (lo, hi) = self.within(lo, hi, wrap);
+        for row in touched(lo, hi) {
+            let Some((left, right)) = span_in_band(&p, row as f64, row as f64 + 1.0) else { continue };
+            if let Some(y) = fold(row, self.height, wrap) {
+                self.mark_span(y, left, right, wrap);
+            }
+        }
+    }
+
+    /// Rows far outside a texture that does not repeat need not be walked one by one.
+    fn within(&self, lo: f64, hi: f64, wrap: Wrap) -> (f64, f64) {
+        match wrap {
+            Wrap::Wrap | Wrap::Mirror => (lo, hi),
+            Wrap::Clamp | Wrap::Border | Wrap::None => {
+                let h = f64::from(self.height);
+                (lo.clamp(-1.0, h + 1.0), hi.clamp(-1.0, h + 1.0))
+            }
+        }
+    }
+
+    fn mark_span(&mut self, y: u32, left: f64, right: f64, wrap: Wrap) {
+        let repeats = matches!(wrap, Wrap::Wrap | Wrap::Mirror);
+        let period = f64::from(self.width) * if wrap == Wrap::Mirror { 2.0 } else { 1.0 };
+        if repeats && right - left >= period {
+            return (0..self.width).for_each(|x| self.mark(x, y));
+        }
+        let (left, right) = if repeats { (left, right) } else { (left.max(-1.0), right.min(f64::from(self.width) + 1.0)) };
+        for column in touched(left, right) {
+            if let Some(x) = fold(column, self.width, wrap) {
+                self.mark(x, y);
+            }
+        }
+    }
+
+    /// Marks one texel.
+    pub fn mark(&mut self, x: u32, y: u32) {
+        let i = y as usize * self.width as usize + x as usize;
+        let bit = 1u64 << (i % 64);
+        self.used += u64::from(self.words[i / 64] & bit == 0);
+        self.words[i / 64] |= bit;
+    }
+
+    fn fill_all(&mut self) {
+        for y in 0..self.height {
+            (0..self.width).for_each(|x| self.mark(x, y));
+        }
+    }
+
+    /// Run lengths in row order as LEB128, starting with unused.
+    pub fn to_runs(&self) -> Vec<u8> {
+        let mut out = Vec::new();
+        let total = u64::from(self.width) * u64::from(self.height);
+        let (mut at, mut value) = (0u64, false);
+        while at < total {
+            let end = self.run_end(at, value, total);
+            leb128(&mut out, end - at);
+            (at, value) = (end, !value);
+        }
+        out
+    }
+
+    fn run_end(&self, from: u64, value: bool, total: u64) -> u64 {
+        let mut at = from;
+        while at < total {
+            let word = self.words[(at / 64) as usize] ^ if value { u64::MAX } else { 0 };
+            let rest = word >> (at % 64);
+            if rest != 0 {
+                return (at + u64::from(rest.trailing_zeros())).min(total);
+            }
+            at = (at / 64 + 1) * 64;
+        }
+        total
+    }
+
+    /// Reads `to_runs` back; `None` when the runs do not add up to the image.
+    pub fn from_runs(width: u32, height: u32, runs: &[u8]) -> Option<Self> {
+        let mut mask = Self::empty(width, height);
+        let total = u64::from(width) * u64::from(height);
+        let (mut at, mut value, mut rest) = (0u64, false, runs);
+        while !rest.is_empty() {
+            let (n, tail) = read_leb128(rest)?;
+            let end = at.checked_add(n).filter(|end| *end <= total)?;
+            if value {
+                mask.set_run(at, end);
+            }
+            (at, value, rest) = (end, !value, tail);
+        }
+        (at == total).then_some(mask)
+    }
+
+    fn set_run(&mut self, from: u64, end: u64) {
+        self.used += end - from;
+        let mut at = from;
+        while at < end {
+            let n = (64 - at % 64).min(end - at);
+            let ones = if n == 64 { u64::MAX } else { (1u64 << n) - 1 };
+            self.words[(at / 64) as usize] |= ones << (at % 64);
+            at += n;
+        }
+    }
+}
+
+fn min3(v: [f64; 3]) -> f64 {
+    v[0].min(v[1]).min(v[2])
+}
+
+fn max3(v: [f64; 3]) -> f64 {
+    v[0].max(v[1]).max(v[2])
+}
+
+/// Whole cells that the interval overlaps by more than the tolerance; a point or a sliver touches the cell it lies in.
+fn touched(lo: f64, hi: f64) -> std::ops::Range<i64> {
+    let first = (lo + TOUCH_TEXELS).floor() as i64;
+    let last = ((hi - TOUCH_TEXELS).ceil() as i64).max(first + 1);
+    first..last
+}
+
+/// Extent in x of the part of a triangle between two horizontals.
+fn span_in_band(p: &[[f64; 2]; 3], top: f64, bottom: f64) -> Option<(f64, f64)> {
+    let mut span: Option<(f64, f64)> = None;
+    let mut add = |x: f64| span = Some(span.map_or((x, x), |(a, b)| (a.min(x), b.max(x))));
+    for k in 0..3 {
+        let (a, b) = (p[k], p[(k + 1) % 3]);
+        if (top..=bottom).contains(&a[1]) {
+            add(a[0]);
+        }
+        for y in [top, bottom] {
+            if (a[1] - y) * (b[1] - y) < 0.0 {
+                add(a[0] + (b[0] - a[0]) * ((y - a[1]) / (b[1] - a[1])));
+            }
+        }
+    }
+    span
+}
+
+/// The texel that a wrap mode puts at an index; `None` outside a texture with a border.
+pub(crate) fn fold(i: i64, n: u32, wrap: Wrap) -> Option<u32> {
+    let size = i64::from(n);
+    match wrap {
+        Wrap::Wrap => Some(i.rem_euclid(size) as u32),
+        Wrap::Mirror => {
+            let m = i.rem_euclid(2 * size);
+            Some(if m < size { m } else { 2 * size - 1 - m } as u32)
+        }
+        Wrap::Clamp => Some(i.clamp(0, size - 1) as u32),
+        Wrap::Border | Wrap::None => (0..size).contains(&i).then_some(i as u32),
+    }
+}
+
+fn leb128(out: &mut Vec<u8>, mut n: u64) {
+    while n >= 128 {
+        out.push(n as u8 | 128);
+        n >>= 7;
+    }
+    out.push(n as u8);
+}
+
+fn read_leb128(bytes: &[u8]) -> Option<(u64, &[u8])> {
+    let mut n = 0u64;
+    for (k, byte) in bytes.iter().enumerate().take(9) {
+        n |= u64::from(byte & 127) << (7 * k);
+        if byte & 128 == 0 {
+            return Some((n, &bytes[k + 1..]));
+        }
+    }
+    None
+}

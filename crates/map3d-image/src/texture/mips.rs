@@ -1,0 +1,108 @@
+//! Mip levels: each the area-weighted mean, in linear light and weighed by alpha, of what it covers in the level before (spec/scene.md, Texture).
+
+use crate::raster::Raster;
+use crate::srgb::{BYTE, LINEAR16};
+
+/// Linear light premultiplied by alpha, 16 bits a channel.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LinearRaster {
+    pub width: u32,
+    pub height: u32,
+    pub pixels: Vec<[u16; 4]>,
+}
+
+/// Levels of an image: down to 1 × 1.
+pub fn level_count(width: u32, height: u32) -> u32 {
+    width.max(height).max(1).ilog2() + 1
+}
+
+pub fn level_size(width: u32, height: u32, level: u32) -> (u32, u32) {
+    ((width >> level).max(1), (height >> level).max(1))
+}
+
+/// Level 1 of an image that is level 0.
+pub fn first_mip(image: &Raster) -> LinearRaster {
+    shrink(image.width, image.height, |y, row| {
+        for (to, from) in row.iter_mut().zip(image.row(y)) {
+            *to = premultiplied(*from);
+        }
+    })
+}
+
+/// The next level.
+pub fn next_mip(image: &LinearRaster) -> LinearRaster {
+    let w = image.width as usize;
+    shrink(image.width, image.height, |y, row| row.copy_from_slice(&image.pixels[y as usize * w..][..w]))
+}
+
+/// Linear light premultiplied by alpha, of an sRGB pixel with straight alpha.
+pub fn premultiplied(p: [u8; 4]) -> [u16; 4] {
+    let light = [LINEAR16[p[0] as usize], LINEAR16[p[1] as usize], LINEAR16[p[2] as usize]];
+    let a = u32::from(p[3]);
+    let times = |c: u16| if a == 255 { c } else { ((u32::from(c) * a + 127) / 255) as u16 };
+    [times(light[0]), times(light[1]), times(light[2]), (a * 257) as u16]
+}
+
+impl LinearRaster {
+    /// sRGB bytes with straight alpha; black where alpha is 0.
+    pub fn to_raster(&self) -> Raster {
+        let byte = |c: u16, a: u16| {
+            let straight = if a == 65_535 { u32::from(c) } else { (u32::from(c) * 65_535 + u32::from(a) / 2) / u32::from(a) };
+            BYTE[straight.min(65_535) as usize]
+        };
+        let pixel = |p: &[u16; 4]| match p[3] {
+            0 => [0; 4],
+            a => [byte(p[0], a), byte(p[1], a), byte(p[2], a), ((u32::from(a) + 128) / 257) as u8],
+        };
+        Raster::new(self.width, self.height, self.pixels.iter().map(pixel).collect())
+    }
+}
+
+/// Halves an image whose rows `load` writes into a buffer.
+fn shrink(width: u32, height: u32, mut load: impl FnMut(u32, &mut [[u16; 4]])) -> LinearRaster {
+    let (nw, nh) = level_size(width, height, 1);
+    if width == 2 * nw && height == 2 * nh {
+        return halve(nw, nh, load);
+    }
+    let mut pixels = Vec::with_capacity(nw as usize * nh as usize);
+    let mut row = vec![[0u16; 4]; width as usize];
+    let columns: Vec<Vec<(usize, u64)>> = (0..nw).map(|x| covered(x, width, nw)).collect();
+    let area = u64::from(width) * u64::from(height);
+    for y in 0..nh {
+        let mut sums = vec![[0u64; 4]; nw as usize];
+        for (source, weight) in covered(y, height, nh) {
+            load(source as u32, &mut row);
+            for (sum, parts) in sums.iter_mut().zip(&columns) {
+                for (x, part) in parts {
+                    (0..4).for_each(|c| sum[c] += u64::from(row[*x][c]) * part * weight);
+                }
+            }
+        }
+        pixels.extend(sums.iter().map(|s| s.map(|c| ((c + area / 2) / area) as u16)));
+    }
+    LinearRaster { width: nw, height: nh, pixels }
+}
+
+/// Cells of `n` that cell `i` of `m` covers, with their shares in units of 1/m cell (together n).
+fn covered(i: u32, n: u32, m: u32) -> Vec<(usize, u64)> {
+    let (i, n, m) = (u64::from(i), u64::from(n), u64::from(m));
+    let (from, to) = (i * n, (i + 1) * n);
+    (from / m..to.div_ceil(m)).map(|k| (k as usize, to.min((k + 1) * m) - from.max(k * m))).collect()
+}
+
+fn halve(nw: u32, nh: u32, mut load: impl FnMut(u32, &mut [[u16; 4]])) -> LinearRaster {
+    let mut pixels = Vec::with_capacity(nw as usize * nh as usize);
+    let mut rows = [vec![[0u16; 4]; nw as usize * 2], vec![[0u16; 4]; nw as usize * 2]];
+    for y in 0..nh {
+        load(2 * y, &mut rows[0]);
+        load(2 * y + 1, &mut rows[1]);
+        let pairs = rows[0].as_chunks::<2>().0.iter().zip(rows[1].as_chunks::<2>().0);
+        pixels.extend(pairs.map(|(top, bottom)| -> [u16; 4] {
+            std::array::from_fn(|c| {
+                let sum = u32::from(top[0][c]) + u32::from(top[1][c]) + u32::from(bottom[0][c]) + u32::from(bottom[1][c]);
+                ((sum + 2) >> 2) as u16
+            })
+        }));
+    }
+    LinearRaster { width: nw, height: nh, pixels }
+}

@@ -1,0 +1,50 @@
+//! Level 0 of a texture: the source image with its alpha image merged and its unused texels filled.
+
+use std::path::Path;
+
+use map3d_base::Result;
+
+use crate::decode::{self, ImageLimits};
+use crate::raster::Raster;
+use crate::texture::fill::fill_unused;
+use crate::texture::mask::UsageMask;
+
+/// Size of a texture: its image's, or its alpha image's where there is no image (then all white).
+pub fn probe(path: &Path, image: &[u8], alpha: &[u8], limits: &ImageLimits) -> Result<(u32, u32)> {
+    if !alpha.is_empty() && !image.is_empty() {
+        decode::probe(path, alpha, limits)?;
+    }
+    decode::probe(path, if image.is_empty() { alpha } else { image }, limits)
+}
+
+/// Decodes, merges, fills. `mask` is absent when every texel is used.
+pub fn level_0(path: &Path, image: &[u8], alpha: &[u8], mask: Option<&UsageMask>, limits: &ImageLimits) -> Result<Raster> {
+    let mut raster = match image.is_empty() {
+        true => {
+            let (width, height) = decode::probe(path, alpha, limits)?;
+            Raster::filled(width, height, [255; 4])
+        }
+        false => decode::decode(path, image, limits)?,
+    };
+    if !alpha.is_empty() {
+        merge_alpha(&mut raster, &decode::decode(path, alpha, limits)?);
+    }
+    if let Some(mask) = mask {
+        fill_unused(&mut raster, mask);
+    }
+    Ok(raster)
+}
+
+/// Multiplies alpha by the grey of another image (Rec. 709 luma, times its own alpha), which may differ in size: the nearest texel counts.
+fn merge_alpha(raster: &mut Raster, grey: &Raster) {
+    let (w, h) = (raster.width as u64, raster.height as u64);
+    for (i, pixel) in raster.pixels.iter_mut().enumerate() {
+        let (x, y) = (i as u64 % w, i as u64 / w);
+        let gx = (2 * x + 1) * u64::from(grey.width) / (2 * w);
+        let gy = (2 * y + 1) * u64::from(grey.height) / (2 * h);
+        let p = grey.pixels[(gy * u64::from(grey.width) + gx) as usize].map(u32::from);
+        let luma = (p[0] * 2126 + p[1] * 7152 + p[2] * 722 + 5000) / 10_000;
+        let alpha = (luma * p[3] + 127) / 255;
+        pixel[3] = ((u32::from(pixel[3]) * alpha + 127) / 255) as u8;
+    }
+}

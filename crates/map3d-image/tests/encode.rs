@@ -1,0 +1,134 @@
+//! Layers as sent (spec/pyramid.md §6).
+
+mod common;
+
+use common::{Random, noise};
+use map3d_base::{LayerFormat, LayerKind, LayerSpec};
+use map3d_image::GBuffer;
+use map3d_image::decode::decode;
+use map3d_image::encode::{Deflate, Encoder, Filter, bytes_from_normals, bytes_from_u32, color_from_linear, decode_png, encode_png};
+use map3d_image::gbuffer::normal_from_vector;
+use map3d_image::srgb::LINEAR16;
+use serde_json::Value;
+
+fn data_vectors() -> Value {
+    let path = format!("{}/../../spec/vectors/data.json", env!("CARGO_MANIFEST_DIR"));
+    serde_json::from_str(&std::fs::read_to_string(path).expect("vectors")).expect("JSON")
+}
+
+fn byte(v: &Value) -> u8 {
+    u8::try_from(v.as_u64().expect("number")).expect("a byte")
+}
+
+#[test]
+fn data_bytes_follow_the_vectors() {
+    let vectors = data_vectors();
+    for row in vectors["uint32"].as_array().expect("rows") {
+        let value = row["value"].as_u64().expect("number") as u32;
+        let expected: Vec<u8> = row["rgba"].as_array().expect("four").iter().map(byte).collect();
+        assert_eq!(bytes_from_u32(&[value]), expected);
+    }
+    for row in vectors["normal"].as_array().expect("rows") {
+        let n = [0, 1, 2].map(|k| row["n"][k].as_f64().expect("number"));
+        let expected: Vec<u8> = row["rgb"].as_array().expect("three").iter().map(byte).collect();
+        assert_eq!(bytes_from_normals(&[normal_from_vector(n).expect("has a direction")]), expected);
+    }
+    assert_eq!(bytes_from_normals(&[[0; 3]]), [0, 0, 0]);
+}
+
+#[test]
+fn png_round_trips_with_every_filter_and_deflate() {
+    let image = noise(33, 17, 5);
+    let rgb: Vec<u8> = image.pixels.iter().flat_map(|p| [p[0], p[1], p[2]]).collect();
+    for filter in [Filter::None, Filter::Sub, Filter::Up, Filter::Average, Filter::Paeth] {
+        for deflate in [Deflate::Fast, Deflate::Matching] {
+            for (channels, pixels) in [(3, &rgb[..]), (4, image.pixels.as_flattened())] {
+                let back = decode_png(&encode_png((33, 17), channels, pixels, filter, deflate)).expect("sound");
+                assert_eq!((back.width, back.height, back.channels, &back.pixels[..]), (33, 17, channels, pixels), "{filter:?} {deflate:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn data_layers_are_lossless() {
+    let mut random = Random(3);
+    let mut g = GBuffer::empty(256, 256);
+    g.id.iter_mut().for_each(|v| *v = random.bits() << 1);
+    g.depth.iter_mut().enumerate().for_each(|(i, v)| *v = 1_000_000 + (i as u32 % 256) * 37 + (i as u32 / 256) * 91);
+    g.normal.iter_mut().for_each(|v| *v = normal_from_vector([random.unit(), random.unit(), 0.1]).expect("has a direction"));
+    let mut encoder = Encoder::new();
+    let mut layer = |kind| {
+        let spec = LayerSpec { kind, format: LayerFormat::Png, quality: 80 };
+        let bytes = encoder.layer(&g, &spec).expect("encodes");
+        assert_eq!(&bytes[24..29], &[8, if kind == LayerKind::Normal { 2 } else { 6 }, 0, 0, 0], "8 bit, colour type, not interlaced");
+        decode_png(&bytes).expect("sound").pixels
+    };
+    assert_eq!(layer(LayerKind::Id), bytes_from_u32(&g.id));
+    assert_eq!(layer(LayerKind::Depth), bytes_from_u32(&g.depth));
+    assert_eq!(layer(LayerKind::Normal), bytes_from_normals(&g.normal));
+}
+
+#[test]
+fn data_layers_refuse_lossy_formats() {
+    let g = GBuffer::empty(4, 4);
+    for kind in [LayerKind::Id, LayerKind::Depth, LayerKind::Normal] {
+        for format in [LayerFormat::Webp, LayerFormat::Jpeg] {
+            assert!(Encoder::new().layer(&g, &LayerSpec { kind, format, quality: 80 }).is_err());
+        }
+    }
+    assert!(Encoder::new().layer(&g, &LayerSpec { kind: LayerKind::Color, format: LayerFormat::Jpeg, quality: 0 }).is_err());
+    assert!(Encoder::new().color((4, 5), &g.color, LayerFormat::Png, 80).is_err());
+}
+
+#[test]
+fn every_byte_and_alpha_survives_linear_light() {
+    for b in 0..=255u8 {
+        let l = LINEAR16[b as usize];
+        assert_eq!(color_from_linear((1, 1), &[[l, l, l, 65_535]]).pixels[0], [b, b, b, 255]);
+    }
+    let half = color_from_linear((1, 1), &[[LINEAR16[200] / 2, 0, 0, 32_768]]).pixels[0];
+    assert_eq!(half, [200, 0, 0, 128]);
+}
+
+#[test]
+fn uncovered_pixels_take_the_nearest_covered_colour() {
+    let mut color = vec![[0u16; 4]; 64];
+    color[9] = [65_535, 0, 0, 65_535];
+    color[54] = [0, 0, 65_535, 65_535];
+    let image = color_from_linear((8, 8), &color);
+    assert_eq!(image.pixels[0], [255, 0, 0, 0]);
+    assert_eq!(image.pixels[63], [0, 0, 255, 0]);
+    assert_eq!(image.pixels[9], [255, 0, 0, 255]);
+}
+
+#[test]
+fn colour_formats_keep_coverage_where_they_have_alpha() {
+    let mut g = GBuffer::empty(64, 64);
+    for (i, c) in g.color.iter_mut().enumerate() {
+        if i % 64 < 40 {
+            *c = [30_000, 20_000, 10_000, 65_535];
+        }
+    }
+    for (format, alpha) in [(LayerFormat::Png, true), (LayerFormat::Webp, true), (LayerFormat::Jpeg, false)] {
+        let bytes = Encoder::new().layer(&g, &LayerSpec { kind: LayerKind::Color, format, quality: 85 }).expect("encodes");
+        let image = decode(std::path::Path::new("tile"), &bytes, &map3d_image::ImageLimits::default()).expect("decodes");
+        assert_eq!((image.pixels[0][3], image.pixels[50][3]), (255, if alpha { 0 } else { 255 }), "{format:?}");
+        assert!(image.pixels[10].iter().zip([179u8, 149, 109]).all(|(a, b)| a.abs_diff(b) < 6), "{format:?} {:?}", image.pixels[10]);
+        assert!(image.pixels[55].iter().zip([179u8, 149, 109]).all(|(a, b)| a.abs_diff(b) < 12), "{format:?} filled {:?}", image.pixels[55]);
+    }
+}
+
+#[test]
+fn encoded_bytes_are_the_same_again() {
+    let mut random = Random(17);
+    let mut g = GBuffer::empty(64, 64);
+    g.color.iter_mut().for_each(|c| *c = [random.below(65_536) as u16, 5, 9, 65_535]);
+    let mut reused = Encoder::new();
+    for format in [LayerFormat::Png, LayerFormat::Webp, LayerFormat::Jpeg] {
+        let spec = LayerSpec { kind: LayerKind::Color, format, quality: 80 };
+        let first = reused.layer(&g, &spec).expect("encodes");
+        assert_eq!(reused.layer(&g, &spec).expect("encodes"), first);
+        assert_eq!(Encoder::new().layer(&g, &spec).expect("encodes"), first);
+    }
+}

@@ -1,0 +1,118 @@
+//! Parents and seams (spec/pyramid.md §7, §8).
+
+mod common;
+
+use common::Random;
+use map3d_base::DEPTH_NOTHING;
+use map3d_image::seam::{read_seam, write_seam};
+use map3d_image::{GBuffer, reduce};
+use serde_json::Value;
+
+fn random_tile(seed: u64, side: u32) -> GBuffer {
+    let mut random = Random(seed);
+    let mut g = GBuffer::empty(side, side);
+    for i in 0..g.id.len() {
+        if random.below(4) == 0 {
+            continue;
+        }
+        g.id[i] = 1 + random.below(3);
+        g.depth[i] = random.below(5);
+        g.color[i] = [(); 4].map(|()| random.below(65_536) as u16);
+        g.normal[i] = map3d_image::gbuffer::normal_from_vector([(); 3].map(|()| random.unit() - 0.5)).expect("has a direction");
+    }
+    g
+}
+
+#[test]
+fn parents_follow_the_vectors() {
+    let path = format!("{}/../../spec/vectors/parents.json", env!("CARGO_MANIFEST_DIR"));
+    let rows: Value = serde_json::from_str(&std::fs::read_to_string(path).expect("vectors")).expect("JSON");
+    let rows = rows.as_array().expect("rows");
+    assert!(rows.len() >= 5);
+    for row in rows {
+        let mut child = GBuffer::empty(2, 2);
+        for (k, c) in row["children"].as_array().expect("four").iter().enumerate() {
+            put(&mut child, k, c);
+        }
+        let mut expected = GBuffer::empty(2, 2);
+        put(&mut expected, 0, &row["parent"]);
+        let got = reduce([Some(&child), None, None, None], 2);
+        assert_eq!(got, expected, "{row}");
+    }
+}
+
+fn put(g: &mut GBuffer, at: usize, pixel: &Value) {
+    let number = |v: &Value| v.as_i64().expect("number");
+    g.color[at] = std::array::from_fn(|c| number(&pixel["color"][c]) as u16);
+    g.normal[at] = std::array::from_fn(|c| number(&pixel["normal"][c]) as i16);
+    g.id[at] = number(&pixel["id"]) as u32;
+    g.depth[at] = number(&pixel["depth"]) as u32;
+}
+
+#[test]
+fn each_child_fills_its_quadrant() {
+    let side = 8;
+    let children: Vec<GBuffer> = (0..4).map(|k| random_tile(k, side)).collect();
+    let whole = reduce([0, 1, 2, 3].map(|k| Some(&children[k])), side);
+    for k in 0..4usize {
+        let mut one = [None; 4];
+        one[0] = Some(&children[k]);
+        let alone = reduce(one, side);
+        for y in 0..4usize {
+            for x in 0..4usize {
+                let (from, to) = (y * 8 + x, (y + k / 2 * 4) * 8 + x + k % 2 * 4);
+                assert_eq!(
+                    (whole.id[to], whole.depth[to], whole.color[to], whole.normal[to]),
+                    (alone.id[from], alone.depth[from], alone.color[from], alone.normal[from])
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn absent_and_empty_children_are_the_same() {
+    let (some, nothing) = (random_tile(5, 16), GBuffer::empty(16, 16));
+    assert_eq!(reduce([Some(&some), None, Some(&nothing), None], 16), reduce([Some(&some), Some(&nothing), None, Some(&nothing)], 16));
+    let none = reduce([None; 4], 16);
+    assert!(none.is_empty() && none.depth.iter().all(|d| *d == DEPTH_NOTHING));
+}
+
+#[test]
+fn opposite_normals_take_the_nearest() {
+    let mut child = GBuffer::empty(2, 2);
+    child.id.fill(9);
+    child.depth.copy_from_slice(&[5, 4, 5, 5]);
+    child.normal.copy_from_slice(&[[32_767, 0, 0], [-32_767, 0, 0], [0, 32_767, 0], [0, -32_767, 0]]);
+    assert_eq!(reduce([Some(&child), None, None, None], 2).normal[0], [-32_767, 0, 0]);
+}
+
+#[test]
+fn seams_come_back_exactly() {
+    for g in [random_tile(1, 32), GBuffer::empty(4, 4), random_tile(2, 256)] {
+        assert_eq!(read_seam("test", &write_seam(&g)).expect("sound"), g);
+    }
+}
+
+#[test]
+fn damaged_seams_are_refused() {
+    let good = write_seam(&random_tile(3, 16));
+    for cut in [0, 3, 15, 16, 23, good.len() - 1] {
+        assert!(read_seam("cut", &good[..cut]).is_err(), "cut at {cut}");
+    }
+    for at in 0..good.len() {
+        let mut bad = good.clone();
+        bad[at] ^= 0x10;
+        assert!(read_seam("flipped", &bad).is_err(), "flipped at {at}");
+    }
+}
+
+#[test]
+fn a_seam_whose_arrays_do_not_fit_its_size_is_refused() {
+    let mut bad = write_seam(&random_tile(3, 16));
+    bad[8] = 17;
+    let body = bad.len() - 8;
+    let checksum = map3d_base::file::checksum(&bad[..body]);
+    bad[body..].copy_from_slice(&checksum.to_le_bytes());
+    assert!(read_seam("resized", &bad).is_err());
+}
