@@ -46,6 +46,39 @@ def test_the_manifest_is_that_of_the_rendering(client, workspace):
     assert client.get("/view/tea/rendering.json").content == answer.content
 
 
+@pytest.mark.parametrize("base", ["/tiles/tea", "/view/tea"])
+def test_objects_come_by_shard(client, base):
+    answer = client.get(f"{base}/objects/0.json")
+    value = answer.json()
+    assert (value["map3d"], value["version"], value["shard"]) == ("objects", 1, 0)
+    assert value["objects"]["1"]["name"] == "House <1>"
+    assert value["objects"]["1"]["attributes"] == {"address": "Main Street 1", "height": 9.5}
+    assert value["objects"]["2"]["parent"] == 1
+    assert answer.headers["access-control-allow-origin"] == "*"
+    assert client.get(f"{base}/objects/0.json", headers={"if-none-match": answer.headers["etag"]}).status_code == 304
+
+
+def test_a_shard_without_objects_is_empty(client):
+    assert client.get("/tiles/tea/objects/7.json").json() == {"map3d": "objects", "version": 1, "shard": 7, "objects": {}}
+
+
+@pytest.mark.parametrize("base", ["/tiles/tea", "/view/tea"])
+def test_objects_are_found_by_label(client, base):
+    value = client.get(f"{base}/objects/search.json").json()
+    assert value == {"map3d": "search", "version": 1, "entries": [[1, "House <1>, Main Street 1", [5.0, 10.0, 9.5]], [2, "Roof", [5.0, 10.0, 9.5]]]}
+
+
+@pytest.mark.parametrize("shard", ["01", "-1", "x", "99999999", "1e3", "%D9%A1"])
+def test_a_shard_that_cannot_be_is_404(client, shard):
+    assert client.get(f"/tiles/tea/objects/{shard}.json").status_code == 404
+
+
+def test_a_scene_without_objects_has_none_to_show(client, workspace):
+    workspace.registry_path("town").unlink()
+    assert client.get("/tiles/tea/objects/0.json").status_code == 404
+    assert not workspace.registry_path("town").exists()
+
+
 @pytest.mark.parametrize("path", ["/tiles/none/rendering.json", "/tiles/..%2f/rendering.json", "/tiles/A/rendering.json", "/nothing", "/view/none/"])
 def test_what_is_not_there_is_404_and_never_cached(client, path):
     answer = client.get(path)

@@ -2,6 +2,7 @@
 
 from map3d.catalogue import RenderingRecord, SceneCrs, SceneRecord, Workspace
 from map3d.geometry.frames import pin
+from map3d.registry import NewObject, Registry
 from map3d.tiles.manifest import CrsFacts, Manifest, ViewFacts
 from map3d.tiles.naming import block_levels, block_of
 from map3d.tiles.occupancy import Occupancy
@@ -15,6 +16,13 @@ VIEWS = (ViewAngles(0, 45), ViewAngles(45, 22.5))
 ZMAX = 4
 OCCUPIED = {(0, 0), (1, 0), (2, 3), (7, 7), (15, 15), (8, 3)}
 """Base tiles with content; block 1/0/1 has none."""
+
+
+OBJECTS = (
+    NewObject("House <1>", "building", box=((0.0, 0.0, 0.0), (10.0, 20.0, 9.5)), attributes={"address": "Main Street 1", "height": 9.5}),
+    NewObject("Roof", "roof", parent=0, box=((0.0, 0.0, 6.0), (10.0, 20.0, 9.5))),
+    NewObject("ghost", "building"),
+)
 
 
 def rendering_record(name="tea"):
@@ -45,6 +53,9 @@ def make_workspace(root, name="tea", version=1):
     catalogue.create_scene(SceneRecord("town", crs=SceneCrs(25832, "PROJCRS[…]", "UTM 32N"), origin=(691000.0, 5336000.0, 500.0)))
     catalogue.create_rendering(record)
     catalogue.close()
+    workspace.scene_folder("town").mkdir(parents=True, exist_ok=True)
+    with Registry(workspace.registry_path("town")) as registry:
+        registry.put_asset("houses", OBJECTS)
     workspace.rendering_folder(name).mkdir(parents=True)
     occupancy = Occupancy.from_tiles(ZMAX, OCCUPIED)
     for frame in record.frames:

@@ -24,6 +24,7 @@ def viewer_folder() -> Path:
 
 
 def viewer_files() -> list[Path]:
-    """Relative paths of all files of the viewer, sorted; raises ViewerMissing."""
+    """Relative paths of all files of the viewer but hidden ones, sorted; raises ViewerMissing."""
     folder = viewer_folder()
-    return sorted(path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
+    found = (path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
+    return sorted(path for path in found if not any(part.startswith(".") for part in path.parts))

@@ -3,20 +3,24 @@
 They stand under /tiles/<rendering>/ and under /view/<rendering>/, whose page reads them as its own folder's, as in a published folder.
 """
 
+import json
 import re
+from collections.abc import Mapping
 from hashlib import sha256
-from typing import Final
+from typing import Any, Final
 
 from flask import Blueprint, Response, current_app, request
 
 from map3d.catalogue import Catalogue, Workspace
 from map3d.errors import NotFound
+from map3d.registry import Registry
 from map3d.tiles.manifest import FILE_NAME
 from map3d.types import check_name
 
 documents = Blueprint("documents", __name__)
 
 _NUMBER: Final = re.compile(r"0|[1-9][0-9]{0,6}", re.ASCII)
+"""Of a shard: ids are 32 bits, so shards have at most seven digits."""
 
 
 @documents.get(f"/tiles/<rendering>/{FILE_NAME}")
@@ -27,6 +31,22 @@ def manifest(rendering: str) -> Response:
         return json_answer(path.read_bytes())
     except FileNotFoundError as error:
         raise NotFound(f"rendering {rendering!r} is not there, or nothing of it is rendered yet") from error
+
+
+@documents.get("/tiles/<rendering>/objects/<shard>.json")
+@documents.get("/view/<rendering>/objects/<shard>.json")
+def shard(rendering: str, shard: str) -> Response:
+    if not _NUMBER.fullmatch(shard):
+        raise NotFound(f"no shard {shard[:64]!r}: shards have plain numbers")
+    with registry(rendering) as objects:
+        return json_answer(dump(objects.shard(int(shard))))
+
+
+@documents.get("/tiles/<rendering>/objects/search.json")
+@documents.get("/view/<rendering>/objects/search.json")
+def search(rendering: str) -> Response:
+    with registry(rendering) as objects:
+        return json_answer(dump(objects.search()))
 
 
 def workspace() -> Workspace:
@@ -40,6 +60,19 @@ def catalogue() -> Catalogue:
     if held is None:
         held = current_app.extensions.setdefault("map3d.catalogue", workspace().open_catalogue())
     return held
+
+
+def registry(rendering: str) -> Registry:
+    """Of the rendering's scene; raises NotFound."""
+    path = workspace().registry_path(catalogue().rendering(check_name(rendering, "rendering")).scene)
+    if not path.is_file():
+        raise NotFound(f"the scene of rendering {rendering!r} has no objects yet")
+    return Registry(path)
+
+
+def dump(document: Mapping[str, Any]) -> bytes:
+    """Compact JSON."""
+    return (json.dumps(document, ensure_ascii=False, separators=(",", ":"), allow_nan=False) + "\n").encode()
 
 
 def json_answer(data: bytes) -> Response:
