@@ -1,0 +1,82 @@
+"""An independent renderer agrees, at the pixel's centre and over the pixel's box."""
+
+import json
+
+import numpy as np
+import pytest
+
+from .compare import edges, gradient_energy, psnr, srgb_from_linear
+from .conftest import Built
+from .mitsuba_scene import MitsubaScene
+
+DEPTH_M = 0.005
+COPLANAR_M = 0.01
+VIEWS = ["30-10", "30-22.5", "30-45", "30-90"]
+
+
+@pytest.fixture(scope="session", params=["town", "ingolstadt"])
+def pair(request: pytest.FixtureRequest) -> tuple[Built, MitsubaScene]:
+    built: Built = request.getfixturevalue(request.param)
+    return built, MitsubaScene(built.assets, np.array(built.scene.origin), built.texture)
+
+
+@pytest.mark.parametrize("view", VIEWS)
+def test_depth_normal_and_id_agree_away_from_edges(pair: tuple[Built, MitsubaScene], view: str) -> None:
+    built, mitsuba = pair
+    frame = built.frames[view]
+    good = {"depth": 0, "id": 0, "normal": 0}
+    counted = 0
+    for x, y in built.busiest_tiles(view, 4):
+        ours = built.scene.gbuffer(json.dumps(frame), x, y)
+        theirs = mitsuba.hits(frame, x, y)
+        theirs_hit = np.isfinite(theirs.depth)
+        grounded = ours["id"] == _ground_id(built)
+        use = ~edges(theirs.id, theirs.normal, theirs.depth) & (theirs.second > COPLANAR_M) & theirs_hit & ~grounded
+        counted += use.sum()
+        depth = ours["depth"] / 1024.0
+        good["depth"] += (np.abs(depth - theirs.depth)[use] <= DEPTH_M).sum()
+        good["id"] += (ours["id"] == theirs.id)[use].sum()
+        normal = ours["normal"] / 32767.0
+        good["normal"] += ((normal * theirs.normal).sum(-1)[use] >= 0.9999).sum()
+    assert counted > 20_000
+    shares = {name: float(count / counted) for name, count in good.items()}
+    print(f"{view}: {counted} pixels, agreement {shares}")
+    assert min(shares.values()) >= 0.999, shares
+
+
+@pytest.mark.parametrize("view", VIEWS)
+def test_colour_is_the_average_over_the_pixels_box(pair: tuple[Built, MitsubaScene], view: str) -> None:
+    built, mitsuba = pair
+    frame = built.frames[view]
+    (tile,) = built.busiest_tiles(view, 1)
+    ours = built.scene.gbuffer(json.dumps(frame), *tile)
+    theirs = srgb_from_linear(mitsuba.albedo(frame, *tile, samples=1024))
+    mine = srgb_from_linear(ours["color"][..., :3] / 65535.0)
+    hits = mitsuba.hits(frame, *tile)
+    use = _without_ground(ours["id"] == _ground_id(built)) & (hits.second > COPLANAR_M)
+    assert use.mean() > 0.2
+    quality = psnr(mine[use], theirs[use])
+    blank = np.where(use[..., None], 1.0, 0.0)
+    sharpness = gradient_energy(mine * blank) / gradient_energy(theirs * blank)
+    print(f"{view}: PSNR {quality:.1f} dB, gradient energy ratio {sharpness:.3f}")
+    assert quality >= 35
+    assert 0.9 <= sharpness <= 1.1
+
+
+def _ground_id(built: Built) -> int:
+    """The ground plane is ours alone: it is not in the assets."""
+    known = set(np.concatenate([asset.ids for asset in built.assets]).tolist())
+    seen = {int(i) for view in VIEWS for x, y in built.busiest_tiles(view, 1) for i in np.unique(built.scene.gbuffer(json.dumps(built.frames[view]), x, y)["id"])}
+    strangers = seen - known - {0}
+    assert len(strangers) <= 1
+    return strangers.pop() if strangers else 0xFFFFFFFF
+
+
+def _without_ground(ground: np.ndarray) -> np.ndarray:
+    """Pixels whose 3 × 3 neighbourhood is free of the ground plane: their box holds none of it."""
+    wide = np.pad(ground, 1)
+    near = np.zeros_like(wide)
+    for dy in (-1, 0, 1):
+        for dx in (-1, 0, 1):
+            near |= np.roll(wide, (dy, dx), (0, 1))
+    return ~near[1:-1, 1:-1]
