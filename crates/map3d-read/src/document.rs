@@ -5,6 +5,7 @@ use std::path::Path;
 use map3d_base::asset::{AssetReport, Batch, Instance, Material, Object};
 use map3d_base::{Error, Result};
 
+use crate::citygml::CityGmlReader;
 use crate::detect::Format;
 use crate::image_file::Texture;
 use crate::obj::ObjReader;
@@ -41,6 +42,6 @@ pub trait DocumentReader {
 pub fn open(path: &Path, format: Format, options: &ReadOptions) -> Result<Box<dyn DocumentReader + Send>> {
     Ok(match format {
         Format::Obj => Box::new(ObjReader::open(path, options)?),
-        Format::CityGml => return Err(Error::format(path, "citygml")),
+        Format::CityGml => Box::new(CityGmlReader::open(path, options)?),
     })
 }

@@ -69,6 +69,11 @@ impl Textures {
         }
     }
 
+    /// Takes over an image that another document brought.
+    pub fn adopt(&mut self, texture: &Texture) {
+        self.keep(texture.clone());
+    }
+
     fn keep(&mut self, texture: Texture) -> usize {
         *self.by_key.entry(texture.key.clone()).or_insert_with(|| {
             self.files.push(texture);

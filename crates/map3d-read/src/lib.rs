@@ -3,6 +3,7 @@
 //! Bad input is data: a broken polygon or a missing image is skipped, counted and reported; with `strict` the first one is an error.
 
 mod asset_folder;
+mod citygml;
 mod detect;
 mod document;
 mod image_file;
