@@ -4,10 +4,9 @@ import re
 from functools import lru_cache
 from typing import Final
 
-from pyproj import CRS
+from pyproj import CRS, network
 from pyproj.crs import CompoundCRS
 from pyproj.exceptions import CRSError
-from pyproj._network import set_network_enabled
 
 from map3d.catalogue import SceneCrs
 from map3d.catalogue.records import LOCAL_CRS_NAME
@@ -15,7 +14,7 @@ from map3d.errors import CrsError
 
 LOCAL: Final = SceneCrs(None, None, LOCAL_CRS_NAME)
 
-set_network_enabled(False)
+network.set_network_enabled(False)  # type: ignore[attr-defined] - it is documented, if not in __all__
 
 _ADV_HORIZONTAL: Final = {
     "ETRS89_UTM31": 25831,

@@ -18,13 +18,14 @@ from map3d.ingest.sources import Source, source_digest
 from map3d.registry import Registry
 from map3d.types import Box, Vec3
 
+ENTRIES: Final = {"raster": "map3d.ingest.terrain_work:open_terrain"}
 IMPORT_ENTRY: Final = "map3d.ingest.work:open_import"
 ORIGIN_STEP_M: Final = 100.0
 MAX_FROM_ORIGIN_M: Final = 1e8
 _START_S: Final = 120.0
 
-Progress = Callable[[int], None]
-"""Called with the triangles read so far."""
+Progress = Callable[[str], None]
+"""Called with how far the reading is, as text."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ def import_file(
     options: ImportOptions,
     progress: Progress | None = None,
     *,
-    entry: str = IMPORT_ENTRY,
+    entry: str | None = None,
 ) -> Imported:
     """Adds a source document to a scene, or replaces the asset of its name. What went wrong in parts is counted in the report.
 
@@ -61,7 +62,7 @@ def import_file(
     shutil.rmtree(draft, ignore_errors=True)
     draft.mkdir(parents=True)
     try:
-        answer = _read(record, source, options, draft, progress, entry)
+        answer = _read(record, source, options, draft, progress, entry or ENTRIES.get(source.format, IMPORT_ENTRY))
         report = answer["report"]
         if not report["triangles"]:
             raise ImportFailed(f"{source.paths[0]}: no triangle in it could be used{_reasons(report)}")
@@ -72,16 +73,17 @@ def import_file(
         shutil.rmtree(draft, ignore_errors=True)
 
 
-def pin_crs(catalogue: Catalogue, scene: str, text: str) -> SceneRecord:
-    """Pins a scene's system as the user named it; raises CrsError."""
-    crs = LOCAL if is_local(text) else scene_crs(parse_crs(text))
-    return catalogue.pin_scene(scene, crs=crs)
+def parse_scene_crs(text: str) -> SceneCrs:
+    """A scene's system as the user names it; raises CrsError unless projected in metres, or "local"."""
+    return LOCAL if is_local(text) else scene_crs(parse_crs(text))
 
 
 def _read(record: SceneRecord, source: Source, options: ImportOptions, draft: Path, progress: Progress | None, entry: str) -> dict[str, Any]:
-    limits = options.limits(source.paths[0])
+    limits = options.limits(source.paths, source.format)
     question = {
         "path": str(source.paths[0].absolute()),
+        "paths": [str(path.absolute()) for path in source.paths],
+        "name": source.name,
         "format": source.format,
         "folder": str(draft.absolute()),
         "reader": options.reader_options(source.format, limits),
@@ -91,7 +93,7 @@ def _read(record: SceneRecord, source: Source, options: ImportOptions, draft: Pa
     child = Child(entry, {}, limits=limits, environment={"RAYON_NUM_THREADS": "1"})
     try:
         applied = child.wait_ready(_START_S)
-        message = child.ask(question, wall_s=limits.wall_s, meanwhile=lambda told: told and progress and progress(told["triangles"]))
+        message = child.ask(question, wall_s=limits.wall_s, meanwhile=lambda told: told and progress and progress(_told(told)))
     except (ChildDied, LimitExceeded) as error:
         raise _explained(source, limits, error) from error
     finally:
@@ -101,6 +103,10 @@ def _read(record: SceneRecord, source: Source, options: ImportOptions, draft: Pa
     answer: dict[str, Any] = message.value
     answer["report"]["parser"] = {**applied, "address_space_bytes": limits.address_space_bytes, "cpu_s": limits.cpu_s}
     return answer
+
+
+def _told(told: Mapping[str, int]) -> str:
+    return f"{told['triangles']:,} triangles" if "triangles" in told else f"{told['done']} of {told['total']} tiles"
 
 
 def _adopt(

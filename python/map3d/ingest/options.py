@@ -1,5 +1,6 @@
 """What a user may choose for an import, and the limits of the child that parses (all may be raised by name)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -9,6 +10,8 @@ from map3d.child import Limits
 GIB: Final = 1 << 30
 BIG_FILE_BYTES: Final = 100_000_000
 CPU_S_A_BIG_FILE: Final = 60
+CPU_S_A_BIG_RASTER: Final = 600
+"""Rasters are compressed and become triangles and textures."""
 OPEN_FILES: Final = 256
 
 
@@ -38,9 +41,10 @@ class ImportOptions:
             options |= {"max_object_bytes": limits.address_space_bytes // 4, "max_appearance_bytes": limits.address_space_bytes // 4}
         return options
 
-    def limits(self, source: Path) -> Limits:
-        """1 GiB, 2 GiB for big files; 60 s of processor time for every 100 MB begun; four times that on the clock."""
-        size = source.stat().st_size
-        cpu_s = self.parse_cpu_s or CPU_S_A_BIG_FILE * max(1, -(-size // BIG_FILE_BYTES))
-        memory = self.parse_memory_bytes or (GIB if size <= BIG_FILE_BYTES else 2 * GIB)
+    def limits(self, paths: Sequence[Path], format: str) -> Limits:
+        """1 GiB, 2 GiB for big files; 60 s of processor time for every 100 MB begun (rasters: 2 GiB, 600 s); four times that on the clock."""
+        size = sum(path.stat().st_size for path in paths)
+        raster = format == "raster"
+        cpu_s = self.parse_cpu_s or (CPU_S_A_BIG_RASTER if raster else CPU_S_A_BIG_FILE) * max(1, -(-size // BIG_FILE_BYTES))
+        memory = self.parse_memory_bytes or (2 * GIB if raster or size > BIG_FILE_BYTES else GIB)
         return Limits(address_space_bytes=memory, cpu_s=cpu_s, wall_s=4.0 * cpu_s, open_files=OPEN_FILES, network=False)

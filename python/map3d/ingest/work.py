@@ -20,8 +20,8 @@ def open_import(_setup: Mapping[str, Any]) -> Work:
 
 
 def _import(question: Mapping[str, Any], tell: Tell) -> dict[str, Any]:
-    """`question`: {"path", "format", "folder", "reader": options of the core's Reader, "crs": as the user gave it or None, "scene_crs": as text, "local"
-    or None while the scene has none}. Answers {"report", "crs": the scene's system as proposed, None if nothing could decide it}."""
+    """`question`: {"path", "format", "folder", "reader": options of the core's Reader, "crs": as the user gave it or None, "scene_crs": as text,
+    "local", or None while the scene has none}. Answers {"report", "crs": the scene's system as proposed, None if nothing could decide it}."""
     reader = _open(question)
     placing = Placing(question["format"], question["crs"] or _source_name(reader, question), question["scene_crs"])
     writer = _core.AssetWriter(question["folder"])

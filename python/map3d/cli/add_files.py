@@ -1,0 +1,91 @@
+"""map3d add-files."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+from map3d.catalogue import Workspace
+from map3d.cli.options import Bytes, json_option, workspace_option
+from map3d.cli.output import console, print_json, print_table
+from map3d.errors import BadRequest, Map3dError
+
+
+@click.command("add-files")
+@click.argument("scene")
+@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--crs", help="The files' coordinate system, where they do not say or say wrong; 'local' for plain metres.")
+@click.option("--name", help="Name of the asset.  [default: that of the file]")
+@click.option("--up", type=click.Choice(["y", "z"]), default="z", show_default=True, help="OBJ: the axis that points up.")
+@click.option("--split", type=click.Choice(["file", "group"]), default="file", show_default=True, help="OBJ: what is one object.")
+@click.option("--theme", help="CityGML: the appearance theme to use.  [default: the first in the file]")
+@click.option("--lod", help="CityGML: the level of detail to use.  [default: the best of each object]")
+@click.option("--strict", is_flag=True, help="Stop at the first fault instead of skipping and counting it.")
+@click.option("--parse-memory", "parse_memory_bytes", type=Bytes(), help="Memory of the process that reads a file.  [default: 1G; 2G above 100 MB]")
+@click.option("--parse-cpu", "parse_cpu_s", type=click.IntRange(1), help="Seconds of processor time to read a file.  [default: 60 for each 100 MB]")
+@json_option
+@workspace_option
+def command(workspace: Workspace, scene: str, files: Sequence[Path], as_json: bool, name: str | None, **options: Any) -> None:
+    """Add FILES to SCENE: CityGML, OBJ, and GeoTIFF rasters of elevation and imagery; of a folder every file that can be read.
+
+    A file of a name that is there already replaces what was imported from it; objects keep their ids.
+    """
+    from map3d.ingest.importing import import_file
+    from map3d.ingest.options import ImportOptions
+    from map3d.ingest.sources import find_sources
+
+    sources = find_sources(files, name)
+    if name is not None and len(sources) > 1:
+        raise BadRequest(f"--name {name}: there are {len(sources)} files; name one at a time")
+    catalogue = workspace.open_catalogue()
+    done, failed = [], []
+    try:
+        catalogue.scene(scene)
+        with Progress(SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), console=console(), transient=True) as bar:
+            for number, source in enumerate(sources, 1):
+                task = bar.add_task(f"{number} of {len(sources)}: {source.paths[0].name}")
+                try:
+                    done.append(import_file(workspace, catalogue, scene, source, ImportOptions(**options), _show(bar, task, source.paths[0].name)))
+                except Map3dError as error:
+                    if options["strict"] or len(sources) == 1:
+                        raise
+                    failed.append((str(source.paths[0]), str(error)))
+                bar.remove_task(task)
+    finally:
+        catalogue.close()
+    if as_json:
+        print_json({"imported": done, "failed": [{"source": path, "error": text} for path, text in failed]})
+    else:
+        _print(scene, done, failed)
+    if failed:
+        raise click.exceptions.Exit(1)
+
+
+def _show(bar: Progress, task: Any, name: str) -> Any:
+    return lambda how_far: bar.update(task, description=f"{name}: {how_far}")
+
+
+def _print(scene: str, done: Sequence[Any], failed: Sequence[tuple[str, str]]) -> None:
+    rows = [
+        (item.asset, item.format, item.objects, item.triangles, sum(item.report.get("skipped", {}).values()), _placed(item.report)) for item in done
+    ]
+    if rows:
+        print_table(("asset", "format", "objects", "triangles", "skipped", "coordinates"), rows)
+    for item in done:
+        for warning in item.report.get("warnings", [])[:8]:
+            click.echo(f"{item.asset}: {warning['count']:,} × {warning['reason']}, e.g. {warning['example']}")
+    for _, text in failed:
+        click.echo(f"not added: {text}", err=True)
+    if done:
+        click.echo(f"next: map3d create-rendering {scene} NAME --res METRES")
+
+
+def _placed(report: Mapping[str, Any]) -> str:
+    placing = report.get("placing", {})
+    if placing.get("from") == placing.get("to") or "heights" not in placing:
+        return str(placing.get("to", ""))
+    accuracy = placing.get("accuracy_m")
+    exact = "ballpark" if placing.get("ballpark") else f"± {accuracy:g} m" if accuracy is not None else "accuracy unknown"
+    return f"{placing['from']} → {placing['to']} ({exact}); heights {placing['heights']}"

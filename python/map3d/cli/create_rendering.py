@@ -1,0 +1,62 @@
+"""map3d create-rendering."""
+
+from typing import Any
+
+import click
+
+from map3d.catalogue import Workspace
+from map3d.cli.options import View, cores, json_option, workspace_option
+from map3d.cli.output import print_json
+from map3d.errors import BadRequest
+from map3d.types import COLOR_FORMATS, LAYER_KINDS, ViewAngles
+
+
+@click.command("create-rendering")
+@click.argument("scene")
+@click.argument("name")
+@click.option("--view", "views", type=View(), multiple=True, help="A view as look-at/pitch in degrees, e.g. 45/22.5; may be given more than once.")
+@click.option("--directions", type=click.IntRange(1, 360), help="Instead of --view: so many views around, evenly.  [default: 4]")
+@click.option("--pitch", type=float, multiple=True, help="Pitch of --directions; 90 looks straight down.  [default: 45]")
+@click.option("--res", "res_m", type=float, help="Metres a pixel at the deepest level.")
+@click.option("--levels", type=click.IntRange(1, 27), help="Instead of --res: how many levels.")
+@click.option("--layers", default=",".join(LAYER_KINDS), show_default=True, help="Which layers.")
+@click.option("--tile-size", type=click.Choice(["256", "512"]), default="256", show_default=True, help="Pixels of a tile's side.")
+@click.option("--color", type=click.Choice(list(COLOR_FORMATS)), default="webp", show_default=True, help="Format of the colour layer.")
+@click.option("--quality", type=click.IntRange(1, 100), default=80, show_default=True, help="Of webp and jpeg.")
+@click.option("--title", default="", help="What people read.")
+@click.option("--attribution", default="", help="Whom to credit.  [default: the scene's]")
+@click.option("--regrid", is_flag=True, help="Pin an existing rendering anew to the scene as it is now; everything is rendered again.")
+@json_option
+@workspace_option
+def command(
+    workspace: Workspace, scene: str, name: str, views: tuple[ViewAngles, ...], directions: int | None, as_json: bool, **options: Any
+) -> None:
+    """Make the rendering NAME of SCENE: which views, layers and resolution. Nothing is rendered yet.
+
+    A view's look-at angle 0 looks north, 45 north-west, 90 west; its pitch is how far it looks below the horizon. The frame of each view is
+    pinned now and never moves, so that later additions do not renumber any tile.
+    """
+    from map3d.jobs.creating import RenderingRequest, create_rendering
+
+    if views and (directions or options["pitch"]):
+        raise BadRequest("give either --view or --directions and --pitch")
+    chosen = views or around(directions or 4, options.pop("pitch") or (45.0,))
+    options.pop("pitch", None)
+    layers = tuple(part.strip() for part in options.pop("layers").split(",") if part.strip())
+    request = RenderingRequest(scene, name, chosen, layers=layers, tile_px=int(options.pop("tile_size")), **options)
+    catalogue = workspace.open_catalogue()
+    try:
+        made = create_rendering(workspace, catalogue, request, threads=cores())
+    finally:
+        catalogue.close()
+    if as_json:
+        print_json(made)
+        return
+    levels, side = made.zmax + 1, made.tile_px << made.zmax
+    click.echo(f"rendering {name}: {len(made.frames)} views, {levels} levels, {made.res_m:g} m a pixel, {side:,} px across at the deepest level")
+    click.echo(f"next: map3d estimate {name}, or map3d render {name}")
+
+
+def around(directions: int, pitches: tuple[float, ...]) -> tuple[ViewAngles, ...]:
+    """Views all around, from north counter-clockwise; straight down one is enough."""
+    return tuple(ViewAngles(360.0 * k / directions, pitch) for pitch in pitches for k in range(1 if pitch == 90 else directions))

@@ -1,0 +1,31 @@
+"""map3d estimate."""
+
+import click
+
+from map3d.catalogue import Workspace
+from map3d.cli.options import json_option, workers_option, workspace_option
+from map3d.cli.output import print_json, size_text, time_text
+
+
+@click.command("estimate")
+@click.argument("rendering")
+@workers_option
+@json_option
+@workspace_option
+def command(workspace: Workspace, rendering: str, workers: int, as_json: bool) -> None:
+    """Say how many tiles, bytes and minutes RENDERING will take, before any of it is done."""
+    from map3d.jobs.estimate import estimate
+
+    catalogue = workspace.open_catalogue()
+    try:
+        found = estimate(workspace, catalogue, rendering, workers)
+    finally:
+        catalogue.close()
+    if as_json:
+        print_json(found)
+        return
+    click.echo(
+        f"{rendering}: about {found.base_tiles:,} base tiles, {found.tiles:,} tiles on all levels, {found.images:,} images, {size_text(found.bytes)}"
+    )
+    click.echo(f"still to render: {found.open_tiles:,} base tiles, about {time_text(found.seconds)} with {found.workers} workers")
+    click.echo(f"from {found.how}")

@@ -1,0 +1,24 @@
+"""map3d retry."""
+
+import click
+
+from map3d.catalogue import Workspace
+from map3d.cli.options import json_option, workspace_option
+from map3d.cli.output import print_json
+
+
+@click.command("retry")
+@click.argument("rendering")
+@json_option
+@workspace_option
+def command(workspace: Workspace, rendering: str, as_json: bool) -> None:
+    """Give quarantined blocks of RENDERING three new attempts."""
+    catalogue = workspace.open_catalogue()
+    try:
+        count = catalogue.retry(rendering)
+    finally:
+        catalogue.close()
+    if as_json:
+        print_json({"retried": count})
+    else:
+        click.echo(f"{count:,} blocks are to be tried again" + (f"; next: map3d render {rendering}" if count else ""))

@@ -1,0 +1,17 @@
+"""createScene.py, addFilesToScene.py, createRendering.py: the verbs under the names of the first system of this kind."""
+
+import sys
+
+from map3d.cli.app import run
+
+
+def create_scene() -> None:
+    sys.exit(run(["create-scene", *sys.argv[1:]]))
+
+
+def add_files_to_scene() -> None:
+    sys.exit(run(["add-files", *sys.argv[1:]]))
+
+
+def create_rendering() -> None:
+    sys.exit(run(["create-rendering", *sys.argv[1:]]))

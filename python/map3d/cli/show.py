@@ -1,0 +1,126 @@
+"""map3d show."""
+
+import click
+
+from map3d.catalogue import Catalogue, State, Workspace
+from map3d.cli.options import json_option, workspace_option
+from map3d.cli.output import counts_text, print_json, print_table
+from map3d.errors import BadRequest
+from map3d.geometry.views import view_id
+
+TOPICS = ("scenes", "scene", "renderings", "rendering", "report", "jobs", "quarantine")
+
+
+@click.command("show")
+@click.argument("topic", type=click.Choice(TOPICS), default="renderings")
+@click.argument("name", required=False)
+@json_option
+@workspace_option
+def command(workspace: Workspace, topic: str, name: str | None, as_json: bool) -> None:
+    """Show what is there: scenes, scene NAME, renderings, rendering NAME, report SCENE (of imports), jobs RENDERING, quarantine RENDERING."""
+    if name is None and topic not in ("scenes", "renderings"):
+        raise BadRequest(f"map3d show {topic}: of which? give a name; map3d show scenes and map3d show renderings list them")
+    catalogue = workspace.open_catalogue()
+    try:
+        _SHOW[topic](catalogue, name or "", as_json)
+    finally:
+        catalogue.close()
+
+
+def _scenes(catalogue: Catalogue, _name: str, as_json: bool) -> None:
+    scenes = catalogue.scenes()
+    if as_json:
+        print_json([{"scene": scene, "assets": [asset.name for asset in catalogue.assets(scene.name)]} for scene in scenes])
+        return
+    rows = [
+        (scene.name, scene.crs.name if scene.crs else None, len(catalogue.assets(scene.name)), len(catalogue.renderings(scene.name)))
+        for scene in scenes
+    ]
+    print_table(("scene", "coordinate system", "assets", "renderings"), rows)
+
+
+def _scene(catalogue: Catalogue, name: str, as_json: bool) -> None:
+    scene, assets = catalogue.scene(name), catalogue.assets(name)
+    if as_json:
+        print_json({"scene": scene, "assets": assets})
+        return
+    click.echo(f"{name}: {scene.crs.name if scene.crs else 'no coordinate system yet'}, origin {scene.origin}, options {dict(scene.options)}")
+    print_table(
+        ("asset", "format", "objects", "triangles", "source"),
+        [(asset.name, asset.format, asset.report.get("objects"), asset.report.get("triangles"), asset.source) for asset in assets],
+    )
+
+
+def _renderings(catalogue: Catalogue, _name: str, as_json: bool) -> None:
+    renderings = catalogue.renderings()
+    if as_json:
+        print_json([{"rendering": item, "jobs": catalogue.count_jobs(item.name)} for item in renderings])
+        return
+    rows = [(item.name, item.scene, len(item.frames), item.zmax + 1, item.res_m, counts_text(catalogue.count_jobs(item.name))) for item in renderings]
+    print_table(("rendering", "scene", "views", "levels", "m a pixel", "blocks"), rows)
+
+
+def _rendering(catalogue: Catalogue, name: str, as_json: bool) -> None:
+    item, counts = catalogue.rendering(name), catalogue.count_jobs(name)
+    if as_json:
+        print_json({"rendering": item, "jobs": counts})
+        return
+    click.echo(
+        f"{name} of scene {item.scene}: {item.zmax + 1} levels, {item.res_m:g} m a pixel, tiles of {item.tile_px} px, version {item.content_version}"
+    )
+    click.echo(f"views: {', '.join(view_id(frame.angles) for frame in item.frames)}")
+    click.echo(f"layers: {', '.join(f'{layer.name} ({layer.format})' for layer in item.layers)}")
+    click.echo(f"blocks: {counts_text(counts)}")
+
+
+def _report(catalogue: Catalogue, name: str, as_json: bool) -> None:
+    assets = catalogue.assets(name)
+    if as_json:
+        print_json({asset.name: asset.report for asset in assets})
+        return
+    for asset in assets:
+        report = asset.report
+        click.echo(f"{asset.name} ({asset.format}): {report.get('objects', 0):,} objects, {report.get('triangles', 0):,} triangles")
+        rows = [("skipped", count, reason, "") for reason, count in sorted(report.get("skipped", {}).items())]
+        rows += [("warning", item["count"], item["reason"], item["example"]) for item in report.get("warnings", [])]
+        if rows:
+            print_table(("", "count", "reason", "e.g."), rows)
+
+
+def _jobs(catalogue: Catalogue, name: str, as_json: bool) -> None:
+    jobs = list(catalogue.jobs(name))
+    if as_json:
+        catalogue.rendering(name)
+        print_json(jobs)
+        return
+    click.echo(counts_text(catalogue.count_jobs(name)))
+    open_jobs = [job for job in jobs if job.state not in (State.DONE, State.WAITING, State.TODO)]
+    if open_jobs:
+        print_table(
+            ("view", "block", "kind", "state", "attempts", "worker", "reason"),
+            [(job.view, job.block, job.kind, job.state, job.attempts, job.worker, job.reason) for job in open_jobs],
+        )
+
+
+def _quarantine(catalogue: Catalogue, name: str, as_json: bool) -> None:
+    catalogue.rendering(name)
+    jobs = list(catalogue.jobs(name, state=State.QUARANTINED))
+    if as_json:
+        print_json(jobs)
+        return
+    if not jobs:
+        click.echo(f"no block of {name} is quarantined")
+        return
+    print_table(("view", "block", "kind", "why"), [(job.view, job.block, job.kind, job.reason) for job in jobs])
+    click.echo(f"try them again with: map3d retry {name} && map3d render {name}")
+
+
+_SHOW = {
+    "scenes": _scenes,
+    "scene": _scene,
+    "renderings": _renderings,
+    "rendering": _rendering,
+    "report": _report,
+    "jobs": _jobs,
+    "quarantine": _quarantine,
+}

@@ -1,0 +1,78 @@
+"""map3d site."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+from map3d.catalogue import Workspace
+from map3d.cli.create_rendering import around
+from map3d.cli.options import View, max_memory_option, workers_option, workspace_option
+from map3d.cli.output import console
+from map3d.cli.render import render_with_progress, report
+from map3d.types import COLOR_FORMATS, ViewAngles
+
+
+@click.command("site")
+@click.argument("folder", type=click.Path(path_type=Path, exists=True))
+@click.option("-o", "--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder for the finished site.")
+@click.option("--name", help="Of scene and rendering.  [default: the folder's]")
+@click.option("--title", help="What people read.  [default: the folder's name]")
+@click.option("--attribution", default="", help="Whom to credit on the map.")
+@click.option(
+    "--view", "views", type=View(), multiple=True, help="A view as look-at/pitch, e.g. 45/22.5; more than once.  [default: 4 around, pitch 45]"
+)
+@click.option("--res", "res_m", type=float, help="Metres a pixel.  [default: by the size of the scene, so that it takes minutes]")
+@click.option("--color", type=click.Choice(list(COLOR_FORMATS)), default="webp", show_default=True, help="Format of the colour layer.")
+@click.option("--crs", help="The files' coordinate system, where they do not say.")
+@click.option("--up", type=click.Choice(["y", "z"]), default="z", show_default=True, help="OBJ: the axis that points up.")
+@click.option("--strict", is_flag=True, help="Stop at the first fault.")
+@workers_option
+@max_memory_option
+@workspace_option
+def command(
+    workspace: Workspace, folder: Path, out: Path, views: tuple[ViewAngles, ...], workers: int, max_memory: int | None, **options: Any
+) -> None:
+    """Make a site of all files in FOLDER: import, build, render, publish.
+
+    Stopped at any point, the same command goes on; run again after files have changed, it does only what changed.
+    """
+    from map3d.ingest.options import ImportOptions
+    from map3d.ingest.sources import asset_name
+    from map3d.jobs.run import Run, Settings
+    from map3d.jobs.site import SiteRequest, add_changed, make_rendering
+    from map3d.publish import publish
+
+    title = options["title"] or folder.resolve().stem
+    reading = ImportOptions(crs=options["crs"], up=options["up"], strict=options["strict"])
+    request = SiteRequest(
+        name=options["name"] or asset_name(folder.resolve().stem),
+        sources=folder,
+        views=views or around(4, (45.0,)),
+        res_m=options["res_m"],
+        title=title,
+        attribution=options["attribution"],
+        color=options["color"],
+        options=reading,
+    )
+    catalogue = workspace.create().open_catalogue()
+    try:
+        with Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), console=console(), transient=True) as bar:
+            task = bar.add_task("importing", total=None)
+            added = add_changed(
+                workspace, catalogue, request, lambda name, n, of: bar.update(task, description=f"importing {name}", completed=n, total=of)
+            )
+        click.echo(f"{len(added.added)} files imported, {len(added.unchanged)} unchanged, {len(added.failed)} not usable")
+        for _, reason in added.failed:
+            click.echo(f"not added: {reason}", err=True)
+        record = make_rendering(workspace, catalogue, request, threads=workers)
+        click.echo(f"rendering {record.name}: {len(record.frames)} views, {record.zmax + 1} levels, {record.res_m:g} m a pixel")
+        outcome = render_with_progress(Run(workspace, catalogue, record.name, Settings(workers, max_memory)))
+    finally:
+        catalogue.close()
+    report(record.name, outcome)
+    if not outcome.complete:
+        raise click.exceptions.Exit(130 if outcome.stopped else 1)
+    publish(workspace, record.name, out)
+    click.echo(f"the site is in {out}; look at it with: python -m http.server -d {out}")

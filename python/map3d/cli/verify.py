@@ -1,0 +1,49 @@
+"""map3d verify."""
+
+import click
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from map3d.catalogue import Workspace
+from map3d.cli.options import json_option, workspace_option
+from map3d.cli.output import console, counts_text, print_json
+
+
+@click.command("verify")
+@click.argument("renderings", nargs=-1)
+@json_option
+@workspace_option
+def command(workspace: Workspace, renderings: tuple[str, ...], as_json: bool) -> None:
+    """Count everything again: files against checksums, blocks against the plan, every tile, seam and id. All RENDERINGS unless named.
+
+    Ends with status 1 and a list when anything is wrong.
+    """
+    from map3d.jobs.findings import Findings
+    from map3d.jobs.verify import verify_rendering, verify_scene
+
+    findings = Findings()
+    catalogue = workspace.open_catalogue()
+    try:
+        chosen = [catalogue.rendering(name) for name in renderings] or catalogue.renderings()
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        with Progress(*columns, console=console(), transient=True) as bar:
+            task = bar.add_task("verifying", total=None)
+
+            def progress(what: str, done: int, total: int) -> None:
+                bar.update(task, description=what, completed=done, total=total)
+
+            scenes = {record.scene for record in chosen} if renderings else {scene.name for scene in catalogue.scenes()}
+            for scene in sorted(scenes):
+                verify_scene(workspace, catalogue, scene, findings, progress)
+            for record in chosen:
+                verify_rendering(workspace, catalogue, record.name, findings, progress)
+    finally:
+        catalogue.close()
+    if as_json:
+        print_json(findings)
+    else:
+        click.echo(f"looked at {counts_text(findings.counted)}")
+        for line in findings.wrong:
+            click.echo(line)
+        click.echo("everything is as it should be" if not findings.total else f"{findings.total:,} things are wrong")
+    if findings.total:
+        raise click.exceptions.Exit(1)

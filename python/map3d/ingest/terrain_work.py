@@ -1,0 +1,67 @@
+"""What the limited child of a terrain import does: tells elevation from imagery, settles the system, has the asset written."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from pyproj import CRS
+
+from map3d.child import Tell, Work
+from map3d.errors import ImportFailed
+from map3d.ingest.crs import LOCAL, is_local, parse_crs, scene_crs
+from map3d.ingest.projection import choose_target
+from map3d.ingest.terrain import TerrainOptions, import_terrain
+from map3d.ingest.terrain_place import open_raster
+
+IMAGE_BANDS: Final = (3, 4)
+
+
+def open_terrain(_setup: Mapping[str, Any]) -> Work:
+    def work(question: dict[str, Any], _blobs: list[bytes], tell: Tell) -> tuple[dict[str, Any], list[bytes]]:
+        return _import(question, tell), []
+
+    return work
+
+
+def _import(question: Mapping[str, Any], tell: Tell) -> dict[str, Any]:
+    """`question`: {"paths", "folder", "name", "crs", "scene_crs"}; see map3d.ingest.work for the answer."""
+    dem, ortho = tell_apart([Path(path) for path in question["paths"]])
+    target = _target(dem or ortho, question["scene_crs"])
+
+    def progress(_stage: str, done: int, total: int) -> bool:
+        tell({"done": done, "total": total})
+        return True
+
+    report = import_terrain(dem, ortho, Path(question["folder"]), target, TerrainOptions(name=question["name"]), progress)
+    proposed = LOCAL if target is None else scene_crs(target)
+    placing = {"from": report["crs"] and CRS.from_user_input(report["crs"]).name, "to": proposed.name, **report["projection"]}
+    return {"report": {**report, "placing": placing}, "crs": asdict(proposed)}
+
+
+def tell_apart(paths: Sequence[Path]) -> tuple[Path | None, Path | None]:
+    """(elevation model, imagery): imagery has three or four bands of bytes, elevation one band. Raises ImportFailed when there are two of a kind."""
+    found: dict[str, Path] = {}
+    for path in paths:
+        with open_raster(path) as raster:
+            kind = "imagery" if raster.count in IMAGE_BANDS or raster.dtypes[0] == "uint8" else "elevation"
+        if kind in found:
+            raise ImportFailed(f"{path}: a second raster of {kind} beside {found[kind].name}; add one elevation model and one image at a time")
+        found[kind] = path
+    return found.get("elevation"), found.get("imagery")
+
+
+def _target(raster: Path | None, scene: str | None) -> CRS | None:
+    """The scene's system; if it has none yet, the raster's own where that is projected in metres, else the UTM zone of its place."""
+    if scene is not None:
+        return None if is_local(scene) else CRS.from_user_input(scene)
+    assert raster is not None, "a source has a path"
+    with open_raster(raster) as data:
+        if data.crs is None:
+            return None
+        own = parse_crs(data.crs.to_wkt())
+        left, bottom, right, top = data.bounds
+    corners = np.array([(left, bottom, 0.0), (right, top, 0.0)])
+    north_first = own.is_geographic and own.axis_info[0].direction == "north"
+    return choose_target(own, corners[:, [1, 0, 2]] if north_first else corners)

@@ -1,0 +1,112 @@
+"""create-rendering: pins the frames of a rendering to a scene as it is now."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from map3d.catalogue import Catalogue, RenderingRecord, Workspace
+from map3d.errors import BadRequest
+from map3d.geometry.frames import pin
+from map3d.render.build import build, is_stale, open_scene
+from map3d.types import LAYER_KINDS, Box, Layer, ViewAngles, check_name
+
+LOSSY: Final = ("webp", "jpeg")
+BUILD_BYTES: Final = 2 << 30
+COARSEST_M: Final = 1e6
+
+
+@dataclass(frozen=True)
+class RenderingRequest:
+    """`res_m` or `levels`; `color` and `quality` are the colour layer's."""
+
+    scene: str
+    name: str
+    views: Sequence[ViewAngles]
+    res_m: float | None = None
+    levels: int | None = None
+    layers: Sequence[str] = LAYER_KINDS
+    tile_px: int = 256
+    color: str = "webp"
+    quality: int = 80
+    title: str = ""
+    attribution: str = ""
+    regrid: bool = False
+
+
+def create_rendering(workspace: Workspace, catalogue: Catalogue, request: RenderingRequest, *, threads: int) -> RenderingRecord:
+    """Builds the scene if its files changed, since the frames need its box. Raises BadRequest, AlreadyExists, NotFound."""
+    check_name(request.name, "rendering")
+    layers = make_layers(request.layers, request.color, request.quality)
+    if not request.regrid:
+        _check_free(catalogue, request.name)
+    if is_stale(workspace, catalogue, request.scene):
+        build(workspace, catalogue, request.scene, threads=threads, max_memory_bytes=BUILD_BYTES)
+    box = open_scene(workspace, request.scene).box
+    res_m = choose_res(box, request)
+    frames = tuple(pin(box, request.tile_px, res_m, request.views))
+    record = RenderingRecord(request.name, request.scene, res_m, layers, frames, box, request.title, request.attribution)
+    if request.regrid:
+        kept = catalogue.regrid(record)
+        _remove_stores(workspace, kept)
+        return kept
+    catalogue.create_rendering(record)
+    return record
+
+
+def make_layers(names: Sequence[str], color: str, quality: int) -> tuple[Layer, ...]:
+    """Raises BadRequest for unknown or repeated layers."""
+    for name in names:
+        if name not in LAYER_KINDS:
+            raise BadRequest(f"layer {name!r} is not known; there are {', '.join(LAYER_KINDS)}")
+    if not names or len(set(names)) != len(names):
+        raise BadRequest(f"layers {', '.join(names) or 'none'}: name at least one, each once")
+    return tuple(_layer(kind, color, quality) for kind in LAYER_KINDS if kind in names)
+
+
+def choose_res(box: Box, request: RenderingRequest) -> float:
+    """The resolution asked for; for a number of levels the finest that needs no more, to three digits."""
+    if (request.res_m is None) == (request.levels is None):
+        raise BadRequest("say how fine: --res METRES a pixel, or --levels N")
+    if request.res_m is not None:
+        return request.res_m
+    assert request.levels is not None, "one of the two is given"
+    extent_m = _extent_m(box, request)
+    exact = extent_m / (request.tile_px * 2.0 ** (request.levels - 1))
+    return _rounded_up(exact)
+
+
+def _extent_m(box: Box, request: RenderingRequest) -> float:
+    """What `pin` needs a square to hold, to a part in a million: the least tile of one level that does."""
+    low, high = 0.0, COARSEST_M
+    while high - low > 1e-9 * high:
+        middle = (low + high) / 2
+        if pin(box, request.tile_px, middle, request.views)[0].zmax == 0:
+            high = middle
+        else:
+            low = middle
+    return high * request.tile_px
+
+
+def _rounded_up(value: float) -> float:
+    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return round(math.ceil(value / unit) * unit, 12)
+
+
+def _layer(kind: str, color: str, quality: int) -> Layer:
+    known = next(known for known in LAYER_KINDS if known == kind)
+    return Layer(known, known, color, quality if color in LOSSY else None) if known == "color" else Layer(known, known, "png")
+
+
+def _check_free(catalogue: Catalogue, name: str) -> None:
+    """Told before a long build rather than after it."""
+    if any(record.name == name for record in catalogue.renderings()):
+        raise BadRequest(f"rendering {name}: exists already; choose another name, or give --regrid to pin it anew and render everything again")
+
+
+def _remove_stores(workspace: Workspace, record: RenderingRecord) -> None:
+    """Tiles of the frames before; views that are no longer wanted go too."""
+    folder = workspace.rendering_folder(record.name)
+    if folder.is_dir():
+        for path in folder.glob("*.sqlite*"):
+            path.unlink()

@@ -1,0 +1,128 @@
+"""What a rendering will take, before any work: tiles counted from the plan, bytes and time from what is known of its tiles."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from map3d import _core
+from map3d.catalogue import Catalogue, RenderingRecord, State, Workspace
+from map3d.errors import BadRequest
+from map3d.geometry.frames import PinnedFrame
+from map3d.render.build import is_stale, open_scene
+from map3d.render.plan import frame_text, planned_occupancy
+from map3d.tiles.naming import block_levels, morton
+from map3d.tiles.occupancy import Occupancy
+from map3d.types import BlockId
+
+SAMPLE_BLOCKS: Final = 12
+SAMPLE_S: Final = 10.0
+RECORDED_BLOCKS: Final = 20
+LEVELS_ABOVE: Final = 1.0 + 1 / 64 + 1 / 256 + 1 / 1024
+"""What the levels above the base blocks add to their tiles: a base block of four levels has 85 tiles, the next three levels up 21/64 of one block."""
+
+
+@dataclass(frozen=True)
+class Rate:
+    """Of one base tile with its share of the levels above: encoded bytes of all layers, seconds of one core. `how` says where they are from."""
+
+    bytes_a_tile: float
+    seconds_a_tile: float
+    filled: float
+    """Base tiles with content for one that may have it."""
+    how: str
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """`base_tiles`: at level zmax, that may have content; `tiles`: of all levels; `images`: those times the layers. Of the whole rendering; `seconds`
+    and `open_tiles`: of what is still to do, with `workers` workers."""
+
+    base_tiles: int
+    tiles: int
+    images: int
+    bytes: int
+    open_tiles: int
+    seconds: float
+    workers: int
+    how: str
+
+
+def estimate(workspace: Workspace, catalogue: Catalogue, name: str, workers: int) -> Estimate:
+    """Raises BadRequest when the scene is not built as it is now."""
+    record = catalogue.rendering(name)
+    if is_stale(workspace, catalogue, record.scene):
+        raise BadRequest(f"scene {record.scene} has changed since it was built; map3d render {name} builds it first")
+    scene = open_scene(workspace, record.scene, 256 << 20)
+    plans = {frame.id: planned_occupancy(scene, record, frame) for frame in record.frames}
+    rate = _recorded(catalogue, record, plans) or _sampled(scene, record, plans)
+    base = sum(plan.count(record.zmax) for plan in plans.values())
+    tiles = sum(plan.count() for plan in plans.values())
+    done = sum(job.result.base_tiles for job in catalogue.jobs(name, state=State.DONE) if job.kind == "base" and job.result is not None)
+    filled = round(base * rate.filled)
+    open_tiles = max(filled - done, 0)
+    return Estimate(
+        base_tiles=filled,
+        tiles=round(tiles * rate.filled),
+        images=round(tiles * rate.filled) * len(record.layers),
+        bytes=round(filled * rate.bytes_a_tile),
+        open_tiles=open_tiles,
+        seconds=open_tiles * rate.seconds_a_tile / workers,
+        workers=workers,
+        how=rate.how,
+    )
+
+
+def _recorded(catalogue: Catalogue, record: RenderingRecord, plans: dict[str, Occupancy]) -> Rate | None:
+    """From the blocks that are done, if they are many enough."""
+    done = [job for job in catalogue.jobs(record.name, state=State.DONE) if job.result is not None]
+    base = [job for job in done if job.kind == "base" and job.result is not None and not job.result.empty]
+    if len(base) < RECORDED_BLOCKS:
+        return None
+    results = [job.result for job in done if job.result is not None]
+    tiles = sum(result.base_tiles for result in results)
+    root = block_levels(record.zmax)[0].root
+    planned = sum(_tiles_within(plans[job.view], job.block, record.zmax - root) for job in done if job.kind == "base")
+    how = f"rates recorded from {len(base)} blocks of this rendering"
+    return Rate(sum(result.bytes for result in results) / tiles, sum(result.seconds for result in results) / tiles, tiles / max(planned, 1), how)
+
+
+def _sampled(scene: _core.Scene, record: RenderingRecord, plans: dict[str, Occupancy]) -> Rate:
+    """From a few blocks spread over all views, rendered now and thrown away."""
+    root = block_levels(record.zmax)[0].root
+    blocks = [(frame, BlockId(*tile)) for frame in record.frames for tile in plans[frame.id].tiles(root)]
+    size, tiles, planned, count = 0, 0, 0, 0
+    begun = time.perf_counter()
+    for frame, block in _spread(blocks):
+        rendered = scene.render_block(frame_text(record, frame), *block)
+        size += sum(len(tile[4]) for tile in rendered.tiles)
+        tiles += sum(tile[0] == 0 and tile[1] == record.zmax for tile in rendered.tiles)
+        planned += _tiles_within(plans[frame.id], block, record.zmax - root)
+        count += 1
+        if time.perf_counter() - begun > SAMPLE_S:
+            break
+    seconds = time.perf_counter() - begun
+    if not tiles:
+        return Rate(0.0, 0.0, 0.0, f"a sample of {count} blocks, all empty")
+    return Rate(
+        size / tiles * LEVELS_ABOVE,
+        seconds / tiles * LEVELS_ABOVE,
+        tiles / planned,
+        f"a sample of {count} blocks ({tiles} tiles) rendered just now on one core",
+    )
+
+
+def _spread(blocks: Sequence[tuple[PinnedFrame, BlockId]]) -> list[tuple[PinnedFrame, BlockId]]:
+    """Evenly over the list, always the same ones."""
+    count = min(len(blocks), SAMPLE_BLOCKS)
+    return [blocks[(2 * k + 1) * len(blocks) // (2 * count)] for k in range(count)]
+
+
+def _tiles_within(plan: Occupancy, block: BlockId, levels: int) -> int:
+    """Base tiles of the plan that lie in a base block."""
+    first = morton(block.x, block.y) << 2 * levels
+    numbers = plan.numbers(plan.zmax)
+    low, high = np.searchsorted(numbers, np.array([first, first + (1 << 2 * levels)], dtype=np.uint64))
+    return int(high - low)

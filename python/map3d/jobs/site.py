@@ -1,0 +1,106 @@
+"""`map3d site`: a folder of files becomes a rendering in steps that can each be repeated."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from map3d.catalogue import Catalogue, RenderingRecord, SceneRecord, Workspace
+from map3d.errors import BadRequest, Map3dError
+from map3d.geometry.frames import pin
+from map3d.ingest.importing import import_file
+from map3d.ingest.options import ImportOptions
+from map3d.ingest.sources import Source, find_sources, source_digest
+from map3d.jobs.creating import RenderingRequest, create_rendering, make_layers
+from map3d.render.build import build, is_stale, open_scene
+from map3d.render.plan import planned_occupancy
+from map3d.types import ViewAngles
+
+RESOLUTIONS_M: Final = (0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
+MOST_BASE_TILES: Final = 30_000
+"""Of all views together: some minutes on a small machine."""
+
+_PROBE_LEVEL: Final = 8
+BUILD_BYTES: Final = 2 << 30
+
+
+@dataclass(frozen=True)
+class SiteRequest:
+    """`res_m` None: chosen by `choose_res`."""
+
+    name: str
+    sources: Path
+    views: Sequence[ViewAngles]
+    res_m: float | None = None
+    title: str = ""
+    attribution: str = ""
+    color: str = "webp"
+    options: ImportOptions = ImportOptions()
+
+
+@dataclass(frozen=True)
+class Added:
+    """What an import step did: assets taken over now, unchanged from before, and failures with their reasons."""
+
+    added: list[str]
+    unchanged: list[str]
+    failed: list[tuple[str, str]]
+
+
+def add_changed(workspace: Workspace, catalogue: Catalogue, request: SiteRequest, tell: Callable[[str, int, int], None]) -> Added:
+    """Makes the scene if need be and imports what is new or has changed; a broken file costs itself alone. Raises Map3dError when none can be used."""
+    if not any(scene.name == request.name for scene in catalogue.scenes()):
+        catalogue.create_scene(SceneRecord(request.name, request.title, request.attribution))
+    have = {asset.name: asset.source_digest for asset in catalogue.assets(request.name)}
+    done = Added([], [], [])
+    sources = find_sources([request.sources])
+    for number, source in enumerate(sources):
+        tell(source.paths[0].name, number, len(sources))
+        _add(workspace, catalogue, request, source, have, done)
+    if not done.added and not done.unchanged:
+        raise BadRequest(f"{request.sources}: none of its {len(sources)} files could be used; the first: {done.failed[0][1]}")
+    return done
+
+
+def _add(workspace: Workspace, catalogue: Catalogue, request: SiteRequest, source: Source, have: dict[str, str], done: Added) -> None:
+    if have.get(source.name) == source_digest(source):
+        done.unchanged.append(source.name)
+        return
+    try:
+        import_file(workspace, catalogue, request.name, source, request.options)
+        done.added.append(source.name)
+    except Map3dError as error:
+        if request.options.strict:
+            raise
+        done.failed.append((str(source.paths[0]), str(error)))
+
+
+def make_rendering(workspace: Workspace, catalogue: Catalogue, request: SiteRequest, *, threads: int) -> RenderingRecord:
+    """The rendering of the site, made if it is not there."""
+    for record in catalogue.renderings(request.name):
+        if record.name == request.name:
+            return record
+    if is_stale(workspace, catalogue, request.name):
+        build(workspace, catalogue, request.name, threads=threads, max_memory_bytes=BUILD_BYTES)
+    res_m = request.res_m or choose_res(workspace, request)
+    wanted = RenderingRequest(
+        request.name, request.name, request.views, res_m=res_m, color=request.color, title=request.title, attribution=request.attribution
+    )
+    return create_rendering(workspace, catalogue, wanted, threads=threads)
+
+
+def choose_res(workspace: Workspace, request: SiteRequest) -> float:
+    """The finest of RESOLUTIONS_M at which the scene needs no more than MOST_BASE_TILES, going by the area that it covers in every view."""
+    scene = open_scene(workspace, request.name)
+    box, tile_px, covered_m2 = scene.box, 256, 0.0
+    frames = pin(box, tile_px, RESOLUTIONS_M[0], request.views)
+    layers = make_layers(("color",), "webp", 80)
+    probe = RenderingRecord(request.name, request.name, RESOLUTIONS_M[0], layers, tuple(frames), box)
+    for frame in frames:
+        level = min(frame.zmax, _PROBE_LEVEL)
+        side_m = frame.size_m / 2.0**level
+        covered_m2 += planned_occupancy(scene, probe, frame, level).count(level) * side_m**2
+    for res_m in RESOLUTIONS_M:
+        if covered_m2 / (res_m * tile_px) ** 2 <= MOST_BASE_TILES:
+            return res_m
+    return RESOLUTIONS_M[-1]

@@ -1,0 +1,95 @@
+"""`map3d verify`: believes nothing that it can count again."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from map3d import _core
+from map3d.catalogue import Catalogue, RenderingRecord, State, Workspace
+from map3d.errors import Map3dError
+from map3d.jobs.findings import Findings
+from map3d.jobs.manifest import current_manifest
+from map3d.jobs.verify_view import check_view
+from map3d.registry import Registry
+from map3d.render.build import is_stale, open_scene
+from map3d.render.plan import plan_jobs
+from map3d.render.scene_files import binary_files, check_file, check_ids, check_index
+from map3d.tiles.manifest import Manifest
+from map3d.types import BlockId
+
+Progress = Callable[[str, int, int], None]
+"""(what, done, total)."""
+
+
+def verify_scene(workspace: Workspace, catalogue: Catalogue, scene: str, findings: Findings, progress: Progress) -> None:
+    """Checksums of all files, the scene index, ids against the registry."""
+    folder = workspace.scene_folder(scene)
+    files = list(binary_files(folder))
+    for done, path in enumerate(files, 1):
+        wrong = check_file(path)
+        if wrong:
+            findings.add(wrong)
+        progress(f"files of {scene}", done, len(files))
+    findings.count("scene files", len(files))
+    if (folder / "scene.json").is_file():
+        for line in check_index(folder):
+            findings.add(line)
+    with Registry(workspace.registry_path(scene)) as registry:
+        for asset in catalogue.assets(scene):
+            for line in check_ids(folder, asset.name, registry):
+                findings.add(line)
+        findings.count("objects", registry.count())
+
+
+def verify_rendering(workspace: Workspace, catalogue: Catalogue, name: str, findings: Findings, progress: Progress) -> None:
+    """Jobs against the plan, tiles against jobs, every tile, seam and parent, the manifest."""
+    record = catalogue.rendering(name)
+    if is_stale(workspace, catalogue, record.scene):
+        findings.add(f"scene {record.scene}: its files changed since it was built; run map3d render {name}")
+        return
+    scene = open_scene(workspace, record.scene)
+    _check_plan(catalogue, record, scene, findings)
+    with Registry(workspace.registry_path(record.scene)) as registry:
+        ids = np.array([item.id for item in registry.objects()], dtype=np.uint32)
+    for frame in record.frames:
+        check_view(workspace, catalogue, record, frame, scene, ids, findings, progress)
+    _check_manifest(workspace, catalogue, record, scene, findings)
+
+
+def _check_plan(catalogue: Catalogue, record: RenderingRecord, scene: _core.Scene, findings: Findings) -> None:
+    """Every block that the scene asks for is a job, done, with the key that it has now."""
+    jobs = {(job.view, job.block): job for job in catalogue.jobs(record.name)}
+    known: dict[str, list[BlockId]] = {}
+    for job in jobs.values():
+        if job.kind == "base":
+            known.setdefault(job.view, []).append(job.block)
+    planned = plan_jobs(scene, record, known)
+    for wanted in planned:
+        found = jobs.pop((wanted.view, wanted.block), None)
+        if found is None:
+            findings.add(f"{record.name} {wanted.view} block {wanted.block}: the scene has content there, no job")
+        elif found.key != wanted.key:
+            findings.add(f"{record.name} {wanted.view} block {wanted.block}: rendered from an older scene; run map3d render {record.name}")
+        elif found.state is not State.DONE:
+            why = f" ({found.reason})" if found.reason else ""
+            findings.add(f"{record.name} {wanted.view} block {wanted.block}: {found.state}, not done{why}")
+    for view, block in jobs:
+        findings.add(f"{record.name} {view} block {block}: a job that no plan asks for")
+    findings.count("blocks", len(planned))
+
+
+def _check_manifest(workspace: Workspace, catalogue: Catalogue, record: RenderingRecord, scene: _core.Scene, findings: Findings) -> None:
+    path = workspace.manifest_path(record.name)
+    counts = catalogue.count_jobs(record.name)
+    if counts[State.DONE] != sum(counts.values()):
+        return
+    try:
+        found = Manifest.load(path.read_bytes(), str(path)).to_json()
+    except (OSError, Map3dError) as error:
+        findings.add(f"{path}: cannot be read: {error}")
+        return
+    expected = current_manifest(workspace, catalogue, record, scene.box, {}).to_json()
+    for key in sorted(set(found) | set(expected)):
+        if found.get(key) != expected.get(key):
+            findings.add(f"{path}: {key} is not what the catalogue and the stores say; run map3d render {record.name}")
+    findings.count("manifests")

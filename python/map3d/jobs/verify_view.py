@@ -1,0 +1,161 @@
+"""Checks of one view's tile store: every block, tile and seam."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from map3d import _core
+from map3d.catalogue import Catalogue, Job, RenderingRecord, State, Workspace
+from map3d.errors import Corrupt, Map3dError
+from map3d.geometry.frames import PinnedFrame
+from map3d.jobs.findings import Findings
+from map3d.render.decode import check_seam, decode_tile, ids_of
+from map3d.render.plan import frame_text, planned_occupancy
+from map3d.tiles.naming import block_level, block_of, blocks_below, children, parent
+from map3d.tiles.occupancy import Occupancy
+from map3d.tiles.sqlite_store import SqliteTileStore
+from map3d.tiles.store import StoredBlock
+from map3d.types import BlockId, TileId
+
+Progress = Callable[[str, int, int], None]
+
+
+def check_view(
+    workspace: Workspace,
+    catalogue: Catalogue,
+    record: RenderingRecord,
+    frame: PinnedFrame,
+    scene: _core.Scene,
+    ids: NDArray[np.uint32],
+    findings: Findings,
+    progress: Progress,
+) -> None:
+    """`ids`: of all objects in the registry, sorted."""
+    jobs = {job.block: job for job in catalogue.jobs(record.name, frame.id)}
+    path = workspace.store_path(record.name, frame.id)
+    if not path.is_file():
+        if any(job.state is State.DONE for job in jobs.values()):
+            findings.add(f"{path}: not there, though jobs of it are done")
+        return
+    with SqliteTileStore(path, read_only=True) as store:
+        check = _ViewCheck(f"{record.name} {frame.id}", store, record, frame, jobs, findings, progress)
+        for line in store.check():
+            findings.add(f"{path}: {line}")
+        check.blocks()
+        tiles = check.tile_names()
+        check.pyramid(tiles, planned_occupancy(scene, record, frame))
+        check.images(tiles, ids)
+        check.reduces()
+
+
+@dataclass
+class _ViewCheck:
+    where: str
+    store: SqliteTileStore
+    record: RenderingRecord
+    frame: PinnedFrame
+    jobs: Mapping[BlockId, Job]
+    findings: Findings
+    progress: Progress
+
+    def blocks(self) -> None:
+        """Done jobs and stored blocks are the same, with the same keys, versions and counts; seams are whole."""
+        stored = {block.id: block for block in self.store.list_blocks()}
+        for block, job in self.jobs.items():
+            if job.state is State.DONE:
+                self._check_block(job, stored.get(block))
+        for block in stored.keys() - self.jobs.keys():
+            self.findings.add(f"{self.where} block {block}: stored, no job stands for it")
+
+    def _check_block(self, job: Job, stored: StoredBlock | None) -> None:
+        where, result = f"{self.where} block {job.block}", job.result
+        if stored is None or result is None:
+            self.findings.add(f"{where}: done, its tiles are not stored; run map3d retry")
+            return
+        if (stored.key, stored.version, stored.tiles) != (job.key, result.version, result.tiles):
+            have, want = f"{stored.key} v{stored.version} {stored.tiles} tiles", f"{job.key} v{result.version} {result.tiles} tiles"
+            self.findings.add(f"{where}: stored is {have}, the catalogue says {want}")
+        seam = self.store.get_seam(job.block)
+        if (seam is None) != (stored.tiles == 0):
+            self.findings.add(f"{where}: {stored.tiles} tiles and {'no' if seam is None else 'a'} seam")
+        elif seam is not None:
+            self._try(where, lambda: check_seam(seam, self.frame.tile_px))
+            self.findings.count("seams")
+
+    def tile_names(self) -> set[TileId]:
+        """Of the first layer; the others must have the same."""
+        sets = [set(self.store.list_tiles(layer)) for layer in range(len(self.record.layers))]
+        for layer, names in zip(self.record.layers, sets, strict=True):
+            for tile in sorted(names ^ sets[0]):
+                self.findings.add(f"{self.where} {_name(tile)}: layer {layer.name} and layer {self.record.layers[0].name} differ in having it")
+        return set.union(*sets)
+
+    def pyramid(self, tiles: set[TileId], planned: Occupancy) -> None:
+        """Over every tile there is its parent, under every tile above zmax a child, no base tile where the scene has nothing."""
+        for tile in sorted(tiles):
+            above = parent(tile)
+            if above is not None and above not in tiles and self._is_done(above):
+                self.findings.add(f"{self.where} {_name(tile)}: its parent is missing")
+            if tile.z < self.frame.zmax:
+                if not any(child in tiles for child in children(tile)):
+                    self.findings.add(f"{self.where} {_name(tile)}: has content, none of its children has")
+            elif tile not in planned:
+                self.findings.add(f"{self.where} {_name(tile)}: has content where the scene has none")
+
+    def images(self, tiles: set[TileId], ids: NDArray[np.uint32]) -> None:
+        """Every image decodes to its size; every id is in the registry."""
+        for done, tile in enumerate(sorted(tiles), 1):
+            for number, layer in enumerate(self.record.layers):
+                data = self.store.get_tile(number, *tile)
+                if data is None:
+                    continue
+                try:
+                    pixels = decode_tile(layer, data, self.frame.tile_px)
+                except Corrupt as error:
+                    self.findings.add(f"{self.where} {_name(tile)} {layer.name}: {error}")
+                    continue
+                if layer.kind == "id" and tile.z == self.frame.zmax:
+                    self._check_ids(tile, np.setdiff1d(ids_of(pixels), ids))
+            if done % 64 == 0 or done == len(tiles):
+                self.progress(f"tiles of {self.where}", done, len(tiles))
+        self.findings.count("tiles", len(tiles))
+        self.findings.count("images", len(tiles) * len(self.record.layers))
+
+    def reduces(self) -> None:
+        """Reduces every done reduce block again from its seams: the tiles must be those that are stored."""
+        text = frame_text(self.record, self.frame)
+        for block, job in self.jobs.items():
+            if job.kind == "reduce" and job.state is State.DONE:
+                seams = [
+                    (below.x, below.y, seam) for below in blocks_below(block, self.frame.zmax) if (seam := self.store.get_seam(below)) is not None
+                ]
+                levels = block_level(block.z, self.frame.zmax).levels
+                self._try(f"{self.where} block {block}", lambda: self._compare(block, _core.reduce_block(text, *block, levels, seams)))  # noqa: B023
+                self.findings.count("reduced again")
+
+    def _compare(self, block: BlockId, made: _core.Block) -> None:
+        for layer, z, x, y, data in made.tiles:
+            if self.store.get_tile(layer, z, x, y) != data:
+                self.findings.add(f"{self.where} {z}/{x}/{y} {self.record.layers[layer].name}: not what its seams reduce to")
+        if self.store.get_seam(block) != made.seam:
+            self.findings.add(f"{self.where} block {block}: its seam is not what the seams below reduce to")
+
+    def _check_ids(self, tile: TileId, unknown: NDArray[np.uint32]) -> None:
+        if len(unknown):
+            self.findings.add(f"{self.where} {_name(tile)}: ids {unknown[:5].tolist()} that the registry does not have")
+
+    def _is_done(self, tile: TileId) -> bool:
+        job = self.jobs.get(block_of(tile, self.frame.zmax))
+        return job is not None and job.state is State.DONE
+
+    def _try(self, where: str, check: Callable[[], None]) -> None:
+        try:
+            check()
+        except (Map3dError, _core.CoreError) as error:
+            self.findings.add(f"{where}: {error}")
+
+
+def _name(tile: TileId) -> str:
+    return f"{tile.z}/{tile.x}/{tile.y}"

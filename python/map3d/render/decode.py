@@ -1,0 +1,59 @@
+"""Decoding of stored tiles and seams, for checks."""
+
+import io
+import struct
+from typing import Final
+
+import numpy as np
+import xxhash
+from numpy.typing import NDArray
+from PIL import Image, UnidentifiedImageError
+
+from map3d.errors import Corrupt
+from map3d.types import Layer
+
+SEAM_MAGIC: Final = b"M3DG"
+SEAM_VERSION: Final = 1
+_SEAM_HEAD: Final = struct.Struct("<4sIII")
+_SEAM_ARRAYS: Final = 4
+_FORMATS: Final = {"webp": "WEBP", "png": "PNG", "jpeg": "JPEG"}
+_MODES: Final = {"normal": ("RGB",), "id": ("RGBA",), "depth": ("RGBA",)}
+
+
+def decode_tile(layer: Layer, data: bytes, tile_px: int) -> NDArray[np.uint8]:
+    """(H, W, C) pixels; raises Corrupt unless the bytes are an image of the layer's format, mode and size."""
+    try:
+        with Image.open(io.BytesIO(data), formats=[_FORMATS[layer.format]]) as image:
+            pixels = np.asarray(image)
+            mode = image.mode
+    except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
+        raise Corrupt(f"not a {layer.format} image: {error}") from error
+    if pixels.shape[:2] != (tile_px, tile_px) or mode not in _MODES.get(layer.kind, ("RGB", "RGBA")):
+        raise Corrupt(f"{mode} of {pixels.shape[1]} × {pixels.shape[0]} px, expected {tile_px} × {tile_px}")
+    return pixels
+
+
+def ids_of(pixels: NDArray[np.uint8]) -> NDArray[np.uint32]:
+    """Distinct object ids of an id tile, without nothing (0)."""
+    ids = np.unique(np.ascontiguousarray(pixels).view("<u4"))
+    return ids[ids != 0]
+
+
+def check_seam(data: bytes, tile_px: int) -> None:
+    """Raises Corrupt unless head, lengths and checksum are right (spec/pyramid.md §8)."""
+    if len(data) < _SEAM_HEAD.size + 8:
+        raise Corrupt(f"seam of {len(data)} bytes")
+    magic, version, width, height = _SEAM_HEAD.unpack_from(data)
+    if (magic, version, width, height) != (SEAM_MAGIC, SEAM_VERSION, tile_px, tile_px):
+        raise Corrupt(
+            f"seam {magic!r} version {version} of {width} × {height} px, expected {SEAM_MAGIC!r} version {SEAM_VERSION} of {tile_px} × {tile_px}"
+        )
+    at = _SEAM_HEAD.size
+    for _ in range(_SEAM_ARRAYS):
+        if at + 4 > len(data) - 8:
+            raise Corrupt(f"seam ends after {len(data)} bytes, within an array")
+        at += 4 + int.from_bytes(data[at : at + 4], "little")
+    if at != len(data) - 8:
+        raise Corrupt(f"seam of {len(data)} bytes, its arrays end at {at}")
+    if xxhash.xxh3_64_intdigest(data[:-8]) != int.from_bytes(data[-8:], "little"):
+        raise Corrupt("seam whose checksum does not match")
