@@ -1,27 +1,42 @@
 """map3d publish."""
 
 from pathlib import Path
+from typing import Any
 
 import click
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from map3d.catalogue import Workspace
 from map3d.cli.options import json_option, workspace_option
-from map3d.cli.output import print_json
+from map3d.cli.output import console, print_json, size_text
 
 
 @click.command("publish")
 @click.argument("rendering")
-@click.option(
-    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder to write; what is there of it is brought up to date."
-)
+@click.option("-o", "--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder to write.")
+@click.option("--replace", is_flag=True, help="Put it in place of an earlier one of that name.")
+@click.option("--allow-incomplete", is_flag=True, help="Publish though blocks are missing.")
 @json_option
 @workspace_option
-def command(workspace: Workspace, rendering: str, out: Path, as_json: bool) -> None:
-    """Write RENDERING as a folder of static files: tiles, objects, viewer. Copy it to any web server."""
+def command(workspace: Workspace, rendering: str, out: Path, replace: bool, allow_incomplete: bool, as_json: bool) -> None:
+    """Write RENDERING as a folder of static files: tiles, objects, viewer. Copy it to any web server that answers range requests."""
+    done = publish_with_progress(workspace, rendering, out, replace=replace, allow_incomplete=allow_incomplete)
+    if as_json:
+        print_json(done)
+    else:
+        click.echo(f"{rendering}: {done.tiles:,} images in {done.archives} archives, {size_text(done.bytes)} in {out}")
+
+
+def publish_with_progress(workspace: Workspace, rendering: str, out: Path, **how: bool) -> Any:
+    """What was published."""
     from map3d.publish import publish
 
-    publish(workspace, rendering, out)
-    if as_json:
-        print_json({"rendering": rendering, "folder": str(out)})
-    else:
-        click.echo(f"{rendering} is in {out}; put the folder on any web server, or look at it with: python -m http.server -d {out}")
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console(), transient=True) as bar:
+        task = bar.add_task("publishing", total=None)
+
+        def progress(stage: str, done: int, total: int) -> bool:
+            bar.update(task, description=f"publishing: {stage}", completed=done, total=total)
+            return True
+
+        return publish(workspace, rendering, out, progress=progress, **how)

@@ -9,7 +9,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from map3d.catalogue import Workspace
 from map3d.cli.create_rendering import around
 from map3d.cli.options import View, max_memory_option, workers_option, workspace_option
-from map3d.cli.output import console
+from map3d.cli.output import console, size_text
+from map3d.cli.publish import publish_with_progress
 from map3d.cli.render import render_with_progress, report
 from map3d.types import COLOR_FORMATS, ViewAngles
 
@@ -42,7 +43,6 @@ def command(
     from map3d.ingest.sources import asset_name
     from map3d.jobs.run import Run, Settings
     from map3d.jobs.site import SiteRequest, add_changed, make_rendering
-    from map3d.publish import publish
 
     title = options["title"] or folder.resolve().stem
     reading = ImportOptions(crs=options["crs"], up=options["up"], strict=options["strict"])
@@ -74,5 +74,5 @@ def command(
     report(record.name, outcome)
     if not outcome.complete:
         raise click.exceptions.Exit(130 if outcome.stopped else 1)
-    publish(workspace, record.name, out)
-    click.echo(f"the site is in {out}; look at it with: python -m http.server -d {out}")
+    done = publish_with_progress(workspace, record.name, out, replace=True)
+    click.echo(f"the site is in {out}, {size_text(done.bytes)}; copy it to any web server that answers range requests")

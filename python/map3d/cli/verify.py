@@ -1,5 +1,7 @@
 """map3d verify."""
 
+from pathlib import Path
+
 import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -10,13 +12,17 @@ from map3d.cli.output import console, counts_text, print_json
 
 @click.command("verify")
 @click.argument("renderings", nargs=-1)
+@click.option("--published", type=click.Path(path_type=Path, exists=True, file_okay=False), help="Check a published folder instead.")
 @json_option
 @workspace_option
-def command(workspace: Workspace, renderings: tuple[str, ...], as_json: bool) -> None:
+def command(workspace: Workspace, renderings: tuple[str, ...], published: Path | None, as_json: bool) -> None:
     """Count everything again: files against checksums, blocks against the plan, every tile, seam and id. All RENDERINGS unless named.
 
     Ends with status 1 and a list when anything is wrong.
     """
+    if published is not None:
+        _verify_published(published, as_json)
+        return
     from map3d.jobs.findings import Findings
     from map3d.jobs.verify import verify_rendering, verify_scene
 
@@ -47,3 +53,13 @@ def command(workspace: Workspace, renderings: tuple[str, ...], as_json: bool) ->
         click.echo("everything is as it should be" if not findings.total else f"{findings.total:,} things are wrong")
     if findings.total:
         raise click.exceptions.Exit(1)
+
+
+def _verify_published(folder: Path, as_json: bool) -> None:
+    from map3d.publish import verify_published
+
+    found = verify_published(folder)
+    if as_json:
+        print_json(found)
+    else:
+        click.echo(f"{folder}: everything is as it should be")

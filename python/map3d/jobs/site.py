@@ -1,7 +1,7 @@
 """`map3d site`: a folder of files becomes a rendering in steps that can each be repeated."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
@@ -35,7 +35,7 @@ class SiteRequest:
     title: str = ""
     attribution: str = ""
     color: str = "webp"
-    options: ImportOptions = ImportOptions()
+    options: ImportOptions = field(default_factory=ImportOptions)
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Added:
 
 
 def add_changed(workspace: Workspace, catalogue: Catalogue, request: SiteRequest, tell: Callable[[str, int, int], None]) -> Added:
-    """Makes the scene if need be and imports what is new or has changed; a broken file costs itself alone. Raises Map3dError when none can be used."""
+    """Makes the scene if need be and imports what is new or has changed; a broken file costs itself alone. Raises BadRequest when none can be used."""
     if not any(scene.name == request.name for scene in catalogue.scenes()):
         catalogue.create_scene(SceneRecord(request.name, request.title, request.attribution))
     have = {asset.name: asset.source_digest for asset in catalogue.assets(request.name)}
