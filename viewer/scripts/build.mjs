@@ -11,7 +11,7 @@ const shared = { bundle: true, minify: true, target: "es2022", legalComments: "n
 const banner = { js: "/*! map3d, Apache-2.0 */" };
 
 /** `import code from "worker:./x.ts"`: the bundled source text of a worker. */
-export const workers = {
+const workers = {
   name: "workers",
   setup(build) {
     build.onResolve({ filter: /^worker:/ }, ({ path, resolveDir }) => ({ path: resolve(resolveDir, path.slice("worker:".length)), namespace: "worker" }));
@@ -27,17 +27,17 @@ async function bundle(entry, name, options) {
   await esbuild.build({ ...shared, banner, entryPoints: [join(root, entry)], outfile: join(dist, name), plugins: [workers], ...options });
 }
 
-export async function build() {
+async function build() {
   rmSync(dist, { recursive: true, force: true });
   mkdirSync(dist, { recursive: true });
   await bundle("src/map3d.ts", "map3d.mjs", { format: "esm" });
   await bundle("src/map3d.ts", "map3d.js", { format: "iife", globalName: "map3d" });
   await bundle("page/page.ts", "page.js", { format: "esm", external: ["./map3d.mjs"] });
-  await esbuild.build({ ...shared, entryPoints: [join(root, "page/page.css")], outfile: join(dist, "page.css"), target: "chrome110" });
+  await esbuild.build({ ...shared, entryPoints: [join(root, "page/page.css")], outfile: join(dist, "page.css"), target: ["chrome111", "firefox121", "safari16.4"] });
   cpSync(join(root, "page/index.html"), join(dist, "index.html"));
   const tsc = join(root, "node_modules/typescript/bin/tsc");
   execFileSync(process.execPath, [tsc, "-p", join(root, "tsconfig.types.json")], { stdio: "inherit" });
   writeFileSync(join(dist, "map3d.d.ts"), 'export * from "./types/map3d";\n');
 }
 
-if (process.argv[1] === fileURLToPath(import.meta.url)) await build();
+await build();

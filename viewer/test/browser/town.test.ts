@@ -41,7 +41,12 @@ async function started(options: object = {}, layer: object = {}, name = "town"):
   return opened;
 }
 
-const idle = (page: Page): Promise<void> => page.evaluate(() => new Promise<void>((done) => { (globalThis as Global).map.once("idle", () => { done(); }); }));
+/** Does something in the page and waits until the map rests again. */
+const settled = <A>(page: Page, act: (argument: A) => unknown, argument: A): Promise<void> =>
+  page.evaluate(([code, given]) => new Promise<void>((done) => {
+    (globalThis as Global).map.once("idle", () => { done(); });
+    (globalThis as unknown as { eval(code: string): (argument: unknown) => unknown }).eval(code)(given);
+  }), [`(${act.toString()})`, argument] as const);
 
 test("the first complete view is drawn without an error", async () => {
   const { page, problems } = await started();
@@ -154,8 +159,7 @@ test("light off is ambient 1 without diffuse, to the byte", async () => {
 test("a highlight changes exactly the pixels of its ids", async () => {
   const { page } = await started({ zoom: 3 });
   const before = await pixels(page);
-  await page.evaluate(() => (globalThis as Global).layer.highlight([1025, 3_900_000_007], { color: "#1389a0" }));
-  await idle(page);
+  await settled(page, (ids) => (globalThis as Global).layer.highlight(ids, { color: "#1389a0" }), [1025, 3_900_000_007]);
   const after = await pixels(page);
   await page.screenshot({ path: `${OUT}/highlight.png` });
   const ids = decodedLevel("id");
@@ -170,8 +174,7 @@ test("a highlight changes exactly the pixels of its ids", async () => {
   }
   expect(wrong.slice(0, 10)).toEqual([]);
   expect(changed).toBeGreaterThan(1000);
-  await page.evaluate(() => (globalThis as Global).layer.clearHighlight());
-  await idle(page);
+  await settled(page, () => (globalThis as Global).layer.clearHighlight(), null);
   expect(before.equals(await pixels(page))).toBe(true);
   await page.context().close();
 });
@@ -225,8 +228,7 @@ test("on the GPU, too, every random id is itself: highlighting a hundred changes
   const { page } = await started({ zoom: 2 }, {}, "noise2");
   const before = await pixels(page);
   const chosen = [...new Set(noise.ids)].filter((id) => id > 0).slice(200, 300);
-  await page.evaluate((ids) => (globalThis as Global).layer.highlight(ids), chosen);
-  await idle(page);
+  await settled(page, (ids) => (globalThis as Global).layer.highlight(ids), chosen);
   const after = await pixels(page);
   let changed = 0;
   for (let at = 0; at < 800 * 600; at++) if (before.readUInt32LE(4 * at) !== after.readUInt32LE(4 * at)) changed++;
@@ -329,8 +331,9 @@ test("dragging moves the ground with the pointer; the wheel zooms about it", asy
   expect(moved[0] - start[0]).toBeCloseTo(40, 0);
   expect(moved[1] - start[1]).toBeCloseTo(-30, 0);
   const zoom = await page.evaluate(() => (globalThis as Global).map.zoom);
+  await page.evaluate(() => { (globalThis as Global & { rest: Promise<unknown> }).rest = new Promise((done) => (globalThis as Global).map.once("idle", done)); });
   await page.mouse.wheel(0, -200);
-  await idle(page);
+  await page.evaluate(() => (globalThis as Global & { rest: Promise<unknown> }).rest);
   const zoomed = await at();
   expect(await page.evaluate(() => (globalThis as Global).map.zoom)).toBeGreaterThan(zoom + 0.5);
   expect(Math.hypot(zoomed[0] - moved[0], zoomed[1] - moved[1])).toBeLessThan(1);

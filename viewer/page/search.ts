@@ -1,0 +1,124 @@
+import { marker, type imageLayer, type map, type SearchEntry } from "./map3d.mjs";
+import { byId, withText } from "./dom";
+import { toast } from "./messages";
+
+const SHOWN = 8;
+const ZOOM_BELOW_DEEPEST = 1;
+
+/** Small letters without accents, so that "strasse" meets "Straße" and "cafe" meets "Café". */
+export function folded(text: string): string {
+  return text.toLowerCase().replaceAll("ß", "ss").normalize("NFD").replace(/\p{M}/gu, "");
+}
+
+/** The first entries that contain all words; those that begin with the text come first. */
+export function found(entries: readonly SearchEntry[], text: string): SearchEntry[] {
+  const words = folded(text).split(/\s+/).filter(Boolean);
+  if (words.length === 0) return [];
+  const hits = entries.filter(([, label]) => {
+    const name = folded(label);
+    return words.every((word) => name.includes(word));
+  });
+  const start = (entry: SearchEntry): number => (folded(entry[1]).startsWith(words[0] ?? "") ? 0 : 1);
+  return hits.sort((a, b) => start(a) - start(b)).slice(0, SHOWN);
+}
+
+/** The search box: a combobox over the rendering's index, which is fetched when the box is first used. */
+export function bindSearch(view: map, layer: imageLayer): void {
+  const [form, query, list] = [byId("search"), byId<HTMLInputElement>("query"), byId("results")];
+  const box = new SearchBox(query, list, () => layer.searchIndex(), (entry) => {
+    go(view, layer, entry);
+  });
+  form.hidden = false;
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    box.choose();
+  });
+}
+
+let chosen: marker | undefined;
+
+function go(view: map, layer: imageLayer, [id, label, local]: SearchEntry): void {
+  const json = layer.rendering?.json;
+  if (!json) return;
+  const world = [json.origin[0] + local[0], json.origin[1] + local[1], json.origin[2] + local[2]] as const;
+  chosen?.remove();
+  chosen = new marker(label, world).addTo(view).select();
+  layer.clearHighlight().highlight(id);
+  view.flyTo(world, Math.max(view.zoom, json.zmax - ZOOM_BELOW_DEEPEST));
+}
+
+class SearchBox {
+  readonly #query: HTMLInputElement;
+  readonly #list: HTMLElement;
+  readonly #entries: () => Promise<readonly SearchEntry[]>;
+  readonly #chose: (entry: SearchEntry) => void;
+  #hits: SearchEntry[] = [];
+  #at = 0;
+
+  constructor(query: HTMLInputElement, list: HTMLElement, entries: () => Promise<readonly SearchEntry[]>, chose: (entry: SearchEntry) => void) {
+    [this.#query, this.#list, this.#entries, this.#chose] = [query, list, entries, chose];
+    query.addEventListener("input", () => void this.#update());
+    query.addEventListener("focus", () => void this.#update());
+    query.addEventListener("blur", () => {
+      this.#show(false);
+    });
+    query.addEventListener("keydown", (event) => {
+      this.#key(event);
+    });
+  }
+
+  choose(at = this.#at): void {
+    const hit = this.#hits[at];
+    if (!hit) return;
+    this.#query.value = hit[1];
+    this.#query.blur();
+    this.#chose(hit);
+  }
+
+  async #update(): Promise<void> {
+    try {
+      const entries = await this.#entries();
+      this.#hits = found(entries, this.#query.value);
+      this.#at = 0;
+      this.#render();
+    } catch (reason) {
+      toast(`The search index cannot be read: ${reason instanceof Error ? reason.message : String(reason)}`);
+    }
+  }
+
+  #render(): void {
+    const rows = this.#hits.map((hit, k) => this.#row(hit, k));
+    this.#list.replaceChildren(...(rows.length > 0 ? rows : [withText("li", "Nothing found", "none")]));
+    this.#show(this.#query.value.trim() !== "" && document.activeElement === this.#query);
+  }
+
+  #row([, label]: SearchEntry, k: number): HTMLElement {
+    const row = withText("li", label);
+    row.id = `result-${String(k)}`;
+    row.setAttribute("role", "option");
+    row.setAttribute("aria-selected", String(k === this.#at));
+    row.addEventListener("pointerdown", (event) => {
+      event.preventDefault(); // the focus stays in the box until the choice is made
+    });
+    row.addEventListener("click", () => {
+      this.choose(k);
+    });
+    return row;
+  }
+
+  #show(shown: boolean): void {
+    this.#list.hidden = !shown;
+    this.#query.setAttribute("aria-expanded", String(shown));
+    if (shown && this.#hits.length > 0) this.#query.setAttribute("aria-activedescendant", `result-${String(this.#at)}`);
+    else this.#query.removeAttribute("aria-activedescendant");
+  }
+
+  #key(event: KeyboardEvent): void {
+    const step = event.key === "ArrowDown" ? 1 : event.key === "ArrowUp" ? -1 : 0;
+    if (event.key === "Escape") this.#query.blur();
+    if (step === 0 || this.#hits.length === 0) return;
+    event.preventDefault();
+    this.#at = (this.#at + step + this.#hits.length) % this.#hits.length;
+    this.#render();
+  }
+}

@@ -1,0 +1,114 @@
+import { afterAll, beforeAll, expect, test } from "vitest";
+import { devices, type Browser, type Page } from "playwright-core";
+import { renderTown } from "../fixture/rendering";
+import { TestServer } from "../fixture/server";
+import { openBrowser, openPage, OUT } from "./browser";
+
+let browser: Browser;
+let host: string;
+const server = new TestServer();
+
+beforeAll(async () => {
+  server.renderings.set("town", renderTown(256, 0.19));
+  host = await server.listen();
+  browser = await openBrowser();
+});
+
+afterAll(async () => {
+  await browser.close();
+  await server.close();
+});
+
+const PHONE = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 3, isMobile: true, hasTouch: true, userAgent: devices["iPhone 14"]?.userAgent ?? "" };
+const DESK = { viewport: { width: 1280, height: 800 } };
+
+/** The page with the town, at rest. */
+async function open(options: object, query = `rendering=${host}/tiles/town`): Promise<{ page: Page; problems: string[] }> {
+  const opened = await openPage(browser, options);
+  await opened.page.goto(`${host}/?${query}`);
+  await opened.page.waitForFunction(() => location.hash.length > 5);
+  await opened.page.waitForTimeout(1500);
+  return opened;
+}
+
+for (const [name, options] of [["desk", DESK], ["phone", PHONE], ["dark", { ...DESK, colorScheme: "dark" }]] as const) {
+  test(`${name}: the page opens, finds, shows and closes without a complaint of the browser or its CSP`, async () => {
+    const { page, problems } = await open(options);
+    await page.screenshot({ path: `${OUT}/${name}-open.png` });
+    expect(await page.title()).toBe("A small town");
+    await page.fill("#query", "SCHOOL old");
+    await page.waitForSelector("#results li");
+    await page.screenshot({ path: `${OUT}/${name}-search.png` });
+    expect(await page.locator("#results li").allTextContents()).toEqual(["School <b>old</b>"]);
+    await page.keyboard.press("Enter");
+    await page.waitForTimeout(2500);
+    const { width, height } = page.viewportSize() ?? { width: 0, height: 0 };
+    await page.mouse.click(width / 2, height / 2 + 4);
+    await page.waitForSelector("#info:not([hidden])");
+    await page.waitForTimeout(800);
+    await page.screenshot({ path: `${OUT}/${name}-info.png` });
+    expect(await page.locator("#info h2").textContent()).toBe("School <b>old</b>");
+    expect(await page.locator("#info img").count()).toBe(0);
+    await page.locator("#info .close").click();
+    expect(await page.locator("#info").isHidden()).toBe(true);
+    expect(problems).toEqual([]);
+    await page.context().close();
+  });
+}
+
+test("the light slider and the layer switch change the picture", async () => {
+  const { page } = await open(DESK);
+  const shots: string[] = [];
+  const shoot = async (name: string): Promise<void> => {
+    await page.waitForTimeout(900);
+    shots.push((await page.screenshot({ path: `${OUT}/${name}.png`, clip: { x: 360, y: 150, width: 600, height: 450 } })).toString("base64"));
+  };
+  await shoot("mode-lit");
+  await page.locator("#time").fill("19");
+  expect(await page.locator("#clock").textContent()).toBe("19:00");
+  await shoot("mode-evening");
+  for (const mode of ["color", "normal", "id", "depth"]) {
+    await page.locator(`#modes input[value=${mode}]`).check({ force: true });
+    await shoot(`mode-${mode}`);
+  }
+  expect(new Set(shots).size).toBe(shots.length);
+  expect(await page.locator("#time").isDisabled()).toBe(true);
+  await page.context().close();
+});
+
+test("a rendering that is not there is said so in words", async () => {
+  const { page } = await openPage(browser, PHONE);
+  await page.goto(`${host}/?rendering=/tiles/nowhere`);
+  await page.waitForSelector(".failed");
+  expect(await page.locator(".failed").textContent()).toContain("HTTP 404");
+  await page.screenshot({ path: `${OUT}/failed.png` });
+  await page.context().close();
+});
+
+test("controls are at least 44 pixels large and have names", async () => {
+  const { page } = await open(PHONE);
+  const small = await page.evaluate(() => [...document.querySelectorAll<HTMLElement>("button, input")].filter((found) => found.offsetParent !== null).flatMap((found) => {
+    const area = found.matches("#modes input") ? (found.parentElement as HTMLElement) : found;
+    const { width, height } = area.getBoundingClientRect();
+    const tall = found.matches("#modes input") ? height + 12 : height;
+    const named = found.getAttribute("aria-label") ?? found.textContent ?? "";
+    return width < 44 || tall < 44 || (named === "" && !found.matches("#modes input")) ? [`${found.outerHTML.slice(0, 80)} ${String(width)} × ${String(height)}`] : [];
+  }));
+  expect(small).toEqual([]);
+  await page.context().close();
+});
+
+test("the first phone view costs less than 1 MB with the script and the manifest", async () => {
+  const { page } = await openPage(browser, PHONE);
+  const session = await page.context().newCDPSession(page);
+  await session.send("Network.enable");
+  let bytes = 0;
+  session.on("Network.loadingFinished", ({ encodedDataLength }) => { bytes += encodedDataLength; });
+  await page.goto(`${host}/?rendering=${host}/tiles/town`);
+  await page.waitForFunction(() => location.hash.length > 5);
+  await page.waitForTimeout(1500);
+  console.log(`first phone view: ${String(bytes)} bytes`);
+  expect(bytes).toBeGreaterThan(50_000);
+  expect(bytes).toBeLessThan(1_000_000);
+  await page.context().close();
+});
