@@ -30,9 +30,13 @@ def rendering_record(name="tea"):
     return RenderingRecord(name, "town", 0.1, LAYERS, frames, BOX, title="Tea <time>", attribution="© somebody")
 
 
+FIRST_BYTES = {"webp": b"RIFF", "png": b"\x89PNG\r\n\x1a\n"}
+
+
 def tile_bytes(view, layer, tile, salt=""):
-    """Some of them equal, as tiles of plain ground are."""
-    return f"{salt}{view}/{layer}/{tile.z}/{tile.x % 2}/{tile.y}".encode() * (1 + tile.x % 3)
+    """Begin as images do. Some are equal, as tiles of plain ground are."""
+    kind = next(one.format for one in LAYERS if one.name == layer)
+    return FIRST_BYTES[kind] + f"{salt}{view}/{layer}/{tile.z}/{tile.x % 2}/{tile.y}".encode() * (1 + tile.x % 3)
 
 
 def store_shape(record):

@@ -3,17 +3,16 @@
 They stand under /tiles/<rendering>/ and under /view/<rendering>/, whose page reads them as its own folder's, as in a published folder.
 """
 
-import json
 import re
-from collections.abc import Mapping
 from hashlib import sha256
-from typing import Any, Final
+from typing import Final
 
 from flask import Blueprint, Response, current_app, request
 
 from map3d.catalogue import Catalogue, Workspace
 from map3d.errors import NotFound
 from map3d.registry import Registry
+from map3d.tiles.documents import dump_document
 from map3d.tiles.manifest import FILE_NAME
 from map3d.types import check_name
 
@@ -39,14 +38,14 @@ def shard(rendering: str, shard: str) -> Response:
     if not _NUMBER.fullmatch(shard):
         raise NotFound(f"no shard {shard[:64]!r}: shards have plain numbers")
     with registry(rendering) as objects:
-        return json_answer(dump(objects.shard(int(shard))))
+        return json_answer(dump_document(objects.shard(int(shard))))
 
 
 @documents.get("/tiles/<rendering>/objects/search.json")
 @documents.get("/view/<rendering>/objects/search.json")
 def search(rendering: str) -> Response:
     with registry(rendering) as objects:
-        return json_answer(dump(objects.search()))
+        return json_answer(dump_document(objects.search()))
 
 
 def workspace() -> Workspace:
@@ -68,11 +67,6 @@ def registry(rendering: str) -> Registry:
     if not path.is_file():
         raise NotFound(f"the scene of rendering {rendering!r} has no objects yet")
     return Registry(path)
-
-
-def dump(document: Mapping[str, Any]) -> bytes:
-    """Compact JSON."""
-    return (json.dumps(document, ensure_ascii=False, separators=(",", ":"), allow_nan=False) + "\n").encode()
 
 
 def json_answer(data: bytes) -> Response:

@@ -1,0 +1,110 @@
+"""Checks a published folder against itself, and against the workspace it came from if that is at hand."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Final
+
+from map3d.catalogue import Workspace
+from map3d.errors import Corrupt, NotFound, VerifyFailed
+from map3d.publish.archive import Archive
+from map3d.publish.folder import CHECKSUMS
+from map3d.tiles.manifest import FILE_NAME, SEARCH, Manifest, ViewFacts
+from map3d.tiles.occupancy import Occupancy
+from map3d.tiles.sqlite_store import SqliteTileStore
+from map3d.tiles.store import TileStore
+from map3d.tiles.viewer import PAGE
+from map3d.types import Layer, TileId
+
+FIRST_BYTES: Final = {"png": b"\x89PNG\r\n\x1a\n", "jpeg": b"\xff\xd8\xff", "webp": b"RIFF"}
+SHOWN: Final = 10
+
+
+@dataclass(frozen=True)
+class Verified:
+    """Counts of what was found right."""
+
+    files: int
+    archives: int
+    tiles: int
+
+
+def verify_published(folder: Path, workspace: Workspace | None = None) -> Verified:
+    """Raises NotFound, Corrupt (the manifest), VerifyFailed with what is wrong. With `workspace`, every tile is compared with the store's."""
+    try:
+        manifest = Manifest.load((folder / FILE_NAME).read_bytes(), str(folder / FILE_NAME))
+    except FileNotFoundError as error:
+        raise NotFound(f"{folder}: no published rendering there") from error
+    wrong = [f"{name} is missing" for name in (PAGE, SEARCH, CHECKSUMS) if not (folder / name).is_file()]
+    files, bad = _check_sums(folder)
+    wrong += bad
+    archives = tiles = 0
+    for view in manifest.views:
+        for number, layer in enumerate(manifest.layers):
+            found, bad = _check_layer(folder, manifest, view, number, layer, workspace)
+            archives, tiles, wrong = archives + (found > 0), tiles + found, wrong + bad
+    if wrong:
+        more = f", and {len(wrong) - SHOWN} more" if len(wrong) > SHOWN else ""
+        raise VerifyFailed(f"{folder}: {'; '.join(wrong[:SHOWN])}{more}; publish it again")
+    return Verified(files, archives, tiles)
+
+
+def _check_sums(folder: Path) -> tuple[int, list[str]]:
+    path = folder / CHECKSUMS
+    lines = path.read_text().splitlines() if path.is_file() else []
+    wrong = []
+    for line in lines:
+        digest, _, name = line.partition("  ")
+        file = folder / name
+        if not file.is_file():
+            wrong.append(f"{name} is missing")
+        elif _digest(file) != digest:
+            wrong.append(f"{name} has other content than was published")
+    return len(lines) - len(wrong), wrong
+
+
+def _check_layer(folder: Path, manifest: Manifest, view: ViewFacts, number: int, layer: Layer, workspace: Workspace | None) -> tuple[int, list[str]]:
+    name = (view.archives or {}).get(layer.name)
+    if name is None:
+        count = view.occupancy.count()
+        return 0, [f"view {view.frame.id}: no archive of layer {layer.name} for {count} tiles"] if count else []
+    with ExitStack() as opened:
+        store = None
+        if workspace is not None:
+            path = workspace.store_path(manifest.name, view.frame.id)
+            store = opened.enter_context(SqliteTileStore(path, read_only=True))
+        try:
+            archive = Archive(folder / name)
+            wrong = [] if archive.is_of(layer) else [f"{name}: its tiles are not {layer.format}"]
+            seen: set[TileId] = set()
+            wrong += _check_tiles(archive, name, layer, number, store, seen)
+        except Corrupt as error:
+            return 0, [str(error)]
+    return len(seen), wrong + _check_occupancy(name, view.occupancy, seen)
+
+
+def _check_tiles(archive: Archive, name: str, layer: Layer, number: int, store: TileStore | None, seen: set[TileId]) -> Iterator[str]:
+    for tile, data in archive.tiles():
+        seen.add(tile)
+        if not data.startswith(FIRST_BYTES[layer.format]):
+            yield f"{name}: tile {tile.z}/{tile.x}/{tile.y} is not {layer.format}"
+        if store is not None and store.get_tile(number, *tile) != data:
+            yield f"{name}: tile {tile.z}/{tile.x}/{tile.y} is not the store's"
+
+
+def _check_occupancy(name: str, occupancy: Occupancy, seen: set[TileId]) -> list[str]:
+    expected = {tile for z in range(occupancy.zmax + 1) for tile in occupancy.tiles(z)}
+    lost, added = expected - seen, seen - expected
+    return ([f"{name}: {len(lost)} tiles are missing"] if lost else []) + (
+        [f"{name}: {len(added)} tiles that the manifest does not know"] if added else []
+    )
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        digest = sha256()
+        while chunk := file.read(1 << 20):
+            digest.update(chunk)
+    return digest.hexdigest()

@@ -1,0 +1,255 @@
+import json
+import os
+import subprocess
+import sys
+from hashlib import sha256
+
+import httpx
+import pytest
+from pmtiles.reader import MemorySource, Reader, all_tiles
+from pmtiles.tile import Compression, TileType, zxy_to_tileid
+
+from map3d.errors import AlreadyExists, BadRequest, Corrupt, NotFound, Stopped
+from map3d.publish import folder as folder_module
+from map3d.publish import publish, verify_published
+from map3d.registry import Registry
+from map3d.tiles import viewer
+from map3d.tiles.manifest import Manifest
+from map3d.tiles.occupancy import Occupancy
+from map3d.tiles.sqlite_store import SqliteTileStore
+from map3d.types import BlockId
+from tests.publish.hosts import static_host
+from tests.web.workspaces import LAYERS, OCCUPIED, ZMAX, every_tile, put_block, tile_bytes
+
+VIEWS = ("0-45", "45-22.5")
+
+
+def contents(path):
+    return {file.relative_to(path).as_posix(): file.read_bytes() for file in path.rglob("*") if file.is_file()}
+
+
+def tiles_of(path):
+    return {zxy: bytes(data) for zxy, data in all_tiles(MemorySource(path.read_bytes()))}
+
+
+def test_the_folder_is_whole(workspace, out):
+    done = publish(workspace, "tea", out)
+    names = {"rendering.json", "README.txt", "checksums.sha256", "index.html", "assets/worker.js", "objects/0.json", "objects/search.json"}
+    names |= {f"{view}/{layer.name}.pmtiles" for view in VIEWS for layer in LAYERS}
+    assert set(contents(out)) == names
+    assert (done.tiles, done.archives, done.kept) == (len(every_tile()) * 8, 8, 0)
+    assert done.bytes == sum(map(len, contents(out).values()))
+    assert not list(out.parent.glob(".public*"))
+
+
+def test_every_tile_is_byte_identical_to_the_stores(workspace, out):
+    publish(workspace, "tea", out)
+    for view in VIEWS:
+        for layer in LAYERS:
+            assert tiles_of(out / view / f"{layer.name}.pmtiles") == {tuple(tile): tile_bytes(view, layer.name, tile) for tile in every_tile()}
+
+
+def test_tiles_are_in_order_and_equal_ones_stored_once(workspace, out):
+    publish(workspace, "tea", out)
+    path = out / "0-45" / "color.pmtiles"
+    header = Reader(MemorySource(path.read_bytes())).header()
+    assert header["clustered"]
+    assert header["addressed_tiles_count"] == len(every_tile())
+    distinct = {tile_bytes("0-45", "color", tile) for tile in every_tile()}
+    assert header["tile_contents_count"] == len(distinct) < len(every_tile())
+    ordered = sorted(every_tile(), key=lambda tile: zxy_to_tileid(*tile))
+    assert list(tiles_of(path)) == [tuple(tile) for tile in ordered]
+    assert (header["min_zoom"], header["max_zoom"]) == (0, ZMAX)
+
+
+def test_archives_say_what_they_are(workspace, out):
+    publish(workspace, "tea", out)
+    for layer, kind in (("color", TileType.WEBP), ("depth", TileType.PNG)):
+        reader = Reader(MemorySource((out / "0-45" / f"{layer}.pmtiles").read_bytes()))
+        assert (reader.header()["tile_type"], reader.header()["tile_compression"]) == (kind, Compression.NONE)
+        assert reader.metadata()["attribution"] == "© somebody"
+        assert reader.metadata()["map3d"]["layer"] == layer
+
+
+def test_the_manifest_names_the_archives_and_nothing_else_differs(workspace, out):
+    publish(workspace, "tea", out)
+    got, original = (json.loads(path.read_text()) for path in (out / "rendering.json", workspace.manifest_path("tea")))
+    for view in got["views"]:
+        archives = view.pop("archives")
+        assert archives == {layer.name: f"{view['id']}/{layer.name}.pmtiles" for layer in LAYERS}
+    assert got == original
+
+
+def test_objects_are_those_of_the_registry(workspace, out):
+    publish(workspace, "tea", out)
+    with Registry(workspace.registry_path("town")) as registry:
+        assert json.loads((out / "objects" / "0.json").read_text()) == json.loads(json.dumps(registry.shard(0)))
+        assert json.loads((out / "objects" / "search.json").read_text()) == json.loads(json.dumps(registry.search()))
+
+
+def test_a_static_host_with_ranges_is_enough(workspace, out):
+    publish(workspace, "tea", out)
+    with static_host(out) as address, httpx.Client(base_url=address) as client:
+        manifest = Manifest.load(client.get("/rendering.json").content)
+        assert client.get("/").text.startswith("<!doctype html>")
+        for view in manifest.views:
+            for layer, path in view.archives.items():
+                asked = []
+
+                def ranges(offset, length, path=path, asked=asked):
+                    asked.append(length)
+                    answer = client.get(f"/{path}", headers={"Range": f"bytes={offset}-{offset + length - 1}"})
+                    assert answer.status_code == 206
+                    return answer.content
+
+                reader = Reader(ranges)
+                for tile in every_tile()[::5]:
+                    assert reader.get(*tile) == tile_bytes(view.frame.id, layer, tile)
+                assert reader.get(ZMAX, 15, 0) is None
+
+
+def test_the_readme_tells_of_ranges(workspace, out):
+    publish(workspace, "tea", out)
+    text = (out / "README.txt").read_text()
+    assert "range requests" in text
+    assert "http.server" in text
+    assert text.startswith("Tea <time>\n© somebody\n")
+
+
+def test_sha256sum_can_check_a_copy(workspace, out):
+    publish(workspace, "tea", out)
+    for line in (out / "checksums.sha256").read_text().splitlines():
+        digest, name = line.split("  ")
+        assert sha256((out / name).read_bytes()).hexdigest() == digest
+    assert len((out / "checksums.sha256").read_text().splitlines()) == len(contents(out)) - 1
+
+
+def test_publishing_twice_gives_equal_bytes(workspace, out):
+    publish(workspace, "tea", out)
+    publish(workspace, "tea", out.with_name("again"))
+    assert contents(out) == contents(out.with_name("again"))
+
+
+def test_what_is_there_is_replaced_only_when_allowed(workspace, out):
+    publish(workspace, "tea", out)
+    (out / "mark").touch()
+    with pytest.raises(AlreadyExists, match="replacing"):
+        publish(workspace, "tea", out)
+    assert (out / "mark").exists()
+    publish(workspace, "tea", out, replace=True)
+    assert not (out / "mark").exists()
+    assert not list(out.parent.glob(".public*"))
+
+
+def test_a_folder_of_something_else_is_never_replaced(workspace, out):
+    out.mkdir()
+    (out / "thesis.txt").write_text("irreplaceable")
+    with pytest.raises(AlreadyExists, match="no published rendering"):
+        publish(workspace, "tea", out, replace=True)
+    assert contents(out) == {"thesis.txt": b"irreplaceable"}
+
+
+def test_an_empty_folder_may_be_filled(workspace, out):
+    out.mkdir()
+    publish(workspace, "tea", out)
+    assert (out / "index.html").is_file()
+
+
+def test_a_stopped_publishing_goes_on_where_it_stopped(workspace, out):
+    seen = []
+    with pytest.raises(Stopped, match="go on"):
+        publish(workspace, "tea", out, progress=lambda *step: seen.append(step) or len(seen) < 4)
+    assert not out.exists()
+    done = publish(workspace, "tea", out)
+    assert done.kept == 3
+    assert verify_published(out, workspace).archives == 8
+
+
+def test_a_killed_publishing_leaves_nothing_under_its_name(workspace, out, tmp_path, built_viewer):
+    script = (
+        "import os, sys; from pathlib import Path\n"
+        "from map3d.catalogue import Workspace; from map3d.publish import publish; from map3d.tiles import viewer\n"
+        "viewer.files = lambda _: Path(sys.argv[3])\n"
+        "die = lambda stage, done, total: os.kill(os.getpid(), 9) if done > 40 else True\n"
+        "publish(Workspace(Path(sys.argv[1])), 'tea', Path(sys.argv[2]), progress=die)\n"
+    )
+    command = [sys.executable, "-c", script, str(workspace.root), str(out), str(built_viewer.parent)]
+    assert subprocess.run(command, check=False, env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}).returncode == -9
+    assert not out.exists()
+    publish(workspace, "tea", out)
+    reference = out.with_name("reference")
+    publish(workspace, "tea", reference)
+    assert contents(out) == contents(reference)
+
+
+def test_archives_of_other_tiles_are_not_taken_up(workspace, out):
+    with pytest.raises(Stopped):
+        publish(workspace, "tea", out, progress=lambda stage, done, total: done < total / 2)
+    with SqliteTileStore(workspace.store_path("tea", "0-45")) as store:
+        put_block(store, "0-45", BlockId(1, 0, 0), Occupancy.from_tiles(ZMAX, OCCUPIED), version=2, salt="new")
+    done = publish(workspace, "tea", out)
+    assert done.kept == 0
+    verify_published(out, workspace)
+
+
+def test_damaged_archives_are_not_taken_up(workspace, out):
+    with pytest.raises(Stopped):
+        publish(workspace, "tea", out, progress=lambda stage, done, total: done < total / 2)
+    draft = out.with_name(".public.publishing")
+    for path in sorted(draft.rglob("*.pmtiles")):
+        os.truncate(path, path.stat().st_size - 5)
+    assert publish(workspace, "tea", out).kept == 0
+    verify_published(out, workspace)
+
+
+def test_tiles_that_change_meanwhile_are_noticed(workspace, out):
+    def render_on(*_):
+        with SqliteTileStore(workspace.store_path("tea", "0-45")) as store:
+            put_block(store, "0-45", BlockId(1, 0, 0), Occupancy.from_tiles(ZMAX, OCCUPIED), version=2, salt="new")
+        return True
+
+    with pytest.raises(Corrupt, match="changed"):
+        publish(workspace, "tea", out, progress=render_on)
+    assert not out.exists()
+
+
+def test_an_incomplete_rendering_must_be_allowed(workspace, out):
+    path = workspace.manifest_path("tea")
+    path.write_text(path.read_text().replace('"complete": true', '"complete": false'))
+    with pytest.raises(BadRequest, match="map3d render"):
+        publish(workspace, "tea", out)
+    publish(workspace, "tea", out, allow_incomplete=True)
+
+
+def test_an_empty_layer_has_no_archive(workspace, out):
+    with SqliteTileStore(workspace.store_path("tea", "0-45")) as store:
+        for block in store.list_blocks():
+            store.put_block(block.id, "empty", 2, [], None)
+    value = json.loads(workspace.manifest_path("tea").read_text())
+    value["views"][0]["occupancy"] = "AA=="
+    workspace.manifest_path("tea").write_text(json.dumps(value))
+    done = publish(workspace, "tea", out)
+    assert done.archives == 4
+    assert json.loads((out / "rendering.json").read_text())["views"][0]["archives"] == {}
+    verify_published(out, workspace)
+
+
+def test_what_is_not_there_cannot_be_published(workspace, out):
+    with pytest.raises(NotFound):
+        publish(workspace, "none", out)
+
+
+def test_without_the_viewer_nothing_is_begun(workspace, out, tmp_path, monkeypatch):
+    monkeypatch.setattr(viewer, "files", lambda _: tmp_path / "nowhere")
+    with pytest.raises(viewer.ViewerMissing, match="make build"):
+        publish(workspace, "tea", out)
+    assert not list(out.parent.glob(".public*"))
+
+
+def test_progress_counts_every_tile(workspace, out, monkeypatch):
+    monkeypatch.setattr(folder_module, "verify_published", None, raising=False)
+    seen = []
+    publish(workspace, "tea", out, progress=lambda *step: seen.append(step) or True)
+    total = len(every_tile()) * 8
+    assert [step[1] for step in seen] == sorted(step[1] for step in seen)
+    assert seen[-1] == ("publish", total, total)
