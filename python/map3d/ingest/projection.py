@@ -1,6 +1,7 @@
 """From a source's coordinates to the scene's: exact where they are the same system, and honest where they are not."""
 
 import math
+import warnings
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -45,7 +46,8 @@ class Projection:
         self._same = self._flat_source.equals(flat_target, ignore_axis_order=True)
         self._zone_m = _ZONE_PREFIXED.get(self._flat_source.to_epsg() or 0, 0) * 1e6
         self._prefixed = 0
-        self._transformer = None if self._same else _best(self._flat_source, flat_target)
+        self._ways = None if self._same else _best(self._flat_source, flat_target)
+        self._transformer = None if self._ways is None else self._ways.transformers[0]
         self._heights = _height_transformer(source, target)
         self._facts: dict[str, Any] = {
             "from": str(source.name),
@@ -99,15 +101,17 @@ class Projection:
         return out
 
     def _describe(self) -> dict[str, Any]:
-        if self._transformer is None:
+        if self._transformer is None or self._ways is None:
             return {"operation": "none: the same system", "accuracy_m": 0.0, "ballpark": False}
         accuracy = self._transformer.accuracy
-        ballpark = "ballpark" in self._transformer.description.lower()
-        return {
+        facts = {
             "operation": self._transformer.description,
             "accuracy_m": accuracy if accuracy is not None and accuracy >= 0 else None,
-            "ballpark": ballpark,
+            "ballpark": "ballpark" in self._transformer.description.lower(),
         }
+        if not self._ways.best_available and self._ways.unavailable_operations:
+            facts["better_but_not_installed"] = self._ways.unavailable_operations[0].name
+        return facts
 
     def _describe_heights(self, source: CRS, target: CRS) -> str:
         have, want = vertical_name(source), vertical_name(target)
@@ -139,15 +143,16 @@ def _utm(flat: CRS, lon: float, lat: float) -> CRS:
     place = AreaOfInterest(lon, lat, lon, lat)
     datum = flat.geodetic_crs.name if flat.geodetic_crs is not None else None
     found = query_utm_crs_info(datum_name=datum, area_of_interest=place) or query_utm_crs_info(datum_name="WGS 84", area_of_interest=place)
-    return CRS.from_epsg(int(min(found, key=lambda info: int(info.code)).code))
+    plain = [info for info in found if info.name.startswith(f"{datum} / UTM zone") and not info.name.endswith(")")] or found
+    return CRS.from_epsg(int(min(plain, key=lambda info: int(info.code)).code))
 
 
-def _best(source: CRS, target: CRS) -> Transformer:
-    """The most exact one that is installed; a ballpark one only where there is no other."""
+def _best(source: CRS, target: CRS) -> TransformerGroup:
+    """Its first transformer is the most exact one that is installed; a ballpark one only where there is no other."""
     for ballpark in (False, True):
-        group = TransformerGroup(source, target, always_xy=True, allow_ballpark=ballpark)
+        group = _group(source, target, ballpark)
         if group.transformers:
-            return group.transformers[0]
+            return group
     raise CrsError(f"no way from {source.name} to {target.name} is known; name another system with --crs")
 
 
@@ -155,8 +160,15 @@ def _height_transformer(source: CRS, target: CRS) -> Transformer | None:
     have, want = vertical(source), vertical(target)
     if have is None or want is None or have.equals(want):
         return None
-    group = TransformerGroup(source, target, always_xy=True, allow_ballpark=False)
+    group = _group(source, target, False)
     return group.transformers[0] if group.transformers else None
+
+
+def _group(source: CRS, target: CRS, ballpark: bool) -> TransformerGroup:
+    """Without the warning that a better way is not installed: the import's report says it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        return TransformerGroup(source, target, always_xy=True, allow_ballpark=ballpark)
 
 
 def _turn(north: Points) -> NDArray[np.float64]:

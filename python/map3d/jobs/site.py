@@ -48,7 +48,7 @@ class Added:
 
 
 def add_changed(workspace: Workspace, catalogue: Catalogue, request: SiteRequest, tell: Callable[[str, int, int], None]) -> Added:
-    """Makes the scene if need be and imports what is new or has changed; a broken file costs itself alone. Raises BadRequest when none can be used."""
+    """Makes the scene if need be and imports what is new or has changed; a broken file costs itself alone. Raises BadRequest when none is usable."""
     if not any(scene.name == request.name for scene in catalogue.scenes()):
         catalogue.create_scene(SceneRecord(request.name, request.title, request.attribution))
     have = {asset.name: asset.source_digest for asset in catalogue.assets(request.name)}

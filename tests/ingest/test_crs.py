@@ -1,0 +1,71 @@
+"""Names of coordinate systems."""
+
+import pytest
+
+from map3d.errors import CrsError
+from map3d.ingest.crs import horizontal, parse_crs, scene_crs, vertical, vertical_name
+
+
+@pytest.mark.parametrize(
+    ("name", "flat", "height"),
+    [
+        ("EPSG:25832", 25832, None),
+        ("epsg:25832", 25832, None),
+        ("urn:ogc:def:crs:EPSG::25832", 25832, None),
+        ("urn:ogc:def:crs:EPSG:6.12:31256", 31256, None),
+        ("http://www.opengis.net/def/crs/EPSG/0/3068", 3068, None),
+        ("http://www.opengis.net/gml/srs/epsg.xml#31467", 31467, None),
+        ("urn:ogc:def:crs,crs:EPSG::25832,crs:EPSG::5783", 25832, 5783),
+        ("urn:ogc:def:crs,crs:EPSG:6.12:31256,crs:EPSG:6.12:5778", 31256, 5778),
+        ("EPSG:25832+5783", 25832, 5783),
+        ("EPSG::25832*EPSG::5783", 25832, 5783),
+        (
+            "http://www.opengis.net/def/crs-compound?1=http://www.opengis.net/def/crs/EPSG/0/25833&2=http://www.opengis.net/def/crs/EPSG/0/7837",
+            25833,
+            7837,
+        ),
+        ("urn:adv:crs:ETRS89_UTM32", 25832, None),
+        ("urn:adv:crs:ETRS89_UTM32*DE_DHHN2016_NH", 25832, 7837),
+        ("urn:adv:crs:ETRS89_UTM33*DE_DHHN92_NH", 25833, 5783),
+        ("urn:adv:crs:DE_DHDN_3GK4*DE_DHHN92_NH", 31468, 5783),
+        ("urn:adv:crs:DHDN_3GK4", 31468, None),
+        ("EPSG:5555", 25832, 5783),
+        ("EPSG:7415", 28992, 5709),
+        ("EPSG:6697", 6668, 6695),
+        (" EPSG:4326 ", 4326, None),
+    ],
+)
+def test_names_mean_what_they_say(name: str, flat: int, height: int | None) -> None:
+    crs = parse_crs(name)
+    above = vertical(crs)
+    assert horizontal(crs).to_epsg() == flat
+    assert (None if above is None else above.to_epsg()) == height
+
+
+@pytest.mark.parametrize(
+    "name", ["", "nonsense", "EPSG:999999", "urn:adv:crs:ETRS89_UTM99", "urn:adv:crs:ETRS89_UTM32*DE_WHAT", "EPSG:25832+nothing", "unknown"]
+)
+def test_unknown_names_say_what_to_do(name: str) -> None:
+    with pytest.raises(CrsError, match="--crs"):
+        parse_crs(name)
+
+
+def test_a_scene_takes_projected_metres_only() -> None:
+    found = scene_crs(parse_crs("urn:adv:crs:ETRS89_UTM32*DE_DHHN2016_NH"))
+    assert (found.epsg, found.name, found.vertical) == (25832, "ETRS89 / UTM zone 32N", "DHHN2016 height")
+    assert found.wkt is not None
+    assert not found.is_local
+    for name in ("EPSG:4326", "EPSG:4979", "EPSG:2263"):
+        with pytest.raises(CrsError, match="projected coordinate system in metres"):
+            scene_crs(parse_crs(name))
+
+
+def test_heights_above_an_ellipsoid_have_a_name() -> None:
+    assert vertical_name(parse_crs("EPSG:4979")) == "ellipsoidal height (WGS 84)"
+    assert vertical_name(parse_crs("EPSG:25832")) is None
+
+
+def test_a_scenes_system_survives_being_written_down() -> None:
+    first = scene_crs(parse_crs("EPSG:25832+7837"))
+    assert first.wkt is not None
+    assert scene_crs(parse_crs(first.wkt)) == first

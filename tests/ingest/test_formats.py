@@ -1,0 +1,59 @@
+"""Formats are told by content."""
+
+from pathlib import Path
+
+import pytest
+
+from map3d.errors import NotFound, UnknownFormat
+from map3d.ingest.formats import detect_format
+
+CITY = '<?xml version="1.0"?>\n<!-- a <b> comment -->\n<core:CityModel xmlns:core="http://www.opengis.net/citygml/2.0"/>'
+OBJ = "# made by hand\nmtllib a.mtl\no thing\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "format"),
+    [
+        ("a.gml", CITY.encode(), "citygml"),
+        ("a.weird", CITY.encode(), "citygml"),
+        ("bom.xml", b"\xef\xbb\xbf" + CITY.encode(), "citygml"),
+        ("utf16.xml", b"\xff\xfe" + CITY.encode("utf-16-le"), "citygml"),
+        ("space.xml", b"  \n" + CITY.encode(), "citygml"),
+        ("a.obj", OBJ.encode(), "obj"),
+        ("a.txt", OBJ.encode(), "obj"),
+        ("dos.obj", OBJ.replace("\n", "\r\n").encode(), "obj"),
+        ("a.tif", b"II*\0rest", "raster"),
+        ("big.tif", b"MM\0+rest", "raster"),
+    ],
+)
+def test_formats_are_told_by_content(tmp_path: Path, name: str, content: bytes, format: str) -> None:
+    path = tmp_path / name
+    path.write_bytes(content)
+    assert detect_format(path) == format
+
+
+@pytest.mark.parametrize(
+    ("content", "is_what"),
+    [
+        (b"", "an empty file"),
+        (b"glTF\2\0\0\0", "glTF"),
+        (b'{"type": "CityJSON"}', "JSON"),
+        (b"<html><body/></html>", "XML with the root html"),
+        (b"<!-- only a comment -->", "XML without a root"),
+        (b"PK\3\4", "ZIP"),
+        (b"just some words\nand more\n", "unknown type"),
+        (b"v 0 0 0\0\0\0", "unknown type"),
+    ],
+)
+def test_what_is_not_known_is_refused_naming_what_is(tmp_path: Path, content: bytes, is_what: str) -> None:
+    path = tmp_path / "a.gml"
+    path.write_bytes(content)
+    with pytest.raises(UnknownFormat, match="map3d reads CityGML") as refused:
+        detect_format(path)
+    assert is_what in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_file_that_cannot_be_read_is_not_found(tmp_path: Path) -> None:
+    with pytest.raises(NotFound):
+        detect_format(tmp_path / "nothing")

@@ -1,0 +1,69 @@
+"""Which files are asked for, and what their assets are called."""
+
+from pathlib import Path
+
+import pytest
+
+from map3d.errors import NotFound, UnknownFormat
+from map3d.ingest.sources import asset_name, find_sources, source_digest
+
+OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+
+
+def fill(folder: Path) -> Path:
+    for name in ("b.obj", "a/b.obj", "a/B.obj", "c d.obj"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(OBJ)
+    (folder / "b.mtl").write_text("newmtl x\n")
+    (folder / "notes.odt").write_text("nothing to read")
+    (folder / ".hidden.obj").write_text(OBJ)
+    for name in ("terrain/dem.tif", "terrain/ortho.tif"):
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_bytes(b"II*\0")
+    return folder
+
+
+def test_a_folder_gives_every_file_that_can_be_read_once_in_order(tmp_path: Path) -> None:
+    found = find_sources([fill(tmp_path)])
+    assert [(source.name, source.format) for source in found] == [("b", "obj"), ("b-2", "obj"), ("b-3", "obj"), ("c-d", "obj"), ("terrain", "raster")]
+    assert [path.name for path in found[-1].paths] == ["dem.tif", "ortho.tif"]
+    assert find_sources([tmp_path]) == found
+
+
+def test_a_folder_without_anything_to_read_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("v 1 2 3")
+    with pytest.raises(UnknownFormat, match="no file in it"):
+        find_sources([tmp_path])
+
+
+def test_a_named_file_of_unknown_type_is_refused_even_beside_others(tmp_path: Path) -> None:
+    fill(tmp_path)
+    with pytest.raises(UnknownFormat, match=r"notes\.odt"):
+        find_sources([tmp_path / "b.obj", tmp_path / "notes.odt"])
+    with pytest.raises(NotFound):
+        find_sources([tmp_path / "nothing.obj"])
+
+
+def test_a_given_name_is_used(tmp_path: Path) -> None:
+    assert [source.name for source in find_sources([fill(tmp_path) / "b.obj"], "Mein Haus")] == ["mein-haus"]
+
+
+@pytest.mark.parametrize(
+    ("text", "name"), [("LoD2_32_691", "lod2_32_691"), ("Käse & Brot.v2", "k-se-brot-v2"), ("--", "asset"), ("a" * 99, "a" * 64), ("_x", "x")]
+)
+def test_names_are_made_of_what_names_may_have(text: str, name: str) -> None:
+    assert asset_name(text) == name
+
+
+def test_the_digest_follows_document_and_materials(tmp_path: Path) -> None:
+    path = tmp_path / "a.obj"
+    path.write_text("mtllib other.mtl\n" + OBJ)
+    (source,) = find_sources([path])
+    seen = {source_digest(source)}
+    (tmp_path / "other.mtl").write_text("newmtl x\n")
+    seen.add(source_digest(source))
+    (tmp_path / "unrelated.obj").write_text(OBJ)
+    assert source_digest(source) in seen
+    path.write_text("mtllib other.mtl\n" + OBJ + "f 3 2 1\n")
+    seen.add(source_digest(source))
+    assert len(seen) == 3
