@@ -6,14 +6,14 @@ from pathlib import Path
 
 from map3d.catalogue import Catalogue, RenderingRecord, SceneRecord, State, Workspace
 from map3d.catalogue.records import LOCAL_CRS_NAME
+from map3d.errors import BadRequest
 from map3d.geometry.frames import PinnedFrame
 from map3d.registry import Registry
-from map3d.render.build import scene_origin
 from map3d.tiles.manifest import CrsFacts, Manifest, ViewFacts
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.store import TileStore
-from map3d.types import Box
+from map3d.types import Box, Vec3
 
 Planned = Mapping[str, Occupancy]
 """View → tiles of level zmax that open base blocks may yet fill."""
@@ -41,7 +41,7 @@ def current_manifest(workspace: Workspace, catalogue: Catalogue, record: Renderi
         content_version=record.content_version,
         complete=counts[State.DONE] == sum(counts.values()) > 0,
         crs=_crs(scene),
-        origin=scene_origin(scene),
+        origin=_origin(scene),
         box=box,
         layers=record.layers,
         views=tuple(_view(workspace, record, frame, planned.get(frame.id)) for frame in record.frames),
@@ -69,6 +69,13 @@ def _view(workspace: Workspace, record: RenderingRecord, frame: PinnedFrame, pla
 def _crs(scene: SceneRecord) -> CrsFacts:
     crs = scene.crs
     return CrsFacts(LOCAL_CRS_NAME) if crs is None else CrsFacts(crs.name, crs.epsg, crs.wkt, crs.vertical)
+
+
+def _origin(record: SceneRecord) -> Vec3:
+    """Raises BadRequest while nothing was imported."""
+    if record.origin is None:
+        raise BadRequest(f"scene {record.name} has no files yet; add some with map3d add-files {record.name} FILE…")
+    return record.origin
 
 
 def _write(path: Path, data: bytes) -> None:

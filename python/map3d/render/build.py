@@ -10,7 +10,7 @@ from map3d.catalogue import Catalogue, SceneRecord, Workspace
 from map3d.errors import BadRequest
 from map3d.ingest.lock import scene_lock
 from map3d.registry import Registry
-from map3d.types import Box, Vec3
+from map3d.types import Box
 
 BuildProgress = Callable[[str, int, int], bool]
 """(stage, done, total) → False to stop."""
@@ -69,13 +69,6 @@ def fingerprint(catalogue: Catalogue, record: SceneRecord) -> str:
 def open_scene(workspace: Workspace, scene: str, cache_bytes: int = 64 << 20) -> _core.Scene:
     """The built scene, for planning and checking."""
     return _core.Scene(str(workspace.scene_folder(scene)), cache_bytes=cache_bytes)
-
-
-def scene_origin(record: SceneRecord) -> Vec3:
-    """Raises BadRequest while nothing was imported."""
-    if record.origin is None:
-        raise BadRequest(f"scene {record.name} has no files yet; add some with map3d add-files {record.name} FILE…")
-    return record.origin
 
 
 def _ground_box(report: Mapping[str, Any]) -> Box | None:

@@ -1,0 +1,34 @@
+"""A scene for planning: cubes in the plane, whose keys are made of what meets a block."""
+
+import hashlib
+import json
+
+import numpy as np
+
+from map3d.catalogue import RenderingRecord
+from map3d.geometry.frames import pin
+from map3d.types import Box, Layer, ViewAngles
+
+LAYERS = (Layer("color", "color", "webp", 80), Layer("id", "id", "png"))
+
+
+class SquareScene:
+    """Content: points (u, v) as shares of the view's square, each with a name that the keys depend on."""
+
+    def __init__(self, content: dict[tuple[float, float], str], box: Box = ((0.0, 0.0, 0.0), (100.0, 100.0, 10.0))) -> None:
+        self.content, self.box = content, box
+
+    def occupied(self, frame: str, level: int) -> np.ndarray:
+        grid = np.zeros((2**level, 2**level), bool)
+        for u, v in self.content:
+            grid[int(v * 2**level), int(u * 2**level)] = True
+        return grid
+
+    def block_key(self, frame: str, z: int, x: int, y: int) -> str:
+        mine = [name for (u, v), name in sorted(self.content.items()) if (int(u * 2**z), int(v * 2**z)) == (x, y)]
+        return hashlib.sha256(json.dumps([frame, z, x, y, mine]).encode()).hexdigest()[:16]
+
+
+def rendering(res_m: float = 0.02, views: tuple[ViewAngles, ...] = (ViewAngles(0, 45), ViewAngles(90, 45))) -> RenderingRecord:
+    box: Box = ((0.0, 0.0, 0.0), (100.0, 100.0, 10.0))
+    return RenderingRecord("r", "town", res_m, LAYERS, tuple(pin(box, 256, res_m, views)), box)

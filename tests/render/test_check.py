@@ -1,0 +1,94 @@
+"""What is checked of a block before it is committed, and of tiles when all is counted again."""
+
+import io
+
+import numpy as np
+import pytest
+import xxhash
+from PIL import Image
+
+from map3d.errors import Corrupt
+from map3d.render.check import check_rendered
+from map3d.render.decode import check_seam, decode_tile, ids_of
+from map3d.tiles.store import StoredTile, StoreShape
+from map3d.types import BlockId, Layer
+
+LAYERS = (Layer("color", "color", "webp", 80), Layer("id", "id", "png"))
+SHAPE = StoreShape(256, 4, LAYERS)
+BLOCK = BlockId(1, 1, 0)
+GOOD = [StoredTile(layer, *tile, b"x") for tile in ((1, 1, 0), (2, 3, 1), (3, 7, 3)) for layer in (0, 1)]
+
+
+def test_a_whole_block_and_an_empty_one_pass() -> None:
+    check_rendered(SHAPE, BLOCK, GOOD, b"seam")
+    check_rendered(SHAPE, BLOCK, [], None)
+
+
+@pytest.mark.parametrize(
+    ("tiles", "seam", "says"),
+    [
+        (GOOD[:-1], b"s", "has layers"),
+        (GOOD[2:], b"s", "its parent is not"),
+        (GOOD[:2] + GOOD[4:], b"s", "its parent is not"),
+        ([*GOOD, StoredTile(0, 1, 0, 0, b"x"), StoredTile(1, 1, 0, 0, b"x")], b"s", "not one of its own"),
+        ([*GOOD, StoredTile(0, 4, 15, 7, b"")], b"s", "no bytes"),
+        (GOOD, None, "no seam"),
+        ([], b"s", "a seam"),
+    ],
+)
+def test_a_block_that_cannot_be_is_refused(tiles: list[StoredTile], seam: bytes | None, says: str) -> None:
+    with pytest.raises(Corrupt, match=says):
+        check_rendered(SHAPE, BLOCK, tiles, seam)
+
+
+def image(mode: str, size: int, format: str) -> bytes:
+    out = io.BytesIO()
+    Image.new(mode, (size, size)).save(out, format)
+    return out.getvalue()
+
+
+def test_tiles_decode_to_their_size() -> None:
+    assert decode_tile(LAYERS[0], image("RGBA", 256, "WEBP"), 256).shape[:2] == (256, 256)
+    assert decode_tile(LAYERS[1], image("RGBA", 256, "PNG"), 256).shape == (256, 256, 4)
+
+
+@pytest.mark.parametrize(
+    ("layer", "data"),
+    [
+        (LAYERS[0], b""),
+        (LAYERS[0], b"RIFF\0\0\0\0WEBP"),
+        (LAYERS[0], image("RGBA", 256, "PNG")),
+        (LAYERS[1], image("RGBA", 128, "PNG")),
+        (LAYERS[1], image("RGB", 256, "PNG")),
+        (LAYERS[1], image("RGBA", 256, "PNG")[:-40]),
+    ],
+)
+def test_other_bytes_are_corrupt(layer: Layer, data: bytes) -> None:
+    with pytest.raises(Corrupt):
+        decode_tile(layer, data, 256)
+
+
+def test_ids_are_little_endian_and_nothing_is_left_out() -> None:
+    pixels = np.zeros((2, 2, 4), np.uint8)
+    pixels[0, 0] = (4, 3, 2, 1)
+    pixels[0, 1] = (7, 0, 0, 0)
+    assert ids_of(pixels).tolist() == [7, 0x01020304]
+
+
+def seam(size: int = 256) -> bytes:
+    body = b"M3DG" + b"".join(value.to_bytes(4, "little") for value in (1, size, size))
+    body += b"".join(len(part).to_bytes(4, "little") + part for part in (b"color", b"normal", b"id", b"depth"))
+    return body + xxhash.xxh3_64_intdigest(body).to_bytes(8, "little")
+
+
+def test_a_whole_seam_passes_and_any_change_does_not() -> None:
+    good = seam()
+    check_seam(good, 256)
+    for at in range(0, len(good), 7):
+        changed = bytearray(good)
+        changed[at] ^= 1
+        with pytest.raises(Corrupt):
+            check_seam(bytes(changed), 256)
+    for broken in (b"", good[:-1], good + b"x", seam(512)):
+        with pytest.raises(Corrupt):
+            check_seam(broken, 256)
