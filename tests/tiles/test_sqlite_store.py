@@ -41,6 +41,7 @@ def rows(path, query):
 
 def test_the_file_is_durable_and_concurrent(path, store):
     assert rows(path, "PRAGMA journal_mode") == [("wal",)]
+    assert rows(path, "PRAGMA page_size") == [(16384,)]
     assert store._connection().execute("PRAGMA synchronous").fetchone() == (2,)
 
 

@@ -1,6 +1,7 @@
 """Names of tiles and blocks (spec/pyramid.md §3 and §8): parents, children, Morton order, which block holds a tile."""
 
 from collections.abc import Iterable, Iterator
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 from map3d.errors import BadRequest
@@ -68,7 +69,8 @@ def in_morton_order(tiles: Iterable[TileId]) -> list[TileId]:
     return sorted(tiles, key=lambda tile: (tile.z, morton(tile.x, tile.y)))
 
 
-def block_levels(zmax: int) -> list[BlockLevel]:
+@lru_cache(maxsize=64)
+def block_levels(zmax: int) -> tuple[BlockLevel, ...]:
     """Deepest first: the base blocks, then the reduce blocks up to the one rooted at level 0."""
     root = max(zmax - BLOCK_LEVELS, 0)
     levels = [BlockLevel(root, zmax - root + 1, "base")]
@@ -76,7 +78,7 @@ def block_levels(zmax: int) -> list[BlockLevel]:
         above = max(root - BLOCK_LEVELS, 0)
         levels.append(BlockLevel(above, root - above, "reduce"))
         root = above
-    return levels
+    return tuple(levels)
 
 
 def block_level(root: int, zmax: int) -> BlockLevel:

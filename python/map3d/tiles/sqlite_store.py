@@ -17,6 +17,9 @@ from map3d.types import BlockId, Layer, TileId
 
 BUSY_TIMEOUT_S: Final = 60.0
 APPLICATION_ID: Final = 0x4D334454  # "M3DT"
+PAGE_BYTES: Final = 16_384
+CHECKPOINT_PAGES: Final = 2_000
+CACHE_KIB: Final = 16_384
 
 _SCHEMA: Final = """
 CREATE TABLE blob(hash BLOB PRIMARY KEY, bytes BLOB NOT NULL);
@@ -216,6 +219,9 @@ def _connect(path: Path, read_only: bool) -> sqlite3.Connection:
     quoted = path.absolute().as_uri()
     connection = sqlite3.connect(f"{quoted}?mode={mode}", uri=True, timeout=BUSY_TIMEOUT_S, isolation_level=None, check_same_thread=False)
     connection.execute("PRAGMA synchronous = FULL")
+    if not read_only:
+        connection.execute(f"PRAGMA wal_autocheckpoint = {CHECKPOINT_PAGES}")
+        connection.execute(f"PRAGMA cache_size = -{CACHE_KIB}")
     return connection
 
 
@@ -225,8 +231,8 @@ def _write_empty(path: Path, shape: StoreShape) -> None:
     meta = {"version": FORMAT_VERSION, "tile_px": shape.tile_px, "zmax": shape.zmax, "layers": json.dumps(layers)}
     connection = sqlite3.connect(path, isolation_level=None)
     try:
+        connection.execute(f"PRAGMA page_size = {PAGE_BYTES}")
         connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
-        connection.execute("PRAGMA page_size = 8192")
         connection.execute("PRAGMA journal_mode = WAL")
         connection.execute("PRAGMA synchronous = FULL")
         connection.executescript(f"BEGIN; {_SCHEMA} COMMIT;")

@@ -84,7 +84,7 @@ class TileStore(Protocol):
 
 def content_hash(data: bytes) -> bytes:
     """16 bytes; equal for equal tiles. Also the ETag of a served tile."""
-    return hashlib.sha256(data).digest()[:HASH_BYTES]
+    return hashlib.blake2b(data, digest_size=HASH_BYTES).digest()
 
 
 def check_block(shape: StoreShape, block: BlockId, version: int, tiles: Sequence[StoredTile]) -> None:
