@@ -1,6 +1,6 @@
 """What fills the blocks of the town: perimeter blocks, rows, detached houses, slabs, halls, parks."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,9 +41,11 @@ class Manner:
     gable_fronts: float
     mansards: float
     ground: str
+    covers: tuple[str, ...] = ("tiles", "tiles", "tiles", "tiles", "tiles", "dark")
+    pitch_deg: tuple[float, float] = (30, 40)
 
 
-OLD = Manner(9.5, (2, 4), 2.95, (6.0, 10.5), ("house", "house", "house", "timber"), 0.28, 0.12, "yard")
+OLD = Manner(9.5, (2, 4), 2.95, (7.0, 12.5), ("house", "house", "house", "timber"), 0.28, 0.12, "yard", pitch_deg=(40, 52))
 GRUENDER = Manner(11.5, (4, 5), 3.35, (11.0, 17.0), ("gruender",), 0.0, 0.45, "garden")
 
 
@@ -52,8 +54,8 @@ def fill_perimeter(sketch: Sketch, block: Block, manner: Manner) -> bool:
     outline, depth = block.outline, manner.depth_m
     inner = offset(outline, depth)
     if not keeps_its_edges(outline, inner, 4.0) or area(inner) < 60:
-        return False
-    sketch.patch(outline, "yard", "block")
+        return depth > 7.0 and fill_perimeter(sketch, block, replace(manner, depth_m=depth - 1.5))
+    sketch.patch(outline, "lawn", "block")
     sketch.patch(inner, manner.ground, "parcel")
     n = len(outline)
     spans = [_edge_spans(block, inner, i, manner) for i in range(n)]
@@ -100,7 +102,7 @@ def _manner_part(manner: Manner, rng: np.random.Generator, extra: int = 0) -> Pa
     """Storeys, look and cover of one house."""
     storeys = int(rng.integers(manner.storeys[0], manner.storeys[1] + 1)) + extra
     look = manner.looks[int(rng.integers(len(manner.looks)))]
-    cover = "tiles" if rng.random() < 0.85 else "dark"
+    cover = manner.covers[int(rng.integers(len(manner.covers)))]
     eave = storeys * manner.storey_m + float(rng.uniform(0.2, 1.0))
     return blank_part(eave, storeys, look, cover, overhang_m=float(rng.uniform(0.3, 0.5)))
 
@@ -108,7 +110,7 @@ def _manner_part(manner: Manner, rng: np.random.Generator, extra: int = 0) -> Pa
 def _roof_over(depth_m: float, manner: Manner, rng: np.random.Generator) -> tuple[tuple[tuple[float, float], ...], str]:
     if rng.random() < manner.mansards:
         return mansard(depth_m), MANSARD
-    return gable(depth_m, float(rng.uniform(40, 52) if manner is OLD else rng.uniform(30, 40))), "1030"
+    return gable(depth_m, float(rng.uniform(*manner.pitch_deg))), "1030"
 
 
 def _row_house(sketch: Sketch, block: Block, a: Points, b: Points, manner: Manner, street: str, number: int) -> None:
@@ -119,21 +121,13 @@ def _row_house(sketch: Sketch, block: Block, a: Points, b: Points, manner: Manne
         made = gable_front_part(a, b, manner.depth_m, profile, part, ("party", "party", "street", "yard"))
     else:
         profile, kind = _roof_over(manner.depth_m, manner, rng)
-        made = row_part(a, b, manner.depth_m, profile, _typed(part, kind), ("street", "yard", "party", "party"))
-    kind = "gruender" if manner is GRUENDER else "house"
+        made = row_part(a, b, manner.depth_m, profile, replace(part, roof_type=kind), ("street", "yard", "party", "party"))
+    kind = "gruender" if manner.looks == GRUENDER.looks else "house"
     sketch.lot(kind, COMMERCIAL if rng.random() < 0.3 else RESIDENTIAL, [made], street, number)
-
-
-def _typed(part: Part, roof_type: str) -> Part:
-    from dataclasses import replace
-
-    return replace(part, roof_type=roof_type)
 
 
 def _corner_house(sketch: Sketch, block: Block, inner: Points, i: int, spans: list[tuple[float, float]], manner: Manner) -> None:
     """A house around corner i, as deep as its neighbours on both streets."""
-    from dataclasses import replace
-
     outline, n = block.outline, len(block.outline)
     corner = outline[i]
     (before, _), (_, after) = block.edge((i - 1) % n), block.edge(i)
@@ -146,7 +140,7 @@ def _corner_house(sketch: Sketch, block: Block, inner: Points, i: int, spans: li
     sides = ("street", "street", "yard", "yard", "party", "party")
     made = replace(part, front=front, back=back, profile=profile, sides=sides, roof_type=kind)
     function = COMMERCIAL if block.rng.random() < 0.6 else RESIDENTIAL
-    sketch.lot("gruender" if manner is GRUENDER else "house", function, [made], block.street(i), 2)
+    sketch.lot("gruender" if manner.looks == GRUENDER.looks else "house", function, [made], block.street(i), 2)
 
 
 def _courtyard(sketch: Sketch, block: Block, inner: Points) -> None:
@@ -254,8 +248,6 @@ def _garage(sketch: Sketch, parcel: Points, ground: Points, along: Points, setba
 
 def villa_part(ground: Points, rng: np.random.Generator) -> Part:
     """A house under a gabled, half-hipped, hipped, mansard or flat roof."""
-    from dataclasses import replace
-
     storeys = int(rng.integers(1, 3))
     part = blank_part(storeys * 2.9 + 0.5, storeys, "villa", "tiles" if rng.random() < 0.7 else "dark", overhang_m=0.5)
     choice, width = rng.random(), float(np.hypot(*(ground[3] - ground[0])))
@@ -343,7 +335,7 @@ def fill_industry(sketch: Sketch, block: Block) -> None:
             part = blank_part(7.0, 1, "industrial", "metal")
             profile = saw_teeth(int(size / 7), 2.4) if rng.random() < 0.55 else gable(size * 0.62, 9.0)
             kind = "1080" if len(profile) > 3 else "1030"
-            made = row_part(ground[0], ground[1], size * 0.62, profile, _typed(part, kind), ("street", "yard", "yard", "yard"))
+            made = row_part(ground[0], ground[1], size * 0.62, profile, replace(part, roof_type=kind), ("street", "yard", "yard", "yard"))
             sketch.lot("industrial", INDUSTRIAL, [made], block.street(0), int(rng.integers(1, 20)))
             break
     for corner in range(len(outline)):
@@ -353,20 +345,3 @@ def fill_industry(sketch: Sketch, block: Block) -> None:
             part = blank_part(9.4, 3, "slab", "flat")
             sketch.lot("office", COMMERCIAL, [flat_part(office, part)], block.street(0), int(rng.integers(1, 20)))
             break
-
-
-def fill_park(sketch: Sketch, block: Block, material: str = "lawn") -> None:
-    """Lawn with crossing paths, a pond and many trees."""
-    rng, outline = block.rng, block.outline
-    sketch.patch(outline, material, "block")
-    middle = outline.mean(axis=0)
-    pond = area(outline) > 1800
-    for corner in outline:
-        sketch.patch(rectangle((corner + middle) / 2, unit(middle - corner), float(np.hypot(*(middle - corner))), 2.4), "gravel", "path")
-    if pond:
-        angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
-        size = np.sqrt(area(outline)) * 0.15 * (1 + 0.18 * np.sin(3 * angle + rng.uniform(0, 6)))
-        sketch.patch(middle + size[:, None] * np.stack([np.cos(angle) * 1.3, np.sin(angle)], axis=1), "water", "thing")
-    for point in scattered(outline, int(area(outline) / 90), 1.5, rng):
-        if not pond or np.hypot(*(point - middle)) > np.sqrt(area(outline)) * 0.24:
-            sketch.tree(point, ("linden", "chestnut", "fir", "linden")[int(rng.integers(4))], float(rng.uniform(8, 13)), rng)

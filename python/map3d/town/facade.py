@@ -16,7 +16,7 @@ SHUTTERS: tuple[Color, ...] = ((62, 92, 66), (96, 58, 42), (60, 84, 110), (122, 
 SHOPS: tuple[Color, ...] = ((92, 62, 46), (48, 70, 62), (110, 42, 40), (60, 66, 84), (186, 176, 158))
 BRICKS: tuple[Color, ...] = ((158, 82, 62), (140, 70, 54), (172, 104, 76), (186, 150, 118))
 TIMBER: Color = (84, 56, 42)
-TILES: tuple[Color, ...] = ((176, 82, 52), (160, 70, 48), (186, 98, 66), (146, 74, 56), (132, 66, 50))
+TILES: tuple[Color, ...] = ((158, 88, 66), (146, 78, 60), (168, 100, 76), (136, 80, 64), (124, 72, 58))
 DARK_TILES: tuple[Color, ...] = ((92, 84, 82), (110, 76, 66), (84, 88, 94))
 ROMAN_WALLS: tuple[Color, ...] = ((226, 206, 172), (196, 92, 62), (214, 160, 88), (236, 226, 206), (206, 178, 136))
 
@@ -30,8 +30,8 @@ class TownDress:
         self.traits, self.colors = facade_style(look, rng)
         self.cover = cover
         self.roof_color = roof_color(cover, rng)
-        self.bay_m = float(rng.uniform(2.5, 3.2)) * {"slab": 1.15, "industrial": 1.9, "church": 1.7, "temple": 1.2}.get(look, 1)
-        self.party = "brick_red" if "brick" in self.traits else ("stone" if look in ("church", "wall") else "plaster")
+        self.bay_m = float(rng.uniform(2.1, 2.7)) * {"slab": 1.35, "industrial": 2.2, "church": 2.0, "temple": 1.4, "gruender": 1.15, "villa": 1.3, "row": 1.25, "roman": 1.5}.get(look, 1)
+        self.party = "brick_red" if "brick" in self.traits else ("stone" if look in ("church", "wall", "arena") else "plaster")
         self.doors = 0
 
     def wall(self, side: str, width_m: float, outline: Outline, foot_m: float) -> Paint | Wrap | Plain:
@@ -69,7 +69,7 @@ class TownDress:
         return tuple(out)
 
     def _opening(self, floor: int, door: bool, shop: bool, middle: float, z: float, bay: float) -> Opening | None:
-        if self.look in ("church", "temple"):
+        if self.look in ("church", "temple", "arena"):
             return self._tall(floor, door, middle, z)
         if floor == 0 and door:
             gate = self.look == "industrial"
@@ -145,7 +145,7 @@ def special_style(look: str, wall: Color, rng: np.random.Generator) -> tuple[set
         return {"panel"}, tint([(224, 222, 214), (206, 196, 180), (190, 200, 204)][rng.integers(3)], rng)
     if look == "industrial":
         return {"ribs"}, tint([(176, 184, 188), (150, 164, 176), (196, 190, 176)][rng.integers(3)], rng)
-    if look in ("church", "wall"):
+    if look in ("church", "wall", "arena"):
         return {"ashlar"}, tint((198, 184, 158), rng)
     if look == "townhall":
         return {"quoins"}, tint((214, 150, 120), rng)

@@ -18,6 +18,7 @@ class Ground:
     waves: tuple[tuple[float, float, float, float], ...]
     river: tuple[tuple[float, float], ...] = ()
     river_half_m: float = 0.0
+    crossings: tuple[tuple[float, float, float, float], ...] = ()
 
     def height(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
         """Heights in metres at points (x, y); any shape, broadcast."""
@@ -29,8 +30,16 @@ class Ground:
         total = self.level_m + total * calm
         if self.river:
             bank = np.clip((self.river_half_m + 7.0 - self.river_distance(px, py)) / 7.0, 0, 1)
-            total = total - 2.2 * bank * bank * (3 - 2 * bank)
+            total = total - 2.2 * bank * bank * (3 - 2 * bank) * self.open_water(px, py)
         return np.asarray(total)
+
+    def open_water(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """0 where a road crosses the river on its dam, 1 elsewhere; a crossing is (x, y, unit x, unit y) of its road."""
+        free = np.ones(x.shape)
+        for cx, cy, ux, uy in self.crossings:
+            aside, ahead = np.abs((x - cx) * uy - (y - cy) * ux), np.abs((x - cx) * ux + (y - cy) * uy)
+            free = np.where(ahead < 90, np.minimum(free, np.clip((aside - 5.0) / 1.5, 0, 1)), free)
+        return np.asarray(free)
 
     def river_distance(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distance to the river's middle line; the line runs from west to east."""
@@ -40,7 +49,7 @@ class Ground:
         return np.asarray(np.abs(y - middle) / np.hypot(1.0, slope))
 
 
-def make_ground(seed: int, level_m: float, river: tuple[tuple[float, float], ...] = (), half_m: float = 0.0) -> Ground:
+def make_ground(seed: int, level_m: float, river: tuple[tuple[float, float], ...] = (), half_m: float = 0.0, crossings: tuple[tuple[float, float, float, float], ...] = ()) -> Ground:
     """The ground of a town, drawn from its seed."""
     source = rng(seed, "ground")
     waves = []
@@ -49,4 +58,4 @@ def make_ground(seed: int, level_m: float, river: tuple[tuple[float, float], ...
             angle, phase = source.uniform(0, 2 * np.pi, 2)
             k = 2 * np.pi / (length * source.uniform(0.8, 1.25))
             waves.append((float(k * np.cos(angle)), float(k * np.sin(angle)), float(phase), size / 2))
-    return Ground(level_m, tuple(waves), river, half_m)
+    return Ground(level_m, tuple(waves), river, half_m, crossings)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from map3d.town.blocks import Block
 from map3d.town.massing import HIP, blank_part, flat_part, gable, ring_part, row_part, spire_part
+from map3d.town.model import Part
 from map3d.town.plane import area, circle, keeps_its_edges, left, offset, rectangle, unit
 from map3d.town.sketch import Sketch
 
@@ -19,22 +20,22 @@ def market_square(sketch: Sketch, outline: Points, rng: np.random.Generator) -> 
     sketch.patch(outline, "plaza", "block")
     angle = float(rng.uniform(-0.5, 0.5))
     along = np.array([np.cos(angle), np.sin(angle)])
-    middle = np.array([0.0, 9.0])
+    centre = outline.mean(axis=0)
+    middle = centre + [2.0, 9.0]
     church(sketch, middle, along)
-    fountain = np.array([-4.0, -15.0]) + rng.uniform(-3, 3, 2)
+    fountain = centre + [-4.0, -16.0] + rng.uniform(-3, 3, 2)
     basin = circle(fountain, 3.6, 12)
     part = replace(blank_part(0.7, 1, "wall", "paving"), sides=("blank",) * 12)
     column = ("column", (float(fountain[0]), float(fountain[1]), 0.5, 0.0, 4.5))
     sketch.lot("monument", MONUMENT, [flat_part(basin, part, 0.3)], "Marktplatz", 2, (column,))
     sketch.patch(circle(fountain, 3.1, 20), "water", "roof")
     for at in ((18.0, -16.0), (22.0, -10.0), (-24.0, -8.0), (-22.0, -15.0)):
-        sketch.tree(np.array(at), "linden", 8.0, rng)
+        sketch.tree(centre + np.array(at), "linden", 8.0, rng)
 
 
 def church(sketch: Sketch, middle: Points, along: Points) -> None:
     """A nave with aisles, a choir and a western tower with a tall spire."""
     across = left(along)
-    plain = ("blank",) * 4
     nave = rectangle(middle, along, 24.0, 9.0)
     side = ("street", "street", "blank", "blank")
     parts = [
@@ -47,7 +48,6 @@ def church(sketch: Sketch, middle: Points, along: Points) -> None:
     parts.append(spire_part(tower, spire, replace(_stone(27.0, 4, "copper", 0.4), sides=("street",) * 4)))
     choir = circle(middle + along * 12.0, 4.6, 8, float(np.arctan2(along[1], along[0])) + np.pi / 8)
     parts.append(spire_part(choir, ((0.0, 0.0), (1.0, 5.5)), replace(_stone(10.0, 1, "slate", 0.3), sides=("street",) * 8)))
-    assert len(plain) == 4
     sketch.lot("church", CHURCH, parts, "Marktplatz", 1)
 
 
@@ -56,7 +56,7 @@ def _aisle(centre: Points, along: Points) -> tuple[Points, Points]:
     return line[0], line[1]
 
 
-def _stone(eave_m: float, storeys: int, cover: str, overhang_m: float):  # type: ignore[no-untyped-def]
+def _stone(eave_m: float, storeys: int, cover: str, overhang_m: float) -> Part:
     return blank_part(eave_m, storeys, "church", cover, overhang_m)
 
 

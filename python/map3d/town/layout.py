@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from map3d.town.blocks import GRUENDER, OLD, Block, fill_industry, fill_park, fill_perimeter, fill_rows, fill_slabs, fill_villas
+from map3d.town.blocks import GRUENDER, OLD, Block, fill_industry, fill_perimeter, fill_rows, fill_slabs, fill_villas
+from map3d.town.greens import fill_belt, fill_green, fill_park
 from map3d.town.landmarks import market_square, town_hall
 from map3d.town.model import Plan
 from map3d.town.names import street_name
@@ -17,11 +18,10 @@ from map3d.town.sketch import Sketch
 
 Points = NDArray[np.float64]
 PLAZA_M = 36.0
-MAIN_HALF_M = 7.5
-ZONES = ("old", "perimeter", "rows", "villas", "slabs", "industry")
-SHARES = {"old": 0.34, "perimeter": 0.22, "rows": 0.17, "villas": 0.22, "slabs": 0.025, "industry": 0.025}
-DEPTHS = {"old": 46.0, "belt": 30.0, "perimeter": 62.0, "outer": 74.0}
-HALF_STREETS = {"old": 3.2, "belt": 5.0, "perimeter": 6.0, "outer": 5.0}
+MAIN_HALF_M = {"old": 4.6, "belt": 7.5, "perimeter": 7.5, "outer": 7.5}
+SHARES = {"perimeter": 0.34, "rows": 0.26, "villas": 0.33, "slabs": 0.035, "industry": 0.035}
+DEPTHS = {"old": 46.0, "belt": 33.0, "perimeter": 62.0, "outer": 74.0}
+HALF_STREETS = {"old": 2.7, "belt": 5.0, "perimeter": 6.0, "outer": 5.0}
 
 
 @dataclass
@@ -67,12 +67,13 @@ class TownPlan:
     def __init__(self, seed: int, wanted: int) -> None:
         self.seed, self.frame = seed, make_frame(seed, wanted)
         self.sketch = Sketch(wanted)
-        self.left = {zone: max(1.0, SHARES[zone] * wanted) for zone in ZONES}
+        old = 0.5 * wanted if wanted < 120 else 0.58 * wanted if wanted < 400 else min(600.0, 120 + 0.26 * wanted)
+        self.left = {zone: max(1.0, share * (wanted - old)) for zone, share in SHARES.items()} | {"old": old}
         self.rings: list[tuple[float, float, str]] = []
         self.reach_m = PLAZA_M
 
     def draw(self) -> Plan:
-        market_square(self.sketch, self.frame.bend(circle(np.zeros(2), PLAZA_M - 4, 40)), rng(self.seed, "market"))
+        market_square(self.sketch, self.frame.bend(circle(np.zeros(2), PLAZA_M - 3, 40)), rng(self.seed, "market"))
         ring = 0
         while not self.sketch.full and ring < 400:
             kind = self.ring_kind(ring)
@@ -85,7 +86,7 @@ class TownPlan:
         return self.sketch.plan
 
     def ring_kind(self, ring: int) -> str:
-        if self.left["old"] > 6 or ring == 0:
+        if self.left["old"] > 30 or ring == 0:
             return "old"
         if self.rings[-1][2] == "old" and self.frame.wanted >= 150:
             return "belt"
@@ -97,7 +98,7 @@ class TownPlan:
         for number, (start, end, main_before, main_after) in enumerate(self.sectors(ring, inner, outer, kind)):
             plain = sector(start, end, inner, outer)
             sides = [half] * len(plain)
-            sides[0], sides[-2] = (MAIN_HALF_M if main_before else half), (MAIN_HALF_M if main_after else half)
+            sides[0], sides[-2] = (MAIN_HALF_M[kind] if main_before else half), (MAIN_HALF_M[kind] if main_after else half)
             lot = inset(plain, np.array(sides))
             for part, piece in enumerate(self.beside_river(lot)):
                 outline = self.frame.bend(piece)
@@ -109,7 +110,7 @@ class TownPlan:
     def sectors(self, ring: int, inner: float, outer: float, kind: str) -> Iterator[tuple[float, float, bool, bool]]:
         """(start, end, main road at the start, main road at the end), angles in radians."""
         source = rng(self.seed, "ring", ring)
-        width = {"old": 52.0, "belt": 90.0, "perimeter": 84.0, "outer": 96.0}[kind]
+        width = {"old": 52.0, "belt": 62.0, "perimeter": 84.0, "outer": 96.0}[kind]
         roads = [*self.frame.roads, self.frame.roads[0] + 2 * np.pi]
         for a, b in zip(roads[:-1], roads[1:], strict=True):
             count = max(1, round((b - a) * (inner + outer) / 2 / width))
@@ -132,11 +133,11 @@ class TownPlan:
         sketch.patch(_wider(block.outline, 1.9), "sidewalk", "sidewalk")
         if ring == 0 and number == 0 and town_hall(sketch, block):
             return
-        if sketch.full or kind == "belt" or area(block.outline) < 520:
-            fill_park(sketch, block)
+        if kind == "belt":
+            fill_belt(sketch, block)
             return
-        if kind != "old" and block.rng.random() < 0.07:
-            fill_park(sketch, block)
+        if sketch.full or area(block.outline) < 450 or (kind != "old" and block.rng.random() < 0.09):
+            (fill_park if kind == "old" else fill_green)(sketch, block)
             return
         zone = self.zone(block, kind, middle)
         build = {
@@ -151,14 +152,14 @@ class TownPlan:
 
     def zone(self, block: Block, kind: str, middle: Points) -> str:
         """What is built here: the ring's kind, or outside a mixture of what is still wanted."""
-        if kind in ("old", "perimeter") and self.left[kind] > 6:
+        if kind == "old" and (self.left[kind] > 3 or self.frame.wanted >= 120):
             return kind
-        names = [z for z in ("rows", "villas", "slabs", "industry")]
+        names = ["perimeter", "rows", "villas", "slabs", "industry"]
         angle = math.atan2(middle[1], middle[0]) - self.frame.roads[1]
         east = math.cos(angle) > 0.75
-        size = {"rows": 14.0, "villas": 9.0, "slabs": 3.0, "industry": 2.0}
+        size = {"perimeter": 14.0 if kind == "perimeter" else 1e9, "rows": 16.0, "villas": 9.0, "slabs": 3.0, "industry": 2.0}
         weights = np.array([max(self.left[z], 0.0) / size[z] for z in names]) + 1e-6
-        weights *= np.array([1.0, 1.0, 1.0, 8.0 if east else 0.15])
+        weights *= np.array([1.6, 1.0, 1.0, 1.0, 8.0 if east else 0.15])
         return names[int(block.rng.choice(len(names), p=weights / weights.sum()))]
 
     def surroundings(self) -> None:

@@ -18,13 +18,13 @@ PATTERN_PX = 512
 STRIP_PX = 2048
 MATERIALS = (
     "meadow", "lawn", "lawn_light", "garden", "forest", "field_green", "field_gold", "field_brown", "asphalt", "cobble", "sidewalk",
-    "plaza", "yard", "gravel", "concrete", "water", "bank", "mark", "roof_red", "roof_dark", "roof_flat", "roof_metal", "sand",
+    "plaza", "yard", "gravel", "concrete", "water", "bank", "mark", "car_white", "car_dark", "car_red", "clay", "roof_red", "roof_dark", "roof_flat", "roof_metal", "sand",
 )  # fmt: skip
 COLORS = {
-    "meadow": (126, 146, 84), "lawn": (106, 138, 70), "lawn_light": (122, 152, 82), "garden": (96, 126, 66), "forest": (58, 84, 48),
-    "field_green": (112, 142, 62), "field_gold": (200, 178, 104), "field_brown": (142, 116, 86), "asphalt": (104, 104, 106),
+    "meadow": (128, 140, 90), "lawn": (106, 128, 76), "lawn_light": (122, 140, 86), "garden": (94, 114, 66), "forest": (58, 84, 48),
+    "field_green": (114, 134, 74), "field_gold": (190, 172, 116), "field_brown": (142, 116, 86), "asphalt": (104, 104, 106),
     "cobble": (138, 130, 120), "sidewalk": (172, 168, 160), "plaza": (190, 178, 158), "yard": (158, 148, 132), "gravel": (188, 178, 156),
-    "concrete": (164, 162, 156), "water": (74, 108, 116), "bank": (110, 132, 80), "mark": (236, 234, 226), "roof_red": (168, 84, 56),
+    "concrete": (164, 162, 156), "water": (74, 108, 116), "bank": (110, 132, 80), "mark": (236, 234, 226), "car_white": (214, 216, 218), "car_dark": (52, 58, 68), "car_red": (140, 44, 40), "clay": (176, 106, 78), "roof_red": (148, 86, 68),
     "roof_dark": (92, 84, 82), "roof_flat": (146, 144, 138), "roof_metal": (160, 166, 170), "sand": (206, 190, 152),
 }  # fmt: skip
 
@@ -44,7 +44,7 @@ def patterns(px_per_m: float) -> NDArray[np.uint8]:
         elif name.startswith("field"):
             rows = (128 + 16 * np.sin(np.arange(PATTERN_PX) * 2 * np.pi / 16)).astype(np.uint8)
             shade = blended(np.broadcast_to(rows[:, None], (PATTERN_PX, PATTERN_PX)), shade)
-        contrast = {"mark": 0.08, "water": 0.25, "asphalt": 0.35}.get(name, 0.7 if name in ("forest", "garden") else 0.5)
+        contrast = {"mark": 0.08, "car_white": 0.05, "car_dark": 0.05, "car_red": 0.05, "water": 0.25, "asphalt": 0.35}.get(name, 0.7 if name in ("forest", "garden") else 0.5)
         pictures.append(colored(np.asarray(shade, dtype=np.uint8), COLORS[name], contrast))
     return np.concatenate(pictures).reshape(-1, 3)
 

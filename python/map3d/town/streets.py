@@ -19,7 +19,7 @@ Rings = list[tuple[float, float, str]]
 def lay_streets(sketch: Sketch, frame: "Frame", rings: Rings, reach_m: float, plaza_m: float) -> None:
     """The town's ground is street wherever nothing else lies; main roads run on to the edge of the map."""
     old = max((outer for _, outer, kind in rings if kind == "old"), default=plaza_m)
-    sketch.patch(frame.bend(circle(np.zeros(2), reach_m + 5, 96)), "asphalt", "town")
+    sketch.patch(frame.bend(circle(np.zeros(2), reach_m - 1.0, 96)), "asphalt", "town")
     sketch.patch(frame.bend(circle(np.zeros(2), old - 1.5, 72)), "cobble", "town")
     for angle in frame.roads:
         _main_road(sketch, frame, angle, old, reach_m, rings)
@@ -72,7 +72,8 @@ def _ring_marks(sketch: Sketch, frame: "Frame", radius: float) -> None:
     line = frame.bend(radius * np.stack([np.cos(angles), np.sin(angles)], axis=1))
     for number, quad in enumerate(band(line, 0.14)):
         gap = np.abs((angles[number] - roads + np.pi) % (2 * np.pi) - np.pi).min() * radius
-        if number % 3 == 0 and gap > 9:
+        wet = near_river(frame, radius * np.array([np.cos(angles[number]), np.sin(angles[number])]))
+        if number % 3 == 0 and gap > 9 and not wet:
             sketch.patch(quad, "mark", "mark")
 
 
@@ -80,6 +81,20 @@ def river_line(frame: "Frame", reach_m: float) -> Points:
     """The river's middle from west to east, far beyond the map, in town coordinates."""
     x = np.arange(-(reach_m * 2 + 600), reach_m * 2 + 601, 12.0)
     return frame.bend(np.stack([x, np.full(len(x), frame.river_y)], axis=1))
+
+
+def river_crossings(frame: "Frame") -> tuple[tuple[float, float, float, float], ...]:
+    """Where main roads cross the river: (x, y) and the road's direction, in town coordinates."""
+    found = []
+    for angle in frame.roads:
+        direction = np.array([np.cos(angle), np.sin(angle)])
+        if direction[1] * frame.river_y <= 0 or abs(direction[1]) < 0.2:
+            continue
+        plain = direction * (frame.river_y / direction[1])
+        here, ahead = frame.bend(np.array([plain, plain + direction]))
+        along = unit(ahead - here)
+        found.append((float(here[0]), float(here[1]), float(along[0]), float(along[1])))
+    return tuple(found)
 
 
 def lay_river(sketch: Sketch, frame: "Frame", reach_m: float) -> None:
@@ -128,7 +143,9 @@ def _grove(sketch: Sketch, frame: "Frame", middle: Points, reach_m: float, radiu
     centre = frame.bend(middle)[0]
     if not _far_from_roads(frame, centre, 45) or near_river(frame, middle - [0, 30]) or near_river(frame, middle + [0, 30]):
         return
-    sketch.patch(circle(centre, 30, 14), "forest", "forest")
+    angle = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    ragged = 30 * (1 + 0.16 * np.sin(2 * angle + source.uniform(0, 6)) + 0.1 * np.sin(5 * angle + source.uniform(0, 6)))
+    sketch.patch(centre + ragged[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1), "forest", "forest")
     for angle, distance in source.uniform([0, 0], [2 * np.pi, 1], (26, 2)):
         point = centre + np.sqrt(distance) * 27 * np.array([np.cos(angle), np.sin(angle)])
         if np.abs(point).max() < radius - 4:

@@ -92,14 +92,14 @@ def _in_crown(points: Points, shape: str, source: np.random.Generator) -> NDArra
     ragged = 1 + 0.1 * np.sin(9 * np.arctan2(y - 0.5, x)) + source.normal(0, 0.05, len(x))
     reach = {
         "round": np.sqrt(np.clip(1 - (2 * y - 1) ** 2, 0, 1)), "disc": np.sqrt(np.clip(1 - (2 * y - 1) ** 2, 0, 1)),
-        "column": np.clip(np.sin(np.pi * np.clip(y, 0, 1)) ** 0.6, 0, 1) * 0.9,
+        "column": np.sin(np.pi * np.clip(y, 0, 1) ** 0.8) ** 0.9,
         "cone": (1 - y) * (0.78 + 0.22 * np.cos(y * 34)), "umbrella": np.sqrt(np.clip(1 - (2 * y - 1) ** 2, 0, 1)) * 0.97,
     }[shape]  # fmt: skip
     return np.asarray(np.abs(x) < reach * np.minimum(ragged * 0.93, 1.0))
 
 
 def _shaded(color: tuple[int, int, int], light: float) -> tuple[int, int, int]:
-    r, g, b = (int(np.clip(c * light, 0, 255)) for c in color)
+    r, g, b = (min(255, max(0, int(c * light))) for c in color)
     return r, g, b
 
 
