@@ -1,0 +1,170 @@
+//! Documents written to a folder of their own and read to the end.
+#![allow(dead_code)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use map3d_base::asset::{AssetReport, Batch, Instance, Material, Object, Rank};
+use map3d_base::vec3::{length, triangle_normal};
+use map3d_base::{Error, Result, Vec3};
+use map3d_read::{Format, ReadOptions, Texture, open};
+
+/// A folder that goes away with its test.
+pub struct Folder(pub PathBuf);
+
+impl Folder {
+    pub fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("map3d-read-{name}-{}", std::process::id()));
+        let _ = fs::remove_dir_all(&path);
+        fs::create_dir_all(&path).expect("create a folder");
+        Self(path.canonicalize().expect("canonical path"))
+    }
+
+    pub fn put(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.0.join(name);
+        fs::create_dir_all(path.parent().expect("a parent")).expect("create a folder");
+        fs::write(&path, bytes).expect("write a file");
+        path
+    }
+
+    /// A PNG of one colour (red, green, blue, alpha).
+    pub fn put_png(&self, name: &str, width: u32, height: u32, texel: [u8; 4]) -> PathBuf {
+        self.put(name, png(width, height, texel))
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+pub fn png(width: u32, height: u32, texel: [u8; 4]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    encoder.set_color(png::ColorType::Rgba);
+    let mut writer = encoder.write_header().expect("header");
+    writer.write_image_data(&texel.repeat((width * height) as usize)).expect("image");
+    writer.finish().expect("finish");
+    bytes
+}
+
+/// All that a document gave.
+#[derive(Debug)]
+pub struct Reading {
+    pub batches: Vec<Batch>,
+    pub objects: Vec<Object>,
+    pub materials: Vec<Material>,
+    pub instances: Vec<Instance>,
+    pub textures: Vec<Texture>,
+    pub srs_name: Option<String>,
+    pub report: AssetReport,
+}
+
+/// One triangle with all that belongs to it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Triangle {
+    pub corners: [Vec3; 3],
+    pub uvs: Option<[[f32; 2]; 3]>,
+    pub material: u32,
+    pub object: u32,
+    pub rank: Rank,
+    pub prototype: u32,
+}
+
+pub fn read_with(path: &Path, format: Format, options: &ReadOptions) -> Result<Reading> {
+    let mut reader = open(path, format, options)?;
+    let mut batches = Vec::new();
+    while let Some(batch) = reader.next_batch()? {
+        check(&batch);
+        batches.push(batch);
+    }
+    assert!(reader.next_batch()?.is_none(), "the end stays the end");
+    let reading = Reading {
+        batches,
+        objects: reader.objects().to_vec(),
+        materials: reader.materials().to_vec(),
+        instances: reader.instances().to_vec(),
+        textures: reader.textures().to_vec(),
+        srs_name: reader.srs_name().map(str::to_owned),
+        report: reader.report().clone(),
+    };
+    reading.check_indices();
+    Ok(reading)
+}
+
+fn check(batch: &Batch) {
+    let n = batch.triangles.len();
+    assert!(n > 0, "batches are not empty");
+    assert_eq!([batch.materials.len(), batch.objects.len(), batch.ranks.len()], [n; 3]);
+    assert!(batch.uvs.is_empty() || batch.uvs.len() == n);
+    assert!(batch.normals.is_empty() || batch.normals.len() == n);
+    assert!(batch.triangles.as_flattened().iter().all(|v| (*v as usize) < batch.positions.len()));
+}
+
+impl Reading {
+    fn check_indices(&self) {
+        for batch in &self.batches {
+            assert!(batch.materials.iter().all(|m| (*m as usize) < self.materials.len()), "materials exist");
+            assert!(batch.objects.iter().all(|o| (*o as usize) < self.objects.len()), "objects exist");
+        }
+        let prototypes: Vec<u32> = self.batches.iter().map(|b| b.prototype).collect();
+        for instance in &self.instances {
+            assert!(instance.prototype > 0 && prototypes.contains(&instance.prototype), "prototypes exist");
+            assert!((instance.object as usize) < self.objects.len());
+        }
+        for material in &self.materials {
+            assert!(material.texture.as_ref().is_none_or(|key| self.textures.iter().any(|t| t.key == *key)), "textures exist");
+        }
+        for object in &self.objects {
+            assert!(object.parent.is_none_or(|p| (p as usize) < self.objects.len()));
+        }
+    }
+
+    pub fn triangles(&self) -> Vec<Triangle> {
+        let of_batch = |b: &Batch| -> Vec<Triangle> {
+            let one = |(i, t): (usize, &[u32; 3])| Triangle {
+                corners: t.map(|v| b.positions[v as usize]),
+                uvs: b.uvs.get(i).copied(),
+                material: b.materials[i],
+                object: b.objects[i],
+                rank: b.ranks[i],
+                prototype: b.prototype,
+            };
+            b.triangles.iter().enumerate().map(one).collect()
+        };
+        self.batches.iter().flat_map(of_batch).collect()
+    }
+
+    pub fn count(&self) -> usize {
+        self.batches.iter().map(|b| b.triangles.len()).sum()
+    }
+
+    pub fn area(&self) -> f64 {
+        self.triangles().iter().map(|t| area(t.corners)).sum()
+    }
+
+    pub fn warned(&self, reason: &str) -> u64 {
+        self.report.warnings.iter().filter(|w| w.reason.contains(reason)).map(|w| w.count).sum()
+    }
+
+    pub fn skipped(&self, reason: &str) -> u64 {
+        self.report.skipped.iter().filter(|(r, _)| r.contains(reason)).map(|(_, n)| n).sum()
+    }
+
+    pub fn material_of(&self, triangle: usize) -> &Material {
+        &self.materials[self.triangles()[triangle].material as usize]
+    }
+}
+
+pub fn area(corners: [Vec3; 3]) -> f64 {
+    length(triangle_normal(corners)) / 2.0
+}
+
+pub fn is_format_error<T>(result: Result<T>, part: &str) -> bool {
+    matches!(result, Err(Error::Format { what, .. }) if what.contains(part))
+}
+
+pub fn is_limit_error<T>(result: Result<T>, name: &str) -> bool {
+    matches!(result, Err(Error::Limit { limit, .. }) if limit == name)
+}
