@@ -38,7 +38,7 @@ class Client:
 
     def close(self) -> None:
         self._loop.run_until_complete(self._client.aclose())
-        self._loop.run_until_complete(self.app.tiles.close())
+        self._loop.run_until_complete(self.app.close())
         self._loop.run_until_complete(self._loop.shutdown_default_executor())
         self._loop.close()
 

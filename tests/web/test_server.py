@@ -54,6 +54,23 @@ def test_it_serves_all_there_is(address):
         assert int(head.headers["content-length"]) == len(tile_bytes("0-45", "id", TileId(0, 0, 0)))
 
 
+def _ask(address, request):
+    host, port = address.removeprefix("http://").rstrip("/").split(":")
+    with socket.create_connection((host, int(port)), timeout=10) as connection:
+        connection.sendall(request)
+        return connection.recv(65536)
+
+
+@pytest.mark.parametrize("address", [1], indirect=True)
+def test_odd_requests_are_refused_without_an_error_of_ours(address):
+    tile = b"/tiles/tea/0-45/color/0/0/0"
+    for target in (b"/?\xd9\xa1", b"/\xff", b"/%ff%fe", b"/%00", tile + b"?v=\xff", tile + b"%zz", b"//" + tile, b"/tiles/tea/%ff/color/0/0/0", b"*"):
+        for method in (b"GET", b"HEAD", b"POST", b"FOO"):
+            head = _ask(address, method + b" " + target + b" HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
+            assert head.startswith(b"HTTP/1.1 ")
+            assert 200 <= int(head[9:12]) < 500, (method, target)
+
+
 def test_a_taken_port_is_refused():
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))

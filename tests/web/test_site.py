@@ -1,3 +1,4 @@
+import asyncio
 import json
 import re
 
@@ -5,6 +6,7 @@ import pytest
 
 from map3d.catalogue import SceneRecord
 from map3d.errors import AlreadyExists, BadRequest, Corrupt, LimitExceeded, Map3dError, NotFound, StoreError
+from map3d.registry import NewObject, Registry
 from map3d.tiles import viewer
 from map3d.web import create_app
 from map3d.web.errors import status_of
@@ -56,6 +58,32 @@ def test_objects_come_by_shard(client, base):
     assert value["objects"]["2"]["parent"] == 1
     assert answer.headers["access-control-allow-origin"] == "*"
     assert client.get(f"{base}/objects/0.json", headers={"if-none-match": answer.headers["etag"]}).status_code == 304
+
+
+def test_new_objects_are_found_at_once(client, workspace):
+    before = client.get("/tiles/tea/objects/search.json").json()["entries"]
+    with Registry(workspace.registry_path("town")) as registry:
+        registry.put_asset("more", [NewObject("Tower", "building", box=((0.0, 0.0, 0.0), (2.0, 2.0, 50.0)))])
+        assert len(client.get("/tiles/tea/objects/search.json").json()["entries"]) == len(before) + 1
+    assert client.get("/tiles/tea/objects/search.json").json()["entries"][2] == [4, "Tower", [1.0, 1.0, 50.0]]
+
+
+def test_large_documents_are_compressed_for_who_can_read_that(client, workspace):
+    with Registry(workspace.registry_path("town")) as registry:
+        registry.put_asset("more", [NewObject(f"House {n}", "building", box=((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))) for n in range(100)])
+    plain, packed = (client.get("/tiles/tea/objects/0.json", headers={"accept-encoding": name}) for name in ("identity", "gzip"))
+    assert "content-encoding" not in plain.headers
+    assert packed.headers["content-encoding"] == "gzip"
+    assert int(packed.headers["content-length"]) < int(plain.headers["content-length"]) / 5
+    assert plain.json() == packed.json()
+    assert plain.headers["vary"] == packed.headers["vary"] == "Accept-Encoding"
+    assert client.get("/tiles/tea/objects/0.json", headers={"if-none-match": packed.headers["etag"]}).status_code == 304
+
+
+def test_scripts_have_the_type_that_browsers_insist_on(client, built_viewer):
+    (built_viewer / "map3d.mjs").write_text("export {}")
+    assert "javascript" in client.get("/view/tea/map3d.mjs").headers["content-type"]
+    assert client.get("/view/none/map3d.mjs").status_code == 404
 
 
 def test_a_shard_without_objects_is_empty(client):
@@ -114,8 +142,9 @@ def test_a_workspace_without_renderings_says_what_to_do(tmp_path):
     home = Workspace(tmp_path).create().open_catalogue()
     home.create_scene(SceneRecord("town"))
     home.close()
-    page = create_app(tmp_path).site.test_client().get("/")
-    assert "map3d create-rendering" in page.text
+    app = create_app(tmp_path)
+    assert "map3d create-rendering" in app.site.test_client().get("/").text
+    asyncio.run(app.close())
 
 
 def test_no_page_has_inline_script_or_style(client, built_viewer):

@@ -1,17 +1,22 @@
 """The ASGI app: tile URLs go to the thin route, all else to Flask."""
 
+import string
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Final, cast
+from urllib.parse import quote
 
 from a2wsgi import WSGIMiddleware
 
 from map3d.catalogue.workspace import Workspace
 from map3d.errors import NotFound
+from map3d.web import documents
 from map3d.web.site import create_site
 from map3d.web.tiles import DEFAULT_CACHE_BYTES, Receive, Scope, Send, TileRoute
 
-FLASK_THREADS = 8
+FLASK_THREADS: Final = 8
+_QUERY_SAFE: Final = string.punctuation
+"""What of a query is left as it is; the bridge to Flask takes ASCII only."""
 
 
 class App:
@@ -24,18 +29,25 @@ class App:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "http":
-            route = self.tiles if self.tiles.owns(scope["path"]) else self._site_asgi
-            await route(scope, receive, send)
+            if self.tiles.owns(scope["path"]):
+                await self.tiles(scope, receive, send)
+            else:
+                await self._site_asgi({**scope, "query_string": quote(scope["query_string"], safe=_QUERY_SAFE).encode()}, receive, send)
         elif scope["type"] == "lifespan":
             await self._live(receive, send)
         elif scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1000})
 
+    async def close(self) -> None:
+        await self.tiles.close()
+        with self.site.app_context():
+            documents.close()
+
     async def _live(self, receive: Receive, send: Send) -> None:
         while True:
             event = (await receive())["type"]
             if event == "lifespan.shutdown":
-                await self.tiles.close()
+                await self.close()
             await send({"type": f"{event}.complete"})
             if event == "lifespan.shutdown":
                 return

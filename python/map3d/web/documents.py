@@ -3,8 +3,11 @@
 They stand under /tiles/<rendering>/ and under /view/<rendering>/, whose page reads them as its own folder's, as in a published folder.
 """
 
+import gzip
 import re
+from functools import lru_cache
 from hashlib import sha256
+from pathlib import Path
 from typing import Final
 
 from flask import Blueprint, Response, current_app, request
@@ -17,6 +20,9 @@ from map3d.tiles.manifest import FILE_NAME
 from map3d.types import check_name
 
 documents = Blueprint("documents", __name__)
+
+PACK_FROM_BYTES: Final = 1024
+Stamp = tuple[tuple[int, int, int], ...]
 
 _NUMBER: Final = re.compile(r"0|[1-9][0-9]{0,6}", re.ASCII)
 """Of a shard: ids are 32 bits, so shards have at most seven digits."""
@@ -37,15 +43,15 @@ def manifest(rendering: str) -> Response:
 def shard(rendering: str, shard: str) -> Response:
     if not _NUMBER.fullmatch(shard):
         raise NotFound(f"no shard {shard[:64]!r}: shards have plain numbers")
-    with registry(rendering) as objects:
+    with Registry(registry_path(rendering)) as objects:
         return json_answer(dump_document(objects.shard(int(shard))))
 
 
 @documents.get("/tiles/<rendering>/objects/search.json")
 @documents.get("/view/<rendering>/objects/search.json")
 def search(rendering: str) -> Response:
-    with registry(rendering) as objects:
-        return json_answer(dump_document(objects.search()))
+    path = registry_path(rendering)
+    return json_answer(_search_bytes(path, _stamp(path)))
 
 
 def workspace() -> Workspace:
@@ -61,19 +67,47 @@ def catalogue() -> Catalogue:
     return held
 
 
-def registry(rendering: str) -> Registry:
+def close() -> None:
+    """Of the app in whose context it is called."""
+    held: Catalogue | None = current_app.extensions.pop("map3d.catalogue", None)
+    if held is not None:
+        held.close()
+
+
+def registry_path(rendering: str) -> Path:
     """Of the rendering's scene; raises NotFound."""
     path = workspace().registry_path(catalogue().rendering(check_name(rendering, "rendering")).scene)
     if not path.is_file():
         raise NotFound(f"the scene of rendering {rendering!r} has no objects yet")
-    return Registry(path)
+    return path
 
 
 def json_answer(data: bytes) -> Response:
-    """With an ETag, to be asked for anew each time."""
-    response = Response(data, mimetype="application/json")
-    response.set_etag(sha256(data).hexdigest()[:32])
+    """With an ETag, to be asked for anew each time; compressed for who can read that."""
+    packed = len(data) >= PACK_FROM_BYTES and request.accept_encodings.quality("gzip") > 0
+    response = Response(_packed(data) if packed else data, mimetype="application/json")
+    if packed:
+        response.headers["Content-Encoding"] = "gzip"
+    response.headers["Vary"] = "Accept-Encoding"
+    response.set_etag(sha256(data).hexdigest()[:32], weak=True)
     response.headers["Cache-Control"] = "no-cache"
     response.headers["Access-Control-Allow-Origin"] = "*"
     response.make_conditional(request)
     return response
+
+
+@lru_cache(maxsize=4)
+def _search_bytes(path: Path, _state: Stamp) -> bytes:
+    with Registry(path) as objects:
+        return dump_document(objects.search())
+
+
+@lru_cache(maxsize=16)
+def _packed(data: bytes) -> bytes:
+    return gzip.compress(data, compresslevel=6, mtime=0)
+
+
+def _stamp(path: Path) -> Stamp:
+    """Differs once the registry has changed."""
+    log = path.with_name(path.name + "-wal")
+    return tuple((stat.st_ino, stat.st_mtime_ns, stat.st_size) for stat in (one.stat() for one in (path, log) if one.is_file()) if stat.st_size)

@@ -39,6 +39,7 @@ def view(rendering: str) -> Response:
 
 @pages.get("/view/<rendering>/<path:file>")
 def viewer_file(rendering: str, file: str) -> Response:
+    catalogue().rendering(check_name(rendering, "rendering"))
     return send_from_directory(viewer_folder(), file, max_age=0)
 
 
