@@ -111,6 +111,21 @@ def test_the_search_index_is_sorted_by_label_then_id(registry: Registry) -> None
     assert registry.search() == {"map3d": "search", "version": 1, "entries": [[a, "a, Street 5", top], [b, "b", top], [b2, "b", top]]}
 
 
+@pytest.mark.parametrize(
+    ("attributes", "label"),
+    [
+        ({}, "id1"),
+        ({"address": "Street 5"}, "id1, Street 5"),
+        ({"name": "St. Martin", "address": "Square 1"}, "St. Martin (id1), Square 1"),
+        ({"name": "id1", "address": "  "}, "id1"),
+        ({"name": 5, "address": None}, "id1"),
+    ],
+)
+def test_labels_are_name_and_address(registry: Registry, attributes: dict[str, object], label: str) -> None:
+    registry.put_asset("a", [NewObject("id1", "building", attributes=attributes, box=UNIT)])
+    assert registry.search()["entries"][0][1] == label
+
+
 def test_ids_are_not_given_beyond_the_last(registry: Registry) -> None:
     with registry._database.transaction() as db:
         db.execute("INSERT INTO object(id, asset, name, occurrence, class, attributes, present) VALUES (?, 'z', 'z', 0, 'z', '{}', 0)", (MAX_ID,))

@@ -38,9 +38,10 @@ class RegisteredObject:
 
     @property
     def label(self) -> str:
-        """Name and address, for searching."""
-        address = self.attributes.get("address")
-        return f"{self.name}, {address}" if isinstance(address, str) and address.strip() else self.name
+        """Name and address, for searching; what people call it comes first: `St. Martin (DEBY_LOD2_1), Marktplatz 1`."""
+        called, address = (_text(self.attributes.get(key)) for key in ("name", "address"))
+        name = f"{called} ({self.name})" if called and called != self.name else self.name
+        return f"{name}, {address}" if address else name
 
     def to_json(self) -> dict[str, Any]:
         """As in an attribute shard."""
@@ -57,6 +58,10 @@ class RegisteredObject:
 def plain_attributes(attributes: Mapping[str, Any]) -> dict[str, Attribute]:
     """Attributes as clients get them: string, number, boolean or null. Anything else becomes its JSON text; NaN and infinities become null."""
     return {str(key): _plain(value) for key, value in attributes.items()}
+
+
+def _text(value: Attribute) -> str:
+    return value.strip() if isinstance(value, str) else ""
 
 
 def _plain(value: Any) -> Attribute:

@@ -1,0 +1,91 @@
+"""A parser that misbehaves costs its own import, within its limits, and is told by a typed error that names the limit."""
+
+import dataclasses
+import socket
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from map3d.catalogue import Catalogue, SceneRecord, Workspace
+from map3d.child import Child, Limits, Message
+from map3d.errors import ImportFailed, LimitExceeded
+from map3d.ingest.importing import import_file
+from map3d.ingest.options import BIG_FILE_BYTES, GIB, ImportOptions
+from map3d.ingest.sources import Source, find_sources
+
+OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Workspace:
+    return Workspace(tmp_path / "workspace").create()
+
+
+@pytest.fixture
+def catalogue(workspace: Workspace) -> Iterator[Catalogue]:
+    opened = workspace.open_catalogue()
+    opened.create_scene(SceneRecord("town"))
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> Source:
+    (tmp_path / "a.obj").write_text(OBJ)
+    return find_sources([tmp_path / "a.obj"])[0]
+
+
+@pytest.mark.parametrize(
+    ("entry", "options", "error", "says"),
+    [
+        ("open_greedy", ImportOptions(), LimitExceeded, "1024 MiB of address space.*--parse-memory"),
+        ("open_greedy", ImportOptions(parse_memory_bytes=3 << 30), LimitExceeded, "3072 MiB of address space"),
+        ("open_busy", ImportOptions(parse_cpu_s=1), LimitExceeded, "1 s of processor time.*--parse-cpu"),
+        ("open_asleep", ImportOptions(parse_cpu_s=1), LimitExceeded, "not read within 4 s.*--parse-cpu"),
+        ("open_crash", ImportOptions(), ImportFailed, "SIGABRT"),
+    ],
+)
+def test_a_parser_out_of_bounds_is_ended_and_explained(
+    workspace: Workspace, catalogue: Catalogue, source: Source, entry: str, options: ImportOptions, error: type[Exception], says: str
+) -> None:
+    begun = time.monotonic()
+    with pytest.raises(error, match=says) as refused:
+        import_file(workspace, catalogue, "town", source, options, entry=f"tests.ingest.parsers:{entry}")
+    assert str(source.paths[0]) in str(refused.value)
+    assert time.monotonic() - begun < 30
+    assert catalogue.assets("town") == []
+    assert list((workspace.scene_folder("town") / "assets").iterdir()) == []
+
+
+def test_a_parser_has_no_network_where_the_system_allows_that() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        child = Child("tests.ingest.parsers:open_curious", {}, limits=Limits(network=False))
+        applied = child.wait_ready(30)
+        answer = child.ask({"port": server.getsockname()[1]}, wall_s=10)
+        child.close()
+    assert isinstance(answer, Message)
+    assert answer.value["network"] == applied["network"]
+
+
+def test_a_parser_has_few_files(tmp_path: Path) -> None:
+    child = Child("tests.ingest.parsers:open_hoarder", {}, limits=Limits(open_files=64))
+    child.wait_ready(30)
+    answer = child.ask({"folder": str(tmp_path)}, wall_s=10)
+    child.close()
+    assert isinstance(answer, Message)
+    assert 32 < answer.value["files"] < 64
+
+
+@pytest.mark.parametrize(
+    ("size", "memory", "cpu_s"), [(BIG_FILE_BYTES - 1, GIB, 60), (BIG_FILE_BYTES, GIB, 60), (BIG_FILE_BYTES + 1, 2 * GIB, 120), (0, GIB, 60)]
+)
+def test_limits_grow_with_the_file(tmp_path: Path, size: int, memory: int, cpu_s: int) -> None:
+    path = tmp_path / "big.gml"
+    with path.open("wb") as file:
+        file.truncate(size)
+    limits = ImportOptions().limits([path], "citygml")
+    assert (limits.address_space_bytes, limits.cpu_s, limits.wall_s, limits.network) == (memory, cpu_s, 4.0 * cpu_s, False)
+    raised = dataclasses.replace(ImportOptions(), parse_memory_bytes=5 * GIB, parse_cpu_s=7).limits([path], "citygml")
+    assert (raised.address_space_bytes, raised.cpu_s) == (5 * GIB, 7)
