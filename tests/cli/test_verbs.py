@@ -1,0 +1,162 @@
+"""What every verb does before any scene is built: help, refusals, listings."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from map3d import __version__
+from map3d.cli import app
+from map3d.cli.app import VERBS
+from map3d.cli.options import Bytes, View
+from map3d.types import ViewAngles
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+    """Runs the command line in an own workspace; (status, output, errors)."""
+    monkeypatch.setenv("MAP3D_WORKSPACE", str(tmp_path / "workspace"))
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments: str) -> tuple[int, str, str]:
+        status = app.run(list(arguments))
+        captured = capsys.readouterr()
+        return status, captured.out, captured.err
+
+    return call
+
+
+@pytest.mark.parametrize("verb", sorted(VERBS))
+def test_every_verb_has_a_help_that_says_what_it_does(run: Run, verb: str) -> None:
+    status, out, err = run(verb, "--help")
+    assert (status, err) == (0, "")
+    assert out.startswith(f"Usage: map3d {verb}")
+    assert all(not line.strip().startswith("--") or len(line.split()) > 1 for line in out.splitlines())
+
+
+def test_help_lists_the_verbs_in_the_order_of_work(run: Run) -> None:
+    for arguments in ((), ("--help",), ("-h",)):
+        status, out, _ = run(*arguments)
+        assert status == 0
+        places = [out.rindex(f"\n  {verb} ") for verb in VERBS]
+        assert places == sorted(places)
+
+
+def test_version(run: Run) -> None:
+    assert run("--version")[1].strip() == f"map3d, version {__version__}"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "says"),
+    [
+        (("rendre",), 2, "No such command"),
+        (("render",), 2, "map3d render --help"),
+        (("render", "x", "--workers", "0"), 2, "--workers"),
+        (("render", "x"), 2, "create-scene"),
+        (("show", "scenes"), 2, "create-scene"),
+        (("show", "jobs"), 2, "give a name"),
+        (("serve",), 2, "create-scene"),
+        (("verify",), 2, "create-scene"),
+        (("create-scene", "Bad Name"), 2, "scene name"),
+        (("create-scene", "a", "--crs", "EPSG:4326"), 2, "projected"),
+        (("create-scene", "a", "--crs", "nonsense"), 2, "--crs"),
+        (("add-files", "a"), 2, "FILES"),
+        (("create-rendering", "a", "b", "--view", "north"), 2, "look-at/pitch"),
+    ],
+)
+def test_errors_are_one_line_that_says_what_to_do(run: Run, arguments: tuple[str, ...], status: int, says: str) -> None:
+    got, _, err = run(*arguments)
+    assert got == status
+    assert err.startswith("map3d: ")
+    assert err.count("\n") == 1
+    assert says in err
+    assert "Traceback" not in err
+
+
+def test_tracebacks_come_only_when_asked_for(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MAP3D_DEBUG", "1")
+    _, _, err = run("show", "scenes")
+    assert "Traceback" in err
+    assert err.splitlines()[-1].startswith("map3d: ")
+
+
+def test_scenes_are_made_and_shown(run: Run) -> None:
+    assert run("create-scene", "town", "--crs", "urn:adv:crs:ETRS89_UTM32*DE_DHHN2016_NH", "--title", "Town", "--no-merge-faces")[0] == 0
+    status, _, err = run("create-scene", "town")
+    assert (status, "exists already" in err) == (2, True)
+    assert json.loads(run("create-scene", "other", "--json")[1])["crs"] is None
+    (other, town) = json.loads(run("show", "scenes", "--json")[1])
+    assert (other["scene"]["name"], other["assets"]) == ("other", [])
+    assert town["scene"]["crs"]["epsg"] == 25832
+    assert town["scene"]["crs"]["vertical"] == "DHHN2016 height"
+    assert town["scene"]["options"]["merge_faces"] is False
+    assert "ETRS89 / UTM zone 32N" in run("show", "scenes")[1]
+    assert run("show", "scene", "town")[0] == run("show", "report", "town")[0] == 0
+    assert json.loads(run("show", "renderings", "--json")[1]) == []
+
+
+def test_what_is_not_there_is_named_with_what_is(run: Run) -> None:
+    run("create-scene", "town")
+    status, _, err = run("show", "scene", "twon")
+    assert (status, "there is town" in err) == (2, True)
+    for arguments in (("render", "x"), ("estimate", "x"), ("retry", "x"), ("verify", "x"), ("show", "jobs", "x"), ("show", "quarantine", "x")):
+        status, _, err = run(*arguments)
+        assert (status, "no rendering 'x'" in err) == (2, True), arguments
+
+
+def test_files_of_unknown_type_are_refused_naming_the_known_ones(run: Run, tmp_path: Path) -> None:
+    run("create-scene", "town")
+    (tmp_path / "a.skp").write_bytes(b"\xff\xfe\xff\x0eSketchUp")
+    status, _, err = run("add-files", "town", "a.skp")
+    assert (status, "CityGML" in err, "OBJ" in err) == (2, True, True)
+    status, _, err = run("add-files", "town", "nothing.obj")
+    assert (status, "no such file" in err) == (2, True)
+
+
+def test_a_scene_without_files_cannot_be_seen(run: Run) -> None:
+    run("create-scene", "town")
+    status, _, err = run("create-rendering", "town", "r", "--res", "1")
+    assert (status, "add-files" in err) == (2, True)
+
+
+def test_resolution_must_be_given_one_way(run: Run) -> None:
+    run("create-scene", "town")
+    for arguments in (("--view", "0/45", "--directions", "4"), ("--layers", "color,colour"), ("--layers", "id,id")):
+        status, _, err = run("create-rendering", "town", "r", "--res", "1", *arguments)
+        assert (status, err.count("\n")) == (2, 1), err
+
+
+@pytest.mark.parametrize(
+    ("text", "size"), [("512M", 512 << 20), ("2G", 2 << 30), ("1.5g", 3 << 29), ("100", 100), ("64 MiB", 64 << 20), ("1kB", 1024)]
+)
+def test_sizes(text: str, size: int) -> None:
+    assert Bytes().convert(text, None, None) == size
+
+
+@pytest.mark.parametrize("text", ["", "-1", "many", "1X", "0", "1e9"])
+def test_what_is_no_size(text: str) -> None:
+    with pytest.raises(Exception, match="not a size"):
+        Bytes().convert(text, None, None)
+
+
+def test_views() -> None:
+    assert View().convert("45/22.5", None, None) == ViewAngles(45.0, 22.5)
+    assert View().convert("90", None, None) == ViewAngles(90.0, 45.0)
+
+
+def test_old_names_are_the_same_verbs(run: Run, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    from map3d.cli import scripts
+
+    for function, verb in (
+        (scripts.create_scene, "create-scene"),
+        (scripts.add_files_to_scene, "add-files"),
+        (scripts.create_rendering, "create-rendering"),
+    ):
+        monkeypatch.setattr("sys.argv", ["script.py", "--help"])
+        with pytest.raises(SystemExit) as ended:
+            function()
+        assert ended.value.code == 0
+        assert f"map3d {verb}" in capsys.readouterr().out
