@@ -1,0 +1,232 @@
+//! CityGML appearances: themes, materials, textures of every kind, and how they pass down.
+
+mod reading;
+
+use map3d_base::asset::Wrap;
+use map3d_read::{Format, ReadOptions};
+use reading::{Folder, Reading, read_with};
+
+/// A building of one square (0 0) … (2 2), its polygon `p` in the surface `s` of the wall `w`, with appearances in the model and in the building.
+fn read(outside: &str, inside: &str, options: &ReadOptions) -> Reading {
+    let folder = Folder::new("appearance");
+    folder.put_png("t.png", 8, 4, [200, 100, 50, 255]);
+    folder.put_png("u.png", 4, 4, [1, 2, 3, 255]);
+    folder.put_png("clear.png", 4, 4, [1, 2, 3, 0]);
+    folder.put("u.pgw", "0.5\n0\n0\n-0.5\n0.25\n1.75\n");
+    let text = format!(
+        r##"<CityModel xmlns:gml="g" xmlns:xlink="x"><cityObjectMember><Building gml:id="b">{inside}
+        <boundedBy><WallSurface gml:id="w"><lod2MultiSurface><gml:MultiSurface gml:id="s"><gml:surfaceMember>
+        <gml:Polygon gml:id="p"><gml:exterior><gml:LinearRing gml:id="r"><gml:posList>0 0 0 2 0 0 2 2 0 0 2 0 0 0 0</gml:posList></gml:LinearRing></gml:exterior></gml:Polygon>
+        </gml:surfaceMember></gml:MultiSurface></lod2MultiSurface></WallSurface></boundedBy>
+        <lod2Solid><gml:Solid><gml:exterior><gml:CompositeSurface gml:id="c"><gml:surfaceMember xlink:href="#p"/></gml:CompositeSurface></gml:exterior></gml:Solid></lod2Solid>
+        </Building></cityObjectMember>{outside}</CityModel>"##
+    );
+    let path = folder.put("a.gml", text);
+    read_with(&path, Format::CityGml, options).expect("readable")
+}
+
+fn appearance(theme: &str, data: &str) -> String {
+    let members: String = data.split('|').map(|d| if d.starts_with('#') { format!("<surfaceDataMember xlink:href='{d}'/>") } else { format!("<surfaceDataMember>{d}</surfaceDataMember>") }).collect();
+    format!("<Appearance><theme>{theme}</theme>{members}</Appearance>")
+}
+
+fn member(theme: &str, data: &str) -> String {
+    format!("<appearanceMember>{}</appearanceMember>", appearance(theme, data))
+}
+
+fn property(theme: &str, data: &str) -> String {
+    format!("<appearance>{}</appearance>", appearance(theme, data))
+}
+
+fn color(rgb: &str, targets: &[&str]) -> String {
+    let targets: String = targets.iter().map(|t| format!("<target>#{t}</target>")).collect();
+    format!("<X3DMaterial><diffuseColor>{rgb}</diffuseColor>{targets}</X3DMaterial>")
+}
+
+fn texture(more: &str, target: &str, coordinates: &str) -> String {
+    format!("<ParameterizedTexture gml:id='tex'><imageURI>t.png</imageURI>{more}<target uri='#{target}'><TexCoordList gml:id='list'><textureCoordinates ring='#r'>{coordinates}</textureCoordinates></TexCoordList></target></ParameterizedTexture>")
+}
+
+const UVS: &str = "0 0 1 0 1 1 0 1 0 0";
+
+fn defaults(outside: &str, inside: &str) -> Reading {
+    read(outside, inside, &ReadOptions::default())
+}
+
+fn diffuse(reading: &Reading) -> [f32; 4] {
+    reading.material_of(0).diffuse
+}
+
+const RED: [f32; 4] = [1.0, 0.0, 0.0, 1.0];
+const GREEN: [f32; 4] = [0.0, 1.0, 0.0, 1.0];
+
+#[test]
+fn appearances_are_found_wherever_they_stand_and_whatever_they_target() {
+    for target in ["p", "s", "c", "w", "b"] {
+        let red = color("1 0 0", &[target]);
+        assert_eq!(diffuse(&defaults(&member("a", &red), "")), RED, "after, {target}");
+        assert_eq!(diffuse(&defaults("", &property("a", &red))), RED, "inside, {target}");
+    }
+    let nowhere = defaults(&member("a", &color("1 0 0", &["other"])), "");
+    assert_ne!(diffuse(&nowhere), RED);
+}
+
+#[test]
+fn the_nearest_wins_and_a_texture_beats_a_colour() {
+    let both = color("0 1 0", &["s"]) + "|" + &color("1 0 0", &["p"]);
+    assert_eq!(diffuse(&defaults(&member("a", &both), "")), RED);
+    let inside_first = defaults(&member("a", &color("0 1 0", &["p"])), &property("a", &color("1 0 0", &["p"])));
+    assert_eq!(diffuse(&inside_first), RED, "the building's own before the model's");
+    let textured = defaults(&member("a", &(color("1 0 0", &["p"]) + "|" + &texture("", "s", UVS))), "");
+    assert!(textured.material_of(0).texture.is_some());
+    assert_eq!(diffuse(&textured), [1.0; 4]);
+}
+
+#[test]
+fn the_first_theme_is_drawn_unless_another_is_asked_for() {
+    let two = member("summer", &color("1 0 0", &["p"])) + &member("winter", &color("0 1 0", &["p"]));
+    let asked = |theme: Option<&str>| read(&two, "", &ReadOptions { theme: theme.map(str::to_owned), ..ReadOptions::default() });
+    assert_eq!(diffuse(&asked(None)), RED);
+    assert_eq!(diffuse(&asked(Some("summer"))), RED);
+    assert_eq!(diffuse(&asked(Some("winter"))), GREEN);
+    assert_eq!(diffuse(&asked(Some("spring"))), [0.8, 0.8, 0.8, 1.0]);
+    assert!(asked(None).report.warnings.iter().any(|w| w.reason == "appearance theme drawn" && w.example == "summer"));
+    assert_eq!(asked(None).warned("another theme"), 1);
+    let inside = read("", &(property("x", &color("1 0 0", &["p"])) + &property("y", &color("0 1 0", &["p"]))), &ReadOptions::default());
+    assert_eq!(diffuse(&inside), RED);
+    assert_eq!(diffuse(&defaults("<appearanceMember><Appearance><surfaceDataMember>".to_owned().as_str(), "")), [0.8, 0.8, 0.8, 1.0], "broken off");
+}
+
+#[test]
+fn themes_share_surface_data_and_mappings_by_reference() {
+    let summer = member("summer", &("<X3DMaterial gml:id='m'><diffuseColor>1 0 0</diffuseColor><target>#p</target></X3DMaterial>".to_owned() + "|" + &texture("", "other", UVS)));
+    let winter = |data: &str| member("winter", data);
+    let options = ReadOptions { theme: Some("winter".into()), ..ReadOptions::default() };
+    assert_eq!(diffuse(&read(&(summer.clone() + &winter("#m")), "", &options)), RED);
+    assert_eq!(diffuse(&read(&(winter("#m") + &summer), "", &options)), RED);
+    let borrowed = "<ParameterizedTexture><imageURI>u.png</imageURI><target uri='#p' xlink:href='#list'/></ParameterizedTexture>";
+    let reading = read(&(summer + &winter(borrowed)), "", &options);
+    assert_eq!(reading.triangles()[0].uvs, Some([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]));
+}
+
+#[test]
+fn colours_and_transparency() {
+    let with = |inner: &str| defaults(&member("a", &format!("<X3DMaterial>{inner}<target>#p</target></X3DMaterial>")), "");
+    assert_eq!(diffuse(&with("")), [0.8, 0.8, 0.8, 1.0]);
+    assert_eq!(diffuse(&with("<diffuseColor>0.5 2 nan</diffuseColor><transparency>0.25</transparency>")), [0.5, 1.0, 0.0, 0.75]);
+    let invisible = with("<transparency>1</transparency>");
+    assert_eq!((invisible.count(), invisible.skipped("transparent")), (0, 1));
+    let back = with("<diffuseColor>1 0 0</diffuseColor><isFront>false</isFront>");
+    assert_eq!((diffuse(&back), back.warned("back sides")), ([0.8, 0.8, 0.8, 1.0], 1));
+}
+
+#[test]
+fn wrap_modes_and_border_colours() {
+    let border = "<wrapMode>border</wrapMode><borderColor>1 0.5 0 1</borderColor>";
+    for (more, wrap, color) in [
+        ("", Wrap::Wrap, [0.0; 4]),
+        ("<wrapMode>none</wrapMode>", Wrap::None, [0.0; 4]),
+        ("<wrapMode>wrap</wrapMode>", Wrap::Wrap, [0.0; 4]),
+        ("<wrapMode>mirror</wrapMode>", Wrap::Mirror, [0.0; 4]),
+        ("<wrapMode>clamp</wrapMode>", Wrap::Clamp, [0.0; 4]),
+        (border, Wrap::Border, [1.0, 0.5, 0.0, 1.0]),
+    ] {
+        let reading = defaults(&member("a", &texture(more, "p", "5 5 6 5 6 6 5 6 5 5")), "");
+        assert_eq!((reading.material_of(0).wrap, reading.material_of(0).border), (wrap, color));
+        let least = reading.triangles()[0].uvs.expect("textured")[0];
+        let expected = match wrap {
+            Wrap::Wrap => [0.0, 0.0],
+            Wrap::Mirror => [1.0, 1.0],
+            Wrap::Clamp | Wrap::Border | Wrap::None => [5.0, 5.0],
+        };
+        assert_eq!(least, expected, "{wrap:?}");
+    }
+}
+
+#[test]
+fn equal_looks_are_one_material() {
+    let reading = defaults(&member("a", &(texture("", "p", UVS) + "|" + &texture("", "q", UVS))), "");
+    assert_eq!((reading.materials.len(), reading.textures.len()), (1, 1));
+}
+
+#[test]
+fn rings_without_usable_coordinates_fall_back_to_the_colour() {
+    for (coordinates, textured) in [(UVS, true), ("0 0 1 0 1 1 0 1", true), ("0 0 1 0 1 1", false), ("0 0 1 0 1", false), ("a b", false), ("", false)] {
+        let reading = defaults(&member("a", &(texture("", "p", coordinates) + "|" + &color("1 0 0", &["p"]))), "");
+        assert_eq!(reading.material_of(0).texture.is_some(), textured, "{coordinates}: {:?}", reading.report);
+        assert!(textured || diffuse(&reading) == RED);
+        assert!(textured || reading.warned("texture") > 0);
+    }
+    let unhashed = texture("", "p", UVS).replace("'#p'", "'p'").replace("'#r'", "'r'");
+    assert!(defaults(&member("a", &unhashed), "").material_of(0).texture.is_some());
+}
+
+#[test]
+fn missing_images_fall_back_to_the_colour() {
+    let missing = texture("", "p", UVS).replace("t.png", "nowhere.png");
+    let reading = defaults(&member("a", &(missing + "|" + &color("1 0 0", &["p"]))), "");
+    assert_eq!((diffuse(&reading), reading.warned("image: file not found")), (RED, 1));
+}
+
+#[test]
+fn transparent_texels_cut_out() {
+    let reading = defaults(&member("a", &texture("", "p", UVS).replace("t.png", "clear.png")), "");
+    assert!(reading.material_of(0).cutout);
+}
+
+#[test]
+fn texture_coordinates_by_matrix() {
+    let generated = "<ParameterizedTexture><imageURI>t.png</imageURI><wrapMode>clamp</wrapMode><target uri='#p'><TexCoordGen><worldToTexture>0.5 0 0 0.25 0 0.25 0 0 0 0 0 1</worldToTexture></TexCoordGen></target></ParameterizedTexture>";
+    let reading = defaults(&member("a", generated), "");
+    assert_eq!(reading.triangles()[0].uvs, Some([[0.25, 0.0], [1.25, 0.0], [1.25, 0.5]]));
+    let perspective = generated.replace("0 0 0 1<", "0 0 0 2<");
+    assert_eq!(defaults(&member("a", &perspective), "").triangles()[0].uvs, Some([[0.125, 0.0], [0.625, 0.0], [0.625, 0.25]]));
+    let short = generated.replace("0 0 0 1<", "0 0 0<");
+    assert!(defaults(&member("a", &short), "").material_of(0).texture.is_none());
+}
+
+#[test]
+fn georeferenced_textures_by_reference_point_or_world_file() {
+    let georeferenced = |more: &str| format!("<GeoreferencedTexture><imageURI>u.png</imageURI><wrapMode>none</wrapMode>{more}<target>#p</target></GeoreferencedTexture>");
+    let point = "<referencePoint><gml:Point><gml:pos>0.25 1.75</gml:pos></gml:Point></referencePoint><orientation>0.5 0 0 -0.5</orientation>";
+    for more in [point, ""] {
+        let reading = defaults(&member("a", &georeferenced(more)), "");
+        assert_eq!(reading.triangles()[0].uvs, Some([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]), "{more}");
+    }
+    let lost = defaults(&member("a", &georeferenced("").replace("u.png", "t.png")), "");
+    assert!(lost.material_of(0).texture.is_none());
+    assert_eq!(lost.warned("without reference point"), 1);
+}
+
+#[test]
+fn coordinates_of_polygons_with_holes_stay_with_their_points() {
+    let folder = Folder::new("holes");
+    folder.put_png("t.png", 8, 8, [1, 1, 1, 255]);
+    // u = x / 10, v = y / 10 on every ring, so the same must hold on every triangle.
+    let (outer, inner) = ("0 0 10 0 10 10 0 10 0 0", "2 2 2 5 5 5 5 2 2 2");
+    let space = |flat: &str| flat.split(' ').collect::<Vec<_>>().chunks(2).map(|p| format!("{} {} 3", p[0], p[1])).collect::<Vec<_>>().join(" ");
+    let tenth = |flat: &str| flat.split(' ').map(|v| (v.parse::<f64>().expect("a number") / 10.0).to_string()).collect::<Vec<_>>().join(" ");
+    let text = format!(
+        "<CityModel xmlns:gml='g'><cityObjectMember><Building><lod2MultiSurface><gml:Polygon gml:id='p'><gml:exterior><gml:LinearRing gml:id='r0'><gml:posList>{}</gml:posList></gml:LinearRing></gml:exterior>\
+         <gml:interior><gml:LinearRing gml:id='r1'><gml:posList>{}</gml:posList></gml:LinearRing></gml:interior></gml:Polygon></lod2MultiSurface></Building></cityObjectMember>\
+         <appearanceMember><Appearance><surfaceDataMember><ParameterizedTexture><imageURI>t.png</imageURI><wrapMode>clamp</wrapMode><target uri='#p'><TexCoordList><textureCoordinates ring='#r1'>{}</textureCoordinates>\
+         <textureCoordinates ring='#r0'>{}</textureCoordinates></TexCoordList></target></ParameterizedTexture></surfaceDataMember></Appearance></appearanceMember></CityModel>",
+        space(outer), space(inner), tenth(inner), tenth(outer),
+    );
+    let path = folder.put("a.gml", text);
+    let reading = read_with(&path, Format::CityGml, &ReadOptions::default()).expect("readable");
+    assert_eq!((reading.count(), reading.area()), (8, 91.0));
+    for t in reading.triangles() {
+        for (corner, uv) in t.corners.iter().zip(t.uvs.expect("textured")) {
+            assert_eq!([(corner[0] / 10.0) as f32, (corner[1] / 10.0) as f32], uv);
+        }
+    }
+}
+
+#[test]
+fn appearances_over_their_limit_are_refused() {
+    let folder = Folder::new("limit");
+    let path = folder.put("a.gml", format!("<CityModel>{}</CityModel>", member("a", &texture("", "p", UVS))));
+    let options = ReadOptions { max_appearance_bytes: 10, ..ReadOptions::default() };
+    assert!(reading::is_limit_error(read_with(&path, Format::CityGml, &options), "max_appearance_bytes"));
+}
