@@ -1,8 +1,15 @@
 /** An element of index.html. */
-export function byId<T extends HTMLElement = HTMLElement>(id: string): T {
+export function byId(id: string): HTMLElement {
   const found = document.getElementById(id);
   if (!found) throw new Error(`index.html has no element "${id}"; take the index.html of the same release`);
-  return found as T;
+  return found;
+}
+
+/** An input of index.html. */
+export function inputById(id: string): HTMLInputElement {
+  const found = byId(id);
+  if (!(found instanceof HTMLInputElement)) throw new Error(`element "${id}" of index.html is no input`);
+  return found;
 }
 
 /** An element with text, never HTML. */

@@ -1,5 +1,5 @@
 import type { imageLayer, Light, map } from "./map3d.mjs";
-import { byId } from "./dom";
+import { byId, inputById } from "./dom";
 
 /** A summer day's sun, simplified: from east over south to west; highest at 13 o'clock. */
 export function lightAt(hour: number): Pick<Light, "azimuth_deg" | "altitude_deg"> {
@@ -9,7 +9,7 @@ export function lightAt(hour: number): Pick<Light, "azimuth_deg" | "altitude_deg
 
 /** The slider moves the light; it rests while nothing is lit. */
 export function bindTime(view: map, layer: imageLayer): void {
-  const [time, clock, sun] = [byId<HTMLInputElement>("time"), byId("clock"), byId("sun")];
+  const [time, clock, sun] = [inputById("time"), byId("clock"), byId("sun")];
   time.addEventListener("input", () => {
     const hour = time.valueAsNumber;
     clock.textContent = clockOf(hour);

@@ -1,4 +1,4 @@
-import { imageLayer, map, Map3dError, type ClickEvent } from "./map3d.mjs";
+import { imageLayer, map, Map3dError, type ClickEvent, type Vec3 } from "./map3d.mjs";
 import { InfoPanel } from "./info";
 import { lightAt, bindTime } from "./light";
 import { bindModes } from "./modes";
@@ -50,7 +50,18 @@ function dress(view: map, layer: imageLayer, info: InfoPanel): void {
   info.units = { crs: json.crs.name, vertical: json.crs.vertical };
   bindTime(view, layer);
   bindModes(layer);
-  if (json.objects) bindSearch(view, layer);
+  if (json.objects) {
+    bindSearch(view, layer, (id, position) => void describe(id, position, layer, info));
+  }
+}
+
+/** An object that was searched for: as if it had been clicked. */
+async function describe(id: number, position: Vec3, layer: imageLayer, info: InfoPanel): Promise<void> {
+  const object = await layer.object(id).catch((reason: unknown) => {
+    toast(String(reason));
+    return null;
+  });
+  show({ id, position, approximate: false, layer, point: [0, 0], ...(object ?? {}) }, layer, info);
 }
 
 function show(event: ClickEvent, layer: imageLayer, info: InfoPanel): void {

@@ -1,5 +1,5 @@
-import { marker, type imageLayer, type map, type SearchEntry } from "./map3d.mjs";
-import { byId, withText } from "./dom";
+import { marker, type imageLayer, type map, type SearchEntry, type Vec3 } from "./map3d.mjs";
+import { byId, inputById, withText } from "./dom";
 import { toast } from "./messages";
 
 const SHOWN = 8;
@@ -23,10 +23,10 @@ export function found(entries: readonly SearchEntry[], text: string): SearchEntr
 }
 
 /** The search box: a combobox over the rendering's index, which is fetched when the box is first used. */
-export function bindSearch(view: map, layer: imageLayer): void {
-  const [form, query, list] = [byId("search"), byId<HTMLInputElement>("query"), byId("results")];
+export function bindSearch(view: map, layer: imageLayer, chose: (id: number, position: Vec3) => void): void {
+  const [form, query, list] = [byId("search"), inputById("query"), byId("results")];
   const box = new SearchBox(query, list, () => layer.searchIndex(), (entry) => {
-    go(view, layer, entry);
+    go(view, layer, entry, chose);
   });
   form.hidden = false;
   form.addEventListener("submit", (event) => {
@@ -37,13 +37,13 @@ export function bindSearch(view: map, layer: imageLayer): void {
 
 let chosen: marker | undefined;
 
-function go(view: map, layer: imageLayer, [id, label, local]: SearchEntry): void {
+function go(view: map, layer: imageLayer, [id, label, local]: SearchEntry, chose: (id: number, position: Vec3) => void): void {
   const json = layer.rendering?.json;
   if (!json) return;
-  const world = [json.origin[0] + local[0], json.origin[1] + local[1], json.origin[2] + local[2]] as const;
+  const world = [json.origin[0] + local[0], json.origin[1] + local[1], json.origin[2] + local[2]] as const satisfies Vec3;
   chosen?.remove();
   chosen = new marker(label, world).addTo(view).select();
-  layer.clearHighlight().highlight(id);
+  chose(id, world);
   view.flyTo(world, Math.max(view.zoom, json.zmax - ZOOM_BELOW_DEEPEST));
 }
 

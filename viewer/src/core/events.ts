@@ -36,7 +36,7 @@ export class Evented<E extends object> {
 
   #add<K extends keyof E>(type: K, handle: unknown, call: Listener<E[K]>): this {
     const listeners = this.#listeners.get(type) ?? new Map<unknown, Listener<never>>();
-    this.#listeners.set(type, listeners.set(handle, call as Listener<never>));
+    this.#listeners.set(type, listeners.set(handle, call));
     return this;
   }
 }

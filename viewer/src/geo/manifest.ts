@@ -88,10 +88,10 @@ function checked(value: unknown, where: string): ManifestJson {
   if (!json || typeof json !== "object" || json.map3d !== "rendering") return refuse('is no rendering.json ("map3d": "rendering" is missing)');
   if (json.version !== READS) return refuse(`has version ${String(json.version)}, this viewer reads version ${String(READS)}; take the viewer of the same release`);
   const wrong = FIELDS.find(([name, ok]) => !ok(json[name]));
-  if (wrong) return refuse(`field "${wrong[0]}" is missing or malformed, got ${String(JSON.stringify(json[wrong[0]])).slice(0, 80)}`);
+  if (wrong) return refuse(`field "${wrong[0]}" is missing or malformed, got ${(JSON.stringify(json[wrong[0]]) as string | undefined ?? "nothing").slice(0, 80)}`);
   const full = json as ManifestJson;
   const odd = full.views.find((view) => !viewOk(view));
-  if (odd) return refuse(`view ${String(JSON.stringify(odd.id))} lacks its frame or occupancy`);
+  if (odd) return refuse(`view ${JSON.stringify(odd.id)} lacks its frame or occupancy`);
   return full;
 }
 

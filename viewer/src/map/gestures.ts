@@ -5,11 +5,11 @@ export interface Steered {
   readonly container: HTMLElement;
   /** A hand is on the map: movements stop. */
   grab(): void;
-  panBy(dx: number, dy: number): void;
+  panBy(dx: number, dy: number): unknown;
   glide(velocity: Vec2): void;
   /** At once, without smoothing. */
-  pinch(factor: number, anchor: Vec2): void;
-  zoomBy(delta: number, anchor: Vec2): void;
+  pinch(factor: number, anchor: Vec2): unknown;
+  zoomBy(delta: number, anchor: Vec2): unknown;
   tap(at: Vec2): void;
   hover(at: Vec2): void;
 }

@@ -37,6 +37,7 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
   #mode: Mode;
   #stage: Stage | undefined;
   #map: map | undefined;
+  #name = "";
   #store: Store | undefined;
   #rendering: Rendering | undefined;
   #objects: Objects | undefined;
@@ -119,12 +120,15 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
   onAdd(map: map): void {
     this.#map = map;
     const stage = map.stage;
+    if (!stage) return; // the map has said why
     this.#stage = stage;
+    this.#name = stage.nameLayer();
     const failed = (error: Error): void => {
+      if (this.#stage !== stage) return;
       this.fire("error", { error });
       stage.report(error);
     };
-    this.#store = new Store(stage.nameLayer(), this.#source, stage.shared, (error) => {
+    this.#store = new Store(this.#name, this.#source, stage.shared, (error) => {
       if (error) failed(error);
       stage.request();
     });
@@ -134,6 +138,7 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
   }
 
   onRemove(): void {
+    this.#stage?.forget(this.#name);
     this.#stage = this.#map = this.#store = this.#rendering = this.#objects = undefined;
   }
 
@@ -219,6 +224,6 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
 }
 
 function checkedMode(mode: Mode): Mode {
-  if (!MODES.includes(mode)) throw new UsageError(`mode "${String(mode)}" is unknown; take one of ${MODES.join(", ")}`);
+  if (!MODES.includes(mode)) throw new UsageError(`mode "${mode}" is unknown; take one of ${MODES.join(", ")}`);
   return mode;
 }

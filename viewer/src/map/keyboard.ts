@@ -1,6 +1,7 @@
 import type { Steered } from "./gestures";
 
 export interface Turned extends Steered {
+  panBy(dx: number, dy: number, options?: { smooth?: boolean }): unknown;
   /** +1: the next direction counter-clockwise. */
   rotate(step: number): unknown;
 }
@@ -11,13 +12,13 @@ const ZOOM: Record<string, number> = { "+": 1, "=": 1, "-": -1, _: -1 };
 const TURN: Record<string, number> = { "[": 1, "]": -1, q: 1, e: -1 };
 
 /** Arrows move, + and − zoom, q and e (or [ and ]) turn. Keys count while the map itself has the focus. */
-export function listenToKeys(map: Turned, smooth: (dx: number, dy: number) => void, signal: AbortSignal): void {
+export function listenToKeys(map: Turned, signal: AbortSignal): void {
   const { container } = map;
   container.tabIndex = 0;
   const pressed = (event: KeyboardEvent): void => {
     if (event.target !== container || event.ctrlKey || event.metaKey || event.altKey) return;
     const [pan, zoom, turn] = [PAN[event.key], ZOOM[event.key], TURN[event.key]];
-    if (pan) smooth(pan[0] * STEP_PX, pan[1] * STEP_PX);
+    if (pan) map.panBy(pan[0] * STEP_PX, pan[1] * STEP_PX, { smooth: true });
     else if (zoom !== undefined) map.zoomBy(zoom, [container.clientWidth / 2, container.clientHeight / 2]);
     else if (turn !== undefined) map.rotate(turn);
     else return;

@@ -8,6 +8,8 @@ export interface Stage {
   readonly shared: Shared;
   /** A name for the layer's tiles that no other layer of the map has. */
   nameLayer(): string;
+  /** A layer has left: its tiles can go. */
+  forget(layer: string): void;
   /** The layer's manifest is here. */
   ready(rendering: Rendering): void;
   /** A frame is needed. */

@@ -24,7 +24,7 @@ export class Viewport {
   /** @param target a canvas or another element, or its id  @throws UsageError */
   constructor(target: string | HTMLElement, resized: () => void) {
     const found = typeof target === "string" ? document.getElementById(target) : target;
-    if (!found) throw new UsageError(`no element has the id "${String(target)}"; give the id of a <canvas> that is in the page`);
+    if (!found) throw new UsageError(`no element has the id "${typeof target === "string" ? target : ""}"; give the id of a <canvas> that is in the page`);
     ({ container: this.container, canvas: this.canvas, unwrap: this.#unwrap } = found instanceof HTMLCanvasElement ? wrap(found) : fill(found));
     this.container.append(this.overlayPane, this.controlPane);
     this.#size = this.#measure();

@@ -71,7 +71,7 @@ export class Archive {
       const bytes = await this.#read(0, FIRST_READ_BYTES);
       const header = readHeader(bytes, this.#name);
       const [offset, length] = header.root;
-      if (offset + length <= bytes.byteLength) this.#keep(header, offset, Promise.resolve(bytes.slice(offset, offset + length)));
+      if (offset + length <= bytes.byteLength) void this.#keep(header, offset, Promise.resolve(bytes.slice(offset, offset + length)));
       return header;
     } catch (reason) {
       this.#header = undefined;

@@ -9,7 +9,7 @@ let host: string;
 const server = new TestServer();
 
 beforeAll(async () => {
-  server.renderings.set("town", renderTown(256, 0.19));
+  server.renderings.set("town", renderTown(256, 0.38));
   host = await server.listen();
   browser = await openBrowser();
 });
@@ -19,7 +19,7 @@ afterAll(async () => {
   await server.close();
 });
 
-const PHONE = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 3, isMobile: true, hasTouch: true, userAgent: devices["iPhone 14"]?.userAgent ?? "" };
+const PHONE = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 3, isMobile: true, hasTouch: true, userAgent: devices["iPhone 14"].userAgent };
 const DESK = { viewport: { width: 1280, height: 800 } };
 
 /** The page with the town, at rest. */
@@ -41,15 +41,19 @@ for (const [name, options] of [["desk", DESK], ["phone", PHONE], ["dark", { ...D
     await page.screenshot({ path: `${OUT}/${name}-search.png` });
     expect(await page.locator("#results li").allTextContents()).toEqual(["School <b>old</b>"]);
     await page.keyboard.press("Enter");
-    await page.waitForTimeout(2500);
-    const { width, height } = page.viewportSize() ?? { width: 0, height: 0 };
-    await page.mouse.click(width / 2, height / 2 + 4);
     await page.waitForSelector("#info:not([hidden])");
-    await page.waitForTimeout(800);
+    await page.waitForTimeout(2500);
     await page.screenshot({ path: `${OUT}/${name}-info.png` });
     expect(await page.locator("#info h2").textContent()).toBe("School <b>old</b>");
     expect(await page.locator("#info img").count()).toBe(0);
     await page.locator("#info .close").click();
+    const { width, height } = options.viewport;
+    await page.mouse.click(width / 2 - 60, height / 2 + 60);
+    await page.waitForSelector("#info:not([hidden])");
+    await page.waitForTimeout(800);
+    await page.screenshot({ path: `${OUT}/${name}-click.png` });
+    expect(await page.locator("#info dd").count()).toBe(7);
+    await page.keyboard.press("Escape");
     expect(await page.locator("#info").isHidden()).toBe(true);
     expect(problems).toEqual([]);
     await page.context().close();
@@ -91,7 +95,7 @@ test("controls are at least 44 pixels large and have names", async () => {
     const area = found.matches("#modes input") ? (found.parentElement as HTMLElement) : found;
     const { width, height } = area.getBoundingClientRect();
     const tall = found.matches("#modes input") ? height + 12 : height;
-    const named = found.getAttribute("aria-label") ?? found.textContent ?? "";
+    const named = found.getAttribute("aria-label") ?? found.textContent;
     return width < 44 || tall < 44 || (named === "" && !found.matches("#modes input")) ? [`${found.outerHTML.slice(0, 80)} ${String(width)} × ${String(height)}`] : [];
   }));
   expect(small).toEqual([]);

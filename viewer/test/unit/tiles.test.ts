@@ -189,7 +189,7 @@ describe("fetch", () => {
 });
 
 describe("queue", () => {
-  const world = (): { started: string[]; aborted: string[]; end: Map<string, () => void>; job(key: string): Job } => {
+  const world = (): { started: string[]; aborted: string[]; end: Map<string, () => void>; job: (key: string) => Job } => {
     const [started, aborted, end] = [[] as string[], [] as string[], new Map<string, () => void>()];
     const job = (key: string): Job => ({
       key,

@@ -95,9 +95,8 @@ vec4 surface(vec2 texel) {
 vec4 surface(vec2 texel) {
   uint id = texelFetch(u_id, inside(ivec2(floor(texel))), 0).r;
   uint h = id * 2654435769u;
-  h ^= h >> 15;
-  vec3 hue = 0.5 + 0.5 * cos(6.2831853 * (float(h & 1023u) / 1024.0 + vec3(0.0, 0.33, 0.67)));
-  return vec4(mix(vec3(0.55 + 0.35 * float(h >> 10 & 255u) / 255.0), hue, 0.45), id == 0u ? 0.0 : 1.0);
+  vec3 hue = 0.5 + 0.5 * cos(6.2831853 * (float(h >> 22) / 1024.0 + vec3(0.0, 0.33, 0.67)));
+  return vec4(mix(vec3(0.5 + 0.4 * float(h >> 12 & 1023u) / 1023.0), hue, 0.34), id == 0u ? 0.0 : 1.0);
 }
 #endif
 #ifdef MODE_DEPTH

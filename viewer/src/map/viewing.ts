@@ -1,0 +1,242 @@
+import { UsageError } from "../core/errors";
+import { Evented } from "../core/events";
+import { add, clamp, mid, sub, type Box3, type Vec2, type Vec3 } from "../core/vec";
+import { depthAtHeight, localFromUvd, uvdFromLocal } from "../geo/axes";
+import { cssPixelM, projectedBox, screenFromLocal, uvFromScreen, zoomedAt, zoomToFit, type Camera } from "../geo/camera";
+import type { Rendering, View } from "../geo/manifest";
+import { neighbourView } from "./directions";
+import { limited, zoomLimits } from "./limits";
+import { Motion } from "./motion";
+import type { FilledOptions, MapEvents } from "./options";
+import type { Sight } from "./stage";
+import type { Size } from "./viewport";
+
+const FLIGHT_MS = 700;
+const STEP_MS = 220;
+
+export interface FitOptions {
+  /** Free room at each side. Default 24. */
+  padding_px?: number;
+  /** Default 0: at once. */
+  duration_ms?: number;
+  /** Default: the map's greatest. */
+  maxZoom?: number;
+}
+
+/** Where a map looks: its camera, and all that moves it. Calls before the first manifest is here wait for it. */
+export abstract class Viewing extends Evented<MapEvents> {
+  abstract readonly options: FilledOptions;
+  protected readonly motion = new Motion(() => { this.requestFrame(); });
+  protected camera: Camera | undefined;
+  /** The first layer's manifest; its origin is that of the camera. */
+  protected reference: Rendering | undefined;
+  #pending: (() => void)[] = [];
+
+  protected abstract get size(): Size;
+  protected abstract requestFrame(): void;
+  protected abstract report(error: Error): void;
+  /** World position of the surface in the middle as far as it is in memory. */
+  protected abstract surfaceInTheMiddle(sight: Sight): Vec3 | null;
+
+  /** The surface in the middle of the screen as far as it is known, else the ground there; null before "ready". */
+  get center(): Vec3 | null {
+    const sight = this.sight();
+    return sight && (this.surfaceInTheMiddle(sight) ?? this.unproject(this.middle()));
+  }
+
+  /** At whole numbers a tile pixel of that level is one CSS pixel. */
+  get zoom(): number {
+    return this.camera?.zoom ?? 0;
+  }
+
+  /** Least and greatest. */
+  get zoomLimits(): [number, number] {
+    return this.camera && this.reference ? zoomLimits(this.camera, this.reference.json.box) : [0, 0];
+  }
+
+  /** The view's id, e.g. "45-22.5". */
+  get direction(): string {
+    return this.camera?.frame.id ?? this.options.direction ?? "";
+  }
+
+  /** Degrees counter-clockwise from north. */
+  get lookAt_deg(): number {
+    return this.camera?.frame.lookAtDeg ?? 0;
+  }
+
+  /** All views of the first layer. */
+  get directions(): readonly { id: string; lookAtDeg: number; pitchDeg: number }[] {
+    return [...(this.reference?.views.values() ?? [])].map(({ frame }) => frame);
+  }
+
+  /** Puts a world position in the middle, at once. */
+  setView(position: Vec3, zoom?: number): this {
+    return this.#go((camera, rendering) => cameraAt(camera, rendering, position, zoom), 0);
+  }
+
+  flyTo(position: Vec3, zoom?: number, { duration_ms = FLIGHT_MS }: { duration_ms?: number } = {}): this {
+    return this.#go((camera, rendering) => cameraAt(camera, rendering, position, zoom), duration_ms);
+  }
+
+  /** Shows a box of world coordinates as large as it fits. */
+  fitBounds([low, high]: Box3, { padding_px = 24, duration_ms = 0, maxZoom = Infinity }: FitOptions = {}): this {
+    return this.#go((camera, { json: { origin } }) => fitted(camera, [sub(low, origin), sub(high, origin)], padding_px, maxZoom), duration_ms);
+  }
+
+  setZoom(zoom: number): this {
+    return this.#go((camera) => ({ ...camera, zoom }), 0);
+  }
+
+  zoomIn(): this {
+    return this.zoomBy(1);
+  }
+
+  zoomOut(): this {
+    return this.zoomBy(-1);
+  }
+
+  /** Zooms smoothly by levels about a point of the screen, its middle unless given. */
+  zoomBy(delta: number, anchor: Vec2 = this.middle()): this {
+    const camera = this.camera;
+    if (!camera) return this;
+    if (still()) return this.setCamera(zoomedAt(camera, clamp(camera.zoom + delta, ...this.zoomLimits), anchor));
+    this.motion.zoomBy(camera, delta, anchor, this.zoomLimits);
+    return this;
+  }
+
+  /** Zooms by a factor about a point of the screen, at once. */
+  pinch(factor: number, anchor: Vec2): this {
+    const camera = this.camera;
+    return camera ? this.setCamera(zoomedAt(camera, clamp(camera.zoom + Math.log2(factor), ...this.zoomLimits), anchor)) : this;
+  }
+
+  /** Moves the picture by CSS pixels: at once, or smoothly. */
+  panBy(dx: number, dy: number, { smooth = false }: { smooth?: boolean } = {}): this {
+    return this.camera ? this.#go((camera) => panned(camera, dx, dy), smooth ? STEP_MS : 0, smooth) : this;
+  }
+
+  /** Another view of the rendering; the point in the middle stays there, highlights and markers stay on their objects. @throws UsageError */
+  setDirection(direction: string): this {
+    return this.whenReady((camera, rendering) => {
+      const view = rendering.views.get(direction);
+      if (!view) throw new UsageError(`view "${direction}" is none of ${[...rendering.views.keys()].join(", ")}`);
+      if (view.frame !== camera.frame) this.#turn(view, camera, rendering);
+    });
+  }
+
+  /** The next direction of the same pitch, +1 counter-clockwise. */
+  rotate(step: number): this {
+    return this.whenReady((camera, rendering) => this.setDirection(neighbourView(rendering, camera.frame, step)));
+  }
+
+  /** CSS pixels of a world position; null before "ready". */
+  project(world: Vec3): Vec2 | null {
+    return this.camera && this.reference ? screenFromLocal(this.camera, sub(world, this.reference.json.origin)) : null;
+  }
+
+  /** World position on the ground (height of the content's lowest point) under CSS pixels; null in level views. */
+  unproject(point: Vec2): Vec3 | null {
+    return this.camera && this.reference ? groundAt(this.camera, this.reference, point) : null;
+  }
+
+  /** @internal */
+  grab(): void {
+    this.motion.stop();
+  }
+
+  /** @internal */
+  glide(velocity: Vec2): void {
+    if (!still()) this.motion.glide(velocity);
+  }
+
+  protected sight(): Sight | null {
+    const dpr = Math.min(this.size.dpr, this.options.maxPixelRatio);
+    return this.camera && this.reference ? { camera: this.camera, origin: this.reference.json.origin, dpr } : null;
+  }
+
+  protected middle(): Vec2 {
+    return [this.size.width / 2, this.size.height / 2];
+  }
+
+  protected setCamera(camera: Camera): this {
+    this.camera = this.reference ? limited(camera, this.reference.json.box) : camera;
+    this.requestFrame();
+    return this;
+  }
+
+  /** The camera for this moment of a movement. */
+  protected stepCamera(now_ms: number): void {
+    const camera = this.camera;
+    const next = camera && this.motion.step(now_ms, camera);
+    if (next && next !== camera) this.camera = this.reference ? limited(next, this.reference.json.box) : next;
+  }
+
+  /** The first manifest gives the map its view. */
+  protected begin(rendering: Rendering): void {
+    const { width, height } = this.size;
+    const { json, views } = rendering;
+    const { direction, center, zoom } = this.options;
+    const view = views.get(direction ?? "") ?? [...views.values()][0];
+    if (!view) return;
+    if (direction !== undefined && !views.has(direction)) this.report(new UsageError(`view "${direction}" is none of ${[...views.keys()].join(", ")}`));
+    this.reference = rendering;
+    const whole = fitted({ frame: view.frame, u: 0, v: 0, zoom: 0, width, height }, json.box, Math.min(width, height) * 0.04, json.zmax);
+    const start = center ?? (json.start && add(json.origin, json.start.local));
+    this.setCamera(start ? cameraAt(whole, rendering, start, zoom) : { ...whole, zoom: zoom ?? whole.zoom });
+    for (const act of this.#pending.splice(0)) act();
+    this.fire("ready", {});
+    this.fire("directionchange", { direction: this.direction });
+  }
+
+  protected whenReady(act: (camera: Camera, rendering: Rendering) => void): this {
+    const run = (): void => {
+      if (this.camera && this.reference) act(this.camera, this.reference);
+    };
+    if (this.camera) run();
+    else this.#pending.push(run);
+    return this;
+  }
+
+  #go(to: (camera: Camera, rendering: Rendering) => Camera, duration_ms: number, stops = true): this {
+    return this.whenReady((camera, rendering) => {
+      const target = limited(to(camera, rendering), rendering.json.box);
+      if (stops) this.motion.stop();
+      if (duration_ms <= 0 || still()) this.setCamera(target);
+      else this.motion.fly(camera, target, duration_ms);
+    });
+  }
+
+  #turn(view: View, camera: Camera, rendering: Rendering): void {
+    const held = this.center;
+    const turned = { ...camera, frame: view.frame };
+    this.motion.stop();
+    this.setCamera(held ? cameraAt(turned, rendering, held) : fitted(turned, rendering.json.box, 0, camera.zoom));
+    this.fire("directionchange", { direction: view.id });
+  }
+}
+
+/** Does the user want no movement? */
+const still = (): boolean => matchMedia("(prefers-reduced-motion: reduce)").matches;
+
+function cameraAt(camera: Camera, { json }: Rendering, position: Vec3, zoom = camera.zoom): Camera {
+  const [u, v] = uvdFromLocal(camera.frame.axes, sub(position, json.origin));
+  return { ...camera, u, v, zoom };
+}
+
+function panned(camera: Camera, dx: number, dy: number): Camera {
+  const px = cssPixelM(camera);
+  return { ...camera, u: camera.u - dx * px, v: camera.v + dy * px };
+}
+
+/** The camera that shows a local box. */
+function fitted(camera: Camera, box: Box3, padding: number, maxZoom: number): Camera {
+  const [low, high] = projectedBox(camera.frame, box);
+  const [u, v] = uvdFromLocal(camera.frame.axes, mid(box));
+  return { ...camera, u, v, zoom: Math.min(zoomToFit(camera, high[0] - low[0], high[1] - low[1], padding), maxZoom) };
+}
+
+function groundAt(camera: Camera, { json }: Rendering, point: Vec2): Vec3 | null {
+  const [u, v] = uvFromScreen(camera, point);
+  const d = depthAtHeight(camera.frame.axes, v, json.box[0][2]);
+  return d === null ? null : add(json.origin, localFromUvd(camera.frame.axes, [u, v, d]));
+}
