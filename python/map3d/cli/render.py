@@ -53,7 +53,7 @@ def render_with_progress(run: "Run") -> "Outcome":
 
 
 def _work(run: "Run", plan: "Plan") -> "Outcome":
-    from map3d.jobs.events import Done, Failed, Left, Lost
+    from map3d.jobs.events import Done, Failed, Left, Lost, Stopping
 
     note = console()
     outcome = plan.outcome
@@ -71,6 +71,9 @@ def _work(run: "Run", plan: "Plan") -> "Outcome":
                 bar.console.print(f"{event.lease.view} {event.lease.block}: attempt {event.lease.attempt} failed, now {event.state}: {event.reason}")
             elif isinstance(event, Lost):
                 bar.console.print(f"{event.lease.view} {event.lease.block}: lease lost: {event.reason}")
+            elif isinstance(event, Stopping):
+                how = "giving the blocks in hand back" if event.abandoning else "finishing the blocks in hand; Ctrl-C again gives them back at once"
+                bar.console.print(f"stopping: {how}")
             elif isinstance(event, Left) and event.because:
                 bar.console.print(f"worker {event.worker} left: {event.because}")
 

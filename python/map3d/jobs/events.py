@@ -39,4 +39,11 @@ class Left:
     error: BaseException | None = None
 
 
-Event = Done | Failed | Lost | Left
+@dataclass(frozen=True)
+class Stopping:
+    """The user asked to stop: at once when `abandoning`, else when the jobs in hand are done."""
+
+    abandoning: bool
+
+
+Event = Done | Failed | Lost | Left | Stopping

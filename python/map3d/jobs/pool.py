@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from map3d.catalogue import Catalogue
-from map3d.jobs.events import Done, Event, Failed, Left, Lost
+from map3d.jobs.events import Done, Event, Failed, Left, Lost, Stopping
 from map3d.jobs.terms import Terms
 from map3d.jobs.worker import Task, Worker
 
@@ -39,7 +39,7 @@ class Tally:
             self.failed_attempts += 1
         elif isinstance(event, Lost):
             self.lost_leases += 1
-        elif event.because:
+        elif isinstance(event, Left) and event.because:
             self.left_early.append(f"{event.worker}: {event.because}")
 
 
@@ -52,7 +52,7 @@ class Pool:
     def __init__(self, catalogue: Catalogue, rendering: str, task: Task, size: int, terms: Terms | None = None, host: str = "local") -> None:
         self._catalogue, self._rendering, self._task, self._terms = catalogue, rendering, task, terms or Terms()
         self._size, self._host = size, host
-        self._events: queue.Queue[Event] = queue.Queue()
+        self._events: queue.SimpleQueue[Event] = queue.SimpleQueue()
         self._stop, self._abandon = threading.Event(), threading.Event()
         self._threads: dict[str, threading.Thread] = {}
         self._started = 0
@@ -74,7 +74,7 @@ class Pool:
 
     def run(self, on_event: Callable[[Event], None]) -> Tally:
         """Blocks; `on_event` is called in the caller's thread. While it runs, the first SIGINT or SIGTERM stops the pool, the second abandons."""
-        with _signals(lambda: self.abandon() if self.stopped else self.stop()):
+        with _signals(self._on_signal):
             for _ in range(self._size):
                 self._start_worker()
             while self._threads or not self._events.empty():
@@ -82,6 +82,10 @@ class Pool:
         if self._error is not None:
             raise self._error
         return self.tally
+
+    def _on_signal(self) -> None:
+        self._events.put(Stopping(abandoning=self.stopped))
+        self.abandon() if self.stopped else self.stop()
 
     def _next(self, on_event: Callable[[Event], None]) -> None:
         try:

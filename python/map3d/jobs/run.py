@@ -84,6 +84,7 @@ class Run:
         self._workspace, self._catalogue, self._settings = workspace, catalogue, settings
         self.record = catalogue.rendering(rendering)
         self._cache_bytes = settings.cache_bytes
+        self._pool: Pool | None = None
 
     def build(self, progress: BuildProgress | None = None) -> dict[str, Any] | None:
         """Builds the scene if its files changed; the report, None when there was nothing to do."""
@@ -111,17 +112,27 @@ class Run:
 
     def work(self, plan: Plan, on_event: Callable[[Event], None]) -> Outcome:
         """Runs the workers until nothing is left to do or the user stops them, then writes the manifest."""
+        if not plan.open_jobs:
+            return self._finish(plan, Tally(), False)
         task = RenderTask(self._workspace, self.record, cache_bytes=self._cache_bytes, entry=self._settings.entry)
-        pool = Pool(self._catalogue, self.record.name, task, self._settings.workers, self._settings.terms)
+        self._pool = Pool(self._catalogue, self.record.name, task, self._settings.workers, self._settings.terms)
         try:
-            tally = pool.run(on_event) if plan.open_jobs else pool.tally
+            tally = self._pool.run(on_event)
         finally:
             task.close()
+        return self._finish(plan, tally, self._pool.stopped)
+
+    def stop(self) -> None:
+        """Lets the blocks in hand be finished and no more begun."""
+        if self._pool is not None:
+            self._pool.stop()
+
+    def _finish(self, plan: Plan, tally: Tally, stopped: bool) -> Outcome:
         counts = self._catalogue.count_jobs(self.record.name)
         complete = counts[State.DONE] == sum(counts.values())
-        write_manifest(self._workspace, self._catalogue, self.record.name, plan.box, {} if complete else self._still_open(plan))
+        write_manifest(self._workspace, self._catalogue, self.record.name, plan.box, {} if complete else self._within_open(plan.occupancy))
         open_jobs = counts[State.WAITING] + counts[State.TODO] + counts[State.LEASED]
-        return Outcome(tally, complete, pool.stopped, open_jobs, counts[State.QUARANTINED], self.record.content_version)
+        return Outcome(tally, complete, stopped, open_jobs, counts[State.QUARANTINED], self.record.content_version)
 
     def _prune(self) -> None:
         """Removes blocks that no job stands for, such as those of frames pinned before."""
@@ -137,9 +148,6 @@ class Run:
     def _open_occupancy(self, scene: PlannedScene) -> dict[str, Occupancy]:
         whole = {frame.id: planned_occupancy(scene, self.record, frame) for frame in self.record.frames}
         return self._within_open(whole)
-
-    def _still_open(self, plan: Plan) -> dict[str, Occupancy]:
-        return self._within_open(plan.occupancy)
 
     def _within_open(self, whole: Planned) -> dict[str, Occupancy]:
         """Only what lies in base blocks that are not done."""

@@ -3,19 +3,19 @@
 import hashlib
 import json
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Final
 
 from map3d import _core
 from map3d.catalogue import Catalogue, SceneRecord, Workspace
 from map3d.errors import BadRequest
 from map3d.ingest.lock import scene_lock
 from map3d.registry import Registry
-from map3d.types import Box
+from map3d.render.scene_files import object_box
 
 BuildProgress = Callable[[str, int, int], bool]
 """(stage, done, total) → False to stop."""
 
-OPTIONS: Mapping[str, Any] = {
+OPTIONS: Final[Mapping[str, Any]] = {
     "merge_vertices": True,
     "merge_faces": True,
     "drop_degenerate": True,
@@ -23,7 +23,7 @@ OPTIONS: Mapping[str, Any] = {
     "drop_untextured": False,
     "ground_plane": "auto",
 }
-GROUND = "ground"
+GROUND: Final = "ground"
 
 
 def is_stale(workspace: Workspace, catalogue: Catalogue, scene: str) -> bool:
@@ -54,7 +54,7 @@ def build(
                 "max_memory_bytes": max_memory_bytes,
             }
             report: dict[str, Any] = json.loads(_core.build_scene(str(folder), json.dumps(request), progress))
-            registry.set_scene_object(ground, _ground_box(report))
+            registry.set_scene_object(ground, object_box(folder, ground) if report.get("ground_plane_triangles") else None)
         catalogue.set_built(scene, mark)
         return report
 
@@ -69,8 +69,3 @@ def fingerprint(catalogue: Catalogue, record: SceneRecord) -> str:
 def open_scene(workspace: Workspace, scene: str, cache_bytes: int = 64 << 20) -> _core.Scene:
     """The built scene, for planning and checking."""
     return _core.Scene(str(workspace.scene_folder(scene)), cache_bytes=cache_bytes)
-
-
-def _ground_box(report: Mapping[str, Any]) -> Box | None:
-    box = report.get("ground_box")
-    return None if box is None else ((box[0][0], box[0][1], box[0][2]), (box[1][0], box[1][1], box[1][2]))

@@ -35,7 +35,7 @@ def decode_tile(layer: Layer, data: bytes, tile_px: int) -> NDArray[np.uint8]:
 
 def ids_of(pixels: NDArray[np.uint8]) -> NDArray[np.uint32]:
     """Distinct object ids of an id tile, without nothing (0)."""
-    ids = np.unique(np.ascontiguousarray(pixels).view("<u4"))
+    ids: NDArray[np.uint32] = np.unique(np.ascontiguousarray(pixels).view("<u4"))
     return ids[ids != 0]
 
 

@@ -1,6 +1,8 @@
 """Checks a scene's files against the checksums that they carry (spec/scene.md)."""
 
 import json
+import os
+import struct
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
@@ -8,14 +10,20 @@ from typing import Any, Final
 import numpy as np
 import xxhash
 
+from map3d.errors import Corrupt
 from map3d.ingest.asset import read_objects
 from map3d.registry import Registry
+from map3d.registry.boxes import united
+from map3d.types import Box
 
 HEADER_BYTES: Final = {b"M3DA": 64, b"M3DC": 64, b"M3DI": 64, b"M3DT": 64}
 """What the checksum at byte 8 leaves out: the first 64 bytes."""
 
 VERSION: Final = 1
 _PIECE: Final = 1 << 22
+_CHUNK_HEAD: Final = struct.Struct("<4sIQ3d6f6I")
+"""Magic, version, checksum, origin, box, counts of nodes, leaves, triangles, objects, materials, flags."""
+_CHUNK_OBJECT: Final = np.dtype([("id", "<u4"), ("rank", "<u4"), ("box", "<f4", 6), ("hash", "<u8", 2), ("pad", "V16")])
 
 
 def binary_files(folder: Path) -> Iterator[Path]:
@@ -37,6 +45,23 @@ def check_file(path: Path) -> str | None:
         while piece := file.read(_PIECE):
             digest.update(piece)
     return None if digest.intdigest() == checksum else f"{path}: checksum {digest.intdigest():016x}, its head says {checksum:016x}"
+
+
+def object_box(folder: Path, number: int) -> Box | None:
+    """The local box of an object, from the tables at the end of the scene's chunks; None when no chunk has it."""
+    found: Box | None = None
+    for path in sorted(folder.glob("chunks/[!p]*.m3c")):
+        with path.open("rb") as file:
+            head = file.read(_CHUNK_HEAD.size)
+            if len(head) < _CHUNK_HEAD.size:
+                raise Corrupt(f"{path}: ends after {len(head)} bytes")
+            origin, count = _CHUNK_HEAD.unpack(head)[3:6], _CHUNK_HEAD.unpack(head)[15]
+            file.seek(-count * _CHUNK_OBJECT.itemsize, os.SEEK_END)
+            table = np.frombuffer(file.read(), _CHUNK_OBJECT)
+        for row in table[table["id"] == number]:
+            low, high = (row["box"].reshape(2, 3).astype(np.float64) + origin).tolist()
+            found = united(found, ((low[0], low[1], low[2]), (high[0], high[1], high[2])))
+    return found
 
 
 def check_index(folder: Path) -> Iterator[str]:
