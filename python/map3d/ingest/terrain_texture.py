@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from rasterio.enums import ColorInterp, Resampling
+from rasterio.enums import ColorInterp, MaskFlags, Resampling
 from rasterio.windows import Window
 
 from map3d.errors import ImportFailed
@@ -54,6 +54,7 @@ class Orthophoto:
         self._ground = np.array(ground, dtype=np.uint8)
         self._max_side_px = max_side_px
         self._bands = _colour_bands(dataset)
+        self._whole = all(flags == [MaskFlags.all_valid] for flags in dataset.mask_flag_enums)
         self._palette = _palette(dataset) if len(self._bands) == 1 else None
         self.stretch = (0.0, 255.0) if self._palette is not None else stretch or self._find_stretch()
 
@@ -64,12 +65,11 @@ class Orthophoto:
         """
         left, top, right, bottom = _aligned(box)
         width, height = self._image_side(right - left), self._image_side(bottom - top)
-        colour, shown, beyond = self._read(left, top, right - left, bottom - top, width, height)
+        colour, shown = self._read(left, top, right - left, bottom - top, width, height)
         if not shown.any():
             return None
-        holed = cutout and not (shown | beyond).all()
-        colour = _spread(colour, shown, self._ground)
-        data = _png(colour, shown | beyond) if holed else _jpeg(colour)
+        holed = cutout and not shown.all()
+        data = _png(colour, shown) if holed else _jpeg(colour)
         key = sha256(data).hexdigest()[:32]
         (folder / f"{key}.{'png' if holed else 'jpg'}").write_bytes(data)
         return TextureTile(key, left, top, (width / (right - left), height / (bottom - top)), (width, height), holed)
@@ -77,29 +77,27 @@ class Orthophoto:
     def _image_side(self, pixels: int) -> int:
         return min(pixels, self._max_side_px)
 
-    def _read(self, left: int, top: int, width: int, height: int, out_width: int, out_height: int) -> tuple[Colours, Mask, Mask]:
-        """(h, w, 3) colours of a window, (h, w) where the photo shows any, (h, w) where the window reaches beyond the photo."""
-        colour = np.zeros((out_height, out_width, 3), dtype=np.uint8)
-        shown, beyond = np.zeros((out_height, out_width), dtype=bool), np.ones((out_height, out_width), dtype=bool)
+    def _read(self, left: int, top: int, width: int, height: int, out_width: int, out_height: int) -> tuple[Colours, Mask]:
+        """(h, w, 3) colours of a window, (h, w) where the photo shows any. Beyond the photo its rim goes on a little, and all counts as shown."""
         x0, y0 = max(left, 0), max(top, 0)
         x1, y1 = min(left + width, self.dataset.width), min(top + height, self.dataset.height)
         if x0 >= x1 or y0 >= y1:
-            return colour, shown, beyond
-        across, down = out_width / width, out_height / height
-        i0, j0 = min(round((x0 - left) * across), out_width - 1), min(round((y0 - top) * down), out_height - 1)
-        i1, j1 = max(round((x1 - left) * across), i0 + 1), max(round((y1 - top) * down), j0 + 1)
-        colour[j0:j1, i0:i1], shown[j0:j1, i0:i1] = self._read_inside(Window(x0, y0, x1 - x0, y1 - y0), j1 - j0, i1 - i0)
-        beyond[j0:j1, i0:i1] = False
-        return colour, shown, beyond
+            return np.zeros((out_height, out_width, 3), dtype=np.uint8), np.zeros((out_height, out_width), dtype=bool)
+        columns = _span(x0 - left, x1 - left, out_width / width, out_width)
+        rows = _span(y0 - top, y1 - top, out_height / height, out_height)
+        colour, shown = self._read_inside(Window(x0, y0, x1 - x0, y1 - y0), len(rows), len(columns))
+        return _widen(_spread(colour, shown, self._ground), shown, rows, columns, (out_height, out_width), self._ground)
 
     def _read_inside(self, window: Window, rows: int, columns: int) -> tuple[Colours, Mask]:
         resampling = Resampling.nearest if self._palette is not None else Resampling.average
         try:
             data = self.dataset.read(self._bands, window=window, out_shape=(len(self._bands), rows, columns), resampling=resampling)
-            mask = self.dataset.dataset_mask(window=window, out_shape=(rows, columns), resampling=Resampling.nearest)
+            mask = None if self._whole else self.dataset.dataset_mask(window=window, out_shape=(rows, columns), resampling=Resampling.nearest)
         except Exception as error:
             raise ImportFailed(f"{self.dataset.name}: cannot read {window}: {error}") from error
-        shown = (mask > 0) & np.isfinite(data).all(axis=0)
+        shown = np.ones((rows, columns), dtype=bool) if mask is None else mask > 0
+        if data.dtype.kind == "f":
+            shown &= np.isfinite(data).all(axis=0)
         return np.moveaxis(self._to_bytes(data), 0, -1), shown
 
     def _to_bytes(self, data: NDArray[Any]) -> Colours:
@@ -175,6 +173,26 @@ def _nearest_in_row(have: Mask) -> NDArray[np.int32]:
     after = np.minimum.accumulate(np.where(have, columns, far)[:, ::-1], axis=1)[:, ::-1]
     nearest = np.where(columns - before <= after - columns, before, after)
     return np.where(np.abs(nearest - columns) <= REACH_PX, nearest, np.int32(-1)).astype(np.int32)
+
+
+def _span(first: int, last: int, scale: float, count: int) -> range:
+    """The image pixels, at least one, of photo pixels [first, last)."""
+    begin = min(round(first * scale), count - 1)
+    return range(begin, min(max(round(last * scale), begin + 1), count))
+
+
+def _widen(colour: Colours, shown: Mask, rows: range, columns: range, shape: tuple[int, int], ground: Colours) -> tuple[Colours, Mask]:
+    """The piece at `rows` and `columns` of an image of that shape: around it its rim, and farther out the ground."""
+    if colour.shape[:2] == shape:
+        return colour, shown
+    spans = zip((rows, columns), shape, strict=True)
+    row_of, column_of = (np.clip(np.arange(count), span.start, span.stop - 1) - span.start for span, count in spans)
+    wide, far = colour[row_of][:, column_of], np.ones(shape, dtype=bool)
+    far[max(rows.start - REACH_PX, 0) : rows.stop + REACH_PX, max(columns.start - REACH_PX, 0) : columns.stop + REACH_PX] = False
+    wide[far] = ground
+    known = np.ones(shape, dtype=bool) if shown.any() else np.zeros(shape, dtype=bool)
+    known[rows.start : rows.stop, columns.start : columns.stop] = shown
+    return wide, known
 
 
 def _jpeg(colour: Colours) -> bytes:
