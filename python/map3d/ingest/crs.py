@@ -14,7 +14,7 @@ from map3d.errors import CrsError
 
 LOCAL: Final = SceneCrs(None, None, LOCAL_CRS_NAME)
 
-network.set_network_enabled(False)  # type: ignore[attr-defined] - it is documented, if not in __all__
+network.set_network_enabled(False)  # type: ignore[attr-defined]
 
 _ADV_HORIZONTAL: Final = {
     "ETRS89_UTM31": 25831,

@@ -35,8 +35,8 @@ def decode_tile(layer: Layer, data: bytes, tile_px: int) -> NDArray[np.uint8]:
 
 def ids_of(pixels: NDArray[np.uint8]) -> NDArray[np.uint32]:
     """Distinct object ids of an id tile, without nothing (0)."""
-    ids: NDArray[np.uint32] = np.unique(np.ascontiguousarray(pixels).view("<u4"))
-    return ids[ids != 0]
+    ids = np.unique(np.ascontiguousarray(pixels).view(np.dtype("<u4")))
+    return np.asarray(ids[ids != 0], dtype=np.uint32)
 
 
 def check_seam(data: bytes, tile_px: int) -> None:

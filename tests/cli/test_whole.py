@@ -1,0 +1,267 @@
+"""The command line from files to tiles."""
+
+import hashlib
+import json
+import os
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from map3d.catalogue import State, Workspace
+from map3d.cli import app
+from map3d.registry import Registry
+from map3d.tiles.manifest import Manifest
+from map3d.tiles.sqlite_store import SqliteTileStore
+from tests.cli.towns import house, write_town
+
+core = pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
+pytestmark = pytest.mark.whole
+
+Run = Callable[..., tuple[int, str, str]]
+VIEWS = ("--view", "0/45", "--view", "90/30")
+
+
+@pytest.fixture
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Run:
+    monkeypatch.setenv("MAP3D_WORKSPACE", str(tmp_path / "workspace"))
+
+    def call(*arguments: str) -> tuple[int, str, str]:
+        status = app.run(list(arguments))
+        captured = capfd.readouterr()
+        return status, captured.out, captured.err
+
+    return call
+
+
+@pytest.fixture
+def town(run: Run, tmp_path: Path) -> Workspace:
+    """A planned rendering `view` of the scene `town`."""
+    assert run("create-scene", "town")[0] == 0
+    status, _, err = run("add-files", "town", str(write_town(tmp_path / "files")))
+    assert status == 0, err
+    status, _, err = run("create-rendering", "town", "view", "--res", "0.05", *VIEWS)
+    assert status == 0, err
+    return Workspace(tmp_path / "workspace")
+
+
+def digest(workspace: Workspace, rendering: str = "view") -> dict[str, str]:
+    """View → hash over every tile and seam."""
+    found = {}
+    for path in sorted(workspace.rendering_folder(rendering).glob("*.sqlite")):
+        total = hashlib.sha256()
+        with SqliteTileStore(path, read_only=True) as store:
+            for block in store.list_blocks():
+                total.update(str(block.id).encode() + (store.get_seam(block.id) or b"-"))
+            for layer in range(len(store.shape.layers)):
+                for tile in store.list_tiles(layer):
+                    total.update(str(tile).encode() + (store.get_tile(layer, *tile) or b"-"))
+        found[path.name] = total.hexdigest()
+    return found
+
+
+def test_files_become_tiles_that_verify(run: Run, town: Workspace) -> None:
+    status, out, err = run("render", "view", "--json")
+    assert status == 0, err
+    outcome = json.loads(out)
+    assert outcome["complete"]
+    assert outcome["tally"]["failed_attempts"] == 0
+    manifest = Manifest.load(town.manifest_path("view").read_bytes())
+    assert manifest.complete
+    assert [view.frame.id for view in manifest.views] == ["0-45", "90-30"]
+    assert all(view.occupancy.count(manifest.zmax) > 10 for view in manifest.views)
+    status, out, err = run("verify", "--json")
+    assert (status, json.loads(out)["wrong"]) == (0, []), err
+
+
+def test_ids_in_tiles_are_those_of_the_registry(run: Run, town: Workspace) -> None:
+    run("render", "view")
+    with Registry(town.registry_path("town")) as registry, SqliteTileStore(town.store_path("view", "0-45"), read_only=True) as store:
+        known = {item.id: item.name for item in registry.objects()}
+        seen: set[int] = set()
+        number = [layer.kind for layer in store.shape.layers].index("id")
+        for tile in store.list_tiles(number):
+            if tile.z == store.shape.zmax:
+                data = store.get_tile(number, *tile)
+                assert data is not None
+                seen |= set(np.unique(np.ascontiguousarray(core.decode_png(data)).view("<u4")).tolist())
+    houses = {number for number, name in known.items() if name.startswith("house")}
+    assert len(houses) == 16
+    assert houses <= seen
+    assert seen - {0} <= set(known)
+
+
+def test_a_second_render_does_nothing(run: Run, town: Workspace) -> None:
+    run("render", "view")
+    before = (digest(town), town.manifest_path("view").read_bytes())
+    status, out, _ = run("render", "view", "--json")
+    assert (status, json.loads(out)["tally"]["done"]) == (0, 0)
+    assert (digest(town), town.manifest_path("view").read_bytes()) == before
+
+
+def test_a_changed_house_renders_little_and_gives_the_tiles_of_a_full_render(run: Run, town: Workspace, tmp_path: Path) -> None:
+    whole = json.loads(run("render", "view", "--json")[1])["tally"]["done"]
+    changed = tmp_path / "files" / "house-0-0.obj"
+    changed.write_text(house(0.0, 0.0, 11.0))
+    assert run("add-files", "town", str(changed))[0] == 0
+    status, out, err = run("render", "view", "--json")
+    assert status == 0, err
+    outcome = json.loads(out)
+    assert 0 < outcome["tally"]["done"] < whole / 2
+    assert outcome["content_version"] == 2
+    assert run("verify")[0] == 0
+    incremental = digest(town)
+    assert run("create-rendering", "town", "view", "--res", "0.05", *VIEWS, "--regrid")[0] == 0
+    assert run("render", "view")[0] == 0
+    if digest(town) != incremental:
+        pytest.fail("the incremental tiles differ from those of a full render")
+
+
+def test_content_that_leaves_the_frame_is_refused_until_regrid(run: Run, town: Workspace, tmp_path: Path) -> None:
+    run("render", "view")
+    before = digest(town)
+    far = tmp_path / "far.obj"
+    far.write_text(house(5000.0, 0.0, 10.0))
+    run("add-files", "town", str(far))
+    status, _, err = run("render", "view")
+    assert (status, "--regrid" in err) == (1, True)
+    assert digest(town) == before
+    assert run("create-rendering", "town", "view", "--res", "0.5", *VIEWS, "--regrid")[0] == 0
+    assert run("render", "view")[0] == 0
+    assert run("verify")[0] == 0
+
+
+def test_a_killed_render_goes_on_and_ends_the_same(run: Run, town: Workspace) -> None:
+    run("render", "view")
+    undisturbed = digest(town)
+    for path in town.rendering_folder("view").iterdir():
+        path.unlink()
+    assert run("create-rendering", "town", "view", "--res", "0.05", *VIEWS, "--regrid")[0] == 0
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    for done in (3, 8):
+        process = subprocess.Popen([sys.executable, "-m", "map3d", "render", "view"], env=environment, stderr=subprocess.DEVNULL)
+        wait_for(town, done, process)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    catalogue = town.open_catalogue(lease_s=0.1)
+    with catalogue._database.transaction() as db:  # type: ignore[attr-defined]
+        db.execute("UPDATE job SET expires = expires - 3600 WHERE state = 'leased'")
+    catalogue.close()
+    assert run("render", "view")[0] == 0
+    assert digest(town) == undisturbed
+    assert run("verify")[0] == 0
+
+
+def wait_for(town: Workspace, done: int, process: "subprocess.Popen[bytes]") -> None:
+    catalogue = town.open_catalogue()
+    deadline = time.monotonic() + 120
+    while catalogue.count_jobs("view")[State.DONE] < done and process.poll() is None:
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    catalogue.close()
+
+
+@pytest.mark.parametrize(
+    ("statement", "says"),
+    [
+        ("UPDATE blob SET bytes = x'00' WHERE hash = (SELECT hash FROM tile WHERE layer = 0 LIMIT 1)", "hash"),
+        ("DELETE FROM tile WHERE layer = 1 AND z = (SELECT max(z) FROM tile) AND x = (SELECT max(x) FROM tile)", "differ in having it"),
+        ("UPDATE block SET key = 'other' WHERE z = 0", "the catalogue says"),
+        ("UPDATE block SET seam = x'4D334447' WHERE z > 0", "seam"),
+        ("DELETE FROM block WHERE z = 0", "not stored"),
+        ("DELETE FROM tile WHERE z = 0", "parent is missing"),
+    ],
+)
+def test_verify_finds_what_was_changed_behind_its_back(run: Run, town: Workspace, statement: str, says: str) -> None:
+    run("render", "view")
+    with sqlite3.connect(town.store_path("view", "0-45")) as db:
+        assert db.execute(statement).rowcount > 0
+    db.close()
+    status, out, _ = run("verify")
+    assert (status, says in out) == (1, True), out
+
+
+def test_verify_finds_a_broken_chunk_and_a_stale_manifest(run: Run, town: Workspace) -> None:
+    run("render", "view")
+    chunk = next(town.scene_folder("town").glob("chunks/*.m3c"))
+    data = bytearray(chunk.read_bytes())
+    data[-1] ^= 1
+    chunk.write_bytes(data)
+    path = town.manifest_path("view")
+    path.write_text(path.read_text().replace('"content_version": 1', '"content_version": 9'))
+    status, out, _ = run("verify")
+    assert status == 1
+    assert "checksum" in out
+    assert "content_version is not what" in out
+
+
+def test_verify_says_when_blocks_are_not_done(run: Run, town: Workspace) -> None:
+    status, out, _ = run("verify", "view")
+    assert (status, "no job" in out) == (1, True)
+
+
+def test_estimates_are_of_the_right_size(run: Run, town: Workspace) -> None:
+    status, out, err = run("estimate", "view", "--json", "--workers", "2")
+    assert status == 0, err
+    before = json.loads(out)
+    assert "sample" in before["how"]
+    outcome = json.loads(run("render", "view", "--json")[1])
+    assert before["base_tiles"] == pytest.approx(outcome["tally"]["base_tiles"], rel=0.35)
+    assert before["bytes"] == pytest.approx(outcome["tally"]["bytes"], rel=0.5)
+    assert before["seconds"] > 0
+    after = json.loads(run("estimate", "view", "--json")[1])
+    assert after["open_tiles"] == 0
+    assert "recorded" in after["how"]
+    assert after["base_tiles"] == outcome["tally"]["base_tiles"]
+
+
+def test_levels_and_layers_are_as_asked(run: Run, town: Workspace) -> None:
+    asked = ("--levels", "4", "--directions", "2", "--pitch", "30", "--pitch", "90", "--layers", "id,color", "--color", "jpeg", "--tile-size", "512")
+    status, out, err = run("create-rendering", "town", "other", *asked, "--json")
+    assert status == 0, err
+    made = json.loads(out)
+    assert [layer["kind"] for layer in made["layers"]] == ["color", "id"]
+    assert made["layers"][0]["format"] == "jpeg"
+    assert [(frame["angles"], frame["zmax"], frame["tile_px"]) for frame in made["frames"]] == [
+        ([a, p], 3, 512) for a, p in ((0, 30), (180, 30), (0, 90))
+    ]
+    assert run("render", "other")[0] == 0
+    assert run("verify", "other")[0] == 0
+
+
+def test_a_folder_becomes_a_site_and_only_changes_are_done_again(run: Run, tmp_path: Path) -> None:
+    from map3d.tiles.viewer import viewer_folder
+
+    try:
+        viewer_folder()
+    except Exception as error:
+        pytest.skip(f"the viewer is not built: {error}")
+    files, out = write_town(tmp_path / "Little Town", 2), tmp_path / "site"
+    status, text, err = run("site", str(files), "-o", str(out), "--res", "0.2")
+    assert status == 0, err
+    assert "4 files imported" in text
+    assert (out / "rendering.json").is_file()
+    assert run("verify", "--published", str(out))[0] == 0
+    (files / "house-0-0.obj").write_text(house(0.0, 0.0, 9.0))
+    (files / "broken.obj").write_text("v 0 0 0\nv nan nan nan\nf 1 2 9\n")
+    status, text, err = run("site", str(files), "-o", str(out), "--res", "0.2")
+    assert status == 0, err
+    assert "1 files imported, 3 unchanged, 1 not usable" in text
+    assert Manifest.load((out / "rendering.json").read_bytes()).content_version == 2
+
+
+def test_a_workspace_can_be_moved(run: Run, town: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run("render", "view")
+    moved = tmp_path / "elsewhere"
+    shutil.move(town.root, moved)
+    monkeypatch.setenv("MAP3D_WORKSPACE", str(moved))
+    assert run("verify")[0] == 0
+    status, out, _ = run("render", "view", "--json")
+    assert (status, json.loads(out)["tally"]["done"]) == (0, 0)

@@ -1,0 +1,20 @@
+"""A small town of boxes as OBJ files."""
+
+from pathlib import Path
+
+
+def house(x: float, y: float, height: float) -> str:
+    """A box of 8 × 10 m."""
+    corners = [(x + dx, y + dy, z) for z in (0.0, height) for dy in (0.0, 10.0) for dx in (0.0, 8.0)]
+    faces = [(1, 3, 4, 2), (5, 6, 8, 7), (1, 2, 6, 5), (2, 4, 8, 6), (4, 3, 7, 8), (3, 1, 5, 7)]
+    lines = [f"v {a} {b} {c}" for a, b, c in corners] + ["f " + " ".join(map(str, face)) for face in faces]
+    return "\n".join(lines) + "\n"
+
+
+def write_town(folder: Path, side: int = 4) -> Path:
+    """side × side houses, 40 m apart."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for i in range(side):
+        for j in range(side):
+            (folder / f"house-{i}-{j}.obj").write_text(house(40.0 * i, 40.0 * j, 6.0 + (3 * i + 5 * j) % 7))
+    return folder
