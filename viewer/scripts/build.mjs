@@ -37,7 +37,7 @@ async function build() {
   cpSync(join(root, "page/index.html"), join(dist, "index.html"));
   const tsc = join(root, "node_modules/typescript/bin/tsc");
   execFileSync(process.execPath, [tsc, "-p", join(root, "tsconfig.types.json")], { stdio: "inherit" });
-  writeFileSync(join(dist, "map3d.d.ts"), 'export * from "./types/map3d";\n');
+  for (const name of ["map3d.d.ts", "map3d.d.mts"]) writeFileSync(join(dist, name), 'export * from "./types/map3d";\nexport as namespace map3d;\n');
 }
 
 await build();

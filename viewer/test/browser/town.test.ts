@@ -4,7 +4,8 @@ import { renderNoise, renderTown } from "../fixture/rendering";
 import { ORIGIN } from "../fixture/town";
 import { TestServer } from "../fixture/server";
 import { openBrowser, openPage, OUT } from "./browser";
-import { BARE, type Global } from "./page";
+import type { Global } from "./page";
+import { addBarePage, pixels, settled, start } from "./start";
 
 let browser: Browser;
 let host: string;
@@ -13,8 +14,7 @@ const town = renderTown();
 
 beforeAll(async () => {
   server.renderings.set("town", town);
-  server.pages.set("/bare", BARE);
-  server.pages.set("/bare.css", "html,body{margin:0;height:100%}#mapcanvas{width:100%;height:100vh}");
+  addBarePage(server);
   host = await server.listen();
   browser = await openBrowser();
 });
@@ -24,29 +24,8 @@ afterAll(async () => {
   await server.close();
 });
 
-/** A page with a map of the town that has drawn its first complete view. */
-async function started(options: object = {}, layer: object = {}, name = "town"): Promise<{ page: Page; problems: string[] }> {
-  const opened = await openPage(browser);
-  await opened.page.goto(`${host}/bare`);
-  await opened.page.evaluate(([base, mapOptions, layerOptions]) => new Promise<void>((done) => {
-    const g = globalThis as Global;
-    g.map = new g.map3d.map("mapcanvas", { preserveDrawingBuffer: true, ...mapOptions });
-    g.layer = new g.map3d.imageLayer(base, layerOptions).addTo(g.map);
-    g.errors = [];
-    g.clicks = [];
-    g.map.on("error", ({ error }) => g.errors.push(error.message));
-    g.map.on("click", (event) => g.clicks.push(event));
-    g.map.once("idle", () => { done(); });
-  }), [`${host}/tiles/${name}`, options, layer] as const);
-  return opened;
-}
-
-/** Does something in the page and waits until the map rests again. */
-const settled = <A>(page: Page, act: (argument: A) => unknown, argument: A): Promise<void> =>
-  page.evaluate(([code, given]) => new Promise<void>((done) => {
-    (globalThis as Global).map.once("idle", () => { done(); });
-    (globalThis as unknown as { eval(code: string): (argument: unknown) => unknown }).eval(code)(given);
-  }), [`(${act.toString()})`, argument] as const);
+/** A page with a map of the town that rests. */
+const started = (options: object = {}, layer: object = {}, name = "town"): ReturnType<typeof start> => start(browser, `${host}/tiles/${name}`, options, layer);
 
 test("the first complete view is drawn without an error", async () => {
   const { page, problems } = await started();
@@ -111,21 +90,6 @@ test("a click on nothing says so", async () => {
   expect(await page.evaluate(() => (globalThis as Global).clicks[0]?.id)).toBe(0);
   await page.context().close();
 });
-
-/** Pixels of the canvas as RGBA bytes, from the top. */
-async function pixels(page: Page): Promise<Buffer> {
-  const text = await page.evaluate(() => {
-    const { canvas } = (globalThis as Global).map;
-    const gl = canvas.getContext("webgl2") as WebGL2RenderingContext;
-    const [row, height] = [4 * canvas.width, canvas.height];
-    const data = new Uint8Array(row * height);
-    gl.readPixels(0, 0, canvas.width, height, gl.RGBA, gl.UNSIGNED_BYTE, data);
-    let out = "";
-    for (let j = height - 1; j >= 0; j--) for (let i = 0; i < row; i += 400) out += String.fromCharCode(...data.subarray(row * j + i, row * j + Math.min(i + 400, row)));
-    return btoa(out);
-  });
-  return Buffer.from(text, "base64");
-}
 
 test("without light, colour bytes come out as they are stored", async () => {
   const { page } = await started({ zoom: 3, light: { lit: false } });

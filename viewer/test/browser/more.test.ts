@@ -1,0 +1,210 @@
+import { afterAll, beforeAll, expect, test } from "vitest";
+import type { Browser } from "playwright-core";
+import { tileId } from "../../src/tiles/pmtiles";
+import { archive, renderRamp, renderTown, type Fixture } from "../fixture/rendering";
+import { ORIGIN } from "../fixture/town";
+import { TestServer } from "../fixture/server";
+import { openBrowser, openPage, OUT } from "./browser";
+import type { Global } from "./page";
+import { addBarePage, pixels, settled, start } from "./start";
+
+let browser: Browser;
+let host: string;
+const server = new TestServer();
+const other = new TestServer();
+const town = renderTown(64, 0.76);
+
+beforeAll(async () => {
+  for (const each of [server, other]) {
+    each.renderings.set("town", town);
+    addBarePage(each);
+  }
+  server.renderings.set("ramp", renderRamp());
+  server.renderings.set("published", published(town));
+  [host] = await Promise.all([server.listen(), other.listen()]);
+  browser = await openBrowser();
+});
+
+afterAll(async () => {
+  await browser.close();
+  await Promise.all([server.close(), other.close()]);
+});
+
+/** The town as a folder with archives instead of tiles. */
+function published({ json, files, raw }: Fixture): Fixture {
+  const out = new Map([...files].filter(([path]) => path.startsWith("objects/")));
+  const views = json.views.map((view) => {
+    const archives = Object.fromEntries(json.layers.map(({ name }) => [name, `${view.id}/${name}.pmtiles`]));
+    for (const [name, path] of Object.entries(archives)) out.set(path, archive(tilesOf(files, `${view.id}/${name}/`)));
+    return { ...view, archives };
+  });
+  return { json: { ...json, views }, files: out, raw };
+}
+
+function tilesOf(files: Map<string, Uint8Array>, folder: string): [number, Uint8Array][] {
+  return [...files].filter(([path]) => path.startsWith(folder)).map(([path, bytes]) => {
+    const [z = 0, x = 0, y = 0] = path.slice(folder.length).split("/").map(Number);
+    return [tileId({ z, x, y }), bytes];
+  });
+}
+
+test.each([[4, 2.4], [3.37, 3.4], [2.5, 6.2]])("at zoom %d no seam is seen between tiles", async (zoom, most) => {
+  const { page } = await start(browser, `${host}/tiles/ramp`, { zoom, light: { lit: false } });
+  const got = await pixels(page);
+  let steepest = 0;
+  for (let y = 60; y < 540; y++) {
+    for (let x = 160; x < 639; x++) {
+      const at = 4 * (800 * y + x);
+      steepest = Math.max(steepest, Math.abs((got[at] ?? 0) - (got[at + 4] ?? 0)), Math.abs((got[at] ?? 0) - (got[at + 3200] ?? 0)));
+      if (got[at + 3] !== 255) throw new Error(`a hole at ${String(x)}, ${String(y)}`);
+    }
+  }
+  expect(steepest).toBeGreaterThan(0.5);
+  expect(steepest).toBeLessThanOrEqual(Math.ceil(most));
+  await page.context().close();
+});
+
+test("requests are spread over the hosts, each tile always from the same one", async () => {
+  const second = other.origin;
+  [server, other].forEach((each) => (each.requests.length = 0));
+  const { page } = await start(browser, [`${host}/tiles/town`, `${second}/tiles/town`], { zoom: 3 });
+  const [mine, theirs] = [server, other].map((each) => new Set(each.requests.filter((url) => /\/tiles\/town\/\d/.test(url))));
+  expect(mine?.size).toBeGreaterThan(4);
+  expect(theirs?.size).toBeGreaterThan(4);
+  expect([...(mine ?? [])].filter((url) => theirs?.has(url))).toEqual([]);
+  await page.context().close();
+});
+
+test("a published folder is read from its archives by ranges", async () => {
+  server.requests.length = 0;
+  const { page } = await start(browser, `${host}/tiles/published`, { zoom: 3 });
+  const asked = server.requests.filter((url) => url.startsWith("/tiles/published/"));
+  expect(asked.filter((url) => url.endsWith(".pmtiles")).length).toBeGreaterThan(10);
+  expect(asked.filter((url) => !/pmtiles$|rendering\.json$/.test(url))).toEqual([]);
+  const fromArchive = await pixels(page);
+  const { page: plain } = await start(browser, `${host}/tiles/town`, { zoom: 3 });
+  expect(fromArchive.equals(await pixels(plain))).toBe(true);
+  await page.context().close();
+  await plain.context().close();
+});
+
+test("keys move, zoom and turn while the map has the focus", async () => {
+  const { page } = await start(browser, `${host}/tiles/town`, { zoom: 2.5 });
+  const state = (): Promise<{ zoom: number; direction: string; x: number }> => page.evaluate((world) => {
+    const { map } = globalThis as Global;
+    return { zoom: map.zoom, direction: map.direction, x: map.project(world)?.[0] ?? NaN };
+  }, ORIGIN as [number, number, number]);
+  const first = await state();
+  await page.evaluate(() => { (globalThis as Global).map.container.focus(); });
+  await page.keyboard.press("ArrowRight");
+  await page.waitForFunction(([world, x]) => Math.abs(((globalThis as Global).map.project(world)?.[0] ?? 0) - x) < 1, [ORIGIN as [number, number, number], first.x - 90] as const);
+  await page.keyboard.press("+");
+  await page.waitForFunction((zoom) => (globalThis as Global).map.zoom > zoom + 0.95, first.zoom);
+  await page.keyboard.press("q");
+  expect((await state()).direction).toBe("90-45");
+  await page.keyboard.press("e");
+  expect((await state()).direction).toBe("0-45");
+  await page.context().close();
+});
+
+test("a double click zooms at the pointer; the buttons zoom and turn", async () => {
+  const { page } = await start(browser, `${host}/tiles/town`, { zoom: 2 });
+  await page.mouse.dblclick(300, 300);
+  await page.waitForFunction(() => (globalThis as Global).map.zoom > 2.95);
+  await page.getByRole("button", { name: "Zoom out" }).click();
+  await page.waitForFunction(() => (globalThis as Global).map.zoom < 2.05);
+  await page.getByRole("button", { name: "Turn view clockwise", exact: true }).click();
+  expect(await page.evaluate(() => (globalThis as Global).map.direction)).toBe("270-45");
+  await page.getByRole("button", { name: /look north/ }).click();
+  expect(await page.evaluate(() => (globalThis as Global).map.direction)).toBe("0-45");
+  await page.context().close();
+});
+
+test("two fingers zoom about what lies between them", async () => {
+  const { page } = await start(browser, `${host}/tiles/town`, { zoom: 2.2 });
+  const session = await page.context().newCDPSession(page);
+  const ground = await page.evaluate(() => (globalThis as Global).map.unproject([400, 300]) as [number, number, number]);
+  const touch = (type: "touchStart" | "touchMove" | "touchEnd", apart: number): Promise<unknown> =>
+    session.send("Input.dispatchTouchEvent", { type, touchPoints: type === "touchEnd" ? [] : [{ x: 400 - apart, y: 300, id: 1 }, { x: 400 + apart, y: 300, id: 2 }] });
+  await touch("touchStart", 50);
+  for (let apart = 55; apart <= 100; apart += 5) await touch("touchMove", apart);
+  await touch("touchEnd", 0);
+  const after = await page.evaluate((world) => ({ zoom: (globalThis as Global).map.zoom, at: (globalThis as Global).map.project(world) as [number, number] }), ground);
+  expect(after.zoom).toBeCloseTo(3.2, 1);
+  expect(Math.hypot(after.at[0] - 400, after.at[1] - 300)).toBeLessThan(3);
+  await page.context().close();
+});
+
+test("hovering names what lies under the pointer", async () => {
+  const { page } = await start(browser, `${host}/tiles/town`, { hover: true, zoom: 2 });
+  const at = await page.evaluate(([x, y, z]) => {
+    const { map } = globalThis as Global;
+    map.on("mousemove", ({ id }) => { (globalThis as Global & { under: number }).under = id; });
+    return map.project([x - 45, y - 4, z + 34]) as [number, number];
+  }, ORIGIN as [number, number, number]);
+  await page.mouse.move(...at);
+  await page.waitForFunction(() => (globalThis as Global & { under: number }).under === 17);
+  await page.context().close();
+});
+
+test("the debug overlay names the tiles", async () => {
+  const { page } = await start(browser, `${host}/tiles/town`, { zoom: 2 });
+  await settled(page, () => (globalThis as Global).map.debug(true), null);
+  await page.screenshot({ path: `${OUT}/debug.png` });
+  expect(await page.locator(".map3d-debug > div").first().textContent()).toMatch(/^2\/\d\/\d × 1\.00$/);
+  await page.context().close();
+});
+
+test("a removed map leaves the canvas, asks for nothing, and another can take its place", async () => {
+  const { page, problems } = await start(browser, `${host}/tiles/town`);
+  const left = await page.evaluate(async (base) => {
+    const g = globalThis as Global;
+    g.map.remove();
+    const bare = document.body.innerHTML.includes("map3d-controls") || document.querySelector("#mapcanvas")?.parentElement !== document.body;
+    const next = new g.map3d.map("mapcanvas");
+    new g.map3d.imageLayer(base).addTo(next);
+    await new Promise((done) => next.once("load", done));
+    return bare;
+  }, `${host}/tiles/town`);
+  expect(left).toBe(false);
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
+
+test("the canvas follows the window", async () => {
+  const { page } = await start(browser, `${host}/tiles/town`);
+  await page.setViewportSize({ width: 500, height: 700 });
+  await page.waitForFunction(() => (globalThis as Global).map.canvas.width === 500 && (globalThis as Global).map.canvas.height === 700);
+  await page.context().close();
+});
+
+test("manifests of another version are refused with both numbers", async () => {
+  server.renderings.set("new", { ...town, json: { ...town.json, version: 9 } });
+  const { page } = await openPage(browser);
+  await page.goto(`${host}/bare`);
+  const message = await page.evaluate((base) => new Promise<string>((done) => {
+    const { map3d } = globalThis as Global;
+    const map = new map3d.map("mapcanvas");
+    map.on("error", ({ error }) => { done(error.message); });
+    new map3d.imageLayer(base).addTo(map);
+  }), `${host}/tiles/new`);
+  expect(message).toMatch(/version 9.*version 1/);
+  await page.context().close();
+});
+
+test("the cache keeps its bound while one wanders about", async () => {
+  const { page } = await start(browser, `${host}/tiles/town`, { zoom: 3, cacheBytes: 600_000 });
+  const most = await page.evaluate(async () => {
+    const { map } = globalThis as Global;
+    let greatest = 0;
+    for (const direction of ["90-45", "180-45", "270-45", "0-45"]) {
+      map.setDirection(direction);
+      await new Promise((done) => map.once("idle", done));
+      greatest = Math.max(greatest, map.cacheBytes);
+    }
+    return greatest;
+  });
+  // What is in view may exceed the bound; what is not may not.
+  expect(most).toBeLessThan(600_000 + 64 * 64 * 7 * 80);
+  await page.context().close();
+});
