@@ -191,11 +191,16 @@ pub struct AlphaSampler {
 
 impl AlphaSampler {
     pub fn new(cache: &TextureCache, texture: &Texture, uv: &UvMap, wrap: Wrap, border_alpha: u8) -> Result<Self> {
+        let level = cache.level(texture, Self::level_for(texture, uv))?;
+        Ok(Self::with(level, uv, wrap, border_alpha))
+    }
+
+    /// The level whose texels are about as large as a sample's footprint.
+    pub fn level_for(texture: &Texture, uv: &UvMap) -> u32 {
         let file = &texture.file;
         let [a, b] = uv.jacobian(file.width, file.height);
-        let area = (a[0] * b[1] - a[1] * b[0]).abs().sqrt() / 4.0;
-        let level = if area > 1.0 && area.is_finite() { (area.log2().round() as u32).min(file.levels - 1) } else { 0 };
-        Ok(Self::with(cache.level(texture, level)?, uv, wrap, border_alpha))
+        let side = (a[0] * b[1] - a[1] * b[0]).abs().sqrt() / 4.0;
+        if side > 1.0 && side.is_finite() { (side.log2().round() as u32).min(file.levels - 1) } else { 0 }
     }
 
     pub fn with(level: Arc<Level>, uv: &UvMap, wrap: Wrap, border_alpha: u8) -> Self {

@@ -1,0 +1,77 @@
+//! What a surface looks like over the pixels of a sub-tile: set up once, then asked per pixel.
+
+use map3d_base::Result;
+use map3d_image::sample::{Outside, Sampler, UvMap};
+use map3d_image::srgb::LINEAR16;
+use map3d_image::texture::TextureCache;
+use map3d_scene::MaterialRecord;
+use map3d_trace::{Affine, Surface};
+
+use crate::cutout::wrap_of;
+
+/// Colour of a surface, linear light, 16 bits.
+pub enum Paint {
+    Flat([u16; 3]),
+    Textured(Sampler),
+}
+
+impl Paint {
+    /// A texture is multiplied by the diffuse colour; without one the diffuse colour stands alone.
+    pub fn new(cache: &TextureCache, material: &MaterialRecord, uv: &[Affine; 2]) -> Result<Self> {
+        let diffuse = material.diffuse;
+        if !material.is_textured() {
+            return Ok(Self::Flat([diffuse[0], diffuse[1], diffuse[2]].map(|b| LINEAR16[b as usize])));
+        }
+        let texture = cache.texture(&material.texture)?;
+        let outside = Outside { diffuse, border: material.border };
+        Sampler::new(cache, &texture, &uv_map(uv), wrap_of(material), outside).map(Self::Textured)
+    }
+
+    /// At a position in 2^-8 px from the sub-tile's corner.
+    #[inline(always)]
+    pub fn at(&self, x: i32, y: i32) -> [u16; 3] {
+        match self {
+            Self::Flat(color) => *color,
+            Self::Textured(sampler) => sampler.sample(x, y),
+        }
+    }
+}
+
+fn uv_map([u, v]: &[Affine; 2]) -> UvMap {
+    let line = |a: &Affine| [a.at0, a.dx, a.dy].map(f64::from);
+    UvMap { u: line(u), v: line(v) }
+}
+
+/// A surface ready to shade.
+pub struct Shaded {
+    pub paint: Paint,
+    pub id: u32,
+    /// Of flat surfaces.
+    normal: [i16; 3],
+    /// Of surfaces with shading normals.
+    smooth: Option<Box<Surface>>,
+}
+
+impl Shaded {
+    pub fn new(cache: &TextureCache, material: &MaterialRecord, surface: &Surface) -> Result<Self> {
+        Ok(Self {
+            paint: Paint::new(cache, material, &surface.uv)?,
+            id: surface.object_id,
+            normal: stored(surface.normal),
+            smooth: surface.corner_normals.is_some().then(|| Box::new(*surface)),
+        })
+    }
+
+    /// Stored normal at a pixel's centre.
+    #[inline(always)]
+    pub fn normal_at(&self, i: usize, j: usize) -> [i16; 3] {
+        match &self.smooth {
+            None => self.normal,
+            Some(surface) => stored(surface.normal_at(i as f32 + 0.5, j as f32 + 0.5)),
+        }
+    }
+}
+
+fn stored(n: [f32; 3]) -> [i16; 3] {
+    n.map(|c| (c * 32_767.0).round() as i16)
+}
