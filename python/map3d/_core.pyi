@@ -4,7 +4,7 @@ Structured arguments and results travel as JSON text (serde on the other side); 
 """
 
 from collections.abc import Callable, Iterator
-from typing import Literal, final
+from typing import Any, Literal, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,7 +87,7 @@ class Scene:
     def occupied(self, frame: str, level: int) -> NDArray[np.bool_]: """(2^level, 2^level) [y, x]: conservative, from the boxes of BVH nodes."""
     def block_key(self, frame: str, z: int, x: int, y: int) -> str: """Hex hash over all that a base block's bytes depend on."""
     def render_block(self, frame: str, z: int, x: int, y: int) -> Block: """A base block rooted at (z, x, y)."""
-    def gbuffer(self, frame: str, x: int, y: int) -> dict[str, NDArray]: """One base tile's G-buffer (spec/pyramid.md §5): color, normal, id, depth."""
+    def gbuffer(self, frame: str, x: int, y: int) -> dict[str, NDArray[Any]]: """One base tile's G-buffer (spec/pyramid.md §5): color, normal, id, depth."""
     def pick(self, frame: str, u: float, v: float) -> tuple[int, float, tuple[float, float, float]] | None: """(id, D, local position) of the surface that a single ray at view coordinates (U, V) meets first."""
     def occluded(self, origins: NDArray[np.float64], direction: tuple[float, float, float], max_distance: float) -> NDArray[np.bool_]: """Any-hit rays from local positions (n, 3)."""
     def stats(self) -> dict[str, int]: """Cache hits, misses, bytes; chunks mapped; triangles tested; ..."""
@@ -107,9 +107,9 @@ class Block:
 def reduce_block(frame: str, z: int, x: int, y: int, levels: int, seams: list[tuple[int, int, bytes]]) -> Block:
     """A reduce block of root (z, x, y) with `levels` levels; seams: (x, y, bytes) of blocks rooted at level z + levels."""
 
-def encode_layer(kind: Literal["color", "normal", "id", "depth"], format: str, array: NDArray, quality: int = 80) -> bytes: """One layer of a G-buffer → image bytes."""
+def encode_layer(kind: Literal["color", "normal", "id", "depth"], format: str, array: NDArray[Any], quality: int = 80) -> bytes: """One layer of a G-buffer → image bytes."""
 def decode_png(data: bytes) -> NDArray[np.uint8]: """(H, W, C), for checks."""
-def reduce_gbuffers(children: list[dict[str, NDArray] | None]) -> dict[str, NDArray]: """Parent of up to four children (spec/pyramid.md §7); for tests."""
+def reduce_gbuffers(children: list[dict[str, NDArray[Any]] | None]) -> dict[str, NDArray[Any]]: """Parent of up to four children (spec/pyramid.md §7); for tests."""
 
 # -- texture, for tests and tools ---------------------------------------------------------------------------------------------------
 
