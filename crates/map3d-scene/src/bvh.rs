@@ -162,7 +162,7 @@ mod tests {
         let same = vec![Aabb::of_points(&[[1.0, 2.0, 3.0]]); 1000];
         let tree = build(&same);
         assert_eq!(tree.order.len(), 1000);
-        assert_eq!(tree.leaves.len(), 125);
+        assert!(tree.leaves.len() <= 190, "{} leaves", tree.leaves.len());
     }
 
     #[test]

@@ -4,6 +4,7 @@
 
 pub mod beam;
 pub mod cutout;
+mod lanes;
 pub mod occupancy;
 pub mod ray;
 pub mod surface;
@@ -11,6 +12,7 @@ pub mod visbuf;
 
 pub use beam::BeamTracer;
 pub use cutout::{Cutout, CutoutSample, Opaque};
+pub use lanes::Isa;
 pub use occupancy::{block_key, occupied};
 pub use ray::{Hit, Ray, Rays};
 pub use surface::{Affine, Surface};

@@ -69,7 +69,7 @@ impl VisBuf {
     #[inline]
     pub fn pixel(&self, i: usize, j: usize) -> Pixel<'_> {
         let p = j * SUBTILE_PX + i;
-        match self.samples.slot[p] {
+        match self.samples.slot_of(p) {
             NOTHING => Pixel::Nothing,
             MIXED => Pixel::Mixed(&self.samples.slots[p]),
             slot => Pixel::One(slot),

@@ -179,7 +179,8 @@ fn split_swept(items: &mut [Item]) -> usize {
         for k in 1..n {
             left.add(&items[k - 1].bounds);
             let cost = leaf_cost(&left, k) + right[k];
-            if cost < best.0 {
+            let more_even = (2 * k).abs_diff(n) < (2 * best.2).abs_diff(n);
+            if cost < best.0 || (cost == best.0 && more_even) {
                 best = (cost, axis, k);
             }
         }

@@ -1,0 +1,234 @@
+//! The quadtree of cells over the pinned square (spec/scene.md). Pinned cells stay; a cell with too many triangles is split.
+
+use std::collections::BTreeSet;
+
+use map3d_base::Box3;
+use map3d_base::tile::morton;
+
+use super::triangle::BuildTriangle;
+use crate::index::Cell;
+
+pub(super) const CELL_TRIANGLES: u64 = 262_144;
+/// A cell's triangles must lie within float32's exact reach of its centre.
+const MAX_SIDE_M: f64 = 4096.0;
+/// Height of the slabs that a cell is cut into, for the same reason; slab 0 is centred on the local origin.
+const SLAB_M: f64 = 6144.0;
+/// Cells of this level are counted before triangles are sorted into them.
+const COUNT_LEVEL: u32 = 10;
+const MAX_LEVEL: u32 = 24;
+
+/// x0, y0 and side in metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Square(pub [f64; 3]);
+
+impl Square {
+    /// Of a new scene: whole metres, a power of two, a little room on each side.
+    pub fn around(bounds: &Box3) -> Self {
+        if bounds.is_empty() {
+            return Self([-32.0, -32.0, 64.0]);
+        }
+        let extent = (bounds.hi[0] - bounds.lo[0]).max(bounds.hi[1] - bounds.lo[1]) * 1.05 + 2.0;
+        let side = f64::exp2(extent.log2().ceil()).max(64.0);
+        let c = bounds.center();
+        Self([(c[0] - side / 2.0).floor(), (c[1] - side / 2.0).floor(), side])
+    }
+
+    /// The cell of a level that holds a point; outside the square the nearest.
+    fn cell(&self, level: u32, p: [f64; 3]) -> Cell {
+        let count = f64::from(1u32 << level);
+        let at = |k: usize| ((p[k] - self.0[k]) / self.0[2] * count).floor().clamp(0.0, count - 1.0) as u32;
+        [level, at(0), at(1)]
+    }
+
+    fn side(&self, level: u32) -> f64 {
+        self.0[2] / f64::from(1u32 << level)
+    }
+
+    /// Local x, y of a cell's centre.
+    pub fn center(&self, [level, x, y]: Cell) -> [f64; 2] {
+        let side = self.side(level);
+        [self.0[0] + (f64::from(x) + 0.5) * side, self.0[1] + (f64::from(y) + 0.5) * side]
+    }
+}
+
+/// Counts triangles per cell of `COUNT_LEVEL`, then says which cell each belongs to.
+pub(super) struct Quadtree {
+    pub square: Square,
+    counts: Vec<u32>,
+    pinned: BTreeSet<Cell>,
+    /// Pinned cells and all above them.
+    above_pinned: BTreeSet<Cell>,
+    sorted_into: BTreeSet<Cell>,
+}
+
+impl Quadtree {
+    pub fn new(square: Square, pinned: &[Cell]) -> Self {
+        let mut above_pinned = BTreeSet::new();
+        for [level, x, y] in pinned {
+            above_pinned.extend((0..*level).map(|l| [l, x >> (level - l), y >> (level - l)]));
+        }
+        let counts = vec![0; 1 << (2 * COUNT_LEVEL)];
+        Self { square, counts, pinned: pinned.iter().copied().collect(), above_pinned, sorted_into: BTreeSet::new() }
+    }
+
+    pub fn count(&mut self, t: &BuildTriangle) {
+        let [_, x, y] = self.square.cell(COUNT_LEVEL, t.centroid_m());
+        let n = &mut self.counts[(y << COUNT_LEVEL | x) as usize];
+        *n = n.saturating_add(1);
+    }
+
+    /// Settles the cells of up to `COUNT_LEVEL` from the counts.
+    pub fn settle(&mut self) {
+        let mut pyramid = vec![std::mem::take(&mut self.counts).into_iter().map(u64::from).collect::<Vec<u64>>()];
+        for level in (0..COUNT_LEVEL).rev() {
+            let below = pyramid.last().expect("one level at least");
+            let side = 1usize << level;
+            let sum = |k: usize| {
+                let (x, y) = (k % side * 2, k / side * 2);
+                [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)].iter().map(|(x, y)| below[y * side * 2 + x]).sum()
+            };
+            pyramid.push((0..side * side).map(sum).collect());
+        }
+        pyramid.reverse();
+        let mut stack: Vec<Cell> = vec![[0, 0, 0]];
+        while let Some(cell) = stack.pop() {
+            let [level, x, y] = cell;
+            let count = pyramid[level as usize][(y as usize) << level | x as usize];
+            if count > 0 && level < COUNT_LEVEL && self.must_split(cell, count) {
+                stack.extend(children(cell));
+            } else if count > 0 {
+                self.sorted_into.insert(cell);
+            }
+        }
+    }
+
+    fn must_split(&self, cell: Cell, count: u64) -> bool {
+        if self.above_pinned.contains(&cell) || count > CELL_TRIANGLES {
+            return true;
+        }
+        !self.pinned.contains(&cell) && self.square.side(cell[0]) > MAX_SIDE_M
+    }
+
+    /// Cells into which triangles are sorted first; a few are split further by `leaves`.
+    pub fn sorting_cells(&self) -> Vec<Cell> {
+        self.sorted_into.iter().copied().collect()
+    }
+
+    /// The sorting cell of a triangle that was counted.
+    pub fn sorting_cell(&self, t: &BuildTriangle) -> Cell {
+        let [_, x, y] = self.square.cell(COUNT_LEVEL, t.centroid_m());
+        let up = |level: u32| [level, x >> (COUNT_LEVEL - level), y >> (COUNT_LEVEL - level)];
+        (0..=COUNT_LEVEL).map(up).find(|c| self.sorted_into.contains(c)).unwrap_or([COUNT_LEVEL, x, y])
+    }
+
+    /// Splits a sorting cell's triangles down to leaf cells, in which their order stays.
+    pub fn leaves(&self, cell: Cell, triangles: Vec<BuildTriangle>) -> Vec<(Cell, Vec<BuildTriangle>)> {
+        let mut out = Vec::new();
+        let mut stack = vec![(cell, triangles)];
+        while let Some((cell, triangles)) = stack.pop() {
+            if cell[0] < MAX_LEVEL && self.must_split(cell, triangles.len() as u64) {
+                let mut parts = children(cell).map(|c| (c, Vec::new()));
+                for t in triangles {
+                    let home = self.square.cell(cell[0] + 1, t.centroid_m());
+                    let k = (home[1] & 1 | (home[2] & 1) << 1) as usize;
+                    parts[k].1.push(t);
+                }
+                stack.extend(parts.into_iter().filter(|p| !p.1.is_empty()));
+            } else {
+                out.push((cell, triangles));
+            }
+        }
+        out
+    }
+
+    /// The leaf cells to pin: those with triangles, and the pinned ones that were not split.
+    pub fn pin(&self, with_triangles: &[Cell]) -> Vec<Cell> {
+        let used: BTreeSet<Cell> = with_triangles.iter().copied().collect();
+        let is_split = |c: &Cell| used.iter().any(|u| u[0] > c[0] && u[1] >> (u[0] - c[0]) == c[1] && u[2] >> (u[0] - c[0]) == c[2]);
+        let kept = self.pinned.iter().filter(|c| !is_split(c)).copied();
+        let mut cells: Vec<Cell> = used.iter().copied().chain(kept).collect();
+        cells.sort_unstable_by_key(|c| morton_key(*c));
+        cells.dedup();
+        cells
+    }
+}
+
+/// Morton order of cells of all levels: by their first corner, the larger first.
+pub(super) fn morton_key([level, x, y]: Cell) -> (u64, u32) {
+    let shift = MAX_LEVEL - level;
+    (morton(x << shift, y << shift), level)
+}
+
+/// In the order of `x & 1 | (y & 1) << 1`.
+fn children([level, x, y]: Cell) -> [Cell; 4] {
+    [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| [level + 1, 2 * x + dx, 2 * y + dy])
+}
+
+/// The slab of a triangle's height; most scenes have slab 0 alone.
+pub(super) fn slab(t: &BuildTriangle) -> i64 {
+    (t.centroid_m()[2] / SLAB_M + 0.5).floor() as i64
+}
+
+/// Local height of a slab's middle.
+pub(super) fn slab_center(slab: i64) -> f64 {
+    slab as f64 * SLAB_M
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+
+    fn at(x: f64, y: f64) -> BuildTriangle {
+        let p = crate::lattice::snap([x, y, 0.0]);
+        BuildTriangle { corners: [p, [p[0] + 6, p[1], 0], [p[0], p[1] + 6, 0]], ..BuildTriangle::zeroed() }
+    }
+
+    fn grow(square: Square, pinned: &[Cell], triangles: &[BuildTriangle]) -> (Quadtree, Vec<Cell>) {
+        let mut tree = Quadtree::new(square, pinned);
+        triangles.iter().for_each(|t| tree.count(t));
+        tree.settle();
+        let mut cells = Vec::new();
+        for cell in tree.sorting_cells() {
+            let mine = triangles.iter().filter(|t| tree.sorting_cell(t) == cell).copied().collect();
+            cells.extend(tree.leaves(cell, mine).into_iter().map(|l| l.0));
+        }
+        let pinned = tree.pin(&cells);
+        (tree, pinned)
+    }
+
+    #[test]
+    fn few_triangles_are_one_cell() {
+        let (_, cells) = grow(Square([0.0, 0.0, 1024.0]), &[], &[at(3.0, 4.0), at(1000.0, 900.0)]);
+        assert_eq!(cells, vec![[0, 0, 0]]);
+    }
+
+    #[test]
+    fn a_wide_square_is_split_to_the_reach_of_float32() {
+        let (tree, cells) = grow(Square([0.0, 0.0, 65536.0]), &[], &[at(3.0, 4.0), at(60000.0, 900.0)]);
+        assert_eq!(cells, vec![[4, 0, 0], [4, 14, 0]]);
+        assert!(cells.iter().all(|c| tree.square.side(c[0]) <= MAX_SIDE_M));
+    }
+
+    #[test]
+    fn pinned_cells_stay_when_content_comes_and_goes() {
+        let square = Square([0.0, 0.0, 65536.0]);
+        let pinned = vec![[4, 0, 0], [5, 28, 0]];
+        let (_, cells) = grow(square, &pinned, &[at(30000.0, 30000.0), at(60000.0, 900.0)]);
+        assert!(pinned.iter().all(|c| cells.contains(c)), "{cells:?}");
+        assert_eq!(cells.len(), 3);
+    }
+
+    #[test]
+    fn too_many_triangles_in_one_place_split_deeper_than_the_counts() {
+        let many: Vec<_> = (0..CELL_TRIANGLES + 1).map(|k| at(0.001 + 0.04 * (k % 2) as f64, 0.001)).collect();
+        let (_, cells) = grow(Square([0.0, 0.0, 64.0]), &[], &many);
+        assert!(cells.len() == 2 && cells.iter().all(|c| c[0] == 11), "{cells:?}");
+    }
+
+    #[test]
+    fn content_outside_the_square_goes_to_the_nearest_cell() {
+        let (_, cells) = grow(Square([0.0, 0.0, 8192.0]), &[], &[at(-500.0, 9000.0)]);
+        assert_eq!(cells, vec![[1, 0, 1]]);
+    }
+}

@@ -1,0 +1,208 @@
+//! Triangles of a cell or prototype → the bytes of a chunk file.
+
+use std::collections::{BTreeMap, HashSet};
+
+use bytemuck::Zeroable;
+use map3d_base::file::{self, HEADER_BYTES, aligned};
+use map3d_base::{Error, Result, Vec3};
+use twox_hash::XxHash3_128;
+
+use super::triangle::BuildTriangle;
+use crate::bvh::{self, Aabb, Tree};
+use crate::lattice::{Point, STEPS_PER_M, metres};
+use crate::records::{
+    CHUNK_MAGIC, ChunkHeader, ChunkObject, EMPTY, FLAG_CUTOUT, FLAG_NORMALS, Leaf, MaterialRecord, TriangleRecord, VERSION,
+};
+
+/// A chunk file's bytes and what the scene index says of it.
+#[derive(Clone, Debug)]
+pub struct ChunkFile {
+    pub bytes: Vec<u8>,
+    pub origin: Vec3,
+    /// In the frame of `origin`'s coordinates (local; a prototype's: its own).
+    pub bounds: [Vec3; 2],
+    pub triangles: u64,
+    pub hash: u64,
+    pub duplicate_faces: u64,
+}
+
+/// Encodes at least one triangle; `origin` is a lattice point within reach of all corners. `materials` are the build's.
+pub fn encode_chunk(mut triangles: Vec<BuildTriangle>, origin: Point, materials: &[MaterialRecord], merge_faces: bool) -> Result<ChunkFile> {
+    triangles.sort_by(|a, b| (a.object_id, a.asset, a.source).cmp(&(b.object_id, b.asset, b.source)));
+    let before = triangles.len();
+    if merge_faces {
+        drop_duplicates(&mut triangles);
+    }
+    let positions = positions(&triangles, origin)?;
+    let boxes: Vec<Aabb> = positions.iter().map(|p| Aabb::of_points(p)).collect();
+    let tree = bvh::build(&boxes);
+    let objects = Objects::of(&triangles, &boxes, materials);
+    let used = used_materials(&triangles);
+    let duplicate_faces = (before - triangles.len()) as u64;
+    let mut body = Body { header: header(origin, &tree, &boxes), bytes: Vec::new() };
+    body.geometry(&tree, &positions);
+    body.records(&tree, &triangles, &objects, &used);
+    body.normals(&tree, &triangles);
+    body.tables(&objects, &used, materials);
+    Ok(body.finish(duplicate_faces))
+}
+
+/// The first of each set of faces with the same object, material and corners stays.
+fn drop_duplicates(triangles: &mut Vec<BuildTriangle>) {
+    let mut seen = HashSet::with_capacity(triangles.len());
+    triangles.retain(|t| {
+        let mut corners = t.corners;
+        corners.sort_unstable();
+        seen.insert((t.object_id, t.material, corners))
+    });
+}
+
+/// Corners relative to the origin, exact in float32.
+fn positions(triangles: &[BuildTriangle], origin: Point) -> Result<Vec<[[f32; 3]; 3]>> {
+    const REACH: u64 = 1 << 24;
+    let relative = |p: Point| [0, 1, 2].map(|k| p[k] - origin[k]);
+    if let Some(t) = triangles.iter().find(|t| t.corners.iter().any(|c| relative(*c).iter().any(|v| v.unsigned_abs() > REACH))) {
+        let what = format!("triangle {} of asset {} lies more than 4,096 m from its chunk's origin", t.source, t.asset);
+        return Err(Error::argument(what));
+    }
+    let place = |c: Point| relative(c).map(|v| v as f32 / STEPS_PER_M as f32);
+    Ok(triangles.iter().map(|t| t.corners.map(place)).collect())
+}
+
+/// Build material → the chunk's own number, in ascending order.
+fn used_materials(triangles: &[BuildTriangle]) -> BTreeMap<u32, u32> {
+    let mut used: BTreeMap<u32, u32> = triangles.iter().map(|t| (t.material, 0)).collect();
+    used.values_mut().zip(0..).for_each(|(number, k)| *number = k);
+    used
+}
+
+fn header(origin: Point, tree: &Tree, boxes: &[Aabb]) -> ChunkHeader {
+    let mut bounds = Aabb::EMPTY;
+    boxes.iter().for_each(|b| bounds.add(b));
+    ChunkHeader {
+        magic: *CHUNK_MAGIC,
+        version: VERSION,
+        origin: metres(origin),
+        bounds: bounds.six(),
+        nodes: tree.nodes.len() as u32,
+        leaves: tree.leaves.len() as u32,
+        triangles: tree.order.len() as u32,
+        ..ChunkHeader::zeroed()
+    }
+}
+
+/// Objects by id, with what the file says of each.
+struct Objects {
+    numbers: BTreeMap<u32, u32>,
+    records: Vec<ChunkObject>,
+}
+
+impl Objects {
+    /// `triangles` are sorted by object.
+    fn of(triangles: &[BuildTriangle], boxes: &[Aabb], materials: &[MaterialRecord]) -> Self {
+        let (mut numbers, mut records) = (BTreeMap::new(), Vec::new());
+        let mut start = 0;
+        for group in triangles.chunk_by(|a, b| a.object_id == b.object_id) {
+            let mut bounds = Aabb::EMPTY;
+            boxes[start..start + group.len()].iter().for_each(|b| bounds.add(b));
+            start += group.len();
+            numbers.insert(group[0].object_id, records.len() as u32);
+            records.push(ChunkObject {
+                id: group[0].object_id,
+                rank: u32::from(group[0].rank),
+                bounds: bounds.six(),
+                content: content_hash(group, materials),
+                reserved: [0; 2],
+            });
+        }
+        Self { numbers, records }
+    }
+}
+
+/// Over all that a rendering sees of the triangles; independent of chunk and file.
+pub(super) fn content_hash(triangles: &[BuildTriangle], materials: &[MaterialRecord]) -> [u64; 2] {
+    let mut hash = XxHash3_128::with_seed(0);
+    for t in triangles {
+        hash.write(bytemuck::bytes_of(&t.corners));
+        hash.write(bytemuck::bytes_of(&t.uv));
+        hash.write(bytemuck::bytes_of(&t.normals));
+        hash.write(&[t.rank]);
+        hash.write(&t.source.to_le_bytes());
+        hash.write(bytemuck::bytes_of(&materials[t.material as usize]));
+    }
+    let value = hash.finish_128();
+    [value as u64, (value >> 64) as u64]
+}
+
+struct Body {
+    header: ChunkHeader,
+    bytes: Vec<u8>,
+}
+
+impl Body {
+    fn geometry(&mut self, tree: &Tree, positions: &[[[f32; 3]; 3]]) {
+        self.bytes.extend_from_slice(bytemuck::cast_slice(&tree.nodes));
+        for (start, end) in &tree.leaves {
+            let mut leaf = Leaf { corners: [[f32::NAN; 8]; 9], triangle: [EMPTY; 8] };
+            for (lane, number) in (*start..*end).enumerate() {
+                let corners = &positions[tree.order[number as usize] as usize];
+                (0..9).for_each(|c| leaf.corners[c][lane] = corners[c / 3][c % 3]);
+                leaf.triangle[lane] = number;
+            }
+            self.bytes.extend_from_slice(bytemuck::bytes_of(&leaf));
+        }
+    }
+
+    /// Triangles in the order of the leaves.
+    fn records(&mut self, tree: &Tree, triangles: &[BuildTriangle], objects: &Objects, used: &BTreeMap<u32, u32>) {
+        for number in &tree.order {
+            let t = &triangles[*number as usize];
+            self.bytes.extend_from_slice(bytemuck::bytes_of(&TriangleRecord {
+                uv: t.uv,
+                material: used[&t.material],
+                object: objects.numbers[&t.object_id],
+                source: t.source,
+                rank: t.rank,
+                padding: [0; 3],
+                reserved: [0; 2],
+            }));
+        }
+        self.pad();
+    }
+
+    fn normals(&mut self, tree: &Tree, triangles: &[BuildTriangle]) {
+        if !triangles.iter().any(BuildTriangle::has_normals) {
+            return;
+        }
+        self.header.flags |= FLAG_NORMALS;
+        for number in &tree.order {
+            self.bytes.extend_from_slice(bytemuck::bytes_of(&triangles[*number as usize].normals));
+        }
+        self.pad();
+    }
+
+    fn tables(&mut self, objects: &Objects, used: &BTreeMap<u32, u32>, materials: &[MaterialRecord]) {
+        for material in used.keys().map(|k| &materials[*k as usize]) {
+            self.header.flags |= if material.is_cutout() { FLAG_CUTOUT } else { 0 };
+            self.bytes.extend_from_slice(bytemuck::bytes_of(material));
+        }
+        self.bytes.extend_from_slice(bytemuck::cast_slice(&objects.records));
+        self.header.materials = used.len() as u32;
+        self.header.objects = objects.records.len() as u32;
+    }
+
+    fn pad(&mut self) {
+        self.bytes.resize(aligned(self.bytes.len()), 0);
+    }
+
+    fn finish(self, duplicate_faces: u64) -> ChunkFile {
+        let mut bytes = bytemuck::bytes_of(&self.header).to_vec();
+        bytes.extend_from_slice(&self.bytes);
+        let hash = file::checksum(&bytes[HEADER_BYTES..]);
+        bytes[8..16].copy_from_slice(&hash.to_le_bytes());
+        let (o, b) = (self.header.origin, self.header.bounds.map(f64::from));
+        let corner = |k: usize| [o[0] + b[k], o[1] + b[k + 1], o[2] + b[k + 2]];
+        let triangles = u64::from(self.header.triangles);
+        ChunkFile { bytes, origin: o, bounds: [corner(0), corner(3)], triangles, hash, duplicate_faces }
+    }
+}

@@ -1,0 +1,89 @@
+//! Materials of all assets as chunk records; equal ones become one.
+
+use std::collections::HashMap;
+
+use map3d_base::asset::{Material, Wrap};
+use map3d_image::texture::TextureKeys;
+
+use super::assets::Asset;
+use crate::records::{MATERIAL_CUTOUT, MATERIAL_TEXTURED, MaterialRecord};
+
+pub(super) struct BuildMaterials {
+    pub records: Vec<MaterialRecord>,
+    /// Per asset: the asset's material → index into `records`.
+    numbers: Vec<Vec<u32>>,
+    pub merged: u64,
+    /// Materials that name an image that is missing or broken.
+    pub without_their_texture: u64,
+}
+
+/// sRGB of the ground plane: a calm, light grey.
+const GROUND: [u8; 4] = [200, 198, 192, 255];
+
+impl BuildMaterials {
+    pub fn new(assets: &[Asset], textures: &TextureKeys, merge: bool) -> Self {
+        let mut out = Self { records: Vec::new(), numbers: Vec::new(), merged: 0, without_their_texture: 0 };
+        let mut known = HashMap::new();
+        for asset in assets {
+            let numbers = asset.materials.iter().map(|m| out.add(m, textures, merge, &mut known)).collect();
+            out.numbers.push(numbers);
+        }
+        out
+    }
+
+    fn add(&mut self, material: &Material, textures: &TextureKeys, merge: bool, known: &mut HashMap<MaterialRecord, u32>) -> u32 {
+        let named = material.texture.is_some() || material.alpha.is_some();
+        self.without_their_texture += u64::from(named && textures.get(material).is_none());
+        let record = record_of(material, textures);
+        if let Some(number) = known.get(&record).filter(|_| merge) {
+            self.merged += 1;
+            return *number;
+        }
+        let number = self.push(record);
+        known.insert(record, number);
+        number
+    }
+
+    fn push(&mut self, record: MaterialRecord) -> u32 {
+        self.records.push(record);
+        self.records.len() as u32 - 1
+    }
+
+    /// The ground plane's material; adds it at the first call.
+    pub fn ground(&mut self) -> u32 {
+        self.push(MaterialRecord { diffuse: GROUND, border: [0; 4], wrap: 0, flags: 0, padding: [0; 6], texture: [0; 16], reserved: [0; 32] })
+    }
+
+    pub fn number(&self, asset: usize, material: u32) -> u32 {
+        self.numbers[asset][material as usize]
+    }
+
+    pub fn is_textured(&self, number: u32) -> bool {
+        self.records[number as usize].is_textured()
+    }
+}
+
+fn record_of(material: &Material, textures: &TextureKeys) -> MaterialRecord {
+    let texture = textures.get(material);
+    let cutout = material.cutout && texture.is_some_and(|t| t.has_alpha);
+    MaterialRecord {
+        diffuse: material.diffuse.map(byte),
+        border: material.border.map(byte),
+        wrap: match material.wrap {
+            Wrap::Wrap => 0,
+            Wrap::Mirror => 1,
+            Wrap::Clamp => 2,
+            Wrap::Border => 3,
+            Wrap::None => 4,
+        },
+        flags: if texture.is_some() { MATERIAL_TEXTURED } else { 0 } | if cutout { MATERIAL_CUTOUT } else { 0 },
+        padding: [0; 6],
+        texture: texture.map_or([0; 16], |t| t.key),
+        reserved: [0; 32],
+    }
+}
+
+/// NaN becomes 0.
+fn byte(v: f32) -> u8 {
+    (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
+}

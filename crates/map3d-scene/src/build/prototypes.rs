@@ -1,0 +1,86 @@
+//! Prototypes become chunks in a frame of their own; their placements become instance records.
+
+use std::collections::BTreeMap;
+
+use map3d_base::{Box3, Result, Vec3};
+use twox_hash::XxHash3_128;
+
+use super::encode::{ChunkFile, content_hash, encode_chunk};
+use super::report::BuildReport;
+use super::source::Source;
+use super::triangle::BuildTriangle;
+use crate::lattice::Point;
+use crate::records::InstanceRecord;
+
+/// (asset, its prototype number) → triangles; ordered, so that numbers are the same in every build.
+pub(super) type Prototypes = BTreeMap<(usize, u32), Vec<BuildTriangle>>;
+
+/// All prototypes of the assets that an instance places.
+pub(super) fn collect(source: &Source, report: &mut BuildReport, go_on: &mut dyn FnMut(u64) -> bool) -> Option<Prototypes> {
+    let mut out = Prototypes::new();
+    for (number, asset) in source.assets.iter().enumerate() {
+        if asset.instances.is_empty() {
+            continue;
+        }
+        let placed: std::collections::BTreeSet<u32> = asset.instances.iter().map(|i| i.prototype).collect();
+        let mut put = |prototype: u32, t: &BuildTriangle| out.entry((number, prototype)).or_default().push(*t);
+        if !source.stream(number, |p| p > 0 && placed.contains(&p), report, &mut put, go_on) {
+            return None;
+        }
+    }
+    Some(out)
+}
+
+/// The chunk of a prototype; its origin is the middle of its box.
+pub(super) fn encode(triangles: &[BuildTriangle], source: &Source) -> Result<ChunkFile> {
+    let corners = || triangles.iter().flat_map(|t| t.corners);
+    let middle = |k: usize| {
+        let (lo, hi) = (corners().map(|c| c[k]).min().unwrap_or(0), corners().map(|c| c[k]).max().unwrap_or(0));
+        lo + (hi - lo) / 2
+    };
+    let origin: Point = [middle(0), middle(1), middle(2)];
+    encode_chunk(triangles.to_vec(), origin, &source.materials.records, source.options.merge_faces)
+}
+
+/// Instances of prototypes that have triangles, sorted by object id, then order in the asset.
+pub(super) fn instances(source: &Source, prototypes: &Prototypes, report: &mut BuildReport) -> Vec<InstanceRecord> {
+    let numbers: BTreeMap<(usize, u32), (u32, [u64; 2])> =
+        prototypes.iter().zip(0..).map(|((key, t), k)| (*key, (k, content_hash(t, &source.materials.records)))).collect();
+    let mut out = Vec::new();
+    for (number, asset) in source.assets.iter().enumerate() {
+        for instance in &asset.instances {
+            let Some((prototype, content)) = numbers.get(&(number, instance.prototype)) else {
+                report.instances_of_nothing += 1;
+                continue;
+            };
+            let transform = to_local(&instance.transform, source.origin);
+            let object_id = asset.ids[instance.object as usize];
+            let content = instance_hash(content, object_id, &transform);
+            out.push(InstanceRecord { prototype: *prototype, object_id, transform, content, reserved: 0 });
+        }
+    }
+    out.sort_by_key(|r| r.object_id);
+    out
+}
+
+fn to_local(transform: &[f64; 12], origin: Vec3) -> [f64; 12] {
+    let mut out = *transform;
+    (0..3).for_each(|k| out[4 * k + 3] -= origin[k]);
+    out
+}
+
+fn instance_hash(content: &[u64; 2], object_id: u32, transform: &[f64; 12]) -> [u64; 2] {
+    let mut hash = XxHash3_128::with_seed(0);
+    hash.write(bytemuck::bytes_of(content));
+    hash.write(&object_id.to_le_bytes());
+    hash.write(bytemuck::bytes_of(transform));
+    let value = hash.finish_128();
+    [value as u64, (value >> 64) as u64]
+}
+
+/// Box of all instances, local.
+pub(super) fn placed_bounds(records: &[InstanceRecord], files: &[Box3]) -> Box3 {
+    let mut out = Box3::EMPTY;
+    records.iter().for_each(|r| out.add_box(&crate::instances::placed_box(&r.transform, &files[r.prototype as usize])));
+    out
+}

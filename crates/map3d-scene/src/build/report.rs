@@ -1,0 +1,43 @@
+//! Counts of what was built and optimised away.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+/// Written to `scene.json` and handed to the caller; every count is there, also when it is 0.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct BuildReport {
+    /// Triangles of all assets, prototypes included.
+    pub triangles_read: u64,
+    /// Triangles in chunks and prototypes.
+    pub triangles: u64,
+    pub degenerate_triangles: u64,
+    pub duplicate_faces: u64,
+    pub duplicate_vertices: u64,
+    pub merged_materials: u64,
+    pub untextured_faces: u64,
+    /// Triangles more, because edges over 1,024 m were split.
+    pub split_triangles: u64,
+    pub ground_plane_triangles: u64,
+    /// Materials whose image is missing or broken; they show their diffuse colour.
+    pub materials_without_their_texture: u64,
+    pub textures: u64,
+    pub textures_kept: u64,
+    pub chunks: u64,
+    pub chunks_kept: u64,
+    pub prototypes: u64,
+    pub instances: u64,
+    /// Instances of prototypes that have no triangles.
+    pub instances_of_nothing: u64,
+    /// Reason → an example, for what went wrong with images.
+    pub texture_warnings: BTreeMap<String, String>,
+}
+
+impl BuildReport {
+    /// The counts by name.
+    pub fn counts(&self) -> BTreeMap<String, u64> {
+        let value = serde_json::to_value(self).expect("counts are plain data");
+        let object = value.as_object().expect("a struct is an object");
+        object.iter().filter_map(|(k, v)| Some((k.clone(), v.as_u64()?))).collect()
+    }
+}

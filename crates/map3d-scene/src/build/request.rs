@@ -1,0 +1,86 @@
+//! What to build, as the caller asks for it in JSON.
+
+use map3d_base::{Error, Result, Vec3};
+use serde::{Deserialize, Serialize};
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BuildRequest {
+    /// Names of folders under `assets/`, in the order of the registry.
+    pub assets: Vec<String>,
+    /// World coordinates of the local origin.
+    pub origin: Vec3,
+    #[serde(default)]
+    pub options: BuildOptions,
+    /// Object of the ground plane; needed when one is made.
+    #[serde(default)]
+    pub ground_id: u32,
+    /// 0: one per core.
+    #[serde(default)]
+    pub threads: usize,
+    /// 0: 1 GiB.
+    #[serde(default)]
+    pub max_memory_bytes: u64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct BuildOptions {
+    /// Chunks store positions, so equal vertices are one anyway; this counts them.
+    pub merge_vertices: bool,
+    /// Faces of the same object and material with the same three corners, whichever way round, become one.
+    pub merge_faces: bool,
+    /// Triangles without area after snapping go.
+    pub drop_degenerate: bool,
+    /// Equal materials become one.
+    pub merge_materials: bool,
+    /// Triangles without a texture go.
+    pub drop_untextured: bool,
+    pub ground_plane: GroundPlane,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum GroundPlane {
+    /// When the scene has no terrain.
+    #[default]
+    Auto,
+    On,
+    Off,
+}
+
+impl Default for BuildOptions {
+    fn default() -> Self {
+        let on = true;
+        Self { merge_vertices: on, merge_faces: on, drop_degenerate: on, merge_materials: on, drop_untextured: false, ground_plane: GroundPlane::Auto }
+    }
+}
+
+const DEFAULT_MEMORY_BYTES: u64 = 1 << 30;
+
+impl BuildRequest {
+    pub fn from_json(text: &str) -> Result<Self> {
+        let request: Self = serde_json::from_str(text).map_err(|e| Error::argument(format!("build request: {e}")))?;
+        request.validate()?;
+        Ok(request)
+    }
+
+    pub(super) fn validate(&self) -> Result<()> {
+        if !self.origin.iter().all(|v| v.is_finite()) {
+            return Err(Error::argument("build request: origin must be finite"));
+        }
+        let plain = |name: &String| !name.is_empty() && !name.starts_with('.') && !name.contains(['/', '\\']);
+        match self.assets.iter().find(|a| !plain(a)) {
+            Some(name) => Err(Error::argument(format!("build request: {name:?} is not the name of an asset's folder"))),
+            None => Ok(()),
+        }
+    }
+
+    pub(super) fn memory_bytes(&self) -> u64 {
+        if self.max_memory_bytes == 0 { DEFAULT_MEMORY_BYTES } else { self.max_memory_bytes }
+    }
+
+    pub(super) fn thread_count(&self) -> usize {
+        if self.threads == 0 { std::thread::available_parallelism().map_or(1, usize::from) } else { self.threads }
+    }
+}

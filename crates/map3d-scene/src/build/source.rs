@@ -1,0 +1,78 @@
+//! Streams the triangles of an asset: to local coordinates, snapped, optimised, split.
+
+use map3d_base::{Vec3, vec3};
+
+use super::assets::Asset;
+use super::materials::BuildMaterials;
+use super::report::BuildReport;
+use super::request::BuildOptions;
+use super::triangle::BuildTriangle;
+use crate::lattice::snap;
+
+/// How the triangles of assets become those of chunks.
+pub(super) struct Source<'a> {
+    pub assets: &'a [Asset],
+    pub materials: &'a BuildMaterials,
+    pub options: &'a BuildOptions,
+    pub origin: Vec3,
+}
+
+impl Source<'_> {
+    /// Hands on the triangles of one asset that are placed as they are (`prototype` 0) or belong to a prototype, in source order.
+    /// Stops at the first `false` of `go_on`, which is asked every 65,536 triangles with the number done.
+    pub fn stream(
+        &self,
+        number: usize,
+        wanted: impl Fn(u32) -> bool,
+        report: &mut BuildReport,
+        out: &mut dyn FnMut(u32, &BuildTriangle),
+        go_on: &mut dyn FnMut(u64) -> bool,
+    ) -> bool {
+        let asset = &self.assets[number];
+        for (i, prototype) in asset.mesh.prototypes().iter().enumerate() {
+            if i % (1 << 16) == 0 && !go_on(i as u64) {
+                return false;
+            }
+            if !wanted(*prototype) {
+                continue;
+            }
+            report.triangles_read += 1;
+            let Some(t) = self.triangle(number, i, *prototype, report) else { continue };
+            report.split_triangles += t.split(&mut |piece| out(*prototype, piece)) - 1;
+        }
+        true
+    }
+
+    fn triangle(&self, number: usize, i: usize, prototype: u32, report: &mut BuildReport) -> Option<BuildTriangle> {
+        let asset = &self.assets[number];
+        let mesh = &asset.mesh;
+        let origin = if prototype == 0 { self.origin } else { [0.0; 3] };
+        let corners = mesh.triangles()[i].map(|v| snap(vec3::sub(mesh.positions()[v as usize], origin)));
+        let material = self.materials.number(number, mesh.materials()[i]);
+        if self.options.drop_untextured && !self.materials.is_textured(material) {
+            report.untextured_faces += 1;
+            return None;
+        }
+        let t = BuildTriangle {
+            corners,
+            uv: mesh.uvs()[i],
+            normals: mesh.normals().get(i).map_or([[0; 3]; 3], |n| n.map(|c| c.map(snorm))),
+            rank: mesh.ranks()[i].min(5),
+            padding: 0,
+            material,
+            object_id: asset.ids[mesh.objects()[i] as usize],
+            source: i as u32,
+            asset: number as u32,
+            padding2: 0,
+        };
+        if self.options.drop_degenerate && t.has_no_area() {
+            report.degenerate_triangles += 1;
+            return None;
+        }
+        Some(t)
+    }
+}
+
+fn snorm(v: f32) -> i16 {
+    (v.clamp(-1.0, 1.0) * 32767.0).round() as i16
+}

@@ -1,0 +1,75 @@
+//! Triangles sorted into cells in bounded memory: what does not fit goes to a file per cell.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use map3d_base::{Error, Result};
+
+use super::triangle::BuildTriangle;
+use crate::index::Cell;
+
+pub(super) struct Spill {
+    folder: PathBuf,
+    memory: BTreeMap<Cell, Vec<BuildTriangle>>,
+    held: usize,
+    /// Triangles held in memory at most.
+    limit: usize,
+}
+
+impl Spill {
+    /// Files go to `folder`, which is emptied.
+    pub fn new(folder: &Path, memory_bytes: u64) -> Result<Self> {
+        remove(folder)?;
+        let limit = (memory_bytes as usize / size_of::<BuildTriangle>()).max(1);
+        Ok(Self { folder: folder.to_path_buf(), memory: BTreeMap::new(), held: 0, limit })
+    }
+
+    pub fn push(&mut self, cell: Cell, triangle: &BuildTriangle) -> Result<()> {
+        self.memory.entry(cell).or_default().push(*triangle);
+        self.held += 1;
+        if self.held > self.limit { self.flush() } else { Ok(()) }
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        fs::create_dir_all(&self.folder).map_err(|e| Error::storage(&self.folder, e))?;
+        for (cell, triangles) in std::mem::take(&mut self.memory) {
+            let path = self.path(cell);
+            let file = File::options().create(true).append(true).open(&path);
+            file.and_then(|mut f| f.write_all(bytemuck::cast_slice(&triangles))).map_err(|e| Error::storage(&path, e))?;
+        }
+        self.held = 0;
+        Ok(())
+    }
+
+    fn path(&self, [level, x, y]: Cell) -> PathBuf {
+        self.folder.join(format!("{level}_{x}_{y}.spill"))
+    }
+
+    /// All triangles of a cell, in the order they were pushed.
+    pub fn load(&self, cell: Cell) -> Result<Vec<BuildTriangle>> {
+        let path = self.path(cell);
+        let mut out = Vec::new();
+        if path.exists() {
+            let bytes = fs::read(&path).map_err(|e| Error::storage(&path, e))?;
+            out.extend(bytes.chunks_exact(size_of::<BuildTriangle>()).map(bytemuck::pod_read_unaligned::<BuildTriangle>));
+        }
+        out.extend_from_slice(self.memory.get(&cell).map_or(&[], Vec::as_slice));
+        Ok(out)
+    }
+}
+
+impl Drop for Spill {
+    fn drop(&mut self) {
+        // What cannot be removed now is removed by the next build.
+        let _ = fs::remove_dir_all(&self.folder);
+    }
+}
+
+fn remove(folder: &Path) -> Result<()> {
+    match fs::remove_dir_all(folder) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::storage(folder, e)),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,98 @@
+//! Lanes as an array, for every machine.
+
+use super::Lanes;
+
+#[derive(Clone, Copy)]
+pub(crate) struct Plain([i32; 16]);
+
+impl Plain {
+    #[inline(always)]
+    fn zip(self, other: Self, f: impl Fn(i32, i32) -> i32) -> Self {
+        Self(std::array::from_fn(|k| f(self.0[k], other.0[k])))
+    }
+
+    #[inline(always)]
+    fn mask(self, other: Self, f: impl Fn(i32, i32) -> bool) -> u32 {
+        (0..16).fold(0, |mask, k| mask | u32::from(f(self.0[k], other.0[k])) << k)
+    }
+}
+
+impl Lanes for Plain {
+    #[inline(always)]
+    fn splat(value: i32) -> Self {
+        Self([value; 16])
+    }
+
+    #[inline(always)]
+    fn load(from: &[i32; 16]) -> Self {
+        Self(*from)
+    }
+
+    #[inline(always)]
+    fn store(self, to: &mut [i32; 16]) {
+        *to = self.0;
+    }
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.zip(other, i32::wrapping_add)
+    }
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.zip(other, i32::wrapping_mul)
+    }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        self.zip(other, i32::min)
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.zip(other, i32::max)
+    }
+
+    #[inline(always)]
+    fn or(self, other: Self) -> Self {
+        self.zip(other, |a, b| a | b)
+    }
+
+    #[inline(always)]
+    fn shift_right(self, bits: u32) -> Self {
+        Self(self.0.map(|v| v >> (bits & 31)))
+    }
+
+    #[inline(always)]
+    fn negative(self) -> u32 {
+        self.mask(self, |a, _| a < 0)
+    }
+
+    #[inline(always)]
+    fn less(self, other: Self) -> u32 {
+        self.mask(other, |a, b| a < b)
+    }
+
+    #[inline(always)]
+    fn equal(self, other: Self) -> u32 {
+        self.mask(other, |a, b| a == b)
+    }
+
+    #[inline(always)]
+    fn put(self, mask: u32, to: &mut [i32; 16]) {
+        for k in 0..16 {
+            to[k] = if mask >> k & 1 != 0 { self.0[k] } else { to[k] };
+        }
+    }
+
+    #[inline(always)]
+    fn greatest(self) -> i32 {
+        self.0.into_iter().fold(i32::MIN, i32::max)
+    }
+
+    #[inline(always)]
+    fn meets_square(x: &[[f32; 8]; 2], y: &[[f32; 8]; 2], side: f32) -> u32 {
+        let meets = |k: usize| x[1][k] >= 0.0 && x[0][k] <= side && y[1][k] >= 0.0 && y[0][k] <= side;
+        (0..8).fold(0, |mask, k| mask | u32::from(meets(k)) << k)
+    }
+}

@@ -1,0 +1,212 @@
+//! Lanes in vector registers. The only file of this crate with `unsafe`.
+//!
+//! SAFETY, for every block here: the intrinsics need AVX2 (`Avx2`) or AVX-512 F and VL (`Avx512`). These types are named only by `beam::dispatch`, which
+//! asks `has_avx2` and `has_avx512` first. Loads and stores go through references to arrays of exactly the bytes they touch, without alignment demands.
+#![allow(clippy::undocumented_unsafe_blocks)]
+
+use std::arch::x86_64::*;
+
+use super::Lanes;
+
+pub(super) fn has_avx2() -> bool {
+    is_x86_feature_detected!("avx2") && is_x86_feature_detected!("bmi1") && is_x86_feature_detected!("bmi2") && is_x86_feature_detected!("lzcnt")
+}
+
+pub(super) fn has_avx512() -> bool {
+    let wide = is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl") && is_x86_feature_detected!("avx512dq");
+    has_avx2() && wide && is_x86_feature_detected!("avx512bw")
+}
+
+/// One 512-bit register.
+#[derive(Clone, Copy)]
+pub(crate) struct Avx512(__m512i);
+
+impl Lanes for Avx512 {
+    #[inline(always)]
+    fn splat(value: i32) -> Self {
+        Self(unsafe { _mm512_set1_epi32(value) })
+    }
+
+    #[inline(always)]
+    fn load(from: &[i32; 16]) -> Self {
+        Self(unsafe { _mm512_loadu_si512(from.as_ptr().cast()) })
+    }
+
+    #[inline(always)]
+    fn store(self, to: &mut [i32; 16]) {
+        unsafe { _mm512_storeu_si512(to.as_mut_ptr().cast(), self.0) }
+    }
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(unsafe { _mm512_add_epi32(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Self(unsafe { _mm512_mullo_epi32(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(unsafe { _mm512_min_epi32(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self(unsafe { _mm512_max_epi32(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn or(self, other: Self) -> Self {
+        Self(unsafe { _mm512_or_si512(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn shift_right(self, bits: u32) -> Self {
+        Self(unsafe { _mm512_sra_epi32(self.0, _mm_cvtsi32_si128(bits as i32)) })
+    }
+
+    #[inline(always)]
+    fn negative(self) -> u32 {
+        u32::from(unsafe { _mm512_movepi32_mask(self.0) })
+    }
+
+    #[inline(always)]
+    fn less(self, other: Self) -> u32 {
+        u32::from(unsafe { _mm512_cmplt_epi32_mask(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn equal(self, other: Self) -> u32 {
+        u32::from(unsafe { _mm512_cmpeq_epi32_mask(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn put(self, mask: u32, to: &mut [i32; 16]) {
+        unsafe { _mm512_mask_storeu_epi32(to.as_mut_ptr(), mask as u16, self.0) }
+    }
+
+    #[inline(always)]
+    fn greatest(self) -> i32 {
+        unsafe { _mm512_reduce_max_epi32(self.0) }
+    }
+
+    #[inline(always)]
+    fn meets_square(x: &[[f32; 8]; 2], y: &[[f32; 8]; 2], side: f32) -> u32 {
+        unsafe { meets_square(x, y, side) }
+    }
+}
+
+/// Two 256-bit registers.
+#[derive(Clone, Copy)]
+pub(crate) struct Avx2(__m256i, __m256i);
+
+impl Avx2 {
+    #[inline(always)]
+    fn both(self, other: Self, f: impl Fn(__m256i, __m256i) -> __m256i) -> Self {
+        Self(f(self.0, other.0), f(self.1, other.1))
+    }
+}
+
+impl Lanes for Avx2 {
+    #[inline(always)]
+    fn splat(value: i32) -> Self {
+        let half = unsafe { _mm256_set1_epi32(value) };
+        Self(half, half)
+    }
+
+    #[inline(always)]
+    fn load(from: &[i32; 16]) -> Self {
+        let (low, high) = from.split_at(8);
+        unsafe { Self(_mm256_loadu_si256(low.as_ptr().cast()), _mm256_loadu_si256(high.as_ptr().cast())) }
+    }
+
+    #[inline(always)]
+    fn store(self, to: &mut [i32; 16]) {
+        let (low, high) = to.split_at_mut(8);
+        unsafe {
+            _mm256_storeu_si256(low.as_mut_ptr().cast(), self.0);
+            _mm256_storeu_si256(high.as_mut_ptr().cast(), self.1);
+        }
+    }
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.both(other, |a, b| unsafe { _mm256_add_epi32(a, b) })
+    }
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.both(other, |a, b| unsafe { _mm256_mullo_epi32(a, b) })
+    }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        self.both(other, |a, b| unsafe { _mm256_min_epi32(a, b) })
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.both(other, |a, b| unsafe { _mm256_max_epi32(a, b) })
+    }
+
+    #[inline(always)]
+    fn or(self, other: Self) -> Self {
+        self.both(other, |a, b| unsafe { _mm256_or_si256(a, b) })
+    }
+
+    #[inline(always)]
+    fn shift_right(self, bits: u32) -> Self {
+        self.both(self, |a, _| unsafe { _mm256_sra_epi32(a, _mm_cvtsi32_si128(bits as i32)) })
+    }
+
+    #[inline(always)]
+    fn negative(self) -> u32 {
+        let half = |a| unsafe { _mm256_movemask_ps(_mm256_castsi256_ps(a)) as u32 };
+        half(self.0) | half(self.1) << 8
+    }
+
+    #[inline(always)]
+    fn less(self, other: Self) -> u32 {
+        self.both(other, |a, b| unsafe { _mm256_cmpgt_epi32(b, a) }).negative()
+    }
+
+    #[inline(always)]
+    fn equal(self, other: Self) -> u32 {
+        self.both(other, |a, b| unsafe { _mm256_cmpeq_epi32(a, b) }).negative()
+    }
+
+    #[inline(always)]
+    fn put(self, mask: u32, to: &mut [i32; 16]) {
+        let (low, high) = to.split_at_mut(8);
+        unsafe {
+            let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+            let lanes = |m: u32| _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(m as i32), bits), bits);
+            _mm256_maskstore_epi32(low.as_mut_ptr(), lanes(mask), self.0);
+            _mm256_maskstore_epi32(high.as_mut_ptr(), lanes(mask >> 8), self.1);
+        }
+    }
+
+    #[inline(always)]
+    fn greatest(self) -> i32 {
+        let mut lanes = [0; 16];
+        self.store(&mut lanes);
+        lanes.into_iter().fold(i32::MIN, i32::max)
+    }
+
+    #[inline(always)]
+    fn meets_square(x: &[[f32; 8]; 2], y: &[[f32; 8]; 2], side: f32) -> u32 {
+        unsafe { meets_square(x, y, side) }
+    }
+}
+
+#[inline(always)]
+unsafe fn meets_square(x: &[[f32; 8]; 2], y: &[[f32; 8]; 2], side: f32) -> u32 {
+    unsafe {
+        let load = |a: &[f32; 8]| _mm256_loadu_ps(a.as_ptr());
+        let (zero, side) = (_mm256_setzero_ps(), _mm256_set1_ps(side));
+        let along = |v: &[[f32; 8]; 2]| _mm256_and_ps(_mm256_cmp_ps::<_CMP_GE_OQ>(load(&v[1]), zero), _mm256_cmp_ps::<_CMP_LE_OQ>(load(&v[0]), side));
+        _mm256_movemask_ps(_mm256_and_ps(along(x), along(y))) as u32
+    }
+}
