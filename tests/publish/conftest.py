@@ -15,6 +15,7 @@ def built_viewer(tmp_path, monkeypatch):
     (folder / "assets").mkdir(parents=True)
     (folder / "index.html").write_text("<!doctype html><script src=map3d.js></script>")
     (folder / "assets" / "worker.js").write_text("// worker")
+    (folder / "map3d.d.ts").write_text("for authors of pages")
     (folder / ".shots").mkdir()
     (folder / ".shots" / "x.png").write_text("not the viewer's")
     monkeypatch.setattr(viewer, "files", lambda _: folder.parent)

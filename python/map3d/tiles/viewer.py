@@ -7,6 +7,7 @@ from typing import Final
 from map3d.errors import Map3dError
 
 PAGE: Final = "index.html"
+TYPES: Final = (".d.ts", ".d.mts")
 
 
 class ViewerMissing(Map3dError):
@@ -24,7 +25,7 @@ def viewer_folder() -> Path:
 
 
 def viewer_files() -> list[Path]:
-    """Relative paths of all files of the viewer but hidden ones, sorted; raises ViewerMissing."""
+    """Relative paths of what a page loads, sorted: neither hidden files nor declarations of types. Raises ViewerMissing."""
     folder = viewer_folder()
     found = (path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
-    return sorted(path for path in found if not any(part.startswith(".") for part in path.parts))
+    return sorted(path for path in found if not any(part.startswith(".") for part in path.parts) and not path.name.endswith(TYPES))
