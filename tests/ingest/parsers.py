@@ -81,3 +81,15 @@ def open_hoarder(_setup: Mapping[str, Any]) -> Work:
         return {"files": many_files(Path(question["folder"]))}, []
 
     return work
+
+
+def open_worker(_setup: Mapping[str, Any]) -> Work:
+    """Uses as much processor time as it is asked to."""
+
+    def work(question: dict[str, Any], _blobs: list[bytes], _tell: Tell) -> tuple[dict[str, Any], list[bytes]]:
+        end = time.process_time() + question["cpu_s"]
+        while time.process_time() < end:
+            pass
+        return {}, []
+
+    return work

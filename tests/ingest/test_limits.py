@@ -13,6 +13,7 @@ from map3d.child import Child, Limits, Message
 from map3d.errors import ImportFailed, LimitExceeded
 from map3d.ingest.importing import import_file
 from map3d.ingest.options import BIG_FILE_BYTES, GIB, ImportOptions
+from map3d.ingest.parsers import Parsers
 from map3d.ingest.sources import Source, find_sources
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
@@ -43,7 +44,7 @@ def source(tmp_path: Path) -> Source:
         ("open_greedy", ImportOptions(), LimitExceeded, "1024 MiB of address space.*--parse-memory"),
         ("open_greedy", ImportOptions(parse_memory_bytes=3 << 30), LimitExceeded, "3072 MiB of address space"),
         ("open_busy", ImportOptions(parse_cpu_s=1), LimitExceeded, "1 s of processor time.*--parse-cpu"),
-        ("open_asleep", ImportOptions(parse_cpu_s=1), LimitExceeded, "not read within 4 s.*--parse-cpu"),
+        ("open_asleep", ImportOptions(parse_cpu_s=1), LimitExceeded, "not read within 14 s.*--parse-cpu"),
         ("open_crash", ImportOptions(), ImportFailed, "SIGABRT"),
     ],
 )
@@ -86,6 +87,30 @@ def test_limits_grow_with_the_file(tmp_path: Path, size: int, memory: int, cpu_s
     with path.open("wb") as file:
         file.truncate(size)
     limits = ImportOptions().limits([path], "citygml")
-    assert (limits.address_space_bytes, limits.cpu_s, limits.wall_s, limits.network) == (memory, cpu_s, 4.0 * cpu_s, False)
+    assert (limits.address_space_bytes, limits.cpu_s, limits.wall_s, limits.network) == (memory, cpu_s, 10.0 + 4.0 * cpu_s, False)
     raised = dataclasses.replace(ImportOptions(), parse_memory_bytes=5 * GIB, parse_cpu_s=7).limits([path], "citygml")
     assert (raised.address_space_bytes, raised.cpu_s) == (5 * GIB, 7)
+
+
+def test_processor_time_is_granted_anew_for_every_file() -> None:
+    child = Child("tests.ingest.parsers:open_worker", {}, limits=Limits(cpu_s=1))
+    child.wait_ready(30)
+    for _ in range(4):
+        assert isinstance(child.ask({"cpu_s": 0.6}, wall_s=30), Message)
+    with pytest.raises(LimitExceeded):
+        child.ask({"cpu_s": 5.0}, wall_s=60)
+    child.close()
+
+
+def test_one_parser_serves_many_files_until_one_fails() -> None:
+    with Parsers() as parsers:
+        limits = Limits(open_files=64)
+        first, _ = parsers.get("tests.child.echo:open_echo", limits)
+        assert parsers.get("tests.child.echo:open_echo", limits)[0] is first
+        with parsers:
+            pass
+        assert isinstance(first.ask({}, wall_s=10), Message), "an inner user does not end it"
+        parsers.drop()
+        second, _ = parsers.get("tests.child.echo:open_echo", limits)
+        assert second is not first
+        assert parsers.get("tests.child.echo:open_echo", Limits(open_files=65))[0] is not second

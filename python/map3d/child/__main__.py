@@ -28,7 +28,8 @@ def _serve(channel: Channel, entry: str) -> None:
     first = channel.receive()
     assert first is not None, "receive without a time limit always has a message"
     try:
-        applied = Limits.from_json(first.value["limits"]).apply()
+        limits = Limits.from_json(first.value["limits"])
+        applied = limits.apply()
         work = _load(entry)(first.value["setup"])
     except Exception as error:
         channel.send(_error(error))
@@ -37,6 +38,7 @@ def _serve(channel: Channel, entry: str) -> None:
     while True:
         asked = channel.receive()
         assert asked is not None, "receive without a time limit always has a message"
+        limits.renew()
         try:
             answer, blobs = work(asked.value["question"], asked.blobs, lambda told: channel.send({"told": told}))
         except MemoryError:

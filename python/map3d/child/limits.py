@@ -1,6 +1,7 @@
 """Limits that a child puts on itself before it touches anything of a user's: memory, processor, files, network."""
 
 import ctypes
+import math
 import os
 import resource
 import signal
@@ -16,7 +17,7 @@ _CLONE_NEWNET: Final = 0x40000000
 
 @dataclass(frozen=True)
 class Limits:
-    """None: unlimited. `wall_s` is watched by the parent, the rest by the kernel."""
+    """None: unlimited. `wall_s` and `cpu_s` are for each question; `wall_s` is watched by the parent, the rest by the kernel."""
 
     address_space_bytes: int | None = None
     cpu_s: int | None = None
@@ -35,14 +36,18 @@ class Limits:
         """Limits this process for good; returns what could be done: {"network": "cut" | "open"}."""
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         cut = not self.network and _cut_network()
-        for what, value in (
-            (resource.RLIMIT_AS, self.address_space_bytes),
-            (resource.RLIMIT_CPU, self.cpu_s),
-            (resource.RLIMIT_NOFILE, self.open_files),
-        ):
+        for what, value in ((resource.RLIMIT_AS, self.address_space_bytes), (resource.RLIMIT_NOFILE, self.open_files)):
             if value is not None:
                 _lower(what, value)
         return {"network": "cut" if cut else "open"}
+
+    def renew(self) -> None:
+        """Grants `cpu_s` of processor time from now on, for the next question."""
+        if self.cpu_s is not None:
+            used = resource.getrusage(resource.RUSAGE_SELF)
+            hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
+            granted = math.ceil(used.ru_utime + used.ru_stime) + self.cpu_s
+            resource.setrlimit(resource.RLIMIT_CPU, (granted if hard == resource.RLIM_INFINITY else min(granted, hard), hard))
 
 
 def die_with_parent(parent_pid: int) -> None:
@@ -56,7 +61,7 @@ def die_with_parent(parent_pid: int) -> None:
 def _lower(what: int, value: int) -> None:
     hard = resource.getrlimit(what)[1]
     allowed = value if hard == resource.RLIM_INFINITY else min(value, hard)
-    resource.setrlimit(what, (allowed, hard if what == resource.RLIMIT_CPU else allowed))
+    resource.setrlimit(what, (allowed, allowed))
 
 
 def _cut_network() -> bool:

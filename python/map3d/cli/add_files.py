@@ -34,6 +34,7 @@ def command(workspace: Workspace, scene: str, files: Sequence[Path], as_json: bo
     """
     from map3d.ingest.importing import import_file
     from map3d.ingest.options import ImportOptions
+    from map3d.ingest.parsers import Parsers
     from map3d.ingest.sources import find_sources
 
     sources = find_sources(files, name)
@@ -43,11 +44,13 @@ def command(workspace: Workspace, scene: str, files: Sequence[Path], as_json: bo
     done, failed = [], []
     try:
         catalogue.scene(scene)
-        with Progress(SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), console=console(), transient=True) as bar:
+        columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+        with Parsers() as parsers, Progress(*columns, console=console(), transient=True) as bar:
             for number, source in enumerate(sources, 1):
                 task = bar.add_task(f"{number} of {len(sources)}: {source.paths[0].name}")
                 try:
-                    done.append(import_file(workspace, catalogue, scene, source, ImportOptions(**options), _show(bar, task, source.paths[0].name)))
+                    show = _show(bar, task, source.paths[0].name)
+                    done.append(import_file(workspace, catalogue, scene, source, ImportOptions(**options), show, parsers=parsers))
                 except Map3dError as error:
                     if options["strict"] or len(sources) == 1:
                         raise

@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from map3d.catalogue import AssetRecord, Catalogue, SceneCrs, SceneRecord, Workspace
-from map3d.child import Child, Failure, Limits
+from map3d.child import Failure, Limits
 from map3d.errors import ChildDied, CrsError, ImportFailed, LimitExceeded, Map3dError
 from map3d.ingest.asset import asset_digest, new_objects, put_in_place, read_objects, world_boxes, write_ids, write_report
 from map3d.ingest.crs import LOCAL, is_local, parse_crs, scene_crs
 from map3d.ingest.lock import scene_lock
 from map3d.ingest.options import ImportOptions
+from map3d.ingest.parsers import Parsers
 from map3d.ingest.sources import Source, source_digest
 from map3d.registry import Registry
 from map3d.types import Box, Vec3
@@ -22,7 +23,6 @@ ENTRIES: Final = {"raster": "map3d.ingest.terrain_work:open_terrain"}
 IMPORT_ENTRY: Final = "map3d.ingest.work:open_import"
 ORIGIN_STEP_M: Final = 100.0
 MAX_FROM_ORIGIN_M: Final = 1e8
-_START_S: Final = 120.0
 
 Progress = Callable[[str], None]
 """Called with how far the reading is, as text."""
@@ -49,9 +49,12 @@ def import_file(
     options: ImportOptions,
     progress: Progress | None = None,
     *,
+    parsers: Parsers | None = None,
     entry: str | None = None,
 ) -> Imported:
     """Adds a source document to a scene, or replaces the asset of its name. What went wrong in parts is counted in the report.
+
+    `parsers`: children to use again when there are many files; else one is started for this file.
 
     Raises ImportFailed (nothing usable, or the first fault under `strict`), LimitExceeded, CrsError. Until the last step the scene is as before.
     """
@@ -62,7 +65,8 @@ def import_file(
     shutil.rmtree(draft, ignore_errors=True)
     draft.mkdir(parents=True)
     try:
-        answer = _read(record, source, options, draft, progress, entry or ENTRIES.get(source.format, IMPORT_ENTRY))
+        with parsers or Parsers() as kept:
+            answer = _read(record, source, options, draft, progress, kept, entry or ENTRIES.get(source.format, IMPORT_ENTRY))
         report = answer["report"]
         if not report["triangles"]:
             raise ImportFailed(f"{source.paths[0]}: no triangle in it could be used{_reasons(report)}")
@@ -78,7 +82,9 @@ def parse_scene_crs(text: str) -> SceneCrs:
     return LOCAL if is_local(text) else scene_crs(parse_crs(text))
 
 
-def _read(record: SceneRecord, source: Source, options: ImportOptions, draft: Path, progress: Progress | None, entry: str) -> dict[str, Any]:
+def _read(
+    record: SceneRecord, source: Source, options: ImportOptions, draft: Path, progress: Progress | None, parsers: Parsers, entry: str
+) -> dict[str, Any]:
     limits = options.limits(source.paths, source.format)
     question = {
         "path": str(source.paths[0].absolute()),
@@ -90,14 +96,15 @@ def _read(record: SceneRecord, source: Source, options: ImportOptions, draft: Pa
         "crs": options.crs,
         "scene_crs": _crs_text(record.crs),
     }
-    child = Child(entry, {}, limits=limits, environment={"RAYON_NUM_THREADS": "1"})
     try:
-        applied = child.wait_ready(_START_S)
+        child, applied = parsers.get(entry, limits)
         message = child.ask(question, wall_s=limits.wall_s, meanwhile=lambda told: told and progress and progress(_told(told)))
     except (ChildDied, LimitExceeded) as error:
+        parsers.drop()
         raise _explained(source, limits, error) from error
-    finally:
-        child.close()
+    except BaseException:
+        parsers.drop()
+        raise
     if isinstance(message, Failure):
         raise _failure(source, message)
     answer: dict[str, Any] = message.value

@@ -42,9 +42,9 @@ class ImportOptions:
         return options
 
     def limits(self, paths: Sequence[Path], format: str) -> Limits:
-        """1 GiB, 2 GiB for big files; 60 s of processor time for every 100 MB begun (rasters: 2 GiB, 600 s); four times that on the clock."""
+        """1 GiB, 2 GiB for big files; 60 s of processor time for every 100 MB begun (rasters: 2 GiB, 600 s); ten seconds and four times that on the clock."""
         size = sum(path.stat().st_size for path in paths)
         raster = format == "raster"
         cpu_s = self.parse_cpu_s or (CPU_S_A_BIG_RASTER if raster else CPU_S_A_BIG_FILE) * max(1, -(-size // BIG_FILE_BYTES))
         memory = self.parse_memory_bytes or (2 * GIB if raster or size > BIG_FILE_BYTES else GIB)
-        return Limits(address_space_bytes=memory, cpu_s=cpu_s, wall_s=4.0 * cpu_s, open_files=OPEN_FILES, network=False)
+        return Limits(address_space_bytes=memory, cpu_s=cpu_s, wall_s=10.0 + 4.0 * cpu_s, open_files=OPEN_FILES, network=False)

@@ -10,6 +10,7 @@ from map3d.errors import BadRequest, Map3dError
 from map3d.geometry.frames import pin
 from map3d.ingest.importing import import_file
 from map3d.ingest.options import ImportOptions
+from map3d.ingest.parsers import Parsers
 from map3d.ingest.sources import Source, find_sources, source_digest
 from map3d.jobs.creating import RenderingRequest, create_rendering, make_layers
 from map3d.render.build import build, is_stale, open_scene
@@ -54,20 +55,23 @@ def add_changed(workspace: Workspace, catalogue: Catalogue, request: SiteRequest
     have = {asset.name: asset.source_digest for asset in catalogue.assets(request.name)}
     done = Added([], [], [])
     sources = find_sources([request.sources])
-    for number, source in enumerate(sources):
-        tell(source.paths[0].name, number, len(sources))
-        _add(workspace, catalogue, request, source, have, done)
+    with Parsers() as parsers:
+        for number, source in enumerate(sources):
+            tell(source.paths[0].name, number, len(sources))
+            _add(workspace, catalogue, request, source, have, done, parsers)
     if not done.added and not done.unchanged:
         raise BadRequest(f"{request.sources}: none of its {len(sources)} files could be used; the first: {done.failed[0][1]}")
     return done
 
 
-def _add(workspace: Workspace, catalogue: Catalogue, request: SiteRequest, source: Source, have: dict[str, str], done: Added) -> None:
+def _add(
+    workspace: Workspace, catalogue: Catalogue, request: SiteRequest, source: Source, have: dict[str, str], done: Added, parsers: Parsers
+) -> None:
     if have.get(source.name) == source_digest(source):
         done.unchanged.append(source.name)
         return
     try:
-        import_file(workspace, catalogue, request.name, source, request.options)
+        import_file(workspace, catalogue, request.name, source, request.options, parsers=parsers)
         done.added.append(source.name)
     except Map3dError as error:
         if request.options.strict:

@@ -24,6 +24,8 @@ Progress = Callable[[str, int, int], None]
 def verify_scene(workspace: Workspace, catalogue: Catalogue, scene: str, findings: Findings, progress: Progress) -> None:
     """Checksums of all files, the scene index, ids against the registry."""
     folder = workspace.scene_folder(scene)
+    if not catalogue.assets(scene):
+        return
     files = list(binary_files(folder))
     for done, path in enumerate(files, 1):
         wrong = check_file(path)
