@@ -83,7 +83,10 @@ export class Store {
     try {
       const bytes = await this.#source.tile(view, layer, tile, signal);
       const data = bytes && (await this.#shared.decoder.decode(layer.kind, layer.media_type, bytes));
-      if (signal.aborted) return;
+      if (signal.aborted) {
+        if (data?.kind === "color") data.bitmap.close();
+        return;
+      }
       this.#shared.cache.set(key, { data, empty: !data }, data ? bytesOf(data) * (data.kind === "id" || data.kind === "depth" ? 2 : 1) : 64);
       this.#failed.delete(key);
       this.#arrived(null);

@@ -89,7 +89,7 @@ test("a published folder is read from its archives by ranges", async () => {
 });
 
 test("keys move, zoom and turn while the map has the focus", async () => {
-  const { page } = await start(browser, `${host}/tiles/town`, { zoom: 2.5 });
+  const { page } = await start(browser, `${host}/tiles/town`, { zoom: 3.8 });
   const state = (): Promise<{ zoom: number; direction: string; x: number }> => page.evaluate((world) => {
     const { map } = globalThis as Global;
     return { zoom: map.zoom, direction: map.direction, x: map.project(world)?.[0] ?? NaN };
@@ -108,11 +108,11 @@ test("keys move, zoom and turn while the map has the focus", async () => {
 });
 
 test("a double click zooms at the pointer; the buttons zoom and turn", async () => {
-  const { page } = await start(browser, `${host}/tiles/town`, { zoom: 2 });
+  const { page } = await start(browser, `${host}/tiles/town`, { zoom: 3.8 });
   await page.mouse.dblclick(300, 300);
-  await page.waitForFunction(() => (globalThis as Global).map.zoom > 2.95);
+  await page.waitForFunction(() => (globalThis as Global).map.zoom > 4.75);
   await page.getByRole("button", { name: "Zoom out" }).click();
-  await page.waitForFunction(() => (globalThis as Global).map.zoom < 2.05);
+  await page.waitForFunction(() => (globalThis as Global).map.zoom < 3.85);
   await page.getByRole("button", { name: "Turn view clockwise", exact: true }).click();
   expect(await page.evaluate(() => (globalThis as Global).map.direction)).toBe("270-45");
   await page.getByRole("button", { name: /look north/ }).click();
@@ -121,7 +121,7 @@ test("a double click zooms at the pointer; the buttons zoom and turn", async () 
 });
 
 test("two fingers zoom about what lies between them", async () => {
-  const { page } = await start(browser, `${host}/tiles/town`, { zoom: 2.2 });
+  const { page } = await start(browser, `${host}/tiles/town`, { zoom: 3.8 });
   const session = await page.context().newCDPSession(page);
   const ground = await page.evaluate(() => (globalThis as Global).map.unproject([400, 300]) as [number, number, number]);
   const touch = (type: "touchStart" | "touchMove" | "touchEnd", apart: number): Promise<unknown> =>
@@ -130,7 +130,7 @@ test("two fingers zoom about what lies between them", async () => {
   for (let apart = 55; apart <= 100; apart += 5) await touch("touchMove", apart);
   await touch("touchEnd", 0);
   const after = await page.evaluate((world) => ({ zoom: (globalThis as Global).map.zoom, at: (globalThis as Global).map.project(world) as [number, number] }), ground);
-  expect(after.zoom).toBeCloseTo(3.2, 1);
+  expect(after.zoom).toBeCloseTo(4.8, 1);
   expect(Math.hypot(after.at[0] - 400, after.at[1] - 300)).toBeLessThan(3);
   await page.context().close();
 });
@@ -148,10 +148,10 @@ test("hovering names what lies under the pointer", async () => {
 });
 
 test("the debug overlay names the tiles", async () => {
-  const { page } = await start(browser, `${host}/tiles/town`, { zoom: 2 });
+  const { page } = await start(browser, `${host}/tiles/town`, { zoom: 4 });
   await settled(page, () => (globalThis as Global).map.debug(true), null);
   await page.screenshot({ path: `${OUT}/debug.png` });
-  expect(await page.locator(".map3d-debug > div").first().textContent()).toMatch(/^2\/\d\/\d × 1\.00$/);
+  expect(await page.locator(".map3d-debug > div").first().textContent()).toMatch(/^3\/\d\/\d × 2\.00$/);
   await page.context().close();
 });
 

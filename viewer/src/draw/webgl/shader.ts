@@ -145,7 +145,7 @@ vec4 highlighted(vec4 color, vec2 texel) {
   float grey = dot(color.rgb, vec3(0.2126, 0.7152, 0.0722));
   bool rim = idAt(texel + vec2(u_rim, 0.0)) != id || idAt(texel - vec2(u_rim, 0.0)) != id
     || idAt(texel + vec2(0.0, u_rim)) != id || idAt(texel - vec2(0.0, u_rim)) != id;
-  vec3 body = mix(color.rgb, tint * (0.35 + 0.75 * grey), 0.72);
+  vec3 body = mix(color.rgb, tint * (0.5 + 0.65 * grey), 0.72);
   return vec4(clamp(rim ? tint : body, 0.0, 1.0), max(color.a, rim ? 0.9 : color.a));
 }
 #endif

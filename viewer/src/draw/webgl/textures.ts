@@ -5,8 +5,8 @@ export interface TileTexture {
   readonly texture: WebGLTexture;
   readonly width: number;
   readonly height: number;
-  /** Sides whose gutter is filled, at (dx + 1) + 3 (dy + 1). */
-  readonly filled: boolean[];
+  /** How well each part of the gutter is filled, at (dx + 1) + 3 (dy + 1): 0 not at all, 3 from the tile that lies there. */
+  readonly filled: number[];
 }
 
 /** Name of the same layer's tile dx columns to the right and dy rows down. */
@@ -68,7 +68,7 @@ export class Textures {
     const stored = data.kind === "color" ? gl.RGBA8 : data.kind === "normal" ? gl.RGB8 : gl.R32UI;
     gl.texStorage2D(gl.TEXTURE_2D, 1, stored, width + 2, height + 2);
     this.#fill(data);
-    return { texture, width, height, filled: new Array<boolean>(9).fill(false) };
+    return { texture, width, height, filled: new Array<number>(9).fill(0) };
   }
 
   #fill(data: TileData): void {
@@ -89,16 +89,18 @@ export class Textures {
     const [toX, fromX, w] = along(dx, to.width);
     const [toY, fromY, h] = along(dy, to.height);
     gl.copyTexSubImage2D(gl.TEXTURE_2D, 0, toX, toY, fromX, fromY, w, h);
-    to.filled[side(dx, dy)] = true;
+    to.filled[side(dx, dy)] = BEST;
     if (dx === 0 || dy === 0) this.#copyCorners(to, dx, dy, fromX, fromY);
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, null);
   }
 
-  /** Corners of the gutter come from the side's end pixels until the tile across the corner is here. */
+  /** Without the tile across a corner, the corner comes from the tile above or below, else beside: whichever came first. */
   #copyCorners(to: TileTexture, dx: number, dy: number, fromX: number, fromY: number): void {
+    const quality = dx === 0 ? 2 : 1;
     for (const end of [-1, 1]) {
       const [cx, cy] = dx === 0 ? [end, dy] : [dx, end];
-      if (to.filled[side(cx, cy)]) continue;
+      if ((to.filled[side(cx, cy)] ?? 0) >= quality) continue;
+      to.filled[side(cx, cy)] = quality;
       const [toX] = along(cx, to.width);
       const [toY] = along(cy, to.height);
       const sourceX = dx === 0 ? (end < 0 ? 1 : to.width) : fromX;
@@ -107,6 +109,8 @@ export class Textures {
     }
   }
 }
+
+const BEST = 3;
 
 /** A unit that no sampler uses. */
 export const SPARE_UNIT = 7;

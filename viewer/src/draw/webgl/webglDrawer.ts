@@ -61,10 +61,14 @@ export class WebGLDrawer implements Drawer {
     const mode: Mode = pass.mode === "lit" && !frame.light.lit ? "color" : pass.mode;
     const kinds = neededKinds(mode, pass.masked);
     const wanted = pass.highlight.size > 0;
-    for (const quad of pass.quads) {
-      const textures = kinds.map((kind) => [kind, this.#textureOf(pass, kind, quad)] as const);
+    // All are uploaded before the first is drawn, so that gutters have their neighbours' pixels.
+    const ready = pass.quads.map((quad) => ({
+      quad,
+      textures: kinds.map((kind) => [kind, this.#textureOf(pass, kind, quad)] as const),
+      ids: wanted ? this.#textureOf(pass, "id", quad) : undefined,
+    }));
+    for (const { quad, textures, ids } of ready) {
       if (textures.some(([, texture]) => !texture)) continue;
-      const ids = wanted ? this.#textureOf(pass, "id", quad) : undefined;
       const program = this.#programs.use({ mode, masked: pass.masked, highlight: ids !== undefined });
       for (const [kind, texture] of textures) this.#bind(kind, texture);
       if (ids) this.#bindHighlight(program, pass, quad, ids, frame.dpr);
