@@ -96,6 +96,16 @@ def test_a_writer_killed_within_a_put_leaves_the_old_block(path, store):
     assert store.check() == []
 
 
+def test_a_store_in_a_folder_that_cannot_be_written_is_read(path, store, monkeypatch):
+    store.put_block(BLOCK, "a", 1, [tile(b"tile")], b"s")
+    store.close()
+    before = sorted(path.parent.iterdir())
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    with SqliteTileStore(path, read_only=True) as reader:
+        assert reader.get_tile(0, 0, 0, 0) == b"tile"
+        assert sorted(path.parent.iterdir()) == before
+
+
 def test_a_full_disk_is_a_typed_error(store):
     store._connection().execute("PRAGMA max_page_count = 20")
     with pytest.raises(StoreError, match="full"):

@@ -32,7 +32,7 @@ def address(request, finished, tmp_path):
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)})
     try:
         yield process.stdout.readline().strip()
-        process.send_signal(signal.SIGINT)
+        process.send_signal(signal.SIGINT if request.param == 1 else signal.SIGTERM)
         assert process.wait(20) == 0
     finally:
         process.kill()

@@ -215,7 +215,8 @@ class SqliteTileStore:
 
 
 def _connect(path: Path, read_only: bool) -> sqlite3.Connection:
-    mode = "ro" if read_only else "rw"
+    """Readers of a WAL file must share memory beside it, unless nobody can write there."""
+    mode = "rw" if not read_only else "ro&immutable=1" if _is_frozen(path) else "ro"
     quoted = path.absolute().as_uri()
     connection = sqlite3.connect(f"{quoted}?mode={mode}", uri=True, timeout=BUSY_TIMEOUT_S, isolation_level=None, check_same_thread=False)
     connection.execute("PRAGMA synchronous = FULL")
@@ -223,6 +224,10 @@ def _connect(path: Path, read_only: bool) -> sqlite3.Connection:
         connection.execute(f"PRAGMA wal_autocheckpoint = {CHECKPOINT_PAGES}")
         connection.execute(f"PRAGMA cache_size = -{CACHE_KIB}")
     return connection
+
+
+def _is_frozen(path: Path) -> bool:
+    return not os.access(path.parent, os.W_OK) and not path.with_name(path.name + "-wal").exists()
 
 
 def _write_empty(path: Path, shape: StoreShape) -> None:
