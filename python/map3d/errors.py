@@ -56,6 +56,10 @@ class ChildDied(Map3dError):
     """A child process ended, hung or answered nonsense; the message says how."""
 
 
+class ChildRefused(ChildDied):
+    """A child could not begin and said why: the next one would say the same."""
+
+
 class Stopped(Map3dError):
     """The user stopped the work; the message says how to go on."""
 

@@ -116,14 +116,15 @@ def test_reasons_say_how_a_child_ended(town: Town, faults: Path) -> None:
 
 def test_killed_children_cost_nothing(town: Town, faults: Path, undisturbed: str) -> None:
     """A new child starts every time; the tiles are those of an undisturbed run."""
-    (faults / "slow").write_text("0.02")
+    (faults / "slow").write_text("0.1")
     chance = random.Random(5)
     over = threading.Event()
 
     def kill_children() -> None:
-        while not over.wait(0.15):
-            children = children_of(os.getpid())
-            if children:
+        done = 0
+        while not over.wait(0.05):
+            if town.count(State.DONE) >= done + 3 and (children := children_of(os.getpid())):
+                done = town.count(State.DONE)
                 os.kill(chance.choice(children), signal.SIGKILL)
 
     killer = threading.Thread(target=kill_children)
@@ -133,9 +134,30 @@ def test_killed_children_cost_nothing(town: Town, faults: Path, undisturbed: str
     killer.join()
     town.catalogue.retry("town-a")
     town.run()
-    assert tally.failed_attempts > 0
+    assert tally.failed_attempts > 3
     assert all_done(town)
     assert town.digest() == undisturbed
+
+
+def test_children_killed_before_they_are_ready_are_replaced(town: Town, faults: Path) -> None:
+    killed = 0
+    over = threading.Event()
+
+    def kill_starters() -> None:
+        nonlocal killed
+        while killed < 4 and not over.wait(0.01):
+            for child in children_of(os.getpid()):
+                os.kill(child, signal.SIGKILL)
+                killed += 1
+
+    killer = threading.Thread(target=kill_starters)
+    killer.start()
+    tally, _ = town.run()
+    over.set()
+    killer.join()
+    assert killed >= 4
+    assert all_done(town)
+    assert tally.left_early == []
 
 
 def test_killing_the_whole_run_loses_nothing(town: Town, faults: Path, undisturbed: str) -> None:

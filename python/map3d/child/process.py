@@ -14,7 +14,7 @@ from typing import IO, Any, Final
 
 from map3d.child.channel import Channel, Message
 from map3d.child.limits import Limits
-from map3d.errors import ChildDied, Corrupt, LimitExceeded
+from map3d.errors import ChildDied, ChildRefused, Corrupt, LimitExceeded
 
 TAIL_BYTES: Final = 2000
 PIPE_BYTES: Final = 1 << 20
@@ -32,7 +32,7 @@ class Failure:
 class Child:
     """One long-lived child. `entry` ("module:function") names what it does: function(setup) → work; work(question, blobs, tell) → (answer, blobs).
 
-    Not for several threads at once. The child dies when the thread that started it ends.
+    Not for several threads at once. The child dies when the thread that started it ends. Making one raises ChildDied when it is gone at once.
     """
 
     def __init__(self, entry: str, setup: Mapping[str, Any], *, limits: Limits | None = None, environment: Mapping[str, str] | None = None) -> None:
@@ -55,14 +55,18 @@ class Child:
         finally:
             os.close(child_reads)
             os.close(child_writes)
-        self._say({"setup": dict(setup), "limits": self.limits.to_json()})
+        try:
+            self._say({"setup": dict(setup), "limits": self.limits.to_json()})
+        except ChildDied:
+            self.close()
+            raise
 
     @property
     def pid(self) -> int:
         return self._process.pid
 
     def wait_ready(self, timeout_s: float) -> dict[str, Any]:
-        """What the child says when its entry has been called; raises ChildDied when it fails or takes longer."""
+        """What the child says when its entry has been called; raises ChildRefused when that fails, ChildDied when it ends or takes longer."""
         message = self._hear(timeout_s)
         if message is None:
             self.kill()
@@ -70,7 +74,7 @@ class Child:
         if "ready" not in message.value:
             self.kill()
             failure = message.value.get("error", {})
-            raise ChildDied(f"child could not start: {failure.get('kind')}: {failure.get('message')}")
+            raise ChildRefused(f"child could not start: {failure.get('kind')}: {failure.get('message')}")
         ready: dict[str, Any] = message.value["ready"]
         return ready
 

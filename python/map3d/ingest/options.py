@@ -42,7 +42,8 @@ class ImportOptions:
         return options
 
     def limits(self, paths: Sequence[Path], format: str) -> Limits:
-        """1 GiB, 2 GiB for big files; 60 s of processor time for every 100 MB begun (rasters: 2 GiB, 600 s); ten seconds and four times that on the clock."""
+        """1 GiB, 2 GiB for big files; 60 s of processor time for every 100 MB begun (rasters: 2 GiB, 600 s); four times that and ten seconds on
+        the clock."""
         size = sum(path.stat().st_size for path in paths)
         raster = format == "raster"
         cpu_s = self.parse_cpu_s or (CPU_S_A_BIG_RASTER if raster else CPU_S_A_BIG_FILE) * max(1, -(-size // BIG_FILE_BYTES))

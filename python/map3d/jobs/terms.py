@@ -8,8 +8,10 @@ from map3d.catalogue import HEARTBEAT_S
 @dataclass(frozen=True)
 class Terms:
     """`block_s`: how long a child may work on one block before it counts as hanging; `start_s`: how long it may take to start.
-    A worker that fails `failures` different jobs leaves, as does one whose child cannot be started `failures` times in a row; a worker without a job
-    looks again every `idle_s`, and every `tick_s` whether it is to stop."""
+
+    A worker that fails `failures` different jobs leaves; so does one whose children die before they are ready `starts` times in a row, or say why
+    they cannot start. A worker without a job looks again every `idle_s`, and every `tick_s` whether it is to stop.
+    """
 
     heartbeat_s: float = HEARTBEAT_S
     block_s: float = 900.0
@@ -17,3 +19,5 @@ class Terms:
     idle_s: float = 0.5
     tick_s: float = 0.25
     failures: int = 3
+    starts: int = 12
+    start_pause_s: float = 0.25

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 from map3d.catalogue import Catalogue, JobResult, Lease, State
 from map3d.child import Child, Failure, Message
-from map3d.errors import Map3dError, StaleFence
+from map3d.errors import ChildRefused, Map3dError, StaleFence
 from map3d.jobs.events import Done, Event, Failed, Left, Lost
 from map3d.jobs.terms import Terms
 
@@ -59,6 +59,8 @@ class Worker:
     def _work_on(self, tell: Callable[[Event], None]) -> Left:
         while not self._stop.is_set():
             child = self._ready_child()
+            if child is None:
+                break
             lease = self._catalogue.lease(self._rendering, self.name)
             if lease is not None:
                 tell(self._work(child, lease))
@@ -109,18 +111,20 @@ class Worker:
         self._failed.add((lease.view, str(lease.block)))
         return Failed(lease, reason, state)
 
-    def _ready_child(self) -> Child:
-        for attempt in range(1, self._terms.failures + 1):
+    def _ready_child(self) -> Child | None:
+        """None: stopped while it tried. Raises ChildRefused, or ChildDied after too many tries."""
+        for attempt in range(1, self._terms.starts + 1):
             if self._child is not None:
-                break
-            self._child = self._task.start_child()
+                return self._child
             try:
+                self._child = self._task.start_child()
                 self._child.wait_ready(self._terms.start_s)
-            except Map3dError:
+            except Map3dError as error:
                 self._drop_child()
-                if attempt == self._terms.failures:
+                if isinstance(error, ChildRefused) or attempt == self._terms.starts:
                     raise
-        assert self._child is not None, "the last attempt raises"
+                if self._stop.wait(self._terms.start_pause_s * attempt):
+                    return None
         return self._child
 
     def _drop_child(self) -> None:
