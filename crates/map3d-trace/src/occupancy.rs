@@ -1,17 +1,218 @@
-//! Which tiles can have content, and what a block's bytes depend on.
+//! Which tiles can have content, and what a block's bytes depend on. Both are decided from boxes, and never leave out what can be seen.
 
-use map3d_base::tile::Tile;
-use map3d_base::{Frame, Result};
-use map3d_scene::SceneStore;
+use map3d_base::tile::{MAX_LEVEL, Tile};
+use map3d_base::{Box3, Error, Frame, RENDER_FORMAT, Result, Vec3, ViewAxes};
+use map3d_scene::instances::{place, placed_box};
+use map3d_scene::records::{EMPTY, LEAF_BIT};
+use map3d_scene::{Chunk, Leaf, SceneStore};
+use twox_hash::XxHash3_128;
+
+/// Beyond this the flags would not fit memory.
+const MAX_FLAGS_LEVEL: u8 = 14;
+/// Boxes up to this part of a tile are not looked into.
+const SMALL_TILES: f64 = 0.25;
 
 /// Row-major flags of the 2^level × 2^level tiles of a level: false only where there is nothing.
 pub fn occupied(scene: &SceneStore, frame: &Frame, level: u8) -> Result<Vec<bool>> {
-    let _ = (scene, frame, level);
-    todo!()
+    frame.validate()?;
+    if level > MAX_FLAGS_LEVEL {
+        return Err(Error::argument(format!("occupancy: level is {level}, at most {MAX_FLAGS_LEVEL}")));
+    }
+    let view = TileView::new(frame, level);
+    let mut flags = Flags { side: 1 << level, flags: vec![false; 1 << (2 * level)] };
+    for part in scene.parts() {
+        let rect = view.rect(&part.bounds);
+        if !flags.has_unset(&rect) {
+            continue;
+        }
+        if rect.is_small() {
+            flags.set(&rect);
+            continue;
+        }
+        let chunk = scene.chunk(part.chunk)?;
+        let transform = part.instance.map(|k| scene.instances()[k as usize].transform);
+        descend(&chunk, transform.as_ref(), &view, &mut flags);
+    }
+    Ok(flags.flags)
 }
 
-/// Hex hash over all that the bytes of the base block rooted at `root` depend on.
+fn descend(chunk: &Chunk, transform: Option<&[f64; 12]>, view: &TileView, flags: &mut Flags) {
+    let origin = chunk.origin();
+    let mut stack = vec![0u32];
+    while let Some(child) = stack.pop() {
+        if child & LEAF_BIT != 0 {
+            mark_leaf(&chunk.leaves()[(child & !LEAF_BIT) as usize], origin, transform, view, flags);
+            continue;
+        }
+        let node = &chunk.nodes()[child as usize];
+        for k in (0..8).filter(|k| node.child[*k] != EMPTY) {
+            let b = [0, 1, 2, 3, 4, 5].map(|a| origin[a % 3] + f64::from(node.bounds[a][k]));
+            let bounds = Box3 { lo: [b[0], b[1], b[2]], hi: [b[3], b[4], b[5]] };
+            let rect = view.rect(&transform.map_or(bounds, |t| placed_box(t, &bounds)));
+            if !flags.has_unset(&rect) {
+                continue;
+            }
+            if rect.is_small() {
+                flags.set(&rect);
+            } else {
+                stack.push(node.child[k]);
+            }
+        }
+    }
+}
+
+fn mark_leaf(leaf: &Leaf, origin: Vec3, transform: Option<&[f64; 12]>, view: &TileView, flags: &mut Flags) {
+    for lane in (0..8).take_while(|l| leaf.triangle[*l] != EMPTY) {
+        let corners = [0, 3, 6].map(|c| {
+            let p = [0, 1, 2].map(|k| origin[k] + f64::from(leaf.corners[c + k][lane]));
+            view.tiles(transform.map_or(p, |t| place(t, p)))
+        });
+        flags.set_triangle(&corners, view.room);
+    }
+}
+
+/// Local points in tiles of a level.
+struct TileView {
+    axes: ViewAxes,
+    origin: [f64; 2],
+    tile_m: f64,
+    /// Room for snapping and rounding, in tiles.
+    room: f64,
+}
+
+/// In tiles, both ends included.
+#[derive(Clone, Copy, Debug)]
+struct Rect {
+    lo: [f64; 2],
+    hi: [f64; 2],
+}
+
+impl Rect {
+    fn is_small(&self) -> bool {
+        (0..2).all(|k| self.hi[k] - self.lo[k] <= SMALL_TILES)
+    }
+}
+
+impl TileView {
+    fn new(frame: &Frame, level: u8) -> Self {
+        let tile_m = frame.size_m / f64::from(1u32 << level);
+        let room = (frame.pixel_m(frame.zmax) / 64.0 + 1e-6) / tile_m;
+        Self { axes: frame.axes(), origin: [frame.u0_m, frame.v0_m], tile_m, room }
+    }
+
+    fn tiles(&self, p: Vec3) -> [f64; 2] {
+        let [u, v, _] = self.axes.uvd_from_local(p);
+        [(u - self.origin[0]) / self.tile_m, (self.origin[1] - v) / self.tile_m]
+    }
+
+    fn rect(&self, b: &Box3) -> Rect {
+        let (center, half) = (self.tiles(b.center()), b.half_extents());
+        let spread = |axis: Vec3| (0..3).map(|k| axis[k].abs() * half[k]).sum::<f64>() / self.tile_m * (1.0 + 1e-12) + self.room;
+        let spread = [spread(self.axes.right), spread(self.axes.up)];
+        Rect { lo: [0, 1].map(|k| center[k] - spread[k]), hi: [0, 1].map(|k| center[k] + spread[k]) }
+    }
+}
+
+struct Flags {
+    side: usize,
+    flags: Vec<bool>,
+}
+
+impl Flags {
+    /// First and last tile of a rectangle along an axis; `None` outside the square.
+    fn range(&self, rect: &Rect, axis: usize) -> Option<(usize, usize)> {
+        let side = self.side as f64;
+        let meets = rect.hi[axis] >= 0.0 && rect.lo[axis] < side;
+        meets.then(|| (rect.lo[axis].max(0.0) as usize, (rect.hi[axis].min(side - 0.5)) as usize))
+    }
+
+    fn tiles(&self, rect: &Rect) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let ranges = self.range(rect, 0).zip(self.range(rect, 1));
+        ranges.into_iter().flat_map(|((x0, x1), (y0, y1))| (y0..=y1).flat_map(move |y| (x0..=x1).map(move |x| (x, y))))
+    }
+
+    fn has_unset(&self, rect: &Rect) -> bool {
+        self.tiles(rect).any(|(x, y)| !self.flags[y * self.side + x])
+    }
+
+    fn set(&mut self, rect: &Rect) {
+        self.tiles(rect).for_each(|(x, y)| self.flags[y * self.side + x] = true);
+    }
+
+    /// Tiles that no edge of the triangle has wholly outside.
+    fn set_triangle(&mut self, c: &[[f64; 2]; 3], room: f64) {
+        let lo = [0, 1].map(|k| c[0][k].min(c[1][k]).min(c[2][k]) - room);
+        let hi = [0, 1].map(|k| c[0][k].max(c[1][k]).max(c[2][k]) + room);
+        let rect = Rect { lo, hi };
+        for (x, y) in self.tiles(&rect) {
+            let tile = Rect { lo: [x as f64 - room, y as f64 - room], hi: [(x + 1) as f64 + room, (y + 1) as f64 + room] };
+            if !(0..3).any(|k| edge_separates(c[k], c[(k + 1) % 3], c[(k + 2) % 3], &tile)) {
+                self.flags[y * self.side + x] = true;
+            }
+        }
+    }
+}
+
+/// Whether a rectangle lies wholly on the far side of the edge a → b from c.
+fn edge_separates(a: [f64; 2], b: [f64; 2], c: [f64; 2], rect: &Rect) -> bool {
+    let normal = [a[1] - b[1], b[0] - a[0]];
+    let side = |p: [f64; 2]| normal[0] * (p[0] - a[0]) + normal[1] * (p[1] - a[1]);
+    let sign = if side(c) < 0.0 { -1.0 } else { 1.0 };
+    let nearest = [0, 1].map(|k| if sign * normal[k] > 0.0 { rect.hi[k] } else { rect.lo[k] });
+    side(c) != 0.0 && sign * side(nearest) < 0.0
+}
+
+/// Hex hash over all that the bytes of the base block rooted at `root` depend on: the format, the frame, and every object and instance whose box meets
+/// the block's beam.
 pub fn block_key(scene: &SceneStore, frame: &Frame, root: Tile) -> Result<String> {
-    let _ = (scene, frame, root);
-    todo!()
+    frame.validate()?;
+    if root.z > MAX_LEVEL || root.x >> root.z != 0 || root.y >> root.z != 0 {
+        return Err(Error::argument(format!("block ({}, {}, {}): no such tile", root.z, root.x, root.y)));
+    }
+    let view = TileView::new(frame, root.z);
+    let meets = |b: &Box3| {
+        let rect = view.rect(b);
+        let at = [f64::from(root.x), f64::from(root.y)];
+        (0..2).all(|k| rect.hi[k] >= at[k] && rect.lo[k] <= at[k] + 1.0)
+    };
+    let mut hash = XxHash3_128::with_seed(0);
+    write_frame(&mut hash, frame, root);
+    for [id, a, b] in contents(scene, &meets)? {
+        [id, a, b].iter().for_each(|v| hash.write(&v.to_le_bytes()));
+    }
+    Ok(format!("{:032x}", hash.finish_128()))
+}
+
+/// (id, content hash) of what meets a beam, sorted.
+fn contents(scene: &SceneStore, meets: &dyn Fn(&Box3) -> bool) -> Result<Vec<[u64; 3]>> {
+    let mut numbers = Vec::new();
+    scene.candidate_parts(meets, &mut numbers);
+    let mut out = Vec::new();
+    for part in numbers.iter().map(|k| &scene.parts()[*k as usize]).filter(|p| meets(&p.bounds)) {
+        if let Some(k) = part.instance {
+            let record = &scene.instances()[k as usize];
+            out.push([u64::from(record.object_id), record.content[0], record.content[1]]);
+            continue;
+        }
+        let chunk = scene.chunk(part.chunk)?;
+        let o = chunk.origin();
+        for object in chunk.objects() {
+            let b = [0, 1, 2, 3, 4, 5].map(|k| o[k % 3] + f64::from(object.bounds[k]));
+            if meets(&Box3 { lo: [b[0], b[1], b[2]], hi: [b[3], b[4], b[5]] }) {
+                out.push([u64::from(object.id), object.content[0], object.content[1]]);
+            }
+        }
+    }
+    out.sort_unstable();
+    Ok(out)
+}
+
+fn write_frame(hash: &mut XxHash3_128, frame: &Frame, root: Tile) {
+    let numbers = [frame.look_at_deg, frame.pitch_deg, frame.u0_m, frame.v0_m, frame.d0_m, frame.size_m];
+    hash.write(&RENDER_FORMAT.to_le_bytes());
+    numbers.iter().for_each(|v| hash.write(&v.to_bits().to_le_bytes()));
+    [frame.tile_px, u32::from(frame.zmax), u32::from(root.z), root.x, root.y].iter().for_each(|v| hash.write(&v.to_le_bytes()));
+    for layer in &frame.layers {
+        hash.write(&[layer.kind as u8, layer.format as u8, layer.quality]);
+    }
 }

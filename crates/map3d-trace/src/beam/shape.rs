@@ -14,8 +14,8 @@ const DEPTH_REACH: f64 = (1 << 20) as f64;
 /// Bias in units per rank.
 const BIAS_UNITS: f64 = 2.0;
 const STEEPEST: f64 = 16.0;
-/// A plane's base keeps this far from overflow: what the plane adds is below 2^23.
-const BASE_LIMIT: i64 = (1 << 31) - (1 << 24);
+/// Depths in units for which no key overflows, whatever its bias.
+const DEPTHS: std::ops::Range<f64> = 1024.0..4_294_966_000.0;
 /// No bias is greater.
 pub(crate) const BIAS_MAX: i64 = 5 * 2 * 16;
 
@@ -152,7 +152,7 @@ pub(crate) fn key_plane<L: Lanes>(pixel: &[[f64; 3]; 3], depth: &Depth, b: &Pixe
     let [gx, gy] = depth.gradient;
     let (ax, ay) = (gx.abs(), gy.abs());
     let reach = ax * f64::from(b.x1 - b.x0 + 1) + ay * f64::from(b.y1 - b.y0 + 1) + 1.0;
-    if !(reach < DEPTH_REACH) {
+    if !(reach < DEPTH_REACH && DEPTHS.contains(&depth.lo) && DEPTHS.contains(&depth.hi)) {
         return Keys::Exact;
     }
     let first = pixel[0][2] + gx * (f64::from(b.x0) + 0.5 - pixel[0][0]) + gy * (f64::from(b.y0) + 0.5 - pixel[0][1]);
@@ -183,7 +183,7 @@ pub(crate) fn key_plane<L: Lanes>(pixel: &[[f64; 3]; 3], depth: &Depth, b: &Pixe
         shift: shift as u32,
         lo: rounded(depth.lo).clamp(-LIMIT, LIMIT) as i32,
         hi: rounded(depth.hi).clamp(-LIMIT, LIMIT) as i32,
-        base: (whole as i64 - depth.bias - (1 << 31)).clamp(-BASE_LIMIT, BASE_LIMIT) as i32,
+        base: (whole as i64 - depth.bias - (1 << 31)) as i32,
         offset_lo: -side,
         offset_hi: side,
     })
