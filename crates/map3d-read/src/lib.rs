@@ -9,6 +9,7 @@ mod document;
 mod image_file;
 mod import;
 mod materials;
+mod mend;
 mod obj;
 mod options;
 mod report;

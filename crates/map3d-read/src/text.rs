@@ -6,13 +6,44 @@ use std::io::{self, BufRead, BufReader, Read, Seek};
 use std::path::Path;
 
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
-use encoding_rs_io::DecodeReaderBytesBuilder;
+use encoding_rs_io::{DecodeReaderBytes, DecodeReaderBytesBuilder};
 use map3d_base::{Error, Result};
 
 const HEAD_BYTES: u64 = 4096;
 const BUFFER_BYTES: usize = 1 << 17;
 
-pub type Input = Box<dyn BufRead + Send>;
+/// Text as it lies in a file, or decoded on the way.
+pub enum Input {
+    Plain(BufReader<File>),
+    Decoded(Box<BufReader<DecodeReaderBytes<File, Vec<u8>>>>),
+}
+
+impl Read for Input {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        match self {
+            Self::Plain(input) => input.read(out),
+            Self::Decoded(input) => input.read(out),
+        }
+    }
+}
+
+impl BufRead for Input {
+    #[inline]
+    fn fill_buf(&mut self) -> io::Result<&[u8]> {
+        match self {
+            Self::Plain(input) => input.fill_buf(),
+            Self::Decoded(input) => input.fill_buf(),
+        }
+    }
+
+    #[inline]
+    fn consume(&mut self, n: usize) {
+        match self {
+            Self::Plain(input) => input.consume(n),
+            Self::Decoded(input) => input.consume(n),
+        }
+    }
+}
 
 /// A regular file, positioned at its start.
 pub fn open_file(path: &Path) -> Result<File> {
@@ -31,10 +62,35 @@ pub fn head(file: &mut File) -> io::Result<Vec<u8>> {
 
 /// An XML document as UTF-8, by its byte order mark or its declaration; bytes that make no sense there become U+FFFD.
 pub fn open_xml(path: &Path) -> Result<Input> {
+    let io = |e| Error::storage(path, e);
     let mut file = open_file(path)?;
-    let head = head(&mut file).map_err(|e| Error::storage(path, e))?;
+    let head = head(&mut file).map_err(io)?;
     let encoding = utf16_without_mark(&head).or_else(|| declared_encoding(&head)).unwrap_or(UTF_8);
+    if encoding == UTF_8 && Encoding::for_bom(&head).is_none() && is_utf8(&mut file).map_err(io)? {
+        return Ok(Input::Plain(BufReader::with_capacity(BUFFER_BYTES, file)));
+    }
     Ok(decoded(file, encoding))
+}
+
+/// Whether all of a file is UTF-8, and can be read without decoding; leaves it at its start.
+fn is_utf8(file: &mut File) -> io::Result<bool> {
+    let mut buffer = vec![0; BUFFER_BYTES];
+    let mut kept = 0;
+    let sound = loop {
+        let n = file.read(&mut buffer[kept..])?;
+        match std::str::from_utf8(&buffer[..kept + n]) {
+            Ok(_) if n == 0 => break true,
+            Ok(_) => kept = 0,
+            // A character may be cut by the end of the buffer.
+            Err(e) if e.error_len().is_none() && n > 0 => {
+                buffer.copy_within(e.valid_up_to()..kept + n, 0);
+                kept = kept + n - e.valid_up_to();
+            }
+            Err(_) => break false,
+        }
+    };
+    file.rewind()?;
+    Ok(sound)
 }
 
 /// Lines of text: UTF-16 is decoded, anything else is passed on as it is, without a byte order mark (see `name_of`).
@@ -53,7 +109,7 @@ pub fn open_lines(path: &Path) -> Result<Input> {
         input.fill_buf().map_err(|e| Error::storage(path, e))?;
         input.consume(3);
     }
-    Ok(Box::new(input))
+    Ok(Input::Plain(input))
 }
 
 /// Bytes of a name: UTF-8, else as Western European text.
@@ -66,7 +122,7 @@ pub fn name_of(bytes: &[u8]) -> Cow<'_, str> {
 
 fn decoded(file: File, encoding: &'static Encoding) -> Input {
     let decoder = DecodeReaderBytesBuilder::new().encoding(Some(encoding)).bom_override(true).build(file);
-    Box::new(BufReader::with_capacity(BUFFER_BYTES, decoder))
+    Input::Decoded(Box::new(BufReader::with_capacity(BUFFER_BYTES, decoder)))
 }
 
 /// Text of mostly ASCII letters has a zero in every other byte.

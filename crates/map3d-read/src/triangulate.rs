@@ -3,6 +3,8 @@
 use earcut::Earcut;
 use map3d_base::Vec3;
 
+use crate::mend::mend;
+
 /// Why a polygon yields no triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
@@ -73,6 +75,7 @@ impl Triangulator {
         self.holes.clear();
         self.holes.extend(ends[..ends.len() - 1].iter().map(|e| *e as u32));
         self.earcut.earcut_slice(&self.flat, &self.holes, &mut self.triangles);
+        mend(&self.flat, &mut self.triangles);
         self.wind();
         if self.triangles.is_empty() { Err(Fault::NoArea) } else { Ok(self.covers(ends)) }
     }

@@ -1,5 +1,7 @@
 //! app:Appearance into the compact form.
 
+use std::io::BufRead;
+
 use map3d_base::asset::Wrap;
 use map3d_base::{Error, Result, Vec3};
 
@@ -34,8 +36,8 @@ impl Theme {
     }
 }
 
-pub struct AppearanceParser<'a> {
-    pub xml: &'a mut Xml,
+pub struct AppearanceParser<'a, R> {
+    pub xml: &'a mut Xml<R>,
     pub log: &'a mut Log,
     pub into: &'a mut Appearances,
     pub theme: &'a mut Theme,
@@ -58,7 +60,7 @@ struct Parts {
     targets: Vec<(Id, Mapping)>,
 }
 
-impl AppearanceParser<'_> {
+impl<R: BufRead> AppearanceParser<'_, R> {
     /// The property that has just started and holds an Appearance (or refers to one, which is read where it stands).
     pub fn property(&mut self) -> Result<()> {
         while self.xml.next_child()? {

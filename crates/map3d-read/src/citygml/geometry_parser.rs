@@ -165,7 +165,7 @@ impl GeometryParser<'_> {
         let mut sound = true;
         let depth = self.xml.depth();
         while self.xml.depth() >= depth {
-            match self.xml.step()? {
+            match self.xml.next_tag()? {
                 Step::Start => sound &= self.positions(dimension)?,
                 Step::Eof => break,
                 Step::End | Step::Text => {}

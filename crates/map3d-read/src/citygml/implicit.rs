@@ -1,5 +1,7 @@
 //! Implicit geometry: a prototype in a frame of its own, placed by a matrix and a reference point.
 
+use std::io::BufRead;
+
 use map3d_base::{Result, Vec3};
 
 use super::coordinates::{parse_list, parse_points};
@@ -57,7 +59,7 @@ fn parse_matrix(text: &str) -> Option<Transform> {
 }
 
 /// The first position inside the open element.
-pub fn point(xml: &mut Xml) -> Result<Option<Vec3>> {
+pub fn point<R: BufRead>(xml: &mut Xml<R>) -> Result<Option<Vec3>> {
     let mut found = None;
     let depth = xml.depth();
     while xml.depth() >= depth {

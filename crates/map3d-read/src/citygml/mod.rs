@@ -22,6 +22,7 @@ mod lod;
 mod paint;
 mod prototypes;
 mod reader;
+mod scan;
 mod shared;
 mod survey;
 mod xml;

@@ -10,9 +10,11 @@ use map3d_base::{Error, Result};
 use super::appearance::Appearances;
 use super::appearance_parser::{AppearanceParser, Theme};
 use super::ids::{IdSet, Target, id_of, target_of};
-use super::xml::{Step, Xml};
+use super::scan::{Scanner, Tag};
+use super::xml::{Step, Xml, attributes, local_name, refused, unescaped};
 use crate::options::ReadOptions;
 use crate::report::Log;
+use crate::text::open_xml;
 
 #[derive(Default)]
 pub struct Survey {
@@ -23,6 +25,47 @@ pub struct Survey {
     pub wanted: IdSet,
 }
 
+/// Looks through the whole document once. A document that breaks off is surveyed up to there.
+pub fn survey(path: &Path, options: &ReadOptions, log: &mut Log) -> Result<Survey> {
+    let io = |e| Error::storage(path, e);
+    let mut survey = Survey { theme: Theme { asked: options.theme.clone(), first: None }, ..Survey::default() };
+    let mut scanner = Scanner::new(open_xml(path)?);
+    let mut local = Local::default();
+    let (mut depth, mut any) = (0usize, false);
+    while let Some(tag) = scanner.next_tag().map_err(io)? {
+        match tag {
+            Tag::Doctype => return Err(refused(path, "a document type definition")),
+            Tag::End => depth = depth.saturating_sub(1),
+            Tag::Start | Tag::Empty => {
+                any = true;
+                let text = String::from_utf8_lossy(scanner.tag());
+                let (name, rest) = text.split_at(text.find(|c: char| c.is_ascii_whitespace()).unwrap_or(text.len()));
+                let name = local_name(name);
+                survey.tag(path, depth, name, rest, &mut local, log)?;
+                let parsed = match (tag, name) {
+                    (Tag::Start, "appearanceMember") if depth == 1 => 1,
+                    (Tag::Start, "theme") => 2,
+                    _ => 0,
+                };
+                match parsed {
+                    1 => scanner = survey.appearance(scanner, options, log)?,
+                    2 => scanner = survey.theme(scanner, log),
+                    _ => depth += usize::from(tag == Tag::Start),
+                }
+            }
+        }
+        if depth <= 1 {
+            local.close(&mut survey.wanted);
+        }
+    }
+    if !any {
+        return Err(Error::format(path, "no XML element; expected a CityGML document"));
+    }
+    local.close(&mut survey.wanted);
+    survey.appearances.resolve_links();
+    Ok(survey)
+}
+
 /// Ids and references of the city object at hand.
 #[derive(Default)]
 struct Local {
@@ -30,73 +73,26 @@ struct Local {
     references: Vec<u64>,
 }
 
-/// Reads the whole document once. A document that breaks off is surveyed up to there.
-pub fn survey(path: &Path, options: &ReadOptions, log: &mut Log) -> Result<Survey> {
-    let mut survey = Survey { theme: Theme { asked: options.theme.clone(), first: None }, ..Survey::default() };
-    let mut xml = Xml::open(path)?;
-    let mut local = Local::default();
-    check_root(&mut xml, path)?;
-    loop {
-        match survey.step(&mut xml, &mut local, options, log) {
-            Ok(true) => {}
-            Ok(false) => break,
-            Err(_) if xml.is_broken() && !options.strict => break,
-            Err(e) => return Err(e),
-        }
-    }
-    local.close(&mut survey.wanted);
-    survey.appearances.resolve_links();
-    Ok(survey)
-}
-
-fn check_root(xml: &mut Xml, path: &Path) -> Result<()> {
-    loop {
-        match xml.step()? {
-            Step::Start if xml.local() == "CityModel" => return Ok(()),
-            Step::Start => return Err(Error::format(path, format!("the root element is {:?}; expected CityModel", xml.local()))),
-            Step::Eof => return Err(Error::format(path, "no XML element; expected a CityGML document")),
-            Step::Text | Step::End => {}
-        }
-    }
-}
-
 impl Survey {
-    /// One step; false at the end of the document.
-    fn step(&mut self, xml: &mut Xml, local: &mut Local, options: &ReadOptions, log: &mut Log) -> Result<bool> {
-        match xml.step()? {
-            Step::Eof => return Ok(false),
-            Step::Text => {}
-            Step::End if xml.depth() == 1 => local.close(&mut self.wanted),
-            Step::End => {}
-            Step::Start => self.start(xml, local, options, log)?,
+    fn tag(&mut self, path: &Path, depth: usize, name: &str, rest: &str, local: &mut Local, log: &mut Log) -> Result<()> {
+        if depth == 0 && name != "CityModel" {
+            return Err(Error::format(path, format!("the root element is {name:?}; expected CityModel")));
         }
-        Ok(true)
-    }
-
-    fn start(&mut self, xml: &mut Xml, local: &mut Local, options: &ReadOptions, log: &mut Log) -> Result<()> {
-        for (name, value) in xml.attributes() {
+        for (name, value) in attributes(rest) {
             match name {
                 "id" => {
-                    local.ids.insert(id_of(&value));
+                    local.ids.insert(id_of(&unescaped(value)));
                 }
                 "href" => {
-                    if let Target::Here(id) = target_of(&value) {
+                    if let Target::Here(id) = target_of(&unescaped(value)) {
                         local.references.push(id);
                     }
                 }
-                "srsName" => self.see_srs(&value, log),
+                "srsName" => self.see_srs(&unescaped(value), log),
                 _ => {}
             }
         }
-        match xml.local() {
-            "appearanceMember" if xml.depth() == 2 => self.appearance(xml, options, log),
-            "theme" => {
-                let name = xml.whole_text()?;
-                self.theme.see(&name);
-                Ok(())
-            }
-            _ => Ok(()),
-        }
+        Ok(())
     }
 
     fn see_srs(&mut self, name: &str, log: &mut Log) {
@@ -107,10 +103,30 @@ impl Survey {
         }
     }
 
-    fn appearance(&mut self, xml: &mut Xml, options: &ReadOptions, log: &mut Log) -> Result<()> {
+    /// Parses the appearanceMember that the scanner stands at; the scanner goes on behind it. One that breaks off is left to the second pass.
+    fn appearance(&mut self, scanner: Scanner, options: &ReadOptions, log: &mut Log) -> Result<Scanner> {
+        let path = log.path().to_path_buf();
+        let mut xml = Xml::new(scanner, &path);
         let max_bytes = options.max_appearance_bytes;
         let (values, text) = (&mut Vec::new(), &mut String::new());
-        AppearanceParser { xml, log, into: &mut self.appearances, theme: &mut self.theme, max_bytes, values, text }.property()
+        let parsed = xml.step().and_then(|_| {
+            AppearanceParser { xml: &mut xml, log, into: &mut self.appearances, theme: &mut self.theme, max_bytes, values, text }.property()
+        });
+        match parsed {
+            Err(e) if !xml.is_broken() => Err(e),
+            _ => Ok(xml.into_inner()),
+        }
+    }
+
+    /// Reads the theme that the scanner stands at.
+    fn theme(&mut self, scanner: Scanner, log: &Log) -> Scanner {
+        let mut xml = Xml::new(scanner, log.path());
+        if let Ok(Step::Start) = xml.step() {
+            if let Ok(name) = xml.whole_text() {
+                self.theme.see(&name);
+            }
+        }
+        xml.into_inner()
     }
 }
 

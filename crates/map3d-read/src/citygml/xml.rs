@@ -1,12 +1,13 @@
 //! A pull parser: no DTD, no entities of a document's own, bounded depth, names without namespace.
 
 use std::borrow::Cow;
+use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
 use map3d_base::{Error, Result};
+use memchr::memchr;
 use quick_xml::Reader;
 use quick_xml::escape::unescape;
-use quick_xml::events::attributes::Attributes;
 use quick_xml::events::{BytesRef, Event};
 
 use crate::text::{Input, open_xml};
@@ -23,8 +24,8 @@ pub enum Step {
 }
 
 /// A document being read. After `Step::Start` the element's name and attributes are at hand, after `Step::Text` the text, until the next step.
-pub struct Xml {
-    reader: Reader<Input>,
+pub struct Xml<R = Input> {
+    reader: Reader<R>,
     path: PathBuf,
     buffer: Vec<u8>,
     tag: String,
@@ -37,9 +38,16 @@ pub struct Xml {
 
 impl Xml {
     pub fn open(path: &Path) -> Result<Self> {
-        let mut reader = Reader::from_reader(open_xml(path)?);
+        Ok(Self::new(open_xml(path)?, path))
+    }
+}
+
+impl<R: BufRead> Xml<R> {
+    /// Reads from anywhere between two elements; `path` is for messages.
+    pub fn new(input: R, path: &Path) -> Self {
+        let mut reader = Reader::from_reader(input);
         reader.config_mut().expand_empty_elements = true;
-        Ok(Self {
+        Self {
             reader,
             path: path.to_path_buf(),
             buffer: Vec::new(),
@@ -49,7 +57,12 @@ impl Xml {
             text: String::new(),
             depth: 0,
             broken: false,
-        })
+        }
+    }
+
+    /// What has not been read.
+    pub fn into_inner(self) -> R {
+        self.reader.into_inner()
     }
 
     /// The last error was that the document is not well-formed from here on; what came before is sound.
@@ -67,6 +80,11 @@ impl Xml {
     }
 
     pub fn step(&mut self) -> Result<Step> {
+        self.step_over::<false>()
+    }
+
+    /// One step; with `BARE`, text is passed over.
+    fn step_over<const BARE: bool>(&mut self) -> Result<Step> {
         loop {
             self.buffer.clear();
             let event = match self.reader.read_event_into(&mut self.buffer) {
@@ -88,6 +106,7 @@ impl Xml {
                     self.depth -= 1;
                     return Ok(Step::End);
                 }
+                Event::Text(_) | Event::CData(_) if BARE => {}
                 Event::Text(e) => {
                     self.text.clear();
                     self.text.push_str(&e);
@@ -112,7 +131,7 @@ impl Xml {
 
     fn enter(&mut self) -> Result<Step> {
         self.depth += 1;
-        self.local_start = self.tag[..self.name_end].rfind(':').map_or(0, |at| at + 1);
+        self.local_start = memchr(b':', &self.tag.as_bytes()[..self.name_end]).map_or(0, |at| at + 1);
         if self.depth > MAX_DEPTH {
             let (got, value) = (self.depth as u64, MAX_DEPTH as u64);
             return Err(Error::Limit { path: self.path.clone(), what: "depth of elements", got, limit: "XML depth", value });
@@ -135,19 +154,12 @@ impl Xml {
 
     /// An attribute of the element that started last, by its name without prefix; the first of that name.
     pub fn attribute(&self, local: &str) -> Option<Cow<'_, str>> {
-        if self.tag.len() <= self.name_end {
-            return None;
-        }
-        let mut attributes = Attributes::new(&self.tag, self.name_end);
-        let found = attributes.with_checks(false).flatten().find(|a| a.key.local_name().as_ref() == local && !is_declaration(a.key.as_ref()))?;
-        Some(unescaped(found.value))
+        self.attributes().find(|(name, _)| *name == local).map(|(_, value)| unescaped(value))
     }
 
-    /// Attributes of the element that started last: name without prefix, value as written.
-    pub fn attributes(&self) -> impl Iterator<Item = (&str, Cow<'_, str>)> {
-        let mut attributes = Attributes::new(&self.tag, self.name_end);
-        attributes.with_checks(false);
-        attributes.flatten().map(|a| (a.key.local_name().into_inner(), a.value))
+    /// Attributes of the element that started last: name without prefix, value as written. Declarations of namespaces are left out.
+    pub fn attributes(&self) -> impl Iterator<Item = (&str, &str)> {
+        attributes(&self.tag[self.name_end..])
     }
 
     /// The text that was read last.
@@ -155,14 +167,23 @@ impl Xml {
         &self.text
     }
 
+    /// The next start or end of an element, or the end of the document; text is passed over (entities of the document's own are refused there too).
+    pub fn next_tag(&mut self) -> Result<Step> {
+        loop {
+            let step = self.step_over::<true>()?;
+            if step != Step::Text {
+                return Ok(step);
+            }
+        }
+    }
+
     /// Goes on to the next child of the element that is open: true, it has started; false, the open element has ended.
     pub fn next_child(&mut self) -> Result<bool> {
         loop {
-            match self.step()? {
+            match self.step_over::<true>()? {
                 Step::Start => return Ok(true),
-                Step::End => return Ok(false),
+                Step::End | Step::Eof => return Ok(false),
                 Step::Text => {}
-                Step::Eof => return Ok(false),
             }
         }
     }
@@ -171,7 +192,7 @@ impl Xml {
     pub fn skip(&mut self) -> Result<()> {
         let depth = self.depth;
         while self.depth >= depth {
-            if self.step()? == Step::Eof {
+            if self.step_over::<true>()? == Step::Eof {
                 break;
             }
         }
@@ -199,17 +220,28 @@ impl Xml {
     }
 }
 
-fn is_declaration(key: &str) -> bool {
-    key == "xmlns" || key.starts_with("xmlns:")
+/// Attributes in the text behind a tag's name: name without prefix, value as written. Declarations of namespaces are left out.
+pub fn attributes(mut rest: &str) -> impl Iterator<Item = (&str, &str)> {
+    std::iter::from_fn(move || {
+        let (name, after) = rest.split_once('=')?;
+        let after = after.trim_start();
+        let quote = after.chars().next().filter(|c| *c == '"' || *c == '\'')?;
+        let (value, after) = after[1..].split_once(quote)?;
+        rest = after;
+        Some((name.trim(), value))
+    })
+    .filter(|(name, _)| !name.starts_with("xmlns"))
+    .map(|(name, value)| (local_name(name), value))
+}
+
+/// A name without its prefix.
+pub fn local_name(name: &str) -> &str {
+    name.split_once(':').map_or(name, |(_, local)| local)
 }
 
 /// A value that cannot be unescaped is taken as it is written.
-fn unescaped(value: Cow<'_, str>) -> Cow<'_, str> {
-    if !value.contains('&') {
-        return value;
-    }
-    let plain = unescape(&value).ok().map(Cow::into_owned);
-    plain.map_or(value, Cow::Owned)
+pub fn unescaped(value: &str) -> Cow<'_, str> {
+    unescape(value).unwrap_or(Cow::Borrowed(value))
 }
 
 /// A character reference or one of the five entities of XML itself.
@@ -227,6 +259,6 @@ fn resolved(reference: &BytesRef) -> Option<char> {
     })
 }
 
-fn refused(path: &Path, what: &str) -> Error {
+pub fn refused(path: &Path, what: &str) -> Error {
     Error::format(path, format!("{what} is refused; remove it and write the text itself"))
 }

@@ -1,5 +1,6 @@
 //! Logical lines of OBJ and MTL: any line end, a backslash at the end joins the next line.
 
+use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
 use map3d_base::{Error, Result};
@@ -45,7 +46,7 @@ impl Lines {
                 return Ok(any);
             }
             any = true;
-            let end = buffer.iter().position(|b| *b == b'\n' || *b == b'\r');
+            let end = memchr::memchr2(b'\n', b'\r', buffer);
             let taken = end.unwrap_or(buffer.len());
             self.line.extend_from_slice(&buffer[..taken]);
             let crlf = end.is_some() && buffer[taken] == b'\r';
