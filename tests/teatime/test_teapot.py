@@ -73,4 +73,5 @@ def test_materials_of_the_objects_exist(tmp_path: Path) -> None:
     write_teatime(tmp_path)
     for name in ("teapot", "cube"):
         used = [line for line in (tmp_path / f"{name}.obj").read_text().splitlines() if line.startswith("usemtl")]
-        assert used and all(f"newmtl {line.split()[1]}" in (tmp_path / "teatime.mtl").read_text() for line in used)
+        assert used
+        assert all(f"newmtl {line.split()[1]}" in (tmp_path / "teatime.mtl").read_text() for line in used)

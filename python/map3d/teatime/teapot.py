@@ -97,7 +97,7 @@ def closed(points: Points, triangles: Indices) -> tuple[Points, Indices]:
     """The ring between lid and rim is bridged, every other open end gets a cap around a new middle point."""
     extra: list[list[int]] = []
     loops = rims(triangles)
-    if len(loops) == 2 and len(loops[0]) == len(loops[1]) and np.ptp(points[sum(loops, [])][:, 2]) < 1e-6:
+    if len(loops) == 2 and len(loops[0]) == len(loops[1]) and np.ptp(points[[*loops[0], *loops[1]]][:, 2]) < 1e-6:
         extra, loops = bridge(points, *loops), []
     for loop in loops:
         points = np.concatenate([points, points[loop].mean(axis=0)[None]])

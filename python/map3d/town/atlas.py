@@ -3,11 +3,13 @@
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from map3d.town.errors import TownError
 from map3d.town.model import Face, Paint
 from map3d.town.paint import painted
 
@@ -15,7 +17,7 @@ GUTTER_PX = 3
 MAGENTA = (255, 0, 255)
 QUALITY = 88
 SHRINK = 0.955
-MOST_PX_PER_M = 40.0
+MOST_PX_PER_M, LEAST_PX_PER_M = 40.0, 0.2
 
 
 @dataclass(frozen=True)
@@ -41,31 +43,46 @@ class Atlas:
 
 
 def pack(paints: Sequence[Paint], side_px: int) -> Atlas:
-    """The finest atlas that holds all paints: shelves, tallest first, at the largest scale that fits."""
+    """The finest atlas that holds all paints: shelves, tallest first, at the largest scale that fits.
+
+    Raises TownError when they do not fit at any scale, because of their gutters.
+    """
     total = sum((p.width_m + 0.2) * (p.height_m + 0.2) for p in paints)
     longest = max(max(p.width_m, p.height_m) for p in paints)
     fits = (side_px - 2 * GUTTER_PX - 2) / longest
     scale = min(MOST_PX_PER_M, fits, side_px * 0.97 / np.sqrt(total))
-    while True:
-        scale = max(np.floor(scale * 4) / 4, 0.25) if scale > 4 else scale
+    while scale > LEAST_PX_PER_M:
+        scale = np.floor(scale * 4) / 4 if scale > 4 else scale
         areas = _shelves(paints, side_px, float(scale))
         if areas is not None:
             return Atlas(side_px, float(scale), areas, tuple(paints))
         scale = min(scale * SHRINK, scale - 0.25 if scale > 4 else scale)
+    raise TownError(f"{len(paints)} surfaces do not fit into a texture of {side_px} px; raise texture_px or lower buildings_per_texture")
 
 
 def _shelves(paints: Sequence[Paint], side_px: int, scale: float) -> dict[int, tuple[int, int, int, int]] | None:
     """Places of all paints at this scale, or None when they do not fit."""
     sizes = [(_pixels(p.height_m, scale), _pixels(p.width_m, scale), i) for i, p in enumerate(paints)]
     areas = {}
+    spaces: list[list[int]] = []  # what is free below the areas of the shelves: x, y, width, height
     x = y = shelf = 0
     for height, width, i in sorted(sizes, key=lambda s: (-s[0], -s[1], s[2])):
+        space = next((s for s in spaces if s[2] >= width and s[3] >= height), None)
+        if space is not None:
+            areas[id(paints[i])] = (space[0], space[1], width, height)
+            if space[2] - width > 8:
+                spaces.append([space[0] + width, space[1], space[2] - width, height])
+            space[1], space[3] = space[1] + height, space[3] - height
+            continue
         if x + width > side_px:
             x, y, shelf = 0, y + shelf, 0
         if x + width > side_px or y + height > side_px:
             return None
         areas[id(paints[i])] = (x, y, width, height)
-        x, shelf = x + width, max(shelf, height)
+        shelf = max(shelf, height)
+        if shelf - height > 8:
+            spaces.append([x, y + height, width, shelf - height])
+        x += width
     return areas
 
 
@@ -73,10 +90,17 @@ def _pixels(length_m: float, scale: float) -> int:
     return int(np.ceil(length_m * scale)) + 2 * GUTTER_PX
 
 
+@lru_cache(maxsize=2)
+def blank(side_px: int) -> NDArray[np.uint8]:
+    """An atlas without paints."""
+    picture = np.empty((side_px, side_px, 3), dtype=np.uint8)
+    picture[:] = MAGENTA
+    return picture
+
+
 def atlas_picture(atlas: Atlas, key: int) -> NDArray[np.uint8]:
     """(side, side, 3): all paints in their places on magenta; the gutters repeat the paint's edge."""
-    picture = np.empty((atlas.side_px, atlas.side_px, 3), dtype=np.uint8)
-    picture[:] = MAGENTA
+    picture = blank(atlas.side_px).copy()
     g = GUTTER_PX
     for number, paint in enumerate(atlas.paints):
         x, y, w, h = atlas.areas[id(paint)]

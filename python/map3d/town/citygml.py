@@ -75,9 +75,7 @@ def texture(uri: str, mime: str, mode: str, targets: list[tuple[str, list[str]]]
         f"<app:textureType>specific</app:textureType><app:wrapMode>{mode}</app:wrapMode>\n"
     ]
     for polygon, rings in targets:
-        coordinates = "".join(
-            f'<app:textureCoordinates ring="#{polygon}_{j}">{text}</app:textureCoordinates>' for j, text in enumerate(rings)
-        )
+        coordinates = "".join(f'<app:textureCoordinates ring="#{polygon}_{j}">{text}</app:textureCoordinates>' for j, text in enumerate(rings))
         parts.append(f'<app:target uri="#{polygon}"><app:TexCoordList>{coordinates}</app:TexCoordList></app:target>\n')
     parts.append("</app:ParameterizedTexture></app:surfaceDataMember>\n")
     return "".join(parts)
@@ -214,8 +212,7 @@ class BuildingWriter:
             place = "exterior" if j == 0 else "interior"
             text = ring_text(ring + self.shift, 4)
             rings.append(
-                f'<gml:{place}><gml:LinearRing gml:id="{name}_{j}"><gml:posList srsDimension="3">{text}</gml:posList>'
-                f"</gml:LinearRing></gml:{place}>"
+                f'<gml:{place}><gml:LinearRing gml:id="{name}_{j}"><gml:posList srsDimension="3">{text}</gml:posList></gml:LinearRing></gml:{place}>'
             )
         return f'<gml:Polygon gml:id="{name}">{"".join(rings)}</gml:Polygon>'
 

@@ -12,7 +12,8 @@ YEARS = {
 NAMES = {
     "church": "St. Martin", "townhall": "Rathaus", "monument": "Marktbrunnen", "industrial": "Werkhalle", "office": "Bürohaus", "slab": "Wohnblock",
     "shed": "Nebengebäude", "temple": "Templum Iovis", "basilica": "Basilica", "theatre": "Theatrum", "baths": "Thermae", "gate": "Porta",
-    "tower": "Turris", "wall": "Murus", "curia": "Curia", "macellum": "Macellum", "amphitheatre": "Amphitheatrum", "domus": "Domus", "insula": "Insula",
+    "tower": "Turris", "wall": "Murus", "curia": "Curia", "macellum": "Macellum", "amphitheatre": "Amphitheatrum", "domus": "Domus",
+    "insula": "Insula",
 }  # fmt: skip
 HEATING = ("district heating", "gas", "heat pump", "oil", "wood pellets")
 

@@ -63,7 +63,9 @@ def shops(sketch: Sketch, block: Block, a: Points, b: Points, edge: int) -> None
         storeys = int(rng.integers(1, 3))
         part = blank_part(3.4 * storeys + 0.4, storeys, "roman", "roman", 0.35)
         ends = ("yard" if i == 0 else "party", "yard" if i == count - 1 else "party")
-        sketch.lot("taberna", SHOP, [row_part(p, q, SHOPS_DEEP_M, gable(SHOPS_DEEP_M, 22), part, ("shop", "blank", *ends))], block.street(edge), i + 1)
+        sketch.lot(
+            "taberna", SHOP, [row_part(p, q, SHOPS_DEEP_M, gable(SHOPS_DEEP_M, 22), part, ("shop", "blank", *ends))], block.street(edge), i + 1
+        )
 
 
 def house(sketch: Sketch, outline: Points, block: Block, number: int) -> None:

@@ -4,19 +4,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 Points = NDArray[np.float64]
+# moves points by less than any drawing shows, so that no three lie on a line; triangles without area are left out
+JITTER = 1e-5
 
 
 def triangles_with_holes(rings: list[Points]) -> list[list[int]]:
     """Triangles as indices into the concatenated rings; the outer ring keeps its direction."""
-    points = np.concatenate(rings)
+    real = np.concatenate(rings)
+    points = real + JITTER * np.random.default_rng(5).uniform(-1, 1, real.shape)
     starts = np.cumsum([0, *(len(r) for r in rings)])
     loops = [list(range(starts[i], starts[i + 1])) for i in range(len(rings))]
     turned = _area(points[loops[0]]) < 0
     loops = [loop if (_area(points[loop]) > 0) == (i == 0) else loop[::-1] for i, loop in enumerate(loops)]
     outer = loops[0]
     for hole in sorted(loops[1:], key=lambda h: -float(points[h, 0].max())):
-        outer = _joined(points, outer, hole)
-    triangles = _ears(points, outer)
+        outer = _joined(points, outer, hole, loops)
+    triangles = [t for t in _ears(points, outer) if abs(_turn(*real[t])) > 1e-7]
     return [t[::-1] for t in triangles] if turned else triangles
 
 
@@ -25,15 +28,23 @@ def _area(ring: Points) -> float:
     return float(0.5 * np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
 
 
-def _joined(points: Points, outer: list[int], hole: list[int]) -> list[int]:
+def _joined(points: Points, outer: list[int], hole: list[int], loops: list[list[int]]) -> list[int]:
     """The outer loop with a bridge to the hole's rightmost point, from the nearest point in sight."""
     start = max(range(len(hole)), key=lambda i: (points[hole[i], 0], points[hole[i], 1]))
     target = points[hole[start]]
     order = sorted(range(len(outer)), key=lambda i: float(np.hypot(*(points[outer[i]] - target))))
     edges = [(points[outer[i]], points[outer[(i + 1) % len(outer)]]) for i in range(len(outer))]
-    edges += [(points[hole[i]], points[hole[(i + 1) % len(hole)]]) for i in range(len(hole))]
-    at = next((i for i in order if not any(_cross(points[outer[i]], target, a, b) for a, b in edges)), order[0])
+    edges += [(points[loop[i - 1]], points[loop[i]]) for loop in loops[1:] for i in range(len(loop))]
+    seen = (i for i in order if _opens(points, outer, i, target) and not any(_cross(points[outer[i]], target, a, b) for a, b in edges))
+    at = next(seen, order[0])
     return [*outer[: at + 1], *hole[start:], *hole[: start + 1], *outer[at:]]
+
+
+def _opens(points: Points, loop: list[int], i: int, target: Points) -> bool:
+    """Whether the target lies in the inner angle of corner i; a corner may be in the loop several times, with an angle each."""
+    before, here, after = (points[loop[j]] for j in (i - 1, i, (i + 1) % len(loop)))
+    sides = (_turn(before, here, target) > 0, _turn(here, after, target) > 0)
+    return all(sides) if _turn(before, here, after) > 0 else any(sides)
 
 
 def _turn(a: Points, b: Points, c: Points) -> float:
@@ -46,33 +57,33 @@ def _cross(p: Points, q: Points, a: Points, b: Points) -> bool:
 
 
 def _ears(points: Points, loop: list[int]) -> list[list[int]]:
-    loop, triangles = list(loop), []
+    """Cuts ears off, going round; corners without area are dropped, and where no ear is left the widest corner goes."""
+    triangles, at, failed = [], 0, 0
     while len(loop) > 3:
-        ear = next((i for i in range(len(loop)) if _is_ear(points, loop, i)), None)
-        if ear is None:
-            ear = max(range(len(loop)), key=lambda i: _corner(points, loop, i))
-        a, b, c = loop[ear - 1], loop[ear], loop[(ear + 1) % len(loop)]
-        if _turn(points[a], points[b], points[c]) > 1e-9:
-            triangles.append([a, b, c])
-        loop.pop(ear)
-    triangles.append(loop)
+        at %= len(loop)
+        corner = [loop[at - 1], loop[at], loop[(at + 1) % len(loop)]]
+        turn = _turn(*points[corner])
+        empty = abs(turn) <= 1e-9
+        if failed > len(loop):
+            at = max(range(len(loop)), key=lambda i: _turn(points[loop[i - 1]], points[loop[i]], points[loop[(i + 1) % len(loop)]]))
+            corner, empty = [loop[at - 1], loop[at], loop[(at + 1) % len(loop)]], False
+        elif not empty and (turn < 0 or not _is_ear(points, loop, corner)):
+            at, failed = at + 1, failed + 1
+            continue
+        if not empty:
+            triangles.append(corner)
+        loop, at, failed = loop[:at] + loop[at + 1 :], at + (not empty), 0
+    if abs(_turn(*points[loop])) > 1e-9:
+        triangles.append(loop)
     return triangles
 
 
-def _corner(points: Points, loop: list[int], i: int) -> float:
-    return _turn(points[loop[i - 1]], points[loop[i]], points[loop[(i + 1) % len(loop)]])
-
-
-def _is_ear(points: Points, loop: list[int], i: int) -> bool:
-    corner = [loop[i - 1], loop[i], loop[(i + 1) % len(loop)]]
-    a, b, c = points[corner]
-    if _turn(a, b, c) <= 1e-12:
-        return False
-    others = points[[j for j in loop if not (np.abs(points[j] - points[corner]).sum(axis=1) < 1e-9).any()]]
-    if len(others) == 0:
-        return True
-
-    def side(p: Points, q: Points) -> Points:
-        return np.asarray((q[0] - p[0]) * (others[:, 1] - p[1]) - (q[1] - p[1]) * (others[:, 0] - p[0]))
-
-    return not bool(np.any((side(a, b) >= -1e-9) & (side(b, c) >= -1e-9) & (side(c, a) >= -1e-9)))
+def _is_ear(points: Points, loop: list[int], corner: list[int]) -> bool:
+    """Whether no other corner lies in the triangle or on its rim."""
+    (ax, ay), (bx, by), (cx, cy) = points[corner].tolist()
+    others = points[[i for i in loop if i not in corner]]
+    x, y = others[:, 0], others[:, 1]
+    inside = (bx - ax) * (y - ay) - (by - ay) * (x - ax) >= -1e-9
+    inside &= (cx - bx) * (y - by) - (cy - by) * (x - bx) >= -1e-9
+    inside &= (ax - cx) * (y - cy) - (ay - cy) * (x - cx) >= -1e-9
+    return not bool(inside.any())

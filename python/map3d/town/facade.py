@@ -30,12 +30,21 @@ class TownDress:
         self.traits, self.colors = facade_style(look, rng)
         self.cover = cover
         self.roof_color = roof_color(cover, rng)
-        self.bay_m = float(rng.uniform(2.1, 2.7)) * {"slab": 1.35, "industrial": 2.2, "church": 2.0, "temple": 1.4, "gruender": 1.15, "villa": 1.3, "row": 1.25, "roman": 1.5}.get(look, 1)
+        self.bay_m = float(rng.uniform(2.1, 2.7)) * {
+            "slab": 1.35,
+            "industrial": 2.2,
+            "church": 2.0,
+            "temple": 1.4,
+            "gruender": 1.15,
+            "villa": 1.3,
+            "row": 1.25,
+            "roman": 1.5,
+        }.get(look, 1)
         self.party = "brick_red" if "brick" in self.traits else ("stone" if look in ("church", "wall", "arena") else "plaster")
         self.doors = 0
 
     def wall(self, side: str, width_m: float, outline: Outline, foot_m: float) -> Paint | Wrap | Plain:
-        if side == "party":
+        if side == "party" or (side == "blank" and self.cover in ("seats", "paving")):
             return Wrap(self.party, 4.0)
         height = max(t for _, t in outline)
         openings: tuple[Opening, ...] = ()
@@ -91,7 +100,9 @@ class TownDress:
         return None
 
     def roof(self, width_m: float, height_m: float, slope: float) -> Paint | Wrap | Plain:
-        cover = "flat" if slope < 0.12 and self.cover not in ("metal", "paving", "seats") else self.cover
+        if self.cover == "seats":
+            return Wrap("stone", 4.0)
+        cover = "flat" if slope < 0.12 and self.cover not in ("metal", "paving") else self.cover
         color = roof_color(cover, self.rng) if cover != self.cover else self.roof_color
         return Paint("roof", width_m, height_m, (color,), traits=frozenset({cover}))
 
@@ -164,14 +175,14 @@ def tint(color: Color, rng: np.random.Generator, spread: float = 7.0) -> Color:
 
 
 def roof_color(cover: str, rng: np.random.Generator) -> Color:
-    """A colour for a roof cover: tiles, dark, slate, metal, copper, flat, paving or seats."""
+    """A colour for a roof cover: tiles, dark, slate, metal, copper, flat or paving."""
     if cover == "tiles":
         return tint(TILES[rng.integers(len(TILES))], rng)
     if cover == "dark":
         return tint(DARK_TILES[rng.integers(len(DARK_TILES))], rng)
     colors: dict[str, Color] = {
         "slate": (88, 94, 104), "metal": (150, 158, 162), "copper": (112, 168, 146), "flat": (150, 148, 142),
-        "paving": (206, 196, 176), "seats": (222, 214, 198), "roman": (190, 102, 66),
+        "paving": (206, 196, 176), "roman": (174, 104, 76),
     }  # fmt: skip
     return tint(colors[cover], rng)
 

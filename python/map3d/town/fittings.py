@@ -51,7 +51,7 @@ def add_fittings(body: Body, part: Part, lot: Lot, number: int, dress: TownDress
 def slopes(frame: Frame) -> list[Slope]:
     """The slopes above the eaves that are long enough to carry something."""
     part = frame.part
-    if part.half_hip_m or len(part.profile) < 3 and not frame.narrows_to_nothing:
+    if part.half_hip_m or (len(part.profile) < 3 and not frame.narrows_to_nothing):
         return []
     out = [Slope(frame, k, False) for k in range(frame.strips)]
     if not part.closed:
@@ -141,8 +141,8 @@ SQUARE = ((-0.35, -0.35), (0.35, -0.35), (0.35, 0.35), (-0.35, 0.35))
 
 def box(feet: list[Points], low: float, high: float, paint: Wrap | Plain, top: Plain | None = None) -> list[Surface]:
     """An upright prism over a counter-clockwise ring, `low` and `high` above the ring's own heights, without floor."""
-    lower = np.round(np.array(feet) + [0, 0, low], 4)
-    upper = np.round(np.array(feet) + [0, 0, high], 4)
+    lower = np.round(np.array(feet) + np.array([0, 0, low]), 4)
+    upper = np.round(np.array(feet) + np.array([0, 0, high]), 4)
     surfaces = []
     for i in range(len(lower)):
         j = (i + 1) % len(lower)

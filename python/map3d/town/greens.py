@@ -1,5 +1,7 @@
 """Blocks without houses: parks, orchards, sports grounds, allotments, meadows, car parks."""
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -43,7 +45,7 @@ def crossing(sketch: Sketch, outline: Points, rng: np.random.Generator) -> None:
     t = np.linspace(0, 1, 15)
     sway = np.sin(t * 2 * np.pi) * np.hypot(*(b - a)) * 0.07
     line = a + (b - a) * t[:, None] + left(unit(b - a)) * sway[:, None]
-    for start, end in zip(line[:-1], line[1:], strict=True):
+    for start, end in itertools.pairwise(line):
         length = float(np.hypot(*(end - start)))
         sketch.patch(rectangle((start + end) / 2, unit(end - start), length + 1.2, 2.2), "gravel", "path")
 
@@ -71,8 +73,8 @@ def lattice(outline: Points, step_m: float, margin_m: float) -> Points:
 def fill_sports(sketch: Sketch, block: Block) -> bool:
     """A football pitch with its lines, trees around; False when there is no room."""
     rng, outline = block.rng, block.outline
-    along = unit(outline[2] - outline[1])
-    for along in (along, left(along), unit(outline[1] - outline[0])):
+    first = unit(outline[2] - outline[1])
+    for along in (first, left(first), unit(outline[1] - outline[0])):
         for length in (62.0, 52.0, 44.0):
             pitch = rectangle(outline.mean(axis=0), along, length, length * 0.62)
             if contains(outline, pitch, 2.5).all():

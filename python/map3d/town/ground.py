@@ -49,7 +49,13 @@ class Ground:
         return np.asarray(np.abs(y - middle) / np.hypot(1.0, slope))
 
 
-def make_ground(seed: int, level_m: float, river: tuple[tuple[float, float], ...] = (), half_m: float = 0.0, crossings: tuple[tuple[float, float, float, float], ...] = ()) -> Ground:
+def make_ground(
+    seed: int,
+    level_m: float,
+    river: tuple[tuple[float, float], ...] = (),
+    half_m: float = 0.0,
+    crossings: tuple[tuple[float, float, float, float], ...] = (),
+) -> Ground:
     """The ground of a town, drawn from its seed."""
     source = rng(seed, "ground")
     waves = []

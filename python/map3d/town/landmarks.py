@@ -21,9 +21,9 @@ def market_square(sketch: Sketch, outline: Points, rng: np.random.Generator) -> 
     angle = float(rng.uniform(-0.5, 0.5))
     along = np.array([np.cos(angle), np.sin(angle)])
     centre = outline.mean(axis=0)
-    middle = centre + [2.0, 9.0]
+    middle = centre + np.array([2.0, 9.0])
     church(sketch, middle, along)
-    fountain = centre + [-4.0, -16.0] + rng.uniform(-3, 3, 2)
+    fountain = centre + np.array([-4.0, -16.0]) + rng.uniform(-3, 3, 2)
     basin = circle(fountain, 3.6, 12)
     part = replace(blank_part(0.7, 1, "wall", "paving"), sides=("blank",) * 12)
     column = ("column", (float(fountain[0]), float(fountain[1]), 0.5, 0.0, 4.5))

@@ -1,5 +1,6 @@
 """The plan of a European town: rings around a market square, main roads to its gates, a river, zones from old to new."""
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -83,7 +84,7 @@ class TownPlan:
                 self.fill(block, kind, ring, number, middle)
             ring += 1
         self.surroundings()
-        return self.sketch.plan
+        return self.sketch.finished()
 
     def ring_kind(self, ring: int) -> str:
         if self.left["old"] > 30 or ring == 0:
@@ -112,7 +113,7 @@ class TownPlan:
         source = rng(self.seed, "ring", ring)
         width = {"old": 52.0, "belt": 62.0, "perimeter": 84.0, "outer": 96.0}[kind]
         roads = [*self.frame.roads, self.frame.roads[0] + 2 * np.pi]
-        for a, b in zip(roads[:-1], roads[1:], strict=True):
+        for a, b in itertools.pairwise(roads):
             count = max(1, round((b - a) * (inner + outer) / 2 / width))
             inside = (np.arange(1, count) + source.uniform(-0.17, 0.17, count - 1)) / count
             cuts = [a, *(a + (b - a) * inside), b]

@@ -1,5 +1,6 @@
 """The plan of a Roman town: insulae between cardo and decumanus, forum, theatre, baths, wall with gates and towers."""
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -19,7 +20,7 @@ from map3d.town.sketch import Sketch
 Points = NDArray[np.float64]
 CELL = np.array([52.0, 64.0])
 STREET_M, MAIN_M = 6.0, 11.0
-PER_CELL, PER_METRE_OF_WALL = 9.0, 1 / 21.0
+PER_CELL, PER_METRE_OF_WALL = 11.0, 1 / 21.0
 INSULA = Manner(8.0, (2, 4), 3.0, (8.0, 13.0), ("roman",), 0.0, 0.0, "yard", ("roman",), (20, 27))
 WALL_STEP_M = 34.0
 
@@ -33,10 +34,12 @@ class RomanPlan:
         turn = float(source.uniform(0.12, 0.45))
         self.axes = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
         side = 2
-        while self._capacity(side + 2) < wanted:
+        while self._capacity(side) < wanted:
             side += 2
         self.half = max(2, side // 2)
         self.plan_half = self.half * CELL + [STREET_M, STREET_M]
+        room = 60 + (110 if self.half >= 3 else 0)
+        self.sketch.plan.radius_m = float(np.ceil((np.hypot(*self.plan_half) + room) / 16) * 16)
 
     def _capacity(self, side: int) -> float:
         return max(0, side * side - 7) * PER_CELL + 4 * side * float(CELL.mean()) * PER_METRE_OF_WALL
@@ -62,9 +65,8 @@ class RomanPlan:
         for x, y in self.order():
             if (x, y) not in taken:
                 self.insula(x, y)
-        self.sketch.plan.radius_m = float(np.ceil((np.hypot(*self.plan_half) + 60 + (110 if self.half >= 3 else 0)) / 16) * 16)
         self.fields()
-        return self.sketch.plan
+        return self.sketch.finished()
 
     def order(self) -> list[tuple[int, int]]:
         """The cells from the middle outwards."""
@@ -123,7 +125,7 @@ class RomanPlan:
             half = int((length / 2 - 9) // WALL_STEP_M) + 1
             reach = np.linspace(9.0, length / 2, half + 1)
             stops = [*(length / 2 - reach[::-1]), *(length / 2 + reach)]
-            for s, t in zip(stops[:-1], stops[1:], strict=True):
+            for s, t in itertools.pairwise(stops):
                 if t - s > 18.01 or abs(s + t - length) > 1:
                     self.wall_piece(a + along * s, a + along * t)
             for s in stops[:-1]:
@@ -175,9 +177,14 @@ class RomanPlan:
                 spot = self.place(along * s + aside * (13.0 * (1 if source.random() < 0.5 else -1)))
                 outline = rectangle(spot, self.place(along), 4.2, 3.6)
                 part = replace(blank_part(3.2, 1, "temple", "roman", 0.2), sides=("blank",) * 4)
-                self.sketch.lot("tomb", "1820", [spire_part(outline, ((0.0, 0.0), (1.0, 1.1)), part)])
+                if self.on_map(spot):
+                    self.sketch.lot("tomb", "1820", [spire_part(outline, ((0.0, 0.0), (1.0, 1.1)), part)])
         for s in np.arange(self.plan_half[1] + 14, self.plan_half[1] + 150, 30.0):
-            self.aqueduct(np.array([-2.5 * CELL[0], s]), np.array([-2.5 * CELL[0], s + 30.0]))
+            if self.on_map(self.place(np.array([-2.5 * CELL[0], s + 30.0]))):
+                self.aqueduct(np.array([-2.5 * CELL[0], s]), np.array([-2.5 * CELL[0], s + 30.0]))
+
+    def on_map(self, at: Points) -> bool:
+        return bool(np.abs(at).max() < self.sketch.plan.radius_m - 12)
 
     def aqueduct(self, a: Points, b: Points) -> None:
         a, b = self.place(a), self.place(b)
@@ -196,7 +203,7 @@ class RomanPlan:
         for x in range(-count, count):
             for y in range(-count, count):
                 corner = np.array([x, y]) * size
-                quad = np.array([corner, corner + [size, 0], corner + [size, size], corner + [0, size]])
+                quad = corner + size * np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
                 material = ("field_gold", "meadow", "field_green", "field_brown", "meadow")[int(source.integers(5))]
                 self.sketch.patch(self.place(quad), material, "field")
                 if source.random() < 0.4 and (np.abs(corner + size / 2) > clear + size / 2).any():
@@ -207,7 +214,7 @@ class RomanPlan:
         arena = self.plan_half * [1.0, -0.35] + [86.0, 0.0]
         for u in np.arange(8, size - 4, 11.0):
             for v in np.arange(8, size - 4, 11.0):
-                spot = corner + [u, v]
+                spot = corner + np.array([u, v])
                 at = self.place(spot)
                 clear = min(abs(spot[0]), abs(spot[1])) > 18 and np.hypot(*(spot - arena)) > 62
                 if clear and np.abs(at).max() < self.sketch.plan.radius_m - 4 and abs(spot[0] + 2.5 * CELL[0]) > 6:

@@ -45,7 +45,14 @@ def temple(sketch: Sketch, middle: Points, along: Points, size: tuple[float, flo
     hall = replace(hall, front=cella, back=offset(cella, 0.6), profile=((0.0, 0.0), (1.0, 0.0)), closed=True)
     lid = replace(blank_part(12.4, 1, "temple", "roman", 0.5), lift_m=11.0)
     pediment = row_part(roof[0], roof[1], width - 0.6, gable(width - 0.6, 17), lid, ("blank",) * 4)
-    sketch.lot("temple", SACRED, [plain_block(podium, 3.0, "temple", "paving"), stairs, hall, pediment], "Forum", 1, columns_along(ring, 3.1, 0.48, 3.0, 11.0))
+    sketch.lot(
+        "temple",
+        SACRED,
+        [plain_block(podium, 3.0, "temple", "paving"), stairs, hall, pediment],
+        "Forum",
+        1,
+        columns_along(ring, 3.1, 0.48, 3.0, 11.0),
+    )
 
 
 def forum(sketch: Sketch, outline: Points, along: Points, rng: np.random.Generator) -> None:
@@ -112,7 +119,9 @@ def theatre(sketch: Sketch, outline: Points, facing: Points, rng: np.random.Gene
     cavea = replace(part, front=middle + 38 * spokes, back=middle + 12 * spokes, profile=seats(18, 12.4), sides=("street",) * 18 + ("blank",) * 20)
     side = np.array([-facing[1], facing[0]])
     stage = rectangle(middle + facing * 9.5, side, 62.0, 7.0)
-    house = row_part(stage[0], stage[1], 7.0, ((0.0, 0.0), (1.0, 2.2)), blank_part(15.0, 3, "arena", "roman", 0.4), ("street", "street", "blank", "blank"))
+    house = row_part(
+        stage[0], stage[1], 7.0, ((0.0, 0.0), (1.0, 2.2)), blank_part(15.0, 3, "arena", "roman", 0.4), ("street", "street", "blank", "blank")
+    )
     boards = plain_block(rectangle(middle + facing * 3.9, side, 34.0, 4.0), 1.3, "roman", "paving")
     row = middle + facing * 5.2
     pillars = columns_along([(row - side * 15, row + side * 15)], 3.0, 0.4, 1.3, 11.0)

@@ -1,5 +1,6 @@
 """Paints facades and roofs into arrays of (height, width, 3) uint8, sRGB; row 0 is the upper edge."""
 
+import itertools
 from functools import lru_cache
 
 import numpy as np
@@ -110,7 +111,7 @@ def courses(px_per_m: float, row_m: float, column_m: float, joint: float, spread
 
 
 def paint_roof(paint: Paint, width_px: int, height_px: int, px_per_m: float, key: int) -> Pixels:
-    """Tiles, slates, metal sheets with seams, gravel, paving or rows of seats."""
+    """Tiles, slates, metal sheets with seams, gravel or paving."""
     cover = next(iter(paint.traits))
     shade = grain(width_px, height_px, key)
     if cover in ("tiles", "dark", "roman"):
@@ -119,7 +120,7 @@ def paint_roof(paint: Paint, width_px: int, height_px: int, px_per_m: float, key
         shade = blended(repeated(tile_rows(px_per_m, TILE_ROW_M, column, relief), width_px, height_px, key), shade)
     elif cover == "slate":
         shade = blended(repeated(tile_rows(px_per_m, 0.25, 0.22, 0.5), width_px, height_px, key), shade)
-    elif cover in ("paving", "seats"):
+    elif cover == "paving":
         shade = blended(repeated(courses(px_per_m, 0.5, 1.1, -30, 8), width_px, height_px, key), shade)
     picture = colored(shade, paint.colors[0], 0.8 if cover in ("tiles", "dark", "roman") else 0.5)
     if cover in ("metal", "copper"):
@@ -220,8 +221,8 @@ class Canvas:
         floors = [*self.paint.floors_m[1:], self.paint.height_m]
         count = max(2, round(self.paint.width_m / 1.25))
         posts = [self.x(i * self.paint.width_m / count) for i in range(count + 1)]
-        for low, high in zip(floors[:-1], floors[1:], strict=True):
-            top, bottom, middle = self.y(high), self.y(low), self.y((low * 0.62 + high * 0.38))
+        for low, high in itertools.pairwise(floors):
+            top, bottom, middle = self.y(high), self.y(low), self.y(low * 0.62 + high * 0.38)
             for y in (bottom, middle, top):
                 draw.line([(0, y), (self.width_px, y)], fill=TIMBER, width=thick)
             for i, x in enumerate(posts):
@@ -299,13 +300,13 @@ def _panes(draw: ImageDraw.ImageDraw, w: int, h: int, bar: float, across: int, u
 
 
 def _door(draw: ImageDraw.ImageDraw, w: int, h: int, bar: float, color: Color, kind: str) -> None:
-    """A door with a fanlight and panels, or a gate of boards."""
-    draw.rectangle([bar, bar, w - bar, h], fill=color)
+    """A door with a fanlight and panels, or a gate of boards; `bar` is the width of its frame."""
+    draw.rectangle([min(bar, w / 3), min(bar, h / 3), max(w - bar, w * 2 / 3), h], fill=color)
     if kind == "gate":
         for i in range(1, 7):
             draw.line([(w * i / 7, bar), (w * i / 7, h)], fill=darker(color, 0.75), width=max(1, int(bar / 2)))
         return
-    draw.rectangle([bar * 1.5, bar * 1.5, w - bar * 1.5, h * 0.2], fill=(86, 104, 118))
+    draw.rectangle([w * 0.14, h * 0.05, w * 0.86, h * 0.2], fill=(86, 104, 118))
     for x0, x1 in ((0.14, 0.45), (0.55, 0.86)):
         for y0, y1 in ((0.27, 0.58), (0.65, 0.93)):
             draw.rectangle([w * x0, h * y0, w * x1, h * y1], fill=darker(color, 0.8), outline=darker(color, 1.25))

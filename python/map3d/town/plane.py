@@ -1,5 +1,7 @@
 """Polygons in the plane: (n, 2) float64, counter-clockwise, metres, convex unless said otherwise."""
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -104,7 +106,7 @@ def circle(centre: Points, radius_m: float, corners: int, start_rad: float = 0.0
 def band(line: Points, width_m: float) -> list[Points]:
     """Quadrilaterals that widen each piece of a polyline to `width_m`."""
     quads = []
-    for a, b in zip(line[:-1], line[1:], strict=True):
+    for a, b in itertools.pairwise(line):
         if np.hypot(*(b - a)) < 1e-6:
             continue
         side = left(unit(b - a)) * (width_m / 2)

@@ -7,7 +7,7 @@ import numpy as np
 import rasterio
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
-from rasterio.transform import from_origin
+from rasterio.transform import Affine
 from rasterio.windows import Window
 
 from map3d.town.ground import Ground
@@ -16,17 +16,15 @@ from map3d.town.paint import blended, colored, courses, grain, repeated, tile_ro
 
 PATTERN_PX = 512
 STRIP_PX = 2048
-MATERIALS = (
-    "meadow", "lawn", "lawn_light", "garden", "forest", "field_green", "field_gold", "field_brown", "asphalt", "cobble", "sidewalk",
-    "plaza", "yard", "gravel", "concrete", "water", "bank", "mark", "car_white", "car_dark", "car_red", "clay", "roof_red", "roof_dark", "roof_flat", "roof_metal", "sand",
-)  # fmt: skip
 COLORS = {
     "meadow": (128, 140, 90), "lawn": (106, 128, 76), "lawn_light": (122, 140, 86), "garden": (94, 114, 66), "forest": (58, 84, 48),
     "field_green": (114, 134, 74), "field_gold": (190, 172, 116), "field_brown": (142, 116, 86), "asphalt": (104, 104, 106),
     "cobble": (138, 130, 120), "sidewalk": (172, 168, 160), "plaza": (190, 178, 158), "yard": (158, 148, 132), "gravel": (188, 178, 156),
-    "concrete": (164, 162, 156), "water": (74, 108, 116), "bank": (110, 132, 80), "mark": (236, 234, 226), "car_white": (214, 216, 218), "car_dark": (52, 58, 68), "car_red": (140, 44, 40), "clay": (176, 106, 78), "roof_red": (148, 86, 68),
-    "roof_dark": (92, 84, 82), "roof_flat": (146, 144, 138), "roof_metal": (160, 166, 170), "sand": (206, 190, 152),
+    "concrete": (164, 162, 156), "water": (74, 108, 116), "bank": (110, 132, 80), "mark": (236, 234, 226), "car_white": (214, 216, 218),
+    "car_dark": (52, 58, 68), "car_red": (140, 44, 40), "roof_red": (148, 86, 68), "roof_dark": (92, 84, 82), "roof_flat": (146, 144, 138),
+    "roof_metal": (160, 166, 170), "sand": (206, 190, 152),
 }  # fmt: skip
+MATERIALS = tuple(COLORS)
 
 
 @lru_cache(maxsize=2)
@@ -44,7 +42,9 @@ def patterns(px_per_m: float) -> NDArray[np.uint8]:
         elif name.startswith("field"):
             rows = (128 + 16 * np.sin(np.arange(PATTERN_PX) * 2 * np.pi / 16)).astype(np.uint8)
             shade = blended(np.broadcast_to(rows[:, None], (PATTERN_PX, PATTERN_PX)), shade)
-        contrast = {"mark": 0.08, "car_white": 0.05, "car_dark": 0.05, "car_red": 0.05, "water": 0.25, "asphalt": 0.35}.get(name, 0.7 if name in ("forest", "garden") else 0.5)
+        contrast = {"mark": 0.08, "car_white": 0.05, "car_dark": 0.05, "car_red": 0.05, "water": 0.25, "asphalt": 0.35}.get(
+            name, 0.7 if name in ("forest", "garden") else 0.5
+        )
         pictures.append(colored(np.asarray(shade, dtype=np.uint8), COLORS[name], contrast))
     return np.concatenate(pictures).reshape(-1, 3)
 
@@ -96,12 +96,17 @@ class Painter:
             piece[:] = (piece.astype(np.uint16) * light[:, :, None]) >> 8
 
 
+def north_up(west: float, north: float, px_m: float) -> Affine:
+    """Pixels to CRS coordinates; (west, north) is the outer corner of the first pixel."""
+    return Affine(px_m, 0.0, west, 0.0, -px_m, north)
+
+
 def write_ortho(path: Path, plan: Plan, px_m: float, side_px: int, crs: str, east: float, north: float) -> None:
     """The orthophoto: JPEG in a tiled GeoTIFF, written in strips, so that memory does not grow with its size."""
     profile = {
         "driver": "GTiff", "width": side_px, "height": side_px, "count": 3, "dtype": "uint8", "crs": crs, "compress": "JPEG",
         "photometric": "YCBCR", "jpeg_quality": 88, "tiled": True, "blockxsize": 512, "blockysize": 512, "bigtiff": "IF_SAFER",
-        "transform": from_origin(east - plan.radius_m, north + plan.radius_m, px_m, px_m),
+        "transform": north_up(east - plan.radius_m, north + plan.radius_m, px_m),
     }  # fmt: skip
     painter = Painter(plan, px_m)
     with rasterio.open(path, "w", **profile) as out:
@@ -118,7 +123,7 @@ def write_dem(path: Path, ground: Ground, radius_m: float, px_m: float, crs: str
     profile = {
         "driver": "GTiff", "width": side, "height": side, "count": 1, "dtype": "float32", "crs": crs, "nodata": -9999.0,
         "compress": "DEFLATE", "predictor": 3, "tiled": True, "blockxsize": 256, "blockysize": 256, "bigtiff": "IF_SAFER",
-        "transform": from_origin(east - radius_m, north + radius_m, px_m, px_m),
+        "transform": north_up(east - radius_m, north + radius_m, px_m),
     }  # fmt: skip
     with rasterio.open(path, "w", **profile) as out:
         for y in range(0, side, STRIP_PX):

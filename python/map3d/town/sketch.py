@@ -54,6 +54,12 @@ class Sketch:
         if len(polygon) >= 3:
             self.plan.patches.append(Patch(np.asarray(polygon, dtype=float), material, ORDER[order]))
 
+    def finished(self) -> Plan:
+        """The plan without trees at or beyond the edge of the map."""
+        reach = self.plan.radius_m - 6
+        self.plan.trees = [t for t in self.plan.trees if max(abs(t.x), abs(t.y)) < reach]
+        return self.plan
+
     def tree(self, at: Points, species: str, height_m: float, rng: np.random.Generator) -> None:
         """Plants a tree, turned and sized by chance."""
         height = height_m * float(rng.uniform(0.8, 1.2))

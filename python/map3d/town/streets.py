@@ -1,5 +1,6 @@
 """What lies between the blocks: carriageways with their marks, alley trees, the river, fields around the town."""
 
+import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -130,7 +131,7 @@ def lay_fields(sketch: Sketch, frame: "Frame", reach_m: float) -> None:
             corner = np.array([[x, y], [x + size, y], [x + size, y + size], [x, y + size]])
             cuts = np.sort(source.uniform(0.2, 0.8, 2))
             edges = [0.0, *cuts, 1.0]
-            for a, b in zip(edges[:-1], edges[1:], strict=True):
+            for a, b in itertools.pairwise(edges):
                 strip = corner[0] + (corner - corner[0]) * [1.0, 0.0] + np.array([[0, a], [0, a], [0, b], [0, b]]) * size
                 material = ("meadow", "field_green", "field_gold", "field_brown", "meadow")[int(source.integers(5))]
                 sketch.patch(frame.bend(strip), material, "field")
@@ -141,7 +142,7 @@ def _grove(sketch: Sketch, frame: "Frame", middle: Points, reach_m: float, radiu
     if np.hypot(*middle) < reach_m + 60 or source.random() > 0.3:
         return
     centre = frame.bend(middle)[0]
-    if not _far_from_roads(frame, centre, 45) or near_river(frame, middle - [0, 30]) or near_river(frame, middle + [0, 30]):
+    if not _far_from_roads(frame, centre, 45) or near_river(frame, middle - np.array([0, 30])) or near_river(frame, middle + np.array([0, 30])):
         return
     angle = np.linspace(0, 2 * np.pi, 40, endpoint=False)
     ragged = 30 * (1 + 0.16 * np.sin(2 * angle + source.uniform(0, 6)) + 0.1 * np.sin(5 * angle + source.uniform(0, 6)))

@@ -70,14 +70,18 @@ def leaf_picture(name: str) -> NDArray[np.uint8]:
     big = LEAF_PX * 2
     image = Image.new("RGBA", (big, big), (*_shaded(color, 0.7), 0))
     draw = ImageDraw.Draw(image)
-    points = source.uniform(0, 1, (6500, 2))
+    points = source.uniform(0, 1, (3600, 2))
     inside = points[_in_crown(points, shape if view == "side" else "disc", source)]
     clumps = source.uniform(0.1, 0.9, (26, 2))
     order = np.argsort(inside[:, 1] if view == "side" else -np.hypot(*(inside - 0.5).T))
     for x, y in inside[order]:
         near = float(np.hypot(*(clumps - [x, y]).T).min())
-        light = 0.62 + 0.5 * y + source.normal(0, 0.13) - 1.1 * min(near, 0.2) if view == "side" else 1.12 + source.normal(0, 0.14) - 1.4 * min(near, 0.25)
-        size = source.uniform(5, 12)
+        light = (
+            0.62 + 0.5 * y + source.normal(0, 0.13) - 1.1 * min(near, 0.2)
+            if view == "side"
+            else 1.12 + source.normal(0, 0.14) - 1.4 * min(near, 0.25)
+        )
+        size = source.uniform(7, 14)
         box = [x * big - size, (1 - y) * big - size * 0.7, x * big + size, (1 - y) * big + size * 0.7]
         draw.ellipse(box, fill=(*_shaded(color, light), 255))
     small = np.asarray(image.resize((LEAF_PX, LEAF_PX), Image.Resampling.BOX)).copy()
@@ -121,7 +125,7 @@ class TreeWriter:
             f'<core:cityObjectMember><veg:SolitaryVegetationObject gml:id="{self.prefix}tree_{number:06d}"><gml:name>{tree.species}</gml:name>'
             f'<veg:class>1070</veg:class><veg:height uom="m">{h:.2f}</veg:height><veg:crownDiameter uom="m">{crown:.2f}</veg:crownDiameter>'
             f"<veg:lod2ImplicitRepresentation><core:ImplicitGeometry><core:transformationMatrix>{matrix}</core:transformationMatrix>"
-            f"{self.geometry(tree.species)}<core:referencePoint><gml:Point><gml:pos srsDimension=\"3\">{x:.4f} {y:.4f} {z:.4f}</gml:pos>"
+            f'{self.geometry(tree.species)}<core:referencePoint><gml:Point><gml:pos srsDimension="3">{x:.4f} {y:.4f} {z:.4f}</gml:pos>'
             f"</gml:Point></core:referencePoint></core:ImplicitGeometry></veg:lod2ImplicitRepresentation>"
             f"</veg:SolitaryVegetationObject></core:cityObjectMember>\n"
         )
