@@ -1,6 +1,6 @@
 // Builds dist/: map3d.js (a global), map3d.mjs (a module), the page that shows a rendering, and type declarations.
 import { execFileSync } from "node:child_process";
-import { cpSync, mkdirSync, rmSync, writeFileSync } from "node:fs";
+import { cpSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { dirname, join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
 import * as esbuild from "esbuild";
@@ -37,7 +37,18 @@ async function build() {
   cpSync(join(root, "page/index.html"), join(dist, "index.html"));
   const tsc = join(root, "node_modules/typescript/bin/tsc");
   execFileSync(process.execPath, [tsc, "-p", join(root, "tsconfig.types.json")], { stdio: "inherit" });
-  for (const name of ["map3d.d.ts", "map3d.d.mts"]) writeFileSync(join(dist, name), 'export * from "./types/map3d";\nexport as namespace map3d;\n');
+  writeDeclarations();
+}
+
+/** Declarations name their files with extensions, which every kind of module resolution understands. */
+function writeDeclarations() {
+  const types = join(dist, "types");
+  for (const file of readdirSync(types, { recursive: true }).filter((name) => name.endsWith(".d.ts"))) {
+    const text = readFileSync(join(types, file), "utf8");
+    writeFileSync(join(types, file), text.replace(/((?:from|import) ?\(?")(\.[^"]+)"/g, '$1$2.js"'));
+  }
+  writeFileSync(join(dist, "map3d.d.mts"), 'export * from "./types/map3d.js";\n');
+  writeFileSync(join(dist, "map3d.d.ts"), 'export * from "./types/map3d.js";\nexport as namespace map3d;\n');
 }
 
 await build();

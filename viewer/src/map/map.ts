@@ -136,8 +136,8 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
     if (!sight) return NOTHING;
     try {
       return await pickExactly(this.#layers, sight, point);
-    } catch (reason) {
-      this.report(asError(reason));
+    } catch {
+      // The tile's own error has been reported when it failed.
       return { ...(pickLoaded(this.#layers, sight, point) ?? NOTHING), approximate: true };
     }
   }

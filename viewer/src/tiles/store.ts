@@ -1,4 +1,4 @@
-import { asError } from "../core/errors";
+import { asError, DecodeError, FetchError } from "../core/errors";
 import { tileName, type Tile } from "../geo/frame";
 import type { LayerInfo, View } from "../geo/manifest";
 import type { Cache } from "./cache";
@@ -26,7 +26,7 @@ export class Store {
   readonly #name: string;
   readonly #source: Source;
   readonly #shared: Shared;
-  readonly #failed = new Map<string, number>();
+  readonly #failed = new Map<string, { readonly at_ms: number; readonly error: Error }>();
   readonly #arrived: (error: Error | null) => void;
 
   /** @param name unique in the map  @param arrived called after each tile, with what went wrong */
@@ -56,8 +56,8 @@ export class Store {
 
   /** True when a tile could not be had a short time ago. */
   failed(view: View, layer: LayerInfo, tile: Tile): boolean {
-    const at = this.#failed.get(this.key(view, layer, tile));
-    return at !== undefined && performance.now() - at < RETRY_AFTER_MS;
+    const failure = this.#failed.get(this.key(view, layer, tile));
+    return failure !== undefined && performance.now() - failure.at_ms < RETRY_AFTER_MS;
   }
 
   /** Forgets failures, so that tiles are asked for again. */
@@ -76,7 +76,9 @@ export class Store {
     const held = this.get(view, layer, tile);
     if (held && (held.data || held.empty)) return held.data;
     await this.#shared.queue.need(this.job(view, layer, tile));
-    return this.get(view, layer, tile)?.data ?? null;
+    const stored = this.get(view, layer, tile);
+    if (!stored) throw this.#failed.get(this.key(view, layer, tile))?.error ?? new FetchError(`${this.key(view, layer, tile)}: the fetch was given up`);
+    return stored.data;
   }
 
   async #load(key: string, view: View, layer: LayerInfo, tile: Tile, signal: AbortSignal): Promise<void> {
@@ -92,8 +94,10 @@ export class Store {
       this.#arrived(null);
     } catch (reason) {
       if (signal.aborted) return;
-      this.#failed.set(key, performance.now());
-      this.#arrived(asError(reason));
+      const name = `tile ${view.id}/${layer.name}/${tileName(tile)}`;
+      const error = reason instanceof DecodeError ? new DecodeError(`${name}: ${reason.message}`) : asError(reason);
+      this.#failed.set(key, { at_ms: performance.now(), error });
+      this.#arrived(error);
     }
   }
 }

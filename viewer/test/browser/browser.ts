@@ -2,7 +2,7 @@ import { mkdirSync } from "node:fs";
 import { resolve } from "node:path";
 import { chromium, type Browser, type BrowserContextOptions, type Page } from "playwright-core";
 
-export const OUT = resolve(import.meta.dirname, "../../dist/.shots");
+export const OUT = resolve(import.meta.dirname, "../../.shots");
 mkdirSync(OUT, { recursive: true });
 
 /** Chromium with software WebGL2. Its path: CHROMIUM, else Debian's. */

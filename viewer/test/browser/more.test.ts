@@ -2,6 +2,7 @@ import { afterAll, beforeAll, expect, test } from "vitest";
 import type { Browser } from "playwright-core";
 import { tileId } from "../../src/tiles/pmtiles";
 import { archive, renderRamp, renderTown, type Fixture } from "../fixture/rendering";
+import { encodePng } from "../fixture/encodePng";
 import { ORIGIN } from "../fixture/town";
 import { TestServer } from "../fixture/server";
 import { openBrowser, openPage, OUT } from "./browser";
@@ -206,5 +207,108 @@ test("the cache keeps its bound while one wanders about", async () => {
   });
   // What is in view may exceed the bound; what is not may not.
   expect(most).toBeLessThan(600_000 + 64 * 64 * 7 * 80);
+  await page.context().close();
+});
+
+/** The town with some files replaced. */
+function changed(name: string, change: (files: Map<string, Uint8Array>) => void, json: Partial<Fixture["json"]> = {}): string {
+  const files = new Map(town.files);
+  change(files);
+  server.renderings.set(name, { json: { ...town.json, ...json }, files, raw: town.raw });
+  return `${host}/tiles/${name}`;
+}
+
+test("a broken tile is named in an error; the rest is shown", async () => {
+  const base = changed("broken", (files) => files.set("0-45/normal/3/3/4", new Uint8Array([1, 2, 3])));
+  const { page } = await start(browser, base, { zoom: 3.5 });
+  const errors = await page.evaluate(() => (globalThis as Global).errors);
+  expect(errors.length).toBe(1);
+  expect(errors[0]).toMatch(/tile 0-45\/normal\/3\/3\/4: no PNG: 3 bytes/);
+  await page.context().close();
+});
+
+test("a pick whose deepest tile cannot be had is approximate", async () => {
+  const base = changed("shallow", (files) => {
+    for (const path of files.keys()) if (/\/(id|depth)\/3\//.test(path)) files.set(path, new Uint8Array([0]));
+  });
+  const { page } = await start(browser, base, { hover: true });
+  const pick = await page.evaluate(async ([x, y, z]) => {
+    const { map, layer } = globalThis as Global;
+    const view = layer.viewOf("0-45");
+    for (const kind of ["id", "depth"]) {
+      const info = layer.rendering?.layers.get(kind);
+      if (view && info) await layer.store?.need(view, info, { z: 0, x: 0, y: 0 });
+    }
+    const { id, position, approximate } = await map.pick(map.project([x - 45, y - 4, z + 34]) as [number, number]);
+    return { id, position, approximate };
+  }, ORIGIN as [number, number, number]);
+  expect(pick).toMatchObject({ id: 17, approximate: true });
+  const level0_m = (0.76 * 8) / 2;
+  expect(Math.hypot(...(pick.position ?? [0, 0, 0]).map((part, k) => part - ([ORIGIN[0] - 45, ORIGIN[1] - 4, ORIGIN[2] + 34][k] ?? 0)))).toBeLessThan(4 * level0_m);
+  await page.context().close();
+});
+
+test("where colour has no alpha, the id layer tells what is covered", async () => {
+  const layers = town.json.layers.map((layer) => (layer.kind === "color" ? { ...layer, format: "jpeg" } : layer));
+  const base = changed("opaque", (files) => {
+    for (const [path, bytes] of town.raw) {
+      if (path.includes("/color/")) files.set(path, encodePng(64, 64, 4, bytes.map((value, at) => (at % 4 === 3 ? 255 : value))));
+    }
+  }, { layers });
+  const { page } = await start(browser, base, { zoom: 3.5 });
+  const got = await pixels(page);
+  const { page: plain } = await start(browser, `${host}/tiles/town`, { zoom: 3.5 });
+  const want = await pixels(plain);
+  const alphas = (bytes: Buffer): number => bytes.filter((value, at) => at % 4 === 3 && value > 127).length;
+  expect(alphas(got)).toBeGreaterThan(10_000);
+  expect(alphas(got)).toBeLessThan(470_000);
+  expect(Math.abs(alphas(got) - alphas(want)) / alphas(want)).toBeLessThan(0.01);
+  await page.context().close();
+  await plain.context().close();
+});
+
+test("markers are reached and chosen by keys; one is selected at a time", async () => {
+  const { page } = await start(browser, `${host}/tiles/town`, { controls: false });
+  await page.evaluate(([x, y, z]) => {
+    const { map, map3d } = globalThis as Global;
+    const told: string[] = [];
+    for (const name of ["a", "b"]) new map3d.marker(name, [x, y + told.length, z]).bindPopup(`about ${name}`).on("click", ({ marker }) => told.push(`click ${marker.label}`)).addTo(map);
+    map.on("select", ({ marker }) => told.push(`select ${marker.label}`));
+    Object.assign(globalThis, { told });
+    map.container.focus();
+  }, ORIGIN as [number, number, number]);
+  await page.keyboard.press("Tab");
+  await page.keyboard.press("Enter");
+  await page.keyboard.press("Tab");
+  await page.keyboard.press("Enter");
+  expect(await page.evaluate(() => (globalThis as unknown as { told: string[] }).told)).toEqual(["click a", "select a", "click b", "select b"]);
+  expect(await page.locator(".map3d-marker-selected").count()).toBe(1);
+  expect(await page.locator(".map3d-popup-body").allTextContents()).toEqual(["about a", "about b"]);
+  await page.context().close();
+});
+
+test("a drag that ends in motion glides on, and comes to rest", async () => {
+  const { page } = await start(browser, `${host}/tiles/town`, { zoom: 4.5 });
+  const at = (): Promise<number> => page.evaluate((world) => (globalThis as Global).map.project(world)?.[0] ?? 0, ORIGIN as [number, number, number]);
+  await page.evaluate(() => {
+    const { map } = globalThis as Global;
+    const point = (type: string, x: number): void => void map.canvas.dispatchEvent(new PointerEvent(type, { pointerId: 1, pointerType: "touch", clientX: x, clientY: 300, bubbles: true }));
+    map.canvas.setPointerCapture = () => undefined;
+    return new Promise<void>((done) => {
+      point("pointerdown", 300);
+      let x = 300;
+      const timer = setInterval(() => {
+        point("pointermove", (x += 8));
+        if (x < 380) return;
+        clearInterval(timer);
+        point("pointerup", x);
+        map.once("moveend", () => { done(); });
+      }, 8);
+    });
+  });
+  const end = await at();
+  await page.waitForTimeout(400);
+  expect(await at()).toBe(end);
+  expect(end - 400).toBeGreaterThan(85);
   await page.context().close();
 });
