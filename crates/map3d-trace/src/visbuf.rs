@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use map3d_base::{DEPTH_NOTHING, Frame, ViewAxes};
+use map3d_base::{DEPTH_NOTHING, Frame, Vec3, ViewAxes};
 use map3d_scene::{Chunk, InstanceRecord};
 
 use crate::beam::buffer::{MIXED, SampleBuffer, Track};
@@ -104,6 +104,12 @@ impl VisBuf {
         let track = &self.tracks[slot as usize];
         let placed = self.placed(track, &self.parts[track.part as usize]);
         units_of_plane(&placed.pixel, i as f64 + 0.5, j as f64 + 0.5)
+    }
+
+    /// Pixel coordinates and depth units of a slot's corners, unsnapped.
+    pub(crate) fn placed_corners(&self, slot: u32) -> [Vec3; 3] {
+        let track = &self.tracks[slot as usize];
+        self.placed(track, &self.parts[track.part as usize]).pixel
     }
 
     /// Depth of the centre sample, `DEPTH_NOTHING` where it meets nothing.

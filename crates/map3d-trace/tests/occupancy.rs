@@ -4,6 +4,7 @@ mod scenes;
 
 use map3d_base::asset::Rank;
 use map3d_base::tile::Tile;
+use map3d_scene::SceneStore;
 use map3d_trace::{BeamTracer, Opaque, SUBTILE_PX, block_key, occupied};
 use scenes::{Dice, Soup, build, frame, new_folder, open, request, write_asset};
 
@@ -63,7 +64,7 @@ fn a_block_key_changes_with_what_the_block_shows() {
     let store = build(&folder, &soup);
     let mut frame = frame(0.0, 90.0, 128.0);
     frame.zmax = 4;
-    let keys = |store| -> Vec<String> {
+    let keys = |store: &SceneStore| -> Vec<String> {
         (0..4).map(|k| block_key(store, &frame, Tile { z: 1, x: k % 2, y: k / 2 }).expect("key")).collect()
     };
     let before = keys(&store);

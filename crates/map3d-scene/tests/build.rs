@@ -1,0 +1,284 @@
+//! Builds: what becomes of assets, and that the same assets give the same bytes.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use map3d_base::asset::{AssetReport, AssetWriter, Batch, Instance, Material, Materials, Object, Rank};
+use map3d_base::{Error, Vec3};
+use map3d_scene::build::{BuildOptions, BuildReport, BuildRequest, GroundPlane, build_scene};
+use map3d_scene::{Chunk, SceneStore};
+
+struct Folder(PathBuf);
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+fn new_folder() -> Folder {
+    static NUMBER: AtomicU32 = AtomicU32::new(0);
+    let path = std::env::temp_dir().join(format!("map3d-build-{}-{}", std::process::id(), NUMBER.fetch_add(1, Ordering::Relaxed)));
+    let _ = std::fs::remove_dir_all(&path);
+    std::fs::create_dir_all(&path).expect("folder");
+    Folder(path)
+}
+
+/// (corners, object, material, rank)
+type Face = ([Vec3; 3], u32, u32, Rank);
+
+fn batch(faces: &[Face], prototype: u32) -> Batch {
+    let mut batch = Batch { prototype, ..Batch::default() };
+    for (corners, object, material, rank) in faces {
+        let first = batch.positions.len() as u32;
+        batch.positions.extend_from_slice(corners);
+        batch.triangles.push([first, first + 1, first + 2]);
+        batch.materials.push(*material);
+        batch.objects.push(*object);
+        batch.ranks.push(*rank);
+    }
+    batch
+}
+
+fn write_asset(folder: &Path, name: &str, batches: &[Batch], materials: Materials) {
+    let asset = folder.join("assets").join(name);
+    let mut writer = AssetWriter::create(&asset).expect("asset");
+    batches.iter().for_each(|b| writer.append(b).expect("append"));
+    let objects = batches.iter().flat_map(|b| &b.objects).chain(materials.instances.iter().map(|i| &i.object)).max().map_or(1, |o| o + 1);
+    writer.finish(&materials, &vec![Object::default(); objects as usize], AssetReport::default()).expect("finish");
+    std::fs::write(asset.join("ids.u32"), (1..=objects).flat_map(|id| (id * 10).to_le_bytes()).collect::<Vec<u8>>()).expect("ids");
+}
+
+fn write_faces(folder: &Path, faces: &[Face]) {
+    let grey = |name: &str| Material { name: name.into(), ..Material::default() };
+    let red = Material { diffuse: [1.0, 0.0, 0.0, 1.0], ..Material::default() };
+    write_asset(folder, "town", &[batch(faces, 0)], Materials { materials: vec![grey("a"), grey("b"), red], instances: vec![] });
+}
+
+fn request() -> BuildRequest {
+    let options = BuildOptions { ground_plane: GroundPlane::Off, ..BuildOptions::default() };
+    BuildRequest { assets: vec!["town".into()], origin: [500_000.0, 5_000_000.0, 0.0], options, ground_id: 0, threads: 2, max_memory_bytes: 0 }
+}
+
+fn run(folder: &Folder, request: &BuildRequest) -> BuildReport {
+    build_scene(&folder.0, request, &mut |_, _, _| true).expect("build")
+}
+
+/// World coordinates of local ones.
+fn world(t: [Vec3; 3]) -> [Vec3; 3] {
+    t.map(|p| [p[0] + 500_000.0, p[1] + 5_000_000.0, p[2]])
+}
+
+fn tent(x: f64, y: f64, object: u32) -> Vec<Face> {
+    let p = |dx: f64, dy: f64, z: f64| [x + dx, y + dy, z];
+    let (a, b, c, top) = (p(0.0, 0.0, 0.0), p(6.0, 0.0, 0.0), p(3.0, 5.0, 0.0), p(3.0, 2.0, 7.0));
+    [[a, b, top], [b, c, top], [c, a, top]].map(|t| (world(t), object, object % 3, Rank::Other)).to_vec()
+}
+
+/// Tents over 20 × 20 km, so that there are many cells.
+fn camp() -> Vec<Face> {
+    (0..400).flat_map(|k| tent(f64::from(k % 20) * 1000.0, f64::from(k / 20) * 1000.0, k)).collect()
+}
+
+fn bytes_of(folder: &Folder) -> BTreeMap<String, Vec<u8>> {
+    let mut out = BTreeMap::new();
+    let mut folders = vec![folder.0.join("chunks")];
+    while let Some(path) = folders.pop() {
+        for entry in std::fs::read_dir(path).expect("list") {
+            let path = entry.expect("entry").path();
+            out.insert(path.display().to_string().replace(&folder.0.display().to_string(), ""), std::fs::read(&path).expect("read"));
+        }
+    }
+    for name in ["scene.json", "instances.m3i"] {
+        out.insert(name.into(), std::fs::read(folder.0.join(name)).expect("read"));
+    }
+    out
+}
+
+#[test]
+fn an_empty_scene_is_a_scene() {
+    let folder = new_folder();
+    write_faces(&folder.0, &[]);
+    assert_eq!(run(&folder, &request()).triangles, 0);
+    let store = SceneStore::open(&folder.0, 1 << 20).expect("open");
+    assert!(store.bounds().is_empty() && store.parts().is_empty());
+    let none = BuildRequest { assets: vec![], ..request() };
+    assert_eq!(run(&folder, &none).triangles_read, 0);
+}
+
+#[test]
+fn one_triangle_is_kept_to_the_lattice() {
+    let folder = new_folder();
+    let t = [[1.0 / 4096.0, 0.0, 0.0], [3.00001, 0.0, 0.0], [0.0, 4.0, 1.5]];
+    write_faces(&folder.0, &[(world(t), 0, 0, Rank::Ground)]);
+    run(&folder, &request());
+    let store = SceneStore::open(&folder.0, 1 << 20).expect("open");
+    let chunk = store.chunk(0).expect("chunk");
+    let leaf = &chunk.leaves()[0];
+    let corner = |c: usize| [0, 1, 2].map(|k| chunk.origin()[k] + f64::from(leaf.corners[3 * c + k][0]));
+    assert_eq!([corner(0), corner(1), corner(2)], [[1.0 / 4096.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 4.0, 1.5]]);
+    assert_eq!((chunk.objects()[0].id, chunk.triangles()[0].rank), (10, 2));
+}
+
+#[test]
+fn each_optimisation_is_counted_and_can_be_switched_off() {
+    let t = world([[0.0; 3], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]]);
+    let faces = [
+        (t, 0, 0, Rank::Other),
+        // The same face once more, turned, the other way round, and with an equal material.
+        ([t[1], t[2], t[0]], 0, 0, Rank::Other),
+        ([t[0], t[2], t[1]], 0, 1, Rank::Other),
+        // Another object's, and another material's: both stay.
+        (t, 1, 0, Rank::Other),
+        (t, 0, 2, Rank::Other),
+        // Without area once snapped.
+        (world([[9.0, 9.0, 0.0], [9.00001, 9.0, 0.0], [9.0, 9.00001, 0.0]]), 0, 0, Rank::Other),
+    ];
+    let folder = new_folder();
+    write_faces(&folder.0, &faces);
+    let on = run(&folder, &request());
+    assert_eq!((on.triangles_read, on.triangles, on.duplicate_faces, on.degenerate_triangles), (6, 3, 2, 1));
+    assert_eq!((on.merged_materials, on.duplicate_vertices), (1, 14));
+    let mut off = request();
+    let no = false;
+    off.options = BuildOptions { merge_vertices: no, merge_faces: no, drop_degenerate: no, merge_materials: no, ..off.options };
+    let off = run(&folder, &off);
+    assert_eq!((off.triangles, off.duplicate_faces, off.degenerate_triangles, off.merged_materials, off.duplicate_vertices), (6, 0, 0, 0, 0));
+    let mut textured = request();
+    textured.options.drop_untextured = true;
+    assert_eq!(run(&folder, &textured).untextured_faces, 6);
+}
+
+#[test]
+fn builds_are_equal_bytes_whatever_the_threads_and_the_memory() {
+    let folders = [new_folder(), new_folder()];
+    folders.iter().for_each(|f| write_faces(&f.0, &camp()));
+    run(&folders[0], &request());
+    // 4 KiB: everything is spilled to files.
+    let report = run(&folders[1], &BuildRequest { threads: 1, max_memory_bytes: 4096, ..request() });
+    assert_eq!((report.triangles, report.chunks_kept), (1200, 0));
+    assert!(report.chunks > 20, "{} chunks", report.chunks);
+    assert!(bytes_of(&folders[0]) == bytes_of(&folders[1]));
+    assert!(!folders[1].0.join("spill").exists());
+    let again = run(&folders[0], &request());
+    assert_eq!(again.chunks_kept, again.chunks);
+    assert!(bytes_of(&folders[0]) == bytes_of(&folders[1]));
+}
+
+#[test]
+fn a_local_edit_rewrites_one_chunk() {
+    let folder = new_folder();
+    write_faces(&folder.0, &camp());
+    run(&folder, &request());
+    let before = bytes_of(&folder);
+    let mut edited = camp();
+    edited.extend(tent(5500.0, 5500.0, 400));
+    write_faces(&folder.0, &edited);
+    let report = run(&folder, &request());
+    assert_eq!(report.chunks - report.chunks_kept, 1);
+    let after = bytes_of(&folder);
+    let changed: Vec<_> = after.iter().filter(|(name, bytes)| name.contains("m3c") && before.get(*name) != Some(bytes)).collect();
+    assert_eq!((changed.len(), after.len()), (1, before.len()));
+}
+
+#[test]
+fn a_ground_plane_lies_under_scenes_without_terrain() {
+    let folder = new_folder();
+    write_faces(&folder.0, &tent(0.0, 0.0, 0));
+    let mut auto = request();
+    auto.options.ground_plane = GroundPlane::Auto;
+    let refused = build_scene(&folder.0, &auto, &mut |_, _, _| true);
+    assert!(matches!(refused, Err(Error::Argument(what)) if what.contains("ground_id")));
+    auto.ground_id = 77;
+    assert_eq!(run(&folder, &auto).ground_plane_triangles, 2);
+    let store = SceneStore::open(&folder.0, 1 << 20).expect("open");
+    assert_eq!((store.bounds().lo, store.bounds().hi), ([-10.0, -10.0, 0.0], [16.0, 15.0, 7.0]));
+    assert!(store.chunk(0).expect("chunk").objects().iter().any(|o| o.id == 77 && o.rank == 0));
+    let mut faces = tent(0.0, 0.0, 0);
+    faces.push((world([[0.0; 3], [9.0, 0.0, 0.0], [0.0, 9.0, 0.0]]), 1, 0, Rank::Terrain));
+    write_faces(&folder.0, &faces);
+    assert_eq!(run(&folder, &auto).ground_plane_triangles, 0);
+}
+
+#[test]
+fn prototypes_are_stored_once_and_placed() {
+    let folder = new_folder();
+    let tree: Vec<Face> = [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 0.0, 3.0]], [[0.0; 3], [0.0, 1.0, 0.0], [0.0, 0.0, 3.0]]].map(|t| (t, 0, 0, Rank::Other)).to_vec();
+    let at = |object: u32, x: f64| Instance { prototype: 1, object, transform: [2.0, 0.0, 0.0, 500_000.0 + x, 0.0, 2.0, 0.0, 5_000_000.0, 0.0, 0.0, 2.0, 1.0] };
+    let instances = vec![at(2, 300.0), at(1, 100.0), Instance { prototype: 9, ..at(1, 0.0) }];
+    write_asset(&folder.0, "town", &[batch(&tree, 1)], Materials { materials: vec![Material::default()], instances });
+    let report = run(&folder, &request());
+    assert_eq!((report.prototypes, report.instances, report.instances_of_nothing), (1, 2, 1));
+    let store = SceneStore::open(&folder.0, 1 << 20).expect("open");
+    let ids: Vec<u32> = store.instances().iter().map(|i| i.object_id).collect();
+    assert_eq!(ids, [20, 30]);
+    assert_eq!(store.parts().len(), 2);
+    let b = store.bounds();
+    assert!((b.lo[0] - 100.0).abs() < 1e-6 && (b.hi[0] - 302.0).abs() < 1e-6 && (b.hi[2] - 7.0).abs() < 1e-6, "{b:?}");
+}
+
+#[test]
+fn a_build_that_is_stopped_says_so_and_the_next_one_finishes() {
+    let folder = new_folder();
+    write_faces(&folder.0, &camp());
+    let stopped = build_scene(&folder.0, &request(), &mut |stage, done, _| stage != "chunks" || done < 8);
+    assert!(matches!(stopped, Err(Error::Interrupted)));
+    assert!(!folder.0.join("scene.json").exists() && !folder.0.join("spill").exists());
+    assert!(run(&folder, &request()).chunks_kept >= 8);
+}
+
+#[test]
+fn a_damaged_chunk_is_refused() {
+    let folder = new_folder();
+    write_faces(&folder.0, &tent(0.0, 0.0, 0));
+    run(&folder, &request());
+    let path = std::fs::read_dir(folder.0.join("chunks")).expect("list").next().expect("a chunk").expect("entry").path();
+    let good = std::fs::read(&path).expect("read");
+    for cut in [0, 40, 127, 128, good.len() - 64] {
+        std::fs::write(&path, &good[..cut]).expect("write");
+        assert!(Chunk::open(&path, false).is_err(), "cut at {cut}");
+    }
+    // Node child, triangle number in a leaf, a NaN corner, material, a box too small.
+    let leaf = 128 + 256;
+    for (at, value) in [(128 + 192, 5u32), (leaf + 288, 9), (leaf, f32::NAN.to_bits()), (leaf + 320 + 24, 70), (128 + 96, 0), (40, f32::NAN.to_bits())] {
+        let mut bad = good.clone();
+        bad[at..at + 4].copy_from_slice(&value.to_le_bytes());
+        std::fs::write(&path, &bad).expect("write");
+        assert!(Chunk::open(&path, false).is_err(), "changed at {at}");
+        assert!(Chunk::open(&path, true).is_err(), "the checksum is wrong too");
+    }
+    std::fs::write(&path, &good).expect("write");
+    assert!(Chunk::open(&path, true).is_ok());
+}
+
+#[test]
+fn broken_requests_and_assets_are_typed_errors() {
+    let folder = new_folder();
+    write_faces(&folder.0, &tent(0.0, 0.0, 0));
+    for name in ["../town", "", ".", "a/b"] {
+        let request = BuildRequest { assets: vec![name.into()], ..request() };
+        assert!(matches!(build_scene(&folder.0, &request, &mut |_, _, _| true), Err(Error::Argument(_))), "{name:?}");
+    }
+    assert!(BuildRequest::from_json("{\"assets\": [], \"origin\": [0, 0, 0], \"colour\": 1}").is_err());
+    let ids = folder.0.join("assets/town/ids.u32");
+    for bytes in [&[0u8, 0, 0, 0][..], &[1, 0, 0][..], &[][..]] {
+        std::fs::write(&ids, bytes).expect("write");
+        assert!(matches!(build_scene(&folder.0, &request(), &mut |_, _, _| true), Err(Error::Format { .. })), "{bytes:?}");
+    }
+}
+
+#[test]
+fn few_mapped_bytes_still_serve_all_chunks() {
+    let folder = new_folder();
+    write_faces(&folder.0, &camp());
+    run(&folder, &request());
+    let store = SceneStore::open(&folder.0, 4096).expect("open");
+    for _ in 0..2 {
+        for part in store.parts() {
+            store.chunk(part.chunk).expect("chunk");
+        }
+    }
+    let stats = store.stats();
+    assert!(stats.chunks_mapped <= 3 && stats.chunk_misses as usize == 2 * store.parts().len(), "{stats:?}");
+}
