@@ -79,7 +79,9 @@ def run(arguments: list[str]) -> int:
     except (click.Abort, KeyboardInterrupt):
         click.echo("map3d: stopped; give the same command again to go on", err=True)
         return 130
-    except Exception as error:
+    except BaseException as error:
+        if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
+            raise
         if os.environ.get("MAP3D_DEBUG"):
             traceback.print_exc()
         click.echo(f"map3d: {_line(error)}", err=True)
@@ -91,7 +93,8 @@ def _see(error: click.ClickException) -> str:
     return f" See {context.command_path} --help." if context else ""
 
 
-def _line(error: Exception) -> str:
+def _line(error: BaseException) -> str:
+    """A panic of the compiled core is no Exception, but as much a bug as one."""
     if isinstance(error, Map3dError) or any(base.__name__ in ("CoreError", "TownError") for base in type(error).__mro__):
         return str(error)
     if isinstance(error, ImportError) and "map3d._core" in str(error):

@@ -5,6 +5,7 @@ from typing import Any
 import click
 
 from map3d.catalogue import Workspace
+from map3d.cli.building import build_with_progress
 from map3d.cli.options import View, cores, json_option, workspace_option
 from map3d.cli.output import print_json
 from map3d.errors import BadRequest
@@ -46,7 +47,9 @@ def command(
     request = RenderingRequest(scene, name, chosen, layers=layers, tile_px=int(options.pop("tile_size")), **options)
     catalogue = workspace.open_catalogue()
     try:
-        made = create_rendering(workspace, catalogue, request, threads=cores())
+        request.check(catalogue)
+        build_with_progress(workspace, catalogue, scene, threads=cores())
+        made = create_rendering(workspace, catalogue, request)
     finally:
         catalogue.close()
     if as_json:

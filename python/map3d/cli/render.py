@@ -7,6 +7,7 @@ import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from map3d.catalogue import Workspace
+from map3d.cli.building import build_with_progress
 from map3d.cli.options import json_option, max_memory_option, workers_option, workspace_option
 from map3d.cli.output import console, counts_text, print_json, size_text
 
@@ -30,8 +31,9 @@ def command(workspace: Workspace, rendering: str, workers: int, max_memory: int 
 
     catalogue = workspace.open_catalogue()
     try:
-        run = Run(workspace, catalogue, rendering, Settings(workers, max_memory))
-        outcome = render_with_progress(run)
+        settings = Settings(workers, max_memory)
+        build_with_progress(workspace, catalogue, catalogue.rendering(rendering).scene, threads=workers, max_memory_bytes=max_memory)
+        outcome = render_with_progress(Run(workspace, catalogue, rendering, settings))
     finally:
         catalogue.close()
     if as_json:
@@ -43,11 +45,9 @@ def command(workspace: Workspace, rendering: str, workers: int, max_memory: int 
 
 
 def render_with_progress(run: "Run") -> "Outcome":
-    """Build, plan and work, each with its bar on standard error."""
+    """Plan and work, each with its bar on standard error."""
     with _bar(MofNCompleteColumn()) as bar:
-        task = bar.add_task("building", total=None)
-        run.build(lambda stage, done, total: _advance(bar, task, f"building: {stage}", done, total))
-        bar.reset(task, description="planning")
+        task = bar.add_task("planning", total=None)
         plan = run.plan(lambda done, total: bar.update(task, completed=done, total=total))
     return _work(run, plan)
 
@@ -97,8 +97,3 @@ def report(rendering: str, outcome: "Outcome") -> None:
 def _bar(last: Any) -> Progress:
     columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), last, TimeElapsedColumn(), TimeRemainingColumn())
     return Progress(*columns, console=console(), transient=True)
-
-
-def _advance(bar: Progress, task: Any, text: str, done: int, total: int) -> bool:
-    bar.update(task, description=text, completed=done, total=total or None)
-    return True

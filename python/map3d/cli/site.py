@@ -7,6 +7,7 @@ import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from map3d.catalogue import Workspace
+from map3d.cli.building import build_with_progress
 from map3d.cli.create_rendering import around
 from map3d.cli.options import View, max_memory_option, workers_option, workspace_option
 from map3d.cli.output import console, size_text
@@ -66,7 +67,8 @@ def command(
         click.echo(f"{len(added.added)} files imported, {len(added.unchanged)} unchanged, {len(added.failed)} not usable")
         for _, reason in added.failed:
             click.echo(f"not added: {reason}", err=True)
-        record = make_rendering(workspace, catalogue, request, threads=workers)
+        build_with_progress(workspace, catalogue, request.name, threads=workers, max_memory_bytes=max_memory)
+        record = make_rendering(workspace, catalogue, request)
         click.echo(f"rendering {record.name}: {len(record.frames)} views, {record.zmax + 1} levels, {record.res_m:g} m a pixel")
         outcome = render_with_progress(Run(workspace, catalogue, record.name, Settings(workers, max_memory)))
     finally:

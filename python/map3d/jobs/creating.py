@@ -8,11 +8,11 @@ from typing import Final
 from map3d.catalogue import Catalogue, RenderingRecord, Workspace
 from map3d.errors import BadRequest
 from map3d.geometry.frames import pin
-from map3d.render.build import build, is_stale, open_scene
+from map3d.geometry.views import check_angles
+from map3d.render.build import is_stale, open_scene
 from map3d.types import LAYER_KINDS, Box, Layer, ViewAngles, check_name
 
 LOSSY: Final = ("webp", "jpeg")
-BUILD_BYTES: Final = 2 << 30
 COARSEST_M: Final = 1e6
 
 
@@ -33,15 +33,26 @@ class RenderingRequest:
     attribution: str = ""
     regrid: bool = False
 
+    def check(self, catalogue: Catalogue) -> tuple[Layer, ...]:
+        """The layers; raises BadRequest for what can be told before the scene is built, NotFound."""
+        check_name(self.name, "rendering")
+        catalogue.scene(self.scene)
+        for view in self.views:
+            check_angles(view)
+        if (self.res_m is None) == (self.levels is None):
+            raise BadRequest("say how fine: --res METRES a pixel, or --levels N")
+        if self.regrid:
+            catalogue.rendering(self.name)
+        else:
+            _check_free(catalogue, self.name)
+        return make_layers(self.layers, self.color, self.quality)
 
-def create_rendering(workspace: Workspace, catalogue: Catalogue, request: RenderingRequest, *, threads: int) -> RenderingRecord:
-    """Builds the scene if its files changed, since the frames need its box. Raises BadRequest, AlreadyExists, NotFound."""
-    check_name(request.name, "rendering")
-    layers = make_layers(request.layers, request.color, request.quality)
-    if not request.regrid:
-        _check_free(catalogue, request.name)
+
+def create_rendering(workspace: Workspace, catalogue: Catalogue, request: RenderingRequest) -> RenderingRecord:
+    """Pins the frames to the box of the scene, which must be built as it is now. Raises BadRequest, NotFound."""
+    layers = request.check(catalogue)
     if is_stale(workspace, catalogue, request.scene):
-        build(workspace, catalogue, request.scene, threads=threads, max_memory_bytes=BUILD_BYTES)
+        raise BadRequest(f"scene {request.scene} has changed since it was built; build it first")
     box = open_scene(workspace, request.scene).box
     res_m = choose_res(box, request)
     frames = tuple(pin(box, request.tile_px, res_m, request.views))
@@ -66,8 +77,6 @@ def make_layers(names: Sequence[str], color: str, quality: int) -> tuple[Layer, 
 
 def choose_res(box: Box, request: RenderingRequest) -> float:
     """The resolution asked for; for a number of levels the finest that needs no more, to three digits."""
-    if (request.res_m is None) == (request.levels is None):
-        raise BadRequest("say how fine: --res METRES a pixel, or --levels N")
     if request.res_m is not None:
         return request.res_m
     assert request.levels is not None, "one of the two is given"
@@ -99,7 +108,6 @@ def _layer(kind: str, color: str, quality: int) -> Layer:
 
 
 def _check_free(catalogue: Catalogue, name: str) -> None:
-    """Told before a long build rather than after it."""
     if any(record.name == name for record in catalogue.renderings()):
         raise BadRequest(f"rendering {name}: exists already; choose another name, or give --regrid to pin it anew and render everything again")
 

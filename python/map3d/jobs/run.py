@@ -1,8 +1,8 @@
-"""`map3d render`: build if need be, plan, run the workers, write the manifest."""
+"""`map3d render`: plan, run the workers, write the manifest."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from map3d.jobs.manifest import Planned, write_manifest
 from map3d.jobs.pool import Pool, Tally
 from map3d.jobs.rendering import CACHE_BYTES, RENDER_ENTRY, RenderTask
 from map3d.jobs.terms import Terms
-from map3d.render.build import BuildProgress, build, is_stale, open_scene
+from map3d.render.build import open_scene
 from map3d.render.plan import PlannedScene, plan_jobs, planned_occupancy
 from map3d.tiles.naming import block_levels
 from map3d.tiles.occupancy import Occupancy, morton_numbers
@@ -47,10 +47,6 @@ class Settings:
             )
         return each
 
-    @property
-    def build_bytes(self) -> int:
-        return self.max_memory_bytes or 2 << 30
-
 
 @dataclass(frozen=True)
 class Plan:
@@ -78,21 +74,13 @@ class Outcome:
 
 
 class Run:
-    """One run of a rendering, in steps, so that a caller can show each."""
+    """One run of a rendering whose scene is built, in steps, so that a caller can show each."""
 
     def __init__(self, workspace: Workspace, catalogue: Catalogue, rendering: str, settings: Settings) -> None:
         self._workspace, self._catalogue, self._settings = workspace, catalogue, settings
         self.record = catalogue.rendering(rendering)
         self._cache_bytes = settings.cache_bytes
         self._pool: Pool | None = None
-
-    def build(self, progress: BuildProgress | None = None) -> dict[str, Any] | None:
-        """Builds the scene if its files changed; the report, None when there was nothing to do."""
-        scene = self.record.scene
-        if not is_stale(self._workspace, self._catalogue, scene):
-            return None
-        limits = {"threads": self._settings.workers, "max_memory_bytes": self._settings.build_bytes}
-        return build(self._workspace, self._catalogue, scene, progress=progress, **limits)
 
     def plan(self, progress: Callable[[int, int], None] | None = None, scene: PlannedScene | None = None) -> Plan:
         """Compares the scene with what is there, opens jobs for what changed, tells clients that more is to come."""

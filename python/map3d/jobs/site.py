@@ -13,7 +13,7 @@ from map3d.ingest.options import ImportOptions
 from map3d.ingest.parsers import Parsers
 from map3d.ingest.sources import Source, find_sources, source_digest
 from map3d.jobs.creating import RenderingRequest, create_rendering, make_layers
-from map3d.render.build import build, is_stale, open_scene
+from map3d.render.build import open_scene
 from map3d.render.plan import planned_occupancy
 from map3d.types import ViewAngles
 
@@ -22,7 +22,6 @@ MOST_BASE_TILES: Final = 30_000
 """Of all views together: some minutes on a small machine."""
 
 _PROBE_LEVEL: Final = 8
-BUILD_BYTES: Final = 2 << 30
 
 
 @dataclass(frozen=True)
@@ -79,18 +78,16 @@ def _add(
         done.failed.append((str(source.paths[0]), str(error)))
 
 
-def make_rendering(workspace: Workspace, catalogue: Catalogue, request: SiteRequest, *, threads: int) -> RenderingRecord:
-    """The rendering of the site, made if it is not there."""
+def make_rendering(workspace: Workspace, catalogue: Catalogue, request: SiteRequest) -> RenderingRecord:
+    """The rendering of the site, made if it is not there; its scene must be built."""
     for record in catalogue.renderings(request.name):
         if record.name == request.name:
             return record
-    if is_stale(workspace, catalogue, request.name):
-        build(workspace, catalogue, request.name, threads=threads, max_memory_bytes=BUILD_BYTES)
     res_m = request.res_m or choose_res(workspace, request)
     wanted = RenderingRequest(
         request.name, request.name, request.views, res_m=res_m, color=request.color, title=request.title, attribution=request.attribution
     )
-    return create_rendering(workspace, catalogue, wanted, threads=threads)
+    return create_rendering(workspace, catalogue, wanted)
 
 
 def choose_res(workspace: Workspace, request: SiteRequest) -> float:

@@ -24,6 +24,8 @@ OPTIONS: Final[Mapping[str, Any]] = {
     "ground_plane": "auto",
 }
 GROUND: Final = "ground"
+BUILD_BYTES: Final = 2 << 30
+"""Memory of a build unless told otherwise."""
 
 
 def is_stale(workspace: Workspace, catalogue: Catalogue, scene: str) -> bool:

@@ -1,0 +1,41 @@
+"""Building a scene with a bar, and its counted report as a table; on standard error, since it is a step on the way."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from map3d.catalogue import Catalogue, Workspace
+from map3d.cli.output import console
+
+
+def build_with_progress(workspace: Workspace, catalogue: Catalogue, scene: str, *, threads: int, max_memory_bytes: int | None = None) -> None:
+    """Builds the scene if its files changed."""
+    from map3d.render.build import BUILD_BYTES, build, is_stale
+
+    if not is_stale(workspace, catalogue, scene):
+        return
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console(), transient=True) as bar:
+        task = bar.add_task("building", total=None)
+
+        def progress(stage: str, done: int, total: int) -> bool:
+            bar.update(task, description=f"building: {stage}", completed=done, total=total or None)
+            return True
+
+        report = build(workspace, catalogue, scene, threads=threads, max_memory_bytes=max_memory_bytes or BUILD_BYTES, progress=progress)
+    show_report(scene, report)
+
+
+def show_report(scene: str, report: Mapping[str, Any]) -> None:
+    """What was read, optimised and written, and what went wrong with images."""
+    note = console()
+    table = Table("count", "", title=f"built {scene}", title_justify="left", box=None, pad_edge=False, show_header=False)
+    table.columns[0].justify = "right"
+    for name, count in report.items():
+        if isinstance(count, int) and count:
+            table.add_row(f"{count:,}", name.replace("_", " "))
+    note.print(table)
+    for reason, example in report.get("texture_warnings", {}).items():
+        note.print(f"{reason}, e.g. {example}")
