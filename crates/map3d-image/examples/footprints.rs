@@ -1,10 +1,9 @@
 //! Footprint sampling against the exact integral: a float64 box over the pixel's parallelogram of the texture interpolated bilinearly, by many samples.
 //!
-//! `cargo run --release -p map3d-image --example footprints [-- share gap point]` prints a row for each texture, pitch and scale:
+//! `cargo run --release -p map3d-image --example footprints [-- scan | axis compensation gap point]` prints a row for each texture, pitch and scale:
 //! taps, cost, PSNR (in sRGB, peak 255) and the ratio of gradient energies (1 = neither blurred nor aliased).
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use map3d_base::asset::Wrap;
 use map3d_image::Raster;
@@ -13,32 +12,82 @@ use map3d_image::srgb::{BYTE, LINEAR16};
 use map3d_image::texture::{Level, LinearRaster, first_mip, level_count, next_mip};
 
 const SIDE: u32 = 256;
-const PIXELS: i32 = 40;
+const PIXELS: i32 = 32;
 
 fn main() {
-    let numbers: Vec<f64> = std::env::args().skip(1).map(|a| a.parse().expect("numbers: share gap point")).collect();
-    let default = Tuning::default();
-    let pick = |k: usize, d: f64| numbers.get(k).copied().unwrap_or(d);
-    let tuning = Tuning { level_share: pick(0, default.level_share), max_gap: pick(1, default.max_gap), point_below: pick(2, default.point_below) };
-    println!("{tuning:?}\n{:8} {:>6} {:>6} {:>5} {:>5} {:>5} {:>8} {:>8} {:>8}", "texture", "pitch", "tex/px", "turn", "level", "taps", "ns/px", "PSNR", "gradient");
-    let textures: [(&str, fn(u32, u32) -> [u8; 3]); 4] = [("noise", noise), ("smooth", smooth), ("checker", checker), ("brick", brick)];
-    let mut worst = (f64::INFINITY, 0.0f64);
-    let mut sum = (0.0, 0.0, 0);
+    let tunings: Vec<Tuning> = tunings();
+    let mut totals = vec![Total::default(); tunings.len()];
+    let textures: [(&str, fn(u32, u32) -> [u8; 3]); 5] = [("town", town), ("noise", noise), ("smooth", smooth), ("checker", checker), ("brick", brick)];
+    println!("{:8} {:>6} {:>6} {:>5} {:>5} {:>5} {:>8} {:>8} {:>8}", "texture", "pitch", "tex/px", "turn", "level", "taps", "ns/px", "PSNR", "gradient");
     for (name, paint) in textures {
         let pyramid = Pyramid::new(paint);
         for pitch in [10.0f64, 22.5, 45.0, 90.0] {
-            for scale in [0.4, 1.0, 1.6, 2.5, 4.0, 6.3] {
+            for scale in [0.4, 1.0, 2.0, 3.0, 4.0, 5.5] {
                 for turn in [0.0f64, 30.0] {
-                    let row = measure(&pyramid, &uv_map(pitch, scale, turn), &tuning);
-                    println!("{name:8} {pitch:6} {scale:6} {turn:5} {:5} {:5} {:8.1} {:8.1} {:8.3}", row.level, row.taps, row.ns, row.psnr, row.gradient);
-                    worst = (worst.0.min(row.psnr), worst.1.max((row.gradient - 1.0).abs()));
-                    sum = (sum.0 + row.taps as f64, sum.1 + row.ns, sum.2 + 1);
+                    let uv = uv_map(pitch, scale, turn);
+                    let exact: Vec<[u16; 3]> = (0..PIXELS * PIXELS).map(|i| pyramid.integrate(&uv, f64::from(i % PIXELS), f64::from(i / PIXELS))).collect();
+                    for (tuning, total) in tunings.iter().zip(&mut totals) {
+                        let row = measure(&pyramid, &uv, &exact, tuning);
+                        if tunings.len() == 1 {
+                            let Row { level, taps, ns, psnr, gradient } = row;
+                            println!("{name:8} {pitch:6} {scale:6} {turn:5} {level:5} {taps:5} {ns:8.1} {psnr:8.1} {gradient:8.3}");
+                        }
+                        total.add(name, &row);
+                    }
                 }
             }
         }
     }
-    let n = f64::from(sum.2);
-    println!("worst: PSNR {:.1} dB, gradient off by {:.1} %; means: {:.1} taps, {:.1} ns/px", worst.0, worst.1 * 100.0, sum.0 / n, sum.1 / n);
+    for (tuning, total) in tunings.iter().zip(&totals) {
+        total.print(tuning);
+    }
+}
+
+/// The default, or one, or a scan: `scan`, or `axis compensation gap point`.
+fn tunings() -> Vec<Tuning> {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let make = |n: &[f64]| Tuning { texels_per_axis: n[0], compensation: n[1], max_gap: n[2], point_below: n[3] };
+    match args.first().map(String::as_str) {
+        None => vec![Tuning::default()],
+        Some("scan") => {
+            let mut out = Vec::new();
+            for axis in [1.75, 2.0, 2.5, 3.0] {
+                for compensation in [0.33, 0.67, 1.0] {
+                    out.extend([1.0, 1.25].map(|gap| make(&[axis, compensation, gap, 0.4])));
+                }
+            }
+            out
+        }
+        Some(_) => vec![make(&args.iter().map(|a| a.parse().expect("numbers: axis compensation gap point")).collect::<Vec<f64>>())],
+    }
+}
+
+#[derive(Clone, Default)]
+struct Total {
+    rows: std::collections::BTreeMap<String, (f64, f64, f64)>,
+    taps: usize,
+    ns: f64,
+    n: usize,
+}
+
+impl Total {
+    fn add(&mut self, name: &str, row: &Row) {
+        let worst = self.rows.entry(name.to_owned()).or_insert((f64::INFINITY, f64::INFINITY, 0.0));
+        *worst = (worst.0.min(row.psnr), worst.1.min(row.gradient), worst.2.max(row.gradient));
+        self.taps += row.taps;
+        self.ns += row.ns;
+        self.n += 1;
+    }
+
+    /// Least PSNR, and range of the ratio of gradient energies, by texture.
+    fn print(&self, t: &Tuning) {
+        let n = self.n as f64;
+        print!("{:4} {:4} {:4} {:4} | {:5.1} taps {:6.1} ns/px |", t.texels_per_axis, t.compensation, t.max_gap, t.point_below, self.taps as f64 / n, self.ns / n);
+        for (name, (psnr, low, high)) in &self.rows {
+            print!(" {name} {psnr:.1} dB {low:.2}..{high:.2} |");
+        }
+        println!();
+    }
 }
 
 /// Horizontal ground seen at a pitch: `scale` texels of level 0 a pixel across, more down the image; turned by `turn` degrees.
@@ -57,20 +106,23 @@ struct Row {
     gradient: f64,
 }
 
-fn measure(pyramid: &Pyramid, uv: &UvMap, tuning: &Tuning) -> Row {
+fn measure(pyramid: &Pyramid, uv: &UvMap, exact: &[[u16; 3]], tuning: &Tuning) -> Row {
     let plan = footprint(uv.jacobian(SIDE, SIDE), level_count(SIDE, SIDE), tuning);
     let white = Outside { diffuse: [255; 4], border: [255; 4] };
     let sampler = Sampler::with(pyramid.levels[plan.level as usize].clone(), &plan, false, uv, Wrap::Wrap, white);
     let render = || -> Vec<[u16; 3]> { (0..PIXELS * PIXELS).map(|i| sampler.sample(i % PIXELS * 256 + 128, i / PIXELS * 256 + 128)).collect() };
     let got = render();
-    let start = Instant::now();
+    let cpu_s = || {
+        let t = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+        t.tv_sec as f64 + t.tv_nsec as f64 * 1e-9
+    };
+    let start = cpu_s();
     let rounds = 4;
     for _ in 0..rounds {
         std::hint::black_box(render());
     }
-    let ns = start.elapsed().as_secs_f64() * 1e9 / f64::from(rounds * PIXELS * PIXELS);
-    let exact: Vec<[u16; 3]> = (0..PIXELS * PIXELS).map(|i| pyramid.integrate(uv, f64::from(i % PIXELS), f64::from(i / PIXELS))).collect();
-    Row { level: plan.level, taps: plan.taps.len(), ns, psnr: psnr(&got, &exact), gradient: gradient(&got) / gradient(&exact) }
+    let ns = (cpu_s() - start) * 1e9 / f64::from(rounds * PIXELS * PIXELS);
+    Row { level: plan.level, taps: plan.taps.len(), ns, psnr: psnr(&got, exact), gradient: gradient(&got) / gradient(exact) }
 }
 
 struct Pyramid {
@@ -100,8 +152,9 @@ impl Pyramid {
     fn bilinear(&self, x: f64, y: f64) -> [f64; 3] {
         let (x, y) = (x - 0.5, y - 0.5);
         let (fx, fy) = (x - x.floor(), y - y.floor());
-        let n = i64::from(SIDE);
-        let at = |i: i64, j: i64| self.exact[((y.floor() as i64 + j).rem_euclid(n) * n + (x.floor() as i64 + i).rem_euclid(n)) as usize];
+        let (ix, iy) = (x.floor() as i32, y.floor() as i32);
+        let fold = |k: i32| (k & (SIDE as i32 - 1)) as usize;
+        let at = |i: i32, j: i32| self.exact[fold(iy + j) * SIDE as usize + fold(ix + i)];
         let (a, b, c, d) = (at(0, 0), at(1, 0), at(0, 1), at(1, 1));
         [0, 1, 2].map(|k| (a[k] * (1.0 - fx) + b[k] * fx) * (1.0 - fy) + (c[k] * (1.0 - fx) + d[k] * fx) * fy)
     }
@@ -161,6 +214,17 @@ fn smooth(x: u32, y: u32) -> [u8; 3] {
         };
         (0.1 * octave(0) + 0.15 * octave(1) + 0.2 * octave(2) + 0.25 * octave(3) + 0.3 * octave(5)) as u8
     })
+}
+
+/// Bricks under noise, of the kind that the measured town wears.
+fn town(x: u32, y: u32) -> [u8; 3] {
+    let (bh, bw) = (17, 41);
+    let shift = y / bh % 2 * (bw / 2);
+    let mortar = y % bh < 2 || (x + shift) % bw < 2;
+    let [a, b, c] = smooth(x, y).map(|v| (i32::from(v) - 128) / 3);
+    let fine = [0, 1, 2].map(|k| (i32::from(hash(x, y, k)) - 128) / 10);
+    let dark = if mortar { -38 } else { 0 };
+    [150 + a + fine[0] + dark, 105 + b + fine[1] + dark, 80 + c + fine[2] + dark].map(|v| v.clamp(0, 255) as u8)
 }
 
 fn checker(x: u32, y: u32) -> [u8; 3] {

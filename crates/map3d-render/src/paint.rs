@@ -5,7 +5,7 @@ use map3d_image::sample::{Outside, Sampler, UvMap};
 use map3d_image::srgb::LINEAR16;
 use map3d_image::texture::TextureCache;
 use map3d_scene::MaterialRecord;
-use map3d_trace::{Affine, Surface};
+use map3d_trace::{Affine, DepthPlane, Surface};
 
 use crate::cutout::wrap_of;
 
@@ -46,6 +46,7 @@ fn uv_map([u, v]: &[Affine; 2]) -> UvMap {
 pub struct Shaded {
     pub paint: Paint,
     pub id: u32,
+    pub depth: DepthPlane,
     /// Of flat surfaces.
     normal: [i16; 3],
     /// Of surfaces with shading normals.
@@ -53,8 +54,9 @@ pub struct Shaded {
 }
 
 impl Shaded {
-    pub fn new(cache: &TextureCache, material: &MaterialRecord, surface: &Surface) -> Result<Self> {
+    pub fn new(cache: &TextureCache, material: &MaterialRecord, surface: &Surface, depth: DepthPlane) -> Result<Self> {
         Ok(Self {
+            depth,
             paint: Paint::new(cache, material, &surface.uv)?,
             id: surface.object_id,
             normal: stored(surface.normal),

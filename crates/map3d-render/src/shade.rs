@@ -44,7 +44,7 @@ impl Shader {
             let chunk = vis.chunk(surface.chunk);
             let material = chunk.materials().get(surface.material as usize);
             let material = material.ok_or_else(|| Error::format(chunk.path(), format!("material {} of a triangle", surface.material)))?;
-            *entry = Some(Shaded::new(cache, material, &surface)?);
+            *entry = Some(Shaded::new(cache, material, &surface, vis.depth_plane(slot))?);
             self.setups += 1;
         }
         Ok(entry.as_ref().expect("set up above"))
@@ -59,7 +59,7 @@ impl Shader {
         g.color[at] = [r, green, b, 65_535];
         g.id[at] = shaded.id;
         g.normal[at] = shaded.normal_at(i, j);
-        g.depth[at] = vis.depth(slot, i, j);
+        g.depth[at] = shaded.depth.units(i, j);
         Ok(())
     }
 
@@ -83,7 +83,7 @@ impl Shader {
             let shaded = self.surface(vis, cache, slots[0])?;
             g.id[at] = shaded.id;
             g.normal[at] = shaded.normal_at(i, j);
-            g.depth[at] = vis.depth(slots[0], i, j);
+            g.depth[at] = shaded.depth.units(i, j);
         }
         Ok(())
     }

@@ -14,8 +14,10 @@ pub const MAX_TAPS: usize = 16;
 /// How the taps are chosen; the default was tuned against the exact integral (`examples/footprints.rs`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tuning {
-    /// A level may be taken when the short axis of the footprint, squared, is at least this share of what its own blur needs.
-    pub level_share: f64,
+    /// A level may be taken when the short axis of the footprint is at least this many of its texels long.
+    pub texels_per_axis: f64,
+    /// Share of the level's own blur that the layout makes up for by being shorter than the footprint.
+    pub compensation: f64,
     /// Largest gap between taps in texels of the level.
     pub max_gap: f64,
     /// A layout shorter than this, in texels of the level, is one tap.
@@ -24,7 +26,7 @@ pub struct Tuning {
 
 impl Default for Tuning {
     fn default() -> Self {
-        Self { level_share: 1.0, max_gap: 1.25, point_below: 0.6 }
+        Self { texels_per_axis: 2.0, compensation: 1.0, max_gap: 1.25, point_below: 0.6 }
     }
 }
 
@@ -43,9 +45,10 @@ pub fn footprint(jacobian: [[f64; 2]; 2], levels: u32, tuning: &Tuning) -> Footp
     }
     let gram = [[dot(a, a), dot(a, b)], [dot(a, b), dot(b, b)]];
     let eigen = Eigen::of(gram);
-    let mut level = (1..levels).rev().find(|l| eigen.small >= tuning.level_share * blur(*l)).unwrap_or(0);
+    let short = eigen.small.sqrt() * (1.0 + 1e-9);
+    let mut level = (1..levels).rev().find(|l| short >= tuning.texels_per_axis * f64::from(1u32 << l)).unwrap_or(0);
     loop {
-        let axes = layout_axes(jacobian, &eigen, level);
+        let axes = layout_axes(jacobian, &eigen, level, tuning.compensation);
         let counts = axes.map(|axis| tap_count(length(axis), tuning));
         if counts.iter().all(|n| *n <= MAX_TAPS) || level + 1 >= levels {
             return Footprint { level, taps: grid(axes, counts.map(|n| n.min(MAX_TAPS))) };
@@ -60,8 +63,8 @@ fn blur(level: u32) -> f64 {
 }
 
 /// The layout's axes in texels of the level: along the pixel's axes, or along the footprint's own where that takes fewer taps.
-fn layout_axes([a, b]: [[f64; 2]; 2], eigen: &Eigen, level: u32) -> [[f64; 2]; 2] {
-    let root = |value: f64| (1.0 - blur(level) / value).max(0.0).sqrt();
+fn layout_axes([a, b]: [[f64; 2]; 2], eigen: &Eigen, level: u32, compensation: f64) -> [[f64; 2]; 2] {
+    let root = |value: f64| (1.0 - compensation * blur(level) / value).max(0.0).sqrt();
     let (major, minor) = (root(eigen.large), root(eigen.small));
     let texels = 1.0 / f64::from(1u32 << level);
     let image = |t: [f64; 2]| [texels * (a[0] * t[0] + b[0] * t[1]), texels * (a[1] * t[0] + b[1] * t[1])];

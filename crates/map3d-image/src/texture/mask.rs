@@ -54,24 +54,32 @@ impl UsageMask {
         if hi - lo > MAX_ROWS || p.as_flattened().iter().any(|c| c.abs() > 1e12) {
             return self.fill_all();
         }
-        let (lo, hi) = self.within(lo, hi, wrap);
-        for row in touched(lo, hi) {
-            let Some((left, right)) = span_in_band(&p, row as f64, row as f64 + 1.0) else { continue };
+        let (first, last) = self.within(lo, hi, wrap);
+        for row in touched(first, last) {
+            let (top, bottom) = self.band(row, lo, hi, wrap);
+            let Some((left, right)) = span_in_band(&p, top, bottom) else { continue };
             if let Some(y) = fold(row, self.height, wrap) {
                 self.mark_span(y, left, right, wrap);
             }
         }
     }
 
-    /// Rows far outside a texture that does not repeat need not be walked one by one.
+    /// Rows of a texture that does not repeat are only its own.
     fn within(&self, lo: f64, hi: f64, wrap: Wrap) -> (f64, f64) {
+        let h = f64::from(self.height);
         match wrap {
             Wrap::Wrap | Wrap::Mirror => (lo, hi),
-            Wrap::Clamp | Wrap::Border | Wrap::None => {
-                let h = f64::from(self.height);
-                (lo.clamp(-1.0, h + 1.0), hi.clamp(-1.0, h + 1.0))
-            }
+            Wrap::Clamp => (lo.clamp(0.0, h - 0.5), hi.clamp(0.5, h)),
+            Wrap::Border | Wrap::None => (lo.clamp(-1.0, h + 1.0), hi.clamp(-1.0, h + 1.0)),
         }
+    }
+
+    /// What a row stands for: itself; with `Wrap::Clamp` the outer rows stand for all beyond them.
+    fn band(&self, row: i64, lo: f64, hi: f64, wrap: Wrap) -> (f64, f64) {
+        let clamp = wrap == Wrap::Clamp;
+        let top = if clamp && row == 0 { lo.min(0.0) } else { row as f64 };
+        let bottom = if clamp && row == i64::from(self.height) - 1 { hi.max(row as f64 + 1.0) } else { row as f64 + 1.0 };
+        (top, bottom)
     }
 
     fn mark_span(&mut self, y: u32, left: f64, right: f64, wrap: Wrap) {
@@ -80,7 +88,8 @@ impl UsageMask {
         if repeats && right - left >= period {
             return (0..self.width).for_each(|x| self.mark(x, y));
         }
-        let (left, right) = if repeats { (left, right) } else { (left.max(-1.0), right.min(f64::from(self.width) + 1.0)) };
+        let w = f64::from(self.width);
+        let (left, right) = if repeats { (left, right) } else { (left.clamp(-1.0, w + 1.0), right.clamp(-1.0, w + 1.0)) };
         for column in touched(left, right) {
             if let Some(x) = fold(column, self.width, wrap) {
                 self.mark(x, y);
