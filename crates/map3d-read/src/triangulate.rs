@@ -83,7 +83,13 @@ impl Triangulator {
     /// Drops the axis nearest to the normal; the exterior ring is counter-clockwise afterwards.
     fn flatten(&mut self, points: &[Vec3], normal: Vec3) {
         let size = normal.map(f64::abs);
-        let axis = if size[2] >= size[0] && size[2] >= size[1] { 2 } else if size[0] >= size[1] { 0 } else { 1 };
+        let axis = if size[2] >= size[0] && size[2] >= size[1] {
+            2
+        } else if size[0] >= size[1] {
+            0
+        } else {
+            1
+        };
         let (mut a, mut b) = ((axis + 1) % 3, (axis + 2) % 3);
         if normal[axis] < 0.0 {
             (a, b) = (b, a);

@@ -26,7 +26,12 @@ fn read(outside: &str, inside: &str, options: &ReadOptions) -> Reading {
 }
 
 fn appearance(theme: &str, data: &str) -> String {
-    let members: String = data.split('|').map(|d| if d.starts_with('#') { format!("<surfaceDataMember xlink:href='{d}'/>") } else { format!("<surfaceDataMember>{d}</surfaceDataMember>") }).collect();
+    let members: String = data
+        .split('|')
+        .map(|d| {
+            if d.starts_with('#') { format!("<surfaceDataMember xlink:href='{d}'/>") } else { format!("<surfaceDataMember>{d}</surfaceDataMember>") }
+        })
+        .collect();
     format!("<Appearance><theme>{theme}</theme>{members}</Appearance>")
 }
 
@@ -44,7 +49,9 @@ fn color(rgb: &str, targets: &[&str]) -> String {
 }
 
 fn texture(more: &str, target: &str, coordinates: &str) -> String {
-    format!("<ParameterizedTexture gml:id='tex'><imageURI>t.png</imageURI>{more}<target uri='#{target}'><TexCoordList gml:id='list'><textureCoordinates ring='#r'>{coordinates}</textureCoordinates></TexCoordList></target></ParameterizedTexture>")
+    format!(
+        "<ParameterizedTexture gml:id='tex'><imageURI>t.png</imageURI>{more}<target uri='#{target}'><TexCoordList gml:id='list'><textureCoordinates ring='#r'>{coordinates}</textureCoordinates></TexCoordList></target></ParameterizedTexture>"
+    )
 }
 
 const UVS: &str = "0 0 1 0 1 1 0 1 0 0";
@@ -99,7 +106,12 @@ fn the_first_theme_is_drawn_unless_another_is_asked_for() {
 
 #[test]
 fn themes_share_surface_data_and_mappings_by_reference() {
-    let summer = member("summer", &("<X3DMaterial gml:id='m'><diffuseColor>1 0 0</diffuseColor><target>#p</target></X3DMaterial>".to_owned() + "|" + &texture("", "other", UVS)));
+    let summer = member(
+        "summer",
+        &("<X3DMaterial gml:id='m'><diffuseColor>1 0 0</diffuseColor><target>#p</target></X3DMaterial>".to_owned()
+            + "|"
+            + &texture("", "other", UVS)),
+    );
     let winter = |data: &str| member("winter", data);
     let options = ReadOptions { theme: Some("winter".into()), ..ReadOptions::default() };
     assert_eq!(diffuse(&read(&(summer.clone() + &winter("#m")), "", &options)), RED);
@@ -151,7 +163,8 @@ fn equal_looks_are_one_material() {
 
 #[test]
 fn rings_without_usable_coordinates_fall_back_to_the_colour() {
-    for (coordinates, textured) in [(UVS, true), ("0 0 1 0 1 1 0 1", true), ("0 0 1 0 1 1", false), ("0 0 1 0 1", false), ("a b", false), ("", false)] {
+    for (coordinates, textured) in [(UVS, true), ("0 0 1 0 1 1 0 1", true), ("0 0 1 0 1 1", false), ("0 0 1 0 1", false), ("a b", false), ("", false)]
+    {
         let reading = defaults(&member("a", &(texture("", "p", coordinates) + "|" + &color("1 0 0", &["p"]))), "");
         assert_eq!(reading.material_of(0).texture.is_some(), textured, "{coordinates}: {:?}", reading.report);
         assert!(textured || diffuse(&reading) == RED);
@@ -187,7 +200,9 @@ fn texture_coordinates_by_matrix() {
 
 #[test]
 fn georeferenced_textures_by_reference_point_or_world_file() {
-    let georeferenced = |more: &str| format!("<GeoreferencedTexture><imageURI>u.png</imageURI><wrapMode>none</wrapMode>{more}<target>#p</target></GeoreferencedTexture>");
+    let georeferenced = |more: &str| {
+        format!("<GeoreferencedTexture><imageURI>u.png</imageURI><wrapMode>none</wrapMode>{more}<target>#p</target></GeoreferencedTexture>")
+    };
     let point = "<referencePoint><gml:Point><gml:pos>0.25 1.75</gml:pos></gml:Point></referencePoint><orientation>0.5 0 0 -0.5</orientation>";
     for more in [point, ""] {
         let reading = defaults(&member("a", &georeferenced(more)), "");
@@ -211,7 +226,10 @@ fn coordinates_of_polygons_with_holes_stay_with_their_points() {
          <gml:interior><gml:LinearRing gml:id='r1'><gml:posList>{}</gml:posList></gml:LinearRing></gml:interior></gml:Polygon></lod2MultiSurface></Building></cityObjectMember>\
          <appearanceMember><Appearance><surfaceDataMember><ParameterizedTexture><imageURI>t.png</imageURI><wrapMode>clamp</wrapMode><target uri='#p'><TexCoordList><textureCoordinates ring='#r1'>{}</textureCoordinates>\
          <textureCoordinates ring='#r0'>{}</textureCoordinates></TexCoordList></target></ParameterizedTexture></surfaceDataMember></Appearance></appearanceMember></CityModel>",
-        space(outer), space(inner), tenth(inner), tenth(outer),
+        space(outer),
+        space(inner),
+        tenth(inner),
+        tenth(outer),
     );
     let path = folder.put("a.gml", text);
     let reading = read_with(&path, Format::CityGml, &ReadOptions::default()).expect("readable");

@@ -102,7 +102,11 @@ fn images_over_a_limit_are_not_taken_over() {
 #[test]
 fn what_is_no_image_is_not_taken_over() {
     let image = png(4, 4, [1, 2, 3, 255]);
-    let huge_header = { let mut b = image.clone(); b[16..20].copy_from_slice(&[0x7F, 0xFF, 0xFF, 0xFF]); b };
+    let huge_header = {
+        let mut b = image.clone();
+        b[16..20].copy_from_slice(&[0x7F, 0xFF, 0xFF, 0xFF]);
+        b
+    };
     for bytes in [&b""[..], b"text", &image[..10], &huge_header, b"GIF89a", b"\xFF\xD8\xFF"] {
         let reading = with_image(bytes, &ReadOptions::default());
         assert_eq!((reading.textures.len(), reading.count()), (0, 1), "{bytes:?}");

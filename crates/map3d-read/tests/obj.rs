@@ -93,7 +93,10 @@ fn y_up_is_turned_to_z_up() {
 
 #[test]
 fn giant_coordinates_keep_every_digit() {
-    let reading = read_text("giant", "v 691000.123456 5336000.654321 1e2\nv 691001.123456 5336000.654321 1.0E+2\nv 691000.123456 5336001.654321 +100.\nf 1 2 3\n");
+    let reading = read_text(
+        "giant",
+        "v 691000.123456 5336000.654321 1e2\nv 691001.123456 5336000.654321 1.0E+2\nv 691000.123456 5336001.654321 +100.\nf 1 2 3\n",
+    );
     assert_eq!(reading.triangles()[0].corners[0], [691_000.123_456, 5_336_000.654_321, 100.0]);
 }
 
@@ -243,7 +246,10 @@ fn libraries_with_blanks_in_their_names_and_in_other_folders() {
     folder.put("my lib.mtl", "newmtl a\nKd 1 0 0\n");
     folder.put("sub/two.mtl", "newmtl b\nmap_Kd t.png\n");
     folder.put_png("sub/t.png", 3, 3, [1, 2, 3, 255]);
-    let path = folder.put("a.obj", format!("mtllib my lib.mtl\nmtllib sub\\TWO.mtl\n{SQUARE}vt 0 0\nvt 1 0\nvt 0 1\nusemtl a\nf 1 2 3\nusemtl b\nf 1/1 2/2 3/3\n"));
+    let path = folder.put(
+        "a.obj",
+        format!("mtllib my lib.mtl\nmtllib sub\\TWO.mtl\n{SQUARE}vt 0 0\nvt 1 0\nvt 0 1\nusemtl a\nf 1 2 3\nusemtl b\nf 1/1 2/2 3/3\n"),
+    );
     let reading = read_with(&path, Format::Obj, &ReadOptions::default()).expect("readable");
     assert_eq!(reading.material_of(0).diffuse, [1.0, 0.0, 0.0, 1.0]);
     assert!(reading.material_of(1).texture.is_some(), "{:?}", reading.report);

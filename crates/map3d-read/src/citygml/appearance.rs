@@ -11,7 +11,12 @@ use super::ids::{self, Id, IdMap};
 pub enum Look {
     /// sRGB and opacity.
     Color([f32; 4]),
-    Texture { image: String, wrap: Wrap, border: [f32; 4], placed: Placement },
+    Texture {
+        image: String,
+        wrap: Wrap,
+        border: [f32; 4],
+        placed: Placement,
+    },
     /// Neither; counted when it was parsed.
     Nothing,
 }
@@ -52,7 +57,10 @@ pub enum Mapping {
     /// Index into `matrices`.
     Matrix(u32),
     /// Range of `rings`, sorted by id.
-    Rings { first: u32, count: u32 },
+    Rings {
+        first: u32,
+        count: u32,
+    },
     /// A mapping that stands elsewhere.
     Named(Id),
 }

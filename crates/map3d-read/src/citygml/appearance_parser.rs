@@ -264,7 +264,7 @@ impl<R: BufRead> AppearanceParser<'_, R> {
         self.xml.append_text(self.text)?;
         self.values.clear();
         let start = self.into.uvs.len() as u32;
-        if parse_list(self.text, self.values).is_none() || self.values.len() % 2 != 0 {
+        if parse_list(self.text, self.values).is_none() || !self.values.len().is_multiple_of(2) {
             return self.log.warn("texture coordinates that cannot be read", self.text.chars().take(40).collect::<String>());
         }
         self.into.uvs.extend(self.values.as_chunks::<2>().0.iter().map(|uv| uv.map(|v| v as f32)));

@@ -66,6 +66,26 @@ pub fn generic(xml: &mut Xml, prefix: &str, attributes: &mut Attributes) -> Resu
     Ok(())
 }
 
+/// Generic attributes of CityGML 3.0 are objects, with name and value as properties.
+pub fn is_generic_object(local: &str) -> bool {
+    matches!(local, "StringAttribute" | "IntAttribute" | "DoubleAttribute" | "DateAttribute" | "UriAttribute" | "MeasureAttribute" | "CodeAttribute")
+}
+
+/// The generic attribute object that has just started.
+pub fn generic_object(xml: &mut Xml, attributes: &mut Attributes) -> Result<()> {
+    let is_number = matches!(xml.local(), "IntAttribute" | "DoubleAttribute" | "MeasureAttribute");
+    let (mut name, mut value) = (String::new(), String::new());
+    while xml.next_child()? {
+        match xml.local() {
+            "name" => name = xml.whole_text()?,
+            "value" => value = xml.whole_text()?,
+            _ => xml.skip()?,
+        }
+    }
+    put(attributes, &name, if is_number { number_or_text(&value) } else { Value::String(value) });
+    Ok(())
+}
+
 /// The external reference that has just started, as `system name`.
 pub fn external_reference(xml: &mut Xml, attributes: &mut Attributes) -> Result<()> {
     let (mut system, mut object) = (String::new(), String::new());

@@ -6,7 +6,7 @@ use map3d_base::Result;
 use map3d_base::asset::{Batch, Instance, Object, Rank};
 
 use super::appearance::Appearances;
-use super::draw::{Aliases, Drawer, Gatherer, Leaf, Paints, Surface, aliases};
+use super::draw::{Aliases, Drawer, Gatherer, Leaf, Paints, Surface, Tree, aliases};
 use super::feature::{Form, Member};
 use super::geometry::NodeId;
 use super::ids::{self, Id, IdSet};
@@ -57,12 +57,12 @@ impl Canvas {
         let (aliases, seen) = (aliases(&member.geometry), vec![0; member.geometry.nodes.len()]);
         let mut sitting = Sitting { member, aliases, seen, object_numbers };
         for bodies in [false, true] {
-            for f in 0..sitting.member.features.len() {
+            for (f, level) in levels.iter().enumerate() {
                 let feature = &sitting.member.features[f];
                 if feature.is_object() != bodies || feature.placed.is_empty() {
                     continue;
                 }
-                match levels[f] {
+                match *level {
                     Some(_) if feature.interior => log.report.skip("surfaces inside of a building", 1),
                     Some(lod) => self.feature(&mut sitting, f as u32, lod, log)?,
                     None => {}
@@ -133,7 +133,8 @@ impl Canvas {
             name: &self.objects[number as usize].name,
         };
         let mut paints = Paints { painter: &mut self.painter, stores: [appearances, &mut self.appearances] };
-        leaves.iter().try_for_each(|leaf| self.drawer.polygon(geometry, &sitting.aliases, *leaf, &surface, &mut paints, log))
+        let tree = Tree { geometry, aliases: &sitting.aliases };
+        leaves.iter().try_for_each(|leaf| self.drawer.polygon(tree, *leaf, &surface, &mut paints, log))
     }
 
     fn borrow(&mut self, sitting: &Sitting, f: u32, outside: &[(Id, bool)]) {
@@ -165,12 +166,15 @@ impl Canvas {
         let surface = Surface { object, rank, locals: ["", ""], feature_ids: &[ids::NONE], name: &name };
         let mut nothing = Appearances::default();
         let mut paints = Paints { painter: &mut self.painter, stores: [&mut nothing, &mut self.appearances] };
-        let geometry = &self.shared.geometry;
-        leaves.iter().try_for_each(|leaf| self.drawer.polygon(geometry, &Aliases::new(), *leaf, &surface, &mut paints, log))
+        let tree = Tree { geometry: &self.shared.geometry, aliases: &Aliases::new() };
+        leaves.iter().try_for_each(|leaf| self.drawer.polygon(tree, *leaf, &surface, &mut paints, log))
     }
 }
 
-fn gather(sitting: &mut Sitting, node: NodeId, log: &mut Log) -> Result<(Vec<Leaf>, Vec<(Id, bool)>)> {
+/// Polygons below a node, and references to what is not in this city object.
+type Gathered = (Vec<Leaf>, Vec<(Id, bool)>);
+
+fn gather(sitting: &mut Sitting, node: NodeId, log: &mut Log) -> Result<Gathered> {
     let geometry = &sitting.member.geometry;
     let mut gatherer = Gatherer { geometry, seen: &mut sitting.seen, leaves: Vec::new(), outside: Vec::new(), cycles: 0 };
     gatherer.gather(node, false, 0);

@@ -27,7 +27,7 @@ pub fn parse_points(text: &str, dimension: usize, values: &mut Vec<f64>, out: &m
 }
 
 fn append_points(values: &[f64], dimension: usize, out: &mut Vec<Vec3>) -> Option<()> {
-    if !(2..=3).contains(&dimension) || values.len() % dimension != 0 {
+    if !(2..=3).contains(&dimension) || !values.len().is_multiple_of(dimension) {
         return None;
     }
     out.extend(values.chunks_exact(dimension).map(|p| [p[0], p[1], p.get(2).copied().unwrap_or(0.0)]));

@@ -4,7 +4,7 @@ use map3d_base::asset::{Batch, Rank};
 use map3d_base::{Error, Result, Vec3};
 
 use super::appearance::Appearances;
-use super::geometry::{Geometry, NO_NODE, Node, NodeId, Shape};
+use super::geometry::{Geometry, NO_NODE, NodeId, Ring, Shape};
 use super::ids::{self, Id};
 use super::paint::{Paint, Painter, RingPoints};
 use crate::materials::shifted_uvs;
@@ -31,6 +31,13 @@ pub struct Surface<'a> {
 
 /// References between nodes of one arena: (referred to, group that refers), sorted.
 pub type Aliases = Vec<(NodeId, NodeId)>;
+
+/// An arena and the references in it.
+#[derive(Clone, Copy)]
+pub struct Tree<'a> {
+    pub geometry: &'a Geometry,
+    pub aliases: &'a Aliases,
+}
 
 pub fn aliases(geometry: &Geometry) -> Aliases {
     let links = geometry.nodes.iter().filter_map(|node| match node.shape {
@@ -91,22 +98,10 @@ impl Drawer {
         batch
     }
 
-    pub fn polygon(
-        &mut self,
-        geometry: &Geometry,
-        aliases: &Aliases,
-        leaf: Leaf,
-        surface: &Surface,
-        paints: &mut Paints,
-        log: &mut Log,
-    ) -> Result<()> {
-        let node = *geometry.node(leaf.node);
-        let rings: Vec<RingPoints> = geometry
-            .rings_of(node.shape)
-            .iter()
-            .map(|r| RingPoints { id: r.id, points: &geometry.points[r.start as usize..r.end as usize] })
-            .collect();
-        let Some(paint) = self.paint(geometry, aliases, &node, leaf.node, &rings, surface, paints, log)? else { return Ok(()) };
+    pub fn polygon(&mut self, tree: Tree, leaf: Leaf, surface: &Surface, paints: &mut Paints, log: &mut Log) -> Result<()> {
+        let points = |r: &Ring| RingPoints { id: r.id, points: &tree.geometry.points[r.start as usize..r.end as usize] };
+        let rings: Vec<RingPoints> = tree.geometry.rings_of(tree.geometry.node(leaf.node).shape).iter().map(points).collect();
+        let Some(paint) = self.paint(tree, leaf.node, &rings, surface, paints, log)? else { return Ok(()) };
         if !self.assemble(&rings, paint.textured, surface, log)? {
             return Ok(());
         }
@@ -119,13 +114,10 @@ impl Drawer {
     }
 
     /// `None`: not drawn, and counted.
-    #[allow(clippy::too_many_arguments)]
     fn paint(
         &mut self,
-        geometry: &Geometry,
-        aliases: &Aliases,
-        node: &Node,
-        number: NodeId,
+        tree: Tree,
+        node: NodeId,
         rings: &[RingPoints],
         surface: &Surface,
         paints: &mut Paints,
@@ -134,7 +126,7 @@ impl Drawer {
         let mut found = None;
         if paints.stores.iter().any(|s| !s.is_empty()) {
             self.chain.clear();
-            climb(geometry, aliases, number, node.id, &mut self.chain);
+            climb(tree, node, &mut self.chain);
             self.chain.extend(surface.feature_ids.iter().filter(|id| **id != ids::NONE));
             let [a, b] = &mut paints.stores;
             found = paints.painter.paint(&self.chain, rings, &mut [a, b], &mut self.raw_uvs, log)?;
@@ -209,22 +201,21 @@ impl Drawer {
 }
 
 /// Ids from a node upwards, then those of groups that refer to it or to what it is in.
-fn climb(geometry: &Geometry, aliases: &Aliases, number: NodeId, id: Id, chain: &mut Vec<Id>) {
-    let parents = |from: NodeId| {
+fn climb(Tree { geometry, aliases }: Tree, node: NodeId, chain: &mut Vec<Id>) {
+    const MAX_ALIASES: usize = 8;
+    let upwards = |from: NodeId| {
         let up = move |n: &NodeId| Some(geometry.node(*n).parent).filter(|p| *p != NO_NODE);
         std::iter::successors(Some(from), up)
     };
-    if id != ids::NONE {
-        chain.push(id);
-    }
-    chain.extend(parents(number).skip(1).map(|n| geometry.node(n).id).filter(|id| *id != ids::NONE));
+    let ids_above = |from: NodeId| upwards(from).map(|n| geometry.node(n).id).filter(|id| *id != ids::NONE);
+    chain.extend(ids_above(node));
     if aliases.is_empty() {
         return;
     }
-    for ancestor in parents(number) {
+    for ancestor in upwards(node) {
         let first = aliases.partition_point(|a| a.0 < ancestor);
-        for (_, group) in aliases[first..].iter().take_while(|a| a.0 == ancestor).take(8) {
-            chain.extend(parents(*group).map(|n| geometry.node(n).id).filter(|id| *id != ids::NONE));
+        for (_, group) in aliases[first..].iter().take_while(|a| a.0 == ancestor).take(MAX_ALIASES) {
+            chain.extend(ids_above(*group));
         }
     }
 }

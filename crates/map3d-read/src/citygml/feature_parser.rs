@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use super::address::address;
 use super::appearance_parser::{AppearanceParser, Theme};
-use super::attributes::{external_reference, generic, is_generic, put, simple_value};
+use super::attributes::{external_reference, generic, generic_object, is_generic, is_generic_object, put, simple_value};
 use super::feature::{Feature, Form, Member, Placed};
 use super::geometry_parser::{GeometryParser, TOP, is_surface, is_thin};
 use super::ids::{self, Target, id_of, target_of};
@@ -138,6 +138,9 @@ impl FeatureParser<'_> {
             self.log.note("geometry outside of a level of detail not drawn", local);
             return self.xml.skip();
         }
+        if is_generic_object(local) {
+            return generic_object(self.xml, &mut self.member.features[number as usize].attributes);
+        }
         if !local.starts_with(|c: char| c.is_uppercase()) {
             return self.xml.skip();
         }
@@ -224,4 +227,3 @@ fn lod_of(local: &str) -> Option<u8> {
         _ => None,
     }
 }
-

@@ -10,7 +10,10 @@ pub const NO_NODE: NodeId = NodeId::MAX;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
     /// Exterior ring, then interior ones.
-    Polygon { first_ring: u32, rings: u32 },
+    Polygon {
+        first_ring: u32,
+        rings: u32,
+    },
     Group,
     /// A reference to a node by its id.
     Link(Id),

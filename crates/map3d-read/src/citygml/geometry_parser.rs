@@ -41,7 +41,15 @@ fn is_group(local: &str) -> bool {
 pub fn is_thin(local: &str) -> bool {
     matches!(
         local,
-        "Point" | "MultiPoint" | "LineString" | "Curve" | "MultiCurve" | "CompositeCurve" | "OrientableCurve" | "LineStringSegment" | "MultiLineString"
+        "Point"
+            | "MultiPoint"
+            | "LineString"
+            | "Curve"
+            | "MultiCurve"
+            | "CompositeCurve"
+            | "OrientableCurve"
+            | "LineStringSegment"
+            | "MultiLineString"
     )
 }
 

@@ -23,19 +23,54 @@ pub enum Kind {
 pub fn kind_of(local: &str) -> Kind {
     match local {
         "BuildingPart" | "BridgePart" | "TunnelPart" => Kind::Part,
-        "Building" | "Bridge" | "Tunnel" | "Road" | "Railway" | "Track" | "Square" | "TransportationComplex" | "WaterBody" | "LandUse"
-        | "PlantCover" | "SolitaryVegetationObject" | "CityFurniture" | "GenericCityObject" | "CityObjectGroup" | "ReliefFeature" | "Waterway" => {
-            Kind::Object
-        }
-        "WallSurface" | "RoofSurface" | "GroundSurface" | "ClosureSurface" | "OuterCeilingSurface" | "OuterFloorSurface" | "TrafficArea"
-        | "AuxiliaryTrafficArea" | "WaterSurface" | "WaterGroundSurface" | "WaterClosureSurface" | "TINRelief" | "MassPointRelief"
-        | "BreaklineRelief" | "RasterRelief" => Kind::Surface,
+        "Building"
+        | "Bridge"
+        | "Tunnel"
+        | "Road"
+        | "Railway"
+        | "Track"
+        | "Square"
+        | "TransportationComplex"
+        | "WaterBody"
+        | "LandUse"
+        | "PlantCover"
+        | "SolitaryVegetationObject"
+        | "CityFurniture"
+        | "GenericCityObject"
+        | "CityObjectGroup"
+        | "ReliefFeature"
+        | "Waterway" => Kind::Object,
+        "WallSurface"
+        | "RoofSurface"
+        | "GroundSurface"
+        | "ClosureSurface"
+        | "OuterCeilingSurface"
+        | "OuterFloorSurface"
+        | "TrafficArea"
+        | "AuxiliaryTrafficArea"
+        | "WaterSurface"
+        | "WaterGroundSurface"
+        | "WaterClosureSurface"
+        | "TINRelief"
+        | "MassPointRelief"
+        | "BreaklineRelief"
+        | "RasterRelief" => Kind::Surface,
         "Window" | "Door" | "WindowSurface" | "DoorSurface" => Kind::Opening,
         "BuildingInstallation" | "BridgeInstallation" | "TunnelInstallation" | "BridgeConstructionElement" | "BuildingConstructiveElement" => {
             Kind::Installation
         }
-        "Room" | "BuildingRoom" | "BridgeRoom" | "HollowSpace" | "BuildingFurniture" | "BridgeFurniture" | "TunnelFurniture"
-        | "IntBuildingInstallation" | "IntBridgeInstallation" | "IntTunnelInstallation" | "InteriorWallSurface" | "CeilingSurface"
+        "Room"
+        | "BuildingRoom"
+        | "BridgeRoom"
+        | "HollowSpace"
+        | "BuildingFurniture"
+        | "BridgeFurniture"
+        | "TunnelFurniture"
+        | "IntBuildingInstallation"
+        | "IntBridgeInstallation"
+        | "IntTunnelInstallation"
+        | "InteriorWallSurface"
+        | "CeilingSurface"
         | "FloorSurface" => Kind::Interior,
         _ => Kind::Unknown,
     }

@@ -213,7 +213,8 @@ mod tests {
         for name in ["EPSG:4326", "http://www.opengis.net/def/crs/EPSG/0/6697", "urn:ogc:def:crs:EPSG::4979", "urn:ogc:def:crs:OGC:1.3:CRS84"] {
             assert!(is_geographic(name), "{name}");
         }
-        for name in ["EPSG:25832+5783", "urn:adv:crs:DE_DHDN_3GK4*DE_DHN92_NH", "urn:ogc:def:crs,crs:EPSG:6.12:3068,crs:EPSG:6.12:5783", "EPSG:4978"] {
+        for name in ["EPSG:25832+5783", "urn:adv:crs:DE_DHDN_3GK4*DE_DHN92_NH", "urn:ogc:def:crs,crs:EPSG:6.12:3068,crs:EPSG:6.12:5783", "EPSG:4978"]
+        {
             assert!(!is_geographic(name), "{name}");
         }
     }

@@ -56,10 +56,10 @@ impl Shared {
         if depth > super::xml::MAX_DEPTH {
             return;
         }
-        if let Shape::Link(id) = shape {
-            if let Some(target) = from.by_id.get(&id).filter(|_| !self.geometry.by_id.contains_key(&id)) {
-                self.copy(from, seen, *target, NO_NODE, depth + 1);
-            }
+        if let Shape::Link(id) = shape
+            && let Some(target) = from.by_id.get(&id).filter(|_| !self.geometry.by_id.contains_key(&id))
+        {
+            self.copy(from, seen, *target, NO_NODE, depth + 1);
         }
         let mut child = node.first_child;
         while child != NO_NODE {

@@ -121,10 +121,10 @@ impl Survey {
     /// Reads the theme that the scanner stands at.
     fn theme(&mut self, scanner: Scanner, log: &Log) -> Scanner {
         let mut xml = Xml::new(scanner, log.path());
-        if let Ok(Step::Start) = xml.step() {
-            if let Ok(name) = xml.whole_text() {
-                self.theme.see(&name);
-            }
+        if let Ok(Step::Start) = xml.step()
+            && let Ok(name) = xml.whole_text()
+        {
+            self.theme.see(&name);
         }
         xml.into_inner()
     }

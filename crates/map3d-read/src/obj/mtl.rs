@@ -1,6 +1,7 @@
 //! MTL libraries: diffuse colour, opacity, colour map and opacity map of named materials.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::path::Path;
 
 use map3d_base::Result;
@@ -87,10 +88,11 @@ impl Library {
 
     fn keep(&mut self, finished: Option<(String, MtlEntry)>, log: &mut Log) {
         let Some((name, entry)) = finished else { return };
-        if self.entries.contains_key(&name) {
-            log.note("material defined more than once; the first counts", name);
-        } else {
-            self.entries.insert(name, entry);
+        match self.entries.entry(name) {
+            Entry::Occupied(first) => log.note("material defined more than once; the first counts", first.key().as_str()),
+            Entry::Vacant(slot) => {
+                slot.insert(entry);
+            }
         }
     }
 }

@@ -1,6 +1,8 @@
 //! Documents written to a folder of their own and read to the end.
 #![allow(dead_code)]
 
+pub mod city;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};

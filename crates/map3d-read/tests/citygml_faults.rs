@@ -1,0 +1,162 @@
+//! CityGML that is broken, hostile or too large: counted or refused, and nothing else is lost.
+
+mod reading;
+
+use map3d_read::{Format, ReadOptions};
+use reading::city::{at_lod, building, member, model, multi_surface, polygon, read_text, square, try_text};
+use reading::{Folder, is_format_error, is_limit_error, read_with};
+use serde_json::json;
+
+#[test]
+fn broken_polygons_are_counted_and_never_cost_the_building() {
+    for (case, points, reason) in [
+        ("no points", "", "fewer than 3"),
+        ("one point", "0 0 0", "fewer than 3"),
+        ("two points", "0 0 0 1 1 1 0 0 0", "fewer than 3"),
+        ("one point often", "1 1 1 1 1 1 1 1 1 1 1 1", "fewer than 3"),
+        ("on a line", "0 0 0 1 1 1 2 2 2 0 0 0", "without area"),
+        ("words", "0 0 a 1 1 1 2 2 2", "cannot be read"),
+        ("numbers left over", "0 0 0 1 1 1 2 2", "cannot be read"),
+        ("not a number", "0 0 0 nan 1 1 2 2 0 0 0 0", "not a finite"),
+        ("infinite", "0 0 0 1e999 1 1 2 2 0 0 0 0", "not a finite"),
+        ("commas", "0,0,0 1,1,1 2,2,0", "cannot be read"),
+    ] {
+        let members = member(&polygon("bad", points)) + &member(&square("good", 1));
+        let reading = read_text(&building(&format!("<bldg:lod2MultiSurface>{}</bldg:lod2MultiSurface>", multi_surface(&members))));
+        assert_eq!((reading.count(), reading.area()), (2, 4.0), "{case}");
+        assert_eq!(reading.skipped(reason), 1, "{case}: {:?}", reading.report);
+    }
+}
+
+#[test]
+fn strict_refuses_the_first_fault() {
+    let strict = ReadOptions { strict: true, ..ReadOptions::default() };
+    let text = building(&at_lod(2, &polygon("p", "0 0 0 1 1 1 0 0 0")));
+    assert!(is_format_error(try_text(&text, &strict), "fewer than 3"));
+    assert!(try_text(&building(&at_lod(2, &square("p", 1))), &strict).is_ok());
+}
+
+#[test]
+fn references_to_nothing_and_to_other_documents_are_reported() {
+    let body = |href: &str| {
+        building(&format!(
+            "{}<bldg:lod2Solid><gml:Solid><gml:exterior xlink:href=\"{href}\"/></gml:Solid></bldg:lod2Solid>",
+            at_lod(2, &square("a", 1))
+        ))
+    };
+    assert_eq!(read_text(&body("#nothing")).warned("leads nowhere"), 1);
+    assert_eq!(read_text(&body("other.gml#a")).warned("another document"), 1);
+}
+
+#[test]
+fn references_in_a_circle_are_refused_and_end() {
+    let group = |id: &str, inner: &str| format!("<gml:CompositeSurface gml:id='{id}'>{inner}</gml:CompositeSurface>");
+    let to = |id: &str| format!("<gml:surfaceMember xlink:href='#{id}'/>");
+    let itself = group("a", &(to("a") + &member(&square("p", 1))));
+    let two = group("a", &(to("b") + &member(&square("p", 1)))) + &group("b", &to("a"));
+    for (case, inner) in [("itself", member(&itself)), ("two", format!("<gml:surfaceMembers>{two}</gml:surfaceMembers>"))] {
+        let reading = read_text(&building(&format!("<bldg:lod2MultiSurface>{}</bldg:lod2MultiSurface>", multi_surface(&inner))));
+        assert_eq!(reading.area(), 4.0, "{case}");
+        assert!(reading.skipped("refers to itself") > 0, "{case}");
+    }
+}
+
+#[test]
+fn references_that_double_at_every_step_cost_nothing() {
+    let mut groups = member(&square("p", 1));
+    for k in 0..60 {
+        let target = if k == 0 { "p".to_owned() } else { format!("g{}", k - 1) };
+        let to = format!("<gml:surfaceMember xlink:href='#{target}'/>");
+        groups += &member(&format!("<gml:CompositeSurface gml:id='g{k}'>{to}{to}</gml:CompositeSurface>"));
+    }
+    assert_eq!(read_text(&building(&format!("<bldg:lod2MultiSurface>{}</bldg:lod2MultiSurface>", multi_surface(&groups)))).area(), 4.0);
+    let chain: String = (0..20_000)
+        .map(|k| member(&format!("<gml:CompositeSurface gml:id='c{k}'><gml:surfaceMember xlink:href='#c{}'/></gml:CompositeSurface>", k + 1)))
+        .collect();
+    let reading =
+        read_text(&building(&format!("<bldg:lod2MultiSurface>{}</bldg:lod2MultiSurface>", multi_surface(&(chain + &member(&square("c20000", 1)))))));
+    assert_eq!(reading.area(), 4.0);
+}
+
+#[test]
+fn broken_documents_keep_what_came_before() {
+    let whole = model(
+        &(0..3)
+            .map(|k| {
+                format!("<core:cityObjectMember><bldg:Building gml:id='b{k}'>{}</bldg:Building></core:cityObjectMember>", at_lod(2, &square("p", k)))
+            })
+            .collect::<String>(),
+    );
+    assert_eq!(read_text(&whole).objects.len(), 3);
+    let cut = whole.rfind("posList").expect("a posList");
+    let strict = ReadOptions { strict: true, ..ReadOptions::default() };
+    for text in [whole[..cut].to_owned(), format!("{}wrong{}", &whole[..cut], &whole[cut + 7..]), format!("{}<{}", &whole[..cut], &whole[cut..])] {
+        let reading = read_text(&text);
+        assert_eq!((reading.objects.len(), reading.count()), (2, 4));
+        assert_eq!(reading.warned("document broken"), 1, "{:?}", reading.report);
+        assert!(is_format_error(try_text(&text, &strict), "byte"));
+    }
+}
+
+#[test]
+fn what_is_no_city_model_is_refused() {
+    for text in ["", "text", "<html/>", "<?xml version='1.0'?>", "<!-- -->", "<CityModel", "<a><CityModel/></a>"] {
+        assert!(try_text(text, &ReadOptions::default()).is_err(), "{text}");
+    }
+}
+
+#[test]
+fn document_types_and_entities_are_refused() {
+    let entity = building("<gml:name>&secret;</gml:name>");
+    assert!(is_format_error(try_text(&entity, &ReadOptions::default()), "entity &secret;"));
+    let dtd = "<!DOCTYPE a [<!ENTITY x SYSTEM \"file:///etc/passwd\">]><CityModel/>";
+    assert!(is_format_error(try_text(dtd, &ReadOptions::default()), "document type"));
+}
+
+#[test]
+fn elements_nest_up_to_the_limit() {
+    // Root, member, building, property and what stands in it.
+    let nested = |n: usize| {
+        format!("<CityModel><cityObjectMember><Building><x>{}{}</x></Building></cityObjectMember></CityModel>", "<y>".repeat(n), "</y>".repeat(n))
+    };
+    assert!(try_text(&nested(252), &ReadOptions::default()).is_ok());
+    assert!(is_limit_error(try_text(&nested(253), &ReadOptions::default()), "XML depth"));
+    let deep = |n: usize| {
+        let open = "<gml:CompositeSurface><gml:surfaceMember>".repeat(n);
+        let close = "</gml:surfaceMember></gml:CompositeSurface>".repeat(n);
+        building(&format!("<bldg:lod2MultiSurface>{open}{}{close}</bldg:lod2MultiSurface>", square("p", 1)))
+    };
+    assert_eq!(try_text(&deep(120), &ReadOptions::default()).expect("readable").area(), 4.0);
+    assert!(is_limit_error(try_text(&deep(10_000), &ReadOptions::default()), "XML depth"));
+}
+
+#[test]
+fn limits_are_met_one_above() {
+    let text = building(&at_lod(2, &(square("a", 1) + &square("b", 2))));
+    for (limit, sound) in [(4, true), (3, false)] {
+        let result = try_text(&text, &ReadOptions { max_triangles: limit, ..ReadOptions::default() });
+        assert!(if sound { result.is_ok() } else { is_limit_error(result, "max_triangles") });
+    }
+    for (limit, triangles) in [(4, 4), (3, 0)] {
+        let reading = try_text(&text, &ReadOptions { max_ring_vertices: limit, ..ReadOptions::default() }).expect("readable");
+        assert_eq!(reading.count(), triangles);
+    }
+    let small = ReadOptions { max_object_bytes: 100, ..ReadOptions::default() };
+    assert!(is_limit_error(try_text(&text, &small), "max_object_bytes"));
+}
+
+#[test]
+fn other_encodings_are_read() {
+    let text = building("<gml:name>Mühle</gml:name>");
+    let latin: Vec<u8> = text.replace("UTF-8", "ISO-8859-1").chars().map(|c| c as u8).collect();
+    let utf16: Vec<u8> =
+        "\u{feff}".chars().chain(text.replace("UTF-8", "UTF-16").chars()).collect::<String>().encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let lying: Vec<u8> = text.chars().map(|c| c as u8).collect();
+    let marked = [&[0xEF, 0xBB, 0xBF], text.as_bytes()].concat();
+    for (bytes, name) in [(text.clone().into_bytes(), "Mühle"), (latin, "Mühle"), (utf16, "Mühle"), (marked, "Mühle"), (lying, "M\u{fffd}hle")] {
+        let folder = Folder::new("encodings");
+        let path = folder.put("a.gml", bytes);
+        let reading = read_with(&path, Format::CityGml, &ReadOptions::default()).expect("readable");
+        assert_eq!(reading.objects[0].attributes["name"], json!(name));
+    }
+}
