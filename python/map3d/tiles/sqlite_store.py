@@ -43,7 +43,11 @@ class SqliteTileStore:
         self._local = threading.local()
         self._opened: list[tuple[int, sqlite3.Connection]] = []
         self._lock = threading.Lock()
-        self._shape = self._read_shape()
+        try:
+            self._shape = self._read_shape()
+        except BaseException:
+            self.close()
+            raise
 
     @classmethod
     def create(cls, path: Path, shape: StoreShape) -> Self:
@@ -219,10 +223,14 @@ def _connect(path: Path, read_only: bool) -> sqlite3.Connection:
     mode = "rw" if not read_only else "ro&immutable=1" if _is_frozen(path) else "ro"
     quoted = path.absolute().as_uri()
     connection = sqlite3.connect(f"{quoted}?mode={mode}", uri=True, timeout=BUSY_TIMEOUT_S, isolation_level=None, check_same_thread=False)
-    connection.execute("PRAGMA synchronous = FULL")
-    if not read_only:
-        connection.execute(f"PRAGMA wal_autocheckpoint = {CHECKPOINT_PAGES}")
-        connection.execute(f"PRAGMA cache_size = -{CACHE_KIB}")
+    try:
+        connection.execute("PRAGMA synchronous = FULL")
+        if not read_only:
+            connection.execute(f"PRAGMA wal_autocheckpoint = {CHECKPOINT_PAGES}")
+            connection.execute(f"PRAGMA cache_size = -{CACHE_KIB}")
+    except BaseException:
+        connection.close()
+        raise
     return connection
 
 

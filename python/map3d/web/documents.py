@@ -8,6 +8,7 @@ import re
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
+from threading import Lock
 from typing import Final
 
 from flask import Blueprint, Response, current_app, request
@@ -20,6 +21,7 @@ from map3d.tiles.manifest import FILE_NAME
 from map3d.types import check_name
 
 documents = Blueprint("documents", __name__)
+_opening: Final = Lock()
 
 PACK_FROM_BYTES: Final = 1024
 Stamp = tuple[tuple[int, int, int], ...]
@@ -61,9 +63,10 @@ def workspace() -> Workspace:
 
 def catalogue() -> Catalogue:
     """Opened at the first question, then kept."""
-    held: Catalogue | None = current_app.extensions.get("map3d.catalogue")
-    if held is None:
-        held = current_app.extensions.setdefault("map3d.catalogue", workspace().open_catalogue())
+    with _opening:
+        held: Catalogue | None = current_app.extensions.get("map3d.catalogue")
+        if held is None:
+            held = current_app.extensions["map3d.catalogue"] = workspace().open_catalogue()
     return held
 
 
