@@ -11,10 +11,8 @@ use map3d_image::seam::read_seam;
 type Codec = (String, Box<dyn Fn(&GBuffer) -> Vec<u8>>);
 
 fn main() {
-    let tiles: Vec<GBuffer> = std::env::args()
-        .skip(1)
-        .map(|path| read_seam(&path, &std::fs::read(&path).expect("readable")).expect("a seam"))
-        .collect();
+    let tiles: Vec<GBuffer> =
+        std::env::args().skip(1).map(|path| read_seam(&path, &std::fs::read(&path).expect("readable")).expect("a seam")).collect();
     assert!(!tiles.is_empty(), "give seam files");
     println!("{} tiles of {} px", tiles.len(), tiles[0].width);
     for (name, codec) in codecs() {
@@ -31,19 +29,26 @@ fn main() {
 }
 
 fn codecs() -> Vec<Codec> {
-    let mut out: Vec<Codec> = vec![("color to sRGB only".into(), Box::new(|g| color_from_linear((g.width, g.height), &g.color).pixels.into_flattened()))];
+    let mut out: Vec<Codec> =
+        vec![("color to sRGB only".into(), Box::new(|g| color_from_linear((g.width, g.height), &g.color).pixels.into_flattened()))];
     for quality in [80, 90] {
-        out.push((format!("color webp q{quality}"), Box::new(move |g| encode_webp(&color_from_linear((g.width, g.height), &g.color), quality).expect("webp"))));
+        out.push((
+            format!("color webp q{quality}"),
+            Box::new(move |g| encode_webp(&color_from_linear((g.width, g.height), &g.color), quality).expect("webp")),
+        ));
     }
     out.push(("color jpeg q85".into(), Box::new(|g| encode_jpeg(&color_from_linear((g.width, g.height), &g.color), 85).expect("jpeg"))));
     for filter in [Filter::None, Filter::Sub, Filter::Up, Filter::Average, Filter::Paeth] {
         for deflate in [Deflate::Fast, Deflate::Matching] {
             let png = move |g: &GBuffer, channels, bytes: &[u8]| encode_png((g.width, g.height), channels, bytes, filter, deflate);
             let name = |layer| format!("{layer} png {filter:?} {deflate:?}");
-            out.push((name("color"), Box::new(move |g| {
-                let rgb: Vec<u8> = color_from_linear((g.width, g.height), &g.color).pixels.iter().flat_map(|p| [p[0], p[1], p[2]]).collect();
-                png(g, 3, &rgb)
-            })));
+            out.push((
+                name("color"),
+                Box::new(move |g| {
+                    let rgb: Vec<u8> = color_from_linear((g.width, g.height), &g.color).pixels.iter().flat_map(|p| [p[0], p[1], p[2]]).collect();
+                    png(g, 3, &rgb)
+                }),
+            ));
             out.push((name("normal"), Box::new(move |g| png(g, 3, &bytes_from_normals(&g.normal)))));
             out.push((name("id"), Box::new(move |g| png(g, 4, bytes_from_u32(&g.id)))));
             out.push((name("depth"), Box::new(move |g| png(g, 4, bytes_from_u32(&g.depth)))));

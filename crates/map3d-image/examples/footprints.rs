@@ -17,15 +17,20 @@ const PIXELS: i32 = 32;
 fn main() {
     let tunings: Vec<Tuning> = tunings();
     let mut totals = vec![Total::default(); tunings.len()];
-    let textures: [(&str, fn(u32, u32) -> [u8; 3]); 5] = [("town", town), ("noise", noise), ("smooth", smooth), ("checker", checker), ("brick", brick)];
-    println!("{:8} {:>6} {:>6} {:>5} {:>5} {:>5} {:>8} {:>8} {:>8}", "texture", "pitch", "tex/px", "turn", "level", "taps", "ns/px", "PSNR", "gradient");
+    let textures: [(&str, fn(u32, u32) -> [u8; 3]); 5] =
+        [("town", town), ("noise", noise), ("smooth", smooth), ("checker", checker), ("brick", brick)];
+    println!(
+        "{:8} {:>6} {:>6} {:>5} {:>5} {:>5} {:>8} {:>8} {:>8}",
+        "texture", "pitch", "tex/px", "turn", "level", "taps", "ns/px", "PSNR", "gradient"
+    );
     for (name, paint) in textures {
         let pyramid = Pyramid::new(paint);
         for pitch in [10.0f64, 22.5, 45.0, 90.0] {
             for scale in [0.4, 1.0, 2.0, 3.0, 4.0, 5.5] {
                 for turn in [0.0f64, 30.0] {
                     let uv = uv_map(pitch, scale, turn);
-                    let exact: Vec<[u16; 3]> = (0..PIXELS * PIXELS).map(|i| pyramid.integrate(&uv, f64::from(i % PIXELS), f64::from(i / PIXELS))).collect();
+                    let exact: Vec<[u16; 3]> =
+                        (0..PIXELS * PIXELS).map(|i| pyramid.integrate(&uv, f64::from(i % PIXELS), f64::from(i / PIXELS))).collect();
                     for (tuning, total) in tunings.iter().zip(&mut totals) {
                         let row = measure(&pyramid, &uv, &exact, tuning);
                         if tunings.len() == 1 {
@@ -82,7 +87,15 @@ impl Total {
     /// Least PSNR, and range of the ratio of gradient energies, by texture.
     fn print(&self, t: &Tuning) {
         let n = self.n as f64;
-        print!("{:4} {:4} {:4} {:4} | {:5.1} taps {:6.1} ns/px |", t.texels_per_axis, t.compensation, t.max_gap, t.point_below, self.taps as f64 / n, self.ns / n);
+        print!(
+            "{:4} {:4} {:4} {:4} | {:5.1} taps {:6.1} ns/px |",
+            t.texels_per_axis,
+            t.compensation,
+            t.max_gap,
+            t.point_below,
+            self.taps as f64 / n,
+            self.ns / n
+        );
         for (name, (psnr, low, high)) in &self.rows {
             print!(" {name} {psnr:.1} dB {low:.2}..{high:.2} |");
         }

@@ -45,8 +45,19 @@ fn pinned(bounds: &Box3, look_at_deg: f64, pitch_deg: f64, res_m: f64, color: La
     let extent = (2.0 * h[0].hypot(h[1])).max(2.0 * (sin * h[0].hypot(h[1]) + cos * h[2]));
     let zmax = (0..=26u8).find(|z| 256.0 * res_m * f64::from(1u32 << z) >= extent).expect("at most 26 levels");
     let png = |kind| LayerSpec { kind, format: LayerFormat::Png, quality: 80 };
-    let layers = vec![LayerSpec { kind: LayerKind::Color, format: color, quality }, png(LayerKind::Normal), png(LayerKind::Id), png(LayerKind::Depth)];
-    let mut f = Frame { look_at_deg, pitch_deg, u0_m: 0.0, v0_m: 0.0, d0_m: 0.0, size_m: 256.0 * res_m * f64::from(1u32 << zmax), tile_px: 256, zmax, layers };
+    let layers =
+        vec![LayerSpec { kind: LayerKind::Color, format: color, quality }, png(LayerKind::Normal), png(LayerKind::Id), png(LayerKind::Depth)];
+    let mut f = Frame {
+        look_at_deg,
+        pitch_deg,
+        u0_m: 0.0,
+        v0_m: 0.0,
+        d0_m: 0.0,
+        size_m: 256.0 * res_m * f64::from(1u32 << zmax),
+        tile_px: 256,
+        zmax,
+        layers,
+    };
     let [u, v, d] = f.axes().uvd_from_local(c);
     let diagonal = (h[0] * h[0] + h[1] * h[1] + h[2] * h[2]).sqrt();
     (f.u0_m, f.v0_m, f.d0_m) = (u - f.size_m / 2.0, v + f.size_m / 2.0, d - diagonal - 1000.0);
@@ -86,7 +97,14 @@ impl Round {
     fn print(&self, layers: &[LayerSpec]) {
         let n = self.tiles as f64;
         let ms = |s: f64| s * 1e3 / n;
-        println!("ms per tile: visibility {:.3}  shade {:.3}  reduce {:.3}  encode {:.3}  total {:.3}", ms(self.visibility_s), ms(self.shade_s), ms(self.reduce_s), ms(self.encode_s.iter().sum()), ms(self.total()));
+        println!(
+            "ms per tile: visibility {:.3}  shade {:.3}  reduce {:.3}  encode {:.3}  total {:.3}",
+            ms(self.visibility_s),
+            ms(self.shade_s),
+            ms(self.reduce_s),
+            ms(self.encode_s.iter().sum()),
+            ms(self.total())
+        );
         println!("shades per px {:.3}, surfaces set up per tile {:.0}", self.shades as f64 / n / 65_536.0, self.setups as f64 / n);
         for (k, spec) in layers.iter().enumerate() {
             println!("  {:?} {:?}: {:.3} ms, {:.1} KB", spec.kind, spec.format, ms(self.encode_s[k]), self.bytes[k] as f64 / n / 1e3);

@@ -2,11 +2,14 @@
 //!
 //! In parallel projection the square maps to one parallelogram of texels for all pixels of a surface. The exact filter is the box over it, of
 //! the texture interpolated bilinearly. Taps at a level of the pyramid blur by that level's texels; so they are laid out, shorter than the
-//! parallelogram, such that the second moments of the whole (layout + level's box + bilinear tent) are those of the exact filter:
+//! parallelogram, that the second moments of the whole (layout + level's box + bilinear tent) come near those of the exact filter:
 //!
 //! ```text
-//! A Aᵀ / 12 = J Jᵀ / 12 − (4^level − 1)/4 · I        J: texels of level 0 per pixel, A: the layout's axes
+//! A Aᵀ / 12 = J Jᵀ / 12 − k (4^level − 1)/4 · I        J: texels of level 0 per pixel, A: the layout's axes, k: compensation
 //! ```
+//!
+//! k = 1 would make them equal, and keeps contrast at the cost of more dependence on where a texel falls in a pixel; k = ⅓ is the exact box over
+//! the level's texels, which blurs by 10–15 % of the gradient energy at two texels a pixel. Between them lies the best of both.
 
 /// Longest row of taps; beyond it a coarser level is taken.
 pub const MAX_TAPS: usize = 16;
@@ -26,7 +29,7 @@ pub struct Tuning {
 
 impl Default for Tuning {
     fn default() -> Self {
-        Self { texels_per_axis: 2.0, compensation: 1.0, max_gap: 1.25, point_below: 0.6 }
+        Self { texels_per_axis: 2.0, compensation: 0.6, max_gap: 1.05, point_below: 0.4 }
     }
 }
 
@@ -145,7 +148,7 @@ mod tests {
         for [a, b] in
             [[[4.0, 0.0], [0.0, 4.0]], [[3.0, 3.0], [-3.0, 3.0]], [[9.0, 1.0], [2.0, 4.0]], [[5.0, 0.0], [4.0, 6.0]], [[1.1, 0.0], [0.0, 9.0]]]
         {
-            let f = footprint([a, b], 12, &Tuning::default());
+            let f = footprint([a, b], 12, &Tuning { compensation: 1.0, point_below: 0.0, ..Tuning::default() });
             let got = moments(&f);
             let exact =
                 [(a[0] * a[0] + b[0] * b[0]) / 12.0 + 1.0 / 6.0, (a[0] * a[1] + b[0] * b[1]) / 12.0, (a[1] * a[1] + b[1] * b[1]) / 12.0 + 1.0 / 6.0];
