@@ -17,7 +17,7 @@ CORE = "{http://www.opengis.net/citygml/2.0}"
 XLINK = "{http://www.w3.org/1999/xlink}href"
 
 TOWN = TownSpec(buildings=14, seed=4, files=2, texture_px=256, formats=("citygml", "obj"), ortho_m=1.0, dem_m=4.0, deep_share=0.5)
-ROMAN = TownSpec(style="roman", buildings=90, seed=2, texture_px=512, buildings_per_texture=8, terrain=False)
+ROMAN = TownSpec(style="roman", buildings=110, seed=2, texture_px=512, buildings_per_texture=8, terrain=False)
 
 
 def trees(folder: Path, pattern: str = "*.gml") -> list[ET.Element]:

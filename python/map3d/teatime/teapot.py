@@ -39,14 +39,16 @@ def teapot(scale: float, steps: int) -> Mesh:
 def _body(data: dict, names: tuple[str, ...], steps: int) -> Mesh:  # type: ignore[type-arg]
     """The patches of one body with all mirrored copies, welded and closed."""
     control = np.array(data["points"])
-    points, triangles = [], []
+    points: list[Points] = []
+    triangles: list[Indices] = []
+    count = 0
     for name in names:
         for patch in data["patches"][name]:
             surface = bezier(control[patch].reshape(4, 4, 3), steps)
             for x, y in MIRRORS[data["mirror"][name]]:
-                start = sum(len(p) for p in points)
                 points.append(surface.reshape(-1, 3) * [x, y, 1])
-                cells = grid_triangles(steps) + start
+                cells = grid_triangles(steps) + count
+                count += len(points[-1])
                 triangles.append(cells[:, ::-1] if x * y < 0 else cells)
     welded, faces = weld(np.concatenate(points), np.concatenate(triangles))
     shared = len(faces)
@@ -60,7 +62,7 @@ def bezier(control: Points, steps: int) -> Points:
     """(steps + 1, steps + 1, 3) points of a bicubic patch."""
     t = np.linspace(0, 1, steps + 1)
     weights = np.stack([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3], axis=1)
-    return np.einsum("ui,vj,ijk->uvk", weights, weights, control)
+    return np.asarray(np.einsum("ui,vj,ijk->uvk", weights, weights, control))
 
 
 def grid_triangles(steps: int) -> Indices:

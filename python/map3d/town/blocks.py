@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from map3d.town.cars import park_cars
 from map3d.town.massing import FLAT, HALF_HIP, MANSARD, blank_part, flat_part, gable, gable_front_part, hipped_part, mansard, row_part, saw_teeth
 from map3d.town.model import Part
 from map3d.town.plane import area, contains, keeps_its_edges, left, offset, rectangle, split, unit
@@ -317,6 +318,8 @@ def fill_slabs(sketch: Sketch, block: Block) -> None:
                 storeys = int(rng.integers(4, 8))
                 part = blank_part(storeys * 2.85 + 0.6, storeys, "slab", "flat")
                 sketch.lot("slab", RESIDENTIAL, [flat_part(ground, part)], block.street(0), int(rng.integers(1, 60)))
+                sketch.patch(rectangle(ground.mean(axis=0) + across * 11.5, along, length, 6.0), "asphalt", "path")
+                park_cars(sketch, outline, ground[3] + across * 5.8, along, length, rng)
                 break
     for point in scattered(outline, int(area(outline) / 200), 2.0, rng):
         if not any(contains(lot.parts[0].front, point[None], -4.0)[0] for lot in sketch.plan.lots[-4:] if len(lot.parts[0].front) == 4):
@@ -337,6 +340,8 @@ def fill_industry(sketch: Sketch, block: Block) -> None:
             kind = "1080" if len(profile) > 3 else "1030"
             made = row_part(ground[0], ground[1], size * 0.62, profile, replace(part, roof_type=kind), ("street", "yard", "yard", "yard"))
             sketch.lot("industrial", INDUSTRIAL, [made], block.street(0), int(rng.integers(1, 20)))
+            park_cars(sketch, outline, ground[0] - left(along) * 5.5, along, size, rng)
+            park_cars(sketch, outline, ground[3] + left(along) * 6.0, along, size, rng)
             break
     for corner in range(len(outline)):
         spot = outline[corner] + unit(middle - outline[corner]) * 13.0

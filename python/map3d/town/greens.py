@@ -10,7 +10,6 @@ from map3d.town.plane import area, contains, inset, left, offset, rectangle, uni
 from map3d.town.sketch import Sketch
 
 Points = NDArray[np.float64]
-CARS = ("car_white", "car_dark", "car_red", "car_white", "car_dark")
 
 
 def fill_park(sketch: Sketch, block: Block) -> None:
@@ -161,14 +160,3 @@ def fill_belt(sketch: Sketch, block: Block) -> None:
     for point in scattered(offset(outline, 0.0), int(area(outline) / 170), 1.5, rng):
         if abs(float((point - middle) @ across)) > 7:
             sketch.tree(point, ("linden", "fir")[int(rng.integers(2))], 9.0, rng)
-
-
-def park_cars(sketch: Sketch, start: Points, along: Points, count: int, rng: np.random.Generator, side_by_side: bool = False) -> None:
-    """Cars in the orthophoto, in a row along a street or side by side, with gaps."""
-    heading = left(along) if side_by_side else along
-    step = 2.6 if side_by_side else 5.6
-    for i in range(count):
-        if rng.random() < 0.6:
-            centre = start + along * (i + 0.5) * step
-            sketch.patch(rectangle(centre, heading, 4.3, 1.75), CARS[int(rng.integers(len(CARS)))], "thing")
-            sketch.patch(rectangle(centre - heading * 0.3, heading, 1.9, 1.5), "car_dark", "mark")

@@ -13,13 +13,15 @@ from map3d.town.greens import fill_belt, fill_green, fill_park
 from map3d.town.landmarks import market_square, town_hall
 from map3d.town.model import Plan
 from map3d.town.names import street_name
-from map3d.town.plane import area, band, circle, clip, inset, rectangle, unit
+from map3d.town.plane import area, circle, clip, inset, offset
 from map3d.town.seeds import rng
 from map3d.town.sketch import Sketch
+from map3d.town.streets import lay_fields, lay_river, lay_streets
 
 Points = NDArray[np.float64]
 PLAZA_M = 36.0
 MAIN_HALF_M = {"old": 4.6, "belt": 7.5, "perimeter": 7.5, "outer": 7.5}
+OUTER = {"rows": fill_rows, "villas": fill_villas, "slabs": fill_slabs, "industry": fill_industry}
 SHARES = {"perimeter": 0.34, "rows": 0.26, "villas": 0.33, "slabs": 0.035, "industry": 0.035}
 DEPTHS = {"old": 46.0, "belt": 33.0, "perimeter": 62.0, "outer": 74.0}
 HALF_STREETS = {"old": 2.7, "belt": 5.0, "perimeter": 6.0, "outer": 5.0}
@@ -43,7 +45,7 @@ class Frame:
         for kx, ky, phase, sx, sy in self.waves:
             wave = np.sin(p[:, 0] * kx + p[:, 1] * ky + phase)
             out = out + wave[:, None] * np.array([sx, sy])
-        return out
+        return np.asarray(out)
 
 
 def make_frame(seed: int, wanted: int) -> Frame:
@@ -131,7 +133,7 @@ class TownPlan:
 
     def fill(self, block: Block, kind: str, ring: int, number: int, middle: Points) -> None:
         sketch, before = self.sketch, len(self.sketch.plan.lots)
-        sketch.patch(_wider(block.outline, 1.9), "sidewalk", "sidewalk")
+        sketch.patch(offset(block.outline, -1.9), "sidewalk", "sidewalk")
         if ring == 0 and number == 0 and town_hall(sketch, block):
             return
         if kind == "belt":
@@ -141,14 +143,10 @@ class TownPlan:
             (fill_park if kind == "old" else fill_green)(sketch, block)
             return
         zone = self.zone(block, kind, middle)
-        build = {
-            "old": lambda: fill_perimeter(sketch, block, OLD), "perimeter": lambda: fill_perimeter(sketch, block, GRUENDER),
-            "rows": lambda: fill_rows(sketch, block), "villas": lambda: fill_villas(sketch, block),
-            "slabs": lambda: fill_slabs(sketch, block), "industry": lambda: fill_industry(sketch, block),
-        }  # fmt: skip
-        if build[zone]() is False:
+        if (zone == "old" and not fill_perimeter(sketch, block, OLD)) or (zone == "perimeter" and not fill_perimeter(sketch, block, GRUENDER)):
             zone = "villas"
-            fill_villas(sketch, block)
+        if zone in OUTER:
+            OUTER[zone](sketch, block)
         self.left[zone] -= len(sketch.plan.lots) - before
 
     def zone(self, block: Block, kind: str, middle: Points) -> str:
@@ -165,18 +163,10 @@ class TownPlan:
 
     def surroundings(self) -> None:
         """Asphalt under the town, roads, river, fields around, alley trees."""
-        from map3d.town.streets import lay_fields, lay_river, lay_streets
-
         lay_streets(self.sketch, self.frame, self.rings, self.reach_m, PLAZA_M)
         lay_river(self.sketch, self.frame, self.reach_m)
         self.sketch.plan.radius_m = float(np.ceil((self.reach_m * 1.12 + 70) / 16) * 16)
         lay_fields(self.sketch, self.frame, self.reach_m)
-
-
-def _wider(outline: Points, by_m: float) -> Points:
-    from map3d.town.plane import offset
-
-    return offset(outline, -by_m)
 
 
 def sector(start: float, end: float, inner: float, outer: float) -> Points:
@@ -189,6 +179,3 @@ def sector(start: float, end: float, inner: float, outer: float) -> Points:
     rim = [(outer, a) for a in angles]
     polar = [(near, start), *rim, (near, end)]
     return np.array([(r * math.cos(a), r * math.sin(a)) for r, a in polar])
-
-
-__all__ = ["Frame", "TownPlan", "band", "rectangle", "unit"]

@@ -73,12 +73,12 @@ def repeated(pattern: Pixels, width_px: int, height_px: int, key: int = 0) -> Pi
     """A pattern laid over an area, beginning at a place chosen by the key."""
     h, w = pattern.shape[:2]
     tall = np.take(pattern, np.arange(key % h, key % h + height_px) % h, axis=0)
-    return np.take(tall, np.arange(key % w, key % w + width_px) % w, axis=1)
+    return np.asarray(np.take(tall, np.arange(key % w, key % w + width_px) % w, axis=1))
 
 
 def blended(a: Pixels, b: Pixels) -> Pixels:
     """Two pictures around 128, added."""
-    return np.clip(a.astype(np.int16) + b - 128, 0, 255).astype(np.uint8)
+    return np.asarray(np.clip(a.astype(np.int16) + b - 128, 0, 255), dtype=np.uint8)
 
 
 @lru_cache(maxsize=64)

@@ -39,7 +39,7 @@ class Frame:
 
     def __init__(self, part: Part, base_z: float, ground_z: float) -> None:
         self.part, self.base_z, self.eave_z = part, base_z, ground_z + part.eave_m
-        front, back = np.asarray(part.front, dtype=float), np.asarray(part.back, dtype=float)
+        front, back = np.asarray(part.front, dtype=float), snapped(np.asarray(part.back, dtype=float))
         t = np.array([p[0] for p in part.profile])
         h = np.array([p[1] for p in part.profile]) + self.eave_z
         plan = front[:, None] + (back - front)[:, None] * t[None, :, None]
@@ -63,6 +63,16 @@ class Frame:
         """Whether the back is a point or a line, as under a hipped roof."""
         x, y = self.points[:, -1, 0], self.points[:, -1, 1]
         return self.part.closed and abs(float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))) < 1e-2
+
+
+def snapped(points: Points) -> Points:
+    """The points, each one that is nearer than 5 mm to an earlier one moved onto it."""
+    out = points.copy()
+    for k in range(1, len(out)):
+        near = np.flatnonzero(np.abs(out[:k] - out[k]).max(axis=1) < 5e-3)
+        if len(near):
+            out[k] = out[near[0]]
+    return out
 
 
 def depth_of(front: Points, back: Points, closed: bool) -> float:
@@ -249,12 +259,12 @@ def _cap(frame: Frame, dress: Dress) -> Surface:
 def _ground(frame: Frame) -> Surface:
     part, n, m = frame.part, frame.strips, frame.last
     if part.closed:
-        rings = [np.array([frame.foot(k, 0) for k in range(n)])[::-1]]
+        rings = [distinct([frame.foot(k, 0) for k in range(n)])[::-1]]
         if part.hollow:
             rings.append(np.array([frame.foot(k, m) for k in range(n)]))
     else:
         loop = [frame.foot(k, 0) for k in range(n + 1)] + [frame.foot(k, m) for k in range(n, -1, -1)]
-        rings = [np.array(loop)[::-1]]
+        rings = [distinct(loop)[::-1]]
     return Surface(GROUND, [Face(rings, [ring[:, :2] - rings[0][0, :2] for ring in rings], Plain("ground"))])
 
 

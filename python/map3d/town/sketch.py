@@ -27,7 +27,15 @@ class Sketch:
     def full(self) -> bool:
         return len(self.plan.lots) >= self.wanted
 
-    def lot(self, kind: str, function: str, parts: Iterable[Part], street: str = "", number: int = 0, extras: tuple = ()) -> bool:
+    def lot(
+        self,
+        kind: str,
+        function: str,
+        parts: Iterable[Part],
+        street: str = "",
+        number: int = 0,
+        extras: tuple[tuple[str, tuple[float, ...]], ...] = (),
+    ) -> bool:
         """Adds a building with its roofs in the orthophoto; False when the town is full."""
         if self.full:
             return False

@@ -9,7 +9,8 @@ STYLES = ("town", "roman")
 FORMATS = ("citygml", "obj")
 MOST_BUILDINGS = 2_000_000
 BYTES_PER_TEXEL = 0.42
-BYTES_PER_BUILDING = {"citygml": 52_000, "obj": 26_000}
+BYTES_PER_BUILDING = {"citygml": 46_000, "obj": 26_000}
+BYTES_PER_DEEP_BUILDING, SHARED_BYTES = 90_000, 900_000
 BYTES_PER_ORTHO_PX, BYTES_PER_DEM_PX, BYTES_PER_TREE = 0.42, 3.2, 700
 AREA_PER_BUILDING_M2 = 900.0
 
@@ -100,8 +101,9 @@ class TownSpec:
 
     def estimate(self) -> Estimate:
         """What the town will take, within about a factor of two."""
-        size = self.atlas_px**2 * self.texture_count * BYTES_PER_TEXEL
+        size = SHARED_BYTES + self.atlas_px**2 * self.texture_count * BYTES_PER_TEXEL * len(self.formats)
         size += sum(BYTES_PER_BUILDING[f] * self.buildings for f in self.formats)
+        size += BYTES_PER_DEEP_BUILDING * self.buildings * self.deep_share * len(self.formats)
         ortho = round(self.extent_m / self.ortho_pixel_m(self.extent_m)) if self.terrain else 0
         dem = self.extent_m / self.dem_pixel_m(self.extent_m) if self.terrain else 0
         size += ortho**2 * BYTES_PER_ORTHO_PX + dem**2 * BYTES_PER_DEM_PX
