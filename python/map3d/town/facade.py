@@ -182,7 +182,7 @@ def roof_color(cover: str, rng: np.random.Generator) -> Color:
         return tint(DARK_TILES[rng.integers(len(DARK_TILES))], rng)
     colors: dict[str, Color] = {
         "slate": (88, 94, 104), "metal": (150, 158, 162), "copper": (112, 168, 146), "flat": (150, 148, 142),
-        "paving": (206, 196, 176), "roman": (174, 104, 76),
+        "paving": (206, 196, 176), "seats": (222, 214, 198), "roman": (174, 104, 76),
     }  # fmt: skip
     return tint(colors[cover], rng)
 
