@@ -226,6 +226,8 @@ fn rooms_are_not_drawn_but_a_door_that_the_street_shares_is() {
     let wall = surface("WallSurface", &at_lod(4, &polygon("w", "0 0 0 1 0 0 0 1 0 0 0 0")));
     assert_eq!(read_text(&building(&(wall.clone() + &room))).area(), 0.5);
     let sharing = surface("WallSurface", "<bldg:opening xlink:href='#door'/>");
+    let naming = room.replace("<bldg:Room>", "<bldg:Room gml:id='room'>") + "<bldg:interiorRoom xlink:href='#room'/>";
+    assert_eq!(read_text(&building(&(wall.clone() + &naming))).area(), 0.5, "to name a room does not bring it out");
     let reading = read_text(&building(&(wall + &room + &sharing)));
     assert_eq!(reading.area(), 4.5);
     assert!(reading.triangles().iter().any(|t| t.rank == Rank::Opening));

@@ -19,13 +19,18 @@ const NUMBERS: [&str; 9] = [
     "averageHeight",
 ];
 
+/// Lists of repeated properties grow no longer than this.
+const MAX_LIST_BYTES: usize = 4096;
+
 /// Adds a value; a property that comes again makes a list, separated by commas.
 pub fn put(attributes: &mut Attributes, name: &str, value: Value) {
     match attributes.get_mut(name) {
         None => {
             attributes.insert(name.to_owned(), value);
         }
-        Some(old) if *old != value => *old = Value::String(format!("{}, {}", shown(old), shown(&value))),
+        Some(old) if *old != value && old.as_str().is_none_or(|list| list.len() < MAX_LIST_BYTES) => {
+            *old = Value::String(format!("{}, {}", shown(old), shown(&value)));
+        }
         Some(_) => {}
     }
 }

@@ -185,21 +185,16 @@ fn gather(sitting: &mut Sitting, node: NodeId, log: &mut Log) -> Result<Gathered
 
 /// What lies inside and is referred to from outside (a door between room and street) is drawn.
 fn pull_out_of_interiors(member: &mut Member) {
-    let outside = member.features.iter().filter(|f| !f.interior);
-    let links: Vec<u32> = outside.flat_map(|f| &f.links).filter_map(|id| member.by_id.get(id).copied()).collect();
-    for f in links {
-        member.features[f as usize].interior = false;
-        for child in f as usize + 1..member.features.len() {
-            let parent = member.features[child].parent;
-            if parent.is_some_and(|p| p >= f && !member.features[p as usize].interior && is_below(member, child as u32, f)) {
-                member.features[child].interior = false;
-            }
+    let mut pulled = vec![false; member.features.len()];
+    for id in member.features.iter().filter(|f| !f.interior).flat_map(|f| &f.links) {
+        if let Some(f) = member.by_id.get(id) {
+            pulled[*f as usize] = true;
         }
     }
-}
-
-fn is_below(member: &Member, feature: u32, ancestor: u32) -> bool {
-    std::iter::successors(Some(feature), |f| member.features[*f as usize].parent).any(|f| f == ancestor)
+    for f in 0..member.features.len() {
+        pulled[f] |= member.features[f].parent.is_some_and(|p| pulled[p as usize]);
+        member.features[f].interior &= !pulled[f];
+    }
 }
 
 /// The level of detail that an object is drawn at, as the table of objects has it.

@@ -103,7 +103,8 @@ impl FeatureParser<'_> {
     /// A property by its content: a reference, text (an attribute), or objects.
     fn other(&mut self, number: u32) -> Result<()> {
         let local = self.xml.local().to_owned();
-        if let Some(Target::Here(id)) = self.xml.attribute("href").map(|href| target_of(&href)) {
+        let target = self.xml.attribute("href").map(|href| target_of(&href));
+        if let Some(Target::Here(id)) = target.filter(|_| !local.starts_with("interior")) {
             self.this(number).links.push(id);
         }
         let depth = self.xml.depth();

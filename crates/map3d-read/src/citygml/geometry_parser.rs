@@ -96,8 +96,11 @@ impl GeometryParser<'_> {
         } else if is_group(local) {
             self.group(parent, dimension).map(Some)
         } else {
-            let what = if is_thin(local) { "points and lines".to_owned() } else { format!("geometry element {local}") };
-            self.log.report.skip(&what, 1);
+            let (thin, local) = (is_thin(local), local.to_owned());
+            self.log.report.skip(if thin { "points and lines" } else { "geometry of other kinds" }, 1);
+            if !thin {
+                self.log.note("geometry element not drawn", local);
+            }
             self.xml.skip()?;
             Ok(None)
         }
@@ -116,7 +119,11 @@ impl GeometryParser<'_> {
         self.geometry.nodes[node as usize].flip = self.xml.attribute("orientation").is_some_and(|o| o.trim() == "-");
         while self.xml.next_child()? {
             match self.xml.local() {
-                "boundedBy" | "name" | "description" | "metaDataProperty" | "appearance" | "controlPoint" => self.xml.skip()?,
+                "boundedBy" | "name" | "description" | "metaDataProperty" | "controlPoint" => self.xml.skip()?,
+                "appearance" => {
+                    self.log.note("appearance of a TexturedSurface (CityGML 1.0) not drawn", "TexturedSurface");
+                    self.xml.skip()?;
+                }
                 _ => {
                     self.property(node, dimension)?;
                 }

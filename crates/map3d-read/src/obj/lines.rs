@@ -7,7 +7,7 @@ use map3d_base::{Error, Result};
 
 use crate::text::{Input, open_lines};
 
-const MAX_LINE_BYTES: usize = 64 << 20;
+const MAX_LINE_BYTES: usize = 16 << 20;
 
 pub struct Lines {
     input: Input,
