@@ -20,6 +20,6 @@ export async function openPage(browser: Browser, options: BrowserContextOptions 
   page.on("console", (message) => {
     if (message.type() === "error" || message.type() === "warning") problems.push(message.text());
   });
-  page.setDefaultTimeout(30_000);
+  page.setDefaultTimeout(90_000);
   return { page, problems };
 }
