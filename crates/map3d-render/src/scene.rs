@@ -35,10 +35,10 @@ pub struct SceneStats {
 }
 
 impl RenderScene {
-    /// Opens a built scene's folder. Half of `cache_bytes` bounds the mapped chunks, half the texture levels.
+    /// Opens a built scene's folder. A quarter of `cache_bytes` bounds the mapped chunks, the rest the texture levels.
     pub fn open(folder: &Path, cache_bytes: u64) -> Result<Self> {
-        let store = SceneStore::open(folder, cache_bytes / 2)?;
-        Ok(Self { store, textures: TextureCache::new(folder.join("textures"), cache_bytes / 2) })
+        let store = SceneStore::open(folder, cache_bytes / 4)?;
+        Ok(Self { store, textures: TextureCache::new(folder.join("textures"), cache_bytes - cache_bytes / 4) })
     }
 
     pub fn store(&self) -> &SceneStore {

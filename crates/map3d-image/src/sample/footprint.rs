@@ -29,7 +29,7 @@ pub struct Tuning {
 
 impl Default for Tuning {
     fn default() -> Self {
-        Self { texels_per_axis: 2.0, compensation: 0.6, max_gap: 1.05, point_below: 0.4 }
+        Self { texels_per_axis: 1.95, compensation: 0.8, max_gap: 1.05, point_below: 0.4 }
     }
 }
 

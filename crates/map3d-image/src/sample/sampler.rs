@@ -44,6 +44,14 @@ struct Grid {
     wrap: Wrap,
     x: [i64; 3],
     y: [i64; 3],
+    /// Where the texture repeats: after how many 2^-TEXEL_BITS texels, right and down; else 0.
+    period: [i64; 2],
+}
+
+/// Into [0, period); a period of 0 is none.
+#[inline(always)]
+fn at_home(t: i64, period: i64) -> i64 {
+    if period & (period - 1) == 0 { t & period.wrapping_sub(1) } else { t.rem_euclid(period) }
 }
 
 impl Grid {
@@ -62,37 +70,57 @@ impl Grid {
         let line = |start: f64, dx: f64, dy: f64| [fixed(start - 0.5 + half_weight), fixed(dx * step), fixed(dy * step)];
         let x = line(home(uv.u[0]) * w, uv.u[1] * w, uv.u[2] * w);
         let y = line(home(1.0 - uv.v[0]) * h, -uv.v[1] * h, -uv.v[2] * h);
-        Self { level, wrap, x, y }
+        let repeats = |n: u32| if wrap == Wrap::Wrap { i64::from(n) << TEXEL_BITS } else { 0 };
+        let period = [repeats(level.width), repeats(level.height)];
+        Self { level, wrap, x, y, period }
     }
 
     #[inline(always)]
     fn at(&self, x: i32, y: i32) -> (i64, i64) {
         let line = |c: &[i64; 3]| c[0].wrapping_add(c[1].wrapping_mul(i64::from(x))).wrapping_add(c[2].wrapping_mul(i64::from(y)));
-        (line(&self.x), line(&self.y))
+        (at_home(line(&self.x), self.period[0]), at_home(line(&self.y), self.period[1]))
+    }
+
+    /// Whether all taps within `reach` (least and greatest offset, right and down) of a place lie on texels with a right and a lower neighbour.
+    #[inline(always)]
+    fn is_inside(&self, tx: i64, ty: i64, reach: &[[i64; 2]; 2]) -> bool {
+        let inside =
+            |t: i64, [least, most]: [i64; 2], n: u32| t.saturating_add(least) >= 0 && t.saturating_add(most) >> TEXEL_BITS < i64::from(n) - 1;
+        inside(tx, reach[0], self.level.width) && inside(ty, reach[1], self.level.height)
+    }
+
+    /// Adds a bilinear tap that `is_inside`.
+    #[inline(always)]
+    fn inner_tap(&self, sum: &mut TapSum, tx: i64, ty: i64) {
+        let fraction = |t: i64| (t >> (TEXEL_BITS - WEIGHT_BITS)) as u32 & ((1 << WEIGHT_BITS) - 1);
+        let w = self.level.width as usize;
+        let at = (ty >> TEXEL_BITS) as usize * w + (tx >> TEXEL_BITS) as usize;
+        let upper: &[[u16; 4]] = &self.level.texels[at..at + w + 2];
+        sum.add([upper[0], upper[1], upper[w], upper[w + 1]], fraction(tx), fraction(ty));
     }
 
     /// Adds a bilinear tap; returns the weight (of 2^14) that fell outside the texture, where there is an outside.
     #[inline(always)]
     fn tap(&self, sum: &mut TapSum, tx: i64, ty: i64) -> u32 {
-        let (ix, iy) = (tx >> TEXEL_BITS, ty >> TEXEL_BITS);
-        let fraction = |t: i64| (t >> (TEXEL_BITS - WEIGHT_BITS)) as u32 & ((1 << WEIGHT_BITS) - 1);
-        let (fx, fy) = (fraction(tx), fraction(ty));
-        let (w, h) = (self.level.width as usize, self.level.height as usize);
-        if (ix as u64) < (w - 1) as u64 && (iy as u64) < (h - 1) as u64 {
-            let at = iy as usize * w + ix as usize;
-            let upper: &[[u16; 4]] = &self.level.texels[at..at + w + 2];
-            sum.add([upper[0], upper[1], upper[w], upper[w + 1]], fx, fy);
+        if self.is_inside(tx, ty, &[[0; 2]; 2]) {
+            self.inner_tap(sum, tx, ty);
             return 0;
         }
-        self.edge_tap(sum, [ix, iy], [fx, fy])
+        let fraction = |t: i64| (t >> (TEXEL_BITS - WEIGHT_BITS)) as u32 & ((1 << WEIGHT_BITS) - 1);
+        self.edge_tap(sum, [tx >> TEXEL_BITS, ty >> TEXEL_BITS], [fraction(tx), fraction(ty)])
     }
 
-    #[cold]
     #[inline(never)]
     fn edge_tap(&self, sum: &mut TapSum, [ix, iy]: [i64; 2], [fx, fy]: [u32; 2]) -> u32 {
         let (w, h) = (self.level.width, self.level.height);
-        let columns = [fold(ix, w, self.wrap), fold(ix.saturating_add(1), w, self.wrap)];
-        let rows = [fold(iy, h, self.wrap), fold(iy.saturating_add(1), h, self.wrap)];
+        let near = |i: i64, n: u32| match self.wrap {
+            Wrap::Wrap if i < 0 && i >= -i64::from(n) => Some((i + i64::from(n)) as u32),
+            Wrap::Wrap if i >= i64::from(n) && i < 2 * i64::from(n) => Some((i - i64::from(n)) as u32),
+            _ if (0..i64::from(n)).contains(&i) => Some(i as u32),
+            wrap => fold(i, n, wrap),
+        };
+        let columns = [near(ix, w), near(ix.saturating_add(1), w)];
+        let rows = [near(iy, h), near(iy.saturating_add(1), h)];
         let mut outside = 0;
         let one = 1 << WEIGHT_BITS;
         let texels: [[u16; 4]; 4] = std::array::from_fn(|k| {
@@ -114,6 +142,7 @@ impl Grid {
 pub struct Sampler {
     grid: Grid,
     taps: Vec<[i64; 2]>,
+    reach: [[i64; 2]; 2],
     has_alpha: bool,
     /// From a sum of taps to 16 bits, times 2^40.
     scale: u64,
@@ -135,11 +164,13 @@ impl Sampler {
     pub fn with(level: Arc<Level>, plan: &Footprint, has_alpha: bool, uv: &UvMap, wrap: Wrap, outside: Outside) -> Self {
         let unit = (1u64 << TEXEL_BITS) as f64;
         let taps: Vec<[i64; 2]> = plan.taps.iter().map(|t| t.map(|c| (c * unit).round() as i64)).collect();
+        let bounds = |k: usize| taps.iter().fold([0, 0], |[lo, hi], t: &[i64; 2]| [t[k].min(lo), t[k].max(hi)]);
+        let reach = [bounds(0), bounds(1)];
         let full = (taps.len() as u64) * (u64::from(UNIT15) << TAP_BITS);
         let scale = ((65_535u64 << 40) + full / 2) / full;
         let linear = |c: [u8; 4]| [c[0], c[1], c[2]].map(|b| LINEAR16[b as usize]);
         let around = if wrap == Wrap::Border { outside.border } else { outside.diffuse };
-        Self { grid: Grid::new(level, wrap, uv), taps, has_alpha, scale, diffuse: linear(outside.diffuse), outside: linear(around) }
+        Self { grid: Grid::new(level, wrap, uv), taps, reach, has_alpha, scale, diffuse: linear(outside.diffuse), outside: linear(around) }
     }
 
     pub fn tap_count(&self) -> usize {
@@ -152,14 +183,21 @@ impl Sampler {
         let (tx, ty) = self.grid.at(x, y);
         let mut sum = TapSum::new();
         let mut outside = 0;
-        for [dx, dy] in &self.taps {
-            outside += self.grid.tap(&mut sum, tx + dx, ty + dy);
+        if self.grid.is_inside(tx, ty, &self.reach) {
+            self.taps.iter().for_each(|[dx, dy]| self.grid.inner_tap(&mut sum, tx + dx, ty + dy));
+        } else {
+            outside = self.edge_taps(&mut sum, tx, ty);
         }
         let channels = sum.channels();
         if outside == 0 && !self.has_alpha {
             return std::array::from_fn(|c| multiplied(((u64::from(channels[c]) * self.scale + (1 << 39)) >> 40) as u32, self.diffuse[c]));
         }
         self.mixed(channels, outside)
+    }
+
+    #[inline(never)]
+    fn edge_taps(&self, sum: &mut TapSum, tx: i64, ty: i64) -> u32 {
+        self.taps.iter().map(|[dx, dy]| self.grid.tap(sum, tx.saturating_add(*dx), ty.saturating_add(*dy))).sum()
     }
 
     /// Weighs by alpha, and with what lies outside the texture.
