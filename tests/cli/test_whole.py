@@ -128,7 +128,7 @@ def test_content_that_leaves_the_frame_is_refused_until_regrid(run: Run, town: W
     run("render", "view")
     before = digest(town)
     far = tmp_path / "far.obj"
-    far.write_text(house(5000.0, 0.0, 10.0))
+    far.write_text(house(600.0, 0.0, 10.0))
     run("add-files", "town", str(far))
     status, _, err = run("render", "view")
     assert (status, "--regrid" in err) == (1, True)
