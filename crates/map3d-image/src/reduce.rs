@@ -54,11 +54,14 @@ fn pairs<'a, T: Copy>(upper: &'a [T], lower: &'a [T]) -> impl Iterator<Item = [T
     squares.map(|(u, l)| [u[0], u[1], l[0], l[1]])
 }
 
+#[inline(always)]
 fn mean_color(four: [[u16; 4]; 4]) -> [u16; 4] {
-    std::array::from_fn(|c| {
-        let sum: u32 = four.iter().map(|p| u32::from(p[c])).sum();
-        ((sum + 2) / 4) as u16
-    })
+    let mut out = [0; 4];
+    for (c, mean) in out.iter_mut().enumerate() {
+        let sum = u32::from(four[0][c]) + u32::from(four[1][c]) + u32::from(four[2][c]) + u32::from(four[3][c]);
+        *mean = ((sum + 2) / 4) as u16;
+    }
+    out
 }
 
 /// The commonest id; nothing only when three are nothing. Ties: the id with the nearest child, then the first.

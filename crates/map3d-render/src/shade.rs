@@ -37,17 +37,23 @@ impl Shader {
         Ok(())
     }
 
+    #[inline(always)]
     fn surface(&mut self, vis: &VisBuf, cache: &TextureCache, slot: u32) -> Result<&Shaded> {
-        let entry = &mut self.surfaces[slot as usize];
-        if entry.is_none() {
-            let surface = vis.surface(slot);
-            let chunk = vis.chunk(surface.chunk);
-            let material = chunk.materials().get(surface.material as usize);
-            let material = material.ok_or_else(|| Error::format(chunk.path(), format!("material {} of a triangle", surface.material)))?;
-            *entry = Some(Shaded::new(cache, material, &surface, vis.depth_plane(slot))?);
-            self.setups += 1;
+        if self.surfaces[slot as usize].is_none() {
+            self.set_up(vis, cache, slot)?;
         }
-        Ok(entry.as_ref().expect("set up above"))
+        Ok(self.surfaces[slot as usize].as_ref().expect("set up above"))
+    }
+
+    #[inline(never)]
+    fn set_up(&mut self, vis: &VisBuf, cache: &TextureCache, slot: u32) -> Result<()> {
+        let surface = vis.surface(slot);
+        let chunk = vis.chunk(surface.chunk);
+        let material = chunk.materials().get(surface.material as usize);
+        let material = material.ok_or_else(|| Error::format(chunk.path(), format!("material {} of a triangle", surface.material)))?;
+        self.surfaces[slot as usize] = Some(Shaded::new(cache, material, &surface, vis.depth_plane(slot))?);
+        self.setups += 1;
+        Ok(())
     }
 
     /// A pixel all of whose samples meet one surface.

@@ -17,7 +17,7 @@ pub fn bytes_from_normals(normals: &[[i16; 3]]) -> Vec<u8> {
     let mut out = vec![0; normals.len() * 3];
     for (to, n) in out.as_chunks_mut::<3>().0.iter_mut().zip(normals) {
         if *n != [0; 3] {
-            *to = n.map(|c| table[c as u16 as usize]);
+            *to = [table[n[0] as u16 as usize], table[n[1] as u16 as usize], table[n[2] as u16 as usize]];
         }
     }
     out

@@ -184,15 +184,23 @@ impl Sampler {
         let mut sum = TapSum::new();
         let mut outside = 0;
         if self.grid.is_inside(tx, ty, &self.reach) {
-            self.taps.iter().for_each(|[dx, dy]| self.grid.inner_tap(&mut sum, tx + dx, ty + dy));
+            for [dx, dy] in &self.taps {
+                self.grid.inner_tap(&mut sum, tx + dx, ty + dy);
+            }
         } else {
             outside = self.edge_taps(&mut sum, tx, ty);
         }
         let channels = sum.channels();
         if outside == 0 && !self.has_alpha {
-            return std::array::from_fn(|c| multiplied(((u64::from(channels[c]) * self.scale + (1 << 39)) >> 40) as u32, self.diffuse[c]));
+            return [self.full(channels, 0), self.full(channels, 1), self.full(channels, 2)];
         }
         self.mixed(channels, outside)
+    }
+
+    /// A channel of an opaque sum.
+    #[inline(always)]
+    fn full(&self, channels: [u32; 4], c: usize) -> u16 {
+        multiplied(((u64::from(channels[c]) * self.scale + (1 << 39)) >> 40) as u32, self.diffuse[c])
     }
 
     #[inline(never)]

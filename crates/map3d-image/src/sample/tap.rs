@@ -15,6 +15,7 @@ const ONE: u32 = 1 << WEIGHT_BITS;
 const DROP: i32 = (2 * WEIGHT_BITS - TAP_BITS) as i32;
 
 /// Weights of the four texels (TL, TR, BL, BR) at fractions in 1/128 texel; together 2^14.
+#[inline(always)]
 fn weights(fx: u32, fy: u32) -> [u32; 4] {
     let (gx, gy) = (ONE - fx, ONE - fy);
     [gx * gy, fx * gy, gx * fy, fx * fy]
@@ -37,7 +38,7 @@ impl TapSum {
     #[inline(always)]
     pub fn add(&mut self, texels: [[u16; 4]; 4], fx: u32, fy: u32) {
         let [w00, w01, w10, w11] = weights(fx, fy);
-        let [a, b, c, d] = texels.map(bytemuck::cast::<[u16; 4], i64>);
+        let [a, b, c, d]: [i64; 4] = bytemuck::cast(texels);
         // SAFETY: SSE2 is part of x86-64; all operands are values.
         unsafe {
             let (above, below) = (_mm_set1_epi32((w00 | w01 << 16) as i32), _mm_set1_epi32((w10 | w11 << 16) as i32));

@@ -22,19 +22,22 @@ pub struct Level {
 
 impl Level {
     pub fn from_raster(raster: &Raster) -> Self {
+        let table: &[u16; 256] = &LINEAR15;
         let texel = |p: &[u8; 4]| {
-            let a = (u32::from(p[3]) * UNIT15 + 127) / 255;
-            let channel = |c: u8| match p[3] {
-                255 => LINEAR15[c as usize],
-                _ => ((u32::from(LINEAR15[c as usize]) * u32::from(p[3]) + 127) / 255) as u16,
-            };
-            [channel(p[0]), channel(p[1]), channel(p[2]), a as u16]
+            let [r, g, b] = [table[p[0] as usize], table[p[1] as usize], table[p[2] as usize]];
+            if p[3] == 255 {
+                return [r, g, b, UNIT15 as u16];
+            }
+            let a = u32::from(p[3]);
+            let times = |c: u16| ((u32::from(c) * a + 127) / 255) as u16;
+            [times(r), times(g), times(b), ((a * UNIT15 + 127) / 255) as u16]
         };
         Self { width: raster.width, height: raster.height, texels: raster.pixels.iter().map(texel).collect() }
     }
 
     pub fn from_linear(linear: &LinearRaster) -> Self {
-        let texel = |p: &[u16; 4]| p.map(|c| ((u32::from(c) * UNIT15 + 32_767) / 65_535) as u16);
+        let channel = |c: u16| ((u32::from(c) * UNIT15 + 32_767) / 65_535) as u16;
+        let texel = |p: &[u16; 4]| [channel(p[0]), channel(p[1]), channel(p[2]), channel(p[3])];
         Self { width: linear.width, height: linear.height, texels: linear.pixels.iter().map(texel).collect() }
     }
 

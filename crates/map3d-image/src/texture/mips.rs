@@ -22,9 +22,10 @@ pub fn level_size(width: u32, height: u32, level: u32) -> (u32, u32) {
 
 /// Level 1 of an image that is level 0.
 pub fn first_mip(image: &Raster) -> LinearRaster {
+    let table: &[u16; 256] = &LINEAR16;
     shrink(image.width, image.height, |y, row| {
         for (to, from) in row.iter_mut().zip(image.row(y)) {
-            *to = premultiplied(*from);
+            *to = premultiplied_by(table, *from);
         }
     })
 }
@@ -37,10 +38,18 @@ pub fn next_mip(image: &LinearRaster) -> LinearRaster {
 
 /// Linear light premultiplied by alpha, of an sRGB pixel with straight alpha.
 pub fn premultiplied(p: [u8; 4]) -> [u16; 4] {
-    let light = [LINEAR16[p[0] as usize], LINEAR16[p[1] as usize], LINEAR16[p[2] as usize]];
+    premultiplied_by(&LINEAR16, p)
+}
+
+#[inline(always)]
+fn premultiplied_by(table: &[u16; 256], p: [u8; 4]) -> [u16; 4] {
+    let (r, g, b) = (table[p[0] as usize], table[p[1] as usize], table[p[2] as usize]);
+    if p[3] == 255 {
+        return [r, g, b, 65_535];
+    }
     let a = u32::from(p[3]);
-    let times = |c: u16| if a == 255 { c } else { ((u32::from(c) * a + 127) / 255) as u16 };
-    [times(light[0]), times(light[1]), times(light[2]), (a * 257) as u16]
+    let times = |c: u16| ((u32::from(c) * a + 127) / 255) as u16;
+    [times(r), times(g), times(b), (a * 257) as u16]
 }
 
 impl LinearRaster {
@@ -97,12 +106,18 @@ fn halve(nw: u32, nh: u32, mut load: impl FnMut(u32, &mut [[u16; 4]])) -> Linear
         load(2 * y, &mut rows[0]);
         load(2 * y + 1, &mut rows[1]);
         let pairs = rows[0].as_chunks::<2>().0.iter().zip(rows[1].as_chunks::<2>().0);
-        pixels.extend(pairs.map(|(top, bottom)| -> [u16; 4] {
-            std::array::from_fn(|c| {
-                let sum = u32::from(top[0][c]) + u32::from(top[1][c]) + u32::from(bottom[0][c]) + u32::from(bottom[1][c]);
-                ((sum + 2) >> 2) as u16
-            })
-        }));
+        pixels.extend(pairs.map(|(top, bottom)| quarter(top, bottom)));
     }
     LinearRaster { width: nw, height: nh, pixels }
+}
+
+/// Mean of four texels.
+#[inline(always)]
+fn quarter(top: &[[u16; 4]; 2], bottom: &[[u16; 4]; 2]) -> [u16; 4] {
+    let mut out = [0; 4];
+    for (c, mean) in out.iter_mut().enumerate() {
+        let sum = u32::from(top[0][c]) + u32::from(top[1][c]) + u32::from(bottom[0][c]) + u32::from(bottom[1][c]);
+        *mean = ((sum + 2) >> 2) as u16;
+    }
+    out
 }
