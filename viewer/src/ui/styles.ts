@@ -59,7 +59,7 @@ export const STYLES = `
 .map3d-popup::after { content: ""; position: absolute; left: 50%; bottom: -5px; width: 10px; height: 10px; margin-left: -5px; background: inherit; clip-path: polygon(0 50%, 100% 50%, 50% 100%); }
 .map3d-popup:has(.map3d-popup-close) { padding-right: 46px; }
 .map3d-popup-body { overflow-wrap: anywhere; max-height: 40vh; overflow-y: auto; }
-.map3d-popup-close { position: absolute; right: 0; top: 0; width: 44px; height: 44px; padding: 0; border: 0; background: none; color: var(--map3d-faint) !important; }
+.map3d-popup-close { position: absolute; right: 0; top: -2px; width: 44px; height: 44px; padding: 0; border: 0; background: none; color: var(--map3d-faint) !important; }
 .map3d-popup-close svg { width: 16px; height: 16px; }
 
 .map3d-debug { position: absolute; inset: 0; font: 11px/1.2 ui-monospace, monospace; }
