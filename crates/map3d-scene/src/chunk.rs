@@ -7,7 +7,8 @@ use map3d_base::{Box3, Error, Result, Vec3};
 use memmap2::Mmap;
 
 use crate::records::{
-    CHUNK_MAGIC, ChunkHeader, ChunkObject, CornerNormals, EMPTY, FLAG_CUTOUT, FLAG_NORMALS, LEAF_BIT, Leaf, MaterialRecord, Node, TriangleRecord, VERSION,
+    CHUNK_MAGIC, ChunkHeader, ChunkObject, CornerNormals, EMPTY, FLAG_CUTOUT, FLAG_NORMALS, LEAF_BIT, Leaf, MaterialRecord, Node, TriangleRecord,
+    VERSION,
 };
 
 /// Section offsets in bytes.

@@ -204,8 +204,13 @@ fn a_ground_plane_lies_under_scenes_without_terrain() {
 #[test]
 fn prototypes_are_stored_once_and_placed() {
     let folder = new_folder();
-    let tree: Vec<Face> = [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 0.0, 3.0]], [[0.0; 3], [0.0, 1.0, 0.0], [0.0, 0.0, 3.0]]].map(|t| (t, 0, 0, Rank::Other)).to_vec();
-    let at = |object: u32, x: f64| Instance { prototype: 1, object, transform: [2.0, 0.0, 0.0, 500_000.0 + x, 0.0, 2.0, 0.0, 5_000_000.0, 0.0, 0.0, 2.0, 1.0] };
+    let tree: Vec<Face> =
+        [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 0.0, 3.0]], [[0.0; 3], [0.0, 1.0, 0.0], [0.0, 0.0, 3.0]]].map(|t| (t, 0, 0, Rank::Other)).to_vec();
+    let at = |object: u32, x: f64| Instance {
+        prototype: 1,
+        object,
+        transform: [2.0, 0.0, 0.0, 500_000.0 + x, 0.0, 2.0, 0.0, 5_000_000.0, 0.0, 0.0, 2.0, 1.0],
+    };
     let instances = vec![at(2, 300.0), at(1, 100.0), Instance { prototype: 9, ..at(1, 0.0) }];
     write_asset(&folder.0, "town", &[batch(&tree, 1)], Materials { materials: vec![Material::default()], instances });
     let report = run(&folder, &request());
@@ -241,7 +246,9 @@ fn a_damaged_chunk_is_refused() {
     }
     // Node child, triangle number in a leaf, a NaN corner, material, a box too small.
     let leaf = 128 + 256;
-    for (at, value) in [(128 + 192, 5u32), (leaf + 288, 9), (leaf, f32::NAN.to_bits()), (leaf + 320 + 24, 70), (128 + 96, 0), (40, f32::NAN.to_bits())] {
+    for (at, value) in
+        [(128 + 192, 5u32), (leaf + 288, 9), (leaf, f32::NAN.to_bits()), (leaf + 320 + 24, 70), (128 + 96, 0), (40, f32::NAN.to_bits())]
+    {
         let mut bad = good.clone();
         bad[at..at + 4].copy_from_slice(&value.to_le_bytes());
         std::fs::write(&path, &bad).expect("write");

@@ -64,9 +64,8 @@ fn a_block_key_changes_with_what_the_block_shows() {
     let store = build(&folder, &soup);
     let mut frame = frame(0.0, 90.0, 128.0);
     frame.zmax = 4;
-    let keys = |store: &SceneStore| -> Vec<String> {
-        (0..4).map(|k| block_key(store, &frame, Tile { z: 1, x: k % 2, y: k / 2 }).expect("key")).collect()
-    };
+    let keys =
+        |store: &SceneStore| -> Vec<String> { (0..4).map(|k| block_key(store, &frame, Tile { z: 1, x: k % 2, y: k / 2 }).expect("key")).collect() };
     let before = keys(&store);
     assert_eq!(before, keys(&open(&folder)), "the same in every process");
     // One more house, in the north-east.

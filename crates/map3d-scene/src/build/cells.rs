@@ -214,7 +214,7 @@ mod tests {
     fn pinned_cells_stay_when_content_comes_and_goes() {
         let square = Square([0.0, 0.0, 65536.0]);
         let pinned = vec![[4, 0, 0], [5, 28, 0]];
-        let (_, cells) = grow(square, &pinned, &[at(30000.0, 30000.0), at(60000.0, 900.0)]);
+        let (_, cells) = grow(square, &pinned, &[at(30000.0, 30000.0), at(58000.0, 900.0)]);
         assert!(pinned.iter().all(|c| cells.contains(c)), "{cells:?}");
         assert_eq!(cells.len(), 3);
     }

@@ -10,9 +10,7 @@ use twox_hash::XxHash3_128;
 use super::triangle::BuildTriangle;
 use crate::bvh::{self, Aabb, Tree};
 use crate::lattice::{Point, STEPS_PER_M, metres};
-use crate::records::{
-    CHUNK_MAGIC, ChunkHeader, ChunkObject, EMPTY, FLAG_CUTOUT, FLAG_NORMALS, Leaf, MaterialRecord, TriangleRecord, VERSION,
-};
+use crate::records::{CHUNK_MAGIC, ChunkHeader, ChunkObject, EMPTY, FLAG_CUTOUT, FLAG_NORMALS, Leaf, MaterialRecord, TriangleRecord, VERSION};
 
 /// A chunk file's bytes and what the scene index says of it.
 #[derive(Clone, Debug)]

@@ -52,7 +52,14 @@ pub enum GroundPlane {
 impl Default for BuildOptions {
     fn default() -> Self {
         let on = true;
-        Self { merge_vertices: on, merge_faces: on, drop_degenerate: on, merge_materials: on, drop_untextured: false, ground_plane: GroundPlane::Auto }
+        Self {
+            merge_vertices: on,
+            merge_faces: on,
+            drop_degenerate: on,
+            merge_materials: on,
+            drop_untextured: false,
+            ground_plane: GroundPlane::Auto,
+        }
     }
 }
 

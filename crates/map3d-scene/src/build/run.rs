@@ -68,7 +68,8 @@ fn textures(folder: &Path, assets: &[Asset], request: &BuildRequest, report: &mu
     })?;
     report.textures = result.by_source.len() as u64;
     report.textures_kept = result.kept;
-    report.texture_warnings = result.missing.iter().map(|(reason, (count, example))| (reason.clone(), format!("{count}, first: {example}"))).collect();
+    report.texture_warnings =
+        result.missing.iter().map(|(reason, (count, example))| (reason.clone(), format!("{count}, first: {example}"))).collect();
     Ok(result)
 }
 
@@ -122,7 +123,8 @@ impl Build<'_> {
         })?;
         if self.work.request.options.merge_vertices {
             let memory = self.work.request.memory_bytes() / 4;
-            self.report.duplicate_vertices = self.work.source.assets.iter().map(|a| duplicate_vertices(&a.mesh, self.work.request.origin, memory)).sum();
+            self.report.duplicate_vertices =
+                self.work.source.assets.iter().map(|a| duplicate_vertices(&a.mesh, self.work.request.origin, memory)).sum();
         }
         Ok(level)
     }

@@ -10,8 +10,13 @@ const SWEEP_ITEMS: usize = 32;
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Kind {
     /// Range of `BinaryTree::order`.
-    Leaf { start: u32, end: u32 },
-    Inner { children: [u32; 2] },
+    Leaf {
+        start: u32,
+        end: u32,
+    },
+    Inner {
+        children: [u32; 2],
+    },
 }
 
 pub(super) struct BinaryNode {

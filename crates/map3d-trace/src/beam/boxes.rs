@@ -64,21 +64,29 @@ impl BoxMap {
     #[inline(always)]
     fn least(&self, row: usize, node: &Node) -> [f32; 8] {
         let r = &self.rows[row];
-        let side = |axis: usize| &node.bounds[if r.m[axis] < 0.0 { axis + 3 } else { axis }];
-        sum(r.m, side(0), side(1), side(2), r.low)
+        sum(r.m, side(node, r.m, 0, true), side(node, r.m, 1, true), side(node, r.m, 2, true), r.low)
     }
 
     #[inline(always)]
     fn greatest(&self, row: usize, node: &Node) -> [f32; 8] {
         let r = &self.rows[row];
-        let side = |axis: usize| &node.bounds[if r.m[axis] < 0.0 { axis } else { axis + 3 }];
-        sum(r.m, side(0), side(1), side(2), r.high)
+        sum(r.m, side(node, r.m, 0, false), side(node, r.m, 1, false), side(node, r.m, 2, false), r.high)
     }
+}
+
+/// The sides of the children's boxes that make a sum with these coefficients least or greatest.
+#[inline(always)]
+fn side(node: &Node, m: [f32; 3], axis: usize, least: bool) -> &[f32; 8] {
+    &node.bounds[if (m[axis] < 0.0) == least { axis + 3 } else { axis }]
 }
 
 #[inline(always)]
 fn sum(m: [f32; 3], a: &[f32; 8], b: &[f32; 8], c: &[f32; 8], constant: f32) -> [f32; 8] {
-    std::array::from_fn(|k| m[0] * a[k] + m[1] * b[k] + m[2] * c[k] + constant)
+    let mut out = [0.0; 8];
+    for k in 0..8 {
+        out[k] = m[0] * a[k] + m[1] * b[k] + m[2] * c[k] + constant;
+    }
+    out
 }
 
 impl Row {

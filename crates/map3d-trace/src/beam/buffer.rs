@@ -154,9 +154,9 @@ impl SampleBuffer {
     /// Whether a key of at least `near` can still win a sample in the groups of the box (first column, first row, last column, last row).
     #[inline(always)]
     pub fn can_win<L: Lanes>(&mut self, near: i32, groups: [u8; 4]) -> bool {
-        let [x0, y0, x1, y1] = groups.map(usize::from);
-        for row in y0..=y1 {
-            for column in x0..=x1 {
+        let [x0, y0, x1, y1] = groups;
+        for row in usize::from(y0)..=usize::from(y1) {
+            for column in usize::from(x0)..=usize::from(x1) {
                 let group = (row * GROUPS_PER_ROW + column) & 63;
                 if near > self.group_far[group] {
                     continue;

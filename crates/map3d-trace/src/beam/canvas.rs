@@ -1,5 +1,7 @@
 //! Draws triangles into the sample buffer: whole pixels 16 at a time, pixels on edges sample by sample.
 
+use std::cell::Cell;
+
 use map3d_base::samples::SAMPLES;
 use map3d_scene::MaterialRecord;
 
@@ -21,7 +23,7 @@ pub(crate) struct Candidate<'a> {
     pub track: Track,
     pub is_regular: bool,
     /// Set once it has won a sample.
-    pub slot: u32,
+    pub slot: Cell<u32>,
     /// Material and UV planes when the material is a cut-out.
     pub cutout: Option<(&'a MaterialRecord, [Affine; 2])>,
 }
@@ -61,6 +63,7 @@ impl<L: Lanes> CoarseEdge<L> {
         }
     }
 
+    /// 16 pixels from (i, j) on: negative where one may be not inside (`inside`), or is outside (`outside`).
     #[inline(always)]
     fn at(&self, from: i32, i: i32, j: i32) -> L {
         L::splat(from + self.x * i + self.y * j).add(self.along)
@@ -70,12 +73,12 @@ impl<L: Lanes> CoarseEdge<L> {
 impl Canvas<'_> {
     /// Draws a triangle with a key plane.
     #[inline(always)]
-    pub fn draw<L: Lanes>(&mut self, candidate: &mut Candidate, b: &PixelBox, edges: &[Edge<L>; 3]) {
+    pub fn draw<L: Lanes>(&mut self, candidate: &Candidate, b: &PixelBox, edges: &[Edge<L>; 3]) {
         if (b.x1 - b.x0 + 1) * (b.y1 - b.y0 + 1) > FEW_PIXELS {
             return self.draw_rows(candidate, b, edges);
         }
-        for j in b.y0..=b.y1 {
-            for i in b.x0..=b.x1 {
+        for j in b.y0..b.y1 + 1 {
+            for i in b.x0..b.x1 + 1 {
                 self.draw_pixel(candidate, i, j, edges);
             }
         }
@@ -83,20 +86,17 @@ impl Canvas<'_> {
 
     /// Rows of up to 64 pixels, 16 at a time: whole pixels in front of all that is there are set at once.
     #[inline(always)]
-    fn draw_rows<L: Lanes>(&mut self, candidate: &mut Candidate, b: &PixelBox, edges: &[Edge<L>; 3]) {
+    fn draw_rows<L: Lanes>(&mut self, candidate: &Candidate, b: &PixelBox, edges: &[Edge<L>; 3]) {
         let coarse = [CoarseEdge::of(&edges[0]), CoarseEdge::of(&edges[1]), CoarseEdge::of(&edges[2])];
-        let plane = candidate.track.plane;
+        let plane = &candidate.track.plane;
         let along = L::load(&COUNT_UP).mul(L::splat(plane.gx));
         let allow_whole = if candidate.cutout.is_some() { 0 } else { 0xFFFF };
-        for j in b.y0..=b.y1 {
-            for block in b.x0 >> 4..=b.x1 >> 4 {
+        for j in b.y0..b.y1 + 1 {
+            for block in b.x0 >> 4..(b.x1 >> 4) + 1 {
                 let i = block * 16;
                 let valid = columns(b, i);
-                let sides = |from: fn(&CoarseEdge<L>) -> i32| {
-                    let at = |k: usize| coarse[k].at(from(&coarse[k]), i, j);
-                    at(0).or(at(1)).or(at(2)).negative()
-                };
-                let mut open = !sides(|e| e.outside) & valid;
+                let [e, f, g] = &coarse;
+                let mut open = !e.at(e.outside, i, j).or(f.at(f.outside, i, j)).or(g.at(g.outside, i, j)).negative() & valid;
                 if open == 0 {
                     continue;
                 }
@@ -108,7 +108,8 @@ impl Canvas<'_> {
                     continue;
                 }
                 let hi = plane.keys(fixed.add(L::splat(plane.offset_hi)));
-                let whole = !sides(|e| e.inside) & hi.less(L::load(&self.samples.near[place])) & open & allow_whole;
+                let partly = e.at(e.inside, i, j).or(f.at(f.inside, i, j)).or(g.at(g.inside, i, j)).negative();
+                let whole = !partly & hi.less(L::load(&self.samples.near[place])) & open & allow_whole;
                 if whole != 0 {
                     self.set_block(candidate, place, whole, lo, hi);
                 }
@@ -124,7 +125,7 @@ impl Canvas<'_> {
 
     /// Whole pixels of a block, all samples in front of what is there.
     #[inline(always)]
-    fn set_block<L: Lanes>(&mut self, candidate: &mut Candidate, place: usize, whole: u32, lo: L, hi: L) {
+    fn set_block<L: Lanes>(&mut self, candidate: &Candidate, place: usize, whole: u32, lo: L, hi: L) {
         let slot = self.slot_of(candidate);
         put_slots::<L>(slot, whole, &mut self.samples.slot[place]);
         lo.put(whole, &mut self.samples.near[place]);
@@ -136,14 +137,13 @@ impl Canvas<'_> {
 
     /// One pixel, sample by sample.
     #[inline(always)]
-    fn draw_pixel<L: Lanes>(&mut self, candidate: &mut Candidate, i: i32, j: i32, edges: &[Edge<L>; 3]) {
+    fn draw_pixel<L: Lanes>(&mut self, candidate: &Candidate, i: i32, j: i32, edges: &[Edge<L>; 3]) {
         let p = (j as usize * SIDE + i as usize) & (SIDE * SIDE - 1);
         let bounds = candidate.track.plane.key_bounds(i, j);
         if bounds.0 > self.samples.far_of(p) {
             return;
         }
-        let at = |k: usize| L::splat(edges[k].corner(i, j)).add(edges[k].offsets);
-        let covered = !at(0).or(at(1)).or(at(2)).negative() & 0xFFFF;
+        let covered = !edges[0].samples(i, j).or(edges[1].samples(i, j)).or(edges[2].samples(i, j)).negative() & 0xFFFF;
         if covered != 0 {
             let keys = candidate.track.plane.sample_keys::<L>(i, j);
             self.merge(candidate, p, covered, keys, bounds);
@@ -162,7 +162,7 @@ impl Canvas<'_> {
 
     /// Lets the covered samples of a pixel compete; `bounds` hold all of `keys`.
     #[inline(always)]
-    pub fn merge<L: Lanes>(&mut self, candidate: &mut Candidate, p: usize, covered: u32, keys: L, bounds: (i32, i32)) {
+    pub fn merge<L: Lanes>(&mut self, candidate: &Candidate, p: usize, covered: u32, keys: L, bounds: (i32, i32)) {
         let old = self.keys_at::<L>(p);
         let mut wins = keys.less(old) & covered;
         let ties = keys.equal(old) & covered;
@@ -227,12 +227,12 @@ impl Canvas<'_> {
 
     /// The candidate's slot; its first win makes one.
     #[inline(always)]
-    fn slot_of(&mut self, candidate: &mut Candidate) -> u32 {
-        if candidate.slot == NOTHING {
-            candidate.slot = self.tracks.len() as u32;
+    fn slot_of(&mut self, candidate: &Candidate) -> u32 {
+        if candidate.slot.get() == NOTHING {
+            candidate.slot.set(self.tracks.len() as u32);
             self.tracks.push(candidate.track);
         }
-        candidate.slot
+        candidate.slot.get()
     }
 }
 

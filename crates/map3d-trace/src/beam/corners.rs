@@ -43,15 +43,27 @@ impl Corners {
         let (r, u, d) = (projection.axes.right, projection.axes.up, projection.axes.forward);
         let left = [projection.corner_px[0] as f64, projection.corner_px[1] as f64];
         for k in 0..8 {
-            let dot = |a: [f64; 3]| a[0] * p[0][k] + a[1] * p[1][k] + a[2] * p[2][k];
-            let x = (dot(r) - frame.u0_m) / pixel_m;
-            let y = (frame.v0_m - dot(u)) / pixel_m;
+            let x = (r[0] * p[0][k] + r[1] * p[1][k] + r[2] * p[2][k] - frame.u0_m) / pixel_m;
+            let y = (frame.v0_m - (u[0] * p[0][k] + u[1] * p[1][k] + u[2] * p[2][k])) / pixel_m;
+            let depth = d[0] * p[0][k] + d[1] * p[1][k] + d[2] * p[2][k];
             self.pixel[corner * 3][k] = x - left[0];
             self.pixel[corner * 3 + 1][k] = y - left[1];
-            self.pixel[corner * 3 + 2][k] = (dot(d) - frame.d0_m) * DEPTH_UNITS_PER_M;
+            self.pixel[corner * 3 + 2][k] = (depth - frame.d0_m) * DEPTH_UNITS_PER_M;
             self.snapped[corner * 2][k] = snap(x) - left[0] * f64::from(STEPS);
             self.snapped[corner * 2 + 1][k] = snap(y) - left[1] * f64::from(STEPS);
         }
+    }
+
+    /// Unsnapped corners of one triangle.
+    #[inline(always)]
+    pub fn of_lane(&self, lane: usize) -> [[f64; 3]; 3] {
+        let mut out = [[0.0; 3]; 3];
+        for corner in 0..3 {
+            for k in 0..3 {
+                out[corner][k] = self.pixel[corner * 3 + k][lane];
+            }
+        }
+        out
     }
 
     /// Lanes whose snapped box meets the sub-tile.
@@ -60,11 +72,16 @@ impl Corners {
         let side = f64::from(STEPS) * SUBTILE_PX as f64;
         let mut flags = [0u32; 8];
         for k in 0..8 {
-            let lo = |axis: usize| least(self.snapped[axis][k], self.snapped[axis + 2][k], self.snapped[axis + 4][k]);
-            let hi = |axis: usize| -least(-self.snapped[axis][k], -self.snapped[axis + 2][k], -self.snapped[axis + 4][k]);
-            flags[k] = u32::from((hi(0) >= 0.0) & (lo(0) < side) & (hi(1) >= 0.0) & (lo(1) < side));
+            let s = &self.snapped;
+            let (x0, y0) = (least(s[0][k], s[2][k], s[4][k]), least(s[1][k], s[3][k], s[5][k]));
+            let (x1, y1) = (-least(-s[0][k], -s[2][k], -s[4][k]), -least(-s[1][k], -s[3][k], -s[5][k]));
+            flags[k] = u32::from((x1 >= 0.0) & (x0 < side) & (y1 >= 0.0) & (y0 < side));
         }
-        (0..8).fold(0, |mask, k| mask | flags[k] << k)
+        let mut mask = 0;
+        for k in 0..8 {
+            mask |= flags[k] << k;
+        }
+        mask
     }
 }
 

@@ -1,7 +1,9 @@
 //! One part's tree, front to back: nodes that are outside or hidden are skipped, triangles of leaves drawn.
 
-use map3d_scene::records::{EMPTY, LEAF_BIT};
+use std::cell::Cell;
+
 use map3d_base::DEPTH_UNITS_PER_M;
+use map3d_scene::records::{EMPTY, LEAF_BIT};
 use map3d_scene::{Chunk, InstanceRecord, Leaf, MaterialRecord, Node};
 
 use super::boxes::{BoxMap, least_key};
@@ -28,7 +30,11 @@ pub(crate) struct Entry {
 #[inline(always)]
 pub(crate) fn groups(pixels: [f32; 4]) -> [u8; 4] {
     const LAST: f32 = (GROUPS_PER_ROW * 8 - 1) as f32;
-    pixels.map(|v| v.max(0.0).min(LAST) as u8 >> 3)
+    let mut out = [0; 4];
+    for k in 0..4 {
+        out[k] = pixels[k].max(0.0).min(LAST) as u8 >> 3;
+    }
+    out
 }
 
 pub(crate) struct Descent<'a> {
@@ -126,7 +132,7 @@ impl<'a> Descent<'a> {
     /// `place`: leaf, triangle in the chunk, lane.
     #[inline(always)]
     fn triangle<L: Lanes>(&mut self, place: (u32, u32, usize), corners: &Corners, snapped: &[[i64; 2]; 3], b: &PixelBox) {
-        let pixel = [0, 3, 6].map(|c| [0, 1, 2].map(|k| corners.pixel[c + k][place.2]));
+        let pixel = corners.of_lane(place.2);
         let rank = self.chunk.triangles()[place.1 as usize].rank;
         let depth = Depth::of(&pixel, rank, self.pixel_units);
         let plane = match (&depth, is_near(snapped)) {
@@ -137,13 +143,13 @@ impl<'a> Descent<'a> {
             Keys::Nowhere => {}
             Keys::Plane(plane) => {
                 let Some(edges) = edges::<L>(snapped) else { return };
-                let mut candidate = self.candidate(place, rank, plane, true);
-                self.canvas.draw(&mut candidate, b, &edges);
+                let candidate = self.candidate(place, rank, plane, true);
+                self.canvas.draw(&candidate, b, &edges);
             }
             Keys::Exact => {
-                let mut candidate = self.candidate(place, rank, KeyPlane::default(), false);
+                let candidate = self.candidate(place, rank, KeyPlane::default(), false);
                 let bias = depth.map_or_else(|| edge_on_bias(rank), |d| d.bias);
-                self.canvas.draw_exact::<L>(&mut candidate, b, snapped, &pixel, bias);
+                self.canvas.draw_exact::<L>(&candidate, b, snapped, &pixel, bias);
             }
         }
     }
@@ -165,7 +171,7 @@ impl<'a> Descent<'a> {
             source: record.source,
         };
         let cutout = if chunk.has_cutouts() { self.cutout(place) } else { None };
-        Candidate { track, is_regular, slot: NOTHING, cutout }
+        Candidate { track, is_regular, slot: Cell::new(NOTHING), cutout }
     }
 
     #[cold]

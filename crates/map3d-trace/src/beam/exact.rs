@@ -29,7 +29,7 @@ impl Canvas<'_> {
     /// Draws a triangle sample by sample.
     #[cold]
     #[inline(never)]
-    pub fn draw_exact<L: Lanes>(&mut self, candidate: &mut Candidate, b: &PixelBox, s: &[[i64; 2]; 3], pixel: &[[f64; 3]; 3], bias: i64) {
+    pub fn draw_exact<L: Lanes>(&mut self, candidate: &Candidate, b: &PixelBox, s: &[[i64; 2]; 3], pixel: &[[f64; 3]; 3], bias: i64) {
         for j in b.y0..=b.y1 {
             for i in b.x0..=b.x1 {
                 let mut keys = [FAR; 16];

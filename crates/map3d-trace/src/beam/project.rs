@@ -29,15 +29,17 @@ impl Projection<'_> {
 }
 
 /// Least and greatest depth of a triangle's corners.
+#[inline(always)]
 pub(crate) fn depth_range(pixel: &[Vec3; 3]) -> (f64, f64) {
-    let d = pixel.map(|p| p[2]);
+    let d = [pixel[0][2], pixel[1][2], pixel[2][2]];
     (d[0].min(d[1]).min(d[2]), d[0].max(d[1]).max(d[2]))
 }
 
 /// Depth gradient in units per pixel right and down; `None` for a triangle seen edge-on.
+#[inline(always)]
 pub(crate) fn depth_gradient(p: &[Vec3; 3]) -> Option<[f64; 2]> {
-    let e = |k: usize| [p[k][0] - p[0][0], p[k][1] - p[0][1], p[k][2] - p[0][2]];
-    let (a, b) = (e(1), e(2));
+    let a = [p[1][0] - p[0][0], p[1][1] - p[0][1], p[1][2] - p[0][2]];
+    let b = [p[2][0] - p[0][0], p[2][1] - p[0][1], p[2][2] - p[0][2]];
     let inverse = 1.0 / (a[0] * b[1] - a[1] * b[0]);
     let g = [(a[2] * b[1] - a[1] * b[2]) * inverse, (a[0] * b[2] - a[2] * b[0]) * inverse];
     (inverse.is_finite() && g[0].is_finite() && g[1].is_finite()).then_some(g)

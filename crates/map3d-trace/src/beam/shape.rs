@@ -87,9 +87,15 @@ impl<L: Lanes> Edge<L> {
         Self { at: at_corner >> 4, x: -dy * 16, y: dx * 16, offsets, lo, hi }
     }
 
+    /// Values at the samples of a pixel.
+    #[inline(always)]
+    pub fn samples(&self, i: i32, j: i32) -> L {
+        L::splat(self.corner(i, j)).add(self.offsets)
+    }
+
     /// Value at the top left corner of a pixel, limited so that adding offsets neither overflows nor changes sign.
     #[inline(always)]
-    pub fn corner(&self, i: i32, j: i32) -> i32 {
+    fn corner(&self, i: i32, j: i32) -> i32 {
         const LIMIT: i64 = 1 << 30;
         (self.at + self.x * i64::from(i) + self.y * i64::from(j)).clamp(-LIMIT, LIMIT) as i32
     }
@@ -132,7 +138,7 @@ pub(crate) fn bias(gradient: [f64; 2], rank: u8, pixel_units: f64) -> i64 {
     if rank == 0 {
         return 0;
     }
-    let slope = gradient.map(|g| g / pixel_units);
+    let slope = [gradient[0] / pixel_units, gradient[1] / pixel_units];
     let steep = (1.0 + slope[0] * slope[0] + slope[1] * slope[1]).sqrt().min(STEEPEST);
     (f64::from(rank) * BIAS_UNITS * steep + 0.5).floor() as i64
 }
@@ -211,7 +217,11 @@ const CENTERED_Y: [i32; 16] = centered(SAMPLE_Y);
 /// Snapped corners as whole numbers.
 #[inline(always)]
 pub(crate) fn whole_steps(snapped: &[[f64; 8]; 6], lane: usize) -> [[i64; 2]; 3] {
-    [0, 2, 4].map(|c| [snapped[c][lane] as i64, snapped[c + 1][lane] as i64])
+    [
+        [snapped[0][lane] as i64, snapped[1][lane] as i64],
+        [snapped[2][lane] as i64, snapped[3][lane] as i64],
+        [snapped[4][lane] as i64, snapped[5][lane] as i64],
+    ]
 }
 
 /// All corners are near enough for 32-bit edge offsets.

@@ -8,12 +8,20 @@ pub(crate) struct Plain([i32; 16]);
 impl Plain {
     #[inline(always)]
     fn zip(self, other: Self, f: impl Fn(i32, i32) -> i32) -> Self {
-        Self(std::array::from_fn(|k| f(self.0[k], other.0[k])))
+        let mut out = [0; 16];
+        for k in 0..16 {
+            out[k] = f(self.0[k], other.0[k]);
+        }
+        Self(out)
     }
 
     #[inline(always)]
     fn mask(self, other: Self, f: impl Fn(i32, i32) -> bool) -> u32 {
-        (0..16).fold(0, |mask, k| mask | u32::from(f(self.0[k], other.0[k])) << k)
+        let mut mask = 0;
+        for k in 0..16 {
+            mask |= u32::from(f(self.0[k], other.0[k])) << k;
+        }
+        mask
     }
 }
 
@@ -60,7 +68,7 @@ impl Lanes for Plain {
 
     #[inline(always)]
     fn shift_right(self, bits: u32) -> Self {
-        Self(self.0.map(|v| v >> (bits & 31)))
+        self.zip(self, |v, _| v >> (bits & 31))
     }
 
     #[inline(always)]

@@ -102,13 +102,6 @@ impl Lanes for Avx512 {
 #[derive(Clone, Copy)]
 pub(crate) struct Avx2(__m256i, __m256i);
 
-impl Avx2 {
-    #[inline(always)]
-    fn both(self, other: Self, f: impl Fn(__m256i, __m256i) -> __m256i) -> Self {
-        Self(f(self.0, other.0), f(self.1, other.1))
-    }
-}
-
 impl Lanes for Avx2 {
     #[inline(always)]
     fn splat(value: i32) -> Self {
@@ -133,48 +126,53 @@ impl Lanes for Avx2 {
 
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        self.both(other, |a, b| unsafe { _mm256_add_epi32(a, b) })
+        unsafe { Self(_mm256_add_epi32(self.0, other.0), _mm256_add_epi32(self.1, other.1)) }
     }
 
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
-        self.both(other, |a, b| unsafe { _mm256_mullo_epi32(a, b) })
+        unsafe { Self(_mm256_mullo_epi32(self.0, other.0), _mm256_mullo_epi32(self.1, other.1)) }
     }
 
     #[inline(always)]
     fn min(self, other: Self) -> Self {
-        self.both(other, |a, b| unsafe { _mm256_min_epi32(a, b) })
+        unsafe { Self(_mm256_min_epi32(self.0, other.0), _mm256_min_epi32(self.1, other.1)) }
     }
 
     #[inline(always)]
     fn max(self, other: Self) -> Self {
-        self.both(other, |a, b| unsafe { _mm256_max_epi32(a, b) })
+        unsafe { Self(_mm256_max_epi32(self.0, other.0), _mm256_max_epi32(self.1, other.1)) }
     }
 
     #[inline(always)]
     fn or(self, other: Self) -> Self {
-        self.both(other, |a, b| unsafe { _mm256_or_si256(a, b) })
+        unsafe { Self(_mm256_or_si256(self.0, other.0), _mm256_or_si256(self.1, other.1)) }
     }
 
     #[inline(always)]
     fn shift_right(self, bits: u32) -> Self {
-        self.both(self, |a, _| unsafe { _mm256_sra_epi32(a, _mm_cvtsi32_si128(bits as i32)) })
+        unsafe {
+            let bits = _mm_cvtsi32_si128(bits as i32);
+            Self(_mm256_sra_epi32(self.0, bits), _mm256_sra_epi32(self.1, bits))
+        }
     }
 
     #[inline(always)]
     fn negative(self) -> u32 {
-        let half = |a| unsafe { _mm256_movemask_ps(_mm256_castsi256_ps(a)) as u32 };
-        half(self.0) | half(self.1) << 8
+        unsafe {
+            let low = _mm256_movemask_ps(_mm256_castsi256_ps(self.0)) as u32;
+            low | (_mm256_movemask_ps(_mm256_castsi256_ps(self.1)) as u32) << 8
+        }
     }
 
     #[inline(always)]
     fn less(self, other: Self) -> u32 {
-        self.both(other, |a, b| unsafe { _mm256_cmpgt_epi32(b, a) }).negative()
+        unsafe { Self(_mm256_cmpgt_epi32(other.0, self.0), _mm256_cmpgt_epi32(other.1, self.1)) }.negative()
     }
 
     #[inline(always)]
     fn equal(self, other: Self) -> u32 {
-        self.both(other, |a, b| unsafe { _mm256_cmpeq_epi32(a, b) }).negative()
+        unsafe { Self(_mm256_cmpeq_epi32(self.0, other.0), _mm256_cmpeq_epi32(self.1, other.1)) }.negative()
     }
 
     #[inline(always)]
@@ -182,9 +180,10 @@ impl Lanes for Avx2 {
         let (low, high) = to.split_at_mut(8);
         unsafe {
             let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
-            let lanes = |m: u32| _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(m as i32), bits), bits);
-            _mm256_maskstore_epi32(low.as_mut_ptr(), lanes(mask), self.0);
-            _mm256_maskstore_epi32(high.as_mut_ptr(), lanes(mask >> 8), self.1);
+            let low_mask = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(mask as i32), bits), bits);
+            let high_mask = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32((mask >> 8) as i32), bits), bits);
+            _mm256_maskstore_epi32(low.as_mut_ptr(), low_mask, self.0);
+            _mm256_maskstore_epi32(high.as_mut_ptr(), high_mask, self.1);
         }
     }
 
@@ -204,9 +203,11 @@ impl Lanes for Avx2 {
 #[inline(always)]
 unsafe fn meets_square(x: &[[f32; 8]; 2], y: &[[f32; 8]; 2], side: f32) -> u32 {
     unsafe {
-        let load = |a: &[f32; 8]| _mm256_loadu_ps(a.as_ptr());
         let (zero, side) = (_mm256_setzero_ps(), _mm256_set1_ps(side));
-        let along = |v: &[[f32; 8]; 2]| _mm256_and_ps(_mm256_cmp_ps::<_CMP_GE_OQ>(load(&v[1]), zero), _mm256_cmp_ps::<_CMP_LE_OQ>(load(&v[0]), side));
-        _mm256_movemask_ps(_mm256_and_ps(along(x), along(y))) as u32
+        let (x0, x1) = (_mm256_loadu_ps(x[0].as_ptr()), _mm256_loadu_ps(x[1].as_ptr()));
+        let (y0, y1) = (_mm256_loadu_ps(y[0].as_ptr()), _mm256_loadu_ps(y[1].as_ptr()));
+        let in_x = _mm256_and_ps(_mm256_cmp_ps::<_CMP_GE_OQ>(x1, zero), _mm256_cmp_ps::<_CMP_LE_OQ>(x0, side));
+        let in_y = _mm256_and_ps(_mm256_cmp_ps::<_CMP_GE_OQ>(y1, zero), _mm256_cmp_ps::<_CMP_LE_OQ>(y0, side));
+        _mm256_movemask_ps(_mm256_and_ps(in_x, in_y)) as u32
     }
 }
