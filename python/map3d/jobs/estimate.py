@@ -76,10 +76,11 @@ def estimate(workspace: Workspace, catalogue: Catalogue, name: str, workers: int
 
 
 def _recorded(catalogue: Catalogue, record: RenderingRecord, plans: dict[str, Occupancy]) -> Rate | None:
-    """From the blocks that are done, if they are many enough."""
-    done = [job for job in catalogue.jobs(record.name, state=State.DONE) if job.result is not None]
+    """From the blocks that are done, if they are many enough, or all."""
+    jobs = list(catalogue.jobs(record.name))
+    done = [job for job in jobs if job.state is State.DONE and job.result is not None]
     base = [job for job in done if job.kind == "base" and job.result is not None and not job.result.empty]
-    if len(base) < RECORDED_BLOCKS:
+    if not base or (len(base) < RECORDED_BLOCKS and len(done) < len(jobs)):
         return None
     results = [job.result for job in done if job.result is not None]
     tiles = sum(result.base_tiles for result in results)
