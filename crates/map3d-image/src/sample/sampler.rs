@@ -210,7 +210,7 @@ impl Sampler {
 
     /// Weighs by alpha, and with what lies outside the texture.
     fn mixed(&self, channels: [u32; 4], outside: u32) -> [u16; 3] {
-        let around = u64::from(outside) * u64::from(UNIT15) >> (2 * WEIGHT_BITS - TAP_BITS);
+        let around = (u64::from(outside) * u64::from(UNIT15)) >> (2 * WEIGHT_BITS - TAP_BITS);
         let total = u64::from(channels[3]) + around;
         if total == 0 {
             return [0; 3];
@@ -260,7 +260,7 @@ impl AlphaSampler {
         let (tx, ty) = self.grid.at(x, y);
         let mut sum = TapSum::new();
         let outside = self.grid.tap(&mut sum, tx, ty);
-        let around = outside * self.outside >> (2 * WEIGHT_BITS - TAP_BITS);
+        let around = (outside * self.outside) >> (2 * WEIGHT_BITS - TAP_BITS);
         (sum.channels()[3] + around) * 2 >= UNIT15 << TAP_BITS
     }
 }
