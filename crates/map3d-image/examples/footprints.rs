@@ -14,11 +14,13 @@ use map3d_image::texture::{Level, LinearRaster, first_mip, level_count, next_mip
 const SIDE: u32 = 256;
 const PIXELS: i32 = 32;
 
+/// sRGB of a texel.
+type Paint = fn(u32, u32) -> [u8; 3];
+
 fn main() {
     let tunings: Vec<Tuning> = tunings();
     let mut totals = vec![Total::default(); tunings.len()];
-    let textures: [(&str, fn(u32, u32) -> [u8; 3]); 5] =
-        [("town", town), ("noise", noise), ("smooth", smooth), ("checker", checker), ("brick", brick)];
+    let textures: [(&str, Paint); 5] = [("town", town), ("noise", noise), ("smooth", smooth), ("checker", checker), ("brick", brick)];
     println!(
         "{:8} {:>6} {:>6} {:>5} {:>5} {:>5} {:>8} {:>8} {:>8}",
         "texture", "pitch", "tex/px", "turn", "level", "taps", "ns/px", "PSNR", "gradient"
@@ -247,7 +249,7 @@ fn checker(x: u32, y: u32) -> [u8; 3] {
 fn brick(x: u32, y: u32) -> [u8; 3] {
     let row = y / 8;
     let column = (x + row % 2 * 8) / 16;
-    if y % 8 == 0 || (x + row % 2 * 8).is_multiple_of(16) {
+    if y.is_multiple_of(8) || (x + row % 2 * 8).is_multiple_of(16) {
         return [200, 195, 185];
     }
     let shade = hash(column % 32, row, 7) / 4;

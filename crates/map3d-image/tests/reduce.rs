@@ -54,9 +54,9 @@ fn each_child_fills_its_quadrant() {
     let side = 8;
     let children: Vec<GBuffer> = (0..4).map(|k| random_tile(k, side)).collect();
     let whole = reduce([0, 1, 2, 3].map(|k| Some(&children[k])), side);
-    for k in 0..4usize {
+    for (k, child) in children.iter().enumerate() {
         let mut one = [None; 4];
-        one[0] = Some(&children[k]);
+        one[0] = Some(child);
         let alone = reduce(one, side);
         for y in 0..4usize {
             for x in 0..4usize {
