@@ -29,10 +29,10 @@ tools:
 
 # -- build ---------------------------------------------------------------------------------------------------------------------------
 
-$(CACHE)/venv: requirements/dev.lock | $(CACHE)
+$(CACHE)/venv: requirements/dev.lock requirements/peers.lock | $(CACHE)
 	@$(MAKE) --no-print-directory -s tools
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install -q --disable-pip-version-check -r requirements/dev.lock
+	$(BIN)/python -m pip install -q --disable-pip-version-check -r requirements/dev.lock -r requirements/peers.lock
 	@touch $@
 
 $(CACHE)/core: $(RUST) pyproject.toml $(CACHE)/venv
