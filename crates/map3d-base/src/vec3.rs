@@ -52,17 +52,12 @@ impl Box3 {
     }
 
     pub fn add_point(&mut self, p: Vec3) {
-        for k in 0..3 {
-            self.lo[k] = self.lo[k].min(p[k]);
-            self.hi[k] = self.hi[k].max(p[k]);
-        }
+        self.add_box(&Self { lo: p, hi: p });
     }
 
     pub fn add_box(&mut self, other: &Self) {
-        for k in 0..3 {
-            self.lo[k] = self.lo[k].min(other.lo[k]);
-            self.hi[k] = self.hi[k].max(other.hi[k]);
-        }
+        self.lo = [0, 1, 2].map(|k| self.lo[k].min(other.lo[k]));
+        self.hi = [0, 1, 2].map(|k| self.hi[k].max(other.hi[k]));
     }
 
     pub fn center(&self) -> Vec3 {

@@ -51,11 +51,12 @@ fn is_sound(positions: &[Vec3], t: [u32; 3], limits: GateLimits, skips: &mut Ski
         return false;
     };
     let values = || [a, b, c].into_iter().flatten();
+    let area = length(triangle_normal([a, b, c]));
     let counter = if !values().all(f64::is_finite) {
         &mut skips.not_finite
     } else if values().any(|v| v.abs() > limits.coordinate_m) {
         &mut skips.too_far
-    } else if !(length(triangle_normal([a, b, c])) > 0.0) {
+    } else if area == 0.0 || area.is_nan() {
         &mut skips.zero_area
     } else {
         return true;
