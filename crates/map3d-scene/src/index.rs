@@ -75,7 +75,7 @@ impl SceneIndex {
         }
         let boxes = self.chunks.iter().chain(&self.prototypes).flat_map(|c| c.bounds.iter().chain([&c.origin]));
         let numbers = boxes.flatten().chain(&self.square).chain(&self.origin);
-        if !numbers.copied().all(f64::is_finite) || !(self.square[2] > 0.0) {
+        if !numbers.copied().all(f64::is_finite) || self.square[2] <= 0.0 {
             return Err(Error::format(path, "a number is not finite, or the square has no side"));
         }
         let files = self.chunks.iter().chain(&self.prototypes).map(|c| &c.file);

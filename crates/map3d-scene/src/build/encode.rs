@@ -26,7 +26,7 @@ pub struct ChunkFile {
 
 /// Encodes at least one triangle; `origin` is a lattice point within reach of all corners. `materials` are the build's.
 pub fn encode_chunk(mut triangles: Vec<BuildTriangle>, origin: Point, materials: &[MaterialRecord], merge_faces: bool) -> Result<ChunkFile> {
-    triangles.sort_by(|a, b| (a.object_id, a.asset, a.source).cmp(&(b.object_id, b.asset, b.source)));
+    triangles.sort_by_key(|t| (t.object_id, t.asset, t.source));
     let before = triangles.len();
     if merge_faces {
         drop_duplicates(&mut triangles);
