@@ -236,7 +236,7 @@ fn instances_and_many_chunks_follow_the_same_rule() {
     soup.add([[-2000.0, -900.0, -30.0], [2500.0, -900.0, -30.0], [0.0, 3000.0, -31.0]], 90, RANKS[0]);
     soup.prototypes = vec![(0..12).map(|_| [dice.point(2.0), dice.point(2.0), dice.point(2.0)]).collect()];
     for k in 0..8 {
-        let (a, s) = (dice.between(0.0, 6.28), dice.between(0.5, 3.0));
+        let (a, s) = (dice.between(0.0, std::f64::consts::TAU), dice.between(0.5, 3.0));
         let (c, n, p) = (a.cos() * s, a.sin() * s, dice.point(12.0));
         let transform = [c, -n, 0.0, p[0], n, c, 0.0, p[1], 0.0, 0.0, s, p[2]];
         soup.instances.push(map3d_base::asset::Instance { prototype: 1, object: 200 + k, transform });

@@ -32,7 +32,7 @@ pub(crate) fn groups(pixels: [f32; 4]) -> [u8; 4] {
     const LAST: f32 = (GROUPS_PER_ROW * 8 - 1) as f32;
     let mut out = [0; 4];
     for k in 0..4 {
-        out[k] = pixels[k].max(0.0).min(LAST) as u8 >> 3;
+        out[k] = pixels[k].clamp(0.0, LAST) as u8 >> 3;
     }
     out
 }
