@@ -75,6 +75,8 @@ impl AssetWriter {
 
     /// For assets made in Python: positions (n, 3) world, triangles (t, 3), uvs (t, 3, 2) or None.
     #[pyo3(signature = (positions, triangles, uvs, material, object, rank))]
+    // The six things that a mesh of one material, object and rank is made of.
+    #[allow(clippy::too_many_arguments)]
     fn append_mesh(
         &mut self,
         py: Python<'_>,

@@ -25,7 +25,10 @@ pub fn dict_of<'py>(py: Python<'py>, g: GBuffer) -> PyResult<Bound<'py, PyDict>>
     Ok(dict)
 }
 
-fn rows3<T: numpy::Element + Copy, const N: usize>(array: &Bound<'_, PyAny>, what: &str) -> PyResult<((u32, u32), Vec<[T; N]>)> {
+/// (width, height) and the pixels, row by row.
+type Pixels<T> = ((u32, u32), Vec<T>);
+
+fn rows3<T: numpy::Element + Copy, const N: usize>(array: &Bound<'_, PyAny>, what: &str) -> PyResult<Pixels<[T; N]>> {
     let array: PyReadonlyArray3<T> = array.extract().map_err(|_| invalid(format!("{what}: expected an array (H, W, {N}) of its type")))?;
     let (h, w, n) = array.as_array().dim();
     if n != N {
@@ -35,7 +38,7 @@ fn rows3<T: numpy::Element + Copy, const N: usize>(array: &Bound<'_, PyAny>, wha
     Ok(((w as u32, h as u32), flat.chunks_exact(N).map(|c| std::array::from_fn(|k| c[k])).collect()))
 }
 
-fn rows2(array: &Bound<'_, PyAny>, what: &str) -> PyResult<((u32, u32), Vec<u32>)> {
+fn rows2(array: &Bound<'_, PyAny>, what: &str) -> PyResult<Pixels<u32>> {
     let array: PyReadonlyArray2<u32> = array.extract().map_err(|_| invalid(format!("{what}: expected an array (H, W) of uint32")))?;
     let (h, w) = array.as_array().dim();
     Ok(((w as u32, h as u32), array.as_array().iter().copied().collect()))

@@ -16,7 +16,10 @@ use crate::errors::{invalid, to_python};
 /// Levels up to this one are answered as a whole array by `occupied`.
 const MAX_OCCUPIED_LEVEL: u8 = 13;
 
-type Corners = ((f64, f64, f64), (f64, f64, f64));
+type Point = (f64, f64, f64);
+type Corners = (Point, Point);
+/// Id, D, local position.
+type Picked = (u32, f64, Point);
 
 /// A built scene, opened for tracing; may be shared between threads.
 #[pyclass(module = "map3d._core", frozen)]
@@ -32,7 +35,7 @@ impl Scene {
 
     /// World coordinates of the local origin.
     #[getter]
-    fn origin(&self) -> (f64, f64, f64) {
+    fn origin(&self) -> Point {
         self.0.store().origin().into()
     }
 
@@ -81,7 +84,7 @@ impl Scene {
     }
 
     /// (id, D, local position) of what the line of sight through view coordinates (U, V) meets first.
-    fn pick(&self, py: Python<'_>, frame: &str, u: f64, v: f64) -> PyResult<Option<(u32, f64, (f64, f64, f64))>> {
+    fn pick(&self, py: Python<'_>, frame: &str, u: f64, v: f64) -> PyResult<Option<Picked>> {
         let frame = Frame::from_json(frame).map_err(to_python)?;
         let pick = py.detach(|| self.0.pick(&frame, u, v)).map_err(to_python)?;
         Ok(pick.map(|p| (p.id, p.d_m, p.position.into())))
@@ -92,7 +95,7 @@ impl Scene {
         &self,
         py: Python<'py>,
         origins: PyReadonlyArray2<f64>,
-        direction: (f64, f64, f64),
+        direction: Point,
         max_distance: f64,
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let array = origins.as_array();
