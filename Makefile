@@ -91,7 +91,6 @@ check-python: build
 	$(BIN)/ruff format --check python tests spec bench
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python tests/core/check_stubs.py
 
 check-viewer: $(CACHE)/viewer
 	cd viewer && npm run --silent lint && npm run --silent typecheck && npm run --silent size

@@ -7,7 +7,16 @@ from pathlib import Path
 
 HERE = Path(__file__).parent / "vectors"
 EXACT = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)}
-HALF = {30: (None, 0.5), 150: (None, 0.5), 210: (None, -0.5), 330: (None, -0.5), 60: (0.5, None), 300: (0.5, None), 120: (-0.5, None), 240: (-0.5, None)}
+HALF = {
+    30: (None, 0.5),
+    150: (None, 0.5),
+    210: (None, -0.5),
+    330: (None, -0.5),
+    60: (0.5, None),
+    300: (0.5, None),
+    120: (-0.5, None),
+    240: (-0.5, None),
+}
 
 
 def cos_sin(deg):
@@ -32,12 +41,13 @@ def dot(a, b):
 def view_id(look_at, pitch):
     def short(v):
         return str(int(v)) if v == int(v) else repr(float(v))
+
     return f"{short(look_at)}-{short(pitch)}"
 
 
 def pin(lo, hi, tile_px, res_m, views):
-    c = [(a + b) / 2 for a, b in zip(lo, hi)]
-    h = [(b - a) / 2 * 1.05 for a, b in zip(lo, hi)]
+    c = [(a + b) / 2 for a, b in zip(lo, hi, strict=True)]
+    h = [(b - a) / 2 * 1.05 for a, b in zip(lo, hi, strict=True)]
     h[2] = max(h[2], (hi[2] - lo[2]) / 2 + 100.0)
     flat = math.hypot(h[0], h[1])
     extent = 2 * flat
@@ -52,8 +62,16 @@ def pin(lo, hi, tile_px, res_m, views):
     out = []
     for look_at, pitch in views:
         r, u, d = axes(look_at, pitch)
-        out.append({"id": view_id(look_at, pitch), "look_at_deg": look_at, "pitch_deg": pitch, "u0_m": dot(r, c) - size / 2,
-                    "v0_m": dot(u, c) + size / 2, "d0_m": dot(d, c) - half_diagonal - 1000})
+        out.append(
+            {
+                "id": view_id(look_at, pitch),
+                "look_at_deg": look_at,
+                "pitch_deg": pitch,
+                "u0_m": dot(r, c) - size / 2,
+                "v0_m": dot(u, c) + size / 2,
+                "d0_m": dot(d, c) - half_diagonal - 1000,
+            }
+        )
     return {"zmax": zmax, "size_m": size, "views": out}
 
 
@@ -89,8 +107,16 @@ def tiles_vectors():
     for z, x, y, i, j in [(0, 0, 0, 0, 0), (3, 1, 6, 255, 0), (frame["zmax"], 3, 2, 17, 200), (1, 1, 1, 128, 128)]:
         px = frame["size_m"] / (256 * 2**z)
         v = frame["views"][1]
-        rows.append({"tile": [z, x, y], "pixel": [i, j], "u": v["u0_m"] + (x * 256 + i + 0.5) * px, "v": v["v0_m"] - (y * 256 + j + 0.5) * px,
-                     "morton": morton(x, y), "parent": [z - 1, x // 2, y // 2] if z else None})
+        rows.append(
+            {
+                "tile": [z, x, y],
+                "pixel": [i, j],
+                "u": v["u0_m"] + (x * 256 + i + 0.5) * px,
+                "v": v["v0_m"] - (y * 256 + j + 0.5) * px,
+                "morton": morton(x, y),
+                "parent": [z - 1, x // 2, y // 2] if z else None,
+            }
+        )
     return {"frame": frame, "view": 1, "tile_px": 256, "rows": rows}
 
 
@@ -118,8 +144,10 @@ def occupancy_vectors():
 def data_vectors():
     ids = [0, 1, 255, 256, 65536, 0x01020304, 0xFFFFFFFF]
     normals = [(0, 0, 1), (1, 0, 0), (0, -1, 0), (-0.6, 0, 0.8)]
-    return {"uint32": [{"value": v, "rgba": list(v.to_bytes(4, "little"))} for v in ids],
-            "normal": [{"n": n, "rgb": [math.floor((c + 1) / 2 * 255 + 0.5) for c in n]} for n in normals]}
+    return {
+        "uint32": [{"value": v, "rgba": list(v.to_bytes(4, "little"))} for v in ids],
+        "normal": [{"n": n, "rgb": [math.floor((c + 1) / 2 * 255 + 0.5) for c in n]} for n in normals],
+    }
 
 
 def depth_key(bits):
@@ -137,10 +165,9 @@ def parent_pixel(children):
     mine = [c for c in children if c[2] == best]
     total = [sum(c[1][k] for c in mine) for k in range(3)]
     length = math.sqrt(sum(v * v for v in total))
-    if length < 1e-6 * 32767 * len(mine):
-        normal = list(min(mine, key=depth_key)[1])
-    else:
-        normal = [math.floor(v / length * 32767 + 0.5) for v in total]
+    nearest = list(min(mine, key=depth_key)[1])
+    unit = [math.floor(v / length * 32767 + 0.5) for v in total] if length > 0 else nearest
+    normal = nearest if length < 1e-6 * 32767 * len(mine) else unit
     return {"color": color, "normal": normal, "id": best, "depth": min(c[3] for c in mine)}
 
 
@@ -149,6 +176,7 @@ def parent_vectors():
 
     def px(v, n, i, d):
         return ([v, v // 2, v // 3, 65535], n, i, d)
+
     up, east, down = [0, 0, 32767], [32767, 0, 0], [0, 0, -32767]
     cases = [
         [none] * 4,
@@ -165,7 +193,7 @@ def parent_vectors():
 def blocks_vectors():
     """Root levels of the blocks of a pyramid, deepest first: (root level, levels held)."""
     rows = []
-    for zmax in range(0, 13):
+    for zmax in range(13):
         root = max(zmax - 3, 0)
         steps = [[root, zmax - root + 1, "base"]]
         while root > 0:
@@ -183,8 +211,15 @@ def write(name, value):
 
 def main():
     HERE.mkdir(exist_ok=True)
-    for name, value in {"views": views_vectors(), "frames": frames_vectors(), "tiles": tiles_vectors(), "occupancy": occupancy_vectors(),
-                        "data": data_vectors(), "parents": parent_vectors(), "blocks": blocks_vectors()}.items():
+    for name, value in {
+        "views": views_vectors(),
+        "frames": frames_vectors(),
+        "tiles": tiles_vectors(),
+        "occupancy": occupancy_vectors(),
+        "data": data_vectors(),
+        "parents": parent_vectors(),
+        "blocks": blocks_vectors(),
+    }.items():
         write(name, value)
 
 

@@ -6,7 +6,6 @@ from typing import Final, Literal, NamedTuple
 
 from map3d.errors import BadName, BadRequest
 
-
 Vec3 = tuple[float, float, float]
 Box = tuple[Vec3, Vec3]
 """(least corner, greatest corner), metres, in the frame that the name says."""

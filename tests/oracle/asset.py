@@ -7,7 +7,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-SECTIONS = (("positions", "<f8", 3), ("triangles", "<u4", 3), ("uvs", "<f4", 6), ("normals", "<f4", 9), ("material", "<u4", 1), ("object", "<u4", 1), ("rank", "u1", 1), ("prototype", "<u4", 1))
+SECTIONS = (
+    ("positions", "<f8", 3),
+    ("triangles", "<u4", 3),
+    ("uvs", "<f4", 6),
+    ("normals", "<f4", 9),
+    ("material", "<u4", 1),
+    ("object", "<u4", 1),
+    ("rank", "u1", 1),
+    ("prototype", "<u4", 1),
+)
 
 
 @dataclass(frozen=True)
@@ -44,6 +53,13 @@ def read_asset(folder: Path) -> Asset:
         parts[name] = data[at : at + size].view(kind).reshape(-1, width) if width > 1 else data[at : at + size].view(kind)
         at += -(-size // 64) * 64
     return Asset(
-        folder, parts["positions"], parts["triangles"], parts["uvs"].reshape(-1, 3, 2), parts["material"], parts["object"], parts["prototype"],
-        np.fromfile(folder / "ids.u32", "<u4"), json.loads((folder / "materials.json").read_text())["materials"],
+        folder,
+        parts["positions"],
+        parts["triangles"],
+        parts["uvs"].reshape(-1, 3, 2),
+        parts["material"],
+        parts["object"],
+        parts["prototype"],
+        np.fromfile(folder / "ids.u32", "<u4"),
+        json.loads((folder / "materials.json").read_text())["materials"],
     )

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from map3d import _core
 from map3d.catalogue import Workspace
 from map3d.cli.app import run
@@ -116,5 +117,3 @@ def ingolstadt(build: Builder) -> Built:
     if not data:
         pytest.skip("MAP3D_DATA is not set: no real city here")
     return build("ingolstadt", [Path(data, "citygml-ingolstadt-lod3")], 0.1, ["30/10", "30/22.5", "30/45", "30/90"])
-
-

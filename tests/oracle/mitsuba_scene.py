@@ -81,9 +81,16 @@ class MitsubaScene:
         integrator = mi.load_dict({"type": "aov", "aovs": "albedo:albedo"})
         total, rounds = None, max(1, samples // 256)
         for seed in range(rounds):
-            image = np.array(mi.render(self.scene, sensor=self._sensor(frame, x, y, samples // rounds), integrator=integrator, seed=seed)).astype(np.float64)
+            image = np.array(mi.render(self.scene, sensor=self._sensor(frame, x, y, samples // rounds), integrator=integrator, seed=seed)).astype(
+                np.float64
+            )
             total = image if total is None else total + image
         return total[..., -3:] / rounds
+
+    def layers(self, frame: Frame, x: int, y: int, samples: int) -> NDArray[np.float64]:
+        """All that a tile of ours has, in one rendering: albedo, depth, normal, shape; for timing."""
+        integrator = mi.load_dict({"type": "aov", "aovs": "albedo:albedo,depth:depth,normal:sh_normal,shape:shape_index"})
+        return np.array(mi.render(self.scene, sensor=self._sensor(frame, x, y, samples), integrator=integrator, seed=0))
 
     def _near_plane(self, frame: Frame) -> float:
         """D of a plane before everything."""
@@ -102,10 +109,16 @@ class MitsubaScene:
         matrix = np.eye(4)
         matrix[:3, 0], matrix[:3, 1], matrix[:3, 2], matrix[:3, 3] = -right * tile_m / 2, up * tile_m / 2, forward, eye
         film = {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": "box"}, "pixel_format": "rgb", "component_format": "float32"}
-        return mi.load_dict({
-            "type": "orthographic", "to_world": mi.ScalarTransform4f(matrix), "near_clip": 1e-3, "far_clip": 1e6,
-            "film": film, "sampler": {"type": "independent", "sample_count": spp},
-        })
+        return mi.load_dict(
+            {
+                "type": "orthographic",
+                "to_world": mi.ScalarTransform4f(matrix),
+                "near_clip": 1e-3,
+                "far_clip": 1e6,
+                "film": film,
+                "sampler": {"type": "independent", "sample_count": spp},
+            }
+        )
 
 
 def _bsdf(material: dict, image: NDArray[np.uint8] | None) -> object:
@@ -113,7 +126,12 @@ def _bsdf(material: dict, image: NDArray[np.uint8] | None) -> object:
         color = {"type": "rgb", "value": _linear(np.array(material["diffuse"][:3])).tolist()}
     else:
         modes = {"wrap": "repeat", "mirror": "mirror"}
-        color = {"type": "bitmap", "bitmap": mi.Bitmap(np.ascontiguousarray(image)), "filter_type": "bilinear", "wrap_mode": modes.get(material["wrap"], "clamp")}
+        color = {
+            "type": "bitmap",
+            "bitmap": mi.Bitmap(np.ascontiguousarray(image)),
+            "filter_type": "bilinear",
+            "wrap_mode": modes.get(material["wrap"], "clamp"),
+        }
     return mi.load_dict({"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": color}})
 
 

@@ -66,7 +66,12 @@ def test_colour_is_the_average_over_the_pixels_box(pair: tuple[Built, MitsubaSce
 def _ground_id(built: Built) -> int:
     """The ground plane is ours alone: it is not in the assets."""
     known = set(np.concatenate([asset.ids for asset in built.assets]).tolist())
-    seen = {int(i) for view in VIEWS for x, y in built.busiest_tiles(view, 1) for i in np.unique(built.scene.gbuffer(json.dumps(built.frames[view]), x, y)["id"])}
+    seen = {
+        int(i)
+        for view in VIEWS
+        for x, y in built.busiest_tiles(view, 1)
+        for i in np.unique(built.scene.gbuffer(json.dumps(built.frames[view]), x, y)["id"])
+    }
     strangers = seen - known - {0}
     assert len(strangers) <= 1
     return strangers.pop() if strangers else 0xFFFFFFFF

@@ -1,0 +1,43 @@
+"""The town that everything is measured on, made once per checkout."""
+
+import json
+from pathlib import Path
+
+from map3d.catalogue import Workspace
+from map3d.cli.app import run
+from map3d.render.plan import frame_text
+
+CACHE = Path(".cache/bench")
+
+
+def prepared(buildings: int, res_m: float, color: str) -> tuple[Path, dict[str, str]]:
+    """The scene's folder, and the core's frame (JSON) of each view. `color`: format of the colour layer."""
+    folder = CACHE / f"town-{buildings}"
+    workspace = Workspace(folder / "workspace").create()
+    where = ["-w", str(workspace.root)]
+    name = f"{color}-{round(res_m * 1000)}mm"
+    catalogue = workspace.open_catalogue()
+    scenes = {scene.name for scene in catalogue.scenes()}
+    renderings = {rendering.name for rendering in catalogue.renderings()}
+    catalogue.close()
+    if "town" not in scenes:
+        _do(["make-town", "-o", str(folder / "town"), "--buildings", str(buildings), "--seed", "7", "--no-trees"])
+        _do(["create-scene", "town", *where])
+        _do(["add-files", "town", str(folder / "town"), *where])
+    if name not in renderings:
+        _do(["create-rendering", "town", name, "--res", str(res_m), "--view", "0/45", "--color", color, *where])
+    catalogue = workspace.open_catalogue()
+    try:
+        record = catalogue.rendering(name)
+        return workspace.root / "scenes" / "town", {frame.id: frame_text(record, frame) for frame in record.frames}
+    finally:
+        catalogue.close()
+
+
+def zmax(frame: str) -> int:
+    return int(json.loads(frame)["zmax"])
+
+
+def _do(command: list[str]) -> None:
+    if run(command) != 0:
+        raise SystemExit(f"bench: map3d {' '.join(command)} failed")
