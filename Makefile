@@ -63,7 +63,7 @@ demo: build ## make a town, render it in 4 directions, serve it on a free port
 test: test-rust test-python test-viewer test-browser ## all quick tests, also in a real browser
 
 test-rust:
-	cargo test --workspace --release --locked --exclude map3d-py
+	cargo test --workspace --locked --exclude map3d-py --lib --tests -q
 
 test-python: build
 	$(BIN)/python -m pytest -q -m "not browser and not slow"
@@ -84,7 +84,7 @@ check: check-rust check-python check-viewer ## format, lint, types, sizes
 
 check-rust: $(CACHE)/venv
 	cargo fmt --all --check
-	PYO3_PYTHON=$(CURDIR)/$(BIN)/python cargo clippy --workspace --all-targets --release --locked -- -D warnings
+	PYO3_PYTHON=$(CURDIR)/$(BIN)/python cargo clippy --workspace --all-targets --locked -q -- -D warnings
 
 check-python: build
 	$(BIN)/ruff check python tests spec bench
