@@ -11,7 +11,7 @@ CACHE := .cache
 RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
 VIEWER := $(shell find viewer/src viewer/page -type f 2>/dev/null) $(wildcard viewer/*.json viewer/*.ts viewer/*.js viewer/*.mjs)
 
-.PHONY: help demo test test-all test-rust test-python test-viewer test-browser check check-rust check-python check-viewer bench bless docs pictures build clean tools
+.PHONY: help demo test test-all test-rust test-python test-viewer test-browser check check-rust check-python check-viewer bench bless build clean tools
 
 help: ## this list
 	@echo "map3d: 3D city models as oblique image tiles"; echo
@@ -100,15 +100,8 @@ check-viewer: $(CACHE)/viewer
 bench: build ## speed and memory, peers beside us
 	$(BIN)/python -m bench
 
-bless: build ## write vectors and golden pictures anew; say why in the commit
+bless: $(CACHE)/venv ## write the spec's test vectors anew; say why in the commit
 	$(BIN)/python spec/make_vectors.py
-	$(BIN)/python -m pytest -q --bless -m "golden"
-
-pictures: build ## write docs/pictures anew
-	$(BIN)/python docs/make_pictures.py
-
-docs: build ## command reference, API reference
-	$(BIN)/python docs/make_reference.py
 
 clean: ## remove what was built
 	rm -rf $(VENV) $(CACHE) target viewer/node_modules viewer/dist python/map3d/viewer demo tests/.out

@@ -1,0 +1,1 @@
+"""From files to a click in a real browser."""
