@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from map3d import _core
 from map3d.catalogue import Workspace
 from map3d.cli.app import run
@@ -87,7 +88,8 @@ def known_buildings(workspace: Path, count: int) -> list[tuple[int, list[float],
 
 def test_a_click_on_a_known_building_gives_its_gml_id_and_position(workspace: Path, origin: str, tmp_path: Path) -> None:
     node = shutil.which("node")
-    assert node and PLAYWRIGHT.is_dir(), "make .cache/npm puts playwright-core there"
+    assert node, "Node.js is not there"
+    assert PLAYWRIGHT.is_dir(), "make .cache/npm puts playwright-core there"
     known = known_buildings(workspace, 3)
     assert known
     picture = ROOT / "tests" / ".out" / "whole.png"
