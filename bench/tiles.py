@@ -99,7 +99,7 @@ def _image(folder: Path, material: dict[str, Any]) -> np.ndarray | None:
     if material["texture"] is None:
         return None
     (path,) = (folder / "textures").glob(f"{material['texture']}.*")
-    return np.asarray(Image.open(path).convert("RGB"))
+    return np.array(Image.open(path).convert("RGB"))
 
 
 def measure(buildings: int, res_m: float, count: int, color: str) -> dict[str, Any]:
