@@ -56,7 +56,7 @@ class MitsubaScene:
 
     def hits(self, frame: Frame, x: int, y: int) -> Hits:
         size = frame["tile_px"]
-        near, forward = self._near_plane(frame), axes(frame)[2]
+        forward = axes(frame)[2]
         sensor = self._sensor(frame, x, y, 1)
         centres = (np.arange(size) + 0.5) / size
         across, down = np.meshgrid(centres, centres)
@@ -72,7 +72,6 @@ class MitsubaScene:
         beyond = self.scene.ray_intersect(mi.Ray3f(ray.o + ray.d * (si.t + 1e-3), ray.d))
         second = np.where(np.array(beyond.is_valid()), np.array(beyond.t) + 1e-3, np.inf)
         ids = np.where(valid, self.ids[np.clip(triangle, 0, len(self.ids) - 1)], 0).astype(np.uint32)
-        del near
         shape = (size, size)
         return Hits(depth.reshape(shape), normal.reshape(*shape, 3), ids.reshape(shape), second.reshape(shape))
 

@@ -1,5 +1,5 @@
 // Opens a served rendering in Chromium, looks at it, clicks on world positions. Arguments: playwright-core's folder, origin, rendering, view, positions (JSON), picture.
-// Prints one JSON document: { problems, clicks: [{ id, name, position, approximate, attributes }], covered }.
+// Prints one JSON document: { problems, clicks: [{ id, name, position, approximate, attributes }] }.
 const [folder, origin, rendering, view, positions, picture] = process.argv.slice(2);
 const { chromium } = await import(`${folder}/index.mjs`);
 const browser = await chromium.launch({

@@ -86,7 +86,7 @@ def known_buildings(workspace: Path, count: int) -> list[tuple[int, list[float],
     return list(found.values())[:count]
 
 
-def test_a_click_on_a_known_building_gives_its_gml_id_and_position(workspace: Path, origin: str, tmp_path: Path) -> None:
+def test_a_click_on_a_known_building_gives_its_gml_id_and_position(workspace: Path, origin: str) -> None:
     node = shutil.which("node")
     assert node, "Node.js is not there"
     assert PLAYWRIGHT.is_dir(), "make .cache/npm puts playwright-core there"
