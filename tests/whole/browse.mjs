@@ -25,8 +25,11 @@ for (const position of JSON.parse(positions)) {
   const at = await page.evaluate(async (world) => {
     const { map } = globalThis;
     map.setView(world, 0);
-    await new Promise((done) => setTimeout(done, 300));
-    globalThis.clicked = new Promise((done) => map.once("click", ({ id, name, position, approximate, attributes }) => done({ id, name, position, approximate, attributes })));
+    await new Promise((done) => setTimeout(done, 600)); // longer than two taps of a double tap lie apart
+    globalThis.clicked = new Promise((done, failed) => {
+      map.once("click", ({ id, name, position, approximate, attributes }) => done({ id, name, position, approximate, attributes }));
+      setTimeout(() => failed(new Error(`no click event at ${map.project(world)} after 20 s`)), 20_000);
+    });
     return map.project(world);
   }, position);
   await page.mouse.click(at[0], at[1]);
