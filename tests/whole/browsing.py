@@ -1,0 +1,63 @@
+"""Scripts that look at pages in Chromium, and the command line as its own process."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PLAYWRIGHT = ROOT / "viewer" / "node_modules" / "playwright-core"
+SCRIPT_S = 120
+
+
+def browse(script: str, **asked: Any) -> dict[str, Any]:
+    """What the script of this folder answers."""
+    node = shutil.which("node")
+    assert node, "Node.js is not there"
+    assert PLAYWRIGHT.is_dir(), "make .cache/npm puts playwright-core there"
+    command = [node, str(Path(__file__).with_name(script)), str(PLAYWRIGHT), json.dumps(asked)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=SCRIPT_S, check=False)
+    if done.returncode:
+        pytest.fail(f"{script} failed:\n{done.stderr[-2000:]}")
+    answer: dict[str, Any] = json.loads(done.stdout)
+    return answer
+
+
+def picture(name: str) -> str:
+    """Where a screenshot of that name goes."""
+    folder = ROOT / "tests" / ".out"
+    folder.mkdir(exist_ok=True)
+    return str(folder / name)
+
+
+def command(*arguments: str | Path) -> list[str]:
+    """The command line as its own process."""
+    return [sys.executable, "-m", "map3d", *map(str, arguments)]
+
+
+@contextmanager
+def served(workspace: Path) -> Iterator[str]:
+    """Yields the address of `map3d serve`."""
+    server = subprocess.Popen(
+        command("serve", "-w", workspace, "--port", "0"), stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"}
+    )
+    assert server.stdout is not None
+    try:
+        for line in server.stdout:
+            if found := re.search(r"http://\S+?(?=/?\s*$)", line):
+                yield found[0].rstrip("/")
+                break
+        else:
+            pytest.fail("the server ended without an address")
+    finally:
+        server.terminate()
+        server.wait(20)
+        server.stdout.close()

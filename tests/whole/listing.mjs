@@ -1,0 +1,29 @@
+// Opens a page that makes `map` and `layer` itself. Asked: hosts, page, picture, positions: world positions to click at.
+// Answers: hosts: tiles asked of each; markers: [label, x, y]; points: where the positions lie on the screen; shot: the picture's own pixels there; clicks.
+import { look } from "./chromium.mjs";
+
+await look(async (page, { page: address, picture, positions }) => {
+  const hosts = {};
+  page.on("response", (response) => {
+    const { hostname, pathname } = new URL(response.url());
+    if (response.ok() && pathname.startsWith("/tiles/") && !pathname.endsWith(".json")) hosts[hostname] = (hosts[hostname] ?? 0) + 1;
+  });
+  await page.goto(address);
+  await page.evaluate(() => new Promise((done) => globalThis.map.once("idle", done)));
+  await page.screenshot({ path: picture });
+  const markers = await page.evaluate(() => [...document.querySelectorAll(".map3d-marker")].map((found) => found.textContent));
+  const points = await page.evaluate((places) => {
+    const { left, top } = globalThis.map.container.getBoundingClientRect();
+    return places.map((place) => globalThis.map.project(place)).map(([x, y]) => [x + left, y + top]);
+  }, positions);
+  const clicks = [];
+  for (const [x, y] of points) {
+    await page.waitForTimeout(600); // longer than two taps of a double tap lie apart
+    await page.evaluate(() => {
+      globalThis.clicked = new Promise((done) => globalThis.map.once("click", ({ id, name, position, approximate }) => done({ id, name, position, approximate })));
+    });
+    await page.mouse.click(x, y);
+    clicks.push(await page.evaluate(() => globalThis.clicked));
+  }
+  return { hosts, markers, points, clicks };
+});
