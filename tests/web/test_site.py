@@ -48,6 +48,14 @@ def test_the_manifest_is_that_of_the_rendering(client, workspace):
     assert client.get("/view/tea/rendering.json").content == answer.content
 
 
+@pytest.mark.parametrize("path", ["rendering.json", "objects/0.json", "objects/search.json", "0-45/color/0/0/0", "nonsense"])
+def test_any_origin_may_read_answers_and_refusals(client, path):
+    for base, status in (("/tiles/tea", (200, 204, 404)), ("/tiles/nowhere", (404,))):
+        answer = client.get(f"{base}/{path}")
+        assert answer.status_code in status
+        assert answer.headers["access-control-allow-origin"] == "*"
+
+
 @pytest.mark.parametrize("base", ["/tiles/tea", "/view/tea"])
 def test_objects_come_by_shard(client, base):
     answer = client.get(f"{base}/objects/0.json")

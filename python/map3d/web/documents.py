@@ -1,4 +1,4 @@
-"""The JSON documents beside the tiles: manifest, attribute shards, search index (spec/manifest.md). Any origin may read them.
+"""The JSON documents beside the tiles: manifest, attribute shards, search index (spec/manifest.md).
 
 They stand under /tiles/<rendering>/ and under /view/<rendering>/, whose page reads them as its own folder's, as in a published folder.
 """
@@ -94,7 +94,6 @@ def json_answer(data: bytes) -> Response:
     response.headers["Vary"] = "Accept-Encoding"
     response.set_etag(sha256(data).hexdigest()[:32], weak=True)
     response.headers["Cache-Control"] = "no-cache"
-    response.headers["Access-Control-Allow-Origin"] = "*"
     response.make_conditional(request)
     return response
 

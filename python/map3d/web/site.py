@@ -10,6 +10,7 @@ from map3d.catalogue.workspace import Workspace
 from map3d.web.documents import documents
 from map3d.web.errors import status_of
 from map3d.web.pages import pages
+from map3d.web.tiles import PREFIXES
 
 CONTENT_SECURITY_POLICY = (
     "default-src 'self'; img-src 'self' data: blob:; worker-src 'self' blob:; connect-src 'self' blob: data:; "
@@ -52,6 +53,8 @@ def _refuse(error: Exception) -> Response:
 
 
 def _protect(response: Response) -> Response:
+    if request.path.startswith(PREFIXES):
+        response.headers["Access-Control-Allow-Origin"] = "*"  # on refusals too: a page of another origin learns why
     response.headers["X-Content-Type-Options"] = "nosniff"
     response.headers["Content-Security-Policy"] = CONTENT_SECURITY_POLICY
     response.headers["Referrer-Policy"] = "same-origin"
