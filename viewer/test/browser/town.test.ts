@@ -109,7 +109,7 @@ test("without light, colour bytes come out as they are stored", async () => {
   await page.context().close();
 });
 
-test("each pixel is lit as Lambert says, in linear light", async () => {
+test("each pixel is lit as Lambert says, in linear light, half by its own normal and an eighth by each neighbour's", async () => {
   const light = { azimuth_deg: 200, altitude_deg: 30, ambient: 0.2, diffuse: 0.6 };
   const { page } = await started({ zoom: 3, light });
   const got = await pixels(page);
@@ -122,7 +122,10 @@ test("each pixel is lit as Lambert says, in linear light", async () => {
     const [c, n] = [color(x, y), normal(x, y)];
     if (!c || !n || c[3] === 0) continue;
     compared++;
-    const want = [0, 1, 2].map((k) => litByte(c[k] ?? 0, [...n], light));
+    const own = lambert(n, light) ?? 0;
+    const around = [normal(x - 1, y), normal(x + 1, y), normal(x, y - 1), normal(x, y + 1)].map((beside) => (beside && lambert(beside, light)) ?? own);
+    const strength = own / 2 + around.reduce((sum, part) => sum + part, 0) / 8;
+    const want = [0, 1, 2].map((k) => litByte(c[k] ?? 0, strength));
     if (want.some((value, k) => Math.abs(value - (got[4 * at + k] ?? 0)) > 1)) wrong.push(`${String(x)}, ${String(y)}: ${String(want)} is ${String([...got.subarray(4 * at, 4 * at + 3)])}`);
   }
   expect(wrong.slice(0, 5)).toEqual([]);
@@ -130,14 +133,27 @@ test("each pixel is lit as Lambert says, in linear light", async () => {
   await page.context().close();
 });
 
-/** The byte that a stored colour byte becomes under a light, on a stored normal. */
-function litByte(byte: number, stored: number[], light: { azimuth_deg: number; altitude_deg: number; ambient: number; diffuse: number }): number {
+interface Lamp {
+  azimuth_deg: number;
+  altitude_deg: number;
+  ambient: number;
+  diffuse: number;
+}
+
+/** Light on a stored normal; null where there is none. */
+function lambert(stored: Uint8Array, light: Lamp): number | null {
+  if (stored.every((part) => part === 0)) return null;
   const [a, h] = [(light.azimuth_deg * Math.PI) / 180, (light.altitude_deg * Math.PI) / 180];
-  const n = stored.map((part) => (part / 255) * 2 - 1);
+  const n = [...stored].map((part) => (part / 255) * 2 - 1);
   const sun = [Math.sin(a) * Math.cos(h), Math.cos(a) * Math.cos(h), Math.sin(h)];
   const cosine = n.reduce((sum, part, k) => sum + part * (sun[k] ?? 0), 0) / Math.hypot(...n);
+  return light.ambient + light.diffuse * Math.max(0, cosine);
+}
+
+/** The byte that a stored colour byte becomes under so much light. */
+function litByte(byte: number, strength: number): number {
   const c = byte / 255;
-  const lit = Math.min((c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4) * (light.ambient + light.diffuse * Math.max(0, cosine)), 1);
+  const lit = Math.min((c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4) * strength, 1);
   return Math.round(255 * (lit <= 0.0031308 ? 12.92 * lit : 1.055 * lit ** (1 / 2.4) - 0.055));
 }
 

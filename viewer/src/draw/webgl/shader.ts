@@ -1,4 +1,5 @@
 import type { Mode } from "../drawer";
+import { GUTTER } from "./textures";
 
 /** What a program is made for; each combination is compiled when it is first drawn. */
 export interface Variant {
@@ -22,6 +23,7 @@ export function fragment({ mode, masked, highlight }: Variant): string {
 }
 
 const HEAD = `
+#define GUTTER ${String(GUTTER)}
 precision highp float;
 precision highp int;
 precision highp usampler2D;
@@ -43,37 +45,77 @@ out vec4 o_color;
 
 vec3 linear(vec3 c) { return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), step(0.04045, c)); }
 vec3 srgb(vec3 c) { return mix(c * 12.92, 1.055 * pow(max(c, 0.0031308), vec3(1.0 / 2.4)) - 0.055, step(0.0031308, c)); }
-ivec2 inside(ivec2 at) { return clamp(at, ivec2(0), ivec2(u_size - 1)) + 1; }
+ivec2 inside(ivec2 at) { return clamp(at, ivec2(0), ivec2(u_size - 1)) + GUTTER; }
 `;
 
-/** Colour is averaged premultiplied, and in linear light when it is lit: shade first, filter then. */
+/**
+ * Colour is averaged premultiplied, and in linear light when it is lit: shade first, filter then.
+ *
+ * Colours of a tile are averages over pixels, its normals are those of the pixels' centres: lit by its own normal
+ * alone, a pixel on the edge of a bright shaded wall shines. So light is spread a little, half from the pixel and an
+ * eighth from each neighbour; against pictures lit before they are averaged this gains 2 to 3 dB at edges.
+ */
 const COLOR = `
 #if defined(MODE_LIT) || defined(MODE_COLOR)
-float lambert(ivec2 at) {
-  vec3 stored = texelFetch(u_normal, at, 0).rgb;
-  if (stored == vec3(0.0)) return u_light.x + 0.5 * u_light.y;
-  return u_light.x + u_light.y * max(0.0, dot(normalize(stored * 2.0 - 1.0), u_sun));
-}
+ivec2 stored(ivec2 texel) { return clamp(texel, u_bounds.xy, u_bounds.zw) + GUTTER; }
 
-vec4 tap(ivec2 texel) {
-  ivec2 at = clamp(texel, u_bounds.xy, u_bounds.zw) + 1;
+vec4 colorAt(ivec2 texel) {
+  ivec2 at = stored(texel);
   vec4 c = texelFetch(u_color, at, 0);
 #ifdef MASKED
   c.a = texelFetch(u_id, at, 0).r == 0u ? 0.0 : 1.0;
 #endif
+  return c;
+}
+
 #ifdef MODE_LIT
-  c.rgb = linear(c.rgb) * lambert(at);
-#endif
+/** Negative where there is no normal. */
+float lambert(ivec2 texel) {
+  vec3 n = texelFetch(u_normal, stored(texel), 0).rgb;
+  return n == vec3(0.0) ? -1.0 : u_light.x + u_light.y * max(0.0, dot(normalize(n * 2.0 - 1.0), u_sun));
+}
+
+float spread(float own, float left, float right, float above, float below) {
+  if (own < 0.0) return u_light.x + 0.5 * u_light.y;
+  vec4 around = vec4(left, right, above, below);
+  return 0.5 * own + 0.125 * dot(mix(around, vec4(own), lessThan(around, vec4(0.0))), vec4(1.0));
+}
+
+vec4 lit(ivec2 texel, float light) {
+  vec4 c = colorAt(texel);
+  return vec4(linear(c.rgb) * light * c.a, c.a);
+}
+
+vec4 exact(ivec2 at) {
+  return lit(at, spread(lambert(at), lambert(at - ivec2(1, 0)), lambert(at + ivec2(1, 0)), lambert(at - ivec2(0, 1)), lambert(at + ivec2(0, 1))));
+}
+
+/** Of the 2 × 2 texels from at; their light comes from 4 × 4 without the corners. */
+vec4 between(ivec2 at, vec2 f) {
+  float n0 = lambert(at + ivec2(0, -1)), n1 = lambert(at + ivec2(1, -1));
+  float w0 = lambert(at + ivec2(-1, 0)), a = lambert(at), b = lambert(at + ivec2(1, 0)), e0 = lambert(at + ivec2(2, 0));
+  float w1 = lambert(at + ivec2(-1, 1)), c = lambert(at + ivec2(0, 1)), d = lambert(at + 1), e1 = lambert(at + ivec2(2, 1));
+  float s0 = lambert(at + ivec2(0, 2)), s1 = lambert(at + ivec2(1, 2));
+  vec4 top = mix(lit(at, spread(a, w0, b, n0, c)), lit(at + ivec2(1, 0), spread(b, a, e0, n1, d)), f.x);
+  vec4 bottom = mix(lit(at + ivec2(0, 1), spread(c, w1, d, a, s0)), lit(at + 1, spread(d, c, e1, b, s1)), f.x);
+  return mix(top, bottom, f.y);
+}
+#else
+vec4 exact(ivec2 at) {
+  vec4 c = colorAt(at);
   return vec4(c.rgb * c.a, c.a);
 }
+
+vec4 between(ivec2 at, vec2 f) {
+  return mix(mix(exact(at), exact(at + ivec2(1, 0)), f.x), mix(exact(at + ivec2(0, 1)), exact(at + 1), f.x), f.y);
+}
+#endif
 
 vec4 surface(vec2 texel) {
   vec2 corner = floor(texel - 0.5), f = texel - 0.5 - corner;
   ivec2 at = ivec2(corner);
   f = mix(f, round(f), lessThan(abs(f - round(f)), vec2(0.004)));
-  vec4 c = f == vec2(0.0) ? tap(at)
-    : f == vec2(1.0) ? tap(at + 1)
-    : mix(mix(tap(at), tap(at + ivec2(1, 0)), f.x), mix(tap(at + ivec2(0, 1)), tap(at + 1), f.x), f.y);
+  vec4 c = f == vec2(0.0) || f == vec2(1.0) ? exact(at + ivec2(f)) : between(at, f);
   if (c.a == 0.0) return vec4(0.0);
 #ifdef MODE_LIT
   return vec4(srgb(clamp(c.rgb / c.a, 0.0, 1.0)), c.a);
@@ -134,7 +176,7 @@ uint colorOf(uint id) {
 
 uint idAt(vec2 texel) {
   ivec2 at = clamp(ivec2(floor(texel)), u_bounds.xy, u_bounds.zw);
-  return texelFetch(u_id, at + 1, 0).r;
+  return texelFetch(u_id, at + GUTTER, 0).r;
 }
 
 vec4 highlighted(vec4 color, vec2 texel) {

@@ -1,6 +1,9 @@
 import type { TileData } from "../../tiles/tileData";
 
-/** A tile on the GPU, with a gutter of one texel around it that holds its neighbours' pixels. */
+/** Texels around a tile that hold its neighbours' pixels: one for filtering, one for the light that is spread at edges. */
+export const GUTTER = 2;
+
+/** A tile on the GPU, with its gutter. */
 export interface TileTexture {
   readonly texture: WebGLTexture;
   readonly width: number;
@@ -66,7 +69,7 @@ export class Textures {
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
     const stored = data.kind === "color" ? gl.RGBA8 : data.kind === "normal" ? gl.RGB8 : gl.R32UI;
-    gl.texStorage2D(gl.TEXTURE_2D, 1, stored, width + 2, height + 2);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, stored, width + 2 * GUTTER, height + 2 * GUTTER);
     this.#fill(data);
     return { texture, width, height, filled: new Array<number>(9).fill(0) };
   }
@@ -74,9 +77,9 @@ export class Textures {
   #fill(data: TileData): void {
     const gl = this.#gl;
     const { width, height } = data;
-    if (data.kind === "color") gl.texSubImage2D(gl.TEXTURE_2D, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, data.bitmap);
-    else if (data.kind === "normal") gl.texSubImage2D(gl.TEXTURE_2D, 0, 1, 1, width, height, gl.RGB, gl.UNSIGNED_BYTE, data.values);
-    else gl.texSubImage2D(gl.TEXTURE_2D, 0, 1, 1, width, height, gl.RED_INTEGER, gl.UNSIGNED_INT, data.values);
+    if (data.kind === "color") gl.texSubImage2D(gl.TEXTURE_2D, 0, GUTTER, GUTTER, gl.RGBA, gl.UNSIGNED_BYTE, data.bitmap);
+    else if (data.kind === "normal") gl.texSubImage2D(gl.TEXTURE_2D, 0, GUTTER, GUTTER, width, height, gl.RGB, gl.UNSIGNED_BYTE, data.values);
+    else gl.texSubImage2D(gl.TEXTURE_2D, 0, GUTTER, GUTTER, width, height, gl.RED_INTEGER, gl.UNSIGNED_INT, data.values);
   }
 
   /** Fills `to`'s gutter towards (dx, dy) with the nearest pixels of `from`, which lies there. */
@@ -103,9 +106,9 @@ export class Textures {
       to.filled[side(cx, cy)] = quality;
       const [toX] = along(cx, to.width);
       const [toY] = along(cy, to.height);
-      const sourceX = dx === 0 ? (end < 0 ? 1 : to.width) : fromX;
-      const sourceY = dy === 0 ? (end < 0 ? 1 : to.height) : fromY;
-      this.#gl.copyTexSubImage2D(this.#gl.TEXTURE_2D, 0, toX, toY, sourceX, sourceY, 1, 1);
+      const sourceX = dx === 0 ? (end < 0 ? GUTTER : to.width) : fromX;
+      const sourceY = dy === 0 ? (end < 0 ? GUTTER : to.height) : fromY;
+      this.#gl.copyTexSubImage2D(this.#gl.TEXTURE_2D, 0, toX, toY, sourceX, sourceY, GUTTER, GUTTER);
     }
   }
 }
@@ -121,12 +124,13 @@ const side = (dx: number, dy: number): number => dx + 1 + 3 * (dy + 1);
 
 /** First texel to write, first texel to read in the other tile, and how many, along one axis. */
 function along(step: number, size: number): [number, number, number] {
-  if (step < 0) return [0, size, 1];
-  if (step > 0) return [size + 1, 1, 1];
-  return [1, 1, size];
+  if (step < 0) return [0, size, GUTTER];
+  if (step > 0) return [size + GUTTER, GUTTER, GUTTER];
+  return [GUTTER, GUTTER, size];
 }
 
-/** Texels that may be read, gutter included where it is filled: least x, least y, greatest x, greatest y; −1 and size are the gutter. */
+/** Texels that may be read, gutter included where it is filled: least x, least y, greatest x, greatest y; −1 and size are the first of the gutter. */
 export function boundsOf({ filled, width, height }: TileTexture): [number, number, number, number] {
-  return [filled[3] ? -1 : 0, filled[1] ? -1 : 0, filled[5] ? width : width - 1, filled[7] ? height : height - 1];
+  const more = (place: number): number => (filled[place] ? GUTTER : 0);
+  return [-more(3), -more(1), width - 1 + more(5), height - 1 + more(7)];
 }
