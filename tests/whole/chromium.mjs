@@ -13,12 +13,15 @@ export async function look(act) {
   const browser = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args });
   try {
     const [width, height] = asked.size ?? [1000, 700];
-    const page = await (await browser.newContext({ viewport: { width, height } })).newPage();
+    const page = await (await browser.newContext({ viewport: { width, height }, reducedMotion: "reduce" })).newPage();
     page.setDefaultTimeout(60_000);
     const problems = [];
     page.on("pageerror", (error) => problems.push(error.message));
     page.on("console", (message) => ["error", "warning"].includes(message.type()) && problems.push(message.text()));
-    page.on("requestfailed", (request) => problems.push(`${request.url()}: ${request.failure()?.errorText}`));
+    page.on("requestfailed", (request) => {
+      const why = request.failure()?.errorText;
+      if (why !== "net::ERR_ABORTED") problems.push(`${request.url()}: ${why}`); // the viewer gives up what is no longer in view
+    });
     const answer = await act(page, asked);
     console.log(JSON.stringify({ ...answer, problems }));
   } finally {

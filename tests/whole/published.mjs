@@ -1,0 +1,55 @@
+// Opens a published folder's own page as a visitor does. Asked: address, direction and position of a known object, zoom, label to search for, picture: where screenshots go.
+// Answers: title; clicked, found: what the panel tells, and whether it covers buttons; turned: the direction in the address; pictures: how many differ; ranges: answers with 206.
+import { look } from "./chromium.mjs";
+
+const REST_MS = 200;
+
+/** No request under way, and the picture stays as it is. */
+async function rest(page, shot) {
+  await page.waitForLoadState("networkidle");
+  for (let before = "", now = ""; ; before = now) {
+    now = (await page.screenshot(shot ? { path: shot } : {})).toString("base64");
+    if (now === before) return now;
+    await page.waitForTimeout(REST_MS);
+  }
+}
+
+async function panel(page) {
+  await page.waitForSelector("#info:not([hidden])");
+  const [name, note] = await Promise.all(["#info h2", "#info .note"].map((place) => page.locator(place).first().textContent()));
+  const [keys, values] = await Promise.all(["#info dt", "#info dd"].map((place) => page.locator(place).allTextContents()));
+  const [box, buttons] = await Promise.all(["#info", ".map3d-buttons"].map((place) => page.locator(place).boundingBox()));
+  const covers = box.y + box.height > buttons.y && box.x + box.width > buttons.x;
+  return { name, note, covers, attributes: Object.fromEntries(keys.map((key, k) => [key, values[k]])) };
+}
+
+await look(async (page, { address, direction, position, zoom, label, picture, size }) => {
+  let ranges = 0;
+  page.on("response", (response) => (ranges += response.status() === 206));
+  await page.goto(address);
+  await page.waitForFunction(() => location.hash.length > 5);
+  const whole = await rest(page, `${picture}-whole.png`);
+  const title = await page.title();
+
+  await page.goto(`${address}#${[direction, ...position, zoom].join("/")}`);
+  await page.reload(); // the place in the address is read when the page opens
+  await page.waitForFunction(() => document.title !== "map3d");
+  const near = await rest(page, `${picture}-near.png`);
+  await page.mouse.click(size[0] / 2, size[1] / 2);
+  const clicked = await panel(page);
+  await rest(page, `${picture}-click.png`);
+  await page.keyboard.press("Escape");
+
+  await page.fill("#query", label);
+  await page.waitForSelector("#results li[role=option]");
+  await page.keyboard.press("Enter");
+  const found = await panel(page);
+  const searched = await rest(page, `${picture}-search.png`);
+  await page.keyboard.press("Escape");
+
+  await page.getByRole("button", { name: "Turn view counter-clockwise" }).click();
+  await page.waitForFunction((before) => !location.hash.startsWith(`#${before}/`), direction);
+  const turned = await rest(page, `${picture}-turned.png`);
+  const hash = await page.evaluate(() => location.hash);
+  return { title, clicked, found, ranges, turned: hash.slice(1).split("/")[0], pictures: new Set([whole, near, searched, turned]).size };
+});
