@@ -51,6 +51,11 @@ class CoreView:
             whole[y * px : (y + 1) * px, x * px : (x + 1) * px] = buffer[kind]
         return whole
 
+    def pixel_of(self, position: list[float]) -> tuple[int, int]:
+        """(column, row) of the whole deepest level."""
+        column, row, _ = self.frame.level_pixel_from_local(self.frame.zmax, np.array(position) - self._scene.origin)
+        return int(column), int(row)
+
     def known(self, kind: str | None, count: int) -> list[Known]:
         """Objects of a class with many pixels in one tile, each at the pixel nearest to their middle. None: any class."""
         found: dict[int, Known] = {}

@@ -54,7 +54,7 @@ def blocks_done(root: Path) -> int:
 
 
 def stopped_after(files: Path, root: Path, blocks: int, number: signal.Signals) -> int:
-    """Starts the command as a shell does, in a process group of its own; sends the signal to all of the group once so many blocks are done. Its status."""
+    """Starts the command in a process group of its own, as a shell does; signals all of it once so many blocks are done. Its status."""
     process = subprocess.Popen(site(files, root), process_group=0, stderr=subprocess.DEVNULL)
     deadline_s = time.monotonic() + 60
     while blocks_done(root) < blocks:

@@ -1,0 +1,41 @@
+// Reads whole tiles as the viewer has them, and highlights objects. Asked: origin, rendering, view, zmax, tiles ([x, y] of the deepest level), targets ([id, world position of a pixel's centre]), size (odd sides), picture.
+// Answers: tiles: { kind: SHA-256 of each tile's numbers, null where empty }, changed: pixels of the canvas that a highlight changed, a byte each, base64, rows from the top.
+import { look, openMap } from "./chromium.mjs";
+
+await look(async (page, { origin, rendering, view, zmax, tiles, targets, picture }) => {
+  await openMap(page, { origin, rendering, view, options: { controls: false, attribution: false, preserveDrawingBuffer: true } });
+  const read = await page.evaluate(async ([name, z, wanted]) => {
+    const hex = async (numbers) => [...new Uint8Array(await crypto.subtle.digest("SHA-256", numbers))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+    const { layer } = globalThis;
+    const answer = {};
+    for (const kind of ["id", "depth"]) {
+      const one = async ([x, y]) => layer.store.need(layer.viewOf(name), layer.rendering.layers.get(kind), { z, x, y });
+      answer[kind] = await Promise.all(wanted.map(async (tile) => { const data = await one(tile); return data && hex(data.values); }));
+    }
+    return answer;
+  }, [view, zmax, tiles]);
+  const changed = [];
+  for (const [id, position] of targets) {
+    changed.push(await page.evaluate(async ([number, world, level]) => {
+      const { map, layer } = globalThis;
+      const rest = () => new Promise((done) => map.once("idle", done));
+      const shot = () => {
+        const gl = map.canvas.getContext("webgl2");
+        const data = new Uint8Array(4 * gl.drawingBufferWidth * gl.drawingBufferHeight);
+        gl.readPixels(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight, gl.RGBA, gl.UNSIGNED_BYTE, data);
+        return new Uint32Array(data.buffer);
+      };
+      await Promise.all([rest(), map.setView(world, level)]);
+      const before = shot();
+      await Promise.all([rest(), layer.highlight(number, { color: "#00ffff" })]);
+      const after = shot();
+      await Promise.all([rest(), layer.clearHighlight()]);
+      if (shot().some((pixel, k) => pixel !== before[k])) throw new Error(`the picture without the highlight of ${number} is not what it was`);
+      const width = map.canvas.width;
+      const rows = Array.from({ length: map.canvas.height }, (_, j) => after.subarray(j * width, (j + 1) * width).map((pixel, i) => Number(pixel !== before[j * width + i])));
+      return btoa(rows.reverse().map((row) => String.fromCharCode(...row)).join(""));
+    }, [id, position, zmax]));
+  }
+  await page.screenshot({ path: picture });
+  return { tiles: read, changed };
+});
