@@ -11,7 +11,7 @@ CACHE := .cache
 RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
 VIEWER := $(shell find viewer/src viewer/page -type f 2>/dev/null) $(wildcard viewer/*.json viewer/*.ts viewer/*.js viewer/*.mjs)
 
-.PHONY: help demo test test-all test-rust test-python test-viewer test-browser check check-rust check-python check-viewer bench bless build clean tools
+.PHONY: help demo test test-all test-rust test-python test-viewer test-browser check check-rust check-python check-viewer bench bless docs build clean tools
 
 help: ## this list
 	@echo "map3d: 3D city models as oblique image tiles"; echo
@@ -86,8 +86,8 @@ check-rust: $(CACHE)/venv
 	PYO3_PYTHON=$(CURDIR)/$(BIN)/python cargo clippy --workspace --all-targets --locked -q -- -D warnings
 
 check-python: build
-	$(BIN)/ruff check python tests spec bench
-	$(BIN)/ruff format --check python tests spec bench
+	$(BIN)/ruff check python tests spec bench docs
+	$(BIN)/ruff format --check python tests spec bench docs
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
@@ -98,6 +98,10 @@ check-viewer: $(CACHE)/viewer
 
 bench: build ## speed and memory, peers beside us
 	$(BIN)/python -m bench
+
+docs: build ## the pictures and the command line's reference in docs/
+	$(BIN)/python docs/make_cli.py
+	$(BIN)/python docs/pictures/make.py .cache/pictures
 
 bless: $(CACHE)/venv ## write the spec's test vectors anew; say why in the commit
 	$(BIN)/python spec/make_vectors.py

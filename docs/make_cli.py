@@ -1,0 +1,32 @@
+"""`python docs/make_cli.py`: writes docs/cli.md, the reference of the command line, from the commands' own help."""
+
+from pathlib import Path
+from typing import Final
+
+import click
+
+from map3d.cli.app import VERBS, cli
+
+TARGET: Final = Path(__file__).with_name("cli.md")
+HEAD: Final = "# Command line\n\nWritten by `make docs` from the commands' own help. All verbs take `-h`, `--help`.\n"
+
+
+def reference() -> str:
+    parts = [HEAD, section("map3d", cli)]
+    with click.Context(cli, info_name="map3d") as context:
+        for verb in VERBS:
+            command = cli.get_command(context, verb)
+            assert command is not None
+            parts.append(section(f"map3d {verb}", command))
+    return "\n".join(parts)
+
+
+def section(name: str, command: click.Command) -> str:
+    settings = {**cli.context_settings, "terminal_width": 110, "max_content_width": 110}
+    with click.Context(command, info_name=name, **settings) as context:
+        return f"## {name}\n\n```text\n{command.get_help(context)}\n```\n"
+
+
+if __name__ == "__main__":
+    TARGET.write_text(reference(), encoding="utf-8")
+    print(TARGET)
