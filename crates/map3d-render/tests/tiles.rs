@@ -47,7 +47,7 @@ fn ids_depths_and_normals_are_those_of_the_plain_renderer() {
     let scene = town.open(&folder);
     for (look_at, pitch) in VIEWS {
         let f = frame(look_at, pitch, 64.0, 0);
-        let (g, plain) = (scene.gbuffer(&f, 0, 0).expect("renders"), Plain::new(&town, &f));
+        let (g, plain) = (scene.gbuffer(&f, 0, 0).expect("renders"), Plain::new(&scene, &town, &f));
         let mut seen = 0;
         for (i, j) in some_pixels(7) {
             let met = plain.pixel_sample(i, j, 0);
@@ -70,7 +70,7 @@ fn flat_colours_are_the_mean_of_the_samples() {
     let scene = town.open(&folder);
     for (look_at, pitch) in VIEWS {
         let f = frame(look_at, pitch, 64.0, 0);
-        let (g, plain) = (scene.gbuffer(&f, 0, 0).expect("renders"), Plain::new(&town, &f));
+        let (g, plain) = (scene.gbuffer(&f, 0, 0).expect("renders"), Plain::new(&scene, &town, &f));
         let mut edges = 0;
         for (i, j) in some_pixels(5) {
             let mets: Vec<Option<Met>> = (0..16).map(|k| plain.pixel_sample(i, j, k)).collect();
@@ -129,7 +129,7 @@ fn textures_are_neither_blurred_nor_aliased() {
             let size = 100.0 * f64::from(pitch as f32).to_radians().sin().max(0.2);
             let f = frame(20.0, pitch, size, 0);
             let g = scene.gbuffer(&f, 0, 0).expect("renders");
-            let (psnr, gradient) = compare(&g, &Plain::new(&town, &f), 40, 24);
+            let (psnr, gradient) = compare(&g, &Plain::new(&scene, &town, &f), 40, 24);
             eprintln!("pitch {pitch}, {repeats} repeats: PSNR {psnr:.1} dB, gradient energy {gradient:.3}");
             assert!(psnr >= least_db, "pitch {pitch}, {repeats} repeats: PSNR {psnr:.1} dB");
             assert!((gradient - 1.0).abs() <= 0.1, "pitch {pitch}, {repeats} repeats: gradient energy {gradient:.3}");
@@ -147,7 +147,7 @@ fn atlases_show_no_background_at_any_footprint() {
     let mut town = Town::default();
     let material = town.textured(image, Wrap::Clamp);
     let (u0, u1, v0, v1) = (24.0 / 128.0, 100.0 / 128.0, 1.0 - 80.0 / 128.0, 1.0 - 40.0 / 128.0);
-    town.quad([[-9.0, -7.0, 0.0], [9.0, -7.0, 0.0], [9.0, 7.0, 5.0], [-9.0, 7.0, 5.0]], [[u0, v0], [u1, v0], [u1, v1], [u0, v1]], material, 0);
+    town.panel([[-9.0, -7.0, 0.0], [9.0, -7.0, 0.0], [9.0, 7.0, 5.0], [-9.0, 7.0, 5.0]], [[u0, v0], [u1, v0], [u1, v1], [u0, v1]], material, 0);
     let folder = new_folder("magenta");
     let scene = town.open(&folder);
     for size in [6.0, 40.0, 100.0, 600.0, 3000.0] {
@@ -169,8 +169,8 @@ fn cut_outs_let_through_what_lies_behind() {
     let mut town = Town::default();
     let (leaf, wall) = (town.textured(image, Wrap::Clamp), town.flat([0.8, 0.2, 0.1]));
     let square = |z: f64| [[-8.0, -8.0, z], [8.0, -8.0, z], [8.0, 8.0, z], [-8.0, 8.0, z]];
-    town.quad(square(5.0), [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], leaf, 0);
-    town.quad(square(0.0), [[0.0; 2]; 4], wall, 1);
+    town.panel(square(5.0), [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], leaf, 0);
+    town.panel(square(0.0), [[0.0; 2]; 4], wall, 1);
     let folder = new_folder("cutout");
     let scene = town.open(&folder);
     let f = frame(0.0, 90.0, 32.0, 0);
@@ -206,8 +206,8 @@ fn shading_normals_bend_and_face_the_viewer() {
 fn higher_ranks_win_on_coplanar_faces() {
     let mut town = Town::default();
     let (wall, door) = (town.flat([0.8; 3]), town.flat([0.3, 0.2, 0.1]));
-    town.quad([[-8.0, 0.0, 0.0], [8.0, 0.0, 0.0], [8.0, 0.0, 10.0], [-8.0, 0.0, 10.0]], [[0.0; 2]; 4], wall, 0);
-    town.quad([[-2.0, 0.0, 2.0], [2.0, 0.0, 2.0], [2.0, 0.0, 8.0], [-2.0, 0.0, 8.0]], [[0.0; 2]; 4], door, 1);
+    town.panel([[-8.0, 0.0, 0.0], [8.0, 0.0, 0.0], [8.0, 0.0, 10.0], [-8.0, 0.0, 10.0]], [[0.0; 2]; 4], wall, 0);
+    town.panel([[-2.0, 0.0, 2.0], [2.0, 0.0, 2.0], [2.0, 0.0, 8.0], [-2.0, 0.0, 8.0]], [[0.0; 2]; 4], door, 1);
     town.faces[2].rank = Rank::Opening;
     town.faces[3].rank = Rank::Opening;
     let folder = new_folder("ranks");
@@ -215,7 +215,7 @@ fn higher_ranks_win_on_coplanar_faces() {
     for look_at in [0.0, 30.0, 160.0] {
         let f = frame(look_at, 30.0, 24.0, 0);
         let g = scene.gbuffer(&f, 0, 0).expect("renders");
-        let (plain, mut doors) = (Plain::new(&town, &f), 0);
+        let (plain, mut doors) = (Plain::new(&scene, &town, &f), 0);
         for (i, j) in some_pixels(11) {
             let met = plain.pixel_sample(i, j, 0);
             doors += usize::from(met.as_ref().is_some_and(|m| m.id == 2));

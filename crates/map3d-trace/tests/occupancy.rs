@@ -6,7 +6,7 @@ use map3d_base::asset::Rank;
 use map3d_base::tile::Tile;
 use map3d_scene::SceneStore;
 use map3d_trace::{BeamTracer, Opaque, SUBTILE_PX, block_key, occupied};
-use scenes::{Dice, Soup, build, frame, new_folder, open, request, write_asset};
+use scenes::{Dice, Soup, build, frame, new_folder, open, rebuild};
 
 fn houses(seed: u64) -> Soup {
     let mut dice = Dice(seed);
@@ -70,8 +70,7 @@ fn a_block_key_changes_with_what_the_block_shows() {
     assert_eq!(before, keys(&open(&folder)), "the same in every process");
     // One more house, in the north-east.
     soup.quad([[50.0, 50.0, 2.0], [52.0, 50.0, 2.0], [52.0, 52.0, 2.0], [50.0, 52.0, 2.0]], 41, Rank::Other);
-    write_asset(&folder, &soup);
-    map3d_scene::build::build_scene(&folder.0, &request(), &mut |_, _, _| true).expect("build");
+    rebuild(&folder, &soup);
     let after = keys(&open(&folder));
     let changed: Vec<bool> = before.iter().zip(&after).map(|(a, b)| a != b).collect();
     assert_eq!(changed, [false, true, false, false]);

@@ -2,11 +2,12 @@
 
 mod scenes;
 
-use map3d_base::asset::Rank;
+use map3d_base::asset::{Instance, Rank};
 use map3d_base::vec3::{normalized, scale};
 use map3d_base::{Vec3, ViewAxes};
+use map3d_scene::SceneStore;
 use map3d_trace::{BeamTracer, Opaque, Pixel, Ray, Rays, SUBTILE_PX};
-use scenes::{Dice, Soup, build, frame, new_folder};
+use scenes::{Dice, Face, Soup, build, frame, new_folder};
 
 /// A closed ball of triangles whose corners are jittered along their radius.
 fn ball(radius: f64, rings: usize, dice: &mut Dice, at: Vec3) -> Vec<[Vec3; 3]> {
@@ -25,9 +26,30 @@ fn ball(radius: f64, rings: usize, dice: &mut Dice, at: Vec3) -> Vec<[Vec3; 3]> 
     for i in 0..rings {
         for j in 0..columns {
             let k = (j + 1) % columns;
-            out.push([points[i][j], points[i + 1][j], points[i + 1][k]]);
-            out.push([points[i][j], points[i + 1][k], points[i][k]]);
+            // At a pole one of the two is a point.
+            if i + 1 < rings {
+                out.push([points[i][j], points[i + 1][j], points[i + 1][k]]);
+            }
+            if i > 0 {
+                out.push([points[i][j], points[i + 1][k], points[i][k]]);
+            }
         }
+    }
+    out
+}
+
+/// A closed box of `count` × `count` squares a side, along the axes: seen along them, its edges fall on samples.
+fn crate_of(half: f64, count: usize) -> Vec<[Vec3; 3]> {
+    let step = 2.0 * half / count as f64;
+    let mut out = Vec::new();
+    for (side, k) in (0..6).flat_map(|side| (0..count * count).map(move |k| (side, k))) {
+        let point = |i: usize, j: usize| {
+            let q = [if side % 2 == 0 { half } else { -half }, i as f64 * step - half, j as f64 * step - half];
+            [0, 1, 2].map(|axis| q[(axis + side / 2) % 3])
+        };
+        let (i, j) = (k % count, k / count);
+        let c = [point(i, j), point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)];
+        out.extend([[c[0], c[1], c[2]], [c[0], c[2], c[3]]]);
     }
     out
 }
@@ -36,34 +58,63 @@ fn soup_of(triangles: &[[Vec3; 3]], far: bool) -> Soup {
     let mut soup = Soup::default();
     triangles.iter().for_each(|t| soup.add(*t, 0, Rank::Other));
     if far {
-        // Widens the square, so that the ball lies in several cells.
+        // Widens the square, so that what lies in the middle is cut into several cells.
         soup.add([[30_000.0, 30_000.0, 0.0], [30_001.0, 30_000.0, 0.0], [30_000.0, 30_001.0, 0.0]], 1, Rank::Other);
         soup.add([[-30_000.0, -30_000.0, 0.0], [-30_001.0, -30_000.0, 0.0], [-30_000.0, -30_001.0, 0.0]], 1, Rank::Other);
     }
     soup
 }
 
+/// Turned, mirrored and stretched, each part a prototype of its own that meets the next at its edges.
+fn planted(triangles: &[[Vec3; 3]]) -> Soup {
+    let mut soup = Soup::default();
+    for (k, half) in triangles.chunks(triangles.len().div_ceil(3)).enumerate() {
+        soup.prototypes.push(half.iter().map(|t| Face::new(*t)).collect());
+        let transform = [0.96, -0.3, 0.1, 0.2, 0.28, 1.1, 0.0, -0.1, 0.0, 0.2, -1.2, 0.3];
+        soup.instances.push(Instance { prototype: k as u32 + 1, object: k as u32, transform });
+    }
+    soup
+}
+
+/// Look-at angle and pitch: along axes and diagonals, straight down, steep and grazing; then all around.
+fn directions(dice: &mut Dice) -> Vec<(f64, f64)> {
+    let along = [0.0, 45.0, 90.0, 135.0, 180.0, 225.0, 270.0, 315.0];
+    let pitches = [90.0, 89.999, 60.0, 45.0, 30.0, 5.0, 0.5, 0.001];
+    let mut out: Vec<(f64, f64)> = along.into_iter().flat_map(|a| pitches.map(|p| (a, p))).collect();
+    out.extend((0..200 - out.len()).map(|_| (dice.between(0.0, 360.0), dice.between(0.0, 1.0).asin().to_degrees().max(0.1))));
+    out
+}
+
+/// Whether all samples around the middle are covered; (look at, pitch) and pixel of the first that is not.
+fn first_hole(store: &SceneStore, directions: &[(f64, f64)], reach_px: f64) -> Option<((f64, f64), usize)> {
+    directions.iter().find_map(|&(look_at, pitch)| {
+        let frame = frame(look_at, pitch, 64.0);
+        let mut tracer = BeamTracer::new(store, &frame).expect("tracer");
+        let result = tracer.trace(96, 96, &Opaque).expect("trace");
+        let is_hole = |p: &usize| match result.pixel(p % SUBTILE_PX, p / SUBTILE_PX) {
+            Pixel::Nothing => true,
+            Pixel::One(_) => false,
+            Pixel::Mixed(slots) => slots.contains(&u32::MAX),
+        };
+        let is_inside = |p: &usize| ((p % SUBTILE_PX) as f64 - 31.5).hypot((p / SUBTILE_PX) as f64 - 31.5) < reach_px;
+        (0..SUBTILE_PX * SUBTILE_PX).filter(is_inside).find(is_hole).map(|p| ((look_at, pitch), p))
+    })
+}
+
 #[test]
 fn a_closed_mesh_shows_no_background_from_any_side() {
     let mut dice = Dice(3);
-    for (far, at) in [(false, [0.0; 3]), (true, [0.0; 3])] {
-        let folder = new_folder("ball");
-        let store = build(&folder, &soup_of(&ball(12.0, 14, &mut dice, at), far));
-        assert!(!far || store.parts().len() > 3, "{} parts", store.parts().len());
-        for _ in 0..100 {
-            let frame = frame(dice.between(0.0, 360.0), dice.between(1.0, 90.0), 64.0);
-            let mut tracer = BeamTracer::new(&store, &frame).expect("tracer");
-            let result = tracer.trace(96, 96, &Opaque).expect("trace");
-            // All within 8 m of the middle: the ball's least radius is 10.8 m.
-            for p in 0..SUBTILE_PX * SUBTILE_PX {
-                let covered = match result.pixel(p % SUBTILE_PX, p / SUBTILE_PX) {
-                    Pixel::Nothing => false,
-                    Pixel::One(_) => true,
-                    Pixel::Mixed(slots) => slots.iter().all(|s| *s != u32::MAX),
-                };
-                let (x, y) = (p as f64 % 64.0 - 32.0, (p / 64) as f64 - 32.0);
-                assert!(covered || x.hypot(y) > 34.0, "a hole at pixel {p}, seen from {} / {}", frame.look_at_deg, frame.pitch_deg);
-            }
+    let directions = directions(&mut dice);
+    assert_eq!(directions.len(), 200);
+    for (name, mesh) in [("ball", ball(12.0, 14, &mut dice, [0.0; 3])), ("crate", crate_of(12.0, 8))] {
+        let scenes = [("one chunk", soup_of(&mesh, false)), ("several chunks", soup_of(&mesh, true)), ("instances", planted(&mesh))];
+        for (place, soup) in scenes {
+            let folder = new_folder("closed");
+            let store = build(&folder, &soup);
+            let near = store.parts().iter().filter(|p| p.bounds.lo[0].abs() < 100.0).count();
+            assert!(near >= [("one chunk", 1), ("several chunks", 4), ("instances", 3)].into_iter().find(|n| n.0 == place).expect("named").1);
+            // Within 8.5 m of the middle; the least radius of each is 9 m or more.
+            assert_eq!(first_hole(&store, &directions, 34.0), None, "a hole in the {name} of {place}");
         }
     }
 }
@@ -118,7 +169,7 @@ fn each_sample_of_a_fan_is_covered_once() {
     assert!(whole.iter().sum::<u32>() > 70_000);
 }
 
-fn count(store: &map3d_scene::SceneStore, frame: &map3d_base::Frame, counts: &mut [u32]) {
+fn count(store: &SceneStore, frame: &map3d_base::Frame, counts: &mut [u32]) {
     let mut tracer = BeamTracer::new(store, frame).expect("tracer");
     for (left, top) in [(64, 64), (128, 64), (64, 128), (128, 128)] {
         let result = tracer.trace(left, top, &Opaque).expect("trace");

@@ -1,4 +1,4 @@
-//! Small synthetic scenes, built like real ones.
+//! Small synthetic scenes, built like real ones. The tests of map3d-render use them too.
 #![allow(dead_code)]
 
 use std::path::PathBuf;
@@ -6,6 +6,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use map3d_base::asset::{AssetReport, AssetWriter, Batch, Instance, Material, Materials, Object, Rank};
 use map3d_base::{Frame, Vec3};
+use map3d_image::Raster;
+use map3d_image::encode::{Deflate, Filter, encode_png};
 use map3d_scene::SceneStore;
 use map3d_scene::build::{BuildOptions, BuildRequest, GroundPlane, build_scene};
 
@@ -35,18 +37,38 @@ impl Dice {
     }
 }
 
-/// Triangles by corners, with object and rank; one asset of one material.
+#[derive(Clone, Copy, Debug)]
+pub struct Face {
+    pub corners: [Vec3; 3],
+    pub uv: [[f32; 2]; 3],
+    pub normals: Option<[[f32; 3]; 3]>,
+    pub material: u32,
+    /// Object k has the id k + 1.
+    pub object: u32,
+    pub rank: Rank,
+}
+
+impl Face {
+    pub fn new(corners: [Vec3; 3]) -> Self {
+        Self { corners, uv: [[0.0; 2]; 3], normals: None, material: 0, object: 0, rank: Rank::Other }
+    }
+}
+
+/// One asset. Without any material all faces are grey.
 #[derive(Default)]
 pub struct Soup {
-    pub placed: Vec<([Vec3; 3], u32, Rank)>,
+    pub faces: Vec<Face>,
     /// Of prototype k + 1.
-    pub prototypes: Vec<Vec<[Vec3; 3]>>,
+    pub prototypes: Vec<Vec<Face>>,
     pub instances: Vec<Instance>,
+    pub materials: Vec<Material>,
+    /// Image of each material.
+    pub images: Vec<Option<Raster>>,
 }
 
 impl Soup {
     pub fn add(&mut self, corners: [Vec3; 3], object: u32, rank: Rank) {
-        self.placed.push((corners, object, rank));
+        self.faces.push(Face { object, rank, ..Face::new(corners) });
     }
 
     /// A four-cornered face.
@@ -54,6 +76,84 @@ impl Soup {
         self.add([c[0], c[1], c[2]], object, rank);
         self.add([c[0], c[2], c[3]], object, rank);
     }
+
+    /// Faces of the asset in its order.
+    pub fn all_faces(&self) -> impl Iterator<Item = &Face> {
+        self.faces.iter().chain(self.prototypes.iter().flatten())
+    }
+
+    /// Writes the asset `soup`.
+    pub fn write(&self, folder: &Folder) {
+        let asset = folder.0.join("assets/soup");
+        let mut writer = AssetWriter::create(&asset).expect("asset");
+        let materials = self.write_materials(&mut writer);
+        let any_normals = self.all_faces().any(|f| f.normals.is_some());
+        writer.append(&batch(&self.faces, 0, any_normals)).expect("append");
+        for (k, faces) in self.prototypes.iter().enumerate() {
+            writer.append(&batch(faces, k as u32 + 1, any_normals)).expect("append");
+        }
+        let objects = self.all_faces().map(|f| f.object).chain(self.instances.iter().map(|i| i.object)).max().map_or(1, |k| k + 1);
+        let tables = Materials { materials, instances: self.instances.clone() };
+        let report = writer.finish(&tables, &vec![Object::default(); objects as usize], AssetReport::default()).expect("finish");
+        assert_eq!(report.triangles, self.all_faces().count() as u64, "{:?}", report.skipped);
+        let ids: Vec<u8> = (1..=objects).flat_map(u32::to_le_bytes).collect();
+        std::fs::write(asset.join("ids.u32"), ids).expect("ids");
+    }
+
+    fn write_materials(&self, writer: &mut AssetWriter) -> Vec<Material> {
+        let mut materials = if self.materials.is_empty() { vec![Material::default()] } else { self.materials.clone() };
+        for (material, image) in materials.iter_mut().zip(&self.images) {
+            if let Some(image) = image {
+                let png = encode_png((image.width, image.height), 4, image.pixels.as_flattened(), Filter::Up, Deflate::Fast);
+                material.texture = Some(writer.add_texture(&png, "png").expect("stored"));
+            }
+        }
+        materials
+    }
+}
+
+fn batch(faces: &[Face], prototype: u32, with_normals: bool) -> Batch {
+    let mut batch = Batch { prototype, ..Batch::default() };
+    for face in faces {
+        let first = batch.positions.len() as u32;
+        batch.positions.extend_from_slice(&face.corners);
+        batch.triangles.push([first, first + 1, first + 2]);
+        batch.uvs.push(face.uv);
+        if with_normals {
+            batch.normals.push(face.normals.unwrap_or_default());
+        }
+        batch.materials.push(face.material);
+        batch.objects.push(face.object);
+        batch.ranks.push(face.rank);
+    }
+    batch
+}
+
+/// Random triangles of all sizes, slivers, walls seen edge-on, stacks of coplanar faces.
+pub fn mixed_soup(dice: &mut Dice, count: usize) -> Soup {
+    let mut soup = Soup::default();
+    for k in 0..count {
+        let object = k as u32 / 2;
+        let rank = RANKS[dice.below(6) as usize];
+        let at = dice.point(16.0);
+        let size = [0.02, 0.2, 1.0, 4.0, 20.0, 300.0][dice.below(6) as usize];
+        let corner = |dice: &mut Dice| {
+            let e = dice.point(size);
+            [at[0] + e[0], at[1] + e[1], at[2] + e[2]]
+        };
+        let mut t = [corner(dice), corner(dice), corner(dice)];
+        match dice.below(8) {
+            // A sliver.
+            0 => t[2] = [0, 1, 2].map(|a| (t[0][a] + t[1][a]) / 2.0 + 0.002),
+            // Upright, so that some views see it edge-on.
+            1 => t = [t[0], t[1], [t[0][0], t[0][1], t[0][2] + size]],
+            // Flat, to lie on others of the same height.
+            2 | 3 => t.iter_mut().for_each(|c| c[2] = (at[2] / 4.0).floor() * 4.0),
+            _ => {}
+        }
+        soup.add(t, object, rank);
+    }
+    soup
 }
 
 /// A scene's folder; removed when dropped.
@@ -68,51 +168,22 @@ impl Drop for Folder {
 pub fn new_folder(name: &str) -> Folder {
     static NUMBER: AtomicU32 = AtomicU32::new(0);
     let number = NUMBER.fetch_add(1, Ordering::Relaxed);
-    let path = std::env::temp_dir().join(format!("map3d-trace-{name}-{}-{number}", std::process::id()));
+    let path = std::env::temp_dir().join(format!("map3d-{}-{name}-{}-{number}", env!("CARGO_CRATE_NAME"), std::process::id()));
     let _ = std::fs::remove_dir_all(&path);
     std::fs::create_dir_all(&path).expect("temporary folder");
     Folder(path)
 }
 
-/// Writes a soup as the asset `soup`; object k has the id k + 1.
-pub fn write_asset(folder: &Folder, soup: &Soup) {
-    let asset = folder.0.join("assets/soup");
-    let mut writer = AssetWriter::create(&asset).expect("asset");
-    let mut objects = soup.instances.iter().map(|i| i.object + 1).max().unwrap_or(1);
-    let mut batch = Batch::default();
-    for (corners, object, rank) in &soup.placed {
-        push(&mut batch, corners, *object, *rank);
-        objects = objects.max(object + 1);
-    }
-    writer.append(&batch).expect("append");
-    for (k, triangles) in soup.prototypes.iter().enumerate() {
-        let mut batch = Batch { prototype: k as u32 + 1, ..Batch::default() };
-        triangles.iter().for_each(|t| push(&mut batch, t, 0, Rank::Other));
-        writer.append(&batch).expect("append");
-    }
-    let materials = Materials { materials: vec![Material::default()], instances: soup.instances.clone() };
-    writer.finish(&materials, &vec![Object::default(); objects as usize], AssetReport::default()).expect("finish");
-    let ids: Vec<u8> = (1..=objects).flat_map(u32::to_le_bytes).collect();
-    std::fs::write(asset.join("ids.u32"), ids).expect("ids");
-}
-
-fn push(batch: &mut Batch, corners: &[Vec3; 3], object: u32, rank: Rank) {
-    let first = batch.positions.len() as u32;
-    batch.positions.extend_from_slice(corners);
-    batch.triangles.push([first, first + 1, first + 2]);
-    batch.materials.push(0);
-    batch.objects.push(object);
-    batch.ranks.push(rank);
-}
-
-pub fn request() -> BuildRequest {
+/// Writes and builds a soup.
+pub fn rebuild(folder: &Folder, soup: &Soup) {
+    soup.write(folder);
     let options = BuildOptions { ground_plane: GroundPlane::Off, merge_faces: false, ..BuildOptions::default() };
-    BuildRequest { assets: vec!["soup".into()], origin: [0.0; 3], options, ground_id: 0, threads: 1, max_memory_bytes: 0 }
+    let request = BuildRequest { assets: vec!["soup".into()], origin: [0.0; 3], options, ground_id: 0, threads: 1, max_memory_bytes: 0 };
+    build_scene(&folder.0, &request, &mut |_, _, _| true).expect("build");
 }
 
 pub fn build(folder: &Folder, soup: &Soup) -> SceneStore {
-    write_asset(folder, soup);
-    build_scene(&folder.0, &request(), &mut |_, _, _| true).expect("build");
+    rebuild(folder, soup);
     open(folder)
 }
 
