@@ -1,0 +1,106 @@
+//! Cut-outs by the alpha of a texture against brute force, which filters the same alpha in float64.
+
+mod town;
+
+use map3d_base::Vec3;
+use map3d_base::asset::Wrap;
+use map3d_image::Raster;
+use map3d_render::TextureCutout;
+use town::brute::contest::{Contest, Presence};
+use town::brute::{Known, Place};
+use town::scenes::RANKS;
+use town::{Town, frame, new_folder};
+
+const SIDE: i64 = 64;
+/// Texels in a cell of the chequer: alpha is 0 or 1 down to level 3.
+const CELL: i64 = 8;
+
+fn chequer() -> Raster {
+    let alpha = |k: i64| if (k % SIDE / CELL + k / SIDE / CELL) % 2 == 0 { 255 } else { 0 };
+    Raster::new(SIDE as u32, SIDE as u32, (0..SIDE * SIDE).map(|k| [90, 140, 60, alpha(k)]).collect())
+}
+
+/// Alpha of texel (x, y) of a level as the wrap mode has it; the border is transparent, what lies beyond `Wrap::None` is not.
+fn texel(wrap: u8, level: u32, x: i64, y: i64) -> f64 {
+    let side = SIDE >> level;
+    let mirrored = |i: i64| if i.rem_euclid(2 * side) < side { i.rem_euclid(side) } else { side - 1 - i.rem_euclid(side) };
+    let fold = |i: i64| match wrap {
+        0 => i.rem_euclid(side),
+        1 => mirrored(i),
+        2 => i.clamp(0, side - 1),
+        _ => i,
+    };
+    let (x, y, cell) = (fold(x), fold(y), CELL >> level);
+    if !(0..side).contains(&x) || !(0..side).contains(&y) {
+        return if wrap == 3 { 0.0 } else { 1.0 };
+    }
+    f64::from(u8::from((x / cell + y / cell) % 2 == 0))
+}
+
+/// Bilinear, at the level whose texels are about a quarter pixel; unsure beyond level 3, where a cell is no whole texel.
+fn presence(t: &Known, place: &Place) -> Presence {
+    let side = SIDE as f64;
+    let [a, b] = place.footprint;
+    let wanted = ((a[0] * b[1] - a[1] * b[0]).abs().sqrt() * side / 4.0).log2().max(0.0);
+    let (level, size) = (wanted.round() as u32, side / wanted.round().exp2());
+    if level > 3 {
+        return Presence::Unsure;
+    }
+    let (x, y) = (place.uv[0] * size - 0.5, (1.0 - place.uv[1]) * size - 0.5);
+    let (fx, fy) = (x - x.floor(), y - y.floor());
+    let at = |i: i64, j: i64| texel(t.material.wrap, level, x.floor() as i64 + i, y.floor() as i64 + j);
+    let alpha = (at(0, 0) * (1.0 - fx) + at(1, 0) * fx) * (1.0 - fy) + (at(0, 1) * (1.0 - fx) + at(1, 1) * fx) * fy;
+    // Taps lie on 1/128 of a texel.
+    let room = 2.0 / 256.0 + (place.room[0] + place.room[1]) * size + 1.0 / 1024.0;
+    match (alpha - 0.5).abs() > room && (wanted - wanted.floor() - 0.5).abs() > 1e-4 {
+        true if alpha > 0.5 => Presence::There,
+        true => Presence::Gone,
+        false => Presence::Unsure,
+    }
+}
+
+/// Panels at all angles, with the texture from `least` to `most` times a metre.
+fn screens(wrap: Wrap, [least, most]: [f64; 2]) -> Town {
+    let mut town = Town::default();
+    let (grey, cut) = (town.flat([0.6; 3]), town.textured(chequer(), wrap));
+    town.panel([[-30.0, -30.0, -9.0], [30.0, -30.0, -9.0], [30.0, 30.0, -9.0], [-30.0, 30.0, -9.0]], [[0.0; 2]; 4], grey, 0);
+    let mut dice = town::scenes::Dice(17);
+    for k in 1..14u32 {
+        let (at, size, repeats) = (dice.point(7.0), dice.between(5.0, 9.0), dice.between(least, most));
+        let (a, b) = (dice.point(1.0), dice.point(1.0));
+        let axes = [a, map3d_base::vec3::cross(a, b)].map(|v| map3d_base::vec3::normalized(v).expect("a direction"));
+        let point = |s: f64, t: f64| -> Vec3 { [0, 1, 2].map(|k| at[k] + axes[0][k] * s * size + axes[1][k] * t * size) };
+        let span = (repeats * size) as f32;
+        let from = dice.between(-0.4, 0.3) as f32;
+        let uv = [[from, from], [from + span, from], [from + span, from + span], [from, from + span]];
+        town.panel([point(-0.5, -0.5), point(0.5, -0.5), point(0.5, 0.5), point(-0.5, 0.5)], uv, if k % 4 == 0 { grey } else { cut }, k);
+    }
+    town.faces.iter_mut().for_each(|f| f.rank = RANKS[f.object as usize % 6]);
+    town
+}
+
+#[test]
+fn texels_decide_which_samples_are_there() {
+    // 64 texels a repeat, some 11 pixels a metre: the second and third take coarser levels.
+    let wraps = [
+        (Wrap::Wrap, [0.06, 0.15]),
+        (Wrap::Wrap, [0.9, 1.9]),
+        (Wrap::Wrap, [1.5, 2.8]),
+        (Wrap::Mirror, [0.1, 0.9]),
+        (Wrap::Clamp, [0.1, 0.3]),
+        (Wrap::Border, [0.1, 0.3]),
+        (Wrap::None, [0.1, 0.3]),
+    ];
+    for (wrap, repeats) in wraps {
+        let folder = new_folder("screens");
+        let scene = screens(wrap, repeats).open(&folder);
+        for (look_at, pitch) in [(0.0, 90.0), (130.0, 35.0)] {
+            let cutout = TextureCutout::new(scene.textures());
+            let frame = frame(look_at, pitch, 24.0, 0);
+            let tally = Contest { store: scene.store(), frame: &frame, cutout: &cutout, presence: &presence }.run();
+            assert_eq!(cutout.failures(), 0);
+            assert!(tally.cut * 40 > tally.met && tally.holes * 20 > tally.met, "{wrap:?}: few holes: {tally:?}");
+            assert!(tally.unsure * 25 < tally.met, "{wrap:?}: too near the edge of a hole: {tally:?}");
+        }
+    }
+}
