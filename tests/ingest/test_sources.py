@@ -36,6 +36,17 @@ def test_a_folder_without_anything_to_read_is_refused(tmp_path: Path) -> None:
         find_sources([tmp_path])
 
 
+def test_files_whose_names_promise_more_than_they_hold_are_told(tmp_path: Path) -> None:
+    fill(tmp_path)
+    for name, data in (("a/empty.gml", b""), ("words.OBJ", b"no lines of an OBJ"), ("page.xml", b"<html/>"), ("data.json", b"{}")):
+        (tmp_path / name).write_bytes(data)
+    told: list[tuple[str, str]] = []
+    found = find_sources([tmp_path], None, lambda path, why: told.append((path.name, why)))
+    assert len(found) == 5
+    assert [name for name, _ in told] == ["empty.gml", "words.OBJ"]
+    assert [why.partition(";")[0].rpartition(": ")[2] for _, why in told] == ["an empty file", "a file of unknown type"]
+
+
 def test_a_named_file_of_unknown_type_is_refused_even_beside_others(tmp_path: Path) -> None:
     fill(tmp_path)
     with pytest.raises(UnknownFormat, match=r"notes\.odt"):

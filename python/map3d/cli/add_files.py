@@ -9,8 +9,8 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from map3d.catalogue import Workspace
 from map3d.cli.options import Bytes, json_option, workspace_option
-from map3d.cli.output import console, print_json, print_table
-from map3d.errors import BadRequest, Map3dError
+from map3d.cli.output import print_json, print_table, progress_bar
+from map3d.errors import BadRequest, Map3dError, UnknownFormat
 
 
 @click.command("add-files")
@@ -37,22 +37,25 @@ def command(workspace: Workspace, scene: str, files: Sequence[Path], as_json: bo
     from map3d.ingest.parsers import Parsers
     from map3d.ingest.sources import find_sources
 
-    sources = find_sources(files, name)
+    done: list[Any] = []
+    failed: list[tuple[str, str]] = []
+    sources = find_sources(files, name, lambda path, why: failed.append((str(path), why)))
+    if failed and options["strict"]:
+        raise UnknownFormat(failed[0][1])
     if name is not None and len(sources) > 1:
         raise BadRequest(f"--name {name}: there are {len(sources)} files; name one at a time")
     catalogue = workspace.open_catalogue()
-    done, failed = [], []
     try:
         catalogue.scene(scene)
         columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-        with Parsers() as parsers, Progress(*columns, console=console(), transient=True) as bar:
+        with Parsers() as parsers, progress_bar(*columns) as bar:
             for number, source in enumerate(sources, 1):
                 task = bar.add_task(f"{number} of {len(sources)}: {source.paths[0].name}")
                 try:
                     show = _show(bar, task, source.paths[0].name)
                     done.append(import_file(workspace, catalogue, scene, source, ImportOptions(**options), show, parsers=parsers))
                 except Map3dError as error:
-                    if options["strict"] or len(sources) == 1:
+                    if options["strict"] or len(sources) + len(failed) == 1:
                         raise
                     failed.append((str(source.paths[0]), str(error)))
                 bar.remove_task(task)

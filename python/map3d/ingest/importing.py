@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from map3d import errors
 from map3d.catalogue import AssetRecord, Catalogue, SceneCrs, SceneRecord, Workspace
 from map3d.child import Failure, Limits
 from map3d.errors import ChildDied, CrsError, ImportFailed, LimitExceeded, Map3dError
@@ -195,5 +196,5 @@ def _failure(source: Source, failure: Failure) -> Map3dError:
     text = failure.message if str(source.paths[0]) in failure.message else f"{source.paths[0]}: {failure.message}"
     if failure.kind in kinds:
         return kinds[failure.kind](text)
-    known = failure.kind in ("FormatError", "StorageError", "InvalidArgument")
+    known = failure.kind in ("FormatError", "StorageError", "InvalidArgument") or hasattr(errors, failure.kind)
     return ImportFailed(text if known else f"{source.paths[0]}: {failure.kind}: {failure.message}")

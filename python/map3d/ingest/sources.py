@@ -2,7 +2,7 @@
 
 import hashlib
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +10,11 @@ from map3d.errors import NotFound, UnknownFormat
 from map3d.ingest.formats import KNOWN, Format, detect_format
 
 _PASSED_OVER = (".mtl", ".jpg", ".jpeg", ".png", ".bmp", ".gif", ".tga", ".txt", ".md", ".json", ".pdf", ".html", ".prj", ".tfw", ".xsd", ".sqlite")
+_PROMISING = (".gml", ".citygml", ".obj", ".tif", ".tiff")
+"""A file of such a name is meant to be read; one that cannot be is worth a word."""
+
+Refuse = Callable[[Path, str], None]
+"""Called with a file of a folder that will not be read, and why."""
 
 
 @dataclass(frozen=True)
@@ -21,15 +26,17 @@ class Source:
     paths: tuple[Path, ...]
 
 
-def find_sources(paths: Iterable[Path], name: str | None = None) -> list[Source]:
+def find_sources(paths: Iterable[Path], name: str | None = None, refuse: Refuse | None = None) -> list[Source]:
     """Files as named; of folders every file of a known format, however deep, in order of their names. Rasters are one terrain for each folder.
+
+    `refuse` hears of files in folders whose names promise what their content is not.
 
     Raises UnknownFormat for a named file of unknown type and for a folder that has nothing to read; NotFound.
     """
     found: list[tuple[Path, Format]] = []
     for path in paths:
         if path.is_dir():
-            found += _in_folder(path)
+            found += _in_folder(path, refuse or (lambda *_: None))
         elif path.exists():
             found.append((path, detect_format(path)))
         else:
@@ -48,17 +55,21 @@ def source_digest(source: Source) -> str:
     return total.hexdigest()[:32]
 
 
-def _in_folder(folder: Path) -> list[tuple[Path, Format]]:
-    found = []
+def _in_folder(folder: Path, refuse: Refuse) -> list[tuple[Path, Format]]:
+    found, refused = [], []
     for path in sorted(path for path in folder.rglob("*") if path.is_file() and not path.name.startswith(".")):
         if path.suffix.lower() in _PASSED_OVER:
             continue
         try:
             found.append((path, detect_format(path)))
-        except UnknownFormat:
-            continue
+        except UnknownFormat as error:
+            if path.suffix.lower() in _PROMISING:
+                refused.append((path, str(error)))
     if not found:
-        raise UnknownFormat(f"{folder}: no file in it that map3d can read; it reads {KNOWN}")
+        why = f" ({refused[0][1].partition(';')[0]})" if refused else ""
+        raise UnknownFormat(f"{folder}: no file in it that map3d can read{why}; it reads {KNOWN}")
+    for path, text in refused:
+        refuse(path, text)
     return found
 
 

@@ -27,7 +27,8 @@ def open_terrain(_setup: Mapping[str, Any]) -> Work:
 
 def _import(question: Mapping[str, Any], tell: Tell) -> dict[str, Any]:
     """`question`: {"paths", "folder", "name", "crs", "scene_crs"}; see map3d.ingest.work for the answer."""
-    dem, ortho = tell_apart([Path(path) for path in question["paths"]])
+    rasters, damaged = usable([Path(path) for path in question["paths"]], strict=question["reader"]["strict"])
+    dem, ortho = tell_apart(rasters)
     target = _target(dem or ortho, question["scene_crs"])
 
     def progress(_stage: str, done: int, total: int) -> bool:
@@ -37,7 +38,24 @@ def _import(question: Mapping[str, Any], tell: Tell) -> dict[str, Any]:
     report = import_terrain(dem, ortho, Path(question["folder"]), target, TerrainOptions(name=question["name"]), progress)
     proposed = LOCAL if target is None else scene_crs(target)
     placing = {"from": report["crs"] and CRS.from_user_input(report["crs"]).name, "to": proposed.name, **report["projection"]}
+    if damaged:
+        report["warnings"].append({"reason": "raster left out", "count": len(damaged), "example": damaged[0]})
     return {"report": {**report, "placing": placing}, "crs": asdict(proposed)}
+
+
+def usable(paths: Sequence[Path], *, strict: bool) -> tuple[list[Path], list[str]]:
+    """The rasters that can be opened, and why the others cannot. Raises ImportFailed when there is none, or the first fault under `strict`."""
+    good: list[Path] = []
+    faults: list[ImportFailed] = []
+    for path in paths:
+        try:
+            open_raster(path).close()
+            good.append(path)
+        except ImportFailed as error:
+            faults.append(error)
+    if faults and (strict or not good):
+        raise faults[0]
+    return good, [str(error) for error in faults]
 
 
 def tell_apart(paths: Sequence[Path]) -> tuple[Path | None, Path | None]:

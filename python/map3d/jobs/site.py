@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from map3d.catalogue import Catalogue, RenderingRecord, SceneRecord, Workspace
-from map3d.errors import BadRequest, Map3dError
+from map3d.errors import BadRequest, Map3dError, UnknownFormat
 from map3d.geometry.frames import pin
 from map3d.ingest.importing import import_file
 from map3d.ingest.options import ImportOptions
@@ -53,7 +53,9 @@ def add_changed(workspace: Workspace, catalogue: Catalogue, request: SiteRequest
         catalogue.create_scene(SceneRecord(request.name, request.title, request.attribution))
     have = {asset.name: asset.source_digest for asset in catalogue.assets(request.name)}
     done = Added([], [], [])
-    sources = find_sources([request.sources])
+    sources = find_sources([request.sources], None, lambda path, why: done.failed.append((str(path), why)))
+    if done.failed and request.options.strict:
+        raise UnknownFormat(done.failed[0][1])
     with Parsers() as parsers:
         for number, source in enumerate(sources):
             tell(source.paths[0].name, number, len(sources))
