@@ -3,21 +3,23 @@
 from collections.abc import Mapping
 from typing import Any
 
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, MofNCompleteColumn, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from map3d.catalogue import Catalogue, Workspace
-from map3d.cli.output import console
+from map3d.cli.output import console, progress_bar
 
 
-def build_with_progress(workspace: Workspace, catalogue: Catalogue, scene: str, *, threads: int, max_memory_bytes: int | None = None) -> None:
-    """Builds the scene if its files changed."""
+def build_with_progress(
+    workspace: Workspace, catalogue: Catalogue, scene: str, *, threads: int, max_memory_bytes: int | None = None
+) -> dict[str, Any] | None:
+    """Builds the scene if its files changed; then its report."""
     from map3d.render.build import BUILD_BYTES, build, is_stale
 
     if not is_stale(workspace, catalogue, scene):
-        return
+        return None
     columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console(), transient=True) as bar:
+    with progress_bar(*columns) as bar:
         task = bar.add_task("building", total=None)
 
         def progress(stage: str, done: int, total: int) -> bool:
@@ -26,6 +28,7 @@ def build_with_progress(workspace: Workspace, catalogue: Catalogue, scene: str, 
 
         report = build(workspace, catalogue, scene, threads=threads, max_memory_bytes=max_memory_bytes or BUILD_BYTES, progress=progress)
     show_report(scene, report)
+    return report
 
 
 def show_report(scene: str, report: Mapping[str, Any]) -> None:
@@ -38,4 +41,4 @@ def show_report(scene: str, report: Mapping[str, Any]) -> None:
             table.add_row(f"{count:,}", name.replace("_", " "))
     note.print(table)
     for reason, example in report.get("texture_warnings", {}).items():
-        note.print(f"{reason}, e.g. {example}")
+        note.print(f"{reason}: {example}")

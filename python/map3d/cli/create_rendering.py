@@ -1,5 +1,6 @@
 """map3d create-rendering."""
 
+from dataclasses import asdict
 from typing import Any
 
 import click
@@ -48,12 +49,12 @@ def command(
     catalogue = workspace.open_catalogue()
     try:
         request.check(catalogue)
-        build_with_progress(workspace, catalogue, scene, threads=cores())
+        built = build_with_progress(workspace, catalogue, scene, threads=cores())
         made = create_rendering(workspace, catalogue, request)
     finally:
         catalogue.close()
     if as_json:
-        print_json(made)
+        print_json({**asdict(made), "build": built})
         return
     levels, side = made.zmax + 1, made.tile_px << made.zmax
     click.echo(f"rendering {name}: {len(made.frames)} views, {levels} levels, {made.res_m:g} m a pixel, {side:,} px across at the deepest level")

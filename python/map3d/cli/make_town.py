@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Any
 
 import click
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
 from map3d.cli.options import cores, json_option
-from map3d.cli.output import console, print_json, size_text
+from map3d.cli.output import print_json, progress_bar, size_text
 
 
 @click.command("make-town")
@@ -30,7 +30,7 @@ def command(out: Path, formats: str, workers: int, as_json: bool, **spec: Any) -
 
     town = TownSpec(formats=tuple(part.strip() for part in formats.split(",")), **spec)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console(), transient=True) as bar:
+    with progress_bar(*columns) as bar:
         task = bar.add_task("making a town", total=None)
         report = make_town(out, town, lambda what, done, total: bar.update(task, description=what, completed=done, total=total), workers)
     if as_json:

@@ -4,11 +4,11 @@ from pathlib import Path
 from typing import Any
 
 import click
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
 from map3d.catalogue import Workspace
 from map3d.cli.options import json_option, workspace_option
-from map3d.cli.output import console, print_json, size_text
+from map3d.cli.output import print_json, progress_bar, size_text
 
 
 @click.command("publish")
@@ -32,7 +32,7 @@ def publish_with_progress(workspace: Workspace, rendering: str, out: Path, **how
     from map3d.publish import publish
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console(), transient=True) as bar:
+    with progress_bar(*columns) as bar:
         task = bar.add_task("publishing", total=None)
 
         def progress(stage: str, done: int, total: int) -> bool:

@@ -1,6 +1,7 @@
 """map3d render."""
 
 import time
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -9,7 +10,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from map3d.catalogue import Workspace
 from map3d.cli.building import build_with_progress
 from map3d.cli.options import json_option, max_memory_option, workers_option, workspace_option
-from map3d.cli.output import console, counts_text, print_json, size_text
+from map3d.cli.output import console, counts_text, print_json, progress_bar, size_text
 
 if TYPE_CHECKING:
     from map3d.jobs.run import Outcome, Plan, Run
@@ -32,12 +33,13 @@ def command(workspace: Workspace, rendering: str, workers: int, max_memory: int 
     catalogue = workspace.open_catalogue()
     try:
         settings = Settings(workers, max_memory)
-        build_with_progress(workspace, catalogue, catalogue.rendering(rendering).scene, threads=workers, max_memory_bytes=max_memory)
+        scene = catalogue.rendering(rendering).scene
+        built = build_with_progress(workspace, catalogue, scene, threads=workers, max_memory_bytes=max_memory)
         outcome = render_with_progress(Run(workspace, catalogue, rendering, settings))
     finally:
         catalogue.close()
     if as_json:
-        print_json(outcome)
+        print_json({**asdict(outcome), "build": built})
     else:
         report(rendering, outcome)
     if not outcome.complete:
@@ -96,4 +98,4 @@ def report(rendering: str, outcome: "Outcome") -> None:
 
 def _bar(last: Any) -> Progress:
     columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), last, TimeElapsedColumn(), TimeRemainingColumn())
-    return Progress(*columns, console=console(), transient=True)
+    return progress_bar(*columns)

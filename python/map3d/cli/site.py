@@ -4,13 +4,13 @@ from pathlib import Path
 from typing import Any
 
 import click
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 
 from map3d.catalogue import Workspace
 from map3d.cli.building import build_with_progress
 from map3d.cli.create_rendering import around
 from map3d.cli.options import View, max_memory_option, workers_option, workspace_option
-from map3d.cli.output import console, size_text
+from map3d.cli.output import progress_bar, size_text
 from map3d.cli.publish import publish_with_progress
 from map3d.cli.render import render_with_progress, report
 from map3d.types import COLOR_FORMATS, ViewAngles
@@ -59,7 +59,7 @@ def command(
     )
     catalogue = workspace.create().open_catalogue()
     try:
-        with Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), console=console(), transient=True) as bar:
+        with progress_bar(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()) as bar:
             task = bar.add_task("importing", total=None)
             added = add_changed(
                 workspace, catalogue, request, lambda name, n, of: bar.update(task, description=f"importing {name}", completed=n, total=of)

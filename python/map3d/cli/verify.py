@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import click
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
 from map3d.catalogue import Workspace
 from map3d.cli.options import json_option, workspace_option
-from map3d.cli.output import console, counts_text, print_json
+from map3d.cli.output import counts_text, print_json, progress_bar
 
 
 @click.command("verify")
@@ -31,7 +31,7 @@ def command(workspace: Workspace, renderings: tuple[str, ...], published: Path |
     try:
         chosen = [catalogue.rendering(name) for name in renderings] or catalogue.renderings()
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        with Progress(*columns, console=console(), transient=True) as bar:
+        with progress_bar(*columns) as bar:
             task = bar.add_task("verifying", total=None)
 
             def progress(what: str, done: int, total: int) -> None:
