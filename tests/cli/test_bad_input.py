@@ -1,0 +1,165 @@
+"""Bad input through the whole command line: what is said, what it costs, and that all else arrives and is rendered."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from map3d.catalogue import Workspace
+from map3d.cli import app
+from map3d.registry import Registry
+from map3d.tiles.sqlite_store import SqliteTileStore
+from tests.cli.bad_files import BAD_LINES, DAMAGED_IMAGES, WHOLE_FILES, citygml, elevation, house_with, jpeg, textured, truncated
+from tests.cli.towns import house
+
+core = pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
+pytestmark = pytest.mark.whole
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Run:
+    monkeypatch.setenv("MAP3D_WORKSPACE", str(tmp_path / "workspace"))
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments: str) -> tuple[int, str, str]:
+        status = app.run(list(arguments))
+        captured = capfd.readouterr()
+        assert "Traceback" not in captured.out + captured.err
+        return status, captured.out, captured.err
+
+    call("create-scene", "town")
+    return call
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "status", "says"),
+    [
+        ("model.skp", b"\xff\xfe\xff\x0eSketchUp", 2, ("model.skp: a file of unknown type", "CityGML", "OBJ")),
+        ("a.zip", b"PK\x03\x04", 2, ("a.zip: a ZIP archive", "map3d reads")),
+        ("a.gml", b"<html></html>", 2, ("a.gml: XML with the root html", "CityGML")),
+        ("empty.gml", b"", 2, ("empty.gml: an empty file", "CityGML")),
+        ("empty.obj", b"", 2, ("empty.obj: an empty file", "OBJ")),
+        ("nothing.obj", WHOLE_FILES["nothing.obj"], 1, ("nothing.obj: no triangle in it could be used", "1 × index out of range")),
+        ("cut.tif", WHOLE_FILES["cut.tif"], 1, ("cut.tif: not a GTiff raster, or damaged",)),
+        ("bomb.gml", WHOLE_FILES["bomb.gml"], 1, ("bomb.gml: a document type definition is refused", "remove it")),
+        ("head.gml", citygml().encode()[:300], 1, ("head.gml: no triangle in it could be used",)),
+    ],
+)
+def test_a_file_of_which_nothing_can_be_used_is_refused_in_one_line(
+    run: Run, tmp_path: Path, name: str, data: bytes, status: int, says: tuple[str, ...]
+) -> None:
+    (tmp_path / name).write_bytes(data)
+    got, out, err = run("add-files", "town", name)
+    assert (got, out) == (status, "")
+    assert err.startswith("map3d: ")
+    assert err.count("\n") == 1
+    assert err.count(str(tmp_path / name)) <= 1, "its path is said once"
+    assert "Error" not in err
+    assert "Failed:" not in err
+    assert [part for part in says if part not in err] == []
+    assert json.loads(run("show", "scene", "town", "--json")[1])["assets"] == []
+
+
+@pytest.mark.parametrize("names", [(), ("notes.txt",), ("empty.gml",)])
+def test_a_folder_without_known_files_is_refused_and_says_why(run: Run, tmp_path: Path, names: tuple[str, ...]) -> None:
+    (tmp_path / "folder").mkdir()
+    for name in names:
+        (tmp_path / "folder" / name).touch()
+    status, _, err = run("add-files", "town", "folder")
+    assert (status, err.count("\n")) == (2, 1)
+    assert "folder: no file in it that map3d can read" in err
+    assert ("empty.gml: an empty file" in err) == ("empty.gml" in names)
+
+
+@pytest.mark.parametrize("name", sorted(BAD_LINES))
+def test_bad_lines_cost_their_faces_alone(run: Run, tmp_path: Path, name: str) -> None:
+    house_with(BAD_LINES[name])(tmp_path / "a.obj")
+    bad = sum(line.startswith("f") for line in BAD_LINES[name].splitlines())
+    status, out, err = run("add-files", "town", "a.obj", "--json")
+    assert (status, err) == (0, "")
+    (report,) = (item["report"] for item in json.loads(out)["imported"])
+    assert (report["triangles"], sum(report["skipped"].values())) == (12, bad)
+    status, out, _ = run("add-files", "town", "a.obj")
+    assert (status, f"{bad} × skipped: " in out, "e.g. line " in out) == (0, True, True)
+    status, _, err = run("add-files", "town", "a.obj", "--strict")
+    assert (status, err.count("\n"), "line " in err) == (1, 1, True)
+
+
+def test_a_truncated_document_gives_what_stands_before_the_cut(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "a.gml").write_text(truncated())
+    status, out, err = run("add-files", "town", "a.gml", "--crs", "local")
+    assert (status, err) == (0, "")
+    assert "document broken; what comes after is lost, e.g. " in out
+    assert "at byte" in out
+    with Registry(Workspace(tmp_path / "workspace").registry_path("town")) as registry:
+        assert {"one", "two"} <= {item.name for item in registry.objects()}
+
+
+@pytest.fixture
+def messy(tmp_path: Path) -> Path:
+    """A folder in which nearly every file has something wrong with it."""
+    folder = tmp_path / "messy"
+    folder.mkdir()
+    (folder / "good.obj").write_text(house(0, 30, 8))
+    for k, (name, lines) in enumerate(BAD_LINES.items()):
+        house_with(lines, x=20.0 * k)(folder / f"{name}.obj")
+    for k, (name, image) in enumerate({**DAMAGED_IMAGES, "sound": jpeg()}.items()):
+        textured(folder, name, 20.0 * (k + len(BAD_LINES)), image)
+    for name, data in WHOLE_FILES.items():
+        (folder / name).write_bytes(data)
+    (folder / "truncated.gml").write_text(truncated())
+    elevation(folder / "plain.tif")
+    return folder
+
+
+def ids_in_tiles(workspace: Workspace) -> set[int]:
+    """Of the deepest level."""
+    seen: set[int] = set()
+    with SqliteTileStore(workspace.store_path("view", "0-45"), read_only=True) as store:
+        number = [layer.kind for layer in store.shape.layers].index("id")
+        for tile in store.list_tiles(number):
+            data = store.get_tile(number, *tile) if tile.z == store.shape.zmax else None
+            if data is not None:
+                seen |= set(np.unique(np.ascontiguousarray(core.decode_png(data)).view("<u4")).tolist())
+    return seen
+
+
+def test_all_that_is_whole_in_a_messy_folder_is_rendered(run: Run, tmp_path: Path, messy: Path) -> None:
+    status, out, err = run("add-files", "town", str(messy), "--crs", "local", "--json")
+    assert (status, err) == (1, "")
+    answer = json.loads(out)
+    assert sorted(Path(item["source"]).name for item in answer["failed"]) == sorted({*WHOLE_FILES} - {"cut.tif"})
+    assert all(Path(item["source"]).name in item["error"] for item in answer["failed"])
+    reports = {item["asset"]: item["report"] for item in answer["imported"]}
+    assert set(reports) == {"good", "messy", "truncated", "sound", *BAD_LINES, *DAMAGED_IMAGES}
+    warned = {name: " ".join(f"{w['reason']} {w['example']}" for w in report["warnings"]) for name, report in reports.items()}
+    assert "cut.tif" in warned["messy"], "the elevation model is used without the raster beside it"
+    assert "file not found missing.jpg" in warned["missing"]
+    assert "unknown format zero.jpg" in warned["zero"]
+    assert "unknown format text.jpg" in warned["text"]
+    assert warned["good"] == warned["sound"] == warned["lying"] == ""
+
+    status, out, err = run("create-rendering", "town", "view", "--res", "0.2", "--view", "0/45", "--json")
+    assert status == 0, err
+    built = json.loads(out)["build"]
+    assert built["materials_without_their_texture"] == 1, "the cut image is found out when it is decoded"
+    assert "damaged" in str(built["texture_warnings"])
+    status, out, err = run("render", "view", "--json")
+    assert (status, json.loads(out)["complete"]) == (0, True), err
+    workspace = Workspace(tmp_path / "workspace")
+    with Registry(workspace.registry_path("town")) as registry:
+        names = {item.id: item.name for item in registry.objects()}
+    seen = {names[number] for number in ids_in_tiles(workspace) if number}
+    assert {"good", "sound", "one", "two", *BAD_LINES, *DAMAGED_IMAGES} <= seen
+    assert run("verify")[0] == 0
+
+
+def test_strict_takes_nothing_from_a_folder_with_a_file_that_cannot_be_read(run: Run, messy: Path) -> None:
+    status, out, err = run("add-files", "town", str(messy), "--strict")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert "empty.gml: an empty file" in err
+    assert json.loads(run("show", "scene", "town", "--json")[1])["assets"] == []
