@@ -26,6 +26,20 @@ fn beams_find_the_winner_of_every_sample() {
     }
 }
 
+/// Planes of steep triangles reach in front of D0 within the triangle's box.
+#[test]
+fn right_behind_the_start_of_the_depths_the_rule_is_the_same() {
+    let mut dice = Dice(61);
+    let mut soup = Soup::default();
+    (0..80).for_each(|k| soup.add([dice.point(12.0), dice.point(12.0), dice.point(12.0)], k, RANKS[k as usize % 6]));
+    let folder = new_folder("near");
+    let store = build(&folder, &soup);
+    for (look_at, pitch) in [(0.0, 90.0), (45.0, 30.0)] {
+        let tally = compare(&store, &Frame { d0_m: -24.0, ..frame(look_at, pitch, 40.0) });
+        assert!(tally.met > 50_000, "{tally:?}");
+    }
+}
+
 #[test]
 fn coplanar_stacks_go_to_the_highest_rank() {
     let mut soup = Soup::default();

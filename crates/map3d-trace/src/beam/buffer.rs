@@ -42,9 +42,10 @@ impl KeyPlane {
         self.z0.wrapping_add(across).wrapping_add(self.gy.wrapping_mul(j - self.y0))
     }
 
+    /// A key fits int32 though `base` alone may not, where the plane runs out of the depths before the triangle ends: so the sum wraps.
     #[inline(always)]
     pub fn key(&self, fixed: i32) -> i32 {
-        (fixed >> self.shift).max(self.lo).min(self.hi) + self.base
+        (fixed >> self.shift).max(self.lo).min(self.hi).wrapping_add(self.base)
     }
 
     /// Keys of fixed-point values.
