@@ -32,7 +32,10 @@ def test_a_folder_gives_every_file_that_can_be_read_once_in_order(tmp_path: Path
 
 def test_a_folder_without_anything_to_read_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("v 1 2 3")
-    with pytest.raises(UnknownFormat, match="no file in it"):
+    with pytest.raises(UnknownFormat, match="no file in it that map3d can read;"):
+        find_sources([tmp_path])
+    (tmp_path / "town.zip").write_bytes(b"PK\x03\x04")
+    with pytest.raises(UnknownFormat, match=r"can read \(.*town.zip: a ZIP archive\);"):
         find_sources([tmp_path])
 
 
@@ -78,3 +81,35 @@ def test_the_digest_follows_document_and_materials(tmp_path: Path) -> None:
     path.write_text("mtllib other.mtl\n" + OBJ + "f 3 2 1\n")
     seen.add(source_digest(source))
     assert len(seen) == 3
+
+
+def digest_of(path: Path) -> str:
+    (source,) = find_sources([path])
+    return source_digest(source)
+
+
+def test_the_digest_follows_images_that_are_named_and_no_others(tmp_path: Path) -> None:
+    textures = tmp_path / "textures"
+    textures.mkdir()
+    for name in ("wall & roof.jpg", "door.png", "other.jpg"):
+        (textures / name).write_bytes(b"before")
+    (tmp_path.parent / "outside.jpg").write_bytes(b"before")
+    (tmp_path / "a.obj").write_text("mtllib lib/m.mtl\n" + OBJ)
+    (tmp_path / "lib").mkdir()
+    (tmp_path / "lib" / "m.mtl").write_text("newmtl x\nmap_Kd -clamp on door.png\n")
+    (tmp_path / "lib" / "door.png").write_bytes(b"before")
+    named = "".join(
+        f"<app:imageURI> {uri} </app:imageURI>" for uri in ("textures/wall &amp; roof.jpg", "textures\\door.png", "../outside.jpg", "none.png")
+    )
+    (tmp_path / "b.gml").write_text(f"<CityModel>{named}</CityModel>")
+    for image, documents in (
+        (textures / "wall & roof.jpg", {"b.gml"}),
+        (textures / "door.png", {"b.gml"}),
+        (tmp_path / "lib" / "door.png", {"a.obj"}),
+        (tmp_path / "lib" / "m.mtl", {"a.obj"}),
+        (textures / "other.jpg", set()),
+        (tmp_path.parent / "outside.jpg", set()),
+    ):
+        before = {name: digest_of(tmp_path / name) for name in ("a.obj", "b.gml")}
+        image.write_bytes(image.read_bytes() + b"after")
+        assert {name for name in before if digest_of(tmp_path / name) != before[name]} == documents, image

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from map3d.errors import NotFound, UnknownFormat
 from map3d.ingest.formats import KNOWN, Format, detect_format
+from map3d.ingest.named_files import named_files
 
 _PASSED_OVER = (".mtl", ".jpg", ".jpeg", ".png", ".bmp", ".gif", ".tga", ".txt", ".md", ".json", ".pdf", ".html", ".prj", ".tfw", ".xsd", ".sqlite")
 _PROMISING = (".gml", ".citygml", ".obj", ".tif", ".tiff")
@@ -45,7 +46,7 @@ def find_sources(paths: Iterable[Path], name: str | None = None, refuse: Refuse 
 
 
 def source_digest(source: Source) -> str:
-    """Over the document's bytes and the files beside it whose names begin with its stem, and an OBJ's material libraries."""
+    """Over the document's bytes, the files beside it whose names begin with its stem, and the libraries and images that it names."""
     total = hashlib.sha256()
     for path in source.paths:
         for part in [path, *_companions(path)]:
@@ -56,20 +57,20 @@ def source_digest(source: Source) -> str:
 
 
 def _in_folder(folder: Path, refuse: Refuse) -> list[tuple[Path, Format]]:
-    found, refused = [], []
+    found, unknown = [], []
     for path in sorted(path for path in folder.rglob("*") if path.is_file() and not path.name.startswith(".")):
         if path.suffix.lower() in _PASSED_OVER:
             continue
         try:
             found.append((path, detect_format(path)))
         except UnknownFormat as error:
-            if path.suffix.lower() in _PROMISING:
-                refused.append((path, str(error)))
+            unknown.append((path, str(error)))
     if not found:
-        why = f" ({refused[0][1].partition(';')[0]})" if refused else ""
+        why = f" ({unknown[0][1].partition(';')[0]})" if unknown else ""
         raise UnknownFormat(f"{folder}: no file in it that map3d can read{why}; it reads {KNOWN}")
-    for path, text in refused:
-        refuse(path, text)
+    for path, text in unknown:
+        if path.suffix.lower() in _PROMISING:
+            refuse(path, text)
     return found
 
 
@@ -105,12 +106,8 @@ def asset_name(text: str) -> str:
 
 
 def _companions(path: Path) -> list[Path]:
-    beside = {other for other in path.parent.glob(f"{_escaped(path.stem)}.*") if other.is_file()} - {path}
-    if path.suffix.lower() == ".obj":
-        with path.open("rb") as lines:
-            names = [line.split(None, 1)[1].strip().decode("utf-8", "replace") for line in lines if line.startswith(b"mtllib ") and line.split()[1:]]
-        beside |= {path.parent / name for name in names if "/" not in name and (path.parent / name).is_file()}
-    return sorted(beside - {path})
+    beside = {other.resolve() for other in path.parent.glob(f"{_escaped(path.stem)}.*") if other.is_file()}
+    return sorted((beside | named_files(path)) - {path.resolve()})
 
 
 def _escaped(stem: str) -> str:
