@@ -133,7 +133,7 @@ def test_publishing_twice_gives_equal_bytes(workspace, out):
 def test_what_is_there_is_replaced_only_when_allowed(workspace, out):
     publish(workspace, "tea", out)
     (out / "mark").touch()
-    with pytest.raises(AlreadyExists, match="replacing"):
+    with pytest.raises(AlreadyExists, match="--replace"):
         publish(workspace, "tea", out)
     assert (out / "mark").exists()
     publish(workspace, "tea", out, replace=True)

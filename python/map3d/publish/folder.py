@@ -168,7 +168,7 @@ def _manifest(workspace: Workspace, rendering: str, allow_incomplete: bool) -> M
     except FileNotFoundError as error:
         raise NotFound(f"rendering {rendering!r} is not there, or nothing of it is rendered yet: map3d render {rendering}") from error
     if not manifest.complete and not allow_incomplete:
-        raise BadRequest(f"rendering {rendering!r} is not complete; render it first (map3d render {rendering}), or allow an incomplete one")
+        raise BadRequest(f"rendering {rendering!r} is not complete; render it first (map3d render {rendering}), or give --allow-incomplete")
     return manifest
 
 
@@ -178,7 +178,7 @@ def _check_place(out: Path, replace: bool) -> None:
     if not out.is_dir() or not (out / FILE_NAME).is_file():
         raise AlreadyExists(f"{out}: is there already and is no published rendering; name another folder")
     if not replace:
-        raise AlreadyExists(f"{out}: is published already; allow replacing it, or name another folder")
+        raise AlreadyExists(f"{out}: is published already; replace it with --replace, or name another folder")
 
 
 def _tiles_of_finished(path: Path, metadata: dict[str, Any]) -> int:
