@@ -49,7 +49,7 @@ async function fetchOnce(url: string, { signal, range }: FetchOptions): Promise<
   }
   if (answer.status === 204) return null;
   if (!answer.ok) throw new FetchError(`${url}: HTTP ${String(answer.status)}`, answer.status);
-  if (range && answer.status !== 206) throw new FetchError(`${url}: the server ignores range requests (HTTP ${String(answer.status)}, expected 206)`, answer.status);
+  if (range && answer.status !== 206) throw new FetchError(`${url}: the server ignores range requests (HTTP ${String(answer.status)}, expected 206); take one that answers them, such as nginx, Apache or Caddy`, answer.status);
   return answer.arrayBuffer();
 }
 
