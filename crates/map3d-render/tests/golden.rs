@@ -1,0 +1,175 @@
+//! Golden pictures: tiny scenes look as they did, to the last bit. When a change is meant, `MAP3D_BLESS=1 cargo test -p map3d-render --test golden` keeps
+//! the new pictures: look at them, and say why in the commit.
+//!
+//! `golden/<scene>-<look at>-<pitch>.png` holds four quarters of 128 × 128 pixels, from the middle of a tile: colour as sent and normals as sent; below
+//! them ids (each id its own colour) and depths (red steps by 1/4 m, green by 2^-10 m). `golden/digests.txt` has a checksum over the G-buffer's full bits.
+
+#[path = "golden/pictures.rs"]
+mod pictures;
+mod town;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use map3d_base::DEPTH_NOTHING;
+use map3d_base::file::checksum;
+use map3d_image::encode::{Deflate, Filter, bytes_from_normals, color_from_linear, decode_png, encode_png};
+use map3d_image::{GBuffer, Raster};
+use pictures::PICTURES;
+use town::{frame, new_folder};
+
+const SIDE: usize = 128;
+const QUARTERS: [&str; 4] = ["colour", "normal", "id", "depth"];
+
+/// The middle of a tile of 256 pixels.
+fn middle(g: &GBuffer) -> GBuffer {
+    let mut out = GBuffer::empty(SIDE as u32, SIDE as u32);
+    for y in 0..SIDE {
+        let (from, to) = ((y + 64) * 256 + 64, y * SIDE);
+        out.color[to..to + SIDE].copy_from_slice(&g.color[from..from + SIDE]);
+        out.normal[to..to + SIDE].copy_from_slice(&g.normal[from..from + SIDE]);
+        out.id[to..to + SIDE].copy_from_slice(&g.id[from..from + SIDE]);
+        out.depth[to..to + SIDE].copy_from_slice(&g.depth[from..from + SIDE]);
+    }
+    out
+}
+
+/// Over all bits.
+fn digest(g: &GBuffer) -> String {
+    let color = g.color.iter().flatten().flat_map(|v| v.to_le_bytes());
+    let normal = g.normal.iter().flatten().flat_map(|v| v.to_le_bytes());
+    let numbers = g.id.iter().chain(&g.depth).flat_map(|v| v.to_le_bytes());
+    format!("{:016x}", checksum(&color.chain(normal).chain(numbers).collect::<Vec<u8>>()))
+}
+
+/// Each id below 2^24 has its own colour.
+fn id_color(id: u32) -> [u8; 4] {
+    assert!(id < 1 << 24);
+    let [r, g, b, _] = id.wrapping_mul(0x9E_3779).to_le_bytes();
+    [r, g, b, 255]
+}
+
+fn depth_color(depth: u32) -> [u8; 4] {
+    if depth == DEPTH_NOTHING {
+        return [0; 4];
+    }
+    let [low, middle, high, top] = depth.to_le_bytes();
+    assert_eq!(top, 0, "a picture's frame starts near its scene");
+    [middle, low, high, 255]
+}
+
+fn quarters(g: &GBuffer) -> Raster {
+    let color = color_from_linear((g.width, g.height), &g.color);
+    let bytes = bytes_from_normals(&g.normal);
+    let normal = |p: usize| [bytes[3 * p], bytes[3 * p + 1], bytes[3 * p + 2], 255];
+    let pixel = |k: usize| {
+        let (x, y) = (k % (2 * SIDE), k / (2 * SIDE));
+        let p = y % SIDE * SIDE + x % SIDE;
+        match (x / SIDE, y / SIDE) {
+            (0, 0) if color.pixels[p][3] == 0 => [0; 4],
+            (0, 0) => color.pixels[p],
+            (_, 0) => normal(p),
+            (0, _) => id_color(g.id[p]),
+            _ => depth_color(g.depth[p]),
+        }
+    };
+    Raster::new(2 * SIDE as u32, 2 * SIDE as u32, (0..4 * SIDE * SIDE).map(pixel).collect())
+}
+
+/// Every picture by name, with its digest.
+fn drawn() -> BTreeMap<String, (Raster, String)> {
+    let mut out = BTreeMap::new();
+    for picture in PICTURES {
+        let (folder, town) = (new_folder(picture.name), (picture.scene)());
+        let scene = town.open(&folder);
+        for &(look_at, pitch) in picture.views {
+            let f = map3d_base::Frame { d0_m: -40.0, ..frame(look_at, pitch, 2.0 * picture.metres, 0) };
+            let g = middle(&scene.gbuffer(&f, 0, 0).expect("renders"));
+            out.insert(format!("{}-{look_at}-{pitch}", picture.name), (quarters(&g), digest(&g)));
+        }
+    }
+    out
+}
+
+fn golden_folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden")
+}
+
+fn write(path: &Path, image: &Raster) {
+    let png = encode_png((image.width, image.height), 4, image.pixels.as_flattened(), Filter::Up, Deflate::Matching);
+    std::fs::create_dir_all(path.parent().expect("a folder")).expect("folder");
+    std::fs::write(path, png).expect("picture");
+}
+
+fn read(path: &Path) -> Option<Raster> {
+    let image = decode_png(&std::fs::read(path).ok()?).expect("a PNG");
+    assert_eq!(image.channels, 4, "{}", path.display());
+    Some(Raster::new(image.width, image.height, image.pixels.as_chunks::<4>().0.to_vec()))
+}
+
+fn bless(drawn: &BTreeMap<String, (Raster, String)>) {
+    let old = golden_pictures().into_iter().filter(|name| !drawn.contains_key(name));
+    old.for_each(|name| std::fs::remove_file(golden_folder().join(name + ".png")).expect("old picture"));
+    let mut lines = String::new();
+    for (name, (image, digest)) in drawn {
+        write(&golden_folder().join(format!("{name}.png")), image);
+        lines += &format!("{name} {digest}\n");
+    }
+    std::fs::write(golden_folder().join("digests.txt"), lines).expect("digests");
+}
+
+/// Names of the pictures kept.
+fn golden_pictures() -> Vec<String> {
+    let entries = std::fs::read_dir(golden_folder()).expect("golden pictures");
+    let names = entries.map(|e| e.expect("entry").file_name().into_string().expect("UTF-8"));
+    names.filter_map(|n| n.strip_suffix(".png").map(str::to_owned)).collect()
+}
+
+/// What differs, quarter by quarter, in words; also written beside each other as pictures.
+fn differences(name: &str, got: &Raster, golden: &Raster) -> String {
+    let side = got.width as usize;
+    let differ = |k: &usize| got.pixels[*k] != golden.pixels[*k];
+    let mut words = Vec::new();
+    for (q, quarter) in QUARTERS.iter().enumerate() {
+        let inside = |k: &usize| (*k % side / SIDE, *k / side / SIDE) == (q % 2, q / 2);
+        let all: Vec<usize> = (0..side * side).filter(inside).filter(differ).collect();
+        if let Some(k) = all.first() {
+            let at = (k % side % SIDE, k / side % SIDE);
+            words.push(format!("{quarter}: {} pixels, first {at:?}: {:?}, was {:?}", all.len(), got.pixels[*k], golden.pixels[*k]));
+        }
+    }
+    if words.is_empty() {
+        return "only in bits that the pictures do not show".into();
+    }
+    let shown = |k: usize| if differ(&k) { [255, 255, 255, 255] } else { golden.pixels[k].map(|c| c / 4).map(|c| c.max(1)) };
+    let difference = Raster::new(got.width, got.height, (0..side * side).map(shown).collect());
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("golden");
+    [("got", got), ("golden", golden), ("difference", &difference)].iter().for_each(|(what, i)| write(&folder.join(format!("{name}.{what}.png")), i));
+    format!("{}\n  pictures: {}/{name}.*.png", words.join("\n  "), folder.display())
+}
+
+#[test]
+fn tiny_scenes_look_as_they_did() {
+    let drawn = drawn();
+    if std::env::var_os("MAP3D_BLESS").is_some_and(|v| v == "1") {
+        return bless(&drawn);
+    }
+    let digests = std::fs::read_to_string(golden_folder().join("digests.txt")).expect("digests");
+    let kept: BTreeMap<&str, &str> = digests.lines().filter_map(|l| l.split_once(' ')).collect();
+    let mut faults = Vec::new();
+    for (name, (image, digest)) in &drawn {
+        match read(&golden_folder().join(format!("{name}.png"))) {
+            None => faults.push(format!("{name}: no such golden picture")),
+            Some(golden) if *image != golden || kept.get(&name[..]) != Some(&&digest[..]) => {
+                faults.push(format!("{name}\n  {}", differences(name, image, &golden)));
+            }
+            Some(_) => {}
+        }
+    }
+    faults.extend(golden_pictures().into_iter().filter(|n| !drawn.contains_key(n)).map(|n| format!("{n}: a golden picture of no scene")));
+    assert!(
+        faults.is_empty(),
+        "\n{}\nIf this is meant: MAP3D_BLESS=1 cargo test -p map3d-render --test golden, and look at the pictures.",
+        faults.join("\n")
+    );
+}
