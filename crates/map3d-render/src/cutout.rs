@@ -5,10 +5,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use map3d_base::asset::Wrap;
+use map3d_base::samples::SAMPLES;
 use map3d_image::sample::{AlphaSampler, POSITION_BITS, UvMap};
 use map3d_image::texture::{Level, Texture, TextureCache, TextureKey};
 use map3d_scene::MaterialRecord;
-use map3d_trace::{Cutout, CutoutSample};
+use map3d_trace::{Affine, Cutout, CutoutSample, Stencil};
 
 /// Wrap mode of a material record.
 pub(crate) fn wrap_of(material: &MaterialRecord) -> Wrap {
@@ -83,6 +84,34 @@ impl Cutout for TextureCutout<'_> {
             }
         }
     }
+
+    fn stencil(&self, material: &MaterialRecord, [u, v]: &[Affine; 2]) -> Option<Box<dyn Stencil>> {
+        if !material.is_textured() {
+            return None;
+        }
+        let origin = CutoutSample { uv: [u.at0, v.at0], footprint: [[u.dx, v.dx], [u.dy, v.dy]] };
+        let level = self.level(material, &origin).ok()?;
+        Some(Box::new(AlphaStencil(AlphaSampler::with(level, &uv_map(&origin), wrap_of(material), material.border[3]))))
+    }
 }
 
-const _: () = assert!(POSITION_BITS == 8);
+/// A surface's alpha over the pixels of a sub-tile.
+struct AlphaStencil(AlphaSampler);
+
+impl Stencil for AlphaStencil {
+    fn covered(&self, i: usize, j: usize, asked: u32) -> u32 {
+        let (x, y) = ((i as i32) << POSITION_BITS, (j as i32) << POSITION_BITS);
+        let mut rest = asked;
+        let mut covered = 0;
+        while rest != 0 {
+            let k = rest.trailing_zeros();
+            rest &= rest - 1;
+            let (sx, sy) = SAMPLES[k as usize];
+            covered |= u32::from(self.0.covers(x + i32::from(sx) * STEP, y + i32::from(sy) * STEP)) << k;
+        }
+        covered
+    }
+}
+
+/// Positions a 1/16 pixel.
+const STEP: i32 = 1 << (POSITION_BITS - 4);

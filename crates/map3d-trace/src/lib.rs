@@ -12,7 +12,7 @@ pub mod surface;
 pub mod visbuf;
 
 pub use beam::BeamTracer;
-pub use cutout::{Cutout, CutoutSample, Opaque};
+pub use cutout::{Cutout, CutoutSample, Opaque, Stencil};
 pub use lanes::Isa;
 pub use occupancy::{block_key, occupied};
 pub use plane::DepthPlane;

@@ -2,14 +2,10 @@
 
 use std::cell::Cell;
 
-use map3d_base::samples::SAMPLES;
-use map3d_scene::MaterialRecord;
-
 use super::buffer::{BLOCKS_PER_ROW, FAR, MIXED, SampleBuffer, Track, bit_in_group, group_of};
 use super::shape::{Edge, PixelBox};
-use crate::cutout::{Cutout, CutoutSample};
+use crate::cutout::{Cutout, Sheet};
 use crate::lanes::Lanes;
-use crate::surface::Affine;
 use crate::visbuf::{NOTHING, SUBTILE_PX};
 
 const SIDE: usize = SUBTILE_PX;
@@ -24,8 +20,8 @@ pub(crate) struct Candidate<'a> {
     pub is_regular: bool,
     /// Set once it has won a sample.
     pub slot: Cell<u32>,
-    /// Material and UV planes when the material is a cut-out.
-    pub cutout: Option<(&'a MaterialRecord, [Affine; 2])>,
+    /// When the material is a cut-out.
+    pub sheet: Option<Sheet<'a>>,
 }
 
 pub(crate) struct Canvas<'a> {
@@ -90,7 +86,7 @@ impl Canvas<'_> {
         let coarse = [CoarseEdge::of(&edges[0]), CoarseEdge::of(&edges[1]), CoarseEdge::of(&edges[2])];
         let plane = &candidate.track.plane;
         let along = L::load(&COUNT_UP).mul(L::splat(plane.gx));
-        let allow_whole = if candidate.cutout.is_some() { 0 } else { 0xFFFF };
+        let allow_whole = if candidate.sheet.is_some() { 0 } else { 0xFFFF };
         for j in b.y0..b.y1 + 1 {
             for block in b.x0 >> 4..(b.x1 >> 4) + 1 {
                 let i = block * 16;
@@ -169,8 +165,8 @@ impl Canvas<'_> {
         if ties != 0 {
             wins |= self.settle(candidate, p, ties);
         }
-        if wins != 0 && candidate.cutout.is_some() {
-            wins = self.cut_out(candidate, p, wins);
+        if let Some(sheet) = candidate.sheet.as_ref().filter(|_| wins != 0) {
+            wins = sheet.covered(self.cutout, p % SIDE, p / SIDE, wins);
         }
         if wins == 0 {
             return;
@@ -211,18 +207,6 @@ impl Canvas<'_> {
         };
         let wins = |k: usize| ties >> k & 1 != 0 && order < self.tracks[holder(k) as usize].tie_order();
         (0..16).filter(|k| wins(*k)).fold(0, |mask, k| mask | 1 << k)
-    }
-
-    /// Samples where the candidate's texture is there.
-    #[cold]
-    #[inline(never)]
-    fn cut_out(&self, candidate: &Candidate, p: usize, wins: u32) -> u32 {
-        let Some((material, [u, v])) = &candidate.cutout else { return wins };
-        let covers = |k: usize| {
-            let (x, y) = ((p % SIDE) as f32 + f32::from(SAMPLES[k].0) / 16.0, (p / SIDE) as f32 + f32::from(SAMPLES[k].1) / 16.0);
-            self.cutout.covers(material, &CutoutSample { uv: [u.at(x, y), v.at(x, y)], footprint: [[u.dx, v.dx], [u.dy, v.dy]] })
-        };
-        (0..16).filter(|k| wins >> k & 1 != 0 && covers(*k)).fold(0, |mask, k| mask | 1 << k)
     }
 
     /// The candidate's slot; its first win makes one.

@@ -4,7 +4,7 @@ use std::cell::Cell;
 
 use map3d_base::DEPTH_UNITS_PER_M;
 use map3d_scene::records::{EMPTY, LEAF_BIT};
-use map3d_scene::{Chunk, InstanceRecord, Leaf, MaterialRecord, Node};
+use map3d_scene::{Chunk, InstanceRecord, Leaf, Node};
 
 use super::boxes::{BoxMap, least_key};
 use super::buffer::{GROUPS_PER_ROW, KeyPlane, Track};
@@ -12,8 +12,9 @@ use super::canvas::{Candidate, Canvas};
 use super::corners::Corners;
 use super::project::Projection;
 use super::shape::{Depth, Keys, PixelBox, bias, edges, is_near, key_plane, whole_steps};
+use crate::cutout::Sheet;
 use crate::lanes::{Isa, Lanes};
-use crate::surface::{Affine, Placed, Surface};
+use crate::surface::{Placed, Surface};
 use crate::visbuf::NOTHING;
 
 /// A node or leaf still to be visited.
@@ -170,13 +171,13 @@ impl<'a> Descent<'a> {
             object_id,
             source: record.source,
         };
-        let cutout = if chunk.has_cutouts() { self.cutout(place) } else { None };
-        Candidate { track, is_regular, slot: Cell::new(NOTHING), cutout }
+        let sheet = if chunk.has_cutouts() { self.sheet(place) } else { None };
+        Candidate { track, is_regular, slot: Cell::new(NOTHING), sheet }
     }
 
     #[cold]
     #[inline(never)]
-    fn cutout(&self, place: (u32, u32, usize)) -> Option<(&'a MaterialRecord, [Affine; 2])> {
+    fn sheet(&self, place: (u32, u32, usize)) -> Option<Sheet<'a>> {
         let record = &self.chunk.triangles()[place.1 as usize];
         let material = &self.chunk.materials()[record.material as usize];
         if !material.is_cutout() {
@@ -186,7 +187,7 @@ impl<'a> Descent<'a> {
         let local = self.projection.local_corners(&self.chunk.leaves()[place.0 as usize], place.2, self.chunk.origin(), transform);
         let placed = Placed { local, pixel: local.map(|p| self.projection.pixel(p)), axes: self.projection.axes };
         let instance = self.instance.map(|i| (self.part.1, i));
-        Some((material, Surface::new(self.part.0, self.chunk, place.1, instance, &placed).uv))
+        Some(Sheet::new(material, Surface::new(self.part.0, self.chunk, place.1, instance, &placed).uv))
     }
 }
 
