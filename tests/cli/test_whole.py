@@ -254,6 +254,11 @@ def test_a_folder_becomes_a_site_and_only_changes_are_done_again(run: Run, tmp_p
     status, text, err = run("site", str(files), "-o", str(out), "--res", "0.2")
     assert status == 0, err
     assert "1 files imported, 3 unchanged, 1 not usable" in text
+    assert "were skipped" not in text
+    with (files / "house-0-0.obj").open("a") as more:
+        more.write("f 1 2 99\n")
+    status, text, err = run("site", str(files), "-o", str(out), "--res", "0.2")
+    assert "1 things in the files were skipped, 0 noted; map3d show report little-town tells which" in text
     assert Manifest.load((out / "rendering.json").read_bytes()).content_version == 2
 
 

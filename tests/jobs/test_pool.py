@@ -7,12 +7,13 @@ import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from map3d.catalogue import State
-from map3d.jobs.events import Done, Event, Left
+from map3d.jobs.events import Done, Event, Left, Waiting
 from map3d.jobs.terms import Terms
 from tests.jobs.town import BLOCKS, LEASE_S, TERMS, Town, make_town
 
@@ -170,6 +171,24 @@ def test_killing_the_whole_run_loses_nothing(town: Town, faults: Path, undisturb
     town.run()
     assert all_done(town)
     assert town.digest() == undisturbed
+
+
+def test_a_run_that_can_only_wait_for_leases_of_others_says_so_once(town: Town, faults: Path) -> None:
+    other = town.workspace.open_catalogue(lease_s=60)
+    held = other.lease("town-a", "other")
+    assert held is not None
+    told: list[Waiting] = []
+
+    def on_event(event: Event) -> None:
+        if isinstance(event, Waiting):
+            told.append(event)
+            other.release(held)
+
+    town.pool(terms=replace(TERMS, wait_s=0.3)).run(on_event)
+    town.task.close()
+    other.close()
+    assert told == [Waiting(1)]
+    assert all_done(town)
 
 
 def test_children_die_with_their_parent(town: Town, faults: Path) -> None:

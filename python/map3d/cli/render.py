@@ -55,7 +55,7 @@ def render_with_progress(run: "Run") -> "Outcome":
 
 
 def _work(run: "Run", plan: "Plan") -> "Outcome":
-    from map3d.jobs.events import Done, Failed, Left, Lost, Stopping
+    from map3d.jobs.events import Done, Failed, Left, Lost, Stopping, Waiting
 
     note = console()
     outcome = plan.outcome
@@ -76,6 +76,8 @@ def _work(run: "Run", plan: "Plan") -> "Outcome":
             elif isinstance(event, Stopping):
                 how = "giving the blocks in hand back" if event.abandoning else "finishing the blocks in hand; Ctrl-C again gives them back at once"
                 bar.console.print(f"stopping: {how}")
+            elif isinstance(event, Waiting):
+                bar.console.print(f"waiting: {event.jobs:,} blocks are in other hands; of a render that was killed they come free within a minute")
             elif isinstance(event, Left) and event.because:
                 bar.console.print(f"worker {event.worker} left: {event.because}")
 

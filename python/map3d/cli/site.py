@@ -6,7 +6,7 @@ from typing import Any
 import click
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 
-from map3d.catalogue import Workspace
+from map3d.catalogue import Catalogue, Workspace
 from map3d.cli.building import build_with_progress
 from map3d.cli.create_rendering import around
 from map3d.cli.options import View, max_memory_option, workers_option, workspace_option
@@ -67,6 +67,7 @@ def command(
         click.echo(f"{len(added.added)} files imported, {len(added.unchanged)} unchanged, {len(added.failed)} not usable")
         for _, reason in added.failed:
             click.echo(f"not added: {reason}", err=True)
+        _tell_faults(catalogue, request.name)
         build_with_progress(workspace, catalogue, request.name, threads=workers, max_memory_bytes=max_memory)
         record = make_rendering(workspace, catalogue, request)
         click.echo(f"rendering {record.name}: {len(record.frames)} views, {record.zmax + 1} levels, {record.res_m:g} m a pixel")
@@ -78,3 +79,12 @@ def command(
         raise click.exceptions.Exit(130 if outcome.stopped else 1)
     done = publish_with_progress(workspace, record.name, out, replace=True)
     click.echo(f"the site is in {out}, {size_text(done.bytes)}; copy it to any web server that answers range requests")
+
+
+def _tell_faults(catalogue: Catalogue, scene: str) -> None:
+    """How much in the files was skipped or is worth a look."""
+    reports = [asset.report for asset in catalogue.assets(scene)]
+    skipped = sum(sum(report.get("skipped", {}).values()) for report in reports)
+    noted = sum(warning["count"] for report in reports for warning in report.get("warnings", []) if not warning["reason"].startswith("skipped: "))
+    if skipped or noted:
+        click.echo(f"{skipped:,} things in the files were skipped, {noted:,} noted; map3d show report {scene} tells which")

@@ -46,4 +46,11 @@ class Stopping:
     abandoning: bool
 
 
-Event = Done | Failed | Lost | Left | Stopping
+@dataclass(frozen=True)
+class Waiting:
+    """All that is left is leased by another run, or by one that was killed and whose leases have yet to expire."""
+
+    jobs: int
+
+
+Event = Done | Failed | Lost | Left | Stopping | Waiting

@@ -3,12 +3,13 @@
 import queue
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
-from map3d.catalogue import Catalogue
-from map3d.jobs.events import Done, Event, Failed, Left, Lost, Stopping
+from map3d.catalogue import Catalogue, State
+from map3d.jobs.events import Done, Event, Failed, Left, Lost, Stopping, Waiting
 from map3d.jobs.terms import Terms
 from map3d.jobs.worker import Task, Worker
 
@@ -55,7 +56,9 @@ class Pool:
         self._events: queue.SimpleQueue[Event] = queue.SimpleQueue()
         self._stop, self._abandon = threading.Event(), threading.Event()
         self._threads: dict[str, threading.Thread] = {}
+        self._workers: dict[str, Worker] = {}
         self._started = 0
+        self._told_waiting = False
         self._error: BaseException | None = None
         self.tally = Tally()
 
@@ -91,19 +94,31 @@ class Pool:
         try:
             event = self._events.get(timeout=_LOOK_S)
         except queue.Empty:
+            self._tell_if_waiting(on_event)
             return
         self.tally.add(event)
         if isinstance(event, Left):
             self._error = self._error or event.error
             self._threads.pop(event.worker).join()
+            del self._workers[event.worker]
             if event.jobs_failed and self.tally.done and not self.stopped:
                 self._start_worker()
         on_event(event)
+
+    def _tell_if_waiting(self, on_event: Callable[[Event], None]) -> None:
+        """Once."""
+        latest = time.monotonic() - self._terms.wait_s
+        idle = [worker.idle_since for worker in self._workers.values()]
+        if self._told_waiting or not idle or any(since is None or since > latest for since in idle):
+            return
+        self._told_waiting = True
+        on_event(Waiting(self._catalogue.count_jobs(self._rendering)[State.LEASED]))
 
     def _start_worker(self) -> None:
         self._started += 1
         name = f"{self._host}-{self._started}"
         worker = Worker(name, self._catalogue, self._rendering, self._task, self._terms, self._stop, self._abandon)
+        self._workers[name] = worker
         self._threads[name] = threading.Thread(target=worker.run, args=(self._events.put,), name=name)
         self._threads[name].start()
 

@@ -42,6 +42,8 @@ class Worker:
         self._stop, self._abandon = stop, abandon
         self._child: Child | None = None
         self._failed: set[tuple[str, str]] = set()
+        self.idle_since: float | None = None
+        """Monotonic seconds; None while it has a job or a child starts."""
 
     def run(self, tell: Callable[[Event], None]) -> None:
         """Works until there is nothing more to do, then tells `Left`."""
@@ -63,10 +65,12 @@ class Worker:
                 break
             lease = self._catalogue.lease(self._rendering, self.name)
             if lease is not None:
+                self.idle_since = None
                 tell(self._work(child, lease))
             elif self._nothing_left():
                 break
             else:
+                self.idle_since = self.idle_since or time.monotonic()
                 self._stop.wait(self._terms.idle_s)
             if len(self._failed) >= self._terms.failures:
                 return Left(self.name, f"failed {len(self._failed)} different jobs", jobs_failed=True)
