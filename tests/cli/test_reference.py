@@ -8,7 +8,8 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 def test_the_reference_is_the_commands_own_help() -> None:
     spec = importlib.util.spec_from_file_location("make_cli", DOCS / "make_cli.py")
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     assert (DOCS / "cli.md").read_text(encoding="utf-8") == module.reference(), "make docs writes it anew"
