@@ -109,9 +109,9 @@ impl TextureCache {
     /// Opens a texture; its file is read and checked the first time. A damaged one stays an error.
     pub fn texture(&self, key: &TextureKey) -> Result<Arc<Texture>> {
         let made = self.textures.lock().expect("no thread panicked").entry(*key).or_default().clone();
-        let path = texture_path(&self.folder, key);
-        let texture = made.get_or_init(|| TextureFile::open(&path).map(|file| Arc::new(Texture { key: *key, file })).map_err(|e| e.to_string()));
-        texture.clone().map_err(|what| Error::Format { path, what })
+        let path = || texture_path(&self.folder, key);
+        let texture = made.get_or_init(|| TextureFile::open(&path()).map(|file| Arc::new(Texture { key: *key, file })).map_err(|e| e.to_string()));
+        texture.clone().map_err(|what| Error::Format { path: path(), what })
     }
 
     /// A level of a texture; made once, however many threads ask.

@@ -1,62 +1,63 @@
 //! Unused texels take the colour of the nearest used one: an exact Euclidean distance transform, rows after columns
 //! (after Meijster, Roerdink & Hesselink 2000). Ties: the upper, then the left texel.
 
+use std::ops::Range;
+
 use crate::raster::Raster;
 use crate::texture::mask::UsageMask;
 
 /// Vertical distance where a column has no used texel.
 const FAR: i32 = 1 << 20;
 
-/// Fills in place. An empty or full mask changes nothing.
+/// Fills in place. An empty or full mask changes nothing. The work grows with the unused area.
 pub fn fill_unused(image: &mut Raster, mask: &UsageMask) {
     assert_eq!((image.width, image.height), (mask.width(), mask.height()), "mask and image differ in size");
     if mask.is_full() || mask.used() == 0 {
         return;
     }
-    let vertical = vertical_offsets(mask);
-    let (w, h) = (image.width as usize, image.height as usize);
+    let w = image.width as usize;
+    let gaps: Vec<Vec<Range<usize>>> = (0..mask.height()).map(|y| mask.gaps(y)).collect();
+    let vertical = vertical_offsets(w, &gaps);
     let mut sources = Envelope::default();
-    let mut row = vec![[0u8; 4]; w];
+    let mut run = Vec::new();
     // Every source is a used texel, and those are never written.
-    for y in 0..h {
+    for (y, row) in gaps.iter().enumerate() {
         let offsets = &vertical[y * w..][..w];
-        let mut x = 0;
-        while x < w {
-            if offsets[x] == 0 {
-                x += 1;
-                continue;
-            }
-            let end = (x..w).find(|i| offsets[*i] == 0).unwrap_or(w);
-            sources.build(offsets, x.saturating_sub(1), (end + 1).min(w));
-            for (i, pixel) in row.iter_mut().enumerate().take(end).skip(x) {
-                let from = sources.nearest(i as i32);
-                let from_row = (y as i32 + offsets[from]) as usize;
-                *pixel = image.pixels[from_row * w + from];
-            }
-            image.pixels[y * w + x..y * w + end].copy_from_slice(&row[x..end]);
-            x = end;
+        for gap in row {
+            sources.build(offsets, gap.start.saturating_sub(1), (gap.end + 1).min(w));
+            run.clear();
+            run.extend(gap.clone().map(|x| {
+                let from = sources.nearest(x as i32);
+                image.pixels[(y as i32 + offsets[from]) as usize * w + from]
+            }));
+            image.pixels[y * w..][gap.clone()].copy_from_slice(&run);
         }
     }
 }
 
 /// For each texel the signed rows to the nearest used one in its column: 0 when it is used itself.
-fn vertical_offsets(mask: &UsageMask) -> Vec<i32> {
-    let (w, h) = (mask.width() as usize, mask.height() as usize);
-    let mut offsets = vec![FAR; w * h];
-    for y in 0..h {
-        for x in 0..w {
-            if mask.get(x as u32, y as u32) {
-                offsets[y * w + x] = 0;
-            } else if y > 0 && offsets[(y - 1) * w + x] != FAR {
-                offsets[y * w + x] = offsets[(y - 1) * w + x] - 1;
+fn vertical_offsets(w: usize, gaps: &[Vec<Range<usize>>]) -> Vec<i32> {
+    let mut offsets = vec![0; w * gaps.len()];
+    for (y, row) in gaps.iter().enumerate() {
+        let (before, own) = offsets.split_at_mut(y * w);
+        for gap in row {
+            match y {
+                0 => own[gap.clone()].fill(FAR),
+                _ => {
+                    let above = &before[(y - 1) * w..][gap.clone()];
+                    own[gap.clone()].iter_mut().zip(above).for_each(|(o, a)| *o = if *a == FAR { FAR } else { a - 1 });
+                }
             }
         }
     }
-    for y in (0..h.saturating_sub(1)).rev() {
+    for (y, row) in gaps.iter().enumerate().rev().skip(1) {
         let (upper, lower) = offsets.split_at_mut((y + 1) * w);
-        for (own, below) in upper[y * w..].iter_mut().zip(&lower[..w]) {
-            if *below != FAR && *below >= 0 && below + 1 < own.abs() {
-                *own = below + 1;
+        for gap in row {
+            let below = &lower[gap.clone()];
+            for (own, below) in upper[y * w..][gap.clone()].iter_mut().zip(below) {
+                if *below != FAR && *below >= 0 && below + 1 < own.abs() {
+                    *own = below + 1;
+                }
             }
         }
     }

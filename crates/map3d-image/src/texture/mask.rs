@@ -1,5 +1,7 @@
 //! Which texels of an image the UV triangles of a scene touch (spec/scene.md, Texture).
 
+use std::ops::Range;
+
 use map3d_base::asset::Wrap;
 
 /// UV coordinates that miss a texel's border by less than this (in texels) do not touch the neighbour: float32 noise.
@@ -41,6 +43,20 @@ impl UsageMask {
     pub fn get(&self, x: u32, y: u32) -> bool {
         let i = y as usize * self.width as usize + x as usize;
         self.words[i / 64] >> (i % 64) & 1 == 1
+    }
+
+    /// Runs of unused texels in a row, as columns.
+    pub fn gaps(&self, y: u32) -> Vec<Range<usize>> {
+        let start = u64::from(y) * u64::from(self.width);
+        let end = start + u64::from(self.width);
+        let mut out = Vec::new();
+        let mut at = self.run_end(start, true, end);
+        while at < end {
+            let stop = self.run_end(at, false, end);
+            out.push((at - start) as usize..(stop - start) as usize);
+            at = self.run_end(stop, true, end);
+        }
+        out
     }
 
     /// Marks the texels that a triangle touches. UVs: u right, v up, origin at the lower left corner of the image.
