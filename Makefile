@@ -103,8 +103,9 @@ docs: build ## the pictures and the command line's reference in docs/
 	$(BIN)/python docs/make_cli.py
 	$(BIN)/python docs/pictures/make.py .cache/pictures
 
-bless: $(CACHE)/venv ## write the spec's test vectors anew; say why in the commit
+bless: $(CACHE)/venv ## write test vectors and golden pictures anew; look at them, and say why in the commit
 	$(BIN)/python spec/make_vectors.py
+	MAP3D_BLESS=1 cargo test --locked -q -p map3d-render --test golden
 
 clean: ## remove what was built
 	rm -rf $(VENV) $(CACHE) target viewer/node_modules viewer/dist python/map3d/viewer demo tests/.out

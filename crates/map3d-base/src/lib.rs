@@ -20,4 +20,4 @@ pub const DEPTH_UNITS_PER_M: f64 = 1024.0;
 /// Stored depth where there is nothing.
 pub const DEPTH_NOTHING: u32 = u32::MAX;
 /// Raised only when rendered bytes change.
-pub const RENDER_FORMAT: u32 = 1;
+pub const RENDER_FORMAT: u32 = 2;

@@ -11,13 +11,15 @@ use crate::visbuf::SUBTILE_PX;
 pub(crate) const REACH_STEPS: f64 = (1 << 24) as f64;
 /// Depth that a triangle may change by within a sub-tile, in units, on the fast path.
 const DEPTH_REACH: f64 = (1 << 20) as f64;
-/// Bias in units per rank.
+/// Bias in units per rank above that of walls and roofs.
 const BIAS_UNITS: f64 = 2.0;
+/// Rank of walls, roofs and all that is nothing else: most of a city, and never moved.
+const RANK_AT_REST: f64 = 3.0;
 const STEEPEST: f64 = 16.0;
 /// Depths in units for which no key overflows, whatever its bias.
 const DEPTHS: std::ops::Range<f64> = 1024.0..4_294_966_000.0;
 /// No bias is greater.
-pub(crate) const BIAS_MAX: i64 = 5 * 2 * 16;
+pub(crate) const BIAS_MAX: i64 = (5 - 3) * 2 * 16;
 
 const fn sample_lanes(axis: usize) -> [i32; 16] {
     let mut out = [0; 16];
@@ -132,15 +134,16 @@ impl Depth {
     }
 }
 
-/// `round(rank·b/max(|n·d|, 1/16))`; |n·d| follows from the gradient.
+/// `round((rank − 3)·b/max(|n·d|, 1/16))`; |n·d| follows from the gradient.
 #[inline(always)]
 pub(crate) fn bias(gradient: [f64; 2], rank: u8, pixel_units: f64) -> i64 {
-    if rank == 0 {
+    let above = f64::from(rank) - RANK_AT_REST;
+    if above == 0.0 {
         return 0;
     }
     let slope = [gradient[0] / pixel_units, gradient[1] / pixel_units];
     let steep = (1.0 + slope[0] * slope[0] + slope[1] * slope[1]).sqrt().min(STEEPEST);
-    (f64::from(rank) * BIAS_UNITS * steep + 0.5).floor() as i64
+    (above * BIAS_UNITS * steep + 0.5).floor() as i64
 }
 
 /// How a triangle's keys are found.

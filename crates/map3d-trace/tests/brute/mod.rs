@@ -92,7 +92,7 @@ impl<'a> Eye<'a> {
             corners,
             range: (d[0].min(d[1]).min(d[2]), d[0].max(d[1]).max(d[2])),
             normal: n.map(|c| if cosine > 0.0 { -c } else { c } / length(n)),
-            bias: (f64::from(record.rank) * 2.0 / cosine.abs().max(1.0 / 16.0)).round() as i64,
+            bias: ((f64::from(record.rank) - 3.0) * 2.0 / cosine.abs().max(1.0 / 16.0)).round() as i64,
             rank: record.rank,
             object_id: instance.map_or(chunk.objects()[record.object as usize].id, |i| i.object_id),
             source: record.source,
