@@ -21,13 +21,16 @@ const DEFAULT_DIFFUSE: [f32; 3] = [0.8; 3];
 pub struct Theme {
     pub asked: Option<String>,
     pub first: Option<String>,
+    /// The file has more than one.
+    pub several: bool,
 }
 
 impl Theme {
     /// Called with every theme in the order of the file.
     pub fn see(&mut self, name: &str) {
-        if self.first.is_none() {
-            self.first = Some(name.to_owned());
+        match &self.first {
+            None => self.first = Some(name.to_owned()),
+            Some(first) => self.several |= first != name,
         }
     }
 

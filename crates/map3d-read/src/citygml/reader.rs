@@ -132,10 +132,9 @@ fn asked_lod(options: &ReadOptions) -> Result<Option<u8>> {
 
 fn note_theme(theme: &Theme, log: &mut Log) {
     match (&theme.asked, &theme.first) {
-        (None, Some(first)) => log.note("appearance theme drawn", first.as_str()),
+        (None, Some(first)) if theme.several => log.note("appearance theme drawn", first.as_str()),
         (Some(asked), first) if first.as_ref() != Some(asked) => log.note("appearance theme drawn, if the document has it", asked.as_str()),
-        (Some(asked), _) => log.note("appearance theme drawn", asked.as_str()),
-        (None, None) => {}
+        _ => {}
     }
 }
 

@@ -28,7 +28,7 @@ pub struct Survey {
 /// Looks through the whole document once. A document that breaks off is surveyed up to there.
 pub fn survey(path: &Path, options: &ReadOptions, log: &mut Log) -> Result<Survey> {
     let io = |e| Error::storage(path, e);
-    let mut survey = Survey { theme: Theme { asked: options.theme.clone(), first: None }, ..Survey::default() };
+    let mut survey = Survey { theme: Theme { asked: options.theme.clone(), ..Theme::default() }, ..Survey::default() };
     let mut scanner = Scanner::new(open_xml(path)?);
     let mut local = Local::default();
     let (mut depth, mut any) = (0usize, false);

@@ -37,11 +37,11 @@ fn parse_corner(word: &[u8], counts: Counts) -> Option<Corner> {
     Some(Corner { position, uv: other(counts.uvs)?, normal: other(counts.normals)? })
 }
 
-/// 1 is the first, −1 the last so far; 0 and what lies before the first are no numbers.
+/// 1 is the first, −1 the last so far; 0 and what lies before the first become a number that no file reaches.
 fn index(part: &[u8], count: usize) -> Option<u32> {
     let n: i64 = std::str::from_utf8(part).ok()?.parse().ok()?;
     let at = if n < 0 { n + count as i64 } else { n - 1 };
-    u32::try_from(at).ok()
+    Some(u32::try_from(at).unwrap_or(u32::MAX))
 }
 
 #[cfg(test)]
@@ -59,11 +59,11 @@ mod tests {
             ("2/1/", corner(1, Some(0), None)),
             ("-1/-3/-2", corner(3, Some(0), Some(0))),
             ("9", corner(8, None, None)),
-            ("0", None),
-            ("-5", None),
+            ("0", corner(u32::MAX, None, None)),
+            ("-5", corner(u32::MAX, None, None)),
             ("a", None),
             ("1.5", None),
-            ("99999999999", None),
+            ("99999999999", corner(u32::MAX, None, None)),
         ] {
             assert_eq!(parse_corner(word.as_bytes(), counts), expected, "{word}");
         }
