@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Final
 from urllib.parse import unquote
 
-_IN_XML: Final = re.compile(rb"(?:imageURI|libraryObject)>\s*([^<>]{1,1024}?)\s*<")
-_IN_OBJ: Final = re.compile(rb"^mtllib[ \t]+(.+?)\s*$", re.MULTILINE)
-_IN_MTL: Final = re.compile(rb"^[ \t]*(?:map_\w+|bump|disp|decal|norm|refl)[ \t]+(.+?)\s*$", re.MULTILINE | re.IGNORECASE)
+# Each part is bounded or excludes what follows it, so that hostile files cost no more than their length.
+_IN_XML: Final = re.compile(rb"(?:imageURI|libraryObject)>([^<>]{1,4096})<")
+_IN_OBJ: Final = re.compile(rb"^mtllib[ \t]([^\r\n]{1,4096})", re.MULTILINE)
+_IN_MTL: Final = re.compile(rb"^[ \t]{0,64}(?:map_\w{1,16}|bump|disp|decal|norm|refl)[ \t]([^\r\n]{1,4096})", re.MULTILINE | re.IGNORECASE)
 
 
 def named_files(path: Path) -> set[Path]:
@@ -27,16 +28,16 @@ def _found(path: Path, pattern: re.Pattern[bytes], folders: Sequence[Path]) -> I
         if path.stat().st_size == 0:
             return
         with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as text:
-            names = {match[1] for match in pattern.finditer(text)}
+            names = {match[1].strip() for match in pattern.finditer(text)}
     for name in names:
         for folder in folders:
             yield from _inside(folder, name.decode("utf-8", "replace"))
 
 
 def _inside(folder: Path, text: str) -> Iterator[Path]:
-    """The name as it stands, decoded as a reference, or one of several words, of which the first may be options."""
+    """The name as it stands, decoded as a reference, or one of a few words, of which the first may be options."""
     plain = unescape(text).replace("\\", "/")
-    for name in {plain, unquote(plain), *plain.split()}:
+    for name in {plain, unquote(plain), *plain.split(maxsplit=16)}:
         try:
             path = (folder / name).resolve()
             if path.is_relative_to(folder) and path.is_file():
