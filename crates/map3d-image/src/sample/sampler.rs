@@ -51,7 +51,11 @@ struct Grid {
 /// Into [0, period); a period of 0 is none.
 #[inline(always)]
 fn at_home(t: i64, period: i64) -> i64 {
-    if period & (period - 1) == 0 { t & period.wrapping_sub(1) } else { t.rem_euclid(period) }
+    match period & (period - 1) == 0 {
+        true => t & period.wrapping_sub(1),
+        false if (0..period).contains(&t) => t,
+        false => t.rem_euclid(period),
+    }
 }
 
 impl Grid {
