@@ -9,7 +9,8 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from map3d.catalogue import Workspace
 from map3d.cli.options import Bytes, json_option, workspace_option
-from map3d.cli.output import print_json, print_table, progress_bar
+from map3d.cli.output import print_json, print_table
+from map3d.cli.progress import progress_bar
 from map3d.errors import BadRequest, Map3dError, UnknownFormat
 
 

@@ -7,7 +7,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, SpinnerColumn, TextColu
 from rich.table import Table
 
 from map3d.catalogue import Catalogue, Workspace
-from map3d.cli.output import console, progress_bar
+from map3d.cli.output import console
+from map3d.cli.progress import progress_bar
 
 
 def build_with_progress(

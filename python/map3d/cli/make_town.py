@@ -8,7 +8,8 @@ import click
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
 from map3d.cli.options import cores, json_option
-from map3d.cli.output import print_json, progress_bar, size_text
+from map3d.cli.output import print_json, size_text
+from map3d.cli.progress import progress_bar
 
 
 @click.command("make-town")

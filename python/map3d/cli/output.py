@@ -7,19 +7,12 @@ from typing import Any
 
 import click
 from rich.console import Console
-from rich.progress import Progress, ProgressColumn
 from rich.table import Table
 
 
 def console() -> Console:
     """For progress and notes: standard error, so that standard output can be piped."""
     return Console(stderr=True, highlight=False, soft_wrap=True)
-
-
-def progress_bar(*columns: ProgressColumn) -> Progress:
-    """On standard error while it is a terminal; gone when done. Nothing at all where nobody looks on."""
-    shown = console()
-    return Progress(*columns, console=shown, transient=True, disable=not shown.is_terminal)
 
 
 def print_json(value: Any) -> None:

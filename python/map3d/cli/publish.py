@@ -8,7 +8,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemaini
 
 from map3d.catalogue import Workspace
 from map3d.cli.options import json_option, workspace_option
-from map3d.cli.output import print_json, progress_bar, size_text
+from map3d.cli.output import print_json, size_text
+from map3d.cli.progress import progress_bar
 
 
 @click.command("publish")

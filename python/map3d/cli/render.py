@@ -10,7 +10,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from map3d.catalogue import Workspace
 from map3d.cli.building import build_with_progress
 from map3d.cli.options import json_option, max_memory_option, workers_option, workspace_option
-from map3d.cli.output import console, counts_text, print_json, progress_bar, size_text
+from map3d.cli.output import console, counts_text, print_json, size_text
+from map3d.cli.progress import progress_bar
 
 if TYPE_CHECKING:
     from map3d.jobs.run import Outcome, Plan, Run

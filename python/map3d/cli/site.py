@@ -10,7 +10,8 @@ from map3d.catalogue import Catalogue, Workspace
 from map3d.cli.building import build_with_progress
 from map3d.cli.create_rendering import around
 from map3d.cli.options import View, max_memory_option, workers_option, workspace_option
-from map3d.cli.output import progress_bar, size_text
+from map3d.cli.output import size_text
+from map3d.cli.progress import progress_bar
 from map3d.cli.publish import publish_with_progress
 from map3d.cli.render import render_with_progress, report
 from map3d.types import COLOR_FORMATS, ViewAngles

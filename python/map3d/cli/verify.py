@@ -7,7 +7,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemaini
 
 from map3d.catalogue import Workspace
 from map3d.cli.options import json_option, workspace_option
-from map3d.cli.output import counts_text, print_json, progress_bar
+from map3d.cli.output import counts_text, print_json
+from map3d.cli.progress import progress_bar
 
 
 @click.command("verify")

@@ -1,0 +1,32 @@
+"""What a log says of a long operation."""
+
+import io
+
+from rich.console import Console
+
+from map3d.cli.progress import LoggedProgress, line
+
+
+def test_a_line_tells_how_much_is_done_how_fast_and_what_is_left() -> None:
+    shown = io.StringIO()
+    with LoggedProgress(Console(file=shown, width=200), every_s=0.0) as bar:
+        task = bar.add_task("rendering", total=120, rate="10 base tiles/s")
+        bar.tasks[0].start_time = bar.get_time() - 20
+        bar.update(task, advance=40)
+    text = shown.getvalue()
+    assert text.startswith("rendering: 40 of 120, 2.0/s, 40 s left, 10 base tiles/s")
+    assert text.count("\n") == 1
+
+
+def test_short_operations_leave_no_line() -> None:
+    shown = io.StringIO()
+    with LoggedProgress(Console(file=shown)) as bar:
+        bar.update(bar.add_task("planning", total=3), completed=3)
+    assert shown.getvalue() == ""
+
+
+def test_what_has_no_number_tells_its_time() -> None:
+    bar = LoggedProgress(Console(file=io.StringIO()))
+    bar.add_task("1 of 3: town.gml", total=None)
+    bar.tasks[0].start_time = bar.get_time() - 75
+    assert line(bar.tasks[0]) == "1 of 3: town.gml: 75 s"
