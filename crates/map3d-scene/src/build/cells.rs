@@ -13,6 +13,8 @@ pub(super) const CELL_TRIANGLES: u64 = 262_144;
 const MAX_SIDE_M: f64 = 4096.0;
 /// Height of the slabs that a cell is cut into, for the same reason; slab 0 is centred on the local origin.
 const SLAB_M: f64 = 6144.0;
+/// Content so far outside the square is still taken into its outer cells.
+const BESIDE_M: f64 = 1024.0;
 /// Cells of this level are counted before triangles are sorted into them.
 const COUNT_LEVEL: u32 = 10;
 const MAX_LEVEL: u32 = 24;
@@ -31,6 +33,29 @@ impl Square {
         let side = f64::exp2(extent.log2().ceil()).max(64.0);
         let c = bounds.center();
         Self([(c[0] - side / 2.0).floor(), (c[1] - side / 2.0).floor(), side])
+    }
+
+    /// This square, doubled until content lies in it or just beside it; and its cells as cells of the larger one.
+    pub fn grown(self, bounds: &Box3, cells: &[Cell]) -> (Self, Vec<Cell>) {
+        let (mut square, mut cells) = (self, cells.to_vec());
+        while !bounds.is_empty() && square.is_left_by(bounds) {
+            let Self([x0, y0, side]) = square;
+            let (west, south) = (bounds.lo[0] < x0, bounds.lo[1] < y0);
+            cells.iter_mut().for_each(|[level, x, y]| {
+                (*x, *y) = (*x + (u32::from(west) << *level), *y + (u32::from(south) << *level));
+                *level += 1;
+            });
+            square = Self([if west { x0 - side } else { x0 }, if south { y0 - side } else { y0 }, side * 2.0]);
+            cells.retain(|c| c[0] <= MAX_LEVEL);
+        }
+        (square, cells)
+    }
+
+    /// A little beside the square the nearest cells still hold what lies there.
+    fn is_left_by(&self, bounds: &Box3) -> bool {
+        let Self([x0, y0, side]) = *self;
+        let room = (side / 4.0).min(BESIDE_M);
+        bounds.lo[0] < x0 - room || bounds.lo[1] < y0 - room || bounds.hi[0] > x0 + side + room || bounds.hi[1] > y0 + side + room
     }
 
     /// The cell of a level that holds a point; outside the square the nearest.
@@ -224,6 +249,27 @@ mod tests {
         let many: Vec<_> = (0..CELL_TRIANGLES + 1).map(|k| at(0.001 + 0.04 * (k % 2) as f64, 0.001)).collect();
         let (_, cells) = grow(Square([0.0, 0.0, 64.0]), &[], &many);
         assert!(cells.len() == 2 && cells.iter().all(|c| c[0] == 11), "{cells:?}");
+    }
+
+    #[test]
+    fn a_square_grows_towards_content_and_its_cells_stay_where_they_are() {
+        let square = Square([-512.0, 256.0, 1024.0]);
+        let cells = [[0, 0, 0], [3, 5, 2], [10, 1023, 0]];
+        for (lo, hi) in [([0.0, 300.0], [400.0, 800.0]), ([-700.0, 300.0], [400.0, 800.0])] {
+            let bounds = Box3 { lo: [lo[0], lo[1], 0.0], hi: [hi[0], hi[1], 9.0] };
+            assert_eq!(square.grown(&bounds, &cells), (square, cells.to_vec()), "inside, or just beside");
+        }
+        for far in [[90_000.0, 0.0], [0.0, -70_000.0], [-60_000.0, 50_000.0], [5_000.0, 9_000.0]] {
+            let mut bounds = Box3 { lo: [-500.0, 260.0, 0.0], hi: [500.0, 1000.0, 9.0] };
+            bounds.add_point([far[0], far[1], 0.0]);
+            let (larger, moved) = square.grown(&bounds, &cells);
+            assert!(!larger.is_left_by(&bounds), "{larger:?}");
+            for (old, new) in cells.iter().zip(&moved) {
+                assert_eq!(square.center(*old), larger.center(*new));
+                assert_eq!(square.side(old[0]), larger.side(new[0]));
+            }
+        }
+        assert_eq!(square.grown(&Box3 { lo: [0.0; 3], hi: [1e9, 1e9, 0.0] }, &[[10, 1, 1]]).1, Vec::<Cell>::new(), "too small to be pinned");
     }
 
     #[test]

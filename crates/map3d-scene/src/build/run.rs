@@ -90,9 +90,9 @@ impl Build<'_> {
     fn run(&mut self, previous: Option<SceneIndex>, ground_material: u32) -> Result<SceneIndex> {
         let level = self.measure()?;
         let ground = self.ground(&level, ground_material)?;
-        let pinned = previous.as_ref().map_or(&[][..], |p| &p.cells);
-        let square = previous.as_ref().map_or_else(|| Square::around(&with_plane(&level, &ground)), |p| Square(p.square));
-        let mut tree = Quadtree::new(square, pinned);
+        let bounds = with_plane(&level, &ground);
+        let (square, pinned) = previous.map_or_else(|| (Square::around(&bounds), Vec::new()), |p| Square(p.square).grown(&bounds, &p.cells));
+        let mut tree = Quadtree::new(square, &pinned);
         self.stream("count", &mut |t| {
             tree.count(t);
             Ok(())
