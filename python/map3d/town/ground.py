@@ -7,6 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from map3d.town.seeds import rng
 
+DAM_HALF_M = 6.6
+"""Half the width of the dam that carries a road over the river, with its slopes."""
 WAVES = ((900.0, 5.0), (420.0, 2.2), (190.0, 0.8), (75.0, 0.16))
 
 
@@ -38,7 +40,7 @@ class Ground:
         free = np.ones(x.shape)
         for cx, cy, ux, uy in self.crossings:
             aside, ahead = np.abs((x - cx) * uy - (y - cy) * ux), np.abs((x - cx) * ux + (y - cy) * uy)
-            free = np.where(ahead < 90, np.minimum(free, np.clip((aside - 5.0) / 1.5, 0, 1)), free)
+            free = np.where(ahead < 90, np.minimum(free, np.clip((aside - DAM_HALF_M + 1.6) / 1.5, 0, 1)), free)
         return np.asarray(free)
 
     def river_distance(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:

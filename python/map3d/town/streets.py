@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from map3d.town.ground import DAM_HALF_M
 from map3d.town.plane import band, circle, rectangle, unit
 from map3d.town.seeds import rng
 from map3d.town.sketch import Sketch
@@ -31,10 +32,11 @@ def lay_streets(sketch: Sketch, frame: "Frame", rings: Rings, reach_m: float, pl
 
 def _main_road(sketch: Sketch, frame: "Frame", angle: float, old: float, reach_m: float, rings: Rings) -> None:
     direction = np.array([np.cos(angle), np.sin(angle)])
-    line = frame.bend(np.arange(old, reach_m * 1.6 + 240, 8.0)[:, None] * direction)
+    start = _lay_dam(sketch, frame, direction, old)
+    line = frame.bend(np.arange(start, reach_m * 1.6 + 240, 8.0)[:, None] * direction)
     for quad in band(line, 9.0):
         sketch.patch(quad, "asphalt", "bridge")
-    for number, quad in enumerate(band(frame.bend(np.arange(old + 3, reach_m * 1.6 + 240, 3.0)[:, None] * direction), 0.16)):
+    for number, quad in enumerate(band(frame.bend(np.arange(start + 3, reach_m * 1.6 + 240, 3.0)[:, None] * direction), 0.16)):
         if number % 3 == 0:
             sketch.patch(quad, "mark", "mark")
     source = rng(frame.seed, "alley", int(angle * 1000))
@@ -48,6 +50,24 @@ def _main_road(sketch: Sketch, frame: "Frame", angle: float, old: float, reach_m
     for inner, _, _ in rings:
         if inner >= old:
             _zebra(sketch, frame, direction, inner + 8.5)
+
+
+def _lay_dam(sketch: Sketch, frame: "Frame", direction: Points, old: float) -> float:
+    """Masonry where a main road crosses the river; returns where its carriageway starts: at the old town, or before the river."""
+    crossing = _crossing_m(frame, direction)
+    if crossing is None:
+        return old
+    reach = (frame.river_half_m + 8.0) / abs(direction[1])
+    for quad in band(frame.bend(np.linspace(crossing - reach, crossing + reach, 9)[:, None] * direction), 2 * DAM_HALF_M):
+        sketch.patch(quad, "concrete", "bridge")
+    return float(min(old, crossing - reach))
+
+
+def _crossing_m(frame: "Frame", direction: Points) -> float | None:
+    """How far from the middle a main road crosses the river, if it does."""
+    if direction[1] * frame.river_y <= 0 or abs(direction[1]) < 0.2:
+        return None
+    return float(frame.river_y / direction[1])
 
 
 def near_river(frame: "Frame", plain: Points) -> bool:
@@ -89,9 +109,10 @@ def river_crossings(frame: "Frame") -> tuple[tuple[float, float, float, float], 
     found = []
     for angle in frame.roads:
         direction = np.array([np.cos(angle), np.sin(angle)])
-        if direction[1] * frame.river_y <= 0 or abs(direction[1]) < 0.2:
+        crossing = _crossing_m(frame, direction)
+        if crossing is None:
             continue
-        plain = direction * (frame.river_y / direction[1])
+        plain = direction * crossing
         here, ahead = frame.bend(np.array([plain, plain + direction]))
         along = unit(ahead - here)
         found.append((float(here[0]), float(here[1]), float(along[0]), float(along[1])))
