@@ -1,13 +1,10 @@
 // Opens a served rendering at the places of views.json and takes a picture of each. Arguments: playwright-core's folder, address of the page, views.json, folder for the pictures.
 import { readFile } from "node:fs/promises";
+import { launch } from "../../tests/whole/chromium.mjs";
 
 const [library, page, list, folder] = process.argv.slice(2);
-const { chromium } = await import(`${library}/index.mjs`);
 const { origin } = await (await fetch(`${page}rendering.json`.replace("/view/", "/tiles/"))).json();
-const browser = await chromium.launch({
-  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
-  args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"],
-});
+const browser = await launch(library);
 
 /** Waits until pictures have come, none is on its way, and nothing has moved for a while. */
 async function quiet(tab, act) {

@@ -1,35 +1,29 @@
 """Bad input through the whole command line: what is said, what it costs, and that all else arrives and is rendered."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from map3d.catalogue import Workspace
-from map3d.cli import app
 from map3d.registry import Registry
 from map3d.tiles.sqlite_store import SqliteTileStore
 from tests.cli.bad_files import BAD_LINES, DAMAGED_IMAGES, WHOLE_FILES, citygml, elevation, house_with, jpeg, textured, truncated
-from tests.cli.towns import house
+from tests.cli.towns import Run, house
 
 core = pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
 pytestmark = pytest.mark.whole
 
-Run = Callable[..., tuple[int, str, str]]
-
 
 @pytest.fixture
-def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Run:
-    monkeypatch.setenv("MAP3D_WORKSPACE", str(tmp_path / "workspace"))
-    monkeypatch.chdir(tmp_path)
+def run(run: Run) -> Run:
+    """Whatever comes in, no traceback comes out. The scene `town` is there."""
 
     def call(*arguments: str) -> tuple[int, str, str]:
-        status = app.run(list(arguments))
-        captured = capfd.readouterr()
-        assert "Traceback" not in captured.out + captured.err
-        return status, captured.out, captured.err
+        status, out, err = run(*arguments)
+        assert "Traceback" not in out + err
+        return status, out, err
 
     call("create-scene", "town")
     return call

@@ -1,32 +1,15 @@
 """What every verb does before any scene is built: help, refusals, listings."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from map3d import __version__
-from map3d.cli import app
 from map3d.cli.app import VERBS
 from map3d.cli.options import Bytes, View
 from map3d.types import ViewAngles
-
-Run = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
-    """Runs the command line in an own workspace; (status, output, errors)."""
-    monkeypatch.setenv("MAP3D_WORKSPACE", str(tmp_path / "workspace"))
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments: str) -> tuple[int, str, str]:
-        status = app.run(list(arguments))
-        captured = capsys.readouterr()
-        return status, captured.out, captured.err
-
-    return call
+from tests.cli.towns import Run
 
 
 @pytest.mark.parametrize("verb", sorted(VERBS))
@@ -147,7 +130,7 @@ def test_views() -> None:
     assert View().convert("90", None, None) == ViewAngles(90.0, 45.0)
 
 
-def test_old_names_are_the_same_verbs(run: Run, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_old_names_are_the_same_verbs(run: Run, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     from map3d.cli import scripts
 
     for function, verb in (
@@ -159,4 +142,4 @@ def test_old_names_are_the_same_verbs(run: Run, monkeypatch: pytest.MonkeyPatch,
         with pytest.raises(SystemExit) as ended:
             function()
         assert ended.value.code == 0
-        assert f"map3d {verb}" in capsys.readouterr().out
+        assert f"map3d {verb}" in capfd.readouterr().out

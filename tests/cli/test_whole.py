@@ -9,36 +9,21 @@ import sqlite3
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from map3d.catalogue import State, Workspace
-from map3d.cli import app
 from map3d.registry import Registry
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.sqlite_store import SqliteTileStore
-from tests.cli.towns import house, write_town
+from tests.cli.towns import Run, house, write_town
 
 core = pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
 pytestmark = pytest.mark.whole
 
-Run = Callable[..., tuple[int, str, str]]
 VIEWS = ("--view", "0/45", "--view", "90/30")
-
-
-@pytest.fixture
-def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Run:
-    monkeypatch.setenv("MAP3D_WORKSPACE", str(tmp_path / "workspace"))
-
-    def call(*arguments: str) -> tuple[int, str, str]:
-        status = app.run(list(arguments))
-        captured = capfd.readouterr()
-        return status, captured.out, captured.err
-
-    return call
 
 
 @pytest.fixture

@@ -1,6 +1,10 @@
-"""A small town of boxes as OBJ files."""
+"""A small town of boxes as OBJ files, and what runs a command line on it."""
 
+from collections.abc import Callable
 from pathlib import Path
+
+Run = Callable[..., tuple[int, str, str]]
+"""(status, output, errors) of a command line's words."""
 
 
 def house(x: float, y: float, height: float) -> str:

@@ -4,13 +4,18 @@ const [folder, given] = process.argv.slice(2);
 
 const ARGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"];
 
+/** Chromium by playwright-core in a folder; `hosts`: names → addresses with ports. */
+export async function launch(library, hosts = {}) {
+  const { chromium } = await import(`${library}/index.mjs`);
+  const rules = Object.entries(hosts).map(([name, address]) => `MAP ${name} ${address}`);
+  const args = rules.length > 0 ? [...ARGS, `--host-resolver-rules=${rules.join(",")}`] : ARGS;
+  return chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args });
+}
+
 /** `act(page, asked)`; `asked.hosts`: names → addresses with ports; `asked.size`: of the window. */
 export async function look(act) {
   const asked = JSON.parse(given);
-  const { chromium } = await import(`${folder}/index.mjs`);
-  const rules = Object.entries(asked.hosts ?? {}).map(([name, address]) => `MAP ${name} ${address}`);
-  const args = rules.length > 0 ? [...ARGS, `--host-resolver-rules=${rules.join(",")}`] : ARGS;
-  const browser = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args });
+  const browser = await launch(folder, asked.hosts);
   try {
     const [width, height] = asked.size ?? [1000, 700];
     const page = await (await browser.newContext({ viewport: { width, height }, reducedMotion: "reduce" })).newPage();

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -68,7 +69,7 @@ def stopped_after(files: Path, root: Path, blocks: int, number: signal.Signals) 
 def let_leases_expire(root: Path) -> None:
     """As if a minute went by: what was killed cannot give its blocks back."""
     catalogue = Workspace(root / "workspace").open_catalogue()
-    with catalogue._database.transaction() as db:  # type: ignore[attr-defined]
+    with catalogue._database.transaction() as db:
         db.execute("UPDATE job SET expires = expires - 3600 WHERE state = 'leased'")
     catalogue.close()
 
@@ -92,7 +93,7 @@ def test_a_site_that_was_stopped_and_killed_goes_on_and_has_the_bytes_of_an_undi
     assert [name for name in want | got if want.get(name) != got.get(name)] == []
 
 
-def visit(folder: Path, view: CoreView, known: Known, label: str, name: str) -> dict:  # type: ignore[type-arg]
+def visit(folder: Path, view: CoreView, known: Known, label: str, name: str) -> dict[str, Any]:
     with static_host(folder) as address:
         return browse(
             "published.mjs",
