@@ -12,6 +12,7 @@ from PIL import Image
 from map3d.town.errors import TownError
 from map3d.town.model import Face, Paint
 from map3d.town.paint import painted
+from map3d.town.shades import Pixels, packed
 
 GUTTER_PX = 3
 MAGENTA = (255, 0, 255)
@@ -33,13 +34,9 @@ class Atlas:
         """Texture coordinates of the face's rings, (0, 0) the lower left corner of the atlas."""
         assert isinstance(face.paint, Paint)
         x, y, _, _ = self.areas[id(face.paint)]
-        left, top = x + GUTTER_PX, y + GUTTER_PX
-        out = []
-        for st in face.st:
-            px = left + st[:, 0] * self.px_per_m
-            py = top + (face.paint.height_m - st[:, 1]) * self.px_per_m
-            out.append(np.stack([px / self.side_px, 1 - py / self.side_px], axis=1))
-        return out
+        scale = self.px_per_m / self.side_px
+        shift = np.array([(x + GUTTER_PX) / self.side_px, 1 - (y + GUTTER_PX) / self.side_px - face.paint.height_m * scale])
+        return [st * scale + shift for st in face.st]
 
 
 def pack(paints: Sequence[Paint], side_px: int) -> Atlas:
@@ -91,15 +88,13 @@ def _pixels(length_m: float, scale: float) -> int:
 
 
 @lru_cache(maxsize=2)
-def blank(side_px: int) -> NDArray[np.uint8]:
+def blank(side_px: int) -> Pixels:
     """An atlas without paints."""
-    picture = np.empty((side_px, side_px, 3), dtype=np.uint8)
-    picture[:] = MAGENTA
-    return picture
+    return np.full((side_px, side_px), packed(MAGENTA))
 
 
-def atlas_picture(atlas: Atlas, key: int) -> NDArray[np.uint8]:
-    """(side, side, 3): all paints in their places on magenta; the gutters repeat the paint's edge."""
+def atlas_picture(atlas: Atlas, key: int) -> Pixels:
+    """(side, side) packed: all paints in their places on magenta; the gutters repeat the paint's edge."""
     picture = blank(atlas.side_px).copy()
     g = GUTTER_PX
     for number, paint in enumerate(atlas.paints):
@@ -112,10 +107,11 @@ def atlas_picture(atlas: Atlas, key: int) -> NDArray[np.uint8]:
     return picture
 
 
-def jpeg(picture: NDArray[np.uint8], quality: int = QUALITY) -> bytes:
-    """The picture as JPEG without chroma subsampling, so that magenta does not bleed far."""
+def jpeg(picture: Pixels, quality: int = QUALITY) -> bytes:
+    """A packed picture as JPEG without chroma subsampling, so that magenta does not bleed far."""
+    height, width = picture.shape
     buffer = io.BytesIO()
-    Image.fromarray(picture).save(buffer, "JPEG", quality=quality, subsampling=0)
+    Image.frombuffer("RGBX", (width, height), picture, "raw", "RGBX", 0, 1).save(buffer, "JPEG", quality=quality, subsampling=0)
     return buffer.getvalue()
 
 

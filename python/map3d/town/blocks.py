@@ -192,15 +192,15 @@ def parcels(outline: Points, target_m2: float, rng: np.random.Generator) -> list
 
 def street_edge(parcel: Points, outline: Points) -> int:
     """The longest edge of the parcel that lies on the block's outline, or -1."""
-    best, best_length = -1, 6.0
-    for i in range(len(parcel)):
-        a, b = parcel[i], parcel[(i + 1) % len(parcel)]
-        middle, length = (a + b) / 2, float(np.hypot(*(b - a)))
-        ahead = np.roll(outline, -1, axis=0) - outline
-        normals = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1) / np.hypot(ahead[:, 0], ahead[:, 1])[:, None]
-        if np.abs(np.sum((middle - outline) * normals, axis=1)).min() < 0.1 and length > best_length:
-            best, best_length = i, length
-    return best
+    after = np.concatenate([parcel[1:], parcel[:1]])
+    middle, length = (parcel + after) / 2, np.hypot(*(after - parcel).T)
+    ahead = np.concatenate([outline[1:], outline[:1]]) - outline
+    ahead /= np.hypot(ahead[:, 0], ahead[:, 1])[:, None]
+    away = middle[:, None] - outline
+    beside = np.abs(away[..., 1] * ahead[:, 0] - away[..., 0] * ahead[:, 1]).min(axis=1)
+    lengths = np.where(beside < 0.1, length, 0.0)
+    best = int(np.argmax(lengths))
+    return best if lengths[best] > 6.0 else -1
 
 
 def fill_villas(sketch: Sketch, block: Block) -> None:

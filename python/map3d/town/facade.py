@@ -1,5 +1,7 @@
 """The design of facades: which floors, windows, doors and shops a wall has, before anything is painted."""
 
+import itertools
+
 import numpy as np
 
 from map3d.town.model import Opening, Paint, Plain, Wrap
@@ -122,10 +124,16 @@ def fits(opening: Opening, outline: Outline, width_m: float) -> bool:
     a, b = opening.left_m, opening.left_m + opening.width_m
     if a < 0.2 or b > width_m - 0.2 or opening.low_m <= 0.05:
         return False
-    s, t = [p[0] for p in outline], [p[1] for p in outline]
     inner = [q for p, q in outline if a - 0.2 < p < b + 0.2]
-    tops = [float(np.interp(x, s, t)) for x in (a - 0.2, b + 0.2)] + inner
-    return min(tops) >= opening.low_m + opening.height_m + 0.25
+    return min(height_at(outline, a - 0.2), height_at(outline, b + 0.2), *inner) >= opening.low_m + opening.height_m + 0.25
+
+
+def height_at(outline: Outline, s: float) -> float:
+    """The height of an outline that runs from left to right, linear between its points, level beyond them."""
+    for (a, low), (b, high) in itertools.pairwise(outline):
+        if s < b:
+            return low if s <= a else low + (high - low) * (s - a) / (b - a)
+    return outline[-1][1]
 
 
 def facade_style(look: str, rng: np.random.Generator) -> tuple[frozenset[str], tuple[Color, ...]]:

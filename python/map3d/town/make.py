@@ -199,7 +199,7 @@ def do_ortho(site: Site, number: int) -> None:
     side_px = int(np.ceil(side_m / spec.ortho_pixel_m(side_m)))
     if site.missing("terrain/ortho.tif"):
         with site.place("terrain/ortho.tif") as place:
-            write_ortho(place.path, site.plan, side_m / side_px, side_px, spec.crs, spec.east_m, spec.north_m)
+            write_ortho(place.path, site.plan, side_m / side_px, side_px, spec.projected_epsg, spec.east_m, spec.north_m)
 
 
 def do_dem(site: Site, number: int) -> None:

@@ -1,9 +1,6 @@
 """Materials without texture, and the repeating textures that all buildings share."""
 
-import numpy as np
-from numpy.typing import NDArray
-
-from map3d.town.paint import blended, colored, courses, grain, repeated
+from map3d.town.shades import Pixels, blended, colored, courses, grain, repeated
 
 WRAP_PX = 256
 DIFFUSE: dict[str, tuple[float, float, float]] = {
@@ -13,8 +10,8 @@ DIFFUSE: dict[str, tuple[float, float, float]] = {
 }  # fmt: skip
 
 
-def wrap_picture(name: str) -> NDArray[np.uint8]:
-    """(256, 256, 3): a picture that repeats without a seam; it covers about 4 m of wall (2 m of a chimney)."""
+def wrap_picture(name: str) -> Pixels:
+    """(256, 256) packed: a picture that repeats without a seam; it covers about 4 m of wall (2 m of a chimney)."""
     px_per_m = WRAP_PX / 4.0
     base = grain(1024, 1024, 0)[::4, ::4]
     if name == "brick_red":

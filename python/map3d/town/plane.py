@@ -1,27 +1,34 @@
 """Polygons in the plane: (n, 2) float64, counter-clockwise, metres, convex unless said otherwise."""
 
-import itertools
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 Points = NDArray[np.float64]
+SQUARE = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
 
 
 def area(polygon: Points) -> float:
     """Signed area, positive when counter-clockwise; any simple polygon."""
-    x, y = polygon[:, 0], polygon[:, 1]
-    return float(0.5 * np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+    ahead = _ahead(polygon)
+    return float(0.5 * np.sum(polygon[:, 0] * ahead[:, 1] - polygon[:, 1] * ahead[:, 0]))
+
+
+def _ahead(polygon: Points) -> Points:
+    """Each vertex's successor."""
+    return np.concatenate([polygon[1:], polygon[:1]])
 
 
 def unit(vector: Points) -> Points:
     """The vector scaled to length 1."""
-    return np.asarray(vector / np.hypot(*vector))
+    return np.asarray(vector / math.hypot(*vector.tolist()))
 
 
 def left(vector: Points) -> Points:
     """The vector turned by 90° counter-clockwise."""
-    return np.array([-vector[1], vector[0]])
+    x, y = vector.tolist()
+    return np.array([-y, x])
 
 
 def without_short_edges(polygon: Points, least_m: float) -> Points:
@@ -66,9 +73,9 @@ def inset(polygon: Points, distance_m: float | Points) -> Points:
 
 def offset(polygon: Points, distance_m: float) -> Points:
     """Each edge moved inward (outward when negative) and met with its neighbours: vertex i stays vertex i."""
-    forward = np.roll(polygon, -1, axis=0) - polygon
+    forward = _ahead(polygon) - polygon
     forward = forward / np.hypot(forward[:, 0], forward[:, 1])[:, None]
-    back = np.roll(forward, 1, axis=0)
+    back = np.concatenate([forward[-1:], forward[:-1]])
     normal, before = (np.stack([-d[:, 1], d[:, 0]], axis=1) for d in (forward, back))
     shared = 1 + np.sum(normal * before, axis=1)
     return np.asarray(polygon + (normal + before) * (distance_m / shared)[:, None])
@@ -76,25 +83,22 @@ def offset(polygon: Points, distance_m: float) -> Points:
 
 def keeps_its_edges(polygon: Points, moved: Points, least_m: float) -> bool:
     """Whether every edge of `moved = offset(polygon, …)` still runs the same way and is at least `least_m` long."""
-    before, after = (np.roll(p, -1, axis=0) - p for p in (polygon, moved))
+    before, after = (_ahead(p) - p for p in (polygon, moved))
     lengths = np.hypot(before[:, 0], before[:, 1])
     return bool(np.all(np.sum(before * after, axis=1) / lengths >= least_m))
 
 
 def contains(polygon: Points, points: Points, margin_m: float = 0.0) -> NDArray[np.bool_]:
     """Which points lie inside the convex polygon, at least `margin_m` from its edges."""
-    inside = np.ones(len(points), dtype=bool)
-    for i in range(len(polygon)):
-        a, b = polygon[i], polygon[(i + 1) % len(polygon)]
-        inside &= (points - a) @ left(unit(b - a)) >= margin_m
-    return inside
+    edge = _ahead(polygon) - polygon
+    edge /= np.hypot(edge[:, 0], edge[:, 1])[:, None]
+    away = points[:, None] - polygon
+    return np.asarray((away[..., 1] * edge[:, 0] - away[..., 0] * edge[:, 1] >= margin_m).all(axis=1))
 
 
 def rectangle(centre: Points, along: Points, length_m: float, width_m: float) -> Points:
     """Counter-clockwise; the first edge runs along `along` on the right-hand side."""
-    u = along * (length_m / 2)
-    v = left(along) * (width_m / 2)
-    return np.array([centre - u - v, centre + u - v, centre + u + v, centre - u + v])
+    return np.asarray(centre + SQUARE @ np.array([along * (length_m / 2), left(along) * (width_m / 2)]))
 
 
 def circle(centre: Points, radius_m: float, corners: int, start_rad: float = 0.0) -> Points:
@@ -105,13 +109,12 @@ def circle(centre: Points, radius_m: float, corners: int, start_rad: float = 0.0
 
 def band(line: Points, width_m: float) -> list[Points]:
     """Quadrilaterals that widen each piece of a polyline to `width_m`."""
-    quads = []
-    for a, b in itertools.pairwise(line):
-        if np.hypot(*(b - a)) < 1e-6:
-            continue
-        side = left(unit(b - a)) * (width_m / 2)
-        quads.append(np.array([a - side, b - side, b + side, a + side]))
-    return quads
+    a, b = line[:-1], line[1:]
+    length = np.hypot(*(b - a).T)
+    a, b, length = a[length >= 1e-6], b[length >= 1e-6], length[length >= 1e-6]
+    step = (b - a) / length[:, None] * (width_m / 2)
+    side = np.stack([-step[:, 1], step[:, 0]], axis=1)
+    return list(np.stack([a - side, b - side, b + side, a + side], axis=1))
 
 
 def split(polygon: Points, at: Points, normal: Points) -> tuple[Points, Points]:

@@ -1,5 +1,6 @@
 """The closed shell of a part: walls, roof and ground polygons whose edges all meet, and the eaves beyond it."""
 
+import math
 from typing import Protocol
 
 import numpy as np
@@ -9,11 +10,14 @@ from map3d.town.model import GROUND, ROOF, WALL, Body, Face, Opening, Paint, Par
 
 Points = NDArray[np.float64]
 Outline = list[tuple[float, float]]
+Vector = tuple[float, float, float]
 DECIMALS = 4
 EAVES_THICK_M = 0.16
 VERGE_M = 0.28
 REVEAL_M = 0.16
 MARGIN_M = 0.1
+AWAY = np.array([(0.0, -0.06), (0.06, 0.0), (0.0, 0.06), (-0.06, 0.0)])
+NEXT = [1, 2, 3, 0]
 
 
 class Dress(Protocol):
@@ -125,17 +129,14 @@ def _pierce(surface: Surface, opening: Opening, origin: Points, along: Points, d
     low, high = opening.low_m, opening.low_m + opening.height_m
     st = np.array([(a, low), (b, low), (b, high), (a, high)])
     inward = np.array([-along[1], along[0], 0.0])
-    outer = np.array([[*(origin[:2] + along[:2] * s), origin[2] + t] for s, t in st]).round(DECIMALS)
+    outer = (origin + np.column_stack([st[:, :1] * along[:2], st[:, 1]])).round(DECIMALS)
     inner = (outer + inward * REVEAL_M).round(DECIMALS)
     wall.rings.append(outer[::-1])
     wall.st.append(st[::-1])
     kind = "Door" if opening.kind in ("door", "gate", "shop_door") else "Window"
     surface.openings.append(Surface(kind, [Face([inner], [st], wall.paint)]))
-    for i in range(4):
-        j = (i + 1) % 4
-        away = np.array([(0.0, -0.06), (0.06, 0.0), (0.0, 0.06), (-0.06, 0.0)])[i]
-        strip = np.array([st[i], st[j], st[j] + away, st[i] + away])
-        surface.faces.append(Face([np.array([outer[i], outer[j], inner[j], inner[i]])], [strip], wall.paint))
+    grid, strips = np.concatenate([outer, inner]), np.concatenate([st, st + AWAY, st[NEXT] + AWAY])
+    surface.faces += [Face([grid[[i, j, j + 4, i + 4]]], [strips[[i, j, i + 8, i + 4]]], wall.paint) for i, j in enumerate(NEXT)]
 
 
 def _front_and_back(frame: Frame, ground_z: float, dress: Dress) -> list[Surface]:
@@ -217,39 +218,50 @@ def roof_surface(loop: list[Points], dress: Dress) -> Surface:
     ring = distinct(loop)
     if len(ring) < 3:
         return Surface(ROOF, [])
-    normal = newell(ring)
-    longest = max(range(len(ring)), key=lambda j: float(np.hypot(*(ring[(j + 1) % len(ring)] - ring[j])[:2])))
-    first = ring[1] - ring[0] if np.hypot(*(ring[1] - ring[0])[:2]) > 0.3 else ring[(longest + 1) % len(ring)] - ring[longest]
-    along = first / np.linalg.norm(first)
-    if abs(normal[2]) > 1e-6 and abs(along[2]) > 1e-3:
-        along = np.array([-normal[1], normal[0], 0.0]) / np.hypot(normal[0], normal[1])
-    up = np.cross(normal, along)
-    st = np.stack([(ring - ring[0]) @ along, (ring - ring[0]) @ up], axis=1)
+    nx, ny, nz = normal = newell(ring)
+    along, up = _paint_axes(ring, normal)
+    st = (ring - ring[0]) @ np.array([along, up]).T
     st -= st.min(axis=0)
-    slope = float(np.hypot(normal[0], normal[1]) / max(abs(normal[2]), 1e-9))
-    upright = abs(normal[2]) < 1e-6
-    width, height = (float(v) for v in st.max(axis=0))
+    slope = math.hypot(nx, ny) / max(abs(nz), 1e-9)
+    upright = abs(nz) < 1e-6
+    width, height = st.max(axis=0).tolist()
     paint = dress.wall("blank", width, [(0.0, height), (width, height)], 0.0) if upright else dress.roof(width, height, slope)
     return Surface(WALL if upright else ROOF, [Face([ring], [st], paint)])
 
 
+def _paint_axes(ring: Points, normal: Vector) -> tuple[Vector, Vector]:
+    """The directions of a roof's paint: along its first edge, or the longest when that is short, kept level; and up the slope."""
+    edges = [tuple(step) for step in (np.concatenate([ring[1:], ring[:1]]) - ring).tolist()]
+    x, y, z = edges[0] if math.hypot(*edges[0][:2]) > 0.3 else _longest(edges)
+    length = math.sqrt(x * x + y * y + z * z)
+    x, y, z = x / length, y / length, z / length
+    nx, ny, nz = normal
+    if abs(nz) > 1e-6 and abs(z) > 1e-3:
+        level = math.hypot(nx, ny)
+        x, y, z = -ny / level, nx / level, 0.0
+    return (x, y, z), (ny * z - nz * y, nz * x - nx * z, nx * y - ny * x)
+
+
+def _longest(edges: list[Vector]) -> Vector:
+    """The longest edge as seen from above."""
+    return max(edges, key=lambda edge: math.hypot(edge[0], edge[1]))
+
+
 def distinct(loop: list[Points]) -> Points:
     """The ring without points that repeat their predecessor."""
-    keep = [p for j, p in enumerate(loop) if np.abs(p - loop[j - 1]).max() > 1e-3]
-    return np.array(keep).reshape(-1, 3)
+    ring = np.array(loop).reshape(-1, 3)
+    moved = np.abs(ring - np.concatenate([ring[-1:], ring[:-1]])).max(axis=1) > 1e-3
+    return ring if moved.all() else ring[moved]
 
 
-def newell(ring: Points) -> Points:
+def newell(ring: Points) -> Vector:
     """The unit normal of a flat ring."""
-    ahead = np.roll(ring, -1, axis=0)
-    normal = np.array(
-        [
-            np.sum((ring[:, 1] - ahead[:, 1]) * (ring[:, 2] + ahead[:, 2])),
-            np.sum((ring[:, 2] - ahead[:, 2]) * (ring[:, 0] + ahead[:, 0])),
-            np.sum((ring[:, 0] - ahead[:, 0]) * (ring[:, 1] + ahead[:, 1])),
-        ]
-    )
-    return np.asarray(normal / np.linalg.norm(normal))
+    nx = ny = nz = 0.0
+    rows = ring.tolist()
+    for (ax, ay, az), (bx, by, bz) in zip(rows, rows[1:] + rows[:1], strict=True):
+        nx, ny, nz = nx + (ay - by) * (az + bz), ny + (az - bz) * (ax + bx), nz + (ax - bx) * (ay + by)
+    length = math.sqrt(nx * nx + ny * ny + nz * nz)
+    return nx / length, ny / length, nz / length
 
 
 def _cap(frame: Frame, dress: Dress) -> Surface:

@@ -3,6 +3,8 @@
 from collections.abc import Collection
 from dataclasses import asdict, dataclass, field
 
+from pyproj import CRS
+
 from map3d.town.errors import TownError
 
 STYLES = ("town", "roman")
@@ -85,6 +87,16 @@ class TownSpec:
     @property
     def srs_name(self) -> str:
         return f"urn:ogc:def:crs:EPSG::{self.crs[5:]}"
+
+    @property
+    def projected_epsg(self) -> int:
+        """The code of the horizontal CRS; raises TownError when it is not a projected one."""
+        crs = CRS.from_epsg(int(self.crs[5:]))
+        flat = crs.sub_crs_list[0] if crs.is_compound else crs
+        code = flat.to_epsg()
+        if not flat.is_projected or code is None:
+            raise TownError(f"crs is {self.crs!r}; it must be a projected one, such as EPSG:25832")
+        return int(code)
 
     @property
     def extent_m(self) -> float:

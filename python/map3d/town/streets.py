@@ -91,10 +91,10 @@ def _ring_marks(sketch: Sketch, frame: "Frame", radius: float) -> None:
     angles = np.linspace(0, 2 * np.pi, count)
     roads = np.array(frame.roads)
     line = frame.bend(radius * np.stack([np.cos(angles), np.sin(angles)], axis=1))
-    for number, quad in enumerate(band(line, 0.14)):
-        gap = np.abs((angles[number] - roads + np.pi) % (2 * np.pi) - np.pi).min() * radius
+    gaps = np.abs((angles[:, None] - roads + np.pi) % (2 * np.pi) - np.pi).min(axis=1) * radius
+    for number, quad in list(enumerate(band(line, 0.14)))[::3]:
         wet = near_river(frame, radius * np.array([np.cos(angles[number]), np.sin(angles[number])]))
-        if number % 3 == 0 and gap > 9 and not wet:
+        if gaps[number] > 9 and not wet:
             sketch.patch(quad, "mark", "mark")
 
 
