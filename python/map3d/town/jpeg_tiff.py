@@ -100,6 +100,11 @@ def _jpeg(picture: Pixels, part: int) -> bytes:
     return buffer.getvalue()
 
 
+def tile_bytes(picture: Pixels) -> int:
+    """How many bytes a tile with this picture takes."""
+    return len(_jpeg(_whole(picture), 2))
+
+
 def _directory(tags: Sequence[Tag], start: int, wide: bool) -> bytes:
     """The image file directory at byte `start`, with the values that do not fit into it behind it."""
     count, entry, room, unit = ("<Q", "<HHQ", 8, 20) if wide else ("<H", "<HHI", 4, 12)
@@ -116,4 +121,4 @@ def _directory(tags: Sequence[Tag], start: int, wide: bool) -> bytes:
     return table + bytes(room) + values
 
 
-__all__ = ["TILE_PX", "JpegTiff"]
+__all__ = ["TILE_PX", "JpegTiff", "tile_bytes"]

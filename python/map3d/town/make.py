@@ -1,34 +1,23 @@
-"""Makes a town: plans it, cuts the work into jobs, writes what is missing, records what is done."""
+"""Makes a town: plans it, checks the room on the disk, has the jobs done, keeps the record."""
 
-import json
 import os
-import shutil
+import signal
+import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from io import StringIO
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from pathlib import Path
 
-import numpy as np
-
-from map3d.town import citygml, obj
-from map3d.town.atlas import Atlas, atlas_picture, jpeg, pack, png
-from map3d.town.describe import describe
 from map3d.town.errors import TownError
-from map3d.town.ground import Ground, make_ground
-from map3d.town.house import Built, build, footprint
-from map3d.town.materials import WRAPS, wrap_picture
-from map3d.town.model import Lot, Paint, Plan
-from map3d.town.obj import all_faces
-from map3d.town.plans import plan_town
-from map3d.town.raster import write_dem, write_ortho
-from map3d.town.spec import TownSpec
-from map3d.town.trees import TreeWriter, leaf_picture
+from map3d.town.measure import check_room, measured
+from map3d.town.site import Site, begun, claimed, finish, record
+from map3d.town.spec import Estimate, TownSpec
+from map3d.town.work import Job, do, jobs_of
 
 Progress = Callable[[str, int, int], None]
-TREES_PER_FILE = 20_000
-SPARE_BYTES = 64 << 20
+Outcome = tuple[Job, dict[str, int], dict[str, int]]
 
 
 @dataclass(frozen=True)
@@ -43,293 +32,69 @@ class TownReport:
     disk_bytes: int
 
 
-@dataclass(frozen=True)
-class Job:
-    """A piece of work that makes some files: ("buildings" | "trees" | "ortho" | "dem" | "shared", number)."""
-
-    kind: str
-    number: int
-
-
-class Site:
-    """A town under construction in a folder: its plan, and which files are complete."""
-
-    def __init__(self, out: Path, spec: TownSpec, done: dict[str, int]) -> None:
-        self.out, self.spec, self.done = out, spec, done
-        self.plan, self.ground = plan_town(spec)
-        self.shift = np.array([spec.east_m, spec.north_m, 0.0])
-        self.made: dict[str, int] = {}
-        self.kept: dict[str, int] = {}
-
-    def missing(self, name: str) -> bool:
-        """Whether a file must be written; a file is complete when town.json lists it with the size it has."""
-        path = self.out / name
-        if name in self.done and path.is_file() and path.stat().st_size == self.done[name]:
-            self.kept[name] = self.done[name]
-            return False
-        return True
-
-    def put(self, name: str, data: bytes) -> None:
-        """Writes a file under another name and renames it, so that a file is there whole or not at all."""
-        with self.place(name) as place:
-            place.path.write_bytes(data)
-
-    def place(self, name: str) -> "Place":
-        return Place(self, name)
-
-
-class Place:
-    """A file while it is written: `path` is renamed to its final name when all went well, removed otherwise."""
-
-    def __init__(self, site: Site, name: str) -> None:
-        self.site, self.name = site, name
-        self.final = site.out / name
-        self.path = self.final.with_name(f".{self.final.name}.part")
-
-    def __enter__(self) -> "Place":
-        self.final.parent.mkdir(parents=True, exist_ok=True)
-        return self
-
-    def __exit__(self, error: object, *_: object) -> None:
-        if error is not None:
-            self.path.unlink(missing_ok=True)
-            return
-        os.replace(self.path, self.final)
-        self.site.made[self.name] = self.final.stat().st_size
-
-
 def make_town(out: Path, spec: TownSpec, progress: Progress | None = None, workers: int = 1) -> TownReport:
     """Writes the town into `out`, or what is missing of it.
 
     Raises TownError when `out` holds a town of another spec, or the disk has too little room. `progress(what, done, all)` is called
-    after each job.
+    after each job. When it is interrupted, killed even, all complete files are kept.
     """
     done = begun(out, spec)
     site = Site(out, spec, done)
     jobs = list(jobs_of(site))
-    check_room(out, spec, done)
-    out.mkdir(parents=True, exist_ok=True)
-    written: dict[str, int] = {}
-    files: dict[str, int] = dict(done)
-    for count, (job, made, kept) in enumerate(results(site, jobs, workers), 1):
-        written.update(made)
-        files.update(made)
-        files.update(kept)
-        record(out, spec, site.plan, files)
-        if progress:
-            progress(job.kind, count, len(jobs))
+    check_room(site)
+    files: dict[str, int] = {}
+    written = 0
+    with claimed(out):
+        record(out, spec, site.plan, done)
+        for count, (job, made, kept) in enumerate(results(site, jobs, workers), 1):
+            written += len(made)
+            files |= made | kept
+            if progress:
+                progress(job.kind, count, len(jobs))
+        finish(out, spec, site.plan, files)
     textures = sum("/textures/a" in name and not name.startswith("obj/") for name in files)
-    return TownReport(len(site.plan.lots), len(site.plan.trees), textures, len(written), len(files) - len(written), sum(files.values()))
+    return TownReport(len(site.plan.lots), len(site.plan.trees), textures, written, len(files) - written, sum(files.values()))
 
 
-def begun(out: Path, spec: TownSpec) -> dict[str, int]:
-    """Name and size of the files that an earlier run completed."""
-    path = out / "town.json"
-    if not path.is_file():
-        return {}
-    record = json.loads(path.read_text())
-    if record["spec"] != spec.record():
-        raise TownError(f"{path}: this folder holds a town made with other arguments; use another folder or delete it")
-    return dict(record["files"])
+def estimate_town(spec: TownSpec) -> Estimate:
+    """What the town will take, within 15 %: it is planned, and a sample of it is made in memory. Nothing is written."""
+    return measured(Site(Path(), spec, {}))
 
 
-def check_room(out: Path, spec: TownSpec, done: dict[str, int]) -> None:
-    """Refuses to begin what the disk cannot hold."""
-    needed = spec.estimate().disk_bytes - sum(done.values())
-    home = next(p for p in [out, *out.absolute().parents] if p.exists())
-    free = shutil.disk_usage(home).free
-    if needed + SPARE_BYTES > free:
-        raise TownError(f"{out}: the town needs about {needed >> 20} MiB, {free >> 20} MiB are free; ask for fewer or smaller textures")
-
-
-def record(out: Path, spec: TownSpec, plan: Plan, files: dict[str, int]) -> None:
-    """Writes town.json: the spec, what the town holds, the complete files with their sizes."""
-    about = {"map3d": "town", "version": 1, "spec": spec.record(), "buildings": len(plan.lots), "trees": len(plan.trees)}
-    text = json.dumps({**about, "extent_m": 2 * plan.radius_m, "files": dict(sorted(files.items()))}, indent=1, ensure_ascii=False)
-    part = out / ".town.json.part"
-    part.write_text(text + "\n")
-    os.replace(part, out / "town.json")
-
-
-def jobs_of(site: Site) -> Iterator[Job]:
-    """All jobs of a town, the longest first."""
-    if site.spec.terrain:
-        yield Job("ortho", 0)
-        yield Job("dem", 0)
-    yield Job("shared", 0)
-    for number in range(site.spec.files):
-        yield Job("buildings", number)
-    if site.spec.trees and "citygml" in site.spec.formats:
-        for number in range(-(-len(site.plan.trees) // TREES_PER_FILE)):
-            yield Job("trees", number)
-
-
-def results(site: Site, jobs: list[Job], workers: int) -> Iterator[tuple[Job, dict[str, int], dict[str, int]]]:
-    """Does the jobs, here or in processes of their own; in the order of the list."""
+def results(site: Site, jobs: list[Job], workers: int) -> Iterator[Outcome]:
+    """Does the jobs, here or in processes of their own; each is told as soon as it is done."""
     if workers <= 1:
         for job in jobs:
             yield do(site, job)
         return
     context = get_context("spawn")
+    site.stop = context.Event()
     with ProcessPoolExecutor(workers, mp_context=context, initializer=_settle, initargs=(site,)) as pool:
-        yield from pool.map(_do_here, jobs)
+        try:
+            yield from (future.result() for future in as_completed([pool.submit(_do_here, job) for job in jobs]))
+        except BrokenProcessPool as error:
+            raise TownError(f"{site.out}: a process ended all at once, for want of memory perhaps; give the same command again to go on") from error
+        finally:
+            site.stop.set()
+            pool.shutdown(cancel_futures=True)
 
 
 _SITE: list[Site] = []
 
 
 def _settle(site: Site) -> None:
+    """A worker's beginning. An interrupt is the parent's to handle; without a parent there is nothing to work for."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     _SITE[:] = [site]
 
 
-def _do_here(job: Job) -> tuple[Job, dict[str, int], dict[str, int]]:
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+def _do_here(job: Job) -> Outcome:
     return do(_SITE[0], job)
-
-
-def do(site: Site, job: Job) -> tuple[Job, dict[str, int], dict[str, int]]:
-    """Does a job; returns the files it wrote and those that were complete already."""
-    site.made, site.kept = {}, {}
-    work = {"ortho": do_ortho, "dem": do_dem, "shared": do_shared, "buildings": do_buildings, "trees": do_trees}
-    work[job.kind](site, job.number)
-    return job, site.made, site.kept
-
-
-def do_ortho(site: Site, number: int) -> None:
-    spec, side_m = site.spec, 2 * site.plan.radius_m
-    side_px = int(np.ceil(side_m / spec.ortho_pixel_m(side_m)))
-    if site.missing("terrain/ortho.tif"):
-        with site.place("terrain/ortho.tif") as place:
-            write_ortho(place.path, site.plan, side_m / side_px, side_px, spec.projected_epsg, spec.east_m, spec.north_m)
-
-
-def do_dem(site: Site, number: int) -> None:
-    spec = site.spec
-    if site.missing("terrain/dem.tif"):
-        with site.place("terrain/dem.tif") as place:
-            pixel = spec.dem_pixel_m(2 * site.plan.radius_m)
-            write_dem(place.path, site.ground, site.plan.radius_m, pixel, spec.crs, spec.east_m, spec.north_m)
-
-
-def do_shared(site: Site, number: int) -> None:
-    """Repeating textures, leaf textures, the MTL."""
-    for folder in site.spec.formats:
-        for name in WRAPS:
-            if site.missing(f"{folder}/textures/{name}.jpg"):
-                site.put(f"{folder}/textures/{name}.jpg", jpeg(wrap_picture(name)))
-    if "citygml" in site.spec.formats and site.spec.trees:
-        for species in sorted({tree.species for tree in site.plan.trees}):
-            for view in ("side", "top"):
-                name = f"citygml/textures/{species}_{view}.png"
-                if site.missing(name):
-                    site.put(name, png(leaf_picture(f"{species}_{view}")))
-    if "obj" in site.spec.formats and site.missing("obj/town.mtl"):
-        names = [atlas_name(f, g) for f in range(site.spec.files) for g, _ in enumerate(groups(site, f))]
-        site.put("obj/town.mtl", obj.mtl_text(names).encode())
-
-
-def atlas_name(file: int, group: int) -> str:
-    return f"a{file:03d}_{group:05d}"
-
-
-def lots_of(site: Site, file: int) -> list[Lot]:
-    """The buildings of one file: neighbours, in the order of the plan."""
-    lots, files = site.plan.lots, site.spec.files
-    return lots[len(lots) * file // files : len(lots) * (file + 1) // files]
-
-
-def groups(site: Site, file: int) -> list[list[Lot]]:
-    """The buildings of a file by atlas; those without textures go with their neighbours."""
-    lots, spec = lots_of(site, file), site.spec
-    count = spec.texture_count * (file + 1) // spec.files - spec.texture_count * file // spec.files
-    count = max(1, min(count, len(lots)))
-    return [lots[len(lots) * g // count : len(lots) * (g + 1) // count] for g in range(count)]
-
-
-def do_buildings(site: Site, file: int) -> None:
-    """A CityGML file with its atlases, and the same buildings as OBJ files."""
-    spec = site.spec
-    name = f"citygml/buildings_{file:03d}.gml"
-    looks, text = citygml.Looks(), StringIO()
-    writing = "citygml" in spec.formats and site.missing(name)
-    with_gml = citygml.BuildingWriter(text, site.shift, looks)
-    if not writing:
-        for group, lots in enumerate(groups(site, file)):
-            do_group(site, lots, atlas_name(file, group), None)
-        return
-    with site.place(name) as place, place.path.open("w", encoding="utf-8", newline="\n") as out:
-        with_gml.out = out
-        low, high = box_of(site, lots_of(site, file))
-        citygml.begin(out, f"{spec.name} {file}", spec.srs_name, low, high, ("building", "appearance", "generics"))
-        for group, lots in enumerate(groups(site, file)):
-            do_group(site, lots, atlas_name(file, group), with_gml)
-        citygml.end(out, looks)
-
-
-def do_group(site: Site, lots: list[Lot], name: str, writer: citygml.BuildingWriter | None) -> None:
-    """The buildings that share an atlas; without `writer` only what else of them is missing."""
-    spec = site.spec
-    objs = [lot for lot in lots if "obj" in spec.formats and site.missing(f"obj/{obj_name(lot)}.obj")]
-    pictures = [f"{folder}/textures/{name}.jpg" for folder in spec.formats]
-    pictures = [picture for picture in pictures if site.missing(picture)]
-    if writer is None and not objs and not pictures:
-        return
-    built = [build(lot, spec.seed, site.ground, spec.deep_share) for lot in lots]
-    atlas = atlas_of(built, spec.atlas_px)
-    if writer is not None:
-        for each in built:
-            writer.write(each, atlas, f"textures/{name}.jpg", describe(each, spec))
-    for each in built:
-        if each.lot in objs:
-            site.put(f"obj/{obj_name(each.lot)}.obj", obj.obj_text(each, obj_name(each.lot), atlas, name, site.shift).encode())
-    if pictures and atlas is not None:
-        data = jpeg(atlas_picture(atlas, lots[0].number))
-        for picture in pictures:
-            site.put(picture, data)
-
-
-def obj_name(lot: Lot) -> str:
-    return f"b{lot.number:06d}"
-
-
-def atlas_of(built: list[Built], side_px: int) -> Atlas | None:
-    """An atlas for all paints of these buildings; None when they have none."""
-    found: dict[int, Paint] = {}
-    for each in built:
-        for face in all_faces(each):
-            if isinstance(face.paint, Paint) and each.lot.kind != "shed":
-                found.setdefault(id(face.paint), face.paint)
-    return pack(list(found.values()), side_px) if found else None
-
-
-def box_of(site: Site, lots: list[Lot]) -> tuple[np.ndarray, np.ndarray]:
-    """A box in CRS coordinates that holds these buildings with their eaves."""
-    parts = [part for lot in lots for part in lot.parts]
-    plan = np.concatenate([footprint(part) for part in parts])
-    heights = site.ground.height(plan[:, 0], plan[:, 1])
-    rise = max(part.eave_m + max(h for _, h in part.profile) for part in parts)
-    low = np.array([*(plan.min(axis=0) - 2), heights.min() - 2])
-    high = np.array([*(plan.max(axis=0) + 2), heights.max() + rise + 6])
-    return low + site.shift, high + site.shift
-
-
-def do_trees(site: Site, number: int) -> None:
-    name = f"citygml/trees_{number:03d}.gml"
-    if not site.missing(name):
-        return
-    first = number * TREES_PER_FILE
-    trees = site.plan.trees[first : first + TREES_PER_FILE]
-    plan = np.array([(t.x, t.y) for t in trees])
-    heights = site.ground.height(plan[:, 0], plan[:, 1])
-    low = np.array([*(plan.min(axis=0) - 8), heights.min() - 1]) + site.shift
-    high = np.array([*(plan.max(axis=0) + 8), heights.max() + 30]) + site.shift
-    with site.place(name) as place, place.path.open("w", encoding="utf-8", newline="\n") as out:
-        looks = citygml.Looks()
-        citygml.begin(out, f"{site.spec.name}, trees {number}", site.spec.srs_name, low, high, ("vegetation", "appearance"))
-        writer = TreeWriter(out, site.ground, site.shift, looks, f"t{number}_")
-        for i, tree in enumerate(trees):
-            writer.write(tree, first + i)
-        writer.appearance()
-        citygml.end(out, looks)
-
-
-__all__ = ["Ground", "TownReport", "make_ground", "make_town"]

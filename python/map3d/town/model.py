@@ -1,6 +1,7 @@
 """What a town is made of. Plans are plain data in town coordinates: metres, (0, 0) the town's middle, x east, y north."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,6 +78,18 @@ class Plan:
     patches: list[Patch] = field(default_factory=list)
     trees: list[Tree] = field(default_factory=list)
     radius_m: float = 0.0
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For other processes: the patches as four arrays, since there are hundreds of thousands."""
+        corners = np.concatenate([patch.polygon for patch in self.patches]) if self.patches else np.zeros((0, 2))
+        ends = np.cumsum([len(patch.polygon) for patch in self.patches], dtype=np.int64)
+        rest = [patch.material for patch in self.patches], [patch.order for patch in self.patches]
+        return {**self.__dict__, "patches": (corners, ends, *rest)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        corners, ends, materials, orders = state["patches"]
+        polygons = np.split(corners, ends[:-1]) if len(ends) else []
+        self.__dict__ |= {**state, "patches": list(map(Patch, polygons, materials, orders))}
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Writes the ground: orthophoto and elevation as GeoTIFF, window by window, from the plan."""
 
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 
@@ -118,12 +119,16 @@ def north_up(west: float, north: float, px_m: float) -> Affine:
     return Affine(px_m, 0.0, west, 0.0, -px_m, north)
 
 
-def write_ortho(path: Path, plan: Plan, px_m: float, side_px: int, epsg: int, east: float, north: float) -> None:
-    """The orthophoto: JPEG in a tiled GeoTIFF, written window by window, so that memory does not grow with its size."""
+def write_ortho(path: Path, plan: Plan, px_m: float, side_px: int, epsg: int, east: float, north: float, check: Callable[[], None]) -> None:
+    """The orthophoto: JPEG in a tiled GeoTIFF, written window by window, so that memory does not grow with its size.
+
+    `check` is called before each window, and may raise to end the work.
+    """
     painter = Painter(plan, px_m)
     with JpegTiff(path, side_px, px_m, epsg, east - plan.radius_m, north + plan.radius_m) as out:
         for y in range(0, side_px, WINDOW_PX):
             for x in range(0, side_px, WINDOW_PX):
+                check()
                 out.write(x, y, painter.window(x, y, min(WINDOW_PX, side_px - x), min(WINDOW_PX, side_px - y)))
 
 
