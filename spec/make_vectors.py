@@ -45,7 +45,7 @@ def view_id(look_at, pitch):
     return f"{short(look_at)}-{short(pitch)}"
 
 
-def pin(lo, hi, tile_px, res_m, views):
+def pin(lo, hi, tile_px, res_m, views, window=None):
     c = [(a + b) / 2 for a, b in zip(lo, hi, strict=True)]
     h = [(b - a) / 2 * 1.05 for a, b in zip(lo, hi, strict=True)]
     h[2] = max(h[2], (hi[2] - lo[2]) / 2 + 100.0)
@@ -54,11 +54,14 @@ def pin(lo, hi, tile_px, res_m, views):
     for _, pitch in views:
         cp, sp = cos_sin(pitch)
         extent = max(extent, 2 * (sp * flat + cp * h[2]))
+    if window is not None:
+        extent = window[2]
     zmax = 0
     while tile_px * res_m * 2**zmax < extent:
         zmax += 1
     size = tile_px * res_m * 2**zmax
     half_diagonal = math.sqrt(h[0] ** 2 + h[1] ** 2 + h[2] ** 2)
+    m = c if window is None else [window[0], window[1], c[2]]
     out = []
     for look_at, pitch in views:
         r, u, d = axes(look_at, pitch)
@@ -67,8 +70,8 @@ def pin(lo, hi, tile_px, res_m, views):
                 "id": view_id(look_at, pitch),
                 "look_at_deg": look_at,
                 "pitch_deg": pitch,
-                "u0_m": dot(r, c) - size / 2,
-                "v0_m": dot(u, c) + size / 2,
+                "u0_m": dot(r, m) - size / 2,
+                "v0_m": dot(u, m) + size / 2,
                 "d0_m": dot(d, c) - half_diagonal - 1000,
             }
         )
@@ -94,6 +97,18 @@ def frames_vectors():
         ([-3500, -3500, -5], [3500, 3500, 180], 256, 0.1, [(0, 10), (0, 90)]),
     ]:
         rows.append({"box": [lo, hi], "tile_px": tile_px, "res_m": res, "views_deg": views, "pinned": pin(lo, hi, tile_px, res, views)})
+    return rows
+
+
+def windows_vectors():
+    rows = []
+    for lo, hi, tile_px, res, views, window in [
+        ([-120, -80, 0], [130, 90, 22.5], 256, 0.2, [(0, 45), (37.5, 60)], [10, -20, 51.2]),
+        ([-3500, -3500, -5], [3500, 3500, 180], 256, 0.0625, [(0, 45), (180, 90)], [-12.5, 800, 4096]),
+        ([0, 0, 0], [1000, 1000, 10], 512, 0.1, [(45, 22.5)], [500, 500, 3]),
+    ]:
+        pinned = pin(lo, hi, tile_px, res, views, window)
+        rows.append({"box": [lo, hi], "tile_px": tile_px, "res_m": res, "views_deg": views, "window": window, "pinned": pinned})
     return rows
 
 
@@ -214,6 +229,7 @@ def main():
     for name, value in {
         "views": views_vectors(),
         "frames": frames_vectors(),
+        "windows": windows_vectors(),
         "tiles": tiles_vectors(),
         "occupancy": occupancy_vectors(),
         "data": data_vectors(),

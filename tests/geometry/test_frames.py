@@ -6,22 +6,24 @@ import numpy as np
 import pytest
 
 from map3d.errors import BadRequest, LimitExceeded, OutsideFrame
-from map3d.geometry.frames import NO_DEPTH, corners, pin, pin_beside
+from map3d.geometry.frames import NO_DEPTH, Window, check_content, corners, pin, pin_beside
 from map3d.geometry.views import uvd_from_local
 from map3d.types import Layer, TileId, ViewAngles
 
 VECTORS = Path(__file__).parents[2] / "spec" / "vectors"
 FRAMES = json.loads((VECTORS / "frames.json").read_text())
+WINDOWS = json.loads((VECTORS / "windows.json").read_text())
 TILES = json.loads((VECTORS / "tiles.json").read_text())
 BOX = ((-120.0, -80.0, 0.0), (130.0, 90.0, 22.5))
 
 
 def pinned(row):
     lo, hi = (tuple(corner) for corner in row["box"])
-    return pin((lo, hi), row["tile_px"], row["res_m"], [ViewAngles(*view) for view in row["views_deg"]])
+    window = Window(*row["window"]) if "window" in row else None
+    return pin((lo, hi), row["tile_px"], row["res_m"], [ViewAngles(*view) for view in row["views_deg"]], window)
 
 
-@pytest.mark.parametrize("row", FRAMES)
+@pytest.mark.parametrize("row", FRAMES + WINDOWS)
 def test_frames_follow_the_vectors(row):
     for got, expected in zip(pinned(row), row["pinned"]["views"], strict=True):
         assert (got.zmax, got.size_m) == (row["pinned"]["zmax"], row["pinned"]["size_m"])
@@ -124,3 +126,83 @@ def test_the_cores_frame_names_its_layers():
     got = frame.to_json([Layer("color", "color", "webp", 80), Layer("id", "id", "png")])
     assert got["layers"] == [{"kind": "color", "format": "webp", "quality": 80}, {"kind": "id", "format": "png"}]
     assert (got["look_at_deg"], got["zmax"], got["size_m"]) == (0, frame.zmax, frame.size_m)
+
+
+SCENE = ((-800.0, -800.0, 0.0), (800.0, 800.0, 60.0))
+
+
+def test_a_window_is_the_square_that_was_asked_for():
+    frame = pin(SCENE, 256, 0.25, [ViewAngles(0, 45)], Window(100.0, -50.0, 512.0))[0]
+    assert (frame.size_m, frame.zmax) == (512.0, 3)
+    middle = uvd_from_local(frame.axes, (100.0, -50.0, 30.0))
+    np.testing.assert_allclose([frame.u0_m + 256, frame.v0_m - 256], middle[:2])
+
+
+def test_a_window_that_is_no_whole_number_of_tiles_grows_to_one():
+    assert pin(SCENE, 256, 0.25, [ViewAngles(0, 45)], Window(0.0, 0.0, 512.1))[0].size_m == 1024.0
+
+
+def test_depths_count_from_where_they_do_without_a_window():
+    views = [ViewAngles(0, 45), ViewAngles(120, 20)]
+    for small, whole in zip(pin(SCENE, 256, 0.25, views, Window(300.0, 300.0, 64.0)), pin(SCENE, 256, 0.25, views), strict=True):
+        assert small.d0_m == whole.d0_m
+
+
+def test_a_square_town_fills_a_window_of_its_width_times_the_sine_of_the_pitch():
+    """Seen at 45 degrees, ground of 1600 m is 1131 m high: a square of that side is full where no horizon ends it."""
+    frame = pin(SCENE, 256, 1131 / 2048, [ViewAngles(0, 45)], Window(0.0, 0.0, 1131.0))[0]
+    ground = frame.seen(((-800.0, -800.0, 30.0), (800.0, 800.0, 30.0)))
+    assert np.ptp(ground[:, 0]) == pytest.approx(frame.size_m)
+    assert np.ptp(ground[:, 1]) > 0.99 * frame.size_m
+
+
+def test_content_beside_a_window_is_left_out_and_without_one_refused():
+    window = Window(0.0, 0.0, 128.0)
+    grown = ((-5000.0, -800.0, 0.0), (800.0, 800.0, 60.0))
+    check_content(pin(SCENE, 256, 0.25, [ViewAngles(0, 45)], window)[0], grown, window)
+    with pytest.raises(OutsideFrame, match="--regrid"):
+        check_content(pin(SCENE, 256, 0.25, [ViewAngles(0, 45)])[0], grown, None)
+
+
+def test_content_nearer_than_depth_zero_is_refused_inside_a_window_only():
+    window = Window(0.0, 0.0, 128.0)
+    frame = pin(SCENE, 256, 0.25, [ViewAngles(0, 90)], window)[0]
+    frame.check_window(SCENE)
+    with pytest.raises(OutsideFrame, match="--regrid"):
+        frame.check_window(((-10.0, -10.0, 0.0), (10.0, 10.0, 5000.0)))
+    slanted = pin(SCENE, 256, 0.25, [ViewAngles(0, 45)], window)[0]
+    far_behind = ((-800.0, -9000.0, 0.0), (800.0, 800.0, 60.0))
+    with pytest.raises(OutsideFrame):
+        slanted.check_holds(far_behind)
+    slanted.check_window(far_behind)
+
+
+def test_what_a_square_shows_of_a_box_lies_in_both():
+    frame = pin(SCENE, 256, 0.25, [ViewAngles(33, 40)], Window(200.0, 100.0, 256.0))[0]
+    seen = frame.seen(SCENE)
+    assert len(seen) >= 4
+    corner, side = np.array([frame.u0_m, frame.v0_m - frame.size_m]), frame.size_m
+    assert seen[:, :2].min(axis=0) == pytest.approx(np.maximum(corner, seen[:, :2].min(axis=0)))
+    assert seen[:, :2].max(axis=0) == pytest.approx(np.minimum(corner + side, seen[:, :2].max(axis=0)))
+    dense = uvd_from_local(frame.axes, np.random.default_rng(3).uniform(SCENE[0], SCENE[1], (200_000, 3)))
+    inside = ((dense[:, :2] >= corner) & (dense[:, :2] <= corner + side)).all(axis=1)
+    assert seen[:, 2].min() <= dense[inside, 2].min()
+    assert seen[:, 2].max() >= dense[inside, 2].max()
+
+
+def test_a_window_beside_the_scene_is_refused():
+    with pytest.raises(BadRequest, match="beside the scene"):
+        pin(SCENE, 256, 0.25, [ViewAngles(0, 45)], Window(5000.0, 0.0, 128.0))
+
+
+def test_a_view_that_joins_a_window_takes_over_its_middle_and_side():
+    window = Window(100.0, 0.0, 300.0)
+    first = pin(SCENE, 256, 0.25, [ViewAngles(0, 45)], window)[0]
+    both = pin(SCENE, 256, 0.25, [ViewAngles(0, 45), ViewAngles(90, 30)], window)
+    assert pin_beside(first, SCENE, ViewAngles(90, 30), window) == both[1]
+
+
+@pytest.mark.parametrize("numbers", [(0, 0, 0), (0, 0, -1), (0, 0, math.inf), (math.nan, 0, 1), (0, math.inf, 1)])
+def test_windows_without_meaning_are_refused(numbers):
+    with pytest.raises(BadRequest, match="window"):
+        Window(*numbers)

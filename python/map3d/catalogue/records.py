@@ -5,10 +5,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from map3d.catalogue.states import State
-from map3d.geometry.frames import PinnedFrame
+from map3d.geometry.frames import PinnedFrame, Window
 from map3d.types import BlockId, BlockKind, Box, Layer, Vec3
 
 LOCAL_CRS_NAME = "local metres"
+WINDOW = "window"
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,11 @@ class RenderingRecord:
     @property
     def size_m(self) -> float:
         return self.frames[0].size_m
+
+    @property
+    def window(self) -> Window | None:
+        """What the frames were pinned to instead of all of `box`; kept among the options."""
+        return Window(**self.options[WINDOW]) if WINDOW in self.options else None
 
     def frame(self, view: str) -> PinnedFrame | None:
         return next((frame for frame in self.frames if frame.id == view), None)

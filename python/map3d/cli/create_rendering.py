@@ -13,6 +13,21 @@ from map3d.errors import BadRequest
 from map3d.types import COLOR_FORMATS, LAYER_KINDS, ViewAngles
 
 
+class WindowText(click.ParamType):  # type: ignore[type-arg]
+    """X,Y,SIZE in metres."""
+
+    name = "x,y,size"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float, float]:
+        if isinstance(value, tuple):
+            return value
+        try:
+            x, y, size = (float(part) for part in str(value).split(","))
+        except ValueError:
+            self.fail(f"{value!r} is not a window; write X,Y,SIZE in metres, e.g. 691000,5336000,2000", param, ctx)
+        return x, y, size
+
+
 @click.command("create-rendering")
 @click.argument("scene")
 @click.argument("name")
@@ -21,6 +36,12 @@ from map3d.types import COLOR_FORMATS, LAYER_KINDS, ViewAngles
 @click.option("--pitch", type=float, multiple=True, help="Pitch of --directions; 90 looks straight down.  [default: 45]")
 @click.option("--res", "res_m", type=float, help="Metres a pixel at the deepest level.")
 @click.option("--levels", type=click.IntRange(1, 27), help="Instead of --res: how many levels.")
+@click.option(
+    "--window",
+    type=WindowText(),
+    help="Show less than the whole scene: a square of SIZE metres in each view, around the ground point X, Y of the scene's coordinate system. "
+    "Content outside is left out.",
+)
 @click.option("--layers", default=",".join(LAYER_KINDS), show_default=True, help="Which layers.")
 @click.option("--tile-size", type=click.Choice(["256", "512"]), default="256", show_default=True, help="Pixels of a tile's side.")
 @click.option("--color", type=click.Choice(list(COLOR_FORMATS)), default="webp", show_default=True, help="Format of the colour layer.")

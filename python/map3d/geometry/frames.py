@@ -17,6 +17,26 @@ GROWTH = 1.05
 MIN_GROWTH_Z_M = 100.0
 ROOM_IN_FRONT_M = 1000.0
 NO_DEPTH = 0xFFFFFFFF
+BOX_FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
+"""Indices into `corners`, around each face."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """Less than the whole scene, by wish: squares of at least `size_m` around a ground point, local metres. What lies outside is left out.
+
+    Raises BadRequest for numbers without meaning.
+    """
+
+    x_m: float
+    y_m: float
+    size_m: float
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.x_m) and math.isfinite(self.y_m)):
+            raise BadRequest(f"window around ({self.x_m}, {self.y_m}): must be a ground point")
+        if not (math.isfinite(self.size_m) and self.size_m > 0):
+            raise BadRequest(f"window of {self.size_m} m: must be a positive number of metres")
 
 
 @dataclass(frozen=True)
@@ -82,11 +102,38 @@ class PinnedFrame:
         uvd = uvd_from_local(self.axes, corners(box))
         low, high = uvd.min(axis=0), uvd.max(axis=0)
         inside = low[0] >= self.u0_m and high[0] <= self.u0_m + self.size_m and low[1] >= self.v0_m - self.size_m and high[1] <= self.v0_m
-        if not (inside and low[2] >= self.d0_m and (high[2] - self.d0_m) / DEPTH_UNIT_M < NO_DEPTH):
-            raise OutsideFrame(
-                f"view {self.id}: content in the local box {box[0]} to {box[1]} leaves the pinned square of side {self.size_m:g} m; "
-                "give --regrid to pin the frame anew and render everything again"
-            )
+        if not (inside and self._holds_depths(uvd)):
+            raise self._outside(box, "leaves the pinned square")
+
+    def check_window(self, box: Box) -> None:
+        """As `check_holds`, of what the square shows of the box; the rest is left out. Raises BadRequest when it shows nothing."""
+        uvd = self.seen(box)
+        if not len(uvd):
+            raise BadRequest(f"view {self.id}: the window of {self.size_m:g} m lies beside the scene, whose local box is {box[0]} to {box[1]}")
+        if not self._holds_depths(uvd):
+            raise self._outside(box, "comes nearer than the depth 0, or farther than can be stored, inside the window")
+
+    def seen(self, box: Box) -> NDArray[np.float64]:
+        """(n, 3) the UVD corners of the part of a box that projects into the square; none when nothing does."""
+        points = uvd_from_local(self.axes, corners(box))
+        left, top = self.u0_m, self.v0_m
+        sides = ((0, 1.0, left), (0, -1.0, -left - self.size_m), (1, -1.0, -top), (1, 1.0, top - self.size_m))
+        found = []
+        for face in BOX_FACES:
+            polygon = points[list(face)]
+            for axis, sign, least in sides:
+                polygon = _cut(polygon, sign * polygon[:, axis] - least)
+            found.append(polygon)
+        return np.concatenate(found)
+
+    def _holds_depths(self, uvd: NDArray[np.float64]) -> bool:
+        return bool(uvd[:, 2].min() >= self.d0_m and (uvd[:, 2].max() - self.d0_m) / DEPTH_UNIT_M < NO_DEPTH)
+
+    def _outside(self, box: Box, what: str) -> OutsideFrame:
+        return OutsideFrame(
+            f"view {self.id}: content in the local box {box[0]} to {box[1]} {what} of side {self.size_m:g} m; "
+            "give --regrid to pin the frame anew and render everything again"
+        )
 
     def to_json(self, layers: Sequence[Layer] = ()) -> dict[str, Any]:
         """The frame as the compiled core reads it."""
@@ -103,23 +150,34 @@ class PinnedFrame:
         }
 
 
-def pin(box: Box, tile_px: int, res_m: float, views: Iterable[ViewAngles]) -> list[PinnedFrame]:
+def pin(box: Box, tile_px: int, res_m: float, views: Iterable[ViewAngles], window: Window | None = None) -> list[PinnedFrame]:
     """Frames for a scene's local box, one per view, all of one size; raises BadRequest, LimitExceeded.
 
     `res_m` is the side of a pixel of the deepest level.
     """
     angles = [check_angles(view) for view in views]
     _check_request(box, tile_px, res_m, angles)
-    _, half = _grown(box)
-    zmax = _least_level(_extent(half, angles), tile_px * res_m)
-    return [_frame(box, view, tile_px * res_m * 2.0**zmax, tile_px, zmax) for view in angles]
+    extent_m = _extent(_grown(box)[1], angles) if window is None else window.size_m
+    zmax = _least_level(extent_m, tile_px * res_m)
+    frames = [_frame(box, view, tile_px * res_m * 2.0**zmax, tile_px, zmax, window) for view in angles]
+    for frame in frames if window is not None else ():
+        frame.check_window(box)
+    return frames
 
 
-def pin_beside(frame: PinnedFrame, box: Box, angles: ViewAngles) -> PinnedFrame:
-    """The frame of a view that joins a rendering: it takes over size, levels and tile size. `box` is the one of the rendering's creation."""
-    added = _frame(box, check_angles(angles), frame.size_m, frame.tile_px, frame.zmax)
-    added.check_holds(box)
+def pin_beside(frame: PinnedFrame, box: Box, angles: ViewAngles, window: Window | None = None) -> PinnedFrame:
+    """The frame of a view that joins a rendering: it takes over size, levels and tile size. `box`, `window`: those of the rendering's creation."""
+    added = _frame(box, check_angles(angles), frame.size_m, frame.tile_px, frame.zmax, window)
+    check_content(added, box, window)
     return added
+
+
+def check_content(frame: PinnedFrame, box: Box, window: Window | None) -> None:
+    """Raises OutsideFrame when the scene's content, or what a window shows of it, cannot be held by the frame."""
+    if window is None:
+        frame.check_holds(box)
+    else:
+        frame.check_window(box)
 
 
 def corners(box: Box) -> NDArray[np.float64]:
@@ -128,14 +186,27 @@ def corners(box: Box) -> NDArray[np.float64]:
     return np.array([(x, y, z) for x in (lo[0], hi[0]) for y in (lo[1], hi[1]) for z in (lo[2], hi[2])], dtype=np.float64)
 
 
-def _frame(box: Box, angles: ViewAngles, size_m: float, tile_px: int, zmax: int) -> PinnedFrame:
+def _cut(polygon: NDArray[np.float64], inside: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The part of a convex polygon where `inside`, a linear function given at its corners, is not negative."""
+    out = []
+    for k in range(len(polygon)):
+        j = (k + 1) % len(polygon)
+        if inside[k] >= 0:
+            out.append(polygon[k])
+        if (inside[k] >= 0) != (inside[j] >= 0):
+            out.append(polygon[k] + (polygon[j] - polygon[k]) * (inside[k] / (inside[k] - inside[j])))
+    return np.array(out).reshape(-1, 3)
+
+
+def _frame(box: Box, angles: ViewAngles, size_m: float, tile_px: int, zmax: int, window: Window | None) -> PinnedFrame:
     centre, half = _grown(box)
+    middle = centre if window is None else (window.x_m, window.y_m, centre[2])
     right, up, forward = axes(angles)
     half_diagonal = math.sqrt(half[0] ** 2 + half[1] ** 2 + half[2] ** 2)
     return PinnedFrame(
         angles=angles,
-        u0_m=dot(right, centre) - size_m / 2,
-        v0_m=dot(up, centre) + size_m / 2,
+        u0_m=dot(right, middle) - size_m / 2,
+        v0_m=dot(up, middle) + size_m / 2,
         d0_m=dot(forward, centre) - half_diagonal - ROOM_IN_FRONT_M,
         size_m=size_m,
         tile_px=tile_px,

@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Final
 
 from map3d.catalogue import Catalogue, RenderingRecord, Workspace
+from map3d.catalogue.records import WINDOW
 from map3d.errors import BadRequest
-from map3d.geometry.frames import pin
+from map3d.geometry.frames import Window, pin
 from map3d.geometry.views import check_angles
 from map3d.render.build import is_stale, open_scene
 from map3d.types import LAYER_KINDS, Box, Layer, ViewAngles, check_name
@@ -18,7 +19,7 @@ COARSEST_M: Final = 1e6
 
 @dataclass(frozen=True)
 class RenderingRequest:
-    """`res_m` or `levels`; `color` and `quality` are the colour layer's."""
+    """`res_m` or `levels`; `color` and `quality` are the colour layer's. `window`: x, y of its middle in the scene's CRS, and its side."""
 
     scene: str
     name: str
@@ -32,6 +33,7 @@ class RenderingRequest:
     title: str = ""
     attribution: str = ""
     regrid: bool = False
+    window: tuple[float, float, float] | None = None
 
     def check(self, catalogue: Catalogue) -> tuple[Layer, ...]:
         """The layers; raises BadRequest for what can be told before the scene is built, NotFound."""
@@ -39,6 +41,8 @@ class RenderingRequest:
         catalogue.scene(self.scene)
         for view in self.views:
             check_angles(view)
+        if self.window is not None:
+            Window(*self.window)
         if (self.res_m is None) == (self.levels is None):
             raise BadRequest("say how fine: --res METRES a pixel, or --levels N")
         if self.regrid:
@@ -54,9 +58,11 @@ def create_rendering(workspace: Workspace, catalogue: Catalogue, request: Render
     if is_stale(workspace, catalogue, request.scene):
         raise BadRequest(f"scene {request.scene} has changed since it was built; build it first")
     box = open_scene(workspace, request.scene).box
+    window = _local_window(catalogue, request)
     res_m = choose_res(box, request)
-    frames = tuple(pin(box, request.tile_px, res_m, request.views))
-    record = RenderingRecord(request.name, request.scene, res_m, layers, frames, box, request.title, request.attribution)
+    frames = tuple(pin(box, request.tile_px, res_m, request.views, window))
+    options = {} if window is None else {WINDOW: asdict(window)}
+    record = RenderingRecord(request.name, request.scene, res_m, layers, frames, box, request.title, request.attribution, options)
     if request.regrid:
         kept = catalogue.regrid(record)
         _remove_stores(workspace, kept)
@@ -76,13 +82,24 @@ def make_layers(names: Sequence[str], color: str, quality: int) -> tuple[Layer, 
 
 
 def choose_res(box: Box, request: RenderingRequest) -> float:
-    """The resolution asked for; for a number of levels the finest that needs no more, to three digits."""
+    """The resolution asked for; for a number of levels the finest that needs no more, to three digits; a window is kept exactly."""
     if request.res_m is not None:
         return request.res_m
     assert request.levels is not None, "one of the two is given"
+    if request.window is not None:
+        return request.window[2] / (request.tile_px * 2.0 ** (request.levels - 1))
     extent_m = _extent_m(box, request)
     exact = extent_m / (request.tile_px * 2.0 ** (request.levels - 1))
     return _rounded_up(exact)
+
+
+def _local_window(catalogue: Catalogue, request: RenderingRequest) -> Window | None:
+    if request.window is None:
+        return None
+    x_m, y_m, size_m = request.window
+    origin = catalogue.scene(request.scene).origin
+    assert origin is not None, "a built scene has one"
+    return Window(x_m - origin[0], y_m - origin[1], size_m)
 
 
 def _extent_m(box: Box, request: RenderingRequest) -> float:
