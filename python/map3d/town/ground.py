@@ -1,6 +1,7 @@
 """The shape of the ground: heights above the vertical datum as a smooth function of town coordinates."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -43,11 +44,16 @@ class Ground:
             free = np.where(ahead < 90, np.minimum(free, np.clip((aside - DAM_HALF_M + 1.6) / 1.5, 0, 1)), free)
         return np.asarray(free)
 
+    @cached_property
+    def _middle(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """The river's line: x, y, and the slope of y over x."""
+        east, north = np.array(self.river).T
+        return east, north, np.gradient(north, east)
+
     def river_distance(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distance to the river's middle line; the line runs from west to east."""
-        line = np.array(self.river)
-        middle = np.interp(x, line[:, 0], line[:, 1])
-        slope = np.interp(x, line[:, 0], np.gradient(line[:, 1], line[:, 0]))
+        east, north, rise = self._middle
+        middle, slope = np.interp(x, east, north), np.interp(x, east, rise)
         return np.asarray(np.abs(y - middle) / np.hypot(1.0, slope))
 
 

@@ -1,5 +1,6 @@
 """Trees as CityGML vegetation: a prototype of leaf cards and a trunk per species, placed by transformation matrices."""
 
+import math
 from typing import TextIO
 
 import numpy as np
@@ -7,7 +8,6 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from map3d.town.citygml import Looks, ring_text, texture
-from map3d.town.ground import Ground
 from map3d.town.model import Tree
 from map3d.town.seeds import rng
 
@@ -110,16 +110,16 @@ def _shaded(color: tuple[int, int, int], light: float) -> tuple[int, int, int]:
 class TreeWriter:
     """Writes trees one after another; the first of each species carries the prototype, the others point to it."""
 
-    def __init__(self, out: TextIO, ground: Ground, shift: Points, looks: Looks, prefix: str) -> None:
-        self.out, self.ground, self.shift, self.looks, self.prefix = out, ground, shift, looks, prefix
+    def __init__(self, out: TextIO, shift: Points, looks: Looks, prefix: str) -> None:
+        self.out, self.looks, self.prefix = out, looks, prefix
+        self.shift: list[float] = shift.tolist()
         self.targets: dict[str, list[tuple[str, list[str]]]] = {}
 
-    def write(self, tree: Tree, number: int) -> None:
-        """A solitary vegetation object of height `tree.height_m` on the ground."""
-        z = float(self.ground.height(tree.x, tree.y))
-        c, s, h = np.cos(tree.turn) * tree.height_m, np.sin(tree.turn) * tree.height_m, tree.height_m
+    def write(self, tree: Tree, number: int, ground_z: float) -> None:
+        """A solitary vegetation object of height `tree.height_m`."""
+        c, s, h = math.cos(tree.turn) * tree.height_m, math.sin(tree.turn) * tree.height_m, tree.height_m
         matrix = f"{c:.6f} {-s:.6f} 0 0 {s:.6f} {c:.6f} 0 0 0 0 {h:.6f} 0 0 0 0 1"
-        x, y, z = np.array([tree.x, tree.y, z]) + self.shift
+        x, y, z = tree.x + self.shift[0], tree.y + self.shift[1], ground_z + self.shift[2]
         crown = 2 * SPECIES[tree.species][0] * h
         self.out.write(
             f'<core:cityObjectMember><veg:SolitaryVegetationObject gml:id="{self.prefix}tree_{number:06d}"><gml:name>{tree.species}</gml:name>'

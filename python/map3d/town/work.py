@@ -187,10 +187,10 @@ def do_trees(site: Site, number: int) -> None:
     with site.place(name) as place, place.path.open("w", encoding="utf-8", newline="\n") as out:
         looks = citygml.Looks()
         citygml.begin(out, f"{site.spec.name}, trees {number}", site.spec.srs_name, low, high, ("vegetation", "appearance"))
-        writer = TreeWriter(out, site.ground, site.shift, looks, f"t{number}_")
+        writer = TreeWriter(out, site.shift, looks, f"t{number}_")
         for i, tree in enumerate(trees):
             if i % 1000 == 0:
                 site.check_going()
-            writer.write(tree, first + i)
+            writer.write(tree, first + i, float(heights[i]))
         writer.appearance()
         citygml.end(out, looks)
