@@ -6,8 +6,8 @@ import pytest
 
 from map3d.town import TownSpec
 from map3d.town.house import build
-from map3d.town.make import atlas_of
 from map3d.town.plans import plan_town
+from map3d.town.work import atlas_of
 
 KINDS = {
     "town": {"church", "townhall", "monument", "house", "gruender", "row", "villa", "slab", "industrial", "shed"},
