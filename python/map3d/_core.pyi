@@ -108,6 +108,8 @@ class Scene:
         """(2^level, 2^level) [y, x]: conservative, from the boxes of BVH nodes."""
     def block_key(self, frame: str, z: int, x: int, y: int) -> str:
         """Hex hash over all that a base block's bytes depend on."""
+    def block_keys(self, frame: str, z: int, blocks: NDArray[np.uint32]) -> list[str]:
+        """The keys of the blocks of level z at (n, 2) columns and rows, each chunk looked at once."""
     def render_block(self, frame: str, z: int, x: int, y: int) -> Block:
         """A base block rooted at (z, x, y)."""
     def gbuffer(self, frame: str, x: int, y: int) -> dict[str, NDArray[Any]]:

@@ -24,7 +24,10 @@ class SquareScene:
             grid[int(v * 2**level), int(u * 2**level)] = True
         return grid
 
-    def block_key(self, frame: str, z: int, x: int, y: int) -> str:
+    def block_keys(self, frame: str, z: int, blocks: np.ndarray) -> list[str]:
+        return [self._block_key(frame, z, int(x), int(y)) for x, y in blocks]
+
+    def _block_key(self, frame: str, z: int, x: int, y: int) -> str:
         mine = [name for (u, v), name in sorted(self.content.items()) if (int(u * 2**z), int(v * 2**z)) == (x, y)]
         return hashlib.sha256(json.dumps([frame, z, x, y, mine]).encode()).hexdigest()[:16]
 

@@ -83,7 +83,7 @@ def test_a_plan_too_deep_is_refused_saying_so() -> None:
         planned_occupancy(SquareScene({}), record, record.frames[0])
 
 
-def test_progress_counts_every_block() -> None:
+def test_progress_counts_every_view() -> None:
     seen: list[tuple[int, int]] = []
     plan_jobs(SquareScene(CONTENT), rendering(), {}, lambda done, total: seen.append((done, total)))
-    assert seen == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    assert seen == [(0, 2), (1, 2)]

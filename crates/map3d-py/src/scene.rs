@@ -69,6 +69,17 @@ impl Scene {
         py.detach(|| self.0.block_key(&frame, root)).map_err(to_python)
     }
 
+    /// The keys of the blocks of level z at (n, 2) columns and rows; every chunk is looked at once.
+    fn block_keys(&self, py: Python<'_>, frame: &str, z: u8, blocks: PyReadonlyArray2<u32>) -> PyResult<Vec<String>> {
+        let array = blocks.as_array();
+        if array.ncols() != 2 {
+            return Err(invalid(format!("blocks: shape {:?}, expected (n, 2)", array.shape())));
+        }
+        let places: Vec<[u32; 2]> = array.rows().into_iter().map(|r| [r[0], r[1]]).collect();
+        let frame = Frame::from_json(frame).map_err(to_python)?;
+        py.detach(|| self.0.block_keys(&frame, z, &places)).map_err(to_python)
+    }
+
     /// A base block rooted at (z, x, y).
     fn render_block(&self, py: Python<'_>, frame: &str, z: u8, x: u32, y: u32) -> PyResult<Block> {
         let (frame, root) = place(frame, z, x, y)?;

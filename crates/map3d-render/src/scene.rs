@@ -65,6 +65,11 @@ impl RenderScene {
         map3d_trace::block_key(&self.store, frame, root)
     }
 
+    /// The keys of the blocks of a level at these (x, y).
+    pub fn block_keys(&self, frame: &Frame, level: u8, blocks: &[[u32; 2]]) -> Result<Vec<String>> {
+        map3d_trace::occupancy::block_keys(&self.store, frame, level, blocks)
+    }
+
     /// A base block: its tiles of all layers of the frame, and its seam.
     pub fn render_block(&self, frame: &Frame, root: Tile) -> Result<Block> {
         render_block(self, frame, root)

@@ -107,7 +107,7 @@ fn compare(town: &Town, look_at: f64, pitch: f64) -> [u32; 3] {
             assert_eq!(g.normal[p], [0; 3]);
             continue;
         };
-        let source = faces[t.source as usize];
+        let source = faces[town.face_number(t.object_id, t.source, t.transform.is_some())];
         let Some(n) = expected(&eye, t, source, at).filter(|_| found.get(1).is_none_or(|second| second.0 > key + 2)) else { continue };
         // Half a unit of the stored normal at most doubles under the placement; half a unit of the result; float32 between them.
         let got = g.normal[p].map(f64::from);

@@ -2,6 +2,7 @@
 
 mod assets;
 mod cells;
+mod chunks;
 mod encode;
 mod files;
 mod ground;
@@ -10,12 +11,16 @@ mod prototypes;
 mod report;
 mod request;
 mod run;
+mod shelf;
 mod source;
 mod spill;
+mod survey;
+mod textures;
 mod triangle;
+mod unpack;
 mod vertices;
 
-pub use encode::{ChunkFile, encode_chunk};
+pub use encode::{ChunkFile, Input, encode_chunk};
 pub use report::BuildReport;
 pub use request::{BuildOptions, BuildRequest, GroundPlane};
 pub use run::build_scene;

@@ -59,6 +59,13 @@ impl Chunk {
         Self::map(path, false)
     }
 
+    /// Maps a chunk of which only few pages will be read.
+    pub(crate) fn outline(path: &Path) -> Result<Outline> {
+        let chunk = Self::map(path, false)?;
+        chunk.validate_objects()?;
+        Ok(Outline(chunk))
+    }
+
     fn map(path: &Path, with_checksum: bool) -> Result<Self> {
         let map = file::map(path)?;
         file::check_header(path, &map, CHUNK_MAGIC, VERSION, with_checksum)?;
@@ -150,6 +157,10 @@ impl Chunk {
                 return Err(Error::format(&self.path, format!("triangle {i}: material, object or uv out of range")));
             }
         }
+        self.validate_objects()
+    }
+
+    fn validate_objects(&self) -> Result<()> {
         match self.objects().iter().position(|o| o.id == 0 || !o.bounds.iter().all(|v| v.is_finite())) {
             Some(i) => Err(Error::format(&self.path, format!("object {i}: id 0 or a box that is not finite"))),
             None => Ok(()),
@@ -190,6 +201,41 @@ impl Chunk {
             return Ok(());
         }
         Err(Error::format(&self.path, "a node, leaf or triangle is not reached from the root"))
+    }
+}
+
+/// A chunk mapped for a look at its boxes: what is asked for is checked when it is asked for, the rest is not read.
+#[derive(Debug)]
+pub struct Outline(Chunk);
+
+impl Outline {
+    pub fn origin(&self) -> Vec3 {
+        self.0.header.origin
+    }
+
+    pub fn checksum(&self) -> u64 {
+        self.0.header.checksum
+    }
+
+    pub fn objects(&self) -> &[ChunkObject] {
+        self.0.objects()
+    }
+
+    /// Children come after their parents, so that a walk down ends.
+    pub fn node(&self, number: u32) -> Result<&Node> {
+        let node = self.0.nodes().get(number as usize).ok_or_else(|| self.fail("node", number))?;
+        match node.child.iter().all(|c| *c == EMPTY || c & LEAF_BIT != 0 || *c > number) {
+            true => Ok(node),
+            false => Err(self.fail("child of node", number)),
+        }
+    }
+
+    pub fn leaf(&self, number: u32) -> Result<&Leaf> {
+        self.0.leaves().get(number as usize).ok_or_else(|| self.fail("leaf", number))
+    }
+
+    fn fail(&self, what: &str, number: u32) -> Error {
+        Error::format(&self.0.path, format!("{what} {number}: out of range"))
     }
 }
 

@@ -10,7 +10,7 @@ pub mod records;
 pub mod store;
 pub mod top;
 
-pub use chunk::Chunk;
+pub use chunk::{Chunk, Outline};
 pub use index::SceneIndex;
 pub use records::{ChunkObject, InstanceRecord, Leaf, MaterialRecord, Node, TriangleRecord};
 pub use store::{Part, SceneStore, StoreStats};

@@ -34,7 +34,20 @@ pub struct ChunkHeader {
     pub objects: u32,
     pub materials: u32,
     pub flags: u32,
-    pub padding: [u8; 40],
+    /// Hash of the triangles that were sorted together and what else their chunks depend on; zeros in a prototype.
+    pub input: [u64; 2],
+    /// How many chunks those triangles became.
+    pub parts: u32,
+    pub padding: [u8; 20],
+}
+
+impl ChunkHeader {
+    /// The box in the frame of `origin`'s coordinates.
+    pub fn placed_bounds(&self) -> [[f64; 3]; 2] {
+        let (o, b) = (self.origin, self.bounds.map(f64::from));
+        let corner = |k: usize| [o[0] + b[k], o[1] + b[k + 1], o[2] + b[k + 2]];
+        [corner(0), corner(3)]
+    }
 }
 
 /// Eight children with their boxes, relative to the chunk's origin.
@@ -66,7 +79,7 @@ pub struct TriangleRecord {
     pub material: u32,
     /// Index into `Chunk::objects`.
     pub object: u32,
-    /// Number in the asset: settles ties.
+    /// Number among its object's triangles in the asset (a prototype's: among the prototype's): settles ties.
     pub source: u32,
     pub rank: u8,
     pub padding: [u8; 3],

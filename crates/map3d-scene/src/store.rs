@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use map3d_base::{Box3, Error, Result, Vec3};
 
-use crate::chunk::Chunk;
+use crate::chunk::{Chunk, Outline};
 use crate::index::{ChunkEntry, SceneIndex};
 use crate::instances;
 use crate::records::InstanceRecord;
@@ -145,15 +145,27 @@ impl SceneStore {
         Ok(self.keep(number, chunk))
     }
 
+    /// A look at a chunk's boxes without reading the rest of it; not kept.
+    pub fn outline(&self, number: u32) -> Result<Outline> {
+        let path = self.folder.join(&self.entry(number).file);
+        let outline = Chunk::outline(&path)?;
+        self.check_hash(number, path, outline.checksum())?;
+        Ok(outline)
+    }
+
     fn open_chunk(&self, number: u32, validated: bool) -> Result<Chunk> {
-        let entry = self.entry(number);
-        let path = self.folder.join(&entry.file);
+        let path = self.folder.join(&self.entry(number).file);
         let chunk = if validated { Chunk::open_trusted(&path)? } else { Chunk::open(&path, false)? };
-        let found = format!("{:016x}", chunk.checksum());
-        if found != entry.hash {
-            return Err(Error::format(path, format!("hash {found}, scene.json says {}: the scene was rebuilt, open it again", entry.hash)));
-        }
+        self.check_hash(number, path, chunk.checksum())?;
         Ok(chunk)
+    }
+
+    fn check_hash(&self, number: u32, path: PathBuf, checksum: u64) -> Result<()> {
+        let (found, expected) = (format!("{checksum:016x}"), &self.entry(number).hash);
+        if found != *expected {
+            return Err(Error::format(path, format!("hash {found}, scene.json says {expected}: the scene was rebuilt, open it again")));
+        }
+        Ok(())
     }
 
     /// Stores a chunk unless another thread was faster; unmaps the least recently used over the cap.

@@ -1,11 +1,16 @@
-//! Which tiles can have content, and what a block's bytes depend on. Both are decided from boxes, and never leave out what can be seen.
+//! Which tiles can have content, decided from boxes and never leaving out what can be seen.
 
-use map3d_base::tile::{MAX_LEVEL, Tile};
-use map3d_base::{Box3, Error, Frame, RENDER_FORMAT, Result, Vec3, ViewAxes};
+mod keys;
+
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+
+use map3d_base::{Box3, Error, Frame, Result, Vec3, ViewAxes};
 use map3d_scene::instances::{place, placed_box};
 use map3d_scene::records::{EMPTY, LEAF_BIT};
-use map3d_scene::{Chunk, Leaf, SceneStore};
-use twox_hash::XxHash3_128;
+use map3d_scene::{Leaf, Outline, Part, SceneStore};
+
+pub use keys::{block_key, block_keys};
 
 /// Beyond this the flags would not fit memory.
 const MAX_FLAGS_LEVEL: u8 = 14;
@@ -20,6 +25,7 @@ pub fn occupied(scene: &SceneStore, frame: &Frame, level: u8) -> Result<Vec<bool
     }
     let view = TileView::new(frame, level);
     let mut flags = Flags { side: 1 << level, flags: vec![false; 1 << (2 * level)] };
+    let mut outlines = Outlines::default();
     for part in scene.parts() {
         let rect = view.rect(&part.bounds);
         if !flags.has_unset(&rect) {
@@ -29,22 +35,40 @@ pub fn occupied(scene: &SceneStore, frame: &Frame, level: u8) -> Result<Vec<bool
             flags.set(&rect);
             continue;
         }
-        let chunk = scene.chunk(part.chunk)?;
         let transform = part.instance.map(|k| scene.instances()[k as usize].transform);
-        descend(&chunk, transform.as_ref(), &view, &mut flags);
+        descend(outlines.get(scene, part)?, transform.as_ref(), &view, &mut flags)?;
     }
     Ok(flags.flags)
 }
 
-fn descend(chunk: &Chunk, transform: Option<&[f64; 12]>, view: &TileView, flags: &mut Flags) {
+/// The outlines of prototypes stay open, since many instances ask for them; a chunk is asked for once.
+#[derive(Default)]
+struct Outlines {
+    prototypes: HashMap<u32, Outline>,
+    chunk: Option<Outline>,
+}
+
+impl Outlines {
+    fn get(&mut self, scene: &SceneStore, part: &Part) -> Result<&Outline> {
+        if part.instance.is_none() {
+            return Ok(self.chunk.insert(scene.outline(part.chunk)?));
+        }
+        Ok(match self.prototypes.entry(part.chunk) {
+            Entry::Occupied(known) => known.into_mut(),
+            Entry::Vacant(free) => free.insert(scene.outline(part.chunk)?),
+        })
+    }
+}
+
+fn descend(chunk: &Outline, transform: Option<&[f64; 12]>, view: &TileView, flags: &mut Flags) -> Result<()> {
     let origin = chunk.origin();
     let mut stack = vec![0u32];
     while let Some(child) = stack.pop() {
         if child & LEAF_BIT != 0 {
-            mark_leaf(&chunk.leaves()[(child & !LEAF_BIT) as usize], origin, transform, view, flags);
+            mark_leaf(chunk.leaf(child & !LEAF_BIT)?, origin, transform, view, flags);
             continue;
         }
-        let node = &chunk.nodes()[child as usize];
+        let node = chunk.node(child)?;
         for k in (0..8).filter(|k| node.child[*k] != EMPTY) {
             let b = [0, 1, 2, 3, 4, 5].map(|a| origin[a % 3] + f64::from(node.bounds[a][k]));
             let bounds = Box3 { lo: [b[0], b[1], b[2]], hi: [b[3], b[4], b[5]] };
@@ -59,6 +83,7 @@ fn descend(chunk: &Chunk, transform: Option<&[f64; 12]>, view: &TileView, flags:
             }
         }
     }
+    Ok(())
 }
 
 fn mark_leaf(leaf: &Leaf, origin: Vec3, transform: Option<&[f64; 12]>, view: &TileView, flags: &mut Flags) {
@@ -83,8 +108,8 @@ struct TileView {
 /// In tiles, both ends included.
 #[derive(Clone, Copy, Debug)]
 struct Rect {
-    lo: [f64; 2],
-    hi: [f64; 2],
+    pub lo: [f64; 2],
+    pub hi: [f64; 2],
 }
 
 impl Rect {
@@ -94,7 +119,7 @@ impl Rect {
 }
 
 impl TileView {
-    fn new(frame: &Frame, level: u8) -> Self {
+    pub fn new(frame: &Frame, level: u8) -> Self {
         let tile_m = frame.size_m / f64::from(1u32 << level);
         let room = (frame.pixel_m(frame.zmax) / 64.0 + 1e-6) / tile_m;
         Self { axes: frame.axes(), origin: [frame.u0_m, frame.v0_m], tile_m, room }
@@ -105,7 +130,7 @@ impl TileView {
         [(u - self.origin[0]) / self.tile_m, (self.origin[1] - v) / self.tile_m]
     }
 
-    fn rect(&self, b: &Box3) -> Rect {
+    pub fn rect(&self, b: &Box3) -> Rect {
         let (center, half) = (self.tiles(b.center()), b.half_extents());
         let spread = |axis: Vec3| (0..3).map(|k| axis[k].abs() * half[k]).sum::<f64>() / self.tile_m * (1.0 + 1e-12) + self.room;
         let spread = [spread(self.axes.right), spread(self.axes.up)];
@@ -160,59 +185,4 @@ fn edge_separates(a: [f64; 2], b: [f64; 2], c: [f64; 2], rect: &Rect) -> bool {
     let sign = if side(c) < 0.0 { -1.0 } else { 1.0 };
     let nearest = [0, 1].map(|k| if sign * normal[k] > 0.0 { rect.hi[k] } else { rect.lo[k] });
     side(c) != 0.0 && sign * side(nearest) < 0.0
-}
-
-/// Hex hash over all that the bytes of the base block rooted at `root` depend on: the format, the frame, and every object and instance whose box meets
-/// the block's beam.
-pub fn block_key(scene: &SceneStore, frame: &Frame, root: Tile) -> Result<String> {
-    frame.validate()?;
-    if root.z > MAX_LEVEL || root.x >> root.z != 0 || root.y >> root.z != 0 {
-        return Err(Error::argument(format!("block ({}, {}, {}): no such tile", root.z, root.x, root.y)));
-    }
-    let view = TileView::new(frame, root.z);
-    let meets = |b: &Box3| {
-        let rect = view.rect(b);
-        let at = [f64::from(root.x), f64::from(root.y)];
-        (0..2).all(|k| rect.hi[k] >= at[k] && rect.lo[k] <= at[k] + 1.0)
-    };
-    let mut hash = XxHash3_128::with_seed(0);
-    write_frame(&mut hash, frame, root);
-    for [id, a, b] in contents(scene, &meets)? {
-        [id, a, b].iter().for_each(|v| hash.write(&v.to_le_bytes()));
-    }
-    Ok(format!("{:032x}", hash.finish_128()))
-}
-
-/// (id, content hash) of what meets a beam, sorted.
-fn contents(scene: &SceneStore, meets: &dyn Fn(&Box3) -> bool) -> Result<Vec<[u64; 3]>> {
-    let mut numbers = Vec::new();
-    scene.candidate_parts(meets, &mut numbers);
-    let mut out = Vec::new();
-    for part in numbers.iter().map(|k| &scene.parts()[*k as usize]).filter(|p| meets(&p.bounds)) {
-        if let Some(k) = part.instance {
-            let record = &scene.instances()[k as usize];
-            out.push([u64::from(record.object_id), record.content[0], record.content[1]]);
-            continue;
-        }
-        let chunk = scene.chunk(part.chunk)?;
-        let o = chunk.origin();
-        for object in chunk.objects() {
-            let b = [0, 1, 2, 3, 4, 5].map(|k| o[k % 3] + f64::from(object.bounds[k]));
-            if meets(&Box3 { lo: [b[0], b[1], b[2]], hi: [b[3], b[4], b[5]] }) {
-                out.push([u64::from(object.id), object.content[0], object.content[1]]);
-            }
-        }
-    }
-    out.sort_unstable();
-    Ok(out)
-}
-
-fn write_frame(hash: &mut XxHash3_128, frame: &Frame, root: Tile) {
-    let numbers = [frame.look_at_deg, frame.pitch_deg, frame.u0_m, frame.v0_m, frame.d0_m, frame.size_m];
-    hash.write(&RENDER_FORMAT.to_le_bytes());
-    numbers.iter().for_each(|v| hash.write(&v.to_bits().to_le_bytes()));
-    [frame.tile_px, u32::from(frame.zmax), u32::from(root.z), root.x, root.y].iter().for_each(|v| hash.write(&v.to_le_bytes()));
-    for layer in &frame.layers {
-        hash.write(&[layer.kind as u8, layer.format as u8, layer.quality]);
-    }
 }

@@ -5,6 +5,7 @@ mod scenes;
 use map3d_base::asset::Rank;
 use map3d_base::tile::Tile;
 use map3d_scene::SceneStore;
+use map3d_trace::occupancy::block_keys;
 use map3d_trace::{BeamTracer, Opaque, SUBTILE_PX, block_key, occupied};
 use scenes::{Dice, Soup, build, frame, new_folder, open, rebuild};
 
@@ -74,8 +75,43 @@ fn a_block_key_changes_with_what_the_block_shows() {
     let after = keys(&open(&folder));
     let changed: Vec<bool> = before.iter().zip(&after).map(|(a, b)| a != b).collect();
     assert_eq!(changed, [false, true, false, false]);
+    let all: Vec<[u32; 2]> = (0..4).map(|k| [k % 2, k / 2]).collect();
+    assert_eq!(block_keys(&open(&folder), &frame, 1, &all).expect("keys"), after, "one by one or together");
+    assert!(block_keys(&store, &frame, 1, &[[0, 0], [0, 2]]).is_err());
     frame.pitch_deg = 89.0;
     let turned = block_key(&open(&folder), &frame, Tile { z: 1, x: 0, y: 0 }).expect("key");
     assert_ne!(turned, after[0]);
     assert!(block_key(&store, &frame, Tile { z: 1, x: 2, y: 0 }).is_err());
+}
+
+#[test]
+fn a_key_changes_just_when_something_in_the_beam_does() {
+    let folder = new_folder("keys");
+    let mut soup = houses(9);
+    build(&folder, &soup);
+    let mut frame = frame(30.0, 45.0, 128.0);
+    frame.zmax = 6;
+    let places: Vec<[u32; 2]> = (0..64).map(|k| [k % 8, k / 8]).collect();
+    let before = block_keys(&open(&folder), &frame, 3, &places).expect("keys");
+    assert_eq!(before.iter().collect::<std::collections::BTreeSet<_>>().len(), 64, "empty blocks have keys of their own too");
+    let (old, new) = (soup.faces[0].corners, soup.faces[0].corners.map(|p| [p[0] + 3.0, p[1], p[2]]));
+    soup.faces[0].corners = new;
+    rebuild(&folder, &soup);
+    let after = block_keys(&open(&folder), &frame, 3, &places).expect("keys");
+    // The object of the face is its house of four triangles.
+    let house: Vec<[f64; 3]> = soup.faces.iter().filter(|f| f.object == 0).flat_map(|f| f.corners).chain(old).collect();
+    let axes = frame.axes();
+    let place = |p: &[f64; 3]| {
+        let [u, v, _] = axes.uvd_from_local(*p);
+        [(u - frame.u0_m) / frame.size_m * 8.0, (frame.v0_m - v) / frame.size_m * 8.0]
+    };
+    let range = |k: usize| house.iter().map(|p| place(p)[k]).fold((f64::INFINITY, f64::NEG_INFINITY), |a, v| (a.0.min(v), a.1.max(v)));
+    let ((x0, x1), (y0, y1)) = (range(0), range(1));
+    for (([x, y], a), b) in places.iter().zip(&before).zip(&after) {
+        let (x, y) = (f64::from(*x), f64::from(*y));
+        let sees = x + 1.0 > x0 && x < x1 && y + 1.0 > y0 && y < y1;
+        let near = x + 1.5 > x0 && x - 0.5 < x1 && y + 1.5 > y0 && y - 0.5 < y1;
+        assert!(!sees || a != b, "block {x} {y} shows the house and has its old key");
+        assert!(near || a == b, "block {x} {y} does not show the house and has a new key");
+    }
 }

@@ -98,7 +98,8 @@ class SqliteJobs:
 
     def jobs(self, rendering: str, view: str | None = None, state: State | None = None) -> Iterator[Job]:
         with self._database.reading() as db:
-            rows = [row for row in _job_rows(db, rendering) if view in (None, row["view"]) and state in (None, row["state"])]
+            query = "SELECT * FROM job WHERE rendering = ?1 AND (?2 IS NULL OR view = ?2) AND (?3 IS NULL OR state = ?3) ORDER BY view, z, morton"
+            rows = db.execute(query, (rendering, view, state)).fetchall()
         return (_job(row) for row in rows)
 
     def count_jobs(self, rendering: str) -> dict[State, int]:

@@ -1,8 +1,11 @@
 """map3d estimate."""
 
+from dataclasses import asdict
+
 import click
 
 from map3d.catalogue import Workspace
+from map3d.cli.building import build_with_progress
 from map3d.cli.options import json_option, workers_option, workspace_option
 from map3d.cli.output import print_json, size_text, time_text
 
@@ -13,16 +16,20 @@ from map3d.cli.output import print_json, size_text, time_text
 @json_option
 @workspace_option
 def command(workspace: Workspace, rendering: str, workers: int, as_json: bool) -> None:
-    """Say how many tiles, bytes and minutes RENDERING will take, before any of it is done."""
+    """Say how many tiles, bytes and minutes RENDERING will take, before any of it is done.
+
+    Of a rendering that is there, what changed since counts as still to render. The scene is built first if its files changed.
+    """
     from map3d.jobs.estimate import estimate
 
     catalogue = workspace.open_catalogue()
     try:
+        built = build_with_progress(workspace, catalogue, catalogue.rendering(rendering).scene, threads=workers)
         found = estimate(workspace, catalogue, rendering, workers)
     finally:
         catalogue.close()
     if as_json:
-        print_json(found)
+        print_json({**asdict(found), "build": built})
         return
     click.echo(
         f"{rendering}: about {found.base_tiles:,} base tiles, {found.tiles:,} tiles on all levels, {found.images:,} images, {size_text(found.bytes)}"

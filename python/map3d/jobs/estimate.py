@@ -1,18 +1,18 @@
 """What a rendering will take, before any work: tiles counted from the plan, bytes and time from what is known of its tiles."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from map3d import _core
-from map3d.catalogue import Catalogue, RenderingRecord, State, Workspace
+from map3d.catalogue import Catalogue, Job, PlannedJob, RenderingRecord, State, Workspace
 from map3d.errors import BadRequest
 from map3d.geometry.frames import PinnedFrame
 from map3d.render.build import is_stale, open_scene
-from map3d.render.plan import frame_text, planned_occupancy
+from map3d.render.plan import PlannedScene, frame_text, plan_jobs, planned_occupancy
 from map3d.tiles.naming import block_levels, morton
 from map3d.tiles.occupancy import Occupancy
 from map3d.types import BlockId
@@ -51,33 +51,58 @@ class Estimate:
 
 
 def estimate(workspace: Workspace, catalogue: Catalogue, name: str, workers: int) -> Estimate:
-    """Raises BadRequest when the scene is not built as it is now."""
+    """Plans in earnest, without keeping the plan: blocks whose content changed since they were rendered count as open. Raises BadRequest when the
+    scene is not built as it is now."""
     record = catalogue.rendering(name)
     if is_stale(workspace, catalogue, record.scene):
         raise BadRequest(f"scene {record.scene} has changed since it was built; map3d render {name} builds it first")
     scene = open_scene(workspace, record.scene, 256 << 20)
     plans = {frame.id: planned_occupancy(scene, record, frame) for frame in record.frames}
-    rate = _recorded(catalogue, record, plans) or _sampled(scene, record, plans)
-    base = sum(plan.count(record.zmax) for plan in plans.values())
-    tiles = sum(plan.count() for plan in plans.values())
-    done = sum(job.result.base_tiles for job in catalogue.jobs(name, state=State.DONE) if job.kind == "base" and job.result is not None)
-    filled = round(base * rate.filled)
-    open_tiles = max(filled - done, 0)
+    known = {(job.view, job.block): job for job in catalogue.jobs(name)}
+    rate = _recorded(list(known.values()), record, plans) or _sampled(scene, record, plans)
+    tiles_of = _tiles(plans, known, record, rate)
+    open_tiles = sum(tiles_of[job.view, job.block] for job in open_blocks(scene, record, known))
+    base, planned = sum(tiles_of.values()), sum(plan.count(record.zmax) for plan in plans.values())
+    tiles = sum(plan.count() for plan in plans.values()) * base / planned if planned else 0.0
     return Estimate(
-        base_tiles=filled,
-        tiles=round(tiles * rate.filled),
-        images=round(tiles * rate.filled) * len(record.layers),
-        bytes=round(filled * rate.bytes_a_tile),
-        open_tiles=open_tiles,
+        base_tiles=round(base),
+        tiles=round(tiles),
+        images=round(tiles) * len(record.layers),
+        bytes=round(base * rate.bytes_a_tile),
+        open_tiles=round(open_tiles),
         seconds=open_tiles * rate.seconds_a_tile / workers,
         workers=workers,
         how=rate.how,
     )
 
 
-def _recorded(catalogue: Catalogue, record: RenderingRecord, plans: dict[str, Occupancy]) -> Rate | None:
+def open_blocks(scene: PlannedScene, record: RenderingRecord, known: Mapping[tuple[str, BlockId], Job]) -> list[PlannedJob]:
+    """Base blocks that `map3d render` would render now: new ones, changed ones, and those that are not done."""
+    blocks: dict[str, list[BlockId]] = {}
+    for (view, block), job in known.items():
+        if job.kind == "base":
+            blocks.setdefault(view, []).append(block)
+    planned = [job for job in plan_jobs(scene, record, blocks) if job.kind == "base"]
+    stands = {place: job.key for place, job in known.items() if job.state is State.DONE}
+    return [job for job in planned if stands.get((job.view, job.block)) != job.key]
+
+
+def _tiles(
+    plans: Mapping[str, Occupancy], known: Mapping[tuple[str, BlockId], Job], record: RenderingRecord, rate: Rate
+) -> dict[tuple[str, BlockId], float]:
+    """Base tiles with content of every base block: as counted when it was rendered, else what the plan lets expect."""
+    root = block_levels(record.zmax)[0].root
+    found = {
+        (view, block): _tiles_within(plan, block, record.zmax - root) * rate.filled
+        for view, plan in plans.items()
+        for block in (BlockId(*tile) for tile in plan.tiles(root))
+    }
+    counted = {place: float(job.result.base_tiles) for place, job in known.items() if place in found and job.result is not None}
+    return {**{place: 0.0 for place, job in known.items() if job.kind == "base"}, **found, **counted}
+
+
+def _recorded(jobs: Sequence[Job], record: RenderingRecord, plans: Mapping[str, Occupancy]) -> Rate | None:
     """From the blocks that are done, if they are many enough, or all."""
-    jobs = list(catalogue.jobs(record.name))
     done = [job for job in jobs if job.state is State.DONE and job.result is not None]
     base = [job for job in done if job.kind == "base" and job.result is not None and not job.result.empty]
     if not base or (len(base) < RECORDED_BLOCKS and len(done) < len(jobs)):
@@ -90,7 +115,7 @@ def _recorded(catalogue: Catalogue, record: RenderingRecord, plans: dict[str, Oc
     return Rate(sum(result.bytes for result in results) / tiles, sum(result.seconds for result in results) / tiles, tiles / max(planned, 1), how)
 
 
-def _sampled(scene: _core.Scene, record: RenderingRecord, plans: dict[str, Occupancy]) -> Rate:
+def _sampled(scene: _core.Scene, record: RenderingRecord, plans: Mapping[str, Occupancy]) -> Rate:
     """From a few blocks spread over all views, rendered now and thrown away."""
     root = block_levels(record.zmax)[0].root
     blocks = [(frame, BlockId(*tile)) for frame in record.frames for tile in plans[frame.id].tiles(root)]

@@ -46,14 +46,19 @@ def current_manifest(workspace: Workspace, catalogue: Catalogue, record: Renderi
         layers=record.layers,
         views=tuple(_view(workspace, record, frame, planned.get(frame.id)) for frame in record.frames),
         objects=objects,
+        start=_start(record, box),
     )
+
+
+def _start(record: RenderingRecord, box: Box) -> Vec3 | None:
+    """The middle of a rendering's window; None, which is the box's middle, without one."""
+    window = record.window
+    return None if window is None else (window.x_m, window.y_m, (box[0][2] + box[1][2]) / 2)
 
 
 def stored_occupancy(store: TileStore) -> Occupancy:
     """Exact: the tiles of level zmax that are in the store, whatever their layer."""
-    zmax = store.shape.zmax
-    tiles = {(tile.x, tile.y) for layer in range(len(store.shape.layers)) for tile in store.list_tiles(layer) if tile.z == zmax}
-    return Occupancy.from_tiles(zmax, tiles)
+    return Occupancy.from_tiles(store.shape.zmax, store.list_places(store.shape.zmax))
 
 
 def _view(workspace: Workspace, record: RenderingRecord, frame: PinnedFrame, planned: Occupancy | None) -> ViewFacts:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from map3d.catalogue import PlannedJob, RenderingRecord
 from map3d.errors import LimitExceeded, OutsideFrame
-from map3d.geometry.frames import PinnedFrame
+from map3d.geometry.frames import PinnedFrame, check_content
 from map3d.tiles.naming import block_above, block_level, block_levels, morton
 from map3d.tiles.occupancy import Occupancy
 from map3d.types import BlockId, Box
@@ -27,28 +27,24 @@ class PlannedScene(Protocol):
 
     def occupied(self, frame: str, level: int) -> NDArray[np.bool_]: ...
 
-    def block_key(self, frame: str, z: int, x: int, y: int) -> str: ...
+    def block_keys(self, frame: str, z: int, blocks: NDArray[np.uint32]) -> list[str]: ...
 
 
 def plan_jobs(
     scene: PlannedScene, rendering: RenderingRecord, known: Mapping[str, Collection[BlockId]], progress: Callable[[int, int], None] | None = None
 ) -> list[PlannedJob]:
-    """Every block that has or had content, of all views. `known`: view → base blocks that were planned before.
+    """Every block that has or had content, of all views. `known`: view → base blocks that were planned before; `progress` counts views.
 
     Raises OutsideFrame when content has left the pinned square, LimitExceeded for a plan too large.
     """
-    wanted = {frame.id: _base_blocks(scene, rendering, frame, known.get(frame.id, ())) for frame in rendering.frames}
-    total, done = sum(map(len, wanted.values())), 0
     jobs: list[PlannedJob] = []
-    for frame in rendering.frames:
-        text = frame_text(rendering, frame)
-        keys: dict[BlockId, str] = {}
-        for block in wanted[frame.id]:
-            keys[block] = scene.block_key(text, *block)
-            done += 1
-            if progress is not None:
-                progress(done, total)
-        jobs += _with_reduces(frame, keys, settings_hash(rendering))
+    for done, frame in enumerate(rendering.frames):
+        if progress is not None:
+            progress(done, len(rendering.frames))
+        blocks = _base_blocks(scene, rendering, frame, known.get(frame.id, ()))
+        places = np.array([(block.x, block.y) for block in blocks], np.uint32).reshape(-1, 2)
+        keys = scene.block_keys(frame_text(rendering, frame), block_levels(frame.zmax)[0].root, places)
+        jobs += _with_reduces(frame, dict(zip(blocks, keys, strict=True)), settings_hash(rendering))
     return jobs
 
 
@@ -74,7 +70,7 @@ def settings_hash(rendering: RenderingRecord) -> str:
 def _base_blocks(scene: PlannedScene, rendering: RenderingRecord, frame: PinnedFrame, known: Iterable[BlockId]) -> list[BlockId]:
     """Occupied ones and those known from before, in Morton order."""
     try:
-        frame.check_holds(scene.box)
+        check_content(frame, scene.box, rendering.window)
     except OutsideFrame as error:
         raise OutsideFrame(f"rendering {rendering.name}: {error}") from error
     root = block_levels(frame.zmax)[0].root

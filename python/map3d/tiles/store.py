@@ -72,6 +72,9 @@ class TileStore(Protocol):
     def list_tiles(self, layer: int) -> Iterator[TileId]:
         """Every stored tile of a layer, by level, then column, then row."""
 
+    def list_places(self, z: int) -> list[tuple[int, int]]:
+        """Columns and rows of the stored tiles of a level, whatever their layer, each once, in any order."""
+
     def remove_block(self, block: BlockId) -> bool:
         """False: there was none."""
 

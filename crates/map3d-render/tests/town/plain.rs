@@ -39,7 +39,13 @@ impl<'a> Plain<'a> {
         let depth = (self.eye.depth(best, at) + 0.5).floor().clamp(0.0, f64::from(DEPTH_NOTHING - 1)) as u32;
         let w = self.eye.weights(best, at);
         let uv = [0, 1].map(|k| (0..3).map(|c| w[c] * best.uv[c][k]).sum());
-        Some(Met { face: best.source as usize, id: best.object_id, depth, normal: best.normal, uv })
+        Some(Met {
+            face: self.town.face_number(best.object_id, best.source, best.transform.is_some()),
+            id: best.object_id,
+            depth,
+            normal: best.normal,
+            uv,
+        })
     }
 
     /// Sample k of pixel (i, j).

@@ -1,9 +1,163 @@
-//! The assets of a scene, opened: meshes stay mapped files.
+//! The assets of a scene: opened when they are needed, meshes stay mapped files; and what earlier builds remember of them.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use map3d_base::asset::{AssetMesh, Instance, Material, Materials};
 use map3d_base::{Error, Result};
+use twox_hash::XxHash3_128;
+
+use super::BuildRequest;
+use super::files::prune;
+use super::survey::{EXTENSION, Survey};
+
+/// Raised when surveys or chunks would come out differently from the same assets.
+pub(super) const BUILD_FORMAT: u32 = 1;
+const FOLDER: &str = "build";
+
+/// The assets of a request, by number.
+pub(super) struct Assets {
+    entries: Vec<Entry>,
+    surveys_at: PathBuf,
+    /// Surveys that assets had before they changed or went.
+    former: Vec<Survey>,
+}
+
+struct Entry {
+    folder: PathBuf,
+    mark: String,
+    opened: Option<Asset>,
+    survey: Option<Survey>,
+    /// The survey was made by this build.
+    is_new: bool,
+}
+
+impl Assets {
+    /// Looks at all assets without opening them; those whose survey still holds need not be opened.
+    pub fn load(folder: &Path, request: &BuildRequest) -> Result<Self> {
+        let surveys_at = folder.join(FOLDER);
+        let mut out = Self { entries: Vec::new(), surveys_at, former: Vec::new() };
+        for name in &request.assets {
+            let place = folder.join("assets").join(name);
+            let mark = mark_of(&place, request)?;
+            let survey = Survey::read(&out.path_of(name));
+            let holds = survey.as_ref().is_some_and(|s| s.facts.mark == mark && s.facts.prototypes.iter().all(|p| folder.join(p).exists()));
+            let (survey, former) = if holds { (survey, None) } else { (None, survey) };
+            out.former.extend(former);
+            out.entries.push(Entry { folder: place, mark, opened: None, survey, is_new: false });
+        }
+        out.former.extend(out.gone(&request.assets)?);
+        Ok(out)
+    }
+
+    /// Surveys of assets that the request does not name.
+    fn gone(&self, names: &[String]) -> Result<Vec<Survey>> {
+        let Ok(entries) = std::fs::read_dir(&self.surveys_at) else { return Ok(Vec::new()) };
+        let names: BTreeSet<PathBuf> = names.iter().map(|n| self.path_of(n)).collect();
+        let paths: Vec<PathBuf> = entries.map(|e| e.map(|e| e.path()).map_err(|e| Error::storage(&self.surveys_at, e))).collect::<Result<_>>()?;
+        Ok(paths.iter().filter(|p| !names.contains(*p)).filter_map(|p| Survey::read(p)).collect())
+    }
+
+    fn path_of(&self, name: &str) -> PathBuf {
+        self.surveys_at.join(format!("{name}.{EXTENSION}"))
+    }
+
+    pub fn len(&self) -> usize {
+        self.entries.len()
+    }
+
+    /// Opens an asset, if it is not yet.
+    pub fn open(&mut self, k: usize) -> Result<&Asset> {
+        if self.entries[k].opened.is_none() {
+            self.entries[k].opened = Some(Asset::open(self.entries[k].folder.clone())?);
+        }
+        Ok(self.get(k))
+    }
+
+    /// One that was opened.
+    pub fn get(&self, k: usize) -> &Asset {
+        self.entries[k].opened.as_ref().expect("opened before")
+    }
+
+    pub fn close_all(&mut self) {
+        self.entries.iter_mut().for_each(|e| e.opened = None);
+    }
+
+    pub fn survey(&self, k: usize) -> Option<&Survey> {
+        self.entries[k].survey.as_ref()
+    }
+
+    /// In the order of the assets, of those that have one.
+    pub fn surveys(&self) -> impl Iterator<Item = &Survey> {
+        self.entries.iter().filter_map(|e| e.survey.as_ref())
+    }
+
+    pub fn former(&self) -> impl Iterator<Item = &Survey> {
+        self.former.iter()
+    }
+
+    pub fn is_new(&self, k: usize) -> bool {
+        self.entries[k].is_new
+    }
+
+    /// What the assets were before: surveys that still hold, and former ones.
+    pub fn before(&self) -> impl Iterator<Item = &Survey> {
+        self.entries.iter().filter(|e| !e.is_new).filter_map(|e| e.survey.as_ref()).chain(&self.former)
+    }
+
+    pub fn without_survey(&self) -> Vec<usize> {
+        (0..self.len()).filter(|k| self.survey(*k).is_none()).collect()
+    }
+
+    /// Makes the surveys that no longer hold former ones.
+    pub fn drop_surveys(&mut self, is_outdated: impl Fn(&Survey) -> bool) {
+        let outdated = self.entries.iter_mut().filter(|e| e.survey.as_ref().is_some_and(&is_outdated));
+        self.former.extend(outdated.filter_map(|e| e.survey.take()));
+    }
+
+    /// Keeps a survey for this build and, on disk, for the next.
+    pub fn keep(&mut self, k: usize, mut survey: Survey) -> Result<()> {
+        let entry = &mut self.entries[k];
+        survey.facts.mark.clone_from(&entry.mark);
+        let name = entry.folder.file_name().and_then(|n| n.to_str()).unwrap_or_default();
+        survey.write(&self.surveys_at.join(format!("{name}.{EXTENSION}")))?;
+        (entry.survey, entry.is_new) = (Some(survey), true);
+        Ok(())
+    }
+
+    /// Removes surveys of assets that are gone, once nothing of them is left.
+    pub fn prune(&self) -> Result<()> {
+        let names: BTreeSet<&str> = self.entries.iter().filter_map(|e| e.folder.file_name()?.to_str()).collect();
+        prune(&self.surveys_at, |file| file.strip_suffix(EXTENSION).and_then(|f| f.strip_suffix('.')).is_some_and(|name| names.contains(name)))
+    }
+}
+
+/// Hash over all that a survey depends on but the keys of textures: the mesh by the checksum in its head.
+fn mark_of(folder: &Path, request: &BuildRequest) -> Result<String> {
+    let mut hash = XxHash3_128::with_seed(u64::from(BUILD_FORMAT));
+    let mut write = |bytes: &[u8]| {
+        hash.write(&(bytes.len() as u64).to_le_bytes());
+        hash.write(bytes);
+    };
+    write(env!("CARGO_PKG_VERSION").as_bytes());
+    write(bytemuck::bytes_of(&request.origin));
+    write(&serde_json::to_vec(&request.options).expect("options are plain data"));
+    let mesh = folder.join("mesh.m3a");
+    let io = |path: &Path| {
+        let path = path.to_path_buf();
+        move |e| Error::storage(&path, e)
+    };
+    let mut head = [0; 64];
+    let mut file = std::fs::File::open(&mesh).map_err(io(&mesh))?;
+    write(&file.metadata().map_err(io(&mesh))?.len().to_le_bytes());
+    std::io::Read::read_exact(&mut file, &mut head).map_err(|_| Error::format(&mesh, "truncated"))?;
+    write(&head);
+    for name in ["materials.json", "ids.u32"] {
+        let path = folder.join(name);
+        write(&std::fs::read(&path).map_err(io(&path))?);
+    }
+    Ok(format!("{:032x}", hash.finish_128()))
+}
 
 pub(super) struct Asset {
     pub folder: PathBuf,

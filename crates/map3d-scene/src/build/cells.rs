@@ -58,6 +58,12 @@ impl Square {
         bounds.lo[0] < x0 - room || bounds.lo[1] < y0 - room || bounds.hi[0] > x0 + side + room || bounds.hi[1] > y0 + side + room
     }
 
+    /// Number of the counting level's cell that holds a triangle.
+    pub fn number(&self, t: &BuildTriangle) -> u32 {
+        let [_, x, y] = self.cell(COUNT_LEVEL, t.centroid_m());
+        y << COUNT_LEVEL | x
+    }
+
     /// The cell of a level that holds a point; outside the square the nearest.
     fn cell(&self, level: u32, p: [f64; 3]) -> Cell {
         let count = f64::from(1u32 << level);
@@ -79,11 +85,13 @@ impl Square {
 /// Counts triangles per cell of `COUNT_LEVEL`, then says which cell each belongs to.
 pub(super) struct Quadtree {
     pub square: Square,
-    counts: Vec<u32>,
+    counts: Vec<u64>,
     pinned: BTreeSet<Cell>,
     /// Pinned cells and all above them.
     above_pinned: BTreeSet<Cell>,
-    sorted_into: BTreeSet<Cell>,
+    sorted_into: Vec<Cell>,
+    /// Of each cell of `COUNT_LEVEL`: index into `sorted_into`.
+    homes: Vec<u32>,
 }
 
 impl Quadtree {
@@ -93,18 +101,19 @@ impl Quadtree {
             above_pinned.extend((0..*level).map(|l| [l, x >> (level - l), y >> (level - l)]));
         }
         let counts = vec![0; 1 << (2 * COUNT_LEVEL)];
-        Self { square, counts, pinned: pinned.iter().copied().collect(), above_pinned, sorted_into: BTreeSet::new() }
+        Self { square, counts, pinned: pinned.iter().copied().collect(), above_pinned, sorted_into: Vec::new(), homes: Vec::new() }
     }
 
-    pub fn count(&mut self, t: &BuildTriangle) {
-        let [_, x, y] = self.square.cell(COUNT_LEVEL, t.centroid_m());
-        let n = &mut self.counts[(y << COUNT_LEVEL | x) as usize];
-        *n = n.saturating_add(1);
+    /// Counts `n` triangles of a cell of the counting level.
+    pub fn add(&mut self, number: u32, n: u64) {
+        if let Some(count) = self.counts.get_mut(number as usize) {
+            *count += n;
+        }
     }
 
     /// Settles the cells of up to `COUNT_LEVEL` from the counts.
     pub fn settle(&mut self) {
-        let mut pyramid = vec![std::mem::take(&mut self.counts).into_iter().map(u64::from).collect::<Vec<u64>>()];
+        let mut pyramid = vec![std::mem::take(&mut self.counts)];
         for level in (0..COUNT_LEVEL).rev() {
             let below = pyramid.last().expect("one level at least");
             let side = 1usize << level;
@@ -122,8 +131,19 @@ impl Quadtree {
             if count > 0 && level < COUNT_LEVEL && self.must_split(cell, count) {
                 stack.extend(children(cell));
             } else if count > 0 {
-                self.sorted_into.insert(cell);
+                self.sorted_into.push(cell);
             }
+        }
+        self.sorted_into.sort_unstable();
+        self.settle_homes();
+    }
+
+    fn settle_homes(&mut self) {
+        self.homes = vec![u32::MAX; 1 << (2 * COUNT_LEVEL)];
+        for ([level, x, y], number) in self.sorted_into.iter().zip(0..) {
+            let side = 1usize << (COUNT_LEVEL - level);
+            let first = ((*y as usize * side) << COUNT_LEVEL) + *x as usize * side;
+            (0..side).for_each(|row| self.homes[first + (row << COUNT_LEVEL)..][..side].fill(number));
         }
     }
 
@@ -135,15 +155,13 @@ impl Quadtree {
     }
 
     /// Cells into which triangles are sorted first; a few are split further by `leaves`.
-    pub fn sorting_cells(&self) -> Vec<Cell> {
-        self.sorted_into.iter().copied().collect()
+    pub fn sorting_cells(&self) -> &[Cell] {
+        &self.sorted_into
     }
 
-    /// The sorting cell of a triangle that was counted.
-    pub fn sorting_cell(&self, t: &BuildTriangle) -> Cell {
-        let [_, x, y] = self.square.cell(COUNT_LEVEL, t.centroid_m());
-        let up = |level: u32| [level, x >> (COUNT_LEVEL - level), y >> (COUNT_LEVEL - level)];
-        (0..=COUNT_LEVEL).map(up).find(|c| self.sorted_into.contains(c)).unwrap_or([COUNT_LEVEL, x, y])
+    /// Which of the sorting cells holds a cell of the counting level; `None`: nothing was counted there.
+    pub fn home(&self, number: u32) -> Option<usize> {
+        self.homes.get(number as usize).filter(|home| **home != u32::MAX).map(|home| *home as usize)
     }
 
     /// Splits a sorting cell's triangles down to leaf cells, in which their order stays.
@@ -211,12 +229,12 @@ mod tests {
 
     fn grow(square: Square, pinned: &[Cell], triangles: &[BuildTriangle]) -> (Quadtree, Vec<Cell>) {
         let mut tree = Quadtree::new(square, pinned);
-        triangles.iter().for_each(|t| tree.count(t));
+        triangles.iter().for_each(|t| tree.add(square.number(t), 1));
         tree.settle();
         let mut cells = Vec::new();
-        for cell in tree.sorting_cells() {
-            let mine = triangles.iter().filter(|t| tree.sorting_cell(t) == cell).copied().collect();
-            cells.extend(tree.leaves(cell, mine).into_iter().map(|l| l.0));
+        for (number, cell) in tree.sorting_cells().iter().enumerate() {
+            let mine = triangles.iter().filter(|t| tree.home(square.number(t)) == Some(number)).copied().collect();
+            cells.extend(tree.leaves(*cell, mine).into_iter().map(|l| l.0));
         }
         let pinned = tree.pin(&cells);
         (tree, pinned)

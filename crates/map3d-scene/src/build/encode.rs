@@ -1,6 +1,6 @@
 //! Triangles of a cell or prototype → the bytes of a chunk file.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use bytemuck::Zeroable;
 use map3d_base::file::{self, HEADER_BYTES, aligned};
@@ -21,13 +21,25 @@ pub struct ChunkFile {
     pub bounds: [Vec3; 2],
     pub triangles: u64,
     pub hash: u64,
-    pub duplicate_faces: u64,
+}
+
+/// Where the triangles of a chunk are from, kept in its header: hash, and the number of chunks that were made of the same input.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Input {
+    pub hash: [u64; 2],
+    pub parts: u32,
 }
 
 /// Encodes at least one triangle; `origin` is a lattice point within reach of all corners. `materials` are the build's.
-pub fn encode_chunk(mut triangles: Vec<BuildTriangle>, origin: Point, materials: &[MaterialRecord], merge_faces: bool) -> Result<ChunkFile> {
-    triangles.sort_by_key(|t| (t.object_id, t.asset, t.source));
-    let before = triangles.len();
+/// The bytes do not depend on the order of the triangles, nor on how the build numbers materials and assets.
+pub fn encode_chunk(
+    mut triangles: Vec<BuildTriangle>,
+    origin: Point,
+    materials: &[MaterialRecord],
+    merge_faces: bool,
+    input: Input,
+) -> Result<ChunkFile> {
+    triangles.sort_by_key(|t| (t.object_id, t.asset, t.source, t.corners));
     if merge_faces {
         drop_duplicates(&mut triangles);
     }
@@ -35,14 +47,14 @@ pub fn encode_chunk(mut triangles: Vec<BuildTriangle>, origin: Point, materials:
     let boxes: Vec<Aabb> = positions.iter().map(|p| Aabb::of_points(p)).collect();
     let tree = bvh::build(&boxes);
     let objects = Objects::of(&triangles, &boxes, materials);
-    let used = used_materials(&triangles);
-    let duplicate_faces = (before - triangles.len()) as u64;
+    let used = used_materials(&triangles, materials);
     let mut body = Body { header: header(origin, &tree, &boxes), bytes: Vec::new() };
+    (body.header.input, body.header.parts) = (input.hash, input.parts);
     body.geometry(&tree, &positions);
     body.records(&tree, &triangles, &objects, &used);
     body.normals(&tree, &triangles);
-    body.tables(&objects, &used, materials);
-    Ok(body.finish(duplicate_faces))
+    body.tables(&objects, &used);
+    Ok(body.finish())
 }
 
 /// The first of each set of faces with the same object, material and corners stays.
@@ -67,11 +79,17 @@ fn positions(triangles: &[BuildTriangle], origin: Point) -> Result<Vec<[[f32; 3]
     Ok(triangles.iter().map(|t| t.corners.map(place)).collect())
 }
 
-/// Build material → the chunk's own number, in ascending order.
-fn used_materials(triangles: &[BuildTriangle]) -> BTreeMap<u32, u32> {
-    let mut used: BTreeMap<u32, u32> = triangles.iter().map(|t| (t.material, 0)).collect();
-    used.values_mut().zip(0..).for_each(|(number, k)| *number = k);
-    used
+/// Materials of the build that the chunk uses, in the order of their records, and their numbers in the chunk.
+struct UsedMaterials {
+    records: Vec<MaterialRecord>,
+    numbers: HashMap<u32, u32>,
+}
+
+fn used_materials(triangles: &[BuildTriangle], materials: &[MaterialRecord]) -> UsedMaterials {
+    let used: BTreeSet<u32> = triangles.iter().map(|t| t.material).collect();
+    let mut used: Vec<u32> = used.into_iter().collect();
+    used.sort_by_key(|number| materials[*number as usize]);
+    UsedMaterials { records: used.iter().map(|n| materials[*n as usize]).collect(), numbers: used.into_iter().zip(0..).collect() }
 }
 
 fn header(origin: Point, tree: &Tree, boxes: &[Aabb]) -> ChunkHeader {
@@ -152,12 +170,12 @@ impl Body {
     }
 
     /// Triangles in the order of the leaves.
-    fn records(&mut self, tree: &Tree, triangles: &[BuildTriangle], objects: &Objects, used: &BTreeMap<u32, u32>) {
+    fn records(&mut self, tree: &Tree, triangles: &[BuildTriangle], objects: &Objects, used: &UsedMaterials) {
         for number in &tree.order {
             let t = &triangles[*number as usize];
             self.bytes.extend_from_slice(bytemuck::bytes_of(&TriangleRecord {
                 uv: t.uv,
-                material: used[&t.material],
+                material: used.numbers[&t.material],
                 object: objects.numbers[&t.object_id],
                 source: t.source,
                 rank: t.rank,
@@ -179,13 +197,13 @@ impl Body {
         self.pad();
     }
 
-    fn tables(&mut self, objects: &Objects, used: &BTreeMap<u32, u32>, materials: &[MaterialRecord]) {
-        for material in used.keys().map(|k| &materials[*k as usize]) {
+    fn tables(&mut self, objects: &Objects, used: &UsedMaterials) {
+        for material in &used.records {
             self.header.flags |= if material.is_cutout() { FLAG_CUTOUT } else { 0 };
             self.bytes.extend_from_slice(bytemuck::bytes_of(material));
         }
         self.bytes.extend_from_slice(bytemuck::cast_slice(&objects.records));
-        self.header.materials = used.len() as u32;
+        self.header.materials = used.records.len() as u32;
         self.header.objects = objects.records.len() as u32;
     }
 
@@ -193,14 +211,13 @@ impl Body {
         self.bytes.resize(aligned(self.bytes.len()), 0);
     }
 
-    fn finish(self, duplicate_faces: u64) -> ChunkFile {
+    fn finish(mut self) -> ChunkFile {
         let mut bytes = bytemuck::bytes_of(&self.header).to_vec();
-        bytes.extend_from_slice(&self.bytes);
+        bytes.append(&mut self.bytes);
         let hash = file::checksum(&bytes[HEADER_BYTES..]);
+        self.header.checksum = hash;
         bytes[8..16].copy_from_slice(&hash.to_le_bytes());
-        let (o, b) = (self.header.origin, self.header.bounds.map(f64::from));
-        let corner = |k: usize| [o[0] + b[k], o[1] + b[k + 1], o[2] + b[k + 2]];
-        let triangles = u64::from(self.header.triangles);
-        ChunkFile { bytes, origin: o, bounds: [corner(0), corner(3)], triangles, hash, duplicate_faces }
+        let header = &self.header;
+        ChunkFile { origin: header.origin, bounds: header.placed_bounds(), triangles: u64::from(header.triangles), hash, bytes }
     }
 }

@@ -33,6 +33,13 @@ impl GroundLevel {
         }
     }
 
+    /// Of both contents together.
+    pub fn merge(&mut self, other: &Self) {
+        self.bounds.add_box(&other.bounds);
+        self.has_terrain |= other.has_terrain;
+        self.ground_m = self.ground_m.min(other.ground_m);
+    }
+
     /// Triangles of the plane; `asset` is a number of its own.
     pub fn plane(&self, asset: u32, object_id: u32, material: u32) -> Result<Vec<BuildTriangle>> {
         if object_id == 0 {

@@ -6,37 +6,38 @@ use map3d_base::asset::{Material, Wrap};
 use map3d_image::texture::TextureKeys;
 
 use super::assets::Asset;
+use super::survey::record_hash;
 use crate::records::{MATERIAL_CUTOUT, MATERIAL_TEXTURED, MaterialRecord};
 
 pub(super) struct BuildMaterials {
     pub records: Vec<MaterialRecord>,
     /// Per asset: the asset's material → index into `records`.
     numbers: Vec<Vec<u32>>,
-    pub merged: u64,
-    /// Materials that name an image that is missing or broken.
-    pub without_their_texture: u64,
+    /// Of each record.
+    hashes: Vec<u64>,
+    /// Per asset: materials that name an image that is missing or broken.
+    pub without_their_texture: Vec<u64>,
 }
 
 /// sRGB of the ground plane: a calm, light grey.
 const GROUND: [u8; 4] = [200, 198, 192, 255];
 
 impl BuildMaterials {
-    pub fn new(assets: &[Asset], textures: &TextureKeys, merge: bool) -> Self {
-        let mut out = Self { records: Vec::new(), numbers: Vec::new(), merged: 0, without_their_texture: 0 };
+    pub fn new(assets: &[&Asset], textures: &TextureKeys, merge: bool) -> Self {
+        let mut out = Self { records: Vec::new(), numbers: Vec::new(), hashes: Vec::new(), without_their_texture: Vec::new() };
         let mut known = HashMap::new();
         for asset in assets {
             let numbers = asset.materials.iter().map(|m| out.add(m, textures, merge, &mut known)).collect();
             out.numbers.push(numbers);
+            let lacks = |m: &&Material| (m.texture.is_some() || m.alpha.is_some()) && textures.get(m).is_none();
+            out.without_their_texture.push(asset.materials.iter().filter(lacks).count() as u64);
         }
         out
     }
 
     fn add(&mut self, material: &Material, textures: &TextureKeys, merge: bool, known: &mut HashMap<MaterialRecord, u32>) -> u32 {
-        let named = material.texture.is_some() || material.alpha.is_some();
-        self.without_their_texture += u64::from(named && textures.get(material).is_none());
         let record = record_of(material, textures);
         if let Some(number) = known.get(&record).filter(|_| merge) {
-            self.merged += 1;
             return *number;
         }
         let number = self.push(record);
@@ -46,16 +47,31 @@ impl BuildMaterials {
 
     fn push(&mut self, record: MaterialRecord) -> u32 {
         self.records.push(record);
+        self.hashes.push(record_hash(&record));
         self.records.len() as u32 - 1
     }
 
-    /// The ground plane's material; adds it at the first call.
+    /// Adds the ground plane's material.
     pub fn ground(&mut self) -> u32 {
-        self.push(MaterialRecord { diffuse: GROUND, border: [0; 4], wrap: 0, flags: 0, padding: [0; 6], texture: [0; 16], reserved: [0; 32] })
+        self.push(Self::ground_record())
+    }
+
+    pub fn ground_record() -> MaterialRecord {
+        MaterialRecord { diffuse: GROUND, border: [0; 4], wrap: 0, flags: 0, padding: [0; 6], texture: [0; 16], reserved: [0; 32] }
     }
 
     pub fn number(&self, asset: usize, material: u32) -> u32 {
         self.numbers[asset][material as usize]
+    }
+
+    /// Hash of a material's record.
+    pub fn hash(&self, number: u32) -> u64 {
+        self.hashes[number as usize]
+    }
+
+    /// Of each of an asset's materials.
+    pub fn hashes_of(&self, asset: usize) -> Vec<u64> {
+        self.numbers[asset].iter().map(|n| self.hash(*n)).collect()
     }
 
     pub fn is_textured(&self, number: u32) -> bool {

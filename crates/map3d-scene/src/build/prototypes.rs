@@ -1,34 +1,31 @@
 //! Prototypes become chunks in a frame of their own; their placements become instance records.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use map3d_base::{Box3, Result, Vec3};
 use twox_hash::XxHash3_128;
 
-use super::encode::{ChunkFile, content_hash, encode_chunk};
+use super::encode::{ChunkFile, Input, content_hash, encode_chunk};
 use super::report::BuildReport;
 use super::source::Source;
 use super::triangle::BuildTriangle;
+use crate::index::ChunkEntry;
 use crate::lattice::Point;
 use crate::records::InstanceRecord;
 
-/// (asset, its prototype number) → triangles; ordered, so that numbers are the same in every build.
-pub(super) type Prototypes = BTreeMap<(usize, u32), Vec<BuildTriangle>>;
+/// An asset's prototype number → triangles; ordered, so that numbers are the same in every build.
+pub(super) type Prototypes = BTreeMap<u32, Vec<BuildTriangle>>;
 
-/// All prototypes of the assets that an instance places.
-pub(super) fn collect(source: &Source, report: &mut BuildReport, go_on: &mut dyn FnMut(u64) -> bool) -> Option<Prototypes> {
+/// All prototypes of an asset that an instance places; `None`: stopped.
+pub(super) fn collect(source: &Source, number: usize, report: &mut BuildReport, go_on: &mut dyn FnMut(u64) -> bool) -> Option<Prototypes> {
     let mut out = Prototypes::new();
-    for (number, asset) in source.assets.iter().enumerate() {
-        if asset.instances.is_empty() {
-            continue;
-        }
-        let placed: std::collections::BTreeSet<u32> = asset.instances.iter().map(|i| i.prototype).collect();
-        let mut put = |prototype: u32, t: &BuildTriangle| out.entry((number, prototype)).or_default().push(*t);
-        if !source.stream(number, |p| p > 0 && placed.contains(&p), report, &mut put, go_on) {
-            return None;
-        }
+    let asset = source.assets[number];
+    if asset.instances.is_empty() {
+        return Some(out);
     }
-    Some(out)
+    let placed: BTreeSet<u32> = asset.instances.iter().map(|i| i.prototype).collect();
+    let mut put = |prototype: u32, t: &BuildTriangle| out.entry(prototype).or_default().push(*t);
+    source.stream(number, |p| p > 0 && placed.contains(&p), report, &mut put, go_on).then_some(out)
 }
 
 /// The chunk of a prototype; its origin is the middle of its box.
@@ -39,27 +36,25 @@ pub(super) fn encode(triangles: &[BuildTriangle], source: &Source) -> Result<Chu
         lo + (hi - lo) / 2
     };
     let origin: Point = [middle(0), middle(1), middle(2)];
-    encode_chunk(triangles.to_vec(), origin, &source.materials.records, source.options.merge_faces)
+    encode_chunk(triangles.to_vec(), origin, &source.materials.records, source.options.merge_faces, Input::default())
 }
 
-/// Instances of prototypes that have triangles, sorted by object id, then order in the asset.
-pub(super) fn instances(source: &Source, prototypes: &Prototypes, report: &mut BuildReport) -> Vec<InstanceRecord> {
-    let numbers: BTreeMap<(usize, u32), (u32, [u64; 2])> =
+/// Instances of an asset's prototypes that have triangles, in its order; they name prototypes by their place in `prototypes`.
+pub(super) fn instances(source: &Source, number: usize, prototypes: &Prototypes, report: &mut BuildReport) -> Vec<InstanceRecord> {
+    let known: BTreeMap<u32, (u32, [u64; 2])> =
         prototypes.iter().zip(0..).map(|((key, t), k)| (*key, (k, content_hash(t, &source.materials.records)))).collect();
+    let asset = source.assets[number];
     let mut out = Vec::new();
-    for (number, asset) in source.assets.iter().enumerate() {
-        for instance in &asset.instances {
-            let Some((prototype, content)) = numbers.get(&(number, instance.prototype)) else {
-                report.instances_of_nothing += 1;
-                continue;
-            };
-            let transform = to_local(&instance.transform, source.origin);
-            let object_id = asset.ids[instance.object as usize];
-            let content = instance_hash(content, object_id, &transform);
-            out.push(InstanceRecord { prototype: *prototype, object_id, transform, content, reserved: 0 });
-        }
+    for instance in &asset.instances {
+        let Some((prototype, content)) = known.get(&instance.prototype) else {
+            report.instances_of_nothing += 1;
+            continue;
+        };
+        let transform = to_local(&instance.transform, source.origin);
+        let object_id = asset.ids[instance.object as usize];
+        let content = instance_hash(content, object_id, &transform);
+        out.push(InstanceRecord { prototype: *prototype, object_id, transform, content, reserved: 0 });
     }
-    out.sort_by_key(|r| r.object_id);
     out
 }
 
@@ -79,8 +74,9 @@ fn instance_hash(content: &[u64; 2], object_id: u32, transform: &[f64; 12]) -> [
 }
 
 /// Box of all instances, local.
-pub(super) fn placed_bounds(records: &[InstanceRecord], files: &[Box3]) -> Box3 {
+pub(super) fn placed_bounds(records: &[InstanceRecord], entries: &[ChunkEntry]) -> Box3 {
+    let boxes: Vec<Box3> = entries.iter().map(ChunkEntry::box3).collect();
     let mut out = Box3::EMPTY;
-    records.iter().for_each(|r| out.add_box(&crate::instances::placed_box(&r.transform, &files[r.prototype as usize])));
+    records.iter().for_each(|r| out.add_box(&crate::instances::placed_box(&r.transform, &boxes[r.prototype as usize])));
     out
 }

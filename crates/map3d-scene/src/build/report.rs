@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// Written to `scene.json` and handed to the caller; every count is there, also when it is 0.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct BuildReport {
     /// Triangles of all assets, prototypes included.
     pub triangles_read: u64,
@@ -34,6 +35,18 @@ pub struct BuildReport {
 }
 
 impl BuildReport {
+    /// Adds what was counted while an asset was read.
+    pub(super) fn add(&mut self, asset: &Self) {
+        self.triangles_read += asset.triangles_read;
+        self.degenerate_triangles += asset.degenerate_triangles;
+        self.duplicate_faces += asset.duplicate_faces;
+        self.duplicate_vertices += asset.duplicate_vertices;
+        self.untextured_faces += asset.untextured_faces;
+        self.split_triangles += asset.split_triangles;
+        self.materials_without_their_texture += asset.materials_without_their_texture;
+        self.instances_of_nothing += asset.instances_of_nothing;
+    }
+
     /// The counts by name.
     pub fn counts(&self) -> BTreeMap<String, u64> {
         let value = serde_json::to_value(self).expect("counts are plain data");

@@ -1,5 +1,7 @@
 //! Streams the triangles of an asset: to local coordinates, snapped, optimised, split.
 
+use std::collections::HashMap;
+
 use map3d_base::{Vec3, vec3};
 
 use super::assets::Asset;
@@ -9,9 +11,12 @@ use super::request::BuildOptions;
 use super::triangle::BuildTriangle;
 use crate::lattice::snap;
 
+/// Stands for the object in a prototype's chunk: every placement has an object of its own.
+const PROTOTYPE_ID: u32 = 1;
+
 /// How the triangles of assets become those of chunks.
 pub(super) struct Source<'a> {
-    pub assets: &'a [Asset],
+    pub assets: &'a [&'a Asset],
     pub materials: &'a BuildMaterials,
     pub options: &'a BuildOptions,
     pub origin: Vec3,
@@ -28,23 +33,26 @@ impl Source<'_> {
         out: &mut dyn FnMut(u32, &BuildTriangle),
         go_on: &mut dyn FnMut(u64) -> bool,
     ) -> bool {
-        let asset = &self.assets[number];
+        let asset = self.assets[number];
+        let mut order = Ordinals::new(asset.ids.len());
         for (i, prototype) in asset.mesh.prototypes().iter().enumerate() {
             if i % (1 << 16) == 0 && !go_on(i as u64) {
                 return false;
             }
+            let ordinal = order.next(*prototype, asset.mesh.objects()[i]);
             if !wanted(*prototype) {
                 continue;
             }
             report.triangles_read += 1;
-            let Some(t) = self.triangle(number, i, *prototype, report) else { continue };
+            let Some(mut t) = self.triangle(number, i, *prototype, report) else { continue };
+            t.source = ordinal;
             report.split_triangles += t.split(&mut |piece| out(*prototype, piece)) - 1;
         }
         true
     }
 
     fn triangle(&self, number: usize, i: usize, prototype: u32, report: &mut BuildReport) -> Option<BuildTriangle> {
-        let asset = &self.assets[number];
+        let asset = self.assets[number];
         let mesh = &asset.mesh;
         let origin = if prototype == 0 { self.origin } else { [0.0; 3] };
         let corners = mesh.triangles()[i].map(|v| snap(vec3::sub(mesh.positions()[v as usize], origin)));
@@ -60,8 +68,8 @@ impl Source<'_> {
             rank: mesh.ranks()[i].min(5),
             padding: 0,
             material,
-            object_id: asset.ids[mesh.objects()[i] as usize],
-            source: i as u32,
+            object_id: if prototype == 0 { asset.ids[mesh.objects()[i] as usize] } else { PROTOTYPE_ID },
+            source: 0,
             asset: number as u32,
             padding2: 0,
         };
@@ -70,6 +78,24 @@ impl Source<'_> {
             return None;
         }
         Some(t)
+    }
+}
+
+/// Counts the triangles of each object and each prototype: a number that stays when other objects of the asset come or go.
+struct Ordinals {
+    objects: Vec<u32>,
+    prototypes: HashMap<u32, u32>,
+}
+
+impl Ordinals {
+    fn new(objects: usize) -> Self {
+        Self { objects: vec![0; objects], prototypes: HashMap::new() }
+    }
+
+    fn next(&mut self, prototype: u32, object: u32) -> u32 {
+        let slot = if prototype == 0 { &mut self.objects[object as usize] } else { self.prototypes.entry(prototype).or_default() };
+        *slot += 1;
+        *slot - 1
     }
 }
 

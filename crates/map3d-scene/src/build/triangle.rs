@@ -18,9 +18,9 @@ pub struct BuildTriangle {
     /// Index into the build's materials.
     pub material: u32,
     pub object_id: u32,
-    /// Number in its asset.
+    /// Number among its object's triangles in the asset; a prototype's: among the prototype's.
     pub source: u32,
-    /// Index of its asset.
+    /// Index of its asset among those that are read.
     pub asset: u32,
     pub padding2: u32,
 }

@@ -82,6 +82,17 @@ impl Soup {
         self.faces.iter().chain(self.prototypes.iter().flatten())
     }
 
+    /// Position among all faces of what a chunk calls triangle `source` of an object, or of the prototype that the object places.
+    pub fn face_number(&self, object_id: u32, source: u32, is_placed: bool) -> usize {
+        let object = object_id - 1;
+        if !is_placed {
+            let mine = self.faces.iter().enumerate().filter(|(_, f)| f.object == object);
+            return mine.map(|(k, _)| k).nth(source as usize).expect("a face of the object");
+        }
+        let prototype = self.instances.iter().find(|i| i.object == object).expect("an instance").prototype as usize;
+        self.faces.len() + self.prototypes[..prototype - 1].iter().map(Vec::len).sum::<usize>() + source as usize
+    }
+
     /// Writes the asset `soup`.
     pub fn write(&self, folder: &Folder) {
         let asset = folder.0.join("assets/soup");

@@ -1,0 +1,217 @@
+//! What a build remembers of an asset (spec/scene.md, Survey), so that the next one reads only the assets that changed.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use bytemuck::{Pod, Zeroable};
+use map3d_base::file::{self, HEADER_BYTES, aligned, header_start};
+use map3d_base::{Error, Result};
+use map3d_image::texture::{TextureInfo, TextureSource};
+use serde::{Deserialize, Serialize};
+use twox_hash::{XxHash3_64, XxHash3_128};
+
+use super::BuildReport;
+use super::ground::GroundLevel;
+use super::triangle::BuildTriangle;
+use crate::records::{InstanceRecord, MaterialRecord};
+
+pub(super) const EXTENSION: &str = "m3v";
+const MAGIC: &[u8; 4] = b"M3DV";
+const VERSION: u32 = 1;
+
+/// Of one asset. Everything follows from the asset, the request and the keys of its textures; `cells` also from the square.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Survey {
+    pub facts: Facts,
+    /// By cell.
+    pub cells: Vec<CellSum>,
+    /// `prototype` counts in `Facts::prototypes`; in the order of the asset.
+    pub instances: Vec<InstanceRecord>,
+    /// Of all its objects.
+    pub ids: Vec<u32>,
+}
+
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub(super) struct Facts {
+    /// Hash of what the survey was made from.
+    pub mark: String,
+    pub level: [u64; 8],
+    /// This asset's share of the report.
+    pub counts: BuildReport,
+    pub textures: Vec<KnownTexture>,
+    /// Hash of each material's record.
+    pub materials: Vec<u64>,
+    /// Files of prototypes, relative to the scene's folder.
+    pub prototypes: Vec<String>,
+    /// Bits of x0, y0, side: what `cells` are cells of.
+    pub square: [u64; 3],
+}
+
+/// A texture source that triangles use; without a key its image is missing or broken.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct KnownTexture {
+    pub texture: Option<String>,
+    pub alpha: Option<String>,
+    pub key: Option<[u8; 16]>,
+    pub width: u32,
+    pub height: u32,
+    pub has_alpha: bool,
+}
+
+impl KnownTexture {
+    pub fn new(source: TextureSource, info: Option<&TextureInfo>) -> Self {
+        let (width, height, has_alpha) = info.map_or((0, 0, false), |i| (i.width, i.height, i.has_alpha));
+        Self { texture: source.0, alpha: source.1, key: info.map(|i| i.key), width, height, has_alpha }
+    }
+
+    pub fn source(&self) -> TextureSource {
+        (self.texture.clone(), self.alpha.clone())
+    }
+
+    pub fn info(&self) -> Option<TextureInfo> {
+        self.key.map(|key| TextureInfo { key, width: self.width, height: self.height, has_alpha: self.has_alpha })
+    }
+}
+
+/// What an asset puts into a cell of the counting level: pieces of triangles, and the sum of their hashes modulo 2^128, whatever their order.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct CellSum {
+    pub cell: u32,
+    pub count: u32,
+    pub sum: [u64; 2],
+}
+
+impl CellSum {
+    pub fn value(&self) -> u128 {
+        u128::from(self.sum[0]) | u128::from(self.sum[1]) << 64
+    }
+}
+
+/// Gathers the cells of triangles.
+#[derive(Default)]
+pub(super) struct CellSums(HashMap<u32, (u32, u128)>);
+
+impl CellSums {
+    pub fn add(&mut self, cell: u32, t: &BuildTriangle, material: u64) {
+        let slot = self.0.entry(cell).or_default();
+        slot.0 = slot.0.saturating_add(1);
+        slot.1 = slot.1.wrapping_add(triangle_hash(t, material));
+    }
+
+    pub fn finish(self) -> Vec<CellSum> {
+        let mut out: Vec<CellSum> = self.0.into_iter().map(|(cell, (count, sum))| CellSum { cell, count, sum: halves(sum) }).collect();
+        out.sort_unstable_by_key(|c| c.cell);
+        out
+    }
+}
+
+pub(super) fn halves(v: u128) -> [u64; 2] {
+    [v as u64, (v >> 64) as u64]
+}
+
+pub(super) fn record_hash(record: &MaterialRecord) -> u64 {
+    XxHash3_64::oneshot(bytemuck::bytes_of(record))
+}
+
+/// Over all that a chunk holds of a triangle; numbers that only count within a build are left out.
+fn triangle_hash(t: &BuildTriangle, material: u64) -> u128 {
+    let plain = BuildTriangle { material: 0, asset: 0, ..*t };
+    XxHash3_128::oneshot_with_seed(material, bytemuck::bytes_of(&plain))
+}
+
+impl GroundLevel {
+    pub fn to_bits(self) -> [u64; 8] {
+        let (lo, hi) = (self.bounds.lo.map(f64::to_bits), self.bounds.hi.map(f64::to_bits));
+        [lo[0], lo[1], lo[2], hi[0], hi[1], hi[2], self.ground_m.to_bits(), u64::from(self.has_terrain)]
+    }
+
+    pub fn from_bits(bits: [u64; 8]) -> Self {
+        let mut out = Self::new();
+        out.bounds.lo = [0, 1, 2].map(|k| f64::from_bits(bits[k]));
+        out.bounds.hi = [3, 4, 5].map(|k| f64::from_bits(bits[k]));
+        (out.ground_m, out.has_terrain) = (f64::from_bits(bits[6]), bits[7] != 0);
+        out
+    }
+}
+
+impl Survey {
+    /// `None` when there is none, or one that cannot be read: then the asset is surveyed anew.
+    pub fn read(path: &Path) -> Option<Self> {
+        let bytes = std::fs::read(path).ok()?;
+        file::check_header(path, &bytes, MAGIC, VERSION, true).ok()?;
+        let count = |at: usize| usize::try_from(u64::from_le_bytes(bytes[at..at + 8].try_into().expect("8 bytes"))).ok();
+        let (text, cells, instances, ids) = (count(16)?, count(24)?, count(32)?, count(40)?);
+        let cells_at = HEADER_BYTES + aligned(text);
+        let instances_at = cells_at + aligned(cells.checked_mul(size_of::<CellSum>())?);
+        let ids_at = instances_at.checked_add(aligned(instances.checked_mul(size_of::<InstanceRecord>())?))?;
+        let facts = serde_json::from_slice(bytes.get(HEADER_BYTES..HEADER_BYTES.checked_add(text)?)?).ok()?;
+        let (cells, instances) = (records(&bytes, cells_at, cells)?, records(&bytes, instances_at, instances)?);
+        Some(Self { facts, cells, instances, ids: records(&bytes, ids_at, ids)? })
+    }
+
+    /// Not synced to the disk: a survey that is lost or torn is made anew.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let text = serde_json::to_vec(&self.facts).expect("facts are plain data");
+        let mut bytes = vec![0; HEADER_BYTES];
+        for section in [&text[..], bytemuck::cast_slice(&self.cells), bytemuck::cast_slice(&self.instances), bytemuck::cast_slice(&self.ids)] {
+            bytes.extend_from_slice(section);
+            bytes.resize(aligned(bytes.len()), 0);
+        }
+        let counts = [text.len(), self.cells.len(), self.instances.len(), self.ids.len()].map(|n| (n as u64).to_le_bytes());
+        bytes[16..48].copy_from_slice(counts.as_flattened());
+        let start = header_start(MAGIC, VERSION, file::checksum(&bytes[HEADER_BYTES..]));
+        bytes[..16].copy_from_slice(&start);
+        let io = |e| Error::storage(path, e);
+        std::fs::create_dir_all(path.parent().unwrap_or(path)).map_err(io)?;
+        let part = path.with_extension("part");
+        std::fs::write(&part, &bytes).and_then(|()| std::fs::rename(&part, path)).map_err(io)
+    }
+}
+
+fn records<T: Pod>(bytes: &[u8], at: usize, count: usize) -> Option<Vec<T>> {
+    let end = at.checked_add(count.checked_mul(size_of::<T>())?)?;
+    Some(bytes.get(at..end)?.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_survey_comes_back_as_it_was_and_a_damaged_one_not_at_all() {
+        let path = std::env::temp_dir().join(format!("map3d-survey-{}", std::process::id())).join("a.m3v");
+        let mut level = GroundLevel::new();
+        level.bounds.add_point([1.0 / 3.0, -2e7 / 7.0, 3.0]);
+        let facts = Facts { mark: "m".into(), level: level.to_bits(), materials: vec![7, u64::MAX], ..Facts::default() };
+        let cell = CellSum { cell: 5, count: 6, sum: [7, 8] };
+        let instance = InstanceRecord { object_id: 9, ..InstanceRecord::zeroed() };
+        let survey = Survey { facts, cells: vec![cell], instances: vec![instance], ids: vec![9, 3] };
+        survey.write(&path).expect("write");
+        let back = Survey::read(&path).expect("read");
+        assert_eq!((&back.cells, &back.instances, &back.ids), (&survey.cells, &survey.instances, &survey.ids));
+        assert_eq!(back.facts.materials, [7, u64::MAX]);
+        let found = GroundLevel::from_bits(back.facts.level);
+        assert_eq!((found.bounds.lo, found.ground_m), (level.bounds.lo, f64::INFINITY));
+        let good = std::fs::read(&path).expect("read");
+        for cut in [0, 10, 64, 100, good.len() - 1] {
+            std::fs::write(&path, &good[..cut]).expect("write");
+            assert!(Survey::read(&path).is_none(), "cut at {cut}");
+        }
+        std::fs::remove_dir_all(path.parent().expect("a folder")).expect("remove");
+        assert!(Survey::read(&path).is_none());
+    }
+
+    #[test]
+    fn sums_do_not_depend_on_order_but_on_every_part() {
+        let at = |x: i64| BuildTriangle { corners: [[x, 0, 0], [x, 1, 0], [x, 0, 1]], ..BuildTriangle::zeroed() };
+        let sum = |all: &[(i64, u64)]| {
+            let mut sums = CellSums::default();
+            all.iter().for_each(|(x, m)| sums.add(3, &at(*x), *m));
+            sums.finish()
+        };
+        assert_eq!(sum(&[(1, 0), (2, 0)]), sum(&[(2, 0), (1, 0)]));
+        assert_ne!(sum(&[(1, 0), (2, 0)]), sum(&[(1, 0), (2, 1)]));
+        assert_ne!(sum(&[(1, 0), (2, 0)]), sum(&[(1, 0), (1, 0)]));
+    }
+}
