@@ -126,8 +126,8 @@ def test_a_town_begun_by_another_version_is_refused(tmp_path: Path) -> None:
     "spec",
     [
         SPEC,
-        TownSpec(buildings=60, files=3, textures=25, texture_px=256, ortho_px=1500, formats=("citygml", "obj")),
-        TownSpec(style="roman", buildings=40, texture_px=256, ortho_px=1500, seed=4),
+        TownSpec(buildings=24, files=3, textures=10, texture_px=256, formats=("citygml", "obj")),
+        TownSpec(style="roman", buildings=40, texture_px=256, seed=4),
     ],
     ids=["small", "both formats", "roman"],
 )
