@@ -100,7 +100,7 @@ bench: build ## speed and memory, peers beside us; then a twentieth of bench-rot
 	$(BIN)/python -m bench
 	$(BIN)/python -m bench.rotterdam --scale 20
 
-bench-rotterdam: build ## a city of 50,000 buildings from nothing to a published folder: hours, 45 GB of disk
+bench-rotterdam: build ## a city of 60,000 buildings from nothing to a published folder: hours, 45 GB of disk
 	$(BIN)/python -m bench.rotterdam
 
 docs: build ## the pictures and the command line's reference in docs/

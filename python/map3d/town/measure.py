@@ -49,7 +49,7 @@ def measured(site: Site) -> Estimate:
     if spec.terrain:
         size += (2 * site.plan.radius_m / spec.dem_pixel_m(2 * site.plan.radius_m)) ** 2 * BYTES_PER_DEM_PX
         size += _ortho_bytes(site, px_m, side_px)
-    return replace(rough, disk_bytes=int(size), ortho_side_px=side_px if spec.terrain else 0)
+    return replace(rough, disk_bytes=int(size), ortho_side_px=side_px if spec.terrain else 0, extent_m=2 * site.plan.radius_m)
 
 
 def spread(every: Sequence[T], most: int) -> list[T]:

@@ -19,12 +19,13 @@ AREA_PER_BUILDING_M2 = 900.0
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a town will take: bytes on disk, files, texture images, orthophoto side in pixels (0: none)."""
+    """What a town will take: bytes on disk, files, texture images, orthophoto side in pixels (0: none), side of its ground."""
 
     disk_bytes: int
     files: int
     textures: int
     ortho_side_px: int
+    extent_m: float
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,7 @@ class TownSpec:
         size += ortho**2 * BYTES_PER_ORTHO_PX + dem**2 * BYTES_PER_DEM_PX
         size += 2.5 * self.buildings * BYTES_PER_TREE * self.trees
         files = self.texture_count + self.files + 2 * self.terrain + self.trees + self.buildings * ("obj" in self.formats)
-        return Estimate(int(size), files, self.texture_count, ortho)
+        return Estimate(int(size), files, self.texture_count, ortho, self.extent_m)
 
     def record(self) -> dict[str, object]:
         """The spec as it is kept in town.json."""

@@ -1,0 +1,78 @@
+"""The large benchmark, very small: it comes to an end, goes on after a failure, cleans up, and its figures are those of all processes."""
+
+import json
+import os
+import sys
+from pathlib import Path
+
+import pytest
+from bench.watch import Figures, family, used_bytes, watched
+
+from bench import rotterdam
+
+pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
+pytestmark = [pytest.mark.whole, pytest.mark.skipif(not Path("/proc/self/stat").is_file(), reason="needs /proc")]
+
+SCALE = 5000
+GREEDY = (
+    "import subprocess, sys; a = bytearray(64 << 20); subprocess.run([sys.executable, '-c', 'import time; b = bytearray(64 << 20); time.sleep(1)'])"
+)
+
+
+def main(monkeypatch: pytest.MonkeyPatch, folder: Path, *options: str) -> None:
+    monkeypatch.setattr(sys, "argv", ["bench", "--scale", str(SCALE), "--folder", str(folder), *options])
+    rotterdam.main()
+
+
+def test_a_tiny_city_goes_all_the_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+    main(monkeypatch, tmp_path)
+    record = json.loads((tmp_path / "figures.json").read_text())
+    assert list(record["stages"]) == ["make-town", "create-scene", "add-files", "create-rendering", "render", "publish"]
+    assert all(row["wall_s"] > 0 and row["cpu_s"] > 0 and row["memory_bytes"] > 1 << 20 for row in record["stages"].values())
+    assert record["facts"]["base_filled"] >= 0.9
+    assert max(row["disk_peak_bytes"] for row in record["stages"].values()) < record["disk_needed_bytes"]
+    assert {path.name for path in tmp_path.iterdir()} == {"figures.json", "table.md", "town.json"}
+    assert "| all |" in capfd.readouterr().out
+
+
+def test_a_run_that_failed_goes_on_where_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    words = rotterdam.view_words
+    monkeypatch.setattr(rotterdam, "view_words", lambda size: [*words(size), "--nonsense"])
+    with pytest.raises(SystemExit, match="create-rendering failed"):
+        main(monkeypatch, tmp_path)
+    before = json.loads((tmp_path / "figures.json").read_text())
+    monkeypatch.setattr(rotterdam, "view_words", words)
+    main(monkeypatch, tmp_path, "--keep")
+    after = json.loads((tmp_path / "figures.json").read_text())
+    assert after["stages"]["add-files"] == before["stages"]["add-files"]
+    assert after["stages"]["create-rendering"]["runs"] == 2
+    assert (tmp_path / "published" / "rendering.json").is_file()
+
+
+def test_a_disk_too_small_is_told_before_anything_is_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("shutil.disk_usage", lambda _: type("Usage", (), {"free": 1 << 20})())
+    with pytest.raises(SystemExit, match="are free"):
+        main(monkeypatch, tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_memory_is_summed_over_a_process_and_its_children(tmp_path: Path) -> None:
+    figures = Figures()
+    assert watched([sys.executable, "-c", GREEDY], tmp_path, figures) == 0
+    assert figures.memory_bytes > 128 << 20
+    assert figures.cpu_s > 0
+    assert figures.runs == 1
+
+
+def test_a_family_is_a_process_with_its_descendants() -> None:
+    own = family(os.getpid())
+    assert own[0] == os.getpid()
+    assert len(own) == len(set(own))
+    assert os.getpid() in family(os.getppid())
+
+
+def test_links_and_what_they_lead_to_are_not_counted_twice(tmp_path: Path) -> None:
+    (tmp_path / "a").write_bytes(bytes(100_000))
+    once = used_bytes(tmp_path)
+    (tmp_path / "b").symlink_to(tmp_path)
+    assert once <= used_bytes(tmp_path) < once + 8192
