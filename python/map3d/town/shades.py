@@ -24,7 +24,7 @@ def packed(color: Color) -> np.uint32:
 def image_of(picture: Pixels) -> Image.Image:
     """An RGB image with the picture's pixels."""
     height, width = picture.shape
-    return Image.frombuffer("RGB", (width, height), np.ascontiguousarray(picture, dtype=PACKED), "raw", "RGBX", 0, 1)
+    return Image.frombuffer("RGBX", (width, height), np.ascontiguousarray(picture, dtype=PACKED), "raw", "RGBX", 0, 1).convert("RGB")
 
 
 def pixels_of(image: Image.Image) -> Pixels:
