@@ -104,8 +104,9 @@ class Scene:
     @property
     def triangle_count(self) -> int:
         """Instances not counted."""
-    def occupied(self, frame: str, level: int) -> NDArray[np.bool_]:
-        """(2^level, 2^level) [y, x]: conservative, from the boxes of BVH nodes."""
+    def occupied(self, frame: str, level: int, within: tuple[int, NDArray[np.uint32]] | None = None) -> NDArray[np.bool_]:
+        """(2^level, 2^level) [y, x]: conservative, from the boxes of BVH nodes. `within`: a level above and (n, 2) columns and rows of its blocks;
+        only they are looked at, outside of them all is False."""
     def block_key(self, frame: str, z: int, x: int, y: int) -> str:
         """Hex hash over all that a base block's bytes depend on."""
     def block_keys(self, frame: str, z: int, blocks: NDArray[np.uint32]) -> list[str]:

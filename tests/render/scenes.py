@@ -18,10 +18,11 @@ class SquareScene:
     def __init__(self, content: dict[tuple[float, float], str], box: Box = ((0.0, 0.0, 0.0), (100.0, 100.0, 10.0))) -> None:
         self.content, self.box = content, box
 
-    def occupied(self, frame: str, level: int) -> np.ndarray:
+    def occupied(self, frame: str, level: int, within: tuple[int, np.ndarray] | None = None) -> np.ndarray:
         grid = np.zeros((2**level, 2**level), bool)
         for u, v in self.content:
-            grid[int(v * 2**level), int(u * 2**level)] = True
+            block = None if within is None else [int(u * 2 ** within[0]), int(v * 2 ** within[0])]
+            grid[int(v * 2**level), int(u * 2**level)] = within is None or block in within[1].tolist()
         return grid
 
     def block_keys(self, frame: str, z: int, blocks: np.ndarray) -> list[str]:

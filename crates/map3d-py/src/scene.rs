@@ -52,13 +52,25 @@ impl Scene {
         self.0.store().triangle_count()
     }
 
-    /// (2^level, 2^level) [y, x]: tiles that may have content.
-    fn occupied<'py>(&self, py: Python<'py>, frame: &str, level: u8) -> PyResult<Bound<'py, PyArray2<bool>>> {
+    /// (2^level, 2^level) [y, x]: tiles that may have content. `within`: level and (n, 2) columns and rows of the blocks to look at.
+    #[pyo3(signature = (frame, level, within=None))]
+    fn occupied<'py>(
+        &self,
+        py: Python<'py>,
+        frame: &str,
+        level: u8,
+        within: Option<(u8, PyReadonlyArray2<u32>)>,
+    ) -> PyResult<Bound<'py, PyArray2<bool>>> {
         let frame = Frame::from_json(frame).map_err(to_python)?;
         if level > MAX_OCCUPIED_LEVEL.min(frame.zmax) {
             return Err(invalid(format!("level: {level}, at most {}", MAX_OCCUPIED_LEVEL.min(frame.zmax))));
         }
-        let flags = py.detach(|| self.0.occupied(&frame, level)).map_err(to_python)?;
+        let blocks = within.map(|(z, array)| Ok::<_, PyErr>((z, places(&array)?))).transpose()?;
+        let look = || match &blocks {
+            Some((z, places)) => self.0.occupied_within(&frame, level, *z, places),
+            None => self.0.occupied(&frame, level),
+        };
+        let flags = py.detach(look).map_err(to_python)?;
         let side = 1usize << level;
         Ok(Array2::from_shape_vec((side, side), flags).map_err(|e| invalid(e.to_string()))?.into_pyarray(py))
     }
@@ -71,11 +83,7 @@ impl Scene {
 
     /// The keys of the blocks of level z at (n, 2) columns and rows; every chunk is looked at once.
     fn block_keys(&self, py: Python<'_>, frame: &str, z: u8, blocks: PyReadonlyArray2<u32>) -> PyResult<Vec<String>> {
-        let array = blocks.as_array();
-        if array.ncols() != 2 {
-            return Err(invalid(format!("blocks: shape {:?}, expected (n, 2)", array.shape())));
-        }
-        let places: Vec<[u32; 2]> = array.rows().into_iter().map(|r| [r[0], r[1]]).collect();
+        let places = places(&blocks)?;
         let frame = Frame::from_json(frame).map_err(to_python)?;
         py.detach(|| self.0.block_keys(&frame, z, &places)).map_err(to_python)
     }
@@ -184,6 +192,15 @@ pub fn reduce_block(py: Python<'_>, frame: &str, z: u8, x: u32, y: u32, levels: 
     let (frame, root) = place(frame, z, x, y)?;
     let borrowed: Vec<(u32, u32, &[u8])> = seams.iter().map(|(x, y, bytes)| (*x, *y, bytes.as_slice())).collect();
     py.detach(|| map3d_render::reduce_block(&frame, root, levels, &borrowed)).map(Block).map_err(to_python)
+}
+
+/// (n, 2) columns and rows.
+fn places(array: &PyReadonlyArray2<u32>) -> PyResult<Vec<[u32; 2]>> {
+    let array = array.as_array();
+    if array.ncols() != 2 {
+        return Err(invalid(format!("blocks: shape {:?}, expected (n, 2)", array.shape())));
+    }
+    Ok(array.rows().into_iter().map(|r| [r[0], r[1]]).collect())
 }
 
 fn place(frame: &str, z: u8, x: u32, y: u32) -> PyResult<(Frame, Tile)> {

@@ -59,6 +59,11 @@ impl RenderScene {
         map3d_trace::occupied(&self.store, frame, level)
     }
 
+    /// The same within some blocks of a level above; false outside of them.
+    pub fn occupied_within(&self, frame: &Frame, level: u8, block_level: u8, blocks: &[[u32; 2]]) -> Result<Vec<bool>> {
+        map3d_trace::occupancy::occupied_within(&self.store, frame, level, block_level, blocks)
+    }
+
     /// Hex hash over all that a base block's bytes depend on.
     pub fn block_key(&self, frame: &Frame, root: Tile) -> Result<String> {
         frame.validate()?;

@@ -19,26 +19,26 @@ const SMALL_TILES: f64 = 0.25;
 
 /// Row-major flags of the 2^level × 2^level tiles of a level: false only where there is nothing.
 pub fn occupied(scene: &SceneStore, frame: &Frame, level: u8) -> Result<Vec<bool>> {
-    frame.validate()?;
-    if level > MAX_FLAGS_LEVEL {
-        return Err(Error::argument(format!("occupancy: level is {level}, at most {MAX_FLAGS_LEVEL}")));
-    }
-    let view = TileView::new(frame, level);
-    let mut flags = Flags { side: 1 << level, flags: vec![false; 1 << (2 * level)] };
-    let mut outlines = Outlines::default();
-    for part in scene.parts() {
-        let rect = view.rect(&part.bounds);
-        if !flags.has_unset(&rect) {
-            continue;
-        }
-        if rect.is_small() {
-            flags.set(&rect);
-            continue;
-        }
-        let transform = part.instance.map(|k| scene.instances()[k as usize].transform);
-        descend(outlines.get(scene, part)?, transform.as_ref(), &view, &mut flags)?;
-    }
+    let mut flags = Flags::new(frame, level, false)?;
+    flags.mark(scene, frame, level)?;
     Ok(flags.flags)
+}
+
+/// The same within some blocks of a level above, (x, y) each; false outside of them, where nothing is looked at.
+pub fn occupied_within(scene: &SceneStore, frame: &Frame, level: u8, block_level: u8, blocks: &[[u32; 2]]) -> Result<Vec<bool>> {
+    let mut flags = Flags::new(frame, level, true)?;
+    if block_level > level || blocks.iter().flatten().any(|v| v >> block_level != 0) {
+        return Err(Error::argument(format!("occupancy: a block of level {block_level} does not exist, or lies below level {level}")));
+    }
+    let (down, side) = (level - block_level, flags.side);
+    let mut inside = vec![false; flags.flags.len()];
+    for [x, y] in blocks {
+        let (x0, y0, count) = ((*x as usize) << down, (*y as usize) << down, 1usize << down);
+        (y0..y0 + count).for_each(|y| inside[y * side + x0..][..count].fill(true));
+    }
+    flags.flags.iter_mut().zip(&inside).for_each(|(f, i)| *f = !i);
+    flags.mark(scene, frame, level)?;
+    Ok(flags.flags.iter().zip(&inside).map(|(f, i)| *f && *i).collect())
 }
 
 /// The outlines of prototypes stay open, since many instances ask for them; a chunk is asked for once.
@@ -144,6 +144,33 @@ struct Flags {
 }
 
 impl Flags {
+    fn new(frame: &Frame, level: u8, value: bool) -> Result<Self> {
+        frame.validate()?;
+        if level > MAX_FLAGS_LEVEL {
+            return Err(Error::argument(format!("occupancy: level is {level}, at most {MAX_FLAGS_LEVEL}")));
+        }
+        Ok(Self { side: 1 << level, flags: vec![value; 1 << (2 * level)] })
+    }
+
+    /// Sets all that may have content and is not set yet.
+    fn mark(&mut self, scene: &SceneStore, frame: &Frame, level: u8) -> Result<()> {
+        let view = TileView::new(frame, level);
+        let mut outlines = Outlines::default();
+        for part in scene.parts() {
+            let rect = view.rect(&part.bounds);
+            if !self.has_unset(&rect) {
+                continue;
+            }
+            if rect.is_small() {
+                self.set(&rect);
+                continue;
+            }
+            let transform = part.instance.map(|k| scene.instances()[k as usize].transform);
+            descend(outlines.get(scene, part)?, transform.as_ref(), &view, self)?;
+        }
+        Ok(())
+    }
+
     /// First and last tile of a rectangle along an axis; `None` outside the square.
     fn range(&self, rect: &Rect, axis: usize) -> Option<(usize, usize)> {
         let side = self.side as f64;

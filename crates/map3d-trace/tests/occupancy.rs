@@ -5,7 +5,7 @@ mod scenes;
 use map3d_base::asset::Rank;
 use map3d_base::tile::Tile;
 use map3d_scene::SceneStore;
-use map3d_trace::occupancy::block_keys;
+use map3d_trace::occupancy::{block_keys, occupied_within};
 use map3d_trace::{BeamTracer, Opaque, SUBTILE_PX, block_key, occupied};
 use scenes::{Dice, Soup, build, frame, new_folder, open, rebuild};
 
@@ -43,6 +43,14 @@ fn occupancy_never_misses_what_a_beam_meets() {
         }
         assert!(met.iter().zip(&flags).all(|(m, f)| *f || !*m), "level {level}: {met:?} {flags:?}");
     }
+    let blocks = [[0, 1], [1, 1]];
+    let part = occupied_within(&store, &frame, 5, 1, &blocks).expect("occupied");
+    let whole = occupied(&store, &frame, 5).expect("occupied");
+    for (k, flag) in part.iter().enumerate() {
+        let place = [k as u32 % 32 / 16, k as u32 / 32 / 16];
+        assert_eq!(*flag, whole[k] && blocks.contains(&place), "{k}");
+    }
+    assert!(occupied_within(&store, &frame, 5, 1, &[[0, 2]]).is_err() && occupied_within(&store, &frame, 1, 2, &[]).is_err());
     let fine = occupied(&store, &frame, 7).expect("occupied");
     let share = fine.iter().filter(|f| **f).count() as f64 / fine.len() as f64;
     assert!(share < 0.2, "{share} of the tiles are said to be occupied");

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from map3d.catalogue import Catalogue, State
 from map3d.jobs.events import Done, Event, Failed, Left, Lost, Stopping, Waiting
 from map3d.jobs.terms import Terms
-from map3d.jobs.worker import Task, Worker
+from map3d.jobs.worker import News, Task, Worker
 
 _LOOK_S = 0.2
 
@@ -54,7 +54,7 @@ class Pool:
         self._catalogue, self._rendering, self._task, self._terms = catalogue, rendering, task, terms or Terms()
         self._size, self._host = size, host
         self._events: queue.SimpleQueue[Event] = queue.SimpleQueue()
-        self._stop, self._abandon = threading.Event(), threading.Event()
+        self._stop, self._abandon, self._news = threading.Event(), threading.Event(), News()
         self._threads: dict[str, threading.Thread] = {}
         self._workers: dict[str, Worker] = {}
         self._started = 0
@@ -65,11 +65,12 @@ class Pool:
     def stop(self) -> None:
         """Workers finish the jobs in hand and leave."""
         self._stop.set()
+        self._news.tell()
 
     def abandon(self) -> None:
         """Workers give the jobs in hand back and leave."""
-        self._stop.set()
         self._abandon.set()
+        self.stop()
 
     @property
     def stopped(self) -> bool:
@@ -117,7 +118,7 @@ class Pool:
     def _start_worker(self) -> None:
         self._started += 1
         name = f"{self._host}-{self._started}"
-        worker = Worker(name, self._catalogue, self._rendering, self._task, self._terms, self._stop, self._abandon)
+        worker = Worker(name, self._catalogue, self._rendering, self._task, self._terms, self._stop, self._abandon, self._news)
         self._workers[name] = worker
         self._threads[name] = threading.Thread(target=worker.run, args=(self._events.put,), name=name)
         self._threads[name].start()

@@ -134,15 +134,17 @@ class Run:
                             store.remove_block(block.id)
 
     def _open_occupancy(self, scene: PlannedScene) -> dict[str, Occupancy]:
-        whole = {frame.id: planned_occupancy(scene, self.record, frame) for frame in self.record.frames}
-        return self._within_open(whole)
+        return {frame.id: planned_occupancy(scene, self.record, frame, within=self._open_blocks(frame.id)) for frame in self.record.frames}
+
+    def _open_blocks(self, view: str) -> list[BlockId]:
+        return [job.block for job in self._catalogue.jobs(self.record.name, view) if job.kind == "base" and job.state is not State.DONE]
 
     def _within_open(self, whole: Planned) -> dict[str, Occupancy]:
         """Only what lies in base blocks that are not done."""
         root = block_levels(self.record.zmax)[0].root
         cut = {}
         for view, occupancy in whole.items():
-            blocks = [job.block for job in self._catalogue.jobs(self.record.name, view) if job.kind == "base" and job.state is not State.DONE]
+            blocks = self._open_blocks(view)
             x, y = np.array([block.x for block in blocks], np.int64), np.array([block.y for block in blocks], np.int64)
             base = occupancy.numbers(self.record.zmax)
             above = base >> np.uint64(2 * (self.record.zmax - root))

@@ -27,6 +27,27 @@ class Task(Protocol):
         """Checks what the child made and stores it; durable on return."""
 
 
+class News:
+    """Wakes workers that wait for a job when another one finished one, which may have opened the next."""
+
+    def __init__(self) -> None:
+        self._changed, self._count = threading.Condition(), 0
+
+    @property
+    def count(self) -> int:
+        return self._count
+
+    def tell(self) -> None:
+        with self._changed:
+            self._count += 1
+            self._changed.notify_all()
+
+    def wait(self, since: int, timeout_s: float) -> None:
+        """Until there is news after `since`, a count from before."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._count != since, timeout_s)
+
+
 class Abandoned(Map3dError):
     """The user wants out at once."""
 
@@ -35,9 +56,9 @@ class Worker:
     """Runs in a thread of its own. `stop` set: finishes the job in hand and leaves; `abandon` set: gives it back and leaves."""
 
     def __init__(
-        self, name: str, catalogue: Catalogue, rendering: str, task: Task, terms: Terms, stop: threading.Event, abandon: threading.Event
+        self, name: str, catalogue: Catalogue, rendering: str, task: Task, terms: Terms, stop: threading.Event, abandon: threading.Event, news: News
     ) -> None:
-        self.name = name
+        self.name, self._news = name, news
         self._catalogue, self._rendering, self._task, self._terms = catalogue, rendering, task, terms
         self._stop, self._abandon = stop, abandon
         self._child: Child | None = None
@@ -63,15 +84,17 @@ class Worker:
             child = self._ready_child()
             if child is None:
                 break
+            since = self._news.count
             lease = self._catalogue.lease(self._rendering, self.name)
             if lease is not None:
                 self.idle_since = None
                 tell(self._work(child, lease))
+                self._news.tell()
             elif self._nothing_left():
                 break
             else:
                 self.idle_since = self.idle_since or time.monotonic()
-                self._stop.wait(self._terms.idle_s)
+                self._news.wait(since, self._terms.idle_s)
             if len(self._failed) >= self._terms.failures:
                 return Left(self.name, f"failed {len(self._failed)} different jobs", jobs_failed=True)
         return Left(self.name)

@@ -25,7 +25,7 @@ class PlannedScene(Protocol):
     @property
     def box(self) -> Box: ...
 
-    def occupied(self, frame: str, level: int) -> NDArray[np.bool_]: ...
+    def occupied(self, frame: str, level: int, within: tuple[int, NDArray[np.uint32]] | None = None) -> NDArray[np.bool_]: ...
 
     def block_keys(self, frame: str, z: int, blocks: NDArray[np.uint32]) -> list[str]: ...
 
@@ -42,8 +42,7 @@ def plan_jobs(
         if progress is not None:
             progress(done, len(rendering.frames))
         blocks = _base_blocks(scene, rendering, frame, known.get(frame.id, ()))
-        places = np.array([(block.x, block.y) for block in blocks], np.uint32).reshape(-1, 2)
-        keys = scene.block_keys(frame_text(rendering, frame), block_levels(frame.zmax)[0].root, places)
+        keys = scene.block_keys(frame_text(rendering, frame), block_levels(frame.zmax)[0].root, _places(blocks))
         jobs += _with_reduces(frame, dict(zip(blocks, keys, strict=True)), settings_hash(rendering))
     return jobs
 
@@ -53,12 +52,22 @@ def frame_text(rendering: RenderingRecord, frame: PinnedFrame) -> str:
     return json.dumps(frame.to_json(rendering.layers))
 
 
-def planned_occupancy(scene: PlannedScene, rendering: RenderingRecord, frame: PinnedFrame, level: int | None = None) -> Occupancy:
-    """Conservative: every tile that may have content. `level`: the deepest to tell, zmax unless given."""
+def planned_occupancy(
+    scene: PlannedScene, rendering: RenderingRecord, frame: PinnedFrame, level: int | None = None, within: Collection[BlockId] | None = None
+) -> Occupancy:
+    """Conservative: every tile that may have content. `level`: the deepest to tell, zmax unless given; `within`: only in these base blocks."""
     depth = frame.zmax if level is None else level
     if depth > MAX_PLAN_LEVEL:
         raise LimitExceeded(f"rendering {rendering.name}: level {depth} is too deep to plan at once, at most {MAX_PLAN_LEVEL}; use a coarser --res")
-    return Occupancy.from_grid(scene.occupied(frame_text(rendering, frame), depth))
+    text = frame_text(rendering, frame)
+    if within is None:
+        return Occupancy.from_grid(scene.occupied(text, depth))
+    return Occupancy.from_grid(scene.occupied(text, depth, (block_levels(frame.zmax)[0].root, _places(within))))
+
+
+def _places(blocks: Iterable[BlockId]) -> NDArray[np.uint32]:
+    """(n, 2) columns and rows."""
+    return np.array([(block.x, block.y) for block in blocks], np.uint32).reshape(-1, 2)
 
 
 def settings_hash(rendering: RenderingRecord) -> str:

@@ -73,7 +73,7 @@ class TileStore(Protocol):
         """Every stored tile of a layer, by level, then column, then row."""
 
     def list_places(self, z: int) -> list[tuple[int, int]]:
-        """Columns and rows of the stored tiles of a level, whatever their layer, each once, in any order."""
+        """Columns and rows of the stored tiles of a level, in any order: a tile has all layers."""
 
     def remove_block(self, block: BlockId) -> bool:
         """False: there was none."""
