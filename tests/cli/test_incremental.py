@@ -1,0 +1,152 @@
+"""After a change: what is rendered again, and that the tiles are those of a render from nothing."""
+
+import json
+import shutil
+import sqlite3
+from pathlib import Path
+
+import pytest
+
+from map3d.catalogue import Workspace
+from map3d.geometry.frames import PinnedFrame
+from map3d.registry import Registry
+from map3d.tiles.naming import block_levels
+from map3d.tiles.sqlite_store import SqliteTileStore
+from map3d.types import Box
+from tests.cli.test_whole import digest
+from tests.cli.towns import Run, house, write_town
+
+pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
+pytestmark = pytest.mark.whole
+
+VIEWS = ("--view", "0/45", "--view", "90/30")
+Blocks = dict[tuple[str, str], str]
+
+
+@pytest.fixture
+def town(run: Run, tmp_path: Path) -> Workspace:
+    """A finished rendering `view` of the scene `town`: houses, each a file, on terrain that is one of them."""
+    assert run("create-scene", "town")[0] == 0
+    files = write_town(tmp_path / "files")
+    (files / "ground.obj").write_text("v -60 -60 -1\nv 190 -60 -1\nv 190 190 -1\nv -60 190 -1\nf 1 2 3 4\n")
+    assert run("add-files", "town", str(files))[0] == 0
+    assert run("create-rendering", "town", "view", "--res", "0.05", *VIEWS)[0] == 0
+    assert run("render", "view")[0] == 0
+    return Workspace(tmp_path / "workspace")
+
+
+def keys(workspace: Workspace) -> Blocks:
+    """(view, block) → key of base blocks in the stores."""
+    found = {}
+    for path in workspace.rendering_folder("view").glob("*.sqlite"):
+        with SqliteTileStore(path, read_only=True) as store:
+            root = block_levels(store.shape.zmax)[0].root
+            found.update({(path.stem, str(block.id)): block.key for block in store.list_blocks() if block.id.z == root})
+    return found
+
+
+def seeing(workspace: Workspace, box: Box) -> set[tuple[str, str]]:
+    """Base blocks whose beam meets a local box, and those that touch one."""
+    catalogue = workspace.open_catalogue()
+    frames = catalogue.rendering("view").frames
+    catalogue.close()
+    return {(frame.id, name) for frame in frames for name in _seeing(frame, box)}
+
+
+def _seeing(frame: PinnedFrame, box: Box) -> list[str]:
+    root = block_levels(frame.zmax)[0].root
+    corners = [(x, y, z) for x in (box[0][0], box[1][0]) for y in (box[0][1], box[1][1]) for z in (box[0][2], box[1][2])]
+    i, j, _ = frame.level_pixel_from_local(root, corners)
+    columns, rows = i / frame.tile_px, j / frame.tile_px
+    last = 2**root - 1
+    first = [max(int(values.min() - 0.01), 0) for values in (columns, rows)]
+    end = [min(int(values.max() + 0.01), last) for values in (columns, rows)]
+    return [f"{root}/{x}/{y}" for x in range(first[0], end[0] + 1) for y in range(first[1], end[1] + 1)]
+
+
+def box_of(workspace: Workspace, name: str) -> Box:
+    with Registry(workspace.registry_path("town")) as registry:
+        (box,) = (item.box for item in registry.objects() if item.asset == name and item.box is not None)
+    return box
+
+
+def from_nothing(run: Run, workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
+    """Digests of the same registry and frames, built and rendered in a workspace that has nothing of either yet."""
+    copy = workspace.root.with_name("again")
+    shutil.rmtree(copy, ignore_errors=True)
+    shutil.copytree(workspace.root, copy)
+    again = Workspace(copy)
+    shutil.rmtree(copy / "renderings")
+    for name in ("chunks", "textures", "build"):
+        shutil.rmtree(again.scene_folder("town") / name, ignore_errors=True)
+    (again.scene_folder("town") / "scene.json").unlink()
+    with sqlite3.connect(copy / "catalogue.sqlite") as db:
+        db.execute("DELETE FROM job")
+        db.execute("UPDATE scene SET built = NULL")
+    assert run("render", "view", "-w", str(copy))[0] == 0
+    return digest(again)
+
+
+def render(run: Run) -> int:
+    """How many jobs were done."""
+    status, out, err = run("render", "view", "--json")
+    assert status == 0, err
+    return int(json.loads(out)["tally"]["done"])
+
+
+def test_a_changed_added_or_removed_house_renders_what_sees_it_and_gives_the_tiles_of_a_render_from_nothing(
+    run: Run, town: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = keys(town)
+    old = box_of(town, "house-1-1")
+    path = tmp_path / "files" / "house-1-1.obj"
+    path.write_text(house(43.0, 40.0, 9.5))
+    assert run("add-files", "town", str(path))[0] == 0
+    assert render(run) > 0
+    after = keys(town)
+    changed = {place for place in after if before.get(place) != after[place]}
+    assert changed <= seeing(town, old) | seeing(town, box_of(town, "house-1-1"))
+    assert 0 < len(changed) < len(after) / 2
+    assert digest(town) == from_nothing(run, town, monkeypatch)
+    # One file with two houses, of which one goes again.
+    path.write_text("o a\n" + house(43.0, 40.0, 9.5) + "o b\n" + _shifted(house(60.0, 62.0, 4.0)))
+    assert run("add-files", "town", str(path), "--split", "group")[0] == 0
+    assert render(run) > 0
+    assert digest(town) == from_nothing(run, town, monkeypatch)
+    path.write_text("o a\n" + house(43.0, 40.0, 9.5))
+    assert run("add-files", "town", str(path), "--split", "group")[0] == 0
+    assert render(run) > 0
+    assert digest(town) == from_nothing(run, town, monkeypatch)
+
+
+def _shifted(text: str) -> str:
+    """Faces of a second house in a file: its vertices are the last eight."""
+    return (
+        text.replace("f 1 3 4 2", "f -8 -6 -5 -7")
+        .replace("f 5 6 8 7", "f -4 -3 -1 -2")
+        .replace("f 1 2 6 5", "f -8 -7 -3 -4")
+        .replace("f 2 4 8 6", "f -7 -5 -1 -3")
+        .replace("f 4 3 7 8", "f -5 -6 -2 -1")
+        .replace("f 3 1 5 7", "f -6 -8 -4 -2")
+    )
+
+
+def test_an_unchanged_scene_renders_nothing_and_a_file_given_again_changes_nothing(run: Run, town: Workspace, tmp_path: Path) -> None:
+    before, tiles = keys(town), digest(town)
+    assert render(run) == 0
+    assert run("add-files", "town", str(tmp_path / "files" / "house-2-1.obj"))[0] == 0
+    assert render(run) == 0
+    assert (keys(town), digest(town)) == (before, tiles)
+
+
+def test_an_estimate_knows_what_a_change_makes_stale(run: Run, town: Workspace, tmp_path: Path) -> None:
+    whole = json.loads(run("estimate", "view", "--json")[1])
+    assert whole["open_tiles"] == 0
+    path = tmp_path / "files" / "house-3-0.obj"
+    path.write_text(house(120.0, 0.0, 9.0))
+    assert run("add-files", "town", str(path))[0] == 0
+    status, out, err = run("estimate", "view", "--json")
+    assert status == 0, err
+    assert 0 < json.loads(out)["open_tiles"] < whole["base_tiles"] / 2
+    assert render(run) > 0
+    assert json.loads(run("estimate", "view", "--json")[1])["open_tiles"] == 0
