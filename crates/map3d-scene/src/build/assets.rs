@@ -12,7 +12,7 @@ use super::files::prune;
 use super::survey::{EXTENSION, Survey};
 
 /// Raised when surveys or chunks would come out differently from the same assets.
-pub(super) const BUILD_FORMAT: u32 = 1;
+pub(super) const BUILD_FORMAT: u32 = 2;
 const FOLDER: &str = "build";
 
 /// The assets of a request, by number.

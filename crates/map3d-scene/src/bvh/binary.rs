@@ -40,8 +40,8 @@ struct Item {
 impl Item {
     /// Twice the box's centre.
     #[inline(always)]
-    fn center2(&self, axis: usize) -> f32 {
-        self.bounds.lo[axis] + self.bounds.hi[axis]
+    fn center2(&self) -> [f32; 4] {
+        std::array::from_fn(|k| self.bounds.lo[k] + self.bounds.hi[k])
     }
 }
 
@@ -52,12 +52,13 @@ impl BinaryTree {
         let mut stack = vec![(0usize, 0usize, items.len())];
         while let Some((node, start, end)) = stack.pop() {
             let slice = &mut items[start..end];
-            nodes[node].bounds = bounds_of(slice);
+            let extent = Extent::of(slice);
+            nodes[node].bounds = extent.bounds;
             if slice.len() <= LEAF_ITEMS {
                 nodes[node].kind = Kind::Leaf { start: start as u32, end: end as u32 };
                 continue;
             }
-            let middle = start + split(slice, &nodes[node].bounds);
+            let middle = start + split(slice, &extent);
             let first = nodes.len();
             nodes[node].kind = Kind::Inner { children: [first as u32, first as u32 + 1] };
             for (k, (a, b)) in [(start, middle), (middle, end)].into_iter().enumerate() {
@@ -69,10 +70,22 @@ impl BinaryTree {
     }
 }
 
-fn bounds_of(items: &[Item]) -> Aabb {
-    let mut out = Aabb::EMPTY;
-    items.iter().for_each(|i| out.add(&i.bounds));
-    out
+/// Box of items, and of twice their centres.
+struct Extent {
+    bounds: Aabb,
+    centers: Aabb,
+}
+
+impl Extent {
+    fn of(items: &[Item]) -> Self {
+        let mut out = Self { bounds: Aabb::EMPTY, centers: Aabb::EMPTY };
+        for item in items {
+            let c = item.center2();
+            out.bounds.add(&item.bounds);
+            out.centers.add(&Aabb { lo: c, hi: c });
+        }
+        out
+    }
 }
 
 fn leaf_cost(bounds: &Aabb, count: usize) -> f32 {
@@ -80,50 +93,46 @@ fn leaf_cost(bounds: &Aabb, count: usize) -> f32 {
 }
 
 /// Reorders the items and returns how many go to the first side: at least one on each.
-fn split(items: &mut [Item], bounds: &Aabb) -> usize {
+fn split(items: &mut [Item], extent: &Extent) -> usize {
     if items.len() <= SWEEP_ITEMS {
         return split_swept(items);
     }
-    split_binned(items, bounds).unwrap_or_else(|| split_at_middle(items))
+    split_binned(items, extent).unwrap_or_else(|| split_at_middle(items.len()))
 }
 
 /// Whole leaves on the first side.
-fn split_at_middle(items: &mut [Item]) -> usize {
-    (items.len() / 2).next_multiple_of(LEAF_ITEMS).min(items.len() - 1)
+fn split_at_middle(count: usize) -> usize {
+    (count / 2).next_multiple_of(LEAF_ITEMS).min(count - 1)
 }
 
 struct Bins {
-    origin: [f32; 3],
-    scale: [f32; 3],
+    origin: [f32; 4],
+    scale: [f32; 4],
     bounds: [[Aabb; BINS]; 3],
     counts: [[usize; BINS]; 3],
 }
 
 impl Bins {
-    fn new(items: &[Item]) -> Self {
-        let (mut lo, mut hi) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-        for item in items {
-            for k in 0..3 {
-                let c = item.center2(k);
-                lo[k] = if c < lo[k] { c } else { lo[k] };
-                hi[k] = if c > hi[k] { c } else { hi[k] };
-            }
-        }
-        let scale = [0, 1, 2].map(|k| if hi[k] > lo[k] { BINS as f32 * 0.9999 / (hi[k] - lo[k]) } else { 0.0 });
+    fn new(items: &[Item], centers: &Aabb) -> Self {
+        let (lo, hi) = (centers.lo, centers.hi);
+        let scale = [0, 1, 2, 3].map(|k| if hi[k] > lo[k] { BINS as f32 * 0.9999 / (hi[k] - lo[k]) } else { 0.0 });
         let mut bins = Self { origin: lo, scale, bounds: [[Aabb::EMPTY; BINS]; 3], counts: [[0; BINS]; 3] };
         for item in items {
+            let k = bins.indices(item);
             for axis in 0..3 {
-                let k = bins.index(item, axis);
-                bins.bounds[axis][k].add(&item.bounds);
-                bins.counts[axis][k] += 1;
+                bins.bounds[axis][k[axis]].add(&item.bounds);
+                bins.counts[axis][k[axis]] += 1;
             }
         }
         bins
     }
 
+    /// Along each axis; the fourth is not used.
     #[inline(always)]
-    fn index(&self, item: &Item, axis: usize) -> usize {
-        (((item.center2(axis) - self.origin[axis]) * self.scale[axis]) as usize).min(BINS - 1)
+    fn indices(&self, item: &Item) -> [usize; 4] {
+        let c = item.center2();
+        let at: [i32; 4] = std::array::from_fn(|k| ((c[k] - self.origin[k]) * self.scale[k]) as i32);
+        at.map(|v| v.clamp(0, BINS as i32 - 1) as usize)
     }
 
     /// (cost, axis, first bin of the second side) of the cheapest split that leaves neither side empty.
@@ -153,12 +162,12 @@ impl Bins {
     }
 }
 
-fn split_binned(items: &mut [Item], _bounds: &Aabb) -> Option<usize> {
-    let bins = Bins::new(items);
+fn split_binned(items: &mut [Item], extent: &Extent) -> Option<usize> {
+    let bins = Bins::new(items, &extent.centers);
     let (_, axis, border) = bins.best(items.len())?;
     let (mut a, mut b) = (0, items.len());
     while a < b {
-        if bins.index(&items[a], axis) < border {
+        if bins.indices(&items[a])[axis] < border {
             a += 1;
         } else {
             b -= 1;
@@ -171,31 +180,54 @@ fn split_binned(items: &mut [Item], _bounds: &Aabb) -> Option<usize> {
 /// The best of all splits along the three axes, each sorted by centre.
 fn split_swept(items: &mut [Item]) -> usize {
     let n = items.len();
-    let mut best = (f32::INFINITY, 0, split_at_middle(items));
+    let mut best = (f32::INFINITY, split_at_middle(n));
+    let mut chosen = [0u64; SWEEP_ITEMS];
     for axis in 0..3 {
-        sort_by_center(items, axis);
-        let mut right = [0f32; SWEEP_ITEMS + 1];
-        let mut acc = Aabb::EMPTY;
-        for k in (1..n).rev() {
-            acc.add(&items[k].bounds);
-            right[k] = leaf_cost(&acc, n - k);
+        let order = sorted_by_center(items, axis);
+        let (cost, k) = sweep(items, &order[..n], best);
+        if axis == 0 || (cost, k) != best {
+            chosen = order;
         }
-        let mut left = Aabb::EMPTY;
-        for k in 1..n {
-            left.add(&items[k - 1].bounds);
-            let cost = leaf_cost(&left, k) + right[k];
-            let more_even = (2 * k).abs_diff(n) < (2 * best.2).abs_diff(n);
-            if cost < best.0 || (cost == best.0 && more_even) {
-                best = (cost, axis, k);
-            }
-        }
+        best = (cost, k);
     }
-    if best.1 != 2 {
-        sort_by_center(items, best.1);
-    }
-    best.2
+    let before: [Item; SWEEP_ITEMS] = std::array::from_fn(|k| items[k.min(n - 1)]);
+    items.iter_mut().zip(chosen).for_each(|(item, key)| *item = before[place(key)]);
+    best.1
 }
 
-fn sort_by_center(items: &mut [Item], axis: usize) {
-    items.sort_unstable_by(|a, b| a.center2(axis).total_cmp(&b.center2(axis)).then(a.number.cmp(&b.number)));
+/// Cost and first item of the second side of the best split in an order, or `best`, if none is better: cheaper, or as cheap and more even.
+fn sweep(items: &[Item], order: &[u64], mut best: (f32, usize)) -> (f32, usize) {
+    let n = items.len();
+    let mut right = [0f32; SWEEP_ITEMS + 1];
+    let mut acc = Aabb::EMPTY;
+    for k in (1..n).rev() {
+        acc.add(&items[place(order[k])].bounds);
+        right[k] = leaf_cost(&acc, n - k);
+    }
+    let mut left = Aabb::EMPTY;
+    for k in 1..n {
+        left.add(&items[place(order[k - 1])].bounds);
+        let cost = leaf_cost(&left, k) + right[k];
+        let more_even = (2 * k).abs_diff(n) < (2 * best.1).abs_diff(n);
+        if cost < best.0 || (cost == best.0 && more_even) {
+            best = (cost, k);
+        }
+    }
+    best
+}
+
+/// Keys that sort like the items' centres, equal ones by place; each ends with the item's place.
+fn sorted_by_center(items: &[Item], axis: usize) -> [u64; SWEEP_ITEMS] {
+    let mut keys = [u64::MAX; SWEEP_ITEMS];
+    for (k, (key, item)) in keys.iter_mut().zip(items).enumerate() {
+        let bits = item.center2()[axis].to_bits();
+        let ordered = if bits >> 31 == 1 { !bits } else { bits | 1 << 31 };
+        *key = u64::from(ordered) << 8 | k as u64;
+    }
+    keys[..items.len()].sort_unstable();
+    keys
+}
+
+fn place(key: u64) -> usize {
+    (key & 0xFF) as usize
 }
