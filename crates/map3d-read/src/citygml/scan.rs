@@ -51,8 +51,11 @@ impl Scanner {
                 h if h.starts_with(b"</") => (b">", Some(Tag::End)),
                 _ => (b"", Some(Tag::Start)),
             };
-            let found =
-                self.find(|bytes| if ending.is_empty() { end_of_tag(bytes) } else { memmem::find(bytes, ending).map(|at| at + ending.len()) })?;
+            let found = self.find(|bytes| match ending {
+                b"" => end_of_tag(bytes),
+                b">" => memchr(b'>', bytes).map(|at| at + 1),
+                _ => memmem::find(bytes, ending).map(|at| at + ending.len()),
+            })?;
             let Some(length) = found else { return Ok(None) };
             match tag {
                 None => self.start += length,

@@ -3,6 +3,7 @@
 //! Memory: appearances outside of city objects in their compact form (about 16 bytes a vertex of a textured ring, `max_appearance_bytes`), and
 //! 8 bytes for each id that is referred to from another city object.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use map3d_base::{Error, Result};
@@ -38,8 +39,8 @@ pub fn survey(path: &Path, options: &ReadOptions, log: &mut Log) -> Result<Surve
             Tag::End => depth = depth.saturating_sub(1),
             Tag::Start | Tag::Empty => {
                 any = true;
-                let text = String::from_utf8_lossy(scanner.tag());
-                let (name, rest) = text.split_at(text.find(|c: char| c.is_ascii_whitespace()).unwrap_or(text.len()));
+                let text = std::str::from_utf8(scanner.tag()).map_or_else(|_| String::from_utf8_lossy(scanner.tag()), Cow::Borrowed);
+                let (name, rest) = text.split_at(text.bytes().position(|b| b.is_ascii_whitespace()).unwrap_or(text.len()));
                 let name = local_name(name);
                 survey.tag(path, depth, name, rest, &mut local, log)?;
                 let parsed = match (tag, name) {

@@ -223,12 +223,12 @@ impl<R: BufRead> Xml<R> {
 /// Attributes in the text behind a tag's name: name without prefix, value as written. Declarations of namespaces are left out.
 pub fn attributes(mut rest: &str) -> impl Iterator<Item = (&str, &str)> {
     std::iter::from_fn(move || {
-        let (name, after) = rest.split_once('=')?;
-        let after = after.trim_start();
-        let quote = after.chars().next().filter(|c| *c == '"' || *c == '\'')?;
-        let (value, after) = after[1..].split_once(quote)?;
-        rest = after;
-        Some((name.trim(), value))
+        let (name, after) = rest.split_at_checked(memchr(b'=', rest.as_bytes())?)?;
+        let after = after[1..].trim_ascii_start();
+        let quote = *after.as_bytes().first().filter(|c| matches!(c, b'"' | b'\''))?;
+        let end = 1 + memchr(quote, &after.as_bytes()[1..])?;
+        rest = &after[end + 1..];
+        Some((name.trim_ascii(), &after[1..end]))
     })
     .filter(|(name, _)| !name.starts_with("xmlns"))
     .map(|(name, value)| (local_name(name), value))
@@ -236,7 +236,7 @@ pub fn attributes(mut rest: &str) -> impl Iterator<Item = (&str, &str)> {
 
 /// A name without its prefix.
 pub fn local_name(name: &str) -> &str {
-    name.split_once(':').map_or(name, |(_, local)| local)
+    memchr(b':', name.as_bytes()).map_or(name, |at| &name[at + 1..])
 }
 
 /// A value that cannot be unescaped is taken as it is written.
