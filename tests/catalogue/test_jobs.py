@@ -68,6 +68,21 @@ def test_a_quarantined_block_keeps_its_reduce_job_waiting(catalogue: Catalogue) 
     assert (counts[State.WAITING], counts[State.QUARANTINED]) == (1, 1)
 
 
+def test_a_lease_goes_on_from_a_place_and_begins_again_at_the_first(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [reduce(), *map(base, range(4))])
+    third = 2
+    taken = [catalogue.lease("town-a", "w", third) for _ in range(4)]
+    assert [lease.block.x for lease in taken if lease is not None] == [2, 3, 0, 1]
+    for lease in taken:
+        assert lease is not None
+        catalogue.release(lease)
+    again = catalogue.lease("town-a", "w", third)
+    assert again is not None
+    catalogue.fail(again, "bad")
+    after = [catalogue.lease("town-a", "w", third) for _ in range(4)]
+    assert [lease.block.x for lease in after if lease is not None] == [3, 0, 1, 2], "what failed comes last"
+
+
 def test_retry_gives_a_quarantined_job_three_new_attempts(catalogue: Catalogue) -> None:
     catalogue.plan("town-a", [base(0), base(1)])
     while (lease := catalogue.lease("town-a", "w")) is not None:

@@ -68,8 +68,12 @@ class Catalogue(Protocol):
         version has been announced, it is raised by one.
         """
 
-    def lease(self, rendering: str, worker: str) -> Lease | None:
-        """Takes the next job, in one atomic statement; None when there is none to take now. Expired leases are given back first."""
+    def lease(self, rendering: str, worker: str, start: int = 0) -> Lease | None:
+        """Takes the next job, in one atomic statement; None when there is none to take now. Expired leases are given back first.
+
+        By fewest attempts, level, view; among these the first at or behind Morton number `start`, else the first of all: so a worker can stay where
+        it is.
+        """
 
     def heartbeat(self, lease: Lease) -> None:
         """Holds the lease for another `lease_s`; raises StaleFence."""

@@ -29,9 +29,13 @@ _ALL_BELOW_DONE: Final = f"""NOT EXISTS (SELECT 1 FROM job AS below WHERE below.
 _AFTER_FAILURE: Final = f"CASE WHEN attempts >= {MAX_ATTEMPTS} THEN '{State.QUARANTINED}' ELSE '{next_state(State.LEASED, Event.FAIL)}' END"
 _EXPIRE: Final = f"""UPDATE job SET state = {_AFTER_FAILURE}, worker = NULL, expires = NULL, reason = 'lease expired (worker ' || worker || ')'
   WHERE state = '{State.LEASED}' AND expires < {NOW}"""
+_NEXT: Final = f"""SELECT {{columns}} FROM job WHERE rendering = :rendering AND state = '{State.TODO}' ORDER BY attempts, z, view, morton LIMIT 1"""
 _LEASE: Final = f"""UPDATE job SET state = '{next_state(State.TODO, Event.LEASE)}', attempts = attempts + 1, fence = fence + 1, worker = :worker,
   expires = {NOW} + :lease_s
-  WHERE rowid = (SELECT rowid FROM job WHERE rendering = :rendering AND state = '{State.TODO}' ORDER BY attempts, z, view, morton LIMIT 1)
+  WHERE rowid = coalesce(
+    (SELECT rowid FROM job WHERE rendering = :rendering AND state = '{State.TODO}' AND morton >= :start
+      AND (attempts, z, view) = ({_NEXT.format(columns="attempts, z, view")}) ORDER BY morton LIMIT 1),
+    ({_NEXT.format(columns="rowid")}))
   RETURNING *, (SELECT content_version FROM rendering WHERE name = rendering) AS content_version"""
 _HELD: Final = f"{_AT} AND state = '{State.LEASED}' AND fence = :fence AND expires >= {NOW}"
 
@@ -63,10 +67,10 @@ class SqliteJobs:
                 db.execute("UPDATE rendering SET content_version = ? WHERE name = ?", (announced + 1, rendering))
         return PlanOutcome(len(added), len(changed), kept)
 
-    def lease(self, rendering: str, worker: str) -> Lease | None:
+    def lease(self, rendering: str, worker: str, start: int = 0) -> Lease | None:
         with self._database.transaction() as db:
             db.execute(_EXPIRE)
-            row = db.execute(_LEASE, {"rendering": rendering, "worker": worker, "lease_s": self.lease_s}).fetchone()
+            row = db.execute(_LEASE, {"rendering": rendering, "worker": worker, "lease_s": self.lease_s, "start": start}).fetchone()
         return None if row is None else _lease(row)
 
     def heartbeat(self, lease: Lease) -> None:

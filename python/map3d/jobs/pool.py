@@ -12,6 +12,7 @@ from map3d.catalogue import Catalogue, State
 from map3d.jobs.events import Done, Event, Failed, Left, Lost, Stopping, Waiting
 from map3d.jobs.terms import Terms
 from map3d.jobs.worker import News, Task, Worker
+from map3d.tiles.naming import morton
 
 _LOOK_S = 0.2
 
@@ -59,6 +60,7 @@ class Pool:
         self._workers: dict[str, Worker] = {}
         self._started = 0
         self._told_waiting = False
+        self._places: list[int] = []
         self._error: BaseException | None = None
         self.tally = Tally()
 
@@ -78,6 +80,7 @@ class Pool:
 
     def run(self, on_event: Callable[[Event], None]) -> Tally:
         """Blocks; `on_event` is called in the caller's thread. While it runs, the first SIGINT or SIGTERM stops the pool, the second abandons."""
+        self._places = self._base_places()
         with _signals(self._on_signal):
             for _ in range(self._size):
                 self._start_worker()
@@ -86,6 +89,11 @@ class Pool:
         if self._error is not None:
             raise self._error
         return self.tally
+
+    def _base_places(self) -> list[int]:
+        """Morton numbers of the base blocks to do, of all views together."""
+        jobs = self._catalogue.jobs(self._rendering, state=State.TODO)
+        return sorted(morton(job.block.x, job.block.y) for job in jobs if job.kind == "base")
 
     def _on_signal(self) -> None:
         self._events.put(Stopping(abandoning=self.stopped))
@@ -119,6 +127,8 @@ class Pool:
         self._started += 1
         name = f"{self._host}-{self._started}"
         worker = Worker(name, self._catalogue, self._rendering, self._task, self._terms, self._stop, self._abandon, self._news)
+        if self._places:
+            worker.start = self._places[(self._started - 1) % self._size * len(self._places) // self._size]
         self._workers[name] = worker
         self._threads[name] = threading.Thread(target=worker.run, args=(self._events.put,), name=name)
         self._threads[name].start()

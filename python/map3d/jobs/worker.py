@@ -13,6 +13,7 @@ from map3d.child import Child, Failure, Message
 from map3d.errors import ChildRefused, Map3dError, StaleFence
 from map3d.jobs.events import Done, Event, Failed, Left, Lost
 from map3d.jobs.terms import Terms
+from map3d.tiles.naming import morton
 
 
 class Task(Protocol):
@@ -63,6 +64,8 @@ class Worker:
         self._stop, self._abandon = stop, abandon
         self._child: Child | None = None
         self._failed: set[tuple[str, str]] = set()
+        self.start = 0
+        """Morton number of base blocks from which on it goes: neighbours share chunks and textures."""
         self.idle_since: float | None = None
         """Monotonic seconds; None while it has a job or a child starts."""
 
@@ -85,9 +88,11 @@ class Worker:
             if child is None:
                 break
             since = self._news.count
-            lease = self._catalogue.lease(self._rendering, self.name)
+            lease = self._catalogue.lease(self._rendering, self.name, self.start)
             if lease is not None:
                 self.idle_since = None
+                if lease.kind == "base":
+                    self.start = morton(lease.block.x, lease.block.y)
                 tell(self._work(child, lease))
                 self._news.tell()
             elif self._nothing_left():
