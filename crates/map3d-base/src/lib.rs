@@ -5,6 +5,7 @@ pub mod asset;
 pub mod error;
 pub mod file;
 pub mod frame;
+pub mod isa;
 pub mod samples;
 pub mod tile;
 pub mod vec3;
@@ -12,6 +13,7 @@ pub mod view;
 
 pub use error::{Error, Result};
 pub use frame::{Frame, LayerFormat, LayerKind, LayerSpec};
+pub use isa::Isa;
 pub use vec3::{Box3, Vec3};
 pub use view::ViewAxes;
 
@@ -20,4 +22,4 @@ pub const DEPTH_UNITS_PER_M: f64 = 1024.0;
 /// Stored depth where there is nothing.
 pub const DEPTH_NOTHING: u32 = u32::MAX;
 /// Raised only when rendered bytes change.
-pub const RENDER_FORMAT: u32 = 2;
+pub const RENDER_FORMAT: u32 = 3;

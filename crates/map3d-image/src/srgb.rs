@@ -2,14 +2,17 @@
 
 use std::sync::LazyLock;
 
-/// Full scale of the sampler's texels: 15 bits, so that a texel times a 14-bit weight fits 32 bits with sign.
-pub const UNIT15: u32 = 32_767;
-
 /// `round(65535·f(b/255))` of each sRGB byte.
 pub static LINEAR16: LazyLock<[u16; 256]> = LazyLock::new(|| std::array::from_fn(|b| scaled(b, 65_535.0)));
 
-/// The same in 15 bits, for texels that are filtered.
-pub static LINEAR15: LazyLock<[u16; 256]> = LazyLock::new(|| std::array::from_fn(|b| scaled(b, f64::from(UNIT15))));
+/// `round(255·√(v/65535))` of each 16-bit linear value: texels that are filtered.
+pub static ROOT: LazyLock<Box<[u8; 65_536]>> = LazyLock::new(|| {
+    let byte = |v: usize| ((v as f64 / 65_535.0).sqrt() * 255.0).round() as u8;
+    (0..65_536).map(byte).collect::<Vec<u8>>().try_into().expect("65,536 entries")
+});
+
+/// The same of each sRGB byte.
+pub static ROOT_OF_BYTE: LazyLock<[u8; 256]> = LazyLock::new(|| std::array::from_fn(|b| ROOT[LINEAR16[b] as usize]));
 
 /// The sRGB byte whose linear value is nearest to a 16-bit linear value; the lower byte when two are as near.
 pub static BYTE: LazyLock<Box<[u8; 65_536]>> = LazyLock::new(|| {

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use common::{Random, noise};
 use map3d_base::asset::Wrap;
 use map3d_image::Raster;
-use map3d_image::sample::{AlphaSampler, Footprint, Outside, Sampler, Tuning, UvMap, footprint};
+use map3d_image::sample::{AlphaSampler, Footprint, Outside, Sampler, TapPlan, Tuning, UvMap, footprint};
 use map3d_image::srgb::{BYTE, LINEAR16};
 use map3d_image::texture::Level;
 
@@ -15,6 +15,10 @@ const WHITE: Outside = Outside { diffuse: [255; 4], border: [9, 200, 60, 255] };
 
 fn point() -> Footprint {
     Footprint { level: 0, taps: vec![[0.0; 2]] }
+}
+
+fn made(plan: &Footprint) -> Arc<TapPlan> {
+    Arc::new(TapPlan::new(plan))
 }
 
 /// One texel a pixel, v up, the image's upper left corner at the origin.
@@ -31,7 +35,7 @@ fn texel_centres_give_texels_in_every_wrap_mode() {
     for (w, h) in [(8, 8), (7, 5), (1, 1), (1, 6)] {
         let image = noise(w, h, 3);
         for wrap in [Wrap::Wrap, Wrap::Mirror, Wrap::Clamp, Wrap::Border, Wrap::None] {
-            let sampler = Sampler::with(Arc::new(Level::from_raster(&image)), &point(), false, &one_to_one(w, h), wrap, WHITE);
+            let sampler = Sampler::new(Arc::new(Level::from_raster(&image)), made(&point()), false, &one_to_one(w, h), wrap, WHITE);
             for y in -20..20 {
                 for x in -20..20 {
                     let got = bytes(sampler.sample(x * 256 + 128, y * 256 + 128));
@@ -63,9 +67,9 @@ fn white_stays_white_and_diffuse_multiplies() {
     for scale in [0.3, 1.0, 2.3, 9.0, 40.0] {
         let uv = UvMap { u: [0.1, scale / 16.0, 0.01], v: [0.2, 0.02, scale / 16.0] };
         let plan = footprint(uv.jacobian(16, 16), 1, &Tuning::default());
-        let white = Sampler::with(level.clone(), &plan, false, &uv, Wrap::Wrap, WHITE);
+        let white = Sampler::new(level.clone(), made(&plan), false, &uv, Wrap::Wrap, WHITE);
         assert_eq!(white.sample(77, 1234), [65_535; 3], "{} taps", plan.taps.len());
-        let tinted = Sampler::with(level.clone(), &plan, false, &uv, Wrap::Wrap, Outside { diffuse: [200, 100, 0, 255], ..WHITE });
+        let tinted = Sampler::new(level.clone(), made(&plan), false, &uv, Wrap::Wrap, Outside { diffuse: [200, 100, 0, 255], ..WHITE });
         assert_eq!(bytes(tinted.sample(77, 1234)), [200, 100, 0]);
     }
 }
@@ -73,7 +77,7 @@ fn white_stays_white_and_diffuse_multiplies() {
 #[test]
 fn transparent_texels_lend_no_colour() {
     let image = Raster::new(2, 1, vec![[255, 0, 255, 0], [0, 128, 0, 255]]);
-    let sampler = Sampler::with(Arc::new(Level::from_raster(&image)), &point(), true, &one_to_one(2, 1), Wrap::Clamp, WHITE);
+    let sampler = Sampler::new(Arc::new(Level::from_raster(&image)), made(&point()), true, &one_to_one(2, 1), Wrap::Clamp, WHITE);
     for x in 140..500 {
         assert_eq!(bytes(sampler.sample(x, 128)), [0, 128, 0], "at {x}");
     }
@@ -108,7 +112,7 @@ fn samples_come_near_the_exact_integral() {
         let mut part = |s: f64| (random.unit() - 0.5) * s / 64.0;
         let uv = UvMap { u: [0.3, part(5.0), part(5.0)], v: [0.6, part(5.0), part(5.0)] };
         let plan = footprint(uv.jacobian(64, 64), 1, &Tuning::default());
-        let sampler = Sampler::with(level.clone(), &plan, false, &uv, Wrap::Wrap, WHITE);
+        let sampler = Sampler::new(level.clone(), made(&plan), false, &uv, Wrap::Wrap, WHITE);
         for (x, y) in [(0.5, 0.5), (7.5, 3.5), (30.5, 60.5)] {
             let exact = integral(&image, &uv, x, y);
             let got = sampler.sample((x * 256.0) as i32, (y * 256.0) as i32);

@@ -405,7 +405,7 @@ fn the_cache_stays_under_its_cap_and_counts() {
             key
         })
         .collect();
-    let level_bytes = 32 * 32 * 8;
+    let level_bytes = 32 * 32 * 4;
     let cache = TextureCache::new(dir.clone(), 3 * level_bytes);
     let mut held = BTreeMap::new();
     for key in &keys {

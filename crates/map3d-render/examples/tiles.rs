@@ -33,7 +33,10 @@ fn main() {
         round(&scene, &f, &tiles, Some(PathBuf::from(folder)));
     }
     rounds.sort_by(|a, b| a.total().total_cmp(&b.total()));
+    print!("median ");
     rounds[rounds.len() / 2].print(f.layers.as_slice());
+    print!("least  ");
+    rounds[0].print(f.layers.as_slice());
     println!("{:?}", scene.stats());
 }
 

@@ -1,13 +1,26 @@
 //! What a surface looks like over the pixels of a sub-tile: set up once, then asked per pixel.
 
-use map3d_base::Result;
-use map3d_image::sample::{Outside, Sampler, UvMap};
+use map3d_base::{Isa, Result};
+use map3d_image::sample::{Outside, POSITION_BITS, Sampler, TapPlans, UvMap};
 use map3d_image::srgb::LINEAR16;
-use map3d_image::texture::TextureCache;
+use map3d_image::texture::{HeldTextures, TextureCache};
 use map3d_scene::MaterialRecord;
 use map3d_trace::{Affine, DepthPlane, Surface};
 
 use crate::cutout::wrap_of;
+
+/// Where textures come from and what is kept of them between surfaces.
+pub struct Palette {
+    pub held: HeldTextures,
+    plans: TapPlans,
+}
+
+impl Palette {
+    /// `isa`: one that this machine has.
+    pub fn new(isa: Isa) -> Self {
+        Self { held: HeldTextures::default(), plans: TapPlans::new(isa) }
+    }
+}
 
 /// Colour of a surface, linear light, 16 bits.
 pub enum Paint {
@@ -17,14 +30,17 @@ pub enum Paint {
 
 impl Paint {
     /// A texture is multiplied by the diffuse colour; without one the diffuse colour stands alone.
-    pub fn new(cache: &TextureCache, material: &MaterialRecord, uv: &[Affine; 2]) -> Result<Self> {
+    fn new(palette: &mut Palette, cache: &TextureCache, material: &MaterialRecord, uv: &[Affine; 2]) -> Result<Self> {
         let diffuse = material.diffuse;
         if !material.is_textured() {
             return Ok(Self::Flat([diffuse[0], diffuse[1], diffuse[2]].map(|b| LINEAR16[b as usize])));
         }
-        let texture = cache.texture(&material.texture)?;
+        let texture = palette.held.texture(cache, &material.texture)?;
+        let (file, uv) = (&texture.file, uv_map(uv));
+        let plan = palette.plans.of(uv.jacobian(file.width, file.height), file.levels);
+        let level = palette.held.level(cache, &texture, plan.level)?;
         let outside = Outside { diffuse, border: material.border };
-        Sampler::new(cache, &texture, &uv_map(uv), wrap_of(material), outside).map(Self::Textured)
+        Ok(Self::Textured(Sampler::new(level, plan, file.has_alpha, &uv, wrap_of(material), outside)))
     }
 
     /// At a position in 2^-8 px from the sub-tile's corner.
@@ -33,6 +49,16 @@ impl Paint {
         match self {
             Self::Flat(color) => *color,
             Self::Textured(sampler) => sampler.sample(x, y),
+        }
+    }
+
+    /// Whole pixels of a row, the first of which is (i, j); full coverage.
+    #[inline(always)]
+    pub fn row(&self, i: usize, j: usize, out: &mut [[u16; 4]]) {
+        const HALF: i32 = 1 << (POSITION_BITS - 1);
+        match self {
+            Self::Flat([r, g, b]) => out.fill([*r, *g, *b, 65_535]),
+            Self::Textured(sampler) => sampler.row((i as i32) << POSITION_BITS | HALF, (j as i32) << POSITION_BITS | HALF, out),
         }
     }
 }
@@ -54,10 +80,10 @@ pub struct Shaded {
 }
 
 impl Shaded {
-    pub fn new(cache: &TextureCache, material: &MaterialRecord, surface: &Surface, depth: DepthPlane) -> Result<Self> {
+    pub fn new(palette: &mut Palette, cache: &TextureCache, material: &MaterialRecord, surface: &Surface, depth: DepthPlane) -> Result<Self> {
         Ok(Self {
             depth,
-            paint: Paint::new(cache, material, &surface.uv)?,
+            paint: Paint::new(palette, cache, material, &surface.uv)?,
             id: surface.object_id,
             normal: stored(surface.normal),
             smooth: surface.corner_normals.is_some().then(|| Box::new(*surface)),
@@ -70,6 +96,15 @@ impl Shaded {
         match &self.smooth {
             None => self.normal,
             Some(surface) => stored(surface.normal_at(i as f32 + 0.5, j as f32 + 0.5)),
+        }
+    }
+
+    /// Those of a row of pixels, the first of which is (i, j).
+    #[inline(always)]
+    pub fn normals(&self, i: usize, j: usize, out: &mut [[i16; 3]]) {
+        match &self.smooth {
+            None => out.fill(self.normal),
+            Some(_) => out.iter_mut().enumerate().for_each(|(k, n)| *n = self.normal_at(i + k, j)),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! One base tile: sub-tiles traced and shaded into a G-buffer.
 
 use map3d_base::tile::Tile;
-use map3d_base::{Error, Frame, Result};
+use map3d_base::{Error, Frame, Isa, Result};
 use map3d_image::GBuffer;
 use map3d_trace::{BeamTracer, SUBTILE_PX};
 
@@ -23,14 +23,20 @@ pub struct TileRenderer<'s> {
 }
 
 impl<'s> TileRenderer<'s> {
+    /// Fails for a frame that is not sound.
     pub fn new(scene: &'s RenderScene, frame: &Frame) -> Result<Self> {
+        Self::with_isa(scene, frame, Isa::best())
+    }
+
+    /// With an instruction set other than the best; the results are the same.
+    pub fn with_isa(scene: &'s RenderScene, frame: &Frame, isa: Isa) -> Result<Self> {
         frame.validate()?;
         Ok(Self {
             scene,
             frame: frame.clone(),
-            tracer: BeamTracer::new(scene.store(), frame)?,
+            tracer: BeamTracer::with_isa(scene.store(), frame, isa)?,
             cutout: TextureCutout::new(scene.textures()),
-            shader: Shader::default(),
+            shader: Shader::new(isa),
             visibility_s: 0.0,
             shade_s: 0.0,
         })

@@ -11,10 +11,11 @@ mod town;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use map3d_base::DEPTH_NOTHING;
 use map3d_base::file::checksum;
+use map3d_base::{DEPTH_NOTHING, Frame, Isa};
 use map3d_image::encode::{Deflate, Filter, bytes_from_normals, color_from_linear, decode_png, encode_png};
 use map3d_image::{GBuffer, Raster};
+use map3d_render::{RenderScene, TileRenderer};
 use pictures::PICTURES;
 use town::{frame, new_folder};
 
@@ -83,12 +84,22 @@ fn drawn() -> BTreeMap<String, (Raster, String)> {
         let (folder, town) = (new_folder(picture.name), (picture.scene)());
         let scene = town.open(&folder);
         for &(look_at, pitch) in picture.views {
-            let f = map3d_base::Frame { d0_m: -40.0, ..frame(look_at, pitch, 2.0 * picture.metres, 0) };
-            let g = middle(&scene.gbuffer(&f, 0, 0).expect("renders"));
+            let f = Frame { d0_m: -40.0, ..frame(look_at, pitch, 2.0 * picture.metres, 0) };
+            let g = middle(&drawn_by_all(&scene, &f));
             out.insert(format!("{}-{look_at}-{pitch}", picture.name), (quarters(&g), digest(&g)));
         }
     }
     out
+}
+
+/// Tile (0, 0), the same bits with every instruction set that this machine has.
+fn drawn_by_all(scene: &RenderScene, frame: &Frame) -> GBuffer {
+    let by = |isa: Isa| TileRenderer::with_isa(scene, frame, isa).expect("a frame").tile(0, 0).expect("renders").expect("has content");
+    let plain = by(Isa::Scalar);
+    for isa in Isa::available() {
+        assert!(by(isa) == plain, "{isa:?} draws other bits");
+    }
+    plain
 }
 
 fn golden_folder() -> PathBuf {

@@ -10,11 +10,10 @@ pub(crate) mod exact;
 pub(crate) mod project;
 pub(crate) mod shape;
 
-use map3d_base::{Box3, DEPTH_UNITS_PER_M, Error, Frame, Result};
+use map3d_base::{Box3, DEPTH_UNITS_PER_M, Error, Frame, Isa, Result};
 use map3d_scene::SceneStore;
 
 use crate::cutout::Cutout;
-use crate::lanes::Isa;
 use crate::visbuf::{MetPart, SUBTILE_PX, VisBuf};
 use boxes::least_key;
 use descent::Descent;

@@ -32,34 +32,3 @@ pub(crate) trait Lanes: Copy {
     /// Eight boxes against the square from 0 to `side`, both ends included: bit k is set when box k meets it. NaN never does.
     fn meets_square(x: &[[f32; 8]; 2], y: &[[f32; 8]; 2], side: f32) -> u32;
 }
-
-/// An instruction set that this machine has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Isa {
-    Scalar,
-    #[cfg(target_arch = "x86_64")]
-    Avx2,
-    #[cfg(target_arch = "x86_64")]
-    Avx512,
-}
-
-impl Isa {
-    /// All that this machine has, the best last.
-    pub fn available() -> Vec<Self> {
-        let mut out = vec![Self::Scalar];
-        #[cfg(target_arch = "x86_64")]
-        {
-            if x86::has_avx2() {
-                out.push(Self::Avx2);
-            }
-            if x86::has_avx512() {
-                out.push(Self::Avx512);
-            }
-        }
-        out
-    }
-
-    pub fn best() -> Self {
-        *Self::available().last().expect("scalar is always there")
-    }
-}

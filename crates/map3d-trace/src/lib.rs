@@ -13,7 +13,7 @@ pub mod visbuf;
 
 pub use beam::BeamTracer;
 pub use cutout::{Cutout, CutoutSample, Opaque, Stencil};
-pub use lanes::Isa;
+pub use map3d_base::Isa;
 pub use occupancy::{block_key, occupied};
 pub use plane::DepthPlane;
 pub use ray::{Hit, Ray, Rays};

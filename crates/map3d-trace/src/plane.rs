@@ -3,7 +3,6 @@
 use map3d_base::{DEPTH_NOTHING, Vec3};
 
 use crate::beam::project::{depth_gradient, depth_range};
-use crate::visbuf::VisBuf;
 
 /// Depth units from D0 over pixel coordinates of the sub-tile: affine, clamped to the triangle's range.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,7 +13,7 @@ pub struct DepthPlane {
 }
 
 impl DepthPlane {
-    fn new(pixel: &[Vec3; 3]) -> Self {
+    pub(crate) fn new(pixel: &[Vec3; 3]) -> Self {
         let range = depth_range(pixel);
         match depth_gradient(pixel) {
             Some(gradient) => Self { corner: pixel[0], gradient, range },
@@ -27,13 +26,24 @@ impl DepthPlane {
     pub fn units(&self, i: usize, j: usize) -> u32 {
         let (dx, dy) = (i as f64 + 0.5 - self.corner[0], j as f64 + 0.5 - self.corner[1]);
         let plane = self.corner[2] + self.gradient[0] * dx + self.gradient[1] * dy;
-        (plane.clamp(self.range.0, self.range.1) + 0.5).floor().clamp(0.0, f64::from(DEPTH_NOTHING - 1)) as u32
+        units_of(plane.clamp(self.range.0, self.range.1))
+    }
+
+    /// The same of a row of pixels, the first of which is (i, j).
+    #[inline(always)]
+    pub fn row(&self, i: usize, j: usize, out: &mut [u32]) {
+        let dy = j as f64 + 0.5 - self.corner[1];
+        for (k, units) in out.iter_mut().enumerate() {
+            let dx = (i + k) as f64 + 0.5 - self.corner[0];
+            let plane = self.corner[2] + self.gradient[0] * dx + self.gradient[1] * dy;
+            *units = units_of(plane.clamp(self.range.0, self.range.1));
+        }
     }
 }
 
-impl VisBuf {
-    /// The depth plane of a slot; set up once per surface, some 100 ns.
-    pub fn depth_plane(&self, slot: u32) -> DepthPlane {
-        DepthPlane::new(&self.placed_corners(slot))
-    }
+/// To the nearest whole unit, never `DEPTH_NOTHING`.
+#[inline(always)]
+fn units_of(depth: f64) -> u32 {
+    // Not negative, so cutting off is rounding down.
+    (depth + 0.5).max(0.0).min(f64::from(DEPTH_NOTHING - 1)) as i64 as u32
 }

@@ -2,11 +2,13 @@
 
 use std::sync::Arc;
 
-use map3d_base::{DEPTH_NOTHING, Frame, Vec3, ViewAxes};
+use map3d_base::{DEPTH_NOTHING, Frame, ViewAxes};
 use map3d_scene::{Chunk, InstanceRecord};
 
-use crate::beam::buffer::{MIXED, SampleBuffer, Track};
+pub use crate::beam::buffer::MIXED;
+use crate::beam::buffer::{BLOCKS_PER_ROW, SampleBuffer, Track};
 use crate::beam::project::{Projection, units_of_plane};
+use crate::plane::DepthPlane;
 use crate::surface::{Placed, Surface};
 
 /// Side of a sub-tile in pixels: its buffers stay in the second-level cache.
@@ -86,12 +88,30 @@ impl VisBuf {
         }
     }
 
+    /// The slots of a row of pixels, `MIXED` for those whose samples meet several, `NOTHING` where there is none.
+    #[inline(always)]
+    pub fn row(&self, j: usize) -> &[u32] {
+        self.samples.slot[j * BLOCKS_PER_ROW..][..BLOCKS_PER_ROW].as_flattened()
+    }
+
+    /// The slots of a `MIXED` pixel's samples.
+    #[inline(always)]
+    pub fn mixed(&self, i: usize, j: usize) -> &[u32; 16] {
+        &self.samples.slots[j * SUBTILE_PX + i]
+    }
+
     /// What shading needs of a slot; computed anew at each call (some 100 ns), so keep it while shading a sub-tile.
     pub fn surface(&self, slot: u32) -> Surface {
+        self.surface_and_depth(slot).0
+    }
+
+    /// The same with its depth plane.
+    pub fn surface_and_depth(&self, slot: u32) -> (Surface, DepthPlane) {
         let track = &self.tracks[slot as usize];
         let part = &self.parts[track.part as usize];
         let placed = self.placed(track, part);
-        Surface::new(track.part, &part.chunk, track.triangle, part.instance.as_ref().map(|(k, r)| (*k, r)), &placed)
+        let surface = Surface::new(track.part, &part.chunk, track.triangle, part.instance.as_ref().map(|(k, r)| (*k, r)), &placed);
+        (surface, DepthPlane::new(&placed.pixel))
     }
 
     /// The chunk of a `Surface::chunk`.
@@ -104,12 +124,6 @@ impl VisBuf {
         let track = &self.tracks[slot as usize];
         let placed = self.placed(track, &self.parts[track.part as usize]);
         units_of_plane(&placed.pixel, i as f64 + 0.5, j as f64 + 0.5)
-    }
-
-    /// Pixel coordinates and depth units of a slot's corners, unsnapped.
-    pub(crate) fn placed_corners(&self, slot: u32) -> [Vec3; 3] {
-        let track = &self.tracks[slot as usize];
-        self.placed(track, &self.parts[track.part as usize]).pixel
     }
 
     /// Depth of the centre sample, `DEPTH_NOTHING` where it meets nothing.

@@ -8,41 +8,37 @@ use std::sync::{Arc, Mutex, OnceLock};
 use map3d_base::{Error, Result};
 
 use crate::raster::Raster;
-use crate::srgb::{LINEAR15, UNIT15};
+use crate::srgb::{ROOT, ROOT_OF_BYTE};
 use crate::texture::file::{TextureFile, TextureKey, texture_path};
-use crate::texture::mips::{LinearRaster, first_mip};
+use crate::texture::mips::{LinearRaster, first_mip, premultiplied};
 
-/// A level in linear light, premultiplied, 15 bits a channel (`UNIT15` = 1); rows top to bottom.
+/// A level as bytes q of √(linear light): q² / 255² is the light, premultiplied by alpha; alpha likewise. Finer than sRGB bytes in shadows and
+/// lights, at most a third coarser between; four bytes a texel are what the memory can carry. Rows top to bottom.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Level {
     pub width: u32,
     pub height: u32,
-    pub texels: Vec<[u16; 4]>,
+    pub texels: Vec<[u8; 4]>,
 }
 
 impl Level {
     pub fn from_raster(raster: &Raster) -> Self {
-        let table: &[u16; 256] = &LINEAR15;
-        let texel = |p: &[u8; 4]| {
-            let [r, g, b] = [table[p[0] as usize], table[p[1] as usize], table[p[2] as usize]];
-            if p[3] == 255 {
-                return [r, g, b, UNIT15 as u16];
-            }
-            let a = u32::from(p[3]);
-            let times = |c: u16| ((u32::from(c) * a + 127) / 255) as u16;
-            [times(r), times(g), times(b), ((a * UNIT15 + 127) / 255) as u16]
+        let table: &[u8; 256] = &ROOT_OF_BYTE;
+        let texel = |p: &[u8; 4]| match p[3] {
+            255 => [table[p[0] as usize], table[p[1] as usize], table[p[2] as usize], 255],
+            _ => premultiplied(*p).map(|c| ROOT[c as usize]),
         };
         Self { width: raster.width, height: raster.height, texels: raster.pixels.iter().map(texel).collect() }
     }
 
     pub fn from_linear(linear: &LinearRaster) -> Self {
-        let channel = |c: u16| ((u32::from(c) * UNIT15 + 32_767) / 65_535) as u16;
-        let texel = |p: &[u16; 4]| [channel(p[0]), channel(p[1]), channel(p[2]), channel(p[3])];
+        let table: &[u8; 65_536] = &ROOT;
+        let texel = |p: &[u16; 4]| [table[p[0] as usize], table[p[1] as usize], table[p[2] as usize], table[p[3] as usize]];
         Self { width: linear.width, height: linear.height, texels: linear.pixels.iter().map(texel).collect() }
     }
 
     fn bytes(&self) -> u64 {
-        (self.texels.len() * 8) as u64
+        self.texels.len() as u64 * 4
     }
 }
 

@@ -4,6 +4,7 @@ mod build;
 mod cache;
 mod file;
 mod fill;
+mod held;
 pub(crate) mod mask;
 mod mips;
 mod source;
@@ -12,5 +13,6 @@ pub use build::{Progress, TextureAsset, TextureInfo, TextureKeys, TextureSource,
 pub use cache::{CacheStats, Level, Texture, TextureCache};
 pub use file::{TextureFile, TextureKey, hex, layout, texture_key, texture_path, write};
 pub use fill::fill_unused;
+pub use held::HeldTextures;
 pub use mask::UsageMask;
 pub use mips::{LinearRaster, first_mip, level_count, level_size, next_mip, premultiplied};

@@ -8,7 +8,7 @@ pub(crate) const PIXELS: usize = SUBTILE_PX * SUBTILE_PX;
 /// Pixels come in blocks of 16 along a row.
 pub(crate) const BLOCKS_PER_ROW: usize = SUBTILE_PX / 16;
 /// `SampleBuffer::slot` of a pixel whose samples meet several surfaces.
-pub(crate) const MIXED: u32 = u32::MAX - 1;
+pub const MIXED: u32 = u32::MAX - 1;
 /// The key of a sample that meets nothing.
 pub(crate) const FAR: i32 = i32::MAX;
 /// Groups of 8 × 8 pixels share a bound of their keys.

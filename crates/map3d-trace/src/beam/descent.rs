@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use map3d_base::DEPTH_UNITS_PER_M;
+use map3d_base::{DEPTH_UNITS_PER_M, Isa};
 use map3d_scene::records::{EMPTY, LEAF_BIT};
 use map3d_scene::{Chunk, InstanceRecord, Leaf, Node};
 
@@ -13,7 +13,7 @@ use super::corners::Corners;
 use super::project::Projection;
 use super::shape::{Depth, Keys, PixelBox, bias, edges, is_near, key_plane, whole_steps};
 use crate::cutout::Sheet;
-use crate::lanes::{Isa, Lanes};
+use crate::lanes::Lanes;
 use crate::surface::{Placed, Surface};
 use crate::visbuf::NOTHING;
 

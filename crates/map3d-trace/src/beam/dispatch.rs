@@ -1,9 +1,11 @@
 //! One compilation of the descent for each instruction set, chosen at run time.
 
+use map3d_base::Isa;
+
 use super::descent::Descent;
+use crate::lanes::Plain;
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::{Avx2, Avx512};
-use crate::lanes::{Isa, Plain};
 
 /// Runs a descent; `BeamTracer::with_isa` has checked that this machine has `isa`.
 pub(crate) fn run(descent: Descent, isa: Isa) {

@@ -1,21 +1,12 @@
 //! Lanes in vector registers. The only file of this crate with `unsafe`.
 //!
-//! SAFETY, for every block here: the intrinsics need AVX2 (`Avx2`) or AVX-512 F and VL (`Avx512`). These types are named only by `beam::dispatch`, which
-//! asks `has_avx2` and `has_avx512` first. Loads and stores go through references to arrays of exactly the bytes they touch, without alignment demands.
+//! SAFETY, for every block here: the intrinsics need AVX2 (`Avx2`) or AVX-512 F and VL (`Avx512`). These types are named only by `beam::dispatch`, after
+//! `BeamTracer::with_isa` has asked for them. Loads and stores go through references to arrays of exactly the bytes they touch, without alignment demands.
 #![allow(clippy::undocumented_unsafe_blocks)]
 
 use std::arch::x86_64::*;
 
 use super::Lanes;
-
-pub(super) fn has_avx2() -> bool {
-    is_x86_feature_detected!("avx2") && is_x86_feature_detected!("bmi1") && is_x86_feature_detected!("bmi2") && is_x86_feature_detected!("lzcnt")
-}
-
-pub(super) fn has_avx512() -> bool {
-    let wide = is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl") && is_x86_feature_detected!("avx512dq");
-    has_avx2() && wide && is_x86_feature_detected!("avx512bw")
-}
 
 /// One 512-bit register.
 #[derive(Clone, Copy)]
