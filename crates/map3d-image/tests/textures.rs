@@ -9,8 +9,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use common::{Random, folder, noise, png};
 use map3d_base::asset::{AssetMesh, AssetReport, AssetWriter, Batch, Material, Materials, Rank, Wrap};
 use map3d_image::texture::{
-    LinearRaster, TextureAsset, TextureCache, TextureFile, TextureKeys, UsageMask, build_textures, fill_unused, first_mip, hex, layout, level_count,
-    next_mip, premultiplied, prune_textures, texture_key, texture_path, write,
+    Level, LinearRaster, TextureAsset, TextureCache, TextureFile, TextureKeys, UsageMask, build_textures, fill_unused, first_mip, hex, layout,
+    level_count, next_mip, premultiplied, prune_textures, texture_key, texture_path, write,
 };
 use map3d_image::{ImageLimits, Raster};
 
@@ -423,6 +423,36 @@ fn the_cache_stays_under_its_cap_and_counts() {
 }
 
 #[test]
+fn level_1_is_the_same_with_and_without_level_0_before_it() {
+    let dir = folder("cache-first");
+    for (w, h) in [(64, 64), (64, 37), (33, 2), (2, 1), (1, 1)] {
+        let image = png(&noise(w, h, 5));
+        let key = texture_key(&image, &[], &full(w, h).to_runs());
+        stored(&dir, &image, &[], &full(w, h));
+        let level_1 = |before: Option<u32>| {
+            let cache = TextureCache::new(dir.clone(), 1 << 20);
+            let texture = cache.texture(&key).expect("opens");
+            before.map(|level| cache.level(&texture, level).expect("a level"));
+            let made = (texture.file.levels > 1).then(|| cache.level(&texture, 1).expect("a level"));
+            (made, cache.stats().decoded)
+        };
+        let (alone, after) = (level_1(None), level_1(Some(0)));
+        assert_eq!(alone.0, after.0, "{w} × {h}");
+        assert_eq!(after.1, 1, "decoded once for both");
+    }
+    std::fs::remove_dir_all(dir).expect("clean up");
+}
+
+#[test]
+fn a_halved_level_is_within_a_step_of_the_mean_light() {
+    let image = noise(64, 64, 9);
+    let exact = Level::from_linear(&first_mip(&image));
+    let halved = Level::from_raster(&image).halved().expect("even");
+    let most = exact.texels.as_flattened().iter().zip(halved.texels.as_flattened()).map(|(a, b)| a.abs_diff(*b)).max();
+    assert!(most <= Some(1), "{most:?}");
+}
+
+#[test]
 fn many_threads_make_a_level_once() {
     let dir = folder("cache-threads");
     let image = png(&noise(200, 100, 1));
@@ -435,6 +465,7 @@ fn many_threads_make_a_level_once() {
         }
     });
     let stats = cache.stats();
-    assert_eq!((stats.misses, stats.hits, stats.levels), (7, 21, 7));
+    // Level 1 comes with level 0.
+    assert_eq!((stats.misses, stats.hits, stats.levels), (6, 22, 7));
     std::fs::remove_dir_all(dir).expect("clean up");
 }

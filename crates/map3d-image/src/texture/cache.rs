@@ -37,9 +37,40 @@ impl Level {
         Self { width: linear.width, height: linear.height, texels: linear.pixels.iter().map(texel).collect() }
     }
 
+    /// The next level: the root of the mean light of four texels each. `None` for odd sides.
+    pub fn halved(&self) -> Option<Self> {
+        let (w, h) = (self.width as usize, self.height as usize);
+        if w % 2 == 1 || h % 2 == 1 {
+            return None;
+        }
+        let mut texels = Vec::with_capacity(w / 2 * (h / 2));
+        for rows in self.texels.chunks_exact(2 * w) {
+            let (upper, lower) = rows.split_at(w);
+            let pairs = upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0);
+            texels.extend(pairs.map(|(a, b)| mean_root(a, b)));
+        }
+        Some(Self { width: self.width / 2, height: self.height / 2, texels })
+    }
+
     fn bytes(&self) -> u64 {
         self.texels.len() as u64 * 4
     }
+}
+
+/// Level 1 of an image whose level 0 is at hand.
+fn first_level(image: &Raster, level_0: &Level) -> Level {
+    level_0.halved().unwrap_or_else(|| Level::from_linear(&first_mip(image)))
+}
+
+#[inline(always)]
+fn mean_root(upper: &[[u8; 4]; 2], lower: &[[u8; 4]; 2]) -> [u8; 4] {
+    let mut out = [0; 4];
+    for c in 0..4 {
+        let square = |q: u8| u32::from(q) * u32::from(q);
+        let sum = square(upper[0][c]) + square(upper[1][c]) + square(lower[0][c]) + square(lower[1][c]);
+        out[c] = ((sum as f32 * 0.25).sqrt() + 0.5) as u8;
+    }
+    out
 }
 
 /// A texture of the store, opened and checked.
@@ -154,9 +185,30 @@ impl TextureCache {
             self.decoded.fetch_add(1, Ordering::Relaxed);
         }
         match level {
-            0 => Ok(Level::from_raster(&texture.file.level_0()?)),
-            1 => Ok(Level::from_linear(&first_mip(&texture.file.level_0()?))),
+            0 => {
+                let image = texture.file.level_0()?;
+                let level_0 = Level::from_raster(&image);
+                self.keep_first(texture, || first_level(&image, &level_0));
+                Ok(level_0)
+            }
+            1 => {
+                let image = texture.file.level_0()?;
+                Ok(first_level(&image, &Level::from_raster(&image)))
+            }
             _ => Ok(Level::from_raster(&texture.file.stored_level(level)?)),
+        }
+    }
+
+    /// Level 1 comes with level 0: most views need both, and the source is decoded only once.
+    fn keep_first(&self, texture: &Texture, make: impl FnOnce() -> Level) {
+        let name = (texture.key, 1);
+        if texture.file.levels == 1 || self.slot(name).get().is_some() {
+            return;
+        }
+        let first = Arc::new(make());
+        let bytes = first.bytes();
+        if self.slot(name).set(Ok(first)).is_ok() {
+            self.account(name, bytes);
         }
     }
 
