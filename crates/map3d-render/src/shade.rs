@@ -113,10 +113,10 @@ impl Shader {
         let slots = scene.vis.mixed(i, j);
         let at = (scene.corner.1 + j) * scene.g.width as usize + scene.corner.0 + i;
         let mut sum = [0u32; 4];
-        let mut todo = !mask_of(slots, NOTHING) & 0xFFFF;
+        let mut todo = !VisBuf::samples_of(slots, NOTHING) & 0xFFFF;
         while todo != 0 {
             let slot = slots[todo.trailing_zeros() as usize & 15];
-            let own = mask_of(slots, slot);
+            let own = VisBuf::samples_of(slots, slot);
             todo &= !own;
             let (x, y) = centroid(own);
             self.shades += 1;
@@ -134,16 +134,6 @@ impl Shader {
         }
         Ok(())
     }
-}
-
-/// Samples that meet a slot.
-#[inline(always)]
-fn mask_of(slots: &[u32; 16], slot: u32) -> u32 {
-    let mut mask = 0;
-    for k in 0..16 {
-        mask |= u32::from(slots[k] == slot) << k;
-    }
-    mask
 }
 
 /// Sums of the x and y (in sixteenths) of the samples of masks of eight, the first and the last eight samples apart: x | y << 16.

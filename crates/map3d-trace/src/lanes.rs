@@ -8,6 +8,15 @@ pub(crate) use plain::Plain;
 #[cfg(target_arch = "x86_64")]
 pub(crate) use x86::{Avx2, Avx512};
 
+/// Lanes that equal a value, as a mask; for code that is not compiled for an instruction set of its own.
+#[inline(always)]
+pub(crate) fn equal_lanes(lanes: &[u32; 16], value: u32) -> u32 {
+    #[cfg(target_arch = "x86_64")]
+    return x86::equal_lanes(lanes, value);
+    #[cfg(not(target_arch = "x86_64"))]
+    (0..16).fold(0, |mask, k| mask | u32::from(lanes[k] == value) << k)
+}
+
 /// Masks have bit k for lane k.
 pub(crate) trait Lanes: Copy {
     fn splat(value: i32) -> Self;
@@ -31,4 +40,19 @@ pub(crate) trait Lanes: Copy {
     fn greatest(self) -> i32;
     /// Eight boxes against the square from 0 to `side`, both ends included: bit k is set when box k meets it. NaN never does.
     fn meets_square(x: &[[f32; 8]; 2], y: &[[f32; 8]; 2], side: f32) -> u32;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::equal_lanes;
+
+    #[test]
+    fn equal_lanes_are_told_for_any_value() {
+        for value in [0, 1, 7, 1 << 15, 1 << 31, u32::MAX] {
+            for mask in (0..0xFFFFu32).step_by(37) {
+                let lanes = std::array::from_fn(|k| if mask >> k & 1 == 1 { value } else { value ^ (1 << (k * 2)) });
+                assert_eq!(equal_lanes(&lanes, value), mask);
+            }
+        }
+    }
 }

@@ -8,6 +8,7 @@ use map3d_scene::{Chunk, InstanceRecord};
 pub use crate::beam::buffer::MIXED;
 use crate::beam::buffer::{BLOCKS_PER_ROW, SampleBuffer, Track};
 use crate::beam::project::{Projection, units_of_plane};
+use crate::lanes::equal_lanes;
 use crate::plane::DepthPlane;
 use crate::surface::{Placed, Surface};
 
@@ -98,6 +99,12 @@ impl VisBuf {
     #[inline(always)]
     pub fn mixed(&self, i: usize, j: usize) -> &[u32; 16] {
         &self.samples.slots[j * SUBTILE_PX + i]
+    }
+
+    /// The samples of a `MIXED` pixel that meet a slot.
+    #[inline(always)]
+    pub fn samples_of(slots: &[u32; 16], slot: u32) -> u32 {
+        equal_lanes(slots, slot)
     }
 
     /// What shading needs of a slot; computed anew at each call (some 100 ns), so keep it while shading a sub-tile.

@@ -8,6 +8,14 @@ use std::arch::x86_64::*;
 
 use super::Lanes;
 
+/// See `super::equal_lanes`. SSE2 is part of x86-64.
+#[inline(always)]
+pub(super) fn equal_lanes(lanes: &[u32; 16], value: u32) -> u32 {
+    let quarter = |k: usize| unsafe { _mm_cmpeq_epi32(_mm_loadu_si128(lanes[4 * k..].as_ptr().cast()), _mm_set1_epi32(value as i32)) };
+    let (a, b, c, d) = (quarter(0), quarter(1), quarter(2), quarter(3));
+    unsafe { _mm_movemask_epi8(_mm_packs_epi16(_mm_packs_epi32(a, b), _mm_packs_epi32(c, d))) as u32 }
+}
+
 /// One 512-bit register.
 #[derive(Clone, Copy)]
 pub(crate) struct Avx512(__m512i);
