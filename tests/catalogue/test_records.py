@@ -9,7 +9,7 @@ import pytest
 from map3d.catalogue import AssetRecord, Catalogue, PlannedJob, SceneCrs, SceneRecord, State, Workspace
 from map3d.catalogue.sqlite import SqliteCatalogue
 from map3d.errors import AlreadyExists, BadName, NotFound, StoreError, UnknownVersion
-from map3d.types import BlockId
+from map3d.types import BlockId, ViewAngles
 from tests.catalogue.homes import rendering
 
 UTM = SceneCrs(25832, "PROJCRS[…]", "ETRS89 / UTM zone 32N", "DHHN2016 height")
@@ -82,6 +82,19 @@ def test_regrid_forgets_jobs_and_raises_the_version(catalogue: Catalogue) -> Non
     assert fresh is not None
     assert fresh.fence > stale.fence
     assert catalogue.count_jobs("town-a")[State.LEASED] == 1
+
+
+def test_a_view_that_is_added_leaves_jobs_and_views_as_they_are(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [PlannedJob("0-45", BlockId(0, 0, 0), "base", 0, "k", None)])
+    before = catalogue.rendering("town-a")
+    added = dataclasses.replace(before.frames[0], angles=ViewAngles(90, 45))
+    after = catalogue.add_frames("town-a", [added])
+    assert after == catalogue.rendering("town-a") == dataclasses.replace(before, frames=(*before.frames, added))
+    assert sum(catalogue.count_jobs("town-a").values()) == 1
+    with pytest.raises(AlreadyExists, match="90-45"):
+        catalogue.add_frames("town-a", [added])
+    with pytest.raises(NotFound):
+        catalogue.add_frames("other", [added])
 
 
 def test_a_catalogue_of_another_version_is_refused_naming_both(tmp_path: Path) -> None:

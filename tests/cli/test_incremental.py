@@ -139,6 +139,22 @@ def test_an_unchanged_scene_renders_nothing_and_a_file_given_again_changes_nothi
     assert (keys(town), digest(town)) == (before, tiles)
 
 
+def test_a_view_that_is_added_is_rendered_alone_and_is_as_if_it_had_been_there(run: Run, town: Workspace) -> None:
+    before, tiles = keys(town), digest(town)
+    status, _, err = run("add-views", "view", "--view", "200/60")
+    assert status == 0, err
+    assert run("add-views", "view", "--view", "0/45")[0] == 2
+    done = render(run)
+    after = keys(town)
+    assert {place: after[place] for place in before} == before
+    assert {name: digest(town)[name] for name in tiles} == tiles
+    assert done < len(after)
+    assert run("create-rendering", "town", "whole", "--res", "0.05", *VIEWS, "--view", "200/60")[0] == 0
+    assert run("render", "whole")[0] == 0
+    assert digest(town, "whole") == digest(town)
+    assert run("verify")[0] == 0
+
+
 def test_an_estimate_knows_what_a_change_makes_stale(run: Run, town: Workspace, tmp_path: Path) -> None:
     whole = json.loads(run("estimate", "view", "--json")[1])
     assert whole["open_tiles"] == 0

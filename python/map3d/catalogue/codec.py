@@ -1,7 +1,7 @@
 """Records as rows and JSON text, and back. Shared by the homes."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -42,12 +42,16 @@ def dump_rendering(rendering: RenderingRecord) -> tuple[Any, ...]:
         rendering.attribution,
         rendering.res_m,
         json.dumps([asdict(layer) for layer in rendering.layers]),
-        json.dumps([frame.to_json() for frame in rendering.frames]),
+        dump_frames(rendering.frames),
         json.dumps(rendering.box),
         json.dumps(dict(rendering.options)),
         rendering.content_version,
         rendering.announced_version,
     )
+
+
+def dump_frames(frames: Iterable[PinnedFrame]) -> str:
+    return json.dumps([frame.to_json() for frame in frames])
 
 
 def load_rendering(row: RowLike) -> RenderingRecord:

@@ -1,10 +1,11 @@
 """The contract of catalogues: scenes, assets, renderings, jobs (spec/catalogue.md). The tests in tests/catalogue run on every home."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Protocol
 
 from map3d.catalogue.records import AssetRecord, Job, JobResult, Lease, PlannedJob, PlanOutcome, RenderingRecord, SceneCrs, SceneRecord
 from map3d.catalogue.states import State
+from map3d.geometry.frames import PinnedFrame
 from map3d.types import BlockId, Vec3
 
 LEASE_S = 60.0
@@ -55,6 +56,9 @@ class Catalogue(Protocol):
 
     def regrid(self, rendering: RenderingRecord) -> RenderingRecord:
         """Puts `rendering` (pinned anew) in place of the one of its name: no jobs, content version one up; returns it as kept."""
+
+    def add_frames(self, name: str, frames: Sequence[PinnedFrame]) -> RenderingRecord:
+        """Adds views to a rendering and returns it as kept; its jobs stay. Raises NotFound, AlreadyExists for a view that it has."""
 
     def announce(self, name: str, version: int) -> None:
         """A manifest of this content version may have been seen by clients."""

@@ -2,6 +2,8 @@
 
 import json
 import sqlite3
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,6 +13,7 @@ from map3d.catalogue.records import AssetRecord, RenderingRecord, SceneCrs, Scen
 from map3d.catalogue.sqlite_jobs import JOB_SCHEMA, SqliteJobs
 from map3d.database import Database
 from map3d.errors import AlreadyExists, NotFound
+from map3d.geometry.frames import PinnedFrame
 from map3d.types import Vec3, check_name
 
 VERSION: Final = 1
@@ -109,6 +112,15 @@ class SqliteCatalogue(SqliteJobs):
             db.execute("DELETE FROM rendering WHERE name = ?", (rendering.name,))
             after = codec.with_versions(rendering, before.content_version + 1, before.announced_version)
             db.execute("INSERT INTO rendering VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", codec.dump_rendering(after))
+            return after
+
+    def add_frames(self, name: str, frames: Sequence[PinnedFrame]) -> RenderingRecord:
+        with self._database.transaction() as db:
+            before = _rendering(db, name)
+            if known := {frame.id for frame in before.frames} & {frame.id for frame in frames}:
+                raise AlreadyExists(f"rendering {name}: has the view {', '.join(sorted(known))} already")
+            after = replace(before, frames=(*before.frames, *frames))
+            db.execute("UPDATE rendering SET frames = ? WHERE name = ?", (codec.dump_frames(after.frames), name))
             return after
 
     def announce(self, name: str, version: int) -> None:

@@ -15,6 +15,7 @@ VERBS: Final = {
     "create-scene": "create_scene",
     "add-files": "add_files",
     "create-rendering": "create_rendering",
+    "add-views": "add_views",
     "estimate": "estimate",
     "render": "render",
     "retry": "retry",

@@ -8,7 +8,7 @@ from typing import Final
 from map3d.catalogue import Catalogue, RenderingRecord, Workspace
 from map3d.catalogue.records import WINDOW
 from map3d.errors import BadRequest
-from map3d.geometry.frames import Window, pin
+from map3d.geometry.frames import Window, pin, pin_beside
 from map3d.geometry.views import check_angles
 from map3d.render.build import is_stale, open_scene
 from map3d.types import LAYER_KINDS, Box, Layer, ViewAngles, check_name
@@ -69,6 +69,19 @@ def create_rendering(workspace: Workspace, catalogue: Catalogue, request: Render
         return kept
     catalogue.create_rendering(record)
     return record
+
+
+def add_views(catalogue: Catalogue, name: str, views: Sequence[ViewAngles]) -> RenderingRecord:
+    """Pins further views of a rendering as if it had been created with them; what is there stays as it is.
+
+    Raises NotFound, BadRequest for a view that is there, OutsideFrame for one that the rendering's square cannot hold.
+    """
+    record = catalogue.rendering(name)
+    frames = [pin_beside(record.frames[0], record.box, view, record.window) for view in views]
+    ids = [frame.id for frame in (*record.frames, *frames)]
+    if twice := sorted({view for view in ids if ids.count(view) > 1}):
+        raise BadRequest(f"rendering {name}: view {', '.join(twice)} is there already, or given twice")
+    return catalogue.add_frames(name, frames)
 
 
 def make_layers(names: Sequence[str], color: str, quality: int) -> tuple[Layer, ...]:

@@ -1,0 +1,28 @@
+"""map3d add-views."""
+
+import click
+
+from map3d.catalogue import Workspace
+from map3d.cli.options import View, json_option, workspace_option
+from map3d.cli.output import print_json
+from map3d.types import ViewAngles
+
+
+@click.command("add-views")
+@click.argument("rendering")
+@click.option("--view", "views", type=View(), multiple=True, required=True, help="A view as look-at/pitch in degrees; may be given more than once.")
+@json_option
+@workspace_option
+def command(workspace: Workspace, rendering: str, views: tuple[ViewAngles, ...], as_json: bool) -> None:
+    """Add views to RENDERING. Nothing is rendered yet, and what is there stays as it is."""
+    from map3d.jobs.creating import add_views
+
+    catalogue = workspace.open_catalogue()
+    try:
+        made = add_views(catalogue, rendering, views)
+    finally:
+        catalogue.close()
+    if as_json:
+        print_json(made)
+        return
+    click.echo(f"rendering {rendering}: {len(made.frames)} views; next: map3d render {rendering}")
