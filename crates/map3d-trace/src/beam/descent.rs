@@ -10,6 +10,7 @@ use super::boxes::{BoxMap, least_key};
 use super::buffer::{GROUPS_PER_ROW, KeyPlane, Track};
 use super::canvas::{Candidate, Canvas};
 use super::corners::Corners;
+use super::exact::Exact;
 use super::project::Projection;
 use super::shape::{Depth, Keys, PixelBox, bias, edges, is_near, key_plane, whole_steps};
 use crate::cutout::Sheet;
@@ -136,21 +137,27 @@ impl<'a> Descent<'a> {
         let pixel = corners.of_lane(place.2);
         let rank = self.chunk.triangles()[place.1 as usize].rank;
         let depth = Depth::of(&pixel, rank, self.pixel_units);
-        let plane = match (&depth, is_near(snapped)) {
+        let is_near = is_near(snapped);
+        let plane = match (&depth, is_near) {
             (Some(depth), true) => key_plane::<L>(&pixel, depth, b),
             _ => Keys::Exact,
         };
-        match plane {
-            Keys::Nowhere => {}
-            Keys::Plane(plane) => {
-                let Some(edges) = edges::<L>(snapped) else { return };
+        if matches!(plane, Keys::Nowhere) {
+            return;
+        }
+        let edges = if is_near { edges::<L>(snapped) } else { None };
+        if is_near && edges.is_none() {
+            return;
+        }
+        match (plane, &edges) {
+            (Keys::Plane(plane), Some(edges)) => {
                 let candidate = self.candidate(place, rank, plane, true);
-                self.canvas.draw(&candidate, b, &edges);
+                self.canvas.draw(&candidate, b, edges);
             }
-            Keys::Exact => {
+            _ => {
                 let candidate = self.candidate(place, rank, KeyPlane::default(), false);
                 let bias = depth.map_or_else(|| edge_on_bias(rank), |d| d.bias);
-                self.canvas.draw_exact::<L>(&candidate, b, snapped, &pixel, bias);
+                self.canvas.draw_exact::<L>(&candidate, b, &Exact { snapped, pixel: &pixel, bias }, edges.as_ref());
             }
         }
     }
