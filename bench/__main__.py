@@ -1,28 +1,44 @@
-"""`python -m bench [--buildings N] [--res M] [--tiles N] [--json]`."""
+"""`python -m bench [PART …] [--json]`; parts: tiles, ingest, incremental (all, unless some are named)."""
 
 import argparse
 import json
+from collections.abc import Callable
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
-from .tiles import measure
+from . import incremental, ingest, tiles
+
+PARTS = ("tiles", "ingest", "incremental")
+Rows = list[dict[str, Any]]
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        prog="bench", description="Non-empty base tiles a second, 256 px, 16 samples, four layers; peers in the same run."
-    )
-    parser.add_argument("--buildings", type=int, default=300)
-    parser.add_argument("--res", type=float, default=0.2, help="metres a pixel")
-    parser.add_argument("--tiles", type=int, default=48)
-    parser.add_argument("--json", action="store_true")
+    parser = argparse.ArgumentParser(prog="bench", description="Speed, peers beside us in the same run.")
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; all unless given")
+    parser.add_argument("--buildings", type=int, default=300, help="tiles: of the town")
+    parser.add_argument("--res", type=float, default=0.2, help="tiles: metres a pixel")
+    parser.add_argument("--tiles", type=int, default=48, help="tiles: how many")
+    parser.add_argument("--json", action="store_true", help="print one JSON document after the tables")
     options = parser.parse_args()
-    rows = [measure(options.buildings, options.res, options.tiles, color) for color in ("webp", "jpeg")]
+    unknown = [part for part in options.parts if part not in PARTS]
+    if unknown:
+        parser.error(f"no part {unknown[0]}; there are {', '.join(PARTS)}")
+    measures: dict[str, Callable[[], Rows]] = {
+        "tiles": lambda: of_tiles(options.buildings, options.res, options.tiles),
+        "ingest": ingest.measure,
+        "incremental": incremental.measure,
+    }
+    rows = {part: measures[part]() for part in options.parts or PARTS}
     if options.json:
-        print(json.dumps(rows, indent=1))
-        return
-    table = Table(title=f"base tiles a second, {options.buildings} buildings at {options.res} m a pixel")
+        print(json.dumps(rows, indent=1, default=str))
+
+
+def of_tiles(buildings: int, res_m: float, count: int) -> Rows:
+    """Rows for both colour formats; the table is printed."""
+    rows = [tiles.measure(buildings, res_m, count, color) for color in ("webp", "jpeg")]
+    table = Table(title=f"base tiles a second, 256 px, 16 samples, four layers, {buildings} buildings at {res_m} m a pixel")
     for column in ("triangles", "tiles", "colour", "one core", "one core, encoded", "all cores, encoded", "Mitsuba 3, all cores", "ratio"):
         table.add_column(column, justify="right")
     for row in rows:
@@ -31,6 +47,7 @@ def main() -> None:
         beside = ["not installed", ""] if peer is None else [f"{peer:.1f}", f"{row['all_cores_encoded'] / peer:.1f} ×"]
         table.add_row(f"{row['triangles']:,}", str(row["tiles"]), row["color"], *rates, *beside)
     Console().print(table)
+    return rows
 
 
 if __name__ == "__main__":
