@@ -115,6 +115,14 @@ def test_blocks_are_listed_deepest_first_in_morton_order(store):
     assert list(store.list_tiles(2)) == sorted(tile[1:4] for block in ids for tile in content(block, layers=[2]))
 
 
+def test_places_of_a_level_are_those_of_its_tiles(store):
+    assert store.list_places(store.shape.zmax) == []
+    for block in (BlockId(1, 1, 1), BlockId(1, 0, 1), BlockId(0, 0, 0)):
+        store.put_block(block, "k", 1, content(block), b"s")
+    for z in range(store.shape.zmax + 1):
+        assert sorted(store.list_places(z)) == sorted((tile.x, tile.y) for tile in store.list_tiles(0) if tile.z == z)
+
+
 @pytest.mark.parametrize(
     ("block", "version", "tiles"),
     [

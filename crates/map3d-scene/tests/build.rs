@@ -172,6 +172,27 @@ fn a_damaged_chunk_is_refused() {
 }
 
 #[test]
+fn an_outline_refuses_what_leads_nowhere_or_back() {
+    let folder = new_folder();
+    write_faces(&folder.0, &tent(0.0, 0.0, 0));
+    run(&folder, &request());
+    let path = std::fs::read_dir(folder.0.join("chunks")).expect("list").next().expect("a chunk").expect("entry").path();
+    let good = std::fs::read(&path).expect("read");
+    let outline = || SceneStore::open(&folder.0, 1 << 20).expect("open").outline(0);
+    let sound = outline().expect("an outline");
+    assert_eq!((sound.objects().len(), sound.objects()[0].id), (1, 10));
+    assert!(sound.node(0).is_ok() && sound.leaf(0).is_ok() && sound.node(1).is_err() && sound.leaf(9).is_err());
+    // A root that is its own child; a file that is cut; one of another build; an object without an id.
+    let with = |at: usize, value: u32| [&good[..at], &value.to_le_bytes(), &good[at + 4..]].concat();
+    std::fs::write(&path, with(128 + 192, 0)).expect("write");
+    assert!(outline().expect("opens").node(0).is_err());
+    for bad in [good[..good.len() - 64].to_vec(), with(8, 7), with(good.len() - 64, 0)] {
+        std::fs::write(&path, bad).expect("write");
+        assert!(matches!(outline(), Err(Error::Format { .. })));
+    }
+}
+
+#[test]
 fn broken_requests_and_assets_are_typed_errors() {
     let folder = new_folder();
     write_faces(&folder.0, &tent(0.0, 0.0, 0));
