@@ -29,7 +29,7 @@ def prepared(buildings: int, res_m: float, color: str) -> tuple[Path, dict[str, 
     catalogue = workspace.open_catalogue()
     try:
         record = catalogue.rendering(name)
-        return workspace.root / "scenes" / "town", {frame.id: frame_text(record, frame) for frame in record.frames}
+        return workspace.root / "scenes" / "town", {track.id: frame_text(track) for track in record.tracks}
     finally:
         catalogue.close()
 

@@ -21,4 +21,4 @@ HOMES = {"sqlite": _sqlite}
 
 def rendering(name: str = "town-a") -> RenderingRecord:
     frames = tuple(pin(BOX, 256, 0.01, [ViewAngles(0, 45)]))
-    return RenderingRecord(name, "town", 0.01, (Layer("color", "color", "webp", 80), Layer("id", "id", "png")), frames, BOX)
+    return RenderingRecord(name, "town", 0.01, ((Layer("color", "color", "webp", 80), Layer("id", "id", "png")),), frames, BOX)

@@ -9,7 +9,7 @@ import pytest
 from map3d.catalogue import AssetRecord, Catalogue, PlannedJob, SceneCrs, SceneRecord, State, Workspace
 from map3d.catalogue.sqlite import SqliteCatalogue
 from map3d.errors import AlreadyExists, BadName, NotFound, StoreError, UnknownVersion
-from map3d.types import BlockId, ViewAngles
+from map3d.types import BlockId, Layer, ViewAngles
 from tests.catalogue.homes import rendering
 
 UTM = SceneCrs(25832, "PROJCRS[…]", "ETRS89 / UTM zone 32N", "DHHN2016 height")
@@ -97,13 +97,28 @@ def test_a_view_that_is_added_leaves_jobs_and_views_as_they_are(catalogue: Catal
         catalogue.add_frames("other", [added])
 
 
+def test_layers_that_are_added_are_a_pass_of_their_own_and_leave_jobs_as_they_are(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [PlannedJob("0-45", BlockId(0, 0, 0), "base", 0, "k", None)])
+    before = catalogue.rendering("town-a")
+    added = (Layer("normal", "normal", "png"), Layer("coarse", "color", "jpeg", 40))
+    after = catalogue.add_pass("town-a", added)
+    assert after == catalogue.rendering("town-a") == dataclasses.replace(before, passes=(*before.passes, added))
+    assert [layer.name for layer in after.layers] == ["color", "id", "normal", "coarse"]
+    assert [(track.id, track.layers) for track in after.tracks] == [("0-45", before.passes[0]), ("0-45+1", added)]
+    assert sum(catalogue.count_jobs("town-a").values()) == 1
+    with pytest.raises(AlreadyExists, match="coarse"):
+        catalogue.add_pass("town-a", added[1:])
+    with pytest.raises(NotFound):
+        catalogue.add_pass("other", added)
+
+
 def test_a_catalogue_of_another_version_is_refused_naming_both(tmp_path: Path) -> None:
     path = tmp_path / "catalogue.sqlite"
     home = SqliteCatalogue(path)
     with home._database.transaction() as db:
         db.execute("PRAGMA user_version = 7")
     home.close()
-    with pytest.raises(UnknownVersion, match="version 7; this map3d reads version 1"):
+    with pytest.raises(UnknownVersion, match="version 7; this map3d reads version 2"):
         SqliteCatalogue(path)
 
 

@@ -12,7 +12,7 @@ from map3d.geometry.frames import PinnedFrame
 from map3d.registry import Registry
 from map3d.tiles.naming import block_levels
 from map3d.tiles.sqlite_store import SqliteTileStore
-from map3d.types import Box
+from map3d.types import Box, TileId
 from tests.cli.test_whole import digest
 from tests.cli.towns import Run, house, write_town
 
@@ -153,6 +153,60 @@ def test_a_view_that_is_added_is_rendered_alone_and_is_as_if_it_had_been_there(r
     assert run("render", "whole")[0] == 0
     assert digest(town, "whole") == digest(town)
     assert run("verify")[0] == 0
+
+
+def test_layers_that_are_added_are_rendered_alone_and_are_as_if_they_had_been_there(run: Run, town: Workspace) -> None:
+    assert run("create-rendering", "town", "less", "--res", "0.05", *VIEWS, "--layers", "color,id,depth")[0] == 0
+    assert run("render", "less")[0] == 0
+    before = contents(town, "less")
+    whole = json.loads(run("estimate", "less", "--json")[1])
+    status, _, err = run("add-layers", "less", "--layers", "normal")
+    assert status == 0, err
+    assert run("add-layers", "less", "--layers", "normal")[0] == 2
+    assert contents(town, "less") == before, "nothing is rendered yet"
+    more = json.loads(run("estimate", "less", "--json")[1])
+    assert (more["base_tiles"], more["images"] * 3) == (whole["base_tiles"], whole["images"] * 4)
+    assert 0 < more["open_tiles"] <= more["base_tiles"]
+    assert more["bytes"] > whole["bytes"]
+    status, out, err = run("render", "less", "--json")
+    assert (status, json.loads(out)["tally"]["done"]) == (0, len({(track, block) for track, block, *_ in before if block})), err
+    after = contents(town, "less")
+    assert {place: after[place] for place in before} == before
+    # Beside a rendering that had them all from the start.
+    assert run("verify", "less")[0] == 0
+    assert layers_of(town, "less") == layers_of(town, "view")
+    assert run("add-views", "less", "--view", "200/60")[0] == 0
+    assert run("add-views", "view", "--view", "200/60")[0] == 0
+    assert run("render", "less")[0] == run("render", "view")[0] == 0
+    assert layers_of(town, "less") == layers_of(town, "view")
+    assert len(list(town.rendering_folder("less").glob("*+1.sqlite"))) == 3
+    assert run("verify", "less")[0] == 0
+    # Pinned anew they are one pass again.
+    assert run("create-rendering", "town", "less", "--res", "0.05", *VIEWS, "--regrid")[0] == 0
+    assert run("render", "less")[0] == 0
+    assert not list(town.rendering_folder("less").glob("*+1.sqlite"))
+    assert digest(town, "less").keys() == {"0-45.sqlite", "90-30.sqlite"}
+
+
+def contents(workspace: Workspace, rendering: str) -> dict[tuple[object, ...], object]:
+    """All that lies in the stores: tiles with their bytes, blocks with key, version and seam."""
+    found: dict[tuple[object, ...], object] = {}
+    for path in workspace.rendering_folder(rendering).glob("*.sqlite"):
+        with SqliteTileStore(path, read_only=True) as store:
+            found.update({(path.stem, str(block.id)): (block, store.get_seam(block.id)) for block in store.list_blocks()})
+            for layer in range(len(store.shape.layers)):
+                found.update({(path.stem, "", layer, tile): store.get_tile(layer, *tile) for tile in store.list_tiles(layer)})
+    return found
+
+
+def layers_of(workspace: Workspace, rendering: str) -> dict[tuple[str, str], dict[TileId, bytes | None]]:
+    """(view, layer) → tiles, from whichever track has them."""
+    found = {}
+    for path in workspace.rendering_folder(rendering).glob("*.sqlite"):
+        with SqliteTileStore(path, read_only=True) as store:
+            for number, layer in enumerate(store.shape.layers):
+                found[path.stem.partition("+")[0], layer.name] = {tile: store.get_tile(number, *tile) for tile in store.list_tiles(number)}
+    return found
 
 
 def test_an_estimate_knows_what_a_change_makes_stale(run: Run, town: Workspace, tmp_path: Path) -> None:

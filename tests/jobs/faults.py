@@ -1,6 +1,6 @@
-"""A child for tests: makes blocks of pseudo-random bytes that depend on the block alone, and fails as it is told.
+"""A child for tests: makes blocks of pseudo-random bytes that depend on block and kind of layer alone, and fails as it is told.
 
-setup["frames"][view]["faults"] is not there in real frames; faults are told by files in the folder MAP3D_TEST_FAULTS: `<x>-<y>` holds the kind.
+setup["frames"][track]["faults"] is not there in real frames; faults are told by files in the folder MAP3D_TEST_FAULTS: `<x>-<y>` holds the kind.
 A file `slow` holds how many seconds each block takes.
 """
 
@@ -23,11 +23,10 @@ def open_work(setup: Mapping[str, Any]) -> Work:
     folder = Path(os.environ["MAP3D_TEST_FAULTS"])
     if (folder / "no-start").exists():
         raise RuntimeError("told not to start")
-    (frame, *_) = setup["frames"].values()
-    layers = len(frame["layers"])
 
     def work(question: dict[str, Any], _blobs: list[bytes], _tell: Tell) -> tuple[dict[str, Any], list[bytes]]:
         z, x, y = question["block"]
+        frame = setup["frames"][question["track"]]
         fault = folder / f"{z}-{x}-{y}"
         if fault.exists():
             fail(fault.read_text())
@@ -35,8 +34,9 @@ def open_work(setup: Mapping[str, Any]) -> Work:
         if slow.exists():
             time.sleep(float(slow.read_text()))
         tiles = [] if (x + y) % 7 == 6 else list(tiles_of_block(BlockId(z, x, y), frame["zmax"]))
-        names = [[layer, *tile] for tile in tiles for layer in range(layers)]
-        blobs = [hashlib.sha256(str(name).encode()).digest() * 8 for name in names]
+        kinds = [layer["kind"] for layer in frame["layers"]]
+        names = [[layer, *tile] for tile in tiles for layer in range(len(kinds))]
+        blobs = [hashlib.sha256(f"{kinds[layer]} {tile}".encode()).digest() * 8 for layer, *tile in names]
         seam = [f"seam {z}/{x}/{y}".encode()] if tiles else []
         return {"tiles": names, "seam": bool(seam), "seconds": 0.01}, blobs + seam
 

@@ -67,7 +67,7 @@ def test_a_run_does_every_job_once(town: Town) -> None:
     tally, events = town.run()
     assert all_done(town)
     leases = [event.lease for event in events if isinstance(event, Done)]
-    assert len({(lease.view, lease.block) for lease in leases}) == len(leases) == tally.done > JOBS
+    assert len({(lease.track, lease.block) for lease in leases}) == len(leases) == tally.done > JOBS
     assert all(event.because == "" for event in events if isinstance(event, Left))
     assert tally.failed_attempts == tally.lost_leases == 0
     assert 0 < tally.empty < tally.done

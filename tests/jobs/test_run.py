@@ -10,12 +10,14 @@ pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_
 
 from map3d.catalogue import Catalogue, RenderingRecord, SceneCrs, SceneRecord, State, Workspace
 from map3d.errors import BadRequest, OutsideFrame
+from map3d.jobs.creating import add_layers, add_views
+from map3d.jobs.layers import LayerRequest
 from map3d.jobs.manifest import stored_occupancy
 from map3d.jobs.run import Outcome, Plan, Run, Settings
 from map3d.jobs.terms import Terms
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.sqlite_store import SqliteTileStore
-from map3d.types import BlockId
+from map3d.types import BlockId, TileId, ViewAngles
 from tests.render.scenes import SquareScene, rendering
 
 CONTENT = {(0.05 + 0.1 * k, 0.05 + 0.1 * k): f"thing {k}" for k in range(10)}
@@ -69,7 +71,7 @@ def test_a_whole_run_is_told_by_the_manifest(workspace: Workspace, catalogue: Ca
     for view in told.views:
         with SqliteTileStore(workspace.store_path("r", view.frame.id), read_only=True) as store:
             assert view.occupancy == stored_occupancy(store)
-            assert set(view.versions.values()) == {1}
+            assert [set(versions.values()) for versions in view.versions] == [{1}]
 
 
 def test_a_second_run_finds_nothing_to_do(workspace: Workspace, catalogue: Catalogue) -> None:
@@ -94,7 +96,75 @@ def test_bytes_that_stay_the_same_keep_their_version(workspace: Workspace, catal
     run_all(workspace, catalogue, SquareScene(CONTENT))
     run_all(workspace, catalogue, SquareScene({**CONTENT, next(iter(CONTENT)): "another thing"}))
     assert manifest(workspace).content_version == 2
-    assert {version for view in manifest(workspace).views for version in view.versions.values()} == {1}
+    assert {version for view in manifest(workspace).views for version in view.versions[0].values()} == {1}
+
+
+def stored(workspace: Workspace) -> dict[tuple[str, int, TileId], bytes | None]:
+    """Every tile in the stores: (track, layer, tile) → bytes."""
+    found = {}
+    for path in workspace.rendering_folder("r").glob("*.sqlite"):
+        with SqliteTileStore(path, read_only=True) as store:
+            for layer in range(len(store.shape.layers)):
+                found.update({(path.stem, layer, tile): store.get_tile(layer, *tile) for tile in store.list_tiles(layer)})
+    return found
+
+
+def test_added_layers_render_tracks_of_their_own_only(workspace: Workspace, catalogue: Catalogue) -> None:
+    first, _ = run_all(workspace, catalogue, SquareScene(CONTENT))
+    before, jobs = stored(workspace), {(job.track, job.block): job for job in catalogue.jobs("r")}
+    add_layers(catalogue, "r", LayerRequest(("normal", "deep=depth")))
+    plan, outcome = run_all(workspace, catalogue, SquareScene(CONTENT))
+    assert (plan.outcome.added, plan.outcome.changed, plan.outcome.kept) == (first.open_jobs, 0, first.open_jobs)
+    assert (outcome.tally.done, outcome.complete, outcome.content_version) == (first.open_jobs, True, 2)
+    after = stored(workspace)
+    assert {place: after[place] for place in before} == before
+    assert {(job.track, job.block): job for job in catalogue.jobs("r") if "+" not in job.track} == jobs
+    assert {track for track, _, _ in after.keys() - before.keys()} == {"0-45+1", "90-45+1"}
+    told = manifest(workspace)
+    assert [[layer.name for layer in layers] for layers in told.passes] == [["color", "id"], ["normal", "deep"]]
+    for view in told.views:
+        assert [set(versions.values()) for versions in view.versions] == [{1}, {2}]
+
+
+def test_a_view_that_joins_later_gets_every_pass(workspace: Workspace, catalogue: Catalogue) -> None:
+    run_all(workspace, catalogue, SquareScene(CONTENT))
+    add_layers(catalogue, "r", LayerRequest(("normal",)))
+    add_views(catalogue, "r", [ViewAngles(180, 45)])
+    assert run_all(workspace, catalogue, SquareScene(CONTENT))[1].complete
+    tracks = {job.track for job in catalogue.jobs("r")}
+    assert tracks == {"0-45", "0-45+1", "90-45", "90-45+1", "180-45", "180-45+1"}
+    assert tracks == {path.stem for path in workspace.rendering_folder("r").glob("*.sqlite")}
+    assert [len(view.versions) for view in manifest(workspace).views] == [2, 2, 2]
+
+
+def test_occupancy_stays_exact_while_added_layers_are_to_come(workspace: Workspace, catalogue: Catalogue) -> None:
+    run_all(workspace, catalogue, SquareScene(CONTENT))
+    before = manifest(workspace)
+    add_layers(catalogue, "r", LayerRequest(("normal",)))
+    Run(workspace, catalogue, "r", SETTINGS).plan(scene=SquareScene(CONTENT))
+    told = manifest(workspace)
+    assert (told.complete, told.content_version) == (False, 2)
+    assert [view.occupancy for view in told.views] == [view.occupancy for view in before.views]
+    assert [view.versions[0] for view in told.views] == [view.versions[0] for view in before.views]
+
+
+def test_a_change_renders_the_blocks_of_every_pass(workspace: Workspace, catalogue: Catalogue) -> None:
+    add_layers(catalogue, "r", LayerRequest(("normal",)))
+    run_all(workspace, catalogue, SquareScene(CONTENT))
+    changed = {**CONTENT, next(iter(CONTENT)): "another thing"}
+    plan, outcome = run_all(workspace, catalogue, SquareScene(changed))
+    levels = len({job.block.z for job in catalogue.jobs("r")})
+    assert plan.outcome.changed == outcome.tally.done == len(record(catalogue).tracks) * levels == 4 * levels
+
+
+@pytest.mark.parametrize(
+    "names", [("id",), ("color",), ("normal", "id"), ("x=normal", "x=depth"), ("normal", "other=normal"), ("moon",), ("=id",), ()]
+)
+def test_layers_that_are_there_or_make_no_sense_are_refused(catalogue: Catalogue, names: tuple[str, ...]) -> None:
+    before = record(catalogue)
+    with pytest.raises(BadRequest):
+        add_layers(catalogue, "r", LayerRequest(names))
+    assert record(catalogue) == before
 
 
 def test_a_stopped_run_tells_what_may_still_come_and_is_taken_up(workspace: Workspace, catalogue: Catalogue, faults: Path) -> None:

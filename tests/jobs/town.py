@@ -61,7 +61,7 @@ def make_town(root: Path) -> Town:
     catalogue = workspace.open_catalogue(lease_s=LEASE_S)
     catalogue.create_scene(SceneRecord("town"))
     frames = tuple(pin(BOX, 256, 0.02, [ViewAngles(0, 45)]))
-    rendering = RenderingRecord("town-a", "town", 0.02, LAYERS, frames, BOX)
+    rendering = RenderingRecord("town-a", "town", 0.02, (LAYERS,), frames, BOX)
     catalogue.create_rendering(rendering)
     base = rendering.zmax - 3
     jobs = [planned(BlockId(base, x, y), "base", rendering.zmax) for x in range(BLOCKS) for y in range(BLOCKS)]

@@ -99,7 +99,7 @@ def _frames(workspace: Path, rendering: str) -> dict[str, dict]:
     catalogue = Workspace(workspace).open_catalogue()
     try:
         record = catalogue.rendering(rendering)
-        return {frame.id: json.loads(frame_text(record, frame)) for frame in record.frames}
+        return {track.id: json.loads(frame_text(track)) for track in record.tracks}
     finally:
         catalogue.close()
 

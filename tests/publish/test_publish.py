@@ -19,7 +19,7 @@ from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.types import BlockId
 from tests.publish.hosts import static_host
-from tests.web.workspaces import LAYERS, OCCUPIED, ZMAX, every_tile, put_block, tile_bytes
+from tests.web.workspaces import ADDED, LAYERS, OCCUPIED, ZMAX, add_pass, every_tile, put_block, tile_bytes
 
 VIEWS = ("0-45", "45-22.5")
 
@@ -47,6 +47,23 @@ def test_every_tile_is_byte_identical_to_the_stores(workspace, out):
     for view in VIEWS:
         for layer in LAYERS:
             assert tiles_of(out / view / f"{layer.name}.pmtiles") == {tuple(tile): tile_bytes(view, layer.name, tile) for tile in every_tile()}
+
+
+def test_layers_that_were_added_are_published_beside_those_before(workspace, out):
+    publish(workspace, "tea", out)
+    before = {view: (out / view / "color.pmtiles").read_bytes() for view in VIEWS}
+    add_pass(workspace)
+    done = publish(workspace, "tea", out, replace=True)
+    assert (done.tiles, done.archives) == (len(every_tile()) * 12, 12)
+    for view in VIEWS:
+        assert (out / view / "color.pmtiles").read_bytes() == before[view]
+        for layer in (*LAYERS, *ADDED):
+            assert tiles_of(out / view / f"{layer.name}.pmtiles") == {tuple(tile): tile_bytes(view, layer.name, tile) for tile in every_tile()}
+    manifest = Manifest.load((out / "rendering.json").read_bytes())
+    assert manifest.view("0-45").archives == {layer.name: f"0-45/{layer.name}.pmtiles" for layer in (*LAYERS, *ADDED)}
+    assert [[layer.name for layer in layers] for layers in manifest.passes] == [["color", "normal", "id", "depth"], ["again", "coarse"]]
+    found = verify_published(out, workspace)
+    assert (found.archives, found.tiles) == (12, len(every_tile()) * 12)
 
 
 def test_tiles_are_in_order_and_equal_ones_stored_once(workspace, out):

@@ -9,7 +9,7 @@ from map3d.publish.archive import Archive
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.types import BlockId
-from tests.web.workspaces import OCCUPIED, ZMAX, every_tile, put_block
+from tests.web.workspaces import OCCUPIED, ZMAX, add_pass, every_tile, put_block
 
 
 @pytest.fixture
@@ -54,6 +54,16 @@ def test_a_tile_that_is_not_the_stores_is_found(workspace, folder):
     verify_published(folder)
     with pytest.raises(VerifyFailed, match="not the store's"):
         verify_published(folder, workspace)
+
+
+def test_a_tile_of_an_added_layer_that_is_not_the_stores_is_found(workspace, out):
+    add_pass(workspace)
+    publish(workspace, "tea", out)
+    verify_published(out, workspace)
+    with SqliteTileStore(workspace.store_path("tea", "0-45+1")) as store:
+        put_block(store, "0-45", BlockId(1, 0, 0), Occupancy.from_tiles(ZMAX, OCCUPIED), version=3, salt="new")
+    with pytest.raises(VerifyFailed, match=r"0-45/again\.pmtiles: tile .* is not the store's"):
+        verify_published(out, workspace)
 
 
 def test_tiles_that_the_manifest_does_not_know_are_found(folder):

@@ -35,4 +35,4 @@ class SquareScene:
 
 def rendering(res_m: float = 0.02, views: tuple[ViewAngles, ...] = (ViewAngles(0, 45), ViewAngles(90, 45))) -> RenderingRecord:
     box: Box = ((0.0, 0.0, 0.0), (100.0, 100.0, 10.0))
-    return RenderingRecord("r", "town", res_m, LAYERS, tuple(pin(box, 256, res_m, views)), box)
+    return RenderingRecord("r", "town", res_m, (LAYERS,), tuple(pin(box, 256, res_m, views)), box)

@@ -1,11 +1,13 @@
 """Which blocks are planned, and what their keys follow."""
 
+from dataclasses import replace
+
 import pytest
 
 from map3d.errors import LimitExceeded, OutsideFrame
 from map3d.render.plan import plan_jobs, planned_occupancy
 from map3d.tiles.naming import block_above, block_levels
-from map3d.types import BlockId, ViewAngles
+from map3d.types import BlockId, Layer, ViewAngles
 from tests.render.scenes import SquareScene, rendering
 
 CONTENT = {(0.1, 0.1): "a", (0.9, 0.9): "b"}
@@ -15,7 +17,7 @@ def test_only_blocks_with_content_are_planned_in_every_view() -> None:
     record = rendering()
     jobs = plan_jobs(SquareScene(CONTENT), record, {})
     root = block_levels(record.zmax)[0].root
-    base = [(job.view, job.block) for job in jobs if job.kind == "base"]
+    base = [(job.track, job.block) for job in jobs if job.kind == "base"]
     side = 2**root
     corners = [BlockId(root, int(0.1 * side), int(0.1 * side)), BlockId(root, int(0.9 * side), int(0.9 * side))]
     assert base == [(frame.id, block) for frame in record.frames for block in corners]
@@ -24,10 +26,10 @@ def test_only_blocks_with_content_are_planned_in_every_view() -> None:
 def test_every_planned_block_has_the_one_above_planned_up_to_the_top() -> None:
     record = rendering()
     jobs = plan_jobs(SquareScene(CONTENT), record, {})
-    have = {(job.view, job.block) for job in jobs}
+    have = {(job.track, job.block) for job in jobs}
     for job in jobs:
         assert job.parent == block_above(job.block, record.zmax)
-        assert job.parent is None or (job.view, job.parent) in have
+        assert job.parent is None or (job.track, job.parent) in have
     assert {(frame.id, BlockId(0, 0, 0)) for frame in record.frames} <= have
     assert len(have) == len(jobs)
 
@@ -69,6 +71,19 @@ def test_a_pyramid_of_one_block_has_no_reduce_job() -> None:
     record = rendering(res_m=1.0, views=(ViewAngles(0, 45),))
     assert record.zmax <= 3
     assert [(job.block, job.kind, job.parent) for job in plan_jobs(SquareScene(CONTENT), record, {})] == [(BlockId(0, 0, 0), "base", None)]
+
+
+def test_every_pass_of_a_view_has_the_same_blocks_with_keys_of_its_own() -> None:
+    record = rendering()
+    wider = replace(record, passes=(*record.passes, (Layer("normal", "normal", "png"),), (Layer("depth", "depth", "png"),)))
+    before = {(job.track, job.block): job.key for job in plan_jobs(SquareScene(CONTENT), record, {})}
+    after = {(job.track, job.block): job.key for job in plan_jobs(SquareScene(CONTENT), wider, {})}
+    assert {place: after[place] for place in before} == before
+    for frame in record.frames:
+        blocks = [{block for track, block in after if track == one.id} for one in wider.tracks_of(frame)]
+        assert blocks[0] == blocks[1] == blocks[2]
+        for block in blocks[0]:
+            assert len({after[one.id, block] for one in wider.tracks_of(frame)}) == 3
 
 
 def test_content_that_left_the_frame_is_refused_naming_regrid() -> None:

@@ -30,8 +30,8 @@ def manifest():
         crs=CrsFacts("ETRS89 / UTM zone 32N", 25832, "PROJCRS[…]", "DHHN92 height"),
         origin=(691000.0, 5336000.0, 500.0),
         box=BOX,
-        layers=LAYERS,
-        views=tuple(ViewFacts(frame, occupancy, versions) for frame in frames),
+        passes=(LAYERS,),
+        views=tuple(ViewFacts(frame, occupancy, (versions,)) for frame in frames),
         objects=54,
     )
 
@@ -40,6 +40,42 @@ def test_a_manifest_reads_back(manifest):
     again = Manifest.load(manifest.dump())
     assert again == replace(manifest, start=(5.0, 5.0, 11.25))
     assert again.dump() == manifest.dump()
+
+
+@pytest.fixture
+def added(manifest):
+    """With a pass that was added and is only begun."""
+    views = tuple(replace(view, versions=(*view.versions, {BlockId(1, 1, 1): 4})) for view in manifest.views)
+    return replace(manifest, passes=(*manifest.passes, (Layer("again", "normal", "png"), Layer("coarse", "color", "jpeg"))), views=views)
+
+
+def test_layers_that_were_added_have_versions_of_their_own(added):
+    value = json.loads(added.dump())
+    assert [layer["name"] for layer in value["layers"]] == ["color", "normal", "id", "depth", "again", "coarse"]
+    assert (value["views"][0]["version"], value["views"][0]["versions"]) == (3, {"1/1/1": 2})
+    assert value["views"][1]["passes"] == [{"layers": ["again", "coarse"], "version": 4, "versions": {}}]
+    again = Manifest.load(added.dump())
+    assert (again.passes, again.layers) == (added.passes, added.layers)
+    assert (block_version(again.views[0], TileId(4, 15, 15), 1), block_version(again.views[0], TileId(4, 15, 15))) == (4, 2)
+
+
+@pytest.mark.parametrize(
+    "passes",
+    [
+        None,
+        [{"layers": ["again"], "version": 4, "versions": {}}],
+        [{"layers": ["nowhere"], "version": 4, "versions": {}}],
+        [{"layers": ["again", "again"], "version": 4, "versions": {}}],
+        [{"layers": [], "version": 4, "versions": {}}],
+        [{"layers": ["again", "coarse"], "versions": {}}],
+    ],
+)
+@pytest.mark.parametrize("view", [0, 1])
+def test_passes_that_do_not_fit_are_corrupt(added, view, passes):
+    value = json.loads(added.dump())
+    value["views"][view]["passes"] = passes
+    with pytest.raises(Corrupt):
+        Manifest.load(json.dumps(value))
 
 
 def test_the_document_is_that_of_the_specification(manifest):
@@ -53,9 +89,9 @@ def test_the_document_is_that_of_the_specification(manifest):
     assert value["objects"] == {"count": 54, "shard_size": 1024, "shards": "objects/{shard}.json", "search": "objects/search.json"}
 
 
-def test_the_schema_names_every_member(manifest):
+def test_the_schema_names_every_member(manifest, added):
     archives = {view.frame.id: {"color": f"{view.frame.id}/color.pmtiles"} for view in manifest.views}
-    value = manifest.with_archives(archives).to_json()
+    value = added.with_archives(archives).to_json()
     schema = SCHEMA["properties"]
     assert set(schema) == set(value) == set(SCHEMA["required"])
     assert set(schema["views"]["items"]["properties"]) == set(value["views"][0])
@@ -64,10 +100,11 @@ def test_the_schema_names_every_member(manifest):
     assert set(schema["objects"]["properties"]) == set(value["objects"])
 
 
-def test_the_schema_accepts_it(manifest):
+def test_the_schema_accepts_it(manifest, added):
     jsonschema = pytest.importorskip("jsonschema")
     jsonschema.Draft202012Validator.check_schema(SCHEMA)
     jsonschema.validate(manifest.to_json(), SCHEMA)
+    jsonschema.validate(added.to_json(), SCHEMA)
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate({**manifest.to_json(), "version": 2}, SCHEMA)
 
@@ -86,7 +123,7 @@ def test_a_tile_has_the_version_of_its_block(manifest):
 
 
 def test_a_rendering_without_tiles_has_a_manifest(manifest):
-    empty = replace(manifest, complete=False, objects=0, views=(ViewFacts(manifest.views[0].frame, Occupancy.from_tiles(4, [])),))
+    empty = replace(manifest, complete=False, objects=0, views=(ViewFacts(manifest.views[0].frame, Occupancy.from_tiles(4, []), ({},)),))
     assert Manifest.load(empty.dump()).views[0].occupancy.count() == 0
 
 
@@ -136,5 +173,7 @@ def test_a_manifest_of_what_does_not_fit_is_not_built(manifest):
         replace(manifest, name="Tea Time")
     with pytest.raises(BadRequest):
         replace(manifest, views=())
+    with pytest.raises(BadRequest, match="2 passes"):
+        replace(manifest, passes=(*manifest.passes, LAYERS[:1]))
     with pytest.raises(BadRequest, match="one size"):
-        replace(manifest, views=(*manifest.views, ViewFacts(pin(BOX, 256, 0.3, [ViewAngles(90, 45)])[0], Occupancy.from_tiles(3, []))))
+        replace(manifest, views=(*manifest.views, ViewFacts(pin(BOX, 256, 0.3, [ViewAngles(90, 45)])[0], Occupancy.from_tiles(3, []), ({},))))

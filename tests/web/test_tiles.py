@@ -8,7 +8,7 @@ from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.store import content_hash
 from map3d.types import BlockId, TileId
 from map3d.web import stores, tiles
-from tests.web.workspaces import LAYERS, OCCUPIED, ZMAX, every_tile, put_block, rendering_record, store_shape, tile_bytes
+from tests.web.workspaces import ADDED, LAYERS, OCCUPIED, ZMAX, add_pass, every_tile, put_block, rendering_record, store_shape, tile_bytes
 
 TILE = TileId(ZMAX, 7, 7)
 URL = f"/tiles/tea/0-45/color/{ZMAX}/7/7"
@@ -118,6 +118,39 @@ def test_a_new_version_is_served_at_once(client, workspace):
     assert client.get(URL).content == new
     answer = client.get(f"{URL}?v=2")
     assert (answer.content, answer.headers["cache-control"]) == (new, IMMUTABLE)
+
+
+def test_layers_that_were_added_are_served_beside_those_before(client, workspace):
+    assert client.get(f"/tiles/tea/0-45/again/{ZMAX}/7/7?v=2").status_code == 404
+    add_pass(workspace)
+    for layer in ADDED:
+        for tile in every_tile():
+            answer = client.get(f"/tiles/tea/0-45/{layer.name}/{tile.z}/{tile.x}/{tile.y}?v=2")
+            assert (answer.status_code, answer.content) == (200, tile_bytes("0-45", layer.name, tile))
+            assert (answer.headers["content-type"], answer.headers["cache-control"]) == (layer.media_type, IMMUTABLE)
+    assert client.get(f"{URL}?v=1").content == tile_bytes("0-45", "color", TILE)
+
+
+def test_an_added_layer_has_versions_of_its_own(client, workspace):
+    add_pass(workspace)
+    added = URL.replace("/color/", "/again/")
+    assert client.get(f"{added}?v=1").headers["cache-control"] == "no-cache"
+    assert client.get(f"{URL}?v=2").headers["cache-control"] == "no-cache"
+    with SqliteTileStore(workspace.store_path("tea", "0-45+1")) as store:
+        store.remove_block(BlockId(1, 0, 0))
+    assert (client.get(added).status_code, client.get(URL).status_code) == (204, 200)
+
+
+@pytest.mark.parametrize("view", ["0-45+1", "0-45%2B1", "0-45+0", "0-45+"])
+def test_a_track_is_no_view(client, workspace, view):
+    add_pass(workspace)
+    assert client.get(f"/tiles/tea/{view}/again/{ZMAX}/7/7").status_code == 404
+
+
+def test_a_layer_that_is_not_there_is_told_from_all_that_are(client, workspace):
+    add_pass(workspace)
+    answer = client.get("/tiles/tea/0-45/other/0/0/0")
+    assert (answer.status_code, answer.text) == (404, "no such layer; there are color, normal, id, depth, again, coarse\n")
 
 
 def test_a_rendering_made_anew_under_its_name_is_noticed(client, workspace, monkeypatch):

@@ -12,6 +12,7 @@ from map3d.types import BlockId, Layer, TileId, ViewAngles
 
 BOX = ((-120.0, -80.0, 0.0), (130.0, 90.0, 22.5))
 LAYERS = (Layer("color", "color", "webp", 80), Layer("normal", "normal", "png"), Layer("id", "id", "png"), Layer("depth", "depth", "png"))
+ADDED = (Layer("again", "normal", "png"), Layer("coarse", "color", "jpeg", 40))
 VIEWS = (ViewAngles(0, 45), ViewAngles(45, 22.5))
 ZMAX = 4
 OCCUPIED = {(0, 0), (1, 0), (2, 3), (7, 7), (15, 15), (8, 3)}
@@ -27,25 +28,25 @@ OBJECTS = (
 
 def rendering_record(name="tea"):
     frames = tuple(pin(BOX, 256, 0.1, VIEWS))
-    return RenderingRecord(name, "town", 0.1, LAYERS, frames, BOX, title="Tea <time>", attribution="© somebody")
+    return RenderingRecord(name, "town", 0.1, (LAYERS,), frames, BOX, title="Tea <time>", attribution="© somebody")
 
 
-FIRST_BYTES = {"webp": b"RIFF", "png": b"\x89PNG\r\n\x1a\n"}
+FIRST_BYTES = {"webp": b"RIFF", "png": b"\x89PNG\r\n\x1a\n", "jpeg": b"\xff\xd8\xff"}
 
 
 def tile_bytes(view, layer, tile, salt=""):
     """Begin as images do. Some are equal, as tiles of plain ground are."""
-    kind = next(one.format for one in LAYERS if one.name == layer)
+    kind = next(one.format for one in (*LAYERS, *ADDED) if one.name == layer)
     return FIRST_BYTES[kind] + f"{salt}{view}/{layer}/{tile.z}/{tile.x % 2}/{tile.y}".encode() * (1 + tile.x % 3)
 
 
-def store_shape(record):
-    return StoreShape(record.tile_px, record.zmax, record.layers)
+def store_shape(record, number=0):
+    return StoreShape(record.tile_px, record.zmax, record.passes[number])
 
 
 def put_block(store, view, block, occupancy, version=1, salt=""):
     tiles = [tile for z in range(ZMAX + 1) for tile in occupancy.tiles(z) if block_of(tile, ZMAX) == block]
-    stored = [StoredTile(n, *tile, tile_bytes(view, layer.name, tile, salt)) for n, layer in enumerate(LAYERS) for tile in tiles]
+    stored = [StoredTile(n, *tile, tile_bytes(view, layer.name, tile, salt)) for n, layer in enumerate(store.shape.layers) for tile in tiles]
     return store.put_block(block, f"key{version}", version, stored, b"seam" if stored else None)
 
 
@@ -62,29 +63,44 @@ def make_workspace(root, name="tea", version=1):
         registry.put_asset("houses", OBJECTS)
     workspace.rendering_folder(name).mkdir(parents=True)
     occupancy = Occupancy.from_tiles(ZMAX, OCCUPIED)
-    for frame in record.frames:
-        with SqliteTileStore.create(workspace.store_path(name, frame.id), store_shape(record)) as store:
-            for level in block_levels(ZMAX):
-                for x in range(2**level.root):
-                    for y in range(2**level.root):
-                        put_block(store, frame.id, BlockId(level.root, x, y), occupancy, version)
+    _put_pass(workspace, record, 0, version)
     workspace.manifest_path(name).write_bytes(manifest_of(record, occupancy, version).dump())
     return workspace
 
 
-def manifest_of(record, occupancy, version=1):
+def add_pass(workspace, name="tea", version=2):
+    """The layers ADDED, rendered."""
+    catalogue = workspace.open_catalogue()
+    record = catalogue.add_pass(name, ADDED)
+    catalogue.close()
+    _put_pass(workspace, record, 1, version)
+    workspace.manifest_path(name).write_bytes(manifest_of(record, Occupancy.from_tiles(ZMAX, OCCUPIED), 1, version).dump())
+
+
+def _put_pass(workspace, record, number, version):
+    for frame in record.frames:
+        path = workspace.store_path(record.name, record.tracks_of(frame)[number].id)
+        with SqliteTileStore.create(path, store_shape(record, number)) as store:
+            for level in block_levels(ZMAX):
+                for x in range(2**level.root):
+                    for y in range(2**level.root):
+                        put_block(store, frame.id, BlockId(level.root, x, y), Occupancy.from_tiles(ZMAX, OCCUPIED), version)
+
+
+def manifest_of(record, occupancy, *versions):
+    """`versions`: of each pass."""
     blocks = [BlockId(*tile) for level in block_levels(ZMAX) for tile in occupancy.tiles(level.root)]
     return Manifest(
         name=record.name,
         title=record.title,
         attribution=record.attribution,
-        content_version=version,
+        content_version=max(versions),
         complete=True,
         crs=CrsFacts("UTM 32N", 25832),
         origin=(691000.0, 5336000.0, 500.0),
         box=BOX,
-        layers=record.layers,
-        views=tuple(ViewFacts(frame, occupancy, dict.fromkeys(blocks, version)) for frame in record.frames),
+        passes=record.passes,
+        views=tuple(ViewFacts(frame, occupancy, tuple(dict.fromkeys(blocks, version) for version in versions)) for frame in record.frames),
         objects=3,
     )
 

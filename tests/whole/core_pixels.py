@@ -34,7 +34,7 @@ class CoreView:
         self.record: RenderingRecord = catalogue.rendering(rendering)
         catalogue.close()
         self.frame: PinnedFrame = next(frame for frame in self.record.frames if frame.id == view)
-        self._text = frame_text(self.record, self.frame)
+        self._text = frame_text(self.record.tracks_of(self.frame)[0])
         self._scene = _core.Scene(str(workspace / "scenes" / self.record.scene))
         self._registry = workspace / "scenes" / self.record.scene / "registry.sqlite"
 

@@ -11,6 +11,7 @@ from map3d.catalogue.records import (
     RenderingRecord,
     SceneCrs,
     SceneRecord,
+    Track,
 )
 from map3d.catalogue.states import State
 from map3d.catalogue.workspace import Workspace
@@ -29,5 +30,6 @@ __all__ = [
     "SceneCrs",
     "SceneRecord",
     "State",
+    "Track",
     "Workspace",
 ]

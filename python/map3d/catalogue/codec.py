@@ -1,7 +1,7 @@
 """Records as rows and JSON text, and back. Shared by the homes."""
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -41,13 +41,17 @@ def dump_rendering(rendering: RenderingRecord) -> tuple[Any, ...]:
         rendering.title,
         rendering.attribution,
         rendering.res_m,
-        json.dumps([asdict(layer) for layer in rendering.layers]),
+        dump_passes(rendering.passes),
         dump_frames(rendering.frames),
         json.dumps(rendering.box),
         json.dumps(dict(rendering.options)),
         rendering.content_version,
         rendering.announced_version,
     )
+
+
+def dump_passes(passes: Iterable[Sequence[Layer]]) -> str:
+    return json.dumps([[asdict(layer) for layer in layers] for layers in passes])
 
 
 def dump_frames(frames: Iterable[PinnedFrame]) -> str:
@@ -61,7 +65,7 @@ def load_rendering(row: RowLike) -> RenderingRecord:
         title=row["title"],
         attribution=row["attribution"],
         res_m=row["res_m"],
-        layers=tuple(Layer(**layer) for layer in json.loads(row["layers"])),
+        passes=tuple(tuple(load_layer(layer) for layer in layers) for layers in json.loads(row["passes"])),
         frames=tuple(load_frame(frame) for frame in json.loads(row["frames"])),
         box=load_box(json.loads(row["box"])),
         options=json.loads(row["options"]),
@@ -70,8 +74,12 @@ def load_rendering(row: RowLike) -> RenderingRecord:
     )
 
 
+def load_layer(value: Mapping[str, Any]) -> Layer:
+    return Layer(**value)
+
+
 def load_frame(value: Mapping[str, Any]) -> PinnedFrame:
-    """The inverse of `PinnedFrame.to_json`; its layers are the rendering's."""
+    """The inverse of `PinnedFrame.to_json`; its layers are those of the rendering's passes."""
     numbers = {name: value[name] for name in ("u0_m", "v0_m", "d0_m", "size_m", "tile_px", "zmax")}
     return PinnedFrame(angles=ViewAngles(value["look_at_deg"], value["pitch_deg"]), **numbers)
 

@@ -6,7 +6,7 @@ from typing import Protocol
 from map3d.catalogue.records import AssetRecord, Job, JobResult, Lease, PlannedJob, PlanOutcome, RenderingRecord, SceneCrs, SceneRecord
 from map3d.catalogue.states import State
 from map3d.geometry.frames import PinnedFrame
-from map3d.types import BlockId, Vec3
+from map3d.types import BlockId, Layer, Vec3
 
 LEASE_S = 60.0
 HEARTBEAT_S = 15.0
@@ -60,6 +60,10 @@ class Catalogue(Protocol):
     def add_frames(self, name: str, frames: Sequence[PinnedFrame]) -> RenderingRecord:
         """Adds views to a rendering and returns it as kept; its jobs stay. Raises NotFound, AlreadyExists for a view that it has."""
 
+    def add_pass(self, name: str, layers: Sequence[Layer]) -> RenderingRecord:
+        """Adds layers to a rendering, as a pass of their own, and returns it as kept; its jobs stay. Raises NotFound, AlreadyExists for a name that
+        it has."""
+
     def announce(self, name: str, version: int) -> None:
         """A manifest of this content version may have been seen by clients."""
 
@@ -75,7 +79,7 @@ class Catalogue(Protocol):
     def lease(self, rendering: str, worker: str, start: int = 0) -> Lease | None:
         """Takes the next job, in one atomic statement; None when there is none to take now. Expired leases are given back first.
 
-        By fewest attempts, level, view; among these the first at or behind Morton number `start`, else the first of all: so a worker can stay where
+        By fewest attempts, level, track; among these the first at or behind Morton number `start`, else the first of all: so a worker can stay where
         it is.
         """
 
@@ -92,10 +96,10 @@ class Catalogue(Protocol):
         """Gives a job back that was not tried to its end (the worker stops): its attempt does not count. Raises StaleFence."""
 
     def retry(self, rendering: str, blocks: Iterable[tuple[str, BlockId]] | None = None) -> int:
-        """Quarantined jobs (all, or those of these views and blocks) become todo with no attempts; returns how many."""
+        """Quarantined jobs (all, or those of these tracks and blocks) become todo with no attempts; returns how many."""
 
-    def jobs(self, rendering: str, view: str | None = None, state: State | None = None) -> Iterator[Job]:
-        """By view, level, Morton order."""
+    def jobs(self, rendering: str, track: str | None = None, state: State | None = None) -> Iterator[Job]:
+        """By track, level, Morton order."""
 
     def count_jobs(self, rendering: str) -> dict[State, int]:
         """All states, also those with none. Expired leases count as what they became."""

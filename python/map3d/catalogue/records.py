@@ -2,10 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from map3d.catalogue.states import State
 from map3d.geometry.frames import PinnedFrame, Window
+from map3d.geometry.views import track_id
 from map3d.types import BlockId, BlockKind, Box, Layer, Vec3
 
 LOCAL_CRS_NAME = "local metres"
@@ -56,8 +58,23 @@ class AssetRecord:
 
 
 @dataclass(frozen=True)
+class Track:
+    """One pass of one view (spec/pyramid.md §8), with jobs, a tile store and block versions of its own. In the store `layers` are numbered from 0."""
+
+    frame: PinnedFrame
+    number: int
+    layers: tuple[Layer, ...]
+
+    @cached_property
+    def id(self) -> str:
+        return track_id(self.frame.id, self.number)
+
+
+@dataclass(frozen=True)
 class RenderingRecord:
     """A scene seen. `box` is the scene's local box that the frames were pinned from. All frames share size, levels and tile size.
+
+    `passes`: the layers made with the rendering, then those of each time that some were added; no name twice.
 
     `content_version` is that of the next tiles to change; `announced_version` the last one that a manifest told clients of, 0 before the first.
     """
@@ -65,7 +82,7 @@ class RenderingRecord:
     name: str
     scene: str
     res_m: float
-    layers: tuple[Layer, ...]
+    passes: tuple[tuple[Layer, ...], ...]
     frames: tuple[PinnedFrame, ...]
     box: Box
     title: str = ""
@@ -73,6 +90,19 @@ class RenderingRecord:
     options: Mapping[str, Any] = field(default_factory=dict)
     content_version: int = 1
     announced_version: int = 0
+
+    @property
+    def layers(self) -> tuple[Layer, ...]:
+        """Of all passes."""
+        return tuple(layer for layers in self.passes for layer in layers)
+
+    @property
+    def tracks(self) -> tuple[Track, ...]:
+        """Every pass of every view, the passes of a view after one another."""
+        return tuple(track for frame in self.frames for track in self.tracks_of(frame))
+
+    def tracks_of(self, frame: PinnedFrame) -> tuple[Track, ...]:
+        return tuple(Track(frame, number, layers) for number, layers in enumerate(self.passes))
 
     @property
     def tile_px(self) -> int:
@@ -100,7 +130,7 @@ class PlannedJob:
     """A block that should be there. `order` is the root's Morton number, `parent` the reduce block that takes its seam (None at the top),
     `key` says what its bytes depend on."""
 
-    view: str
+    track: str
     block: BlockId
     kind: BlockKind
     order: int
@@ -135,7 +165,7 @@ class Job:
     """A job as it stands. `expires_s` is on the database's clock; `result` only when done once."""
 
     rendering: str
-    view: str
+    track: str
     block: BlockId
     kind: BlockKind
     key: str
@@ -153,7 +183,7 @@ class Lease:
     """A worker's claim. Every later word about the job carries `fence`; `content_version` is what changed tiles are to be stamped with."""
 
     rendering: str
-    view: str
+    track: str
     block: BlockId
     kind: BlockKind
     key: str

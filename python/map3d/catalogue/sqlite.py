@@ -14,9 +14,9 @@ from map3d.catalogue.sqlite_jobs import JOB_SCHEMA, SqliteJobs
 from map3d.database import Database
 from map3d.errors import AlreadyExists, NotFound
 from map3d.geometry.frames import PinnedFrame
-from map3d.types import Vec3, check_name
+from map3d.types import Layer, Vec3, check_name
 
-VERSION: Final = 1
+VERSION: Final = 2
 
 _SCHEMA: Final = (
     """
@@ -24,7 +24,7 @@ CREATE TABLE scene(name TEXT PRIMARY KEY, title TEXT NOT NULL, attribution TEXT 
 CREATE TABLE asset(scene TEXT NOT NULL REFERENCES scene(name), name TEXT NOT NULL, source TEXT NOT NULL, format TEXT NOT NULL,
   digest TEXT NOT NULL, source_digest TEXT NOT NULL, report TEXT NOT NULL, PRIMARY KEY(scene, name));
 CREATE TABLE rendering(name TEXT PRIMARY KEY, scene TEXT NOT NULL REFERENCES scene(name), title TEXT NOT NULL, attribution TEXT NOT NULL,
-  res_m REAL NOT NULL, layers TEXT NOT NULL, frames TEXT NOT NULL, box TEXT NOT NULL, options TEXT NOT NULL,
+  res_m REAL NOT NULL, passes TEXT NOT NULL, frames TEXT NOT NULL, box TEXT NOT NULL, options TEXT NOT NULL,
   content_version INTEGER NOT NULL, announced_version INTEGER NOT NULL);
 """
     + JOB_SCHEMA
@@ -121,6 +121,15 @@ class SqliteCatalogue(SqliteJobs):
                 raise AlreadyExists(f"rendering {name}: has the view {', '.join(sorted(known))} already")
             after = replace(before, frames=(*before.frames, *frames))
             db.execute("UPDATE rendering SET frames = ? WHERE name = ?", (codec.dump_frames(after.frames), name))
+            return after
+
+    def add_pass(self, name: str, layers: Sequence[Layer]) -> RenderingRecord:
+        with self._database.transaction() as db:
+            before = _rendering(db, name)
+            if known := {layer.name for layer in before.layers} & {layer.name for layer in layers}:
+                raise AlreadyExists(f"rendering {name}: has the layer {', '.join(sorted(known))} already")
+            after = replace(before, passes=(*before.passes, tuple(layers)))
+            db.execute("UPDATE rendering SET passes = ? WHERE name = ?", (codec.dump_passes(after.passes), name))
             return after
 
     def announce(self, name: str, version: int) -> None:

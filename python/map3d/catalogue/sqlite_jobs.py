@@ -14,27 +14,27 @@ FENCES_A_VERSION: Final = 1 << 20
 """New jobs start at content version times this, so that a job of a pinned-anew rendering never gets a fence that an older job of its name had."""
 
 JOB_SCHEMA: Final = """
-CREATE TABLE job(rendering TEXT NOT NULL REFERENCES rendering(name), view TEXT NOT NULL, z INTEGER NOT NULL, x INTEGER NOT NULL, y INTEGER NOT NULL,
+CREATE TABLE job(rendering TEXT NOT NULL REFERENCES rendering(name), track TEXT NOT NULL, z INTEGER NOT NULL, x INTEGER NOT NULL, y INTEGER NOT NULL,
   kind TEXT NOT NULL, morton INTEGER NOT NULL, key TEXT NOT NULL, parent_z INTEGER, parent_x INTEGER, parent_y INTEGER,
   state TEXT NOT NULL, attempts INTEGER NOT NULL DEFAULT 0, fence INTEGER NOT NULL DEFAULT 0, worker TEXT, expires REAL, reason TEXT,
-  version INTEGER, empty INTEGER, tiles INTEGER, base_tiles INTEGER, bytes INTEGER, seconds REAL, UNIQUE(rendering, view, z, x, y));
-CREATE INDEX job_next ON job(rendering, state, attempts, z, view, morton);
+  version INTEGER, empty INTEGER, tiles INTEGER, base_tiles INTEGER, bytes INTEGER, seconds REAL, UNIQUE(rendering, track, z, x, y));
+CREATE INDEX job_next ON job(rendering, state, attempts, z, track, morton);
 CREATE INDEX job_expiry ON job(expires) WHERE state = 'leased';
-CREATE INDEX job_parent ON job(rendering, view, parent_z, parent_x, parent_y)
+CREATE INDEX job_parent ON job(rendering, track, parent_z, parent_x, parent_y)
 """
 
-_AT: Final = "rendering = :rendering AND view = :view AND z = :z AND x = :x AND y = :y"
-_ALL_BELOW_DONE: Final = f"""NOT EXISTS (SELECT 1 FROM job AS below WHERE below.rendering = job.rendering AND below.view = job.view
+_AT: Final = "rendering = :rendering AND track = :track AND z = :z AND x = :x AND y = :y"
+_ALL_BELOW_DONE: Final = f"""NOT EXISTS (SELECT 1 FROM job AS below WHERE below.rendering = job.rendering AND below.track = job.track
   AND below.parent_z = job.z AND below.parent_x = job.x AND below.parent_y = job.y AND below.state <> '{State.DONE}')"""
 _AFTER_FAILURE: Final = f"CASE WHEN attempts >= {MAX_ATTEMPTS} THEN '{State.QUARANTINED}' ELSE '{next_state(State.LEASED, Event.FAIL)}' END"
 _EXPIRE: Final = f"""UPDATE job SET state = {_AFTER_FAILURE}, worker = NULL, expires = NULL, reason = 'lease expired (worker ' || worker || ')'
   WHERE state = '{State.LEASED}' AND expires < {NOW}"""
-_NEXT: Final = f"""SELECT {{columns}} FROM job WHERE rendering = :rendering AND state = '{State.TODO}' ORDER BY attempts, z, view, morton LIMIT 1"""
+_NEXT: Final = f"""SELECT {{columns}} FROM job WHERE rendering = :rendering AND state = '{State.TODO}' ORDER BY attempts, z, track, morton LIMIT 1"""
 _LEASE: Final = f"""UPDATE job SET state = '{next_state(State.TODO, Event.LEASE)}', attempts = attempts + 1, fence = fence + 1, worker = :worker,
   expires = {NOW} + :lease_s
   WHERE rowid = coalesce(
     (SELECT rowid FROM job WHERE rendering = :rendering AND state = '{State.TODO}' AND morton >= :start
-      AND (attempts, z, view) = ({_NEXT.format(columns="attempts, z, view")}) ORDER BY morton LIMIT 1),
+      AND (attempts, z, track) = ({_NEXT.format(columns="attempts, z, track")}) ORDER BY morton LIMIT 1),
     ({_NEXT.format(columns="rowid")}))
   RETURNING *, (SELECT content_version FROM rendering WHERE name = rendering) AS content_version"""
 _HELD: Final = f"{_AT} AND state = '{State.LEASED}' AND fence = :fence AND expires >= {NOW}"
@@ -50,10 +50,10 @@ class SqliteJobs:
     def plan(self, rendering: str, jobs: Iterable[PlannedJob]) -> PlanOutcome:
         with self._database.transaction() as db:
             content_version, announced = _versions(db, rendering)
-            known = {(row["view"], row["z"], row["x"], row["y"]): row["key"] for row in _job_rows(db, rendering)}
+            known = {(row["track"], row["z"], row["x"], row["y"]): row["key"] for row in _job_rows(db, rendering)}
             added, changed, kept = [], [], 0
             for job in jobs:
-                key = known.get((job.view, *job.block))
+                key = known.get((job.track, *job.block))
                 if key is None:
                     added.append({**_planned_row(rendering, job), "fence": content_version * FENCES_A_VERSION})
                 elif key != job.key:
@@ -95,15 +95,15 @@ class SqliteJobs:
             if blocks is None:
                 count = db.execute(f"{change} AND rendering = ?", (rendering,)).rowcount
             else:
-                count = sum(db.execute(f"{change} AND {_AT}", _place(rendering, view, block)).rowcount for view, block in blocks)
+                count = sum(db.execute(f"{change} AND {_AT}", _place(rendering, track, block)).rowcount for track, block in blocks)
             if count and announced >= content_version:
                 db.execute("UPDATE rendering SET content_version = ? WHERE name = ?", (announced + 1, rendering))
         return count
 
-    def jobs(self, rendering: str, view: str | None = None, state: State | None = None) -> Iterator[Job]:
+    def jobs(self, rendering: str, track: str | None = None, state: State | None = None) -> Iterator[Job]:
         with self._database.reading() as db:
-            query = "SELECT * FROM job WHERE rendering = ?1 AND (?2 IS NULL OR view = ?2) AND (?3 IS NULL OR state = ?3) ORDER BY view, z, morton"
-            rows = db.execute(query, (rendering, view, state)).fetchall()
+            query = "SELECT * FROM job WHERE rendering = ?1 AND (?2 IS NULL OR track = ?2) AND (?3 IS NULL OR state = ?3) ORDER BY track, z, morton"
+            rows = db.execute(query, (rendering, track, state)).fetchall()
         return (_job(row) for row in rows)
 
     def count_jobs(self, rendering: str) -> dict[State, int]:
@@ -116,12 +116,12 @@ class SqliteJobs:
 
     def _move(self, lease: Lease, change: str, *, wake: bool = False, **values: Any) -> sqlite3.Row:
         """One transition out of a held lease; raises StaleFence when it is not held any more."""
-        place = {**_place(lease.rendering, lease.view, lease.block), "fence": lease.fence}
+        place = {**_place(lease.rendering, lease.track, lease.block), "fence": lease.fence}
         with self._database.transaction() as db:
             row: sqlite3.Row | None = db.execute(f"UPDATE job SET {change} WHERE {_HELD} RETURNING *", {**place, **values}).fetchone()
             if row is None:
                 raise StaleFence(
-                    f"job {lease.view} {lease.block}: the lease of {lease.worker} (fence {lease.fence}) is no longer held; {_holder(db, place)}"
+                    f"job {lease.track} {lease.block}: the lease of {lease.worker} (fence {lease.fence}) is no longer held; {_holder(db, place)}"
                 )
             if wake:
                 _wake_above(db, row)
@@ -129,7 +129,7 @@ class SqliteJobs:
 
 
 def _add(db: sqlite3.Connection, rows: list[dict[str, Any]]) -> None:
-    columns = "rendering, view, z, x, y, kind, morton, key, parent_z, parent_x, parent_y, state, fence"
+    columns = "rendering, track, z, x, y, kind, morton, key, parent_z, parent_x, parent_y, state, fence"
     db.executemany(f"INSERT INTO job({columns}) VALUES (:{columns.replace(', ', ', :')})", rows)
 
 
@@ -140,7 +140,7 @@ def _reopen(db: sqlite3.Connection, rows: list[dict[str, Any]]) -> None:
 
 
 def _wake_above(db: sqlite3.Connection, row: sqlite3.Row) -> None:
-    place = {"rendering": row["rendering"], "view": row["view"], "z": row["parent_z"], "x": row["parent_x"], "y": row["parent_y"]}
+    place = {"rendering": row["rendering"], "track": row["track"], "z": row["parent_z"], "x": row["parent_x"], "y": row["parent_y"]}
     after = next_state(State.WAITING, Event.BELOW_DONE)
     db.execute(f"UPDATE job SET state = '{after}' WHERE {_AT} AND state = '{State.WAITING}' AND {_ALL_BELOW_DONE}", place)
 
@@ -158,7 +158,7 @@ def _any_open(db: sqlite3.Connection, rendering: str) -> bool:
 
 
 def _job_rows(db: sqlite3.Connection, rendering: str) -> list[sqlite3.Row]:
-    return db.execute("SELECT * FROM job WHERE rendering = ? ORDER BY view, z, morton", (rendering,)).fetchall()
+    return db.execute("SELECT * FROM job WHERE rendering = ? ORDER BY track, z, morton", (rendering,)).fetchall()
 
 
 def _holder(db: sqlite3.Connection, place: dict[str, Any]) -> str:
@@ -170,13 +170,13 @@ def _holder(db: sqlite3.Connection, place: dict[str, Any]) -> str:
 
 def _planned_row(rendering: str, job: PlannedJob) -> dict[str, Any]:
     above = job.parent or (None, None, None)
-    row = {**_place(rendering, job.view, job.block), "kind": job.kind, "morton": job.order, "key": job.key}
+    row = {**_place(rendering, job.track, job.block), "kind": job.kind, "morton": job.order, "key": job.key}
     row |= {"parent_z": above[0], "parent_x": above[1], "parent_y": above[2]}
     return {**row, "state": State.TODO if job.kind == "base" else State.WAITING}
 
 
-def _place(rendering: str, view: str, block: BlockId) -> dict[str, Any]:
-    return {"rendering": rendering, "view": view, "z": block.z, "x": block.x, "y": block.y}
+def _place(rendering: str, track: str, block: BlockId) -> dict[str, Any]:
+    return {"rendering": rendering, "track": track, "z": block.z, "x": block.x, "y": block.y}
 
 
 def _quoted(states: Iterable[State]) -> str:
@@ -186,7 +186,7 @@ def _quoted(states: Iterable[State]) -> str:
 def _lease(row: sqlite3.Row) -> Lease:
     return Lease(
         rendering=row["rendering"],
-        view=row["view"],
+        track=row["track"],
         block=BlockId(row["z"], row["x"], row["y"]),
         kind=row["kind"],
         key=row["key"],
@@ -202,7 +202,7 @@ def _job(row: sqlite3.Row) -> Job:
     result = JobResult(row["version"], bool(row["empty"]), row["tiles"], row["base_tiles"], row["bytes"], row["seconds"]) if done else None
     return Job(
         rendering=row["rendering"],
-        view=row["view"],
+        track=row["track"],
         block=BlockId(row["z"], row["x"], row["y"]),
         kind=row["kind"],
         key=row["key"],

@@ -34,8 +34,8 @@ class Workspace:
     def manifest_path(self, rendering: str) -> Path:
         return self.rendering_folder(rendering) / "rendering.json"
 
-    def store_path(self, rendering: str, view: str) -> Path:
-        return self.rendering_folder(rendering) / f"{view}.sqlite"
+    def store_path(self, rendering: str, track: str) -> Path:
+        return self.rendering_folder(rendering) / f"{track}.sqlite"
 
     def create(self) -> "Workspace":
         """Makes the folder if it is not there."""

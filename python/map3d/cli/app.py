@@ -16,6 +16,7 @@ VERBS: Final = {
     "add-files": "add_files",
     "create-rendering": "create_rendering",
     "add-views": "add_views",
+    "add-layers": "add_layers",
     "estimate": "estimate",
     "render": "render",
     "retry": "retry",

@@ -7,10 +7,10 @@ import click
 
 from map3d.catalogue import Workspace
 from map3d.cli.building import build_with_progress
-from map3d.cli.options import View, cores, json_option, workspace_option
+from map3d.cli.options import View, cores, json_option, layer_options, workspace_option
 from map3d.cli.output import print_json
 from map3d.errors import BadRequest
-from map3d.types import COLOR_FORMATS, LAYER_KINDS, ViewAngles
+from map3d.types import ViewAngles
 
 
 class WindowText(click.ParamType):  # type: ignore[type-arg]
@@ -42,10 +42,8 @@ class WindowText(click.ParamType):  # type: ignore[type-arg]
     help="Show less than the whole scene: a square of SIZE metres in each view, around the ground point X, Y of the scene's coordinate system. "
     "Content outside is left out.",
 )
-@click.option("--layers", default=",".join(LAYER_KINDS), show_default=True, help="Which layers.")
+@layer_options()
 @click.option("--tile-size", type=click.Choice(["256", "512"]), default="256", show_default=True, help="Pixels of a tile's side.")
-@click.option("--color", type=click.Choice(list(COLOR_FORMATS)), default="webp", show_default=True, help="Format of the colour layer.")
-@click.option("--quality", type=click.IntRange(1, 100), default=80, show_default=True, help="Of webp and jpeg.")
 @click.option("--title", default="", help="What people read.")
 @click.option("--attribution", default="", help="Whom to credit.  [default: the scene's]")
 @click.option("--regrid", is_flag=True, help="Pin an existing rendering anew to the scene as it is now; everything is rendered again.")
@@ -65,8 +63,7 @@ def command(
         raise BadRequest("give either --view or --directions and --pitch")
     chosen = views or around(directions or 4, options.pop("pitch") or (45.0,))
     options.pop("pitch", None)
-    layers = tuple(part.strip() for part in options.pop("layers").split(",") if part.strip())
-    request = RenderingRequest(scene, name, chosen, layers=layers, tile_px=int(options.pop("tile_size")), **options)
+    request = RenderingRequest(scene, name, chosen, tile_px=int(options.pop("tile_size")), **options)
     catalogue = workspace.open_catalogue()
     try:
         request.check(catalogue)

@@ -71,9 +71,9 @@ def _work(run: "Run", plan: "Plan") -> "Outcome":
                 rate = seen["base"] / max(time.monotonic() - begun, 1e-3)
                 bar.update(task, advance=1, rate=f"{rate:,.0f} base tiles/s")
             elif isinstance(event, Failed):
-                bar.console.print(f"{event.lease.view} {event.lease.block}: attempt {event.lease.attempt} failed, now {event.state}: {event.reason}")
+                bar.console.print(f"{event.lease.track} {event.lease.block}: attempt {event.lease.attempt} failed, now {event.state}: {event.reason}")
             elif isinstance(event, Lost):
-                bar.console.print(f"{event.lease.view} {event.lease.block}: lease lost: {event.reason}")
+                bar.console.print(f"{event.lease.track} {event.lease.block}: lease lost: {event.reason}")
             elif isinstance(event, Stopping):
                 how = "giving the blocks in hand back" if event.abandoning else "finishing the blocks in hand; Ctrl-C again gives them back at once"
                 bar.console.print(f"stopping: {how}")

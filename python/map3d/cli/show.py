@@ -69,7 +69,9 @@ def _rendering(catalogue: Catalogue, name: str, as_json: bool) -> None:
         f"{name} of scene {item.scene}: {item.zmax + 1} levels, {item.res_m:g} m a pixel, tiles of {item.tile_px} px, version {item.content_version}"
     )
     click.echo(f"views: {', '.join(view_id(frame.angles) for frame in item.frames)}")
-    click.echo(f"layers: {', '.join(f'{layer.name} ({layer.format})' for layer in item.layers)}")
+    for number, layers in enumerate(item.passes):
+        names = ", ".join(f"{layer.name} ({layer.format})" for layer in layers)
+        click.echo(f"layers: {names}" if number == 0 else f"added layers: {names}")
     click.echo(f"blocks: {counts_text(counts)}")
 
 
@@ -97,8 +99,8 @@ def _jobs(catalogue: Catalogue, name: str, as_json: bool) -> None:
     open_jobs = [job for job in jobs if job.state not in (State.DONE, State.WAITING, State.TODO)]
     if open_jobs:
         print_table(
-            ("view", "block", "kind", "state", "attempts", "worker", "reason"),
-            [(job.view, job.block, job.kind, job.state, job.attempts, job.worker, job.reason) for job in open_jobs],
+            ("track", "block", "kind", "state", "attempts", "worker", "reason"),
+            [(job.track, job.block, job.kind, job.state, job.attempts, job.worker, job.reason) for job in open_jobs],
         )
 
 
@@ -111,7 +113,7 @@ def _quarantine(catalogue: Catalogue, name: str, as_json: bool) -> None:
     if not jobs:
         click.echo(f"no block of {name} is quarantined")
         return
-    print_table(("view", "block", "kind", "why"), [(job.view, job.block, job.kind, job.reason) for job in jobs])
+    print_table(("track", "block", "kind", "why"), [(job.track, job.block, job.kind, job.reason) for job in jobs])
     click.echo(f"try them again with: map3d retry {name} && map3d render {name}")
 
 

@@ -80,6 +80,11 @@ def view_id(angles: ViewAngles) -> str:
     return f"{_shortest(look_at_deg)}-{_shortest(pitch_deg)}"
 
 
+def track_id(view: str, number: int) -> str:
+    """Of pass `number` of a view (spec/pyramid.md §8)."""
+    return f"{view}+{number}" if number else view
+
+
 def parse_view_id(text: str) -> ViewAngles:
     """The angles of a view id; raises BadRequest unless `view_id` would write it just so."""
     match = _ID.fullmatch(text)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Final
 
 from map3d.catalogue import Catalogue, RenderingRecord, Workspace
@@ -10,33 +10,31 @@ from map3d.catalogue.records import WINDOW
 from map3d.errors import BadRequest
 from map3d.geometry.frames import Window, pin, pin_beside
 from map3d.geometry.views import check_angles
+from map3d.jobs.layers import LayerRequest
 from map3d.render.build import is_stale, open_scene
-from map3d.types import LAYER_KINDS, Box, Layer, ViewAngles, check_name
+from map3d.types import Box, ViewAngles, check_name
 
-LOSSY: Final = ("webp", "jpeg")
 COARSEST_M: Final = 1e6
 
 
 @dataclass(frozen=True)
 class RenderingRequest:
-    """`res_m` or `levels`; `color` and `quality` are the colour layer's. `window`: x, y of its middle in the scene's CRS, and its side."""
+    """`res_m` or `levels`. `window`: x, y of its middle in the scene's CRS, and its side."""
 
     scene: str
     name: str
     views: Sequence[ViewAngles]
     res_m: float | None = None
     levels: int | None = None
-    layers: Sequence[str] = LAYER_KINDS
+    layers: LayerRequest = field(default_factory=LayerRequest)
     tile_px: int = 256
-    color: str = "webp"
-    quality: int = 80
     title: str = ""
     attribution: str = ""
     regrid: bool = False
     window: tuple[float, float, float] | None = None
 
-    def check(self, catalogue: Catalogue) -> tuple[Layer, ...]:
-        """The layers; raises BadRequest for what can be told before the scene is built, NotFound."""
+    def check(self, catalogue: Catalogue) -> None:
+        """Raises BadRequest for what can be told before the scene is built, NotFound."""
         check_name(self.name, "rendering")
         catalogue.scene(self.scene)
         for view in self.views:
@@ -49,12 +47,12 @@ class RenderingRequest:
             catalogue.rendering(self.name)
         else:
             _check_free(catalogue, self.name)
-        return make_layers(self.layers, self.color, self.quality)
+        self.layers.check()
 
 
 def create_rendering(workspace: Workspace, catalogue: Catalogue, request: RenderingRequest) -> RenderingRecord:
     """Pins the frames to the box of the scene, which must be built as it is now. Raises BadRequest, NotFound."""
-    layers = request.check(catalogue)
+    request.check(catalogue)
     if is_stale(workspace, catalogue, request.scene):
         raise BadRequest(f"scene {request.scene} has changed since it was built; build it first")
     box = open_scene(workspace, request.scene).box
@@ -62,7 +60,7 @@ def create_rendering(workspace: Workspace, catalogue: Catalogue, request: Render
     res_m = choose_res(box, request)
     frames = tuple(pin(box, request.tile_px, res_m, request.views, window))
     options = {} if window is None else {WINDOW: asdict(window)}
-    record = RenderingRecord(request.name, request.scene, res_m, layers, frames, box, request.title, request.attribution, options)
+    record = RenderingRecord(request.name, request.scene, res_m, (request.layers.layers(),), frames, box, request.title, request.attribution, options)
     if request.regrid:
         kept = catalogue.regrid(record)
         _remove_stores(workspace, kept)
@@ -84,14 +82,15 @@ def add_views(catalogue: Catalogue, name: str, views: Sequence[ViewAngles]) -> R
     return catalogue.add_frames(name, frames)
 
 
-def make_layers(names: Sequence[str], color: str, quality: int) -> tuple[Layer, ...]:
-    """Raises BadRequest for unknown or repeated layers."""
-    for name in names:
-        if name not in LAYER_KINDS:
-            raise BadRequest(f"layer {name!r} is not known; there are {', '.join(LAYER_KINDS)}")
-    if not names or len(set(names)) != len(names):
-        raise BadRequest(f"layers {', '.join(names) or 'none'}: name at least one, each once")
-    return tuple(_layer(kind, color, quality) for kind in LAYER_KINDS if kind in names)
+def add_layers(catalogue: Catalogue, name: str, request: LayerRequest) -> RenderingRecord:
+    """Adds layers to a rendering, as a pass of their own; what is there stays as it is.
+
+    Raises NotFound, BadRequest for a name that is there, and what `LayerRequest.layers` raises.
+    """
+    record = catalogue.rendering(name)
+    if twice := sorted({layer.name for layer in record.layers} & set(request.check())):
+        raise BadRequest(f"rendering {name}: layer {', '.join(twice)} is there already; give the new one another name, as NAME=KIND")
+    return catalogue.add_pass(name, request.layers())
 
 
 def choose_res(box: Box, request: RenderingRequest) -> float:
@@ -132,18 +131,13 @@ def _rounded_up(value: float) -> float:
     return round(math.ceil(value / unit) * unit, 12)
 
 
-def _layer(kind: str, color: str, quality: int) -> Layer:
-    known = next(known for known in LAYER_KINDS if known == kind)
-    return Layer(known, known, color, quality if color in LOSSY else None) if known == "color" else Layer(known, known, "png")
-
-
 def _check_free(catalogue: Catalogue, name: str) -> None:
     if any(record.name == name for record in catalogue.renderings()):
         raise BadRequest(f"rendering {name}: exists already; choose another name, or give --regrid to pin it anew and render everything again")
 
 
 def _remove_stores(workspace: Workspace, record: RenderingRecord) -> None:
-    """Tiles of the frames before; views that are no longer wanted go too."""
+    """Tiles of the frames before; views and passes that are no longer wanted go too."""
     folder = workspace.rendering_folder(record.name)
     if folder.is_dir():
         for path in folder.glob("*.sqlite*"):

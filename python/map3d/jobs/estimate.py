@@ -8,9 +8,8 @@ from typing import Final
 import numpy as np
 
 from map3d import _core
-from map3d.catalogue import Catalogue, Job, PlannedJob, RenderingRecord, State, Workspace
+from map3d.catalogue import Catalogue, Job, PlannedJob, RenderingRecord, State, Track, Workspace
 from map3d.errors import BadRequest
-from map3d.geometry.frames import PinnedFrame
 from map3d.render.build import is_stale, open_scene
 from map3d.render.plan import PlannedScene, frame_text, plan_jobs, planned_occupancy
 from map3d.tiles.naming import block_levels, morton
@@ -26,7 +25,8 @@ LEVELS_ABOVE: Final = 1.0 + 1 / 64 + 1 / 256 + 1 / 1024
 
 @dataclass(frozen=True)
 class Rate:
-    """Of one base tile with its share of the levels above: encoded bytes of all layers, seconds of one core. `how` says where they are from."""
+    """Of one base tile of a pass with its share of the levels above: encoded bytes of all its layers, seconds of one core. `how` says where they are
+    from."""
 
     bytes_a_tile: float
     seconds_a_tile: float
@@ -38,7 +38,7 @@ class Rate:
 @dataclass(frozen=True)
 class Estimate:
     """`base_tiles`: at level zmax, that may have content; `tiles`: of all levels; `images`: those times the layers. Of the whole rendering; `seconds`
-    and `open_tiles`: of what is still to do, with `workers` workers."""
+    and `open_tiles` (one that several passes want counts for each): of what is still to do, with `workers` workers."""
 
     base_tiles: int
     tiles: int
@@ -58,74 +58,89 @@ def estimate(workspace: Workspace, catalogue: Catalogue, name: str, workers: int
         raise BadRequest(f"scene {record.scene} has changed since it was built; map3d render {name} builds it first")
     scene = open_scene(workspace, record.scene, 256 << 20)
     plans = {frame.id: planned_occupancy(scene, record, frame) for frame in record.frames}
-    known = {(job.view, job.block): job for job in catalogue.jobs(name)}
-    rate = _recorded(list(known.values()), record, plans) or _sampled(scene, record, plans)
-    tiles_of = _tiles(plans, known, record, rate)
-    open_tiles = sum(tiles_of[job.view, job.block] for job in open_blocks(scene, record, known))
-    base, planned = sum(tiles_of.values()), sum(plan.count(record.zmax) for plan in plans.values())
+    known = {(job.track, job.block): job for job in catalogue.jobs(name)}
+    to_do = open_blocks(scene, record, known)
+    parts = [_of_pass(scene, tracks, plans, known, to_do) for tracks in zip(*map(record.tracks_of, record.frames), strict=True)]
+    base, planned = parts[0].base_tiles, sum(plan.count(record.zmax) for plan in plans.values())
     tiles = sum(plan.count() for plan in plans.values()) * base / planned if planned else 0.0
     return Estimate(
         base_tiles=round(base),
         tiles=round(tiles),
         images=round(tiles) * len(record.layers),
-        bytes=round(base * rate.bytes_a_tile),
-        open_tiles=round(open_tiles),
-        seconds=open_tiles * rate.seconds_a_tile / workers,
+        bytes=round(sum(part.base_tiles * part.rate.bytes_a_tile for part in parts)),
+        open_tiles=round(sum(part.open_tiles for part in parts)),
+        seconds=sum(part.open_tiles * part.rate.seconds_a_tile for part in parts) / workers,
         workers=workers,
-        how=rate.how,
+        how="; ".join(dict.fromkeys(part.rate.how for part in parts)),
     )
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Of one pass, all views together."""
+
+    rate: Rate
+    base_tiles: float
+    open_tiles: float
+
+
+def _of_pass(
+    scene: _core.Scene, tracks: Sequence[Track], plans: Mapping[str, Occupancy], known: Mapping[tuple[str, BlockId], Job], to_do: Sequence[PlannedJob]
+) -> _Part:
+    ids = {track.id for track in tracks}
+    jobs = {place: job for place, job in known.items() if place[0] in ids}
+    within = {track.id: plans[track.frame.id] for track in tracks}
+    rate = _recorded(list(jobs.values()), within) or _sampled(scene, tracks, within)
+    tiles_of = _tiles(within, jobs, rate)
+    return _Part(rate, sum(tiles_of.values()), sum(tiles_of[job.track, job.block] for job in to_do if job.track in ids))
 
 
 def open_blocks(scene: PlannedScene, record: RenderingRecord, known: Mapping[tuple[str, BlockId], Job]) -> list[PlannedJob]:
     """Base blocks that `map3d render` would render now: new ones, changed ones, and those that are not done."""
     blocks: dict[str, list[BlockId]] = {}
-    for (view, block), job in known.items():
+    for (track, block), job in known.items():
         if job.kind == "base":
-            blocks.setdefault(view, []).append(block)
+            blocks.setdefault(track, []).append(block)
     planned = [job for job in plan_jobs(scene, record, blocks) if job.kind == "base"]
     stands = {place: job.key for place, job in known.items() if job.state is State.DONE}
-    return [job for job in planned if stands.get((job.view, job.block)) != job.key]
+    return [job for job in planned if stands.get((job.track, job.block)) != job.key]
 
 
-def _tiles(
-    plans: Mapping[str, Occupancy], known: Mapping[tuple[str, BlockId], Job], record: RenderingRecord, rate: Rate
-) -> dict[tuple[str, BlockId], float]:
-    """Base tiles with content of every base block: as counted when it was rendered, else what the plan lets expect."""
-    root = block_levels(record.zmax)[0].root
+def _tiles(plans: Mapping[str, Occupancy], known: Mapping[tuple[str, BlockId], Job], rate: Rate) -> dict[tuple[str, BlockId], float]:
+    """Base tiles with content of every base block: as counted when it was rendered, else what the plan of its track lets expect."""
     found = {
-        (view, block): _tiles_within(plan, block, record.zmax - root) * rate.filled
-        for view, plan in plans.items()
-        for block in (BlockId(*tile) for tile in plan.tiles(root))
+        (track, block): _tiles_within(plan, block) * rate.filled
+        for track, plan in plans.items()
+        for block in (BlockId(*tile) for tile in plan.tiles(block_levels(plan.zmax)[0].root))
     }
     counted = {place: float(job.result.base_tiles) for place, job in known.items() if place in found and job.result is not None}
     return {**{place: 0.0 for place, job in known.items() if job.kind == "base"}, **found, **counted}
 
 
-def _recorded(jobs: Sequence[Job], record: RenderingRecord, plans: Mapping[str, Occupancy]) -> Rate | None:
-    """From the blocks that are done, if they are many enough, or all."""
+def _recorded(jobs: Sequence[Job], plans: Mapping[str, Occupancy]) -> Rate | None:
+    """From the blocks that are done, if they are many enough, or all. `plans`: of each track."""
     done = [job for job in jobs if job.state is State.DONE and job.result is not None]
     base = [job for job in done if job.kind == "base" and job.result is not None and not job.result.empty]
     if not base or (len(base) < RECORDED_BLOCKS and len(done) < len(jobs)):
         return None
     results = [job.result for job in done if job.result is not None]
     tiles = sum(result.base_tiles for result in results)
-    root = block_levels(record.zmax)[0].root
-    planned = sum(_tiles_within(plans[job.view], job.block, record.zmax - root) for job in done if job.kind == "base")
+    planned = sum(_tiles_within(plans[job.track], job.block) for job in done if job.kind == "base")
     how = f"rates recorded from {len(base)} blocks of this rendering"
     return Rate(sum(result.bytes for result in results) / tiles, sum(result.seconds for result in results) / tiles, tiles / max(planned, 1), how)
 
 
-def _sampled(scene: _core.Scene, record: RenderingRecord, plans: Mapping[str, Occupancy]) -> Rate:
-    """From a few blocks spread over all views, rendered now and thrown away."""
-    root = block_levels(record.zmax)[0].root
-    blocks = [(frame, BlockId(*tile)) for frame in record.frames for tile in plans[frame.id].tiles(root)]
+def _sampled(scene: _core.Scene, tracks: Sequence[Track], plans: Mapping[str, Occupancy]) -> Rate:
+    """From a few blocks spread over all tracks, rendered now and thrown away."""
+    zmax = tracks[0].frame.zmax
+    blocks = [(track, BlockId(*tile)) for track in tracks for tile in plans[track.id].tiles(block_levels(zmax)[0].root)]
     size, tiles, planned, count = 0, 0, 0, 0
     begun = time.perf_counter()
-    for frame, block in _spread(blocks):
-        rendered = scene.render_block(frame_text(record, frame), *block)
+    for track, block in _spread(blocks):
+        rendered = scene.render_block(frame_text(track), *block)
         size += sum(len(tile[4]) for tile in rendered.tiles)
-        tiles += sum(tile[0] == 0 and tile[1] == record.zmax for tile in rendered.tiles)
-        planned += _tiles_within(plans[frame.id], block, record.zmax - root)
+        tiles += sum(tile[0] == 0 and tile[1] == zmax for tile in rendered.tiles)
+        planned += _tiles_within(plans[track.id], block)
         count += 1
         if time.perf_counter() - begun > SAMPLE_S:
             break
@@ -140,14 +155,15 @@ def _sampled(scene: _core.Scene, record: RenderingRecord, plans: Mapping[str, Oc
     )
 
 
-def _spread(blocks: Sequence[tuple[PinnedFrame, BlockId]]) -> list[tuple[PinnedFrame, BlockId]]:
+def _spread(blocks: Sequence[tuple[Track, BlockId]]) -> list[tuple[Track, BlockId]]:
     """Evenly over the list, always the same ones."""
     count = min(len(blocks), SAMPLE_BLOCKS)
     return [blocks[(2 * k + 1) * len(blocks) // (2 * count)] for k in range(count)]
 
 
-def _tiles_within(plan: Occupancy, block: BlockId, levels: int) -> int:
+def _tiles_within(plan: Occupancy, block: BlockId) -> int:
     """Base tiles of the plan that lie in a base block."""
+    levels = plan.zmax - block_levels(plan.zmax)[0].root
     first = morton(block.x, block.y) << 2 * levels
     numbers = plan.numbers(plan.zmax)
     low, high = np.searchsorted(numbers, np.array([first, first + (1 << 2 * levels)], dtype=np.uint64))

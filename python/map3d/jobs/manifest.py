@@ -13,10 +13,10 @@ from map3d.tiles.manifest import CrsFacts, Manifest, ViewFacts
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.store import TileStore
-from map3d.types import Box, Vec3
+from map3d.types import BlockId, Box, Vec3
 
 Planned = Mapping[str, Occupancy]
-"""View → tiles of level zmax that open base blocks may yet fill."""
+"""View → tiles of level zmax that open base blocks of its first pass may yet fill."""
 
 
 def write_manifest(workspace: Workspace, catalogue: Catalogue, rendering: str, box: Box, planned: Planned | None = None) -> Manifest:
@@ -43,7 +43,7 @@ def current_manifest(workspace: Workspace, catalogue: Catalogue, record: Renderi
         crs=_crs(scene),
         origin=_origin(scene),
         box=box,
-        layers=record.layers,
+        passes=record.passes,
         views=tuple(_view(workspace, record, frame, planned.get(frame.id)) for frame in record.frames),
         objects=objects,
         start=_start(record, box),
@@ -62,13 +62,17 @@ def stored_occupancy(store: TileStore) -> Occupancy:
 
 
 def _view(workspace: Workspace, record: RenderingRecord, frame: PinnedFrame, planned: Occupancy | None) -> ViewFacts:
-    path = workspace.store_path(record.name, frame.id)
-    occupancy, versions = Occupancy.from_tiles(frame.zmax, ()), {}
-    if path.is_file():
-        with SqliteTileStore(path, read_only=True) as store:
-            occupancy = stored_occupancy(store)
-            versions = {block.id: block.version for block in store.list_blocks()}
-    return ViewFacts(frame, occupancy if planned is None else occupancy | planned, versions)
+    """Every pass has the same tiles: those of the first tell."""
+    occupancy, versions = Occupancy.from_tiles(frame.zmax, ()), []
+    for track in record.tracks_of(frame):
+        path = workspace.store_path(record.name, track.id)
+        blocks: dict[BlockId, int] = {}
+        if path.is_file():
+            with SqliteTileStore(path, read_only=True) as store:
+                occupancy = occupancy if track.number else stored_occupancy(store)
+                blocks = {block.id: block.version for block in store.list_blocks()}
+        versions.append(blocks)
+    return ViewFacts(frame, occupancy if planned is None else occupancy | planned, tuple(versions))
 
 
 def _crs(scene: SceneRecord) -> CrsFacts:

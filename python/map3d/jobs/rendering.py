@@ -1,9 +1,9 @@
-"""The task of rendering jobs: a block is rendered by a child of map3d.render.work and committed to the view's tile store."""
+"""The task of rendering jobs: a block is rendered by a child of map3d.render.work and committed to the track's tile store."""
 
 from collections.abc import Mapping
 from typing import Any, Final
 
-from map3d.catalogue import JobResult, Lease, RenderingRecord, Workspace
+from map3d.catalogue import JobResult, Lease, RenderingRecord, Track, Workspace
 from map3d.child import Child, Message
 from map3d.render.check import check_rendered
 from map3d.tiles.naming import block_level
@@ -15,25 +15,23 @@ CACHE_BYTES: Final = 512 << 20
 
 
 class RenderTask:
-    """A `Task`. Holds the tile stores of the rendering's views, made if absent."""
+    """A `Task`. Holds the tile stores of the rendering's tracks, made if absent."""
 
     def __init__(self, workspace: Workspace, rendering: RenderingRecord, *, cache_bytes: int = CACHE_BYTES, entry: str = RENDER_ENTRY) -> None:
         workspace.rendering_folder(rendering.name).mkdir(parents=True, exist_ok=True)
         self._zmax = rendering.zmax
         self._entry = entry
         self._setup = _setup(workspace, rendering, cache_bytes)
-        shape = StoreShape(rendering.tile_px, rendering.zmax, rendering.layers)
-        paths = {frame.id: workspace.store_path(rendering.name, frame.id) for frame in rendering.frames}
-        self._stores: Mapping[str, TileStore] = {view: SqliteTileStore.open_or_create(path, shape) for view, path in paths.items()}
+        self._stores: Mapping[str, TileStore] = {track.id: _open_store(workspace, rendering, track) for track in rendering.tracks}
 
     def start_child(self) -> Child:
         return Child(self._entry, self._setup)
 
     def question(self, lease: Lease) -> dict[str, Any]:
-        return {"view": lease.view, "block": list(lease.block), "kind": lease.kind, "levels": block_level(lease.block.z, self._zmax).levels}
+        return {"track": lease.track, "block": list(lease.block), "kind": lease.kind, "levels": block_level(lease.block.z, self._zmax).levels}
 
     def commit(self, lease: Lease, answer: Message) -> JobResult:
-        store = self._stores[lease.view]
+        store = self._stores[lease.track]
         names: list[list[int]] = answer.value["tiles"]
         tiles = [StoredTile(layer, z, x, y, data) for (layer, z, x, y), data in zip(names, answer.blobs, strict=False)]
         seam = answer.blobs[len(names)] if answer.value["seam"] else None
@@ -53,10 +51,15 @@ class RenderTask:
             store.close()
 
 
+def _open_store(workspace: Workspace, rendering: RenderingRecord, track: Track) -> TileStore:
+    shape = StoreShape(rendering.tile_px, rendering.zmax, track.layers)
+    return SqliteTileStore.open_or_create(workspace.store_path(rendering.name, track.id), shape)
+
+
 def _setup(workspace: Workspace, rendering: RenderingRecord, cache_bytes: int) -> dict[str, Any]:
     return {
         "scene": str(workspace.scene_folder(rendering.scene).absolute()),
         "cache_bytes": cache_bytes,
-        "frames": {frame.id: frame.to_json(rendering.layers) for frame in rendering.frames},
-        "stores": {frame.id: str(workspace.store_path(rendering.name, frame.id).absolute()) for frame in rendering.frames},
+        "frames": {track.id: track.frame.to_json(track.layers) for track in rendering.tracks},
+        "stores": {track.id: str(workspace.store_path(rendering.name, track.id).absolute()) for track in rendering.tracks},
     }

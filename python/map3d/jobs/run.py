@@ -50,13 +50,12 @@ class Settings:
 
 @dataclass(frozen=True)
 class Plan:
-    """What there is to do: jobs by state, non-empty base tiles that open blocks may fill."""
+    """What there is to do: jobs by state, base tiles that open blocks of the first pass may fill."""
 
     outcome: PlanOutcome
     open_jobs: int
     done_jobs: int
     quarantined_jobs: int
-    open_base_tiles: int
     box: Box
     occupancy: Planned
 
@@ -95,8 +94,7 @@ class Run:
         if occupancy or outcome.added or not self._workspace.manifest_path(self.record.name).is_file():
             write_manifest(self._workspace, self._catalogue, self.record.name, box, occupancy)
         open_jobs = counts[State.WAITING] + counts[State.TODO] + counts[State.LEASED]
-        tiles = sum(part.count(self.record.zmax) for part in occupancy.values())
-        return Plan(outcome, open_jobs, counts[State.DONE], counts[State.QUARANTINED], tiles, box, occupancy)
+        return Plan(outcome, open_jobs, counts[State.DONE], counts[State.QUARANTINED], box, occupancy)
 
     def work(self, plan: Plan, on_event: Callable[[Event], None]) -> Outcome:
         """Runs the workers until nothing is left to do or the user stops them, then writes the manifest."""
@@ -124,23 +122,25 @@ class Run:
 
     def _prune(self) -> None:
         """Removes blocks that no job stands for, such as those of frames pinned before."""
-        for frame in self.record.frames:
-            path = self._workspace.store_path(self.record.name, frame.id)
+        for track in self.record.tracks:
+            path = self._workspace.store_path(self.record.name, track.id)
             if path.is_file():
-                jobs = {job.block for job in self._catalogue.jobs(self.record.name, frame.id)}
+                jobs = {job.block for job in self._catalogue.jobs(self.record.name, track.id)}
                 with SqliteTileStore(path) as store:
                     for block in store.list_blocks():
                         if block.id not in jobs:
                             store.remove_block(block.id)
 
     def _open_occupancy(self, scene: PlannedScene) -> dict[str, Occupancy]:
+        """Where the first pass of a view is done, its tiles say exactly where those of further passes will be."""
         return {frame.id: planned_occupancy(scene, self.record, frame, within=self._open_blocks(frame.id)) for frame in self.record.frames}
 
     def _open_blocks(self, view: str) -> list[BlockId]:
+        """Base blocks of the view's first pass that are not done."""
         return [job.block for job in self._catalogue.jobs(self.record.name, view) if job.kind == "base" and job.state is not State.DONE]
 
     def _within_open(self, whole: Planned) -> dict[str, Occupancy]:
-        """Only what lies in base blocks that are not done."""
+        """Only what lies in base blocks that are not done now."""
         root = block_levels(self.record.zmax)[0].root
         cut = {}
         for view, occupancy in whole.items():
@@ -153,8 +153,8 @@ class Run:
 
 
 def _known_blocks(catalogue: Catalogue, record: RenderingRecord) -> dict[str, list[BlockId]]:
-    known: dict[str, list[BlockId]] = {frame.id: [] for frame in record.frames}
+    known: dict[str, list[BlockId]] = {track.id: [] for track in record.tracks}
     for job in catalogue.jobs(record.name):
-        if job.kind == "base" and job.view in known:
-            known[job.view].append(job.block)
+        if job.kind == "base" and job.track in known:
+            known[job.track].append(job.block)
     return known

@@ -12,7 +12,8 @@ from map3d.ingest.importing import import_file
 from map3d.ingest.options import ImportOptions
 from map3d.ingest.parsers import Parsers
 from map3d.ingest.sources import Source, find_sources, source_digest
-from map3d.jobs.creating import RenderingRequest, create_rendering, make_layers
+from map3d.jobs.creating import RenderingRequest, create_rendering
+from map3d.jobs.layers import LayerRequest
 from map3d.render.build import open_scene
 from map3d.render.plan import planned_occupancy
 from map3d.types import ViewAngles
@@ -86,9 +87,8 @@ def make_rendering(workspace: Workspace, catalogue: Catalogue, request: SiteRequ
         if record.name == request.name:
             return record
     res_m = request.res_m or choose_res(workspace, request)
-    wanted = RenderingRequest(
-        request.name, request.name, request.views, res_m=res_m, color=request.color, title=request.title, attribution=request.attribution
-    )
+    layers = LayerRequest(color=request.color)
+    wanted = RenderingRequest(request.name, request.name, request.views, res_m, layers=layers, title=request.title, attribution=request.attribution)
     return create_rendering(workspace, catalogue, wanted)
 
 
@@ -97,8 +97,8 @@ def choose_res(workspace: Workspace, request: SiteRequest) -> float:
     scene = open_scene(workspace, request.name)
     box, tile_px, covered_m2 = scene.box, 256, 0.0
     frames = pin(box, tile_px, RESOLUTIONS_M[0], request.views)
-    layers = make_layers(("color",), "webp", 80)
-    probe = RenderingRecord(request.name, request.name, RESOLUTIONS_M[0], layers, tuple(frames), box)
+    layers = LayerRequest(("color",)).layers()
+    probe = RenderingRecord(request.name, request.name, RESOLUTIONS_M[0], (layers,), tuple(frames), box)
     for frame in frames:
         level = min(frame.zmax, _PROBE_LEVEL)
         side_m = frame.size_m / 2.0**level

@@ -1,6 +1,6 @@
 """`map3d verify`: believes nothing that it can count again."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -9,13 +9,13 @@ from map3d.catalogue import Catalogue, RenderingRecord, State, Workspace
 from map3d.errors import Map3dError
 from map3d.jobs.findings import Findings
 from map3d.jobs.manifest import current_manifest
-from map3d.jobs.verify_view import check_view
+from map3d.jobs.verify_track import check_track
 from map3d.registry import Registry
 from map3d.render.build import is_stale, open_scene
 from map3d.render.plan import plan_jobs
 from map3d.render.scene_files import binary_files, check_file, check_ids, check_index
 from map3d.tiles.manifest import Manifest
-from map3d.types import BlockId
+from map3d.types import BlockId, TileId
 
 Progress = Callable[[str, int, int], None]
 """(what, done, total)."""
@@ -54,30 +54,39 @@ def verify_rendering(workspace: Workspace, catalogue: Catalogue, name: str, find
     with Registry(workspace.registry_path(record.scene)) as registry:
         ids = np.array([item.id for item in registry.objects()], dtype=np.uint32)
     for frame in record.frames:
-        check_view(workspace, catalogue, record, frame, scene, ids, findings, progress)
+        found = {track.id: check_track(workspace, catalogue, record, track, scene, ids, findings, progress) for track in record.tracks_of(frame)}
+        _check_passes(record, found, findings)
     _check_manifest(workspace, catalogue, record, scene, findings)
 
 
 def _check_plan(catalogue: Catalogue, record: RenderingRecord, scene: _core.Scene, findings: Findings) -> None:
     """Every block that the scene asks for is a job, done, with the key that it has now."""
-    jobs = {(job.view, job.block): job for job in catalogue.jobs(record.name)}
+    jobs = {(job.track, job.block): job for job in catalogue.jobs(record.name)}
     known: dict[str, list[BlockId]] = {}
     for job in jobs.values():
         if job.kind == "base":
-            known.setdefault(job.view, []).append(job.block)
+            known.setdefault(job.track, []).append(job.block)
     planned = plan_jobs(scene, record, known)
     for wanted in planned:
-        found = jobs.pop((wanted.view, wanted.block), None)
+        found = jobs.pop((wanted.track, wanted.block), None)
         if found is None:
-            findings.add(f"{record.name} {wanted.view} block {wanted.block}: the scene has content there, no job")
+            findings.add(f"{record.name} {wanted.track} block {wanted.block}: the scene has content there, no job")
         elif found.key != wanted.key:
-            findings.add(f"{record.name} {wanted.view} block {wanted.block}: rendered from an older scene; run map3d render {record.name}")
+            findings.add(f"{record.name} {wanted.track} block {wanted.block}: rendered from an older scene; run map3d render {record.name}")
         elif found.state is not State.DONE:
             why = f" ({found.reason})" if found.reason else ""
-            findings.add(f"{record.name} {wanted.view} block {wanted.block}: {found.state}, not done{why}")
-    for view, block in jobs:
-        findings.add(f"{record.name} {view} block {block}: a job that no plan asks for")
+            findings.add(f"{record.name} {wanted.track} block {wanted.block}: {found.state}, not done{why}")
+    for track, block in jobs:
+        findings.add(f"{record.name} {track} block {block}: a job that no plan asks for")
     findings.count("blocks", len(planned))
+
+
+def _check_passes(record: RenderingRecord, found: Mapping[str, set[TileId]], findings: Findings) -> None:
+    """Every pass of a view has the same tiles. `found`: of each track, the first pass first."""
+    (first, tiles), *later = found.items()
+    for track, others in later:
+        for tile in sorted(tiles ^ others):
+            findings.add(f"{record.name} tile {tile.z}/{tile.x}/{tile.y}: tracks {first} and {track} differ in having it")
 
 
 def _check_manifest(workspace: Workspace, catalogue: Catalogue, record: RenderingRecord, scene: _core.Scene, findings: Findings) -> None:

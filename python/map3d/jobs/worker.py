@@ -140,7 +140,7 @@ class Worker:
             state = self._catalogue.fail(lease, reason)
         except StaleFence as error:
             return Lost(lease, f"{reason}; {error}")
-        self._failed.add((lease.view, str(lease.block)))
+        self._failed.add((lease.track, str(lease.block)))
         return Failed(lease, reason, state)
 
     def _ready_child(self) -> Child | None:

@@ -14,6 +14,7 @@ from typing import Any, Final
 
 from map3d.catalogue import Workspace
 from map3d.errors import AlreadyExists, BadRequest, Corrupt, NotFound, Stopped, StoreError
+from map3d.geometry.views import track_id
 from map3d.publish.archive import Archive, write_archive
 from map3d.publish.readme import README, readme
 from map3d.registry import Registry
@@ -22,6 +23,7 @@ from map3d.tiles.manifest import FILE_NAME, SEARCH, SHARDS, Manifest, ViewFacts
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.store import TileStore
 from map3d.tiles.viewer import viewer_files, viewer_folder
+from map3d.types import Layer
 
 Progress = Callable[[str, int, int], bool]
 """(stage, done, total) → False to stop."""
@@ -98,33 +100,35 @@ class _Work:
     def _write_view(self, view: ViewFacts) -> dict[str, str]:
         """Layer → path of its archive."""
         paths = {}
-        with SqliteTileStore(self._workspace.store_path(self._manifest.name, view.frame.id), read_only=True) as store:
-            for number, layer in enumerate(self._manifest.layers):
-                name = f"{view.frame.id}/{layer.name}.pmtiles"
-                if self._write_archive(store, number, view.frame.id, self._draft / name):
-                    paths[layer.name] = name
-                    self._files[name] = _digest(self._draft / name)
-                    self.archives += 1
+        for number, layers in enumerate(self._manifest.passes):
+            track = self._workspace.store_path(self._manifest.name, track_id(view.frame.id, number))
+            with SqliteTileStore(track, read_only=True) as store:
+                for layer in layers:
+                    name = f"{view.frame.id}/{layer.name}.pmtiles"
+                    if self._write_archive(store, layer, view.frame.id, self._draft / name):
+                        paths[layer.name] = name
+                        self._files[name] = _digest(self._draft / name)
+                        self.archives += 1
         return paths
 
-    def _write_archive(self, store: TileStore, number: int, view: str, path: Path) -> int:
-        metadata = self._metadata(store, number, view)
+    def _write_archive(self, store: TileStore, layer: Layer, view: str, path: Path) -> int:
+        metadata = self._metadata(store, layer, view)
+        number = store.shape.number_of(layer.name)
         tiles = _tiles_of_finished(path, metadata)
         if tiles:
             self.kept += 1
             self._step(tiles)
         else:
             tiles = write_archive(store, number, path, metadata, self._step)
-        if self._metadata(store, number, view) != metadata:
+        if self._metadata(store, layer, view) != metadata:
             path.unlink(missing_ok=True)
             raise Corrupt(f"rendering {self._manifest.name}, view {view}: tiles changed meanwhile; publish again when nothing renders")
         self.tiles += tiles
         return tiles
 
-    def _metadata(self, store: TileStore, number: int, view: str) -> dict[str, Any]:
+    def _metadata(self, store: TileStore, layer: Layer, view: str) -> dict[str, Any]:
         """`content` tells archives of other tiles apart."""
         blocks = [(str(block.id), block.key, block.version, block.tiles) for block in store.list_blocks()]
-        layer = self._manifest.layers[number]
         content = sha256(json.dumps([ARCHIVE_VERSION, layer.name, layer.format, blocks]).encode()).hexdigest()
         facts = {"rendering": self._manifest.name, "view": view, "layer": layer.name, "content": content}
         title = self._manifest.title or self._manifest.name

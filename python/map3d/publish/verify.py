@@ -9,6 +9,7 @@ from typing import Final
 
 from map3d.catalogue import Workspace
 from map3d.errors import Corrupt, NotFound, VerifyFailed
+from map3d.geometry.views import track_id
 from map3d.publish.archive import Archive
 from map3d.publish.folder import CHECKSUMS
 from map3d.tiles.manifest import FILE_NAME, SEARCH, Manifest, ViewFacts
@@ -42,9 +43,11 @@ def verify_published(folder: Path, workspace: Workspace | None = None) -> Verifi
     wrong += bad
     archives = tiles = 0
     for view in manifest.views:
-        for number, layer in enumerate(manifest.layers):
-            found, bad = _check_layer(folder, manifest, view, number, layer, workspace)
-            archives, tiles, wrong = archives + (found > 0), tiles + found, wrong + bad
+        for number, layers in enumerate(manifest.passes):
+            track = None if workspace is None else workspace.store_path(manifest.name, track_id(view.frame.id, number))
+            for layer in layers:
+                found, bad = _check_layer(folder, view, layer, track)
+                archives, tiles, wrong = archives + (found > 0), tiles + found, wrong + bad
     if wrong:
         more = f", and {len(wrong) - SHOWN} more" if len(wrong) > SHOWN else ""
         raise VerifyFailed(f"{folder}: {'; '.join(wrong[:SHOWN])}{more}; publish it again")
@@ -65,27 +68,26 @@ def _check_sums(folder: Path) -> tuple[int, list[str]]:
     return len(lines) - len(wrong), wrong
 
 
-def _check_layer(folder: Path, manifest: Manifest, view: ViewFacts, number: int, layer: Layer, workspace: Workspace | None) -> tuple[int, list[str]]:
+def _check_layer(folder: Path, view: ViewFacts, layer: Layer, track: Path | None) -> tuple[int, list[str]]:
+    """`track`: the tile store to compare with."""
     name = (view.archives or {}).get(layer.name)
     if name is None:
         count = view.occupancy.count()
         return 0, [f"view {view.frame.id}: no archive of layer {layer.name} for {count} tiles"] if count else []
     with ExitStack() as opened:
-        store = None
-        if workspace is not None:
-            path = workspace.store_path(manifest.name, view.frame.id)
-            store = opened.enter_context(SqliteTileStore(path, read_only=True))
+        store = None if track is None else opened.enter_context(SqliteTileStore(track, read_only=True))
         try:
             archive = Archive(folder / name)
             wrong = [] if archive.is_of(layer) else [f"{name}: its tiles are not {layer.format}"]
             seen: set[TileId] = set()
-            wrong += _check_tiles(archive, name, layer, number, store, seen)
+            wrong += _check_tiles(archive, name, layer, store, seen)
         except Corrupt as error:
             return 0, [str(error)]
     return len(seen), wrong + _check_occupancy(name, view.occupancy, seen)
 
 
-def _check_tiles(archive: Archive, name: str, layer: Layer, number: int, store: TileStore | None, seen: set[TileId]) -> Iterator[str]:
+def _check_tiles(archive: Archive, name: str, layer: Layer, store: TileStore | None, seen: set[TileId]) -> Iterator[str]:
+    number = 0 if store is None else store.shape.number_of(layer.name)
     for tile, data in archive.tiles():
         seen.add(tile)
         if not data.startswith(FIRST_BYTES[layer.format]):

@@ -8,7 +8,7 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from map3d.catalogue import PlannedJob, RenderingRecord
+from map3d.catalogue import PlannedJob, RenderingRecord, Track
 from map3d.errors import LimitExceeded, OutsideFrame
 from map3d.geometry.frames import PinnedFrame, check_content
 from map3d.tiles.naming import block_above, block_level, block_levels, morton
@@ -33,7 +33,7 @@ class PlannedScene(Protocol):
 def plan_jobs(
     scene: PlannedScene, rendering: RenderingRecord, known: Mapping[str, Collection[BlockId]], progress: Callable[[int, int], None] | None = None
 ) -> list[PlannedJob]:
-    """Every block that has or had content, of all views. `known`: view → base blocks that were planned before; `progress` counts views.
+    """Every block that has or had content, of all tracks. `known`: track → base blocks that were planned before; `progress` counts views.
 
     Raises OutsideFrame when content has left the pinned square, LimitExceeded for a plan too large.
     """
@@ -41,15 +41,17 @@ def plan_jobs(
     for done, frame in enumerate(rendering.frames):
         if progress is not None:
             progress(done, len(rendering.frames))
-        blocks = _base_blocks(scene, rendering, frame, known.get(frame.id, ()))
-        keys = scene.block_keys(frame_text(rendering, frame), block_levels(frame.zmax)[0].root, _places(blocks))
-        jobs += _with_reduces(frame, dict(zip(blocks, keys, strict=True)), settings_hash(rendering))
+        occupied = _occupied_blocks(scene, rendering, frame)
+        for track in rendering.tracks_of(frame):
+            blocks = sorted(occupied | set(known.get(track.id, ())), key=lambda block: morton(block.x, block.y))
+            keys = scene.block_keys(frame_text(track), block_levels(frame.zmax)[0].root, _places(blocks))
+            jobs += _with_reduces(track, dict(zip(blocks, keys, strict=True)))
     return jobs
 
 
-def frame_text(rendering: RenderingRecord, frame: PinnedFrame) -> str:
-    """The frame with its layers as the core takes it."""
-    return json.dumps(frame.to_json(rendering.layers))
+def frame_text(track: Track) -> str:
+    """The frame with the layers of its pass as the core takes it."""
+    return json.dumps(track.frame.to_json(track.layers))
 
 
 def planned_occupancy(
@@ -59,7 +61,7 @@ def planned_occupancy(
     depth = frame.zmax if level is None else level
     if depth > MAX_PLAN_LEVEL:
         raise LimitExceeded(f"rendering {rendering.name}: level {depth} is too deep to plan at once, at most {MAX_PLAN_LEVEL}; use a coarser --res")
-    text = frame_text(rendering, frame)
+    text = json.dumps(frame.to_json())
     if within is None:
         return Occupancy.from_grid(scene.occupied(text, depth))
     return Occupancy.from_grid(scene.occupied(text, depth, (block_levels(frame.zmax)[0].root, _places(within))))
@@ -70,33 +72,31 @@ def _places(blocks: Iterable[BlockId]) -> NDArray[np.uint32]:
     return np.array([(block.x, block.y) for block in blocks], np.uint32).reshape(-1, 2)
 
 
-def settings_hash(rendering: RenderingRecord) -> str:
+def settings_hash(track: Track) -> str:
     """Of what reduce blocks depend on besides the blocks below."""
-    layers = [[layer.kind, layer.format, layer.quality] for layer in rendering.layers]
-    return hashlib.sha256(json.dumps([layers, rendering.tile_px, rendering.zmax]).encode()).hexdigest()
+    layers = [[layer.kind, layer.format, layer.quality] for layer in track.layers]
+    return hashlib.sha256(json.dumps([layers, track.frame.tile_px, track.frame.zmax]).encode()).hexdigest()
 
 
-def _base_blocks(scene: PlannedScene, rendering: RenderingRecord, frame: PinnedFrame, known: Iterable[BlockId]) -> list[BlockId]:
-    """Occupied ones and those known from before, in Morton order."""
+def _occupied_blocks(scene: PlannedScene, rendering: RenderingRecord, frame: PinnedFrame) -> set[BlockId]:
+    """Base blocks that may have content. Raises OutsideFrame."""
     try:
         check_content(frame, scene.box, rendering.window)
     except OutsideFrame as error:
         raise OutsideFrame(f"rendering {rendering.name}: {error}") from error
     root = block_levels(frame.zmax)[0].root
-    occupied = planned_occupancy(scene, rendering, frame, root)
-    blocks = {BlockId(*tile) for tile in occupied.tiles(root)} | set(known)
-    return sorted(blocks, key=lambda block: morton(block.x, block.y))
+    return {BlockId(*tile) for tile in planned_occupancy(scene, rendering, frame, root).tiles(root)}
 
 
-def _with_reduces(frame: PinnedFrame, base: Mapping[BlockId, str], settings: str) -> list[PlannedJob]:
+def _with_reduces(track: Track, base: Mapping[BlockId, str]) -> list[PlannedJob]:
     """The base blocks and all reduce blocks above them; a reduce block's key is made of those below it."""
     jobs: list[PlannedJob] = []
-    keys = dict(base)
+    keys, settings, zmax = dict(base), settings_hash(track), track.frame.zmax
     while keys:
         above: dict[BlockId, list[tuple[BlockId, str]]] = {}
         for block, key in sorted(keys.items(), key=lambda item: morton(item[0].x, item[0].y)):
-            parent = block_above(block, frame.zmax)
-            jobs.append(PlannedJob(frame.id, block, block_level(block.z, frame.zmax).kind, morton(block.x, block.y), key, parent))
+            parent = block_above(block, zmax)
+            jobs.append(PlannedJob(track.id, block, block_level(block.z, zmax).kind, morton(block.x, block.y), key, parent))
             if parent is not None:
                 above.setdefault(parent, []).append((block, key))
         keys = {block: hashlib.sha256(json.dumps([settings, below]).encode()).hexdigest()[:32] for block, below in above.items()}

@@ -15,12 +15,12 @@ from map3d.types import BlockId
 
 
 def open_work(setup: Mapping[str, Any]) -> Work:
-    """`setup`: {"scene": folder, "cache_bytes", "frames": {view: frame}, "stores": {view: path}}."""
+    """`setup`: {"scene": folder, "cache_bytes", "frames": {track: frame}, "stores": {track: path}}."""
     renderer = _Renderer(setup)
 
     def work(question: dict[str, Any], _blobs: list[bytes], _tell: Tell) -> tuple[dict[str, Any], Sequence[bytes]]:
         begun = time.perf_counter()
-        block = renderer.block(question["view"], BlockId(*question["block"]), question["kind"], question["levels"])
+        block = renderer.block(question["track"], BlockId(*question["block"]), question["kind"], question["levels"])
         tiles, seam = block.tiles, block.seam
         answer = {"tiles": [list(tile[:4]) for tile in tiles], "seam": seam is not None, "stats": block.stats}
         blobs = [tile[4] for tile in tiles] + ([] if seam is None else [seam])
@@ -32,29 +32,29 @@ def open_work(setup: Mapping[str, Any]) -> Work:
 class _Renderer:
     def __init__(self, setup: Mapping[str, Any]) -> None:
         self._scene = _core.Scene(setup["scene"], cache_bytes=setup["cache_bytes"])
-        self._frames = {view: json.dumps(frame) for view, frame in setup["frames"].items()}
-        self._zmax = {view: int(frame["zmax"]) for view, frame in setup["frames"].items()}
-        self._paths = {view: Path(path) for view, path in setup["stores"].items()}
+        self._frames = {track: json.dumps(frame) for track, frame in setup["frames"].items()}
+        self._zmax = {track: int(frame["zmax"]) for track, frame in setup["frames"].items()}
+        self._paths = {track: Path(path) for track, path in setup["stores"].items()}
         self._stores: dict[str, SqliteTileStore] = {}
 
-    def block(self, view: str, block: BlockId, kind: str, levels: int) -> _core.Block:
+    def block(self, track: str, block: BlockId, kind: str, levels: int) -> _core.Block:
         if kind == "base":
-            return self._scene.render_block(self._frames[view], *block)
-        return _core.reduce_block(self._frames[view], *block, levels, self._seams_below(view, block))
+            return self._scene.render_block(self._frames[track], *block)
+        return _core.reduce_block(self._frames[track], *block, levels, self._seams_below(track, block))
 
-    def _seams_below(self, view: str, block: BlockId) -> list[tuple[int, int, bytes]]:
+    def _seams_below(self, track: str, block: BlockId) -> list[tuple[int, int, bytes]]:
         """Of the blocks below that have content."""
-        store = self._store(view)
+        store = self._store(track)
         seams = []
-        for below in blocks_below(block, self._zmax[view]):
+        for below in blocks_below(block, self._zmax[track]):
             stored, seam = store.get_block(below), store.get_seam(below)
             if seam is not None:
                 seams.append((below.x, below.y, seam))
             elif stored is not None and stored.tiles:
-                raise NotFound(f"block {below} of view {view} has {stored.tiles} tiles and no seam; run map3d verify")
+                raise NotFound(f"block {below} of track {track} has {stored.tiles} tiles and no seam; run map3d verify")
         return seams
 
-    def _store(self, view: str) -> SqliteTileStore:
-        if view not in self._stores:
-            self._stores[view] = SqliteTileStore(self._paths[view], read_only=True)
-        return self._stores[view]
+    def _store(self, track: str) -> SqliteTileStore:
+        if track not in self._stores:
+            self._stores[track] = SqliteTileStore(self._paths[track], read_only=True)
+        return self._stores[track]

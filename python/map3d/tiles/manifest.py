@@ -2,8 +2,8 @@
 
 import json
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Final, Self
 
 from map3d.errors import BadRequest, Corrupt, Map3dError, UnknownVersion
@@ -32,11 +32,12 @@ class CrsFacts:
 
 @dataclass(frozen=True)
 class ViewFacts:
-    """A view's frame and content. `versions`: of every block that is in the store. `archives`: layer → path, published folders only."""
+    """A view's frame and content. `versions`: for each pass those of every block that is in its store. `archives`: layer → path, published folders
+    only."""
 
     frame: PinnedFrame
     occupancy: Occupancy
-    versions: Mapping[BlockId, int] = field(default_factory=dict)
+    versions: tuple[Mapping[BlockId, int], ...]
     archives: Mapping[str, str] | None = None
 
 
@@ -50,7 +51,7 @@ class Manifest:
     crs: CrsFacts
     origin: Vec3
     box: Box
-    layers: tuple[Layer, ...]
+    passes: tuple[tuple[Layer, ...], ...]
     views: tuple[ViewFacts, ...]
     title: str = ""
     attribution: str = ""
@@ -60,10 +61,17 @@ class Manifest:
 
     def __post_init__(self) -> None:
         check_name(self.name, "rendering")
-        if not self.layers or not self.views:
+        if not self.passes or not all(self.passes) or not self.views:
             raise BadRequest(f"rendering {self.name}: a manifest needs layers and views")
+        if any(len(view.versions) != len(self.passes) for view in self.views):
+            raise BadRequest(f"rendering {self.name}: every view needs the versions of {len(self.passes)} passes")
         if len({(view.frame.size_m, view.frame.tile_px, view.frame.zmax, view.occupancy.zmax - view.frame.zmax) for view in self.views}) != 1:
             raise BadRequest(f"rendering {self.name}: all views must have one size, tile size and depth")
+
+    @property
+    def layers(self) -> tuple[Layer, ...]:
+        """Of all passes."""
+        return tuple(layer for layers in self.passes for layer in layers)
 
     @property
     def zmax(self) -> int:
@@ -100,7 +108,7 @@ class Manifest:
             "size_m": frame.size_m,
             "samples": self.samples,
             "layers": [_layer_json(layer) for layer in self.layers],
-            "views": [_view_json(view) for view in self.views],
+            "views": [_view_json(view, self.passes) for view in self.views],
             "objects": {"count": self.objects, "shard_size": SHARD_SIZE, "shards": SHARDS, "search": SEARCH},
         }
 
@@ -113,7 +121,7 @@ class Manifest:
         """Reads a manifest; raises Corrupt, UnknownVersion. `where` is for the message."""
         value = _document(data, where)
         try:
-            layers = tuple(Layer(row["name"], row["kind"], row["format"]) for row in value["layers"])
+            passes = _load_passes(value)
             shape = {"size_m": float(value["size_m"]), "tile_px": int(value["tile_px"]), "zmax": int(value["zmax"])}
             return cls(
                 name=value["name"],
@@ -122,8 +130,8 @@ class Manifest:
                 crs=CrsFacts(**{key: value["crs"][key] for key in ("name", "epsg", "wkt", "vertical")}),
                 origin=_vec3(value["origin"]),
                 box=(_vec3(value["box"][0]), _vec3(value["box"][1])),
-                layers=layers,
-                views=tuple(_load_view(row, shape) for row in value["views"]),
+                passes=passes,
+                views=tuple(_load_view(row, shape, passes) for row in value["views"]),
                 title=value["title"],
                 attribution=value["attribution"],
                 start=_vec3(value["start"]["local"]),
@@ -151,11 +159,9 @@ def _layer_json(layer: Layer) -> dict[str, Any]:
     return {**row, "unit_m": DEPTH_UNIT_M} if layer.kind == "depth" else row
 
 
-def _view_json(view: ViewFacts) -> dict[str, Any]:
-    frame = view.frame
-    common = _commonest(view.versions)
-    others = {str(block): version for block, version in sorted(view.versions.items()) if version != common}
-    row = {
+def _view_json(view: ViewFacts, passes: Sequence[Sequence[Layer]]) -> dict[str, Any]:
+    frame, (first, *later) = view.frame, view.versions
+    row: dict[str, Any] = {
         "id": frame.id,
         "look_at_deg": frame.angles.look_at_deg,
         "pitch_deg": frame.angles.pitch_deg,
@@ -163,10 +169,17 @@ def _view_json(view: ViewFacts) -> dict[str, Any]:
         "v0_m": frame.v0_m,
         "d0_m": frame.d0_m,
         "occupancy": view.occupancy.encode(),
-        "version": common,
-        "versions": others,
+        **_versions_json(first),
     }
+    if later:
+        added = zip(passes[1:], later, strict=True)
+        row["passes"] = [{"layers": [layer.name for layer in layers], **_versions_json(versions)} for layers, versions in added]
     return row if view.archives is None else {**row, "archives": dict(view.archives)}
+
+
+def _versions_json(versions: Mapping[BlockId, int]) -> dict[str, Any]:
+    common = _commonest(versions)
+    return {"version": common, "versions": {str(block): version for block, version in sorted(versions.items()) if version != common}}
 
 
 def _commonest(versions: Mapping[BlockId, int]) -> int:
@@ -175,16 +188,31 @@ def _commonest(versions: Mapping[BlockId, int]) -> int:
     return max(counts, key=lambda version: (counts[version], version), default=1)
 
 
-def _load_view(row: Mapping[str, Any], shape: Mapping[str, Any]) -> ViewFacts:
+def _load_passes(value: Mapping[str, Any]) -> tuple[tuple[Layer, ...], ...]:
+    """The first view says which layers were added later."""
+    layers = {row["name"]: Layer(row["name"], row["kind"], row["format"]) for row in value["layers"]}
+    if len(layers) != len(value["layers"]):
+        raise Corrupt("a layer is there twice")
+    later = [tuple(layers.pop(name) for name in added["layers"]) for added in value["views"][0].get("passes", ())]
+    return (tuple(layers.values()), *later)
+
+
+def _load_view(row: Mapping[str, Any], shape: Mapping[str, Any], passes: Sequence[Sequence[Layer]]) -> ViewFacts:
     """Every block whose root tile is occupied gets a version; empty blocks that are not named are not told by a manifest."""
     angles = ViewAngles(row["look_at_deg"], row["pitch_deg"])
     if parse_view_id(row["id"]) != angles:
         raise Corrupt(f"view {row['id']}: its angles are {angles.look_at_deg} and {angles.pitch_deg}")
     frame = PinnedFrame(angles=angles, u0_m=float(row["u0_m"]), v0_m=float(row["v0_m"]), d0_m=float(row["d0_m"]), **shape)
     occupancy = Occupancy.decode(frame.zmax, row["occupancy"])
-    named = {_block(text, frame.zmax): int(version) for text, version in row["versions"].items()}
-    versions = {**dict.fromkeys(_blocks(occupancy), int(row["version"])), **named}
-    return ViewFacts(frame, occupancy, versions, row.get("archives"))
+    later = row.get("passes", [])
+    if [added["layers"] for added in later] != [[layer.name for layer in layers] for layers in passes[1:]]:
+        raise Corrupt(f"view {row['id']}: its passes are not those of the first view")
+    return ViewFacts(frame, occupancy, tuple(_load_versions(part, occupancy) for part in (row, *later)), row.get("archives"))
+
+
+def _load_versions(row: Mapping[str, Any], occupancy: Occupancy) -> dict[BlockId, int]:
+    named = {_block(text, occupancy.zmax): int(version) for text, version in row["versions"].items()}
+    return {**dict.fromkeys(_blocks(occupancy), int(row["version"])), **named}
 
 
 def _blocks(occupancy: Occupancy) -> list[BlockId]:
@@ -204,6 +232,7 @@ def _vec3(value: Any) -> Vec3:
     return (x, y, z)
 
 
-def block_version(view: ViewFacts, tile: TileId) -> int:
-    """The version to ask a tile's URL with."""
-    return view.versions.get(block_of(tile, view.frame.zmax), _commonest(view.versions))
+def block_version(view: ViewFacts, tile: TileId, number: int = 0) -> int:
+    """The version to ask a tile's URL with, for a layer of pass `number`."""
+    versions = view.versions[number]
+    return versions.get(block_of(tile, view.frame.zmax), _commonest(versions))

@@ -1,4 +1,4 @@
-"""The tile store in one SQLite file per rendering and view (spec/catalogue.md): WAL, synchronous=FULL, one transaction a block."""
+"""The tile store in one SQLite file per rendering and track (spec/catalogue.md): WAL, synchronous=FULL, one transaction a block."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""The contract of a tile store (spec/catalogue.md). One store holds all layers of one view of a rendering; every home passes the same tests."""
+"""The contract of a tile store (spec/catalogue.md). One store holds the layers of one track of a rendering; every home passes the same tests."""
 
 import hashlib
 from collections.abc import Iterator, Sequence
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Final, NamedTuple, Protocol, Self
 
-from map3d.errors import BadRequest
+from map3d.errors import BadRequest, NotFound
 from map3d.tiles.naming import block_level, block_of
 from map3d.types import MAX_LEVEL, BlockId, Layer, TileId
 
@@ -15,7 +15,7 @@ HASH_BYTES: Final = 16
 
 
 class StoredTile(NamedTuple):
-    """An encoded tile; `layer` is its number in the order of the rendering's layers."""
+    """An encoded tile; `layer` is its number in the order of the store's layers."""
 
     layer: int
     z: int
@@ -35,6 +35,13 @@ class StoreShape:
     def __post_init__(self) -> None:
         if not (self.layers and 0 <= self.zmax <= MAX_LEVEL and self.tile_px > 0):
             raise BadRequest(f"a tile store needs layers, zmax 0 to {MAX_LEVEL} and a tile size; got {self}")
+
+    def number_of(self, layer: str) -> int:
+        """Of a layer of this name; raises NotFound."""
+        for number, known in enumerate(self.layers):
+            if known.name == layer:
+                return number
+        raise NotFound(f"a tile store without layer {layer!r}; it has {', '.join(known.name for known in self.layers)}")
 
 
 @dataclass(frozen=True)

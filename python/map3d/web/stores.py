@@ -2,13 +2,15 @@
 
 import threading
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import count
 from typing import Final
 
 from map3d.catalogue.workspace import Workspace
 from map3d.errors import BadRequest, NotFound
-from map3d.geometry.views import parse_view_id
+from map3d.geometry.views import parse_view_id, track_id
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.types import Layer
 
@@ -47,16 +49,28 @@ class Stores:
         self._open: dict[tuple[str, str], OpenStore] = {}
         self._lock = threading.Lock()
 
-    def get(self, rendering: str, view: str) -> OpenStore | None:
-        """None: there is no such rendering, or no such view of it. Reads the disk at most once in a while."""
-        key = (rendering, view)
+    def of_view(self, rendering: str, view: str) -> Iterator[OpenStore]:
+        """The stores of a view's tracks, pass by pass; none: there is no such rendering, or no such view of it."""
+        try:
+            parse_view_id(view)
+        except BadRequest:
+            return
+        for number in count():
+            opened = self._get(rendering, track_id(view, number))
+            if opened is None:
+                return
+            yield opened
+
+    def _get(self, rendering: str, track: str) -> OpenStore | None:
+        """None: there is none. Reads the disk at most once in a while."""
+        key = (rendering, track)
         with self._lock:
             held = self._open.get(key)
             if held is not None and held.is_current(time.monotonic()):
                 return held
             if held is not None:
                 self._open.pop(key).store.close()
-            opened = self._try_open(rendering, view)
+            opened = self._try_open(rendering, track)
             if opened is not None:
                 self._make_room()
                 self._open[key] = opened
@@ -67,11 +81,9 @@ class Stores:
             while self._open:
                 self._open.popitem()[1].store.close()
 
-    def _try_open(self, rendering: str, view: str) -> OpenStore | None:
+    def _try_open(self, rendering: str, track: str) -> OpenStore | None:
         try:
-            parse_view_id(view)
-            path = self._workspace.store_path(rendering, view)
-            store = SqliteTileStore(path, read_only=True)
+            store = SqliteTileStore(self._workspace.store_path(rendering, track), read_only=True)
         except (NotFound, BadRequest):
             return None
         identity = _identity(store)

@@ -118,21 +118,26 @@ class TileRoute:
             return _refusal(*status_of(error))
 
     def _read(self, url: TileUrl) -> Answer:
-        opened = self.stores.get(url.rendering, url.view)
-        if opened is None:
-            return _refusal(404, "no such rendering or view")
-        numbered = opened.layers.get(url.layer)
-        if numbered is None:
-            return _refusal(404, f"no such layer; there are {', '.join(opened.layers)}")
-        shape = opened.store.shape
-        if url.tile.z > shape.zmax:
-            return _refusal(404, f"the deepest level is {shape.zmax}")
-        root = block_of(url.tile, shape.zmax)
-        before = opened.store.get_block(root)
-        data = opened.store.get_tile(numbered[0], *url.tile)
-        caching = _caching(before, opened.store.get_block(root), url.version)
-        source = opened if caching is IMMUTABLE else None
-        return _empty(caching, source) if data is None else _tile(data, numbered[1].media_type, caching, source)
+        names: list[str] = []
+        for opened in self.stores.of_view(url.rendering, url.view):
+            if url.layer in opened.layers:
+                return _read_from(opened, url)
+            names += opened.layers
+        return _refusal(404, f"no such layer; there are {', '.join(names)}" if names else "no such rendering or view")
+
+
+def _read_from(opened: OpenStore, url: TileUrl) -> Answer:
+    """From the store that has the layer."""
+    number, layer = opened.layers[url.layer]
+    shape = opened.store.shape
+    if url.tile.z > shape.zmax:
+        return _refusal(404, f"the deepest level is {shape.zmax}")
+    root = block_of(url.tile, shape.zmax)
+    before = opened.store.get_block(root)
+    data = opened.store.get_tile(number, *url.tile)
+    caching = _caching(before, opened.store.get_block(root), url.version)
+    source = opened if caching is IMMUTABLE else None
+    return _empty(caching, source) if data is None else _tile(data, layer.media_type, caching, source)
 
 
 def _caching(before: StoredBlock | None, after: StoredBlock | None, version: int | None) -> bytes:

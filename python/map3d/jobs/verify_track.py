@@ -1,4 +1,4 @@
-"""Checks of one view's tile store: every block, tile and seam."""
+"""Checks of one track's tile store: every block, tile and seam."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -7,9 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from map3d import _core
-from map3d.catalogue import Catalogue, Job, RenderingRecord, State, Workspace
+from map3d.catalogue import Catalogue, Job, RenderingRecord, State, Track, Workspace
 from map3d.errors import Corrupt, Map3dError
-from map3d.geometry.frames import PinnedFrame
 from map3d.jobs.findings import Findings
 from map3d.render.decode import check_seam, decode_tile, ids_of
 from map3d.render.plan import frame_text, planned_occupancy
@@ -22,40 +21,40 @@ from map3d.types import BlockId, TileId
 Progress = Callable[[str, int, int], None]
 
 
-def check_view(
+def check_track(
     workspace: Workspace,
     catalogue: Catalogue,
     record: RenderingRecord,
-    frame: PinnedFrame,
+    track: Track,
     scene: _core.Scene,
     ids: NDArray[np.uint32],
     findings: Findings,
     progress: Progress,
-) -> None:
-    """`ids`: of all objects in the registry, sorted."""
-    jobs = {job.block: job for job in catalogue.jobs(record.name, frame.id)}
-    path = workspace.store_path(record.name, frame.id)
+) -> set[TileId]:
+    """`ids`: of all objects in the registry, sorted. Returns the tiles that are there."""
+    jobs = {job.block: job for job in catalogue.jobs(record.name, track.id)}
+    path = workspace.store_path(record.name, track.id)
     if not path.is_file():
         if any(job.state is State.DONE for job in jobs.values()):
             findings.add(f"{path}: not there, though jobs of it are done")
-        return
+        return set()
     with SqliteTileStore(path, read_only=True) as store:
-        check = _ViewCheck(f"{record.name} {frame.id}", store, record, frame, jobs, findings, progress)
+        check = _TrackCheck(f"{record.name} {track.id}", store, track, jobs, findings, progress)
         for line in store.check():
             findings.add(f"{path}: {line}")
         check.blocks()
         tiles = check.tile_names()
-        check.pyramid(tiles, planned_occupancy(scene, record, frame))
+        check.pyramid(tiles, planned_occupancy(scene, record, track.frame))
         check.images(tiles, ids)
         check.reduces()
+    return tiles
 
 
 @dataclass
-class _ViewCheck:
+class _TrackCheck:
     where: str
     store: SqliteTileStore
-    record: RenderingRecord
-    frame: PinnedFrame
+    track: Track
     jobs: Mapping[BlockId, Job]
     findings: Findings
     progress: Progress
@@ -81,15 +80,15 @@ class _ViewCheck:
         if (seam is None) != (stored.tiles == 0):
             self.findings.add(f"{where}: {stored.tiles} tiles and {'no' if seam is None else 'a'} seam")
         elif seam is not None:
-            self._try(where, lambda: check_seam(seam, self.frame.tile_px))
+            self._try(where, lambda: check_seam(seam, self.track.frame.tile_px))
             self.findings.count("seams")
 
     def tile_names(self) -> set[TileId]:
         """Of the first layer; the others must have the same."""
-        sets = [set(self.store.list_tiles(layer)) for layer in range(len(self.record.layers))]
-        for layer, names in zip(self.record.layers, sets, strict=True):
+        sets = [set(self.store.list_tiles(layer)) for layer in range(len(self.track.layers))]
+        for layer, names in zip(self.track.layers, sets, strict=True):
             for tile in sorted(names ^ sets[0]):
-                self.findings.add(f"{self.where} {_name(tile)}: layer {layer.name} and layer {self.record.layers[0].name} differ in having it")
+                self.findings.add(f"{self.where} {_name(tile)}: layer {layer.name} and layer {self.track.layers[0].name} differ in having it")
         return set.union(*sets)
 
     def pyramid(self, tiles: set[TileId], planned: Occupancy) -> None:
@@ -98,7 +97,7 @@ class _ViewCheck:
             above = parent(tile)
             if above is not None and above not in tiles and self._is_done(above):
                 self.findings.add(f"{self.where} {_name(tile)}: its parent is missing")
-            if tile.z < self.frame.zmax:
+            if tile.z < self.track.frame.zmax:
                 if not any(child in tiles for child in children(tile)):
                     self.findings.add(f"{self.where} {_name(tile)}: has content, none of its children has")
             elif tile not in planned:
@@ -107,38 +106,40 @@ class _ViewCheck:
     def images(self, tiles: set[TileId], ids: NDArray[np.uint32]) -> None:
         """Every image decodes to its size; every id is in the registry."""
         for done, tile in enumerate(sorted(tiles), 1):
-            for number, layer in enumerate(self.record.layers):
+            for number, layer in enumerate(self.track.layers):
                 data = self.store.get_tile(number, *tile)
                 if data is None:
                     continue
                 try:
-                    pixels = decode_tile(layer, data, self.frame.tile_px)
+                    pixels = decode_tile(layer, data, self.track.frame.tile_px)
                 except Corrupt as error:
                     self.findings.add(f"{self.where} {_name(tile)} {layer.name}: {error}")
                     continue
-                if layer.kind == "id" and tile.z == self.frame.zmax:
+                if layer.kind == "id" and tile.z == self.track.frame.zmax:
                     self._check_ids(tile, np.setdiff1d(ids_of(pixels), ids))
             if done % 64 == 0 or done == len(tiles):
                 self.progress(f"tiles of {self.where}", done, len(tiles))
         self.findings.count("tiles", len(tiles))
-        self.findings.count("images", len(tiles) * len(self.record.layers))
+        self.findings.count("images", len(tiles) * len(self.track.layers))
 
     def reduces(self) -> None:
         """Reduces every done reduce block again from its seams: the tiles must be those that are stored."""
-        text = frame_text(self.record, self.frame)
+        text = frame_text(self.track)
         for block, job in self.jobs.items():
             if job.kind == "reduce" and job.state is State.DONE:
                 seams = [
-                    (below.x, below.y, seam) for below in blocks_below(block, self.frame.zmax) if (seam := self.store.get_seam(below)) is not None
+                    (below.x, below.y, seam)
+                    for below in blocks_below(block, self.track.frame.zmax)
+                    if (seam := self.store.get_seam(below)) is not None
                 ]
-                levels = block_level(block.z, self.frame.zmax).levels
+                levels = block_level(block.z, self.track.frame.zmax).levels
                 self._try(f"{self.where} block {block}", lambda: self._compare(block, _core.reduce_block(text, *block, levels, seams)))  # noqa: B023
                 self.findings.count("reduced again")
 
     def _compare(self, block: BlockId, made: _core.Block) -> None:
         for layer, z, x, y, data in made.tiles:
             if self.store.get_tile(layer, z, x, y) != data:
-                self.findings.add(f"{self.where} {z}/{x}/{y} {self.record.layers[layer].name}: not what its seams reduce to")
+                self.findings.add(f"{self.where} {z}/{x}/{y} {self.track.layers[layer].name}: not what its seams reduce to")
         if self.store.get_seam(block) != made.seam:
             self.findings.add(f"{self.where} block {block}: its seam is not what the seams below reduce to")
 
@@ -147,7 +148,7 @@ class _ViewCheck:
             self.findings.add(f"{self.where} {_name(tile)}: ids {unknown[:5].tolist()} that the registry does not have")
 
     def _is_done(self, tile: TileId) -> bool:
-        job = self.jobs.get(block_of(tile, self.frame.zmax))
+        job = self.jobs.get(block_of(tile, self.track.frame.zmax))
         return job is not None and job.state is State.DONE
 
     def _try(self, where: str, check: Callable[[], None]) -> None:

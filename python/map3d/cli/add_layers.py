@@ -1,0 +1,28 @@
+"""map3d add-layers."""
+
+import click
+
+from map3d.catalogue import Workspace
+from map3d.cli.options import json_option, layer_options, workspace_option
+from map3d.cli.output import print_json
+from map3d.jobs.layers import LayerRequest
+
+
+@click.command("add-layers")
+@click.argument("rendering")
+@layer_options(default=())
+@json_option
+@workspace_option
+def command(workspace: Workspace, rendering: str, layers: LayerRequest, as_json: bool) -> None:
+    """Add layers to RENDERING, in all of its views. Nothing is rendered yet, and what is there stays as it is."""
+    from map3d.jobs.creating import add_layers
+
+    catalogue = workspace.open_catalogue()
+    try:
+        made = add_layers(catalogue, rendering, layers)
+    finally:
+        catalogue.close()
+    if as_json:
+        print_json(made)
+        return
+    click.echo(f"rendering {rendering}: {len(made.layers)} layers; next: map3d render {rendering}")
