@@ -13,10 +13,19 @@ export interface LayerInfo {
   readonly unit_m?: number;
 }
 
-interface ViewJson extends FrameNumbers {
-  occupancy: string;
+interface Versions {
   version: number;
   versions?: Record<string, number>;
+}
+
+/** Layers that were added later, with versions of their own. */
+interface PassJson extends Versions {
+  layers: string[];
+}
+
+interface ViewJson extends FrameNumbers, Versions {
+  occupancy: string;
+  passes?: PassJson[];
   archives?: Record<string, string>;
 }
 
@@ -47,8 +56,8 @@ export interface View {
   readonly frame: Frame;
   readonly occupancy: Occupancy;
   readonly archives: Readonly<Record<string, string>> | undefined;
-  /** The version of the block that holds the tile. */
-  versionOf(tile: Tile): number;
+  /** The version of the block that holds the tile of a layer. */
+  versionOf(tile: Tile, layer: LayerInfo): number;
 }
 
 /** A manifest that has been checked. */
@@ -70,13 +79,16 @@ export function readManifest(value: unknown, where: string): Rendering {
 }
 
 function viewOf(view: ViewJson, json: ManifestJson): View {
-  const versions = view.versions ?? {};
+  const passes = new Map(view.passes?.flatMap((pass) => pass.layers.map((name) => [name, pass] as const)));
   return {
     id: view.id,
     frame: frameOf(view, json.size_m, json.tile_px, json.zmax),
     occupancy: new Occupancy(view.occupancy, json.zmax),
     archives: view.archives,
-    versionOf: (tile) => versions[tileName(blockOf(tile, json.zmax))] ?? view.version,
+    versionOf: (tile, layer) => {
+      const { version, versions } = passes.get(layer.name) ?? view;
+      return versions?.[tileName(blockOf(tile, json.zmax))] ?? version;
+    },
   };
 }
 
@@ -91,7 +103,9 @@ function checked(value: unknown, where: string): ManifestJson {
   if (wrong) return refuse(`field "${wrong[0]}" is missing or malformed, got ${(JSON.stringify(json[wrong[0]]) as string | undefined ?? "nothing").slice(0, 80)}`);
   const full = json as ManifestJson;
   const odd = full.views.find((view) => !viewOk(view));
+  const lost = full.views.find((view) => !passesOk(view.passes));
   if (odd) return refuse(`view ${JSON.stringify(odd.id)} lacks its frame or occupancy`);
+  if (lost) return refuse(`view ${lost.id} has passes without layers or version`);
   return full;
 }
 
@@ -112,6 +126,11 @@ const FIELDS: [keyof ManifestJson, (v: unknown) => boolean][] = [
 function layerOk(value: unknown): boolean {
   const layer = value as Partial<LayerInfo> | null;
   return typeof layer?.name === "string" && typeof layer.kind === "string" && typeof layer.format === "string";
+}
+
+function passesOk(value: unknown): boolean {
+  const ok = (pass: Partial<PassJson> | null): boolean => Array.isArray(pass?.layers) && isNumber(pass.version);
+  return value === undefined || (Array.isArray(value) && value.every(ok));
 }
 
 function viewOk(view: Partial<ViewJson>): boolean {

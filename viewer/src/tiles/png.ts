@@ -1,24 +1,30 @@
 import { DecodeError } from "../core/errors";
 
-/** Pixels row by row from the top; 3 or 4 bytes each. */
+/** Bytes of a pixel. */
+type Channels = 1 | 2 | 3 | 4;
+
+/** Pixels row by row from the top. */
 export interface Pixels {
   readonly width: number;
   readonly height: number;
-  readonly channels: 3 | 4;
+  readonly channels: Channels;
   readonly data: Uint8Array<ArrayBuffer>;
 }
 
 interface Header {
   width: number;
   height: number;
-  channels: 3 | 4;
+  channels: Channels;
 }
+
+/** Of each colour type: grey, RGB, grey with alpha, RGBA. */
+const CHANNELS: Partial<Record<number, Channels>> = { 0: 1, 2: 3, 4: 2, 6: 4 };
 
 const SIGNATURE = [0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a];
 const SIDE_LIMIT = 4096;
 
 /**
- * Decodes the PNGs that data layers are made of (8 bits, RGB or RGBA, not interlaced) bit for bit, which a browser's
+ * Decodes the PNGs that data layers are made of (8 bits, grey or RGB with or without alpha, not interlaced) bit for bit, which a browser's
  * own decoder does not: it multiplies by alpha, manages colours, or perturbs them. The checksum of the zlib stream is
  * verified, those of the chunks are not.
  * @throws DecodeError
@@ -55,13 +61,14 @@ function readHeader(view: DataView, at: number, length: number): Header {
   if (length !== 13) throw new DecodeError(`IHDR of ${String(length)} bytes, expected 13`);
   const [width, height] = [view.getUint32(at), view.getUint32(at + 4)];
   const [depth, type, interlace] = [view.getUint8(at + 8), view.getUint8(at + 9), view.getUint8(at + 12)];
-  if (depth !== 8 || (type !== 2 && type !== 6) || interlace !== 0) {
-    throw new DecodeError(`PNG of ${String(depth)} bits, colour type ${String(type)}, interlace ${String(interlace)}; data layers have 8 bits, type 2 or 6, none`);
+  const channels = CHANNELS[type];
+  if (depth !== 8 || !channels || interlace !== 0) {
+    throw new DecodeError(`PNG of ${String(depth)} bits, colour type ${String(type)}, interlace ${String(interlace)}; data layers have 8 bits, type 0, 2, 4 or 6, none`);
   }
   if (width < 1 || height < 1 || width > SIDE_LIMIT || height > SIDE_LIMIT) {
     throw new DecodeError(`PNG of ${String(width)} × ${String(height)} pixels; tiles have 1 to ${String(SIDE_LIMIT)} a side`);
   }
-  return { width, height, channels: type === 2 ? 3 : 4 };
+  return { width, height, channels };
 }
 
 /** Exactly `size` bytes, or an error: a longer stream is not read to its end. */

@@ -28,7 +28,7 @@ export class Source {
   tile(view: View, layer: LayerInfo, tile: Tile, signal?: AbortSignal): Promise<ArrayBuffer | null> {
     const archive = view.archives?.[layer.name];
     if (archive !== undefined) return this.#archive(archive).tile(tile, signal);
-    return fetchBytes(tileUrls(this.#bases, view.id, layer.name, tile, view.versionOf(tile)), { signal });
+    return fetchBytes(tileUrls(this.#bases, view.id, layer.name, tile, view.versionOf(tile, layer)), { signal });
   }
 
   #archive(path: string): Archive {

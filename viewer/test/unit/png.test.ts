@@ -13,7 +13,7 @@ function noise(length: number, seed: number): Uint8Array {
 }
 
 describe("PNG", () => {
-  for (const channels of [3, 4] as const) {
+  for (const channels of [1, 2, 3, 4] as const) {
     for (const filter of [0, 1, 2, 3, 4, "mixed"] as const) {
       test(`${String(channels)} channels, filter ${String(filter)}: random bytes come back bit for bit`, async () => {
         const [width, height] = [37, 29];
@@ -93,6 +93,12 @@ describe("data", () => {
     const bytes = Uint8Array.from(file.normal.flatMap(({ rgb }) => rgb));
     const tile = await decodeTile("normal", "image/png", encodePng(file.normal.length, 1, 3, bytes).buffer);
     expect(tile.kind === "normal" ? [...tile.values] : []).toEqual([...bytes]);
+  });
+
+  test.each([1, 2] as const)("a tile of %i bytes a pixel is none of the kinds that have 3 or 4", async (channels) => {
+    for (const kind of ["normal", "id", "depth"]) {
+      await expect(decodeTile(kind, "image/png", encodePng(1, 1, channels, new Uint8Array(channels)).buffer)).rejects.toThrow(DecodeError);
+    }
   });
 
   test("an id tile without alpha is refused", async () => {
