@@ -212,8 +212,9 @@ def test_levels_and_layers_are_as_asked(run: Run, town: Workspace) -> None:
     status, out, err = run("create-rendering", "town", "other", *asked, "--json")
     assert status == 0, err
     made = json.loads(out)
-    assert [layer["kind"] for layer in made["layers"]] == ["color", "id"]
-    assert made["layers"][0]["format"] == "jpeg"
+    (layers,) = made["passes"]
+    assert [layer["kind"] for layer in layers] == ["color", "id"]
+    assert layers[0]["format"] == "jpeg"
     assert [(frame["angles"], frame["zmax"], frame["tile_px"]) for frame in made["frames"]] == [
         ([a, p], 3, 512) for a, p in ((0, 30), (180, 30), (0, 90))
     ]
