@@ -1,34 +1,39 @@
-"""`python -m bench [PART …] [--json]`; parts: tiles, ingest, incremental (all, unless some are named)."""
+"""`python -m bench [PART …] [--json]`; parts: tiles, encoding, ingest, incremental (these, unless some are named), extent."""
 
 import argparse
 import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
-from . import incremental, ingest, tiles
+from . import encoding, extent, incremental, ingest, tiles
 
-PARTS = ("tiles", "ingest", "incremental")
+PARTS = ("tiles", "encoding", "ingest", "incremental")
+LONG = ("extent",)
 Rows = list[dict[str, Any]]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="bench", description="Speed, peers beside us in the same run.")
-    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; all unless given")
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)} (these unless given), {', '.join(LONG)}")
+    parser.add_argument("--millions", type=float, nargs="+", default=extent.MILLIONS, help="extent: sizes in million triangles")
     parser.add_argument("--buildings", type=int, default=300, help="tiles: of the town")
     parser.add_argument("--res", type=float, default=0.2, help="tiles: metres a pixel")
     parser.add_argument("--tiles", type=int, default=48, help="tiles: how many")
     parser.add_argument("--json", action="store_true", help="print one JSON document after the tables")
     options = parser.parse_args()
-    unknown = [part for part in options.parts if part not in PARTS]
+    unknown = [part for part in options.parts if part not in PARTS + LONG]
     if unknown:
-        parser.error(f"no part {unknown[0]}; there are {', '.join(PARTS)}")
+        parser.error(f"no part {unknown[0]}; there are {', '.join(PARTS + LONG)}")
     measures: dict[str, Callable[[], Rows]] = {
         "tiles": lambda: of_tiles(options.buildings, options.res, options.tiles),
+        "encoding": encoding.measure,
         "ingest": ingest.measure,
         "incremental": incremental.measure,
+        "extent": lambda: extent.measure(tuple(options.millions), plots=Path("docs/plots")),
     }
     rows = {part: measures[part]() for part in options.parts or PARTS}
     if options.json:
@@ -39,15 +44,13 @@ def of_tiles(buildings: int, res_m: float, count: int) -> Rows:
     """Rows for both colour formats; the table is printed."""
     rows = [tiles.measure(buildings, res_m, count, color) for color in ("webp", "jpeg")]
     table = Table(title=f"base tiles a second, 256 px, 16 samples, four layers, {buildings} buildings at {res_m} m a pixel")
-    for column in ("triangles", "tiles", "colour", "one core", "one core, encoded", "all cores, encoded", "Mitsuba 3, all cores", "ratio"):
+    for column in ("triangles", "tiles", "colour", "one core", "one core, encoded", "all cores, encoded"):
         table.add_column(column, justify="right")
     for row in rows:
-        peer = row["mitsuba_all_cores"]
         rates = [f"{row[key]:.1f}" for key in ("one_core", "one_core_encoded", "all_cores_encoded")]
-        beside = ["not installed", ""] if peer is None else [f"{peer:.1f}", f"{row['all_cores_encoded'] / peer:.1f} ×"]
-        table.add_row(f"{row['triangles']:,}", str(row["tiles"]), row["color"], *rates, *beside)
+        table.add_row(f"{row['triangles']:,}", str(row["tiles"]), row["color"], *rates)
     Console().print(table)
-    return rows
+    return [*rows, tiles.peers(buildings, res_m)]
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Non-empty base tiles a second: ours with and without encoding, per core and in total; Mitsuba 3 on the same tiles, without encoding."""
+"""Non-empty base tiles a second: ours with and without encoding, per core and in total."""
 
 import json
 import multiprocessing
@@ -13,7 +13,8 @@ import numpy as np
 
 from map3d import _core
 
-from .scene import prepared, zmax
+from . import beside
+from .scene import CACHE, prepared, zmax
 
 Tile = tuple[int, int]
 
@@ -22,7 +23,11 @@ def busy_tiles(scene: _core.Scene, frame: str, count: int) -> list[Tile]:
     """Evenly chosen among the base tiles that have content."""
     places = [(int(x), int(y)) for y, x in np.argwhere(scene.occupied(frame, zmax(frame)))]
     chosen = places[:: max(1, len(places) // (2 * count))]
-    return [tile for tile in chosen if scene.gbuffer(frame, *tile)["id"].any()][:count]
+    return with_content(scene, frame, chosen)[:count]
+
+
+def with_content(scene: _core.Scene, frame: str, places: list[Tile]) -> list[Tile]:
+    return [tile for tile in places if scene.gbuffer(frame, *tile)["id"].any()]
 
 
 def seconds(work: Callable[[], object], rounds: int = 3) -> float:
@@ -77,31 +82,6 @@ def all_cores(folder: Path, frame: str, tiles: list[Tile], cores: int) -> float:
     return elapsed
 
 
-def mitsuba(folder: Path, frame: str, tiles: list[Tile], samples: int = 16) -> float | None:
-    """Seconds for the tiles' albedo, depth, normal and shape; None, said aloud, when Mitsuba is not installed."""
-    try:
-        from tests.oracle.asset import read_asset
-        from tests.oracle.mitsuba_scene import MitsubaScene
-    except ImportError as error:
-        print(f"peer skipped: Mitsuba 3 ({error}); pip install map3d[peers]")
-        return None
-    assets = [read_asset(path.parent) for path in sorted(folder.glob("assets/*/mesh.m3a"))]
-    index = json.loads((folder / "scene.json").read_text())
-    scene = MitsubaScene(assets, np.array(index["origin"]), lambda asset, material: _image(asset.folder, material))
-    parsed = json.loads(frame)
-    scene.layers(parsed, *tiles[0], samples)
-    return seconds(lambda: [scene.layers(parsed, *tile, samples) for tile in tiles], rounds=1)
-
-
-def _image(folder: Path, material: dict[str, Any]) -> np.ndarray | None:
-    from PIL import Image
-
-    if material["texture"] is None:
-        return None
-    (path,) = (folder / "textures").glob(f"{material['texture']}.*")
-    return np.array(Image.open(path).convert("RGB"))
-
-
 def measure(buildings: int, res_m: float, count: int, color: str) -> dict[str, Any]:
     """One row of the table; tiles a second."""
     folder, frames = prepared(buildings, res_m, color)
@@ -113,8 +93,6 @@ def measure(buildings: int, res_m: float, count: int, color: str) -> dict[str, A
     plain = len(tiles) / seconds(lambda: trace(scene, frame, tiles))
     encoded = len(tiles) / seconds(lambda: trace_and_encode(scene, frame, tiles))
     total = len(tiles) / all_cores(folder, frame, tiles, cores)
-    peer_time = mitsuba(folder, frame, tiles[: min(12, len(tiles))])
-    peer = None if peer_time is None else min(12, len(tiles)) / peer_time
     return {
         "triangles": scene.triangle_count,
         "tiles": len(tiles),
@@ -123,5 +101,13 @@ def measure(buildings: int, res_m: float, count: int, color: str) -> dict[str, A
         "one_core": plain,
         "one_core_encoded": encoded,
         "all_cores_encoded": total,
-        "mitsuba_all_cores": peer,
     }
+
+
+def peers(buildings: int, res_m: float) -> dict[str, Any]:
+    """The same town drawn by others, beside us."""
+    folder, frames = prepared(buildings, res_m, "webp")
+    frame = next(iter(frames.values()))
+    scene = _core.Scene(str(folder), 1 << 30)
+    places = [(int(x), int(y)) for y, x in np.argwhere(scene.occupied(frame, zmax(frame)))]
+    return beside.measure(folder, frame, with_content(scene, frame, places), pictures=CACHE / "pictures")

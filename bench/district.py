@@ -1,0 +1,86 @@
+"""A large town from one district, placed many times: each place is an asset of its own, moved, with image files of its own.
+
+The images of a copy show the same, but their bytes differ by a comment, so they are other textures to map3d: each is prepared, kept, read and decoded
+for itself.
+"""
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xxhash
+
+from map3d.catalogue import AssetRecord, Catalogue, Workspace
+from map3d.ingest.asset import asset_digest, new_objects, read_objects, world_boxes, write_ids
+from map3d.registry import Registry
+
+HEADER_BYTES = 64
+
+
+@dataclass(frozen=True)
+class Copies:
+    """Puts copies of the assets of one scene of a workspace into another, `pitch_m` apart."""
+
+    workspace: Workspace
+    source: str
+    scene: str
+    pitch_m: float
+
+    def put(self, catalogue: Catalogue, number: int) -> None:
+        """The copy of this number, 0 …: the first n fill a square as nearly as n allows."""
+        column, row = place(number)
+        offset = np.array([column * self.pitch_m, row * self.pitch_m, 0.0])
+        template = catalogue.scene(self.source)
+        origin = catalogue.pin_scene(self.scene, crs=template.crs, origin=template.origin).origin
+        assert origin is not None, "the source has assets"
+        with Registry(self.workspace.registry_path(self.scene)) as registry:
+            for asset in catalogue.assets(self.source):
+                name = f"d{number:04d}-{asset.name}"
+                folder = self.workspace.asset_folder(self.scene, name)
+                copy_asset(self.workspace.asset_folder(self.source, asset.name), folder, f"copy {number}", offset)
+                lines = read_objects(folder)
+                write_ids(folder, registry.put_asset(name, new_objects(lines, world_boxes(folder, len(lines)), origin)))
+                record = AssetRecord(
+                    self.scene, name, asset.source, asset.format, asset_digest(folder), f"{asset.source_digest}-{number}", asset.report
+                )
+                catalogue.put_asset(record)
+
+
+def place(number: int) -> tuple[int, int]:
+    """Column and row: squares of 1, 4, 9, … places grow by an L."""
+    side = int(np.sqrt(number))
+    rest = number - side * side
+    return (side, rest) if rest <= side else (rest - side - 1, side)
+
+
+def copy_asset(source: Path, folder: Path, comment: str, offset: "np.ndarray[Any, np.dtype[np.float64]]") -> None:
+    """An asset folder without ids, moved by `offset` (metres)."""
+    (folder / "textures").mkdir(parents=True)
+    keys = {path.stem: _other_image(path, folder / "textures", comment) for path in sorted((source / "textures").iterdir())}
+    tables = json.loads((source / "materials.json").read_text(encoding="utf-8"))
+    for material in tables["materials"]:
+        material["texture"] = keys.get(material["texture"])
+        if material["alpha"] is not None:
+            raise SystemExit(f"bench: {source}: has images that cut out; make the town without trees")
+    (folder / "materials.json").write_text(json.dumps(tables), encoding="utf-8")
+    (folder / "objects.jsonl").write_bytes((source / "objects.jsonl").read_bytes())
+    data = np.fromfile(source / "mesh.m3a", np.uint8)
+    vertices = int(data[16:24].view("<u8")[0])
+    data[HEADER_BYTES : HEADER_BYTES + 24 * vertices].view("<f8").reshape(-1, 3)[:] += offset
+    data[8:16].view("<u8")[0] = xxhash.xxh3_64_intdigest(data[HEADER_BYTES:].data)
+    data.tofile(folder / "mesh.m3a")
+
+
+def _other_image(path: Path, folder: Path, comment: str) -> str:
+    """A JPEG with one more comment; returns its key."""
+    data = path.read_bytes()
+    if data[:2] != b"\xff\xd8":
+        raise SystemExit(f"bench: {path}: not a JPEG")
+    text = comment.encode()
+    data = data[:2] + b"\xff\xfe" + (len(text) + 2).to_bytes(2, "big") + text + data[2:]
+    key = hashlib.sha256(data).hexdigest()[:32]
+    (folder / f"{key}{path.suffix}").write_bytes(data)
+    return key

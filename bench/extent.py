@@ -1,0 +1,169 @@
+"""Out of core: a town that grows in extent at one density, rendered within a fixed memory. `python -m bench extent`.
+
+One district of 300 buildings with terrain and textures, without trees, is placed as often as a size asks for (bench/district.py). For each size
+the scene is built from nothing, a rendering planned, and the same number of base blocks rendered by two workers within 1 GiB (bench/extent_work.py).
+"""
+
+import json
+import shutil
+import sys
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from map3d.catalogue import Catalogue, Workspace
+
+from .district import Copies
+from .plot import plot
+from .scene import CACHE, _do
+from .watch import Figures, watched
+
+MILLIONS = (1, 3, 10)
+BLOCKS, RES_M, TEXTURE_PX = 40, 0.04, 512
+BYTES_PER_TRIANGLE, SPARE_BYTES = 260, 1 << 30
+"""Disk at the peak, as measured: assets, chunks, textures and what the build remembers."""
+MIB = 1 << 20
+Row = dict[str, Any]
+
+
+def measure(millions: tuple[float, ...] = MILLIONS, folder: Path = CACHE / "extent", plots: Path | None = None, blocks: int = BLOCKS) -> list[Row]:
+    """A row a size, smallest first; the table is printed as Markdown, `plots` is where the pictures go. What was measured before is kept beside."""
+    kept = folder / "sizes.json"
+    rows: list[Row] = json.loads(kept.read_text()) if kept.is_file() else []
+    _check_room(folder, max(millions))
+    workspace = Workspace(folder / "workspace").create()
+    try:
+        _district(workspace, folder)
+        for size in sorted(millions):
+            row = _measured(workspace, folder, size, blocks)
+            rows = sorted([*(old for old in rows if old["millions"] != size), row], key=lambda row: row["triangles"])
+            kept.write_text(json.dumps(rows, indent=1))
+            Console().print(f"{row['triangles']:,} triangles: {row['wall_tile_ms']:.1f} ms a tile, {row['memory_bytes'] / MIB:.0f} MiB")
+    finally:
+        shutil.rmtree(workspace.root)
+    _print(rows)
+    if plots is not None:
+        draw(rows, plots)
+    return rows
+
+
+def _check_room(folder: Path, millions: float) -> None:
+    need = int(millions * 1e6 * BYTES_PER_TRIANGLE) + SPARE_BYTES
+    folder.mkdir(parents=True, exist_ok=True)
+    free = shutil.disk_usage(folder).free
+    if free < need:
+        raise SystemExit(f"bench: {need / 1e9:.0f} GB are needed in {folder}, {free / 1e9:.0f} GB are free")
+
+
+def _district(workspace: Workspace, folder: Path) -> None:
+    """The scene that is copied, made once."""
+    town, where = folder / "town", ["-w", str(workspace.root)]
+    if not (town / "town.json").is_file():
+        _do(["make-town", "-o", str(town), "--buildings", "300", "--seed", "7", "--texture-px", str(TEXTURE_PX), "--no-trees"])
+    for scene in ("district", "extent"):
+        _do(["create-scene", scene, *where])
+    _do(["add-files", "district", str(town), *where])
+
+
+def _measured(workspace: Workspace, folder: Path, millions: float, blocks: int) -> Row:
+    pitch_m = json.loads((folder / "town" / "town.json").read_text())["extent_m"]
+    copies = Copies(workspace, "district", "extent", pitch_m)
+    catalogue = workspace.open_catalogue()
+    try:
+        each = sum(asset.report["triangles"] for asset in catalogue.assets("district"))
+        there = len(catalogue.assets("extent")) // len(catalogue.assets("district"))
+        count = max(1, round(millions * 1e6 / each))
+        for number in range(there, count):
+            copies.put(catalogue, number)
+        _forget_build(workspace, catalogue)
+    finally:
+        catalogue.close()
+    name, out, program = f"size-{count}", folder / "answer.json", ["-m", "bench.extent_work"]
+    built = _watched([*program, "build", str(workspace.root), "extent"], folder)
+    _do(["create-rendering", "extent", name, "--res", str(RES_M), "--view", "0/45", "--color", "jpeg", "-w", str(workspace.root)])
+    work = _watched([*program, "render", str(workspace.root), name, str(blocks), str(out)], folder)
+    answer: Row = json.loads(out.read_text())
+    out.unlink()
+    figures = {f"build_{key}": value for key, value in asdict(built).items() if key in ("wall_s", "cpu_s", "memory_bytes")}
+    sizes = {"millions": millions, "districts": count, "extent_m": pitch_m, "disk_bytes": built.disk_bytes}
+    return {**sizes, **answer, **figures, "memory_bytes": work.memory_bytes}
+
+
+def _forget_build(workspace: Workspace, catalogue: Catalogue) -> None:
+    """So that the next build is one from nothing."""
+    scene = workspace.scene_folder("extent")
+    for name in ("chunks", "textures", "build"):
+        shutil.rmtree(scene / name, ignore_errors=True)
+    (scene / "scene.json").unlink(missing_ok=True)
+    catalogue.set_built("extent", "")
+
+
+def _watched(words: list[str], folder: Path) -> Figures:
+    figures = Figures()
+    if watched([sys.executable, *words], folder, figures) != 0:
+        raise SystemExit(f"bench: {' '.join(words)} failed")
+    return figures
+
+
+COLUMNS = (
+    "triangles, M",
+    "build, CPU s per M",
+    "build, MiB",
+    "open, s",
+    "plan, s",
+    "base blocks",
+    "render, MiB",
+    "tile, ms",
+    "CPU ms",
+    "chunks missed",
+    "textures missed",
+)
+
+
+def cells(row: Row) -> Iterator[str]:
+    """Of the table."""
+    million = row["triangles"] / 1e6
+    yield f"{million:.1f}"
+    yield f"{row['build_cpu_s'] / million:.2f}"
+    yield f"{row['build_memory_bytes'] / MIB:,.0f}"
+    yield f"{row['open_s']:.2f}"
+    yield f"{row['plan_s']:.2f}"
+    yield f"{row['base_blocks']:,}"
+    yield f"{row['memory_bytes'] / MIB:,.0f}"
+    yield f"{row['wall_tile_ms']:.1f}"
+    yield f"{row['cpu_tile_ms']:.1f}"
+    for what in ("chunk", "texture"):
+        misses, hits = row[f"{what}_misses"], row[f"{what}_hits"]
+        yield f"{misses:,} ({100 * misses / max(1, misses + hits):.2f} %)"
+
+
+def _print(rows: list[Row]) -> None:
+    table = Table(title=f"a town that grows, {BLOCKS} base blocks at {RES_M} m a pixel, two workers, 1 GiB", title_justify="left")
+    for column in COLUMNS:
+        table.add_column(column, justify="right")
+    for row in rows:
+        table.add_row(*cells(row))
+    Console(width=200).print(table)
+    for line in (COLUMNS, ["---"] * len(COLUMNS), *(list(cells(row)) for row in rows)):
+        print(f"| {' | '.join(line)} |")
+
+
+def draw(rows: list[Row], folder: Path) -> None:
+    x = [row["triangles"] / 1e6 for row in rows]
+
+    def line(key: str, unit: float) -> list[tuple[float, float]]:
+        return [(at, row[key] / unit) for at, row in zip(x, rows, strict=True)]
+
+    label = "million triangles (logarithmic)"
+    plot(
+        folder / "extent-memory.svg",
+        "Memory of all processes",
+        label,
+        "MiB",
+        {"render": line("memory_bytes", MIB), "build": line("build_memory_bytes", MIB)},
+    )
+    plot(folder / "extent-time.svg", "A base tile with content", label, "ms", {"wall": line("wall_tile_ms", 1), "processor": line("cpu_tile_ms", 1)})
