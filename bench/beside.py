@@ -21,8 +21,9 @@ from .peers.mitsuba import Mitsuba
 from .peers.opengl import OpenGL
 from .peers.ours import Ours
 
-PICTURES = (16, 6, 3, 1)
+PICTURES = (16, 6, 2, 1)
 """How many pictures are drawn of 1, 2, 4 and 8 tiles on a side."""
+ROUNDS = (3, 3, 2, 2)
 SOFTWARE = {"EGL_PLATFORM": "surfaceless", "LIBGL_ALWAYS_SOFTWARE": "1"}
 AGREE_M = 0.02
 COLORS = ("webp", "jpeg")
@@ -52,17 +53,16 @@ class Agreement:
     depth: float
 
 
-def measure(folder: Path, frame: str, tiles: list[Place], rounds: int = 3, pictures: Path | None = None) -> dict[str, Any]:
-    """`tiles`: all base tiles with content; the tables are printed. `pictures`: folder for a picture of one tile by each."""
+def measure(folder: Path, frame: str, tiles: list[Place], shown: Place, pictures: Path | None = None) -> dict[str, Any]:
+    """`tiles`: all base tiles with content; the tables are printed. `shown`: the tile that is compared; `pictures`: folder for pictures of it."""
     parsed: Frame = json.loads(frame)
-    shown = tiles[len(tiles) // 2]
     with ExitStack() as stack:
         cores = len(os.sched_getaffinity(0))
         ours = stack.enter_context(Crew("map3d", partial(Ours, folder), cores))
         peers = list(_peers(stack, folder, cores))
         agreements = [_agreement(ours, peer, parsed, shown, pictures) for peer in peers]
         rows = []
-        for doublings, count in enumerate(PICTURES):
+        for doublings, (count, rounds) in enumerate(zip(PICTURES, ROUNDS, strict=True)):
             rows += _turns(ours, peers, parsed, tiles, doublings, count, rounds)
     _print(rows, agreements)
     return {"rows": [asdict(row) for row in rows], "agreement": [asdict(one) for one in agreements], **ratios(rows)}

@@ -36,6 +36,7 @@ class Copies:
         template = catalogue.scene(self.source)
         origin = catalogue.pin_scene(self.scene, crs=template.crs, origin=template.origin).origin
         assert origin is not None, "the source has assets"
+        self.workspace.scene_folder(self.scene).mkdir(parents=True, exist_ok=True)
         with Registry(self.workspace.registry_path(self.scene)) as registry:
             for asset in catalogue.assets(self.source):
                 name = f"d{number:04d}-{asset.name}"

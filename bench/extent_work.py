@@ -63,7 +63,7 @@ def rendered(workspace: Path, rendering: str, blocks: int) -> dict[str, Any]:
     setup = {
         "scene": str(place.scene_folder(record.scene).absolute()),
         "cache_bytes": Settings(WORKERS, MAX_MEMORY_BYTES).cache_bytes,
-        "frame": frame_text(record, record.frames[0]),
+        "frame": frame_text(record.tracks[0]),
     }
     answers = _answers(setup, chosen(jobs, blocks))
     return {

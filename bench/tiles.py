@@ -110,4 +110,6 @@ def peers(buildings: int, res_m: float) -> dict[str, Any]:
     frame = next(iter(frames.values()))
     scene = _core.Scene(str(folder), 1 << 30)
     places = [(int(x), int(y)) for y, x in np.argwhere(scene.occupied(frame, zmax(frame)))]
-    return beside.measure(folder, frame, with_content(scene, frame, places), pictures=CACHE / "pictures")
+    tiles = with_content(scene, frame, places)
+    shown = max(tiles, key=lambda tile: len(np.unique(scene.gbuffer(frame, *tile)["id"])))
+    return beside.measure(folder, frame, tiles, shown, pictures=CACHE / "pictures")

@@ -12,6 +12,7 @@ from map3d.cli.building import build_with_progress
 from map3d.cli.options import json_option, max_memory_option, workers_option, workspace_option
 from map3d.cli.output import console, counts_text, print_json, size_text
 from map3d.cli.progress import progress_bar
+from map3d.cli.render_stats import print_summary, summary
 
 if TYPE_CHECKING:
     from map3d.jobs.run import Outcome, Plan, Run
@@ -21,9 +22,10 @@ if TYPE_CHECKING:
 @click.argument("rendering")
 @workers_option
 @max_memory_option
+@click.option("--stats", "with_stats", is_flag=True, help="Say at the end where the time went and how often the caches had what was asked for.")
 @json_option
 @workspace_option
-def command(workspace: Workspace, rendering: str, workers: int, max_memory: int | None, as_json: bool) -> None:
+def command(workspace: Workspace, rendering: str, workers: int, max_memory: int | None, with_stats: bool, as_json: bool) -> None:
     """Make the tiles of RENDERING: what is missing or has changed.
 
     It may be stopped at any time, even by killing it; the same command goes on where it was. Ctrl-C lets the blocks in hand be finished, a
@@ -40,9 +42,11 @@ def command(workspace: Workspace, rendering: str, workers: int, max_memory: int 
     finally:
         catalogue.close()
     if as_json:
-        print_json({**asdict(outcome), "build": built})
+        print_json({**asdict(outcome), "stats": summary(outcome.stats) if with_stats else None, "build": built})
     else:
         report(rendering, outcome)
+        if with_stats:
+            print_summary(summary(outcome.stats))
     if not outcome.complete:
         raise click.exceptions.Exit(130 if outcome.stopped else 1)
 

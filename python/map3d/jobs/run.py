@@ -1,6 +1,6 @@
 """`map3d render`: plan, run the workers, write the manifest."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -62,7 +62,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a run ended. `complete`: every job is done."""
+    """How a run ended. `complete`: every job is done; `stats`: as RenderTask sums them, empty when nothing was to be done."""
 
     tally: Tally
     complete: bool
@@ -70,6 +70,7 @@ class Outcome:
     open_jobs: int
     quarantined_jobs: int
     content_version: int
+    stats: Mapping[str, float] = field(default_factory=dict)
 
 
 class Run:
@@ -106,19 +107,19 @@ class Run:
             tally = self._pool.run(on_event)
         finally:
             task.close()
-        return self._finish(plan, tally, self._pool.stopped)
+        return self._finish(plan, tally, self._pool.stopped, dict(task.stats))
 
     def stop(self) -> None:
         """Lets the blocks in hand be finished and no more begun."""
         if self._pool is not None:
             self._pool.stop()
 
-    def _finish(self, plan: Plan, tally: Tally, stopped: bool) -> Outcome:
+    def _finish(self, plan: Plan, tally: Tally, stopped: bool, stats: Mapping[str, float] | None = None) -> Outcome:
         counts = self._catalogue.count_jobs(self.record.name)
         complete = counts[State.DONE] == sum(counts.values())
         write_manifest(self._workspace, self._catalogue, self.record.name, plan.box, {} if complete else self._within_open(plan.occupancy))
         open_jobs = counts[State.WAITING] + counts[State.TODO] + counts[State.LEASED]
-        return Outcome(tally, complete, stopped, open_jobs, counts[State.QUARANTINED], self.record.content_version)
+        return Outcome(tally, complete, stopped, open_jobs, counts[State.QUARANTINED], self.record.content_version, stats or {})
 
     def _prune(self) -> None:
         """Removes blocks that no job stands for, such as those of frames pinned before."""

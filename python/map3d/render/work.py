@@ -4,7 +4,7 @@ import json
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from map3d import _core
 from map3d.child import Tell, Work
@@ -12,6 +12,8 @@ from map3d.errors import NotFound
 from map3d.tiles.naming import blocks_below
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.types import BlockId
+
+COUNTED: Final = ("chunk_hits", "chunk_misses", "texture_hits", "texture_misses", "texture_decoded", "texture_evicted")
 
 
 def open_work(setup: Mapping[str, Any]) -> Work:
@@ -22,7 +24,8 @@ def open_work(setup: Mapping[str, Any]) -> Work:
         begun = time.perf_counter()
         block = renderer.block(question["track"], BlockId(*question["block"]), question["kind"], question["levels"])
         tiles, seam = block.tiles, block.seam
-        answer = {"tiles": [list(tile[:4]) for tile in tiles], "seam": seam is not None, "stats": block.stats}
+        stats = {**block.stats, **renderer.cache_counts()}
+        answer = {"tiles": [list(tile[:4]) for tile in tiles], "seam": seam is not None, "stats": stats}
         blobs = [tile[4] for tile in tiles] + ([] if seam is None else [seam])
         return {**answer, "seconds": time.perf_counter() - begun}, blobs
 
@@ -36,11 +39,18 @@ class _Renderer:
         self._zmax = {track: int(frame["zmax"]) for track, frame in setup["frames"].items()}
         self._paths = {track: Path(path) for track, path in setup["stores"].items()}
         self._stores: dict[str, SqliteTileStore] = {}
+        self._counted = dict.fromkeys(COUNTED, 0)
 
     def block(self, track: str, block: BlockId, kind: str, levels: int) -> _core.Block:
         if kind == "base":
             return self._scene.render_block(self._frames[track], *block)
         return _core.reduce_block(self._frames[track], *block, levels, self._seams_below(track, block))
+
+    def cache_counts(self) -> dict[str, int]:
+        """What the scene's caches did since this was last asked."""
+        before, now = self._counted, self._scene.stats()
+        self._counted = {name: now[name] for name in COUNTED}
+        return {name: self._counted[name] - before[name] for name in COUNTED}
 
     def _seams_below(self, track: str, block: BlockId) -> list[tuple[int, int, bytes]]:
         """Of the blocks below that have content."""
