@@ -9,7 +9,7 @@ import pytest
 from map3d.catalogue import AssetRecord, Catalogue, PlannedJob, SceneCrs, SceneRecord, State, Workspace
 from map3d.catalogue.sqlite import SqliteCatalogue
 from map3d.errors import AlreadyExists, BadName, NotFound, StoreError, UnknownVersion
-from map3d.types import BlockId, Layer, ViewAngles
+from map3d.types import BlockId, Layer, Sun, ViewAngles
 from tests.catalogue.homes import rendering
 
 UTM = SceneCrs(25832, "PROJCRS[…]", "ETRS89 / UTM zone 32N", "DHHN2016 height")
@@ -100,14 +100,15 @@ def test_a_view_that_is_added_leaves_jobs_and_views_as_they_are(catalogue: Catal
 def test_layers_that_are_added_are_a_pass_of_their_own_and_leave_jobs_as_they_are(catalogue: Catalogue) -> None:
     catalogue.plan("town-a", [PlannedJob("0-45", BlockId(0, 0, 0), "base", 0, "k", None)])
     before = catalogue.rendering("town-a")
-    added = (Layer("normal", "normal", "png"), Layer("coarse", "color", "jpeg", 40))
+    sun = Sun("2026-06-21T13:00:00Z", 196.2, 64.1, (-0.1, -0.4, 0.9))
+    added = (Layer("normal", "normal", "png"), Layer("coarse", "color", "jpeg", 40), Layer("noon", "picture", "webp", 80, (sun,), 20.0))
     after = catalogue.add_pass("town-a", added)
     assert after == catalogue.rendering("town-a") == dataclasses.replace(before, passes=(*before.passes, added))
-    assert [layer.name for layer in after.layers] == ["color", "id", "normal", "coarse"]
+    assert [layer.name for layer in after.layers] == ["color", "id", "normal", "coarse", "noon"]
     assert [(track.id, track.layers) for track in after.tracks] == [("0-45", before.passes[0]), ("0-45+1", added)]
     assert sum(catalogue.count_jobs("town-a").values()) == 1
     with pytest.raises(AlreadyExists, match="coarse"):
-        catalogue.add_pass("town-a", added[1:])
+        catalogue.add_pass("town-a", added[1:2])
     with pytest.raises(NotFound):
         catalogue.add_pass("other", added)
 

@@ -8,7 +8,7 @@ import pytest
 from map3d.errors import BadRequest, LimitExceeded, OutsideFrame
 from map3d.geometry.frames import NO_DEPTH, Window, check_content, corners, pin, pin_beside
 from map3d.geometry.views import uvd_from_local
-from map3d.types import Layer, TileId, ViewAngles
+from map3d.types import Layer, Sun, TileId, ViewAngles
 
 VECTORS = Path(__file__).parents[2] / "spec" / "vectors"
 FRAMES = json.loads((VECTORS / "frames.json").read_text())
@@ -126,6 +126,24 @@ def test_the_cores_frame_names_its_layers():
     got = frame.to_json([Layer("color", "color", "webp", 80), Layer("id", "id", "png")])
     assert got["layers"] == [{"kind": "color", "format": "webp", "quality": 80}, {"kind": "id", "format": "png"}]
     assert (got["look_at_deg"], got["zmax"], got["size_m"]) == (0, frame.zmax, frame.size_m)
+
+
+def test_the_core_is_told_of_light_by_directions_and_reach_alone():
+    noon, evening = Sun("2026-06-21T12:00:00Z", 180.0, 60.0, (0.0, -0.5, 0.75**0.5)), Sun(None, 270.0, 0.0, (-1.0, 0.0, 0.0))
+    layers = [
+        Layer("noon", "sun", "png", suns=(noon,)),
+        Layer("day", "sun16", "png", suns=(noon, evening)),
+        Layer("ao", "ao", "png", radius_m=20.0),
+        Layer("behind", "depth2", "png"),
+        Layer("picture", "picture", "webp", 70, (evening,), 5.0),
+    ]
+    assert pin(BOX, 256, 0.2, [ViewAngles(0, 45)])[0].to_json(layers)["layers"] == [
+        {"kind": "sun", "format": "png", "suns": [[0.0, -0.5, 0.75**0.5]]},
+        {"kind": "sun16", "format": "png", "suns": [[0.0, -0.5, 0.75**0.5], [-1.0, 0.0, 0.0]]},
+        {"kind": "ao", "format": "png", "radius_m": 20.0},
+        {"kind": "depth2", "format": "png"},
+        {"kind": "picture", "format": "webp", "quality": 70, "suns": [[-1.0, 0.0, 0.0]], "radius_m": 5.0},
+    ]
 
 
 SCENE = ((-800.0, -800.0, 0.0), (800.0, 800.0, 60.0))

@@ -11,7 +11,7 @@ from map3d.errors import Corrupt
 from map3d.render.check import check_rendered
 from map3d.render.decode import check_seam, decode_tile, ids_of
 from map3d.tiles.store import StoredTile, StoreShape
-from map3d.types import BlockId, Layer
+from map3d.types import BlockId, Layer, Sun
 
 LAYERS = (Layer("color", "color", "webp", 80), Layer("id", "id", "png"))
 SHAPE = StoreShape(256, 4, LAYERS)
@@ -50,6 +50,25 @@ def image(mode: str, size: int, format: str) -> bytes:
 def test_tiles_decode_to_their_size() -> None:
     assert decode_tile(LAYERS[0], image("RGBA", 256, "WEBP"), 256).shape[:2] == (256, 256)
     assert decode_tile(LAYERS[1], image("RGBA", 256, "PNG"), 256).shape == (256, 256, 4)
+
+
+SUN = Sun(None, 180.0, 45.0, (0.0, -(0.5**0.5), 0.5**0.5))
+LIGHT = {
+    "sun": (Layer("sun", "sun", "png", suns=(SUN,)), "L", 1),
+    "sun16": (Layer("sun16", "sun16", "png", suns=(SUN,)), "LA", 2),
+    "ao": (Layer("ao", "ao", "png", radius_m=20.0), "L", 1),
+    "depth2": (Layer("depth2", "depth2", "png"), "RGBA", 4),
+    "picture": (Layer("picture", "picture", "png", suns=(SUN,), radius_m=20.0), "RGBA", 4),
+}
+
+
+@pytest.mark.parametrize("kind", LIGHT)
+def test_layers_of_light_decode_in_their_own_mode_only(kind: str) -> None:
+    layer, mode, channels = LIGHT[kind]
+    assert decode_tile(layer, image(mode, 256, "PNG"), 256).shape == (256, 256, channels)
+    for other in {"L", "LA", "RGBA"} - {mode}:
+        with pytest.raises(Corrupt, match=f"{other} of 256 × 256 px, expected"):
+            decode_tile(layer, image(other, 256, "PNG"), 256)
 
 
 @pytest.mark.parametrize(

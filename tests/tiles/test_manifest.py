@@ -8,7 +8,7 @@ from map3d.errors import BadName, BadRequest, Corrupt, UnknownVersion
 from map3d.geometry.frames import pin
 from map3d.tiles.manifest import CrsFacts, Manifest, ViewFacts, block_version
 from map3d.tiles.occupancy import Occupancy
-from map3d.types import BlockId, Layer, TileId, ViewAngles
+from map3d.types import BlockId, Layer, Sun, TileId, ViewAngles
 
 SCHEMA = json.loads((Path(__file__).parents[2] / "spec" / "manifest.schema.json").read_text())
 BOX = ((-120.0, -80.0, 0.0), (130.0, 90.0, 22.5))
@@ -42,18 +42,44 @@ def test_a_manifest_reads_back(manifest):
     assert again.dump() == manifest.dump()
 
 
+NOON = Sun("2026-06-21T13:00:00Z", 196.2, 64.1, (-0.1, -0.4, 0.9))
+LIGHT = (
+    Layer("evening", "sun", "png", suns=(Sun(None, 280.0, 12.5, (-0.9, 0.2, 0.2)),)),
+    Layer("day", "sun16", "png", suns=(NOON,) * 16),
+    Layer("ao", "ao", "png", radius_m=20.0),
+    Layer("behind", "depth2", "png"),
+    Layer("picture", "picture", "webp", suns=(NOON,), radius_m=0.5),
+)
+
+
 @pytest.fixture
 def added(manifest):
     """With a pass that was added and is only begun."""
     views = tuple(replace(view, versions=(*view.versions, {BlockId(1, 1, 1): 4})) for view in manifest.views)
-    return replace(manifest, passes=(*manifest.passes, (Layer("again", "normal", "png"), Layer("coarse", "color", "jpeg"))), views=views)
+    return replace(manifest, passes=(*manifest.passes, LIGHT), views=views)
+
+
+def test_layers_of_light_say_where_the_sun_stands_and_how_far_they_reach(added):
+    layers = {layer["name"]: layer for layer in json.loads(added.dump())["layers"]}
+    noon = {"time": "2026-06-21T13:00:00Z", "azimuth_deg": 196.2, "elevation_deg": 64.1, "direction": [-0.1, -0.4, 0.9]}
+    png = {"format": "png", "media_type": "image/png"}
+    assert layers["evening"] == {
+        "name": "evening", "kind": "sun", **png, "suns": [{"time": None, "azimuth_deg": 280.0, "elevation_deg": 12.5, "direction": [-0.9, 0.2, 0.2]}],
+    }  # fmt: skip
+    assert layers["day"] == {"name": "day", "kind": "sun16", **png, "suns": [noon] * 16}
+    assert layers["ao"] == {"name": "ao", "kind": "ao", **png, "radius_m": 20.0}
+    assert layers["behind"] == {"name": "behind", "kind": "depth2", **png, "unit_m": 2**-10}
+    assert layers["picture"] == {
+        "name": "picture", "kind": "picture", "format": "webp", "media_type": "image/webp", "suns": [noon], "radius_m": 0.5,
+    }  # fmt: skip
+    assert Manifest.load(added.dump()).passes == added.passes
 
 
 def test_layers_that_were_added_have_versions_of_their_own(added):
     value = json.loads(added.dump())
-    assert [layer["name"] for layer in value["layers"]] == ["color", "normal", "id", "depth", "again", "coarse"]
+    assert [layer["name"] for layer in value["layers"]] == ["color", "normal", "id", "depth", "evening", "day", "ao", "behind", "picture"]
     assert (value["views"][0]["version"], value["views"][0]["versions"]) == (3, {"1/1/1": 2})
-    assert value["views"][1]["passes"] == [{"layers": ["again", "coarse"], "version": 4, "versions": {}}]
+    assert value["views"][1]["passes"] == [{"layers": [layer.name for layer in LIGHT], "version": 4, "versions": {}}]
     again = Manifest.load(added.dump())
     assert (again.passes, again.layers) == (added.passes, added.layers)
     assert (block_version(again.views[0], TileId(4, 15, 15), 1), block_version(again.views[0], TileId(4, 15, 15))) == (4, 2)
@@ -63,11 +89,11 @@ def test_layers_that_were_added_have_versions_of_their_own(added):
     "passes",
     [
         None,
-        [{"layers": ["again"], "version": 4, "versions": {}}],
+        [{"layers": ["ao"], "version": 4, "versions": {}}],
         [{"layers": ["nowhere"], "version": 4, "versions": {}}],
-        [{"layers": ["again", "again"], "version": 4, "versions": {}}],
+        [{"layers": ["ao", "ao"], "version": 4, "versions": {}}],
         [{"layers": [], "version": 4, "versions": {}}],
-        [{"layers": ["again", "coarse"], "versions": {}}],
+        [{"layers": [layer.name for layer in LIGHT], "versions": {}}],
     ],
 )
 @pytest.mark.parametrize("view", [0, 1])
@@ -95,7 +121,7 @@ def test_the_schema_names_every_member(manifest, added):
     schema = SCHEMA["properties"]
     assert set(schema) == set(value) == set(SCHEMA["required"])
     assert set(schema["views"]["items"]["properties"]) == set(value["views"][0])
-    assert set(schema["layers"]["items"]["properties"]) == set(value["layers"][3])
+    assert set(schema["layers"]["items"]["properties"]) == set().union(*value["layers"])
     assert set(schema["crs"]["properties"]) == set(value["crs"])
     assert set(schema["objects"]["properties"]) == set(value["objects"])
 
@@ -150,6 +176,9 @@ def test_what_is_no_manifest_is_corrupt(data):
         (("views", 0, "u0_m"), "zero"),
         (("views",), []),
         (("layers", 0, "format"), "bmp"),
+        (("layers", 0, "radius_m"), 20),
+        (("layers", 0, "suns"), [{"time": None, "azimuth_deg": 0, "elevation_deg": 90, "direction": [0, 0, 1]}]),
+        (("layers", 0, "suns"), [{}]),
         (("layers",), None),
         (("origin",), [1, 2]),
         (("box",), [[0, 0, 0]]),

@@ -5,13 +5,14 @@ import signal
 import sqlite3
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 
-from map3d.errors import Corrupt, StoreError, UnknownVersion
+from map3d.errors import BadRequest, Corrupt, StoreError, UnknownVersion
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.store import StoredTile, StoreShape
-from map3d.types import BlockId, Layer
+from map3d.types import BlockId, Layer, Sun
 
 SHAPE = StoreShape(256, 0, (Layer("color", "color", "png"),))
 BLOCK = BlockId(0, 0, 0)
@@ -165,3 +166,13 @@ def test_a_forked_child_has_connections_of_its_own(store):
         os._exit(0 if own else 1)
     assert os.waitpid(child, 0)[1] == 0
     assert store.get_tile(0, 0, 0, 0) == b"tile"
+
+
+def test_a_store_knows_its_layers_again_with_all_that_belongs_to_them(tmp_path):
+    sun = Sun("2026-06-21T13:00:00Z", 196.2, 64.1, (-0.1, -0.4, 0.9))
+    shape = StoreShape(256, 2, (Layer("picture", "picture", "jpeg", 70, (sun,), 12.5), Layer("day", "sun16", "png", suns=(sun, sun))))
+    SqliteTileStore.create(tmp_path / "light.sqlite", shape).close()
+    SqliteTileStore.open_or_create(tmp_path / "light.sqlite", shape).close()
+    other = StoreShape(256, 2, (replace(shape.layers[0], radius_m=13.0), shape.layers[1]))
+    with pytest.raises(BadRequest, match="--regrid"):
+        SqliteTileStore.open_or_create(tmp_path / "light.sqlite", other)

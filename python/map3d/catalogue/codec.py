@@ -65,17 +65,13 @@ def load_rendering(row: RowLike) -> RenderingRecord:
         title=row["title"],
         attribution=row["attribution"],
         res_m=row["res_m"],
-        passes=tuple(tuple(load_layer(layer) for layer in layers) for layers in json.loads(row["passes"])),
+        passes=tuple(tuple(Layer.load(layer) for layer in layers) for layers in json.loads(row["passes"])),
         frames=tuple(load_frame(frame) for frame in json.loads(row["frames"])),
         box=load_box(json.loads(row["box"])),
         options=json.loads(row["options"]),
         content_version=row["content_version"],
         announced_version=row["announced_version"],
     )
-
-
-def load_layer(value: Mapping[str, Any]) -> Layer:
-    return Layer(**value)
 
 
 def load_frame(value: Mapping[str, Any]) -> PinnedFrame:

@@ -3,7 +3,8 @@
 import click
 
 from map3d.catalogue import Workspace
-from map3d.cli.options import json_option, layer_options, workspace_option
+from map3d.cli.layer_options import layer_options
+from map3d.cli.options import json_option, workspace_option
 from map3d.cli.output import print_json
 from map3d.jobs.layers import LayerRequest
 

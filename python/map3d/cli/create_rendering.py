@@ -7,7 +7,8 @@ import click
 
 from map3d.catalogue import Workspace
 from map3d.cli.building import build_with_progress
-from map3d.cli.options import View, cores, json_option, layer_options, workspace_option
+from map3d.cli.layer_options import layer_options
+from map3d.cli.options import View, cores, json_option, workspace_option
 from map3d.cli.output import print_json
 from map3d.errors import BadRequest
 from map3d.types import ViewAngles

@@ -2,16 +2,14 @@
 
 import os
 import re
-from collections.abc import Callable, Sequence
-from functools import wraps
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final, TypeVar, cast
+from typing import Any, Final, TypeVar
 
 import click
 
 from map3d.catalogue import Workspace
-from map3d.jobs.layers import LayerRequest
-from map3d.types import COLOR_FORMATS, LAYER_KINDS, ViewAngles
+from map3d.types import ViewAngles
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -64,31 +62,6 @@ class View(click.ParamType):  # type: ignore[type-arg]
             return ViewAngles(float(look_at), float(pitch) if slash else 45.0)
         except ValueError:
             self.fail(f"{value!r} is not a view; write look-at/pitch in degrees, e.g. 45/22.5 (0 looks north, 45 north-west)", param, ctx)
-
-
-def layer_options(*, default: Sequence[str] = LAYER_KINDS) -> Callable[[Command], Command]:
-    """`--layers` and what goes with it: passed together as `layers`, a LayerRequest. Without a `default`, `--layers` is required."""
-
-    def add(command: Command) -> Command:
-        @wraps(command)
-        def gathered(*args: Any, layers: str, color: str, quality: int, **rest: Any) -> Any:
-            names = tuple(part.strip() for part in layers.split(",") if part.strip())
-            return command(*args, layers=LayerRequest(names, color, quality), **rest)
-
-        for option in reversed(_layer_options(default)):
-            gathered = option(gathered)
-        return cast(Command, gathered)
-
-    return add
-
-
-def _layer_options(default: Sequence[str]) -> list[Callable[[Any], Any]]:
-    layers = {"default": ",".join(default), "show_default": True} if default else {"required": True}
-    return [
-        click.option("--layers", help="Which layers: KIND or NAME=KIND, with commas between.", **layers),
-        click.option("--color", type=click.Choice(list(COLOR_FORMATS)), default="webp", show_default=True, help="Format of the colour layer."),
-        click.option("--quality", type=click.IntRange(1, 100), default=80, show_default=True, help="Of webp and jpeg."),
-    ]
 
 
 def cores() -> int:

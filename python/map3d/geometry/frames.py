@@ -256,4 +256,10 @@ def _check_request(box: Box, tile_px: int, res_m: float, angles: Sequence[ViewAn
 
 def _layer_json(layer: Layer) -> dict[str, Any]:
     row: dict[str, Any] = {"kind": layer.kind, "format": layer.format}
-    return row if layer.quality is None else {**row, "quality": layer.quality}
+    if layer.quality is not None:
+        row["quality"] = layer.quality
+    if layer.suns:
+        row["suns"] = [list(sun.direction) for sun in layer.suns]
+    if layer.radius_m is not None:
+        row["radius_m"] = layer.radius_m
+    return row

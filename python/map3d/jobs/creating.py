@@ -36,7 +36,7 @@ class RenderingRequest:
     def check(self, catalogue: Catalogue) -> None:
         """Raises BadRequest for what can be told before the scene is built, NotFound."""
         check_name(self.name, "rendering")
-        catalogue.scene(self.scene)
+        scene = catalogue.scene(self.scene)
         for view in self.views:
             check_angles(view)
         if self.window is not None:
@@ -47,7 +47,7 @@ class RenderingRequest:
             catalogue.rendering(self.name)
         else:
             _check_free(catalogue, self.name)
-        self.layers.check()
+        self.layers.check(scene)
 
 
 def create_rendering(workspace: Workspace, catalogue: Catalogue, request: RenderingRequest) -> RenderingRecord:
@@ -60,7 +60,17 @@ def create_rendering(workspace: Workspace, catalogue: Catalogue, request: Render
     res_m = choose_res(box, request)
     frames = tuple(pin(box, request.tile_px, res_m, request.views, window))
     options = {} if window is None else {WINDOW: asdict(window)}
-    record = RenderingRecord(request.name, request.scene, res_m, (request.layers.layers(),), frames, box, request.title, request.attribution, options)
+    record = RenderingRecord(
+        request.name,
+        request.scene,
+        res_m,
+        (request.layers.layers(catalogue.scene(request.scene), box),),
+        frames,
+        box,
+        request.title,
+        request.attribution,
+        options,
+    )
     if request.regrid:
         kept = catalogue.regrid(record)
         _remove_stores(workspace, kept)
@@ -88,9 +98,10 @@ def add_layers(catalogue: Catalogue, name: str, request: LayerRequest) -> Render
     Raises NotFound, BadRequest for a name that is there, and what `LayerRequest.layers` raises.
     """
     record = catalogue.rendering(name)
-    if twice := sorted({layer.name for layer in record.layers} & set(request.check())):
+    scene = catalogue.scene(record.scene)
+    if twice := sorted({layer.name for layer in record.layers} & set(request.check(scene))):
         raise BadRequest(f"rendering {name}: layer {', '.join(twice)} is there already; give the new one another name, as NAME=KIND")
-    return catalogue.add_pass(name, request.layers())
+    return catalogue.add_pass(name, request.layers(scene, record.box))
 
 
 def choose_res(box: Box, request: RenderingRequest) -> float:

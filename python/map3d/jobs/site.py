@@ -16,7 +16,7 @@ from map3d.jobs.creating import RenderingRequest, create_rendering
 from map3d.jobs.layers import LayerRequest
 from map3d.render.build import open_scene
 from map3d.render.plan import planned_occupancy
-from map3d.types import ViewAngles
+from map3d.types import Layer, ViewAngles
 
 RESOLUTIONS_M: Final = (0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 MOST_BASE_TILES: Final = 30_000
@@ -97,7 +97,7 @@ def choose_res(workspace: Workspace, request: SiteRequest) -> float:
     scene = open_scene(workspace, request.name)
     box, tile_px, covered_m2 = scene.box, 256, 0.0
     frames = pin(box, tile_px, RESOLUTIONS_M[0], request.views)
-    layers = LayerRequest(("color",)).layers()
+    layers = (Layer("color", "color", "webp", 80),)
     probe = RenderingRecord(request.name, request.name, RESOLUTIONS_M[0], (layers,), tuple(frames), box)
     for frame in frames:
         level = min(frame.zmax, _PROBE_LEVEL)

@@ -17,7 +17,8 @@ SEAM_VERSION: Final = 1
 _SEAM_HEAD: Final = struct.Struct("<4sIII")
 _SEAM_ARRAYS: Final = 4
 _FORMATS: Final = {"webp": "WEBP", "png": "PNG", "jpeg": "JPEG"}
-_MODES: Final = {"normal": ("RGB",), "id": ("RGBA",), "depth": ("RGBA",)}
+_MODES: Final = {"normal": ("RGB",), "id": ("RGBA",), "depth": ("RGBA",), "depth2": ("RGBA",), "sun": ("L",), "ao": ("L",), "sun16": ("LA",)}
+_COLOR_MODES: Final = ("RGB", "RGBA")
 
 
 def decode_tile(layer: Layer, data: bytes, tile_px: int) -> NDArray[np.uint8]:
@@ -28,9 +29,10 @@ def decode_tile(layer: Layer, data: bytes, tile_px: int) -> NDArray[np.uint8]:
             mode = image.mode
     except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
         raise Corrupt(f"not a {layer.format} image: {error}") from error
-    if pixels.shape[:2] != (tile_px, tile_px) or mode not in _MODES.get(layer.kind, ("RGB", "RGBA")):
-        raise Corrupt(f"{mode} of {pixels.shape[1]} × {pixels.shape[0]} px, expected {tile_px} × {tile_px}")
-    return pixels
+    modes = _MODES.get(layer.kind, _COLOR_MODES)
+    if pixels.shape[:2] != (tile_px, tile_px) or mode not in modes:
+        raise Corrupt(f"{mode} of {pixels.shape[1]} × {pixels.shape[0]} px, expected {' or '.join(modes)} of {tile_px} × {tile_px}")
+    return pixels.reshape(tile_px, tile_px, -1)
 
 
 def ids_of(pixels: NDArray[np.uint8]) -> NDArray[np.uint32]:

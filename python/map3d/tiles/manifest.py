@@ -3,7 +3,7 @@
 import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Final, Self
 
 from map3d.errors import BadRequest, Corrupt, Map3dError, UnknownVersion
@@ -11,7 +11,7 @@ from map3d.geometry.frames import PinnedFrame
 from map3d.geometry.views import parse_view_id
 from map3d.tiles.naming import block_level, block_levels, block_of, parse_tile
 from map3d.tiles.occupancy import Occupancy
-from map3d.types import DEPTH_UNIT_M, BlockId, Box, Layer, TileId, Vec3, ViewAngles, check_name
+from map3d.types import DEPTH_KINDS, DEPTH_UNIT_M, BlockId, Box, Layer, TileId, Vec3, ViewAngles, check_name
 
 VERSION: Final = 1
 SHARD_SIZE: Final = 1024
@@ -156,7 +156,13 @@ def _document(data: bytes | str, where: str) -> dict[str, Any]:
 
 def _layer_json(layer: Layer) -> dict[str, Any]:
     row: dict[str, Any] = {"name": layer.name, "kind": layer.kind, "format": layer.format, "media_type": layer.media_type}
-    return {**row, "unit_m": DEPTH_UNIT_M} if layer.kind == "depth" else row
+    if layer.kind in DEPTH_KINDS:
+        row["unit_m"] = DEPTH_UNIT_M
+    if layer.suns:
+        row["suns"] = [{**asdict(sun), "direction": list(sun.direction)} for sun in layer.suns]
+    if layer.radius_m is not None:
+        row["radius_m"] = layer.radius_m
+    return row
 
 
 def _view_json(view: ViewFacts, passes: Sequence[Sequence[Layer]]) -> dict[str, Any]:
@@ -190,7 +196,7 @@ def _commonest(versions: Mapping[BlockId, int]) -> int:
 
 def _load_passes(value: Mapping[str, Any]) -> tuple[tuple[Layer, ...], ...]:
     """The first view says which layers were added later."""
-    layers = {row["name"]: Layer(row["name"], row["kind"], row["format"]) for row in value["layers"]}
+    layers = {row["name"]: Layer.load(row) for row in value["layers"]}
     if len(layers) != len(value["layers"]):
         raise Corrupt("a layer is there twice")
     later = [tuple(layers.pop(name) for name in added["layers"]) for added in value["views"][0].get("passes", ())]

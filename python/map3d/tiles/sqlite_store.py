@@ -6,6 +6,7 @@ import sqlite3
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
@@ -216,7 +217,7 @@ class SqliteTileStore:
         if version != FORMAT_VERSION:
             raise UnknownVersion(f"{self.path}: tile store of version {version}; this map3d reads version {FORMAT_VERSION}")
         try:
-            layers = tuple(Layer(**row) for row in json.loads(meta["layers"]))
+            layers = tuple(Layer.load(row) for row in json.loads(meta["layers"]))
             return StoreShape(int(meta["tile_px"]), int(meta["zmax"]), layers)
         except (KeyError, ValueError, TypeError, Map3dError) as error:
             raise Corrupt(f"{self.path}: the tile store does not say what it holds: {error}") from error
@@ -244,7 +245,7 @@ def _is_frozen(path: Path) -> bool:
 
 def _write_empty(path: Path, shape: StoreShape) -> None:
     """The finished file has no WAL beside it, so that it can be linked to its name."""
-    layers = [{"name": layer.name, "kind": layer.kind, "format": layer.format, "quality": layer.quality} for layer in shape.layers]
+    layers = [asdict(layer) for layer in shape.layers]
     meta = {"version": FORMAT_VERSION, "tile_px": shape.tile_px, "zmax": shape.zmax, "layers": json.dumps(layers)}
     connection = sqlite3.connect(path, isolation_level=None)
     try:
