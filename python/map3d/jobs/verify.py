@@ -55,7 +55,8 @@ def verify_rendering(workspace: Workspace, catalogue: Catalogue, name: str, find
         ids = np.array([item.id for item in registry.objects()], dtype=np.uint32)
     for frame in record.frames:
         found = {track.id: check_track(workspace, catalogue, record, track, scene, ids, findings, progress) for track in record.tracks_of(frame)}
-        _check_passes(record, found, findings)
+        if _is_complete(catalogue, record):
+            _check_passes(record, found, findings)
     _check_manifest(workspace, catalogue, record, scene, findings)
 
 
@@ -81,18 +82,22 @@ def _check_plan(catalogue: Catalogue, record: RenderingRecord, scene: _core.Scen
     findings.count("blocks", len(planned))
 
 
-def _check_passes(record: RenderingRecord, found: Mapping[str, set[TileId]], findings: Findings) -> None:
-    """Every pass of a view has the same tiles. `found`: of each track, the first pass first."""
+def _check_passes(record: RenderingRecord, found: Mapping[str, set[TileId] | None], findings: Findings) -> None:
+    """Every pass of a view has the same tiles, unless nothing of it is rendered yet. `found`: of each track, the first pass first."""
     (first, tiles), *later = found.items()
     for track, others in later:
-        for tile in sorted(tiles ^ others):
+        for tile in sorted(tiles ^ others) if tiles is not None and others is not None else ():
             findings.add(f"{record.name} tile {tile.z}/{tile.x}/{tile.y}: tracks {first} and {track} differ in having it")
+
+
+def _is_complete(catalogue: Catalogue, record: RenderingRecord) -> bool:
+    counts = catalogue.count_jobs(record.name)
+    return counts[State.DONE] == sum(counts.values())
 
 
 def _check_manifest(workspace: Workspace, catalogue: Catalogue, record: RenderingRecord, scene: _core.Scene, findings: Findings) -> None:
     path = workspace.manifest_path(record.name)
-    counts = catalogue.count_jobs(record.name)
-    if counts[State.DONE] != sum(counts.values()):
+    if not _is_complete(catalogue, record):
         return
     try:
         found = Manifest.load(path.read_bytes(), str(path)).to_json()

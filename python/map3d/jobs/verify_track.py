@@ -30,14 +30,14 @@ def check_track(
     ids: NDArray[np.uint32],
     findings: Findings,
     progress: Progress,
-) -> set[TileId]:
-    """`ids`: of all objects in the registry, sorted. Returns the tiles that are there."""
+) -> set[TileId] | None:
+    """`ids`: of all objects in the registry, sorted. Returns the tiles that are there; None: not one block is done."""
     jobs = {job.block: job for job in catalogue.jobs(record.name, track.id)}
     path = workspace.store_path(record.name, track.id)
     if not path.is_file():
         if any(job.state is State.DONE for job in jobs.values()):
             findings.add(f"{path}: not there, though jobs of it are done")
-        return set()
+        return None
     with SqliteTileStore(path, read_only=True) as store:
         check = _TrackCheck(f"{record.name} {track.id}", store, track, jobs, findings, progress)
         for line in store.check():
@@ -47,7 +47,7 @@ def check_track(
         check.pyramid(tiles, planned_occupancy(scene, record, track.frame))
         check.images(tiles, ids)
         check.reduces()
-    return tiles
+    return tiles if any(job.state is State.DONE for job in jobs.values()) else None
 
 
 @dataclass
