@@ -1,4 +1,4 @@
-"""`python -m bench [PART …] [--json]`; parts: tiles, encoding, ingest, incremental (these, unless some are named), extent."""
+"""`python -m bench [PART …] [--json]`; parts: tiles, encoding, ingest, incremental (these, unless some are named), extent, stored."""
 
 import argparse
 import json
@@ -9,31 +9,34 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from . import encoding, extent, incremental, ingest, tiles
+from . import encoding, extent, incremental, ingest, stored, tiles
+from .scene import CACHE
 
 PARTS = ("tiles", "encoding", "ingest", "incremental")
-LONG = ("extent",)
+ASKED = ("extent", "stored")
 Rows = list[dict[str, Any]]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="bench", description="Speed, peers beside us in the same run.")
-    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)} (these unless given), {', '.join(LONG)}")
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)} (these unless given), {', '.join(ASKED)}")
     parser.add_argument("--millions", type=float, nargs="+", default=extent.MILLIONS, help="extent: sizes in million triangles")
     parser.add_argument("--buildings", type=int, default=300, help="tiles: of the town")
     parser.add_argument("--res", type=float, default=0.2, help="tiles: metres a pixel")
     parser.add_argument("--tiles", type=int, default=48, help="tiles: how many")
+    parser.add_argument("--folders", type=Path, nargs="+", default=[CACHE], help="stored: where renderings or published folders lie")
     parser.add_argument("--json", action="store_true", help="print one JSON document after the tables")
     options = parser.parse_args()
-    unknown = [part for part in options.parts if part not in PARTS + LONG]
+    unknown = [part for part in options.parts if part not in PARTS + ASKED]
     if unknown:
-        parser.error(f"no part {unknown[0]}; there are {', '.join(PARTS + LONG)}")
+        parser.error(f"no part {unknown[0]}; there are {', '.join(PARTS + ASKED)}")
     measures: dict[str, Callable[[], Rows]] = {
         "tiles": lambda: of_tiles(options.buildings, options.res, options.tiles),
         "encoding": encoding.measure,
         "ingest": ingest.measure,
         "incremental": incremental.measure,
         "extent": lambda: extent.measure(tuple(options.millions), plots=Path("docs/plots")),
+        "stored": lambda: stored.measure(options.folders),
     }
     rows = {part: measures[part]() for part in options.parts or PARTS}
     if options.json:

@@ -78,7 +78,7 @@ LOSSLESS = ("png", "lossless", "level 1", "level 6", "level 9")
 
 
 def _of_color(arrays: list[NDArray[Any]], pixels: list[Pixels]) -> dict[str, Encode]:
-    images = [Image.fromarray(tile if (tile[..., 3] < 255).any() else np.ascontiguousarray(tile[..., :3])) for tile in pixels]
+    images = [Image.fromarray(tile) for tile in pixels]
     plain = [image.convert("RGB") for image in images]
     found: dict[str, Encode] = {}
     for form in ("webp", "jpeg"):
@@ -122,7 +122,7 @@ def _saved(image: Image.Image, form: str, **options: Any) -> bytes:
 
 def _psnr(tile: Pixels, data: bytes) -> float:
     seen = np.array(Image.open(io.BytesIO(data)).convert("RGB"), float)
-    covered = tile[..., 3] == 255
+    covered = tile[..., 3] == 255 if tile.shape[-1] == 4 else np.ones(tile.shape[:2], bool)
     error = ((seen - tile[..., :3])[covered] ** 2).mean()
     return float(10 * np.log10(255**2 / max(error, 1e-9)))
 

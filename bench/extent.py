@@ -88,9 +88,9 @@ def _measured(workspace: Workspace, folder: Path, millions: float, blocks: int) 
     work = _watched([*program, "render", str(workspace.root), name, str(blocks), str(out)], folder)
     answer: Row = json.loads(out.read_text())
     out.unlink()
-    figures = {f"build_{key}": value for key, value in asdict(built).items() if key in ("wall_s", "cpu_s", "memory_bytes")}
+    figures = {f"build_{key}": value for key, value in asdict(built).items() if key in ("wall_s", "cpu_s", "memory_bytes", "anonymous_bytes")}
     sizes = {"millions": millions, "districts": count, "extent_m": pitch_m, "disk_bytes": built.disk_bytes}
-    return {**sizes, **answer, **figures, "memory_bytes": work.memory_bytes}
+    return {**sizes, **answer, **figures, "memory_bytes": work.memory_bytes, "anonymous_bytes": work.anonymous_bytes}
 
 
 def _forget_build(workspace: Workspace, catalogue: Catalogue) -> None:
@@ -113,10 +113,12 @@ COLUMNS = (
     "triangles, M",
     "build, CPU s per M",
     "build, MiB",
+    "of it not files",
     "open, s",
     "plan, s",
     "base blocks",
     "render, MiB",
+    "of it not files",
     "tile, ms",
     "CPU ms",
     "chunks missed",
@@ -130,10 +132,12 @@ def cells(row: Row) -> Iterator[str]:
     yield f"{million:.1f}"
     yield f"{row['build_cpu_s'] / million:.2f}"
     yield f"{row['build_memory_bytes'] / MIB:,.0f}"
+    yield f"{row['build_anonymous_bytes'] / MIB:,.0f}"
     yield f"{row['open_s']:.2f}"
     yield f"{row['plan_s']:.2f}"
     yield f"{row['base_blocks']:,}"
     yield f"{row['memory_bytes'] / MIB:,.0f}"
+    yield f"{row['anonymous_bytes'] / MIB:,.0f}"
     yield f"{row['wall_tile_ms']:.1f}"
     yield f"{row['cpu_tile_ms']:.1f}"
     for what in ("chunk", "texture"):

@@ -5,6 +5,7 @@ BLOCKS of the base blocks are rendered: runs of RUN that follow each other in th
 """
 
 import json
+import os
 import sys
 import threading
 import time
@@ -22,6 +23,8 @@ from map3d.render.build import build, open_scene
 from map3d.render.plan import frame_text, plan_jobs
 from map3d.tiles.naming import morton
 
+from .watch import resident
+
 WORKERS, MAX_MEMORY_BYTES, RUN = 2, 1 << 30, 5
 
 
@@ -32,10 +35,15 @@ def open_work(setup: Mapping[str, Any]) -> Work:
     def work(question: dict[str, Any], _blobs: list[bytes], _tell: Tell) -> tuple[dict[str, Any], Sequence[bytes]]:
         begun, spent = time.perf_counter(), time.process_time()
         block = scene.render_block(setup["frame"], *question["block"])
-        stats = block.stats
-        return {"wall_s": time.perf_counter() - begun, "cpu_s": time.process_time() - spent, "stats": stats, "scene": scene.stats()}, []
+        times = {"wall_s": time.perf_counter() - begun, "cpu_s": time.process_time() - spent}
+        return {**times, "stats": block.stats, "scene": scene.stats(), "memory": memory()}, []
 
     return work
+
+
+def memory() -> dict[str, int]:
+    """Of this process, bytes: the most that was ever resident, and what is now without mapped files."""
+    return {"peak": resident(os.getpid(), "VmHWM:"), "anonymous": resident(os.getpid(), "RssAnon:")}
 
 
 def built(workspace: Path, scene: str) -> None:
@@ -60,6 +68,7 @@ def rendered(workspace: Path, rendering: str, blocks: int) -> dict[str, Any]:
     opened = time.perf_counter()
     jobs = [job for job in plan_jobs(scene, record, {}) if job.kind == "base"]
     planned = time.perf_counter()
+    parent = memory()
     setup = {
         "scene": str(place.scene_folder(record.scene).absolute()),
         "cache_bytes": Settings(WORKERS, MAX_MEMORY_BYTES).cache_bytes,
@@ -69,6 +78,8 @@ def rendered(workspace: Path, rendering: str, blocks: int) -> dict[str, Any]:
     return {
         "triangles": scene.triangle_count,
         "base_blocks": len(jobs),
+        "parent": parent,
+        "children": [part[-1]["memory"] for part in answers if part],
         "open_s": opened - begun,
         "plan_s": planned - opened,
         "render_s": time.perf_counter() - planned,

@@ -14,11 +14,13 @@ MEMORY_S, DISK_S = 0.2, 5.0
 
 @dataclass
 class Figures:
-    """`memory_bytes`: the most that the processes alive at one moment had ever resident, summed over them (VmHWM, mapped files included)."""
+    """`memory_bytes`: the most that the processes alive at one moment had ever resident, summed over them (VmHWM, mapped files included);
+    `anonymous_bytes`: the most that they had at one moment without mapped files, which the system takes back when it needs room."""
 
     wall_s: float = 0.0
     cpu_s: float = 0.0
     memory_bytes: int = 0
+    anonymous_bytes: int = 0
     disk_peak_bytes: int = 0
     disk_bytes: int = 0
     runs: int = 0
@@ -31,13 +33,16 @@ class Watch:
     process: int
     folder: Path
     memory_bytes: int = 0
+    anonymous_bytes: int = 0
     disk_bytes: int = 0
     ended: threading.Event = field(default_factory=threading.Event)
 
     def run(self) -> None:
         next_disk = 0.0
         while not self.ended.wait(MEMORY_S):
-            self.memory_bytes = max(self.memory_bytes, sum(map(high_water, family(self.process))))
+            members = family(self.process)
+            self.memory_bytes = max(self.memory_bytes, sum(map(high_water, members)))
+            self.anonymous_bytes = max(self.anonymous_bytes, sum(resident(member, "RssAnon:") for member in members))
             if time.monotonic() >= next_disk:
                 self.disk_bytes = max(self.disk_bytes, used_bytes(self.folder))
                 next_disk = time.monotonic() + DISK_S
@@ -63,6 +68,7 @@ def watched(command: Sequence[str], folder: Path, figures: Figures) -> int:
         figures.wall_s += time.monotonic() - begun
         figures.cpu_s += after.children_user + after.children_system - before.children_user - before.children_system
         figures.memory_bytes = max(figures.memory_bytes, watch.memory_bytes)
+        figures.anonymous_bytes = max(figures.anonymous_bytes, watch.anonymous_bytes)
         figures.disk_bytes = used_bytes(folder)
         figures.disk_peak_bytes = max(figures.disk_peak_bytes, watch.disk_bytes, figures.disk_bytes)
         figures.runs += 1
@@ -86,11 +92,16 @@ def family(process: int) -> list[int]:
 
 def high_water(process: int) -> int:
     """VmHWM in bytes; 0 of a process that has ended."""
+    return resident(process, "VmHWM:")
+
+
+def resident(process: int, what: str) -> int:
+    """A line of /proc/…/status in bytes; 0 of a process that has ended."""
     try:
         lines = Path(f"/proc/{process}/status").read_text().splitlines()
     except OSError:
         return 0
-    return next((int(line.split()[1]) << 10 for line in lines if line.startswith("VmHWM:")), 0)
+    return next((int(line.split()[1]) << 10 for line in lines if line.startswith(what)), 0)
 
 
 def used_bytes(folder: Path) -> int:

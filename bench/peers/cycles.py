@@ -25,9 +25,7 @@ MAX_NAMES = 32_767
 class Cycles:
     def __init__(self, folder: Path, samples: int = 16) -> None:
         if not PYTHON.exists():
-            raise Missing(
-                f"Blender Cycles ({PYTHON} is not there); python3 -m venv .cache/cycles && {PYTHON} -m pip install -r requirements/cycles.lock"
-            )
+            raise Missing(f"Blender Cycles ({PYTHON} is not there); make bench-cycles")
         self._samples = samples
         self._room = tempfile.TemporaryDirectory(prefix="bench-", dir="/dev/shm")
         self._file = Path(self._room.name, "layers.exr")
