@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 use crate::tile::{MAX_LEVEL, Tile};
-use crate::vec3::Vec3;
+use crate::vec3::{Vec3, length};
 use crate::view::ViewAxes;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -14,6 +14,11 @@ pub enum LayerKind {
     Normal,
     Id,
     Depth,
+    Sun,
+    Sun16,
+    Ao,
+    Depth2,
+    Picture,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -24,17 +29,56 @@ pub enum LayerFormat {
     Jpeg,
 }
 
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// How a layer is made and sent (spec/pyramid.md §6, §10).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LayerSpec {
     pub kind: LayerKind,
     pub format: LayerFormat,
     /// For lossy formats, 1..=100.
     #[serde(default = "default_quality")]
     pub quality: u8,
+    /// Towards the suns of `Sun` and `Picture` (one) and `Sun16` (up to 16), local axes.
+    #[serde(default)]
+    pub suns: Vec<Vec3>,
+    /// Of `Ao` and `Picture`.
+    #[serde(default)]
+    pub radius_m: f64,
 }
 
 fn default_quality() -> u8 {
     80
+}
+
+/// Suns of `Sun16` at most.
+pub const MAX_SUNS: usize = 16;
+const MAX_RADIUS_M: f64 = 1000.0;
+
+impl LayerSpec {
+    /// A layer of quality 80 without suns.
+    pub fn new(kind: LayerKind, format: LayerFormat) -> Self {
+        Self { kind, format, quality: default_quality(), suns: Vec::new(), radius_m: 0.0 }
+    }
+
+    fn validate(&self) -> Result<()> {
+        let kind = self.kind;
+        let expected = match kind {
+            LayerKind::Sun | LayerKind::Picture => 1..=1,
+            LayerKind::Sun16 => 1..=MAX_SUNS,
+            _ => 0..=0,
+        };
+        if !expected.contains(&self.suns.len()) {
+            return Err(Error::argument(format!("layer {kind:?}: {} suns, expected {} to {}", self.suns.len(), expected.start(), expected.end())));
+        }
+        let is_unit = |v: &Vec3| (length(*v) - 1.0).abs() < 1e-6;
+        if let Some(sun) = self.suns.iter().find(|s| !is_unit(s)) {
+            return Err(Error::argument(format!("layer {kind:?}: {sun:?} is no unit vector towards a sun")));
+        }
+        let has_radius = matches!(kind, LayerKind::Ao | LayerKind::Picture);
+        if has_radius && !(self.radius_m > 0.0 && self.radius_m <= MAX_RADIUS_M) {
+            return Err(Error::argument(format!("layer {kind:?}: radius_m is {}, expected more than 0 and at most {MAX_RADIUS_M}", self.radius_m)));
+        }
+        Ok(())
+    }
 }
 
 /// One view's square, pinned when the rendering was created. Local metres.
@@ -74,7 +118,16 @@ impl Frame {
         if self.zmax > MAX_LEVEL {
             return Err(Error::argument(format!("frame: zmax is {}, at most {MAX_LEVEL}", self.zmax)));
         }
-        Ok(())
+        let twice = (1..self.layers.len()).find(|k| self.layers[..*k].iter().any(|l| l.kind == self.layers[*k].kind));
+        if let Some(k) = twice {
+            return Err(Error::argument(format!("frame: two layers are {:?}; a pass has one of a kind", self.layers[k].kind)));
+        }
+        self.layers.iter().try_for_each(LayerSpec::validate)
+    }
+
+    /// The layer of a kind.
+    pub fn layer(&self, kind: LayerKind) -> Option<&LayerSpec> {
+        self.layers.iter().find(|l| l.kind == kind)
     }
 
     pub fn axes(&self) -> ViewAxes {

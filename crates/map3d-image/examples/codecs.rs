@@ -55,7 +55,7 @@ fn codecs() -> Vec<Codec> {
         }
     }
     for kind in [LayerKind::Color, LayerKind::Normal, LayerKind::Id, LayerKind::Depth] {
-        let spec = LayerSpec { kind, format: if kind == LayerKind::Color { LayerFormat::Webp } else { LayerFormat::Png }, quality: 80 };
+        let spec = LayerSpec::new(kind, if kind == LayerKind::Color { LayerFormat::Webp } else { LayerFormat::Png });
         let encoder = std::cell::RefCell::new(Encoder::new());
         out.push((format!("{kind:?} as shipped"), Box::new(move |g| encoder.borrow_mut().layer(g, &spec).expect("encodes"))));
     }

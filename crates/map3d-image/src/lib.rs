@@ -11,6 +11,6 @@ pub mod srgb;
 pub mod texture;
 
 pub use decode::ImageLimits;
-pub use gbuffer::GBuffer;
+pub use gbuffer::{Arrays, GBuffer};
 pub use raster::Raster;
 pub use reduce::reduce;

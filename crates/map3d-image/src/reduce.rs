@@ -2,50 +2,99 @@
 
 use map3d_base::DEPTH_NOTHING;
 
-use crate::gbuffer::{GBuffer, normal_from_vector};
+use crate::gbuffer::{Arrays, GBuffer, normal_from_vector};
 
 /// A mean shorter than this has no direction.
 const MIN_MEAN: f64 = 1e-6;
 
-/// The parent of four children in the order TL, TR, BL, BR; `None`: a child without content. All children are `side` × `side` px, even.
+/// The parent of four children in the order TL, TR, BL, BR; `None`: a child without content. All children are `side` × `side` px, even, and have the
+/// same arrays.
 pub fn reduce(children: [Option<&GBuffer>; 4], side: u32) -> GBuffer {
     assert!(side.is_multiple_of(2), "a tile's side is even, not {side}");
-    let mut parent = GBuffer::empty(side, side);
+    let arrays = children.iter().flatten().next().map_or(Arrays::STANDARD, |c| c.arrays());
+    let mut parent = GBuffer::with(side, side, arrays);
     for (number, child) in children.into_iter().enumerate() {
         let Some(child) = child else { continue };
-        assert_eq!((child.width, child.height), (side, side), "a child's size");
+        assert_eq!((child.width, child.height, child.arrays()), (side, side, arrays), "a child's size and arrays");
         let half = side as usize / 2;
         let (left, top) = (number % 2 * half, number / 2 * half);
         for y in 0..half {
-            reduce_row(child, y, &mut parent, (top + y) * side as usize + left);
+            let rows = Rows { width: side as usize, y, at: (top + y) * side as usize + left };
+            rows.ids(child, &mut parent);
+            rows.colors(&child.color, &mut parent.color);
+            rows.colors(&child.picture, &mut parent.picture);
+            rows.shades(child, &child.sun, &mut parent.sun);
+            rows.shades(child, &child.ao, &mut parent.ao);
         }
     }
     parent
 }
 
-/// One row of a quadrant: two rows of the child.
-fn reduce_row(child: &GBuffer, y: usize, parent: &mut GBuffer, at: usize) {
-    let w = child.width as usize;
-    let (upper, lower) = (2 * y * w..(2 * y + 1) * w, (2 * y + 1) * w..(2 * y + 2) * w);
-    let half = w / 2;
-    let colors = pairs(&child.color[upper.clone()], &child.color[lower.clone()]);
-    for (to, four) in parent.color[at..at + half].iter_mut().zip(colors) {
-        *to = mean_color(four);
+/// Two rows of a child and the half row of the parent that they make.
+struct Rows {
+    /// Of the child.
+    width: usize,
+    /// Of the half row, in its quadrant.
+    y: usize,
+    /// First pixel of the half row.
+    at: usize,
+}
+
+impl Rows {
+    /// 2 × 2 squares, in the order TL, TR, BL, BR.
+    fn squares<'a, T: Copy>(&self, array: &'a [T]) -> impl Iterator<Item = [T; 4]> + use<'a, T> {
+        let w = self.width;
+        pairs(&array[2 * self.y * w..(2 * self.y + 1) * w], &array[(2 * self.y + 1) * w..(2 * self.y + 2) * w])
     }
-    let ids = pairs(&child.id[upper.clone()], &child.id[lower.clone()]);
-    let depths = pairs(&child.depth[upper.clone()], &child.depth[lower.clone()]);
-    let normals = pairs(&child.normal[upper], &child.normal[lower]);
-    for (x, ((ids, depths), normals)) in ids.zip(depths).zip(normals).enumerate() {
-        let id = winner(ids, depths);
-        if id == 0 {
-            continue;
+
+    /// Of a square of the half row.
+    fn square<T: Copy>(&self, array: &[T], x: usize) -> [T; 4] {
+        let (upper, lower) = (2 * self.y * self.width + 2 * x, (2 * self.y + 1) * self.width + 2 * x);
+        [array[upper], array[upper + 1], array[lower], array[lower + 1]]
+    }
+
+    fn ids(&self, child: &GBuffer, parent: &mut GBuffer) {
+        for (x, (ids, depths)) in self.squares(&child.id).zip(self.squares(&child.depth)).enumerate() {
+            let id = winner(ids, depths);
+            if id == 0 {
+                continue;
+            }
+            let of_id = [0, 1, 2, 3].map(|k| ids[k] == id);
+            let (nearest, depth) = nearest(of_id, depths);
+            let to = self.at + x;
+            (parent.id[to], parent.depth[to]) = (id, depth);
+            if !child.normal.is_empty() {
+                parent.normal[to] = mean_normal(of_id, self.square(&child.normal, x), nearest);
+            }
+            if !child.sun16.is_empty() {
+                parent.sun16[to] = self.square(&child.sun16, x)[nearest];
+            }
+            if !child.depth2.is_empty() {
+                let second = self.square(&child.depth2, x);
+                parent.depth2[to] = (0..4).filter(|k| of_id[*k]).map(|k| second[k]).min().expect("the nearest is of the id");
+            }
         }
-        let of_id = [0, 1, 2, 3].map(|k| ids[k] == id);
-        let (nearest, depth) = nearest(of_id, depths);
-        parent.id[at + x] = id;
-        parent.depth[at + x] = depth;
-        parent.normal[at + x] = mean_normal(of_id, normals, nearest);
     }
+
+    fn colors(&self, child: &[[u16; 4]], parent: &mut [[u16; 4]]) {
+        if !child.is_empty() {
+            parent[self.at..][..self.width / 2].iter_mut().zip(self.squares(child)).for_each(|(to, four)| *to = mean_color(four));
+        }
+    }
+
+    fn shades(&self, child: &GBuffer, array: &[u8], parent: &mut [u8]) {
+        if !array.is_empty() {
+            let fours = self.squares(array).zip(self.squares(&child.id));
+            parent[self.at..][..self.width / 2].iter_mut().zip(fours).for_each(|(to, (four, ids))| *to = mean_shade(four, ids));
+        }
+    }
+}
+
+/// Over the children that have an id, rounded half up; 255 when none has.
+fn mean_shade(four: [u8; 4], ids: [u32; 4]) -> u8 {
+    let there = (0..4).filter(|k| ids[*k] != 0);
+    let (sum, count) = there.fold((0u32, 0u32), |(sum, count), k| (sum + u32::from(four[k]), count + 1));
+    if count == 0 { 255 } else { ((2 * sum + count) / (2 * count)) as u8 }
 }
 
 /// 2 × 2 squares of two rows, in the order TL, TR, BL, BR.

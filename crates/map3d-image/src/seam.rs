@@ -6,11 +6,11 @@ use bytemuck::Pod;
 use map3d_base::{Error, Result};
 use twox_hash::XxHash3_64;
 
-use crate::gbuffer::GBuffer;
+use crate::gbuffer::{Arrays, GBuffer};
 
 const MAGIC: &[u8; 4] = b"M3DG";
-const VERSION: u32 = 1;
-const HEADER_BYTES: usize = 16;
+const VERSION: u32 = 2;
+const HEADER_BYTES: usize = 20;
 const MAX_SIDE_PX: u32 = 4_096;
 const ZSTD_LEVEL: i32 = 1;
 
@@ -18,10 +18,12 @@ const ZSTD_LEVEL: i32 = 1;
 pub fn write_seam(g: &GBuffer) -> Vec<u8> {
     let mut out = Vec::new();
     out.extend_from_slice(MAGIC);
-    for n in [VERSION, g.width, g.height] {
+    for n in [VERSION, g.width, g.height, g.arrays().bits()] {
         out.extend_from_slice(&n.to_le_bytes());
     }
-    for bytes in [little_endian(&g.color), little_endian(&g.normal), little_endian(&g.id), little_endian(&g.depth)] {
+    let standard = [little_endian(&g.color), little_endian(&g.normal), little_endian(&g.id), little_endian(&g.depth)];
+    let further = [&g.sun, little_endian(&g.sun16), &g.ao, little_endian(&g.depth2), little_endian(&g.picture)];
+    for bytes in standard.into_iter().chain(further).filter(|b| !b.is_empty()) {
         let frame = zstd::bulk::compress(bytes, ZSTD_LEVEL).expect("memory to memory");
         out.extend_from_slice(&(frame.len() as u32).to_le_bytes());
         out.extend_from_slice(&frame);
@@ -50,12 +52,20 @@ pub fn read_seam(name: &str, bytes: &[u8]) -> Result<GBuffer> {
     if !(1..=MAX_SIDE_PX).contains(&width) || !(1..=MAX_SIDE_PX).contains(&height) {
         return Err(refuse(format!("{width} × {height} px, at most {MAX_SIDE_PX}")));
     }
-    let mut g = GBuffer::empty(width, height);
+    let Some(arrays) = Arrays::from_bits(number(16)) else {
+        return Err(refuse(format!("arrays {:#x}, of which this program does not know all", number(16))));
+    };
+    let mut g = GBuffer::with(width, height, arrays);
     let mut rest = &body[HEADER_BYTES..];
     fill(&mut g.color, &mut rest).map_err(&refuse)?;
     fill(&mut g.normal, &mut rest).map_err(&refuse)?;
     fill(&mut g.id, &mut rest).map_err(&refuse)?;
     fill(&mut g.depth, &mut rest).map_err(&refuse)?;
+    fill(&mut g.sun, &mut rest).map_err(&refuse)?;
+    fill(&mut g.sun16, &mut rest).map_err(&refuse)?;
+    fill(&mut g.ao, &mut rest).map_err(&refuse)?;
+    fill(&mut g.depth2, &mut rest).map_err(&refuse)?;
+    fill(&mut g.picture, &mut rest).map_err(&refuse)?;
     if !rest.is_empty() {
         return Err(refuse(format!("{} bytes too many", rest.len())));
     }
@@ -69,8 +79,11 @@ fn little_endian<T: Pod>(array: &[T]) -> &[u8] {
     bytemuck::cast_slice(array)
 }
 
-/// One array: length, frame; it must hold exactly the array.
+/// One array, unless it is not there: length, frame; it must hold exactly the array.
 fn fill<T: Pod>(array: &mut [T], rest: &mut &[u8]) -> std::result::Result<(), String> {
+    if array.is_empty() {
+        return Ok(());
+    }
     let (length, tail) = rest.split_first_chunk::<4>().ok_or("truncated")?;
     let length = u32::from_le_bytes(*length) as usize;
     let frame = tail.get(..length).ok_or("truncated")?;

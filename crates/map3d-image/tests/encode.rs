@@ -4,11 +4,11 @@ mod common;
 
 use common::{Random, noise};
 use map3d_base::{LayerFormat, LayerKind, LayerSpec};
-use map3d_image::GBuffer;
 use map3d_image::decode::decode;
 use map3d_image::encode::{Deflate, Encoder, Filter, bytes_from_normals, bytes_from_u32, color_from_linear, decode_png, encode_png};
 use map3d_image::gbuffer::normal_from_vector;
 use map3d_image::srgb::LINEAR16;
+use map3d_image::{Arrays, GBuffer};
 use serde_json::Value;
 
 fn data_vectors() -> Value {
@@ -42,7 +42,8 @@ fn png_round_trips_with_every_filter_and_deflate() {
     let rgb: Vec<u8> = image.pixels.iter().flat_map(|p| [p[0], p[1], p[2]]).collect();
     for filter in [Filter::None, Filter::Sub, Filter::Up, Filter::Average, Filter::Paeth] {
         for deflate in [Deflate::Fast, Deflate::Matching] {
-            for (channels, pixels) in [(3, &rgb[..]), (4, image.pixels.as_flattened())] {
+            let grey: Vec<u8> = rgb.iter().step_by(3).copied().collect();
+            for (channels, pixels) in [(1, &grey[..]), (2, &rgb[..2 * grey.len()]), (3, &rgb[..]), (4, image.pixels.as_flattened())] {
                 let back = decode_png(&encode_png((33, 17), channels, pixels, filter, deflate)).expect("sound");
                 assert_eq!((back.width, back.height, back.channels, &back.pixels[..]), (33, 17, channels, pixels), "{filter:?} {deflate:?}");
             }
@@ -59,7 +60,7 @@ fn data_layers_are_lossless() {
     g.normal.iter_mut().for_each(|v| *v = normal_from_vector([random.unit(), random.unit(), 0.1]).expect("has a direction"));
     let mut encoder = Encoder::new();
     let mut layer = |kind| {
-        let spec = LayerSpec { kind, format: LayerFormat::Png, quality: 80 };
+        let spec = LayerSpec::new(kind, LayerFormat::Png);
         let bytes = encoder.layer(&g, &spec).expect("encodes");
         assert_eq!(&bytes[24..29], &[8, if kind == LayerKind::Normal { 2 } else { 6 }, 0, 0, 0], "8 bit, colour type, not interlaced");
         decode_png(&bytes).expect("sound").pixels
@@ -70,14 +71,35 @@ fn data_layers_are_lossless() {
 }
 
 #[test]
+fn shades_and_suns_are_lossless() {
+    let mut random = Random(4);
+    let arrays = [LayerKind::Sun, LayerKind::Sun16, LayerKind::Ao, LayerKind::Depth2].into_iter().fold(Arrays::LEAST, Arrays::and);
+    let mut g = GBuffer::with(64, 64, arrays);
+    g.sun.iter_mut().for_each(|v| *v = random.bits() as u8);
+    g.ao.iter_mut().for_each(|v| *v = random.bits() as u8);
+    g.sun16.iter_mut().for_each(|v| *v = random.bits() as u16);
+    g.depth2.iter_mut().for_each(|v| *v = random.bits());
+    let layer = |kind, color_type: u8| {
+        let bytes = Encoder::new().layer(&g, &LayerSpec::new(kind, LayerFormat::Png)).expect("encodes");
+        assert_eq!(&bytes[24..26], &[8, color_type]);
+        decode_png(&bytes).expect("sound").pixels
+    };
+    assert_eq!(layer(LayerKind::Sun, 0), g.sun);
+    assert_eq!(layer(LayerKind::Ao, 0), g.ao);
+    assert_eq!(layer(LayerKind::Sun16, 4), g.sun16.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>());
+    assert_eq!(layer(LayerKind::Depth2, 6), bytes_from_u32(&g.depth2));
+    assert!(Encoder::new().layer(&g, &LayerSpec::new(LayerKind::Color, LayerFormat::Png)).is_err(), "an array that is not there");
+}
+
+#[test]
 fn data_layers_refuse_lossy_formats() {
     let g = GBuffer::empty(4, 4);
     for kind in [LayerKind::Id, LayerKind::Depth, LayerKind::Normal] {
         for format in [LayerFormat::Webp, LayerFormat::Jpeg] {
-            assert!(Encoder::new().layer(&g, &LayerSpec { kind, format, quality: 80 }).is_err());
+            assert!(Encoder::new().layer(&g, &LayerSpec::new(kind, format)).is_err());
         }
     }
-    assert!(Encoder::new().layer(&g, &LayerSpec { kind: LayerKind::Color, format: LayerFormat::Jpeg, quality: 0 }).is_err());
+    assert!(Encoder::new().layer(&g, &LayerSpec { quality: 0, ..LayerSpec::new(LayerKind::Color, LayerFormat::Jpeg) }).is_err());
     assert!(Encoder::new().color((4, 5), &g.color, LayerFormat::Png, 80).is_err());
 }
 
@@ -111,7 +133,7 @@ fn colour_formats_keep_coverage_where_they_have_alpha() {
         }
     }
     for (format, alpha) in [(LayerFormat::Png, true), (LayerFormat::Webp, true), (LayerFormat::Jpeg, false)] {
-        let bytes = Encoder::new().layer(&g, &LayerSpec { kind: LayerKind::Color, format, quality: 85 }).expect("encodes");
+        let bytes = Encoder::new().layer(&g, &LayerSpec { quality: 85, ..LayerSpec::new(LayerKind::Color, format) }).expect("encodes");
         let image = decode(std::path::Path::new("tile"), &bytes, &map3d_image::ImageLimits::default()).expect("decodes");
         assert_eq!((image.pixels[0][3], image.pixels[50][3]), (255, if alpha { 0 } else { 255 }), "{format:?}");
         assert!(image.pixels[10].iter().zip([179u8, 149, 109]).all(|(a, b)| a.abs_diff(b) < 6), "{format:?} {:?}", image.pixels[10]);
@@ -126,7 +148,7 @@ fn encoded_bytes_are_the_same_again() {
     g.color.iter_mut().for_each(|c| *c = [random.below(65_536) as u16, 5, 9, 65_535]);
     let mut reused = Encoder::new();
     for format in [LayerFormat::Png, LayerFormat::Webp, LayerFormat::Jpeg] {
-        let spec = LayerSpec { kind: LayerKind::Color, format, quality: 80 };
+        let spec = LayerSpec::new(LayerKind::Color, format);
         let first = reused.layer(&g, &spec).expect("encodes");
         assert_eq!(reused.layer(&g, &spec).expect("encodes"), first);
         assert_eq!(Encoder::new().layer(&g, &spec).expect("encodes"), first);

@@ -3,9 +3,9 @@
 mod common;
 
 use common::Random;
-use map3d_base::DEPTH_NOTHING;
+use map3d_base::{DEPTH_NOTHING, LayerKind};
 use map3d_image::seam::{read_seam, write_seam};
-use map3d_image::{GBuffer, reduce};
+use map3d_image::{Arrays, GBuffer, reduce};
 use serde_json::Value;
 
 fn random_tile(seed: u64, side: u32) -> GBuffer {
@@ -115,4 +115,60 @@ fn a_seam_whose_arrays_do_not_fit_its_size_is_refused() {
     let checksum = map3d_base::file::checksum(&bad[..body]);
     bad[body..].copy_from_slice(&checksum.to_le_bytes());
     assert!(read_seam("resized", &bad).is_err());
+}
+
+/// Id, depth and all that rays make.
+fn light_tile(seed: u64, side: u32) -> GBuffer {
+    let mut random = Random(seed);
+    let arrays =
+        [LayerKind::Sun, LayerKind::Sun16, LayerKind::Ao, LayerKind::Depth2, LayerKind::Picture].into_iter().fold(Arrays::LEAST, Arrays::and);
+    let mut g = GBuffer::with(side, side, arrays);
+    for i in 0..g.id.len() {
+        if random.below(4) != 0 {
+            (g.id[i], g.depth[i], g.depth2[i]) = (1 + random.below(3), random.below(5), 100 + random.below(9));
+            (g.sun[i], g.ao[i], g.sun16[i]) = (random.below(256) as u8, random.below(256) as u8, random.below(65_536) as u16);
+            g.picture[i] = [(); 4].map(|()| random.below(65_536) as u16);
+        }
+    }
+    g
+}
+
+#[test]
+fn shades_are_means_of_what_is_there() {
+    let mut child = GBuffer::with(2, 2, Arrays::LEAST.and(LayerKind::Sun).and(LayerKind::Ao));
+    (child.id, child.depth) = (vec![7, 9, 0, 9], vec![5, 6, DEPTH_NOTHING, 8]);
+    (child.sun, child.ao) = (vec![255, 0, 255, 0], vec![10, 20, 255, 31]);
+    let parent = reduce([Some(&child), None, None, None], 2);
+    assert_eq!((parent.sun[0], parent.ao[0], parent.id[0]), (85, 20, 9));
+    assert_eq!((parent.sun[1], parent.ao[3]), (255, 255), "nothing there");
+    assert_eq!(parent.arrays(), child.arrays());
+}
+
+#[test]
+fn suns_and_second_depths_come_from_the_id_that_wins() {
+    let mut child = GBuffer::with(2, 2, Arrays::LEAST.and(LayerKind::Sun16).and(LayerKind::Depth2));
+    (child.id, child.depth) = (vec![7, 9, 9, 4], vec![1, 6, 5, 2]);
+    (child.sun16, child.depth2) = (vec![1, 2, 4, 8], vec![10, 40, 50, 20]);
+    let parent = reduce([None, Some(&child), None, None], 2);
+    assert_eq!((parent.id[1], parent.sun16[1], parent.depth2[1]), (9, 4, 40));
+}
+
+#[test]
+fn seams_keep_the_arrays_that_there_are() {
+    for g in [light_tile(8, 32), light_tile(9, 256)] {
+        assert_eq!(read_seam("test", &write_seam(&g)).expect("sound"), g);
+        let mut some = g.clone();
+        some.keep(Arrays::LEAST.and(LayerKind::Ao));
+        let bytes = write_seam(&some);
+        assert_eq!(bytes[16..20], 0b100_1100u32.to_le_bytes());
+        assert_eq!(read_seam("test", &bytes).expect("sound"), some);
+    }
+}
+
+#[test]
+fn pictures_are_reduced_as_colours_are() {
+    let mut g = light_tile(5, 16);
+    let picture = reduce([Some(&g), None, Some(&g), None], 16).picture;
+    g.color = std::mem::take(&mut g.picture);
+    assert_eq!(reduce([Some(&g), None, Some(&g), None], 16).color, picture);
 }

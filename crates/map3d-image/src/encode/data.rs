@@ -27,3 +27,8 @@ pub fn bytes_from_normals(normals: &[[i16; 3]]) -> Vec<u8> {
 pub fn bytes_from_u32(values: &[u32]) -> &[u8] {
     bytemuck::cast_slice(values)
 }
+
+/// Grey is the less significant byte, alpha the other.
+pub fn bytes_from_u16(values: &[u16]) -> &[u8] {
+    bytemuck::cast_slice(values)
+}

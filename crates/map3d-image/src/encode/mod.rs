@@ -10,7 +10,7 @@ mod webp;
 use map3d_base::{Error, LayerFormat, LayerKind, LayerSpec, Result};
 
 pub use color::{color_from_linear, opaque};
-pub use data::{bytes_from_normals, bytes_from_u32};
+pub use data::{bytes_from_normals, bytes_from_u16, bytes_from_u32};
 pub use jpeg::encode_jpeg;
 pub use png::{Deflate, Filter, PngImage, decode_png, encode_png};
 pub use webp::encode_webp;
@@ -37,6 +37,11 @@ impl Encoder {
             LayerKind::Normal => self.normal(size, &g.normal, spec.format),
             LayerKind::Id => self.id(size, &g.id, spec.format),
             LayerKind::Depth => self.depth(size, &g.depth, spec.format),
+            LayerKind::Sun => self.shade(size, &g.sun, spec.format),
+            LayerKind::Sun16 => self.sun16(size, &g.sun16, spec.format),
+            LayerKind::Ao => self.shade(size, &g.ao, spec.format),
+            LayerKind::Depth2 => self.depth(size, &g.depth2, spec.format),
+            LayerKind::Picture => self.color(size, &g.picture, spec.format, spec.quality),
         }
     }
 
@@ -80,6 +85,20 @@ impl Encoder {
         only_png("depth", format)?;
         check_length(size, depths.len())?;
         Ok(self.png.write(size, 4, bytes_from_u32(depths), png::DEPTH))
+    }
+
+    /// One byte a pixel: sun, ambient occlusion.
+    pub fn shade(&mut self, size: (u32, u32), shades: &[u8], format: LayerFormat) -> Result<Vec<u8>> {
+        only_png("of shades", format)?;
+        check_length(size, shades.len())?;
+        Ok(self.png.write(size, 1, shades, png::SHADE))
+    }
+
+    /// A bit a sun.
+    pub fn sun16(&mut self, size: (u32, u32), suns: &[u16], format: LayerFormat) -> Result<Vec<u8>> {
+        only_png("sun16", format)?;
+        check_length(size, suns.len())?;
+        Ok(self.png.write(size, 2, bytes_from_u16(suns), png::SUN16))
     }
 }
 

@@ -27,6 +27,8 @@ pub const COLOR: Method = (Filter::Up, Deflate::Fast);
 pub const NORMAL: Method = (Filter::Up, Deflate::Fast);
 pub const ID: Method = (Filter::Up, Deflate::Fast);
 pub const DEPTH: Method = (Filter::Up, Deflate::Matching);
+pub const SHADE: Method = (Filter::Up, Deflate::Fast);
+pub const SUN16: Method = (Filter::Up, Deflate::Fast);
 
 const SIGNATURE: [u8; 8] = [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1A, b'\n'];
 
@@ -38,7 +40,7 @@ pub struct PngWriter {
 }
 
 impl PngWriter {
-    /// `pixels`: rows of `width · channels` bytes; 3 channels (RGB) or 4 (RGBA).
+    /// `pixels`: rows of `width · channels` bytes; 1 channel (grey), 2 (grey, alpha), 3 (RGB) or 4 (RGBA).
     pub fn write(&mut self, size: (u32, u32), channels: usize, pixels: &[u8], (filter, deflate): Method) -> Vec<u8> {
         let row = size.0 as usize * channels;
         assert_eq!(pixels.len(), row * size.1 as usize, "{size:?} × {channels} bytes");
@@ -47,7 +49,8 @@ impl PngWriter {
         let mut header = [0u8; 13];
         header[..4].copy_from_slice(&size.0.to_be_bytes());
         header[4..8].copy_from_slice(&size.1.to_be_bytes());
-        header[8..10].copy_from_slice(&[8, if channels == 3 { 2 } else { 6 }]);
+        let color_type = [0, 4, 2, 6][channels - 1];
+        header[8..10].copy_from_slice(&[8, color_type]);
         let mut out = Vec::with_capacity(body.len() + 64);
         out.extend_from_slice(&SIGNATURE);
         chunk(&mut out, b"IHDR", &header);
