@@ -1,6 +1,6 @@
 //! Beams: all samples of a sub-tile at once, through the trees of all parts that it meets, front to back.
 
-mod boxes;
+pub(crate) mod boxes;
 pub(crate) mod buffer;
 mod canvas;
 mod corners;

@@ -1,9 +1,13 @@
 //! Sixteen int32 lanes: the 16 samples of a pixel, or 16 pixels of a row. All arithmetic is on integers, so every implementation gives equal bits.
 
+mod floats;
 mod plain;
 #[cfg(target_arch = "x86_64")]
 mod x86;
+#[cfg(target_arch = "x86_64")]
+mod x86_floats;
 
+pub(crate) use floats::{FloatLanes, Floats};
 pub(crate) use plain::Plain;
 #[cfg(target_arch = "x86_64")]
 pub(crate) use x86::{Avx2, Avx512};

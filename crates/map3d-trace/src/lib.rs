@@ -3,6 +3,7 @@
 //! `BeamTracer::trace` fills a `VisBuf`: which surface each of the 16 samples of each pixel meets. `Rays` answers single rays by the same rules.
 
 pub mod beam;
+pub mod bundle;
 pub mod cutout;
 mod lanes;
 pub mod occupancy;
@@ -12,6 +13,7 @@ pub mod surface;
 pub mod visbuf;
 
 pub use beam::BeamTracer;
+pub use bundle::{Bundles, Nearest, Openness, Patch, RAYS, Shadow, Surroundings};
 pub use cutout::{Cutout, CutoutSample, Opaque, Stencil};
 pub use map3d_base::Isa;
 pub use occupancy::{block_key, occupied};

@@ -1,6 +1,7 @@
 //! Which tiles can have content, decided from boxes and never leaving out what can be seen.
 
 mod keys;
+mod reach;
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;

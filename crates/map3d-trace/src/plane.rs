@@ -1,8 +1,8 @@
 //! The depth of one surface over the pixels of a sub-tile, for shaders that ask it pixel by pixel.
 
-use map3d_base::{DEPTH_NOTHING, Vec3};
+use map3d_base::{DEPTH_NOTHING, Frame, Vec3, ViewAxes};
 
-use crate::beam::project::{depth_gradient, depth_range};
+use crate::beam::project::{Projection, depth_gradient, depth_range};
 
 /// Depth units from D0 over pixel coordinates of the sub-tile: affine, clamped to the triangle's range.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,6 +13,12 @@ pub struct DepthPlane {
 }
 
 impl DepthPlane {
+    /// Of a triangle with local corners, over the pixels of level zmax right and down of `corner_px`.
+    pub fn of_corners(frame: &Frame, axes: &ViewAxes, corners: &[Vec3; 3], corner_px: [u64; 2]) -> Self {
+        let projection = Projection { frame, axes, corner_px };
+        Self::new(&corners.map(|p| projection.pixel(p)))
+    }
+
     pub(crate) fn new(pixel: &[Vec3; 3]) -> Self {
         let range = depth_range(pixel);
         match depth_gradient(pixel) {
@@ -29,7 +35,14 @@ impl DepthPlane {
         units_of(plane.clamp(self.range.0, self.range.1))
     }
 
-    /// The same of a row of pixels, the first of which is (i, j).
+    /// Depth in units, not rounded, at (x, y) in pixels from the sub-tile's corner.
+    #[inline(always)]
+    pub fn at(&self, x: f64, y: f64) -> f64 {
+        let plane = self.corner[2] + self.gradient[0] * (x - self.corner[0]) + self.gradient[1] * (y - self.corner[1]);
+        plane.clamp(self.range.0, self.range.1)
+    }
+
+    /// `units` of a row of pixels, the first of which is (i, j).
     #[inline(always)]
     pub fn row(&self, i: usize, j: usize, out: &mut [u32]) {
         let dy = j as f64 + 0.5 - self.corner[1];

@@ -2,79 +2,13 @@
 
 mod scenes;
 
-use map3d_base::asset::{Instance, Rank};
+use map3d_base::ViewAxes;
+use map3d_base::asset::Rank;
 use map3d_base::vec3::{normalized, scale};
-use map3d_base::{Vec3, ViewAxes};
 use map3d_scene::SceneStore;
 use map3d_trace::{BeamTracer, Opaque, Pixel, Ray, Rays, SUBTILE_PX};
-use scenes::{Dice, Face, Soup, build, frame, new_folder};
-
-/// A closed ball of triangles whose corners are jittered along their radius.
-fn ball(radius: f64, rings: usize, dice: &mut Dice, at: Vec3) -> Vec<[Vec3; 3]> {
-    let columns = 2 * rings;
-    let mut points = vec![vec![[0.0; 3]; columns]; rings + 1];
-    for (i, row) in points.iter_mut().enumerate() {
-        let pole = radius * dice.between(0.9, 1.1);
-        for (j, p) in row.iter_mut().enumerate() {
-            let (t, a) = (std::f64::consts::PI * i as f64 / rings as f64, std::f64::consts::TAU * j as f64 / columns as f64);
-            let r = if i == 0 || i == rings { pole } else { radius * dice.between(0.9, 1.1) };
-            let ring = if i == 0 || i == rings { 0.0 } else { t.sin() };
-            *p = [at[0] + r * ring * a.cos(), at[1] + r * ring * a.sin(), at[2] + r * t.cos()];
-        }
-    }
-    let mut out = Vec::new();
-    for i in 0..rings {
-        for j in 0..columns {
-            let k = (j + 1) % columns;
-            // At a pole one of the two is a point.
-            if i + 1 < rings {
-                out.push([points[i][j], points[i + 1][j], points[i + 1][k]]);
-            }
-            if i > 0 {
-                out.push([points[i][j], points[i + 1][k], points[i][k]]);
-            }
-        }
-    }
-    out
-}
-
-/// A closed box of `count` × `count` squares a side, along the axes: seen along them, its edges fall on samples.
-fn crate_of(half: f64, count: usize) -> Vec<[Vec3; 3]> {
-    let step = 2.0 * half / count as f64;
-    let mut out = Vec::new();
-    for (side, k) in (0..6).flat_map(|side| (0..count * count).map(move |k| (side, k))) {
-        let point = |i: usize, j: usize| {
-            let q = [if side % 2 == 0 { half } else { -half }, i as f64 * step - half, j as f64 * step - half];
-            [0, 1, 2].map(|axis| q[(axis + side / 2) % 3])
-        };
-        let (i, j) = (k % count, k / count);
-        let c = [point(i, j), point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)];
-        out.extend([[c[0], c[1], c[2]], [c[0], c[2], c[3]]]);
-    }
-    out
-}
-
-fn soup_of(triangles: &[[Vec3; 3]], far: bool) -> Soup {
-    let mut soup = Soup::default();
-    triangles.iter().for_each(|t| soup.add(*t, 0, Rank::Other));
-    if far {
-        // Widens the square, so that what lies in the middle is cut into several cells.
-        soup.add([[30_000.0, 30_000.0, 0.0], [30_001.0, 30_000.0, 0.0], [30_000.0, 30_001.0, 0.0]], 1, Rank::Other);
-        soup.add([[-30_000.0, -30_000.0, 0.0], [-30_001.0, -30_000.0, 0.0], [-30_000.0, -30_001.0, 0.0]], 1, Rank::Other);
-    }
-    soup
-}
-
-/// Turned, mirrored and stretched, each part a prototype of its own that meets the next at its edges.
-fn planted(triangles: &[[Vec3; 3]]) -> Soup {
-    let mut soup = Soup::default();
-    for (k, half) in triangles.chunks(triangles.len().div_ceil(3)).enumerate() {
-        soup.prototypes.push(half.iter().map(|t| Face::new(*t)).collect());
-        let transform = [0.96, -0.3, 0.1, 0.2, 0.28, 1.1, 0.0, -0.1, 0.0, 0.2, -1.2, 0.3];
-        soup.instances.push(Instance { prototype: k as u32 + 1, object: k as u32, transform });
-    }
-    soup
-}
+use scenes::closed::{ball, crate_of, planted, soup_of};
+use scenes::{Dice, Soup, build, frame, new_folder};
 
 /// Look-at angle and pitch: along axes and diagonals, straight down, steep and grazing; then all around.
 fn directions(dice: &mut Dice) -> Vec<(f64, f64)> {

@@ -15,16 +15,27 @@ const FLOAT_ROOM: f64 = 1.0 / (1 << 20) as f64;
 
 /// One affine row: coefficients, and the constant lowered and raised by the room.
 #[derive(Clone, Copy, Debug)]
-struct Row {
-    m: [f32; 3],
-    low: f32,
-    high: f32,
+pub(crate) struct Row {
+    pub m: [f32; 3],
+    pub low: f32,
+    pub high: f32,
+    /// Of each axis, which side of a box makes the sum least: 0 the lower, 3 the upper one.
+    least_side: [u8; 3],
+}
+
+impl Row {
+    /// The sides of the children's boxes that make a sum with these coefficients least or greatest.
+    #[inline(always)]
+    pub fn side<'n>(&self, node: &'n Node, axis: usize, least: bool) -> &'n [f32; 8] {
+        let side = self.least_side[axis] as usize;
+        &node.bounds[(axis + if least { side } else { 3 - side }) % 6]
+    }
 }
 
 /// From a part's own coordinates, relative to its chunk's origin, to pixels of the sub-tile and depth units.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BoxMap {
-    rows: [Row; 3],
+    pub rows: [Row; 3],
 }
 
 /// Where the boxes of a node's children lie.
@@ -48,8 +59,13 @@ impl BoxMap {
             (axes.up.map(|v| -v / pixel_m), frame.v0_m / pixel_m - corner[1], SNAP_ROOM),
             (axes.forward.map(|v| v * DEPTH_UNITS_PER_M), -frame.d0_m * DEPTH_UNITS_PER_M, 1.0),
         ];
+        Self::of_rows(view, origin, bounds, transform)
+    }
+
+    /// To other coordinates: of each its coefficients of local positions, constant, and room besides that for rounding.
+    pub fn of_rows(rows: [([f64; 3], f64, f64); 3], origin: [f64; 3], bounds: &Box3, transform: Option<&[f64; 12]>) -> Self {
         let reach = [0, 1, 2].map(|k| (bounds.lo[k] - origin[k]).abs().max((bounds.hi[k] - origin[k]).abs()));
-        Self { rows: view.map(|(m, c, room)| Row::new(m, c, room, origin, reach, transform)) }
+        Self { rows: rows.map(|(m, c, room)| Row::new(m, c, room, origin, reach, transform)) }
     }
 
     /// Places the boxes of a node's children and tells which meet the sub-tile.
@@ -64,20 +80,14 @@ impl BoxMap {
     #[inline(always)]
     fn least(&self, row: usize, node: &Node) -> [f32; 8] {
         let r = &self.rows[row];
-        sum(r.m, side(node, r.m, 0, true), side(node, r.m, 1, true), side(node, r.m, 2, true), r.low)
+        sum(r.m, r.side(node, 0, true), r.side(node, 1, true), r.side(node, 2, true), r.low)
     }
 
     #[inline(always)]
     fn greatest(&self, row: usize, node: &Node) -> [f32; 8] {
         let r = &self.rows[row];
-        sum(r.m, side(node, r.m, 0, false), side(node, r.m, 1, false), side(node, r.m, 2, false), r.high)
+        sum(r.m, r.side(node, 0, false), r.side(node, 1, false), r.side(node, 2, false), r.high)
     }
-}
-
-/// The sides of the children's boxes that make a sum with these coefficients least or greatest.
-#[inline(always)]
-fn side(node: &Node, m: [f32; 3], axis: usize, least: bool) -> &[f32; 8] {
-    &node.bounds[if (m[axis] < 0.0) == least { axis + 3 } else { axis }]
 }
 
 #[inline(always)]
@@ -103,7 +113,9 @@ impl Row {
         // The float64 sum's own error is far below that of float32, also when its terms are huge.
         let local = constant.abs() + (0..3).map(|k| m[k].abs() * reach[k]).sum::<f64>();
         let room = room + local * FLOAT_ROOM + size * 1e-13;
-        Self { m: m.map(|v| v as f32), low: ((constant - room) as f32).next_down(), high: ((constant + room) as f32).next_up() }
+        let m = m.map(|v| v as f32);
+        let (low, high) = (((constant - room) as f32).next_down(), ((constant + room) as f32).next_up());
+        Self { m, low, high, least_side: m.map(|v| if v < 0.0 { 3 } else { 0 }) }
     }
 }
 

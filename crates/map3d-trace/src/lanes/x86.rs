@@ -1,7 +1,7 @@
-//! Lanes in vector registers. The only file of this crate with `unsafe`.
+//! Lanes in vector registers. One of this crate's two files with `unsafe`, beside `x86_floats`.
 //!
-//! SAFETY, for every block here: the intrinsics need AVX2 (`Avx2`) or AVX-512 F and VL (`Avx512`). These types are named only by `beam::dispatch`, after
-//! `BeamTracer::with_isa` has asked for them. Loads and stores go through references to arrays of exactly the bytes they touch, without alignment demands.
+//! SAFETY, for every block here: the intrinsics need AVX2 (`Avx2`) or AVX-512 F and VL (`Avx512`). These types are named only by `beam::dispatch` and
+//! `bundle::dispatch`, after their callers have asked for them. Loads and stores go through references to arrays of exactly the bytes they touch, without alignment demands.
 #![allow(clippy::undocumented_unsafe_blocks)]
 
 use std::arch::x86_64::*;

@@ -7,10 +7,11 @@ use map3d_base::{Box3, Error, Frame, RENDER_FORMAT, Result};
 use map3d_scene::SceneStore;
 use twox_hash::XxHash3_128;
 
+use super::reach::Reach;
 use super::{Rect, TileView};
 
 /// Hex hash over all that the bytes of the base block rooted at `root` depend on: the format, the frame, and every object and instance whose box meets
-/// the block's beam.
+/// the block's beam, or can throw a shadow into it or close it in.
 pub fn block_key(scene: &SceneStore, frame: &Frame, root: Tile) -> Result<String> {
     Ok(block_keys(scene, frame, root.z, &[[root.x, root.y]])?.remove(0))
 }
@@ -21,7 +22,9 @@ pub fn block_keys(scene: &SceneStore, frame: &Frame, level: u8, blocks: &[[u32; 
     if let Some([x, y]) = blocks.iter().find(|[x, y]| level > MAX_LEVEL || x >> level != 0 || y >> level != 0) {
         return Err(Error::argument(format!("block ({level}, {x}, {y}): no such tile")));
     }
-    let mut sums = Sums::new(TileView::new(frame, level), blocks);
+    let view = TileView::new(frame, level);
+    let reach = Reach::new(frame, &view, &scene.bounds());
+    let mut sums = Sums::new(view, reach, blocks);
     for part in scene.parts() {
         if !sums.meets_any(&part.bounds) {
             continue;
@@ -44,39 +47,49 @@ pub fn block_keys(scene: &SceneStore, frame: &Frame, level: u8, blocks: &[[u32; 
 /// Of each block: how many contents meet its beam, and the sum of their hashes modulo 2^128, whatever their order.
 struct Sums<'a> {
     view: TileView,
+    reach: Reach,
     blocks: &'a [[u32; 2]],
     numbers: HashMap<[u32; 2], Vec<u32>>,
     sums: Vec<(u64, u128)>,
     /// Columns and rows that have a block.
-    reach: [[u32; 2]; 2],
+    span: [[u32; 2]; 2],
 }
 
 impl<'a> Sums<'a> {
-    fn new(view: TileView, blocks: &'a [[u32; 2]]) -> Self {
+    fn new(view: TileView, reach: Reach, blocks: &'a [[u32; 2]]) -> Self {
         let mut numbers: HashMap<[u32; 2], Vec<u32>> = HashMap::new();
         blocks.iter().zip(0..).for_each(|(b, k)| numbers.entry(*b).or_default().push(k));
         let end = |k: usize| [blocks.iter().map(|b| b[k]).min().unwrap_or(1), blocks.iter().map(|b| b[k]).max().unwrap_or(0)];
-        Self { view, blocks, numbers, sums: vec![(0, 0); blocks.len()], reach: [end(0), end(1)] }
+        Self { view, reach, blocks, numbers, sums: vec![(0, 0); blocks.len()], span: [end(0), end(1)] }
     }
 
     /// First and last column and row that a rectangle meets, of those that have a block.
     fn tiles(&self, rect: &Rect) -> [[u32; 2]; 2] {
         // Where a border lies on that of a tile, both tiles are met.
-        let first = |k: usize| ((rect.lo[k].ceil() - 1.0).max(0.0) as u32).max(self.reach[k][0]);
-        let last = |k: usize| if rect.hi[k] < 0.0 { None } else { Some((rect.hi[k] as u32).min(self.reach[k][1])) };
+        let first = |k: usize| ((rect.lo[k].ceil() - 1.0).max(0.0) as u32).max(self.span[k][0]);
+        let last = |k: usize| if rect.hi[k] < 0.0 { None } else { Some((rect.hi[k] as u32).min(self.span[k][1])) };
         [0, 1].map(|k| last(k).map_or([1, 0], |last| [first(k), last]))
     }
 
     fn meets_any(&self, bounds: &Box3) -> bool {
-        self.tiles(&self.view.rect(bounds)).iter().all(|[first, last]| first <= last)
+        let mut any = false;
+        let meets = |rect: &Rect| self.tiles(rect).iter().all(|[first, last]| first <= last);
+        self.reach.each(bounds, self.view.rect(bounds), |rect| any |= meets(rect));
+        any
     }
 
+    /// A content that reaches a block in several ways counts several times there, always as many.
     fn add(&mut self, bounds: &Box3, id: u32, content: [u64; 2]) {
-        let [[x0, x1], [y0, y1]] = self.tiles(&self.view.rect(bounds));
+        let mut reached = Vec::new();
+        self.reach.each(bounds, self.view.rect(bounds), |rect| reached.push(self.tiles(rect)));
+        let value = content_hash(id, content);
+        reached.into_iter().for_each(|tiles| self.add_to(tiles, value));
+    }
+
+    fn add_to(&mut self, [[x0, x1], [y0, y1]]: [[u32; 2]; 2], value: u128) {
         if x0 > x1 || y0 > y1 {
             return;
         }
-        let value = content_hash(id, content);
         let mut take = |k: u32| {
             let sum = &mut self.sums[k as usize];
             *sum = (sum.0 + 1, sum.1.wrapping_add(value));
@@ -111,5 +124,6 @@ fn write_frame(hash: &mut XxHash3_128, frame: &Frame, root: Tile) {
     [frame.tile_px, u32::from(frame.zmax), u32::from(root.z), root.x, root.y].iter().for_each(|v| hash.write(&v.to_le_bytes()));
     for layer in &frame.layers {
         hash.write(&[layer.kind as u8, layer.format as u8, layer.quality]);
+        layer.suns.iter().flatten().chain([&layer.radius_m]).for_each(|v| hash.write(&v.to_bits().to_le_bytes()));
     }
 }

@@ -1,6 +1,8 @@
 //! Small synthetic scenes, built like real ones. The tests of map3d-render use them too.
 #![allow(dead_code)]
 
+pub mod closed;
+
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
 
