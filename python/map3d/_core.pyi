@@ -114,7 +114,7 @@ class Scene:
     def render_block(self, frame: str, z: int, x: int, y: int) -> Block:
         """A base block rooted at (z, x, y)."""
     def gbuffer(self, frame: str, x: int, y: int) -> dict[str, NDArray[Any]]:
-        """One base tile's G-buffer (spec/pyramid.md §5): color, normal, id, depth."""
+        """One base tile's G-buffer (spec/pyramid.md §5): id, depth and the arrays of the frame's layers; color, normal, id, depth without any."""
     def pick(self, frame: str, u: float, v: float) -> tuple[int, float, tuple[float, float, float]] | None:
         """(id, D, local position) of the surface that a single ray at view coordinates (U, V) meets first."""
     def occluded(self, origins: NDArray[np.float64], direction: tuple[float, float, float], max_distance: float) -> NDArray[np.bool_]:
@@ -140,7 +140,7 @@ class Block:
 def reduce_block(frame: str, z: int, x: int, y: int, levels: int, seams: list[tuple[int, int, bytes]]) -> Block:
     """A reduce block of root (z, x, y) with `levels` levels; seams: (x, y, bytes) of blocks rooted at level z + levels."""
 
-def encode_layer(kind: Literal["color", "normal", "id", "depth"], format: str, array: NDArray[Any], quality: int = 80) -> bytes:
+def encode_layer(kind: Literal["color", "normal", "id", "depth", "sun", "sun16", "ao", "depth2", "picture"], format: str, array: NDArray[Any], quality: int = 80) -> bytes:
     """One layer of a G-buffer → image bytes."""
 
 def decode_png(data: bytes) -> NDArray[np.uint8]:

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use map3d_base::{LayerFormat, LayerKind, LayerSpec};
-use map3d_image::GBuffer;
 use map3d_image::encode::{self, Encoder};
 use map3d_image::texture::TextureFile;
+use map3d_image::{Arrays, GBuffer};
 use numpy::ndarray::{Array2, Array3};
 use numpy::{IntoPyArray, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -13,16 +13,38 @@ use pyo3::types::{PyBytes, PyDict};
 
 use crate::errors::{invalid, to_python};
 
-/// color (H, W, 4) uint16, normal (H, W, 3) int16, id and depth (H, W) uint32.
+/// The arrays that a G-buffer has: color, picture (H, W, 4) uint16, normal (H, W, 3) int16, id, depth, depth2 (H, W) uint32, sun, ao (H, W) uint8, sun16
+/// (H, W) uint16.
 pub fn dict_of<'py>(py: Python<'py>, g: GBuffer) -> PyResult<Bound<'py, PyDict>> {
-    let (h, w) = (g.height as usize, g.width as usize);
-    let sizes = "a G-buffer's arrays have its size";
+    let size = (g.height as usize, g.width as usize);
     let dict = PyDict::new(py);
-    dict.set_item("color", Array3::from_shape_vec((h, w, 4), g.color.into_flattened()).expect(sizes).into_pyarray(py))?;
-    dict.set_item("normal", Array3::from_shape_vec((h, w, 3), g.normal.into_flattened()).expect(sizes).into_pyarray(py))?;
-    dict.set_item("id", Array2::from_shape_vec((h, w), g.id).expect(sizes).into_pyarray(py))?;
-    dict.set_item("depth", Array2::from_shape_vec((h, w), g.depth).expect(sizes).into_pyarray(py))?;
+    set3(&dict, "color", size, g.color)?;
+    set3(&dict, "normal", size, g.normal)?;
+    set2(&dict, "id", size, g.id)?;
+    set2(&dict, "depth", size, g.depth)?;
+    set2(&dict, "sun", size, g.sun)?;
+    set2(&dict, "sun16", size, g.sun16)?;
+    set2(&dict, "ao", size, g.ao)?;
+    set2(&dict, "depth2", size, g.depth2)?;
+    set3(&dict, "picture", size, g.picture)?;
     Ok(dict)
+}
+
+const SIZES: &str = "a G-buffer's arrays have its size";
+
+/// Unless it is not there.
+fn set2<T: numpy::Element>(dict: &Bound<'_, PyDict>, name: &str, size: (usize, usize), array: Vec<T>) -> PyResult<()> {
+    if array.is_empty() {
+        return Ok(());
+    }
+    dict.set_item(name, Array2::from_shape_vec(size, array).expect(SIZES).into_pyarray(dict.py()))
+}
+
+fn set3<T: numpy::Element, const N: usize>(dict: &Bound<'_, PyDict>, name: &str, (h, w): (usize, usize), array: Vec<[T; N]>) -> PyResult<()> {
+    if array.is_empty() {
+        return Ok(());
+    }
+    dict.set_item(name, Array3::from_shape_vec((h, w, N), array.into_flattened()).expect(SIZES).into_pyarray(dict.py()))
 }
 
 /// (width, height) and the pixels, row by row.
@@ -38,22 +60,38 @@ fn rows3<T: numpy::Element + Copy, const N: usize>(array: &Bound<'_, PyAny>, wha
     Ok(((w as u32, h as u32), flat.chunks_exact(N).map(|c| std::array::from_fn(|k| c[k])).collect()))
 }
 
-fn rows2(array: &Bound<'_, PyAny>, what: &str) -> PyResult<Pixels<u32>> {
-    let array: PyReadonlyArray2<u32> = array.extract().map_err(|_| invalid(format!("{what}: expected an array (H, W) of uint32")))?;
+fn rows2<T: numpy::Element + Copy>(array: &Bound<'_, PyAny>, what: &str) -> PyResult<Pixels<T>> {
+    let array: PyReadonlyArray2<T> = array.extract().map_err(|_| invalid(format!("{what}: expected an array (H, W) of its type")))?;
     let (h, w) = array.as_array().dim();
     Ok(((w as u32, h as u32), array.as_array().iter().copied().collect()))
 }
 
+/// Id and depth must be there.
 fn gbuffer_of(dict: &Bound<'_, PyDict>) -> PyResult<GBuffer> {
     let item = |name: &str| dict.get_item(name)?.ok_or_else(|| invalid(format!("G-buffer: no {name}")));
-    let (size, color) = rows3(&item("color")?, "color")?;
-    let (normal_size, normal) = rows3(&item("normal")?, "normal")?;
-    let (id_size, id) = rows2(&item("id")?, "id")?;
-    let (depth_size, depth) = rows2(&item("depth")?, "depth")?;
-    if [normal_size, id_size, depth_size].iter().any(|s| *s != size) {
-        return Err(invalid("G-buffer: its arrays differ in size"));
+    let (size, id) = rows2(&item("id")?, "id")?;
+    let fits = |other: (u32, u32), name: &str| if other == size { Ok(()) } else { Err(invalid(format!("G-buffer: {name} differs in size from id"))) };
+    let mut g = GBuffer { id, ..GBuffer::with(0, 0, Arrays::LEAST) };
+    (g.width, g.height) = size;
+    macro_rules! take {
+        ($rows:ident, $name:ident) => {
+            if let Some(array) = dict.get_item(stringify!($name))? {
+                let (size, pixels) = $rows(&array, stringify!($name))?;
+                fits(size, stringify!($name))?;
+                g.$name = pixels;
+            }
+        };
     }
-    Ok(GBuffer { width: size.0, height: size.1, color, normal, id, depth })
+    item("depth")?;
+    take!(rows2, depth);
+    take!(rows3, color);
+    take!(rows3, normal);
+    take!(rows2, sun);
+    take!(rows2, sun16);
+    take!(rows2, ao);
+    take!(rows2, depth2);
+    take!(rows3, picture);
+    Ok(g)
 }
 
 /// One layer of a G-buffer as image bytes.
@@ -63,10 +101,12 @@ pub fn encode_layer<'py>(py: Python<'py>, kind: &str, format: &str, array: &Boun
     let spec = layer_spec(kind, format, quality)?;
     let mut encoder = Encoder::new();
     let bytes = match spec.kind {
-        LayerKind::Color => rows3(array, "color").map(|(size, a)| encoder.color(size, &a, spec.format, quality)),
+        LayerKind::Color | LayerKind::Picture => rows3(array, "color").map(|(size, a)| encoder.color(size, &a, spec.format, quality)),
         LayerKind::Normal => rows3(array, "normal").map(|(size, a)| encoder.normal(size, &a, spec.format)),
         LayerKind::Id => rows2(array, "id").map(|(size, a)| encoder.id(size, &a, spec.format)),
-        LayerKind::Depth => rows2(array, "depth").map(|(size, a)| encoder.depth(size, &a, spec.format)),
+        LayerKind::Depth | LayerKind::Depth2 => rows2(array, "depth").map(|(size, a)| encoder.depth(size, &a, spec.format)),
+        LayerKind::Sun | LayerKind::Ao => rows2(array, "shades").map(|(size, a)| encoder.shade(size, &a, spec.format)),
+        LayerKind::Sun16 => rows2(array, "sun16").map(|(size, a)| encoder.sun16(size, &a, spec.format)),
     }?
     .map_err(to_python)?;
     Ok(PyBytes::new(py, &bytes))
@@ -76,7 +116,7 @@ fn layer_spec(kind: &str, format: &str, quality: u8) -> PyResult<LayerSpec> {
     let named = |name: &str| serde_json::Value::String(name.to_owned());
     let kind: LayerKind = serde_json::from_value(named(kind)).map_err(|e| invalid(format!("kind: {e}")))?;
     let format: LayerFormat = serde_json::from_value(named(format)).map_err(|e| invalid(format!("format: {e}")))?;
-    Ok(LayerSpec { kind, format, quality })
+    Ok(LayerSpec { quality, ..LayerSpec::new(kind, format) })
 }
 
 /// (H, W, C) of an 8-bit PNG.

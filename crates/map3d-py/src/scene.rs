@@ -172,6 +172,7 @@ impl Block {
         let rows = [
             ("visibility_s", s.visibility_s),
             ("shade_s", s.shade_s),
+            ("light_s", s.light_s),
             ("reduce_s", s.reduce_s),
             ("encode_s", s.encode_s),
             ("seam_s", s.seam_s),

@@ -1,12 +1,12 @@
 //! Milliseconds per tile by stage, and bytes per layer, of a built scene.
 //!
 //! `cargo run --release -p map3d-render --example tiles -- <scene folder> [--look-at 45] [--pitch 45] [--res 0.2] [--tiles 400] [--color webp|png|jpeg]
-//! [--rounds 3] [--save folder]`. Times are CPU time of the one thread; the median round is printed.
+//! [--layers color,normal,id,depth,sun,sun16,ao,depth2,picture] [--rounds 3] [--save folder]`. Times are CPU time of the one thread; the median round is printed.
 
 use std::path::PathBuf;
 
 use map3d_base::tile::Tile;
-use map3d_base::{Box3, Frame, LayerFormat, LayerKind, LayerSpec};
+use map3d_base::{Box3, Frame, LayerFormat, LayerKind, LayerSpec, Vec3};
 use map3d_image::GBuffer;
 use map3d_image::encode::Encoder;
 use map3d_image::reduce;
@@ -25,7 +25,13 @@ fn main() {
         _ => LayerFormat::Webp,
     };
     let quality = if color == LayerFormat::Jpeg { 85 } else { 80 };
-    let f = pinned(&scene.store().bounds(), number("--look-at", 45.0), number("--pitch", 45.0), number("--res", 0.2), color, quality);
+    let f = pinned(
+        &scene.store().bounds(),
+        number("--look-at", 45.0),
+        number("--pitch", 45.0),
+        number("--res", 0.2),
+        layers(&option("--layers").unwrap_or_else(|| "color,normal,id,depth".into()), color, quality),
+    );
     let tiles = middle_tiles(&scene, &f, number("--tiles", 400.0) as usize);
     println!("{} triangles, zmax {}, {} tiles, color {color:?} q{quality}", scene.store().triangle_count(), f.zmax, tiles.len());
     let mut rounds: Vec<Round> = (0..number("--rounds", 3.0) as usize + 1).map(|_| round(&scene, &f, &tiles, None)).skip(1).collect();
@@ -40,16 +46,41 @@ fn main() {
     println!("{:?}", scene.stats());
 }
 
+/// Suns from sunrise to sunset of a summer's day.
+fn suns(count: usize) -> Vec<Vec3> {
+    let at = |k: usize| {
+        let (azimuth, altitude) =
+            ((60.0 + 240.0 * (k as f64 + 0.5) / count as f64).to_radians(), (k as f64 + 0.5) / count as f64 * std::f64::consts::PI);
+        let altitude = altitude.sin();
+        [azimuth.sin() * (1.0 - altitude * altitude).sqrt(), azimuth.cos() * (1.0 - altitude * altitude).sqrt(), altitude]
+    };
+    (0..count).map(at).collect()
+}
+
+fn layers(names: &str, color: LayerFormat, quality: u8) -> Vec<LayerSpec> {
+    let afternoon = vec![[0.6, -0.48, 0.64]];
+    let layer = |name: &str| match name {
+        "color" => LayerSpec { quality, ..LayerSpec::new(LayerKind::Color, color) },
+        "normal" => LayerSpec::new(LayerKind::Normal, LayerFormat::Png),
+        "id" => LayerSpec::new(LayerKind::Id, LayerFormat::Png),
+        "depth" => LayerSpec::new(LayerKind::Depth, LayerFormat::Png),
+        "sun" => LayerSpec { suns: afternoon.clone(), ..LayerSpec::new(LayerKind::Sun, LayerFormat::Png) },
+        "sun16" => LayerSpec { suns: suns(16), ..LayerSpec::new(LayerKind::Sun16, LayerFormat::Png) },
+        "ao" => LayerSpec { radius_m: 20.0, ..LayerSpec::new(LayerKind::Ao, LayerFormat::Png) },
+        "depth2" => LayerSpec::new(LayerKind::Depth2, LayerFormat::Png),
+        "picture" => LayerSpec { quality, suns: afternoon.clone(), radius_m: 20.0, ..LayerSpec::new(LayerKind::Picture, color) },
+        other => panic!("no layer {other}"),
+    };
+    names.split(',').map(layer).collect()
+}
+
 /// As create-rendering pins it (spec/pyramid.md §2), for one view.
-fn pinned(bounds: &Box3, look_at_deg: f64, pitch_deg: f64, res_m: f64, color: LayerFormat, quality: u8) -> Frame {
+fn pinned(bounds: &Box3, look_at_deg: f64, pitch_deg: f64, res_m: f64, layers: Vec<LayerSpec>) -> Frame {
     let (c, h) = (bounds.center(), bounds.half_extents());
     let h = [h[0] * 1.05, h[1] * 1.05, (h[2] * 1.05).max(h[2] + 100.0)];
     let (sin, cos) = pitch_deg.to_radians().sin_cos();
     let extent = (2.0 * h[0].hypot(h[1])).max(2.0 * (sin * h[0].hypot(h[1]) + cos * h[2]));
     let zmax = (0..=26u8).find(|z| 256.0 * res_m * f64::from(1u32 << z) >= extent).expect("at most 26 levels");
-    let png = |kind| LayerSpec { kind, format: LayerFormat::Png, quality: 80 };
-    let layers =
-        vec![LayerSpec { kind: LayerKind::Color, format: color, quality }, png(LayerKind::Normal), png(LayerKind::Id), png(LayerKind::Depth)];
     let mut f = Frame {
         look_at_deg,
         pitch_deg,
@@ -85,25 +116,27 @@ struct Round {
     tiles: usize,
     visibility_s: f64,
     shade_s: f64,
+    light_s: f64,
     reduce_s: f64,
-    encode_s: [f64; 4],
-    bytes: [usize; 4],
+    encode_s: Vec<f64>,
+    bytes: Vec<usize>,
     shades: u64,
     setups: u64,
 }
 
 impl Round {
     fn total(&self) -> f64 {
-        self.visibility_s + self.shade_s + self.reduce_s + self.encode_s.iter().sum::<f64>()
+        self.visibility_s + self.shade_s + self.light_s + self.reduce_s + self.encode_s.iter().sum::<f64>()
     }
 
     fn print(&self, layers: &[LayerSpec]) {
         let n = self.tiles as f64;
         let ms = |s: f64| s * 1e3 / n;
         println!(
-            "ms per tile: visibility {:.3}  shade {:.3}  reduce {:.3}  encode {:.3}  total {:.3}",
+            "ms per tile: visibility {:.3}  shade {:.3}  light {:.3}  reduce {:.3}  encode {:.3}  total {:.3}",
             ms(self.visibility_s),
             ms(self.shade_s),
+            ms(self.light_s),
             ms(self.reduce_s),
             ms(self.encode_s.iter().sum()),
             ms(self.total())
@@ -118,7 +151,7 @@ impl Round {
 fn round(scene: &RenderScene, f: &Frame, tiles: &[Tile], save: Option<PathBuf>) -> Round {
     let mut renderer = TileRenderer::new(scene, f).expect("a frame");
     let mut encoder = Encoder::new();
-    let mut out = Round { tiles: tiles.len(), ..Round::default() };
+    let mut out = Round { tiles: tiles.len(), encode_s: vec![0.0; f.layers.len()], bytes: vec![0; f.layers.len()], ..Round::default() };
     let mut siblings: Vec<GBuffer> = Vec::new();
     for (number, t) in tiles.iter().enumerate() {
         let Some(g) = renderer.tile(t.x, t.y).expect("renders") else { continue };
@@ -145,7 +178,7 @@ fn round(scene: &RenderScene, f: &Frame, tiles: &[Tile], save: Option<PathBuf>) 
             siblings.clear();
         }
     }
-    (out.visibility_s, out.shade_s) = (renderer.visibility_s, renderer.shade_s);
+    (out.visibility_s, out.shade_s, out.light_s) = (renderer.visibility_s, renderer.shade_s, renderer.light_s);
     (out.shades, out.setups) = renderer.shade_counts();
     out
 }

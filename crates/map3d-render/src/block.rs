@@ -6,7 +6,7 @@ use map3d_base::tile::{Tile, block_levels};
 use map3d_base::{Error, Frame, Result};
 use map3d_image::encode::Encoder;
 use map3d_image::seam::{read_seam, write_seam};
-use map3d_image::{GBuffer, reduce};
+use map3d_image::{Arrays, GBuffer, reduce};
 
 use crate::clock::CpuClock;
 use crate::scene::RenderScene;
@@ -26,6 +26,8 @@ pub struct EncodedTile {
 pub struct BlockStats {
     pub visibility_s: f64,
     pub shade_s: f64,
+    /// Of rays: suns, ambient occlusion, second surfaces.
+    pub light_s: f64,
     pub reduce_s: f64,
     pub encode_s: f64,
     pub seam_s: f64,
@@ -64,6 +66,7 @@ pub(crate) fn render_block(scene: &RenderScene, frame: &Frame, root: Tile) -> Re
     let mut block = build(frame, root, &mut leaves)?;
     let Traced(renderer, _, traced) = leaves;
     (block.stats.visibility_s, block.stats.shade_s, block.stats.traced_tiles) = (renderer.visibility_s, renderer.shade_s, traced);
+    block.stats.light_s = renderer.light_s;
     (block.stats.shades, block.stats.setups) = renderer.shade_counts();
     Ok(block)
 }
@@ -81,7 +84,7 @@ pub fn reduce_block(frame: &Frame, root: Tile, levels: u8, seams: &[(u32, u32, &
             return Err(Error::argument(format!("seam ({x}, {y}) is not below ({}, {}, {}), or there twice", root.z, root.x, root.y)));
         }
     }
-    build(frame, root, &mut Seams { by_place, level: root.z + levels, side: frame.tile_px })
+    build(frame, root, &mut Seams { by_place, level: root.z + levels, side: frame.tile_px, arrays: Arrays::of(&frame.layers) })
 }
 
 fn check_root(frame: &Frame, root: Tile, level: u8) -> Result<()> {
@@ -167,6 +170,7 @@ struct Seams<'a> {
     by_place: HashMap<(u32, u32), &'a [u8]>,
     level: u8,
     side: u32,
+    arrays: Arrays,
 }
 
 impl Leaves for Seams<'_> {
@@ -179,8 +183,9 @@ impl Leaves for Seams<'_> {
         let name = format!("seam {}/{}/{}", tile.z, tile.x, tile.y);
         let g = read_seam(&name, bytes)?;
         match (g.width, g.height) == (self.side, self.side) {
-            true => Ok(Some(g)),
             false => Err(Error::format(name, format!("{} × {} px, expected {}", g.width, g.height, self.side))),
+            true if g.arrays() != self.arrays => Err(Error::format(name, "it has not the arrays of the frame's layers")),
+            true => Ok(Some(g)),
         }
     }
 

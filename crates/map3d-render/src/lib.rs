@@ -3,6 +3,7 @@
 mod block;
 mod clock;
 mod cutout;
+mod light;
 mod paint;
 mod scene;
 mod shade;

@@ -1,6 +1,6 @@
 //! What a surface looks like over the pixels of a sub-tile: set up once, then asked per pixel.
 
-use map3d_base::{Isa, Result};
+use map3d_base::{Isa, Result, Vec3};
 use map3d_image::sample::{Outside, POSITION_BITS, Sampler, TapPlans, UvMap};
 use map3d_image::srgb::LINEAR16;
 use map3d_image::texture::{HeldTextures, TextureCache};
@@ -24,6 +24,8 @@ impl Palette {
 
 /// Colour of a surface, linear light, 16 bits.
 pub enum Paint {
+    /// Nobody asks for it.
+    None,
     Flat([u16; 3]),
     Textured(Sampler),
 }
@@ -47,6 +49,7 @@ impl Paint {
     #[inline(always)]
     pub fn at(&self, x: i32, y: i32) -> [u16; 3] {
         match self {
+            Self::None => [0; 3],
             Self::Flat(color) => *color,
             Self::Textured(sampler) => sampler.sample(x, y),
         }
@@ -57,6 +60,7 @@ impl Paint {
     pub fn row(&self, i: usize, j: usize, out: &mut [[u16; 4]]) {
         const HALF: i32 = 1 << (POSITION_BITS - 1);
         match self {
+            Self::None => {}
             Self::Flat([r, g, b]) => out.fill([*r, *g, *b, 65_535]),
             Self::Textured(sampler) => sampler.row((i as i32) << POSITION_BITS | HALF, (j as i32) << POSITION_BITS | HALF, out),
         }
@@ -80,10 +84,18 @@ pub struct Shaded {
 }
 
 impl Shaded {
-    pub fn new(palette: &mut Palette, cache: &TextureCache, material: &MaterialRecord, surface: &Surface, depth: DepthPlane) -> Result<Self> {
+    /// `is_painted`: somebody asks for colours.
+    pub fn new(
+        palette: &mut Palette,
+        cache: &TextureCache,
+        material: &MaterialRecord,
+        surface: &Surface,
+        depth: DepthPlane,
+        is_painted: bool,
+    ) -> Result<Self> {
         Ok(Self {
             depth,
-            paint: Paint::new(palette, cache, material, &surface.uv)?,
+            paint: if is_painted { Paint::new(palette, cache, material, &surface.uv)? } else { Paint::None },
             id: surface.object_id,
             normal: stored(surface.normal),
             smooth: surface.corner_normals.is_some().then(|| Box::new(*surface)),
@@ -97,6 +109,18 @@ impl Shaded {
             None => self.normal,
             Some(surface) => stored(surface.normal_at(i as f32 + 0.5, j as f32 + 0.5)),
         }
+    }
+
+    /// Cosine between the shading normal at a pixel's centre and a direction in 1/65536, 0 where it faces away.
+    pub fn cosine(&self, i: usize, j: usize, towards: Vec3) -> u32 {
+        let n = self.normal_at(i, j);
+        let cosine = (0..3).map(|k| f64::from(n[k]) * towards[k]).sum::<f64>() / 32_767.0;
+        (cosine * 65_536.0 + 0.5).clamp(0.0, 65_536.0) as u32
+    }
+
+    /// Geometric unit normal, local axes.
+    pub fn geometric_normal(&self) -> Vec3 {
+        self.normal.map(|c| f64::from(c) / 32_767.0)
     }
 
     /// Those of a row of pixels, the first of which is (i, j).

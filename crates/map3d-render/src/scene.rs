@@ -4,8 +4,8 @@ use std::path::Path;
 
 use map3d_base::tile::Tile;
 use map3d_base::{Error, Frame, Result, Vec3};
-use map3d_image::GBuffer;
 use map3d_image::texture::{CacheStats, TextureCache};
+use map3d_image::{Arrays, GBuffer};
 use map3d_scene::{SceneStore, StoreStats};
 use map3d_trace::{Ray, Rays};
 
@@ -83,7 +83,7 @@ impl RenderScene {
     /// One base tile's G-buffer; nothing anywhere when the tile is empty.
     pub fn gbuffer(&self, frame: &Frame, x: u32, y: u32) -> Result<GBuffer> {
         let tile = TileRenderer::new(self, frame)?.tile(x, y)?;
-        Ok(tile.unwrap_or_else(|| GBuffer::empty(frame.tile_px, frame.tile_px)))
+        Ok(tile.unwrap_or_else(|| GBuffer::with(frame.tile_px, frame.tile_px, Arrays::of(&frame.layers))))
     }
 
     /// What the line of sight through view coordinates (U, V) meets first.

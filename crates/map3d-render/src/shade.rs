@@ -13,6 +13,8 @@ use crate::paint::{Palette, Shaded};
 /// Shades sub-tiles; buffers are kept.
 pub struct Shader {
     palette: Palette,
+    /// What the pixels of the sub-tile in hand show, if somebody asks.
+    points: Option<Vec<SurfacePoint>>,
     /// Surfaces of the sub-tile in hand, and where each slot's stands among them.
     surfaces: Vec<Shaded>,
     of_slot: Vec<u32>,
@@ -34,13 +36,15 @@ struct Scene<'a> {
 }
 
 impl Shader {
-    pub fn new(isa: Isa) -> Self {
-        Self { palette: Palette::new(isa), surfaces: Vec::new(), of_slot: Vec::new(), shades: 0, setups: 0 }
+    /// `keeps_points`: `points` is asked for.
+    pub fn new(isa: Isa, keeps_points: bool) -> Self {
+        Self { palette: Palette::new(isa), points: keeps_points.then(Vec::new), surfaces: Vec::new(), of_slot: Vec::new(), shades: 0, setups: 0 }
     }
 
-    /// Shades a sub-tile into the G-buffer, whose pixel `corner` (left, top) is the sub-tile's first.
+    /// Shades a sub-tile into the arrays that the G-buffer has; its pixel `corner` (left, top) is the sub-tile's first.
     pub fn subtile(&mut self, vis: &VisBuf, cache: &TextureCache, g: &mut GBuffer, corner: (usize, usize)) -> Result<()> {
         self.surfaces.clear();
+        self.points.iter_mut().for_each(Vec::clear);
         self.of_slot.clear();
         self.of_slot.resize(vis.slot_count(), UNKNOWN);
         let done = self.rows(&mut Scene { vis, cache, g, corner });
@@ -87,7 +91,7 @@ impl Shader {
         let material = chunk.materials().get(surface.material as usize);
         let material = material.ok_or_else(|| Error::format(chunk.path(), format!("material {} of a triangle", surface.material)))?;
         let at = self.surfaces.len() as u32;
-        self.surfaces.push(Shaded::new(&mut self.palette, scene.cache, material, &surface, depth)?);
+        self.surfaces.push(Shaded::new(&mut self.palette, scene.cache, material, &surface, depth, !scene.g.color.is_empty())?);
         self.of_slot[slot as usize] = at;
         self.setups += 1;
         Ok(at)
@@ -100,10 +104,25 @@ impl Shader {
         let shaded = self.surface(scene, slot)?;
         let first = (scene.corner.1 + j) * scene.g.width as usize + scene.corner.0 + i;
         let pixels = first..first + end - i;
-        shaded.paint.row(i, j, &mut scene.g.color[pixels.clone()]);
         shaded.depth.row(i, j, &mut scene.g.depth[pixels.clone()]);
-        shaded.normals(i, j, &mut scene.g.normal[pixels.clone()]);
-        scene.g.id[pixels].fill(shaded.id);
+        scene.g.id[pixels.clone()].fill(shaded.id);
+        if !scene.g.normal.is_empty() {
+            shaded.normals(i, j, &mut scene.g.normal[pixels.clone()]);
+        }
+        if !scene.g.color.is_empty() {
+            shaded.paint.row(i, j, &mut scene.g.color[pixels.clone()]);
+        }
+        if let Some(points) = &mut self.points {
+            let surface = self.of_slot[slot as usize];
+            let color = |k: usize| scene.g.color.get(first + k).map_or([0; 3], |c| [c[0], c[1], c[2]]);
+            points.extend((0..end - i).map(|k| SurfacePoint {
+                pixel: [i + k, j].map(|v| v as u8),
+                at: [128; 2],
+                samples: 16,
+                surface,
+                color: color(k),
+            }));
+        }
         Ok(())
     }
 
@@ -120,20 +139,53 @@ impl Shader {
             todo &= !own;
             let (x, y) = centroid(own);
             self.shades += 1;
-            let color = self.surface(scene, slot)?.paint.at((i as i32) << 8 | x, (j as i32) << 8 | y);
+            let shaded = self.surface(scene, slot)?;
+            let color = shaded.paint.at((i as i32) << 8 | x, (j as i32) << 8 | y);
             let weight = own.count_ones();
             (0..3).for_each(|c| sum[c] += u32::from(color[c]) * weight);
             sum[3] += 65_535 * weight;
+            if let Some(points) = &mut self.points {
+                let (pixel, at) = ([i, j].map(|v| v as u8), [x, y].map(|v| v as u8));
+                points.push(SurfacePoint { pixel, at, samples: weight as u8, surface: self.of_slot[slot as usize], color });
+            }
         }
-        scene.g.color[at] = sum.map(|c| ((c + 8) >> 4) as u16);
+        if !scene.g.color.is_empty() {
+            scene.g.color[at] = sum.map(|c| ((c + 8) >> 4) as u16);
+        }
         if slots[0] != NOTHING {
             let shaded = self.surface(scene, slots[0])?;
             scene.g.id[at] = shaded.id;
-            scene.g.normal[at] = shaded.normal_at(i, j);
             scene.g.depth[at] = shaded.depth.units(i, j);
+            if !scene.g.normal.is_empty() {
+                scene.g.normal[at] = shaded.normal_at(i, j);
+            }
         }
         Ok(())
     }
+
+    /// What the pixels of the sub-tile shaded last show, with the surfaces that they name. Empty unless asked for.
+    pub fn points(&self) -> (&[SurfacePoint], &[Shaded]) {
+        (self.points.as_deref().unwrap_or_default(), &self.surfaces)
+    }
+
+    /// The surface of the sub-tile shaded last that a slot stands for.
+    pub fn surface_of(&self, slot: u32) -> &Shaded {
+        &self.surfaces[self.of_slot[slot as usize] as usize]
+    }
+}
+
+/// A surface in a pixel: its colour there, and how many of the pixel's samples meet it.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfacePoint {
+    /// Column and row in the sub-tile.
+    pub pixel: [u8; 2],
+    /// Middle of those samples, in 1/256 px from the pixel's corner.
+    pub at: [u8; 2],
+    pub samples: u8,
+    /// Index into the sub-tile's surfaces.
+    pub surface: u32,
+    /// Linear light; 0 when nobody asks for colours.
+    pub color: [u16; 3],
 }
 
 /// Sums of the x and y (in sixteenths) of the samples of masks of eight, the first and the last eight samples apart: x | y << 16.

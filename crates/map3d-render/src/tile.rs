@@ -1,12 +1,13 @@
 //! One base tile: sub-tiles traced and shaded into a G-buffer.
 
 use map3d_base::tile::Tile;
-use map3d_base::{Error, Frame, Isa, Result};
-use map3d_image::GBuffer;
+use map3d_base::{Error, Frame, Isa, LayerKind, Result};
+use map3d_image::{Arrays, GBuffer};
 use map3d_trace::{BeamTracer, SUBTILE_PX};
 
 use crate::clock::CpuClock;
 use crate::cutout::TextureCutout;
+use crate::light::{Lights, Place};
 use crate::scene::RenderScene;
 use crate::shade::Shader;
 
@@ -17,9 +18,14 @@ pub struct TileRenderer<'s> {
     tracer: BeamTracer<'s>,
     cutout: TextureCutout<'s>,
     shader: Shader,
+    lights: Option<Lights<'s>>,
+    /// What tiles keep, and what they are made with.
+    kept: Arrays,
+    made: Arrays,
     /// Seconds of the thread's CPU time.
     pub visibility_s: f64,
     pub shade_s: f64,
+    pub light_s: f64,
 }
 
 impl<'s> TileRenderer<'s> {
@@ -31,14 +37,21 @@ impl<'s> TileRenderer<'s> {
     /// With an instruction set other than the best; the results are the same.
     pub fn with_isa(scene: &'s RenderScene, frame: &Frame, isa: Isa) -> Result<Self> {
         frame.validate()?;
+        let kept = Arrays::of(&frame.layers);
+        let lights = Lights::new(scene.store(), frame, isa);
+        let has_picture = kept.has(LayerKind::Picture);
         Ok(Self {
             scene,
             frame: frame.clone(),
             tracer: BeamTracer::with_isa(scene.store(), frame, isa)?,
             cutout: TextureCutout::new(scene.textures()),
-            shader: Shader::new(isa),
+            shader: Shader::new(isa, lights.is_some()),
+            lights,
+            kept,
+            made: if has_picture { kept.and(LayerKind::Color) } else { kept },
             visibility_s: 0.0,
             shade_s: 0.0,
+            light_s: 0.0,
         })
     }
 
@@ -61,7 +74,10 @@ impl<'s> TileRenderer<'s> {
             self.subtile(corner, (left, top), &mut g)?;
         }
         match self.cutout.failures() {
-            0 => Ok(g.filter(|g: &GBuffer| !g.is_empty())),
+            0 => Ok(g.map(|mut g: GBuffer| {
+                g.keep(self.kept);
+                g
+            })),
             n => Err(Error::format(self.scene.store().folder(), format!("{n} samples met a texture that cannot be read"))),
         }
     }
@@ -71,9 +87,13 @@ impl<'s> TileRenderer<'s> {
         let vis = self.tracer.trace(x_px, y_px, &self.cutout)?;
         self.visibility_s += clock.lap_s();
         if !vis.is_empty() {
-            let g = g.get_or_insert_with(|| GBuffer::empty(self.frame.tile_px, self.frame.tile_px));
+            let g = g.get_or_insert_with(|| GBuffer::with(self.frame.tile_px, self.frame.tile_px, self.made));
             self.shader.subtile(vis, self.scene.textures(), g, place)?;
             self.shade_s += clock.lap_s();
+            if let Some(lights) = &mut self.lights {
+                lights.subtile(vis, &self.shader, g, Place { corner: place, corner_px: [x_px, y_px] }, &self.cutout)?;
+                self.light_s += clock.lap_s();
+            }
         }
         Ok(())
     }

@@ -63,8 +63,8 @@ impl Town {
 }
 
 pub fn all_layers(color: LayerFormat) -> Vec<LayerSpec> {
-    let png = |kind| LayerSpec { kind, format: LayerFormat::Png, quality: 80 };
-    vec![LayerSpec { kind: LayerKind::Color, format: color, quality: 80 }, png(LayerKind::Normal), png(LayerKind::Id), png(LayerKind::Depth)]
+    let png = |kind| LayerSpec::new(kind, LayerFormat::Png);
+    vec![LayerSpec::new(LayerKind::Color, color), png(LayerKind::Normal), png(LayerKind::Id), png(LayerKind::Depth)]
 }
 
 /// A square of `size_m` centred on the origin.
