@@ -80,7 +80,7 @@ class _TrackCheck:
         if (seam is None) != (stored.tiles == 0):
             self.findings.add(f"{where}: {stored.tiles} tiles and {'no' if seam is None else 'a'} seam")
         elif seam is not None:
-            self._try(where, lambda: check_seam(seam, self.track.frame.tile_px))
+            self._try(where, lambda: check_seam(seam, self.track.frame.tile_px, self.track.layers))
             self.findings.count("seams")
 
     def tile_names(self) -> set[TileId]:

@@ -2,6 +2,7 @@
 
 import io
 import struct
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -10,12 +11,12 @@ from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 from map3d.errors import Corrupt
-from map3d.types import Layer
+from map3d.types import LAYER_KINDS, Layer
 
 SEAM_MAGIC: Final = b"M3DG"
-SEAM_VERSION: Final = 1
-_SEAM_HEAD: Final = struct.Struct("<4sIII")
-_SEAM_ARRAYS: Final = 4
+SEAM_VERSION: Final = 2
+_SEAM_HEAD: Final = struct.Struct("<4sIIII")
+_ALWAYS: Final = ("id", "depth")
 _FORMATS: Final = {"webp": "WEBP", "png": "PNG", "jpeg": "JPEG"}
 _MODES: Final = {"normal": ("RGB",), "id": ("RGBA",), "depth": ("RGBA",), "depth2": ("RGBA",), "sun": ("L",), "ao": ("L",), "sun16": ("LA",)}
 _COLOR_MODES: Final = ("RGB", "RGBA")
@@ -41,17 +42,25 @@ def ids_of(pixels: NDArray[np.uint8]) -> NDArray[np.uint32]:
     return np.asarray(ids[ids != 0], dtype=np.uint32)
 
 
-def check_seam(data: bytes, tile_px: int) -> None:
-    """Raises Corrupt unless head, lengths and checksum are right (spec/pyramid.md §8)."""
+def seam_arrays(layers: Sequence[Layer]) -> int:
+    """Which arrays the seams of a pass have: bit k for kind k of LAYER_KINDS, the row of its array in spec/pyramid.md §5."""
+    return sum(1 << LAYER_KINDS.index(kind) for kind in {*_ALWAYS, *(layer.kind for layer in layers)})
+
+
+def check_seam(data: bytes, tile_px: int, layers: Sequence[Layer]) -> None:
+    """Raises Corrupt unless head, lengths and checksum are right for a pass of these layers (spec/pyramid.md §8)."""
     if len(data) < _SEAM_HEAD.size + 8:
         raise Corrupt(f"seam of {len(data)} bytes")
-    magic, version, width, height = _SEAM_HEAD.unpack_from(data)
+    magic, version, width, height, arrays = _SEAM_HEAD.unpack_from(data)
     if (magic, version, width, height) != (SEAM_MAGIC, SEAM_VERSION, tile_px, tile_px):
         raise Corrupt(
             f"seam {magic!r} version {version} of {width} × {height} px, expected {SEAM_MAGIC!r} version {SEAM_VERSION} of {tile_px} × {tile_px}"
         )
+    expected = seam_arrays(layers)
+    if arrays != expected:
+        raise Corrupt(f"seam with arrays {arrays:#b}, expected {expected:#b} ({', '.join(layer.kind for layer in layers)}, and id and depth)")
     at = _SEAM_HEAD.size
-    for _ in range(_SEAM_ARRAYS):
+    for _ in range(arrays.bit_count()):
         if at + 4 > len(data) - 8:
             raise Corrupt(f"seam ends after {len(data)} bytes, within an array")
         at += 4 + int.from_bytes(data[at : at + 4], "little")
