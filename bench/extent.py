@@ -23,7 +23,7 @@ from .scene import CACHE, _do
 from .watch import Figures, watched
 
 MILLIONS = (1, 3, 10)
-BLOCKS, RES_M, TEXTURE_PX = 40, 0.04, 512
+BUILDINGS, BLOCKS, RES_M, TEXTURE_PX = 300, 40, 0.04, 512
 BYTES_PER_TRIANGLE, SPARE_BYTES = 260, 1 << 30
 """Disk at the peak, as measured: assets, chunks, textures and what the build remembers."""
 MIB = 1 << 20
@@ -63,7 +63,7 @@ def _district(workspace: Workspace, folder: Path) -> None:
     """The scene that is copied, made once."""
     town, where = folder / "town", ["-w", str(workspace.root)]
     if not (town / "town.json").is_file():
-        _do(["make-town", "-o", str(town), "--buildings", "300", "--seed", "7", "--texture-px", str(TEXTURE_PX), "--no-trees"])
+        _do(["make-town", "-o", str(town), "--buildings", str(BUILDINGS), "--seed", "7", "--texture-px", str(TEXTURE_PX), "--no-trees"])
     for scene in ("district", "extent"):
         _do(["create-scene", scene, *where])
     _do(["add-files", "district", str(town), *where])
@@ -163,11 +163,7 @@ def draw(rows: list[Row], folder: Path) -> None:
         return [(at, row[key] / unit) for at, row in zip(x, rows, strict=True)]
 
     label = "million triangles (logarithmic)"
-    plot(
-        folder / "extent-memory.svg",
-        "Memory of all processes",
-        label,
-        "MiB",
-        {"render": line("memory_bytes", MIB), "build": line("build_memory_bytes", MIB)},
-    )
+    memory = {"render": "memory_bytes", "build": "build_memory_bytes", "build without mapped files": "build_anonymous_bytes"}
+    lines = {name: line(key, MIB) for name, key in memory.items()}
+    plot(folder / "extent-memory.svg", "Memory of all processes", label, "MiB", lines)
     plot(folder / "extent-time.svg", "A base tile with content", label, "ms", {"wall": line("wall_tile_ms", 1), "processor": line("cpu_tile_ms", 1)})

@@ -1,10 +1,12 @@
 """The town that everything is measured on, made once per checkout."""
 
 import json
+import shutil
 from pathlib import Path
 
 from map3d.catalogue import Workspace
 from map3d.cli.app import run
+from map3d.errors import UnknownVersion
 from map3d.render.plan import frame_text
 
 CACHE = Path(".cache/bench")
@@ -13,7 +15,7 @@ CACHE = Path(".cache/bench")
 def prepared(buildings: int, res_m: float, color: str) -> tuple[Path, dict[str, str]]:
     """The scene's folder, and the core's frame (JSON) of each view. `color`: format of the colour layer."""
     folder = CACHE / f"town-{buildings}"
-    workspace = Workspace(folder / "workspace").create()
+    workspace = _current(folder / "workspace")
     where = ["-w", str(workspace.root)]
     name = f"{color}-{round(res_m * 1000)}mm"
     catalogue = workspace.open_catalogue()
@@ -32,6 +34,17 @@ def prepared(buildings: int, res_m: float, color: str) -> tuple[Path, dict[str, 
         return workspace.root / "scenes" / "town", {track.id: frame_text(track) for track in record.tracks}
     finally:
         catalogue.close()
+
+
+def _current(folder: Path) -> Workspace:
+    """The workspace, made anew when it is there from an earlier version."""
+    try:
+        workspace = Workspace(folder).create()
+        workspace.open_catalogue().close()
+    except UnknownVersion:
+        shutil.rmtree(folder)
+        workspace = Workspace(folder).create()
+    return workspace
 
 
 def zmax(frame: str) -> int:
