@@ -100,8 +100,8 @@ bench: build ## speed and memory, peers beside us; then a twentieth of bench-rot
 	$(BIN)/python -m bench
 	$(BIN)/python -m bench.rotterdam --scale 20
 
-bench-extent: build ## a town that grows to 100 million triangles, in one memory: an hour, 30 GB of disk
-	$(BIN)/python -m bench extent --millions 1 3 10 30 100
+bench-extent: build ## a town that grows to 75 million triangles, in one memory: an hour, 30 GB of disk
+	$(BIN)/python -m bench extent --millions 1 3 10 30 75
 
 bench-cycles: requirements/cycles.lock | $(CACHE) ## install Blender (350 MB) in a Python of its own, a further peer of `make bench`
 	$(PYTHON) -m venv $(CACHE)/cycles
