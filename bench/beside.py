@@ -150,7 +150,7 @@ def _print(rows: list[Row], agreements: list[Agreement]) -> None:
     for row in rows:
         beside = [text for color in COLORS for text in (f"{row.ours_per_s[color]:.1f}", f"{row.ratio[color]:.1f} ×")]
         table.add_row(row.peer, str(row.px), str(row.pictures), str(row.tiles), f"{row.tiles_per_s:.1f}", *beside)
-    console = Console()
+    console = Console(width=140)
     console.print(table)
     for one in agreements:
         console.print(
