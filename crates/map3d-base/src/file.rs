@@ -38,6 +38,12 @@ pub fn map(path: &Path) -> Result<Mmap> {
     unsafe { Mmap::map(&file) }.map_err(|e| Error::storage(path, e))
 }
 
+/// Lets go of the memory that a mapping took up to now; what is looked at again comes back from the file. A failure changes nothing but memory.
+pub fn release(map: &Mmap) {
+    // SAFETY: the mapping is of a file and read-only, so what is dropped is read again as it was.
+    let _ = unsafe { map.unchecked_advise(memmap2::UncheckedAdvice::DontNeed) };
+}
+
 /// Checks magic, version and, on demand, the checksum over everything after `HEADER_BYTES`.
 pub fn check_header(path: &Path, bytes: &[u8], magic: &[u8; 4], version: u32, with_checksum: bool) -> Result<()> {
     if bytes.len() < HEADER_BYTES || &bytes[..4] != magic {

@@ -29,6 +29,8 @@ fn what_is_written_is_read_back() {
     assert_eq!(mesh.positions()[3], [5.0, 6.0, 5.0]);
     assert_eq!(mesh.uvs()[0], [[0.5, 0.25], [1.5, 0.25], [0.5, 1.25]]);
     assert!(mesh.normals().is_empty());
+    mesh.release();
+    assert_eq!((mesh.triangles(), mesh.positions()[3]), (&[[0, 1, 2], [3, 4, 5]][..], [5.0, 6.0, 5.0]), "what was let go comes back");
     std::fs::remove_dir_all(dir).expect("clean up");
 }
 

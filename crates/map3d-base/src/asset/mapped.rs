@@ -53,6 +53,11 @@ impl AssetMesh {
         Ok(mesh)
     }
 
+    /// Lets go of the memory that looking at the mesh took; it may be looked at again.
+    pub fn release(&self) {
+        file::release(&self.map);
+    }
+
     fn validate(&self) -> Result<()> {
         let bad = self.triangles().as_flattened().iter().find(|v| **v as usize >= self.vertices);
         if let Some(v) = bad {

@@ -65,6 +65,7 @@ pub fn build_textures(assets: &[TextureAsset], out_dir: &Path, threads: usize, p
     pool.install(|| {
         for (number, asset) in assets.iter().enumerate() {
             build.asset(number, asset)?;
+            asset.mesh.release();
         }
         Ok(build.result.into_inner().expect("no thread panicked"))
     })
@@ -112,6 +113,7 @@ impl<'a> Build<'a> {
             let used: BTreeSet<u32> = asset.mesh.materials().iter().copied().collect();
             let materials = used.iter().filter_map(|m| asset.materials.get(*m as usize));
             last_use.extend(materials.filter_map(source_of).map(|source| (source, number)));
+            asset.mesh.release();
         }
         Self {
             out_dir,

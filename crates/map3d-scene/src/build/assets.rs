@@ -177,6 +177,7 @@ impl Asset {
         let ids = read_ids(&folder.join("ids.u32"))?;
         let asset = Self { folder, mesh, materials, instances, ids };
         asset.validate()?;
+        asset.mesh.release();
         Ok(asset)
     }
 

@@ -120,6 +120,7 @@ impl<'a> Writer<'a> {
                 return Err(Error::Interrupted);
             }
             before += asset.mesh.triangles().len() as u64;
+            asset.mesh.release();
         }
         Ok(())
     }

@@ -82,6 +82,7 @@ impl Build<'_> {
         for number in 0..opened.len() {
             out.push(survey(self.folder, self.request, &source, number, self.textures, &mut |n| (self.progress)("measure", before + n, total))?);
             before += opened[number].mesh.triangles().len() as u64;
+            opened[number].mesh.release();
         }
         Ok(out)
     }
@@ -120,6 +121,7 @@ impl Build<'_> {
                 return Err(Error::Interrupted);
             }
             before += opened[number].mesh.triangles().len() as u64;
+            opened[number].mesh.release();
             (survey.cells, survey.facts.square) = (sums.finish(), bits(square));
         }
         numbers.iter().zip(surveys).try_for_each(|(k, survey)| self.assets.keep(*k, survey))

@@ -52,6 +52,7 @@ fn open_sources(assets: &mut Assets, out_dir: &Path) -> Result<BTreeSet<TextureS
 pub(super) fn used_sources(asset: &Asset) -> BTreeSet<TextureSource> {
     let mut used = vec![false; asset.materials.len()];
     asset.mesh.materials().iter().for_each(|m| used[*m as usize] = true);
+    asset.mesh.release();
     asset.materials.iter().zip(used).filter(|(_, used)| *used).filter_map(|(m, _)| source_of(m)).collect()
 }
 
