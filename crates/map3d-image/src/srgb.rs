@@ -27,6 +27,30 @@ pub static BYTE: LazyLock<Box<[u8; 65_536]>> = LazyLock::new(|| {
     table.try_into().expect("65,536 entries")
 });
 
+/// `BYTE` in tables that stay in the first-level cache, for whole images.
+pub struct ToByte {
+    /// Of each 16 values the byte of the first.
+    first: [u8; 4_096],
+    /// The least value of the next byte, beyond all for the last. Between two of them lie more than 16 values.
+    next: [u32; 256],
+}
+
+pub static TO_BYTE: LazyLock<ToByte> = LazyLock::new(|| {
+    let mut next = [1 << 16; 256];
+    for (value, pair) in BYTE.windows(2).enumerate().filter(|(_, pair)| pair[0] != pair[1]) {
+        next[pair[0] as usize] = value as u32 + 1;
+    }
+    ToByte { first: std::array::from_fn(|k| BYTE[k * 16]), next }
+});
+
+impl ToByte {
+    #[inline(always)]
+    pub fn byte(&self, value: u16) -> u8 {
+        let first = self.first[usize::from(value >> 4)];
+        first + u8::from(u32::from(value) >= self.next[first as usize])
+    }
+}
+
 /// The curve on 0..1: encoded to linear.
 pub fn linear_from_srgb(c: f64) -> f64 {
     if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
@@ -43,6 +67,11 @@ mod tests {
     #[test]
     fn a_byte_comes_back_from_its_linear_value() {
         assert!((0..=255u8).all(|b| BYTE[LINEAR16[b as usize] as usize] == b));
+    }
+
+    #[test]
+    fn small_tables_give_the_same_bytes() {
+        assert!((0..=u16::MAX).all(|v| TO_BYTE.byte(v) == BYTE[v as usize]));
     }
 
     #[test]

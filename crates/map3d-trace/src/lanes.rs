@@ -22,7 +22,7 @@ pub(crate) fn equal_lanes(lanes: &[u32; 16], value: u32) -> u32 {
 }
 
 /// Masks have bit k for lane k.
-pub(crate) trait Lanes: Copy {
+pub(crate) trait Lanes: Copy + FloatLanes {
     fn splat(value: i32) -> Self;
     fn load(from: &[i32; 16]) -> Self;
     fn store(self, to: &mut [i32; 16]);
@@ -42,8 +42,6 @@ pub(crate) trait Lanes: Copy {
     /// Stores the lanes of the mask.
     fn put(self, mask: u32, to: &mut [i32; 16]);
     fn greatest(self) -> i32;
-    /// Eight boxes against the square from 0 to `side`, both ends included: bit k is set when box k meets it. NaN never does.
-    fn meets_square(x: &[[f32; 8]; 2], y: &[[f32; 8]; 2], side: f32) -> u32;
 }
 
 #[cfg(test)]

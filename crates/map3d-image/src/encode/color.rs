@@ -1,34 +1,32 @@
 //! Colour to sRGB bytes with straight coverage alpha; under alpha 0 the colour of the nearest covered pixel.
 
 use crate::raster::Raster;
-use crate::srgb::BYTE;
+use crate::srgb::{TO_BYTE, ToByte};
 use crate::texture::{UsageMask, fill_unused};
 
 /// Linear premultiplied 16-bit colour to sRGB bytes.
 pub fn color_from_linear((width, height): (u32, u32), color: &[[u16; 4]]) -> Raster {
-    let table: &[u8; 65_536] = &BYTE;
+    let table: &ToByte = &TO_BYTE;
+    let mut pixels = vec![[0; 4]; color.len()];
     let mut covered = 0usize;
-    let pixels = color.iter().map(|p| {
-        let pixel = match p[3] {
-            65_535 => [table[p[0] as usize], table[p[1] as usize], table[p[2] as usize], 255],
-            a => straight(table, *p, a),
-        };
-        covered += usize::from(pixel[3] != 0);
-        pixel
-    });
-    let mut image = Raster::new(width, height, pixels.collect());
+    for (to, p) in pixels.iter_mut().zip(color) {
+        *to = if p[3] == 65_535 { [table.byte(p[0]), table.byte(p[1]), table.byte(p[2]), 255] } else { straight(table, *p) };
+        covered += usize::from(to[3] != 0);
+    }
+    let mut image = Raster::new(width, height, pixels);
     if covered != 0 && covered != color.len() {
         fill_uncovered(&mut image);
     }
     image
 }
 
-fn straight(table: &[u8; 65_536], p: [u16; 4], a: u16) -> [u8; 4] {
-    let alpha = ((u32::from(a) + 128) / 257) as u8;
+fn straight(table: &ToByte, p: [u16; 4]) -> [u8; 4] {
+    let a = u32::from(p[3]);
+    let alpha = ((a + 128) / 257) as u8;
     if alpha == 0 {
         return [0; 4];
     }
-    let byte = |c: u16| table[((u32::from(c) * 65_535 + u32::from(a) / 2) / u32::from(a)).min(65_535) as usize];
+    let byte = |c: u16| table.byte(((u32::from(c) * 65_535 + a / 2) / a).min(65_535) as u16);
     [byte(p[0]), byte(p[1]), byte(p[2]), alpha]
 }
 

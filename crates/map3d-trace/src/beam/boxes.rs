@@ -5,7 +5,7 @@ use map3d_scene::Node;
 
 use super::project::Projection;
 use super::shape::BIAS_MAX;
-use crate::lanes::Lanes;
+use crate::lanes::{Floats, Lanes};
 use crate::visbuf::SUBTILE_PX;
 
 /// Room for the snapping of corners, in pixels.
@@ -24,9 +24,27 @@ pub(crate) struct Row {
 }
 
 impl Row {
-    /// The sides of the children's boxes that make a sum with these coefficients least or greatest.
+    /// The least coordinate of each child's box.
     #[inline(always)]
-    pub fn side<'n>(&self, node: &'n Node, axis: usize, least: bool) -> &'n [f32; 8] {
+    pub fn least<F: Floats<8>>(&self, node: &Node) -> F {
+        self.sum(node, true, self.low)
+    }
+
+    /// The greatest coordinate of each child's box.
+    #[inline(always)]
+    pub fn greatest<F: Floats<8>>(&self, node: &Node) -> F {
+        self.sum(node, false, self.high)
+    }
+
+    #[inline(always)]
+    fn sum<F: Floats<8>>(&self, node: &Node, least: bool, constant: f32) -> F {
+        let term = |axis: usize| F::splat(self.m[axis]).mul(F::load(self.side(node, axis, least)));
+        term(0).add(term(1)).add(term(2)).add(F::splat(constant))
+    }
+
+    /// The side of the children's boxes along an axis that makes the sum least, or greatest.
+    #[inline(always)]
+    fn side<'n>(&self, node: &'n Node, axis: usize, least: bool) -> &'n [f32; 8] {
         let side = self.least_side[axis] as usize;
         &node.bounds[(axis + if least { side } else { 3 - side }) % 6]
     }
@@ -71,32 +89,21 @@ impl BoxMap {
     /// Places the boxes of a node's children and tells which meet the sub-tile.
     #[inline(always)]
     pub fn children<L: Lanes>(&self, node: &Node) -> ChildBoxes {
-        let x = [self.least(0, node), self.greatest(0, node)];
-        let y = [self.least(1, node), self.greatest(1, node)];
-        let mask = L::meets_square(&x, &y, SUBTILE_PX as f32);
-        ChildBoxes { x, y, near: self.least(2, node), mask }
+        let [x, y, depth] = &self.rows;
+        let (x0, x1) = (x.least::<L::Eight>(node), x.greatest::<L::Eight>(node));
+        let (y0, y1) = (y.least::<L::Eight>(node), y.greatest::<L::Eight>(node));
+        let (zero, side) = (L::Eight::splat(0.0), L::Eight::splat(SUBTILE_PX as f32));
+        let mask = x1.at_least(zero) & side.at_least(x0) & y1.at_least(zero) & side.at_least(y0);
+        let mut out = ChildBoxes { x: [[0.0; 8]; 2], y: [[0.0; 8]; 2], near: [0.0; 8], mask };
+        if mask != 0 {
+            x0.store(&mut out.x[0]);
+            x1.store(&mut out.x[1]);
+            y0.store(&mut out.y[0]);
+            y1.store(&mut out.y[1]);
+            depth.least::<L::Eight>(node).store(&mut out.near);
+        }
+        out
     }
-
-    #[inline(always)]
-    fn least(&self, row: usize, node: &Node) -> [f32; 8] {
-        let r = &self.rows[row];
-        sum(r.m, r.side(node, 0, true), r.side(node, 1, true), r.side(node, 2, true), r.low)
-    }
-
-    #[inline(always)]
-    fn greatest(&self, row: usize, node: &Node) -> [f32; 8] {
-        let r = &self.rows[row];
-        sum(r.m, r.side(node, 0, false), r.side(node, 1, false), r.side(node, 2, false), r.high)
-    }
-}
-
-#[inline(always)]
-fn sum(m: [f32; 3], a: &[f32; 8], b: &[f32; 8], c: &[f32; 8], constant: f32) -> [f32; 8] {
-    let mut out = [0.0; 8];
-    for k in 0..8 {
-        out[k] = m[0] * a[k] + m[1] * b[k] + m[2] * c[k] + constant;
-    }
-    out
 }
 
 impl Row {

@@ -115,8 +115,7 @@ pub(super) fn children<F: Floats<8>>(map: &BoxMap, node: &Node, reach: &Reach) -
     let mut near = [0.0; 8];
     for axis in 0..3 {
         let row = &map.rows[axis];
-        let sides = |least: bool| [F::load(row.side(node, 0, least)), F::load(row.side(node, 1, least)), F::load(row.side(node, 2, least))];
-        let (lo, hi) = (sum(row.m, sides(true), F::splat(row.low)), sum(row.m, sides(false), F::splat(row.high)));
+        let (lo, hi) = (row.least::<F>(node), row.greatest::<F>(node));
         mask &= hi.at_least(F::splat(reach.lo[axis])) & F::splat(reach.hi[axis]).at_least(lo);
         if axis == 2 {
             lo.store(&mut near);

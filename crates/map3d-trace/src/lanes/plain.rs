@@ -97,10 +97,4 @@ impl Lanes for Plain {
     fn greatest(self) -> i32 {
         self.0.into_iter().fold(i32::MIN, i32::max)
     }
-
-    #[inline(always)]
-    fn meets_square(x: &[[f32; 8]; 2], y: &[[f32; 8]; 2], side: f32) -> u32 {
-        let meets = |k: usize| x[1][k] >= 0.0 && x[0][k] <= side && y[1][k] >= 0.0 && y[0][k] <= side;
-        (0..8).fold(0, |mask, k| mask | u32::from(meets(k)) << k)
-    }
 }

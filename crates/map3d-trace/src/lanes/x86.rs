@@ -90,11 +90,6 @@ impl Lanes for Avx512 {
     fn greatest(self) -> i32 {
         unsafe { _mm512_reduce_max_epi32(self.0) }
     }
-
-    #[inline(always)]
-    fn meets_square(x: &[[f32; 8]; 2], y: &[[f32; 8]; 2], side: f32) -> u32 {
-        unsafe { meets_square(x, y, side) }
-    }
 }
 
 /// Two 256-bit registers.
@@ -191,22 +186,5 @@ impl Lanes for Avx2 {
         let mut lanes = [0; 16];
         self.store(&mut lanes);
         lanes.into_iter().fold(i32::MIN, i32::max)
-    }
-
-    #[inline(always)]
-    fn meets_square(x: &[[f32; 8]; 2], y: &[[f32; 8]; 2], side: f32) -> u32 {
-        unsafe { meets_square(x, y, side) }
-    }
-}
-
-#[inline(always)]
-unsafe fn meets_square(x: &[[f32; 8]; 2], y: &[[f32; 8]; 2], side: f32) -> u32 {
-    unsafe {
-        let (zero, side) = (_mm256_setzero_ps(), _mm256_set1_ps(side));
-        let (x0, x1) = (_mm256_loadu_ps(x[0].as_ptr()), _mm256_loadu_ps(x[1].as_ptr()));
-        let (y0, y1) = (_mm256_loadu_ps(y[0].as_ptr()), _mm256_loadu_ps(y[1].as_ptr()));
-        let in_x = _mm256_and_ps(_mm256_cmp_ps::<_CMP_GE_OQ>(x1, zero), _mm256_cmp_ps::<_CMP_LE_OQ>(x0, side));
-        let in_y = _mm256_and_ps(_mm256_cmp_ps::<_CMP_GE_OQ>(y1, zero), _mm256_cmp_ps::<_CMP_LE_OQ>(y0, side));
-        _mm256_movemask_ps(_mm256_and_ps(in_x, in_y)) as u32
     }
 }
