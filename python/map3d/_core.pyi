@@ -140,7 +140,9 @@ class Block:
 def reduce_block(frame: str, z: int, x: int, y: int, levels: int, seams: list[tuple[int, int, bytes]]) -> Block:
     """A reduce block of root (z, x, y) with `levels` levels; seams: (x, y, bytes) of blocks rooted at level z + levels."""
 
-def encode_layer(kind: Literal["color", "normal", "id", "depth", "sun", "sun16", "ao", "depth2", "picture"], format: str, array: NDArray[Any], quality: int = 80) -> bytes:
+def encode_layer(
+    kind: Literal["color", "normal", "id", "depth", "sun", "sun16", "ao", "depth2", "picture"], format: str, array: NDArray[Any], quality: int = 80
+) -> bytes:
     """One layer of a G-buffer → image bytes."""
 
 def decode_png(data: bytes) -> NDArray[np.uint8]:
