@@ -1,4 +1,4 @@
-"""`python -m bench [PART …] [--json]`; parts: tiles, encoding, ingest, incremental (these, unless some are named), extent, stored."""
+"""`python -m bench [PART …] [--json]`; parts: tiles, light, encoding, ingest, incremental (these, unless some are named), extent, stored."""
 
 import argparse
 import json
@@ -9,10 +9,10 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from . import encoding, extent, incremental, ingest, stored, tiles
+from . import encoding, extent, incremental, ingest, light, stored, tiles
 from .scene import CACHE
 
-PARTS = ("tiles", "encoding", "ingest", "incremental")
+PARTS = ("tiles", "light", "encoding", "ingest", "incremental")
 ASKED = ("extent", "stored")
 Rows = list[dict[str, Any]]
 
@@ -32,6 +32,7 @@ def main() -> None:
         parser.error(f"no part {unknown[0]}; there are {', '.join(PARTS + ASKED)}")
     measures: dict[str, Callable[[], Rows]] = {
         "tiles": lambda: of_tiles(options.buildings, options.res, options.tiles),
+        "light": light.measure,
         "encoding": encoding.measure,
         "ingest": ingest.measure,
         "incremental": incremental.measure,

@@ -8,7 +8,7 @@ import pytest
 from map3d.cli.render_stats import print_summary, summary
 from tests.cli.towns import Run, write_town
 
-STAGES = {"visibility", "shade", "reduce", "encode", "seam"}
+STAGES = {"visibility", "shade", "light", "reduce", "encode", "seam"}
 
 
 def test_nothing_rendered_is_all_zero() -> None:
@@ -38,9 +38,12 @@ def test_a_render_tells_its_stages_and_caches(run: Run, tmp_path: Path) -> None:
     assert status == 0, err
     stats = json.loads(out)["stats"]
     assert set(stats["seconds"]) == STAGES
-    assert all(seconds > 0 for seconds in stats["seconds"].values())
+    assert all(seconds > 0 for stage, seconds in stats["seconds"].items() if stage != "light")
+    assert stats["seconds"]["light"] == 0
     assert 0 < stats["caches"]["chunk"]["hit_rate"] < 1
     status, out, _ = run("render", "view", "--stats")
     assert status == 0
     assert "visibility" in out
     assert json.loads(run("render", "view", "--json")[1])["stats"] is None
+    assert run("add-layers", "view", "--layers", "sun", "--sun", "200,40")[0] == 0
+    assert json.loads(run("render", "view", "--json", "--stats")[1])["stats"]["seconds"]["light"] > 0

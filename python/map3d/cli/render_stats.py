@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from map3d.cli.output import print_table
 
-STAGES: Final = ("visibility", "shade", "reduce", "encode", "seam")
+STAGES: Final = ("visibility", "shade", "light", "reduce", "encode", "seam")
 CACHES: Final = ("chunk", "texture")
 
 

@@ -1,0 +1,83 @@
+"""What the layers of light cost: processor time a base tile of their rays, beside the visibility and shading that go before them."""
+
+import json
+import math
+from typing import Any, Final
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from map3d import _core
+from map3d.tiles.naming import block_levels
+
+from .scene import prepared, zmax
+
+BUILDINGS: Final = 300
+RES_M: Final = 0.2
+BLOCKS: Final = 3
+ROUNDS: Final = 3
+RADIUS_M: Final = 20.0
+SUN: Final = (0.6, -0.48, 0.64)
+SUNS: Final = 16
+
+
+def measure() -> list[dict[str, Any]]:
+    """A row a kind; the table is printed."""
+    folder, frames = prepared(BUILDINGS, RES_M, "webp")
+    frame = next(iter(frames.values()))
+    scene = _core.Scene(str(folder))
+    blocks = _full_blocks(scene, frame)
+    rows = [_row(scene, kind, _frame_of(frame, layer), blocks) for kind, layer in layers().items()]
+    table = Table(title=f"layers of light, ms of processor time a base tile, {scene.triangle_count:,} triangles at {RES_M} m a pixel")
+    for column in ("layer", "tiles", "visibility and shading", "rays", "rays, of one sun"):
+        table.add_column(column, justify="right")
+    for row in rows:
+        each = f"{row['light_ms'] / row['suns']:.2f}" if row["suns"] else ""
+        table.add_row(row["kind"], str(row["tiles"]), f"{row['before_ms']:.2f}", f"{row['light_ms']:.2f}", each)
+    Console().print(table)
+    return rows
+
+
+def layers() -> dict[str, dict[str, Any]]:
+    """Kind → the core's layer."""
+    day = [_sun(40.0 + 280.0 * (k + 0.5) / SUNS, 60.0 * math.sin(math.pi * (k + 0.5) / SUNS)) for k in range(SUNS)]
+    options: dict[str, dict[str, Any]] = {
+        "sun": {"suns": [SUN]},
+        "sun16": {"suns": day},
+        "ao": {"radius_m": RADIUS_M},
+        "depth2": {},
+        "picture": {"suns": [SUN], "radius_m": RADIUS_M},
+    }
+    return {kind: {"kind": kind, "format": "png", **more} for kind, more in options.items()}
+
+
+def _row(scene: _core.Scene, kind: str, frame: str, blocks: list[tuple[int, int, int]]) -> dict[str, Any]:
+    """The least of the rounds, after one that warms the caches."""
+    rounds = []
+    for _ in range(ROUNDS + 1):
+        stats = [scene.render_block(frame, *block).stats for block in blocks]
+        tiles = sum(one["traced_tiles"] for one in stats)
+        before = sum(one["visibility_s"] + one["shade_s"] for one in stats)
+        rounds.append((sum(one["light_s"] for one in stats) / tiles * 1e3, before / tiles * 1e3, tiles))
+    light_ms, before_ms, tiles = min(rounds[1:])
+    return {"kind": kind, "tiles": int(tiles), "light_ms": light_ms, "before_ms": before_ms, "suns": len(layers()[kind].get("suns", ()))}
+
+
+def _full_blocks(scene: _core.Scene, frame: str) -> list[tuple[int, int, int]]:
+    """Base blocks with the most tiles that may have content."""
+    root, deepest = block_levels(zmax(frame))[0].root, zmax(frame)
+    flags = scene.occupied(frame, deepest)
+    side = 1 << (deepest - root)
+    counts = flags.reshape(1 << root, side, 1 << root, side).sum(axis=(1, 3))
+    order = np.argsort(-counts, axis=None, kind="stable")[:BLOCKS]
+    return [(root, int(k) % (1 << root), int(k) >> root) for k in order]
+
+
+def _frame_of(frame: str, layer: dict[str, Any]) -> str:
+    return json.dumps({**json.loads(frame), "layers": [layer]})
+
+
+def _sun(azimuth_deg: float, elevation_deg: float) -> tuple[float, float, float]:
+    a, e = math.radians(azimuth_deg), math.radians(elevation_deg)
+    return (math.sin(a) * math.cos(e), math.cos(a) * math.cos(e), math.sin(e))
