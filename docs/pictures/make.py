@@ -7,17 +7,22 @@ import sys
 from pathlib import Path
 from typing import Final
 
+from light import side_by_side
+
 from map3d.catalogue import Workspace
 from map3d.cli.app import run
+from map3d.geometry.views import uvd_from_local
+from map3d.tiles.sqlite_store import SqliteTileStore
 
 HERE: Final = Path(__file__).parent
 PLAYWRIGHT: Final = HERE.parents[1] / "viewer" / "node_modules" / "playwright-core"
 TITLE: Final = ("--title", "A made-up town")
+LIGHT: Final = ("--res", "0.2", "--view", "30/45", "--layers", "picture,sun,ao", "--time", "2026-06-21T17:00+02:00", "--quality", "92")
 VIEWS: Final = ("--view", "0/45", "--view", "120/45", "--view", "0/22.5", "--view", "0/10")
 
 
 def prepare(folder: Path) -> Path:
-    """The workspace with the rendering `pictures` of the town."""
+    """The workspace with the renderings `pictures` and `light` of the town."""
     workspace = Workspace(folder / "workspace").create()
     where = ("--workspace", str(workspace.root))
     steps = [("make-town", "-o", str(folder / "town"), "--buildings", "300", "--seed", "7")]
@@ -26,12 +31,25 @@ def prepare(folder: Path) -> Path:
         steps += [("create-scene", "town", *TITLE, *where), ("add-files", "town", str(folder / "town"), *where)]
     if not catalogue.renderings():
         steps.append(("create-rendering", "town", "pictures", "--res", "0.1", *VIEWS, *TITLE, *where))
+        steps.append(("create-rendering", "town", "light", *LIGHT, *TITLE, *where))
     catalogue.close()
-    for step in [*steps, ("render", "pictures", *where)]:
+    for step in [*steps, ("render", "pictures", *where), ("render", "light", *where)]:
         status = run(list(step))
         if status:
             sys.exit(status)
     return workspace.root
+
+
+def light(workspace: Path) -> None:
+    """The layers of light around the middle of the town."""
+    catalogue = Workspace(workspace).open_catalogue()
+    frame = catalogue.rendering("light").frames[0]
+    catalogue.close()
+    # The origin of a scene lies near its middle: here the church square.
+    u, v = uvd_from_local(frame.axes, (0.0, 0.0, 0.0))[:2]
+    pixel_m = frame.pixel_m(frame.zmax)
+    with SqliteTileStore(Workspace(workspace).store_path("light", frame.id), read_only=True) as store:
+        side_by_side(store, (round((u - frame.u0_m) / pixel_m), round((frame.v0_m - v) / pixel_m)), HERE / "light.jpg")
 
 
 def shoot(workspace: Path) -> None:
@@ -51,4 +69,6 @@ def shoot(workspace: Path) -> None:
 if __name__ == "__main__":
     if len(sys.argv) != 2:
         sys.exit("usage: python docs/pictures/make.py FOLDER")
-    shoot(prepare(Path(sys.argv[1])))
+    root = prepare(Path(sys.argv[1]))
+    light(root)
+    shoot(root)

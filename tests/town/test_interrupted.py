@@ -30,6 +30,8 @@ def cut_off(_kind, done, _all):
 
 
 if __name__ == "__main__":
+    # A shell ignores it for what it starts in the background, and children inherit that.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     make_town(Path(sys.argv[1]), SPEC, cut_off, workers=2)
 """
 """Cuts itself off after four jobs, whatever else the machine does."""

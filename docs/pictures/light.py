@@ -1,0 +1,39 @@
+"""The layers of light side by side, straight from a tile store."""
+
+import io
+from pathlib import Path
+from typing import Final
+
+from PIL import Image
+
+from map3d.tiles.sqlite_store import SqliteTileStore
+
+PANELS: Final = ("picture", "sun", "ao")
+SIZE_PX: Final = (500, 620)
+GAP_PX: Final = 8
+QUALITY: Final = 88
+
+
+def side_by_side(store: SqliteTileStore, middle_px: tuple[int, int], out: Path) -> None:
+    """A JPEG of all panels around a pixel of level zmax, counted from the top left corner of the square."""
+    width, height = SIZE_PX
+    sheet = Image.new("RGB", (len(PANELS) * (width + GAP_PX) - GAP_PX, height), "white")
+    left_px, top_px = middle_px[0] - width // 2, middle_px[1] - height // 2
+    for number, name in enumerate(PANELS):
+        sheet.paste(_cut(store, name, left_px, top_px), (number * (width + GAP_PX), 0))
+    sheet.save(out, quality=QUALITY)
+
+
+def _cut(store: SqliteTileStore, name: str, left_px: int, top_px: int) -> Image.Image:
+    """What a layer shows of a rectangle of pixels of level zmax."""
+    shape = store.shape
+    layer = next(number for number, layer in enumerate(shape.layers) if layer.name == name)
+    cut = Image.new("RGB", SIZE_PX, "white")
+    side = shape.tile_px
+    for x in range(left_px // side, (left_px + SIZE_PX[0]) // side + 1):
+        for y in range(top_px // side, (top_px + SIZE_PX[1]) // side + 1):
+            data = store.get_tile(layer, shape.zmax, x, y)
+            if data is not None:
+                tile = Image.open(io.BytesIO(data)).convert("RGB")
+                cut.paste(tile, (x * side - left_px, y * side - top_px))
+    return cut
