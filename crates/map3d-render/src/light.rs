@@ -3,7 +3,7 @@
 mod planes;
 mod points;
 
-use map3d_base::{Frame, Isa, LayerKind, LayerSpec, RAY_LIFT_M, Result, Vec3, ViewAxes};
+use map3d_base::{DEPTH_NOTHING, DEPTH_UNITS_PER_M, Frame, Isa, LayerKind, LayerSpec, RAY_LIFT_M, Result, Vec3, ViewAxes};
 use map3d_image::GBuffer;
 use map3d_scene::SceneStore;
 use map3d_trace::{Cutout, DepthPlane, Openness, SUBTILE_PX, Surroundings, VisBuf};
@@ -26,6 +26,8 @@ pub struct Lights<'s> {
     scene: &'s SceneStore,
     frame: Frame,
     axes: ViewAxes,
+    /// Side of a pixel of level zmax.
+    pixel_m: f64,
     isa: Isa,
     directions: Vec<Vec3>,
     /// Every surface in every pixel, for what is averaged over a pixel.
@@ -61,6 +63,7 @@ impl<'s> Lights<'s> {
             scene,
             frame: frame.clone(),
             axes: frame.axes(),
+            pixel_m: frame.pixel_m(frame.zmax),
             isa,
             directions: even_directions(DIRECTIONS),
             surfaces: Points::default(),
@@ -89,17 +92,22 @@ impl<'s> Lights<'s> {
         if layers.iter().any(|l| matches!(l.kind, LayerKind::Sun16 | LayerKind::Depth2)) {
             self.take_centers(vis, shader, place);
         }
+        // Layers of one pass may share a sun or a radius.
+        let (mut suns, mut radii) = (Found::default(), Found::default());
         for layer in layers {
             match layer.kind {
                 LayerKind::Sun => {
-                    let lit = self.lit(&self.surfaces, layer.suns[0], cutout)?;
-                    let shares: Vec<f32> = lit.into_iter().map(|lit| if lit { 1.0 } else { 0.0 }).collect();
+                    let lit = suns.get(layer.suns[0], || self.lit(&self.surfaces, layer.suns[0], cutout))?;
+                    let shares: Vec<f32> = lit.iter().map(|lit| if *lit { 1.0 } else { 0.0 }).collect();
                     average(seen, &shares, &mut g.sun, g.width, place);
                 }
-                LayerKind::Ao => average(seen, &self.open(layer.radius_m, cutout)?, &mut g.ao, g.width, place),
+                LayerKind::Ao => {
+                    let open = radii.get(layer.radius_m, || self.open(layer.radius_m, cutout))?;
+                    average(seen, open, &mut g.ao, g.width, place);
+                }
                 LayerKind::Picture => {
-                    let lit = self.lit(&self.surfaces, layer.suns[0], cutout)?;
-                    let open = self.open(layer.radius_m, cutout)?;
+                    let lit = suns.get(layer.suns[0], || self.lit(&self.surfaces, layer.suns[0], cutout))?;
+                    let open = radii.get(layer.radius_m, || self.open(layer.radius_m, cutout))?;
                     let light = |k: usize, p: &SurfacePoint| {
                         let cosine = if lit[k] {
                             u64::from(shaded[p.surface as usize].cosine(p.pixel[0].into(), p.pixel[1].into(), layer.suns[0]))
@@ -129,7 +137,7 @@ impl<'s> Lights<'s> {
         for p in seen {
             let surface = &shaded[p.surface as usize];
             let [x, y] = [0, 1].map(|k| f64::from(p.pixel[k]) + f64::from(p.at[k]) / 256.0);
-            let at = local(&self.frame, &self.axes, place, x, y, surface.depth.at(x, y));
+            let at = self.local(place, x, y, &surface.depth);
             let stand = if p.samples == 16 { Stand::Pixel } else { Stand::Share };
             self.surfaces.push(p.pixel, stand, at, surface.geometric_normal());
         }
@@ -142,7 +150,7 @@ impl<'s> Lights<'s> {
         for p in seen {
             let surface = &shaded[p.surface as usize];
             let [x, y] = [0, 1].map(|k| f64::from(p.pixel[k]) + f64::from(p.at[k]) / 256.0);
-            let at = local(&self.frame, &self.axes, place, x, y, surface.depth.at(x, y));
+            let at = self.local(place, x, y, &surface.depth);
             self.quad_of.push(planes.add(p.pixel, at, surface.geometric_normal(), p.samples));
         }
         self.quads.clear();
@@ -158,11 +166,20 @@ impl<'s> Lights<'s> {
             if let Some(slot) = vis.center_slot(i, j) {
                 let surface = shader.surface_of(slot);
                 let (x, y) = (i as f64 + 0.5, j as f64 + 0.5);
-                let at = local(&self.frame, &self.axes, place, x, y, surface.depth.at(x, y));
+                let at = self.local(place, x, y, &surface.depth);
                 self.centers.push([i as u8, j as u8], Stand::Pixel, at, surface.geometric_normal());
             }
         }
         self.centers.finish();
+    }
+
+    /// Local point of a surface at (x, y) in pixels from the sub-tile's corner.
+    fn local(&self, place: Place, x: f64, y: f64, depth: &DepthPlane) -> Vec3 {
+        let u = self.frame.u0_m + (place.corner_px[0] as f64 + x) * self.pixel_m;
+        let v = self.frame.v0_m - (place.corner_px[1] as f64 + y) * self.pixel_m;
+        let d = self.frame.d0_m + depth.at(x, y) / DEPTH_UNITS_PER_M;
+        let (r, up, f) = (self.axes.right, self.axes.up, self.axes.forward);
+        [r[0] * u + up[0] * v + f[0] * d, r[1] * u + up[1] * v + f[1] * d, r[2] * u + up[2] * v + f[2] * d]
     }
 
     /// Of each point, whether a sun lights it.
@@ -172,7 +189,7 @@ impl<'s> Lights<'s> {
             return Ok(out);
         }
         let around = Surroundings::ahead(self.scene, points.center, &points.bounds, sun)?;
-        let mut bundles = around.along(sun, self.frame.pixel_m(self.frame.zmax), self.isa)?;
+        let mut bundles = around.along(sun, self.pixel_m, self.isa)?;
         for (patch, numbers) in points.patches(RAY_LIFT_M) {
             let shadow = bundles.any_hit(&patch, f64::INFINITY, cutout);
             let lit = shadow.sent & !shadow.hit;
@@ -192,7 +209,7 @@ impl<'s> Lights<'s> {
         let patches: Vec<_> = points.patches(RAY_LIFT_M).collect();
         let mut openness = vec![Openness::default(); patches.len()];
         for direction in &self.directions {
-            let mut bundles = around.along(*direction, self.frame.pixel_m(self.frame.zmax), self.isa)?;
+            let mut bundles = around.along(*direction, self.pixel_m, self.isa)?;
             for ((patch, _), openness) in patches.iter().zip(&mut openness) {
                 bundles.add_open(patch, radius_m, cutout, openness);
             }
@@ -210,8 +227,8 @@ impl<'s> Lights<'s> {
         }
         let forward = self.axes.forward;
         let around = Surroundings::ahead(self.scene, points.center, &points.bounds, forward)?;
-        let mut bundles = around.along(forward, self.frame.pixel_m(self.frame.zmax), self.isa)?;
-        let near_m = (f64::from(BEHIND_UNITS) - 0.5) / map3d_base::DEPTH_UNITS_PER_M;
+        let mut bundles = around.along(forward, self.pixel_m, self.isa)?;
+        let near_m = (f64::from(BEHIND_UNITS) - 0.5) / DEPTH_UNITS_PER_M;
         for (patch, numbers) in points.patches(0.0) {
             let nearest = bundles.nearest(&patch, near_m, cutout);
             let plane = |t: &[Vec3; 3]| DepthPlane::of_corners(&self.frame, &self.axes, t, place.corner_px);
@@ -220,7 +237,7 @@ impl<'s> Lights<'s> {
                 let Some(triangle) = nearest.of_point[k] else { continue };
                 let [i, j] = points.pixels[*number as usize].map(usize::from);
                 let at = place.index(g.width, i, j);
-                let least = g.depth[at].saturating_add(BEHIND_UNITS).min(map3d_base::DEPTH_NOTHING - 1);
+                let least = g.depth[at].saturating_add(BEHIND_UNITS).min(DEPTH_NOTHING - 1);
                 g.depth2[at] = planes[triangle as usize].units(i, j).max(least);
             }
         }
@@ -228,19 +245,31 @@ impl<'s> Lights<'s> {
     }
 }
 
+/// What was found of each point, by what it was found for.
+struct Found<K, T>(Vec<(K, Vec<T>)>);
+
+impl<K, T> Default for Found<K, T> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+impl<K: Copy + PartialEq, T> Found<K, T> {
+    fn get(&mut self, key: K, find: impl FnOnce() -> Result<Vec<T>>) -> Result<&[T]> {
+        let at = match self.0.iter().position(|(known, _)| *known == key) {
+            Some(at) => at,
+            None => {
+                self.0.push((key, find()?));
+                self.0.len() - 1
+            }
+        };
+        Ok(&self.0[at].1)
+    }
+}
+
 /// The layer's values are means over a pixel's samples, as colours are.
 fn is_averaged(kind: LayerKind) -> bool {
     matches!(kind, LayerKind::Sun | LayerKind::Ao | LayerKind::Picture)
-}
-
-/// Local point of (x, y) in pixels from the sub-tile's corner at a depth in units.
-fn local(frame: &Frame, axes: &ViewAxes, place: Place, x: f64, y: f64, depth: f64) -> Vec3 {
-    let pixel_m = frame.pixel_m(frame.zmax);
-    let u = frame.u0_m + (place.corner_px[0] as f64 + x) * pixel_m;
-    let v = frame.v0_m - (place.corner_px[1] as f64 + y) * pixel_m;
-    let d = frame.d0_m + depth / map3d_base::DEPTH_UNITS_PER_M;
-    let (r, up, f) = (axes.right, axes.up, axes.forward);
-    [r[0] * u + up[0] * v + f[0] * d, r[1] * u + up[1] * v + f[1] * d, r[2] * u + up[2] * v + f[2] * d]
 }
 
 /// Means over the covered samples of each pixel; 255 is 1. Points of one pixel follow each other.

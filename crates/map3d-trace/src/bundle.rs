@@ -3,7 +3,7 @@
 //!
 //! `Surroundings` keeps what rays from some part of the scene can meet, `Bundles` sees it along one direction, a `Patch` is where a bundle starts.
 
-pub mod descent;
+mod descent;
 mod dispatch;
 mod patch;
 mod rays;
@@ -43,7 +43,8 @@ impl Surroundings {
         snap(p).map(|v| v as f64 / STEPS_PER_M)
     }
 
-    /// `center`: a local lattice point, near where the rays start; `meets`: whether they can meet anything in a box.
+    /// `center`: a local lattice point, near where the rays start; `meets`: whether they can meet anything in a local box. Fails for another center, and
+    /// for a chunk that cannot be read.
     pub fn gather(scene: &SceneStore, center: Vec3, mut meets: impl FnMut(&Box3) -> bool) -> Result<Self> {
         if Self::center_near(center) != center {
             return Err(Error::argument(format!("bundle around {center:?}: no point of the lattice")));
@@ -90,16 +91,13 @@ impl Surroundings {
         self.center
     }
 
+    /// Rays meet nothing.
     pub fn is_empty(&self) -> bool {
         self.parts.is_empty()
     }
 
-    /// Parts gathered.
-    pub fn len(&self) -> usize {
-        self.parts.len()
-    }
-
-    /// For rays along a direction of any length but zero. `width_m`: over which cut-outs are filtered.
+    /// For rays along a local direction of any length. `width_m`: over which cut-outs are filtered. Fails for a direction of zero, and for an instruction
+    /// set that this machine does not have.
     pub fn along(&self, direction: Vec3, width_m: f64, isa: Isa) -> Result<Bundles<'_>> {
         let axes = across(direction)?;
         if !Isa::available().contains(&isa) {

@@ -16,14 +16,14 @@ use crate::surface::{Placed, Surface};
 
 /// A node or leaf still to be visited, and where its box begins along the rays.
 #[derive(Clone, Copy)]
-pub(crate) struct Entry {
+pub(super) struct Entry {
     child: u32,
     near: f32,
 }
 
 /// A triangle that was the nearest of some ray.
 #[derive(Clone, Copy)]
-pub(crate) struct Met {
+pub(super) struct Met {
     pub part: u32,
     pub leaf: u32,
     pub lane: u8,
