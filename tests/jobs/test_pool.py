@@ -3,10 +3,12 @@
 import os
 import random
 import signal
+import sqlite3
 import subprocess
 import sys
 import threading
 import time
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +17,7 @@ import pytest
 from map3d.catalogue import State
 from map3d.jobs.events import Done, Event, Left, Waiting
 from map3d.jobs.terms import Terms
-from tests.jobs.town import BLOCKS, LEASE_S, TERMS, Town, make_town
+from tests.jobs.town import BLOCKS, LEASE_S, TERMS, VIEW, Town, make_town
 
 JOBS = BLOCKS * BLOCKS
 POISON = ["segfault", "abort", "killed", "hang", "spin", "exception", "exit 0", "memory", "nonsense"]
@@ -51,8 +53,30 @@ def render_in_process(town: Town, workers: int) -> subprocess.Popen[str]:
     return process
 
 
+def freeze_with_a_lease(process: subprocess.Popen[str], town: Town) -> None:
+    """Stops a process while it holds a lease and no lock of a database, which nobody could take from it."""
+    databases = [town.workspace.root / "catalogue.sqlite", town.workspace.store_path(town.rendering.name, VIEW)]
+    for _ in range(200):
+        os.kill(process.pid, signal.SIGSTOP)
+        os.waitpid(process.pid, os.WUNTRACED)
+        if not any(is_locked(path) for path in databases) and town.count(State.LEASED) == 1:
+            return
+        os.kill(process.pid, signal.SIGCONT)
+        time.sleep(0.05)
+    raise AssertionError("never found with a lease and without a lock")
+
+
+def is_locked(path: Path) -> bool:
+    with closing(sqlite3.connect(path, timeout=0.2, isolation_level=None)) as db:
+        try:
+            db.execute("BEGIN IMMEDIATE")
+        except sqlite3.OperationalError:
+            return True
+        return False
+
+
 def wait_for(town: Town, done: int) -> None:
-    deadline = time.monotonic() + 30
+    deadline = time.monotonic() + 120
     while town.count(State.DONE) < done:
         assert time.monotonic() < deadline
         time.sleep(0.01)
@@ -209,7 +233,7 @@ def test_a_worker_frozen_past_its_lease_is_refused(town: Town, faults: Path, und
     (faults / "slow").write_text("0.3")
     process = render_in_process(town, 1)
     wait_for(town, 1)
-    os.kill(process.pid, signal.SIGSTOP)
+    freeze_with_a_lease(process, town)
     (faults / "slow").unlink()
     town.run()
     assert all_done(town)
@@ -281,6 +305,18 @@ def test_a_long_block_is_held_by_heartbeats(town: Town, faults: Path) -> None:
 
 
 def children_of(pid: int) -> list[int]:
+    """Without the process that Python's multiprocessing keeps for itself."""
+    return [child for child in all_children_of(pid) if "resource_tracker" not in command_of(child)]
+
+
+def command_of(pid: int) -> str:
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_text()
+    except OSError:
+        return ""
+
+
+def all_children_of(pid: int) -> list[int]:
     found = []
     for task in Path(f"/proc/{pid}/task").iterdir():
         try:
