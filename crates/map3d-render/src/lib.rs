@@ -6,6 +6,7 @@ mod cutout;
 mod light;
 mod paint;
 mod scene;
+mod seen;
 mod shade;
 mod tile;
 

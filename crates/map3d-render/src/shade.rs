@@ -9,12 +9,14 @@ use map3d_trace::visbuf::{MIXED, NOTHING};
 use map3d_trace::{SUBTILE_PX, VisBuf};
 
 use crate::paint::{Palette, Shaded};
+use crate::seen::{Seen, Share};
 
 /// Shades sub-tiles; buffers are kept.
 pub struct Shader {
     palette: Palette,
     /// What the pixels of the sub-tile in hand show, if somebody asks.
-    points: Option<Vec<SurfacePoint>>,
+    seen: Seen,
+    keeps_seen: bool,
     /// Surfaces of the sub-tile in hand, and where each slot's stands among them.
     surfaces: Vec<Shaded>,
     of_slot: Vec<u32>,
@@ -36,15 +38,15 @@ struct Scene<'a> {
 }
 
 impl Shader {
-    /// `keeps_points`: `points` is asked for.
-    pub fn new(isa: Isa, keeps_points: bool) -> Self {
-        Self { palette: Palette::new(isa), points: keeps_points.then(Vec::new), surfaces: Vec::new(), of_slot: Vec::new(), shades: 0, setups: 0 }
+    /// `keeps_seen`: `seen` is asked for.
+    pub fn new(isa: Isa, keeps_seen: bool) -> Self {
+        Self { palette: Palette::new(isa), seen: Seen::default(), keeps_seen, surfaces: Vec::new(), of_slot: Vec::new(), shades: 0, setups: 0 }
     }
 
     /// Shades a sub-tile into the arrays that the G-buffer has; its pixel `corner` (left, top) is the sub-tile's first.
     pub fn subtile(&mut self, vis: &VisBuf, cache: &TextureCache, g: &mut GBuffer, corner: (usize, usize)) -> Result<()> {
         self.surfaces.clear();
-        self.points.iter_mut().for_each(Vec::clear);
+        self.seen.clear();
         self.of_slot.clear();
         self.of_slot.resize(vis.slot_count(), UNKNOWN);
         let done = self.rows(&mut Scene { vis, cache, g, corner });
@@ -112,16 +114,8 @@ impl Shader {
         if !scene.g.color.is_empty() {
             shaded.paint.row(i, j, &mut scene.g.color[pixels.clone()]);
         }
-        if let Some(points) = &mut self.points {
-            let surface = self.of_slot[slot as usize];
-            let color = |k: usize| scene.g.color.get(first + k).map_or([0; 3], |c| [c[0], c[1], c[2]]);
-            points.extend((0..end - i).map(|k| SurfacePoint {
-                pixel: [i + k, j].map(|v| v as u8),
-                at: [128; 2],
-                samples: 16,
-                surface,
-                color: color(k),
-            }));
+        if self.keeps_seen {
+            self.seen.push_run(j, i, end, self.of_slot[slot as usize]);
         }
         Ok(())
     }
@@ -132,6 +126,7 @@ impl Shader {
         let slots = scene.vis.mixed(i, j);
         let at = (scene.corner.1 + j) * scene.g.width as usize + scene.corner.0 + i;
         let mut sum = [0u32; 4];
+        let first = self.seen.shares.len();
         let mut todo = !VisBuf::samples_of(slots, NOTHING) & 0xFFFF;
         while todo != 0 {
             let slot = slots[todo.trailing_zeros() as usize & 15];
@@ -144,10 +139,13 @@ impl Shader {
             let weight = own.count_ones();
             (0..3).for_each(|c| sum[c] += u32::from(color[c]) * weight);
             sum[3] += 65_535 * weight;
-            if let Some(points) = &mut self.points {
-                let (pixel, at) = ([i, j].map(|v| v as u8), [x, y].map(|v| v as u8));
-                points.push(SurfacePoint { pixel, at, samples: weight as u8, surface: self.of_slot[slot as usize], color });
+            if self.keeps_seen {
+                let (at, surface) = ([x, y].map(|v| v as u8), self.of_slot[slot as usize]);
+                self.seen.shares.push(Share { at, samples: weight as u8, surface, color });
             }
+        }
+        if self.keeps_seen {
+            self.seen.end_pixel(j, i, first);
         }
         if !scene.g.color.is_empty() {
             scene.g.color[at] = sum.map(|c| ((c + 8) >> 4) as u16);
@@ -163,29 +161,15 @@ impl Shader {
         Ok(())
     }
 
-    /// What the pixels of the sub-tile shaded last show, with the surfaces that they name. Empty unless asked for.
-    pub fn points(&self) -> (&[SurfacePoint], &[Shaded]) {
-        (self.points.as_deref().unwrap_or_default(), &self.surfaces)
+    /// What the pixels of the sub-tile shaded last show, with the surfaces that they name. Nothing unless asked for.
+    pub fn seen(&self) -> (&Seen, &[Shaded]) {
+        (&self.seen, &self.surfaces)
     }
 
     /// The surface of the sub-tile shaded last that a slot stands for.
     pub fn surface_of(&self, slot: u32) -> &Shaded {
         &self.surfaces[self.of_slot[slot as usize] as usize]
     }
-}
-
-/// A surface in a pixel: its colour there, and how many of the pixel's samples meet it.
-#[derive(Clone, Copy, Debug)]
-pub struct SurfacePoint {
-    /// Column and row in the sub-tile.
-    pub pixel: [u8; 2],
-    /// Middle of those samples, in 1/256 px from the pixel's corner.
-    pub at: [u8; 2],
-    pub samples: u8,
-    /// Index into the sub-tile's surfaces.
-    pub surface: u32,
-    /// Linear light; 0 when nobody asks for colours.
-    pub color: [u16; 3],
 }
 
 /// Sums of the x and y (in sixteenths) of the samples of masks of eight, the first and the last eight samples apart: x | y << 16.

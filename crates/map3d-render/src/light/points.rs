@@ -1,137 +1,165 @@
-//! The points of a sub-tile that rays start from, gathered into patches.
+//! The points of a sub-tile that rays start from, in patches.
 
 use map3d_base::{Box3, Vec3};
 use map3d_trace::{Patch, RAYS, SUBTILE_PX, Surroundings};
 
-/// What a point stands for; those of a kind that lie together come into a patch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Stand {
-    /// The only surface of a pixel.
-    Pixel,
-    /// One of several surfaces of a pixel.
-    Share,
-    /// A plane that two by two pixels show; the first is named.
-    Quad,
-}
+use super::place::Row;
 
-impl Stand {
-    /// Side of the square of pixels whose points come into a patch.
-    fn side_px(self) -> usize {
-        if self == Self::Pixel { 8 } else { 16 }
-    }
-}
+/// Sides of a patch of whole pixels, and of a bucket of points that have no pixel for themselves.
+const SQUARE_PX: usize = 8;
+pub(super) const BUCKET_PX: usize = 16;
+const SQUARES: usize = (SUBTILE_PX / SQUARE_PX) * (SUBTILE_PX / SQUARE_PX);
+const NO_BUCKET: usize = usize::MAX;
 
+/// Points of whole pixels have places of their own. What else there is comes to patches in the order in which it is added, bucket by bucket.
 pub(super) struct Points {
-    /// Column and row of each.
-    pub pixels: Vec<[u8; 2]>,
+    /// Local, around all.
     pub bounds: Box3,
     /// A lattice point near the first.
     pub center: Vec3,
-    /// From the center, and normals.
-    at: Vec<[Vec3; 2]>,
-    /// (bucket, place within it, number) of each, in order once `finish` is called.
-    order: Vec<(u16, u16, u32)>,
+    lift_m: f64,
+    /// Those of whole pixels, then others; kept from sub-tile to sub-tile.
+    patches: Vec<Patch>,
+    used: usize,
+    bucket: usize,
 }
 
 impl Default for Points {
     fn default() -> Self {
-        Self { pixels: Vec::new(), bounds: Box3::EMPTY, center: [0.0; 3], at: Vec::new(), order: Vec::new() }
+        Self { bounds: Box3::EMPTY, center: [0.0; 3], lift_m: 0.0, patches: vec![Patch::default(); SQUARES], used: SQUARES, bucket: NO_BUCKET }
     }
 }
 
 impl Points {
-    pub fn clear(&mut self) {
-        self.pixels.clear();
-        self.at.clear();
-        self.order.clear();
-        self.bounds = Box3::EMPTY;
+    /// Without points again; the next will be raised above their surfaces. `first`: that of them which comes first,
+    /// local.
+    pub fn restart(&mut self, lift_m: f64, first: Option<Vec3>) {
+        self.patches[..self.used].iter_mut().for_each(Patch::clear);
+        (self.used, self.bucket) = (SQUARES, NO_BUCKET);
+        (self.bounds, self.center, self.lift_m) = (Box3::EMPTY, first.map_or([0.0; 3], Surroundings::center_near), lift_m);
     }
 
-    pub fn len(&self) -> usize {
-        self.pixels.len()
+    pub fn is_empty(&self) -> bool {
+        self.bounds.is_empty()
     }
 
-    /// `p`: local; `n`: geometric normal.
-    pub fn push(&mut self, pixel: [u8; 2], stand: Stand, p: Vec3, n: Vec3) {
-        if self.pixels.is_empty() {
-            self.center = Surroundings::center_near(p);
-        }
-        let mut from_center = [0.0; 3];
-        for k in 0..3 {
-            self.bounds.lo[k] = if p[k] < self.bounds.lo[k] { p[k] } else { self.bounds.lo[k] };
-            self.bounds.hi[k] = if p[k] > self.bounds.hi[k] { p[k] } else { self.bounds.hi[k] };
-            from_center[k] = p[k] - self.center[k];
-        }
-        let (bucket, place) = bucket_of(pixel.map(usize::from), stand);
-        self.order.push((bucket, place, self.pixels.len() as u32));
-        self.pixels.push(pixel);
-        self.at.push([from_center, n]);
+    /// Some are empty.
+    pub fn patches(&self) -> &[Patch] {
+        &self.patches[..self.used]
     }
 
-    /// To be called when all are there.
-    pub fn finish(&mut self) {
-        self.order.sort_unstable();
-    }
-
-    /// Patches of neighbours, raised above their surfaces, with the number of each of their points.
-    pub fn patches(&self, lift_m: f64) -> impl Iterator<Item = (Patch, Vec<u32>)> {
-        let buckets = self.order.chunk_by(|a, b| a.0 == b.0);
-        buckets.flat_map(|bucket| bucket.chunks(RAYS)).map(move |chunk| {
-            let mut patch = Patch::default();
-            for (k, (_, _, number)) in chunk.iter().enumerate() {
-                let [mut p, n] = self.at[*number as usize];
-                for axis in 0..3 {
-                    p[axis] += n[axis] * lift_m;
-                }
-                patch.put(k, p, n);
+    /// The points of whole pixels of a row, the first of which is (i, j), in order; `at`: local; `normal`: geometric.
+    pub fn put_row(&mut self, [i, j]: [usize; 2], count: usize, at: &Row, normal: Vec3) {
+        let at = [&at[0][..count], &at[1][..count], &at[2][..count]];
+        for axis in 0..3 {
+            let (lo, hi) = (&mut self.bounds.lo[axis], &mut self.bounds.hi[axis]);
+            for p in at[axis] {
+                *lo = if *p < *lo { *p } else { *lo };
+                *hi = if *p > *hi { *p } else { *hi };
             }
-            (patch, chunk.iter().map(|c| c.2).collect())
-        })
+        }
+        let up = normal.map(|n| n * self.lift_m);
+        for k in 0..count {
+            let place = place_of([i + k, j]);
+            let p = [at[0][k] - self.center[0] + up[0], at[1][k] - self.center[1] + up[1], at[2][k] - self.center[2] + up[2]];
+            self.patches[place / RAYS].put(place % RAYS, p, normal);
+        }
+    }
+
+    /// Another point; its place is told.
+    pub fn add(&mut self, bucket: usize, at: Vec3, normal: Vec3) -> u32 {
+        let mut p = [0.0; 3];
+        for k in 0..3 {
+            self.bounds.lo[k] = if at[k] < self.bounds.lo[k] { at[k] } else { self.bounds.lo[k] };
+            self.bounds.hi[k] = if at[k] > self.bounds.hi[k] { at[k] } else { self.bounds.hi[k] };
+            p[k] = at[k] - self.center[k] + normal[k] * self.lift_m;
+        }
+        let count = self.patches[self.used - 1].there().count_ones() as usize;
+        let k = if bucket == self.bucket && count < RAYS { count } else { self.next_patch(bucket) };
+        self.patches[self.used - 1].put(k, p, normal);
+        ((self.used - 1) * RAYS + k) as u32
+    }
+
+    fn next_patch(&mut self, bucket: usize) -> usize {
+        if self.used == self.patches.len() {
+            self.patches.push(Patch::default());
+        }
+        (self.used, self.bucket) = (self.used + 1, bucket);
+        0
     }
 }
 
-/// The bucket of a point and its place there, four by four points after each other.
-fn bucket_of([i, j]: [usize; 2], stand: Stand) -> (u16, u16) {
-    let side = stand.side_px();
+/// Place of the point of whole pixel (i, j): its patch times `RAYS`, and its number there.
+#[inline(always)]
+pub(super) fn place_of(pixel: [usize; 2]) -> usize {
+    key_of(pixel, SQUARE_PX)
+}
+
+/// The pixel of a place.
+pub(super) fn pixel_of(place: usize) -> [usize; 2] {
+    cell_of(place, SQUARE_PX, SUBTILE_PX)
+}
+
+/// The place of a pixel of a sub-tile in the order of buckets of `side` × `side`, and there four by four after each other.
+#[inline(always)]
+pub(super) fn key_of([i, j]: [usize; 2], side: usize) -> usize {
     let bucket = j / side * (SUBTILE_PX / side) + i / side;
-    let step = if stand == Stand::Quad { 2 } else { 1 };
-    let (i, j) = (i % side / step, j % side / step);
-    let square = j / 4 * (side / step / 4) + i / 4;
-    ((stand as u16) << 8 | bucket as u16, (square * 16 + j % 4 * 4 + i % 4) as u16)
+    let square = j % side / 4 * (side / 4) + i % side / 4;
+    (bucket * (side * side / 16) + square) * 16 + j % 4 * 4 + i % 4
+}
+
+/// The cell of a key, in any grid that is `row` cells wide.
+#[inline(always)]
+pub(super) fn cell_of(key: usize, side: usize, row: usize) -> [usize; 2] {
+    let (bucket, square) = (key / (side * side), key / 16 % (side * side / 16));
+    let (i, j) = (square % (side / 4) * 4 + key % 4, square / (side / 4) * 4 + key / 4 % 4);
+    [bucket % (row / side) * side + i, bucket / (row / side) * side + j]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    const UP: Vec3 = [0.0, 0.0, 1.0];
+
     #[test]
-    fn every_point_is_in_one_patch() {
+    fn whole_pixels_have_places_of_their_own() {
         let mut points = Points::default();
-        for k in 0..SUBTILE_PX * SUBTILE_PX {
-            let pixel = [k % SUBTILE_PX, k / SUBTILE_PX];
-            let p = [pixel[0] as f64, pixel[1] as f64, 100.0];
-            let shared = k % 7 == 0;
-            let stand = if shared { Stand::Share } else { Stand::Pixel };
-            (0..if shared { 3 } else { 1 }).for_each(|_| points.push(pixel.map(|v| v as u8), stand, p, [0.0, 0.0, 1.0]));
-        }
-        points.finish();
-        let mut seen = vec![0; points.len()];
-        for (patch, numbers) in points.patches(0.0) {
-            assert_eq!(patch.there().count_ones() as usize, numbers.len());
-            let near = numbers.iter().map(|n| points.pixels[*n as usize]).all(|p| p[0].abs_diff(points.pixels[numbers[0] as usize][0]) < 16);
-            assert!(near);
-            numbers.iter().for_each(|n| seen[*n as usize] += 1);
-        }
-        assert!(seen.iter().all(|n| *n == 1));
-        points.clear();
-        assert_eq!((points.len(), points.patches(0.0).count(), points.bounds.is_empty()), (0, 0, true));
+        points.restart(0.5, Some([3.0, 4.0, 100.0]));
+        let row: Row = [std::array::from_fn(|k| k as f64), [7.0; SUBTILE_PX], [100.0; SUBTILE_PX]];
+        points.put_row([0, 7], 10, &row, UP);
+        assert_eq!(
+            points.patches().iter().map(|p| p.there()).filter(|there| *there != 0).collect::<Vec<_>>(),
+            [0xF000_F000_0000_0000, 0x3000_0000_0000]
+        );
+        assert_eq!((points.bounds.lo, points.bounds.hi), ([0.0, 7.0, 100.0], [9.0, 7.0, 100.0]));
+        points.restart(0.0, None);
+        assert!(points.patches().iter().all(Patch::is_empty) && points.is_empty());
+    }
+
+    #[test]
+    fn others_come_to_patches_of_their_bucket() {
+        let mut points = Points::default();
+        points.restart(0.0, None);
+        let places: Vec<u32> = (0..150).map(|k| points.add(k / 100, [k as f64, 0.0, 0.0], UP)).collect();
+        let patch_of = |k: usize| places[k] as usize / RAYS - SQUARES;
+        assert_eq!([0, 63, 64, 99, 100, 149].map(patch_of), [0, 0, 1, 1, 2, 2]);
+        assert_eq!(points.patches()[SQUARES..].iter().map(|p| p.there().count_ones()).collect::<Vec<_>>(), [64, 36, 50]);
+        assert!(places.windows(2).all(|two| two[0] < two[1]));
+        points.restart(0.0, None);
+        assert_eq!((points.patches().len(), points.add(1, [0.0; 3], UP) as usize), (SQUARES, SQUARES * RAYS));
+        assert_eq!(points.patches()[SQUARES].there(), 1);
     }
 
     #[test]
     fn sixteen_places_are_four_by_four_pixels() {
-        assert_eq!(bucket_of([9, 2], Stand::Pixel), (1, 2 * 4 + 1));
-        assert_eq!(bucket_of([13, 6], Stand::Pixel), (1, 3 * 16 + 2 * 4 + 1));
-        assert_eq!(bucket_of([63, 63], Stand::Share), (0x100 | 15, 255));
-        assert_eq!(bucket_of([62, 62], Stand::Quad), (0x200 | 15, 63));
+        assert_eq!(place_of([9, 2]), 64 + 2 * 4 + 1);
+        assert_eq!(place_of([13, 6]), 64 + 3 * 16 + 2 * 4 + 1);
+        assert_eq!(key_of([63, 63], 16), 15 * 256 + 255);
+        for side in [8, 16] {
+            assert!((0..SUBTILE_PX * SUBTILE_PX).all(|key| key_of(cell_of(key, side, SUBTILE_PX), side) == key));
+        }
+        assert_eq!(cell_of(15 * 64 + 63, 8, 32), [31, 31]);
+        assert_eq!(cell_of(5 * 64 + 16, 8, 32), [12, 8]);
     }
 }
