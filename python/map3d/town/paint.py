@@ -3,6 +3,7 @@
 import itertools
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import ImageDraw
 
 from map3d.town.facade import TIMBER, Color
@@ -30,9 +31,15 @@ def paint_roof(paint: Paint, width_px: int, height_px: int, px_per_m: float, key
         return colored_sum(added(repeated(pattern, width_px, height_px, key), shade), color, contrast)
     picture = colored(shade, color, contrast)
     if cover in ("metal", "copper"):
-        seam = np.arange(0, width_px, max(3.0, 0.6 * px_per_m)).astype(int)
+        seam = seams_px(width_px, max(3.0, 0.6 * px_per_m))
         picture[:, seam] = (picture[:, seam] >> 2 & 0x3F3F3F) * 3
     return picture
+
+
+def seams_px(width_px: int, step_px: float) -> NDArray[np.intp]:
+    """Columns of seams at equal distances from the left edge. (Steps of a fraction may round up to the width itself.)"""
+    seam = np.arange(0, width_px, step_px).astype(np.intp)
+    return seam[seam < width_px]
 
 
 def roof_pattern(cover: str, px_per_m: float) -> Grey | None:
