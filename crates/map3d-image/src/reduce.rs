@@ -54,14 +54,25 @@ impl Rows {
     }
 
     fn ids(&self, child: &GBuffer, parent: &mut GBuffer) {
+        let is_plain = child.sun16.is_empty() && child.depth2.is_empty();
         for (x, (ids, depths)) in self.squares(&child.id).zip(self.squares(&child.depth)).enumerate() {
+            let to = self.at + x;
+            // Most squares show one object: nothing is chosen.
+            if is_plain && ids == [ids[0]; 4] {
+                if ids[0] != 0 {
+                    (parent.id[to], parent.depth[to]) = (ids[0], depths[0].min(depths[1]).min(depths[2].min(depths[3])));
+                    if !child.normal.is_empty() {
+                        parent.normal[to] = normal_of_one(self.square(&child.normal, x), depths);
+                    }
+                }
+                continue;
+            }
             let id = winner(ids, depths);
             if id == 0 {
                 continue;
             }
             let of_id = [0, 1, 2, 3].map(|k| ids[k] == id);
             let (nearest, depth) = nearest(of_id, depths);
-            let to = self.at + x;
             (parent.id[to], parent.depth[to]) = (id, depth);
             if !child.normal.is_empty() {
                 parent.normal[to] = mean_normal(of_id, self.square(&child.normal, x), nearest);
@@ -146,6 +157,16 @@ fn nearest(of_id: [bool; 4], depths: [u32; 4]) -> (usize, u32) {
     best
 }
 
+/// Of a square that shows one object.
+#[inline(always)]
+fn normal_of_one(normals: [[i16; 3]; 4], depths: [u32; 4]) -> [i16; 3] {
+    match normals == [normals[0]; 4] {
+        true => normals[0],
+        false => mean_normal([true; 4], normals, nearest([true; 4], depths).0),
+    }
+}
+
+#[inline(never)]
 fn mean_normal(of_id: [bool; 4], normals: [[i16; 3]; 4], nearest: usize) -> [i16; 3] {
     if of_id == [true; 4] && normals == [normals[0]; 4] {
         return normals[0];
