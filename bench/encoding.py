@@ -74,7 +74,7 @@ def _turns(encoders: dict[str, Encode], numbers: range, rounds: int) -> dict[str
     return times
 
 
-LOSSLESS = ("png", "lossless", "level 1", "level 6", "level 9")
+LOSSLESS = ("png", "png, small", "lossless", "level 1", "level 6", "level 9")
 
 
 def _of_color(arrays: list[NDArray[Any]], pixels: list[Pixels]) -> dict[str, Encode]:
@@ -84,6 +84,7 @@ def _of_color(arrays: list[NDArray[Any]], pixels: list[Pixels]) -> dict[str, Enc
     for form in ("webp", "jpeg"):
         for quality in QUALITIES:
             found[f"core {form} q{quality}"] = lambda k, form=form, quality=quality: _core.encode_layer("color", form, arrays[k], quality)
+        found[f"core {form} q80 small"] = lambda k, form=form: _core.encode_layer("color", form, arrays[k], 80, True)
     found["core png"] = lambda k: _core.encode_layer("color", "png", arrays[k])
     for method in (0, 4, 6):
         found[f"Pillow webp q80 method {method}"] = lambda k, method=method: _saved(images[k], "WEBP", quality=80, method=method)
@@ -96,7 +97,10 @@ def _of_color(arrays: list[NDArray[Any]], pixels: list[Pixels]) -> dict[str, Enc
 
 def _of_data(layer: str, arrays: list[NDArray[Any]], pixels: list[Pixels]) -> dict[str, Encode]:
     images = [Image.fromarray(tile) for tile in pixels]
-    found: dict[str, Encode] = {"core png": lambda k: _core.encode_layer(layer, "png", arrays[k])}
+    found: dict[str, Encode] = {
+        "core png": lambda k: _core.encode_layer(layer, "png", arrays[k]),
+        "core png, small": lambda k: _core.encode_layer(layer, "png", arrays[k], 80, True),
+    }
     raw = [tile.tobytes() for tile in pixels]
     for level in (1, 6, 9):
         found[f"zlib of the raw bytes, level {level}"] = lambda k, level=level: zlib.compress(raw[k], level)

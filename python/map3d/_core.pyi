@@ -141,9 +141,13 @@ def reduce_block(frame: str, z: int, x: int, y: int, levels: int, seams: list[tu
     """A reduce block of root (z, x, y) with `levels` levels; seams: (x, y, bytes) of blocks rooted at level z + levels."""
 
 def encode_layer(
-    kind: Literal["color", "normal", "id", "depth", "sun", "sun16", "ao", "depth2", "picture"], format: str, array: NDArray[Any], quality: int = 80
+    kind: Literal["color", "normal", "id", "depth", "sun", "sun16", "ao", "depth2", "picture"],
+    format: str,
+    array: NDArray[Any],
+    quality: int = 80,
+    small: bool = False,
 ) -> bytes:
-    """One layer of a G-buffer → image bytes."""
+    """One layer of a G-buffer → image bytes; `small` spends time for fewer."""
 
 def decode_png(data: bytes) -> NDArray[np.uint8]:
     """(H, W, C), for checks."""

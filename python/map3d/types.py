@@ -78,7 +78,7 @@ class Sun:
 @dataclass(frozen=True)
 class Layer:
     """One layer of a rendering as sent. `quality` is for lossy colour formats only (1..100); `suns`: of sun, sun16, picture; `radius_m`: of ambient
-    occlusion, in ao, picture."""
+    occlusion, in ao, picture; `small`: encoding takes its time for fewer bytes."""
 
     name: str
     kind: LayerKind
@@ -86,6 +86,7 @@ class Layer:
     quality: int | None = None
     suns: tuple[Sun, ...] = ()
     radius_m: float | None = None
+    small: bool = False
 
     def __post_init__(self) -> None:
         check_name(self.name, "layer")
@@ -105,7 +106,7 @@ class Layer:
     def load(cls, value: Mapping[str, Any]) -> "Layer":
         """The inverse of `dataclasses.asdict`, also from JSON; what is not a layer's is left out."""
         suns = tuple(Sun(sun["time"], sun["azimuth_deg"], sun["elevation_deg"], _vec3(sun["direction"])) for sun in value.get("suns", ()))
-        return cls(value["name"], value["kind"], value["format"], value.get("quality"), suns, value.get("radius_m"))
+        return cls(value["name"], value["kind"], value["format"], value.get("quality"), suns, value.get("radius_m"), value.get("small", False))
 
     @property
     def media_type(self) -> str:

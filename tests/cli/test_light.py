@@ -101,6 +101,19 @@ def linear(byte: np.ndarray) -> np.ndarray:
     return np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
 
 
+def test_small_tiles_show_the_same_in_fewer_bytes(plain: Plain) -> None:
+    layers = ("--layers", "color,normal,id,depth,sun", *EAST_45)
+    plain.make("quick", *layers)
+    plain.make("small", *layers, "--small")
+    quick, small = plain.tiles("quick"), plain.tiles("small")
+    assert quick.keys() == small.keys()
+    for place, tiles in quick.items():
+        assert tiles.keys() == small[place].keys()
+        for tile, data in tiles.items():
+            assert np.array_equal(*(np.asarray(Image.open(io.BytesIO(found))) for found in (data, small[place][tile]))), (place, tile)
+        assert sum(map(len, small[place].values())) < sum(map(len, tiles.values())), place
+
+
 def test_a_shadow_is_as_long_as_the_house_is_high_at_45_degrees(plain: Plain) -> None:
     plain.make("r", "--layers", "sun", *EAST_45)
     look = plain.looker("r")

@@ -37,6 +37,9 @@ pub struct LayerSpec {
     /// For lossy formats, 1..=100.
     #[serde(default = "default_quality")]
     pub quality: u8,
+    /// Time is spent for fewer bytes.
+    #[serde(default)]
+    pub small: bool,
     /// Towards the suns of `Sun` and `Picture` (one) and `Sun16` (up to 16), local axes.
     #[serde(default)]
     pub suns: Vec<Vec3>,
@@ -56,7 +59,7 @@ const MAX_RADIUS_M: f64 = 1000.0;
 impl LayerSpec {
     /// A layer of quality 80 without suns.
     pub fn new(kind: LayerKind, format: LayerFormat) -> Self {
-        Self { kind, format, quality: default_quality(), suns: Vec::new(), radius_m: 0.0 }
+        Self { kind, format, quality: default_quality(), small: false, suns: Vec::new(), radius_m: 0.0 }
     }
 
     fn validate(&self) -> Result<()> {

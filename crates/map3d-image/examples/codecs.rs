@@ -34,12 +34,12 @@ fn codecs() -> Vec<Codec> {
     for quality in [80, 90] {
         out.push((
             format!("color webp q{quality}"),
-            Box::new(move |g| encode_webp(&color_from_linear((g.width, g.height), &g.color), quality).expect("webp")),
+            Box::new(move |g| encode_webp(&color_from_linear((g.width, g.height), &g.color), quality, false).expect("webp")),
         ));
     }
-    out.push(("color jpeg q85".into(), Box::new(|g| encode_jpeg(&color_from_linear((g.width, g.height), &g.color), 85).expect("jpeg"))));
+    out.push(("color jpeg q85".into(), Box::new(|g| encode_jpeg(&color_from_linear((g.width, g.height), &g.color), 85, false).expect("jpeg"))));
     for filter in [Filter::None, Filter::Sub, Filter::Up, Filter::Average, Filter::Paeth] {
-        for deflate in [Deflate::Fast, Deflate::Matching] {
+        for deflate in [Deflate::Fast, Deflate::Matching, Deflate::Thorough] {
             let png = move |g: &GBuffer, channels, bytes: &[u8]| encode_png((g.width, g.height), channels, bytes, filter, deflate);
             let name = |layer| format!("{layer} png {filter:?} {deflate:?}");
             out.push((

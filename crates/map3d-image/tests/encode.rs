@@ -142,6 +142,36 @@ fn colour_formats_keep_coverage_where_they_have_alpha() {
 }
 
 #[test]
+fn small_tiles_take_fewer_bytes_and_show_the_same() {
+    let mut random = Random(29);
+    let arrays = [LayerKind::Color, LayerKind::Normal, LayerKind::Sun, LayerKind::Ao, LayerKind::Sun16].into_iter().fold(Arrays::LEAST, Arrays::and);
+    let mut g = GBuffer::with(256, 256, arrays);
+    for i in 0..g.id.len() {
+        let (x, y) = (i as u32 % 256, i as u32 / 256);
+        let house = x / 40 + y / 24 * 7;
+        g.id[i] = 1000 + house;
+        g.depth[i] = 900_000 + 117 * x + (house * 7919 % 31) * y;
+        g.normal[i] = normal_from_vector([f64::from(house % 5) - 2.0, f64::from(house % 3) - 1.0, 1.0]).expect("has a direction");
+        let light = 20_000 + (house * 911 % 29_000) as u16 + random.below(3000) as u16;
+        g.color[i] = [light, light / 2, light / 3, 65_535];
+        (g.sun[i], g.ao[i], g.sun16[i]) = (if x > y { 255 } else { 0 }, (x / 2 + house) as u8, house as u16);
+    }
+    let tile = |kind, format, small| Encoder::new().layer(&g, &LayerSpec { small, ..LayerSpec::new(kind, format) }).expect("encodes");
+    for kind in [LayerKind::Color, LayerKind::Normal, LayerKind::Id, LayerKind::Depth, LayerKind::Sun, LayerKind::Ao, LayerKind::Sun16] {
+        let [quick, small] = [false, true].map(|small| tile(kind, LayerFormat::Png, small));
+        assert!(small.len() < quick.len(), "{kind:?}: {} and {} bytes", small.len(), quick.len());
+        assert_eq!(decode_png(&small).expect("sound"), decode_png(&quick).expect("sound"), "{kind:?}");
+    }
+    for format in [LayerFormat::Webp, LayerFormat::Jpeg] {
+        let [quick, small] = [false, true].map(|small| tile(LayerKind::Color, format, small));
+        assert!(small.len() < quick.len(), "{format:?}: {} and {} bytes", small.len(), quick.len());
+        let [a, b] = [&quick, &small].map(|t| decode(std::path::Path::new("tile"), t, &map3d_image::ImageLimits::default()).expect("decodes"));
+        let worst = a.pixels.as_flattened().iter().zip(b.pixels.as_flattened()).map(|(a, b)| a.abs_diff(*b)).max();
+        assert!(worst <= Some(if format == LayerFormat::Jpeg { 0 } else { 40 }), "{format:?}: {worst:?}");
+    }
+}
+
+#[test]
 fn encoded_bytes_are_the_same_again() {
     let mut random = Random(17);
     let mut g = GBuffer::empty(64, 64);

@@ -96,10 +96,17 @@ fn gbuffer_of(dict: &Bound<'_, PyDict>) -> PyResult<GBuffer> {
 
 /// One layer of a G-buffer as image bytes.
 #[pyfunction]
-#[pyo3(signature = (kind, format, array, quality=80))]
-pub fn encode_layer<'py>(py: Python<'py>, kind: &str, format: &str, array: &Bound<'py, PyAny>, quality: u8) -> PyResult<Bound<'py, PyBytes>> {
+#[pyo3(signature = (kind, format, array, quality=80, small=false))]
+pub fn encode_layer<'py>(
+    py: Python<'py>,
+    kind: &str,
+    format: &str,
+    array: &Bound<'py, PyAny>,
+    quality: u8,
+    small: bool,
+) -> PyResult<Bound<'py, PyBytes>> {
     let spec = layer_spec(kind, format, quality)?;
-    let mut encoder = Encoder::new();
+    let mut encoder = if small { Encoder::small() } else { Encoder::new() };
     let bytes = match spec.kind {
         LayerKind::Color | LayerKind::Picture => rows3(array, "color").map(|(size, a)| encoder.color(size, &a, spec.format, quality)),
         LayerKind::Normal => rows3(array, "normal").map(|(size, a)| encoder.normal(size, &a, spec.format)),

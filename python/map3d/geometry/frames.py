@@ -258,6 +258,8 @@ def _layer_json(layer: Layer) -> dict[str, Any]:
     row: dict[str, Any] = {"kind": layer.kind, "format": layer.format}
     if layer.quality is not None:
         row["quality"] = layer.quality
+    if layer.small:
+        row["small"] = True
     if layer.suns:
         row["suns"] = [list(sun.direction) for sun in layer.suns]
     if layer.radius_m is not None:

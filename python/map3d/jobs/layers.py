@@ -14,12 +14,14 @@ LOSSY: Final = ("webp", "jpeg")
 
 @dataclass(frozen=True)
 class LayerRequest:
-    """`names`: KIND or NAME=KIND each; `color` and `quality`: format of the layers color and picture; `light`: what layers of light need."""
+    """`names`: KIND or NAME=KIND each; `color` and `quality`: format of the layers color and picture; `light`: what layers of light need; `small`:
+    encoding takes its time for fewer bytes."""
 
     names: Sequence[str] = DEFAULT_LAYERS
     color: str = "webp"
     quality: int = 80
     light: LightRequest = field(default_factory=LightRequest)
+    small: bool = False
 
     def check(self, scene: SceneRecord) -> dict[str, LayerKind]:
         """Name → kind, in the order of LAYER_KINDS; raises BadRequest for what can be told before the scene is built."""
@@ -38,8 +40,8 @@ class LayerRequest:
     def _layer(self, name: str, kind: LayerKind, scene: SceneRecord, box: Box) -> Layer:
         suns, radius_m = self.light.suns(kind, scene, box), self.light.radius_of(kind)
         if kind in COLOR_KINDS:
-            return Layer(name, kind, self.color, self.quality if self.color in LOSSY else None, suns, radius_m)
-        return Layer(name, kind, "png", suns=suns, radius_m=radius_m)
+            return Layer(name, kind, self.color, self.quality if self.color in LOSSY else None, suns, radius_m, self.small)
+        return Layer(name, kind, "png", suns=suns, radius_m=radius_m, small=self.small)
 
 
 def _name_and_kind(text: str) -> tuple[str, LayerKind]:

@@ -74,7 +74,7 @@ def _places(blocks: Iterable[BlockId]) -> NDArray[np.uint32]:
 
 def settings_hash(track: Track) -> str:
     """Of what reduce blocks depend on besides the blocks below."""
-    layers = [[layer.kind, layer.format, layer.quality] for layer in track.layers]
+    layers = [[layer.kind, layer.format, layer.quality, layer.small] for layer in track.layers]
     return hashlib.sha256(json.dumps([layers, track.frame.tile_px, track.frame.zmax]).encode()).hexdigest()
 
 

@@ -1,4 +1,4 @@
-//! Deflate, two ways: `Fast` for layers whose filtered bytes are mostly zeros, `Matching` where repeats pay.
+//! Deflate, three ways: `Fast` for layers whose filtered bytes are mostly zeros, `Matching` where repeats pay, `Thorough` where bytes count.
 
 /// Which deflate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -7,18 +7,20 @@ pub enum Deflate {
     Fast,
     /// libdeflate level 1.
     Matching,
+    /// libdeflate level 6: of depth 9 saves a tenth for four times the time.
+    Thorough,
 }
 
 /// Compresses to zlib streams; keeps its buffers.
 pub struct Deflater {
     matching: libdeflater::Compressor,
+    thorough: Option<libdeflater::Compressor>,
     out: Vec<u8>,
 }
 
 impl Default for Deflater {
     fn default() -> Self {
-        let level = libdeflater::CompressionLvl::new(1).expect("1 is a level");
-        Self { matching: libdeflater::Compressor::new(level), out: Vec::new() }
+        Self { matching: of_level(1), thorough: None, out: Vec::new() }
     }
 }
 
@@ -33,12 +35,18 @@ impl Deflater {
                 compressor.finish().expect("memory");
                 &self.out
             }
-            Deflate::Matching => {
-                let bound = self.matching.zlib_compress_bound(data.len());
-                self.out.resize(bound, 0);
-                let n = self.matching.zlib_compress(data, &mut self.out).expect("the buffer is as large as the bound");
-                &self.out[..n]
-            }
+            Deflate::Matching => by_libdeflate(&mut self.matching, data, &mut self.out),
+            Deflate::Thorough => by_libdeflate(self.thorough.get_or_insert_with(|| of_level(6)), data, &mut self.out),
         }
     }
+}
+
+fn of_level(level: i32) -> libdeflater::Compressor {
+    libdeflater::Compressor::new(libdeflater::CompressionLvl::new(level).expect("a level"))
+}
+
+fn by_libdeflate<'a>(compressor: &mut libdeflater::Compressor, data: &[u8], out: &'a mut Vec<u8>) -> &'a [u8] {
+    out.resize(compressor.zlib_compress_bound(data.len()), 0);
+    let n = compressor.zlib_compress(data, out).expect("the buffer is as large as the bound");
+    &out[..n]
 }

@@ -22,6 +22,7 @@ use crate::raster::Raster;
 #[derive(Default)]
 pub struct Encoder {
     png: png::PngWriter,
+    small: bool,
 }
 
 impl Encoder {
@@ -29,9 +30,19 @@ impl Encoder {
         Self::default()
     }
 
+    /// Spends time for fewer bytes. (`layer` does as its layer says.)
+    pub fn small() -> Self {
+        Self { small: true, ..Self::default() }
+    }
+
+    fn png(&mut self, size: (u32, u32), channels: usize, pixels: &[u8], methods: png::Methods) -> Vec<u8> {
+        self.png.write(size, channels, pixels, methods[usize::from(self.small)])
+    }
+
     /// One layer of a G-buffer.
     pub fn layer(&mut self, g: &GBuffer, spec: &LayerSpec) -> Result<Vec<u8>> {
         let size = (g.width, g.height);
+        self.small = spec.small;
         match spec.kind {
             LayerKind::Color => self.color(size, &g.color, spec.format, spec.quality),
             LayerKind::Normal => self.normal(size, &g.normal, spec.format),
@@ -53,8 +64,8 @@ impl Encoder {
         check_length(size, color.len())?;
         let image = color_from_linear(size, color);
         match format {
-            LayerFormat::Webp => encode_webp(&image, quality),
-            LayerFormat::Jpeg => encode_jpeg(&image, quality),
+            LayerFormat::Webp => encode_webp(&image, quality, self.small),
+            LayerFormat::Jpeg => encode_jpeg(&image, quality, self.small),
             LayerFormat::Png => Ok(self.color_png(&image)),
         }
     }
@@ -63,42 +74,42 @@ impl Encoder {
     fn color_png(&mut self, image: &Raster) -> Vec<u8> {
         let size = (image.width, image.height);
         if image.has_alpha() {
-            return self.png.write(size, 4, image.pixels.as_flattened(), png::COLOR);
+            return self.png(size, 4, image.pixels.as_flattened(), png::COLOR);
         }
         let rgb: Vec<u8> = image.pixels.iter().flat_map(|p| [p[0], p[1], p[2]]).collect();
-        self.png.write(size, 3, &rgb, png::COLOR)
+        self.png(size, 3, &rgb, png::COLOR)
     }
 
     pub fn normal(&mut self, size: (u32, u32), normals: &[[i16; 3]], format: LayerFormat) -> Result<Vec<u8>> {
         only_png("normal", format)?;
         check_length(size, normals.len())?;
-        Ok(self.png.write(size, 3, &bytes_from_normals(normals), png::NORMAL))
+        Ok(self.png(size, 3, &bytes_from_normals(normals), png::NORMAL))
     }
 
     pub fn id(&mut self, size: (u32, u32), ids: &[u32], format: LayerFormat) -> Result<Vec<u8>> {
         only_png("id", format)?;
         check_length(size, ids.len())?;
-        Ok(self.png.write(size, 4, bytes_from_u32(ids), png::ID))
+        Ok(self.png(size, 4, bytes_from_u32(ids), png::ID))
     }
 
     pub fn depth(&mut self, size: (u32, u32), depths: &[u32], format: LayerFormat) -> Result<Vec<u8>> {
         only_png("depth", format)?;
         check_length(size, depths.len())?;
-        Ok(self.png.write(size, 4, bytes_from_u32(depths), png::DEPTH))
+        Ok(self.png(size, 4, bytes_from_u32(depths), png::DEPTH))
     }
 
     /// One byte a pixel: sun, ambient occlusion.
     pub fn shade(&mut self, size: (u32, u32), shades: &[u8], format: LayerFormat) -> Result<Vec<u8>> {
         only_png("of shades", format)?;
         check_length(size, shades.len())?;
-        Ok(self.png.write(size, 1, shades, png::SHADE))
+        Ok(self.png(size, 1, shades, png::SHADE))
     }
 
     /// A bit a sun.
     pub fn sun16(&mut self, size: (u32, u32), suns: &[u16], format: LayerFormat) -> Result<Vec<u8>> {
         only_png("sun16", format)?;
         check_length(size, suns.len())?;
-        Ok(self.png.write(size, 2, bytes_from_u16(suns), png::SUN16))
+        Ok(self.png(size, 2, bytes_from_u16(suns), png::SUN16))
     }
 }
 

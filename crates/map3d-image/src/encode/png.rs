@@ -23,12 +23,15 @@ pub enum Filter {
 /// How a layer is written.
 pub type Method = (Filter, Deflate);
 
-pub const COLOR: Method = (Filter::Up, Deflate::Fast);
-pub const NORMAL: Method = (Filter::Up, Deflate::Fast);
-pub const ID: Method = (Filter::Up, Deflate::Fast);
-pub const DEPTH: Method = (Filter::Up, Deflate::Matching);
-pub const SHADE: Method = (Filter::Up, Deflate::Fast);
-pub const SUN16: Method = (Filter::Up, Deflate::Fast);
+/// Of a layer's two methods, the quick one and the small one.
+pub type Methods = [Method; 2];
+
+pub const COLOR: Methods = [(Filter::Up, Deflate::Fast), (Filter::Average, Deflate::Thorough)];
+pub const NORMAL: Methods = [(Filter::Up, Deflate::Fast), (Filter::None, Deflate::Thorough)];
+pub const ID: Methods = [(Filter::Up, Deflate::Fast), (Filter::Up, Deflate::Thorough)];
+pub const DEPTH: Methods = [(Filter::Sub, Deflate::Matching), (Filter::Sub, Deflate::Thorough)];
+pub const SHADE: Methods = [(Filter::Up, Deflate::Fast), (Filter::Up, Deflate::Thorough)];
+pub const SUN16: Methods = [(Filter::Up, Deflate::Fast), (Filter::Up, Deflate::Thorough)];
 
 const SIGNATURE: [u8; 8] = [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1A, b'\n'];
 

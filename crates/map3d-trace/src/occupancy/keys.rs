@@ -123,7 +123,7 @@ fn write_frame(hash: &mut XxHash3_128, frame: &Frame, root: Tile) {
     numbers.iter().for_each(|v| hash.write(&v.to_bits().to_le_bytes()));
     [frame.tile_px, u32::from(frame.zmax), u32::from(root.z), root.x, root.y].iter().for_each(|v| hash.write(&v.to_le_bytes()));
     for layer in &frame.layers {
-        hash.write(&[layer.kind as u8, layer.format as u8, layer.quality]);
+        hash.write(&[layer.kind as u8, layer.format as u8, layer.quality | u8::from(layer.small) << 7]);
         layer.suns.iter().flatten().chain([&layer.radius_m]).for_each(|v| hash.write(&v.to_bits().to_le_bytes()));
     }
 }
