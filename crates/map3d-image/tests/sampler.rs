@@ -93,6 +93,25 @@ fn coverage_is_alpha_of_a_half() {
     assert!(border(255) && !border(0));
 }
 
+#[test]
+fn a_place_is_covered_as_the_origin_of_a_map_that_begins_there() {
+    let mut random = Random(9);
+    let texels = (0..35).map(|_| [7, 7, 7, (random.unit() * 255.0) as u8]).collect();
+    let level = Arc::new(Level::from_raster(&Raster::new(7, 5, texels)));
+    let mut covered = 0;
+    for wrap in [Wrap::Wrap, Wrap::Mirror, Wrap::Clamp, Wrap::Border, Wrap::None] {
+        let map = |u: f64, v: f64| UvMap { u: [u, 0.03, -0.01], v: [v, 0.02, 0.05] };
+        let sampler = AlphaSampler::with(level.clone(), &map(0.3, -4.2), wrap, 90);
+        for k in 0..2_000 {
+            let place = if k == 0 { [f64::NAN, 1.0] } else { [0, 1].map(|_| (random.unit() - 0.5) * [1.5, 9.0, 4e9][k % 3]) };
+            let expected = AlphaSampler::with(level.clone(), &map(place[0], place[1]), wrap, 90).covers(0, 0);
+            assert_eq!(sampler.covers_at(place), expected, "{wrap:?} {place:?}");
+            covered += u32::from(expected);
+        }
+    }
+    assert!((2_000..8_000).contains(&covered), "{covered}");
+}
+
 /// A box over each pixel, of many bilinear samples, against the taps.
 #[test]
 fn samples_come_near_the_exact_integral() {

@@ -95,7 +95,7 @@ impl Cutout for TextureCutout<'_> {
     }
 }
 
-/// A surface's alpha over the pixels of a sub-tile.
+/// A surface's alpha.
 struct AlphaStencil(AlphaSampler);
 
 impl Stencil for AlphaStencil {
@@ -110,6 +110,10 @@ impl Stencil for AlphaStencil {
             covered |= u32::from(self.0.covers(x + i32::from(sx) * STEP, y + i32::from(sy) * STEP)) << k;
         }
         covered
+    }
+
+    fn covers(&self, uv: [f32; 2]) -> bool {
+        self.0.covers_at(uv.map(f64::from))
     }
 }
 

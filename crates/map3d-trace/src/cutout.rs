@@ -20,16 +20,20 @@ pub struct CutoutSample {
 pub trait Cutout {
     fn covers(&self, material: &MaterialRecord, sample: &CutoutSample) -> bool;
 
-    /// Sets up a surface of a sub-tile, whose (u, v) are given over its pixels, for many samples. `None`: `covers` is asked of each.
+    /// Sets up a surface for many samples; its (u, v) are given over the pixels of a sub-tile, or over a bundle's rays in their widths. `None`: `covers` is
+    /// asked of each.
     fn stencil(&self, _material: &MaterialRecord, _uv: &[Affine; 2]) -> Option<Box<dyn Stencil>> {
         None
     }
 }
 
-/// Coverage of one cut-out surface over the pixels of a sub-tile.
+/// Coverage of one cut-out surface.
 pub trait Stencil {
     /// Those of the `asked` samples of pixel (i, j) that the surface covers; bit k is sample k.
     fn covered(&self, i: usize, j: usize, asked: u32) -> u32;
+
+    /// The same as `Cutout::covers` with the footprint that the surface was set up with.
+    fn covers(&self, uv: [f32; 2]) -> bool;
 }
 
 /// Takes every cut-out for opaque.

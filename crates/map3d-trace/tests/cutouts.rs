@@ -9,11 +9,11 @@ use std::f64::consts::TAU;
 use brute::contest::{Contest, Presence, Tally};
 use brute::{Eye, Known, Place};
 use map3d_base::asset::{Instance, Material, Rank};
-use map3d_base::vec3::scale;
+use map3d_base::vec3::{add, scale, sub};
 use map3d_base::{Frame, Vec3};
 use map3d_image::Raster;
 use map3d_scene::{MaterialRecord, SceneStore};
-use map3d_trace::{BeamTracer, Cutout, CutoutSample, Ray, Rays, SUBTILE_PX};
+use map3d_trace::{Affine, BeamTracer, Cutout, CutoutSample, Isa, Opaque, Patch, RAYS, Ray, Rays, SUBTILE_PX, Stencil, Surroundings};
 use scenes::{Dice, Face, RANKS, Soup, build, frame, mixed_soup, new_folder};
 
 const CHEQUERED: u32 = 1;
@@ -279,4 +279,59 @@ fn rays_pass_through_the_same_holes() {
     }
     // Only where an edge, or the edge of a hole, passes within a lattice step of the pixel's centre.
     assert!(compared > 2_000 && differ * 100 < compared, "{differ} of {compared} differ");
+}
+
+/// Sets surfaces up before it is asked.
+struct HolesInAdvance;
+
+struct Stretched(MaterialRecord, [[f32; 2]; 2]);
+
+impl Cutout for HolesInAdvance {
+    fn covers(&self, _: &MaterialRecord, _: &CutoutSample) -> bool {
+        panic!("a surface that is not set up");
+    }
+
+    fn stencil(&self, material: &MaterialRecord, [u, v]: &[Affine; 2]) -> Option<Box<dyn Stencil>> {
+        Some(Box::new(Stretched(*material, [[u.dx, v.dx], [u.dy, v.dy]])))
+    }
+}
+
+impl Stencil for Stretched {
+    fn covered(&self, _: usize, _: usize, _: u32) -> u32 {
+        panic!("rays are not the samples of a pixel");
+    }
+
+    fn covers(&self, uv: [f32; 2]) -> bool {
+        Holes.covers(&self.0, &CutoutSample { uv, footprint: self.1 })
+    }
+}
+
+#[test]
+fn bundles_pass_through_the_holes_of_surfaces_that_are_set_up() {
+    let mut dice = Dice(77);
+    let folder = new_folder("stencils");
+    let soup = mixed_soup(&mut dice, 60);
+    let mut soup = perforated(soup, &mut dice);
+    soup.prototypes = vec![tree()];
+    soup.instances = (0..10).map(|k| planted(&mut dice, 100 + k)).collect();
+    let store = build(&folder, &soup);
+    let around = Surroundings::gather(&store, [0.0; 3], |_| true).expect("parts");
+    let (mut hit, mut passed) = (0, 0);
+    for _ in 0..40 {
+        let (from, towards) = (dice.point(30.0), dice.point(10.0));
+        let direction = sub(towards, from);
+        let mut patch = Patch::default();
+        (0..RAYS).for_each(|k| patch.put(k, add(from, dice.point(4.0)), direction));
+        for isa in Isa::available() {
+            let mut bundles = around.along(direction, 0.1, isa).expect("bundles");
+            let holes = bundles.any_hit(&patch, 1e6, &Holes);
+            assert_eq!(holes, bundles.any_hit(&patch, 1e6, &HolesInAdvance));
+            let nearest = bundles.nearest(&patch, 0.0, &Holes);
+            let in_advance = bundles.nearest(&patch, 0.0, &HolesInAdvance);
+            assert_eq!((nearest.of_point, nearest.triangles), (in_advance.of_point, in_advance.triangles));
+            hit += holes.hit.count_ones();
+            passed += (bundles.any_hit(&patch, 1e6, &Opaque).hit & !holes.hit).count_ones();
+        }
+    }
+    assert!(hit > 500 && passed > 100, "{hit} hit, {passed} passed through holes");
 }

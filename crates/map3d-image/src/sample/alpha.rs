@@ -33,7 +33,17 @@ impl AlphaSampler {
     /// At a position in 2^-8 px from the map's origin.
     #[inline(always)]
     pub fn covers(&self, x: i32, y: i32) -> bool {
-        let ([upper, lower], weights, outside) = self.grid.tap(self.grid.at(x, y));
+        self.covers_texel(self.grid.at(x, y))
+    }
+
+    /// At texture coordinates (u right, v up): as a sampler whose map has them for its origin covers that.
+    pub fn covers_at(&self, [u, v]: [f64; 2]) -> bool {
+        self.covers_texel(self.grid.of_uv(u, v))
+    }
+
+    #[inline(always)]
+    fn covers_texel(&self, texel: [i64; 2]) -> bool {
+        let ([upper, lower], weights, outside) = self.grid.tap(texel);
         let around = (outside * self.outside) >> (2 * WEIGHT_BITS - TAP_BITS);
         (single(upper, lower, 3, weights) + around) * 2 >= FULL << TAP_BITS
     }

@@ -33,25 +33,38 @@ fn at_home(t: i64, period: i64) -> i64 {
     }
 }
 
+fn fixed(texels: f64) -> i64 {
+    let unit = (1u64 << TEXEL_BITS) as f64;
+    if texels.is_finite() { (texels * unit).clamp(-4e18, 4e18).round() as i64 } else { 0 }
+}
+
+/// Texel coordinates of texture coordinates, without whole periods, so that they stay small.
+fn start(level: &Level, wrap: Wrap, u: f64, v: f64) -> [i64; 2] {
+    let home = |c: f64| match wrap {
+        Wrap::Wrap => c - c.floor(),
+        Wrap::Mirror => c - 2.0 * (c / 2.0).floor(),
+        _ => c,
+    };
+    let half_weight = 0.5 / f64::from(1u32 << WEIGHT_BITS);
+    [(home(u), level.width), (home(1.0 - v), level.height)].map(|(c, n)| fixed(c * f64::from(n) - 0.5 + half_weight))
+}
+
 impl Grid {
     pub fn new(level: Arc<Level>, wrap: Wrap, uv: &UvMap) -> Self {
         let (w, h) = (f64::from(level.width), f64::from(level.height));
-        // Whole periods are dropped, so that texel coordinates stay small.
-        let home = |c: f64| match wrap {
-            Wrap::Wrap => c - c.floor(),
-            Wrap::Mirror => c - 2.0 * (c / 2.0).floor(),
-            _ => c,
-        };
-        let unit = (1u64 << TEXEL_BITS) as f64;
-        let fixed = |t: f64| if t.is_finite() { (t * unit).clamp(-4e18, 4e18).round() as i64 } else { 0 };
         let step = 1.0 / f64::from(1u32 << POSITION_BITS);
-        let half_weight = 0.5 / f64::from(1u32 << WEIGHT_BITS);
-        let line = |start: f64, dx: f64, dy: f64| [fixed(start - 0.5 + half_weight), fixed(dx * step), fixed(dy * step)];
-        let x = line(home(uv.u[0]) * w, uv.u[1] * w, uv.u[2] * w);
-        let y = line(home(1.0 - uv.v[0]) * h, -uv.v[1] * h, -uv.v[2] * h);
+        let [x, y] = start(&level, wrap, uv.u[0], uv.v[0]);
+        let x = [x, fixed(uv.u[1] * w * step), fixed(uv.u[2] * w * step)];
+        let y = [y, fixed(-uv.v[1] * h * step), fixed(-uv.v[2] * h * step)];
         let repeats = |n: u32| if wrap == Wrap::Wrap { i64::from(n) << TEXEL_BITS } else { 0 };
         let period = [repeats(level.width), repeats(level.height)];
         Self { level, wrap, x, y, period }
+    }
+
+    /// Texel coordinates of texture coordinates: as those of the origin of a map that begins there.
+    pub fn of_uv(&self, u: f64, v: f64) -> [i64; 2] {
+        let [tx, ty] = start(&self.level, self.wrap, u, v);
+        [at_home(tx, self.period[0]), at_home(ty, self.period[1])]
     }
 
     /// Texel coordinates of a position, where the texture repeats in its first period.

@@ -6,12 +6,12 @@ use map3d_scene::records::{EMPTY, LEAF_BIT};
 use map3d_scene::{Leaf, MaterialRecord, Node};
 
 use super::patch::{Openness, Patch};
-use super::rays::{Aim, RayLanes, Reach, Triangle};
+use super::rays::{Aim, RayLanes, Reach};
 use super::view::{PartView, children};
 use super::{NearPart, Shadow};
 use crate::beam::boxes::BoxMap;
 use crate::cutout::{Cutout, CutoutSample};
-use crate::lanes::{FloatLanes, Plain};
+use crate::lanes::FloatLanes;
 use crate::surface::{Placed, Surface};
 
 /// A node or leaf still to be visited, and where its box begins along the rays.
@@ -48,7 +48,7 @@ pub(super) struct Descent<'a> {
     pub shadow: &'a mut Shadow,
 }
 
-impl Descent<'_> {
+impl<'a> Descent<'a> {
     /// `ANY`: the first hit ends a ray; else the nearest triangle of each ray is found.
     #[inline(always)]
     pub fn run<L: FloatLanes, const ANY: bool>(mut self) {
@@ -140,7 +140,13 @@ impl Descent<'_> {
             let Some(triangle) = corners.triangle(lane) else { continue };
             let only = match self.sheet(number, leaf.triangle[lane]) {
                 None => u64::MAX,
-                Some(material) => self.uncut(number, leaf_number, lane, &triangle, &material),
+                Some(material) => {
+                    let meeting = self.rays.meeting::<L::Sixteen>(&triangle);
+                    if meeting == 0 {
+                        continue;
+                    }
+                    self.uncut(number, leaf_number, lane, meeting, material)
+                }
             };
             if self.rays.meet::<L::Sixteen, ANY>(&triangle, self.met.len() as u32, only) {
                 any = true;
@@ -154,19 +160,20 @@ impl Descent<'_> {
 
     /// The material of a triangle that may be cut out.
     #[inline(always)]
-    fn sheet(&self, number: u32, triangle: u32) -> Option<MaterialRecord> {
-        let chunk = &self.parts[number as usize].chunk;
+    fn sheet(&self, number: u32, triangle: u32) -> Option<&'a MaterialRecord> {
+        let parts: &'a [NearPart] = self.parts;
+        let chunk = &parts[number as usize].chunk;
         if !chunk.has_cutouts() {
             return None;
         }
-        let material = chunk.materials()[chunk.triangles()[triangle as usize].material as usize];
+        let material = &chunk.materials()[chunk.triangles()[triangle as usize].material as usize];
         material.is_cutout().then_some(material)
     }
 
-    /// Bits of the rays for which a triangle that they meet is not cut out.
+    /// Those of the rays that meet a triangle for which it is not cut out, a bit each.
     #[cold]
     #[inline(never)]
-    fn uncut(&self, number: u32, leaf: u32, lane: usize, triangle: &Triangle, material: &MaterialRecord) -> u64 {
+    fn uncut(&self, number: u32, leaf: u32, lane: usize, mut meeting: u64, material: &MaterialRecord) -> u64 {
         let part = &self.parts[number as usize];
         let record = part.chunk.leaves()[leaf as usize].triangle[lane];
         let local = local_corners(part, leaf, lane);
@@ -176,15 +183,19 @@ impl Descent<'_> {
         });
         let instance = part.instance.as_ref().map(|(k, record)| (*k, record));
         let [u, v] = Surface::new(0, &part.chunk, record, instance, &Placed { local, pixel, axes: self.axes }).uv;
-        let mut meeting = self.rays.meeting::<<Plain as FloatLanes>::Sixteen>(triangle);
+        let stencil = self.cutout.stencil(material, &[u, v]);
         let mut there = 0;
         while meeting != 0 {
             let ray = meeting.trailing_zeros();
             meeting &= meeting - 1;
             let [right, up] = self.rays.across(ray as usize);
             let (x, y) = (right / self.width_m as f32, -up / self.width_m as f32);
-            let sample = CutoutSample { uv: [u.at(x, y), v.at(x, y)], footprint: [[u.dx, v.dx], [u.dy, v.dy]] };
-            there |= u64::from(self.cutout.covers(material, &sample)) << ray;
+            let uv = [u.at(x, y), v.at(x, y)];
+            let covers = match &stencil {
+                Some(stencil) => stencil.covers(uv),
+                None => self.cutout.covers(material, &CutoutSample { uv, footprint: [[u.dx, v.dx], [u.dy, v.dy]] }),
+            };
+            there |= u64::from(covers) << ray;
         }
         there
     }

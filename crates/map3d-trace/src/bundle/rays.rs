@@ -162,7 +162,16 @@ impl RayLanes {
     /// Bits of the rays that meet the triangle.
     #[inline(always)]
     pub fn meeting<F: Floats<GROUP>>(&self, triangle: &Triangle) -> u64 {
-        (0..GROUPS).fold(0, |mask, g| mask | u64::from(self.hits::<F>(g, triangle).0) << (g * GROUP))
+        let mut meeting = 0;
+        let mut near = self.groups_near(triangle);
+        while near != 0 {
+            let g = near.trailing_zeros() as usize & (GROUPS - 1);
+            near &= near - 1;
+            if !self.is_done(g) {
+                meeting |= u64::from(self.hits::<F>(g, triangle).0) << (g * GROUP);
+            }
+        }
+        meeting
     }
 
     /// Which rays of a group meet a triangle, and where. On an edge counts as inside, whichever way round: corners are the same bits in all triangles
