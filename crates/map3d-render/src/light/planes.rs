@@ -4,12 +4,16 @@ use map3d_base::Vec3;
 use map3d_base::vec3::{dot, sub};
 use map3d_trace::SUBTILE_PX;
 
-use super::points::{BUCKET_PX, cell_of};
+use super::points::cell_of;
 
 const QUADS_PER_ROW: usize = SUBTILE_PX / 2;
 const NO_PLANE: u32 = u32::MAX;
 /// Points this near to a plane lie in it, in metres.
 const NEAR_M: f64 = 1.0 / 64.0;
+
+/// Quads in a row of those whose planes may come together: more of them would see too much, of fewer too few planes face alike.
+const BUCKET: usize = 16;
+const SIDES: usize = 6;
 
 pub(super) struct Plane {
     pub normal: Vec3,
@@ -37,19 +41,21 @@ impl Planes {
         self.first_of_quad.fill(NO_PLANE);
     }
 
-    /// The numbers of all, by buckets of quads, those of a quad in the order in which they came.
-    pub fn by_bucket(&self, mut each: impl FnMut(usize, u32)) {
-        const SIDE: usize = BUCKET_PX / 2;
-        let mut of_quad = Vec::new();
+    /// The bucket and number of all, those that lie and face alike after each other: their rays go the same ways, and are sent together or not at all.
+    pub fn in_order(&self) -> Vec<(usize, u32)> {
+        let mut all = Vec::with_capacity(self.all.len());
         for key in 0..QUADS_PER_ROW * QUADS_PER_ROW {
-            let [i, j] = cell_of(key, SIDE, QUADS_PER_ROW);
+            let [i, j] = cell_of(key, BUCKET / 2, QUADS_PER_ROW);
+            let bucket = j / BUCKET * (QUADS_PER_ROW / BUCKET) + i / BUCKET;
             let mut number = self.first_of_quad[j * QUADS_PER_ROW + i];
             while number != NO_PLANE {
-                of_quad.push(number);
-                number = self.all[number as usize].next;
+                let plane = &self.all[number as usize];
+                all.push((bucket * SIDES + side_of(plane.normal), key, number));
+                number = plane.next;
             }
-            of_quad.drain(..).rev().for_each(|number| each(key / (SIDE * SIDE), number));
         }
+        all.sort_unstable();
+        all.into_iter().map(|(side, _, number)| (side / SIDES, number)).collect()
     }
 
     /// The number of the plane that a pixel shows at a local point.
@@ -76,6 +82,13 @@ impl Planes {
     }
 }
 
+/// The axis along which a plane faces: flat ones up or down, others by the direction in which they slope.
+fn side_of(normal: Vec3) -> usize {
+    let [x, y, z] = normal.map(f64::abs);
+    let axis = if z > 0.9 { 2 } else { usize::from(x <= y) };
+    axis * 2 + usize::from(normal[axis] < 0.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -94,13 +107,12 @@ mod tests {
         let thin = planes.add([8, 8], [1.0, 0.0, 1.5], up, 4);
         assert_eq!(planes.add([9, 8], [3.0, 0.0, 1.5], up, 5), thin);
         assert_eq!((planes.all[1].at, planes.all[thin as usize].at), ([2.0, 3.0, 1.5], [3.0, 0.0, 1.5]));
-        let mut order = Vec::new();
-        planes.by_bucket(|bucket, number| order.push((bucket, number)));
-        assert_eq!(order, [(0, first), (0, below), (0, turned), (0, neighbour), (0, thin)]);
-        let far = planes.add([16, 15], [3.0, 0.0, 1.5], up, 5);
-        planes.by_bucket(|bucket, number| assert_eq!(bucket, usize::from(number == far)));
+        let order = planes.in_order();
+        assert_eq!(order, [(0, turned), (0, first), (0, below), (0, neighbour), (0, thin)]);
+        let far = planes.add([32, 31], [3.0, 0.0, 1.5], up, 5);
+        assert_eq!(planes.in_order().last(), Some(&(1, far)));
         planes.clear();
-        planes.by_bucket(|_, _| panic!("a plane"));
+        assert!(planes.in_order().is_empty());
         assert_eq!(planes.add([4, 6], [1.0, 0.0, 1.5], up, 4), 0);
     }
 }

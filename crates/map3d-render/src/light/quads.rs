@@ -72,9 +72,9 @@ impl Quads {
         points.restart(RAY_LIFT_M, planes.all.first().map(|plane| plane.at));
         places.clear();
         places.resize(planes.all.len(), 0);
-        planes.by_bucket(|bucket, number| {
+        for (bucket, number) in planes.in_order() {
             let plane = &planes.all[number as usize];
             places[number as usize] = points.add(bucket, plane.at, plane.normal);
-        });
+        }
     }
 }

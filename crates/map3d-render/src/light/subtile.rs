@@ -50,12 +50,12 @@ impl Subtile<'_> {
             let slot = |i: usize| if row[i] == MIXED { self.vis.mixed(i, j)[0] } else { row[i] };
             let mut first = 0;
             while first < SUBTILE_PX {
-                let mut end = first + 1;
-                while end < SUBTILE_PX && slot(end) == slot(first) {
+                let (shown, mut end) = (slot(first), first + 1);
+                while end < SUBTILE_PX && slot(end) == shown {
                     end += 1;
                 }
-                if slot(first) != NOTHING {
-                    each([first, j], end - first, self.shader.surface_of(slot(first)));
+                if shown != NOTHING {
+                    each([first, j], end - first, self.shader.surface_of(shown));
                 }
                 first = end;
             }

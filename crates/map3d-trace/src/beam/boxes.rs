@@ -19,8 +19,8 @@ pub(crate) struct Row {
     pub m: [f32; 3],
     pub low: f32,
     pub high: f32,
-    /// Of each axis, which side of a box makes the sum least: 0 the lower, 3 the upper one.
-    least_side: [u8; 3],
+    /// Axes along which a box's upper side makes the sum least.
+    falls: [bool; 3],
 }
 
 impl Row {
@@ -45,8 +45,8 @@ impl Row {
     /// The side of the children's boxes along an axis that makes the sum least, or greatest.
     #[inline(always)]
     fn side<'n>(&self, node: &'n Node, axis: usize, least: bool) -> &'n [f32; 8] {
-        let side = self.least_side[axis] as usize;
-        &node.bounds[(axis + if least { side } else { 3 - side }) % 6]
+        let (lower, upper) = (&node.bounds[axis], &node.bounds[axis + 3]);
+        if self.falls[axis] == least { upper } else { lower }
     }
 }
 
@@ -122,7 +122,7 @@ impl Row {
         let room = room + local * FLOAT_ROOM + size * 1e-13;
         let m = m.map(|v| v as f32);
         let (low, high) = (((constant - room) as f32).next_down(), ((constant + room) as f32).next_up());
-        Self { m, low, high, least_side: m.map(|v| if v < 0.0 { 3 } else { 0 }) }
+        Self { m, low, high, falls: m.map(|v| v < 0.0) }
     }
 }
 
