@@ -183,6 +183,7 @@ impl<'a> Writer<'a> {
             kept += u64::from(is_kept);
             entries.push(entry);
         }
+        self.spill.forget(cell)?;
         Ok(self.written(number, kept, entries))
     }
 

@@ -47,6 +47,15 @@ impl Spill {
         self.folder.join(format!("{level}_{x}_{y}.spill"))
     }
 
+    /// Frees the disk of a cell that is not needed any more.
+    pub fn forget(&self, cell: Cell) -> Result<()> {
+        let path = self.path(cell);
+        match fs::remove_file(&path) {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::storage(&path, e)),
+            _ => Ok(()),
+        }
+    }
+
     /// All triangles of a cell, in the order they were pushed.
     pub fn load(&self, cell: Cell) -> Result<Vec<BuildTriangle>> {
         let path = self.path(cell);
@@ -71,5 +80,29 @@ fn remove(folder: &Path) -> Result<()> {
     match fs::remove_dir_all(folder) {
         Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::storage(folder, e)),
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+
+    #[test]
+    fn a_forgotten_cell_leaves_the_disk_and_the_others_stay() {
+        let folder = std::env::temp_dir().join(format!("map3d-spill-{}", std::process::id()));
+        let mut spill = Spill::new(&folder, 1).expect("a folder");
+        let triangle = |x| BuildTriangle { corners: [[x, 0, 0], [x, 1, 0], [x, 0, 1]], ..BuildTriangle::zeroed() };
+        let cells = [[1, 0, 0], [1, 1, 0]];
+        for k in 0..6 {
+            spill.push(cells[k % 2], &triangle(k as i64)).expect("written");
+        }
+        let first = |spill: &Spill, cell| spill.load(cell).expect("read").iter().map(|t| t.corners[0][0]).collect::<Vec<_>>();
+        assert_eq!((first(&spill, cells[0]), first(&spill, cells[1])), (vec![0, 2, 4], vec![1, 3, 5]));
+        spill.forget(cells[0]).expect("removed");
+        spill.forget(cells[0]).expect("nothing to remove");
+        assert_eq!((first(&spill, cells[0]), first(&spill, cells[1])), (vec![], vec![1, 3, 5]));
+        drop(spill);
+        assert!(!folder.exists());
     }
 }
