@@ -30,8 +30,8 @@ pub const COLOR: Methods = [(Filter::Up, Deflate::Fast), (Filter::Average, Defla
 pub const NORMAL: Methods = [(Filter::Up, Deflate::Fast), (Filter::None, Deflate::Thorough)];
 pub const ID: Methods = [(Filter::Up, Deflate::Fast), (Filter::Up, Deflate::Thorough)];
 pub const DEPTH: Methods = [(Filter::Sub, Deflate::Matching), (Filter::Sub, Deflate::Thorough)];
-pub const SHADE: Methods = [(Filter::Up, Deflate::Fast), (Filter::Up, Deflate::Thorough)];
-pub const SUN16: Methods = [(Filter::Up, Deflate::Fast), (Filter::Up, Deflate::Thorough)];
+pub const SHADE: Methods = [(Filter::Up, Deflate::Fast), (Filter::Sub, Deflate::Thorough)];
+pub const SUN16: Methods = [(Filter::Up, Deflate::Fast), (Filter::None, Deflate::Thorough)];
 
 const SIGNATURE: [u8; 8] = [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1A, b'\n'];
 
