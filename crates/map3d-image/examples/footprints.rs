@@ -154,10 +154,10 @@ impl Pyramid {
             [r, g, b, 255]
         };
         let image = Raster::new(SIDE, SIDE, (0..SIDE * SIDE).map(pixel).collect());
-        let mut levels = vec![Arc::new(Level::from_raster(&image))];
+        let mut levels = vec![Arc::new(Level::from_raster(image.clone()))];
         let mut mip: LinearRaster = first_mip(&image);
         for level in 1..level_count(SIDE, SIDE) {
-            let stored = if level == 1 { Level::from_linear(&mip) } else { Level::from_raster(&mip.to_raster()) };
+            let stored = if level == 1 { Level::from_linear(&mip) } else { Level::from_raster(mip.to_raster()) };
             levels.push(Arc::new(stored));
             mip = next_mip(&mip);
         }

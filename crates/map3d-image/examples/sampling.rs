@@ -17,7 +17,7 @@ const WHITE: Outside = Outside { diffuse: [255; 4], border: [255; 4] };
 fn main() {
     let texel = |i: u32| (i.wrapping_mul(0x9E37_79B1) ^ i >> 7).to_le_bytes();
     let image = Raster::new(SIDE, SIDE, (0..SIDE * SIDE).map(|i| [texel(i)[0], texel(i)[1], texel(i)[2], 255]).collect());
-    let level = Arc::new(Level::from_raster(&image));
+    let level = Arc::new(Level::from_raster(image.clone()));
     println!("{:>8} {:>22} {:>5} | ns a pixel in runs of 64, 8, 1", "isa", "texels a pixel", "taps");
     for isa in Isa::available() {
         for [right, down, shear] in [[0.4, 0.6, 0.0], [1.0, 1.4, 0.3], [2.0, 2.8, 0.7], [3.0, 4.2, 0.7], [2.8, 5.6, 2.0], [3.8, 5.4, 0.0]] {

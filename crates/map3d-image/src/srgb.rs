@@ -11,8 +11,11 @@ pub static ROOT: LazyLock<Box<[u8; 65_536]>> = LazyLock::new(|| {
     (0..65_536).map(byte).collect::<Vec<u8>>().try_into().expect("65,536 entries")
 });
 
-/// The same of each sRGB byte.
-pub static ROOT_OF_BYTE: LazyLock<[u8; 256]> = LazyLock::new(|| std::array::from_fn(|b| ROOT[LINEAR16[b] as usize]));
+/// The same of each sRGB byte, where red, green and blue lie in a little-endian RGBA word; together with red an alpha of 255.
+pub static ROOT_OF_RGB: LazyLock<[[u32; 256]; 3]> = LazyLock::new(|| {
+    let at = |k: usize, b: usize| u32::from(ROOT[LINEAR16[b] as usize]) << (8 * k) | if k == 0 { 255 << 24 } else { 0 };
+    std::array::from_fn(|k| std::array::from_fn(|b| at(k, b)))
+});
 
 /// The sRGB byte whose linear value is nearest to a 16-bit linear value; the lower byte when two are as near.
 pub static BYTE: LazyLock<Box<[u8; 65_536]>> = LazyLock::new(|| {

@@ -35,7 +35,7 @@ fn texel_centres_give_texels_in_every_wrap_mode() {
     for (w, h) in [(8, 8), (7, 5), (1, 1), (1, 6)] {
         let image = noise(w, h, 3);
         for wrap in [Wrap::Wrap, Wrap::Mirror, Wrap::Clamp, Wrap::Border, Wrap::None] {
-            let sampler = Sampler::new(Arc::new(Level::from_raster(&image)), made(&point()), false, &one_to_one(w, h), wrap, WHITE);
+            let sampler = Sampler::new(Arc::new(Level::from_raster(image.clone())), made(&point()), false, &one_to_one(w, h), wrap, WHITE);
             for y in -20..20 {
                 for x in -20..20 {
                     let got = bytes(sampler.sample(x * 256 + 128, y * 256 + 128));
@@ -63,7 +63,7 @@ fn fold(i: i32, n: u32, wrap: Wrap) -> Option<u32> {
 
 #[test]
 fn white_stays_white_and_diffuse_multiplies() {
-    let level = Arc::new(Level::from_raster(&Raster::filled(16, 16, [255; 4])));
+    let level = Arc::new(Level::from_raster(Raster::filled(16, 16, [255; 4])));
     for scale in [0.3, 1.0, 2.3, 9.0, 40.0] {
         let uv = UvMap { u: [0.1, scale / 16.0, 0.01], v: [0.2, 0.02, scale / 16.0] };
         let plan = footprint(uv.jacobian(16, 16), 1, &Tuning::default());
@@ -77,7 +77,7 @@ fn white_stays_white_and_diffuse_multiplies() {
 #[test]
 fn transparent_texels_lend_no_colour() {
     let image = Raster::new(2, 1, vec![[255, 0, 255, 0], [0, 128, 0, 255]]);
-    let sampler = Sampler::new(Arc::new(Level::from_raster(&image)), made(&point()), true, &one_to_one(2, 1), Wrap::Clamp, WHITE);
+    let sampler = Sampler::new(Arc::new(Level::from_raster(image.clone())), made(&point()), true, &one_to_one(2, 1), Wrap::Clamp, WHITE);
     for x in 140..500 {
         assert_eq!(bytes(sampler.sample(x, 128)), [0, 128, 0], "at {x}");
     }
@@ -86,10 +86,10 @@ fn transparent_texels_lend_no_colour() {
 #[test]
 fn coverage_is_alpha_of_a_half() {
     let image = Raster::new(4, 1, vec![[0; 4], [0; 4], [9, 9, 9, 255], [9, 9, 9, 255]]);
-    let alpha = AlphaSampler::with(Arc::new(Level::from_raster(&image)), &one_to_one(4, 1), Wrap::Clamp, 0);
+    let alpha = AlphaSampler::with(Arc::new(Level::from_raster(image.clone())), &one_to_one(4, 1), Wrap::Clamp, 0);
     let covered: Vec<i32> = (0..1024).filter(|x| alpha.covers(*x, 128)).collect();
     assert!(covered[0].abs_diff(512) <= 2 && covered.len() == (1024 - covered[0]) as usize, "{:?}", covered.first());
-    let border = |a| AlphaSampler::with(Arc::new(Level::from_raster(&image)), &one_to_one(4, 1), Wrap::Border, a).covers(2000, 128);
+    let border = |a| AlphaSampler::with(Arc::new(Level::from_raster(image.clone())), &one_to_one(4, 1), Wrap::Border, a).covers(2000, 128);
     assert!(border(255) && !border(0));
 }
 
@@ -97,7 +97,7 @@ fn coverage_is_alpha_of_a_half() {
 fn a_place_is_covered_as_the_origin_of_a_map_that_begins_there() {
     let mut random = Random(9);
     let texels = (0..35).map(|_| [7, 7, 7, (random.unit() * 255.0) as u8]).collect();
-    let level = Arc::new(Level::from_raster(&Raster::new(7, 5, texels)));
+    let level = Arc::new(Level::from_raster(Raster::new(7, 5, texels)));
     let mut covered = 0;
     for wrap in [Wrap::Wrap, Wrap::Mirror, Wrap::Clamp, Wrap::Border, Wrap::None] {
         let map = |u: f64, v: f64| UvMap { u: [u, 0.03, -0.01], v: [v, 0.02, 0.05] };
@@ -126,7 +126,7 @@ fn samples_come_near_the_exact_integral() {
             })
             .collect(),
     );
-    let level = Arc::new(Level::from_raster(&image));
+    let level = Arc::new(Level::from_raster(image.clone()));
     for _ in 0..40 {
         let mut part = |s: f64| (random.unit() - 0.5) * s / 64.0;
         let uv = UvMap { u: [0.3, part(5.0), part(5.0)], v: [0.6, part(5.0), part(5.0)] };

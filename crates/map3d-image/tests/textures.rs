@@ -127,7 +127,7 @@ fn unused_texels_take_the_nearest_used_one() {
             mask.mark(random.below(w), random.below(h));
         }
         let mut filled = image.clone();
-        fill_unused(&mut filled, &mask);
+        fill_unused(&mut filled, &mask, u32::MAX);
         for y in 0..h {
             for x in 0..w {
                 let distance = |(i, j): (u32, u32)| i64::from(i.abs_diff(x)).pow(2) + i64::from(j.abs_diff(y)).pow(2);
@@ -137,6 +137,24 @@ fn unused_texels_take_the_nearest_used_one() {
                 assert!(right, "({x}, {y}) at density {density}");
             }
         }
+    }
+}
+
+#[test]
+fn a_limited_fill_is_the_whole_one_within_its_reach() {
+    let mut random = Random(5);
+    let (w, h) = (61, 47);
+    for (reach, marks) in [(1, 3), (4, 1), (9, 5), (200, 2)] {
+        let image = noise(w, h, u64::from(reach));
+        let mut mask = UsageMask::empty(w, h);
+        (0..marks).for_each(|_| mask.mark(random.below(w), random.below(h)));
+        let (mut whole, mut limited) = (image.clone(), image);
+        fill_unused(&mut whole, &mask, u32::MAX);
+        fill_unused(&mut limited, &mask, reach);
+        let near = |x: u32, y: u32| used(&mask).iter().any(|(i, j)| i.abs_diff(x).pow(2) + j.abs_diff(y).pow(2) <= reach * reach);
+        let differ = (0..h).flat_map(|y| (0..w).map(move |x| (x, y))).filter(|(x, y)| whole.row(*y)[*x as usize] != limited.row(*y)[*x as usize]);
+        assert!(differ.clone().all(|(x, y)| !near(x, y)), "reach {reach}");
+        assert_eq!(differ.count() == 0, reach == 200, "reach {reach}: what is beyond is left");
     }
 }
 
@@ -447,7 +465,7 @@ fn level_1_is_the_same_with_and_without_level_0_before_it() {
 fn a_halved_level_is_within_a_step_of_the_mean_light() {
     let image = noise(64, 64, 9);
     let exact = Level::from_linear(&first_mip(&image));
-    let halved = Level::from_raster(&image).halved().expect("even");
+    let halved = Level::from_raster(image.clone()).halved().expect("even");
     let most = exact.texels.as_flattened().iter().zip(halved.texels.as_flattened()).map(|(a, b)| a.abs_diff(*b)).max();
     assert!(most <= Some(1), "{most:?}");
 }

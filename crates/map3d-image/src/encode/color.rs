@@ -40,7 +40,7 @@ fn fill_uncovered(image: &mut Raster) {
         }
     }
     let alpha: Vec<u8> = image.pixels.iter().map(|p| p[3]).collect();
-    fill_unused(image, &mask);
+    fill_unused(image, &mask, u32::MAX);
     for (pixel, a) in image.pixels.iter_mut().zip(alpha) {
         pixel[3] = a;
     }

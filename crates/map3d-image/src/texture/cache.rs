@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 use map3d_base::{Error, Result};
 
 use crate::raster::Raster;
-use crate::srgb::{ROOT, ROOT_OF_BYTE};
+use crate::srgb::{ROOT, ROOT_OF_RGB};
 use crate::texture::file::{TextureFile, TextureKey, texture_path};
 use crate::texture::mips::{LinearRaster, first_mip, premultiplied};
 
@@ -22,13 +22,17 @@ pub struct Level {
 }
 
 impl Level {
-    pub fn from_raster(raster: &Raster) -> Self {
-        let table: &[u8; 256] = &ROOT_OF_BYTE;
-        let texel = |p: &[u8; 4]| match p[3] {
-            255 => [table[p[0] as usize], table[p[1] as usize], table[p[2] as usize], 255],
-            _ => premultiplied(*p).map(|c| ROOT[c as usize]),
-        };
-        Self { width: raster.width, height: raster.height, texels: raster.pixels.iter().map(texel).collect() }
+    pub fn from_raster(raster: Raster) -> Self {
+        let table: &[[u32; 256]; 3] = &ROOT_OF_RGB;
+        let Raster { width, height, pixels: mut texels } = raster;
+        for p in &mut texels {
+            let [r, g, b, a] = *p;
+            *p = match a {
+                255 => (table[0][r as usize] | table[1][g as usize] | table[2][b as usize]).to_le_bytes(),
+                _ => premultiplied(*p).map(|c| ROOT[c as usize]),
+            };
+        }
+        Self { width, height, texels }
     }
 
     pub fn from_linear(linear: &LinearRaster) -> Self {
@@ -43,11 +47,20 @@ impl Level {
         if w % 2 == 1 || h % 2 == 1 {
             return None;
         }
-        let mut texels = Vec::with_capacity(w / 2 * (h / 2));
-        for rows in self.texels.chunks_exact(2 * w) {
+        let mut texels = vec![[0; 4]; w / 2 * (h / 2)];
+        let mut sums = vec![[0i32; 4]; w];
+        let mut fours = vec![[0i32; 4]; w / 2];
+        for (rows, out) in self.texels.chunks_exact(2 * w).zip(texels.chunks_exact_mut(w / 2)) {
             let (upper, lower) = rows.split_at(w);
-            let pairs = upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0);
-            texels.extend(pairs.map(|(a, b)| mean_root(a, b)));
+            for ((sum, a), b) in sums.as_flattened_mut().iter_mut().zip(upper.as_flattened()).zip(lower.as_flattened()) {
+                *sum = square(*a) + square(*b);
+            }
+            for (four, [a, b]) in fours.iter_mut().zip(sums.as_chunks::<2>().0) {
+                for c in 0..4 {
+                    four[c] = a[c] + b[c];
+                }
+            }
+            out.as_flattened_mut().iter_mut().zip(fours.as_flattened()).for_each(|(q, four)| *q = mean_root(*four));
         }
         Some(Self { width: self.width / 2, height: self.height / 2, texels })
     }
@@ -57,20 +70,25 @@ impl Level {
     }
 }
 
-/// Level 1 of an image whose level 0 is at hand.
-fn first_level(image: &Raster, level_0: &Level) -> Level {
-    level_0.halved().unwrap_or_else(|| Level::from_linear(&first_mip(image)))
+/// Levels 0 and 1 of an image.
+fn first_two(image: Raster) -> (Level, Level) {
+    let odd = (image.width % 2 == 1 || image.height % 2 == 1).then(|| Level::from_linear(&first_mip(&image)));
+    let level_0 = Level::from_raster(image);
+    let level_1 = odd.or_else(|| level_0.halved()).expect("even sides");
+    (level_0, level_1)
 }
 
 #[inline(always)]
-fn mean_root(upper: &[[u8; 4]; 2], lower: &[[u8; 4]; 2]) -> [u8; 4] {
-    let mut out = [0; 4];
-    for c in 0..4 {
-        let square = |q: u8| u32::from(q) * u32::from(q);
-        let sum = square(upper[0][c]) + square(upper[1][c]) + square(lower[0][c]) + square(lower[1][c]);
-        out[c] = ((sum as f32 * 0.25).sqrt() + 0.5) as u8;
-    }
-    out
+fn square(q: u8) -> i32 {
+    i32::from(q) * i32::from(q)
+}
+
+/// The root of a quarter of a sum of four squares, halves upwards.
+#[inline(always)]
+fn mean_root(sum: i32) -> u8 {
+    // 2^23 leaves no place for a fraction. Roots of whole quarters that are not halves are at least 4.9e-4 away from one.
+    let rounded = (sum as f32 * 0.25).sqrt() + 2e-4 + 8_388_608.0;
+    rounded.to_bits() as u8
 }
 
 /// A texture of the store, opened and checked.
@@ -187,25 +205,27 @@ impl TextureCache {
         match level {
             0 => {
                 let image = texture.file.level_0()?;
-                let level_0 = Level::from_raster(&image);
-                self.keep_first(texture, || first_level(&image, &level_0));
+                if self.has_first(texture) {
+                    return Ok(Level::from_raster(image));
+                }
+                let (level_0, level_1) = first_two(image);
+                self.keep_first(texture, level_1);
                 Ok(level_0)
             }
-            1 => {
-                let image = texture.file.level_0()?;
-                Ok(first_level(&image, &Level::from_raster(&image)))
-            }
-            _ => Ok(Level::from_raster(&texture.file.stored_level(level)?)),
+            1 => Ok(first_two(texture.file.level_0()?).1),
+            _ => Ok(Level::from_raster(texture.file.stored_level(level)?)),
         }
     }
 
+    /// Is level 1 there, or none to be had?
+    fn has_first(&self, texture: &Texture) -> bool {
+        texture.file.levels == 1 || self.slot((texture.key, 1)).get().is_some()
+    }
+
     /// Level 1 comes with level 0: most views need both, and the source is decoded only once.
-    fn keep_first(&self, texture: &Texture, make: impl FnOnce() -> Level) {
+    fn keep_first(&self, texture: &Texture, level_1: Level) {
         let name = (texture.key, 1);
-        if texture.file.levels == 1 || self.slot(name).get().is_some() {
-            return;
-        }
-        let first = Arc::new(make());
+        let first = Arc::new(level_1);
         let bytes = first.bytes();
         if self.slot(name).set(Ok(first)).is_ok() {
             self.account(name, bytes);
@@ -236,6 +256,16 @@ impl TextureCache {
             let entry = levels.entries.remove(&name).expect("listed above");
             levels.bytes -= entry.bytes;
             self.evicted.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_mean_root_is_rounded_exactly() {
+        for sum in 0..=4 * 255 * 255 {
+            assert_eq!(super::mean_root(sum), ((f64::from(sum) / 4.0).sqrt() + 0.5) as u8, "{sum}");
         }
     }
 }

@@ -21,6 +21,9 @@ const SECTIONS: usize = 16;
 const TABLE_BYTES: usize = SECTIONS * 16;
 /// The section of level 2.
 const FIRST_LEVEL_SECTION: usize = 3;
+/// Texels around a used one, in those of level 0, that samples of levels 0 and 1 can meet: half a pixel of `MAX_TAPS` texels of level 1 to the side
+/// of the triangle, half a footprint beyond it, both along a diagonal.
+const SAMPLED_REACH: u32 = 64;
 
 /// Binary key of a texture: xxh3-128.
 pub type TextureKey = [u8; 16];
@@ -49,7 +52,7 @@ pub fn texture_key(image: &[u8], alpha: &[u8], runs: &[u8]) -> TextureKey {
 /// Decodes a texture and lays it out as a file's bytes.
 pub fn layout(path: &Path, image: &[u8], alpha: &[u8], mask: &UsageMask, limits: &ImageLimits) -> Result<Vec<u8>> {
     let masked = !mask.is_full();
-    let level_0 = source::level_0(path, image, alpha, masked.then_some(mask), limits)?;
+    let level_0 = source::level_0(path, image, alpha, masked.then_some((mask, u32::MAX)), limits)?;
     let levels = level_count(level_0.width, level_0.height);
     let mut sections = vec![image.to_vec(), alpha.to_vec(), if masked { mask.to_runs() } else { Vec::new() }];
     let mut mip = first_mip(&level_0);
@@ -161,7 +164,7 @@ impl TextureFile {
         Ok(Raster::new(w, h, bytemuck::cast_slice(&bytes).to_vec()))
     }
 
-    /// Level 0: decoded and filled.
+    /// Level 0: decoded, and filled as far as levels 0 and 1 are sampled.
     pub fn level_0(&self) -> Result<Raster> {
         let (image, alpha) = (self.section(0)?, self.section(1)?);
         let mask = if self.masked { Some(self.mask()?) } else { None };
@@ -169,7 +172,7 @@ impl TextureFile {
         if source::probe(&self.path, &image, &alpha, &limits)? != (self.width, self.height) {
             return Err(Error::format(&self.path, "its image has another size than its header says"));
         }
-        source::level_0(&self.path, &image, &alpha, mask.as_ref(), &limits)
+        source::level_0(&self.path, &image, &alpha, mask.as_ref().map(|m| (m, SAMPLED_REACH)), &limits)
     }
 
     /// Any level as sRGB bytes.

@@ -6,106 +6,114 @@ use std::ops::Range;
 use crate::raster::Raster;
 use crate::texture::mask::UsageMask;
 
-/// Vertical distance where a column has no used texel.
-const FAR: i32 = 1 << 20;
+/// Longest side of an image: a distance and the next greater one fit 16 bits.
+const MAX_SIDE: u32 = i16::MAX as u32 - 1;
 
-/// Fills in place. An empty or full mask changes nothing. The work grows with the unused area.
-pub fn fill_unused(image: &mut Raster, mask: &UsageMask) {
+/// Fills in place. An empty or full mask changes nothing. Texels farther than `reach` from every used one may keep what they have.
+pub fn fill_unused(image: &mut Raster, mask: &UsageMask, reach: u32) {
     assert_eq!((image.width, image.height), (mask.width(), mask.height()), "mask and image differ in size");
+    assert!(image.width.max(image.height) <= MAX_SIDE, "{} × {} px", image.width, image.height);
     if mask.is_full() || mask.used() == 0 {
         return;
     }
     let w = image.width as usize;
+    // Beyond it, nothing is near.
+    let far = reach.min(MAX_SIDE - 1) as i16 + 1;
     let gaps: Vec<Vec<Range<usize>>> = (0..mask.height()).map(|y| mask.gaps(y)).collect();
-    let vertical = vertical_offsets(w, &gaps);
-    let mut sources = Envelope::default();
-    let mut run = Vec::new();
-    // Every source is a used texel, and those are never written.
-    for (y, row) in gaps.iter().enumerate() {
-        let offsets = &vertical[y * w..][..w];
+    let up = rows_up(w, &gaps, far);
+    let mut down = vec![far; w];
+    let mut offsets = vec![0; w];
+    let mut envelope = Vec::new();
+    for (y, row) in gaps.iter().enumerate().rev() {
+        step_down(&mut down, &mut offsets, &up[y * w..][..w], row, far);
         for gap in row {
-            sources.build(offsets, gap.start.saturating_sub(1), (gap.end + 1).min(w));
-            run.clear();
-            run.extend(gap.clone().map(|x| {
-                let from = sources.nearest(x as i32);
-                image.pixels[(y as i32 + offsets[from]) as usize * w + from]
-            }));
-            image.pixels[y * w..][gap.clone()].copy_from_slice(&run);
+            lower_envelope(&mut envelope, &offsets, gap.start.saturating_sub(1), (gap.end + 1).min(w), far);
+            copy_nearest(image, y, gap, &offsets, &envelope, far);
         }
     }
 }
 
-/// For each texel the signed rows to the nearest used one in its column: 0 when it is used itself.
-fn vertical_offsets(w: usize, gaps: &[Vec<Range<usize>>]) -> Vec<i32> {
-    let mut offsets = vec![0; w * gaps.len()];
+/// For each texel the rows up to the nearest used one in its column, at most `far`: 0 when it is used itself.
+fn rows_up(w: usize, gaps: &[Vec<Range<usize>>], far: i16) -> Vec<i16> {
+    let mut up = vec![0; w * gaps.len()];
     for (y, row) in gaps.iter().enumerate() {
-        let (before, own) = offsets.split_at_mut(y * w);
+        let (before, own) = up.split_at_mut(y * w);
         for gap in row {
             match y {
-                0 => own[gap.clone()].fill(FAR),
-                _ => {
-                    let above = &before[(y - 1) * w..][gap.clone()];
-                    own[gap.clone()].iter_mut().zip(above).for_each(|(o, a)| *o = if *a == FAR { FAR } else { a - 1 });
-                }
+                0 => own[gap.clone()].fill(far),
+                _ => own[gap.clone()].iter_mut().zip(&before[(y - 1) * w..][gap.clone()]).for_each(|(o, a)| *o = (a + 1).min(far)),
             }
         }
     }
-    for (y, row) in gaps.iter().enumerate().rev().skip(1) {
-        let (upper, lower) = offsets.split_at_mut((y + 1) * w);
-        for gap in row {
-            let below = &lower[gap.clone()];
-            for (own, below) in upper[y * w..][gap.clone()].iter_mut().zip(below) {
-                if *below != FAR && *below >= 0 && below + 1 < own.abs() {
-                    *own = below + 1;
-                }
-            }
+    up
+}
+
+/// From the rows down of the row below to those of this row; `offsets`: to the nearer of both, up is negative. Beyond reach `far` or `-far`.
+fn step_down(down: &mut [i16], offsets: &mut [i16], up: &[i16], gaps: &[Range<usize>], far: i16) {
+    let mut used_from = 0;
+    for gap in gaps {
+        down[used_from..gap.start].fill(0);
+        offsets[used_from..gap.start].fill(0);
+        used_from = gap.end;
+        let cells = down[gap.clone()].iter_mut().zip(&mut offsets[gap.clone()]).zip(&up[gap.clone()]);
+        for ((down, offset), up) in cells {
+            *down = (*down + 1).min(far);
+            *offset = if *down < *up { *down } else { -up };
         }
     }
-    offsets
+    down[used_from..].fill(0);
+    offsets[used_from..].fill(0);
+}
+
+/// A column whose source is the nearest from `start` on.
+struct Part {
+    column: i32,
+    start: i32,
 }
 
 /// Lower envelope of the parabolas (x − i)² + offset(i)² over part of a row.
-#[derive(Default)]
-struct Envelope {
-    /// (column, first x at which it is the nearest)
-    parts: Vec<(usize, i32)>,
-    at: usize,
-}
-
-impl Envelope {
-    fn build(&mut self, offsets: &[i32], from: usize, end: usize) {
-        self.parts.clear();
-        self.at = 0;
-        for i in from..end {
-            if offsets[i] == FAR {
-                continue;
-            }
-            let square = i64::from(offsets[i]).pow(2);
-            let mut start = i32::MIN;
-            while let Some(&(top, top_start)) = self.parts.last() {
-                start = overtakes(top, i64::from(offsets[top]).pow(2), i, square);
-                if start > top_start {
-                    break;
-                }
-                self.parts.pop();
-                start = i32::MIN;
-            }
-            self.parts.push((i, start));
+fn lower_envelope(parts: &mut Vec<Part>, offsets: &[i16], from: usize, end: usize, far: i16) {
+    parts.clear();
+    for (i, offset) in (from as i32..).zip(&offsets[from..end]) {
+        if offset.abs() >= far {
+            continue;
         }
-    }
-
-    /// The nearest column to x; x must not decrease between calls.
-    fn nearest(&mut self, x: i32) -> usize {
-        while self.parts.get(self.at + 1).is_some_and(|(_, start)| *start <= x) {
-            self.at += 1;
+        let square = i32::from(*offset).pow(2);
+        let mut start = i32::MIN;
+        while let Some(top) = parts.last() {
+            start = overtakes(top.column, i32::from(offsets[top.column as usize]).pow(2), i, square);
+            if start > top.start {
+                break;
+            }
+            parts.pop();
+            start = i32::MIN;
         }
-        self.parts[self.at].0
+        parts.push(Part { column: i, start });
     }
 }
 
 /// The first x at which column b is strictly nearer than column a < b.
-fn overtakes(a: usize, a_square: i64, b: usize, b_square: i64) -> i32 {
-    let (ai, bi) = (a as i64, b as i64);
-    let numerator = bi * bi - ai * ai + b_square - a_square;
-    (numerator.div_euclid(2 * (bi - ai)) + 1) as i32
+#[inline(always)]
+fn overtakes(a: i32, a_square: i32, b: i32, b_square: i32) -> i32 {
+    let numerator = b * b - a * a + b_square - a_square;
+    // Mostly neighbours.
+    if b - a == 1 { (numerator >> 1) + 1 } else { numerator.div_euclid(2 * (b - a)) + 1 }
+}
+
+/// Every source is a used texel, and those are never written.
+fn copy_nearest(image: &mut Raster, y: usize, gap: &Range<usize>, offsets: &[i16], parts: &[Part], far: i16) {
+    let (w, far) = (image.width as usize, i32::from(far));
+    for (k, part) in parts.iter().enumerate() {
+        let next = parts.get(k + 1).map_or(i32::MAX, |p| p.start);
+        let from = part.start.max(part.column - far).max(gap.start as i32) as usize;
+        let end = next.min(part.column + far).min(gap.end as i32).max(0) as usize;
+        if from < end {
+            let row = (y as i32 + i32::from(offsets[part.column as usize])) as usize;
+            let color = image.pixels[row * w + part.column as usize];
+            match end - from {
+                1 => image.pixels[y * w + from] = color,
+                _ => image.pixels[y * w..][from..end].fill(color),
+            }
+        }
+    }
 }

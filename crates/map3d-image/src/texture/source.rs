@@ -17,8 +17,8 @@ pub fn probe(path: &Path, image: &[u8], alpha: &[u8], limits: &ImageLimits) -> R
     decode::probe(path, if image.is_empty() { alpha } else { image }, limits)
 }
 
-/// Decodes, merges, fills. `mask` is absent when every texel is used.
-pub fn level_0(path: &Path, image: &[u8], alpha: &[u8], mask: Option<&UsageMask>, limits: &ImageLimits) -> Result<Raster> {
+/// Decodes, merges, fills as far as `reach`. `mask` is absent when every texel is used.
+pub fn level_0(path: &Path, image: &[u8], alpha: &[u8], mask: Option<(&UsageMask, u32)>, limits: &ImageLimits) -> Result<Raster> {
     let mut raster = match image.is_empty() {
         true => {
             let (width, height) = decode::probe(path, alpha, limits)?;
@@ -29,8 +29,8 @@ pub fn level_0(path: &Path, image: &[u8], alpha: &[u8], mask: Option<&UsageMask>
     if !alpha.is_empty() {
         merge_alpha(&mut raster, &decode::decode(path, alpha, limits)?);
     }
-    if let Some(mask) = mask {
-        fill_unused(&mut raster, mask);
+    if let Some((mask, reach)) = mask {
+        fill_unused(&mut raster, mask, reach);
     }
     Ok(raster)
 }
