@@ -1,6 +1,7 @@
 //! Binary files: a header with magic, version and checksum, then sections aligned to 64 bytes (spec/scene.md). The only place that maps files.
 
 use std::fs::File;
+use std::hash::Hasher;
 use std::path::Path;
 
 use bytemuck::Pod;
@@ -11,6 +12,8 @@ use crate::error::{Error, Result};
 
 pub const HEADER_BYTES: usize = 64;
 pub const ALIGN: usize = 64;
+/// Memory of a mapping that a pass over it lets go of at a time.
+pub const RELEASED_BYTES: usize = 1 << 26;
 
 /// Rounds up to the alignment of sections.
 pub const fn aligned(bytes: usize) -> usize {
@@ -29,6 +32,16 @@ pub fn header_start(magic: &[u8; 4], version: u32, checksum: u64) -> [u8; 16] {
 /// Checksum of a body: xxh3-64 with seed 0.
 pub fn checksum(body: &[u8]) -> u64 {
     XxHash3_64::oneshot(body)
+}
+
+/// The same, letting go of the mapping's memory on the way.
+fn mapped_checksum(map: &Mmap) -> u64 {
+    let mut hasher = XxHash3_64::new();
+    for piece in map[HEADER_BYTES..].chunks(RELEASED_BYTES) {
+        hasher.write(piece);
+        release(map);
+    }
+    hasher.finish()
 }
 
 /// Maps a file read-only. The file must not be changed in place while mapped: map3d's writers write elsewhere and rename.
@@ -53,14 +66,21 @@ pub fn check_header(path: &Path, bytes: &[u8], magic: &[u8; 4], version: u32, wi
     if found != version {
         return Err(Error::format(path, format!("version {found}, this program reads {version}")));
     }
-    if with_checksum {
-        let stored = u64::from_le_bytes(bytes[8..16].try_into().expect("8 bytes"));
-        let actual = checksum(&bytes[HEADER_BYTES..]);
-        if stored != actual {
-            return Err(Error::format(path, format!("checksum {actual:016x}, expected {stored:016x}: the file is damaged")));
-        }
+    if with_checksum { compare(path, bytes, checksum(&bytes[HEADER_BYTES..])) } else { Ok(()) }
+}
+
+/// Checks magic, version and checksum of a mapped file of any size in little memory.
+pub fn check_mapped(path: &Path, map: &Mmap, magic: &[u8; 4], version: u32) -> Result<()> {
+    check_header(path, map, magic, version, false)?;
+    compare(path, map, mapped_checksum(map))
+}
+
+fn compare(path: &Path, bytes: &[u8], actual: u64) -> Result<()> {
+    let stored = u64::from_le_bytes(bytes[8..16].try_into().expect("8 bytes"));
+    match stored == actual {
+        true => Ok(()),
+        false => Err(Error::format(path, format!("checksum {actual:016x}, expected {stored:016x}: the file is damaged"))),
     }
-    Ok(())
 }
 
 /// `count` records of `T` at `offset`, or an error that says the file is too short. `offset` must be aligned for `T`.

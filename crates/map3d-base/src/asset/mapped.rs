@@ -27,7 +27,7 @@ impl AssetMesh {
     /// Maps and validates a `mesh.m3a`, its checksum too.
     pub fn open(path: &Path) -> Result<Self> {
         let map = file::map(path)?;
-        file::check_header(path, &map, MAGIC, VERSION, true)?;
+        file::check_mapped(path, &map, MAGIC, VERSION)?;
         let count = |at: usize| usize::try_from(u64::from_le_bytes(map[at..at + 8].try_into().expect("8 bytes")));
         let (Ok(vertices), Ok(triangles)) = (count(16), count(24)) else {
             return Err(Error::format(path, "counts are too large"));
@@ -59,14 +59,22 @@ impl AssetMesh {
     }
 
     fn validate(&self) -> Result<()> {
-        let bad = self.triangles().as_flattened().iter().find(|v| **v as usize >= self.vertices);
-        if let Some(v) = bad {
-            return Err(Error::format(&self.path, format!("vertex {v} of {}", self.vertices)));
+        for triangles in self.pieces(self.triangles()) {
+            if let Some(v) = triangles.as_flattened().iter().find(|v| **v as usize >= self.vertices) {
+                return Err(Error::format(&self.path, format!("vertex {v} of {}", self.vertices)));
+            }
         }
-        if !self.positions().as_flattened().iter().all(|v| v.is_finite()) {
-            return Err(Error::format(&self.path, "a coordinate is not a finite number"));
+        for positions in self.pieces(self.positions()) {
+            if !positions.as_flattened().iter().all(|v| v.is_finite()) {
+                return Err(Error::format(&self.path, "a coordinate is not a finite number"));
+            }
         }
         Ok(())
+    }
+
+    /// One of the mesh's arrays in order, piece by piece; the memory of a piece is let go of before the next one comes.
+    pub fn pieces<'a, T>(&'a self, records: &'a [T]) -> impl Iterator<Item = &'a [T]> {
+        records.chunks(file::RELEASED_BYTES / size_of::<T>()).inspect(|_| self.release())
     }
 
     fn part<T: bytemuck::Pod>(&self, k: usize, n: usize) -> &[T] {

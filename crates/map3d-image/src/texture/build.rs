@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use map3d_base::asset::{AssetMesh, Material, Wrap};
+use map3d_base::asset::{AssetMesh, Material};
 use map3d_base::{Error, Result};
 use rayon::prelude::*;
 
@@ -100,11 +100,15 @@ struct Build<'a> {
     pending: Mutex<HashMap<TextureSource, Vec<u8>>>,
     result: Mutex<TextureKeys>,
     done: AtomicU64,
+    masks: AtomicU64,
     stopped: AtomicBool,
 }
 
-/// Triangles of one asset that use one source, each with its wrap mode.
-type Uses = Vec<(u32, Wrap)>;
+/// Triangles of one asset that use one source.
+type Uses = Vec<u32>;
+
+/// Sources after whose masks the memory of an asset's mesh is let go of.
+const RELEASED: u64 = 64;
 
 impl<'a> Build<'a> {
     fn plan(assets: &[TextureAsset], out_dir: &'a Path, progress: &'a Progress<'a>) -> Self {
@@ -122,6 +126,7 @@ impl<'a> Build<'a> {
             pending: Mutex::default(),
             result: Mutex::default(),
             done: AtomicU64::new(0),
+            masks: AtomicU64::new(0),
             stopped: AtomicBool::new(false),
         }
     }
@@ -175,11 +180,14 @@ impl<'a> Build<'a> {
         let before = self.pending.lock().expect("no thread panicked").remove(source);
         let mut mask = before.and_then(|runs| UsageMask::from_runs(width, height, &runs)).unwrap_or_else(|| UsageMask::empty(width, height));
         let uvs = asset.mesh.uvs();
-        for (triangle, wrap) in uses {
+        for triangle in uses.iter().map(|t| *t as usize) {
             if mask.is_full() {
                 break;
             }
-            mask.add_triangle(uvs[*triangle as usize], *wrap);
+            mask.add_triangle(uvs[triangle], asset.materials[asset.mesh.materials()[triangle] as usize].wrap);
+        }
+        if self.masks.fetch_add(1, Ordering::Relaxed) % RELEASED == RELEASED - 1 {
+            asset.mesh.release();
         }
         if !last {
             self.pending.lock().expect("no thread panicked").insert(source.clone(), mask.to_runs());
@@ -230,12 +238,16 @@ fn uses_by_source(asset: &TextureAsset) -> Vec<(TextureSource, Uses)> {
             source.as_ref().map(|s| *numbers.entry(s).or_insert(next))
         })
         .collect();
-    let mut groups: Vec<Uses> = vec![Vec::new(); numbers.len()];
+    let slot_of = |material: &u32| slots.get(*material as usize).copied().flatten();
+    let mut counts = vec![0; numbers.len()];
+    asset.mesh.materials().iter().filter_map(slot_of).for_each(|slot| counts[slot] += 1);
+    let mut groups: Vec<Uses> = counts.into_iter().map(Vec::with_capacity).collect();
     for (triangle, material) in asset.mesh.materials().iter().enumerate() {
-        if let Some(Some(slot)) = slots.get(*material as usize) {
-            groups[*slot].push((triangle as u32, asset.materials[*material as usize].wrap));
+        if let Some(slot) = slot_of(material) {
+            groups[slot].push(triangle as u32);
         }
     }
+    asset.mesh.release();
     numbers.into_iter().map(|(source, slot)| (source.clone(), std::mem::take(&mut groups[slot]))).filter(|(_, uses)| !uses.is_empty()).collect()
 }
 

@@ -11,6 +11,8 @@ use super::request::BuildOptions;
 use super::triangle::BuildTriangle;
 use crate::lattice::snap;
 
+/// Triangles after which the memory of an asset's mesh is let go of; some 60 bytes each.
+const RELEASED: usize = 1 << 20;
 /// Stands for the object in a prototype's chunk: every placement has an object of its own.
 const PROTOTYPE_ID: u32 = 1;
 
@@ -38,6 +40,9 @@ impl Source<'_> {
         for (i, prototype) in asset.mesh.prototypes().iter().enumerate() {
             if i % (1 << 16) == 0 && !go_on(i as u64) {
                 return false;
+            }
+            if i % RELEASED == 0 {
+                asset.mesh.release();
             }
             let ordinal = order.next(*prototype, asset.mesh.objects()[i]);
             if !wanted(*prototype) {
