@@ -6,8 +6,9 @@ use std::sync::Arc;
 
 use common::{Random, noise};
 use map3d_base::asset::Wrap;
+use map3d_base::samples::SAMPLES;
 use map3d_image::Raster;
-use map3d_image::sample::{AlphaSampler, Footprint, Outside, Sampler, TapPlan, Tuning, UvMap, footprint};
+use map3d_image::sample::{AlphaSampler, Footprint, Outside, POSITION_BITS, Sampler, TapPlan, Tuning, UvMap, footprint};
 use map3d_image::srgb::{BYTE, LINEAR16};
 use map3d_image::texture::Level;
 
@@ -91,6 +92,30 @@ fn coverage_is_alpha_of_a_half() {
     assert!(covered[0].abs_diff(512) <= 2 && covered.len() == (1024 - covered[0]) as usize, "{:?}", covered.first());
     let border = |a| AlphaSampler::with(Arc::new(Level::from_raster(image.clone())), &one_to_one(4, 1), Wrap::Border, a).covers(2000, 128);
     assert!(border(255) && !border(0));
+}
+
+#[test]
+fn samples_of_a_pixel_are_covered_as_one_by_one() {
+    let mut random = Random(31);
+    // Patches that are clear or solid, and noise between.
+    let alpha = |x: usize, y: usize, noise: f64| [0, 255, (noise * 255.0) as u8, 255][(x / 3 + 2 * (y / 4)) % 4];
+    let texels = (0..24 * 17).map(|k| [9, 9, 9, alpha(k % 24, k / 24, random.unit())]).collect();
+    let level = Arc::new(Level::from_raster(Raster::new(24, 17, texels)));
+    let mut counts = [0, 0];
+    for wrap in [Wrap::Wrap, Wrap::Mirror, Wrap::Clamp, Wrap::Border, Wrap::None] {
+        let slopes = [0; 4].map(|_| (random.unit() - 0.5) / 4.0);
+        let map = UvMap { u: [random.unit(), slopes[0], slopes[1]], v: [random.unit(), slopes[2], slopes[3]] };
+        let stencil = AlphaSampler::with(level.clone(), &map, wrap, 77);
+        for (i, j) in (0..256).map(|p| (p % 16, p / 16)) {
+            let position = |c: i32, s: u8| (c << POSITION_BITS) + i32::from(s) * (1 << (POSITION_BITS - 4));
+            let expected = SAMPLES.iter().enumerate().fold(0, |m, (k, (x, y))| m | u32::from(stencil.covers(position(i, *x), position(j, *y))) << k);
+            assert_eq!(stencil.covered(i, j, 0xFFFF), expected, "{wrap:?} ({i}, {j})");
+            assert_eq!(stencil.covered(i, j, 0x5A5A), expected & 0x5A5A);
+            counts[0] += expected.count_ones();
+            counts[1] += 16 - expected.count_ones();
+        }
+    }
+    assert!(counts.iter().all(|n| *n > 2000), "{counts:?}");
 }
 
 #[test]

@@ -5,8 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use map3d_base::asset::Wrap;
-use map3d_base::samples::SAMPLES;
-use map3d_image::sample::{AlphaSampler, POSITION_BITS, UvMap};
+use map3d_image::sample::{AlphaSampler, UvMap};
 use map3d_image::texture::{Level, Texture, TextureCache, TextureKey};
 use map3d_scene::MaterialRecord;
 use map3d_trace::{Affine, Cutout, CutoutSample, Stencil};
@@ -100,22 +99,10 @@ struct AlphaStencil(AlphaSampler);
 
 impl Stencil for AlphaStencil {
     fn covered(&self, i: usize, j: usize, asked: u32) -> u32 {
-        let (x, y) = ((i as i32) << POSITION_BITS, (j as i32) << POSITION_BITS);
-        let mut rest = asked;
-        let mut covered = 0;
-        while rest != 0 {
-            let k = rest.trailing_zeros();
-            rest &= rest - 1;
-            let (sx, sy) = SAMPLES[k as usize];
-            covered |= u32::from(self.0.covers(x + i32::from(sx) * STEP, y + i32::from(sy) * STEP)) << k;
-        }
-        covered
+        self.0.covered(i as i32, j as i32, asked)
     }
 
     fn covers(&self, uv: [f32; 2]) -> bool {
         self.0.covers_at(uv.map(f64::from))
     }
 }
-
-/// Positions a 1/16 pixel.
-const STEP: i32 = 1 << (POSITION_BITS - 4);

@@ -3,15 +3,21 @@
 use std::sync::Arc;
 
 use map3d_base::asset::Wrap;
+use map3d_base::samples::SAMPLES;
 
 use crate::sample::grid::Grid;
-use crate::sample::sampler::UvMap;
+use crate::sample::sampler::{POSITION_BITS, UvMap};
 use crate::sample::tap::{FULL, TAP_BITS, WEIGHT_BITS, single};
-use crate::texture::{Level, Texture};
+use crate::texture::{AlphaCell, Level, Texture};
+
+/// Positions a 1/16 pixel.
+const STEP: i32 = 1 << (POSITION_BITS - 4);
 
 /// Whether a cut-out surface covers a sample: alpha ≥ ½, filtered at about a sample's footprint (a quarter pixel).
 pub struct AlphaSampler {
     grid: Grid,
+    /// From a pixel's origin to its samples.
+    steps: [[i64; 2]; 16],
     /// Alpha outside the texture; `FULL` = 1.
     outside: u32,
 }
@@ -27,13 +33,35 @@ impl AlphaSampler {
 
     pub fn with(level: Arc<Level>, uv: &UvMap, wrap: Wrap, border_alpha: u8) -> Self {
         let alpha = if wrap == Wrap::Border { border_alpha } else { 255 };
-        Self { grid: Grid::new(level, wrap, uv), outside: (u32::from(alpha) * FULL + 127) / 255 }
+        let grid = Grid::new(level, wrap, uv);
+        let steps = SAMPLES.map(|(x, y)| grid.step(i32::from(x) * STEP, i32::from(y) * STEP));
+        Self { grid, steps, outside: (u32::from(alpha) * FULL + 127) / 255 }
     }
 
     /// At a position in 2^-8 px from the map's origin.
     #[inline(always)]
     pub fn covers(&self, x: i32, y: i32) -> bool {
         self.covers_texel(self.grid.at(x, y))
+    }
+
+    /// Those of the `asked` samples of pixel (i, j) that are covered; bit k is sample k.
+    pub fn covered(&self, i: i32, j: i32, asked: u32) -> u32 {
+        let [x, y] = self.grid.far_at(i << POSITION_BITS, j << POSITION_BITS);
+        let mut rest = asked & 0xFFFF;
+        let mut covered = 0;
+        while rest != 0 {
+            let k = rest.trailing_zeros();
+            rest &= rest - 1;
+            let [dx, dy] = self.steps[k as usize];
+            let texel = self.grid.home([x.wrapping_add(dx), y.wrapping_add(dy)]);
+            let is_covered = match self.grid.cell(texel) {
+                AlphaCell::Clear => false,
+                AlphaCell::Solid => true,
+                AlphaCell::Mixed => self.covers_texel(texel),
+            };
+            covered |= u32::from(is_covered) << k;
+        }
+        covered
     }
 
     /// At texture coordinates (u right, v up): as a sampler whose map has them for its origin covers that.

@@ -7,8 +7,8 @@ use map3d_base::asset::Wrap;
 use crate::sample::plan::Batch;
 use crate::sample::sampler::{POSITION_BITS, UvMap};
 use crate::sample::tap::{BATCH, PLACE_BITS, Pair, Placed, TapSum, WEIGHT_BITS, Weights, weights};
-use crate::texture::Level;
 use crate::texture::mask::fold;
+use crate::texture::{AlphaCell, Level};
 
 /// Fraction bits of texel coordinates.
 pub(super) const TEXEL_BITS: u32 = 32;
@@ -63,15 +63,34 @@ impl Grid {
 
     /// Texel coordinates of texture coordinates: as those of the origin of a map that begins there.
     pub fn of_uv(&self, u: f64, v: f64) -> [i64; 2] {
-        let [tx, ty] = start(&self.level, self.wrap, u, v);
-        [at_home(tx, self.period[0]), at_home(ty, self.period[1])]
+        self.home(start(&self.level, self.wrap, u, v))
     }
 
     /// Texel coordinates of a position, where the texture repeats in its first period.
     #[inline(always)]
     pub fn at(&self, x: i32, y: i32) -> [i64; 2] {
-        let [tx, ty] = self.far_at(x, y);
+        self.home(self.far_at(x, y))
+    }
+
+    /// In the first period.
+    #[inline(always)]
+    pub fn home(&self, [tx, ty]: [i64; 2]) -> [i64; 2] {
         [at_home(tx, self.period[0]), at_home(ty, self.period[1])]
+    }
+
+    /// Change of texel coordinates over a distance of positions.
+    pub fn step(&self, x: i32, y: i32) -> [i64; 2] {
+        let line = |c: &[i64; 3]| c[1].wrapping_mul(i64::from(x)).wrapping_add(c[2].wrapping_mul(i64::from(y)));
+        [line(&self.x), line(&self.y)]
+    }
+
+    /// What a bilinear tap at a place meets, if that is known beforehand.
+    #[inline(always)]
+    pub fn cell(&self, [tx, ty]: [i64; 2]) -> AlphaCell {
+        let (x, y) = (tx >> TEXEL_BITS, ty >> TEXEL_BITS);
+        let (w, h) = (i64::from(self.level.width), i64::from(self.level.height));
+        let is_inside = (x as u64) < (w - 1) as u64 && (y as u64) < (h - 1) as u64;
+        if is_inside { self.level.alpha_cell((y * w + x) as usize) } else { AlphaCell::Mixed }
     }
 
     /// The same in whatever period.

@@ -7,89 +7,8 @@ use std::sync::{Arc, Mutex, OnceLock};
 
 use map3d_base::{Error, Result};
 
-use crate::raster::Raster;
-use crate::srgb::{ROOT, ROOT_OF_RGB};
 use crate::texture::file::{TextureFile, TextureKey, texture_path};
-use crate::texture::mips::{LinearRaster, first_mip, premultiplied};
-
-/// A level as bytes q of √(linear light): q² / 255² is the light, premultiplied by alpha; alpha likewise. Finer than sRGB bytes in shadows and
-/// lights, at most a third coarser between; four bytes a texel are what the memory can carry. Rows top to bottom.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Level {
-    pub width: u32,
-    pub height: u32,
-    pub texels: Vec<[u8; 4]>,
-}
-
-impl Level {
-    pub fn from_raster(raster: Raster) -> Self {
-        let table: &[[u32; 256]; 3] = &ROOT_OF_RGB;
-        let Raster { width, height, pixels: mut texels } = raster;
-        for p in &mut texels {
-            let [r, g, b, a] = *p;
-            *p = match a {
-                255 => (table[0][r as usize] | table[1][g as usize] | table[2][b as usize]).to_le_bytes(),
-                _ => premultiplied(*p).map(|c| ROOT[c as usize]),
-            };
-        }
-        Self { width, height, texels }
-    }
-
-    pub fn from_linear(linear: &LinearRaster) -> Self {
-        let table: &[u8; 65_536] = &ROOT;
-        let texel = |p: &[u16; 4]| [table[p[0] as usize], table[p[1] as usize], table[p[2] as usize], table[p[3] as usize]];
-        Self { width: linear.width, height: linear.height, texels: linear.pixels.iter().map(texel).collect() }
-    }
-
-    /// The next level: the root of the mean light of four texels each. `None` for odd sides.
-    pub fn halved(&self) -> Option<Self> {
-        let (w, h) = (self.width as usize, self.height as usize);
-        if w % 2 == 1 || h % 2 == 1 {
-            return None;
-        }
-        let mut texels = vec![[0; 4]; w / 2 * (h / 2)];
-        let mut sums = vec![[0i32; 4]; w];
-        let mut fours = vec![[0i32; 4]; w / 2];
-        for (rows, out) in self.texels.chunks_exact(2 * w).zip(texels.chunks_exact_mut(w / 2)) {
-            let (upper, lower) = rows.split_at(w);
-            for ((sum, a), b) in sums.as_flattened_mut().iter_mut().zip(upper.as_flattened()).zip(lower.as_flattened()) {
-                *sum = square(*a) + square(*b);
-            }
-            for (four, [a, b]) in fours.iter_mut().zip(sums.as_chunks::<2>().0) {
-                for c in 0..4 {
-                    four[c] = a[c] + b[c];
-                }
-            }
-            out.as_flattened_mut().iter_mut().zip(fours.as_flattened()).for_each(|(q, four)| *q = mean_root(*four));
-        }
-        Some(Self { width: self.width / 2, height: self.height / 2, texels })
-    }
-
-    fn bytes(&self) -> u64 {
-        self.texels.len() as u64 * 4
-    }
-}
-
-/// Levels 0 and 1 of an image.
-fn first_two(image: Raster) -> (Level, Level) {
-    let odd = (image.width % 2 == 1 || image.height % 2 == 1).then(|| Level::from_linear(&first_mip(&image)));
-    let level_0 = Level::from_raster(image);
-    let level_1 = odd.or_else(|| level_0.halved()).expect("even sides");
-    (level_0, level_1)
-}
-
-#[inline(always)]
-fn square(q: u8) -> i32 {
-    i32::from(q) * i32::from(q)
-}
-
-/// The root of a quarter of a sum of four squares, halves upwards.
-#[inline(always)]
-fn mean_root(sum: i32) -> u8 {
-    // 2^23 leaves no place for a fraction. Roots of whole quarters that are not halves are at least 4.9e-4 away from one.
-    let rounded = (sum as f32 * 0.25).sqrt() + 2e-4 + 8_388_608.0;
-    rounded.to_bits() as u8
-}
+use crate::texture::level::Level;
 
 /// A texture of the store, opened and checked.
 #[derive(Debug)]
@@ -208,11 +127,11 @@ impl TextureCache {
                 if self.has_first(texture) {
                     return Ok(Level::from_raster(image));
                 }
-                let (level_0, level_1) = first_two(image);
+                let (level_0, level_1) = Level::first_two(image);
                 self.keep_first(texture, level_1);
                 Ok(level_0)
             }
-            1 => Ok(first_two(texture.file.level_0()?).1),
+            1 => Ok(Level::first_two(texture.file.level_0()?).1),
             _ => Ok(Level::from_raster(texture.file.stored_level(level)?)),
         }
     }
@@ -256,16 +175,6 @@ impl TextureCache {
             let entry = levels.entries.remove(&name).expect("listed above");
             levels.bytes -= entry.bytes;
             self.evicted.fetch_add(1, Ordering::Relaxed);
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    #[test]
-    fn the_mean_root_is_rounded_exactly() {
-        for sum in 0..=4 * 255 * 255 {
-            assert_eq!(super::mean_root(sum), ((f64::from(sum) / 4.0).sqrt() + 0.5) as u8, "{sum}");
         }
     }
 }

@@ -6,8 +6,9 @@ use std::sync::Arc;
 
 use map3d_base::Result;
 
-use crate::texture::cache::{Level, Texture, TextureCache};
+use crate::texture::cache::{Texture, TextureCache};
 use crate::texture::file::TextureKey;
+use crate::texture::level::Level;
 
 /// Levels stay alive while they are held, also those that the cache drops meanwhile.
 #[derive(Default)]
