@@ -53,6 +53,7 @@ fn masks_hold_what_brute_force_finds() {
             let uv = [(); 3].map(|()| [(random.unit() * 3.0 - 1.0) as f32, (random.unit() * 3.0 - 1.0) as f32]);
             let mut mask = UsageMask::empty(13, 9);
             mask.add_triangle(uv, wrap);
+            assert_eq!(mask.used() as usize, used(&mask).len());
             let mut seen = std::collections::BTreeSet::new();
             for _ in 0..4000 {
                 let (mut a, mut b) = (random.unit(), random.unit());

@@ -102,14 +102,34 @@ impl UsageMask {
         let repeats = matches!(wrap, Wrap::Wrap | Wrap::Mirror);
         let period = f64::from(self.width) * if wrap == Wrap::Mirror { 2.0 } else { 1.0 };
         if repeats && right - left >= period {
-            return (0..self.width).for_each(|x| self.mark(x, y));
+            return self.mark_row(y, 0..i64::from(self.width));
         }
         let w = f64::from(self.width);
         let (left, right) = if repeats { (left, right) } else { (left.clamp(-1.0, w + 1.0), right.clamp(-1.0, w + 1.0)) };
-        for column in touched(left, right) {
-            if let Some(x) = fold(column, self.width, wrap) {
-                self.mark(x, y);
+        self.mark_columns(y, touched(left, right), wrap);
+    }
+
+    /// Marks the texels that a wrap mode puts at columns of a row, at least one of them and hardly more than a period.
+    fn mark_columns(&mut self, y: u32, columns: Range<i64>, wrap: Wrap) {
+        let w = i64::from(self.width);
+        match wrap {
+            Wrap::Clamp => self.mark_row(y, columns.start.clamp(0, w - 1)..(columns.end - 1).clamp(0, w - 1) + 1),
+            Wrap::Border | Wrap::None => self.mark_row(y, columns.start.max(0)..columns.end.min(w)),
+            Wrap::Wrap => {
+                let start = columns.start.rem_euclid(w);
+                let end = start + columns.end - columns.start;
+                self.mark_row(y, start..end.min(w));
+                self.mark_row(y, 0..(end - w).min(w));
             }
+            Wrap::Mirror => columns.filter_map(|column| fold(column, w as u32, wrap)).for_each(|x| self.mark(x, y)),
+        }
+    }
+
+    /// Marks columns of a row; none where the range is empty.
+    fn mark_row(&mut self, y: u32, columns: Range<i64>) {
+        if columns.start < columns.end {
+            let row = u64::from(y) * u64::from(self.width);
+            self.set_run(row + columns.start as u64, row + columns.end as u64);
         }
     }
 
@@ -122,9 +142,7 @@ impl UsageMask {
     }
 
     fn fill_all(&mut self) {
-        for y in 0..self.height {
-            (0..self.width).for_each(|x| self.mark(x, y));
-        }
+        self.set_run(0, u64::from(self.width) * u64::from(self.height));
     }
 
     /// Run lengths in row order as LEB128, starting with unused.
@@ -170,12 +188,13 @@ impl UsageMask {
     }
 
     fn set_run(&mut self, from: u64, end: u64) {
-        self.used += end - from;
         let mut at = from;
         while at < end {
             let n = (64 - at % 64).min(end - at);
             let ones = if n == 64 { u64::MAX } else { (1u64 << n) - 1 };
-            self.words[(at / 64) as usize] |= ones << (at % 64);
+            let word = &mut self.words[(at / 64) as usize];
+            self.used += u64::from((ones << (at % 64) & !*word).count_ones());
+            *word |= ones << (at % 64);
             at += n;
         }
     }
