@@ -34,6 +34,8 @@ export interface TileAccess {
 /** One image layer in a frame. */
 export interface Pass {
   readonly mode: Mode;
+  /** The one whose tile pixels are nearest in size to device pixels; quads are of this level or stand in for it. */
+  readonly level: number;
   readonly quads: readonly Quad[];
   readonly tiles: TileAccess;
   /** Colours by object id. */
@@ -59,11 +61,18 @@ export interface DrawerEvents {
   /** All that was drawn is gone; what the drawer had taken must be fetched anew. */
   lost(): void;
   restored(): void;
+  /** Something that was still to be made is ready: a frame is needed. */
+  changed(): void;
+  failed(error: Error): void;
 }
 
-/** What paints a frame. It never asks for frames or tiles itself. */
+/** What paints a frame. It never asks for tiles itself, and for frames only by `changed`. */
 export interface Drawer {
-  readonly name: string;
+  readonly name: "webgl" | "canvas";
+  /** What was drawn last is not all: `changed` will be called. */
+  readonly busy: boolean;
+  /** What one who debugs should know; mostly empty. */
+  readonly note: string;
   draw(frame: FrameSpec): void;
   /** The tile has left the cache. */
   release(key: string): void;

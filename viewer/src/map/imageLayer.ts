@@ -166,6 +166,7 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
     const rendering = this.#rendering as Rendering;
     return {
       mode: this.#shownMode(rendering),
+      level: plan.level,
       quads: plan.quads,
       tiles: this.#access(plan.view),
       highlight: this.#colors,

@@ -32,6 +32,7 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
   readonly #items = new Set<Attachable<map>>();
   readonly #ending = new AbortController();
   readonly #debug = new DebugTiles();
+  #gestures: Gestures | undefined;
   #layers: imageLayer[] = [];
   #light: Readonly<Light>;
   #drawn: Camera | undefined;
@@ -98,6 +99,11 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
 
   get canvas(): HTMLCanvasElement {
     return this.#viewport.canvas;
+  }
+
+  /** What draws: "webgl" or "canvas"; null when nothing can. */
+  get drawer(): "webgl" | "canvas" | null {
+    return this.#painter?.drawer.name ?? null;
   }
 
   get overlayPane(): HTMLElement {
@@ -216,7 +222,7 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
     const before = this.#drawn;
     [this.#drawn, this.#dirty] = [sight.camera, false];
     const { plans, complete } = this.#painter.paint(sight, this.#layers, this.#light, this.options.hover);
-    this.#debug.update(plans, sight.dpr);
+    this.#debug.update(plans, sight.dpr, this.#painter.drawer);
     if (before !== sight.camera) this.#moved(before, sight.camera);
     if (this.motion.moving || !this.#resting || complete) this.#loop.request();
     if (complete) this.#complete();
@@ -266,6 +272,12 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
       return new Painter(this.#viewport, this.options, {
         lost: () => this.fire("contextlost", {}),
         restored: () => this.fire("contextrestored", {}).#redraw(),
+        replaced: () => {
+          this.#steer();
+          this.fire("contextrestored", {}).#redraw();
+        },
+        changed: () => this.#redraw(),
+        failed: (error) => { this.report(error); },
       });
     } catch (reason) {
       const error = asError(reason);
@@ -284,10 +296,16 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
 
   #listen(): void {
     const { signal } = this.#ending;
-    const gestures = new Gestures(this, this.canvas);
-    signal.addEventListener("abort", () => { gestures.destroy(); });
+    this.#steer();
+    signal.addEventListener("abort", () => { this.#gestures?.destroy(); });
     listenToKeys(this, signal);
     window.addEventListener("online", () => { this.#retry(); }, { signal });
+  }
+
+  /** Listens to hands on the canvas that is there now. */
+  #steer(): void {
+    this.#gestures?.destroy();
+    this.#gestures = new Gestures(this, this.canvas);
   }
 
   #retry(): void {

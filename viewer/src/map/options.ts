@@ -29,6 +29,8 @@ export interface MapOptions {
   workers?: number;
   /** Device pixels a CSS pixel are at most this. Default 3. */
   maxPixelRatio?: number;
+  /** "webgl" needs WebGL2; "canvas" does without; "auto" takes WebGL2 where it can be had, else the canvas. Default "auto". */
+  drawer?: "auto" | "webgl" | "canvas";
   /** Keeps the picture readable between frames (screenshots, tests). Default false. */
   preserveDrawingBuffer?: boolean;
 }
@@ -43,6 +45,7 @@ export const DEFAULTS: Omit<FilledOptions, "center" | "zoom" | "direction" | "li
   concurrency: 12,
   workers: 2,
   maxPixelRatio: 3,
+  drawer: "auto",
   preserveDrawingBuffer: false,
 };
 

@@ -1,4 +1,5 @@
-import type { Drawer } from "../draw/drawer";
+import { CanvasDrawer } from "../draw/canvas/canvasDrawer";
+import type { Drawer, DrawerEvents } from "../draw/drawer";
 import { WebGLDrawer } from "../draw/webgl/webglDrawer";
 import type { Light } from "../geo/light";
 import { Cache } from "../tiles/cache";
@@ -14,7 +15,14 @@ import type { Viewport } from "./viewport";
 export interface PainterEvents {
   lost(): void;
   restored(): void;
+  /** Another canvas has taken the place of the map's; the picture comes back. */
+  replaced(): void;
+  changed(): void;
+  failed(error: Error): void;
 }
+
+/** A context that has not come back after this time is lost for good. */
+const RESTORE_MS = 5000;
 
 export interface Painted {
   readonly plans: readonly LayerPlan[];
@@ -29,18 +37,17 @@ export class Painter {
   readonly #cache: Cache<Stored>;
   readonly #queue: Queue;
   readonly #decoder: Decoder;
-  readonly #drawer: Drawer;
+  readonly #options: FilledOptions;
+  readonly #events: PainterEvents;
+  #drawer: Drawer;
+  #waiting: ReturnType<typeof setTimeout> | undefined;
 
   /** @throws DrawError when the browser cannot draw */
   constructor(viewport: Viewport, options: FilledOptions, events: PainterEvents) {
     this.#viewport = viewport;
-    this.#drawer = new WebGLDrawer(viewport.canvas, { preserve: options.preserveDrawingBuffer }, {
-      lost: () => { events.lost(); },
-      restored: () => {
-        this.#cache.prune((_, { data, empty }) => data === null && !empty);
-        events.restored();
-      },
-    });
+    this.#options = options;
+    this.#events = events;
+    this.#drawer = this.#open(options.drawer);
     this.#cache = new Cache<Stored>(options.cacheBytes, (key, { data }) => {
       if (data?.kind === "color") data.bitmap.close();
       this.#drawer.release(key);
@@ -51,7 +58,11 @@ export class Painter {
   }
 
   get busy(): boolean {
-    return this.#queue.busy;
+    return this.#queue.busy || this.#drawer.busy;
+  }
+
+  get drawer(): Pick<Drawer, "name" | "note"> {
+    return this.#drawer;
   }
 
   get cacheBytes(): number {
@@ -69,7 +80,7 @@ export class Painter {
     const { width, height } = this.#viewport.canvas;
     this.#drawer.draw({ width, height, dpr: sight.dpr, light, passes: planned.map(({ layer, plan }) => layer.pass(plan)) });
     const complete = layers.every((layer) => layer.rendering) && planned.every(({ plan }) => plan.complete);
-    return { plans: planned.map(({ plan }) => plan), complete };
+    return { plans: planned.map(({ plan }) => plan), complete: complete && !this.#drawer.busy };
   }
 
   /** Forgets the tiles of a layer that has left. */
@@ -78,9 +89,54 @@ export class Painter {
   }
 
   destroy(): void {
+    clearTimeout(this.#waiting);
     this.#queue.want([]);
     this.#cache.prune(() => true);
     this.#decoder.stop();
     this.#drawer.destroy();
+  }
+
+  /** @throws DrawError */
+  #open(kind: FilledOptions["drawer"]): Drawer {
+    const { canvas } = this.#viewport;
+    const events: DrawerEvents = {
+      lost: () => { this.#lost(); },
+      restored: () => { this.#restored(); },
+      changed: () => { this.#events.changed(); },
+      failed: (error) => { this.#events.failed(error); },
+    };
+    if (kind === "canvas") return new CanvasDrawer(canvas, events);
+    try {
+      return new WebGLDrawer(canvas, { preserve: this.#options.preserveDrawingBuffer }, events);
+    } catch (reason) {
+      if (kind === "webgl") throw reason;
+      return new CanvasDrawer(canvas, events);
+    }
+  }
+
+  #lost(): void {
+    if (this.#options.drawer === "auto") this.#waiting ??= setTimeout(() => { this.#replace(); }, RESTORE_MS);
+    this.#events.lost();
+  }
+
+  #restored(): void {
+    clearTimeout(this.#waiting);
+    this.#waiting = undefined;
+    this.#refetch();
+    this.#events.restored();
+  }
+
+  /** A canvas that had WebGL gives no 2D context: a fresh one takes its place. */
+  #replace(): void {
+    this.#drawer.destroy();
+    this.#viewport.replaceCanvas();
+    this.#drawer = this.#open("canvas");
+    this.#refetch();
+    this.#events.replaced();
+  }
+
+  /** Forgets the tiles that only the drawer had. */
+  #refetch(): void {
+    this.#cache.prune((_, { data, empty }) => data === null && !empty);
   }
 }

@@ -14,25 +14,29 @@ const PLACEMENT = ["top", "right", "bottom", "left", "z-index", "flex-grow", "fl
 /** The map's place in the page: the canvas, wrapped in a container that takes the canvas's place in the layout. */
 export class Viewport {
   readonly container: HTMLElement;
-  readonly canvas: HTMLCanvasElement;
   readonly overlayPane = element("div", "map3d-overlay");
   readonly controlPane = element("div", "map3d-controls");
   readonly #observer: ResizeObserver;
-  readonly #unwrap: () => void;
+  readonly #unwrap: (canvas: HTMLCanvasElement) => void;
+  #canvas: HTMLCanvasElement;
   #size: Size;
 
   /** @param target a canvas or another element, or its id  @throws UsageError */
   constructor(target: string | HTMLElement, resized: () => void) {
     const found = typeof target === "string" ? document.getElementById(target) : target;
     if (!found) throw new UsageError(`no element has the id "${typeof target === "string" ? target : ""}"; give the id of a <canvas> that is in the page`);
-    ({ container: this.container, canvas: this.canvas, unwrap: this.#unwrap } = found instanceof HTMLCanvasElement ? wrap(found) : fill(found));
+    ({ container: this.container, canvas: this.#canvas, unwrap: this.#unwrap } = found instanceof HTMLCanvasElement ? wrap(found) : fill(found));
     this.container.append(this.overlayPane, this.controlPane);
     this.#size = this.#measure();
     this.#observer = new ResizeObserver(() => {
       this.#size = this.#measure();
       resized();
     });
-    this.#observer.observe(this.canvas);
+    this.#observer.observe(this.#canvas);
+  }
+
+  get canvas(): HTMLCanvasElement {
+    return this.#canvas;
   }
 
   get size(): Size {
@@ -43,26 +47,36 @@ export class Viewport {
   fitCanvas(dpr: number): void {
     const { width, height } = this.#size;
     const [w, h] = [Math.max(1, Math.round(width * dpr)), Math.max(1, Math.round(height * dpr))];
-    if (this.canvas.width !== w) this.canvas.width = w;
-    if (this.canvas.height !== h) this.canvas.height = h;
+    if (this.#canvas.width !== w) this.#canvas.width = w;
+    if (this.#canvas.height !== h) this.#canvas.height = h;
+  }
+
+  /** Puts a fresh canvas, which can get any context, in the place of the one that is there. */
+  replaceCanvas(): void {
+    const fresh = this.#canvas.cloneNode(false) as HTMLCanvasElement;
+    this.#observer.unobserve(this.#canvas);
+    this.#canvas.replaceWith(fresh);
+    this.#canvas = fresh;
+    this.#observer.observe(fresh);
   }
 
   destroy(): void {
     this.#observer.disconnect();
     this.overlayPane.remove();
     this.controlPane.remove();
-    this.#unwrap();
+    this.#unwrap(this.#canvas);
   }
 
   #measure(): Size {
-    return { width: this.canvas.clientWidth, height: this.canvas.clientHeight, dpr: window.devicePixelRatio || 1 };
+    return { width: this.#canvas.clientWidth, height: this.#canvas.clientHeight, dpr: window.devicePixelRatio || 1 };
   }
 }
 
 interface Wrapped {
   container: HTMLElement;
   canvas: HTMLCanvasElement;
-  unwrap: () => void;
+  /** Undoes it for the canvas that is there now. */
+  unwrap: (canvas: HTMLCanvasElement) => void;
 }
 
 /**
@@ -83,9 +97,9 @@ function wrap(canvas: HTMLCanvasElement): Wrapped {
   for (const [side, value] of sides) placeSide(container, canvas, side, value);
   canvas.replaceWith(container);
   container.append(canvas);
-  const unwrap = (): void => {
-    canvas.style.cssText = before;
-    container.replaceWith(canvas);
+  const unwrap = (last: HTMLCanvasElement): void => {
+    last.style.cssText = before;
+    container.replaceWith(last);
   };
   return { container, canvas, unwrap };
 }
@@ -103,8 +117,8 @@ function fill(container: HTMLElement): Wrapped {
   container.classList.add("map3d");
   if (getComputedStyle(container).position === "static") container.style.position = "relative";
   container.append(canvas);
-  const unwrap = (): void => {
-    canvas.remove();
+  const unwrap = (last: HTMLCanvasElement): void => {
+    last.remove();
     container.classList.remove("map3d");
   };
   return { container, canvas, unwrap };

@@ -1,8 +1,8 @@
 import { element } from "../core/dom";
-import type { Quad } from "../draw/drawer";
+import type { Drawer, Quad } from "../draw/drawer";
 import { tileName } from "../geo/frame";
 
-/** Outlines of the painted tiles with their names; a stand-in shows the name of the tile it comes from. */
+/** Outlines of the painted tiles with their names; a stand-in shows the name of the tile it comes from. In a corner, what draws. */
 export class DebugTiles {
   readonly pane = element("div", "map3d-debug", { "aria-hidden": "true" });
   #on = false;
@@ -17,8 +17,10 @@ export class DebugTiles {
     if (!on) this.pane.replaceChildren();
   }
 
-  update(plans: readonly { readonly quads: readonly Quad[] }[], dpr: number): void {
-    if (this.#on) this.pane.replaceChildren(...plans.flatMap(({ quads }) => quads.map((quad) => outline(quad, dpr))));
+  update(plans: readonly { readonly quads: readonly Quad[] }[], dpr: number, { name, note }: Pick<Drawer, "name" | "note">): void {
+    if (!this.#on) return;
+    const boxes = plans.flatMap(({ quads }) => quads.map((quad) => outline(quad, dpr)));
+    this.pane.replaceChildren(...boxes, element("p", "", {}, note ? `${name}: ${note}` : name));
   }
 }
 

@@ -1,4 +1,4 @@
-import type { Browser, Page } from "playwright-core";
+import type { Browser, BrowserContextOptions, Page } from "playwright-core";
 import type { TestServer } from "../fixture/server";
 import { openPage } from "./browser";
 import { BARE, type Global } from "./page";
@@ -9,8 +9,8 @@ export function addBarePage(server: TestServer): void {
 }
 
 /** A page with a map of a rendering that has drawn its first complete view and rests. */
-export async function start(browser: Browser, bases: string | string[], options: object = {}, layer: object = {}): Promise<{ page: Page; problems: string[] }> {
-  const opened = await openPage(browser);
+export async function start(browser: Browser, bases: string | string[], options: object = {}, layer: object = {}, context: BrowserContextOptions = {}): Promise<{ page: Page; problems: string[] }> {
+  const opened = await openPage(browser, context);
   const first = typeof bases === "string" ? bases : (bases[0] ?? "");
   await opened.page.goto(`${new URL(first).origin}/bare`);
   await opened.page.evaluate(([urls, mapOptions, layerOptions]) => new Promise<void>((done) => {
@@ -44,6 +44,20 @@ export async function pixels(page: Page): Promise<Buffer> {
     gl.readPixels(0, 0, canvas.width, height, gl.RGBA, gl.UNSIGNED_BYTE, data);
     let out = "";
     for (let j = height - 1; j >= 0; j--) for (let i = 0; i < row; i += 400) out += String.fromCharCode(...data.subarray(row * j + i, row * j + Math.min(i + 400, row)));
+    return btoa(out);
+  });
+  return Buffer.from(text, "base64");
+}
+
+/** The picture as RGBA bytes with straight alpha, from the top, whatever draws it. */
+export async function picture(page: Page): Promise<Buffer> {
+  const text = await page.evaluate(() => {
+    const { canvas } = (globalThis as Global).map;
+    const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d") as OffscreenCanvasRenderingContext2D;
+    copy.drawImage(canvas, 0, 0);
+    const { data } = copy.getImageData(0, 0, canvas.width, canvas.height);
+    let out = "";
+    for (let k = 0; k < data.length; k += 8192) out += String.fromCharCode(...data.subarray(k, k + 8192));
     return btoa(out);
   });
   return Buffer.from(text, "base64");

@@ -15,7 +15,9 @@ export interface WebGLOptions {
 
 /** Draws with WebGL2: one quad a tile, light and highlights in the shader. */
 export class WebGLDrawer implements Drawer {
-  readonly name = "webgl2";
+  readonly name = "webgl";
+  readonly busy = false;
+  readonly note = "";
   readonly #gl: WebGL2RenderingContext;
   readonly #canvas: HTMLCanvasElement;
   readonly #listeners = new AbortController();

@@ -1,0 +1,168 @@
+import { DrawError } from "../../core/errors";
+import type { Tile } from "../../geo/frame";
+import type { LayerKind } from "../../geo/manifest";
+import { standsFor } from "../../tiles/cover";
+import { neededKinds, type Drawer, type DrawerEvents, type FrameSpec, type Pass, type Quad } from "../drawer";
+import { kindsBeside, kindsOf, lookOf, type Look } from "./look";
+import { Pictures, type Picture, type Wish } from "./pictures";
+import type { Order } from "./shade.worker";
+import { areaOf, gridOf, Sheet, type Grid, type Piece } from "./sheet";
+
+/** A tile that is to be seen. */
+interface Wanted {
+  readonly from: Tile;
+  readonly look: Look;
+  readonly layers: Order["layers"];
+  /** From the middle of the screen, device pixels. */
+  readonly far: number;
+}
+
+/** Draws on a 2D canvas. A worker makes the tiles' pictures; what is not made yet is stood in for by what is. */
+export class CanvasDrawer implements Drawer {
+  readonly name = "canvas";
+  readonly #context: CanvasRenderingContext2D;
+  readonly #pictures: Pictures;
+  readonly #sheet = new Sheet();
+  readonly #listeners = new AbortController();
+  /** Data that the worker has, and the picture it is for. */
+  readonly #given = new Map<string, Picture>();
+  readonly #highlights = new Map<ReadonlyMap<number, unknown>, string>();
+  #tilePx = 0;
+  #names = 0;
+
+  /** @throws DrawError when the canvas has another context already, or the browser no 2D canvas */
+  constructor(canvas: HTMLCanvasElement, events: DrawerEvents) {
+    const context = canvas.getContext("2d");
+    if (!context) throw new DrawError("this browser offers neither WebGL2 nor a 2D canvas, of which the map needs one to draw; update it");
+    this.#context = context;
+    this.#pictures = new Pictures({ made: () => { events.changed(); }, failed: (error) => { events.failed(error); } });
+    canvas.addEventListener("contextrestored", () => { events.changed(); }, { signal: this.#listeners.signal });
+  }
+
+  get busy(): boolean {
+    return this.#pictures.busy;
+  }
+
+  get note(): string {
+    return this.#pictures.composed ? "light by compositing: this browser changes pixels that are read" : "";
+  }
+
+  draw(frame: FrameSpec): void {
+    this.#context.clearRect(0, 0, frame.width, frame.height);
+    const wishes = frame.passes.flatMap((pass) => this.#drawPass(frame, pass));
+    this.#pictures.want(wishes.filter(({ urgency }) => urgency.length > 0));
+    this.#dropHighlights(frame.passes);
+    if (this.busy) return;
+    const [seen, looks] = [new Set(wishes.map(({ picture }) => picture)), new Set(wishes.map(({ look }) => look))];
+    this.#pictures.prune((picture) => !seen.has(picture) && !looks.has(picture.look));
+  }
+
+  release(key: string): void {
+    const picture = this.#given.get(key);
+    if (!picture) return;
+    this.#given.delete(key);
+    this.#pictures.drop(key);
+    picture.parts.delete(key);
+    if (picture.parts.size === 0) this.#pictures.forget(picture.name);
+  }
+
+  destroy(): void {
+    this.#listeners.abort();
+    this.#pictures.stop();
+    this.#sheet.empty();
+    this.#given.clear();
+  }
+
+  /** Paints what is there. @returns a wish for each tile; one without urgency is fulfilled */
+  #drawPass(frame: FrameSpec, pass: Pass): Wish[] {
+    const highlight = pass.highlight.size > 0 ? this.#nameOf(pass) : null;
+    const wanted = new Map<string, Wanted>();
+    for (const { from, rect, scale } of pass.quads) {
+      const name = nameIn(pass, from);
+      const far = Math.hypot((rect[0] + rect[2] - frame.width) / 2, (rect[1] + rect[3] - frame.height) / 2);
+      const known = wanted.get(name);
+      const look = known?.look ?? lookOf(frame, pass, scale, highlight);
+      const layers = known?.layers ?? this.#give(pass, look, from);
+      if (layers) wanted.set(name, { from, look, layers, far: Math.min(far, known?.far ?? far) });
+    }
+    this.#paint(pass, wanted);
+    return [...wanted].map(([name, tile]) => this.#wish(pass, this.#pictures.of(name), tile));
+  }
+
+  /** Gives the worker a tile's data. @returns its names; null when there is nothing to show */
+  #give(pass: Pass, look: Look, tile: Tile): Order["layers"] | null {
+    const picture = this.#pictures.of(nameIn(pass, tile));
+    const layers: Partial<Record<LayerKind, string>> = {};
+    for (const kind of kindsOf(look)) {
+      const key = pass.tiles.key(kind, tile);
+      const data = this.#given.has(key) ? null : pass.tiles.data(kind, tile);
+      if (data) {
+        this.#tilePx = data.width;
+        this.#pictures.put(key, data, data.kind === "color" ? [data.bitmap] : data.kind === "normal" ? [data.values.buffer] : []);
+        this.#given.set(key, picture);
+        picture.parts.add(key);
+        pass.tiles.taken(kind, tile);
+      }
+      if (this.#given.has(key)) layers[kind] = key;
+    }
+    return neededKinds(look.mode, look.masked).every((kind) => layers[kind] !== undefined) ? layers : null;
+  }
+
+  #paint(pass: Pass, wanted: ReadonlyMap<string, Wanted>): void {
+    const grid = gridOf(pass, this.#tilePx);
+    if (!grid || this.#tilePx === 0) return;
+    const pieces = pass.quads.filter(({ from }) => wanted.has(nameIn(pass, from))).flatMap((quad) => this.#piecesFor(pass, grid, quad));
+    if (pieces.length > 0) this.#sheet.show(this.#context, grid, pieces, pass.mode === "lit" || pass.mode === "color", pass.opacity);
+  }
+
+  /** What stands for a quad: the picture of its tile, or of tiles below or above it that have one. */
+  #piecesFor(pass: Pass, grid: Grid, { from, rect }: Quad): Piece[] {
+    const area = areaOf(grid, rect);
+    const shown = (tile: Tile): ImageBitmap | undefined => this.#pictures.get(nameIn(pass, tile))?.bitmap;
+    const own = shown(from);
+    if (own) return [{ area, from, bitmap: own }];
+    const stands = standsFor(area, (tile) => shown(tile) !== undefined, () => true, area.z > grid.level ? 0 : 2);
+    return stands.map((stand) => ({ ...stand, bitmap: shown(stand.from) as ImageBitmap }));
+  }
+
+  #wish({ tiles }: Pass, picture: Picture, { from, look, layers, far }: Wanted): Wish {
+    const shown = look.highlight !== null && layers.id === undefined ? { ...look, highlight: null } : look;
+    const beside: Partial<Record<LayerKind, string[]>> = {};
+    let edges = 0;
+    for (const kind of kindsBeside(shown)) {
+      const keys = BESIDE.map(([dx, dy]) => tiles.key(kind, { z: from.z, x: from.x + dx, y: from.y + dy }));
+      keys.forEach((key, k) => (edges |= this.#given.has(key) ? 1 << (k + (kind === "id" ? 4 : 0)) : 0));
+      beside[kind] = keys;
+    }
+    const text = JSON.stringify(shown);
+    return { picture, look: text, edges, order: { look: shown, layers, beside }, urgency: urgencyOf(picture, text, edges, far) };
+  }
+
+  #nameOf({ highlight }: Pass): string {
+    const known = this.#highlights.get(highlight);
+    if (known !== undefined) return known;
+    const name = `highlight ${String(this.#names++)}`;
+    this.#pictures.put(name, highlight);
+    this.#highlights.set(highlight, name);
+    return name;
+  }
+
+  #dropHighlights(passes: readonly Pass[]): void {
+    for (const [highlight, name] of this.#highlights) {
+      if (passes.some((pass) => pass.highlight === highlight)) continue;
+      this.#pictures.drop(name);
+      this.#highlights.delete(highlight);
+    }
+  }
+}
+
+const BESIDE = [[-1, 0], [1, 0], [0, -1], [0, 1]] as const;
+
+/** Name of a tile's picture, whatever it shows. */
+const nameIn = ({ tiles, mode }: Pass, tile: Tile): string => tiles.key("color", tile) || tiles.key(mode === "lit" ? "color" : mode, tile);
+
+/** First what has no picture, then what looks otherwise (the longest first), then edges; from the middle of the screen. */
+function urgencyOf(picture: Picture, look: string, edges: number, far: number): number[] {
+  if (picture.look !== look) return picture.bitmap ? [1, picture.ticket, far] : [0, 0, far];
+  return (edges & ~picture.edges) === 0 ? [] : [2, 0, far];
+}

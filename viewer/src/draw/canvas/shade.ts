@@ -1,0 +1,155 @@
+import type { Rgb } from "../drawer";
+import type { Look } from "./look";
+import { lightOn } from "./lightOn";
+
+/** A tile's layers; pixels row by row from the top. */
+export interface Layers {
+  readonly width: number;
+  readonly height: number;
+  /** RGBA, straight alpha. */
+  readonly color?: Uint8ClampedArray | undefined;
+  readonly normal?: Uint8Array | undefined;
+  readonly id?: Uint32Array | undefined;
+  readonly depth?: Uint32Array | undefined;
+}
+
+/** Of the tiles to the left, to the right, above and below, as far as they are here. */
+export type Beside<T> = readonly (T | undefined)[];
+
+export interface Around {
+  readonly normal: Beside<Uint8Array>;
+  readonly id: Beside<Uint32Array>;
+}
+
+type Bytes = Uint8ClampedArray<ArrayBuffer>;
+
+/** RGBA with straight alpha: what the fragment shader of the WebGL drawer makes at the middle of each tile pixel. */
+export function shade(look: Look, layers: Layers, around: Around, colors: ReadonlyMap<number, Rgb> | undefined): Bytes {
+  const out: Bytes = new Uint8ClampedArray(layers.width * layers.height * 4);
+  if (look.mode === "normal") showNormals(out, layers);
+  else if (look.mode === "id") showIds(out, layers);
+  else if (look.mode === "depth") showDepths(out, layers, look.depthRange ?? [0, 1]);
+  else showColors(out, look, layers, around);
+  if (colors && layers.id) highlight(out, look, layers, around, colors);
+  return out;
+}
+
+/** Linear light of an sRGB byte, 0..65535. */
+const LINEAR = Float32Array.from({ length: 256 }, (_, byte) => 65535 * linear(byte / 255));
+/** sRGB byte of linear light, 0..65535. */
+const BYTE = Uint8ClampedArray.from({ length: 65536 }, (_, light) => 255 * srgb(light / 65535));
+
+function linear(c: number): number {
+  return c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4;
+}
+
+function srgb(c: number): number {
+  return c <= 0.0031308 ? c * 12.92 : 1.055 * c ** (1 / 2.4) - 0.055;
+}
+
+function showColors(out: Bytes, look: Look, layers: Layers, around: Around): void {
+  const { color = out, id } = layers;
+  out.set(color);
+  for (let at = 0; look.masked && id && at < id.length; at++) out[4 * at + 3] = id[at] === 0 ? 0 : 255;
+  if (!look.light || !layers.normal) return;
+  const light = lightOn(look.light, layers.width, layers.height, layers.normal, around.normal);
+  for (let at = 0, k = 0; at < light.length; at++, k += 4) {
+    const strength = light[at] as number;
+    for (let channel = k; channel < k + 3; channel++) {
+      out[channel] = BYTE[Math.min((LINEAR[out[channel] as number] as number) * strength + 0.5, 65535) | 0] as number;
+    }
+  }
+}
+
+function showNormals(out: Bytes, { normal }: Layers): void {
+  for (let k = 0, from = 0; normal && k < out.length; k += 4, from += 3) {
+    const [r, g, b] = [normal[from] as number, normal[from + 1] as number, normal[from + 2] as number];
+    out[k] = r;
+    out[k + 1] = g;
+    out[k + 2] = b;
+    out[k + 3] = (r | g | b) === 0 ? 0 : 255;
+  }
+}
+
+function showIds(out: Bytes, { id }: Layers): void {
+  const words = new Uint32Array(out.buffer);
+  let [last, word] = [0, 0];
+  for (let at = 0; id && at < words.length; at++) {
+    const own = id[at] as number;
+    if (own !== last) [last, word] = [own, own === 0 ? 0 : packed(colorOfId(own))];
+    words[at] = word;
+  }
+}
+
+/** Pale, and the same for an id everywhere. */
+export function colorOfId(id: number): Rgb {
+  const h = Math.imul(id, 0x9e3779b9) >>> 0;
+  const grey = 0.5 + (0.4 * ((h >>> 12) & 1023)) / 1023;
+  const hue = (shift: number): number => 0.5 + 0.5 * Math.cos(6.2831853 * ((h >>> 22) / 1024 + shift));
+  return [grey + (hue(0) - grey) * 0.34, grey + (hue(0.33) - grey) * 0.34, grey + (hue(0.67) - grey) * 0.34];
+}
+
+const NEAR: Rgb = [0.99, 0.91, 0.7];
+const MIDDLE: Rgb = [0.36, 0.62, 0.62];
+const FAR: Rgb = [0.16, 0.18, 0.36];
+
+function showDepths(out: Bytes, { depth }: Layers, [first, last]: readonly [number, number]): void {
+  for (let at = 0, k = 0; depth && at < depth.length; at++, k += 4) {
+    const d = depth[at] as number;
+    if (d === 0xffffffff) continue;
+    const t = 2 * Math.min(Math.max((d - first) / (last - first), 0), 1);
+    const [from, to, part] = t < 1 ? [NEAR, MIDDLE, t] : [MIDDLE, FAR, t - 1];
+    for (const channel of [0, 1, 2] as const) out[k + channel] = 255 * (from[channel] + (to[channel] - from[channel]) * part);
+    out[k + 3] = 255;
+  }
+}
+
+function highlight(out: Bytes, look: Look, layers: Layers, around: Around, colors: ReadonlyMap<number, Rgb>): void {
+  eachHighlighted(look, layers, around, colors, (at, tint, rim) => {
+    const k = 4 * at;
+    const [r, g, b] = out[k + 3] === 0 ? [0, 0, 0] : [out[k] as number, out[k + 1] as number, out[k + 2] as number];
+    const grey = (0.2126 * r + 0.7152 * g + 0.0722 * b) / 255;
+    const body = (own: number, part: number): number => own * 0.28 + 255 * part * (0.5 + 0.65 * grey) * 0.72;
+    out[k] = rim ? 255 * tint[0] : body(r, tint[0]);
+    out[k + 1] = rim ? 255 * tint[1] : body(g, tint[1]);
+    out[k + 2] = rim ? 255 * tint[2] : body(b, tint[2]);
+    if (rim) out[k + 3] = Math.max(out[k + 3] as number, 0.9 * 255);
+  });
+}
+
+/** Pixels of objects that have a colour: where, which, and whether another object is near. */
+export function eachHighlighted(look: Look, layers: Layers, around: Around, colors: ReadonlyMap<number, Rgb>, act: (at: number, tint: Rgb, rim: boolean) => void): void {
+  const { width, height, id } = layers;
+  if (!id) return;
+  const idAt = idsAround(width, height, id, around.id);
+  const [more, less] = look.rim;
+  let last = 0;
+  let tint: Rgb | undefined;
+  for (let y = 0, at = 0; y < height; y++) {
+    for (let x = 0; x < width; x++, at++) {
+      const own = id[at] as number;
+      if (own === 0) continue;
+      if (own !== last) [last, tint] = [own, colors.get(own)];
+      if (tint) act(at, tint, idAt(x + more, y) !== own || idAt(x + less, y) !== own || idAt(x, y + more) !== own || idAt(x, y + less) !== own);
+    }
+  }
+}
+
+/** Pixels of the tiles beside it that are looked at; the WebGL drawer's gutter. */
+const REACH = 2;
+
+/** The id at a pixel of the tile or, beyond one edge of it, of the tile there; without that, of the tile's edge. */
+function idsAround(width: number, height: number, id: Uint32Array, [left, right, above, below]: Beside<Uint32Array>): (x: number, y: number) => number {
+  return (x, y) => {
+    if (x < 0) return left ? (left[y * width + width + Math.max(x, -REACH)] as number) : (id[y * width] as number);
+    if (x >= width) return right ? (right[y * width + Math.min(x - width, REACH - 1)] as number) : (id[y * width + width - 1] as number);
+    if (y < 0) return above ? (above[(height + Math.max(y, -REACH)) * width + x] as number) : (id[x] as number);
+    if (y >= height) return below ? (below[Math.min(y - height, REACH - 1) * width + x] as number) : (id[(height - 1) * width + x] as number);
+    return id[y * width + x] as number;
+  };
+}
+
+/** Little-endian RGBA, opaque. */
+export function packed([r, g, b]: Rgb): number {
+  return (Math.round(255 * r) | (Math.round(255 * g) << 8) | (Math.round(255 * b) << 16) | (255 << 24)) >>> 0;
+}

@@ -1,0 +1,112 @@
+import type { LayerKind } from "../../geo/manifest";
+import type { TileData } from "../../tiles/tileData";
+import type { Rgb } from "../drawer";
+import type { Look } from "./look";
+import { shade, type Around, type Layers } from "./shade";
+import { composed } from "./unread";
+
+/** What the worker keeps under a name: a tile's layer, or colours of highlighted ids. */
+export type Kept = TileData | ReadonlyMap<number, Rgb>;
+
+/** A picture that is asked for; layers are named. */
+export interface Order {
+  readonly ticket: number;
+  readonly look: Look;
+  readonly layers: Partial<Record<LayerKind, string>>;
+  /** To the left, to the right, above, below. */
+  readonly beside: Partial<Record<LayerKind, readonly string[]>>;
+}
+
+export type Task = { readonly put: string; readonly value: Kept } | { readonly drop: string } | Order;
+
+export type Reply =
+  /** Once: can pixels of pictures be read as they are? */
+  | { readonly exact: boolean }
+  | { readonly ticket: number; readonly picture: ImageBitmap }
+  | { readonly ticket: number; readonly error: string };
+
+const scope = self as unknown as { onmessage: (event: MessageEvent<Task>) => void; postMessage: (reply: Reply, transfer?: Transferable[]) => void };
+
+const kept = new Map<string, Kept>();
+/** Pixels of the colour tiles, once they have been read. */
+const read = new Map<string, Uint8ClampedArray>();
+
+const reader = new OffscreenCanvas(64, 64).getContext("2d", { willReadFrequently: true }) as OffscreenCanvasRenderingContext2D;
+const exact = readsExactly();
+scope.postMessage({ exact });
+
+scope.onmessage = ({ data: task }) => {
+  if ("put" in task) kept.set(task.put, task.value);
+  else if ("drop" in task) drop(task.drop);
+  else void fill(task);
+};
+
+/** Some browsers answer with other pixels than were drawn, so that users cannot be told apart. */
+function readsExactly(): boolean {
+  const known = new ImageData(64, 64);
+  for (let k = 0; k < known.data.length; k++) known.data[k] = k % 4 === 3 ? 255 : Math.imul(k, 0x9e3779b9) >>> 24;
+  reader.putImageData(known, 0, 0);
+  return reader.getImageData(0, 0, 64, 64).data.every((byte, k) => byte === known.data[k]);
+}
+
+function drop(name: string): void {
+  const value = kept.get(name);
+  if (value && "bitmap" in value) value.bitmap.close();
+  kept.delete(name);
+  read.delete(name);
+}
+
+async function fill({ ticket, look, layers, beside }: Order): Promise<void> {
+  try {
+    const picture = await paint(look, layers, beside);
+    scope.postMessage({ ticket, picture }, [picture]);
+  } catch (reason) {
+    scope.postMessage({ ticket, error: String(reason) });
+  }
+}
+
+async function paint(look: Look, names: Order["layers"], beside: Order["beside"]): Promise<ImageBitmap> {
+  const color = tile(names.color);
+  const data = [color, tile(names.normal), tile(names.id), tile(names.depth)].filter((value) => value !== undefined);
+  const { width, height } = data[0] ?? { width: 0, height: 0 };
+  const bitmap = color?.kind === "color" ? color.bitmap : undefined;
+  const layers: Layers = {
+    width,
+    height,
+    color: exact && bitmap && names.color !== undefined ? pixelsOf(names.color, bitmap) : undefined,
+    normal: bytes(names.normal),
+    id: words(names.id),
+    depth: words(names.depth),
+  };
+  const around: Around = { normal: (beside.normal ?? []).map(bytes), id: (beside.id ?? []).map(words) };
+  const colors = look.highlight === null ? undefined : (kept.get(look.highlight) as ReadonlyMap<number, Rgb> | undefined);
+  if (bitmap && !exact && (look.mode === "lit" || look.mode === "color")) return composed(look, bitmap, layers, around, colors);
+  return createImageBitmap(new ImageData(shade(look, layers, around, colors), width, height));
+}
+
+function tile(name: string | undefined): TileData | undefined {
+  const value = name === undefined ? undefined : kept.get(name);
+  return value && "kind" in value ? value : undefined;
+}
+
+function bytes(name: string | undefined): Uint8Array | undefined {
+  const data = tile(name);
+  return data?.kind === "normal" ? data.values : undefined;
+}
+
+function words(name: string | undefined): Uint32Array | undefined {
+  const data = tile(name);
+  return data?.kind === "id" || data?.kind === "depth" ? data.values : undefined;
+}
+
+function pixelsOf(name: string, bitmap: ImageBitmap): Uint8ClampedArray {
+  const known = read.get(name);
+  if (known) return known;
+  const { width, height } = bitmap;
+  Object.assign(reader.canvas, { width, height });
+  reader.drawImage(bitmap, 0, 0);
+  const { data } = reader.getImageData(0, 0, width, height);
+  bitmap.close();
+  read.set(name, data);
+  return data;
+}

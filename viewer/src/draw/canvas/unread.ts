@@ -1,0 +1,84 @@
+import type { Rgb } from "../drawer";
+import type { Look } from "./look";
+import { lightOn } from "./lightOn";
+import { eachHighlighted, packed, type Around, type Layers } from "./shade";
+
+/**
+ * A colour tile's picture made by compositing alone, for browsers that do not let pixels be read exactly. Light
+ * multiplies sRGB values by its 2.2nd root, which stays within a few bytes of linear light.
+ */
+export function composed(look: Look, bitmap: ImageBitmap, layers: Layers, around: Around, colors: ReadonlyMap<number, Rgb> | undefined): ImageBitmap {
+  const { width, height } = layers;
+  const context = canvasOf(width, height);
+  context.drawImage(bitmap, 0, 0);
+  if (look.light && layers.normal) shine(context, lightOn(look.light, width, height, layers.normal, around.normal));
+  context.globalCompositeOperation = "destination-in";
+  context.drawImage(look.masked && layers.id ? imageOf(width, height, (at) => (layers.id?.[at] ? 0xff000000 : 0)) : bitmap, 0, 0);
+  if (colors) tint(context, look, layers, around, colors);
+  return context.canvas.transferToImageBitmap();
+}
+
+function canvasOf(width: number, height: number): OffscreenCanvasRenderingContext2D {
+  return new OffscreenCanvas(width, height).getContext("2d") as OffscreenCanvasRenderingContext2D;
+}
+
+/** @param word little-endian RGBA of a pixel */
+function imageOf(width: number, height: number, word: (at: number) => number): OffscreenCanvas {
+  const words = Uint32Array.from({ length: width * height }, (_, at) => word(at));
+  const context = canvasOf(width, height);
+  context.putImageData(new ImageData(new Uint8ClampedArray(words.buffer), width, height), 0, 0);
+  return context.canvas;
+}
+
+/** Light up to 1 multiplies; what is above 1 divides by its inverse, which "color-dodge" does. Alpha is spoilt. */
+function shine(context: OffscreenCanvasRenderingContext2D, light: Float32Array): void {
+  const { width, height } = context.canvas;
+  const grey = (byte: number): number => 0xff000000 + 0x010101 * Math.round(255 * byte);
+  const roots = light.map((strength) => strength ** (1 / 2.2));
+  // Drawn upon themselves, pixels in part covered become opaque and keep their colour, as blending wants it.
+  context.globalCompositeOperation = "source-over";
+  for (let k = 0; k < 8; k++) context.drawImage(context.canvas, 0, 0);
+  context.globalCompositeOperation = "multiply";
+  context.drawImage(imageOf(width, height, (at) => grey(Math.min(roots[at] ?? 1, 1))), 0, 0);
+  if (!roots.some((root) => root > 1)) return;
+  context.globalCompositeOperation = "color-dodge";
+  context.drawImage(imageOf(width, height, (at) => grey(Math.max(1 - 1 / (roots[at] ?? 1), 0))), 0, 0);
+}
+
+/** tint × (½ + 0.65 grey) over 28 % of the colour; the rim on top, opaque. */
+function tint(context: OffscreenCanvasRenderingContext2D, look: Look, layers: Layers, around: Around, colors: ReadonlyMap<number, Rgb>): void {
+  const { width, height } = layers;
+  const [bodies, rims] = [new Uint32Array(width * height), new Uint32Array(width * height)];
+  eachHighlighted(look, layers, around, colors, (at, color, rim) => {
+    (rim ? rims : bodies)[at] = packed(color);
+  });
+  const tints = imageOf(width, height, (at) => bodies[at] ?? 0);
+  const shadows = greyOf(context.canvas);
+  shadows.globalCompositeOperation = "multiply";
+  shadows.drawImage(tints, 0, 0);
+  const body = canvasOf(width, height);
+  body.globalCompositeOperation = "lighter";
+  layOver(body, shadows.canvas, 0.65);
+  layOver(body, tints, 0.5);
+  body.globalCompositeOperation = "destination-in";
+  layOver(body, tints, 1);
+  context.globalCompositeOperation = "source-atop";
+  layOver(context, body.canvas, 0.72);
+  context.globalCompositeOperation = "source-over";
+  layOver(context, imageOf(width, height, (at) => rims[at] ?? 0), 1);
+}
+
+function greyOf(canvas: OffscreenCanvas): OffscreenCanvasRenderingContext2D {
+  const context = canvasOf(canvas.width, canvas.height);
+  context.drawImage(canvas, 0, 0);
+  context.globalCompositeOperation = "saturation";
+  context.fillStyle = "#808080";
+  context.fillRect(0, 0, canvas.width, canvas.height);
+  return context;
+}
+
+function layOver(context: OffscreenCanvasRenderingContext2D, image: OffscreenCanvas, alpha: number): void {
+  context.globalAlpha = alpha;
+  context.drawImage(image, 0, 0);
+  context.globalAlpha = 1;
+}
