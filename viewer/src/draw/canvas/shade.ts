@@ -55,10 +55,15 @@ function showColors(out: Bytes, look: Look, layers: Layers, around: Around): voi
   const light = lightOn(look.light, layers.width, layers.height, layers.normal, around.normal);
   for (let at = 0, k = 0; at < light.length; at++, k += 4) {
     const strength = light[at] as number;
-    for (let channel = k; channel < k + 3; channel++) {
-      out[channel] = BYTE[Math.min((LINEAR[out[channel] as number] as number) * strength + 0.5, 65535) | 0] as number;
-    }
+    out[k] = litByte(out[k] as number, strength);
+    out[k + 1] = litByte(out[k + 1] as number, strength);
+    out[k + 2] = litByte(out[k + 2] as number, strength);
   }
+}
+
+function litByte(byte: number, strength: number): number {
+  const light = (LINEAR[byte] as number) * strength + 0.5;
+  return BYTE[light < 65535 ? light | 0 : 65535] as number;
 }
 
 function showNormals(out: Bytes, { normal }: Layers): void {
@@ -98,8 +103,11 @@ function showDepths(out: Bytes, { depth }: Layers, [first, last]: readonly [numb
     const d = depth[at] as number;
     if (d === 0xffffffff) continue;
     const t = 2 * Math.min(Math.max((d - first) / (last - first), 0), 1);
-    const [from, to, part] = t < 1 ? [NEAR, MIDDLE, t] : [MIDDLE, FAR, t - 1];
-    for (const channel of [0, 1, 2] as const) out[k + channel] = 255 * (from[channel] + (to[channel] - from[channel]) * part);
+    const [from, to] = t < 1 ? [NEAR, MIDDLE] : [MIDDLE, FAR];
+    const part = t < 1 ? t : t - 1;
+    out[k] = 255 * (from[0] + (to[0] - from[0]) * part);
+    out[k + 1] = 255 * (from[1] + (to[1] - from[1]) * part);
+    out[k + 2] = 255 * (from[2] + (to[2] - from[2]) * part);
     out[k + 3] = 255;
   }
 }

@@ -1,0 +1,317 @@
+import { afterAll, beforeAll, describe, expect, test } from "vitest";
+import type { Browser, Page } from "playwright-core";
+import { encodePng } from "../fixture/encodePng";
+import { renderRamp, renderTown, type Fixture } from "../fixture/rendering";
+import { ORIGIN } from "../fixture/town";
+import { TestServer } from "../fixture/server";
+import { openBrowser, openPage, OUT } from "./browser";
+import type { Global } from "./page";
+import { addBarePage, picture, settled, start } from "./start";
+
+let browser: Browser;
+let host: string;
+const server = new TestServer();
+const town = renderTown();
+const VIEWPORT = { width: 500, height: 400 };
+
+beforeAll(async () => {
+  server.renderings.set("town", town);
+  server.renderings.set("ramp", renderRamp());
+  server.renderings.set("opaque", opaque(town));
+  server.renderings.set("broken", broken(town));
+  addBarePage(server);
+  host = await server.listen();
+  browser = await openBrowser();
+});
+
+afterAll(async () => {
+  await browser.close();
+  await server.close();
+});
+
+/** The town with colour that has no alpha, as jpeg has it. */
+function opaque({ json, files, raw }: Fixture): Fixture {
+  const layers = json.layers.map((layer) => (layer.kind === "color" ? { ...layer, format: "jpeg" } : layer));
+  const filled = [...raw].filter(([path]) => path.includes("/color/")).map(([path, bytes]) => [path, encodePng(128, 128, 4, bytes.map((value, at) => (at % 4 === 3 ? 255 : value)))] as const);
+  return { json: { ...json, layers }, files: new Map([...files, ...filled]), raw };
+}
+
+/** The town without some tiles: level 2 cannot be read, nor the left half of level 3. */
+function broken({ json, files, raw }: Fixture): Fixture {
+  const bad = [...files.keys()].filter((path) => /\/(2\/\d+\/\d+|3\/[0-3]\/\d+)$/.test(path));
+  return { json, files: new Map([...files, ...bad.map((path) => [path, new Uint8Array([0])] as const)]), raw };
+}
+
+interface Difference {
+  /** Of premultiplied bytes. */
+  readonly most: number;
+  /** Share of bytes that differ by more than 2. */
+  readonly off: number;
+}
+
+function differenceOf(a: Buffer, b: Buffer): Difference {
+  expect(a.length).toBe(b.length);
+  let [most, off] = [0, 0];
+  for (let k = 0; k < a.length; k++) {
+    const byte = (from: Buffer): number => (k % 4 === 3 ? (from[k] ?? 0) : ((from[k] ?? 0) * (from[k | 3] ?? 0)) / 255);
+    const apart = Math.abs(byte(a) - byte(b));
+    most = Math.max(most, apart);
+    if (apart > 2) off++;
+  }
+  return { most, off: off / a.length };
+}
+
+/** The same scene in both drawers. */
+async function both(name: string, options: object = {}, layer: object = {}, deviceScaleFactor = 1): Promise<{ pages: Page[]; close: () => Promise<void> }> {
+  const pages: Page[] = [];
+  for (const drawer of ["webgl", "canvas"]) {
+    const { page, problems } = await start(browser, `${host}/tiles/${name}`, { zoom: 3, drawer, ...options }, layer, { deviceScaleFactor, viewport: VIEWPORT });
+    expect(problems).toEqual([]);
+    expect(await page.evaluate(() => (globalThis as Global).map.drawer)).toBe(drawer);
+    pages.push(page);
+  }
+  return { pages, close: async () => { for (const page of pages) await page.context().close(); } };
+}
+
+/** Does something on both pages and compares what they show then. */
+async function compared<A>(pages: readonly Page[], act: (argument: A) => unknown, argument: A): Promise<Difference> {
+  const shots: Buffer[] = [];
+  for (const page of pages) {
+    await settled(page, act, argument);
+    shots.push(await picture(page));
+  }
+  return differenceOf(shots[0] as Buffer, shots[1] as Buffer);
+}
+
+const setMode = (mode: string): unknown => (globalThis as Global).layer.setMode(mode as "lit");
+const setZoom = (zoom: number): unknown => (globalThis as Global).map.setZoom(zoom);
+const MODES = ["color", "normal", "id", "depth", "lit"];
+const CHOSEN = [17, 1025, 3_900_000_007];
+
+describe("where a tile pixel is a device pixel, both drawers differ by no more than rounding", () => {
+  test.each([1, 2])("in every mode, with and without highlights, at pixel ratio %i", async (dpr) => {
+    const { pages, close } = await both("town", { zoom: dpr === 1 ? 3 : 2 }, {}, dpr);
+    for (const mode of MODES) expect((await compared(pages, setMode, mode)).most, mode).toBeLessThanOrEqual(1.01);
+    await settledAll(pages, () => (globalThis as Global).layer.highlight([17, 1025], { color: "#1389a0" }).highlight(3_900_000_007));
+    for (const mode of MODES) expect((await compared(pages, setMode, mode)).most, `${mode} with highlights`).toBeLessThanOrEqual(1.01);
+    await pages[1]?.screenshot({ path: `${OUT}/canvas-highlight-${String(dpr)}.png` });
+    await close();
+  });
+
+  test("under another light, and without light", async () => {
+    const { pages, close } = await both("town");
+    for (const light of [{ azimuth_deg: 20, altitude_deg: 10, ambient: 0.1, diffuse: 3 }, { azimuth_deg: 200, diffuse: 0 }, { lit: false }]) {
+      expect((await compared(pages, (given) => (globalThis as Global).map.setLight(given), light)).most).toBeLessThanOrEqual(1.01);
+    }
+    await close();
+  });
+
+  test("where the id layer tells what is covered", async () => {
+    const { pages, close } = await both("opaque");
+    for (const mode of ["color", "lit"]) expect((await compared(pages, setMode, mode)).most).toBeLessThanOrEqual(1.01);
+    expect((await compared(pages, (ids) => (globalThis as Global).layer.highlight(ids), CHOSEN)).most).toBeLessThanOrEqual(1.01);
+    await close();
+  });
+
+  test("with a second layer that lets the first one through", async () => {
+    const { pages, close } = await both("town");
+    const add = (url: string): unknown => new (globalThis as Global).map3d.imageLayer(url, { mode: "id", opacity: 0.4 }).addTo((globalThis as Global).map);
+    expect((await compared(pages, add, `${host}/tiles/opaque`)).most).toBeLessThanOrEqual(2.01);
+    await pages[1]?.screenshot({ path: `${OUT}/canvas-layers.png` });
+    await close();
+  });
+});
+
+async function settledAll(pages: readonly Page[], act: () => unknown): Promise<void> {
+  for (const page of pages) await settled(page, act, null);
+}
+
+/** Colours are mixed as sRGB here and in linear light there, so edges between dark and bright differ; false colours are not mixed. */
+describe("at zooms between", () => {
+  test.each([1, 2, 3])("both drawers agree but for edges at pixel ratio %i", async (dpr) => {
+    const { pages, close } = await both("town", {}, {}, dpr);
+    for (const mode of ["lit", "id"]) {
+      await settledAll(pages, mode === "lit" ? () => (globalThis as Global).layer.setMode("lit") : () => (globalThis as Global).layer.setMode("id"));
+      for (const zoom of dpr === 3 ? [2.6] : [1.8, 2.6, 3.45, 4.7]) {
+        const { most, off } = await compared(pages, setZoom, zoom);
+        expect(off, `${mode} at ${String(zoom)}`).toBeLessThan(mode === "lit" ? 0.03 : 0.002);
+        if (mode === "lit") expect(most).toBeLessThan(30);
+      }
+    }
+    await pages[1]?.screenshot({ path: `${OUT}/canvas-between-${String(dpr)}.png` });
+    await close();
+  });
+
+  test.each([[4, 1, 2.4], [3.37, 1, 3.4], [2.5, 1, 6.2], [2.71, 2, 4], [3.9, 3, 2]])("at zoom %d and pixel ratio %i no seam is seen between tiles", async (zoom, dpr, most) => {
+    const { page } = await start(browser, `${host}/tiles/ramp`, { zoom, light: { lit: false }, drawer: "canvas" }, {}, { deviceScaleFactor: dpr });
+    const got = await picture(page);
+    const width = 800 * dpr;
+    let steepest = 0;
+    for (let y = 60 * dpr; y < 540 * dpr; y++) {
+      for (let x = 160 * dpr; x < 639 * dpr; x++) {
+        const at = 4 * (width * y + x);
+        steepest = Math.max(steepest, Math.abs((got[at] ?? 0) - (got[at + 4] ?? 0)), Math.abs((got[at] ?? 0) - (got[at + 4 * width] ?? 0)));
+        if (got[at + 3] !== 255) throw new Error(`a hole at ${String(x)}, ${String(y)}`);
+      }
+    }
+    expect(steepest).toBeGreaterThan(0.5);
+    expect(steepest).toBeLessThanOrEqual(Math.ceil(most));
+    await page.context().close();
+  });
+});
+
+test("tiles above and below stand in for those that cannot be had", async () => {
+  const { pages, close } = await both("broken", {}, { mode: "id" });
+  expect((await compared(pages, setMode, "depth")).most).toBeLessThanOrEqual(1.01);
+  expect((await compared(pages, setMode, "lit")).off).toBeLessThan(0.03);
+  await pages[1]?.screenshot({ path: `${OUT}/canvas-stand-ins.png` });
+  expect((await compared(pages, setZoom, 2)).off).toBeLessThan(0.02);
+  await close();
+});
+
+describe("the drawer is chosen", () => {
+  const withoutWebGL = (): void => {
+    const original = Object.getOwnPropertyDescriptor(HTMLCanvasElement.prototype, "getContext")?.value as (this: HTMLCanvasElement, kind: string, ...rest: unknown[]) => null;
+    HTMLCanvasElement.prototype.getContext = function (this: HTMLCanvasElement, kind: string, ...rest: unknown[]): null {
+      return kind === "webgl2" ? null : original.call(this, kind, ...rest);
+    };
+  };
+
+  test.each([["auto", "canvas", /^$/], ["webgl", null, /no WebGL2/]])("%s without WebGL2", async (drawer, name, message) => {
+    const { page } = await openPage(browser);
+    await page.addInitScript(withoutWebGL);
+    await page.goto(`${host}/bare`);
+    const got = await page.evaluate(([base, drawer]) => new Promise<{ name: string | null; message: string }>((done) => {
+      const g = globalThis as Global;
+      const map = new g.map3d.map("mapcanvas", { drawer: drawer as "auto" });
+      const layer = new g.map3d.imageLayer(base).addTo(map);
+      map.once("idle", () => { done({ name: map.drawer, message: "" }); }).on("error", ({ error }) => { done({ name: map.drawer, message: error.message }); });
+      return layer;
+    }), [`${host}/tiles/town`, drawer] as const);
+    expect(got.name).toBe(name);
+    expect(got.message).toMatch(message);
+    await page.context().close();
+  });
+
+  test("a context that is lost for good is replaced by a canvas without WebGL; hands still move the map", async () => {
+    const { page, problems } = await start(browser, `${host}/tiles/town`, { zoom: 3 });
+    const before = await picture(page);
+    const told = await page.evaluate(async () => {
+      const { map } = globalThis as Global;
+      const [told, old] = [[] as string[], map.canvas];
+      map.on("contextlost", () => told.push("lost")).on("contextrestored", () => told.push("restored"));
+      const back = new Promise((done) => map.once("contextrestored", done));
+      old.getContext("webgl2")?.getExtension("WEBGL_lose_context")?.loseContext();
+      await back;
+      await new Promise((done) => map.once("idle", done));
+      return [...told, map.drawer, String(map.canvas === old), map.canvas.id, String(document.querySelectorAll("canvas").length)];
+    });
+    expect(told).toEqual(["lost", "restored", "canvas", "false", "mapcanvas", "1"]);
+    expect(differenceOf(before, await picture(page)).most).toBeLessThanOrEqual(1.01);
+    await page.mouse.move(400, 300);
+    await page.mouse.down();
+    await page.mouse.move(450, 300, { steps: 4 });
+    await page.waitForTimeout(150);
+    await page.mouse.up();
+    await page.evaluate(() => new Promise((done) => (globalThis as Global).map.once("idle", done).setLight({})));
+    expect(differenceOf(before, await picture(page)).off).toBeGreaterThan(0.01);
+    expect(await page.evaluate(() => {
+      (globalThis as Global).map.remove();
+      return document.querySelector("#mapcanvas")?.parentElement === document.body;
+    })).toBe(true);
+    expect(problems.filter((text) => !/WebGL|CONTEXT_LOST/i.test(text))).toEqual([]);
+    await page.context().close();
+  });
+});
+
+test("picks are exact", async () => {
+  const { page } = await start(browser, `${host}/tiles/town`, { drawer: "canvas" });
+  const roof: [number, number, number] = [ORIGIN[0] - 45, ORIGIN[1] - 4, ORIGIN[2] + 34];
+  const pick = await page.evaluate(async (world) => {
+    const { map } = globalThis as Global;
+    const { id, position, approximate } = await map.pick(map.project(world) as [number, number]);
+    return { id, position, approximate };
+  }, roof);
+  expect(pick).toMatchObject({ id: 17, approximate: false });
+  expect(pick.position?.[2]).toBeCloseTo(roof[2], 2);
+  await page.context().close();
+});
+
+test("idle means no frames and no messages to workers", async () => {
+  const { page } = await start(browser, `${host}/tiles/town`, { drawer: "canvas" });
+  const counts = await page.evaluate(() => new Promise<{ resting: number; moving: number }>((done) => {
+    let count = 0;
+    const [request, post] = [globalThis.requestAnimationFrame.bind(globalThis), Object.getOwnPropertyDescriptor(Worker.prototype, "postMessage")?.value as Worker["postMessage"]];
+    globalThis.requestAnimationFrame = (call) => {
+      count++;
+      return request(call);
+    };
+    Worker.prototype.postMessage = function (this: Worker, ...given: unknown[]): void {
+      count++;
+      post.apply(this, given as Parameters<typeof post>);
+    };
+    setTimeout(() => {
+      const resting = count;
+      const { map } = globalThis as Global;
+      map.once("idle", () => { done({ resting, moving: count }); }).setLight({ azimuth_deg: 10 });
+    }, 1000);
+  }));
+  expect(counts.resting).toBe(0);
+  expect(counts.moving).toBeGreaterThan(4);
+  await page.context().close();
+});
+
+test("while new light is computed the old picture stays", async () => {
+  const { page } = await start(browser, `${host}/tiles/town`, { drawer: "canvas" });
+  const least = await page.evaluate(() => new Promise<number>((done) => {
+    const { map } = globalThis as Global;
+    const copy = new OffscreenCanvas(80, 60).getContext("2d", { willReadFrequently: true }) as OffscreenCanvasRenderingContext2D;
+    let least = Infinity;
+    const look = (): void => {
+      copy.clearRect(0, 0, 80, 60);
+      copy.drawImage(map.canvas, 0, 0, 80, 60);
+      least = Math.min(least, copy.getImageData(0, 0, 80, 60).data.filter((value, k) => k % 4 === 3 && value > 0).length);
+      requestAnimationFrame(look);
+    };
+    look();
+    const full = least;
+    map.once("idle", () => { done(least / full); });
+    for (let k = 1; k < 12; k++) setTimeout(() => map.setLight({ azimuth_deg: 30 * k }), 30 * k);
+  }));
+  expect(least).toBe(1);
+  await page.context().close();
+});
+
+test("where pixels cannot be read as they are, light is composed instead, nearly the same", async () => {
+  const options = { zoom: 3, light: { azimuth_deg: 215, altitude_deg: 48, ambient: 0.42, diffuse: 0.9 } };
+  const { page: plain } = await start(browser, `${host}/tiles/town`, { ...options, drawer: "webgl" });
+  const { page } = await openPage(browser);
+  await page.addInitScript(() => {
+    const spoil = "{ const read = OffscreenCanvasRenderingContext2D.prototype.getImageData; OffscreenCanvasRenderingContext2D.prototype.getImageData = function (...at) { const image = read.apply(this, at); for (let k = 0; k < image.data.length; k++) image.data[k] ^= 7 * (k & 1); return image; }; }";
+    const Plain = Blob;
+    globalThis.Blob = class extends Plain {
+      constructor(parts: BlobPart[] = [], options?: BlobPropertyBag) {
+        super(options?.type === "text/javascript" ? [spoil, ...parts] : parts, options);
+      }
+    };
+  });
+  await page.goto(`${host}/bare`);
+  await page.evaluate(([base, options]) => new Promise<void>((done) => {
+    const g = globalThis as Global;
+    g.map = new g.map3d.map("mapcanvas", { ...options, drawer: "canvas" });
+    g.layer = new g.map3d.imageLayer(base).addTo(g.map);
+    g.map.once("idle", () => { done(); }).debug();
+  }), [`${host}/tiles/town`, options] as const);
+  expect(await page.locator(".map3d-debug > p").textContent()).toMatch(/^canvas: light by compositing/);
+  const lit = differenceOf(await picture(plain), await picture(page));
+  await page.screenshot({ path: `${OUT}/canvas-composed.png` });
+  expect(lit.most).toBeLessThan(12);
+  for (const each of [plain, page]) await settled(each, (ids) => (globalThis as Global).layer.highlight(ids), CHOSEN);
+  await page.screenshot({ path: `${OUT}/canvas-composed-highlight.png` });
+  const shown = differenceOf(await picture(plain), await picture(page));
+  expect(shown.most).toBeLessThan(30);
+  for (const each of [plain, page]) await settled(each, setMode, "id");
+  expect(differenceOf(await picture(plain), await picture(page)).most).toBeLessThanOrEqual(1.01);
+  await page.context().close();
+  await plain.context().close();
+});

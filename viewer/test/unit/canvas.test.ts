@@ -1,0 +1,111 @@
+import { describe, expect, test } from "vitest";
+import type { Pass } from "../../src/draw/drawer";
+import { kindsBeside, kindsOf, lookOf, type Look } from "../../src/draw/canvas/look";
+import { lightOn } from "../../src/draw/canvas/lightOn";
+import { colorOfId, shade, type Around } from "../../src/draw/canvas/shade";
+import { areaOf, gridOf } from "../../src/draw/canvas/sheet";
+import { placeQuads } from "../../src/draw/plan";
+import { frameOf } from "../../src/geo/frame";
+import { DEFAULT_LIGHT, lambert, towardsLight } from "../../src/geo/light";
+
+const LAMP = { sun: towardsLight(DEFAULT_LIGHT), ambient: 0.42, diffuse: 0.76 };
+const LOOK: Look = { mode: "id", masked: false, light: null, highlight: null, rim: [0, 0], depthRange: null };
+const ALONE: Around = { normal: [], id: [] };
+const bytes = (...normal: number[][]): Uint8Array => Uint8Array.from(normal.flat());
+const UP = [128, 128, 255];
+const SOUTH = [128, 0, 128];
+const NOTHING = [0, 0, 0];
+
+/** Light on a stored normal. */
+const strength = (stored: number[]): number => {
+  const n = stored.map((byte) => (byte / 255) * 2 - 1);
+  const length = Math.hypot(...n);
+  return lambert(DEFAULT_LIGHT, n.map((part) => part / length) as unknown as [number, number, number]);
+};
+
+describe("light", () => {
+  test("is half a pixel's own and an eighth of each neighbour's, across tile borders, too", () => {
+    const [light] = lightOn(LAMP, 1, 1, bytes(UP), [bytes(SOUTH), bytes(SOUTH), bytes(UP), undefined]);
+    expect(light).toBeCloseTo(0.75 * strength(UP) + 0.25 * strength(SOUTH), 6);
+  });
+
+  test("of a tile's own pixels is the same as across a border", () => {
+    const whole = lightOn(LAMP, 2, 1, bytes(UP, SOUTH), []);
+    expect(lightOn(LAMP, 1, 1, bytes(UP), [undefined, bytes(SOUTH)])[0]).toBe(whole[0]);
+    expect(lightOn(LAMP, 1, 1, bytes(SOUTH), [bytes(UP)])[0]).toBe(whole[1]);
+    const column = lightOn(LAMP, 1, 2, bytes(UP, SOUTH), []);
+    expect(lightOn(LAMP, 1, 1, bytes(UP), [, , , bytes(SOUTH)])[0]).toBe(column[0]);
+    expect(lightOn(LAMP, 1, 1, bytes(SOUTH), [, , bytes(UP)])[0]).toBe(column[1]);
+  });
+
+  test("beside nothing, a pixel's own counts; where there is no normal it is middling", () => {
+    const light = lightOn(LAMP, 2, 1, bytes(UP, NOTHING), []);
+    expect(light[0]).toBeCloseTo(strength(UP), 6);
+    expect(light[1]).toBeCloseTo(0.42 + 0.38, 6);
+  });
+});
+
+describe("pictures", () => {
+  const ids = Uint32Array.of(7, 7, 7, 7, 9, 0, 7, 7, 7);
+  const tile = { width: 3, height: 3, id: ids };
+
+  test("of ids have the same colour for the same id, and nothing where there is none", () => {
+    const out = shade(LOOK, tile, ALONE, undefined);
+    expect([...out.subarray(0, 4)]).toEqual([...out.subarray(4, 8)]);
+    expect([...out.subarray(0, 4)]).toEqual([...colorOfId(7).map((part) => Math.round(255 * part)), 255]);
+    expect(out[4 * 5 + 3]).toBe(0);
+  });
+
+  test("show stored colours as they are; masked, where the ids say so", () => {
+    const color = Uint8ClampedArray.from({ length: 36 }, (_, k) => (k % 4 === 3 ? 255 : 7 * k));
+    expect([...shade({ ...LOOK, mode: "color" }, { ...tile, color }, ALONE, undefined)]).toEqual([...color]);
+    const masked = shade({ ...LOOK, mode: "color", masked: true }, { ...tile, color }, ALONE, undefined);
+    expect([masked[4 * 4 + 3], masked[4 * 5 + 3]]).toEqual([255, 0]);
+  });
+
+  test("have a highlight's rim where the id beside is another, beyond the tile's edge, too", () => {
+    const look = { ...LOOK, highlight: "h", rim: [1, -1] as const };
+    const rims = (around: Around): number[] => {
+      const out = shade(look, { width: 3, height: 3, id: new Uint32Array(9).fill(7) }, around, new Map([[7, [1, 0, 0]]]));
+      return [0, 1, 2, 3, 4, 5, 6, 7, 8].filter((at) => out[4 * at] === 255 && out[4 * at + 1] === 0);
+    };
+    expect(rims(ALONE)).toEqual([]);
+    expect(rims({ normal: [], id: [undefined, new Uint32Array(9).fill(8)] })).toEqual([2, 5, 8]);
+    expect(rims({ normal: [], id: [undefined, undefined, new Uint32Array(9)] })).toEqual([0, 1, 2]);
+  });
+
+  test("of depths run from the first to the last colour", () => {
+    const out = shade({ ...LOOK, mode: "depth", depthRange: [100, 300] }, { width: 2, height: 2, depth: Uint32Array.of(0, 200, 5000, 0xffffffff) }, ALONE, undefined);
+    expect([...out]).toEqual([252, 232, 178, 255, 92, 158, 158, 255, 41, 46, 92, 255, 0, 0, 0, 0]);
+  });
+});
+
+describe("looks", () => {
+  const pass = { mode: "lit", masked: true, depthRange: [0, 9] } as unknown as Pass;
+  const frame = { width: 1, height: 1, dpr: 1, light: DEFAULT_LIGHT, passes: [] };
+
+  test("name what they need and what counts beyond the edge", () => {
+    const look = lookOf(frame, pass, 1, "h");
+    expect(kindsOf(look)).toEqual(["color", "normal", "id"]);
+    expect(kindsBeside(look)).toEqual(["normal", "id"]);
+  });
+
+  test("without light do not depend on it", () => {
+    const dark = { ...frame, light: { ...DEFAULT_LIGHT, lit: false } };
+    expect(lookOf(dark, pass, 1, null)).toEqual(lookOf({ ...dark, light: { ...dark.light, azimuth_deg: 3 } }, pass, 2, null));
+    expect(kindsOf(lookOf(dark, { ...pass, masked: false }, 1, null))).toEqual(["color"]);
+  });
+});
+
+test("areas are found again from their rectangles, at any zoom", () => {
+  const frame = frameOf({ id: "0-45", look_at_deg: 0, pitch_deg: 45, u0_m: -512, v0_m: 512, d0_m: 0 }, 1024, 256, 5);
+  for (const px_m of [1, 0.7, 0.31, 0.123]) {
+    const stands = [{ area: { z: 4, x: 9, y: 3 }, from: { z: 4, x: 9, y: 3 } }, { area: { z: 4, x: 10, y: 3 }, from: { z: 1, x: 1, y: 0 } }, { area: { z: 6, x: 44, y: 15 }, from: { z: 6, x: 44, y: 15 } }];
+    const quads = placeQuads(frame, { left: -77.3, top: 41.9, px_m }, stands, 4);
+    for (const quad of quads) {
+      const grid = gridOf({ quads: [quad], level: 4 } as unknown as Pass, 256);
+      expect(quads.map(({ rect }) => grid && areaOf(grid, rect))).toEqual(stands.map(({ area }) => area));
+      expect(grid?.px).toBeCloseTo(1024 / 16 / 256 / px_m, 6);
+    }
+  }
+});
