@@ -219,6 +219,32 @@ def blocks_vectors():
     return rows
 
 
+def geographic_vectors():
+    """A made-up map with all terms of the second degree: places and what the polynomials give."""
+    row = {
+        "local": [5.0, -3.5],
+        "lon_lat": [179.9, -18.25],
+        "unit_m": 2500.0,
+        "unit_deg": 0.03125,
+        "degree": 2,
+        "error_m": 0.0,
+        "to": [[0.0, 0.024, 0.0011, 2.5e-6, -7e-6, 3e-6], [1e-9, -0.0009, 0.022, -1.5e-6, 4e-6, -8e-6]],
+        "back": [[0.001, 3255.0, -160.0, 0.4, 1.25, -0.75], [-0.002, 130.0, 3551.0, 0.3, -0.6, 1.5]],
+    }
+
+    def sums(terms, p, q):
+        t = (1.0, p, q, p * p, p * q, q * q)
+        return [sum(c * v for c, v in zip(row[terms][k], t, strict=True)) for k in (0, 1)]
+
+    points = []
+    for x, y in ((5.0, -3.5), (2505.0, -2503.5), (-812.5, 1330.25)):
+        to = sums("to", (x - row["local"][0]) / row["unit_m"], (y - row["local"][1]) / row["unit_m"])
+        lon_lat = [row["lon_lat"][k] + to[k] for k in (0, 1)]
+        back = sums("back", *(to[k] / row["unit_deg"] for k in (0, 1)))
+        points.append({"local": [x, y], "lon_lat": lon_lat, "back": [row["local"][k] + back[k] for k in (0, 1)]})
+    return {"geographic": row, "points": points}
+
+
 def write(name, value):
     text = json.dumps(value, indent=1)
     (HERE / f"{name}.json").write_text(text + "\n")
@@ -235,6 +261,7 @@ def main():
         "data": data_vectors(),
         "parents": parent_vectors(),
         "blocks": blocks_vectors(),
+        "geographic": geographic_vectors(),
     }.items():
         write(name, value)
 

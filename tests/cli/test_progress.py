@@ -4,7 +4,7 @@ import io
 
 from rich.console import Console
 
-from map3d.cli.progress import LoggedProgress, line
+from map3d.cli.progress import LoggedProgress, line, show_stage
 
 
 def test_a_line_tells_how_much_is_done_how_fast_and_what_is_left() -> None:
@@ -30,3 +30,16 @@ def test_what_has_no_number_tells_its_time() -> None:
     bar.add_task("1 of 3: town.gml", total=None)
     bar.tasks[0].start_time = bar.get_time() - 75
     assert line(bar.tasks[0]) == "1 of 3: town.gml: 75 s"
+
+
+def test_each_stage_has_a_rate_of_its_own() -> None:
+    shown = io.StringIO()
+    with LoggedProgress(Console(file=shown, width=200), every_s=0.0) as bar:
+        task = bar.add_task("building", total=None)
+        show_stage(bar, task, "textures", 10, 10)
+        bar.tasks[0].start_time = bar.get_time() - 600
+        show_stage(bar, task, "textures", 10, 10)
+        show_stage(bar, task, "chunks", 1, 4)
+        bar.tasks[0].start_time = bar.get_time() - 2
+        show_stage(bar, task, "chunks", 2, 4)
+    assert shown.getvalue().splitlines()[-1] == "chunks: 2 of 4, 1.0/s, 2 s left"

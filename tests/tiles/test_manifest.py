@@ -6,7 +6,7 @@ import pytest
 
 from map3d.errors import BadName, BadRequest, Corrupt, UnknownVersion
 from map3d.geometry.frames import pin
-from map3d.tiles.manifest import CrsFacts, Manifest, ViewFacts, block_version
+from map3d.tiles.manifest import CrsFacts, Geographic, Manifest, ViewFacts, block_version
 from map3d.tiles.occupancy import Occupancy
 from map3d.types import BlockId, Layer, Sun, TileId, ViewAngles
 
@@ -40,6 +40,17 @@ def test_a_manifest_reads_back(manifest):
     again = Manifest.load(manifest.dump())
     assert again == replace(manifest, start=(5.0, 5.0, 11.25))
     assert again.dump() == manifest.dump()
+
+
+PLACE = Geographic(
+    (5.0, 5.0), (11.5, 48.1), 656.25, 0.0087, 1, ((0.0, 0.0087, 0.0001), (0.0, 0.0001, 0.0058)), ((0.0, 650.0, 1.0), (0.0, 1.0, 970.0)), 0.01
+)
+
+
+def test_where_it_lies_reads_back(manifest):
+    placed = replace(manifest, geographic=PLACE)
+    assert Manifest.load(placed.dump()).geographic == PLACE
+    assert b"geographic" not in manifest.dump()
 
 
 NOON = Sun("2026-06-21T13:00:00Z", 196.2, 64.1, (-0.1, -0.4, 0.9))
@@ -117,9 +128,9 @@ def test_the_document_is_that_of_the_specification(manifest):
 
 def test_the_schema_names_every_member(manifest, added):
     archives = {view.frame.id: {"color": f"{view.frame.id}/color.pmtiles"} for view in manifest.views}
-    value = added.with_archives(archives).to_json()
+    value = replace(added, geographic=PLACE).with_archives(archives).to_json()
     schema = SCHEMA["properties"]
-    assert set(schema) == set(value) == set(SCHEMA["required"])
+    assert set(schema) == set(value) == {*SCHEMA["required"], "geographic"}
     assert set(schema["views"]["items"]["properties"]) == set(value["views"][0])
     assert set(schema["layers"]["items"]["properties"]) == set().union(*value["layers"])
     assert set(schema["crs"]["properties"]) == set(value["crs"])

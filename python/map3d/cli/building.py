@@ -8,7 +8,7 @@ from rich.table import Table
 
 from map3d.catalogue import Catalogue, Workspace
 from map3d.cli.output import console
-from map3d.cli.progress import progress_bar
+from map3d.cli.progress import progress_bar, show_stage
 
 
 def build_with_progress(
@@ -24,7 +24,7 @@ def build_with_progress(
         task = bar.add_task("building", total=None)
 
         def progress(stage: str, done: int, total: int) -> bool:
-            bar.update(task, description=f"building: {stage}", completed=done, total=total or None)
+            show_stage(bar, task, f"building: {stage}", done, total or None)
             return True
 
         report = build(workspace, catalogue, scene, threads=threads, max_memory_bytes=max_memory_bytes or BUILD_BYTES, progress=progress)

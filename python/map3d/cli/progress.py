@@ -17,6 +17,13 @@ def progress_bar(*columns: ProgressColumn) -> Progress:
     return Progress(*columns, console=shown, transient=True) if shown.is_terminal else LoggedProgress(shown)
 
 
+def show_stage(bar: Progress, task_id: TaskID, stage: str, done: int, total: int | None) -> None:
+    """How far a stage of an operation is. Each has a clock of its own, so that its rate and the time left are its own too."""
+    if bar.tasks[bar.task_ids.index(task_id)].description != stage:
+        bar.reset(task_id, description=stage)
+    bar.update(task_id, completed=done, total=total)
+
+
 class LoggedProgress(Progress):
     """Prints `rendering: 40 of 120, 1.3/s, 62 s left, 10 base tiles/s` instead of drawing."""
 

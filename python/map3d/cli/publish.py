@@ -9,7 +9,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemaini
 from map3d.catalogue import Workspace
 from map3d.cli.options import json_option, workspace_option
 from map3d.cli.output import print_json, size_text
-from map3d.cli.progress import progress_bar
+from map3d.cli.progress import progress_bar, show_stage
 
 
 @click.command("publish")
@@ -37,7 +37,7 @@ def publish_with_progress(workspace: Workspace, rendering: str, out: Path, **how
         task = bar.add_task("publishing", total=None)
 
         def progress(stage: str, done: int, total: int) -> bool:
-            bar.update(task, description=f"publishing: {stage}", completed=done, total=total)
+            show_stage(bar, task, f"publishing: {stage}", done, total)
             return True
 
         return publish(workspace, rendering, out, progress=progress, **how)

@@ -8,7 +8,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemaini
 from map3d.catalogue import Workspace
 from map3d.cli.options import json_option, workspace_option
 from map3d.cli.output import counts_text, print_json
-from map3d.cli.progress import progress_bar
+from map3d.cli.progress import progress_bar, show_stage
 
 
 @click.command("verify")
@@ -36,7 +36,7 @@ def command(workspace: Workspace, renderings: tuple[str, ...], published: Path |
             task = bar.add_task("verifying", total=None)
 
             def progress(what: str, done: int, total: int) -> None:
-                bar.update(task, description=what, completed=done, total=total)
+                show_stage(bar, task, what, done, total)
 
             scenes = {record.scene for record in chosen} if renderings else {scene.name for scene in catalogue.scenes()}
             for scene in sorted(scenes):

@@ -8,6 +8,7 @@ from map3d.catalogue import Catalogue, RenderingRecord, SceneRecord, State, Work
 from map3d.catalogue.records import LOCAL_CRS_NAME
 from map3d.errors import BadRequest
 from map3d.geometry.frames import PinnedFrame
+from map3d.jobs.geographic import geographic_of
 from map3d.registry import Registry
 from map3d.tiles.manifest import CrsFacts, Manifest, ViewFacts
 from map3d.tiles.occupancy import Occupancy
@@ -47,6 +48,7 @@ def current_manifest(workspace: Workspace, catalogue: Catalogue, record: Renderi
         views=tuple(_view(workspace, record, frame, planned.get(frame.id)) for frame in record.frames),
         objects=objects,
         start=_start(record, box),
+        geographic=geographic_of(scene, box),
     )
 
 

@@ -31,6 +31,35 @@ class CrsFacts:
 
 
 @dataclass(frozen=True)
+class Geographic:
+    """WGS 84 of local x, y, by polynomials with the terms 1, x, y, x², xy, y², … up to `degree` (spec/manifest.md). `error_m`: greatest error
+    either way, within `unit_m` of `local`."""
+
+    local: tuple[float, float]
+    lon_lat: tuple[float, float]
+    unit_m: float
+    unit_deg: float
+    degree: int
+    to: tuple[tuple[float, ...], tuple[float, ...]]
+    back: tuple[tuple[float, ...], tuple[float, ...]]
+    error_m: float
+
+    @classmethod
+    def load(cls, row: Mapping[str, Any]) -> Self:
+        (x, y), (lon, lat), to, back = (row[key] for key in ("local", "lon_lat", "to", "back"))
+        return cls(
+            local=(float(x), float(y)),
+            lon_lat=(float(lon), float(lat)),
+            unit_m=float(row["unit_m"]),
+            unit_deg=float(row["unit_deg"]),
+            degree=int(row["degree"]),
+            to=_terms(to),
+            back=_terms(back),
+            error_m=float(row["error_m"]),
+        )
+
+
+@dataclass(frozen=True)
 class ViewFacts:
     """A view's frame and content. `versions`: for each pass those of every block that is in its store. `archives`: layer → path, published folders
     only."""
@@ -58,6 +87,7 @@ class Manifest:
     start: Vec3 | None = None
     samples: int = 16
     objects: int = 0
+    geographic: Geographic | None = None
 
     def __post_init__(self) -> None:
         check_name(self.name, "rendering")
@@ -100,6 +130,7 @@ class Manifest:
             "content_version": self.content_version,
             "complete": self.complete,
             "crs": {"epsg": self.crs.epsg, "wkt": self.crs.wkt, "name": self.crs.name, "vertical": self.crs.vertical},
+            **({} if self.geographic is None else {"geographic": asdict(self.geographic)}),
             "origin": list(self.origin),
             "box": [list(corner) for corner in self.box],
             "start": {"local": list(start)},
@@ -137,6 +168,7 @@ class Manifest:
                 start=_vec3(value["start"]["local"]),
                 samples=int(value["samples"]),
                 objects=int(value["objects"]["count"]),
+                geographic=Geographic.load(value["geographic"]) if "geographic" in value else None,
             )
         except (KeyError, TypeError, ValueError, IndexError, AttributeError, Map3dError) as error:
             raise Corrupt(f"{where}: not a manifest of map3d: {type(error).__name__}: {error}") from error
@@ -231,6 +263,11 @@ def _block(text: str, zmax: int) -> BlockId:
         raise Corrupt(f"versions: {text!r} is not the name of a block")
     block_level(tile.z, zmax)
     return BlockId(*tile)
+
+
+def _terms(value: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    first, second = (tuple(float(c) for c in row) for row in value)
+    return first, second
 
 
 def _vec3(value: Any) -> Vec3:
