@@ -9,7 +9,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemaini
 
 from map3d.cli.options import cores, json_option
 from map3d.cli.output import print_json, size_text
-from map3d.cli.progress import progress_bar, show_stage
+from map3d.cli.progress import progress_bar
 
 
 @click.command("make-town")
@@ -44,7 +44,7 @@ def command(out: Path, formats: str, workers: int, estimate: bool, as_json: bool
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with progress_bar(*columns) as bar:
         task = bar.add_task("making a town", total=None)
-        report = make_town(out, town, lambda what, done, total: show_stage(bar, task, what, done, total), workers)
+        report = make_town(out, town, lambda what, done, total: bar.update(task, description=what, completed=done, total=total), workers)
     if as_json:
         print_json(asdict(report))
     else:
