@@ -13,6 +13,7 @@ export type { Mode } from "./draw/drawer";
 export type { Light } from "./geo/light";
 export type { ManifestJson, Rendering } from "./geo/manifest";
 export type { Attribute, ObjectInfo, SearchEntry } from "./tiles/objects";
+export { zoneOf } from "./geo/daylight";
 export { windOf } from "./ui/controls";
 
 /** Of the viewer; manifests of version 1 are read. */

@@ -1,11 +1,12 @@
 import type { Tile } from "../geo/frame";
 import type { LayerKind } from "../geo/manifest";
 import type { Light } from "../geo/light";
+import type { Shadow } from "../geo/shadows";
 import type { TileData } from "../tiles/tileData";
 
-/** How a layer is shown: lit colour, colour as stored, or a data layer in false colours. */
-export type Mode = "lit" | "color" | "normal" | "id" | "depth";
-export const MODES: readonly Mode[] = ["lit", "color", "normal", "id", "depth"];
+/** How a layer is shown: lit colour, colour or picture as stored, or a data layer in false colours. */
+export type Mode = "lit" | "color" | "picture" | "normal" | "id" | "depth";
+export const MODES: readonly Mode[] = ["lit", "color", "picture", "normal", "id", "depth"];
 
 /** sRGB, 0..1 each. */
 export type Rgb = readonly [number, number, number];
@@ -40,11 +41,19 @@ export interface Pass {
   readonly tiles: TileAccess;
   /** Colours by object id. */
   readonly highlight: ReadonlyMap<number, Rgb>;
+  /** Light that was rendered; drawn where its tiles are here. */
+  readonly baked: Baked;
   /** True when colour has no alpha, so that the id layer says what is covered. */
   readonly masked: boolean;
   readonly opacity: number;
   /** Depth values that get the first and the last false colour. */
   readonly depthRange: readonly [number, number];
+}
+
+/** Rendered light that suits the present one. */
+export interface Baked {
+  readonly shadow: Shadow | null;
+  readonly occlusion: boolean;
 }
 
 export interface FrameSpec {
@@ -82,6 +91,12 @@ export interface Drawer {
 /** Layers without which a tile cannot be shown in a mode. */
 export function neededKinds(mode: Mode, masked: boolean): LayerKind[] {
   if (mode === "lit") return masked ? ["color", "normal", "id"] : ["color", "normal"];
-  if (mode === "color") return masked ? ["color", "id"] : ["color"];
+  if (mode === "color" || mode === "picture") return masked ? [mode, "id"] : [mode];
   return [mode];
+}
+
+/** Layers that a mode shows when they are here. */
+export function bakedKinds(mode: Mode, { shadow, occlusion }: Baked): LayerKind[] {
+  if (mode !== "lit") return [];
+  return [...(shadow ? [shadow.layer.kind as LayerKind] : []), ...(occlusion ? ["ao" as const] : [])];
 }

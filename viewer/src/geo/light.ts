@@ -11,9 +11,17 @@ export interface Light {
   ambient: number;
   /** Light on a surface that faces the sun; linear light, added to ambient. */
   diffuse: number;
+  /** Colour of the sun's light: factors of diffuse. */
+  sun_rgb: Vec3;
+  /** Colour of the light that is everywhere: factors of ambient. */
+  sky_rgb: Vec3;
+  /** Shadows of the rendering's layers sun and sun16, where they were made for this sun. */
+  shadows: boolean;
+  /** The rendering's layer ao dims the light that is everywhere. */
+  occlusion: boolean;
 }
 
-export const DEFAULT_LIGHT: Readonly<Light> = { lit: true, azimuth_deg: 215, altitude_deg: 48, ambient: 0.42, diffuse: 0.76 };
+export const DEFAULT_LIGHT: Readonly<Light> = { lit: true, azimuth_deg: 215, altitude_deg: 48, ambient: 0.42, diffuse: 0.76, sun_rgb: [1, 1, 1], sky_rgb: [1, 1, 1], shadows: true, occlusion: true };
 
 /** Unit vector towards the light, local axes. */
 export function towardsLight({ azimuth_deg, altitude_deg }: Pick<Light, "azimuth_deg" | "altitude_deg">): Vec3 {
@@ -21,11 +29,6 @@ export function towardsLight({ azimuth_deg, altitude_deg }: Pick<Light, "azimuth
   return [Math.sin(azimuth) * Math.cos(altitude), Math.cos(azimuth) * Math.cos(altitude), Math.sin(altitude)];
 }
 
-/** Linear light on a unit normal. */
-export function lambert(light: Light, normal: Vec3): number {
-  const l = towardsLight(light);
-  return light.ambient + light.diffuse * Math.max(0, normal[0] * l[0] + normal[1] * l[1] + normal[2] * l[2]);
-}
 
 /** The light with numbers brought into their ranges. */
 export function validLight(light: Light): Light {
@@ -35,5 +38,9 @@ export function validLight(light: Light): Light {
     altitude_deg: clamp(light.altitude_deg, -90, 90),
     ambient: clamp(light.ambient, 0, 1),
     diffuse: clamp(light.diffuse, 0, 4),
+    sun_rgb: light.sun_rgb.map((part) => clamp(part, 0, 4)) as unknown as Vec3,
+    sky_rgb: light.sky_rgb.map((part) => clamp(part, 0, 4)) as unknown as Vec3,
+    shadows: light.shadows,
+    occlusion: light.occlusion,
   };
 }

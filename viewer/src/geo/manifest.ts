@@ -1,9 +1,10 @@
 import { ManifestError } from "../core/errors";
 import type { Box3, Vec3 } from "../core/vec";
+import type { GeographicJson } from "./geographic";
 import { blockOf, frameOf, tileName, type Frame, type FrameNumbers, type Tile } from "./frame";
 import { Occupancy } from "./occupancy";
 
-export type LayerKind = "color" | "normal" | "id" | "depth";
+export type LayerKind = "color" | "normal" | "id" | "depth" | "sun" | "sun16" | "ao" | "depth2" | "picture";
 
 export interface LayerInfo {
   readonly name: string;
@@ -11,6 +12,20 @@ export interface LayerInfo {
   readonly format: string;
   readonly media_type: string;
   readonly unit_m?: number;
+  /** Of sun, sun16 and picture. */
+  readonly suns?: readonly SunJson[];
+  readonly radius_m?: number;
+}
+
+/** A sun that a layer was made for. */
+export interface SunJson {
+  /** ISO 8601 in UTC; null when the sun was given by its angles. */
+  readonly time: string | null;
+  /** From true north. */
+  readonly azimuth_deg: number;
+  readonly elevation_deg: number;
+  /** Unit vector towards it, local axes. */
+  readonly direction: Vec3;
 }
 
 interface Versions {
@@ -39,6 +54,8 @@ export interface ManifestJson {
   content_version: number;
   complete: boolean;
   crs: { epsg: number | null; wkt: string | null; name: string; vertical: string | null };
+  /** Where it lies on earth; absent when that is not known. */
+  geographic?: GeographicJson;
   origin: Vec3;
   box: Box3;
   start?: { local: Vec3 };
@@ -121,11 +138,28 @@ const FIELDS: [keyof ManifestJson, (v: unknown) => boolean][] = [
   ["size_m", (v) => isNumber(v) && Number(v) > 0],
   ["layers", (v) => Array.isArray(v) && v.length > 0 && v.every(layerOk)],
   ["views", (v) => Array.isArray(v) && v.length > 0],
+  ["geographic", geographicOk],
 ];
 
 function layerOk(value: unknown): boolean {
   const layer = value as Partial<LayerInfo> | null;
-  return typeof layer?.name === "string" && typeof layer.kind === "string" && typeof layer.format === "string";
+  return typeof layer?.name === "string" && typeof layer.kind === "string" && typeof layer.format === "string" && sunsOk(layer.suns);
+}
+
+function sunsOk(value: unknown): boolean {
+  return value === undefined || (Array.isArray(value) && value.every((sun: Partial<SunJson> | null) => isPoint(sun?.direction)));
+}
+
+const isPair = (v: unknown): boolean => Array.isArray(v) && v.length === 2 && v.every(isNumber);
+const isTerms = (v: unknown, degree: number): boolean => Array.isArray(v) && v.length === (degree + 1) * (degree + 2) / 2 && v.every(isNumber);
+
+function geographicOk(value: unknown): boolean {
+  const place = value as Partial<GeographicJson> | undefined | null;
+  if (place === undefined) return true;
+  if (!place || !isPair(place.local) || !isPair(place.lon_lat) || !(Number(place.unit_m) > 0) || !(Number(place.unit_deg) > 0)) return false;
+  const degree = Number(place.degree);
+  const rows = [place.to, place.back].flatMap((pair: readonly unknown[] | undefined) => (Array.isArray(pair) ? [pair[0], pair[1]] as unknown[] : [null]));
+  return Number.isInteger(degree) && degree >= 1 && degree <= 16 && rows.every((row) => isTerms(row, degree));
 }
 
 function passesOk(value: unknown): boolean {

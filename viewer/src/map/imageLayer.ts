@@ -2,9 +2,11 @@ import { UsageError } from "../core/errors";
 import { Evented } from "../core/events";
 import type { Attachable } from "../core/surface";
 import { readColor } from "../draw/color";
-import { MODES, neededKinds, type Mode, type Pass, type Rgb, type TileAccess } from "../draw/drawer";
+import { bakedKinds, MODES, neededKinds, type Baked, type Mode, type Pass, type Rgb, type TileAccess } from "../draw/drawer";
 import type { Tile } from "../geo/frame";
-import type { LayerKind, Rendering, View } from "../geo/manifest";
+import { towardsLight, type Light } from "../geo/light";
+import type { LayerInfo, LayerKind, Rendering, View } from "../geo/manifest";
+import { shadowOf } from "../geo/shadows";
 import { Objects, type ObjectInfo, type SearchEntry } from "../tiles/objects";
 import { Source } from "../tiles/source";
 import { Store } from "../tiles/store";
@@ -14,7 +16,7 @@ import type { map } from "./map";
 import type { Sight, Stage } from "./stage";
 
 export interface ImageLayerOptions {
-  /** lit | color | normal | id | depth. Default "lit". */
+  /** lit | color | picture | normal | id | depth. Default "lit". */
   mode?: Mode;
   /** 0..1. Default 1. */
   opacity?: number;
@@ -153,22 +155,27 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
   }
 
   /** @internal What to paint and to fetch. */
-  plan(sight: Sight, hover: boolean): LayerPlan | null {
+  plan(sight: Sight, light: Readonly<Light>, hover: boolean): LayerPlan | null {
     const view = this.viewOf(sight.camera.frame.id);
     if (!view || !this.#rendering || !this.#store) return null;
-    const needed = neededKinds(this.#shownMode(this.#rendering), this.#masked(this.#rendering));
-    const extra: LayerKind[] = (this.#colors.size > 0 || hover) && !needed.includes("id") ? ["id"] : [];
-    return planLayer(sight, this.#rendering, view, this.#store, needed, extra);
+    const mode = this.#shownMode(this.#rendering);
+    const needed = neededKinds(mode, this.#masked(this.#rendering));
+    const baked = this.#baked(this.#rendering, light);
+    const ids: LayerKind[] = (this.#colors.size > 0 || hover) && !needed.includes("id") ? ["id"] : [];
+    const extra = [...(light.lit ? bakedKinds(mode, baked) : []), ...ids];
+    return planLayer(sight, this.#rendering, view, this.#store, { layers: layersWith(this.#rendering, baked), needed, extra });
   }
 
   /** @internal */
-  pass(plan: LayerPlan): Pass {
+  pass(plan: LayerPlan, light: Readonly<Light>): Pass {
     const rendering = this.#rendering as Rendering;
+    const baked = this.#baked(rendering, light);
     return {
       mode: this.#shownMode(rendering),
       level: plan.level,
       quads: plan.quads,
-      tiles: this.#access(plan.view),
+      tiles: this.#access(plan.view, layersWith(rendering, baked)),
+      baked,
       highlight: this.#colors,
       masked: this.#masked(rendering),
       opacity: this.options.opacity,
@@ -197,11 +204,17 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
   }
 
   #masked(rendering: Rendering): boolean {
-    return rendering.layers.get("color")?.format === "jpeg";
+    return rendering.layers.get(this.#mode === "picture" ? "picture" : "color")?.format === "jpeg";
   }
 
-  #access(view: View): TileAccess {
-    const [store, layers] = [this.#store as Store, (this.#rendering as Rendering).layers];
+  /** Rendered light that suits a light. */
+  #baked({ layers, json }: Rendering, light: Readonly<Light>): Baked {
+    const shadow = light.shadows && light.altitude_deg > 0 ? shadowOf(json.layers, towardsLight(light)) : null;
+    return { shadow, occlusion: light.occlusion && layers.has("ao") };
+  }
+
+  #access(view: View, layers: ReadonlyMap<string, LayerInfo>): TileAccess {
+    const store = this.#store as Store;
     const stored = (kind: LayerKind, tile: Tile): ReturnType<Store["get"]> => {
       const layer = layers.get(kind);
       return layer && store.get(view, layer, tile);
@@ -213,7 +226,7 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
       },
       data: (kind, tile) => stored(kind, tile)?.data,
       taken: (kind, tile) => {
-        if (kind === "color" || kind === "normal") store.surrender(view, layers.get(kind), tile);
+        if (kind !== "id" && kind !== "depth") store.surrender(view, layers.get(kind), tile);
       },
     };
   }
@@ -222,6 +235,11 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
     this.#stage?.request();
     return this;
   }
+}
+
+/** A rendering's layers by kind, with the one that has the shadows. */
+function layersWith({ layers }: Rendering, { shadow }: Baked): ReadonlyMap<string, LayerInfo> {
+  return shadow && layers.get(shadow.layer.kind) !== shadow.layer ? new Map([...layers, [shadow.layer.kind, shadow.layer]]) : layers;
 }
 
 function checkedMode(mode: Mode): Mode {

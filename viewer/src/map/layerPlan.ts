@@ -2,7 +2,7 @@ import { dot, sub, type Vec2 } from "../core/vec";
 import { uvdFromLocal } from "../geo/axes";
 import { cssPixelM, type Camera } from "../geo/camera";
 import { ancestor, type Frame, type Tile } from "../geo/frame";
-import type { LayerKind, Rendering, View } from "../geo/manifest";
+import type { LayerInfo, LayerKind, Rendering, View } from "../geo/manifest";
 import { corners } from "../core/vec";
 import { placeQuads } from "../draw/plan";
 import type { Quad } from "../draw/drawer";
@@ -31,8 +31,14 @@ export function middleIn(frame: Frame, { camera, origin }: Sight, rendering: Ren
   return [camera.u + dot(frame.axes.right, shift), camera.v + dot(frame.axes.up, shift)];
 }
 
-/** @param needed kinds without which a tile is not shown  @param extra kinds that are fetched after them */
-export function planLayer(sight: Sight, rendering: Rendering, view: View, store: Store, needed: readonly LayerKind[], extra: readonly LayerKind[]): LayerPlan {
+/** What a layer shows: its layers by kind, those without which a tile is not shown, and those that are fetched after them. */
+export interface Wanted {
+  readonly layers: ReadonlyMap<string, LayerInfo>;
+  readonly needed: readonly LayerKind[];
+  readonly extra: readonly LayerKind[];
+}
+
+export function planLayer(sight: Sight, rendering: Rendering, view: View, store: Store, { layers, needed, extra }: Wanted): LayerPlan {
   const { frame, occupancy } = view;
   const { camera, dpr } = sight;
   const [u, v] = middleIn(frame, sight, rendering);
@@ -41,15 +47,15 @@ export function planLayer(sight: Sight, rendering: Rendering, view: View, store:
   const level = levelFor(frame, px / dpr, dpr);
   const occupied = (tile: Tile): boolean => occupancy.has(tile);
   const cover = coverOf(frame, occupied, level, rect);
-  const here = (kind: LayerKind, tile: Tile): boolean => holds(rendering, store, view, kind, tile);
+  const here = (kind: LayerKind, tile: Tile): boolean => holds(layers, store, view, kind, tile);
   const ready = (tile: Tile): boolean => needed.every((kind) => here(kind, tile));
   const screen = { left: rect[0][0], top: rect[1][1], px_m: px / dpr };
   const quads = placeQuads(frame, screen, cover.flatMap((tile) => standsFor(tile, ready, occupied)), level);
   const ordered = fromTheMiddle(frame, cover, rect);
   const jobs = [
-    ...jobsFor(rendering, store, view, needed, ancestorsOf(ordered)),
-    ...jobsFor(rendering, store, view, needed, ordered),
-    ...jobsFor(rendering, store, view, extra, ordered),
+    ...jobsFor(layers, store, view, needed, ancestorsOf(ordered)),
+    ...jobsFor(layers, store, view, needed, ordered),
+    ...jobsFor(layers, store, view, extra, ordered),
   ];
   return { view, level, cover, quads, jobs, complete: jobs.length === 0 };
 }
@@ -78,17 +84,17 @@ function ancestorsOf(tiles: readonly Tile[]): Tile[] {
   return [...found.values()];
 }
 
-function holds(rendering: Rendering, store: Store, view: View, kind: LayerKind, tile: Tile): boolean {
-  const layer = rendering.layers.get(kind);
+function holds(layers: Wanted["layers"], store: Store, view: View, kind: LayerKind, tile: Tile): boolean {
+  const layer = layers.get(kind);
   return layer !== undefined && store.get(view, layer, tile) !== undefined;
 }
 
 /** Jobs for the tiles that are neither here nor known to have failed. */
-function jobsFor(rendering: Rendering, store: Store, view: View, kinds: readonly LayerKind[], tiles: readonly Tile[]): Job[] {
+function jobsFor(layers: Wanted["layers"], store: Store, view: View, kinds: readonly LayerKind[], tiles: readonly Tile[]): Job[] {
   const jobs: Job[] = [];
   for (const tile of tiles) {
     for (const kind of kinds) {
-      const layer = rendering.layers.get(kind);
+      const layer = layers.get(kind);
       if (layer && !store.get(view, layer, tile) && !store.failed(view, layer, tile)) jobs.push(store.job(view, layer, tile));
     }
   }

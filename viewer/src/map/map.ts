@@ -1,9 +1,10 @@
 import { adoptStyles, element } from "../core/dom";
-import { asError } from "../core/errors";
+import { asError, UsageError } from "../core/errors";
 import { Evented } from "../core/events";
 import type { Attachable, Holder, Surface, SurfaceEvents } from "../core/surface";
 import type { Vec2, Vec3 } from "../core/vec";
 import type { Camera } from "../geo/camera";
+import { daylightAt } from "../geo/daylight";
 import { DEFAULT_LIGHT, validLight, type Light } from "../geo/light";
 import { marker } from "../overlay/marker";
 import { attributionLine } from "../ui/attribution";
@@ -35,6 +36,7 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
   #gestures: Gestures | undefined;
   #layers: imageLayer[] = [];
   #light: Readonly<Light>;
+  #time: Date | null = null;
   #drawn: Camera | undefined;
   /** Something besides the camera has changed since the last frame. */
   #dirty = true;
@@ -117,9 +119,22 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
   }
 
   setLight(light: Partial<Light>): this {
-    this.#light = validLight({ ...this.#light, ...light });
-    this.fire("lightchange", { light: this.#light });
-    return this.#redraw();
+    if (light.azimuth_deg !== undefined || light.altitude_deg !== undefined) this.#time = null;
+    return this.#relight(light);
+  }
+
+  /** The time that the light is of; null when it was set otherwise. */
+  get time(): Date | null {
+    return this.#time;
+  }
+
+  /** Light of a moment at the scene's place, with the colours of the day, and shadows where the rendering has them. */
+  setTime(time: Date): this {
+    return this.whenReady((_, { json }) => {
+      if (!json.geographic) throw new UsageError(`rendering "${json.name}" does not say where on earth it lies, so the sun's place is not known; use setLight`);
+      this.#time = time;
+      this.#relight(daylightAt(time, json.geographic));
+    });
   }
 
   /** Any CSS background; the same as the custom property --map3d-background. */
@@ -131,6 +146,12 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
   /** Outlines and names of the tiles that are shown. */
   debug(on = true): this {
     this.#debug.show(on);
+    return this.#redraw();
+  }
+
+  #relight(light: Partial<Light>): this {
+    this.#light = validLight({ ...this.#light, ...light });
+    this.fire("lightchange", { light: this.#light });
     return this.#redraw();
   }
 

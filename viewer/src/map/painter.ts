@@ -49,7 +49,7 @@ export class Painter {
     this.#events = events;
     this.#drawer = this.#open(options.drawer);
     this.#cache = new Cache<Stored>(options.cacheBytes, (key, { data }) => {
-      if (data?.kind === "color") data.bitmap.close();
+      if (data && "bitmap" in data) data.bitmap.close();
       this.#drawer.release(key);
     });
     this.#queue = new Queue(options.concurrency);
@@ -73,12 +73,12 @@ export class Painter {
     this.#cache.tick();
     this.#viewport.fitCanvas(sight.dpr);
     const planned = layers.flatMap((layer) => {
-      const plan = layer.plan(sight, hover);
+      const plan = layer.plan(sight, light, hover);
       return plan ? [{ layer, plan }] : [];
     });
     this.#queue.want(planned.flatMap(({ plan }) => plan.jobs));
     const { width, height } = this.#viewport.canvas;
-    this.#drawer.draw({ width, height, dpr: sight.dpr, light, passes: planned.map(({ layer, plan }) => layer.pass(plan)) });
+    this.#drawer.draw({ width, height, dpr: sight.dpr, light, passes: planned.map(({ layer, plan }) => layer.pass(plan, light)) });
     const complete = layers.every((layer) => layer.rendering) && planned.every(({ plan }) => plan.complete);
     return { plans: planned.map(({ plan }) => plan), complete: complete && !this.#drawer.busy };
   }

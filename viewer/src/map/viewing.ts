@@ -3,6 +3,7 @@ import { Evented } from "../core/events";
 import { add, clamp, mid, sub, type Box3, type Vec2, type Vec3 } from "../core/vec";
 import { depthAtHeight, localFromUvd, uvdFromLocal } from "../geo/axes";
 import { cssPixelM, projectedBox, screenFromLocal, uvFromScreen, zoomedAt, zoomToFit, type Camera } from "../geo/camera";
+import { localFromLonLat, lonLatOf } from "../geo/geographic";
 import type { Rendering, View } from "../geo/manifest";
 import { neighbourView } from "./directions";
 import { limited, zoomLimits } from "./limits";
@@ -137,6 +138,20 @@ export abstract class Viewing extends Evented<MapEvents> {
   /** World position on the ground (height of the content's lowest point) under CSS pixels; null in level views. */
   unproject(point: Vec2): Vec3 | null {
     return this.camera && this.reference ? groundAt(this.camera, this.reference, point) : null;
+  }
+
+  /** Longitude and latitude (WGS 84, degrees) of a world position; null before "ready", and where the scene's place on earth is not known. */
+  lonLat(world: Vec3): Vec2 | null {
+    const json = this.reference?.json;
+    return json?.geographic ? lonLatOf(json.geographic, sub(world, json.origin)) : null;
+  }
+
+  /** World x and y of a longitude and latitude; null as with lonLat. */
+  fromLonLat(lonLat: Vec2): Vec2 | null {
+    const json = this.reference?.json;
+    if (!json?.geographic) return null;
+    const [x, y] = localFromLonLat(json.geographic, lonLat);
+    return [json.origin[0] + x, json.origin[1] + y];
   }
 
   /** @internal */

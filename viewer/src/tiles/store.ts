@@ -50,7 +50,7 @@ export class Store {
   surrender(view: View, layer: LayerInfo | undefined, tile: Tile): void {
     const stored = layer && this.get(view, layer, tile);
     if (!stored) return;
-    if (stored.data?.kind === "color") stored.data.bitmap.close();
+    if (stored.data && "bitmap" in stored.data) stored.data.bitmap.close();
     stored.data = null;
   }
 
@@ -86,7 +86,7 @@ export class Store {
       const bytes = await this.#source.tile(view, layer, tile, signal);
       const data = bytes && (await this.#shared.decoder.decode(layer.kind, layer.media_type, bytes));
       if (signal.aborted) {
-        if (data?.kind === "color") data.bitmap.close();
+        if (data && "bitmap" in data) data.bitmap.close();
         return;
       }
       this.#shared.cache.set(key, { data, empty: !data }, data ? bytesOf(data) * (data.kind === "id" || data.kind === "depth" ? 2 : 1) : 64);

@@ -1,44 +1,49 @@
 import { DecodeError } from "../core/errors";
-import { decodePng, type Pixels } from "./png";
+import { decodePng } from "./png";
 
 /** A decoded tile. Rows from the top. */
 export type TileData =
-  | { readonly kind: "color"; readonly width: number; readonly height: number; readonly bitmap: ImageBitmap }
+  | { readonly kind: "color" | "picture"; readonly width: number; readonly height: number; readonly bitmap: ImageBitmap }
   /** values: RGB8 as stored */
   | { readonly kind: "normal"; readonly width: number; readonly height: number; readonly values: Uint8Array<ArrayBuffer> }
   /** values: one uint32 a pixel */
-  | { readonly kind: "id" | "depth"; readonly width: number; readonly height: number; readonly values: Uint32Array<ArrayBuffer> };
+  | { readonly kind: "id" | "depth" | "depth2"; readonly width: number; readonly height: number; readonly values: Uint32Array<ArrayBuffer> }
+  /** values: share of light, 255 all */
+  | { readonly kind: "sun" | "ao"; readonly width: number; readonly height: number; readonly values: Uint8Array<ArrayBuffer> }
+  /** values: a bit for each sun */
+  | { readonly kind: "sun16"; readonly width: number; readonly height: number; readonly values: Uint16Array<ArrayBuffer> };
+
+type Kind = TileData["kind"];
+/** Bytes of a pixel in a layer's PNG; none for pictures that the browser decodes. */
+const CHANNELS: Readonly<Record<Kind, number>> = { color: 0, picture: 0, normal: 3, id: 4, depth: 4, depth2: 4, sun: 1, ao: 1, sun16: 2 };
 
 export const NO_DEPTH = 0xffffffff;
 
 /** @throws DecodeError */
 export async function decodeTile(kind: string, mediaType: string, bytes: ArrayBuffer): Promise<TileData> {
-  if (kind === "color") return decodeColor(mediaType, bytes);
-  const pixels = await decodePng(new Uint8Array(bytes));
-  const channels = kind === "normal" ? 3 : 4;
-  if (pixels.channels !== channels) throw new DecodeError(`a ${kind} tile has ${String(channels)} bytes a pixel, got ${String(pixels.channels)}`);
-  const { width, height } = pixels;
-  if (kind === "normal") return { kind, width, height, values: pixels.data };
-  if (kind === "id" || kind === "depth") return { kind, width, height, values: uint32s(pixels) };
-  throw new DecodeError(`layers of kind "${kind}" are unknown to this viewer`);
+  if (!isKind(kind)) throw new DecodeError(`layers of kind "${kind}" are unknown to this viewer`);
+  if (kind === "color" || kind === "picture") return decodeColor(kind, mediaType, bytes);
+  const { width, height, channels, data } = await decodePng(new Uint8Array(bytes));
+  if (channels !== CHANNELS[kind]) throw new DecodeError(`a ${kind} tile has ${String(CHANNELS[kind])} bytes a pixel, got ${String(channels)}`);
+  // Little-endian, which is how memory is read on every machine that runs a browser.
+  if (kind === "sun16") return { kind, width, height, values: new Uint16Array(data.buffer, data.byteOffset, data.byteLength / 2) };
+  if (kind === "normal" || kind === "sun" || kind === "ao") return { kind, width, height, values: data };
+  return { kind, width, height, values: new Uint32Array(data.buffer, data.byteOffset, data.byteLength / 4) };
 }
+
+const isKind = (kind: string): kind is Kind => Object.hasOwn(CHANNELS, kind);
 
 export function transferable(data: TileData): Transferable {
-  return data.kind === "color" ? data.bitmap : data.values.buffer;
+  return "bitmap" in data ? data.bitmap : data.values.buffer;
 }
 
-export const bytesOf = (data: TileData): number => data.width * data.height * (data.kind === "normal" ? 3 : 4);
+export const bytesOf = (data: TileData): number => data.width * data.height * (CHANNELS[data.kind] || 4);
 
-/** Little-endian in R, G, B, A, which is how memory is read on every machine that runs a browser. */
-function uint32s({ data }: Pixels): Uint32Array<ArrayBuffer> {
-  return new Uint32Array(data.buffer, data.byteOffset, data.byteLength / 4);
-}
-
-async function decodeColor(mediaType: string, bytes: ArrayBuffer): Promise<TileData> {
+async function decodeColor(kind: "color" | "picture", mediaType: string, bytes: ArrayBuffer): Promise<TileData> {
   const blob = new Blob([bytes], { type: mediaType });
   try {
     const bitmap = await createImageBitmap(blob, { premultiplyAlpha: "none", colorSpaceConversion: "none" });
-    return { kind: "color", width: bitmap.width, height: bitmap.height, bitmap };
+    return { kind, width: bitmap.width, height: bitmap.height, bitmap };
   } catch (reason) {
     throw new DecodeError(`the browser cannot decode a ${mediaType} tile of ${String(bytes.byteLength)} bytes: ${String(reason)}`);
   }

@@ -6,9 +6,13 @@ export interface Variant {
   readonly mode: Mode;
   readonly masked: boolean;
   readonly highlight: boolean;
+  /** The layer with shadows, if any. */
+  readonly shadow: "sun" | "sun16" | null;
+  readonly occlusion: boolean;
 }
 
-export const variantName = (v: Variant): string => `${v.mode}${v.masked ? "+masked" : ""}${v.highlight ? "+highlight" : ""}`;
+export const variantName = (v: Variant): string =>
+  [v.mode, v.masked && "masked", v.highlight && "highlight", v.shadow, v.occlusion && "ao"].filter(Boolean).join("+");
 
 export const VERTEX = `#version 300 es
 uniform vec4 u_rect; // left, top, right, bottom in clip space
@@ -17,8 +21,9 @@ void main() {
   gl_Position = vec4(right ? u_rect.z : u_rect.x, bottom ? u_rect.w : u_rect.y, 0.0, 1.0);
 }`;
 
-export function fragment({ mode, masked, highlight }: Variant): string {
-  const defines = [`#define MODE_${mode.toUpperCase()}`, masked ? "#define MASKED" : "", highlight ? "#define HIGHLIGHT" : ""];
+export function fragment({ mode, masked, highlight, shadow, occlusion }: Variant): string {
+  const names = [`MODE_${mode === "picture" ? "COLOR" : mode.toUpperCase()}`, masked && "MASKED", highlight && "HIGHLIGHT", shadow && `SHADOW_${shadow.toUpperCase()}`, occlusion && "OCCLUSION"];
+  const defines = names.filter(Boolean).map((name) => `#define ${String(name)}`);
   return ["#version 300 es", ...defines, HEAD, COLOR, FALSE_COLOR, HIGHLIGHT, MAIN].join("\n");
 }
 
@@ -35,7 +40,8 @@ uniform ivec4 u_bounds;   // texels that may be read, the gutter's among them wh
 uniform int u_size;       // texels a side
 uniform float u_opacity;
 uniform vec3 u_sun;       // unit, towards the light
-uniform vec2 u_light;     // ambient, diffuse
+uniform vec3 u_sky;       // linear light that is everywhere
+uniform vec3 u_beam;      // and of the sun on a surface that faces it
 uniform vec2 u_range;     // depth
 uniform sampler2D u_color;
 uniform sampler2D u_normal;
@@ -69,21 +75,48 @@ vec4 colorAt(ivec2 texel) {
 }
 
 #ifdef MODE_LIT
-/** Negative where there is no normal. */
-float lambert(ivec2 texel) {
-  vec3 n = texelFetch(u_normal, stored(texel), 0).rgb;
-  return n == vec3(0.0) ? -1.0 : u_light.x + u_light.y * max(0.0, dot(normalize(n * 2.0 - 1.0), u_sun));
+#ifdef OCCLUSION
+uniform sampler2D u_ao;
+#endif
+#ifdef SHADOW_SUN
+uniform sampler2D u_shadow;
+float unshaded(ivec2 at) { return texelFetch(u_shadow, at, 0).r; }
+#endif
+#ifdef SHADOW_SUN16
+uniform usampler2D u_shadow;
+uniform uvec2 u_suns;     // numbers of the two suns
+uniform float u_share;    // of the second
+float unshaded(ivec2 at) {
+  uvec2 lit = texelFetch(u_shadow, at, 0).r >> u_suns & 1u;
+  return mix(float(lit.x), float(lit.y), u_share);
+}
+#endif
+
+/** Shares of the sky's and the sun's light; negative where there is no normal. */
+vec2 lambert(ivec2 texel) {
+  ivec2 at = stored(texel);
+  vec3 n = texelFetch(u_normal, at, 0).rgb;
+  if (n == vec3(0.0)) return vec2(-1.0);
+  vec2 light = vec2(1.0, max(0.0, dot(normalize(n * 2.0 - 1.0), u_sun)));
+#ifdef OCCLUSION
+  light.x = texelFetch(u_ao, at, 0).r;
+#endif
+#if defined(SHADOW_SUN) || defined(SHADOW_SUN16)
+  light.y *= unshaded(at);
+#endif
+  return light;
 }
 
-float spread(float own, float left, float right, float above, float below) {
-  if (own < 0.0) return u_light.x + 0.5 * u_light.y;
-  vec4 around = vec4(left, right, above, below);
-  return 0.5 * own + 0.125 * dot(mix(around, vec4(own), lessThan(around, vec4(0.0))), vec4(1.0));
+vec2 known(vec2 light, vec2 own) { return light.x < 0.0 ? own : light; }
+
+vec2 spread(vec2 own, vec2 left, vec2 right, vec2 above, vec2 below) {
+  if (own.x < 0.0) return vec2(1.0, 0.5);
+  return 0.5 * own + 0.125 * (known(left, own) + known(right, own) + known(above, own) + known(below, own));
 }
 
-vec4 lit(ivec2 texel, float light) {
+vec4 lit(ivec2 texel, vec2 light) {
   vec4 c = colorAt(texel);
-  return vec4(linear(c.rgb) * light * c.a, c.a);
+  return vec4(linear(c.rgb) * (light.x * u_sky + light.y * u_beam) * c.a, c.a);
 }
 
 vec4 exact(ivec2 at) {
@@ -92,10 +125,10 @@ vec4 exact(ivec2 at) {
 
 /** Of the 2 × 2 texels from at; their light comes from 4 × 4 without the corners. */
 vec4 between(ivec2 at, vec2 f) {
-  float n0 = lambert(at + ivec2(0, -1)), n1 = lambert(at + ivec2(1, -1));
-  float w0 = lambert(at + ivec2(-1, 0)), a = lambert(at), b = lambert(at + ivec2(1, 0)), e0 = lambert(at + ivec2(2, 0));
-  float w1 = lambert(at + ivec2(-1, 1)), c = lambert(at + ivec2(0, 1)), d = lambert(at + 1), e1 = lambert(at + ivec2(2, 1));
-  float s0 = lambert(at + ivec2(0, 2)), s1 = lambert(at + ivec2(1, 2));
+  vec2 n0 = lambert(at + ivec2(0, -1)), n1 = lambert(at + ivec2(1, -1));
+  vec2 w0 = lambert(at + ivec2(-1, 0)), a = lambert(at), b = lambert(at + ivec2(1, 0)), e0 = lambert(at + ivec2(2, 0));
+  vec2 w1 = lambert(at + ivec2(-1, 1)), c = lambert(at + ivec2(0, 1)), d = lambert(at + 1), e1 = lambert(at + ivec2(2, 1));
+  vec2 s0 = lambert(at + ivec2(0, 2)), s1 = lambert(at + ivec2(1, 2));
   vec4 top = mix(lit(at, spread(a, w0, b, n0, c)), lit(at + ivec2(1, 0), spread(b, a, e0, n1, d)), f.x);
   vec4 bottom = mix(lit(at + ivec2(0, 1), spread(c, w1, d, a, s0)), lit(at + 1, spread(d, c, e1, b, s1)), f.x);
   return mix(top, bottom, f.y);

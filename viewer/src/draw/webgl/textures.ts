@@ -68,7 +68,7 @@ export class Textures {
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
-    const stored = data.kind === "color" ? gl.RGBA8 : data.kind === "normal" ? gl.RGB8 : gl.R32UI;
+    const [stored] = this.#formatOf(data.kind);
     gl.texStorage2D(gl.TEXTURE_2D, 1, stored, width + 2 * GUTTER, height + 2 * GUTTER);
     this.#fill(data);
     return { texture, width, height, filled: new Array<number>(9).fill(0) };
@@ -77,9 +77,23 @@ export class Textures {
   #fill(data: TileData): void {
     const gl = this.#gl;
     const { width, height } = data;
-    if (data.kind === "color") gl.texSubImage2D(gl.TEXTURE_2D, 0, GUTTER, GUTTER, gl.RGBA, gl.UNSIGNED_BYTE, data.bitmap);
-    else if (data.kind === "normal") gl.texSubImage2D(gl.TEXTURE_2D, 0, GUTTER, GUTTER, width, height, gl.RGB, gl.UNSIGNED_BYTE, data.values);
-    else gl.texSubImage2D(gl.TEXTURE_2D, 0, GUTTER, GUTTER, width, height, gl.RED_INTEGER, gl.UNSIGNED_INT, data.values);
+    const [, format, type] = this.#formatOf(data.kind);
+    if ("bitmap" in data) gl.texSubImage2D(gl.TEXTURE_2D, 0, GUTTER, GUTTER, format, type, data.bitmap);
+    else gl.texSubImage2D(gl.TEXTURE_2D, 0, GUTTER, GUTTER, width, height, format, type, data.values);
+  }
+
+  /** Stored format, format and type of what is uploaded. */
+  #formatOf(kind: TileData["kind"]): [stored: number, format: number, type: number] {
+    const gl = this.#gl;
+    switch (kind) {
+      case "color":
+      case "picture": return [gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE];
+      case "normal": return [gl.RGB8, gl.RGB, gl.UNSIGNED_BYTE];
+      case "sun":
+      case "ao": return [gl.R8, gl.RED, gl.UNSIGNED_BYTE];
+      case "sun16": return [gl.R16UI, gl.RED_INTEGER, gl.UNSIGNED_SHORT];
+      default: return [gl.R32UI, gl.RED_INTEGER, gl.UNSIGNED_INT];
+    }
   }
 
   /** Fills `to`'s gutter towards (dx, dy) with the nearest pixels of `from`, which lies there. */
@@ -129,8 +143,12 @@ function along(step: number, size: number): [number, number, number] {
   return [GUTTER, GUTTER, size];
 }
 
-/** Texels that may be read, gutter included where it is filled: least x, least y, greatest x, greatest y; −1 and size are the first of the gutter. */
-export function boundsOf({ filled, width, height }: TileTexture): [number, number, number, number] {
-  const more = (place: number): number => (filled[place] ? GUTTER : 0);
+/**
+ * Texels that may be read in all of a tile's textures, gutter included where it is filled: least x, least y, greatest x, greatest y; −1 and size are
+ * the first of the gutter.
+ */
+export function boundsOf(textures: readonly TileTexture[]): [number, number, number, number] {
+  const { width = 0, height = 0 } = textures[0] ?? {};
+  const more = (place: number): number => (textures.every(({ filled }) => filled[place]) ? GUTTER : 0);
   return [-more(3), -more(1), width - 1 + more(5), height - 1 + more(7)];
 }

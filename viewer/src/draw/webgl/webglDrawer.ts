@@ -1,12 +1,25 @@
 import { DrawError } from "../../core/errors";
+import type { Vec3 } from "../../core/vec";
 import { towardsLight } from "../../geo/light";
 import type { LayerKind } from "../../geo/manifest";
-import { neededKinds, type Drawer, type DrawerEvents, type FrameSpec, type Mode, type Pass, type Quad } from "../drawer";
+import { bakedKinds, neededKinds, type Drawer, type DrawerEvents, type FrameSpec, type Mode, type Pass, type Quad } from "../drawer";
 import { idTable, tableShape, type IdTable } from "./idTable";
 import { Programs, unitOf, type Program } from "./program";
 import { boundsOf, SPARE_UNIT, Textures, type TileTexture } from "./textures";
 
-const SAMPLERS = { color: "u_color", normal: "u_normal", id: "u_id", depth: "u_depth" } as const;
+const SAMPLERS = {
+  color: "u_color", picture: "u_color", normal: "u_normal", id: "u_id", depth: "u_depth", depth2: "u_depth", sun: "u_shadow", sun16: "u_shadow", ao: "u_ao",
+} as const;
+
+/** What is drawn of a quad. */
+interface Ready {
+  readonly quad: Quad;
+  /** Those without which nothing is drawn; absent: not here. */
+  readonly textures: readonly (readonly [LayerKind, TileTexture | undefined])[];
+  /** Baked light that is here. */
+  readonly baked: readonly (readonly [LayerKind, TileTexture])[];
+  readonly ids: TileTexture | undefined;
+}
 
 export interface WebGLOptions {
   /** Keep the picture readable after a frame: for tests and screenshots; costs memory. */
@@ -61,21 +74,29 @@ export class WebGLDrawer implements Drawer {
 
   #drawPass(frame: FrameSpec, pass: Pass): void {
     const mode: Mode = pass.mode === "lit" && !frame.light.lit ? "color" : pass.mode;
-    const kinds = neededKinds(mode, pass.masked);
-    const wanted = pass.highlight.size > 0;
     // All are uploaded before the first is drawn, so that gutters have their neighbours' pixels.
-    const ready = pass.quads.map((quad) => ({
-      quad,
-      textures: kinds.map((kind) => [kind, this.#textureOf(pass, kind, quad)] as const),
-      ids: wanted ? this.#textureOf(pass, "id", quad) : undefined,
-    }));
-    for (const { quad, textures, ids } of ready) {
+    for (const ready of pass.quads.map((quad) => this.#readyOf(pass, mode, quad))) {
+      const { quad, textures, baked, ids } = ready;
       if (textures.some(([, texture]) => !texture)) continue;
-      const program = this.#programs.use({ mode, masked: pass.masked, highlight: ids !== undefined });
-      for (const [kind, texture] of textures) this.#bind(kind, texture);
+      const has = (kind: LayerKind): boolean => baked.some(([other]) => other === kind);
+      const shadow = has("sun") ? "sun" : has("sun16") ? "sun16" : null;
+      const program = this.#programs.use({ mode, masked: pass.masked, highlight: ids !== undefined, shadow, occlusion: has("ao") });
+      for (const [kind, texture] of [...textures, ...baked]) this.#bind(kind, texture);
       if (ids) this.#bindHighlight(program, pass, quad, ids, frame.dpr);
-      this.#drawQuad(frame, pass, quad, program, textures[0]?.[1]);
+      this.#drawQuad(frame, pass, quad, program, [...textures, ...baked, ["id", ids] as const].flatMap(([, texture]) => texture ?? []));
     }
+  }
+
+  #readyOf(pass: Pass, mode: Mode, quad: Quad): Ready {
+    return {
+      quad,
+      textures: neededKinds(mode, pass.masked).map((kind) => [kind, this.#textureOf(pass, kind, quad)] as const),
+      baked: bakedKinds(mode, pass.baked).flatMap((kind) => {
+        const texture = this.#textureOf(pass, kind, quad);
+        return texture ? [[kind, texture] as const] : [];
+      }),
+      ids: pass.highlight.size > 0 ? this.#textureOf(pass, "id", quad) : undefined,
+    };
   }
 
   #textureOf(pass: Pass, kind: LayerKind, { from }: Quad): TileTexture | undefined {
@@ -96,7 +117,7 @@ export class WebGLDrawer implements Drawer {
     gl.bindTexture(gl.TEXTURE_2D, texture?.texture ?? null);
   }
 
-  #drawQuad(frame: FrameSpec, pass: Pass, quad: Quad, program: Program, texture: TileTexture | undefined): void {
+  #drawQuad(frame: FrameSpec, pass: Pass, quad: Quad, program: Program, textures: readonly TileTexture[]): void {
     const gl = this.#gl;
     const { width, height, light } = frame;
     const [left, top, right, bottom] = quad.rect;
@@ -105,11 +126,14 @@ export class WebGLDrawer implements Drawer {
     gl.uniform1f(program.at("u_height"), height);
     gl.uniform2f(program.at("u_origin"), ...quad.origin);
     gl.uniform1f(program.at("u_scale"), quad.scale);
-    gl.uniform1i(program.at("u_size"), texture?.width ?? 0);
-    if (texture) gl.uniform4i(program.at("u_bounds"), ...boundsOf(texture));
+    gl.uniform1i(program.at("u_size"), textures[0]?.width ?? 0);
+    gl.uniform4i(program.at("u_bounds"), ...boundsOf(textures));
     gl.uniform1f(program.at("u_opacity"), pass.opacity);
     gl.uniform3f(program.at("u_sun"), ...towardsLight(light));
-    gl.uniform2f(program.at("u_light"), light.ambient, light.diffuse);
+    gl.uniform3f(program.at("u_sky"), ...scaled(light.sky_rgb, light.ambient));
+    gl.uniform3f(program.at("u_beam"), ...scaled(light.sun_rgb, light.diffuse));
+    gl.uniform2ui(program.at("u_suns"), pass.baked.shadow?.first ?? 0, pass.baked.shadow?.second ?? 0);
+    gl.uniform1f(program.at("u_share"), pass.baked.shadow?.share ?? 0);
     gl.uniform2f(program.at("u_range"), ...pass.depthRange);
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
   }
@@ -164,3 +188,5 @@ export class WebGLDrawer implements Drawer {
     this.#canvas.addEventListener("webglcontextrestored", restored, { signal });
   }
 }
+
+const scaled = ([x, y, z]: Vec3, by: number): Vec3 => [x * by, y * by, z * by];
