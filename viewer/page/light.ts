@@ -1,21 +1,20 @@
-import type { imageLayer, Light, map } from "./map3d.mjs";
+import { zoneOf, type imageLayer, type Light, type map, type Rendering } from "./map3d.mjs";
 import { byId, inputById } from "./dom";
 
-/** A summer day's sun, simplified: from east over south to west; highest at 13 o'clock. */
+/** Where nothing is known of the place: a summer day's sun from east over south to west, highest at 13 o'clock. */
 export function lightAt(hour: number): Pick<Light, "azimuth_deg" | "altitude_deg"> {
   const day = (hour - 6) / 14;
   return { azimuth_deg: 75 + 210 * day, altitude_deg: 14 + 46 * Math.sin(Math.PI * day) };
 }
 
-/** The slider moves the light; it rests while nothing is lit. */
-export function bindTime(view: map, layer: imageLayer): void {
-  const [time, clock, sun] = [inputById("time"), byId("clock"), byId("sun")];
-  time.addEventListener("input", () => {
-    const hour = time.valueAsNumber;
-    clock.textContent = clockOf(hour);
-    time.setAttribute("aria-valuetext", clockOf(hour));
-    view.setLight(lightAt(hour));
-  });
+/** The slider moves the light through a day, that of the date where the scene's place is known; it rests while nothing is lit. */
+export function bindLight(view: map, layer: imageLayer): void {
+  const { rendering } = layer;
+  if (!rendering) return;
+  const [time, sun] = [inputById("time"), byId("sun")];
+  if (rendering.json.geographic) bindDay(view, rendering);
+  else time.addEventListener("input", () => { showClock(time.valueAsNumber); view.setLight(lightAt(time.valueAsNumber)); });
+  bindShadows(view, rendering);
   byId("modes").addEventListener("change", () => {
     const off = layer.mode !== "lit";
     sun.toggleAttribute("data-off", off);
@@ -23,4 +22,46 @@ export function bindTime(view: map, layer: imageLayer): void {
   });
 }
 
-const clockOf = (hour: number): string => `${String(Math.floor(hour))}:${String(Math.round((hour % 1) * 60)).padStart(2, "0")}`;
+function bindDay(view: map, rendering: Rendering): void {
+  const [time, day] = [inputById("time"), inputById("day")];
+  const zone = (): number => zoneOf(rendering.json.geographic?.lon_lat[0] ?? 0, -new Date(`${day.value}T12:00`).getTimezoneOffset() / 60);
+  const moment = (hour: number): Date => new Date(Date.parse(`${day.value}T00:00Z`) + (hour - zone()) * 3_600_000);
+  const show = (): void => {
+    if (day.value === "") return;
+    showClock(time.valueAsNumber);
+    view.setTime(moment(time.valueAsNumber));
+  };
+  [time.min, time.max, time.step] = ["0", "24", String(1 / 12)];
+  byId("days").hidden = false;
+  const first = firstMoment(rendering);
+  day.value = first.toISOString().slice(0, 10);
+  const hour = rendering.json.layers.some(({ suns }) => suns?.[0]?.time) ? (first.getTime() - Date.parse(`${day.value}T00:00Z`)) / 3_600_000 + zone() : 14;
+  time.valueAsNumber = Math.min(Math.max(hour, 0), 24);
+  time.addEventListener("input", show);
+  day.addEventListener("input", show);
+  show();
+}
+
+/** When the shadows are of that the rendering has; today without any. */
+function firstMoment({ json }: Rendering): Date {
+  const suns = [...json.layers].sort((a, b) => Number(b.kind === "sun") - Number(a.kind === "sun")).flatMap(({ suns: of }) => of ?? []);
+  const times = suns.flatMap(({ time }) => (time === null ? [] : [new Date(time)])).filter((time) => !Number.isNaN(time.getTime()));
+  return times[Math.floor(times.length * 0.6)] ?? new Date();
+}
+
+function bindShadows(view: map, { layers }: Rendering): void {
+  const box = inputById("shadows");
+  byId("shading").hidden = !["sun", "sun16", "ao"].some((kind) => layers.has(kind));
+  box.addEventListener("change", () => view.setLight({ shadows: box.checked, occlusion: box.checked }));
+}
+
+function showClock(hour: number): void {
+  const clock = clockOf(hour);
+  byId("clock").textContent = clock;
+  inputById("time").setAttribute("aria-valuetext", clock);
+}
+
+const clockOf = (hour: number): string => {
+  const minutes = Math.round(hour * 60);
+  return `${String(Math.floor(minutes / 60))}:${String(minutes % 60).padStart(2, "0")}`;
+};

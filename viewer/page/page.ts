@@ -1,6 +1,6 @@
 import { imageLayer, map, Map3dError, type ClickEvent, type Vec3 } from "./map3d.mjs";
 import { InfoPanel } from "./info";
-import { lightAt, bindTime } from "./light";
+import { bindLight, lightAt } from "./light";
 import { bindModes } from "./modes";
 import { bindSearch } from "./search";
 import { readPlace, writePlace } from "./place";
@@ -48,7 +48,7 @@ function dress(view: map, layer: imageLayer, info: InfoPanel): void {
   byId("progress").hidden = json.complete;
   byId("look").hidden = false;
   info.units = { crs: json.crs.name, vertical: json.crs.vertical };
-  bindTime(view, layer);
+  bindLight(view, layer);
   bindModes(layer);
   if (json.objects) {
     bindSearch(view, layer, (id, position) => void describe(id, position, layer, info));

@@ -1,9 +1,10 @@
 import { afterAll, beforeAll, expect, test } from "vitest";
-import type { Browser, Page } from "playwright-core";
+import type { Browser } from "playwright-core";
 import { renderNoise, renderTown } from "../fixture/rendering";
 import { ORIGIN } from "../fixture/town";
 import { TestServer } from "../fixture/server";
 import { openBrowser, openPage, OUT } from "./browser";
+import { cosine, decodedLevel, litByte, placeOf, spread, type Shares } from "./level";
 import type { Global } from "./page";
 import { addBarePage, pixels, settled, start } from "./start";
 
@@ -94,7 +95,7 @@ test("a click on nothing says so", async () => {
 test("without light, colour bytes come out as they are stored", async () => {
   const { page } = await started({ zoom: 3, light: { lit: false } });
   const got = await pixels(page);
-  const stored = decodedLevel("color");
+  const stored = decodedLevel(town, "color");
   const [left, top] = await placeOf(page);
   const wrong: string[] = [];
   let compared = 0;
@@ -113,7 +114,7 @@ test("each pixel is lit as Lambert says, in linear light, half by its own normal
   const light = { azimuth_deg: 200, altitude_deg: 30, ambient: 0.2, diffuse: 0.6 };
   const { page } = await started({ zoom: 3, light });
   const got = await pixels(page);
-  const [color, normal] = [decodedLevel("color"), decodedLevel("normal")];
+  const [color, normal] = [decodedLevel(town, "color"), decodedLevel(town, "normal")];
   const [left, top] = await placeOf(page);
   const wrong: string[] = [];
   let compared = 0;
@@ -122,9 +123,12 @@ test("each pixel is lit as Lambert says, in linear light, half by its own normal
     const [c, n] = [color(x, y), normal(x, y)];
     if (!c || !n || c[3] === 0) continue;
     compared++;
-    const own = lambert(n, light) ?? 0;
-    const around = [normal(x - 1, y), normal(x + 1, y), normal(x, y - 1), normal(x, y + 1)].map((beside) => (beside && lambert(beside, light)) ?? own);
-    const strength = own / 2 + around.reduce((sum, part) => sum + part, 0) / 8;
+    const shares = (stored: Uint8Array | undefined): Shares | null => {
+      const cos = stored && cosine(stored, light);
+      return cos === undefined || cos === null ? null : [1, cos];
+    };
+    const [sky, sun] = spread(shares(n) ?? [1, 0.5], [normal(x - 1, y), normal(x + 1, y), normal(x, y - 1), normal(x, y + 1)].map(shares));
+    const strength = light.ambient * sky + light.diffuse * sun;
     const want = [0, 1, 2].map((k) => litByte(c[k] ?? 0, strength));
     if (want.some((value, k) => Math.abs(value - (got[4 * at + k] ?? 0)) > 1)) wrong.push(`${String(x)}, ${String(y)}: ${String(want)} is ${String([...got.subarray(4 * at, 4 * at + 3)])}`);
   }
@@ -133,37 +137,13 @@ test("each pixel is lit as Lambert says, in linear light, half by its own normal
   await page.context().close();
 });
 
-interface Lamp {
-  azimuth_deg: number;
-  altitude_deg: number;
-  ambient: number;
-  diffuse: number;
-}
-
-/** Light on a stored normal; null where there is none. */
-function lambert(stored: Uint8Array, light: Lamp): number | null {
-  if (stored.every((part) => part === 0)) return null;
-  const [a, h] = [(light.azimuth_deg * Math.PI) / 180, (light.altitude_deg * Math.PI) / 180];
-  const n = [...stored].map((part) => (part / 255) * 2 - 1);
-  const sun = [Math.sin(a) * Math.cos(h), Math.cos(a) * Math.cos(h), Math.sin(h)];
-  const cosine = n.reduce((sum, part, k) => sum + part * (sun[k] ?? 0), 0) / Math.hypot(...n);
-  return light.ambient + light.diffuse * Math.max(0, cosine);
-}
-
-/** The byte that a stored colour byte becomes under so much light. */
-function litByte(byte: number, strength: number): number {
-  const c = byte / 255;
-  const lit = Math.min((c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4) * strength, 1);
-  return Math.round(255 * (lit <= 0.0031308 ? 12.92 * lit : 1.055 * lit ** (1 / 2.4) - 0.055));
-}
-
 test("a highlight changes exactly the pixels of its ids", async () => {
   const { page } = await started({ zoom: 3 });
   const before = await pixels(page);
   await settled(page, (ids) => (globalThis as Global).layer.highlight(ids, { color: "#1389a0" }), [1025, 3_900_000_007]);
   const after = await pixels(page);
   await page.screenshot({ path: `${OUT}/highlight.png` });
-  const ids = decodedLevel("id");
+  const ids = decodedLevel(town, "id");
   const [left, top] = await placeOf(page);
   const wrong: string[] = [];
   let changed = 0;
@@ -180,29 +160,6 @@ test("a highlight changes exactly the pixels of its ids", async () => {
   await page.context().close();
 });
 
-/** A pixel of the whole level 3 of the view 0-45 as stored, from the fixture's own files. */
-function decodedLevel(layer: "color" | "normal" | "id"): (x: number, y: number) => Buffer | undefined {
-  const tiles = new Map([...town.raw].map(([path, bytes]) => [path, Buffer.from(bytes)]));
-  const size = layer === "normal" ? 3 : 4;
-  return (x, y) => {
-    const bytes = tiles.get(`0-45/${layer}/3/${String(Math.floor(x / 128))}/${String(Math.floor(y / 128))}`);
-    const at = size * (128 * (((y % 128) + 128) % 128) + (((x % 128) + 128) % 128));
-    return bytes?.subarray(at, at + size);
-  };
-}
-
-/** Canvas pixel of level 3's first pixel. */
-const placeOf = (page: Page): Promise<[number, number]> => page.evaluate(() => {
-  const { map, layer } = globalThis as Global;
-  const view = layer.viewOf(map.direction);
-  if (!view) throw new Error("no view");
-  const { frame } = view;
-  const { right, up } = frame.axes;
-  const world = [0, 1, 2].map((k) => (layer.rendering?.json.origin[k] ?? 0) + frame.u0 * (right[k] ?? 0) + frame.v0 * (up[k] ?? 0)) as [number, number, number];
-  const [x, y] = map.project(world) as [number, number];
-  return [Math.round(x), Math.round(y)];
-});
-
 test("random data tiles arrive bit for bit", async () => {
   const noise = renderNoise(7);
   server.renderings.set("noise", noise);
@@ -214,7 +171,7 @@ test("random data tiles arrive bit for bit", async () => {
       const info = layer.rendering?.layers.get(kind);
       if (!view || !store || !info) throw new Error("not ready");
       const data = await store.need(view, info, { z: 0, x: 0, y: 0 });
-      return data && data.kind !== "color" ? [...data.values] : [];
+      return data && "values" in data ? [...data.values] : [];
     };
     return { ids: await values("id"), depths: await values("depth") };
   });

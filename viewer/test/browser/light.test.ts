@@ -1,0 +1,134 @@
+import { afterAll, beforeAll, describe, expect, test } from "vitest";
+import type { Browser } from "playwright-core";
+import { DAY, NOON, PATTERN, withBakedLight } from "../fixture/baked";
+import { renderTown } from "../fixture/rendering";
+import { TestServer } from "../fixture/server";
+import { openBrowser, OUT } from "./browser";
+import { cosine, decodedLevel, litByte, placeOf, spread, type Shares } from "./level";
+import type { Global } from "./page";
+import { addBarePage, pixels, settled, start } from "./start";
+
+let browser: Browser;
+let host: string;
+const server = new TestServer();
+const town = renderTown();
+
+beforeAll(async () => {
+  server.renderings.set("town", withBakedLight(town));
+  server.renderings.set("plain", town);
+  addBarePage(server);
+  host = await server.listen();
+  browser = await openBrowser();
+});
+
+afterAll(async () => {
+  await browser.close();
+  await server.close();
+});
+
+const BETWEEN = { azimuth_deg: 110 + 0.3 * 25, altitude_deg: 35.6 };
+/** Share of DAY[2], from the map itself in a unit test; here as far as bytes can tell. */
+const bits = (share: number) => (x: number, y: number): number => {
+  const value = PATTERN.sun16(x, y);
+  return ((value >> 1) & 1) * (1 - share) + ((value >> 2) & 1) * share;
+};
+const all = (): number => 1;
+const RGB = { sun_rgb: [1, 0.7, 0.4], sky_rgb: [0.5, 0.6, 1] } as const;
+
+describe("rendered light dims what is lit, pixel by pixel", () => {
+  const noon = { azimuth_deg: NOON.azimuth_deg, altitude_deg: NOON.elevation_deg };
+  const hour = { azimuth_deg: DAY[1]?.azimuth_deg ?? 0, altitude_deg: DAY[1]?.elevation_deg ?? 0 };
+  test.each([
+    ["the sun's own layer", noon, { occlusion: false }, all, (x: number, y: number) => PATTERN.sun(x, y) / 255],
+    ["an hour of the day", hour, { occlusion: false }, all, bits(0)],
+    ["occlusion alone", noon, { shadows: false }, (x: number, y: number) => PATTERN.ao(x, y) / 255, all],
+    ["shadows and occlusion in colours", hour, RGB, (x: number, y: number) => PATTERN.ao(x, y) / 255, bits(0)],
+    ["no layer for another sun", { azimuth_deg: 300, altitude_deg: 30 }, { occlusion: false }, all, all],
+  ] as const)("%s", async (_, towards, more, skyAt, sunAt) => {
+    const light = { ambient: 0.3, diffuse: 0.6, sun_rgb: [1, 1, 1], sky_rgb: [1, 1, 1], ...towards, ...more };
+    const { page } = await start(browser, `${host}/tiles/town`, { zoom: 3, light });
+    const got = await pixels(page);
+    const [color, normal] = [decodedLevel(town, "color"), decodedLevel(town, "normal")];
+    const [left, top] = await placeOf(page);
+    const shares = (x: number, y: number): Shares | null => {
+      const stored = normal(x, y);
+      const cos = stored && cosine(stored, light);
+      return cos === undefined || cos === null ? null : [skyAt(x, y), cos * sunAt(x, y)];
+    };
+    const wrong: string[] = [];
+    let compared = 0;
+    for (let at = 0; at < 800 * 600; at++) {
+      const [x, y] = [(at % 800) - left, Math.floor(at / 800) - top];
+      const c = color(x, y);
+      if (!c || c[3] === 0) continue;
+      compared++;
+      const own = shares(x, y);
+      const [sky, sun] = own ? spread(own, [shares(x - 1, y), shares(x + 1, y), shares(x, y - 1), shares(x, y + 1)]) : [1, 0.5];
+      const want = [0, 1, 2].map((k) => litByte(c[k] ?? 0, light.ambient * (light.sky_rgb[k] ?? 0) * sky + light.diffuse * (light.sun_rgb[k] ?? 0) * sun));
+      if (want.some((value, k) => Math.abs(value - (got[4 * at + k] ?? 0)) > 1)) wrong.push(`${String(x)}, ${String(y)}: ${String(want)} is ${String([...got.subarray(4 * at, 4 * at + 3)])}`);
+    }
+    expect(wrong.slice(0, 5)).toEqual([]);
+    expect(compared).toBeGreaterThan(50_000);
+    await page.context().close();
+  });
+});
+
+test("between two hours the picture lies between theirs", async () => {
+  const { page, problems } = await start(browser, `${host}/tiles/town`, { zoom: 3, light: { ...BETWEEN, occlusion: false } });
+  await page.screenshot({ path: `${OUT}/between.png` });
+  const mixed = await pixels(page);
+  await settled(page, () => (globalThis as Global).map.setLight({ shadows: false }), null);
+  const bright = await pixels(page);
+  const darker = mixed.filter((value, at) => at % 4 < 3 && value < (bright[at] ?? 0) - 2).length;
+  const brighter = mixed.filter((value, at) => at % 4 < 3 && value > (bright[at] ?? 0) + 1).length;
+  expect(darker).toBeGreaterThan(30_000);
+  expect(brighter).toBe(0);
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
+
+test("tiles of light are asked for when they are shown, after colour and normals, and never without need", async () => {
+  server.requests.length = 0;
+  const { page } = await start(browser, `${host}/tiles/town`, { light: { shadows: false, occlusion: false } });
+  expect(server.requests.filter((url) => /\/(noon|day|ao)\//.test(url))).toEqual([]);
+  await settled(page, (light) => (globalThis as Global).map.setLight(light), { shadows: true, azimuth_deg: 200, altitude_deg: 50 });
+  const asked = server.requests.filter((url) => /\/(noon|day|ao)\//.test(url));
+  expect(asked.length).toBeGreaterThan(0);
+  expect(asked.every((url) => url.includes("/noon/"))).toBe(true);
+  await page.context().close();
+});
+
+test("a moment sets the light of the sun over the scene; a direction of one's own forgets it", async () => {
+  const { page } = await start(browser, `${host}/tiles/plain`);
+  const [noon, time] = await page.evaluate(() => {
+    const { map } = globalThis as Global;
+    map.setTime(new Date("2026-06-21T11:15:00Z"));
+    return [map.light, map.time?.toISOString()] as const;
+  });
+  expect(time).toBe("2026-06-21T11:15:00.000Z");
+  expect(noon.altitude_deg).toBeCloseTo(65.3, 1);
+  expect(noon.azimuth_deg).toBeGreaterThan(176);
+  expect(noon.azimuth_deg).toBeLessThan(180);
+  const bright = await pixels(page);
+  await settled(page, () => (globalThis as Global).map.setTime(new Date("2026-06-21T22:30:00Z")), null);
+  await page.screenshot({ path: `${OUT}/night.png` });
+  const dark = await pixels(page);
+  const mean = (bytes: Buffer, k: number): number => bytes.reduce((sum, value, at) => sum + (at % 4 === k ? value : 0), 0);
+  expect(mean(dark, 0)).toBeLessThan(0.65 * mean(bright, 0));
+  expect(mean(dark, 2) / mean(dark, 0)).toBeGreaterThan(1.2 * (mean(bright, 2) / mean(bright, 0)));
+  expect(await page.evaluate(() => (globalThis as Global).map.setLight({ azimuth_deg: 10 }).time)).toBeNull();
+  await page.context().close();
+});
+
+test("places have longitudes and latitudes, and the other way round", async () => {
+  const { page } = await start(browser, `${host}/tiles/plain`);
+  const [there, back] = await page.evaluate(() => {
+    const { map } = globalThis as Global;
+    const lonLat = map.lonLat([691012, 5335950, 510]);
+    return [lonLat, lonLat && map.fromLonLat(lonLat)] as const;
+  });
+  expect(there?.[0]).toBeCloseTo(11.5680891, 5);
+  expect(back?.[0]).toBeCloseTo(691012, 3);
+  expect(back?.[1]).toBeCloseTo(5335950, 3);
+  await page.context().close();
+});
