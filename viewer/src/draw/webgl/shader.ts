@@ -87,7 +87,7 @@ uniform usampler2D u_shadow;
 uniform uvec2 u_suns;     // numbers of the two suns
 uniform float u_share;    // of the second
 float unshaded(ivec2 at) {
-  uvec2 lit = texelFetch(u_shadow, at, 0).r >> u_suns & 1u;
+  uvec2 lit = uvec2(texelFetch(u_shadow, at, 0).r) >> u_suns & uvec2(1u);
   return mix(float(lit.x), float(lit.y), u_share);
 }
 #endif
