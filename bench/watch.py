@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-MEMORY_S, DISK_S = 0.2, 5.0
+MEMORY_S, DISK_S = 0.2, 20.0
 
 
 @dataclass

@@ -233,8 +233,12 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
   #frame(now: number): void {
     this.stepCamera(now);
     if (this.#hover) this.#fireHover(this.#hover);
-    if (this.#dirty || this.camera !== this.#drawn) this.#draw();
-    else this.#settle();
+    try {
+      if (this.#dirty || this.camera !== this.#drawn) this.#draw();
+      else this.#settle();
+    } catch (reason) {
+      this.report(asError(reason));
+    }
   }
 
   #draw(): void {

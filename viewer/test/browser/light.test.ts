@@ -6,6 +6,7 @@ import { TestServer } from "../fixture/server";
 import { openBrowser, OUT } from "./browser";
 import { cosine, decodedLevel, litByte, placeOf, spread, type Shares } from "./level";
 import type { Global } from "./page";
+import type { Light } from "../../src/map3d";
 import { addBarePage, pixels, settled, start } from "./start";
 
 let browser: Browser;
@@ -33,20 +34,23 @@ const bits = (share: number) => (x: number, y: number): number => {
   return ((value >> 1) & 1) * (1 - share) + ((value >> 2) & 1) * share;
 };
 const all = (): number => 1;
-const RGB = { sun_rgb: [1, 0.7, 0.4], sky_rgb: [0.5, 0.6, 1] } as const;
+type Share = (x: number, y: number) => number;
+type Row = [name: string, towards: { azimuth_deg: number; altitude_deg: number }, more: Partial<Light>, sky: Share, sun: Share];
+const RGB: Partial<Light> = { sun_rgb: [1, 0.7, 0.4], sky_rgb: [0.5, 0.6, 1] };
 
 describe("rendered light dims what is lit, pixel by pixel", () => {
   const noon = { azimuth_deg: NOON.azimuth_deg, altitude_deg: NOON.elevation_deg };
   const hour = { azimuth_deg: DAY[1]?.azimuth_deg ?? 0, altitude_deg: DAY[1]?.elevation_deg ?? 0 };
-  test.each([
+  const rows: Row[] = [
     ["the sun's own layer", noon, { occlusion: false }, all, (x: number, y: number) => PATTERN.sun(x, y) / 255],
     ["an hour of the day", hour, { occlusion: false }, all, bits(0)],
     ["occlusion alone", noon, { shadows: false }, (x: number, y: number) => PATTERN.ao(x, y) / 255, all],
     ["shadows and occlusion in colours", hour, RGB, (x: number, y: number) => PATTERN.ao(x, y) / 255, bits(0)],
     ["no layer for another sun", { azimuth_deg: 300, altitude_deg: 30 }, { occlusion: false }, all, all],
-  ] as const)("%s", async (_, towards, more, skyAt, sunAt) => {
+  ];
+  test.each(rows.flatMap((row) => (["webgl", "canvas"] as const).map((drawer) => [drawer, ...row] as const)))("%s: %s", async (drawer, _, towards, more, skyAt, sunAt) => {
     const light = { ambient: 0.3, diffuse: 0.6, sun_rgb: [1, 1, 1], sky_rgb: [1, 1, 1], ...towards, ...more };
-    const { page } = await start(browser, `${host}/tiles/town`, { zoom: 3, light });
+    const { page } = await start(browser, `${host}/tiles/town`, { zoom: 3, light, drawer });
     const got = await pixels(page);
     const [color, normal] = [decodedLevel(town, "color"), decodedLevel(town, "normal")];
     const [left, top] = await placeOf(page);

@@ -38,12 +38,12 @@ export function settled<A>(page: Page, act: (argument: A) => unknown, argument: 
 export async function pixels(page: Page): Promise<Buffer> {
   const text = await page.evaluate(() => {
     const { canvas } = (globalThis as Global).map;
-    const gl = canvas.getContext("webgl2") as WebGL2RenderingContext;
+    const gl = canvas.getContext("webgl2");
     const [row, height] = [4 * canvas.width, canvas.height];
-    const data = new Uint8Array(row * height);
-    gl.readPixels(0, 0, canvas.width, height, gl.RGBA, gl.UNSIGNED_BYTE, data);
+    const data = gl ? new Uint8Array(row * height) : canvas.getContext("2d")?.getImageData(0, 0, canvas.width, height).data ?? new Uint8ClampedArray();
+    gl?.readPixels(0, 0, canvas.width, height, gl.RGBA, gl.UNSIGNED_BYTE, data);
     let out = "";
-    for (let j = height - 1; j >= 0; j--) for (let i = 0; i < row; i += 400) out += String.fromCharCode(...data.subarray(row * j + i, row * j + Math.min(i + 400, row)));
+    for (let k = 0, j = gl ? height - 1 : 0; k < height; k++, j += gl ? -1 : 1) for (let i = 0; i < row; i += 400) out += String.fromCharCode(...data.subarray(row * j + i, row * j + Math.min(i + 400, row)));
     return btoa(out);
   });
   return Buffer.from(text, "base64");

@@ -1,47 +1,56 @@
 import { describe, expect, test } from "vitest";
 import type { Pass } from "../../src/draw/drawer";
 import { kindsBeside, kindsOf, lookOf, type Look } from "../../src/draw/canvas/look";
-import { lightOn } from "../../src/draw/canvas/lightOn";
+import { lightOn, type Lamp, type Shades } from "../../src/draw/canvas/lightOn";
 import { colorOfId, shade, type Around } from "../../src/draw/canvas/shade";
 import { areaOf, gridOf } from "../../src/draw/canvas/sheet";
 import { placeQuads } from "../../src/draw/plan";
 import { frameOf } from "../../src/geo/frame";
-import { DEFAULT_LIGHT, lambert, towardsLight } from "../../src/geo/light";
+import { DEFAULT_LIGHT, towardsLight } from "../../src/geo/light";
 
-const LAMP = { sun: towardsLight(DEFAULT_LIGHT), ambient: 0.42, diffuse: 0.76 };
+const LAMP: Lamp = { sun: towardsLight(DEFAULT_LIGHT), sky: [0.42, 0.42, 0.42], beam: [0.76, 0.76, 0.76], occlusion: false, shadow: null };
 const LOOK: Look = { mode: "id", masked: false, light: null, highlight: null, rim: [0, 0], depthRange: null };
-const ALONE: Around = { normal: [], id: [] };
-const bytes = (...normal: number[][]): Uint8Array => Uint8Array.from(normal.flat());
+const ALONE: Around = { shades: [], id: [] };
+const bytes = (...normal: number[][]): Shades => ({ normal: Uint8Array.from(normal.flat()) });
 const UP = [128, 128, 255];
 const SOUTH = [128, 0, 128];
 const NOTHING = [0, 0, 0];
 
-/** Light on a stored normal. */
+/** Share of the sun's light on a stored normal. */
 const strength = (stored: number[]): number => {
   const n = stored.map((byte) => (byte / 255) * 2 - 1);
-  const length = Math.hypot(...n);
-  return lambert(DEFAULT_LIGHT, n.map((part) => part / length) as unknown as [number, number, number]);
+  const cosine = n.reduce((sum, part, k) => sum + part * (LAMP.sun[k as 0]), 0) / Math.hypot(...n);
+  return Math.max(0, cosine);
 };
 
 describe("light", () => {
   test("is half a pixel's own and an eighth of each neighbour's, across tile borders, too", () => {
-    const [light] = lightOn(LAMP, 1, 1, bytes(UP), [bytes(SOUTH), bytes(SOUTH), bytes(UP), undefined]);
+    const [sky, light] = lightOn(LAMP, 1, 1, bytes(UP), [bytes(SOUTH), bytes(SOUTH), bytes(UP), undefined]);
+    expect(sky).toBe(1);
     expect(light).toBeCloseTo(0.75 * strength(UP) + 0.25 * strength(SOUTH), 6);
   });
 
   test("of a tile's own pixels is the same as across a border", () => {
     const whole = lightOn(LAMP, 2, 1, bytes(UP, SOUTH), []);
-    expect(lightOn(LAMP, 1, 1, bytes(UP), [undefined, bytes(SOUTH)])[0]).toBe(whole[0]);
-    expect(lightOn(LAMP, 1, 1, bytes(SOUTH), [bytes(UP)])[0]).toBe(whole[1]);
+    expect(lightOn(LAMP, 1, 1, bytes(UP), [undefined, bytes(SOUTH)])[1]).toBe(whole[1]);
+    expect(lightOn(LAMP, 1, 1, bytes(SOUTH), [bytes(UP)])[1]).toBe(whole[3]);
     const column = lightOn(LAMP, 1, 2, bytes(UP, SOUTH), []);
-    expect(lightOn(LAMP, 1, 1, bytes(UP), [, , , bytes(SOUTH)])[0]).toBe(column[0]);
-    expect(lightOn(LAMP, 1, 1, bytes(SOUTH), [, , bytes(UP)])[0]).toBe(column[1]);
+    expect(lightOn(LAMP, 1, 1, bytes(UP), [, , , bytes(SOUTH)])[1]).toBe(column[1]);
+    expect(lightOn(LAMP, 1, 1, bytes(SOUTH), [, , bytes(UP)])[1]).toBe(column[3]);
   });
 
   test("beside nothing, a pixel's own counts; where there is no normal it is middling", () => {
     const light = lightOn(LAMP, 2, 1, bytes(UP, NOTHING), []);
-    expect(light[0]).toBeCloseTo(strength(UP), 6);
-    expect(light[1]).toBeCloseTo(0.42 + 0.38, 6);
+    expect(light[1]).toBeCloseTo(strength(UP), 6);
+    expect([light[2], light[3]]).toEqual([1, 0.5]);
+  });
+
+  test("is dimmed by occlusion and shadows, each pixel by its own", () => {
+    const shades = (ao: number, suns: number): Shades => ({ ...bytes(UP), ao: Uint8Array.of(ao), shadow: Uint16Array.of(suns) });
+    const lamp: Lamp = { ...LAMP, occlusion: true, shadow: { kind: "sun16", first: 3, second: 4, share: 0.25 } };
+    const [sky, sun] = lightOn(lamp, 1, 1, shades(255, 0b01000), [shades(51, 0b10000), shades(51, 0), shades(255, 0b11000), undefined]);
+    expect(sky).toBeCloseTo(0.5 + (0.2 + 0.2 + 1 + 1) / 8, 6);
+    expect(sun).toBeCloseTo(strength(UP) * (0.75 / 2 + (0.25 + 0 + 1 + 0.75) / 8), 6);
   });
 });
 
@@ -70,8 +79,8 @@ describe("pictures", () => {
       return [0, 1, 2, 3, 4, 5, 6, 7, 8].filter((at) => out[4 * at] === 255 && out[4 * at + 1] === 0);
     };
     expect(rims(ALONE)).toEqual([]);
-    expect(rims({ normal: [], id: [undefined, new Uint32Array(9).fill(8)] })).toEqual([2, 5, 8]);
-    expect(rims({ normal: [], id: [undefined, undefined, new Uint32Array(9)] })).toEqual([0, 1, 2]);
+    expect(rims({ shades: [], id: [undefined, new Uint32Array(9).fill(8)] })).toEqual([2, 5, 8]);
+    expect(rims({ shades: [], id: [undefined, undefined, new Uint32Array(9)] })).toEqual([0, 1, 2]);
   });
 
   test("of depths run from the first to the last colour", () => {
@@ -81,7 +90,7 @@ describe("pictures", () => {
 });
 
 describe("looks", () => {
-  const pass = { mode: "lit", masked: true, depthRange: [0, 9] } as unknown as Pass;
+  const pass = { mode: "lit", masked: true, depthRange: [0, 9], baked: { shadow: null, occlusion: false } } as unknown as Pass;
   const frame = { width: 1, height: 1, dpr: 1, light: DEFAULT_LIGHT, passes: [] };
 
   test("name what they need and what counts beyond the edge", () => {

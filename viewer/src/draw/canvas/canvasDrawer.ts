@@ -3,7 +3,7 @@ import type { Tile } from "../../geo/frame";
 import type { LayerKind } from "../../geo/manifest";
 import { standsFor } from "../../tiles/cover";
 import { neededKinds, type Drawer, type DrawerEvents, type FrameSpec, type Pass, type Quad } from "../drawer";
-import { kindsBeside, kindsOf, lookOf, type Look } from "./look";
+import { kindsBeside, kindsOf, lookOf, lookWith, type Look } from "./look";
 import { Pictures, type Picture, type Wish } from "./pictures";
 import type { Order } from "./shade.worker";
 import { areaOf, gridOf, Sheet, type Grid, type Piece } from "./sheet";
@@ -98,7 +98,7 @@ export class CanvasDrawer implements Drawer {
       const data = this.#given.has(key) ? null : pass.tiles.data(kind, tile);
       if (data) {
         this.#tilePx = data.width;
-        this.#pictures.put(key, data, data.kind === "color" ? [data.bitmap] : data.kind === "normal" ? [data.values.buffer] : []);
+        this.#pictures.put(key, data, "bitmap" in data ? [data.bitmap] : data.kind === "normal" ? [data.values.buffer] : []);
         this.#given.set(key, picture);
         picture.parts.add(key);
         pass.tiles.taken(kind, tile);
@@ -112,7 +112,7 @@ export class CanvasDrawer implements Drawer {
     const grid = gridOf(pass, this.#tilePx);
     if (!grid || this.#tilePx === 0) return;
     const pieces = pass.quads.filter(({ from }) => wanted.has(nameIn(pass, from))).flatMap((quad) => this.#piecesFor(pass, grid, quad));
-    if (pieces.length > 0) this.#sheet.show(this.#context, grid, pieces, pass.mode === "lit" || pass.mode === "color", pass.opacity);
+    if (pieces.length > 0) this.#sheet.show(this.#context, grid, pieces, pass.mode === "lit" || pass.mode === "color" || pass.mode === "picture", pass.opacity);
   }
 
   /** What stands for a quad: the picture of its tile, or of tiles below or above it that have one. */
@@ -126,12 +126,12 @@ export class CanvasDrawer implements Drawer {
   }
 
   #wish({ tiles }: Pass, picture: Picture, { from, look, layers, far }: Wanted): Wish {
-    const shown = look.highlight !== null && layers.id === undefined ? { ...look, highlight: null } : look;
+    const shown = lookWith(look, (kind) => layers[kind] !== undefined);
     const beside: Partial<Record<LayerKind, string[]>> = {};
     let edges = 0;
-    for (const kind of kindsBeside(shown)) {
+    for (const [number, kind] of kindsBeside(shown).entries()) {
       const keys = BESIDE.map(([dx, dy]) => tiles.key(kind, { z: from.z, x: from.x + dx, y: from.y + dy }));
-      keys.forEach((key, k) => (edges |= this.#given.has(key) ? 1 << (k + (kind === "id" ? 4 : 0)) : 0));
+      keys.forEach((key, k) => (edges |= this.#given.has(key) ? 1 << (k + 4 * number) : 0));
       beside[kind] = keys;
     }
     const text = JSON.stringify(shown);

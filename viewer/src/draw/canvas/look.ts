@@ -2,14 +2,25 @@ import type { Light } from "../../geo/light";
 import { towardsLight } from "../../geo/light";
 import type { LayerKind } from "../../geo/manifest";
 import type { Vec2, Vec3 } from "../../core/vec";
-import { neededKinds, type FrameSpec, type Mode, type Pass } from "../drawer";
+import type { Shadow } from "../../geo/shadows";
+import { neededKinds, type Baked, type FrameSpec, type Mode, type Pass } from "../drawer";
+
+/** Of lit tiles. */
+interface Lamp {
+  /** Unit vector towards the sun. */
+  readonly sun: Vec3;
+  /** Linear light, RGB: everywhere, and of the sun on a surface that faces it. */
+  readonly sky: Vec3;
+  readonly beam: Vec3;
+  readonly occlusion: boolean;
+  readonly shadow: (Omit<Shadow, "layer"> & { readonly kind: "sun" | "sun16" }) | null;
+}
 
 /** All that a tile's picture depends on besides the tile. */
 export interface Look {
   readonly mode: Mode;
   readonly masked: boolean;
-  /** Of lit tiles: unit vector towards the sun, ambient, diffuse. */
-  readonly light: { readonly sun: Vec3; readonly ambient: number; readonly diffuse: number } | null;
+  readonly light: Lamp | null;
   /** Under this name the worker has the colours of highlighted ids. */
   readonly highlight: string | null;
   /** A highlight's rim: pixels to the right and below, to the left and above (negative), at which the id differs. */
@@ -20,12 +31,24 @@ export interface Look {
 /** Kinds that a picture is made from. Without ids a highlight is not shown. */
 export function kindsOf(look: Look): LayerKind[] {
   const needed = neededKinds(look.mode, look.masked);
-  return look.highlight !== null && !needed.includes("id") ? [...needed, "id"] : needed;
+  return [...needed, ...bakedKindsOf(look), ...(look.highlight !== null && !needed.includes("id") ? ["id" as const] : [])];
+}
+
+/** Rendered light; what is not here is done without. */
+function bakedKindsOf({ light }: Look): LayerKind[] {
+  return [...(light?.shadow ? [light.shadow.kind] : []), ...(light?.occlusion ? ["ao" as const] : [])];
+}
+
+/** The look of a picture for which some layers are not here. */
+export function lookWith(look: Look, has: (kind: LayerKind) => boolean): Look {
+  const { light, highlight } = look;
+  const lamp = light && { ...light, occlusion: light.occlusion && has("ao"), shadow: light.shadow && has(light.shadow.kind) ? light.shadow : null };
+  return { ...look, light: lamp, highlight: highlight !== null && has("id") ? highlight : null };
 }
 
 /** Kinds of which the pixels beyond the tile's edge count, too. */
 export function kindsBeside(look: Look): LayerKind[] {
-  return [...(look.light ? ["normal" as const] : []), ...(look.highlight === null ? [] : ["id" as const])];
+  return [...(look.light ? ["normal" as const, ...bakedKindsOf(look)] : []), ...(look.highlight === null ? [] : ["id" as const])];
 }
 
 /** @param scale texels a device pixel  @param highlight name of the pass's highlighted ids */
@@ -33,15 +56,24 @@ export function lookOf({ light, dpr }: FrameSpec, pass: Pass, scale: number, hig
   const mode = pass.mode === "lit" && !light.lit ? "color" : pass.mode;
   return {
     mode,
-    masked: pass.masked && (mode === "lit" || mode === "color"),
-    light: mode === "lit" ? lampOf(light) : null,
+    masked: pass.masked && (mode === "lit" || mode === "color" || mode === "picture"),
+    light: mode === "lit" ? lampOf(light, pass.baked) : null,
     highlight,
     rim: highlight === null ? [0, 0] : rimOf(Math.max(1, 1.25 * dpr * scale)),
     depthRange: mode === "depth" ? pass.depthRange : null,
   };
 }
 
-const lampOf = (light: Readonly<Light>): Look["light"] => ({ sun: towardsLight(light), ambient: light.ambient, diffuse: light.diffuse });
+function lampOf(light: Readonly<Light>, { shadow, occlusion }: Baked): Lamp {
+  const scaled = (rgb: Vec3, by: number): Vec3 => [rgb[0] * by, rgb[1] * by, rgb[2] * by];
+  return {
+    sun: towardsLight(light),
+    sky: scaled(light.sky_rgb, light.ambient),
+    beam: scaled(light.sun_rgb, light.diffuse),
+    occlusion,
+    shadow: shadow && { kind: shadow.layer.kind === "sun" ? "sun" : "sun16", first: shadow.first, second: shadow.second, share: shadow.share },
+  };
+}
 
 /** From a pixel's middle. */
 const rimOf = (width: number): Vec2 => [Math.floor(0.5 + width), Math.floor(0.5 - width)];

@@ -1,6 +1,6 @@
 import type { Rgb } from "../drawer";
 import type { Look } from "./look";
-import { lightOn } from "./lightOn";
+import { lightOn, type Lamp, type Shades } from "./lightOn";
 
 /** A tile's layers; pixels row by row from the top. */
 export interface Layers {
@@ -8,7 +8,7 @@ export interface Layers {
   readonly height: number;
   /** RGBA, straight alpha. */
   readonly color?: Uint8ClampedArray | undefined;
-  readonly normal?: Uint8Array | undefined;
+  readonly shades?: Shades | undefined;
   readonly id?: Uint32Array | undefined;
   readonly depth?: Uint32Array | undefined;
 }
@@ -17,7 +17,7 @@ export interface Layers {
 export type Beside<T> = readonly (T | undefined)[];
 
 export interface Around {
-  readonly normal: Beside<Uint8Array>;
+  readonly shades: Beside<Shades>;
   readonly id: Beside<Uint32Array>;
 }
 
@@ -51,14 +51,23 @@ function showColors(out: Bytes, look: Look, layers: Layers, around: Around): voi
   const { color = out, id } = layers;
   out.set(color);
   for (let at = 0; look.masked && id && at < id.length; at++) out[4 * at + 3] = id[at] === 0 ? 0 : 255;
-  if (!look.light || !layers.normal) return;
-  const light = lightOn(look.light, layers.width, layers.height, layers.normal, around.normal);
-  for (let at = 0, k = 0; at < light.length; at++, k += 4) {
-    const strength = light[at] as number;
-    out[k] = litByte(out[k] as number, strength);
-    out[k + 1] = litByte(out[k + 1] as number, strength);
-    out[k + 2] = litByte(out[k + 2] as number, strength);
+  if (!look.light || !layers.shades) return;
+  const shares = lightOn(look.light, layers.width, layers.height, layers.shades, around.shades);
+  const [red, green, blue] = ([0, 1, 2] as const).map((channel) => strengthIn(look.light as Lamp, channel)) as [Strength, Strength, Strength];
+  for (let at = 0, k = 0; at < shares.length; at += 2, k += 4) {
+    const [sky, sun] = [shares[at] as number, shares[at + 1] as number];
+    out[k] = litByte(out[k] as number, red(sky, sun));
+    out[k + 1] = litByte(out[k + 1] as number, green(sky, sun));
+    out[k + 2] = litByte(out[k + 2] as number, blue(sky, sun));
   }
+}
+
+type Strength = (sky: number, sun: number) => number;
+
+/** Linear light in a channel, of shares of the sky's and the sun's. */
+export function strengthIn({ sky, beam }: Lamp, channel: 0 | 1 | 2): Strength {
+  const [of, from] = [sky[channel], beam[channel]];
+  return (share, lit) => of * share + from * lit;
 }
 
 function litByte(byte: number, strength: number): number {
@@ -66,7 +75,8 @@ function litByte(byte: number, strength: number): number {
   return BYTE[light < 65535 ? light | 0 : 65535] as number;
 }
 
-function showNormals(out: Bytes, { normal }: Layers): void {
+function showNormals(out: Bytes, { shades }: Layers): void {
+  const normal = shades?.normal;
   for (let k = 0, from = 0; normal && k < out.length; k += 4, from += 3) {
     const [r, g, b] = [normal[from] as number, normal[from + 1] as number, normal[from + 2] as number];
     out[k] = r;

@@ -2,6 +2,7 @@ import type { LayerKind } from "../../geo/manifest";
 import type { TileData } from "../../tiles/tileData";
 import type { Rgb } from "../drawer";
 import type { Look } from "./look";
+import type { Shades } from "./lightOn";
 import { shade, type Around, type Layers } from "./shade";
 import { composed } from "./unread";
 
@@ -66,21 +67,23 @@ async function fill({ ticket, look, layers, beside }: Order): Promise<void> {
 }
 
 async function paint(look: Look, names: Order["layers"], beside: Order["beside"]): Promise<ImageBitmap> {
-  const color = tile(names.color);
-  const data = [color, tile(names.normal), tile(names.id), tile(names.depth)].filter((value) => value !== undefined);
-  const { width, height } = data[0] ?? { width: 0, height: 0 };
-  const bitmap = color?.kind === "color" ? color.bitmap : undefined;
+  const pictured = names.color ?? names.picture;
+  const color = tile(pictured);
+  const { width, height } = [color, tile(names.normal), tile(names.id), tile(names.depth)].find((value) => value !== undefined) ?? { width: 0, height: 0 };
+  const bitmap = color && "bitmap" in color ? color.bitmap : undefined;
+  const shades = shadesOf(look, names.normal, names.ao, names[look.light?.shadow?.kind ?? "sun"]);
   const layers: Layers = {
     width,
     height,
-    color: exact && bitmap && names.color !== undefined ? pixelsOf(names.color, bitmap) : undefined,
-    normal: bytes(names.normal),
+    color: exact && bitmap && pictured !== undefined ? pixelsOf(pictured, bitmap) : undefined,
+    shades,
     id: words(names.id),
     depth: words(names.depth),
   };
-  const around: Around = { normal: (beside.normal ?? []).map(bytes), id: (beside.id ?? []).map(words) };
+  const shadow = beside[look.light?.shadow?.kind ?? "sun"];
+  const around: Around = { shades: (beside.normal ?? []).map((name, k) => shadesOf(look, name, beside.ao?.[k], shadow?.[k])), id: (beside.id ?? []).map(words) };
   const colors = look.highlight === null ? undefined : (kept.get(look.highlight) as ReadonlyMap<number, Rgb> | undefined);
-  if (bitmap && !exact && (look.mode === "lit" || look.mode === "color")) return composed(look, bitmap, layers, around, colors);
+  if (bitmap && !exact && look.mode !== "id" && look.mode !== "normal" && look.mode !== "depth") return composed(look, bitmap, layers, around, colors);
   return createImageBitmap(new ImageData(shade(look, layers, around, colors), width, height));
 }
 
@@ -89,9 +92,11 @@ function tile(name: string | undefined): TileData | undefined {
   return value && "kind" in value ? value : undefined;
 }
 
-function bytes(name: string | undefined): Uint8Array | undefined {
-  const data = tile(name);
-  return data?.kind === "normal" ? data.values : undefined;
+/** What the light of a tile depends on; none when a part that the look asks for is not here. */
+function shadesOf({ light }: Look, normal: string | undefined, ao: string | undefined, shadow: string | undefined): Shades | undefined {
+  const [n, o, s] = [tile(normal), light?.occlusion ? tile(ao) : undefined, light?.shadow ? tile(shadow) : undefined];
+  if (n?.kind !== "normal" || (light?.occlusion && o?.kind !== "ao") || (light?.shadow && s?.kind !== light.shadow.kind)) return undefined;
+  return { normal: n.values, ao: o?.kind === "ao" ? o.values : undefined, shadow: s?.kind === "sun" || s?.kind === "sun16" ? s.values : undefined };
 }
 
 function words(name: string | undefined): Uint32Array | undefined {

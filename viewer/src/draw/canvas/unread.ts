@@ -1,7 +1,7 @@
 import type { Rgb } from "../drawer";
 import type { Look } from "./look";
-import { lightOn } from "./lightOn";
-import { eachHighlighted, packed, type Around, type Layers } from "./shade";
+import { lightOn, type Lamp } from "./lightOn";
+import { eachHighlighted, packed, strengthIn, type Around, type Layers } from "./shade";
 
 /**
  * A colour tile's picture made by compositing alone, for browsers that do not let pixels be read exactly. Light
@@ -11,7 +11,7 @@ export function composed(look: Look, bitmap: ImageBitmap, layers: Layers, around
   const { width, height } = layers;
   const context = canvasOf(width, height);
   context.drawImage(bitmap, 0, 0);
-  if (look.light && layers.normal) shine(context, lightOn(look.light, width, height, layers.normal, around.normal));
+  if (look.light && layers.shades) shine(context, look.light, lightOn(look.light, width, height, layers.shades, around.shades));
   context.globalCompositeOperation = "destination-in";
   context.drawImage(look.masked && layers.id ? imageOf(width, height, (at) => (layers.id?.[at] ? 0xff000000 : 0)) : bitmap, 0, 0);
   if (colors) tint(context, look, layers, around, colors);
@@ -31,18 +31,21 @@ function imageOf(width: number, height: number, word: (at: number) => number): O
 }
 
 /** Light up to 1 multiplies; what is above 1 divides by its inverse, which "color-dodge" does. Alpha is spoilt. */
-function shine(context: OffscreenCanvasRenderingContext2D, light: Float32Array): void {
+function shine(context: OffscreenCanvasRenderingContext2D, lamp: Lamp, shares: Float32Array): void {
   const { width, height } = context.canvas;
-  const grey = (byte: number): number => 0xff000000 + 0x010101 * Math.round(255 * byte);
-  const roots = light.map((strength) => strength ** (1 / 2.2));
+  const roots = ([0, 1, 2] as const).map((channel) => {
+    const strength = strengthIn(lamp, channel);
+    return Float32Array.from({ length: width * height }, (_, at) => strength(shares[2 * at] as number, shares[2 * at + 1] as number) ** (1 / 2.2));
+  });
+  const wordOf = (at: number, byte: (root: number) => number): number => packed(roots.map((root) => byte(root[at] ?? 1)) as unknown as Rgb);
   // Drawn upon themselves, pixels in part covered become opaque and keep their colour, as blending wants it.
   context.globalCompositeOperation = "source-over";
   for (let k = 0; k < 8; k++) context.drawImage(context.canvas, 0, 0);
   context.globalCompositeOperation = "multiply";
-  context.drawImage(imageOf(width, height, (at) => grey(Math.min(roots[at] ?? 1, 1))), 0, 0);
-  if (!roots.some((root) => root > 1)) return;
+  context.drawImage(imageOf(width, height, (at) => wordOf(at, (root) => Math.min(root, 1))), 0, 0);
+  if (!roots.some((channel) => channel.some((root) => root > 1))) return;
   context.globalCompositeOperation = "color-dodge";
-  context.drawImage(imageOf(width, height, (at) => grey(Math.max(1 - 1 / (roots[at] ?? 1), 0))), 0, 0);
+  context.drawImage(imageOf(width, height, (at) => wordOf(at, (root) => Math.max(1 - 1 / root, 0))), 0, 0);
 }
 
 /** tint × (½ + 0.65 grey) over 28 % of the colour; the rim on top, opaque. */
