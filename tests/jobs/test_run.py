@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from pyproj import CRS
 
 pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
 
@@ -32,7 +33,7 @@ def workspace(tmp_path: Path, faults: Path) -> Workspace:
 @pytest.fixture
 def catalogue(workspace: Workspace) -> Iterator[Catalogue]:
     opened = workspace.open_catalogue()
-    crs = SceneCrs(25832, "PROJCRS[…]", "ETRS89 / UTM zone 32N", "DHHN2016 height")
+    crs = SceneCrs(25832, CRS.from_epsg(25832).to_wkt(), "ETRS89 / UTM zone 32N", "DHHN2016 height")
     opened.create_scene(SceneRecord("town", "A town", "© someone", crs, (691_000.0, 5_336_000.0, 500.0)))
     workspace.scene_folder("town").mkdir(parents=True)
     opened.create_rendering(rendering())
