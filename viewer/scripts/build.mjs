@@ -23,6 +23,17 @@ const workers = {
   },
 };
 
+/** Entries beside the core use it by its public names: as a module from map3d.mjs, in a script from the global. */
+const ENTRIES = { measure: "src/measure/index.ts" };
+
+const coreAs = (how) => ({
+  name: "core",
+  setup(build) {
+    build.onResolve({ filter: /\/map3d$/ }, () => (how === "module" ? { path: "./map3d.mjs", external: true } : { path: "map3d", namespace: "global" }));
+    build.onLoad({ filter: /.*/, namespace: "global" }, () => ({ contents: "module.exports = map3d;", loader: "js" }));
+  },
+});
+
 async function bundle(entry, name, options) {
   await esbuild.build({ ...shared, banner, entryPoints: [join(root, entry)], outfile: join(dist, name), plugins: [workers], ...options });
 }
@@ -32,6 +43,10 @@ async function build() {
   mkdirSync(dist, { recursive: true });
   await bundle("src/map3d.ts", "map3d.mjs", { format: "esm" });
   await bundle("src/map3d.ts", "map3d.js", { format: "iife", globalName: "map3d" });
+  for (const [name, entry] of Object.entries(ENTRIES)) {
+    await bundle(entry, `map3d-${name}.mjs`, { format: "esm", plugins: [coreAs("module"), workers] });
+    await bundle(entry, `map3d-${name}.js`, { format: "iife", plugins: [coreAs("global"), workers], globalName: "entry", banner: { js: `${banner.js}\n(() => {` }, footer: { js: "Object.assign(map3d, entry);\n})();" } });
+  }
   await bundle("page/page.ts", "page.js", { format: "esm", external: ["./map3d.mjs"] });
   await esbuild.build({ ...shared, entryPoints: [join(root, "page/page.css")], outfile: join(dist, "page.css"), target: ["chrome111", "firefox121", "safari16.4"] });
   cpSync(join(root, "page/index.html"), join(dist, "index.html"));
@@ -48,6 +63,7 @@ function writeDeclarations() {
     writeFileSync(join(types, file), text.replace(/((?:from|import) ?\(?")(\.[^"]+)"/g, '$1$2.js"'));
   }
   writeFileSync(join(dist, "map3d.d.mts"), 'export * from "./types/map3d.js";\n');
+  for (const name of Object.keys(ENTRIES)) writeFileSync(join(dist, `map3d-${name}.d.mts`), `export * from "./types/${name}/index.js";\n`);
   writeFileSync(join(dist, "map3d.d.ts"), 'export * from "./types/map3d.js";\nexport as namespace map3d;\n');
 }
 

@@ -26,12 +26,13 @@ export function icon(path: string): SVGSVGElement {
   return svg;
 }
 
-const adopted = new WeakSet<Document>();
+const adopted = new WeakMap<Document, Set<string>>();
 
-/** Adds the viewer's style sheet to a document, once. A constructed sheet, which a CSP without inline styles allows. */
+/** Adds a style sheet of the viewer to a document, once. A constructed sheet, which a CSP without inline styles allows. */
 export function adoptStyles(document: Document, css: string): void {
-  if (adopted.has(document)) return;
-  adopted.add(document);
+  const known = adopted.get(document) ?? new Set();
+  if (known.has(css)) return;
+  adopted.set(document, known.add(css));
   const sheet = new CSSStyleSheet();
   sheet.replaceSync(css);
   document.adoptedStyleSheets = [sheet, ...document.adoptedStyleSheets];
