@@ -10,6 +10,8 @@ export interface Steered {
   /** At once, without smoothing. */
   pinch(factor: number, anchor: Vec2): unknown;
   zoomBy(delta: number, anchor: Vec2): unknown;
+  /** +1: the next direction counter-clockwise, which turns the picture clockwise. */
+  rotate(step: number): unknown;
   tap(at: Vec2): void;
   hover(at: Vec2): void;
 }
@@ -23,6 +25,8 @@ const TAP_PX = 6;
 const DOUBLE_TAP_MS = 320;
 const DOUBLE_TAP_PX = 28;
 const VELOCITY_MS = 90;
+/** Two fingers turned so far turn the view to the next direction. */
+const TWIST_RAD = (28 * Math.PI) / 180;
 
 /** Mouse, touch and pen on the canvas: drag, pinch, wheel, tap, double tap. */
 export class Gestures {
@@ -32,6 +36,8 @@ export class Gestures {
   readonly #listeners = new AbortController();
   #trail: { at: Vec2; ms: number }[] = [];
   #moved = false;
+  /** Clockwise, since the last turn. */
+  #twist_rad = 0;
   #lastTap: { at: Vec2; ms: number } | null = null;
 
   constructor(map: Steered, canvas: HTMLCanvasElement) {
@@ -63,6 +69,7 @@ export class Gestures {
     else this.#moved = true;
     this.#touches.set(event.pointerId, { at, start: at });
     this.#trail = [];
+    this.#twist_rad = 0;
   }
 
   #move(event: PointerEvent): void {
@@ -92,6 +99,17 @@ export class Gestures {
     const after = Math.hypot(at[0] - other.at[0], at[1] - other.at[1]);
     this.#map.panBy((at[0] - touch.at[0]) / 2, (at[1] - touch.at[1]) / 2);
     if (before > 0 && after > 0) this.#map.pinch(after / before, [(at[0] + other.at[0]) / 2, (at[1] + other.at[1]) / 2]);
+    this.#twist(touch.at, other.at, at);
+  }
+
+  /** Snaps to the rendered directions. */
+  #twist(from: Vec2, other: Vec2, to: Vec2): void {
+    const angle = ([x, y]: Vec2): number => Math.atan2(y - other[1], x - other[0]);
+    const turned = angle(to) - angle(from);
+    this.#twist_rad += turned - 2 * Math.PI * Math.round(turned / (2 * Math.PI));
+    if (Math.abs(this.#twist_rad) < TWIST_RAD) return;
+    this.#map.rotate(Math.sign(this.#twist_rad));
+    this.#twist_rad = 0;
   }
 
   #up(event: PointerEvent, meant: boolean): void {

@@ -9,6 +9,7 @@ import { DEFAULT_LIGHT, validLight, type Light } from "../geo/light";
 import { marker } from "../overlay/marker";
 import { attributionLine } from "../ui/attribution";
 import { controls } from "../ui/controls";
+import { scaleBar } from "../ui/scaleBar";
 import { DebugTiles } from "../ui/debugTiles";
 import { STYLES } from "../ui/styles";
 import { FrameLoop } from "./frameLoop";
@@ -315,7 +316,7 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
   #dress(): void {
     const { controlPane, overlayPane } = this.#viewport;
     overlayPane.append(this.#debug.pane);
-    if (this.options.controls) controlPane.append(controls(this));
+    if (this.options.controls) controlPane.append(controls(this), scaleBar(this));
     if (this.options.attribution) controlPane.append(attributionLine(this, () => this.#layers.map((layer) => layer.attribution)));
   }
 

@@ -5,7 +5,7 @@ import { depthAtHeight, localFromUvd, uvdFromLocal } from "../geo/axes";
 import { cssPixelM, projectedBox, screenFromLocal, uvFromScreen, zoomedAt, zoomToFit, type Camera } from "../geo/camera";
 import { localFromLonLat, lonLatOf } from "../geo/geographic";
 import type { Rendering, View } from "../geo/manifest";
-import { neighbourView } from "./directions";
+import { neighbourView, tiltedView } from "./directions";
 import { limited, zoomLimits } from "./limits";
 import { Motion } from "./motion";
 import type { FilledOptions, MapEvents } from "./options";
@@ -48,6 +48,11 @@ export abstract class Viewing extends Evented<MapEvents> {
   /** At whole numbers a tile pixel of that level is one CSS pixel. */
   get zoom(): number {
     return this.camera?.zoom ?? 0;
+  }
+
+  /** Of the ground across the screen, a CSS pixel; 0 before "ready". */
+  get metresPerPixel(): number {
+    return this.camera ? cssPixelM(this.camera) : 0;
   }
 
   /** Least and greatest. */
@@ -128,6 +133,14 @@ export abstract class Viewing extends Evented<MapEvents> {
   /** The next direction of the same pitch, +1 counter-clockwise. */
   rotate(step: number): this {
     return this.whenReady((camera, rendering) => this.setDirection(neighbourView(rendering, camera.frame, step)));
+  }
+
+  /** The next pitch of the nearest direction, +1 steeper; nothing when there is none. */
+  tilt(step: number): this {
+    return this.whenReady((camera, rendering) => {
+      const view = tiltedView(rendering, camera.frame, step);
+      if (view !== null) this.setDirection(view);
+    });
   }
 
   /** CSS pixels of a world position; null before "ready". */

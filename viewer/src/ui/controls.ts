@@ -11,16 +11,39 @@ export interface Steering {
   rotate(step: number): unknown;
   setDirection(id: string): unknown;
   on(type: "zoom" | "directionchange", listener: () => void): unknown;
+  /** What fills the screen. */
+  readonly container: HTMLElement;
 }
 
 const PLUS = "M12 5v14M5 12h14";
 const MINUS = "M5 12h14";
 const LEFT = "M4 10a8 8 0 1 1 2.3 7.6M4 4v6h6";
+const WHOLE = "M4 9V4h5M15 4h5v5M20 15v5h-5M9 20H4v-5";
+const PART = "M9 4v5H4M20 9h-5V4M15 20v-5h5M4 15h5v5";
 const RIGHT = "M20 10a8 8 0 1 0-2.3 7.6M20 4v6h-6";
 
-/** Zoom buttons, and a compass with buttons that turn the view when there are several. */
+/** Zoom buttons, a compass with buttons that turn the view when there are several, and one that fills the screen where that can be done. */
 export function controls(map: Steering): HTMLElement {
-  return element("div", "map3d-buttons", {}, turnGroup(map), zoomGroup(map));
+  const whole = document.fullscreenEnabled ? [screenGroup(map)] : [];
+  return element("div", "map3d-buttons", {}, ...whole, turnGroup(map), zoomGroup(map));
+}
+
+/** The whole page fills the screen, with all that lies on the map. */
+function screenGroup({ container }: Steering): HTMLElement {
+  const button = iconButton("", "Fill the screen", WHOLE);
+  const group = element("div", "map3d-group", { role: "group", "aria-label": "Screen" }, button);
+  const isWhole = (): boolean => document.fullscreenElement !== null;
+  button.addEventListener("click", () => {
+    // Refused without a user's gesture, or by the page's policy: then all stays as it is.
+    void (isWhole() ? document.exitFullscreen() : document.documentElement.requestFullscreen()).catch(() => undefined);
+  });
+  const show = (): void => {
+    if (!container.isConnected) document.removeEventListener("fullscreenchange", show);
+    button.querySelector("path")?.setAttribute("d", isWhole() ? PART : WHOLE);
+    button.setAttribute("aria-label", isWhole() ? "Leave the whole screen" : "Fill the screen");
+  };
+  document.addEventListener("fullscreenchange", show);
+  return group;
 }
 
 function zoomGroup(map: Steering): HTMLElement {

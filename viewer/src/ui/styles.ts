@@ -40,6 +40,10 @@ export const STYLES = `
 .map3d-compass .map3d-south { fill: var(--map3d-faint); stroke: none; opacity: 0.55; }
 @media (prefers-reduced-motion: reduce) { .map3d-compass svg { transition: none; } }
 
+.map3d-scale { position: absolute; left: max(16px, env(safe-area-inset-left)); bottom: calc(8px + env(safe-area-inset-bottom)); height: 14px; box-sizing: border-box; border: solid var(--map3d-faint); border-width: 0 1.5px 1.5px;
+  color: var(--map3d-faint); font-size: 11px; line-height: 12px; text-align: center; text-shadow: 0 0 3px var(--map3d-background), 0 0 3px var(--map3d-background); pointer-events: none; }
+.map3d-scale[hidden] { display: none; }
+
 .map3d-attribution { position: absolute; right: 0; bottom: 0; max-width: 100%; box-sizing: border-box; margin: 0; padding: 3px 12px calc(4px + env(safe-area-inset-bottom));
   color: var(--map3d-faint); font-size: 11px; text-align: right; text-shadow: 0 0 3px var(--map3d-background), 0 0 3px var(--map3d-background); pointer-events: none; }
 .map3d-message { position: absolute; inset: 0; display: grid; place-content: center; margin: 0; padding: 24px; text-align: center; max-width: 42ch; justify-self: center; margin-inline: auto; }

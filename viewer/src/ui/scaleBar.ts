@@ -1,0 +1,37 @@
+import { element } from "../core/dom";
+
+/** What the bar needs of a map. */
+export interface Scaled {
+  /** Metres a CSS pixel, across the screen; 0 while there is nothing to see. */
+  readonly metresPerPixel: number;
+  on(type: "zoom" | "ready" | "directionchange", listener: () => void): unknown;
+}
+
+const LONGEST_PX = 110;
+
+/** A bar as long as a round number of metres. It holds across the screen everywhere; upwards the ground is foreshortened. */
+export function scaleBar(map: Scaled): HTMLElement {
+  const text = element("span", "");
+  const bar = element("div", "map3d-scale", { role: "img" }, text);
+  const show = (): void => {
+    const longest_m = LONGEST_PX * map.metresPerPixel;
+    bar.hidden = !(longest_m > 0);
+    if (bar.hidden) return;
+    const metres = roundBelow(longest_m);
+    bar.style.width = `${(metres / map.metresPerPixel).toFixed(1)}px`;
+    text.textContent = lengthOf(metres);
+    bar.setAttribute("aria-label", `Scale: ${lengthOf(metres)}`);
+  };
+  for (const type of ["zoom", "ready", "directionchange"] as const) map.on(type, show);
+  show();
+  return bar;
+}
+
+/** 1, 2 or 5 times a power of ten. */
+export function roundBelow(value: number): number {
+  const power = 10 ** Math.floor(Math.log10(value));
+  const digit = value / power;
+  return power * (digit >= 5 ? 5 : digit >= 2 ? 2 : 1);
+}
+
+const lengthOf = (metres: number): string => metres >= 1000 ? `${String(metres / 1000)} km` : metres >= 1 ? `${String(metres)} m` : `${String(Math.round(metres * 100))} cm`;
