@@ -1,6 +1,7 @@
 import { imageLayer, map, Map3dError, type ClickEvent, type Vec3 } from "./map3d.mjs";
 import { InfoPanel } from "./info";
 import { bindLight, lightAt } from "./light";
+import { Tools } from "./tools";
 import { bindModes } from "./modes";
 import { bindSearch } from "./search";
 import { readPlace, writePlace } from "./place";
@@ -24,8 +25,9 @@ function open(): void {
     if (layer.rendering) toast(error.message);
     else fail("This rendering cannot be shown", error.message);
   });
+  let tools: Tools | undefined;
   view.on("click", (event) => {
-    show(event, layer, info);
+    if (!tools?.active) show(event, layer, info);
   });
   view.on("moveend", () => {
     writePlace(view);
@@ -35,6 +37,7 @@ function open(): void {
   });
   layer.on("ready", () => {
     dress(view, layer, info);
+    if (layer.rendering?.layers.has("depth")) tools = new Tools(view);
   });
   layer.addTo(view);
 }

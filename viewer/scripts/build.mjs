@@ -47,7 +47,7 @@ async function build() {
     await bundle(entry, `map3d-${name}.mjs`, { format: "esm", plugins: [coreAs("module"), workers] });
     await bundle(entry, `map3d-${name}.js`, { format: "iife", plugins: [coreAs("global"), workers], globalName: "entry", banner: { js: `${banner.js}\n(() => {` }, footer: { js: "Object.assign(map3d, entry);\n})();" } });
   }
-  await bundle("page/page.ts", "page.js", { format: "esm", external: ["./map3d.mjs"] });
+  await bundle("page/page.ts", "page.js", { format: "esm", external: ["./map3d.mjs", "./map3d-measure.mjs"] });
   await esbuild.build({ ...shared, entryPoints: [join(root, "page/page.css")], outfile: join(dist, "page.css"), target: ["chrome111", "firefox121", "safari16.4"] });
   cpSync(join(root, "page/index.html"), join(dist, "index.html"));
   const tsc = join(root, "node_modules/typescript/bin/tsc");

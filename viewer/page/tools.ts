@@ -1,0 +1,42 @@
+import type { map } from "./map3d.mjs";
+import type { measure } from "./map3d-measure.mjs";
+import { byId } from "./dom";
+import { toast } from "./messages";
+
+type Kind = "line" | "area";
+
+/** Buttons that measure on the map: one at a time; pressed again, it is put away. */
+export class Tools {
+  readonly #view: map;
+  readonly #buttons: ReadonlyMap<Kind, HTMLElement>;
+  #tool: measure | undefined;
+  #kind: Kind | null = null;
+
+  constructor(view: map) {
+    this.#view = view;
+    this.#buttons = new Map((["line", "area"] as const).map((kind) => [kind, byId(`measure-${kind}`)]));
+    for (const [kind, button] of this.#buttons) button.addEventListener("click", () => void this.#choose(this.#kind === kind ? null : kind));
+    byId("tools").hidden = false;
+  }
+
+  /** Clicks on the map belong to a tool. */
+  get active(): boolean {
+    return this.#kind !== null;
+  }
+
+  async #choose(kind: Kind | null): Promise<void> {
+    this.#kind = kind;
+    this.#tool?.remove();
+    this.#tool = undefined;
+    for (const [own, button] of this.#buttons) button.setAttribute("aria-pressed", String(own === kind));
+    byId("hint").hidden = kind === null;
+    byId("hint").textContent = kind === "line" ? "Click along what you measure." : "Click the corners of a roof, a wall or a piece of ground.";
+    if (kind === null) return;
+    try {
+      const made = await import("./map3d-measure.mjs");
+      if (this.#kind === kind) this.#tool = new made.measure({ kind }).addTo(this.#view);
+    } catch (reason) {
+      toast(`The tool cannot be loaded: ${String(reason)}`);
+    }
+  }
+}
