@@ -8,11 +8,11 @@ export function lightAt(hour: number): Pick<Light, "azimuth_deg" | "altitude_deg
 }
 
 /** The slider moves the light through a day, that of the date where the scene's place is known; it rests while nothing is lit. */
-export function bindLight(view: map, layer: imageLayer): void {
+export function bindLight(view: map, layer: imageLayer, first?: Date): void {
   const { rendering } = layer;
   if (!rendering) return;
   const [time, sun] = [inputById("time"), byId("sun")];
-  if (rendering.json.geographic) bindDay(view, rendering);
+  if (rendering.json.geographic) bindDay(view, rendering, first);
   else time.addEventListener("input", () => { showClock(time.valueAsNumber); view.setLight(lightAt(time.valueAsNumber)); });
   bindShadows(view, rendering);
   byId("modes").addEventListener("change", () => {
@@ -22,7 +22,7 @@ export function bindLight(view: map, layer: imageLayer): void {
   });
 }
 
-function bindDay(view: map, rendering: Rendering): void {
+function bindDay(view: map, rendering: Rendering, asked: Date | undefined): void {
   const [time, day] = [inputById("time"), inputById("day")];
   const zone = (): number => zoneOf(rendering.json.geographic?.lon_lat[0] ?? 0, -new Date(`${day.value}T12:00`).getTimezoneOffset() / 60);
   const moment = (hour: number): Date => new Date(Date.parse(`${day.value}T00:00Z`) + (hour - zone()) * 3_600_000);
@@ -33,10 +33,13 @@ function bindDay(view: map, rendering: Rendering): void {
   };
   [time.min, time.max, time.step] = ["0", "24", String(1 / 12)];
   byId("days").hidden = false;
-  const first = firstMoment(rendering);
+  const first = asked ?? firstMoment(rendering);
   day.value = first.toISOString().slice(0, 10);
-  const hour = rendering.json.layers.some(({ suns }) => suns?.[0]?.time) ? (first.getTime() - Date.parse(`${day.value}T00:00Z`)) / 3_600_000 + zone() : 14;
-  time.valueAsNumber = Math.min(Math.max(hour, 0), 24);
+  // By the clock there it may be the day before or after.
+  const local = new Date(first.getTime() + zone() * 3_600_000);
+  day.value = local.toISOString().slice(0, 10);
+  const known = asked !== undefined || rendering.json.layers.some(({ suns }) => suns?.[0]?.time);
+  time.valueAsNumber = known ? local.getUTCHours() + local.getUTCMinutes() / 60 : 14;
   time.addEventListener("input", show);
   day.addEventListener("input", show);
   show();

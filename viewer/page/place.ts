@@ -1,17 +1,49 @@
-import type { map, MapOptions, Vec3 } from "./map3d.mjs";
+import type { map, Vec3 } from "./map3d.mjs";
 
-/** The view in the address: `#<direction>/<x>/<y>/<z>/<zoom>`, so that it can be shared. Anything else is ignored. */
-export function readPlace(hash: string): Pick<MapOptions, "direction" | "center" | "zoom"> {
-  const [direction, ...parts] = decodeURIComponent(hash.replace(/^#/, "")).split("/");
-  const numbers = parts.map(Number);
-  if (!direction || numbers.length !== 4 || !numbers.every(Number.isFinite)) return {};
-  const [x, y, z, zoom] = numbers as [number, number, number, number];
-  return { direction, center: [x, y, z] as Vec3, zoom };
+/** What a page's address says of what is seen. */
+export interface Place {
+  readonly direction?: string;
+  readonly center?: Vec3;
+  readonly zoom?: number;
+  /** Of the light. */
+  readonly time?: Date;
+  /** Of the chosen object. */
+  readonly id?: number;
 }
 
-export function writePlace(view: map): void {
-  const { center } = view;
+/** `#<direction>/<x>/<y>/<z>/<zoom>`, then `/t=<UTC time>` and `/id=<object>` if they are set. Anything else is ignored. */
+export function readPlace(hash: string): Place {
+  const [direction, x, y, z, zoom, ...more] = decoded(hash.replace(/^#/, "")).split("/");
+  const numbers = [x, y, z, zoom].map(Number);
+  if (!direction || !x || !y || !z || !zoom || !numbers.every(Number.isFinite)) return {};
+  const value = (name: string): string | undefined => more.find((part) => part.startsWith(`${name}=`))?.slice(name.length + 1);
+  const [time, id] = [new Date(value("t") ?? ""), Number(value("id") ?? "")];
+  return {
+    direction,
+    center: numbers.slice(0, 3) as unknown as Vec3,
+    zoom: numbers[3] as number,
+    ...(!Number.isNaN(time.getTime()) && { time }),
+    ...(Number.isInteger(id) && id > 0 && { id }),
+  };
+}
+
+/** Puts what is seen into the address; `step`: as a step that the back button takes back. */
+export function writePlace(view: map, id: number, step = false): void {
+  const { center, time } = view;
   if (!center) return;
-  const place = [view.direction, ...center.map((part) => part.toFixed(1)), view.zoom.toFixed(2)].join("/");
-  history.replaceState(null, "", `#${place}`);
+  const parts = [view.direction, ...center.map((part) => part.toFixed(1)), view.zoom.toFixed(2)];
+  if (time) parts.push(`t=${time.toISOString().slice(0, 16)}Z`);
+  if (id > 0) parts.push(`id=${String(id)}`);
+  const hash = `#${parts.join("/")}`;
+  if (hash === location.hash) return;
+  if (step) history.pushState(null, "", hash);
+  else history.replaceState(null, "", hash);
+}
+
+function decoded(text: string): string {
+  try {
+    return decodeURIComponent(text);
+  } catch {
+    return "";
+  }
 }
