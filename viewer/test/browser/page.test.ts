@@ -120,3 +120,48 @@ test("the first phone view costs less than 1 MB with the script and the manifest
   expect(bytes).toBeLessThan(1_000_000);
   await page.context().close();
 });
+
+test("view, time and choice are in the address; the back button takes a choice back", async () => {
+  const { page, problems } = await open(DESK);
+  await page.fill("#query", "Tower");
+  await page.waitForSelector("#results li");
+  await page.keyboard.press("Enter");
+  await page.waitForSelector("#info:not([hidden])");
+  await page.locator("#time").fill("9");
+  await page.waitForFunction(() => location.hash.includes("/id=2000000001") && /\/t=[-\d]+T\d\d:\d\dZ/.test(location.hash));
+  await page.waitForTimeout(1500);
+  const shared = page.url();
+  const { page: other } = await openPage(browser, DESK);
+  await other.goto(shared);
+  await other.waitForSelector("#info:not([hidden])");
+  expect(await other.locator("#info h2").textContent()).toBe("Tower");
+  expect(await other.locator("#clock").textContent()).toBe("9:00");
+  await other.waitForTimeout(1500);
+  expect(other.url()).toBe(shared);
+  await page.goBack();
+  await page.waitForSelector("#info", { state: "hidden" });
+  expect(page.url()).not.toContain("id=");
+  expect(problems).toEqual([]);
+  await page.context().close();
+  await other.context().close();
+});
+
+test("tools measure where the map is clicked, and nothing is chosen meanwhile", async () => {
+  const { page, problems } = await open(PHONE);
+  await page.locator("#measure-line").tap();
+  await page.waitForSelector(".map3d-measure", { state: "attached" });
+  await page.touchscreen.tap(150, 420);
+  await page.waitForFunction(() => document.querySelectorAll(".map3d-measure circle").length === 1);
+  await page.waitForTimeout(600);
+  await page.touchscreen.tap(240, 450);
+  await page.waitForFunction(() => document.querySelectorAll(".map3d-measure circle").length === 2);
+  await page.screenshot({ path: `${OUT}/phone-measure.png` });
+  expect(await page.locator(".map3d-measure-main").textContent()).toMatch(/^\d+\.\d+ m {2}[↑↓] \d+\.\d\d m$/);
+  expect(await page.locator("#info").isHidden()).toBe(true);
+  await page.locator("#measure-line").tap();
+  expect(await page.locator(".map3d-measure").count()).toBe(0);
+  await page.touchscreen.tap(150, 420);
+  await page.waitForSelector("#info:not([hidden])");
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
