@@ -163,19 +163,18 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
     const baked = this.#baked(this.#rendering, light);
     const ids: LayerKind[] = (this.#colors.size > 0 || hover) && !needed.includes("id") ? ["id"] : [];
     const extra = [...(light.lit ? bakedKinds(mode, baked) : []), ...ids];
-    return planLayer(sight, this.#rendering, view, this.#store, { layers: layersWith(this.#rendering, baked), needed, extra });
+    return planLayer(sight, this.#rendering, view, this.#store, { baked, layers: layersWith(this.#rendering, baked), needed, extra });
   }
 
   /** @internal */
-  pass(plan: LayerPlan, light: Readonly<Light>): Pass {
+  pass(plan: LayerPlan): Pass {
     const rendering = this.#rendering as Rendering;
-    const baked = this.#baked(rendering, light);
     return {
       mode: this.#shownMode(rendering),
       level: plan.level,
       quads: plan.quads,
-      tiles: this.#access(plan.view, layersWith(rendering, baked)),
-      baked,
+      tiles: this.#access(plan.view, plan.layers),
+      baked: plan.baked,
       highlight: this.#colors,
       masked: this.#masked(rendering),
       opacity: this.options.opacity,

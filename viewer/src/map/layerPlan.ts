@@ -5,7 +5,7 @@ import { ancestor, type Frame, type Tile } from "../geo/frame";
 import type { LayerInfo, LayerKind, Rendering, View } from "../geo/manifest";
 import { corners } from "../core/vec";
 import { placeQuads } from "../draw/plan";
-import type { Quad } from "../draw/drawer";
+import type { Baked, Quad } from "../draw/drawer";
 import { coverOf, fromTheMiddle, levelFor, standsFor, type Rect } from "../tiles/cover";
 import type { Job } from "../tiles/queue";
 import type { Store } from "../tiles/store";
@@ -14,6 +14,9 @@ import type { Sight } from "./stage";
 /** What a layer wants painted and fetched for a camera. */
 export interface LayerPlan {
   readonly view: View;
+  readonly baked: Baked;
+  /** The layers that are shown, by kind. */
+  readonly layers: ReadonlyMap<string, LayerInfo>;
   readonly level: number;
   readonly cover: readonly Tile[];
   readonly quads: readonly Quad[];
@@ -31,14 +34,15 @@ export function middleIn(frame: Frame, { camera, origin }: Sight, rendering: Ren
   return [camera.u + dot(frame.axes.right, shift), camera.v + dot(frame.axes.up, shift)];
 }
 
-/** What a layer shows: its layers by kind, those without which a tile is not shown, and those that are fetched after them. */
+/** What a layer shows: its layers by kind, the light that was rendered, kinds without which a tile is not shown, and those that are fetched after them. */
 export interface Wanted {
+  readonly baked: Baked;
   readonly layers: ReadonlyMap<string, LayerInfo>;
   readonly needed: readonly LayerKind[];
   readonly extra: readonly LayerKind[];
 }
 
-export function planLayer(sight: Sight, rendering: Rendering, view: View, store: Store, { layers, needed, extra }: Wanted): LayerPlan {
+export function planLayer(sight: Sight, rendering: Rendering, view: View, store: Store, { baked, layers, needed, extra }: Wanted): LayerPlan {
   const { frame, occupancy } = view;
   const { camera, dpr } = sight;
   const [u, v] = middleIn(frame, sight, rendering);
@@ -57,7 +61,7 @@ export function planLayer(sight: Sight, rendering: Rendering, view: View, store:
     ...jobsFor(layers, store, view, needed, ordered),
     ...jobsFor(layers, store, view, extra, ordered),
   ];
-  return { view, level, cover, quads, jobs, complete: jobs.length === 0 };
+  return { view, baked, layers, level, cover, quads, jobs, complete: jobs.length === 0 };
 }
 
 /** Least and greatest depth value that the rendering's box can have in a view. */

@@ -78,7 +78,7 @@ export class Painter {
     });
     this.#queue.want(planned.flatMap(({ plan }) => plan.jobs));
     const { width, height } = this.#viewport.canvas;
-    this.#drawer.draw({ width, height, dpr: sight.dpr, light, passes: planned.map(({ layer, plan }) => layer.pass(plan, light)) });
+    this.#drawer.draw({ width, height, dpr: sight.dpr, light, passes: planned.map(({ layer, plan }) => layer.pass(plan)) });
     const complete = layers.every((layer) => layer.rendering) && planned.every(({ plan }) => plan.complete);
     return { plans: planned.map(({ plan }) => plan), complete: complete && !this.#drawer.busy };
   }

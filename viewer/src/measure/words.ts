@@ -13,9 +13,10 @@ export class Words {
     return `${this.#numbers(size >= 99.995 ? 1 : 2).format(metres)} m`;
   }
 
-  /** With a sign, up or down. */
+  /** With an arrow up or down, unless it is level as far as the words tell. */
   rise(metres: number): string {
-    return `${metres < 0 ? "↓" : "↑"} ${this.length(Math.abs(metres))}`;
+    const arrow = Math.abs(metres) < 0.005 ? "" : metres < 0 ? "↓ " : "↑ ";
+    return arrow + this.length(Math.abs(metres));
   }
 
   area(squareMetres: number): string {

@@ -1,33 +1,16 @@
-import { afterAll, beforeAll, describe, expect, test } from "vitest";
-import type { Browser, Page } from "playwright-core";
+import { describe, expect, test } from "vitest";
+import type { Page } from "playwright-core";
 import { encodePng } from "../fixture/encodePng";
 import { renderRamp, renderTown, type Fixture } from "../fixture/rendering";
 import { ORIGIN } from "../fixture/town";
-import { TestServer } from "../fixture/server";
-import { openBrowser, openPage, OUT } from "./browser";
-import type { Global } from "./page";
-import { addBarePage, picture, settled, start } from "./start";
+import { TestBed } from "./bed";
+import { OUT } from "./browser";
+import { picture, settled, type Global } from "./page";
 
-let browser: Browser;
-let host: string;
-const server = new TestServer();
 const town = renderTown();
 const VIEWPORT = { width: 500, height: 400 };
 
-beforeAll(async () => {
-  server.renderings.set("town", town);
-  server.renderings.set("ramp", renderRamp());
-  server.renderings.set("opaque", opaque(town));
-  server.renderings.set("broken", broken(town));
-  addBarePage(server);
-  host = await server.listen();
-  browser = await openBrowser();
-});
-
-afterAll(async () => {
-  await browser.close();
-  await server.close();
-});
+const bed = new TestBed({ town, ramp: renderRamp(), opaque: opaque(town), broken: broken(town) });
 
 /** The town with colour that has no alpha, as jpeg has it. */
 function opaque({ json, files, raw }: Fixture): Fixture {
@@ -65,7 +48,7 @@ function differenceOf(a: Buffer, b: Buffer): Difference {
 async function both(name: string, options: object = {}, layer: object = {}, deviceScaleFactor = 1): Promise<{ pages: Page[]; close: () => Promise<void> }> {
   const pages: Page[] = [];
   for (const drawer of ["webgl", "canvas"]) {
-    const { page, problems } = await start(browser, `${host}/tiles/${name}`, { zoom: 3, drawer, ...options }, layer, { deviceScaleFactor, viewport: VIEWPORT });
+    const { page, problems } = await bed.start(name, { zoom: 3, drawer, ...options }, layer, { deviceScaleFactor, viewport: VIEWPORT });
     expect(problems).toEqual([]);
     expect(await page.evaluate(() => (globalThis as Global).map.drawer)).toBe(drawer);
     pages.push(page);
@@ -116,7 +99,7 @@ describe("where a tile pixel is a device pixel, both drawers differ by no more t
   test("with a second layer that lets the first one through", async () => {
     const { pages, close } = await both("town");
     const add = (url: string): unknown => new (globalThis as Global).map3d.imageLayer(url, { mode: "id", opacity: 0.4 }).addTo((globalThis as Global).map);
-    expect((await compared(pages, add, `${host}/tiles/opaque`)).most).toBeLessThanOrEqual(2.01);
+    expect((await compared(pages, add, bed.url("opaque"))).most).toBeLessThanOrEqual(2.01);
     await pages[1]?.screenshot({ path: `${OUT}/canvas-layers.png` });
     await close();
   });
@@ -143,7 +126,7 @@ describe("at zooms between", () => {
   });
 
   test.each([[4, 1, 2.4], [3.37, 1, 3.4], [2.5, 1, 6.2], [2.71, 2, 4], [3.9, 3, 2]])("at zoom %d and pixel ratio %i no seam is seen between tiles", async (zoom, dpr, most) => {
-    const { page } = await start(browser, `${host}/tiles/ramp`, { zoom, light: { lit: false }, drawer: "canvas" }, {}, { deviceScaleFactor: dpr });
+    const { page } = await bed.start("ramp", { zoom, light: { lit: false }, drawer: "canvas" }, {}, { deviceScaleFactor: dpr });
     const got = await picture(page);
     const width = 800 * dpr;
     let steepest = 0;
@@ -178,23 +161,23 @@ describe("the drawer is chosen", () => {
   };
 
   test.each([["auto", "canvas", /^$/], ["webgl", null, /no WebGL2/]])("%s without WebGL2", async (drawer, name, message) => {
-    const { page } = await openPage(browser);
+    const { page } = await bed.openPage();
     await page.addInitScript(withoutWebGL);
-    await page.goto(`${host}/bare`);
+    await page.goto(`${bed.server.origin}/bare`);
     const got = await page.evaluate(([base, drawer]) => new Promise<{ name: string | null; message: string }>((done) => {
       const g = globalThis as Global;
       const map = new g.map3d.map("mapcanvas", { drawer: drawer as "auto" });
       const layer = new g.map3d.imageLayer(base).addTo(map);
       map.once("idle", () => { done({ name: map.drawer, message: "" }); }).on("error", ({ error }) => { done({ name: map.drawer, message: error.message }); });
       return layer;
-    }), [`${host}/tiles/town`, drawer] as const);
+    }), [bed.url("town"), drawer] as const);
     expect(got.name).toBe(name);
     expect(got.message).toMatch(message);
     await page.context().close();
   });
 
   test("a context that is lost for good is replaced by a canvas without WebGL; hands still move the map", async () => {
-    const { page, problems } = await start(browser, `${host}/tiles/town`, { zoom: 3 });
+    const { page, problems } = await bed.start("town", { zoom: 3 });
     const before = await picture(page);
     const told = await page.evaluate(async () => {
       const { map } = globalThis as Global;
@@ -225,7 +208,7 @@ describe("the drawer is chosen", () => {
 });
 
 test("picks are exact", async () => {
-  const { page } = await start(browser, `${host}/tiles/town`, { drawer: "canvas" });
+  const { page } = await bed.start("town", { drawer: "canvas" });
   const roof: [number, number, number] = [ORIGIN[0] - 45, ORIGIN[1] - 4, ORIGIN[2] + 34];
   const pick = await page.evaluate(async (world) => {
     const { map } = globalThis as Global;
@@ -238,7 +221,7 @@ test("picks are exact", async () => {
 });
 
 test("idle means no frames and no messages to workers", async () => {
-  const { page } = await start(browser, `${host}/tiles/town`, { drawer: "canvas" });
+  const { page } = await bed.start("town", { drawer: "canvas" });
   const counts = await page.evaluate(() => new Promise<{ resting: number; moving: number }>((done) => {
     let count = 0;
     const [request, post] = [globalThis.requestAnimationFrame.bind(globalThis), Object.getOwnPropertyDescriptor(Worker.prototype, "postMessage")?.value as Worker["postMessage"]];
@@ -262,7 +245,7 @@ test("idle means no frames and no messages to workers", async () => {
 });
 
 test("while new light is computed the old picture stays", async () => {
-  const { page } = await start(browser, `${host}/tiles/town`, { drawer: "canvas" });
+  const { page } = await bed.start("town", { drawer: "canvas" });
   const least = await page.evaluate(() => new Promise<number>((done) => {
     const { map } = globalThis as Global;
     const copy = new OffscreenCanvas(80, 60).getContext("2d", { willReadFrequently: true }) as OffscreenCanvasRenderingContext2D;
@@ -284,8 +267,8 @@ test("while new light is computed the old picture stays", async () => {
 
 test("where pixels cannot be read as they are, light is composed instead, nearly the same", async () => {
   const options = { zoom: 3, light: { azimuth_deg: 215, altitude_deg: 48, ambient: 0.42, diffuse: 0.9 } };
-  const { page: plain } = await start(browser, `${host}/tiles/town`, { ...options, drawer: "webgl" });
-  const { page } = await openPage(browser);
+  const { page: plain } = await bed.start("town", { ...options, drawer: "webgl" });
+  const { page } = await bed.openPage();
   await page.addInitScript(() => {
     const spoil = "{ const read = OffscreenCanvasRenderingContext2D.prototype.getImageData; OffscreenCanvasRenderingContext2D.prototype.getImageData = function (...at) { const image = read.apply(this, at); for (let k = 0; k < image.data.length; k++) image.data[k] ^= 7 * (k & 1); return image; }; }";
     const Plain = Blob;
@@ -295,13 +278,13 @@ test("where pixels cannot be read as they are, light is composed instead, nearly
       }
     };
   });
-  await page.goto(`${host}/bare`);
+  await page.goto(`${bed.server.origin}/bare`);
   await page.evaluate(([base, options]) => new Promise<void>((done) => {
     const g = globalThis as Global;
     g.map = new g.map3d.map("mapcanvas", { ...options, drawer: "canvas" });
     g.layer = new g.map3d.imageLayer(base).addTo(g.map);
     g.map.once("idle", () => { done(); }).debug();
-  }), [`${host}/tiles/town`, options] as const);
+  }), [bed.url("town"), options] as const);
   expect(await page.locator(".map3d-debug > p").textContent()).toMatch(/^canvas: light by compositing/);
   const lit = differenceOf(await picture(plain), await picture(page));
   await page.screenshot({ path: `${OUT}/canvas-composed.png` });

@@ -1,31 +1,15 @@
-import { afterAll, beforeAll, describe, expect, test } from "vitest";
-import type { Browser } from "playwright-core";
+import { describe, expect, test } from "vitest";
 import { DAY, NOON, PATTERN, withBakedLight } from "../fixture/baked";
 import { renderTown } from "../fixture/rendering";
-import { TestServer } from "../fixture/server";
-import { openBrowser, OUT } from "./browser";
+import { TestBed } from "./bed";
+import { OUT } from "./browser";
 import { cosine, decodedLevel, litByte, placeOf, spread, type Shares } from "./level";
-import type { Global } from "./page";
+import { pixels, settled, type Global } from "./page";
 import type { Light } from "../../src/map3d";
-import { addBarePage, pixels, settled, start } from "./start";
 
-let browser: Browser;
-let host: string;
-const server = new TestServer();
 const town = renderTown();
 
-beforeAll(async () => {
-  server.renderings.set("town", withBakedLight(town));
-  server.renderings.set("plain", town);
-  addBarePage(server);
-  host = await server.listen();
-  browser = await openBrowser();
-});
-
-afterAll(async () => {
-  await browser.close();
-  await server.close();
-});
+const bed = new TestBed({ town: withBakedLight(town), plain: town });
 
 const BETWEEN = { azimuth_deg: 110 + 0.3 * 25, altitude_deg: 35.6 };
 /** Share of DAY[2], from the map itself in a unit test; here as far as bytes can tell. */
@@ -50,7 +34,7 @@ describe("rendered light dims what is lit, pixel by pixel", () => {
   ];
   test.each(rows.flatMap((row) => (["webgl", "canvas"] as const).map((drawer) => [drawer, ...row] as const)))("%s: %s", async (drawer, _, towards, more, skyAt, sunAt) => {
     const light = { ambient: 0.3, diffuse: 0.6, sun_rgb: [1, 1, 1], sky_rgb: [1, 1, 1], ...towards, ...more };
-    const { page } = await start(browser, `${host}/tiles/town`, { zoom: 3, light, drawer });
+    const { page } = await bed.start("town", { zoom: 3, light, drawer });
     const got = await pixels(page);
     const [color, normal] = [decodedLevel(town, "color"), decodedLevel(town, "normal")];
     const [left, top] = await placeOf(page);
@@ -78,7 +62,7 @@ describe("rendered light dims what is lit, pixel by pixel", () => {
 });
 
 test("between two hours the picture lies between theirs", async () => {
-  const { page, problems } = await start(browser, `${host}/tiles/town`, { zoom: 3, light: { ...BETWEEN, occlusion: false } });
+  const { page, problems } = await bed.start("town", { zoom: 3, light: { ...BETWEEN, occlusion: false } });
   await page.screenshot({ path: `${OUT}/between.png` });
   const mixed = await pixels(page);
   await settled(page, () => (globalThis as Global).map.setLight({ shadows: false }), null);
@@ -92,18 +76,18 @@ test("between two hours the picture lies between theirs", async () => {
 });
 
 test("tiles of light are asked for when they are shown, after colour and normals, and never without need", async () => {
-  server.requests.length = 0;
-  const { page } = await start(browser, `${host}/tiles/town`, { light: { shadows: false, occlusion: false } });
-  expect(server.requests.filter((url) => /\/(noon|day|ao)\//.test(url))).toEqual([]);
+  bed.server.requests.length = 0;
+  const { page } = await bed.start("town", { light: { shadows: false, occlusion: false } });
+  expect(bed.server.requests.filter((url) => /\/(noon|day|ao)\//.test(url))).toEqual([]);
   await settled(page, (light) => (globalThis as Global).map.setLight(light), { shadows: true, azimuth_deg: 200, altitude_deg: 50 });
-  const asked = server.requests.filter((url) => /\/(noon|day|ao)\//.test(url));
+  const asked = bed.server.requests.filter((url) => /\/(noon|day|ao)\//.test(url));
   expect(asked.length).toBeGreaterThan(0);
   expect(asked.every((url) => url.includes("/noon/"))).toBe(true);
   await page.context().close();
 });
 
 test("a moment sets the light of the sun over the scene; a direction of one's own forgets it", async () => {
-  const { page } = await start(browser, `${host}/tiles/plain`);
+  const { page } = await bed.start("plain");
   const [noon, time] = await page.evaluate(() => {
     const { map } = globalThis as Global;
     map.setTime(new Date("2026-06-21T11:15:00Z"));
@@ -125,7 +109,7 @@ test("a moment sets the light of the sun over the scene; a direction of one's ow
 });
 
 test("places have longitudes and latitudes, and the other way round", async () => {
-  const { page } = await start(browser, `${host}/tiles/plain`);
+  const { page } = await bed.start("plain");
   const [there, back] = await page.evaluate(() => {
     const { map } = globalThis as Global;
     const lonLat = map.lonLat([691012, 5335950, 510]);

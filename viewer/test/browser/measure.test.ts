@@ -1,29 +1,15 @@
-import { afterAll, beforeAll, expect, test } from "vitest";
-import type { Browser, Page } from "playwright-core";
+import { expect, test } from "vitest";
+import type { Page } from "playwright-core";
 import type * as Measure from "../../src/measure";
 import type { Vec3 } from "../../src/map3d";
 import { renderTown } from "../fixture/rendering";
-import { TestServer } from "../fixture/server";
 import { ORIGIN } from "../fixture/town";
-import { openBrowser, OUT } from "./browser";
+import { TestBed } from "./bed";
+import { OUT } from "./browser";
 import type { Global } from "./page";
-import { addBarePage, start } from "./start";
 
-let browser: Browser;
-let host: string;
-const server = new TestServer();
 
-beforeAll(async () => {
-  server.renderings.set("town", renderTown());
-  addBarePage(server);
-  host = await server.listen();
-  browser = await openBrowser();
-});
-
-afterAll(async () => {
-  await browser.close();
-  await server.close();
-});
+const bed = new TestBed({ town: renderTown() });
 
 type Measuring = Global & { map3d: typeof Measure; tool: Measure.measure };
 /** Longer than a double tap. */
@@ -31,7 +17,7 @@ const APART_MS = 600;
 const PIXEL_M = 0.38;
 
 async function measuring(kind: "line" | "area"): Promise<{ page: Page; problems: string[] }> {
-  const opened = await start(browser, `${host}/tiles/town`);
+  const opened = await bed.start("town");
   await opened.page.addScriptTag({ url: "/map3d-measure.js" });
   await opened.page.evaluate((chosen) => {
     const g = globalThis as unknown as Measuring;

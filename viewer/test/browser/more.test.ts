@@ -1,35 +1,16 @@
-import { afterAll, beforeAll, expect, test } from "vitest";
-import type { Browser } from "playwright-core";
+import { expect, test } from "vitest";
 import { tileId } from "../../src/tiles/pmtiles";
 import { archive, renderRamp, renderTown, type Fixture } from "../fixture/rendering";
 import { encodePng } from "../fixture/encodePng";
 import { ORIGIN } from "../fixture/town";
-import { TestServer } from "../fixture/server";
-import { openBrowser, openPage, OUT } from "./browser";
-import type { Global } from "./page";
-import { addBarePage, pixels, settled, start } from "./start";
+import { serve, TestBed } from "./bed";
+import { OUT } from "./browser";
+import { pixels, settled, type Global } from "./page";
 
-let browser: Browser;
-let host: string;
-const server = new TestServer();
-const other = new TestServer();
 const town = renderTown(64, 0.76);
 
-beforeAll(async () => {
-  for (const each of [server, other]) {
-    each.renderings.set("town", town);
-    addBarePage(each);
-  }
-  server.renderings.set("ramp", renderRamp());
-  server.renderings.set("published", published(town));
-  [host] = await Promise.all([server.listen(), other.listen()]);
-  browser = await openBrowser();
-});
-
-afterAll(async () => {
-  await browser.close();
-  await Promise.all([server.close(), other.close()]);
-});
+const bed = new TestBed({ town, ramp: renderRamp(), published: published(town) });
+const other = serve({ town });
 
 /** The town as a folder with archives instead of tiles. */
 function published({ json, files, raw }: Fixture): Fixture {
@@ -50,7 +31,7 @@ function tilesOf(files: Map<string, Uint8Array>, folder: string): [number, Uint8
 }
 
 test.each([[4, 2.4], [3.37, 3.4], [2.5, 6.2]])("at zoom %d no seam is seen between tiles", async (zoom, most) => {
-  const { page } = await start(browser, `${host}/tiles/ramp`, { zoom, light: { lit: false } });
+  const { page } = await bed.start("ramp", { zoom, light: { lit: false } });
   const got = await pixels(page);
   let steepest = 0;
   for (let y = 60; y < 540; y++) {
@@ -67,9 +48,9 @@ test.each([[4, 2.4], [3.37, 3.4], [2.5, 6.2]])("at zoom %d no seam is seen betwe
 
 test("requests are spread over the hosts, each tile always from the same one", async () => {
   const second = other.origin;
-  [server, other].forEach((each) => (each.requests.length = 0));
-  const { page } = await start(browser, [`${host}/tiles/town`, `${second}/tiles/town`], { zoom: 3 });
-  const [mine, theirs] = [server, other].map((each) => new Set(each.requests.filter((url) => /\/tiles\/town\/\d/.test(url))));
+  [bed.server, other].forEach((each) => (each.requests.length = 0));
+  const { page } = await bed.start([bed.url("town"), `${second}/tiles/town`], { zoom: 3 });
+  const [mine, theirs] = [bed.server, other].map((each) => new Set(each.requests.filter((url) => /\/tiles\/town\/\d/.test(url))));
   expect(mine?.size).toBeGreaterThan(4);
   expect(theirs?.size).toBeGreaterThan(4);
   expect([...(mine ?? [])].filter((url) => theirs?.has(url))).toEqual([]);
@@ -77,20 +58,20 @@ test("requests are spread over the hosts, each tile always from the same one", a
 });
 
 test("a published folder is read from its archives by ranges", async () => {
-  server.requests.length = 0;
-  const { page } = await start(browser, `${host}/tiles/published`, { zoom: 3 });
-  const asked = server.requests.filter((url) => url.startsWith("/tiles/published/"));
+  bed.server.requests.length = 0;
+  const { page } = await bed.start("published", { zoom: 3 });
+  const asked = bed.server.requests.filter((url) => url.startsWith("/tiles/published/"));
   expect(asked.filter((url) => url.endsWith(".pmtiles")).length).toBeGreaterThan(10);
   expect(asked.filter((url) => !/pmtiles$|rendering\.json$/.test(url))).toEqual([]);
   const fromArchive = await pixels(page);
-  const { page: plain } = await start(browser, `${host}/tiles/town`, { zoom: 3 });
+  const { page: plain } = await bed.start("town", { zoom: 3 });
   expect(fromArchive.equals(await pixels(plain))).toBe(true);
   await page.context().close();
   await plain.context().close();
 });
 
 test("keys move, zoom and turn while the map has the focus", async () => {
-  const { page } = await start(browser, `${host}/tiles/town`, { zoom: 3.8 });
+  const { page } = await bed.start("town", { zoom: 3.8 });
   const state = (): Promise<{ zoom: number; direction: string; x: number }> => page.evaluate((world) => {
     const { map } = globalThis as Global;
     return { zoom: map.zoom, direction: map.direction, x: map.project(world)?.[0] ?? NaN };
@@ -109,7 +90,7 @@ test("keys move, zoom and turn while the map has the focus", async () => {
 });
 
 test("a double click zooms at the pointer; the buttons zoom and turn", async () => {
-  const { page } = await start(browser, `${host}/tiles/town`, { zoom: 3.8 });
+  const { page } = await bed.start("town", { zoom: 3.8 });
   await page.mouse.dblclick(300, 300);
   await page.waitForFunction(() => (globalThis as Global).map.zoom > 4.75);
   await page.getByRole("button", { name: "Zoom out" }).click();
@@ -122,7 +103,7 @@ test("a double click zooms at the pointer; the buttons zoom and turn", async () 
 });
 
 test("two fingers zoom about what lies between them", async () => {
-  const { page } = await start(browser, `${host}/tiles/town`, { zoom: 3.8 });
+  const { page } = await bed.start("town", { zoom: 3.8 });
   const session = await page.context().newCDPSession(page);
   const ground = await page.evaluate(() => (globalThis as Global).map.unproject([400, 300]) as [number, number, number]);
   const touch = (type: "touchStart" | "touchMove" | "touchEnd", apart: number): Promise<unknown> =>
@@ -137,7 +118,7 @@ test("two fingers zoom about what lies between them", async () => {
 });
 
 test("hovering names what lies under the pointer", async () => {
-  const { page } = await start(browser, `${host}/tiles/town`, { hover: true, zoom: 2 });
+  const { page } = await bed.start("town", { hover: true, zoom: 2 });
   const at = await page.evaluate(([x, y, z]) => {
     const { map } = globalThis as Global;
     map.on("mousemove", ({ id }) => { (globalThis as Global & { under: number }).under = id; });
@@ -149,7 +130,7 @@ test("hovering names what lies under the pointer", async () => {
 });
 
 test("the debug overlay names the tiles", async () => {
-  const { page } = await start(browser, `${host}/tiles/town`, { zoom: 4 });
+  const { page } = await bed.start("town", { zoom: 4 });
   await settled(page, () => (globalThis as Global).map.debug(true), null);
   await page.screenshot({ path: `${OUT}/debug.png` });
   expect(await page.locator(".map3d-debug > div").first().textContent()).toMatch(/^3\/\d\/\d × 2\.00$/);
@@ -157,7 +138,7 @@ test("the debug overlay names the tiles", async () => {
 });
 
 test("a removed map leaves the canvas, asks for nothing, and another can take its place", async () => {
-  const { page, problems } = await start(browser, `${host}/tiles/town`);
+  const { page, problems } = await bed.start("town");
   const left = await page.evaluate(async (base) => {
     const g = globalThis as Global;
     g.map.remove();
@@ -166,35 +147,34 @@ test("a removed map leaves the canvas, asks for nothing, and another can take it
     new g.map3d.imageLayer(base).addTo(next);
     await new Promise((done) => next.once("load", done));
     return bare;
-  }, `${host}/tiles/town`);
+  }, bed.url("town"));
   expect(left).toBe(false);
   expect(problems).toEqual([]);
   await page.context().close();
 });
 
 test("the canvas follows the window", async () => {
-  const { page } = await start(browser, `${host}/tiles/town`);
+  const { page } = await bed.start("town");
   await page.setViewportSize({ width: 500, height: 700 });
   await page.waitForFunction(() => (globalThis as Global).map.canvas.width === 500 && (globalThis as Global).map.canvas.height === 700);
   await page.context().close();
 });
 
 test("manifests of another version are refused with both numbers", async () => {
-  server.renderings.set("new", { ...town, json: { ...town.json, version: 9 } });
-  const { page } = await openPage(browser);
-  await page.goto(`${host}/bare`);
+  bed.server.renderings.set("new", { ...town, json: { ...town.json, version: 9 } });
+  const { page } = await bed.bare();
   const message = await page.evaluate((base) => new Promise<string>((done) => {
     const { map3d } = globalThis as Global;
     const map = new map3d.map("mapcanvas");
     map.on("error", ({ error }) => { done(error.message); });
     new map3d.imageLayer(base).addTo(map);
-  }), `${host}/tiles/new`);
+  }), bed.url("new"));
   expect(message).toMatch(/version 9.*version 1/);
   await page.context().close();
 });
 
 test("the cache keeps its bound while one wanders about", async () => {
-  const { page } = await start(browser, `${host}/tiles/town`, { zoom: 3, cacheBytes: 600_000 });
+  const { page } = await bed.start("town", { zoom: 3, cacheBytes: 600_000 });
   const most = await page.evaluate(async () => {
     const { map } = globalThis as Global;
     let greatest = 0;
@@ -214,13 +194,13 @@ test("the cache keeps its bound while one wanders about", async () => {
 function changed(name: string, change: (files: Map<string, Uint8Array>) => void, json: Partial<Fixture["json"]> = {}): string {
   const files = new Map(town.files);
   change(files);
-  server.renderings.set(name, { json: { ...town.json, ...json }, files, raw: town.raw });
-  return `${host}/tiles/${name}`;
+  bed.server.renderings.set(name, { json: { ...town.json, ...json }, files, raw: town.raw });
+  return bed.url(name);
 }
 
 test("a broken tile is named in an error; the rest is shown", async () => {
   const base = changed("broken", (files) => files.set("0-45/normal/3/3/4", new Uint8Array([1, 2, 3])));
-  const { page } = await start(browser, base, { zoom: 3.5 });
+  const { page } = await bed.start(base, { zoom: 3.5 });
   const errors = await page.evaluate(() => (globalThis as Global).errors);
   expect(errors.length).toBe(1);
   expect(errors[0]).toMatch(/tile 0-45\/normal\/3\/3\/4: no PNG: 3 bytes/);
@@ -231,7 +211,7 @@ test("a pick whose deepest tile cannot be had is approximate", async () => {
   const base = changed("shallow", (files) => {
     for (const path of files.keys()) if (/\/(id|depth)\/3\//.test(path)) files.set(path, new Uint8Array([0]));
   });
-  const { page } = await start(browser, base, { hover: true });
+  const { page } = await bed.start(base, { hover: true });
   const pick = await page.evaluate(async ([x, y, z]) => {
     const { map, layer } = globalThis as Global;
     const view = layer.viewOf("0-45");
@@ -255,9 +235,9 @@ test("where colour has no alpha, the id layer tells what is covered", async () =
       if (path.includes("/color/")) files.set(path, encodePng(64, 64, 4, bytes.map((value, at) => (at % 4 === 3 ? 255 : value))));
     }
   }, { layers });
-  const { page } = await start(browser, base, { zoom: 3.5 });
+  const { page } = await bed.start(base, { zoom: 3.5 });
   const got = await pixels(page);
-  const { page: plain } = await start(browser, `${host}/tiles/town`, { zoom: 3.5 });
+  const { page: plain } = await bed.start("town", { zoom: 3.5 });
   const want = await pixels(plain);
   const alphas = (bytes: Buffer): number => bytes.filter((value, at) => at % 4 === 3 && value > 127).length;
   expect(alphas(got)).toBeGreaterThan(10_000);
@@ -268,7 +248,7 @@ test("where colour has no alpha, the id layer tells what is covered", async () =
 });
 
 test("markers are reached and chosen by keys; one is selected at a time", async () => {
-  const { page } = await start(browser, `${host}/tiles/town`, { controls: false });
+  const { page } = await bed.start("town", { controls: false });
   await page.evaluate(([x, y, z]) => {
     const { map, map3d } = globalThis as Global;
     const told: string[] = [];
@@ -288,7 +268,7 @@ test("markers are reached and chosen by keys; one is selected at a time", async 
 });
 
 test("a drag that ends in motion glides on, and comes to rest", async () => {
-  const { page } = await start(browser, `${host}/tiles/town`, { zoom: 4.5 });
+  const { page } = await bed.start("town", { zoom: 4.5 });
   const at = (): Promise<number> => page.evaluate((world) => (globalThis as Global).map.project(world)?.[0] ?? 0, ORIGIN as [number, number, number]);
   await page.evaluate(() => {
     const { map } = globalThis as Global;

@@ -1,31 +1,19 @@
-import { afterAll, beforeAll, expect, test } from "vitest";
-import { devices, type Browser, type Page } from "playwright-core";
+import { expect, test } from "vitest";
+import { devices, type Page } from "playwright-core";
 import { renderTown } from "../fixture/rendering";
-import { TestServer } from "../fixture/server";
-import { openBrowser, openPage, OUT } from "./browser";
+import { TestBed } from "./bed";
+import { OUT } from "./browser";
 
-let browser: Browser;
-let host: string;
-const server = new TestServer();
 
-beforeAll(async () => {
-  server.renderings.set("town", renderTown(256, 0.38));
-  host = await server.listen();
-  browser = await openBrowser();
-});
-
-afterAll(async () => {
-  await browser.close();
-  await server.close();
-});
+const bed = new TestBed({ town: renderTown(256, 0.38) });
 
 const PHONE = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 3, isMobile: true, hasTouch: true, userAgent: devices["iPhone 14"].userAgent };
 const DESK = { viewport: { width: 1280, height: 800 } };
 
 /** The page with the town, at rest. */
-async function open(options: object, query = `rendering=${host}/tiles/town`): Promise<{ page: Page; problems: string[] }> {
-  const opened = await openPage(browser, options);
-  await opened.page.goto(`${host}/?${query}`);
+async function open(options: object, query = `rendering=${bed.url("town")}`): Promise<{ page: Page; problems: string[] }> {
+  const opened = await bed.openPage(options);
+  await opened.page.goto(`${bed.server.origin}/?${query}`);
   await opened.page.waitForFunction(() => location.hash.length > 5);
   await opened.page.waitForTimeout(1500);
   return opened;
@@ -85,8 +73,8 @@ test("the light slider and the layer switch change the picture", async () => {
 });
 
 test("a rendering that is not there is said so in words", async () => {
-  const { page } = await openPage(browser, PHONE);
-  await page.goto(`${host}/?rendering=/tiles/nowhere`);
+  const { page } = await bed.openPage(PHONE);
+  await page.goto(`${bed.server.origin}/?rendering=/tiles/nowhere`);
   await page.waitForSelector(".failed");
   expect(await page.locator(".failed").textContent()).toContain("HTTP 404");
   await page.screenshot({ path: `${OUT}/failed.png` });
@@ -107,12 +95,12 @@ test("controls are at least 44 pixels large and have names", async () => {
 });
 
 test("the first phone view costs less than 1 MB with the script and the manifest", async () => {
-  const { page } = await openPage(browser, PHONE);
+  const { page } = await bed.openPage(PHONE);
   const session = await page.context().newCDPSession(page);
   await session.send("Network.enable");
   let bytes = 0;
   session.on("Network.loadingFinished", ({ encodedDataLength }) => { bytes += encodedDataLength; });
-  await page.goto(`${host}/?rendering=${host}/tiles/town`);
+  await page.goto(`${bed.server.origin}/?rendering=${bed.url("town")}`);
   await page.waitForFunction(() => location.hash.length > 5);
   await page.waitForTimeout(1500);
   console.log(`first phone view: ${String(bytes)} bytes`);
@@ -131,7 +119,7 @@ test("view, time and choice are in the address; the back button takes a choice b
   await page.waitForFunction(() => location.hash.includes("/id=2000000001") && /\/t=[-\d]+T\d\d:\d\dZ/.test(location.hash));
   await page.waitForTimeout(1500);
   const shared = page.url();
-  const { page: other } = await openPage(browser, DESK);
+  const { page: other } = await bed.openPage(DESK);
   await other.goto(shared);
   await other.waitForSelector("#info:not([hidden])");
   expect(await other.locator("#info h2").textContent()).toBe("Tower");

@@ -1,3 +1,4 @@
+import type { Page } from "playwright-core";
 /** Runs in the page: what the tests call. map3d is the global of dist/map3d.js. */
 import type * as M from "../../src/map3d";
 
@@ -10,3 +11,40 @@ export interface Started {
 }
 
 export type Global = typeof globalThis & Started & { errors: string[]; clicks: M.ClickEvent[]; map3d: typeof M };
+
+/** Does something in the page and waits until the map rests again. */
+export function settled<A>(page: Page, act: (argument: A) => unknown, argument: A): Promise<void> {
+  return page.evaluate(([code, given]) => new Promise<void>((done) => {
+    (globalThis as Global).map.once("idle", () => { done(); });
+    (globalThis as unknown as { eval(code: string): (argument: unknown) => unknown }).eval(code)(given);
+  }), [`(${act.toString()})`, argument] as const);
+}
+
+/** Pixels of the canvas as RGBA bytes, from the top. */
+export async function pixels(page: Page): Promise<Buffer> {
+  const text = await page.evaluate(() => {
+    const { canvas } = (globalThis as Global).map;
+    const gl = canvas.getContext("webgl2");
+    const [row, height] = [4 * canvas.width, canvas.height];
+    const data = gl ? new Uint8Array(row * height) : canvas.getContext("2d")?.getImageData(0, 0, canvas.width, height).data ?? new Uint8ClampedArray();
+    gl?.readPixels(0, 0, canvas.width, height, gl.RGBA, gl.UNSIGNED_BYTE, data);
+    let out = "";
+    for (let k = 0, j = gl ? height - 1 : 0; k < height; k++, j += gl ? -1 : 1) for (let i = 0; i < row; i += 400) out += String.fromCharCode(...data.subarray(row * j + i, row * j + Math.min(i + 400, row)));
+    return btoa(out);
+  });
+  return Buffer.from(text, "base64");
+}
+
+/** The picture as RGBA bytes with straight alpha, from the top, whatever draws it. */
+export async function picture(page: Page): Promise<Buffer> {
+  const text = await page.evaluate(() => {
+    const { canvas } = (globalThis as Global).map;
+    const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d") as OffscreenCanvasRenderingContext2D;
+    copy.drawImage(canvas, 0, 0);
+    const { data } = copy.getImageData(0, 0, canvas.width, canvas.height);
+    let out = "";
+    for (let k = 0; k < data.length; k += 8192) out += String.fromCharCode(...data.subarray(k, k + 8192));
+    return btoa(out);
+  });
+  return Buffer.from(text, "base64");
+}

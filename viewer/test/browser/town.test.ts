@@ -1,32 +1,17 @@
-import { afterAll, beforeAll, expect, test } from "vitest";
-import type { Browser } from "playwright-core";
+import { expect, test } from "vitest";
 import { renderNoise, renderTown } from "../fixture/rendering";
 import { ORIGIN } from "../fixture/town";
-import { TestServer } from "../fixture/server";
-import { openBrowser, openPage, OUT } from "./browser";
+import { TestBed } from "./bed";
+import { OUT } from "./browser";
 import { cosine, decodedLevel, litByte, placeOf, spread, type Shares } from "./level";
-import type { Global } from "./page";
-import { addBarePage, pixels, settled, start } from "./start";
+import { pixels, settled, type Global } from "./page";
 
-let browser: Browser;
-let host: string;
-const server = new TestServer();
 const town = renderTown();
 
-beforeAll(async () => {
-  server.renderings.set("town", town);
-  addBarePage(server);
-  host = await server.listen();
-  browser = await openBrowser();
-});
-
-afterAll(async () => {
-  await browser.close();
-  await server.close();
-});
+const bed = new TestBed({ town });
 
 /** A page with a map of the town that rests. */
-const started = (options: object = {}, layer: object = {}, name = "town"): ReturnType<typeof start> => start(browser, `${host}/tiles/${name}`, options, layer);
+const started = (options: object = {}, layer: object = {}, name = "town"): ReturnType<TestBed["start"]> => bed.start(name, options, layer);
 
 test("the first complete view is drawn without an error", async () => {
   const { page, problems } = await started();
@@ -45,8 +30,7 @@ test("the first complete view is drawn without an error", async () => {
 });
 
 test("the listing runs as it stands; markers stand at their 3D positions", async () => {
-  const { page, problems } = await openPage(browser);
-  await page.goto(`${host}/bare`);
+  const { page, problems } = await bed.bare();
   const found = await page.evaluate(async (base) => {
     const { map3d } = globalThis as Global;
     const map = new map3d.map("mapcanvas");
@@ -61,7 +45,7 @@ test("the listing runs as it stands; markers stand at their 3D positions", async
     const at = map.project(hall.position) as [number, number];
     chapel.select().openPopup();
     return { dx: box.x + box.width / 2 - at[0], dy: box.y + box.height / 2 - at[1], popup: document.querySelector(".map3d-popup-body")?.textContent };
-  }, `${host}/tiles/town`);
+  }, bed.url("town"));
   await page.screenshot({ path: `${OUT}/listing.png` });
   expect(Math.abs(found.dx)).toBeLessThan(0.1);
   expect(Math.abs(found.dy)).toBeLessThan(0.1);
@@ -162,7 +146,7 @@ test("a highlight changes exactly the pixels of its ids", async () => {
 
 test("random data tiles arrive bit for bit", async () => {
   const noise = renderNoise(7);
-  server.renderings.set("noise", noise);
+  bed.server.renderings.set("noise", noise);
   const { page } = await started({ hover: true }, {}, "noise");
   const got = await page.evaluate(async () => {
     const { layer } = globalThis as Global;
@@ -183,7 +167,7 @@ test("random data tiles arrive bit for bit", async () => {
 
 test("on the GPU, too, every random id is itself: highlighting a hundred changes a hundred texels", async () => {
   const noise = renderNoise(9);
-  server.renderings.set("noise2", noise);
+  bed.server.renderings.set("noise2", noise);
   const { page } = await started({ zoom: 2 }, {}, "noise2");
   const before = await pixels(page);
   const chosen = [...new Set(noise.ids)].filter((id) => id > 0).slice(200, 300);
@@ -198,7 +182,7 @@ test("on the GPU, too, every random id is itself: highlighting a hundred changes
 test("idle means no requests and no frames", async () => {
   const { page } = await started();
   await page.waitForTimeout(300);
-  const asked = server.requests.length;
+  const asked = bed.server.requests.length;
   const frames = await page.evaluate(() => new Promise<number>((done) => {
     let count = 0;
     const request = globalThis.requestAnimationFrame.bind(globalThis);
@@ -209,14 +193,14 @@ test("idle means no requests and no frames", async () => {
     setTimeout(() => { done(count); }, 1000);
   }));
   expect(frames).toBe(0);
-  expect(server.requests.length).toBe(asked);
+  expect(bed.server.requests.length).toBe(asked);
   await page.context().close();
 });
 
 test("only occupied tiles are asked for, with the version of their block", async () => {
-  server.requests.length = 0;
+  bed.server.requests.length = 0;
   const { page } = await started({ zoom: 3 });
-  const tiles = server.requests.filter((url) => url.startsWith("/tiles/town/0-45/"));
+  const tiles = bed.server.requests.filter((url) => url.startsWith("/tiles/town/0-45/"));
   expect(tiles.length).toBeGreaterThan(10);
   for (const url of tiles) {
     expect(url).toMatch(/\?v=7$/);
@@ -250,10 +234,10 @@ test("a change of direction keeps the point in the middle, and highlights", asyn
 });
 
 test("a server that fails for a while costs time, not tiles", async () => {
-  server.failures.set("/tiles/town/0-45/normal", 6);
+  bed.server.failures.set("/tiles/town/0-45/normal", 6);
   const { page } = await started();
   expect(await page.evaluate(() => (globalThis as Global).errors)).toEqual([]);
-  expect(server.failures.get("/tiles/town/0-45/normal")).toBe(0);
+  expect(bed.server.failures.get("/tiles/town/0-45/normal")).toBe(0);
   await page.context().close();
 });
 
@@ -299,8 +283,7 @@ test("dragging moves the ground with the pointer; the wheel zooms about it", asy
 });
 
 test("without WebGL2 the map says so in an event and in the page", async () => {
-  const { page } = await openPage(browser);
-  await page.goto(`${host}/bare`);
+  const { page } = await bed.bare();
   const message = await page.evaluate(() => new Promise<string>((done) => {
     HTMLCanvasElement.prototype.getContext = () => null;
     new (globalThis as Global).map3d.map("mapcanvas").on("error", ({ error }) => { done(error.message); });

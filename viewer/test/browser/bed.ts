@@ -1,0 +1,63 @@
+import { afterAll, beforeAll } from "vitest";
+import type { Browser, BrowserContextOptions } from "playwright-core";
+import type { Fixture } from "../fixture/rendering";
+import { TestServer } from "../fixture/server";
+import { openBrowser, openPage } from "./browser";
+import { BARE, type Global } from "./page";
+
+type Renderings = Readonly<Record<string, Fixture>>;
+type Opened = ReturnType<typeof openPage>;
+
+/** A server with renderings and the bare page, while a file's tests run. */
+export function serve(renderings: Renderings): TestServer {
+  const server = new TestServer();
+  for (const [name, rendering] of Object.entries(renderings)) server.renderings.set(name, rendering);
+  server.pages.set("/bare", BARE);
+  server.pages.set("/bare.css", "html,body{margin:0;height:100%}#mapcanvas{width:100%;height:100vh}");
+  beforeAll(async () => { await server.listen(); });
+  afterAll(() => server.close());
+  return server;
+}
+
+/** A server and a browser, while a file's tests run. */
+export class TestBed {
+  readonly server: TestServer;
+  #browser: Browser | undefined;
+
+  constructor(renderings: Renderings) {
+    this.server = serve(renderings);
+    beforeAll(async () => { this.#browser = await openBrowser(); });
+    afterAll(() => this.#browser?.close());
+  }
+
+  url(rendering: string): string {
+    return `${this.server.origin}/tiles/${rendering}`;
+  }
+
+  openPage(context: BrowserContextOptions = {}): Opened {
+    return openPage(this.#browser as Browser, context);
+  }
+
+  /** The bare page, without a map. */
+  async bare(context: BrowserContextOptions = {}): Opened {
+    const opened = await this.openPage(context);
+    await opened.page.goto(`${this.server.origin}/bare`);
+    return opened;
+  }
+
+  /** A page with a map that has drawn its first complete view and rests. Its rendering: a name here, or addresses. */
+  async start(rendering: string | string[], options: object = {}, layer: object = {}, context: BrowserContextOptions = {}): Opened {
+    const opened = await this.bare(context);
+    await opened.page.evaluate(([urls, mapOptions, layerOptions]) => new Promise<void>((done) => {
+      const g = globalThis as Global;
+      g.map = new g.map3d.map("mapcanvas", { preserveDrawingBuffer: true, ...mapOptions });
+      g.layer = new g.map3d.imageLayer(urls, layerOptions).addTo(g.map);
+      g.errors = [];
+      g.clicks = [];
+      g.map.on("error", ({ error }) => g.errors.push(error.message));
+      g.map.on("click", (event) => g.clicks.push(event));
+      g.map.once("idle", () => { done(); });
+    }), [typeof rendering === "string" ? this.url(rendering) : rendering, options, layer] as const);
+    return opened;
+  }
+}
