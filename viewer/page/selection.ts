@@ -35,16 +35,19 @@ export class Selection {
 
   /** An object by its id: as if it had been clicked; without a position at the top of its box. */
   async chooseId(id: number, position: Vec3 | null = null, step = true): Promise<void> {
+    const changed = id !== this.#id;
+    this.#id = id;
     const object = await this.#layer.object(id).catch((reason: unknown) => {
       toast(String(reason));
       return null;
     });
+    if (this.#id !== id) return;
     const [low, high] = object?.box ?? [];
     const origin = this.#layer.rendering?.json.origin;
     const top: Vec3 | null = low && high && origin ? [origin[0] + (low[0] + high[0]) / 2, origin[1] + (low[1] + high[1]) / 2, origin[2] + high[2]] : null;
     const event: ClickEvent = { id, position: position ?? top, approximate: false, layer: this.#layer, point: [0, 0], ...(object ?? {}) };
-    if (step) this.choose(event);
-    else this.#show(event);
+    this.#show(event);
+    if (step) writePlace(this.#view, id, changed);
   }
 
   /** Nothing is chosen any more. */

@@ -13,9 +13,9 @@ export class Words {
     return `${this.#numbers(size >= 99.995 ? 1 : 2).format(metres)} m`;
   }
 
-  /** With an arrow up or down, unless it is level as far as the words tell. */
+  /** With an arrow up or down; ± where it is level as far as the words tell. */
   rise(metres: number): string {
-    const arrow = Math.abs(metres) < 0.005 ? "" : metres < 0 ? "↓ " : "↑ ";
+    const arrow = Math.abs(metres) < 0.005 ? "± " : metres < 0 ? "↓ " : "↑ ";
     return arrow + this.length(Math.abs(metres));
   }
 

@@ -195,12 +195,12 @@ function changed(name: string, change: (files: Map<string, Uint8Array>) => void,
   const files = new Map(town.files);
   change(files);
   bed.server.renderings.set(name, { json: { ...town.json, ...json }, files, raw: town.raw });
-  return bed.url(name);
+  return name;
 }
 
 test("a broken tile is named in an error; the rest is shown", async () => {
-  const base = changed("broken", (files) => files.set("0-45/normal/3/3/4", new Uint8Array([1, 2, 3])));
-  const { page } = await bed.start(base, { zoom: 3.5 });
+  const name = changed("broken", (files) => files.set("0-45/normal/3/3/4", new Uint8Array([1, 2, 3])));
+  const { page } = await bed.start(name, { zoom: 3.5 });
   const errors = await page.evaluate(() => (globalThis as Global).errors);
   expect(errors.length).toBe(1);
   expect(errors[0]).toMatch(/tile 0-45\/normal\/3\/3\/4: no PNG: 3 bytes/);
@@ -208,10 +208,10 @@ test("a broken tile is named in an error; the rest is shown", async () => {
 });
 
 test("a pick whose deepest tile cannot be had is approximate", async () => {
-  const base = changed("shallow", (files) => {
+  const name = changed("shallow", (files) => {
     for (const path of files.keys()) if (/\/(id|depth)\/3\//.test(path)) files.set(path, new Uint8Array([0]));
   });
-  const { page } = await bed.start(base, { hover: true });
+  const { page } = await bed.start(name, { hover: true });
   const pick = await page.evaluate(async ([x, y, z]) => {
     const { map, layer } = globalThis as Global;
     const view = layer.viewOf("0-45");
@@ -230,12 +230,12 @@ test("a pick whose deepest tile cannot be had is approximate", async () => {
 
 test("where colour has no alpha, the id layer tells what is covered", async () => {
   const layers = town.json.layers.map((layer) => (layer.kind === "color" ? { ...layer, format: "jpeg" } : layer));
-  const base = changed("opaque", (files) => {
+  const name = changed("opaque", (files) => {
     for (const [path, bytes] of town.raw) {
       if (path.includes("/color/")) files.set(path, encodePng(64, 64, 4, bytes.map((value, at) => (at % 4 === 3 ? 255 : value))));
     }
   }, { layers });
-  const { page } = await bed.start(base, { zoom: 3.5 });
+  const { page } = await bed.start(name, { zoom: 3.5 });
   const got = await pixels(page);
   const { page: plain } = await bed.start("town", { zoom: 3.5 });
   const want = await pixels(plain);

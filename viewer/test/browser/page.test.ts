@@ -144,7 +144,7 @@ test("tools measure where the map is clicked, and nothing is chosen meanwhile", 
   await page.touchscreen.tap(240, 450);
   await page.waitForFunction(() => document.querySelectorAll(".map3d-measure circle").length === 2);
   await page.screenshot({ path: `${OUT}/phone-measure.png` });
-  expect(await page.locator(".map3d-measure-main").textContent()).toMatch(/^\d+\.\d+ m {2}[↑↓] \d+\.\d\d m$/);
+  expect(await page.locator(".map3d-measure-main").textContent()).toMatch(/^\d+\.\d+ m {2}[↑↓±] \d+\.\d\d m$/);
   expect(await page.locator("#info").isHidden()).toBe(true);
   await page.locator("#measure-line").tap();
   expect(await page.locator(".map3d-measure").count()).toBe(0);

@@ -56,8 +56,8 @@ describe("words", () => {
   test("rise and fall, in the reader's own numbers", () => {
     expect(words.rise(-2.5)).toBe("↓ 2.50 m");
     expect(new Words("de").rise(2.5)).toBe("↑ 2,50 m");
-    expect(words.rise(0.004)).toBe("0.00 m");
-    expect(words.rise(-0.004)).toBe("0.00 m");
+    expect(words.rise(0.004)).toBe("± 0.00 m");
+    expect(words.rise(-0.004)).toBe("± 0.00 m");
     expect(words.rise(-0.006)).toBe("↓ 0.01 m");
   });
 });
