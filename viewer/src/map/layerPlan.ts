@@ -1,12 +1,12 @@
 import { dot, sub, type Vec2 } from "../core/vec";
 import { uvdFromLocal } from "../geo/axes";
-import { cssPixelM, type Camera } from "../geo/camera";
+import { cssPixelM } from "../geo/camera";
 import { ancestor, type Frame, type Tile } from "../geo/frame";
 import type { LayerInfo, LayerKind, Rendering, View } from "../geo/manifest";
 import { corners } from "../core/vec";
 import { placeQuads } from "../draw/plan";
 import type { Baked, Quad } from "../draw/drawer";
-import { coverOf, fromTheMiddle, levelFor, standsFor, type Rect } from "../tiles/cover";
+import { coverOf, fromTheMiddle, levelFor, rectAround, standsFor } from "../tiles/cover";
 import type { Job } from "../tiles/queue";
 import type { Store } from "../tiles/store";
 import type { Sight } from "./stage";
@@ -69,14 +69,6 @@ export function depthRangeOf(rendering: Rendering, { frame }: View): Vec2 {
   const unit = rendering.layers.get("depth")?.unit_m ?? 2 ** -10;
   const depths = corners(rendering.json.box).map((corner) => (uvdFromLocal(frame.axes, corner)[2] - frame.d0) / unit);
   return [Math.min(...depths), Math.max(...depths)];
-}
-
-function rectAround(u: number, v: number, { width, height }: Camera, px: number): Rect {
-  const [w, h] = [(width / 2) * px, (height / 2) * px];
-  return [
-    [u - w, v - h],
-    [u + w, v + h],
-  ];
 }
 
 function ancestorsOf(tiles: readonly Tile[]): Tile[] {

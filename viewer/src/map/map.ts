@@ -15,6 +15,7 @@ import { STYLES } from "../ui/styles";
 import { FrameLoop } from "./frameLoop";
 import { Gestures, type Steered } from "./gestures";
 import { imageLayer } from "./imageLayer";
+import { objectsIn, type Seen } from "./inView";
 import { listenToKeys } from "./keyboard";
 import { DEFAULTS, type ClickEvent, type FilledOptions, type MapOptions } from "./options";
 import { Painter } from "./painter";
@@ -168,6 +169,14 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
       // The tile's own error has been reported when it failed.
       return { ...(pickLoaded(this.#layers, sight, point) ?? NOTHING), approximate: true };
     }
+  }
+
+  /** Objects of all layers that are seen, the largest of each layer first; those below the topmost layer count as if they were not hidden by it. */
+  async objectsInView(): Promise<readonly (Seen & { readonly layer: imageLayer })[]> {
+    const sight = this.sight();
+    if (!sight) return [];
+    const found = await Promise.all([...this.#layers].reverse().map(async (layer) => (await objectsIn(layer, sight)).map((seen) => ({ ...seen, layer }))));
+    return found.flat();
   }
 
   /** What the tiles in memory tell of a point; null when they tell nothing. */

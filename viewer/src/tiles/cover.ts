@@ -1,9 +1,19 @@
 import type { Vec2 } from "../core/vec";
 import { clamp } from "../core/vec";
+import type { Camera } from "../geo/camera";
 import { ancestor, childrenOf, type Frame, type Tile } from "../geo/frame";
 
 /** [[least U, least V], [greatest U, greatest V]], metres. */
 export type Rect = readonly [Vec2, Vec2];
+
+/** What a screen shows whose middle lies at U and V; `px` metres a CSS pixel. */
+export function rectAround(u: number, v: number, { width, height }: Pick<Camera, "width" | "height">, px: number): Rect {
+  const [w, h] = [(width / 2) * px, (height / 2) * px];
+  return [
+    [u - w, v - h],
+    [u + w, v + h],
+  ];
+}
 
 /**
  * The level to show when a device pixel is `devicePx_m` metres wide. On dense screens a tile pixel covers one to two

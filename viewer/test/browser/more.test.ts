@@ -292,3 +292,19 @@ test("a drag that ends in motion glides on, and comes to rest", async () => {
   expect(end - 400).toBeGreaterThan(85);
   await page.context().close();
 });
+
+test("objects in view are those whose ids are on the screen, by what they cover", async () => {
+  const { page } = await bed.start("town");
+  const whole = await page.evaluate(async () => (await (globalThis as Global).map.objectsInView()).map(({ id, share }) => ({ id, share })));
+  expect(whole.map(({ id }) => id).sort((a, b) => a - b)).toEqual([3, 17, 1025, 2_000_000_001, 3_900_000_007]);
+  expect(whole[0]?.id).toBe(3);
+  const covered = whole.reduce((sum, { share }) => sum + share, 0);
+  const bytes = await pixels(page);
+  const painted = bytes.filter((value, k) => k % 4 === 3 && value > 127).length / (bytes.length / 4);
+  expect(painted).toBeGreaterThan(0.1);
+  expect(Math.abs(covered / painted - 1)).toBeLessThan(0.02);
+  await settled(page, () => (globalThis as Global).map.setView([691_000 + 32, 5_336_000 + 26, 500 + 62], 6), null);
+  const near = await page.evaluate(async () => (await (globalThis as Global).map.objectsInView()).map(({ id }) => id));
+  expect([...near].sort((a, b) => a - b)).toEqual([3, 17, 2_000_000_001, 3_900_000_007]);
+  await page.context().close();
+});

@@ -1,0 +1,43 @@
+import { cssPixelM } from "../geo/camera";
+import { coverOf, levelFor, rectAround } from "../tiles/cover";
+import type { imageLayer } from "./imageLayer";
+import { middleIn } from "./layerPlan";
+import type { Sight } from "./stage";
+
+/** An object that is seen, and how much of it. */
+export interface Seen {
+  readonly id: number;
+  /** Share of the screen. */
+  readonly share: number;
+}
+
+/** Objects of a layer that are seen, the largest first. Fetches the id tiles of the level that is shown. @throws what a fetch threw */
+export async function objectsIn(layer: imageLayer, sight: Sight): Promise<Seen[]> {
+  const { camera, dpr } = sight;
+  const [view, info] = [layer.viewOf(camera.frame.id), layer.rendering?.layers.get("id")];
+  const { rendering, store } = layer;
+  if (!view || !rendering || !info || !store) return [];
+  const { frame } = view;
+  const px = cssPixelM(camera);
+  const rect = rectAround(...middleIn(frame, sight, rendering), camera, px);
+  const level = levelFor(frame, px / dpr, dpr);
+  const pixel_m = frame.size / (frame.tilePx * 2 ** level);
+  const counts = new Map<number, number>();
+  const [[left, bottom], [right, top]] = rect;
+  const tiles = coverOf(frame, (tile) => view.occupancy.has(tile), level, rect);
+  for (const [tile, data] of await Promise.all(tiles.map(async (tile) => [tile, await store.need(view, info, tile)] as const))) {
+    if (data?.kind !== "id") continue;
+    const [u, v] = [frame.u0 + tile.x * frame.tilePx * pixel_m, frame.v0 - tile.y * frame.tilePx * pixel_m];
+    const inside = (from: number, to: number): [number, number] => [Math.max(0, Math.round(from / pixel_m)), Math.min(frame.tilePx, Math.round(to / pixel_m))];
+    const [i0, i1] = inside(left - u, right - u);
+    const [j0, j1] = inside(v - top, v - bottom);
+    for (let j = j0; j < j1; j++) {
+      for (let i = i0; i < i1; i++) {
+        const id = data.values[j * data.width + i] as number;
+        if (id !== 0) counts.set(id, (counts.get(id) ?? 0) + 1);
+      }
+    }
+  }
+  const whole = ((right - left) * (top - bottom)) / pixel_m ** 2;
+  return [...counts].map(([id, count]) => ({ id, share: count / whole })).sort((a, b) => b.share - a.share || a.id - b.id);
+}
