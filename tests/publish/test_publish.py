@@ -36,6 +36,8 @@ def test_the_folder_is_whole(workspace, out):
     done = publish(workspace, "tea", out)
     names = {"rendering.json", "README.txt", "checksums.sha256", "index.html", "assets/worker.js", "objects/0.json", "objects/search.json"}
     names |= {f"{view}/{layer.name}.pmtiles" for view in VIEWS for layer in LAYERS}
+    index = json.loads((out / "objects" / "attributes.json").read_text())
+    names |= {"objects/attributes.json", *(f"objects/columns/{row['column']}.json" for row in index["attributes"])}
     assert set(contents(out)) == names
     assert (done.tiles, done.archives, done.kept) == (len(every_tile()) * 8, 8, 0)
     assert done.bytes == sum(map(len, contents(out).values()))
@@ -102,6 +104,11 @@ def test_objects_are_those_of_the_registry(workspace, out):
     with Registry(workspace.registry_path("town")) as registry:
         assert json.loads((out / "objects" / "0.json").read_text()) == json.loads(json.dumps(registry.shard(0)))
         assert json.loads((out / "objects" / "search.json").read_text()) == json.loads(json.dumps(registry.search()))
+        assert json.loads((out / "objects" / "attributes.json").read_text()) == registry.attribute_index()
+        columns = dict(registry.columns())
+        assert len(columns) > 2
+        for key, column in columns.items():
+            assert json.loads((out / "objects" / "columns" / f"{key}.json").read_text()) == column
 
 
 def test_a_static_host_with_ranges_is_enough(workspace, out):

@@ -26,7 +26,7 @@ def change(path, find, put):
 
 def test_what_was_published_is_right(workspace, folder):
     done = verify_published(folder)
-    assert (done.files, done.archives, done.tiles) == (14, 8, 8 * len(every_tile()))
+    assert (done.files, done.archives, done.tiles) == (14 + 1 + 4, 8, 8 * len(every_tile()))
     assert verify_published(folder, workspace) == done
 
 
@@ -34,7 +34,9 @@ def test_a_copy_is_right_too(folder, tmp_path):
     verify_published(shutil.copytree(folder, tmp_path / "elsewhere"))
 
 
-@pytest.mark.parametrize("name", ["index.html", "objects/0.json", "objects/search.json", "0-45/id.pmtiles", "checksums.sha256", "README.txt"])
+@pytest.mark.parametrize(
+    "name", ["index.html", "objects/0.json", "objects/search.json", "objects/attributes.json", "0-45/id.pmtiles", "checksums.sha256", "README.txt"]
+)
 def test_a_missing_file_is_found(folder, name):
     (folder / name).unlink()
     with pytest.raises(VerifyFailed, match=name):

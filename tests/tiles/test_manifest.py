@@ -123,7 +123,13 @@ def test_the_document_is_that_of_the_specification(manifest):
     assert value["views"][1]["id"] == "45-22.5"
     assert (value["views"][0]["version"], value["views"][0]["versions"]) == (3, {"1/1/1": 2})
     assert "archives" not in value["views"][0]
-    assert value["objects"] == {"count": 54, "shard_size": 1024, "shards": "objects/{shard}.json", "search": "objects/search.json"}
+    files = {
+        "shards": "objects/{shard}.json",
+        "search": "objects/search.json",
+        "attributes": "objects/attributes.json",
+        "columns": "objects/columns/{column}.json",
+    }
+    assert value["objects"] == {"count": 54, "shard_size": 1024} | files
 
 
 def test_the_schema_names_every_member(manifest, added):

@@ -48,7 +48,10 @@ def test_the_manifest_is_that_of_the_rendering(client, workspace):
     assert client.get("/view/tea/rendering.json").content == answer.content
 
 
-@pytest.mark.parametrize("path", ["rendering.json", "objects/0.json", "objects/search.json", "0-45/color/0/0/0", "nonsense"])
+@pytest.mark.parametrize(
+    "path",
+    ["rendering.json", "objects/0.json", "objects/search.json", "objects/attributes.json", "objects/columns/x.json", "0-45/color/0/0/0", "nonsense"],
+)
 def test_any_origin_may_read_answers_and_refusals(client, path):
     for base, status in (("/tiles/tea", (200, 204, 404)), ("/tiles/nowhere", (404,))):
         answer = client.get(f"{base}/{path}")
@@ -102,6 +105,25 @@ def test_a_shard_without_objects_is_empty(client):
 def test_objects_are_found_by_label(client, base):
     value = client.get(f"{base}/objects/search.json").json()
     assert value == {"map3d": "search", "version": 1, "entries": [[1, "House <1>, Main Street 1", [5.0, 10.0, 9.5]], [2, "Roof", [5.0, 10.0, 9.5]]]}
+
+
+@pytest.mark.parametrize("base", ["/tiles/tea", "/view/tea"])
+def test_attributes_come_by_column(client, base):
+    index = client.get(f"{base}/objects/attributes.json").json()
+    assert [(row["of"], row["name"]) for row in index["attributes"]] == [
+        ("object", "class"),
+        ("object", "asset"),
+        ("attributes", "address"),
+        ("attributes", "height"),
+    ]
+    answer = client.get(f"{base}/objects/columns/{index['attributes'][3]['column']}.json")
+    assert answer.json() == {"map3d": "column", "version": 1, "name": "height", "of": "attributes", "ids": [1, 2], "values": [9.5, 9.5]}
+    assert answer.headers["access-control-allow-origin"] == "*"
+
+
+@pytest.mark.parametrize("column", ["0" * 16, "0" * 15, "..%2fsearch", "ABCDEF0123456789", "x" * 5000])
+def test_a_column_that_is_not_there_is_404(client, column):
+    assert client.get(f"/tiles/tea/objects/columns/{column}.json").status_code == 404
 
 
 @pytest.mark.parametrize("shard", ["01", "-1", "x", "99999999", "1e3", "%D9%A1"])

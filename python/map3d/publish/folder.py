@@ -19,7 +19,7 @@ from map3d.publish.archive import Archive, write_archive
 from map3d.publish.readme import README, readme
 from map3d.registry import Registry
 from map3d.tiles.documents import dump_document
-from map3d.tiles.manifest import FILE_NAME, SEARCH, SHARDS, Manifest, ViewFacts
+from map3d.tiles.manifest import ATTRIBUTES, COLUMNS, FILE_NAME, SEARCH, SHARDS, Manifest, ViewFacts
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.store import TileStore
 from map3d.tiles.viewer import viewer_files, viewer_folder
@@ -88,6 +88,9 @@ class _Work:
             for shard in registry.shards():
                 self._put(SHARDS.format(shard=shard["shard"]), dump_document(shard))
             self._put(SEARCH, dump_document(registry.search()))
+            self._put(ATTRIBUTES, dump_document(registry.attribute_index()))
+            for key, column in registry.columns():
+                self._put(COLUMNS.format(column=key), dump_document(column))
         for file in viewer_files():
             self._put(file.as_posix(), (viewer_folder() / file).read_bytes())
         self._put(README, readme(self._manifest).encode())

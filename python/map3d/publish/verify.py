@@ -12,7 +12,7 @@ from map3d.errors import Corrupt, NotFound, VerifyFailed
 from map3d.geometry.views import track_id
 from map3d.publish.archive import Archive
 from map3d.publish.folder import CHECKSUMS
-from map3d.tiles.manifest import FILE_NAME, SEARCH, Manifest, ViewFacts
+from map3d.tiles.manifest import ATTRIBUTES, FILE_NAME, SEARCH, Manifest, ViewFacts
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.store import TileStore
@@ -38,7 +38,7 @@ def verify_published(folder: Path, workspace: Workspace | None = None) -> Verifi
         manifest = Manifest.load((folder / FILE_NAME).read_bytes(), str(folder / FILE_NAME))
     except FileNotFoundError as error:
         raise NotFound(f"{folder}: no published rendering there") from error
-    wrong = [f"{name} is missing" for name in (PAGE, SEARCH, CHECKSUMS) if not (folder / name).is_file()]
+    wrong = [f"{name} is missing" for name in (PAGE, SEARCH, ATTRIBUTES, CHECKSUMS) if not (folder / name).is_file()]
     files, bad = _check_sums(folder)
     wrong += bad
     archives = tiles = 0

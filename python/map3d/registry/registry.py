@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from map3d.database import Database
 from map3d.errors import LimitExceeded
 from map3d.registry.boxes import with_parts
+from map3d.registry.columns import attribute_index, column, columns
 from map3d.registry.objects import NewObject, RegisteredObject, plain_attributes
 from map3d.registry.schema import MAX_ID, SCHEMA, VERSION
 from map3d.types import Box
@@ -114,6 +115,18 @@ class Registry:
         entries = [(item.label, item.id, item.box) for item in self.objects() if item.box is not None]
         entries.sort(key=lambda entry: entry[:2])
         return {"map3d": "search", "version": 1, "entries": [[number, label, _top_centre(box)] for label, number, box in entries]}
+
+    def attribute_index(self) -> dict[str, Any]:
+        """The document that lists the attributes' columns (spec/manifest.md)."""
+        return attribute_index(self.objects())
+
+    def column(self, key: str) -> dict[str, Any] | None:
+        """The document of a column; None when there is none with this key."""
+        return column(self.objects, key)
+
+    def columns(self) -> Iterator[tuple[str, dict[str, Any]]]:
+        """Keys and documents of all columns that are listed."""
+        return columns(self.objects)
 
     def close(self) -> None:
         self._database.close()

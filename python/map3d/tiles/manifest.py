@@ -18,6 +18,8 @@ SHARD_SIZE: Final = 1024
 FILE_NAME: Final = "rendering.json"
 SHARDS: Final = "objects/{shard}.json"
 SEARCH: Final = "objects/search.json"
+ATTRIBUTES: Final = "objects/attributes.json"
+COLUMNS: Final = "objects/columns/{column}.json"
 
 
 @dataclass(frozen=True)
@@ -140,7 +142,14 @@ class Manifest:
             "samples": self.samples,
             "layers": [_layer_json(layer) for layer in self.layers],
             "views": [_view_json(view, self.passes) for view in self.views],
-            "objects": {"count": self.objects, "shard_size": SHARD_SIZE, "shards": SHARDS, "search": SEARCH},
+            "objects": {
+                "count": self.objects,
+                "shard_size": SHARD_SIZE,
+                "shards": SHARDS,
+                "search": SEARCH,
+                "attributes": ATTRIBUTES,
+                "columns": COLUMNS,
+            },
         }
 
     def dump(self) -> bytes:

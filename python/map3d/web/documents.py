@@ -1,4 +1,4 @@
-"""The JSON documents beside the tiles: manifest, attribute shards, search index (spec/manifest.md).
+"""The JSON documents beside the tiles: manifest, attribute shards and columns, search index (spec/manifest.md).
 
 They stand under /tiles/<rendering>/ and under /view/<rendering>/, whose page reads them as its own folder's, as in a published folder.
 """
@@ -29,6 +29,9 @@ Stamp = tuple[tuple[int, int, int], ...]
 _NUMBER: Final = re.compile(r"0|[1-9][0-9]{0,6}", re.ASCII)
 """Of a shard: ids are 32 bits, so shards have at most seven digits."""
 
+_KEY: Final = re.compile(r"[0-9a-f]{16}", re.ASCII)
+"""Of a column."""
+
 
 @documents.get(f"/tiles/<rendering>/{FILE_NAME}")
 @documents.get(f"/view/<rendering>/{FILE_NAME}")
@@ -54,6 +57,23 @@ def shard(rendering: str, shard: str) -> Response:
 def search(rendering: str) -> Response:
     path = registry_path(rendering)
     return json_answer(_search_bytes(path, _stamp(path)))
+
+
+@documents.get("/tiles/<rendering>/objects/attributes.json")
+@documents.get("/view/<rendering>/objects/attributes.json")
+def attributes(rendering: str) -> Response:
+    path = registry_path(rendering)
+    return json_answer(_index_bytes(path, _stamp(path)))
+
+
+@documents.get("/tiles/<rendering>/objects/columns/<column>.json")
+@documents.get("/view/<rendering>/objects/columns/<column>.json")
+def column(rendering: str, column: str) -> Response:
+    path = registry_path(rendering)
+    data = _column_bytes(path, column, _stamp(path)) if _KEY.fullmatch(column) else None
+    if data is None:
+        raise NotFound(f"no column {column[:64]!r}: objects/attributes.json lists those there are")
+    return json_answer(data)
 
 
 def workspace() -> Workspace:
@@ -102,6 +122,19 @@ def json_answer(data: bytes) -> Response:
 def _search_bytes(path: Path, _state: Stamp) -> bytes:
     with Registry(path) as objects:
         return dump_document(objects.search())
+
+
+@lru_cache(maxsize=4)
+def _index_bytes(path: Path, _state: Stamp) -> bytes:
+    with Registry(path) as objects:
+        return dump_document(objects.attribute_index())
+
+
+@lru_cache(maxsize=4)
+def _column_bytes(path: Path, column: str, _state: Stamp) -> bytes | None:
+    with Registry(path) as objects:
+        found = objects.column(column)
+    return None if found is None else dump_document(found)
 
 
 @lru_cache(maxsize=16)
