@@ -6,6 +6,7 @@ export { popup, type PopupEvents, type PopupOptions } from "./overlay/popup";
 export { Evented, type Fired, type Listener } from "./core/events";
 export { DecodeError, DrawError, FetchError, ManifestError, Map3dError, UsageError } from "./core/errors";
 export type { ClickEvent, HoverEvent, MapEvents, MapOptions } from "./map/options";
+export type { ObjectStyle } from "./map/objectStyle";
 export type { Seen } from "./map/inView";
 export type { Pick } from "./map/picker";
 export type { Attachable, Holder, Surface } from "./core/surface";
@@ -13,7 +14,7 @@ export type { Box3, Vec2, Vec3 } from "./core/vec";
 export type { Mode } from "./draw/drawer";
 export type { Light } from "./geo/light";
 export type { ManifestJson, Rendering } from "./geo/manifest";
-export type { Attribute, ObjectInfo, SearchEntry } from "./tiles/objects";
+export type { Attribute, AttributeInfo, AttributeValue, ObjectInfo, SearchEntry } from "./tiles/objects";
 export { zoneOf } from "./geo/daylight";
 export { windOf } from "./ui/controls";
 

@@ -3,6 +3,7 @@ import type { LayerKind } from "../geo/manifest";
 import type { Light } from "../geo/light";
 import type { Shadow } from "../geo/shadows";
 import type { TileData } from "../tiles/tileData";
+import type { Finishes } from "./finish";
 
 /** How a layer is shown: lit colour, colour or picture as stored, or a data layer in false colours. */
 export type Mode = "lit" | "color" | "picture" | "normal" | "id" | "depth";
@@ -41,6 +42,8 @@ export interface Pass {
   readonly tiles: TileAccess;
   /** Colours by object id. */
   readonly highlight: ReadonlyMap<number, Rgb>;
+  /** How objects are shown; null: all as they are. */
+  readonly finishes: Finishes | null;
   /** Light that was rendered; drawn where its tiles are here. */
   readonly baked: Baked;
   /** True when colour has no alpha, so that the id layer says what is covered. */

@@ -64,7 +64,7 @@ export interface ManifestJson {
   size_m: number;
   layers: LayerInfo[];
   views: ViewJson[];
-  objects?: { count: number; shard_size: number; shards: string; search: string };
+  objects?: { count: number; shard_size: number; shards: string; search: string; attributes?: string; columns?: string };
 }
 
 /** A view of a rendering: its frame, what is occupied, versions of its blocks. */

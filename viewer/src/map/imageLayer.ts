@@ -3,16 +3,18 @@ import { Evented } from "../core/events";
 import type { Attachable } from "../core/surface";
 import { readColor } from "../draw/color";
 import { bakedKinds, MODES, neededKinds, type Baked, type Mode, type Pass, type Rgb, type TileAccess } from "../draw/drawer";
+import type { Finishes } from "../draw/finish";
 import type { Tile } from "../geo/frame";
 import { towardsLight, type Light } from "../geo/light";
 import type { LayerInfo, LayerKind, Rendering, View } from "../geo/manifest";
 import { shadowOf } from "../geo/shadows";
-import { Objects, type ObjectInfo, type SearchEntry } from "../tiles/objects";
+import { Objects, type AttributeInfo, type AttributeValue, type ObjectInfo, type SearchEntry } from "../tiles/objects";
 import { Source } from "../tiles/source";
 import { Store } from "../tiles/store";
 import { baseUrl } from "../tiles/url";
 import { depthRangeOf, planLayer, type LayerPlan } from "./layerPlan";
 import type { map } from "./map";
+import { finishesOf, isHidden, type ObjectStyle } from "./objectStyle";
 import type { Sight, Stage } from "./stage";
 
 export interface ImageLayerOptions {
@@ -44,6 +46,9 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
   #rendering: Rendering | undefined;
   #objects: Objects | undefined;
   #colors: ReadonlyMap<number, Rgb> = new Map();
+  #finishes: Finishes | null = null;
+  /** Those of #colors that are not hidden. */
+  #shown: ReadonlyMap<number, Rgb> = new Map();
 
   constructor(urls: string | readonly string[], options: ImageLayerOptions = {}) {
     super();
@@ -93,15 +98,13 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
     const rgb = readColor(color);
     const colors = new Map(this.#colors);
     for (const id of typeof ids === "number" ? [ids] : ids) colors.set(id >>> 0, rgb);
-    this.#colors = colors;
-    return this.#redraw();
+    return this.#setColors(colors);
   }
 
   /** Without ids: all highlights. */
   clearHighlight(ids?: number | Iterable<number>): this {
     const gone = new Set(typeof ids === "number" ? [ids] : (ids ?? this.#colors.keys()));
-    this.#colors = new Map([...this.#colors].filter(([id]) => !gone.has(id)));
-    return this.#redraw();
+    return this.#setColors(new Map([...this.#colors].filter(([id]) => !gone.has(id))));
   }
 
   /** Highlighted object ids. */
@@ -109,9 +112,30 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
     return [...this.#colors.keys()];
   }
 
+  /** Colours, dims and hides objects, in place of the style before; {} shows all as they are. @throws UsageError for what is no colour */
+  setStyle(style: ObjectStyle): this {
+    this.#finishes = finishesOf(style);
+    return this.#setColors(this.#colors);
+  }
+
+  /** @internal */
+  hides(id: number): boolean {
+    return isHidden(this.#finishes, id);
+  }
+
   /** Name, class and attributes of an object; null when nothing is known of it. */
   async object(id: number): Promise<ObjectInfo | null> {
     return (await this.#objects?.get(id)) ?? null;
+  }
+
+  /** Attributes that the objects have, for `column`; none when the rendering does not list them. */
+  async attributes(): Promise<readonly AttributeInfo[]> {
+    return (await this.#objects?.attributes()) ?? [];
+  }
+
+  /** What an attribute says of all objects, by id. */
+  async column({ column }: Pick<AttributeInfo, "column">): Promise<ReadonlyMap<number, AttributeValue>> {
+    return (await this.#objects?.column(column)) ?? new Map<number, AttributeValue>();
   }
 
   /** The search index: id, label, local position. */
@@ -161,7 +185,7 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
     const mode = this.#shownMode(this.#rendering);
     const needed = neededKinds(mode, this.#masked(this.#rendering));
     const baked = this.#baked(this.#rendering, light);
-    const ids: LayerKind[] = (this.#colors.size > 0 || hover) && !needed.includes("id") ? ["id"] : [];
+    const ids: LayerKind[] = (this.#shown.size > 0 || this.#finishes || hover) && !needed.includes("id") ? ["id"] : [];
     const extra = [...(light.lit ? bakedKinds(mode, baked) : []), ...ids];
     return planLayer(sight, this.#rendering, view, this.#store, { baked, layers: layersWith(this.#rendering, baked), needed, extra });
   }
@@ -175,11 +199,18 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
       quads: plan.quads,
       tiles: this.#access(plan.view, plan.layers),
       baked: plan.baked,
-      highlight: this.#colors,
+      highlight: this.#shown,
+      finishes: this.#finishes,
       masked: this.#masked(rendering),
       opacity: this.options.opacity,
       depthRange: depthRangeOf(rendering, plan.view),
     };
+  }
+
+  #setColors(colors: ReadonlyMap<number, Rgb>): this {
+    this.#colors = colors;
+    this.#shown = new Map([...colors].filter(([id]) => !this.hides(id)));
+    return this.#redraw();
   }
 
   #begin(rendering: Rendering, stage: Stage): void {

@@ -34,7 +34,7 @@ export async function objectsIn(layer: imageLayer, sight: Sight): Promise<Seen[]
     for (let j = j0; j < j1; j++) {
       for (let i = i0; i < i1; i++) {
         const id = data.values[j * data.width + i] as number;
-        if (id !== 0) counts.set(id, (counts.get(id) ?? 0) + 1);
+        if (id !== 0 && !layer.hides(id)) counts.set(id, (counts.get(id) ?? 0) + 1);
       }
     }
   }

@@ -90,7 +90,7 @@ interface Pixel {
 function read(layer: imageLayer, view: View, pixel: Pixel, ids: TileData | null, depths: TileData | null): Pick | null {
   const id = valueAt(ids, pixel);
   const depth = valueAt(depths, pixel) ?? NO_DEPTH;
-  if (!id && depth === NO_DEPTH) return null;
+  if ((!id && depth === NO_DEPTH) || layer.hides(id ?? 0)) return null;
   return { id: id ?? 0, position: positionOf(layer, view, pixel, depth), approximate: pixel.tile.z < view.frame.zmax, layer };
 }
 

@@ -20,6 +20,29 @@ export interface ObjectInfo {
 /** id, label, local position. */
 export type SearchEntry = readonly [number, string, Vec3];
 
+export type AttributeValue = Exclude<Attribute, null>;
+
+/** An attribute, as the index lists it. */
+export interface AttributeInfo {
+  readonly name: string;
+  /** What every object has (class, asset), or its attributes. */
+  readonly of: "object" | "attributes";
+  readonly column: string;
+  readonly type: "number" | "text" | "boolean" | "mixed";
+  /** How many objects have a value of their own. */
+  readonly objects: number;
+  /** Different values, counted up to 1,000. */
+  readonly variety: number;
+  /** Of numbers. */
+  readonly min?: number;
+  readonly max?: number;
+}
+
+interface Column {
+  readonly ids: readonly number[];
+  readonly values: readonly AttributeValue[];
+}
+
 type Shard = Readonly<Record<string, ObjectInfo>>;
 const SHARDS_KEPT = 64;
 
@@ -29,6 +52,7 @@ export class Objects {
   readonly #json: ManifestJson;
   readonly #shards = new Map<number, Promise<Shard>>();
   #search: Promise<readonly SearchEntry[]> | undefined;
+  #attributes: Promise<readonly AttributeInfo[]> | undefined;
 
   constructor(base: string, json: ManifestJson) {
     this.#base = base;
@@ -48,6 +72,21 @@ export class Objects {
     const path = this.#json.objects?.search;
     if (path === undefined) return Promise.resolve([]);
     return (this.#search ??= this.#fetch<{ entries: SearchEntry[] }>(path, "search").then((file) => file?.entries ?? []));
+  }
+
+  /** All attributes; none when the rendering does not list them. */
+  attributes(): Promise<readonly AttributeInfo[]> {
+    const path = this.#json.objects?.attributes;
+    if (path === undefined) return Promise.resolve([]);
+    return (this.#attributes ??= this.#fetch<{ attributes: AttributeInfo[] }>(path, "attributes").then((file) => file?.attributes ?? []));
+  }
+
+  /** Values by id; none when there is no such column. */
+  async column(name: string): Promise<ReadonlyMap<number, AttributeValue>> {
+    const template = this.#json.objects?.columns;
+    const file = template === undefined || !/^[0-9a-f]{16}$/.test(name) ? null : await this.#fetch<Column>(template.replace("{column}", name), "column");
+    const values = file?.values ?? [];
+    return new Map((file?.ids ?? []).slice(0, values.length).map((id, k) => [id, values[k] as AttributeValue]));
   }
 
   #shard(number: number, template: string): Promise<Shard> {

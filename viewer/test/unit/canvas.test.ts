@@ -2,14 +2,16 @@ import { describe, expect, test } from "vitest";
 import type { Pass } from "../../src/draw/drawer";
 import { kindsBeside, kindsOf, lookOf, type Look } from "../../src/draw/canvas/look";
 import { lightOn, type Lamp, type Shades } from "../../src/draw/canvas/lightOn";
-import { colorOfId, shade, type Around } from "../../src/draw/canvas/shade";
+import type { Finishes } from "../../src/draw/finish";
+import { colorOfId, shade, type Around, type Said } from "../../src/draw/canvas/shade";
 import { areaOf, gridOf } from "../../src/draw/canvas/sheet";
 import { placeQuads } from "../../src/draw/plan";
 import { frameOf } from "../../src/geo/frame";
 import { DEFAULT_LIGHT, towardsLight } from "../../src/geo/light";
 
 const LAMP: Lamp = { sun: towardsLight(DEFAULT_LIGHT), sky: [0.42, 0.42, 0.42], beam: [0.76, 0.76, 0.76], occlusion: false, shadow: null };
-const LOOK: Look = { mode: "id", masked: false, light: null, highlight: null, rim: [0, 0], depthRange: null };
+const LOOK: Look = { mode: "id", masked: false, light: null, highlight: null, finish: null, rim: [0, 0], depthRange: null };
+const UNSAID: Said = { colors: undefined, finishes: undefined };
 const ALONE: Around = { shades: [], id: [] };
 const bytes = (...normal: number[][]): Shades => ({ normal: Uint8Array.from(normal.flat()) });
 const UP = [128, 128, 255];
@@ -59,7 +61,7 @@ describe("pictures", () => {
   const tile = { width: 3, height: 3, id: ids };
 
   test("of ids have the same colour for the same id, and nothing where there is none", () => {
-    const out = shade(LOOK, tile, ALONE, undefined);
+    const out = shade(LOOK, tile, ALONE, UNSAID);
     expect([...out.subarray(0, 4)]).toEqual([...out.subarray(4, 8)]);
     expect([...out.subarray(0, 4)]).toEqual([...colorOfId(7).map((part) => Math.round(255 * part)), 255]);
     expect(out[4 * 5 + 3]).toBe(0);
@@ -67,15 +69,15 @@ describe("pictures", () => {
 
   test("show stored colours as they are; masked, where the ids say so", () => {
     const color = Uint8ClampedArray.from({ length: 36 }, (_, k) => (k % 4 === 3 ? 255 : 7 * k));
-    expect([...shade({ ...LOOK, mode: "color" }, { ...tile, color }, ALONE, undefined)]).toEqual([...color]);
-    const masked = shade({ ...LOOK, mode: "color", masked: true }, { ...tile, color }, ALONE, undefined);
+    expect([...shade({ ...LOOK, mode: "color" }, { ...tile, color }, ALONE, UNSAID)]).toEqual([...color]);
+    const masked = shade({ ...LOOK, mode: "color", masked: true }, { ...tile, color }, ALONE, UNSAID);
     expect([masked[4 * 4 + 3], masked[4 * 5 + 3]]).toEqual([255, 0]);
   });
 
   test("have a highlight's rim where the id beside is another, beyond the tile's edge, too", () => {
     const look = { ...LOOK, highlight: "h", rim: [1, -1] as const };
     const rims = (around: Around): number[] => {
-      const out = shade(look, { width: 3, height: 3, id: new Uint32Array(9).fill(7) }, around, new Map([[7, [1, 0, 0]]]));
+      const out = shade(look, { width: 3, height: 3, id: new Uint32Array(9).fill(7) }, around, { ...UNSAID, colors: new Map([[7, [1, 0, 0]]]) });
       return [0, 1, 2, 3, 4, 5, 6, 7, 8].filter((at) => out[4 * at] === 255 && out[4 * at + 1] === 0);
     };
     expect(rims(ALONE)).toEqual([]);
@@ -83,8 +85,24 @@ describe("pictures", () => {
     expect(rims({ shades: [], id: [undefined, undefined, new Uint32Array(9)] })).toEqual([0, 1, 2]);
   });
 
+  test("take an object's finish: painted, pale, not at all; others as is said", () => {
+    const color = Uint8ClampedArray.from({ length: 36 }, (_, k) => (k % 4 === 3 ? 255 : 40 + 60 * (k % 4)));
+    const found = (finishes: Finishes): number[][] => {
+      const out = shade({ ...LOOK, mode: "color", finish: "f" }, { ...tile, color }, ALONE, { ...UNSAID, finishes });
+      return [0, 4, 5].map((at) => [...out.subarray(4 * at, 4 * at + 4)]);
+    };
+    const own = [40, 100, 160, 255];
+    const painted = [40 + 0.85 * 215, 100 - 0.85 * 100, 160 - 0.85 * 160].map((byte) => Math.round(byte));
+    const pale = Math.round(0.35 * (0.2126 * 40 + 0.7152 * 100 + 0.0722 * 160) + 0.65 * 0.86 * 255);
+    const none = found({ byId: new Map([[9, "hidden"]]), others: "plain" });
+    expect(none[0]).toEqual(own);
+    expect(none[1]?.[3]).toBe(0);
+    expect(found({ byId: new Map([[9, [1, 0, 0]]]), others: "dimmed" })).toEqual([[pale, pale, pale, 255], [...painted, 255], own]);
+    expect(found({ byId: new Map([[7, "plain"]]), others: "hidden" }).map(([, , , alpha]) => alpha)).toEqual([255, 0, 255]);
+  });
+
   test("of depths run from the first to the last colour", () => {
-    const out = shade({ ...LOOK, mode: "depth", depthRange: [100, 300] }, { width: 2, height: 2, depth: Uint32Array.of(0, 200, 5000, 0xffffffff) }, ALONE, undefined);
+    const out = shade({ ...LOOK, mode: "depth", depthRange: [100, 300] }, { width: 2, height: 2, depth: Uint32Array.of(0, 200, 5000, 0xffffffff) }, ALONE, UNSAID);
     expect([...out]).toEqual([252, 232, 178, 255, 92, 158, 158, 255, 41, 46, 92, 255, 0, 0, 0, 0]);
   });
 });
@@ -94,15 +112,15 @@ describe("looks", () => {
   const frame = { width: 1, height: 1, dpr: 1, light: DEFAULT_LIGHT, passes: [] };
 
   test("name what they need and what counts beyond the edge", () => {
-    const look = lookOf(frame, pass, 1, "h");
+    const look = lookOf(frame, pass, 1, { highlight: "h", finish: null });
     expect(kindsOf(look)).toEqual(["color", "normal", "id"]);
     expect(kindsBeside(look)).toEqual(["normal", "id"]);
   });
 
   test("without light do not depend on it", () => {
     const dark = { ...frame, light: { ...DEFAULT_LIGHT, lit: false } };
-    expect(lookOf(dark, pass, 1, null)).toEqual(lookOf({ ...dark, light: { ...dark.light, azimuth_deg: 3 } }, pass, 2, null));
-    expect(kindsOf(lookOf(dark, { ...pass, masked: false }, 1, null))).toEqual(["color"]);
+    expect(lookOf(dark, pass, 1, { highlight: null, finish: null })).toEqual(lookOf({ ...dark, light: { ...dark.light, azimuth_deg: 3 } }, pass, 2, { highlight: null, finish: null }));
+    expect(kindsOf(lookOf(dark, { ...pass, masked: false }, 1, { highlight: null, finish: null }))).toEqual(["color"]);
   });
 });
 

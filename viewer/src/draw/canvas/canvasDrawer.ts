@@ -3,10 +3,13 @@ import type { Tile } from "../../geo/frame";
 import type { LayerKind } from "../../geo/manifest";
 import { standsFor } from "../../tiles/cover";
 import { neededKinds, type Drawer, type DrawerEvents, type FrameSpec, type Pass, type Quad } from "../drawer";
+import type { Finishes } from "../finish";
 import { kindsBeside, kindsOf, lookOf, lookWith, type Look } from "./look";
 import { Pictures, type Picture, type Wish } from "./pictures";
 import type { Order } from "./shade.worker";
 import { areaOf, gridOf, Sheet, type Grid, type Piece } from "./sheet";
+
+type Named = Pass["highlight"] | Finishes;
 
 /** A tile that is to be seen. */
 interface Wanted {
@@ -26,7 +29,8 @@ export class CanvasDrawer implements Drawer {
   readonly #listeners = new AbortController();
   /** Data that the worker has, and the picture it is for. */
   readonly #given = new Map<string, Picture>();
-  readonly #highlights = new Map<ReadonlyMap<number, unknown>, string>();
+  /** Highlights and finishes that the worker has, and their names. */
+  readonly #named = new Map<Named, string>();
   #tilePx = 0;
   #names = 0;
 
@@ -51,7 +55,7 @@ export class CanvasDrawer implements Drawer {
     this.#context.clearRect(0, 0, frame.width, frame.height);
     const wishes = frame.passes.flatMap((pass) => this.#drawPass(frame, pass));
     this.#pictures.want(wishes.filter(({ urgency }) => urgency.length > 0));
-    this.#dropHighlights(frame.passes);
+    this.#dropNamed(frame.passes);
     if (this.busy) return;
     const [seen, looks] = [new Set(wishes.map(({ picture }) => picture)), new Set(wishes.map(({ look }) => look))];
     this.#pictures.prune((picture) => !seen.has(picture) && !looks.has(picture.look));
@@ -75,13 +79,13 @@ export class CanvasDrawer implements Drawer {
 
   /** Paints what is there. @returns a wish for each tile; one without urgency is fulfilled */
   #drawPass(frame: FrameSpec, pass: Pass): Wish[] {
-    const highlight = pass.highlight.size > 0 ? this.#nameOf(pass) : null;
+    const names = { highlight: pass.highlight.size > 0 ? this.#nameOf(pass.highlight) : null, finish: pass.finishes && this.#nameOf(pass.finishes) };
     const wanted = new Map<string, Wanted>();
     for (const { from, rect, scale } of pass.quads) {
       const name = nameIn(pass, from);
       const far = Math.hypot((rect[0] + rect[2] - frame.width) / 2, (rect[1] + rect[3] - frame.height) / 2);
       const known = wanted.get(name);
-      const look = known?.look ?? lookOf(frame, pass, scale, highlight);
+      const look = known?.look ?? lookOf(frame, pass, scale, names);
       const layers = known?.layers ?? this.#give(pass, look, from);
       if (layers) wanted.set(name, { from, look, layers, far: Math.min(far, known?.far ?? far) });
     }
@@ -138,20 +142,20 @@ export class CanvasDrawer implements Drawer {
     return { picture, look: text, edges, order: { look: shown, layers, beside }, urgency: urgencyOf(picture, text, edges, far) };
   }
 
-  #nameOf({ highlight }: Pass): string {
-    const known = this.#highlights.get(highlight);
+  #nameOf(said: Named): string {
+    const known = this.#named.get(said);
     if (known !== undefined) return known;
-    const name = `highlight ${String(this.#names++)}`;
-    this.#pictures.put(name, highlight);
-    this.#highlights.set(highlight, name);
+    const name = `said ${String(this.#names++)}`;
+    this.#pictures.put(name, said);
+    this.#named.set(said, name);
     return name;
   }
 
-  #dropHighlights(passes: readonly Pass[]): void {
-    for (const [highlight, name] of this.#highlights) {
-      if (passes.some((pass) => pass.highlight === highlight)) continue;
+  #dropNamed(passes: readonly Pass[]): void {
+    for (const [said, name] of this.#named) {
+      if (passes.some(({ highlight, finishes }) => highlight === said || finishes === said)) continue;
       this.#pictures.drop(name);
-      this.#highlights.delete(highlight);
+      this.#named.delete(said);
     }
   }
 }

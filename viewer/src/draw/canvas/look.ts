@@ -23,15 +23,17 @@ export interface Look {
   readonly light: Lamp | null;
   /** Under this name the worker has the colours of highlighted ids. */
   readonly highlight: string | null;
+  /** Under this name it has the finishes of objects. */
+  readonly finish: string | null;
   /** A highlight's rim: pixels to the right and below, to the left and above (negative), at which the id differs. */
   readonly rim: Vec2;
   readonly depthRange: Vec2 | null;
 }
 
-/** Kinds that a picture is made from. Without ids a highlight is not shown. */
+/** Kinds that a picture is made from. Without ids neither highlights nor finishes are shown. */
 export function kindsOf(look: Look): LayerKind[] {
   const needed = neededKinds(look.mode, look.masked);
-  return [...needed, ...bakedKindsOf(look), ...(look.highlight !== null && !needed.includes("id") ? ["id" as const] : [])];
+  return [...needed, ...bakedKindsOf(look), ...((look.highlight !== null || look.finish !== null) && !needed.includes("id") ? ["id" as const] : [])];
 }
 
 /** Rendered light; what is not here is done without. */
@@ -41,9 +43,9 @@ function bakedKindsOf({ light }: Look): LayerKind[] {
 
 /** The look of a picture for which some layers are not here. */
 export function lookWith(look: Look, has: (kind: LayerKind) => boolean): Look {
-  const { light, highlight } = look;
+  const { light, highlight, finish } = look;
   const lamp = light && { ...light, occlusion: light.occlusion && has("ao"), shadow: light.shadow && has(light.shadow.kind) ? light.shadow : null };
-  return { ...look, light: lamp, highlight: highlight !== null && has("id") ? highlight : null };
+  return { ...look, light: lamp, highlight: has("id") ? highlight : null, finish: has("id") ? finish : null };
 }
 
 /** Kinds of which the pixels beyond the tile's edge count, too. */
@@ -51,14 +53,22 @@ export function kindsBeside(look: Look): LayerKind[] {
   return [...(look.light ? ["normal" as const, ...bakedKindsOf(look)] : []), ...(look.highlight === null ? [] : ["id" as const])];
 }
 
-/** @param scale texels a device pixel  @param highlight name of the pass's highlighted ids */
-export function lookOf({ light, dpr }: FrameSpec, pass: Pass, scale: number, highlight: string | null): Look {
+/** Names of the pass's highlighted ids and of its finishes. */
+export interface Names {
+  readonly highlight: string | null;
+  readonly finish: string | null;
+}
+
+/** @param scale texels a device pixel */
+export function lookOf({ light, dpr }: FrameSpec, pass: Pass, scale: number, { highlight, finish }: Names): Look {
   const mode = pass.mode === "lit" && !light.lit ? "color" : pass.mode;
+  const colored = mode === "lit" || mode === "color" || mode === "picture";
   return {
     mode,
-    masked: pass.masked && (mode === "lit" || mode === "color" || mode === "picture"),
+    masked: pass.masked && colored,
     light: mode === "lit" ? lampOf(light, pass.baked) : null,
     highlight,
+    finish: colored ? finish : null,
     rim: highlight === null ? [0, 0] : rimOf(Math.max(1, 1.25 * dpr * scale)),
     depthRange: mode === "depth" ? pass.depthRange : null,
   };

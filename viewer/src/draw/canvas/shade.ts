@@ -1,4 +1,5 @@
 import type { Rgb } from "../drawer";
+import { packFinish, PAINT, PALE, type Finishes } from "../finish";
 import type { Look } from "./look";
 import { lightOn, type Lamp, type Shades } from "./lightOn";
 
@@ -21,15 +22,21 @@ export interface Around {
   readonly id: Beside<Uint32Array>;
 }
 
+/** What is said of objects by id. */
+export interface Said {
+  readonly colors: ReadonlyMap<number, Rgb> | undefined;
+  readonly finishes: Finishes | undefined;
+}
+
 type Bytes = Uint8ClampedArray<ArrayBuffer>;
 
 /** RGBA with straight alpha: what the fragment shader of the WebGL drawer makes at the middle of each tile pixel. */
-export function shade(look: Look, layers: Layers, around: Around, colors: ReadonlyMap<number, Rgb> | undefined): Bytes {
+export function shade(look: Look, layers: Layers, around: Around, { colors, finishes }: Said): Bytes {
   const out: Bytes = new Uint8ClampedArray(layers.width * layers.height * 4);
   if (look.mode === "normal") showNormals(out, layers);
   else if (look.mode === "id") showIds(out, layers);
   else if (look.mode === "depth") showDepths(out, layers, look.depthRange ?? [0, 1]);
-  else showColors(out, look, layers, around);
+  else showColors(out, look, layers, around, finishes);
   if (colors && layers.id) highlight(out, look, layers, around, colors);
   return out;
 }
@@ -47,10 +54,11 @@ function srgb(c: number): number {
   return c <= 0.0031308 ? c * 12.92 : 1.055 * c ** (1 / 2.4) - 0.055;
 }
 
-function showColors(out: Bytes, look: Look, layers: Layers, around: Around): void {
+function showColors(out: Bytes, look: Look, layers: Layers, around: Around, finishes: Finishes | undefined): void {
   const { color = out, id } = layers;
   out.set(color);
   for (let at = 0; look.masked && id && at < id.length; at++) out[4 * at + 3] = id[at] === 0 ? 0 : 255;
+  if (finishes && id) finish(out, id, finishes);
   if (!look.light || !layers.shades) return;
   const shares = lightOn(look.light, layers.width, layers.height, layers.shades, around.shades);
   const [red, green, blue] = ([0, 1, 2] as const).map((channel) => strengthIn(look.light as Lamp, channel)) as [Strength, Strength, Strength];
@@ -59,6 +67,30 @@ function showColors(out: Bytes, look: Look, layers: Layers, around: Around): voi
     out[k] = litByte(out[k] as number, red(sky, sun));
     out[k + 1] = litByte(out[k + 1] as number, green(sky, sun));
     out[k + 2] = litByte(out[k + 2] as number, blue(sky, sun));
+  }
+}
+
+/** As the shader's `finished`. */
+function finish(out: Bytes, id: Uint32Array, finishes: Finishes): void {
+  eachFinished(id, finishes, (at, word) => {
+    const k = 4 * at;
+    const kind = word >>> 24;
+    if (kind === 4) out[k + 3] = 0;
+    const grey = kind === 3 ? (0.2126 * (out[k] as number) + 0.7152 * (out[k + 1] as number) + 0.0722 * (out[k + 2] as number)) * (1 - PALE[1]) + 255 * PALE[0] * PALE[1] : 0;
+    for (let c = 0; c < 3 && (kind === 1 || kind === 3); c++) {
+      const own = out[k + c] as number;
+      out[k + c] = kind === 3 ? grey : own + (((word >> (8 * c)) & 255) - own) * PAINT;
+    }
+  });
+}
+
+/** Pixels of objects that are not shown as they are: where, and the finish as the shader has it. */
+export function eachFinished(id: Uint32Array, { byId, others }: Finishes, act: (at: number, word: number) => void): void {
+  let [last, word] = [0, 0];
+  for (let at = 0; at < id.length; at++) {
+    const own = id[at] as number;
+    if (own !== last) [last, word] = [own, own === 0 ? 0 : packFinish(byId.get(own) ?? others)];
+    if (own !== 0 && word >>> 24 !== 2) act(at, word);
   }
 }
 

@@ -1,13 +1,14 @@
 import type { LayerKind } from "../../geo/manifest";
 import type { TileData } from "../../tiles/tileData";
 import type { Rgb } from "../drawer";
+import type { Finishes } from "../finish";
 import type { Look } from "./look";
 import type { Shades } from "./lightOn";
 import { shade, type Around, type Layers } from "./shade";
 import { composed } from "./unread";
 
-/** What the worker keeps under a name: a tile's layer, or colours of highlighted ids. */
-export type Kept = TileData | ReadonlyMap<number, Rgb>;
+/** What the worker keeps under a name: a tile's layer, colours of highlighted ids, or finishes. */
+export type Kept = TileData | ReadonlyMap<number, Rgb> | Finishes;
 
 /** A picture that is asked for; layers are named. */
 export interface Order {
@@ -83,8 +84,9 @@ async function paint(look: Look, names: Order["layers"], beside: Order["beside"]
   const shadow = beside[look.light?.shadow?.kind ?? "sun"];
   const around: Around = { shades: (beside.normal ?? []).map((name, k) => shadesOf(look, name, beside.ao?.[k], shadow?.[k])), id: (beside.id ?? []).map(words) };
   const colors = look.highlight === null ? undefined : (kept.get(look.highlight) as ReadonlyMap<number, Rgb> | undefined);
-  if (bitmap && !exact && look.mode !== "id" && look.mode !== "normal" && look.mode !== "depth") return composed(look, bitmap, layers, around, colors);
-  return createImageBitmap(new ImageData(shade(look, layers, around, colors), width, height));
+  const finishes = look.finish === null ? undefined : (kept.get(look.finish) as Finishes | undefined);
+  if (bitmap && !exact && look.mode !== "id" && look.mode !== "normal" && look.mode !== "depth") return composed(look, bitmap, layers, around, { colors, finishes });
+  return createImageBitmap(new ImageData(shade(look, layers, around, { colors, finishes }), width, height));
 }
 
 function tile(name: string | undefined): TileData | undefined {

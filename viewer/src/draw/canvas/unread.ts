@@ -1,21 +1,45 @@
 import type { Rgb } from "../drawer";
+import { PAINT, PALE, type Finishes } from "../finish";
 import type { Look } from "./look";
 import { lightOn, type Lamp } from "./lightOn";
-import { eachHighlighted, packed, strengthIn, type Around, type Layers } from "./shade";
+import { eachFinished, eachHighlighted, packed, strengthIn, type Around, type Layers, type Said } from "./shade";
 
 /**
  * A colour tile's picture made by compositing alone, for browsers that do not let pixels be read exactly. Light
  * multiplies sRGB values by its 2.2nd root, which stays within a few bytes of linear light.
  */
-export function composed(look: Look, bitmap: ImageBitmap, layers: Layers, around: Around, colors: ReadonlyMap<number, Rgb> | undefined): ImageBitmap {
+export function composed(look: Look, bitmap: ImageBitmap, layers: Layers, around: Around, { colors, finishes }: Said): ImageBitmap {
   const { width, height } = layers;
   const context = canvasOf(width, height);
   context.drawImage(bitmap, 0, 0);
+  const hidden = finishes && layers.id ? finish(context, layers.id, finishes) : null;
   if (look.light && layers.shades) shine(context, look.light, lightOn(look.light, width, height, layers.shades, around.shades));
   context.globalCompositeOperation = "destination-in";
   context.drawImage(look.masked && layers.id ? imageOf(width, height, (at) => (layers.id?.[at] ? 0xff000000 : 0)) : bitmap, 0, 0);
+  if (hidden) {
+    context.globalCompositeOperation = "destination-out";
+    context.drawImage(hidden, 0, 0);
+  }
   if (colors) tint(context, look, layers, around, colors);
   return context.canvas.transferToImageBitmap();
+}
+
+/** Colours and greys laid over; what is hidden comes back as an image, since alpha is spoilt until the end. */
+function finish(context: OffscreenCanvasRenderingContext2D, id: Uint32Array, finishes: Finishes): OffscreenCanvas {
+  const { width, height } = context.canvas;
+  const [paints, pale, hidden] = [new Uint32Array(id.length), new Uint32Array(id.length), new Uint32Array(id.length)];
+  eachFinished(id, finishes, (at, word) => {
+    const kind = word >>> 24;
+    (kind === 1 ? paints : kind === 3 ? pale : hidden)[at] = kind === 1 ? (word | 0xff000000) >>> 0 : packed([PALE[0], PALE[0], PALE[0]]);
+  });
+  const greyed = greyOf(context.canvas);
+  greyed.globalCompositeOperation = "destination-in";
+  greyed.drawImage(imageOf(width, height, (at) => pale[at] ?? 0), 0, 0);
+  context.globalCompositeOperation = "source-atop";
+  layOver(context, greyed.canvas, 1);
+  layOver(context, imageOf(width, height, (at) => pale[at] ?? 0), PALE[1]);
+  layOver(context, imageOf(width, height, (at) => paints[at] ?? 0), PAINT);
+  return imageOf(width, height, (at) => hidden[at] ?? 0);
 }
 
 function canvasOf(width: number, height: number): OffscreenCanvasRenderingContext2D {

@@ -1,8 +1,6 @@
-import type { Rgb } from "../drawer";
-
-/** Ids and their colours in a table with open addressing, as the shader searches it. */
+/** Ids and a word for each in a table with open addressing, as the shader searches it. */
 export interface IdTable {
-  /** Places in pairs: id, colour (R in the low byte; bit 24 set, so that it is never 0). */
+  /** Places in pairs: id, word (never 0). */
   readonly places: Uint32Array;
   /** Number of places − 1; a power of two − 1. */
   readonly mask: number;
@@ -12,16 +10,14 @@ export interface IdTable {
   readonly one: readonly [number, number];
 }
 
-export const packColor = (color: Rgb): number => color.reduce((sum, part, k) => sum + (Math.round(part * 255) << (8 * k)), 1 << 24);
-
-export function idTable(colors: ReadonlyMap<number, Rgb>): IdTable {
-  const ids = [...colors].filter(([id]) => id > 0);
+export function idTable<T>(values: ReadonlyMap<number, T>, wordOf: (value: T) => number): IdTable {
+  const ids = [...values].filter(([id]) => id > 0);
   const size = 2 ** Math.ceil(Math.log2(Math.max(ids.length * 2, 16)));
   const places = new Uint32Array(size * 2);
   let probes = 1;
-  for (const [id, color] of ids) probes = Math.max(probes, insert(places, size - 1, id, packColor(color)));
+  for (const [id, value] of ids) probes = Math.max(probes, insert(places, size - 1, id, wordOf(value)));
   const first = ids.length === 1 ? ids[0] : undefined;
-  return { places, mask: size - 1, probes: probes + 1, one: first ? [first[0], packColor(first[1])] : [0, 0] };
+  return { places, mask: size - 1, probes: probes + 1, one: first ? [first[0], wordOf(first[1])] : [0, 0] };
 }
 
 /** Width and height of the texture that holds a table. */
@@ -30,13 +26,13 @@ export function tableShape({ mask }: IdTable): [number, number] {
   return [width, (mask + 1) / width];
 }
 
-function insert(places: Uint32Array, mask: number, id: number, color: number): number {
+function insert(places: Uint32Array, mask: number, id: number, word: number): number {
   let place = (Math.imul(id, 0x9e3779b9) >>> 7) & mask;
   for (let probe = 1; ; probe++) {
     const there = places[2 * place];
     if (there === 0 || there === id) {
       places[2 * place] = id;
-      places[2 * place + 1] = color;
+      places[2 * place + 1] = word;
       return probe;
     }
     place = (place + 1) & mask;

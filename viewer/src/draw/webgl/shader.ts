@@ -1,4 +1,5 @@
 import type { Mode } from "../drawer";
+import { PAINT, PALE } from "../finish";
 import { GUTTER } from "./textures";
 
 /** What a program is made for; each combination is compiled when it is first drawn. */
@@ -6,13 +7,15 @@ export interface Variant {
   readonly mode: Mode;
   readonly masked: boolean;
   readonly highlight: boolean;
+  /** Objects are not all shown as they are. */
+  readonly finish: boolean;
   /** The layer with shadows, if any. */
   readonly shadow: "sun" | "sun16" | null;
   readonly occlusion: boolean;
 }
 
 export const variantName = (v: Variant): string =>
-  [v.mode, v.masked && "masked", v.highlight && "highlight", v.shadow, v.occlusion && "ao"].filter(Boolean).join("+");
+  [v.mode, v.masked && "masked", v.highlight && "highlight", v.finish && "finish", v.shadow, v.occlusion && "ao"].filter(Boolean).join("+");
 
 export const VERTEX = `#version 300 es
 uniform vec4 u_rect; // left, top, right, bottom in clip space
@@ -21,10 +24,10 @@ void main() {
   gl_Position = vec4(right ? u_rect.z : u_rect.x, bottom ? u_rect.w : u_rect.y, 0.0, 1.0);
 }`;
 
-export function fragment({ mode, masked, highlight, shadow, occlusion }: Variant): string {
-  const names = [`MODE_${mode === "picture" ? "COLOR" : mode.toUpperCase()}`, masked && "MASKED", highlight && "HIGHLIGHT", shadow && `SHADOW_${shadow.toUpperCase()}`, occlusion && "OCCLUSION"];
+export function fragment({ mode, masked, highlight, finish, shadow, occlusion }: Variant): string {
+  const names = [`MODE_${mode === "picture" ? "COLOR" : mode.toUpperCase()}`, masked && "MASKED", highlight && "HIGHLIGHT", finish && "FINISH", shadow && `SHADOW_${shadow.toUpperCase()}`, occlusion && "OCCLUSION"];
   const defines = names.filter(Boolean).map((name) => `#define ${String(name)}`);
-  return ["#version 300 es", ...defines, HEAD, COLOR, FALSE_COLOR, HIGHLIGHT, MAIN].join("\n");
+  return ["#version 300 es", ...defines, HEAD, FIND, COLOR, FALSE_COLOR, HIGHLIGHT, MAIN].join("\n");
 }
 
 const HEAD = `
@@ -54,6 +57,45 @@ vec3 srgb(vec3 c) { return mix(c * 12.92, 1.055 * pow(max(c, 0.0031308), vec3(1.
 ivec2 inside(ivec2 at) { return clamp(at, ivec2(0), ivec2(u_size - 1)) + GUTTER; }
 `;
 
+/** Tables of ids with open addressing: R is the id, G its word; an empty place ends the search. */
+const FIND = `
+#if defined(HIGHLIGHT) || defined(FINISH)
+/** one: the only id and its word; id 0: see the table. mask: places − 1. */
+uint find(usampler2D table, uint id, uint mask, int probes, uvec2 one) {
+  if (id == 0u) return 0u;
+  if (one.x != 0u) return one.x == id ? one.y : 0u;
+  uint width = uint(textureSize(table, 0).x);
+  uint place = (id * 2654435769u >> 7) & mask;
+  for (int k = 0; k < probes; k++) {
+    uvec2 entry = texelFetch(table, ivec2(place % width, place / width), 0).rg;
+    if (entry.x == id) return entry.y;
+    if (entry.x == 0u) return 0u;
+    place = (place + 1u) & mask;
+  }
+  return 0u;
+}
+
+vec3 rgbOf(uint word) { return vec3(uvec3(word, word >> 8, word >> 16) & 255u) / 255.0; }
+#endif
+
+#ifdef FINISH
+uniform usampler2D u_finishes;
+uniform uint u_finishMask;
+uniform int u_finishProbes;
+uniform uvec2 u_finishOne;
+uniform uint u_others;    // of ids that are not in the table
+
+vec4 finished(vec4 c, uint id) {
+  uint word = find(u_finishes, id, u_finishMask, u_finishProbes, u_finishOne);
+  uint kind = (word == 0u && id != 0u ? u_others : word) >> 24;
+  if (kind == 1u) c.rgb = mix(c.rgb, rgbOf(word), ${String(PAINT)});
+  else if (kind == 3u) c.rgb = mix(vec3(dot(c.rgb, vec3(0.2126, 0.7152, 0.0722))), vec3(${String(PALE[0])}), ${String(PALE[1])});
+  else if (kind == 4u) c.a = 0.0;
+  return c;
+}
+#endif
+`;
+
 /**
  * Colour is averaged premultiplied, and in linear light when it is lit: shade first, filter then.
  *
@@ -70,6 +112,9 @@ vec4 colorAt(ivec2 texel) {
   vec4 c = texelFetch(u_color, at, 0);
 #ifdef MASKED
   c.a = texelFetch(u_id, at, 0).r == 0u ? 0.0 : 1.0;
+#endif
+#ifdef FINISH
+  c = finished(c, texelFetch(u_id, at, 0).r);
 #endif
   return c;
 }
@@ -184,28 +229,13 @@ vec4 surface(vec2 texel) {
 #endif
 `;
 
-/** A table of ids with open addressing: R is the id, G its colour; an empty place ends the search. */
 const HIGHLIGHT = `
 #ifdef HIGHLIGHT
 uniform usampler2D u_table;
-uniform uint u_mask;      // places − 1
+uniform uint u_mask;
 uniform int u_probes;
-uniform uvec2 u_one;      // the only id and its colour; id 0: see the table
+uniform uvec2 u_one;
 uniform float u_rim;      // texels
-
-uint colorOf(uint id) {
-  if (id == 0u) return 0u;
-  if (u_one.x != 0u) return u_one.x == id ? u_one.y : 0u;
-  uint width = uint(textureSize(u_table, 0).x);
-  uint place = (id * 2654435769u >> 7) & u_mask;
-  for (int k = 0; k < u_probes; k++) {
-    uvec2 entry = texelFetch(u_table, ivec2(place % width, place / width), 0).rg;
-    if (entry.x == id) return entry.y;
-    if (entry.x == 0u) return 0u;
-    place = (place + 1u) & u_mask;
-  }
-  return 0u;
-}
 
 uint idAt(vec2 texel) {
   ivec2 at = clamp(ivec2(floor(texel)), u_bounds.xy, u_bounds.zw);
@@ -214,9 +244,9 @@ uint idAt(vec2 texel) {
 
 vec4 highlighted(vec4 color, vec2 texel) {
   uint id = texelFetch(u_id, inside(ivec2(floor(texel))), 0).r;
-  uint packed = colorOf(id);
+  uint packed = find(u_table, id, u_mask, u_probes, u_one);
   if (packed == 0u) return color;
-  vec3 tint = vec3(uvec3(packed, packed >> 8, packed >> 16) & 255u) / 255.0;
+  vec3 tint = rgbOf(packed);
   float grey = dot(color.rgb, vec3(0.2126, 0.7152, 0.0722));
   bool rim = idAt(texel + vec2(u_rim, 0.0)) != id || idAt(texel - vec2(u_rim, 0.0)) != id
     || idAt(texel + vec2(0.0, u_rim)) != id || idAt(texel - vec2(0.0, u_rim)) != id;

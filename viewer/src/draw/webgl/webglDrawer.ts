@@ -3,6 +3,7 @@ import type { Vec3 } from "../../core/vec";
 import { towardsLight } from "../../geo/light";
 import type { LayerKind } from "../../geo/manifest";
 import { bakedKinds, neededKinds, type Drawer, type DrawerEvents, type FrameSpec, type Mode, type Pass, type Quad } from "../drawer";
+import { packColor, packFinish } from "../finish";
 import { idTable, tableShape, type IdTable } from "./idTable";
 import { Programs, unitOf, type Program } from "./program";
 import { boundsOf, SPARE_UNIT, Textures, type TileTexture } from "./textures";
@@ -80,9 +81,10 @@ export class WebGLDrawer implements Drawer {
       if (textures.some(([, texture]) => !texture)) continue;
       const has = (kind: LayerKind): boolean => baked.some(([other]) => other === kind);
       const shadow = has("sun") ? "sun" : has("sun16") ? "sun16" : null;
-      const program = this.#programs.use({ mode, masked: pass.masked, highlight: ids !== undefined, shadow, occlusion: has("ao") });
+      const finish = ids !== undefined && pass.finishes !== null;
+      const program = this.#programs.use({ mode, masked: pass.masked, highlight: ids !== undefined && pass.highlight.size > 0, finish, shadow, occlusion: has("ao") });
       for (const [kind, texture] of [...textures, ...baked]) this.#bind(kind, texture);
-      if (ids) this.#bindHighlight(program, pass, quad, ids, frame.dpr);
+      if (ids) this.#bindIds(program, pass, quad, ids, frame.dpr);
       this.#drawQuad(frame, pass, quad, program, [...textures, ...baked, ["id", ids] as const].flatMap(([, texture]) => texture ?? []));
     }
   }
@@ -95,7 +97,7 @@ export class WebGLDrawer implements Drawer {
         const texture = this.#textureOf(pass, kind, quad);
         return texture ? [[kind, texture] as const] : [];
       }),
-      ids: pass.highlight.size > 0 ? this.#textureOf(pass, "id", quad) : undefined,
+      ids: pass.highlight.size > 0 || pass.finishes ? this.#textureOf(pass, "id", quad) : undefined,
     };
   }
 
@@ -138,21 +140,28 @@ export class WebGLDrawer implements Drawer {
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
   }
 
-  #bindHighlight(program: Program, pass: Pass, quad: Quad, ids: TileTexture, dpr: number): void {
+  #bindIds(program: Program, { highlight, finishes }: Pass, quad: Quad, ids: TileTexture, dpr: number): void {
     const gl = this.#gl;
-    const { table, texture } = this.#tables.get(pass.highlight) ?? this.#uploadTable(pass);
     this.#bind("id", ids);
-    gl.activeTexture(gl.TEXTURE0 + unitOf("u_table"));
-    gl.bindTexture(gl.TEXTURE_2D, texture);
-    gl.uniform1ui(program.at("u_mask"), table.mask);
-    gl.uniform1i(program.at("u_probes"), table.probes);
-    gl.uniform2ui(program.at("u_one"), ...table.one);
     gl.uniform1f(program.at("u_rim"), Math.max(1, 1.25 * dpr * quad.scale));
+    if (highlight.size > 0) this.#bindTable(program, ["u_table", "u_mask", "u_probes", "u_one"], highlight, () => idTable(highlight, packColor));
+    if (!finishes) return;
+    this.#bindTable(program, ["u_finishes", "u_finishMask", "u_finishProbes", "u_finishOne"], finishes.byId, () => idTable(finishes.byId, packFinish));
+    gl.uniform1ui(program.at("u_others"), packFinish(finishes.others));
   }
 
-  #uploadTable(pass: Pass): { table: IdTable; texture: WebGLTexture } {
+  #bindTable(program: Program, [sampler, mask, probes, one]: readonly ["u_table" | "u_finishes", string, string, string], values: ReadonlyMap<number, unknown>, make: () => IdTable): void {
     const gl = this.#gl;
-    const table = idTable(pass.highlight);
+    const { table, texture } = this.#tables.get(values) ?? this.#uploadTable(values, make());
+    gl.activeTexture(gl.TEXTURE0 + unitOf(sampler));
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.uniform1ui(program.at(mask), table.mask);
+    gl.uniform1i(program.at(probes), table.probes);
+    gl.uniform2ui(program.at(one), ...table.one);
+  }
+
+  #uploadTable(values: ReadonlyMap<number, unknown>, table: IdTable): { table: IdTable; texture: WebGLTexture } {
+    const gl = this.#gl;
     const texture = gl.createTexture();
     const [width, height] = tableShape(table);
     gl.activeTexture(gl.TEXTURE0 + SPARE_UNIT);
@@ -160,15 +169,15 @@ export class WebGLDrawer implements Drawer {
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RG32UI, width, height, 0, gl.RG_INTEGER, gl.UNSIGNED_INT, table.places);
-    this.#tables.set(pass.highlight, { table, texture });
+    this.#tables.set(values, { table, texture });
     return { table, texture };
   }
 
   #dropTables(passes: readonly Pass[]): void {
-    for (const [highlight, { texture }] of this.#tables) {
-      if (passes.some((pass) => pass.highlight === highlight)) continue;
+    for (const [values, { texture }] of this.#tables) {
+      if (passes.some(({ highlight, finishes }) => highlight === values || finishes?.byId === values)) continue;
       this.#gl.deleteTexture(texture);
-      this.#tables.delete(highlight);
+      this.#tables.delete(values);
     }
   }
 

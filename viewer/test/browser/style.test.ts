@@ -1,0 +1,101 @@
+import { expect, test } from "vitest";
+import { renderTown } from "../fixture/rendering";
+import { ORIGIN } from "../fixture/town";
+import { TestBed } from "./bed";
+import { OUT } from "./browser";
+import { decodedLevel, placeOf } from "./level";
+import { picture, settled, type Global } from "./page";
+
+const town = renderTown();
+const bed = new TestBed({ town });
+const [GROUND, HALL, SCHOOL, TOWER, CHAPEL] = [3, 17, 1025, 2_000_000_001, 3_900_000_007] as const;
+const VIEWPORT = { viewport: { width: 500, height: 400 } };
+
+type Bytes = readonly number[];
+const grey = ([r = 0, g = 0, b = 0]: Bytes): number => 0.2126 * r + 0.7152 * g + 0.0722 * b;
+/** What becomes of a pixel's colour, by the object's id. */
+const expected: Record<number, (color: Bytes) => Bytes> = {
+  [HALL]: (color) => [19, 137, 160].map((paint, k) => 0.15 * (color[k] ?? 0) + 0.85 * paint),
+  [SCHOOL]: (color) => color.slice(0, 3),
+  [TOWER]: () => [],
+  [GROUND]: (color) => [0, 1, 2].map(() => 0.35 * grey(color) + 0.65 * 0.86 * 255),
+  [CHAPEL]: (color) => [0, 1, 2].map(() => 0.35 * grey(color) + 0.65 * 0.86 * 255),
+};
+const style = ([hall, school, tower]: readonly number[]): unknown =>
+  (globalThis as Global).layer.setStyle({ colors: new Map([[hall as number, "#1389a0"]]), only: [hall as number, school as number], hidden: [tower as number] });
+
+test.each(["webgl", "canvas"])("%s: every pixel has the finish of its object, and all comes back", async (drawer) => {
+  const { page, problems } = await bed.start("town", { zoom: 3, drawer, light: { lit: false } }, {}, VIEWPORT);
+  const before = await picture(page);
+  await settled(page, style, [HALL, SCHOOL, TOWER]);
+  const after = await picture(page);
+  await page.screenshot({ path: `${OUT}/style-${drawer}.png` });
+  const [ids, colors] = [decodedLevel(town, "id"), decodedLevel(town, "color")];
+  const [left, top] = await placeOf(page);
+  const [wrong, seen]: [string[], Set<number>] = [[], new Set()];
+  for (let at = 0; at < 500 * 400; at++) {
+    const [x, y] = [(at % 500) - left, Math.floor(at / 500) - top];
+    const [id, color] = [ids(x, y)?.readUInt32LE() ?? 0, colors(x, y)];
+    if (!color || id === 0 || color[3] !== 255) continue;
+    seen.add(id);
+    const want = expected[id]?.([...color]) ?? [];
+    const got = [...after.subarray(4 * at, 4 * at + 4)];
+    const right = id === TOWER ? got[3] === 0 : got[3] === 255 && want.every((byte, k) => Math.abs(byte - (got[k] ?? 0)) <= 1.01);
+    if (!right) wrong.push(`${String(x)}, ${String(y)} of object ${String(id)}: ${got.join(" ")} for ${want.join(" ")}`);
+  }
+  expect(wrong.slice(0, 5)).toEqual([]);
+  expect([...seen].sort((a, b) => a - b)).toEqual([GROUND, HALL, SCHOOL, TOWER, CHAPEL]);
+  await settled(page, () => (globalThis as Global).layer.setStyle({}), null);
+  expect(before.equals(await picture(page))).toBe(true);
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
+
+test("lit, both drawers show the same", async () => {
+  const shots: Buffer[] = [];
+  for (const drawer of ["webgl", "canvas"]) {
+    const { page } = await bed.start("town", { zoom: 3, drawer }, {}, VIEWPORT);
+    await settled(page, style, [HALL, SCHOOL, TOWER]);
+    await settled(page, (ids) => (globalThis as Global).layer.highlight(ids), [TOWER, CHAPEL]);
+    shots.push(await picture(page));
+    await page.screenshot({ path: `${OUT}/style-lit-${drawer}.png` });
+    await page.context().close();
+  }
+  const [a, b] = shots as [Buffer, Buffer];
+  const byte = (from: Buffer, k: number): number => ((from[k] ?? 0) * (k % 4 === 3 ? 255 : (from[k | 3] ?? 0))) / 255;
+  let most = 0;
+  for (let k = 0; k < a.length; k++) most = Math.max(most, Math.abs(byte(a, k) - byte(b, k)));
+  expect(most).toBeLessThanOrEqual(2.01);
+  expect(a.length).toBe(b.length);
+});
+
+test("what is hidden is not picked, and does not count as seen", async () => {
+  const { page } = await bed.start("town", { zoom: 3 });
+  const top = [ORIGIN[0] + 32, ORIGIN[1] + 26, ORIGIN[2] + 62] as const;
+  const idAt = (): Promise<number> => page.evaluate(async (world) => {
+    const { map } = globalThis as Global;
+    return (await map.pick(map.project(world) as [number, number])).id;
+  }, top);
+  const seen = (): Promise<number[]> => page.evaluate(async () => (await (globalThis as Global).map.objectsInView()).map(({ id }) => id));
+  expect(await idAt()).toBe(TOWER);
+  expect(await seen()).toContain(TOWER);
+  await settled(page, (id) => (globalThis as Global).layer.setStyle({ hidden: [id] }), TOWER);
+  expect(await idAt()).not.toBe(TOWER);
+  expect(await seen()).not.toContain(TOWER);
+  await page.context().close();
+});
+
+test("attributes come by column", async () => {
+  const { page } = await bed.start("town");
+  const found = await page.evaluate(async () => {
+    const { layer } = globalThis as Global;
+    const all = await layer.attributes();
+    const height = all.find(({ name }) => name === "measuredHeight");
+    return { names: all.map(({ of, name }) => `${of}.${name}`), height, values: height ? [...await layer.column(height)] : [], none: (await layer.column({ column: "../../rendering" })).size };
+  });
+  expect(found.names).toEqual(["object.class", "attributes.listed", "attributes.measuredHeight", "attributes.note", "attributes.roofType"]);
+  expect(found.height).toMatchObject({ type: "number", min: 2, max: 62, objects: 5 });
+  expect(found.values).toEqual([[GROUND, 2], [HALL, 34], [SCHOOL, 16], [TOWER, 62], [CHAPEL, 20]]);
+  expect(found.none).toBe(0);
+  await page.context().close();
+});

@@ -1,0 +1,56 @@
+import { describe, expect, test } from "vitest";
+import { packColor, packFinish } from "../../src/draw/finish";
+import { idTable } from "../../src/draw/webgl/idTable";
+import { finishesOf, isHidden, type ObjectStyle } from "../../src/map/objectStyle";
+
+const RED = [1, 0, 0];
+
+describe("a style says how each object is shown", () => {
+  const rows: [string, ObjectStyle, Record<number, unknown>, string][] = [
+    ["colours alone leave the others as they are", { colors: new Map([[5, "#ff0000"]]) }, { 5: RED }, "plain"],
+    ["only dims the others", { only: [5, 6] }, { 5: "plain", 6: "plain" }, "dimmed"],
+    ["or hides them", { only: [5], others: "hidden" }, { 5: "plain" }, "hidden"],
+    ["only none dims all", { only: [] }, {}, "dimmed"],
+    ["colours hold for those that are shown", { colors: new Map([[5, "#ff0000"], [6, "#ff0000"]]), only: [5] }, { 5: RED }, "dimmed"],
+    ["what is hidden is hidden", { colors: new Map([[5, "#ff0000"]]), only: [5], hidden: [5, 7] }, { 5: "hidden", 7: "hidden" }, "dimmed"],
+    ["large ids are themselves", { hidden: [3_900_000_007] }, { 3_900_000_007: "hidden" }, "plain"],
+  ];
+  test.each(rows)("%s", (_, style, byId, others) => {
+    const found = finishesOf(style);
+    expect(found?.others).toBe(others);
+    expect(Object.fromEntries(found?.byId ?? [])).toEqual(byId);
+  });
+
+  test("nothing said: no style at all", () => {
+    expect(finishesOf({})).toBe(null);
+    expect(finishesOf({ colors: new Map() })).toBe(null);
+  });
+
+  test("what is no colour is refused", () => {
+    expect(() => finishesOf({ colors: new Map([[1, "url(x)"]]) })).toThrow(/url\(x\)/);
+  });
+
+  test("nothing is never hidden", () => {
+    const none = finishesOf({ only: [5], others: "hidden" });
+    expect([isHidden(none, 0), isHidden(none, 5), isHidden(none, 6), isHidden(null, 6)]).toEqual([false, false, true, false]);
+  });
+});
+
+test("words of finishes differ, and are never 0", () => {
+  const words = (["plain", "dimmed", "hidden", [0, 0, 0], [1, 1, 1]] as const).map(packFinish);
+  expect(new Set(words).size).toBe(5);
+  expect(words.every((word) => word >>> 24 > 0 && word >>> 24 < 8)).toBe(true);
+  expect(packFinish([1, 0, 0])).toBe(packColor([1, 0, 0]));
+});
+
+test("every id of a table is found within its probes", () => {
+  const ids = Array.from({ length: 5000 }, (_, k) => (Math.imul(k + 1, 0x85ebca6b) >>> 0) || 1);
+  const table = idTable(new Map(ids.map((id, k) => [id, k + 1])), (word) => word);
+  ids.forEach((id, k) => {
+    let place = (Math.imul(id, 0x9e3779b9) >>> 7) & table.mask;
+    let probe = 1;
+    for (; table.places[2 * place] !== id; probe++) place = (place + 1) & table.mask;
+    expect(table.places[2 * place + 1]).toBe(k + 1);
+    expect(probe).toBeLessThanOrEqual(table.probes);
+  });
+});
