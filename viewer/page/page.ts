@@ -1,4 +1,6 @@
 import { imageLayer, map, Map3dError } from "./map3d.mjs";
+import { Address } from "./address";
+import { Colors } from "./colors";
 import { InfoPanel } from "./info";
 import { bindLight, lightAt } from "./light";
 import { Tools } from "./tools";
@@ -16,11 +18,12 @@ function bases(): string[] {
 }
 
 function open(): void {
-  const { time, id, ...place } = readPlace(location.hash);
+  const { time, id, by, ...place } = readPlace(location.hash);
   const view = new map("mapcanvas", { light: lightAt(14), ...place });
   const layer = new imageLayer(bases());
   const info = new InfoPanel(byId("info"), () => { selection.forget(); });
-  const selection = new Selection(view, layer, info);
+  const address = new Address(view);
+  const selection = new Selection(view, layer, info, address);
   view.on("error", ({ error }) => {
     if (layer.rendering) toast(error.message);
     else fail("This rendering cannot be shown", error.message);
@@ -31,6 +34,8 @@ function open(): void {
   });
   layer.on("ready", () => {
     dress(view, layer, info, selection, time);
+    address.by = by ?? "";
+    new Colors(view, layer, address).open().catch((reason: unknown) => { toast(String(reason)); });
     if (id !== undefined) void selection.chooseId(id, null, false);
     if (layer.rendering?.layers.has("depth")) tools = new Tools(view);
   });
@@ -45,6 +50,10 @@ function dress(view: map, layer: imageLayer, info: InfoPanel, selection: Selecti
   byId("title").textContent = json.title || json.name;
   byId("progress").hidden = json.complete;
   byId("look").hidden = false;
+  byId("more").addEventListener("click", ({ currentTarget }) => {
+    const more = currentTarget as HTMLElement;
+    more.setAttribute("aria-expanded", String(more.getAttribute("aria-expanded") !== "true"));
+  });
   info.units = { crs: json.crs.name, vertical: json.crs.vertical };
   bindLight(view, layer, time);
   bindModes(layer);

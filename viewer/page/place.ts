@@ -9,31 +9,36 @@ export interface Place {
   readonly time?: Date;
   /** Of the chosen object. */
   readonly id?: number;
+  /** Attribute that colours the objects. */
+  readonly by?: string;
 }
 
-/** `#<direction>/<x>/<y>/<z>/<zoom>`, then `/t=<UTC time>` and `/id=<object>` if they are set. Anything else is ignored. */
+/** `#<direction>/<x>/<y>/<z>/<zoom>`, then `/t=<UTC time>`, `/id=<object>` and `/by=<attribute>` if they are set. Anything else is ignored. */
 export function readPlace(hash: string): Place {
   const [direction, x, y, z, zoom, ...more] = decoded(hash.replace(/^#/, "")).split("/");
   const numbers = [x, y, z, zoom].map(Number);
   if (!direction || !x || !y || !z || !zoom || !numbers.every(Number.isFinite)) return {};
   const value = (name: string): string | undefined => more.find((part) => part.startsWith(`${name}=`))?.slice(name.length + 1);
-  const [time, id] = [new Date(value("t") ?? ""), Number(value("id") ?? "")];
+  const [time, id, by] = [new Date(value("t") ?? ""), Number(value("id") ?? ""), decoded(value("by") ?? "")];
   return {
     direction,
     center: numbers.slice(0, 3) as unknown as Vec3,
     zoom: numbers[3] as number,
     ...(!Number.isNaN(time.getTime()) && { time }),
     ...(Number.isInteger(id) && id > 0 && { id }),
+    ...(by !== "" && { by }),
   };
 }
 
 /** Puts what is seen into the address; `step`: as a step that the back button takes back. */
-export function writePlace(view: map, id: number, step = false): void {
+export function writePlace(view: map, { id, by }: { readonly id: number; readonly by: string }, step = false): void {
   const { center, time } = view;
   if (!center) return;
   const parts = [view.direction, ...center.map((part) => part.toFixed(1)), view.zoom.toFixed(2)];
   if (time) parts.push(`t=${time.toISOString().slice(0, 16)}Z`);
   if (id > 0) parts.push(`id=${String(id)}`);
+  // Twice, since a name may have a slash and the whole is decoded before it is taken apart.
+  if (by !== "") parts.push(`by=${encodeURIComponent(encodeURIComponent(by))}`);
   const hash = `#${parts.join("/")}`;
   if (hash === location.hash) return;
   if (step) history.pushState(null, "", hash);

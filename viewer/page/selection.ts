@@ -1,65 +1,56 @@
 import type { ClickEvent, imageLayer, map, Vec3 } from "./map3d.mjs";
 import type { InfoPanel } from "./info";
 import { toast } from "./messages";
-import { readPlace, writePlace } from "./place";
+import type { Address } from "./address";
+import { readPlace } from "./place";
 
 const QUIET = new Set(["terrain", "ground"]);
-/** Addresses may not be changed as often as a slider moves. */
-const ADDRESS_MS = 400;
-
-/** The chosen object: highlighted, described, and kept in the address with the view and the time. The back button goes from choice to choice. */
+/** The chosen object: highlighted, described, and kept in the address. The back button goes from choice to choice. */
 export class Selection {
   readonly #view: map;
   readonly #layer: imageLayer;
   readonly #info: InfoPanel;
-  #id = 0;
-  #timer = 0;
+  readonly #address: Address;
 
-  constructor(view: map, layer: imageLayer, info: InfoPanel) {
-    [this.#view, this.#layer, this.#info] = [view, layer, info];
-    view.on("moveend", () => { writePlace(view, this.#id); });
-    view.on("directionchange", () => { writePlace(view, this.#id); });
-    view.on("lightchange", () => {
-      clearTimeout(this.#timer);
-      this.#timer = window.setTimeout(() => { writePlace(view, this.#id); }, ADDRESS_MS);
-    });
+  constructor(view: map, layer: imageLayer, info: InfoPanel, address: Address) {
+    [this.#view, this.#layer, this.#info, this.#address] = [view, layer, info, address];
     addEventListener("popstate", () => { this.#return(); });
   }
 
   /** What was clicked. */
   choose(event: ClickEvent): void {
-    const changed = event.id !== this.#id;
+    const changed = event.id !== this.#address.id;
     this.#show(event);
-    writePlace(this.#view, this.#id, changed);
+    this.#address.write(changed);
   }
 
   /** An object by its id: as if it had been clicked; without a position at the top of its box. */
   async chooseId(id: number, position: Vec3 | null = null, step = true): Promise<void> {
-    const changed = id !== this.#id;
-    this.#id = id;
+    const changed = id !== this.#address.id;
+    this.#address.id = id;
     const object = await this.#layer.object(id).catch((reason: unknown) => {
       toast(String(reason));
       return null;
     });
-    if (this.#id !== id) return;
+    if (this.#address.id !== id) return;
     const [low, high] = object?.box ?? [];
     const origin = this.#layer.rendering?.json.origin;
     const top: Vec3 | null = low && high && origin ? [origin[0] + (low[0] + high[0]) / 2, origin[1] + (low[1] + high[1]) / 2, origin[2] + high[2]] : null;
     const event: ClickEvent = { id, position: position ?? top, approximate: false, layer: this.#layer, point: [0, 0], ...(object ?? {}) };
     this.#show(event);
-    if (step) writePlace(this.#view, id, changed);
+    if (step) this.#address.write(changed);
   }
 
   /** Nothing is chosen any more. */
   forget(): void {
-    this.#id = 0;
+    this.#address.id = 0;
     this.#layer.clearHighlight();
-    writePlace(this.#view, 0);
+    this.#address.write();
   }
 
   #show(event: ClickEvent): void {
     this.#layer.clearHighlight();
-    this.#id = event.id;
+    this.#address.id = event.id;
     if (event.id === 0 && !event.position) {
       this.#info.close();
       return;
@@ -74,6 +65,6 @@ export class Selection {
     if (direction !== undefined && this.#view.directions.some((view) => view.id === direction)) this.#view.setDirection(direction);
     if (center) this.#view.setView(center, zoom);
     if (id > 0) void this.chooseId(id, null, false);
-    else if (this.#id > 0) this.#info.close();
+    else if (this.#address.id > 0) this.#info.close();
   }
 }

@@ -24,7 +24,7 @@ const workers = {
 };
 
 /** Entries beside the core use it by its public names: as a module from map3d.mjs, in a script from the global. */
-const ENTRIES = { measure: "src/measure/index.ts" };
+const ENTRIES = { measure: "src/measure/index.ts", theme: "src/theme/index.ts" };
 
 const coreAs = (how) => ({
   name: "core",
@@ -47,7 +47,7 @@ async function build() {
     await bundle(entry, `map3d-${name}.mjs`, { format: "esm", plugins: [coreAs("module"), workers] });
     await bundle(entry, `map3d-${name}.js`, { format: "iife", plugins: [coreAs("global"), workers], globalName: "entry", banner: { js: `${banner.js}\n(() => {` }, footer: { js: "Object.assign(map3d, entry);\n})();" } });
   }
-  await bundle("page/page.ts", "page.js", { format: "esm", external: ["./map3d.mjs", "./map3d-measure.mjs"] });
+  await bundle("page/page.ts", "page.js", { format: "esm", external: ["./map3d.mjs", ...Object.keys(ENTRIES).map((name) => `./map3d-${name}.mjs`)] });
   await esbuild.build({ ...shared, entryPoints: [join(root, "page/page.css")], outfile: join(dist, "page.css"), target: ["chrome111", "firefox121", "safari16.4"] });
   cpSync(join(root, "page/index.html"), join(dist, "index.html"));
   const tsc = join(root, "node_modules/typescript/bin/tsc");

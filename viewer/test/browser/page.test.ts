@@ -153,3 +153,36 @@ test("tools measure where the map is clicked, and nothing is chosen meanwhile", 
   expect(problems).toEqual([]);
   await page.context().close();
 });
+
+for (const [name, options] of [["desk", DESK], ["phone", PHONE]] as const) {
+  test(`${name}: objects have colours by an attribute; the legend filters; the address keeps it`, async () => {
+    const { page, problems } = await open(options);
+    if (name === "phone") {
+      expect(await page.locator("#by").isVisible()).toBe(false);
+      await page.locator("#more").tap();
+    }
+    const names = await page.locator("#by option").allTextContents();
+    expect(names).toEqual(["–", "Class", "measuredHeight", "roofType"]);
+    await page.selectOption("#by", { label: "measuredHeight" });
+    await page.waitForSelector("#legend button");
+    await page.waitForTimeout(1200);
+    await page.screenshot({ path: `${OUT}/${name}-colors.png` });
+    expect(await page.locator("#legend button").allTextContents()).toEqual(["2", "16", "20", "34", "62"]);
+    await page.locator("#legend button").nth(3).click();
+    await page.waitForTimeout(800);
+    if (name === "phone") await page.locator("#more").tap();
+    await page.screenshot({ path: `${OUT}/${name}-filter.png` });
+    expect(await page.locator("#legend button[aria-pressed=true]").allTextContents()).toEqual(["34"]);
+    await page.waitForFunction(() => location.hash.endsWith("/by=measuredHeight"));
+    const { page: other } = await bed.openPage(options);
+    await other.goto(page.url());
+    await other.waitForSelector("#legend button");
+    expect(await other.locator("#by").inputValue()).toBe("measuredHeight");
+    if (name === "phone") await page.locator("#more").tap();
+    await page.selectOption("#by", { label: "–" });
+    await page.waitForFunction(() => !location.hash.includes("by=") && document.querySelector("#legend button") === null);
+    expect(problems).toEqual([]);
+    await page.context().close();
+    await other.context().close();
+  });
+}

@@ -1,0 +1,55 @@
+import type { AttributeInfo, imageLayer, map } from "./map3d.mjs";
+import type { theme } from "./map3d-theme.mjs";
+import type { Address } from "./address";
+import { byId } from "./dom";
+import { toast } from "./messages";
+
+/** Text of more values tells nothing as colours. */
+const MOST_VALUES = 60;
+
+/** A choice of attributes by which the objects are coloured. */
+export class Colors {
+  readonly #view: map;
+  readonly #layer: imageLayer;
+  readonly #address: Address;
+  readonly #select = byId("by") as HTMLSelectElement;
+  #theme: theme | undefined;
+
+  constructor(view: map, layer: imageLayer, address: Address) {
+    [this.#view, this.#layer, this.#address] = [view, layer, address];
+  }
+
+  /** Offers what the objects have; takes the attribute that the address names. */
+  async open(): Promise<void> {
+    const all = (await this.#layer.attributes()).filter(tells);
+    if (all.length === 0) return;
+    this.#select.append(...all.map((info) => new Option(info.of === "object" ? capital(info.name) : info.name)));
+    byId("colors").hidden = false;
+    this.#select.addEventListener("change", () => void this.#choose(all[this.#select.selectedIndex - 1]));
+    const asked = all.findIndex(({ name }) => name === this.#address.by);
+    if (asked < 0) return;
+    this.#select.selectedIndex = asked + 1;
+    await this.#choose(all[asked]);
+  }
+
+  async #choose(info: AttributeInfo | undefined): Promise<void> {
+    this.#address.by = info?.name ?? "";
+    this.#address.write();
+    this.#theme?.remove();
+    this.#theme = undefined;
+    if (!info) return;
+    try {
+      const made = await import("./map3d-theme.mjs");
+      if (this.#address.by !== info.name) return;
+      this.#theme = new made.theme(this.#layer, info, { legend: byId("legend"), title: info.name }).addTo(this.#view);
+      this.#theme.on("error", ({ error }) => { toast(`Colours cannot be shown: ${error.message}`); });
+    } catch (reason) {
+      toast(`Colours cannot be loaded: ${String(reason)}`);
+    }
+  }
+}
+
+/** Something is to be seen: not all the same, nor all different. */
+const tells = ({ type, variety }: AttributeInfo): boolean => variety > 1 && (type === "number" || variety <= MOST_VALUES);
+
+const capital = (name: string): string => name.slice(0, 1).toUpperCase() + name.slice(1);

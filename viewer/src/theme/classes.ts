@@ -1,0 +1,112 @@
+import type { AttributeInfo, AttributeValue } from "../map3d";
+
+/** A group of objects that have one colour. */
+export interface ThemeClass {
+  readonly label: string;
+  /** #rrggbb */
+  readonly color: string;
+  readonly ids: readonly number[];
+}
+
+export interface Classes {
+  readonly classes: readonly ThemeClass[];
+  /** They follow each other, as numbers do. */
+  readonly ordered: boolean;
+}
+
+/** Light to dark, readable in grey and by the colour-blind. */
+export const RAMP: readonly string[] = ["#fbe3a8", "#f2b077", "#d97568", "#9d4772", "#4f2a6d"];
+/** Told apart by the colour-blind; after Okabe and Ito. */
+export const HUES: readonly string[] = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442"];
+export const REST = "#8f9296";
+
+export interface ClassOptions {
+  readonly classes: number;
+  readonly colors: readonly string[] | undefined;
+  readonly language: string | undefined;
+  /** What those are called that have no class of their own. */
+  readonly rest: string;
+}
+
+type Entry = readonly [id: number, value: AttributeValue];
+
+/** Numbers by size, everything else by value. Text that is always a number counts as such. */
+export function classify(info: Pick<AttributeInfo, "type">, column: ReadonlyMap<number, AttributeValue>, options: ClassOptions): Classes {
+  const entries = [...column];
+  const variety = new Set(entries.map(([, value]) => value)).size;
+  const numbers = info.type === "boolean" ? null : entries.map(([id, value]) => [id, typeof value === "string" && value.trim() === "" ? NaN : Number(value)] as const);
+  const numeric = numbers?.every(([, value]) => Number.isFinite(value)) === true;
+  if (numeric && variety > options.classes && (info.type === "number" || variety > 12)) return { classes: bySize(numbers, options), ordered: true };
+  const ordered = numeric && info.type === "number";
+  const found = byValue(entries, ordered, options);
+  return { classes: found, ordered: ordered && found.length <= 6 };
+}
+
+/** As many objects in each class, as round bounds allow. */
+function bySize(entries: readonly (readonly [number, number])[], { classes, colors, language }: ClassOptions): ThemeClass[] {
+  const sorted = entries.map(([, value]) => value).sort((a, b) => a - b);
+  const bounds = breaksOf(sorted, classes);
+  const format = numberFormat(sorted, language);
+  const groups = [...bounds, Infinity].map<number[]>(() => []);
+  for (const [id, value] of entries) groups[bounds.filter((bound) => value >= bound).length]?.push(id);
+  const ramp = rampOf(colors ?? RAMP, groups.length);
+  return groups.map((ids, k) => ({ ids, color: ramp[k] as string, label: rangeLabel(bounds[k - 1], bounds[k], format) }));
+}
+
+/** Lower bounds of all classes but the first. */
+export function breaksOf(sorted: readonly number[], classes: number): number[] {
+  const at = (share: number): number => sorted[Math.min(Math.floor(share * sorted.length), sorted.length - 1)] ?? 0;
+  const [least, most] = [sorted[0] ?? 0, sorted.at(-1) ?? 0];
+  const step = roundStep((at(0.95) - at(0.05) || most - least) / (4 * classes));
+  const bounds = Array.from({ length: classes - 1 }, (_, k) => Number((Math.round(at((k + 1) / classes) / step) * step).toPrecision(12)));
+  return [...new Set(bounds)].filter((bound) => bound > least && bound <= most).sort((a, b) => a - b);
+}
+
+/** 1, 2 or 5 times a power of ten, at most `value`. */
+function roundStep(value: number): number {
+  const power = 10 ** Math.floor(Math.log10(value));
+  const digit = value / power;
+  return power * (digit >= 5 ? 5 : digit >= 2 ? 2 : 1);
+}
+
+function rangeLabel(from: number | undefined, to: number | undefined, format: (value: number) => string): string {
+  if (from === undefined) return to === undefined ? "" : `< ${format(to)}`;
+  return to === undefined ? `≥ ${format(from)}` : `${format(from)}–${format(to)}`;
+}
+
+/** Whole numbers that may be years have no separators. */
+function numberFormat(sorted: readonly number[], language: string | undefined): (value: number) => string {
+  const years = sorted.every((value) => Number.isInteger(value)) && (sorted[0] ?? 0) >= 0 && (sorted.at(-1) ?? 0) < 10_000;
+  const numbers = new Intl.NumberFormat(language, { useGrouping: !years, maximumSignificantDigits: 6 });
+  return (value) => numbers.format(value);
+}
+
+/** The most frequent values, and what is left. */
+function byValue(entries: readonly Entry[], ordered: boolean, { colors, language, rest }: ClassOptions): ThemeClass[] {
+  const groups = new Map<AttributeValue, number[]>();
+  for (const [id, value] of entries) {
+    const group = groups.get(value);
+    if (group) group.push(id);
+    else groups.set(value, [id]);
+  }
+  const palette = colors ?? (ordered ? rampOf(RAMP, groups.size) : HUES);
+  const frequent = [...groups].sort((a, b) => b[1].length - a[1].length || compare(a[0], b[0], language));
+  const [kept, left] = frequent.length <= palette.length ? [frequent, []] : [frequent.slice(0, palette.length), frequent.slice(palette.length)];
+  if (ordered) kept.sort((a, b) => compare(a[0], b[0], language));
+  const named = kept.map(([value, ids], k) => ({ ids, color: palette[k] as string, label: String(value) }));
+  return left.length === 0 ? named : [...named, { ids: left.flatMap(([, ids]) => ids), color: REST, label: rest }];
+}
+
+const compare = (a: AttributeValue, b: AttributeValue, language: string | undefined): number =>
+  typeof a === "number" && typeof b === "number" ? a - b : String(a).localeCompare(String(b), language, { numeric: true });
+
+/** So many colours, evenly along a ramp; between its own by mixing. */
+export function rampOf(ramp: readonly string[], count: number): string[] {
+  return Array.from({ length: count }, (_, k) => {
+    const at = count === 1 ? 0 : (k / (count - 1)) * (ramp.length - 1);
+    const [from, to] = [ramp[Math.floor(at)] as string, ramp[Math.ceil(at)] as string];
+    const part = (color: string, place: number): number => parseInt(color.slice(1 + 2 * place, 3 + 2 * place), 16);
+    const mixed = [0, 1, 2].map((place) => Math.round(part(from, place) + (part(to, place) - part(from, place)) * (at - Math.floor(at))));
+    return `#${mixed.map((byte) => byte.toString(16).padStart(2, "0")).join("")}`;
+  });
+}
