@@ -12,6 +12,7 @@ export class Address {
   by = "";
   readonly #view: map;
   #timer = 0;
+  #quiet = false;
 
   constructor(view: map) {
     this.#view = view;
@@ -25,6 +26,13 @@ export class Address {
 
   /** `step`: as a step that the back button takes back. */
   write(step = false): void {
-    writePlace(this.#view, this, step);
+    if (!this.#quiet) writePlace(this.#view, this, step);
+  }
+
+  /** Does something without writing, such as going where the address says, of which the first part would write over the rest. */
+  quietly(act: () => void): void {
+    this.#quiet = true;
+    act();
+    this.#quiet = false;
   }
 }

@@ -62,8 +62,10 @@ export class Selection {
   /** To where the address says. */
   #return(): void {
     const { direction, center, zoom, id = 0 } = readPlace(location.hash);
-    if (direction !== undefined && this.#view.directions.some((view) => view.id === direction)) this.#view.setDirection(direction);
-    if (center) this.#view.setView(center, zoom);
+    this.#address.quietly(() => {
+      if (direction !== undefined && this.#view.directions.some((view) => view.id === direction)) this.#view.setDirection(direction);
+      if (center) this.#view.setView(center, zoom);
+    });
     if (id > 0) void this.chooseId(id, null, false);
     else if (this.#address.id > 0) this.#info.close();
   }

@@ -134,6 +134,20 @@ test("view, time and choice are in the address; the back button takes a choice b
   await other.context().close();
 });
 
+test("another address on the same page goes there, direction and all", async () => {
+  const { page, problems } = await open(DESK);
+  const place = "#90-45/691032.0/5336026.0/562.0/4.00";
+  await page.evaluate((hash) => { location.hash = hash; }, place);
+  await page.waitForTimeout(1500);
+  const [, direction, x, y, z, zoom] = /^#(.+?)\/(.+?)\/(.+?)\/(.+?)\/(.+?)\//.exec(`${await page.evaluate(() => location.hash)}/`) ?? [];
+  expect([direction, zoom]).toEqual(["90-45", "4.00"]);
+  // The surface that is seen in the middle, wherever it lies along the ray: looking west at 45 degrees, x − z stays.
+  expect(Number(x) - Number(z)).toBeCloseTo(691_032 - 562, -0.5);
+  expect(Number(y)).toBeCloseTo(5_336_026, -0.5);
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
+
 test("tools measure where the map is clicked, and nothing is chosen meanwhile", async () => {
   const { page, problems } = await open(PHONE);
   await page.locator("#measure-line").tap();
