@@ -42,7 +42,6 @@ export class Colors {
       const made = await import("./map3d-theme.mjs");
       if (this.#address.by !== info.name) return;
       this.#theme = new made.theme(this.#layer, info, { legend: byId("legend"), title: info.name }).addTo(this.#view);
-      this.#theme.on("error", ({ error }) => { toast(`Colours cannot be shown: ${error.message}`); });
     } catch (reason) {
       toast(`Colours cannot be loaded: ${String(reason)}`);
     }

@@ -23,6 +23,7 @@ export interface ThemeOptions {
 export interface ThemeEvents {
   /** Objects have their colours. */
   ready: { classes: readonly ThemeClass[] };
+  /** The map's "error" says so, too. */
   error: { error: Error };
 }
 
@@ -64,7 +65,10 @@ export class theme extends Evented<ThemeEvents> implements Attachable<map> {
     this.#map = map;
     adoptStyles(document, STYLES);
     this.#load(map).catch((reason: unknown) => {
-      if (this.#map === map) this.fire("error", { error: reason instanceof Error ? reason : new Error(String(reason)) });
+      if (this.#map !== map) return;
+      const error = reason instanceof Error ? reason : new Error(String(reason));
+      this.fire("error", { error });
+      map.fire("error", { error });
     });
   }
 

@@ -1,4 +1,5 @@
 import { expect, test } from "vitest";
+import type * as Theme from "../../src/theme";
 import { renderTown } from "../fixture/rendering";
 import { ORIGIN } from "../fixture/town";
 import { TestBed } from "./bed";
@@ -8,6 +9,7 @@ import { picture, settled, type Global } from "./page";
 
 const town = renderTown();
 const bed = new TestBed({ town });
+type Theming = Global & { map3d: typeof Theme; theme: Theme.theme };
 const [GROUND, HALL, SCHOOL, TOWER, CHAPEL] = [3, 17, 1025, 2_000_000_001, 3_900_000_007] as const;
 const VIEWPORT = { viewport: { width: 500, height: 400 } };
 
@@ -97,5 +99,35 @@ test("attributes come by column", async () => {
   expect(found.height).toMatchObject({ type: "number", min: 2, max: 62, objects: 5 });
   expect(found.values).toEqual([[GROUND, 2], [HALL, 34], [SCHOOL, 16], [TOWER, 62], [CHAPEL, 20]]);
   expect(found.none).toBe(0);
+  await page.context().close();
+});
+
+test("a theme colours, filters by its legend, and leaves all as it was; an unknown attribute is an error", async () => {
+  const { page, problems } = await bed.start("town", { zoom: 3 }, {}, VIEWPORT);
+  const before = await picture(page);
+  await page.addScriptTag({ url: "/map3d-theme.js" });
+  await settled(page, () => {
+    const g = globalThis as unknown as Theming;
+    g.theme = new g.map3d.theme(g.layer, "measuredHeight", { language: "de", others: "hidden" }).addTo(g.map);
+  }, null);
+  await page.waitForSelector(".map3d-legend");
+  const painted = await picture(page);
+  expect(painted.equals(before)).toBe(false);
+  await page.screenshot({ path: `${OUT}/theme.png` });
+  expect(await page.evaluate(() => (globalThis as unknown as Theming).theme.classes.map(({ ids }) => ids))).toEqual([[GROUND], [SCHOOL], [CHAPEL], [HALL], [TOWER]]);
+  await page.locator(".map3d-legend button").nth(3).click();
+  await page.waitForFunction(async () => (await (globalThis as Global).map.objectsInView()).length === 1);
+  await page.locator(".map3d-legend button").nth(3).click();
+  await page.waitForFunction(async () => (await (globalThis as Global).map.objectsInView()).length === 5);
+  await settled(page, () => { (globalThis as unknown as Theming).theme.remove(); }, null);
+  expect(before.equals(await picture(page))).toBe(true);
+  expect(await page.locator(".map3d-legend").count()).toBe(0);
+  const failed = await page.evaluate(() => new Promise<string>((done) => {
+    const g = globalThis as unknown as Theming;
+    g.map.on("error", ({ error }) => { done(error.message); });
+    new g.map3d.theme(g.layer, "height").addTo(g.map);
+  }));
+  expect(failed).toBe('no attribute "height"; the rendering has class, listed, measuredHeight, note, roofType');
+  expect(problems).toEqual([]);
   await page.context().close();
 });
