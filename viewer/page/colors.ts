@@ -3,6 +3,7 @@ import type { theme } from "./map3d-theme.mjs";
 import type { Address } from "./address";
 import { byId } from "./dom";
 import { toast } from "./messages";
+import { say } from "./words";
 
 /** Text of more values tells nothing as colours. */
 const MOST_VALUES = 60;
@@ -23,7 +24,7 @@ export class Colors {
   async open(): Promise<void> {
     const all = (await this.#layer.attributes()).filter(tells);
     if (all.length === 0) return;
-    this.#select.append(...all.map((info) => new Option(info.of === "object" ? capital(info.name) : info.name)));
+    this.#select.append(...all.map((info) => new Option(nameOf(info))));
     byId("colors").hidden = false;
     this.#select.addEventListener("change", () => void this.#choose(all[this.#select.selectedIndex - 1]));
     const asked = all.findIndex(({ name }) => name === this.#address.by);
@@ -43,7 +44,7 @@ export class Colors {
       if (this.#address.by !== info.name) return;
       this.#theme = new made.theme(this.#layer, info, { legend: byId("legend"), title: info.name }).addTo(this.#view);
     } catch (reason) {
-      toast(`Colours cannot be loaded: ${String(reason)}`);
+      toast(`${say("noColors")}: ${String(reason)}`);
     }
   }
 }
@@ -51,4 +52,4 @@ export class Colors {
 /** Something is to be seen: not all the same, nor all different. */
 const tells = ({ type, variety }: AttributeInfo): boolean => variety > 1 && (type === "number" || variety <= MOST_VALUES);
 
-const capital = (name: string): string => name.slice(0, 1).toUpperCase() + name.slice(1);
+const nameOf = ({ of, name }: AttributeInfo): string => (of === "object" && (name === "class" || name === "asset") ? say(name) : name);

@@ -1,5 +1,6 @@
 import type { Attribute, ClickEvent } from "./map3d.mjs";
 import { withText } from "./dom";
+import { say } from "./words";
 
 /** What is known of the chosen object. All of it is text. */
 export class InfoPanel {
@@ -24,8 +25,8 @@ export class InfoPanel {
     const rows = [...this.#places(event), ...Object.entries(event.attributes ?? {}).map(([name, value]) => [name, written(value)] as const)];
     const list = document.createElement("dl");
     for (const [name, value] of rows) list.append(withText("dt", name), withText("dd", value));
-    const kind = [event.class, event.id > 0 ? `id ${String(event.id)}` : "", event.approximate ? "approximate" : ""];
-    this.#box.replaceChildren(withText("h2", event.name ?? (event.id > 0 ? `Object ${String(event.id)}` : "A point")), withText("p", kind.filter(Boolean).join(" · "), "note"), list, this.#closeButton());
+    const kind = [event.class, event.id > 0 ? `id ${String(event.id)}` : "", event.approximate ? say("approximate") : ""];
+    this.#box.replaceChildren(withText("h2", event.name ?? (event.id > 0 ? `${say("object")} ${String(event.id)}` : say("point"))), withText("p", kind.filter(Boolean).join(" · "), "note"), list, this.#closeButton());
     this.#box.hidden = false;
     this.#box.scrollTop = 0;
   }
@@ -35,15 +36,15 @@ export class InfoPanel {
     const [x, y, z] = position.map((part) => part.toFixed(2));
     const height = this.units.vertical ? ` (${this.units.vertical})` : "";
     return [
-      ["Position", `${x ?? ""}, ${y ?? ""}`],
-      ["Height", `${z ?? ""} m${height}`],
+      [say("position"), `${x ?? ""}, ${y ?? ""}`],
+      [say("height"), `${z ?? ""} m${height}`],
     ];
   }
 
   #closeButton(): HTMLButtonElement {
     const button = withText("button", "", "close");
     button.type = "button";
-    button.setAttribute("aria-label", "Close");
+    button.setAttribute("aria-label", say("close"));
     const ns = "http://www.w3.org/2000/svg";
     const [svg, path] = [document.createElementNS(ns, "svg"), document.createElementNS(ns, "path")];
     svg.setAttribute("viewBox", "0 0 24 24");
@@ -59,5 +60,5 @@ export class InfoPanel {
 
 function written(value: Attribute): string {
   if (value === null) return "–";
-  return typeof value === "boolean" ? (value ? "yes" : "no") : String(value);
+  return typeof value === "boolean" ? say(value ? "yes" : "no") : String(value);
 }

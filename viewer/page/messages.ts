@@ -1,4 +1,5 @@
 import { byId, withText } from "./dom";
+import { say } from "./words";
 
 const SHOWN = 3;
 const LASTS_MS = 12_000;
@@ -9,7 +10,7 @@ export function toast(text: string): void {
   if ([...toasts.children].some((child) => child.firstElementChild?.textContent === text)) return;
   while (toasts.children.length >= SHOWN) toasts.firstElementChild?.remove();
   const box = withText("div", "", "toast");
-  const close = withText("button", "Close");
+  const close = withText("button", say("close"));
   close.type = "button";
   close.addEventListener("click", () => {
     box.remove();

@@ -1,19 +1,15 @@
 import type { imageLayer, Mode } from "./map3d.mjs";
 import { byId } from "./dom";
+import { say } from "./words";
 
-const NAMES: readonly [Mode, string, string][] = [
-  ["lit", "Lit", "color"],
-  ["color", "Colour", "color"],
-  ["normal", "Normals", "normal"],
-  ["id", "Ids", "id"],
-  ["depth", "Depth", "depth"],
-];
+type Shown = Exclude<Mode, "picture">;
+const MODES: readonly Shown[] = ["lit", "color", "normal", "id", "depth"];
 
 /** A switch with what the rendering can show. */
 export function bindModes(layer: imageLayer): void {
   const layers = layer.rendering?.layers;
-  const shown = NAMES.filter(([mode, , kind]) => layers?.has(kind) && (mode !== "lit" || layers.has("normal")));
-  byId("modes").append(...shown.map(([mode, name]) => choice(layer, mode, name)));
+  const shown = MODES.filter((mode) => (mode === "lit" ? layers?.has("color") && layers.has("normal") : layers?.has(mode)));
+  byId("modes").append(...shown.map((mode) => choice(layer, mode, say(mode))));
 }
 
 function choice(layer: imageLayer, mode: Mode, name: string): HTMLLabelElement {

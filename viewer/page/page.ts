@@ -10,6 +10,7 @@ import { readPlace } from "./place";
 import { Selection } from "./selection";
 import { fail, toast } from "./messages";
 import { byId } from "./dom";
+import { say, translate } from "./words";
 
 /** Base URLs of the rendering: `?rendering=` (again for further hosts), `data-base` on <html>, else this folder. */
 function bases(): string[] {
@@ -26,7 +27,7 @@ function open(): void {
   const selection = new Selection(view, layer, info, address);
   view.on("error", ({ error }) => {
     if (layer.rendering) toast(error.message);
-    else fail("This rendering cannot be shown", error.message);
+    else fail(say("notShown"), error.message);
   });
   let tools: Tools | undefined;
   view.on("click", (event) => {
@@ -63,7 +64,8 @@ function dress(view: map, layer: imageLayer, info: InfoPanel, selection: Selecti
 }
 
 try {
+  translate();
   open();
 } catch (reason) {
-  fail("This page cannot start", reason instanceof Map3dError ? reason.message : String(reason));
+  fail(say("notStarted"), reason instanceof Map3dError ? reason.message : String(reason));
 }

@@ -1,6 +1,7 @@
 import { marker, type imageLayer, type map, type SearchEntry, type Vec3 } from "./map3d.mjs";
 import { byId, inputById, withText } from "./dom";
 import { toast } from "./messages";
+import { say } from "./words";
 
 const SHOWN = 8;
 const ZOOM_BELOW_DEEPEST = 1;
@@ -82,13 +83,13 @@ class SearchBox {
       this.#at = 0;
       this.#render();
     } catch (reason) {
-      toast(`The search index cannot be read: ${reason instanceof Error ? reason.message : String(reason)}`);
+      toast(`${say("noIndex")}: ${reason instanceof Error ? reason.message : String(reason)}`);
     }
   }
 
   #render(): void {
     const rows = this.#hits.map((hit, k) => this.#row(hit, k));
-    this.#list.replaceChildren(...(rows.length > 0 ? rows : [withText("li", "Nothing found", "none")]));
+    this.#list.replaceChildren(...(rows.length > 0 ? rows : [withText("li", say("nothingFound"), "none")]));
     this.#show(this.#query.value.trim() !== "" && document.activeElement === this.#query);
   }
 

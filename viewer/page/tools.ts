@@ -2,6 +2,7 @@ import type { map } from "./map3d.mjs";
 import type { measure } from "./map3d-measure.mjs";
 import { byId } from "./dom";
 import { toast } from "./messages";
+import { say } from "./words";
 
 type Kind = "line" | "area";
 
@@ -30,13 +31,13 @@ export class Tools {
     this.#tool = undefined;
     for (const [own, button] of this.#buttons) button.setAttribute("aria-pressed", String(own === kind));
     byId("hint").hidden = kind === null;
-    byId("hint").textContent = kind === "line" ? "Click along what you measure." : "Click the corners of a roof, a wall or a piece of ground.";
+    byId("hint").textContent = kind === "line" ? say("lineHint") : say("areaHint");
     if (kind === null) return;
     try {
       const made = await import("./map3d-measure.mjs");
       if (this.#kind === kind) this.#tool = new made.measure({ kind }).addTo(this.#view);
     } catch (reason) {
-      toast(`The tool cannot be loaded: ${String(reason)}`);
+      toast(`${say("noTool")}: ${String(reason)}`);
     }
   }
 }

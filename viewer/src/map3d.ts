@@ -16,7 +16,6 @@ export type { Light } from "./geo/light";
 export type { ManifestJson, Rendering } from "./geo/manifest";
 export type { Attribute, AttributeInfo, AttributeValue, ObjectInfo, SearchEntry } from "./tiles/objects";
 export { zoneOf } from "./geo/daylight";
-export { windOf } from "./ui/controls";
 
 /** Of the viewer; manifests of version 1 are read. */
 export const version = "0.1.0";

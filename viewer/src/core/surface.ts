@@ -11,6 +11,8 @@ export interface Surface {
   readonly container: HTMLElement;
   /** Holds markers and popups; lies over the picture and lets pointers through. */
   readonly overlayPane: HTMLElement;
+  /** BCP 47. */
+  readonly language: string;
   /** CSS pixels from the container's top left corner; null while the map has no view yet. */
   project(world: Vec3): Vec2 | null;
   readonly moves: Pick<Evented<SurfaceEvents>, "on" | "off">;

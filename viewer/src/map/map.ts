@@ -3,6 +3,7 @@ import { asError, UsageError } from "../core/errors";
 import { Evented } from "../core/events";
 import type { Attachable, Holder, Surface, SurfaceEvents } from "../core/surface";
 import type { Vec2, Vec3 } from "../core/vec";
+import { languageOf } from "../core/words";
 import type { Camera } from "../geo/camera";
 import { daylightAt } from "../geo/daylight";
 import { DEFAULT_LIGHT, validLight, type Light } from "../geo/light";
@@ -108,6 +109,10 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
   /** What draws: "webgl" or "canvas"; null when nothing can. */
   get drawer(): "webgl" | "canvas" | null {
     return this.#painter?.drawer.name ?? null;
+  }
+
+  get language(): string {
+    return this.options.language ?? languageOf(this.container);
   }
 
   get overlayPane(): HTMLElement {

@@ -29,15 +29,17 @@ export interface MapOptions {
   workers?: number;
   /** Device pixels a CSS pixel are at most this. Default 3. */
   maxPixelRatio?: number;
+  /** Of controls and numbers, BCP 47; English, German and French are known. Default: that of the page around the map (its `lang`), else the browser's. */
+  language?: string;
   /** "webgl" needs WebGL2; "canvas" does without; "auto" takes WebGL2 where it can be had, else the canvas. Default "auto". */
   drawer?: "auto" | "webgl" | "canvas";
   /** Keeps the picture readable between frames (screenshots, tests). Default false. */
   preserveDrawingBuffer?: boolean;
 }
 
-export type FilledOptions = MapOptions & Required<Omit<MapOptions, "center" | "zoom" | "direction" | "light" | "background">>;
+export type FilledOptions = MapOptions & Required<Omit<MapOptions, "center" | "zoom" | "direction" | "light" | "background" | "language">>;
 
-export const DEFAULTS: Omit<FilledOptions, "center" | "zoom" | "direction" | "light" | "background"> = {
+export const DEFAULTS: Omit<FilledOptions, "center" | "zoom" | "direction" | "light" | "background" | "language"> = {
   controls: true,
   attribution: true,
   hover: false,

@@ -9,7 +9,7 @@ import { Words } from "./words";
 export interface MeasureOptions {
   /** A line over the surface, or a polygon on it. Default "line". */
   kind?: "line" | "area";
-  /** BCP 47, of the numbers. Default the browser's. */
+  /** BCP 47, of the numbers. Default the map's. */
   language?: string;
 }
 
@@ -31,16 +31,15 @@ export interface MeasureEvents {
  * level is shown.
  */
 export class measure extends Evented<MeasureEvents> implements Attachable<map> {
-  readonly options: Required<Omit<MeasureOptions, "language">>;
-  readonly #words: Words;
+  readonly options: Required<Omit<MeasureOptions, "language">> & Pick<MeasureOptions, "language">;
+  #words = new Words(undefined);
   readonly #sketch = new Sketch();
   #corners: readonly Corner[] = [];
   #map: map | undefined;
 
-  constructor({ kind = "line", language }: MeasureOptions = {}) {
+  constructor({ kind = "line", ...options }: MeasureOptions = {}) {
     super();
-    this.options = { kind };
-    this.#words = new Words(language);
+    this.options = { kind, ...options };
   }
 
   addTo(map: map): this {
@@ -83,6 +82,7 @@ export class measure extends Evented<MeasureEvents> implements Attachable<map> {
 
   onAdd(map: map): void {
     this.#map = map;
+    this.#words = new Words(this.options.language ?? map.language);
     adoptStyles(document, STYLES);
     map.overlayPane.append(this.#sketch.box);
     map.moves.on("move", this.#place);

@@ -1,5 +1,6 @@
 import { element, iconButton } from "../core/dom";
 import { Evented } from "../core/events";
+import { wordsOf } from "../core/words";
 import type { Attachable, Holder, Surface } from "../core/surface";
 import type { Vec3 } from "../core/vec";
 
@@ -33,7 +34,7 @@ export class popup extends Evented<PopupEvents> implements Attachable<Surface> {
     this.options = { offset_px: 14, closeButton: true, ...options };
     this.#position = position;
     this.#body = element("div", "map3d-popup-body");
-    this.#box = element("div", "map3d-popup", { role: "dialog", "aria-label": "Details" }, this.#body);
+    this.#box = element("div", "map3d-popup", { role: "dialog" }, this.#body);
     if (this.options.closeButton) this.#addCloseButton();
     this.setContent(content);
   }
@@ -66,6 +67,10 @@ export class popup extends Evented<PopupEvents> implements Attachable<Surface> {
 
   onAdd(map: Surface): void {
     this.#map = map;
+    const { details, close } = wordsOf(map.language);
+    this.#box.setAttribute("aria-label", details);
+    const button = this.#box.querySelector(".map3d-popup-close");
+    for (const name of ["aria-label", "title"]) button?.setAttribute(name, close);
     map.overlayPane.append(this.#box);
     map.moves.on("move", this.#place);
     this.#update();
@@ -80,7 +85,7 @@ export class popup extends Evented<PopupEvents> implements Attachable<Surface> {
   }
 
   #addCloseButton(): void {
-    const button = iconButton("map3d-popup-close", "Close", CLOSE);
+    const button = iconButton("map3d-popup-close", "", CLOSE);
     button.addEventListener("click", () => this.remove());
     this.#box.append(button);
     this.#box.addEventListener("keydown", (event) => {

@@ -3,7 +3,7 @@ import { Evented, UsageError, type Attachable, type AttributeInfo, type imageLay
 import { classify, type Classes, type ThemeClass } from "./classes";
 import { Legend } from "./legend";
 import { STYLES } from "./styles";
-import { wordsOf } from "./words";
+import { themeWords } from "./words";
 
 export interface ThemeOptions {
   /** Of the legend. Default the attribute's name. */
@@ -16,7 +16,7 @@ export interface ThemeOptions {
   others?: "dimmed" | "hidden";
   /** Where the legend goes; null: none. Default the map's lower left corner. */
   legend?: HTMLElement | null;
-  /** BCP 47. Default the browser's. */
+  /** BCP 47. Default the map's. */
   language?: string;
 }
 
@@ -85,8 +85,8 @@ export class theme extends Evented<ThemeEvents> implements Attachable<map> {
     const info = this.#info ?? (await this.#find());
     const column = await this.#layer.column(info);
     if (this.#map !== map) return;
-    const { language = navigator.language, classes = 5, colors } = this.options;
-    const words = wordsOf(language);
+    const { language = map.language, classes = 5, colors } = this.options;
+    const words = themeWords(language);
     const found = classify(info, column, { classes, colors, language, rest: words.rest });
     this.#show(map, info.type === "boolean" ? { ...found, classes: found.classes.map((row) => ({ ...row, label: row.label === "true" ? words.yes : words.no })) } : found);
   }

@@ -1,15 +1,15 @@
-interface Words {
+import { inLanguage } from "../core/words";
+
+interface ThemeWords {
   readonly rest: string;
-  readonly legend: string;
   readonly yes: string;
   readonly no: string;
 }
 
-const WORDS: Readonly<Record<string, Words>> = {
-  en: { rest: "Other", legend: "Legend", yes: "Yes", no: "No" },
-  de: { rest: "Andere", legend: "Legende", yes: "Ja", no: "Nein" },
-  fr: { rest: "Autres", legend: "Légende", yes: "Oui", no: "Non" },
+const WORDS = {
+  en: { rest: "Other", yes: "Yes", no: "No" },
+  de: { rest: "Andere", yes: "Ja", no: "Nein" },
+  fr: { rest: "Autres", yes: "Oui", no: "Non" },
 };
 
-/** English where a language is not known. */
-export const wordsOf = (language: string): Words => WORDS[language.slice(0, 2).toLowerCase()] ?? (WORDS["en"] as Words);
+export const themeWords = (language: string): ThemeWords => inLanguage(WORDS, language);

@@ -1,10 +1,12 @@
 import { element, iconButton } from "../core/dom";
+import { wordsOf, type Words } from "../core/words";
 
 /** What the buttons need of a map. */
 export interface Steering {
   readonly zoom: number;
   readonly zoomLimits: readonly [number, number];
   readonly lookAt_deg: number;
+  readonly language: string;
   readonly directions: readonly { id: string; lookAtDeg: number }[];
   zoomIn(): unknown;
   zoomOut(): unknown;
@@ -24,14 +26,15 @@ const RIGHT = "M20 10a8 8 0 1 0-2.3 7.6M20 4v6h-6";
 
 /** Zoom buttons, a compass with buttons that turn the view when there are several, and one that fills the screen where that can be done. */
 export function controls(map: Steering): HTMLElement {
-  const whole = document.fullscreenEnabled ? [screenGroup(map)] : [];
-  return element("div", "map3d-buttons", {}, ...whole, turnGroup(map), zoomGroup(map));
+  const words = wordsOf(map.language);
+  const whole = document.fullscreenEnabled ? [screenGroup(map, words)] : [];
+  return element("div", "map3d-buttons", {}, ...whole, turnGroup(map, words), zoomGroup(map, words));
 }
 
 /** The whole page fills the screen, with all that lies on the map. */
-function screenGroup({ container }: Steering): HTMLElement {
-  const button = iconButton("", "Fill the screen", WHOLE);
-  const group = element("div", "map3d-group", { role: "group", "aria-label": "Screen" }, button);
+function screenGroup({ container }: Steering, words: Words): HTMLElement {
+  const button = iconButton("", words.fill, WHOLE);
+  const group = element("div", "map3d-group", { role: "group", "aria-label": words.screen }, button);
   const isWhole = (): boolean => document.fullscreenElement !== null;
   button.addEventListener("click", () => {
     // Refused without a user's gesture, or by the page's policy: then all stays as it is.
@@ -40,14 +43,14 @@ function screenGroup({ container }: Steering): HTMLElement {
   const show = (): void => {
     if (!container.isConnected) document.removeEventListener("fullscreenchange", show);
     button.querySelector("path")?.setAttribute("d", isWhole() ? PART : WHOLE);
-    button.setAttribute("aria-label", isWhole() ? "Leave the whole screen" : "Fill the screen");
+    button.setAttribute("aria-label", isWhole() ? words.leave : words.fill);
   };
   document.addEventListener("fullscreenchange", show);
   return group;
 }
 
-function zoomGroup(map: Steering): HTMLElement {
-  const [inward, outward] = [iconButton("", "Zoom in", PLUS), iconButton("", "Zoom out", MINUS)];
+function zoomGroup(map: Steering, words: Words): HTMLElement {
+  const [inward, outward] = [iconButton("", words.zoomIn, PLUS), iconButton("", words.zoomOut, MINUS)];
   inward.addEventListener("click", () => map.zoomIn());
   outward.addEventListener("click", () => map.zoomOut());
   map.on("zoom", () => {
@@ -55,12 +58,12 @@ function zoomGroup(map: Steering): HTMLElement {
     outward.disabled = map.zoom <= least + 1e-3;
     inward.disabled = map.zoom >= greatest - 1e-3;
   });
-  return element("div", "map3d-group", { role: "group", "aria-label": "Zoom" }, inward, outward);
+  return element("div", "map3d-group", { role: "group", "aria-label": words.zoom }, inward, outward);
 }
 
-function turnGroup(map: Steering): HTMLElement {
-  const [left, right, compass] = [iconButton("", "Turn view counter-clockwise", LEFT), iconButton("", "Turn view clockwise", RIGHT), compassButton()];
-  const group = element("div", "map3d-group", { role: "group", "aria-label": "Direction" }, compass, left, right);
+function turnGroup(map: Steering, words: Words): HTMLElement {
+  const [left, right, compass] = [iconButton("", words.left, LEFT), iconButton("", words.right, RIGHT), compassButton(words)];
+  const group = element("div", "map3d-group", { role: "group", "aria-label": words.direction }, compass, left, right);
   left.addEventListener("click", () => map.rotate(1));
   right.addEventListener("click", () => map.rotate(-1));
   compass.addEventListener("click", () => {
@@ -69,15 +72,15 @@ function turnGroup(map: Steering): HTMLElement {
   });
   map.on("directionchange", () => {
     (compass.firstElementChild as SVGElement).style.transform = `rotate(${String(map.lookAt_deg)}deg)`;
-    compass.setAttribute("aria-label", `Looking ${windOf(map.lookAt_deg)}; look north`);
+    compass.setAttribute("aria-label", words.looking(words.winds[windOf(map.lookAt_deg)] as string));
     left.hidden = right.hidden = map.directions.length < 2;
   });
   return group;
 }
 
 /** A needle that points to where north is on the screen. */
-function compassButton(): HTMLButtonElement {
-  const button = iconButton("map3d-compass", "Look north", "M12 2l4 10h-8z");
+function compassButton({ north }: Words): HTMLButtonElement {
+  const button = iconButton("map3d-compass", north, "M12 2l4 10h-8z");
   const needle = button.querySelector("path");
   needle?.classList.add("map3d-north");
   const tail = needle?.cloneNode() as SVGPathElement;
@@ -87,9 +90,7 @@ function compassButton(): HTMLButtonElement {
   return button;
 }
 
-const WINDS = ["north", "north-west", "west", "south-west", "south", "south-east", "east", "north-east"];
-
-/** The wind of a look-at angle, which counts counter-clockwise. */
-export const windOf = (lookAtDeg: number): string => WINDS[Math.round((((lookAtDeg % 360) + 360) % 360) / 45) % 8] ?? "north";
+/** The wind's place among the eight, counter-clockwise from north, of a look-at angle. */
+export const windOf = (lookAtDeg: number): number => Math.round((((lookAtDeg % 360) + 360) % 360) / 45) % 8;
 
 const fromNorth = (deg: number): number => Math.min(deg, 360 - deg);

@@ -200,3 +200,20 @@ for (const [name, options] of [["desk", DESK], ["phone", PHONE]] as const) {
     await other.context().close();
   });
 }
+
+test.each([
+  ["de-CH", ["Suchen", "Vergrößern", "Licht", "Strecke messen"]],
+  ["fr-FR", ["Rechercher", "Agrandir", "Lumière", "Mesurer une ligne"]],
+])("a reader of %s is spoken to in that language, numbers and all", async (locale, [search, zoomIn, lit, line]) => {
+  const { page, problems } = await open({ ...DESK, locale });
+  expect(await page.evaluate(() => document.documentElement.lang)).toBe(locale);
+  expect(await page.locator("#query").getAttribute("placeholder")).toBe(search);
+  expect(await page.getByRole("button", { name: zoomIn as string }).count()).toBe(1);
+  expect(await page.locator("#modes label").first().textContent()).toBe(lit);
+  expect(await page.locator("#measure-line").getAttribute("title")).toBe(line);
+  await page.screenshot({ path: `${OUT}/page-${locale}.png` });
+  const english = await page.evaluate(() => [...document.querySelectorAll<HTMLElement>("button, input, select, [role]")].map((found) => found.getAttribute("aria-label") ?? "").filter((label) => /\b(the|of|view|search|look|light)\b/i.test(label)));
+  expect(english).toEqual([]);
+  expect(problems).toEqual([]);
+  await page.context().close();
+});

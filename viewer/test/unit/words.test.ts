@@ -1,0 +1,36 @@
+import { readFileSync } from "node:fs";
+import { resolve } from "node:path";
+import { expect, test } from "vitest";
+import { chooseLanguage, KEYS } from "../../page/words";
+import { wordsOf } from "../../src/core/words";
+import { windOf } from "../../src/ui/controls";
+
+test.each([
+  [["de-CH", "en"], "de-CH"],
+  [["it", "fr-FR", "en"], "fr-FR"],
+  [["EN-us"], "EN-us"],
+  [["ja", "zh"], "en"],
+  [[], "en"],
+])("of %j the page speaks %s", (wanted, language) => {
+  expect(chooseLanguage(wanted)).toBe(language);
+});
+
+test("the page's markup asks for words that there are", () => {
+  const html = readFileSync(resolve(import.meta.dirname, "../../page/index.html"), "utf8");
+  const asked = [...html.matchAll(/data-say(?:-label|-hint)?="([^"]*)"/g)].map(([, key]) => key ?? "");
+  expect(asked.length).toBeGreaterThan(10);
+  expect(asked.filter((key) => !KEYS.has(key))).toEqual([]);
+});
+
+test.each(["en", "de", "fr", "de-AT", "it", ""])("%s: every control has a name, every wind another", (language) => {
+  const { looking, scale, winds, ...names } = wordsOf(language);
+  expect(Object.values(names).every((name) => name.trim() !== "")).toBe(true);
+  expect(new Set(winds).size).toBe(8);
+  for (const wind of winds) expect(looking(wind)).toContain(wind);
+  expect(scale("20 m")).toContain("20 m");
+});
+
+test("winds count counter-clockwise", () => {
+  const { winds } = wordsOf("en");
+  expect([0, 45, 90, 179, 270, 340, -90, 720].map((deg) => winds[windOf(deg)])).toEqual(["north", "north-west", "west", "south", "east", "north", "east", "north"]);
+});
