@@ -27,21 +27,21 @@ export class Colors {
     this.#select.append(...all.map((info) => new Option(nameOf(info))));
     byId("colors").hidden = false;
     this.#select.addEventListener("change", () => void this.#choose(all[this.#select.selectedIndex - 1]));
-    const asked = all.findIndex(({ name }) => name === this.#address.by);
+    const asked = all.findIndex((info) => keyOf(info) === this.#address.by);
     if (asked < 0) return;
     this.#select.selectedIndex = asked + 1;
     await this.#choose(all[asked]);
   }
 
   async #choose(info: AttributeInfo | undefined): Promise<void> {
-    this.#address.by = info?.name ?? "";
+    this.#address.by = info ? keyOf(info) : "";
     this.#address.write();
     this.#theme?.remove();
     this.#theme = undefined;
     if (!info) return;
     try {
       const made = await import("./map3d-theme.mjs");
-      if (this.#address.by !== info.name) return;
+      if (this.#address.by !== keyOf(info)) return;
       this.#theme = new made.theme(this.#layer, info, { legend: byId("legend"), title: info.name }).addTo(this.#view);
     } catch (reason) {
       toast(`${say("noColors")}: ${String(reason)}`);
@@ -51,5 +51,8 @@ export class Colors {
 
 /** Something is to be seen: not all the same, nor all different. */
 const tells = ({ type, variety }: AttributeInfo): boolean => variety > 1 && (type === "number" || variety <= MOST_VALUES);
+
+/** In the address; an attribute may be called as what every object has. */
+const keyOf = ({ of, name }: AttributeInfo): string => (of === "object" ? `:${name}` : name);
 
 const nameOf = ({ of, name }: AttributeInfo): string => (of === "object" && (name === "class" || name === "asset") ? say(name) : name);

@@ -7,6 +7,7 @@ import { Tools } from "./tools";
 import { bindModes } from "./modes";
 import { bindSearch } from "./search";
 import { readPlace } from "./place";
+import { bindSeen } from "./seen";
 import { Selection } from "./selection";
 import { fail, toast } from "./messages";
 import { byId } from "./dom";
@@ -59,6 +60,7 @@ function dress(view: map, layer: imageLayer, info: InfoPanel, selection: Selecti
   bindLight(view, layer, time);
   bindModes(layer);
   if (json.objects) {
+    bindSeen(view, layer, (id) => void selection.chooseId(id));
     bindSearch(view, layer, (id, position) => void selection.chooseId(id, position));
   }
 }

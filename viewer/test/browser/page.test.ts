@@ -217,3 +217,28 @@ test.each([
   expect(problems).toEqual([]);
   await page.context().close();
 });
+
+test("what is in view can be listed and chosen by keys alone", async () => {
+  const { page, problems } = await open(DESK);
+  await page.locator("#list-seen").focus();
+  await page.keyboard.press("Shift+Tab");
+  await page.keyboard.press("Tab");
+  await page.screenshot({ path: `${OUT}/desk-skip.png` });
+  await page.keyboard.press("Enter");
+  await page.waitForSelector("#seen li");
+  await page.screenshot({ path: `${OUT}/desk-seen.png` });
+  const names = await page.locator("#seen button").allTextContents();
+  expect([...names].sort()).toEqual(["Chapel", "Ground", "School <b>old</b>", "Tower", "Town hall"]);
+  expect(names[0]).toBe("Ground");
+  await page.keyboard.press("Escape");
+  expect(await page.locator("#seen").isHidden()).toBe(true);
+  expect(await page.evaluate(() => document.activeElement?.id)).toBe("list-seen");
+  await page.keyboard.press("Enter");
+  await page.waitForSelector("#seen li");
+  await page.locator("#seen button", { hasText: "Tower" }).focus();
+  await page.keyboard.press("Enter");
+  await page.waitForSelector("#info:not([hidden])");
+  expect(await page.locator("#info h2").textContent()).toBe("Tower");
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
