@@ -97,6 +97,20 @@ def test_scripts_have_the_type_that_browsers_insist_on(client, built_viewer):
     assert client.get("/view/none/map3d.mjs").status_code == 404
 
 
+def test_the_viewers_files_are_compressed_for_who_can_read_that(client, built_viewer):
+    text = "export const a = 1;\n" * 500
+    (built_viewer / "map3d.mjs").write_text(text)
+    plain, packed = (client.get("/view/tea/map3d.mjs", headers={"accept-encoding": name}) for name in ("identity", "gzip"))
+    assert plain.text == packed.text == text
+    assert "content-encoding" not in plain.headers
+    assert packed.headers["content-encoding"] == "gzip"
+    assert int(packed.headers["content-length"]) < len(text) / 20
+    assert plain.headers["vary"] == packed.headers["vary"] == "Accept-Encoding"
+    for answer in (plain, packed):
+        again = client.get("/view/tea/map3d.mjs", headers={"if-none-match": answer.headers["etag"]})
+        assert (again.status_code, again.content) == (304, b"")
+
+
 def test_a_shard_without_objects_is_empty(client):
     assert client.get("/tiles/tea/objects/7.json").json() == {"map3d": "objects", "version": 1, "shard": 7, "objects": {}}
 

@@ -3,7 +3,6 @@
 They stand under /tiles/<rendering>/ and under /view/<rendering>/, whose page reads them as its own folder's, as in a published folder.
 """
 
-import gzip
 import re
 from functools import lru_cache
 from hashlib import sha256
@@ -19,11 +18,11 @@ from map3d.registry import Registry
 from map3d.tiles.documents import dump_document
 from map3d.tiles.manifest import FILE_NAME
 from map3d.types import check_name
+from map3d.web.packing import pack
 
 documents = Blueprint("documents", __name__)
 _opening: Final = Lock()
 
-PACK_FROM_BYTES: Final = 1024
 Stamp = tuple[tuple[int, int, int], ...]
 
 _NUMBER: Final = re.compile(r"0|[1-9][0-9]{0,6}", re.ASCII)
@@ -107,15 +106,11 @@ def registry_path(rendering: str) -> Path:
 
 def json_answer(data: bytes) -> Response:
     """With an ETag, to be asked for anew each time; compressed for who can read that."""
-    packed = len(data) >= PACK_FROM_BYTES and request.accept_encodings.quality("gzip") > 0
-    response = Response(_packed(data) if packed else data, mimetype="application/json")
-    if packed:
-        response.headers["Content-Encoding"] = "gzip"
-    response.headers["Vary"] = "Accept-Encoding"
+    response = Response(data, mimetype="application/json")
     response.set_etag(sha256(data).hexdigest()[:32], weak=True)
     response.headers["Cache-Control"] = "no-cache"
     response.make_conditional(request)
-    return response
+    return pack(response)
 
 
 @lru_cache(maxsize=4)
@@ -135,11 +130,6 @@ def _column_bytes(path: Path, column: str, _state: Stamp) -> bytes | None:
     with Registry(path) as objects:
         found = objects.column(column)
     return None if found is None else dump_document(found)
-
-
-@lru_cache(maxsize=16)
-def _packed(data: bytes) -> bytes:
-    return gzip.compress(data, compresslevel=6, mtime=0)
 
 
 def _stamp(path: Path) -> Stamp:

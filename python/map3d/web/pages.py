@@ -11,6 +11,7 @@ from map3d.tiles.viewer import PAGE, viewer_folder
 from map3d.types import check_name
 from map3d.web.documents import catalogue, workspace
 from map3d.web.errors import status_of
+from map3d.web.packing import pack
 
 pages = Blueprint("pages", __name__)
 
@@ -34,13 +35,13 @@ def renderings() -> str:
 @pages.get("/view/<rendering>/")
 def view(rendering: str) -> Response:
     catalogue().rendering(check_name(rendering, "rendering"))
-    return send_from_directory(viewer_folder(), PAGE, max_age=0)
+    return pack(send_from_directory(viewer_folder(), PAGE, max_age=0))
 
 
 @pages.get("/view/<rendering>/<path:file>")
 def viewer_file(rendering: str, file: str) -> Response:
     catalogue().rendering(check_name(rendering, "rendering"))
-    return send_from_directory(viewer_folder(), file, max_age=0)
+    return pack(send_from_directory(viewer_folder(), file, max_age=0))
 
 
 @pages.get("/healthz")
