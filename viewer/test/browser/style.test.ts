@@ -106,11 +106,12 @@ test("a theme colours, filters by its legend, and leaves all as it was; an unkno
   const { page, problems } = await bed.start("town", { zoom: 3 }, {}, VIEWPORT);
   const before = await picture(page);
   await page.addScriptTag({ url: "/map3d-theme.js" });
-  await settled(page, () => {
+  await page.evaluate(() => new Promise<void>((done) => {
     const g = globalThis as unknown as Theming;
     g.theme = new g.map3d.theme(g.layer, "measuredHeight", { language: "de", others: "hidden" }).addTo(g.map);
-  }, null);
-  await page.waitForSelector(".map3d-legend");
+    g.theme.once("ready", () => { g.map.once("idle", () => { done(); }); });
+  }));
+  expect(await page.locator(".map3d-legend").count()).toBe(1);
   const painted = await picture(page);
   expect(painted.equals(before)).toBe(false);
   await page.screenshot({ path: `${OUT}/theme.png` });
