@@ -20,6 +20,8 @@ export interface Surface {
 
 /** Something that can be added to a map. */
 export interface Attachable<M> {
+  /** Layers that it reads: while it is on the map, their tiles are fetched for what is in view. */
+  readonly needs?: readonly ("id" | "depth")[];
   onAdd(map: M): void;
   onRemove(map: M): void;
 }

@@ -178,15 +178,16 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
     return this.#store;
   }
 
-  /** @internal What to paint and to fetch. */
-  plan(sight: Sight, light: Readonly<Light>, hover: boolean): LayerPlan | null {
+  /** @internal What to paint and to fetch; `kinds` are read by others. */
+  plan(sight: Sight, light: Readonly<Light>, kinds: readonly LayerKind[]): LayerPlan | null {
     const view = this.viewOf(sight.camera.frame.id);
     if (!view || !this.#rendering || !this.#store) return null;
     const mode = this.#shownMode(this.#rendering);
     const needed = neededKinds(mode, this.#masked(this.#rendering));
     const baked = this.#baked(this.#rendering, light);
-    const ids: LayerKind[] = (this.#shown.size > 0 || this.#finishes || hover) && !needed.includes("id") ? ["id"] : [];
-    const extra = [...(light.lit ? bakedKinds(mode, baked) : []), ...ids];
+    const ids: LayerKind[] = this.#shown.size > 0 || this.#finishes ? ["id"] : [];
+    const read = [...new Set([...ids, ...kinds])].filter((kind) => !needed.includes(kind));
+    const extra = [...(light.lit ? bakedKinds(mode, baked) : []), ...read];
     return planLayer(sight, this.#rendering, view, this.#store, { baked, layers: layersWith(this.#rendering, baked), needed, extra });
   }
 

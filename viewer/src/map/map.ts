@@ -7,6 +7,7 @@ import { languageOf } from "../core/words";
 import type { Camera } from "../geo/camera";
 import { daylightAt } from "../geo/daylight";
 import { DEFAULT_LIGHT, validLight, type Light } from "../geo/light";
+import type { LayerKind } from "../geo/manifest";
 import { marker } from "../overlay/marker";
 import { attributionLine } from "../ui/attribution";
 import { controls } from "../ui/controls";
@@ -261,11 +262,16 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
     if (!sight || !this.#painter || this.size.width === 0) return;
     const before = this.#drawn;
     [this.#drawn, this.#dirty] = [sight.camera, false];
-    const { plans, complete } = this.#painter.paint(sight, this.#layers, this.#light, this.options.hover);
+    const { plans, complete } = this.#painter.paint(sight, this.#layers, this.#light, this.#kindsRead());
     this.#debug.update(plans, sight.dpr, this.#painter.drawer);
     if (before !== sight.camera) this.#moved(before, sight.camera);
     if (this.motion.moving || !this.#resting || complete) this.#loop.request();
     if (complete) this.#complete();
+  }
+
+  /** Layers that somebody reads, besides those that are shown. */
+  #kindsRead(): LayerKind[] {
+    return [...new Set([...(this.options.hover ? ["id" as const] : []), ...[...this.#items].flatMap(({ needs }) => needs ?? [])])];
   }
 
   #moved(before: Camera | undefined, { zoom }: Camera): void {

@@ -2,6 +2,7 @@ import { CanvasDrawer } from "../draw/canvas/canvasDrawer";
 import type { Drawer, DrawerEvents } from "../draw/drawer";
 import { WebGLDrawer } from "../draw/webgl/webglDrawer";
 import type { Light } from "../geo/light";
+import type { LayerKind } from "../geo/manifest";
 import { Cache } from "../tiles/cache";
 import { Decoder } from "../tiles/decoder";
 import { Queue } from "../tiles/queue";
@@ -69,11 +70,12 @@ export class Painter {
     return this.#cache.bytes;
   }
 
-  paint(sight: Sight, layers: readonly imageLayer[], light: Readonly<Light>, hover: boolean): Painted {
+  /** @param kinds layers that are read, besides those that are shown */
+  paint(sight: Sight, layers: readonly imageLayer[], light: Readonly<Light>, kinds: readonly LayerKind[]): Painted {
     this.#cache.tick();
     this.#viewport.fitCanvas(sight.dpr);
     const planned = layers.flatMap((layer) => {
-      const plan = layer.plan(sight, light, hover);
+      const plan = layer.plan(sight, light, kinds);
       return plan ? [{ layer, plan }] : [];
     });
     this.#queue.want(planned.flatMap(({ plan }) => plan.jobs));
