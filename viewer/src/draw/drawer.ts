@@ -3,6 +3,7 @@ import type { LayerKind } from "../geo/manifest";
 import type { Light } from "../geo/light";
 import type { Shadow } from "../geo/shadows";
 import type { TileData } from "../tiles/tileData";
+import type { Clip, Depths } from "./combine";
 import type { Finishes } from "./finish";
 
 /** How a layer is shown: lit colour, colour or picture as stored, or a data layer in false colours. */
@@ -49,6 +50,10 @@ export interface Pass {
   /** True when colour has no alpha, so that the id layer says what is covered. */
   readonly masked: boolean;
   readonly opacity: number;
+  /** null: it is painted over what was painted before, whatever lies nearer. */
+  readonly depths: Depths | null;
+  /** The part of the map that it is seen in. */
+  readonly clip: Clip | null;
   /** Depth values that get the first and the last false colour. */
   readonly depthRange: readonly [number, number];
 }
@@ -91,8 +96,13 @@ export interface Drawer {
   destroy(): void;
 }
 
-/** Layers without which a tile cannot be shown in a mode. */
-export function neededKinds(mode: Mode, masked: boolean): LayerKind[] {
+/** Layers without which a tile cannot be shown in a mode; `combined` by depth with others. */
+export function neededKinds(mode: Mode, masked: boolean, combined: boolean): LayerKind[] {
+  const shown = shownKinds(mode, masked);
+  return combined && mode !== "depth" ? [...shown, "depth"] : shown;
+}
+
+function shownKinds(mode: Mode, masked: boolean): LayerKind[] {
   if (mode === "lit") return masked ? ["color", "normal", "id"] : ["color", "normal"];
   if (mode === "color" || mode === "picture") return masked ? [mode, "id"] : [mode];
   return [mode];

@@ -1,10 +1,12 @@
-import { UsageError } from "../core/errors";
+import { asError, UsageError } from "../core/errors";
 import { Evented } from "../core/events";
 import type { Attachable } from "../core/surface";
+import type { Vec2 } from "../core/vec";
 import { readColor } from "../draw/color";
+import type { Clip } from "../draw/combine";
 import { bakedKinds, MODES, neededKinds, type Baked, type Mode, type Pass, type Rgb, type TileAccess } from "../draw/drawer";
 import type { Finishes } from "../draw/finish";
-import type { Tile } from "../geo/frame";
+import type { Frame, Tile } from "../geo/frame";
 import { towardsLight, type Light } from "../geo/light";
 import type { LayerInfo, LayerKind, Rendering, View } from "../geo/manifest";
 import { shadowOf } from "../geo/shadows";
@@ -12,7 +14,8 @@ import { Objects, type AttributeInfo, type AttributeValue, type ObjectInfo, type
 import { Source } from "../tiles/source";
 import { Store } from "../tiles/store";
 import { baseUrl } from "../tiles/url";
-import { depthRangeOf, planLayer, type LayerPlan } from "./layerPlan";
+import { viewLike } from "./agreement";
+import { depthRangeOf, depthsOf, planLayer, type LayerPlan } from "./layerPlan";
 import type { map } from "./map";
 import { finishesOf, isHidden, type ObjectStyle } from "./objectStyle";
 import type { Sight, Stage } from "./stage";
@@ -26,6 +29,8 @@ export interface ImageLayerOptions {
   highlightColor?: string;
   /** Overrides the manifest's. */
   attribution?: string;
+  /** Where several layers show something, what is nearest is seen. false: it is painted over layers that were added before. Default true. */
+  combine?: boolean;
 }
 
 export interface ImageLayerEvents {
@@ -49,12 +54,15 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
   #finishes: Finishes | null = null;
   /** Those of #colors that are not hidden. */
   #shown: ReadonlyMap<number, Rgb> = new Map();
+  #clip: Clip | null = null;
+  /** There will be no manifest. */
+  #failed = false;
 
   constructor(urls: string | readonly string[], options: ImageLayerOptions = {}) {
     super();
     const list = typeof urls === "string" ? [urls] : urls;
     if (list.length === 0) throw new UsageError("an imageLayer needs at least one base URL, e.g. \"https://host/tiles/teatime\"");
-    this.options = { mode: "lit", opacity: 1, highlightColor: "#e4572e", ...options };
+    this.options = { mode: "lit", opacity: 1, highlightColor: "#e4572e", combine: true, ...options };
     this.#mode = checkedMode(this.options.mode);
     this.#source = new Source(list.map((url) => baseUrl(url, document.baseURI)));
   }
@@ -91,6 +99,20 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
   setOpacity(opacity: number): this {
     this.options.opacity = Math.min(Math.max(opacity, 0), 1);
     return this.#redraw();
+  }
+
+  get opacity(): number {
+    return this.options.opacity;
+  }
+
+  /** Shows the layer in a part of the map only: left, top, right, bottom in shares of its width and height; null: in all of it. */
+  setClip(clip: Clip | null): this {
+    this.#clip = clip;
+    return this.#redraw();
+  }
+
+  get clip(): Clip | null {
+    return this.#clip;
   }
 
   /** Shows objects in a colour (#rrggbb), besides those that are highlighted already. */
@@ -151,6 +173,7 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
     this.#name = stage.nameLayer();
     const failed = (error: Error): void => {
       if (this.#stage !== stage) return;
+      this.#failed = !this.#rendering;
       this.fire("error", { error });
       stage.report(error);
     };
@@ -160,7 +183,7 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
     });
     this.#source.manifest().then((rendering) => {
       if (this.#stage === stage) this.#begin(rendering, stage);
-    }, failed);
+    }).catch((reason: unknown) => { failed(asError(reason)); });
   }
 
   onRemove(): void {
@@ -168,9 +191,25 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
     this.#stage = this.#map = this.#store = this.#rendering = this.#objects = undefined;
   }
 
-  /** @internal The layer's view of a direction. */
-  viewOf(direction: string): View | undefined {
-    return this.#rendering?.views.get(direction);
+  /** @internal The layer's view that looks as a frame does. */
+  viewOf(frame: Frame): View | undefined {
+    return this.#rendering && viewLike(this.#rendering, frame);
+  }
+
+  /** @internal Its manifest is on the way. */
+  get loading(): boolean {
+    return !this.#rendering && !this.#failed;
+  }
+
+  /** @internal Something of it can hide what other layers show. */
+  get combines(): boolean {
+    return this.options.combine && this.options.opacity > 0 && this.#rendering?.layers.has("depth") === true;
+  }
+
+  /** @internal It shows something at a point (shares of the map's width and height). */
+  shows([x, y]: Vec2): boolean {
+    const [left, top, right, bottom] = this.#clip ?? [0, 0, 1, 1];
+    return this.options.opacity > 0 && x >= left && x < right && y >= top && y < bottom;
   }
 
   /** @internal */
@@ -179,11 +218,11 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
   }
 
   /** @internal What to paint and to fetch; `kinds` are read by others. */
-  plan(sight: Sight, light: Readonly<Light>, kinds: readonly LayerKind[]): LayerPlan | null {
-    const view = this.viewOf(sight.camera.frame.id);
-    if (!view || !this.#rendering || !this.#store) return null;
+  plan(sight: Sight, light: Readonly<Light>, kinds: readonly LayerKind[], combined: boolean): LayerPlan | null {
+    const view = this.viewOf(sight.camera.frame);
+    if (!view || !this.#rendering || !this.#store || this.options.opacity === 0) return null;
     const mode = this.#shownMode(this.#rendering);
-    const needed = neededKinds(mode, this.#masked(this.#rendering));
+    const needed = neededKinds(mode, this.#masked(this.#rendering), combined);
     const baked = this.#baked(this.#rendering, light);
     const ids: LayerKind[] = this.#shown.size > 0 || this.#finishes ? ["id"] : [];
     const read = [...new Set([...ids, ...kinds])].filter((kind) => !needed.includes(kind));
@@ -191,8 +230,8 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
     return planLayer(sight, this.#rendering, view, this.#store, { baked, layers: layersWith(this.#rendering, baked), needed, extra });
   }
 
-  /** @internal */
-  pass(plan: LayerPlan): Pass {
+  /** @internal @param before layers with which it is combined and that were added before; null: it is not combined */
+  pass(plan: LayerPlan, { origin }: Sight, before: number | null): Pass {
     const rendering = this.#rendering as Rendering;
     return {
       mode: this.#shownMode(rendering),
@@ -204,6 +243,8 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
       finishes: this.#finishes,
       masked: this.#masked(rendering),
       opacity: this.options.opacity,
+      depths: before === null ? null : depthsOf(rendering, plan, origin, before),
+      clip: this.#clip,
       depthRange: depthRangeOf(rendering, plan.view),
     };
   }
@@ -215,6 +256,7 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
   }
 
   #begin(rendering: Rendering, stage: Stage): void {
+    stage.admit(rendering);
     this.#rendering = rendering;
     this.#objects = new Objects(this.#source.base, rendering.json);
     stage.ready(rendering);
@@ -225,7 +267,7 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
   #checkLayers(): void {
     const [rendering, stage] = [this.#rendering, this.#stage];
     if (!rendering || !stage) return;
-    const missing = neededKinds(this.#shownMode(rendering), this.#masked(rendering)).filter((kind) => !rendering.layers.has(kind));
+    const missing = neededKinds(this.#shownMode(rendering), this.#masked(rendering), false).filter((kind) => !rendering.layers.has(kind));
     if (missing.length > 0) stage.report(new UsageError(`mode "${this.#mode}" needs the layer ${missing.join(", ")}, which rendering "${rendering.json.name}" does not have`));
   }
 

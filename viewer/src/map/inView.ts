@@ -14,7 +14,7 @@ export interface Seen {
 /** Objects of a layer that are seen, the largest first. Fetches the id tiles of the level that is shown. @throws what a fetch threw */
 export async function objectsIn(layer: imageLayer, sight: Sight): Promise<Seen[]> {
   const { camera, dpr } = sight;
-  const [view, info] = [layer.viewOf(camera.frame.id), layer.rendering?.layers.get("id")];
+  const [view, info] = [layer.viewOf(camera.frame), layer.rendering?.layers.get("id")];
   const { rendering, store } = layer;
   if (!view || !rendering || !info || !store) return [];
   const { frame } = view;

@@ -1,9 +1,10 @@
-import { dot, sub, type Vec2 } from "../core/vec";
+import { dot, sub, type Vec2, type Vec3 } from "../core/vec";
 import { uvdFromLocal } from "../geo/axes";
 import { cssPixelM } from "../geo/camera";
 import { ancestor, type Frame, type Tile } from "../geo/frame";
 import type { LayerInfo, LayerKind, Rendering, View } from "../geo/manifest";
 import { corners } from "../core/vec";
+import { leadOf, type Depths } from "../draw/combine";
 import { placeQuads } from "../draw/plan";
 import type { Baked, Quad } from "../draw/drawer";
 import { coverOf, fromTheMiddle, levelFor, rectAround, standsFor } from "../tiles/cover";
@@ -24,6 +25,9 @@ export interface LayerPlan {
   /** All of the view is here (or known not to come). */
   readonly complete: boolean;
 }
+
+/** Of depth values, when the manifest does not say. */
+export const DEPTH_UNIT_M = 2 ** -10;
 
 /** Levels above the shown one whose tiles are fetched first, so that something stands there soon. */
 const COARSE_STEPS = 3;
@@ -66,9 +70,18 @@ export function planLayer(sight: Sight, rendering: Rendering, view: View, store:
 
 /** Least and greatest depth value that the rendering's box can have in a view. */
 export function depthRangeOf(rendering: Rendering, { frame }: View): Vec2 {
-  const unit = rendering.layers.get("depth")?.unit_m ?? 2 ** -10;
+  const unit = rendering.layers.get("depth")?.unit_m ?? DEPTH_UNIT_M;
   const depths = corners(rendering.json.box).map((corner) => (uvdFromLocal(frame.axes, corner)[2] - frame.d0) / unit);
   return [Math.min(...depths), Math.max(...depths)];
+}
+
+/** How a layer is combined with others on a map with this origin. @param before layers that were added before it */
+export function depthsOf(rendering: Rendering, { view, level }: LayerPlan, origin: Vec3, before: number): Depths {
+  const { frame } = view;
+  const unit_m = rendering.layers.get("depth")?.unit_m ?? DEPTH_UNIT_M;
+  const shift = uvdFromLocal(frame.axes, sub(rendering.json.origin, origin));
+  const [near, far] = depthRangeOf(rendering, view).map((value) => frame.d0 + shift[2] + value * unit_m) as [number, number];
+  return { frame, shift, unit_m, lead_m: leadOf(frame, level, before), range: [near, far] };
 }
 
 function ancestorsOf(tiles: readonly Tile[]): Tile[] {

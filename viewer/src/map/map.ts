@@ -218,6 +218,7 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
       shared: painter.shared,
       nameLayer: () => `layer${String(this.#names++)}`,
       forget: (layer) => { painter.forget(`${layer}/`); },
+      admit: (rendering) => { this.admit(rendering); },
       ready: (rendering) => {
         if (!this.camera) this.begin(rendering);
         this.#redraw();

@@ -7,6 +7,7 @@ import { Cache } from "../tiles/cache";
 import { Decoder } from "../tiles/decoder";
 import { Queue } from "../tiles/queue";
 import type { Shared, Stored } from "../tiles/store";
+import { combinedOf } from "./combined";
 import type { imageLayer } from "./imageLayer";
 import type { LayerPlan } from "./layerPlan";
 import type { FilledOptions } from "./options";
@@ -74,14 +75,16 @@ export class Painter {
   paint(sight: Sight, layers: readonly imageLayer[], light: Readonly<Light>, kinds: readonly LayerKind[]): Painted {
     this.#cache.tick();
     this.#viewport.fitCanvas(sight.dpr);
+    const combined = combinedOf(layers);
     const planned = layers.flatMap((layer) => {
-      const plan = layer.plan(sight, light, kinds);
+      const plan = layer.plan(sight, light, kinds, combined.includes(layer));
       return plan ? [{ layer, plan }] : [];
     });
+    const before = (layer: imageLayer): number | null => (combined.includes(layer) ? combined.indexOf(layer) : null);
     this.#queue.want(planned.flatMap(({ plan }) => plan.jobs));
     const { width, height } = this.#viewport.canvas;
-    this.#drawer.draw({ width, height, dpr: sight.dpr, light, passes: planned.map(({ layer, plan }) => layer.pass(plan)) });
-    const complete = layers.every((layer) => layer.rendering) && planned.every(({ plan }) => plan.complete);
+    this.#drawer.draw({ width, height, dpr: sight.dpr, light, passes: planned.map(({ layer, plan }) => layer.pass(plan, sight, before(layer))) });
+    const complete = !layers.some((layer) => layer.loading) && planned.every(({ plan }) => plan.complete);
     return { plans: planned.map(({ plan }) => plan), complete: complete && !this.#drawer.busy };
   }
 

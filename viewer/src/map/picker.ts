@@ -1,9 +1,11 @@
-import { add, type Vec2, type Vec3 } from "../core/vec";
+import { add, dot, sub, type Vec2, type Vec3 } from "../core/vec";
+import { leadOf } from "../draw/combine";
 import { localFromUvd } from "../geo/axes";
 import { cssPixelM } from "../geo/camera";
 import { pixelAt, uvOfPixel, type Tile } from "../geo/frame";
 import type { LayerKind, View } from "../geo/manifest";
 import { NO_DEPTH, type TileData } from "../tiles/tileData";
+import { groupsOf } from "./combined";
 import type { imageLayer } from "./imageLayer";
 import { middleIn } from "./layerPlan";
 import type { Sight } from "./stage";
@@ -23,37 +25,59 @@ export const NOTHING: Pick = { id: 0, position: null, approximate: false, layer:
 
 /** What is exact: from the deepest level, whose tiles are fetched when they are not here. */
 export async function pickExactly(layers: readonly imageLayer[], sight: Sight, at: Vec2): Promise<Pick> {
-  for (const layer of [...layers].reverse()) {
-    const spot = spotOf(layer, sight, at);
-    if (!spot) continue;
-    const zmax = spot.view.frame.zmax;
-    const pixel = pixelAt(spot.view.frame, zmax, ...spot.uv);
-    if (!pixel) continue;
-    const [ids, depths] = await Promise.all([need(layer, spot.view, "id", pixel.tile), need(layer, spot.view, "depth", pixel.tile)]);
-    const pick = read(layer, spot.view, pixel, ids, depths);
+  for (const group of shownGroups(layers, sight, at)) {
+    const picks = await Promise.all(group.map((layer) => pickFrom(layer, sight, at)));
+    const pick = nearest(picks, group, sight);
     if (pick) return pick;
   }
   return NOTHING;
 }
 
+async function pickFrom(layer: imageLayer, sight: Sight, at: Vec2): Promise<Pick | null> {
+  const spot = spotOf(layer, sight, at);
+  const pixel = spot && pixelAt(spot.view.frame, spot.view.frame.zmax, ...spot.uv);
+  if (!pixel) return null;
+  const [ids, depths] = await Promise.all([need(layer, spot.view, "id", pixel.tile), need(layer, spot.view, "depth", pixel.tile)]);
+  return read(layer, spot.view, pixel, ids, depths);
+}
+
 /** What the tiles in memory tell, finest first; null when they tell nothing. */
 export function pickLoaded(layers: readonly imageLayer[], sight: Sight, at: Vec2): Pick | null {
   let nothing: Pick | null = null;
-  for (const layer of [...layers].reverse()) {
-    const spot = spotOf(layer, sight, at);
-    if (!spot) continue;
-    for (let z = spot.view.frame.zmax; z >= 0; z--) {
-      const pixel = pixelAt(spot.view.frame, z, ...spot.uv);
-      if (!pixel) break;
-      const ids = loaded(layer, spot.view, "id", pixel.tile);
-      if (!ids) continue;
-      const pick = read(layer, spot.view, pixel, ids, loaded(layer, spot.view, "depth", pixel.tile));
-      if (pick) return pick;
-      nothing = { ...NOTHING, approximate: z < spot.view.frame.zmax };
-      break;
-    }
+  for (const group of shownGroups(layers, sight, at)) {
+    const picks = group.map((layer) => loadedFrom(layer, sight, at));
+    const pick = nearest(picks.map((found) => (found?.layer ? found : null)), group, sight);
+    if (pick) return pick;
+    nothing ??= picks.find((found) => found !== null) ?? null;
   }
   return nothing;
+}
+
+/** Of the finest tile in memory; without a layer: nothing is there. */
+function loadedFrom(layer: imageLayer, sight: Sight, at: Vec2): Pick | null {
+  const spot = spotOf(layer, sight, at);
+  if (!spot) return null;
+  const { frame } = spot.view;
+  for (let z = frame.zmax; z >= 0; z--) {
+    const pixel = pixelAt(frame, z, ...spot.uv);
+    if (!pixel) return null;
+    const ids = loaded(layer, spot.view, "id", pixel.tile);
+    if (ids) return read(layer, spot.view, pixel, ids, loaded(layer, spot.view, "depth", pixel.tile)) ?? { ...NOTHING, approximate: z < frame.zmax };
+  }
+  return null;
+}
+
+/** Layers that show something at a point, uppermost first; those of a group hide each other by depth. */
+function shownGroups(layers: readonly imageLayer[], { camera }: Sight, [x, y]: Vec2): (readonly imageLayer[])[] {
+  const point: Vec2 = [x / camera.width, y / camera.height];
+  return [...groupsOf(layers.filter((layer) => layer.shows(point)))].reverse();
+}
+
+/** Of what a group shows at a point, by the drawers' rule. */
+function nearest(picks: readonly (Pick | null)[], group: readonly imageLayer[], { camera: { frame, zoom }, origin }: Sight): Pick | null {
+  const far = (pick: Pick, k: number): number => (pick.position ? dot(frame.axes.forward, sub(pick.position, origin)) - leadOf(frame, zoom, k) : Infinity);
+  const found = picks.flatMap((pick, k) => (pick ? [{ pick, far: group.length > 1 ? far(pick, k) : 0 }] : []));
+  return found.reduce<(typeof found)[0] | null>((best, one) => (best && best.far < one.far ? best : one), null)?.pick ?? null;
 }
 
 interface Spot {
@@ -63,7 +87,7 @@ interface Spot {
 
 function spotOf(layer: imageLayer, sight: Sight, [x, y]: Vec2): Spot | null {
   const { camera } = sight;
-  const view = layer.viewOf(camera.frame.id);
+  const view = layer.viewOf(camera.frame);
   if (!view || !layer.rendering) return null;
   const [u, v] = middleIn(view.frame, sight, layer.rendering);
   const px = cssPixelM(camera);

@@ -10,6 +10,8 @@ export interface Stage {
   nameLayer(): string;
   /** A layer has left: its tiles can go. */
   forget(layer: string): void;
+  /** @throws UsageError when a manifest does not go with what is on the map */
+  admit(rendering: Rendering): void;
   /** The layer's manifest is here. */
   ready(rendering: Rendering): void;
   /** A frame is needed. */

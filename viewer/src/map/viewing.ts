@@ -5,6 +5,7 @@ import { depthAtHeight, localFromUvd, uvdFromLocal } from "../geo/axes";
 import { cssPixelM, projectedBox, screenFromLocal, uvFromScreen, zoomedAt, zoomToFit, type Camera } from "../geo/camera";
 import { localFromLonLat, lonLatOf } from "../geo/geographic";
 import type { Rendering, View } from "../geo/manifest";
+import { discord } from "./agreement";
 import { neighbourView, tiltedView } from "./directions";
 import { limited, zoomLimits } from "./limits";
 import { Motion } from "./motion";
@@ -197,6 +198,12 @@ export abstract class Viewing extends Evented<MapEvents> {
     const camera = this.camera;
     const next = camera && this.motion.step(now_ms, camera);
     if (next && next !== camera) this.camera = this.reference ? limited(next, this.reference.json.box) : next;
+  }
+
+  /** @throws UsageError when a manifest does not go with the first */
+  protected admit(rendering: Rendering): void {
+    const why = this.reference ? discord(this.reference, rendering) : null;
+    if (why !== null) throw new UsageError(`rendering "${rendering.json.name}" cannot be shown on this map: ${why}`);
   }
 
   /** The first manifest gives the map its view. */

@@ -16,7 +16,7 @@ export function decodedLevel(town: Fixture, layer: "color" | "normal" | "id"): (
 /** Canvas pixel of level 3's first pixel. */
 export const placeOf = (page: Page): Promise<[number, number]> => page.evaluate(() => {
   const { map, layer } = globalThis as Global;
-  const view = layer.viewOf(map.direction);
+  const view = layer.rendering?.views.get(map.direction);
   if (!view) throw new Error("no view");
   const { frame } = view;
   const { right, up } = frame.axes;

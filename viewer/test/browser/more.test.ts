@@ -214,7 +214,7 @@ test("a pick whose deepest tile cannot be had is approximate", async () => {
   const { page } = await bed.start(name, { hover: true });
   const pick = await page.evaluate(async ([x, y, z]) => {
     const { map, layer } = globalThis as Global;
-    const view = layer.viewOf("0-45");
+    const view = layer.rendering?.views.get("0-45");
     for (const kind of ["id", "depth"]) {
       const info = layer.rendering?.layers.get(kind);
       if (view && info) await layer.store?.need(view, info, { z: 0, x: 0, y: 0 });

@@ -10,9 +10,9 @@ import { frameOf } from "../../src/geo/frame";
 import { DEFAULT_LIGHT, towardsLight } from "../../src/geo/light";
 
 const LAMP: Lamp = { sun: towardsLight(DEFAULT_LIGHT), sky: [0.42, 0.42, 0.42], beam: [0.76, 0.76, 0.76], occlusion: false, shadow: null };
-const LOOK: Look = { mode: "id", masked: false, light: null, highlight: null, finish: null, rim: [0, 0], depthRange: null };
+const LOOK: Look = { mode: "id", masked: false, light: null, highlight: null, finish: null, rim: [0, 0], depthRange: null, combined: false, masks: [] };
 const UNSAID: Said = { colors: undefined, finishes: undefined };
-const ALONE: Around = { shades: [], id: [] };
+const ALONE: Around = { shades: [], id: [], masks: [] };
 const bytes = (...normal: number[][]): Shades => ({ normal: Uint8Array.from(normal.flat()) });
 const UP = [128, 128, 255];
 const SOUTH = [128, 0, 128];
@@ -81,8 +81,8 @@ describe("pictures", () => {
       return [0, 1, 2, 3, 4, 5, 6, 7, 8].filter((at) => out[4 * at] === 255 && out[4 * at + 1] === 0);
     };
     expect(rims(ALONE)).toEqual([]);
-    expect(rims({ shades: [], id: [undefined, new Uint32Array(9).fill(8)] })).toEqual([2, 5, 8]);
-    expect(rims({ shades: [], id: [undefined, undefined, new Uint32Array(9)] })).toEqual([0, 1, 2]);
+    expect(rims({ masks: [], shades: [], id: [undefined, new Uint32Array(9).fill(8)] })).toEqual([2, 5, 8]);
+    expect(rims({ masks: [], shades: [], id: [undefined, undefined, new Uint32Array(9)] })).toEqual([0, 1, 2]);
   });
 
   test("take an object's finish: painted, pale, not at all; others as is said", () => {

@@ -3,8 +3,10 @@ import type { Tile } from "../../geo/frame";
 import type { LayerKind } from "../../geo/manifest";
 import { standsFor } from "../../tiles/cover";
 import { neededKinds, type Drawer, type DrawerEvents, type FrameSpec, type Pass, type Quad } from "../drawer";
+import { meet, type Clip } from "../combine";
 import type { Finishes } from "../finish";
 import { kindsBeside, kindsOf, lookOf, lookWith, type Look } from "./look";
+import { maskOf, type Mask } from "./mask";
 import { Pictures, type Picture, type Wish } from "./pictures";
 import type { Order } from "./shade.worker";
 import { areaOf, gridOf, Sheet, type Grid, type Piece } from "./sheet";
@@ -53,7 +55,11 @@ export class CanvasDrawer implements Drawer {
 
   draw(frame: FrameSpec): void {
     this.#context.clearRect(0, 0, frame.width, frame.height);
-    const wishes = frame.passes.flatMap((pass) => this.#drawPass(frame, pass));
+    const wanted = frame.passes.map((pass) => [pass, this.#giveAll(frame, pass)] as const);
+    const wishes = wanted.flatMap(([pass, tiles]) => {
+      this.#paint(pass, tiles);
+      return [...tiles].map(([name, tile]) => this.#wish(frame.passes, pass, this.#pictures.of(name), tile));
+    });
     this.#pictures.want(wishes.filter(({ urgency }) => urgency.length > 0));
     this.#dropNamed(frame.passes);
     if (this.busy) return;
@@ -77,8 +83,8 @@ export class CanvasDrawer implements Drawer {
     this.#given.clear();
   }
 
-  /** Paints what is there. @returns a wish for each tile; one without urgency is fulfilled */
-  #drawPass(frame: FrameSpec, pass: Pass): Wish[] {
+  /** Gives the worker what it has not. @returns the tiles that are to be seen, by the name of their picture */
+  #giveAll(frame: FrameSpec, pass: Pass): Map<string, Wanted> {
     const names = { highlight: pass.highlight.size > 0 ? this.#nameOf(pass.highlight) : null, finish: pass.finishes && this.#nameOf(pass.finishes) };
     const wanted = new Map<string, Wanted>();
     for (const { from, rect, scale } of pass.quads) {
@@ -89,8 +95,7 @@ export class CanvasDrawer implements Drawer {
       const layers = known?.layers ?? this.#give(pass, look, from);
       if (layers) wanted.set(name, { from, look, layers, far: Math.min(far, known?.far ?? far) });
     }
-    this.#paint(pass, wanted);
-    return [...wanted].map(([name, tile]) => this.#wish(pass, this.#pictures.of(name), tile));
+    return wanted;
   }
 
   /** Gives the worker a tile's data. @returns its names; null when there is nothing to show */
@@ -109,14 +114,26 @@ export class CanvasDrawer implements Drawer {
       }
       if (this.#given.has(key)) layers[kind] = key;
     }
-    return neededKinds(look.mode, look.masked).every((kind) => layers[kind] !== undefined) ? layers : null;
+    return neededKinds(look.mode, look.masked, look.combined).every((kind) => layers[kind] !== undefined) ? layers : null;
   }
 
   #paint(pass: Pass, wanted: ReadonlyMap<string, Wanted>): void {
     const grid = gridOf(pass, this.#tilePx);
     if (!grid || this.#tilePx === 0) return;
     const pieces = pass.quads.filter(({ from }) => wanted.has(nameIn(pass, from))).flatMap((quad) => this.#piecesFor(pass, grid, quad));
-    if (pieces.length > 0) this.#sheet.show(this.#context, grid, pieces, pass.mode === "lit" || pass.mode === "color" || pass.mode === "picture", pass.opacity);
+    if (pieces.length === 0) return;
+    this.#context.save();
+    if (pass.clip) this.#clip(pass.clip);
+    this.#sheet.show(this.#context, grid, pieces, pass.mode === "lit" || pass.mode === "color" || pass.mode === "picture", pass.opacity);
+    this.#context.restore();
+  }
+
+  #clip([left, top, right, bottom]: Clip): void {
+    const { width, height } = this.#context.canvas;
+    const [x, y] = [Math.round(left * width), Math.round(top * height)];
+    this.#context.beginPath();
+    this.#context.rect(x, y, Math.round(right * width) - x, Math.round(bottom * height) - y);
+    this.#context.clip();
   }
 
   /** What stands for a quad: the picture of its tile, or of tiles below or above it that have one. */
@@ -129,8 +146,10 @@ export class CanvasDrawer implements Drawer {
     return stands.map((stand) => ({ ...stand, bitmap: shown(stand.from) as ImageBitmap }));
   }
 
-  #wish({ tiles }: Pass, picture: Picture, { from, look, layers, far }: Wanted): Wish {
-    const shown = lookWith(look, (kind) => layers[kind] !== undefined);
+  /** One without urgency is fulfilled. */
+  #wish(passes: readonly Pass[], pass: Pass, picture: Picture, { from, look, layers, far }: Wanted): Wish {
+    const { tiles } = pass;
+    const shown = { ...lookWith(look, (kind) => layers[kind] !== undefined), masks: this.#masksOver(passes, pass, from) };
     const beside: Partial<Record<LayerKind, string[]>> = {};
     let edges = 0;
     for (const [number, kind] of kindsBeside(shown).entries()) {
@@ -140,6 +159,20 @@ export class CanvasDrawer implements Drawer {
     }
     const text = JSON.stringify(shown);
     return { picture, look: text, edges, order: { look: shown, layers, beside }, urgency: urgencyOf(picture, text, edges, far) };
+  }
+
+  /** Tiles of other layers that may hide parts of one of this. */
+  #masksOver(passes: readonly Pass[], { depths, clip, tiles }: Pass, from: Tile): Mask[] {
+    if (!depths) return [];
+    const others = passes.filter((other) => other.tiles !== tiles && other.depths && other.opacity === 1 && meet(clip, other.clip));
+    return others.flatMap((other) => {
+      const above = new Map(other.quads.map((quad) => [other.tiles.key("depth", quad.from), quad.from]));
+      return [...above].flatMap(([depth, tile]) => {
+        const color = other.tiles.key(other.mode === "picture" ? "picture" : "color", tile);
+        const mask = other.depths && this.#given.has(depth) ? maskOf(depths, from, other.depths, tile, { depth, color: other.masked || !this.#given.has(color) ? null : color }) : null;
+        return mask ? [mask] : [];
+      });
+    });
   }
 
   #nameOf(said: Named): string {

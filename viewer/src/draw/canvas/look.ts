@@ -3,6 +3,7 @@ import { towardsLight } from "../../geo/light";
 import type { LayerKind } from "../../geo/manifest";
 import type { Vec2, Vec3 } from "../../core/vec";
 import type { Shadow } from "../../geo/shadows";
+import type { Mask } from "./mask";
 import { neededKinds, type Baked, type FrameSpec, type Mode, type Pass } from "../drawer";
 
 /** Of lit tiles. */
@@ -28,11 +29,15 @@ export interface Look {
   /** A highlight's rim: pixels to the right and below, to the left and above (negative), at which the id differs. */
   readonly rim: Vec2;
   readonly depthRange: Vec2 | null;
+  /** Other layers may hide it. */
+  readonly combined: boolean;
+  /** Tiles of theirs that lie over it. */
+  readonly masks: readonly Mask[];
 }
 
 /** Kinds that a picture is made from. Without ids neither highlights nor finishes are shown. */
 export function kindsOf(look: Look): LayerKind[] {
-  const needed = neededKinds(look.mode, look.masked);
+  const needed = neededKinds(look.mode, look.masked, look.combined);
   return [...needed, ...bakedKindsOf(look), ...((look.highlight !== null || look.finish !== null) && !needed.includes("id") ? ["id" as const] : [])];
 }
 
@@ -71,6 +76,8 @@ export function lookOf({ light, dpr }: FrameSpec, pass: Pass, scale: number, { h
     finish: colored ? finish : null,
     rim: highlight === null ? [0, 0] : rimOf(Math.max(1, 1.25 * dpr * scale)),
     depthRange: mode === "depth" ? pass.depthRange : null,
+    combined: pass.depths !== null,
+    masks: [],
   };
 }
 

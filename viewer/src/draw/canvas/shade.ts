@@ -2,6 +2,7 @@ import type { Rgb } from "../drawer";
 import { packFinish, PAINT, PALE, type Finishes } from "../finish";
 import type { Look } from "./look";
 import { lightOn, type Lamp, type Shades } from "./lightOn";
+import { eachHidden, type Masking } from "./mask";
 
 /** A tile's layers; pixels row by row from the top. */
 export interface Layers {
@@ -20,6 +21,8 @@ export type Beside<T> = readonly (T | undefined)[];
 export interface Around {
   readonly shades: Beside<Shades>;
   readonly id: Beside<Uint32Array>;
+  /** Tiles of other layers that may hide this one's pixels. */
+  readonly masks: readonly Masking[];
 }
 
 /** What is said of objects by id. */
@@ -38,6 +41,7 @@ export function shade(look: Look, layers: Layers, around: Around, { colors, fini
   else if (look.mode === "depth") showDepths(out, layers, look.depthRange ?? [0, 1]);
   else showColors(out, look, layers, around, finishes);
   if (colors && layers.id) highlight(out, look, layers, around, colors);
+  if (layers.depth) eachHidden(layers.width, layers.height, layers.depth, around.masks, (at) => (out[4 * at + 3] = 0));
   return out;
 }
 

@@ -4,6 +4,7 @@ import type { Rgb } from "../drawer";
 import type { Finishes } from "../finish";
 import type { Look } from "./look";
 import type { Shades } from "./lightOn";
+import type { Mask, Masking } from "./mask";
 import { shade, type Around, type Layers } from "./shade";
 import { composed } from "./unread";
 
@@ -82,11 +83,18 @@ async function paint(look: Look, names: Order["layers"], beside: Order["beside"]
     depth: words(names.depth),
   };
   const shadow = beside[look.light?.shadow?.kind ?? "sun"];
-  const around: Around = { shades: (beside.normal ?? []).map((name, k) => shadesOf(look, name, beside.ao?.[k], shadow?.[k])), id: (beside.id ?? []).map(words) };
+  const around: Around = { shades: (beside.normal ?? []).map((name, k) => shadesOf(look, name, beside.ao?.[k], shadow?.[k])), id: (beside.id ?? []).map(words), masks: look.masks.flatMap(maskingOf) };
   const colors = look.highlight === null ? undefined : (kept.get(look.highlight) as ReadonlyMap<number, Rgb> | undefined);
   const finishes = look.finish === null ? undefined : (kept.get(look.finish) as Finishes | undefined);
   if (bitmap && !exact && look.mode !== "id" && look.mode !== "normal" && look.mode !== "depth") return composed(look, bitmap, layers, around, { colors, finishes });
   return createImageBitmap(new ImageData(shade(look, layers, around, { colors, finishes }), width, height));
+}
+
+function maskingOf(mask: Mask): Masking[] {
+  const [data, color] = [tile(mask.depth), tile(mask.color ?? undefined)];
+  if (data?.kind !== "depth") return [];
+  const pixels = exact && mask.color !== null && color && "bitmap" in color ? pixelsOf(mask.color, color.bitmap) : undefined;
+  return [{ mask, width: data.width, height: data.height, depth: data.values, color: pixels }];
 }
 
 function tile(name: string | undefined): TileData | undefined {

@@ -2,6 +2,7 @@ import type { Rgb } from "../drawer";
 import { PAINT, PALE, type Finishes } from "../finish";
 import type { Look } from "./look";
 import { lightOn, type Lamp } from "./lightOn";
+import { eachHidden } from "./mask";
 import { eachFinished, eachHighlighted, packed, strengthIn, type Around, type Layers, type Said } from "./shade";
 
 /**
@@ -21,6 +22,12 @@ export function composed(look: Look, bitmap: ImageBitmap, layers: Layers, around
     context.drawImage(hidden, 0, 0);
   }
   if (colors) tint(context, look, layers, around, colors);
+  if (layers.depth && around.masks.length > 0) {
+    const behind = new Uint32Array(width * height);
+    eachHidden(width, height, layers.depth, around.masks, (at) => (behind[at] = 0xff000000));
+    context.globalCompositeOperation = "destination-out";
+    context.drawImage(imageOf(width, height, (at) => behind[at] ?? 0), 0, 0);
+  }
   return context.canvas.transferToImageBitmap();
 }
 

@@ -12,10 +12,12 @@ export interface Variant {
   /** The layer with shadows, if any. */
   readonly shadow: "sun" | "sun16" | null;
   readonly occlusion: boolean;
+  /** Takes part in a picture that several layers make by depth. */
+  readonly combined: boolean;
 }
 
 export const variantName = (v: Variant): string =>
-  [v.mode, v.masked && "masked", v.highlight && "highlight", v.finish && "finish", v.shadow, v.occlusion && "ao"].filter(Boolean).join("+");
+  [v.mode, v.masked && "masked", v.highlight && "highlight", v.finish && "finish", v.shadow, v.occlusion && "ao", v.combined && "combined"].filter(Boolean).join("+");
 
 export const VERTEX = `#version 300 es
 uniform vec4 u_rect; // left, top, right, bottom in clip space
@@ -24,10 +26,10 @@ void main() {
   gl_Position = vec4(right ? u_rect.z : u_rect.x, bottom ? u_rect.w : u_rect.y, 0.0, 1.0);
 }`;
 
-export function fragment({ mode, masked, highlight, finish, shadow, occlusion }: Variant): string {
-  const names = [`MODE_${mode === "picture" ? "COLOR" : mode.toUpperCase()}`, masked && "MASKED", highlight && "HIGHLIGHT", finish && "FINISH", shadow && `SHADOW_${shadow.toUpperCase()}`, occlusion && "OCCLUSION"];
+export function fragment({ mode, masked, highlight, finish, shadow, occlusion, combined }: Variant): string {
+  const names = [`MODE_${mode === "picture" ? "COLOR" : mode.toUpperCase()}`, masked && "MASKED", highlight && "HIGHLIGHT", finish && "FINISH", shadow && `SHADOW_${shadow.toUpperCase()}`, occlusion && "OCCLUSION", combined && "COMBINED"];
   const defines = names.filter(Boolean).map((name) => `#define ${String(name)}`);
-  return ["#version 300 es", ...defines, HEAD, FIND, COLOR, FALSE_COLOR, HIGHLIGHT, MAIN].join("\n");
+  return ["#version 300 es", ...defines, HEAD, FIND, COLOR, FALSE_COLOR, HIGHLIGHT, COMBINED, MAIN].join("\n");
 }
 
 const HEAD = `
@@ -256,12 +258,50 @@ vec4 highlighted(vec4 color, vec2 texel) {
 #endif
 `;
 
+/** Pixels that are covered all are drawn first, with their depth; edges then, which let through what lies behind them. */
+const COMBINED = `
+#ifdef COMBINED
+uniform vec2 u_depths;    // share of the range at value 0, and a value more
+uniform bool u_soft;      // edges are drawn
+const uint NONE = 0xffffffffu;
+uint depthAt(ivec2 texel) { return texelFetch(u_depth, inside(texel), 0).r; }
+
+/** Of a pixel that is covered in part but has no depth: that of the nearest around it. */
+float shareOf(vec2 texel) {
+  ivec2 at = ivec2(floor(texel));
+  uint d = depthAt(at);
+  if (d == NONE) for (int k = 0; k < 9; k++) d = min(d, depthAt(at + ivec2(k % 3 - 1, k / 3 - 1)));
+  return d == NONE ? 1.0 : u_depths.x + float(d) * u_depths.y;
+}
+
+bool isSolid(float alpha) { return alpha > 0.998; }
+
+#if defined(MODE_LIT) || defined(MODE_COLOR)
+/** Known before any light is: all pixels that the colour is mixed of are covered. */
+bool surelySolid(vec2 texel) {
+  ivec2 at = ivec2(floor(texel - 0.5));
+  return isSolid(min(min(colorAt(at).a, colorAt(at + ivec2(1, 0)).a), min(colorAt(at + ivec2(0, 1)).a, colorAt(at + 1).a)));
+}
+#else
+bool surelySolid(vec2 texel) { return false; }
+#endif
+#endif
+`;
+
 const MAIN = `
 void main() {
   vec2 texel = (vec2(gl_FragCoord.x, u_height - gl_FragCoord.y) - u_origin) * u_scale;
+#ifdef COMBINED
+  bool whole = u_opacity == 1.0;
+  if (whole && u_soft && surelySolid(texel)) discard;
+#endif
   vec4 color = surface(texel);
 #ifdef HIGHLIGHT
   color = highlighted(color, texel);
+#endif
+#ifdef COMBINED
+  if (color.a == 0.0 || (whole && isSolid(color.a) == u_soft)) discard;
+  gl_FragDepth = clamp(shareOf(texel), 0.0, 1.0);
 #endif
   color.a *= u_opacity;
   o_color = vec4(color.rgb * color.a, color.a);

@@ -1,8 +1,9 @@
 import { DrawError } from "../../core/errors";
-import type { Vec3 } from "../../core/vec";
+import type { Vec2, Vec3 } from "../../core/vec";
 import { towardsLight } from "../../geo/light";
 import type { LayerKind } from "../../geo/manifest";
 import { bakedKinds, neededKinds, type Drawer, type DrawerEvents, type FrameSpec, type Mode, type Pass, type Quad } from "../drawer";
+import { firstOf, rangeOf, type Depths } from "../combine";
 import { packColor, packFinish } from "../finish";
 import { idTable, tableShape, type IdTable } from "./idTable";
 import { Programs, unitOf, type Program } from "./program";
@@ -41,7 +42,7 @@ export class WebGLDrawer implements Drawer {
 
   /** @throws DrawError when the browser has no WebGL2 */
   constructor(canvas: HTMLCanvasElement, options: WebGLOptions, events: DrawerEvents) {
-    const settings: WebGLContextAttributes = { alpha: true, premultipliedAlpha: true, antialias: false, depth: false, stencil: false, preserveDrawingBuffer: options.preserve };
+    const settings: WebGLContextAttributes = { alpha: true, premultipliedAlpha: true, antialias: false, depth: true, stencil: false, preserveDrawingBuffer: options.preserve };
     const gl = canvas.getContext("webgl2", settings);
     if (!gl) throw new DrawError("this browser offers no WebGL2, which the map needs to draw; update it or switch hardware acceleration on");
     this.#gl = gl;
@@ -56,10 +57,17 @@ export class WebGLDrawer implements Drawer {
     if (gl.isContextLost()) return;
     gl.viewport(0, 0, frame.width, frame.height);
     gl.clearColor(0, 0, 0, 0);
-    gl.clear(gl.COLOR_BUFFER_BIT);
+    gl.depthMask(true);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    for (const pass of frame.passes) this.#drawPass(frame, pass);
+    gl.depthFunc(gl.LEQUAL);
+    const combined = frame.passes.filter(({ depths }) => depths);
+    for (const pass of frame.passes) {
+      if (!pass.depths) this.#drawPass(frame, pass, null, false);
+      else if (pass === combined[0]) this.#drawTogether(frame, combined);
+    }
+    gl.disable(gl.SCISSOR_TEST);
     this.#dropTables(frame.passes);
   }
 
@@ -73,7 +81,20 @@ export class WebGLDrawer implements Drawer {
     this.#dropTables([]);
   }
 
-  #drawPass(frame: FrameSpec, pass: Pass): void {
+  /** Passes that hide each other by depth: all that is solid, then edges and what lets through. */
+  #drawTogether(frame: FrameSpec, passes: readonly Pass[]): void {
+    const gl = this.#gl;
+    const range = rangeOf(passes.flatMap(({ depths }) => depths ?? []));
+    gl.enable(gl.DEPTH_TEST);
+    for (const pass of passes) if (pass.opacity === 1) this.#drawPass(frame, pass, range, false);
+    gl.depthMask(false);
+    for (const pass of passes) this.#drawPass(frame, pass, range, true);
+    gl.disable(gl.DEPTH_TEST);
+  }
+
+  /** @param range of D, of what is drawn together  @param soft only what lets through */
+  #drawPass(frame: FrameSpec, pass: Pass, range: Vec2 | null, soft: boolean): void {
+    this.#clip(frame, pass);
     const mode: Mode = pass.mode === "lit" && !frame.light.lit ? "color" : pass.mode;
     // All are uploaded before the first is drawn, so that gutters have their neighbours' pixels.
     for (const ready of pass.quads.map((quad) => this.#readyOf(pass, mode, quad))) {
@@ -82,8 +103,9 @@ export class WebGLDrawer implements Drawer {
       const has = (kind: LayerKind): boolean => baked.some(([other]) => other === kind);
       const shadow = has("sun") ? "sun" : has("sun16") ? "sun16" : null;
       const finish = ids !== undefined && pass.finishes !== null;
-      const program = this.#programs.use({ mode, masked: pass.masked, highlight: ids !== undefined && pass.highlight.size > 0, finish, shadow, occlusion: has("ao") });
+      const program = this.#programs.use({ mode, masked: pass.masked, highlight: ids !== undefined && pass.highlight.size > 0, finish, shadow, occlusion: has("ao"), combined: range !== null });
       for (const [kind, texture] of [...textures, ...baked]) this.#bind(kind, texture);
+      if (range && pass.depths) this.#setDepths(program, pass.depths, range, soft);
       if (ids) this.#bindIds(program, pass, quad, ids, frame.dpr);
       this.#drawQuad(frame, pass, quad, program, [...textures, ...baked, ["id", ids] as const].flatMap(([, texture]) => texture ?? []));
     }
@@ -92,7 +114,7 @@ export class WebGLDrawer implements Drawer {
   #readyOf(pass: Pass, mode: Mode, quad: Quad): Ready {
     return {
       quad,
-      textures: neededKinds(mode, pass.masked).map((kind) => [kind, this.#textureOf(pass, kind, quad)] as const),
+      textures: neededKinds(mode, pass.masked, pass.depths !== null).map((kind) => [kind, this.#textureOf(pass, kind, quad)] as const),
       baked: bakedKinds(mode, pass.baked).flatMap((kind) => {
         const texture = this.#textureOf(pass, kind, quad);
         return texture ? [[kind, texture] as const] : [];
@@ -138,6 +160,22 @@ export class WebGLDrawer implements Drawer {
     gl.uniform1f(program.at("u_share"), pass.baked.shadow?.share ?? 0);
     gl.uniform2f(program.at("u_range"), ...pass.depthRange);
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
+  }
+
+  #setDepths(program: Program, depths: Depths, [near, far]: Vec2, soft: boolean): void {
+    this.#gl.uniform2f(program.at("u_depths"), (firstOf(depths) - near) / (far - near), depths.unit_m / (far - near));
+    this.#gl.uniform1i(program.at("u_soft"), Number(soft));
+  }
+
+  #clip({ width, height }: FrameSpec, { clip }: Pass): void {
+    const gl = this.#gl;
+    if (!clip) {
+      gl.disable(gl.SCISSOR_TEST);
+      return;
+    }
+    const [left, top, right, bottom] = [Math.round(clip[0] * width), Math.round(clip[1] * height), Math.round(clip[2] * width), Math.round(clip[3] * height)];
+    gl.enable(gl.SCISSOR_TEST);
+    gl.scissor(left, height - bottom, Math.max(0, right - left), Math.max(0, bottom - top));
   }
 
   #bindIds(program: Program, { highlight, finishes }: Pass, quad: Quad, ids: TileTexture, dpr: number): void {

@@ -1,0 +1,45 @@
+import type { Vec2, Vec3 } from "../core/vec";
+import { pixelM, type Frame, type Tile } from "../geo/frame";
+
+/** How a pass takes part in a picture that several make by depth. U, V and D are those of the map: of its first layer's origin. Metres. */
+export interface Depths {
+  /** Of the pass's own rendering. */
+  readonly frame: Frame;
+  /** U, V and D of its origin. */
+  readonly shift: Vec3;
+  /** Of its depth values. */
+  readonly unit_m: number;
+  /** How much nearer than measured it counts, so that of two layers with one surface the later is seen. */
+  readonly lead_m: number;
+  /** Least and greatest D. */
+  readonly range: Vec2;
+}
+
+/** How near a later layer may be behind an earlier one to be seen: so many of its pixels for each layer that comes before it. */
+const LEAD_PX = 1;
+
+export const leadOf = (frame: Frame, level: number, before: number): number => LEAD_PX * before * pixelM(frame, level);
+
+/** D of a depth value is `first + value · unit_m`, for comparisons. */
+export const firstOf = ({ frame, shift, lead_m }: Depths): number => frame.d0 + shift[2] - lead_m;
+
+/** Least and greatest D of passes, with a little room; null without any. */
+export function rangeOf(all: readonly Depths[]): Vec2 | null {
+  if (all.length === 0) return null;
+  const [near, far] = [Math.min(...all.map(({ range, lead_m }) => range[0] - lead_m)), Math.max(...all.map(({ range }) => range[1]))];
+  const room = 0.01 * (far - near) + 1;
+  return [near - room, far + room];
+}
+
+/** U and V of a tile's left top corner on the map, and metres a pixel. */
+export function cornerOf({ frame, shift }: Depths, { z, x, y }: Tile): readonly [u: number, v: number, px_m: number] {
+  const px = pixelM(frame, z);
+  return [frame.u0 + shift[0] + x * frame.tilePx * px, frame.v0 + shift[1] - y * frame.tilePx * px, px];
+}
+
+/** Two clips (left, top, right, bottom in shares of the map; null: all of it) that have a point in common. */
+export function meet(a: Clip | null, b: Clip | null): boolean {
+  return !a || !b || (a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]);
+}
+
+export type Clip = readonly [left: number, top: number, right: number, bottom: number];
