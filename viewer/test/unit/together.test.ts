@@ -1,5 +1,5 @@
 import { describe, expect, test } from "vitest";
-import { cornerOf, leadOf, meet, rangeOf, type Depths } from "../../src/draw/combine";
+import { cornerOf, leadOf, meet, rangeOf, type Clip, type Depths } from "../../src/draw/combine";
 import { eachHidden, maskOf } from "../../src/draw/canvas/mask";
 import { frameOf, pixelM, uvOfPixel } from "../../src/geo/frame";
 import type { ManifestJson, Rendering } from "../../src/geo/manifest";
@@ -58,11 +58,14 @@ test("clips meet where they have a point in common", () => {
 });
 
 test("layers that combine make one group where the first of them is", () => {
-  const layer = (name: string, combines: boolean): imageLayer => ({ name, combines }) as unknown as imageLayer;
+  const layer = (name: string, combines: boolean, clip: Clip | null = null): imageLayer => ({ name, combines, clip }) as unknown as imageLayer;
   const [a, b, c, d] = [layer("a", false), layer("b", true), layer("c", false), layer("d", true)];
   expect(groupsOf([a, b, c, d])).toEqual([[a], [b, d], [c]]);
   expect(combinedOf([a, b, c])).toEqual([]);
   expect(groupsOf([a, b, c])).toEqual([[a], [b], [c]]);
+  const [left, right] = [layer("left", true, [0, 0, 0.4, 1]), layer("right", true, [0.4, 0, 1, 1])];
+  expect(combinedOf([left, right])).toEqual([]);
+  expect(combinedOf([left, b, right])).toEqual([left, b, right]);
 });
 
 describe("renderings on one map", () => {

@@ -1,0 +1,117 @@
+import { adoptStyles, element, icon } from "../core/dom";
+import { UsageError } from "../core/errors";
+import { clamp } from "../core/vec";
+import { Evented, type Attachable, type imageLayer, type map } from "../map3d";
+import { STYLES } from "./styles";
+import { wordsOf } from "./words";
+
+export interface SwipeOptions {
+  /** Where the border stands, 0 (left edge) to 1. Default 0.5. */
+  at?: number;
+  /** What stands at the border's left and right. */
+  names?: readonly [left: string, right: string];
+}
+
+export interface SwipeEvents {
+  /** The border has moved. */
+  change: { at: number };
+}
+
+type Layers = imageLayer | readonly imageLayer[];
+
+const ARROWS = "M9 7l-5 5 5 5M15 7l5 5-5 5";
+const STEP = 0.02;
+
+const list = (layers: Layers): readonly imageLayer[] => (Array.isArray(layers) ? (layers as readonly imageLayer[]) : [layers as imageLayer]);
+
+/** Some layers left of a border, others right of it; the border can be moved by pointer and by arrow keys. Other layers of the map stay whole. */
+export class swipe extends Evented<SwipeEvents> implements Attachable<map> {
+  readonly #sides: readonly [readonly imageLayer[], readonly imageLayer[]];
+  readonly #border: HTMLElement;
+  #at: number;
+  #map: map | undefined;
+
+  /** @throws UsageError when a layer is on both sides */
+  constructor(left: Layers, right: Layers, { at = 0.5, names }: SwipeOptions = {}) {
+    super();
+    this.#sides = [list(left), list(right)];
+    if (this.#sides[0].some((layer) => this.#sides[1].includes(layer))) throw new UsageError("a layer cannot be on both sides of a swipe");
+    this.#at = clamp(at, 0, 1);
+    this.#border = element("div", "map3d-swipe", { role: "slider", tabindex: "0", "aria-orientation": "horizontal", "aria-valuemin": "0", "aria-valuemax": "100" }, ...(names ?? []).map((name) => element("span", "map3d-swipe-name", {}, name)), icon(ARROWS));
+    if (names) this.#border.setAttribute("aria-description", names.join(" | "));
+    this.#border.addEventListener("pointerdown", (event) => { this.#grab(event); });
+    this.#border.addEventListener("keydown", (event) => { this.#press(event); });
+  }
+
+  addTo(map: map): this {
+    map.add(this);
+    return this;
+  }
+
+  remove(): this {
+    this.#map?.discard(this);
+    return this;
+  }
+
+  /** Where the border stands, 0 (left edge) to 1. */
+  get at(): number {
+    return this.#at;
+  }
+
+  setAt(at: number): this {
+    const next = clamp(at, 0, 1);
+    if (!(next !== this.#at)) return this;
+    this.#at = next;
+    this.#apply();
+    return this.fire("change", { at: next });
+  }
+
+  onAdd(map: map): void {
+    this.#map = map;
+    adoptStyles(document, STYLES);
+    this.#border.setAttribute("aria-label", wordsOf(map.language).border);
+    map.overlayPane.append(this.#border);
+    this.#apply();
+  }
+
+  onRemove(): void {
+    this.#map = undefined;
+    this.#border.remove();
+    for (const layer of this.#sides.flat()) layer.setClip(null);
+  }
+
+  #apply(): void {
+    this.#border.style.left = `${String(100 * this.#at)}%`;
+    this.#border.setAttribute("aria-valuenow", String(Math.round(100 * this.#at)));
+    if (!this.#map) return;
+    for (const layer of this.#sides[0]) layer.setClip([0, 0, this.#at, 1]);
+    for (const layer of this.#sides[1]) layer.setClip([this.#at, 0, 1, 1]);
+  }
+
+  #grab(event: PointerEvent): void {
+    if (event.button !== 0) return;
+    const border = this.#border;
+    border.setPointerCapture(event.pointerId);
+    const { left, width } = border.getBoundingClientRect();
+    const off = event.clientX - (left + width / 2);
+    const move = ({ clientX }: PointerEvent): void => {
+      const box = this.#map?.container.getBoundingClientRect();
+      if (box) this.setAt((clientX - off - box.left) / box.width);
+    };
+    const end = (): void => {
+      border.removeEventListener("pointermove", move);
+    };
+    border.addEventListener("pointermove", move);
+    border.addEventListener("lostpointercapture", end, { once: true });
+    event.preventDefault();
+    border.focus({ preventScroll: true });
+  }
+
+  #press(event: KeyboardEvent): void {
+    const to = { ArrowLeft: this.#at - STEP, ArrowRight: this.#at + STEP, ArrowDown: this.#at - STEP, ArrowUp: this.#at + STEP, PageDown: this.#at - 5 * STEP, PageUp: this.#at + 5 * STEP, Home: 0, End: 1 }[event.key];
+    if (to === undefined || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    event.stopPropagation();
+    this.setAt(to);
+  }
+}
