@@ -1,3 +1,4 @@
+import type { Vec2 } from "../core/vec";
 import type { Tile } from "../geo/frame";
 import type { LayerKind } from "../geo/manifest";
 import type { Light } from "../geo/light";
@@ -72,6 +73,8 @@ export interface FrameSpec {
   readonly dpr: number;
   readonly light: Readonly<Light>;
   readonly passes: readonly Pass[];
+  /** WebGL only: where to draw in place of the canvas, with the depth of all passes as a share of a range of D. */
+  readonly into?: { readonly framebuffer: WebGLFramebuffer; readonly range: Vec2 };
 }
 
 export interface DrawerEvents {
@@ -88,6 +91,8 @@ export interface Drawer {
   readonly name: "webgl" | "canvas";
   /** What was drawn last is not all: `changed` will be called. */
   readonly busy: boolean;
+  /** null: it does not draw with WebGL. */
+  readonly gl: WebGL2RenderingContext | null;
   /** What one who debugs should know; mostly empty. */
   readonly note: string;
   draw(frame: FrameSpec): void;

@@ -10,8 +10,10 @@ export interface Steered {
   /** At once, without smoothing. */
   pinch(factor: number, anchor: Vec2): unknown;
   zoomBy(delta: number, anchor: Vec2): unknown;
-  /** +1: the next direction counter-clockwise, which turns the picture clockwise. */
-  rotate(step: number): unknown;
+  /** Turns the picture clockwise. */
+  twist(rad: number): void;
+  /** No hand is on the map any more. */
+  release(): void;
   tap(at: Vec2): void;
   hover(at: Vec2): void;
 }
@@ -25,8 +27,8 @@ const TAP_PX = 6;
 const DOUBLE_TAP_MS = 320;
 const DOUBLE_TAP_PX = 28;
 const VELOCITY_MS = 90;
-/** Two fingers turned so far turn the view to the next direction. */
-const TWIST_RAD = (28 * Math.PI) / 180;
+/** A drag with the right button turns the picture by so much a pixel. */
+const TURN_RAD = (0.4 * Math.PI) / 180;
 
 /** Mouse, touch and pen on the canvas: drag, pinch, wheel, tap, double tap. */
 export class Gestures {
@@ -36,8 +38,8 @@ export class Gestures {
   readonly #listeners = new AbortController();
   #trail: { at: Vec2; ms: number }[] = [];
   #moved = false;
-  /** Clockwise, since the last turn. */
-  #twist_rad = 0;
+  /** Where the right button was last, while it is down. */
+  #turning: Vec2 | null = null;
   #lastTap: { at: Vec2; ms: number } | null = null;
 
   constructor(map: Steered, canvas: HTMLCanvasElement) {
@@ -48,6 +50,7 @@ export class Gestures {
     canvas.addEventListener("pointermove", (event) => { this.#move(event); }, { signal });
     canvas.addEventListener("pointerup", (event) => { this.#up(event, true); }, { signal });
     canvas.addEventListener("pointercancel", (event) => { this.#up(event, false); }, { signal });
+    canvas.addEventListener("contextmenu", (event) => { event.preventDefault(); }, { signal });
     canvas.addEventListener("wheel", (event) => { this.#wheel(event); }, { signal, passive: false });
   }
 
@@ -61,20 +64,26 @@ export class Gestures {
   }
 
   #down(event: PointerEvent): void {
-    if (event.pointerType === "mouse" && event.button !== 0) return;
     const at = this.#place(event);
+    if (event.pointerType === "mouse" && event.button === 2) this.#turning = at;
+    else if (event.pointerType === "mouse" && event.button !== 0) return;
     this.#canvas.setPointerCapture(event.pointerId);
+    if (this.#turning) return;
     this.#map.grab();
     if (this.#touches.size === 0) this.#moved = false;
     else this.#moved = true;
     this.#touches.set(event.pointerId, { at, start: at });
     this.#trail = [];
-    this.#twist_rad = 0;
   }
 
   #move(event: PointerEvent): void {
     const touch = this.#touches.get(event.pointerId);
     const at = this.#place(event);
+    if (this.#turning) {
+      this.#map.twist((at[0] - this.#turning[0]) * TURN_RAD);
+      this.#turning = at;
+      return;
+    }
     if (!touch) {
       if (event.pointerType === "mouse") this.#map.hover(at);
       return;
@@ -102,21 +111,22 @@ export class Gestures {
     this.#twist(touch.at, other.at, at);
   }
 
-  /** Snaps to the rendered directions. */
   #twist(from: Vec2, other: Vec2, to: Vec2): void {
     const angle = ([x, y]: Vec2): number => Math.atan2(y - other[1], x - other[0]);
     const turned = angle(to) - angle(from);
-    this.#twist_rad += turned - 2 * Math.PI * Math.round(turned / (2 * Math.PI));
-    if (Math.abs(this.#twist_rad) < TWIST_RAD) return;
-    this.#map.rotate(Math.sign(this.#twist_rad));
-    this.#twist_rad = 0;
+    this.#map.twist(turned - 2 * Math.PI * Math.round(turned / (2 * Math.PI)));
   }
 
   #up(event: PointerEvent, meant: boolean): void {
+    if (this.#turning && (event.button === 2 || !meant)) {
+      this.#turning = null;
+      this.#map.release();
+    }
     const touch = this.#touches.get(event.pointerId);
     if (!touch) return;
     this.#touches.delete(event.pointerId);
     if (this.#touches.size > 0) return;
+    this.#map.release();
     this.#map.container.classList.remove("map3d-dragging");
     if (!meant) return;
     if (this.#moved) this.#release();

@@ -2,6 +2,8 @@ import type { Steered } from "./gestures";
 
 export interface Turned extends Steered {
   panBy(dx: number, dy: number, options?: { smooth?: boolean }): unknown;
+  /** +1: the next direction counter-clockwise, which turns the picture clockwise. */
+  rotate(step: number): unknown;
   /** +1: steeper. */
   tilt(step: number): unknown;
 }

@@ -1,4 +1,4 @@
-import { dot, sub, type Vec2, type Vec3 } from "../core/vec";
+import { add, dot, sub, type Vec2, type Vec3 } from "../core/vec";
 import { uvdFromLocal } from "../geo/axes";
 import { cssPixelM } from "../geo/camera";
 import { ancestor, type Frame, type Tile } from "../geo/frame";
@@ -10,6 +10,7 @@ import type { Baked, Quad } from "../draw/drawer";
 import { coverOf, fromTheMiddle, levelFor, rectAround, standsFor } from "../tiles/cover";
 import type { Job } from "../tiles/queue";
 import type { Store } from "../tiles/store";
+import type { imageLayer } from "./imageLayer";
 import type { Sight } from "./stage";
 
 /** What a layer wants painted and fetched for a camera. */
@@ -73,6 +74,12 @@ export function depthRangeOf(rendering: Rendering, { frame }: View): Vec2 {
   const unit = rendering.layers.get("depth")?.unit_m ?? DEPTH_UNIT_M;
   const depths = corners(rendering.json.box).map((corner) => (uvdFromLocal(frame.axes, corner)[2] - frame.d0) / unit);
   return [Math.min(...depths), Math.max(...depths)];
+}
+
+/** Least and greatest D, along a frame, of all layers of a map. */
+export function rangeAlong({ origin }: Sight, { axes }: Frame, layers: readonly imageLayer[]): Vec2 {
+  const all = layers.flatMap(({ rendering }) => (rendering ? corners(rendering.json.box).map((corner) => dot(axes.forward, sub(add(rendering.json.origin, corner), origin))) : []));
+  return [Math.min(...all) - 1, Math.max(...all) + 1];
 }
 
 /** How a layer is combined with others on a map with this origin. @param before layers that were added before it */

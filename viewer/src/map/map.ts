@@ -248,25 +248,27 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
   // Frames
 
   #frame(now: number): void {
+    const turned = this.apparent !== null;
     this.stepCamera(now);
     if (this.#hover) this.#fireHover(this.#hover);
     try {
-      if (this.#dirty || this.camera !== this.#drawn) this.#draw();
+      if (this.#dirty || this.camera !== this.#drawn || turned || this.apparent) this.#draw(turned || this.apparent !== null);
       else this.#settle();
     } catch (reason) {
       this.report(asError(reason));
     }
   }
 
-  #draw(): void {
+  /** @param turning places on the screen are others even when the camera is not */
+  #draw(turning: boolean): void {
     const sight = this.sight();
     if (!sight || !this.#painter || this.size.width === 0) return;
-    const before = this.#drawn;
+    const [before, changed] = [this.#drawn, this.#dirty];
     [this.#drawn, this.#dirty] = [sight.camera, false];
-    const { plans, complete } = this.#painter.paint(sight, this.#layers, this.#light, this.#kindsRead());
+    const { plans, complete } = this.#painter.paint(sight, this.#layers, this.#light, this.#kindsRead(), this.apparent && ((scene) => { this.turner?.paint({ ...scene, camera: sight.camera, changed }); }));
     this.#debug.update(plans, sight.dpr, this.#painter.drawer);
-    if (before !== sight.camera) this.#moved(before, sight.camera);
-    if (this.motion.moving || !this.#resting || complete) this.#loop.request();
+    if (before !== sight.camera || turning) this.#moved(before, sight.camera);
+    if (this.moving || !this.#resting || complete) this.#loop.request();
     if (complete) this.#complete();
   }
 
@@ -290,7 +292,7 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
 
   /** Nothing is left to draw. */
   #settle(): void {
-    if (this.motion.moving) {
+    if (this.moving) {
       this.#loop.request();
       return;
     }

@@ -1,5 +1,5 @@
 import { CanvasDrawer } from "../draw/canvas/canvasDrawer";
-import type { Drawer, DrawerEvents } from "../draw/drawer";
+import type { Drawer, DrawerEvents, FrameSpec } from "../draw/drawer";
 import { WebGLDrawer } from "../draw/webgl/webglDrawer";
 import type { Light } from "../geo/light";
 import type { LayerKind } from "../geo/manifest";
@@ -9,9 +9,10 @@ import { Queue } from "../tiles/queue";
 import type { Shared, Stored } from "../tiles/store";
 import { combinedOf } from "./combined";
 import type { imageLayer } from "./imageLayer";
-import type { LayerPlan } from "./layerPlan";
+import { rangeAlong, type LayerPlan } from "./layerPlan";
 import type { FilledOptions } from "./options";
 import type { Sight } from "./stage";
+import type { Depicting } from "./turner";
 import type { Viewport } from "./viewport";
 
 export interface PainterEvents {
@@ -22,6 +23,8 @@ export interface PainterEvents {
   changed(): void;
   failed(error: Error): void;
 }
+
+export type Turning = Omit<Depicting, "camera" | "changed">;
 
 /** A context that has not come back after this time is lost for good. */
 const RESTORE_MS = 5000;
@@ -71,8 +74,8 @@ export class Painter {
     return this.#cache.bytes;
   }
 
-  /** @param kinds layers that are read, besides those that are shown */
-  paint(sight: Sight, layers: readonly imageLayer[], light: Readonly<Light>, kinds: readonly LayerKind[]): Painted {
+  /** @param kinds layers that are read, besides those that are shown  @param turn paints a movement, where that can be done, in place of the frame */
+  paint(sight: Sight, layers: readonly imageLayer[], light: Readonly<Light>, kinds: readonly LayerKind[], turn: ((scene: Turning) => void) | null): Painted {
     this.#cache.tick();
     this.#viewport.fitCanvas(sight.dpr);
     const combined = combinedOf(layers);
@@ -83,9 +86,21 @@ export class Painter {
     const before = (layer: imageLayer): number | null => (combined.includes(layer) ? combined.indexOf(layer) : null);
     this.#queue.want(planned.flatMap(({ plan }) => plan.jobs));
     const { width, height } = this.#viewport.canvas;
-    this.#drawer.draw({ width, height, dpr: sight.dpr, light, passes: planned.map(({ layer, plan }) => layer.pass(plan, sight, before(layer))) });
     const complete = !layers.some((layer) => layer.loading) && planned.every(({ plan }) => plan.complete);
+    const { gl } = this.#drawer;
+    if (turn && gl) turn({ gl, width, height, complete, rangeOf: (frame) => rangeAlong(sight, frame, layers), depict: (camera, range, framebuffer) => { this.#depict({ ...sight, camera, dpr: 1 }, layers, light, { range, framebuffer }); } });
+    else this.#drawer.draw({ width, height, dpr: sight.dpr, light, passes: planned.map(({ layer, plan }) => layer.pass(plan, sight, before(layer))) });
     return { plans: planned.map(({ plan }) => plan), complete: complete && !this.#drawer.busy };
+  }
+
+  /** What is in memory, with the depth of all layers that have any. */
+  #depict(sight: Sight, layers: readonly imageLayer[], light: Readonly<Light>, into: NonNullable<FrameSpec["into"]>): void {
+    const { width, height } = sight.camera;
+    const passes = layers.filter((layer) => layer.combines).flatMap((layer, k) => {
+      const plan = layer.plan(sight, light, [], true);
+      return plan ? [layer.pass(plan, sight, k)] : [];
+    });
+    this.#drawer.draw({ width, height, dpr: 1, light, passes, into });
   }
 
   /** Forgets the tiles of a layer that has left. */

@@ -11,10 +11,13 @@ import { limited, zoomLimits } from "./limits";
 import { Motion } from "./motion";
 import type { FilledOptions, MapEvents } from "./options";
 import type { Sight } from "./stage";
+import type { Turner } from "./turner";
 import type { Size } from "./viewport";
 
 const FLIGHT_MS = 700;
 const STEP_MS = 220;
+/** Two fingers turned so far turn the view to the next direction. */
+const TWIST_RAD = (28 * Math.PI) / 180;
 
 export interface FitOptions {
   /** Free room at each side. Default 24. */
@@ -32,7 +35,13 @@ export abstract class Viewing extends Evented<MapEvents> {
   protected camera: Camera | undefined;
   /** The first layer's manifest; its origin is that of the camera. */
   protected reference: Rendering | undefined;
+  /** Makes movements of changes of direction; null: they are cuts. */
+  protected turner: Turner | null = null;
+  /** What is seen while a change of direction is a movement. */
+  protected apparent: Camera | null = null;
   #pending: (() => void)[] = [];
+  /** Clockwise, since the last turn. */
+  #twist_rad = 0;
 
   protected abstract get size(): Size;
   protected abstract requestFrame(): void;
@@ -146,7 +155,7 @@ export abstract class Viewing extends Evented<MapEvents> {
 
   /** CSS pixels of a world position; null before "ready". */
   project(world: Vec3): Vec2 | null {
-    return this.camera && this.reference ? screenFromLocal(this.camera, sub(world, this.reference.json.origin)) : null;
+    return this.camera && this.reference ? screenFromLocal(this.apparent ?? this.camera, sub(world, this.reference.json.origin)) : null;
   }
 
   /** World position on the ground (height of the content's lowest point) under CSS pixels; null in level views. */
@@ -169,6 +178,34 @@ export abstract class Viewing extends Evented<MapEvents> {
   }
 
   /** @internal */
+  setTurner(turner: Turner | null): this {
+    this.turner = turner;
+    this.apparent = null;
+    this.requestFrame();
+    return this;
+  }
+
+  /** @internal Turns the picture clockwise under a hand; to the next direction when it has been turned far enough, unless a turner follows the hand. */
+  twist(rad: number): void {
+    if (this.turner?.twist(rad)) return;
+    this.#twist_rad += rad;
+    if (Math.abs(this.#twist_rad) < TWIST_RAD) return;
+    this.rotate(Math.sign(this.#twist_rad));
+    this.#twist_rad = 0;
+  }
+
+  /** @internal The turner shows something else now. */
+  requestTurn(): void {
+    this.requestFrame();
+  }
+
+  /** @internal The hand has left. */
+  release(): void {
+    this.#twist_rad = 0;
+    this.turner?.release();
+  }
+
+  /** @internal */
   grab(): void {
     this.motion.stop();
   }
@@ -181,6 +218,10 @@ export abstract class Viewing extends Evented<MapEvents> {
   protected sight(): Sight | null {
     const dpr = Math.min(this.size.dpr, this.options.maxPixelRatio);
     return this.camera && this.reference ? { camera: this.camera, origin: this.reference.json.origin, dpr } : null;
+  }
+
+  protected get moving(): boolean {
+    return this.motion.moving || this.apparent !== null;
   }
 
   protected middle(): Vec2 {
@@ -198,6 +239,7 @@ export abstract class Viewing extends Evented<MapEvents> {
     const camera = this.camera;
     const next = camera && this.motion.step(now_ms, camera);
     if (next && next !== camera) this.camera = this.reference ? limited(next, this.reference.json.box) : next;
+    this.apparent = (this.camera && this.turner?.step(now_ms, this.camera)) ?? null;
   }
 
   /** @throws UsageError when a manifest does not go with the first */
@@ -246,6 +288,7 @@ export abstract class Viewing extends Evented<MapEvents> {
     const turned = { ...camera, frame: view.frame };
     this.motion.stop();
     this.setCamera(held ? cameraAt(turned, rendering, held) : fitted(turned, rendering.json.box, 0, camera.zoom));
+    this.turner?.turn(camera, held ? sub(held, rendering.json.origin) : mid(rendering.json.box));
     this.fire("directionchange", { direction: view.id });
   }
 }

@@ -25,6 +25,7 @@ interface Wanted {
 /** Draws on a 2D canvas. A worker makes the tiles' pictures; what is not made yet is stood in for by what is. */
 export class CanvasDrawer implements Drawer {
   readonly name = "canvas";
+  readonly gl = null;
   readonly #context: CanvasRenderingContext2D;
   readonly #pictures: Pictures;
   readonly #sheet = new Sheet();

@@ -33,7 +33,7 @@ export class WebGLDrawer implements Drawer {
   readonly name = "webgl";
   readonly busy = false;
   readonly note = "";
-  readonly #gl: WebGL2RenderingContext;
+  readonly gl: WebGL2RenderingContext;
   readonly #canvas: HTMLCanvasElement;
   readonly #listeners = new AbortController();
   #programs: Programs;
@@ -45,7 +45,7 @@ export class WebGLDrawer implements Drawer {
     const settings: WebGLContextAttributes = { alpha: true, premultipliedAlpha: true, antialias: false, depth: true, stencil: false, preserveDrawingBuffer: options.preserve };
     const gl = canvas.getContext("webgl2", settings);
     if (!gl) throw new DrawError("this browser offers no WebGL2, which the map needs to draw; update it or switch hardware acceleration on");
-    this.#gl = gl;
+    this.gl = gl;
     this.#canvas = canvas;
     this.#programs = new Programs(gl);
     this.#textures = new Textures(gl);
@@ -53,8 +53,9 @@ export class WebGLDrawer implements Drawer {
   }
 
   draw(frame: FrameSpec): void {
-    const gl = this.#gl;
+    const gl = this.gl;
     if (gl.isContextLost()) return;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, frame.into?.framebuffer ?? null);
     gl.viewport(0, 0, frame.width, frame.height);
     gl.clearColor(0, 0, 0, 0);
     gl.depthMask(true);
@@ -83,11 +84,11 @@ export class WebGLDrawer implements Drawer {
 
   /** Passes that hide each other by depth: all that is solid, then edges and what lets through. */
   #drawTogether(frame: FrameSpec, passes: readonly Pass[]): void {
-    const gl = this.#gl;
-    const range = rangeOf(passes.flatMap(({ depths }) => depths ?? []));
+    const gl = this.gl;
+    const range = frame.into?.range ?? rangeOf(passes.flatMap(({ depths }) => depths ?? []));
     gl.enable(gl.DEPTH_TEST);
     for (const pass of passes) if (pass.opacity === 1) this.#drawPass(frame, pass, range, false);
-    gl.depthMask(false);
+    gl.depthMask(frame.into !== undefined);
     for (const pass of passes) this.#drawPass(frame, pass, range, true);
     gl.disable(gl.DEPTH_TEST);
   }
@@ -136,13 +137,13 @@ export class WebGLDrawer implements Drawer {
   }
 
   #bind(kind: LayerKind, texture: TileTexture | undefined): void {
-    const gl = this.#gl;
+    const gl = this.gl;
     gl.activeTexture(gl.TEXTURE0 + unitOf(SAMPLERS[kind]));
     gl.bindTexture(gl.TEXTURE_2D, texture?.texture ?? null);
   }
 
   #drawQuad(frame: FrameSpec, pass: Pass, quad: Quad, program: Program, textures: readonly TileTexture[]): void {
-    const gl = this.#gl;
+    const gl = this.gl;
     const { width, height, light } = frame;
     const [left, top, right, bottom] = quad.rect;
     const [x, y] = [(at: number): number => (at / width) * 2 - 1, (at: number): number => 1 - (at / height) * 2];
@@ -163,12 +164,12 @@ export class WebGLDrawer implements Drawer {
   }
 
   #setDepths(program: Program, depths: Depths, [near, far]: Vec2, soft: boolean): void {
-    this.#gl.uniform2f(program.at("u_depths"), (firstOf(depths) - near) / (far - near), depths.unit_m / (far - near));
-    this.#gl.uniform1i(program.at("u_soft"), Number(soft));
+    this.gl.uniform2f(program.at("u_depths"), (firstOf(depths) - near) / (far - near), depths.unit_m / (far - near));
+    this.gl.uniform1i(program.at("u_soft"), Number(soft));
   }
 
   #clip({ width, height }: FrameSpec, { clip }: Pass): void {
-    const gl = this.#gl;
+    const gl = this.gl;
     if (!clip) {
       gl.disable(gl.SCISSOR_TEST);
       return;
@@ -179,7 +180,7 @@ export class WebGLDrawer implements Drawer {
   }
 
   #bindIds(program: Program, { highlight, finishes }: Pass, quad: Quad, ids: TileTexture, dpr: number): void {
-    const gl = this.#gl;
+    const gl = this.gl;
     this.#bind("id", ids);
     gl.uniform1f(program.at("u_rim"), Math.max(1, 1.25 * dpr * quad.scale));
     if (highlight.size > 0) this.#bindTable(program, ["u_table", "u_mask", "u_probes", "u_one"], highlight, () => idTable(highlight, packColor));
@@ -189,7 +190,7 @@ export class WebGLDrawer implements Drawer {
   }
 
   #bindTable(program: Program, [sampler, mask, probes, one]: readonly ["u_table" | "u_finishes", string, string, string], values: ReadonlyMap<number, unknown>, make: () => IdTable): void {
-    const gl = this.#gl;
+    const gl = this.gl;
     const { table, texture } = this.#tables.get(values) ?? this.#uploadTable(values, make());
     gl.activeTexture(gl.TEXTURE0 + unitOf(sampler));
     gl.bindTexture(gl.TEXTURE_2D, texture);
@@ -199,7 +200,7 @@ export class WebGLDrawer implements Drawer {
   }
 
   #uploadTable(values: ReadonlyMap<number, unknown>, table: IdTable): { table: IdTable; texture: WebGLTexture } {
-    const gl = this.#gl;
+    const gl = this.gl;
     const texture = gl.createTexture();
     const [width, height] = tableShape(table);
     gl.activeTexture(gl.TEXTURE0 + SPARE_UNIT);
@@ -214,7 +215,7 @@ export class WebGLDrawer implements Drawer {
   #dropTables(passes: readonly Pass[]): void {
     for (const [values, { texture }] of this.#tables) {
       if (passes.some(({ highlight, finishes }) => highlight === values || finishes?.byId === values)) continue;
-      this.#gl.deleteTexture(texture);
+      this.gl.deleteTexture(texture);
       this.#tables.delete(values);
     }
   }
@@ -226,8 +227,8 @@ export class WebGLDrawer implements Drawer {
       events.lost();
     };
     const restored = (): void => {
-      this.#programs = new Programs(this.#gl);
-      this.#textures = new Textures(this.#gl);
+      this.#programs = new Programs(this.gl);
+      this.#textures = new Textures(this.gl);
       this.#tables = new Map();
       events.restored();
     };
