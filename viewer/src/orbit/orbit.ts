@@ -22,9 +22,9 @@ interface Turn {
   /** What was seen before, in full. */
   readonly from: Camera;
   readonly pivot: Vec3;
-  /** Where it started, and when; `at` moves on from there. */
+  /** Where it started, and when the first picture of it was there; `at` moves on from there. */
   readonly start: Gaze;
-  readonly start_ms: number;
+  start_ms: number | null;
   at: Gaze;
   /** Of what the map looks along: all is here. */
   complete: boolean;
@@ -102,7 +102,7 @@ export class orbit implements Attachable<map>, Turner {
     }
     const start = this.#turn?.at ?? gazeOf(from.frame);
     this.#free();
-    this.#turn = { from, pivot, start, start_ms: performance.now(), at: start, complete: false, ended_ms: null, shots: null };
+    this.#turn = { from, pivot, start, start_ms: null, at: start, complete: false, ended_ms: null, shots: null };
   }
 
   /** @internal */
@@ -140,7 +140,7 @@ export class orbit implements Attachable<map>, Turner {
     if (!this.#hand) {
       const way = apart(turn.start, goal);
       const duration_ms = clamp(this.#duration_ms * (0.35 + (0.65 * way) / 90), 1, 2 * this.#duration_ms);
-      const share = clamp((now_ms - turn.start_ms) / duration_ms, 0, 1);
+      const share = clamp((now_ms - (turn.start_ms ?? now_ms)) / duration_ms, 0, 1);
       const part = share * share * (3 - 2 * share);
       turn.at = { lookAt: turn.start.lookAt + wayTo(turn.start.lookAt, goal.lookAt) * part, pitch: turn.start.pitch + (goal.pitch - turn.start.pitch) * part };
       if (share === 1) turn.ended_ms ??= now_ms;
@@ -167,6 +167,7 @@ export class orbit implements Attachable<map>, Turner {
     const [a, b] = [apart(turn.at, gazeOf(turn.from.frame)), apart(turn.at, gazeOf(camera.frame))];
     const share = a + b > 0 ? a / (a + b) : 1;
     const size = fitted(scene.width, scene.height);
+    turn.start_ms ??= performance.now();
     warp.show(turn.shots, { camera: goal, pivot: turn.pivot, range: scene.rangeOf(goal.frame) }, share * share * (3 - 2 * share), scene, size);
   }
 

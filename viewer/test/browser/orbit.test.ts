@@ -15,13 +15,13 @@ const [WIDE, HIGH] = [500, 420];
 const VIEWPORT = { viewport: { width: WIDE, height: HIGH } };
 type Orbiting = Global & { map3d: typeof Orbit; orbit: Orbit.orbit };
 
-async function start(options: object = {}): ReturnType<TestBed["start"]> {
+async function start(options: object = {}, duration_ms = 300): ReturnType<TestBed["start"]> {
   const opened = await bed.start("town", { zoom: 3, direction: "0-45", light: { lit: false }, ...options }, {}, VIEWPORT);
   await opened.page.addScriptTag({ url: "/map3d-orbit.js" });
-  await settled(opened.page, () => {
+  await settled(opened.page, (ms) => {
     const g = globalThis as Orbiting;
-    g.orbit = new g.map3d.orbit({ duration_ms: 300 }).addTo(g.map);
-  }, null);
+    g.orbit = new g.map3d.orbit({ duration_ms: ms }).addTo(g.map);
+  }, duration_ms);
   return opened;
 }
 
@@ -79,7 +79,7 @@ test("held between two directions, the picture is that of a ray along it; let go
 });
 
 test("a turn ends in the picture that a cut shows; markers go along; where no movement is wanted it is a cut, without WebGL a cross-fade", async () => {
-  const { page, problems } = await start();
+  const { page, problems } = await start({}, 2500);
   await page.evaluate((origin) => {
     const { map, map3d } = globalThis as Global;
     const path: number[] = [];
