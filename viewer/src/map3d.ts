@@ -9,6 +9,7 @@ export type { ClickEvent, HoverEvent, MapEvents, MapOptions } from "./map/option
 export type { ObjectStyle } from "./map/objectStyle";
 export type { Seen } from "./map/inView";
 export type { Pick } from "./map/picker";
+export type { Relief } from "./map/relief";
 export type { Attachable, Holder, Surface } from "./core/surface";
 export type { Box3, Vec2, Vec3 } from "./core/vec";
 export type { Mode } from "./draw/drawer";
