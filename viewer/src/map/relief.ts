@@ -112,6 +112,8 @@ class Sheet {
   readonly #view: View;
   readonly #read: (kind: "depth" | "id", tile: Tile) => Uint32Array | "empty" | undefined;
   readonly #level: number;
+  /** Tiles along a side of the level. */
+  readonly #side: number;
   readonly #unit_m: number;
   /** From the camera's U, V and D to the layer's. */
   readonly #shift: Vec3;
@@ -127,6 +129,7 @@ class Sheet {
   private constructor(layer: imageLayer, view: View, { json, layers }: Rendering, store: Store, { origin, dpr }: Sight, px: number) {
     [this.#layer, this.#view] = [layer, view];
     this.#level = levelFor(view.frame, px, dpr);
+    this.#side = 2 ** this.#level;
     this.#unit_m = layers.get("depth")?.unit_m ?? 2 ** -10;
     this.#shift = uvdFromLocal(view.frame.axes, sub(origin, json.origin));
     this.#read = (kind, tile) => {
@@ -138,11 +141,16 @@ class Sheet {
 
   depthAt(u: number, v: number): number {
     const { frame } = this.#view;
-    const [right, down, side] = [u + this.#shift[0] - frame.u0, frame.v0 - v - this.#shift[1], 2 ** this.#level];
-    const [x, y] = [Math.floor((right * side) / frame.size), Math.floor((down * side) / frame.size)];
+    const side = this.#side;
+    const right = u + this.#shift[0] - frame.u0;
+    const down = frame.v0 - v - this.#shift[1];
+    const x = Math.floor((right * side) / frame.size);
+    const y = Math.floor((down * side) / frame.size);
     if (!(x >= 0 && y >= 0 && x < side && y < side)) return Infinity;
-    const at = y * side + x;
-    if (at !== this.#last) [this.#last, this.#patch] = [at, this.#patchOf({ z: this.#level, x, y })];
+    if (y * side + x !== this.#last) {
+      this.#last = y * side + x;
+      this.#patch = this.#patchOf({ z: this.#level, x, y });
+    }
     return this.#valueOf(this.#patch, right, down);
   }
 
@@ -170,7 +178,7 @@ class Sheet {
   }
 
   #patchOf(tile: Tile): Patch {
-    const at = tile.y * 2 ** this.#level + tile.x;
+    const at = tile.y * this.#side + tile.x;
     const patch = this.#patches.get(at) ?? this.#found(tile);
     this.#patches.set(at, patch);
     return patch;
