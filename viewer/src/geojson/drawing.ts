@@ -6,7 +6,7 @@ import { BEHIND, same, within, type Line, type Occlusion, type Placed } from "./
 import type { Rect, Run } from "./runs";
 
 /** Of work on one frame, ms; the rest is done in the next. */
-const WORK_MS = 10;
+const WORK_MS = 12;
 /** What is computed around the screen, in screens. */
 const MARGIN = 0.25;
 /** Gaps of what is hidden. */

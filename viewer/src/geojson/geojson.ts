@@ -43,6 +43,8 @@ export interface FeatureEvent {
 export interface GeojsonEvents {
   /** The features are on the map. */
   ready: { features: readonly Feature[]; skipped: Skipped };
+  /** All that is in view is drawn, as far as the surface is known. */
+  load: object;
   /** The map's "error" says so, too. */
   error: { error: Error };
   /** Clicked, tapped, or Enter pressed on its name. */
@@ -66,6 +68,8 @@ export class geojson extends Evented<GeojsonEvents> implements Attachable<map> {
   #origin: Vec3 = [0, 0, 0];
   #bounds: Box3 | null = null;
   #over: Placed | null = null;
+  #next = 0;
+  #done = false;
 
   /** @param data GeoJSON, or where it is to be fetched */
   constructor(data: object | string, options: GeojsonOptions = {}) {
@@ -107,7 +111,7 @@ export class geojson extends Evented<GeojsonEvents> implements Attachable<map> {
     this.#style = style;
     this.#placed.forEach((placed, k) => (placed.style = styles[k] ?? placed.style));
     this.#drawing.restyle();
-    this.#map?.stage?.request();
+    this.#draw();
     return this;
   }
 
@@ -128,6 +132,7 @@ export class geojson extends Evented<GeojsonEvents> implements Attachable<map> {
 
   onRemove(map: map): void {
     this.#load?.abort();
+    cancelAnimationFrame(this.#next);
     this.#leave();
     map.moves.off("draw", this.#draw);
     map.off("preclick", this.#clicked).off("mousemove", this.#moved).off("moveend", this.#named).off("idle", this.#named);
@@ -189,7 +194,11 @@ export class geojson extends Evented<GeojsonEvents> implements Attachable<map> {
     const relief = this.#map?.relief;
     if (!relief || this.#placed.length === 0) return;
     this.#landMarkers(relief);
-    if (!this.#drawing.frame(relief)) this.#map?.stage?.request();
+    const done = this.#drawing.frame(relief);
+    cancelAnimationFrame(this.#next);
+    if (!done) this.#next = requestAnimationFrame(this.#draw);
+    else if (!this.#done) this.fire("load", {});
+    this.#done = done;
   };
 
   /** Markers of points without a height come onto the surface as soon as it is seen. */
@@ -232,7 +241,7 @@ export class geojson extends Evented<GeojsonEvents> implements Attachable<map> {
 
   #choose(placed: Placed | null): void {
     this.#drawing.choose(placed);
-    this.#map?.stage?.request();
+    this.#draw();
   }
 
   #hit(point: Vec2): Placed | null {
