@@ -21,6 +21,9 @@ export interface Cover {
 /** null for a polygon that is seen edge-on. */
 export const coverIn = (polygon: Polygon, relief: Relief): Cover | null => (polygon.draped ? drapedCover(polygon, relief) : planeCover(polygon, relief));
 
+/** Surfaces are taken a little behind where they are seen, so that the walls of a building whose outline is filled are filled, too. */
+const BEHIND_M = 0.05;
+
 /** The surface whose place on the ground lies in the polygon, walls included. */
 function drapedCover({ rings }: Polygon, { camera, heights }: Relief): Cover {
   const { right, up, forward } = camera.frame.axes;
@@ -28,7 +31,10 @@ function drapedCover({ rings }: Polygon, { camera, heights }: Relief): Cover {
   const corners = [area.low, area.high].flatMap(([x]) => [area.low, area.high].flatMap(([, y]) => heights.map((z) => uvdFromLocal(camera.frame.axes, [x, y, z]))));
   return {
     box: boxOf(corners),
-    at: (u, v, d) => (area.has(u * right[0] + v * up[0] + d * forward[0], u * right[1] + v * up[1] + d * forward[1]) ? 1 : 0),
+    at: (u, v, depth) => {
+      const d = depth + BEHIND_M;
+      return area.has(u * right[0] + v * up[0] + d * forward[0], u * right[1] + v * up[1] + d * forward[1]) ? 1 : 0;
+    },
   };
 }
 

@@ -28,6 +28,7 @@ export class Relief {
   /** Least and greatest height of what the layers hold, local. */
   readonly heights: Vec2;
   readonly #sheets: readonly Sheet[];
+  readonly #bias_m: number;
 
   constructor(layers: readonly imageLayer[], sight: Sight) {
     const { camera, origin, dpr } = sight;
@@ -35,6 +36,8 @@ export class Relief {
     const px = cssPixelM(camera) / dpr;
     this.level = levelFor(camera.frame, px, dpr);
     this.pixel_m = pixelM(camera.frame, this.level);
+    const { up, forward } = camera.frame.axes;
+    this.#bias_m = LEAST_BIAS_M + (this.pixel_m / 2) * (1 + up[2] / Math.max(-forward[2], 0.05));
     const shown = layers.filter((layer) => layer.options.opacity > 0);
     this.#sheets = shown.flatMap((layer) => Sheet.of(layer, sight, px) ?? []);
     const heights = shown.flatMap(({ rendering }) => rendering?.json.box.map(([, , z]) => z + rendering.json.origin[2] - origin[2]) ?? []);
@@ -54,11 +57,11 @@ export class Relief {
 
   /**
    * Does a surface lie before a point? A point on a surface is not hidden by it: the farthest of the 3 × 3 pixels around counts, as far as they go on from
-   * the point's own (steps of up to 8 pixels), and a quarter of a pixel and 5 cm more. Where nothing is known, nothing hides.
+   * the point's own (steps of up to 8 pixels), and 5 cm, half a pixel and what level ground rises in half a pixel more. Where nothing is known, nothing hides.
    */
   hides(u: number, v: number, d: number): boolean {
     const own = this.depthAt(u, v);
-    const near = d - LEAST_BIAS_M - this.pixel_m / 4;
+    const near = d - this.#bias_m;
     if (!(own < near)) return false;
     const farthest = own + STEEPEST * this.pixel_m;
     for (let k = 0; k < 9; k++) {
