@@ -25,14 +25,16 @@ export function groupsOf(uv: Float64Array, radius: number): Group[] {
   return groups;
 }
 
-type Cells = ReadonlyMap<string, readonly number[]>;
+type Cells = ReadonlyMap<number, readonly number[]>;
 
 const cellOf = (value: number, radius: number): number => Math.floor(value / radius);
+/** Cells far beyond any scene share keys, which only costs time. */
+const keyOf = (x: number, y: number): number => x * 2 ** 26 + y;
 
 function sorted(uv: Float64Array, radius: number): Cells {
-  const cells = new Map<string, number[]>();
+  const cells = new Map<number, number[]>();
   for (let k = 0; 2 * k < uv.length; k++) {
-    const key = `${String(cellOf(uv[2 * k] as number, radius))} ${String(cellOf(uv[2 * k + 1] as number, radius))}`;
+    const key = keyOf(cellOf(uv[2 * k] as number, radius), cellOf(uv[2 * k + 1] as number, radius));
     const cell = cells.get(key);
     if (cell) cell.push(k);
     else cells.set(key, [k]);
@@ -46,7 +48,7 @@ function near(uv: Float64Array, cells: Cells, at: number, radius: number): numbe
   const found: number[] = [];
   for (let x = cellOf(u, radius) - 1; x <= cellOf(u, radius) + 1; x++) {
     for (let y = cellOf(v, radius) - 1; y <= cellOf(v, radius) + 1; y++) {
-      for (const other of cells.get(`${String(x)} ${String(y)}`) ?? []) if (other !== at && Math.hypot((uv[2 * other] as number) - u, (uv[2 * other + 1] as number) - v) <= radius) found.push(other);
+      for (const other of cells.get(keyOf(x, y)) ?? []) if (other !== at && Math.hypot((uv[2 * other] as number) - u, (uv[2 * other + 1] as number) - v) <= radius) found.push(other);
     }
   }
   return [at, ...found.sort((a, b) => a - b)];

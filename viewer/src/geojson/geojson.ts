@@ -111,6 +111,7 @@ export class geojson extends Evented<GeojsonEvents> implements Attachable<map> {
     this.#style = style;
     this.#placed.forEach((placed, k) => (placed.style = styles[k] ?? placed.style));
     this.#drawing.restyle();
+    this.#done = false;
     this.#draw();
     return this;
   }

@@ -104,7 +104,7 @@ describe("draping", () => {
 
   test("what a building hides has no height, what is not loaded none yet", () => {
     expect(landing(relief, 32, 45)).toBeNaN();
-    expect(landing(reliefOf([{ ...layerOf(), store: { get: () => undefined } } as unknown as imageLayer]), 0, 0)).toBeNull();
+    expect(landing(reliefOf([Object.assign(layerOf(), { store: { get: () => undefined } })]), 0, 0)).toBeNull();
   });
 
   test("heights between those that are known", () => {
