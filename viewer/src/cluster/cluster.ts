@@ -52,7 +52,7 @@ export class cluster extends Evented<ClusterEvents> implements Attachable<map> {
   #view = "";
   /** By what they show: the first member and the level. */
   #shown = new Map<string, Shown>();
-  #spread: { readonly key: string; readonly markers: readonly marker[]; readonly legs: SVGSVGElement; readonly zoom: number } | undefined;
+  #spread: { readonly key: string; readonly markers: readonly marker[]; readonly shifts: readonly Vec2[]; readonly legs: SVGSVGElement; readonly zoom: number } | undefined;
 
   /** @param markers they are added to maps by the cluster, not by the page */
   constructor(markers: readonly marker[] = [], options: ClusterOptions = {}) {
@@ -175,28 +175,32 @@ export class cluster extends Evented<ClusterEvents> implements Attachable<map> {
     }
     const open = this.#spread?.key === key;
     this.#join();
-    if (!open) this.#spreadOut(map, key, this.#of(group));
+    if (!open) this.#spreadOut(map, key, this.#of(group), map.project(position) ?? [0, 0]);
   }
 
-  #spreadOut(map: map, key: string, markers: readonly marker[]): void {
+  /** Around a place of the screen. */
+  #spreadOut(map: map, key: string, markers: readonly marker[], [x, y]: Vec2): void {
     const legs = document.createElementNS(SVG, "svg");
     legs.setAttribute("class", "map3d-legs");
     legs.setAttribute("aria-hidden", "true");
     legs.append(...markers.map(() => document.createElementNS(SVG, "line")));
     map.overlayPane.prepend(legs);
-    this.#spread = { key, markers, legs, zoom: map.zoom };
     const places = spread(markers.length, APART_PX);
-    markers.forEach((one, k) => map.add(one.setShift(places[k] ?? [0, 0])));
+    const shifts = markers.map(({ position }, k): Vec2 => {
+      const [[dx, dy], at] = [places[k] ?? [0, 0], map.project(position) ?? [x, y]];
+      return [x + dx - at[0], y + dy - at[1]];
+    });
+    this.#spread = { key, markers, shifts, legs, zoom: map.zoom };
+    markers.forEach((one, k) => map.add(one.setShift(shifts[k] ?? [0, 0])));
     this.#drawLegs();
     this.fire("spread", { markers });
   }
 
   #drawLegs(): void {
     if (!this.#spread || !this.#map) return;
-    const { markers, legs } = this.#spread;
-    const places = spread(markers.length, APART_PX);
+    const { markers, shifts, legs } = this.#spread;
     markers.forEach(({ position }, k) => {
-      const [at, [dx, dy]] = [this.#map?.project(position) ?? [0, 0] as Vec2, places[k] ?? [0, 0]];
+      const [at, [dx, dy]] = [this.#map?.project(position) ?? [0, 0], shifts[k] ?? [0, 0]];
       Object.entries({ x1: at[0], y1: at[1], x2: at[0] + dx, y2: at[1] + dy }).forEach(([name, value]) => legs.children[k]?.setAttribute(name, value.toFixed(1)));
     });
   }

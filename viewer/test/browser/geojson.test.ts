@@ -162,6 +162,7 @@ test("10,000 markers in clusters: few elements, none lost, the same after a way 
   const many = await page.evaluate(() => {
     const far = (item: Element): number => Math.hypot(item.getBoundingClientRect().x - 280, item.getBoundingClientRect().y - 210);
     const [nearest] = [...document.querySelectorAll(".map3d-marker:has(.map3d-cluster)")].sort((a, b) => far(a) - far(b));
+    (nearest as HTMLElement).focus();
     (nearest as HTMLElement).click();
     return Number(nearest?.querySelector(".map3d-cluster")?.textContent);
   });
