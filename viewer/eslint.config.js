@@ -2,9 +2,9 @@ import { dirname, relative, resolve } from "node:path";
 import tseslint from "typescript-eslint";
 
 /** Folders of src from the ground up: a folder may import those of lower ranks, and itself. */
-const RANKS = { core: 0, geo: 1, tiles: 2, draw: 3, overlay: 4, ui: 4, map: 5, map3d: 6, compare: 7, measure: 7, orbit: 7, theme: 7 };
+const RANKS = { core: 0, geo: 1, tiles: 2, draw: 3, overlay: 4, ui: 4, map: 5, map3d: 6, cluster: 7, compare: 7, geojson: 7, measure: 7, orbit: 7, theme: 7 };
 /** Entries of their own see what every page sees, and the ground. */
-const ENTRIES = { compare: ["core", "map3d"], measure: ["core", "map3d"], orbit: ["core", "geo", "map3d"], theme: ["core", "map3d"] };
+const ENTRIES = { cluster: ["core", "geo", "map3d"], compare: ["core", "map3d"], geojson: ["core", "geo", "map3d"], measure: ["core", "map3d"], orbit: ["core", "geo", "map3d"], theme: ["core", "map3d"] };
 const SRC = resolve(import.meta.dirname, "src");
 
 const folderOf = (file) => relative(SRC, file).split(/[\\/]/)[0];

@@ -24,7 +24,7 @@ const workers = {
 };
 
 /** Entries beside the core use it by its public names: as a module from map3d.mjs, in a script from the global. */
-const ENTRIES = { compare: "src/compare/index.ts", measure: "src/measure/index.ts", orbit: "src/orbit/index.ts", theme: "src/theme/index.ts" };
+const ENTRIES = { cluster: "src/cluster/index.ts", compare: "src/compare/index.ts", geojson: "src/geojson/index.ts", measure: "src/measure/index.ts", orbit: "src/orbit/index.ts", theme: "src/theme/index.ts" };
 
 const coreAs = (how) => ({
   name: "core",

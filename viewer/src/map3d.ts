@@ -10,6 +10,7 @@ export type { ObjectStyle } from "./map/objectStyle";
 export type { Seen } from "./map/inView";
 export type { Pick } from "./map/picker";
 export type { Depicting, Turner } from "./map/turner";
+export type { Relief } from "./map/relief";
 export type { Attachable, Holder, Surface } from "./core/surface";
 export type { Box3, Vec2, Vec3 } from "./core/vec";
 export type { Mode } from "./draw/drawer";

@@ -4,6 +4,8 @@ import type { Vec2, Vec3 } from "./vec";
 export interface SurfaceEvents {
   /** The picture has moved: places on the screen are others now. */
   move: object;
+  /** A frame has been drawn: places, or what is known of the surface, may be others now. */
+  draw: object;
 }
 
 /** What markers, popups and controls see of a map. */
@@ -15,6 +17,10 @@ export interface Surface {
   readonly language: string;
   /** CSS pixels from the container's top left corner; null while the map has no view yet. */
   project(world: Vec3): Vec2 | null;
+  /** Does something that is seen lie before a position? As far as the depths in memory tell. */
+  covers(world: Vec3): boolean;
+  /** World position of the surface that is seen under a point; null where nothing is, or nothing is known yet. */
+  surfaceAt(point: Vec2): Vec3 | null;
   readonly moves: Pick<Evented<SurfaceEvents>, "on" | "off">;
 }
 

@@ -145,6 +145,11 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
     return isHidden(this.#finishes, id);
   }
 
+  /** @internal What `hides` goes by; null: all is shown. Another object whenever it has changed. */
+  get finishes(): Finishes | null {
+    return this.#finishes;
+  }
+
   /** Name, class and attributes of an object; null when nothing is known of it. */
   async object(id: number): Promise<ObjectInfo | null> {
     return (await this.#objects?.get(id)) ?? null;

@@ -22,6 +22,7 @@ import { listenToKeys } from "./keyboard";
 import { DEFAULTS, type ClickEvent, type FilledOptions, type MapOptions } from "./options";
 import { Painter } from "./painter";
 import { NOTHING, pickExactly, pickLoaded, type Pick } from "./picker";
+import { Relief } from "./relief";
 import type { Sight, Stage } from "./stage";
 import { Viewing } from "./viewing";
 import { Viewport, type Size } from "./viewport";
@@ -42,6 +43,7 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
   #light: Readonly<Light>;
   #time: Date | null = null;
   #drawn: Camera | undefined;
+  #relief: Relief | undefined;
   /** Something besides the camera has changed since the last frame. */
   #dirty = true;
   /** The picture has not moved since the last "moveend". */
@@ -191,6 +193,22 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
     return sight && pickLoaded(this.#layers, sight, point);
   }
 
+  covers(world: Vec3): boolean {
+    return this.relief?.covers(world) ?? false;
+  }
+
+  surfaceAt(point: Vec2): Vec3 | null {
+    return this.relief?.positionAt(point) ?? null;
+  }
+
+  /** @internal Depths of the picture that was drawn last, of items that need them; null before "ready". */
+  get relief(): Relief | null {
+    const sight = this.sight();
+    if (this.#relief?.camera !== sight?.camera) this.#relief = undefined;
+    this.#relief ??= sight ? new Relief(this.#layers, sight) : undefined;
+    return this.#relief ?? null;
+  }
+
   /** Bytes of decoded tiles in memory. */
   get cacheBytes(): number {
     return this.#painter?.cacheBytes ?? 0;
@@ -264,10 +282,11 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
     const sight = this.sight();
     if (!sight || !this.#painter || this.size.width === 0) return;
     const [before, changed] = [this.#drawn, this.#dirty];
-    [this.#drawn, this.#dirty] = [sight.camera, false];
+    [this.#drawn, this.#dirty, this.#relief] = [sight.camera, false, undefined];
     const { plans, complete } = this.#painter.paint(sight, this.#layers, this.#light, this.#kindsRead(), this.apparent && ((scene) => { this.turner?.paint({ ...scene, camera: sight.camera, changed }); }));
     this.#debug.update(plans, sight.dpr, this.#painter.drawer);
     if (before !== sight.camera || turning) this.#moved(before, sight.camera);
+    this.moves.fire("draw", {});
     if (this.moving || !this.#resting || complete) this.#loop.request();
     if (complete) this.#complete();
   }

@@ -1,7 +1,8 @@
 import { element } from "../core/dom";
 import { Evented } from "../core/events";
 import type { Attachable, Holder, Surface } from "../core/surface";
-import type { Vec3 } from "../core/vec";
+import type { Vec2, Vec3 } from "../core/vec";
+import { listenToDrags } from "./drag";
 import { popup, type PopupOptions } from "./popup";
 
 export interface MarkerOptions {
@@ -9,6 +10,12 @@ export interface MarkerOptions {
   color?: string;
   /** false: the label shows only under the pointer or focus. Default true. */
   showLabel?: boolean;
+  /** Stands with its middle at the position, in place of the dot. Text is shown as text. */
+  icon?: string | Node;
+  /** What becomes of it behind a building: nothing, pale, or not shown. Default "none". */
+  occlusion?: "none" | "fade" | "hide";
+  /** Can be moved over the surface, by hand or, when it has the focus, by arrow keys (with Shift in small steps). Default false. */
+  draggable?: boolean;
 }
 
 export interface MarkerEvents {
@@ -17,15 +24,20 @@ export interface MarkerEvents {
   /** Became the selected one. */
   select: { marker: marker };
   deselect: { marker: marker };
+  dragstart: { marker: marker };
+  /** Moved by hand or keys. */
+  drag: { marker: marker; position: Vec3 };
+  dragend: { marker: marker; position: Vec3 };
 }
 
 /** A labelled 3D position (coordinates of the scene's CRS). */
 export class marker extends Evented<MarkerEvents> implements Attachable<Surface> {
-  readonly options: Required<Omit<MarkerOptions, "color">> & Pick<MarkerOptions, "color">;
-  readonly #button: HTMLButtonElement;
-  readonly #text: HTMLElement;
+  readonly options: Required<Omit<MarkerOptions, "color" | "icon">> & Pick<MarkerOptions, "color" | "icon">;
+  readonly needs: readonly "depth"[];
+  #button: HTMLButtonElement | undefined;
   #label: string;
   #position: Vec3;
+  #shift: Vec2 = [0, 0];
   #popup: popup | undefined;
   #map: (Surface & Partial<Holder<Surface>>) | undefined;
   #selected = false;
@@ -35,16 +47,10 @@ export class marker extends Evented<MarkerEvents> implements Attachable<Surface>
 
   constructor(label: string, position: Vec3, options: MarkerOptions = {}) {
     super();
-    this.options = { showLabel: true, ...options };
+    this.options = { showLabel: true, occlusion: "none", draggable: false, ...options };
+    this.needs = this.options.draggable || this.options.occlusion !== "none" ? ["depth"] : [];
     this.#label = label;
     this.#position = position;
-    this.#text = element("span", "map3d-marker-label", {}, label);
-    this.#button = element("button", "map3d-marker", { type: "button", "aria-label": label }, element("span", "map3d-marker-stem"), this.#text);
-    this.#button.classList.toggle("map3d-marker-quiet", !this.options.showLabel);
-    if (options.color !== undefined) this.#button.style.setProperty("--map3d-marker", options.color);
-    this.#button.addEventListener("click", () => {
-      this.#clicked();
-    });
   }
 
   addTo(map: Holder<Surface>): this {
@@ -71,14 +77,20 @@ export class marker extends Evented<MarkerEvents> implements Attachable<Surface>
 
   setLabel(label: string): this {
     this.#label = label;
-    this.#text.textContent = label;
-    this.#button.setAttribute("aria-label", label);
+    this.#dress();
     return this;
   }
 
   setPosition(position: Vec3): this {
     this.#position = position;
     this.#popup?.setPosition(position);
+    this.#update();
+    return this;
+  }
+
+  /** @internal Shown so many CSS pixels beside its position. */
+  setShift(shift: Vec2): this {
+    this.#shift = shift;
     this.#update();
     return this;
   }
@@ -103,23 +115,43 @@ export class marker extends Evented<MarkerEvents> implements Attachable<Surface>
   select(selected = true): this {
     if (selected === this.#selected) return this;
     this.#selected = selected;
-    this.#button.classList.toggle("map3d-marker-selected", selected);
-    this.#button.setAttribute("aria-pressed", String(selected));
+    this.#dress();
     return this.fire(selected ? "select" : "deselect", { marker: this });
   }
 
   onAdd(map: Surface): void {
     this.#map = map;
+    this.#button = this.#made(map);
+    this.#dress();
     map.overlayPane.append(this.#button);
-    map.moves.on("move", this.#place);
+    map.moves.on(this.options.occlusion === "none" ? "move" : "draw", this.#place);
     this.#update();
   }
 
   onRemove(map: Surface): void {
-    map.moves.off("move", this.#place);
+    map.moves.off("move", this.#place).off("draw", this.#place);
     this.#popup?.remove();
-    this.#button.remove();
-    this.#map = undefined;
+    this.#button?.remove();
+    this.#button = this.#map = undefined;
+  }
+
+  #made(map: Surface): HTMLButtonElement {
+    const { color, icon, showLabel, draggable } = this.options;
+    const button = element("button", "map3d-marker", { type: "button" }, icon === undefined ? element("span", "map3d-marker-stem") : element("span", "map3d-marker-icon", {}, icon), element("span", "map3d-marker-label"));
+    button.classList.toggle("map3d-marker-quiet", !showLabel);
+    if (color !== undefined) button.style.setProperty("--map3d-marker", color);
+    button.addEventListener("click", () => { this.#clicked(); });
+    if (draggable) listenToDrags(button, map, () => this.#position, (type, position) => { this.#dragged(type, position); });
+    return button;
+  }
+
+  #dress(): void {
+    const button = this.#button;
+    if (!button) return;
+    (button.lastChild as HTMLElement).textContent = this.#label;
+    button.setAttribute("aria-label", this.#label);
+    button.classList.toggle("map3d-marker-selected", this.#selected);
+    button.setAttribute("aria-pressed", String(this.#selected));
   }
 
   #clicked(): void {
@@ -129,11 +161,20 @@ export class marker extends Evented<MarkerEvents> implements Attachable<Surface>
     else this.openPopup();
   }
 
+  #dragged(type: "dragstart" | "drag" | "dragend", position: Vec3): void {
+    if (type === "drag") this.setPosition(position);
+    this.fire(type, { marker: this, position });
+  }
+
   #update(): void {
-    const at = this.#map?.project(this.#position);
-    const pane = this.#map?.container;
-    const seen = at && pane && at[0] > -80 && at[1] > -10 && at[0] < pane.clientWidth + 80 && at[1] < pane.clientHeight + 80;
-    this.#button.hidden = !seen;
-    if (seen) this.#button.style.transform = `translate(${at[0].toFixed(1)}px, ${at[1].toFixed(1)}px)`;
+    const [button, map] = [this.#button, this.#map];
+    const at = map?.project(this.#position);
+    if (!button || !map) return;
+    const behind = this.options.occlusion !== "none" && map.covers(this.#position);
+    const { clientWidth, clientHeight } = map.container;
+    const seen = at && at[0] > -80 && at[1] > -10 && at[0] < clientWidth + 80 && at[1] < clientHeight + 80;
+    button.hidden = !seen || (behind && this.options.occlusion === "hide");
+    button.classList.toggle("map3d-marker-behind", behind);
+    if (at) button.style.transform = `translate(${(at[0] + this.#shift[0]).toFixed(1)}px, ${(at[1] + this.#shift[1]).toFixed(1)}px)`;
   }
 }

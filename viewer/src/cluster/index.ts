@@ -1,0 +1,2 @@
+/** map3d-cluster: markers that lie close together join into one. */
+export { cluster, type ClusterEvents, type ClusterOptions } from "./cluster";

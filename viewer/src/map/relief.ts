@@ -1,0 +1,213 @@
+import { add, clamp, sub, type Vec2, type Vec3 } from "../core/vec";
+import { localFromUvd, uvdFromLocal } from "../geo/axes";
+import { cssPixelM, uvFromScreen, type Camera } from "../geo/camera";
+import { ancestor, childrenOf, pixelM, type Tile } from "../geo/frame";
+import type { Rendering, View } from "../geo/manifest";
+import { coverOf, levelFor, type Rect } from "../tiles/cover";
+import type { Store } from "../tiles/store";
+import { NO_DEPTH } from "../tiles/tileData";
+import type { imageLayer } from "./imageLayer";
+import type { Sight } from "./stage";
+
+/** Surfaces that go on from a pixel to the next are at most so steep: metres of depth a metre across. */
+const STEEPEST = 8;
+const LEAST_BIAS_M = 0.05;
+
+/**
+ * How deep the seen surface lies, for many points of one picture, from the tiles in memory. U, V and D are metres in the camera's frame, local to
+ * the camera's origin. Of several layers the nearest surface counts; what is hidden, and layers that are not seen, do not.
+ */
+export class Relief {
+  readonly camera: Camera;
+  readonly origin: Vec3;
+  readonly dpr: number;
+  /** The level whose tiles are read first. */
+  readonly level: number;
+  /** Metres a pixel of that level. */
+  readonly pixel_m: number;
+  /** Least and greatest height of what the layers hold, local. */
+  readonly heights: Vec2;
+  readonly #sheets: readonly Sheet[];
+  readonly #bias_m: number;
+
+  constructor(layers: readonly imageLayer[], sight: Sight) {
+    const { camera, origin, dpr } = sight;
+    [this.camera, this.origin, this.dpr] = [camera, origin, dpr];
+    const px = cssPixelM(camera) / dpr;
+    this.level = levelFor(camera.frame, px, dpr);
+    this.pixel_m = pixelM(camera.frame, this.level);
+    const { up, forward } = camera.frame.axes;
+    this.#bias_m = LEAST_BIAS_M + (this.pixel_m / 2) * (1 + up[2] / Math.max(-forward[2], 0.05));
+    const shown = layers.filter((layer) => layer.options.opacity > 0);
+    this.#sheets = shown.flatMap((layer) => Sheet.of(layer, sight, px) ?? []);
+    const heights = shown.flatMap(({ rendering }) => rendering?.json.box.map(([, , z]) => z + rendering.json.origin[2] - origin[2]) ?? []);
+    this.heights = heights.length > 0 ? [Math.min(...heights), Math.max(...heights)] : [0, 0];
+  }
+
+  /** Of the nearest surface; Infinity where nothing is, NaN where that is not known (yet). */
+  depthAt(u: number, v: number): number {
+    let nearest = Infinity;
+    for (const sheet of this.#sheets) {
+      const depth = sheet.depthAt(u, v);
+      if (Number.isNaN(depth)) return NaN;
+      if (depth < nearest) nearest = depth;
+    }
+    return nearest;
+  }
+
+  /**
+   * Does a surface lie before a point? A point on a surface is not hidden by it: the farthest of the 3 × 3 pixels around counts, as far as they go on from
+   * the point's own (steps of up to 8 pixels), and 5 cm, half a pixel and what level ground rises in half a pixel more. Where nothing is known, nothing hides.
+   */
+  hides(u: number, v: number, d: number): boolean {
+    const own = this.depthAt(u, v);
+    const near = d - this.#bias_m;
+    if (!(own < near)) return false;
+    const farthest = own + STEEPEST * this.pixel_m;
+    for (let k = 0; k < 9; k++) {
+      const beside = this.depthAt(u + ((k % 3) - 1) * this.pixel_m, v + (Math.floor(k / 3) - 1) * this.pixel_m);
+      if (beside >= near && beside <= farthest) return false;
+    }
+    return true;
+  }
+
+  /** Does something that is seen lie before a world position? */
+  covers(world: Vec3): boolean {
+    return this.hides(...uvdFromLocal(this.camera.frame.axes, sub(world, this.origin)));
+  }
+
+  /** World position of the surface under CSS pixels; null where nothing is, or nothing is known. */
+  positionAt(point: Vec2): Vec3 | null {
+    const [u, v] = uvFromScreen(this.camera, point);
+    const d = this.depthAt(u, v);
+    return Number.isFinite(d) ? add(this.origin, localFromUvd(this.camera.frame.axes, [u, v, d])) : null;
+  }
+
+  /** What the depths of a rectangle (U, V) are read from: as long as the list has the same members, they are the same. */
+  sources(rect: Rect): unknown[] {
+    return this.#sheets.flatMap((sheet) => sheet.sources(rect));
+  }
+}
+
+/** What the depths of a tile are read from: its own pixels or an ancestor's, those of its children, or none. */
+type Patch = "empty" | "unknown" | Quarters | Pixels;
+
+interface Quarters {
+  readonly tile: Tile;
+  /** TL, TR, BL, BR. */
+  readonly children: readonly Patch[];
+}
+
+interface Pixels {
+  readonly tile: Tile;
+  readonly px: number;
+  readonly depths: Uint32Array;
+  /** null: nothing is hidden. */
+  readonly ids: Uint32Array | null;
+}
+
+/** Levels below the shown one that are looked into. */
+const DOWN = 2;
+
+/** A layer's depths in the camera's frame. */
+class Sheet {
+  readonly #layer: imageLayer;
+  readonly #view: View;
+  readonly #read: (kind: "depth" | "id", tile: Tile) => Uint32Array | "empty" | undefined;
+  readonly #level: number;
+  /** Tiles along a side of the level. */
+  readonly #side: number;
+  readonly #unit_m: number;
+  /** From the camera's U, V and D to the layer's. */
+  readonly #shift: Vec3;
+  readonly #patches = new Map<number, Patch>();
+  #last = -1;
+  #patch: Patch = "empty";
+
+  static of(layer: imageLayer, sight: Sight, px: number): Sheet | null {
+    const [view, { rendering, store }] = [layer.viewOf(sight.camera.frame), layer];
+    return view && store && rendering?.layers.has("depth") ? new Sheet(layer, view, rendering, store, sight, px) : null;
+  }
+
+  private constructor(layer: imageLayer, view: View, { json, layers }: Rendering, store: Store, { origin, dpr }: Sight, px: number) {
+    [this.#layer, this.#view] = [layer, view];
+    this.#level = levelFor(view.frame, px, dpr);
+    this.#side = 2 ** this.#level;
+    this.#unit_m = layers.get("depth")?.unit_m ?? 2 ** -10;
+    this.#shift = uvdFromLocal(view.frame.axes, sub(origin, json.origin));
+    this.#read = (kind, tile) => {
+      const info = layers.get(kind);
+      const stored = info && store.get(view, info, tile);
+      return stored?.empty ? "empty" : stored?.data?.kind === kind ? stored.data.values : undefined;
+    };
+  }
+
+  depthAt(u: number, v: number): number {
+    const { frame } = this.#view;
+    const side = this.#side;
+    const right = u + this.#shift[0] - frame.u0;
+    const down = frame.v0 - v - this.#shift[1];
+    const x = Math.floor((right * side) / frame.size);
+    const y = Math.floor((down * side) / frame.size);
+    if (!(x >= 0 && y >= 0 && x < side && y < side)) return Infinity;
+    if (y * side + x !== this.#last) {
+      this.#last = y * side + x;
+      this.#patch = this.#patchOf({ z: this.#level, x, y });
+    }
+    return this.#valueOf(this.#patch, right, down);
+  }
+
+  sources([low, high]: Rect): unknown[] {
+    const { frame, occupancy } = this.#view;
+    const [du, dv] = this.#shift;
+    const tiles = coverOf(frame, (tile) => occupancy.has(tile), this.#level, [[low[0] + du, low[1] + dv], [high[0] + du, high[1] + dv]]);
+    const of = (patch: Patch): unknown[] => (typeof patch === "string" ? [patch] : "children" in patch ? patch.children.flatMap(of) : [patch.depths]);
+    return [this.#layer.finishes, ...tiles.flatMap((tile) => of(this.#patchOf(tile)))];
+  }
+
+  #valueOf(patch: Patch, right: number, down: number): number {
+    if (typeof patch === "string") return patch === "empty" ? Infinity : NaN;
+    const { tilePx, d0, size } = this.#view.frame;
+    const { z, x, y } = patch.tile;
+    if ("children" in patch) {
+      const half = size / 2 ** (z + 1);
+      return this.#valueOf(patch.children[(right >= (2 * x + 1) * half ? 1 : 0) + (down >= (2 * y + 1) * half ? 2 : 0)] as Patch, right, down);
+    }
+    const i = clamp(Math.floor(right / patch.px) - x * tilePx, 0, tilePx - 1);
+    const j = clamp(Math.floor(down / patch.px) - y * tilePx, 0, tilePx - 1);
+    const depth = patch.depths[j * tilePx + i] as number;
+    if (depth === NO_DEPTH || (patch.ids && this.#layer.hides(patch.ids[j * tilePx + i] as number))) return Infinity;
+    return d0 + depth * this.#unit_m - this.#shift[2];
+  }
+
+  #patchOf(tile: Tile): Patch {
+    const at = tile.y * this.#side + tile.x;
+    const patch = this.#patches.get(at) ?? this.#found(tile);
+    this.#patches.set(at, patch);
+    return patch;
+  }
+
+  #found(tile: Tile): Patch {
+    const below = this.#below(tile, DOWN);
+    if (below) return below;
+    for (let up = 1; up <= tile.z; up++) {
+      const above = this.#own(ancestor(tile, up));
+      if (above) return above;
+    }
+    return "unknown";
+  }
+
+  #own(tile: Tile): Patch | undefined {
+    if (!this.#view.occupancy.has(tile)) return "empty";
+    const [depths, ids] = [this.#read("depth", tile), this.#layer.finishes ? this.#read("id", tile) : null];
+    if (depths === "empty" || ids === "empty") return "empty";
+    return depths && ids !== undefined ? { tile, px: pixelM(this.#view.frame, tile.z), depths, ids } : undefined;
+  }
+
+  #below(tile: Tile, down: number): Patch | undefined {
+    const own = this.#own(tile);
+    if (own ?? (down === 0 || tile.z === this.#view.frame.zmax)) return own;
+    const children = childrenOf(tile).map((child) => this.#below(child, down - 1));
+    return children.every((child) => child !== undefined) ? { tile, children } : undefined;
+  }
+}
