@@ -15,6 +15,7 @@ import type { Size } from "./viewport";
 const FLIGHT_MS = 700;
 const STEP_MS = 220;
 
+/** Of `fitBounds`. */
 export interface FitOptions {
   /** Free room at each side. Default 24. */
   padding_px?: number;
@@ -80,6 +81,7 @@ export abstract class Viewing extends Evented<MapEvents> {
     return this.#go((camera, rendering) => cameraAt(camera, rendering, position, zoom), 0);
   }
 
+  /** Brings a world position to the middle, smoothly unless the reader wants no movement. */
   flyTo(position: Vec3, zoom?: number, { duration_ms = FLIGHT_MS }: { duration_ms?: number } = {}): this {
     return this.#go((camera, rendering) => cameraAt(camera, rendering, position, zoom), duration_ms);
   }
@@ -89,14 +91,17 @@ export abstract class Viewing extends Evented<MapEvents> {
     return this.#go((camera, { json: { origin } }) => fitted(camera, [sub(low, origin), sub(high, origin)], padding_px, maxZoom), duration_ms);
   }
 
+  /** At once, about the middle; brought into `zoomLimits`. */
   setZoom(zoom: number): this {
     return this.#go((camera) => ({ ...camera, zoom }), 0);
   }
 
+  /** One level nearer, smoothly. */
   zoomIn(): this {
     return this.zoomBy(1);
   }
 
+  /** One level further, smoothly. */
   zoomOut(): this {
     return this.zoomBy(-1);
   }

@@ -35,8 +35,6 @@ async function still(page: Page): Promise<Buffer> {
   }
 }
 
-/** Clicks where the middle of an 800 × 600 picture is, a little to the side. */
-const clickAt = (page: Page, x: number, y: number): Promise<void> => page.mouse.click(x, y);
 const text = (page: Page, selector: string): Promise<string> => page.locator(selector).first().innerText();
 
 /** What each example is for. */
@@ -51,7 +49,7 @@ const POINTS: Readonly<Record<string, (page: Page, picture: Buffer) => Promise<v
   },
   attributes: async (page) => {
     const [x, y] = await page.evaluate<[number, number]>("map.project([691032, 5336026, 562])");
-    await clickAt(page, x, y);
+    await page.mouse.click(x, y);
     await page.getByRole("heading", { name: "Tower" }).waitFor();
     expect(await text(page, "dl")).toMatch(/measuredHeight\s+62/);
     expect(await text(page, "dl")).toContain("<img src=x onerror=alert(1)>");
@@ -65,7 +63,7 @@ const POINTS: Readonly<Record<string, (page: Page, picture: Buffer) => Promise<v
   measure: async (page) => {
     for (const at of ["[690938, 5335978, 534]", "[690972, 5335978, 534]"]) {
       const [x, y] = await page.evaluate<[number, number]>(`map.project(${at})`);
-      await clickAt(page, x + (at.startsWith("[690938") ? 2 : -2), y - 2);
+      await page.mouse.click(x + (at.startsWith("[690938") ? 2 : -2), y - 2);
       await page.waitForTimeout(400); // two clicks, not a double one
     }
     await page.waitForFunction(() => /^[\d.]+ m, of which/.test(document.querySelector("output")?.value ?? ""));
@@ -82,8 +80,8 @@ const POINTS: Readonly<Record<string, (page: Page, picture: Buffer) => Promise<v
   search: async (page) => {
     await page.getByRole("searchbox").fill("school old");
     await page.getByRole("button", { name: "School <b>old</b>" }).click();
-    await still(page);
-    expect(await page.evaluate("[layer.highlighted, map.zoom, map.project([691031, 5335968, 516]).map(Math.round)]")).toEqual([[1025], 2, [400, 300]]);
+    await page.waitForFunction("map.zoom === 2"); // there
+    expect(await page.evaluate("[layer.highlighted, map.project([691031, 5335968, 516]).map(Math.round)]")).toEqual([[1025], [400, 300]]);
   },
   company: async (page) => {
     expect(await text(page, ".map3d-popup")).toContain("Tower Lane 3, first floor");
