@@ -11,7 +11,7 @@ CACHE := .cache
 RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
 VIEWER := $(shell find viewer/src viewer/page -type f 2>/dev/null) $(wildcard viewer/*.json viewer/*.ts viewer/*.js viewer/*.mjs)
 
-.PHONY: help demo test test-all test-rust test-python test-viewer test-browser check check-rust check-python check-viewer bench bench-extent bench-cycles bench-rotterdam bless docs build clean tools
+.PHONY: help demo test test-all test-rust test-python test-viewer test-browser check check-rust check-python check-viewer bench bench-extent bench-cycles bench-rotterdam bless docs reference build clean tools
 
 help: ## this list
 	@echo "map3d: 3D city models as oblique image tiles"; echo
@@ -92,7 +92,7 @@ check-python: build
 	$(BIN)/lint-imports
 
 check-viewer: $(CACHE)/viewer
-	cd viewer && npm run --silent lint && npm run --silent typecheck && npm run --silent size
+	cd viewer && npm run --silent lint && npm run --silent typecheck && npm run --silent size && npm run --silent docs:check
 
 # -- keep --------------------------------------------------------------------------------------------------------------------------
 
@@ -110,13 +110,16 @@ bench-cycles: requirements/cycles.lock | $(CACHE) ## install Blender (350 MB) in
 bench-rotterdam: build ## a city of 60,000 buildings from nothing to a published folder: hours, 45 GB of disk
 	$(BIN)/python -m bench.rotterdam
 
-docs: build ## the pictures and the command line's reference in docs/
+docs: build reference ## the pictures and the command line's reference in docs/; the viewer's reference
 	$(BIN)/python docs/make_cli.py
 	$(BIN)/python docs/pictures/make.py .cache/pictures
+
+reference: $(CACHE)/npm ## the viewer's reference as pages, viewer/reference/
+	cd viewer && npm run --silent docs
 
 bless: $(CACHE)/venv ## write test vectors and golden pictures anew; look at them, and say why in the commit
 	$(BIN)/python spec/make_vectors.py
 	MAP3D_BLESS=1 cargo test --locked -q -p map3d-render --test golden
 
 clean: ## remove what was built
-	rm -rf $(VENV) $(CACHE) target viewer/node_modules viewer/dist python/map3d/viewer demo tests/.out
+	rm -rf $(VENV) $(CACHE) target viewer/node_modules viewer/dist viewer/reference python/map3d/viewer demo tests/.out

@@ -1,9 +1,10 @@
-// Builds dist/: map3d.js (a global), map3d.mjs (a module), the page that shows a rendering, and type declarations.
+// Builds dist/: map3d.js (a global), map3d.mjs (a module), entries beside them, map3d-full with all in one, the page that shows a rendering, and type declarations.
 import { execFileSync } from "node:child_process";
 import { cpSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { dirname, join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
 import * as esbuild from "esbuild";
+import { ENTRIES } from "./entries.mjs";
 
 const root = resolve(dirname(fileURLToPath(import.meta.url)), "..");
 const dist = join(root, "dist");
@@ -24,8 +25,6 @@ const workers = {
 };
 
 /** Entries beside the core use it by its public names: as a module from map3d.mjs, in a script from the global. */
-const ENTRIES = { cluster: "src/cluster/index.ts", compare: "src/compare/index.ts", geojson: "src/geojson/index.ts", measure: "src/measure/index.ts", orbit: "src/orbit/index.ts", theme: "src/theme/index.ts" };
-
 const coreAs = (how) => ({
   name: "core",
   setup(build) {
@@ -38,6 +37,12 @@ async function bundle(entry, name, options) {
   await esbuild.build({ ...shared, banner, entryPoints: [join(root, entry)], outfile: join(dist, name), plugins: [workers], ...options });
 }
 
+/** The core and all entries in one file. */
+async function bundleFull(name, options) {
+  const contents = ["src/map3d.ts", ...Object.values(ENTRIES)].map((file) => `export * from "./${file}";\n`).join("");
+  await esbuild.build({ ...shared, banner, stdin: { contents, resolveDir: root }, outfile: join(dist, name), plugins: [workers], ...options });
+}
+
 async function build() {
   rmSync(dist, { recursive: true, force: true });
   mkdirSync(dist, { recursive: true });
@@ -47,6 +52,8 @@ async function build() {
     await bundle(entry, `map3d-${name}.mjs`, { format: "esm", plugins: [coreAs("module"), workers] });
     await bundle(entry, `map3d-${name}.js`, { format: "iife", plugins: [coreAs("global"), workers], globalName: "entry", banner: { js: `${banner.js}\n(() => {` }, footer: { js: "Object.assign(map3d, entry);\n})();" } });
   }
+  await bundleFull("map3d-full.mjs", { format: "esm" });
+  await bundleFull("map3d-full.js", { format: "iife", globalName: "map3d" });
   await bundle("page/page.ts", "page.js", { format: "esm", external: ["./map3d.mjs", ...Object.keys(ENTRIES).map((name) => `./map3d-${name}.mjs`)] });
   await esbuild.build({ ...shared, entryPoints: [join(root, "page/page.css")], outfile: join(dist, "page.css"), target: ["chrome111", "firefox121", "safari16.4"] });
   cpSync(join(root, "page/index.html"), join(dist, "index.html"));
@@ -62,9 +69,14 @@ function writeDeclarations() {
     const text = readFileSync(join(types, file), "utf8");
     writeFileSync(join(types, file), text.replace(/((?:from|import) ?\(?")(\.[^"]+)"/g, '$1$2.js"'));
   }
-  writeFileSync(join(dist, "map3d.d.mts"), 'export * from "./types/map3d.js";\n');
-  for (const name of Object.keys(ENTRIES)) writeFileSync(join(dist, `map3d-${name}.d.mts`), `export * from "./types/${name}/index.js";\n`);
-  writeFileSync(join(dist, "map3d.d.ts"), 'export * from "./types/map3d.js";\nexport as namespace map3d;\n');
+  const lines = Object.keys(ENTRIES).map((name) => `export * from "./types/${name}/index.js";\n`);
+  const core = 'export * from "./types/map3d.js";\n';
+  const global = "export as namespace map3d;\n";
+  Object.keys(ENTRIES).forEach((name, k) => { writeFileSync(join(dist, `map3d-${name}.d.mts`), lines[k]); });
+  writeFileSync(join(dist, "map3d.d.mts"), core);
+  writeFileSync(join(dist, "map3d.d.ts"), core + global);
+  writeFileSync(join(dist, "map3d-full.d.mts"), core + lines.join(""));
+  writeFileSync(join(dist, "map3d-full.d.ts"), core + lines.join("") + global);
 }
 
 await build();

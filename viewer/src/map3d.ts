@@ -6,6 +6,7 @@ export { popup, type PopupEvents, type PopupOptions } from "./overlay/popup";
 export { Evented, type Fired, type Listener } from "./core/events";
 export { DecodeError, DrawError, FetchError, ManifestError, Map3dError, UsageError } from "./core/errors";
 export type { ClickEvent, HoverEvent, MapEvents, MapOptions } from "./map/options";
+export type { FitOptions } from "./map/viewing";
 export type { ObjectStyle } from "./map/objectStyle";
 export type { Seen } from "./map/inView";
 export type { Pick } from "./map/picker";

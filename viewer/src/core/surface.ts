@@ -1,6 +1,7 @@
 import type { Evented } from "./events";
 import type { Vec2, Vec3 } from "./vec";
 
+/** What places on the screen depend on. */
 export interface SurfaceEvents {
   /** The picture has moved: places on the screen are others now. */
   move: object;
@@ -28,12 +29,16 @@ export interface Surface {
 export interface Attachable<M> {
   /** Layers that it reads: while it is on the map, their tiles are fetched for what is in view. */
   readonly needs?: readonly ("id" | "depth")[];
+  /** @internal The map calls it, once. */
   onAdd(map: M): void;
+  /** @internal The map calls it, once. */
   onRemove(map: M): void;
 }
 
 /** A map to which things are added. */
 export interface Holder<M> {
+  /** Puts it on the map; nothing when it is there. */
   add(item: Attachable<M>): unknown;
+  /** Takes it off the map; nothing when it is not there. */
   discard(item: Attachable<M>): unknown;
 }

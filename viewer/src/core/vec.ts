@@ -1,4 +1,6 @@
+/** x and y: metres of the scene's CRS, or CSS pixels of the map, y down. */
 export type Vec2 = readonly [number, number];
+/** x, y and z: east, north and up, metres of the scene's CRS (world) or from its origin (local). */
 export type Vec3 = readonly [number, number, number];
 /** Lowest and highest corner. */
 export type Box3 = readonly [Vec3, Vec3];

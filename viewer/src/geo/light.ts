@@ -1,5 +1,6 @@
 import { clamp, type Vec3 } from "../core/vec";
 
+/** Light from one side and from everywhere, as Lambert has it. */
 export interface Light {
   /** false: colours are shown as they are stored. */
   lit: boolean;

@@ -48,19 +48,26 @@ interface ViewJson extends FrameNumbers, Versions {
 export interface ManifestJson {
   map3d: string;
   version: number;
+  /** The last part of its base URL. */
   name: string;
   title: string;
   attribution: string;
+  /** Grows with every change of what is shown. */
   content_version: number;
+  /** Everything has been rendered. */
   complete: boolean;
   crs: { epsg: number | null; wkt: string | null; name: string; vertical: string | null };
   /** Where it lies on earth; absent when that is not known. */
   geographic?: GeographicJson;
+  /** World coordinates of the local origin, metres. */
   origin: Vec3;
+  /** Of what is shown, local. */
   box: Box3;
   start?: { local: Vec3 };
   tile_px: number;
+  /** The deepest level. */
   zmax: number;
+  /** Side of level 0's only tile. */
   size_m: number;
   layers: LayerInfo[];
   views: ViewJson[];

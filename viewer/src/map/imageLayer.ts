@@ -20,6 +20,7 @@ import type { map } from "./map";
 import { finishesOf, isHidden, type ObjectStyle } from "./objectStyle";
 import type { Sight, Stage } from "./stage";
 
+/** How a layer begins; all can be left out. */
 export interface ImageLayerOptions {
   /** lit | color | picture | normal | id | depth. Default "lit". */
   mode?: Mode;
@@ -33,9 +34,11 @@ export interface ImageLayerOptions {
   combine?: boolean;
 }
 
+/** What a layer fires. */
 export interface ImageLayerEvents {
   /** The manifest has been read. */
   ready: { rendering: Rendering };
+  /** The map's "error" says so, too. */
   error: { error: Error };
 }
 
@@ -67,11 +70,13 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
     this.#source = new Source(list.map((url) => baseUrl(url, document.baseURI)));
   }
 
+  /** Puts it over the layers that are there; its tiles are fetched from now on. */
   addTo(map: map): this {
     map.add(this);
     return this;
   }
 
+  /** Takes it off its map, and its tiles out of memory. */
   remove(): this {
     this.#map?.discard(this);
     return this;
@@ -82,20 +87,24 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
     return this.#rendering;
   }
 
+  /** Whose data it is: the option's, else the manifest's; "" before "ready". */
   get attribution(): string {
     return this.options.attribution ?? this.#rendering?.json.attribution ?? "";
   }
 
+  /** How it is shown. */
   get mode(): Mode {
     return this.#mode;
   }
 
+  /** Shows it otherwise. @throws UsageError for a mode that is unknown; one whose layers the rendering lacks is the map's "error" */
   setMode(mode: Mode): this {
     this.#mode = checkedMode(mode);
     this.#checkLayers();
     return this.#redraw();
   }
 
+  /** 0..1 */
   setOpacity(opacity: number): this {
     this.options.opacity = Math.min(Math.max(opacity, 0), 1);
     return this.#redraw();

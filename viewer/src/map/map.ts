@@ -97,14 +97,17 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
     return this.fire("remove", {});
   }
 
+  /** Its image layers, the lowest first. */
   get layers(): readonly imageLayer[] {
     return this.#layers;
   }
 
+  /** What the canvas lies in, with markers, popups and controls. */
   get container(): HTMLElement {
     return this.#viewport.container;
   }
 
+  /** The one that is there now: when WebGL is lost for good, another takes its place. */
   get canvas(): HTMLCanvasElement {
     return this.#viewport.canvas;
   }
@@ -124,10 +127,12 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
 
   // Looks
 
+  /** What the picture is lit by. */
   get light(): Readonly<Light> {
     return this.#light;
   }
 
+  /** Changes parts of the light; numbers are brought into their ranges. Another direction ends the light of a time. */
   setLight(light: Partial<Light>): this {
     if (light.azimuth_deg !== undefined || light.altitude_deg !== undefined) this.#time = null;
     return this.#relight(light);

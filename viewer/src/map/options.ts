@@ -4,6 +4,7 @@ import type { Pick } from "./picker";
 import type { Attribute } from "../tiles/objects";
 import type { marker } from "../overlay/marker";
 
+/** How a map begins; all can be left out. */
 export interface MapOptions {
   /** Where to look first, world coordinates. Default: the rendering's start. */
   center?: Vec3;
@@ -64,6 +65,7 @@ export interface HoverEvent extends Pick {
   readonly point: readonly [number, number];
 }
 
+/** What a map fires, and the fields of each event. */
 export interface MapEvents {
   /** The first layer's manifest is here: the map has a view. */
   ready: object;
@@ -71,21 +73,32 @@ export interface MapEvents {
   load: object;
   /** Everything in view is drawn and nothing moves. */
   idle: object;
+  /** The view has changed; fired with each frame that shows it. */
   move: object;
+  /** The view rests. */
   moveend: object;
+  /** After a change, with "move". */
   zoom: { zoom: number };
+  /** Another view of the rendering is shown; its id. */
   directionchange: { direction: string };
+  /** By setLight or setTime. */
   lightchange: { light: Readonly<Light> };
   /** At once after a click, from what is in memory. */
   preclick: ClickEvent;
   /** With exact values and attributes, once they are here. */
   click: ClickEvent;
+  /** The pointer moves; from what is in memory (see the option `hover`). */
   mousemove: HoverEvent;
   /** A marker was selected. */
   select: { marker: marker };
+  /** CSS pixels. */
   resize: { width: number; height: number };
+  /** Something could not be fetched, read or drawn; the map goes on. Without a listener it is a warning in the console. */
   error: { error: Error };
+  /** The browser has taken WebGL away. */
   contextlost: object;
+  /** All is drawn again, by WebGL or without it. */
   contextrestored: object;
+  /** The map has ended. */
   remove: object;
 }

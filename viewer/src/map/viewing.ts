@@ -19,6 +19,7 @@ const STEP_MS = 220;
 /** Two fingers turned so far turn the view to the next direction. */
 const TWIST_RAD = (28 * Math.PI) / 180;
 
+/** Of `fitBounds`. */
 export interface FitOptions {
   /** Free room at each side. Default 24. */
   padding_px?: number;
@@ -90,6 +91,7 @@ export abstract class Viewing extends Evented<MapEvents> {
     return this.#go((camera, rendering) => cameraAt(camera, rendering, position, zoom), 0);
   }
 
+  /** Brings a world position to the middle, smoothly unless the reader wants no movement. */
   flyTo(position: Vec3, zoom?: number, { duration_ms = FLIGHT_MS }: { duration_ms?: number } = {}): this {
     return this.#go((camera, rendering) => cameraAt(camera, rendering, position, zoom), duration_ms);
   }
@@ -99,14 +101,17 @@ export abstract class Viewing extends Evented<MapEvents> {
     return this.#go((camera, { json: { origin } }) => fitted(camera, [sub(low, origin), sub(high, origin)], padding_px, maxZoom), duration_ms);
   }
 
+  /** At once, about the middle; brought into `zoomLimits`. */
   setZoom(zoom: number): this {
     return this.#go((camera) => ({ ...camera, zoom }), 0);
   }
 
+  /** One level nearer, smoothly. */
   zoomIn(): this {
     return this.zoomBy(1);
   }
 
+  /** One level further, smoothly. */
   zoomOut(): this {
     return this.zoomBy(-1);
   }

@@ -26,6 +26,7 @@ export interface AreaMeasure {
   readonly unevenness_m: number;
 }
 
+/** Of a line from point to point; zeros for less than two. */
 export function measureLine(points: readonly Vec3[]): LineMeasure {
   const steps = points.slice(1).map((point, k) => sub(point, points[k] as Vec3));
   const steps_m = steps.map((step) => Math.hypot(...step));

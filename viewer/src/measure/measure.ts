@@ -42,24 +42,29 @@ export class measure extends Evented<MeasureEvents> implements Attachable<map> {
     this.options = { kind, ...options };
   }
 
+  /** Turns it on: clicks on the map set corners. */
   addTo(map: map): this {
     map.add(this);
     return this;
   }
 
+  /** Turns it off; what was measured is no longer shown. */
   remove(): this {
     this.#map?.discard(this);
     return this;
   }
 
+  /** In the order in which they were set. */
   get corners(): readonly Corner[] {
     return this.#corners;
   }
 
+  /** Of the corners as a line. */
   get line(): LineMeasure {
     return measureLine(this.#corners.map(({ position }) => position));
   }
 
+  /** Of the corners as a polygon; zeros for less than three. */
   get area(): AreaMeasure {
     return measureArea(this.#corners.map(({ position }) => position));
   }
@@ -76,6 +81,7 @@ export class measure extends Evented<MeasureEvents> implements Attachable<map> {
     return this.setCorners(this.#corners.slice(0, -1));
   }
 
+  /** Takes all corners back. */
   clear(): this {
     return this.setCorners([]);
   }

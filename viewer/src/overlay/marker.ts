@@ -5,6 +5,7 @@ import type { Vec2, Vec3 } from "../core/vec";
 import { listenToDrags } from "./drag";
 import { popup, type PopupOptions } from "./popup";
 
+/** How a marker looks. */
 export interface MarkerOptions {
   /** Any CSS colour; default the map's accent. */
   color?: string;
@@ -18,11 +19,13 @@ export interface MarkerOptions {
   draggable?: boolean;
 }
 
+/** What a marker fires. */
 export interface MarkerEvents {
   /** Clicked, tapped, or Enter pressed. */
   click: { marker: marker };
   /** Became the selected one. */
   select: { marker: marker };
+  /** Is no longer the selected one. */
   deselect: { marker: marker };
   dragstart: { marker: marker };
   /** Moved by hand or keys. */
@@ -53,34 +56,41 @@ export class marker extends Evented<MarkerEvents> implements Attachable<Surface>
     this.#position = position;
   }
 
+  /** Puts it on a map. */
   addTo(map: Holder<Surface>): this {
     map.add(this);
     return this;
   }
 
+  /** Takes it off its map, with its popup. */
   remove(): this {
     this.#map?.discard?.(this);
     return this;
   }
 
+  /** What it is called. */
   get label(): string {
     return this.#label;
   }
 
+  /** World coordinates. */
   get position(): Vec3 {
     return this.#position;
   }
 
+  /** One marker of a map is, at most. */
   get selected(): boolean {
     return this.#selected;
   }
 
+  /** Text, never HTML. */
   setLabel(label: string): this {
     this.#label = label;
     this.#dress();
     return this;
   }
 
+  /** World coordinates; its popup follows. */
   setPosition(position: Vec3): this {
     this.#position = position;
     this.#popup?.setPosition(position);
@@ -102,16 +112,19 @@ export class marker extends Evented<MarkerEvents> implements Attachable<Surface>
     return this;
   }
 
+  /** Nothing when it has none, or is on no map. */
   openPopup(): this {
     if (this.#map?.add && this.#popup && !this.#popup.isOpen) this.#popup.addTo(this.#map as Holder<Surface>);
     return this;
   }
 
+  /** Nothing when none is open. */
   closePopup(): this {
     this.#popup?.remove();
     return this;
   }
 
+  /** Makes it the selected one, or no longer. */
   select(selected = true): this {
     if (selected === this.#selected) return this;
     this.#selected = selected;

@@ -4,6 +4,7 @@ import { wordsOf } from "../core/words";
 import type { Attachable, Holder, Surface } from "../core/surface";
 import type { Vec3 } from "../core/vec";
 
+/** How a popup looks. */
 export interface PopupOptions {
   /** Pixels above the position. Default 14. */
   offset_px?: number;
@@ -11,8 +12,11 @@ export interface PopupOptions {
   closeButton?: boolean;
 }
 
+/** What a popup fires. */
 export interface PopupEvents {
+  /** It came onto a map. */
   open: object;
+  /** It left its map, by its button, Escape or a script. */
   close: object;
 }
 
@@ -39,16 +43,19 @@ export class popup extends Evented<PopupEvents> implements Attachable<Surface> {
     this.setContent(content);
   }
 
+  /** Opens it on a map. */
   addTo(map: Holder<Surface>): this {
     map.add(this);
     return this;
   }
 
+  /** Closes it. */
   remove(): this {
     this.#map?.discard?.(this);
     return this;
   }
 
+  /** It is on a map. */
   get isOpen(): boolean {
     return this.#map !== undefined;
   }
@@ -59,6 +66,7 @@ export class popup extends Evented<PopupEvents> implements Attachable<Surface> {
     return this;
   }
 
+  /** World coordinates. */
   setPosition(position: Vec3): this {
     this.#position = position;
     this.#update();

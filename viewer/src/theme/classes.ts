@@ -2,6 +2,7 @@ import type { AttributeInfo, AttributeValue } from "../map3d";
 
 /** A group of objects that have one colour. */
 export interface ThemeClass {
+  /** As the legend says it. */
   readonly label: string;
   /** #rrggbb */
   readonly color: string;

@@ -46,11 +46,13 @@ export class theme extends Evented<ThemeEvents> implements Attachable<map> {
     this.options = options;
   }
 
+  /** Colours the layer, once the attribute is here ("ready"). */
   addTo(map: map): this {
     map.add(this);
     return this;
   }
 
+  /** Takes colours and legend away; the layer's objects are as they were rendered. */
   remove(): this {
     this.#map?.discard(this);
     return this;

@@ -10,7 +10,9 @@ export type Attribute = string | number | boolean | null;
 export interface ObjectInfo {
   readonly name: string;
   readonly class: string;
+  /** Id of the object that it is a part of. */
   readonly parent: number | null;
+  /** The source document it came from. */
   readonly asset?: string;
   /** Local coordinates. */
   readonly box?: Box3;
@@ -20,6 +22,7 @@ export interface ObjectInfo {
 /** id, label, local position. */
 export type SearchEntry = readonly [number, string, Vec3];
 
+/** A value that is there. */
 export type AttributeValue = Exclude<Attribute, null>;
 
 /** An attribute, as the index lists it. */

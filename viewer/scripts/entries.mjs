@@ -1,0 +1,10 @@
+/** Bundles beside the core, `map3d-<name>`: what each exports. `map3d-full` has the core and all of them. */
+export const ENTRIES = {
+  cluster: "src/cluster/index.ts",
+  compare: "src/compare/index.ts",
+  element: "src/element/index.ts",
+  geojson: "src/geojson/index.ts",
+  measure: "src/measure/index.ts",
+  orbit: "src/orbit/index.ts",
+  theme: "src/theme/index.ts",
+};

@@ -1,0 +1,14 @@
+import { inLanguage } from "../core/words";
+
+interface ElementWords {
+  readonly map: string;
+  readonly failed: string;
+}
+
+const WORDS = {
+  en: { map: "Map", failed: "The map cannot be shown." },
+  de: { map: "Karte", failed: "Die Karte kann nicht gezeigt werden." },
+  fr: { map: "Carte", failed: "La carte ne peut pas être affichée." },
+};
+
+export const elementWords = (language: string): ElementWords => inLanguage(WORDS, language);

@@ -1,0 +1,136 @@
+import { readdirSync, readFileSync } from "node:fs";
+import { join } from "node:path";
+import type { Page } from "playwright-core";
+import { expect, test } from "vitest";
+import { renderTown } from "../fixture/rendering";
+import { TestBed } from "./bed";
+import { OUT } from "./browser";
+import { VIEWER } from "./package";
+
+const bed = new TestBed({ town: renderTown() });
+const FOLDER = join(VIEWER, "examples");
+const FILES = readdirSync(FOLDER).filter((file) => file.endsWith(".html"));
+const ORDER = ["shortest", "markers", "attributes", "theme", "measure", "sun", "search", "company", "styles", "link"];
+const COLOURS = 24;
+
+/** How many colours a part of the page has: a map that shows something has many. */
+async function colours(page: Page, selector: string): Promise<number> {
+  const shot = (await page.locator(selector).first().screenshot()).toString("base64");
+  return page.evaluate(async (bytes) => {
+    const picture = await createImageBitmap(await (await fetch(`data:image/png;base64,${bytes}`)).blob());
+    const pen = new OffscreenCanvas(picture.width, picture.height).getContext("2d") as OffscreenCanvasRenderingContext2D;
+    pen.drawImage(picture, 0, 0);
+    return new Set(new Uint32Array(pen.getImageData(0, 0, picture.width, picture.height).data.buffer)).size;
+  }, shot);
+}
+
+/** Waits until the picture no longer changes; the way of a page whose map is its own. */
+async function still(page: Page): Promise<Buffer> {
+  await page.waitForLoadState("networkidle");
+  for (let before = await page.screenshot(); ;) {
+    await page.waitForTimeout(150);
+    const now = await page.screenshot();
+    if (now.equals(before)) return now;
+    before = now;
+  }
+}
+
+const text = (page: Page, selector: string): Promise<string> => page.locator(selector).first().innerText();
+
+/** What each example is for. */
+const POINTS: Readonly<Record<string, (page: Page, picture: Buffer) => Promise<void>>> = {
+  shortest: async (page) => {
+    expect(await page.evaluate("[map.layers.length, map.drawer, layer.rendering.json.name]")).toEqual([1, "webgl", "town"]);
+  },
+  markers: async (page) => {
+    await page.getByRole("button", { name: "Chapel" }).click();
+    expect(await text(page, ".map3d-popup")).toContain("The oldest building, <em>of 1290</em>");
+    expect(await page.locator(".map3d-popup em").count()).toBe(0);
+  },
+  attributes: async (page) => {
+    const [x, y] = await page.evaluate<[number, number]>("map.project([691032, 5336026, 562])");
+    await page.mouse.click(x, y);
+    await page.getByRole("heading", { name: "Tower" }).waitFor();
+    expect(await text(page, "dl")).toMatch(/measuredHeight\s+62/);
+    expect(await text(page, "dl")).toContain("<img src=x onerror=alert(1)>");
+  },
+  theme: async (page, before) => {
+    expect(await page.locator(".map3d-legend button").count()).toBe(4);
+    await page.getByLabel("Colour by").selectOption({ label: "class" });
+    await page.locator(".map3d-legend button", { hasText: "terrain" }).waitFor();
+    expect(before.equals(await still(page))).toBe(false);
+  },
+  measure: async (page) => {
+    for (const at of ["[690938, 5335978, 534]", "[690972, 5335978, 534]"]) {
+      const [x, y] = await page.evaluate<[number, number]>(`map.project(${at})`);
+      await page.mouse.click(x + (at.startsWith("[690938") ? 2 : -2), y - 2);
+      await page.waitForTimeout(400); // two clicks, not a double one
+    }
+    await page.waitForFunction(() => /^[\d.]+ m, of which/.test(document.querySelector("output")?.value ?? ""));
+    const length = parseFloat(await text(page, "output"));
+    expect(length).toBeGreaterThan(28);
+    expect(length).toBeLessThan(34.2);
+  },
+  sun: async (page, afternoon) => {
+    expect(await text(page, "output")).toMatch(/^15:00: sun \d+° high/);
+    await page.locator("#hour").fill("23");
+    expect(await text(page, "output")).toBe("23:00: the sun has set");
+    expect(afternoon.equals(await still(page))).toBe(false);
+  },
+  search: async (page) => {
+    await page.getByRole("searchbox").fill("school old");
+    await page.getByRole("button", { name: "School <b>old</b>" }).click();
+    await page.waitForFunction("map.zoom === 2"); // there
+    expect(await page.evaluate("[layer.highlighted, map.project([691031, 5335968, 516]).map(Math.round)]")).toEqual([[1025], [400, 300]]);
+  },
+  company: async (page) => {
+    expect(await text(page, ".map3d-popup")).toContain("Tower Lane 3, first floor");
+    expect(await page.locator("map-3d").innerText()).not.toContain("needs a browser");
+    const embed = /<!-- From here[^]*all that the map needs/.exec(readFileSync(join(FOLDER, "company.html"), "utf8"))?.[0] ?? "";
+    expect(embed.split("\n").length).toBeLessThanOrEqual(24);
+  },
+  styles: async (page) => {
+    for (const mode of ["normal", "depth"]) expect(await colours(page, `[data-mode=${mode}]`)).toBeGreaterThan(COLOURS / 4);
+    await page.locator("[data-mode=depth]").getByRole("button", { name: "Zoom in" }).click();
+    await still(page);
+    const views = await page.evaluate<[string, number, number[]][]>("maps.map((map) => [map.direction, map.zoom, map.project([691000, 5336000, 500]).map(Math.round)])");
+    expect(views[0]).toEqual(views[2]);
+    expect(views[1]).toEqual(views[2]);
+  },
+  link: async (page) => {
+    await page.getByLabel(/Language|Sprache|Langue/).selectOption("de");
+    await page.getByRole("button", { name: "Drehen" }).click();
+    await page.waitForFunction(() => location.hash.startsWith("#90-45/"));
+    await page.getByRole("button", { name: "Näher" }).click();
+    await still(page);
+    const address = page.url();
+    await page.goto("about:blank");
+    await page.goto(address);
+    await page.getByText("Die Ansicht dieses Links").waitFor();
+    await still(page);
+    const [from, to] = [address, page.url()].map((url) => url.split("/").slice(-4).map(Number)) as [number[], number[]];
+    expect(page.url()).toContain("#90-45/");
+    expect(Math.hypot(...from.map((part, k) => part - (to[k] ?? 0)))).toBeLessThan(2);
+  },
+};
+
+test("there are ten, and the page that lists them names all", () => {
+  expect(FILES.sort()).toEqual([...ORDER.map((name) => `${name}.html`), "examples.html"].sort());
+  const index = readFileSync(join(FOLDER, "examples.html"), "utf8");
+  expect([...index.matchAll(/<li><a href="(\w+)\.html">/g)].map(([, name]) => name)).toEqual(ORDER);
+  for (const file of FILES) expect(readFileSync(join(FOLDER, file), "utf8")).not.toMatch(/\son\w+=|innerHTML|https?:\/\/(?!.*example\.org)/);
+});
+
+test.each(["examples", ...ORDER])("%s", async (name) => {
+  const { page, problems } = await bed.openPage({ locale: "en-GB", timezoneId: "Europe/Berlin" });
+  await page.goto(`${bed.server.origin}/examples/${name}.html`);
+  if (name !== "examples") await page.locator("canvas").first().waitFor();
+  const picture = await still(page);
+  await page.screenshot({ path: `${OUT}/example-${name}.png` });
+  if (name !== "examples") expect(await colours(page, ".map3d")).toBeGreaterThan(COLOURS);
+  await POINTS[name]?.(page, picture);
+  const nameless = await page.locator("button, input, select, a").evaluateAll((all) => all.filter((node) => !(node.textContent.trim() || node.ariaLabel || (node as HTMLInputElement).labels?.length)).map((node) => node.outerHTML));
+  expect(nameless).toEqual([]);
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
