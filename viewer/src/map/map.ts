@@ -99,6 +99,16 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
     return this.#layers;
   }
 
+  /** Whose data is shown. */
+  get attributions(): readonly string[] {
+    return [...new Set(this.#layers.map(({ attribution }) => attribution).filter((text) => text !== ""))];
+  }
+
+  /** @internal Markers on it. */
+  get markers(): readonly marker[] {
+    return [...this.#items].filter((item) => item instanceof marker);
+  }
+
   get container(): HTMLElement {
     return this.#viewport.container;
   }
@@ -337,7 +347,7 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
     const { controlPane, overlayPane } = this.#viewport;
     overlayPane.append(this.#debug.pane);
     if (this.options.controls) controlPane.append(controls(this), scaleBar(this));
-    if (this.options.attribution) controlPane.append(attributionLine(this, () => this.#layers.map((layer) => layer.attribution)));
+    if (this.options.attribution) controlPane.append(attributionLine(this));
   }
 
   #listen(): void {

@@ -29,6 +29,10 @@ export interface MapOptions {
   workers?: number;
   /** Device pixels a CSS pixel are at most this. Default 3. */
   maxPixelRatio?: number;
+  /** Device pixels a CSS pixel, whatever the screen has. Default: those of the screen, up to `maxPixelRatio`. */
+  pixelRatio?: number;
+  /** @internal Tiles of so many levels more than usual. Default 0. */
+  finer?: number;
   /** Of controls and numbers, BCP 47; English, German and French are known. Default: that of the page around the map (its `lang`), else the browser's. */
   language?: string;
   /** "webgl" needs WebGL2; "canvas" does without; "auto" takes WebGL2 where it can be had, else the canvas. Default "auto". */
@@ -37,9 +41,11 @@ export interface MapOptions {
   preserveDrawingBuffer?: boolean;
 }
 
-export type FilledOptions = MapOptions & Required<Omit<MapOptions, "center" | "zoom" | "direction" | "light" | "background" | "language">>;
+/** Those without a default of their own. */
+type Left = "center" | "zoom" | "direction" | "light" | "background" | "language" | "pixelRatio";
+export type FilledOptions = MapOptions & Required<Omit<MapOptions, Left>>;
 
-export const DEFAULTS: Omit<FilledOptions, "center" | "zoom" | "direction" | "light" | "background" | "language"> = {
+export const DEFAULTS: Omit<FilledOptions, Left> = {
   controls: true,
   attribution: true,
   hover: false,
@@ -49,6 +55,7 @@ export const DEFAULTS: Omit<FilledOptions, "center" | "zoom" | "direction" | "li
   maxPixelRatio: 3,
   drawer: "auto",
   preserveDrawingBuffer: false,
+  finer: 0,
 };
 
 export interface ClickEvent extends Pick {
