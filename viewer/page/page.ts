@@ -41,6 +41,10 @@ function open(): void {
     const colors = new Colors(view, layer, address);
     if (layer.rendering) bindPicture({ view, json: layer.rendering.json, legend: () => colors.theme });
     colors.open().catch((reason: unknown) => { toast(String(reason)); });
+    import("./map3d-controls.mjs").then(({ locate, overview }) => {
+      if (layer.rendering?.json.geographic) new locate().addTo(view);
+      new overview().addTo(view);
+    }, (reason: unknown) => { toast(String(reason)); });
     if (id !== undefined) void selection.chooseId(id, null, false);
     if (layer.rendering?.layers.has("depth")) tools = new Tools(view);
   });

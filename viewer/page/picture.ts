@@ -1,7 +1,6 @@
 import type { map, ManifestJson } from "./map3d.mjs";
 import type { PictureLegend, PictureOptions } from "./map3d-print.mjs";
 import { byId, withText } from "./dom";
-import { toast } from "./messages";
 import { language, say } from "./words";
 
 type Side = readonly [long: number, short: number];
@@ -41,9 +40,10 @@ export function bindPicture(shown: Shown): void {
     if (!size) return;
     making = new AbortController();
     const { signal } = making;
+    sayFailed("");
     work(true);
     act(size, signal).then(() => { dialog.close(); }, (reason: unknown) => {
-      if (!signal.aborted) toast(`${say("noPicture")}: ${reason instanceof Error ? reason.message : String(reason)}`);
+      if (!signal.aborted) sayFailed(`${say("noPicture")}: ${reason instanceof Error ? reason.message : String(reason)}`);
     }).finally(() => { work(false); });
   };
   button.addEventListener("click", () => {
@@ -52,6 +52,7 @@ export function bindPicture(shown: Shown): void {
     select.replaceChildren(...sizes.map(({ name }) => new Option(name)));
     select.selectedIndex = Math.min(at, sizes.length - 1);
     note();
+    sayFailed("");
     dialog.showModal();
   });
   select.addEventListener("change", note);
@@ -66,6 +67,11 @@ function sizesOf({ clientWidth: width, clientHeight: height }: HTMLCanvasElement
     name: `${name}, 300 dpi`, width_px: width < height ? short : long, height_px: width < height ? long : short, textScale: PAPER_SCALE,
   }));
   return [...screens.filter(({ width_px, height_px }) => Math.max(width_px, height_px) <= LONGEST_SIDE_PX), ...papers];
+}
+
+function sayFailed(text: string): void {
+  byId("picture-failed").textContent = text;
+  byId("picture-failed").hidden = text === "";
 }
 
 function work(on: boolean): void {

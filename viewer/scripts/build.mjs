@@ -24,7 +24,7 @@ const workers = {
 };
 
 /** Entries beside the core use it by its public names: as a module from map3d.mjs, in a script from the global. */
-const ENTRIES = { measure: "src/measure/index.ts", theme: "src/theme/index.ts", print: "src/print/index.ts" };
+const ENTRIES = { measure: "src/measure/index.ts", theme: "src/theme/index.ts", print: "src/print/index.ts", controls: "src/controls/index.ts" };
 
 const coreAs = (how) => ({
   name: "core",

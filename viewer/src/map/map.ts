@@ -130,6 +130,11 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
     return this.#viewport.overlayPane;
   }
 
+  /** @internal Holds buttons. */
+  get controlPane(): HTMLElement {
+    return this.#viewport.controlPane;
+  }
+
   // Looks
 
   get light(): Readonly<Light> {
