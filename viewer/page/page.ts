@@ -58,6 +58,7 @@ function dress(view: map, layer: imageLayer, info: InfoPanel, selection: Selecti
   document.title = json.title || json.name;
   byId("title").textContent = json.title || json.name;
   byId("progress").hidden = json.complete;
+  byId("saving").hidden = !view.options.dataSaver;
   byId("look").hidden = byId("tools").hidden = false;
   byId("more").addEventListener("click", ({ currentTarget }) => {
     const more = currentTarget as HTMLElement;

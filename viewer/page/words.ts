@@ -1,5 +1,6 @@
 const EN = {
   incomplete: "This rendering is not complete yet.",
+  saving: "Data saver is on: fewer details.",
   search: "Search",
   searchFor: "Search for a name or an address",
   results: "Results",
@@ -54,6 +55,7 @@ type Words = typeof EN;
 
 const DE: Words = {
   incomplete: "Diese Darstellung ist noch nicht vollständig.",
+  saving: "Datensparen ist an: weniger Einzelheiten.",
   search: "Suchen",
   searchFor: "Namen oder Adresse suchen",
   results: "Treffer",
@@ -106,6 +108,7 @@ const DE: Words = {
 
 const FR: Words = {
   incomplete: "Ce rendu n’est pas encore complet.",
+  saving: "Économie de données : moins de détails.",
   search: "Rechercher",
   searchFor: "Rechercher un nom ou une adresse",
   results: "Résultats",

@@ -17,4 +17,9 @@ export const STYLES = `
 .map3d-overview > button { position: relative; display: block; width: 44px; height: 44px; padding: 0; border: 0; border-radius: 12px; background: none; }
 .map3d-overview > button[aria-expanded="true"] { position: absolute; right: 0; top: 0; z-index: 1; }
 .map3d-overview > button[aria-expanded="true"] svg { padding: 3px; border-radius: 6px; background: var(--map3d-panel); }
+@media (forced-colors: active) {
+  .map3d-said, .map3d-overview { border: 1px solid CanvasText; }
+  .map3d-group [aria-pressed="true"] { forced-color-adjust: none; background: Highlight; color: HighlightText; }
+  .map3d-overview-frame, .map3d-accuracy { forced-color-adjust: none; }
+}
 `;

@@ -19,7 +19,7 @@ import { Gestures, type Steered } from "./gestures";
 import { imageLayer } from "./imageLayer";
 import { objectsIn, type Seen } from "./inView";
 import { listenToKeys } from "./keyboard";
-import { DEFAULTS, type ClickEvent, type FilledOptions, type MapOptions } from "./options";
+import { DEFAULTS, savesData, type ClickEvent, type FilledOptions, type MapOptions } from "./options";
 import { Painter } from "./painter";
 import { NOTHING, pickExactly, pickLoaded, type Pick } from "./picker";
 import type { Sight, Stage } from "./stage";
@@ -54,8 +54,10 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
   /** @param target the id of a canvas, or the element  @throws UsageError when there is none */
   constructor(target: string | HTMLElement, options: MapOptions = {}) {
     super();
-    this.options = { ...DEFAULTS, ...options };
-    this.#light = validLight({ ...DEFAULT_LIGHT, ...options.light });
+    const { dataSaver = DEFAULTS.dataSaver } = options;
+    this.options = { ...DEFAULTS, ...options, dataSaver: dataSaver === "auto" ? savesData() : dataSaver };
+    const spared = this.options.dataSaver ? { shadows: false, occlusion: false } : {};
+    this.#light = validLight({ ...DEFAULT_LIGHT, ...spared, ...options.light });
     adoptStyles(document, STYLES);
     this.#viewport = new Viewport(target, () => { this.#resized(); });
     if (options.background !== undefined) this.setBackground(options.background);
@@ -286,7 +288,7 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
 
   /** Layers that somebody reads, besides those that are shown. */
   #kindsRead(): LayerKind[] {
-    return [...new Set([...(this.options.hover ? ["id" as const] : []), ...[...this.#items].flatMap(({ needs }) => needs ?? [])])];
+    return [...new Set([...(this.options.hover && !this.options.dataSaver ? ["id" as const] : []), ...[...this.#items].flatMap(({ needs }) => needs ?? [])])];
   }
 
   #moved(before: Camera | undefined, { zoom }: Camera): void {
@@ -321,7 +323,7 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
 
   #resized(): void {
     const { width, height } = this.size;
-    if (this.camera) this.setCamera({ ...this.camera, width, height });
+    if (this.camera && (this.camera.width !== width || this.camera.height !== height)) this.setCamera({ ...this.camera, width, height });
     this.fire("resize", { width, height });
     this.#redraw();
   }

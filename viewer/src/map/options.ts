@@ -31,6 +31,8 @@ export interface MapOptions {
   maxPixelRatio?: number;
   /** Device pixels a CSS pixel, whatever the screen has. Default: those of the screen, up to `maxPixelRatio`. */
   pixelRatio?: number;
+  /** Fewer bytes: coarser tiles on dense screens, no ids for hovering, shadows and occlusion once they are asked for. "auto": where the browser's user saves data. Default "auto". */
+  dataSaver?: boolean | "auto";
   /** @internal Tiles of so many levels more than usual. Default 0. */
   finer?: number;
   /** Of controls and numbers, BCP 47; English, German and French are known. Default: that of the page around the map (its `lang`), else the browser's. */
@@ -43,9 +45,9 @@ export interface MapOptions {
 
 /** Those without a default of their own. */
 type Left = "center" | "zoom" | "direction" | "light" | "background" | "language" | "pixelRatio";
-export type FilledOptions = MapOptions & Required<Omit<MapOptions, Left>>;
+export type FilledOptions = MapOptions & Required<Omit<MapOptions, Left | "dataSaver">> & { dataSaver: boolean };
 
-export const DEFAULTS: Omit<FilledOptions, Left> = {
+export const DEFAULTS: Required<Omit<MapOptions, Left>> = {
   controls: true,
   attribution: true,
   hover: false,
@@ -55,8 +57,13 @@ export const DEFAULTS: Omit<FilledOptions, Left> = {
   maxPixelRatio: 3,
   drawer: "auto",
   preserveDrawingBuffer: false,
+  dataSaver: "auto",
   finer: 0,
 };
+
+/** Does the browser's user want fewer bytes (Save-Data, or reduced data)? */
+export const savesData = (): boolean =>
+  (navigator as { connection?: { saveData?: boolean } }).connection?.saveData === true || matchMedia("(prefers-reduced-data: reduce)").matches;
 
 export interface ClickEvent extends Pick {
   /** CSS pixels from the container's top left corner. */

@@ -179,9 +179,10 @@ export abstract class Viewing extends Evented<MapEvents> {
 
   /** @internal */
   sight(): Sight | null {
-    const { pixelRatio, maxPixelRatio, finer } = this.options;
+    const { pixelRatio, maxPixelRatio, finer, dataSaver } = this.options;
     const dpr = pixelRatio ?? Math.min(this.size.dpr, maxPixelRatio);
-    return this.camera && this.reference ? { camera: this.camera, origin: this.reference.json.origin, dpr, finer } : null;
+    const spared = dataSaver && dpr >= 1.5 ? 1 : 0;
+    return this.camera && this.reference ? { camera: this.camera, origin: this.reference.json.origin, dpr, finer: finer - spared } : null;
   }
 
   /** @internal As another map's camera, whose origin is given, without limits. */
