@@ -1,6 +1,7 @@
 import { adoptStyles, element, iconButton } from "../core/dom";
 import type { Vec2, Vec3 } from "../core/vec";
 import { Evented, Map3dError, marker, type Attachable, type map } from "../map3d";
+import { besideButton } from "./column";
 import { Circle } from "./circle";
 import { STYLES } from "./styles";
 import { surfaceAt } from "./surface";
@@ -65,16 +66,12 @@ export class locate extends Evented<LocateEvents> implements Attachable<map> {
     this.#button = iconButton("", words.locate, TARGET);
     this.#button.setAttribute("aria-pressed", "false");
     this.#button.addEventListener("click", () => { this.toggle(); });
-    this.#box = element("div", "map3d-group", {}, this.#button);
-    const column = map.controlPane.querySelector(".map3d-buttons") ?? map.controlPane.appendChild(element("div", "map3d-buttons"));
-    column.prepend(this.#box);
-    map.controlPane.append(this.#said);
+    this.#box = besideButton(map, this.#button, this.#said);
   }
 
   onRemove(): void {
     this.clear();
     this.#box?.remove();
-    this.#said.remove();
     this.#map = undefined;
   }
 

@@ -1,6 +1,7 @@
 import { adoptStyles, element, iconButton } from "../core/dom";
 import { add, dot, sub, type Box3, type Vec2 } from "../core/vec";
 import { map, type Attachable } from "../map3d";
+import { besideButton } from "./column";
 import { STYLES } from "./styles";
 import { controlWords } from "./words";
 
@@ -14,7 +15,6 @@ export interface OverviewOptions {
 const NARROW_PX = 640;
 const STEP = 0.25;
 const SHEET = "M3 6l6-2 6 2 6-2v14l-6 2-6-2-6 2zM9 4v14M15 6v14";
-const LESS = "M7 7l10 10M17 10v7h-7";
 const KEYS: Record<string, Vec2> = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 /** A small map of the whole with a frame around what is seen, which can be dragged; a click goes there. */
@@ -52,8 +52,7 @@ export class overview implements Attachable<map> {
     this.#hand.replaceChildren(this.#frame);
     this.#button = iconButton("", words.overview, SHEET);
     this.#button.addEventListener("click", () => { this.toggle(); });
-    this.#box = element("div", "map3d-overview", { role: "group", "aria-label": words.overview }, this.#button, this.#pane);
-    map.controlPane.append(this.#box);
+    this.#box = besideButton(map, this.#button, this.#pane);
     map.moves.on("move", this.#follow);
     map.on("directionchange", this.#turn);
     map.on("lightchange", this.#relight);
@@ -81,7 +80,6 @@ export class overview implements Attachable<map> {
   toggle(open = !this.open): this {
     this.#pane.hidden = !open;
     this.#button.setAttribute("aria-expanded", String(open));
-    this.#button.querySelector("path")?.setAttribute("d", open ? LESS : SHEET);
     if (open) this.#open();
     else this.#close();
     return this;

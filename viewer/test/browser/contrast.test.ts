@@ -15,7 +15,7 @@ test.each([
   const { page, problems } = await bed.openPage(options);
   await page.goto(`${bed.server.origin}/?rendering=${bed.url("town")}`);
   await page.waitForFunction(() => location.hash.length > 5);
-  await page.waitForSelector(".map3d-overview", { state: "attached" });
+  await page.waitForSelector(".map3d-overview-map", { state: "attached" });
   await page.locator("#measure-line").focus();
   await page.keyboard.press("Enter");
   await page.waitForSelector(".map3d-measure", { state: "attached" });

@@ -114,7 +114,7 @@ test("the overview's frame follows the view, and is dragged, clicked and moved b
   await page.getByRole("button", { name: "Overview map" }).click();
   expect(await page.locator("canvas").count()).toBe(1);
   await page.evaluate(() => (globalThis as unknown as Controlled).overview.remove());
-  expect(await page.locator(".map3d-overview").count()).toBe(0);
+  expect(await page.locator(".map3d-overview-map").count()).toBe(0);
   expect(problems).toEqual([]);
   await page.context().close();
   const { page: phone } = await bed.start("town", START, {}, { viewport: { width: 390, height: 844 }, deviceScaleFactor: 3 });
