@@ -13,6 +13,8 @@ export interface OverviewOptions {
 }
 
 const NARROW_PX = 640;
+/** Less is a tap. */
+const TAP_PX = 4;
 const STEP = 0.25;
 const SHEET = "M3 6l6-2 6 2 6-2v14l-6 2-6-2-6 2zM9 4v14M15 6v14";
 const KEYS: Record<string, Vec2> = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
@@ -135,20 +137,24 @@ export class overview implements Attachable<map> {
 
   #steer(): void {
     const { signal } = this.#ending;
-    let last: Vec2 | null = null;
-    this.#hand.addEventListener("pointerdown", (event) => {
-      if (event.button !== 0) return;
-      this.#hand.setPointerCapture(event.pointerId);
+    let hand: { at: Vec2; moved: boolean } | null = null;
+    this.#hand.addEventListener("pointerdown", ({ button, pointerId, target, clientX, clientY }) => {
+      if (button !== 0) return;
+      this.#hand.setPointerCapture(pointerId);
       this.#map?.grab();
-      last = [event.clientX, event.clientY];
-      if (event.target !== this.#frame) this.#goTo(last);
+      hand = { at: [clientX, clientY], moved: target !== this.#frame };
+      if (hand.moved) this.#goTo(hand.at);
     }, { signal });
     this.#hand.addEventListener("pointermove", ({ clientX, clientY }) => {
-      if (!last) return;
-      this.#shift(clientX - last[0], clientY - last[1], false);
-      last = [clientX, clientY];
+      if (!hand || (!hand.moved && Math.hypot(clientX - hand.at[0], clientY - hand.at[1]) < TAP_PX)) return;
+      this.#shift(clientX - hand.at[0], clientY - hand.at[1], false);
+      hand = { at: [clientX, clientY], moved: true };
     }, { signal });
-    for (const type of ["pointerup", "pointercancel"] as const) this.#hand.addEventListener(type, () => { last = null; }, { signal });
+    this.#hand.addEventListener("pointerup", () => {
+      if (hand && !hand.moved) this.#goTo(hand.at);
+      hand = null;
+    }, { signal });
+    this.#hand.addEventListener("pointercancel", () => { hand = null; }, { signal });
     this.#hand.addEventListener("keydown", (event) => {
       const step = KEYS[event.key];
       if (!step || !this.#map) return;

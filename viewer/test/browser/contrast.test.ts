@@ -3,7 +3,7 @@ import { renderTown } from "../fixture/rendering";
 import { TestBed } from "./bed";
 import { OUT } from "./browser";
 
-const bed = new TestBed({ town: renderTown(256, 0.38) });
+const bed = new TestBed({ town: renderTown(256, 0.38), small: renderTown() });
 const DESK = { viewport: { width: 1280, height: 800 } };
 
 test.each([
@@ -26,9 +26,13 @@ test.each([
     const channels = (color: string): number[] => (color.match(/[\d.]+/g) ?? []).map(Number);
     const bright = (color: string): number => channels(color).slice(0, 3).map((c) => c / 255).map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4)).reduce((sum, c, k) => sum + c * ([0.2126, 0.7152, 0.0722][k] ?? 0), 0);
     const ratio = (a: string, b: string): number => { const [x, y] = [bright(a), bright(b)].sort((p, q) => q - p) as [number, number]; return (x + 0.05) / (y + 0.05); };
+    /** Opaque: the element's own background over that of those around it. */
     const behind = (element: Element | null): string => {
-      for (let at = element; at; at = at.parentElement) { const color = getComputedStyle(at).backgroundColor; if ((channels(color)[3] ?? 1) > 0.9) return color; }
-      return getComputedStyle(document.body).backgroundColor;
+      if (!element) return "rgb(255, 255, 255)";
+      const [r = 0, g = 0, b = 0, a = 1] = channels(getComputedStyle(element).backgroundColor);
+      if (a === 1) return `rgb(${String(r)}, ${String(g)}, ${String(b)})`;
+      const below = channels(behind(element.parentElement));
+      return `rgb(${[r, g, b].map((c, k) => a * c + (1 - a) * (below[k] ?? 0)).join(", ")})`;
     };
     const seen = [...document.querySelectorAll<HTMLElement>("h1, .note, button, label, .map3d-attribution, .map3d-scale span, output")].filter((found) => found.getClientRects().length > 0 && !found.matches(":disabled, .skip"));
     const low = seen.filter((found) => found.textContent.trim() !== "").map((found) => [ratio(getComputedStyle(found).color, behind(found)), found.outerHTML.slice(0, 60)] as const).filter(([value]) => value < 7);
@@ -50,14 +54,17 @@ test("who saves data gets coarser tiles on a dense screen, no ids for hovering, 
   for (const kind of ["saved", "full"] as const) {
     const { page } = await bed.openPage({ viewport: { width: 390, height: 844 }, deviceScaleFactor: 3, isMobile: true });
     if (kind === "saved") await page.addInitScript(() => { Object.defineProperty(navigator, "connection", { value: { saveData: true } }); });
-    bed.server.requests.length = 0;
     await page.goto(`${bed.server.origin}/?rendering=${bed.url("town")}`);
     await page.waitForFunction(() => location.hash.length > 5);
     await page.waitForTimeout(1500);
     expect(await page.locator("#saving").isVisible()).toBe(kind === "saved");
     if (kind === "saved") await page.screenshot({ path: `${OUT}/saving.png` });
-    const levels = bed.server.requests.flatMap((url) => /\/color\/(\d+)\//.exec(url)?.[1] ?? []).map(Number);
-    deepest[kind] = Math.max(...levels);
+    await page.context().close();
+  }
+  for (const kind of ["saved", "full"] as const) {
+    bed.server.requests.length = 0;
+    const { page } = await bed.start("small", { zoom: -9, dataSaver: kind === "saved" }, {}, { viewport: { width: 390, height: 844 }, deviceScaleFactor: 3 });
+    deepest[kind] = Math.max(...bed.server.requests.flatMap((url) => /\/color\/(\d+)\//.exec(url)?.[1] ?? []).map(Number));
     await page.context().close();
   }
   expect(deepest.saved).toBe(deepest.full - 1);

@@ -8,7 +8,9 @@ import { OUT } from "./browser";
 import type { Global } from "./page";
 
 const town = renderTown();
-const bed = new TestBed({ town, placeless: { ...town, json: (({ geographic: _, ...rest }) => rest)(town.json) } });
+const placeless = { ...town, json: { ...town.json } };
+delete placeless.json.geographic;
+const bed = new TestBed({ town, placeless });
 type Controlled = Global & { map3d: typeof Controls; control: Controls.locate; overview: Controls.overview };
 
 const START = { zoom: 3, center: [ORIGIN[0], ORIGIN[1], ORIGIN[2]] };
@@ -28,6 +30,7 @@ test("the reader is shown on the surface with a circle as large as the accuracy;
     await button.click();
     await page.waitForSelector(".map3d-accuracy");
     expect(await page.locator(".map3d-marker").getAttribute("aria-label")).toBe("Sie sind hier, ± 12 m");
+    await page.waitForTimeout(500);
     const [center, zoom, circle, wide] = await page.evaluate(() => {
       const { map } = globalThis as Global;
       return [map.unproject([400, 300]), map.zoom, document.querySelector(".map3d-accuracy path")?.getBoundingClientRect().width, 24 / map.metresPerPixel] as const;
@@ -74,7 +77,7 @@ const stateOf = (page: Page): Promise<{ x: number; y: number; width: number; hei
 });
 
 test("the overview's frame follows the view, and is dragged, clicked and moved by keys; it turns along; on phones only its button is there", async () => {
-  const { page, problems } = await bed.start("town", START, {}, { reducedMotion: "reduce" });
+  const { page, problems } = await bed.start("town", { ...START, zoom: 4.5 }, {}, { reducedMotion: "reduce" });
   await page.addScriptTag({ url: "/map3d-controls.js" });
   await page.evaluate(() => new Promise<void>((done) => {
     const g = globalThis as unknown as Controlled;

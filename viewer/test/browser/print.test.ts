@@ -80,8 +80,8 @@ test("title, legend, markers, scale bar and attribution stand on it; what is ask
   bed.server.failures.clear();
   expect(lost).toMatch(/^FetchError: .*HTTP 503/);
   const legend = { title: "Height", classes: [{ label: "low", color: "#ff0000" }, { label: "high", color: "#00ff00" }] };
-  const { width, height, bytes } = await exported(page, { width_px: 3508, height_px: 2480, title: "A small town", legend, textScale: 3.125 }, `${OUT}/print-a4.png`);
-  expect([width, height]).toEqual([3508, 2480]);
+  const { width, height, bytes } = await exported(page, { width_px: 1754, height_px: 1240, title: "A small town", legend, textScale: 1.5625 }, `${OUT}/print-a4.png`);
+  expect([width, height]).toEqual([1754, 1240]);
   const has = (color: readonly number[]): boolean => {
     for (let k = 0; k < bytes.length; k += 4) if (color.every((part, j) => bytes[k + j] === part)) return true;
     return false;
