@@ -142,7 +142,7 @@ function positionOf(words: ControlWords): Promise<GeolocationPosition> {
   return new Promise((resolve, reject) => {
     navigator.geolocation.getCurrentPosition(resolve, ({ code, PERMISSION_DENIED }) => {
       reject(new Map3dError(code === PERMISSION_DENIED ? words.denied : words.unavailable));
-    }, { enableHighAccuracy: true, timeout: WAIT_MS, maximumAge: 10_000 });
+    }, { enableHighAccuracy: true, timeout: WAIT_MS, maximumAge: 0 });
   });
 }
 
