@@ -20,6 +20,11 @@ export class Colors {
     [this.#view, this.#layer, this.#address] = [view, layer, address];
   }
 
+  /** What colours the objects. */
+  get theme(): theme | undefined {
+    return this.#theme;
+  }
+
   /** Offers what the objects have; takes the attribute that the address names. */
   async open(): Promise<void> {
     const all = (await this.#layer.attributes()).filter(tells);

@@ -54,6 +54,7 @@ function firstMoment({ json }: Rendering): Date {
 
 function bindShadows(view: map, { layers }: Rendering): void {
   const box = inputById("shadows");
+  box.checked = view.light.shadows;
   byId("shading").hidden = !["sun", "sun16", "ao"].some((kind) => layers.has(kind));
   box.addEventListener("change", () => view.setLight({ shadows: box.checked, occlusion: box.checked }));
 }

@@ -6,6 +6,7 @@ import { bindLight, lightAt } from "./light";
 import { Tools } from "./tools";
 import { bindModes } from "./modes";
 import { bindSearch } from "./search";
+import { bindPicture } from "./picture";
 import { readPlace } from "./place";
 import { bindSeen } from "./seen";
 import { Selection } from "./selection";
@@ -37,7 +38,13 @@ function open(): void {
   layer.on("ready", () => {
     dress(view, layer, info, selection, time);
     address.by = by ?? "";
-    new Colors(view, layer, address).open().catch((reason: unknown) => { toast(String(reason)); });
+    const colors = new Colors(view, layer, address);
+    if (layer.rendering) bindPicture({ view, json: layer.rendering.json, legend: () => colors.theme });
+    colors.open().catch((reason: unknown) => { toast(String(reason)); });
+    import("./map3d-controls.mjs").then(({ locate, overview }) => {
+      if (layer.rendering?.json.geographic) new locate().addTo(view);
+      new overview().addTo(view);
+    }, (reason: unknown) => { toast(String(reason)); });
     if (id !== undefined) void selection.chooseId(id, null, false);
     if (layer.rendering?.layers.has("depth")) tools = new Tools(view);
   });
@@ -51,7 +58,8 @@ function dress(view: map, layer: imageLayer, info: InfoPanel, selection: Selecti
   document.title = json.title || json.name;
   byId("title").textContent = json.title || json.name;
   byId("progress").hidden = json.complete;
-  byId("look").hidden = false;
+  byId("saving").hidden = !view.options.dataSaver;
+  byId("look").hidden = byId("tools").hidden = false;
   byId("more").addEventListener("click", ({ currentTarget }) => {
     const more = currentTarget as HTMLElement;
     more.setAttribute("aria-expanded", String(more.getAttribute("aria-expanded") !== "true"));

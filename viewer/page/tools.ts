@@ -16,8 +16,10 @@ export class Tools {
   constructor(view: map) {
     this.#view = view;
     this.#buttons = new Map((["line", "area"] as const).map((kind) => [kind, byId(`measure-${kind}`)]));
-    for (const [kind, button] of this.#buttons) button.addEventListener("click", () => void this.#choose(this.#kind === kind ? null : kind));
-    byId("tools").hidden = false;
+    for (const [kind, button] of this.#buttons) {
+      button.addEventListener("click", () => void this.#choose(this.#kind === kind ? null : kind));
+      button.hidden = false;
+    }
   }
 
   /** Clicks on the map belong to a tool. */

@@ -2,9 +2,11 @@
 export const ENTRIES = {
   cluster: "src/cluster/index.ts",
   compare: "src/compare/index.ts",
+  controls: "src/controls/index.ts",
   element: "src/element/index.ts",
   geojson: "src/geojson/index.ts",
   measure: "src/measure/index.ts",
   orbit: "src/orbit/index.ts",
+  print: "src/print/index.ts",
   theme: "src/theme/index.ts",
 };

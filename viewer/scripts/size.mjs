@@ -11,10 +11,12 @@ const BUDGET = {
   core: 50,
   cluster: 4,
   compare: 4,
+  controls: 6,
   element: 4,
   geojson: 12,
   measure: 5,
   orbit: 7,
+  print: 5,
   theme: 4,
   full: 130,
 };

@@ -61,13 +61,18 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
   /** There will be no manifest. */
   #failed = false;
 
-  constructor(urls: string | readonly string[], options: ImageLayerOptions = {}) {
+  constructor(urls: string | readonly string[] | Source, options: ImageLayerOptions = {}) {
     super();
-    const list = typeof urls === "string" ? [urls] : urls;
-    if (list.length === 0) throw new UsageError("an imageLayer needs at least one base URL, e.g. \"https://host/tiles/teatime\"");
     this.options = { mode: "lit", opacity: 1, highlightColor: "#e4572e", combine: true, ...options };
     this.#mode = checkedMode(this.options.mode);
-    this.#source = new Source(list.map((url) => baseUrl(url, document.baseURI)));
+    this.#source = urls instanceof Source ? urls : sourceOf(urls);
+  }
+
+  /** @internal The same rendering with the same looks, for another map. */
+  copy(): imageLayer {
+    const made = new imageLayer(this.#source, { ...this.options, mode: this.#mode });
+    made.#finishes = this.#finishes;
+    return made.#setColors(this.#colors);
   }
 
   /** Puts it over the layers that are there; its tiles are fetched from now on. */
@@ -322,6 +327,12 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
     this.#stage?.request();
     return this;
   }
+}
+
+function sourceOf(urls: string | readonly string[]): Source {
+  const list = typeof urls === "string" ? [urls] : urls;
+  if (list.length === 0) throw new UsageError("an imageLayer needs at least one base URL, e.g. \"https://host/tiles/teatime\"");
+  return new Source(list.map((url) => baseUrl(url, document.baseURI)));
 }
 
 /** A rendering's layers by kind, with the one that has the shadows. */

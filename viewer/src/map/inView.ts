@@ -13,14 +13,14 @@ export interface Seen {
 
 /** Objects of a layer that are seen, the largest first. Fetches the id tiles of the level that is shown. @throws what a fetch threw */
 export async function objectsIn(layer: imageLayer, sight: Sight): Promise<Seen[]> {
-  const { camera, dpr } = sight;
+  const { camera, dpr, finer } = sight;
   const [view, info] = [layer.viewOf(camera.frame), layer.rendering?.layers.get("id")];
   const { rendering, store } = layer;
   if (!view || !rendering || !info || !store) return [];
   const { frame } = view;
   const px = cssPixelM(camera);
   const rect = rectAround(...middleIn(frame, sight, rendering), camera, px);
-  const level = levelFor(frame, px / dpr, dpr);
+  const level = levelFor(frame, px / dpr, dpr, finer);
   const pixel_m = frame.size / (frame.tilePx * 2 ** level);
   const counts = new Map<number, number>();
   const [[left, bottom], [right, top]] = rect;

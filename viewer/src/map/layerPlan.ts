@@ -49,11 +49,11 @@ export interface Wanted {
 
 export function planLayer(sight: Sight, rendering: Rendering, view: View, store: Store, { baked, layers, needed, extra }: Wanted): LayerPlan {
   const { frame, occupancy } = view;
-  const { camera, dpr } = sight;
+  const { camera, dpr, finer } = sight;
   const [u, v] = middleIn(frame, sight, rendering);
   const px = cssPixelM(camera);
   const rect = rectAround(u, v, camera, px);
-  const level = levelFor(frame, px / dpr, dpr);
+  const level = levelFor(frame, px / dpr, dpr, finer);
   const occupied = (tile: Tile): boolean => occupancy.has(tile);
   const cover = coverOf(frame, occupied, level, rect);
   const here = (kind: LayerKind, tile: Tile): boolean => holds(layers, store, view, kind, tile);

@@ -19,7 +19,7 @@ import { Gestures, type Steered } from "./gestures";
 import { imageLayer } from "./imageLayer";
 import { objectsIn, type Seen } from "./inView";
 import { listenToKeys } from "./keyboard";
-import { DEFAULTS, type ClickEvent, type FilledOptions, type MapOptions } from "./options";
+import { DEFAULTS, savesData, type ClickEvent, type FilledOptions, type MapOptions } from "./options";
 import { Painter } from "./painter";
 import { NOTHING, pickExactly, pickLoaded, type Pick } from "./picker";
 import { Relief } from "./relief";
@@ -56,8 +56,10 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
   /** @param target the id of a canvas, or the element  @throws UsageError when there is none */
   constructor(target: string | HTMLElement, options: MapOptions = {}) {
     super();
-    this.options = { ...DEFAULTS, ...options };
-    this.#light = validLight({ ...DEFAULT_LIGHT, ...options.light });
+    const { dataSaver = DEFAULTS.dataSaver } = options;
+    this.options = { ...DEFAULTS, ...options, dataSaver: dataSaver === "auto" ? savesData() : dataSaver };
+    const spared = this.options.dataSaver ? { shadows: false, occlusion: false } : {};
+    this.#light = validLight({ ...DEFAULT_LIGHT, ...spared, ...options.light });
     adoptStyles(document, STYLES);
     this.#viewport = new Viewport(target, () => { this.#resized(); });
     if (options.background !== undefined) this.setBackground(options.background);
@@ -102,6 +104,16 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
     return this.#layers;
   }
 
+  /** Whose data is shown. */
+  get attributions(): readonly string[] {
+    return [...new Set(this.#layers.map(({ attribution }) => attribution).filter((text) => text !== ""))];
+  }
+
+  /** @internal Markers on it. */
+  get markers(): readonly marker[] {
+    return [...this.#items].filter((item) => item instanceof marker);
+  }
+
   /** What the canvas lies in, with markers, popups and controls. */
   get container(): HTMLElement {
     return this.#viewport.container;
@@ -123,6 +135,11 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
 
   get overlayPane(): HTMLElement {
     return this.#viewport.overlayPane;
+  }
+
+  /** @internal Holds buttons. */
+  get controlPane(): HTMLElement {
+    return this.#viewport.controlPane;
   }
 
   // Looks
@@ -298,7 +315,7 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
 
   /** Layers that somebody reads, besides those that are shown. */
   #kindsRead(): LayerKind[] {
-    return [...new Set([...(this.options.hover ? ["id" as const] : []), ...[...this.#items].flatMap(({ needs }) => needs ?? [])])];
+    return [...new Set([...(this.options.hover && !this.options.dataSaver ? ["id" as const] : []), ...[...this.#items].flatMap(({ needs }) => needs ?? [])])];
   }
 
   #moved(before: Camera | undefined, { zoom }: Camera): void {
@@ -333,7 +350,7 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
 
   #resized(): void {
     const { width, height } = this.size;
-    if (this.camera) this.setCamera({ ...this.camera, width, height });
+    if (this.camera && (this.camera.width !== width || this.camera.height !== height)) this.setCamera({ ...this.camera, width, height });
     this.fire("resize", { width, height });
     this.#redraw();
   }
@@ -364,7 +381,7 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
     const { controlPane, overlayPane } = this.#viewport;
     overlayPane.append(this.#debug.pane);
     if (this.options.controls) controlPane.append(controls(this), scaleBar(this));
-    if (this.options.attribution) controlPane.append(attributionLine(this, () => this.#layers.map((layer) => layer.attribution)));
+    if (this.options.attribution) controlPane.append(attributionLine(this));
   }
 
   #listen(): void {

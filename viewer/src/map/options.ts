@@ -30,6 +30,12 @@ export interface MapOptions {
   workers?: number;
   /** Device pixels a CSS pixel are at most this. Default 3. */
   maxPixelRatio?: number;
+  /** Device pixels a CSS pixel, whatever the screen has. Default: those of the screen, up to `maxPixelRatio`. */
+  pixelRatio?: number;
+  /** Fewer bytes: coarser tiles on dense screens, no ids for hovering, shadows and occlusion once they are asked for. "auto": where the browser's user saves data. Default "auto". */
+  dataSaver?: boolean | "auto";
+  /** @internal Tiles of so many levels more than usual. Default 0. */
+  finer?: number;
   /** Of controls and numbers, BCP 47; English, German and French are known. Default: that of the page around the map (its `lang`), else the browser's. */
   language?: string;
   /** "webgl" needs WebGL2; "canvas" does without; "auto" takes WebGL2 where it can be had, else the canvas. Default "auto". */
@@ -38,9 +44,11 @@ export interface MapOptions {
   preserveDrawingBuffer?: boolean;
 }
 
-export type FilledOptions = MapOptions & Required<Omit<MapOptions, "center" | "zoom" | "direction" | "light" | "background" | "language">>;
+/** Those without a default of their own. */
+type Left = "center" | "zoom" | "direction" | "light" | "background" | "language" | "pixelRatio";
+export type FilledOptions = MapOptions & Required<Omit<MapOptions, Left | "dataSaver">> & { dataSaver: boolean };
 
-export const DEFAULTS: Omit<FilledOptions, "center" | "zoom" | "direction" | "light" | "background" | "language"> = {
+export const DEFAULTS: Required<Omit<MapOptions, Left>> = {
   controls: true,
   attribution: true,
   hover: false,
@@ -50,7 +58,13 @@ export const DEFAULTS: Omit<FilledOptions, "center" | "zoom" | "direction" | "li
   maxPixelRatio: 3,
   drawer: "auto",
   preserveDrawingBuffer: false,
+  dataSaver: "auto",
+  finer: 0,
 };
+
+/** Does the browser's user want fewer bytes (Save-Data, or reduced data)? */
+export const savesData = (): boolean =>
+  (navigator as { connection?: { saveData?: boolean } }).connection?.saveData === true || matchMedia("(prefers-reduced-data: reduce)").matches;
 
 export interface ClickEvent extends Pick {
   /** CSS pixels from the container's top left corner. */

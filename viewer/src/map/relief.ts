@@ -7,6 +7,7 @@ import { coverOf, levelFor, type Rect } from "../tiles/cover";
 import type { Store } from "../tiles/store";
 import { NO_DEPTH } from "../tiles/tileData";
 import type { imageLayer } from "./imageLayer";
+import { DEPTH_UNIT_M } from "./layerPlan";
 import type { Sight } from "./stage";
 
 /** Surfaces that go on from a pixel to the next are at most so steep: metres of depth a metre across. */
@@ -31,10 +32,10 @@ export class Relief {
   readonly #bias_m: number;
 
   constructor(layers: readonly imageLayer[], sight: Sight) {
-    const { camera, origin, dpr } = sight;
+    const { camera, origin, dpr, finer } = sight;
     [this.camera, this.origin, this.dpr] = [camera, origin, dpr];
     const px = cssPixelM(camera) / dpr;
-    this.level = levelFor(camera.frame, px, dpr);
+    this.level = levelFor(camera.frame, px, dpr, finer);
     this.pixel_m = pixelM(camera.frame, this.level);
     const { up, forward } = camera.frame.axes;
     this.#bias_m = LEAST_BIAS_M + (this.pixel_m / 2) * (1 + up[2] / Math.max(-forward[2], 0.05));
@@ -129,11 +130,11 @@ class Sheet {
     return view && store && rendering?.layers.has("depth") ? new Sheet(layer, view, rendering, store, sight, px) : null;
   }
 
-  private constructor(layer: imageLayer, view: View, { json, layers }: Rendering, store: Store, { origin, dpr }: Sight, px: number) {
+  private constructor(layer: imageLayer, view: View, { json, layers }: Rendering, store: Store, { origin, dpr, finer }: Sight, px: number) {
     [this.#layer, this.#view] = [layer, view];
-    this.#level = levelFor(view.frame, px, dpr);
+    this.#level = levelFor(view.frame, px, dpr, finer);
     this.#side = 2 ** this.#level;
-    this.#unit_m = layers.get("depth")?.unit_m ?? 2 ** -10;
+    this.#unit_m = layers.get("depth")?.unit_m ?? DEPTH_UNIT_M;
     this.#shift = uvdFromLocal(view.frame.axes, sub(origin, json.origin));
     this.#read = (kind, tile) => {
       const info = layers.get(kind);

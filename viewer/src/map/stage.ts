@@ -24,4 +24,6 @@ export interface Sight {
   readonly camera: Camera;
   readonly origin: Vec3;
   readonly dpr: number;
+  /** Levels by which tiles are finer than is usual for the pixels; negative: coarser. */
+  readonly finer: number;
 }

@@ -1,6 +1,6 @@
 import { UsageError } from "../core/errors";
 import { Evented } from "../core/events";
-import { add, clamp, mid, sub, type Box3, type Vec2, type Vec3 } from "../core/vec";
+import { add, clamp, dot, mid, sub, type Box3, type Vec2, type Vec3 } from "../core/vec";
 import { depthAtHeight, localFromUvd, uvdFromLocal } from "../geo/axes";
 import { cssPixelM, projectedBox, screenFromLocal, uvFromScreen, zoomedAt, zoomToFit, type Camera } from "../geo/camera";
 import { localFromLonLat, lonLatOf } from "../geo/geographic";
@@ -220,9 +220,22 @@ export abstract class Viewing extends Evented<MapEvents> {
     if (!still()) this.motion.glide(velocity);
   }
 
-  protected sight(): Sight | null {
-    const dpr = Math.min(this.size.dpr, this.options.maxPixelRatio);
-    return this.camera && this.reference ? { camera: this.camera, origin: this.reference.json.origin, dpr } : null;
+  /** @internal */
+  sight(): Sight | null {
+    const { pixelRatio, maxPixelRatio, finer, dataSaver } = this.options;
+    const dpr = pixelRatio ?? Math.min(this.size.dpr, maxPixelRatio);
+    const spared = dataSaver && dpr >= 1.5 ? 1 : 0;
+    return this.camera && this.reference ? { camera: this.camera, origin: this.reference.json.origin, dpr, finer: finer - spared } : null;
+  }
+
+  /** @internal As another map's camera, whose origin is given, without limits. */
+  look(camera: Camera, origin: Vec3): this {
+    const { width, height } = this.size;
+    const shift = sub(origin, this.reference?.json.origin ?? origin);
+    const { right, up } = camera.frame.axes;
+    this.camera = { ...camera, width, height, u: camera.u + dot(right, shift), v: camera.v + dot(up, shift) };
+    this.requestFrame();
+    return this;
   }
 
   protected get moving(): boolean {

@@ -17,4 +17,6 @@ export const STYLES = `
 .map3d-legend-ordered i { width: auto; height: 12px; border-radius: 0; }
 .map3d-legend-ordered li:first-child i { border-radius: 6px 0 0 6px; }
 .map3d-legend-ordered li:last-child i { border-radius: 0 6px 6px 0; }
+.map3d-legend i { forced-color-adjust: none; }
+@media (prefers-contrast: more), (forced-colors: active) { .map3d-legend-chosen button[aria-pressed] { opacity: 1; } .map3d-legend button[aria-pressed="true"] { outline: 2px solid; outline-offset: -2px; } .map3d-legend i { box-shadow: inset 0 0 0 1px CanvasText; } }
 `;

@@ -36,6 +36,7 @@ export class theme extends Evented<ThemeEvents> implements Attachable<map> {
   #map: map | undefined;
   #legend: Legend | undefined;
   #classes: readonly ThemeClass[] = [];
+  #chosen: readonly ThemeClass[] = [];
 
   /** The attribute: its name, or one of the layer's `attributes()`. The layer must be on the map, and ready, once the theme is added. */
   constructor(layer: imageLayer, attribute: string | AttributeInfo, options: ThemeOptions = {}) {
@@ -63,6 +64,16 @@ export class theme extends Evented<ThemeEvents> implements Attachable<map> {
     return this.#classes;
   }
 
+  /** Classes that are pressed in the legend; without any, all. */
+  get chosen(): readonly ThemeClass[] {
+    return this.#chosen;
+  }
+
+  /** Of the legend. */
+  get title(): string {
+    return this.options.title ?? this.#name;
+  }
+
   onAdd(map: map): void {
     this.#map = map;
     adoptStyles(document, STYLES);
@@ -79,7 +90,7 @@ export class theme extends Evented<ThemeEvents> implements Attachable<map> {
     this.#legend?.box.remove();
     this.#legend = undefined;
     if (this.#classes.length > 0) this.#layer.setStyle({});
-    this.#classes = [];
+    this.#classes = this.#chosen = [];
   }
 
   async #load(map: map): Promise<void> {
@@ -103,9 +114,9 @@ export class theme extends Evented<ThemeEvents> implements Attachable<map> {
   #show(map: map, found: Classes): void {
     this.#classes = found.classes;
     this.#paint(new Set());
-    const { legend, title = this.#name } = this.options;
+    const { legend } = this.options;
     if (legend !== null) {
-      this.#legend = new Legend(title, found, (chosen) => { this.#paint(chosen); });
+      this.#legend = new Legend(this.title, found, (chosen) => { this.#paint(chosen); });
       (legend ?? map.overlayPane).append(this.#legend.box);
     }
     this.fire("ready", { classes: this.#classes });
@@ -113,8 +124,8 @@ export class theme extends Evented<ThemeEvents> implements Attachable<map> {
 
   /** Classes by their places; none: all. */
   #paint(chosen: ReadonlySet<number>): void {
-    const shown = this.#classes.filter((_, k) => chosen.size === 0 || chosen.has(k));
-    const colors = new Map(shown.flatMap(({ ids, color }) => ids.map((id) => [id, color] as const)));
+    this.#chosen = this.#classes.filter((_, k) => chosen.size === 0 || chosen.has(k));
+    const colors = new Map(this.#chosen.flatMap(({ ids, color }) => ids.map((id) => [id, color] as const)));
     this.#layer.setStyle({ colors, only: colors.keys(), others: this.options.others ?? "dimmed" });
   }
 }

@@ -1,10 +1,16 @@
 import { element } from "../core/dom";
 
+/** What the line needs of a map. */
+export interface Credited {
+  readonly attributions: readonly string[];
+  on(type: "ready" | "load", listener: () => void): unknown;
+}
+
 /** A quiet line that names whose data is shown. */
-export function attributionLine(map: { on(type: "ready" | "load", listener: () => void): unknown }, texts: () => readonly string[]): HTMLElement {
+export function attributionLine(map: Credited): HTMLElement {
   const line = element("p", "map3d-attribution");
   const write = (): void => {
-    line.textContent = [...new Set(texts().filter((text) => text !== ""))].join(" · ");
+    line.textContent = map.attributions.join(" · ");
   };
   map.on("ready", write);
   map.on("load", write);

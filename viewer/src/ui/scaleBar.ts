@@ -1,4 +1,5 @@
 import { element } from "../core/dom";
+import { LONGEST_PX, lengthOf, roundBelow } from "../core/lengths";
 import { wordsOf } from "../core/words";
 
 /** What the bar needs of a map. */
@@ -8,8 +9,6 @@ export interface Scaled {
   readonly language: string;
   on(type: "zoom" | "ready" | "directionchange", listener: () => void): unknown;
 }
-
-const LONGEST_PX = 110;
 
 /** A bar as long as a round number of metres. It holds across the screen everywhere; upwards the ground is foreshortened. */
 export function scaleBar(map: Scaled): HTMLElement {
@@ -29,12 +28,3 @@ export function scaleBar(map: Scaled): HTMLElement {
   show();
   return bar;
 }
-
-/** 1, 2 or 5 times a power of ten. */
-export function roundBelow(value: number): number {
-  const power = 10 ** Math.floor(Math.log10(value));
-  const digit = value / power;
-  return power * (digit >= 5 ? 5 : digit >= 2 ? 2 : 1);
-}
-
-const lengthOf = (metres: number): string => metres >= 1000 ? `${String(metres / 1000)} km` : metres >= 1 ? `${String(metres)} m` : `${String(Math.round(metres * 100))} cm`;

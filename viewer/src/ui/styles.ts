@@ -19,6 +19,15 @@ export const STYLES = `
     --map3d-shadow: 0 1px 2px rgb(0 0 0 / 0.4), 0 4px 16px rgb(0 0 0 / 0.35);
   }
 }
+@media (prefers-contrast: more) {
+  .map3d { --map3d-accent: #004f63; --map3d-background: #fff; --map3d-panel: #fff; --map3d-ink: #000; --map3d-faint: #1c1e20; --map3d-line: #000; --map3d-shadow: 0 0 0 2px #000; }
+}
+@media (prefers-contrast: more) and (prefers-color-scheme: dark) {
+  .map3d { --map3d-accent: #8fe3f7; --map3d-background: #000; --map3d-panel: #000; --map3d-ink: #fff; --map3d-faint: #e8e8e8; --map3d-line: #fff; --map3d-shadow: 0 0 0 2px #fff; }
+}
+@media (forced-colors: active) {
+  .map3d { --map3d-accent: Highlight; --map3d-background: Canvas; --map3d-panel: Canvas; --map3d-ink: CanvasText; --map3d-faint: CanvasText; --map3d-line: CanvasText; }
+}
 .map3d > canvas { touch-action: none; cursor: grab; user-select: none; -webkit-user-select: none; }
 .map3d-dragging > canvas { cursor: grabbing; }
 .map3d:focus-visible::after { content: ""; position: absolute; inset: 0; border: 3px solid var(--map3d-accent); pointer-events: none; z-index: 5; }
@@ -29,6 +38,7 @@ export const STYLES = `
 .map3d-icon { display: block; width: 20px; height: 20px; margin: auto; fill: none; stroke: currentColor; stroke-width: 1.8; stroke-linecap: round; stroke-linejoin: round; }
 
 .map3d-buttons { position: absolute; right: max(12px, env(safe-area-inset-right)); bottom: calc(34px + env(safe-area-inset-bottom)); display: grid; gap: 10px; }
+@media (max-height: 500px) { .map3d-buttons { display: flex; flex-flow: column wrap-reverse; justify-content: flex-end; max-height: calc(100% - 46px); } }
 .map3d-group { display: grid; border-radius: 12px; background: var(--map3d-panel); box-shadow: var(--map3d-shadow); overflow: hidden; }
 .map3d-group button { width: 44px; height: 44px; padding: 0; border: 0; background: none; }
 .map3d-group button + button { border-top: 1px solid var(--map3d-line); }
@@ -73,4 +83,18 @@ export const STYLES = `
 .map3d-debug { position: absolute; inset: 0; font: 11px/1.2 ui-monospace, monospace; }
 .map3d-debug > div { position: absolute; box-sizing: border-box; padding: 3px; border: 1px solid rgb(200 30 90 / 0.7); color: rgb(170 10 70); overflow: hidden; }
 .map3d-debug > p { position: absolute; top: 4px; left: 4px; margin: 0; padding: 2px 6px; background: var(--map3d-panel); }
+
+@media (prefers-contrast: more), (forced-colors: active) {
+  .map3d-scale, .map3d-attribution { background: var(--map3d-panel); }
+  .map3d-group button:disabled { opacity: 0.55; }
+  .map3d-compass .map3d-south { opacity: 1; }
+  .map3d-marker-selected .map3d-marker-label { background: var(--map3d-ink); color: var(--map3d-panel); }
+}
+@media (forced-colors: active) {
+  .map3d-group, .map3d-marker-label, .map3d-popup { border: 1px solid CanvasText; }
+  .map3d-group button:disabled { opacity: 1; color: GrayText; }
+  .map3d-compass path, .map3d-marker::before, .map3d-marker-stem { forced-color-adjust: none; }
+  .map3d-compass .map3d-south { fill: none; stroke: CanvasText; }
+  .map3d-marker-selected .map3d-marker-label { forced-color-adjust: none; background: Highlight; color: HighlightText; }
+}
 `;

@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import type { Rendering } from "../../src/geo/manifest";
 import { neighbourView, tiltedView } from "../../src/map/directions";
-import { roundBelow } from "../../src/ui/scaleBar";
+import { roundBelow } from "../../src/core/lengths";
 
 const VIEWS = [[0, 30], [90, 30], [180, 30], [270, 30], [0, 60], [180, 60], [0, 90]] as const;
 const views = new Map(VIEWS.map(([lookAtDeg, pitchDeg]) => [`${String(lookAtDeg)}-${String(pitchDeg)}`, { frame: { id: `${String(lookAtDeg)}-${String(pitchDeg)}`, lookAtDeg, pitchDeg } }]));

@@ -1,7 +1,7 @@
 import { describe, expect, test, vi } from "vitest";
 import type { Vec2, Vec3 } from "../../src/core/vec";
 import { localFromUvd, uvdFromLocal } from "../../src/geo/axes";
-import { pixelM, tileName, type Tile } from "../../src/geo/frame";
+import { pixelM, tileName, type Frame, type Tile } from "../../src/geo/frame";
 import { readManifest, type LayerInfo, type View } from "../../src/geo/manifest";
 import { Area } from "../../src/geojson/area";
 import { fillHeights, landing } from "../../src/geojson/drape";
@@ -33,12 +33,12 @@ function layerOf({ opacity = 1, hidden, gone }: Made = {}): imageLayer {
     const raw = tileName(tile) === gone ? undefined : town.raw.get(`${view.id}/${info.name}/${tileName(tile)}`);
     return raw && { empty: false, data: { kind: info.name, width: PIXELS, height: PIXELS, values: new Uint32Array(raw.buffer, raw.byteOffset, raw.byteLength / 4) } };
   };
-  return { options: { opacity }, rendering, finishes: hidden === undefined ? null : {}, hides: (id: number) => id === hidden, viewOf: (direction: string) => rendering.views.get(direction), store: { get: stored } } as unknown as imageLayer;
+  return { options: { opacity }, rendering, finishes: hidden === undefined ? null : {}, hides: (id: number) => id === hidden, viewOf: ({ id }: Frame) => rendering.views.get(id), store: { get: stored } } as unknown as imageLayer;
 }
 
 function reliefOf(layers: readonly imageLayer[], direction = "0-45"): Relief {
   const { frame } = rendering.views.get(direction) as View;
-  return new Relief(layers, { camera: { frame, u: 0, v: 0, zoom: 3, width: 800, height: 600 }, origin: ORIGIN, dpr: 1 });
+  return new Relief(layers, { camera: { frame, u: 0, v: 0, zoom: 3, width: 800, height: 600 }, origin: ORIGIN, dpr: 1, finer: 0 });
 }
 
 let state = 7;

@@ -1,0 +1,141 @@
+import { readFileSync, writeFileSync } from "node:fs";
+import { expect, test } from "vitest";
+import type { Page } from "playwright-core";
+import type * as Print from "../../src/print";
+import { renderTown } from "../fixture/rendering";
+import { ORIGIN } from "../fixture/town";
+import { TestBed } from "./bed";
+import { OUT } from "./browser";
+import { picture, settled, type Global } from "./page";
+
+const town = renderTown();
+const bed = new TestBed({ town, fine: renderTown(256, 0.38) });
+type Printing = Global & { map3d: typeof Print };
+const BARE = { scaleBar: false, northArrow: false, attribution: "", background: "transparent", markers: false };
+
+/** A picture's size and its RGBA bytes. */
+async function exported(page: Page, options: object, path?: string): Promise<{ width: number; height: number; bytes: Buffer }> {
+  const [width, height, text, file] = await page.evaluate(async (given) => {
+    const g = globalThis as unknown as Printing;
+    const blob = await g.map3d.exportPicture(g.map, given);
+    const bitmap = await createImageBitmap(blob, { premultiplyAlpha: "none" });
+    const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d") as OffscreenCanvasRenderingContext2D;
+    context.drawImage(bitmap, 0, 0);
+    const base64 = (bytes: Uint8Array | Uint8ClampedArray): string => {
+      let out = "";
+      for (let k = 0; k < bytes.length; k += 8192) out += String.fromCharCode(...bytes.subarray(k, k + 8192));
+      return btoa(out);
+    };
+    return [bitmap.width, bitmap.height, base64(context.getImageData(0, 0, bitmap.width, bitmap.height).data), base64(new Uint8Array(await blob.arrayBuffer()))] as const;
+  }, options);
+  if (path !== undefined) writeFileSync(path, Buffer.from(file, "base64"));
+  return { width, height, bytes: Buffer.from(text, "base64") };
+}
+
+test.each(["webgl", "canvas"])("%s: a picture of the screen's size is what the screen shows; a wider one is put together without seams", async (drawer) => {
+  const { page, problems } = await bed.start("town", { zoom: 3, drawer }, {}, { viewport: { width: 700, height: 500 } });
+  await page.addScriptTag({ url: "/map3d-print.js" });
+  await settled(page, (id) => (globalThis as Global).layer.setStyle({ colors: new Map([[id, "#1389a0"]]) }).highlight(1025), 17);
+  const screen = await picture(page);
+  const same = await exported(page, { ...BARE, scale: 1 });
+  expect([same.width, same.height]).toEqual([700, 500]);
+  let most = 0;
+  for (let k = 0; k < screen.length; k++) if ((screen[k | 3] ?? 0) === 255) most = Math.max(most, Math.abs((screen[k] ?? 0) - (same.bytes[k] ?? 0)));
+  expect(most).toBeLessThanOrEqual(1);
+  // Wider, so that it is made of two pieces: the screen's part of it is the same across their seam.
+  const wide = await exported(page, { ...BARE, width_px: 1600, height_px: 500 });
+  expect([wide.width, wide.height]).toEqual([1600, 500]);
+  let [off, crossed] = [0, 0];
+  for (let y = 0; y < 500; y++) {
+    for (let x = 0; x < 700; x++) {
+      const [a, b] = [4 * (700 * y + x), 4 * (1600 * y + x + 450)];
+      if (screen[a + 3] !== 255) continue;
+      if (x + 450 >= 1024) crossed++;
+      if ([0, 1, 2, 3].some((k) => Math.abs((screen[a + k] ?? 0) - (wide.bytes[b + k] ?? 0)) > 1)) off++;
+    }
+  }
+  expect(crossed).toBeGreaterThan(1_000);
+  expect(off).toBe(0);
+  expect(await page.locator(".map3d").count()).toBe(1);
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
+
+test("title, legend, markers, scale bar and attribution stand on it; what is asked wrongly is an error; it can be stopped; a lost tile is no picture", async () => {
+  const { page } = await bed.start("fine", { zoom: 1.4 }, {}, { viewport: { width: 400, height: 280 } });
+  await page.addScriptTag({ url: "/map3d-print.js" });
+  await page.evaluate((at) => {
+    const g = globalThis as Global;
+    new g.map3d.marker("Tower", at).addTo(g.map);
+  }, [ORIGIN[0] + 32, ORIGIN[1] + 26, ORIGIN[2] + 62] as const);
+  const failed = (options: object): Promise<string> => page.evaluate(async (given) => {
+    const g = globalThis as unknown as Printing;
+    const stop = new AbortController();
+    const signal = "stop" in given ? { signal: stop.signal, progress: () => { stop.abort(new Error("enough")); } } : {};
+    return g.map3d.exportPicture(g.map, { ...given, ...signal }).then(() => "a picture", (reason: unknown) => String(reason));
+  }, options);
+  // Before the browser has them: a picture twice as large needs tiles that the screen does not.
+  bed.server.failures.set("/color/2/", 1e9);
+  const lost = await failed({ scale: 2 });
+  bed.server.failures.clear();
+  expect(lost).toMatch(/^FetchError: .*HTTP 503/);
+  const legend = { title: "Height", classes: [{ label: "low", color: "#ff0000" }, { label: "high", color: "#00ff00" }] };
+  const { width, height, bytes } = await exported(page, { width_px: 1754, height_px: 1240, title: "A small town", legend, textScale: 1.5625 }, `${OUT}/print-a4.png`);
+  expect([width, height]).toEqual([1754, 1240]);
+  const has = (color: readonly number[]): boolean => {
+    for (let k = 0; k < bytes.length; k += 4) if (color.every((part, j) => bytes[k + j] === part)) return true;
+    return false;
+  };
+  expect([has([255, 0, 0, 255]), has([0, 255, 0, 255])]).toEqual([true, true]);
+  expect(await failed({ width_px: 9000, height_px: 20 })).toBe("UsageError: a picture's width is a whole number from 1 to 8192 pixels, got 9000");
+  expect(await failed({ background: "url(x)" })).toBe('UsageError: background "url(x)" is no colour');
+  expect(await failed({ scale: 4, stop: true })).toBe("Error: enough");
+  expect(await page.locator(".map3d").count()).toBe(1);
+  await page.context().close();
+});
+
+const DESK = { viewport: { width: 1280, height: 800 } };
+const PHONE = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 3, isMobile: true, hasTouch: true };
+
+test.each([["desk", DESK], ["phone", PHONE]] as const)("%s: the page saves and prints what it shows, with all that belongs to it", async (name, options) => {
+  const { page, problems } = await bed.openPage({ ...options, acceptDownloads: true });
+  await page.addInitScript(() => { window.print = () => { document.title = "printed"; }; });
+  await page.goto(`${bed.server.origin}/?rendering=${bed.url("fine")}`);
+  await page.waitForSelector("#make-picture");
+  if (name === "phone") await page.locator("#more").tap();
+  await page.selectOption("#by", { label: "measuredHeight" });
+  await page.waitForSelector("#legend button");
+  if (name === "phone") await page.locator("#more").tap();
+  await page.locator("#make-picture").click();
+  await page.selectOption("#picture-size", { index: name === "desk" ? 0 : 1 });
+  await page.screenshot({ path: `${OUT}/${name}-picture.png` });
+  expect(await page.locator("#picture-note").textContent()).toBe(name === "desk" ? "1280 × 800 px" : "780 × 1688 px");
+  const [download] = await Promise.all([page.waitForEvent("download"), page.locator("#picture-save").click()]);
+  expect(download.suggestedFilename()).toBe("town-0-45.png");
+  await download.saveAs(`${OUT}/${name}-saved.png`);
+  expect(readFileSync(`${OUT}/${name}-saved.png`).readUInt32BE(16)).toBe(name === "desk" ? 1280 : 780);
+  await page.waitForSelector("#picture", { state: "hidden" });
+  await page.locator("#make-picture").click();
+  await page.locator("#picture-print").click();
+  await page.waitForFunction(() => document.title === "printed");
+  await page.emulateMedia({ media: "print" });
+  await page.screenshot({ path: `${OUT}/${name}-print.png` });
+  const sheet = (await page.locator("#sheet").innerText()).replace(/\s+/g, " ");
+  for (const part of ["A small town", "measuredHeight", "62", "Made by hand", "Coordinates: ETRS89 / UTM zone 32N", String(new Date().getFullYear())]) expect(sheet).toContain(part);
+  // As when paper has been printed, after which the sheet goes.
+  await page.pdf({ path: `${OUT}/${name}-print.pdf`, preferCSSPageSize: true, printBackground: false });
+  await page.emulateMedia({ media: null });
+  expect(await page.locator("#sheet > *").count()).toBe(0);
+  // Stopped half-way: the dialog is closed, nothing is saved, and it can be had again.
+  await page.locator("#make-picture").click();
+  await page.selectOption("#picture-size", { index: 3 });
+  await page.locator("#picture-save").click();
+  await page.waitForSelector("#picture-working:not([hidden])");
+  await page.screenshot({ path: `${OUT}/${name}-picture-working.png` });
+  await page.keyboard.press("Escape");
+  await page.waitForSelector("#picture-working", { state: "hidden" });
+  await page.locator("#make-picture").click();
+  expect(await page.locator("#picture-save").isEnabled()).toBe(true);
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
