@@ -5,19 +5,21 @@ const NEAR_M = 0.5;
 
 /**
  * The surface over a place on the ground plan, by halving heights: the line of sight through one that is too high passes over the surface and meets
- * something lower, or nothing; through one that is too low it meets something higher before. Where something stands before the place, the lowest that was met.
+ * something lower, or nothing; through one that is too low it meets something higher before. Where something stands before the place, the lowest that was met;
+ * where nothing is, the lowest of all.
  */
 export async function surfaceAt(map: map, [x, y]: Vec2): Promise<Vec3> {
-  let [low, high] = heightsOf(map);
-  let met = high;
-  for (let z = low; ; z = (low + high) / 2) {
+  const [lowest, highest] = heightsOf(map);
+  let [low, high, met] = [lowest, highest, Infinity];
+  for (;;) {
+    const z = (low + high) / 2;
     const point = map.project([x, y, z]);
     const hit = point && (await map.pick(point)).position;
     if (hit && Math.hypot(hit[0] - x, hit[1] - y) < NEAR_M) return [x, y, hit[2]];
     if (hit) met = Math.min(met, hit[2]);
     if (hit && hit[2] > z) low = z;
     else high = z;
-    if (high - low < NEAR_M / 4) return [x, y, met];
+    if (high - low < NEAR_M / 4) return [x, y, Number.isFinite(met) ? met : lowest];
   }
 }
 
