@@ -9,7 +9,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 CACHE := .cache
 RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
-VIEWER := $(shell find viewer/src viewer/page -type f 2>/dev/null) $(wildcard viewer/*.json viewer/*.ts viewer/*.js viewer/*.mjs)
+VIEWER := $(shell find viewer/src viewer/page viewer/scripts -type f 2>/dev/null) $(wildcard viewer/*.json viewer/*.ts viewer/*.js viewer/*.mjs)
 
 .PHONY: help demo test test-all test-rust test-python test-viewer test-browser check check-rust check-python check-viewer bench bench-extent bench-cycles bench-rotterdam bless docs reference build clean tools
 

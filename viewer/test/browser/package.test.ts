@@ -29,7 +29,7 @@ new marker("Town hall", hall).addTo(view);
 const colors = new theme(layer, "measuredHeight").addTo(view);
 const length: LineMeasure = measureLine([hall, [690955, 5335996, 500]]);
 // @ts-expect-error a layer has an address
-new imageLayer(5);
+void (() => new imageLayer(5));
 document.addEventListener("map-click", ({ detail }: CustomEvent<ClickEvent>) => detail.name);
 const element = document.createElement("map-3d");
 element.setAttribute("src", "tiles/town");
