@@ -1,0 +1,81 @@
+// What is measured of a page; each answers with numbers that are printed as they are.
+import { Phone } from "./browser.mjs";
+
+export const median = (values) => {
+  const sorted = [...values].sort((a, b) => a - b);
+  return sorted[Math.floor(sorted.length / 2)];
+};
+
+export const quantile = (values, q) => [...values].sort((a, b) => a - b)[Math.min(values.length - 1, Math.floor(q * values.length))];
+
+/** The first complete view with an empty cache: milliseconds since navigation, requests, bytes. */
+export async function first(server, url, network) {
+  const phone = await Phone.open();
+  try {
+    const before = server.count;
+    const ms = await phone.goto(url, network);
+    const after = server.count;
+    return { ms, requests: after.requests - before.requests, bytes: after.bytes - before.bytes, ...problems(phone) };
+  } finally {
+    await phone.close();
+  }
+}
+
+/** Frames along a path, twice, drawn as fast as it goes: processor milliseconds a frame when everything has been here before, and the first time. */
+export async function frames(server, url, path) {
+  const phone = await Phone.open({ unbound: true });
+  try {
+    await phone.goto(url);
+    const walk = async () => {
+      const [cpu, count] = [phone.cpu(), server.count];
+      const intervals = await phone.page.evaluate((steps) => globalThis.bench.walk(steps), path.steps);
+      const [spent, sent] = [phone.cpu(), server.count];
+      const n = path.steps.length;
+      return {
+        cpu_ms: (spent.all - cpu.all) / n, page_ms: (spent.all - spent.gpu - cpu.all + cpu.gpu) / n, p50_ms: quantile(intervals, 0.5), p95_ms: quantile(intervals, 0.95),
+        requests: sent.requests - count.requests, bytes: sent.bytes - count.bytes,
+      };
+    };
+    const cold = await walk();
+    const warm = await walk();
+    const about = await phone.page.evaluate(() => globalThis.bench.about?.() ?? {});
+    return { cold, warm, about, ...problems(phone) };
+  } finally {
+    await phone.close();
+  }
+}
+
+/** Memory after some seconds of use, and what happens in the idle seconds after that. */
+export async function stays(server, url, path, { use_s, idle_s }) {
+  const phone = await Phone.open();
+  try {
+    await phone.goto(url);
+    const fresh = phone.memory();
+    await phone.page.evaluate(([steps, seconds]) => globalThis.bench.stroll(steps, seconds), [path.steps, use_s]);
+    await phone.page.waitForTimeout(3000);
+    const used = phone.memory();
+    const [cpu, count, drawn] = [phone.cpu(), server.count, await phone.page.evaluate(() => globalThis.bench.frames)];
+    await phone.page.waitForTimeout(1000 * idle_s);
+    const [spent, sent, then] = [phone.cpu(), server.count, await phone.page.evaluate(() => globalThis.bench.frames)];
+    return {
+      fresh, used, after_idle: phone.memory(), use_s,
+      idle: { s: idle_s, frames: then - drawn, requests: sent.requests - count.requests, cpu_ms_per_s: (spent.all - cpu.all) / idle_s }, ...problems(phone),
+    };
+  } finally {
+    await phone.close();
+  }
+}
+
+export async function picture(url, file) {
+  const phone = await Phone.open({ dpr: 2 });
+  try {
+    await phone.goto(url);
+    await phone.page.waitForTimeout(500);
+    await phone.page.screenshot({ path: file, type: "jpeg", quality: 80 });
+    return { file, about: await phone.page.evaluate(() => globalThis.bench.about?.() ?? {}), ...problems(phone) };
+  } finally {
+    await phone.close();
+  }
+}
+
+const problems = (phone) => (phone.problems.length > 0 ? { problems: phone.problems.slice(0, 5) } : {});
