@@ -1,7 +1,7 @@
 """Cities that grow around one district, for the viewer's benchmark: places of 512 m in rings, each an asset of its own (bench/district.py).
 
-The middle place and those next to it are the plain district (80 buildings, elevations every 12.8 m); further rings are the same buildings with windows
-that are modelled and finer elevations, so that ten million triangles need 6.7 km. The middle is the same in all of them, down to its texels.
+The middle place and those next to it are the plain district (80 buildings, elevations every 12.8 m); further rings are the same buildings with
+windows that are modelled and finer elevations, so that ten million triangles need 6.7 km. The middle is the same in all of them, down to its texels.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""The same cities as 3D Tiles 1.1: districts as OBJ, made into GLB by npm's obj2gltf and glTF-Transform (bench/viewer/glb.mjs), in a quadtree of places.
+"""The same cities as 3D Tiles 1.1: districts as OBJ, made into GLB by npm's obj2gltf and glTF-Transform (bench/viewer/glb.mjs), in a quadtree.
 
 A district is cut as its textures are: what shares an atlas is a tile, and so is each piece of the terrain. Every place has addresses of its own
 (the server finds the district's file behind them), as every place has texels of its own in the renderings. Coordinates: metres east, north and up of
@@ -45,7 +45,7 @@ class Part:
 
 
 def tileset(city: City, far: bool = False) -> Path:
-    """Writes what is missing of a city's tileset; returns the file to open. `far`: for looking at all of it, a district is one mesh in plain colours."""
+    """Writes what is missing of a city's tileset; returns the file to open. `far`: to look at all of it, a district is one mesh in plain colours."""
     out = city.folder / "3dtiles"
     out.mkdir(parents=True, exist_ok=True)
     kinds = sorted(set(city.places.values()))
@@ -150,7 +150,7 @@ def _far_district(folder: Path, out: Path, kind: str) -> Box:
 
 
 def plainly_coloured(tiles: list[Part], folder: Path) -> Part:
-    """One part of them all with a picture of 16 × 16 squares of four pixels, which is written into `folder`; a triangle lies in the middle of a square."""
+    """One part of them all; its texture, written into `folder`, has 16 × 16 squares of one colour, and a triangle lies in the middle of one."""
     folder.mkdir(parents=True, exist_ok=True)
     colors = np.concatenate([_colors(part) for part in tiles])
     picture = Image.fromarray(colors[None].astype(np.uint8)).quantize(256, dither=Image.Dither.NONE)
@@ -209,7 +209,10 @@ def _volume(box: Box, error: float | None = None) -> dict[str, Any]:
     """Of a tile; the error of one that shows nothing itself is its diameter."""
     middle, half = (box[0] + box[1]) / 2, (box[1] - box[0]) / 2
     volume = [*middle, half[0], 0, 0, 0, half[1], 0, 0, 0, half[2]]
-    return {"boundingVolume": {"box": [round(float(value), 3) for value in volume]}, "geometricError": 2 * math.dist(half, (0, 0, 0)) if error is None else error}
+    return {
+        "boundingVolume": {"box": [round(float(value), 3) for value in volume]},
+        "geometricError": 2 * math.dist(half, (0, 0, 0)) if error is None else error,
+    }
 
 
 def _moved(box: Box, at: Place) -> Box:

@@ -8,21 +8,24 @@ export const median = (values) => {
 
 export const quantile = (values, q) => [...values].sort((a, b) => a - b)[Math.min(values.length - 1, Math.floor(q * values.length))];
 
-/** The first complete view with an empty cache: milliseconds since navigation, requests, bytes. */
+/** The first complete view with an empty cache: milliseconds since navigation, of processors, requests, bytes. */
 export async function first(server, url, network) {
   const phone = await Phone.open();
   try {
-    const before = server.count;
+    const [before, cpu] = [server.count, phone.cpu()];
     const ms = await phone.goto(url, network);
-    const after = server.count;
-    return { ms, requests: after.requests - before.requests, bytes: after.bytes - before.bytes, ...problems(phone) };
+    const [after, spent] = [server.count, phone.cpu()];
+    return { ms, cpu_ms: spent.all - cpu.all, requests: after.requests - before.requests, bytes: after.bytes - before.bytes, ...problems(phone) };
   } finally {
     await phone.close();
   }
 }
 
-/** Frames along a path, twice, drawn as fast as it goes: processor milliseconds a frame when everything has been here before, and the first time. */
-export async function frames(server, url, path) {
+/** Steps between the stops at which everything along a path is fetched. */
+const STOP = 4;
+
+/** Frames along a path, as many as the machine makes: processor milliseconds a frame. `cold`: the first time; `warm`: once all along the path has been fetched, median of `walks`. */
+export async function frames(server, url, path, walks = 3) {
   const phone = await Phone.open({ unbound: true });
   try {
     await phone.goto(url);
@@ -37,7 +40,10 @@ export async function frames(server, url, path) {
       };
     };
     const cold = await walk();
-    const warm = await walk();
+    await phone.page.evaluate(([steps, every]) => globalThis.bench.visit(steps, every), [path.steps, STOP]);
+    const warmer = [];
+    for (let k = 0; k < walks; k++) warmer.push(await walk());
+    const warm = Object.fromEntries(Object.keys(cold).map((key) => [key, median(warmer.map((one) => one[key]))]));
     const about = await phone.page.evaluate(() => globalThis.bench.about?.() ?? {});
     return { cold, warm, about, ...problems(phone) };
   } finally {

@@ -56,7 +56,7 @@ export class Server {
       else await this.#file(this.#place(root, rest), request, response);
     } catch (reason) {
       if (reason.code !== "ENOENT") console.error(`bench: ${path}: ${reason.stack}`);
-      if (path !== "/favicon.ico") this.missing.push(path); // browsers ask for that by themselves
+      this.missing.push(path);
       response.writeHead(404).end();
     }
   }

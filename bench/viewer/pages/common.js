@@ -30,7 +30,15 @@ bench.walk = async (path) => {
   return intervals;
 };
 
-/** The same at the pace of the screen, over and over for some seconds; the browser stays usable meanwhile. */
+/** Stops at every few steps until everything is there. */
+bench.visit = async (path, every) => {
+  for (let k = 0; k < path.length; k += every) {
+    bench.set(path[k]);
+    await bench.quiet();
+  }
+};
+
+/** Along a path at the pace of the screen, over and over for some seconds; the browser stays usable meanwhile. */
 bench.stroll = async (path, seconds) => {
   const end = performance.now() + 1000 * seconds;
   while (performance.now() < end) {
@@ -41,4 +49,12 @@ bench.stroll = async (path, seconds) => {
     }
   }
   await bench.quiet();
+};
+
+/** For viewers of pictures: the manifest, the view that looks north, and U and V of a step on the ground (spec/pyramid.md). */
+bench.pyramid = async () => {
+  const json = await (await fetch(`${asked.get("base")}/rendering.json`)).json();
+  const view = json.views.find(({ look_at_deg }) => look_at_deg === 0);
+  const tilt = Math.sin((view.pitch_deg * Math.PI) / 180);
+  return { json, view, place: ({ x, y }) => [x, y * tilt] };
 };
