@@ -35,7 +35,7 @@ class Wish:
 
     cities: tuple[str, ...] = tuple(RINGS)
     reps: int = 5
-    length: int = 80
+    length: int = 48
     use_s: int = 300
     idle_s: int = 60
     peers: bool = True

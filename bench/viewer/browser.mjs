@@ -49,6 +49,20 @@ export class Phone {
     return { all, gpu };
   }
 
+  /** Waits until all that was drawn has gone through the rasteriser, which lags behind the page; the page draws no more meanwhile. */
+  async settled() {
+    await this.page.evaluate(() => globalThis.bench.pause?.(true));
+    for (let [last, tries] = [this.cpu().all, 0]; tries < 60; tries++) {
+      await this.page.waitForTimeout(400);
+      const now = this.cpu().all;
+      if (now - last <= 40) break;
+      last = now;
+    }
+    const spent = this.cpu();
+    await this.page.evaluate(() => globalThis.bench.pause?.(false));
+    return spent;
+  }
+
   /** Bytes of all processes: PSS, and the part of it that is no file. */
   memory() {
     let [pss, anonymous] = [0, 0];

@@ -30,9 +30,9 @@ export async function frames(server, url, path, walks = 3) {
   try {
     await phone.goto(url);
     const walk = async () => {
-      const [cpu, count] = [phone.cpu(), server.count];
+      const [cpu, count] = [await phone.settled(), server.count];
       const intervals = await phone.page.evaluate((steps) => globalThis.bench.walk(steps), path.steps);
-      const [spent, sent] = [phone.cpu(), server.count];
+      const [spent, sent] = [await phone.settled(), server.count];
       const n = path.steps.length;
       return {
         cpu_ms: (spent.all - cpu.all) / n, page_ms: (spent.all - spent.gpu - cpu.all + cpu.gpu) / n, p50_ms: quantile(intervals, 0.5), p95_ms: quantile(intervals, 0.95),
@@ -59,10 +59,11 @@ export async function stays(server, url, path, { use_s, idle_s }) {
     const fresh = phone.memory();
     await phone.page.evaluate(([steps, seconds]) => globalThis.bench.stroll(steps, seconds), [path.steps, use_s]);
     await phone.page.waitForTimeout(3000);
+    await phone.settled();
     const used = phone.memory();
-    const [cpu, count, drawn] = [phone.cpu(), server.count, await phone.page.evaluate(() => globalThis.bench.frames)];
+    const [cpu, count, drawn] = [phone.cpu(), server.count, await phone.page.evaluate(() => globalThis.bench.drawn())];
     await phone.page.waitForTimeout(1000 * idle_s);
-    const [spent, sent, then] = [phone.cpu(), server.count, await phone.page.evaluate(() => globalThis.bench.frames)];
+    const [spent, sent, then] = [phone.cpu(), server.count, await phone.page.evaluate(() => globalThis.bench.drawn())];
     return {
       fresh, used, after_idle: phone.memory(), use_s,
       idle: { s: idle_s, frames: then - drawn, requests: sent.requests - count.requests, cpu_ms_per_s: (spent.all - cpu.all) / idle_s }, ...problems(phone),
