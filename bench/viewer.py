@@ -158,13 +158,6 @@ def _tables(samples: Samples) -> list[tuple[str, str, list[Column]]]:
     def ratio(measure: str, *path: str) -> Callable[[str, str], str]:
         return lambda viewer, city: "" if viewer == "map3d" else _number(samples.ratio(measure, viewer, city, *path), "{:.1f}")
 
-    def beyond(*path: str) -> Callable[[str, str], str]:
-        def cell(viewer: str, city: str) -> str:
-            value, empty = samples.median("stays", viewer, city, *path), samples.median("stays", "empty", city, *path)
-            return "" if value is None or empty is None else f"{(value - empty) / 1e6:,.0f}"
-
-        return cell
-
     def first(measure: str) -> list[Column]:
         return [
             ("bytes", plain(measure, "{:,.0f}", "bytes")),
@@ -190,9 +183,8 @@ def _tables(samples: Samples) -> list[tuple[str, str, list[Column]]]:
     stays: list[Column] = [
         ("use, s", plain("stays", "{:.0f}", "use_s")),
         ("PSS, MB", plain("stays", "{:.0f}", "used", "pss", unit=1e6)),
-        ("beyond the empty page, MB", beyond("used", "pss")),
-        ("of it no files", beyond("used", "anonymous")),
-        ("after the first view", beyond("fresh", "pss")),
+        ("beyond the empty page, MB", plain("stays", "{:.0f}", "beyond", "pss", unit=1e6)),
+        ("of it no files", plain("stays", "{:.0f}", "beyond", "anonymous", unit=1e6)),
         ("idle frames", plain("stays", "{:.0f}", "idle", "frames")),
         ("requests", plain("stays", "{:.0f}", "idle", "requests")),
         ("CPU, ms/s", plain("stays", "{:.0f}", "idle", "cpu_ms_per_s")),
@@ -239,8 +231,7 @@ def goals(samples: Samples, names: list[str], middle: str) -> list[str]:
         for viewer in ("cesium", "cesium-device"):
             value = samples.ratio(measure, viewer, middle, "warm", "cpu_ms")
             say(f"five times less CPU a frame than {viewer}, {what}", value, lambda value: value >= LESS_CPU, "{:.1f} times")
-    ours, empty = (samples.median("stays", viewer, middle, "used", "pss") for viewer in ("map3d", "empty"))
-    say("memory at most 150 MB", None if ours is None or empty is None else ours - empty, lambda value: value <= MEMORY_BYTES, "{:,.0f} bytes")
+    say("memory at most 150 MB", samples.median("stays", "map3d", middle, "beyond", "pss"), lambda value: value <= MEMORY_BYTES, "{:,.0f} bytes")
     for what, measure, path, span in (
         ("bytes", "first", ("bytes",), BYTES_SPAN),
         ("requests", "first", ("requests",), BYTES_SPAN),

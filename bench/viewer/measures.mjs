@@ -51,25 +51,29 @@ export async function frames(server, url, path, walks = 3) {
   }
 }
 
-/** Memory after some seconds of use, and what happens in the idle seconds after that. */
-export async function stays(server, url, path, { use_s, idle_s }) {
-  const phone = await Phone.open();
+/**
+ * Memory after some seconds of use, and what happens in the idle seconds after that. An empty canvas in a browser of its own is read at the same moment:
+ * what processes share (the browser's own files) is then divided among the same number for both.
+ */
+export async function stays(server, url, emptyUrl, path, { use_s, idle_s }) {
+  const [phone, empty] = [await Phone.open(), await Phone.open()];
   try {
     await phone.goto(url);
+    await empty.goto(emptyUrl);
     const fresh = phone.memory();
     await phone.page.evaluate(([steps, seconds]) => globalThis.bench.stroll(steps, seconds), [path.steps, use_s]);
     await phone.page.waitForTimeout(3000);
     await phone.settled();
-    const used = phone.memory();
+    const [used, beside] = [phone.memory(), empty.memory()];
     const [cpu, count, drawn] = [phone.cpu(), server.count, await phone.page.evaluate(() => globalThis.bench.drawn())];
     await phone.page.waitForTimeout(1000 * idle_s);
     const [spent, sent, then] = [phone.cpu(), server.count, await phone.page.evaluate(() => globalThis.bench.drawn())];
-    return {
-      fresh, used, after_idle: phone.memory(), use_s,
-      idle: { s: idle_s, frames: then - drawn, requests: sent.requests - count.requests, cpu_ms_per_s: (spent.all - cpu.all) / idle_s }, ...problems(phone),
-    };
+    const idle = { s: idle_s, frames: then - drawn, requests: sent.requests - count.requests, cpu_ms_per_s: (spent.all - cpu.all) / idle_s };
+    const beyond = { pss: used.pss - beside.pss, anonymous: used.anonymous - beside.anonymous };
+    return { fresh, used, empty: beside, beyond, use_s, steps: then, idle, ...problems(phone) };
   } finally {
     await phone.close();
+    await empty.close();
   }
 }
 

@@ -44,7 +44,7 @@ function* round() {
   if (asked.peers) yield ["first-network", "cesium", middle, () => measures.first(server, cesium(middle, district), NETWORK)];
   for (const city of cities) {
     yield ["frames", "map3d", city, () => measures.frames(server, map3d(city, district), district)];
-    if (asked.peers) yield ["frames", "cesium", city, () => measures.frames(server, cesium(city, district), district)];
+    if (asked.peers) yield ["frames", "cesium", city, () => measures.frames(server, cesium(city, district), district, 1)];
   }
   if (asked.peers) yield ["frames", "cesium-device", middle, () => measures.frames(server, cesium(middle, district, DEVICE), districtShort, 1)];
   yield ["whole", "map3d", middle, () => measures.frames(server, map3d(middle, whole), whole)];
@@ -58,12 +58,12 @@ function* round() {
 
 /** Once: minutes of use, and a minute of nothing. */
 function* once() {
+  const empty = page("empty", at(district));
   const times = { use_s: asked.use_s, idle_s: asked.idle_s };
-  yield ["stays", "empty", middle, () => measures.stays(server, page("empty", at(district)), district, { ...times, use_s: 5 })];
-  yield ["stays", "map3d", middle, () => measures.stays(server, map3d(middle, district), district, times)];
+  yield ["stays", "map3d", middle, () => measures.stays(server, map3d(middle, district), empty, district, times)];
   if (!asked.peers) return;
-  yield ["stays", "cesium", middle, () => measures.stays(server, cesium(middle, district), district, times)];
-  yield ["stays", "cesium-onrequest", middle, () => measures.stays(server, cesium(middle, district, { onrequest: "1" }), district, { ...times, use_s: 5 })];
+  yield ["stays", "cesium", middle, () => measures.stays(server, cesium(middle, district), empty, district, times)];
+  yield ["stays", "cesium-onrequest", middle, () => measures.stays(server, cesium(middle, district, { onrequest: "1" }), empty, district, { ...times, use_s: 5 })];
 }
 
 const done = new Map();
