@@ -1,4 +1,4 @@
-"""`python -m bench [PART …] [--json]`; parts: tiles, light, encoding, ingest, incremental (these, unless some are named), extent, stored."""
+"""`python -m bench [PART …] [--json]`; parts: tiles, light, encoding, ingest, incremental (these, unless some are named), extent, stored, viewer."""
 
 import argparse
 import json
@@ -9,11 +9,11 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from . import encoding, extent, incremental, ingest, light, stored, tiles
+from . import encoding, extent, incremental, ingest, light, stored, tiles, viewer
 from .scene import CACHE
 
 PARTS = ("tiles", "light", "encoding", "ingest", "incremental")
-ASKED = ("extent", "stored")
+ASKED = ("extent", "stored", "viewer")
 Rows = list[dict[str, Any]]
 
 
@@ -25,6 +25,10 @@ def main() -> None:
     parser.add_argument("--res", type=float, default=0.2, help="tiles: metres a pixel")
     parser.add_argument("--tiles", type=int, default=48, help="tiles: how many")
     parser.add_argument("--folders", type=Path, nargs="+", default=[CACHE], help="stored: where renderings or published folders lie")
+    parser.add_argument("--quick", action="store_true", help="viewer: a small town without peers, to see that it works")
+    parser.add_argument("--reps", type=int, default=5, help="viewer: rounds")
+    parser.add_argument("--only", nargs="+", help="viewer: measures, e.g. first frames")
+    parser.add_argument("--work", type=Path, default=CACHE / "viewer", help="viewer: folder for cities and samples, 6 GB")
     parser.add_argument("--json", action="store_true", help="print one JSON document after the tables")
     options = parser.parse_args()
     unknown = [part for part in options.parts if part not in PARTS + ASKED]
@@ -38,6 +42,7 @@ def main() -> None:
         "incremental": incremental.measure,
         "extent": lambda: extent.measure(tuple(options.millions), plots=Path("docs/plots")),
         "stored": lambda: stored.measure(options.folders),
+        "viewer": lambda: viewer.measure(options.quick, options.reps, options.work, tuple(options.only) if options.only else None),
     }
     rows = {part: measures[part]() for part in options.parts or PARTS}
     if options.json:

@@ -32,7 +32,10 @@ class Copies:
     def put(self, catalogue: Catalogue, number: int) -> None:
         """The copy of this number, 0 …: the first n fill a square as nearly as n allows."""
         column, row = place(number)
-        offset = np.array([column * self.pitch_m, row * self.pitch_m, 0.0])
+        self.put_at(catalogue, number, np.array([column * self.pitch_m, row * self.pitch_m, 0.0]))
+
+    def put_at(self, catalogue: Catalogue, number: int, offset: "np.ndarray[Any, np.dtype[np.float64]]") -> None:
+        """A copy moved by `offset` (metres); a number is a name."""
         template = catalogue.scene(self.source)
         origin = catalogue.pin_scene(self.scene, crs=template.crs, origin=template.origin).origin
         assert origin is not None, "the source has assets"

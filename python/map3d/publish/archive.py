@@ -1,8 +1,10 @@
 """One pyramid as a PMTiles archive: tiles in the order of their ids, equal tiles once, the tile numbers of the pyramid unchanged."""
 
+import itertools
 import os
 import tempfile
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any, BinaryIO, Final
 
@@ -19,6 +21,8 @@ _writing: Any = pmtiles.writer
 
 TILE_TYPES: Final = {"webp": TileType.WEBP, "png": TileType.PNG, "jpeg": TileType.JPEG}
 PER_STEP: Final = 256
+LEAF_ENTRIES: Final = 256
+"""Tiles of a leaf directory, 0.9 kB or so: who looks at one place of a large pyramid reads four or five of them. Doubled until the root fits."""
 
 Step = Callable[[int], None]
 """Told of every few tiles written; stops the work by raising."""
@@ -37,7 +41,8 @@ def write_archive(store: TileStore, layer: int, path: Path, metadata: dict[str, 
             _write_tile(writer, tile_id, _tile(store, layer, TileId(*tileid_to_zxy(tile_id))))
             if done % PER_STEP == 0 or done == len(ids):
                 step((done - 1) % PER_STEP + 1)
-        writer.finalize({"tile_type": TILE_TYPES[store.shape.layers[layer].format], "tile_compression": Compression.NONE}, metadata)
+        with _small_leaves():
+            writer.finalize({"tile_type": TILE_TYPES[store.shape.layers[layer].format], "tile_compression": Compression.NONE}, metadata)
         file.flush()
         os.fsync(file.fileno())
     draft.replace(path)
@@ -85,6 +90,29 @@ def _writer(file: BinaryIO, data: IO[bytes]) -> Any:
     writer.tile_f.close()
     writer.tile_f = data
     return writer
+
+
+@contextmanager
+def _small_leaves() -> Iterator[None]:
+    """The writer's own leaves begin at 4,096 entries, 13 kB each, for the sake of whole planets."""
+    its_own = _writing.optimize_directories
+    _writing.optimize_directories = _directories
+    try:
+        yield
+    finally:
+        _writing.optimize_directories = its_own
+
+
+def _directories(entries: list[Entry], root_bytes: int) -> tuple[bytes, bytes, int]:
+    """Root and leaf directories, and how many leaves; the root is shorter than `root_bytes`."""
+    whole: bytes = _writing.serialize_directory(entries)
+    if len(whole) < root_bytes:
+        return whole, b"", 0
+    for doubling in itertools.count():
+        root, leaves, count = _writing.build_roots_leaves(entries, LEAF_ENTRIES << doubling)
+        if len(root) < root_bytes:
+            return root, leaves, count
+    raise AssertionError("unreachable")
 
 
 def _write_tile(writer: Any, tile_id: int, data: bytes) -> None:

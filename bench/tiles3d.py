@@ -1,0 +1,224 @@
+"""The same cities as 3D Tiles 1.1: districts as OBJ, made into GLB by npm's obj2gltf and glTF-Transform (bench/viewer/glb.mjs), in a quadtree.
+
+A district is cut as its textures are: what shares an atlas is a tile, and so is each piece of the terrain. Every place has addresses of its own
+(the server finds the district's file behind them), as every place has texels of its own in the renderings. Coordinates: metres east, north and up of
+the scene's origin.
+"""
+
+import json
+import math
+import shutil
+import subprocess
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from map3d.ingest.asset import open_mesh
+
+from .city import PLACE_M, SPECS, City, Place, assets_of
+
+GLB = Path(__file__).parent / "viewer" / "glb.mjs"
+Floats = NDArray[np.float64]
+Box = tuple[Floats, Floats]
+
+
+@dataclass(frozen=True)
+class Part:
+    """Triangles of one asset: a tile of a district. `corners`: (n, 3, 3) local; `uvs`: (n, 3, 2); `materials`: (n,)."""
+
+    corners: Floats
+    uvs: NDArray[np.float32]
+    materials: NDArray[np.uint32]
+    table: list[dict[str, Any]]
+    textures: Path
+
+    @property
+    def box(self) -> Box:
+        points = self.corners.reshape(-1, 3)
+        return points.min(axis=0), points.max(axis=0)
+
+
+def tileset(city: City, far: bool = False) -> Path:
+    """Writes what is missing of a city's tileset; returns the file to open. `far`: to look at all of it, a district is one mesh in plain colours."""
+    out = city.folder / "3dtiles"
+    out.mkdir(parents=True, exist_ok=True)
+    kinds = sorted(set(city.places.values()))
+    boxes = {kind: (_far_district if far else _district)(city.folder, out, kind) for kind in kinds}
+    path = out / f"{city.name}{'-far' * far}.json"
+    root = _node({at: kind + "-far" * far for at, kind in city.places.items()}, {kind + "-far" * far: box for kind, box in boxes.items()})
+    path.write_text(json.dumps({"asset": {"version": "1.1"}, "geometricError": 2 * root["geometricError"], "root": {**root, "refine": "ADD"}}))
+    return path
+
+
+def parts(folder: Path, kind: str) -> list[Part]:
+    """The district's tiles, the largest last."""
+    spec = SPECS[kind]
+    origin = np.array([spec.east_m, spec.north_m, spec.height_m])
+    found = []
+    for asset in assets_of(folder, kind):
+        mesh = open_mesh(asset)
+        uvs, materials = _sections(asset, len(mesh.positions), len(mesh.triangles))
+        table = json.loads((asset / "materials.json").read_text())["materials"]
+        group = _groups(np.asarray(mesh.objects), materials, table)
+        for number in np.unique(group):
+            mine = group == number
+            corners = mesh.positions[mesh.triangles[mine]] - origin
+            found.append(Part(corners, uvs[mine], materials[mine], table, asset / "textures"))
+    return found
+
+
+def _sections(asset: Path, vertices: int, triangles: int) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+    """(nt, 3, 2) texture coordinates and (nt,) materials of a mesh (spec/scene.md)."""
+    data, at, wanted = np.fromfile(asset / "mesh.m3a", np.uint8), 64, []
+    normals = int(data[32:36].view("<u4")[0]) & 1
+    for size in (vertices * 24, triangles * 12, triangles * 24, triangles * 36 * normals, triangles * 4):
+        wanted.append(data[at : at + size])
+        at = -(-(at + size) // 64) * 64
+    return wanted[2].view("<f4").reshape(-1, 3, 2), wanted[4].view("<u4")
+
+
+def _groups(objects: NDArray[np.uint32], materials: NDArray[np.uint32], table: list[dict[str, Any]]) -> NDArray[np.int64]:
+    """The tile of each triangle: the atlas, or piece of terrain, that most of its object's triangles have."""
+    own = np.array([index if str(entry["name"]).startswith(("textures/a", "terrain")) else -1 for index, entry in enumerate(table)])[materials]
+    result = np.zeros(len(objects), np.int64)
+    for number in np.unique(objects):
+        mine = objects == number
+        atlases = own[mine & (own >= 0)]
+        result[mine] = np.bincount(atlases).argmax() if len(atlases) else -1
+    return result
+
+
+def write_obj(part: Part, folder: Path) -> Path:
+    """An OBJ with z up, its MTL and its textures, triangles of a material together, normals of faces."""
+    folder.mkdir(parents=True, exist_ok=True)
+    normal = np.cross(part.corners[:, 1] - part.corners[:, 0], part.corners[:, 2] - part.corners[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    used = np.unique(part.materials)
+    mtl = []
+    for index in used:
+        entry = part.table[index]
+        mtl += [f"newmtl m{index}", "Kd {:.4f} {:.4f} {:.4f}".format(*entry["diffuse"][:3]), "Ks 0 0 0"]
+        if entry["texture"]:
+            file = next(part.textures.glob(f"{entry['texture']}.*"))
+            shutil.copy(file, folder / file.name)
+            mtl.append(f"map_Kd {file.name}")
+    lines = ["mtllib part.mtl", *("v {:.4f} {:.4f} {:.4f}".format(*point) for point in part.corners.reshape(-1, 3))]
+    lines += ["vt {:.6f} {:.6f}".format(*pair) for pair in part.uvs.reshape(-1, 2)]
+    lines += ["vn {:.5f} {:.5f} {:.5f}".format(*row) for row in normal]
+    for index in used:
+        lines.append(f"usemtl m{index}")
+        for row in np.flatnonzero(part.materials == index):
+            lines.append("f " + " ".join(f"{3 * row + k}/{3 * row + k}/{row + 1}" for k in (1, 2, 3)))
+    (folder / "part.mtl").write_text("\n".join(mtl) + "\n")
+    path = folder / "part.obj"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def _district(folder: Path, out: Path, kind: str) -> Box:
+    """GLBs and the tileset of a district, its middle at 0; returns its box."""
+    tiles = parts(folder, kind)
+    jobs = []
+    for number, part in enumerate(tiles):
+        if not (out / f"{kind}-{number}.glb").is_file():
+            jobs.append({"obj": str(write_obj(part, folder / "obj" / f"{kind}-{number}")), "glb": str(out / f"{kind}-{number}.glb")})
+    _make_glbs(jobs, kind)
+    boxes = [part.box for part in tiles]
+    whole = _united(boxes)
+    children = [{**_volume(box, 0.0), "content": {"uri": f"{kind}-{number}.glb"}} for number, box in enumerate(boxes)]
+    root = {**_volume(whole), "refine": "ADD", "children": children}
+    (out / f"{kind}.json").write_text(json.dumps({"asset": {"version": "1.1"}, "geometricError": PLACE_M, "root": root}))
+    return whole
+
+
+def _far_district(folder: Path, out: Path, kind: str) -> Box:
+    """All triangles of a district in one mesh, each in its mean colour, of 256."""
+    tiles, glb = parts(folder, kind), out / f"{kind}-far.glb"
+    if not glb.is_file():
+        part = plainly_coloured(tiles, folder / "obj" / f"{kind}-palette")
+        _make_glbs([{"obj": str(write_obj(part, folder / "obj" / f"{kind}-far")), "glb": str(glb)}], kind)
+    box = _united([part.box for part in tiles])
+    root = {**_volume(box, 0.0), "refine": "ADD", "content": {"uri": glb.name}}
+    (out / f"{kind}-far.json").write_text(json.dumps({"asset": {"version": "1.1"}, "geometricError": PLACE_M, "root": root}))
+    return box
+
+
+def plainly_coloured(tiles: list[Part], folder: Path) -> Part:
+    """One part of them all; its texture, written into `folder`, has 16 × 16 squares of one colour, and a triangle lies in the middle of one."""
+    folder.mkdir(parents=True, exist_ok=True)
+    colors = np.concatenate([_colors(part) for part in tiles])
+    picture = Image.fromarray(colors[None].astype(np.uint8)).quantize(256, dither=Image.Dither.NONE)
+    index = np.asarray(picture)[0].astype(np.int64)
+    palette = np.zeros((256, 3), np.uint8)
+    known = np.array(picture.getpalette() or [], np.uint8).reshape(-1, 3)
+    palette[: len(known)] = known
+    Image.fromarray(palette.reshape(16, 16, 3)).resize((64, 64), Image.Resampling.NEAREST).save(folder / "palette.png")
+    uv = np.stack([(index % 16 + 0.5) / 16, 1 - (index // 16 + 0.5) / 16], axis=1).astype(np.float32)
+    table = [{"name": "palette", "diffuse": [1, 1, 1, 1], "texture": "palette"}]
+    corners = np.concatenate([part.corners for part in tiles])
+    return Part(corners, np.repeat(uv[:, None], 3, axis=1), np.zeros(len(index), np.uint32), table, folder)
+
+
+def _colors(part: Part) -> Floats:
+    """(n, 3) of sRGB 0..255: a triangle's texture, averaged to 64 × 64, at its middle."""
+    result = np.zeros((len(part.corners), 3))
+    for index in np.unique(part.materials):
+        mine, entry = part.materials == index, part.table[index]
+        if not entry["texture"]:
+            result[mine] = 255 * np.array(entry["diffuse"][:3])
+            continue
+        with Image.open(next(part.textures.glob(f"{entry['texture']}.*"))) as image:
+            small = np.asarray(image.convert("RGB").resize((64, 64), Image.Resampling.BOX), dtype=float)
+        at = np.floor(part.uvs[mine].mean(axis=1) % 1 * 64).astype(int)
+        result[mine] = small[63 - at[:, 1], at[:, 0]]
+    return result
+
+
+def _make_glbs(jobs: list[dict[str, str]], kind: str) -> None:
+    if jobs:
+        print(f"bench: {len(jobs)} GLB files of the {kind} district", file=sys.stderr, flush=True)
+        subprocess.run(["node", str(GLB)], input=json.dumps(jobs), text=True, check=True)
+
+
+def _node(places: Mapping[Place, str], boxes: Mapping[str, Box], number: list[int] | None = None) -> dict[str, Any]:
+    """A quadtree over the places; a leaf is a district's tileset. Nodes above are empty, so that nothing may stand in for what they hold."""
+    counter = [0] if number is None else number
+    placed = {at: _moved(boxes[kind], at) for at, kind in places.items()}
+    whole = _volume(_united(list(placed.values())))
+    if len(places) == 1:
+        kind = next(iter(places.values()))
+        counter[0] += 1
+        offset = [PLACE_M * step for step in next(iter(places))]
+        move = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, *offset, 0, 1]
+        leaf = {**_volume(boxes[kind]), "transform": move, "content": {"uri": f"place-{counter[0]}/{kind}.json"}}
+        return {**whole, "children": [leaf]}
+    middle = [(min(at[axis] for at in places) + max(at[axis] for at in places)) / 2 for axis in (0, 1)]
+    quarters: dict[tuple[bool, bool], dict[Place, str]] = {}
+    for at, kind in places.items():
+        quarters.setdefault((at[0] > middle[0], at[1] > middle[1]), {})[at] = kind
+    return {**whole, "children": [_node(quarter, boxes, counter) for quarter in quarters.values()]}
+
+
+def _volume(box: Box, error: float | None = None) -> dict[str, Any]:
+    """Of a tile; the error of one that shows nothing itself is its diameter."""
+    middle, half = (box[0] + box[1]) / 2, (box[1] - box[0]) / 2
+    volume = [*middle, half[0], 0, 0, 0, half[1], 0, 0, 0, half[2]]
+    return {
+        "boundingVolume": {"box": [round(float(value), 3) for value in volume]},
+        "geometricError": 2 * math.dist(half, (0, 0, 0)) if error is None else error,
+    }
+
+
+def _moved(box: Box, at: Place) -> Box:
+    offset = np.array([at[0] * PLACE_M, at[1] * PLACE_M, 0.0])
+    return box[0] + offset, box[1] + offset
+
+
+def _united(boxes: list[Box]) -> Box:
+    return np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)

@@ -1,0 +1,25 @@
+// OBJ files as GLB for CesiumJS; standard input: [{ "obj": …, "glb": … }]. obj2gltf, then with glTF-Transform (which 3d-tiles-tools brings) what makes
+// them cheapest to send and to draw: plain colours in one palette, one mesh a material, WebP of the quality that our tiles have, meshopt.
+import { readFileSync } from "node:fs";
+import { Logger, NodeIO } from "@gltf-transform/core";
+import { ALL_EXTENSIONS } from "@gltf-transform/extensions";
+import { dedup, flatten, join, meshopt, palette, prune, textureCompress, weld } from "@gltf-transform/functions";
+import { MeshoptEncoder } from "meshoptimizer";
+import obj2gltf from "obj2gltf";
+import sharp from "sharp";
+
+await MeshoptEncoder.ready;
+const io = new NodeIO().registerExtensions(ALL_EXTENSIONS).registerDependencies({ "meshopt.encoder": MeshoptEncoder });
+const jobs = JSON.parse(readFileSync(0, "utf8"));
+for (const [number, { obj, glb }] of jobs.entries()) {
+  const document = await io.readBinary(await obj2gltf(obj, { binary: true, inputUpAxis: "Z", outputUpAxis: "Y" }));
+  document.setLogger(new Logger(Logger.Verbosity.WARN));
+  await document.transform(
+    dedup(), palette({ min: 2 }), flatten(), join(), weld(), prune(),
+    textureCompress({ encoder: sharp, targetFormat: "webp", quality: 80 }),
+    meshopt({ encoder: MeshoptEncoder, level: "medium" }),
+  );
+  await io.write(glb, document);
+  const count = document.getRoot().listMeshes().reduce((sum, mesh) => sum + mesh.listPrimitives().length, 0);
+  console.error(`bench: ${number + 1} of ${jobs.length}: ${glb}, ${count} primitives`);
+}

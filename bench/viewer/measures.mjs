@@ -1,0 +1,92 @@
+// What is measured of a page; each answers with numbers that are printed as they are.
+import { Phone } from "./browser.mjs";
+
+export const median = (values) => {
+  const sorted = [...values].sort((a, b) => a - b);
+  return sorted[Math.floor(sorted.length / 2)];
+};
+
+export const quantile = (values, q) => [...values].sort((a, b) => a - b)[Math.min(values.length - 1, Math.floor(q * values.length))];
+
+/** The first complete view with an empty cache: milliseconds since navigation, of processors, requests, bytes. */
+export async function first(server, url, network) {
+  const phone = await Phone.open();
+  try {
+    const [before, cpu] = [server.count, phone.cpu()];
+    const ms = await phone.goto(url, network);
+    const [after, spent] = [server.count, phone.cpu()];
+    return { ms, cpu_ms: spent.all - cpu.all, requests: after.requests - before.requests, bytes: after.bytes - before.bytes, ...problems(phone) };
+  } finally {
+    await phone.close();
+  }
+}
+
+/** Steps between the stops at which everything along a path is fetched. */
+const STOP = 4;
+
+/** Frames along a path, as many as the machine makes: processor milliseconds a frame. `cold`: the first time; `warm`: once all along the path has been fetched, median of `walks`. */
+export async function frames(server, url, path, walks = 3) {
+  const phone = await Phone.open({ unbound: true });
+  try {
+    await phone.goto(url);
+    const walk = async () => {
+      const [cpu, count] = [await phone.settled(), server.count];
+      const intervals = await phone.page.evaluate((steps) => globalThis.bench.walk(steps), path.steps);
+      const [spent, sent] = [await phone.settled(), server.count];
+      const n = path.steps.length;
+      return {
+        cpu_ms: (spent.all - cpu.all) / n, page_ms: (spent.all - spent.gpu - cpu.all + cpu.gpu) / n, p50_ms: quantile(intervals, 0.5), p95_ms: quantile(intervals, 0.95),
+        requests: sent.requests - count.requests, bytes: sent.bytes - count.bytes,
+      };
+    };
+    const cold = await walk();
+    await phone.page.evaluate(([steps, every]) => globalThis.bench.visit(steps, every), [path.steps, STOP]);
+    const warmer = [];
+    for (let k = 0; k < walks; k++) warmer.push(await walk());
+    const warm = Object.fromEntries(Object.keys(cold).map((key) => [key, median(warmer.map((one) => one[key]))]));
+    const about = await phone.page.evaluate(() => globalThis.bench.about?.() ?? {});
+    return { cold, warm, about, ...problems(phone) };
+  } finally {
+    await phone.close();
+  }
+}
+
+/**
+ * Memory after some seconds of use, and what happens in the idle seconds after that. An empty canvas in a browser of its own is read at the same moment:
+ * what processes share (the browser's own files) is then divided among the same number for both.
+ */
+export async function stays(server, url, emptyUrl, path, { use_s, idle_s }) {
+  const [phone, empty] = [await Phone.open(), await Phone.open()];
+  try {
+    await phone.goto(url);
+    await empty.goto(emptyUrl);
+    const fresh = phone.memory();
+    await phone.page.evaluate(([steps, seconds]) => globalThis.bench.stroll(steps, seconds), [path.steps, use_s]);
+    await phone.page.waitForTimeout(3000);
+    await phone.settled();
+    const [used, beside] = [phone.memory(), empty.memory()];
+    const [cpu, count, drawn] = [phone.cpu(), server.count, await phone.page.evaluate(() => globalThis.bench.drawn())];
+    await phone.page.waitForTimeout(1000 * idle_s);
+    const [spent, sent, then] = [phone.cpu(), server.count, await phone.page.evaluate(() => globalThis.bench.drawn())];
+    const idle = { s: idle_s, frames: then - drawn, requests: sent.requests - count.requests, cpu_ms_per_s: (spent.all - cpu.all) / idle_s };
+    const beyond = { pss: used.pss - beside.pss, anonymous: used.anonymous - beside.anonymous };
+    return { fresh, used, empty: beside, beyond, use_s, steps: then, idle, ...problems(phone) };
+  } finally {
+    await phone.close();
+    await empty.close();
+  }
+}
+
+export async function picture(url, file) {
+  const phone = await Phone.open({ dpr: 2 });
+  try {
+    await phone.goto(url);
+    await phone.page.waitForTimeout(500);
+    await phone.page.screenshot({ path: file, type: "jpeg", quality: 80 });
+    return { file, about: await phone.page.evaluate(() => globalThis.bench.about?.() ?? {}), ...problems(phone) };
+  } finally {
+    await phone.close();
+  }
+}
+
+const problems = (phone) => (phone.problems.length > 0 ? { problems: phone.problems.slice(0, 5) } : {});

@@ -1,0 +1,99 @@
+// Runs what Python asks for (bench/viewer.py): standard input is { work, peers, cities, reps, length, use_s, idle_s, out, pictures }; every sample is a line of
+// `out`, and those that are there already are not taken again. Viewers take turns; rounds come one after another.
+import { appendFileSync, existsSync, mkdirSync, readFileSync } from "node:fs";
+import { loadavg } from "node:os";
+import { join } from "node:path";
+import { build } from "../../viewer/node_modules/esbuild/lib/main.js";
+import * as measures from "./measures.mjs";
+import * as paths from "./paths.mjs";
+import { Server } from "./server.mjs";
+
+const asked = JSON.parse(readFileSync(0, "utf8"));
+const here = import.meta.dirname;
+const { cities, work } = asked;
+/** What people have on the way, besides this machine alone: 10 Mbit/s, 40 ms there and back. */
+const NETWORK = { latency: 40, downloadThroughput: 10e6 / 8, uploadThroughput: 5e6 / 8 };
+
+if (asked.peers) await build({ entryPoints: [join(here, "pages/cesium.entry.js")], bundle: true, minify: true, format: "iife", globalName: "Cesium", outfile: join(work, "built/cesium.js"), logLevel: "error" });
+const modules = join(here, "node_modules");
+const server = new Server(work, { pages: join(here, "pages"), map3d: join(work, "published", cities[0]), city: join(work, "published"), "3dtiles": join(work, "3dtiles"), cesium: join(modules, "cesium/Build/Cesium"), built: join(work, "built"), peers: modules });
+await server.listen();
+
+const page = (name, query) => `${server.origin}/pages/${name}.html?${new URLSearchParams(query)}`;
+const district = paths.district(asked.length);
+const pan = paths.pan(asked.length);
+const middle = cities.includes("1e6") ? "1e6" : cities.at(-1);
+const whole = paths.whole(asked.length, asked.width_m[middle]);
+/** For what takes seconds a frame. */
+const SHORT = 12;
+const [districtShort, wholeShort] = [paths.district(2 * SHORT), paths.whole(SHORT, asked.width_m[middle])];
+const at = ({ start }) => ({ start: JSON.stringify(start) });
+
+const map3d = (city, path, more = {}) => page("map3d", { base: `${server.origin}/city/${city}`, ...at(path), ...more });
+const cesium = (tiles, path, more = {}) => page("cesium", { base: `${server.origin}/3dtiles/${tiles}.json`, ...at(path), ...more });
+const flat = (name) => page(name, { base: `${server.origin}/plain/${middle}`, mode: "color", ...at(pan) });
+const DEVICE = { resolution: "device" };
+
+/** [measure, viewer, city, what to do]; in this order, round after round. */
+function* round() {
+  for (const city of cities) {
+    yield ["first", "map3d", city, () => measures.first(server, map3d(city, district))];
+    if (asked.peers) yield ["first", "cesium", city, () => measures.first(server, cesium(city, district))];
+  }
+  yield ["first-network", "map3d", middle, () => measures.first(server, map3d(middle, district), NETWORK)];
+  if (asked.peers) yield ["first-network", "cesium", middle, () => measures.first(server, cesium(middle, district), NETWORK)];
+  for (const city of cities) {
+    yield ["frames", "map3d", city, () => measures.frames(server, map3d(city, district), district)];
+    if (asked.peers) yield ["frames", "cesium", city, () => measures.frames(server, cesium(city, district), district, 1)];
+  }
+  if (asked.peers) yield ["frames", "cesium-device", middle, () => measures.frames(server, cesium(middle, district, DEVICE), districtShort, 1)];
+  yield ["whole", "map3d", middle, () => measures.frames(server, map3d(middle, whole), whole)];
+  if (asked.peers) yield ["whole", "cesium", middle, () => measures.frames(server, cesium(`${middle}-far`, whole), wholeShort, 1)];
+  if (asked.peers) yield ["whole", "cesium-device", middle, () => measures.frames(server, cesium(`${middle}-far`, whole, DEVICE), wholeShort, 1)];
+  for (const name of asked.peers ? ["map3d", "openseadragon", "leaflet"] : ["map3d"]) {
+    yield ["color-first", name, middle, () => measures.first(server, flat(name))];
+    yield ["color-frames", name, middle, () => measures.frames(server, flat(name), pan)];
+  }
+}
+
+/** Once: minutes of use, and a minute of nothing. */
+function* once() {
+  const empty = page("empty", at(district));
+  const times = { use_s: asked.use_s, idle_s: asked.idle_s };
+  yield ["stays", "map3d", middle, () => measures.stays(server, map3d(middle, district), empty, district, times)];
+  if (!asked.peers) return;
+  yield ["stays", "cesium", middle, () => measures.stays(server, cesium(middle, district), empty, district, times)];
+  yield ["stays", "cesium-onrequest", middle, () => measures.stays(server, cesium(middle, district, { onrequest: "1" }), empty, district, { ...times, use_s: 5 })];
+}
+
+const done = new Map();
+mkdirSync(work, { recursive: true });
+if (existsSync(asked.out)) for (const line of readFileSync(asked.out, "utf8").split("\n").filter(Boolean)) count(JSON.parse(line));
+
+function count({ measure, viewer, city }) {
+  const key = `${measure} ${viewer} ${city}`;
+  done.set(key, (done.get(key) ?? 0) + 1);
+}
+
+async function take([measure, viewer, city, act], wanted) {
+  if ((done.get(`${measure} ${viewer} ${city}`) ?? 0) >= wanted) return;
+  const load = loadavg()[0];
+  const sample = { measure, viewer, city, load, ...(await act()) };
+  appendFileSync(asked.out, `${JSON.stringify(sample)}\n`);
+  count(sample);
+  console.error(`bench: round ${wanted}: ${measure}, ${viewer}, ${city} (load ${load.toFixed(1)})${sample.problems ? `: ${sample.problems.join("; ")}` : ""}`);
+}
+
+for (let number = 1; number <= asked.reps; number++) {
+  for (const what of round()) if (asked.only === null || asked.only.includes(what[0])) await take(what, number);
+}
+for (const what of once()) if (asked.only === null || asked.only.includes(what[0])) await take(what, 1);
+for (const [name, url] of asked.pictures ? [["map3d", map3d(middle, district)], ["cesium", cesium(middle, district, DEVICE)], ["whole-map3d", map3d(middle, whole)], ["whole-cesium", cesium(`${middle}-far`, whole)], ["leaflet", flat("leaflet")], ["openseadragon", flat("openseadragon")], ["color-map3d", flat("map3d")]] : []) {
+  await measures.picture(url, join(work, `${name}.jpg`));
+}
+server.close();
+if (server.missing.length > 0) {
+  console.error(`bench: the pages asked for what is not there: ${[...new Set(server.missing)].slice(0, 5).join(", ")}`);
+  process.exit(1);
+}
+process.exit(0);
