@@ -45,6 +45,9 @@ function open(): void {
       if (layer.rendering?.json.geographic) new locate().addTo(view);
       new overview().addTo(view);
     }, (reason: unknown) => { toast(String(reason)); });
+    if (layer.rendering?.layers.has("depth") && !view.options.dataSaver) {
+      import("./map3d-orbit.mjs").then(({ orbit }) => new orbit().addTo(view), (reason: unknown) => { toast(String(reason)); });
+    }
     if (id !== undefined) void selection.chooseId(id, null, false);
     if (layer.rendering?.layers.has("depth")) tools = new Tools(view);
   });

@@ -194,6 +194,8 @@ export class geojson extends Evented<GeojsonEvents> implements Attachable<map> {
   readonly #draw = (): void => {
     const relief = this.#map?.relief;
     if (!relief || this.#placed.length === 0) return;
+    // What is known lies in the plane of the view that comes.
+    this.#drawing.canvas.style.visibility = this.#map?.turning ? "hidden" : "";
     this.#landMarkers(relief);
     const done = this.#drawing.frame(relief);
     cancelAnimationFrame(this.#next);

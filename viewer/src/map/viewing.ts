@@ -199,6 +199,11 @@ export abstract class Viewing extends Evented<MapEvents> {
     this.#twist_rad = 0;
   }
 
+  /** @internal A change of direction is under way. */
+  get turning(): boolean {
+    return this.apparent !== null;
+  }
+
   /** @internal The turner shows something else now. */
   requestTurn(): void {
     this.requestFrame();
