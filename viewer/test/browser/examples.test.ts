@@ -80,8 +80,9 @@ const POINTS: Readonly<Record<string, (page: Page, picture: Buffer) => Promise<v
   search: async (page) => {
     await page.getByRole("searchbox").fill("school old");
     await page.getByRole("button", { name: "School <b>old</b>" }).click();
-    await page.waitForFunction("map.zoom === 2"); // there
-    expect(await page.evaluate("[layer.highlighted, map.project([691031, 5335968, 516]).map(Math.round)]")).toEqual([[1025], [400, 300]]);
+    await page.waitForFunction("map.zoom === 3 && map.project([691031, 5335968, 516]).map(Math.round).join() === '400,300'"); // there
+    expect(await page.evaluate("layer.highlighted")).toEqual([1025]);
+    expect(await text(page, ".map3d-marker-selected")).toBe("School <b>old</b>");
   },
   company: async (page) => {
     expect(await text(page, ".map3d-popup")).toContain("Tower Lane 3, first floor");
