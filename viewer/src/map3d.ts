@@ -14,6 +14,7 @@ export type { Depicting, Turner } from "./map/turner";
 export type { Relief } from "./map/relief";
 export type { Attachable, Holder, Surface } from "./core/surface";
 export type { Box3, Vec2, Vec3 } from "./core/vec";
+export type { Clip } from "./draw/combine";
 export type { Mode } from "./draw/drawer";
 export type { Light } from "./geo/light";
 export type { ManifestJson, Rendering } from "./geo/manifest";

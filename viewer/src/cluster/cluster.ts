@@ -62,16 +62,19 @@ export class cluster extends Evented<ClusterEvents> implements Attachable<map> {
     this.#markers = [...markers];
   }
 
+  /** Puts the markers on a map, in groups. */
   addTo(map: map): this {
     map.add(this);
     return this;
   }
 
+  /** Takes all markers off the map. */
   remove(): this {
     this.#map?.discard(this);
     return this;
   }
 
+  /** All markers, in the order in which they were given. */
   get markers(): readonly marker[] {
     return this.#markers;
   }

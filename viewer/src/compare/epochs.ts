@@ -11,6 +11,7 @@ export interface Epoch {
   readonly label: string;
 }
 
+/** Of an `epochs`. */
 export interface EpochsOptions {
   /** Number of the one that is shown first. Default the last. */
   shown?: number;
@@ -18,6 +19,7 @@ export interface EpochsOptions {
   fade_ms?: number;
 }
 
+/** Of an `epochs`. */
 export interface EpochsEvents {
   /** Another one was chosen. */
   change: { epoch: Epoch; index: number };
@@ -49,11 +51,13 @@ export class epochs extends Evented<EpochsEvents> implements Attachable<map> {
     this.#box = element("div", "map3d-epochs", {}, this.#name, this.#slider, element("div", "", { "aria-hidden": "true" }, ...ends));
   }
 
+  /** Puts the slider and its layers on a map. */
   addTo(map: map): this {
     map.add(this);
     return this;
   }
 
+  /** Takes the slider and its layers off the map. */
   remove(): this {
     this.#map?.discard(this);
     return this;

@@ -17,7 +17,8 @@ export interface SwipeEvents {
   change: { at: number };
 }
 
-type Layers = imageLayer | readonly imageLayer[];
+/** One layer, or several that are shown together. */
+export type Layers = imageLayer | readonly imageLayer[];
 
 const ARROWS = "M9 7l-5 5 5 5M15 7l5 5-5 5";
 const STEP = 0.02;
@@ -43,11 +44,13 @@ export class swipe extends Evented<SwipeEvents> implements Attachable<map> {
     this.#border.addEventListener("keydown", (event) => { this.#press(event); });
   }
 
+  /** Puts the border on a map; the layers are added by themselves. */
   addTo(map: map): this {
     map.add(this);
     return this;
   }
 
+  /** Takes the border away; the layers stay, whole. */
   remove(): this {
     this.#map?.discard(this);
     return this;
@@ -58,6 +61,7 @@ export class swipe extends Evented<SwipeEvents> implements Attachable<map> {
     return this.#at;
   }
 
+  /** Moves the border: 0 is the left edge, 1 the right. */
   setAt(at: number): this {
     const next = clamp(at, 0, 1);
     if (!(next !== this.#at)) return this;

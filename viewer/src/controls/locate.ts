@@ -49,11 +49,13 @@ export class locate extends Evented<LocateEvents> implements Attachable<map> {
     this.options = options;
   }
 
+  /** Puts the button on a map. */
   addTo(map: map): this {
     map.add(this);
     return this;
   }
 
+  /** Takes the button and what it shows off the map. */
   remove(): this {
     this.#map?.discard(this);
     return this;

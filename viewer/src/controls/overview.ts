@@ -5,6 +5,7 @@ import { besideButton } from "./column";
 import { STYLES } from "./styles";
 import { controlWords } from "./words";
 
+/** Of an `overview`. */
 export interface OverviewOptions {
   /** Only its button is shown at first. Default: on maps that are narrower than 640 CSS pixels. */
   collapsed?: boolean;
@@ -35,11 +36,13 @@ export class overview implements Attachable<map> {
     this.options = options;
   }
 
+  /** Puts the button of the small map on a map. */
   addTo(map: map): this {
     map.add(this);
     return this;
   }
 
+  /** Takes the small map away. */
   remove(): this {
     this.#map?.discard(this);
     return this;
@@ -79,6 +82,7 @@ export class overview implements Attachable<map> {
     return !this.#pane.hidden;
   }
 
+  /** Opens or closes it. */
   toggle(open = !this.open): this {
     this.#pane.hidden = !open;
     this.#button.setAttribute("aria-expanded", String(open));

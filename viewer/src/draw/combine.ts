@@ -42,4 +42,5 @@ export function meet(a: Clip | null, b: Clip | null): boolean {
   return !a || !b || (a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]);
 }
 
+/** A part of the map, in shares of its width and height. */
 export type Clip = readonly [left: number, top: number, right: number, bottom: number];

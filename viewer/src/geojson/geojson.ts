@@ -80,11 +80,13 @@ export class geojson extends Evented<GeojsonEvents> implements Attachable<map> {
     this.#drawing.occlusion = options.occlusion ?? "fade";
   }
 
+  /** Puts the features on a map; data of a URL is fetched now. */
   addTo(map: map): this {
     map.add(this);
     return this;
   }
 
+  /** Takes the features off the map. */
   remove(): this {
     this.#map?.discard(this);
     return this;

@@ -8,6 +8,7 @@ import type { Feature, Shape } from "./parse";
 import type { Placing } from "./place";
 import type { FilledStyle } from "./style";
 
+/** What becomes of parts behind buildings. */
 export type Occlusion = "hide" | "fade" | "none";
 
 /** What of it is seen behind buildings. */

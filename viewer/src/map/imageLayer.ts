@@ -115,6 +115,7 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
     return this.#redraw();
   }
 
+  /** 0 to 1. */
   get opacity(): number {
     return this.options.opacity;
   }
@@ -125,6 +126,7 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
     return this.#redraw();
   }
 
+  /** The part of the map that it is shown in; null: all of it. */
   get clip(): Clip | null {
     return this.#clip;
   }

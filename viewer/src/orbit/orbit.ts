@@ -71,11 +71,13 @@ export class orbit implements Attachable<map>, Turner {
     this.#duration_ms = duration_ms;
   }
 
+  /** Makes changes of direction of a map movements, from now on. */
   addTo(map: map): this {
     map.add(this);
     return this;
   }
 
+  /** Makes them cuts again. */
   remove(): this {
     this.#map?.discard(this);
     return this;

@@ -108,7 +108,7 @@ describe("pictures", () => {
 });
 
 describe("looks", () => {
-  const pass = { mode: "lit", masked: true, depthRange: [0, 9], baked: { shadow: null, occlusion: false } } as unknown as Pass;
+  const pass = { mode: "lit", masked: true, depths: null, clip: null, depthRange: [0, 9], baked: { shadow: null, occlusion: false } } as unknown as Pass;
   const frame = { width: 1, height: 1, dpr: 1, light: DEFAULT_LIGHT, passes: [] };
 
   test("name what they need and what counts beyond the edge", () => {
