@@ -1,4 +1,4 @@
-import { UsageError } from "../core/errors";
+import { asError, UsageError } from "../core/errors";
 import { Evented } from "../core/events";
 import { add, clamp, dot, mid, sub, type Box3, type Vec2, type Vec3 } from "../core/vec";
 import { depthAtHeight, localFromUvd, uvdFromLocal } from "../geo/axes";
@@ -283,9 +283,18 @@ export abstract class Viewing extends Evented<MapEvents> {
     const whole = fitted({ frame: view.frame, u: 0, v: 0, zoom: 0, width, height }, json.box, Math.min(width, height) * 0.04, json.zmax);
     const start = center ?? (json.start && add(json.origin, json.start.local));
     this.setCamera(start ? cameraAt(whole, rendering, start, zoom) : { ...whole, zoom: zoom ?? whole.zoom });
-    for (const act of this.#pending.splice(0)) act();
+    for (const act of this.#pending.splice(0)) this.#attempt(act);
     this.fire("ready", {});
     this.fire("directionchange", { direction: this.direction });
+  }
+
+  /** What was called before there was a manifest fails like what comes later, but has nobody to tell but the map. */
+  #attempt(act: () => void): void {
+    try {
+      act();
+    } catch (reason) {
+      this.report(asError(reason));
+    }
   }
 
   protected whenReady(act: (camera: Camera, rendering: Rendering) => void): this {

@@ -308,3 +308,18 @@ test("objects in view are those whose ids are on the screen, by what they cover"
   expect([...near].sort((a, b) => a - b)).toEqual([3, 17, 2_000_000_001, 3_900_000_007]);
   await page.context().close();
 });
+
+test("what is asked before the manifest is here and cannot be done is said, and the rest goes on", async () => {
+  const { page } = await bed.bare();
+  const said = await page.evaluate((url) => new Promise<[string[], string]>((done) => {
+    const g = globalThis as Global;
+    const errors: string[] = [];
+    const view = new g.map3d.map("mapcanvas").setDirection("5-5").setDirection("90-45");
+    view.on("error", ({ error }) => errors.push(error.message)).once("idle", () => { done([errors, view.direction]); });
+    new g.map3d.imageLayer(url).addTo(view);
+  }), bed.url("town"));
+  expect(said[0]).toHaveLength(1);
+  expect(said[0][0]).toMatch(/^view "5-5" is none of 0-45, /);
+  expect(said[1]).toBe("90-45");
+  await page.context().close();
+});
