@@ -111,7 +111,7 @@ bench-viewer: build ## map3d.js beside CesiumJS, OpenSeadragon and Leaflet (npm,
 	cd bench/viewer && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error || echo "bench: NO PEERS: npm could not install them" >&2
 	$(BIN)/python -m bench viewer
 
-bench-rotterdam: build ## a city of 60,000 buildings from nothing to a published folder: hours, 45 GB of disk
+bench-rotterdam: build ## a city of 62,000 buildings from nothing to a published folder: hours, 45 GB of disk
 	$(BIN)/python -m bench.rotterdam
 
 docs: build reference ## the pictures and the command line's reference in docs/; the viewer's reference
