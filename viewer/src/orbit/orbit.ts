@@ -39,10 +39,10 @@ interface Hand {
 }
 
 const FADE_MS = 300;
-/** The picture beyond the screen that may come into view, in screens. */
-const ROOM = 1.3;
+/** What more than the turned screen a picture holds, for what stands high. */
+const ROOM = 1.1;
 /** Texels of a picture that is turned, and pixels of what comes out, at most. */
-const MOST_PX = 1e6;
+const MOST_PX = 1.4e6;
 /** How long the turned picture may stand for tiles that are still on the way. */
 const PATIENCE_MS = 2500;
 /** A hand that has turned so far means it. */
@@ -162,9 +162,9 @@ export class orbit implements Attachable<map>, Turner {
     if (this.#warp?.gl !== gl) this.#free();
     const warp = (this.#warp ??= this.#made(gl));
     turn.complete = scene.complete;
-    turn.shots ??= [shotOf(scene, warp, turn.from, null), shotOf(scene, warp, camera, null)];
+    turn.shots ??= [shotOf(scene, warp, turn.from, camera.frame, null), shotOf(scene, warp, camera, turn.from.frame, null)];
     const second = turn.shots[1];
-    if (scene.changed || moved(second.of, camera)) turn.shots[1] = shotOf(scene, warp, camera, second);
+    if (scene.changed || moved(second.of, camera)) turn.shots[1] = shotOf(scene, warp, camera, turn.from.frame, second);
     const goal = seenFrom(camera, turn);
     const [a, b] = [apart(turn.at, gazeOf(turn.from.frame)), apart(turn.at, gazeOf(camera.frame))];
     const share = a + b > 0 ? a / (a + b) : 1;
@@ -205,15 +205,23 @@ function seenFrom(camera: Camera, { at, pivot }: Pick<Turn, "at" | "pivot">): Ca
 
 const moved = (a: Camera, b: Camera): boolean => (["u", "v", "zoom", "frame", "width", "height"] as const).some((part) => a[part] !== b[part]);
 
-/** What a camera sees and some of what lies beyond, in a picture of its own. @param into whose place is taken again */
-function shotOf(scene: Depicting, warp: Warp, camera: Camera, into: Shot | null): Shot {
-  const [wide, high] = [ROOM * camera.width, ROOM * camera.height];
+/** What a camera sees, and what lies beyond and is seen half-way to another frame, in a picture of its own. @param into whose place is taken again */
+function shotOf(scene: Depicting, warp: Warp, camera: Camera, other: Frame, into: Shot | null): Shot {
+  const [wide, high] = turnedScreen(camera, other);
   const [width, height] = fitted(wide * (scene.width / camera.width), high * (scene.height / camera.height));
   const larger = { ...camera, width, height, zoom: camera.zoom - Math.log2(wide / width) };
   const range = scene.rangeOf(camera.frame);
   const target = into?.target.width === width && into.target.height === height ? into.target : warp.target(width, height);
   scene.depict(larger, range, target.framebuffer);
   return { of: camera, camera: larger, range, target };
+}
+
+/** Width and height, CSS pixels, of what the screen has covered of level ground when it has been turned half-way. */
+function turnedScreen({ frame, width, height }: Camera, other: Frame): Vec2 {
+  const half = (Math.abs(wayTo(frame.lookAtDeg, other.lookAtDeg)) / 2) * (Math.PI / 180);
+  const flat = Math.max(0.3, Math.sin((frame.pitchDeg * Math.PI) / 180));
+  const [along, across] = [Math.abs(Math.cos(half)), Math.abs(Math.sin(half))];
+  return [ROOM * Math.max(width, width * along + (height * across) / flat), ROOM * Math.max(height, height * along + width * across * flat)];
 }
 
 /** At most so many pixels, in the same shape. */
