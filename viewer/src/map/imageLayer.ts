@@ -279,7 +279,7 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
   #begin(rendering: Rendering, stage: Stage): void {
     stage.admit(rendering);
     this.#rendering = rendering;
-    this.#objects = new Objects(this.#source.base, rendering.json);
+    this.#objects = new Objects(this.#source, rendering.json);
     stage.ready(rendering);
     this.#checkLayers();
     this.fire("ready", { rendering });

@@ -1,7 +1,7 @@
 import { FetchError } from "../core/errors";
 import type { Box3, Vec3 } from "../core/vec";
 import type { ManifestJson } from "../geo/manifest";
-import { fetchJson } from "./fetch";
+import type { Source } from "./source";
 
 /** Attribute values are text, never HTML. */
 export type Attribute = string | number | boolean | null;
@@ -51,14 +51,14 @@ const SHARDS_KEPT = 64;
 
 /** Attributes of objects by id, fetched a shard at a time. */
 export class Objects {
-  readonly #base: string;
+  readonly #source: Pick<Source, "json">;
   readonly #json: ManifestJson;
   readonly #shards = new Map<number, Promise<Shard>>();
-  #search: Promise<readonly SearchEntry[]> | undefined;
-  #attributes: Promise<readonly AttributeInfo[]> | undefined;
+  /** What has been fetched, or is on the way. */
+  readonly #kept = new Map<string, Promise<unknown>>();
 
-  constructor(base: string, json: ManifestJson) {
-    this.#base = base;
+  constructor(source: Pick<Source, "json">, json: ManifestJson) {
+    this.#source = source;
     this.#json = json;
   }
 
@@ -74,14 +74,14 @@ export class Objects {
   search(): Promise<readonly SearchEntry[]> {
     const path = this.#json.objects?.search;
     if (path === undefined) return Promise.resolve([]);
-    return (this.#search ??= this.#fetch<{ entries: SearchEntry[] }>(path, "search").then((file) => file?.entries ?? []));
+    return this.#once<{ entries: SearchEntry[] }>(path, "search").then((file) => file?.entries ?? []);
   }
 
   /** All attributes; none when the rendering does not list them. */
   attributes(): Promise<readonly AttributeInfo[]> {
     const path = this.#json.objects?.attributes;
     if (path === undefined) return Promise.resolve([]);
-    return (this.#attributes ??= this.#fetch<{ attributes: AttributeInfo[] }>(path, "attributes").then((file) => file?.attributes ?? []));
+    return this.#once<{ attributes: AttributeInfo[] }>(path, "attributes").then((file) => file?.attributes ?? []);
   }
 
   /** Values by id; none when there is no such column. */
@@ -103,16 +103,20 @@ export class Objects {
     return shard;
   }
 
+  /** A file that is kept; one that could not be had is asked for again. */
+  #once<T>(path: string, what: string): Promise<T | null> {
+    const known = this.#kept.get(path) as Promise<T | null> | undefined;
+    if (known) return known;
+    const file = this.#fetch<T>(path, what);
+    this.#kept.set(path, file);
+    file.catch(() => this.#kept.delete(path));
+    return file;
+  }
+
   /** null when there is no such file. */
   async #fetch<T>(path: string, what: string): Promise<T | null> {
-    const url = `${this.#base}/${path}`;
-    try {
-      const file = (await fetchJson([url])) as { map3d?: string; version?: number } | null;
-      if (file && (file.map3d !== what || file.version !== 1)) throw new FetchError(`${url}: expected map3d "${what}" of version 1, got ${String(file.map3d)} ${String(file.version)}`, 200);
-      return file as T | null;
-    } catch (reason) {
-      if (reason instanceof FetchError && reason.status === 404) return null;
-      throw reason;
-    }
+    const file = (await this.#source.json(path)) as { map3d?: string; version?: number } | null;
+    if (file && (file.map3d !== what || file.version !== 1)) throw new FetchError(`${path}: expected map3d "${what}" of version 1, got ${String(file.map3d)} ${String(file.version)}`, 200);
+    return file as T | null;
   }
 }

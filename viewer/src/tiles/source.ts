@@ -14,8 +14,15 @@ export class Source {
     this.#bases = bases;
   }
 
-  get base(): string {
-    return this.#bases[0] ?? "";
+  /** A file beside the manifest; null when there is none. @throws FetchError */
+  async json(path: string): Promise<unknown> {
+    const urls = this.#bases.map((base) => `${base}/${path}`);
+    try {
+      return await fetchJson(urls, { attempts: Math.max(4, urls.length) });
+    } catch (reason) {
+      if (reason instanceof FetchError && reason.status === 404) return null;
+      throw reason;
+    }
   }
 
   /** @throws ManifestError, FetchError */
