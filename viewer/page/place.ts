@@ -13,6 +13,9 @@ export interface Place {
   readonly by?: string;
 }
 
+/** An address has decimetres, which are up to some pixels. */
+const SAME_PX = 2;
+
 /** `#<direction>/<x>/<y>/<z>/<zoom>`, then `/t=<UTC time>`, `/id=<object>` and `/by=<attribute>` if they are set. Anything else is ignored. */
 export function readPlace(hash: string): Place {
   const [direction, x, y, z, zoom, ...more] = decoded(hash.replace(/^#/, "")).split("/");
@@ -32,7 +35,8 @@ export function readPlace(hash: string): Place {
 
 /** Puts what is seen into the address; `step`: as a step that the back button takes back. */
 export function writePlace(view: map, { id, by }: { readonly id: number; readonly by: string }, step = false): void {
-  const { center, time } = view;
+  const { time } = view;
+  const center = saidCenter(view) ?? view.center;
   if (!center) return;
   const parts = [view.direction, ...center.map((part) => part.toFixed(1)), view.zoom.toFixed(2)];
   if (time) parts.push(`t=${time.toISOString().slice(0, 16)}Z`);
@@ -43,6 +47,14 @@ export function writePlace(view: map, { id, by }: { readonly id: number; readonl
   if (hash === location.hash) return;
   if (step) history.pushState(null, "", hash);
   else history.replaceState(null, "", hash);
+}
+
+/** The address's own centre, as long as it is in the middle: which point of a ray that is is known better as tiles come, and need not be said anew. */
+function saidCenter(view: map): Vec3 | null {
+  const { direction, center, zoom } = readPlace(location.hash);
+  const at = direction === view.direction && center && Math.abs((zoom ?? NaN) - view.zoom) < 0.01 ? view.project(center) : null;
+  const { clientWidth, clientHeight } = view.container;
+  return center && at && Math.hypot(at[0] - clientWidth / 2, at[1] - clientHeight / 2) < SAME_PX ? center : null;
 }
 
 function decoded(text: string): string {
