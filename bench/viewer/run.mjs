@@ -24,9 +24,9 @@ const district = paths.district(asked.length);
 const pan = paths.pan(asked.length);
 const middle = cities.includes("1e6") ? "1e6" : cities.at(-1);
 const whole = paths.whole(asked.length, asked.width_m[middle]);
-/** For what takes seconds a frame. */
-const SHORT = 12;
-const [districtShort, wholeShort] = [paths.district(2 * SHORT), paths.whole(SHORT, asked.width_m[middle])];
+/** CesiumJS takes up to seconds a picture with software GL: half the steps of the same path, or a few. */
+const [half, few] = [paths.district(asked.length / 2), { walks: 1, brief: true }];
+const [districtFew, wholeFew] = [paths.district(8), paths.whole(8, asked.width_m[middle])];
 const at = ({ start }) => ({ start: JSON.stringify(start) });
 
 const map3d = (city, path, more = {}) => page("map3d", { base: `${server.origin}/city/${city}`, ...at(path), ...more });
@@ -44,12 +44,11 @@ function* round() {
   if (asked.peers) yield ["first-network", "cesium", middle, () => measures.first(server, cesium(middle, district), NETWORK)];
   for (const city of cities) {
     yield ["frames", "map3d", city, () => measures.frames(server, map3d(city, district), district)];
-    if (asked.peers) yield ["frames", "cesium", city, () => measures.frames(server, cesium(city, district), district, 1)];
+    if (asked.peers) yield ["frames", "cesium", city, () => measures.frames(server, cesium(city, district), half, { walks: 1 })];
   }
-  if (asked.peers) yield ["frames", "cesium-device", middle, () => measures.frames(server, cesium(middle, district, DEVICE), districtShort, 1)];
+  if (asked.peers) yield ["frames", "cesium-device", middle, () => measures.frames(server, cesium(middle, district, DEVICE), districtFew, few)];
   yield ["whole", "map3d", middle, () => measures.frames(server, map3d(middle, whole), whole)];
-  if (asked.peers) yield ["whole", "cesium", middle, () => measures.frames(server, cesium(`${middle}-far`, whole), wholeShort, 1)];
-  if (asked.peers) yield ["whole", "cesium-device", middle, () => measures.frames(server, cesium(`${middle}-far`, whole, DEVICE), wholeShort, 1)];
+  if (asked.peers) yield ["whole", "cesium", middle, () => measures.frames(server, cesium(`${middle}-far`, whole), wholeFew, few)];
   for (const name of asked.peers ? ["map3d", "openseadragon", "leaflet"] : ["map3d"]) {
     yield ["color-first", name, middle, () => measures.first(server, flat(name))];
     yield ["color-frames", name, middle, () => measures.frames(server, flat(name), pan)];
