@@ -25,21 +25,19 @@ export async function first(server, url, network) {
 const STOP = 4;
 
 /**
- * Frames along a path, as many as the machine makes: processor milliseconds a picture, rasteriser included. `cold`: the first time; `warm`: once all along the
- * path has been fetched, median of `walks`. `brief`: nothing is fetched first and there is no cold walk, for what takes seconds a picture. Intervals are
- * the page's own: the rasteriser may lag behind it.
+ * Frames along a path once all along it has been fetched: processor milliseconds a picture, rasteriser included, median of `walks`. `paced`: at the pace of
+ * the screen, when the page's intervals say how smooth it is; else as many as the machine makes, and the rasteriser lags behind the page.
  */
-export async function frames(server, url, path, { walks = 3, brief = false } = {}) {
-  const phone = await Phone.open({ unbound: true });
+export async function frames(server, url, path, { walks = 1, paced = false } = {}) {
+  const phone = await Phone.open({ unbound: !paced });
   try {
     await phone.goto(url);
-    const cold = brief ? null : await walk(phone, server, path);
-    if (!brief) await phone.page.evaluate(([steps, every]) => globalThis.bench.visit(steps, every), [path.steps, STOP]);
-    const warmer = [];
-    for (let k = 0; k < walks; k++) warmer.push(await walk(phone, server, path));
-    const warm = Object.fromEntries(Object.keys(warmer[0]).map((key) => [key, median(warmer.map((one) => one[key]))]));
+    await phone.page.evaluate(([steps, every]) => globalThis.bench.visit(steps, every), [path.steps, STOP]);
+    const taken = [];
+    for (let k = 0; k < walks; k++) taken.push(await walk(phone, server, path));
+    const figures = Object.fromEntries(Object.keys(taken[0]).map((key) => [key, median(taken.map((one) => one[key]))]));
     const about = await phone.page.evaluate(() => globalThis.bench.about?.() ?? {});
-    return { cold: cold ?? warm, warm, about, ...problems(phone) };
+    return { ...figures, about, ...problems(phone) };
   } finally {
     await phone.close();
   }
