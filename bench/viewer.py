@@ -19,7 +19,6 @@ from rich.console import Console
 from rich.table import Table
 
 from .city import PLACE_M, RINGS, City, made
-from .scene import CACHE
 from .tiles3d import tileset
 
 HERE = Path(__file__).parent / "viewer"
@@ -31,7 +30,8 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True)
 class Wish:
-    """What to measure. `length`: steps of a path; `use_s`, `idle_s`: seconds of use before memory is read, and of nothing after it."""
+    """What to measure. `length`: steps of a path; `use_s`, `idle_s`: seconds of use before memory is read, and of nothing after it;
+    `free`: pictures are not held back to the screen's pace (see measures.mjs)."""
 
     cities: tuple[str, ...] = tuple(RINGS)
     reps: int = 5
@@ -39,15 +39,16 @@ class Wish:
     use_s: int = 300
     idle_s: int = 60
     peers: bool = True
+    free: bool = False
     only: tuple[str, ...] | None = None
 
 
 QUICK = Wish(cities=("1e4",), reps=1, length=8, use_s=5, idle_s=5, peers=False)
 
 
-def measure(quick: bool = False, reps: int = 5, folder: Path = CACHE / "viewer", only: tuple[str, ...] | None = None) -> list[Row]:
+def measure(quick: bool, reps: int, folder: Path, only: tuple[str, ...] | None, free: bool) -> list[Row]:
     """All samples; the tables are printed. `only`: measures (see run.mjs)."""
-    wish = QUICK if quick else Wish(reps=reps, peers=_peers(), only=only)
+    wish = QUICK if quick else Wish(reps=reps, peers=_peers(), only=only, free=free)
     cities = list(made(folder, wish.cities))
     middle = cities[min(2, len(cities) - 1)]
     if wish.peers:
@@ -84,6 +85,7 @@ def _samples(cities: list[City], wish: Wish, folder: Path) -> list[Row]:
         "use_s": wish.use_s,
         "idle_s": wish.idle_s,
         "only": wish.only,
+        "free": wish.free,
         "pictures": wish.peers and wish.only is None,
     }
     if shutil.which("node") is None:

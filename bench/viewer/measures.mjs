@@ -25,11 +25,12 @@ export async function first(server, url, network) {
 const STOP = 4;
 
 /**
- * Frames along a path once all along it has been fetched: processor milliseconds a picture, rasteriser included, median of `walks`. `paced`: at the pace of
- * the screen, when the page's intervals say how smooth it is; else as many as the machine makes, and the rasteriser lags behind the page.
+ * Frames along a path once all along it has been fetched: processor milliseconds a picture, rasteriser included, median of `walks`. `free`: not held back
+ * to the screen's pace. That is for browsers with a GPU: with software GL a picture takes far longer than a screen's, and a page that is not held back
+ * runs ahead of the rasteriser, which makes both time and processor time uncertain.
  */
-export async function frames(server, url, path, { walks = 1, paced = false } = {}) {
-  const phone = await Phone.open({ unbound: !paced });
+export async function frames(server, url, path, { walks = 1, free = false } = {}) {
+  const phone = await Phone.open({ unbound: free });
   try {
     await phone.goto(url);
     await phone.page.evaluate(([steps, every]) => globalThis.bench.visit(steps, every), [path.steps, STOP]);

@@ -1,4 +1,4 @@
-// Runs what Python asks for (bench/viewer.py): standard input is { work, peers, cities, reps, length, use_s, idle_s, out, pictures }; every sample is a line of
+// Runs what Python asks for (bench/viewer.py): standard input is { work, peers, cities, reps, length, use_s, idle_s, free, only, out, pictures }; every sample is a line of
 // `out`, and those that are there already are not taken again. Viewers take turns; rounds come one after another.
 import { appendFileSync, existsSync, mkdirSync, readFileSync } from "node:fs";
 import { loadavg } from "node:os";
@@ -10,7 +10,7 @@ import { Server } from "./server.mjs";
 
 const asked = JSON.parse(readFileSync(0, "utf8"));
 const here = import.meta.dirname;
-const { cities, work } = asked;
+const { cities, work, free } = asked;
 /** What people have on the way, besides this machine alone: 10 Mbit/s, 40 ms there and back. */
 const NETWORK = { latency: 40, downloadThroughput: 10e6 / 8, uploadThroughput: 5e6 / 8 };
 
@@ -43,16 +43,16 @@ function* round() {
   yield ["first-network", "map3d", middle, () => measures.first(server, map3d(middle, district), NETWORK)];
   if (asked.peers) yield ["first-network", "cesium-css", middle, () => measures.first(server, cesium(middle, district), NETWORK)];
   for (const city of cities) {
-    yield ["frames", "map3d-css", city, () => measures.frames(server, map3d(city, district, CSS), district)];
-    if (asked.peers) yield ["frames", "cesium-css", city, () => measures.frames(server, cesium(city, district), district)];
+    yield ["frames", "map3d-css", city, () => measures.frames(server, map3d(city, district, CSS), district, { free })];
+    if (asked.peers) yield ["frames", "cesium-css", city, () => measures.frames(server, cesium(city, district), district, { free })];
   }
-  yield ["frames", "map3d", middle, () => measures.frames(server, map3d(middle, district), districtFew)];
-  if (asked.peers) yield ["frames", "cesium", middle, () => measures.frames(server, cesium(middle, district, DEVICE), districtFew)];
-  yield ["whole", "map3d-css", middle, () => measures.frames(server, map3d(middle, whole, CSS), wholeFew)];
-  if (asked.peers) yield ["whole", "cesium-css", middle, () => measures.frames(server, cesium(`${middle}-far`, whole), wholeFew)];
+  yield ["frames", "map3d", middle, () => measures.frames(server, map3d(middle, district), districtFew, { free })];
+  if (asked.peers) yield ["frames", "cesium", middle, () => measures.frames(server, cesium(middle, district, DEVICE), districtFew, { free })];
+  yield ["whole", "map3d-css", middle, () => measures.frames(server, map3d(middle, whole, CSS), wholeFew, { free })];
+  if (asked.peers) yield ["whole", "cesium-css", middle, () => measures.frames(server, cesium(`${middle}-far`, whole), wholeFew, { free })];
   for (const name of asked.peers ? ["map3d", "openseadragon", "leaflet"] : ["map3d"]) {
     yield ["color-first", name, middle, () => measures.first(server, flat(name))];
-    yield ["color-frames", name, middle, () => measures.frames(server, flat(name), panFew, { paced: true, walks: 3 })];
+    yield ["color-frames", name, middle, () => measures.frames(server, flat(name), panFew, { walks: 3, free })];
   }
 }
 
