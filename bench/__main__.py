@@ -28,6 +28,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="viewer: a small town without peers, to see that it works")
     parser.add_argument("--reps", type=int, default=5, help="viewer: rounds")
     parser.add_argument("--only", nargs="+", help="viewer: measures, e.g. first frames")
+    parser.add_argument("--free", action="store_true", help="viewer: vsync off, for machines whose browser draws with a GPU")
     parser.add_argument("--work", type=Path, default=CACHE / "viewer", help="viewer: folder for cities and samples, 6 GB")
     parser.add_argument("--json", action="store_true", help="print one JSON document after the tables")
     options = parser.parse_args()
@@ -42,7 +43,7 @@ def main() -> None:
         "incremental": incremental.measure,
         "extent": lambda: extent.measure(tuple(options.millions), plots=Path("docs/plots")),
         "stored": lambda: stored.measure(options.folders),
-        "viewer": lambda: viewer.measure(options.quick, options.reps, options.work, tuple(options.only) if options.only else None),
+        "viewer": lambda: viewer.measure(options.quick, options.reps, options.work, tuple(options.only) if options.only else None, options.free),
     }
     rows = {part: measures[part]() for part in options.parts or PARTS}
     if options.json:

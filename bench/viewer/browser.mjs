@@ -52,10 +52,10 @@ export class Phone {
   /** Waits until all that was drawn has gone through the rasteriser, which lags behind the page; the page draws no more meanwhile. */
   async settled() {
     await this.page.evaluate(() => globalThis.bench.pause?.(true));
-    for (let [last, tries] = [this.cpu().all, 0]; tries < 60; tries++) {
-      await this.page.waitForTimeout(400);
+    for (let [last, still, tries] = [this.cpu().all, 0, 0]; still < 3 && tries < 200; tries++) {
+      await this.page.waitForTimeout(300);
       const now = this.cpu().all;
-      if (now - last <= 40) break;
+      still = now - last <= 30 ? still + 1 : 0;
       last = now;
     }
     const spent = this.cpu();

@@ -24,31 +24,37 @@ export async function first(server, url, network) {
 /** Steps between the stops at which everything along a path is fetched. */
 const STOP = 4;
 
-/** Frames along a path, as many as the machine makes: processor milliseconds a frame. `cold`: the first time; `warm`: once all along the path has been fetched, median of `walks`. */
-export async function frames(server, url, path, walks = 3) {
-  const phone = await Phone.open({ unbound: true });
+/**
+ * Frames along a path once all along it has been fetched: processor milliseconds a picture, rasteriser included, median of `walks`. `free`: not held back
+ * to the screen's pace. That is for browsers with a GPU: with software GL a picture takes far longer than a screen's, and a page that is not held back
+ * runs ahead of the rasteriser, which makes both time and processor time uncertain.
+ */
+export async function frames(server, url, path, { walks = 1, free = false } = {}) {
+  const phone = await Phone.open({ unbound: free });
   try {
     await phone.goto(url);
-    const walk = async () => {
-      const [cpu, count] = [await phone.settled(), server.count];
-      const intervals = await phone.page.evaluate((steps) => globalThis.bench.walk(steps), path.steps);
-      const [spent, sent] = [await phone.settled(), server.count];
-      const n = path.steps.length;
-      return {
-        cpu_ms: (spent.all - cpu.all) / n, page_ms: (spent.all - spent.gpu - cpu.all + cpu.gpu) / n, p50_ms: quantile(intervals, 0.5), p95_ms: quantile(intervals, 0.95),
-        requests: sent.requests - count.requests, bytes: sent.bytes - count.bytes,
-      };
-    };
-    const cold = await walk();
     await phone.page.evaluate(([steps, every]) => globalThis.bench.visit(steps, every), [path.steps, STOP]);
-    const warmer = [];
-    for (let k = 0; k < walks; k++) warmer.push(await walk());
-    const warm = Object.fromEntries(Object.keys(cold).map((key) => [key, median(warmer.map((one) => one[key]))]));
+    const taken = [];
+    for (let k = 0; k < walks; k++) taken.push(await walk(phone, server, path));
+    const figures = Object.fromEntries(Object.keys(taken[0]).map((key) => [key, median(taken.map((one) => one[key]))]));
     const about = await phone.page.evaluate(() => globalThis.bench.about?.() ?? {});
-    return { cold, warm, about, ...problems(phone) };
+    return { ...figures, about, ...problems(phone) };
   } finally {
     await phone.close();
   }
+}
+
+/** Once along a path. Pages that draw of their own accord tell how many pictures that were; for others it is a picture a step, at least. */
+async function walk(phone, server, path) {
+  const pictures = () => phone.page.evaluate(() => globalThis.bench.pictures?.() ?? 0);
+  const [cpu, count, before] = [await phone.settled(), server.count, await pictures()];
+  const intervals = await phone.page.evaluate((steps) => globalThis.bench.walk(steps), path.steps);
+  const [spent, sent, after] = [await phone.settled(), server.count, await pictures()];
+  const n = Math.max(path.steps.length, after - before);
+  return {
+    cpu_ms: (spent.all - cpu.all) / n, page_ms: (spent.all - spent.gpu - cpu.all + cpu.gpu) / n, p50_ms: quantile(intervals, 0.5), p95_ms: quantile(intervals, 0.95),
+    pictures: n, requests: sent.requests - count.requests, bytes: sent.bytes - count.bytes,
+  };
 }
 
 /**
@@ -70,7 +76,7 @@ export async function stays(server, url, emptyUrl, path, { use_s, idle_s }) {
     const [spent, sent, then] = [phone.cpu(), server.count, await phone.page.evaluate(() => globalThis.bench.drawn())];
     const idle = { s: idle_s, frames: then - drawn, requests: sent.requests - count.requests, cpu_ms_per_s: (spent.all - cpu.all) / idle_s };
     const beyond = { pss: used.pss - beside.pss, anonymous: used.anonymous - beside.anonymous };
-    return { fresh, used, empty: beside, beyond, use_s, steps: then, idle, ...problems(phone) };
+    return { fresh, used, empty: beside, beyond, use_s, idle, ...problems(phone) };
   } finally {
     await phone.close();
     await empty.close();

@@ -1,4 +1,4 @@
-// Runs what Python asks for (bench/viewer.py): standard input is { work, peers, cities, reps, length, use_s, idle_s, out, pictures }; every sample is a line of
+// Runs what Python asks for (bench/viewer.py): standard input is { work, peers, cities, reps, length, use_s, idle_s, free, only, out, pictures }; every sample is a line of
 // `out`, and those that are there already are not taken again. Viewers take turns; rounds come one after another.
 import { appendFileSync, existsSync, mkdirSync, readFileSync } from "node:fs";
 import { loadavg } from "node:os";
@@ -10,7 +10,7 @@ import { Server } from "./server.mjs";
 
 const asked = JSON.parse(readFileSync(0, "utf8"));
 const here = import.meta.dirname;
-const { cities, work } = asked;
+const { cities, work, free } = asked;
 /** What people have on the way, besides this machine alone: 10 Mbit/s, 40 ms there and back. */
 const NETWORK = { latency: 40, downloadThroughput: 10e6 / 8, uploadThroughput: 5e6 / 8 };
 
@@ -24,35 +24,35 @@ const district = paths.district(asked.length);
 const pan = paths.pan(asked.length);
 const middle = cities.includes("1e6") ? "1e6" : cities.at(-1);
 const whole = paths.whole(asked.length, asked.width_m[middle]);
-/** For what takes seconds a frame. */
-const SHORT = 12;
-const [districtShort, wholeShort] = [paths.district(2 * SHORT), paths.whole(SHORT, asked.width_m[middle])];
+/** With software GL a picture of three device pixels a CSS pixel takes seconds: a few steps must do. */
+const [districtFew, wholeFew, panFew] = [paths.district(8), paths.whole(8, asked.width_m[middle]), paths.pan(8)];
 const at = ({ start }) => ({ start: JSON.stringify(start) });
 
 const map3d = (city, path, more = {}) => page("map3d", { base: `${server.origin}/city/${city}`, ...at(path), ...more });
 const cesium = (tiles, path, more = {}) => page("cesium", { base: `${server.origin}/3dtiles/${tiles}.json`, ...at(path), ...more });
 const flat = (name) => page(name, { base: `${server.origin}/plain/${middle}`, mode: "color", ...at(pan) });
-const DEVICE = { resolution: "device" };
+/** CesiumJS draws a picture of CSS pixels unless told otherwise, map3d.js one of device pixels; "-css" are pictures of CSS pixels. */
+const [DEVICE, CSS] = [{ resolution: "device" }, { ratio: "1" }];
 
 /** [measure, viewer, city, what to do]; in this order, round after round. */
 function* round() {
   for (const city of cities) {
     yield ["first", "map3d", city, () => measures.first(server, map3d(city, district))];
-    if (asked.peers) yield ["first", "cesium", city, () => measures.first(server, cesium(city, district))];
+    if (asked.peers) yield ["first", "cesium-css", city, () => measures.first(server, cesium(city, district))];
   }
   yield ["first-network", "map3d", middle, () => measures.first(server, map3d(middle, district), NETWORK)];
-  if (asked.peers) yield ["first-network", "cesium", middle, () => measures.first(server, cesium(middle, district), NETWORK)];
+  if (asked.peers) yield ["first-network", "cesium-css", middle, () => measures.first(server, cesium(middle, district), NETWORK)];
   for (const city of cities) {
-    yield ["frames", "map3d", city, () => measures.frames(server, map3d(city, district), district)];
-    if (asked.peers) yield ["frames", "cesium", city, () => measures.frames(server, cesium(city, district), district, 1)];
+    yield ["frames", "map3d-css", city, () => measures.frames(server, map3d(city, district, CSS), district, { free })];
+    if (asked.peers) yield ["frames", "cesium-css", city, () => measures.frames(server, cesium(city, district), district, { free })];
   }
-  if (asked.peers) yield ["frames", "cesium-device", middle, () => measures.frames(server, cesium(middle, district, DEVICE), districtShort, 1)];
-  yield ["whole", "map3d", middle, () => measures.frames(server, map3d(middle, whole), whole)];
-  if (asked.peers) yield ["whole", "cesium", middle, () => measures.frames(server, cesium(`${middle}-far`, whole), wholeShort, 1)];
-  if (asked.peers) yield ["whole", "cesium-device", middle, () => measures.frames(server, cesium(`${middle}-far`, whole, DEVICE), wholeShort, 1)];
+  yield ["frames", "map3d", middle, () => measures.frames(server, map3d(middle, district), districtFew, { free })];
+  if (asked.peers) yield ["frames", "cesium", middle, () => measures.frames(server, cesium(middle, district, DEVICE), districtFew, { free })];
+  yield ["whole", "map3d-css", middle, () => measures.frames(server, map3d(middle, whole, CSS), wholeFew, { free })];
+  if (asked.peers) yield ["whole", "cesium-css", middle, () => measures.frames(server, cesium(`${middle}-far`, whole), wholeFew, { free })];
   for (const name of asked.peers ? ["map3d", "openseadragon", "leaflet"] : ["map3d"]) {
     yield ["color-first", name, middle, () => measures.first(server, flat(name))];
-    yield ["color-frames", name, middle, () => measures.frames(server, flat(name), pan)];
+    yield ["color-frames", name, middle, () => measures.frames(server, flat(name), panFew, { walks: 3, free })];
   }
 }
 
@@ -62,8 +62,8 @@ function* once() {
   const times = { use_s: asked.use_s, idle_s: asked.idle_s };
   yield ["stays", "map3d", middle, () => measures.stays(server, map3d(middle, district), empty, district, times)];
   if (!asked.peers) return;
-  yield ["stays", "cesium", middle, () => measures.stays(server, cesium(middle, district), empty, district, times)];
-  yield ["stays", "cesium-onrequest", middle, () => measures.stays(server, cesium(middle, district, { onrequest: "1" }), empty, district, { ...times, use_s: 5 })];
+  yield ["stays", "cesium-css", middle, () => measures.stays(server, cesium(middle, district), empty, district, times)];
+  yield ["stays", "cesium-css-onrequest", middle, () => measures.stays(server, cesium(middle, district, { onrequest: "1" }), empty, district, { ...times, use_s: 5 })];
 }
 
 const done = new Map();
