@@ -107,7 +107,7 @@ bench-cycles: requirements/cycles.lock | $(CACHE) ## install Blender (350 MB) in
 	$(PYTHON) -m venv $(CACHE)/cycles
 	$(CACHE)/cycles/bin/python -m pip install -q --disable-pip-version-check -r requirements/cycles.lock
 
-bench-viewer: build ## map3d.js beside CesiumJS, OpenSeadragon and Leaflet (npm, 230 MB), cities to 10 million triangles: 2 hours, 6 GB of disk
+bench-viewer: build ## map3d.js beside CesiumJS, OpenSeadragon and Leaflet (npm, 230 MB), cities to 10 million triangles: 2 hours and 9 GB of disk
 	cd bench/viewer && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error || echo "bench: NO PEERS: npm could not install them" >&2
 	$(BIN)/python -m bench viewer
 

@@ -29,7 +29,7 @@ def main() -> None:
     parser.add_argument("--reps", type=int, default=5, help="viewer: rounds")
     parser.add_argument("--only", nargs="+", help="viewer: measures, e.g. first frames")
     parser.add_argument("--free", action="store_true", help="viewer: vsync off, for machines whose browser draws with a GPU")
-    parser.add_argument("--work", type=Path, default=CACHE / "viewer", help="viewer: folder for cities and samples, 6 GB")
+    parser.add_argument("--work", type=Path, default=CACHE / "viewer", help="viewer: folder for cities and samples, 9 GB")
     parser.add_argument("--json", action="store_true", help="print one JSON document after the tables")
     options = parser.parse_args()
     unknown = [part for part in options.parts if part not in PARTS + ASKED]
