@@ -7,7 +7,7 @@ import type { LayerKind, View } from "../geo/manifest";
 import { NO_DEPTH, type TileData } from "../tiles/tileData";
 import { groupsOf } from "./combined";
 import type { imageLayer } from "./imageLayer";
-import { middleIn } from "./layerPlan";
+import { DEPTH_UNIT_M, middleIn } from "./layerPlan";
 import type { Sight } from "./stage";
 
 /** What lies under a pixel. */
@@ -126,7 +126,7 @@ function valueAt(data: TileData | null, { i, j }: Pixel): number | undefined {
 function positionOf(layer: imageLayer, { frame }: View, { tile, i, j }: Pixel, depth: number): Vec3 | null {
   const rendering = layer.rendering;
   if (!rendering || depth === NO_DEPTH) return null;
-  const unit = rendering.layers.get("depth")?.unit_m ?? 2 ** -10;
+  const unit = rendering.layers.get("depth")?.unit_m ?? DEPTH_UNIT_M;
   const [u, v] = uvOfPixel(frame, tile, i, j);
   return add(rendering.json.origin, localFromUvd(frame.axes, [u, v, frame.d0 + depth * unit]));
 }

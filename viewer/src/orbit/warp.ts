@@ -1,4 +1,4 @@
-import { DrawError } from "../core/errors";
+import { linkProgram } from "../core/gl";
 import { dot, type Vec2, type Vec3 } from "../core/vec";
 import { uvdFromLocal, type Axes } from "../geo/axes";
 import { cssPixelM, type Camera } from "../geo/camera";
@@ -45,8 +45,8 @@ export class Warp {
   /** @throws DrawError */
   constructor(gl: WebGL2RenderingContext) {
     this.#gl = gl;
-    this.#warp = linked(gl, WARP_VERTEX, WARP_FRAGMENT);
-    this.#mix = linked(gl, MIX_VERTEX, MIX_FRAGMENT);
+    this.#warp = linkProgram(gl, "warp", WARP_VERTEX, WARP_FRAGMENT);
+    this.#mix = linkProgram(gl, "mix", MIX_VERTEX, MIX_FRAGMENT);
   }
 
   get gl(): WebGL2RenderingContext {
@@ -152,20 +152,4 @@ export class Warp {
 /** Column by column: U, V, D there of the unit vectors here. */
 export function turnOf(here: Axes, there: Axes): number[] {
   return [here.right, here.up, here.forward].flatMap((from) => [there.right, there.up, there.forward].map((to) => dot(from, to)));
-}
-
-/** @throws DrawError with the compiler's log */
-function linked(gl: WebGL2RenderingContext, vertex: string, fragment: string): WebGLProgram {
-  const program = gl.createProgram();
-  for (const [type, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]] as const) {
-    const shader = gl.createShader(type);
-    if (!shader) throw new DrawError("the WebGL context is lost");
-    gl.shaderSource(shader, source);
-    gl.compileShader(shader);
-    gl.attachShader(program, shader);
-  }
-  gl.linkProgram(program);
-  if (gl.getProgramParameter(program, gl.LINK_STATUS) || gl.isContextLost()) return program;
-  const logs = (gl.getAttachedShaders(program) ?? []).map((shader) => gl.getShaderInfoLog(shader));
-  throw new DrawError(`orbit: ${[gl.getProgramInfoLog(program), ...logs].join(" ").trim()}`);
 }

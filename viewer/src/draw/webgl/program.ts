@@ -1,4 +1,4 @@
-import { DrawError } from "../../core/errors";
+import { linkProgram } from "../../core/gl";
 import { fragment, VERTEX, variantName, type Variant } from "./shader";
 
 /** A linked program and where its uniforms are; those it does not use are null, which WebGL ignores. */
@@ -31,23 +31,7 @@ export class Programs {
   }
 
   #link(variant: Variant, name: string): Program {
-    const gl = this.#gl;
-    const handle = gl.createProgram();
-    for (const [type, source] of [[gl.VERTEX_SHADER, VERTEX] as const, [gl.FRAGMENT_SHADER, fragment(variant)] as const]) {
-      const shader = gl.createShader(type);
-      if (!shader) throw new DrawError("the WebGL context is lost");
-      gl.shaderSource(shader, source);
-      gl.compileShader(shader);
-      gl.attachShader(handle, shader);
-    }
-    gl.linkProgram(handle);
-    if (!gl.getProgramParameter(handle, gl.LINK_STATUS) && !gl.isContextLost()) throw new DrawError(`shader ${name}: ${this.#log(handle)}`);
-    return this.#withUniforms(handle);
-  }
-
-  #log(handle: WebGLProgram): string {
-    const shaders = this.#gl.getAttachedShaders(handle) ?? [];
-    return [this.#gl.getProgramInfoLog(handle), ...shaders.map((shader) => this.#gl.getShaderInfoLog(shader))].join(" ").trim();
+    return this.#withUniforms(linkProgram(this.#gl, name, VERTEX, fragment(variant)));
   }
 
   #withUniforms(handle: WebGLProgram): Program {
