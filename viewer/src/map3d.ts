@@ -3,6 +3,7 @@ export { map } from "./map/map";
 export { imageLayer, type ImageLayerEvents, type ImageLayerOptions } from "./map/imageLayer";
 export { marker, type MarkerEvents, type MarkerOptions } from "./overlay/marker";
 export { popup, type PopupEvents, type PopupOptions } from "./overlay/popup";
+export { Attached } from "./core/attached";
 export { Evented, type Fired, type Listener } from "./core/events";
 export { DecodeError, DrawError, FetchError, ManifestError, Map3dError, UsageError } from "./core/errors";
 export type { ClickEvent, HoverEvent, MapEvents, MapOptions } from "./map/options";

@@ -2,7 +2,7 @@ import { adoptStyles, element } from "../core/dom";
 import { inLanguage } from "../core/words";
 import { sub, type Vec2, type Vec3 } from "../core/vec";
 import { uvdFromLocal } from "../geo/axes";
-import { Evented, marker, UsageError, type Attachable, type map, type Relief } from "../map3d";
+import { Attached, marker, UsageError, type map, type Relief } from "../map3d";
 import { groupsOf, spread, type Group } from "./groups";
 import { STYLES } from "./styles";
 
@@ -43,10 +43,9 @@ interface Shown {
  * Markers that lie close together on the screen join into one with their number; a click on it comes nearer, or, where that does not part them, spreads them. Groups are those of a
  * whole zoom level, so that they stay while the picture moves; only what is in view has elements in the page.
  */
-export class cluster extends Evented<ClusterEvents> implements Attachable<map> {
+export class cluster extends Attached<map, ClusterEvents> {
   readonly options: Required<Omit<ClusterOptions, "color" | "label">> & Pick<ClusterOptions, "color" | "label">;
   #markers: readonly marker[];
-  #map: map | undefined;
   #groups = new Map<number, Group[]>();
   #uv = new Float64Array();
   #view = "";
@@ -62,18 +61,6 @@ export class cluster extends Evented<ClusterEvents> implements Attachable<map> {
     this.#markers = [...markers];
   }
 
-  /** Puts the markers on a map, in groups. */
-  addTo(map: map): this {
-    map.add(this);
-    return this;
-  }
-
-  /** Takes all markers off the map. */
-  remove(): this {
-    this.#map?.discard(this);
-    return this;
-  }
-
   /** All markers, in the order in which they were given. */
   get markers(): readonly marker[] {
     return this.#markers;
@@ -84,12 +71,11 @@ export class cluster extends Evented<ClusterEvents> implements Attachable<map> {
     this.#clear();
     this.#markers = [...markers];
     this.#view = "";
-    this.#map?.stage?.request();
+    this.map?.stage?.request();
     return this;
   }
 
-  onAdd(map: map): void {
-    this.#map = map;
+  protected enter(map: map): void {
     adoptStyles(document, STYLES);
     map.moves.on("draw", this.#place);
     map.on("preclick", this.#join);
@@ -97,16 +83,15 @@ export class cluster extends Evented<ClusterEvents> implements Attachable<map> {
     this.#place();
   }
 
-  onRemove(map: map): void {
+  protected leave(map: map): void {
     this.#clear();
     map.moves.off("draw", this.#place);
     map.off("preclick", this.#join);
     map.container.removeEventListener("keydown", this.#pressed);
-    this.#map = undefined;
   }
 
   readonly #place = (): void => {
-    const [map, relief] = [this.#map, this.#map?.relief];
+    const [map, relief] = [this.map, this.map?.relief];
     if (!map || !relief) return;
     this.#turn(relief);
     if (this.#spread && Math.abs(map.zoom - this.#spread.zoom) > 1e-6) this.#join();
@@ -200,10 +185,10 @@ export class cluster extends Evented<ClusterEvents> implements Attachable<map> {
   }
 
   #drawLegs(): void {
-    if (!this.#spread || !this.#map) return;
+    if (!this.#spread || !this.map) return;
     const { markers, shifts, legs } = this.#spread;
     markers.forEach(({ position }, k) => {
-      const [at, [dx, dy]] = [this.#map?.project(position) ?? [0, 0], shifts[k] ?? [0, 0]];
+      const [at, [dx, dy]] = [this.map?.project(position) ?? [0, 0], shifts[k] ?? [0, 0]];
       Object.entries({ x1: at[0], y1: at[1], x2: at[0] + dx, y2: at[1] + dy }).forEach(([name, value]) => legs.children[k]?.setAttribute(name, value.toFixed(1)));
     });
   }
@@ -213,7 +198,7 @@ export class cluster extends Evented<ClusterEvents> implements Attachable<map> {
     if (!open) return;
     this.#spread = undefined;
     open.legs.remove();
-    for (const one of open.markers) this.#map?.discard(one.setShift([0, 0]));
+    for (const one of open.markers) this.map?.discard(one.setShift([0, 0]));
     this.fire("join", {});
   };
 
@@ -223,7 +208,7 @@ export class cluster extends Evented<ClusterEvents> implements Attachable<map> {
 
   #clear(): void {
     this.#join();
-    for (const { item } of this.#shown.values()) this.#map?.discard(item);
+    for (const { item } of this.#shown.values()) this.map?.discard(item);
     this.#shown.clear();
   }
 }

@@ -1,6 +1,6 @@
 import { adoptStyles, element } from "../core/dom";
 import { UsageError } from "../core/errors";
-import { Evented, type Attachable, type imageLayer, type map } from "../map3d";
+import { Attached, type imageLayer, type map } from "../map3d";
 import { STYLES } from "./styles";
 import { wordsOf } from "./words";
 
@@ -26,14 +26,13 @@ export interface EpochsEvents {
 }
 
 /** A slider over layers of which one is shown; the one before stays until the next is complete, then it fades. Adds the layers to the map. */
-export class epochs extends Evented<EpochsEvents> implements Attachable<map> {
+export class epochs extends Attached<map, EpochsEvents> {
   readonly #list: readonly Epoch[];
   readonly #fade_ms: number;
   readonly #box: HTMLElement;
   readonly #slider: HTMLInputElement;
   readonly #name = element("output", "");
   #shown: number;
-  #map: map | undefined;
   #leaving: (() => void) | undefined;
 
   /** @throws UsageError without at least two epochs, or when the one to show first is none of them */
@@ -49,18 +48,6 @@ export class epochs extends Evented<EpochsEvents> implements Attachable<map> {
     this.#slider.addEventListener("keydown", (event) => { event.stopPropagation(); });
     const ends = [list[0], list[list.length - 1]].map((epoch) => element("span", "", {}, epoch?.label ?? ""));
     this.#box = element("div", "map3d-epochs", {}, this.#name, this.#slider, element("div", "", { "aria-hidden": "true" }, ...ends));
-  }
-
-  /** Puts the slider and its layers on a map. */
-  addTo(map: map): this {
-    map.add(this);
-    return this;
-  }
-
-  /** Takes the slider and its layers off the map. */
-  remove(): this {
-    this.#map?.discard(this);
-    return this;
   }
 
   /** Number of the one that is shown. */
@@ -80,8 +67,7 @@ export class epochs extends Evented<EpochsEvents> implements Attachable<map> {
     return this.fire("change", { epoch, index });
   }
 
-  onAdd(map: map): void {
-    this.#map = map;
+  protected enter(map: map): void {
     adoptStyles(document, STYLES);
     this.#slider.setAttribute("aria-label", wordsOf(map.language).time);
     this.#label();
@@ -89,9 +75,8 @@ export class epochs extends Evented<EpochsEvents> implements Attachable<map> {
     map.overlayPane.append(this.#box);
   }
 
-  onRemove(map: map): void {
+  protected leave(map: map): void {
     this.#leaving?.();
-    this.#map = undefined;
     this.#box.remove();
     for (const { layer } of this.#list) map.discard(layer.setOpacity(1));
   }
@@ -105,7 +90,7 @@ export class epochs extends Evented<EpochsEvents> implements Attachable<map> {
 
   /** The new one comes; the old ones go when it is here. */
   #change(before: number): void {
-    const map = this.#map;
+    const map = this.map;
     if (!map) return;
     this.#leaving?.();
     const [next, old] = [this.#list[this.#shown]?.layer, this.#list[before]?.layer];

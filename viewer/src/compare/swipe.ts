@@ -1,7 +1,7 @@
 import { adoptStyles, element, icon } from "../core/dom";
 import { UsageError } from "../core/errors";
 import { clamp } from "../core/vec";
-import { Evented, type Attachable, type imageLayer, type map } from "../map3d";
+import { Attached, type imageLayer, type map } from "../map3d";
 import { STYLES } from "./styles";
 import { wordsOf } from "./words";
 
@@ -26,11 +26,10 @@ const STEP = 0.02;
 const list = (layers: Layers): readonly imageLayer[] => (Array.isArray(layers) ? (layers as readonly imageLayer[]) : [layers as imageLayer]);
 
 /** Some layers left of a border, others right of it; the border can be moved by pointer and by arrow keys. Other layers of the map stay whole. */
-export class swipe extends Evented<SwipeEvents> implements Attachable<map> {
+export class swipe extends Attached<map, SwipeEvents> {
   readonly #sides: readonly [readonly imageLayer[], readonly imageLayer[]];
   readonly #border: HTMLElement;
   #at: number;
-  #map: map | undefined;
 
   /** @throws UsageError when a layer is on both sides */
   constructor(left: Layers, right: Layers, { at = 0.5, names }: SwipeOptions = {}) {
@@ -42,18 +41,6 @@ export class swipe extends Evented<SwipeEvents> implements Attachable<map> {
     if (names) this.#border.setAttribute("aria-description", names.join(" | "));
     this.#border.addEventListener("pointerdown", (event) => { this.#grab(event); });
     this.#border.addEventListener("keydown", (event) => { this.#press(event); });
-  }
-
-  /** Puts the border on a map; the layers are added by themselves. */
-  addTo(map: map): this {
-    map.add(this);
-    return this;
-  }
-
-  /** Takes the border away; the layers stay, whole. */
-  remove(): this {
-    this.#map?.discard(this);
-    return this;
   }
 
   /** Where the border stands, 0 (left edge) to 1. */
@@ -70,16 +57,14 @@ export class swipe extends Evented<SwipeEvents> implements Attachable<map> {
     return this.fire("change", { at: next });
   }
 
-  onAdd(map: map): void {
-    this.#map = map;
+  protected enter(map: map): void {
     adoptStyles(document, STYLES);
     this.#border.setAttribute("aria-label", wordsOf(map.language).border);
     map.overlayPane.append(this.#border);
     this.#apply();
   }
 
-  onRemove(): void {
-    this.#map = undefined;
+  protected leave(): void {
     this.#border.remove();
     for (const layer of this.#sides.flat()) layer.setClip(null);
   }
@@ -87,7 +72,7 @@ export class swipe extends Evented<SwipeEvents> implements Attachable<map> {
   #apply(): void {
     this.#border.style.left = `${String(100 * this.#at)}%`;
     this.#border.setAttribute("aria-valuenow", String(Math.round(100 * this.#at)));
-    if (!this.#map) return;
+    if (!this.map) return;
     for (const layer of this.#sides[0]) layer.setClip([0, 0, this.#at, 1]);
     for (const layer of this.#sides[1]) layer.setClip([this.#at, 0, 1, 1]);
   }
@@ -99,7 +84,7 @@ export class swipe extends Evented<SwipeEvents> implements Attachable<map> {
     const { left, width } = border.getBoundingClientRect();
     const off = event.clientX - (left + width / 2);
     const move = ({ clientX }: PointerEvent): void => {
-      const box = this.#map?.container.getBoundingClientRect();
+      const box = this.map?.container.getBoundingClientRect();
       if (box) this.setAt((clientX - off - box.left) / box.width);
     };
     const end = (): void => {

@@ -1,6 +1,6 @@
 import { adoptStyles, element, iconButton } from "../core/dom";
 import type { Vec2, Vec3 } from "../core/vec";
-import { Evented, Map3dError, marker, type Attachable, type map } from "../map3d";
+import { Attached, Map3dError, marker, type map } from "../map3d";
 import { besideButton } from "./column";
 import { Circle } from "./circle";
 import { STYLES } from "./styles";
@@ -32,14 +32,13 @@ const WAIT_MS = 15_000;
 const SAME_DEG = 1e-5;
 
 /** A button that shows where the reader is: a marker with a circle of the accuracy. Pressed again, they go. */
-export class locate extends Evented<LocateEvents> implements Attachable<map> {
+export class locate extends Attached<map, LocateEvents> {
   readonly options: LocateOptions;
   readonly #said = element("p", "map3d-said", { role: "status" });
   readonly #circle = new Circle();
   #button = element("button", "");
   #box: HTMLElement | undefined;
   #words: ControlWords | undefined;
-  #map: map | undefined;
   #pin: marker | undefined;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #asked = 0;
@@ -49,20 +48,7 @@ export class locate extends Evented<LocateEvents> implements Attachable<map> {
     this.options = options;
   }
 
-  /** Puts the button on a map. */
-  addTo(map: map): this {
-    map.add(this);
-    return this;
-  }
-
-  /** Takes the button and what it shows off the map. */
-  remove(): this {
-    this.#map?.discard(this);
-    return this;
-  }
-
-  onAdd(map: map): void {
-    this.#map = map;
+  protected enter(map: map): void {
     const words = (this.#words = controlWords(this.options.language ?? map.language));
     adoptStyles(document, STYLES);
     this.#button = iconButton("", words.locate, TARGET);
@@ -71,10 +57,9 @@ export class locate extends Evented<LocateEvents> implements Attachable<map> {
     this.#box = besideButton(map, this.#button, this.#said);
   }
 
-  onRemove(): void {
+  protected leave(): void {
     this.clear();
     this.#box?.remove();
-    this.#map = undefined;
   }
 
   /** As if its button had been pressed. */
@@ -104,7 +89,7 @@ export class locate extends Evented<LocateEvents> implements Attachable<map> {
   }
 
   async #find(): Promise<Located> {
-    const [map, words] = [this.#map as map, this.#words as ControlWords];
+    const [map, words] = [this.map as map, this.#words as ControlWords];
     if (!map.fromLonLat([0, 0])) throw new Map3dError(words.placeless);
     if (!isSecureContext) throw new Map3dError(words.insecure);
     const { latitude, longitude, accuracy } = (await positionOf(words)).coords;
@@ -115,7 +100,7 @@ export class locate extends Evented<LocateEvents> implements Attachable<map> {
   }
 
   #show(place: Located): void {
-    const [map, words] = [this.#map as map, this.#words as ControlWords];
+    const [map, words] = [this.map as map, this.#words as ControlWords];
     const { position, accuracy_m } = place;
     this.#button.ariaPressed = "true";
     const metres = Math.round(accuracy_m).toLocaleString(this.options.language ?? map.language);

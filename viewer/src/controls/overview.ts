@@ -1,6 +1,6 @@
 import { adoptStyles, element, iconButton } from "../core/dom";
 import { add, dot, sub, type Box3, type Vec2 } from "../core/vec";
-import { map, type Attachable } from "../map3d";
+import { Attached, map } from "../map3d";
 import { besideButton } from "./column";
 import { STYLES } from "./styles";
 import { controlWords } from "./words";
@@ -21,35 +21,22 @@ const SHEET = "M3 6l6-2 6 2 6-2v14l-6 2-6-2-6 2zM9 4v14M15 6v14";
 const KEYS: Record<string, Vec2> = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 /** A small map of the whole with a frame around what is seen, which can be dragged; a click goes there. */
-export class overview implements Attachable<map> {
+export class overview extends Attached<map, object> {
   readonly options: OverviewOptions;
   readonly #pane = element("div", "map3d-overview-map");
   readonly #hand = element("div", "map3d-overview-hand", { tabindex: "0", role: "group" });
   readonly #frame = element("div", "map3d-overview-frame");
   #button = element("button", "");
   #box: HTMLElement | undefined;
-  #map: map | undefined;
   #small: map | undefined;
   #ending = new AbortController();
 
   constructor(options: OverviewOptions = {}) {
+    super();
     this.options = options;
   }
 
-  /** Puts the button of the small map on a map. */
-  addTo(map: map): this {
-    map.add(this);
-    return this;
-  }
-
-  /** Takes the small map away. */
-  remove(): this {
-    this.#map?.discard(this);
-    return this;
-  }
-
-  onAdd(map: map): void {
-    this.#map = map;
+  protected enter(map: map): void {
     this.#ending = new AbortController();
     const words = controlWords(this.options.language ?? map.language);
     adoptStyles(document, STYLES);
@@ -66,7 +53,7 @@ export class overview implements Attachable<map> {
     this.toggle(!(this.options.collapsed ?? map.container.clientWidth < NARROW_PX));
   }
 
-  onRemove(map: map): void {
+  protected leave(map: map): void {
     this.#ending.abort();
     this.toggle(false);
     map.moves.off("move", this.#follow);
@@ -74,7 +61,6 @@ export class overview implements Attachable<map> {
     map.off("lightchange", this.#relight);
     map.off("ready", this.#open);
     this.#box?.remove();
-    this.#map = undefined;
   }
 
   /** Is the small map shown? */
@@ -92,7 +78,7 @@ export class overview implements Attachable<map> {
   }
 
   readonly #open = (): void => {
-    const shown = this.#map;
+    const shown = this.map;
     if (!shown?.sight() || this.#small || !this.open) return;
     const place = this.#pane.appendChild(element("div", ""));
     const small = new map(place, { controls: false, attribution: false, direction: shown.direction, light: shown.light, cacheBytes: 16e6, workers: 1, maxPixelRatio: 2, ...(shown.drawer && { drawer: shown.drawer }) });
@@ -113,26 +99,26 @@ export class overview implements Attachable<map> {
 
   /** The whole, from where the map looks. */
   readonly #turn = (): void => {
-    const rendering = this.#map?.layers.find((layer) => layer.rendering)?.rendering;
-    if (!this.#map || !rendering || !this.#small?.sight()) return;
+    const rendering = this.map?.layers.find((layer) => layer.rendering)?.rendering;
+    if (!this.map || !rendering || !this.#small?.sight()) return;
     const { origin, box: [low, high] } = rendering.json;
     const whole: Box3 = [add(origin, low), add(origin, high)];
-    this.#small.setDirection(this.#map.direction).fitBounds(whole, { padding_px: 6 });
+    this.#small.setDirection(this.map.direction).fitBounds(whole, { padding_px: 6 });
     this.#follow();
   };
 
   readonly #relight = (): void => {
-    if (this.#map) this.#small?.setLight(this.#map.light);
+    if (this.map) this.#small?.setLight(this.map.light);
   };
 
   /** Puts the frame around what the map shows. */
   readonly #follow = (): void => {
-    const [shown, small] = [this.#map?.sight(), this.#small?.sight()];
+    const [shown, small] = [this.map?.sight(), this.#small?.sight()];
     if (!shown || !small) return;
     const { right, up } = shown.camera.frame.axes;
     const shift = sub(shown.origin, small.origin);
     const px_m = (this.#small as map).metresPerPixel;
-    const across = (this.#map as map).metresPerPixel / px_m;
+    const across = (this.map as map).metresPerPixel / px_m;
     const x = (shown.camera.u + dot(right, shift) - small.camera.u) / px_m + small.camera.width / 2;
     const y = (small.camera.v - shown.camera.v - dot(up, shift)) / px_m + small.camera.height / 2;
     const [width, height] = [shown.camera.width * across, shown.camera.height * across];
@@ -145,7 +131,7 @@ export class overview implements Attachable<map> {
     this.#hand.addEventListener("pointerdown", ({ button, pointerId, target, clientX, clientY }) => {
       if (button !== 0) return;
       this.#hand.setPointerCapture(pointerId);
-      this.#map?.grab();
+      this.map?.grab();
       hand = { at: [clientX, clientY], moved: target !== this.#frame };
       if (hand.moved) this.#goTo(hand.at);
     }, { signal });
@@ -161,10 +147,10 @@ export class overview implements Attachable<map> {
     this.#hand.addEventListener("pointercancel", () => { hand = null; }, { signal });
     this.#hand.addEventListener("keydown", (event) => {
       const step = KEYS[event.key];
-      if (!step || !this.#map) return;
+      if (!step || !this.map) return;
       event.preventDefault();
-      const { clientWidth, clientHeight } = this.#map.container;
-      this.#map.panBy(step[0] * STEP * clientWidth, step[1] * STEP * clientHeight, { smooth: true });
+      const { clientWidth, clientHeight } = this.map.container;
+      this.map.panBy(step[0] * STEP * clientWidth, step[1] * STEP * clientHeight, { smooth: true });
     }, { signal });
   }
 
@@ -175,8 +161,8 @@ export class overview implements Attachable<map> {
 
   /** Moves what is seen by pixels of the small map. */
   #shift(dx: number, dy: number, smooth: boolean): void {
-    if (!this.#map || !this.#small) return;
-    const times = this.#small.metresPerPixel / this.#map.metresPerPixel;
-    this.#map.panBy(-dx * times, -dy * times, { smooth });
+    if (!this.map || !this.#small) return;
+    const times = this.#small.metresPerPixel / this.map.metresPerPixel;
+    this.map.panBy(-dx * times, -dy * times, { smooth });
   }
 }

@@ -1,6 +1,6 @@
 import { adoptStyles } from "../core/dom";
 import { add, type Box3, type Vec2, type Vec3 } from "../core/vec";
-import { Evented, FetchError, UsageError, type Attachable, type map, type marker, type Relief } from "../map3d";
+import { Attached, FetchError, UsageError, type map, type marker, type Relief } from "../map3d";
 import { Drawing } from "./drawing";
 import { anchorOf, hit } from "./hit";
 import { FeatureList } from "./list";
@@ -54,13 +54,12 @@ export interface GeojsonEvents {
 }
 
 /** GeoJSON on the map: points, lines and polygons on the surface, or at heights of their own, hidden behind what stands before them. */
-export class geojson extends Evented<GeojsonEvents> implements Attachable<map> {
+export class geojson extends Attached<map, GeojsonEvents> {
   readonly needs = ["depth"] as const;
   readonly options: GeojsonOptions;
   readonly #data: unknown;
   readonly #drawing = new Drawing();
   #style: GeojsonOptions["style"];
-  #map: map | undefined;
   #load: AbortController | undefined;
   #placed: readonly Placed[] = [];
   #markers: { marker: marker; spot: Spot; height: number }[] = [];
@@ -78,18 +77,6 @@ export class geojson extends Evented<GeojsonEvents> implements Attachable<map> {
     this.options = options;
     this.#style = options.style;
     this.#drawing.occlusion = options.occlusion ?? "fade";
-  }
-
-  /** Puts the features on a map; data of a URL is fetched now. */
-  addTo(map: map): this {
-    map.add(this);
-    return this;
-  }
-
-  /** Takes the features off the map. */
-  remove(): this {
-    this.#map?.discard(this);
-    return this;
   }
 
   /** Features that are shown; none before "ready". */
@@ -118,8 +105,7 @@ export class geojson extends Evented<GeojsonEvents> implements Attachable<map> {
     return this;
   }
 
-  onAdd(map: map): void {
-    this.#map = map;
+  protected enter(map: map): void {
     adoptStyles(document, STYLES);
     map.overlayPane.prepend(this.#drawing.canvas);
     map.moves.on("draw", this.#draw);
@@ -133,7 +119,7 @@ export class geojson extends Evented<GeojsonEvents> implements Attachable<map> {
     });
   }
 
-  onRemove(map: map): void {
+  protected leave(map: map): void {
     this.#load?.abort();
     cancelAnimationFrame(this.#next);
     this.#leave();
@@ -142,7 +128,7 @@ export class geojson extends Evented<GeojsonEvents> implements Attachable<map> {
     this.#drawing.canvas.remove();
     this.#list?.box.remove();
     for (const { marker } of this.#markers) map.discard(marker);
-    this.#map = this.#list = undefined;
+    this.#list = undefined;
     [this.#markers, this.#placed] = [[], []];
   }
 
@@ -188,16 +174,17 @@ export class geojson extends Evented<GeojsonEvents> implements Attachable<map> {
   }
 
   #styleOf(feature: Feature, style = this.#style): Placed["style"] {
-    const { container } = this.#map ?? {};
+    const { container } = this.map ?? {};
     const accent = (container && getComputedStyle(container).getPropertyValue("--map3d-accent").trim()) || "#0e7490";
     return filledStyle((typeof style === "function" ? style(feature) : style) ?? {}, accent);
   }
 
   readonly #draw = (): void => {
-    const relief = this.#map?.relief;
+    const { map } = this;
+    const relief = map?.relief;
     if (!relief || this.#placed.length === 0) return;
     // What is known lies in the plane of the view that comes.
-    this.#drawing.canvas.style.visibility = this.#map?.turning ? "hidden" : "";
+    this.#drawing.canvas.style.visibility = map.turning ? "hidden" : "";
     this.#landMarkers(relief);
     const done = this.#drawing.frame(relief);
     cancelAnimationFrame(this.#next);
@@ -226,12 +213,12 @@ export class geojson extends Evented<GeojsonEvents> implements Attachable<map> {
     if (placed === this.#over) return;
     if (this.#over) this.#fire("mouseout", this.#over, point);
     this.#over = placed;
-    this.#map?.container.classList.toggle("map3d-over", placed !== null);
+    this.map?.container.classList.toggle("map3d-over", placed !== null);
     if (placed) this.#fire("mouseover", placed, point);
   };
 
   readonly #named = (): void => {
-    const relief = this.#map?.relief;
+    const relief = this.map?.relief;
     if (!relief) return;
     this.#list?.show(this.#placed.flatMap((placed) => {
       const at = anchorOf(placed, relief);
@@ -240,7 +227,7 @@ export class geojson extends Evented<GeojsonEvents> implements Attachable<map> {
   };
 
   #leave(): void {
-    if (this.#over) this.#map?.container.classList.remove("map3d-over");
+    if (this.#over) this.map?.container.classList.remove("map3d-over");
     this.#over = null;
   }
 
@@ -250,12 +237,12 @@ export class geojson extends Evented<GeojsonEvents> implements Attachable<map> {
   }
 
   #hit(point: Vec2): Placed | null {
-    const relief = this.#map?.relief;
+    const relief = this.map?.relief;
     return relief ? hit(this.#placed, relief, point, this.#drawing.occlusion) : null;
   }
 
   #fire(type: "click" | "mouseover" | "mouseout", { feature }: Placed, point: Vec2): void {
-    this.fire(type, { feature, point, position: this.#map?.surfaceAt(point) ?? null });
+    this.fire(type, { feature, point, position: this.map?.surfaceAt(point) ?? null });
   }
 }
 

@@ -1,6 +1,5 @@
+import { Attached } from "../core/attached";
 import { asError, UsageError } from "../core/errors";
-import { Evented } from "../core/events";
-import type { Attachable } from "../core/surface";
 import type { Vec2 } from "../core/vec";
 import { readColor } from "../draw/color";
 import type { Clip } from "../draw/combine";
@@ -43,12 +42,11 @@ export interface ImageLayerEvents {
 }
 
 /** A rendering on the map. Several base URLs are several hosts with the same tiles; requests are spread over them by tile. */
-export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<map> {
+export class imageLayer extends Attached<map, ImageLayerEvents> {
   readonly options: Required<Omit<ImageLayerOptions, "attribution">> & Pick<ImageLayerOptions, "attribution">;
   readonly #source: Source;
   #mode: Mode;
   #stage: Stage | undefined;
-  #map: map | undefined;
   #name = "";
   #store: Store | undefined;
   #rendering: Rendering | undefined;
@@ -73,18 +71,6 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
     const made = new imageLayer(this.#source, { ...this.options, mode: this.#mode });
     made.#finishes = this.#finishes;
     return made.#setColors(this.#colors);
-  }
-
-  /** Puts it over the layers that are there; its tiles are fetched from now on. */
-  addTo(map: map): this {
-    map.add(this);
-    return this;
-  }
-
-  /** Takes it off its map, and its tiles out of memory. */
-  remove(): this {
-    this.#map?.discard(this);
-    return this;
   }
 
   /** The manifest; undefined until it has been read. */
@@ -186,8 +172,7 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
     return (await this.#objects?.search()) ?? [];
   }
 
-  onAdd(map: map): void {
-    this.#map = map;
+  protected enter(map: map): void {
     const stage = map.stage;
     if (!stage) return; // the map has said why
     this.#stage = stage;
@@ -207,9 +192,9 @@ export class imageLayer extends Evented<ImageLayerEvents> implements Attachable<
     }).catch((reason: unknown) => { failed(asError(reason)); });
   }
 
-  onRemove(): void {
+  protected leave(): void {
     this.#stage?.forget(this.#name);
-    this.#stage = this.#map = this.#store = this.#rendering = this.#objects = undefined;
+    this.#stage = this.#store = this.#rendering = this.#objects = undefined;
   }
 
   /** @internal The layer's view that looks as a frame does. */

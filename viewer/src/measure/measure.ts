@@ -1,6 +1,6 @@
 import { adoptStyles } from "../core/dom";
 import type { Vec3 } from "../core/vec";
-import { Evented, type Attachable, type ClickEvent, type map } from "../map3d";
+import { Attached, type ClickEvent, type map } from "../map3d";
 import { measureArea, measureLine, type AreaMeasure, type LineMeasure } from "./geometry";
 import { Sketch, type Note } from "./sketch";
 import { STYLES } from "./styles";
@@ -30,28 +30,15 @@ export interface MeasureEvents {
  * Measures on the surface: each click sets a corner; Backspace takes the last one back, Escape all. Positions are those of the deepest level, whatever
  * level is shown.
  */
-export class measure extends Evented<MeasureEvents> implements Attachable<map> {
+export class measure extends Attached<map, MeasureEvents> {
   readonly options: Required<Omit<MeasureOptions, "language">> & Pick<MeasureOptions, "language">;
   #words = new Words(undefined);
   readonly #sketch = new Sketch();
   #corners: readonly Corner[] = [];
-  #map: map | undefined;
 
   constructor({ kind = "line", ...options }: MeasureOptions = {}) {
     super();
     this.options = { kind, ...options };
-  }
-
-  /** Turns it on: clicks on the map set corners. */
-  addTo(map: map): this {
-    map.add(this);
-    return this;
-  }
-
-  /** Turns it off; what was measured is no longer shown. */
-  remove(): this {
-    this.#map?.discard(this);
-    return this;
   }
 
   /** In the order in which they were set. */
@@ -86,8 +73,7 @@ export class measure extends Evented<MeasureEvents> implements Attachable<map> {
     return this.setCorners([]);
   }
 
-  onAdd(map: map): void {
-    this.#map = map;
+  protected enter(map: map): void {
     this.#words = new Words(this.options.language ?? map.language);
     adoptStyles(document, STYLES);
     map.overlayPane.append(this.#sketch.box);
@@ -97,12 +83,11 @@ export class measure extends Evented<MeasureEvents> implements Attachable<map> {
     this.#draw();
   }
 
-  onRemove(map: map): void {
+  protected leave(map: map): void {
     map.moves.off("move", this.#place);
     map.off("click", this.#clicked);
     map.container.removeEventListener("keydown", this.#pressed);
     this.#sketch.box.remove();
-    this.#map = undefined;
   }
 
   readonly #clicked = ({ position, approximate }: ClickEvent): void => {
@@ -115,7 +100,7 @@ export class measure extends Evented<MeasureEvents> implements Attachable<map> {
   };
 
   readonly #place = (): void => {
-    this.#sketch.place((world) => this.#map?.project(world) ?? null);
+    this.#sketch.place((world) => this.map?.project(world) ?? null);
   };
 
   #draw(): void {

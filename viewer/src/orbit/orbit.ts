@@ -2,7 +2,7 @@ import { clamp, type Vec2, type Vec3 } from "../core/vec";
 import { axesOf, uvdFromLocal } from "../geo/axes";
 import type { Camera } from "../geo/camera";
 import type { Frame } from "../geo/frame";
-import type { Attachable, Depicting, map, Turner } from "../map3d";
+import { Attached, type Depicting, type map, type Turner } from "../map3d";
 import { fadeOut } from "./fade";
 import { Warp, type Shot } from "./warp";
 
@@ -59,44 +59,30 @@ const apart = (a: Gaze, b: Gaze): number => Math.hypot(wayTo(a.lookAt, b.lookAt)
  * the other. Two fingers, or the right mouse button, turn freely between directions; let go, the picture moves on to the nearest. A cross-fade where there
  * is no WebGL, a cut where the user wants no movement. Reads depth: its tiles are fetched.
  */
-export class orbit implements Attachable<map>, Turner {
+export class orbit extends Attached<map, object> implements Turner {
   readonly needs = ["depth"] as const;
   readonly #duration_ms: number;
-  #map: map | undefined;
   #warp: Warp | undefined;
   #turn: Turn | null = null;
   #hand: Hand | null = null;
 
   constructor({ duration_ms = 750 }: OrbitOptions = {}) {
+    super();
     this.#duration_ms = duration_ms;
   }
 
-  /** Makes changes of direction of a map movements, from now on. */
-  addTo(map: map): this {
-    map.add(this);
-    return this;
-  }
-
-  /** Makes them cuts again. */
-  remove(): this {
-    this.#map?.discard(this);
-    return this;
-  }
-
-  onAdd(map: map): void {
-    this.#map = map;
+  protected enter(map: map): void {
     map.setTurner(this);
   }
 
-  onRemove(map: map): void {
+  protected leave(map: map): void {
     this.#end();
     map.setTurner(null);
-    this.#map = undefined;
   }
 
   /** @internal */
   turn(from: Camera, pivot: Vec3): void {
-    const { drawer, canvas } = this.#map ?? {};
+    const { drawer, canvas } = this.map ?? {};
     if (still() || !drawer) return;
     if (drawer === "canvas") {
       if (canvas) fadeOut(canvas, FADE_MS);
@@ -109,7 +95,7 @@ export class orbit implements Attachable<map>, Turner {
 
   /** @internal */
   twist(rad: number): boolean {
-    const map = this.#map;
+    const map = this.map;
     if (!map || map.drawer !== "webgl" || still()) return false;
     this.#hand ??= { base_deg: this.#turn?.at.lookAt ?? map.lookAt_deg, turned_deg: 0 };
     this.#hand.turned_deg += (rad * 180) / Math.PI;
@@ -125,7 +111,7 @@ export class orbit implements Attachable<map>, Turner {
 
   /** @internal */
   release(): void {
-    const [turn, map] = [this.#turn, this.#map];
+    const [turn, map] = [this.#turn, this.map];
     if (!this.#hand || !map) return;
     this.#hand = null;
     if (!turn) return;

@@ -1,5 +1,5 @@
 import { adoptStyles } from "../core/dom";
-import { Evented, UsageError, type Attachable, type AttributeInfo, type imageLayer, type map } from "../map3d";
+import { Attached, UsageError, type AttributeInfo, type imageLayer, type map } from "../map3d";
 import { classify, type Classes, type ThemeClass } from "./classes";
 import { Legend } from "./legend";
 import { STYLES } from "./styles";
@@ -28,12 +28,11 @@ export interface ThemeEvents {
 }
 
 /** Colours a layer's objects by an attribute, with a legend whose classes can be pressed to show only those. Takes the place of the layer's style. */
-export class theme extends Evented<ThemeEvents> implements Attachable<map> {
+export class theme extends Attached<map, ThemeEvents> {
   readonly options: ThemeOptions;
   readonly #layer: imageLayer;
   readonly #name: string;
   readonly #info: AttributeInfo | undefined;
-  #map: map | undefined;
   #legend: Legend | undefined;
   #classes: readonly ThemeClass[] = [];
   #chosen: readonly ThemeClass[] = [];
@@ -45,18 +44,6 @@ export class theme extends Evented<ThemeEvents> implements Attachable<map> {
     this.#name = typeof attribute === "string" ? attribute : attribute.name;
     this.#info = typeof attribute === "string" ? undefined : attribute;
     this.options = options;
-  }
-
-  /** Colours the layer, once the attribute is here ("ready"). */
-  addTo(map: map): this {
-    map.add(this);
-    return this;
-  }
-
-  /** Takes colours and legend away; the layer's objects are as they were rendered. */
-  remove(): this {
-    this.#map?.discard(this);
-    return this;
   }
 
   /** In the legend's order; none before "ready". */
@@ -74,19 +61,17 @@ export class theme extends Evented<ThemeEvents> implements Attachable<map> {
     return this.options.title ?? this.#name;
   }
 
-  onAdd(map: map): void {
-    this.#map = map;
+  protected enter(map: map): void {
     adoptStyles(document, STYLES);
     this.#load(map).catch((reason: unknown) => {
-      if (this.#map !== map) return;
+      if (this.map !== map) return;
       const error = reason instanceof Error ? reason : new Error(String(reason));
       this.fire("error", { error });
       map.fire("error", { error });
     });
   }
 
-  onRemove(): void {
-    this.#map = undefined;
+  protected leave(): void {
     this.#legend?.box.remove();
     this.#legend = undefined;
     if (this.#classes.length > 0) this.#layer.setStyle({});
@@ -97,7 +82,7 @@ export class theme extends Evented<ThemeEvents> implements Attachable<map> {
     if (!this.#layer.rendering) await new Promise((ready) => this.#layer.once("ready", ready));
     const info = this.#info ?? (await this.#find());
     const column = await this.#layer.column(info);
-    if (this.#map !== map) return;
+    if (this.map !== map) return;
     const { language = map.language, classes = 5, colors } = this.options;
     const words = themeWords(language);
     const found = classify(info, column, { classes, colors, language, rest: words.rest });
