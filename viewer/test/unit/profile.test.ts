@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 import type { Vec3 } from "../../src/core/vec";
-import { axesOf, uvdFromLocal } from "../../src/geo/axes";
+import { uvdFromLocal } from "../../src/geo/axes";
 import { along, heightAt } from "../../src/measure/profile";
 import { BOX, framesOf, THINGS, trace } from "../fixture/town";
 
