@@ -71,7 +71,7 @@ test-python: build
 test-viewer: $(CACHE)/npm
 	cd viewer && npm test --silent
 
-test-browser: build ## whole-way tests in Chromium
+test-browser: build ## whole-way tests in Chromium; the viewer also in Firefox and WebKitGTK where they are installed
 	cd viewer && npm run --silent test:browser
 	$(BIN)/python -m pytest -q -m browser
 

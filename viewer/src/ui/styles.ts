@@ -37,8 +37,9 @@ export const STYLES = `
 .map3d button:focus-visible { outline: 3px solid var(--map3d-accent); outline-offset: 1px; }
 .map3d-icon { display: block; width: 20px; height: 20px; margin: auto; fill: none; stroke: currentColor; stroke-width: 1.8; stroke-linecap: round; stroke-linejoin: round; }
 
-.map3d-buttons { position: absolute; right: max(12px, env(safe-area-inset-right)); bottom: calc(34px + env(safe-area-inset-bottom)); display: grid; gap: 10px; }
-@media (max-height: 660px) { .map3d-buttons { display: flex; flex-flow: column wrap-reverse; justify-content: flex-end; max-height: min(280px, calc(100% - 46px)); } }
+.map3d-buttons { position: absolute; right: max(12px, env(safe-area-inset-right)); bottom: calc(34px + env(safe-area-inset-bottom)); display: grid; gap: 10px; pointer-events: none; }
+.map3d-buttons > * { pointer-events: auto; }
+@media (max-height: 660px) { .map3d-buttons { display: flex; flex-flow: column wrap-reverse; justify-content: flex-end; height: min(280px, calc(100% - 46px)); } }
 .map3d-group { display: grid; border-radius: 12px; background: var(--map3d-panel); box-shadow: var(--map3d-shadow); overflow: hidden; }
 .map3d-group button { width: 44px; height: 44px; padding: 0; border: 0; background: none; }
 .map3d-group button + button { border-top: 1px solid var(--map3d-line); }

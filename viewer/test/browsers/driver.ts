@@ -35,7 +35,11 @@ export abstract class Driver {
 
   /** Waits until something is so. @throws Error after 20 seconds */
   async until<A>(test: (argument: A) => boolean, argument: A): Promise<void> {
-    for (const end = Date.now() + 20_000; Date.now() < end; await pause(50)) if (await this.evaluate(test, argument)) return;
+    const end = Date.now() + 20_000;
+    while (Date.now() < end) {
+      if (await this.evaluate(test, argument)) return;
+      await pause(50);
+    }
     throw new Error(`not so after 20 seconds: ${test.toString()}`);
   }
 

@@ -41,7 +41,7 @@ export class WebKit extends Driver {
   }
 
   async perform(actions: readonly Input[]): Promise<void> {
-    await this.#post("/actions", { actions });
+    await this.#post("/actions", { actions: actions.map(unlikeLast) });
   }
 
   async run(expression: string): Promise<unknown> {
@@ -63,6 +63,11 @@ export class WebKit extends Driver {
   #post(path: string, body: object): Promise<unknown> {
     return ask("POST", this.session + path, body);
   }
+}
+
+/** A wheel that turns as far as the last time does nothing: so it stands still in between. */
+function unlikeLast(input: Input): Input {
+  return input.type === "wheel" ? { ...input, actions: input.actions.flatMap((action) => [{ ...action, deltaX: 0, deltaY: 0 }, action]) } : input;
 }
 
 /** @throws Error with the driver's words */
