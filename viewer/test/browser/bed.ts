@@ -24,9 +24,10 @@ export class TestBed {
   readonly server: TestServer;
   #browser: Browser | undefined;
 
-  constructor(renderings: Renderings) {
+  /** @param env of the browser */
+  constructor(renderings: Renderings, env: Record<string, string> = {}) {
     this.server = serve(renderings);
-    beforeAll(async () => { this.#browser = await openBrowser(); });
+    beforeAll(async () => { this.#browser = await openBrowser(env); });
     afterAll(() => this.#browser?.close());
   }
 
