@@ -8,5 +8,6 @@ export const ENTRIES = {
   measure: "src/measure/index.ts",
   orbit: "src/orbit/index.ts",
   print: "src/print/index.ts",
+  shade: "src/shade/index.ts",
   theme: "src/theme/index.ts",
 };

@@ -17,6 +17,7 @@ const BUDGET = {
   measure: 5,
   orbit: 7,
   print: 5,
+  shade: 4,
   theme: 4,
   full: 130,
 };
