@@ -29,6 +29,8 @@ export type Turning = Omit<Depicting, "camera" | "changed">;
 
 /** A context that has not come back after this time is lost for good. */
 const RESTORE_MS = 5000;
+/** Of tiles that are kept, for each device pixel, and at least. */
+const [KEPT_BYTES, LEAST_BYTES] = [20, 24e6];
 
 export interface Painted {
   readonly plans: readonly LayerPlan[];
@@ -54,7 +56,7 @@ export class Painter {
     this.#options = options;
     this.#events = events;
     this.#drawer = this.#open(options.drawer);
-    this.#cache = new Cache<Stored>(options.cacheBytes, (key, { data }) => {
+    this.#cache = new Cache<Stored>(options.cacheBytes ?? LEAST_BYTES, (key, { data }) => {
       if (data && "bitmap" in data) data.bitmap.close();
       this.#drawer.release(key);
     });
@@ -77,8 +79,10 @@ export class Painter {
 
   /** @param kinds layers that are read, besides those that are shown  @param shade finds light that was not rendered; roughly while the picture is moving  @param turn paints a movement, where that can be done, in place of the frame */
   paint(sight: Sight, layers: readonly imageLayer[], light: Readonly<Light>, kinds: readonly LayerKind[], shade: Shade | null, moving: boolean, turn: ((scene: Turning) => void) | null): Painted {
-    this.#cache.tick();
     this.#viewport.fitCanvas(sight.dpr);
+    const { width, height } = this.#viewport.canvas;
+    this.#cache.limit(this.#options.cacheBytes ?? Math.max(LEAST_BYTES, KEPT_BYTES * width * height));
+    this.#cache.tick();
     const combined = combinedOf(layers);
     const planned = layers.flatMap((layer) => {
       const plan = layer.plan(sight, light, kinds, combined.includes(layer));
@@ -86,7 +90,6 @@ export class Painter {
     });
     const before = (layer: imageLayer): number | null => (combined.includes(layer) ? combined.indexOf(layer) : null);
     this.#queue.want(planned.flatMap(({ plan }) => plan.jobs));
-    const { width, height } = this.#viewport.canvas;
     const complete = !layers.some((layer) => layer.loading) && planned.every(({ plan }) => plan.complete);
     const { gl } = this.#drawer;
     if (turn && gl) turn({ gl, width, height, complete, rangeOf: (frame) => rangeAlong(sight, frame, layers), depict: (camera, range, framebuffer) => { this.#depict({ ...sight, camera, dpr: 1 }, layers, light, shade, { range, framebuffer }); } });
