@@ -23,10 +23,11 @@ export const leadOf = (frame: Frame, level: number, before: number): number => L
 /** D of a depth value is `first + value · unit_m`, for comparisons. */
 export const firstOf = ({ frame, shift, lead_m }: Depths): number => frame.d0 + shift[2] - lead_m;
 
-/** Least and greatest D of passes, with a little room; null without any. */
-export function rangeOf(all: readonly Depths[]): Vec2 | null {
-  if (all.length === 0) return null;
-  const [near, far] = [Math.min(...all.map(({ range, lead_m }) => range[0] - lead_m)), Math.max(...all.map(({ range }) => range[1]))];
+/** Least and greatest D of passes and of what else is there, with a little room; null without any. */
+export function rangeOf(all: readonly Depths[], others: readonly Vec2[] = []): Vec2 | null {
+  const ranges = [...others, ...all.map(({ range, lead_m }): Vec2 => [range[0] - lead_m, range[1]])];
+  if (ranges.length === 0) return null;
+  const [near, far] = [Math.min(...ranges.map(([least]) => least)), Math.max(...ranges.map(([, most]) => most))];
   const room = 0.01 * (far - near) + 1;
   return [near - room, far + room];
 }

@@ -4,6 +4,7 @@ import { Evented } from "../core/events";
 import type { Attachable, Holder, Surface, SurfaceEvents } from "../core/surface";
 import type { Vec2, Vec3 } from "../core/vec";
 import { languageOf } from "../core/words";
+import type { Guest } from "../draw/drawer";
 import type { Camera } from "../geo/camera";
 import { daylightAt } from "../geo/daylight";
 import { DEFAULT_LIGHT, validLight, type Light } from "../geo/light";
@@ -249,6 +250,12 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
     if (!this.listens("mousemove")) return;
     this.#hover = point;
     this.#loop.request();
+  }
+
+  /** @internal Something else is seen among the layers by its depth; `on` false: no longer. */
+  seat(guest: Guest, on = true): this {
+    this.#painter?.guests[on ? "add" : "delete"](guest);
+    return this.#redraw();
   }
 
   /** @internal undefined when the map cannot draw. */

@@ -1,5 +1,5 @@
 import { CanvasDrawer } from "../draw/canvas/canvasDrawer";
-import type { Drawer, DrawerEvents, FrameSpec } from "../draw/drawer";
+import type { Drawer, DrawerEvents, FrameSpec, Guest } from "../draw/drawer";
 import { WebGLDrawer } from "../draw/webgl/webglDrawer";
 import type { Light } from "../geo/light";
 import type { LayerKind } from "../geo/manifest";
@@ -38,6 +38,8 @@ export interface Painted {
 /** Makes a frame: asks the layers what they want, fetches it, has it drawn. Owns tiles and drawer. */
 export class Painter {
   readonly shared: Shared;
+  /** What is seen among the layers. */
+  readonly guests = new Set<Guest>();
   readonly #viewport: Viewport;
   readonly #cache: Cache<Stored>;
   readonly #queue: Queue;
@@ -45,6 +47,8 @@ export class Painter {
   readonly #options: FilledOptions;
   readonly #events: PainterEvents;
   #drawer: Drawer;
+  /** Guests are shown: from when the depth of all that was in view was here, so that no tile had to wait for its own. */
+  #seated = false;
   #waiting: ReturnType<typeof setTimeout> | undefined;
 
   /** @throws DrawError when the browser cannot draw */
@@ -78,7 +82,10 @@ export class Painter {
   paint(sight: Sight, layers: readonly imageLayer[], light: Readonly<Light>, kinds: readonly LayerKind[], turn: ((scene: Turning) => void) | null): Painted {
     this.#cache.tick();
     this.#viewport.fitCanvas(sight.dpr);
-    const combined = combinedOf(layers);
+    const { gl } = this.#drawer;
+    this.#seated &&= this.guests.size > 0 && gl !== null;
+    const guests = this.#seated ? [...this.guests] : [];
+    const combined = combinedOf(layers, this.#seated);
     const planned = layers.flatMap((layer) => {
       const plan = layer.plan(sight, light, kinds, combined.includes(layer));
       return plan ? [{ layer, plan }] : [];
@@ -87,20 +94,24 @@ export class Painter {
     this.#queue.want(planned.flatMap(({ plan }) => plan.jobs));
     const { width, height } = this.#viewport.canvas;
     const complete = !layers.some((layer) => layer.loading) && planned.every(({ plan }) => plan.complete);
-    const { gl } = this.#drawer;
-    if (turn && gl) turn({ gl, width, height, complete, rangeOf: (frame) => rangeAlong(sight, frame, layers), depict: (camera, range, framebuffer) => { this.#depict({ ...sight, camera, dpr: 1 }, layers, light, { range, framebuffer }); } });
-    else this.#drawer.draw({ width, height, dpr: sight.dpr, light, passes: planned.map(({ layer, plan }) => layer.pass(plan, sight, before(layer))) });
+    if (turn && gl) turn({ gl, width, height, complete, rangeOf: (frame) => rangeAlong(sight, frame, layers, guests), depict: (camera, range, framebuffer) => { this.#depict({ ...sight, camera, dpr: 1 }, layers, light, guests, { range, framebuffer }); } });
+    else this.#drawer.draw({ camera: sight.camera, width, height, dpr: sight.dpr, light, guests, passes: planned.map(({ layer, plan }) => layer.pass(plan, sight, before(layer))) });
+    if (complete && gl && this.guests.size > 0 && !this.#seated) {
+      this.#seated = true;
+      this.#events.changed();
+    }
     return { plans: planned.map(({ plan }) => plan), complete: complete && !this.#drawer.busy };
   }
 
   /** What is in memory, with the depth of all layers that have any. */
-  #depict(sight: Sight, layers: readonly imageLayer[], light: Readonly<Light>, into: NonNullable<FrameSpec["into"]>): void {
-    const { width, height } = sight.camera;
+  #depict(sight: Sight, layers: readonly imageLayer[], light: Readonly<Light>, guests: readonly Guest[], into: NonNullable<FrameSpec["into"]>): void {
+    const { camera } = sight;
+    const { width, height } = camera;
     const passes = layers.filter((layer) => layer.combines).flatMap((layer, k) => {
       const plan = layer.plan(sight, light, [], true);
       return plan ? [layer.pass(plan, sight, k)] : [];
     });
-    this.#drawer.draw({ width, height, dpr: 1, light, passes, into });
+    this.#drawer.draw({ camera, width, height, dpr: 1, light, guests, passes, into });
   }
 
   /** Forgets the tiles of a layer that has left. */

@@ -55,19 +55,18 @@ export class WebGLDrawer implements Drawer {
   draw(frame: FrameSpec): void {
     const gl = this.gl;
     if (gl.isContextLost()) return;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, frame.into?.framebuffer ?? null);
-    gl.viewport(0, 0, frame.width, frame.height);
-    gl.clearColor(0, 0, 0, 0);
-    gl.depthMask(true);
-    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    gl.enable(gl.BLEND);
-    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    gl.depthFunc(gl.LEQUAL);
     const combined = frame.passes.filter(({ depths }) => depths);
+    const range = frame.into?.range ?? rangeOf(combined.flatMap(({ depths }) => depths ?? []), frame.guests.flatMap((guest) => {
+      const own = guest.rangeAlong(frame.camera.frame);
+      return own ? [own] : [];
+    }));
+    if (range) for (const guest of frame.guests) guest.prepare(gl, frame, range);
+    this.#begin(frame);
     for (const pass of frame.passes) {
       if (!pass.depths) this.#drawPass(frame, pass, null, false);
-      else if (pass === combined[0]) this.#drawTogether(frame, combined);
+      else if (pass === combined[0]) this.#drawTogether(frame, combined, range);
     }
+    if (combined.length === 0) this.#drawTogether(frame, [], range);
     gl.disable(gl.SCISSOR_TEST);
     this.#dropTables(frame.passes);
   }
@@ -82,15 +81,36 @@ export class WebGLDrawer implements Drawer {
     this.#dropTables([]);
   }
 
-  /** Passes that hide each other by depth: all that is solid, then edges and what lets through. */
-  #drawTogether(frame: FrameSpec, passes: readonly Pass[]): void {
+  #begin({ into, width, height }: FrameSpec): void {
     const gl = this.gl;
-    const range = frame.into?.range ?? rangeOf(passes.flatMap(({ depths }) => depths ?? []));
+    gl.bindFramebuffer(gl.FRAMEBUFFER, into?.framebuffer ?? null);
+    gl.viewport(0, 0, width, height);
+    gl.clearColor(0, 0, 0, 0);
+    gl.depthMask(true);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.disable(gl.CULL_FACE);
+    gl.disable(gl.DEPTH_TEST);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    gl.depthFunc(gl.LEQUAL);
+  }
+
+  /** Passes and guests that hide each other by depth: all that is solid, then edges and what lets through. */
+  #drawTogether(frame: FrameSpec, passes: readonly Pass[], range: Vec2 | null): void {
+    const gl = this.gl;
+    if (!range) return;
     gl.enable(gl.DEPTH_TEST);
     for (const pass of passes) if (pass.opacity === 1) this.#drawPass(frame, pass, range, false);
+    this.#drawGuests(frame, false);
     gl.depthMask(frame.into !== undefined);
     for (const pass of passes) this.#drawPass(frame, pass, range, true);
+    this.#drawGuests(frame, true);
     gl.disable(gl.DEPTH_TEST);
+  }
+
+  #drawGuests(frame: FrameSpec, soft: boolean): void {
+    this.gl.disable(this.gl.SCISSOR_TEST);
+    for (const guest of frame.guests) guest.paint(this.gl, frame, soft);
   }
 
   /** @param range of D, of what is drawn together  @param soft only what lets through */

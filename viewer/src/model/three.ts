@@ -1,0 +1,125 @@
+/** What is used of three.js: any build since r155 has it, and the page's own types stay whatever they are. */
+export interface Three {
+  readonly REVISION: string;
+  readonly LoopOnce: number;
+  readonly LoopRepeat: number;
+  readonly WebGLRenderer: new (options: { canvas: HTMLCanvasElement; context: WebGL2RenderingContext }) => ThreeRenderer;
+  readonly WebGLRenderTarget: new (width: number, height: number, options: { samples: number; colorSpace: "srgb"; depthTexture: never }) => ThreeTarget;
+  readonly DepthTexture: new (width: number, height: number) => object;
+  readonly Scene: new () => Node;
+  readonly Group: new () => Node;
+  readonly Object3D: new () => Node;
+  readonly OrthographicCamera: new () => ThreeCamera;
+  readonly AmbientLight: new () => Lamp;
+  readonly DirectionalLight: new () => Lamp;
+  readonly Vector3: new (x: number, y: number, z: number) => Vector;
+  readonly Box3: new () => Box;
+  readonly Raycaster: new () => ThreeRaycaster;
+  readonly AnimationMixer: new (root: never) => Mixer;
+}
+
+export interface Vector {
+  readonly x: number;
+  readonly y: number;
+  readonly z: number;
+  set(x: number, y: number, z: number): unknown;
+}
+
+/** An Object3D. */
+export interface Node {
+  readonly position: Vector;
+  readonly rotation: { set(x: number, y: number, z: number, order: "ZYX"): unknown };
+  readonly scale: Vector;
+  readonly parent: Node | null;
+  readonly animations: readonly Clip[];
+  visible: boolean;
+  frustumCulled: boolean;
+  add(node: Node): unknown;
+  remove(node: Node): unknown;
+  traverse(visit: (node: Node) => void): void;
+}
+
+export interface Lamp extends Node {
+  readonly color: { setRGB(r: number, g: number, b: number): unknown };
+  intensity: number;
+}
+
+/** An AnimationClip. */
+export interface Clip {
+  readonly name: string;
+}
+
+/** An OrthographicCamera. */
+export interface ThreeCamera extends Node {
+  left: number;
+  right: number;
+  top: number;
+  bottom: number;
+  near: number;
+  far: number;
+  matrixAutoUpdate: boolean;
+  readonly matrix: { set(...rows: readonly [number, number, number, number, number, number, number, number, number, number, number, number, number, number, number, number]): unknown };
+  updateProjectionMatrix(): void;
+}
+
+/** A WebGLRenderTarget. */
+export interface ThreeTarget {
+  readonly width: number;
+  readonly height: number;
+  readonly texture: object;
+  readonly depthTexture: object | null;
+  dispose(): void;
+}
+
+/** A WebGLRenderer. */
+export interface ThreeRenderer {
+  /** `__webglTexture` of a texture that has been drawn to. */
+  readonly properties: { get(texture: object): unknown };
+  setClearColor(color: number, alpha: number): void;
+  setRenderTarget(target: ThreeTarget | null): void;
+  render(scene: Node, camera: ThreeCamera): void;
+  resetState(): void;
+  dispose(): void;
+}
+
+export interface Box {
+  readonly min: Vector;
+  readonly max: Vector;
+  setFromObject(node: Node): unknown;
+  isEmpty(): boolean;
+}
+
+/** An intersection, as a Raycaster finds it. */
+export interface ThreeHit {
+  readonly object: Node;
+  readonly point: Vector;
+}
+
+/** A Raycaster. */
+export interface ThreeRaycaster {
+  readonly params: { readonly Line: { threshold: number }; readonly Points: { threshold: number } };
+  camera: unknown;
+  set(origin: Vector, direction: Vector): void;
+  intersectObjects(nodes: Node[], recursive: boolean): readonly ThreeHit[];
+}
+
+export interface Mixer {
+  clipAction(clip: Clip): Action;
+  update(seconds: number): unknown;
+  stopAllAction(): unknown;
+  uncacheRoot(root: Node): void;
+}
+
+export interface Action {
+  clampWhenFinished: boolean;
+  reset(): Action;
+  setLoop(mode: never, repetitions: number): Action;
+  play(): Action;
+  stop(): Action;
+  isRunning(): boolean;
+}
+
+/** GLTFLoader, or any other of three.js. */
+export interface Loader {
+  loadAsync(url: string): Promise<unknown>;
+}
