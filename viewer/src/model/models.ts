@@ -23,7 +23,7 @@ export interface Member {
 }
 
 const NO_CANVAS = "a modelLayer needs WebGL, and this map draws on a 2D canvas (map.drawer tells): show a marker there, or nothing";
-const STYLES = ".map3d-over-model > canvas { cursor: pointer; }";
+const STYLES = ".map3d.map3d-over-model > canvas { cursor: pointer; }";
 /** Of a pixel: as many as every WebGL2 has. */
 const SAMPLES = 4;
 /** What has slept does not jump. */
@@ -120,7 +120,7 @@ export class Models implements Guest {
     this.#target = this.#targetOf(this.#part);
     this.#renderer.resetState();
     this.#renderer.setRenderTarget(this.#target);
-    this.#renderer.render(this.#scene, this.#camera);
+    this.#renderer.render(this.#scene as never, this.#camera as never);
     this.#renderer.resetState();
   }
 
@@ -148,7 +148,7 @@ export class Models implements Guest {
     const [left, top, px] = groundOf(part, setting);
     const [w, h, d] = [part.width * px, part.height * px, (near + far) / 2];
     const [x, y, z] = localFromUvd(setting.camera.frame.axes, [left + w / 2, top - h / 2, d]);
-    Object.assign(this.#camera, { left: -w / 2, right: w / 2, top: h / 2, bottom: -h / 2, near: near - d, far: far - d });
+    Object.assign(this.#camera, { left: -w / 2, right: w / 2, top: h / 2, bottom: -h / 2, near: near - d, far: far - d, matrixWorldNeedsUpdate: true });
     this.#camera.matrix.set(right[0], up[0], -forward[0], x, right[1], up[1], -forward[1], y, right[2], up[2], -forward[2], z, 0, 0, 0, 1);
     this.#camera.updateProjectionMatrix();
   }

@@ -77,7 +77,7 @@ export interface ThreeRenderer {
   readonly properties: { get(texture: object): unknown };
   setClearColor(color: number, alpha: number): void;
   setRenderTarget(target: ThreeTarget | null): void;
-  render(scene: Node, camera: ThreeCamera): void;
+  render(scene: never, camera: never): void;
   resetState(): void;
   dispose(): void;
 }
@@ -106,8 +106,6 @@ export interface ThreeRaycaster {
 export interface Mixer {
   clipAction(clip: Clip): Action;
   update(seconds: number): unknown;
-  stopAllAction(): unknown;
-  uncacheRoot(root: Node): void;
 }
 
 export interface Action {

@@ -76,12 +76,12 @@ async function judged(page: Page, light: Light): Promise<{ wrong: string[]; befo
       const kind = ({ town: a, box: b }: typeof here): string => `${String(a?.id)} ${String(a?.normal)} ${String(b?.normal)} ${String(b && (!a || b.d < a.d))}`;
       if ([raysAt(x - 1, y), raysAt(x + 1, y), raysAt(x, y - 1), raysAt(x, y + 1)].some((beside) => kind(beside) !== kind(here))) continue;
       const seen = !here.town || here.box.d < here.town.d;
-      count[seen ? "before" : "behind"]++;
       const want = lambert(WALL, here.box.normal, light);
       const got = rgbAt(shot, x, y);
       const same = want.every((byte, k) => Math.abs(byte - (got[k] ?? 0)) <= 2);
       // The town hall's walls have the box's colour and face as its walls do: what is hidden there is told by windows and roof alone.
       const alike = here.town && !seen && String(here.town.normal) === String(here.box.normal);
+      if (!alike) count[seen ? "before" : "behind"]++;
       if (!alike && same !== seen) wrong.push(`${String(x)}, ${String(y)}: ${got.join(" ")} for ${want.map(Math.round).join(" ")}, ${seen ? "seen" : "hidden"}`);
     }
   }
@@ -95,7 +95,7 @@ test("a box is seen exactly where it is nearer than the images, as bright as the
   await page.screenshot({ path: `${OUT}/model-box.png` });
   const found = await judged(page, DEFAULT_LIGHT);
   expect(found.wrong.slice(0, 5)).toEqual([]);
-  expect([found.before > 3000, found.behind > 1000]).toEqual([true, true]);
+  expect([found.before > 2500, found.behind > 800]).toEqual([true, true]);
 
   const evening: Light = { ...DEFAULT_LIGHT, azimuth_deg: 265, altitude_deg: 20, ambient: 0.3, diffuse: 0.9, sun_rgb: [1, 0.7, 0.4], sky_rgb: [0.6, 0.8, 1] };
   await settled(page, (light) => (globalThis as Global).map.setLight(light), evening);
@@ -110,5 +110,195 @@ test("a box is seen exactly where it is nearer than the images, as bright as the
   await settled(page, () => (globalThis as Modelling).model.addTo((globalThis as Global).map), null);
   expect((await judged(page, DEFAULT_LIGHT)).wrong.slice(0, 5)).toEqual([]);
   expect(problems).toEqual([]);
+  await page.context().close();
+});
+
+/** Colours of the canvas at CSS pixels. */
+const seenAt = async (page: Page, world: Vec3): Promise<number[]> => {
+  const [x, y] = await page.evaluate((at) => (globalThis as Global).map.project(at) as [number, number], world);
+  return rgbAt(await picture(page), Math.round(x), Math.round(y));
+};
+const inTown = (x: number, y: number, z: number): Vec3 => [ORIGIN[0] + x, ORIGIN[1] + y, ORIGIN[2] + z];
+
+test("a white wall of a model is as bright as the same wall in the images", async () => {
+  const { page, problems } = await start();
+  // The school's south wall, and a model of it beside it, both of one colour.
+  await addBox(page, { position: inTown(31, -62, 0) });
+  await settled(page, () => {
+    const { model, THREE } = globalThis as Modelling;
+    model.object?.traverse((node) => {
+      if (node instanceof THREE.Mesh) node.material = new THREE.MeshStandardMaterial({ color: new THREE.Color().setRGB(202 / 255, 205 / 255, 208 / 255, THREE.SRGBColorSpace), roughness: 1 });
+    });
+    model.redraw();
+  }, null);
+  const [wall, model] = [await seenAt(page, inTown(30.8, -46, 0.6)), await seenAt(page, inTown(30.8, -67, 12))];
+  wall.forEach((byte, k) => { expect(Math.abs(byte - (model[k] ?? 0))).toBeLessThanOrEqual(6); });
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
+
+/** Clicks at a world position; what the model and the map say of it. */
+async function clicked(page: Page, world: Vec3): Promise<{ model: { object: string; position: Vec3 } | null; id: number }> {
+  const [x, y] = await page.evaluate((at) => {
+    const g = globalThis as Modelling & { hit: unknown };
+    g.hit = null;
+    g.clicks.length = 0;
+    return g.map.project(at) as [number, number];
+  }, world);
+  await page.mouse.click(x, y);
+  await page.waitForFunction(() => (globalThis as Global).clicks.length > 0);
+  await page.waitForTimeout(350); // not a double click
+  return page.evaluate(() => {
+    const { hit, clicks } = globalThis as unknown as { hit: { object: string; position: Vec3 } | null; clicks: { id: number }[] };
+    return { model: hit, id: clicks[0]?.id ?? 0 };
+  });
+}
+
+test("a click tells the model where nothing stands before it, and the pointer says so; the map's click tells of the images", async () => {
+  const { page, problems } = await start();
+  await addBox(page);
+  await page.evaluate(() => {
+    const g = globalThis as Modelling & { hit: unknown };
+    g.model.on("click", ({ object, position, intersection }) => (g.hit = { object: object.type, position, distance: intersection.distance }));
+  });
+  const top = inTown(-20, 23, 24);
+  const { model, id } = await clicked(page, top);
+  expect(model?.object).toBe("Mesh");
+  model?.position.forEach((part, k) => { expect(Math.abs(part - (top[k] ?? 0))).toBeLessThan(0.5); });
+  expect(id).toBe(3_900_000_007); // the chapel behind it
+  const over = (): Promise<string> => page.evaluate(() => getComputedStyle((globalThis as Global).map.canvas).cursor);
+  await page.waitForFunction(() => (globalThis as Global).map.container.classList.contains("map3d-over-model"));
+  expect(await over()).toBe("pointer");
+  expect(await clicked(page, inTown(-40, 18, 10))).toEqual({ model: null, id: 17 }); // behind the town hall
+  await page.waitForFunction(() => !(globalThis as Global).map.container.classList.contains("map3d-over-model"));
+  expect(await clicked(page, inTown(-20, -60, 0))).toEqual({ model: null, id: 3 });
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
+
+/** Frames that the map draws in some milliseconds. */
+const framesIn = (page: Page, ms: number): Promise<number> => page.evaluate((duration_ms) => new Promise<number>((done) => {
+  const { map } = globalThis as Global;
+  let count = 0;
+  const counted = (): void => { count++; };
+  map.moves.on("draw", counted);
+  setTimeout(() => {
+    map.moves.off("draw", counted);
+    done(count);
+  }, duration_ms);
+}), ms);
+
+const addTriangle = (page: Page, options: object): Promise<void> => page.evaluate(([origin, more]) => new Promise<void>((done) => {
+  const g = globalThis as Modelling;
+  g.model = new g.map3d.modelLayer(g.THREE, "/triangle.gltf", { position: origin, loader: g.GLTFLoader, ...more });
+  g.model.on("ready", () => { done(); }).addTo(g.map);
+}), [inTown(-45, -40, 0), options] as const);
+
+test("a glTF plays its clips and stops; what stands still draws no frames; who wants no movement sees none until it is asked for", async () => {
+  const { page, problems } = await start();
+  await addTriangle(page, { heading_deg: 0 });
+  expect(await page.evaluate(() => [(globalThis as Modelling).model.clips, (globalThis as Modelling).model.playing])).toEqual([["up"], true]);
+  expect(await framesIn(page, 1000)).toBeGreaterThan(4);
+  await settled(page, () => (globalThis as Modelling).model.stop(), null);
+  expect(await framesIn(page, 300)).toBe(0);
+  const isRed = async (at: Vec3): Promise<boolean> => {
+    const [r = 0, g = 0] = await seenAt(page, at);
+    return r > 100 && g < 40;
+  };
+  const [foot, above] = [inTown(-45, -40, 4), inTown(-45, -40, 34)];
+  expect([await isRed(foot), await isRed(above)]).toEqual([true, false]);
+  await settled(page, () => (globalThis as Modelling).model.play("up", { loop: false }), null);
+  expect([await isRed(foot), await isRed(above)]).toEqual([false, true]);
+  expect(await framesIn(page, 300)).toBe(0);
+  expect(await page.evaluate(() => {
+    try {
+      (globalThis as Modelling).model.play("down");
+      return "";
+    } catch (error) {
+      return (error as Error).message;
+    }
+  })).toBe('animation "down" is none of "up"');
+  expect(problems).toEqual([]);
+  await page.context().close();
+
+  const { page: calm } = await start({}, { reducedMotion: "reduce" });
+  await addTriangle(calm, {});
+  await calm.waitForTimeout(300);
+  expect(await framesIn(calm, 300)).toBe(0);
+  await calm.evaluate(() => (globalThis as Modelling).model.play());
+  expect(await framesIn(calm, 1000)).toBeGreaterThan(4);
+  await calm.context().close();
+});
+
+test("position, heading and scale in metres of the scene; bounds for fitBounds", async () => {
+  const { page, problems } = await start();
+  await addTriangle(page, { play: false });
+  const boundsOf = (): Promise<number[][]> => page.evaluate((origin) => ((globalThis as Modelling).model.bounds ?? []).map((corner) => corner.map((part, k) => Math.round((part - (origin[k] ?? 0)) * 1e3) / 1e3)), ORIGIN);
+  expect(await boundsOf()).toEqual([[-55, -40, 0], [-35, -40, 20]]);
+  await settled(page, (at) => (globalThis as Modelling).model.setPosition(at).setHeading(90).setScale(0.5), inTown(10, -60, 2));
+  expect(await boundsOf()).toEqual([[10, -65, 2], [10, -55, 12]]);
+  await settled(page, () => (globalThis as Modelling).model.setHeading(-90).setPosition([691010, 5335940, 502]), null);
+  await settled(page, () => (globalThis as Modelling).model.setHeading(0), null);
+  expect((await seenAt(page, inTown(10, -60, 6)))[1]).toBeLessThan(40);
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
+
+test("what cannot be is refused by name: no WebGL, no loader, no file, no numbers", async () => {
+  const { page, problems } = await start({ drawer: "canvas" });
+  const before = await picture(page);
+  const errors = await page.evaluate((position) => new Promise<string[]>((done) => {
+    const g = globalThis as Modelling;
+    const said: string[] = [];
+    const attempt = (act: () => unknown): void => {
+      try {
+        act();
+      } catch (error) {
+        said.push((error as Error).message);
+      }
+    };
+    attempt(() => new g.map3d.modelLayer(g.THREE, "/a.glb", { position }));
+    attempt(() => new g.map3d.modelLayer(g.THREE, new g.THREE.Group(), { position: [1, NaN, 2] }));
+    attempt(() => new g.map3d.modelLayer(g.THREE, new g.THREE.Group(), { position, scale: 0 }));
+    attempt(() => new g.map3d.modelLayer({ ...g.THREE, REVISION: "124" }, new g.THREE.Group(), { position }));
+    g.model = new g.map3d.modelLayer(g.THREE, new g.THREE.Group(), { position }).addTo(g.map);
+    g.model.on("error", ({ error }) => {
+      said.push(error.name, error.message);
+      done(said);
+    });
+  }), ORIGIN);
+  const canvas = "a modelLayer needs WebGL, and this map draws on a 2D canvas (map.drawer tells): show a marker there, or nothing";
+  expect(errors).toEqual(['a modelLayer that fetches "/a.glb" needs a loader, e.g. { loader: GLTFLoader }', "position y is to be a number, got NaN", "scale is to be above 0, got 0", "a modelLayer needs three.js r155 or newer, got r124", "UsageError", canvas]);
+  expect(await page.evaluate(() => (globalThis as Global).errors)).toEqual([canvas]);
+  await settled(page, () => (globalThis as Modelling).map.panBy(0, 0).setLight({}), null);
+  expect(before.equals(await picture(page))).toBe(true);
+  await page.evaluate(() => (globalThis as Modelling).model.remove());
+  expect(problems).toEqual([]);
+  await page.context().close();
+
+  const { page: other } = await start();
+  expect(await other.evaluate((position) => new Promise<unknown[]>((done) => {
+    const g = globalThis as Modelling;
+    new g.map3d.modelLayer(g.THREE, "/none.gltf", { position, loader: new g.GLTFLoader() }).addTo(g.map).on("error", ({ error }) => { done([error.name, (error as { status?: number }).status, error.message.startsWith("/none.gltf: ")]); });
+  }), ORIGIN)).toEqual(["FetchError", 404, true]);
+  await other.context().close();
+});
+
+test("a lost context comes back with the model; a map that ends takes it along", async () => {
+  const { page } = await start();
+  await addBox(page);
+  const before = await picture(page);
+  await page.evaluate(() => new Promise<void>((done) => {
+    const { map } = globalThis as Global;
+    const lose = map.canvas.getContext("webgl2")?.getExtension("WEBGL_lose_context");
+    map.once("contextlost", () => setTimeout(() => lose?.restoreContext(), 50));
+    map.once("contextrestored", () => map.once("idle", () => { done(); }));
+    lose?.loseContext();
+  }));
+  expect((await judged(page, DEFAULT_LIGHT)).wrong.slice(0, 5)).toEqual([]);
+  expect(before.equals(await picture(page))).toBe(true);
+  await page.evaluate(() => (globalThis as Modelling).map.remove());
+  await page.waitForTimeout(200);
+  expect(await page.evaluate(() => (globalThis as Global).errors)).toEqual([]);
   await page.context().close();
 });
