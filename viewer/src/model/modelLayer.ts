@@ -2,7 +2,7 @@ import { add, sub, type Box3, type Vec2, type Vec3 } from "../core/vec";
 import { Attached, FetchError, UsageError, type map } from "../map3d";
 import { contentsOf, freed, isBoned, type Contents } from "./contents";
 import { Models, type Member } from "./models";
-import type { Action, Clip, Loader, Mixer, Node, Three } from "./three";
+import type { Action, ThreeClip, ModelLoader, Mixer, ThreeNode, Three } from "./three";
 
 /** How a model begins. */
 export interface ModelLayerOptions {
@@ -15,7 +15,7 @@ export interface ModelLayerOptions {
   /** Its axis that points to the sky: glTF has "y". Default "y". */
   up?: "y" | "z";
   /** What reads the file, e.g. three.js's GLTFLoader: the class, or one of it. Any loader whose `loadAsync` gives an Object3D, or `{ scene, animations }`. */
-  loader?: Loader | (new () => Loader);
+  loader?: ModelLoader | (new () => ModelLoader);
   /** Clips that play from the beginning, by name; true: all, unless the reader wants no movement. Default true. */
   play?: boolean | string | readonly string[];
 }
@@ -48,7 +48,7 @@ export interface ModelLayerEvents<T extends Three = Three> {
   error: { error: Error };
 }
 
-type Source<T extends Three> = string | InstanceType<T["Object3D"]> | { readonly scene: InstanceType<T["Object3D"]>; readonly animations?: readonly Clip[] };
+type Source<T extends Three> = string | InstanceType<T["Object3D"]> | { readonly scene: InstanceType<T["Object3D"]>; readonly animations?: readonly ThreeClip[] };
 
 /** three.js's lights count in today's units from here on. */
 const OLDEST = 155;
@@ -62,7 +62,7 @@ export class modelLayer<T extends Three = Three> extends Attached<map, ModelLaye
   readonly options: Readonly<ModelLayerOptions>;
   readonly #three: Three;
   readonly #source: Source<T>;
-  readonly #pivot: Node;
+  readonly #pivot: ThreeNode;
   #position: Vec3;
   #heading_deg: number;
   #scale: number;
@@ -174,8 +174,8 @@ export class modelLayer<T extends Three = Three> extends Attached<map, ModelLaye
   }
 
   protected leave(map: map): void {
+    if (this.#contents) freed(this.#contents.object); // while the renderer still knows what it has of it
     Models.remove(map, this.#three, this.#member);
-    if (this.#contents) freed(this.#contents.object);
   }
 
   async #begin(map: map): Promise<void> {
@@ -185,6 +185,8 @@ export class modelLayer<T extends Three = Three> extends Attached<map, ModelLaye
       this.#loading = undefined; // put on a map again, it is tried again
       throw reason;
     });
+    // A context that is lost makes nothing.
+    if (map.canvas.getContext("webgl2")?.isContextLost()) await new Promise<void>((back) => map.once("contextrestored", () => { back(); }));
     if (this.map !== map) return;
     this.#contents ??= this.#placed(contents);
     Models.add(map, this.#three, this.#member);

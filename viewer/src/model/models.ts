@@ -6,12 +6,12 @@ import type { Frame } from "../geo/frame";
 import { UsageError, type Guest, type map, type Setting } from "../map3d";
 import { Composite } from "./composite";
 import { depthsOf, groundOf, lampsOf, partOf, type Part } from "./place";
-import type { Lamp, Node, Three, ThreeCamera, ThreeHit, ThreeRenderer, ThreeTarget } from "./three";
+import type { Lamp, ThreeNode, Three, ThreeCamera, ThreeHit, ThreeRenderer, ThreeTarget } from "./three";
 
 /** One of the models of a map. */
 export interface Member {
   /** What of it stands in the scene. */
-  readonly pivot: Node;
+  readonly pivot: ThreeNode;
   /** Somebody wants to know of clicks. */
   readonly listening: boolean;
   /** Local boxes of what it shows, its place being told from an origin (world). */
@@ -45,11 +45,11 @@ export class Models implements Guest {
   readonly #map: map;
   readonly #three: Three;
   readonly #renderer: ThreeRenderer;
-  readonly #scene: Node;
+  readonly #scene: ThreeNode;
   readonly #camera: ThreeCamera;
   readonly #sky: Lamp;
   readonly #sun: Lamp;
-  readonly #members = new Map<Node, Member>();
+  readonly #members = new Map<ThreeNode, Member>();
   #composite: Composite | undefined;
   #target: ThreeTarget | undefined;
   /** Of the screen, that the picture shows; null: there is nothing to show. */
@@ -212,13 +212,13 @@ export class Models implements Guest {
     return member?.listening && !(relief.depthAt(u, v) < d) ? { member, position: add(origin, local), hit } : null;
   }
 
-  #memberOf(node: Node): Member | undefined {
-    let at: Node | null = node;
+  #memberOf(node: ThreeNode): Member | undefined {
+    let at: ThreeNode | null = node;
     while (at && !this.#members.has(at)) at = at.parent;
     return at ? this.#members.get(at) : undefined;
   }
 }
 
-function isShown(node: Node): boolean {
+function isShown(node: ThreeNode): boolean {
   return node.visible && (!node.parent || isShown(node.parent));
 }

@@ -6,9 +6,9 @@ export interface Three {
   readonly WebGLRenderer: new (options: { canvas: HTMLCanvasElement; context: WebGL2RenderingContext }) => ThreeRenderer;
   readonly WebGLRenderTarget: new (width: number, height: number, options: { samples: number; colorSpace: "srgb"; depthTexture: never }) => ThreeTarget;
   readonly DepthTexture: new (width: number, height: number) => object;
-  readonly Scene: new () => Node;
-  readonly Group: new () => Node;
-  readonly Object3D: new () => Node;
+  readonly Scene: new () => ThreeNode;
+  readonly Group: new () => ThreeNode;
+  readonly Object3D: new () => ThreeNode;
   readonly OrthographicCamera: new () => ThreeCamera;
   readonly AmbientLight: new () => Lamp;
   readonly DirectionalLight: new () => Lamp;
@@ -26,31 +26,31 @@ export interface Vector {
 }
 
 /** An Object3D. */
-export interface Node {
+export interface ThreeNode {
   readonly position: Vector;
   readonly rotation: { set(x: number, y: number, z: number, order: "ZYX"): unknown };
   readonly scale: Vector;
-  readonly parent: Node | null;
-  readonly animations: readonly Clip[];
+  readonly parent: ThreeNode | null;
+  readonly animations: readonly ThreeClip[];
   visible: boolean;
   frustumCulled: boolean;
-  add(node: Node): unknown;
-  remove(node: Node): unknown;
-  traverse(visit: (node: Node) => void): void;
+  add(node: ThreeNode): unknown;
+  remove(node: ThreeNode): unknown;
+  traverse(visit: (node: ThreeNode) => void): void;
 }
 
-export interface Lamp extends Node {
+export interface Lamp extends ThreeNode {
   readonly color: { setRGB(r: number, g: number, b: number): unknown };
   intensity: number;
 }
 
 /** An AnimationClip. */
-export interface Clip {
+export interface ThreeClip {
   readonly name: string;
 }
 
 /** An OrthographicCamera. */
-export interface ThreeCamera extends Node {
+export interface ThreeCamera extends ThreeNode {
   left: number;
   right: number;
   top: number;
@@ -85,13 +85,13 @@ export interface ThreeRenderer {
 export interface Box {
   readonly min: Vector;
   readonly max: Vector;
-  setFromObject(node: Node): unknown;
+  setFromObject(node: ThreeNode): unknown;
   isEmpty(): boolean;
 }
 
 /** An intersection, as a Raycaster finds it. */
 export interface ThreeHit {
-  readonly object: Node;
+  readonly object: ThreeNode;
   readonly point: Vector;
 }
 
@@ -100,11 +100,11 @@ export interface ThreeRaycaster {
   readonly params: { readonly Line: { threshold: number }; readonly Points: { threshold: number } };
   camera: unknown;
   set(origin: Vector, direction: Vector): void;
-  intersectObjects(nodes: Node[], recursive: boolean): readonly ThreeHit[];
+  intersectObjects(nodes: ThreeNode[], recursive: boolean): readonly ThreeHit[];
 }
 
 export interface Mixer {
-  clipAction(clip: Clip): Action;
+  clipAction(clip: ThreeClip): Action;
   update(seconds: number): unknown;
 }
 
@@ -118,6 +118,7 @@ export interface Action {
 }
 
 /** GLTFLoader, or any other of three.js. */
-export interface Loader {
+export interface ModelLoader {
+  /** An Object3D, or `{ scene, animations }`. */
   loadAsync(url: string): Promise<unknown>;
 }

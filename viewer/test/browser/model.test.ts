@@ -3,7 +3,9 @@ import type * as THREE from "three";
 import type { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { beforeAll, expect, test } from "vitest";
 import type * as Model from "../../src/model";
+import type * as Orbit from "../../src/orbit";
 import { dot, type Vec3 } from "../../src/core/vec";
+import { axesOf } from "../../src/geo/axes";
 import { frameOf } from "../../src/geo/frame";
 import { DEFAULT_LIGHT, towardsLight, type Light } from "../../src/geo/light";
 import { renderTown } from "../fixture/rendering";
@@ -50,10 +52,10 @@ const addBox = (page: Page, options: object = {}): Promise<void> => settled(page
 const frame = frameOf(town.json.views[0] as (typeof town.json.views)[0], town.json.size_m, town.json.tile_px, town.json.zmax);
 
 /** What the ray through a pixel's middle meets of the town and of the box. */
-async function raysOf(page: Page): Promise<(x: number, y: number) => { town: Hit | null; box: Hit | null }> {
+async function raysOf(page: Page, dpr = 1): Promise<(x: number, y: number) => { town: Hit | null; box: Hit | null }> {
   const [[x0, y0], px] = await page.evaluate((origin) => [(globalThis as Global).map.project(origin) as [number, number], (globalThis as Global).map.metresPerPixel] as const, ORIGIN);
   return (x, y) => {
-    const [u, v] = [(x + 0.5 - x0) * px, (y0 - y - 0.5) * px];
+    const [u, v] = [((x + 0.5) / dpr - x0) * px, (y0 - (y + 0.5) / dpr) * px];
     return { town: trace(frame, u, v), box: trace(frame, u, v, [BOX]) };
   };
 }
@@ -63,21 +65,21 @@ const srgb = (value: number): number => 255 * (value <= 0.0031308 ? value * 12.9
 const lambert = (color: Vec3, normal: Vec3, light: Light): number[] =>
   color.map((byte, k) => srgb(Math.min(1, linear(byte) * (light.ambient * (light.sky_rgb[k] ?? 0) + light.diffuse * (light.sun_rgb[k] ?? 0) * Math.max(0, dot(normal, towardsLight(light)))))));
 
-const rgbAt = (shot: Buffer, x: number, y: number): number[] => [...shot.subarray(4 * (WIDE * y + x), 4 * (WIDE * y + x) + 3)];
+const rgbAt = (shot: Buffer, x: number, y: number, wide = WIDE): number[] => [...shot.subarray(4 * (wide * y + x), 4 * (wide * y + x) + 3)];
 
-/** Pixels whose neighbours show the same faces: those that show the box wrongly, and how many there are of each kind. */
-async function judged(page: Page, light: Light): Promise<{ wrong: string[]; before: number; behind: number }> {
-  const [shot, raysAt] = [await picture(page), await raysOf(page)];
+/** Pixels around which, as far as `reach`, the same faces are seen: those that show the box wrongly, and how many there are of each kind. */
+async function judged(page: Page, light: Light, { dpr = 1, reach = 1 } = {}): Promise<{ wrong: string[]; before: number; behind: number }> {
+  const [shot, raysAt] = [await picture(page), await raysOf(page, dpr)];
   const [wrong, count]: [string[], { before: number; behind: number }] = [[], { before: 0, behind: 0 }];
-  for (let y = 2; y < HIGH - 2; y++) {
-    for (let x = 2; x < WIDE - 2; x++) {
+  for (let y = 2; y < HIGH * dpr - 2; y += dpr) {
+    for (let x = 2; x < WIDE * dpr - 2; x += dpr) {
       const here = raysAt(x, y);
       if (!here.box) continue;
       const kind = ({ town: a, box: b }: typeof here): string => `${String(a?.id)} ${String(a?.normal)} ${String(b?.normal)} ${String(b && (!a || b.d < a.d))}`;
-      if ([raysAt(x - 1, y), raysAt(x + 1, y), raysAt(x, y - 1), raysAt(x, y + 1)].some((beside) => kind(beside) !== kind(here))) continue;
+      if ([raysAt(x - reach, y), raysAt(x + reach, y), raysAt(x, y - reach), raysAt(x, y + reach)].some((beside) => kind(beside) !== kind(here))) continue;
       const seen = !here.town || here.box.d < here.town.d;
       const want = lambert(WALL, here.box.normal, light);
-      const got = rgbAt(shot, x, y);
+      const got = rgbAt(shot, x, y, WIDE * dpr);
       const same = want.every((byte, k) => Math.abs(byte - (got[k] ?? 0)) <= 2);
       // The town hall's walls have the box's colour and face as its walls do: what is hidden there is told by windows and roof alone.
       const alike = here.town && !seen && String(here.town.normal) === String(here.box.normal);
@@ -109,6 +111,18 @@ test("a box is seen exactly where it is nearer than the images, as bright as the
   expect(before.equals(await picture(page))).toBe(true);
   await settled(page, () => (globalThis as Modelling).model.addTo((globalThis as Global).map), null);
   expect((await judged(page, DEFAULT_LIGHT)).wrong.slice(0, 5)).toEqual([]);
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
+
+test.each([[1, 2], [1, 3.6], [2, 2.6], [2, 4.3]])("at %d device pixels a CSS pixel and zoom %d, too", async (dpr, zoom) => {
+  const { page, problems } = await start({ zoom }, { deviceScaleFactor: dpr });
+  await addBox(page);
+  await page.screenshot({ path: `${OUT}/model-box-${String(dpr)}-${String(zoom)}.png` });
+  // The images' own edges are known to a texel of theirs.
+  const found = await judged(page, DEFAULT_LIGHT, { dpr, reach: 2 * Math.ceil(dpr * 2 ** Math.max(0, zoom - 3)) });
+  expect(found.wrong.slice(0, 5)).toEqual([]);
+  expect([found.before > 300, found.behind > 100]).toEqual([true, true]);
   expect(problems).toEqual([]);
   await page.context().close();
 });
@@ -176,6 +190,35 @@ test("a click tells the model where nothing stands before it, and the pointer sa
   await page.context().close();
 });
 
+test("what is taken off gives back all that it had of the GPU", async () => {
+  const { page, problems } = await start();
+  await addBox(page);
+  await settled(page, () => (globalThis as Modelling).model.remove(), null);
+  await page.evaluate(() => {
+    const context = WebGL2RenderingContext.prototype as unknown as Record<string, (...given: unknown[]) => unknown>;
+    const alive: Record<string, number> = {};
+    for (const kind of ["Texture", "Buffer", "Framebuffer", "Renderbuffer", "Program", "Shader", "VertexArray"]) {
+      alive[kind] = 0;
+      for (const [verb, step] of [["create", 1], ["delete", -1]] as const) {
+        const own = context[`${verb}${kind}`] as (...given: unknown[]) => unknown;
+        context[`${verb}${kind}`] = function (this: unknown, ...given: unknown[]) {
+          alive[kind] = (alive[kind] ?? 0) + step;
+          return own.apply(this, given);
+        };
+      }
+    }
+    Object.assign(globalThis, { alive });
+  });
+  await settled(page, () => (globalThis as Modelling).model.addTo((globalThis as Global).map), null);
+  const alive = (): Promise<Record<string, number>> => page.evaluate(() => (globalThis as unknown as { alive: Record<string, number> }).alive);
+  expect((await alive())["Renderbuffer"]).toBe(2);
+  await settled(page, () => (globalThis as Modelling).model.remove(), null);
+  // three.js leaves four textures of a pixel, and framebuffers without anything.
+  expect(Object.entries(await alive()).filter(([, count]) => count > 0)).toEqual([["Texture", 4], ["Framebuffer", 3]]);
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
+
 /** Frames that the map draws in some milliseconds. */
 const framesIn = (page: Page, ms: number): Promise<number> => page.evaluate((duration_ms) => new Promise<number>((done) => {
   const { map } = globalThis as Global;
@@ -223,7 +266,7 @@ test("a glTF plays its clips and stops; what stands still draws no frames; who w
 
   const { page: calm } = await start({}, { reducedMotion: "reduce" });
   await addTriangle(calm, {});
-  await calm.waitForTimeout(300);
+  await settled(calm, () => (globalThis as Modelling).model.redraw(), null);
   expect(await framesIn(calm, 300)).toBe(0);
   await calm.evaluate(() => (globalThis as Modelling).model.play());
   expect(await framesIn(calm, 1000)).toBeGreaterThan(4);
@@ -300,5 +343,39 @@ test("a lost context comes back with the model; a map that ends takes it along",
   await page.evaluate(() => (globalThis as Modelling).map.remove());
   await page.waitForTimeout(200);
   expect(await page.evaluate(() => (globalThis as Global).errors)).toEqual([]);
+  await page.context().close();
+});
+
+test("while the map turns, the model turns along; the turn ends in the picture of a cut", async () => {
+  const { page, problems } = await start({ light: { lit: false } });
+  await addBox(page);
+  await settled(page, () => (globalThis as Global).map.setDirection("90-45"), null);
+  const cut = await picture(page);
+  await settled(page, () => (globalThis as Global).map.setDirection("0-45"), null);
+  await page.addScriptTag({ url: "/map3d-orbit.js" });
+  await settled(page, () => { new (globalThis as unknown as { map3d: typeof Orbit }).map3d.orbit({ duration_ms: 300 }).addTo((globalThis as Global).map); }, null);
+  await page.evaluate(() => { (globalThis as Global).map.twist(Math.PI / 9); });
+  await page.waitForFunction(() => (globalThis as Global).map.direction === "90-45");
+  await page.waitForTimeout(1500);
+  const shot = await picture(page);
+  await page.screenshot({ path: `${OUT}/model-turning.png` });
+  const turned = { ...frame, axes: axesOf(20, 45), d0: -2000 };
+  const [[x0, y0], px] = await page.evaluate((origin) => [(globalThis as Global).map.project(origin) as [number, number], (globalThis as Global).map.metresPerPixel] as const, ORIGIN);
+  let [all, right] = [0, 0];
+  for (let y = 1; y < HIGH; y += 2) {
+    for (let x = 1; x < WIDE; x += 2) {
+      const [u, v] = [(x + 0.5 - x0) * px, (y0 - y - 0.5) * px];
+      const [box, other] = [trace(turned, u, v, [BOX]), trace(turned, u, v)];
+      if (!box || (other && other.d < box.d)) continue;
+      all++;
+      if (rgbAt(shot, x, y).every((byte, k) => Math.abs(byte - (WALL[k] ?? 0)) <= 8)) right++;
+    }
+  }
+  expect(all).toBeGreaterThan(500);
+  expect(right / all).toBeGreaterThan(0.8); // what neither direction sees is closed with the colours behind
+  await page.evaluate(() => { (globalThis as Global).map.twist(Math.PI / 3); });
+  await settled(page, () => { (globalThis as Global).map.release(); }, null);
+  expect(cut.equals(await picture(page))).toBe(true);
+  expect(problems).toEqual([]);
   await page.context().close();
 });
