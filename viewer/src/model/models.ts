@@ -209,7 +209,7 @@ export class Models implements Guest {
     const local: Vec3 = [hit.point.x, hit.point.y, hit.point.z];
     const member = this.#memberOf(hit.object);
     const d = axes.forward[0] * local[0] + axes.forward[1] * local[1] + axes.forward[2] * local[2];
-    return member?.listening && !(relief.depthAt(u, v) < d) ? { member, position: add(origin, local), hit } : null;
+    return member?.listening && !relief.hides(u, v, d) ? { member, position: add(origin, local), hit } : null;
   }
 
   #memberOf(node: ThreeNode): Member | undefined {

@@ -3,7 +3,7 @@ import type { Vec2, Vec3 } from "../../core/vec";
 import { towardsLight } from "../../geo/light";
 import type { LayerKind } from "../../geo/manifest";
 import { bakedKinds, neededKinds, type Drawer, type DrawerEvents, type FrameSpec, type Mode, type Pass, type Quad } from "../drawer";
-import { firstOf, rangeOf, type Depths } from "../combine";
+import { firstOf, guestLead, rangeOf, steepOf, type Depths } from "../combine";
 import { packColor, packFinish } from "../finish";
 import { idTable, tableShape, type IdTable } from "./idTable";
 import { Programs, unitOf, type Program } from "./program";
@@ -60,7 +60,8 @@ export class WebGLDrawer implements Drawer {
       const own = guest.rangeAlong(frame.camera.frame);
       return own ? [own] : [];
     }));
-    if (range) for (const guest of frame.guests) guest.prepare(gl, frame, range);
+    const lead = Math.max(0, ...combined.map(({ depths, level }) => (depths ? guestLead(depths.frame, level) : 0)));
+    if (range) for (const guest of frame.guests) guest.prepare(gl, frame, [range[0] + lead, range[1] + lead]);
     this.#begin(frame);
     for (const pass of frame.passes) {
       if (!pass.depths) this.#drawPass(frame, pass, null, false);
@@ -126,7 +127,7 @@ export class WebGLDrawer implements Drawer {
       const finish = ids !== undefined && pass.finishes !== null;
       const program = this.#programs.use({ mode, masked: pass.masked, highlight: ids !== undefined && pass.highlight.size > 0, finish, shadow, occlusion: has("ao"), combined: range !== null });
       for (const [kind, texture] of [...textures, ...baked]) this.#bind(kind, texture);
-      if (range && pass.depths) this.#setDepths(program, pass.depths, range, soft);
+      if (range && pass.depths) this.#setDepths(program, pass.depths, quad, range, soft);
       if (ids) this.#bindIds(program, pass, quad, ids, frame.dpr);
       this.#drawQuad(frame, pass, quad, program, [...textures, ...baked, ["id", ids] as const].flatMap(([, texture]) => texture ?? []));
     }
@@ -183,8 +184,9 @@ export class WebGLDrawer implements Drawer {
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
   }
 
-  #setDepths(program: Program, depths: Depths, [near, far]: Vec2, soft: boolean): void {
+  #setDepths(program: Program, depths: Depths, { from }: Quad, [near, far]: Vec2, soft: boolean): void {
     this.gl.uniform2f(program.at("u_depths"), (firstOf(depths) - near) / (far - near), depths.unit_m / (far - near));
+    this.gl.uniform1ui(program.at("u_steep"), steepOf(depths, from.z));
     this.gl.uniform1i(program.at("u_soft"), Number(soft));
   }
 
