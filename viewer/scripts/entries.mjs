@@ -9,5 +9,6 @@ export const ENTRIES = {
   model: "src/model/index.ts",
   orbit: "src/orbit/index.ts",
   print: "src/print/index.ts",
+  shade: "src/shade/index.ts",
   theme: "src/theme/index.ts",
 };

@@ -18,6 +18,7 @@ const BUDGET = {
   model: 6,
   orbit: 7,
   print: 5,
+  shade: 4,
   theme: 4,
   full: 130,
 };

@@ -1,5 +1,6 @@
 import { CanvasDrawer } from "../draw/canvas/canvasDrawer";
 import type { Drawer, DrawerEvents, FrameSpec, Guest } from "../draw/drawer";
+import type { Shade } from "../draw/shade";
 import { WebGLDrawer } from "../draw/webgl/webglDrawer";
 import type { Light } from "../geo/light";
 import type { LayerKind } from "../geo/manifest";
@@ -78,8 +79,8 @@ export class Painter {
     return this.#cache.bytes;
   }
 
-  /** @param kinds layers that are read, besides those that are shown  @param turn paints a movement, where that can be done, in place of the frame */
-  paint(sight: Sight, layers: readonly imageLayer[], light: Readonly<Light>, kinds: readonly LayerKind[], turn: ((scene: Turning) => void) | null): Painted {
+  /** @param kinds layers that are read, besides those that are shown  @param shade finds light that was not rendered; roughly while the picture is moving  @param turn paints a movement, where that can be done, in place of the frame */
+  paint(sight: Sight, layers: readonly imageLayer[], light: Readonly<Light>, kinds: readonly LayerKind[], shade: Shade | null, moving: boolean, turn: ((scene: Turning) => void) | null): Painted {
     this.#cache.tick();
     this.#viewport.fitCanvas(sight.dpr);
     const { gl } = this.#drawer;
@@ -94,8 +95,8 @@ export class Painter {
     this.#queue.want(planned.flatMap(({ plan }) => plan.jobs));
     const { width, height } = this.#viewport.canvas;
     const complete = !layers.some((layer) => layer.loading) && planned.every(({ plan }) => plan.complete);
-    if (turn && gl) turn({ gl, width, height, complete, rangeOf: (frame) => rangeAlong(sight, frame, layers, guests), depict: (camera, range, framebuffer) => { this.#depict({ ...sight, camera, dpr: 1 }, layers, light, guests, { range, framebuffer }); } });
-    else this.#drawer.draw({ camera: sight.camera, width, height, dpr: sight.dpr, light, guests, passes: planned.map(({ layer, plan }) => layer.pass(plan, sight, before(layer))) });
+    if (turn && gl) turn({ gl, width, height, complete, rangeOf: (frame) => rangeAlong(sight, frame, layers, guests), depict: (camera, range, framebuffer) => { this.#depict({ ...sight, camera, dpr: 1 }, layers, light, shade, guests, { range, framebuffer }); } });
+    else this.#drawer.draw({ camera: sight.camera, width, height, dpr: sight.dpr, light, guests, shade: shade && { by: shade, camera: sight.camera, moving }, passes: planned.map(({ layer, plan }) => layer.pass(plan, sight, before(layer))) });
     if (complete && gl && this.guests.size > 0 && !this.#seated) {
       this.#seated = true;
       this.#events.changed();
@@ -104,14 +105,14 @@ export class Painter {
   }
 
   /** What is in memory, with the depth of all layers that have any. */
-  #depict(sight: Sight, layers: readonly imageLayer[], light: Readonly<Light>, guests: readonly Guest[], into: NonNullable<FrameSpec["into"]>): void {
+  #depict(sight: Sight, layers: readonly imageLayer[], light: Readonly<Light>, shade: Shade | null, guests: readonly Guest[], into: NonNullable<FrameSpec["into"]>): void {
     const { camera } = sight;
     const { width, height } = camera;
     const passes = layers.filter((layer) => layer.combines).flatMap((layer, k) => {
       const plan = layer.plan(sight, light, [], true);
       return plan ? [layer.pass(plan, sight, k)] : [];
     });
-    this.#drawer.draw({ camera, width, height, dpr: 1, light, guests, passes, into });
+    this.#drawer.draw({ camera, width, height, dpr: 1, light, guests, shade: shade && { by: shade, camera, moving: false }, passes, into });
   }
 
   /** Forgets the tiles of a layer that has left. */
