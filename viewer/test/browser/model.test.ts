@@ -4,6 +4,7 @@ import type { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { beforeAll, expect, test } from "vitest";
 import type * as Model from "../../src/model";
 import type * as Orbit from "../../src/orbit";
+import type * as Shading from "../../src/shade";
 import { dot, type Vec3 } from "../../src/core/vec";
 import { axesOf } from "../../src/geo/axes";
 import { frameOf } from "../../src/geo/frame";
@@ -146,6 +147,19 @@ test.each(["0-45", "90-45"])("a lawn that lies on the ground is seen whole at ev
     }
     expect([zoom, wrong.slice(0, 3)]).toEqual([zoom, []]);
   }
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
+
+test("where light is found from depth, a model that stands out of what the images hold is seen whole", async () => {
+  const { page, problems } = await start();
+  await page.addScriptTag({ url: "/map3d-shade.js" });
+  await settled(page, () => { new (globalThis as unknown as { map3d: typeof Shading }).map3d.shade().addTo((globalThis as Global).map); }, null);
+  await addBox(page);
+  expect((await judged(page, DEFAULT_LIGHT)).wrong.slice(0, 5)).toEqual([]);
+  await settled(page, (position) => { (globalThis as Modelling).model.setPosition(position); }, inTown(-29, -300, 300));
+  const [r = 0] = await seenAt(page, inTown(-29, -300, 324));
+  expect(Math.abs(r - (lambert(WALL, [0, 0, 1], DEFAULT_LIGHT)[0] ?? 0))).toBeLessThanOrEqual(2);
   expect(problems).toEqual([]);
   await page.context().close();
 });
