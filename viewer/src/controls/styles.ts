@@ -6,6 +6,7 @@ export const STYLES = `
 @media (prefers-reduced-motion: reduce) { .map3d-group [aria-busy="true"] svg { animation: none; opacity: 0.5; } }
 .map3d-beside { position: relative; }
 .map3d-beside > :not(.map3d-group) { position: absolute; right: calc(100% + 10px); border-radius: 12px; background: var(--map3d-panel); box-shadow: var(--map3d-shadow); z-index: 4; }
+@media (max-height: 660px) { .map3d-beside > :not(.map3d-group) { right: calc(100% + 64px); } }
 .map3d-said { bottom: 0; width: max-content; max-width: min(260px, calc(100vw - 90px)); margin: 0; padding: 10px 14px; }
 .map3d-said:empty { display: none; }
 .map3d-accuracy { position: absolute; inset: 0; width: 100%; height: 100%; overflow: visible; fill: var(--map3d-accent); fill-opacity: 0.14; stroke: var(--map3d-accent); stroke-width: 1.5; }
