@@ -6,6 +6,7 @@ export const ENTRIES = {
   element: "src/element/index.ts",
   geojson: "src/geojson/index.ts",
   measure: "src/measure/index.ts",
+  model: "src/model/index.ts",
   orbit: "src/orbit/index.ts",
   print: "src/print/index.ts",
   shade: "src/shade/index.ts",

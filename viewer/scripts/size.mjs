@@ -15,6 +15,7 @@ const BUDGET = {
   element: 4,
   geojson: 12,
   measure: 7,
+  model: 6,
   orbit: 7,
   print: 5,
   shade: 4,

@@ -16,7 +16,7 @@ export type { Relief } from "./map/relief";
 export type { Attachable, Holder, Surface } from "./core/surface";
 export type { Box3, Vec2, Vec3 } from "./core/vec";
 export type { Clip } from "./draw/combine";
-export type { Mode } from "./draw/drawer";
+export type { Guest, Mode, Setting } from "./draw/drawer";
 export type { SeenDepths, Shade } from "./draw/shade";
 export type { Light } from "./geo/light";
 export type { ManifestJson, Rendering } from "./geo/manifest";

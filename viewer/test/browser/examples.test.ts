@@ -10,7 +10,7 @@ import { VIEWER } from "./package";
 const bed = new TestBed({ town: renderTown() });
 const FOLDER = join(VIEWER, "examples");
 const FILES = readdirSync(FOLDER).filter((file) => file.endsWith(".html"));
-const ORDER = ["shortest", "markers", "attributes", "theme", "measure", "sun", "search", "company", "styles", "link"];
+const ORDER = ["shortest", "markers", "attributes", "theme", "measure", "sun", "search", "company", "styles", "link", "model"];
 const COLOURS = 24;
 
 /** How many colours a part of the page has: a map that shows something has many. */
@@ -113,9 +113,18 @@ const POINTS: Readonly<Record<string, (page: Page, picture: Buffer) => Promise<v
     expect(page.url()).toContain("#90-45/");
     expect(Math.hypot(...from.map((part, k) => part - (to[k] ?? 0)))).toBeLessThan(2);
   },
+  model: async (page, standing) => {
+    await page.mouse.click(400, 338);
+    await page.getByText("base, 502.0 m").waitFor();
+    await page.getByRole("button", { name: "Turn the crane" }).click();
+    await page.waitForTimeout(1000);
+    expect(standing.equals(await page.screenshot())).toBe(false);
+    await page.getByRole("button", { name: "Stop the crane" }).click();
+    await still(page);
+  },
 };
 
-test("there are ten, and the page that lists them names all", () => {
+test("there are eleven, and the page that lists them names all", () => {
   expect(FILES.sort()).toEqual([...ORDER.map((name) => `${name}.html`), "examples.html"].sort());
   const index = readFileSync(join(FOLDER, "examples.html"), "utf8");
   expect([...index.matchAll(/<li><a href="(\w+)\.html">/g)].map(([, name]) => name)).toEqual(ORDER);

@@ -4,7 +4,7 @@ import { cssPixelM, type Camera } from "../../geo/camera";
 import { towardsLight } from "../../geo/light";
 import type { LayerKind } from "../../geo/manifest";
 import { bakedKinds, neededKinds, type Drawer, type DrawerEvents, type FrameSpec, type Mode, type Pass, type Quad } from "../drawer";
-import { firstOf, rangeOf, type Depths } from "../combine";
+import { firstOf, guestLead, rangeOf, steepOf, type Depths } from "../combine";
 import { packColor, packFinish } from "../finish";
 import { DepthPicture } from "./depthPicture";
 import { idTable, tableShape, type IdTable } from "./idTable";
@@ -74,20 +74,18 @@ export class WebGLDrawer implements Drawer {
   draw(frame: FrameSpec): void {
     const gl = this.gl;
     if (gl.isContextLost()) return;
+    gl.disable(gl.CULL_FACE);
     this.#shares = this.#sharesFor(frame);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, frame.into?.framebuffer ?? null);
-    gl.viewport(0, 0, frame.width, frame.height);
-    gl.clearColor(0, 0, 0, 0);
-    gl.depthMask(true);
-    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    gl.enable(gl.BLEND);
-    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    gl.depthFunc(gl.LEQUAL);
     const combined = frame.passes.filter(({ depths }) => depths);
+    const range = frame.into?.range ?? this.#shares?.range ?? rangeOf(combined.flatMap(({ depths }) => depths ?? []), guestRanges(frame));
+    const lead = Math.max(0, ...combined.map(({ depths, level }) => (depths ? guestLead(depths.frame, level) : 0)));
+    if (range) for (const guest of frame.guests) guest.prepare(gl, frame, [range[0] + lead, range[1] + lead]);
+    this.#begin(frame);
     for (const pass of frame.passes) {
       if (!pass.depths) this.#drawPass(frame, pass, null, false);
-      else if (pass === combined[0]) this.#drawTogether(frame, combined);
+      else if (pass === combined[0]) this.#drawTogether(frame, combined, range);
     }
+    if (combined.length === 0) this.#drawTogether(frame, [], range);
     gl.disable(gl.SCISSOR_TEST);
     this.#dropTables(frame.passes);
   }
@@ -106,14 +104,14 @@ export class WebGLDrawer implements Drawer {
   /** Has light found for what the frame shows; null where all that is wanted was rendered. */
   #sharesFor(frame: FrameSpec): Shares | null {
     const { gl } = this;
-    const { shade, light } = frame;
+    const { shade, light, camera } = frame;
     if (!shade || !frame.passes.some((pass) => isShaded(frame, pass))) return null;
     const step = Math.max(1, frame.dpr);
     const last = this.#shares;
-    if (shade.moving && last?.camera.frame === shade.camera.frame && last.step === step && !frame.into) return last;
+    if (shade.moving && last?.camera.frame === camera.frame && last.step === step && !frame.into) return last;
     const [width, height] = [Math.ceil(frame.width / step), Math.ceil(frame.height / step)];
-    const range = frame.into?.range ?? (rangeOf(frame.passes.flatMap(({ relief }) => relief ?? [])) as Vec2);
-    const px_m = (cssPixelM(shade.camera) * step) / frame.dpr;
+    const range = frame.into?.range ?? (rangeOf(frame.passes.flatMap(({ relief }) => relief ?? []), guestRanges(frame)) as Vec2);
+    const px_m = (cssPixelM(camera) * step) / frame.dpr;
     const picture = this.#pictureOf(width, height);
     gl.bindFramebuffer(gl.FRAMEBUFFER, picture.framebuffer);
     gl.viewport(0, 0, width, height);
@@ -123,12 +121,12 @@ export class WebGLDrawer implements Drawer {
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LEQUAL);
     for (const pass of frame.passes) if (pass.relief && pass.opacity === 1) this.#drawPass({ ...frame, width, height }, depthsAlone(pass, step), range, false);
-    const { right, up, forward } = shade.camera.frame.axes;
+    const { right, up, forward } = camera.frame.axes;
     const towards = towardsLight(light);
     const sun: Vec3 | null = hasShadows(frame) ? [dot(right, towards), dot(up, towards), dot(forward, towards)] : null;
     const texture = shade.by.sharesOf({ gl, depth: picture.texture, width, height, px_m, range, sun, occlusion: light.occlusion });
     gl.disable(gl.DEPTH_TEST);
-    return { texture, range, camera: shade.camera, step, height, same: (2 * px_m) / (range[1] - range[0]) + 1 / 65535 };
+    return { texture, range, camera, step, height, same: (2 * px_m) / (range[1] - range[0]) + 1 / 65535 };
   }
 
   #pictureOf(width: number, height: number): DepthPicture {
@@ -137,15 +135,35 @@ export class WebGLDrawer implements Drawer {
     return (this.#picture = new DepthPicture(this.gl, width, height));
   }
 
-  /** Passes that hide each other by depth: all that is solid, then edges and what lets through. */
-  #drawTogether(frame: FrameSpec, passes: readonly Pass[]): void {
+  #begin({ into, width, height }: FrameSpec): void {
     const gl = this.gl;
-    const range = frame.into?.range ?? this.#shares?.range ?? rangeOf(passes.flatMap(({ depths }) => depths ?? []));
+    gl.bindFramebuffer(gl.FRAMEBUFFER, into?.framebuffer ?? null);
+    gl.viewport(0, 0, width, height);
+    gl.clearColor(0, 0, 0, 0);
+    gl.depthMask(true);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.disable(gl.DEPTH_TEST);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    gl.depthFunc(gl.LEQUAL);
+  }
+
+  /** Passes and guests that hide each other by depth: all that is solid, then edges and what lets through. */
+  #drawTogether(frame: FrameSpec, passes: readonly Pass[], range: Vec2 | null): void {
+    const gl = this.gl;
+    if (!range) return;
     gl.enable(gl.DEPTH_TEST);
     for (const pass of passes) if (pass.opacity === 1) this.#drawPass(frame, pass, range, false);
+    this.#drawGuests(frame, false);
     gl.depthMask(frame.into !== undefined);
     for (const pass of passes) this.#drawPass(frame, pass, range, true);
+    this.#drawGuests(frame, true);
     gl.disable(gl.DEPTH_TEST);
+  }
+
+  #drawGuests(frame: FrameSpec, soft: boolean): void {
+    this.gl.disable(this.gl.SCISSOR_TEST);
+    for (const guest of frame.guests) guest.paint(this.gl, frame, soft);
   }
 
   /** @param range of D, of what is drawn together  @param soft only what lets through */
@@ -162,10 +180,10 @@ export class WebGLDrawer implements Drawer {
       const finish = ids !== undefined && pass.finishes !== null;
       const program = this.#programs.use({ mode, masked: pass.masked, highlight: ids !== undefined && pass.highlight.size > 0, finish, shadow, occlusion: has("ao"), combined: range !== null, shaded: depth !== undefined });
       for (const [kind, texture] of [...textures, ...baked]) this.#bind(kind, texture);
-      if (depth && this.#shares && pass.relief) this.#setShares(program, frame, pass, this.#shares, depth);
-      if (range && pass.depths) this.#setDepths(program, pass.depths, range, soft);
+      if (depth && this.#shares && pass.relief) this.#setShares(program, frame, pass, quad, this.#shares, depth);
+      if (range && pass.depths) this.#setDepths(program, pass.depths, quad, range, soft);
       if (ids) this.#bindIds(program, pass, quad, ids, frame.dpr);
-      this.#drawQuad(frame, pass, quad, program, [...textures, ...baked, ["id", ids] as const].flatMap(([, texture]) => texture ?? []));
+      this.#drawQuad(frame, pass, quad, program, [...textures, ...baked, ["id", ids] as const, ["depth", depth] as const].flatMap(([, texture]) => texture ?? []));
     }
   }
 
@@ -221,13 +239,13 @@ export class WebGLDrawer implements Drawer {
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
   }
 
-  #setShares(program: Program, frame: FrameSpec, { baked, relief }: Pass, { texture, range, camera, step, height, same }: Shares, depth: TileTexture): void {
+  #setShares(program: Program, frame: FrameSpec, { baked, relief }: Pass, quad: Quad, { texture, range, camera, step, height, same }: Shares, depth: TileTexture): void {
     const { gl } = this;
     this.#bind("depth", depth);
     gl.activeTexture(gl.TEXTURE0 + unitOf("u_shares"));
     gl.bindTexture(gl.TEXTURE_2D, texture);
-    if (relief) this.#setDepths(program, relief, range, false);
-    const now = frame.shade?.camera ?? camera;
+    if (relief) this.#setDepths(program, relief, quad, range, false);
+    const now = frame.camera;
     const [px, times] = [cssPixelM(camera), frame.dpr / step];
     const larger = cssPixelM(now) / px;
     const [x, y] = [(now.u - camera.u) / px + camera.width / 2 - (larger * now.width) / 2, (camera.v - now.v) / px + camera.height / 2 - (larger * now.height) / 2];
@@ -236,8 +254,9 @@ export class WebGLDrawer implements Drawer {
     gl.uniform2i(program.at("u_found"), Number(frame.light.occlusion && !baked.occlusion), Number(hasShadows(frame) && !baked.shadow));
   }
 
-  #setDepths(program: Program, depths: Depths, [near, far]: Vec2, soft: boolean): void {
+  #setDepths(program: Program, depths: Depths, { from }: Quad, [near, far]: Vec2, soft: boolean): void {
     this.gl.uniform2f(program.at("u_depths"), (firstOf(depths) - near) / (far - near), depths.unit_m / (far - near));
+    this.gl.uniform1ui(program.at("u_steep"), steepOf(depths, from.z));
     this.gl.uniform1i(program.at("u_soft"), Number(soft));
   }
 
@@ -324,5 +343,10 @@ function depthsAlone(pass: Pass, step: number): Pass {
   const quads = pass.quads.map(({ from, rect: [left, top, right, bottom], origin: [x, y], scale }) => ({ from, rect: [left / step, top / step, right / step, bottom / step] as const, origin: [x / step, y / step] as const, scale: scale * step }));
   return { ...pass, mode: "depth", quads, highlight: new Map(), depths: pass.relief };
 }
+
+const guestRanges = ({ guests, camera }: FrameSpec): Vec2[] => guests.flatMap((guest) => {
+  const range = guest.rangeAlong(camera.frame);
+  return range ? [range] : [];
+});
 
 const scaled = ([x, y, z]: Vec3, by: number): Vec3 => [x * by, y * by, z * by];
