@@ -4,6 +4,7 @@ export const ENTRIES = {
   compare: "src/compare/index.ts",
   controls: "src/controls/index.ts",
   element: "src/element/index.ts",
+  files: "src/files/index.ts",
   geojson: "src/geojson/index.ts",
   measure: "src/measure/index.ts",
   orbit: "src/orbit/index.ts",

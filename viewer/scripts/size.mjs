@@ -13,6 +13,7 @@ const BUDGET = {
   compare: 4,
   controls: 6,
   element: 4,
+  files: 5,
   geojson: 12,
   measure: 5,
   orbit: 7,
