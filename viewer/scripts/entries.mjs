@@ -7,6 +7,7 @@ export const ENTRIES = {
   files: "src/files/index.ts",
   geojson: "src/geojson/index.ts",
   measure: "src/measure/index.ts",
+  offline: "src/offline/index.ts",
   orbit: "src/orbit/index.ts",
   print: "src/print/index.ts",
   theme: "src/theme/index.ts",
