@@ -30,7 +30,7 @@ export async function listAreas(): Promise<StoredArea[]> {
 
 /** null when there is none of that name. */
 export async function readArea(name: string): Promise<StoredArea | null> {
-  const record = (await storage().has(CACHE + name)) ? await (await storage().open(CACHE + name)).match(RECORD) : undefined;
+  const record = await storage().match(RECORD, { cacheName: CACHE + name });
   return record ? ((await record.json()) as StoredArea) : null;
 }
 

@@ -46,7 +46,7 @@ const SAMPLES = 6;
 
 /** How many tiles and bytes an area needs. Some tiles are fetched, for their sizes. @throws UsageError, FetchError */
 export async function estimateArea(shown: map, options: AreaOptions = {}): Promise<AreaEstimate> {
-  const area = filled(shown, options);
+  const area = await filled(shown, options);
   return estimate(await open(shown), area);
 }
 
@@ -56,7 +56,7 @@ export async function estimateArea(shown: map, options: AreaOptions = {}): Promi
  */
 export async function downloadArea(shown: map, options: DownloadOptions = {}): Promise<StoredArea> {
   const { name = "area", concurrency = 6, onProgress, signal } = options;
-  const area = filled(shown, options);
+  const area = await filled(shown, options);
   const ending = new AbortController();
   const stop = (): void => { ending.abort(signal?.reason); };
   signal?.throwIfAborted();

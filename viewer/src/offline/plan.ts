@@ -1,11 +1,12 @@
-import { clamp, sub, type Box3, type Vec2 } from "../core/vec";
+import { add, clamp, sub, type Box3, type Vec2, type Vec3 } from "../core/vec";
+import { depthAtHeight, localFromUvd, uvdFromLocal } from "../geo/axes";
 import { projectedBox } from "../geo/camera";
 import { childrenOf } from "../geo/frame";
 import { UsageError, type LayerInfo, type map, type Rendering, type Tile, type View } from "../map3d";
 
 /** What of a map is kept; all can be left out. */
 export interface AreaOptions {
-  /** World coordinates, as of `fitBounds`. Default: the ground that is in view. */
+  /** World coordinates, as of `fitBounds`. Default: what is in view, from all directions. */
   bounds?: Box3;
   /** First and last level. Default all. */
   levels?: readonly [number, number];
@@ -27,7 +28,7 @@ const WHOLE_LEVEL = 1;
 const SELDOM = ["depth2", "picture"];
 
 /** Options with their defaults. @throws UsageError for a map that shows nothing yet, or what no rendering of it has */
-export function filled(shown: map, { bounds, levels, layers, directions, objects = true }: AreaOptions): FilledArea {
+export async function filled(shown: map, { bounds, levels, layers, directions, objects = true }: AreaOptions): Promise<FilledArea> {
   const renderings = shown.layers.flatMap(({ rendering }) => rendering ?? []);
   if (renderings.length === 0) throw new UsageError("the map shows nothing yet; wait for its event \"ready\"");
   const known = { layers: unique(renderings.flatMap(({ json }) => json.layers.map(({ name }) => name))), directions: unique(renderings.flatMap(({ views }) => [...views.keys()])) };
@@ -38,22 +39,33 @@ export function filled(shown: map, { bounds, levels, layers, directions, objects
   const [least, greatest] = levels ?? [0, 26];
   if (!(least >= 0 && least <= greatest)) throw new UsageError(`levels go from 0 upwards, got ${String(least)} to ${String(greatest)}`);
   return {
-    bounds: bounds ?? boundsInView(shown, renderings), objects, directions: directions ?? known.directions,
+    bounds: bounds ?? await boundsInView(shown, renderings, directions ?? known.directions), objects, directions: directions ?? known.directions,
     levels: [least, Math.min(greatest, Math.max(...renderings.map(({ json }) => json.zmax)))],
     layers: layers ?? known.layers.filter((name) => !SELDOM.includes(name)),
   };
 }
 
-/** Upright over the ground that is in view. */
-function boundsInView(shown: map, renderings: readonly Rendering[]): Box3 {
-  const { clientWidth: width, clientHeight: height } = shown.container;
-  const seen = ([[0, 0], [width, 0], [0, height], [width, height]] as const).map((point) => shown.unproject(point)).filter((at) => at !== null);
-  const boxes = renderings.map(({ json: { origin, box } }) => box.map((corner) => corner.map((part, k) => part + (origin[k] ?? 0))));
-  const ends = (k: number, of: (...parts: number[]) => number, corner: 0 | 1): number => {
-    const whole = of(...boxes.map((box) => box[corner]?.[k] ?? 0));
-    return k === 2 || seen.length === 0 ? whole : of(...seen.map((at) => at[k] ?? 0));
-  };
-  return [[ends(0, Math.min, 0), ends(1, Math.min, 0), ends(2, Math.min, 0)], [ends(0, Math.max, 1), ends(1, Math.max, 1), ends(2, Math.max, 1)]];
+/** Upright over the ground that is in view when the map looks from each direction at what is in its middle: the surface there, or the ground while that is not known. */
+async function boundsInView(shown: map, renderings: readonly Rendering[], directions: readonly string[]): Promise<Box3> {
+  const { metresPerPixel: px_m, container: { clientWidth, clientHeight } } = shown;
+  const middle = [clientWidth / 2, clientHeight / 2] as const;
+  const centers = [shown.unproject(middle), (await shown.pick(middle)).position].filter((at) => at !== null);
+  const found = renderings.flatMap(({ json: { origin, box }, views }) => {
+    const bottom = box[0][2];
+    const ground = [...views.values()].filter(({ id }) => directions.includes(id)).flatMap(({ frame: { axes } }) => centers.flatMap((center) => {
+      const [u, v] = uvdFromLocal(axes, sub(center, origin));
+      return ([[-1, -1], [-1, 1], [1, -1], [1, 1]] as const).flatMap(([x, y]) => {
+        const at = [u + (x * clientWidth * px_m) / 2, v + (y * clientHeight * px_m) / 2] as const;
+        const depth = depthAtHeight(axes, at[1], bottom);
+        return depth === null ? [] : [localFromUvd(axes, [...at, depth])];
+      });
+    }));
+    // In level views the ground has no end.
+    const flat: readonly Vec3[] = ground.length === 0 ? box : ground;
+    return flat.flatMap(([x, y]) => box.map(([, , z]) => add(origin, [x, y, z])));
+  });
+  const ends = (of: (...parts: number[]) => number): Vec3 => [of(...found.map((at) => at[0])), of(...found.map((at) => at[1])), of(...found.map((at) => at[2]))];
+  return [ends(Math.min), ends(Math.max)];
 }
 
 /** A tile to be kept. */

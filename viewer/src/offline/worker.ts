@@ -75,7 +75,7 @@ async function networkFirst(request: Request, find: () => Promise<Response | und
 
 async function kept(key: string): Promise<Response | undefined> {
   for (const name of await areas()) {
-    const found = await (await caches.open(name)).match(key, { ignoreVary: true });
+    const found = await caches.match(key, { cacheName: name, ignoreVary: true }); // opening it would make one that was removed
     if (found) return found;
   }
   return undefined;
@@ -91,7 +91,7 @@ function areas(): Promise<string[]> {
 async function ordered(): Promise<string[]> {
   const names = (await caches.keys()).filter((name) => name.startsWith(CACHE));
   const times = await Promise.all(names.map(async (name) => {
-    const record = await (await caches.open(name)).match(RECORD);
+    const record = await caches.match(RECORD, { cacheName: name });
     return record ? ((await record.json()) as { stored: string }).stored : "";
   }));
   return names.map((name, k) => ({ name, time: times[k] ?? "" })).sort((a, b) => (a.time < b.time ? 1 : -1)).map(({ name }) => name);

@@ -1,5 +1,4 @@
 import { describe, expect, test } from "vitest";
-import type { Vec2 } from "../../src/core/vec";
 import { projectedBox } from "../../src/geo/camera";
 import { tileName, type Tile } from "../../src/geo/frame";
 import { readManifest } from "../../src/geo/manifest";
@@ -23,8 +22,8 @@ function* random(seed: number): Generator<number, never> {
 }
 
 /** A map that shows the town. */
-const shown = { layers: [{ rendering: town }], container: { clientWidth: 100, clientHeight: 50 }, unproject: ([x, y]: Vec2) => [ORIGIN[0] + x / 10, ORIGIN[1] - y / 10, ORIGIN[2] - 2] } as unknown as map;
-const planned = (options: AreaOptions): string[] => [...tilesOf(town, filled(shown, options))].map(({ view, layer, tile }) => `${view.id}/${layer.name}/${tileName(tile)}`).sort();
+const shown = { layers: [{ rendering: town }], container: { clientWidth: 100, clientHeight: 50 }, unproject: () => [ORIGIN[0], ORIGIN[1] + 20, ORIGIN[2] - 2], pick: () => Promise.resolve({ position: [ORIGIN[0], ORIGIN[1], ORIGIN[2] - 2 + 20] }), metresPerPixel: 0.1 } as unknown as map;
+const planned = async (options: AreaOptions): Promise<string[]> => [...tilesOf(town, await filled(shown, options))].map(({ view, layer, tile }) => `${view.id}/${layer.name}/${tileName(tile)}`).sort();
 
 describe("tiles of an area", () => {
   const views = [...town.views.values()];
@@ -55,29 +54,39 @@ describe("tiles of an area", () => {
     }
   });
 
-  test("are of the layers, directions and levels that were asked for; without words those of the ground in view", () => {
+  test("are of the layers, directions and levels that were asked for; without words those in view from all directions", async () => {
     const bounds = [[ORIGIN[0] + 24, ORIGIN[1] + 18, ORIGIN[2]], [ORIGIN[0] + 40, ORIGIN[1] + 34, ORIGIN[2] + 62]] as const;
-    const few = planned({ bounds, layers: ["id"], directions: ["90-45"], levels: [3, 3] });
+    const few = await planned({ bounds, layers: ["id"], directions: ["90-45"], levels: [3, 3] });
     const view = town.views.get("90-45");
     const rect = projectedBox((view as (typeof views)[0]).frame, [[24, 18, 0], [40, 34, 62]]);
     expect(few).toEqual(coverOf((view as (typeof views)[0]).frame, (tile) => view?.occupancy.has(tile) === true, 3, rect).map((tile) => `90-45/id/${tileName(tile)}`).sort());
-    expect(planned({ bounds })).toHaveLength(new Set(planned({ bounds })).size);
-    expect(new Set(planned({}).map((name) => name.split("/").slice(0, 2).join("/"))).size).toBe(16);
-    expect(planned({}).length).toBeLessThan(planned({ bounds: [[0, 0, 0], [1e7, 1e7, 1e4]] }).length);
-    expect(filled(shown, {}).bounds).toEqual([[ORIGIN[0], ORIGIN[1] - 5, ORIGIN[2] - 2], [ORIGIN[0] + 10, ORIGIN[1], ORIGIN[2] + 62]]);
-    expect(planned({ bounds: [[0, 0, 0], [10, 10, 10]] })).toEqual([]);
+    expect(await planned({ bounds })).toHaveLength(new Set(await planned({ bounds })).size);
+    expect(new Set((await planned({})).map((name) => name.split("/").slice(0, 2).join("/"))).size).toBe(16);
+    expect((await planned({})).length).toBeLessThan((await planned({ bounds: [[0, 0, 0], [1e7, 1e7, 1e4]] })).length);
+    // A point 20 m above the ground at 45 degrees: beside 10 m by 5 m / sin 45°, ground 20 m to each side.
+    // Looking there from the south at the ground, if the surface is not known: 20 m further north, which is looked at from the side, too.
+    const around = 20 + 2.5 * Math.SQRT2;
+    expect((await filled(shown, {})).bounds.flat().map((part, k) => part - (ORIGIN[k % 3] ?? 0)).map((part) => Number(part.toFixed(3)))).toEqual([-around, -around, -2, around, 25, 62].map((part) => Number(part.toFixed(3))));
+    for (const view of views) {
+      const { axes } = view.frame;
+      const [u, v] = [axes.right[2] * 18, axes.up[2] * 18];
+      const rect: Rect = [[u - 5, v - 2.5], [u + 5, v + 2.5]];
+      const kept = new Set(await planned({ directions: [view.id], layers: ["id"] }));
+      for (const { z, x, y } of coverOf(view.frame, (tile) => view.occupancy.has(tile), view.frame.zmax, rect)) expect(kept.has(`${view.id}/id/${String(z)}/${String(x)}/${String(y)}`)).toBe(true);
+    }
+    expect(await planned({ bounds: [[0, 0, 0], [10, 10, 10]] })).toEqual([]);
   });
 
   test.each<[AreaOptions, RegExp]>([
     [{ layers: ["colour"] }, /"colour" is none of the map's layers: color, normal, id, depth/],
     [{ directions: ["1-2"] }, /"1-2" is none of the map's directions: 0-45/],
     [{ levels: [4, 2] }, /levels go from 0 upwards, got 4 to 2/],
-  ])("%o is refused", (options, message) => {
-    expect(() => filled(shown, options)).toThrow(message);
+  ])("%o is refused", async (options, message) => {
+    await expect(filled(shown, options)).rejects.toThrow(message);
   });
 
-  test("a map without a manifest is refused", () => {
-    expect(() => filled({ ...shown, layers: [] } as unknown as map, {})).toThrow(/shows nothing yet/);
+  test("a map without a manifest is refused", async () => {
+    await expect(filled({ ...shown, layers: [] } as unknown as map, {})).rejects.toThrow(/shows nothing yet/);
   });
 });
 
