@@ -131,7 +131,7 @@ function progressBar(): (progress: AreaProgress) => void {
     const seconds = (performance.now() - start) / 1000;
     const left = (seconds * (total - done)) / done;
     const time = left < 90 ? unit(Math.ceil(left), "second") : unit(Math.ceil(left / 60), "minute");
-    showProgress(done / total, seconds < 1 ? "" : [`${unit(bytes / 1e6 / seconds, "megabyte-per-second", 1)}`, say("timeLeft").replace("%", time)].join(" · "));
+    showProgress(done / total, seconds < 1 ? "" : [unit(bytes / 1e6 / seconds, "megabyte-per-second", 1), say("timeLeft").replace("%", time)].join(" · "));
   };
 }
 

@@ -18,6 +18,8 @@ export interface DropOptions {
   target?: HTMLElement;
   /** Of the layer that is made. */
   layer?: ImageLayerOptions;
+  /** A layer of the map whose place the first files take. Default none: they are shown with what is there. */
+  instead?: imageLayer;
 }
 
 /** What a `dropFiles` fires. */
@@ -64,7 +66,7 @@ export class dropFiles extends Attached<map, DropEvents> {
     await source.manifest();
     const map = this.map;
     if (!map || at !== this.#asked) throw new DOMException("other files were opened meanwhile, or the map is gone", "AbortError");
-    const [before, layer] = [this.#layer, new imageLayer(source, this.options.layer)];
+    const [before, layer] = [this.#layer ?? this.options.instead, new imageLayer(source, this.options.layer)];
     before?.remove();
     if (map.layers.length === 0) map.restart();
     try {

@@ -32,6 +32,7 @@ export interface DownloadOptions extends AreaOptions {
   concurrency?: number;
   /** Stops it: the promise is rejected with the signal's reason. What has been kept stays, to go on with. */
   signal?: AbortSignal;
+  /** Called after each tile. */
   onProgress?: (progress: AreaProgress) => void;
 }
 

@@ -18,6 +18,7 @@ export interface AreaOptions {
   objects?: boolean;
 }
 
+/** What of a map is kept, in full. */
 export type FilledArea = Required<AreaOptions>;
 
 /** [[least U, least V], [greatest U, greatest V]], metres. */

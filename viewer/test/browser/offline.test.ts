@@ -146,11 +146,12 @@ test("without room, without a worker in reach, and without a host that answers, 
   await start(page, "town");
   const failed = (act: string): Promise<string> => page.evaluate(`(async () => { try { return String(JSON.stringify(await (${act}))); } catch (error) { return error.name + ": " + error.message; } })()`);
   await page.evaluate(() => {
-    const { put } = Cache.prototype;
-    Object.assign(globalThis, { full: () => { Cache.prototype.put = (key) => (String(key).includes("/depth/") ? Promise.reject(new DOMException("no room", "QuotaExceededError")) : Promise.resolve()); }, roomy: () => { Cache.prototype.put = put; } });
+    const put = Object.getOwnPropertyDescriptor(Cache.prototype, "put") as PropertyDescriptor;
+    const full = (key: string): Promise<void> => (key.includes("/depth/") ? Promise.reject(new DOMException("no room", "QuotaExceededError")) : Promise.resolve());
+    Object.assign(globalThis, { full: () => Object.defineProperty(Cache.prototype, "put", { ...put, value: full }), roomy: () => Object.defineProperty(Cache.prototype, "put", put) });
   });
   expect(await failed("(full(), map3d.downloadArea(map, { files: [] }))")).toMatch(/^StorageError: the browser could not keep http.*\/depth\/.*\(QuotaExceededError\): its room for this site is used up/);
-  await page.evaluate("roomy()");
+  await page.evaluate("void roomy()");
   expect(await failed("(navigator.storage.estimate = async () => ({ quota: 1000, usage: 990 }), map3d.downloadArea(map, { files: [] }))")).toMatch(/^StorageError: the area needs about [\d.]+ MB, the browser keeps 0\.0 MB more/);
   await page.evaluate("delete navigator.storage.estimate");
   expect(await failed('map3d.registerWorker("/nowhere/map3d-worker.js")')).toMatch(/^StorageError: \/nowhere\/map3d-worker\.js cannot be registered/);

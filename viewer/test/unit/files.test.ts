@@ -1,4 +1,4 @@
-import { beforeAll, describe, expect, test } from "vitest";
+import { beforeAll, describe, expect, test, vi } from "vitest";
 import { filesSource } from "../../src/files/filesSource";
 import { basesOf, isInside } from "../../src/files/folder";
 import { HttpSource, type Source } from "../../src/map3d";
@@ -114,7 +114,7 @@ test("manifests are found where they are, not inside of one another", () => {
 });
 
 test("a source over HTTP asks what it was given", async () => {
-  globalThis.document ??= { baseURI: "https://host.example/page/" } as Document;
+  vi.stubGlobal("document", { baseURI: "https://host.example/page/" });
   const asked: string[] = [];
   const source = new HttpSource(["/town/", "https://other.example/town"], (url) => {
     asked.push(url);

@@ -86,7 +86,7 @@ describe("tiles of an area", () => {
   });
 
   test("a map without a manifest is refused", async () => {
-    await expect(filled({ ...shown, layers: [] } as unknown as map, {})).rejects.toThrow(/shows nothing yet/);
+    await expect(filled({ layers: [] } as unknown as map, {})).rejects.toThrow(/shows nothing yet/);
   });
 });
 
