@@ -48,6 +48,7 @@ function open(): void {
       new overview().addTo(view);
     }, (reason: unknown) => { toast(String(reason)); });
     if (layer.rendering?.layers.has("depth") && !view.options.dataSaver) {
+      import("./map3d-shade.mjs").then(({ shade }) => new shade().addTo(view), (reason: unknown) => { toast(String(reason)); });
       import("./map3d-orbit.mjs").then(({ orbit }) => new orbit().addTo(view), (reason: unknown) => { toast(String(reason)); });
     }
     if (id !== undefined) void selection.chooseId(id, null, false);

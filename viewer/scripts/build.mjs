@@ -24,6 +24,15 @@ const workers = {
   },
 };
 
+/** Shaders without comments and indentation. */
+const shaders = {
+  name: "shaders",
+  setup(build) {
+    build.onLoad({ filter: /\/shaders?\.ts$/ }, ({ path }) => ({ contents: readFileSync(path, "utf8").replace(/\/\*[^]*?\*\/|\/\/.*|^[ \t]+/gm, "").replace(/\n{2,}/g, "\n"), loader: "ts" }));
+  },
+};
+const plugins = [workers, shaders];
+
 /** Entries beside the core use it by its public names: as a module from map3d.mjs, in a script from the global. */
 const coreAs = (how) => ({
   name: "core",
@@ -34,13 +43,13 @@ const coreAs = (how) => ({
 });
 
 async function bundle(entry, name, options) {
-  await esbuild.build({ ...shared, banner, entryPoints: [join(root, entry)], outfile: join(dist, name), plugins: [workers], ...options });
+  await esbuild.build({ ...shared, banner, entryPoints: [join(root, entry)], outfile: join(dist, name), plugins, ...options });
 }
 
 /** The core and all entries in one file. */
 async function bundleFull(name, options) {
   const contents = ["src/map3d.ts", ...Object.values(ENTRIES)].map((file) => `export * from "./${file}";\n`).join("");
-  await esbuild.build({ ...shared, banner, stdin: { contents, resolveDir: root }, outfile: join(dist, name), plugins: [workers], ...options });
+  await esbuild.build({ ...shared, banner, stdin: { contents, resolveDir: root }, outfile: join(dist, name), plugins, ...options });
 }
 
 async function build() {
@@ -49,8 +58,8 @@ async function build() {
   await bundle("src/map3d.ts", "map3d.mjs", { format: "esm" });
   await bundle("src/map3d.ts", "map3d.js", { format: "iife", globalName: "map3d" });
   for (const [name, entry] of Object.entries(ENTRIES)) {
-    await bundle(entry, `map3d-${name}.mjs`, { format: "esm", plugins: [coreAs("module"), workers] });
-    await bundle(entry, `map3d-${name}.js`, { format: "iife", plugins: [coreAs("global"), workers], globalName: "entry", banner: { js: `${banner.js}\n(() => {` }, footer: { js: "Object.assign(map3d, entry);\n})();" } });
+    await bundle(entry, `map3d-${name}.mjs`, { format: "esm", plugins: [coreAs("module"), ...plugins] });
+    await bundle(entry, `map3d-${name}.js`, { format: "iife", plugins: [coreAs("global"), ...plugins], globalName: "entry", banner: { js: `${banner.js}\n(() => {` }, footer: { js: "Object.assign(map3d, entry);\n})();" } });
   }
   await bundle("src/offline/worker.ts", "map3d-worker.js", { format: "iife" });
   await bundleFull("map3d-full.mjs", { format: "esm" });

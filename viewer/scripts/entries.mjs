@@ -10,5 +10,6 @@ export const ENTRIES = {
   offline: "src/offline/index.ts",
   orbit: "src/orbit/index.ts",
   print: "src/print/index.ts",
+  shade: "src/shade/index.ts",
   theme: "src/theme/index.ts",
 };

@@ -19,6 +19,7 @@ const BUDGET = {
   offline: 6,
   orbit: 7,
   print: 5,
+  shade: 4,
   theme: 4,
   full: 130,
 };

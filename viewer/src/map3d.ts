@@ -17,6 +17,7 @@ export type { Attachable, Holder, Surface } from "./core/surface";
 export type { Box3, Vec2, Vec3 } from "./core/vec";
 export type { Clip } from "./draw/combine";
 export type { Mode } from "./draw/drawer";
+export type { SeenDepths, Shade } from "./draw/shade";
 export type { Light } from "./geo/light";
 export { readManifest, type LayerInfo, type ManifestJson, type Rendering, type View } from "./geo/manifest";
 export type { Tile } from "./geo/frame";

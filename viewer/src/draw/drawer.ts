@@ -1,4 +1,5 @@
 import type { Vec2 } from "../core/vec";
+import type { Camera } from "../geo/camera";
 import type { Tile } from "../geo/frame";
 import type { LayerKind } from "../geo/manifest";
 import type { Light } from "../geo/light";
@@ -6,6 +7,7 @@ import type { Shadow } from "../geo/shadows";
 import type { TileData } from "../tiles/tileData";
 import type { Clip, Depths } from "./combine";
 import type { Finishes } from "./finish";
+import type { Shade } from "./shade";
 
 /** How a layer is shown: lit colour, colour or picture as stored, or a data layer in false colours. */
 export type Mode = "lit" | "color" | "picture" | "normal" | "id" | "depth";
@@ -53,6 +55,8 @@ export interface Pass {
   readonly opacity: number;
   /** null: it is painted over what was painted before, whatever lies nearer. */
   readonly depths: Depths | null;
+  /** Where its depths lie, alone or with others; null: it has none. */
+  readonly relief: Depths | null;
   /** The part of the map that it is seen in. */
   readonly clip: Clip | null;
   /** Depth values that get the first and the last false colour. */
@@ -73,6 +77,8 @@ export interface FrameSpec {
   readonly dpr: number;
   readonly light: Readonly<Light>;
   readonly passes: readonly Pass[];
+  /** WebGL only: finds light that was not rendered, for what this camera sees; while it moves, what was found last does. */
+  readonly shade?: { readonly by: Shade; readonly camera: Camera; readonly moving: boolean } | null;
   /** WebGL only: where to draw in place of the canvas, with the depth of all passes as a share of a range of D. */
   readonly into?: { readonly framebuffer: WebGLFramebuffer; readonly range: Vec2 };
 }

@@ -86,6 +86,7 @@ export class dropFiles extends Attached<map, DropEvents> {
     adoptStyles(document, STYLES);
     const words = wordsOf(this.options.language ?? map.language);
     this.#over.textContent = words.drop;
+    this.#input.setAttribute("aria-label", words.open);
     map.container.append(this.#over, this.#input);
     if (this.options.button ?? true) {
       const button = iconButton("", words.open, FOLDER);

@@ -208,6 +208,11 @@ export class imageLayer extends Attached<map, ImageLayerEvents> {
     return !this.#rendering && !this.#failed;
   }
 
+  /** @internal Rendered light that it shows in a light; null before its manifest is here. */
+  bakedFor(light: Readonly<Light>): Baked | null {
+    return this.#rendering ? this.#baked(this.#rendering, light) : null;
+  }
+
   /** @internal Something of it can hide what other layers show. */
   get combines(): boolean {
     return this.options.combine && this.options.opacity > 0 && this.#rendering?.layers.has("depth") === true;
@@ -251,6 +256,7 @@ export class imageLayer extends Attached<map, ImageLayerEvents> {
       masked: this.#masked(rendering),
       opacity: this.options.opacity,
       depths: before === null ? null : depthsOf(rendering, plan, origin, before),
+      relief: rendering.layers.has("depth") ? depthsOf(rendering, plan, origin, before ?? 0) : null,
       clip: this.#clip,
       depthRange: depthRangeOf(rendering, plan.view),
     };

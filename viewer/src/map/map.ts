@@ -7,6 +7,7 @@ import { languageOf } from "../core/words";
 import type { Camera } from "../geo/camera";
 import { daylightAt } from "../geo/daylight";
 import { DEFAULT_LIGHT, validLight, type Light } from "../geo/light";
+import type { Shade } from "../draw/shade";
 import type { LayerKind } from "../geo/manifest";
 import { marker } from "../overlay/marker";
 import { attributionLine } from "../ui/attribution";
@@ -44,6 +45,7 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
   #time: Date | null = null;
   #drawn: Camera | undefined;
   #relief: Relief | undefined;
+  #shade: Shade | null = null;
   /** Something besides the camera has changed since the last frame. */
   #dirty = true;
   /** The picture has not moved since the last "moveend". */
@@ -167,6 +169,12 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
       this.#time = time;
       this.#relight(daylightAt(time, json.geographic));
     });
+  }
+
+  /** @internal What finds light that was not rendered. */
+  setShade(shade: Shade | null): this {
+    this.#shade = shade;
+    return this.#redraw();
   }
 
   /** Any CSS background; the same as the custom property --map3d-background. */
@@ -305,10 +313,12 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
     if (!sight || !this.#painter || this.size.width === 0) return;
     const [before, changed] = [this.#drawn, this.#dirty];
     [this.#drawn, this.#dirty, this.#relief] = [sight.camera, false, undefined];
-    const { plans, complete } = this.#painter.paint(sight, this.#layers, this.#light, this.#kindsRead(), this.apparent && ((scene) => { this.turner?.paint({ ...scene, camera: sight.camera, changed }); }));
+    const moving = before !== undefined && before !== sight.camera;
+    const { plans, complete } = this.#painter.paint(sight, this.#layers, this.#light, this.#kindsRead(), this.#shade, moving, this.apparent && ((scene) => { this.turner?.paint({ ...scene, camera: sight.camera, changed }); }));
     this.#debug.update(plans, sight.dpr, this.#painter.drawer);
     if (before !== sight.camera || turning) this.#moved(before, sight.camera);
     this.moves.fire("draw", {});
+    if (this.#shade && moving) this.#redraw();
     if (this.moving || !this.#resting || complete) this.#loop.request();
     if (complete) this.#complete();
   }

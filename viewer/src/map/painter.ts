@@ -1,5 +1,6 @@
 import { CanvasDrawer } from "../draw/canvas/canvasDrawer";
 import type { Drawer, DrawerEvents, FrameSpec } from "../draw/drawer";
+import type { Shade } from "../draw/shade";
 import { WebGLDrawer } from "../draw/webgl/webglDrawer";
 import type { Light } from "../geo/light";
 import type { LayerKind } from "../geo/manifest";
@@ -74,8 +75,8 @@ export class Painter {
     return this.#cache.bytes;
   }
 
-  /** @param kinds layers that are read, besides those that are shown  @param turn paints a movement, where that can be done, in place of the frame */
-  paint(sight: Sight, layers: readonly imageLayer[], light: Readonly<Light>, kinds: readonly LayerKind[], turn: ((scene: Turning) => void) | null): Painted {
+  /** @param kinds layers that are read, besides those that are shown  @param shade finds light that was not rendered; roughly while the picture is moving  @param turn paints a movement, where that can be done, in place of the frame */
+  paint(sight: Sight, layers: readonly imageLayer[], light: Readonly<Light>, kinds: readonly LayerKind[], shade: Shade | null, moving: boolean, turn: ((scene: Turning) => void) | null): Painted {
     this.#cache.tick();
     this.#viewport.fitCanvas(sight.dpr);
     const combined = combinedOf(layers);
@@ -88,19 +89,19 @@ export class Painter {
     const { width, height } = this.#viewport.canvas;
     const complete = !layers.some((layer) => layer.loading) && planned.every(({ plan }) => plan.complete);
     const { gl } = this.#drawer;
-    if (turn && gl) turn({ gl, width, height, complete, rangeOf: (frame) => rangeAlong(sight, frame, layers), depict: (camera, range, framebuffer) => { this.#depict({ ...sight, camera, dpr: 1 }, layers, light, { range, framebuffer }); } });
-    else this.#drawer.draw({ width, height, dpr: sight.dpr, light, passes: planned.map(({ layer, plan }) => layer.pass(plan, sight, before(layer))) });
+    if (turn && gl) turn({ gl, width, height, complete, rangeOf: (frame) => rangeAlong(sight, frame, layers), depict: (camera, range, framebuffer) => { this.#depict({ ...sight, camera, dpr: 1 }, layers, light, shade, { range, framebuffer }); } });
+    else this.#drawer.draw({ width, height, dpr: sight.dpr, light, shade: shade && { by: shade, camera: sight.camera, moving }, passes: planned.map(({ layer, plan }) => layer.pass(plan, sight, before(layer))) });
     return { plans: planned.map(({ plan }) => plan), complete: complete && !this.#drawer.busy };
   }
 
   /** What is in memory, with the depth of all layers that have any. */
-  #depict(sight: Sight, layers: readonly imageLayer[], light: Readonly<Light>, into: NonNullable<FrameSpec["into"]>): void {
+  #depict(sight: Sight, layers: readonly imageLayer[], light: Readonly<Light>, shade: Shade | null, into: NonNullable<FrameSpec["into"]>): void {
     const { width, height } = sight.camera;
     const passes = layers.filter((layer) => layer.combines).flatMap((layer, k) => {
       const plan = layer.plan(sight, light, [], true);
       return plan ? [layer.pass(plan, sight, k)] : [];
     });
-    this.#drawer.draw({ width, height, dpr: 1, light, passes, into });
+    this.#drawer.draw({ width, height, dpr: 1, light, shade: shade && { by: shade, camera: sight.camera, moving: false }, passes, into });
   }
 
   /** Forgets the tiles of a layer that has left. */

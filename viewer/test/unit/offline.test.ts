@@ -1,4 +1,7 @@
+import { readdirSync, readFileSync } from "node:fs";
+import { join } from "node:path";
 import { describe, expect, test } from "vitest";
+import { PAGE_FILES } from "../../page/offline";
 import { projectedBox } from "../../src/geo/camera";
 import { tileName, type Tile } from "../../src/geo/frame";
 import { readManifest } from "../../src/geo/manifest";
@@ -88,6 +91,13 @@ describe("tiles of an area", () => {
   test("a map without a manifest is refused", async () => {
     await expect(filled({ layers: [] } as unknown as map, {})).rejects.toThrow(/shows nothing yet/);
   });
+});
+
+test("the page keeps whatever it imports", () => {
+  const folder = join(import.meta.dirname, "../../page");
+  const imported = readdirSync(folder).filter((file) => file.endsWith(".ts")).flatMap((file) => [...readFileSync(join(folder, file), "utf8").matchAll(/import (?!type)[^;]*?"\.\/(map3d[\w-]*\.mjs)"|import\("\.\/(map3d[\w-]*\.mjs)"\)/g)].map(([, fixed, later]) => fixed ?? later));
+  const links = [...readFileSync(join(folder, "index.html"), "utf8").matchAll(/(?:href|src)="([\w.-]+)"/g)].map(([, file]) => file);
+  expect([...PAGE_FILES].sort()).toEqual([...new Set([...imported, ...links])].sort());
 });
 
 describe("keys", () => {

@@ -7,7 +7,7 @@ export interface Program {
   at(uniform: string): WebGLUniformLocation | null;
 }
 
-const UNITS = ["u_color", "u_normal", "u_id", "u_depth", "u_table", "u_ao", "u_shadow", "u_finishes"] as const;
+const UNITS = ["u_color", "u_normal", "u_id", "u_depth", "u_table", "u_ao", "u_shadow", "u_finishes", "u_shares"] as const;
 
 /** Texture unit of a sampler. */
 export const unitOf = (sampler: (typeof UNITS)[number]): number => UNITS.indexOf(sampler);

@@ -14,10 +14,12 @@ export interface Variant {
   readonly occlusion: boolean;
   /** Takes part in a picture that several layers make by depth. */
   readonly combined: boolean;
+  /** Light comes from the shares that were found for the whole picture. */
+  readonly shaded: boolean;
 }
 
 export const variantName = (v: Variant): string =>
-  [v.mode, v.masked && "masked", v.highlight && "highlight", v.finish && "finish", v.shadow, v.occlusion && "ao", v.combined && "combined"].filter(Boolean).join("+");
+  [v.mode, v.masked && "masked", v.highlight && "highlight", v.finish && "finish", v.shadow, v.occlusion && "ao", v.combined && "combined", v.shaded && "shaded"].filter(Boolean).join("+");
 
 export const VERTEX = `#version 300 es
 uniform vec4 u_rect; // left, top, right, bottom in clip space
@@ -26,10 +28,10 @@ void main() {
   gl_Position = vec4(right ? u_rect.z : u_rect.x, bottom ? u_rect.w : u_rect.y, 0.0, 1.0);
 }`;
 
-export function fragment({ mode, masked, highlight, finish, shadow, occlusion, combined }: Variant): string {
-  const names = [`MODE_${mode === "picture" ? "COLOR" : mode.toUpperCase()}`, masked && "MASKED", highlight && "HIGHLIGHT", finish && "FINISH", shadow && `SHADOW_${shadow.toUpperCase()}`, occlusion && "OCCLUSION", combined && "COMBINED"];
+export function fragment({ mode, masked, highlight, finish, shadow, occlusion, combined, shaded }: Variant): string {
+  const names = [`MODE_${mode === "picture" ? "COLOR" : mode.toUpperCase()}`, masked && "MASKED", highlight && "HIGHLIGHT", finish && "FINISH", shadow && `SHADOW_${shadow.toUpperCase()}`, occlusion && "OCCLUSION", combined && "COMBINED", shaded && "SHADED"];
   const defines = names.filter(Boolean).map((name) => `#define ${String(name)}`);
-  return ["#version 300 es", ...defines, HEAD, FIND, COLOR, FALSE_COLOR, HIGHLIGHT, COMBINED, MAIN].join("\n");
+  return ["#version 300 es", ...defines, HEAD, FIND, DEPTH, SHADED, COLOR, FALSE_COLOR, HIGHLIGHT, COMBINED, MAIN].join("\n");
 }
 
 const HEAD = `
@@ -98,6 +100,59 @@ vec4 finished(vec4 c, uint id) {
 #endif
 `;
 
+const DEPTH = `
+#if defined(COMBINED) || defined(SHADED)
+uniform vec2 u_depths;    // share of the range at value 0, and a value more
+const uint NONE = 0xffffffffu;
+uint depthAt(ivec2 texel) { return texelFetch(u_depth, inside(texel), 0).r; }
+
+/** Of a pixel that is covered in part but has no depth: that of the nearest around it. */
+float shareOf(vec2 texel) {
+  ivec2 at = ivec2(floor(texel));
+  uint d = depthAt(at);
+  if (d == NONE) for (int k = 0; k < 9; k++) d = min(d, depthAt(at + ivec2(k % 3 - 1, k / 3 - 1)));
+  return d == NONE ? 1.0 : u_depths.x + float(d) * u_depths.y;
+}
+#endif
+`;
+
+/**
+ * Shares of light that were found for CSS pixels (see draw/shade.ts): of the four around, those at the same depth count.
+ * As with light itself, half comes from the pixel and an eighth from each neighbour: colours at edges are mixed.
+ */
+const SHADED = `
+#ifdef SHADED
+uniform sampler2D u_shares;
+uniform vec4 u_onto;      // pixels of the shares a pixel, where the left top corner lies in them, their height
+uniform float u_same;     // share of the range that counts as the same depth
+uniform bvec2 u_found;    // which of the two are used
+vec2 g_reach;
+
+vec2 nearest(vec2 at, vec2 pixels) {
+  return texelFetch(u_shares, clamp(ivec2(round(at + pixels * u_onto.x)), ivec2(0), textureSize(u_shares, 0) - 1), 0).rg;
+}
+
+vec2 reachOf(float depth) {
+  vec2 down = vec2(gl_FragCoord.x, u_height - gl_FragCoord.y) * u_onto.x + u_onto.yz;
+  vec2 at = vec2(down.x, u_onto.w - down.y) - 0.5;
+  ivec2 corner = ivec2(floor(at)), last = textureSize(u_shares, 0) - 1;
+  if (any(lessThan(at, vec2(-1.0))) || any(greaterThan(at, vec2(last + 1)))) return vec2(1.0);
+  vec2 f = at - vec2(corner), sum = vec2(0.0);
+  float weights = 0.0;
+  for (int k = 0; k < 4; k++) {
+    ivec2 step = ivec2(k & 1, k >> 1);
+    vec4 shares = texelFetch(u_shares, clamp(corner + step, ivec2(0), last), 0);
+    float apart = abs((shares.b * 65280.0 + shares.a * 255.0) / 65535.0 - depth) / u_same;
+    float weight = (step.x == 1 ? f.x : 1.0 - f.x) * (step.y == 1 ? f.y : 1.0 - f.y) / (0.01 + apart * apart) + 1e-9;
+    sum += weight * shares.rg;
+    weights += weight;
+  }
+  vec2 around = nearest(at, vec2(1.0, 0.0)) + nearest(at, vec2(-1.0, 0.0)) + nearest(at, vec2(0.0, 1.0)) + nearest(at, vec2(0.0, -1.0));
+  return mix(vec2(1.0), 0.5 * sum / weights + 0.125 * around, vec2(u_found));
+}
+#endif
+`;
+
 /**
  * Colour is averaged premultiplied, and in linear light when it is lit: shade first, filter then.
  *
@@ -150,6 +205,9 @@ vec2 lambert(ivec2 texel) {
 #endif
 #if defined(SHADOW_SUN) || defined(SHADOW_SUN16)
   light.y *= unshaded(at);
+#endif
+#ifdef SHADED
+  light *= g_reach;
 #endif
   return light;
 }
@@ -223,7 +281,11 @@ vec4 surface(vec2 texel) {
 #endif
 #ifdef MODE_DEPTH
 vec4 surface(vec2 texel) {
-  uint d = texelFetch(u_depth, inside(ivec2(floor(texel))), 0).r;
+  ivec2 at = inside(ivec2(floor(texel)));
+#if defined(FINISH) && defined(COMBINED)
+  if (finished(vec4(1.0), texelFetch(u_id, at, 0).r).a == 0.0) return vec4(0.0);
+#endif
+  uint d = texelFetch(u_depth, at, 0).r;
   float t = clamp((float(d) - u_range.x) / (u_range.y - u_range.x), 0.0, 1.0);
   vec3 near = vec3(0.99, 0.91, 0.70), middle = vec3(0.36, 0.62, 0.62), far = vec3(0.16, 0.18, 0.36);
   return vec4(t < 0.5 ? mix(near, middle, t * 2.0) : mix(middle, far, t * 2.0 - 1.0), d == 0xffffffffu ? 0.0 : 1.0);
@@ -261,19 +323,7 @@ vec4 highlighted(vec4 color, vec2 texel) {
 /** Pixels that are covered all are drawn first, with their depth; edges then, which let through what lies behind them. */
 const COMBINED = `
 #ifdef COMBINED
-uniform vec2 u_depths;    // share of the range at value 0, and a value more
 uniform bool u_soft;      // edges are drawn
-const uint NONE = 0xffffffffu;
-uint depthAt(ivec2 texel) { return texelFetch(u_depth, inside(texel), 0).r; }
-
-/** Of a pixel that is covered in part but has no depth: that of the nearest around it. */
-float shareOf(vec2 texel) {
-  ivec2 at = ivec2(floor(texel));
-  uint d = depthAt(at);
-  if (d == NONE) for (int k = 0; k < 9; k++) d = min(d, depthAt(at + ivec2(k % 3 - 1, k / 3 - 1)));
-  return d == NONE ? 1.0 : u_depths.x + float(d) * u_depths.y;
-}
-
 bool isSolid(float alpha) { return alpha > 0.998; }
 
 #if defined(MODE_LIT) || defined(MODE_COLOR)
@@ -291,6 +341,9 @@ bool surelySolid(vec2 texel) { return false; }
 const MAIN = `
 void main() {
   vec2 texel = (vec2(gl_FragCoord.x, u_height - gl_FragCoord.y) - u_origin) * u_scale;
+#ifdef SHADED
+  g_reach = reachOf(shareOf(texel));
+#endif
 #ifdef COMBINED
   bool whole = u_opacity == 1.0;
   if (whole && u_soft && surelySolid(texel)) discard;

@@ -130,7 +130,7 @@ export class Textures {
 const BEST = 3;
 
 /** A unit that no sampler uses. */
-export const SPARE_UNIT = 8;
+export const SPARE_UNIT = 9;
 
 const AROUND = [-1, 0, 1].flatMap((dy) => [-1, 0, 1].map((dx) => [dx, dy] as const)).filter(([dx, dy]) => dx !== 0 || dy !== 0);
 

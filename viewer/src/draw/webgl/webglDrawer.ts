@@ -1,10 +1,12 @@
 import { DrawError } from "../../core/errors";
-import type { Vec2, Vec3 } from "../../core/vec";
+import { dot, type Vec2, type Vec3 } from "../../core/vec";
+import { cssPixelM, type Camera } from "../../geo/camera";
 import { towardsLight } from "../../geo/light";
 import type { LayerKind } from "../../geo/manifest";
 import { bakedKinds, neededKinds, type Drawer, type DrawerEvents, type FrameSpec, type Mode, type Pass, type Quad } from "../drawer";
 import { firstOf, rangeOf, type Depths } from "../combine";
 import { packColor, packFinish } from "../finish";
+import { DepthPicture } from "./depthPicture";
 import { idTable, tableShape, type IdTable } from "./idTable";
 import { Programs, unitOf, type Program } from "./program";
 import { boundsOf, SPARE_UNIT, Textures, type TileTexture } from "./textures";
@@ -21,6 +23,21 @@ interface Ready {
   /** Baked light that is here. */
   readonly baked: readonly (readonly [LayerKind, TileTexture])[];
   readonly ids: TileTexture | undefined;
+  /** Where the pass is shaded, and depths are here. */
+  readonly depth: TileTexture | undefined;
+}
+
+/** Light that was found for a frame. */
+interface Shares {
+  readonly texture: WebGLTexture;
+  /** Of D. */
+  readonly range: Vec2;
+  /** For whom it was found, and device pixels a pixel of it. */
+  readonly camera: Camera;
+  readonly step: number;
+  readonly height: number;
+  /** Of the range: what counts as the same depth. */
+  readonly same: number;
 }
 
 export interface WebGLOptions {
@@ -38,6 +55,8 @@ export class WebGLDrawer implements Drawer {
   readonly #listeners = new AbortController();
   #programs: Programs;
   #textures: Textures;
+  #picture: DepthPicture | undefined;
+  #shares: Shares | null = null;
   #tables = new Map<ReadonlyMap<number, unknown>, { table: IdTable; texture: WebGLTexture }>();
 
   /** @throws DrawError when the browser has no WebGL2 */
@@ -55,6 +74,7 @@ export class WebGLDrawer implements Drawer {
   draw(frame: FrameSpec): void {
     const gl = this.gl;
     if (gl.isContextLost()) return;
+    this.#shares = this.#sharesFor(frame);
     gl.bindFramebuffer(gl.FRAMEBUFFER, frame.into?.framebuffer ?? null);
     gl.viewport(0, 0, frame.width, frame.height);
     gl.clearColor(0, 0, 0, 0);
@@ -80,12 +100,47 @@ export class WebGLDrawer implements Drawer {
     this.#listeners.abort();
     this.#textures.clear();
     this.#dropTables([]);
+    this.#picture?.free();
+  }
+
+  /** Has light found for what the frame shows; null where all that is wanted was rendered. */
+  #sharesFor(frame: FrameSpec): Shares | null {
+    const { gl } = this;
+    const { shade, light } = frame;
+    if (!shade || !frame.passes.some((pass) => isShaded(frame, pass))) return null;
+    const step = Math.max(1, frame.dpr);
+    const last = this.#shares;
+    if (shade.moving && last?.camera.frame === shade.camera.frame && last.step === step && !frame.into) return last;
+    const [width, height] = [Math.ceil(frame.width / step), Math.ceil(frame.height / step)];
+    const range = frame.into?.range ?? (rangeOf(frame.passes.flatMap(({ relief }) => relief ?? [])) as Vec2);
+    const px_m = (cssPixelM(shade.camera) * step) / frame.dpr;
+    const picture = this.#pictureOf(width, height);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, picture.framebuffer);
+    gl.viewport(0, 0, width, height);
+    gl.depthMask(true);
+    gl.disable(gl.SCISSOR_TEST);
+    gl.clear(gl.DEPTH_BUFFER_BIT);
+    gl.enable(gl.DEPTH_TEST);
+    gl.depthFunc(gl.LEQUAL);
+    for (const pass of frame.passes) if (pass.relief && pass.opacity === 1) this.#drawPass({ ...frame, width, height }, depthsAlone(pass, step), range, false);
+    const { right, up, forward } = shade.camera.frame.axes;
+    const towards = towardsLight(light);
+    const sun: Vec3 | null = hasShadows(frame) ? [dot(right, towards), dot(up, towards), dot(forward, towards)] : null;
+    const texture = shade.by.sharesOf({ gl, depth: picture.texture, width, height, px_m, range, sun, occlusion: light.occlusion });
+    gl.disable(gl.DEPTH_TEST);
+    return { texture, range, camera: shade.camera, step, height, same: (2 * px_m) / (range[1] - range[0]) + 1 / 65535 };
+  }
+
+  #pictureOf(width: number, height: number): DepthPicture {
+    if (this.#picture?.width === width && this.#picture.height === height) return this.#picture;
+    this.#picture?.free();
+    return (this.#picture = new DepthPicture(this.gl, width, height));
   }
 
   /** Passes that hide each other by depth: all that is solid, then edges and what lets through. */
   #drawTogether(frame: FrameSpec, passes: readonly Pass[]): void {
     const gl = this.gl;
-    const range = frame.into?.range ?? rangeOf(passes.flatMap(({ depths }) => depths ?? []));
+    const range = frame.into?.range ?? this.#shares?.range ?? rangeOf(passes.flatMap(({ depths }) => depths ?? []));
     gl.enable(gl.DEPTH_TEST);
     for (const pass of passes) if (pass.opacity === 1) this.#drawPass(frame, pass, range, false);
     gl.depthMask(frame.into !== undefined);
@@ -97,22 +152,24 @@ export class WebGLDrawer implements Drawer {
   #drawPass(frame: FrameSpec, pass: Pass, range: Vec2 | null, soft: boolean): void {
     this.#clip(frame, pass);
     const mode: Mode = pass.mode === "lit" && !frame.light.lit ? "color" : pass.mode;
+    const shaded = this.#shares !== null && mode === "lit" && isShaded(frame, pass);
     // All are uploaded before the first is drawn, so that gutters have their neighbours' pixels.
-    for (const ready of pass.quads.map((quad) => this.#readyOf(pass, mode, quad))) {
-      const { quad, textures, baked, ids } = ready;
+    for (const ready of pass.quads.map((quad) => this.#readyOf(pass, mode, quad, shaded))) {
+      const { quad, textures, baked, ids, depth } = ready;
       if (textures.some(([, texture]) => !texture)) continue;
       const has = (kind: LayerKind): boolean => baked.some(([other]) => other === kind);
       const shadow = has("sun") ? "sun" : has("sun16") ? "sun16" : null;
       const finish = ids !== undefined && pass.finishes !== null;
-      const program = this.#programs.use({ mode, masked: pass.masked, highlight: ids !== undefined && pass.highlight.size > 0, finish, shadow, occlusion: has("ao"), combined: range !== null });
+      const program = this.#programs.use({ mode, masked: pass.masked, highlight: ids !== undefined && pass.highlight.size > 0, finish, shadow, occlusion: has("ao"), combined: range !== null, shaded: depth !== undefined });
       for (const [kind, texture] of [...textures, ...baked]) this.#bind(kind, texture);
+      if (depth && this.#shares && pass.relief) this.#setShares(program, frame, pass, this.#shares, depth);
       if (range && pass.depths) this.#setDepths(program, pass.depths, range, soft);
       if (ids) this.#bindIds(program, pass, quad, ids, frame.dpr);
       this.#drawQuad(frame, pass, quad, program, [...textures, ...baked, ["id", ids] as const].flatMap(([, texture]) => texture ?? []));
     }
   }
 
-  #readyOf(pass: Pass, mode: Mode, quad: Quad): Ready {
+  #readyOf(pass: Pass, mode: Mode, quad: Quad, shaded: boolean): Ready {
     return {
       quad,
       textures: neededKinds(mode, pass.masked, pass.depths !== null).map((kind) => [kind, this.#textureOf(pass, kind, quad)] as const),
@@ -120,6 +177,7 @@ export class WebGLDrawer implements Drawer {
         const texture = this.#textureOf(pass, kind, quad);
         return texture ? [[kind, texture] as const] : [];
       }),
+      depth: shaded ? this.#textureOf(pass, "depth", quad) : undefined,
       ids: pass.highlight.size > 0 || pass.finishes ? this.#textureOf(pass, "id", quad) : undefined,
     };
   }
@@ -161,6 +219,21 @@ export class WebGLDrawer implements Drawer {
     gl.uniform1f(program.at("u_share"), pass.baked.shadow?.share ?? 0);
     gl.uniform2f(program.at("u_range"), ...pass.depthRange);
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
+  }
+
+  #setShares(program: Program, frame: FrameSpec, { baked, relief }: Pass, { texture, range, camera, step, height, same }: Shares, depth: TileTexture): void {
+    const { gl } = this;
+    this.#bind("depth", depth);
+    gl.activeTexture(gl.TEXTURE0 + unitOf("u_shares"));
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    if (relief) this.#setDepths(program, relief, range, false);
+    const now = frame.shade?.camera ?? camera;
+    const [px, times] = [cssPixelM(camera), frame.dpr / step];
+    const larger = cssPixelM(now) / px;
+    const [x, y] = [(now.u - camera.u) / px + camera.width / 2 - (larger * now.width) / 2, (camera.v - now.v) / px + camera.height / 2 - (larger * now.height) / 2];
+    gl.uniform4f(program.at("u_onto"), larger / step, x * times, y * times, height);
+    gl.uniform1f(program.at("u_same"), same);
+    gl.uniform2i(program.at("u_found"), Number(frame.light.occlusion && !baked.occlusion), Number(hasShadows(frame) && !baked.shadow));
   }
 
   #setDepths(program: Program, depths: Depths, [near, far]: Vec2, soft: boolean): void {
@@ -229,12 +302,27 @@ export class WebGLDrawer implements Drawer {
     const restored = (): void => {
       this.#programs = new Programs(this.gl);
       this.#textures = new Textures(this.gl);
+      this.#picture = undefined;
       this.#tables = new Map();
       events.restored();
     };
     this.#canvas.addEventListener("webglcontextlost", lost, { signal });
     this.#canvas.addEventListener("webglcontextrestored", restored, { signal });
   }
+}
+
+const hasShadows = ({ light }: FrameSpec): boolean => light.shadows && light.altitude_deg > 0;
+
+/** Is there light that was not rendered, and a way to find it? */
+function isShaded(frame: FrameSpec, { mode, relief, baked }: Pass): boolean {
+  const { light, shade } = frame;
+  return shade !== undefined && shade !== null && relief !== null && mode === "lit" && light.lit && ((light.occlusion && !baked.occlusion) || (hasShadows(frame) && !baked.shadow));
+}
+
+/** A pass that draws depths alone, on a screen whose pixels are `step` times as large. */
+function depthsAlone(pass: Pass, step: number): Pass {
+  const quads = pass.quads.map(({ from, rect: [left, top, right, bottom], origin: [x, y], scale }) => ({ from, rect: [left / step, top / step, right / step, bottom / step] as const, origin: [x / step, y / step] as const, scale: scale * step }));
+  return { ...pass, mode: "depth", quads, highlight: new Map(), depths: pass.relief };
 }
 
 const scaled = ([x, y, z]: Vec3, by: number): Vec3 => [x * by, y * by, z * by];

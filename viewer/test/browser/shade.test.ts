@@ -1,0 +1,144 @@
+import type { Page } from "playwright-core";
+import { expect, test } from "vitest";
+import { dot, type Vec3 } from "../../src/core/vec";
+import { axesOf, localFromUvd, uvdFromLocal } from "../../src/geo/axes";
+import { frameOf, type Frame } from "../../src/geo/frame";
+import { towardsLight } from "../../src/geo/light";
+import { withBakedLight } from "../fixture/baked";
+import { renderTown } from "../fixture/rendering";
+import { ORIGIN, trace, type Hit } from "../fixture/town";
+import { TestBed } from "./bed";
+import { OUT } from "./browser";
+import { picture, settled, type Global } from "./page";
+
+const town = renderTown();
+const bed = new TestBed({ town, baked: withBakedLight(town) });
+const [WIDTH, HEIGHT] = [600, 480];
+/** From the left, so that shadows lie beside what casts them; white light from one side alone, and from everywhere alone. */
+const SUN = { azimuth_deg: 280, altitude_deg: 38, ambient: 0.1, diffuse: 0.9, occlusion: false };
+const SKY = { ambient: 1, diffuse: 0, shadows: false };
+const OPTIONS = { center: [ORIGIN[0] - 5, ORIGIN[1], ORIGIN[2]], zoom: 3, direction: "0-45" };
+const VIEWPORT = { viewport: { width: WIDTH, height: HEIGHT } };
+
+const numbers = town.json.views.find(({ id }) => id === "0-45") as (typeof town.json.views)[0];
+const frame = frameOf(numbers, town.json.size_m, town.json.tile_px, town.json.zmax);
+
+const addShade = (options: object): unknown => {
+  const g = globalThis as Global & { shade: { remove(): void } };
+  const made = new (g.map3d as unknown as { shade: new (options: object) => { addTo(map: unknown): never; remove(): void } }).shade(options);
+  return (g.shade = made.addTo(g.map));
+};
+
+async function start(options: object, rendering = "town", context: object = VIEWPORT): ReturnType<TestBed["start"]> {
+  const opened = await bed.start(rendering, { ...OPTIONS, ...options }, {}, context);
+  await opened.page.addScriptTag({ url: "/map3d-shade.js" });
+  return opened;
+}
+
+/** U and V of a CSS pixel's middle. */
+async function gridOf(page: Page): Promise<(x: number, y: number) => [number, number]> {
+  const [corner, px] = await page.evaluate((origin) => [(globalThis as Global).map.project(origin), (globalThis as Global).map.metresPerPixel] as const, ORIGIN);
+  const [x0, y0] = corner as [number, number];
+  return (x, y) => [(x + 0.5 - x0) * px, (y0 - y - 0.5) * px];
+}
+
+/** What is seen, and the points around it: local. */
+const pointOf = ({ d }: Hit, [u, v]: readonly [number, number]): Vec3 => localFromUvd(frame.axes, [u, v, frame.d0 + d]);
+
+/** Is the sun seen from there, past all boxes? */
+function seesSun(point: Vec3): boolean {
+  const axes = axesOf((540 - SUN.azimuth_deg) % 360, SUN.altitude_deg);
+  const sunny: Frame = { ...frame, axes, d0: -2000 };
+  const [u, v, d] = uvdFromLocal(axes, point);
+  const first = trace(sunny, u, v);
+  return first === null || first.d + sunny.d0 > d - 0.05;
+}
+
+test("shadows that are found lie where rays to the sun are stopped, for what the picture shows", async () => {
+  expect(dot(axesOf((540 - SUN.azimuth_deg) % 360, SUN.altitude_deg).forward, towardsLight(SUN))).toBeCloseTo(-1, 9);
+  const { page, problems } = await start({ light: SUN });
+  const bright = await picture(page);
+  await settled(page, addShade, {});
+  await page.screenshot({ path: `${OUT}/shade-sun.png` });
+  const [dim, uvOf] = [await picture(page), await gridOf(page)];
+  const counts = { lit: 0, falsely: 0, shadow: 0, missed: 0 };
+  for (let y = 6; y < HEIGHT - 6; y += 2) {
+    for (let x = 6; x < WIDTH - 6; x += 2) {
+      const seen = [[0, 0], [-3, 0], [3, 0], [0, -3], [0, 3]].map(([dx = 0, dy = 0]) => {
+        const uv = uvOf(x + dx, y + dy);
+        const hit = trace(frame, ...uv);
+        return hit && { name: `${String(hit.id)} ${String(hit.normal)}`, normal: hit.normal, open: seesSun(pointOf(hit, uv)) };
+      });
+      const [here] = seen;
+      // Beside an edge, or one of a shadow, a pixel may be either.
+      if (!here || dot(here.normal, towardsLight(SUN)) < 0.1 || seen.some((other) => other?.name !== here.name || other.open !== here.open)) continue;
+      const dimmed = (dim[4 * (WIDTH * y + x)] ?? 0) < 0.75 * (bright[4 * (WIDTH * y + x)] ?? 0);
+      counts[here.open ? (dimmed ? "falsely" : "lit") : dimmed ? "shadow" : "missed"]++;
+    }
+  }
+  console.log("shadows from depth:", JSON.stringify(counts));
+  expect(counts.shadow).toBeGreaterThan(500);
+  expect(counts.shadow / (counts.shadow + counts.missed)).toBeGreaterThan(0.85);
+  expect(counts.lit / (counts.lit + counts.falsely)).toBeGreaterThan(0.97);
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
+
+test("occlusion darkens the ground at the foot of a wall, fading away from it, and leaves roofs and open ground as they are", async () => {
+  const { page } = await start({ light: SKY });
+  const bright = await picture(page);
+  await settled(page, addShade, {});
+  await page.screenshot({ path: `${OUT}/shade-sky.png` });
+  const dim = await picture(page);
+  const shareAt = async (local: Vec3): Promise<number> => {
+    const [x, y] = (await page.evaluate((world) => (globalThis as Global).map.project(world as [number, number, number]), local.map((value, k) => value + (ORIGIN[k] ?? 0)))) as [number, number];
+    const at = 4 * (WIDTH * Math.round(y) + Math.round(x));
+    return (dim[at] ?? 0) / (bright[at] ?? 1);
+  };
+  // The town hall's wall towards the viewer stands on y = −22.
+  const [foot, near, open, roof] = await Promise.all([[-45, -23.5, 0], [-45, -32, 0], [-45, -60, 0], [-45, -4, 34]].map((point) => shareAt(point as unknown as Vec3)));
+  expect(foot).toBeLessThan(0.88);
+  expect(near).toBeGreaterThan((foot ?? 1) + 0.03);
+  expect(open).toBeGreaterThan(0.98);
+  expect(roof).toBeGreaterThan(0.98);
+  await page.context().close();
+});
+
+test("after a movement the picture is that of a map opened there; it comes to rest; taken off, nothing is left", async () => {
+  const { page } = await start({ light: SUN });
+  const bare = await picture(page);
+  await settled(page, addShade, {});
+  const before = await picture(page);
+  await page.mouse.move(300, 240);
+  await page.mouse.down();
+  await page.mouse.move(330, 260, { steps: 4 });
+  await page.mouse.move(300, 240, { steps: 4 });
+  await page.waitForTimeout(200);
+  await page.mouse.up();
+  await page.waitForTimeout(300);
+  expect(Buffer.compare(await picture(page), before)).toBe(0);
+  const frames = await page.evaluate(() => new Promise<number>((done) => {
+    let drawn = 0;
+    (globalThis as Global).map.moves.on("draw", () => { drawn++; });
+    setTimeout(() => { done(drawn); }, 1000);
+  }));
+  expect(frames).toBe(0);
+  await settled(page, () => (globalThis as Global & { shade: { remove(): void } }).shade.remove(), null);
+  expect(Buffer.compare(await picture(page), bare)).toBe(0);
+  await page.context().close();
+});
+
+test.each([
+  ["rendered light suits", "baked", { light: { azimuth_deg: 200, altitude_deg: 50 } }],
+  ["the canvas drawer draws", "town", { drawer: "canvas" }],
+  ["nothing is lit", "town", { light: { lit: false } }],
+] as const)("where %s nothing is found, and no depth fetched", async (_, rendering, options) => {
+  const { page, problems } = await start(options, rendering);
+  const before = await picture(page);
+  bed.server.requests.length = 0;
+  await settled(page, addShade, {});
+  expect(bed.server.requests.filter((url) => url.includes("/depth/"))).toEqual([]);
+  expect(Buffer.compare(await picture(page), before)).toBe(0);
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
