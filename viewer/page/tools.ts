@@ -4,7 +4,8 @@ import { byId } from "./dom";
 import { toast } from "./messages";
 import { say } from "./words";
 
-type Kind = "line" | "area";
+const HINTS = { line: "lineHint", area: "areaHint", profile: "profileHint" } as const;
+type Kind = keyof typeof HINTS;
 
 /** Buttons that measure on the map: one at a time; pressed again, it is put away. */
 export class Tools {
@@ -15,7 +16,7 @@ export class Tools {
 
   constructor(view: map) {
     this.#view = view;
-    this.#buttons = new Map((["line", "area"] as const).map((kind) => [kind, byId(`measure-${kind}`)]));
+    this.#buttons = new Map((Object.keys(HINTS) as Kind[]).map((kind) => [kind, byId(`measure-${kind}`)]));
     for (const [kind, button] of this.#buttons) {
       button.addEventListener("click", () => void this.#choose(this.#kind === kind ? null : kind));
       button.hidden = false;
@@ -33,8 +34,8 @@ export class Tools {
     this.#tool = undefined;
     for (const [own, button] of this.#buttons) button.setAttribute("aria-pressed", String(own === kind));
     byId("hint").hidden = kind === null;
-    byId("hint").textContent = kind === "line" ? say("lineHint") : say("areaHint");
     if (kind === null) return;
+    byId("hint").textContent = say(HINTS[kind]);
     try {
       const made = await import("./map3d-measure.mjs");
       if (this.#kind === kind) this.#tool = new made.measure({ kind }).addTo(this.#view);

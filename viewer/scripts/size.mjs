@@ -15,7 +15,7 @@ const BUDGET = {
   element: 4,
   files: 5,
   geojson: 12,
-  measure: 5,
+  measure: 7,
   offline: 6,
   orbit: 7,
   print: 5,

@@ -27,6 +27,7 @@ import { Relief } from "./relief";
 import type { Sight, Stage } from "./stage";
 import { Viewing } from "./viewing";
 import { Viewport, type Size } from "./viewport";
+import type { Rect } from "../tiles/cover";
 
 /** A map in a canvas of the page. World coordinates are those of the scene's CRS, in metres. */
 export class map extends Viewing implements Surface, Holder<map>, Steered {
@@ -237,6 +238,11 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
     if (this.#relief?.camera !== sight?.camera) this.#relief = undefined;
     this.#relief ??= sight ? new Relief(this.#layers, sight) : undefined;
     return this.#relief ?? null;
+  }
+
+  /** @internal Depths of a rectangle (U and V), from the deepest level that takes at most so many tiles. */
+  reliefOf(sight: Sight, rect: Rect, most: number): ReturnType<typeof Relief.fetched> {
+    return Relief.fetched(this.#layers, sight, rect, most);
   }
 
   /** Bytes of decoded tiles in memory. */

@@ -45,6 +45,21 @@ export class Relief {
     this.heights = heights.length > 0 ? [Math.min(...heights), Math.max(...heights)] : [0, 0];
   }
 
+  /**
+   * Of a rectangle (U and V of the sight's frame) at the deepest level whose tiles in it are no more than so many; they are fetched. What cannot be
+   * had is read from what is in memory: `approximate` then, and where the level is not the deepest.
+   */
+  static async fetched(layers: readonly imageLayer[], sight: Sight, [low, high]: Rect, most: number): Promise<{ relief: Relief; approximate: boolean }> {
+    const { frame } = sight.camera;
+    const across = (z: number): number => (((high[0] - low[0]) * 2 ** z) / frame.size + 1) * (((high[1] - low[1]) * 2 ** z) / frame.size + 1);
+    let zoom = frame.zmax;
+    while (zoom > 0 && across(zoom) > most) zoom--;
+    const relief = new Relief(layers, { ...sight, camera: { ...sight.camera, zoom }, dpr: 1, finer: 0 });
+    const got = await Promise.allSettled(relief.#sheets.flatMap((sheet) => sheet.fetch([low, high])));
+    relief.#sheets.forEach((sheet) => { sheet.forget(); });
+    return { relief, approximate: zoom < frame.zmax || got.some(({ status }) => status === "rejected") };
+  }
+
   /** Of the nearest surface; Infinity where nothing is, NaN where that is not known (yet). */
   depthAt(u: number, v: number): number {
     let nearest = Infinity;
@@ -114,6 +129,7 @@ const DOWN = 2;
 class Sheet {
   readonly #layer: imageLayer;
   readonly #view: View;
+  readonly #need: (kind: "depth" | "id", tile: Tile) => Promise<unknown>;
   readonly #read: (kind: "depth" | "id", tile: Tile) => Uint32Array | "empty" | undefined;
   readonly #level: number;
   /** Tiles along a side of the level. */
@@ -136,6 +152,10 @@ class Sheet {
     this.#side = 2 ** this.#level;
     this.#unit_m = layers.get("depth")?.unit_m ?? DEPTH_UNIT_M;
     this.#shift = uvdFromLocal(view.frame.axes, sub(origin, json.origin));
+    this.#need = async (kind, tile) => {
+      const info = layers.get(kind);
+      return info && store.need(view, info, tile);
+    };
     this.#read = (kind, tile) => {
       const info = layers.get(kind);
       const stored = info && store.get(view, info, tile);
@@ -158,12 +178,27 @@ class Sheet {
     return this.#valueOf(this.#patch, right, down);
   }
 
-  sources([low, high]: Rect): unknown[] {
+  /** Tiles that a rectangle is read from. */
+  fetch([low, high]: Rect): Promise<unknown>[] {
+    const kinds = this.#layer.finishes ? (["depth", "id"] as const) : (["depth"] as const);
+    return this.#tilesIn([low, high]).flatMap((tile) => kinds.map((kind) => this.#need(kind, tile)));
+  }
+
+  /** Reads anew what it has looked up. */
+  forget(): void {
+    this.#patches.clear();
+    this.#last = -1;
+  }
+
+  #tilesIn([low, high]: Rect): Tile[] {
     const { frame, occupancy } = this.#view;
     const [du, dv] = this.#shift;
-    const tiles = coverOf(frame, (tile) => occupancy.has(tile), this.#level, [[low[0] + du, low[1] + dv], [high[0] + du, high[1] + dv]]);
+    return coverOf(frame, (tile) => occupancy.has(tile), this.#level, [[low[0] + du, low[1] + dv], [high[0] + du, high[1] + dv]]);
+  }
+
+  sources(rect: Rect): unknown[] {
     const of = (patch: Patch): unknown[] => (typeof patch === "string" ? [patch] : "children" in patch ? patch.children.flatMap(of) : [patch.depths]);
-    return [this.#layer.finishes, ...tiles.flatMap((tile) => of(this.#patchOf(tile)))];
+    return [this.#layer.finishes, ...this.#tilesIn(rect).flatMap((tile) => of(this.#patchOf(tile)))];
   }
 
   #valueOf(patch: Patch, right: number, down: number): number {

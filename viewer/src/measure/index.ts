@@ -1,3 +1,4 @@
-/** map3d-measure: lengths, heights and areas on the surface. */
+/** map3d-measure: lengths, heights, areas and profiles on the surface. */
 export { measure, type Corner, type MeasureEvents, type MeasureOptions } from "./measure";
+export { measureProfile, type Profile, type ProfileOptions } from "./profile";
 export { measureArea, measureLine, type AreaMeasure, type LineMeasure } from "./geometry";

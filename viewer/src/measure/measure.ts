@@ -2,13 +2,15 @@ import { adoptStyles } from "../core/dom";
 import type { Vec3 } from "../core/vec";
 import { Attached, type ClickEvent, type map } from "../map3d";
 import { measureArea, measureLine, type AreaMeasure, type LineMeasure } from "./geometry";
+import { Chart } from "./chart";
+import { along, measureProfile, type Profile } from "./profile";
 import { Sketch, type Note } from "./sketch";
 import { STYLES } from "./styles";
 import { Words } from "./words";
 
 export interface MeasureOptions {
-  /** A line over the surface, or a polygon on it. Default "line". */
-  kind?: "line" | "area";
+  /** A line over the surface, a polygon on it, or the heights along a line. Default "line". */
+  kind?: "line" | "area" | "profile";
   /** BCP 47, of the numbers. Default the map's. */
   language?: string;
 }
@@ -24,6 +26,8 @@ export interface Corner {
 export interface MeasureEvents {
   /** A corner came or went. */
   change: { corners: readonly Corner[]; line: LineMeasure; area: AreaMeasure };
+  /** The heights along the corners are known. */
+  profile: { profile: Profile };
 }
 
 /**
@@ -34,7 +38,11 @@ export class measure extends Attached<map, MeasureEvents> {
   readonly options: Required<Omit<MeasureOptions, "language">> & Pick<MeasureOptions, "language">;
   #words = new Words(undefined);
   readonly #sketch = new Sketch();
+  readonly #chart = new Chart((at) => { this.#walk(at); });
   #corners: readonly Corner[] = [];
+  #profile: Profile | null = null;
+  #direction = "";
+  #reading = new AbortController();
 
   constructor({ kind = "line", ...options }: MeasureOptions = {}) {
     super();
@@ -48,18 +56,24 @@ export class measure extends Attached<map, MeasureEvents> {
 
   /** Of the corners as a line. */
   get line(): LineMeasure {
-    return measureLine(this.#corners.map(({ position }) => position));
+    return measureLine(this.#points());
   }
 
   /** Of the corners as a polygon; zeros for less than three. */
   get area(): AreaMeasure {
-    return measureArea(this.#corners.map(({ position }) => position));
+    return measureArea(this.#points());
+  }
+
+  /** Heights along the corners; null while they are not known, and for another kind. */
+  get profile(): Profile | null {
+    return this.#profile;
   }
 
   /** Replaces all corners. */
   setCorners(corners: readonly Corner[]): this {
     this.#corners = corners;
     this.#draw();
+    void this.#read();
     return this.fire("change", { corners, line: this.line, area: this.area });
   }
 
@@ -81,13 +95,18 @@ export class measure extends Attached<map, MeasureEvents> {
     map.on("click", this.#clicked);
     map.container.addEventListener("keydown", this.#pressed);
     this.#draw();
+    map.on("moveend", this.#turned);
+    void this.#read();
   }
 
   protected leave(map: map): void {
     map.moves.off("move", this.#place);
     map.off("click", this.#clicked);
     map.container.removeEventListener("keydown", this.#pressed);
+    map.off("moveend", this.#turned);
+    this.#reading.abort();
     this.#sketch.box.remove();
+    this.#chart.box.remove();
   }
 
   readonly #clicked = ({ position, approximate }: ClickEvent): void => {
@@ -99,12 +118,56 @@ export class measure extends Attached<map, MeasureEvents> {
     else if (key === "Escape") this.clear();
   };
 
+  /** What is seen along the line is another in another direction. */
+  readonly #turned = (): void => {
+    const seen = this.map?.direction ?? "";
+    if (seen !== this.#direction) void this.#read();
+  };
+
+  /** Reads the heights along the corners. */
+  async #read(): Promise<void> {
+    this.#reading.abort();
+    this.#profile = null;
+    const { map } = this;
+    if (!map || this.options.kind !== "profile" || this.#corners.length < 2) {
+      this.#chart.box.remove();
+      return;
+    }
+    const { signal } = (this.#reading = new AbortController());
+    this.#direction = map.direction;
+    const profile = await measureProfile(map, this.#points(), { signal }).catch((reason: unknown) => {
+      if (!signal.aborted) throw reason;
+      return null;
+    });
+    if (signal.aborted || !profile) return;
+    this.#profile = profile;
+    const places = along(this.#points(), profile.heights_m.length);
+    this.#sketch.follow(places.map(({ place: [x, y] }, k) => (Number.isNaN(profile.heights_m[k]) ? null : [x, y, profile.heights_m[k] as number])));
+    this.#place();
+    this.#chart.set(profile, this.#words, profile.approximate ? "≈ " : "");
+    map.overlayPane.append(this.#chart.box);
+    this.fire("profile", { profile });
+  }
+
+  /** Marks the place on the map that the reader of the profile is at. */
+  #walk(at: number | null): void {
+    const { heights_m } = this.#profile ?? {};
+    const height = at === null ? NaN : (heights_m?.[at] ?? NaN);
+    const { place } = (at !== null && heights_m && along(this.#points(), heights_m.length)[at]) || {};
+    this.#sketch.mark(place && !Number.isNaN(height) ? [place[0], place[1], height] : null);
+    this.#place();
+  }
+
+  #points(): Vec3[] {
+    return this.#corners.map(({ position }) => position);
+  }
+
   readonly #place = (): void => {
     this.#sketch.place((world) => this.map?.project(world) ?? null);
   };
 
   #draw(): void {
-    const points = this.#corners.map(({ position }) => position);
+    const points = this.#points();
     this.#sketch.set(points, this.options.kind === "area", this.options.kind === "area" ? this.#areaNotes(points) : this.#lineNotes(points));
     this.#place();
   }

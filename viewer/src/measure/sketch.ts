@@ -19,20 +19,38 @@ export class Sketch {
   readonly #line = this.#path("map3d-measure-line");
   readonly #notes = element("div", "");
   #points: readonly Vec3[] = [];
+  #course: readonly (Vec3 | null)[] | null = null;
   #closed = false;
+  readonly #marked = document.createElementNS(NS, "circle");
+  #mark: Vec3 | null = null;
   #shown: { note: Note; label: HTMLElement }[] = [];
 
   constructor() {
     this.#svg.setAttribute("aria-hidden", "true");
+    this.#marked.setAttribute("r", "7");
+    this.#marked.setAttribute("class", "map3d-measure-mark");
     this.box.append(this.#svg, this.#notes);
   }
 
   /** @param closed fills the polygon */
   set(points: readonly Vec3[], closed: boolean, notes: readonly Note[]): void {
     this.#points = points;
+    this.#course = null;
     this.#closed = closed;
     this.#shown = notes.map((note) => ({ note, label: element("span", note.main ? "map3d-measure-main" : "", {}, note.text) }));
     this.#notes.replaceChildren(...this.#shown.map(({ label }) => label));
+  }
+
+  /** Draws the line over these places, with gaps at null, in place of straight from corner to corner. */
+  follow(course: readonly (Vec3 | null)[]): void {
+    this.#course = course;
+  }
+
+  /** Marks a place besides the corners; null: none. */
+  mark(place: Vec3 | null): void {
+    this.#mark = place;
+    if (place) this.#svg.append(this.#marked);
+    else this.#marked.remove();
   }
 
   /** Puts everything where the world is now. */
@@ -41,10 +59,13 @@ export class Sketch {
       const at = project(point);
       return at ? [at] : [];
     });
-    const shape = corners.map(([x, y], k) => `${k === 0 ? "M" : "L"}${x.toFixed(1)} ${y.toFixed(1)}`).join("") + (this.#closed && corners.length > 2 ? "Z" : "");
+    const shape = this.#course ? lineOver(this.#course.map((place) => place && project(place))) : lineOver(corners) + (this.#closed && corners.length > 2 ? "Z" : "");
     for (const path of [this.#halo, this.#line]) path.setAttribute("d", shape);
     this.#line.classList.toggle("map3d-measure-filled", this.#closed);
     this.#placeCorners(corners);
+    const [x = -99, y = -99] = (this.#mark && project(this.#mark)) ?? [];
+    this.#marked.setAttribute("cx", x.toFixed(1));
+    this.#marked.setAttribute("cy", y.toFixed(1));
     for (const { note, label } of this.#shown) {
       const at = project(note.at);
       label.hidden = !at;
@@ -53,7 +74,7 @@ export class Sketch {
   }
 
   #placeCorners(corners: readonly Vec2[]): void {
-    const dots = [...this.#svg.querySelectorAll("circle")];
+    const dots = [...this.#svg.querySelectorAll<SVGCircleElement>("circle:not(.map3d-measure-mark)")];
     while (dots.length > corners.length) dots.pop()?.remove();
     while (dots.length < corners.length) {
       const dot = document.createElementNS(NS, "circle");
@@ -73,4 +94,9 @@ export class Sketch {
     this.#svg.append(path);
     return path;
   }
+}
+
+/** An SVG path over points, broken at null. */
+function lineOver(points: readonly (Vec2 | null)[]): string {
+  return points.map((point, k) => (point ? `${points[k - 1] ? "L" : "M"}${point[0].toFixed(1)} ${point[1].toFixed(1)}` : "")).join("");
 }

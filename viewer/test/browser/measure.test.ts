@@ -16,7 +16,7 @@ type Measuring = Global & { map3d: typeof Measure; tool: Measure.measure };
 const APART_MS = 600;
 const PIXEL_M = 0.38;
 
-async function measuring(kind: "line" | "area"): Promise<{ page: Page; problems: string[] }> {
+async function measuring(kind: "line" | "area" | "profile"): Promise<{ page: Page; problems: string[] }> {
   const opened = await bed.start("town");
   await opened.page.addScriptTag({ url: "/map3d-measure.js" });
   await opened.page.evaluate((chosen) => {
@@ -90,5 +90,49 @@ test("corners are taken back by Backspace, all by Escape; taken off, the tool le
   expect(await page.evaluate(() => (globalThis as unknown as Measuring).tool.corners.length), "nothing is there").toBe(0);
   await page.evaluate(() => { (globalThis as unknown as Measuring).tool.remove(); });
   expect(await page.locator(".map3d-measure").count()).toBe(0);
+  await page.context().close();
+});
+
+test("a profile has the heights of the model, gaps where it is hidden, and is walked along by pointer and keys", async () => {
+  const { page, problems } = await measuring("profile");
+  // Over the town hall (34 m) from the left, on its roof and down its far side.
+  await clickAll(page, [[-80, -10, 0], [-45, -10, 34], [0, -10, 0]]);
+  await page.waitForFunction(() => (globalThis as unknown as Measuring).tool.profile !== null);
+  const profile = await page.evaluate(() => {
+    const { distances_m, heights_m, approximate } = (globalThis as unknown as Measuring).tool.profile as Measure.Profile;
+    return { distances: [...distances_m], heights: [...heights_m], approximate };
+  });
+  expect(profile.approximate).toBe(false);
+  const inside = profile.distances.map((distance, k) => ({ x: -80 + distance, height: (profile.heights[k] ?? NaN) - ORIGIN[2] })).filter(({ x }) => Math.abs(x + 62) > 1.5 && Math.abs(x + 28) > 1.5);
+  for (const { x, height } of inside) expect(Math.abs(height - (x > -62 && x < -28 ? 34 : 0))).toBeLessThan(2 * PIXEL_M);
+  expect(inside.length).toBeGreaterThan(300);
+  await page.screenshot({ path: `${OUT}/measure-profile.png` });
+  const chart = page.locator(".map3d-profile");
+  expect(await chart.getAttribute("aria-valuetext")).toMatch(/^80\.\d\d m {2}\d{3}\.\d\d – 5\d\d\.\d\d m/);
+  await chart.focus();
+  await page.keyboard.press("End");
+  expect(await chart.getAttribute("aria-valuetext")).toMatch(/^(79|80)\.\d\d m {2}↕ \d{3}\.\d\d m$/);
+  const marked = (): Promise<number | null> => page.evaluate(() => {
+    const mark = document.querySelector(".map3d-measure-mark");
+    return mark && Number(mark.getAttribute("cx"));
+  });
+  const end = (await page.evaluate((world) => (globalThis as Global).map.project(world), [ORIGIN[0], ORIGIN[1] - 10, ORIGIN[2]] as const)) as [number, number];
+  expect(Math.abs((await marked() ?? 0) - end[0])).toBeLessThan(2);
+  const box = (await chart.boundingBox()) as { x: number; y: number; width: number; height: number };
+  await page.mouse.move(box.x + box.width / 2, box.y + 40);
+  expect(await chart.getAttribute("aria-valuetext")).toMatch(/↕ 53[34]\.\d\d m$/);
+  await page.screenshot({ path: `${OUT}/measure-profile-at.png` });
+  await page.keyboard.press("Escape");
+  await page.locator(".map3d-container, #mapcanvas").first().focus().catch(() => undefined);
+  await page.evaluate(() => (globalThis as unknown as Measuring).tool.clear());
+  expect(await chart.count()).toBe(0);
+  // Behind the town hall, as seen from the south.
+  await page.evaluate((corners) => (globalThis as unknown as Measuring).tool.setCorners(corners.map((position) => ({ position, approximate: false }))), [[-45, 16, 0], [-45, 60, 0]].map(([x = 0, y = 0, z = 0]) => [ORIGIN[0] + x, ORIGIN[1] + y, ORIGIN[2] + z] as Vec3));
+  await page.waitForFunction(() => (globalThis as unknown as Measuring).tool.profile !== null);
+  const hidden = await page.evaluate(() => [...((globalThis as unknown as Measuring).tool.profile as Measure.Profile).heights_m].map((height) => Number.isNaN(height)));
+  expect(hidden.slice(0, 200).every(Boolean)).toBe(true);
+  expect(hidden.slice(-40).some(Boolean)).toBe(false);
+  await page.screenshot({ path: `${OUT}/measure-profile-hidden.png` });
+  expect(problems).toEqual([]);
   await page.context().close();
 });

@@ -1,0 +1,138 @@
+import { element } from "../core/dom";
+import { clamp } from "../core/vec";
+import { roundBelow } from "../core/lengths";
+import type { Profile } from "./profile";
+import type { Words } from "./words";
+
+const NS = "http://www.w3.org/2000/svg";
+/** Of the drawing, in its own units; it is stretched to the box. */
+const [WIDTH, HEIGHT] = [400, 100];
+const LINES = 3;
+
+/** A profile as a drawing, on which a pointer or the arrow keys walk along the line. */
+export class Chart {
+  readonly box = element("div", "map3d-profile", { role: "slider", tabindex: "0" });
+  readonly #svg = document.createElementNS(NS, "svg");
+  readonly #heights = element("div", "map3d-profile-heights");
+  readonly #said = element("div", "map3d-profile-said");
+  readonly #hand = element("div", "map3d-profile-hand");
+  readonly #walk: (at: number | null) => void;
+  #profile: Profile | undefined;
+  #words: Words | undefined;
+  #range: readonly [number, number] = [0, 1];
+  #at: number | null = null;
+
+  /** @param walk told the number of the place that the reader is at; null: nowhere */
+  constructor(walk: (at: number | null) => void) {
+    this.#walk = walk;
+    this.#svg.setAttribute("viewBox", `0 0 ${String(WIDTH)} ${String(HEIGHT)}`);
+    this.#svg.setAttribute("preserveAspectRatio", "none");
+    this.#svg.setAttribute("aria-hidden", "true");
+    const field = element("div", "map3d-profile-field", {}, this.#svg, this.#heights, this.#hand);
+    this.box.append(field, this.#said);
+    this.box.addEventListener("pointermove", ({ clientX }) => { this.#goTo(clientX); });
+    this.box.addEventListener("pointerdown", ({ clientX }) => { this.#goTo(clientX); });
+    this.box.addEventListener("pointerleave", () => { this.#show(null); });
+    this.box.addEventListener("blur", () => { this.#show(null); });
+    this.box.addEventListener("keydown", (event) => { this.#key(event); });
+    for (const type of ["pointerdown", "wheel", "click", "dblclick"]) this.box.addEventListener(type, (event) => { event.stopPropagation(); });
+  }
+
+  /** The number of the place that the reader is at. */
+  get at(): number | null {
+    return this.#at;
+  }
+
+  /** @param about said before numbers that are not exact */
+  set(profile: Profile, words: Words, about: string): void {
+    [this.#profile, this.#words, this.#at] = [profile, words, null];
+    const known = [...profile.heights_m].filter((height) => !Number.isNaN(height));
+    const [low, high] = known.length > 0 ? [Math.min(...known), Math.max(...known)] : [0, 1];
+    const room = Math.max(0.08 * (high - low), 0.5);
+    this.#range = [low - room, high + room];
+    this.#svg.replaceChildren(...this.#grid(words), path("map3d-profile-fill", this.#shape(true)), path("map3d-profile-line", this.#shape(false)));
+    const length = profile.distances_m.at(-1) ?? 0;
+    const text = known.length > 0 ? `${about}${words.length(length)}  ${words.range(low, high)}${known.length < profile.heights_m.length ? `  ${words.partHidden}` : ""}` : words.allHidden;
+    for (const [name, value] of Object.entries({ "aria-label": words.profile, "aria-valuemin": "0", "aria-valuemax": length.toFixed(2), "aria-valuenow": "0", "aria-valuetext": text })) this.box.setAttribute(name, value);
+    this.box.dataset["rest"] = text;
+    this.#show(null);
+  }
+
+  #grid(words: Words): SVGElement[] {
+    const [low, high] = this.#range;
+    const step = roundBelow((high - low) / LINES) * ((high - low) / LINES / roundBelow((high - low) / LINES) >= 2 ? 2 : 1);
+    const heights = Array.from({ length: Math.max(0, Math.floor(high / step) - Math.ceil(low / step) + 1) }, (_, k) => (Math.ceil(low / step) + k) * step);
+    this.#heights.replaceChildren(...heights.map((height) => {
+      const label = element("span", "", {}, words.height(height));
+      label.style.top = `${this.#y(height).toFixed(1)}%`;
+      return label;
+    }));
+    return heights.map((height) => path("map3d-profile-grid", `M0 ${this.#y(height).toFixed(2)}H${String(WIDTH)}`));
+  }
+
+  /** One piece for each stretch that is seen. */
+  #shape(filled: boolean): string {
+    const { heights_m = new Float64Array() } = this.#profile ?? {};
+    let [shape, start] = ["", -1];
+    for (let k = 0; k <= heights_m.length; k++) {
+      const height = heights_m[k] ?? NaN;
+      if (!Number.isNaN(height)) {
+        const at = `${this.#x(k).toFixed(2)} ${this.#y(height).toFixed(2)}`;
+        shape += start < 0 ? (filled ? `M${this.#x(k).toFixed(2)} ${String(HEIGHT)}L${at}` : `M${at}`) : `L${at}`;
+        if (start < 0) start = k;
+      } else if (start >= 0) {
+        if (filled) shape += `L${this.#x(k - 1).toFixed(2)} ${String(HEIGHT)}Z`;
+        start = -1;
+      }
+    }
+    return shape;
+  }
+
+  #x(k: number): number {
+    return (WIDTH * k) / Math.max((this.#profile?.heights_m.length ?? 1) - 1, 1);
+  }
+
+  #y(height: number): number {
+    const [low, high] = this.#range;
+    return (HEIGHT * (high - height)) / (high - low);
+  }
+
+  #goTo(clientX: number): void {
+    const { left, width } = this.#svg.getBoundingClientRect();
+    const last = (this.#profile?.heights_m.length ?? 0) - 1;
+    if (last > 0 && width > 0) this.#show(clamp(Math.round((last * (clientX - left)) / width), 0, last));
+  }
+
+  #key(event: KeyboardEvent): void {
+    const last = (this.#profile?.heights_m.length ?? 0) - 1;
+    const step = Math.max(1, Math.round(last / 100));
+    const to: Record<string, number> = { ArrowLeft: (this.#at ?? step) - step, ArrowRight: (this.#at ?? -step) + step, Home: 0, End: last };
+    const at = to[event.key];
+    if (at === undefined) return;
+    event.preventDefault();
+    event.stopPropagation();
+    this.#show(clamp(at, 0, last));
+  }
+
+  #show(at: number | null): void {
+    const [profile, words] = [this.#profile, this.#words];
+    if (!profile || !words) return;
+    this.#at = at;
+    this.#hand.hidden = at === null;
+    const text = at === null ? (this.box.dataset["rest"] ?? "") : words.placeOf(profile.distances_m[at] ?? 0, profile.heights_m[at] ?? NaN);
+    this.#said.textContent = text;
+    if (at !== null) {
+      this.#hand.style.left = `${((100 * this.#x(at)) / WIDTH).toFixed(2)}%`;
+      this.box.setAttribute("aria-valuenow", (profile.distances_m[at] ?? 0).toFixed(2));
+      this.box.setAttribute("aria-valuetext", text);
+    }
+    this.#walk(at);
+  }
+}
+
+function path(classes: string, d: string): SVGPathElement {
+  const made = document.createElementNS(NS, "path");
+  made.setAttribute("class", classes);
+  made.setAttribute("d", d);
+  return made;
+}
