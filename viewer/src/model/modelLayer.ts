@@ -48,7 +48,7 @@ export interface ModelLayerEvents<T extends Three = Three> {
   error: { error: Error };
 }
 
-type Source<T extends Three> = string | InstanceType<T["Object3D"]> | { readonly scene: InstanceType<T["Object3D"]>; readonly animations?: readonly ThreeClip[] };
+export type ModelSource<T extends Three> = string | InstanceType<T["Object3D"]> | { readonly scene: InstanceType<T["Object3D"]>; readonly animations?: readonly ThreeClip[] };
 
 /** three.js's lights count in today's units from here on. */
 const OLDEST = 155;
@@ -61,7 +61,7 @@ export class modelLayer<T extends Three = Three> extends Attached<map, ModelLaye
   readonly needs = ["depth"] as const;
   readonly options: Readonly<ModelLayerOptions>;
   readonly #three: Three;
-  readonly #source: Source<T>;
+  readonly #source: ModelSource<T>;
   readonly #pivot: ThreeNode;
   #position: Vec3;
   #heading_deg: number;
@@ -76,7 +76,7 @@ export class modelLayer<T extends Three = Three> extends Attached<map, ModelLaye
   readonly #member: Member;
 
   /** @param three the page's three.js, r155 or newer  @param source where a model is to be fetched, an Object3D, or what GLTFLoader made  @throws UsageError */
-  constructor(three: T, source: Source<T>, options: ModelLayerOptions) {
+  constructor(three: T, source: ModelSource<T>, options: ModelLayerOptions) {
     super();
     if (!(parseInt(three.REVISION) >= OLDEST)) throw new UsageError(`a modelLayer needs three.js r${OLDEST} or newer, got ${three.REVISION ? `r${three.REVISION}` : typeof three}`);
     if (typeof source === "string" && !options.loader) throw new UsageError(`a modelLayer that fetches "${source}" needs a loader, e.g. { loader: GLTFLoader }`);

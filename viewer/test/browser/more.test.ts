@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
-import { tileId } from "../../src/tiles/pmtiles";
-import { archive, renderRamp, renderTown, type Fixture } from "../fixture/rendering";
+import { published } from "../fixture/folder";
+import { renderRamp, renderTown, type Fixture } from "../fixture/rendering";
 import { encodePng } from "../fixture/encodePng";
 import { ORIGIN } from "../fixture/town";
 import { serve, TestBed } from "./bed";
@@ -11,24 +11,6 @@ const town = renderTown(64, 0.76);
 
 const bed = new TestBed({ town, ramp: renderRamp(), published: published(town) });
 const other = serve({ town });
-
-/** The town as a folder with archives instead of tiles. */
-function published({ json, files, raw }: Fixture): Fixture {
-  const out = new Map([...files].filter(([path]) => path.startsWith("objects/")));
-  const views = json.views.map((view) => {
-    const archives = Object.fromEntries(json.layers.map(({ name }) => [name, `${view.id}/${name}.pmtiles`]));
-    for (const [name, path] of Object.entries(archives)) out.set(path, archive(tilesOf(files, `${view.id}/${name}/`)));
-    return { ...view, archives };
-  });
-  return { json: { ...json, views }, files: out, raw };
-}
-
-function tilesOf(files: Map<string, Uint8Array>, folder: string): [number, Uint8Array][] {
-  return [...files].filter(([path]) => path.startsWith(folder)).map(([path, bytes]) => {
-    const [z = 0, x = 0, y = 0] = path.slice(folder.length).split("/").map(Number);
-    return [tileId({ z, x, y }), bytes];
-  });
-}
 
 test.each([[4, 2.4], [3.37, 3.4], [2.5, 6.2]])("at zoom %d no seam is seen between tiles", async (zoom, most) => {
   const { page } = await bed.start("ramp", { zoom, light: { lit: false } });
