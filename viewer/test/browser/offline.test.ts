@@ -173,7 +173,13 @@ test.each(rows)("the page keeps itself and what is in view: %s", async (name, op
     await page.waitForFunction(() => location.hash.length > 5);
     await page.waitForTimeout(1500);
     const { width = 0, height = 0 } = options.viewport ?? {};
-    return page.screenshot({ clip: { x: width / 2 - 180, y: height / 2 - 160, width: 360, height: 300 } }); // the picture, without what lies over it
+    const shoot = (): Promise<Buffer> => page.screenshot({ clip: { x: width / 2 - 180, y: height / 2 - 160, width: 360, height: 300 } }); // the picture, without what lies over it
+    for (let last = await shoot(), left = 20; ; left--) {
+      await page.waitForTimeout(700);
+      const next = await shoot();
+      if (next.equals(last) || left === 0) return next;
+      last = next;
+    }
   };
   const before = await open();
   expect(await page.evaluate(async () => [await caches.keys(), (await navigator.serviceWorker.getRegistrations()).length])).toEqual([[], 0]);

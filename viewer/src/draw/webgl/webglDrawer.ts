@@ -6,6 +6,7 @@ import type { LayerKind } from "../../geo/manifest";
 import { bakedKinds, neededKinds, type Drawer, type DrawerEvents, type FrameSpec, type Mode, type Pass, type Quad } from "../drawer";
 import { firstOf, guestLead, rangeOf, steepOf, type Depths } from "../combine";
 import { packColor, packFinish } from "../finish";
+import { DeepCanvas } from "./deepCanvas";
 import { DepthPicture } from "./depthPicture";
 import { idTable, tableShape, type IdTable } from "./idTable";
 import { Programs, unitOf, type Program } from "./program";
@@ -56,12 +57,13 @@ export class WebGLDrawer implements Drawer {
   #programs: Programs;
   #textures: Textures;
   #picture: DepthPicture | undefined;
+  #deep: DeepCanvas | undefined;
   #shares: Shares | null = null;
   #tables = new Map<ReadonlyMap<number, unknown>, { table: IdTable; texture: WebGLTexture }>();
 
   /** @throws DrawError when the browser has no WebGL2 */
   constructor(canvas: HTMLCanvasElement, options: WebGLOptions, events: DrawerEvents) {
-    const settings: WebGLContextAttributes = { alpha: true, premultipliedAlpha: true, antialias: false, depth: true, stencil: false, preserveDrawingBuffer: options.preserve };
+    const settings: WebGLContextAttributes = { alpha: true, premultipliedAlpha: true, antialias: false, depth: false, stencil: false, preserveDrawingBuffer: options.preserve };
     const gl = canvas.getContext("webgl2", settings);
     if (!gl) throw new DrawError("this browser offers no WebGL2, which the map needs to draw; update it or switch hardware acceleration on");
     this.gl = gl;
@@ -80,13 +82,15 @@ export class WebGLDrawer implements Drawer {
     const range = frame.into?.range ?? this.#shares?.range ?? rangeOf(combined.flatMap(({ depths }) => depths ?? []), guestRanges(frame));
     const lead = Math.max(0, ...combined.map(({ depths, level }) => (depths ? guestLead(depths.frame, level) : 0)));
     if (range) for (const guest of frame.guests) guest.prepare(gl, frame, [range[0] + lead, range[1] + lead]);
-    this.#begin(frame);
+    const deep = this.#deepFor(frame, combined.length + frame.guests.length > 0);
+    this.#begin(frame, frame.into?.framebuffer ?? deep?.framebuffer ?? null);
     for (const pass of frame.passes) {
       if (!pass.depths) this.#drawPass(frame, pass, null, false);
       else if (pass === combined[0]) this.#drawTogether(frame, combined, range);
     }
     if (combined.length === 0) this.#drawTogether(frame, [], range);
     gl.disable(gl.SCISSOR_TEST);
+    if (!frame.into) deep?.show();
     this.#dropTables(frame.passes);
   }
 
@@ -99,6 +103,7 @@ export class WebGLDrawer implements Drawer {
     this.#textures.clear();
     this.#dropTables([]);
     this.#picture?.free();
+    this.#deep?.free();
   }
 
   /** Has light found for what the frame shows; null where all that is wanted was rendered. */
@@ -135,9 +140,16 @@ export class WebGLDrawer implements Drawer {
     return (this.#picture = new DepthPicture(this.gl, width, height));
   }
 
-  #begin({ into, width, height }: FrameSpec): void {
+  /** What the frame is drawn in when it needs depth; kept from frame to frame as long as they do. */
+  #deepFor({ into, width, height }: FrameSpec, needed: boolean): DeepCanvas | undefined {
+    if (into || (needed && this.#deep?.width === width && this.#deep.height === height)) return this.#deep;
+    this.#deep?.free();
+    return (this.#deep = needed ? new DeepCanvas(this.gl, width, height) : undefined);
+  }
+
+  #begin({ width, height }: FrameSpec, framebuffer: WebGLFramebuffer | null): void {
     const gl = this.gl;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, into?.framebuffer ?? null);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     gl.viewport(0, 0, width, height);
     gl.clearColor(0, 0, 0, 0);
     gl.depthMask(true);
@@ -321,7 +333,7 @@ export class WebGLDrawer implements Drawer {
     const restored = (): void => {
       this.#programs = new Programs(this.gl);
       this.#textures = new Textures(this.gl);
-      this.#picture = undefined;
+      this.#picture = this.#deep = undefined;
       this.#tables = new Map();
       events.restored();
     };
