@@ -23,6 +23,8 @@ export interface LayerPlan {
   readonly cover: readonly Tile[];
   readonly quads: readonly Quad[];
   readonly jobs: readonly Job[];
+  /** Where its tiles are. */
+  readonly store: Store;
   /** All of the view is here (or known not to come). */
   readonly complete: boolean;
 }
@@ -66,7 +68,7 @@ export function planLayer(sight: Sight, rendering: Rendering, view: View, store:
     ...jobsFor(layers, store, view, needed, ordered),
     ...jobsFor(layers, store, view, extra, ordered),
   ];
-  return { view, baked, layers, level, cover, quads, jobs, complete: jobs.length === 0 };
+  return { view, baked, layers, store, level, cover, quads, jobs, complete: jobs.length === 0 };
 }
 
 /** Least and greatest depth value that the rendering's box can have in a view. */

@@ -111,11 +111,12 @@ test("hovering names what lies under the pointer", async () => {
   await page.context().close();
 });
 
-test("the debug overlay names the tiles", async () => {
+test("the debug overlay names the tiles, and tells their layers' bytes and ages", async () => {
   const { page } = await bed.start("town", { zoom: 4 });
   await settled(page, () => (globalThis as Global).map.debug(true), null);
   await page.screenshot({ path: `${OUT}/debug.png` });
-  expect(await page.locator(".map3d-debug > div").first().textContent()).toMatch(/^3\/\d\/\d × 2\.00$/);
+  expect(await page.locator(".map3d-debug > div").first().textContent()).toMatch(/^3\/\d\/\d × 2\.00\nnormal [1-9]*\d\.\d kB, \d s\ncolor [1-9]*\d\.\d kB, \d s$/);
+  expect(await page.locator(".map3d-debug > div").allTextContents()).not.toEqual(expect.arrayContaining([expect.stringMatching(/ 0\.0 kB/)]));
   await page.context().close();
 });
 
