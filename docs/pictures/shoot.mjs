@@ -1,6 +1,6 @@
 // Opens a served rendering at the places of views.json and takes a picture of each. Arguments: playwright-core's folder, address of the page, views.json, folder for the pictures.
 import { readFile } from "node:fs/promises";
-import { launch } from "../../tests/whole/chromium.mjs";
+import { anyWebGL, launch } from "../../tests/whole/chromium.mjs";
 
 const [library, page, list, folder] = process.argv.slice(2);
 const { origin } = await (await fetch(`${page}rendering.json`.replace("/view/", "/tiles/"))).json();
@@ -21,6 +21,7 @@ async function quiet(tab, act) {
 for (const { name, view, at, zoom, size, dpr, click, bare } of JSON.parse(await readFile(list, "utf8"))) {
   const [width, height] = size;
   const context = await browser.newContext({ viewport: { width, height }, deviceScaleFactor: dpr ?? 1, isMobile: dpr !== undefined, hasTouch: dpr !== undefined, colorScheme: "light", bypassCSP: true });
+  await context.addInitScript(anyWebGL);
   const tab = await context.newPage();
   tab.on("pageerror", (error) => { throw error; });
   await quiet(tab, async () => {

@@ -12,13 +12,27 @@ export async function launch(library, hosts = {}) {
   return chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args });
 }
 
+/** In a page: without a GPU, too, maps draw with WebGL, as they do for most readers. */
+export function anyWebGL() {
+  const own = HTMLCanvasElement.prototype.getContext;
+  HTMLCanvasElement.prototype.getContext = function (kind, options) {
+    return own.call(this, kind, options && { ...options, failIfMajorPerformanceCaveat: false });
+  };
+  const tell = WebGL2RenderingContext.prototype.getParameter;
+  WebGL2RenderingContext.prototype.getParameter = function (name) {
+    return name === 0x9246 ? "a GPU" : tell.call(this, name); // UNMASKED_RENDERER_WEBGL
+  };
+}
+
 /** `act(page, asked)`; `asked.hosts`: names → addresses with ports; `asked.size`: of the window. */
 export async function look(act) {
   const asked = JSON.parse(given);
   const browser = await launch(folder, asked.hosts);
   try {
     const [width, height] = asked.size ?? [1000, 700];
-    const page = await (await browser.newContext({ viewport: { width, height }, reducedMotion: "reduce" })).newPage();
+    const context = await browser.newContext({ viewport: { width, height }, reducedMotion: "reduce" });
+    await context.addInitScript(anyWebGL);
+    const page = await context.newPage();
     page.setDefaultTimeout(60_000);
     const problems = [];
     page.on("pageerror", (error) => problems.push(error.message));

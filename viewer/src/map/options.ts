@@ -38,7 +38,7 @@ export interface MapOptions {
   finer?: number;
   /** Of controls and numbers, BCP 47; English, German and French are known. Default: that of the page around the map (its `lang`), else the browser's. */
   language?: string;
-  /** "webgl" needs WebGL2; "canvas" does without; "auto" takes WebGL2 where it can be had, else the canvas. Default "auto". */
+  /** "webgl" needs WebGL2; "canvas" does without; "auto" takes WebGL2 where a GPU draws it, else the canvas, which is much quicker than WebGL without one. Default "auto". */
   drawer?: "auto" | "webgl" | "canvas";
   /** Keeps the picture readable between frames (screenshots, tests). Default false. */
   preserveDrawingBuffer?: boolean;

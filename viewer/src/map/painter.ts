@@ -155,10 +155,12 @@ export class Painter {
     };
     if (kind === "canvas") return new CanvasDrawer(canvas, events);
     try {
-      return new WebGLDrawer(canvas, { preserve: this.#options.preserveDrawingBuffer }, events);
+      return new WebGLDrawer(canvas, { preserve: this.#options.preserveDrawingBuffer, quick: kind === "auto" }, events);
     } catch (reason) {
       if (kind === "webgl") throw reason;
-      return new CanvasDrawer(canvas, events);
+      // A canvas that has tried WebGL gives nothing else.
+      if (canvas.getContext("2d") === null) this.#viewport.replaceCanvas();
+      return new CanvasDrawer(this.#viewport.canvas, events);
     }
   }
 

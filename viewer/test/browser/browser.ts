@@ -11,9 +11,22 @@ export async function openBrowser(env: Record<string, string> = {}): Promise<Bro
   return chromium.launch({ executablePath: process.env["CHROMIUM"] ?? "/usr/bin/chromium", headless: true, args, env: { ...process.env, ...env } });
 }
 
+/** These browsers have no GPU: maps that would take WebGL only where there is one shall take it here, too, as most readers' do. */
+function anyWebGL(): void {
+  const own = Object.getOwnPropertyDescriptor(HTMLCanvasElement.prototype, "getContext")?.value as (kind: string, options?: object) => unknown;
+  HTMLCanvasElement.prototype.getContext = function (this: HTMLCanvasElement, kind: string, options?: object) {
+    return own.call(this, kind, options && { ...options, failIfMajorPerformanceCaveat: false });
+  } as typeof HTMLCanvasElement.prototype.getContext;
+  const tell = Object.getOwnPropertyDescriptor(WebGL2RenderingContext.prototype, "getParameter")?.value as (name: number) => unknown;
+  WebGL2RenderingContext.prototype.getParameter = function (this: WebGL2RenderingContext, name: number): unknown {
+    return name === 0x9246 ? "a GPU" : tell.call(this, name); // UNMASKED_RENDERER_WEBGL
+  };
+}
+
 /** A page whose errors and console errors fail the test that looks at them. */
 export async function openPage(browser: Browser, options: BrowserContextOptions = {}): Promise<{ page: Page; problems: string[] }> {
   const context = await browser.newContext({ viewport: { width: 800, height: 600 }, ...options });
+  await context.addInitScript(anyWebGL);
   const page = await context.newPage();
   const problems: string[] = [];
   page.on("pageerror", (error) => problems.push(String(error)));

@@ -160,9 +160,28 @@ describe("the drawer is chosen", () => {
     };
   };
 
-  test.each([["auto", "canvas", /^$/], ["webgl", null, /no WebGL2/]])("%s without WebGL2", async (drawer, name, message) => {
+  /** As browsers do whose WebGL is drawn by the processor. */
+  const slowly = (): void => {
+    const original = Object.getOwnPropertyDescriptor(HTMLCanvasElement.prototype, "getContext")?.value as (this: HTMLCanvasElement, kind: string, options?: object) => null;
+    HTMLCanvasElement.prototype.getContext = function (this: HTMLCanvasElement, kind: string, options?: WebGLContextAttributes): null {
+      return options?.failIfMajorPerformanceCaveat === true ? null : original.call(this, kind, options);
+    };
+  };
+
+  const named = (): void => {
+    WebGL2RenderingContext.prototype.getParameter = () => "ANGLE (Google, Vulkan 1.3.0 (SwiftShader Device (LLVM 10.0.0)), SwiftShader driver)";
+  };
+
+  test.each([
+    ["auto", "without WebGL2", withoutWebGL, "canvas", /^$/],
+    ["webgl", "without WebGL2", withoutWebGL, null, /no WebGL2/],
+    ["auto", "where WebGL2 is slow", slowly, "canvas", /^$/],
+    ["webgl", "where WebGL2 is slow", slowly, "webgl", /^$/],
+    ["auto", "where the processor draws WebGL2, by its name", named, "canvas", /^$/],
+    ["auto", "where WebGL2 is quick", (): void => undefined, "webgl", /^$/],
+  ])("%s %s", async (drawer, _, script, name, message) => {
     const { page } = await bed.openPage();
-    await page.addInitScript(withoutWebGL);
+    await page.addInitScript(script);
     await page.goto(`${bed.server.origin}/bare`);
     const got = await page.evaluate(([base, drawer]) => new Promise<{ name: string | null; message: string }>((done) => {
       const g = globalThis as Global;

@@ -262,6 +262,13 @@ vec4 surface(vec2 texel) {
   vec2 corner = floor(texel - 0.5), f = texel - 0.5 - corner;
   ivec2 at = ivec2(corner);
   f = mix(f, round(f), lessThan(abs(f - round(f)), vec2(0.004)));
+#if !defined(MODE_LIT) && !defined(MASKED) && !defined(FINISH)
+  // Where all four are whole, the texture unit mixes as well as we do, in a quarter of the time.
+  if (all(greaterThanEqual(at, u_bounds.xy)) && all(lessThan(at, u_bounds.zw)) && f != vec2(0.0) && f != vec2(1.0)) {
+    vec4 mixed = texture(u_color, (texel + float(GUTTER)) / vec2(textureSize(u_color, 0)));
+    if (mixed.a == 1.0) return mixed;
+  }
+#endif
   vec4 c = f == vec2(0.0) || f == vec2(1.0) ? exact(at + ivec2(f)) : between(at, f);
   if (c.a == 0.0) return vec4(0.0);
 #ifdef MODE_LIT

@@ -30,6 +30,8 @@ interface Ready {
 export interface WebGLOptions {
   /** Keep the picture readable after a frame: for tests and screenshots; costs memory. */
   preserve: boolean;
+  /** Not where the processor would do the work of the GPU, which a canvas without WebGL does with a ninth of it. */
+  quick: boolean;
 }
 
 /** Draws with WebGL2: one quad a tile, light and highlights in the shader. */
@@ -46,11 +48,15 @@ export class WebGLDrawer implements Drawer {
   #found: FoundLight;
   #deep: DeepCanvas | undefined;
 
-  /** @throws DrawError when the browser has no WebGL2 */
+  /** @throws DrawError when the browser has no WebGL2, or none that is quick */
   constructor(canvas: HTMLCanvasElement, options: WebGLOptions, events: DrawerEvents) {
-    const settings: WebGLContextAttributes = { alpha: true, premultipliedAlpha: true, antialias: false, depth: false, stencil: false, preserveDrawingBuffer: options.preserve };
+    const settings: WebGLContextAttributes = { alpha: true, premultipliedAlpha: true, antialias: false, depth: false, stencil: false, preserveDrawingBuffer: options.preserve, failIfMajorPerformanceCaveat: options.quick };
     const gl = canvas.getContext("webgl2", settings);
     if (!gl) throw new DrawError("this browser offers no WebGL2, which the map needs to draw; update it or switch hardware acceleration on");
+    if (options.quick && isSoftware(gl)) {
+      gl.getExtension("WEBGL_lose_context")?.loseContext();
+      throw new DrawError("this browser draws WebGL2 without a GPU");
+    }
     this.gl = gl;
     this.#canvas = canvas;
     this.#programs = new Programs(gl);
@@ -252,6 +258,14 @@ export class WebGLDrawer implements Drawer {
     this.#canvas.addEventListener("webglcontextlost", lost, { signal });
     this.#canvas.addEventListener("webglcontextrestored", restored, { signal });
   }
+}
+
+/** Does the processor do the work of the GPU? Browsers tell by the flag above when that is their own choice, and by name otherwise. */
+function isSoftware(gl: WebGL2RenderingContext): boolean {
+  const open = String(gl.getParameter(gl.RENDERER));
+  // Some keep the name for those who ask twice.
+  const told = open === "WebKit WebGL" ? gl.getExtension("WEBGL_debug_renderer_info") : null;
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(told ? String(gl.getParameter(told.UNMASKED_RENDERER_WEBGL)) : open);
 }
 
 const scaled = ([x, y, z]: Vec3, by: number): Vec3 => [x * by, y * by, z * by];
