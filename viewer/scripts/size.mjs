@@ -14,7 +14,7 @@ const BUDGET = {
   controls: 6,
   element: 4,
   geojson: 12,
-  measure: 7,
+  measure: 9,
   orbit: 7,
   print: 5,
   shade: 4,
