@@ -33,6 +33,7 @@ export interface Plane {
 /** Pixels of a face. */
 export interface Region {
   readonly plane: Plane;
+  /** Parts of pixels count where the border is a crease. */
   readonly pixels: number;
   /** Share of the border where something nearer stands before the plane. */
   readonly hidden: number;
@@ -42,6 +43,8 @@ export interface Region {
 
 /** Off a plane, at right angles to it: metres, and pixels. */
 const [NEAR_M, NEAR_PX] = [0.05, 0.75];
+/** The same in the end, besides what the pixels scatter by. */
+const LEAST_M = 0.01;
 const FIRST_RADIUS_PX = 3;
 /** Pixels that a plane is fitted to, of all that there are. */
 const FITTED = 20_000;
@@ -89,7 +92,7 @@ export class Growing {
     for (let [radius, rounds] = [FIRST_RADIUS_PX, 2]; rounds > 0; radius *= 2) {
       if (radius === Infinity) rounds--;
       const loose = this.#loose(plane);
-      const more = this.#grow(plane, radius === Infinity ? Math.min(loose, (loose * NEAR_M) / (NEAR_M + NEAR_PX * this.#picture.pixel_m) + 3 * plane.rms_m) : loose, radius);
+      const more = this.#grow(plane, radius === Infinity ? Math.min(loose, LEAST_M * this.#stretch(plane) + 3 * plane.rms_m) : loose, radius);
       if (this.#touches & this.#window.open) return this.#touches;
       plane = this.#fitted(true) ?? this.#fitted() ?? plane;
       if (!more) radius = Infinity;
@@ -97,7 +100,7 @@ export class Growing {
     const { d, x, y } = plane;
     const [left, top] = this.#window.sides;
     const loops = loopsOf(this.#mask, this.#width).map((loop) => loop.map(([i, j]) => [i + left - PAD, j + top - PAD, this.#d + d + x * (i - 0.5 - this.#x) + y * (j - 0.5 - this.#y)] as const));
-    return { plane, pixels: this.#count, hidden: this.#hidden(plane), loops };
+    return { plane, ...this.#measured(plane), loops };
   }
 
   /** Of the 3 × 3 pixels around the middle or beside it that lie best in a plane, so that it may stand at an edge. */
@@ -161,24 +164,33 @@ export class Growing {
     return { x: a, y: b, d: md - a * mx - b * my, rms_m: Math.sqrt(sum((x, y, d) => (d - md - a * (x - mx) - b * (y - my)) ** 2) / n) };
   }
 
-  /** Share of the border where something stands before the plane that does not begin at it: a step, told from a crease by the second pixel. */
-  #hidden(plane: Plane): number {
-    let [all, before] = [0, 0];
+  /**
+   * What goes on beyond the border from the plane itself is a crease: it stands where both meet, told by two pixels beyond. Else there is a step; the
+   * border counts as hidden where what is beyond stands before the plane.
+   */
+  #measured(plane: Plane): Pick<Region, "pixels" | "hidden"> {
+    let [all, before, pixels] = [0, 0, this.#count];
     for (const at of this.#found.subarray(0, this.#count)) {
       for (const step of this.#steps) {
         if (this.#mask[at + step]) continue;
         const [first, second] = [-this.#off(plane, at + step), -this.#off(plane, at + 2 * step)];
+        const crease = 1 - first / (second - first);
+        if (crease >= 0 && crease <= 1) pixels += crease - 0.5;
         all++;
         if (Math.min(first, 2 * first - second) > this.#loose(plane)) before++;
       }
     }
-    return before / all;
+    return { pixels, hidden: before / all };
   }
 
   /** Metres along the line of sight that may lie between a pixel and the plane. */
-  #loose({ x, y }: Plane): number {
-    const px = this.#picture.pixel_m;
-    return (NEAR_M + NEAR_PX * px) * Math.hypot(1, x / px, y / px);
+  #loose(plane: Plane): number {
+    return (NEAR_M + NEAR_PX * this.#picture.pixel_m) * this.#stretch(plane);
+  }
+
+  /** Square metres of the plane a square metre of the picture. */
+  #stretch({ x, y }: Plane): number {
+    return Math.hypot(1, x / this.#picture.pixel_m, y / this.#picture.pixel_m);
   }
 
   /** How far a pixel lies behind the plane. */

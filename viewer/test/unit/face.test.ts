@@ -141,6 +141,12 @@ describe("faces that are harder", () => {
     expect(face?.hidden).toBe(false);
   });
 
+  test("a wall between a roof and the ground is exact to parts of a pixel", async () => {
+    // 54 × 16 m: 14.9 rows of pixels.
+    const face = await measureFace(mapOf(frameAt(0, 45, 256, 0.76)), add(ORIGIN, [31, -46, 8]));
+    expect(Math.abs((face?.area_m2 ?? 0) / (54 * 16) - 1)).toBeLessThan(0.01);
+  });
+
   test("what takes more than its share of tiles is read from a level above, and says so", async () => {
     // A field of 200 × 160 m, 5 m beneath the origin.
     const asked: number[] = [];
