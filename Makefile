@@ -71,7 +71,7 @@ test-python: build
 test-viewer: $(CACHE)/npm
 	cd viewer && npm test --silent
 
-test-browser: build ## whole-way tests in Chromium
+test-browser: build ## whole-way tests in Chromium; the viewer also in Firefox and WebKitGTK where they are installed
 	cd viewer && npm run --silent test:browser
 	$(BIN)/python -m pytest -q -m browser
 
@@ -121,9 +121,10 @@ docs: build reference ## the pictures and the command line's reference in docs/;
 reference: $(CACHE)/npm ## the viewer's reference as pages, viewer/reference/
 	cd viewer && npm run --silent docs
 
-bless: $(CACHE)/venv ## write test vectors and golden pictures anew; look at them, and say why in the commit
+bless: $(CACHE)/venv $(CACHE)/npm ## write test vectors and golden pictures anew; look at them, and say why in the commit
 	$(BIN)/python spec/make_vectors.py
 	MAP3D_BLESS=1 cargo test --locked -q -p map3d-render --test golden
+	cd viewer && npm run --silent bless
 
 clean: ## remove what was built
 	rm -rf $(VENV) $(CACHE) target viewer/node_modules viewer/dist viewer/reference python/map3d/viewer demo tests/.out

@@ -14,7 +14,7 @@ export default {
   disableSources: true,
   hideGenerator: true,
   // Parts of public types that say enough where they are used.
-  intentionallyNotExported: ["Steered", "SurfaceEvents", "Source", "Camera", "Frame", "Rect", "FilledOptions", "GeographicJson", "LayerInfo", "ViewJson", "View"],
+  intentionallyNotExported: ["Steered", "SurfaceEvents", "Camera", "Frame", "Rect", "FilledOptions", "GeographicJson", "SunJson", "ViewJson", "Occupancy", "ThreeNode", "ThreeRenderer", "ThreeTarget", "ThreeCamera", "ThreeRaycaster", "Lamp", "Vector", "Box", "Mixer"],
   // Fields have a sentence where their name and type do not say it all.
   requiredToBeDocumented: ["Class", "Interface", "TypeAlias", "Function", "Variable", "Enum", "EnumMember", "Method", "Accessor"],
   validation: { notExported: true, invalidLink: true, invalidPath: false, rewrittenLink: true, notDocumented: true, unusedMergeModuleWith: true },

@@ -7,6 +7,7 @@ import { bindLight, lightAt } from "./light";
 import { Tools } from "./tools";
 import { bindModes } from "./modes";
 import { bindSearch } from "./search";
+import { bindOffline } from "./offline";
 import { bindPicture } from "./picture";
 import { readPlace } from "./place";
 import { bindSeen } from "./seen";
@@ -31,7 +32,7 @@ function open(): void {
   const address = new Address(view);
   const selection = new Selection(view, layer, info, address);
   view.on("error", ({ error }) => {
-    if (layer.rendering) toast(error.message);
+    if (layer.rendering) toast(navigator.onLine ? error.message : say("offlineOnly"));
     else fail(say("notShown"), error.message);
   });
   let tools: Tools | undefined;
@@ -44,6 +45,7 @@ function open(): void {
     address.by = by ?? "";
     const colors = new Colors(view, layer, address);
     if (layer.rendering) bindPicture({ view, json: layer.rendering.json, legend: () => colors.theme });
+    if (layer.rendering) bindOffline(view, layer.rendering.json.name);
     colors.open().catch((reason: unknown) => { toast(String(reason)); });
     import("./map3d-controls.mjs").then(({ locate, overview }) => {
       if (layer.rendering?.json.geographic) new locate().addTo(view);

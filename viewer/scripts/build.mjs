@@ -1,4 +1,4 @@
-// Builds dist/: map3d.js (a global), map3d.mjs (a module), entries beside them, map3d-full with all in one, the page that shows a rendering, and type declarations.
+// Builds dist/: map3d.js (a global), map3d.mjs (a module), entries beside them, map3d-full with all in one, the service worker, the page that shows a rendering, and type declarations.
 import { execFileSync } from "node:child_process";
 import { cpSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { dirname, join, resolve } from "node:path";
@@ -61,6 +61,7 @@ async function build() {
     await bundle(entry, `map3d-${name}.mjs`, { format: "esm", plugins: [coreAs("module"), ...plugins] });
     await bundle(entry, `map3d-${name}.js`, { format: "iife", plugins: [coreAs("global"), ...plugins], globalName: "entry", banner: { js: `${banner.js}\n(() => {` }, footer: { js: "Object.assign(map3d, entry);\n})();" } });
   }
+  await bundle("src/offline/worker.ts", "map3d-worker.js", { format: "iife" });
   await bundleFull("map3d-full.mjs", { format: "esm" });
   await bundleFull("map3d-full.js", { format: "iife", globalName: "map3d" });
   await bundle("page/page.ts", "page.js", { format: "esm", external: ["./map3d.mjs", ...Object.keys(ENTRIES).map((name) => `./map3d-${name}.mjs`)] });

@@ -16,10 +16,14 @@ export type { Relief } from "./map/relief";
 export type { Attachable, Holder, Surface } from "./core/surface";
 export type { Box3, Vec2, Vec3 } from "./core/vec";
 export type { Clip } from "./draw/combine";
-export type { Mode } from "./draw/drawer";
+export type { Guest, Mode, Setting } from "./draw/drawer";
 export type { SeenDepths, Shade } from "./draw/shade";
 export type { Light } from "./geo/light";
-export type { ManifestJson, Rendering } from "./geo/manifest";
+export { readManifest, type LayerInfo, type ManifestJson, type Rendering, type View } from "./geo/manifest";
+export type { Tile } from "./geo/frame";
+export { HttpSource, type Source } from "./tiles/source";
+export { Archive, type ReadRange } from "./tiles/pmtiles";
+export type { Ask } from "./tiles/fetch";
 export type { Attribute, AttributeInfo, AttributeValue, ObjectInfo, SearchEntry } from "./tiles/objects";
 export { zoneOf } from "./geo/daylight";
 

@@ -1,7 +1,7 @@
+import { besideButton } from "../core/column";
 import { adoptStyles, element, iconButton } from "../core/dom";
 import type { Vec2, Vec3 } from "../core/vec";
 import { Attached, Map3dError, marker, type map } from "../map3d";
-import { besideButton } from "./column";
 import { Circle } from "./circle";
 import { STYLES } from "./styles";
 import { surfaceAt } from "./surface";

@@ -1,7 +1,7 @@
+import { besideButton } from "../core/column";
 import { adoptStyles, element, iconButton } from "../core/dom";
 import { add, dot, sub, type Box3, type Vec2 } from "../core/vec";
 import { Attached, map } from "../map3d";
-import { besideButton } from "./column";
 import { STYLES } from "./styles";
 import { controlWords } from "./words";
 

@@ -4,10 +4,6 @@ export const STYLES = `
 .map3d-group [aria-busy="true"] svg { animation: map3d-waits 1s ease-in-out infinite alternate; }
 @keyframes map3d-waits { to { opacity: 0.25; } }
 @media (prefers-reduced-motion: reduce) { .map3d-group [aria-busy="true"] svg { animation: none; opacity: 0.5; } }
-.map3d-beside { position: relative; }
-.map3d-beside > :not(.map3d-group) { position: absolute; right: calc(100% + 10px); border-radius: 12px; background: var(--map3d-panel); box-shadow: var(--map3d-shadow); z-index: 4; }
-.map3d-said { bottom: 0; width: max-content; max-width: min(260px, calc(100vw - 90px)); margin: 0; padding: 10px 14px; }
-.map3d-said:empty { display: none; }
 .map3d-accuracy { position: absolute; inset: 0; width: 100%; height: 100%; overflow: visible; fill: var(--map3d-accent); fill-opacity: 0.14; stroke: var(--map3d-accent); stroke-width: 1.5; }
 .map3d-overview-map { top: 0; width: 190px; height: 132px; overflow: hidden; }
 .map3d-overview-map[hidden] { display: none; }
@@ -16,7 +12,7 @@ export const STYLES = `
 .map3d-overview-hand:focus-visible { outline: 3px solid var(--map3d-accent); outline-offset: -3px; }
 .map3d-overview-frame { position: absolute; left: 0; top: 0; box-sizing: border-box; min-width: 8px; min-height: 8px; border: 2px solid var(--map3d-accent); box-shadow: 0 0 0 1px rgb(255 255 255 / 0.8), 0 0 0 999px rgb(0 0 0 / 0.16); cursor: grab; }
 @media (forced-colors: active) {
-  .map3d-said, .map3d-overview-map { border: 1px solid CanvasText; }
+  .map3d-overview-map { border: 1px solid CanvasText; }
   .map3d-group :is([aria-pressed="true"], [aria-expanded="true"]) { forced-color-adjust: none; background: Highlight; color: HighlightText; }
   .map3d-overview-frame, .map3d-accuracy { forced-color-adjust: none; }
 }

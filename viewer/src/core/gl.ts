@@ -9,6 +9,7 @@ export function linkProgram(gl: WebGL2RenderingContext, name: string, vertex: st
     gl.shaderSource(shader, source);
     gl.compileShader(shader);
     gl.attachShader(program, shader);
+    gl.deleteShader(shader); // goes with the program
   }
   gl.linkProgram(program);
   if (gl.getProgramParameter(program, gl.LINK_STATUS) || gl.isContextLost()) return program;

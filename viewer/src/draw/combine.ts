@@ -20,13 +20,29 @@ const LEAD_PX = 1;
 
 export const leadOf = (frame: Frame, level: number, before: number): number => LEAD_PX * before * pixelM(frame, level);
 
+/** Metres that level ground recedes for each metre that it rises on the screen; walls come nearer by the inverse. */
+const recession = ({ axes: { up, forward } }: Frame): number => up[2] / Math.max(-forward[2], 0.05);
+
+/** By how many depth values of a level neighbouring pixels differ at most, if they are of one surface: once and a half what ground or walls do. */
+export function steepOf({ frame, unit_m }: Depths, level: number): number {
+  const ground = recession(frame);
+  return Math.ceil((1.5 * Math.max(ground, 1 / Math.max(ground, 0.1)) * pixelM(frame, level)) / unit_m);
+}
+
+/** What lies on a surface is seen, if it lies not deeper in it than this. */
+const LEAST_LEAD_M = 0.05;
+
+/** How much nearer guests count than they are: pixels above the deepest level have the nearest depth below them, on level ground up to half a pixel's before the middle. */
+export const guestLead = (frame: Frame, level: number): number => LEAST_LEAD_M + 0.5 * (1 - 2 ** (level - frame.zmax)) * pixelM(frame, level) * recession(frame);
+
 /** D of a depth value is `first + value · unit_m`, for comparisons. */
 export const firstOf = ({ frame, shift, lead_m }: Depths): number => frame.d0 + shift[2] - lead_m;
 
-/** Least and greatest D of passes, with a little room; null without any. */
-export function rangeOf(all: readonly Depths[]): Vec2 | null {
-  if (all.length === 0) return null;
-  const [near, far] = [Math.min(...all.map(({ range, lead_m }) => range[0] - lead_m)), Math.max(...all.map(({ range }) => range[1]))];
+/** Least and greatest D of passes and of what else is there, with a little room; null without any. */
+export function rangeOf(all: readonly Depths[], others: readonly Vec2[] = []): Vec2 | null {
+  const ranges = [...others, ...all.map(({ range, lead_m }): Vec2 => [range[0] - lead_m, range[1]])];
+  if (ranges.length === 0) return null;
+  const [near, far] = [Math.min(...ranges.map(([least]) => least)), Math.max(...ranges.map(([, most]) => most))];
   const room = 0.01 * (far - near) + 1;
   return [near - room, far + room];
 }

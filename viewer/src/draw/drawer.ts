@@ -1,6 +1,6 @@
 import type { Vec2 } from "../core/vec";
 import type { Camera } from "../geo/camera";
-import type { Tile } from "../geo/frame";
+import type { Frame, Tile } from "../geo/frame";
 import type { LayerKind } from "../geo/manifest";
 import type { Light } from "../geo/light";
 import type { Shadow } from "../geo/shadows";
@@ -69,16 +69,32 @@ export interface Baked {
   readonly occlusion: boolean;
 }
 
-export interface FrameSpec {
+/** What a frame is painted of, and on. */
+export interface Setting {
+  readonly camera: Camera;
   /** Device pixels. */
   readonly width: number;
   readonly height: number;
   /** Device pixels a CSS pixel. */
   readonly dpr: number;
   readonly light: Readonly<Light>;
+}
+
+/** Something that is not made of images, but seen among them by its depth. WebGL only. */
+export interface Guest {
+  /** Least and greatest D, along a frame, of what it shows; null: it shows nothing. */
+  rangeAlong(frame: Frame): Vec2 | null;
+  /** Makes its pictures, before the frame is painted. Leaves the context's state as a new context has it, but for what uploads are unpacked by. @param range of D, of all that is painted */
+  prepare(gl: WebGL2RenderingContext, setting: Setting, range: Vec2): void;
+  /** Paints what it has prepared into what is bound, premultiplied, with depth as a share of the range: pixels that it covers all; `soft`: the others. */
+  paint(gl: WebGL2RenderingContext, setting: Setting, soft: boolean): void;
+}
+
+export interface FrameSpec extends Setting {
   readonly passes: readonly Pass[];
-  /** WebGL only: finds light that was not rendered, for what this camera sees; while it moves, what was found last does. */
-  readonly shade?: { readonly by: Shade; readonly camera: Camera; readonly moving: boolean } | null;
+  readonly guests: readonly Guest[];
+  /** WebGL only: finds light that was not rendered; while the camera moves, what was found last does. */
+  readonly shade?: { readonly by: Shade; readonly moving: boolean } | null;
   /** WebGL only: where to draw in place of the canvas, with the depth of all passes as a share of a range of D. */
   readonly into?: { readonly framebuffer: WebGLFramebuffer; readonly range: Vec2 };
 }

@@ -1,6 +1,7 @@
 import type { Vec2 } from "../core/vec";
 import { axesOf, type Axes } from "./axes";
 
+/** A tile's number in its pyramid: spec/pyramid.md §3. */
 export interface Tile {
   readonly z: number;
   readonly x: number;

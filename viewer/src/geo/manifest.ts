@@ -6,6 +6,7 @@ import { Occupancy } from "./occupancy";
 
 export type LayerKind = "color" | "normal" | "id" | "depth" | "sun" | "sun16" | "ao" | "depth2" | "picture";
 
+/** A layer of the manifest, such as colour. */
 export interface LayerInfo {
   readonly name: string;
   readonly kind: string;

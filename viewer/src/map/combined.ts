@@ -1,10 +1,10 @@
 import { meet } from "../draw/combine";
 import type { imageLayer } from "./imageLayer";
 
-/** Layers that make one picture by depth, in the order in which they were added: those that share a part of the map with another. */
-export function combinedOf(layers: readonly imageLayer[]): readonly imageLayer[] {
+/** Layers that make one picture by depth, in the order in which they were added: those that share a part of the map with another, or with guests. */
+export function combinedOf(layers: readonly imageLayer[], guests = false): readonly imageLayer[] {
   const able = layers.filter((layer) => layer.combines);
-  return able.filter((layer) => able.some((other) => other !== layer && meet(layer.clip, other.clip)));
+  return able.filter((layer) => guests || able.some((other) => other !== layer && meet(layer.clip, other.clip)));
 }
 
 /** Layers as they are painted, lowest first; those of a group hide each other by depth. */

@@ -93,14 +93,16 @@ export class Gestures {
     this.#map.container.classList.add("map3d-dragging");
     const other = [...this.#touches].find(([id]) => id !== event.pointerId)?.[1];
     if (other) this.#pinch(touch, other, at);
-    else this.#drag(touch, at);
+    else this.#drag(touch, at, event);
     touch.at = at;
   }
 
-  #drag(touch: Touch, at: Vec2): void {
+  #drag(touch: Touch, at: Vec2, event: PointerEvent): void {
     this.#map.panBy(at[0] - touch.at[0], at[1] - touch.at[1]);
-    const now = performance.now();
-    this.#trail = [...this.#trail.filter(({ ms }) => now - ms < VELOCITY_MS), { at, ms: now }];
+    // Where frames are slow, one event stands for several: the hand's speed is known from them all, and from when they were, not when they are told.
+    const all = "getCoalescedEvents" in event ? event.getCoalescedEvents() : [];
+    const points = (all.length > 0 ? all : [event]).map((each) => ({ at: this.#place(each), ms: each.timeStamp }));
+    this.#trail = [...this.#trail, ...points].filter(({ ms }) => event.timeStamp - ms < VELOCITY_MS);
   }
 
   #pinch(touch: Touch, other: Touch, at: Vec2): void {
@@ -129,12 +131,11 @@ export class Gestures {
     this.#map.release();
     this.#map.container.classList.remove("map3d-dragging");
     if (!meant) return;
-    if (this.#moved) this.#release();
-    else this.#tap(touch.at);
+    if (this.#moved) this.#release(event.timeStamp);
+    else this.#tap(touch.at, event.timeStamp);
   }
 
-  #release(): void {
-    const now = performance.now();
+  #release(now: number): void {
     const recent = this.#trail.filter(({ ms }) => now - ms < VELOCITY_MS);
     const [first, last] = [recent[0], recent.at(-1)];
     const ms = first && last ? last.ms - first.ms : 0;
@@ -143,9 +144,8 @@ export class Gestures {
     if (Math.hypot(...velocity) > 0.15) this.#map.glide(velocity);
   }
 
-  #tap(at: Vec2): void {
+  #tap(at: Vec2, now: number): void {
     const last = this.#lastTap;
-    const now = performance.now();
     const double = last && now - last.ms < DOUBLE_TAP_MS && Math.hypot(at[0] - last.at[0], at[1] - last.at[1]) < DOUBLE_TAP_PX;
     this.#lastTap = double ? null : { at, ms: now };
     if (double) this.#map.zoomBy(1, at);

@@ -10,9 +10,8 @@ import { towardsLight, type Light } from "../geo/light";
 import type { LayerInfo, LayerKind, Rendering, View } from "../geo/manifest";
 import { shadowOf } from "../geo/shadows";
 import { Objects, type AttributeInfo, type AttributeValue, type ObjectInfo, type SearchEntry } from "../tiles/objects";
-import { Source } from "../tiles/source";
+import { HttpSource, type Source } from "../tiles/source";
 import { Store } from "../tiles/store";
-import { baseUrl } from "../tiles/url";
 import { viewLike } from "./agreement";
 import { depthRangeOf, depthsOf, planLayer, type LayerPlan } from "./layerPlan";
 import type { map } from "./map";
@@ -41,10 +40,11 @@ export interface ImageLayerEvents {
   error: { error: Error };
 }
 
-/** A rendering on the map. Several base URLs are several hosts with the same tiles; requests are spread over them by tile. */
+/** A rendering on the map, from base URLs or another source. Several base URLs are several hosts with the same tiles; requests are spread over them by tile. */
 export class imageLayer extends Attached<map, ImageLayerEvents> {
   readonly options: Required<Omit<ImageLayerOptions, "attribution">> & Pick<ImageLayerOptions, "attribution">;
-  readonly #source: Source;
+  /** Where it comes from. */
+  readonly source: Source;
   #mode: Mode;
   #stage: Stage | undefined;
   #name = "";
@@ -59,16 +59,17 @@ export class imageLayer extends Attached<map, ImageLayerEvents> {
   /** There will be no manifest. */
   #failed = false;
 
+  /** @param urls base URLs, or another source  @throws UsageError without one, or for a mode that is unknown */
   constructor(urls: string | readonly string[] | Source, options: ImageLayerOptions = {}) {
     super();
     this.options = { mode: "lit", opacity: 1, highlightColor: "#e4572e", combine: true, ...options };
     this.#mode = checkedMode(this.options.mode);
-    this.#source = urls instanceof Source ? urls : sourceOf(urls);
+    this.source = typeof urls === "object" && "tile" in urls ? urls : new HttpSource(urls);
   }
 
   /** @internal The same rendering with the same looks, for another map. */
   copy(): imageLayer {
-    const made = new imageLayer(this.#source, { ...this.options, mode: this.#mode });
+    const made = new imageLayer(this.source, { ...this.options, mode: this.#mode });
     made.#finishes = this.#finishes;
     return made.#setColors(this.#colors);
   }
@@ -183,11 +184,11 @@ export class imageLayer extends Attached<map, ImageLayerEvents> {
       this.fire("error", { error });
       stage.report(error);
     };
-    this.#store = new Store(this.#name, this.#source, stage.shared, (error) => {
+    this.#store = new Store(this.#name, this.source, stage.shared, (error) => {
       if (error) failed(error);
       stage.request();
     });
-    this.#source.manifest().then((rendering) => {
+    this.source.manifest().then((rendering) => {
       if (this.#stage === stage) this.#begin(rendering, stage);
     }).catch((reason: unknown) => { failed(asError(reason)); });
   }
@@ -270,7 +271,7 @@ export class imageLayer extends Attached<map, ImageLayerEvents> {
   #begin(rendering: Rendering, stage: Stage): void {
     stage.admit(rendering);
     this.#rendering = rendering;
-    this.#objects = new Objects(this.#source, rendering.json);
+    this.#objects = new Objects(this.source, rendering.json);
     stage.ready(rendering);
     this.#checkLayers();
     this.fire("ready", { rendering });
@@ -320,12 +321,6 @@ export class imageLayer extends Attached<map, ImageLayerEvents> {
     this.#stage?.request();
     return this;
   }
-}
-
-function sourceOf(urls: string | readonly string[]): Source {
-  const list = typeof urls === "string" ? [urls] : urls;
-  if (list.length === 0) throw new UsageError("an imageLayer needs at least one base URL, e.g. \"https://host/tiles/teatime\"");
-  return new Source(list.map((url) => baseUrl(url, document.baseURI)));
 }
 
 /** A rendering's layers by kind, with the one that has the shadows. */

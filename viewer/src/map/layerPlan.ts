@@ -6,7 +6,7 @@ import type { LayerInfo, LayerKind, Rendering, View } from "../geo/manifest";
 import { corners } from "../core/vec";
 import { leadOf, type Depths } from "../draw/combine";
 import { placeQuads } from "../draw/plan";
-import type { Baked, Quad } from "../draw/drawer";
+import type { Baked, Guest, Quad } from "../draw/drawer";
 import { coverOf, fromTheMiddle, levelFor, rectAround, standsFor } from "../tiles/cover";
 import type { Job } from "../tiles/queue";
 import type { Store } from "../tiles/store";
@@ -23,6 +23,8 @@ export interface LayerPlan {
   readonly cover: readonly Tile[];
   readonly quads: readonly Quad[];
   readonly jobs: readonly Job[];
+  /** Where its tiles are. */
+  readonly store: Store;
   /** All of the view is here (or known not to come). */
   readonly complete: boolean;
 }
@@ -66,7 +68,7 @@ export function planLayer(sight: Sight, rendering: Rendering, view: View, store:
     ...jobsFor(layers, store, view, needed, ordered),
     ...jobsFor(layers, store, view, extra, ordered),
   ];
-  return { view, baked, layers, level, cover, quads, jobs, complete: jobs.length === 0 };
+  return { view, baked, layers, store, level, cover, quads, jobs, complete: jobs.length === 0 };
 }
 
 /** Least and greatest depth value that the rendering's box can have in a view. */
@@ -76,9 +78,10 @@ export function depthRangeOf(rendering: Rendering, { frame }: View): Vec2 {
   return [Math.min(...depths), Math.max(...depths)];
 }
 
-/** Least and greatest D, along a frame, of all layers of a map. */
-export function rangeAlong({ origin }: Sight, { axes }: Frame, layers: readonly imageLayer[]): Vec2 {
-  const all = layers.flatMap(({ rendering }) => (rendering ? corners(rendering.json.box).map((corner) => dot(axes.forward, sub(add(rendering.json.origin, corner), origin))) : []));
+/** Least and greatest D, along a frame, of all layers of a map and its guests. */
+export function rangeAlong({ origin }: Sight, frame: Frame, layers: readonly imageLayer[], guests: readonly Guest[]): Vec2 {
+  const { axes } = frame;
+  const all = [...guests.flatMap((guest) => guest.rangeAlong(frame) ?? []), ...layers.flatMap(({ rendering }) => (rendering ? corners(rendering.json.box).map((corner) => dot(axes.forward, sub(add(rendering.json.origin, corner), origin))) : []))];
   return [Math.min(...all) - 1, Math.max(...all) + 1];
 }
 

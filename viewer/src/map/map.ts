@@ -4,6 +4,7 @@ import { Evented } from "../core/events";
 import type { Attachable, Holder, Surface, SurfaceEvents } from "../core/surface";
 import type { Vec2, Vec3 } from "../core/vec";
 import { languageOf } from "../core/words";
+import type { Guest } from "../draw/drawer";
 import type { Camera } from "../geo/camera";
 import { daylightAt } from "../geo/daylight";
 import { DEFAULT_LIGHT, validLight, type Light } from "../geo/light";
@@ -265,6 +266,12 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
     this.#loop.request();
   }
 
+  /** @internal Something else is seen among the layers by its depth; `on` false: no longer. */
+  seat(guest: Guest, on = true): this {
+    this.#painter?.guests[on ? "add" : "delete"](guest);
+    return this.#redraw();
+  }
+
   /** @internal undefined when the map cannot draw. */
   get stage(): Stage | undefined {
     const painter = this.#painter;
@@ -320,7 +327,7 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
     const [before, changed] = [this.#drawn, this.#dirty];
     [this.#drawn, this.#dirty, this.#relief] = [sight.camera, false, undefined];
     const moving = before !== undefined && before !== sight.camera;
-    const { plans, complete } = this.#painter.paint(sight, this.#layers, this.#light, this.#kindsRead(), this.#shade, moving, this.apparent && ((scene) => { this.turner?.paint({ ...scene, camera: sight.camera, changed }); }));
+    const { plans, complete } = this.#painter.paint(sight, { layers: this.#layers, light: this.#light, kinds: this.#kindsRead(), shade: this.#shade, moving }, this.apparent && ((scene) => { this.turner?.paint({ ...scene, camera: sight.camera, changed }); }));
     this.#debug.update(plans, sight.dpr, this.#painter.drawer);
     if (before !== sight.camera || turning) this.#moved(before, sight.camera);
     this.moves.fire("draw", {});

@@ -22,7 +22,7 @@ export interface MapOptions {
   attribution?: boolean;
   /** Fetches ids of what is seen, so that "mousemove" tells what lies under the pointer. Default false. */
   hover?: boolean;
-  /** Bytes of decoded tiles to keep. Default 96 MB. */
+  /** Bytes of decoded tiles to keep. Default: 20 for each device pixel of the map, which is twice what colour and normals in view take; at least 24 MB. */
   cacheBytes?: number;
   /** Tile requests at once. Default 12. */
   concurrency?: number;
@@ -45,14 +45,13 @@ export interface MapOptions {
 }
 
 /** Those without a default of their own. */
-type Left = "center" | "zoom" | "direction" | "light" | "background" | "language" | "pixelRatio";
+type Left = "center" | "zoom" | "direction" | "light" | "background" | "language" | "pixelRatio" | "cacheBytes";
 export type FilledOptions = MapOptions & Required<Omit<MapOptions, Left | "dataSaver">> & { dataSaver: boolean };
 
 export const DEFAULTS: Required<Omit<MapOptions, Left>> = {
   controls: true,
   attribution: true,
   hover: false,
-  cacheBytes: 96e6,
   concurrency: 12,
   workers: 2,
   maxPixelRatio: 3,

@@ -1,5 +1,5 @@
 import { CanvasDrawer } from "../draw/canvas/canvasDrawer";
-import type { Drawer, DrawerEvents, FrameSpec } from "../draw/drawer";
+import type { Drawer, DrawerEvents, FrameSpec, Guest } from "../draw/drawer";
 import type { Shade } from "../draw/shade";
 import { WebGLDrawer } from "../draw/webgl/webglDrawer";
 import type { Light } from "../geo/light";
@@ -29,6 +29,8 @@ export type Turning = Omit<Depicting, "camera" | "changed">;
 
 /** A context that has not come back after this time is lost for good. */
 const RESTORE_MS = 5000;
+/** Of tiles that are kept, for each device pixel, and at least. */
+const [KEPT_BYTES, LEAST_BYTES] = [20, 24e6];
 
 export interface Painted {
   readonly plans: readonly LayerPlan[];
@@ -36,9 +38,23 @@ export interface Painted {
   readonly complete: boolean;
 }
 
+/** What a frame shows. */
+export interface Content {
+  readonly layers: readonly imageLayer[];
+  readonly light: Readonly<Light>;
+  /** Layers that are read, besides those that are shown. */
+  readonly kinds: readonly LayerKind[];
+  /** Finds light that was not rendered. */
+  readonly shade: Shade | null;
+  /** The picture is under way: what is costly may be rough. */
+  readonly moving: boolean;
+}
+
 /** Makes a frame: asks the layers what they want, fetches it, has it drawn. Owns tiles and drawer. */
 export class Painter {
   readonly shared: Shared;
+  /** What is seen among the layers. */
+  readonly guests = new Set<Guest>();
   readonly #viewport: Viewport;
   readonly #cache: Cache<Stored>;
   readonly #queue: Queue;
@@ -46,6 +62,8 @@ export class Painter {
   readonly #options: FilledOptions;
   readonly #events: PainterEvents;
   #drawer: Drawer;
+  /** Guests are shown: from when the depth of all that was in view was here, so that no tile had to wait for its own. */
+  #seated = false;
   #waiting: ReturnType<typeof setTimeout> | undefined;
 
   /** @throws DrawError when the browser cannot draw */
@@ -54,7 +72,7 @@ export class Painter {
     this.#options = options;
     this.#events = events;
     this.#drawer = this.#open(options.drawer);
-    this.#cache = new Cache<Stored>(options.cacheBytes, (key, { data }) => {
+    this.#cache = new Cache<Stored>(options.cacheBytes ?? LEAST_BYTES, (key, { data }) => {
       if (data && "bitmap" in data) data.bitmap.close();
       this.#drawer.release(key);
     });
@@ -75,33 +93,42 @@ export class Painter {
     return this.#cache.bytes;
   }
 
-  /** @param kinds layers that are read, besides those that are shown  @param shade finds light that was not rendered; roughly while the picture is moving  @param turn paints a movement, where that can be done, in place of the frame */
-  paint(sight: Sight, layers: readonly imageLayer[], light: Readonly<Light>, kinds: readonly LayerKind[], shade: Shade | null, moving: boolean, turn: ((scene: Turning) => void) | null): Painted {
-    this.#cache.tick();
+  /** @param turn paints a movement, where that can be done, in place of the frame */
+  paint(sight: Sight, content: Content, turn: ((scene: Turning) => void) | null): Painted {
+    const { layers, light, kinds, shade, moving } = content;
     this.#viewport.fitCanvas(sight.dpr);
-    const combined = combinedOf(layers);
+    const { width, height } = this.#viewport.canvas;
+    this.#cache.limit(this.#options.cacheBytes ?? Math.max(LEAST_BYTES, KEPT_BYTES * width * height));
+    this.#cache.tick();
+    const { gl } = this.#drawer;
+    this.#seated &&= this.guests.size > 0 && gl !== null;
+    const guests = this.#seated ? [...this.guests] : [];
+    const combined = combinedOf(layers, this.#seated);
     const planned = layers.flatMap((layer) => {
       const plan = layer.plan(sight, light, kinds, combined.includes(layer));
       return plan ? [{ layer, plan }] : [];
     });
     const before = (layer: imageLayer): number | null => (combined.includes(layer) ? combined.indexOf(layer) : null);
     this.#queue.want(planned.flatMap(({ plan }) => plan.jobs));
-    const { width, height } = this.#viewport.canvas;
     const complete = !layers.some((layer) => layer.loading) && planned.every(({ plan }) => plan.complete);
-    const { gl } = this.#drawer;
-    if (turn && gl) turn({ gl, width, height, complete, rangeOf: (frame) => rangeAlong(sight, frame, layers), depict: (camera, range, framebuffer) => { this.#depict({ ...sight, camera, dpr: 1 }, layers, light, shade, { range, framebuffer }); } });
-    else this.#drawer.draw({ width, height, dpr: sight.dpr, light, shade: shade && { by: shade, camera: sight.camera, moving }, passes: planned.map(({ layer, plan }) => layer.pass(plan, sight, before(layer))) });
+    if (turn && gl) turn({ gl, width, height, complete, rangeOf: (frame) => rangeAlong(sight, frame, layers, guests), depict: (camera, range, framebuffer) => { this.#depict({ ...sight, camera, dpr: 1 }, content, guests, { range, framebuffer }); } });
+    else this.#drawer.draw({ camera: sight.camera, width, height, dpr: sight.dpr, light, guests, shade: shade && { by: shade, moving }, passes: planned.map(({ layer, plan }) => layer.pass(plan, sight, before(layer))) });
+    if (complete && gl && this.guests.size > 0 && !this.#seated) {
+      this.#seated = true;
+      this.#events.changed();
+    }
     return { plans: planned.map(({ plan }) => plan), complete: complete && !this.#drawer.busy };
   }
 
   /** What is in memory, with the depth of all layers that have any. */
-  #depict(sight: Sight, layers: readonly imageLayer[], light: Readonly<Light>, shade: Shade | null, into: NonNullable<FrameSpec["into"]>): void {
-    const { width, height } = sight.camera;
+  #depict(sight: Sight, { layers, light, shade }: Content, guests: readonly Guest[], into: NonNullable<FrameSpec["into"]>): void {
+    const { camera } = sight;
+    const { width, height } = camera;
     const passes = layers.filter((layer) => layer.combines).flatMap((layer, k) => {
       const plan = layer.plan(sight, light, [], true);
       return plan ? [layer.pass(plan, sight, k)] : [];
     });
-    this.#drawer.draw({ width, height, dpr: 1, light, shade: shade && { by: shade, camera: sight.camera, moving: false }, passes, into });
+    this.#drawer.draw({ camera, width, height, dpr: 1, light, guests, shade: shade && { by: shade, moving: false }, passes, into });
   }
 
   /** Forgets the tiles of a layer that has left. */

@@ -243,6 +243,12 @@ export abstract class Viewing extends Evented<MapEvents> {
     return this;
   }
 
+  /** @internal The next manifest gives the map its view, as the first one did. */
+  restart(): void {
+    this.motion.stop();
+    this.camera = this.reference = undefined;
+  }
+
   protected get moving(): boolean {
     return this.motion.moving || this.apparent !== null;
   }

@@ -12,6 +12,7 @@ export interface Profile {
   readonly approximate: boolean;
 }
 
+/** How finely, and until when, heights are read. */
 export interface ProfileOptions {
   /** Places along the line; 400 when left out. 2 to 10,000. */
   samples?: number;

@@ -71,7 +71,7 @@ class Hidden {
     this.#box = box;
     const { light, drawer, options } = shown;
     this.map = new map(box, {
-      light, ...(drawer && { drawer }), direction: shown.direction, concurrency: options.concurrency, cacheBytes: options.cacheBytes, workers: options.workers,
+      light, ...(drawer && { drawer }), direction: shown.direction, concurrency: options.concurrency, ...(options.cacheBytes !== undefined && { cacheBytes: options.cacheBytes }), workers: options.workers,
       dataSaver: false, pixelRatio: scale, finer: scale >= 1.5 ? 0.5 : 0, controls: false, attribution: false, preserveDrawingBuffer: true,
     });
     this.#failed = new Promise((_, reject) => {

@@ -8,7 +8,7 @@ interface Held<V> {
 /** Keeps the most recently used values within a number of bytes. What was used in the current tick is never dropped. */
 export class Cache<V> {
   readonly #held = new Map<string, Held<V>>();
-  readonly #limit_bytes: number;
+  #limit_bytes: number;
   readonly #dropped: (key: string, value: V) => void;
   #tick = 0;
   #bytes = 0;
@@ -24,6 +24,11 @@ export class Cache<V> {
 
   get size(): number {
     return this.#held.size;
+  }
+
+  /** Keeps so many bytes from the next tick on. */
+  limit(bytes: number): void {
+    this.#limit_bytes = bytes;
   }
 
   /** A new tick: what is used from now on is safe until the next. */

@@ -14,7 +14,8 @@ const scope = self as unknown as { onmessage: (event: MessageEvent<Task>) => voi
 scope.onmessage = ({ data: { ticket, kind, mediaType, bytes } }) => {
   decodeTile(kind, mediaType, bytes).then(
     (data) => {
-      scope.postMessage({ ticket, data }, [transferable(data)]);
+      scope.postMessage({ ticket, data }, transferable(data));
+      if ("bitmap" in data) data.bitmap.close();
     },
     (reason: unknown) => {
       scope.postMessage({ ticket, error: reason instanceof Error ? reason.message : String(reason) }, []);

@@ -1,5 +1,8 @@
 import { FetchError } from "../core/errors";
 
+/** What answers requests: the browser's fetch, or something that keeps what it got. */
+export type Ask = (url: string, init: RequestInit) => Promise<Response>;
+
 export interface FetchOptions {
   signal?: AbortSignal | undefined;
   /** First byte and length. */
@@ -8,6 +11,8 @@ export interface FetchOptions {
   attempts?: number | undefined;
   /** Wait before the second try; doubled each time. */
   backoff_ms?: number | undefined;
+  /** Default the browser's fetch. */
+  ask?: Ask | undefined;
 }
 
 /**
@@ -39,11 +44,11 @@ export async function fetchJson(urls: readonly string[], options: FetchOptions =
   }
 }
 
-async function fetchOnce(url: string, { signal, range }: FetchOptions): Promise<ArrayBuffer | null> {
+async function fetchOnce(url: string, { signal, range, ask = fetch }: FetchOptions): Promise<ArrayBuffer | null> {
   const headers = range ? { Range: `bytes=${String(range[0])}-${String(range[0] + range[1] - 1)}` } : undefined;
   let answer: Response;
   try {
-    answer = await fetch(url, { ...(signal && { signal }), ...(headers && { headers }) });
+    answer = await ask(url, { ...(signal && { signal }), ...(headers && { headers }) });
   } catch (reason) {
     throw new FetchError(`${url}: no answer (${reason instanceof Error ? reason.message : String(reason)})`);
   }

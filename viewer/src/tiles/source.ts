@@ -1,49 +1,70 @@
-import { FetchError } from "../core/errors";
+import { FetchError, UsageError } from "../core/errors";
 import type { Tile } from "../geo/frame";
 import { readManifest, type LayerInfo, type Rendering, type View } from "../geo/manifest";
-import { fetchBytes, fetchJson } from "./fetch";
+import { fetchBytes, fetchJson, type Ask, type FetchOptions } from "./fetch";
 import { Archive } from "./pmtiles";
-import { tileUrls } from "./url";
+import { baseUrl, tileUrls } from "./url";
 
-/** Where the encoded tiles of a rendering come from: tile URLs over several hosts, or archives when the manifest names them. */
-export class Source {
-  readonly #bases: readonly string[];
+/** Where a rendering comes from: its manifest, what lies beside it, and its encoded tiles. Several layers may share one. */
+export interface Source {
+  /** The checked manifest. @throws ManifestError, FetchError */
+  manifest(signal?: AbortSignal): Promise<Rendering>;
+  /** A file beside the manifest, parsed; null when there is none. @throws FetchError */
+  json(path: string): Promise<unknown>;
+  /** The encoded tile, which the caller owns; null when it is empty. @throws FetchError, or the signal's reason */
+  tile(view: View, layer: LayerInfo, tile: Tile, signal?: AbortSignal): Promise<ArrayBuffer | null>;
+}
+
+/** A rendering behind URLs: tile URLs over several hosts, or archives when the manifest names them. */
+export class HttpSource implements Source {
+  /** Base URLs, in full. */
+  readonly bases: readonly string[];
+  readonly #ask: Ask | undefined;
   readonly #archives = new Map<string, Archive>();
 
-  constructor(bases: readonly string[]) {
-    this.#bases = bases;
+  /** @param ask in place of the browser's fetch  @throws UsageError without a URL */
+  constructor(urls: string | readonly string[], ask?: Ask) {
+    const list = typeof urls === "string" ? [urls] : urls;
+    if (list.length === 0) throw new UsageError("an imageLayer needs at least one base URL, e.g. \"https://host/tiles/teatime\"");
+    this.bases = list.map((url) => baseUrl(url, document.baseURI));
+    this.#ask = ask;
   }
 
-  /** A file beside the manifest; null when there is none. @throws FetchError */
   async json(path: string): Promise<unknown> {
-    const urls = this.#bases.map((base) => `${base}/${path}`);
+    const urls = this.#urls(path);
     try {
-      return await fetchJson(urls, { attempts: Math.max(4, urls.length) });
+      return await fetchJson(urls, this.#with({ attempts: Math.max(4, urls.length) }));
     } catch (reason) {
       if (reason instanceof FetchError && reason.status === 404) return null;
       throw reason;
     }
   }
 
-  /** @throws ManifestError, FetchError */
   async manifest(signal?: AbortSignal): Promise<Rendering> {
-    const urls = this.#bases.map((base) => `${base}/rendering.json`);
-    return readManifest(await fetchJson(urls, { signal, attempts: Math.max(3, urls.length) }), urls[0] ?? "");
+    const urls = this.#urls("rendering.json");
+    return readManifest(await fetchJson(urls, this.#with({ signal, attempts: Math.max(3, urls.length) })), urls[0] ?? "");
   }
 
-  /** The encoded tile; null when it is empty. */
   tile(view: View, layer: LayerInfo, tile: Tile, signal?: AbortSignal): Promise<ArrayBuffer | null> {
     const archive = view.archives?.[layer.name];
     if (archive !== undefined) return this.#archive(archive).tile(tile, signal);
-    return fetchBytes(tileUrls(this.#bases, view.id, layer.name, tile, view.versionOf(tile, layer)), { signal });
+    return fetchBytes(tileUrls(this.bases, view.id, layer.name, tile, view.versionOf(tile, layer)), this.#with({ signal }));
+  }
+
+  #urls(path: string): string[] {
+    return this.bases.map((base) => `${base}/${path}`);
+  }
+
+  #with(options: FetchOptions): FetchOptions {
+    return { ...options, ask: this.#ask };
   }
 
   #archive(path: string): Archive {
     const known = this.#archives.get(path);
     if (known) return known;
-    const urls = this.#bases.map((base) => `${base}/${path}`);
+    const urls = this.#urls(path);
     const archive = new Archive(path, async (offset, length, signal) => {
-      const bytes = await fetchBytes(urls, { range: [offset, length], signal });
+      const bytes = await fetchBytes(urls, this.#with({ range: [offset, length], signal }));
       if (!bytes) throw new FetchError(`${urls[0] ?? path}: no content`, 204);
       return bytes;
     });

@@ -11,6 +11,8 @@ import { bytesOf, type TileData } from "./tileData";
 export interface Stored {
   data: TileData | null;
   readonly empty: boolean;
+  /** As it was sent, and when it came (performance.now). */
+  readonly sent: { readonly bytes: number; readonly at_ms: number };
 }
 
 export interface Shared {
@@ -44,6 +46,11 @@ export class Store {
   /** The tile if it is in memory, which counts as use. */
   get(view: View, layer: LayerInfo, tile: Tile): Stored | undefined {
     return this.#shared.cache.get(this.key(view, layer, tile));
+  }
+
+  /** How large a tile in memory was as it came, and when; not a use. */
+  sent(view: View, layer: LayerInfo, tile: Tile): Stored["sent"] | undefined {
+    return this.#shared.cache.peek(this.key(view, layer, tile))?.sent;
   }
 
   /** The drawer has a copy of the tile; ours is let go. Ids and depths are to be kept: picks read them. */
@@ -84,12 +91,13 @@ export class Store {
   async #load(key: string, view: View, layer: LayerInfo, tile: Tile, signal: AbortSignal): Promise<void> {
     try {
       const bytes = await this.#source.tile(view, layer, tile, signal);
+      const sent = { bytes: bytes?.byteLength ?? 0, at_ms: performance.now() }; // the bytes move to another thread
       const data = bytes && (await this.#shared.decoder.decode(layer.kind, layer.media_type, bytes));
       if (signal.aborted) {
         if (data && "bitmap" in data) data.bitmap.close();
         return;
       }
-      this.#shared.cache.set(key, { data, empty: !data }, data ? bytesOf(data) * (data.kind === "id" || data.kind === "depth" ? 2 : 1) : 64);
+      this.#shared.cache.set(key, { data, empty: !data, sent }, data ? bytesOf(data) * (data.kind === "id" || data.kind === "depth" ? 2 : 1) : 64);
       this.#failed.delete(key);
       this.#arrived(null);
     } catch (reason) {

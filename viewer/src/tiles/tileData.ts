@@ -33,8 +33,11 @@ export async function decodeTile(kind: string, mediaType: string, bytes: ArrayBu
 
 const isKind = (kind: string): kind is Kind => Object.hasOwn(CHANNELS, kind);
 
-export function transferable(data: TileData): Transferable {
-  return "bitmap" in data ? data.bitmap : data.values.buffer;
+/**
+ * What of a tile is moved to another thread. Pictures are copied: WebKitGTK 2.50 gives WebGL nothing of one that has been moved.
+ */
+export function transferable(data: TileData): Transferable[] {
+  return "bitmap" in data ? [] : [data.values.buffer];
 }
 
 export const bytesOf = (data: TileData): number => data.width * data.height * (CHANNELS[data.kind] || 4);

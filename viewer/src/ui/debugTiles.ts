@@ -1,8 +1,21 @@
 import { element } from "../core/dom";
 import type { Drawer, Quad } from "../draw/drawer";
 import { tileName } from "../geo/frame";
+import type { LayerInfo, View } from "../geo/manifest";
+import type { Store } from "../tiles/store";
 
-/** Outlines of the painted tiles with their names; a stand-in shows the name of the tile it comes from. In a corner, what draws. */
+/** What a layer paints. */
+interface Painted {
+  readonly view: View;
+  readonly layers: ReadonlyMap<string, LayerInfo>;
+  readonly store: Pick<Store, "sent">;
+  readonly quads: readonly Quad[];
+}
+
+/**
+ * Outlines of the painted tiles with their names, and how many bytes of which layers came how long ago; a stand-in shows those of the tile it comes
+ * from. In a corner, what draws.
+ */
 export class DebugTiles {
   readonly pane = element("div", "map3d-debug", { "aria-hidden": "true" });
   #on = false;
@@ -17,15 +30,20 @@ export class DebugTiles {
     if (!on) this.pane.replaceChildren();
   }
 
-  update(plans: readonly { readonly quads: readonly Quad[] }[], dpr: number, { name, note }: Pick<Drawer, "name" | "note">): void {
+  update(plans: readonly Painted[], dpr: number, { name, note }: Pick<Drawer, "name" | "note">): void {
     if (!this.#on) return;
-    const boxes = plans.flatMap(({ quads }) => quads.map((quad) => outline(quad, dpr)));
+    const boxes = plans.flatMap((plan) => plan.quads.map((quad) => outline(plan, quad, dpr)));
     this.pane.replaceChildren(...boxes, element("p", "", {}, note ? `${name}: ${note}` : name));
   }
 }
 
-function outline({ from, rect: [left, top, right, bottom], scale }: Quad, dpr: number): HTMLElement {
-  const box = element("div", "", {}, `${tileName(from)} × ${(1 / scale).toFixed(2)}`);
+function outline({ view, layers, store }: Painted, { from, rect: [left, top, right, bottom], scale }: Quad, dpr: number): HTMLElement {
+  const now = performance.now();
+  const told = [...layers.values()].flatMap((layer) => {
+    const sent = store.sent(view, layer, from);
+    return sent ? [`${layer.name} ${(sent.bytes / 1000).toFixed(1)} kB, ${((now - sent.at_ms) / 1000).toFixed(0)} s`] : [];
+  });
+  const box = element("div", "", {}, [`${tileName(from)} × ${(1 / scale).toFixed(2)}`, ...told].join("\n"));
   box.style.transform = `translate(${String(left / dpr)}px, ${String(top / dpr)}px)`;
   box.style.width = `${String((right - left) / dpr)}px`;
   box.style.height = `${String((bottom - top) / dpr)}px`;

@@ -37,8 +37,9 @@ export const STYLES = `
 .map3d button:focus-visible { outline: 3px solid var(--map3d-accent); outline-offset: 1px; }
 .map3d-icon { display: block; width: 20px; height: 20px; margin: auto; fill: none; stroke: currentColor; stroke-width: 1.8; stroke-linecap: round; stroke-linejoin: round; }
 
-.map3d-buttons { position: absolute; right: max(12px, env(safe-area-inset-right)); bottom: calc(34px + env(safe-area-inset-bottom)); display: grid; gap: 10px; }
-@media (max-height: 660px) { .map3d-buttons { display: flex; flex-flow: column wrap-reverse; justify-content: flex-end; max-height: min(280px, calc(100% - 46px)); } }
+.map3d-buttons { position: absolute; right: max(12px, env(safe-area-inset-right)); bottom: calc(34px + env(safe-area-inset-bottom)); display: grid; gap: 10px; pointer-events: none; }
+.map3d-buttons > * { pointer-events: auto; }
+@media (max-height: 660px) { .map3d-buttons { display: flex; flex-flow: column wrap-reverse; justify-content: flex-end; height: min(280px, calc(100% - 46px)); } }
 .map3d-group { display: grid; border-radius: 12px; background: var(--map3d-panel); box-shadow: var(--map3d-shadow); overflow: hidden; }
 .map3d-group button { width: 44px; height: 44px; padding: 0; border: 0; background: none; }
 .map3d-group button + button { border-top: 1px solid var(--map3d-line); }
@@ -50,12 +51,13 @@ export const STYLES = `
 .map3d-compass .map3d-south { fill: var(--map3d-faint); stroke: none; opacity: 0.55; }
 @media (prefers-reduced-motion: reduce) { .map3d-compass svg { transition: none; } }
 
-.map3d-scale { position: absolute; left: max(16px, env(safe-area-inset-left)); bottom: calc(8px + env(safe-area-inset-bottom)); height: 14px; box-sizing: border-box; border: solid var(--map3d-faint); border-width: 0 1.5px 1.5px;
-  color: var(--map3d-faint); font-size: 11px; line-height: 12px; text-align: center; text-shadow: 0 0 3px var(--map3d-background), 0 0 3px var(--map3d-background); pointer-events: none; }
+.map3d-scale { position: absolute; left: max(16px, env(safe-area-inset-left)); bottom: calc(8px + env(safe-area-inset-bottom)); height: 14px; box-sizing: border-box; border: solid var(--map3d-faint); border-width: 0 1.5px 1.5px; background: var(--map3d-panel);
+  color: var(--map3d-faint); font-size: 11px; line-height: 12px; text-align: center; pointer-events: none; }
 .map3d-scale[hidden] { display: none; }
 
 .map3d-attribution { position: absolute; right: 0; bottom: 0; max-width: 100%; box-sizing: border-box; margin: 0; padding: 3px 12px calc(4px + env(safe-area-inset-bottom));
-  color: var(--map3d-faint); font-size: 11px; text-align: right; text-shadow: 0 0 3px var(--map3d-background), 0 0 3px var(--map3d-background); pointer-events: none; }
+  border-radius: 8px 0 0; background: var(--map3d-panel); color: var(--map3d-faint); font-size: 11px; text-align: right; pointer-events: none; }
+.map3d-attribution:empty { display: none; }
 .map3d-message { position: absolute; inset: 0; display: grid; place-content: center; margin: 0; padding: 24px; text-align: center; max-width: 42ch; justify-self: center; margin-inline: auto; }
 
 .map3d-marker { position: absolute; left: 0; top: 0; width: 44px; height: 44px; margin: -22px 0 0 -22px; padding: 0; border: 0; background: none; pointer-events: auto; }
@@ -81,7 +83,7 @@ export const STYLES = `
 .map3d-popup-close svg { width: 16px; height: 16px; }
 
 .map3d-debug { position: absolute; inset: 0; font: 11px/1.2 ui-monospace, monospace; }
-.map3d-debug > div { position: absolute; box-sizing: border-box; padding: 3px; border: 1px solid rgb(200 30 90 / 0.7); color: rgb(170 10 70); overflow: hidden; }
+.map3d-debug > div { position: absolute; box-sizing: border-box; padding: 3px; border: 1px solid rgb(200 30 90 / 0.7); color: rgb(170 10 70); overflow: hidden; white-space: pre; }
 .map3d-debug > p { position: absolute; top: 4px; left: 4px; margin: 0; padding: 2px 6px; background: var(--map3d-panel); }
 
 @media (prefers-contrast: more), (forced-colors: active) {

@@ -3,7 +3,7 @@ import type { Browser, BrowserContextOptions } from "playwright-core";
 import type { Fixture } from "../fixture/rendering";
 import { TestServer } from "../fixture/server";
 import { openBrowser, openPage } from "./browser";
-import { BARE, type Global } from "./page";
+import { BARE, begin } from "./page";
 
 type Renderings = Readonly<Record<string, Fixture>>;
 type Opened = ReturnType<typeof openPage>;
@@ -24,9 +24,10 @@ export class TestBed {
   readonly server: TestServer;
   #browser: Browser | undefined;
 
-  constructor(renderings: Renderings) {
+  /** @param env of the browser */
+  constructor(renderings: Renderings, env: Record<string, string> = {}) {
     this.server = serve(renderings);
-    beforeAll(async () => { this.#browser = await openBrowser(); });
+    beforeAll(async () => { this.#browser = await openBrowser(env); });
     afterAll(() => this.#browser?.close());
   }
 
@@ -48,16 +49,7 @@ export class TestBed {
   /** A page with a map that has drawn its first complete view and rests. Its rendering: a name here, or addresses. */
   async start(rendering: string | string[], options: object = {}, layer: object = {}, context: BrowserContextOptions = {}): Opened {
     const opened = await this.bare(context);
-    await opened.page.evaluate(([urls, mapOptions, layerOptions]) => new Promise<void>((done) => {
-      const g = globalThis as Global;
-      g.map = new g.map3d.map("mapcanvas", { preserveDrawingBuffer: true, ...mapOptions });
-      g.layer = new g.map3d.imageLayer(urls, layerOptions).addTo(g.map);
-      g.errors = [];
-      g.clicks = [];
-      g.map.on("error", ({ error }) => g.errors.push(error.message));
-      g.map.on("click", (event) => g.clicks.push(event));
-      g.map.once("idle", () => { done(); });
-    }), [typeof rendering === "string" ? this.url(rendering) : rendering, options, layer] as const);
+    await opened.page.evaluate(begin, [typeof rendering === "string" ? this.url(rendering) : rendering, options, layer] as const);
     return opened;
   }
 }

@@ -5,10 +5,10 @@ import { chromium, type Browser, type BrowserContextOptions, type Page } from "p
 export const OUT = resolve(import.meta.dirname, "../../.shots");
 mkdirSync(OUT, { recursive: true });
 
-/** Chromium with software WebGL2. Its path: CHROMIUM, else Debian's. */
-export async function openBrowser(): Promise<Browser> {
+/** Chromium with software WebGL2. Its path: CHROMIUM, else Debian's. @param env what it is told besides this process's environment */
+export async function openBrowser(env: Record<string, string> = {}): Promise<Browser> {
   const args = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"];
-  return chromium.launch({ executablePath: process.env["CHROMIUM"] ?? "/usr/bin/chromium", headless: true, args });
+  return chromium.launch({ executablePath: process.env["CHROMIUM"] ?? "/usr/bin/chromium", headless: true, args, env: { ...process.env, ...env } });
 }
 
 /** A page whose errors and console errors fail the test that looks at them. */

@@ -1,7 +1,8 @@
-import { readdirSync, readFileSync } from "node:fs";
-import { join } from "node:path";
+import { readdirSync, readFileSync, rmSync } from "node:fs";
+import { dirname, join } from "node:path";
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
+import { published, writeFolder } from "../fixture/folder";
 import { renderTown } from "../fixture/rendering";
 import { TestBed } from "./bed";
 import { OUT } from "./browser";
@@ -10,7 +11,7 @@ import { VIEWER } from "./package";
 const bed = new TestBed({ town: renderTown() });
 const FOLDER = join(VIEWER, "examples");
 const FILES = readdirSync(FOLDER).filter((file) => file.endsWith(".html"));
-const ORDER = ["shortest", "markers", "attributes", "theme", "measure", "sun", "search", "company", "styles", "link"];
+const ORDER = ["shortest", "markers", "attributes", "theme", "measure", "sun", "search", "company", "styles", "link", "model", "files"];
 const COLOURS = 24;
 
 /** How many colours a part of the page has: a map that shows something has many. */
@@ -113,9 +114,28 @@ const POINTS: Readonly<Record<string, (page: Page, picture: Buffer) => Promise<v
     expect(page.url()).toContain("#90-45/");
     expect(Math.hypot(...from.map((part, k) => part - (to[k] ?? 0)))).toBeLessThan(2);
   },
+  model: async (page, standing) => {
+    await page.mouse.click(400, 338);
+    await page.getByText("base, 502.0 m").waitFor();
+    await page.getByRole("button", { name: "Turn the crane" }).click();
+    await page.waitForTimeout(1000);
+    expect(standing.equals(await page.screenshot())).toBe(false);
+    await page.getByRole("button", { name: "Stop the crane" }).click();
+    await still(page);
+  },
+  files: async (page, before) => {
+    const folder = writeFolder(published(renderTown(64, 0.76)), "mine");
+    const chooser = page.waitForEvent("filechooser");
+    await page.getByRole("button", { name: "Open a map folder from this device" }).click();
+    await (await chooser).setFiles(folder);
+    await page.getByText("A small town: 4 directions, read from your device.").waitFor();
+    expect((await still(page)).equals(before)).toBe(false);
+    expect(await page.evaluate("[map.layers.length, files.layer.source === map.layers[0].source]")).toEqual([1, true]);
+    rmSync(dirname(folder), { recursive: true });
+  },
 };
 
-test("there are ten, and the page that lists them names all", () => {
+test("there are eleven, and the page that lists them names all", () => {
   expect(FILES.sort()).toEqual([...ORDER.map((name) => `${name}.html`), "examples.html"].sort());
   const index = readFileSync(join(FOLDER, "examples.html"), "utf8");
   expect([...index.matchAll(/<li><a href="(\w+)\.html">/g)].map(([, name]) => name)).toEqual(ORDER);

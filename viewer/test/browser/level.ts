@@ -13,17 +13,22 @@ export function decodedLevel(town: Fixture, layer: "color" | "normal" | "id"): (
   };
 }
 
-/** Canvas pixel of level 3's first pixel. */
-export const placeOf = (page: Page): Promise<[number, number]> => page.evaluate(() => {
+/** Where the left top corner of the view's square lies on the map, in CSS pixels. */
+export const cornerOf = (page: Page): Promise<[number, number]> => page.evaluate(() => {
   const { map, layer } = globalThis as Global;
   const view = layer.rendering?.views.get(map.direction);
   if (!view) throw new Error("no view");
   const { frame } = view;
   const { right, up } = frame.axes;
   const world = [0, 1, 2].map((k) => (layer.rendering?.json.origin[k] ?? 0) + frame.u0 * (right[k] ?? 0) + frame.v0 * (up[k] ?? 0)) as [number, number, number];
-  const [x, y] = map.project(world) as [number, number];
-  return [Math.round(x), Math.round(y)];
+  return map.project(world) as [number, number];
 });
+
+/** Canvas pixel of level 3's first pixel. */
+export const placeOf = async (page: Page): Promise<[number, number]> => {
+  const [x, y] = await cornerOf(page);
+  return [Math.round(x), Math.round(y)];
+};
 
 /** What a pixel gets of the sky's and of the sun's light. */
 export type Shares = readonly [sky: number, sun: number];

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
-import { tileId } from "../../src/tiles/pmtiles";
-import { archive, renderRamp, renderTown, type Fixture } from "../fixture/rendering";
+import { published } from "../fixture/folder";
+import { renderRamp, renderTown, type Fixture } from "../fixture/rendering";
 import { encodePng } from "../fixture/encodePng";
 import { ORIGIN } from "../fixture/town";
 import { serve, TestBed } from "./bed";
@@ -11,24 +11,6 @@ const town = renderTown(64, 0.76);
 
 const bed = new TestBed({ town, ramp: renderRamp(), published: published(town) });
 const other = serve({ town });
-
-/** The town as a folder with archives instead of tiles. */
-function published({ json, files, raw }: Fixture): Fixture {
-  const out = new Map([...files].filter(([path]) => path.startsWith("objects/")));
-  const views = json.views.map((view) => {
-    const archives = Object.fromEntries(json.layers.map(({ name }) => [name, `${view.id}/${name}.pmtiles`]));
-    for (const [name, path] of Object.entries(archives)) out.set(path, archive(tilesOf(files, `${view.id}/${name}/`)));
-    return { ...view, archives };
-  });
-  return { json: { ...json, views }, files: out, raw };
-}
-
-function tilesOf(files: Map<string, Uint8Array>, folder: string): [number, Uint8Array][] {
-  return [...files].filter(([path]) => path.startsWith(folder)).map(([path, bytes]) => {
-    const [z = 0, x = 0, y = 0] = path.slice(folder.length).split("/").map(Number);
-    return [tileId({ z, x, y }), bytes];
-  });
-}
 
 test.each([[4, 2.4], [3.37, 3.4], [2.5, 6.2]])("at zoom %d no seam is seen between tiles", async (zoom, most) => {
   const { page } = await bed.start("ramp", { zoom, light: { lit: false } });
@@ -129,11 +111,12 @@ test("hovering names what lies under the pointer", async () => {
   await page.context().close();
 });
 
-test("the debug overlay names the tiles", async () => {
+test("the debug overlay names the tiles, and tells their layers' bytes and ages", async () => {
   const { page } = await bed.start("town", { zoom: 4 });
   await settled(page, () => (globalThis as Global).map.debug(true), null);
   await page.screenshot({ path: `${OUT}/debug.png` });
-  expect(await page.locator(".map3d-debug > div").first().textContent()).toMatch(/^3\/\d\/\d × 2\.00$/);
+  expect(await page.locator(".map3d-debug > div").first().textContent()).toMatch(/^3\/\d\/\d × 2\.00\nnormal [1-9]*\d\.\d kB, \d s\ncolor [1-9]*\d\.\d kB, \d s$/);
+  expect(await page.locator(".map3d-debug > div").allTextContents()).not.toEqual(expect.arrayContaining([expect.stringMatching(/ 0\.0 kB/)]));
   await page.context().close();
 });
 

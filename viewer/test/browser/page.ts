@@ -12,6 +12,20 @@ export interface Started {
 
 export type Global = typeof globalThis & Started & { errors: string[]; clicks: M.ClickEvent[]; map3d: typeof M };
 
+/** Makes a map in the bare page and waits until it rests. */
+export function begin([urls, mapOptions, layerOptions]: readonly [string | string[], object, object]): Promise<void> {
+  return new Promise((done) => {
+    const g = globalThis as Global;
+    g.map = new g.map3d.map("mapcanvas", { preserveDrawingBuffer: true, ...mapOptions });
+    g.layer = new g.map3d.imageLayer(urls, layerOptions).addTo(g.map);
+    g.errors = [];
+    g.clicks = [];
+    g.map.on("error", ({ error }) => g.errors.push(error.message));
+    g.map.on("click", (event) => g.clicks.push(event));
+    g.map.once("idle", () => { done(); });
+  });
+}
+
 /** Does something in the page and waits until the map rests again. */
 export function settled<A>(page: Page, act: (argument: A) => unknown, argument: A): Promise<void> {
   return page.evaluate(([code, given]) => new Promise<void>((done) => {

@@ -65,7 +65,7 @@ export interface Names {
 }
 
 /** @param scale texels a device pixel */
-export function lookOf({ light, dpr }: FrameSpec, pass: Pass, scale: number, { highlight, finish }: Names): Look {
+export function lookOf({ light, dpr }: Pick<FrameSpec, "light" | "dpr">, pass: Pass, scale: number, { highlight, finish }: Names): Look {
   const mode = pass.mode === "lit" && !light.lit ? "color" : pass.mode;
   const colored = mode === "lit" || mode === "color" || mode === "picture";
   return {

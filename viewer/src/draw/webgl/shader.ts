@@ -104,14 +104,23 @@ const DEPTH = `
 #if defined(COMBINED) || defined(SHADED)
 uniform vec2 u_depths;    // share of the range at value 0, and a value more
 const uint NONE = 0xffffffffu;
-uint depthAt(ivec2 texel) { return texelFetch(u_depth, inside(texel), 0).r; }
+uniform uint u_steep;     // values by which neighbours on one surface differ at most
+uint depthAt(ivec2 texel) { return texelFetch(u_depth, clamp(texel, u_bounds.xy, u_bounds.zw) + GUTTER, 0).r; }
 
-/** Of a pixel that is covered in part but has no depth: that of the nearest around it. */
+/** Between the four nearest texels where they are of one surface. Of a pixel that is covered in part but has no depth: that of the nearest around it. */
 float shareOf(vec2 texel) {
-  ivec2 at = ivec2(floor(texel));
-  uint d = depthAt(at);
-  if (d == NONE) for (int k = 0; k < 9; k++) d = min(d, depthAt(at + ivec2(k % 3 - 1, k / 3 - 1)));
-  return d == NONE ? 1.0 : u_depths.x + float(d) * u_depths.y;
+  ivec2 at = ivec2(floor(texel - 0.5));
+  vec2 f = texel - 0.5 - vec2(at);
+  uvec4 four = uvec4(depthAt(at), depthAt(at + ivec2(1, 0)), depthAt(at + ivec2(0, 1)), depthAt(at + 1));
+  uint d = min(min(four.x, four.y), min(four.z, four.w));
+  vec4 more = vec4(four - d);
+  if (max(max(four.x, four.y), max(four.z, four.w)) - d > u_steep || d == NONE) {
+    at = ivec2(floor(texel));
+    d = depthAt(at);
+    if (d == NONE) for (int k = 0; k < 9; k++) d = min(d, depthAt(at + ivec2(k % 3 - 1, k / 3 - 1)));
+    more = vec4(0.0);
+  }
+  return d == NONE ? 1.0 : u_depths.x + (float(d) + mix(mix(more.x, more.y, f.x), mix(more.z, more.w, f.x), f.y)) * u_depths.y;
 }
 #endif
 `;

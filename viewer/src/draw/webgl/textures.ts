@@ -24,9 +24,6 @@ export class Textures {
   constructor(gl: WebGL2RenderingContext) {
     this.#gl = gl;
     this.#reader = gl.createFramebuffer();
-    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-    gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, false);
-    gl.pixelStorei(gl.UNPACK_COLORSPACE_CONVERSION_WEBGL, gl.NONE);
   }
 
   get(key: string): TileTexture | undefined {
@@ -78,6 +75,11 @@ export class Textures {
     const gl = this.#gl;
     const { width, height } = data;
     const [, format, type] = this.#formatOf(data.kind);
+    // Guests upload in other ways.
+    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
+    gl.pixelStorei(gl.UNPACK_FLIP_Y_WEBGL, false);
+    gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, false);
+    gl.pixelStorei(gl.UNPACK_COLORSPACE_CONVERSION_WEBGL, gl.NONE);
     if ("bitmap" in data) gl.texSubImage2D(gl.TEXTURE_2D, 0, GUTTER, GUTTER, format, type, data.bitmap);
     else gl.texSubImage2D(gl.TEXTURE_2D, 0, GUTTER, GUTTER, width, height, format, type, data.values);
   }

@@ -1,15 +1,15 @@
 import { DrawError } from "../../core/errors";
-import { dot, type Vec2, type Vec3 } from "../../core/vec";
-import { cssPixelM, type Camera } from "../../geo/camera";
+import type { Vec2, Vec3 } from "../../core/vec";
 import { towardsLight } from "../../geo/light";
 import type { LayerKind } from "../../geo/manifest";
 import { bakedKinds, neededKinds, type Drawer, type DrawerEvents, type FrameSpec, type Mode, type Pass, type Quad } from "../drawer";
-import { firstOf, rangeOf, type Depths } from "../combine";
+import { firstOf, guestLead, rangeOf, steepOf, type Depths } from "../combine";
 import { packColor, packFinish } from "../finish";
-import { DepthPicture } from "./depthPicture";
-import { idTable, tableShape, type IdTable } from "./idTable";
+import { DeepCanvas } from "./deepCanvas";
+import { FoundLight, guestRanges } from "./foundLight";
 import { Programs, unitOf, type Program } from "./program";
-import { boundsOf, SPARE_UNIT, Textures, type TileTexture } from "./textures";
+import { Tables } from "./tables";
+import { boundsOf, Textures, type TileTexture } from "./textures";
 
 const SAMPLERS = {
   color: "u_color", picture: "u_color", normal: "u_normal", id: "u_id", depth: "u_depth", depth2: "u_depth", sun: "u_shadow", sun16: "u_shadow", ao: "u_ao",
@@ -27,19 +27,6 @@ interface Ready {
   readonly depth: TileTexture | undefined;
 }
 
-/** Light that was found for a frame. */
-interface Shares {
-  readonly texture: WebGLTexture;
-  /** Of D. */
-  readonly range: Vec2;
-  /** For whom it was found, and device pixels a pixel of it. */
-  readonly camera: Camera;
-  readonly step: number;
-  readonly height: number;
-  /** Of the range: what counts as the same depth. */
-  readonly same: number;
-}
-
 export interface WebGLOptions {
   /** Keep the picture readable after a frame: for tests and screenshots; costs memory. */
   preserve: boolean;
@@ -55,41 +42,43 @@ export class WebGLDrawer implements Drawer {
   readonly #listeners = new AbortController();
   #programs: Programs;
   #textures: Textures;
-  #picture: DepthPicture | undefined;
-  #shares: Shares | null = null;
-  #tables = new Map<ReadonlyMap<number, unknown>, { table: IdTable; texture: WebGLTexture }>();
+  #tables: Tables;
+  #found: FoundLight;
+  #deep: DeepCanvas | undefined;
 
   /** @throws DrawError when the browser has no WebGL2 */
   constructor(canvas: HTMLCanvasElement, options: WebGLOptions, events: DrawerEvents) {
-    const settings: WebGLContextAttributes = { alpha: true, premultipliedAlpha: true, antialias: false, depth: true, stencil: false, preserveDrawingBuffer: options.preserve };
+    const settings: WebGLContextAttributes = { alpha: true, premultipliedAlpha: true, antialias: false, depth: false, stencil: false, preserveDrawingBuffer: options.preserve };
     const gl = canvas.getContext("webgl2", settings);
     if (!gl) throw new DrawError("this browser offers no WebGL2, which the map needs to draw; update it or switch hardware acceleration on");
     this.gl = gl;
     this.#canvas = canvas;
     this.#programs = new Programs(gl);
     this.#textures = new Textures(gl);
+    this.#tables = new Tables(gl);
+    this.#found = new FoundLight(gl);
     this.#watch(events);
   }
 
   draw(frame: FrameSpec): void {
     const gl = this.gl;
     if (gl.isContextLost()) return;
-    this.#shares = this.#sharesFor(frame);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, frame.into?.framebuffer ?? null);
-    gl.viewport(0, 0, frame.width, frame.height);
-    gl.clearColor(0, 0, 0, 0);
-    gl.depthMask(true);
-    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    gl.enable(gl.BLEND);
-    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    gl.depthFunc(gl.LEQUAL);
+    gl.disable(gl.CULL_FACE);
+    this.#found.find(frame, (coarse, pass, range) => { this.#drawPass(coarse, pass, range, false); });
     const combined = frame.passes.filter(({ depths }) => depths);
+    const range = frame.into?.range ?? this.#found.range ?? rangeOf(combined.flatMap(({ depths }) => depths ?? []), guestRanges(frame));
+    const lead = Math.max(0, ...combined.map(({ depths, level }) => (depths ? guestLead(depths.frame, level) : 0)));
+    if (range) for (const guest of frame.guests) guest.prepare(gl, frame, [range[0] + lead, range[1] + lead]);
+    const deep = this.#deepFor(frame, combined.length + frame.guests.length > 0);
+    this.#begin(frame, frame.into?.framebuffer ?? deep?.framebuffer ?? null);
     for (const pass of frame.passes) {
       if (!pass.depths) this.#drawPass(frame, pass, null, false);
-      else if (pass === combined[0]) this.#drawTogether(frame, combined);
+      else if (pass === combined[0]) this.#drawTogether(frame, combined, range);
     }
+    if (combined.length === 0) this.#drawTogether(frame, [], range);
     gl.disable(gl.SCISSOR_TEST);
-    this.#dropTables(frame.passes);
+    if (!frame.into) deep?.show();
+    this.#tables.keep(new Set(frame.passes.flatMap(({ highlight, finishes }) => [highlight, ...(finishes ? [finishes.byId] : [])])));
   }
 
   release(key: string): void {
@@ -99,60 +88,54 @@ export class WebGLDrawer implements Drawer {
   destroy(): void {
     this.#listeners.abort();
     this.#textures.clear();
-    this.#dropTables([]);
-    this.#picture?.free();
+    this.#tables.keep(new Set());
+    this.#found.free();
+    this.#deep?.free();
   }
 
-  /** Has light found for what the frame shows; null where all that is wanted was rendered. */
-  #sharesFor(frame: FrameSpec): Shares | null {
-    const { gl } = this;
-    const { shade, light } = frame;
-    if (!shade || !frame.passes.some((pass) => isShaded(frame, pass))) return null;
-    const step = Math.max(1, frame.dpr);
-    const last = this.#shares;
-    if (shade.moving && last?.camera.frame === shade.camera.frame && last.step === step && !frame.into) return last;
-    const [width, height] = [Math.ceil(frame.width / step), Math.ceil(frame.height / step)];
-    const range = frame.into?.range ?? (rangeOf(frame.passes.flatMap(({ relief }) => relief ?? [])) as Vec2);
-    const px_m = (cssPixelM(shade.camera) * step) / frame.dpr;
-    const picture = this.#pictureOf(width, height);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, picture.framebuffer);
-    gl.viewport(0, 0, width, height);
-    gl.depthMask(true);
-    gl.disable(gl.SCISSOR_TEST);
-    gl.clear(gl.DEPTH_BUFFER_BIT);
-    gl.enable(gl.DEPTH_TEST);
-    gl.depthFunc(gl.LEQUAL);
-    for (const pass of frame.passes) if (pass.relief && pass.opacity === 1) this.#drawPass({ ...frame, width, height }, depthsAlone(pass, step), range, false);
-    const { right, up, forward } = shade.camera.frame.axes;
-    const towards = towardsLight(light);
-    const sun: Vec3 | null = hasShadows(frame) ? [dot(right, towards), dot(up, towards), dot(forward, towards)] : null;
-    const texture = shade.by.sharesOf({ gl, depth: picture.texture, width, height, px_m, range, sun, occlusion: light.occlusion });
-    gl.disable(gl.DEPTH_TEST);
-    return { texture, range, camera: shade.camera, step, height, same: (2 * px_m) / (range[1] - range[0]) + 1 / 65535 };
+  /** What the frame is drawn in when it needs depth; kept from frame to frame as long as they do. */
+  #deepFor({ into, width, height }: FrameSpec, needed: boolean): DeepCanvas | undefined {
+    if (into || (needed && this.#deep?.width === width && this.#deep.height === height)) return this.#deep;
+    this.#deep?.free();
+    return (this.#deep = needed ? new DeepCanvas(this.gl, width, height) : undefined);
   }
 
-  #pictureOf(width: number, height: number): DepthPicture {
-    if (this.#picture?.width === width && this.#picture.height === height) return this.#picture;
-    this.#picture?.free();
-    return (this.#picture = new DepthPicture(this.gl, width, height));
-  }
-
-  /** Passes that hide each other by depth: all that is solid, then edges and what lets through. */
-  #drawTogether(frame: FrameSpec, passes: readonly Pass[]): void {
+  #begin({ width, height }: FrameSpec, framebuffer: WebGLFramebuffer | null): void {
     const gl = this.gl;
-    const range = frame.into?.range ?? this.#shares?.range ?? rangeOf(passes.flatMap(({ depths }) => depths ?? []));
+    gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+    gl.viewport(0, 0, width, height);
+    gl.clearColor(0, 0, 0, 0);
+    gl.depthMask(true);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.disable(gl.DEPTH_TEST);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    gl.depthFunc(gl.LEQUAL);
+  }
+
+  /** Passes and guests that hide each other by depth: all that is solid, then edges and what lets through. */
+  #drawTogether(frame: FrameSpec, passes: readonly Pass[], range: Vec2 | null): void {
+    const gl = this.gl;
+    if (!range) return;
     gl.enable(gl.DEPTH_TEST);
     for (const pass of passes) if (pass.opacity === 1) this.#drawPass(frame, pass, range, false);
+    this.#drawGuests(frame, false);
     gl.depthMask(frame.into !== undefined);
     for (const pass of passes) this.#drawPass(frame, pass, range, true);
+    this.#drawGuests(frame, true);
     gl.disable(gl.DEPTH_TEST);
+  }
+
+  #drawGuests(frame: FrameSpec, soft: boolean): void {
+    this.gl.disable(this.gl.SCISSOR_TEST);
+    for (const guest of frame.guests) guest.paint(this.gl, frame, soft);
   }
 
   /** @param range of D, of what is drawn together  @param soft only what lets through */
   #drawPass(frame: FrameSpec, pass: Pass, range: Vec2 | null, soft: boolean): void {
     this.#clip(frame, pass);
     const mode: Mode = pass.mode === "lit" && !frame.light.lit ? "color" : pass.mode;
-    const shaded = this.#shares !== null && mode === "lit" && isShaded(frame, pass);
+    const shaded = mode === "lit" && this.#found.lights(frame, pass);
     // All are uploaded before the first is drawn, so that gutters have their neighbours' pixels.
     for (const ready of pass.quads.map((quad) => this.#readyOf(pass, mode, quad, shaded))) {
       const { quad, textures, baked, ids, depth } = ready;
@@ -162,10 +145,14 @@ export class WebGLDrawer implements Drawer {
       const finish = ids !== undefined && pass.finishes !== null;
       const program = this.#programs.use({ mode, masked: pass.masked, highlight: ids !== undefined && pass.highlight.size > 0, finish, shadow, occlusion: has("ao"), combined: range !== null, shaded: depth !== undefined });
       for (const [kind, texture] of [...textures, ...baked]) this.#bind(kind, texture);
-      if (depth && this.#shares && pass.relief) this.#setShares(program, frame, pass, this.#shares, depth);
-      if (range && pass.depths) this.#setDepths(program, pass.depths, range, soft);
+      if (depth && pass.relief && this.#found.range) {
+        this.#bind("depth", depth);
+        this.#setDepths(program, pass.relief, quad, this.#found.range, false);
+        this.#found.bind(program, frame, pass);
+      }
+      if (range && pass.depths) this.#setDepths(program, pass.depths, quad, range, soft);
       if (ids) this.#bindIds(program, pass, quad, ids, frame.dpr);
-      this.#drawQuad(frame, pass, quad, program, [...textures, ...baked, ["id", ids] as const].flatMap(([, texture]) => texture ?? []));
+      this.#drawQuad(frame, pass, quad, program, [...textures, ...baked, ["id", ids] as const, ["depth", depth] as const].flatMap(([, texture]) => texture ?? []));
     }
   }
 
@@ -221,23 +208,9 @@ export class WebGLDrawer implements Drawer {
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
   }
 
-  #setShares(program: Program, frame: FrameSpec, { baked, relief }: Pass, { texture, range, camera, step, height, same }: Shares, depth: TileTexture): void {
-    const { gl } = this;
-    this.#bind("depth", depth);
-    gl.activeTexture(gl.TEXTURE0 + unitOf("u_shares"));
-    gl.bindTexture(gl.TEXTURE_2D, texture);
-    if (relief) this.#setDepths(program, relief, range, false);
-    const now = frame.shade?.camera ?? camera;
-    const [px, times] = [cssPixelM(camera), frame.dpr / step];
-    const larger = cssPixelM(now) / px;
-    const [x, y] = [(now.u - camera.u) / px + camera.width / 2 - (larger * now.width) / 2, (camera.v - now.v) / px + camera.height / 2 - (larger * now.height) / 2];
-    gl.uniform4f(program.at("u_onto"), larger / step, x * times, y * times, height);
-    gl.uniform1f(program.at("u_same"), same);
-    gl.uniform2i(program.at("u_found"), Number(frame.light.occlusion && !baked.occlusion), Number(hasShadows(frame) && !baked.shadow));
-  }
-
-  #setDepths(program: Program, depths: Depths, [near, far]: Vec2, soft: boolean): void {
+  #setDepths(program: Program, depths: Depths, { from }: Quad, [near, far]: Vec2, soft: boolean): void {
     this.gl.uniform2f(program.at("u_depths"), (firstOf(depths) - near) / (far - near), depths.unit_m / (far - near));
+    this.gl.uniform1ui(program.at("u_steep"), steepOf(depths, from.z));
     this.gl.uniform1i(program.at("u_soft"), Number(soft));
   }
 
@@ -256,41 +229,10 @@ export class WebGLDrawer implements Drawer {
     const gl = this.gl;
     this.#bind("id", ids);
     gl.uniform1f(program.at("u_rim"), Math.max(1, 1.25 * dpr * quad.scale));
-    if (highlight.size > 0) this.#bindTable(program, ["u_table", "u_mask", "u_probes", "u_one"], highlight, () => idTable(highlight, packColor));
+    if (highlight.size > 0) this.#tables.bind(program, ["u_table", "u_mask", "u_probes", "u_one"], highlight, packColor);
     if (!finishes) return;
-    this.#bindTable(program, ["u_finishes", "u_finishMask", "u_finishProbes", "u_finishOne"], finishes.byId, () => idTable(finishes.byId, packFinish));
+    this.#tables.bind(program, ["u_finishes", "u_finishMask", "u_finishProbes", "u_finishOne"], finishes.byId, packFinish);
     gl.uniform1ui(program.at("u_others"), packFinish(finishes.others));
-  }
-
-  #bindTable(program: Program, [sampler, mask, probes, one]: readonly ["u_table" | "u_finishes", string, string, string], values: ReadonlyMap<number, unknown>, make: () => IdTable): void {
-    const gl = this.gl;
-    const { table, texture } = this.#tables.get(values) ?? this.#uploadTable(values, make());
-    gl.activeTexture(gl.TEXTURE0 + unitOf(sampler));
-    gl.bindTexture(gl.TEXTURE_2D, texture);
-    gl.uniform1ui(program.at(mask), table.mask);
-    gl.uniform1i(program.at(probes), table.probes);
-    gl.uniform2ui(program.at(one), ...table.one);
-  }
-
-  #uploadTable(values: ReadonlyMap<number, unknown>, table: IdTable): { table: IdTable; texture: WebGLTexture } {
-    const gl = this.gl;
-    const texture = gl.createTexture();
-    const [width, height] = tableShape(table);
-    gl.activeTexture(gl.TEXTURE0 + SPARE_UNIT);
-    gl.bindTexture(gl.TEXTURE_2D, texture);
-    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
-    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RG32UI, width, height, 0, gl.RG_INTEGER, gl.UNSIGNED_INT, table.places);
-    this.#tables.set(values, { table, texture });
-    return { table, texture };
-  }
-
-  #dropTables(passes: readonly Pass[]): void {
-    for (const [values, { texture }] of this.#tables) {
-      if (passes.some(({ highlight, finishes }) => highlight === values || finishes?.byId === values)) continue;
-      this.gl.deleteTexture(texture);
-      this.#tables.delete(values);
-    }
   }
 
   #watch(events: DrawerEvents): void {
@@ -302,27 +244,14 @@ export class WebGLDrawer implements Drawer {
     const restored = (): void => {
       this.#programs = new Programs(this.gl);
       this.#textures = new Textures(this.gl);
-      this.#picture = undefined;
-      this.#tables = new Map();
+      this.#tables = new Tables(this.gl);
+      this.#found = new FoundLight(this.gl);
+      this.#deep = undefined;
       events.restored();
     };
     this.#canvas.addEventListener("webglcontextlost", lost, { signal });
     this.#canvas.addEventListener("webglcontextrestored", restored, { signal });
   }
-}
-
-const hasShadows = ({ light }: FrameSpec): boolean => light.shadows && light.altitude_deg > 0;
-
-/** Is there light that was not rendered, and a way to find it? */
-function isShaded(frame: FrameSpec, { mode, relief, baked }: Pass): boolean {
-  const { light, shade } = frame;
-  return shade !== undefined && shade !== null && relief !== null && mode === "lit" && light.lit && ((light.occlusion && !baked.occlusion) || (hasShadows(frame) && !baked.shadow));
-}
-
-/** A pass that draws depths alone, on a screen whose pixels are `step` times as large. */
-function depthsAlone(pass: Pass, step: number): Pass {
-  const quads = pass.quads.map(({ from, rect: [left, top, right, bottom], origin: [x, y], scale }) => ({ from, rect: [left / step, top / step, right / step, bottom / step] as const, origin: [x / step, y / step] as const, scale: scale * step }));
-  return { ...pass, mode: "depth", quads, highlight: new Map(), depths: pass.relief };
 }
 
 const scaled = ([x, y, z]: Vec3, by: number): Vec3 => [x * by, y * by, z * by];

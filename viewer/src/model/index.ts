@@ -1,0 +1,3 @@
+/** map3d-model: polygonal objects among the images, drawn by the page's three.js. */
+export { modelLayer, type ModelClick, type ModelLayerEvents, type ModelLayerOptions, type ModelSource, type PlayOptions } from "./modelLayer";
+export type { ModelLoader, Three, ThreeClip } from "./three";

@@ -1,0 +1,129 @@
+import { expect, test } from "vitest";
+import { devices, type CDPSession, type Page } from "playwright-core";
+import { renderTown } from "../fixture/rendering";
+import { ORIGIN } from "../fixture/town";
+import { TestBed } from "./bed";
+import { OUT } from "./browser";
+import { BARE, picture, type Global } from "./page";
+
+const bed = new TestBed({ town: renderTown() });
+bed.server.pages.set("/phone", BARE.replace("<title>", '<meta name="viewport" content="width=device-width, initial-scale=1"><title>'));
+const PHONE = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 3, isMobile: true, hasTouch: true, userAgent: devices["iPhone 14"].userAgent };
+/** Times slower than this machine. */
+const SLOW = 4;
+type Point = readonly [x: number, y: number];
+type World = [number, number, number];
+const GROUND: World = [ORIGIN[0] + 10, ORIGIN[1] + 4, ORIGIN[2]];
+const ROOF: World = [ORIGIN[0] - 45, ORIGIN[1] - 4, ORIGIN[2] + 34];
+
+/** Fingers on the screen. */
+class Hand {
+  constructor(private readonly page: Page, private readonly session: CDPSession) {}
+
+  /** Puts fingers down, moves them through the steps a frame of a fast screen apart, and lifts them, however long the page takes. */
+  async move(steps: readonly (readonly Point[])[]): Promise<void> {
+    const [start, sent]: [number, Promise<unknown>[]] = [Date.now() / 1000, []];
+    for (const [k, fingers] of [...steps, []].entries()) {
+      const type = k === 0 ? "touchStart" : k === steps.length ? "touchEnd" : "touchMove";
+      sent.push(this.session.send("Input.dispatchTouchEvent", { type, touchPoints: fingers.map(([x, y], id) => ({ x, y, id })), timestamp: start + 0.016 * k }));
+      await this.page.waitForTimeout(16);
+    }
+    await Promise.all(sent);
+  }
+
+  async tap(at: Point): Promise<void> {
+    await this.move([[at]]);
+  }
+}
+
+const steps = (count: number, at: (part: number) => readonly Point[]): (readonly Point[])[] => Array.from({ length: count + 1 }, (_, k) => at(k / count));
+const placeOf = (page: Page, world: World): Promise<Point> => page.evaluate((at) => (globalThis as Global).map.project(at) as Point, world);
+const zoomOf = (page: Page): Promise<number> => page.evaluate(() => (globalThis as Global).map.zoom);
+/** Waits until the map neither moves nor draws. */
+const resting = (page: Page): Promise<void> => page.evaluate(() => new Promise<void>((done) => {
+  const { map } = globalThis as Global;
+  let timer = setTimeout(done, 700);
+  map.on("move", () => {
+    clearTimeout(timer);
+    timer = setTimeout(done, 700);
+  });
+}));
+
+test.each(["webgl", "canvas"])("%s: on a slow phone the map opens; fingers drag, fling, pinch, turn, tap and tap twice", async (drawer) => {
+  const { page, problems } = await bed.openPage(PHONE);
+  await page.goto(`${bed.server.origin}/phone`);
+  const session = await page.context().newCDPSession(page);
+  await session.send("Emulation.setCPUThrottlingRate", { rate: SLOW });
+  await page.evaluate(([url, drawn]) => new Promise<void>((done) => {
+    const g = globalThis as Global;
+    g.clicks = [];
+    g.map = new g.map3d.map("mapcanvas", { zoom: 2.4, drawer: drawn as "webgl", preserveDrawingBuffer: true });
+    g.layer = new g.map3d.imageLayer(url).addTo(g.map);
+    g.map.on("click", (event) => g.clicks.push(event)).once("idle", () => { done(); });
+  }), [bed.url("town"), drawer] as const);
+  const hand = new Hand(page, session);
+  expect(await page.evaluate(() => [(globalThis as Global).map.drawer, (globalThis as Global).map.canvas.width, (globalThis as Global).map.canvas.height])).toEqual([drawer, 1170, 2532]);
+  const shown = await picture(page);
+  expect(shown.filter((value, k) => k % 4 === 3 && value === 255).length / (1170 * 2532)).toBeGreaterThan(0.15);
+  await page.screenshot({ path: `${OUT}/phone-${drawer}.png` });
+
+  // A drag that rests before the finger is lifted: the ground stays under it.
+  const from = await placeOf(page, GROUND);
+  const still = Array.from({ length: 9 }, () => [[from[0] + 60, from[1] - 80]] as const);
+  await hand.move([...steps(8, (part) => [[from[0] + 60 * part, from[1] - 80 * part]]), ...still]);
+  const dragged = await placeOf(page, GROUND);
+  expect(Math.hypot(dragged[0] - from[0] - 60, dragged[1] - from[1] + 80)).toBeLessThan(1.5);
+
+  // One that is lifted in motion goes on, and ends.
+  await hand.move(steps(8, (part) => [[300 - 120 * part, 400]]));
+  const lifted = await placeOf(page, GROUND);
+  await resting(page);
+  const flung = await placeOf(page, GROUND);
+  expect(lifted[0] - dragged[0]).toBeLessThan(-100);
+  expect(flung[0] - dragged[0]).toBeLessThan(-135);
+  expect(Math.abs(flung[1] - dragged[1])).toBeLessThan(2);
+
+  // Two fingers that part by twice: one level more, about what lies between them.
+  await page.evaluate((at) => (globalThis as Global).map.setView(at, 2.4), GROUND);
+  await resting(page);
+  const [before, between] = [await zoomOf(page), await page.evaluate(() => (globalThis as Global).map.unproject([200, 420]) as World)];
+  await hand.move(steps(10, (part) => [[200 - 50 * (1 + part), 420], [200 + 50 * (1 + part), 420]]));
+  expect(await zoomOf(page)).toBeCloseTo(before + 1, 1);
+  await resting(page);
+  const stayed = await placeOf(page, between);
+  expect(Math.hypot(stayed[0] - 200, stayed[1] - 420)).toBeLessThan(3);
+
+  // Two fingers that turn by 40 degrees: the next direction, and back.
+  const turn = (sign: number): Promise<void> => hand.move(steps(10, (part) => {
+    const [dx, dy] = [80 * Math.cos(sign * part * 0.7), 80 * Math.sin(sign * part * 0.7)];
+    return [[200 - dx, 420 - dy], [200 + dx, 420 + dy]];
+  }));
+  const direction = (): Promise<string> => page.evaluate(() => (globalThis as Global).map.direction);
+  await turn(1);
+  const turned = await direction();
+  expect(["90-45", "270-45"]).toContain(turned);
+  await resting(page);
+  await turn(-1);
+  expect(await direction()).toBe("0-45");
+  expect(await zoomOf(page)).toBeCloseTo(before + 1, 1);
+
+  // A tap picks; two taps zoom in where they are, and pick no second time at the same place.
+  await page.evaluate((at) => (globalThis as Global).map.setView(at, 2), ROOF);
+  await resting(page);
+  const roof = await placeOf(page, ROOF);
+  await hand.tap(roof);
+  await page.waitForFunction(() => (globalThis as Global).clicks.length > 0);
+  const click = await page.evaluate(() => (({ id, position }) => ({ id, position }))((globalThis as Global).clicks[0] as Global["clicks"][0]));
+  expect(click.id).toBe(17);
+  expect(click.position?.[2]).toBeCloseTo(ROOF[2], 2);
+  await page.waitForTimeout(400);
+  await hand.tap(roof);
+  await hand.tap(roof);
+  await page.waitForFunction(() => (globalThis as Global).map.zoom > 2.95);
+  await resting(page);
+  const zoomed = await placeOf(page, ROOF);
+  expect(Math.hypot(zoomed[0] - roof[0], zoomed[1] - roof[1])).toBeLessThan(2);
+  await page.screenshot({ path: `${OUT}/phone-${drawer}-end.png` });
+  expect(problems).toEqual([]);
+  await page.context().close();
+});

@@ -1,0 +1,102 @@
+import { describe, expect, test } from "vitest";
+import type { Page } from "playwright-core";
+import { levelFor } from "../../src/tiles/cover";
+import { frameOf } from "../../src/geo/frame";
+import { renderPainted, type Paint } from "../fixture/rendering";
+import { compareTo, stitch, type Errors } from "../fixture/stitched";
+import { TestBed } from "./bed";
+import { cornerOf } from "./level";
+import { picture, settled, type Global } from "./page";
+
+const [TILE, ZMAX] = [64, 3];
+const ZOOMS = Array.from({ length: 20 }, (_, k) => 1.53 + 0.1737 * k);
+const VIEWPORT = { width: 240, height: 180 };
+/** Middles of the view, metres from the origin: the picture's own, and one near its left top corner. */
+const MIDDLES = [[1.23, 4.56, 0], [-131.7, 133.3, 0]] as const;
+
+/** Steps between neighbours, so that a pixel too many or too few is seen; a hole that holds a tile; it and the picture are soft at their edges. */
+const speckled: Paint = (z, x, y) => {
+  const side = TILE * 2 ** z;
+  const noise = (k: number): number => (Math.imul(Math.imul(x + 1, 0x9e3779b1) ^ Math.imul(y + 7 * k + 1, 0x85ebca6b), 0xc2b2ae35) >>> 24) / 255;
+  const hole = Math.hypot(x + 0.5 - 0.4375 * side, y + 0.5 - 0.3125 * side) - 0.1 * side;
+  const rim = Math.min(x, y, side - 1 - x, side - 1 - y) - 1;
+  const wave = (at: number): number => 60 * Math.sin((at / side) * 19);
+  return [128 + wave(x) + 48 * (noise(0) - 0.5), 128 + wave(y) + 48 * (noise(1) - 0.5), 128 + wave(x + y) + 48 * (noise(2) - 0.5), 24 * Math.min(Math.max(rim, 0), Math.max(hole, 0), 255 / 24)];
+};
+
+const fixture = renderPainted("speckled", TILE, ZMAX, 150, speckled);
+const levels = Array.from({ length: ZMAX + 1 }, (_, z) => stitch(fixture, z));
+const frame = frameOf(fixture.json.views[0] as (typeof fixture.json.views)[0], fixture.json.size_m, TILE, ZMAX);
+const bed = new TestBed({ speckled: fixture });
+
+/** How far the map is from the stitched level, at a zoom and a middle. */
+async function errorsAt(page: Page, dpr: number, zoom: number, middle: readonly number[]): Promise<Errors> {
+  await settled(page, ([to, [x, y, z]]) => {
+    const { map, layer } = globalThis as Global;
+    const origin = layer.rendering?.json.origin ?? [0, 0, 0];
+    map.setView([origin[0] + x, origin[1] + y, origin[2] + z], to);
+  }, [zoom, middle as [number, number, number]] as const);
+  expect(await page.evaluate(() => (globalThis as Global).map.zoom)).toBe(zoom);
+  const [x, y] = await cornerOf(page);
+  const level = levelFor(frame, frame.size / (TILE * 2 ** zoom) / dpr, dpr);
+  return compareTo(levels[level] as (typeof levels)[0], { left: x * dpr, top: y * dpr, px: dpr * 2 ** (zoom - level) }, await picture(page), VIEWPORT.width * dpr);
+}
+
+const start = (drawer: string, dpr: number): ReturnType<TestBed["start"]> => bed.start("speckled", { drawer, light: { lit: false }, controls: false, attribution: false }, {}, { viewport: VIEWPORT, deviceScaleFactor: dpr });
+
+/** Levels of 255 that a premultiplied byte may be off: rounding and the shader's snap to pixels; the canvas mixes bytes, with weights of a few bits. */
+const TOLERANCE = { webgl: 1.5, canvas: 4 } as const;
+const DRAWERS = ["webgl", "canvas"] as const;
+
+test.each(DRAWERS.flatMap((drawer) => [1, 1.5, 3].map((dpr) => [drawer, dpr] as const)))("%s at pixel ratio %d: at twenty zooms the map is the stitched level, tile edges and all", async (drawer, dpr) => {
+  const { page, problems } = await start(drawer, dpr);
+  let [edges, elsewhere] = [0, 0];
+  for (const [k, zoom] of ZOOMS.entries()) {
+    const found = await errorsAt(page, dpr, zoom, MIDDLES[k % 2] ?? [0, 0, 0]);
+    expect(Math.max(found.edges, found.elsewhere), `at zoom ${String(zoom)} ${found.at}`).toBeLessThan(TOLERANCE[drawer]);
+    [edges, elsewhere] = [Math.max(edges, found.edges), Math.max(elsewhere, found.elsewhere)];
+  }
+  console.log(`seams, ${drawer}, pixel ratio ${String(dpr)}: off by ${edges.toFixed(2)} of 255 at tile edges, ${elsewhere.toFixed(2)} elsewhere`);
+  expect(Math.min(edges, elsewhere)).toBeGreaterThan(0.3);
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
+
+/** Faults that the test above has to see: what they do to the browser, and how far off that makes the map at least. */
+const faults = {
+  "quads a device pixel short": ["webgl", 80, () => {
+    const set = Object.getOwnPropertyDescriptor(WebGL2RenderingContext.prototype, "uniform4f")?.value as (this: WebGL2RenderingContext, ...given: unknown[]) => void;
+    WebGL2RenderingContext.prototype.uniform4f = function (at, left, ...rest) { set.call(this, at, left + 2 / this.canvas.width, ...rest); };
+  }],
+  "pixels of the tile beside not mixed in": ["webgl", 6, () => {
+    const set = Object.getOwnPropertyDescriptor(WebGL2RenderingContext.prototype, "uniform4i")?.value as (this: WebGL2RenderingContext, ...given: unknown[]) => void;
+    WebGL2RenderingContext.prototype.uniform4i = function (at) { set.call(this, at, 0, 0, 63, 63); };
+  }],
+  "a tile's first column left out": ["canvas", 80, () => {
+    const draw = Object.getOwnPropertyDescriptor(CanvasRenderingContext2D.prototype, "drawImage")?.value as (this: CanvasRenderingContext2D, ...given: unknown[]) => void;
+    CanvasRenderingContext2D.prototype.drawImage = function (this: CanvasRenderingContext2D, ...given: unknown[]): void {
+      const [image, x, y, width, height] = given as [ImageBitmap, number, number, number, number];
+      if (given.length === 5) draw.call(this, image, 1, 0, width - 1, height, x + 1, y, width - 1, height);
+      else draw.apply(this, given);
+    };
+  }],
+  "a tile's second column in place of its first": ["canvas", 12, () => {
+    const draw = Object.getOwnPropertyDescriptor(CanvasRenderingContext2D.prototype, "drawImage")?.value as (this: CanvasRenderingContext2D, ...given: unknown[]) => void;
+    CanvasRenderingContext2D.prototype.drawImage = function (this: CanvasRenderingContext2D, ...given: unknown[]): void {
+      draw.apply(this, given);
+      const [image, x, y, , height] = given as [ImageBitmap, number, number, number, number];
+      if (given.length === 5) draw.call(this, image, 1, 0, 1, height, x, y, 1, height);
+    };
+  }],
+} as const satisfies Record<string, readonly [string, number, () => void]>;
+
+describe("a fault is seen, and seen at tile edges alone", () => {
+  test.each(Object.entries(faults).flatMap(([name, fault]) => [1, 3].map((dpr) => [name, dpr, fault] as const)))("%s, pixel ratio %d", async (_, dpr, [drawer, least, breakIt]) => {
+    const { page } = await start(drawer, dpr);
+    await page.evaluate(breakIt);
+    const found = await errorsAt(page, dpr, 3.2671, MIDDLES[0]);
+    expect(found.edges, found.at).toBeGreaterThan(least);
+    expect(found.elsewhere).toBeLessThan(TOLERANCE[drawer]);
+    await page.context().close();
+  });
+});
