@@ -8,6 +8,8 @@ const ADDRESS_MS = 400;
 export class Address {
   /** Of the chosen object; 0: none. */
   id = 0;
+  /** Number of the epoch that is shown. */
+  epoch = 0;
   /** The attribute by which objects are coloured; "": none. */
   by = "";
   readonly #view: map;

@@ -11,7 +11,7 @@ const MOST_VALUES = 60;
 /** A choice of attributes by which the objects are coloured. */
 export class Colors {
   readonly #view: map;
-  readonly #layer: imageLayer;
+  #layer: imageLayer;
   readonly #address: Address;
   readonly #select = byId("by") as HTMLSelectElement;
   #theme: theme | undefined;
@@ -38,16 +38,30 @@ export class Colors {
     await this.#choose(all[asked]);
   }
 
+  /** Colours another layer, by its own attribute of the same name. */
+  async use(layer: imageLayer): Promise<void> {
+    this.#layer = layer;
+    this.#theme?.remove();
+    this.#theme = undefined;
+    const { by } = this.#address;
+    if (by !== "") await this.#paint((await layer.attributes()).find((info) => keyOf(info) === by));
+  }
+
   async #choose(info: AttributeInfo | undefined): Promise<void> {
     this.#address.by = info ? keyOf(info) : "";
     this.#address.write();
-    this.#theme?.remove();
-    this.#theme = undefined;
+    await this.use(this.#layer);
+  }
+
+  /** Nothing, where there is no such attribute. */
+  async #paint(info: AttributeInfo | undefined): Promise<void> {
+    const layer = this.#layer;
     if (!info) return;
     try {
       const made = await import("./map3d-theme.mjs");
-      if (this.#address.by !== keyOf(info)) return;
-      this.#theme = new made.theme(this.#layer, info, { legend: byId("legend"), title: info.name }).addTo(this.#view);
+      if (this.#address.by !== keyOf(info) || this.#layer !== layer) return;
+      this.#theme?.remove();
+      this.#theme = new made.theme(layer, info, { legend: byId("legend"), title: info.name }).addTo(this.#view);
     } catch (reason) {
       toast(`${say("noColors")}: ${String(reason)}`);
     }

@@ -21,12 +21,14 @@ export class InfoPanel {
     this.#closed();
   }
 
-  show(event: ClickEvent): void {
+  /** @param behind shows the object from the other side */
+  show(event: ClickEvent, behind?: () => void): void {
     const rows = [...this.#places(event), ...Object.entries(event.attributes ?? {}).map(([name, value]) => [name, written(value)] as const)];
     const list = document.createElement("dl");
     for (const [name, value] of rows) list.append(withText("dt", name), withText("dd", value));
     const kind = [event.class, event.id > 0 ? `id ${String(event.id)}` : "", event.approximate ? say("approximate") : ""];
-    this.#box.replaceChildren(withText("h2", event.name ?? (event.id > 0 ? `${say("object")} ${String(event.id)}` : say("point"))), withText("p", kind.filter(Boolean).join(" · "), "note"), list, this.#closeButton());
+    const title = withText("h2", event.name ?? (event.id > 0 ? `${say("object")} ${String(event.id)}` : say("point")));
+    this.#box.replaceChildren(title, ...(behind ? [behindButton(behind)] : []), withText("p", kind.filter(Boolean).join(" · "), "note"), list, this.#closeButton());
     this.#box.hidden = false;
     this.#box.scrollTop = 0;
   }
@@ -56,6 +58,13 @@ export class InfoPanel {
     });
     return button;
   }
+}
+
+function behindButton(behind: () => void): HTMLButtonElement {
+  const button = withText("button", say("behind"), "behind");
+  button.type = "button";
+  button.addEventListener("click", behind);
+  return button;
 }
 
 function written(value: Attribute): string {

@@ -40,7 +40,14 @@ function bindDay(view: map, rendering: Rendering, asked: Date | undefined): void
   day.value = local.toISOString().slice(0, 10);
   const known = asked !== undefined || rendering.json.layers.some(({ suns }) => suns?.[0]?.time);
   time.valueAsNumber = known ? local.getUTCHours() + local.getUTCMinutes() / 60 : 14;
-  time.addEventListener("input", show);
+  let dragged = false;
+  time.addEventListener("pointerdown", () => { dragged = true; });
+  time.addEventListener("keydown", () => { dragged = false; });
+  // A finger is good for quarters of an hour, keys for five minutes.
+  time.addEventListener("input", () => {
+    if (dragged) time.valueAsNumber = Math.round(4 * time.valueAsNumber) / 4;
+    show();
+  });
   day.addEventListener("input", show);
   show();
 }

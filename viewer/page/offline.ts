@@ -7,7 +7,7 @@ import { language, say } from "./words";
 type Offline = typeof import("./map3d-offline.mjs");
 
 /** What this page loads, now or when it is asked to. */
-export const PAGE_FILES = ["page.js", "page.css", "map3d.mjs", ...["controls", "measure", "offline", "orbit", "print", "shade", "theme"].map((name) => `map3d-${name}.mjs`)];
+export const PAGE_FILES = ["page.js", "page.css", "map3d.mjs", ...["compare", "controls", "measure", "offline", "orbit", "print", "shade", "theme"].map((name) => `map3d-${name}.mjs`)];
 
 /** A dialog that keeps what is in view for times without a network. Nothing is stored before it is asked for. */
 export function bindOffline(view: map, name: string): void {

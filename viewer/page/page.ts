@@ -1,6 +1,7 @@
 import { imageLayer, map, Map3dError } from "./map3d.mjs";
 import { Address } from "./address";
 import { Colors } from "./colors";
+import { bindEpochs, othersOf } from "./epochs";
 import { InfoPanel } from "./info";
 import { bindLight, lightAt } from "./light";
 import { Tools } from "./tools";
@@ -11,6 +12,7 @@ import { bindPicture } from "./picture";
 import { readPlace } from "./place";
 import { bindSeen } from "./seen";
 import { Selection } from "./selection";
+import { bindShare } from "./share";
 import { fail, toast } from "./messages";
 import { byId } from "./dom";
 import { say, translate } from "./words";
@@ -22,9 +24,10 @@ function bases(): string[] {
 }
 
 function open(): void {
-  const { time, id, by, ...place } = readPlace(location.hash);
+  const { time, id, by, epoch = 0, ...place } = readPlace(location.hash);
   const view = new map("mapcanvas", { light: lightAt(14), ...place });
-  const layer = new imageLayer(bases());
+  const urls = bases();
+  const layer = new imageLayer(urls);
   const info = new InfoPanel(byId("info"), () => { selection.forget(); });
   const address = new Address(view);
   const selection = new Selection(view, layer, info, address);
@@ -38,6 +41,7 @@ function open(): void {
   });
   layer.on("ready", () => {
     dress(view, layer, info, selection, time);
+    bindShare(address);
     address.by = by ?? "";
     const colors = new Colors(view, layer, address);
     if (layer.rendering) bindPicture({ view, json: layer.rendering.json, legend: () => colors.theme });
@@ -51,7 +55,14 @@ function open(): void {
       import("./map3d-shade.mjs").then(({ shade }) => new shade().addTo(view), (reason: unknown) => { toast(String(reason)); });
       import("./map3d-orbit.mjs").then(({ orbit }) => new orbit().addTo(view), (reason: unknown) => { toast(String(reason)); });
     }
-    if (id !== undefined) void selection.chooseId(id, null, false);
+    bindEpochs(view, layer, othersOf(urls[0] ?? "."), epoch, (shown, index) => {
+      address.epoch = index;
+      selection.use(shown);
+      colors.use(shown).catch((reason: unknown) => { toast(String(reason)); });
+      address.write();
+    }).then(() => {
+      if (id !== undefined) void selection.chooseId(id, null, false);
+    }, (reason: unknown) => { toast(String(reason)); });
     if (layer.rendering?.layers.has("depth")) tools = new Tools(view);
   });
   layer.addTo(view);
@@ -74,8 +85,8 @@ function dress(view: map, layer: imageLayer, info: InfoPanel, selection: Selecti
   bindLight(view, layer, time);
   bindModes(layer);
   if (json.objects) {
-    bindSeen(view, layer, (id) => void selection.chooseId(id));
-    bindSearch(view, layer, (id, position) => void selection.chooseId(id, position));
+    bindSeen(view, () => selection.layer, (id) => void selection.chooseId(id));
+    bindSearch(view, () => selection.layer, (id, position) => void selection.chooseId(id, position));
   }
 }
 

@@ -24,10 +24,10 @@ export function found(entries: readonly SearchEntry[], text: string): SearchEntr
 }
 
 /** The search box: a combobox over the rendering's index, which is fetched when the box is first used. */
-export function bindSearch(view: map, layer: imageLayer, chose: (id: number, position: Vec3) => void): void {
+export function bindSearch(view: map, layer: () => imageLayer, chose: (id: number, position: Vec3) => void): void {
   const [form, query, list] = [byId("search"), inputById("query"), byId("results")];
-  const box = new SearchBox(query, list, () => layer.searchIndex(), (entry) => {
-    go(view, layer, entry, chose);
+  const box = new SearchBox(query, list, () => layer().searchIndex(), (entry) => {
+    go(view, layer(), entry, chose);
   });
   form.hidden = false;
   form.addEventListener("submit", (event) => {

@@ -6,7 +6,7 @@ import { say } from "./words";
 const SHOWN = 30;
 
 /** A list of what is in view, the largest first: for those who read the page instead of seeing it, and for keyboards. */
-export function bindSeen(view: map, layer: imageLayer, chose: (id: number) => void): void {
+export function bindSeen(view: map, layer: () => imageLayer, chose: (id: number) => void): void {
   const [button, box] = [byId("list-seen"), byId("seen")];
   const close = (): void => {
     box.hidden = true;
@@ -14,7 +14,7 @@ export function bindSeen(view: map, layer: imageLayer, chose: (id: number) => vo
   };
   button.hidden = false;
   button.addEventListener("click", () => {
-    named(view, layer).then((rows) => {
+    named(view, layer()).then((rows) => {
       box.replaceChildren(withText("h2", say("inView")), rows.length > 0 ? listOf(rows, (id) => { close(); chose(id); }) : withText("p", say("nothingFound"), "note"));
       box.hidden = false;
       button.setAttribute("aria-expanded", "true");
@@ -32,7 +32,7 @@ export function bindSeen(view: map, layer: imageLayer, chose: (id: number) => vo
 type Row = readonly [id: number, name: string];
 
 async function named(view: map, layer: imageLayer): Promise<Row[]> {
-  const seen = (await view.objectsInView()).slice(0, SHOWN);
+  const seen = (await view.objectsInView()).filter((seen) => seen.layer === layer).slice(0, SHOWN);
   return Promise.all(seen.map(async ({ id }) => [id, (await layer.object(id))?.name ?? `${say("object")} ${String(id)}`] as const));
 }
 

@@ -8,13 +8,24 @@ const QUIET = new Set(["terrain", "ground"]);
 /** The chosen object: highlighted, described, and kept in the address. The back button goes from choice to choice. */
 export class Selection {
   readonly #view: map;
-  readonly #layer: imageLayer;
+  #layer: imageLayer;
   readonly #info: InfoPanel;
   readonly #address: Address;
 
   constructor(view: map, layer: imageLayer, info: InfoPanel, address: Address) {
     [this.#view, this.#layer, this.#info, this.#address] = [view, layer, info, address];
     addEventListener("popstate", () => { this.#return(); });
+  }
+
+  /** Whose objects are chosen. */
+  get layer(): imageLayer {
+    return this.#layer;
+  }
+
+  /** Objects of another layer are chosen from now on; what is chosen has gone with its own. */
+  use(layer: imageLayer): void {
+    if (this.#address.id > 0) this.#info.close();
+    this.#layer = layer;
   }
 
   /** What was clicked. */
@@ -56,7 +67,23 @@ export class Selection {
       return;
     }
     if (event.id > 0 && !QUIET.has(event.class ?? "")) this.#layer.highlight(event.id);
-    this.#info.show(event);
+    this.#info.show(event, event.id > 0 && !QUIET.has(event.class ?? "") ? this.#behind(event) : undefined);
+  }
+
+  /** What shows the other side of an object; undefined where no view does. */
+  #behind({ id, position }: ClickEvent): (() => void) | undefined {
+    const { directions, direction, lookAt_deg } = this.#view;
+    const pitch = directions.find((view) => view.id === direction)?.pitchDeg;
+    const opposite = directions.find(({ lookAtDeg, pitchDeg }) => pitchDeg === pitch && (lookAtDeg + 180) % 360 === lookAt_deg % 360);
+    return opposite && (() => {
+      const origin = this.#layer.rendering?.json.origin;
+      this.#layer.object(id).then((object) => {
+        const [low, high] = object?.box ?? [];
+        const middle = low && high && origin ? ([0, 1, 2] as const).map((k) => origin[k] + (low[k] + high[k]) / 2) as unknown as Vec3 : position;
+        this.#view.setDirection(opposite.id);
+        if (middle) this.#view.setView(middle);
+      }, (reason: unknown) => { toast(String(reason)); });
+    });
   }
 
   /** To where the address says. */

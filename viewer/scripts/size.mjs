@@ -15,7 +15,7 @@ const BUDGET = {
   element: 4,
   files: 5,
   geojson: 12,
-  measure: 7,
+  measure: 9,
   model: 6,
   offline: 6,
   orbit: 7,

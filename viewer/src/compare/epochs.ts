@@ -17,6 +17,8 @@ export interface EpochsOptions {
   shown?: number;
   /** How long the one before fades. Default 250; 0 where the user wants no movement. */
   fade_ms?: number;
+  /** Where the slider goes. Default the map's lower edge. */
+  container?: HTMLElement;
 }
 
 /** Of an `epochs`. */
@@ -29,6 +31,7 @@ export interface EpochsEvents {
 export class epochs extends Attached<map, EpochsEvents> {
   readonly #list: readonly Epoch[];
   readonly #fade_ms: number;
+  readonly #container: HTMLElement | undefined;
   readonly #box: HTMLElement;
   readonly #slider: HTMLInputElement;
   readonly #name = element("output", "");
@@ -36,13 +39,14 @@ export class epochs extends Attached<map, EpochsEvents> {
   #leaving: (() => void) | undefined;
 
   /** @throws UsageError without at least two epochs, or when the one to show first is none of them */
-  constructor(list: readonly Epoch[], { shown = list.length - 1, fade_ms = 250 }: EpochsOptions = {}) {
+  constructor(list: readonly Epoch[], { shown = list.length - 1, fade_ms = 250, container }: EpochsOptions = {}) {
     super();
     if (list.length < 2) throw new UsageError("epochs need at least two layers");
     if (!Object.hasOwn(list, shown)) throw new UsageError(`epoch ${String(shown)} is none of 0 to ${String(list.length - 1)}`);
     this.#list = list;
     this.#shown = shown;
     this.#fade_ms = fade_ms;
+    this.#container = container;
     this.#slider = element("input", "", { type: "range", min: "0", max: String(list.length - 1), step: "1", value: String(shown) });
     this.#slider.addEventListener("input", () => { this.show(Number(this.#slider.value)); });
     this.#slider.addEventListener("keydown", (event) => { event.stopPropagation(); });
@@ -72,7 +76,7 @@ export class epochs extends Attached<map, EpochsEvents> {
     this.#slider.setAttribute("aria-label", wordsOf(map.language).time);
     this.#label();
     this.#list.forEach(({ layer }, k) => layer.setOpacity(k === this.#shown ? 1 : 0).addTo(map));
-    map.overlayPane.append(this.#box);
+    (this.#container ?? map.overlayPane).append(this.#box);
   }
 
   protected leave(map: map): void {

@@ -241,9 +241,9 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
     return this.#relief ?? null;
   }
 
-  /** @internal Depths of a rectangle (U and V), from the deepest level that takes at most so many tiles. */
-  reliefOf(sight: Sight, rect: Rect, most: number): ReturnType<typeof Relief.fetched> {
-    return Relief.fetched(this.#layers, sight, rect, most);
+  /** @internal Depths of a rectangle (U and V), from the deepest level that takes at most so many tiles; `ids`: object ids, too. */
+  reliefOf(sight: Sight, rect: Rect, most: number, ids = false): ReturnType<typeof Relief.fetched> {
+    return Relief.fetched(this.#layers, sight, rect, most, ids);
   }
 
   /** Bytes of decoded tiles in memory. */

@@ -31,7 +31,8 @@ export class Relief {
   readonly #sheets: readonly Sheet[];
   readonly #bias_m: number;
 
-  constructor(layers: readonly imageLayer[], sight: Sight) {
+  /** @param ids object ids are read, too, for `idAt` */
+  constructor(layers: readonly imageLayer[], sight: Sight, ids = false) {
     const { camera, origin, dpr, finer } = sight;
     [this.camera, this.origin, this.dpr] = [camera, origin, dpr];
     const px = cssPixelM(camera) / dpr;
@@ -40,7 +41,7 @@ export class Relief {
     const { up, forward } = camera.frame.axes;
     this.#bias_m = LEAST_BIAS_M + (this.pixel_m / 2) * (1 + up[2] / Math.max(-forward[2], 0.05));
     const shown = layers.filter((layer) => layer.options.opacity > 0);
-    this.#sheets = shown.flatMap((layer) => Sheet.of(layer, sight, px) ?? []);
+    this.#sheets = shown.flatMap((layer) => Sheet.of(layer, sight, px, ids) ?? []);
     const heights = shown.flatMap(({ rendering }) => rendering?.json.box.map(([, , z]) => z + rendering.json.origin[2] - origin[2]) ?? []);
     this.heights = heights.length > 0 ? [Math.min(...heights), Math.max(...heights)] : [0, 0];
   }
@@ -49,12 +50,12 @@ export class Relief {
    * Of a rectangle (U and V of the sight's frame) at the deepest level whose tiles in it are no more than so many; they are fetched. What cannot be
    * had is read from what is in memory: `approximate` then, and where the level is not the deepest.
    */
-  static async fetched(layers: readonly imageLayer[], sight: Sight, [low, high]: Rect, most: number): Promise<{ relief: Relief; approximate: boolean }> {
+  static async fetched(layers: readonly imageLayer[], sight: Sight, [low, high]: Rect, most: number, ids = false): Promise<{ relief: Relief; approximate: boolean }> {
     const { frame } = sight.camera;
     const across = (z: number): number => (((high[0] - low[0]) * 2 ** z) / frame.size + 1) * (((high[1] - low[1]) * 2 ** z) / frame.size + 1);
     let zoom = frame.zmax;
     while (zoom > 0 && across(zoom) > most) zoom--;
-    const relief = new Relief(layers, { ...sight, camera: { ...sight.camera, zoom }, dpr: 1, finer: 0 });
+    const relief = new Relief(layers, { ...sight, camera: { ...sight.camera, zoom }, dpr: 1, finer: 0 }, ids);
     const got = await Promise.allSettled(relief.#sheets.flatMap((sheet) => sheet.fetch([low, high])));
     relief.#sheets.forEach((sheet) => { sheet.forget(); });
     return { relief, approximate: zoom < frame.zmax || got.some(({ status }) => status === "rejected") };
@@ -69,6 +70,16 @@ export class Relief {
       if (depth < nearest) nearest = depth;
     }
     return nearest;
+  }
+
+  /** Object id of the nearest surface; 0 where nothing is, or ids are not read. */
+  idAt(u: number, v: number): number {
+    let [nearest, id] = [Infinity, 0];
+    for (const sheet of this.#sheets) {
+      const depth = sheet.depthAt(u, v);
+      if (depth < nearest) [nearest, id] = [depth, sheet.id];
+    }
+    return id;
   }
 
   /**
@@ -118,7 +129,7 @@ interface Pixels {
   readonly tile: Tile;
   readonly px: number;
   readonly depths: Uint32Array;
-  /** null: nothing is hidden. */
+  /** null: nobody reads them. */
   readonly ids: Uint32Array | null;
 }
 
@@ -138,16 +149,19 @@ class Sheet {
   /** From the camera's U, V and D to the layer's. */
   readonly #shift: Vec3;
   readonly #patches = new Map<number, Patch>();
+  readonly #ids: boolean;
   #last = -1;
   #patch: Patch = "empty";
+  /** Of the object whose depth was read last. */
+  id = 0;
 
-  static of(layer: imageLayer, sight: Sight, px: number): Sheet | null {
+  static of(layer: imageLayer, sight: Sight, px: number, ids: boolean): Sheet | null {
     const [view, { rendering, store }] = [layer.viewOf(sight.camera.frame), layer];
-    return view && store && rendering?.layers.has("depth") ? new Sheet(layer, view, rendering, store, sight, px) : null;
+    return view && store && rendering?.layers.has("depth") ? new Sheet(layer, view, rendering, store, sight, px, ids) : null;
   }
 
-  private constructor(layer: imageLayer, view: View, { json, layers }: Rendering, store: Store, { origin, dpr, finer }: Sight, px: number) {
-    [this.#layer, this.#view] = [layer, view];
+  private constructor(layer: imageLayer, view: View, { json, layers }: Rendering, store: Store, { origin, dpr, finer }: Sight, px: number, ids: boolean) {
+    [this.#layer, this.#view, this.#ids] = [layer, view, ids && layers.has("id")];
     this.#level = levelFor(view.frame, px, dpr, finer);
     this.#side = 2 ** this.#level;
     this.#unit_m = layers.get("depth")?.unit_m ?? DEPTH_UNIT_M;
@@ -180,8 +194,12 @@ class Sheet {
 
   /** Tiles that a rectangle is read from. */
   fetch([low, high]: Rect): Promise<unknown>[] {
-    const kinds = this.#layer.finishes ? (["depth", "id"] as const) : (["depth"] as const);
+    const kinds = this.#readsIds ? (["depth", "id"] as const) : (["depth"] as const);
     return this.#tilesIn([low, high]).flatMap((tile) => kinds.map((kind) => this.#need(kind, tile)));
+  }
+
+  get #readsIds(): boolean {
+    return this.#ids || this.#layer.finishes !== null;
   }
 
   /** Reads anew what it has looked up. */
@@ -212,7 +230,8 @@ class Sheet {
     const i = clamp(Math.floor(right / patch.px) - x * tilePx, 0, tilePx - 1);
     const j = clamp(Math.floor(down / patch.px) - y * tilePx, 0, tilePx - 1);
     const depth = patch.depths[j * tilePx + i] as number;
-    if (depth === NO_DEPTH || (patch.ids && this.#layer.hides(patch.ids[j * tilePx + i] as number))) return Infinity;
+    this.id = patch.ids?.[j * tilePx + i] ?? 0;
+    if (depth === NO_DEPTH || (patch.ids && this.#layer.hides(this.id))) return Infinity;
     return d0 + depth * this.#unit_m - this.#shift[2];
   }
 
@@ -235,7 +254,7 @@ class Sheet {
 
   #own(tile: Tile): Patch | undefined {
     if (!this.#view.occupancy.has(tile)) return "empty";
-    const [depths, ids] = [this.#read("depth", tile), this.#layer.finishes ? this.#read("id", tile) : null];
+    const [depths, ids] = [this.#read("depth", tile), this.#readsIds ? this.#read("id", tile) : null];
     if (depths === "empty" || ids === "empty") return "empty";
     return depths && ids !== undefined ? { tile, px: pixelM(this.#view.frame, tile.z), depths, ids } : undefined;
   }

@@ -3,13 +3,14 @@ import type { Vec3 } from "../core/vec";
 import { Attached, type ClickEvent, type map } from "../map3d";
 import { measureArea, measureLine, type AreaMeasure, type LineMeasure } from "./geometry";
 import { Chart } from "./chart";
+import { measureFace, type Face } from "./face";
 import { along, measureProfile, type Profile } from "./profile";
 import { Sketch, type Note } from "./sketch";
 import { STYLES } from "./styles";
 import { Words } from "./words";
 
 export interface MeasureOptions {
-  /** A line over the surface, a polygon on it, or the heights along a line. Default "line". */
+  /** A line over the surface; the face under the first corner, then a polygon; or the heights along a line. Default "line". */
   kind?: "line" | "area" | "profile";
   /** BCP 47, of the numbers. Default the map's. */
   language?: string;
@@ -26,6 +27,8 @@ export interface Corner {
 export interface MeasureEvents {
   /** A corner came or went. */
   change: { corners: readonly Corner[]; line: LineMeasure; area: AreaMeasure };
+  /** The face under the only corner is known; null: nothing flat is there. */
+  face: { face: Face | null };
   /** The heights along the corners are known. */
   profile: { profile: Profile };
 }
@@ -41,6 +44,7 @@ export class measure extends Attached<map, MeasureEvents> {
   readonly #chart = new Chart((at) => { this.#walk(at); });
   #corners: readonly Corner[] = [];
   #profile: Profile | null = null;
+  #face: Face | null = null;
   #direction = "";
   #reading = new AbortController();
 
@@ -69,9 +73,14 @@ export class measure extends Attached<map, MeasureEvents> {
     return this.#profile;
   }
 
+  /** Of the surface under the only corner, for the kind "area"; null while it is not known, or nothing flat is there. */
+  get face(): Face | null {
+    return this.#face;
+  }
+
   /** Replaces all corners. */
   setCorners(corners: readonly Corner[]): this {
-    this.#corners = corners;
+    [this.#corners, this.#face] = [corners, null];
     this.#draw();
     void this.#read();
     return this.fire("change", { corners, line: this.line, area: this.area });
@@ -121,25 +130,36 @@ export class measure extends Attached<map, MeasureEvents> {
   /** What is seen along the line is another in another direction. */
   readonly #turned = (): void => {
     const seen = this.map?.direction ?? "";
-    if (seen !== this.#direction) void this.#read();
+    if (this.options.kind === "profile" && seen !== this.#direction) void this.#read();
   };
 
-  /** Reads the heights along the corners. */
+  /** Reads what the corners alone do not tell: the heights along them, or the face under the only one. */
   async #read(): Promise<void> {
     this.#reading.abort();
-    this.#profile = null;
-    const { map } = this;
-    if (!map || this.options.kind !== "profile" || this.#corners.length < 2) {
-      this.#chart.box.remove();
-      return;
-    }
+    [this.#profile, this.#face] = [null, null];
+    const { map, options: { kind } } = this;
+    const count = this.#corners.length;
     const { signal } = (this.#reading = new AbortController());
+    if (kind !== "profile" || count < 2) this.#chart.box.remove();
+    if (!map) return;
     this.#direction = map.direction;
-    const profile = await measureProfile(map, this.#points(), { signal }).catch((reason: unknown) => {
+    const reading = kind === "profile" && count > 1 ? this.#readProfile(map, signal) : kind === "area" && count === 1 ? this.#readFace(map, signal) : null;
+    await reading?.catch((reason: unknown) => {
       if (!signal.aborted) throw reason;
-      return null;
     });
-    if (signal.aborted || !profile) return;
+  }
+
+  async #readFace(map: map, signal: AbortSignal): Promise<void> {
+    const face = await measureFace(map, this.#points()[0] as Vec3, { signal });
+    if (signal.aborted) return;
+    this.#face = face;
+    this.#draw();
+    this.fire("face", { face });
+  }
+
+  async #readProfile(map: map, signal: AbortSignal): Promise<void> {
+    const profile = await measureProfile(map, this.#points(), { signal });
+    if (signal.aborted) return;
     this.#profile = profile;
     const places = along(this.#points(), profile.heights_m.length);
     this.#sketch.follow(places.map(({ place: [x, y] }, k) => (Number.isNaN(profile.heights_m[k]) ? null : [x, y, profile.heights_m[k] as number])));
@@ -169,6 +189,7 @@ export class measure extends Attached<map, MeasureEvents> {
   #draw(): void {
     const points = this.#points();
     this.#sketch.set(points, this.options.kind === "area", this.options.kind === "area" ? this.#areaNotes(points) : this.#lineNotes(points));
+    if (this.#face) this.#sketch.follow(this.#face.outline.flatMap((loop) => [...loop, loop[0] as Vec3, null]));
     this.#place();
   }
 
@@ -181,10 +202,15 @@ export class measure extends Attached<map, MeasureEvents> {
   }
 
   #areaNotes(points: readonly Vec3[]): Note[] {
+    const [first] = points;
+    if (this.#face && first) return [{ at: first, text: this.#areaText(this.#face, this.#face), main: true }];
     if (points.length < 3) return [];
-    const { area_m2, slope_deg } = this.area;
     const middle = points.reduce<Vec3>((sum, point) => between(sum, point, 1 / points.length, 1), [0, 0, 0]);
-    return [{ at: middle, text: `${this.#about()}${this.#words.area(area_m2)}  ∠ ${slope_deg.toFixed(0)}°`, main: true }];
+    return [{ at: middle, text: this.#areaText(this.area, {}), main: true }];
+  }
+
+  #areaText({ area_m2, slope_deg }: Pick<AreaMeasure, "area_m2" | "slope_deg">, { hidden = false, approximate = false }: Partial<Face>): string {
+    return `${approximate ? "≈ " : this.#about()}${hidden ? "≥ " : ""}${this.#words.area(area_m2)}  ∠ ${slope_deg.toFixed(0)}°`;
   }
 
   /** Said before a number that is not exact. */

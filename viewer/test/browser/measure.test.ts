@@ -27,11 +27,11 @@ async function measuring(kind: "line" | "area" | "profile"): Promise<{ page: Pag
 }
 
 /** Clicks where local places of the surface are seen. */
-async function clickAll(page: Page, places: readonly Vec3[]): Promise<void> {
+async function clickAll(page: Page, places: readonly Vec3[], before = 0): Promise<void> {
   for (const [k, [x, y, z]] of places.entries()) {
     const at = await page.evaluate((world) => (globalThis as Global).map.project(world) as [number, number], [ORIGIN[0] + x, ORIGIN[1] + y, ORIGIN[2] + z] as const);
     await page.mouse.click(at[0], at[1]);
-    await page.waitForFunction((count) => (globalThis as unknown as Measuring).tool.corners.length === count, k + 1);
+    await page.waitForFunction((count) => (globalThis as unknown as Measuring).tool.corners.length === count, before + k + 1);
     await page.waitForTimeout(APART_MS);
   }
 }
@@ -74,6 +74,49 @@ test("areas of a roof and of a facade are those of the model", async () => {
   expect(wall.slope_deg).toBeGreaterThan(88);
   expect((await labels(page))[0]).toMatch(/m² {2}∠ (89|90)°$/);
   await page.screenshot({ path: `${OUT}/measure-wall.png` });
+  await page.context().close();
+});
+
+test("one click on a wall or a roof tells its area, outlines it, and says when a part is hidden; the second corner makes it a polygon", async () => {
+  const { page, problems } = await measuring("area");
+  const known = async (): Promise<Measure.Face> => {
+    await page.waitForFunction(() => (globalThis as unknown as Measuring).tool.face !== null);
+    return page.evaluate(() => (globalThis as unknown as Measuring).tool.face as Measure.Face);
+  };
+  await clickAll(page, [[-45, -22, 15]]);
+  const wall = await known();
+  expect(Math.abs(wall.area_m2 / (34 * 34) - 1)).toBeLessThan(0.02);
+  expect([wall.hidden, wall.approximate]).toEqual([false, false]);
+  expect(await labels(page)).toEqual([expect.stringMatching(/^1,1[5-7]\d m² {2}∠ 90°$/)]);
+  // The outline's box is that of the wall in the picture.
+  const place = ([x, y, z]: Vec3): Promise<[number, number]> => page.evaluate((world) => (globalThis as Global).map.project(world) as [number, number], [ORIGIN[0] + x, ORIGIN[1] + y, ORIGIN[2] + z] as const);
+  const outline = (): Promise<number[]> => page.evaluate(() => {
+    const { x, y, width, height } = (document.querySelector(".map3d-measure-filled") as SVGPathElement).getBBox();
+    return [x, y, x + width, y + height];
+  });
+  const expected = async (): Promise<number[]> => [...(await place([-62, -22, 34])), ...(await place([-28, -22, 0]))];
+  const off = async (): Promise<number> => {
+    const [is, should] = [await outline(), await expected()];
+    return Math.max(...is.map((value, k) => Math.abs(value - (should[k] ?? NaN))));
+  };
+  expect(await off()).toBeLessThan(2.5);
+  await page.screenshot({ path: `${OUT}/measure-face.png` });
+  await page.evaluate(() => { (globalThis as Global).map.panBy(60, 20).zoomBy(0.5, [400, 300]); });
+  await page.waitForTimeout(600);
+  expect(await off()).toBeLessThan(3.5);
+  await clickAll(page, [[-30, -22, 30]], 1);
+  expect(await labels(page)).toEqual([]);
+  expect(await page.evaluate(() => (globalThis as unknown as Measuring).tool.face)).toBeNull();
+  await page.evaluate(() => { (globalThis as unknown as Measuring).tool.clear(); });
+  await page.waitForTimeout(APART_MS);
+  // The chapel's wall is hidden by the town hall below.
+  await clickAll(page, [[-28, 34, 18]]);
+  const hidden = await known();
+  expect(hidden.hidden).toBe(true);
+  expect(hidden.area_m2).toBeLessThan(24 * 20);
+  expect((await labels(page))[0]).toMatch(/^≥ \d{2,3}\.\d m² {2}∠ 90°$/);
+  await page.screenshot({ path: `${OUT}/measure-face-hidden.png` });
+  expect(problems).toEqual([]);
   await page.context().close();
 });
 

@@ -5,6 +5,7 @@ test("an address tells view, time and object", () => {
   expect(readPlace("#45-22.5/691000.5/5336000.0/512.3/4.20")).toEqual({ direction: "45-22.5", center: [691000.5, 5336000, 512.3], zoom: 4.2 });
   expect(readPlace("#0-45/-1/2/3/0/t=2026-06-21T15:00Z/id=4000000000")).toEqual({ direction: "0-45", center: [-1, 2, 3], zoom: 0, time: new Date("2026-06-21T15:00:00Z"), id: 4_000_000_000 });
   expect(readPlace(`#0-45/1/2/3/4/by=${encodeURIComponent(encodeURIComponent("a/b=c d%"))}`).by).toBe("a/b=c d%");
+  expect(readPlace("#0-45/1/2/3/4/epoch=2").epoch).toBe(2);
   expect(readPlace("#0-45%2F1%2F2%2F3%2F4").center).toEqual([1, 2, 3]);
 });
 
