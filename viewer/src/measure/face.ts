@@ -20,6 +20,7 @@ export interface Face {
   readonly approximate: boolean;
 }
 
+/** Until when a face is looked for. */
 export interface FaceOptions {
   signal?: AbortSignal;
 }
