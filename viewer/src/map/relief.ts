@@ -56,9 +56,10 @@ export class Relief {
     let zoom = frame.zmax;
     while (zoom > 0 && across(zoom) > most) zoom--;
     const relief = new Relief(layers, { ...sight, camera: { ...sight.camera, zoom }, dpr: 1, finer: 0 }, ids);
-    const got = await Promise.allSettled(relief.#sheets.flatMap((sheet) => sheet.fetch([low, high])));
+    await Promise.allSettled(relief.#sheets.flatMap((sheet) => sheet.fetch([low, high])));
     relief.#sheets.forEach((sheet) => { sheet.forget(); });
-    return { relief, approximate: zoom < frame.zmax || got.some(({ status }) => status === "rejected") };
+    // Some may have failed, or be gone from memory before the last had come.
+    return { relief, approximate: zoom < frame.zmax || !relief.#sheets.every((sheet) => sheet.holds([low, high])) };
   }
 
   /** Of the nearest surface; Infinity where nothing is, NaN where that is not known (yet). */
@@ -196,6 +197,14 @@ class Sheet {
   fetch([low, high]: Rect): Promise<unknown>[] {
     const kinds = this.#readsIds ? (["depth", "id"] as const) : (["depth"] as const);
     return this.#tilesIn([low, high]).flatMap((tile) => kinds.map((kind) => this.#need(kind, tile)));
+  }
+
+  /** Are they all in memory, at the shown level? */
+  holds(rect: Rect): boolean {
+    return this.#tilesIn(rect).every((tile) => {
+      const patch = this.#patchOf(tile);
+      return patch === "empty" || (typeof patch === "object" && "depths" in patch && patch.tile.z === this.#level);
+    });
   }
 
   get #readsIds(): boolean {
