@@ -1,4 +1,5 @@
 import { adoptStyles } from "../core/dom";
+import { asError } from "../core/errors";
 import type { Vec3 } from "../core/vec";
 import { Attached, type ClickEvent, type map } from "../map3d";
 import { measureArea, measureLine, type AreaMeasure, type LineMeasure } from "./geometry";
@@ -115,7 +116,7 @@ export class measure extends Attached<map, MeasureEvents> {
     map.off("moveend", this.#turned);
     this.#reading.abort();
     this.#sketch.box.remove();
-    this.#chart.box.remove();
+    this.#closeChart();
   }
 
   readonly #clicked = ({ position, approximate }: ClickEvent): void => {
@@ -140,12 +141,12 @@ export class measure extends Attached<map, MeasureEvents> {
     const { map, options: { kind } } = this;
     const count = this.#corners.length;
     const { signal } = (this.#reading = new AbortController());
-    if (kind !== "profile" || count < 2) this.#chart.box.remove();
+    if (kind !== "profile" || count < 2) this.#closeChart();
     if (!map) return;
     this.#direction = map.direction;
     const reading = kind === "profile" && count > 1 ? this.#readProfile(map, signal) : kind === "area" && count === 1 ? this.#readFace(map, signal) : null;
     await reading?.catch((reason: unknown) => {
-      if (!signal.aborted) throw reason;
+      if (!signal.aborted) map.stage?.report(asError(reason));
     });
   }
 
@@ -167,6 +168,12 @@ export class measure extends Attached<map, MeasureEvents> {
     this.#chart.set(profile, this.#words, profile.approximate ? "≈ " : "");
     map.overlayPane.append(this.#chart.box);
     this.fire("profile", { profile });
+  }
+
+  /** A pointer may be over it. */
+  #closeChart(): void {
+    this.#chart.box.remove();
+    this.#sketch.mark(null);
   }
 
   /** Marks the place on the map that the reader of the profile is at. */

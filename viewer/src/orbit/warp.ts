@@ -1,4 +1,4 @@
-import { linkProgram } from "../core/gl";
+import { linkProgram, makeTexture } from "../core/gl";
 import { dot, type Vec2, type Vec3 } from "../core/vec";
 import { uvdFromLocal, type Axes } from "../geo/axes";
 import { cssPixelM, type Camera } from "../geo/camera";
@@ -56,7 +56,8 @@ export class Warp {
   /** A place for a shot. */
   target(width: number, height: number): Target {
     const gl = this.#gl;
-    const [color, depth] = [this.#texture(gl.RGBA8, width, height, gl.LINEAR), this.#texture(gl.DEPTH_COMPONENT32F, width, height, gl.NEAREST)];
+    gl.activeTexture(gl.TEXTURE0);
+    const [color, depth] = [makeTexture(gl, gl.RGBA8, width, height, gl.LINEAR), makeTexture(gl, gl.DEPTH_COMPONENT32F, width, height)];
     const framebuffer = gl.createFramebuffer();
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, color, 0);
@@ -135,17 +136,6 @@ export class Warp {
 
   #at(program: WebGLProgram, name: string): WebGLUniformLocation | null {
     return this.#gl.getUniformLocation(program, name);
-  }
-
-  #texture(format: number, width: number, height: number, filter: number): WebGLTexture {
-    const gl = this.#gl;
-    const texture = gl.createTexture();
-    gl.activeTexture(gl.TEXTURE0);
-    gl.bindTexture(gl.TEXTURE_2D, texture);
-    for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, filter);
-    for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, name, gl.CLAMP_TO_EDGE);
-    gl.texStorage2D(gl.TEXTURE_2D, 1, format, width, height);
-    return texture;
   }
 }
 

@@ -1,4 +1,4 @@
-import { linkProgram } from "../core/gl";
+import { linkProgram, makeTexture } from "../core/gl";
 import type { SeenDepths, Shade } from "../map3d";
 import { SHARES, SMOOTH, VERTEX } from "./shaders";
 
@@ -81,12 +81,8 @@ function draw(gl: WebGL2RenderingContext, from: WebGLTexture, { framebuffer }: T
 }
 
 function target(gl: WebGL2RenderingContext, width: number, height: number): Target {
-  const [framebuffer, texture] = [gl.createFramebuffer(), gl.createTexture()];
   gl.activeTexture(gl.TEXTURE0);
-  gl.bindTexture(gl.TEXTURE_2D, texture);
-  for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
-  for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, name, gl.CLAMP_TO_EDGE);
-  gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA8, width, height);
+  const [framebuffer, texture] = [gl.createFramebuffer(), makeTexture(gl, gl.RGBA8, width, height)];
   gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
   gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
   return { framebuffer, texture };

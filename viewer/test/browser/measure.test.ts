@@ -168,7 +168,7 @@ test("a profile has the heights of the model, gaps where it is hidden, and is wa
   await page.keyboard.press("Escape");
   await page.locator(".map3d-container, #mapcanvas").first().focus().catch(() => undefined);
   await page.evaluate(() => (globalThis as unknown as Measuring).tool.clear());
-  expect(await chart.count()).toBe(0);
+  expect(await page.locator(".map3d-profile, .map3d-measure-mark").count()).toBe(0);
   // Behind the town hall, as seen from the south.
   await page.evaluate((corners) => (globalThis as unknown as Measuring).tool.setCorners(corners.map((position) => ({ position, approximate: false }))), [[-45, 16, 0], [-45, 60, 0]].map(([x = 0, y = 0, z = 0]) => [ORIGIN[0] + x, ORIGIN[1] + y, ORIGIN[2] + z] as Vec3));
   await page.waitForFunction(() => (globalThis as unknown as Measuring).tool.profile !== null);

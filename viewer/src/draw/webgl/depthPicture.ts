@@ -1,3 +1,5 @@
+import { makeTexture } from "../../core/gl";
+
 /** Depths of what a frame shows, a pixel for each CSS pixel of it, as a texture. */
 export class DepthPicture {
   readonly framebuffer: WebGLFramebuffer;
@@ -7,11 +9,7 @@ export class DepthPicture {
   constructor(gl: WebGL2RenderingContext, readonly width: number, readonly height: number) {
     this.#gl = gl;
     this.framebuffer = gl.createFramebuffer();
-    this.texture = gl.createTexture();
-    gl.bindTexture(gl.TEXTURE_2D, this.texture);
-    for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
-    for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, name, gl.CLAMP_TO_EDGE);
-    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.DEPTH_COMPONENT32F, width, height);
+    this.texture = makeTexture(gl, gl.DEPTH_COMPONENT32F, width, height);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.framebuffer);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.TEXTURE_2D, this.texture, 0);
     gl.drawBuffers([gl.NONE]);
