@@ -111,6 +111,8 @@ export interface DrawerEvents {
 /** What paints a frame. It never asks for tiles itself, and for frames only by `changed`. */
 export interface Drawer {
   readonly name: "webgl" | "canvas";
+  /** What the picture is seen in: a canvas, or an element that holds some. */
+  readonly shown: HTMLElement;
   /** What was drawn last is not all: `changed` will be called. */
   readonly busy: boolean;
   /** null: it does not draw with WebGL. */

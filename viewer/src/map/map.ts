@@ -133,6 +133,11 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
     return this.#painter?.drawer.name ?? null;
   }
 
+  /** @internal What the picture is seen in: the canvas, or an element below it; null when nothing can be drawn. */
+  get shown(): HTMLElement | null {
+    return this.#painter?.drawer.shown ?? null;
+  }
+
   get language(): string {
     return this.options.language ?? languageOf(this.container);
   }

@@ -85,7 +85,7 @@ export class Painter {
     return this.#queue.busy || this.#drawer.busy;
   }
 
-  get drawer(): Pick<Drawer, "name" | "note"> {
+  get drawer(): Pick<Drawer, "name" | "note" | "shown"> {
     return this.#drawer;
   }
 
@@ -153,14 +153,15 @@ export class Painter {
       changed: () => { this.#events.changed(); },
       failed: (error) => { this.#events.failed(error); },
     };
-    if (kind === "canvas") return new CanvasDrawer(canvas, events);
+    const preserve = this.#options.preserveDrawingBuffer;
+    if (kind === "canvas") return new CanvasDrawer(canvas, preserve, events);
     try {
-      return new WebGLDrawer(canvas, { preserve: this.#options.preserveDrawingBuffer, quick: kind === "auto" }, events);
+      return new WebGLDrawer(canvas, { preserve, quick: kind === "auto" }, events);
     } catch (reason) {
       if (kind === "webgl") throw reason;
       // A canvas that has tried WebGL gives nothing else.
       if (canvas.getContext("2d") === null) this.#viewport.replaceCanvas();
-      return new CanvasDrawer(this.#viewport.canvas, events);
+      return new CanvasDrawer(this.#viewport.canvas, preserve, events);
     }
   }
 

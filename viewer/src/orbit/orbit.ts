@@ -82,10 +82,10 @@ export class orbit extends Attached<map, object> implements Turner {
 
   /** @internal */
   turn(from: Camera, pivot: Vec3): void {
-    const { drawer, canvas } = this.map ?? {};
+    const { drawer, shown } = this.map ?? {};
     if (still() || !drawer) return;
     if (drawer === "canvas") {
-      if (canvas) fadeOut(canvas, FADE_MS);
+      if (shown) fadeOut(shown, FADE_MS);
       return;
     }
     const start = this.#turn?.at ?? gazeOf(from.frame);

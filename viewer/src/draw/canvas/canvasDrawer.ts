@@ -1,15 +1,15 @@
-import { DrawError } from "../../core/errors";
 import type { Tile } from "../../geo/frame";
 import type { LayerKind } from "../../geo/manifest";
 import { standsFor } from "../../tiles/cover";
 import { neededKinds, type Drawer, type DrawerEvents, type FrameSpec, type Pass, type Quad } from "../drawer";
-import { meet, type Clip } from "../combine";
+import { meet } from "../combine";
 import type { Finishes } from "../finish";
 import { kindsBeside, kindsOf, lookOf, lookWith, type Look } from "./look";
 import { maskOf, type Mask } from "./mask";
 import { Pictures, type Picture, type Wish } from "./pictures";
 import type { Order } from "./shade.worker";
-import { areaOf, gridOf, Sheet, type Grid, type Piece } from "./sheet";
+import { areaOf, gridOf, type Grid, type Piece } from "./sheet";
+import { Laid, Painted, type Showing, type Shown } from "./showing";
 
 type Named = Pass["highlight"] | Finishes;
 
@@ -26,10 +26,8 @@ interface Wanted {
 export class CanvasDrawer implements Drawer {
   readonly name = "canvas";
   readonly gl = null;
-  readonly #context: CanvasRenderingContext2D;
+  readonly #showing: Showing;
   readonly #pictures: Pictures;
-  readonly #sheet = new Sheet();
-  readonly #listeners = new AbortController();
   /** Data that the worker has, and the picture it is for. */
   readonly #given = new Map<string, Picture>();
   /** Highlights and finishes that the worker has, and their names. */
@@ -37,13 +35,10 @@ export class CanvasDrawer implements Drawer {
   #tilePx = 0;
   #names = 0;
 
-  /** @throws DrawError when the canvas has another context already, or the browser no 2D canvas */
-  constructor(canvas: HTMLCanvasElement, events: DrawerEvents) {
-    const context = canvas.getContext("2d");
-    if (!context) throw new DrawError("this browser offers neither WebGL2 nor a 2D canvas, of which the map needs one to draw; update it");
-    this.#context = context;
+  /** @param preserve the canvas itself is painted, so that its pixels can be read  @throws DrawError when the canvas has another context already, or the browser no 2D canvas */
+  constructor(canvas: HTMLCanvasElement, preserve: boolean, events: DrawerEvents) {
+    this.#showing = new (preserve ? Painted : Laid)(canvas, () => { events.changed(); });
     this.#pictures = new Pictures({ made: () => { events.changed(); }, failed: (error) => { events.failed(error); } });
-    canvas.addEventListener("contextrestored", () => { events.changed(); }, { signal: this.#listeners.signal });
   }
 
   get busy(): boolean {
@@ -54,13 +49,14 @@ export class CanvasDrawer implements Drawer {
     return this.#pictures.composed ? "light by compositing: this browser changes pixels that are read" : "";
   }
 
+  get shown(): HTMLElement {
+    return this.#showing.element;
+  }
+
   draw(frame: FrameSpec): void {
-    this.#context.clearRect(0, 0, frame.width, frame.height);
     const wanted = frame.passes.map((pass) => [pass, this.#giveAll(frame, pass)] as const);
-    const wishes = wanted.flatMap(([pass, tiles]) => {
-      this.#paint(pass, tiles);
-      return [...tiles].map(([name, tile]) => this.#wish(frame.passes, pass, this.#pictures.of(name), tile));
-    });
+    this.#showing.show(frame, wanted.flatMap(([pass, tiles]) => this.#shownOf(pass, tiles)));
+    const wishes = wanted.flatMap(([pass, tiles]) => [...tiles].map(([name, tile]) => this.#wish(frame.passes, pass, this.#pictures.of(name), tile)));
     this.#pictures.want(wishes.filter(({ urgency }) => urgency.length > 0));
     this.#dropNamed(frame.passes);
     if (this.busy) return;
@@ -78,9 +74,8 @@ export class CanvasDrawer implements Drawer {
   }
 
   destroy(): void {
-    this.#listeners.abort();
     this.#pictures.stop();
-    this.#sheet.empty();
+    this.#showing.remove();
     this.#given.clear();
   }
 
@@ -118,23 +113,12 @@ export class CanvasDrawer implements Drawer {
     return neededKinds(look.mode, look.masked, look.combined).every((kind) => layers[kind] !== undefined) ? layers : null;
   }
 
-  #paint(pass: Pass, wanted: ReadonlyMap<string, Wanted>): void {
+  #shownOf(pass: Pass, wanted: ReadonlyMap<string, Wanted>): Shown[] {
+    const { mode, opacity, clip, quads } = pass;
     const grid = gridOf(pass, this.#tilePx);
-    if (!grid || this.#tilePx === 0) return;
-    const pieces = pass.quads.filter(({ from }) => wanted.has(nameIn(pass, from))).flatMap((quad) => this.#piecesFor(pass, grid, quad));
-    if (pieces.length === 0) return;
-    this.#context.save();
-    if (pass.clip) this.#clip(pass.clip);
-    this.#sheet.show(this.#context, grid, pieces, pass.mode === "lit" || pass.mode === "color" || pass.mode === "picture", pass.opacity);
-    this.#context.restore();
-  }
-
-  #clip([left, top, right, bottom]: Clip): void {
-    const { width, height } = this.#context.canvas;
-    const [x, y] = [Math.round(left * width), Math.round(top * height)];
-    this.#context.beginPath();
-    this.#context.rect(x, y, Math.round(right * width) - x, Math.round(bottom * height) - y);
-    this.#context.clip();
+    if (!grid || this.#tilePx === 0) return [];
+    const pieces = quads.filter(({ from }) => wanted.has(nameIn(pass, from))).flatMap((quad) => this.#piecesFor(pass, grid, quad));
+    return pieces.length > 0 ? [{ grid, pieces, smooth: mode === "lit" || mode === "color" || mode === "picture", opacity, clip }] : [];
   }
 
   /** What stands for a quad: the picture of its tile, or of tiles below or above it that have one. */

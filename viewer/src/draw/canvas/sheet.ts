@@ -1,6 +1,7 @@
 import type { Tile } from "../../geo/frame";
 import type { Stand } from "../../tiles/cover";
-import type { Pass } from "../drawer";
+import { DrawError } from "../../core/errors";
+import type { Pass, Setting } from "../drawer";
 
 /** Where the tile pixels of the shown level lie on the screen. */
 export interface Grid {
@@ -36,49 +37,75 @@ export interface Piece extends Stand {
   readonly bitmap: ImageBitmap;
 }
 
+/** Left, top, right, bottom: pixels of a level. */
+export type Window = readonly [number, number, number, number];
+
+/** What a sheet holds. */
+interface Held {
+  readonly grid: Grid;
+  readonly smooth: boolean;
+  readonly window: Window;
+  readonly pieces: readonly Piece[];
+}
+
+/** A canvas has sides of whole multiples, so that it need not change with each picture. */
+const SIDE_PX = 32;
+
 /**
- * Tiles put together at whole pixels of their level, then drawn scaled as one picture: no seam can show, since there is
+ * Tiles put together at whole pixels of their level, to be seen scaled as one picture: no seam can show, since there is
  * none. A border of nothing around them keeps their outer edges as soft as inner ones.
  */
 export class Sheet {
   readonly #context: CanvasRenderingContext2D;
+  #held: Held | null = null;
 
+  /** @throws DrawError when the browser has no 2D canvas */
   constructor() {
-    this.#context = document.createElement("canvas").getContext("2d") as CanvasRenderingContext2D;
+    this.#context = contextOf(document.createElement("canvas"));
   }
 
-  /** @param smooth mixes colours between pixels; ids and the like are not to be mixed */
-  show(screen: CanvasRenderingContext2D, grid: Grid, pieces: readonly Piece[], smooth: boolean, opacity: number): void {
-    const { canvas } = this.#context;
-    const [x0, y0, x1, y1] = this.#window(screen.canvas, grid, pieces);
-    if (x1 <= x0 || y1 <= y0) return;
-    const [width, height] = [x1 - x0, y1 - y0];
-    if (canvas.width < width) canvas.width = width;
-    if (canvas.height < height) canvas.height = height;
-    this.#context.setTransform(1, 0, 0, 1, 0, 0);
-    this.#context.clearRect(0, 0, canvas.width, canvas.height);
+  get canvas(): HTMLCanvasElement {
+    return this.#context.canvas;
+  }
+
+  /**
+   * Puts together what is seen of the pieces and so many pixels `beyond`; does nothing while it holds what is seen.
+   * @param smooth mixes colours between pixels; ids and the like are not to be mixed  @returns what the canvas holds, from its left top corner on; null: nothing is seen
+   */
+  lay(screen: Setting, grid: Grid, pieces: readonly Piece[], smooth: boolean, beyond: number): Window | null {
+    const seen = windowOf(screen, grid, pieces, 0);
+    if (!seen) return this.empty();
+    if (this.#held && holds(this.#held, seen, grid, pieces, smooth)) return this.#held.window;
+    const window = windowOf(screen, grid, pieces, beyond) as Window;
+    const [x0, y0, x1, y1] = window;
+    this.#room(x1 - x0, y1 - y0);
     this.#context.translate(-x0, -y0);
     this.#context.imageSmoothingEnabled = smooth;
     for (const piece of pieces) this.#lay(grid, piece);
-    const { left, top, px } = grid;
-    screen.imageSmoothingEnabled = smooth && px !== 1;
-    screen.globalAlpha = opacity;
-    screen.drawImage(canvas, 0, 0, width, height, left + x0 * px, top + y0 * px, width * px, height * px);
-    screen.globalAlpha = 1;
+    this.#held = { grid, smooth, window, pieces };
+    return window;
+  }
+
+  /** What it held is gone. */
+  forget(): void {
+    this.#held = null;
   }
 
   /** Gives its memory back. */
-  empty(): void {
-    Object.assign(this.#context.canvas, { width: 0, height: 0 });
+  empty(): null {
+    Object.assign(this.canvas, { width: 0, height: 0 });
+    this.#held = null;
+    return null;
   }
 
-  /** What is seen of the pieces and one pixel more, in pixels of the level. */
-  #window({ width, height }: HTMLCanvasElement, grid: Grid, pieces: readonly Piece[]): [number, number, number, number] {
-    const { left, top, px } = grid;
-    const places = pieces.map(({ area }) => placeOf(grid, area));
-    const least = (k: number, edge: number): number => Math.max(Math.min(...places.map((place) => place[k] ?? 0)), Math.floor(edge)) - 1;
-    const most = (k: number, edge: number): number => Math.min(Math.max(...places.map((place) => place[k] ?? 0)), Math.ceil(edge)) + 1;
-    return [least(0, -left / px), least(1, -top / px), most(2, (width - left) / px), most(3, (height - top) / px)];
+  /** Nothing, from the left top corner on. */
+  #room(width: number, height: number): void {
+    const { canvas } = this;
+    const side = (is: number, need: number): number => (is < need || is > 2 * need ? Math.ceil(need / SIDE_PX) * SIDE_PX : is);
+    const [w, h] = [side(canvas.width, width), side(canvas.height, height)];
+    if (w !== canvas.width || h !== canvas.height) [canvas.width, canvas.height] = [w, h];
+    this.#context.setTransform(1, 0, 0, 1, 0, 0);
+    this.#context.clearRect(0, 0, w, h);
   }
 
   #lay(grid: Grid, { area, from, bitmap }: Piece): void {
@@ -105,3 +132,34 @@ export class Sheet {
   }
 }
 
+/** @throws DrawError when the canvas has another context already, or the browser no 2D canvas */
+export function contextOf(canvas: HTMLCanvasElement): CanvasRenderingContext2D {
+  const context = canvas.getContext("2d");
+  if (!context) throw new DrawError("this browser offers neither WebGL2 nor a 2D canvas, of which the map needs one to draw; update it");
+  return context;
+}
+
+/** What is seen of the pieces, so much beyond, and one pixel more; null: nothing. */
+function windowOf({ width, height }: Pick<Setting, "width" | "height">, grid: Grid, pieces: readonly Piece[], beyond: number): Window | null {
+  const { left, top, px } = grid;
+  const places = pieces.map(({ area }) => placeOf(grid, area));
+  const least = (k: number, edge: number): number => Math.max(Math.min(...places.map((place) => place[k] ?? 0)), Math.floor(edge) - beyond) - 1;
+  const most = (k: number, edge: number): number => Math.min(Math.max(...places.map((place) => place[k] ?? 0)), Math.ceil(edge) + beyond) + 1;
+  const window = [least(0, -left / px), least(1, -top / px), most(2, (width - left) / px), most(3, (height - top) / px)] as const;
+  return window[2] > window[0] && window[3] > window[1] ? window : null;
+}
+
+/** Is all there that is seen, and as it is wanted? */
+function holds({ grid, smooth, window, pieces }: Held, seen: Window, wanted: Grid, now: readonly Piece[], smoothNow: boolean): boolean {
+  if (grid.level !== wanted.level || grid.tilePx !== wanted.tilePx || smooth !== smoothNow) return false;
+  if (seen[0] < window[0] || seen[1] < window[1] || seen[2] > window[2] || seen[3] > window[3]) return false;
+  const met = ({ area }: Piece): boolean => {
+    const [x0, y0, x1, y1] = placeOf(wanted, area);
+    return x0 < seen[2] && y0 < seen[3] && x1 > seen[0] && y1 > seen[1];
+  };
+  const there = new Map(pieces.filter(met).map((piece) => [pieceKey(piece), piece.bitmap]));
+  const here = now.filter(met);
+  return here.length === there.size && here.every((piece) => there.get(pieceKey(piece)) === piece.bitmap);
+}
+
+const pieceKey = ({ area, from }: Piece): string => [area.z, area.x, area.y, from.z].join("/");

@@ -66,6 +66,10 @@ export class WebGLDrawer implements Drawer {
     this.#watch(events);
   }
 
+  get shown(): HTMLElement {
+    return this.#canvas;
+  }
+
   draw(frame: FrameSpec): void {
     const gl = this.gl;
     if (gl.isContextLost()) return;

@@ -1,0 +1,130 @@
+import { element } from "../../core/dom";
+import type { Clip } from "../combine";
+import type { Setting } from "../drawer";
+import { contextOf, Sheet, type Grid, type Piece } from "./sheet";
+
+/** What a pass shows. */
+export interface Shown {
+  readonly grid: Grid;
+  readonly pieces: readonly Piece[];
+  readonly smooth: boolean;
+  readonly opacity: number;
+  readonly clip: Clip | null;
+}
+
+/** How passes come to be seen. */
+export interface Showing {
+  /** What they are seen in. */
+  readonly element: HTMLElement;
+  /** All of a frame, the lowest first. */
+  show(screen: Setting, passes: readonly Shown[]): void;
+  remove(): void;
+}
+
+/** Painted on a canvas, whose pixels can be read. */
+export class Painted implements Showing {
+  readonly #context: CanvasRenderingContext2D;
+  readonly #sheet = new Sheet();
+  readonly #listeners = new AbortController();
+
+  /** @param lost the browser has lost what was drawn  @throws DrawError */
+  constructor(canvas: HTMLCanvasElement, lost: () => void) {
+    this.#context = contextOf(canvas);
+    for (const each of [canvas, this.#sheet.canvas]) each.addEventListener("contextrestored", () => {
+      this.#sheet.forget();
+      lost();
+    }, { signal: this.#listeners.signal });
+  }
+
+  get element(): HTMLElement {
+    return this.#context.canvas;
+  }
+
+  show(screen: Setting, passes: readonly Shown[]): void {
+    this.#context.clearRect(0, 0, screen.width, screen.height);
+    for (const pass of passes) {
+      this.#context.save();
+      this.#paint(screen, pass);
+      this.#context.restore();
+    }
+  }
+
+  remove(): void {
+    this.#listeners.abort();
+    this.#sheet.empty();
+  }
+
+  #paint(screen: Setting, { grid, pieces, smooth, opacity, clip }: Shown): void {
+    const window = this.#sheet.lay(screen, grid, pieces, smooth, 0);
+    if (!window) return;
+    const [[x0, y0, x1, y1], { left, top, px }, context] = [window, grid, this.#context];
+    if (clip) {
+      const [x, y, right, bottom] = clipped(clip, screen);
+      context.beginPath();
+      context.rect(x, y, right - x, bottom - y);
+      context.clip();
+    }
+    context.imageSmoothingEnabled = smooth && px !== 1;
+    context.globalAlpha = opacity;
+    context.drawImage(this.#sheet.canvas, 0, 0, x1 - x0, y1 - y0, left + x0 * px, top + y0 * px, (x1 - x0) * px, (y1 - y0) * px);
+  }
+}
+
+/** Pixels of the level beyond what is seen that are there when the picture is moved. */
+const BEYOND_PX = 64;
+
+/** Elements of the page, below a canvas: the browser moves and scales what has not changed, which takes a quarter of the work that painting does, and memory for pixels of the level alone. */
+export class Laid implements Showing {
+  readonly element = element("div", "map3d-sheets", { "aria-hidden": "true" });
+  readonly #lost: () => void;
+  readonly #places: { readonly box: HTMLElement; readonly sheet: Sheet }[] = [];
+
+  /** @param lost the browser has lost what was drawn  @throws DrawError */
+  constructor(canvas: HTMLCanvasElement, lost: () => void) {
+    this.#lost = lost;
+    this.#place(0);
+    const { borderRadius, filter } = getComputedStyle(canvas);
+    Object.assign(this.element.style, { borderRadius, filter });
+    canvas.before(this.element);
+  }
+
+  show(screen: Setting, passes: readonly Shown[]): void {
+    passes.forEach((pass, k) => { this.#show(screen, pass, this.#place(k)); });
+    for (const { box, sheet } of this.#places.splice(passes.length)) {
+      box.remove();
+      sheet.empty();
+    }
+  }
+
+  remove(): void {
+    this.element.remove();
+    for (const { sheet } of this.#places) sheet.empty();
+  }
+
+  #show(screen: Setting, { grid, pieces, smooth, opacity, clip }: Shown, { box, sheet }: { box: HTMLElement; sheet: Sheet }): void {
+    const [x, y] = sheet.lay(screen, grid, pieces, smooth, BEYOND_PX) ?? [0, 0];
+    const [scale, css] = [grid.px / screen.dpr, (at: number): string => `${String(at / screen.dpr)}px`];
+    Object.assign(sheet.canvas.style, { transform: `translate(${css(grid.left + x * grid.px)}, ${css(grid.top + y * grid.px)}) scale(${String(scale)})`, imageRendering: smooth ? "auto" : "pixelated" });
+    const [left, top, right, bottom] = clipped(clip ?? [0, 0, 1, 1], screen);
+    Object.assign(box.style, { opacity: String(opacity), clipPath: clip ? `inset(${css(top)} ${css(screen.width - right)} ${css(screen.height - bottom)} ${css(left)})` : "" });
+  }
+
+  #place(k: number): { box: HTMLElement; sheet: Sheet } {
+    const known = this.#places[k];
+    if (known) return known;
+    const place = { box: element("div", ""), sheet: new Sheet() };
+    place.sheet.canvas.addEventListener("contextrestored", () => {
+      place.sheet.forget();
+      this.#lost();
+    });
+    place.box.append(place.sheet.canvas);
+    this.element.append(place.box);
+    this.#places.push(place);
+    return place;
+  }
+}
+
+/** Left, top, right, bottom in whole device pixels. */
+function clipped([left, top, right, bottom]: Clip, { width, height }: Setting): [number, number, number, number] {
+  return [Math.round(left * width), Math.round(top * height), Math.round(right * width), Math.round(bottom * height)];
+}
