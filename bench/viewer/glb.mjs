@@ -12,7 +12,9 @@ await MeshoptEncoder.ready;
 const io = new NodeIO().registerExtensions(ALL_EXTENSIONS).registerDependencies({ "meshopt.encoder": MeshoptEncoder });
 const jobs = JSON.parse(readFileSync(0, "utf8"));
 for (const [number, { obj, glb }] of jobs.entries()) {
-  const document = await io.readBinary(await obj2gltf(obj, { binary: true, inputUpAxis: "Z", outputUpAxis: "Y" }));
+  const document = await io.readBinary(await obj2gltf(obj, { binary: true, inputUpAxis: "Z", outputUpAxis: "Y", checkTransparency: true }));
+  // What lets light through is leaves and the like: cut out, as map3d does.
+  for (const material of document.getRoot().listMaterials()) if (material.getAlphaMode() === "BLEND") material.setAlphaMode("MASK");
   document.setLogger(new Logger(Logger.Verbosity.WARN));
   await document.transform(
     dedup(), palette({ min: 2 }), flatten(), join(), weld(), prune(),
