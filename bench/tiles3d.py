@@ -137,14 +137,18 @@ def write_obj(part: Part, folder: Path) -> Path:
     return path
 
 
-def write_tileset(tiles: list[Part], folder: Path, name: str) -> Box:
-    """GLBs and the tileset NAME.json of some tiles in `folder`/3dtiles, coordinates as they are; returns the box of all. GLBs that are there stay."""
+def write_tileset(tiles: list[Part], folder: Path, name: str, mipmaps: bool = False) -> Box:
+    """GLBs and the tileset NAME.json of some tiles in `folder`/3dtiles, coordinates as they are; returns the box of all. GLBs that are there stay.
+
+    `mipmaps`: textures ask for them, as pictures need; without, as obj2gltf has them.
+    """
     out = folder / "3dtiles"
     out.mkdir(parents=True, exist_ok=True)
     jobs = []
     for number, part in enumerate(tiles):
         if not (out / f"{name}-{number}.glb").is_file():
-            jobs.append({"obj": str(write_obj(part, folder / "obj" / f"{name}-{number}")), "glb": str(out / f"{name}-{number}.glb")})
+            obj = write_obj(part, folder / "obj" / f"{name}-{number}")
+            jobs.append({"obj": str(obj), "glb": str(out / f"{name}-{number}.glb"), "mipmaps": mipmaps})
     _make_glbs(jobs, name)
     boxes = [part.box for part in tiles]
     whole = _united(boxes)
@@ -197,7 +201,7 @@ def _colors(part: Part) -> Floats:
     return result
 
 
-def _make_glbs(jobs: list[dict[str, str]], name: str) -> None:
+def _make_glbs(jobs: list[dict[str, Any]], name: str) -> None:
     if jobs:
         print(f"bench: {len(jobs)} GLB files of {name}", file=sys.stderr, flush=True)
         subprocess.run(["node", str(GLB)], input=json.dumps(jobs), text=True, check=True)
