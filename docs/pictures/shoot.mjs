@@ -10,7 +10,7 @@ import { build } from "../../viewer/node_modules/esbuild/lib/main.js";
 const { playwright, page, views, cesium, out } = JSON.parse(readFileSync(0, "utf8"));
 const SOURCES = join(import.meta.dirname, "../../viewer/src");
 /** A summer's day, two o'clock by the town's clocks. */
-const DAY = "2026-06-21T12:00Z";
+const [DAY, ZONE] = ["2026-06-21T12:00Z", "Europe/Berlin"];
 /** The viewer's own. */
 const PAPER = "#f2f0eb";
 const TILES_BYTES = 2 ** 31;
@@ -27,7 +27,7 @@ async function compiled(contents) {
 
 /** A fresh browser window, as the first visit has it; `sent`: bytes that came, heads included. */
 async function open({ size: [width, height], dpr }) {
-  const context = await browser.newContext({ viewport: { width, height }, deviceScaleFactor: dpr ?? 1, isMobile: dpr !== undefined, hasTouch: dpr !== undefined, colorScheme: "light", bypassCSP: true });
+  const context = await browser.newContext({ viewport: { width, height }, deviceScaleFactor: dpr ?? 1, isMobile: dpr !== undefined, hasTouch: dpr !== undefined, colorScheme: "light", timezoneId: ZONE, bypassCSP: true });
   const tab = await context.newPage();
   tab.setDefaultTimeout(LIMIT_MS);
   tab.on("pageerror", (error) => { throw error; });
@@ -37,15 +37,19 @@ async function open({ size: [width, height], dpr }) {
   return { context, tab, sent };
 }
 
-/** Waits until pictures have come, none is on its way, and nothing has moved for a while. */
+/** Waits until pictures have come, none is on its way, and nothing has moved for a while; throws when that never comes. */
 async function quiet(tab, act) {
+  const end = performance.now() + LIMIT_MS;
   let [open, images, last] = [0, 0, performance.now()];
   const heard = (step) => () => { [open, last] = [open + step, performance.now()]; };
   const [begun, ended] = [heard(1), heard(-1)];
   const answered = (response) => { images += Number(response.headers()["content-type"]?.startsWith("image/") ?? false); };
   tab.on("request", begun).on("requestfinished", ended).on("requestfailed", ended).on("response", answered);
   const pictures = await act();
-  while (open > 0 || images < pictures || performance.now() - last < 2000) await new Promise((done) => setTimeout(done, 100));
+  while (open > 0 || images < pictures || performance.now() - last < 2000) {
+    if (performance.now() > end || tab.isClosed()) throw new Error(`${tab.url()}: ${open} requests are still open, ${images} pictures came of ${pictures}`);
+    await new Promise((done) => setTimeout(done, 100));
+  }
   tab.off("request", begun).off("requestfinished", ended).off("requestfailed", ended).off("response", answered);
 }
 
