@@ -11,7 +11,7 @@ CACHE := .cache
 RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
 VIEWER := $(shell find viewer/src viewer/page viewer/scripts -type f 2>/dev/null) $(wildcard viewer/*.json viewer/*.ts viewer/*.js viewer/*.mjs)
 
-.PHONY: help demo test test-all test-rust test-python test-viewer test-browser check check-rust check-python check-viewer bench bench-extent bench-cycles bench-rotterdam bench-viewer bless docs reference build clean tools
+.PHONY: help demo test test-all test-rust test-python test-viewer test-browser check check-rust check-python check-viewer bench bench-extent bench-cycles bench-rotterdam bench-viewer peers bless docs reference build clean tools
 
 help: ## this list
 	@echo "map3d: 3D city models as oblique image tiles"; echo
@@ -107,14 +107,16 @@ bench-cycles: requirements/cycles.lock | $(CACHE) ## install Blender (350 MB) in
 	$(PYTHON) -m venv $(CACHE)/cycles
 	$(CACHE)/cycles/bin/python -m pip install -q --disable-pip-version-check -r requirements/cycles.lock
 
-bench-viewer: build ## map3d.js beside CesiumJS, OpenSeadragon and Leaflet (npm, 230 MB), cities to 10 million triangles: 2 hours and 9 GB of disk
-	cd bench/viewer && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error || echo "bench: NO PEERS: npm could not install them" >&2
+bench-viewer: build peers ## map3d.js beside CesiumJS, OpenSeadragon and Leaflet (npm, 230 MB), cities to 10 million triangles: 2 hours and 9 GB of disk
 	$(BIN)/python -m bench viewer
+
+peers:
+	cd bench/viewer && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error || echo "NO PEERS: npm could not install them" >&2
 
 bench-rotterdam: build ## a city of 62,000 buildings from nothing to a published folder: hours, 45 GB of disk
 	$(BIN)/python -m bench.rotterdam
 
-docs: build reference ## the pictures and the command line's reference in docs/; the viewer's reference
+docs: build reference peers ## the pictures (beside CesiumJS: npm, 230 MB) and the command line's reference in docs/; the viewer's reference
 	$(BIN)/python docs/make_cli.py
 	$(BIN)/python docs/pictures/make.py .cache/pictures
 

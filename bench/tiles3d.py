@@ -7,6 +7,7 @@ the scene's origin.
 
 import json
 import math
+import re
 import shutil
 import subprocess
 import sys
@@ -19,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from map3d.ingest.asset import open_mesh
+from map3d.ingest.asset import Mesh, open_mesh
 
 from .city import PLACE_M, SPECS, City, Place, assets_of
 
@@ -49,7 +50,7 @@ def tileset(city: City, far: bool = False) -> Path:
     out = city.folder / "3dtiles"
     out.mkdir(parents=True, exist_ok=True)
     kinds = sorted(set(city.places.values()))
-    boxes = {kind: (_far_district if far else _district)(city.folder, out, kind) for kind in kinds}
+    boxes = {kind: _far_district(city.folder, out, kind) if far else write_tileset(parts(city.folder, kind), city.folder, kind) for kind in kinds}
     path = out / f"{city.name}{'-far' * far}.json"
     root = _node({at: kind + "-far" * far for at, kind in city.places.items()}, {kind + "-far" * far: box for kind, box in boxes.items()})
     path.write_text(json.dumps({"asset": {"version": "1.1"}, "geometricError": 2 * root["geometricError"], "root": {**root, "refine": "ADD"}}))
@@ -59,18 +60,33 @@ def tileset(city: City, far: bool = False) -> Path:
 def parts(folder: Path, kind: str) -> list[Part]:
     """The district's tiles, the largest last."""
     spec = SPECS[kind]
-    origin = np.array([spec.east_m, spec.north_m, spec.height_m])
+    return parts_of(assets_of(folder, kind), np.array([spec.east_m, spec.north_m, spec.height_m]))
+
+
+def parts_of(assets: list[Path], origin: Floats) -> list[Part]:
+    """The tiles of some asset folders; corners become local to `origin`, (3,) in the scene's CRS."""
     found = []
-    for asset in assets_of(folder, kind):
+    for asset in assets:
         mesh = open_mesh(asset)
         uvs, materials = _sections(asset, len(mesh.positions), len(mesh.triangles))
-        table = json.loads((asset / "materials.json").read_text())["materials"]
-        group = _groups(np.asarray(mesh.objects), materials, table)
+        given = json.loads((asset / "materials.json").read_text())
+        rows, corners = _placed(mesh, given["instances"], origin)
+        group = _groups(mesh.objects[rows], materials[rows], given["materials"])
         for number in np.unique(group):
             mine = group == number
-            corners = mesh.positions[mesh.triangles[mine]] - origin
-            found.append(Part(corners, uvs[mine], materials[mine], table, asset / "textures"))
+            found.append(Part(corners[mine], uvs[rows[mine]], materials[rows[mine]], given["materials"], asset / "textures"))
     return found
+
+
+def _placed(mesh: Mesh, instances: list[dict[str, Any]], origin: Floats) -> tuple[NDArray[np.int64], Floats]:
+    """(n,) numbers and (n, 3, 3) local corners of the triangles as they stand in the scene: those of a prototype once for each instance."""
+    rows = [np.flatnonzero(mesh.prototypes == 0)]
+    corners = [mesh.positions[mesh.triangles[rows[0]]] - origin]
+    for instance in instances:
+        own, move = np.flatnonzero(mesh.prototypes == instance["prototype"]), np.array(instance["transform"]).reshape(3, 4)
+        rows.append(own)
+        corners.append(mesh.positions[mesh.triangles[own]] @ move[:, :3].T + (move[:, 3] - origin))
+    return np.concatenate(rows), np.concatenate(corners)
 
 
 def _sections(asset: Path, vertices: int, triangles: int) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
@@ -85,7 +101,7 @@ def _sections(asset: Path, vertices: int, triangles: int) -> tuple[NDArray[np.fl
 
 def _groups(objects: NDArray[np.uint32], materials: NDArray[np.uint32], table: list[dict[str, Any]]) -> NDArray[np.int64]:
     """The tile of each triangle: the atlas, or piece of terrain, that most of its object's triangles have."""
-    own = np.array([index if str(entry["name"]).startswith(("textures/a", "terrain")) else -1 for index, entry in enumerate(table)])[materials]
+    own = np.array([index if re.match(r"textures/a\d|terrain", entry["name"]) else -1 for index, entry in enumerate(table)])[materials]
     result = np.zeros(len(objects), np.int64)
     for number in np.unique(objects):
         mine = objects == number
@@ -121,19 +137,24 @@ def write_obj(part: Part, folder: Path) -> Path:
     return path
 
 
-def _district(folder: Path, out: Path, kind: str) -> Box:
-    """GLBs and the tileset of a district, its middle at 0; returns its box."""
-    tiles = parts(folder, kind)
+def write_tileset(tiles: list[Part], folder: Path, name: str, mipmaps: bool = False) -> Box:
+    """GLBs and the tileset NAME.json of some tiles in `folder`/3dtiles, coordinates as they are; returns the box of all. GLBs that are there stay.
+
+    `mipmaps`: textures ask for them, as pictures need; without, as obj2gltf has them.
+    """
+    out = folder / "3dtiles"
+    out.mkdir(parents=True, exist_ok=True)
     jobs = []
     for number, part in enumerate(tiles):
-        if not (out / f"{kind}-{number}.glb").is_file():
-            jobs.append({"obj": str(write_obj(part, folder / "obj" / f"{kind}-{number}")), "glb": str(out / f"{kind}-{number}.glb")})
-    _make_glbs(jobs, kind)
+        if not (out / f"{name}-{number}.glb").is_file():
+            obj = write_obj(part, folder / "obj" / f"{name}-{number}")
+            jobs.append({"obj": str(obj), "glb": str(out / f"{name}-{number}.glb"), "mipmaps": mipmaps})
+    _make_glbs(jobs, name)
     boxes = [part.box for part in tiles]
     whole = _united(boxes)
-    children = [{**_volume(box, 0.0), "content": {"uri": f"{kind}-{number}.glb"}} for number, box in enumerate(boxes)]
+    children = [{**_volume(box, 0.0), "content": {"uri": f"{name}-{number}.glb"}} for number, box in enumerate(boxes)]
     root = {**_volume(whole), "refine": "ADD", "children": children}
-    (out / f"{kind}.json").write_text(json.dumps({"asset": {"version": "1.1"}, "geometricError": PLACE_M, "root": root}))
+    (out / f"{name}.json").write_text(json.dumps({"asset": {"version": "1.1"}, "geometricError": 2 * root["geometricError"], "root": root}))
     return whole
 
 
@@ -142,7 +163,7 @@ def _far_district(folder: Path, out: Path, kind: str) -> Box:
     tiles, glb = parts(folder, kind), out / f"{kind}-far.glb"
     if not glb.is_file():
         part = plainly_coloured(tiles, folder / "obj" / f"{kind}-palette")
-        _make_glbs([{"obj": str(write_obj(part, folder / "obj" / f"{kind}-far")), "glb": str(glb)}], kind)
+        _make_glbs([{"obj": str(write_obj(part, folder / "obj" / f"{kind}-far")), "glb": str(glb)}], glb.stem)
     box = _united([part.box for part in tiles])
     root = {**_volume(box, 0.0), "refine": "ADD", "content": {"uri": glb.name}}
     (out / f"{kind}-far.json").write_text(json.dumps({"asset": {"version": "1.1"}, "geometricError": PLACE_M, "root": root}))
@@ -180,9 +201,9 @@ def _colors(part: Part) -> Floats:
     return result
 
 
-def _make_glbs(jobs: list[dict[str, str]], kind: str) -> None:
+def _make_glbs(jobs: list[dict[str, Any]], name: str) -> None:
     if jobs:
-        print(f"bench: {len(jobs)} GLB files of the {kind} district", file=sys.stderr, flush=True)
+        print(f"bench: {len(jobs)} GLB files of {name}", file=sys.stderr, flush=True)
         subprocess.run(["node", str(GLB)], input=json.dumps(jobs), text=True, check=True)
 
 

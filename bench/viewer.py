@@ -48,7 +48,7 @@ QUICK = Wish(cities=("1e4",), reps=1, length=8, use_s=5, idle_s=5, peers=False)
 
 def measure(quick: bool, reps: int, folder: Path, only: tuple[str, ...] | None, free: bool) -> list[Row]:
     """All samples; the tables are printed. `only`: measures (see run.mjs)."""
-    wish = QUICK if quick else Wish(reps=reps, peers=_peers(), only=only, free=free)
+    wish = QUICK if quick else Wish(reps=reps, peers=peers(), only=only, free=free)
     cities = list(made(folder, wish.cities))
     middle = cities[min(2, len(cities) - 1)]
     if wish.peers:
@@ -60,7 +60,7 @@ def measure(quick: bool, reps: int, folder: Path, only: tuple[str, ...] | None, 
     return samples
 
 
-def _peers() -> bool:
+def peers() -> bool:
     """Are they installed? Says so when not."""
     if (HERE / "node_modules" / "cesium").is_dir():
         return True

@@ -1,7 +1,7 @@
-// OBJ files as GLB for CesiumJS; standard input: [{ "obj": …, "glb": … }]. obj2gltf, then with glTF-Transform (which 3d-tiles-tools brings) what makes
+// OBJ files as GLB for CesiumJS; standard input: [{ "obj": …, "glb": …, "mipmaps": boolean }]. obj2gltf, then with glTF-Transform (which 3d-tiles-tools brings) what makes
 // them cheapest to send and to draw: plain colours in one palette, one mesh a material, WebP of the quality that our tiles have, meshopt.
 import { readFileSync } from "node:fs";
-import { Logger, NodeIO } from "@gltf-transform/core";
+import { Logger, NodeIO, TextureInfo } from "@gltf-transform/core";
 import { ALL_EXTENSIONS } from "@gltf-transform/extensions";
 import { dedup, flatten, join, meshopt, palette, prune, textureCompress, weld } from "@gltf-transform/functions";
 import { MeshoptEncoder } from "meshoptimizer";
@@ -11,8 +11,14 @@ import sharp from "sharp";
 await MeshoptEncoder.ready;
 const io = new NodeIO().registerExtensions(ALL_EXTENSIONS).registerDependencies({ "meshopt.encoder": MeshoptEncoder });
 const jobs = JSON.parse(readFileSync(0, "utf8"));
-for (const [number, { obj, glb }] of jobs.entries()) {
-  const document = await io.readBinary(await obj2gltf(obj, { binary: true, inputUpAxis: "Z", outputUpAxis: "Y" }));
+for (const [number, { obj, glb, mipmaps }] of jobs.entries()) {
+  const document = await io.readBinary(await obj2gltf(obj, { binary: true, inputUpAxis: "Z", outputUpAxis: "Y", checkTransparency: true }));
+  for (const material of document.getRoot().listMaterials()) {
+    // What lets light through is leaves and the like: cut out, as map3d does.
+    if (material.getAlphaMode() === "BLEND") material.setAlphaMode("MASK");
+    // obj2gltf's textures ask for none.
+    if (mipmaps) material.getBaseColorTextureInfo()?.setMinFilter(TextureInfo.MinFilter.LINEAR_MIPMAP_LINEAR);
+  }
   document.setLogger(new Logger(Logger.Verbosity.WARN));
   await document.transform(
     dedup(), palette({ min: 2 }), flatten(), join(), weld(), prune(),

@@ -3,20 +3,18 @@
 import { appendFileSync, existsSync, mkdirSync, readFileSync } from "node:fs";
 import { loadavg } from "node:os";
 import { join } from "node:path";
-import { build } from "../../viewer/node_modules/esbuild/lib/main.js";
+import { bundled, modules, roots } from "./cesium.mjs";
 import * as measures from "./measures.mjs";
 import * as paths from "./paths.mjs";
 import { Server } from "./server.mjs";
 
 const asked = JSON.parse(readFileSync(0, "utf8"));
-const here = import.meta.dirname;
 const { cities, work, free } = asked;
 /** What people have on the way, besides this machine alone: 10 Mbit/s, 40 ms there and back. */
 const NETWORK = { latency: 40, downloadThroughput: 10e6 / 8, uploadThroughput: 5e6 / 8 };
 
-if (asked.peers) await build({ entryPoints: [join(here, "pages/cesium.entry.js")], bundle: true, minify: true, format: "iife", globalName: "Cesium", outfile: join(work, "built/cesium.js"), logLevel: "error" });
-const modules = join(here, "node_modules");
-const server = new Server(work, { pages: join(here, "pages"), map3d: join(work, "published", cities[0]), city: join(work, "published"), "3dtiles": join(work, "3dtiles"), cesium: join(modules, "cesium/Build/Cesium"), built: join(work, "built"), peers: modules });
+if (asked.peers) await bundled(work);
+const server = new Server(work, { ...roots(work), map3d: join(work, "published", cities[0]), city: join(work, "published"), peers: modules });
 await server.listen();
 
 const page = (name, query) => `${server.origin}/pages/${name}.html?${new URLSearchParams(query)}`;

@@ -5,23 +5,19 @@ from pathlib import Path
 from typing import Final
 
 from PIL import Image
+from sheet import sheet
 
 from map3d.tiles.sqlite_store import SqliteTileStore
 
 PANELS: Final = ("picture", "sun", "ao")
 SIZE_PX: Final = (500, 620)
-GAP_PX: Final = 8
 QUALITY: Final = 88
 
 
 def side_by_side(store: SqliteTileStore, middle_px: tuple[int, int], out: Path) -> None:
     """A JPEG of all panels around a pixel of level zmax, counted from the top left corner of the square."""
-    width, height = SIZE_PX
-    sheet = Image.new("RGB", (len(PANELS) * (width + GAP_PX) - GAP_PX, height), "white")
-    left_px, top_px = middle_px[0] - width // 2, middle_px[1] - height // 2
-    for number, name in enumerate(PANELS):
-        sheet.paste(_cut(store, name, left_px, top_px), (number * (width + GAP_PX), 0))
-    sheet.save(out, quality=QUALITY)
+    left_px, top_px = (at - side // 2 for at, side in zip(middle_px, SIZE_PX, strict=True))
+    sheet([_cut(store, name, left_px, top_px) for name in PANELS]).save(out, quality=QUALITY)
 
 
 def _cut(store: SqliteTileStore, name: str, left_px: int, top_px: int) -> Image.Image:

@@ -1,13 +1,25 @@
-"""`python docs/pictures/make.py FOLDER`: the pictures of the documentation, from a made-up town in FOLDER. Stopped, it goes on where it was."""
+"""`python docs/pictures/make.py FOLDER`: the pictures of the documentation, from a made-up town in FOLDER. Stopped, it goes on where it was.
 
+CesiumJS and what makes its tiles are npm packages in bench/viewer; without them the pictures that show it stay as they are, and that is said.
+"""
+
+import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
+from PIL import Image
+
+sys.path.append(str(Path(__file__).parents[2]))
+
+from bench.viewer import peers
 from light import side_by_side
+from sheet import sheet
+from town3d import town_tileset
 
 from map3d.catalogue import Workspace
 from map3d.cli.app import run
@@ -15,10 +27,15 @@ from map3d.geometry.views import uvd_from_local
 from map3d.tiles.sqlite_store import SqliteTileStore
 
 HERE: Final = Path(__file__).parent
-PLAYWRIGHT: Final = HERE.parents[1] / "viewer" / "node_modules" / "playwright-core"
+ROOT: Final = HERE.parents[1]
+PLAYWRIGHT: Final = ROOT / "viewer" / "node_modules" / "playwright-core"
+CESIUM: Final = ROOT / "bench" / "viewer" / "node_modules" / "cesium" / "package.json"
 TITLE: Final = ("--title", "A made-up town")
 LIGHT: Final = ("--res", "0.2", "--view", "30/45", "--layers", "picture,sun,ao", "--time", "2026-06-21T17:00+02:00", "--quality", "92")
-VIEWS: Final = ("--view", "0/45", "--view", "120/45", "--view", "0/22.5", "--view", "0/10")
+VIEWS: Final = ("--view", "0/45", "--view", "120/45", "--view", "0/22.5", "--view", "0/10", "--view", "0/90")
+QUALITY: Final = 80
+PHONE_PX: Final = 780
+"""A telephone's picture has three pixels a CSS pixel; two are shown."""
 
 
 def prepare(folder: Path) -> Path:
@@ -52,7 +69,9 @@ def light(workspace: Path) -> None:
         side_by_side(store, (round((u - frame.u0_m) / pixel_m), round((frame.v0_m - v) / pixel_m)), HERE / "light.jpg")
 
 
-def shoot(workspace: Path) -> None:
+def shoot(workspace: Path, views: list[dict[str, Any]], cesium: Path | None, out: Path) -> None:
+    """PNG files of the views that are not in `out` yet, by map3d.js and, if there is a folder with the town's 3D Tiles, CesiumJS."""
+    out.mkdir(parents=True, exist_ok=True)
     command = [sys.executable, "-m", "map3d", "serve", "--workspace", str(workspace), "--port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"}) as server:
         assert server.stdout is not None
@@ -60,15 +79,50 @@ def shoot(workspace: Path) -> None:
             address = next((found[0] for line in server.stdout if (found := re.search(r"http://[^\s/]+", line))), None)
             if address is None:
                 sys.exit("the server ended without an address")
-            shot = ["node", str(HERE / "shoot.mjs"), str(PLAYWRIGHT), f"{address}/view/pictures/", str(HERE / "views.json"), str(HERE)]
-            subprocess.run(shot, check=True)
+            where = {"playwright": str(PLAYWRIGHT), "page": f"{address}/view/pictures/", "cesium": cesium and str(cesium), "out": str(out)}
+            subprocess.run(["node", str(HERE / "shoot.mjs")], input=json.dumps({"views": views, **where}), text=True, check=True)
         finally:
             server.terminate()
+
+
+def beside(view: dict[str, Any], shots: Path) -> None:
+    """A JPEG of map3d.js, left, and CesiumJS."""
+    panels, words = [], []
+    for viewer, title in (("map3d", "map3d.js"), ("cesium", f"CesiumJS {json.loads(CESIUM.read_text())['version']}")):
+        with Image.open(shots / f"{view['name']}-{viewer}.png") as shot:
+            panel = shot.convert("RGB")
+        if "dpr" in view:
+            panel = panel.resize((PHONE_PX, PHONE_PX * panel.height // panel.width), Image.Resampling.LANCZOS)
+        panels.append(panel)
+        told = json.loads((shots / f"{view['name']}-{viewer}.json").read_text())
+        drawn = f", {told['triangles']:,} triangles drawn" if "triangles" in told else ""
+        words.append(f"{title}: {told['bytes'] / 1e6:.1f} MB fetched{drawn}")
+    sheet(panels, words).save(HERE / f"{view['name']}.jpg", quality=QUALITY)
+
+
+def main(folder: Path) -> None:
+    workspace = prepare(folder)
+    light(workspace)
+    views = json.loads((HERE / "views.json").read_text())
+    with_cesium = peers()
+    if with_cesium:
+        town_tileset(Workspace(workspace), "town", folder)
+    else:
+        print("docs: pictures beside CesiumJS stay as they are", file=sys.stderr)
+        views = [view for view in views if view.get("alone")]
+    shots = folder / "shots"
+    shoot(workspace, views, folder.absolute() if with_cesium else None, shots.absolute())
+    for view in views:
+        if view.get("alone"):
+            with Image.open(shots / f"{view['name']}-map3d.png") as shot:
+                shot.convert("RGB").save(HERE / f"{view['name']}.jpg", quality=QUALITY)
+        else:
+            beside(view, shots)
+    # The next time all of them are taken anew.
+    shutil.rmtree(shots)
 
 
 if __name__ == "__main__":
     if len(sys.argv) != 2:
         sys.exit("usage: python docs/pictures/make.py FOLDER")
-    root = prepare(Path(sys.argv[1]))
-    light(root)
-    shoot(root)
+    main(Path(sys.argv[1]))

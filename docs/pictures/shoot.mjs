@@ -1,37 +1,106 @@
-// Opens a served rendering at the places of views.json and takes a picture of each. Arguments: playwright-core's folder, address of the page, views.json, folder for the pictures.
-import { readFile } from "node:fs/promises";
+// Opens a served rendering at the places of views.json, and the same town in CesiumJS, and takes a picture of each. Standard input: { playwright: its folder, page:
+// address of the rendering, views: of views.json, cesium: a folder whose 3dtiles/town.json is the town | null, out: folder for the pictures }. What is there stays.
+import { existsSync, readFileSync, renameSync, writeFileSync } from "node:fs";
+import { join } from "node:path";
+import { bundled, roots } from "../../bench/viewer/cesium.mjs";
+import { Server } from "../../bench/viewer/server.mjs";
 import { anyWebGL, launch } from "../../tests/whole/chromium.mjs";
+import { build } from "../../viewer/node_modules/esbuild/lib/main.js";
 
-const [library, page, list, folder] = process.argv.slice(2);
-const { origin } = await (await fetch(`${page}rendering.json`.replace("/view/", "/tiles/"))).json();
-const browser = await launch(library);
+const { playwright, page, views, cesium, out } = JSON.parse(readFileSync(0, "utf8"));
+const SOURCES = join(import.meta.dirname, "../../viewer/src");
+/** A summer's day, two o'clock by the town's clocks. */
+const [DAY, ZONE] = ["2026-06-21T12:00Z", "Europe/Berlin"];
+/** The viewer's own. */
+const PAPER = "#f2f0eb";
+const TILES_BYTES = 2 ** 31;
+const LIMIT_MS = 240_000;
 
-/** Waits until pictures have come, none is on its way, and nothing has moved for a while. */
+const manifest = await (await fetch(`${page}rendering.json`.replace("/view/", "/tiles/"))).json();
+const { DEFAULT_LIGHT, daylightAt } = await compiled('export { daylightAt } from "./geo/daylight"; export { DEFAULT_LIGHT } from "./geo/light";');
+const browser = await launch(playwright);
+
+async function compiled(contents) {
+  const { outputFiles } = await build({ stdin: { contents, resolveDir: SOURCES, loader: "ts" }, bundle: true, format: "esm", write: false });
+  return import(`data:text/javascript,${encodeURIComponent(outputFiles[0].text)}`);
+}
+
+/** A fresh browser window, as the first visit has it; `sent`: bytes that came, heads included. */
+async function open({ size: [width, height], dpr }) {
+  const context = await browser.newContext({ viewport: { width, height }, deviceScaleFactor: dpr ?? 1, isMobile: dpr !== undefined, hasTouch: dpr !== undefined, colorScheme: "light", timezoneId: ZONE, bypassCSP: true });
+  const tab = await context.newPage();
+  tab.setDefaultTimeout(LIMIT_MS);
+  tab.on("pageerror", (error) => { throw error; });
+  const sizes = [];
+  tab.on("requestfinished", (request) => { sizes.push(request.sizes().then(({ responseBodySize: body, responseHeadersSize: head }) => body + head)); });
+  const sent = async () => (await Promise.all(sizes)).reduce((sum, size) => sum + size, 0);
+  return { context, tab, sent };
+}
+
+/** Waits until pictures have come, none is on its way, and nothing has moved for a while; throws when that never comes. */
 async function quiet(tab, act) {
+  const end = performance.now() + LIMIT_MS;
   let [open, images, last] = [0, 0, performance.now()];
   const heard = (step) => () => { [open, last] = [open + step, performance.now()]; };
   const [begun, ended] = [heard(1), heard(-1)];
   const answered = (response) => { images += Number(response.headers()["content-type"]?.startsWith("image/") ?? false); };
   tab.on("request", begun).on("requestfinished", ended).on("requestfailed", ended).on("response", answered);
   const pictures = await act();
-  while (open > 0 || images < pictures || performance.now() - last < 2000) await new Promise((done) => setTimeout(done, 100));
+  while (open > 0 || images < pictures || performance.now() - last < 2000) {
+    if (performance.now() > end || tab.isClosed()) throw new Error(`${tab.url()}: ${open} requests are still open, ${images} pictures came of ${pictures}`);
+    await new Promise((done) => setTimeout(done, 100));
+  }
   tab.off("request", begun).off("requestfinished", ended).off("requestfailed", ended).off("response", answered);
 }
 
-for (const { name, view, at, zoom, size, dpr, click, bare } of JSON.parse(await readFile(list, "utf8"))) {
-  const [width, height] = size;
-  const context = await browser.newContext({ viewport: { width, height }, deviceScaleFactor: dpr ?? 1, isMobile: dpr !== undefined, hasTouch: dpr !== undefined, colorScheme: "light", bypassCSP: true });
+async function ours(view, path) {
+  const { context, tab, sent } = await open(view);
   await context.addInitScript(anyWebGL);
-  const tab = await context.newPage();
-  tab.on("pageerror", (error) => { throw error; });
   await quiet(tab, async () => {
-    await tab.goto(`${page}#${[view, ...at.map((part, k) => part + origin[k]), zoom].join("/")}`);
+    await tab.goto(`${page}#${[view.view, ...view.at.map((part, k) => part + manifest.origin[k]), view.zoom, `t=${view.time ?? DAY}`].join("/")}`);
     return 8;
   });
-  if (click) await quiet(tab, async () => { await tab.touchscreen.tap(click[0], click[1]); return 0; });
-  if (bare) await tab.addStyleTag({ content: ".card, .map3d-controls { display: none }" });
-  await tab.screenshot({ path: `${folder}/${name}.jpg`, type: "jpeg", quality: 85 });
-  console.log(`${name}.jpg`);
+  const bytes = await sent();
+  if (view.click) await quiet(tab, async () => { await tab.touchscreen.tap(view.click[0], view.click[1]); return 0; });
+  if (view.bare) await tab.addStyleTag({ content: ".card, .map3d-controls { display: none }" });
+  await tab.screenshot({ path });
   await context.close();
+  return { bytes };
+}
+
+async function theirs(view, path, origin) {
+  const { context, tab, sent } = await open(view);
+  const [look, pitch] = view.view.split("-").map(Number);
+  const [x, y, z] = view.at;
+  const start = { x, y, z, mpp: manifest.size_m / (manifest.tile_px * 2 ** view.zoom), look, pitch };
+  const light = { ...DEFAULT_LIGHT, ...daylightAt(new Date(view.time ?? DAY), manifest.geographic) };
+  const asked = { base: "/3dtiles/town.json", start: JSON.stringify(start), light: JSON.stringify(light), paper: PAPER, resolution: "device", onrequest: "1", cache: TILES_BYTES };
+  await tab.goto(`${origin}/pages/cesium.html?${new URLSearchParams(asked)}`);
+  await tab.evaluate(() => globalThis.bench.complete);
+  const about = await tab.evaluate(() => globalThis.bench.about());
+  await tab.screenshot({ path });
+  const bytes = await sent();
+  await context.close();
+  return { bytes, triangles: about.triangles };
+}
+
+/** Takes a picture unless it is there; what is told of it lies beside it. */
+async function take(view, viewer, act) {
+  const path = join(out, `${view.name}-${viewer}.png`);
+  if (existsSync(path)) return;
+  const draft = join(out, `draft-${viewer}.png`);
+  const told = await act(view, draft);
+  writeFileSync(path.replace(/png$/, "json"), JSON.stringify(told));
+  renameSync(draft, path);
+  console.log(view.name, viewer, JSON.stringify(told));
+}
+
+for (const view of views) await take(view, "map3d", ours);
+if (cesium !== null) {
+  await bundled(cesium);
+  const server = new Server(cesium, roots(cesium));
+  await server.listen();
+  for (const view of views.filter(({ alone }) => !alone)) await take(view, "cesium", (...given) => theirs(...given, server.origin));
+  server.close();
 }
 await browser.close();

@@ -1,6 +1,6 @@
 // What all pages share. A page makes `bench.complete` (milliseconds from navigation to the first complete view), `bench.set` (a step of a path) and
 // `bench.quiet` (resolves when nothing is missing in view). A step: { x, y (metres east and north of the scene's origin), mpp (metres a CSS pixel), look (degrees
-// counter-clockwise from north) }.
+// counter-clockwise from north) }; CesiumJS takes z (metres up) and pitch (degrees below the horizon), too.
 "use strict";
 const asked = new URLSearchParams(location.search);
 const bench = { asked, start: JSON.parse(asked.get("start") ?? "null"), frames: 0 };
