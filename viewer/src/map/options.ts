@@ -22,7 +22,7 @@ export interface MapOptions {
   attribution?: boolean;
   /** Fetches ids of what is seen, so that "mousemove" tells what lies under the pointer. Default false. */
   hover?: boolean;
-  /** Bytes of decoded tiles to keep. Default: 20 for each device pixel of the map, which is twice what colour and normals in view take; at least 24 MB. */
+  /** Bytes of decoded tiles to keep. What is in view stays, however much that is. Default: 60 for each device pixel of the map, 20 on dense screens, whose tiles have fewer; at least 24 MB. */
   cacheBytes?: number;
   /** Tile requests at once. Default 12. */
   concurrency?: number;

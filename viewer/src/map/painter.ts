@@ -5,6 +5,7 @@ import { WebGLDrawer } from "../draw/webgl/webglDrawer";
 import type { Light } from "../geo/light";
 import type { LayerKind } from "../geo/manifest";
 import { Cache } from "../tiles/cache";
+import { DENSE } from "../tiles/cover";
 import { Decoder } from "../tiles/decoder";
 import { Queue } from "../tiles/queue";
 import type { Shared, Stored } from "../tiles/store";
@@ -29,8 +30,8 @@ export type Turning = Omit<Depicting, "camera" | "changed">;
 
 /** A context that has not come back after this time is lost for good. */
 const RESTORE_MS = 5000;
-/** Of tiles that are kept, for each device pixel, and at least. */
-const [KEPT_BYTES, LEAST_BYTES] = [20, 24e6];
+/** Of tiles that are kept, for each device pixel, and at least. On dense screens tile pixels are fewer, see `levelFor`. */
+const [KEPT_BYTES, KEPT_DENSE_BYTES, LEAST_BYTES] = [60, 20, 24e6];
 
 export interface Painted {
   readonly plans: readonly LayerPlan[];
@@ -98,7 +99,7 @@ export class Painter {
     const { layers, light, kinds, shade, moving } = content;
     this.#viewport.fitCanvas(sight.dpr);
     const { width, height } = this.#viewport.canvas;
-    this.#cache.limit(this.#options.cacheBytes ?? Math.max(LEAST_BYTES, KEPT_BYTES * width * height));
+    this.#cache.limit(this.#options.cacheBytes ?? Math.max(LEAST_BYTES, (sight.dpr >= DENSE ? KEPT_DENSE_BYTES : KEPT_BYTES) * width * height));
     this.#cache.tick();
     const { gl } = this.#drawer;
     this.#seated &&= this.guests.size > 0 && gl !== null;

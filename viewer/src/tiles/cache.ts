@@ -5,7 +5,7 @@ interface Held<V> {
   used: number;
 }
 
-/** Keeps the most recently used values within a number of bytes. What was used in the current tick is never dropped. */
+/** Keeps the most recently used values within a number of bytes. What was used in the current tick, or in the last before it has been asked for again, is never dropped. */
 export class Cache<V> {
   readonly #held = new Map<string, Held<V>>();
   #limit_bytes: number;
@@ -31,10 +31,10 @@ export class Cache<V> {
     this.#limit_bytes = bytes;
   }
 
-  /** A new tick: what is used from now on is safe until the next. */
+  /** A new tick: what is used from now on is safe until the one after it has begun. */
   tick(): void {
-    this.#tick++;
     this.#trim();
+    this.#tick++;
   }
 
   /** The value, which counts as use. */

@@ -15,13 +15,16 @@ export function rectAround(u: number, v: number, { width, height }: Pick<Camera,
   ];
 }
 
+/** Device pixels a CSS pixel from which a screen is dense. */
+export const DENSE = 1.5;
+
 /**
  * The level to show when a device pixel is `devicePx_m` metres wide. On dense screens a tile pixel covers one to two
  * device pixels, which nobody sees there and which saves bytes; else 0.7 to 1.4. `finer`: so many levels more.
  */
 export function levelFor(frame: Frame, devicePx_m: number, dpr: number, finer = 0): number {
   const exact = Math.log2(frame.size / (frame.tilePx * devicePx_m)) + finer;
-  return clamp(Math.floor(exact + (dpr >= 1.5 ? 0.001 : 0.5)), 0, frame.zmax);
+  return clamp(Math.floor(exact + (dpr >= DENSE ? 0.001 : 0.5)), 0, frame.zmax);
 }
 
 /** Occupied tiles of a level that meet the rectangle, row by row. Together they partition what is occupied of it. */

@@ -33,10 +33,10 @@ export async function decodePng(bytes: Uint8Array<ArrayBuffer>): Promise<Pixels>
   const { header, parts } = readChunks(bytes);
   const { width, height, channels } = header;
   const stride = width * channels;
+  // In place, since each row ends before the next begins: what is thrown away stays in a worker's memory for long.
   const raw = await inflate(parts, height * (stride + 1));
-  const data = new Uint8Array(height * stride);
-  for (let row = 0; row < height; row++) unfilter(raw, data, row, stride, channels);
-  return { width, height, channels, data };
+  for (let row = 0; row < height; row++) unfilter(raw, row, stride, channels);
+  return { width, height, channels, data: raw.subarray(0, height * stride) };
 }
 
 function readChunks(bytes: Uint8Array<ArrayBuffer>): { header: Header; parts: Uint8Array<ArrayBuffer>[] } {
@@ -72,7 +72,7 @@ function readHeader(view: DataView, at: number, length: number): Header {
 }
 
 /** Exactly `size` bytes, or an error: a longer stream is not read to its end. */
-async function inflate(parts: Uint8Array<ArrayBuffer>[], size: number): Promise<Uint8Array> {
+async function inflate(parts: Uint8Array<ArrayBuffer>[], size: number): Promise<Uint8Array<ArrayBuffer>> {
   const out = new Uint8Array(size);
   const reader = new Blob(parts).stream().pipeThrough(new DecompressionStream("deflate")).getReader();
   let at = 0;
@@ -93,48 +93,48 @@ async function inflate(parts: Uint8Array<ArrayBuffer>[], size: number): Promise<
   return out;
 }
 
-function unfilter(raw: Uint8Array, out: Uint8Array, row: number, stride: number, channels: number): void {
+function unfilter(bytes: Uint8Array, row: number, stride: number, channels: number): void {
   const [from, to] = [row * (stride + 1) + 1, row * stride];
-  const filter = raw[from - 1] ?? 0;
+  const filter = bytes[from - 1] ?? 0;
   const undo = FILTERS[filter];
   if (!undo) throw new DecodeError(`PNG row ${String(row)} has filter ${String(filter)}, expected 0 to 4`);
-  undo(raw, from, out, to, stride, channels, row > 0);
+  undo(bytes, from, to, stride, channels, row > 0);
 }
 
-/** Writes `n` bytes at out[to] from raw[from]; `c` bytes a pixel; the row above, if any, is `n` bytes before. */
-type Unfilter = (raw: Uint8Array, from: number, out: Uint8Array, to: number, n: number, c: number, above: boolean) => void;
+/** Writes `n` bytes at `to` from those at `from`, which lies behind it; `c` bytes a pixel; the row above, if any, is `n` bytes before. */
+type Unfilter = (bytes: Uint8Array, from: number, to: number, n: number, c: number, above: boolean) => void;
 
-const plain: Unfilter = (raw, from, out, to, n) => {
-  out.set(raw.subarray(from, from + n), to);
+const plain: Unfilter = (out, from, to, n) => {
+  out.copyWithin(to, from, from + n);
 };
 
-const sub: Unfilter = (raw, from, out, to, n, c) => {
-  plain(raw, from, out, to, n, c, false);
+const sub: Unfilter = (out, from, to, n, c) => {
+  plain(out, from, to, n, c, false);
   for (let i = to + c; i < to + n; i++) out[i] = (out[i] as number) + (out[i - c] as number);
 };
 
-const up: Unfilter = (raw, from, out, to, n, c, above) => {
-  plain(raw, from, out, to, n, c, false);
+const up: Unfilter = (out, from, to, n, c, above) => {
+  plain(out, from, to, n, c, false);
   if (above) for (let i = to; i < to + n; i++) out[i] = (out[i] as number) + (out[i - n] as number);
 };
 
-const average: Unfilter = (raw, from, out, to, n, c, above) => {
+const average: Unfilter = (out, from, to, n, c, above) => {
   for (let i = 0; i < n; i++) {
     const left = i < c ? 0 : (out[to + i - c] as number);
     const over = above ? (out[to + i - n] as number) : 0;
-    out[to + i] = (raw[from + i] as number) + ((left + over) >> 1);
+    out[to + i] = (out[from + i] as number) + ((left + over) >> 1);
   }
 };
 
-const paeth: Unfilter = (raw, from, out, to, n, c, above) => {
+const paeth: Unfilter = (out, from, to, n, c, above) => {
   if (!above) {
-    sub(raw, from, out, to, n, c, false);
+    sub(out, from, to, n, c, false);
     return;
   }
-  for (let i = 0; i < c; i++) out[to + i] = (raw[from + i] as number) + (out[to + i - n] as number);
+  for (let i = 0; i < c; i++) out[to + i] = (out[from + i] as number) + (out[to + i - n] as number);
   for (let i = c; i < n; i++) {
     const at = to + i;
-    out[at] = (raw[from + i] as number) + nearest(out[at - c] as number, out[at - n] as number, out[at - n - c] as number);
+    out[at] = (out[from + i] as number) + nearest(out[at - c] as number, out[at - n] as number, out[at - n - c] as number);
   }
 };
 

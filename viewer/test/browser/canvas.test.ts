@@ -300,7 +300,7 @@ test("where pixels cannot be read as they are, light is composed instead, nearly
   await page.goto(`${bed.server.origin}/bare`);
   await page.evaluate(([base, options]) => new Promise<void>((done) => {
     const g = globalThis as Global;
-    g.map = new g.map3d.map("mapcanvas", { ...options, drawer: "canvas" });
+    g.map = new g.map3d.map("mapcanvas", { ...options, drawer: "canvas", preserveDrawingBuffer: true });
     g.layer = new g.map3d.imageLayer(base).addTo(g.map);
     g.map.once("idle", () => { done(); }).debug();
   }), [bed.url("town"), options] as const);

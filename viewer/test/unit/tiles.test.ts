@@ -111,7 +111,22 @@ describe("cache", () => {
     expect(cache.peek("a")).toBe(1);
     expect(cache.bytes).toBe(120);
     cache.tick();
+    cache.tick();
     expect(cache.bytes).toBeLessThanOrEqual(30);
+  });
+
+  test("what is in use tick after tick stays, though it is more than the limit", () => {
+    const dropped: string[] = [];
+    const cache = new Cache<number>(30, (key) => dropped.push(key));
+    for (const key of ["a", "b", "c", "d", "e"]) cache.set(key, 1, 20);
+    for (let k = 0; k < 3; k++) {
+      cache.tick();
+      for (const key of ["e", "d", "c", "b", "a"]) expect(cache.get(key)).toBe(1);
+    }
+    cache.tick();
+    cache.get("c");
+    cache.tick();
+    expect([dropped.length, cache.peek("c")]).toEqual([4, 1]);
   });
 
   test("a value set anew replaces the old one and its bytes", () => {

@@ -6,7 +6,7 @@ import { meet } from "../combine";
 import type { Finishes } from "../finish";
 import { kindsBeside, kindsOf, lookOf, lookWith, type Look } from "./look";
 import { maskOf, type Mask } from "./mask";
-import { Pictures, type Picture, type Wish } from "./pictures";
+import { Pictures, type Image, type Picture, type Wish } from "./pictures";
 import type { Order } from "./shade.worker";
 import { areaOf, gridOf, type Grid, type Piece } from "./sheet";
 import { Laid, Painted, type Showing, type Shown } from "./showing";
@@ -124,11 +124,11 @@ export class CanvasDrawer implements Drawer {
   /** What stands for a quad: the picture of its tile, or of tiles below or above it that have one. */
   #piecesFor(pass: Pass, grid: Grid, { from, rect }: Quad): Piece[] {
     const area = areaOf(grid, rect);
-    const shown = (tile: Tile): ImageBitmap | undefined => this.#pictures.get(nameIn(pass, tile))?.bitmap;
+    const shown = (tile: Tile): Image | undefined => this.#pictures.get(nameIn(pass, tile))?.image;
     const own = shown(from);
-    if (own) return [{ area, from, bitmap: own }];
+    if (own) return [{ area, from, image: own }];
     const stands = standsFor(area, (tile) => shown(tile) !== undefined, () => true, area.z > grid.level ? 0 : 2);
-    return stands.map((stand) => ({ ...stand, bitmap: shown(stand.from) as ImageBitmap }));
+    return stands.map((stand) => ({ ...stand, image: shown(stand.from) as Image }));
   }
 
   /** One without urgency is fulfilled. */
@@ -185,6 +185,6 @@ const nameIn = ({ tiles, mode }: Pass, tile: Tile): string => tiles.key("color",
 
 /** First what has no picture, then what looks otherwise (the longest first), then edges; from the middle of the screen. */
 function urgencyOf(picture: Picture, look: string, edges: number, far: number): number[] {
-  if (picture.look !== look) return picture.bitmap ? [1, picture.ticket, far] : [0, 0, far];
+  if (picture.look !== look) return picture.image ? [1, picture.ticket, far] : [0, 0, far];
   return (edges & ~picture.edges) === 0 ? [] : [2, 0, far];
 }

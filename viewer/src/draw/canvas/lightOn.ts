@@ -14,11 +14,11 @@ export interface Shades {
 /**
  * Shares of the sky's and of the sun's light on each pixel of a tile, in pairs: half by the pixel's own normal, occlusion and shadow, an eighth by each
  * neighbour's, as the shader has it (draw/webgl/shader.ts says why). Where a tile beside it is not here, the pixel's own light stands for it.
- * @param beside tiles to the left, to the right, above, below
+ * @param beside tiles to the left, to the right, above, below  @returns good until the next call
  */
 export function lightOn(lamp: Lamp, width: number, height: number, shades: Shades, beside: readonly (Shades | undefined)[]): Float32Array {
   const wide = width + 2;
-  const own = new Float32Array(2 * wide * (height + 2)).fill(NONE);
+  const own = (room[0] = sized(room[0], 2 * wide * (height + 2))).fill(NONE);
   const row = rowLighter(lamp, own);
   for (let y = 0; y < height; y++) row(shades, y * width, 1, wide * (y + 1) + 1, 1, width);
   const [left, right, above, below] = beside;
@@ -28,6 +28,11 @@ export function lightOn(lamp: Lamp, width: number, height: number, shades: Shade
   if (below) row(below, 0, 1, wide * (height + 1) + 1, 1, width);
   return spread(own, width, height);
 }
+
+/** Used again for each tile: what is thrown away stays in a worker's memory for long. */
+const room = [new Float32Array(0), new Float32Array(0)] as [Float32Array, Float32Array];
+
+const sized = (is: Float32Array, length: number): Float32Array => (is.length === length ? is : new Float32Array(length));
 
 /** Where there is no normal. */
 const NONE = -1;
@@ -62,7 +67,7 @@ function unshaded({ kind, first, second, share }: NonNullable<Lamp["shadow"]>, v
 /** @param own with a border of one pixel */
 function spread(own: Float32Array, width: number, height: number): Float32Array {
   const row = 2 * (width + 2);
-  const out = new Float32Array(2 * width * height);
+  const out = (room[1] = sized(room[1], 2 * width * height));
   const or = (at: number, k: number, instead: number): number => ((own[at] as number) < 0 ? instead : (own[at + k] as number));
   for (let y = 0, to = 0; y < height; y++) {
     for (let x = 0, at = row * (y + 1) + 2; x < width; x++, at += 2, to += 2) {

@@ -2,12 +2,19 @@ import workerCode from "worker:./shade.worker.ts";
 import { DrawError } from "../../core/errors";
 import type { Order, Reply, Task, Kept } from "./shade.worker";
 
+/** Pixels, or a bitmap where the browser does not let them be read. */
+export type Image = ImageData | ImageBitmap;
+
+const close = (image: Image | undefined): void => {
+  if (image && "close" in image) image.close();
+};
+
 /** A tile's picture, as far as one has been made. */
 export interface Picture {
   readonly name: string;
   /** Names of the data that the worker has for it. */
   readonly parts: Set<string>;
-  bitmap: ImageBitmap | undefined;
+  image: Image | undefined;
   /** The look that was made last, or tried. */
   look: string;
   /** Bit by bit, the tiles beside it that were here then. */
@@ -65,7 +72,7 @@ export class Pictures {
 
   /** The picture's place; empty at first. */
   of(name: string): Picture {
-    const known = this.#known.get(name) ?? { name, parts: new Set<string>(), bitmap: undefined, look: "", edges: 0, ticket: 0 };
+    const known = this.#known.get(name) ?? { name, parts: new Set<string>(), image: undefined, look: "", edges: 0, ticket: 0 };
     this.#known.set(name, known);
     return known;
   }
@@ -88,7 +95,7 @@ export class Pictures {
   }
 
   forget(name: string): void {
-    this.#known.get(name)?.bitmap?.close();
+    close(this.#known.get(name)?.image);
     this.#known.delete(name);
     this.#wishes = this.#wishes.filter(({ picture }) => picture.name !== name);
   }
@@ -96,9 +103,9 @@ export class Pictures {
   /** Forgets pictures that nobody will see as they are. */
   prune(stale: (picture: Picture) => boolean): void {
     for (const picture of this.#known.values()) {
-      if (!picture.bitmap || !stale(picture)) continue;
-      picture.bitmap.close();
-      Object.assign(picture, { bitmap: undefined, look: "" });
+      if (!picture.image || !stale(picture)) continue;
+      close(picture.image);
+      Object.assign(picture, { image: undefined, look: "" });
     }
   }
 
@@ -151,14 +158,14 @@ export class Pictures {
 
   #take({ picture, look, edges }: Wish, reply: Exclude<Reply, { exact: boolean }>): void {
     if ("error" in reply) this.#events.failed(new DrawError(`tile ${picture.name}: ${reply.error}`));
-    const bitmap = "picture" in reply ? reply.picture : undefined;
+    const image = "picture" in reply ? reply.picture : undefined;
     if (this.#known.get(picture.name) !== picture) {
-      bitmap?.close();
+      close(image);
       return;
     }
-    if (bitmap) {
-      picture.bitmap?.close();
-      picture.bitmap = bitmap;
+    if (image) {
+      close(picture.image);
+      picture.image = image;
     }
     Object.assign(picture, { look, edges, ticket: reply.ticket });
   }

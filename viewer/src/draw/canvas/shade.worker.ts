@@ -5,6 +5,7 @@ import type { Finishes } from "../finish";
 import type { Look } from "./look";
 import type { Shades } from "./lightOn";
 import type { Mask, Masking } from "./mask";
+import type { Image } from "./pictures";
 import { shade, type Around, type Layers } from "./shade";
 import { composed } from "./unread";
 
@@ -25,7 +26,7 @@ export type Task = { readonly put: string; readonly value: Kept } | { readonly d
 export type Reply =
   /** Once: can pixels of pictures be read as they are? */
   | { readonly exact: boolean }
-  | { readonly ticket: number; readonly picture: ImageBitmap }
+  | { readonly ticket: number; readonly picture: Image }
   | { readonly ticket: number; readonly error: string };
 
 const scope = self as unknown as { onmessage: (event: MessageEvent<Task>) => void; postMessage: (reply: Reply, transfer?: Transferable[]) => void };
@@ -41,7 +42,7 @@ scope.postMessage({ exact });
 scope.onmessage = ({ data: task }) => {
   if ("put" in task) kept.set(task.put, task.value);
   else if ("drop" in task) drop(task.drop);
-  else void fill(task);
+  else fill(task);
 };
 
 /** Some browsers answer with other pixels than were drawn, so that users cannot be told apart. */
@@ -59,16 +60,16 @@ function drop(name: string): void {
   read.delete(name);
 }
 
-async function fill({ ticket, look, layers, beside }: Order): Promise<void> {
+function fill({ ticket, look, layers, beside }: Order): void {
   try {
-    const picture = await paint(look, layers, beside);
-    scope.postMessage({ ticket, picture }, [picture]);
+    const picture = paint(look, layers, beside);
+    scope.postMessage({ ticket, picture }, ["data" in picture ? picture.data.buffer : picture]);
   } catch (reason) {
     scope.postMessage({ ticket, error: String(reason) });
   }
 }
 
-async function paint(look: Look, names: Order["layers"], beside: Order["beside"]): Promise<ImageBitmap> {
+function paint(look: Look, names: Order["layers"], beside: Order["beside"]): Image {
   const pictured = names.color ?? names.picture;
   const color = tile(pictured);
   const { width, height } = [color, tile(names.normal), tile(names.id), tile(names.depth)].find((value) => value !== undefined) ?? { width: 0, height: 0 };
@@ -87,7 +88,7 @@ async function paint(look: Look, names: Order["layers"], beside: Order["beside"]
   const colors = look.highlight === null ? undefined : (kept.get(look.highlight) as ReadonlyMap<number, Rgb> | undefined);
   const finishes = look.finish === null ? undefined : (kept.get(look.finish) as Finishes | undefined);
   if (bitmap && !exact && look.mode !== "id" && look.mode !== "normal" && look.mode !== "depth") return composed(look, bitmap, layers, around, { colors, finishes });
-  return createImageBitmap(new ImageData(shade(look, layers, around, { colors, finishes }), width, height));
+  return new ImageData(shade(look, layers, around, { colors, finishes }), width, height);
 }
 
 function maskingOf(mask: Mask): Masking[] {

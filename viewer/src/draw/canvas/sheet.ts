@@ -2,6 +2,7 @@ import type { Tile } from "../../geo/frame";
 import type { Stand } from "../../tiles/cover";
 import { DrawError } from "../../core/errors";
 import type { Pass, Setting } from "../drawer";
+import type { Image } from "./pictures";
 
 /** Where the tile pixels of the shown level lie on the screen. */
 export interface Grid {
@@ -28,24 +29,27 @@ export function areaOf({ level, tilePx, left, top, px }: Grid, [x0, y0, x1]: rea
 }
 
 /** Left, top, right, bottom in pixels of the level; whole, and the same for an edge whichever tile it belongs to. */
-function placeOf({ level, tilePx }: Grid, { z, x, y }: Tile): [number, number, number, number] {
+function placeOf({ level, tilePx }: Grid, { z, x, y }: Tile): Window {
   const side = tilePx * 2 ** (level - z);
   return [Math.round(x * side), Math.round(y * side), Math.round((x + 1) * side), Math.round((y + 1) * side)];
 }
 
 export interface Piece extends Stand {
-  readonly bitmap: ImageBitmap;
+  readonly image: Image;
 }
 
 /** Left, top, right, bottom: pixels of a level. */
 export type Window = readonly [number, number, number, number];
+
+type Extent = Pick<Setting, "width" | "height">;
 
 /** What a sheet holds. */
 interface Held {
   readonly grid: Grid;
   readonly smooth: boolean;
   readonly window: Window;
-  readonly pieces: readonly Piece[];
+  /** By their area. */
+  readonly pieces: Map<string, Piece>;
 }
 
 /** A canvas has sides of whole multiples, so that it need not change with each picture. */
@@ -69,21 +73,25 @@ export class Sheet {
   }
 
   /**
-   * Puts together what is seen of the pieces and so many pixels `beyond`; does nothing while it holds what is seen.
+   * Puts together what is seen of the pieces and so many pixels `beyond`; what it holds already stays as it is.
    * @param smooth mixes colours between pixels; ids and the like are not to be mixed  @returns what the canvas holds, from its left top corner on; null: nothing is seen
    */
-  lay(screen: Setting, grid: Grid, pieces: readonly Piece[], smooth: boolean, beyond: number): Window | null {
-    const seen = windowOf(screen, grid, pieces, 0);
+  lay(screen: Extent, grid: Grid, pieces: readonly Piece[], smooth: boolean, beyond: number): Window | null {
+    const seen = windowOf(screen, grid, 0);
     if (!seen) return this.empty();
-    if (this.#held && holds(this.#held, seen, grid, pieces, smooth)) return this.#held.window;
-    const window = windowOf(screen, grid, pieces, beyond) as Window;
-    const [x0, y0, x1, y1] = window;
-    this.#room(x1 - x0, y1 - y0);
-    this.#context.translate(-x0, -y0);
-    this.#context.imageSmoothingEnabled = smooth;
-    for (const piece of pieces) this.#lay(grid, piece);
-    this.#held = { grid, smooth, window, pieces };
-    return window;
+    const held = this.#held && fits(this.#held, seen, grid, smooth) ? this.#held : this.#begin(grid, smooth, windowOf(screen, grid, beyond) ?? seen);
+    const wanted = new Map(pieces.filter(({ area }) => meet(placeOf(grid, area), held.window)).map((piece) => [keyOf(piece), piece]));
+    for (const [key, { area }] of held.pieces) {
+      if (wanted.has(key)) continue;
+      this.#clear(grid, area);
+      held.pieces.delete(key);
+    }
+    for (const [key, piece] of wanted) {
+      if (held.pieces.get(key)?.image === piece.image) continue;
+      this.#lay(grid, held.window, piece);
+      held.pieces.set(key, piece);
+    }
+    return held.window;
   }
 
   /** What it held is gone. */
@@ -98,38 +106,59 @@ export class Sheet {
     return null;
   }
 
-  /** Nothing, from the left top corner on. */
-  #room(width: number, height: number): void {
-    const { canvas } = this;
+  /** Nothing yet. */
+  #begin(grid: Grid, smooth: boolean, window: Window): Held {
+    const [{ canvas }, [x0, y0, x1, y1]] = [this, window];
     const side = (is: number, need: number): number => (is < need || is > 2 * need ? Math.ceil(need / SIDE_PX) * SIDE_PX : is);
-    const [w, h] = [side(canvas.width, width), side(canvas.height, height)];
+    const [w, h] = [side(canvas.width, x1 - x0), side(canvas.height, y1 - y0)];
     if (w !== canvas.width || h !== canvas.height) [canvas.width, canvas.height] = [w, h];
     this.#context.setTransform(1, 0, 0, 1, 0, 0);
     this.#context.clearRect(0, 0, w, h);
+    this.#context.translate(-x0, -y0);
+    this.#context.imageSmoothingEnabled = smooth;
+    return (this.#held = { grid, smooth, window, pieces: new Map() });
   }
 
-  #lay(grid: Grid, { area, from, bitmap }: Piece): void {
+  #clear(grid: Grid, area: Tile): void {
     const [x0, y0, x1, y1] = placeOf(grid, area);
-    if (from.z === area.z) this.#context.drawImage(bitmap, x0, y0, x1 - x0, y1 - y0);
-    else this.#layPart(area, from, bitmap, [x0, y0, x1, y1]);
+    this.#context.clearRect(x0, y0, x1 - x0, y1 - y0);
+  }
+
+  #lay(grid: Grid, [left, top]: Window, { area, from, image }: Piece): void {
+    const [x0, y0, x1, y1] = placeOf(grid, area);
+    if (from.z === area.z && "data" in image && image.width === x1 - x0) {
+      this.#context.putImageData(image, x0 - left, y0 - top);
+      return;
+    }
+    this.#clear(grid, area);
+    if (from.z !== area.z) this.#layPart(area, from, drawable(image), [x0, y0, x1, y1]);
+    else this.#context.drawImage(drawable(image), x0, y0, x1 - x0, y1 - y0);
   }
 
   /** Part of an ancestor, with the pixels around it, so that what is beside it goes on smoothly. */
-  #layPart(area: Tile, from: Tile, bitmap: ImageBitmap, [x0, y0, x1, y1]: readonly [number, number, number, number]): void {
+  #layPart(area: Tile, from: Tile, image: ImageBitmap | OffscreenCanvas, [x0, y0, x1, y1]: Window): void {
     const context = this.#context;
     const parts = 2 ** (area.z - from.z);
-    const side = bitmap.width / parts;
+    const side = image.width / parts;
     const [u, v] = [(area.x - from.x * parts) * side, (area.y - from.y * parts) * side];
     const [left, top] = [Math.max(Math.floor(u) - 1, 0), Math.max(Math.floor(v) - 1, 0)];
-    const [right, bottom] = [Math.min(Math.ceil(u + side) + 1, bitmap.width), Math.min(Math.ceil(v + side) + 1, bitmap.height)];
+    const [right, bottom] = [Math.min(Math.ceil(u + side) + 1, image.width), Math.min(Math.ceil(v + side) + 1, image.height)];
     const scale = (x1 - x0) / side;
     context.save();
     context.beginPath();
     context.rect(x0, y0, x1 - x0, y1 - y0);
     context.clip();
-    context.drawImage(bitmap, left, top, right - left, bottom - top, x0 + (left - u) * scale, y0 + (top - v) * scale, (right - left) * scale, (bottom - top) * scale);
+    context.drawImage(image, left, top, right - left, bottom - top, x0 + (left - u) * scale, y0 + (top - v) * scale, (right - left) * scale, (bottom - top) * scale);
     context.restore();
   }
+}
+
+/** Pixels in a form that can be drawn scaled. */
+function drawable(image: Image): ImageBitmap | OffscreenCanvas {
+  if (!("data" in image)) return image;
+  const canvas = new OffscreenCanvas(image.width, image.height);
+  canvas.getContext("2d")?.putImageData(image, 0, 0);
+  return canvas;
 }
 
 /** @throws DrawError when the canvas has another context already, or the browser no 2D canvas */
@@ -139,27 +168,18 @@ export function contextOf(canvas: HTMLCanvasElement): CanvasRenderingContext2D {
   return context;
 }
 
-/** What is seen of the pieces, so much beyond, and one pixel more; null: nothing. */
-function windowOf({ width, height }: Pick<Setting, "width" | "height">, grid: Grid, pieces: readonly Piece[], beyond: number): Window | null {
-  const { left, top, px } = grid;
-  const places = pieces.map(({ area }) => placeOf(grid, area));
-  const least = (k: number, edge: number): number => Math.max(Math.min(...places.map((place) => place[k] ?? 0)), Math.floor(edge) - beyond) - 1;
-  const most = (k: number, edge: number): number => Math.min(Math.max(...places.map((place) => place[k] ?? 0)), Math.ceil(edge) + beyond) + 1;
-  const window = [least(0, -left / px), least(1, -top / px), most(2, (width - left) / px), most(3, (height - top) / px)] as const;
-  return window[2] > window[0] && window[3] > window[1] ? window : null;
+/** What is seen of the level, so much beyond, and one pixel more; null: nothing. */
+function windowOf({ width, height }: Extent, { level, tilePx, left, top, px }: Grid, beyond: number): Window | null {
+  const side = tilePx * 2 ** level;
+  const [x0, y0] = [left, top].map((at) => Math.max(0, Math.floor(-at / px) - beyond) - 1) as [number, number];
+  const [x1, y1] = [Math.min(side, Math.ceil((width - left) / px) + beyond) + 1, Math.min(side, Math.ceil((height - top) / px) + beyond) + 1];
+  return x1 - x0 > 2 && y1 - y0 > 2 ? [x0, y0, x1, y1] : null;
 }
 
-/** Is all there that is seen, and as it is wanted? */
-function holds({ grid, smooth, window, pieces }: Held, seen: Window, wanted: Grid, now: readonly Piece[], smoothNow: boolean): boolean {
-  if (grid.level !== wanted.level || grid.tilePx !== wanted.tilePx || smooth !== smoothNow) return false;
-  if (seen[0] < window[0] || seen[1] < window[1] || seen[2] > window[2] || seen[3] > window[3]) return false;
-  const met = ({ area }: Piece): boolean => {
-    const [x0, y0, x1, y1] = placeOf(wanted, area);
-    return x0 < seen[2] && y0 < seen[3] && x1 > seen[0] && y1 > seen[1];
-  };
-  const there = new Map(pieces.filter(met).map((piece) => [pieceKey(piece), piece.bitmap]));
-  const here = now.filter(met);
-  return here.length === there.size && here.every((piece) => there.get(pieceKey(piece)) === piece.bitmap);
-}
+const meet = (a: Window, b: Window): boolean => a[0] < b[2] && a[1] < b[3] && a[2] > b[0] && a[3] > b[1];
 
-const pieceKey = ({ area, from }: Piece): string => [area.z, area.x, area.y, from.z].join("/");
+/** Is there room for all that is seen? */
+const fits = ({ grid, smooth, window }: Held, seen: Window, now: Grid, smoothNow: boolean): boolean =>
+  grid.level === now.level && grid.tilePx === now.tilePx && smooth === smoothNow && seen[0] >= window[0] && seen[1] >= window[1] && seen[2] <= window[2] && seen[3] <= window[3];
+
+const keyOf = ({ area }: Piece): string => `${String(area.z)}/${String(area.x)}/${String(area.y)}`;
