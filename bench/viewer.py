@@ -186,6 +186,7 @@ def _tables(samples: Samples) -> list[tuple[str, str, list[Column]]]:
         ("PSS, MB", plain("stays", "{:.0f}", "used", "pss", unit=1e6)),
         ("beyond the empty page, MB", plain("stays", "{:.0f}", "beyond", "pss", unit=1e6)),
         ("of it no files", plain("stays", "{:.0f}", "beyond", "anonymous", unit=1e6)),
+        ("after the minute, MB", plain("stays", "{:.0f}", "rested", "pss", unit=1e6)),
         ("idle frames", plain("stays", "{:.0f}", "idle", "frames")),
         ("requests", plain("stays", "{:.0f}", "idle", "requests")),
         ("CPU, ms/s", plain("stays", "{:.0f}", "idle", "cpu_ms_per_s")),

@@ -58,7 +58,7 @@ async function walk(phone, server, path) {
 }
 
 /**
- * Memory after some seconds of use, and what happens in the idle seconds after that. An empty canvas in a browser of its own is read at the same moment:
+ * Memory after some seconds of use, what happens in the idle seconds after that, and memory then. An empty canvas in a browser of its own is read at the same moment:
  * what processes share (the browser's own files) is then divided among the same number for both.
  */
 export async function stays(server, url, emptyUrl, path, { use_s, idle_s }) {
@@ -75,8 +75,8 @@ export async function stays(server, url, emptyUrl, path, { use_s, idle_s }) {
     await phone.page.waitForTimeout(1000 * idle_s);
     const [spent, sent, then] = [phone.cpu(), server.count, await phone.page.evaluate(() => globalThis.bench.drawn())];
     const idle = { s: idle_s, frames: then - drawn, requests: sent.requests - count.requests, cpu_ms_per_s: (spent.all - cpu.all) / idle_s };
-    const beyond = { pss: used.pss - beside.pss, anonymous: used.anonymous - beside.anonymous };
-    return { fresh, used, empty: beside, beyond, use_s, idle, ...problems(phone) };
+    const more = (ours, theirs) => ({ pss: ours.pss - theirs.pss, anonymous: ours.anonymous - theirs.anonymous });
+    return { fresh, used, empty: beside, beyond: more(used, beside), rested: more(phone.memory(), empty.memory()), use_s, idle, ...problems(phone) };
   } finally {
     await phone.close();
     await empty.close();

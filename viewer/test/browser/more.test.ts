@@ -173,6 +173,16 @@ test("the cache keeps its bound while one wanders about", async () => {
   await page.context().close();
 });
 
+test("a view that takes more than the cache may hold comes to rest, and asks for each tile once", async () => {
+  const from = bed.server.requests.length;
+  const { page } = await bed.start("town", { zoom: 3, cacheBytes: 1 });
+  await settled(page, () => (globalThis as Global).map.setLight({ azimuth_deg: 12 }), null);
+  const asked = bed.server.requests.slice(from).filter((url) => /\/(color|normal)\//.test(url));
+  expect(asked.length).toBeGreaterThan(10);
+  expect(new Set(asked).size).toBe(asked.length);
+  await page.context().close();
+});
+
 /** The town with some files replaced. */
 function changed(name: string, change: (files: Map<string, Uint8Array>) => void, json: Partial<Fixture["json"]> = {}): string {
   const files = new Map(town.files);
