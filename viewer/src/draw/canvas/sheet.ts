@@ -86,9 +86,10 @@ export class Sheet {
       this.#clear(grid, area);
       held.pieces.delete(key);
     }
+    const drawables: Drawables = new Map();
     for (const [key, piece] of wanted) {
       if (held.pieces.get(key)?.image === piece.image) continue;
-      this.#lay(grid, held.window, piece);
+      this.#lay(grid, held.window, piece, drawables);
       held.pieces.set(key, piece);
     }
     return held.window;
@@ -124,15 +125,15 @@ export class Sheet {
     this.#context.clearRect(x0, y0, x1 - x0, y1 - y0);
   }
 
-  #lay(grid: Grid, [left, top]: Window, { area, from, image }: Piece): void {
+  #lay(grid: Grid, [left, top]: Window, { area, from, image }: Piece, drawables: Drawables): void {
     const [x0, y0, x1, y1] = placeOf(grid, area);
     if (from.z === area.z && "data" in image && image.width === x1 - x0) {
       this.#context.putImageData(image, x0 - left, y0 - top);
       return;
     }
     this.#clear(grid, area);
-    if (from.z !== area.z) this.#layPart(area, from, drawable(image), [x0, y0, x1, y1]);
-    else this.#context.drawImage(drawable(image), x0, y0, x1 - x0, y1 - y0);
+    if (from.z !== area.z) this.#layPart(area, from, drawable(image, drawables), [x0, y0, x1, y1]);
+    else this.#context.drawImage(drawable(image, drawables), x0, y0, x1 - x0, y1 - y0);
   }
 
   /** Part of an ancestor, with the pixels around it, so that what is beside it goes on smoothly. */
@@ -153,9 +154,16 @@ export class Sheet {
   }
 }
 
-/** Pixels in a form that can be drawn scaled. */
-function drawable(image: Image): ImageBitmap | OffscreenCanvas {
-  if (!("data" in image)) return image;
+type Drawables = Map<Image, ImageBitmap | OffscreenCanvas>;
+
+/** Pixels in a form that can be drawn scaled. @param known made before: one tile may stand in for many */
+function drawable(image: Image, known: Drawables): ImageBitmap | OffscreenCanvas {
+  const made = known.get(image) ?? ("data" in image ? canvasOf(image) : image);
+  known.set(image, made);
+  return made;
+}
+
+function canvasOf(image: ImageData): OffscreenCanvas {
   const canvas = new OffscreenCanvas(image.width, image.height);
   canvas.getContext("2d")?.putImageData(image, 0, 0);
   return canvas;
