@@ -372,7 +372,8 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
 
   #redraw(): this {
     this.#dirty = true;
-    this.#loop.request();
+    // Until the first picture is whole, what has come is to be passed on at once. WebGL must not run ahead of what the GPU can do.
+    this.#loop.request(!this.#loaded && this.drawer === "canvas" && !document.hidden);
     return this;
   }
 
