@@ -29,8 +29,6 @@ export const STYLES = `
   .map3d { --map3d-accent: Highlight; --map3d-background: Canvas; --map3d-panel: Canvas; --map3d-ink: CanvasText; --map3d-faint: CanvasText; --map3d-line: CanvasText; }
 }
 .map3d > canvas { touch-action: none; cursor: grab; user-select: none; -webkit-user-select: none; }
-.map3d-sheets, .map3d-sheets > div { position: absolute; inset: 0; overflow: hidden; pointer-events: none; }
-.map3d-sheets canvas { position: absolute; left: 0; top: 0; transform-origin: 0 0; will-change: transform; }
 .map3d-dragging > canvas { cursor: grabbing; }
 .map3d:focus-visible::after { content: ""; position: absolute; inset: 0; border: 3px solid var(--map3d-accent); pointer-events: none; z-index: 5; }
 .map3d-overlay, .map3d-controls { position: absolute; inset: 0; pointer-events: none; overflow: hidden; }

@@ -56,7 +56,9 @@ test("what has not changed is moved and scaled, not drawn; other light is drawn,
 test("several layers, half seen and in parts of the map, look as they do when they are painted", async () => {
   const shots: Buffer[] = [];
   for (const preserveDrawingBuffer of [true, false]) {
-    const { page, problems } = await bed.start("town", { ...QUIET, preserveDrawingBuffer }, {}, { viewport: { width: 500, height: 400 }, deviceScaleFactor: 2 });
+    const { page, problems } = await bed.start("town", { ...QUIET, preserveDrawingBuffer }, {}, { viewport: { width: 500, height: 400 }, deviceScaleFactor: 2, bypassCSP: true });
+    // What pages say of any canvas or block.
+    if (!preserveDrawingBuffer) await page.addStyleTag({ content: "canvas:not(#mapcanvas) { width: 100%; height: 100%; max-width: 90%; margin: 7px; border: 2px solid red; padding: 3px; opacity: 0.5; transition: transform 1s } .map3d-sheets, .map3d-sheets div { margin: 9px; padding: 4px; border: 1px solid; transform: scale(0.9) }" });
     await settled(page, (url) => new (globalThis as Global).map3d.imageLayer(url, { mode: "id", opacity: 0.6, combine: false }).addTo((globalThis as Global).map).setClip([0, 0, 0.613, 0.8]), bed.url("later"));
     await settled(page, () => (globalThis as Global).map.setZoom(3.37), null);
     shots.push(await page.screenshot({ path: `${OUT}/laid-${String(preserveDrawingBuffer)}.png` }));

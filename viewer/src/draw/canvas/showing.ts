@@ -73,9 +73,18 @@ export class Painted implements Showing {
 /** Pixels of the level beyond what is seen that are there when the picture is moved. */
 const BEYOND_PX = 64;
 
+/** Page styles for any canvas or block (widths, margins, frames) must not reach what is so styled. */
+const OWN = "all:initial;position:absolute;pointer-events:none;";
+
+function block(name: string): HTMLElement {
+  const made = element("div", name, { "aria-hidden": "true" });
+  made.style.cssText = `${OWN}inset:0;overflow:hidden`;
+  return made;
+}
+
 /** Elements of the page, below a canvas: the browser moves and scales what has not changed, which takes a quarter of the work that painting does, and memory for pixels of the level alone. */
 export class Laid implements Showing {
-  readonly element = element("div", "map3d-sheets", { "aria-hidden": "true" });
+  readonly element = block("map3d-sheets");
   readonly #lost: () => void;
   readonly #places: { readonly box: HTMLElement; readonly sheet: Sheet }[] = [];
 
@@ -104,7 +113,8 @@ export class Laid implements Showing {
   #show(screen: Setting, { grid, pieces, smooth, opacity, clip }: Shown, { box, sheet }: { box: HTMLElement; sheet: Sheet }): void {
     const [x, y] = sheet.lay(screen, grid, pieces, smooth, BEYOND_PX) ?? [0, 0];
     const [scale, css] = [grid.px / screen.dpr, (at: number): string => `${String(at / screen.dpr)}px`];
-    Object.assign(sheet.canvas.style, { transform: `translate(${css(grid.left + x * grid.px)}, ${css(grid.top + y * grid.px)}) scale(${String(scale)})`, imageRendering: smooth ? "auto" : "pixelated" });
+    const { canvas } = sheet;
+    Object.assign(canvas.style, { width: `${String(canvas.width)}px`, height: `${String(canvas.height)}px`, transform: `translate(${css(grid.left + x * grid.px)}, ${css(grid.top + y * grid.px)}) scale(${String(scale)})`, imageRendering: smooth ? "auto" : "pixelated" });
     const [left, top, right, bottom] = clipped(clip ?? [0, 0, 1, 1], screen);
     Object.assign(box.style, { opacity: String(opacity), clipPath: clip ? `inset(${css(top)} ${css(screen.width - right)} ${css(screen.height - bottom)} ${css(left)})` : "" });
   }
@@ -112,7 +122,8 @@ export class Laid implements Showing {
   #place(k: number): { box: HTMLElement; sheet: Sheet } {
     const known = this.#places[k];
     if (known) return known;
-    const place = { box: element("div", ""), sheet: new Sheet() };
+    const place = { box: block(""), sheet: new Sheet() };
+    place.sheet.canvas.style.cssText = `${OWN}left:0;top:0;transform-origin:0 0;will-change:transform`;
     place.sheet.canvas.addEventListener("contextrestored", () => {
       place.sheet.forget();
       this.#lost();
