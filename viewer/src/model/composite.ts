@@ -1,6 +1,7 @@
 import { linkProgram } from "../core/gl";
+import { RECT_VERTEX } from "../core/shaders";
 import type { Part } from "./place";
-import { FRAGMENT, VERTEX } from "./shaders";
+import { FRAGMENT } from "./shaders";
 
 /** Puts a picture with depth onto the screen, a pixel for a pixel. */
 export class Composite {
@@ -10,7 +11,7 @@ export class Composite {
   /** @throws DrawError */
   constructor(gl: WebGL2RenderingContext) {
     this.#gl = gl;
-    this.#program = linkProgram(gl, "model", VERTEX, FRAGMENT);
+    this.#program = linkProgram(gl, "model", RECT_VERTEX, FRAGMENT);
   }
 
   /** @param screen its width and height, device pixels */

@@ -8,6 +8,7 @@ export function fadeOut(picture: HTMLElement, duration_ms: number): void {
     if (from[k]?.width) canvas.getContext("2d")?.drawImage(from[k], 0, 0);
   });
   copy.setAttribute("aria-hidden", "true");
+  copy.removeAttribute("id"); // the page's own canvas has one
   copy.style.cssText += `;position:absolute;inset:0;width:100%;height:100%;pointer-events:none;background:var(--map3d-background);transition:opacity ${String(duration_ms)}ms`;
   picture.after(copy);
   requestAnimationFrame(() => requestAnimationFrame(() => { copy.style.opacity = "0"; }));

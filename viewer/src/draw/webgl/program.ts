@@ -1,5 +1,6 @@
 import { linkProgram } from "../../core/gl";
-import { fragment, VERTEX, variantName, type Variant } from "./shader";
+import { RECT_VERTEX } from "../../core/shaders";
+import { fragment, variantName, type Variant } from "./shader";
 
 /** A linked program and where its uniforms are; those it does not use are null, which WebGL ignores. */
 export interface Program {
@@ -31,7 +32,7 @@ export class Programs {
   }
 
   #link(variant: Variant, name: string): Program {
-    return this.#withUniforms(linkProgram(this.#gl, name, VERTEX, fragment(variant)));
+    return this.#withUniforms(linkProgram(this.#gl, name, RECT_VERTEX, fragment(variant)));
   }
 
   #withUniforms(handle: WebGLProgram): Program {

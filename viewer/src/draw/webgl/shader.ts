@@ -21,13 +21,6 @@ export interface Variant {
 export const variantName = (v: Variant): string =>
   [v.mode, v.masked && "masked", v.highlight && "highlight", v.finish && "finish", v.shadow, v.occlusion && "ao", v.combined && "combined", v.shaded && "shaded"].filter(Boolean).join("+");
 
-export const VERTEX = `#version 300 es
-uniform vec4 u_rect; // left, top, right, bottom in clip space
-void main() {
-  bool right = (gl_VertexID & 1) == 1, bottom = gl_VertexID > 1;
-  gl_Position = vec4(right ? u_rect.z : u_rect.x, bottom ? u_rect.w : u_rect.y, 0.0, 1.0);
-}`;
-
 export function fragment({ mode, masked, highlight, finish, shadow, occlusion, combined, shaded }: Variant): string {
   const names = [`MODE_${mode === "picture" ? "COLOR" : mode.toUpperCase()}`, masked && "MASKED", highlight && "HIGHLIGHT", finish && "FINISH", shadow && `SHADOW_${shadow.toUpperCase()}`, occlusion && "OCCLUSION", combined && "COMBINED", shaded && "SHADED"];
   const defines = names.filter(Boolean).map((name) => `#define ${String(name)}`);
