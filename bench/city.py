@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from map3d.catalogue import Workspace
-from map3d.town import TownSpec, make_town
+from map3d_town import TownSpec, make_town
 
 from .district import Copies
 from .scene import _do

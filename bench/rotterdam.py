@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from map3d.town import TownSpec, estimate_town
+from map3d_town import TownSpec, estimate_town
 
 from .watch import Figures, used_bytes, watched
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from map3d.cli.app import run
-from map3d.teatime import write_teatime
+from map3d_town.teatime import write_teatime
 
 pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
 pytestmark = pytest.mark.whole

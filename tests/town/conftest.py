@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from map3d.town import make_town
+from map3d_town import make_town
 from tests.town.documents import ROMAN, TOWN
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from map3d.town import TownSpec
+from map3d_town import TownSpec
 
 Points = NDArray[np.float64]
 GML = "{http://www.opengis.net/gml}"

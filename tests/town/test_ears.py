@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from map3d.town.ears import triangles_with_holes
+from map3d_town.ears import triangles_with_holes
 
 SQUARE = np.array([(0, 0), (10, 0), (10, 10), (0, 10)], dtype=float)
 

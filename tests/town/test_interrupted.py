@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from map3d.town import TownError, TownSpec, estimate_town, make_town
-from map3d.town.site import JOURNAL, PART, claimed
+from map3d_town import TownError, TownSpec, estimate_town, make_town
+from map3d_town.site import JOURNAL, PART, claimed
 
 SPEC = TownSpec(buildings=60, files=6, texture_px=256, trees=False, ortho_px=2500)
 SCRIPT = """
@@ -19,7 +19,7 @@ import os
 from pathlib import Path
 import signal
 import sys
-from map3d.town import make_town
+from map3d_town import make_town
 from tests.town.test_interrupted import SPEC
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import rasterio
 
-from map3d.town import TownError, TownSpec, make_town
+from map3d_town import TownError, TownSpec, make_town
 from tests.town.documents import BLDG, GML, TOWN, numbers, polygons, trees
 
 

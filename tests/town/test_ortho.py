@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import rasterio
 
-from map3d.town import TownError, TownSpec
-from map3d.town.jpeg_tiff import JpegTiff
-from map3d.town.plans import plan_town
-from map3d.town.raster import Painter, write_ortho
-from map3d.town.shades import Pixels, packed
+from map3d_town import TownError, TownSpec
+from map3d_town.jpeg_tiff import JpegTiff
+from map3d_town.plans import plan_town
+from map3d_town.raster import Painter, write_ortho
+from map3d_town.shades import Pixels, packed
 
 
 def smooth(side: int) -> Pixels:
@@ -33,7 +33,7 @@ def write(path: Path, picture: Pixels) -> None:
 @pytest.mark.parametrize("classic", [True, False])
 def test_gdal_reads_what_was_written(side: int, classic: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if not classic:
-        monkeypatch.setattr("map3d.town.jpeg_tiff.CLASSIC_BYTES", 0)
+        monkeypatch.setattr("map3d_town.jpeg_tiff.CLASSIC_BYTES", 0)
     picture = smooth(side)
     write(tmp_path / "o.tif", picture)
     assert (tmp_path / "o.tif").read_bytes()[:4] == (b"II*\0" if classic else b"II+\0")
@@ -88,9 +88,9 @@ def test_the_horizontal_part_of_a_compound_crs_is_recorded() -> None:
 HIGH_WATER = """
 import sys
 from pathlib import Path
-from map3d.town import TownSpec
-from map3d.town.plans import plan_town
-from map3d.town.raster import write_ortho
+from map3d_town import TownSpec
+from map3d_town.plans import plan_town
+from map3d_town.raster import write_ortho
 plan, _ = plan_town(TownSpec(buildings=40))
 side = int(sys.argv[2])
 write_ortho(Path(sys.argv[1]), plan, 2 * plan.radius_m / side, side, 25832, 0.0, 0.0, lambda: None)

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from map3d.town.model import Paint
-from map3d.town.paint import painted, seams_px
+from map3d_town.model import Paint
+from map3d_town.paint import painted, seams_px
 
 
 @pytest.mark.parametrize(("width_px", "step_px"), [(69, 4.6), (84, 5.6), (134, 5.359999999999999), (12, 3.0), (3, 40.0)])

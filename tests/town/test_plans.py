@@ -4,10 +4,10 @@ from collections import Counter
 
 import pytest
 
-from map3d.town import TownSpec
-from map3d.town.house import build
-from map3d.town.plans import plan_town
-from map3d.town.work import atlas_of
+from map3d_town import TownSpec
+from map3d_town.house import build
+from map3d_town.plans import plan_town
+from map3d_town.work import atlas_of
 
 KINDS = {
     "town": {"church", "townhall", "monument", "house", "gruender", "row", "villa", "slab", "industrial", "shed"},

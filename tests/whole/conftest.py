@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from map3d.cli.app import run
-from map3d.town import TownSpec, make_town
+from map3d_town import TownSpec, make_town
 from tests.whole.browsing import served
 
 

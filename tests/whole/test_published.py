@@ -14,8 +14,8 @@ from map3d.catalogue import State, Workspace
 from map3d.cli.app import run
 from map3d.publish.archive import Archive
 from map3d.registry import Registry
-from map3d.teatime import write_teatime
 from map3d.types import TileId
+from map3d_town.teatime import write_teatime
 from tests.publish.hosts import static_host
 from tests.whole.browsing import browse, command, picture
 from tests.whole.core_pixels import CoreView, Known

@@ -33,7 +33,7 @@ def command(out: Path, formats: str, workers: int, estimate: bool, as_json: bool
 
     What is complete stays when it is interrupted; the same command again makes the rest.
     """
-    from map3d.town import TownSpec, estimate_town, make_town
+    from map3d_town import TownSpec, estimate_town, make_town
 
     town = TownSpec(formats=tuple(part.strip() for part in formats.split(",")), **spec)
     if estimate:

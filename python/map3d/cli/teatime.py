@@ -9,7 +9,7 @@ import click
 @click.option("-o", "--out", type=click.Path(path_type=Path), default=Path("teatime"), show_default=True, help="Folder to write into.")
 def command(out: Path) -> None:
     """Write the tea time scene as OBJ files: a teapot at the origin and a cube beside it."""
-    from map3d.teatime import write_teatime
+    from map3d_town.teatime import write_teatime
 
     write_teatime(out)
     click.echo(f"written to {out}; next: map3d site {out} -o teatime-site")
