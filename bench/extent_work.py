@@ -17,10 +17,10 @@ import numpy as np
 
 from map3d import _core
 from map3d.catalogue import PlannedJob, Workspace
-from map3d.child import Child, Message, Tell, Work
 from map3d.jobs.run import Settings
-from map3d.render.build import build, open_scene
-from map3d.render.plan import frame_text, plan_jobs
+from map3d.renderings.build import build, open_scene
+from map3d.renderings.plan import frame_text, plan_jobs
+from map3d.subprocess import Child, Message, Tell, Work
 from map3d.tiles.naming import morton
 
 from .watch import resident

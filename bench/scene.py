@@ -7,7 +7,7 @@ from pathlib import Path
 from map3d.catalogue import Workspace
 from map3d.cli.app import run
 from map3d.errors import UnknownVersion
-from map3d.render.plan import frame_text
+from map3d.renderings.plan import frame_text
 
 CACHE = Path(".cache/bench")
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from map3d.child import Tell, Work
+from map3d.subprocess import Tell, Work
 
 
 def open_greedy(_setup: Mapping[str, Any]) -> Work:

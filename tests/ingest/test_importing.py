@@ -13,7 +13,7 @@ from map3d.ingest.importing import Imported, import_file
 from map3d.ingest.options import ImportOptions
 from map3d.ingest.sources import find_sources
 from map3d.registry import Registry
-from map3d.render.scene_files import check_file
+from map3d.renderings.scene_files import check_file
 
 pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
 

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from map3d.catalogue import Catalogue, SceneRecord, Workspace
-from map3d.child import Child, Limits, Message
 from map3d.errors import ImportFailed, LimitExceeded
 from map3d.ingest.importing import import_file
 from map3d.ingest.options import BIG_FILE_BYTES, GIB, ImportOptions
 from map3d.ingest.parsers import Parsers
 from map3d.ingest.sources import Source, find_sources
+from map3d.subprocess import Child, Limits, Message
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
@@ -105,12 +105,12 @@ def test_processor_time_is_granted_anew_for_every_file() -> None:
 def test_one_parser_serves_many_files_until_one_fails() -> None:
     with Parsers() as parsers:
         limits = Limits(open_files=64)
-        first, _ = parsers.get("tests.child.echo:open_echo", limits)
-        assert parsers.get("tests.child.echo:open_echo", limits)[0] is first
+        first, _ = parsers.get("tests.subprocess.echo:open_echo", limits)
+        assert parsers.get("tests.subprocess.echo:open_echo", limits)[0] is first
         with parsers:
             pass
         assert isinstance(first.ask({}, wall_s=10), Message), "an inner user does not end it"
         parsers.drop()
-        second, _ = parsers.get("tests.child.echo:open_echo", limits)
+        second, _ = parsers.get("tests.subprocess.echo:open_echo", limits)
         assert second is not first
-        assert parsers.get("tests.child.echo:open_echo", Limits(open_files=65))[0] is not second
+        assert parsers.get("tests.subprocess.echo:open_echo", Limits(open_files=65))[0] is not second

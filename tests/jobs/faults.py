@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from map3d.child import Tell, Work
+from map3d.subprocess import Tell, Work
 from map3d.tiles.naming import tiles_of_block
 from map3d.types import BlockId
 

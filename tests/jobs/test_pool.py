@@ -16,7 +16,7 @@ import pytest
 
 from map3d.catalogue import State
 from map3d.jobs.events import Done, Event, Left, Waiting
-from map3d.jobs.terms import Terms
+from map3d.jobs.timeouts import Terms
 from tests.jobs.town import BLOCKS, LEASE_S, TERMS, VIEW, Town, make_town
 
 JOBS = BLOCKS * BLOCKS

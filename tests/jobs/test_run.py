@@ -11,15 +11,15 @@ pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_
 
 from map3d.catalogue import Catalogue, RenderingRecord, SceneCrs, SceneRecord, State, Workspace
 from map3d.errors import BadRequest, OutsideFrame
-from map3d.jobs.creating import add_layers, add_views
-from map3d.jobs.layers import LayerRequest
-from map3d.jobs.manifest import stored_occupancy
 from map3d.jobs.run import Outcome, Plan, Run, Settings
-from map3d.jobs.terms import Terms
+from map3d.jobs.timeouts import Terms
+from map3d.renderings.create import add_layers, add_views
+from map3d.renderings.layers import LayerRequest
+from map3d.renderings.manifest_writer import stored_occupancy
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.types import BlockId, TileId, ViewAngles
-from tests.render.scenes import SquareScene, rendering
+from tests.renderings.scenes import SquareScene, rendering
 
 CONTENT = {(0.05 + 0.1 * k, 0.05 + 0.1 * k): f"thing {k}" for k in range(10)}
 SETTINGS = Settings(2, terms=Terms(heartbeat_s=0.5, block_s=10, idle_s=0.1, tick_s=0.05), entry="tests.jobs.faults:open_work")

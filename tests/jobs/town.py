@@ -8,8 +8,8 @@ from map3d.catalogue import Catalogue, PlannedJob, RenderingRecord, SceneRecord,
 from map3d.geometry.frames import pin
 from map3d.jobs.events import Event
 from map3d.jobs.pool import Pool, Tally
-from map3d.jobs.rendering import RenderTask
-from map3d.jobs.terms import Terms
+from map3d.jobs.timeouts import Terms
+from map3d.renderings.render_task import RenderTask
 from map3d.tiles.naming import block_above, morton
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.types import BlockId, Layer, ViewAngles

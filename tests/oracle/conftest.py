@@ -13,7 +13,7 @@ import pytest
 from map3d import _core
 from map3d.catalogue import Workspace
 from map3d.cli.app import run
-from map3d.render.plan import frame_text
+from map3d.renderings.plan import frame_text
 from map3d_town import TownSpec, make_town
 
 from .asset import Asset, read_asset

@@ -11,13 +11,14 @@ from pmtiles.tile import Compression, TileType, zxy_to_tileid
 
 from map3d.errors import AlreadyExists, BadRequest, Corrupt, NotFound, Stopped
 from map3d.publish import folder as folder_module
-from map3d.publish import publish, verify_published
+from map3d.publish import publish
 from map3d.registry import Registry
 from map3d.tiles import viewer
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.types import BlockId
+from map3d.verify.published_checks import verify_published
 from tests.publish.hosts import static_host
 from tests.web.workspaces import ADDED, LAYERS, OCCUPIED, ZMAX, add_pass, every_tile, put_block, tile_bytes
 

@@ -11,7 +11,7 @@ from map3d import _core
 from map3d.catalogue import RenderingRecord, Workspace
 from map3d.geometry.frames import PinnedFrame
 from map3d.registry import Registry
-from map3d.render.plan import frame_text
+from map3d.renderings.plan import frame_text
 from map3d.types import TileId
 
 LEAST_PIXELS = 400

@@ -6,7 +6,7 @@ from map3d.catalogue import Workspace
 from map3d.cli.layer_options import layer_options
 from map3d.cli.options import json_option, workspace_option
 from map3d.cli.output import print_json
-from map3d.jobs.layers import LayerRequest
+from map3d.renderings.layers import LayerRequest
 
 
 @click.command("add-layers")
@@ -16,7 +16,7 @@ from map3d.jobs.layers import LayerRequest
 @workspace_option
 def command(workspace: Workspace, rendering: str, layers: LayerRequest, as_json: bool) -> None:
     """Add layers to RENDERING, in all of its views. Nothing is rendered yet, and what is there stays as it is."""
-    from map3d.jobs.creating import add_layers
+    from map3d.renderings.create import add_layers
 
     catalogue = workspace.open_catalogue()
     try:

@@ -15,7 +15,7 @@ from map3d.types import ViewAngles
 @workspace_option
 def command(workspace: Workspace, rendering: str, views: tuple[ViewAngles, ...], as_json: bool) -> None:
     """Add views to RENDERING. Nothing is rendered yet, and what is there stays as it is."""
-    from map3d.jobs.creating import add_views
+    from map3d.renderings.create import add_views
 
     catalogue = workspace.open_catalogue()
     try:

@@ -15,7 +15,7 @@ def build_with_progress(
     workspace: Workspace, catalogue: Catalogue, scene: str, *, threads: int, max_memory_bytes: int | None = None
 ) -> dict[str, Any] | None:
     """Builds the scene if its files changed; then its report."""
-    from map3d.render.build import BUILD_BYTES, build, is_stale
+    from map3d.renderings.build import BUILD_BYTES, build, is_stale
 
     if not is_stale(workspace, catalogue, scene):
         return None

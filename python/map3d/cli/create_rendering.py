@@ -58,7 +58,7 @@ def command(
     A view's look-at angle 0 looks north, 45 north-west, 90 west; its pitch is how far it looks below the horizon. The frame of each view is
     pinned now and never moves, so that later additions do not renumber any tile.
     """
-    from map3d.jobs.creating import RenderingRequest, create_rendering
+    from map3d.renderings.create import RenderingRequest, create_rendering
 
     if views and (directions or options["pitch"]):
         raise BadRequest("give either --view or --directions and --pitch")

@@ -20,7 +20,7 @@ def command(workspace: Workspace, rendering: str, workers: int, as_json: bool) -
 
     Of a rendering that is there, what changed since counts as still to render. The scene is built first if its files changed.
     """
-    from map3d.jobs.estimate import estimate
+    from map3d.renderings.cost_estimate import estimate
 
     catalogue = workspace.open_catalogue()
     try:

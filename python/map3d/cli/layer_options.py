@@ -9,9 +9,9 @@ import click
 
 from map3d.cli.options import Command
 from map3d.geometry.sun import Place, SunAngles
-from map3d.jobs.layers import LayerRequest
-from map3d.jobs.light import RADIUS_M as USUAL_RADIUS_M
-from map3d.jobs.light import LightRequest
+from map3d.renderings.layers import LayerRequest
+from map3d.renderings.sun_layers import RADIUS_M as USUAL_RADIUS_M
+from map3d.renderings.sun_layers import LightRequest
 from map3d.types import COLOR_FORMATS, DEFAULT_LAYERS, LAYER_KINDS, RADIUS_M
 
 

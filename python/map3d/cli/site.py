@@ -44,7 +44,7 @@ def command(
     from map3d.ingest.options import ImportOptions
     from map3d.ingest.sources import asset_name
     from map3d.jobs.run import Run, Settings
-    from map3d.jobs.site import SiteRequest, add_changed, make_rendering
+    from map3d.renderings.site_steps import SiteRequest, add_changed, make_rendering
 
     title = options["title"] or folder.resolve().stem
     reading = ImportOptions(crs=options["crs"], up=options["up"], strict=options["strict"])

@@ -24,8 +24,8 @@ def command(workspace: Workspace, renderings: tuple[str, ...], published: Path |
     if published is not None:
         _verify_published(published, as_json)
         return
-    from map3d.jobs.findings import Findings
-    from map3d.jobs.verify import verify_rendering, verify_scene
+    from map3d.verify.findings import Findings
+    from map3d.verify.rendering_checks import verify_rendering, verify_scene
 
     findings = Findings()
     catalogue = workspace.open_catalogue()
@@ -57,7 +57,7 @@ def command(workspace: Workspace, renderings: tuple[str, ...], published: Path |
 
 
 def _verify_published(folder: Path, as_json: bool) -> None:
-    from map3d.publish import verify_published
+    from map3d.verify.published_checks import verify_published
 
     found = verify_published(folder)
     if as_json:

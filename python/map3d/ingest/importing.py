@@ -9,15 +9,15 @@ from typing import Any, Final
 
 from map3d import errors
 from map3d.catalogue import AssetRecord, Catalogue, SceneCrs, SceneRecord, Workspace
-from map3d.child import Failure, Limits
+from map3d.catalogue.scene_lock import scene_lock
 from map3d.errors import ChildDied, CrsError, ImportFailed, LimitExceeded, Map3dError
 from map3d.ingest.asset import asset_digest, new_objects, put_in_place, read_objects, world_boxes, write_ids, write_report
 from map3d.ingest.crs import LOCAL, is_local, parse_crs, scene_crs
-from map3d.ingest.lock import scene_lock
 from map3d.ingest.options import ImportOptions
 from map3d.ingest.parsers import Parsers
 from map3d.ingest.sources import Source, source_digest
 from map3d.registry import Registry
+from map3d.subprocess import Failure, Limits
 from map3d.types import Box, Vec3
 
 ENTRIES: Final = {"raster": "map3d.ingest.terrain_work:open_terrain"}

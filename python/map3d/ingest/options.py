@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from map3d.child import Limits
+from map3d.subprocess import Limits
 
 GIB: Final = 1 << 30
 BIG_FILE_BYTES: Final = 100_000_000

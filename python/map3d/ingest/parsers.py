@@ -4,7 +4,7 @@ processes; after any failure a new one starts."""
 from types import TracebackType
 from typing import Any, Final, Self
 
-from map3d.child import Child, Limits
+from map3d.subprocess import Child, Limits
 
 START_S: Final = 120.0
 _ENVIRONMENT: Final = {"RAYON_NUM_THREADS": "1"}

@@ -8,12 +8,12 @@ from typing import Any, Final
 import numpy as np
 from pyproj import CRS
 
-from map3d.child import Tell, Work
 from map3d.errors import ImportFailed
 from map3d.ingest.crs import LOCAL, is_local, parse_crs, scene_crs
 from map3d.ingest.projection import choose_target
 from map3d.ingest.terrain import TerrainOptions, import_terrain
 from map3d.ingest.terrain_place import open_raster
+from map3d.subprocess import Tell, Work
 
 IMAGE_BANDS: Final = (3, 4)
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from map3d.catalogue import Catalogue, State
 from map3d.jobs.events import Done, Event, Failed, Left, Lost, Stopping, Waiting
-from map3d.jobs.terms import Terms
+from map3d.jobs.timeouts import Terms
 from map3d.jobs.worker import News, Task, Worker
 from map3d.tiles.naming import morton
 

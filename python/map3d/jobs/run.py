@@ -9,12 +9,12 @@ import numpy as np
 from map3d.catalogue import Catalogue, PlanOutcome, RenderingRecord, State, Workspace
 from map3d.errors import BadRequest
 from map3d.jobs.events import Event
-from map3d.jobs.manifest import Planned, write_manifest
 from map3d.jobs.pool import Pool, Tally
-from map3d.jobs.rendering import CACHE_BYTES, RENDER_ENTRY, RenderTask
-from map3d.jobs.terms import Terms
-from map3d.render.build import open_scene
-from map3d.render.plan import PlannedScene, plan_jobs, planned_occupancy
+from map3d.jobs.timeouts import Terms
+from map3d.renderings.build import open_scene
+from map3d.renderings.manifest_writer import Planned, write_manifest
+from map3d.renderings.plan import PlannedScene, plan_jobs, planned_occupancy
+from map3d.renderings.render_task import CACHE_BYTES, RENDER_ENTRY, RenderTask
 from map3d.tiles.naming import block_levels
 from map3d.tiles.occupancy import Occupancy, morton_numbers
 from map3d.tiles.sqlite_store import SqliteTileStore

@@ -9,10 +9,10 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 from map3d.catalogue import Catalogue, JobResult, Lease, State
-from map3d.child import Child, Failure, Message
 from map3d.errors import ChildRefused, Map3dError, StaleFence
 from map3d.jobs.events import Done, Event, Failed, Left, Lost
-from map3d.jobs.terms import Terms
+from map3d.jobs.timeouts import Terms
+from map3d.subprocess import Child, Failure, Message
 from map3d.tiles.naming import morton
 
 

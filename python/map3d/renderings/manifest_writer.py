@@ -8,8 +8,8 @@ from map3d.catalogue import Catalogue, RenderingRecord, SceneRecord, State, Work
 from map3d.catalogue.records import LOCAL_CRS_NAME
 from map3d.errors import BadRequest
 from map3d.geometry.frames import PinnedFrame
-from map3d.jobs.geographic import geographic_of
 from map3d.registry import Registry
+from map3d.renderings.lon_lat import geographic_of
 from map3d.tiles.manifest import CrsFacts, Manifest, ViewFacts
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore

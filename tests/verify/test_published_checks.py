@@ -4,11 +4,12 @@ import shutil
 import pytest
 
 from map3d.errors import Corrupt, NotFound, UnknownVersion, VerifyFailed
-from map3d.publish import publish, verify_published
+from map3d.publish import publish
 from map3d.publish.archive import Archive
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.types import BlockId
+from map3d.verify.published_checks import verify_published
 from tests.web.workspaces import OCCUPIED, ZMAX, add_pass, every_tile, put_block
 
 

@@ -12,10 +12,10 @@ from map3d.ingest.importing import import_file
 from map3d.ingest.options import ImportOptions
 from map3d.ingest.parsers import Parsers
 from map3d.ingest.sources import Source, find_sources, source_digest
-from map3d.jobs.creating import RenderingRequest, create_rendering
-from map3d.jobs.layers import LayerRequest
-from map3d.render.build import open_scene
-from map3d.render.plan import planned_occupancy
+from map3d.renderings.build import open_scene
+from map3d.renderings.create import RenderingRequest, create_rendering
+from map3d.renderings.layers import LayerRequest
+from map3d.renderings.plan import planned_occupancy
 from map3d.types import Layer, ViewAngles
 
 RESOLUTIONS_M: Final = (0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)

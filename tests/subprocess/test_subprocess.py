@@ -5,11 +5,11 @@ import threading
 
 import pytest
 
-from map3d.child import Channel, Child, Message
-from map3d.child.channel import MAX_JSON_BYTES
 from map3d.errors import ChildDied, Corrupt
+from map3d.subprocess import Channel, Child, Message
+from map3d.subprocess.channel import MAX_JSON_BYTES
 
-ECHO = "tests.child.echo:open_echo"
+ECHO = "tests.subprocess.echo:open_echo"
 
 
 def pipe() -> tuple[Channel, int]:
@@ -109,7 +109,8 @@ def test_an_exception_of_the_listener_kills_the_child_and_goes_on() -> None:
 
 
 @pytest.mark.parametrize(
-    ("entry", "says"), [("tests.child.echo:open_broken", "cannot open"), ("tests.child.nothing:x", "nothing"), ("tests.child.echo:x", "x")]
+    ("entry", "says"),
+    [("tests.subprocess.echo:open_broken", "cannot open"), ("tests.subprocess.nothing:x", "nothing"), ("tests.subprocess.echo:x", "x")],
 )
 def test_a_child_that_cannot_start_says_why(entry: str, says: str) -> None:
     child = Child(entry, {})

@@ -8,7 +8,7 @@ from pyproj import CRS, Geod, Transformer
 
 from map3d.catalogue import SceneRecord
 from map3d.catalogue.records import LOCAL_CRS_NAME, SceneCrs
-from map3d.jobs.geographic import geographic_of
+from map3d.renderings.lon_lat import geographic_of
 from map3d.tiles.manifest import Geographic
 
 PLACES = {

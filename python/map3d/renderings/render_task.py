@@ -1,4 +1,4 @@
-"""The task of rendering jobs: a block is rendered by a child of map3d.render.work and committed to the track's tile store."""
+"""The task of rendering jobs: a block is rendered by a child of map3d.renderings.block_renderer and committed to the track's tile store."""
 
 import threading
 from collections import Counter
@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from map3d.catalogue import JobResult, Lease, RenderingRecord, Track, Workspace
-from map3d.child import Child, Message
-from map3d.render.check import check_rendered
+from map3d.renderings.block_check import check_rendered
+from map3d.subprocess import Child, Message
 from map3d.tiles.naming import block_level
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.store import StoredTile, StoreShape, TileStore
 
-RENDER_ENTRY: Final = "map3d.render.work:open_work"
+RENDER_ENTRY: Final = "map3d.renderings.block_renderer:open_work"
 CACHE_BYTES: Final = 512 << 20
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from map3d import _core
 from map3d.catalogue import Catalogue, Job, PlannedJob, RenderingRecord, State, Track, Workspace
 from map3d.errors import BadRequest
-from map3d.render.build import is_stale, open_scene
-from map3d.render.plan import PlannedScene, frame_text, plan_jobs, planned_occupancy
+from map3d.renderings.build import is_stale, open_scene
+from map3d.renderings.plan import PlannedScene, frame_text, plan_jobs, planned_occupancy
 from map3d.tiles.naming import block_levels, morton
 from map3d.tiles.occupancy import Occupancy
 from map3d.types import BlockId

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from map3d import _core
-from map3d.child import Tell, Work
 from map3d.errors import NotFound
+from map3d.subprocess import Tell, Work
 from map3d.tiles.naming import blocks_below
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.types import BlockId

@@ -5,10 +5,10 @@ from dataclasses import replace
 import pytest
 
 from map3d.errors import LimitExceeded, OutsideFrame
-from map3d.render.plan import plan_jobs, planned_occupancy
+from map3d.renderings.plan import plan_jobs, planned_occupancy
 from map3d.tiles.naming import block_above, block_levels
 from map3d.types import BlockId, Layer, ViewAngles
-from tests.render.scenes import SquareScene, rendering
+from tests.renderings.scenes import SquareScene, rendering
 
 CONTENT = {(0.1, 0.1): "a", (0.9, 0.9): "b"}
 

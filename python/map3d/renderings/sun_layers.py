@@ -90,7 +90,7 @@ class Ground:
 
     def __init__(self, scene: SceneRecord, box: Box, place: Place | None) -> None:
         """Raises BadRequest when the scene's system cannot tell."""
-        from map3d.jobs.north import Grid
+        from map3d.renderings.grid_north import Grid
 
         origin = scene.origin or (0.0, 0.0, 0.0)
         x, y = (origin[k] + (box[0][k] + box[1][k]) / 2 for k in (0, 1))

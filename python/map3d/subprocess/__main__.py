@@ -1,4 +1,4 @@
-"""`python -m map3d.child ENTRY READ_FD WRITE_FD PARENT_PID`: the child's side. Started by map3d.child.Child and nothing else."""
+"""`python -m map3d.subprocess ENTRY READ_FD WRITE_FD PARENT_PID`: the child's side. Started by map3d.subprocess.Child and nothing else."""
 
 import importlib
 import os
@@ -7,9 +7,9 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from map3d.child.channel import Channel
-from map3d.child.limits import Limits, die_with_parent
-from map3d.child.work import Work
+from map3d.subprocess.channel import Channel
+from map3d.subprocess.handler import Work
+from map3d.subprocess.limits import Limits, die_with_parent
 
 
 def main() -> None:

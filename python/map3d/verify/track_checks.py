@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 from map3d import _core
 from map3d.catalogue import Catalogue, Job, RenderingRecord, State, Track, Workspace
 from map3d.errors import Corrupt, Map3dError
-from map3d.jobs.findings import Findings
-from map3d.render.decode import check_seam, decode_tile, ids_of
-from map3d.render.plan import frame_text, planned_occupancy
+from map3d.renderings.plan import frame_text, planned_occupancy
 from map3d.tiles.naming import block_level, block_of, blocks_below, children, parent
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.store import StoredBlock
 from map3d.types import BlockId, TileId
+from map3d.verify.decode import check_seam, decode_tile, ids_of
+from map3d.verify.findings import Findings
 
 Progress = Callable[[str, int, int], None]
 

@@ -7,10 +7,10 @@ from typing import Any, Final
 
 from map3d import _core
 from map3d.catalogue import Catalogue, SceneRecord, Workspace
+from map3d.catalogue.scene_lock import scene_lock
 from map3d.errors import BadRequest
-from map3d.ingest.lock import scene_lock
 from map3d.registry import Registry
-from map3d.render.scene_files import object_box
+from map3d.renderings.scene_files import object_box
 
 BuildProgress = Callable[[str, int, int], bool]
 """(stage, done, total) → False to stop."""

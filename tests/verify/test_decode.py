@@ -1,4 +1,4 @@
-"""What is checked of a block before it is committed, and of tiles when all is counted again."""
+"""Decoding of stored tiles and seams."""
 
 import io
 
@@ -8,37 +8,10 @@ import xxhash
 from PIL import Image
 
 from map3d.errors import Corrupt
-from map3d.render.check import check_rendered
-from map3d.render.decode import check_seam, decode_tile, ids_of
-from map3d.tiles.store import StoredTile, StoreShape
-from map3d.types import BlockId, Layer, Sun
+from map3d.types import Layer, Sun
+from map3d.verify.decode import check_seam, decode_tile, ids_of
 
 LAYERS = (Layer("color", "color", "webp", 80), Layer("id", "id", "png"))
-SHAPE = StoreShape(256, 4, LAYERS)
-BLOCK = BlockId(1, 1, 0)
-GOOD = [StoredTile(layer, *tile, b"x") for tile in ((1, 1, 0), (2, 3, 1), (3, 7, 3)) for layer in (0, 1)]
-
-
-def test_a_whole_block_and_an_empty_one_pass() -> None:
-    check_rendered(SHAPE, BLOCK, GOOD, b"seam")
-    check_rendered(SHAPE, BLOCK, [], None)
-
-
-@pytest.mark.parametrize(
-    ("tiles", "seam", "says"),
-    [
-        (GOOD[:-1], b"s", "has layers"),
-        (GOOD[2:], b"s", "its parent is not"),
-        (GOOD[:2] + GOOD[4:], b"s", "its parent is not"),
-        ([*GOOD, StoredTile(0, 1, 0, 0, b"x"), StoredTile(1, 1, 0, 0, b"x")], b"s", "not one of its own"),
-        ([*GOOD, StoredTile(0, 4, 15, 7, b"")], b"s", "no bytes"),
-        (GOOD, None, "no seam"),
-        ([], b"s", "a seam"),
-    ],
-)
-def test_a_block_that_cannot_be_is_refused(tiles: list[StoredTile], seam: bytes | None, says: str) -> None:
-    with pytest.raises(Corrupt, match=says):
-        check_rendered(SHAPE, BLOCK, tiles, seam)
 
 
 def image(mode: str, size: int, format: str) -> bytes:

@@ -10,8 +10,8 @@ from map3d.catalogue.records import WINDOW
 from map3d.errors import BadRequest
 from map3d.geometry.frames import Window, pin, pin_beside
 from map3d.geometry.views import check_angles
-from map3d.jobs.layers import LayerRequest
-from map3d.render.build import is_stale, open_scene
+from map3d.renderings.build import is_stale, open_scene
+from map3d.renderings.layers import LayerRequest
 from map3d.types import Box, ViewAngles, check_name
 
 COARSEST_M: Final = 1e6

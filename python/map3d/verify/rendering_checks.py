@@ -7,15 +7,15 @@ import numpy as np
 from map3d import _core
 from map3d.catalogue import Catalogue, RenderingRecord, State, Workspace
 from map3d.errors import Map3dError
-from map3d.jobs.findings import Findings
-from map3d.jobs.manifest import current_manifest
-from map3d.jobs.verify_track import check_track
 from map3d.registry import Registry
-from map3d.render.build import is_stale, open_scene
-from map3d.render.plan import plan_jobs
-from map3d.render.scene_files import binary_files, check_file, check_ids, check_index
+from map3d.renderings.build import is_stale, open_scene
+from map3d.renderings.manifest_writer import current_manifest
+from map3d.renderings.plan import plan_jobs
+from map3d.renderings.scene_files import binary_files, check_file, check_ids, check_index
 from map3d.tiles.manifest import Manifest
 from map3d.types import BlockId, TileId
+from map3d.verify.findings import Findings
+from map3d.verify.track_checks import check_track
 
 Progress = Callable[[str, int, int], None]
 """(what, done, total)."""

@@ -12,9 +12,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import IO, Any, Final
 
-from map3d.child.channel import Channel, Message
-from map3d.child.limits import Limits
 from map3d.errors import ChildDied, ChildRefused, Corrupt, LimitExceeded
+from map3d.subprocess.channel import Channel, Message
+from map3d.subprocess.limits import Limits
 
 TAIL_BYTES: Final = 2000
 PIPE_BYTES: Final = 1 << 20
@@ -44,7 +44,7 @@ class Child:
         self._channel = Channel(parent_reads, parent_writes)
         try:
             self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "map3d.child", entry, str(child_reads), str(child_writes), str(os.getpid())],
+                [sys.executable, "-P", "-m", "map3d.subprocess", entry, str(child_reads), str(child_writes), str(os.getpid())],
                 stdin=subprocess.DEVNULL,
                 stdout=self._stderr,
                 stderr=self._stderr,

@@ -13,9 +13,9 @@ from map3d.catalogue import SceneCrs, SceneRecord
 from map3d.errors import BadRequest
 from map3d.geometry.sun import Place, SunAngles, sun_angles
 from map3d.ingest.crs import LOCAL, parse_crs, scene_crs
-from map3d.jobs.layers import LayerRequest
-from map3d.jobs.light import LightRequest
-from map3d.jobs.north import Grid
+from map3d.renderings.grid_north import Grid
+from map3d.renderings.layers import LayerRequest
+from map3d.renderings.sun_layers import LightRequest
 from map3d.types import Box, Layer, Sun
 
 BOX: Box = ((-100.0, -50.0, 0.0), (300.0, 250.0, 40.0))

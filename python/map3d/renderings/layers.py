@@ -6,7 +6,7 @@ from typing import Final
 
 from map3d.catalogue import SceneRecord
 from map3d.errors import BadRequest
-from map3d.jobs.light import LightRequest
+from map3d.renderings.sun_layers import LightRequest
 from map3d.types import COLOR_KINDS, DEFAULT_LAYERS, LAYER_KINDS, Box, Layer, LayerKind
 
 LOSSY: Final = ("webp", "jpeg")

@@ -4,7 +4,7 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
-from map3d.child import Tell, Work
+from map3d.subprocess import Tell, Work
 
 
 def open_echo(setup: Mapping[str, Any]) -> Work:

@@ -1,0 +1,1 @@
+"""Renderings: creating and planning them, estimating and building what they need, rendering one block, writing the manifest."""

@@ -1,0 +1,1 @@
+"""Verification: recomputes and compares everything stored, for scenes, renderings and published folders."""

@@ -1,0 +1,5 @@
+"""Published folders are made as in tests/publish."""
+
+from tests.publish.conftest import built_viewer, finished, out, workspace
+
+__all__ = ["built_viewer", "finished", "out", "workspace"]
