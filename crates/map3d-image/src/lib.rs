@@ -1,16 +1,18 @@
-//! Images: textures in mip levels, footprint sampling, G-buffers, pyramid reduction, seams and encoding. Knows no geometry but UV coordinates.
+//! Images without geometry: decoding, encoding, G-buffers, reduction to the next level, seams. Knows no assets and no textures.
 
 pub mod decode;
 pub mod encode;
+mod fill;
 pub mod gbuffer;
+mod mask;
 pub mod raster;
 pub mod reduce;
-pub mod sample;
 pub mod seam;
 pub mod srgb;
-pub mod texture;
 
 pub use decode::ImageLimits;
+pub use fill::fill_unmarked;
 pub use gbuffer::{Arrays, GBuffer};
+pub use mask::PixelMask;
 pub use raster::Raster;
 pub use reduce::reduce;

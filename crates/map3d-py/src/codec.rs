@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use map3d_base::{LayerFormat, LayerKind, LayerSpec};
 use map3d_image::encode::{self, Encoder};
-use map3d_image::texture::TextureFile;
 use map3d_image::{Arrays, GBuffer};
+use map3d_texture::TextureFile;
 use numpy::ndarray::{Array2, Array3};
 use numpy::{IntoPyArray, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;

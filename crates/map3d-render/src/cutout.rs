@@ -5,9 +5,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use map3d_base::asset::Wrap;
-use map3d_image::sample::{AlphaSampler, UvMap};
-use map3d_image::texture::{Level, Texture, TextureCache, TextureKey};
 use map3d_scene::MaterialRecord;
+use map3d_texture::sample::{AlphaSampler, UvMap};
+use map3d_texture::{Level, Texture, TextureCache, TextureKey};
 use map3d_trace::{Affine, Cutout, CutoutSample, Stencil};
 
 /// Wrap mode of a material record.

@@ -1,10 +1,10 @@
 //! What a surface looks like over the pixels of a sub-tile: set up once, then asked per pixel.
 
 use map3d_base::{Isa, Result, Vec3};
-use map3d_image::sample::{Outside, POSITION_BITS, Sampler, TapPlans, UvMap};
 use map3d_image::srgb::LINEAR16;
-use map3d_image::texture::{HeldTextures, TextureCache};
 use map3d_scene::MaterialRecord;
+use map3d_texture::sample::{Outside, POSITION_BITS, Sampler, TapPlans, UvMap};
+use map3d_texture::{HeldTextures, TextureCache};
 use map3d_trace::{Affine, DepthPlane, Surface};
 
 use crate::cutout::wrap_of;

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use map3d_base::tile::Tile;
 use map3d_base::{Error, Frame, Result, Vec3};
-use map3d_image::texture::{CacheStats, TextureCache};
 use map3d_image::{Arrays, GBuffer};
 use map3d_scene::{SceneStore, StoreStats};
+use map3d_texture::{CacheStats, TextureCache};
 use map3d_trace::{Ray, Rays};
 
 use crate::block::{Block, render_block};

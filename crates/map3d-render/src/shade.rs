@@ -4,7 +4,7 @@
 use map3d_base::samples::SAMPLES;
 use map3d_base::{Error, Isa, Result};
 use map3d_image::GBuffer;
-use map3d_image::texture::TextureCache;
+use map3d_texture::TextureCache;
 use map3d_trace::visbuf::{MIXED, NOTHING};
 use map3d_trace::{SUBTILE_PX, VisBuf};
 

@@ -1,6 +1,6 @@
-//! Scenes: assets to chunks with a BVH (`build`), and chunks memory-mapped for tracing (`SceneStore`). File formats: spec/scene.md.
+//! Scenes: assets to chunks with a BVH (`builder`), and chunks memory-mapped for tracing (`SceneStore`). File formats: spec/scene.md.
 
-pub mod build;
+pub mod builder;
 pub mod bvh;
 pub mod chunk;
 pub mod index;

@@ -5,7 +5,7 @@ mod camp;
 use camp::{Face, batch, bytes_of, camp, new_folder, request, run, tent, world, write_asset, write_faces};
 use map3d_base::Error;
 use map3d_base::asset::{Instance, Material, Materials, Rank};
-use map3d_scene::build::{BuildOptions, BuildRequest, GroundPlane, build_scene};
+use map3d_scene::builder::{BuildOptions, BuildRequest, GroundPlane, build_scene};
 use map3d_scene::{Chunk, SceneStore};
 
 #[test]

@@ -9,7 +9,7 @@ use camp::{Face, Folder, batch, bytes_of, new_folder, request, run, tent, write_
 use map3d_base::asset::{Instance, Material, Materials, Rank};
 use map3d_image::encode::{Deflate, Filter, encode_png};
 use map3d_scene::SceneStore;
-use map3d_scene::build::{BuildRequest, build_scene};
+use map3d_scene::builder::{BuildRequest, build_scene};
 
 /// Quarters of a camp of 20 × 20 km, so that cells at their borders hold tents of several; objects of a quarter start at 10 × (100 × its number + 1).
 fn quarter(number: u32) -> Vec<Face> {

@@ -1,8 +1,9 @@
 //! Colour to sRGB bytes with straight coverage alpha; under alpha 0 the colour of the nearest covered pixel.
 
+use crate::fill::fill_unmarked;
+use crate::mask::PixelMask;
 use crate::raster::Raster;
 use crate::srgb::{TO_BYTE, ToByte};
-use crate::texture::{UsageMask, fill_unused};
 
 /// Linear premultiplied 16-bit colour to sRGB bytes.
 pub fn color_from_linear((width, height): (u32, u32), color: &[[u16; 4]]) -> Raster {
@@ -31,7 +32,7 @@ fn straight(table: &ToByte, p: [u16; 4]) -> [u8; 4] {
 }
 
 fn fill_uncovered(image: &mut Raster) {
-    let mut mask = UsageMask::empty(image.width, image.height);
+    let mut mask = PixelMask::empty(image.width, image.height);
     for y in 0..image.height {
         for (x, pixel) in image.row(y).iter().enumerate() {
             if pixel[3] != 0 {
@@ -40,7 +41,7 @@ fn fill_uncovered(image: &mut Raster) {
         }
     }
     let alpha: Vec<u8> = image.pixels.iter().map(|p| p[3]).collect();
-    fill_unused(image, &mask, u32::MAX);
+    fill_unmarked(image, &mask, u32::MAX);
     for (pixel, a) in image.pixels.iter_mut().zip(alpha) {
         pixel[3] = a;
     }

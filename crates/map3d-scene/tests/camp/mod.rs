@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use map3d_base::Vec3;
 use map3d_base::asset::{AssetReport, AssetWriter, Batch, Material, Materials, Object, Rank};
-use map3d_scene::build::{BuildOptions, BuildReport, BuildRequest, GroundPlane, build_scene};
+use map3d_scene::builder::{BuildOptions, BuildReport, BuildRequest, GroundPlane, build_scene};
 
 pub struct Folder(pub PathBuf);
 

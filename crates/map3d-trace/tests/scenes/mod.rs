@@ -11,7 +11,7 @@ use map3d_base::{Frame, Vec3};
 use map3d_image::Raster;
 use map3d_image::encode::{Deflate, Filter, encode_png};
 use map3d_scene::SceneStore;
-use map3d_scene::build::{BuildOptions, BuildRequest, GroundPlane, build_scene};
+use map3d_scene::builder::{BuildOptions, BuildRequest, GroundPlane, build_scene};
 
 pub const RANKS: [Rank; 6] = [Rank::Terrain, Rank::Road, Rank::Ground, Rank::Other, Rank::Installation, Rank::Opening];
 

@@ -1,19 +1,19 @@
-//! Unused texels take the colour of the nearest used one: an exact Euclidean distance transform, rows after columns
+//! Gives unmarked pixels the colour of the nearest marked one by an exact Euclidean distance transform, rows after columns
 //! (after Meijster, Roerdink & Hesselink 2000). Ties: the upper, then the left texel.
 
 use std::ops::Range;
 
+use crate::mask::PixelMask;
 use crate::raster::Raster;
-use crate::texture::mask::UsageMask;
 
 /// Longest side of an image: a distance and the next greater one fit 16 bits.
 const MAX_SIDE: u32 = i16::MAX as u32 - 1;
 
 /// Fills in place. An empty or full mask changes nothing. Texels farther than `reach` from every used one may keep what they have.
-pub fn fill_unused(image: &mut Raster, mask: &UsageMask, reach: u32) {
+pub fn fill_unmarked(image: &mut Raster, mask: &PixelMask, reach: u32) {
     assert_eq!((image.width, image.height), (mask.width(), mask.height()), "mask and image differ in size");
     assert!(image.width.max(image.height) <= MAX_SIDE, "{} × {} px", image.width, image.height);
-    if mask.is_full() || mask.used() == 0 {
+    if mask.is_full() || mask.marked() == 0 {
         return;
     }
     let w = image.width as usize;

@@ -1,15 +1,15 @@
 //! Footprint sampling against the exact integral: a float64 box over the pixel's parallelogram of the texture interpolated bilinearly, by many samples.
 //!
-//! `cargo run --release -p map3d-image --example footprints [-- scan | axis compensation gap point]` prints a row for each texture, pitch and scale:
+//! `cargo run --release -p map3d-texture --example footprints [-- scan | axis compensation gap point]` prints a row for each texture, pitch and scale:
 //! taps, cost, PSNR (in sRGB, peak 255) and the ratio of gradient energies (1 = neither blurred nor aliased).
 
 use std::sync::Arc;
 
 use map3d_base::asset::Wrap;
 use map3d_image::Raster;
-use map3d_image::sample::{Outside, Sampler, TapPlan, Tuning, UvMap, footprint};
 use map3d_image::srgb::{BYTE, LINEAR16};
-use map3d_image::texture::{Level, LinearRaster, first_mip, level_count, next_mip};
+use map3d_texture::sample::{Outside, Sampler, TapPlan, Tuning, UvMap, footprint};
+use map3d_texture::{Level, LinearRaster, first_mip, level_count, next_mip};
 
 const SIDE: u32 = 256;
 const PIXELS: i32 = 32;

@@ -6,7 +6,7 @@ use std::sync::mpsc;
 
 use map3d_base::asset::Material;
 use map3d_base::{Error, Result};
-use map3d_image::texture::{TextureAsset, TextureKeys, TextureSource, build_textures, source_of, texture_path};
+use map3d_texture::{TextureAsset, TextureKeys, TextureSource, build_textures, source_of, texture_path};
 
 use super::assets::{Asset, Assets};
 use super::{BuildReport, BuildRequest, Progress};

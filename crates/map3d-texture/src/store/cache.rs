@@ -7,8 +7,8 @@ use std::sync::{Arc, Mutex, OnceLock};
 
 use map3d_base::{Error, Result};
 
-use crate::texture::file::{TextureFile, TextureKey, texture_path};
-use crate::texture::level::Level;
+use crate::store::file::{TextureFile, TextureKey, texture_path};
+use crate::store::level::Level;
 
 /// A texture of the store, opened and checked.
 #[derive(Debug)]

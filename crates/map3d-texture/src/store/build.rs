@@ -9,10 +9,11 @@ use map3d_base::asset::{AssetMesh, Material};
 use map3d_base::{Error, Result};
 use rayon::prelude::*;
 
-use crate::decode::ImageLimits;
-use crate::texture::file::{self, TextureFile, TextureKey, texture_key, texture_path};
-use crate::texture::mask::UsageMask;
-use crate::texture::source;
+use crate::store::file::{self, TextureFile, TextureKey, texture_key, texture_path};
+use crate::store::source;
+use crate::store::usage::mark_triangle;
+use map3d_image::ImageLimits;
+use map3d_image::PixelMask;
 
 /// (stage, done, total) → false to stop.
 pub type Progress<'a> = dyn Fn(&str, u64, u64) -> bool + Sync + 'a;
@@ -178,13 +179,13 @@ impl<'a> Build<'a> {
         let path = if image.is_empty() { alpha_path } else { path };
         let (width, height) = source::probe(&path, &image, &alpha, &limits)?;
         let before = self.pending.lock().expect("no thread panicked").remove(source);
-        let mut mask = before.and_then(|runs| UsageMask::from_runs(width, height, &runs)).unwrap_or_else(|| UsageMask::empty(width, height));
+        let mut mask = before.and_then(|runs| PixelMask::from_runs(width, height, &runs)).unwrap_or_else(|| PixelMask::empty(width, height));
         let uvs = asset.mesh.uvs();
         for triangle in uses.iter().map(|t| *t as usize) {
             if mask.is_full() {
                 break;
             }
-            mask.add_triangle(uvs[triangle], asset.materials[asset.mesh.materials()[triangle] as usize].wrap);
+            mark_triangle(&mut mask, uvs[triangle], asset.materials[asset.mesh.materials()[triangle] as usize].wrap);
         }
         if self.masks.fetch_add(1, Ordering::Relaxed) % RELEASED == RELEASED - 1 {
             asset.mesh.release();
@@ -196,7 +197,7 @@ impl<'a> Build<'a> {
         self.make(&path, &image, &alpha, &mask).map(Some)
     }
 
-    fn make(&self, path: &Path, image: &[u8], alpha: &[u8], mask: &UsageMask) -> Result<(TextureInfo, bool)> {
+    fn make(&self, path: &Path, image: &[u8], alpha: &[u8], mask: &PixelMask) -> Result<(TextureInfo, bool)> {
         let runs = if mask.is_full() { Vec::new() } else { mask.to_runs() };
         let key = texture_key(image, alpha, &runs);
         let target = texture_path(self.out_dir, &key);

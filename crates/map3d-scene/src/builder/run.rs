@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::path::Path;
 
 use map3d_base::{Error, Result};
-use map3d_image::texture::{TextureKeys, prune_textures};
+use map3d_texture::{TextureKeys, prune_textures};
 
 use super::assets::{Asset, Assets, BUILD_FORMAT};
 use super::cells::{Quadtree, Square};

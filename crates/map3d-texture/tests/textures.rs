@@ -8,40 +8,40 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use common::{Random, folder, noise, png};
 use map3d_base::asset::{AssetMesh, AssetReport, AssetWriter, Batch, Material, Materials, Rank, Wrap};
-use map3d_image::texture::{
-    Level, LinearRaster, TextureAsset, TextureCache, TextureFile, TextureKeys, UsageMask, build_textures, fill_unused, first_mip, hex, layout,
-    level_count, next_mip, premultiplied, prune_textures, texture_key, texture_path, write,
+use map3d_image::{ImageLimits, PixelMask, Raster, fill_unmarked};
+use map3d_texture::{
+    Level, LinearRaster, TextureAsset, TextureCache, TextureFile, TextureKeys, build_textures, first_mip, hex, layout, level_count, mark_triangle,
+    next_mip, premultiplied, prune_textures, texture_key, texture_path, write,
 };
-use map3d_image::{ImageLimits, Raster};
 
 // -- usage masks
 
-fn used(mask: &UsageMask) -> Vec<(u32, u32)> {
-    (0..mask.height()).flat_map(|y| (0..mask.width()).map(move |x| (x, y))).filter(|(x, y)| mask.get(*x, *y)).collect()
+fn used(mask: &PixelMask) -> Vec<(u32, u32)> {
+    (0..mask.height()).flat_map(|y| (0..mask.width()).map(move |x| (x, y))).filter(|(x, y)| mask.contains(*x, *y)).collect()
 }
 
 #[test]
 fn v_points_up() {
-    let mut mask = UsageMask::empty(4, 4);
-    mask.add_triangle([[0.05, 0.05], [0.2, 0.05], [0.05, 0.2]], Wrap::Wrap);
+    let mut mask = PixelMask::empty(4, 4);
+    mark_triangle(&mut mask, [[0.05, 0.05], [0.2, 0.05], [0.05, 0.2]], Wrap::Wrap);
     assert_eq!(used(&mask), [(0, 3)]);
 }
 
 #[test]
 fn triangles_on_texel_borders_touch_no_neighbour() {
-    let mut mask = UsageMask::empty(8, 8);
-    mask.add_triangle([[0.25, 0.25], [0.5, 0.25], [0.5, 0.5]], Wrap::Wrap);
-    mask.add_triangle([[0.25, 0.25], [0.5, 0.5], [0.25, 0.5]], Wrap::Wrap);
+    let mut mask = PixelMask::empty(8, 8);
+    mark_triangle(&mut mask, [[0.25, 0.25], [0.5, 0.25], [0.5, 0.5]], Wrap::Wrap);
+    mark_triangle(&mut mask, [[0.25, 0.25], [0.5, 0.5], [0.25, 0.5]], Wrap::Wrap);
     assert_eq!(used(&mask), [(2, 4), (3, 4), (2, 5), (3, 5)]);
 }
 
 #[test]
 fn a_point_or_sliver_uses_the_texels_it_lies_in() {
-    let mut mask = UsageMask::empty(8, 8);
-    mask.add_triangle([[0.3, 0.3]; 3], Wrap::Wrap);
+    let mut mask = PixelMask::empty(8, 8);
+    mark_triangle(&mut mask, [[0.3, 0.3]; 3], Wrap::Wrap);
     assert_eq!(used(&mask), [(2, 5)]);
-    mask.add_triangle([[0.01, 0.99], [0.99, 0.99], [0.5, 0.99]], Wrap::Wrap);
-    assert_eq!(mask.used(), 9);
+    mark_triangle(&mut mask, [[0.01, 0.99], [0.99, 0.99], [0.5, 0.99]], Wrap::Wrap);
+    assert_eq!(mask.marked(), 9);
 }
 
 /// Every texel that a random point of a triangle lies in is used; with room to spare none is that lies clear of the triangle.
@@ -51,9 +51,9 @@ fn masks_hold_what_brute_force_finds() {
     for wrap in [Wrap::Wrap, Wrap::Mirror, Wrap::Clamp, Wrap::None] {
         for _ in 0..60 {
             let uv = [(); 3].map(|()| [(random.unit() * 3.0 - 1.0) as f32, (random.unit() * 3.0 - 1.0) as f32]);
-            let mut mask = UsageMask::empty(13, 9);
-            mask.add_triangle(uv, wrap);
-            assert_eq!(mask.used() as usize, used(&mask).len());
+            let mut mask = PixelMask::empty(13, 9);
+            mark_triangle(&mut mask, uv, wrap);
+            assert_eq!(mask.marked() as usize, used(&mask).len());
             let mut seen = std::collections::BTreeSet::new();
             for _ in 0..4000 {
                 let (mut a, mut b) = (random.unit(), random.unit());
@@ -63,10 +63,10 @@ fn masks_hold_what_brute_force_finds() {
                 let at = |k: usize| f64::from(uv[0][k]) * (1.0 - a - b) + f64::from(uv[1][k]) * a + f64::from(uv[2][k]) * b;
                 seen.extend(texel(at(0), at(1), 13, 9, wrap));
             }
-            let missed: Vec<_> = seen.iter().filter(|(x, y)| !mask.get(*x, *y)).collect();
+            let missed: Vec<_> = seen.iter().filter(|(x, y)| !mask.contains(*x, *y)).collect();
             // Samples within 1/512 texel of a border may fall on a neighbour that is only grazed.
             assert!(missed.len() <= 1, "{wrap:?} {uv:?}: {missed:?}");
-            assert!(mask.used() as usize <= seen.len() + 8, "{wrap:?} {uv:?}: {} used, {} seen", mask.used(), seen.len());
+            assert!(mask.marked() as usize <= seen.len() + 8, "{wrap:?} {uv:?}: {} used, {} seen", mask.marked(), seen.len());
         }
     }
 }
@@ -86,33 +86,33 @@ fn texel(u: f64, v: f64, w: i64, h: i64, wrap: Wrap) -> Option<(u32, u32)> {
 
 #[test]
 fn repeated_and_absurd_coordinates_end_quickly() {
-    let mut mask = UsageMask::empty(64, 64);
-    mask.add_triangle([[0.0, 0.1], [5_000.0, 0.1], [5_000.0, 0.2]], Wrap::Wrap);
-    assert!(mask.used() > 0 && mask.used() < 64 * 64, "a trim sheet uses its band only");
-    let mut all = UsageMask::empty(64, 64);
-    all.add_triangle([[0.0, 0.0], [1e9, 3e9], [1e9, 1e9]], Wrap::Wrap);
+    let mut mask = PixelMask::empty(64, 64);
+    mark_triangle(&mut mask, [[0.0, 0.1], [5_000.0, 0.1], [5_000.0, 0.2]], Wrap::Wrap);
+    assert!(mask.marked() > 0 && mask.marked() < 64 * 64, "a trim sheet uses its band only");
+    let mut all = PixelMask::empty(64, 64);
+    mark_triangle(&mut all, [[0.0, 0.0], [1e9, 3e9], [1e9, 1e9]], Wrap::Wrap);
     assert!(all.is_full());
-    let mut none = UsageMask::empty(64, 64);
-    none.add_triangle([[f32::NAN, 0.0], [1.0, 0.0], [0.0, 1.0]], Wrap::Wrap);
-    none.add_triangle([[5.0, 5.0], [1e30, 5.0], [5.0, 6.0]], Wrap::None);
-    assert!(none.used() == 0 || none.is_full());
+    let mut none = PixelMask::empty(64, 64);
+    mark_triangle(&mut none, [[f32::NAN, 0.0], [1.0, 0.0], [0.0, 1.0]], Wrap::Wrap);
+    mark_triangle(&mut none, [[5.0, 5.0], [1e30, 5.0], [5.0, 6.0]], Wrap::None);
+    assert!(none.marked() == 0 || none.is_full());
 }
 
 #[test]
 fn runs_come_back() {
     let mut random = Random(8);
     for (w, h) in [(1, 1), (7, 3), (64, 2), (65, 33), (200, 100)] {
-        let mut mask = UsageMask::empty(w, h);
-        assert_eq!(UsageMask::from_runs(w, h, &mask.to_runs()), Some(mask.clone()));
+        let mut mask = PixelMask::empty(w, h);
+        assert_eq!(PixelMask::from_runs(w, h, &mask.to_runs()), Some(mask.clone()));
         for _ in 0..w * h / 3 {
             mask.mark(random.below(w), random.below(h));
         }
         let runs = mask.to_runs();
-        assert_eq!(UsageMask::from_runs(w, h, &runs), Some(mask));
-        assert_eq!(UsageMask::from_runs(w + 1, h, &runs), None);
-        assert_eq!(UsageMask::from_runs(w, h, &runs[..runs.len() - 1]), None);
+        assert_eq!(PixelMask::from_runs(w, h, &runs), Some(mask));
+        assert_eq!(PixelMask::from_runs(w + 1, h, &runs), None);
+        assert_eq!(PixelMask::from_runs(w, h, &runs[..runs.len() - 1]), None);
     }
-    assert_eq!(UsageMask::from_runs(2, 2, &[0xFF; 12]), None);
+    assert_eq!(PixelMask::from_runs(2, 2, &[0xFF; 12]), None);
 }
 
 // -- filling
@@ -123,12 +123,12 @@ fn unused_texels_take_the_nearest_used_one() {
     for density in [1, 5, 60] {
         let (w, h) = (37, 29);
         let image = noise(w, h, u64::from(density));
-        let mut mask = UsageMask::empty(w, h);
+        let mut mask = PixelMask::empty(w, h);
         for _ in 0..w * h * density / 100 + 1 {
             mask.mark(random.below(w), random.below(h));
         }
         let mut filled = image.clone();
-        fill_unused(&mut filled, &mask, u32::MAX);
+        fill_unmarked(&mut filled, &mask, u32::MAX);
         for y in 0..h {
             for x in 0..w {
                 let distance = |(i, j): (u32, u32)| i64::from(i.abs_diff(x)).pow(2) + i64::from(j.abs_diff(y)).pow(2);
@@ -147,11 +147,11 @@ fn a_limited_fill_is_the_whole_one_within_its_reach() {
     let (w, h) = (61, 47);
     for (reach, marks) in [(1, 3), (4, 1), (9, 5), (200, 2)] {
         let image = noise(w, h, u64::from(reach));
-        let mut mask = UsageMask::empty(w, h);
+        let mut mask = PixelMask::empty(w, h);
         (0..marks).for_each(|_| mask.mark(random.below(w), random.below(h)));
         let (mut whole, mut limited) = (image.clone(), image);
-        fill_unused(&mut whole, &mask, u32::MAX);
-        fill_unused(&mut limited, &mask, reach);
+        fill_unmarked(&mut whole, &mask, u32::MAX);
+        fill_unmarked(&mut limited, &mask, reach);
         let near = |x: u32, y: u32| used(&mask).iter().any(|(i, j)| i.abs_diff(x).pow(2) + j.abs_diff(y).pow(2) <= reach * reach);
         let differ = (0..h).flat_map(|y| (0..w).map(move |x| (x, y))).filter(|(x, y)| whole.row(*y)[*x as usize] != limited.row(*y)[*x as usize]);
         assert!(differ.clone().all(|(x, y)| !near(x, y)), "reach {reach}");
@@ -217,16 +217,16 @@ fn transparent_texels_lend_no_colour() {
 
 // -- files
 
-fn stored(dir: &Path, image: &[u8], alpha: &[u8], mask: &UsageMask) -> TextureFile {
+fn stored(dir: &Path, image: &[u8], alpha: &[u8], mask: &PixelMask) -> TextureFile {
     let path = texture_path(dir, &texture_key(image, alpha, &mask.to_runs()));
     write(&path, &layout(&path, image, alpha, mask, &ImageLimits::default()).expect("sound")).expect("written");
     TextureFile::open(&path).expect("opens")
 }
 
-fn full(w: u32, h: u32) -> UsageMask {
-    let mut mask = UsageMask::empty(w, h);
-    mask.add_triangle([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], Wrap::Wrap);
-    mask.add_triangle([[0.0, 0.0], [1.0, 1.0], [0.0, 1.0]], Wrap::Wrap);
+fn full(w: u32, h: u32) -> PixelMask {
+    let mut mask = PixelMask::empty(w, h);
+    mark_triangle(&mut mask, [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], Wrap::Wrap);
+    mark_triangle(&mut mask, [[0.0, 0.0], [1.0, 1.0], [0.0, 1.0]], Wrap::Wrap);
     assert!(mask.is_full(), "two triangles tile the image");
     mask
 }
@@ -252,7 +252,7 @@ fn a_texture_file_yields_all_its_levels() {
 fn damaged_texture_files_are_refused() {
     let dir = folder("damaged");
     let image = png(&noise(20, 20, 2));
-    let mut mask = UsageMask::empty(20, 20);
+    let mut mask = PixelMask::empty(20, 20);
     mask.mark(3, 3);
     stored(&dir, &image, &[], &mask);
     let path = texture_path(&dir, &texture_key(&image, &[], &mask.to_runs()));
@@ -297,15 +297,15 @@ fn an_atlas_bleeds_no_background_into_any_level() {
     let dir = folder("atlas");
     let islands = [(3u32, 5u32, 30u32, 40u32, [200u8, 60, 40]), (50, 10, 90, 33, [30, 140, 60]), (20, 60, 60, 110, [240, 240, 200])];
     let mut image = Raster::filled(120, 120, [255, 0, 255, 255]);
-    let mut mask = UsageMask::empty(120, 120);
+    let mut mask = PixelMask::empty(120, 120);
     for (x0, y0, x1, y1, c) in islands {
         for y in y0..y1 {
             (x0..x1).for_each(|x| image.pixels[(y * 120 + x) as usize] = [c[0], c[1], c[2], 255]);
         }
         let [u0, u1] = [x0, x1].map(|x| x as f32 / 120.0);
         let [v0, v1] = [y0, y1].map(|y| 1.0 - y as f32 / 120.0);
-        mask.add_triangle([[u0, v0], [u1, v0], [u1, v1]], Wrap::Wrap);
-        mask.add_triangle([[u0, v0], [u1, v1], [u0, v1]], Wrap::Wrap);
+        mark_triangle(&mut mask, [[u0, v0], [u1, v0], [u1, v1]], Wrap::Wrap);
+        mark_triangle(&mut mask, [[u0, v0], [u1, v1], [u0, v1]], Wrap::Wrap);
     }
     let file = stored(&dir, &png(&image), &[], &mask);
     for level in 0..file.levels {

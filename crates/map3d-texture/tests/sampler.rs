@@ -8,9 +8,9 @@ use common::{Random, noise};
 use map3d_base::asset::Wrap;
 use map3d_base::samples::SAMPLES;
 use map3d_image::Raster;
-use map3d_image::sample::{AlphaSampler, Footprint, Outside, POSITION_BITS, Sampler, TapPlan, Tuning, UvMap, footprint};
 use map3d_image::srgb::{BYTE, LINEAR16};
-use map3d_image::texture::Level;
+use map3d_texture::Level;
+use map3d_texture::sample::{AlphaSampler, Footprint, Outside, POSITION_BITS, Sampler, TapPlan, Tuning, UvMap, footprint};
 
 const WHITE: Outside = Outside { diffuse: [255; 4], border: [9, 200, 60, 255] };
 

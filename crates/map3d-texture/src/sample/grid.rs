@@ -7,8 +7,8 @@ use map3d_base::asset::Wrap;
 use crate::sample::plan::Batch;
 use crate::sample::sampler::{POSITION_BITS, UvMap};
 use crate::sample::tap::{BATCH, PLACE_BITS, Pair, Placed, TapSum, WEIGHT_BITS, Weights, weights};
-use crate::texture::mask::fold;
-use crate::texture::{AlphaCell, Level};
+use crate::store::{AlphaCell, Level};
+use crate::wrap::wrap_texel;
 
 /// Fraction bits of texel coordinates.
 pub(super) const TEXEL_BITS: u32 = 32;
@@ -160,7 +160,7 @@ impl Grid {
             Wrap::Wrap if i < 0 && i >= -i64::from(n) => Some((i + i64::from(n)) as u32),
             Wrap::Wrap if i >= i64::from(n) && i < 2 * i64::from(n) => Some((i - i64::from(n)) as u32),
             _ if (0..i64::from(n)).contains(&i) => Some(i as u32),
-            wrap => fold(i, n, wrap),
+            wrap => wrap_texel(i, n, wrap),
         };
         let columns = [near(ix, w), near(ix.saturating_add(1), w)];
         let rows = [near(iy, h), near(iy.saturating_add(1), h)];

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use map3d_base::asset::{Material, Wrap};
-use map3d_image::texture::TextureKeys;
+use map3d_texture::TextureKeys;
 
 use super::assets::Asset;
 use super::survey::record_hash;

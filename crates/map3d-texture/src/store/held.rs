@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use map3d_base::Result;
 
-use crate::texture::cache::{Texture, TextureCache};
-use crate::texture::file::TextureKey;
-use crate::texture::level::Level;
+use crate::store::cache::{Texture, TextureCache};
+use crate::store::file::TextureKey;
+use crate::store::level::Level;
 
 /// Levels stay alive while they are held, also those that the cache drops meanwhile.
 #[derive(Default)]

@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 use map3d_base::file::{self, HEADER_BYTES, aligned};
 use map3d_base::{Error, Result};
 
-use crate::decode::ImageLimits;
-use crate::raster::Raster;
-use crate::texture::mask::UsageMask;
-use crate::texture::mips::{first_mip, level_count, level_size, next_mip};
-use crate::texture::source;
+use crate::store::mips::{first_mip, level_count, level_size, next_mip};
+use crate::store::source;
+use map3d_image::ImageLimits;
+use map3d_image::PixelMask;
+use map3d_image::Raster;
 
 const MAGIC: &[u8; 4] = b"M3DT";
 const VERSION: u32 = 1;
@@ -50,7 +50,7 @@ pub fn texture_key(image: &[u8], alpha: &[u8], runs: &[u8]) -> TextureKey {
 }
 
 /// Decodes a texture and lays it out as a file's bytes.
-pub fn layout(path: &Path, image: &[u8], alpha: &[u8], mask: &UsageMask, limits: &ImageLimits) -> Result<Vec<u8>> {
+pub fn layout(path: &Path, image: &[u8], alpha: &[u8], mask: &PixelMask, limits: &ImageLimits) -> Result<Vec<u8>> {
     let masked = !mask.is_full();
     let level_0 = source::level_0(path, image, alpha, masked.then_some((mask, u32::MAX)), limits)?;
     let levels = level_count(level_0.width, level_0.height);
@@ -185,9 +185,9 @@ impl TextureFile {
         }
     }
 
-    fn mask(&self) -> Result<UsageMask> {
+    fn mask(&self) -> Result<PixelMask> {
         let runs = self.section(2)?;
-        UsageMask::from_runs(self.width, self.height, &runs).ok_or_else(|| Error::format(&self.path, "the runs of its usage mask do not add up"))
+        PixelMask::from_runs(self.width, self.height, &runs).ok_or_else(|| Error::format(&self.path, "the runs of its usage mask do not add up"))
     }
 
     fn section(&self, k: usize) -> Result<Vec<u8>> {

@@ -1,8 +1,8 @@
 //! A level of a texture, ready to sample.
 
-use crate::raster::Raster;
-use crate::srgb::{ROOT, ROOT_OF_RGB};
-use crate::texture::mips::{LinearRaster, first_mip, premultiplied};
+use crate::store::mips::{LinearRaster, first_mip, premultiplied};
+use map3d_image::Raster;
+use map3d_image::srgb::{ROOT, ROOT_OF_RGB};
 
 /// A level as bytes q of √(linear light): q² / 255² is the light, premultiplied by alpha; alpha likewise. Finer than sRGB bytes in shadows and
 /// lights, at most a third coarser between; four bytes a texel are what the memory can carry. Rows top to bottom.

@@ -6,7 +6,7 @@ use std::path::Path;
 use bytemuck::{Pod, Zeroable};
 use map3d_base::file::{self, HEADER_BYTES, aligned, header_start};
 use map3d_base::{Error, Result};
-use map3d_image::texture::{TextureInfo, TextureSource};
+use map3d_texture::{TextureInfo, TextureSource};
 use serde::{Deserialize, Serialize};
 use twox_hash::{XxHash3_64, XxHash3_128};
 

@@ -8,8 +8,8 @@ use crate::sample::grid::{Grid, TEXEL_BITS};
 use crate::sample::plan::TapPlan;
 use crate::sample::tap::{FULL, PLACE_BITS, Placed, PlainSum, TAP_BITS, TapSum, WEIGHT_BITS};
 use crate::sample::wide;
-use crate::srgb::LINEAR16;
-use crate::texture::Level;
+use crate::store::Level;
+use map3d_image::srgb::LINEAR16;
 
 /// Positions are given in 2^-POSITION_BITS pixel.
 pub const POSITION_BITS: u32 = 8;

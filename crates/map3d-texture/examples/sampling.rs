@@ -1,6 +1,6 @@
 //! What a sample costs: least ns a pixel over many rounds, for runs of several lengths in sub-tiles of 64 × 64 pixels.
 //!
-//! `cargo run --release -p map3d-image --example sampling`
+//! `cargo run --release -p map3d-texture --example sampling`
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -8,8 +8,8 @@ use std::time::Instant;
 use map3d_base::Isa;
 use map3d_base::asset::Wrap;
 use map3d_image::Raster;
-use map3d_image::sample::{Outside, Sampler, TapPlan, Tuning, UvMap, footprint};
-use map3d_image::texture::{Level, level_count};
+use map3d_texture::sample::{Outside, Sampler, TapPlan, Tuning, UvMap, footprint};
+use map3d_texture::{Level, level_count};
 
 const SIDE: u32 = 1024;
 const WHITE: Outside = Outside { diffuse: [255; 4], border: [255; 4] };

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use map3d_base::Result;
 
-use crate::decode::{self, ImageLimits};
-use crate::raster::Raster;
-use crate::texture::fill::fill_unused;
-use crate::texture::mask::UsageMask;
+use map3d_image::PixelMask;
+use map3d_image::Raster;
+use map3d_image::decode::{self, ImageLimits};
+use map3d_image::fill_unmarked;
 
 /// Size of a texture: its image's, or its alpha image's where there is no image (then all white).
 pub fn probe(path: &Path, image: &[u8], alpha: &[u8], limits: &ImageLimits) -> Result<(u32, u32)> {
@@ -18,7 +18,7 @@ pub fn probe(path: &Path, image: &[u8], alpha: &[u8], limits: &ImageLimits) -> R
 }
 
 /// Decodes, merges, fills as far as `reach`. `mask` is absent when every texel is used.
-pub fn level_0(path: &Path, image: &[u8], alpha: &[u8], mask: Option<(&UsageMask, u32)>, limits: &ImageLimits) -> Result<Raster> {
+pub fn level_0(path: &Path, image: &[u8], alpha: &[u8], mask: Option<(&PixelMask, u32)>, limits: &ImageLimits) -> Result<Raster> {
     let mut raster = match image.is_empty() {
         true => {
             let (width, height) = decode::probe(path, alpha, limits)?;
@@ -30,7 +30,7 @@ pub fn level_0(path: &Path, image: &[u8], alpha: &[u8], mask: Option<(&UsageMask
         merge_alpha(&mut raster, &decode::decode(path, alpha, limits)?);
     }
     if let Some((mask, reach)) = mask {
-        fill_unused(&mut raster, mask, reach);
+        fill_unmarked(&mut raster, mask, reach);
     }
     Ok(raster)
 }

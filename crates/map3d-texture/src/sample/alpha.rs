@@ -8,7 +8,7 @@ use map3d_base::samples::SAMPLES;
 use crate::sample::grid::Grid;
 use crate::sample::sampler::{POSITION_BITS, UvMap};
 use crate::sample::tap::{FULL, TAP_BITS, WEIGHT_BITS, single};
-use crate::texture::{AlphaCell, Level, Texture};
+use crate::store::{AlphaCell, Level, Texture};
 
 /// Positions a 1/16 pixel.
 const STEP: i32 = 1 << (POSITION_BITS - 4);

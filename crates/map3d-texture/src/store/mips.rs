@@ -1,7 +1,7 @@
 //! Mip levels: each the area-weighted mean, in linear light and weighed by alpha, of what it covers in the level before (spec/scene.md, Texture).
 
-use crate::raster::Raster;
-use crate::srgb::{BYTE, LINEAR16};
+use map3d_image::Raster;
+use map3d_image::srgb::{BYTE, LINEAR16};
 
 /// Linear light premultiplied by alpha, 16 bits a channel.
 #[derive(Clone, Debug, PartialEq, Eq)]
