@@ -11,7 +11,7 @@ CACHE := .cache
 RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
 VIEWER := $(shell find viewer/src viewer/page viewer/scripts -type f 2>/dev/null) $(wildcard viewer/*.json viewer/*.ts viewer/*.js viewer/*.mjs)
 
-.PHONY: help demo test test-all test-rust test-python test-viewer test-browser check check-rust check-python check-viewer bench bench-extent bench-cycles bench-rotterdam bench-viewer peers bless docs reference build clean tools
+.PHONY: help demo test test-all test-rust test-python test-viewer test-browser browser-suite check check-rust check-python check-viewer bench bench-extent bench-cycles bench-rotterdam bench-viewer peers bless docs reference build clean tools
 
 help: ## this list
 	@echo "map3d: 3D city models as oblique image tiles"; echo
@@ -71,7 +71,11 @@ test-python: build
 test-viewer: $(CACHE)/npm
 	cd viewer && npm test --silent
 
-test-browser: build ## whole-way tests in Chromium; the viewer also in Firefox and WebKitGTK where they are installed
+test-browser: build ## whole-way tests in Chromium, Firefox and WebKitGTK; skipped, loudly, where a browser is not installed
+	@status=0; tests/browsers.sh || status=$$?; \
+	case $$status in 0) $(MAKE) --no-print-directory browser-suite;; 3) ;; *) exit $$status;; esac
+
+browser-suite: build
 	cd viewer && npm run --silent test:browser
 	$(BIN)/python -m pytest -q -m browser
 
