@@ -11,7 +11,7 @@ CACHE := .cache
 RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
 VIEWER := $(shell find viewer/src viewer/page viewer/scripts -type f 2>/dev/null) $(wildcard viewer/*.json viewer/*.ts viewer/*.js viewer/*.mjs)
 
-.PHONY: help demo test test-all test-rust test-python test-viewer test-browser browser-suite check check-rust check-python check-viewer bench bench-extent bench-cycles bench-rotterdam bench-viewer peers bless docs reference build clean tools
+.PHONY: help demo test test-all test-rust test-python test-viewer test-wheel test-browser browser-suite wheel check check-rust check-python check-viewer bench bench-extent bench-cycles bench-rotterdam bench-viewer peers bless docs reference build clean tools
 
 help: ## this list
 	@echo "map3d: 3D city models as oblique image tiles"; echo
@@ -53,6 +53,11 @@ $(CACHE):
 
 build: $(CACHE)/core $(CACHE)/viewer ## compile the core and the viewer into .venv
 
+wheel: build ## build dist/map3d-*.whl: abi3, manylinux, with the viewer inside
+	rm -f dist/map3d-*.whl
+	$(BIN)/maturin build --release --locked -q -o dist
+	@ls -sh dist/map3d-*.whl
+
 # -- use -----------------------------------------------------------------------------------------------------------------------------
 
 demo: build ## make a town, render it in 4 directions, serve it on a free port
@@ -60,16 +65,19 @@ demo: build ## make a town, render it in 4 directions, serve it on a free port
 
 # -- test ----------------------------------------------------------------------------------------------------------------------------
 
-test: test-rust test-python test-viewer test-browser ## all quick tests, also in a real browser
+test: test-rust test-python test-viewer test-wheel test-browser ## all quick tests, also in a real browser
 
 test-rust:
 	cargo test --workspace --locked --exclude map3d-py --lib --tests -q
 
 test-python: build
-	$(BIN)/python -m pytest -q -m "not browser and not slow"
+	$(BIN)/python -m pytest -q -m "not browser and not slow and not wheel"
 
 test-viewer: $(CACHE)/npm
 	cd viewer && npm test --silent
+
+test-wheel: wheel ## install the wheel into an empty environment, without Rust and Node.js, and run it
+	$(BIN)/python -m pytest -q -m wheel
 
 test-browser: build ## whole-way tests in Chromium, Firefox and WebKitGTK; skipped, loudly, where a browser is not installed
 	@status=0; tests/browsers.sh || status=$$?; \
@@ -133,4 +141,4 @@ bless: $(CACHE)/venv $(CACHE)/npm ## write test vectors and golden pictures anew
 	cd viewer && npm run --silent bless
 
 clean: ## remove what was built
-	rm -rf $(VENV) $(CACHE) target viewer/node_modules viewer/dist viewer/reference python/map3d/viewer demo tests/.out
+	rm -rf $(VENV) $(CACHE) target viewer/node_modules viewer/dist viewer/reference python/map3d/viewer dist demo tests/.out
