@@ -12,9 +12,9 @@ from rich.console import Console
 from rich.table import Table
 
 from map3d import _core
-from map3d.ingest.options import ImportOptions
+from map3d.ingest.import_options import ImportOptions
+from map3d.ingest.parse_document import open_import
 from map3d.ingest.sources import Source, find_sources
-from map3d.ingest.work import open_import
 
 from .scene import CACHE, _do
 

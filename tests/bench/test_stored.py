@@ -8,7 +8,7 @@ pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_
 
 from bench.stored import of_archive, of_store
 
-from map3d.publish.archive import write_archive
+from map3d.publish.pmtiles_archive import write_archive
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.store import StoredTile, StoreShape
 from map3d.types import BlockId, Layer

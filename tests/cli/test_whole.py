@@ -223,7 +223,7 @@ def test_levels_and_layers_are_as_asked(run: Run, town: Workspace) -> None:
 
 
 def test_a_folder_becomes_a_site_and_only_changes_are_done_again(run: Run, tmp_path: Path) -> None:
-    from map3d.tiles.viewer import viewer_folder
+    from map3d.tiles.viewer_files import viewer_folder
 
     try:
         viewer_folder()

@@ -9,8 +9,8 @@ import pytest
 
 from map3d.catalogue import Catalogue, SceneRecord, Workspace
 from map3d.errors import CrsError, ImportFailed, LimitExceeded, NotFound
+from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import Imported, import_file
-from map3d.ingest.options import ImportOptions
 from map3d.ingest.sources import find_sources
 from map3d.registry import Registry
 from map3d.renderings.scene_files import check_file

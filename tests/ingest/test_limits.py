@@ -10,9 +10,9 @@ import pytest
 
 from map3d.catalogue import Catalogue, SceneRecord, Workspace
 from map3d.errors import ImportFailed, LimitExceeded
+from map3d.ingest.import_options import BIG_FILE_BYTES, GIB, ImportOptions
 from map3d.ingest.importing import import_file
-from map3d.ingest.options import BIG_FILE_BYTES, GIB, ImportOptions
-from map3d.ingest.parsers import Parsers
+from map3d.ingest.parser_process import Parsers
 from map3d.ingest.sources import Source, find_sources
 from map3d.subprocess import Child, Limits, Message
 
@@ -53,7 +53,7 @@ def test_a_parser_out_of_bounds_is_ended_and_explained(
 ) -> None:
     begun = time.monotonic()
     with pytest.raises(error, match=says) as refused:
-        import_file(workspace, catalogue, "town", source, options, entry=f"tests.ingest.parsers:{entry}")
+        import_file(workspace, catalogue, "town", source, options, entry=f"tests.ingest.misbehaving_parsers:{entry}")
     assert str(source.paths[0]) in str(refused.value)
     assert time.monotonic() - begun < 30
     assert catalogue.assets("town") == []
@@ -62,7 +62,7 @@ def test_a_parser_out_of_bounds_is_ended_and_explained(
 
 def test_a_parser_has_no_network_where_the_system_allows_that() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
-        child = Child("tests.ingest.parsers:open_curious", {}, limits=Limits(network=False))
+        child = Child("tests.ingest.misbehaving_parsers:open_curious", {}, limits=Limits(network=False))
         applied = child.wait_ready(30)
         answer = child.ask({"port": server.getsockname()[1]}, wall_s=10)
         child.close()
@@ -71,7 +71,7 @@ def test_a_parser_has_no_network_where_the_system_allows_that() -> None:
 
 
 def test_a_parser_has_few_files(tmp_path: Path) -> None:
-    child = Child("tests.ingest.parsers:open_hoarder", {}, limits=Limits(open_files=64))
+    child = Child("tests.ingest.misbehaving_parsers:open_hoarder", {}, limits=Limits(open_files=64))
     child.wait_ready(30)
     answer = child.ask({"folder": str(tmp_path)}, wall_s=10)
     child.close()
@@ -93,7 +93,7 @@ def test_limits_grow_with_the_file(tmp_path: Path, size: int, memory: int, cpu_s
 
 
 def test_processor_time_is_granted_anew_for_every_file() -> None:
-    child = Child("tests.ingest.parsers:open_worker", {}, limits=Limits(cpu_s=1))
+    child = Child("tests.ingest.misbehaving_parsers:open_worker", {}, limits=Limits(cpu_s=1))
     child.wait_ready(30)
     for _ in range(4):
         assert isinstance(child.ask({"cpu_s": 0.6}, wall_s=30), Message)

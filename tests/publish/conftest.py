@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from map3d.catalogue import Workspace
-from map3d.tiles import viewer
+from map3d.tiles import viewer_files
 from tests.web.workspaces import make_workspace
 
 
@@ -18,7 +18,7 @@ def built_viewer(tmp_path, monkeypatch):
     (folder / "map3d.d.ts").write_text("for authors of pages")
     (folder / ".shots").mkdir()
     (folder / ".shots" / "x.png").write_text("not the viewer's")
-    monkeypatch.setattr(viewer, "files", lambda _: folder.parent)
+    monkeypatch.setattr(viewer_files, "files", lambda _: folder.parent)
     return folder
 
 

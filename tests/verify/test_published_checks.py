@@ -5,7 +5,7 @@ import pytest
 
 from map3d.errors import Corrupt, NotFound, UnknownVersion, VerifyFailed
 from map3d.publish import publish
-from map3d.publish.archive import Archive
+from map3d.publish.pmtiles_archive import Archive
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.types import BlockId

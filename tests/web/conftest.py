@@ -7,7 +7,7 @@ import httpx
 import pytest
 
 from map3d.catalogue import Workspace
-from map3d.web.app import App, create_app
+from map3d.web.asgi_app import App, create_app
 from tests.web.workspaces import make_workspace
 
 

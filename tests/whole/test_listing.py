@@ -11,7 +11,7 @@ from PIL import Image
 
 from map3d.cli.app import run
 from map3d.registry import Registry
-from map3d.tiles.viewer import viewer_folder
+from map3d.tiles.viewer_files import viewer_folder
 from tests.publish.hosts import static_host
 from tests.whole.browsing import browse, picture, served
 

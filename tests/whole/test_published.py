@@ -12,7 +12,7 @@ import pytest
 
 from map3d.catalogue import State, Workspace
 from map3d.cli.app import run
-from map3d.publish.archive import Archive
+from map3d.publish.pmtiles_archive import Archive
 from map3d.registry import Registry
 from map3d.types import TileId
 from map3d_town.teatime import write_teatime

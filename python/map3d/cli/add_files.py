@@ -33,9 +33,9 @@ def command(workspace: Workspace, scene: str, files: Sequence[Path], as_json: bo
 
     A file of a name that is there already replaces what was imported from it; objects keep their ids.
     """
+    from map3d.ingest.import_options import ImportOptions
     from map3d.ingest.importing import import_file
-    from map3d.ingest.options import ImportOptions
-    from map3d.ingest.parsers import Parsers
+    from map3d.ingest.parser_process import Parsers
     from map3d.ingest.sources import find_sources
 
     done: list[Any] = []

@@ -41,7 +41,7 @@ def command(
 
     Stopped at any point, the same command goes on; run again after files have changed, it does only what changed.
     """
-    from map3d.ingest.options import ImportOptions
+    from map3d.ingest.import_options import ImportOptions
     from map3d.ingest.sources import asset_name
     from map3d.jobs.run import Run, Settings
     from map3d.renderings.site_steps import SiteRequest, add_changed, make_rendering

@@ -13,15 +13,15 @@ from map3d.catalogue.scene_lock import scene_lock
 from map3d.errors import ChildDied, CrsError, ImportFailed, LimitExceeded, Map3dError
 from map3d.ingest.asset import asset_digest, new_objects, put_in_place, read_objects, world_boxes, write_ids, write_report
 from map3d.ingest.crs import LOCAL, is_local, parse_crs, scene_crs
-from map3d.ingest.options import ImportOptions
-from map3d.ingest.parsers import Parsers
+from map3d.ingest.import_options import ImportOptions
+from map3d.ingest.parser_process import Parsers
 from map3d.ingest.sources import Source, source_digest
 from map3d.registry import Registry
 from map3d.subprocess import Failure, Limits
 from map3d.types import Box, Vec3
 
-ENTRIES: Final = {"raster": "map3d.ingest.terrain_work:open_terrain"}
-IMPORT_ENTRY: Final = "map3d.ingest.work:open_import"
+ENTRIES: Final = {"raster": "map3d.ingest.terrain.parse_terrain:open_terrain"}
+IMPORT_ENTRY: Final = "map3d.ingest.parse_document:open_import"
 ORIGIN_STEP_M: Final = 100.0
 MAX_FROM_ORIGIN_M: Final = 1e8
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from map3d.errors import NotFound, UnknownFormat
 from map3d.ingest.formats import KNOWN, Format, detect_format
-from map3d.ingest.named_files import named_files
+from map3d.ingest.referenced_files import named_files
 
 _PASSED_OVER = (".mtl", ".jpg", ".jpeg", ".png", ".bmp", ".gif", ".tga", ".txt", ".md", ".json", ".pdf", ".html", ".prj", ".tfw", ".xsd", ".sqlite")
 _PROMISING = (".gml", ".citygml", ".obj", ".tif", ".tiff")

@@ -8,9 +8,9 @@ from typing import Final
 from map3d.catalogue import Catalogue, RenderingRecord, SceneRecord, Workspace
 from map3d.errors import BadRequest, Map3dError, UnknownFormat
 from map3d.geometry.frames import pin
+from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import import_file
-from map3d.ingest.options import ImportOptions
-from map3d.ingest.parsers import Parsers
+from map3d.ingest.parser_process import Parsers
 from map3d.ingest.sources import Source, find_sources, source_digest
 from map3d.renderings.build import open_scene
 from map3d.renderings.create import RenderingRequest, create_rendering

@@ -288,3 +288,8 @@ def block_version(view: ViewFacts, tile: TileId, number: int = 0) -> int:
     """The version to ask a tile's URL with, for a layer of pass `number`."""
     versions = view.versions[number]
     return versions.get(block_of(tile, view.frame.zmax), _commonest(versions))
+
+
+def dump_document(document: Mapping[str, Any]) -> bytes:
+    """Serializes a document beside the manifest: compact UTF-8 JSON with a final newline. Raises ValueError for NaN and infinities."""
+    return (json.dumps(document, ensure_ascii=False, separators=(",", ":"), allow_nan=False) + "\n").encode()

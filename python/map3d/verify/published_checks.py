@@ -10,13 +10,13 @@ from typing import Final
 from map3d.catalogue import Workspace
 from map3d.errors import Corrupt, NotFound, VerifyFailed
 from map3d.geometry.views import track_id
-from map3d.publish.archive import Archive
-from map3d.publish.folder import CHECKSUMS
+from map3d.publish.pmtiles_archive import Archive
+from map3d.publish.publish_folder import CHECKSUMS
 from map3d.tiles.manifest import ATTRIBUTES, FILE_NAME, SEARCH, Manifest, ViewFacts
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.store import TileStore
-from map3d.tiles.viewer import PAGE
+from map3d.tiles.viewer_files import PAGE
 from map3d.types import Layer, TileId
 
 FIRST_BYTES: Final = {"png": b"\x89PNG\r\n\x1a\n", "jpeg": b"\xff\xd8\xff", "webp": b"RIFF"}

@@ -13,8 +13,8 @@ from granian.log import LogLevels
 from granian.server import Server
 
 from map3d.errors import BadRequest
-from map3d.web.app import App, create_app
-from map3d.web.tiles import DEFAULT_CACHE_BYTES
+from map3d.web.asgi_app import App, create_app
+from map3d.web.tile_route import DEFAULT_CACHE_BYTES
 
 START_TIMEOUT_S: Final = 60.0
 BACKLOG: Final = 2048

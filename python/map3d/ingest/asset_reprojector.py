@@ -10,7 +10,7 @@ from pyproj.crs import CompoundCRS
 from map3d.catalogue import SceneCrs
 from map3d.errors import CrsError
 from map3d.ingest.crs import LOCAL, is_local, parse_crs, scene_crs, vertical
-from map3d.ingest.projection import Points, Projection, choose_target
+from map3d.ingest.crs_transformer import Points, Projection, choose_target
 
 LOCAL_NAME: Final = "local"
 _MAY_BE_UNNAMED: Final = ("obj",)

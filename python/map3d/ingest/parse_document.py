@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import Any, Final
 
 from map3d import _core
-from map3d.ingest.placing import Placing
+from map3d.ingest.asset_reprojector import Placing
 from map3d.subprocess import Tell, Work
 
 _TELL_EVERY: Final = 50_000

@@ -7,7 +7,7 @@ import pmtiles.tile
 import pytest
 from pmtiles.tile import Entry
 
-from map3d.publish.archive import LEAF_ENTRIES, _directories
+from map3d.publish.pmtiles_archive import LEAF_ENTRIES, _directories
 
 ROOT_BYTES = 16_384 - 127
 

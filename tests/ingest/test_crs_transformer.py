@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from map3d.errors import CrsError
+from map3d.ingest.asset_reprojector import Placing
 from map3d.ingest.crs import horizontal, parse_crs
-from map3d.ingest.placing import Placing
-from map3d.ingest.projection import Projection, choose_target
+from map3d.ingest.crs_transformer import Projection, choose_target
 
 MUNICH_UTM = (691_000.0, 5_336_000.0, 520.0)
 

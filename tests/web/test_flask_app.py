@@ -7,9 +7,9 @@ import pytest
 from map3d.catalogue import SceneRecord
 from map3d.errors import AlreadyExists, BadRequest, Corrupt, LimitExceeded, Map3dError, NotFound, StoreError
 from map3d.registry import NewObject, Registry
-from map3d.tiles import viewer
+from map3d.tiles import viewer_files
 from map3d.web import create_app
-from map3d.web.errors import status_of
+from map3d.web.http_errors import status_of
 from tests.web.workspaces import rendering_record
 
 
@@ -20,7 +20,7 @@ def built_viewer(tmp_path, monkeypatch):
     (folder / "assets").mkdir(parents=True)
     (folder / "index.html").write_text("<!doctype html><script src=map3d.js></script>")
     (folder / "assets" / "worker.js").write_text("// worker")
-    monkeypatch.setattr(viewer, "files", lambda _: folder.parent)
+    monkeypatch.setattr(viewer_files, "files", lambda _: folder.parent)
     return folder
 
 
@@ -213,7 +213,7 @@ def test_nothing_outside_the_viewer_is_served(client, built_viewer, file):
 
 
 def test_a_viewer_that_is_not_built_is_said_clearly(client, tmp_path, monkeypatch):
-    monkeypatch.setattr(viewer, "files", lambda _: tmp_path / "nowhere")
+    monkeypatch.setattr(viewer_files, "files", lambda _: tmp_path / "nowhere")
     answer = client.get("/view/tea/")
     assert (answer.status_code, answer.headers["cache-control"]) == (503, "no-store")
     assert "make build" in answer.text
@@ -225,7 +225,7 @@ def test_it_is_alive(client):
 
 
 def test_an_unexpected_error_is_500_without_its_text(client, monkeypatch):
-    monkeypatch.setattr("map3d.web.pages.catalogue", lambda: 1 / 0)
+    monkeypatch.setattr("map3d.web.page_routes.catalogue", lambda: 1 / 0)
     answer = client.get("/healthz")
     assert (answer.status_code, answer.text) == (500, "internal error\n")
 

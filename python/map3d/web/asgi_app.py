@@ -10,9 +10,9 @@ from a2wsgi import WSGIMiddleware
 
 from map3d.catalogue.workspace import Workspace
 from map3d.errors import NotFound
-from map3d.web import documents
-from map3d.web.site import create_site
-from map3d.web.tiles import DEFAULT_CACHE_BYTES, Receive, Scope, Send, TileRoute
+from map3d.web import document_routes
+from map3d.web.flask_app import create_site
+from map3d.web.tile_route import DEFAULT_CACHE_BYTES, Receive, Scope, Send, TileRoute
 
 FLASK_THREADS: Final = 8
 _QUERY_SAFE: Final = string.punctuation
@@ -41,7 +41,7 @@ class App:
     async def close(self) -> None:
         await self.tiles.close()
         with self.site.app_context():
-            documents.close()
+            document_routes.close()
 
     async def _live(self, receive: Receive, send: Send) -> None:
         while True:

@@ -10,10 +10,10 @@ from pmtiles.reader import MemorySource, Reader, all_tiles
 from pmtiles.tile import Compression, TileType, zxy_to_tileid
 
 from map3d.errors import AlreadyExists, BadRequest, Corrupt, NotFound, Stopped
-from map3d.publish import folder as folder_module
 from map3d.publish import publish
+from map3d.publish import publish_folder as folder_module
 from map3d.registry import Registry
-from map3d.tiles import viewer
+from map3d.tiles import viewer_files
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
@@ -193,8 +193,8 @@ def test_a_stopped_publishing_goes_on_where_it_stopped(workspace, out):
 def test_a_killed_publishing_leaves_nothing_under_its_name(workspace, out, tmp_path, built_viewer):
     script = (
         "import os, sys; from pathlib import Path\n"
-        "from map3d.catalogue import Workspace; from map3d.publish import publish; from map3d.tiles import viewer\n"
-        "viewer.files = lambda _: Path(sys.argv[3])\n"
+        "from map3d.catalogue import Workspace; from map3d.publish import publish; from map3d.tiles import viewer_files\n"
+        "viewer_files.files = lambda _: Path(sys.argv[3])\n"
         "die = lambda stage, done, total: os.kill(os.getpid(), 9) if done > 40 else True\n"
         "publish(Workspace(Path(sys.argv[1])), 'tea', Path(sys.argv[2]), progress=die)\n"
     )
@@ -265,8 +265,8 @@ def test_what_is_not_there_cannot_be_published(workspace, out):
 
 
 def test_without_the_viewer_nothing_is_begun(workspace, out, tmp_path, monkeypatch):
-    monkeypatch.setattr(viewer, "files", lambda _: tmp_path / "nowhere")
-    with pytest.raises(viewer.ViewerMissing, match="make build"):
+    monkeypatch.setattr(viewer_files, "files", lambda _: tmp_path / "nowhere")
+    with pytest.raises(viewer_files.ViewerMissing, match="make build"):
         publish(workspace, "tea", out)
     assert not list(out.parent.glob(".public*"))
 

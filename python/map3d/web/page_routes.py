@@ -7,11 +7,11 @@ from flask import Blueprint, Response, render_template, send_from_directory
 from map3d.catalogue import RenderingRecord
 from map3d.errors import Map3dError
 from map3d.tiles.manifest import Manifest
-from map3d.tiles.viewer import PAGE, viewer_folder
+from map3d.tiles.viewer_files import PAGE, viewer_folder
 from map3d.types import check_name
-from map3d.web.documents import catalogue, workspace
-from map3d.web.errors import status_of
-from map3d.web.packing import pack
+from map3d.web.compression import pack
+from map3d.web.document_routes import catalogue, workspace
+from map3d.web.http_errors import status_of
 
 pages = Blueprint("pages", __name__)
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from map3d.errors import BadRequest
-from map3d.ingest.terrain_mesh import all_triangles, facing_up, few_triangles, used_vertices
+from map3d.ingest.terrain.triangulation import all_triangles, facing_up, few_triangles, used_vertices
 
 SIDES = [1, 2, 4, 16, 64]
 

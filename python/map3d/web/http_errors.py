@@ -4,7 +4,7 @@ import logging
 from typing import Final
 
 from map3d.errors import AlreadyExists, BadName, BadRequest, LimitExceeded, Map3dError, NotFound, StoreError
-from map3d.tiles.viewer import ViewerMissing
+from map3d.tiles.viewer_files import ViewerMissing
 
 log: Final = logging.getLogger("map3d.web")
 

@@ -7,10 +7,10 @@ from werkzeug import Response
 from werkzeug.exceptions import HTTPException
 
 from map3d.catalogue.workspace import Workspace
-from map3d.web.documents import documents
-from map3d.web.errors import status_of
-from map3d.web.pages import pages
-from map3d.web.tiles import PREFIXES
+from map3d.web.document_routes import documents
+from map3d.web.http_errors import status_of
+from map3d.web.page_routes import pages
+from map3d.web.tile_route import PREFIXES
 
 CONTENT_SECURITY_POLICY = (
     "default-src 'self'; img-src 'self' data: blob:; worker-src 'self' blob:; connect-src 'self' blob: data:; "

@@ -12,9 +12,9 @@ from map3d.catalogue.workspace import Workspace
 from map3d.tiles.naming import block_of, parse_tile
 from map3d.tiles.store import StoredBlock, content_hash
 from map3d.types import TileId
-from map3d.web.errors import status_of
-from map3d.web.lru import ByteLru
-from map3d.web.stores import OpenStore, Stores
+from map3d.web.byte_lru import ByteLru
+from map3d.web.http_errors import status_of
+from map3d.web.open_stores import OpenStore, Stores
 
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]

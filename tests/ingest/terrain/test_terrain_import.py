@@ -14,9 +14,8 @@ from rasterio.enums import ColorInterp
 from rasterio.shutil import copy
 
 from map3d.errors import BadRequest, CrsError, ImportFailed, LimitExceeded, NotFound, Stopped
-from map3d.ingest import terrain
-from map3d.ingest.terrain import TerrainOptions, import_terrain
-from tests.terrain.rasters import NORTH, WEST, KeepingWriter, colours, from_bounds, hills, pixel_of, write
+from map3d.ingest.terrain.terrain_import import TerrainOptions, import_terrain, terrain_import
+from tests.ingest.terrain.rasters import NORTH, WEST, KeepingWriter, colours, from_bounds, hills, pixel_of, write
 
 UTM = CRS.from_epsg(25832)
 NAN_LAYER = float(np.float32(-3.4e38))
@@ -395,9 +394,9 @@ def test_too_many_triangles_are_refused_with_what_to_do(tmp_path, folder, monkey
     dem = write(tmp_path / "dem.tif", hills(20, 20))
     triangles = 2 * 21 * 21
     for limit in (triangles, triangles + 1):
-        monkeypatch.setattr(terrain, "MAX_TRIANGLES", limit)
+        monkeypatch.setattr(terrain_import, "MAX_TRIANGLES", limit)
         run(dem, None, folder)
-    monkeypatch.setattr(terrain, "MAX_TRIANGLES", triangles - 1)
+    monkeypatch.setattr(terrain_import, "MAX_TRIANGLES", triangles - 1)
     with pytest.raises(LimitExceeded, match="--max-error"):
         run(dem, None, folder)
 

@@ -15,10 +15,9 @@ from flask import Blueprint, Response, current_app, request
 from map3d.catalogue import Catalogue, Workspace
 from map3d.errors import NotFound
 from map3d.registry import Registry
-from map3d.tiles.documents import dump_document
-from map3d.tiles.manifest import FILE_NAME
+from map3d.tiles.manifest import FILE_NAME, dump_document
 from map3d.types import check_name
-from map3d.web.packing import pack
+from map3d.web.compression import pack
 
 documents = Blueprint("documents", __name__)
 _opening: Final = Lock()

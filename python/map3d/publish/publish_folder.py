@@ -15,14 +15,13 @@ from typing import Any, Final
 from map3d.catalogue import Workspace
 from map3d.errors import AlreadyExists, BadRequest, Corrupt, NotFound, Stopped, StoreError
 from map3d.geometry.views import track_id
-from map3d.publish.archive import Archive, write_archive
+from map3d.publish.pmtiles_archive import Archive, write_archive
 from map3d.publish.readme import README, readme
 from map3d.registry import Registry
-from map3d.tiles.documents import dump_document
-from map3d.tiles.manifest import ATTRIBUTES, COLUMNS, FILE_NAME, SEARCH, SHARDS, Manifest, ViewFacts
+from map3d.tiles.manifest import ATTRIBUTES, COLUMNS, FILE_NAME, SEARCH, SHARDS, Manifest, ViewFacts, dump_document
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.store import TileStore
-from map3d.tiles.viewer import viewer_files, viewer_folder
+from map3d.tiles.viewer_files import viewer_files, viewer_folder
 from map3d.types import Layer
 
 Progress = Callable[[str, int, int], bool]

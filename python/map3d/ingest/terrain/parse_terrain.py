@@ -10,9 +10,9 @@ from pyproj import CRS
 
 from map3d.errors import ImportFailed
 from map3d.ingest.crs import LOCAL, is_local, parse_crs, scene_crs
-from map3d.ingest.projection import choose_target
-from map3d.ingest.terrain import TerrainOptions, import_terrain
-from map3d.ingest.terrain_place import open_raster
+from map3d.ingest.crs_transformer import choose_target
+from map3d.ingest.terrain.raster_georeference import open_raster
+from map3d.ingest.terrain.terrain_import import TerrainOptions, import_terrain
 from map3d.subprocess import Tell, Work
 
 IMAGE_BANDS: Final = (3, 4)
@@ -26,7 +26,7 @@ def open_terrain(_setup: Mapping[str, Any]) -> Work:
 
 
 def _import(question: Mapping[str, Any], tell: Tell) -> dict[str, Any]:
-    """`question`: {"paths", "folder", "name", "crs", "scene_crs"}; see map3d.ingest.work for the answer."""
+    """`question`: {"paths", "folder", "name", "crs", "scene_crs"}; see map3d.ingest.parse_document for the answer."""
     rasters, damaged = usable([Path(path) for path in question["paths"]], strict=question["reader"]["strict"])
     dem, ortho = tell_apart(rasters)
     target = _target(dem or ortho, question["scene_crs"])

@@ -7,7 +7,7 @@ from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.store import content_hash
 from map3d.types import BlockId, TileId
-from map3d.web import stores, tiles
+from map3d.web import open_stores, tile_route
 from tests.web.workspaces import ADDED, LAYERS, OCCUPIED, ZMAX, add_pass, every_tile, put_block, rendering_record, store_shape, tile_bytes
 
 TILE = TileId(ZMAX, 7, 7)
@@ -154,7 +154,7 @@ def test_a_layer_that_is_not_there_is_told_from_all_that_are(client, workspace):
 
 
 def test_a_rendering_made_anew_under_its_name_is_noticed(client, workspace, monkeypatch):
-    monkeypatch.setattr(stores, "RECHECK_S", 0.0)
+    monkeypatch.setattr(open_stores, "RECHECK_S", 0.0)
     assert client.get(f"{URL}?v=1").status_code == 200
     path = workspace.store_path("tea", "0-45")
     fresh = path.with_name("fresh.sqlite")
@@ -165,7 +165,7 @@ def test_a_rendering_made_anew_under_its_name_is_noticed(client, workspace, monk
 
 
 def test_a_removed_rendering_is_gone(client, workspace, monkeypatch):
-    monkeypatch.setattr(stores, "RECHECK_S", 0.0)
+    monkeypatch.setattr(open_stores, "RECHECK_S", 0.0)
     assert client.get(f"{URL}?v=1").status_code == 200
     shutil.rmtree(workspace.rendering_folder("tea"))
     assert client.get(f"{URL}?v=1").status_code == 404
@@ -173,7 +173,7 @@ def test_a_removed_rendering_is_gone(client, workspace, monkeypatch):
 
 def test_an_error_is_told_without_paths_and_not_kept(client, workspace, monkeypatch):
     def fail(*_):
-        raise tiles.status_of.__globals__["StoreError"](f"{workspace.root}: disk I/O error")
+        raise tile_route.status_of.__globals__["StoreError"](f"{workspace.root}: disk I/O error")
 
     with monkeypatch.context() as broken:
         broken.setattr(SqliteTileStore, "get_tile", fail)

@@ -18,10 +18,10 @@ from pyproj import CRS
 
 from map3d.errors import BadRequest, LimitExceeded, Stopped
 from map3d.ingest.crs import vertical_unit_m
-from map3d.ingest.terrain_grid import FlatSurface, Grid, GridTile, RasterSurface, Surface, centre_positions, even_positions
-from map3d.ingest.terrain_mesh import Triangles, all_triangles, facing_up, few_triangles, used_vertices
-from map3d.ingest.terrain_place import Place, WayTo, crs_of, open_raster
-from map3d.ingest.terrain_texture import ALIGN_PX, MARGIN_PX, Orthophoto, TextureTile
+from map3d.ingest.terrain.orthophoto import ALIGN_PX, MARGIN_PX, Orthophoto, TextureTile
+from map3d.ingest.terrain.raster_georeference import Place, WayTo, crs_of, open_raster
+from map3d.ingest.terrain.triangulation import Triangles, all_triangles, facing_up, few_triangles, used_vertices
+from map3d.ingest.terrain.vertex_grid import FlatSurface, Grid, GridTile, RasterSurface, Surface, centre_positions, even_positions
 
 Progress = Callable[[str, int, int], bool]
 """(stage, done, total) → False to stop."""

@@ -1,0 +1,1 @@
+"""Import of elevation models and orthophotos as textured ground."""
