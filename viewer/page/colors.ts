@@ -3,7 +3,7 @@ import type { theme } from "./map3d-theme.mjs";
 import type { Address } from "./address";
 import { byId } from "./dom";
 import { toast } from "./messages";
-import { say } from "./words";
+import { say } from "./i18n";
 
 /** Text of more values tells nothing as colours. */
 const MOST_VALUES = 60;

@@ -1,6 +1,6 @@
 import type { Attribute, ClickEvent } from "./map3d.mjs";
 import { withText } from "./dom";
-import { say } from "./words";
+import { say } from "./i18n";
 
 /** What is known of the chosen object. All of it is text. */
 export class InfoPanel {

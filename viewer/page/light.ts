@@ -1,4 +1,4 @@
-import { zoneOf, type imageLayer, type Light, type map, type Rendering } from "./map3d.mjs";
+import { chooseUtcOffset, type imageLayer, type Light, type map, type Rendering } from "./map3d.mjs";
 import { byId, inputById } from "./dom";
 
 /** Where nothing is known of the place: a summer day's sun from east over south to west, highest at 13 o'clock. */
@@ -24,7 +24,7 @@ export function bindLight(view: map, layer: imageLayer, first?: Date): void {
 
 function bindDay(view: map, rendering: Rendering, asked: Date | undefined): void {
   const [time, day] = [inputById("time"), inputById("day")];
-  const zone = (): number => zoneOf(rendering.json.geographic?.lon_lat[0] ?? 0, -new Date(`${day.value}T12:00`).getTimezoneOffset() / 60);
+  const zone = (): number => chooseUtcOffset(rendering.json.geographic?.lon_lat[0] ?? 0, -new Date(`${day.value}T12:00`).getTimezoneOffset() / 60);
   const moment = (hour: number): Date => new Date(Date.parse(`${day.value}T00:00Z`) + (hour - zone()) * 3_600_000);
   const show = (): void => {
     if (day.value === "") return;

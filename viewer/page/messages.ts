@@ -1,5 +1,5 @@
 import { byId, withText } from "./dom";
-import { say } from "./words";
+import { say } from "./i18n";
 
 const SHOWN = 3;
 const LASTS_MS = 12_000;

@@ -1,6 +1,6 @@
 import type { imageLayer, Mode } from "./map3d.mjs";
 import { byId } from "./dom";
-import { say } from "./words";
+import { say } from "./i18n";
 
 type Shown = Exclude<Mode, "picture">;
 const MODES: readonly Shown[] = ["lit", "color", "normal", "id", "depth"];

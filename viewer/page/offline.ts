@@ -2,7 +2,7 @@ import type { map } from "./map3d.mjs";
 import type { AreaProgress, DownloadOptions, StoredArea } from "./map3d-offline.mjs";
 import { byId, withText } from "./dom";
 import { toast } from "./messages";
-import { language, say } from "./words";
+import { language, say } from "./i18n";
 
 type Offline = typeof import("./map3d-offline.mjs");
 

@@ -15,7 +15,7 @@ import { Selection } from "./selection";
 import { bindShare } from "./share";
 import { fail, toast } from "./messages";
 import { byId } from "./dom";
-import { say, translate } from "./words";
+import { say, translate } from "./i18n";
 
 /** Base URLs of the rendering: `?rendering=` (again for further hosts), `data-base` on <html>, else this folder. */
 function bases(): string[] {

@@ -1,7 +1,7 @@
 import type { map, ManifestJson } from "./map3d.mjs";
 import type { PictureLegend, PictureOptions } from "./map3d-print.mjs";
 import { byId, withText } from "./dom";
-import { language, say } from "./words";
+import { language, say } from "./i18n";
 
 type Side = readonly [long: number, short: number];
 

@@ -1,7 +1,7 @@
 import { marker, type imageLayer, type map, type SearchEntry, type Vec3 } from "./map3d.mjs";
 import { byId, inputById, withText } from "./dom";
 import { toast } from "./messages";
-import { say } from "./words";
+import { say } from "./i18n";
 
 const SHOWN = 8;
 const ZOOM_BELOW_DEEPEST = 1;

@@ -1,7 +1,7 @@
 import type { imageLayer, map } from "./map3d.mjs";
 import { byId, withText } from "./dom";
 import { toast } from "./messages";
-import { say } from "./words";
+import { say } from "./i18n";
 
 const SHOWN = 30;
 

@@ -1,7 +1,7 @@
 import type { Address } from "./address";
 import { byId } from "./dom";
 import { toast } from "./messages";
-import { say } from "./words";
+import { say } from "./i18n";
 
 /** A button that passes on the address of what is seen: by the device's own means, else through the clipboard. */
 export function bindShare(address: Address): void {

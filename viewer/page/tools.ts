@@ -2,7 +2,7 @@ import type { map } from "./map3d.mjs";
 import type { measure } from "./map3d-measure.mjs";
 import { byId } from "./dom";
 import { toast } from "./messages";
-import { say } from "./words";
+import { say } from "./i18n";
 
 const HINTS = { line: "lineHint", area: "areaHint", profile: "profileHint" } as const;
 type Kind = keyof typeof HINTS;

@@ -1,8 +1,8 @@
 import { adoptStyles, element } from "../core/dom";
-import { inLanguage } from "../core/words";
+import { selectTranslation } from "../core/i18n";
 import { sub, type Vec2, type Vec3 } from "../core/vec";
 import { uvdFromLocal } from "../geo/axes";
-import { Attached, marker, UsageError, type map, type Relief } from "../map3d";
+import { MapLayer, marker, UsageError, type map, type Relief } from "../map3d";
 import { groupsOf, spread, type Group } from "./groups";
 import { STYLES } from "./styles";
 
@@ -43,7 +43,7 @@ interface Shown {
  * Markers that lie close together on the screen join into one with their number; a click on it comes nearer, or, where that does not part them, spreads them. Groups are those of a
  * whole zoom level, so that they stay while the picture moves; only what is in view has elements in the page.
  */
-export class cluster extends Attached<map, ClusterEvents> {
+export class cluster extends MapLayer<map, ClusterEvents> {
   readonly options: Required<Omit<ClusterOptions, "color" | "label">> & Pick<ClusterOptions, "color" | "label">;
   #markers: readonly marker[];
   #groups = new Map<number, Group[]>();
@@ -71,21 +71,21 @@ export class cluster extends Attached<map, ClusterEvents> {
     this.#clear();
     this.#markers = [...markers];
     this.#view = "";
-    this.map?.stage?.request();
+    this.map?.layerContext?.requestFrame();
     return this;
   }
 
-  protected enter(map: map): void {
+  protected onAdd(map: map): void {
     adoptStyles(document, STYLES);
-    map.moves.on("draw", this.#place);
+    map.frameEvents.on("draw", this.#place);
     map.on("preclick", this.#join);
     map.container.addEventListener("keydown", this.#pressed);
     this.#place();
   }
 
-  protected leave(map: map): void {
+  protected onRemove(map: map): void {
     this.#clear();
-    map.moves.off("draw", this.#place);
+    map.frameEvents.off("draw", this.#place);
     map.off("preclick", this.#join);
     map.container.removeEventListener("keydown", this.#pressed);
   }
@@ -144,7 +144,7 @@ export class cluster extends Attached<map, ClusterEvents> {
     const { label, color } = this.options;
     const count = markers.length.toLocaleString(map.language);
     const position = [0, 1, 2].map((k) => markers.reduce((sum, one) => sum + (one.position[k] as number), 0) / markers.length) as unknown as Vec3;
-    const item = new marker(label?.(markers) ?? inLanguage(WORDS, map.language)(count), position, { showLabel: false, icon: element("span", "map3d-cluster", {}, count), ...(color !== undefined && { color }) });
+    const item = new marker(label?.(markers) ?? selectTranslation(WORDS, map.language)(count), position, { showLabel: false, icon: element("span", "map3d-cluster", {}, count), ...(color !== undefined && { color }) });
     return item.on("click", () => {
       item.select(false);
       this.fire("click", { markers, position });
@@ -179,7 +179,7 @@ export class cluster extends Attached<map, ClusterEvents> {
       return [x + dx - at[0], y + dy - at[1]];
     });
     this.#spread = { key, markers, shifts, legs, zoom: map.zoom };
-    markers.forEach((one, k) => map.add(one.setShift(shifts[k] ?? [0, 0])));
+    markers.forEach((one, k) => map.add(one.setOffset(shifts[k] ?? [0, 0])));
     this.#drawLegs();
     this.fire("spread", { markers });
   }
@@ -198,7 +198,7 @@ export class cluster extends Attached<map, ClusterEvents> {
     if (!open) return;
     this.#spread = undefined;
     open.legs.remove();
-    for (const one of open.markers) this.map?.discard(one.setShift([0, 0]));
+    for (const one of open.markers) this.map?.discard(one.setOffset([0, 0]));
     this.fire("join", {});
   };
 

@@ -1,8 +1,8 @@
 import { adoptStyles, element } from "../core/dom";
 import { UsageError } from "../core/errors";
-import { Attached, type imageLayer, type map } from "../map3d";
+import { MapLayer, type imageLayer, type map } from "../map3d";
 import { STYLES } from "./styles";
-import { wordsOf } from "./words";
+import { getCompareMessages } from "./i18n";
 
 /** A state of the city. */
 export interface Epoch {
@@ -28,7 +28,7 @@ export interface EpochsEvents {
 }
 
 /** A slider over layers of which one is shown; the one before stays until the next is complete, then it fades. Adds the layers to the map. */
-export class epochs extends Attached<map, EpochsEvents> {
+export class epochs extends MapLayer<map, EpochsEvents> {
   readonly #list: readonly Epoch[];
   readonly #fade_ms: number;
   readonly #container: HTMLElement | undefined;
@@ -71,15 +71,15 @@ export class epochs extends Attached<map, EpochsEvents> {
     return this.fire("change", { epoch, index });
   }
 
-  protected enter(map: map): void {
+  protected onAdd(map: map): void {
     adoptStyles(document, STYLES);
-    this.#slider.setAttribute("aria-label", wordsOf(map.language).time);
+    this.#slider.setAttribute("aria-label", getCompareMessages(map.language).time);
     this.#label();
     this.#list.forEach(({ layer }, k) => layer.setOpacity(k === this.#shown ? 1 : 0).addTo(map));
     (this.#container ?? map.overlayPane).append(this.#box);
   }
 
-  protected leave(map: map): void {
+  protected onRemove(map: map): void {
     this.#leaving?.();
     this.#box.remove();
     for (const { layer } of this.#list) map.discard(layer.setOpacity(1));

@@ -1,9 +1,9 @@
 import { adoptStyles, element, icon } from "../core/dom";
 import { UsageError } from "../core/errors";
 import { clamp } from "../core/vec";
-import { Attached, type imageLayer, type map } from "../map3d";
+import { MapLayer, type imageLayer, type map } from "../map3d";
 import { STYLES } from "./styles";
-import { wordsOf } from "./words";
+import { getCompareMessages } from "./i18n";
 
 export interface SwipeOptions {
   /** Where the border stands, 0 (left edge) to 1. Default 0.5. */
@@ -26,7 +26,7 @@ const STEP = 0.02;
 const list = (layers: Layers): readonly imageLayer[] => (Array.isArray(layers) ? (layers as readonly imageLayer[]) : [layers as imageLayer]);
 
 /** Some layers left of a border, others right of it; the border can be moved by pointer and by arrow keys. Other layers of the map stay whole. */
-export class swipe extends Attached<map, SwipeEvents> {
+export class swipe extends MapLayer<map, SwipeEvents> {
   readonly #sides: readonly [readonly imageLayer[], readonly imageLayer[]];
   readonly #border: HTMLElement;
   #at: number;
@@ -57,14 +57,14 @@ export class swipe extends Attached<map, SwipeEvents> {
     return this.fire("change", { at: next });
   }
 
-  protected enter(map: map): void {
+  protected onAdd(map: map): void {
     adoptStyles(document, STYLES);
-    this.#border.setAttribute("aria-label", wordsOf(map.language).border);
+    this.#border.setAttribute("aria-label", getCompareMessages(map.language).border);
     map.overlayPane.append(this.#border);
     this.#apply();
   }
 
-  protected leave(): void {
+  protected onRemove(): void {
     this.#border.remove();
     for (const layer of this.#sides.flat()) layer.setClip(null);
   }

@@ -26,8 +26,8 @@ export class Circle {
     };
     this.remove();
     map.overlayPane.prepend(this.#svg);
-    map.moves.on("move", place);
-    this.#leave = () => { map.moves.off("move", place); };
+    map.frameEvents.on("move", place);
+    this.#leave = () => { map.frameEvents.off("move", place); };
     place();
   }
 

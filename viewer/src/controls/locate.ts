@@ -1,11 +1,11 @@
-import { besideButton } from "../core/column";
+import { addPanelButton } from "../core/panelButton";
 import { adoptStyles, element, iconButton } from "../core/dom";
 import type { Vec2, Vec3 } from "../core/vec";
-import { Attached, Map3dError, marker, type map } from "../map3d";
+import { MapLayer, Map3dError, marker, type map } from "../map3d";
 import { Circle } from "./circle";
 import { STYLES } from "./styles";
 import { surfaceAt } from "./surface";
-import { controlWords, type ControlWords } from "./words";
+import { getControlMessages, type ControlMessages } from "./i18n";
 
 export interface LocateOptions {
   /** BCP 47. Default the map's. */
@@ -32,13 +32,13 @@ const WAIT_MS = 15_000;
 const SAME_DEG = 1e-5;
 
 /** A button that shows where the reader is: a marker with a circle of the accuracy. Pressed again, they go. */
-export class locate extends Attached<map, LocateEvents> {
+export class locate extends MapLayer<map, LocateEvents> {
   readonly options: LocateOptions;
-  readonly #said = element("p", "map3d-said", { role: "status" });
+  readonly #said = element("p", "map3d-status", { role: "status" });
   readonly #circle = new Circle();
   #button = element("button", "");
   #box: HTMLElement | undefined;
-  #words: ControlWords | undefined;
+  #words: ControlMessages | undefined;
   #pin: marker | undefined;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #asked = 0;
@@ -48,16 +48,16 @@ export class locate extends Attached<map, LocateEvents> {
     this.options = options;
   }
 
-  protected enter(map: map): void {
-    const words = (this.#words = controlWords(this.options.language ?? map.language));
+  protected onAdd(map: map): void {
+    const words = (this.#words = getControlMessages(this.options.language ?? map.language));
     adoptStyles(document, STYLES);
     this.#button = iconButton("", words.locate, TARGET);
     this.#button.setAttribute("aria-pressed", "false");
     this.#button.addEventListener("click", () => { this.toggle(); });
-    this.#box = besideButton(map, this.#button, this.#said);
+    this.#box = addPanelButton(map, this.#button, this.#said);
   }
 
-  protected leave(): void {
+  protected onRemove(): void {
     this.clear();
     this.#box?.remove();
   }
@@ -89,7 +89,7 @@ export class locate extends Attached<map, LocateEvents> {
   }
 
   async #find(): Promise<Located> {
-    const [map, words] = [this.map as map, this.#words as ControlWords];
+    const [map, words] = [this.map as map, this.#words as ControlMessages];
     if (!map.fromLonLat([0, 0])) throw new Map3dError(words.placeless);
     if (!isSecureContext) throw new Map3dError(words.insecure);
     const { latitude, longitude, accuracy } = (await positionOf(words)).coords;
@@ -100,7 +100,7 @@ export class locate extends Attached<map, LocateEvents> {
   }
 
   #show(place: Located): void {
-    const [map, words] = [this.map as map, this.#words as ControlWords];
+    const [map, words] = [this.map as map, this.#words as ControlMessages];
     const { position, accuracy_m } = place;
     this.#button.ariaPressed = "true";
     const metres = Math.round(accuracy_m).toLocaleString(this.options.language ?? map.language);
@@ -125,7 +125,7 @@ export class locate extends Attached<map, LocateEvents> {
 }
 
 /** @throws Map3dError in the reader's words */
-function positionOf(words: ControlWords): Promise<GeolocationPosition> {
+function positionOf(words: ControlMessages): Promise<GeolocationPosition> {
   return new Promise((resolve, reject) => {
     navigator.geolocation.getCurrentPosition(resolve, ({ code, PERMISSION_DENIED }) => {
       reject(new Map3dError(code === PERMISSION_DENIED ? words.denied : words.unavailable));

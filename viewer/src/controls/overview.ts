@@ -1,9 +1,9 @@
-import { besideButton } from "../core/column";
+import { addPanelButton } from "../core/panelButton";
 import { adoptStyles, element, iconButton } from "../core/dom";
 import { add, dot, sub, type Box3, type Vec2 } from "../core/vec";
-import { Attached, map } from "../map3d";
+import { MapLayer, map } from "../map3d";
 import { STYLES } from "./styles";
-import { controlWords } from "./words";
+import { getControlMessages } from "./i18n";
 
 /** Of an `overview`. */
 export interface OverviewOptions {
@@ -21,7 +21,7 @@ const SHEET = "M3 6l6-2 6 2 6-2v14l-6 2-6-2-6 2zM9 4v14M15 6v14";
 const KEYS: Record<string, Vec2> = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 /** A small map of the whole with a frame around what is seen, which can be dragged; a click goes there. */
-export class overview extends Attached<map, object> {
+export class overview extends MapLayer<map, object> {
   readonly options: OverviewOptions;
   readonly #pane = element("div", "map3d-overview-map");
   readonly #hand = element("div", "map3d-overview-hand", { tabindex: "0", role: "group" });
@@ -36,16 +36,16 @@ export class overview extends Attached<map, object> {
     this.options = options;
   }
 
-  protected enter(map: map): void {
+  protected onAdd(map: map): void {
     this.#ending = new AbortController();
-    const words = controlWords(this.options.language ?? map.language);
+    const words = getControlMessages(this.options.language ?? map.language);
     adoptStyles(document, STYLES);
     this.#hand.setAttribute("aria-label", words.move);
     this.#hand.replaceChildren(this.#frame);
     this.#button = iconButton("", words.overview, SHEET);
     this.#button.addEventListener("click", () => { this.toggle(); });
-    this.#box = besideButton(map, this.#button, this.#pane);
-    map.moves.on("move", this.#follow);
+    this.#box = addPanelButton(map, this.#button, this.#pane);
+    map.frameEvents.on("move", this.#follow);
     map.on("directionchange", this.#turn);
     map.on("lightchange", this.#relight);
     map.on("ready", this.#open);
@@ -53,10 +53,10 @@ export class overview extends Attached<map, object> {
     this.toggle(!(this.options.collapsed ?? map.container.clientWidth < NARROW_PX));
   }
 
-  protected leave(map: map): void {
+  protected onRemove(map: map): void {
     this.#ending.abort();
     this.toggle(false);
-    map.moves.off("move", this.#follow);
+    map.frameEvents.off("move", this.#follow);
     map.off("directionchange", this.#turn);
     map.off("lightchange", this.#relight);
     map.off("ready", this.#open);
@@ -79,7 +79,7 @@ export class overview extends Attached<map, object> {
 
   readonly #open = (): void => {
     const shown = this.map;
-    if (!shown?.sight() || this.#small || !this.open) return;
+    if (!shown?.getViewState() || this.#small || !this.open) return;
     const place = this.#pane.appendChild(element("div", ""));
     const small = new map(place, { controls: false, attribution: false, direction: shown.direction, light: shown.light, cacheBytes: 16e6, workers: 1, maxPixelRatio: 2, ...(shown.drawer && { drawer: shown.drawer }) });
     [place.inert, place.tabIndex] = [true, -1];
@@ -87,7 +87,7 @@ export class overview extends Attached<map, object> {
     this.#small = small;
     small.on("error", () => undefined); // the large map says what is wrong
     small.on("ready", () => { this.#turn(); });
-    small.moves.on("move", this.#follow);
+    small.frameEvents.on("move", this.#follow);
     for (const layer of shown.layers) layer.copy().setStyle({}).clearHighlight().addTo(small);
   };
 
@@ -100,7 +100,7 @@ export class overview extends Attached<map, object> {
   /** The whole, from where the map looks. */
   readonly #turn = (): void => {
     const rendering = this.map?.layers.find((layer) => layer.rendering)?.rendering;
-    if (!this.map || !rendering || !this.#small?.sight()) return;
+    if (!this.map || !rendering || !this.#small?.getViewState()) return;
     const { origin, box: [low, high] } = rendering.json;
     const whole: Box3 = [add(origin, low), add(origin, high)];
     this.#small.setDirection(this.map.direction).fitBounds(whole, { padding_px: 6 });
@@ -113,7 +113,7 @@ export class overview extends Attached<map, object> {
 
   /** Puts the frame around what the map shows. */
   readonly #follow = (): void => {
-    const [shown, small] = [this.map?.sight(), this.#small?.sight()];
+    const [shown, small] = [this.map?.getViewState(), this.#small?.getViewState()];
     if (!shown || !small) return;
     const { right, up } = shown.camera.frame.axes;
     const shift = sub(shown.origin, small.origin);
@@ -131,7 +131,7 @@ export class overview extends Attached<map, object> {
     this.#hand.addEventListener("pointerdown", ({ button, pointerId, target, clientX, clientY }) => {
       if (button !== 0) return;
       this.#hand.setPointerCapture(pointerId);
-      this.map?.grab();
+      this.map?.startGesture();
       hand = { at: [clientX, clientY], moved: target !== this.#frame };
       if (hand.moved) this.#goTo(hand.at);
     }, { signal });

@@ -1,7 +1,7 @@
 /** What a listener gets: the event's own fields, its name and who fired it. */
-export type Fired<T> = T & { type: string; target: unknown };
+export type FiredEvent<T> = T & { type: string; target: unknown };
 /** Called with each event. */
-export type Listener<T> = (event: Fired<T>) => void;
+export type Listener<T> = (event: FiredEvent<T>) => void;
 
 /** An event source. `E` maps event names to the fields of the event. Methods return `this`. */
 export class Evented<E extends object> {
@@ -14,7 +14,7 @@ export class Evented<E extends object> {
 
   /** Calls a listener at the next event of a type. */
   once<K extends keyof E>(type: K, listener: Listener<E[K]>): this {
-    return this.#add(type, listener, (event: Fired<E[K]>) => {
+    return this.#add(type, listener, (event: FiredEvent<E[K]>) => {
       this.off(type, listener);
       listener(event);
     });

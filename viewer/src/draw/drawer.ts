@@ -6,8 +6,8 @@ import type { Light } from "../geo/light";
 import type { Shadow } from "../geo/shadows";
 import type { TileData } from "../tiles/tileData";
 import type { Clip, Depths } from "./combine";
-import type { Finishes } from "./finish";
-import type { Shade } from "./shade";
+import type { DrawStyles } from "./drawStyle";
+import type { LightEstimator } from "./lightEstimator";
 
 /** How a layer is shown: lit colour, colour or picture as stored, or a data layer in false colours. */
 export type Mode = "lit" | "color" | "picture" | "normal" | "id" | "depth";
@@ -47,9 +47,9 @@ export interface Pass {
   /** Colours by object id. */
   readonly highlight: ReadonlyMap<number, Rgb>;
   /** How objects are shown; null: all as they are. */
-  readonly finishes: Finishes | null;
+  readonly finishes: DrawStyles | null;
   /** Light that was rendered; drawn where its tiles are here. */
-  readonly baked: Baked;
+  readonly baked: BakedLight;
   /** True when colour has no alpha, so that the id layer says what is covered. */
   readonly masked: boolean;
   readonly opacity: number;
@@ -64,13 +64,13 @@ export interface Pass {
 }
 
 /** Rendered light that suits the present one. */
-export interface Baked {
+export interface BakedLight {
   readonly shadow: Shadow | null;
   readonly occlusion: boolean;
 }
 
 /** What a frame is painted of, and on. */
-export interface Setting {
+export interface FrameState {
   readonly camera: Camera;
   /** Device pixels. */
   readonly width: number;
@@ -81,20 +81,20 @@ export interface Setting {
 }
 
 /** Something that is not made of images, but seen among them by its depth. WebGL only. */
-export interface Guest {
+export interface CustomLayer {
   /** Least and greatest D, along a frame, of what it shows; null: it shows nothing. */
-  rangeAlong(frame: Frame): Vec2 | null;
+  getDepthRange(frame: Frame): Vec2 | null;
   /** Makes its pictures, before the frame is painted. Leaves the context's state as a new context has it, but for what uploads are unpacked by. @param range of D, of all that is painted */
-  prepare(gl: WebGL2RenderingContext, setting: Setting, range: Vec2): void;
+  prerender(gl: WebGL2RenderingContext, setting: FrameState, range: Vec2): void;
   /** Paints what it has prepared into what is bound, premultiplied, with depth as a share of the range: pixels that it covers all; `soft`: the others. */
-  paint(gl: WebGL2RenderingContext, setting: Setting, soft: boolean): void;
+  render(gl: WebGL2RenderingContext, setting: FrameState, soft: boolean): void;
 }
 
-export interface FrameSpec extends Setting {
+export interface FrameSpec extends FrameState {
   readonly passes: readonly Pass[];
-  readonly guests: readonly Guest[];
+  readonly customLayers: readonly CustomLayer[];
   /** WebGL only: finds light that was not rendered; while the camera moves, what was found last does. */
-  readonly shade?: { readonly by: Shade; readonly moving: boolean } | null;
+  readonly shade?: { readonly by: LightEstimator; readonly moving: boolean } | null;
   /** WebGL only: where to draw in place of the canvas, with the depth of all passes as a share of a range of D. */
   readonly into?: { readonly framebuffer: WebGLFramebuffer; readonly range: Vec2 };
 }
@@ -112,7 +112,7 @@ export interface DrawerEvents {
 export interface Drawer {
   readonly name: "webgl" | "canvas";
   /** What the picture is seen in: a canvas, or an element that holds some. */
-  readonly shown: HTMLElement;
+  readonly element: HTMLElement;
   /** What was drawn last is not all: `changed` will be called. */
   readonly busy: boolean;
   /** null: it does not draw with WebGL. */
@@ -138,7 +138,7 @@ function shownKinds(mode: Mode, masked: boolean): LayerKind[] {
 }
 
 /** Layers that a mode shows when they are here. */
-export function bakedKinds(mode: Mode, { shadow, occlusion }: Baked): LayerKind[] {
+export function bakedKinds(mode: Mode, { shadow, occlusion }: BakedLight): LayerKind[] {
   if (mode !== "lit") return [];
   return [...(shadow ? [shadow.layer.kind as LayerKind] : []), ...(occlusion ? ["ao" as const] : [])];
 }

@@ -1,6 +1,6 @@
 import { element } from "../core/dom";
-import { languageOf } from "../core/words";
-import { elementWords } from "./words";
+import { findLanguage } from "../core/i18n";
+import { getElementMessages } from "./i18n";
 
 const STYLES = `
 :host { display: block; position: relative; height: 24rem; }
@@ -26,7 +26,7 @@ export class Frame {
 
   /** An element for a new map. */
   lay(language: string | undefined): HTMLElement {
-    const label = this.#host.getAttribute("label") ?? elementWords(language ?? languageOf(this.#host)).map;
+    const label = this.#host.getAttribute("label") ?? getElementMessages(language ?? findLanguage(this.#host)).map;
     this.#ground = element("div", "", { slot: "map", role: "group", "aria-label": label });
     this.#host.append(this.#ground);
     return this.#ground;
@@ -43,6 +43,6 @@ export class Frame {
     [this.#map.hidden, this.#rest.hidden] = [instead, !instead];
     const said = this.#ground?.querySelector(":scope > .map3d-message");
     if (drawn) said?.remove();
-    else if (!said) this.#ground?.append(element("p", "map3d-message", { role: "alert" }, elementWords(language).failed));
+    else if (!said) this.#ground?.append(element("p", "map3d-message", { role: "alert" }, getElementMessages(language).failed));
   }
 }

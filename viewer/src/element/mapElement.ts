@@ -1,4 +1,4 @@
-import { map, type Attachable, type imageLayer, type Light, type MapEvents, type MapOptions, type Vec3 } from "../map3d";
+import { map, type Addable, type imageLayer, type Light, type MapEvents, type MapOptions, type Vec3 } from "../map3d";
 import { isOn, light, number, PageElement, position, time, words } from "./attributes";
 import { Frame } from "./frame";
 import { followLayer, layerOf } from "./layerElement";
@@ -165,8 +165,8 @@ export class mapElement extends PageElement implements Place {
   }
 
   /** Those that are registered already; the others come by themselves. */
-  #parts(selector: string): part<Attachable<map>>[] {
-    return [...this.querySelectorAll<part<Attachable<map>>>(selector)].filter((element) => "enter" in element);
+  #parts(selector: string): part<Addable<map>>[] {
+    return [...this.querySelectorAll<part<Addable<map>>>(selector)].filter((element) => "enter" in element);
   }
 
   // Attributes

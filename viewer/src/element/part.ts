@@ -1,4 +1,4 @@
-import type { Attachable, imageLayer, map } from "../map3d";
+import type { Addable, imageLayer, map } from "../map3d";
 import { PageElement } from "./attributes";
 
 /** What a part sees of the `<map-3d>` around it. */
@@ -14,7 +14,7 @@ export interface Place {
 }
 
 /** An element inside `<map-3d>` that puts something on its map. */
-export abstract class part<T extends Attachable<map>> extends PageElement {
+export abstract class part<T extends Addable<map>> extends PageElement {
   #item: T | null = null;
   #place: Place | null = null;
   #waits = false;

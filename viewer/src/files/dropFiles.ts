@@ -1,12 +1,12 @@
-import { besideButton } from "../core/column";
+import { addPanelButton } from "../core/panelButton";
 import { adoptStyles, element, iconButton } from "../core/dom";
 import { asError } from "../core/errors";
 import { add } from "../core/vec";
-import { Attached, imageLayer, type ImageLayerOptions, type map } from "../map3d";
+import { MapLayer, imageLayer, type ImageLayerOptions, type map } from "../map3d";
 import { FilesError, filesSource, named } from "./filesSource";
 import { Dropped, MANIFEST, type Folder } from "./folder";
 import { STYLES } from "./styles";
-import { wordsOf } from "./words";
+import { getFilesMessages } from "./i18n";
 
 /** Of a `dropFiles`. */
 export interface DropOptions {
@@ -34,9 +34,9 @@ const FOLDER = "M3 7a2 2 0 0 1 2-2h4l2 2h8a2 2 0 0 1 2 2v8a2 2 0 0 1-2 2H5a2 2 0
 const SHOWN_MS = 12_000;
 
 /** Shows renderings from files: a published folder that is dropped on the map, or chosen. The next one takes the place of the one before. */
-export class dropFiles extends Attached<map, DropEvents> {
+export class dropFiles extends MapLayer<map, DropEvents> {
   readonly options: DropOptions;
-  readonly #said = element("p", "map3d-said", { role: "status" });
+  readonly #said = element("p", "map3d-status", { role: "status" });
   readonly #input = element("input", "", { type: "file", multiple: "", webkitdirectory: "", hidden: "", tabindex: "-1" });
   readonly #over = element("div", "map3d-drop", { "aria-hidden": "true" });
   #box: HTMLElement | undefined;
@@ -68,7 +68,7 @@ export class dropFiles extends Attached<map, DropEvents> {
     if (!map || at !== this.#asked) throw new DOMException("other files were opened meanwhile, or the map is gone", "AbortError");
     const [before, layer] = [this.#layer ?? this.options.instead, new imageLayer(source, this.options.layer)];
     before?.remove();
-    if (map.layers.length === 0) map.restart();
+    if (map.layers.length === 0) map.resetView();
     try {
       await shown(layer, map);
     } catch (reason) {
@@ -82,22 +82,22 @@ export class dropFiles extends Attached<map, DropEvents> {
     return layer;
   }
 
-  protected enter(map: map): void {
+  protected onAdd(map: map): void {
     adoptStyles(document, STYLES);
-    const words = wordsOf(this.options.language ?? map.language);
+    const words = getFilesMessages(this.options.language ?? map.language);
     this.#over.textContent = words.drop;
     this.#input.setAttribute("aria-label", words.open);
     map.container.append(this.#over, this.#input);
     if (this.options.button ?? true) {
       const button = iconButton("", words.open, FOLDER);
       button.addEventListener("click", () => { this.#input.click(); });
-      this.#box = besideButton(map, button, this.#said);
+      this.#box = addPanelButton(map, button, this.#said);
     }
     this.#ending = new AbortController();
     this.#listen(this.options.target ?? map.container, this.#ending.signal);
   }
 
-  protected leave(): void {
+  protected onRemove(): void {
     this.#asked++;
     this.#ending.abort();
     this.#say("");
@@ -141,7 +141,7 @@ export class dropFiles extends Attached<map, DropEvents> {
   }
 
   #failed(error: Error): void {
-    const words = wordsOf(this.options.language ?? this.map?.language ?? "en");
+    const words = getFilesMessages(this.options.language ?? this.map?.language ?? "en");
     this.#say(error instanceof FilesError ? words[error.problem](named(error.paths)) : `${words.failed}: ${error.message}`);
     this.#timer = setTimeout(() => { this.#say(""); }, SHOWN_MS);
     this.fire("error", { error });

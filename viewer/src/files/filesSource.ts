@@ -1,6 +1,6 @@
 import { Archive, FetchError, Map3dError, readManifest, type LayerInfo, type Rendering, type Source, type Tile, type View } from "../map3d";
 import { basesOf, folderOf, isInside, MANIFEST, pathOf, type Folder } from "./folder";
-import { wordsOf, type FilesProblem } from "./words";
+import { getFilesMessages, type FilesProblem } from "./i18n";
 
 /** Files that are no whole rendering. */
 export class FilesError extends Map3dError {
@@ -10,7 +10,7 @@ export class FilesError extends Map3dError {
   readonly paths: readonly string[];
 
   constructor(problem: FilesProblem, paths: readonly string[] = []) {
-    super(wordsOf("en")[problem](named(paths)));
+    super(getFilesMessages("en")[problem](named(paths)));
     [this.problem, this.paths] = [problem, paths];
   }
 }

@@ -20,7 +20,7 @@ export function cosSin(deg: number): Vec2 {
 }
 
 /** Axes of look-at angle (counter-clockwise from north) and pitch (below the horizon). spec/pyramid.md §1. */
-export function axesOf(lookAtDeg: number, pitchDeg: number): Axes {
+export function computeAxes(lookAtDeg: number, pitchDeg: number): Axes {
   const [ca, sa] = cosSin(lookAtDeg);
   const [cp, sp] = cosSin(pitchDeg);
   return { right: [ca, sa, 0], up: [-sp * sa, sp * ca, cp], forward: [-cp * sa, cp * ca, -sp] };

@@ -4,17 +4,17 @@ import { localAzimuth, type GeographicJson } from "./geographic";
 import type { Light } from "./light";
 
 /** How the light falls at a time on the middle of a scene, through the standard atmosphere. */
-export function daylightAt(time: Date, geographic: GeographicJson): Pick<Light, "azimuth_deg" | "altitude_deg" | "sun_rgb" | "sky_rgb"> {
+export function computeDaylight(time: Date, geographic: GeographicJson): Pick<Light, "azimuth_deg" | "altitude_deg" | "sun_rgb" | "sky_rgb"> {
   const [lon, lat] = geographic.lon_lat;
   const { azimuth, altitude } = getPosition(time, lat, lon);
-  return { azimuth_deg: localAzimuth(geographic, [lon, lat], azimuth), altitude_deg: altitude, ...skyAt(altitude) };
+  return { azimuth_deg: localAzimuth(geographic, [lon, lat], azimuth), altitude_deg: altitude, ...computeSkyColors(altitude) };
 }
 
 /**
  * Colours of sun and sky over the sun's altitude: white at noon, warm when it is low, blue after it has set. By night what is left of the light is
  * enough to know the town again, as in a photograph that was exposed for long.
  */
-export function skyAt(altitude_deg: number): { sun_rgb: Vec3; sky_rgb: Vec3 } {
+export function computeSkyColors(altitude_deg: number): { sun_rgb: Vec3; sky_rgb: Vec3 } {
   const at = (table: readonly Stop[]): Vec3 => {
     const next = table.findIndex(([altitude]) => altitude >= altitude_deg);
     const [high, low] = [table[next < 0 ? table.length - 1 : next] as Stop, table[Math.max((next < 0 ? table.length : next) - 1, 0)] as Stop];
@@ -33,7 +33,7 @@ const SUN: readonly Stop[] = [[-1, [0, 0, 0]], [0.5, [0.42, 0.17, 0.06]], [4, [0
 const SKY: readonly Stop[] = [[-12, [0.14, 0.18, 0.31]], [-6, [0.22, 0.28, 0.46]], [0, [0.6, 0.62, 0.74]], [8, [0.9, 0.93, 1]], [30, WHITE]];
 
 /** The zone in which a place's clock may be read, in hours from UTC: the page's own if that is near its longitude, else the longitude's. */
-export function zoneOf(lon: number, own_h: number): number {
+export function chooseUtcOffset(lon: number, own_h: number): number {
   return Math.abs(own_h - lon / 15) <= OWN_ZONE_H ? own_h : Math.round(lon / 15);
 }
 

@@ -1,5 +1,5 @@
 import type { Vec2 } from "../core/vec";
-import { axesOf, type Axes } from "./axes";
+import { computeAxes, type Axes } from "./axes";
 
 /** A tile's number in its pyramid: spec/pyramid.md §3. */
 export interface Tile {
@@ -23,7 +23,7 @@ export interface Frame {
   readonly zmax: number;
 }
 
-export interface FrameNumbers {
+export interface FrameJson {
   id: string;
   look_at_deg: number;
   pitch_deg: number;
@@ -32,8 +32,8 @@ export interface FrameNumbers {
   d0_m: number;
 }
 
-export function frameOf(view: FrameNumbers, size: number, tilePx: number, zmax: number): Frame {
-  const axes = axesOf(view.look_at_deg, view.pitch_deg);
+export function makeFrame(view: FrameJson, size: number, tilePx: number, zmax: number): Frame {
+  const axes = computeAxes(view.look_at_deg, view.pitch_deg);
   const { id, look_at_deg: lookAtDeg, pitch_deg: pitchDeg, u0_m: u0, v0_m: v0, d0_m: d0 } = view;
   return { id, lookAtDeg, pitchDeg, axes, u0, v0, d0, size, tilePx, zmax };
 }
@@ -85,6 +85,6 @@ export function blockLevel(z: number, zmax: number): number {
 }
 
 /** The block's root tile. */
-export const blockOf = (tile: Tile, zmax: number): Tile => ancestor(tile, tile.z - blockLevel(tile.z, zmax));
+export const blockRoot = (tile: Tile, zmax: number): Tile => ancestor(tile, tile.z - blockLevel(tile.z, zmax));
 
 export const tileName = ({ z, x, y }: Tile): string => `${String(z)}/${String(x)}/${String(y)}`;

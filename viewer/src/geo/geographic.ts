@@ -12,7 +12,7 @@ export interface GeographicJson {
 }
 
 /** Longitude and latitude (WGS 84, degrees) of a local place. */
-export function lonLatOf({ local, lon_lat, unit_m, degree, to }: GeographicJson, [x, y]: Vec2 | Vec3): Vec2 {
+export function lonLatFromLocal({ local, lon_lat, unit_m, degree, to }: GeographicJson, [x, y]: Vec2 | Vec3): Vec2 {
   const terms = termsOf((x - local[0]) / unit_m, (y - local[1]) / unit_m, degree);
   const lon = lon_lat[0] + sum(to[0], terms);
   return [lon > 180 ? lon - 360 : lon < -180 ? lon + 360 : lon, lon_lat[1] + sum(to[1], terms)];

@@ -1,7 +1,7 @@
 import { ManifestError } from "../core/errors";
 import type { Box3, Vec3 } from "../core/vec";
 import type { GeographicJson } from "./geographic";
-import { blockOf, frameOf, tileName, type Frame, type FrameNumbers, type Tile } from "./frame";
+import { blockRoot, makeFrame, tileName, type Frame, type FrameJson, type Tile } from "./frame";
 import { Occupancy } from "./occupancy";
 
 export type LayerKind = "color" | "normal" | "id" | "depth" | "sun" | "sun16" | "ao" | "depth2" | "picture";
@@ -39,7 +39,7 @@ interface PassJson extends Versions {
   layers: string[];
 }
 
-interface ViewJson extends FrameNumbers, Versions {
+interface ViewJson extends FrameJson, Versions {
   occupancy: string;
   passes?: PassJson[];
   archives?: Record<string, string>;
@@ -107,12 +107,12 @@ function viewOf(view: ViewJson, json: ManifestJson): View {
   const passes = new Map(view.passes?.flatMap((pass) => pass.layers.map((name) => [name, pass] as const)));
   return {
     id: view.id,
-    frame: frameOf(view, json.size_m, json.tile_px, json.zmax),
+    frame: makeFrame(view, json.size_m, json.tile_px, json.zmax),
     occupancy: new Occupancy(view.occupancy, json.zmax),
     archives: view.archives,
     versionOf: (tile, layer) => {
       const { version, versions } = passes.get(layer.name) ?? view;
-      return versions?.[tileName(blockOf(tile, json.zmax))] ?? version;
+      return versions?.[tileName(blockRoot(tile, json.zmax))] ?? version;
     },
   };
 }

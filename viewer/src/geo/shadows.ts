@@ -17,7 +17,7 @@ const SAME_RAD = (0.6 * Math.PI) / 180;
 const NEAR_RAD = (5 * Math.PI) / 180;
 
 /** The layer and suns that suit a light best; null when none does. `towards`: unit vector towards the light, local axes. */
-export function shadowOf(layers: readonly LayerInfo[], towards: Vec3): Shadow | null {
+export function findShadow(layers: readonly LayerInfo[], towards: Vec3): Shadow | null {
   let best: Shadow | null = null;
   let least = Infinity;
   for (const layer of layers) {

@@ -59,7 +59,7 @@ function planeCover({ rings }: Polygon, relief: Relief): Cover | null {
   const area = new Area(flat.map((ring) => ring.map(([u, v]): Vec2 => [u, v])));
   return {
     box: [area.low, area.high],
-    at: (u, v) => (area.has(u, v) ? (relief.hides(u, v, middle[2] + du * (u - middle[0]) + dv * (v - middle[1])) ? 2 : 1) : 0),
+    at: (u, v) => (area.has(u, v) ? (relief.isOccluded(u, v, middle[2] + du * (u - middle[0]) + dv * (v - middle[1])) ? 2 : 1) : 0),
   };
 }
 

@@ -1,6 +1,6 @@
 import { adoptStyles } from "../core/dom";
 import { add, type Box3, type Vec2, type Vec3 } from "../core/vec";
-import { Attached, FetchError, UsageError, type map, type marker, type Relief } from "../map3d";
+import { MapLayer, FetchError, UsageError, type map, type marker, type Relief } from "../map3d";
 import { Drawing } from "./drawing";
 import { anchorOf, hit } from "./hit";
 import { FeatureList } from "./list";
@@ -9,7 +9,7 @@ import { placing, worldOf } from "./place";
 import { placedShape, type Occlusion, type Placed, type Spot } from "./placed";
 import { filledStyle, type FeatureStyle } from "./style";
 import { STYLES } from "./styles";
-import { wordsIn } from "./words";
+import { getGeojsonMessages } from "./i18n";
 
 export interface GeojsonOptions {
   /** Of all features, or of each. */
@@ -54,7 +54,7 @@ export interface GeojsonEvents {
 }
 
 /** GeoJSON on the map: points, lines and polygons on the surface, or at heights of their own, hidden behind what stands before them. */
-export class geojson extends Attached<map, GeojsonEvents> {
+export class geojson extends MapLayer<map, GeojsonEvents> {
   readonly needs = ["depth"] as const;
   readonly options: GeojsonOptions;
   readonly #data: unknown;
@@ -105,10 +105,10 @@ export class geojson extends Attached<map, GeojsonEvents> {
     return this;
   }
 
-  protected enter(map: map): void {
+  protected onAdd(map: map): void {
     adoptStyles(document, STYLES);
     map.overlayPane.prepend(this.#drawing.canvas);
-    map.moves.on("draw", this.#draw);
+    map.frameEvents.on("draw", this.#draw);
     if (this.options.interactive !== false) map.on("preclick", this.#clicked).on("mousemove", this.#moved).on("moveend", this.#named).on("idle", this.#named);
     const load = (this.#load = new AbortController());
     this.#begin(map, load.signal).catch((reason: unknown) => {
@@ -119,11 +119,11 @@ export class geojson extends Attached<map, GeojsonEvents> {
     });
   }
 
-  protected leave(map: map): void {
+  protected onRemove(map: map): void {
     this.#load?.abort();
     cancelAnimationFrame(this.#next);
     this.#leave();
-    map.moves.off("draw", this.#draw);
+    map.frameEvents.off("draw", this.#draw);
     map.off("preclick", this.#clicked).off("mousemove", this.#moved).off("moveend", this.#named).off("idle", this.#named);
     this.#drawing.canvas.remove();
     this.#list?.box.remove();
@@ -141,7 +141,7 @@ export class geojson extends Attached<map, GeojsonEvents> {
     if (signal.aborted || !relief) return;
     this.#place(map, relief, filter ? shapes.filter(({ feature }) => filter(feature)) : shapes, crs);
     this.fire("ready", { features: this.features, skipped });
-    map.stage?.request();
+    map.layerContext?.requestFrame();
   }
 
   #place(map: map, relief: Relief, shapes: readonly Shape[], crs: "lonlat" | "scene"): void {
@@ -152,7 +152,7 @@ export class geojson extends Attached<map, GeojsonEvents> {
     this.#bounds = boundsOf(this.#placed, relief);
     if (pointToMarker) this.#placed = this.#placed.map((placed) => this.#marked(map, relief, placed, pointToMarker));
     this.#drawing.set(this.#placed);
-    const words = wordsIn(map.language);
+    const words = getGeojsonMessages(map.language);
     const numbers = new Map(this.#placed.map((placed, k) => [placed, k + 1]));
     if (interactive !== false) {
       const press = (placed: Placed): void => { this.#fire("click", placed, anchorOf(placed, map.relief ?? relief) ?? [0, 0]); };
@@ -184,7 +184,7 @@ export class geojson extends Attached<map, GeojsonEvents> {
     const relief = map?.relief;
     if (!relief || this.#placed.length === 0) return;
     // What is known lies in the plane of the view that comes.
-    this.#drawing.canvas.style.visibility = map.turning ? "hidden" : "";
+    this.#drawing.canvas.style.visibility = map.inTransition ? "hidden" : "";
     this.#landMarkers(relief);
     const done = this.#drawing.frame(relief);
     cancelAnimationFrame(this.#next);
@@ -242,7 +242,7 @@ export class geojson extends Attached<map, GeojsonEvents> {
   }
 
   #fire(type: "click" | "mouseover" | "mouseout", { feature }: Placed, point: Vec2): void {
-    this.fire(type, { feature, point, position: this.map?.surfaceAt(point) ?? null });
+    this.fire(type, { feature, point, position: this.map?.findSurfaceAt(point) ?? null });
   }
 }
 

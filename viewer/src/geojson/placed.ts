@@ -156,7 +156,7 @@ export class Spot extends Kept {
     if (height !== null && !Number.isNaN(height)) this.#height = height;
     this.position = [x, y, Number.isNaN(this.#height) ? relief.heights[0] : this.#height];
     this.at = uvdFromLocal(relief.camera.frame.axes, this.position);
-    this.hidden = occlusion !== "none" && relief.hides(...this.at);
+    this.hidden = occlusion !== "none" && relief.isOccluded(...this.at);
   }
 }
 

@@ -81,7 +81,7 @@ class Runs {
   }
 
   #hides([u, v, d]: Vec3): boolean {
-    return this.#occluded && this.#relief.hides(u, v, d);
+    return this.#occluded && this.#relief.isOccluded(u, v, d);
   }
 
   #stretch(hidden: boolean, from: Vec3, to: Vec3): void {

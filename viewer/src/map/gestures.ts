@@ -1,19 +1,19 @@
 import type { Vec2 } from "../core/vec";
 
 /** What gestures do to a map. Screen positions in CSS pixels from the container's top left corner. */
-export interface Steered {
+export interface GestureTarget {
   readonly container: HTMLElement;
   /** A hand is on the map: movements stop. */
-  grab(): void;
+  startGesture(): void;
   panBy(dx: number, dy: number): unknown;
-  glide(velocity: Vec2): void;
+  startInertia(velocity: Vec2): void;
   /** At once, without smoothing. */
   pinch(factor: number, anchor: Vec2): unknown;
   zoomBy(delta: number, anchor: Vec2): unknown;
   /** Turns the picture clockwise. */
-  twist(rad: number): void;
+  rotateBy(rad: number): void;
   /** No hand is on the map any more. */
-  release(): void;
+  endGesture(): void;
   tap(at: Vec2): void;
   hover(at: Vec2): void;
 }
@@ -32,7 +32,7 @@ const TURN_RAD = (0.4 * Math.PI) / 180;
 
 /** Mouse, touch and pen on the canvas: drag, pinch, wheel, tap, double tap. */
 export class Gestures {
-  readonly #map: Steered;
+  readonly #map: GestureTarget;
   readonly #canvas: HTMLCanvasElement;
   readonly #touches = new Map<number, Touch>();
   readonly #listeners = new AbortController();
@@ -42,7 +42,7 @@ export class Gestures {
   #turning: Vec2 | null = null;
   #lastTap: { at: Vec2; ms: number } | null = null;
 
-  constructor(map: Steered, canvas: HTMLCanvasElement) {
+  constructor(map: GestureTarget, canvas: HTMLCanvasElement) {
     this.#map = map;
     this.#canvas = canvas;
     const { signal } = this.#listeners;
@@ -69,7 +69,7 @@ export class Gestures {
     else if (event.pointerType === "mouse" && event.button !== 0) return;
     this.#canvas.setPointerCapture(event.pointerId);
     if (this.#turning) return;
-    this.#map.grab();
+    this.#map.startGesture();
     if (this.#touches.size === 0) this.#moved = false;
     else this.#moved = true;
     this.#touches.set(event.pointerId, { at, start: at });
@@ -80,7 +80,7 @@ export class Gestures {
     const touch = this.#touches.get(event.pointerId);
     const at = this.#place(event);
     if (this.#turning) {
-      this.#map.twist((at[0] - this.#turning[0]) * TURN_RAD);
+      this.#map.rotateBy((at[0] - this.#turning[0]) * TURN_RAD);
       this.#turning = at;
       return;
     }
@@ -116,19 +116,19 @@ export class Gestures {
   #twist(from: Vec2, other: Vec2, to: Vec2): void {
     const angle = ([x, y]: Vec2): number => Math.atan2(y - other[1], x - other[0]);
     const turned = angle(to) - angle(from);
-    this.#map.twist(turned - 2 * Math.PI * Math.round(turned / (2 * Math.PI)));
+    this.#map.rotateBy(turned - 2 * Math.PI * Math.round(turned / (2 * Math.PI)));
   }
 
   #up(event: PointerEvent, meant: boolean): void {
     if (this.#turning && (event.button === 2 || !meant)) {
       this.#turning = null;
-      this.#map.release();
+      this.#map.endGesture();
     }
     const touch = this.#touches.get(event.pointerId);
     if (!touch) return;
     this.#touches.delete(event.pointerId);
     if (this.#touches.size > 0) return;
-    this.#map.release();
+    this.#map.endGesture();
     this.#map.container.classList.remove("map3d-dragging");
     if (!meant) return;
     if (this.#moved) this.#release(event.timeStamp);
@@ -141,7 +141,7 @@ export class Gestures {
     const ms = first && last ? last.ms - first.ms : 0;
     if (!first || !last || ms < 10) return;
     const velocity: Vec2 = [(last.at[0] - first.at[0]) / ms, (last.at[1] - first.at[1]) / ms];
-    if (Math.hypot(...velocity) > 0.15) this.#map.glide(velocity);
+    if (Math.hypot(...velocity) > 0.15) this.#map.startInertia(velocity);
   }
 
   #tap(at: Vec2, now: number): void {

@@ -1,22 +1,22 @@
-import { Attached } from "../core/attached";
+import { MapLayer } from "../core/mapLayer";
 import { asError, UsageError } from "../core/errors";
 import type { Vec2 } from "../core/vec";
 import { readColor } from "../draw/color";
 import type { Clip } from "../draw/combine";
-import { bakedKinds, MODES, neededKinds, type Baked, type Mode, type Pass, type Rgb, type TileAccess } from "../draw/drawer";
-import type { Finishes } from "../draw/finish";
+import { bakedKinds, MODES, neededKinds, type BakedLight, type Mode, type Pass, type Rgb, type TileAccess } from "../draw/drawer";
+import type { DrawStyles } from "../draw/drawStyle";
 import type { Frame, Tile } from "../geo/frame";
 import { towardsLight, type Light } from "../geo/light";
 import type { LayerInfo, LayerKind, Rendering, View } from "../geo/manifest";
-import { shadowOf } from "../geo/shadows";
+import { findShadow } from "../geo/shadows";
 import { Objects, type AttributeInfo, type AttributeValue, type ObjectInfo, type SearchEntry } from "../tiles/objects";
 import { HttpSource, type Source } from "../tiles/source";
-import { Store } from "../tiles/store";
+import { LayerTiles } from "../tiles/layerTiles";
 import { viewLike } from "./agreement";
 import { depthRangeOf, depthsOf, planLayer, type LayerPlan } from "./layerPlan";
 import type { map } from "./map";
 import { finishesOf, isHidden, type ObjectStyle } from "./objectStyle";
-import type { Sight, Stage } from "./stage";
+import type { ViewState, LayerContext } from "./layerContext";
 
 /** How a layer begins; all can be left out. */
 export interface ImageLayerOptions {
@@ -41,18 +41,18 @@ export interface ImageLayerEvents {
 }
 
 /** A rendering on the map, from base URLs or another source. Several base URLs are several hosts with the same tiles; requests are spread over them by tile. */
-export class imageLayer extends Attached<map, ImageLayerEvents> {
+export class imageLayer extends MapLayer<map, ImageLayerEvents> {
   readonly options: Required<Omit<ImageLayerOptions, "attribution">> & Pick<ImageLayerOptions, "attribution">;
   /** Where it comes from. */
   readonly source: Source;
   #mode: Mode;
-  #stage: Stage | undefined;
+  #stage: LayerContext | undefined;
   #name = "";
-  #store: Store | undefined;
+  #store: LayerTiles | undefined;
   #rendering: Rendering | undefined;
   #objects: Objects | undefined;
   #colors: ReadonlyMap<number, Rgb> = new Map();
-  #finishes: Finishes | null = null;
+  #finishes: DrawStyles | null = null;
   /** Those of #colors that are not hidden. */
   #shown: ReadonlyMap<number, Rgb> = new Map();
   #clip: Clip | null = null;
@@ -144,12 +144,12 @@ export class imageLayer extends Attached<map, ImageLayerEvents> {
   }
 
   /** @internal */
-  hides(id: number): boolean {
+  isHidden(id: number): boolean {
     return isHidden(this.#finishes, id);
   }
 
   /** @internal What `hides` goes by; null: all is shown. Another object whenever it has changed. */
-  get finishes(): Finishes | null {
+  get drawStyles(): DrawStyles | null {
     return this.#finishes;
   }
 
@@ -173,33 +173,33 @@ export class imageLayer extends Attached<map, ImageLayerEvents> {
     return (await this.#objects?.search()) ?? [];
   }
 
-  protected enter(map: map): void {
-    const stage = map.stage;
+  protected onAdd(map: map): void {
+    const stage = map.layerContext;
     if (!stage) return; // the map has said why
     this.#stage = stage;
-    this.#name = stage.nameLayer();
+    this.#name = stage.createName();
     const failed = (error: Error): void => {
       if (this.#stage !== stage) return;
       this.#failed = !this.#rendering;
       this.fire("error", { error });
       stage.report(error);
     };
-    this.#store = new Store(this.#name, this.source, stage.shared, (error) => {
+    this.#store = new LayerTiles(this.#name, this.source, stage.tileResources, (error) => {
       if (error) failed(error);
-      stage.request();
+      stage.requestFrame();
     });
     this.source.manifest().then((rendering) => {
       if (this.#stage === stage) this.#begin(rendering, stage);
     }).catch((reason: unknown) => { failed(asError(reason)); });
   }
 
-  protected leave(): void {
-    this.#stage?.forget(this.#name);
+  protected onRemove(): void {
+    this.#stage?.dropTiles(this.#name);
     this.#stage = this.#store = this.#rendering = this.#objects = undefined;
   }
 
   /** @internal The layer's view that looks as a frame does. */
-  viewOf(frame: Frame): View | undefined {
+  findView(frame: Frame): View | undefined {
     return this.#rendering && viewLike(this.#rendering, frame);
   }
 
@@ -209,7 +209,7 @@ export class imageLayer extends Attached<map, ImageLayerEvents> {
   }
 
   /** @internal Rendered light that it shows in a light; null before its manifest is here. */
-  bakedFor(light: Readonly<Light>): Baked | null {
+  getBakedLight(light: Readonly<Light>): BakedLight | null {
     return this.#rendering ? this.#baked(this.#rendering, light) : null;
   }
 
@@ -225,13 +225,13 @@ export class imageLayer extends Attached<map, ImageLayerEvents> {
   }
 
   /** @internal */
-  get store(): Store | undefined {
+  get tiles(): LayerTiles | undefined {
     return this.#store;
   }
 
   /** @internal What to paint and to fetch; `kinds` are read by others. */
-  plan(sight: Sight, light: Readonly<Light>, kinds: readonly LayerKind[], combined: boolean): LayerPlan | null {
-    const view = this.viewOf(sight.camera.frame);
+  plan(sight: ViewState, light: Readonly<Light>, kinds: readonly LayerKind[], combined: boolean): LayerPlan | null {
+    const view = this.findView(sight.camera.frame);
     if (!view || !this.#rendering || !this.#store || this.options.opacity === 0) return null;
     const mode = this.#shownMode(this.#rendering);
     const needed = neededKinds(mode, this.#masked(this.#rendering), combined);
@@ -243,7 +243,7 @@ export class imageLayer extends Attached<map, ImageLayerEvents> {
   }
 
   /** @internal @param before layers with which it is combined and that were added before; null: it is not combined */
-  pass(plan: LayerPlan, { origin }: Sight, before: number | null): Pass {
+  pass(plan: LayerPlan, { origin }: ViewState, before: number | null): Pass {
     const rendering = this.#rendering as Rendering;
     return {
       mode: this.#shownMode(rendering),
@@ -264,15 +264,15 @@ export class imageLayer extends Attached<map, ImageLayerEvents> {
 
   #setColors(colors: ReadonlyMap<number, Rgb>): this {
     this.#colors = colors;
-    this.#shown = new Map([...colors].filter(([id]) => !this.hides(id)));
+    this.#shown = new Map([...colors].filter(([id]) => !this.isHidden(id)));
     return this.#redraw();
   }
 
-  #begin(rendering: Rendering, stage: Stage): void {
-    stage.admit(rendering);
+  #begin(rendering: Rendering, stage: LayerContext): void {
+    stage.checkCompatible(rendering);
     this.#rendering = rendering;
     this.#objects = new Objects(this.source, rendering.json);
-    stage.ready(rendering);
+    stage.onManifest(rendering);
     this.#checkLayers();
     this.fire("ready", { rendering });
   }
@@ -294,14 +294,14 @@ export class imageLayer extends Attached<map, ImageLayerEvents> {
   }
 
   /** Rendered light that suits a light. */
-  #baked({ layers, json }: Rendering, light: Readonly<Light>): Baked {
-    const shadow = light.shadows && light.altitude_deg > 0 ? shadowOf(json.layers, towardsLight(light)) : null;
+  #baked({ layers, json }: Rendering, light: Readonly<Light>): BakedLight {
+    const shadow = light.shadows && light.altitude_deg > 0 ? findShadow(json.layers, towardsLight(light)) : null;
     return { shadow, occlusion: light.occlusion && layers.has("ao") };
   }
 
   #access(view: View, layers: ReadonlyMap<string, LayerInfo>): TileAccess {
-    const store = this.#store as Store;
-    const stored = (kind: LayerKind, tile: Tile): ReturnType<Store["get"]> => {
+    const store = this.#store as LayerTiles;
+    const stored = (kind: LayerKind, tile: Tile): ReturnType<LayerTiles["get"]> => {
       const layer = layers.get(kind);
       return layer && store.get(view, layer, tile);
     };
@@ -318,13 +318,13 @@ export class imageLayer extends Attached<map, ImageLayerEvents> {
   }
 
   #redraw(): this {
-    this.#stage?.request();
+    this.#stage?.requestFrame();
     return this;
   }
 }
 
 /** A rendering's layers by kind, with the one that has the shadows. */
-function layersWith({ layers }: Rendering, { shadow }: Baked): ReadonlyMap<string, LayerInfo> {
+function layersWith({ layers }: Rendering, { shadow }: BakedLight): ReadonlyMap<string, LayerInfo> {
   return shadow && layers.get(shadow.layer.kind) !== shadow.layer ? new Map([...layers, [shadow.layer.kind, shadow.layer]]) : layers;
 }
 

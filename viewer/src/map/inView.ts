@@ -2,21 +2,21 @@ import { cssPixelM } from "../geo/camera";
 import { coverOf, levelFor, rectAround } from "../tiles/cover";
 import type { imageLayer } from "./imageLayer";
 import { middleIn } from "./layerPlan";
-import type { Sight } from "./stage";
+import type { ViewState } from "./layerContext";
 
 /** An object that is seen, and how much of it. */
-export interface Seen {
+export interface VisibleObject {
   readonly id: number;
   /** Share of the screen. */
   readonly share: number;
 }
 
 /** Objects of a layer that are seen, the largest first. Fetches the id tiles of the level that is shown. @throws what a fetch threw */
-export async function objectsIn(layer: imageLayer, sight: Sight): Promise<Seen[]> {
+export async function objectsIn(layer: imageLayer, sight: ViewState): Promise<VisibleObject[]> {
   const { camera, dpr, finer } = sight;
-  const [view, info] = [layer.viewOf(camera.frame), layer.rendering?.layers.get("id")];
-  const { rendering, store } = layer;
-  if (!view || !rendering || !info || !store) return [];
+  const [view, info] = [layer.findView(camera.frame), layer.rendering?.layers.get("id")];
+  const { rendering, tiles } = layer;
+  if (!view || !rendering || !info || !tiles) return [];
   const { frame } = view;
   const px = cssPixelM(camera);
   const rect = rectAround(...middleIn(frame, sight, rendering), camera, px);
@@ -24,8 +24,8 @@ export async function objectsIn(layer: imageLayer, sight: Sight): Promise<Seen[]
   const pixel_m = frame.size / (frame.tilePx * 2 ** level);
   const counts = new Map<number, number>();
   const [[left, bottom], [right, top]] = rect;
-  const tiles = coverOf(frame, (tile) => view.occupancy.has(tile), level, rect);
-  for (const [tile, data] of await Promise.all(tiles.map(async (tile) => [tile, await store.need(view, info, tile)] as const))) {
+  const cover = coverOf(frame, (tile) => view.occupancy.has(tile), level, rect);
+  for (const [tile, data] of await Promise.all(cover.map(async (tile) => [tile, await tiles.need(view, info, tile)] as const))) {
     if (data?.kind !== "id") continue;
     const [u, v] = [frame.u0 + tile.x * frame.tilePx * pixel_m, frame.v0 - tile.y * frame.tilePx * pixel_m];
     const inside = (from: number, to: number): [number, number] => [Math.max(0, Math.round(from / pixel_m)), Math.min(frame.tilePx, Math.round(to / pixel_m))];
@@ -34,7 +34,7 @@ export async function objectsIn(layer: imageLayer, sight: Sight): Promise<Seen[]
     for (let j = j0; j < j1; j++) {
       for (let i = i0; i < i1; i++) {
         const id = data.values[j * data.width + i] as number;
-        if (id !== 0 && !layer.hides(id)) counts.set(id, (counts.get(id) ?? 0) + 1);
+        if (id !== 0 && !layer.isHidden(id)) counts.set(id, (counts.get(id) ?? 0) + 1);
       }
     }
   }

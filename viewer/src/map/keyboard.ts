@@ -1,6 +1,6 @@
-import type { Steered } from "./gestures";
+import type { GestureTarget } from "./gestures";
 
-export interface Turned extends Steered {
+export interface Turned extends GestureTarget {
   panBy(dx: number, dy: number, options?: { smooth?: boolean }): unknown;
   /** +1: the next direction counter-clockwise, which turns the picture clockwise. */
   rotate(step: number): unknown;

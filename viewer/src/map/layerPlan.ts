@@ -6,17 +6,17 @@ import type { LayerInfo, LayerKind, Rendering, View } from "../geo/manifest";
 import { corners } from "../core/vec";
 import { leadOf, type Depths } from "../draw/combine";
 import { placeQuads } from "../draw/plan";
-import type { Baked, Guest, Quad } from "../draw/drawer";
+import type { BakedLight, CustomLayer, Quad } from "../draw/drawer";
 import { coverOf, fromTheMiddle, levelFor, rectAround, standsFor } from "../tiles/cover";
 import type { Job } from "../tiles/queue";
-import type { Store } from "../tiles/store";
+import type { LayerTiles } from "../tiles/layerTiles";
 import type { imageLayer } from "./imageLayer";
-import type { Sight } from "./stage";
+import type { ViewState } from "./layerContext";
 
 /** What a layer wants painted and fetched for a camera. */
 export interface LayerPlan {
   readonly view: View;
-  readonly baked: Baked;
+  readonly baked: BakedLight;
   /** The layers that are shown, by kind. */
   readonly layers: ReadonlyMap<string, LayerInfo>;
   readonly level: number;
@@ -24,7 +24,7 @@ export interface LayerPlan {
   readonly quads: readonly Quad[];
   readonly jobs: readonly Job[];
   /** Where its tiles are. */
-  readonly store: Store;
+  readonly store: LayerTiles;
   /** All of the view is here (or known not to come). */
   readonly complete: boolean;
 }
@@ -36,20 +36,20 @@ export const DEPTH_UNIT_M = 2 ** -10;
 const COARSE_STEPS = 3;
 
 /** U and V of the camera's middle in the layer's own frame. */
-export function middleIn(frame: Frame, { camera, origin }: Sight, rendering: Rendering): Vec2 {
+export function middleIn(frame: Frame, { camera, origin }: ViewState, rendering: Rendering): Vec2 {
   const shift = sub(origin, rendering.json.origin);
   return [camera.u + dot(frame.axes.right, shift), camera.v + dot(frame.axes.up, shift)];
 }
 
 /** What a layer shows: its layers by kind, the light that was rendered, kinds without which a tile is not shown, and those that are fetched after them. */
 export interface Wanted {
-  readonly baked: Baked;
+  readonly baked: BakedLight;
   readonly layers: ReadonlyMap<string, LayerInfo>;
   readonly needed: readonly LayerKind[];
   readonly extra: readonly LayerKind[];
 }
 
-export function planLayer(sight: Sight, rendering: Rendering, view: View, store: Store, { baked, layers, needed, extra }: Wanted): LayerPlan {
+export function planLayer(sight: ViewState, rendering: Rendering, view: View, store: LayerTiles, { baked, layers, needed, extra }: Wanted): LayerPlan {
   const { frame, occupancy } = view;
   const { camera, dpr, finer } = sight;
   const [u, v] = middleIn(frame, sight, rendering);
@@ -79,9 +79,9 @@ export function depthRangeOf(rendering: Rendering, { frame }: View): Vec2 {
 }
 
 /** Least and greatest D, along a frame, of all layers of a map and its guests. */
-export function rangeAlong({ origin }: Sight, frame: Frame, layers: readonly imageLayer[], guests: readonly Guest[]): Vec2 {
+export function rangeAlong({ origin }: ViewState, frame: Frame, layers: readonly imageLayer[], guests: readonly CustomLayer[]): Vec2 {
   const { axes } = frame;
-  const all = [...guests.flatMap((guest) => guest.rangeAlong(frame) ?? []), ...layers.flatMap(({ rendering }) => (rendering ? corners(rendering.json.box).map((corner) => dot(axes.forward, sub(add(rendering.json.origin, corner), origin))) : []))];
+  const all = [...guests.flatMap((guest) => guest.getDepthRange(frame) ?? []), ...layers.flatMap(({ rendering }) => (rendering ? corners(rendering.json.box).map((corner) => dot(axes.forward, sub(add(rendering.json.origin, corner), origin))) : []))];
   return [Math.min(...all) - 1, Math.max(...all) + 1];
 }
 
@@ -103,13 +103,13 @@ function ancestorsOf(tiles: readonly Tile[]): Tile[] {
   return [...found.values()];
 }
 
-function holds(layers: Wanted["layers"], store: Store, view: View, kind: LayerKind, tile: Tile): boolean {
+function holds(layers: Wanted["layers"], store: LayerTiles, view: View, kind: LayerKind, tile: Tile): boolean {
   const layer = layers.get(kind);
   return layer !== undefined && store.get(view, layer, tile) !== undefined;
 }
 
 /** Jobs for the tiles that are neither here nor known to have failed. */
-function jobsFor(layers: Wanted["layers"], store: Store, view: View, kinds: readonly LayerKind[], tiles: readonly Tile[]): Job[] {
+function jobsFor(layers: Wanted["layers"], store: LayerTiles, view: View, kinds: readonly LayerKind[], tiles: readonly Tile[]): Job[] {
   const jobs: Job[] = [];
   for (const tile of tiles) {
     for (const kind of kinds) {

@@ -1,14 +1,14 @@
 import { adoptStyles, element } from "../core/dom";
 import { asError, UsageError } from "../core/errors";
 import { Evented } from "../core/events";
-import type { Attachable, Holder, Surface, SurfaceEvents } from "../core/surface";
+import type { Addable, LayerHost, OverlayHost, OverlayEvents } from "../core/overlayHost";
 import type { Vec2, Vec3 } from "../core/vec";
-import { languageOf } from "../core/words";
-import type { Guest } from "../draw/drawer";
+import { findLanguage } from "../core/i18n";
+import type { CustomLayer } from "../draw/drawer";
 import type { Camera } from "../geo/camera";
-import { daylightAt } from "../geo/daylight";
+import { computeDaylight } from "../geo/daylight";
 import { DEFAULT_LIGHT, validLight, type Light } from "../geo/light";
-import type { Shade } from "../draw/shade";
+import type { LightEstimator } from "../draw/lightEstimator";
 import type { LayerKind } from "../geo/manifest";
 import { marker } from "../overlay/marker";
 import { attributionLine } from "../ui/attribution";
@@ -17,28 +17,28 @@ import { scaleBar } from "../ui/scaleBar";
 import { DebugTiles } from "../ui/debugTiles";
 import { STYLES } from "../ui/styles";
 import { FrameLoop } from "./frameLoop";
-import { Gestures, type Steered } from "./gestures";
+import { Gestures, type GestureTarget } from "./gestures";
 import { imageLayer } from "./imageLayer";
-import { objectsIn, type Seen } from "./inView";
+import { objectsIn, type VisibleObject } from "./inView";
 import { listenToKeys } from "./keyboard";
 import { DEFAULTS, savesData, type ClickEvent, type FilledOptions, type MapOptions } from "./options";
 import { Painter } from "./painter";
 import { NOTHING, pickExactly, pickLoaded, type Pick } from "./picker";
 import { Relief } from "./relief";
-import type { Sight, Stage } from "./stage";
-import { Viewing } from "./viewing";
+import type { ViewState, LayerContext } from "./layerContext";
+import { CameraController } from "./cameraController";
 import { Viewport, type Size } from "./viewport";
 import type { Rect } from "../tiles/cover";
 
 /** A map in a canvas of the page. World coordinates are those of the scene's CRS, in metres. */
-export class map extends Viewing implements Surface, Holder<map>, Steered {
+export class map extends CameraController implements OverlayHost, LayerHost<map>, GestureTarget {
   readonly options: FilledOptions;
   /** Tells markers and popups that places on the screen have changed. */
-  readonly moves = new Evented<SurfaceEvents>();
+  readonly frameEvents = new Evented<OverlayEvents>();
   readonly #viewport: Viewport;
   readonly #painter: Painter | null;
   readonly #loop = new FrameLoop((now) => { this.#frame(now); });
-  readonly #items = new Set<Attachable<map>>();
+  readonly #items = new Set<Addable<map>>();
   readonly #ending = new AbortController();
   readonly #debug = new DebugTiles();
   #gestures: Gestures | undefined;
@@ -47,7 +47,7 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
   #time: Date | null = null;
   #drawn: Camera | undefined;
   #relief: Relief | undefined;
-  #shade: Shade | null = null;
+  #shade: LightEstimator | null = null;
   /** Something besides the camera has changed since the last frame. */
   #dirty = true;
   /** The picture has not moved since the last "moveend". */
@@ -75,21 +75,21 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
   // Things on the map
 
   /** Puts a layer, marker or popup on the map. */
-  add(item: Attachable<map>): this {
+  add(item: Addable<map>): this {
     if (this.#items.has(item)) return this;
     this.#items.add(item);
     if (item instanceof imageLayer) this.#layers = [...this.#layers, item];
     if (item instanceof marker) item.on("select", this.#selected);
-    item.onAdd(this);
+    item.attachTo(this);
     return this.#redraw();
   }
 
   /** Takes a layer, marker or popup off the map. */
-  discard(item: Attachable<map>): this {
+  discard(item: Addable<map>): this {
     if (!this.#items.delete(item)) return this;
     this.#layers = this.#layers.filter((layer) => layer !== item);
     if (item instanceof marker) item.off("select", this.#selected);
-    item.onRemove(this);
+    item.detachFrom(this);
     return this.#redraw();
   }
 
@@ -134,12 +134,12 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
   }
 
   /** @internal What the picture is seen in: the canvas, or an element below it; null when nothing can be drawn. */
-  get shown(): HTMLElement | null {
-    return this.#painter?.drawer.shown ?? null;
+  get drawerElement(): HTMLElement | null {
+    return this.#painter?.drawer.element ?? null;
   }
 
   get language(): string {
-    return this.options.language ?? languageOf(this.container);
+    return this.options.language ?? findLanguage(this.container);
   }
 
   get overlayPane(): HTMLElement {
@@ -174,12 +174,12 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
     return this.whenReady((_, { json }) => {
       if (!json.geographic) throw new UsageError(`rendering "${json.name}" does not say where on earth it lies, so the sun's place is not known; use setLight`);
       this.#time = time;
-      this.#relight(daylightAt(time, json.geographic));
+      this.#relight(computeDaylight(time, json.geographic));
     });
   }
 
   /** @internal What finds light that was not rendered. */
-  setShade(shade: Shade | null): this {
+  setLightEstimator(shade: LightEstimator | null): this {
     this.#shade = shade;
     return this.#redraw();
   }
@@ -206,7 +206,7 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
 
   /** What lies under CSS pixels, exactly: the deepest level's tile is fetched. Approximate when that fails. */
   async pick(point: Vec2): Promise<Pick> {
-    const sight = this.sight();
+    const sight = this.getViewState();
     if (!sight) return NOTHING;
     try {
       return await pickExactly(this.#layers, sight, point);
@@ -217,8 +217,8 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
   }
 
   /** Objects of all layers that are seen, the largest of each layer first; those below the topmost layer count as if they were not hidden by it. */
-  async objectsInView(): Promise<readonly (Seen & { readonly layer: imageLayer })[]> {
-    const sight = this.sight();
+  async objectsInView(): Promise<readonly (VisibleObject & { readonly layer: imageLayer })[]> {
+    const sight = this.getViewState();
     if (!sight) return [];
     const found = await Promise.all([...this.#layers].reverse().map(async (layer) => (await objectsIn(layer, sight)).map((seen) => ({ ...seen, layer }))));
     return found.flat();
@@ -226,29 +226,29 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
 
   /** What the tiles in memory tell of a point; null when they tell nothing. */
   pickLoaded(point: Vec2): Pick | null {
-    const sight = this.sight();
+    const sight = this.getViewState();
     return sight && pickLoaded(this.#layers, sight, point);
   }
 
-  covers(world: Vec3): boolean {
+  isOccluded(world: Vec3): boolean {
     return this.relief?.covers(world) ?? false;
   }
 
-  surfaceAt(point: Vec2): Vec3 | null {
+  findSurfaceAt(point: Vec2): Vec3 | null {
     return this.relief?.positionAt(point) ?? null;
   }
 
   /** @internal Depths of the picture that was drawn last, of items that need them; null before "ready". */
   get relief(): Relief | null {
-    const sight = this.sight();
+    const sight = this.getViewState();
     if (this.#relief?.camera !== sight?.camera) this.#relief = undefined;
     this.#relief ??= sight ? new Relief(this.#layers, sight) : undefined;
     return this.#relief ?? null;
   }
 
   /** @internal Depths of a rectangle (U and V), from the deepest level that takes at most so many tiles; `ids`: object ids, too. */
-  reliefOf(sight: Sight, rect: Rect, most: number, ids = false): ReturnType<typeof Relief.fetched> {
-    return Relief.fetched(this.#layers, sight, rect, most, ids);
+  fetchRelief(sight: ViewState, rect: Rect, most: number, ids = false): ReturnType<typeof Relief.fetch> {
+    return Relief.fetch(this.#layers, sight, rect, most, ids);
   }
 
   /** Bytes of decoded tiles in memory. */
@@ -272,24 +272,24 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
   }
 
   /** @internal Something else is seen among the layers by its depth; `on` false: no longer. */
-  seat(guest: Guest, on = true): this {
-    this.#painter?.guests[on ? "add" : "delete"](guest);
+  toggleCustomLayer(guest: CustomLayer, on = true): this {
+    this.#painter?.customLayers[on ? "add" : "delete"](guest);
     return this.#redraw();
   }
 
   /** @internal undefined when the map cannot draw. */
-  get stage(): Stage | undefined {
+  get layerContext(): LayerContext | undefined {
     const painter = this.#painter;
     return painter === null ? undefined : {
-      shared: painter.shared,
-      nameLayer: () => `layer${String(this.#names++)}`,
-      forget: (layer) => { painter.forget(`${layer}/`); },
-      admit: (rendering) => { this.admit(rendering); },
-      ready: (rendering) => {
+      tileResources: painter.shared,
+      createName: () => `layer${String(this.#names++)}`,
+      dropTiles: (layer) => { painter.forget(`${layer}/`); },
+      checkCompatible: (rendering) => { this.admit(rendering); },
+      onManifest: (rendering) => {
         if (!this.camera) this.begin(rendering);
         this.#redraw();
       },
-      request: () => { this.#redraw(); },
+      requestFrame: () => { this.#redraw(); },
       report: (error) => { this.report(error); },
     };
   }
@@ -302,7 +302,7 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
     this.#loop.request();
   }
 
-  protected surfaceInTheMiddle(sight: Sight): Vec3 | null {
+  protected surfaceInTheMiddle(sight: ViewState): Vec3 | null {
     return pickLoaded(this.#layers, sight, this.middle())?.position ?? null;
   }
 
@@ -314,11 +314,11 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
   // Frames
 
   #frame(now: number): void {
-    const turned = this.apparent !== null;
+    const turned = this.transitionCamera !== null;
     this.stepCamera(now);
     if (this.#hover) this.#fireHover(this.#hover);
     try {
-      if (this.#dirty || this.camera !== this.#drawn || turned || this.apparent) this.#draw(turned || this.apparent !== null);
+      if (this.#dirty || this.camera !== this.#drawn || turned || this.transitionCamera) this.#draw(turned || this.transitionCamera !== null);
       else this.#settle();
     } catch (reason) {
       this.report(asError(reason));
@@ -327,15 +327,15 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
 
   /** @param turning places on the screen are others even when the camera is not */
   #draw(turning: boolean): void {
-    const sight = this.sight();
+    const sight = this.getViewState();
     if (!sight || !this.#painter || this.size.width === 0) return;
     const [before, changed] = [this.#drawn, this.#dirty];
     [this.#drawn, this.#dirty, this.#relief] = [sight.camera, false, undefined];
     const moving = before !== undefined && before !== sight.camera;
-    const { plans, complete } = this.#painter.paint(sight, { layers: this.#layers, light: this.#light, kinds: this.#kindsRead(), shade: this.#shade, moving }, this.apparent && ((scene) => { this.turner?.paint({ ...scene, camera: sight.camera, changed }); }));
+    const { plans, complete } = this.#painter.paint(sight, { layers: this.#layers, light: this.#light, kinds: this.#kindsRead(), shade: this.#shade, moving }, this.transitionCamera && ((scene) => { this.transition?.draw({ ...scene, camera: sight.camera, changed }); }));
     this.#debug.update(plans, sight.dpr, this.#painter.drawer);
     if (before !== sight.camera || turning) this.#moved(before, sight.camera);
-    this.moves.fire("draw", {});
+    this.frameEvents.fire("draw", {});
     if (this.#shade && moving) this.#redraw();
     if (this.moving || !this.#resting || complete) this.#loop.request();
     if (complete) this.#complete();
@@ -348,7 +348,7 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
 
   #moved(before: Camera | undefined, { zoom }: Camera): void {
     this.#resting = false;
-    this.moves.fire("move", {});
+    this.frameEvents.fire("move", {});
     this.fire("move", {});
     if (before?.zoom !== zoom) this.fire("zoom", { zoom });
   }
@@ -428,7 +428,7 @@ export class map extends Viewing implements Surface, Holder<map>, Steered {
   }
 
   #retry(): void {
-    for (const layer of this.#layers) layer.store?.forgive();
+    for (const layer of this.#layers) layer.tiles?.forgive();
     this.#redraw();
   }
 

@@ -1,6 +1,6 @@
 import { readColor } from "../draw/color";
 import type { Rgb } from "../draw/drawer";
-import type { Finish, Finishes } from "../draw/finish";
+import type { DrawStyle, DrawStyles } from "../draw/drawStyle";
 
 /** How a layer's objects are shown. What is not said stays as it is. */
 export interface ObjectStyle {
@@ -15,18 +15,18 @@ export interface ObjectStyle {
 }
 
 /** null: all as they are. */
-export function finishesOf({ colors, only, others = "dimmed", hidden }: ObjectStyle): Finishes | null {
+export function finishesOf({ colors, only, others = "dimmed", hidden }: ObjectStyle): DrawStyles | null {
   const read = new Map<string, Rgb>();
   const rgbOf = (color: string): Rgb => {
     const rgb = read.get(color) ?? readColor(color);
     read.set(color, rgb);
     return rgb;
   };
-  const byId = new Map<number, Finish>();
+  const byId = new Map<number, DrawStyle>();
   for (const id of only ?? []) byId.set(id >>> 0, "plain");
   for (const [id, color] of colors ?? []) if (!only || byId.has(id >>> 0)) byId.set(id >>> 0, rgbOf(color));
   for (const id of hidden ?? []) byId.set(id >>> 0, "hidden");
   return only || byId.size > 0 ? { byId, others: only ? others : "plain" } : null;
 }
 
-export const isHidden = (finishes: Finishes | null, id: number): boolean => finishes !== null && id !== 0 && (finishes.byId.get(id) ?? finishes.others) === "hidden";
+export const isHidden = (finishes: DrawStyles | null, id: number): boolean => finishes !== null && id !== 0 && (finishes.byId.get(id) ?? finishes.others) === "hidden";

@@ -1,6 +1,6 @@
 import { CanvasDrawer } from "../draw/canvas/canvasDrawer";
-import type { Drawer, DrawerEvents, FrameSpec, Guest } from "../draw/drawer";
-import type { Shade } from "../draw/shade";
+import type { Drawer, DrawerEvents, FrameSpec, CustomLayer } from "../draw/drawer";
+import type { LightEstimator } from "../draw/lightEstimator";
 import { WebGLDrawer } from "../draw/webgl/webglDrawer";
 import type { Light } from "../geo/light";
 import type { LayerKind } from "../geo/manifest";
@@ -8,13 +8,13 @@ import { Cache } from "../tiles/cache";
 import { DENSE } from "../tiles/cover";
 import { Decoder } from "../tiles/decoder";
 import { Queue } from "../tiles/queue";
-import type { Shared, Stored } from "../tiles/store";
+import type { TileResources, CachedTile } from "../tiles/layerTiles";
 import { combinedOf } from "./combined";
 import type { imageLayer } from "./imageLayer";
 import { rangeAlong, type LayerPlan } from "./layerPlan";
 import type { FilledOptions } from "./options";
-import type { Sight } from "./stage";
-import type { Depicting } from "./turner";
+import type { ViewState } from "./layerContext";
+import type { TransitionFrame } from "./viewTransition";
 import type { Viewport } from "./viewport";
 
 export interface PainterEvents {
@@ -26,7 +26,7 @@ export interface PainterEvents {
   failed(error: Error): void;
 }
 
-export type Turning = Omit<Depicting, "camera" | "changed">;
+export type Turning = Omit<TransitionFrame, "camera" | "changed">;
 
 /** A context that has not come back after this time is lost for good. */
 const RESTORE_MS = 5000;
@@ -46,18 +46,18 @@ export interface Content {
   /** Layers that are read, besides those that are shown. */
   readonly kinds: readonly LayerKind[];
   /** Finds light that was not rendered. */
-  readonly shade: Shade | null;
+  readonly shade: LightEstimator | null;
   /** The picture is under way: what is costly may be rough. */
   readonly moving: boolean;
 }
 
 /** Makes a frame: asks the layers what they want, fetches it, has it drawn. Owns tiles and drawer. */
 export class Painter {
-  readonly shared: Shared;
+  readonly shared: TileResources;
   /** What is seen among the layers. */
-  readonly guests = new Set<Guest>();
+  readonly customLayers = new Set<CustomLayer>();
   readonly #viewport: Viewport;
-  readonly #cache: Cache<Stored>;
+  readonly #cache: Cache<CachedTile>;
   readonly #queue: Queue;
   readonly #decoder: Decoder;
   readonly #options: FilledOptions;
@@ -73,7 +73,7 @@ export class Painter {
     this.#options = options;
     this.#events = events;
     this.#drawer = this.#open(options.drawer);
-    this.#cache = new Cache<Stored>(options.cacheBytes ?? LEAST_BYTES, (key, { data }) => {
+    this.#cache = new Cache<CachedTile>(options.cacheBytes ?? LEAST_BYTES, (key, { data }) => {
       if (data && "bitmap" in data) data.bitmap.close();
       this.#drawer.release(key);
     });
@@ -86,7 +86,7 @@ export class Painter {
     return this.#queue.busy || this.#drawer.busy;
   }
 
-  get drawer(): Pick<Drawer, "name" | "note" | "shown"> {
+  get drawer(): Pick<Drawer, "name" | "note" | "element"> {
     return this.#drawer;
   }
 
@@ -95,15 +95,15 @@ export class Painter {
   }
 
   /** @param turn paints a movement, where that can be done, in place of the frame */
-  paint(sight: Sight, content: Content, turn: ((scene: Turning) => void) | null): Painted {
+  paint(sight: ViewState, content: Content, turn: ((scene: Turning) => void) | null): Painted {
     const { layers, light, kinds, shade, moving } = content;
     this.#viewport.fitCanvas(sight.dpr);
     const { width, height } = this.#viewport.canvas;
     this.#cache.limit(this.#options.cacheBytes ?? Math.max(LEAST_BYTES, (sight.dpr >= DENSE ? KEPT_DENSE_BYTES : KEPT_BYTES) * width * height));
     this.#cache.tick();
     const { gl } = this.#drawer;
-    this.#seated &&= this.guests.size > 0 && gl !== null;
-    const guests = this.#seated ? [...this.guests] : [];
+    this.#seated &&= this.customLayers.size > 0 && gl !== null;
+    const customLayers = this.#seated ? [...this.customLayers] : [];
     const combined = combinedOf(layers, this.#seated);
     const planned = layers.flatMap((layer) => {
       const plan = layer.plan(sight, light, kinds, combined.includes(layer));
@@ -112,9 +112,9 @@ export class Painter {
     const before = (layer: imageLayer): number | null => (combined.includes(layer) ? combined.indexOf(layer) : null);
     this.#queue.want(planned.flatMap(({ plan }) => plan.jobs));
     const complete = !layers.some((layer) => layer.loading) && planned.every(({ plan }) => plan.complete);
-    if (turn && gl) turn({ gl, width, height, complete, rangeOf: (frame) => rangeAlong(sight, frame, layers, guests), depict: (camera, range, framebuffer) => { this.#depict({ ...sight, camera, dpr: 1 }, content, guests, { range, framebuffer }); } });
-    else this.#drawer.draw({ camera: sight.camera, width, height, dpr: sight.dpr, light, guests, shade: shade && { by: shade, moving }, passes: planned.map(({ layer, plan }) => layer.pass(plan, sight, before(layer))) });
-    if (complete && gl && this.guests.size > 0 && !this.#seated) {
+    if (turn && gl) turn({ gl, width, height, complete, getDepthRange: (frame) => rangeAlong(sight, frame, layers, customLayers), drawView: (camera, range, framebuffer) => { this.#depict({ ...sight, camera, dpr: 1 }, content, customLayers, { range, framebuffer }); } });
+    else this.#drawer.draw({ camera: sight.camera, width, height, dpr: sight.dpr, light, customLayers, shade: shade && { by: shade, moving }, passes: planned.map(({ layer, plan }) => layer.pass(plan, sight, before(layer))) });
+    if (complete && gl && this.customLayers.size > 0 && !this.#seated) {
       this.#seated = true;
       this.#events.changed();
     }
@@ -122,14 +122,14 @@ export class Painter {
   }
 
   /** What is in memory, with the depth of all layers that have any. */
-  #depict(sight: Sight, { layers, light, shade }: Content, guests: readonly Guest[], into: NonNullable<FrameSpec["into"]>): void {
+  #depict(sight: ViewState, { layers, light, shade }: Content, customLayers: readonly CustomLayer[], into: NonNullable<FrameSpec["into"]>): void {
     const { camera } = sight;
     const { width, height } = camera;
     const passes = layers.filter((layer) => layer.combines).flatMap((layer, k) => {
       const plan = layer.plan(sight, light, [], true);
       return plan ? [layer.pass(plan, sight, k)] : [];
     });
-    this.#drawer.draw({ camera, width, height, dpr: 1, light, guests, shade: shade && { by: shade, moving: false }, passes, into });
+    this.#drawer.draw({ camera, width, height, dpr: 1, light, customLayers, shade: shade && { by: shade, moving: false }, passes, into });
   }
 
   /** Forgets the tiles of a layer that has left. */

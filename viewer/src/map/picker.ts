@@ -8,7 +8,7 @@ import { NO_DEPTH, type TileData } from "../tiles/tileData";
 import { groupsOf } from "./combined";
 import type { imageLayer } from "./imageLayer";
 import { DEPTH_UNIT_M, middleIn } from "./layerPlan";
-import type { Sight } from "./stage";
+import type { ViewState } from "./layerContext";
 
 /** What lies under a pixel. */
 export interface Pick {
@@ -24,7 +24,7 @@ export interface Pick {
 export const NOTHING: Pick = { id: 0, position: null, approximate: false, layer: null };
 
 /** What is exact: from the deepest level, whose tiles are fetched when they are not here. */
-export async function pickExactly(layers: readonly imageLayer[], sight: Sight, at: Vec2): Promise<Pick> {
+export async function pickExactly(layers: readonly imageLayer[], sight: ViewState, at: Vec2): Promise<Pick> {
   for (const group of shownGroups(layers, sight, at)) {
     const picks = await Promise.all(group.map((layer) => pickFrom(layer, sight, at)));
     const pick = nearest(picks, group, sight);
@@ -33,7 +33,7 @@ export async function pickExactly(layers: readonly imageLayer[], sight: Sight, a
   return NOTHING;
 }
 
-async function pickFrom(layer: imageLayer, sight: Sight, at: Vec2): Promise<Pick | null> {
+async function pickFrom(layer: imageLayer, sight: ViewState, at: Vec2): Promise<Pick | null> {
   const spot = spotOf(layer, sight, at);
   const pixel = spot && pixelAt(spot.view.frame, spot.view.frame.zmax, ...spot.uv);
   if (!pixel) return null;
@@ -42,7 +42,7 @@ async function pickFrom(layer: imageLayer, sight: Sight, at: Vec2): Promise<Pick
 }
 
 /** What the tiles in memory tell, finest first; null when they tell nothing. */
-export function pickLoaded(layers: readonly imageLayer[], sight: Sight, at: Vec2): Pick | null {
+export function pickLoaded(layers: readonly imageLayer[], sight: ViewState, at: Vec2): Pick | null {
   let nothing: Pick | null = null;
   for (const group of shownGroups(layers, sight, at)) {
     const picks = group.map((layer) => loadedFrom(layer, sight, at));
@@ -54,7 +54,7 @@ export function pickLoaded(layers: readonly imageLayer[], sight: Sight, at: Vec2
 }
 
 /** Of the finest tile in memory; without a layer: nothing is there. */
-function loadedFrom(layer: imageLayer, sight: Sight, at: Vec2): Pick | null {
+function loadedFrom(layer: imageLayer, sight: ViewState, at: Vec2): Pick | null {
   const spot = spotOf(layer, sight, at);
   if (!spot) return null;
   const { frame } = spot.view;
@@ -68,13 +68,13 @@ function loadedFrom(layer: imageLayer, sight: Sight, at: Vec2): Pick | null {
 }
 
 /** Layers that show something at a point, uppermost first; those of a group hide each other by depth. */
-function shownGroups(layers: readonly imageLayer[], { camera }: Sight, [x, y]: Vec2): (readonly imageLayer[])[] {
+function shownGroups(layers: readonly imageLayer[], { camera }: ViewState, [x, y]: Vec2): (readonly imageLayer[])[] {
   const point: Vec2 = [x / camera.width, y / camera.height];
   return [...groupsOf(layers.filter((layer) => layer.shows(point)))].reverse();
 }
 
 /** Of what a group shows at a point, by the drawers' rule. */
-function nearest(picks: readonly (Pick | null)[], group: readonly imageLayer[], { camera: { frame, zoom }, origin }: Sight): Pick | null {
+function nearest(picks: readonly (Pick | null)[], group: readonly imageLayer[], { camera: { frame, zoom }, origin }: ViewState): Pick | null {
   const far = (pick: Pick, k: number): number => (pick.position ? dot(frame.axes.forward, sub(pick.position, origin)) - leadOf(frame, zoom, k) : Infinity);
   const found = picks.flatMap((pick, k) => (pick ? [{ pick, far: group.length > 1 ? far(pick, k) : 0 }] : []));
   return found.reduce<(typeof found)[0] | null>((best, one) => (best && best.far < one.far ? best : one), null)?.pick ?? null;
@@ -85,9 +85,9 @@ interface Spot {
   readonly uv: Vec2;
 }
 
-function spotOf(layer: imageLayer, sight: Sight, [x, y]: Vec2): Spot | null {
+function spotOf(layer: imageLayer, sight: ViewState, [x, y]: Vec2): Spot | null {
   const { camera } = sight;
-  const view = layer.viewOf(camera.frame);
+  const view = layer.findView(camera.frame);
   if (!view || !layer.rendering) return null;
   const [u, v] = middleIn(view.frame, sight, layer.rendering);
   const px = cssPixelM(camera);
@@ -96,12 +96,12 @@ function spotOf(layer: imageLayer, sight: Sight, [x, y]: Vec2): Spot | null {
 
 async function need(layer: imageLayer, view: View, kind: LayerKind, tile: Tile): Promise<TileData | null> {
   const info = layer.rendering?.layers.get(kind);
-  return info && layer.store ? layer.store.need(view, info, tile) : null;
+  return info && layer.tiles ? layer.tiles.need(view, info, tile) : null;
 }
 
 function loaded(layer: imageLayer, view: View, kind: LayerKind, tile: Tile): TileData | null {
   const info = layer.rendering?.layers.get(kind);
-  return (info && layer.store?.get(view, info, tile)?.data) ?? null;
+  return (info && layer.tiles?.get(view, info, tile)?.data) ?? null;
 }
 
 interface Pixel {
@@ -114,7 +114,7 @@ interface Pixel {
 function read(layer: imageLayer, view: View, pixel: Pixel, ids: TileData | null, depths: TileData | null): Pick | null {
   const id = valueAt(ids, pixel);
   const depth = valueAt(depths, pixel) ?? NO_DEPTH;
-  if ((!id && depth === NO_DEPTH) || layer.hides(id ?? 0)) return null;
+  if ((!id && depth === NO_DEPTH) || layer.isHidden(id ?? 0)) return null;
   return { id: id ?? 0, position: positionOf(layer, view, pixel, depth), approximate: pixel.tile.z < view.frame.zmax, layer };
 }
 

@@ -4,11 +4,11 @@ import { cssPixelM, uvFromScreen, type Camera } from "../geo/camera";
 import { ancestor, childrenOf, pixelM, type Tile } from "../geo/frame";
 import type { Rendering, View } from "../geo/manifest";
 import { coverOf, levelFor, type Rect } from "../tiles/cover";
-import type { Store } from "../tiles/store";
+import type { LayerTiles } from "../tiles/layerTiles";
 import { NO_DEPTH } from "../tiles/tileData";
 import type { imageLayer } from "./imageLayer";
 import { DEPTH_UNIT_M } from "./layerPlan";
-import type { Sight } from "./stage";
+import type { ViewState } from "./layerContext";
 
 /** Surfaces that go on from a pixel to the next are at most so steep: metres of depth a metre across. */
 const STEEPEST = 8;
@@ -32,7 +32,7 @@ export class Relief {
   readonly #bias_m: number;
 
   /** @param ids object ids are read, too, for `idAt` */
-  constructor(layers: readonly imageLayer[], sight: Sight, ids = false) {
+  constructor(layers: readonly imageLayer[], sight: ViewState, ids = false) {
     const { camera, origin, dpr, finer } = sight;
     [this.camera, this.origin, this.dpr] = [camera, origin, dpr];
     const px = cssPixelM(camera) / dpr;
@@ -50,7 +50,7 @@ export class Relief {
    * Of a rectangle (U and V of the sight's frame) at the deepest level whose tiles in it are no more than so many; they are fetched. What cannot be
    * had is read from what is in memory: `approximate` then, and where the level is not the deepest.
    */
-  static async fetched(layers: readonly imageLayer[], sight: Sight, [low, high]: Rect, most: number, ids = false): Promise<{ relief: Relief; approximate: boolean }> {
+  static async fetch(layers: readonly imageLayer[], sight: ViewState, [low, high]: Rect, most: number, ids = false): Promise<{ relief: Relief; approximate: boolean }> {
     const { frame } = sight.camera;
     const across = (z: number): number => (((high[0] - low[0]) * 2 ** z) / frame.size + 1) * (((high[1] - low[1]) * 2 ** z) / frame.size + 1);
     let zoom = frame.zmax;
@@ -87,7 +87,7 @@ export class Relief {
    * Does a surface lie before a point? A point on a surface is not hidden by it: the farthest of the 3 × 3 pixels around counts, as far as they go on from
    * the point's own (steps of up to 8 pixels), and 5 cm, half a pixel and what level ground rises in half a pixel more. Where nothing is known, nothing hides.
    */
-  hides(u: number, v: number, d: number): boolean {
+  isOccluded(u: number, v: number, d: number): boolean {
     const own = this.depthAt(u, v);
     const near = d - this.#bias_m;
     if (!(own < near)) return false;
@@ -101,7 +101,7 @@ export class Relief {
 
   /** Does something that is seen lie before a world position? */
   covers(world: Vec3): boolean {
-    return this.hides(...uvdFromLocal(this.camera.frame.axes, sub(world, this.origin)));
+    return this.isOccluded(...uvdFromLocal(this.camera.frame.axes, sub(world, this.origin)));
   }
 
   /** World position of the surface under CSS pixels; null where nothing is, or nothing is known. */
@@ -156,12 +156,12 @@ class Sheet {
   /** Of the object whose depth was read last. */
   id = 0;
 
-  static of(layer: imageLayer, sight: Sight, px: number, ids: boolean): Sheet | null {
-    const [view, { rendering, store }] = [layer.viewOf(sight.camera.frame), layer];
-    return view && store && rendering?.layers.has("depth") ? new Sheet(layer, view, rendering, store, sight, px, ids) : null;
+  static of(layer: imageLayer, sight: ViewState, px: number, ids: boolean): Sheet | null {
+    const [view, { rendering, tiles }] = [layer.findView(sight.camera.frame), layer];
+    return view && tiles && rendering?.layers.has("depth") ? new Sheet(layer, view, rendering, tiles, sight, px, ids) : null;
   }
 
-  private constructor(layer: imageLayer, view: View, { json, layers }: Rendering, store: Store, { origin, dpr, finer }: Sight, px: number, ids: boolean) {
+  private constructor(layer: imageLayer, view: View, { json, layers }: Rendering, store: LayerTiles, { origin, dpr, finer }: ViewState, px: number, ids: boolean) {
     [this.#layer, this.#view, this.#ids] = [layer, view, ids && layers.has("id")];
     this.#level = levelFor(view.frame, px, dpr, finer);
     this.#side = 2 ** this.#level;
@@ -208,7 +208,7 @@ class Sheet {
   }
 
   get #readsIds(): boolean {
-    return this.#ids || this.#layer.finishes !== null;
+    return this.#ids || this.#layer.drawStyles !== null;
   }
 
   /** Reads anew what it has looked up. */
@@ -225,7 +225,7 @@ class Sheet {
 
   sources(rect: Rect): unknown[] {
     const of = (patch: Patch): unknown[] => (typeof patch === "string" ? [patch] : "children" in patch ? patch.children.flatMap(of) : [patch.depths]);
-    return [this.#layer.finishes, ...this.#tilesIn(rect).flatMap((tile) => of(this.#patchOf(tile)))];
+    return [this.#layer.drawStyles, ...this.#tilesIn(rect).flatMap((tile) => of(this.#patchOf(tile)))];
   }
 
   #valueOf(patch: Patch, right: number, down: number): number {
@@ -240,7 +240,7 @@ class Sheet {
     const j = clamp(Math.floor(down / patch.px) - y * tilePx, 0, tilePx - 1);
     const depth = patch.depths[j * tilePx + i] as number;
     this.id = patch.ids?.[j * tilePx + i] ?? 0;
-    if (depth === NO_DEPTH || (patch.ids && this.#layer.hides(this.id))) return Infinity;
+    if (depth === NO_DEPTH || (patch.ids && this.#layer.isHidden(this.id))) return Infinity;
     return d0 + depth * this.#unit_m - this.#shift[2];
   }
 

@@ -1,8 +1,8 @@
 import { element } from "../core/dom";
 import { clamp } from "../core/vec";
-import { roundBelow } from "../core/lengths";
+import { floorToRound } from "../core/lengths";
 import type { Profile } from "./profile";
-import type { Words } from "./words";
+import type { MeasureMessages } from "./i18n";
 
 const NS = "http://www.w3.org/2000/svg";
 /** Of the drawing, in its own units; it is stretched to the box. */
@@ -18,7 +18,7 @@ export class Chart {
   readonly #hand = element("div", "map3d-profile-hand");
   readonly #walk: (at: number | null) => void;
   #profile: Profile | undefined;
-  #words: Words | undefined;
+  #words: MeasureMessages | undefined;
   #range: readonly [number, number] = [0, 1];
   #at: number | null = null;
 
@@ -44,7 +44,7 @@ export class Chart {
   }
 
   /** @param about said before numbers that are not exact */
-  set(profile: Profile, words: Words, about: string): void {
+  set(profile: Profile, words: MeasureMessages, about: string): void {
     [this.#profile, this.#words, this.#at] = [profile, words, null];
     const known = [...profile.heights_m].filter((height) => !Number.isNaN(height));
     const [low, high] = known.length > 0 ? [Math.min(...known), Math.max(...known)] : [0, 1];
@@ -58,9 +58,9 @@ export class Chart {
     this.#show(null);
   }
 
-  #grid(words: Words): SVGElement[] {
+  #grid(words: MeasureMessages): SVGElement[] {
     const [low, high] = this.#range;
-    const step = roundBelow((high - low) / LINES) * ((high - low) / LINES / roundBelow((high - low) / LINES) >= 2 ? 2 : 1);
+    const step = floorToRound((high - low) / LINES) * ((high - low) / LINES / floorToRound((high - low) / LINES) >= 2 ? 2 : 1);
     const heights = Array.from({ length: Math.max(0, Math.floor(high / step) - Math.ceil(low / step) + 1) }, (_, k) => (Math.ceil(low / step) + k) * step);
     this.#heights.replaceChildren(...heights.map((height) => {
       const label = element("span", "", {}, words.height(height));

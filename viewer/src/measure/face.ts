@@ -37,7 +37,7 @@ const [OFF_PX, OFF_M] = [8, 0.5];
  * it grows. null where the place is hidden, or nothing flat is there. @throws the signal's reason
  */
 export async function measureFace(map: map, position: Vec3, { signal }: FaceOptions = {}): Promise<Face | null> {
-  const sight = map.sight();
+  const sight = map.getViewState();
   if (!sight) return null;
   const { axes, u0, v0, size, zmax, tilePx } = sight.camera.frame;
   const [u, v, d] = uvdFromLocal(axes, sub(position, sight.origin));
@@ -45,7 +45,7 @@ export async function measureFace(map: map, position: Vec3, { signal }: FaceOpti
   const tile_m = size / last;
   const [x, y] = [Math.floor((u - u0) / tile_m), Math.floor((v0 - v) / tile_m)];
   for (let tiles: Sides = [x, y, x + 1, y + 1]; ;) {
-    const { relief, approximate } = await map.reliefOf(sight, rectOf(tiles, u0, v0, tile_m), Math.max(TILES * (256 / tilePx) ** 2, 4), true);
+    const { relief, approximate } = await map.fetchRelief(sight, rectOf(tiles, u0, v0, tile_m), Math.max(TILES * (256 / tilePx) ** 2, 4), true);
     signal?.throwIfAborted();
     const px = relief.pixel_m;
     if (!(Math.abs(relief.depthAt(u, v) - d) <= OFF_PX * px + OFF_M)) return null;

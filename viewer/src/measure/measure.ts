@@ -1,14 +1,14 @@
 import { adoptStyles } from "../core/dom";
 import { asError } from "../core/errors";
 import type { Vec3 } from "../core/vec";
-import { Attached, type ClickEvent, type map } from "../map3d";
+import { MapLayer, type ClickEvent, type map } from "../map3d";
 import { measureArea, measureLine, type AreaMeasure, type LineMeasure } from "./geometry";
 import { Chart } from "./chart";
 import { measureFace, type Face } from "./face";
 import { along, measureProfile, type Profile } from "./profile";
 import { Sketch, type Note } from "./sketch";
 import { STYLES } from "./styles";
-import { Words } from "./words";
+import { MeasureMessages } from "./i18n";
 
 export interface MeasureOptions {
   /** A line over the surface; the face under the first corner, then a polygon; or the heights along a line. Default "line". */
@@ -38,9 +38,9 @@ export interface MeasureEvents {
  * Measures on the surface: each click sets a corner; Backspace takes the last one back, Escape all. Positions are those of the deepest level, whatever
  * level is shown.
  */
-export class measure extends Attached<map, MeasureEvents> {
+export class measure extends MapLayer<map, MeasureEvents> {
   readonly options: Required<Omit<MeasureOptions, "language">> & Pick<MeasureOptions, "language">;
-  #words = new Words(undefined);
+  #words = new MeasureMessages(undefined);
   readonly #sketch = new Sketch();
   readonly #chart = new Chart((at) => { this.#walk(at); });
   #corners: readonly Corner[] = [];
@@ -97,11 +97,11 @@ export class measure extends Attached<map, MeasureEvents> {
     return this.setCorners([]);
   }
 
-  protected enter(map: map): void {
-    this.#words = new Words(this.options.language ?? map.language);
+  protected onAdd(map: map): void {
+    this.#words = new MeasureMessages(this.options.language ?? map.language);
     adoptStyles(document, STYLES);
     map.overlayPane.append(this.#sketch.box);
-    map.moves.on("move", this.#place);
+    map.frameEvents.on("move", this.#place);
     map.on("click", this.#clicked);
     map.container.addEventListener("keydown", this.#pressed);
     this.#draw();
@@ -109,8 +109,8 @@ export class measure extends Attached<map, MeasureEvents> {
     void this.#read();
   }
 
-  protected leave(map: map): void {
-    map.moves.off("move", this.#place);
+  protected onRemove(map: map): void {
+    map.frameEvents.off("move", this.#place);
     map.off("click", this.#clicked);
     map.container.removeEventListener("keydown", this.#pressed);
     map.off("moveend", this.#turned);
@@ -146,7 +146,7 @@ export class measure extends Attached<map, MeasureEvents> {
     this.#direction = map.direction;
     const reading = kind === "profile" && count > 1 ? this.#readProfile(map, signal) : kind === "area" && count === 1 ? this.#readFace(map, signal) : null;
     await reading?.catch((reason: unknown) => {
-      if (!signal.aborted) map.stage?.report(asError(reason));
+      if (!signal.aborted) map.layerContext?.report(asError(reason));
     });
   }
 

@@ -30,7 +30,7 @@ export async function measureProfile(map: map, points: readonly Vec3[], { sample
   const places = along(points, clamp(Math.round(samples), 2, 10_000));
   const heights_m = new Float64Array(places.length).fill(NaN);
   const distances_m = Float64Array.from(places, ({ distance_m }) => distance_m);
-  const sight = map.sight();
+  const sight = map.getViewState();
   if (!sight || points.length < 2) return { distances_m, heights_m, approximate: false };
   const { axes } = sight.camera.frame;
   const span = map.relief?.heights ?? [0, 0];
@@ -41,7 +41,7 @@ export async function measureProfile(map: map, points: readonly Vec3[], { sample
     const part = places.slice(first, first + size).map(({ place }) => sub(place, sight.origin));
     const corners = part.flatMap((place) => span.map((z): Vec2 => [dot(axes.right, place), flat(axes.up, place) + axes.up[2] * z]));
     const rect = [[least(corners, 0), least(corners, 1)], [-least(corners, 0, -1), -least(corners, 1, -1)]] as const;
-    const found = await map.reliefOf(sight, rect, TILES);
+    const found = await map.fetchRelief(sight, rect, TILES);
     approximate ||= found.approximate;
     part.forEach((place, k) => { heights_m[first + k] = heightAt(found.relief, axes, place, span) + sight.origin[2]; });
   }

@@ -1,5 +1,5 @@
 import { add, sub, type Box3, type Vec2, type Vec3 } from "../core/vec";
-import { Attached, FetchError, UsageError, type map } from "../map3d";
+import { MapLayer, FetchError, UsageError, type map } from "../map3d";
 import { contentsOf, freed, isBoned, type Contents } from "./contents";
 import { Models, type Member } from "./models";
 import type { Action, ThreeClip, ModelLoader, Mixer, ThreeNode, Three } from "./three";
@@ -57,7 +57,7 @@ const RAD = Math.PI / 180;
 const still = (): boolean => matchMedia("(prefers-reduced-motion: reduce)").matches;
 
 /** A polygonal object among the images: hidden by what stands before it, lit by the map's light. The page hands in its own three.js, which draws it. */
-export class modelLayer<T extends Three = Three> extends Attached<map, ModelLayerEvents<T>> {
+export class modelLayer<T extends Three = Three> extends MapLayer<map, ModelLayerEvents<T>> {
   readonly needs = ["depth"] as const;
   readonly options: Readonly<ModelLayerOptions>;
   readonly #three: Three;
@@ -163,17 +163,17 @@ export class modelLayer<T extends Three = Three> extends Attached<map, ModelLaye
 
   /** Shows what the page has changed of `object`. */
   redraw(): this {
-    this.map?.stage?.request();
+    this.map?.layerContext?.requestFrame();
     return this;
   }
 
-  protected enter(map: map): void {
+  protected onAdd(map: map): void {
     this.#begin(map).catch((reason: unknown) => {
       if (this.map === map) this.#fail(map, reason instanceof Error ? reason : new Error(String(reason)));
     });
   }
 
-  protected leave(map: map): void {
+  protected onRemove(map: map): void {
     if (this.#contents) freed(this.#contents.object); // while the renderer still knows what it has of it
     Models.remove(map, this.#three, this.#member);
   }
@@ -190,7 +190,7 @@ export class modelLayer<T extends Three = Three> extends Attached<map, ModelLaye
     if (this.map !== map) return;
     this.#contents ??= this.#placed(contents);
     Models.add(map, this.#three, this.#member);
-    map.stage?.request();
+    map.layerContext?.requestFrame();
     this.fire("ready", { object: contents.object as InstanceType<T["Object3D"]>, clips: this.clips });
     const wanted = this.#wanted;
     this.#wanted = null;
@@ -229,7 +229,7 @@ export class modelLayer<T extends Three = Three> extends Attached<map, ModelLaye
 
   #fail(map: map, error: Error): void {
     this.fire("error", { error });
-    map.stage?.report(error);
+    map.layerContext?.report(error);
   }
 
   #made(): Member {

@@ -3,7 +3,7 @@ import { add, type Box3, type Vec2, type Vec3 } from "../core/vec";
 import { localFromUvd } from "../geo/axes";
 import { cssPixelM, uvFromScreen } from "../geo/camera";
 import type { Frame } from "../geo/frame";
-import { UsageError, type Guest, type map, type Setting } from "../map3d";
+import { UsageError, type CustomLayer, type map, type FrameState } from "../map3d";
 import { Composite } from "./composite";
 import { depthsOf, groundOf, lampsOf, partOf, type Part } from "./place";
 import type { Lamp, ThreeNode, Three, ThreeCamera, ThreeHit, ThreeRenderer, ThreeTarget } from "./three";
@@ -41,7 +41,7 @@ const known = new WeakMap<map, Map<Three, Models>>();
  * pixel that part of the screen where models are, before the frame begins, and the picture is put among the images with its depth: three.js's orthographic camera
  * with the frame's range of D as its near and far planes has just the images' depth.
  */
-export class Models implements Guest {
+export class Models implements CustomLayer {
   readonly #map: map;
   readonly #three: Three;
   readonly #renderer: ThreeRenderer;
@@ -90,14 +90,14 @@ export class Models implements Guest {
     this.#scene.add(this.#sky);
     this.#scene.add(this.#sun);
     adoptStyles(document, STYLES);
-    map.seat(this).on("preclick", this.#clicked).on("mousemove", this.#moved).on("contextlost", this.#gone).on("contextrestored", this.#back);
-    map.moves.on("draw", this.#drawn);
+    map.toggleCustomLayer(this).on("preclick", this.#clicked).on("mousemove", this.#moved).on("contextlost", this.#gone).on("contextrestored", this.#back);
+    map.frameEvents.on("draw", this.#drawn);
   }
 
   #end(): void {
     const map = this.#map;
-    map.seat(this, false).off("preclick", this.#clicked).off("mousemove", this.#moved).off("contextlost", this.#gone).off("contextrestored", this.#back);
-    map.moves.off("draw", this.#drawn);
+    map.toggleCustomLayer(this, false).off("preclick", this.#clicked).off("mousemove", this.#moved).off("contextlost", this.#gone).off("contextrestored", this.#back);
+    map.frameEvents.off("draw", this.#drawn);
     map.container.classList.remove("map3d-over-model");
     this.#composite?.free();
     this.#target?.dispose();
@@ -107,11 +107,11 @@ export class Models implements Guest {
 
   // What the drawer calls
 
-  rangeAlong(frame: Frame): Vec2 | null {
+  getDepthRange(frame: Frame): Vec2 | null {
     return depthsOf(this.#boxes(), frame);
   }
 
-  prepare(gl: WebGL2RenderingContext, setting: Setting, range: Vec2): void {
+  prerender(gl: WebGL2RenderingContext, setting: FrameState, range: Vec2): void {
     this.#part = partOf(this.#boxes(), setting);
     if (!this.#part) return;
     this.#aim(setting, this.#part, range);
@@ -124,7 +124,7 @@ export class Models implements Guest {
     this.#renderer.resetState();
   }
 
-  paint(_gl: WebGL2RenderingContext, setting: Setting, soft: boolean): void {
+  render(_gl: WebGL2RenderingContext, setting: FrameState, soft: boolean): void {
     const [part, target] = [this.#part, this.#target];
     if (!part || !target?.depthTexture) return;
     const [color, depth] = [target.texture, target.depthTexture].map((texture) => (this.#renderer.properties.get(texture) as { __webglTexture?: WebGLTexture }).__webglTexture);
@@ -132,7 +132,7 @@ export class Models implements Guest {
   }
 
   #boxes(): Box3[] {
-    const origin = this.#map.sight()?.origin;
+    const origin = this.#map.getViewState()?.origin;
     return origin ? [...this.#members.values()].flatMap((member) => member.boxes(origin)) : [];
   }
 
@@ -143,7 +143,7 @@ export class Models implements Guest {
   }
 
   /** The camera stands in the middle of what it sees, so that numbers are small on the GPU. */
-  #aim(setting: Setting, part: Part, [near, far]: Vec2): void {
+  #aim(setting: FrameState, part: Part, [near, far]: Vec2): void {
     const { right, up, forward } = setting.camera.frame.axes;
     const [left, top, px] = groundOf(part, setting);
     const [w, h, d] = [part.width * px, part.height * px, (near + far) / 2];
@@ -153,7 +153,7 @@ export class Models implements Guest {
     this.#camera.updateProjectionMatrix();
   }
 
-  #shine({ light }: Setting): void {
+  #shine({ light }: FrameState): void {
     const { sky_rgb, sky, sun_rgb, sun, towards } = lampsOf(light);
     this.#sky.color.setRGB(...sky_rgb);
     this.#sky.intensity = sky;
@@ -170,7 +170,7 @@ export class Models implements Guest {
     const seconds = Math.min((now - (this.#last_ms ?? now)) / 1000, LONGEST_STEP_S);
     const moving = [...this.#members.values()].filter((member) => member.step(seconds)).length > 0 && !this.#lost;
     this.#last_ms = moving ? now : null;
-    if (moving) this.#map.stage?.request();
+    if (moving) this.#map.layerContext?.requestFrame();
   };
 
   readonly #gone = (): void => {
@@ -194,8 +194,8 @@ export class Models implements Guest {
 
   /** The nearest model under a point of the screen, when it is listened to and no image hides it as far as depths are known. */
   #hit(point: Vec2): { member: Member; position: Vec3; hit: ThreeHit } | null {
-    const { relief, turning } = this.#map;
-    if (!relief || turning || ![...this.#members.values()].some(({ listening }) => listening)) return null;
+    const { relief, inTransition } = this.#map;
+    if (!relief || inTransition || ![...this.#members.values()].some(({ listening }) => listening)) return null;
     const { camera, origin } = relief;
     const { axes } = camera.frame;
     const [near] = depthsOf(this.#boxes(), camera.frame) ?? [0];
@@ -209,7 +209,7 @@ export class Models implements Guest {
     const local: Vec3 = [hit.point.x, hit.point.y, hit.point.z];
     const member = this.#memberOf(hit.object);
     const d = axes.forward[0] * local[0] + axes.forward[1] * local[1] + axes.forward[2] * local[2];
-    return member?.listening && !relief.hides(u, v, d) ? { member, position: add(origin, local), hit } : null;
+    return member?.listening && !relief.isOccluded(u, v, d) ? { member, position: add(origin, local), hit } : null;
   }
 
   #memberOf(node: ThreeNode): Member | undefined {

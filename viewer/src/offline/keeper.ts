@@ -1,4 +1,4 @@
-import { Map3dError, type Ask } from "../map3d";
+import { Map3dError, type FetchFunction } from "../map3d";
 import { isVersioned, pageKey, partOf, pieceKey, rangeOf, tagOf } from "./keys";
 
 /** The browser has no room for an area, or keeps nothing at all. */
@@ -27,7 +27,7 @@ export class Keeper {
     this.#failed = failed;
   }
 
-  readonly ask: Ask = async (url, init) => {
+  readonly ask: FetchFunction = async (url, init) => {
     const range = rangeOf(new Headers(init.headers));
     const key = range === undefined ? url : pieceKey(url, range);
     const kept = await this.#cache.match(key);

@@ -1,8 +1,8 @@
 import { clamp, type Vec2, type Vec3 } from "../core/vec";
-import { axesOf, uvdFromLocal } from "../geo/axes";
+import { computeAxes, uvdFromLocal } from "../geo/axes";
 import type { Camera } from "../geo/camera";
 import type { Frame } from "../geo/frame";
-import { Attached, type Depicting, type map, type Turner } from "../map3d";
+import { MapLayer, type TransitionFrame, type map, type ViewTransition } from "../map3d";
 import { fadeOut } from "./fade";
 import { Warp, type Shot } from "./warp";
 
@@ -59,7 +59,7 @@ const apart = (a: Gaze, b: Gaze): number => Math.hypot(wayTo(a.lookAt, b.lookAt)
  * the other. Two fingers, or the right mouse button, turn freely between directions; let go, the picture moves on to the nearest. A cross-fade where there
  * is no WebGL, a cut where the user wants no movement. Reads depth: its tiles are fetched.
  */
-export class orbit extends Attached<map, object> implements Turner {
+export class orbit extends MapLayer<map, object> implements ViewTransition {
   readonly needs = ["depth"] as const;
   readonly #duration_ms: number;
   #warp: Warp | undefined;
@@ -71,21 +71,21 @@ export class orbit extends Attached<map, object> implements Turner {
     this.#duration_ms = duration_ms;
   }
 
-  protected enter(map: map): void {
-    map.setTurner(this);
+  protected onAdd(map: map): void {
+    map.setTransition(this);
   }
 
-  protected leave(map: map): void {
+  protected onRemove(map: map): void {
     this.#end();
-    map.setTurner(null);
+    map.setTransition(null);
   }
 
   /** @internal */
-  turn(from: Camera, pivot: Vec3): void {
-    const { drawer, shown } = this.map ?? {};
+  start(from: Camera, pivot: Vec3): void {
+    const { drawer, drawerElement } = this.map ?? {};
     if (still() || !drawer) return;
     if (drawer === "canvas") {
-      if (shown) fadeOut(shown, FADE_MS);
+      if (drawerElement) fadeOut(drawerElement, FADE_MS);
       return;
     }
     const start = this.#turn?.at ?? gazeOf(from.frame);
@@ -94,7 +94,7 @@ export class orbit extends Attached<map, object> implements Turner {
   }
 
   /** @internal */
-  twist(rad: number): boolean {
+  rotateBy(rad: number): boolean {
     const map = this.map;
     if (!map || map.drawer !== "webgl" || still()) return false;
     this.#hand ??= { base_deg: this.#turn?.at.lookAt ?? map.lookAt_deg, turned_deg: 0 };
@@ -105,12 +105,12 @@ export class orbit extends Attached<map, object> implements Turner {
     const between = this.#turn && Math.sign(beyond) === Math.sign(back) && Math.abs(beyond) <= Math.abs(back);
     if (!between && Math.abs(beyond) > MEANT_DEG) map.rotate(Math.sign(beyond));
     if (this.#turn) this.#turn.at = { ...this.#turn.at, lookAt };
-    map.requestTurn();
+    map.requestTransitionFrame();
     return true;
   }
 
   /** @internal */
-  release(): void {
+  endGesture(): void {
     const [turn, map] = [this.#turn, this.map];
     if (!this.#hand || !map) return;
     this.#hand = null;
@@ -141,7 +141,7 @@ export class orbit extends Attached<map, object> implements Turner {
   }
 
   /** @internal */
-  paint(scene: Depicting): void {
+  draw(scene: TransitionFrame): void {
     const turn = this.#turn;
     const { gl, camera } = scene;
     if (!turn || gl.isContextLost()) return;
@@ -156,7 +156,7 @@ export class orbit extends Attached<map, object> implements Turner {
     const share = a + b > 0 ? a / (a + b) : 1;
     const size = fitted(scene.width, scene.height);
     turn.start_ms ??= performance.now();
-    warp.show(turn.shots, { camera: goal, pivot: turn.pivot, range: scene.rangeOf(goal.frame) }, share * share * (3 - 2 * share), scene, size);
+    warp.show(turn.shots, { camera: goal, pivot: turn.pivot, range: scene.getDepthRange(goal.frame) }, share * share * (3 - 2 * share), scene, size);
   }
 
   /** @throws DrawError, once: the change is a cut then */
@@ -183,7 +183,7 @@ export class orbit extends Attached<map, object> implements Turner {
 
 /** As the map's camera, but along the direction of the moment; the pivot stays where the camera has it. */
 function seenFrom(camera: Camera, { at, pivot }: Pick<Turn, "at" | "pivot">): Camera {
-  const axes = axesOf(at.lookAt, at.pitch);
+  const axes = computeAxes(at.lookAt, at.pitch);
   const [u, v] = uvdFromLocal(camera.frame.axes, pivot);
   const [turnedU, turnedV] = uvdFromLocal(axes, pivot);
   return { ...camera, frame: { ...camera.frame, axes, lookAtDeg: at.lookAt, pitchDeg: at.pitch }, u: turnedU + camera.u - u, v: turnedV + camera.v - v };
@@ -192,13 +192,13 @@ function seenFrom(camera: Camera, { at, pivot }: Pick<Turn, "at" | "pivot">): Ca
 const moved = (a: Camera, b: Camera): boolean => (["u", "v", "zoom", "frame", "width", "height"] as const).some((part) => a[part] !== b[part]);
 
 /** What a camera sees, and what lies beyond and is seen half-way to another frame, in a picture of its own. @param into whose place is taken again */
-function shotOf(scene: Depicting, warp: Warp, camera: Camera, other: Frame, into: Shot | null): Shot {
+function shotOf(scene: TransitionFrame, warp: Warp, camera: Camera, other: Frame, into: Shot | null): Shot {
   const [wide, high] = turnedScreen(camera, other);
   const [width, height] = fitted(wide * (scene.width / camera.width), high * (scene.height / camera.height));
   const larger = { ...camera, width, height, zoom: camera.zoom - Math.log2(wide / width) };
-  const range = scene.rangeOf(camera.frame);
+  const range = scene.getDepthRange(camera.frame);
   const target = into?.target.width === width && into.target.height === height ? into.target : warp.target(width, height);
-  scene.depict(larger, range, target.framebuffer);
+  scene.drawView(larger, range, target.framebuffer);
   return { of: camera, camera: larger, range, target };
 }
 

@@ -1,4 +1,4 @@
-import type { Surface } from "../core/surface";
+import type { OverlayHost } from "../core/overlayHost";
 import type { Vec2, Vec3 } from "../core/vec";
 
 const START_PX = 4;
@@ -6,10 +6,10 @@ const STEP_PX = 10;
 const KEYS: Readonly<Record<string, Vec2>> = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
 /** Moves something that has a position over the surface: under the pointer, or by arrow keys. Where no surface is known it stays. */
-export function listenToDrags(handle: HTMLElement, map: Surface, position: () => Vec3, tell: (type: "dragstart" | "drag" | "dragend", position: Vec3) => void): void {
+export function listenToDrags(handle: HTMLElement, map: OverlayHost, position: () => Vec3, tell: (type: "dragstart" | "drag" | "dragend", position: Vec3) => void): void {
   let hand: { readonly id: number; readonly from: Vec2; readonly grip: Vec2; moved: boolean } | undefined;
   const place = (x: number, y: number): void => {
-    const on = map.surfaceAt([x, y]);
+    const on = map.findSurfaceAt([x, y]);
     if (on) tell("drag", on);
   };
   handle.classList.add("map3d-marker-loose");

@@ -1,6 +1,6 @@
 import { element } from "../core/dom";
 import { Evented } from "../core/events";
-import type { Attachable, Holder, Surface } from "../core/surface";
+import type { Addable, LayerHost, OverlayHost } from "../core/overlayHost";
 import type { Vec2, Vec3 } from "../core/vec";
 import { listenToDrags } from "./drag";
 import { popup, type PopupOptions } from "./popup";
@@ -34,7 +34,7 @@ export interface MarkerEvents {
 }
 
 /** A labelled 3D position (coordinates of the scene's CRS). */
-export class marker extends Evented<MarkerEvents> implements Attachable<Surface> {
+export class marker extends Evented<MarkerEvents> implements Addable<OverlayHost> {
   readonly options: Required<Omit<MarkerOptions, "color" | "icon">> & Pick<MarkerOptions, "color" | "icon">;
   readonly needs: readonly "depth"[];
   #button: HTMLButtonElement | undefined;
@@ -42,7 +42,7 @@ export class marker extends Evented<MarkerEvents> implements Attachable<Surface>
   #position: Vec3;
   #shift: Vec2 = [0, 0];
   #popup: popup | undefined;
-  #map: (Surface & Partial<Holder<Surface>>) | undefined;
+  #map: (OverlayHost & Partial<LayerHost<OverlayHost>>) | undefined;
   #selected = false;
   #place = (): void => {
     this.#update();
@@ -57,7 +57,7 @@ export class marker extends Evented<MarkerEvents> implements Attachable<Surface>
   }
 
   /** Puts it on a map. */
-  addTo(map: Holder<Surface>): this {
+  addTo(map: LayerHost<OverlayHost>): this {
     map.add(this);
     return this;
   }
@@ -99,7 +99,7 @@ export class marker extends Evented<MarkerEvents> implements Attachable<Surface>
   }
 
   /** @internal Shown so many CSS pixels beside its position. */
-  setShift(shift: Vec2): this {
+  setOffset(shift: Vec2): this {
     this.#shift = shift;
     this.#update();
     return this;
@@ -114,7 +114,7 @@ export class marker extends Evented<MarkerEvents> implements Attachable<Surface>
 
   /** Nothing when it has none, or is on no map. */
   openPopup(): this {
-    if (this.#map?.add && this.#popup && !this.#popup.isOpen) this.#popup.addTo(this.#map as Holder<Surface>);
+    if (this.#map?.add && this.#popup && !this.#popup.isOpen) this.#popup.addTo(this.#map as LayerHost<OverlayHost>);
     return this;
   }
 
@@ -132,23 +132,23 @@ export class marker extends Evented<MarkerEvents> implements Attachable<Surface>
     return this.fire(selected ? "select" : "deselect", { marker: this });
   }
 
-  onAdd(map: Surface): void {
+  attachTo(map: OverlayHost): void {
     this.#map = map;
     this.#button = this.#made(map);
     this.#dress();
     map.overlayPane.append(this.#button);
-    map.moves.on(this.options.occlusion === "none" ? "move" : "draw", this.#place);
+    map.frameEvents.on(this.options.occlusion === "none" ? "move" : "draw", this.#place);
     this.#update();
   }
 
-  onRemove(map: Surface): void {
-    map.moves.off("move", this.#place).off("draw", this.#place);
+  detachFrom(map: OverlayHost): void {
+    map.frameEvents.off("move", this.#place).off("draw", this.#place);
     this.#popup?.remove();
     this.#button?.remove();
     this.#button = this.#map = undefined;
   }
 
-  #made(map: Surface): HTMLButtonElement {
+  #made(map: OverlayHost): HTMLButtonElement {
     const { color, icon, showLabel, draggable } = this.options;
     const button = element("button", "map3d-marker", { type: "button" }, icon === undefined ? element("span", "map3d-marker-stem") : element("span", "map3d-marker-icon", {}, icon), element("span", "map3d-marker-label"));
     button.classList.toggle("map3d-marker-quiet", !showLabel);
@@ -183,7 +183,7 @@ export class marker extends Evented<MarkerEvents> implements Attachable<Surface>
     const [button, map] = [this.#button, this.#map];
     const at = map?.project(this.#position);
     if (!button || !map) return;
-    const behind = this.options.occlusion !== "none" && map.covers(this.#position);
+    const behind = this.options.occlusion !== "none" && map.isOccluded(this.#position);
     const { clientWidth, clientHeight } = map.container;
     const seen = at && at[0] > -80 && at[1] > -10 && at[0] < clientWidth + 80 && at[1] < clientHeight + 80;
     button.hidden = !seen || (behind && this.options.occlusion === "hide");

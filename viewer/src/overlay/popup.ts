@@ -1,7 +1,7 @@
 import { element, iconButton } from "../core/dom";
 import { Evented } from "../core/events";
-import { wordsOf } from "../core/words";
-import type { Attachable, Holder, Surface } from "../core/surface";
+import { getMapMessages } from "../core/i18n";
+import type { Addable, LayerHost, OverlayHost } from "../core/overlayHost";
 import type { Vec3 } from "../core/vec";
 
 /** How a popup looks. */
@@ -23,12 +23,12 @@ export interface PopupEvents {
 const CLOSE = "M6 6l12 12M18 6L6 18";
 
 /** A box with text or DOM content that points at a position (world coordinates). */
-export class popup extends Evented<PopupEvents> implements Attachable<Surface> {
+export class popup extends Evented<PopupEvents> implements Addable<OverlayHost> {
   readonly options: Required<PopupOptions>;
   readonly #box: HTMLElement;
   readonly #body: HTMLElement;
   #position: Vec3;
-  #map: (Surface & Partial<Holder<Surface>>) | undefined;
+  #map: (OverlayHost & Partial<LayerHost<OverlayHost>>) | undefined;
   #place = (): void => {
     this.#update();
   };
@@ -44,7 +44,7 @@ export class popup extends Evented<PopupEvents> implements Attachable<Surface> {
   }
 
   /** Opens it on a map. */
-  addTo(map: Holder<Surface>): this {
+  addTo(map: LayerHost<OverlayHost>): this {
     map.add(this);
     return this;
   }
@@ -73,20 +73,20 @@ export class popup extends Evented<PopupEvents> implements Attachable<Surface> {
     return this;
   }
 
-  onAdd(map: Surface): void {
+  attachTo(map: OverlayHost): void {
     this.#map = map;
-    const { details, close } = wordsOf(map.language);
+    const { details, close } = getMapMessages(map.language);
     this.#box.setAttribute("aria-label", details);
     const button = this.#box.querySelector(".map3d-popup-close");
     for (const name of ["aria-label", "title"]) button?.setAttribute(name, close);
     map.overlayPane.append(this.#box);
-    map.moves.on("move", this.#place);
+    map.frameEvents.on("move", this.#place);
     this.#update();
     this.fire("open", {});
   }
 
-  onRemove(map: Surface): void {
-    map.moves.off("move", this.#place);
+  detachFrom(map: OverlayHost): void {
+    map.frameEvents.off("move", this.#place);
     this.#box.remove();
     this.#map = undefined;
     this.fire("close", {});

@@ -1,4 +1,4 @@
-import { LONGEST_PX, lengthOf, roundBelow } from "../core/lengths";
+import { SCALE_BAR_MAX_PX, formatLength, floorToRound } from "../core/lengths";
 import type { map } from "../map3d";
 import type { PictureLegend } from "./picture";
 
@@ -56,7 +56,7 @@ export class Furniture {
 
   /** Legend, scale bar and attribution, from the bottom upwards. */
   foot(legend: PictureLegend | undefined, scaleBar: boolean, attribution: string): void {
-    const high = this.#attribution(attribution, scaleBar ? LONGEST_PX + 2 * MARGIN : MARGIN);
+    const high = this.#attribution(attribution, scaleBar ? SCALE_BAR_MAX_PX + 2 * MARGIN : MARGIN);
     if (scaleBar) this.#scaleBar(this.#height - MARGIN);
     if (legend) this.#legend(legend, this.#height - MARGIN - Math.max(high, scaleBar ? 24 : 0));
   }
@@ -118,7 +118,7 @@ export class Furniture {
 
   #scaleBar(bottom: number): void {
     const context = this.#context;
-    const metres = roundBelow(Math.min(LONGEST_PX, this.#width / 3) * this.#unit_m);
+    const metres = floorToRound(Math.min(SCALE_BAR_MAX_PX, this.#width / 3) * this.#unit_m);
     const length = metres / this.#unit_m;
     context.beginPath();
     for (const [x, y] of [[0, -7], [0, 0], [length, 0], [length, -7]] as const) context.lineTo(MARGIN + x, bottom + y);
@@ -126,8 +126,8 @@ export class Furniture {
     context.textAlign = "center";
     context.font = `500 12px ${FONT}`;
     [context.strokeStyle, context.lineWidth] = [HALO, 3];
-    context.strokeText(lengthOf(metres), MARGIN + length / 2, bottom - 9);
-    this.#text(lengthOf(metres), MARGIN + length / 2, bottom - 9, 12, 500);
+    context.strokeText(formatLength(metres), MARGIN + length / 2, bottom - 9);
+    this.#text(formatLength(metres), MARGIN + length / 2, bottom - 9, 12, 500);
     context.textAlign = "left";
   }
 

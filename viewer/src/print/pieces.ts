@@ -26,7 +26,7 @@ const PIECE_PX = 1024;
 
 /** Paints what a map shows, in all its looks, piece by piece by a map of its own off the screen. @throws what a tile's fetch threw, or the signal's reason */
 export async function paintPieces(shown: map, { width, height, scale }: Extent, into: CanvasRenderingContext2D, { signal, progress }: Watch): Promise<void> {
-  const sight = shown.sight();
+  const sight = shown.getViewState();
   if (!sight || shown.drawer === null) throw new UsageError("the map shows nothing yet; wait for its event \"ready\"");
   const { camera, origin } = sight;
   const side = { width: Math.min(PIECE_PX, width), height: Math.min(PIECE_PX, height) };
@@ -41,7 +41,7 @@ export async function paintPieces(shown: map, { width, height, scale }: Extent, 
       const middle = { x: x + (box.clientWidth * scale) / 2, y: y + (box.clientHeight * scale) / 2 };
       const corner = { x: (x - width / 2) / scale / camera.width + 0.5, y: (y - height / 2) / scale / camera.height + 0.5 };
       hidden.clip(corner, { x: box.clientWidth / camera.width, y: box.clientHeight / camera.height });
-      hidden.map.look({ ...camera, u: camera.u + (middle.x - width / 2) * px_m, v: camera.v - (middle.y - height / 2) * px_m }, origin);
+      hidden.map.syncCamera({ ...camera, u: camera.u + (middle.x - width / 2) * px_m, v: camera.v - (middle.y - height / 2) * px_m }, origin);
       await hidden.rest(signal);
       into.drawImage(hidden.map.canvas, 0, 0, side.width, side.height, x, y, side.width, side.height);
       progress?.(k + 1, across * down);

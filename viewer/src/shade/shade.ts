@@ -1,4 +1,4 @@
-import { Attached, type imageLayer, type Light, type map } from "../map3d";
+import { MapLayer, type imageLayer, type Light, type map } from "../map3d";
 import { Shading } from "./shading";
 
 /** How light is found from depth. */
@@ -14,7 +14,7 @@ export interface ShadeOptions {
  * As good as what is seen: things outside the screen or behind others cast no shadow. WebGL only; the canvas drawer shows
  * the light without them. Reads depth: its tiles are fetched.
  */
-export class shade extends Attached<map, object> {
+export class shade extends MapLayer<map, object> {
   readonly #shading: Shading;
 
   constructor({ radius_m = 20, thickness_m = 6 }: ShadeOptions = {}) {
@@ -28,18 +28,18 @@ export class shade extends Attached<map, object> {
     return map?.drawer === "webgl" && map.layers.some((layer) => lacks(layer, map.light)) ? ["depth"] : [];
   }
 
-  protected enter(map: map): void {
-    map.setShade(this.#shading);
+  protected onAdd(map: map): void {
+    map.setLightEstimator(this.#shading);
   }
 
-  protected leave(map: map): void {
-    map.setShade(null);
+  protected onRemove(map: map): void {
+    map.setLightEstimator(null);
     this.#shading.free();
   }
 }
 
 /** Is there light that could be found? */
 function lacks(layer: imageLayer, light: Readonly<Light>): boolean {
-  const baked = layer.bakedFor(light);
+  const baked = layer.getBakedLight(light);
   return baked !== null && layer.mode === "lit" && light.lit && ((light.occlusion && !baked.occlusion) || (light.shadows && light.altitude_deg > 0 && !baked.shadow));
 }

@@ -1,5 +1,5 @@
 import { linkProgram, makeTexture } from "../core/gl";
-import type { SeenDepths, Shade } from "../map3d";
+import type { DepthImage, LightEstimator } from "../map3d";
 import { SHARES, SMOOTH, VERTEX } from "./shaders";
 
 interface Target {
@@ -21,7 +21,7 @@ interface Made {
 const STEEPEST = 3;
 
 /** Shares of light from depths, with WebGL. */
-export class Shading implements Shade {
+export class Shading implements LightEstimator {
   readonly radius_m: number;
   readonly thickness_m: number;
   #made: Made | undefined;
@@ -32,7 +32,7 @@ export class Shading implements Shade {
     this.thickness_m = thickness_m;
   }
 
-  sharesOf(seen: SeenDepths): WebGLTexture {
+  estimateLight(seen: DepthImage): WebGLTexture {
     const { gl, width, height, px_m } = seen;
     const span = seen.range[1] - seen.range[0];
     const { shares, smooth, targets } = this.#prepare(seen);
@@ -66,7 +66,7 @@ export class Shading implements Shade {
     this.#made = undefined;
   }
 
-  #prepare({ gl, width, height }: SeenDepths): Made {
+  #prepare({ gl, width, height }: DepthImage): Made {
     const made = this.#made;
     if (made?.gl === gl && made.width === width && made.height === height && gl.isProgram(made.shares)) return made;
     this.free();

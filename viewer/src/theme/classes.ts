@@ -1,4 +1,4 @@
-import { roundBelow } from "../core/lengths";
+import { floorToRound } from "../core/lengths";
 import type { AttributeInfo, AttributeValue } from "../map3d";
 
 /** A group of objects that have one colour. */
@@ -59,7 +59,7 @@ function bySize(entries: readonly (readonly [number, number])[], { classes, colo
 export function breaksOf(sorted: readonly number[], classes: number): number[] {
   const at = (share: number): number => sorted[Math.min(Math.floor(share * sorted.length), sorted.length - 1)] ?? 0;
   const [least, most] = [sorted[0] ?? 0, sorted.at(-1) ?? 0];
-  const step = roundBelow((at(0.95) - at(0.05) || most - least) / (4 * classes));
+  const step = floorToRound((at(0.95) - at(0.05) || most - least) / (4 * classes));
   const bounds = Array.from({ length: classes - 1 }, (_, k) => Number((Math.round(at((k + 1) / classes) / step) * step).toPrecision(12)));
   return [...new Set(bounds)].filter((bound) => bound > least && bound <= most).sort((a, b) => a - b);
 }

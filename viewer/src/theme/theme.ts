@@ -1,9 +1,9 @@
 import { adoptStyles } from "../core/dom";
-import { Attached, UsageError, type AttributeInfo, type imageLayer, type map } from "../map3d";
+import { MapLayer, UsageError, type AttributeInfo, type imageLayer, type map } from "../map3d";
 import { classify, type Classes, type ThemeClass } from "./classes";
 import { Legend } from "./legend";
 import { STYLES } from "./styles";
-import { themeWords } from "./words";
+import { getThemeMessages } from "./i18n";
 
 export interface ThemeOptions {
   /** Of the legend. Default the attribute's name. */
@@ -28,7 +28,7 @@ export interface ThemeEvents {
 }
 
 /** Colours a layer's objects by an attribute, with a legend whose classes can be pressed to show only those. Takes the place of the layer's style. */
-export class theme extends Attached<map, ThemeEvents> {
+export class theme extends MapLayer<map, ThemeEvents> {
   readonly options: ThemeOptions;
   readonly #layer: imageLayer;
   readonly #name: string;
@@ -61,7 +61,7 @@ export class theme extends Attached<map, ThemeEvents> {
     return this.options.title ?? this.#name;
   }
 
-  protected enter(map: map): void {
+  protected onAdd(map: map): void {
     adoptStyles(document, STYLES);
     this.#load(map).catch((reason: unknown) => {
       if (this.map !== map) return;
@@ -71,7 +71,7 @@ export class theme extends Attached<map, ThemeEvents> {
     });
   }
 
-  protected leave(): void {
+  protected onRemove(): void {
     this.#legend?.box.remove();
     this.#legend = undefined;
     if (this.#classes.length > 0) this.#layer.setStyle({});
@@ -84,7 +84,7 @@ export class theme extends Attached<map, ThemeEvents> {
     const column = await this.#layer.column(info);
     if (this.map !== map) return;
     const { language = map.language, classes = 5, colors } = this.options;
-    const words = themeWords(language);
+    const words = getThemeMessages(language);
     const found = classify(info, column, { classes, colors, language, rest: words.rest });
     this.#show(map, info.type === "boolean" ? { ...found, classes: found.classes.map((row) => ({ ...row, label: row.label === "true" ? words.yes : words.no })) } : found);
   }

@@ -1,7 +1,7 @@
 import { FetchError } from "../core/errors";
 
 /** What answers requests: the browser's fetch, or something that keeps what it got. */
-export type Ask = (url: string, init: RequestInit) => Promise<Response>;
+export type FetchFunction = (url: string, init: RequestInit) => Promise<Response>;
 
 export interface FetchOptions {
   signal?: AbortSignal | undefined;
@@ -12,7 +12,7 @@ export interface FetchOptions {
   /** Wait before the second try; doubled each time. */
   backoff_ms?: number | undefined;
   /** Default the browser's fetch. */
-  ask?: Ask | undefined;
+  ask?: FetchFunction | undefined;
 }
 
 /**

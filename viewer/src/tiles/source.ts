@@ -1,7 +1,7 @@
 import { FetchError, UsageError } from "../core/errors";
 import type { Tile } from "../geo/frame";
 import { readManifest, type LayerInfo, type Rendering, type View } from "../geo/manifest";
-import { fetchBytes, fetchJson, type Ask, type FetchOptions } from "./fetch";
+import { fetchBytes, fetchJson, type FetchFunction, type FetchOptions } from "./fetch";
 import { Archive } from "./pmtiles";
 import { baseUrl, tileUrls } from "./url";
 
@@ -19,11 +19,11 @@ export interface Source {
 export class HttpSource implements Source {
   /** Base URLs, in full. */
   readonly bases: readonly string[];
-  readonly #ask: Ask | undefined;
+  readonly #ask: FetchFunction | undefined;
   readonly #archives = new Map<string, Archive>();
 
   /** @param ask in place of the browser's fetch  @throws UsageError without a URL */
-  constructor(urls: string | readonly string[], ask?: Ask) {
+  constructor(urls: string | readonly string[], ask?: FetchFunction) {
     const list = typeof urls === "string" ? [urls] : urls;
     if (list.length === 0) throw new UsageError("an imageLayer needs at least one base URL, e.g. \"https://host/tiles/teatime\"");
     this.bases = list.map((url) => baseUrl(url, document.baseURI));

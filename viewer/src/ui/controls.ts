@@ -1,5 +1,5 @@
 import { element, iconButton } from "../core/dom";
-import { wordsOf, type Words } from "../core/words";
+import { getMapMessages, type MapMessages } from "../core/i18n";
 
 /** What the buttons need of a map. */
 export interface Steering {
@@ -26,13 +26,13 @@ const RIGHT = "M20 10a8 8 0 1 0-2.3 7.6M20 4v6h-6";
 
 /** Zoom buttons, a compass with buttons that turn the view when there are several, and one that fills the screen where that can be done. */
 export function controls(map: Steering): HTMLElement {
-  const words = wordsOf(map.language);
+  const words = getMapMessages(map.language);
   const whole = document.fullscreenEnabled ? [screenGroup(map, words)] : [];
   return element("div", "map3d-buttons", {}, ...whole, turnGroup(map, words), zoomGroup(map, words));
 }
 
 /** The whole page fills the screen, with all that lies on the map. */
-function screenGroup({ container }: Steering, words: Words): HTMLElement {
+function screenGroup({ container }: Steering, words: MapMessages): HTMLElement {
   const button = iconButton("", words.fill, WHOLE);
   const group = element("div", "map3d-group", { role: "group", "aria-label": words.screen }, button);
   const isWhole = (): boolean => document.fullscreenElement !== null;
@@ -49,7 +49,7 @@ function screenGroup({ container }: Steering, words: Words): HTMLElement {
   return group;
 }
 
-function zoomGroup(map: Steering, words: Words): HTMLElement {
+function zoomGroup(map: Steering, words: MapMessages): HTMLElement {
   const [inward, outward] = [iconButton("", words.zoomIn, PLUS), iconButton("", words.zoomOut, MINUS)];
   inward.addEventListener("click", () => map.zoomIn());
   outward.addEventListener("click", () => map.zoomOut());
@@ -61,7 +61,7 @@ function zoomGroup(map: Steering, words: Words): HTMLElement {
   return element("div", "map3d-group", { role: "group", "aria-label": words.zoom }, inward, outward);
 }
 
-function turnGroup(map: Steering, words: Words): HTMLElement {
+function turnGroup(map: Steering, words: MapMessages): HTMLElement {
   const [left, right, compass] = [iconButton("", words.left, LEFT), iconButton("", words.right, RIGHT), compassButton(words)];
   const group = element("div", "map3d-group", { role: "group", "aria-label": words.direction }, compass, left, right);
   left.addEventListener("click", () => map.rotate(1));
@@ -79,7 +79,7 @@ function turnGroup(map: Steering, words: Words): HTMLElement {
 }
 
 /** A needle that points to where north is on the screen. */
-function compassButton({ north }: Words): HTMLButtonElement {
+function compassButton({ north }: MapMessages): HTMLButtonElement {
   const button = iconButton("map3d-compass", north, "M12 2l4 10h-8z");
   const needle = button.querySelector("path");
   needle?.classList.add("map3d-north");

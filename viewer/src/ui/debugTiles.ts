@@ -2,13 +2,13 @@ import { element } from "../core/dom";
 import type { Drawer, Quad } from "../draw/drawer";
 import { tileName } from "../geo/frame";
 import type { LayerInfo, View } from "../geo/manifest";
-import type { Store } from "../tiles/store";
+import type { LayerTiles } from "../tiles/layerTiles";
 
 /** What a layer paints. */
 interface Painted {
   readonly view: View;
   readonly layers: ReadonlyMap<string, LayerInfo>;
-  readonly store: Pick<Store, "sent">;
+  readonly store: Pick<LayerTiles, "sent">;
   readonly quads: readonly Quad[];
 }
 

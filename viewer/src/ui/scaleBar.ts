@@ -1,6 +1,6 @@
 import { element } from "../core/dom";
-import { LONGEST_PX, lengthOf, roundBelow } from "../core/lengths";
-import { wordsOf } from "../core/words";
+import { SCALE_BAR_MAX_PX, formatLength, floorToRound } from "../core/lengths";
+import { getMapMessages } from "../core/i18n";
 
 /** What the bar needs of a map. */
 export interface Scaled {
@@ -12,17 +12,17 @@ export interface Scaled {
 
 /** A bar as long as a round number of metres. It holds across the screen everywhere; upwards the ground is foreshortened. */
 export function scaleBar(map: Scaled): HTMLElement {
-  const words = wordsOf(map.language);
+  const words = getMapMessages(map.language);
   const text = element("span", "");
   const bar = element("div", "map3d-scale", { role: "img" }, text);
   const show = (): void => {
-    const longest_m = LONGEST_PX * map.metresPerPixel;
+    const longest_m = SCALE_BAR_MAX_PX * map.metresPerPixel;
     bar.hidden = !(longest_m > 0);
     if (bar.hidden) return;
-    const metres = roundBelow(longest_m);
+    const metres = floorToRound(longest_m);
     bar.style.width = `${(metres / map.metresPerPixel).toFixed(1)}px`;
-    text.textContent = lengthOf(metres);
-    bar.setAttribute("aria-label", words.scale(lengthOf(metres)));
+    text.textContent = formatLength(metres);
+    bar.setAttribute("aria-label", words.scale(formatLength(metres)));
   };
   for (const type of ["zoom", "ready", "directionchange"] as const) map.on(type, show);
   show();

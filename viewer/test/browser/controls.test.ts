@@ -14,7 +14,7 @@ const bed = new TestBed({ town, placeless });
 type Controlled = Global & { map3d: typeof Controls; control: Controls.locate; overview: Controls.overview };
 
 const START = { zoom: 3, center: [ORIGIN[0], ORIGIN[1], ORIGIN[2]] };
-const said = (page: Page, text: string): Promise<unknown> => page.waitForFunction((wanted) => document.querySelector(".map3d-said")?.textContent === wanted, text);
+const said = (page: Page, text: string): Promise<unknown> => page.waitForFunction((wanted) => document.querySelector(".map3d-status")?.textContent === wanted, text);
 
 test("the reader is shown on the surface with a circle as large as the accuracy; denied, outside and placeless are said", async () => {
   const { page, problems } = await bed.start("town", { ...START, zoom: 1, language: "de" }, {}, { permissions: ["geolocation"], reducedMotion: "reduce" });
@@ -55,7 +55,7 @@ test("the reader is shown on the surface with a circle as large as the accuracy;
   await said(page, "Ihr Browser sagt nicht, wo Sie sind. Erlauben Sie es in den Einstellungen dieser Seite.");
   await page.screenshot({ path: `${OUT}/locate-denied.png` });
   await page.evaluate(() => (globalThis as unknown as Controlled).control.remove());
-  expect(await button.count() + await page.locator(".map3d-said").count()).toBe(0);
+  expect(await button.count() + await page.locator(".map3d-status").count()).toBe(0);
   expect(problems).toEqual([]);
   await page.context().close();
   const { page: other } = await bed.start("placeless", START);

@@ -50,7 +50,7 @@ async function drag(page: Page, paths: readonly string[], until: "over" | "dropp
   if (until === "dropped") await send("drop");
 }
 
-const said = (page: Page): Promise<string> => page.locator(".map3d-said").innerText();
+const said = (page: Page): Promise<string> => page.locator(".map3d-status").innerText();
 const STATE = "[map.zoom, map.direction, map.layers.length, dropped, errors]";
 
 /** What the same view looks like over HTTP. */
@@ -193,6 +193,6 @@ test("a made-up drop of files without folders is taken by their names; taken off
     (globalThis as Global).map.canvas.dispatchEvent(new DragEvent("drop", { bubbles: true, cancelable: true, dataTransfer: data }));
   }, json);
   await expect.poll(() => said(page), { timeout: 20_000 }).toMatch(/^Files of this map are missing: https:\/\/evil\.example\/color\.pmtiles/);
-  expect(await page.evaluate("(tool.remove(), document.querySelectorAll('.map3d-drop, .map3d-said, input').length)")).toBe(0);
+  expect(await page.evaluate("(tool.remove(), document.querySelectorAll('.map3d-drop, .map3d-status, input').length)")).toBe(0);
   await page.context().close();
 });

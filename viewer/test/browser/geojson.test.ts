@@ -3,10 +3,10 @@ import type { Page } from "playwright-core";
 import type * as Cluster from "../../src/cluster";
 import type * as Geojson from "../../src/geojson";
 import type { Vec3 } from "../../src/map3d";
-import { axesOf, localFromUvd } from "../../src/geo/axes";
+import { computeAxes, localFromUvd } from "../../src/geo/axes";
 import { renderTown } from "../fixture/rendering";
 import { ORIGIN, trace } from "../fixture/town";
-import { frameOf } from "../../src/geo/frame";
+import { makeFrame } from "../../src/geo/frame";
 import { TestBed } from "./bed";
 import { OUT } from "./browser";
 import { placeOf } from "./level";
@@ -15,7 +15,7 @@ import { settled, type Global } from "./page";
 const town = renderTown();
 const bed = new TestBed({ town });
 type Featured = Global & { map3d: typeof Geojson & typeof Cluster; overlay: Geojson.geojson; group: Cluster.cluster; told: string[]; pin: InstanceType<Global["map3d"]["marker"]> };
-const frame = frameOf(town.json.views[0] as never, town.json.size_m, town.json.tile_px, town.json.zmax);
+const frame = makeFrame(town.json.views[0] as never, town.json.size_m, town.json.tile_px, town.json.zmax);
 const world = (x: number, y: number, z?: number): number[] => [ORIGIN[0] + x, ORIGIN[1] + y, ...(z === undefined ? [] : [ORIGIN[2] + z])];
 const VIEWPORT = { viewport: { width: 560, height: 420 } };
 
@@ -59,7 +59,7 @@ test.each(["webgl", "canvas"])("%s: a draped polygon covers the pixels whose sur
   for (let at = 0; at < got.length; at++) {
     const [u, v] = [frame.u0 + ((at % 560) - left + 0.5) * px, frame.v0 - (Math.floor(at / 560) - top + 0.5) * px];
     const hit = trace(frame, u, v);
-    const [x, y] = hit ? localFromUvd(axesOf(0, 45), [u, v, frame.d0 + hit.d]) : [NaN, NaN];
+    const [x, y] = hit ? localFromUvd(computeAxes(0, 45), [u, v, frame.d0 + hit.d]) : [NaN, NaN];
     const near = [-0.06, 0.06].some((by) => inside(x, y + by) !== inside(x, y));
     if (near) continue;
     if (hit && inside(x, y)) covered++;

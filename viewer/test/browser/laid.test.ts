@@ -42,7 +42,7 @@ test("what has not changed is moved and scaled, not drawn; other light is drawn,
   await settled(page, () => (globalThis as Global).map.panBy(9, -6), null);
   await settled(page, () => (globalThis as Global).map.setZoom(3.2), null);
   expect(await counted(page)).toEqual({ puts: 0, draws: 0 });
-  const tiles = await page.evaluate(() => document.querySelectorAll(".map3d-sheets canvas").length);
+  const tiles = await page.evaluate(() => document.querySelectorAll(".map3d-mosaics canvas").length);
   expect(tiles).toBe(1);
   await settled(page, () => (globalThis as Global).map.setLight({ azimuth_deg: 10 }), null);
   const { puts, draws } = await counted(page);
@@ -58,7 +58,7 @@ test("several layers, half seen and in parts of the map, look as they do when th
   for (const preserveDrawingBuffer of [true, false]) {
     const { page, problems } = await bed.start("town", { ...QUIET, preserveDrawingBuffer }, {}, { viewport: { width: 500, height: 400 }, deviceScaleFactor: 2, bypassCSP: true });
     // What pages say of any canvas or block.
-    if (!preserveDrawingBuffer) await page.addStyleTag({ content: "canvas:not(#mapcanvas) { width: 100%; height: 100%; max-width: 90%; margin: 7px; border: 2px solid red; padding: 3px; opacity: 0.5; transition: transform 1s } .map3d-sheets, .map3d-sheets div { margin: 9px; padding: 4px; border: 1px solid; transform: scale(0.9) }" });
+    if (!preserveDrawingBuffer) await page.addStyleTag({ content: "canvas:not(#mapcanvas) { width: 100%; height: 100%; max-width: 90%; margin: 7px; border: 2px solid red; padding: 3px; opacity: 0.5; transition: transform 1s } .map3d-mosaics, .map3d-mosaics div { margin: 9px; padding: 4px; border: 1px solid; transform: scale(0.9) }" });
     await settled(page, (url) => new (globalThis as Global).map3d.imageLayer(url, { mode: "id", opacity: 0.6, combine: false }).addTo((globalThis as Global).map).setClip([0, 0, 0.613, 0.8]), bed.url("later"));
     await settled(page, () => (globalThis as Global).map.setZoom(3.37), null);
     shots.push(await page.screenshot({ path: `${OUT}/laid-${String(preserveDrawingBuffer)}.png` }));
@@ -85,11 +85,11 @@ test("a change of direction fades: a copy of what was seen lies over what comes"
     new g.map3d.orbit().addTo(g.map);
     g.map.rotate(1);
     requestAnimationFrame(() => {
-      const [first, second] = document.querySelectorAll<HTMLElement>(".map3d-sheets");
+      const [first, second] = document.querySelectorAll<HTMLElement>(".map3d-mosaics");
       const copy = second?.querySelector("canvas");
       const pixel = copy?.getContext("2d")?.getImageData(copy.width / 2, copy.height / 2, 1, 1).data[3];
-      const there = [document.querySelectorAll(".map3d-sheets").length, first?.nextElementSibling === second, pixel === 255];
-      setTimeout(() => { done([...there, document.querySelectorAll(".map3d-sheets").length]); }, 900);
+      const there = [document.querySelectorAll(".map3d-mosaics").length, first?.nextElementSibling === second, pixel === 255];
+      setTimeout(() => { done([...there, document.querySelectorAll(".map3d-mosaics").length]); }, 900);
     });
   }));
   expect(seen).toEqual([2, true, true, 1]);
@@ -99,8 +99,8 @@ test("a change of direction fades: a copy of what was seen lies over what comes"
 
 test("a removed map takes its elements along", async () => {
   const { page } = await bed.start("town", { ...QUIET, preserveDrawingBuffer: false });
-  expect(await page.locator(".map3d-sheets").count()).toBe(1);
+  expect(await page.locator(".map3d-mosaics").count()).toBe(1);
   await page.evaluate(() => (globalThis as Global).map.remove());
-  expect(await page.locator(".map3d-sheets").count()).toBe(0);
+  expect(await page.locator(".map3d-mosaics").count()).toBe(0);
   await page.context().close();
 });

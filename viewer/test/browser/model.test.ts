@@ -6,8 +6,8 @@ import type * as Model from "../../src/model";
 import type * as Orbit from "../../src/orbit";
 import type * as Shading from "../../src/shade";
 import { dot, type Vec3 } from "../../src/core/vec";
-import { axesOf } from "../../src/geo/axes";
-import { frameOf } from "../../src/geo/frame";
+import { computeAxes } from "../../src/geo/axes";
+import { makeFrame } from "../../src/geo/frame";
 import { DEFAULT_LIGHT, towardsLight, type Light } from "../../src/geo/light";
 import { renderTown } from "../fixture/rendering";
 import { threeScript, triangleGltf } from "../fixture/three";
@@ -50,7 +50,7 @@ const addBox = (page: Page, options: object = {}): Promise<void> => settled(page
   g.model = new g.map3d.modelLayer(g.THREE, group, { position: [origin[0] + box[0][0] + w / 2, origin[1] + box[0][1] + d / 2, origin[2] + box[0][2]], ...more }).addTo(g.map);
 }, [BOX, ORIGIN, options] as const);
 
-const frame = frameOf(town.json.views[0] as (typeof town.json.views)[0], town.json.size_m, town.json.tile_px, town.json.zmax);
+const frame = makeFrame(town.json.views[0] as (typeof town.json.views)[0], town.json.size_m, town.json.tile_px, town.json.zmax);
 
 /** What the ray through a pixel's middle meets of the town and of the box. */
 async function raysOf(page: Page, dpr = 1): Promise<(x: number, y: number) => { town: Hit | null; box: Hit | null }> {
@@ -259,8 +259,8 @@ test("what is taken off gives back all that it had of the GPU", async () => {
 /** Waits for some frames. */
 const moving = (page: Page): Promise<void> => page.evaluate(() => new Promise<void>((done) => {
   let left = 5;
-  const { moves } = (globalThis as Global).map;
-  moves.on("draw", () => { if (--left === 0) done(); });
+  const { frameEvents } = (globalThis as Global).map;
+  frameEvents.on("draw", () => { if (--left === 0) done(); });
 }));
 
 /** Frames that the map draws in some milliseconds. */
@@ -268,9 +268,9 @@ const framesIn = (page: Page, ms: number): Promise<number> => page.evaluate((dur
   const { map } = globalThis as Global;
   let count = 0;
   const counted = (): void => { count++; };
-  map.moves.on("draw", counted);
+  map.frameEvents.on("draw", counted);
   setTimeout(() => {
-    map.moves.off("draw", counted);
+    map.frameEvents.off("draw", counted);
     done(count);
   }, duration_ms);
 }), ms);
@@ -398,12 +398,12 @@ test("while the map turns, the model turns along; the turn ends in the picture o
   await settled(page, () => (globalThis as Global).map.setDirection("0-45"), null);
   await page.addScriptTag({ url: "/map3d-orbit.js" });
   await settled(page, () => { new (globalThis as unknown as { map3d: typeof Orbit }).map3d.orbit({ duration_ms: 300 }).addTo((globalThis as Global).map); }, null);
-  await page.evaluate(() => { (globalThis as Global).map.twist(Math.PI / 9); });
+  await page.evaluate(() => { (globalThis as Global).map.rotateBy(Math.PI / 9); });
   await page.waitForFunction(() => (globalThis as Global).map.direction === "90-45");
   await page.waitForTimeout(1500);
   const shot = await picture(page);
   await page.screenshot({ path: `${OUT}/model-turning.png` });
-  const turned = { ...frame, axes: axesOf(20, 45), d0: -2000 };
+  const turned = { ...frame, axes: computeAxes(20, 45), d0: -2000 };
   const [[x0, y0], px] = await page.evaluate((origin) => [(globalThis as Global).map.project(origin) as [number, number], (globalThis as Global).map.metresPerPixel] as const, ORIGIN);
   let [all, right] = [0, 0];
   for (let y = 1; y < HIGH; y += 2) {
@@ -417,8 +417,8 @@ test("while the map turns, the model turns along; the turn ends in the picture o
   }
   expect(all).toBeGreaterThan(500);
   expect(right / all).toBeGreaterThan(0.8); // what neither direction sees is closed with the colours behind
-  await page.evaluate(() => { (globalThis as Global).map.twist(Math.PI / 3); });
-  await settled(page, () => { (globalThis as Global).map.release(); }, null);
+  await page.evaluate(() => { (globalThis as Global).map.rotateBy(Math.PI / 3); });
+  await settled(page, () => { (globalThis as Global).map.endGesture(); }, null);
   expect(cut.equals(await picture(page))).toBe(true);
   expect(problems).toEqual([]);
   await page.context().close();

@@ -1,8 +1,8 @@
 import { expect, test } from "vitest";
 import type { Page } from "playwright-core";
 import type * as Orbit from "../../src/orbit";
-import { axesOf } from "../../src/geo/axes";
-import { frameOf } from "../../src/geo/frame";
+import { computeAxes } from "../../src/geo/axes";
+import { makeFrame } from "../../src/geo/frame";
 import { renderTown } from "../fixture/rendering";
 import { ORIGIN, trace } from "../fixture/town";
 import { TestBed } from "./bed";
@@ -26,7 +26,7 @@ async function start(options: object = {}, duration_ms = 300): ReturnType<TestBe
 }
 
 const twist = (page: Page, deg: number): Promise<void> => page.evaluate((angle) => {
-  (globalThis as Global).map.twist((angle * Math.PI) / 180);
+  (globalThis as Global).map.rotateBy((angle * Math.PI) / 180);
 }, deg);
 
 /** Waits until two frames in a row show the same. */
@@ -43,7 +43,7 @@ async function steady(page: Page): Promise<Buffer> {
 async function agreement(page: Page, shot: Buffer, lookAt: number): Promise<{ right: number; shown: number }> {
   const [corner, px] = await page.evaluate((origin) => [(globalThis as Global).map.project(origin) as [number, number], (globalThis as Global).map.metresPerPixel] as const, ORIGIN);
   const { json } = town;
-  const frame = { ...frameOf(json.views[0] as (typeof json.views)[0], json.size_m, json.tile_px, json.zmax), axes: axesOf(lookAt, 45), d0: -2000 };
+  const frame = { ...makeFrame(json.views[0] as (typeof json.views)[0], json.size_m, json.tile_px, json.zmax), axes: computeAxes(lookAt, 45), d0: -2000 };
   let [right, shown, all] = [0, 0, 0];
   for (let y = 1; y < HIGH; y += 3) {
     for (let x = 1; x < WIDE; x += 3) {
@@ -71,7 +71,7 @@ test("held between two directions, the picture is that of a ray along it; let go
     expect(right).toBeGreaterThan(0.9);
   }
   await twist(page, -20); // at 25 degrees: back is nearer
-  await settled(page, () => { (globalThis as Global).map.release(); }, null);
+  await settled(page, () => { (globalThis as Global).map.endGesture(); }, null);
   expect(await page.evaluate(() => (globalThis as Global).map.direction)).toBe("0-45");
   expect((await agreement(page, await picture(page), 0)).right).toBeGreaterThan(0.95);
   expect(problems).toEqual([]);

@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
 import type { Page } from "playwright-core";
 import { levelFor } from "../../src/tiles/cover";
-import { frameOf } from "../../src/geo/frame";
+import { makeFrame } from "../../src/geo/frame";
 import { renderPainted, type Paint } from "../fixture/rendering";
 import { compareTo, stitch, type Errors } from "../fixture/stitched";
 import { TestBed } from "./bed";
@@ -27,7 +27,7 @@ const speckled: Paint = (z, x, y) => {
 
 const fixture = renderPainted("speckled", TILE, ZMAX, 150, speckled);
 const levels = Array.from({ length: ZMAX + 1 }, (_, z) => stitch(fixture, z));
-const frame = frameOf(fixture.json.views[0] as (typeof fixture.json.views)[0], fixture.json.size_m, TILE, ZMAX);
+const frame = makeFrame(fixture.json.views[0] as (typeof fixture.json.views)[0], fixture.json.size_m, TILE, ZMAX);
 const bed = new TestBed({ speckled: fixture });
 
 /** Ways to show the picture: that of the page's elements can only be seen, not read. */

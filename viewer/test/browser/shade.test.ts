@@ -1,8 +1,8 @@
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { dot, type Vec3 } from "../../src/core/vec";
-import { axesOf, localFromUvd, uvdFromLocal } from "../../src/geo/axes";
-import { frameOf, type Frame } from "../../src/geo/frame";
+import { computeAxes, localFromUvd, uvdFromLocal } from "../../src/geo/axes";
+import { makeFrame, type Frame } from "../../src/geo/frame";
 import { towardsLight } from "../../src/geo/light";
 import { withBakedLight } from "../fixture/baked";
 import { renderTown } from "../fixture/rendering";
@@ -21,7 +21,7 @@ const OPTIONS = { center: [ORIGIN[0] - 5, ORIGIN[1], ORIGIN[2]], zoom: 3, direct
 const VIEWPORT = { viewport: { width: WIDTH, height: HEIGHT } };
 
 const numbers = town.json.views.find(({ id }) => id === "0-45") as (typeof town.json.views)[0];
-const frame = frameOf(numbers, town.json.size_m, town.json.tile_px, town.json.zmax);
+const frame = makeFrame(numbers, town.json.size_m, town.json.tile_px, town.json.zmax);
 
 const addShade = (options: object): unknown => {
   const g = globalThis as Global & { shade: { remove(): void } };
@@ -47,7 +47,7 @@ const pointOf = ({ d }: Hit, [u, v]: readonly [number, number]): Vec3 => localFr
 
 /** Is the sun seen from there, past all boxes? */
 function seesSun(point: Vec3): boolean {
-  const axes = axesOf((540 - SUN.azimuth_deg) % 360, SUN.altitude_deg);
+  const axes = computeAxes((540 - SUN.azimuth_deg) % 360, SUN.altitude_deg);
   const sunny: Frame = { ...frame, axes, d0: -2000 };
   const [u, v, d] = uvdFromLocal(axes, point);
   const first = trace(sunny, u, v);
@@ -55,7 +55,7 @@ function seesSun(point: Vec3): boolean {
 }
 
 test("shadows that are found lie where rays to the sun are stopped, for what the picture shows", async () => {
-  expect(dot(axesOf((540 - SUN.azimuth_deg) % 360, SUN.altitude_deg).forward, towardsLight(SUN))).toBeCloseTo(-1, 9);
+  expect(dot(computeAxes((540 - SUN.azimuth_deg) % 360, SUN.altitude_deg).forward, towardsLight(SUN))).toBeCloseTo(-1, 9);
   const { page, problems } = await start({ light: SUN });
   const bright = await picture(page);
   await settled(page, addShade, {});
@@ -119,7 +119,7 @@ test("after a movement the picture is that of a map opened there; it comes to re
   expect(Buffer.compare(await picture(page), before)).toBe(0);
   const frames = await page.evaluate(() => new Promise<number>((done) => {
     let drawn = 0;
-    (globalThis as Global).map.moves.on("draw", () => { drawn++; });
+    (globalThis as Global).map.frameEvents.on("draw", () => { drawn++; });
     setTimeout(() => { done(drawn); }, 1000);
   }));
   expect(frames).toBe(0);

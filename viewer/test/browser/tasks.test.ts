@@ -5,7 +5,7 @@ import type { Vec2, Vec3 } from "../../src/core/vec";
 import { sub } from "../../src/core/vec";
 import { uvdFromLocal } from "../../src/geo/axes";
 import { screenFromLocal, type Camera } from "../../src/geo/camera";
-import { daylightAt } from "../../src/geo/daylight";
+import { computeDaylight } from "../../src/geo/daylight";
 import { towardsLight } from "../../src/geo/light";
 import type { Pixels } from "../../src/tiles/png";
 import { renderTown, type Fixture } from "../fixture/rendering";
@@ -236,7 +236,7 @@ test("see the shadow at 17:00", async () => {
   await hand.drag(at(12), at(17));
   expect(await page.locator("#clock").textContent()).toBe("17:00");
   await page.waitForFunction(() => location.hash.includes("/t=2026-06-21T15:00Z"));
-  const light = towardsLight(daylightAt(new Date("2026-06-21T15:00:00Z"), PLACE));
+  const light = towardsLight(computeDaylight(new Date("2026-06-21T15:00:00Z"), PLACE));
   const places = { lit: [] as Vec2[], dark: [] as Vec2[] };
   for (let k = 0; k < 4000; k++) {
     const ground: Vec3 = [-95 + ((k * 37.7) % 190), -75 + ((k * 61.3) % 150), 0];

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import { uvdFromLocal } from "../../src/geo/axes";
-import { frameOf, type Frame } from "../../src/geo/frame";
+import { makeFrame, type Frame } from "../../src/geo/frame";
 import { renderTown, type Fixture } from "../fixture/rendering";
 import { ORIGIN, trace, type Hit, type Place, type Thing } from "../fixture/town";
 import { TestBed } from "./bed";
@@ -19,7 +19,7 @@ const bed = new TestBed({ town, plan, abroad });
 const VIEWPORT = { viewport: { width: 500, height: 420 } };
 const OPTIONS = { center: [ORIGIN[0] - 45, ORIGIN[1], ORIGIN[2]], zoom: 3, direction: "0-45", light: { lit: false } };
 
-const frameIn = ({ json }: Fixture, id = "0-45"): Frame => frameOf(json.views.find((view) => view.id === id) as (typeof json.views)[0], json.size_m, json.tile_px, json.zmax);
+const frameIn = ({ json }: Fixture, id = "0-45"): Frame => makeFrame(json.views.find((view) => view.id === id) as (typeof json.views)[0], json.size_m, json.tile_px, json.zmax);
 const [townFrame, planFrame] = [frameIn(town), frameIn(plan)];
 const [du, dv, dd] = uvdFromLocal(townFrame.axes, SHIFT);
 

@@ -150,7 +150,7 @@ test("random data tiles arrive bit for bit", async () => {
   const { page } = await started({ hover: true }, {}, "noise");
   const got = await page.evaluate(async () => {
     const { layer } = globalThis as Global;
-    const [view, store] = [layer.rendering?.views.get("0-45"), layer.store];
+    const [view, store] = [layer.rendering?.views.get("0-45"), layer.tiles];
     const values = async (kind: string): Promise<number[]> => {
       const info = layer.rendering?.layers.get(kind);
       if (!view || !store || !info) throw new Error("not ready");

@@ -74,7 +74,7 @@ for (const { name, perturbs, start, missing } of OTHERS) {
       await started(its(), "noise", {});
       const got = await its().evaluate(async () => {
         const { layer } = globalThis as Global;
-        const [view, store] = [layer.rendering?.views.get("0-45"), layer.store];
+        const [view, store] = [layer.rendering?.views.get("0-45"), layer.tiles];
         const values = async (kind: string): Promise<number[]> => {
           const info = layer.rendering?.layers.get(kind);
           const data = view && store && info ? await store.need(view, info, { z: 0, x: 0, y: 0 }) : null;

@@ -2,11 +2,11 @@ import { describe, expect, test } from "vitest";
 import type { Pass } from "../../src/draw/drawer";
 import { kindsBeside, kindsOf, lookOf, type Look } from "../../src/draw/canvas/look";
 import { lightOn, type Lamp, type Shades } from "../../src/draw/canvas/lightOn";
-import type { Finishes } from "../../src/draw/finish";
+import type { DrawStyles } from "../../src/draw/drawStyle";
 import { colorOfId, shade, type Around, type Said } from "../../src/draw/canvas/shade";
 import { areaOf, gridOf } from "../../src/draw/canvas/sheet";
 import { placeQuads } from "../../src/draw/plan";
-import { frameOf } from "../../src/geo/frame";
+import { makeFrame } from "../../src/geo/frame";
 import { DEFAULT_LIGHT, towardsLight } from "../../src/geo/light";
 
 const LAMP: Lamp = { sun: towardsLight(DEFAULT_LIGHT), sky: [0.42, 0.42, 0.42], beam: [0.76, 0.76, 0.76], occlusion: false, shadow: null };
@@ -87,7 +87,7 @@ describe("pictures", () => {
 
   test("take an object's finish: painted, pale, not at all; others as is said", () => {
     const color = Uint8ClampedArray.from({ length: 36 }, (_, k) => (k % 4 === 3 ? 255 : 40 + 60 * (k % 4)));
-    const found = (finishes: Finishes): number[][] => {
+    const found = (finishes: DrawStyles): number[][] => {
       const out = shade({ ...LOOK, mode: "color", finish: "f" }, { ...tile, color }, ALONE, { ...UNSAID, finishes });
       return [0, 4, 5].map((at) => [...out.subarray(4 * at, 4 * at + 4)]);
     };
@@ -125,7 +125,7 @@ describe("looks", () => {
 });
 
 test("areas are found again from their rectangles, at any zoom", () => {
-  const frame = frameOf({ id: "0-45", look_at_deg: 0, pitch_deg: 45, u0_m: -512, v0_m: 512, d0_m: 0 }, 1024, 256, 5);
+  const frame = makeFrame({ id: "0-45", look_at_deg: 0, pitch_deg: 45, u0_m: -512, v0_m: 512, d0_m: 0 }, 1024, 256, 5);
   for (const px_m of [1, 0.7, 0.31, 0.123]) {
     const stands = [{ area: { z: 4, x: 9, y: 3 }, from: { z: 4, x: 9, y: 3 } }, { area: { z: 4, x: 10, y: 3 }, from: { z: 1, x: 1, y: 0 } }, { area: { z: 6, x: 44, y: 15 }, from: { z: 6, x: 44, y: 15 } }];
     const quads = placeQuads(frame, { left: -77.3, top: 41.9, px_m }, stands, 4);

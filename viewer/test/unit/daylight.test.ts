@@ -3,11 +3,11 @@ import { resolve } from "node:path";
 import { describe, expect, test } from "vitest";
 import { getPosition } from "suncalc";
 import type { Vec2, Vec3 } from "../../src/core/vec";
-import { daylightAt, skyAt, zoneOf } from "../../src/geo/daylight";
-import { localAzimuth, localFromLonLat, lonLatOf, type GeographicJson } from "../../src/geo/geographic";
+import { computeDaylight, computeSkyColors, chooseUtcOffset } from "../../src/geo/daylight";
+import { localAzimuth, localFromLonLat, lonLatFromLocal, type GeographicJson } from "../../src/geo/geographic";
 import { towardsLight } from "../../src/geo/light";
 import type { LayerInfo } from "../../src/geo/manifest";
-import { shadowOf } from "../../src/geo/shadows";
+import { findShadow } from "../../src/geo/shadows";
 import { PLACE } from "../fixture/town";
 
 const { geographic, points } = JSON.parse(readFileSync(resolve(import.meta.dirname, "../../../spec/vectors/geographic.json"), "utf8")) as {
@@ -16,7 +16,7 @@ const { geographic, points } = JSON.parse(readFileSync(resolve(import.meta.dirna
 
 describe("places on earth", () => {
   test.each(points)("$local has the longitude and latitude of the vectors, and back", ({ local, lon_lat, back }) => {
-    const [lon, lat] = lonLatOf(geographic, local);
+    const [lon, lat] = lonLatFromLocal(geographic, local);
     expect(((lon - lon_lat[0] + 540) % 360) - 180).toBeCloseTo(0, 10);
     expect(Math.abs(lon)).toBeLessThanOrEqual(180);
     expect(lat).toBeCloseTo(lon_lat[1], 10);
@@ -44,17 +44,17 @@ test.each(SUNS)("the sun over %d, %d at %s stands where an almanac has it, to a 
 });
 
 test("daylight comes from the sun's place in the grid, white at noon and blue by night", () => {
-  const noon = daylightAt(new Date("2026-06-21T11:15:00Z"), PLACE);
+  const noon = computeDaylight(new Date("2026-06-21T11:15:00Z"), PLACE);
   expect(noon.altitude_deg).toBeGreaterThan(64);
   expect(noon.sun_rgb).toEqual([1, 1, 1]);
-  const night = daylightAt(new Date("2026-06-21T23:00:00Z"), PLACE);
+  const night = computeDaylight(new Date("2026-06-21T23:00:00Z"), PLACE);
   expect(night.sun_rgb).toEqual([0, 0, 0]);
   expect(night.sky_rgb[2]).toBeGreaterThan(1.3 * night.sky_rgb[0]);
 });
 
 test("light grows with the sun's altitude, without jumps", () => {
   for (let altitude = -20; altitude < 60; altitude += 0.1) {
-    const [low, high] = [skyAt(altitude), skyAt(altitude + 0.1)];
+    const [low, high] = [computeSkyColors(altitude), computeSkyColors(altitude + 0.1)];
     high.sky_rgb.forEach((part, k) => {
       expect(part - low.sky_rgb[k as 0]).toBeGreaterThanOrEqual(-1e-12);
       expect(part - low.sky_rgb[k as 0]).toBeLessThan(0.02);
@@ -64,9 +64,9 @@ test("light grows with the sun's altitude, without jumps", () => {
 });
 
 test("a clock is the reader's near home, the sun's elsewhere", () => {
-  expect(zoneOf(11.4, 2)).toBe(2);
-  expect(zoneOf(-8.6, 1)).toBe(1);
-  expect(zoneOf(151.2, 1)).toBe(10);
+  expect(chooseUtcOffset(11.4, 2)).toBe(2);
+  expect(chooseUtcOffset(-8.6, 1)).toBe(1);
+  expect(chooseUtcOffset(151.2, 1)).toBe(10);
 });
 
 describe("shadows that suit a light", () => {
@@ -74,7 +74,7 @@ describe("shadows that suit a light", () => {
   const layer = (name: string, kind: string, suns: ReturnType<typeof sun>[]): LayerInfo => ({ name, kind, format: "png", media_type: "image/png", suns });
   const hours = layer("day", "sun16", [sun(90, 20), sun(110, 32), sun(135, 42), sun(165, 48)]);
   const noon = layer("noon", "sun", [sun(200, 50)]);
-  const at = (azimuth_deg: number, altitude_deg: number): ReturnType<typeof shadowOf> => shadowOf([hours, noon, layer("color", "color", [])], towardsLight({ azimuth_deg, altitude_deg }));
+  const at = (azimuth_deg: number, altitude_deg: number): ReturnType<typeof findShadow> => findShadow([hours, noon, layer("color", "color", [])], towardsLight({ azimuth_deg, altitude_deg }));
 
   test("the single sun where the light is its own", () => {
     expect(at(200, 50)).toMatchObject({ layer: noon, first: 0, second: 0, share: 0 });
@@ -94,6 +94,6 @@ describe("shadows that suit a light", () => {
     expect(at(300, 30)).toBeNull();
     expect(at(110, 55)).toBeNull();
     expect(at(90, 5)).toBeNull();
-    expect(shadowOf([], [0, 0, 1])).toBeNull();
+    expect(findShadow([], [0, 0, 1])).toBeNull();
   });
 });

@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import type { Rendering } from "../../src/geo/manifest";
 import { neighbourView, tiltedView } from "../../src/map/directions";
-import { roundBelow } from "../../src/core/lengths";
+import { floorToRound } from "../../src/core/lengths";
 
 const VIEWS = [[0, 30], [90, 30], [180, 30], [270, 30], [0, 60], [180, 60], [0, 90]] as const;
 const views = new Map(VIEWS.map(([lookAtDeg, pitchDeg]) => [`${String(lookAtDeg)}-${String(pitchDeg)}`, { frame: { id: `${String(lookAtDeg)}-${String(pitchDeg)}`, lookAtDeg, pitchDeg } }]));
@@ -25,5 +25,5 @@ test("tilting takes the next pitch, in the nearest direction that has it", () =>
 });
 
 test.each([[110, 100], [99, 50], [49, 20], [19.9, 10], [5, 5], [0.3, 0.2], [1, 1]])("below %d the round number is %d", (value, round) => {
-  expect(roundBelow(value)).toBeCloseTo(round, 12);
+  expect(floorToRound(value)).toBeCloseTo(round, 12);
 });

@@ -44,8 +44,8 @@ const town = (frame: Frame): Surface => (u, v) => {
 /** A map that shows a surface, pixel by pixel; `asked`: how many tiles it was asked for. */
 function mapOf(frame: Frame, surface: Surface = town(frame), asked: number[] = []): map {
   return {
-    sight: () => ({ camera: { frame }, origin: ORIGIN }),
-    reliefOf: (_: unknown, [low, high]: readonly [Vec2, Vec2], most: number) => {
+    getViewState: () => ({ camera: { frame }, origin: ORIGIN }),
+    fetchRelief: (_: unknown, [low, high]: readonly [Vec2, Vec2], most: number) => {
       let z = frame.zmax;
       const tiles = (): number => (((high[0] - low[0]) * 2 ** z) / frame.size + 1) * (((high[1] - low[1]) * 2 ** z) / frame.size + 1);
       while (z > 0 && tiles() > most) z--;

@@ -33,7 +33,7 @@ function layerOf({ opacity = 1, hidden, gone }: Made = {}): imageLayer {
     const raw = tileName(tile) === gone ? undefined : town.raw.get(`${view.id}/${info.name}/${tileName(tile)}`);
     return raw && { empty: false, data: { kind: info.name, width: PIXELS, height: PIXELS, values: new Uint32Array(raw.buffer, raw.byteOffset, raw.byteLength / 4) } };
   };
-  return { options: { opacity }, rendering, finishes: hidden === undefined ? null : {}, hides: (id: number) => id === hidden, viewOf: ({ id }: Frame) => rendering.views.get(id), store: { get: stored } } as unknown as imageLayer;
+  return { options: { opacity }, rendering, drawStyles: hidden === undefined ? null : {}, isHidden: (id: number) => id === hidden, findView: ({ id }: Frame) => rendering.views.get(id), tiles: { get: stored } } as unknown as imageLayer;
 }
 
 function reliefOf(layers: readonly imageLayer[], direction = "0-45"): Relief {
@@ -69,8 +69,8 @@ describe("relief", () => {
       const centre = [frame.u0 + (Math.floor((u - frame.u0) / PX) + 0.5) * PX, frame.v0 - (Math.floor((frame.v0 - v) / PX) + 0.5) * PX] as const;
       const [hit, own] = [trace(frame, u, v), trace(frame, ...centre)];
       if (!hit || own?.id !== hit.id || own.normal.join() !== hit.normal.join()) continue; // a pixel on an edge shows one side of it
-      expect(relief.hides(u, v, frame.d0 + hit.d), `${String(u)} ${String(v)}`).toBe(false);
-      expect(relief.hides(u, v, frame.d0 + hit.d + 12 * PX)).toBe(true);
+      expect(relief.isOccluded(u, v, frame.d0 + hit.d), `${String(u)} ${String(v)}`).toBe(false);
+      expect(relief.isOccluded(u, v, frame.d0 + hit.d + 12 * PX)).toBe(true);
       tested++;
     }
     expect(tested).toBeGreaterThan(800);
@@ -104,7 +104,7 @@ describe("draping", () => {
 
   test("what a building hides has no height, what is not loaded none yet", () => {
     expect(landing(relief, 32, 45)).toBeNaN();
-    expect(landing(reliefOf([Object.assign(layerOf(), { store: { get: () => undefined } })]), 0, 0)).toBeNull();
+    expect(landing(reliefOf([Object.assign(layerOf(), { tiles: { get: () => undefined } })]), 0, 0)).toBeNull();
   });
 
   test("heights between those that are known", () => {

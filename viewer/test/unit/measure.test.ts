@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
 import type { Vec3 } from "../../src/core/vec";
 import { measureArea, measureLine } from "../../src/measure/geometry";
-import { Words } from "../../src/measure/words";
+import { MeasureMessages } from "../../src/measure/i18n";
 
 const ORIGIN: Vec3 = [691_000, 5_336_000, 500];
 const at = (x: number, y: number, z: number): Vec3 => [ORIGIN[0] + x, ORIGIN[1] + y, ORIGIN[2] + z];
@@ -46,7 +46,7 @@ describe("areas", () => {
 });
 
 describe("words", () => {
-  const words = new Words("en");
+  const words = new MeasureMessages("en");
   test.each([[0, "0.00 m"], [12.345, "12.35 m"], [99.996, "100.0 m"], [999.96, "1.00 km"], [1234.5, "1.23 km"], [12_345, "12.3 km"]])("%d m is %s", (metres, text) => {
     expect(words.length(metres)).toBe(text);
   });
@@ -55,7 +55,7 @@ describe("words", () => {
   });
   test("rise and fall, in the reader's own numbers", () => {
     expect(words.rise(-2.5)).toBe("↓ 2.50 m");
-    expect(new Words("de").rise(2.5)).toBe("↑ 2,50 m");
+    expect(new MeasureMessages("de").rise(2.5)).toBe("↑ 2,50 m");
     expect(words.rise(0.004)).toBe("± 0.00 m");
     expect(words.rise(-0.004)).toBe("± 0.00 m");
     expect(words.rise(-0.006)).toBe("↓ 0.01 m");

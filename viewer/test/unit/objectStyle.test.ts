@@ -1,5 +1,5 @@
 import { describe, expect, test } from "vitest";
-import { packColor, packFinish } from "../../src/draw/finish";
+import { packColor, packFinish } from "../../src/draw/drawStyle";
 import { idTable } from "../../src/draw/webgl/idTable";
 import { finishesOf, isHidden, type ObjectStyle } from "../../src/map/objectStyle";
 

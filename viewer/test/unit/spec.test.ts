@@ -1,8 +1,8 @@
 import { readFileSync } from "node:fs";
 import { resolve } from "node:path";
 import { describe, expect, test } from "vitest";
-import { axesOf, depthAtHeight, localFromUvd, uvdFromLocal, viewId } from "../../src/geo/axes";
-import { ancestor, blockLevel, blockOf, childrenOf, frameOf, morton, pixelAt, uvOfPixel, type FrameNumbers } from "../../src/geo/frame";
+import { computeAxes, depthAtHeight, localFromUvd, uvdFromLocal, viewId } from "../../src/geo/axes";
+import { ancestor, blockLevel, blockRoot, childrenOf, makeFrame, morton, pixelAt, uvOfPixel, type FrameJson } from "../../src/geo/frame";
 import { Occupancy } from "../../src/geo/occupancy";
 import type { Box3, Vec3 } from "../../src/core/vec";
 import { pin } from "../fixture/town";
@@ -14,7 +14,7 @@ interface ViewRow { look_at_deg: number; pitch_deg: number; id: string; right: V
 
 describe("views", () => {
   test.each(vectors<ViewRow[]>("views"))("view $id has the axes, and points the coordinates, of the vectors", (row) => {
-    const axes = axesOf(row.look_at_deg, row.pitch_deg);
+    const axes = computeAxes(row.look_at_deg, row.pitch_deg);
     expect(viewId(row.look_at_deg, row.pitch_deg)).toBe(row.id);
     for (const name of ["right", "up", "forward"] as const) row[name].forEach((part, k) => { expect(axes[name][k as 0]).toBeCloseTo(part, 15); });
     for (const { local, uvd } of row.points) {
@@ -24,18 +24,18 @@ describe("views", () => {
   });
 
   test("the point at a height has that height", () => {
-    const axes = axesOf(37.5, 22.5);
+    const axes = computeAxes(37.5, 22.5);
     const d = depthAtHeight(axes, 12.5, 42) ?? NaN;
     expect(localFromUvd(axes, [3, 12.5, d])[2]).toBeCloseTo(42, 9);
     expect(depthAtHeight({ ...axes, forward: [0, 1, 0] }, 0, 0)).toBeNull();
   });
 });
 
-interface TilesFile { frame: { zmax: number; size_m: number; views: FrameNumbers[] }; view: number; tile_px: number; rows: { tile: [number, number, number]; pixel: [number, number]; u: number; v: number; morton: number; parent: [number, number, number] | null }[] }
+interface TilesFile { frame: { zmax: number; size_m: number; views: FrameJson[] }; view: number; tile_px: number; rows: { tile: [number, number, number]; pixel: [number, number]; u: number; v: number; morton: number; parent: [number, number, number] | null }[] }
 
 describe("tiles", () => {
   const file = vectors<TilesFile>("tiles");
-  const frame = frameOf(file.frame.views[file.view] as FrameNumbers, file.frame.size_m, file.tile_px, file.frame.zmax);
+  const frame = makeFrame(file.frame.views[file.view] as FrameJson, file.frame.size_m, file.tile_px, file.frame.zmax);
 
   test.each(file.rows)("tile $tile, pixel $pixel", ({ tile: [z, x, y], pixel: [i, j], u, v, morton: code, parent }) => {
     const tile = { z, x, y };
@@ -68,18 +68,18 @@ describe("blocks", () => {
   });
 
   test("a tile's block is its ancestor at the root level", () => {
-    expect(blockOf({ z: 5, x: 21, y: 30 }, 5)).toEqual({ z: 2, x: 2, y: 3 });
-    expect(blockOf({ z: 1, x: 1, y: 0 }, 5)).toEqual({ z: 0, x: 0, y: 0 });
+    expect(blockRoot({ z: 5, x: 21, y: 30 }, 5)).toEqual({ z: 2, x: 2, y: 3 });
+    expect(blockRoot({ z: 1, x: 1, y: 0 }, 5)).toEqual({ z: 0, x: 0, y: 0 });
   });
 });
 
 describe("frames", () => {
-  interface Row { box: Box3; tile_px: number; res_m: number; views_deg: [number, number][]; pinned: { zmax: number; size_m: number; views: FrameNumbers[] } }
+  interface Row { box: Box3; tile_px: number; res_m: number; views_deg: [number, number][]; pinned: { zmax: number; size_m: number; views: FrameJson[] } }
   test.each(vectors<Row[]>("frames"))("the fixture pins $box as the vectors do", (row) => {
     const { size, zmax, numbers } = pin(row.box, row.tile_px, row.res_m, row.views_deg);
     expect([size, zmax]).toEqual([row.pinned.size_m, row.pinned.zmax]);
     numbers.forEach((view, k) => {
-      const want = row.pinned.views[k] as FrameNumbers;
+      const want = row.pinned.views[k] as FrameJson;
       expect(view.id).toBe(want.id);
       for (const name of ["u0_m", "v0_m", "d0_m"] as const) expect(view[name]).toBeCloseTo(want[name], 8);
     });

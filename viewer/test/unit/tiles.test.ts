@@ -1,7 +1,7 @@
 import { afterEach, describe, expect, test, vi } from "vitest";
 import { PMTiles, zxyToTileId, type Source as PmSource } from "pmtiles";
 import { gzipSync } from "node:zlib";
-import { frameOf, type Tile } from "../../src/geo/frame";
+import { makeFrame, type Tile } from "../../src/geo/frame";
 import { Cache } from "../../src/tiles/cache";
 import { coverOf, fromTheMiddle, levelFor, standsFor, type Rect } from "../../src/tiles/cover";
 import { fetchBytes } from "../../src/tiles/fetch";
@@ -9,7 +9,7 @@ import { Archive, tileId } from "../../src/tiles/pmtiles";
 import { Queue, type Job } from "../../src/tiles/queue";
 import { baseUrl, hostOf, tileUrl, tileUrls } from "../../src/tiles/url";
 
-const frame = frameOf({ id: "0-45", look_at_deg: 0, pitch_deg: 45, u0_m: -512, v0_m: 512, d0_m: 0 }, 1024, 256, 4);
+const frame = makeFrame({ id: "0-45", look_at_deg: 0, pitch_deg: 45, u0_m: -512, v0_m: 512, d0_m: 0 }, 1024, 256, 4);
 const area = ({ z }: Tile): number => (frame.size / 2 ** z) ** 2;
 
 describe("cover", () => {

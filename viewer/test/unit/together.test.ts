@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
 import { cornerOf, leadOf, meet, rangeOf, type Clip, type Depths } from "../../src/draw/combine";
 import { eachHidden, maskOf } from "../../src/draw/canvas/mask";
-import { frameOf, pixelM, uvOfPixel } from "../../src/geo/frame";
+import { makeFrame, pixelM, uvOfPixel } from "../../src/geo/frame";
 import type { ManifestJson, Rendering } from "../../src/geo/manifest";
 import { discord } from "../../src/map/agreement";
 import { combinedOf, groupsOf } from "../../src/map/combined";
@@ -9,8 +9,8 @@ import type { imageLayer } from "../../src/map/imageLayer";
 import { NO_DEPTH } from "../../src/tiles/tileData";
 
 const VIEW = { id: "0-45", look_at_deg: 0, pitch_deg: 45, u0_m: -50, v0_m: 40, d0_m: -1000 };
-const own: Depths = { frame: frameOf(VIEW, 100, 16, 2), shift: [0, 0, 0], unit_m: 1 / 1024, lead_m: 0, range: [-900, -800] };
-const other: Depths = { frame: frameOf({ ...VIEW, u0_m: -70, v0_m: 61, d0_m: -1200 }, 170, 16, 3), shift: [7.25, -3.5, 11], unit_m: 1 / 512, lead_m: 0.5, range: [-950, -700] };
+const own: Depths = { frame: makeFrame(VIEW, 100, 16, 2), shift: [0, 0, 0], unit_m: 1 / 1024, lead_m: 0, range: [-900, -800] };
+const other: Depths = { frame: makeFrame({ ...VIEW, u0_m: -70, v0_m: 61, d0_m: -1200 }, 170, 16, 3), shift: [7.25, -3.5, 11], unit_m: 1 / 512, lead_m: 0.5, range: [-950, -700] };
 
 describe("a mask", () => {
   test("asks for the pixel that lies at the middle of this one, at any level and origin", () => {
@@ -71,7 +71,7 @@ test("layers that combine make one group where the first of them is", () => {
 describe("renderings on one map", () => {
   const rendering = (crs: Partial<ManifestJson["crs"]>, angles: readonly (readonly [number, number])[] = [[0, 45]]): Rendering => ({
     json: { crs: { epsg: 25832, wkt: null, name: "UTM 32", vertical: null, ...crs } } as ManifestJson,
-    views: new Map(angles.map(([a, p]) => [`${String(a)}:${String(p)}`, { frame: frameOf({ ...VIEW, look_at_deg: a, pitch_deg: p }, 10, 16, 1) } as never])),
+    views: new Map(angles.map(([a, p]) => [`${String(a)}:${String(p)}`, { frame: makeFrame({ ...VIEW, look_at_deg: a, pitch_deg: p }, 10, 16, 1) } as never])),
     layers: new Map(),
   });
 

@@ -3,7 +3,7 @@ import type { LayerKind } from "../../geo/manifest";
 import { standsFor } from "../../tiles/cover";
 import { neededKinds, type Drawer, type DrawerEvents, type FrameSpec, type Pass, type Quad } from "../drawer";
 import { meet } from "../combine";
-import type { Finishes } from "../finish";
+import type { DrawStyles } from "../drawStyle";
 import { kindsBeside, kindsOf, lookOf, lookWith, type Look } from "./look";
 import { maskOf, type Mask } from "./mask";
 import { Pictures, type Image, type Picture, type Wish } from "./pictures";
@@ -11,7 +11,7 @@ import type { Order } from "./shade.worker";
 import { areaOf, gridOf, type Grid, type Piece } from "./sheet";
 import { Laid, Painted, type Showing, type Shown } from "./showing";
 
-type Named = Pass["highlight"] | Finishes;
+type Named = Pass["highlight"] | DrawStyles;
 
 /** A tile that is to be seen. */
 interface Wanted {
@@ -49,7 +49,7 @@ export class CanvasDrawer implements Drawer {
     return this.#pictures.composed ? "light by compositing: this browser changes pixels that are read" : "";
   }
 
-  get shown(): HTMLElement {
+  get element(): HTMLElement {
     return this.#showing.element;
   }
 

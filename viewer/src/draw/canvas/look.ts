@@ -4,7 +4,7 @@ import type { LayerKind } from "../../geo/manifest";
 import type { Vec2, Vec3 } from "../../core/vec";
 import type { Shadow } from "../../geo/shadows";
 import type { Mask } from "./mask";
-import { neededKinds, type Baked, type FrameSpec, type Mode, type Pass } from "../drawer";
+import { neededKinds, type BakedLight, type FrameSpec, type Mode, type Pass } from "../drawer";
 
 /** Of lit tiles. */
 interface Lamp {
@@ -81,7 +81,7 @@ export function lookOf({ light, dpr }: Pick<FrameSpec, "light" | "dpr">, pass: P
   };
 }
 
-function lampOf(light: Readonly<Light>, { shadow, occlusion }: Baked): Lamp {
+function lampOf(light: Readonly<Light>, { shadow, occlusion }: BakedLight): Lamp {
   const scaled = (rgb: Vec3, by: number): Vec3 => [rgb[0] * by, rgb[1] * by, rgb[2] * by];
   return {
     sun: towardsLight(light),

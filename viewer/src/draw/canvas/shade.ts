@@ -1,5 +1,5 @@
 import type { Rgb } from "../drawer";
-import { packFinish, PAINT, PALE, type Finishes } from "../finish";
+import { packFinish, PAINT, PALE, type DrawStyles } from "../drawStyle";
 import type { Look } from "./look";
 import { lightOn, type Lamp, type Shades } from "./lightOn";
 import { eachHidden, type Masking } from "./mask";
@@ -28,7 +28,7 @@ export interface Around {
 /** What is said of objects by id. */
 export interface Said {
   readonly colors: ReadonlyMap<number, Rgb> | undefined;
-  readonly finishes: Finishes | undefined;
+  readonly finishes: DrawStyles | undefined;
 }
 
 type Bytes = Uint8ClampedArray<ArrayBuffer>;
@@ -58,7 +58,7 @@ function srgb(c: number): number {
   return c <= 0.0031308 ? c * 12.92 : 1.055 * c ** (1 / 2.4) - 0.055;
 }
 
-function showColors(out: Bytes, look: Look, layers: Layers, around: Around, finishes: Finishes | undefined): void {
+function showColors(out: Bytes, look: Look, layers: Layers, around: Around, finishes: DrawStyles | undefined): void {
   const { color = out, id } = layers;
   out.set(color);
   for (let at = 0; look.masked && id && at < id.length; at++) out[4 * at + 3] = id[at] === 0 ? 0 : 255;
@@ -75,7 +75,7 @@ function showColors(out: Bytes, look: Look, layers: Layers, around: Around, fini
 }
 
 /** As the shader's `finished`. */
-function finish(out: Bytes, id: Uint32Array, finishes: Finishes): void {
+function finish(out: Bytes, id: Uint32Array, finishes: DrawStyles): void {
   eachFinished(id, finishes, (at, word) => {
     const k = 4 * at;
     const kind = word >>> 24;
@@ -89,7 +89,7 @@ function finish(out: Bytes, id: Uint32Array, finishes: Finishes): void {
 }
 
 /** Pixels of objects that are not shown as they are: where, and the finish as the shader has it. */
-export function eachFinished(id: Uint32Array, { byId, others }: Finishes, act: (at: number, word: number) => void): void {
+export function eachFinished(id: Uint32Array, { byId, others }: DrawStyles, act: (at: number, word: number) => void): void {
   let [last, word] = [0, 0];
   for (let at = 0; at < id.length; at++) {
     const own = id[at] as number;

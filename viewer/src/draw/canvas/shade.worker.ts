@@ -1,7 +1,7 @@
 import type { LayerKind } from "../../geo/manifest";
 import type { TileData } from "../../tiles/tileData";
 import type { Rgb } from "../drawer";
-import type { Finishes } from "../finish";
+import type { DrawStyles } from "../drawStyle";
 import type { Look } from "./look";
 import type { Shades } from "./lightOn";
 import type { Mask, Masking } from "./mask";
@@ -10,7 +10,7 @@ import { shade, type Around, type Layers } from "./shade";
 import { composed } from "./unread";
 
 /** What the worker keeps under a name: a tile's layer, colours of highlighted ids, or finishes. */
-export type Kept = TileData | ReadonlyMap<number, Rgb> | Finishes;
+export type Kept = TileData | ReadonlyMap<number, Rgb> | DrawStyles;
 
 /** A picture that is asked for; layers are named. */
 export interface Order {
@@ -86,7 +86,7 @@ function paint(look: Look, names: Order["layers"], beside: Order["beside"]): Ima
   const shadow = beside[look.light?.shadow?.kind ?? "sun"];
   const around: Around = { shades: (beside.normal ?? []).map((name, k) => shadesOf(look, name, beside.ao?.[k], shadow?.[k])), id: (beside.id ?? []).map(words), masks: look.masks.flatMap(maskingOf) };
   const colors = look.highlight === null ? undefined : (kept.get(look.highlight) as ReadonlyMap<number, Rgb> | undefined);
-  const finishes = look.finish === null ? undefined : (kept.get(look.finish) as Finishes | undefined);
+  const finishes = look.finish === null ? undefined : (kept.get(look.finish) as DrawStyles | undefined);
   if (bitmap && !exact && look.mode !== "id" && look.mode !== "normal" && look.mode !== "depth") return composed(look, bitmap, layers, around, { colors, finishes });
   return new ImageData(shade(look, layers, around, { colors, finishes }), width, height);
 }

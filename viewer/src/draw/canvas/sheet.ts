@@ -1,7 +1,7 @@
 import type { Tile } from "../../geo/frame";
 import type { Stand } from "../../tiles/cover";
 import { DrawError } from "../../core/errors";
-import type { Pass, Setting } from "../drawer";
+import type { Pass, FrameState } from "../drawer";
 import type { Image } from "./pictures";
 
 /** Where the tile pixels of the shown level lie on the screen. */
@@ -41,7 +41,7 @@ export interface Piece extends Stand {
 /** Left, top, right, bottom: pixels of a level. */
 export type Window = readonly [number, number, number, number];
 
-type Extent = Pick<Setting, "width" | "height">;
+type Extent = Pick<FrameState, "width" | "height">;
 
 /** What a sheet holds. */
 interface Held {

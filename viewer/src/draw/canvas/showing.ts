@@ -1,6 +1,6 @@
 import { element } from "../../core/dom";
 import type { Clip } from "../combine";
-import type { Setting } from "../drawer";
+import type { FrameState } from "../drawer";
 import { contextOf, Sheet, type Grid, type Piece } from "./sheet";
 
 /** What a pass shows. */
@@ -17,7 +17,7 @@ export interface Showing {
   /** What they are seen in. */
   readonly element: HTMLElement;
   /** All of a frame, the lowest first. */
-  show(screen: Setting, passes: readonly Shown[]): void;
+  show(screen: FrameState, passes: readonly Shown[]): void;
   remove(): void;
 }
 
@@ -40,7 +40,7 @@ export class Painted implements Showing {
     return this.#context.canvas;
   }
 
-  show(screen: Setting, passes: readonly Shown[]): void {
+  show(screen: FrameState, passes: readonly Shown[]): void {
     this.#context.clearRect(0, 0, screen.width, screen.height);
     for (const pass of passes) {
       this.#context.save();
@@ -54,7 +54,7 @@ export class Painted implements Showing {
     this.#sheet.empty();
   }
 
-  #paint(screen: Setting, { grid, pieces, smooth, opacity, clip }: Shown): void {
+  #paint(screen: FrameState, { grid, pieces, smooth, opacity, clip }: Shown): void {
     const window = this.#sheet.lay(screen, grid, pieces, smooth, 0);
     if (!window) return;
     const [[x0, y0, x1, y1], { left, top, px }, context] = [window, grid, this.#context];
@@ -84,7 +84,7 @@ function block(name: string): HTMLElement {
 
 /** Elements of the page, below a canvas: the browser moves and scales what has not changed, which takes a quarter of the work that painting does, and memory for pixels of the level alone. */
 export class Laid implements Showing {
-  readonly element = block("map3d-sheets");
+  readonly element = block("map3d-mosaics");
   readonly #lost: () => void;
   readonly #places: { readonly box: HTMLElement; readonly sheet: Sheet }[] = [];
 
@@ -97,7 +97,7 @@ export class Laid implements Showing {
     canvas.before(this.element);
   }
 
-  show(screen: Setting, passes: readonly Shown[]): void {
+  show(screen: FrameState, passes: readonly Shown[]): void {
     passes.forEach((pass, k) => { this.#show(screen, pass, this.#place(k)); });
     for (const { box, sheet } of this.#places.splice(passes.length)) {
       box.remove();
@@ -110,7 +110,7 @@ export class Laid implements Showing {
     for (const { sheet } of this.#places) sheet.empty();
   }
 
-  #show(screen: Setting, { grid, pieces, smooth, opacity, clip }: Shown, { box, sheet }: { box: HTMLElement; sheet: Sheet }): void {
+  #show(screen: FrameState, { grid, pieces, smooth, opacity, clip }: Shown, { box, sheet }: { box: HTMLElement; sheet: Sheet }): void {
     const [x, y] = sheet.lay(screen, grid, pieces, smooth, BEYOND_PX) ?? [0, 0];
     const [scale, css] = [grid.px / screen.dpr, (at: number): string => `${String(at / screen.dpr)}px`];
     const { canvas } = sheet;
@@ -136,6 +136,6 @@ export class Laid implements Showing {
 }
 
 /** Left, top, right, bottom in whole device pixels. */
-function clipped([left, top, right, bottom]: Clip, { width, height }: Setting): [number, number, number, number] {
+function clipped([left, top, right, bottom]: Clip, { width, height }: FrameState): [number, number, number, number] {
   return [Math.round(left * width), Math.round(top * height), Math.round(right * width), Math.round(bottom * height)];
 }

@@ -1,5 +1,5 @@
 import type { Rgb } from "../drawer";
-import { PAINT, PALE, type Finishes } from "../finish";
+import { PAINT, PALE, type DrawStyles } from "../drawStyle";
 import type { Look } from "./look";
 import { lightOn, type Lamp } from "./lightOn";
 import { eachHidden } from "./mask";
@@ -32,7 +32,7 @@ export function composed(look: Look, bitmap: ImageBitmap, layers: Layers, around
 }
 
 /** Colours and greys laid over; what is hidden comes back as an image, since alpha is spoilt until the end. */
-function finish(context: OffscreenCanvasRenderingContext2D, id: Uint32Array, finishes: Finishes): OffscreenCanvas {
+function finish(context: OffscreenCanvasRenderingContext2D, id: Uint32Array, finishes: DrawStyles): OffscreenCanvas {
   const { width, height } = context.canvas;
   const [paints, pale, hidden] = [new Uint32Array(id.length), new Uint32Array(id.length), new Uint32Array(id.length)];
   eachFinished(id, finishes, (at, word) => {

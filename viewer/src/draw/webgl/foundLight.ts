@@ -90,7 +90,7 @@ export class FoundLight {
     const { right, up, forward } = camera.frame.axes;
     const towards = towardsLight(light);
     const sun: Vec3 | null = hasShadows(frame) ? [dot(right, towards), dot(up, towards), dot(forward, towards)] : null;
-    const texture = by.sharesOf({ gl, depth: picture.texture, width, height, px_m, range, sun, occlusion: light.occlusion });
+    const texture = by.estimateLight({ gl, depth: picture.texture, width, height, px_m, range, sun, occlusion: light.occlusion });
     gl.disable(gl.DEPTH_TEST);
     return { texture, range, camera, step, height, same: (2 * px_m) / (range[1] - range[0]) + 1 / 65535 };
   }
@@ -103,8 +103,8 @@ export class FoundLight {
 }
 
 /** Least and greatest D of a frame's guests. */
-export const guestRanges = ({ guests, camera }: FrameSpec): Vec2[] => guests.flatMap((guest) => {
-  const range = guest.rangeAlong(camera.frame);
+export const guestRanges = ({ customLayers, camera }: FrameSpec): Vec2[] => customLayers.flatMap((guest) => {
+  const range = guest.getDepthRange(camera.frame);
   return range ? [range] : [];
 });
 

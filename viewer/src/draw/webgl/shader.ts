@@ -1,5 +1,5 @@
 import type { Mode } from "../drawer";
-import { PAINT, PALE } from "../finish";
+import { PAINT, PALE } from "../drawStyle";
 import { GUTTER } from "./textures";
 
 /** What a program is made for; each combination is compiled when it is first drawn. */

@@ -4,7 +4,7 @@ import { towardsLight } from "../../geo/light";
 import type { LayerKind } from "../../geo/manifest";
 import { bakedKinds, neededKinds, type Drawer, type DrawerEvents, type FrameSpec, type Mode, type Pass, type Quad } from "../drawer";
 import { firstOf, guestLead, rangeOf, steepOf, type Depths } from "../combine";
-import { packColor, packFinish } from "../finish";
+import { packColor, packFinish } from "../drawStyle";
 import { DeepCanvas } from "./deepCanvas";
 import { FoundLight, guestRanges } from "./foundLight";
 import { Programs, unitOf, type Program } from "./program";
@@ -66,7 +66,7 @@ export class WebGLDrawer implements Drawer {
     this.#watch(events);
   }
 
-  get shown(): HTMLElement {
+  get element(): HTMLElement {
     return this.#canvas;
   }
 
@@ -78,8 +78,8 @@ export class WebGLDrawer implements Drawer {
     const combined = frame.passes.filter(({ depths }) => depths);
     const range = frame.into?.range ?? this.#found.range ?? rangeOf(combined.flatMap(({ depths }) => depths ?? []), guestRanges(frame));
     const lead = Math.max(0, ...combined.map(({ depths, level }) => (depths ? guestLead(depths.frame, level) : 0)));
-    if (range) for (const guest of frame.guests) guest.prepare(gl, frame, [range[0] + lead, range[1] + lead]);
-    const deep = this.#deepFor(frame, combined.length + frame.guests.length > 0);
+    if (range) for (const guest of frame.customLayers) guest.prerender(gl, frame, [range[0] + lead, range[1] + lead]);
+    const deep = this.#deepFor(frame, combined.length + frame.customLayers.length > 0);
     this.#begin(frame, frame.into?.framebuffer ?? deep?.framebuffer ?? null);
     for (const pass of frame.passes) {
       if (!pass.depths) this.#drawPass(frame, pass, null, false);
@@ -138,7 +138,7 @@ export class WebGLDrawer implements Drawer {
 
   #drawGuests(frame: FrameSpec, soft: boolean): void {
     this.gl.disable(this.gl.SCISSOR_TEST);
-    for (const guest of frame.guests) guest.paint(this.gl, frame, soft);
+    for (const guest of frame.customLayers) guest.render(this.gl, frame, soft);
   }
 
   /** @param range of D, of what is drawn together  @param soft only what lets through */

@@ -1,5 +1,5 @@
 /** What the map says itself: names of controls, read aloud or shown. */
-export interface Words {
+export interface MapMessages {
   readonly zoom: string;
   readonly zoomIn: string;
   readonly zoomOut: string;
@@ -18,7 +18,7 @@ export interface Words {
   readonly close: string;
 }
 
-const EN: Words = {
+const EN: MapMessages = {
   zoom: "Zoom",
   zoomIn: "Zoom in",
   zoomOut: "Zoom out",
@@ -36,7 +36,7 @@ const EN: Words = {
   close: "Close",
 };
 
-const DE: Words = {
+const DE: MapMessages = {
   zoom: "Zoom",
   zoomIn: "Vergrößern",
   zoomOut: "Verkleinern",
@@ -54,7 +54,7 @@ const DE: Words = {
   close: "Schließen",
 };
 
-const FR: Words = {
+const FR: MapMessages = {
   zoom: "Zoom",
   zoomIn: "Agrandir",
   zoomOut: "Réduire",
@@ -73,19 +73,19 @@ const FR: Words = {
 };
 
 /** The languages that are known. */
-export interface Languages<T> {
+export interface Translations<T> {
   readonly en: T;
   readonly de: T;
   readonly fr: T;
 }
 
 /** English where a language (BCP 47) is not known. */
-export const inLanguage = <T>(known: Languages<T>, language: string): T => {
+export const selectTranslation = <T>(known: Translations<T>, language: string): T => {
   const short = language.slice(0, 2).toLowerCase();
   return short === "de" || short === "fr" ? known[short] : known.en;
 };
 
-export const wordsOf = (language: string): Words => inLanguage({ en: EN, de: DE, fr: FR }, language);
+export const getMapMessages = (language: string): MapMessages => selectTranslation({ en: EN, de: DE, fr: FR }, language);
 
 /** What the page around an element is written in, else what the browser's user reads. */
-export const languageOf = (element: Element): string => element.closest<HTMLElement>("[lang]:not([lang=''])")?.lang ?? navigator.language;
+export const findLanguage = (element: Element): string => element.closest<HTMLElement>("[lang]:not([lang=''])")?.lang ?? navigator.language;

@@ -1,6 +1,6 @@
-import { inLanguage } from "../core/words";
+import { selectTranslation } from "../core/i18n";
 
-export interface ControlWords {
+export interface ControlMessages {
   readonly locate: string;
   readonly here: (accuracy: string) => string;
   readonly denied: string;
@@ -12,7 +12,7 @@ export interface ControlWords {
   readonly move: string;
 }
 
-const EN: ControlWords = {
+const EN: ControlMessages = {
   locate: "Show where I am",
   here: (accuracy) => `You are here, ± ${accuracy}`,
   denied: "Your browser does not tell where you are. Allow it in the settings of this page.",
@@ -24,7 +24,7 @@ const EN: ControlWords = {
   move: "Overview: arrow keys move the view",
 };
 
-const DE: ControlWords = {
+const DE: ControlMessages = {
   locate: "Zeigen, wo ich bin",
   here: (accuracy) => `Sie sind hier, ± ${accuracy}`,
   denied: "Ihr Browser sagt nicht, wo Sie sind. Erlauben Sie es in den Einstellungen dieser Seite.",
@@ -36,7 +36,7 @@ const DE: ControlWords = {
   move: "Übersicht: Pfeiltasten bewegen den Ausschnitt",
 };
 
-const FR: ControlWords = {
+const FR: ControlMessages = {
   locate: "Montrer où je suis",
   here: (accuracy) => `Vous êtes ici, ± ${accuracy}`,
   denied: "Votre navigateur ne dit pas où vous êtes. Permettez-le dans les réglages de cette page.",
@@ -48,4 +48,4 @@ const FR: ControlWords = {
   move: "Vue d’ensemble : les flèches déplacent la vue",
 };
 
-export const controlWords = (language: string): ControlWords => inLanguage({ en: EN, de: DE, fr: FR }, language);
+export const getControlMessages = (language: string): ControlMessages => selectTranslation({ en: EN, de: DE, fr: FR }, language);

@@ -1,15 +1,15 @@
-import { inLanguage } from "../core/words";
+import { selectTranslation } from "../core/i18n";
 
 /** No rendering.json among the files, several, files that it names are missing, or a file cannot be read any more. */
 export type FilesProblem = "none" | "several" | "missing" | "changed";
 
-interface Words extends Record<FilesProblem, (paths: string) => string> {
+interface FilesMessages extends Record<FilesProblem, (paths: string) => string> {
   readonly open: string;
   readonly drop: string;
   readonly failed: string;
 }
 
-const EN: Words = {
+const EN: FilesMessages = {
   open: "Open a map folder from this device",
   drop: "Drop the folder of a published map here",
   failed: "This cannot be shown",
@@ -19,7 +19,7 @@ const EN: Words = {
   changed: (paths) => `${paths} has changed or moved since it was opened. Open the folder again.`,
 };
 
-const DE: Words = {
+const DE: FilesMessages = {
   open: "Kartenordner von diesem Gerät öffnen",
   drop: "Den Ordner einer veröffentlichten Karte hier ablegen",
   failed: "Das kann nicht gezeigt werden",
@@ -29,7 +29,7 @@ const DE: Words = {
   changed: (paths) => `${paths} wurde seit dem Öffnen geändert oder verschoben. Öffnen Sie den Ordner noch einmal.`,
 };
 
-const FR: Words = {
+const FR: FilesMessages = {
   open: "Ouvrir un dossier de carte de cet appareil",
   drop: "Déposez ici le dossier d’une carte publiée",
   failed: "Ceci ne peut pas être montré",
@@ -39,4 +39,4 @@ const FR: Words = {
   changed: (paths) => `${paths} a changé ou a été déplacé depuis son ouverture. Ouvrez le dossier à nouveau.`,
 };
 
-export const wordsOf = (language: string): Words => inLanguage({ en: EN, de: DE, fr: FR }, language);
+export const getFilesMessages = (language: string): FilesMessages => selectTranslation({ en: EN, de: DE, fr: FR }, language);

@@ -1,4 +1,4 @@
-import { inLanguage } from "../core/words";
+import { selectTranslation } from "../core/i18n";
 
 const WORDS = {
   en: { profile: "Profile", partHidden: "partly hidden", allHidden: "hidden all along", hidden: "hidden" },
@@ -7,13 +7,13 @@ const WORDS = {
 };
 
 /** Lengths and areas in words of the reader's language. */
-export class Words {
+export class MeasureMessages {
   readonly #numbers: (digits: number) => Intl.NumberFormat;
 
   readonly #words: (typeof WORDS)["en"];
 
   constructor(language: string | undefined) {
-    this.#words = inLanguage(WORDS, language ?? "en");
+    this.#words = selectTranslation(WORDS, language ?? "en");
     this.#numbers = (digits) => new Intl.NumberFormat(language, { minimumFractionDigits: digits, maximumFractionDigits: digits });
   }
 

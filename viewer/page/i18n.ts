@@ -72,9 +72,9 @@ const EN = {
   notStarted: "This page cannot start",
 };
 
-type Words = typeof EN;
+type PageMessages = typeof EN;
 
-const DE: Words = {
+const DE: PageMessages = {
   incomplete: "Diese Darstellung ist noch nicht vollständig.",
   saving: "Datensparen ist an: weniger Einzelheiten.",
   search: "Suchen",
@@ -148,7 +148,7 @@ const DE: Words = {
   notStarted: "Diese Seite kann nicht starten",
 };
 
-const FR: Words = {
+const FR: PageMessages = {
   incomplete: "Ce rendu n’est pas encore complet.",
   saving: "Économie de données : moins de détails.",
   search: "Rechercher",
@@ -222,7 +222,7 @@ const FR: Words = {
   notStarted: "Cette page ne peut pas démarrer",
 };
 
-const KNOWN: Readonly<Record<string, Words>> = { en: EN, de: DE, fr: FR };
+const KNOWN: Readonly<Record<string, PageMessages>> = { en: EN, de: DE, fr: FR };
 
 /** The first of the reader's languages that is known here, else English. */
 export function chooseLanguage(wanted: readonly string[]): string {
@@ -235,13 +235,13 @@ const words = KNOWN[language.slice(0, 2).toLowerCase()] ?? EN;
 /** The keys of all words. */
 export const KEYS: ReadonlySet<string> = new Set(Object.keys(EN));
 
-export const say = (what: keyof Words): string => words[what];
+export const say = (what: keyof PageMessages): string => words[what];
 
 /** Puts the page's own words into the reader's language: `data-say` is for text, `data-say-label` for names that are read aloud and `data-say-hint` for what stands in an empty field. */
 export function translate(page: ParentNode = document): void {
   document.documentElement.lang = language;
   const each = (name: string, act: (element: HTMLElement, text: string) => void): void => {
-    for (const element of page.querySelectorAll<HTMLElement>(`[data-${name}]`)) act(element, say(element.getAttribute(`data-${name}`) as keyof Words));
+    for (const element of page.querySelectorAll<HTMLElement>(`[data-${name}]`)) act(element, say(element.getAttribute(`data-${name}`) as keyof PageMessages));
   };
   each("say", (element, text) => { element.textContent = text; });
   each("say-label", (element, text) => {

@@ -1,6 +1,6 @@
-import { inLanguage } from "../core/words";
+import { selectTranslation } from "../core/i18n";
 
-interface ElementWords {
+interface ElementMessages {
   readonly map: string;
   readonly failed: string;
 }
@@ -11,4 +11,4 @@ const WORDS = {
   fr: { map: "Carte", failed: "La carte ne peut pas être affichée." },
 };
 
-export const elementWords = (language: string): ElementWords => inLanguage(WORDS, language);
+export const getElementMessages = (language: string): ElementMessages => selectTranslation(WORDS, language);

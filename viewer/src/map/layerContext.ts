@@ -1,26 +1,26 @@
 import type { Vec3 } from "../core/vec";
 import type { Camera } from "../geo/camera";
 import type { Rendering } from "../geo/manifest";
-import type { Shared } from "../tiles/store";
+import type { TileResources } from "../tiles/layerTiles";
 
 /** What an image layer gets from the map it is on. */
-export interface Stage {
-  readonly shared: Shared;
+export interface LayerContext {
+  readonly tileResources: TileResources;
   /** A name for the layer's tiles that no other layer of the map has. */
-  nameLayer(): string;
+  createName(): string;
   /** A layer has left: its tiles can go. */
-  forget(layer: string): void;
+  dropTiles(layer: string): void;
   /** @throws UsageError when a manifest does not go with what is on the map */
-  admit(rendering: Rendering): void;
+  checkCompatible(rendering: Rendering): void;
   /** The layer's manifest is here. */
-  ready(rendering: Rendering): void;
+  onManifest(rendering: Rendering): void;
   /** A frame is needed. */
-  request(): void;
+  requestFrame(): void;
   report(error: Error): void;
 }
 
 /** The camera, and the origin (world) that its U and V refer to. */
-export interface Sight {
+export interface ViewState {
   readonly camera: Camera;
   readonly origin: Vec3;
   readonly dpr: number;

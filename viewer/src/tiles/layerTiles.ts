@@ -8,15 +8,15 @@ import type { Source } from "./source";
 import { bytesOf, type TileData } from "./tileData";
 
 /** A tile in memory. `data` is null when the tile is empty, or when the drawer keeps it for us. */
-export interface Stored {
+export interface CachedTile {
   data: TileData | null;
   readonly empty: boolean;
   /** As it was sent, and when it came (performance.now). */
   readonly sent: { readonly bytes: number; readonly at_ms: number };
 }
 
-export interface Shared {
-  readonly cache: Cache<Stored>;
+export interface TileResources {
+  readonly cache: Cache<CachedTile>;
   readonly queue: Queue;
   readonly decoder: Decoder;
 }
@@ -24,15 +24,15 @@ export interface Shared {
 const RETRY_AFTER_MS = 15_000;
 
 /** The tiles of one rendering: fetched, decoded, kept. */
-export class Store {
+export class LayerTiles {
   readonly #name: string;
   readonly #source: Source;
-  readonly #shared: Shared;
+  readonly #shared: TileResources;
   readonly #failed = new Map<string, { readonly at_ms: number; readonly error: Error }>();
   readonly #arrived: (error: Error | null) => void;
 
   /** @param name unique in the map  @param arrived called after each tile, with what went wrong */
-  constructor(name: string, source: Source, shared: Shared, arrived: (error: Error | null) => void) {
+  constructor(name: string, source: Source, shared: TileResources, arrived: (error: Error | null) => void) {
     this.#name = name;
     this.#source = source;
     this.#shared = shared;
@@ -44,12 +44,12 @@ export class Store {
   }
 
   /** The tile if it is in memory, which counts as use. */
-  get(view: View, layer: LayerInfo, tile: Tile): Stored | undefined {
+  get(view: View, layer: LayerInfo, tile: Tile): CachedTile | undefined {
     return this.#shared.cache.get(this.key(view, layer, tile));
   }
 
   /** How large a tile in memory was as it came, and when; not a use. */
-  sent(view: View, layer: LayerInfo, tile: Tile): Stored["sent"] | undefined {
+  sent(view: View, layer: LayerInfo, tile: Tile): CachedTile["sent"] | undefined {
     return this.#shared.cache.peek(this.key(view, layer, tile))?.sent;
   }
 

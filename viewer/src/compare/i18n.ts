@@ -1,6 +1,6 @@
-import { inLanguage } from "../core/words";
+import { selectTranslation } from "../core/i18n";
 
-interface Words {
+interface CompareMessages {
   /** Of the line between two renderings. */
   readonly border: string;
   readonly time: string;
@@ -10,6 +10,6 @@ const KNOWN = {
   en: { border: "Border between the left and the right picture", time: "Time" },
   de: { border: "Grenze zwischen linkem und rechtem Bild", time: "Zeit" },
   fr: { border: "Limite entre l’image de gauche et celle de droite", time: "Époque" },
-} satisfies Record<string, Words>;
+} satisfies Record<string, CompareMessages>;
 
-export const wordsOf = (language: string): Words => inLanguage<Words>(KNOWN, language);
+export const getCompareMessages = (language: string): CompareMessages => selectTranslation<CompareMessages>(KNOWN, language);

@@ -1,7 +1,7 @@
 import type { Vec2, Vec3 } from "../core/vec";
 
 /** What is seen, by depth alone. */
-export interface SeenDepths {
+export interface DepthImage {
   readonly gl: WebGL2RenderingContext;
   /** Of each pixel, as a share of `range`; 1 where nothing is. A depth texture, the lowest row first. */
   readonly depth: WebGLTexture;
@@ -18,10 +18,10 @@ export interface SeenDepths {
 }
 
 /** Finds from depths how much light reaches what is seen. */
-export interface Shade {
+export interface LightEstimator {
   /**
    * RGBA8 texture as large as the depths: red is the share of the sky's light, green of the sun's; blue and alpha are the
    * high and the low byte of the depth that they are of. It lasts until the next call.
    */
-  sharesOf(seen: SeenDepths): WebGLTexture;
+  estimateLight(seen: DepthImage): WebGLTexture;
 }

@@ -1,8 +1,8 @@
 import { Evented } from "./events";
-import type { Attachable, Holder } from "./surface";
+import type { Addable, LayerHost } from "./overlayHost";
 
 /** Base of what is put on a map: on one at a time. `E` maps its events to their fields. */
-export abstract class Attached<M extends Holder<M>, E extends object> extends Evented<E> implements Attachable<M> {
+export abstract class MapLayer<M extends LayerHost<M>, E extends object> extends Evented<E> implements Addable<M> {
   #map: M | undefined;
 
   /** Puts it on a map. */
@@ -18,14 +18,14 @@ export abstract class Attached<M extends Holder<M>, E extends object> extends Ev
   }
 
   /** @internal */
-  onAdd(map: M): void {
+  attachTo(map: M): void {
     this.#map = map;
-    this.enter(map);
+    this.onAdd(map);
   }
 
   /** @internal */
-  onRemove(map: M): void {
-    this.leave(map);
+  detachFrom(map: M): void {
+    this.onRemove(map);
     this.#map = undefined;
   }
 
@@ -35,8 +35,8 @@ export abstract class Attached<M extends Holder<M>, E extends object> extends Ev
   }
 
   /** It is on a map now. */
-  protected abstract enter(map: M): void;
+  protected abstract onAdd(map: M): void;
 
   /** It leaves the map; `map` tells still which. */
-  protected abstract leave(map: M): void;
+  protected abstract onRemove(map: M): void;
 }

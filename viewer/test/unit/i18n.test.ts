@@ -1,8 +1,8 @@
 import { readFileSync } from "node:fs";
 import { resolve } from "node:path";
 import { expect, test } from "vitest";
-import { chooseLanguage, KEYS } from "../../page/words";
-import { wordsOf } from "../../src/core/words";
+import { chooseLanguage, KEYS } from "../../page/i18n";
+import { getMapMessages } from "../../src/core/i18n";
 import { windOf } from "../../src/ui/controls";
 
 test.each([
@@ -23,7 +23,7 @@ test("the page's markup asks for words that there are", () => {
 });
 
 test.each(["en", "de", "fr", "de-AT", "it", ""])("%s: every control has a name, every wind another", (language) => {
-  const { looking, scale, winds, ...names } = wordsOf(language);
+  const { looking, scale, winds, ...names } = getMapMessages(language);
   expect(Object.values(names).every((name) => name.trim() !== "")).toBe(true);
   expect(new Set(winds).size).toBe(8);
   for (const wind of winds) expect(looking(wind)).toContain(wind);
@@ -31,6 +31,6 @@ test.each(["en", "de", "fr", "de-AT", "it", ""])("%s: every control has a name, 
 });
 
 test("winds count counter-clockwise", () => {
-  const { winds } = wordsOf("en");
+  const { winds } = getMapMessages("en");
   expect([0, 45, 90, 179, 270, 340, -90, 720].map((deg) => winds[windOf(deg)])).toEqual(["north", "north-west", "west", "south", "east", "north", "east", "north"]);
 });

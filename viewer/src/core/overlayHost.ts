@@ -2,7 +2,7 @@ import type { Evented } from "./events";
 import type { Vec2, Vec3 } from "./vec";
 
 /** What places on the screen depend on. */
-export interface SurfaceEvents {
+export interface OverlayEvents {
   /** The picture has moved: places on the screen are others now. */
   move: object;
   /** A frame has been drawn: places, or what is known of the surface, may be others now. */
@@ -10,7 +10,7 @@ export interface SurfaceEvents {
 }
 
 /** What markers, popups and controls see of a map. */
-export interface Surface {
+export interface OverlayHost {
   readonly container: HTMLElement;
   /** Holds markers and popups; lies over the picture and lets pointers through. */
   readonly overlayPane: HTMLElement;
@@ -19,26 +19,26 @@ export interface Surface {
   /** CSS pixels from the container's top left corner; null while the map has no view yet. */
   project(world: Vec3): Vec2 | null;
   /** Does something that is seen lie before a position? As far as the depths in memory tell. */
-  covers(world: Vec3): boolean;
+  isOccluded(world: Vec3): boolean;
   /** World position of the surface that is seen under a point; null where nothing is, or nothing is known yet. */
-  surfaceAt(point: Vec2): Vec3 | null;
-  readonly moves: Pick<Evented<SurfaceEvents>, "on" | "off">;
+  findSurfaceAt(point: Vec2): Vec3 | null;
+  readonly frameEvents: Pick<Evented<OverlayEvents>, "on" | "off">;
 }
 
 /** Something that can be added to a map. */
-export interface Attachable<M> {
+export interface Addable<M> {
   /** Layers that it reads: while it is on the map, their tiles are fetched for what is in view. */
   readonly needs?: readonly ("id" | "depth")[];
   /** @internal The map calls it, once. */
-  onAdd(map: M): void;
+  attachTo(map: M): void;
   /** @internal The map calls it, once. */
-  onRemove(map: M): void;
+  detachFrom(map: M): void;
 }
 
 /** A map to which things are added. */
-export interface Holder<M> {
+export interface LayerHost<M> {
   /** Puts it on the map; nothing when it is there. */
-  add(item: Attachable<M>): unknown;
+  add(item: Addable<M>): unknown;
   /** Takes it off the map; nothing when it is not there. */
-  discard(item: Attachable<M>): unknown;
+  discard(item: Addable<M>): unknown;
 }

@@ -3,15 +3,15 @@ import { Evented } from "../core/events";
 import { add, clamp, dot, mid, sub, type Box3, type Vec2, type Vec3 } from "../core/vec";
 import { depthAtHeight, localFromUvd, uvdFromLocal } from "../geo/axes";
 import { cssPixelM, projectedBox, screenFromLocal, uvFromScreen, zoomedAt, zoomToFit, type Camera } from "../geo/camera";
-import { localFromLonLat, lonLatOf } from "../geo/geographic";
+import { localFromLonLat, lonLatFromLocal } from "../geo/geographic";
 import type { Rendering, View } from "../geo/manifest";
 import { discord } from "./agreement";
 import { neighbourView, tiltedView } from "./directions";
 import { limited, zoomLimits } from "./limits";
 import { Motion } from "./motion";
 import type { FilledOptions, MapEvents } from "./options";
-import type { Sight } from "./stage";
-import type { Turner } from "./turner";
+import type { ViewState } from "./layerContext";
+import type { ViewTransition } from "./viewTransition";
 import type { Size } from "./viewport";
 
 const FLIGHT_MS = 700;
@@ -30,16 +30,16 @@ export interface FitOptions {
 }
 
 /** Where a map looks: its camera, and all that moves it. Calls before the first manifest is here wait for it. */
-export abstract class Viewing extends Evented<MapEvents> {
+export abstract class CameraController extends Evented<MapEvents> {
   abstract readonly options: FilledOptions;
   protected readonly motion = new Motion(() => { this.requestFrame(); });
   protected camera: Camera | undefined;
   /** The first layer's manifest; its origin is that of the camera. */
   protected reference: Rendering | undefined;
   /** Makes movements of changes of direction; null: they are cuts. */
-  protected turner: Turner | null = null;
+  protected transition: ViewTransition | null = null;
   /** What is seen while a change of direction is a movement. */
-  protected apparent: Camera | null = null;
+  protected transitionCamera: Camera | null = null;
   #pending: (() => void)[] = [];
   /** Clockwise, since the last turn. */
   #twist_rad = 0;
@@ -48,12 +48,12 @@ export abstract class Viewing extends Evented<MapEvents> {
   protected abstract requestFrame(): void;
   protected abstract report(error: Error): void;
   /** World position of the surface in the middle as far as it is in memory. */
-  protected abstract surfaceInTheMiddle(sight: Sight): Vec3 | null;
+  protected abstract surfaceInTheMiddle(viewState: ViewState): Vec3 | null;
 
   /** The surface in the middle of the screen as far as it is known, else the ground there; null before "ready". */
   get center(): Vec3 | null {
-    const sight = this.sight();
-    return sight && (this.surfaceInTheMiddle(sight) ?? this.unproject(this.middle()));
+    const viewState = this.getViewState();
+    return viewState && (this.surfaceInTheMiddle(viewState) ?? this.unproject(this.middle()));
   }
 
   /** At whole numbers a tile pixel of that level is one CSS pixel. */
@@ -160,7 +160,7 @@ export abstract class Viewing extends Evented<MapEvents> {
 
   /** CSS pixels of a world position; null before "ready". */
   project(world: Vec3): Vec2 | null {
-    return this.camera && this.reference ? screenFromLocal(this.apparent ?? this.camera, sub(world, this.reference.json.origin)) : null;
+    return this.camera && this.reference ? screenFromLocal(this.transitionCamera ?? this.camera, sub(world, this.reference.json.origin)) : null;
   }
 
   /** World position on the ground (height of the content's lowest point) under CSS pixels; null in level views. */
@@ -171,7 +171,7 @@ export abstract class Viewing extends Evented<MapEvents> {
   /** Longitude and latitude (WGS 84, degrees) of a world position; null before "ready", and where the scene's place on earth is not known. */
   lonLat(world: Vec3): Vec2 | null {
     const json = this.reference?.json;
-    return json?.geographic ? lonLatOf(json.geographic, sub(world, json.origin)) : null;
+    return json?.geographic ? lonLatFromLocal(json.geographic, sub(world, json.origin)) : null;
   }
 
   /** World x and y of a longitude and latitude; null as with lonLat. */
@@ -183,16 +183,16 @@ export abstract class Viewing extends Evented<MapEvents> {
   }
 
   /** @internal */
-  setTurner(turner: Turner | null): this {
-    this.turner = turner;
-    this.apparent = null;
+  setTransition(turner: ViewTransition | null): this {
+    this.transition = turner;
+    this.transitionCamera = null;
     this.requestFrame();
     return this;
   }
 
   /** @internal Turns the picture clockwise under a hand; to the next direction when it has been turned far enough, unless a turner follows the hand. */
-  twist(rad: number): void {
-    if (this.turner?.twist(rad)) return;
+  rotateBy(rad: number): void {
+    if (this.transition?.rotateBy(rad)) return;
     this.#twist_rad += rad;
     if (Math.abs(this.#twist_rad) < TWIST_RAD) return;
     this.rotate(Math.sign(this.#twist_rad));
@@ -200,33 +200,33 @@ export abstract class Viewing extends Evented<MapEvents> {
   }
 
   /** @internal A change of direction is under way. */
-  get turning(): boolean {
-    return this.apparent !== null;
+  get inTransition(): boolean {
+    return this.transitionCamera !== null;
   }
 
   /** @internal The turner shows something else now. */
-  requestTurn(): void {
+  requestTransitionFrame(): void {
     this.requestFrame();
   }
 
   /** @internal The hand has left. */
-  release(): void {
+  endGesture(): void {
     this.#twist_rad = 0;
-    this.turner?.release();
+    this.transition?.endGesture();
   }
 
   /** @internal */
-  grab(): void {
+  startGesture(): void {
     this.motion.stop();
   }
 
   /** @internal */
-  glide(velocity: Vec2): void {
+  startInertia(velocity: Vec2): void {
     if (!still()) this.motion.glide(velocity);
   }
 
   /** @internal */
-  sight(): Sight | null {
+  getViewState(): ViewState | null {
     const { pixelRatio, maxPixelRatio, finer, dataSaver } = this.options;
     const dpr = pixelRatio ?? Math.min(this.size.dpr, maxPixelRatio);
     const spared = dataSaver && dpr >= 1.5 ? 1 : 0;
@@ -234,7 +234,7 @@ export abstract class Viewing extends Evented<MapEvents> {
   }
 
   /** @internal As another map's camera, whose origin is given, without limits. */
-  look(camera: Camera, origin: Vec3): this {
+  syncCamera(camera: Camera, origin: Vec3): this {
     const { width, height } = this.size;
     const shift = sub(origin, this.reference?.json.origin ?? origin);
     const { right, up } = camera.frame.axes;
@@ -244,13 +244,13 @@ export abstract class Viewing extends Evented<MapEvents> {
   }
 
   /** @internal The next manifest gives the map its view, as the first one did. */
-  restart(): void {
+  resetView(): void {
     this.motion.stop();
     this.camera = this.reference = undefined;
   }
 
   protected get moving(): boolean {
-    return this.motion.moving || this.apparent !== null;
+    return this.motion.moving || this.transitionCamera !== null;
   }
 
   protected middle(): Vec2 {
@@ -268,7 +268,7 @@ export abstract class Viewing extends Evented<MapEvents> {
     const camera = this.camera;
     const next = camera && this.motion.step(now_ms, camera);
     if (next && next !== camera) this.camera = this.reference ? limited(next, this.reference.json.box) : next;
-    this.apparent = (this.camera && this.turner?.step(now_ms, this.camera)) ?? null;
+    this.transitionCamera = (this.camera && this.transition?.step(now_ms, this.camera)) ?? null;
   }
 
   /** @throws UsageError when a manifest does not go with the first */
@@ -326,7 +326,7 @@ export abstract class Viewing extends Evented<MapEvents> {
     const turned = { ...camera, frame: view.frame };
     this.motion.stop();
     this.setCamera(held ? cameraAt(turned, rendering, held) : fitted(turned, rendering.json.box, 0, camera.zoom));
-    this.turner?.turn(camera, held ? sub(held, rendering.json.origin) : mid(rendering.json.box));
+    this.transition?.start(camera, held ? sub(held, rendering.json.origin) : mid(rendering.json.box));
     this.fire("directionchange", { direction: view.id });
   }
 }

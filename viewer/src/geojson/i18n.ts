@@ -1,6 +1,6 @@
-import { inLanguage } from "../core/words";
+import { selectTranslation } from "../core/i18n";
 
-interface Words {
+interface GeojsonMessages {
   readonly features: string;
   readonly feature: (number: string) => string;
 }
@@ -11,4 +11,4 @@ const WORDS = {
   fr: { features: "Objets sur la carte", feature: (number: string) => `Objet ${number}` },
 };
 
-export const wordsIn = (language: string): Words => inLanguage(WORDS, language);
+export const getGeojsonMessages = (language: string): GeojsonMessages => selectTranslation(WORDS, language);

@@ -1,6 +1,6 @@
-import { inLanguage } from "../core/words";
+import { selectTranslation } from "../core/i18n";
 
-interface ThemeWords {
+interface ThemeMessages {
   readonly rest: string;
   readonly yes: string;
   readonly no: string;
@@ -12,4 +12,4 @@ const WORDS = {
   fr: { rest: "Autres", yes: "Oui", no: "Non" },
 };
 
-export const themeWords = (language: string): ThemeWords => inLanguage(WORDS, language);
+export const getThemeMessages = (language: string): ThemeMessages => selectTranslation(WORDS, language);
