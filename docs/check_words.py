@@ -25,7 +25,8 @@ def files() -> Iterator[Path]:
     names = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True).stdout.decode().split("\0")
     for name in names:
         path = ROOT / name
-        if name and name not in SKIPPED and path.suffix in SUFFIXES and not name.endswith("-lock.json") and "vectors" not in path.parts and path.is_file():
+        generated = name in SKIPPED or name.endswith("-lock.json") or "vectors" in path.parts
+        if path.suffix in SUFFIXES and not generated and path.is_file():
             yield path
 
 
