@@ -1,9 +1,9 @@
-"""One SQLite file used by many threads and processes: a connection per thread, WAL, BEGIN IMMEDIATE, busy timeout."""
+"""SQLite files used by many threads and processes: one connection per thread, write-ahead log, BEGIN IMMEDIATE, busy timeout."""
 
 import os
 import sqlite3
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
@@ -15,28 +15,21 @@ NOW: Final = "((julianday('now') - 2440587.5) * 86400.0)"
 """Seconds since 1970 on the database's clock, to the millisecond, as an SQL expression."""
 
 
-class Database:
-    """Opens the file and writes `schema` if it is new; refuses files of another `version`."""
+class Connections:
+    """One connection to the file at `path` per thread; a connection never crosses a fork. `connect` opens a connection in autocommit mode."""
 
-    def __init__(self, path: Path, schema: str, version: int) -> None:
+    def __init__(self, path: Path, connect: Callable[[], sqlite3.Connection]) -> None:
         self.path = path
+        self._connect = connect
         self._local = threading.local()
-        self._opened: list[sqlite3.Connection] = []
+        self._opened: list[tuple[int, sqlite3.Connection]] = []
         self._lock = threading.Lock()
-        with self.transaction() as db:
-            found = int(db.execute("PRAGMA user_version").fetchone()[0])
-            if found == 0:
-                for statement in schema.split(";"):
-                    db.execute(statement)
-                db.execute(f"PRAGMA user_version = {version}")
-            elif found != version:
-                raise UnknownVersion(f"{path}: version {found}; this map3d reads version {version}")
 
     @contextmanager
     def transaction(self) -> Iterator[sqlite3.Connection]:
-        """A write transaction, committed at the end, rolled back on any exception. Raises StoreError."""
+        """Opens a write transaction: commits it at the end, rolls it back on any exception. Raises StoreError."""
         try:
-            db = self._connection()
+            db = self.current()
             db.execute("BEGIN IMMEDIATE")
             try:
                 yield db
@@ -46,43 +39,69 @@ class Database:
                     db.execute("ROLLBACK")
                 raise
         except sqlite3.Error as error:
-            raise StoreError(f"{self.path}: {error}") from error
+            raise StoreError(f"{self.path}: cannot write: {error}") from error
 
     @contextmanager
     def reading(self) -> Iterator[sqlite3.Connection]:
-        """A read transaction: all statements see one state. Raises StoreError."""
-        try:
-            db = self._connection()
+        """Opens a read transaction, in which all statements see the same state. Raises StoreError."""
+        with self.autocommit() as db:
             db.execute("BEGIN")
             try:
                 yield db
             finally:
                 if db.in_transaction:
                     db.execute("ROLLBACK")
+
+    @contextmanager
+    def autocommit(self) -> Iterator[sqlite3.Connection]:
+        """Gives the connection for queries that each see the latest state. Raises StoreError."""
+        try:
+            yield self.current()
         except sqlite3.Error as error:
-            raise StoreError(f"{self.path}: {error}") from error
+            raise StoreError(f"{self.path}: cannot read: {error}") from error
+
+    def current(self) -> sqlite3.Connection:
+        """Returns this thread's connection, opened on first use. Raises sqlite3.Error."""
+        opened: tuple[int, sqlite3.Connection] | None = getattr(self._local, "opened", None)
+        if opened is None or opened[0] != os.getpid():
+            self._local.opened = opened = (os.getpid(), self._connect())
+            with self._lock:
+                self._opened.append(opened)
+        return opened[1]
 
     def close(self) -> None:
-        """Closes the connections of all threads; the database can be used again afterwards."""
+        """Closes the connections of all threads; later calls open new ones."""
         with self._lock:
             opened, self._opened = self._opened, []
             self._local = threading.local()
-        for connection in opened:
-            connection.close()
+        for process, connection in opened:
+            if process == os.getpid():
+                connection.close()
 
-    def _connection(self) -> sqlite3.Connection:
-        """This thread's own; a connection never crosses a fork."""
-        held: tuple[int, sqlite3.Connection] | None = getattr(self._local, "held", None)
-        if held is None or held[0] != os.getpid():
-            self._local.held = held = (os.getpid(), self._connect())
-        return held[1]
 
-    def _connect(self) -> sqlite3.Connection:
-        connection = sqlite3.connect(self.path, timeout=BUSY_TIMEOUT_S, isolation_level=None, check_same_thread=False)
+class Database(Connections):
+    """A database file with `schema`, written when the file is new. Raises UnknownVersion when the file has another `version`."""
+
+    def __init__(self, path: Path, schema: str, version: int) -> None:
+        super().__init__(path, lambda: _connect(path))
+        with self.transaction() as db:
+            found = int(db.execute("PRAGMA user_version").fetchone()[0])
+            if found == 0:
+                for statement in schema.split(";"):
+                    db.execute(statement)
+                db.execute(f"PRAGMA user_version = {version}")
+            elif found != version:
+                raise UnknownVersion(f"{path}: version {found}; this map3d reads version {version}")
+
+
+def _connect(path: Path) -> sqlite3.Connection:
+    connection = sqlite3.connect(path, timeout=BUSY_TIMEOUT_S, isolation_level=None, check_same_thread=False)
+    try:
         connection.row_factory = sqlite3.Row
-        with self._lock:
-            self._opened.append(connection)
         connection.execute("PRAGMA journal_mode = WAL")
         connection.execute("PRAGMA synchronous = FULL")
         connection.execute("PRAGMA foreign_keys = ON")
-        return connection
+    except BaseException:
+        connection.close()
+        raise
+    return connection

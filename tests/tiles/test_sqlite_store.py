@@ -43,7 +43,7 @@ def rows(path, query):
 def test_the_file_is_durable_and_concurrent(path, store):
     assert rows(path, "PRAGMA journal_mode") == [("wal",)]
     assert rows(path, "PRAGMA page_size") == [(16384,)]
-    assert store._connection().execute("PRAGMA synchronous").fetchone() == (2,)
+    assert store._connections.current().execute("PRAGMA synchronous").fetchone() == (2,)
 
 
 def test_the_tables_are_those_of_the_specification(path, store):
@@ -108,7 +108,7 @@ def test_a_store_in_a_folder_that_cannot_be_written_is_read(path, store, monkeyp
 
 
 def test_a_full_disk_is_a_typed_error(store):
-    store._connection().execute("PRAGMA max_page_count = 20")
+    store._connections.current().execute("PRAGMA max_page_count = 20")
     with pytest.raises(StoreError, match="full"):
         store.put_block(BLOCK, "a", 1, [tile(bytes(1 << 20))], b"s")
     assert store.get_block(BLOCK) is None
@@ -159,10 +159,10 @@ def test_check_finds_changed_and_lost_bytes(path, store):
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
 def test_a_forked_child_has_connections_of_its_own(store):
     store.put_block(BLOCK, "a", 1, [tile(b"tile")], b"s")
-    mine = store._connection()
+    mine = store._connections.current()
     child = os.fork()
     if child == 0:
-        own = store._connection() is not mine and store.get_tile(0, 0, 0, 0) == b"tile"
+        own = store._connections.current() is not mine and store.get_tile(0, 0, 0, 0) == b"tile"
         os._exit(0 if own else 1)
     assert os.waitpid(child, 0)[1] == 0
     assert store.get_tile(0, 0, 0, 0) == b"tile"

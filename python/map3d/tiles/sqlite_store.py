@@ -5,18 +5,18 @@ import os
 import sqlite3
 import threading
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
 
+from map3d.database import BUSY_TIMEOUT_S, Connections
 from map3d.errors import AlreadyExists, BadRequest, Corrupt, Map3dError, NotFound, StoreError, UnknownVersion
 from map3d.tiles.naming import block_level, morton
 from map3d.tiles.store import FORMAT_VERSION, StoredBlock, StoredTile, StoreShape, check_block, content_hash
 from map3d.types import BlockId, Layer, TileId
 
-BUSY_TIMEOUT_S: Final = 60.0
 APPLICATION_ID: Final = 0x4D334454  # "M3DT"
 PAGE_BYTES: Final = 16_384
 CHECKPOINT_PAGES: Final = 2_000
@@ -41,9 +41,7 @@ class SqliteTileStore:
             raise NotFound(f"{path}: no tile store there; render the rendering first")
         self.path = path
         self._read_only = read_only
-        self._local = threading.local()
-        self._opened: list[tuple[int, sqlite3.Connection]] = []
-        self._lock = threading.Lock()
+        self._connections = Connections(path, lambda: _connect(path, read_only))
         try:
             self._shape = self._read_shape()
         except BaseException:
@@ -159,12 +157,7 @@ class SqliteTileStore:
 
     def close(self) -> None:
         """Closes the connections of all threads; the store can be used again afterwards."""
-        with self._lock:
-            opened, self._opened = self._opened, []
-            self._local = threading.local()
-        for process, connection in opened:
-            if process == os.getpid():
-                connection.close()
+        self._connections.close()
 
     def __enter__(self) -> Self:
         return self
@@ -172,43 +165,17 @@ class SqliteTileStore:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self.close()
 
-    @contextmanager
-    def _reading(self) -> Iterator[sqlite3.Connection]:
-        try:
-            yield self._connection()
-        except sqlite3.Error as error:
-            raise StoreError(f"{self.path}: cannot read: {error}") from error
+    def _reading(self) -> AbstractContextManager[sqlite3.Connection]:
+        return self._connections.autocommit()
 
-    @contextmanager
-    def _transaction(self) -> Iterator[sqlite3.Connection]:
+    def _transaction(self) -> AbstractContextManager[sqlite3.Connection]:
         if self._read_only:
             raise BadRequest(f"{self.path}: opened for reading only")
-        try:
-            db = self._connection()
-            db.execute("BEGIN IMMEDIATE")
-            try:
-                yield db
-                db.execute("COMMIT")
-            except BaseException:
-                if db.in_transaction:
-                    db.execute("ROLLBACK")
-                raise
-        except sqlite3.Error as error:
-            raise StoreError(f"{self.path}: cannot write: {error}") from error
-
-    def _connection(self) -> sqlite3.Connection:
-        """This thread's own; a connection never crosses a fork."""
-        held: tuple[int, sqlite3.Connection] | None = getattr(self._local, "held", None)
-        if held is None or held[0] != os.getpid():
-            connection = _connect(self.path, self._read_only)
-            self._local.held = held = (os.getpid(), connection)
-            with self._lock:
-                self._opened.append(held)
-        return held[1]
+        return self._connections.transaction()
 
     def _read_shape(self) -> StoreShape:
         try:
-            meta = dict(self._connection().execute("SELECT key, value FROM meta").fetchall())
+            meta = dict(self._connections.current().execute("SELECT key, value FROM meta").fetchall())
             version = int(meta["version"])
         except sqlite3.OperationalError as error:
             raise StoreError(f"{self.path}: cannot open: {error}") from error
