@@ -17,10 +17,10 @@ import numpy as np
 
 from map3d import _core
 from map3d.catalogue import PlannedJob, Workspace
-from map3d.jobs.run import Settings
+from map3d.jobs.run import RunSettings
 from map3d.renderings.build import build, open_scene
 from map3d.renderings.plan import frame_text, plan_jobs
-from map3d.subprocess import Child, Message, Tell, Work
+from map3d.subprocess import Handler, Message, ReportProgress, Subprocess
 from map3d.tiles.naming import morton
 
 from .watch import resident
@@ -28,17 +28,17 @@ from .watch import resident
 WORKERS, MAX_MEMORY_BYTES, RUN = 2, 1 << 30, 5
 
 
-def open_work(setup: Mapping[str, Any]) -> Work:
+def open_renderer(setup: Mapping[str, Any]) -> Handler:
     """A child that renders blocks and tells how its caches stand, but keeps the tiles to itself."""
     scene = _core.Scene(setup["scene"], cache_bytes=setup["cache_bytes"])
 
-    def work(question: dict[str, Any], _blobs: list[bytes], _tell: Tell) -> tuple[dict[str, Any], Sequence[bytes]]:
+    def handle(request: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], Sequence[bytes]]:
         begun, spent = time.perf_counter(), time.process_time()
-        block = scene.render_block(setup["frame"], *question["block"])
+        block = scene.render_block(setup["frame"], *request["block"])
         times = {"wall_s": time.perf_counter() - begun, "cpu_s": time.process_time() - spent}
         return {**times, "stats": block.stats, "scene": scene.stats(), "memory": memory()}, []
 
-    return work
+    return handle
 
 
 def memory() -> dict[str, int]:
@@ -71,7 +71,7 @@ def rendered(workspace: Path, rendering: str, blocks: int) -> dict[str, Any]:
     parent = memory()
     setup = {
         "scene": str(place.scene_folder(record.scene).absolute()),
-        "cache_bytes": Settings(WORKERS, MAX_MEMORY_BYTES).cache_bytes,
+        "cache_bytes": RunSettings(WORKERS, MAX_MEMORY_BYTES).cache_bytes,
         "frame": frame_text(record.tracks[0]),
     }
     answers = _answers(setup, chosen(jobs, blocks))
@@ -101,16 +101,16 @@ def _answers(setup: dict[str, Any], jobs: list[PlannedJob]) -> list[list[dict[st
     answers: list[list[dict[str, Any]]] = [[] for _ in range(WORKERS)]
 
     def work(number: int) -> None:
-        child = Child("bench.extent_work:open_work", setup)
+        process = Subprocess("bench.extent_work:open_renderer", setup)
         try:
-            child.wait_ready(60)
+            process.wait_ready(60)
             for job in jobs[len(jobs) * number // WORKERS : len(jobs) * (number + 1) // WORKERS]:
-                answer = child.ask({"block": list(job.block)}, wall_s=None)
+                answer = process.request({"block": list(job.block)}, wall_s=None)
                 if not isinstance(answer, Message):
                     raise SystemExit(f"bench: {job.block}: {answer}")
                 answers[number].append(answer.value)
         finally:
-            child.close()
+            process.close()
 
     threads = [threading.Thread(target=work, args=(number,)) for number in range(WORKERS)]
     for thread in threads:

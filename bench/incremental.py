@@ -79,7 +79,7 @@ class _Bench:
 
     def render(self, what: str) -> Row:
         wall, cpu, out = self._run("render", "view", "--json")
-        return Row(what, wall, cpu, int(json.loads(out)["tally"]["done"]), cpu / self._all_s if self._all_s else 1.0)
+        return Row(what, wall, cpu, int(json.loads(out)["statistics"]["done"]), cpu / self._all_s if self._all_s else 1.0)
 
     def _run(self, *words: str, where: bool = True) -> tuple[float, float, str]:
         place = ["-w", str(self.workspace.root)] if where else []

@@ -1,84 +1,84 @@
-"""The errors of map3d: one base class, small leaves. Every message says what, where, got and expected, and what to do.
+"""The errors of map3d: one base class with small subclasses. Every message says what failed, where, what was found and expected, and what to do.
 
-`exit_code` is what the command line returns: 2 for a request that cannot be meant, 1 for a task that failed.
+The command line exits with `exit_code`: 2 for an invalid request, 1 for a task that failed.
 """
 
 
 class Map3dError(Exception):
-    """Base of all errors that map3d raises on purpose; its text is one line for the user."""
+    """The base class of all errors that map3d raises deliberately; the text is one line for the user."""
 
     exit_code = 1
 
 
 class BadRequest(Map3dError):
-    """The caller asks for something that cannot be done as asked."""
+    """The request is invalid."""
 
     exit_code = 2
 
 
 class NotFound(BadRequest):
-    """No scene, asset, rendering, view, job or file of that name."""
+    """No scene, asset, rendering, view, job or file has this name."""
 
 
 class AlreadyExists(BadRequest):
-    """The name is taken."""
+    """The name is already in use."""
 
 
 class BadName(BadRequest):
-    """A name of a scene, rendering or layer that does not match `[a-z0-9][a-z0-9_-]{0,63}`."""
+    """The name of a scene, rendering or layer does not match `[a-z0-9][a-z0-9_-]{0,63}`."""
 
 
 class UnknownFormat(BadRequest):
-    """A file that is none of the formats that map3d reads."""
+    """The file has a format that map3d does not read."""
 
 
 class CrsError(BadRequest):
-    """A coordinate system that is unknown, missing, or does not fit the scene's."""
+    """The coordinate system is unknown, missing, or incompatible with the scene's."""
 
 
 class ImportFailed(Map3dError):
-    """A source document could not be read at all, or not without loss under `--strict`."""
+    """A source document could not be read, or not without loss under `--strict`."""
 
 
 class LimitExceeded(Map3dError):
-    """A limit was met; the message names it, its value and how to raise it."""
+    """A limit was reached; the message names the limit, its value and how to raise it."""
 
 
 class OutsideFrame(Map3dError):
-    """Content lies outside the pinned frame of a rendering; the message names `--regrid`."""
+    """The content extends beyond the pinned frame of a rendering; the message names `--regrid`."""
 
 
 class StaleFence(Map3dError):
-    """A lease is no longer held: its fence is older than the job's."""
+    """The lease is no longer held: its fence is older than the job's."""
 
 
-class ChildDied(Map3dError):
-    """A child process ended, hung or answered nonsense; the message says how."""
+class SubprocessDied(Map3dError):
+    """A subprocess ended or sent an invalid message; the message says how."""
 
 
-class ChildRefused(ChildDied):
-    """A child could not begin and said why: the next one would say the same."""
+class SubprocessStartFailed(SubprocessDied):
+    """A subprocess reported why it cannot start; another one would fail in the same way."""
+
+
+class SubprocessTimedOut(SubprocessDied):
+    """A subprocess did not respond in time and was killed."""
 
 
 class Stopped(Map3dError):
-    """The user stopped the work; the message says how to go on."""
+    """The user stopped the work; the message says how to resume it."""
 
 
 class UnknownVersion(Map3dError):
-    """A file or document of a version that this map3d does not know; the message names both numbers."""
+    """A file or document has a version that this map3d does not read; the message names both versions."""
 
 
 class Corrupt(Map3dError):
-    """Something stored is not what was written: checksum, length or shape differ."""
+    """Stored data differ from what was written, in checksum, length or shape."""
 
 
 class StoreError(Map3dError):
-    """Reading or writing stored data failed; the message has the path and the cause."""
-
-
-class CoreMissing(Map3dError):
-    """The compiled module `map3d._core` cannot be imported."""
+    """Stored data could not be read or written; the message names the path and the cause."""
 
 
 class VerifyFailed(Map3dError):
-    """`map3d verify` found differences between what is stored and what should be."""
+    """`map3d verify` found differences between stored and expected data."""

@@ -91,7 +91,7 @@ def render(run: Run) -> int:
     """How many jobs were done."""
     status, out, err = run("render", "view", "--json")
     assert status == 0, err
-    return int(json.loads(out)["tally"]["done"])
+    return int(json.loads(out)["statistics"]["done"])
 
 
 def test_a_changed_added_or_removed_house_renders_what_sees_it_and_gives_the_tiles_of_a_render_from_nothing(
@@ -171,7 +171,7 @@ def test_layers_that_are_added_are_rendered_alone_and_are_as_if_they_had_been_th
     assert 0 < more["open_tiles"] <= more["base_tiles"]
     assert more["bytes"] > whole["bytes"]
     status, out, err = run("render", "less", "--json")
-    assert (status, json.loads(out)["tally"]["done"]) == (0, len({(track, block) for track, block, *_ in before if block})), err
+    assert (status, json.loads(out)["statistics"]["done"]) == (0, len({(track, block) for track, block, *_ in before if block})), err
     after = contents(town, "less")
     assert {place: after[place] for place in before} == before
     # Beside a rendering that had them all from the start.

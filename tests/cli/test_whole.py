@@ -57,7 +57,7 @@ def test_files_become_tiles_that_verify(run: Run, town: Workspace) -> None:
     assert status == 0, err
     outcome = json.loads(out)
     assert outcome["complete"]
-    assert outcome["tally"]["failed_attempts"] == 0
+    assert outcome["statistics"]["failed_attempts"] == 0
     manifest = Manifest.load(town.manifest_path("view").read_bytes())
     assert manifest.complete
     assert [view.frame.id for view in manifest.views] == ["0-45", "90-30"]
@@ -87,19 +87,19 @@ def test_a_second_render_does_nothing(run: Run, town: Workspace) -> None:
     run("render", "view")
     before = (digest(town), town.manifest_path("view").read_bytes())
     status, out, _ = run("render", "view", "--json")
-    assert (status, json.loads(out)["tally"]["done"]) == (0, 0)
+    assert (status, json.loads(out)["statistics"]["done"]) == (0, 0)
     assert (digest(town), town.manifest_path("view").read_bytes()) == before
 
 
 def test_a_changed_house_renders_little_and_gives_the_tiles_of_a_full_render(run: Run, town: Workspace, tmp_path: Path) -> None:
-    whole = json.loads(run("render", "view", "--json")[1])["tally"]["done"]
+    whole = json.loads(run("render", "view", "--json")[1])["statistics"]["done"]
     changed = tmp_path / "files" / "house-0-0.obj"
     changed.write_text(house(0.0, 0.0, 11.0))
     assert run("add-files", "town", str(changed))[0] == 0
     status, out, err = run("render", "view", "--json")
     assert status == 0, err
     outcome = json.loads(out)
-    assert 0 < outcome["tally"]["done"] < whole / 2
+    assert 0 < outcome["statistics"]["done"] < whole / 2
     assert outcome["content_version"] == 2
     assert run("verify")[0] == 0
     incremental = digest(town)
@@ -198,13 +198,13 @@ def test_estimates_are_of_the_right_size(run: Run, town: Workspace) -> None:
     before = json.loads(out)
     assert "sample" in before["how"]
     outcome = json.loads(run("render", "view", "--json")[1])
-    assert before["base_tiles"] == pytest.approx(outcome["tally"]["base_tiles"], rel=0.35)
-    assert before["bytes"] == pytest.approx(outcome["tally"]["bytes"], rel=0.5)
+    assert before["base_tiles"] == pytest.approx(outcome["statistics"]["base_tiles"], rel=0.35)
+    assert before["bytes"] == pytest.approx(outcome["statistics"]["bytes"], rel=0.5)
     assert before["seconds"] > 0
     after = json.loads(run("estimate", "view", "--json")[1])
     assert after["open_tiles"] == 0
     assert "recorded" in after["how"]
-    assert after["base_tiles"] == outcome["tally"]["base_tiles"]
+    assert after["base_tiles"] == outcome["statistics"]["base_tiles"]
 
 
 def test_levels_and_layers_are_as_asked(run: Run, town: Workspace) -> None:
@@ -255,4 +255,4 @@ def test_a_workspace_can_be_moved(run: Run, town: Workspace, tmp_path: Path, mon
     monkeypatch.setenv("MAP3D_WORKSPACE", str(moved))
     assert run("verify")[0] == 0
     status, out, _ = run("render", "view", "--json")
-    assert (status, json.loads(out)["tally"]["done"]) == (0, 0)
+    assert (status, json.loads(out)["statistics"]["done"]) == (0, 0)

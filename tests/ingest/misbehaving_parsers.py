@@ -6,51 +6,51 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from map3d.subprocess import Tell, Work
+from map3d.subprocess import Handler, ReportProgress
 
 
-def open_greedy(_setup: Mapping[str, Any]) -> Work:
+def open_greedy(_setup: Mapping[str, Any]) -> Handler:
     """Takes more memory than it may."""
 
-    def work(_question: dict[str, Any], _blobs: list[bytes], _tell: Tell) -> tuple[dict[str, Any], list[bytes]]:
+    def work(_question: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
         return {"size": len(bytearray(8 << 30))}, []
 
     return work
 
 
-def open_busy(_setup: Mapping[str, Any]) -> Work:
+def open_busy(_setup: Mapping[str, Any]) -> Handler:
     """Computes for ever."""
 
-    def work(_question: dict[str, Any], _blobs: list[bytes], _tell: Tell) -> tuple[dict[str, Any], list[bytes]]:
+    def work(_question: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
         while True:
             pass
 
     return work
 
 
-def open_asleep(_setup: Mapping[str, Any]) -> Work:
+def open_asleep(_setup: Mapping[str, Any]) -> Handler:
     """Waits for ever."""
 
-    def work(_question: dict[str, Any], _blobs: list[bytes], _tell: Tell) -> tuple[dict[str, Any], list[bytes]]:
+    def work(_question: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
         time.sleep(3600)
         return {}, []
 
     return work
 
 
-def open_crash(_setup: Mapping[str, Any]) -> Work:
+def open_crash(_setup: Mapping[str, Any]) -> Handler:
     """Dies."""
 
-    def work(_question: dict[str, Any], _blobs: list[bytes], _tell: Tell) -> tuple[dict[str, Any], list[bytes]]:
+    def work(_question: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
         os.abort()
 
     return work
 
 
-def open_curious(_setup: Mapping[str, Any]) -> Work:
+def open_curious(_setup: Mapping[str, Any]) -> Handler:
     """Tries what it must not be able to do, and says what happened."""
 
-    def work(question: dict[str, Any], _blobs: list[bytes], _tell: Tell) -> tuple[dict[str, Any], list[bytes]]:
+    def work(question: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
         import socket
 
         try:
@@ -76,17 +76,17 @@ def many_files(folder: Path) -> int:
     return len(opened)
 
 
-def open_hoarder(_setup: Mapping[str, Any]) -> Work:
-    def work(question: dict[str, Any], _blobs: list[bytes], _tell: Tell) -> tuple[dict[str, Any], list[bytes]]:
+def open_hoarder(_setup: Mapping[str, Any]) -> Handler:
+    def work(question: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
         return {"files": many_files(Path(question["folder"]))}, []
 
     return work
 
 
-def open_worker(_setup: Mapping[str, Any]) -> Work:
+def open_worker(_setup: Mapping[str, Any]) -> Handler:
     """Uses as much processor time as it is asked to."""
 
-    def work(question: dict[str, Any], _blobs: list[bytes], _tell: Tell) -> tuple[dict[str, Any], list[bytes]]:
+    def work(question: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
         end = time.process_time() + question["cpu_s"]
         while time.process_time() < end:
             pass

@@ -14,7 +14,7 @@ from map3d.ingest.import_options import BIG_FILE_BYTES, GIB, ImportOptions
 from map3d.ingest.importing import import_file
 from map3d.ingest.parser_process import Parsers
 from map3d.ingest.sources import Source, find_sources
-from map3d.subprocess import Child, Limits, Message
+from map3d.subprocess import Limits, Message, Subprocess
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
@@ -43,7 +43,7 @@ def source(tmp_path: Path) -> Source:
     [
         ("open_greedy", ImportOptions(), LimitExceeded, "1024 MiB of address space.*--parse-memory"),
         ("open_greedy", ImportOptions(parse_memory_bytes=3 << 30), LimitExceeded, "3072 MiB of address space"),
-        ("open_busy", ImportOptions(parse_cpu_s=1), LimitExceeded, "1 s of processor time.*--parse-cpu"),
+        ("open_busy", ImportOptions(parse_cpu_s=1), LimitExceeded, "1 s of CPU time.*--parse-cpu"),
         ("open_asleep", ImportOptions(parse_cpu_s=1), LimitExceeded, "not read within 14 s.*--parse-cpu"),
         ("open_crash", ImportOptions(), ImportFailed, "SIGABRT"),
     ],
@@ -62,18 +62,18 @@ def test_a_parser_out_of_bounds_is_ended_and_explained(
 
 def test_a_parser_has_no_network_where_the_system_allows_that() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
-        child = Child("tests.ingest.misbehaving_parsers:open_curious", {}, limits=Limits(network=False))
+        child = Subprocess("tests.ingest.misbehaving_parsers:open_curious", {}, limits=Limits(network=False))
         applied = child.wait_ready(30)
-        answer = child.ask({"port": server.getsockname()[1]}, wall_s=10)
+        answer = child.request({"port": server.getsockname()[1]}, wall_s=10)
         child.close()
     assert isinstance(answer, Message)
     assert answer.value["network"] == applied["network"]
 
 
 def test_a_parser_has_few_files(tmp_path: Path) -> None:
-    child = Child("tests.ingest.misbehaving_parsers:open_hoarder", {}, limits=Limits(open_files=64))
+    child = Subprocess("tests.ingest.misbehaving_parsers:open_hoarder", {}, limits=Limits(open_files=64))
     child.wait_ready(30)
-    answer = child.ask({"folder": str(tmp_path)}, wall_s=10)
+    answer = child.request({"folder": str(tmp_path)}, wall_s=10)
     child.close()
     assert isinstance(answer, Message)
     assert 32 < answer.value["files"] < 64
@@ -93,12 +93,12 @@ def test_limits_grow_with_the_file(tmp_path: Path, size: int, memory: int, cpu_s
 
 
 def test_processor_time_is_granted_anew_for_every_file() -> None:
-    child = Child("tests.ingest.misbehaving_parsers:open_worker", {}, limits=Limits(cpu_s=1))
+    child = Subprocess("tests.ingest.misbehaving_parsers:open_worker", {}, limits=Limits(cpu_s=1))
     child.wait_ready(30)
     for _ in range(4):
-        assert isinstance(child.ask({"cpu_s": 0.6}, wall_s=30), Message)
+        assert isinstance(child.request({"cpu_s": 0.6}, wall_s=30), Message)
     with pytest.raises(LimitExceeded):
-        child.ask({"cpu_s": 5.0}, wall_s=60)
+        child.request({"cpu_s": 5.0}, wall_s=60)
     child.close()
 
 
@@ -109,7 +109,7 @@ def test_one_parser_serves_many_files_until_one_fails() -> None:
         assert parsers.get("tests.subprocess.echo:open_echo", limits)[0] is first
         with parsers:
             pass
-        assert isinstance(first.ask({}, wall_s=10), Message), "an inner user does not end it"
+        assert isinstance(first.request({}, wall_s=10), Message), "an inner user does not end it"
         parsers.drop()
         second, _ = parsers.get("tests.subprocess.echo:open_echo", limits)
         assert second is not first

@@ -1,4 +1,4 @@
-"""A workspace with a planned rendering of 64 base blocks, and a place to tell the test child how to fail."""
+"""A workspace with a planned rendering of 64 base blocks, and a folder that selects the faults of the test subprocess."""
 
 from collections.abc import Iterator
 from pathlib import Path

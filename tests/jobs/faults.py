@@ -1,7 +1,7 @@
-"""A child for tests: makes blocks of pseudo-random bytes that depend on block and kind of layer alone, and fails as it is told.
+"""A subprocess for tests: makes blocks of pseudo-random bytes that depend only on block and layer kind, and fails on request.
 
-setup["frames"][track]["faults"] is not there in real frames; faults are told by files in the folder MAP3D_TEST_FAULTS: `<x>-<y>` holds the kind.
-A file `slow` holds how many seconds each block takes.
+The folder MAP3D_TEST_FAULTS selects the faults: a file `<z>-<x>-<y>` contains the kind of fault of that block, a file `slow` the seconds that each
+block takes, and a file `no-start` makes the start fail.
 """
 
 import contextlib
@@ -14,19 +14,19 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from map3d.subprocess import Tell, Work
+from map3d.subprocess import Handler, ReportProgress
 from map3d.tiles.naming import tiles_of_block
 from map3d.types import BlockId
 
 
-def open_work(setup: Mapping[str, Any]) -> Work:
+def open_faulty(setup: Mapping[str, Any]) -> Handler:
     folder = Path(os.environ["MAP3D_TEST_FAULTS"])
     if (folder / "no-start").exists():
-        raise RuntimeError("told not to start")
+        raise RuntimeError("cannot start")
 
-    def work(question: dict[str, Any], _blobs: list[bytes], _tell: Tell) -> tuple[dict[str, Any], list[bytes]]:
-        z, x, y = question["block"]
-        frame = setup["frames"][question["track"]]
+    def handle(request: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
+        z, x, y = request["block"]
+        frame = setup["frames"][request["track"]]
         fault = folder / f"{z}-{x}-{y}"
         if fault.exists():
             fail(fault.read_text())
@@ -40,7 +40,7 @@ def open_work(setup: Mapping[str, Any]) -> Work:
         seam = [f"seam {z}/{x}/{y}".encode()] if tiles else []
         return {"tiles": names, "seam": bool(seam), "seconds": 0.01}, blobs + seam
 
-    return work
+    return handle
 
 
 def fail(kind: str) -> None:
@@ -62,11 +62,11 @@ def spin() -> None:
 
 
 def exception() -> None:
-    raise ValueError("poison")
+    raise ValueError("faulty block")
 
 
 def memory() -> None:
-    raise MemoryError("told so")
+    raise MemoryError("requested")
 
 
 def nonsense() -> None:

@@ -1,4 +1,4 @@
-"""A run from plan to manifest, on a scene that is only a plan and a child that makes up tiles."""
+"""A run from plan to manifest, with a planned scene and a subprocess that invents tiles."""
 
 import dataclasses
 from collections.abc import Iterator
@@ -11,8 +11,8 @@ pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_
 
 from map3d.catalogue import Catalogue, RenderingRecord, SceneCrs, SceneRecord, State, Workspace
 from map3d.errors import BadRequest, OutsideFrame
-from map3d.jobs.run import Outcome, Plan, Run, Settings
-from map3d.jobs.timeouts import Terms
+from map3d.jobs.run import Run, RunPlan, RunResult, RunSettings
+from map3d.jobs.timeouts import Timeouts
 from map3d.renderings.create import add_layers, add_views
 from map3d.renderings.layers import LayerRequest
 from map3d.renderings.manifest_writer import stored_occupancy
@@ -22,7 +22,7 @@ from map3d.types import BlockId, TileId, ViewAngles
 from tests.renderings.scenes import SquareScene, rendering
 
 CONTENT = {(0.05 + 0.1 * k, 0.05 + 0.1 * k): f"thing {k}" for k in range(10)}
-SETTINGS = Settings(2, terms=Terms(heartbeat_s=0.5, block_s=10, idle_s=0.1, tick_s=0.05), entry="tests.jobs.faults:open_work")
+SETTINGS = RunSettings(2, timeouts=Timeouts(heartbeat_s=0.5, block_s=10, idle_s=0.1, tick_s=0.05), entry="tests.jobs.faults:open_faulty")
 
 
 @pytest.fixture
@@ -41,7 +41,7 @@ def catalogue(workspace: Workspace) -> Iterator[Catalogue]:
     opened.close()
 
 
-def run_all(workspace: Workspace, catalogue: Catalogue, scene: SquareScene, stop_after: int | None = None) -> tuple[Plan, Outcome]:
+def run_all(workspace: Workspace, catalogue: Catalogue, scene: SquareScene, stop_after: int | None = None) -> tuple[RunPlan, RunResult]:
     run = Run(workspace, catalogue, "r", SETTINGS)
     plan = run.plan(scene=scene)
     seen: list[object] = []
@@ -62,38 +62,38 @@ def record(catalogue: Catalogue) -> RenderingRecord:
     return catalogue.rendering("r")
 
 
-def test_a_whole_run_is_told_by_the_manifest(workspace: Workspace, catalogue: Catalogue) -> None:
-    plan, outcome = run_all(workspace, catalogue, SquareScene(CONTENT))
-    assert (outcome.complete, outcome.stopped, outcome.open_jobs, outcome.quarantined_jobs) == (True, False, 0, 0)
-    assert outcome.tally.done == plan.open_jobs
-    told = manifest(workspace)
-    assert (told.complete, told.content_version, told.title, told.attribution) == (True, 1, "A town", "© someone")
-    assert (told.crs.epsg, told.crs.vertical, told.origin) == (25832, "DHHN2016 height", (691_000.0, 5_336_000.0, 500.0))
-    for view in told.views:
+def test_manifest_describes_a_complete_run(workspace: Workspace, catalogue: Catalogue) -> None:
+    plan, result = run_all(workspace, catalogue, SquareScene(CONTENT))
+    assert (result.complete, result.stopped, result.open_jobs, result.quarantined_jobs) == (True, False, 0, 0)
+    assert result.statistics.done == plan.open_jobs
+    found = manifest(workspace)
+    assert (found.complete, found.content_version, found.title, found.attribution) == (True, 1, "A town", "© someone")
+    assert (found.crs.epsg, found.crs.vertical, found.origin) == (25832, "DHHN2016 height", (691_000.0, 5_336_000.0, 500.0))
+    for view in found.views:
         with SqliteTileStore(workspace.store_path("r", view.frame.id), read_only=True) as store:
             assert view.occupancy == stored_occupancy(store)
             assert [set(versions.values()) for versions in view.versions] == [{1}]
 
 
-def test_a_second_run_finds_nothing_to_do(workspace: Workspace, catalogue: Catalogue) -> None:
+def test_second_run_finds_no_jobs(workspace: Workspace, catalogue: Catalogue) -> None:
     run_all(workspace, catalogue, SquareScene(CONTENT))
     before = workspace.manifest_path("r").read_bytes()
-    plan, outcome = run_all(workspace, catalogue, SquareScene(CONTENT))
-    assert (plan.open_jobs, plan.outcome.added, plan.outcome.changed, outcome.tally.done) == (0, 0, 0, 0)
+    plan, result = run_all(workspace, catalogue, SquareScene(CONTENT))
+    assert (plan.open_jobs, plan.counts.added, plan.counts.changed, result.statistics.done) == (0, 0, 0, 0)
     assert workspace.manifest_path("r").read_bytes() == before
 
 
-def test_a_change_renders_its_blocks_and_those_above_only(workspace: Workspace, catalogue: Catalogue) -> None:
+def test_change_renders_only_its_blocks_and_those_above(workspace: Workspace, catalogue: Catalogue) -> None:
     whole, _ = run_all(workspace, catalogue, SquareScene(CONTENT))
     changed = {**CONTENT, next(iter(CONTENT)): "another thing"}
-    plan, outcome = run_all(workspace, catalogue, SquareScene(changed))
+    plan, result = run_all(workspace, catalogue, SquareScene(changed))
     views = len(record(catalogue).frames)
     levels = len({job.block.z for job in catalogue.jobs("r")})
-    assert plan.outcome.changed == outcome.tally.done == views * levels < whole.open_jobs
-    assert outcome.content_version == 2
+    assert plan.counts.changed == result.statistics.done == views * levels < whole.open_jobs
+    assert result.content_version == 2
 
 
-def test_bytes_that_stay_the_same_keep_their_version(workspace: Workspace, catalogue: Catalogue) -> None:
+def test_unchanged_bytes_keep_their_version(workspace: Workspace, catalogue: Catalogue) -> None:
     run_all(workspace, catalogue, SquareScene(CONTENT))
     run_all(workspace, catalogue, SquareScene({**CONTENT, next(iter(CONTENT)): "another thing"}))
     assert manifest(workspace).content_version == 2
@@ -101,7 +101,7 @@ def test_bytes_that_stay_the_same_keep_their_version(workspace: Workspace, catal
 
 
 def stored(workspace: Workspace) -> dict[tuple[str, int, TileId], bytes | None]:
-    """Every tile in the stores: (track, layer, tile) → bytes."""
+    """Returns every stored tile: (track, layer, tile) → bytes."""
     found = {}
     for path in workspace.rendering_folder("r").glob("*.sqlite"):
         with SqliteTileStore(path, read_only=True) as store:
@@ -110,24 +110,24 @@ def stored(workspace: Workspace) -> dict[tuple[str, int, TileId], bytes | None]:
     return found
 
 
-def test_added_layers_render_tracks_of_their_own_only(workspace: Workspace, catalogue: Catalogue) -> None:
+def test_added_layers_render_only_their_own_tracks(workspace: Workspace, catalogue: Catalogue) -> None:
     first, _ = run_all(workspace, catalogue, SquareScene(CONTENT))
     before, jobs = stored(workspace), {(job.track, job.block): job for job in catalogue.jobs("r")}
     add_layers(catalogue, "r", LayerRequest(("normal", "deep=depth")))
-    plan, outcome = run_all(workspace, catalogue, SquareScene(CONTENT))
-    assert (plan.outcome.added, plan.outcome.changed, plan.outcome.kept) == (first.open_jobs, 0, first.open_jobs)
-    assert (outcome.tally.done, outcome.complete, outcome.content_version) == (first.open_jobs, True, 2)
+    plan, result = run_all(workspace, catalogue, SquareScene(CONTENT))
+    assert (plan.counts.added, plan.counts.changed, plan.counts.kept) == (first.open_jobs, 0, first.open_jobs)
+    assert (result.statistics.done, result.complete, result.content_version) == (first.open_jobs, True, 2)
     after = stored(workspace)
     assert {place: after[place] for place in before} == before
     assert {(job.track, job.block): job for job in catalogue.jobs("r") if "+" not in job.track} == jobs
     assert {track for track, _, _ in after.keys() - before.keys()} == {"0-45+1", "90-45+1"}
-    told = manifest(workspace)
-    assert [[layer.name for layer in layers] for layers in told.passes] == [["color", "id"], ["normal", "deep"]]
-    for view in told.views:
+    found = manifest(workspace)
+    assert [[layer.name for layer in layers] for layers in found.passes] == [["color", "id"], ["normal", "deep"]]
+    for view in found.views:
         assert [set(versions.values()) for versions in view.versions] == [{1}, {2}]
 
 
-def test_a_view_that_joins_later_gets_every_pass(workspace: Workspace, catalogue: Catalogue) -> None:
+def test_added_view_gets_every_pass(workspace: Workspace, catalogue: Catalogue) -> None:
     run_all(workspace, catalogue, SquareScene(CONTENT))
     add_layers(catalogue, "r", LayerRequest(("normal",)))
     add_views(catalogue, "r", [ViewAngles(180, 45)])
@@ -138,63 +138,63 @@ def test_a_view_that_joins_later_gets_every_pass(workspace: Workspace, catalogue
     assert [len(view.versions) for view in manifest(workspace).views] == [2, 2, 2]
 
 
-def test_occupancy_stays_exact_while_added_layers_are_to_come(workspace: Workspace, catalogue: Catalogue) -> None:
+def test_occupancy_stays_exact_until_added_layers_are_rendered(workspace: Workspace, catalogue: Catalogue) -> None:
     run_all(workspace, catalogue, SquareScene(CONTENT))
     before = manifest(workspace)
     add_layers(catalogue, "r", LayerRequest(("normal",)))
     Run(workspace, catalogue, "r", SETTINGS).plan(scene=SquareScene(CONTENT))
-    told = manifest(workspace)
-    assert (told.complete, told.content_version) == (False, 2)
-    assert [view.occupancy for view in told.views] == [view.occupancy for view in before.views]
-    assert [view.versions[0] for view in told.views] == [view.versions[0] for view in before.views]
+    found = manifest(workspace)
+    assert (found.complete, found.content_version) == (False, 2)
+    assert [view.occupancy for view in found.views] == [view.occupancy for view in before.views]
+    assert [view.versions[0] for view in found.views] == [view.versions[0] for view in before.views]
 
 
-def test_a_change_renders_the_blocks_of_every_pass(workspace: Workspace, catalogue: Catalogue) -> None:
+def test_change_renders_the_blocks_of_every_pass(workspace: Workspace, catalogue: Catalogue) -> None:
     add_layers(catalogue, "r", LayerRequest(("normal",)))
     run_all(workspace, catalogue, SquareScene(CONTENT))
     changed = {**CONTENT, next(iter(CONTENT)): "another thing"}
-    plan, outcome = run_all(workspace, catalogue, SquareScene(changed))
+    plan, result = run_all(workspace, catalogue, SquareScene(changed))
     levels = len({job.block.z for job in catalogue.jobs("r")})
-    assert plan.outcome.changed == outcome.tally.done == len(record(catalogue).tracks) * levels == 4 * levels
+    assert plan.counts.changed == result.statistics.done == len(record(catalogue).tracks) * levels == 4 * levels
 
 
 @pytest.mark.parametrize(
     "names", [("id",), ("color",), ("normal", "id"), ("x=normal", "x=depth"), ("normal", "other=normal"), ("moon",), ("=id",), ()]
 )
-def test_layers_that_are_there_or_make_no_sense_are_refused(catalogue: Catalogue, names: tuple[str, ...]) -> None:
+def test_duplicate_or_unknown_layers_are_refused(catalogue: Catalogue, names: tuple[str, ...]) -> None:
     before = record(catalogue)
     with pytest.raises(BadRequest):
         add_layers(catalogue, "r", LayerRequest(names))
     assert record(catalogue) == before
 
 
-def test_a_stopped_run_tells_what_may_still_come_and_is_taken_up(workspace: Workspace, catalogue: Catalogue, faults: Path) -> None:
+def test_stopped_run_announces_open_tiles_and_can_be_resumed(workspace: Workspace, catalogue: Catalogue, faults: Path) -> None:
     (faults / "slow").write_text("0.1")
     scene = SquareScene(CONTENT)
-    _, outcome = run_all(workspace, catalogue, scene, stop_after=3)
-    assert outcome.stopped
-    assert outcome.open_jobs > 0
-    told = manifest(workspace)
-    assert not told.complete
-    for view in told.views:
+    _, result = run_all(workspace, catalogue, scene, stop_after=3)
+    assert result.stopped
+    assert result.open_jobs > 0
+    found = manifest(workspace)
+    assert not found.complete
+    for view in found.views:
         with SqliteTileStore(workspace.store_path("r", view.frame.id), read_only=True) as store:
             assert view.occupancy == view.occupancy | stored_occupancy(store)
         zmax = view.frame.zmax
         planned = scene.occupied("", zmax)
         assert all(tile in view.occupancy or planned[tile.y, tile.x] for tile in view.occupancy.tiles(zmax))
     (faults / "slow").unlink()
-    _, outcome = run_all(workspace, catalogue, scene)
-    assert outcome.complete
+    _, result = run_all(workspace, catalogue, scene)
+    assert result.complete
     assert manifest(workspace).complete
     assert manifest(workspace).content_version == 2, "clients may have seen the first version without these tiles"
 
 
-def test_a_quarantined_block_leaves_the_rendering_incomplete(workspace: Workspace, catalogue: Catalogue, faults: Path) -> None:
+def test_quarantined_block_leaves_the_rendering_incomplete(workspace: Workspace, catalogue: Catalogue, faults: Path) -> None:
     block = next(job.block for job in _planned(workspace, catalogue))
     (faults / f"{block.z}-{block.x}-{block.y}").write_text("exception")
-    _, outcome = run_all(workspace, catalogue, SquareScene(CONTENT))
-    assert not outcome.complete
-    assert outcome.quarantined_jobs == len(record(catalogue).frames)
+    _, result = run_all(workspace, catalogue, SquareScene(CONTENT))
+    assert not result.complete
+    assert result.quarantined_jobs == len(record(catalogue).frames)
     assert not manifest(workspace).complete
     (faults / f"{block.z}-{block.x}-{block.y}").unlink()
     catalogue.retry("r")
@@ -206,7 +206,7 @@ def _planned(workspace: Workspace, catalogue: Catalogue) -> list[object]:
     return [job for job in catalogue.jobs("r") if job.kind == "base"]
 
 
-def test_blocks_that_nobody_stands_for_are_removed(workspace: Workspace, catalogue: Catalogue) -> None:
+def test_blocks_without_a_job_are_removed(workspace: Workspace, catalogue: Catalogue) -> None:
     run_all(workspace, catalogue, SquareScene(CONTENT))
     view = record(catalogue).frames[0].id
     root = next(job.block.z for job in catalogue.jobs("r") if job.kind == "base")
@@ -218,7 +218,7 @@ def test_blocks_that_nobody_stands_for_are_removed(workspace: Workspace, catalog
         assert len(store.list_blocks()) == len(list(catalogue.jobs("r", view)))
 
 
-def test_content_that_left_the_frame_stops_before_any_change(workspace: Workspace, catalogue: Catalogue) -> None:
+def test_content_outside_the_frame_stops_before_any_change(workspace: Workspace, catalogue: Catalogue) -> None:
     run_all(workspace, catalogue, SquareScene(CONTENT))
     far = SquareScene(CONTENT, box=((0.0, 0.0, 0.0), (900.0, 100.0, 10.0)))
     with pytest.raises(OutsideFrame, match="--regrid"):
@@ -226,8 +226,8 @@ def test_content_that_left_the_frame_stops_before_any_change(workspace: Workspac
     assert catalogue.count_jobs("r")[State.DONE] == len(list(catalogue.jobs("r")))
 
 
-def test_memory_is_shared_among_workers_and_too_little_is_refused() -> None:
-    assert Settings(2).cache_bytes == 512 << 20
-    assert Settings(2, 2 << 30).cache_bytes == (1 << 30) - (256 << 20)
+def test_workers_share_memory_and_too_little_is_refused() -> None:
+    assert RunSettings(2).cache_bytes == 512 << 20
+    assert RunSettings(2, 2 << 30).cache_bytes == (1 << 30) - (256 << 20)
     with pytest.raises(BadRequest, match="640 MiB"):
-        _ = dataclasses.replace(Settings(2), max_memory_bytes=500 << 20).cache_bytes
+        _ = dataclasses.replace(RunSettings(2), max_memory_bytes=500 << 20).cache_bytes

@@ -1,4 +1,4 @@
-"""A rendering of 8 × 8 base blocks and what is known of it, without any scene."""
+"""A rendering of 8 × 8 base blocks without a scene."""
 
 import hashlib
 from dataclasses import dataclass
@@ -6,17 +6,17 @@ from pathlib import Path
 
 from map3d.catalogue import Catalogue, PlannedJob, RenderingRecord, SceneRecord, State, Workspace
 from map3d.geometry.frames import pin
-from map3d.jobs.events import Event
-from map3d.jobs.pool import Pool, Tally
-from map3d.jobs.timeouts import Terms
+from map3d.jobs.events import RunEvent
+from map3d.jobs.pool import Pool, RunStatistics
+from map3d.jobs.timeouts import Timeouts
 from map3d.renderings.render_task import RenderTask
 from map3d.tiles.naming import block_above, morton
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.types import BlockId, Layer, ViewAngles
 
 VIEW = "0-45"
-ENTRY = "tests.jobs.faults:open_work"
-LEASE_S, TERMS = 2.0, Terms(heartbeat_s=0.5, block_s=1.5, start_s=30, idle_s=0.1, tick_s=0.1)
+ENTRY = "tests.jobs.faults:open_faulty"
+LEASE_S, TIMEOUTS = 2.0, Timeouts(heartbeat_s=0.5, block_s=1.5, start_s=30, idle_s=0.1, tick_s=0.1)
 LAYERS = (Layer("color", "color", "webp", 80), Layer("id", "id", "png"))
 BOX = ((0.0, 0.0, 0.0), (100.0, 100.0, 10.0))
 BLOCKS = 8
@@ -28,21 +28,21 @@ class Town:
     catalogue: Catalogue
     rendering: RenderingRecord
 
-    def pool(self, size: int = 2, terms: Terms = TERMS) -> Pool:
+    def pool(self, size: int = 2, timeouts: Timeouts = TIMEOUTS) -> Pool:
         self.task = RenderTask(self.workspace, self.rendering, entry=ENTRY)
-        return Pool(self.catalogue, self.rendering.name, self.task, size, terms)
+        return Pool(self.catalogue, self.rendering.name, self.task, size, timeouts)
 
-    def run(self, size: int = 2, terms: Terms = TERMS) -> tuple[Tally, list[Event]]:
-        events: list[Event] = []
-        tally = self.pool(size, terms).run(events.append)
+    def run(self, size: int = 2, timeouts: Timeouts = TIMEOUTS) -> tuple[RunStatistics, list[RunEvent]]:
+        events: list[RunEvent] = []
+        statistics = self.pool(size, timeouts).run(events.append)
         self.task.close()
-        return tally, events
+        return statistics, events
 
     def count(self, state: State) -> int:
         return self.catalogue.count_jobs(self.rendering.name)[state]
 
     def digest(self) -> str:
-        """Over every tile and seam of the store."""
+        """Returns a digest of every tile and seam in the store."""
         total = hashlib.sha256()
         with SqliteTileStore(self.workspace.store_path(self.rendering.name, VIEW), read_only=True) as store:
             for block in store.list_blocks():
@@ -79,7 +79,7 @@ def planned(block: BlockId, kind: str, zmax: int) -> PlannedJob:
 
 
 def open_town(root: Path) -> Town:
-    """The same town from another process."""
+    """Opens the same town from another process."""
     workspace = Workspace(root)
     catalogue = workspace.open_catalogue(lease_s=LEASE_S)
     return Town(workspace, catalogue, catalogue.rendering("town-a"))

@@ -1,23 +1,23 @@
-"""Children for tests of the conversation itself."""
+"""Entry functions of test subprocesses."""
 
 import os
 from collections.abc import Mapping
 from typing import Any
 
-from map3d.subprocess import Tell, Work
+from map3d.subprocess import Handler, ReportProgress
 
 
-def open_echo(setup: Mapping[str, Any]) -> Work:
-    def work(question: dict[str, Any], _blobs: list[bytes], tell: Tell) -> tuple[dict[str, Any], list[bytes]]:
-        for step in range(question.get("tell", 0)):
-            tell(step)
-        if question.get("print"):
+def open_echo(setup: Mapping[str, Any]) -> Handler:
+    def handle(request: dict[str, Any], _blobs: list[bytes], report: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
+        for step in range(request.get("reports", 0)):
+            report(step)
+        if request.get("print"):
             print("noise on standard output")
             os.write(2, b"noise on standard error\n")
-        return {"setup": dict(setup), "question": question, "pid": os.getpid()}, [bytes([k % 256]) * k for k in question.get("sizes", [])]
+        return {"setup": dict(setup), "request": request, "pid": os.getpid()}, [bytes([k % 256]) * k for k in request.get("sizes", [])]
 
-    return work
+    return handle
 
 
-def open_broken(_setup: Mapping[str, Any]) -> Work:
+def open_broken(_setup: Mapping[str, Any]) -> Handler:
     raise RuntimeError("cannot open")

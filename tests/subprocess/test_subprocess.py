@@ -1,25 +1,25 @@
-"""The conversation between parent and child."""
+"""Requests and responses between a process and its subprocess."""
 
 import os
 import threading
 
 import pytest
 
-from map3d.errors import ChildDied, Corrupt
-from map3d.subprocess import Channel, Child, Message
+from map3d.errors import Corrupt, SubprocessDied
+from map3d.subprocess import Channel, Message, Subprocess
 from map3d.subprocess.channel import MAX_JSON_BYTES
 
 ECHO = "tests.subprocess.echo:open_echo"
 
 
 def pipe() -> tuple[Channel, int]:
-    """A channel that reads what is written to the descriptor."""
+    """Returns a channel and the descriptor that it reads from."""
     read, write = os.pipe()
     return Channel(read, -1), write
 
 
 @pytest.mark.parametrize("sizes", [[], [0], [1], [0, 0, 5], [100_000, 0, 3_000_000], list(range(200))])
-def test_what_is_sent_arrives(sizes: list[int]) -> None:
+def test_sent_messages_arrive(sizes: list[int]) -> None:
     read, write = os.pipe()
     sender, receiver = Channel(-1, write), Channel(read, -1)
     blobs = [os.urandom(size) for size in sizes]
@@ -37,7 +37,7 @@ def test_what_is_sent_arrives(sizes: list[int]) -> None:
     receiver.close()
 
 
-def test_half_a_message_is_no_message() -> None:
+def test_incomplete_message_is_not_returned() -> None:
     channel, write = pipe()
     os.write(write, b"\x02\0\0\0")
     assert channel.receive(0.05) is None
@@ -61,7 +61,7 @@ def test_half_a_message_is_no_message() -> None:
         b"\x0f\0\0\0" + bytes(8) + b'{"blobs":["x"]}',
     ],
 )
-def test_nonsense_is_refused(data: bytes) -> None:
+def test_invalid_message_is_refused(data: bytes) -> None:
     channel, write = pipe()
     os.write(write, data)
     with pytest.raises(Corrupt):
@@ -70,50 +70,50 @@ def test_nonsense_is_refused(data: bytes) -> None:
     channel.close()
 
 
-def test_a_child_answers_one_question_after_another() -> None:
-    child = Child(ECHO, {"a": 1})
-    child.wait_ready(30)
+def test_subprocess_handles_one_request_after_another() -> None:
+    process = Subprocess(ECHO, {"a": 1})
+    process.wait_ready(30)
     pids = set()
     for sizes in ([], [1, 2], [2_000_000]):
-        answer = child.ask({"sizes": sizes, "print": True}, wall_s=30)
-        assert isinstance(answer, Message)
-        assert answer.value["setup"] == {"a": 1}
-        assert [len(blob) for blob in answer.blobs] == sizes
-        pids.add(answer.value["pid"])
-    assert pids == {child.pid}
-    child.close()
-    child.close()
+        response = process.request({"sizes": sizes, "print": True}, wall_s=30)
+        assert isinstance(response, Message)
+        assert response.value["setup"] == {"a": 1}
+        assert [len(blob) for blob in response.blobs] == sizes
+        pids.add(response.value["pid"])
+    assert pids == {process.pid}
+    process.close()
+    process.close()
 
 
-def test_what_a_child_tells_on_the_way_is_heard() -> None:
-    child = Child(ECHO, {})
-    child.wait_ready(30)
-    told: list[object] = []
-    child.ask({"tell": 5}, wall_s=30, meanwhile=told.append)
-    child.close()
-    assert [item for item in told if item is not None] == [0, 1, 2, 3, 4]
+def test_progress_reports_arrive_before_the_response() -> None:
+    process = Subprocess(ECHO, {})
+    process.wait_ready(30)
+    reports: list[object] = []
+    process.request({"reports": 5}, wall_s=30, on_progress=reports.append)
+    process.close()
+    assert [item for item in reports if item is not None] == [0, 1, 2, 3, 4]
 
 
-def test_an_exception_of_the_listener_kills_the_child_and_goes_on() -> None:
-    child = Child(ECHO, {})
-    child.wait_ready(30)
+def test_exception_in_on_progress_kills_the_subprocess_and_propagates() -> None:
+    process = Subprocess(ECHO, {})
+    process.wait_ready(30)
 
-    def object_to(told: object) -> None:
-        raise KeyError(told)
+    def fail(progress: object) -> None:
+        raise KeyError(progress)
 
     with pytest.raises(KeyError):
-        child.ask({"tell": 5}, wall_s=30, meanwhile=object_to)
-    with pytest.raises(ChildDied):
-        child.ask({}, wall_s=30)
-    child.close()
+        process.request({"reports": 5}, wall_s=30, on_progress=fail)
+    with pytest.raises(SubprocessDied):
+        process.request({}, wall_s=30)
+    process.close()
 
 
 @pytest.mark.parametrize(
     ("entry", "says"),
     [("tests.subprocess.echo:open_broken", "cannot open"), ("tests.subprocess.nothing:x", "nothing"), ("tests.subprocess.echo:x", "x")],
 )
-def test_a_child_that_cannot_start_says_why(entry: str, says: str) -> None:
-    child = Child(entry, {})
-    with pytest.raises(ChildDied, match=says):
-        child.wait_ready(30)
-    child.close()
+def test_failed_start_says_why(entry: str, says: str) -> None:
+    process = Subprocess(entry, {})
+    with pytest.raises(SubprocessDied, match=says):
+        process.wait_ready(30)
+    process.close()

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Protocol
 
-from map3d.catalogue.records import AssetRecord, Job, JobResult, Lease, PlannedJob, PlanOutcome, RenderingRecord, SceneCrs, SceneRecord
+from map3d.catalogue.records import AssetRecord, Job, JobResult, Lease, PlanCounts, PlannedJob, RenderingRecord, SceneCrs, SceneRecord
 from map3d.catalogue.states import State
 from map3d.geometry.frames import PinnedFrame
 from map3d.types import BlockId, Layer, Vec3
@@ -69,7 +69,7 @@ class Catalogue(Protocol):
 
     # -- jobs -------------------------------------------------------------------------------------------------------------------
 
-    def plan(self, rendering: str, jobs: Iterable[PlannedJob]) -> PlanOutcome:
+    def plan(self, rendering: str, jobs: Iterable[PlannedJob]) -> PlanCounts:
         """Adds jobs, reopens those whose key changed, keeps the rest; all in one transaction.
 
         A base job opens as todo; a reduce job as waiting, or todo when all blocks below are done. If jobs are open afterwards and the content

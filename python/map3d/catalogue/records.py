@@ -139,7 +139,7 @@ class PlannedJob:
 
 
 @dataclass(frozen=True)
-class PlanOutcome:
+class PlanCounts:
     """Counts of jobs by what planning did to them."""
 
     added: int = 0

@@ -4,7 +4,7 @@ import sqlite3
 from collections.abc import Iterable, Iterator
 from typing import Any, Final
 
-from map3d.catalogue.records import Job, JobResult, Lease, PlannedJob, PlanOutcome
+from map3d.catalogue.records import Job, JobResult, Lease, PlanCounts, PlannedJob
 from map3d.catalogue.states import MAX_ATTEMPTS, OPEN, Event, State, next_state, sources
 from map3d.database import NOW, Database
 from map3d.errors import NotFound, StaleFence
@@ -47,7 +47,7 @@ class SqliteJobs:
         self._database = database
         self.lease_s = lease_s
 
-    def plan(self, rendering: str, jobs: Iterable[PlannedJob]) -> PlanOutcome:
+    def plan(self, rendering: str, jobs: Iterable[PlannedJob]) -> PlanCounts:
         with self._database.transaction() as db:
             content_version, announced = _versions(db, rendering)
             known = {(row["track"], row["z"], row["x"], row["y"]): row["key"] for row in _job_rows(db, rendering)}
@@ -65,7 +65,7 @@ class SqliteJobs:
             db.execute(f"UPDATE job SET state = '{State.TODO}' WHERE rendering = ? AND state = '{State.WAITING}' AND {_ALL_BELOW_DONE}", (rendering,))
             if announced >= content_version and _any_open(db, rendering):
                 db.execute("UPDATE rendering SET content_version = ? WHERE name = ?", (announced + 1, rendering))
-        return PlanOutcome(len(added), len(changed), kept)
+        return PlanCounts(len(added), len(changed), kept)
 
     def lease(self, rendering: str, worker: str, start: int = 0) -> Lease | None:
         with self._database.transaction() as db:

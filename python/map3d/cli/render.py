@@ -15,92 +15,98 @@ from map3d.cli.progress import progress_bar
 from map3d.cli.render_stats import print_summary, summary
 
 if TYPE_CHECKING:
-    from map3d.jobs.run import Outcome, Plan, Run
+    from map3d.jobs.run import Run, RunPlan, RunResult
 
 
 @click.command("render")
 @click.argument("rendering")
 @workers_option
 @max_memory_option
-@click.option("--stats", "with_stats", is_flag=True, help="Say at the end where the time went and how often the caches had what was asked for.")
+@click.option("--stats", "with_stats", is_flag=True, help="Print the time spent in each stage and the hit rates of the caches.")
 @json_option
 @workspace_option
 def command(workspace: Workspace, rendering: str, workers: int, max_memory: int | None, with_stats: bool, as_json: bool) -> None:
-    """Make the tiles of RENDERING: what is missing or has changed.
+    """Render the missing and changed tiles of RENDERING.
 
-    It may be stopped at any time, even by killing it; the same command goes on where it was. Ctrl-C lets the blocks in hand be finished, a
-    second Ctrl-C gives them back at once.
+    You can stop it at any time, even with kill; re-run it to resume. Ctrl-C finishes the current blocks first; a second Ctrl-C releases them
+    and stops at once.
     """
-    from map3d.jobs.run import Run, Settings
+    from map3d.jobs.run import Run, RunSettings
 
     catalogue = workspace.open_catalogue()
     try:
-        settings = Settings(workers, max_memory)
+        settings = RunSettings(workers, max_memory)
         scene = catalogue.rendering(rendering).scene
         built = build_with_progress(workspace, catalogue, scene, threads=workers, max_memory_bytes=max_memory)
-        outcome = render_with_progress(Run(workspace, catalogue, rendering, settings))
+        result = render_with_progress(Run(workspace, catalogue, rendering, settings))
     finally:
         catalogue.close()
     if as_json:
-        print_json({**asdict(outcome), "stats": summary(outcome.stats) if with_stats else None, "build": built})
+        print_json({**asdict(result), "stats": summary(result.stats) if with_stats else None, "build": built})
     else:
-        report(rendering, outcome)
+        print_result(rendering, result)
         if with_stats:
-            print_summary(summary(outcome.stats))
-    if not outcome.complete:
-        raise click.exceptions.Exit(130 if outcome.stopped else 1)
+            print_summary(summary(result.stats))
+    if not result.complete:
+        raise click.exceptions.Exit(130 if result.stopped else 1)
 
 
-def render_with_progress(run: "Run") -> "Outcome":
-    """Plan and work, each with its bar on standard error."""
+def render_with_progress(run: "Run") -> "RunResult":
+    """Plans and runs the jobs, with a progress bar for each on standard error."""
     with _bar(MofNCompleteColumn()) as bar:
         task = bar.add_task("planning", total=None)
         plan = run.plan(lambda done, total: bar.update(task, completed=done, total=total))
     return _work(run, plan)
 
 
-def _work(run: "Run", plan: "Plan") -> "Outcome":
-    from map3d.jobs.events import Done, Failed, Left, Lost, Stopping, Waiting
+def _work(run: "Run", plan: "RunPlan") -> "RunResult":
+    from map3d.jobs.events import JobDone, JobFailed, LeaseLost, Stopping, Waiting, WorkerExited
 
-    note = console()
-    outcome = plan.outcome
-    note.print(f"blocks: {counts_text({'new': outcome.added, 'changed': outcome.changed, 'unchanged': outcome.kept})}; {plan.open_jobs:,} to do")
-    begun, seen = time.monotonic(), {"base": 0}
+    log, counts = console(), plan.counts
+    log.print(f"blocks: {counts_text({'new': counts.added, 'changed': counts.changed, 'unchanged': counts.kept})}; {plan.open_jobs:,} to render")
+    started_s, base_tiles = time.monotonic(), 0
     with _bar(TextColumn("{task.fields[rate]}")) as bar:
         task = bar.add_task("rendering", total=plan.open_jobs, rate="")
 
         def on_event(event: Any) -> None:
-            if isinstance(event, Done):
-                seen["base"] += event.result.base_tiles
-                rate = seen["base"] / max(time.monotonic() - begun, 1e-3)
+            nonlocal base_tiles
+            if isinstance(event, JobDone):
+                base_tiles += event.result.base_tiles
+                rate = base_tiles / max(time.monotonic() - started_s, 1e-3)
                 bar.update(task, advance=1, rate=f"{rate:,.0f} base tiles/s")
-            elif isinstance(event, Failed):
-                bar.console.print(f"{event.lease.track} {event.lease.block}: attempt {event.lease.attempt} failed, now {event.state}: {event.reason}")
-            elif isinstance(event, Lost):
+            elif isinstance(event, JobFailed):
+                bar.console.print(
+                    f"{event.lease.track} {event.lease.block}: attempt {event.lease.attempt} failed ({event.reason}); the block is now {event.state}"
+                )
+            elif isinstance(event, LeaseLost):
                 bar.console.print(f"{event.lease.track} {event.lease.block}: lease lost: {event.reason}")
             elif isinstance(event, Stopping):
-                how = "giving the blocks in hand back" if event.abandoning else "finishing the blocks in hand; Ctrl-C again gives them back at once"
-                bar.console.print(f"stopping: {how}")
+                bar.console.print(
+                    "stopping: releasing current blocks" if event.at_once else "stopping after the current blocks; press Ctrl-C again to stop at once"
+                )
             elif isinstance(event, Waiting):
-                bar.console.print(f"waiting: {event.jobs:,} blocks are in other hands; of a render that was killed they come free within a minute")
-            elif isinstance(event, Left) and event.because:
-                bar.console.print(f"worker {event.worker} left: {event.because}")
+                bar.console.print(f"waiting for {event.jobs:,} blocks leased by another run; the leases of a killed run expire within a minute")
+            elif isinstance(event, WorkerExited) and event.reason:
+                bar.console.print(f"worker {event.worker} exited: {event.reason}")
 
         return run.work(plan, on_event)
 
 
-def report(rendering: str, outcome: "Outcome") -> None:
-    tally = outcome.tally
-    click.echo(f"{tally.done:,} blocks done: {tally.base_tiles:,} base tiles, {tally.tiles:,} images, {size_text(tally.bytes)}")
-    if outcome.complete:
-        click.echo(f"{rendering} is complete (content version {outcome.content_version}); next: map3d serve, or map3d publish {rendering} -o FOLDER")
+def print_result(rendering: str, result: "RunResult") -> None:
+    done = result.statistics
+    click.echo(f"rendered {done.done:,} blocks: {done.base_tiles:,} base tiles, {done.tiles:,} images, {size_text(done.bytes)}")
+    if result.complete:
+        version = result.content_version
+        click.echo(f"{rendering} is complete (content version {version}); next: map3d serve {rendering}, or map3d publish {rendering} -o FOLDER")
         return
-    if outcome.quarantined_jobs:
+    if result.quarantined_jobs:
         click.echo(
-            f"{outcome.quarantined_jobs:,} blocks failed three times; see map3d show quarantine {rendering}, then map3d retry {rendering}", err=True
+            f"{result.quarantined_jobs:,} blocks failed three times; run map3d show quarantine {rendering} for the reasons, "
+            f"then map3d retry {rendering}",
+            err=True,
         )
-    if outcome.open_jobs:
-        click.echo(f"{outcome.open_jobs:,} blocks are still to do; go on with: map3d render {rendering}", err=True)
+    if result.open_jobs:
+        click.echo(f"{result.open_jobs:,} blocks remain; resume with map3d render {rendering}", err=True)
 
 
 def _bar(last: Any) -> Progress:

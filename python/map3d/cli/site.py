@@ -13,7 +13,7 @@ from map3d.cli.options import View, max_memory_option, workers_option, workspace
 from map3d.cli.output import size_text
 from map3d.cli.progress import progress_bar
 from map3d.cli.publish import publish_with_progress
-from map3d.cli.render import render_with_progress, report
+from map3d.cli.render import print_result, render_with_progress
 from map3d.types import COLOR_FORMATS, ViewAngles
 
 
@@ -43,7 +43,7 @@ def command(
     """
     from map3d.ingest.import_options import ImportOptions
     from map3d.ingest.sources import asset_name
-    from map3d.jobs.run import Run, Settings
+    from map3d.jobs.run import Run, RunSettings
     from map3d.renderings.site_steps import SiteRequest, add_changed, make_rendering
 
     title = options["title"] or folder.resolve().stem
@@ -72,10 +72,10 @@ def command(
         build_with_progress(workspace, catalogue, request.name, threads=workers, max_memory_bytes=max_memory)
         record = make_rendering(workspace, catalogue, request)
         click.echo(f"rendering {record.name}: {len(record.frames)} views, {record.zmax + 1} levels, {record.res_m:g} m a pixel")
-        outcome = render_with_progress(Run(workspace, catalogue, record.name, Settings(workers, max_memory)))
+        outcome = render_with_progress(Run(workspace, catalogue, record.name, RunSettings(workers, max_memory)))
     finally:
         catalogue.close()
-    report(record.name, outcome)
+    print_result(record.name, outcome)
     if not outcome.complete:
         raise click.exceptions.Exit(130 if outcome.stopped else 1)
     done = publish_with_progress(workspace, record.name, out, replace=True)

@@ -10,7 +10,7 @@ from typing import Any, Final
 from map3d import errors
 from map3d.catalogue import AssetRecord, Catalogue, SceneCrs, SceneRecord, Workspace
 from map3d.catalogue.scene_lock import scene_lock
-from map3d.errors import ChildDied, CrsError, ImportFailed, LimitExceeded, Map3dError
+from map3d.errors import CrsError, ImportFailed, LimitExceeded, Map3dError, SubprocessDied, SubprocessTimedOut
 from map3d.ingest.asset import asset_digest, new_objects, put_in_place, read_objects, world_boxes, write_ids, write_report
 from map3d.ingest.crs import LOCAL, is_local, parse_crs, scene_crs
 from map3d.ingest.import_options import ImportOptions
@@ -99,8 +99,8 @@ def _read(
     }
     try:
         child, applied = parsers.get(entry, limits)
-        message = child.ask(question, wall_s=limits.wall_s, meanwhile=lambda told: told and progress and progress(_told(told)))
-    except (ChildDied, LimitExceeded) as error:
+        message = child.request(question, wall_s=limits.wall_s, on_progress=lambda counts: counts and progress and progress(_told(counts)))
+    except (SubprocessDied, LimitExceeded) as error:
         parsers.drop()
         raise _explained(source, limits, error) from error
     except BaseException:
@@ -183,10 +183,10 @@ def _reasons(report: Mapping[str, Any]) -> str:
     return f" (skipped: {skipped})" if skipped else ""
 
 
-def _explained(source: Source, limits: Limits, error: ChildDied | LimitExceeded) -> ImportFailed | LimitExceeded:
+def _explained(source: Source, limits: Limits, error: SubprocessDied | LimitExceeded) -> ImportFailed | LimitExceeded:
     if isinstance(error, LimitExceeded):
         return LimitExceeded(f"{source.paths[0]}: {error}; raise it with --parse-memory or --parse-cpu")
-    if limits.wall_s is not None and "no answer within" in str(error):
+    if isinstance(error, SubprocessTimedOut) and limits.wall_s is not None:
         return LimitExceeded(f"{source.paths[0]}: not read within {limits.wall_s:g} s; raise it with --parse-cpu")
     return ImportFailed(f"{source.paths[0]}: the parser broke down and nothing was taken over: {error}")
 

@@ -7,19 +7,19 @@ from typing import Any, Final
 
 from map3d import _core
 from map3d.ingest.asset_reprojector import Placing
-from map3d.subprocess import Tell, Work
+from map3d.subprocess import Handler, ReportProgress
 
 _TELL_EVERY: Final = 50_000
 
 
-def open_import(_setup: Mapping[str, Any]) -> Work:
-    def work(question: dict[str, Any], _blobs: list[bytes], tell: Tell) -> tuple[dict[str, Any], list[bytes]]:
-        return _import(question, tell), []
+def open_import(_setup: Mapping[str, Any]) -> Handler:
+    def work(question: dict[str, Any], _blobs: list[bytes], report_progress: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
+        return _import(question, report_progress), []
 
     return work
 
 
-def _import(question: Mapping[str, Any], tell: Tell) -> dict[str, Any]:
+def _import(question: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
     """`question`: {"path", "format", "folder", "reader": options of the core's Reader, "crs": as the user gave it or None, "scene_crs": as text,
     "local", or None while the scene has none}. Answers {"report", "crs": the scene's system as proposed, None if nothing could decide it}."""
     reader = _open(question)
@@ -33,7 +33,7 @@ def _import(question: Mapping[str, Any], tell: Tell) -> dict[str, Any]:
         triangles += batch.triangle_count
         if triangles - told >= _TELL_EVERY:
             told = triangles
-            tell({"triangles": triangles})
+            report_progress({"triangles": triangles})
     transforms = reader.instances()
     if len(transforms):
         reader.set_instances(placing.world_transforms(transforms))

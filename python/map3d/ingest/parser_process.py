@@ -4,7 +4,7 @@ processes; after any failure a new one starts."""
 from types import TracebackType
 from typing import Any, Final, Self
 
-from map3d.subprocess import Child, Limits
+from map3d.subprocess import Limits, Subprocess
 
 START_S: Final = 120.0
 _ENVIRONMENT: Final = {"RAYON_NUM_THREADS": "1"}
@@ -14,16 +14,16 @@ class Parsers:
     """Entered by every import that uses it and by its owner; the outermost `with` ends the child."""
 
     def __init__(self) -> None:
-        self._child: Child | None = None
+        self._child: Subprocess | None = None
         self._for: tuple[str, Limits] | None = None
         self._applied: dict[str, Any] = {}
         self._depth = 0
 
-    def get(self, entry: str, limits: Limits) -> tuple[Child, dict[str, Any]]:
-        """A ready child, and what it could limit. Raises ChildDied."""
+    def get(self, entry: str, limits: Limits) -> tuple[Subprocess, dict[str, Any]]:
+        """A ready child, and what it could limit. Raises SubprocessDied."""
         if self._child is None or self._for != (entry, limits):
             self.drop()
-            self._child, self._for = Child(entry, {}, limits=limits, environment=_ENVIRONMENT), (entry, limits)
+            self._child, self._for = Subprocess(entry, {}, limits=limits, environment=_ENVIRONMENT), (entry, limits)
             self._applied = self._child.wait_ready(START_S)
         return self._child, self._applied
 

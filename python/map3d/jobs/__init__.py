@@ -1,1 +1,1 @@
-"""Jobs: workers lease blocks, have them rendered in a child and commit them."""
+"""Jobs: workers lease blocks, have a subprocess render them and commit the result."""

@@ -1,4 +1,4 @@
-"""What workers tell while they work."""
+"""The events of a run."""
 
 from dataclasses import dataclass
 
@@ -6,14 +6,14 @@ from map3d.catalogue import JobResult, Lease, State
 
 
 @dataclass(frozen=True)
-class Done:
+class JobDone:
     lease: Lease
     result: JobResult
 
 
 @dataclass(frozen=True)
-class Failed:
-    """The job in hand lost an attempt; `state` is what it became."""
+class JobFailed:
+    """A job lost one attempt; `state` is its state afterwards."""
 
     lease: Lease
     reason: str
@@ -21,36 +21,36 @@ class Failed:
 
 
 @dataclass(frozen=True)
-class Lost:
-    """The lease was no longer held: somebody else has the job, nothing was committed as done."""
+class LeaseLost:
+    """A lease was released, or another worker took it over; the job was not committed as done."""
 
     lease: Lease
     reason: str
 
 
 @dataclass(frozen=True)
-class Left:
-    """A worker's end. `because` is empty when there was nothing more to do or it was told to stop; `jobs_failed`: it left after failing too many;
-    `error`: something that nobody foresaw."""
+class WorkerExited:
+    """A worker exited. `reason` is empty when no jobs were left or the run was stopped; `jobs_failed`: it exited after too many failed jobs;
+    `error`: an unexpected exception."""
 
     worker: str
-    because: str = ""
+    reason: str = ""
     jobs_failed: bool = False
     error: BaseException | None = None
 
 
 @dataclass(frozen=True)
 class Stopping:
-    """The user asked to stop: at once when `abandoning`, else when the jobs in hand are done."""
+    """The user asked to stop: `at_once`, or after the current jobs."""
 
-    abandoning: bool
+    at_once: bool
 
 
 @dataclass(frozen=True)
 class Waiting:
-    """All that is left is leased by another run, or by one that was killed and whose leases have yet to expire."""
+    """All remaining jobs are leased by another run, or by a killed one whose leases have not expired yet."""
 
     jobs: int
 
 
-Event = Done | Failed | Lost | Left | Stopping | Waiting
+RunEvent = JobDone | JobFailed | LeaseLost | WorkerExited | Stopping | Waiting

@@ -1,4 +1,4 @@
-"""`map3d render`: plan, run the workers, write the manifest."""
+"""`map3d render`: plans the jobs, runs the workers, writes the manifest."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -6,11 +6,11 @@ from typing import Final
 
 import numpy as np
 
-from map3d.catalogue import Catalogue, PlanOutcome, RenderingRecord, State, Workspace
+from map3d.catalogue import Catalogue, PlanCounts, RenderingRecord, State, Workspace
 from map3d.errors import BadRequest
-from map3d.jobs.events import Event
-from map3d.jobs.pool import Pool, Tally
-from map3d.jobs.timeouts import Terms
+from map3d.jobs.events import RunEvent
+from map3d.jobs.pool import Pool, RunStatistics
+from map3d.jobs.timeouts import Timeouts
 from map3d.renderings.build import open_scene
 from map3d.renderings.manifest_writer import Planned, write_manifest
 from map3d.renderings.plan import PlannedScene, plan_jobs, planned_occupancy
@@ -22,37 +22,38 @@ from map3d.types import BlockId, Box
 
 MIN_CACHE_BYTES: Final = 64 << 20
 WORKER_BYTES: Final = 256 << 20
-"""Of a child without its cache: interpreter, libraries, a block's G-buffers."""
+"""Memory of a subprocess without its cache: interpreter, libraries, G-buffers of one block."""
 
 
 @dataclass(frozen=True)
-class Settings:
-    """`max_memory_bytes`: over all workers, None for the default caches."""
+class RunSettings:
+    """`max_memory_bytes`: for all workers together; None selects the default cache size."""
 
     workers: int
     max_memory_bytes: int | None = None
-    terms: Terms = field(default_factory=Terms)
+    timeouts: Timeouts = field(default_factory=Timeouts)
     entry: str = RENDER_ENTRY
 
     @property
     def cache_bytes(self) -> int:
-        """Of one child."""
+        """Cache size of one subprocess. Raises BadRequest when the memory is too small for the workers."""
         if self.max_memory_bytes is None:
             return CACHE_BYTES
         each = self.max_memory_bytes // self.workers - WORKER_BYTES
         if each < MIN_CACHE_BYTES:
             need = self.workers * (MIN_CACHE_BYTES + WORKER_BYTES)
             raise BadRequest(
-                f"--max-memory {self.max_memory_bytes >> 20} MiB is too little for {self.workers} workers: give {need >> 20} MiB, or fewer --workers"
+                f"--max-memory {self.max_memory_bytes >> 20} MiB is too small for {self.workers} workers: "
+                f"give at least {need >> 20} MiB, or fewer --workers"
             )
         return each
 
 
 @dataclass(frozen=True)
-class Plan:
-    """What there is to do: jobs by state, base tiles that open blocks of the first pass may fill."""
+class RunPlan:
+    """The planned work: counts of jobs, and the base tiles that open blocks of the first pass may fill."""
 
-    outcome: PlanOutcome
+    counts: PlanCounts
     open_jobs: int
     done_jobs: int
     quarantined_jobs: int
@@ -61,10 +62,10 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """How a run ended. `complete`: every job is done; `stats`: as RenderTask sums them, empty when nothing was to be done."""
+class RunResult:
+    """How a run ended. `complete`: every job is done; `stats`: the sums of `RenderTask.stats`, empty when there were no jobs to do."""
 
-    tally: Tally
+    statistics: RunStatistics
     complete: bool
     stopped: bool
     open_jobs: int
@@ -74,55 +75,55 @@ class Outcome:
 
 
 class Run:
-    """One run of a rendering whose scene is built, in steps, so that a caller can show each."""
+    """One run of a rendering whose scene is built; the steps are separate so that the caller can show progress."""
 
-    def __init__(self, workspace: Workspace, catalogue: Catalogue, rendering: str, settings: Settings) -> None:
+    def __init__(self, workspace: Workspace, catalogue: Catalogue, rendering: str, settings: RunSettings) -> None:
         self._workspace, self._catalogue, self._settings = workspace, catalogue, settings
         self.record = catalogue.rendering(rendering)
         self._cache_bytes = settings.cache_bytes
         self._pool: Pool | None = None
 
-    def plan(self, progress: Callable[[int, int], None] | None = None, scene: PlannedScene | None = None) -> Plan:
-        """Compares the scene with what is there, opens jobs for what changed, tells clients that more is to come."""
+    def plan(self, progress: Callable[[int, int], None] | None = None, scene: PlannedScene | None = None) -> RunPlan:
+        """Compares the scene with the stored blocks, opens jobs for new and changed blocks, and announces them in the manifest."""
         opened = scene or open_scene(self._workspace, self.record.scene)
-        known = _known_blocks(self._catalogue, self.record)
-        outcome = self._catalogue.plan(self.record.name, plan_jobs(opened, self.record, known, progress))
+        blocks = _planned_blocks(self._catalogue, self.record)
+        planned = self._catalogue.plan(self.record.name, plan_jobs(opened, self.record, blocks, progress))
         self.record = self._catalogue.rendering(self.record.name)
         self._prune()
         counts = self._catalogue.count_jobs(self.record.name)
         occupancy = self._open_occupancy(opened) if counts[State.DONE] < sum(counts.values()) else {}
         box = opened.box
-        if occupancy or outcome.added or not self._workspace.manifest_path(self.record.name).is_file():
+        if occupancy or planned.added or not self._workspace.manifest_path(self.record.name).is_file():
             write_manifest(self._workspace, self._catalogue, self.record.name, box, occupancy)
         open_jobs = counts[State.WAITING] + counts[State.TODO] + counts[State.LEASED]
-        return Plan(outcome, open_jobs, counts[State.DONE], counts[State.QUARANTINED], box, occupancy)
+        return RunPlan(planned, open_jobs, counts[State.DONE], counts[State.QUARANTINED], box, occupancy)
 
-    def work(self, plan: Plan, on_event: Callable[[Event], None]) -> Outcome:
-        """Runs the workers until nothing is left to do or the user stops them, then writes the manifest."""
+    def work(self, plan: RunPlan, on_event: Callable[[RunEvent], None]) -> RunResult:
+        """Runs the workers until no jobs are left or the user stops them, then writes the manifest."""
         if not plan.open_jobs:
-            return self._finish(plan, Tally(), False)
+            return self._finish(plan, RunStatistics(), False)
         task = RenderTask(self._workspace, self.record, cache_bytes=self._cache_bytes, entry=self._settings.entry)
-        self._pool = Pool(self._catalogue, self.record.name, task, self._settings.workers, self._settings.terms)
+        self._pool = Pool(self._catalogue, self.record.name, task, self._settings.workers, self._settings.timeouts)
         try:
-            tally = self._pool.run(on_event)
+            statistics = self._pool.run(on_event)
         finally:
             task.close()
-        return self._finish(plan, tally, self._pool.stopped, dict(task.stats))
+        return self._finish(plan, statistics, self._pool.stopped, dict(task.stats))
 
     def stop(self) -> None:
-        """Lets the blocks in hand be finished and no more begun."""
+        """Makes the workers finish their current blocks and exit."""
         if self._pool is not None:
             self._pool.stop()
 
-    def _finish(self, plan: Plan, tally: Tally, stopped: bool, stats: Mapping[str, float] | None = None) -> Outcome:
+    def _finish(self, plan: RunPlan, statistics: RunStatistics, stopped: bool, stats: Mapping[str, float] | None = None) -> RunResult:
         counts = self._catalogue.count_jobs(self.record.name)
         complete = counts[State.DONE] == sum(counts.values())
         write_manifest(self._workspace, self._catalogue, self.record.name, plan.box, {} if complete else self._within_open(plan.occupancy))
         open_jobs = counts[State.WAITING] + counts[State.TODO] + counts[State.LEASED]
-        return Outcome(tally, complete, stopped, open_jobs, counts[State.QUARANTINED], self.record.content_version, stats or {})
+        return RunResult(statistics, complete, stopped, open_jobs, counts[State.QUARANTINED], self.record.content_version, stats or {})
 
     def _prune(self) -> None:
-        """Removes blocks that no job stands for, such as those of frames pinned before."""
+        """Removes stored blocks without a job, such as those of earlier frames."""
         for track in self.record.tracks:
             path = self._workspace.store_path(self.record.name, track.id)
             if path.is_file():
@@ -133,29 +134,30 @@ class Run:
                             store.remove_block(block.id)
 
     def _open_occupancy(self, scene: PlannedScene) -> dict[str, Occupancy]:
-        """Where the first pass of a view is done, its tiles say exactly where those of further passes will be."""
+        """Returns, for each view, the base tiles that open blocks of its first pass may fill; later passes fill the same tiles as the first."""
         return {frame.id: planned_occupancy(scene, self.record, frame, within=self._open_blocks(frame.id)) for frame in self.record.frames}
 
     def _open_blocks(self, view: str) -> list[BlockId]:
-        """Base blocks of the view's first pass that are not done."""
+        """Returns the base blocks of the view's first pass that are not done."""
         return [job.block for job in self._catalogue.jobs(self.record.name, view) if job.kind == "base" and job.state is not State.DONE]
 
-    def _within_open(self, whole: Planned) -> dict[str, Occupancy]:
-        """Only what lies in base blocks that are not done now."""
+    def _within_open(self, planned: Planned) -> dict[str, Occupancy]:
+        """Restricts each view's occupancy to base blocks that are not done now."""
         root = block_levels(self.record.zmax)[0].root
-        cut = {}
-        for view, occupancy in whole.items():
+        remaining = {}
+        for view, occupancy in planned.items():
             blocks = self._open_blocks(view)
             x, y = np.array([block.x for block in blocks], np.int64), np.array([block.y for block in blocks], np.int64)
             base = occupancy.numbers(self.record.zmax)
             above = base >> np.uint64(2 * (self.record.zmax - root))
-            cut[view] = Occupancy(self.record.zmax, base[np.isin(above, morton_numbers(x, y))])
-        return cut
+            remaining[view] = Occupancy(self.record.zmax, base[np.isin(above, morton_numbers(x, y))])
+        return remaining
 
 
-def _known_blocks(catalogue: Catalogue, record: RenderingRecord) -> dict[str, list[BlockId]]:
-    known: dict[str, list[BlockId]] = {track.id: [] for track in record.tracks}
+def _planned_blocks(catalogue: Catalogue, record: RenderingRecord) -> dict[str, list[BlockId]]:
+    """Returns the base blocks with a job, by track."""
+    blocks: dict[str, list[BlockId]] = {track.id: [] for track in record.tracks}
     for job in catalogue.jobs(record.name):
-        if job.kind == "base" and job.track in known:
-            known[job.track].append(job.block)
-    return known
+        if job.kind == "base" and job.track in blocks:
+            blocks[job.track].append(job.block)
+    return blocks

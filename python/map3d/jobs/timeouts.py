@@ -1,4 +1,4 @@
-"""The times and counts that workers keep to."""
+"""The timeouts and retry limits of workers."""
 
 from dataclasses import dataclass
 
@@ -6,20 +6,22 @@ from map3d.catalogue import HEARTBEAT_S
 
 
 @dataclass(frozen=True)
-class Terms:
-    """`block_s`: how long a child may work on one block before it counts as hanging; `start_s`: how long it may take to start.
-
-    A worker that fails `failures` different jobs leaves; so does one whose children die before they are ready `starts` times in a row, or say why
-    they cannot start. A worker without a job looks again every `idle_s`, and every `tick_s` whether it is to stop. When all have had none for
-    `wait_s`, the user is told.
-    """
-
+class Timeouts:
     heartbeat_s: float = HEARTBEAT_S
+    """Interval between two renewals of a lease."""
     block_s: float = 900.0
+    """A subprocess that works longer on one block counts as hung."""
     start_s: float = 120.0
+    """The longest time that a subprocess may take to start."""
     idle_s: float = 0.5
+    """How often a worker without a job polls for one."""
     tick_s: float = 0.25
+    """How often a busy worker checks whether to stop."""
     wait_s: float = 3.0
+    """When all workers have been idle this long, the user is informed."""
     failures: int = 3
+    """A worker exits when this many different jobs have failed."""
     starts: int = 12
+    """A worker exits when this many subprocesses in a row died before they were ready."""
     start_pause_s: float = 0.25
+    """Pause before the next start, times the number of attempts so far."""

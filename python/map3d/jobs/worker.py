@@ -1,6 +1,6 @@
-"""A worker: leases jobs one after another, has its child do them, commits what the child made (spec/catalogue.md).
+"""A worker: leases one job after another, has its subprocess do it and commits the result (spec/catalogue.md).
 
-Commit of a block: the child renders → check → `commit` (one transaction of the tile store) → `done` with the fence.
+Commit of a block: the subprocess renders it → checks → `commit` (one transaction of the tile store) → `done` with the fence.
 """
 
 import threading
@@ -9,27 +9,27 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 from map3d.catalogue import Catalogue, JobResult, Lease, State
-from map3d.errors import ChildRefused, Map3dError, StaleFence
-from map3d.jobs.events import Done, Event, Failed, Left, Lost
-from map3d.jobs.timeouts import Terms
-from map3d.subprocess import Child, Failure, Message
+from map3d.errors import Map3dError, StaleFence, Stopped, SubprocessStartFailed
+from map3d.jobs.events import JobDone, JobFailed, LeaseLost, RunEvent, WorkerExited
+from map3d.jobs.timeouts import Timeouts
+from map3d.subprocess import Failure, Message, Subprocess
 from map3d.tiles.naming import morton
 
 
 class Task(Protocol):
-    """What a job is about; the worker itself knows only leases and children."""
+    """The work of a job; a worker itself deals only with leases and subprocesses."""
 
-    def start_child(self) -> Child: ...
+    def start_subprocess(self) -> Subprocess: ...
 
-    def question(self, lease: Lease) -> dict[str, Any]:
-        """What the child is asked."""
+    def request(self, lease: Lease) -> dict[str, Any]:
+        """Returns the request for the subprocess."""
 
-    def commit(self, lease: Lease, answer: Message) -> JobResult:
-        """Checks what the child made and stores it; durable on return."""
+    def commit(self, lease: Lease, response: Message) -> JobResult:
+        """Checks and stores the response; it is durable on return."""
 
 
-class News:
-    """Wakes workers that wait for a job when another one finished one, which may have opened the next."""
+class Signal:
+    """Wakes idle workers when a job has ended, since that may have opened another one."""
 
     def __init__(self) -> None:
         self._changed, self._count = threading.Condition(), 0
@@ -38,147 +38,153 @@ class News:
     def count(self) -> int:
         return self._count
 
-    def tell(self) -> None:
+    def notify(self) -> None:
         with self._changed:
             self._count += 1
             self._changed.notify_all()
 
     def wait(self, since: int, timeout_s: float) -> None:
-        """Until there is news after `since`, a count from before."""
+        """Waits until `count` differs from `since`."""
         with self._changed:
             self._changed.wait_for(lambda: self._count != since, timeout_s)
 
 
-class Abandoned(Map3dError):
-    """The user wants out at once."""
-
-
 class Worker:
-    """Runs in a thread of its own. `stop` set: finishes the job in hand and leaves; `abandon` set: gives it back and leaves."""
+    """Runs in its own thread. When `stop` is set it finishes its job and exits; when `stop_now` is set it releases its job and exits."""
 
     def __init__(
-        self, name: str, catalogue: Catalogue, rendering: str, task: Task, terms: Terms, stop: threading.Event, abandon: threading.Event, news: News
+        self,
+        name: str,
+        catalogue: Catalogue,
+        rendering: str,
+        task: Task,
+        timeouts: Timeouts,
+        stop: threading.Event,
+        stop_now: threading.Event,
+        job_ended: Signal,
     ) -> None:
-        self.name, self._news = name, news
-        self._catalogue, self._rendering, self._task, self._terms = catalogue, rendering, task, terms
-        self._stop, self._abandon = stop, abandon
-        self._child: Child | None = None
+        self.name, self._job_ended = name, job_ended
+        self._catalogue, self._rendering, self._task, self._timeouts = catalogue, rendering, task, timeouts
+        self._stop, self._stop_now = stop, stop_now
+        self._subprocess: Subprocess | None = None
         self._failed: set[tuple[str, str]] = set()
         self.start = 0
-        """Morton number of base blocks from which on it goes: neighbours share chunks and textures."""
+        """Morton number from which the worker takes its next base block: neighbours share chunks and textures."""
         self.idle_since: float | None = None
-        """Monotonic seconds; None while it has a job or a child starts."""
+        """Monotonic seconds; None while the worker has a job or starts a subprocess."""
 
-    def run(self, tell: Callable[[Event], None]) -> None:
-        """Works until there is nothing more to do, then tells `Left`."""
-        left = Left(self.name)
+    def run(self, report: Callable[[RunEvent], None]) -> None:
+        """Works until no jobs are left, then reports `WorkerExited`."""
+        exited = WorkerExited(self.name)
         try:
-            left = self._work_on(tell)
+            exited = self._work_on(report)
         except Map3dError as error:
-            left = Left(self.name, str(error))
+            exited = WorkerExited(self.name, str(error))
         except BaseException as error:
-            left = Left(self.name, f"{type(error).__name__}: {error}", error=error)
+            exited = WorkerExited(self.name, f"{type(error).__name__}: {error}", error=error)
         finally:
-            self._drop_child()
-            tell(left)
+            self._end_subprocess()
+            report(exited)
 
-    def _work_on(self, tell: Callable[[Event], None]) -> Left:
+    def _work_on(self, report: Callable[[RunEvent], None]) -> WorkerExited:
         while not self._stop.is_set():
-            child = self._ready_child()
-            if child is None:
+            process = self._ready_subprocess()
+            if process is None:
                 break
-            since = self._news.count
+            since = self._job_ended.count
             lease = self._catalogue.lease(self._rendering, self.name, self.start)
             if lease is not None:
                 self.idle_since = None
                 if lease.kind == "base":
                     self.start = morton(lease.block.x, lease.block.y)
-                tell(self._work(child, lease))
-                self._news.tell()
-            elif self._nothing_left():
+                report(self._work(process, lease))
+                self._job_ended.notify()
+            elif self._no_jobs_left():
                 break
             else:
                 self.idle_since = self.idle_since or time.monotonic()
-                self._news.wait(since, self._terms.idle_s)
-            if len(self._failed) >= self._terms.failures:
-                return Left(self.name, f"failed {len(self._failed)} different jobs", jobs_failed=True)
-        return Left(self.name)
+                self._job_ended.wait(since, self._timeouts.idle_s)
+            if len(self._failed) >= self._timeouts.failures:
+                return WorkerExited(self.name, f"failed {len(self._failed)} different jobs", jobs_failed=True)
+        return WorkerExited(self.name)
 
-    def _nothing_left(self) -> bool:
+    def _no_jobs_left(self) -> bool:
         counts = self._catalogue.count_jobs(self._rendering)
         return counts[State.TODO] + counts[State.LEASED] == 0
 
-    def _work(self, child: Child, lease: Lease) -> Event:
-        hold = _Hold(self._catalogue, lease, self._terms, self._abandon)
+    def _work(self, process: Subprocess, lease: Lease) -> RunEvent:
+        heartbeat = _Heartbeat(self._catalogue, lease, self._timeouts, self._stop_now)
         try:
-            answer = child.ask(self._task.question(lease), wall_s=self._terms.block_s, every_s=self._terms.tick_s, meanwhile=hold.look)
-            if isinstance(answer, Failure):
-                return self._fail(lease, f"{answer.kind}: {answer.message}")
-            hold.beat()
-            result = self._task.commit(lease, answer)
+            response = process.request(
+                self._task.request(lease), wall_s=self._timeouts.block_s, every_s=self._timeouts.tick_s, on_progress=heartbeat.on_progress
+            )
+            if isinstance(response, Failure):
+                return self._fail(lease, f"{response.kind}: {response.message}")
+            heartbeat.renew()
+            result = self._task.commit(lease, response)
             self._catalogue.done(lease, result)
-            return Done(lease, result)
+            return JobDone(lease, result)
         except StaleFence as error:
-            self._drop_child()
-            return Lost(lease, str(error))
-        except Abandoned as error:
-            self._drop_child()
-            return self._give_back(lease, str(error))
+            self._end_subprocess()
+            return LeaseLost(lease, str(error))
+        except Stopped as error:
+            self._end_subprocess()
+            return self._release(lease, str(error))
         except Map3dError as error:
-            self._drop_child()
+            self._end_subprocess()
             return self._fail(lease, str(error))
 
-    def _give_back(self, lease: Lease, reason: str) -> Event:
+    def _release(self, lease: Lease, reason: str) -> RunEvent:
         try:
             self._catalogue.release(lease)
         except StaleFence as error:
-            return Lost(lease, f"{reason}; {error}")
-        return Lost(lease, reason)
+            return LeaseLost(lease, f"{reason}; {error}")
+        return LeaseLost(lease, reason)
 
-    def _fail(self, lease: Lease, reason: str) -> Event:
+    def _fail(self, lease: Lease, reason: str) -> RunEvent:
         try:
             state = self._catalogue.fail(lease, reason)
         except StaleFence as error:
-            return Lost(lease, f"{reason}; {error}")
+            return LeaseLost(lease, f"{reason}; {error}")
         self._failed.add((lease.track, str(lease.block)))
-        return Failed(lease, reason, state)
+        return JobFailed(lease, reason, state)
 
-    def _ready_child(self) -> Child | None:
-        """None: stopped while it tried. Raises ChildRefused, or ChildDied after too many tries."""
-        for attempt in range(1, self._terms.starts + 1):
-            if self._child is not None:
-                return self._child
+    def _ready_subprocess(self) -> Subprocess | None:
+        """Returns None when stopped meanwhile. Raises SubprocessStartFailed, or SubprocessDied after too many attempts."""
+        for attempt in range(1, self._timeouts.starts + 1):
+            if self._subprocess is not None:
+                return self._subprocess
             try:
-                self._child = self._task.start_child()
-                self._child.wait_ready(self._terms.start_s)
+                self._subprocess = self._task.start_subprocess()
+                self._subprocess.wait_ready(self._timeouts.start_s)
             except Map3dError as error:
-                self._drop_child()
-                if isinstance(error, ChildRefused) or attempt == self._terms.starts:
+                self._end_subprocess()
+                if isinstance(error, SubprocessStartFailed) or attempt == self._timeouts.starts:
                     raise
-                if self._stop.wait(self._terms.start_pause_s * attempt):
+                if self._stop.wait(self._timeouts.start_pause_s * attempt):
                     return None
-        return self._child
+        return self._subprocess
 
-    def _drop_child(self) -> None:
-        if self._child is not None:
-            self._child.close()
-            self._child = None
+    def _end_subprocess(self) -> None:
+        if self._subprocess is not None:
+            self._subprocess.close()
+            self._subprocess = None
 
 
-class _Hold:
-    """Keeps a lease while the child works."""
+class _Heartbeat:
+    """Renews a lease while the subprocess works."""
 
-    def __init__(self, catalogue: Catalogue, lease: Lease, terms: Terms, abandon: threading.Event) -> None:
-        self._catalogue, self._lease, self._terms, self._abandon = catalogue, lease, terms, abandon
-        self._beaten = time.monotonic()
+    def __init__(self, catalogue: Catalogue, lease: Lease, timeouts: Timeouts, stop_now: threading.Event) -> None:
+        self._catalogue, self._lease, self._timeouts, self._stop_now = catalogue, lease, timeouts, stop_now
+        self._renewed_s = time.monotonic()
 
-    def look(self, _told: object) -> None:
-        """Raises Abandoned when the user wants out, StaleFence when the lease is lost."""
-        if self._abandon.is_set():
-            raise Abandoned("abandoned by the user")
-        if time.monotonic() - self._beaten >= self._terms.heartbeat_s:
-            self.beat()
+    def on_progress(self, _progress: object) -> None:
+        """Raises Stopped when the user stops the run at once, StaleFence when the lease is lost."""
+        if self._stop_now.is_set():
+            raise Stopped("stopped by the user")
+        if time.monotonic() - self._renewed_s >= self._timeouts.heartbeat_s:
+            self.renew()
 
-    def beat(self) -> None:
+    def renew(self) -> None:
         self._catalogue.heartbeat(self._lease)
-        self._beaten = time.monotonic()
+        self._renewed_s = time.monotonic()

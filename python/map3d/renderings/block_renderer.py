@@ -1,4 +1,4 @@
-"""What the child of a worker does: renders a base block from the scene, or reduces seams to a reduce block. Keeps the scene open between blocks."""
+"""The subprocess of a render worker: renders base blocks of the scene and reduces seams to reduce blocks. Keeps the scene open between requests."""
 
 import json
 import time
@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from map3d import _core
 from map3d.errors import NotFound
-from map3d.subprocess import Tell, Work
+from map3d.subprocess import Handler, ReportProgress
 from map3d.tiles.naming import blocks_below
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.types import BlockId
@@ -16,23 +16,23 @@ from map3d.types import BlockId
 COUNTED: Final = ("chunk_hits", "chunk_misses", "texture_hits", "texture_misses", "texture_decoded", "texture_evicted")
 
 
-def open_work(setup: Mapping[str, Any]) -> Work:
+def open_renderer(setup: Mapping[str, Any]) -> Handler:
     """`setup`: {"scene": folder, "cache_bytes", "frames": {track: frame}, "stores": {track: path}}."""
-    renderer = _Renderer(setup)
+    renderer = _BlockRenderer(setup)
 
-    def work(question: dict[str, Any], _blobs: list[bytes], _tell: Tell) -> tuple[dict[str, Any], Sequence[bytes]]:
-        begun = time.perf_counter()
-        block = renderer.block(question["track"], BlockId(*question["block"]), question["kind"], question["levels"])
+    def handle(request: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], Sequence[bytes]]:
+        started = time.perf_counter()
+        block = renderer.render(request["track"], BlockId(*request["block"]), request["kind"], request["levels"])
         tiles, seam = block.tiles, block.seam
-        stats = {**block.stats, **renderer.cache_counts()}
-        answer = {"tiles": [list(tile[:4]) for tile in tiles], "seam": seam is not None, "stats": stats}
+        stats = {**block.stats, **renderer.take_cache_counts()}
+        response = {"tiles": [list(tile[:4]) for tile in tiles], "seam": seam is not None, "stats": stats}
         blobs = [tile[4] for tile in tiles] + ([] if seam is None else [seam])
-        return {**answer, "seconds": time.perf_counter() - begun}, blobs
+        return {**response, "seconds": time.perf_counter() - started}, blobs
 
-    return work
+    return handle
 
 
-class _Renderer:
+class _BlockRenderer:
     def __init__(self, setup: Mapping[str, Any]) -> None:
         self._scene = _core.Scene(setup["scene"], cache_bytes=setup["cache_bytes"])
         self._frames = {track: json.dumps(frame) for track, frame in setup["frames"].items()}
@@ -41,19 +41,19 @@ class _Renderer:
         self._stores: dict[str, SqliteTileStore] = {}
         self._counted = dict.fromkeys(COUNTED, 0)
 
-    def block(self, track: str, block: BlockId, kind: str, levels: int) -> _core.Block:
+    def render(self, track: str, block: BlockId, kind: str, levels: int) -> _core.Block:
         if kind == "base":
             return self._scene.render_block(self._frames[track], *block)
         return _core.reduce_block(self._frames[track], *block, levels, self._seams_below(track, block))
 
-    def cache_counts(self) -> dict[str, int]:
-        """What the scene's caches did since this was last asked."""
+    def take_cache_counts(self) -> dict[str, int]:
+        """Returns the counts of the scene's caches since the previous call."""
         before, now = self._counted, self._scene.stats()
         self._counted = {name: now[name] for name in COUNTED}
         return {name: self._counted[name] - before[name] for name in COUNTED}
 
     def _seams_below(self, track: str, block: BlockId) -> list[tuple[int, int, bytes]]:
-        """Of the blocks below that have content."""
+        """Returns (x, y, seam) of each block below that has content."""
         store = self._store(track)
         seams = []
         for below in blocks_below(block, self._zmax[track]):
@@ -61,7 +61,7 @@ class _Renderer:
             if seam is not None:
                 seams.append((below.x, below.y, seam))
             elif stored is not None and stored.tiles:
-                raise NotFound(f"block {below} of track {track} has {stored.tiles} tiles and no seam; run map3d verify")
+                raise NotFound(f"block {below} of track {track} has {stored.tiles} tiles but no seam; run map3d verify")
         return seams
 
     def _store(self, track: str) -> SqliteTileStore:

@@ -1,4 +1,4 @@
-"""The task of rendering jobs: a block is rendered by a child of map3d.renderings.block_renderer and committed to the track's tile store."""
+"""The render task: has a subprocess render each leased block and commits the block to the track's tile store."""
 
 import threading
 from collections import Counter
@@ -7,52 +7,52 @@ from typing import Any, Final
 
 from map3d.catalogue import JobResult, Lease, RenderingRecord, Track, Workspace
 from map3d.renderings.block_check import check_rendered
-from map3d.subprocess import Child, Message
+from map3d.subprocess import Message, Subprocess
 from map3d.tiles.naming import block_level
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.store import StoredTile, StoreShape, TileStore
 
-RENDER_ENTRY: Final = "map3d.renderings.block_renderer:open_work"
+RENDER_ENTRY: Final = "map3d.renderings.block_renderer:open_renderer"
 CACHE_BYTES: Final = 512 << 20
 
 
 class RenderTask:
-    """A `Task`. Holds the tile stores of the rendering's tracks, made if absent.
+    """Implements `Task`. Opens the tile stores of the rendering's tracks, and creates missing ones.
 
-    `stats`: what the children told of the blocks that were committed, summed: seconds of each stage, tiles, hits and misses of the caches.
+    `stats` sums the statistics of all committed blocks: seconds of each stage, tiles, cache hits and misses.
     """
 
     def __init__(self, workspace: Workspace, rendering: RenderingRecord, *, cache_bytes: int = CACHE_BYTES, entry: str = RENDER_ENTRY) -> None:
         workspace.rendering_folder(rendering.name).mkdir(parents=True, exist_ok=True)
         self.stats: Counter[str] = Counter()
-        self._adding = threading.Lock()
+        self._stats_lock = threading.Lock()
         self._zmax = rendering.zmax
         self._entry = entry
         self._setup = _setup(workspace, rendering, cache_bytes)
         self._stores: Mapping[str, TileStore] = {track.id: _open_store(workspace, rendering, track) for track in rendering.tracks}
 
-    def start_child(self) -> Child:
-        return Child(self._entry, self._setup)
+    def start_subprocess(self) -> Subprocess:
+        return Subprocess(self._entry, self._setup)
 
-    def question(self, lease: Lease) -> dict[str, Any]:
+    def request(self, lease: Lease) -> dict[str, Any]:
         return {"track": lease.track, "block": list(lease.block), "kind": lease.kind, "levels": block_level(lease.block.z, self._zmax).levels}
 
-    def commit(self, lease: Lease, answer: Message) -> JobResult:
+    def commit(self, lease: Lease, response: Message) -> JobResult:
         store = self._stores[lease.track]
-        names: list[list[int]] = answer.value["tiles"]
-        tiles = [StoredTile(layer, z, x, y, data) for (layer, z, x, y), data in zip(names, answer.blobs, strict=False)]
-        seam = answer.blobs[len(names)] if answer.value["seam"] else None
+        names: list[list[int]] = response.value["tiles"]
+        tiles = [StoredTile(layer, z, x, y, data) for (layer, z, x, y), data in zip(names, response.blobs, strict=False)]
+        seam = response.blobs[len(names)] if response.value["seam"] else None
         check_rendered(store.shape, lease.block, tiles, seam)
         stored = store.put_block(lease.block, lease.key, lease.content_version, tiles, seam)
-        with self._adding:
-            self.stats.update(answer.value.get("stats", {}))
+        with self._stats_lock:
+            self.stats.update(response.value.get("stats", {}))
         return JobResult(
             version=stored.version,
             empty=not tiles,
             tiles=len(tiles),
             base_tiles=sum(tile.layer == 0 and tile.z == self._zmax for tile in tiles),
             bytes=sum(len(tile.data) for tile in tiles),
-            seconds=float(answer.value["seconds"]),
+            seconds=float(response.value["seconds"]),
         )
 
     def close(self) -> None:

@@ -1,8 +1,7 @@
-"""Child processes: one long-lived child does what it is asked, one thing after another, and can take nothing down but itself."""
+"""Subprocesses: a long-lived process under a worker handles one request after another, under limits, and can crash without harm to its parent."""
 
-from map3d.subprocess.channel import Channel, Message
-from map3d.subprocess.handler import Tell, Work
+from map3d.subprocess.channel import Channel, Handler, Message, ReportProgress
 from map3d.subprocess.limits import Limits
-from map3d.subprocess.process import Child, Failure
+from map3d.subprocess.process import Failure, Subprocess
 
-__all__ = ["Channel", "Child", "Failure", "Limits", "Message", "Tell", "Work"]
+__all__ = ["Channel", "Failure", "Handler", "Limits", "Message", "ReportProgress", "Subprocess"]

@@ -1,4 +1,4 @@
-"""`python -m map3d.subprocess ENTRY READ_FD WRITE_FD PARENT_PID`: the child's side. Started by map3d.subprocess.Child and nothing else."""
+"""`python -m map3d.subprocess ENTRY READ_FD WRITE_FD PARENT_PID`: the subprocess's side. Only map3d.subprocess.Subprocess starts it."""
 
 import importlib
 import os
@@ -7,8 +7,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from map3d.subprocess.channel import Channel
-from map3d.subprocess.handler import Work
+from map3d.subprocess.channel import Channel, Handler
 from map3d.subprocess.limits import Limits, die_with_parent
 
 
@@ -26,32 +25,32 @@ def main() -> None:
 
 def _serve(channel: Channel, entry: str) -> None:
     first = channel.receive()
-    assert first is not None, "receive without a time limit always has a message"
+    assert first is not None, "receive without a timeout always returns a message"
     try:
         limits = Limits.from_json(first.value["limits"])
         applied = limits.apply()
-        work = _load(entry)(first.value["setup"])
+        handle = _load(entry)(first.value["setup"])
     except Exception as error:
         channel.send(_error(error))
         raise
     channel.send({"ready": applied})
     while True:
-        asked = channel.receive()
-        assert asked is not None, "receive without a time limit always has a message"
+        message = channel.receive()
+        assert message is not None, "receive without a timeout always returns a message"
         limits.renew()
         try:
-            answer, blobs = work(asked.value["question"], asked.blobs, lambda told: channel.send({"told": told}))
+            response, blobs = handle(message.value["request"], message.blobs, lambda progress: channel.send({"progress": progress}))
         except MemoryError:
             raise
         except Exception as error:
             channel.send(_error(error))
         else:
-            channel.send({"answer": answer}, blobs)
+            channel.send({"response": response}, blobs)
 
 
-def _load(entry: str) -> Callable[[dict[str, Any]], Work]:
+def _load(entry: str) -> Callable[[dict[str, Any]], Handler]:
     module, _, name = entry.partition(":")
-    function: Callable[[dict[str, Any]], Work] = getattr(importlib.import_module(module), name)
+    function: Callable[[dict[str, Any]], Handler] = getattr(importlib.import_module(module), name)
     return function
 
 

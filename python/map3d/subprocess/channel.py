@@ -1,7 +1,7 @@
-"""Messages between a parent and its child over pipes: a JSON object and any number of byte strings, each with its length before it.
+"""Messages between a process and its subprocess over pipes: a JSON object and any number of byte strings.
 
-On the wire: u32 length of the JSON text, u64 length of all byte strings together (little-endian), the JSON, the byte strings. Their single lengths
-are in the JSON under "blobs".
+On the wire: u32 length of the JSON text, u64 total length of the byte strings (both little-endian), the JSON text, the byte strings. The JSON lists
+the length of each byte string under "blobs".
 """
 
 import json
@@ -9,7 +9,7 @@ import os
 import select
 import struct
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Final, NamedTuple
 
 from map3d.errors import Corrupt
@@ -25,16 +25,23 @@ class Message(NamedTuple):
     blobs: list[bytes]
 
 
+ReportProgress = Callable[[Any], None]
+"""Sends a JSON value to the parent while a request is being handled."""
+
+Handler = Callable[[dict[str, Any], list[bytes], ReportProgress], tuple[dict[str, Any], Sequence[bytes]]]
+"""(request, its byte strings, report) → (response, its byte strings). The parent receives an exception as a `Failure`; the subprocess lives on."""
+
+
 class Channel:
-    """Both ends of a conversation. Not for several threads at once."""
+    """Sends and receives messages over two pipes. Not thread-safe."""
 
     def __init__(self, read_fd: int, write_fd: int) -> None:
-        """Takes over the two file descriptors."""
+        """Takes ownership of the two file descriptors."""
         self._read_fd, self._write_fd = read_fd, write_fd
-        self._have = bytearray()
+        self._buffer = bytearray()
 
     def send(self, value: dict[str, Any], blobs: Sequence[bytes] = ()) -> None:
-        """Blocks until all is written; raises BrokenPipeError when the other side is gone."""
+        """Blocks until the message is written; raises BrokenPipeError when the other side has closed its pipe."""
         text = json.dumps({**value, "blobs": [len(blob) for blob in blobs]}, ensure_ascii=False).encode("utf-8", "replace")
         for part in (_HEAD.pack(len(text), sum(map(len, blobs))) + text, *blobs):
             view = memoryview(part)
@@ -42,19 +49,20 @@ class Channel:
                 view = view[os.write(self._write_fd, view) :]
 
     def receive(self, timeout_s: float | None = None) -> Message | None:
-        """The next message, None when none is complete within the time; raises EOFError when the other side is gone, Corrupt on nonsense."""
+        """Returns the next message, None when no message is complete within the time. Raises EOFError when the other side has closed its pipe,
+        Corrupt for an invalid message."""
         end = None if timeout_s is None else time.monotonic() + timeout_s
         while True:
             message = self._take()
             if message is not None:
                 return message
-            left = None if end is None else max(end - time.monotonic(), 0.0)
-            if not select.select([self._read_fd], [], [], left)[0]:
+            remaining_s = None if end is None else max(end - time.monotonic(), 0.0)
+            if not select.select([self._read_fd], [], [], remaining_s)[0]:
                 return None
             data = os.read(self._read_fd, _READ_BYTES)
             if not data:
                 raise EOFError("the other side closed the pipe")
-            self._have += data
+            self._buffer += data
 
     def close(self) -> None:
         for fd in (self._read_fd, self._write_fd):
@@ -63,16 +71,16 @@ class Channel:
         self._read_fd = self._write_fd = -1
 
     def _take(self) -> Message | None:
-        if len(self._have) < _HEAD.size:
+        if len(self._buffer) < _HEAD.size:
             return None
-        json_bytes, blobs_bytes = _HEAD.unpack_from(self._have)
+        json_bytes, blobs_bytes = _HEAD.unpack_from(self._buffer)
         if json_bytes > MAX_JSON_BYTES or blobs_bytes > MAX_BLOBS_BYTES:
-            raise Corrupt(f"message of {json_bytes} + {blobs_bytes} bytes; at most {MAX_JSON_BYTES} + {MAX_BLOBS_BYTES} are taken")
+            raise Corrupt(f"message of {json_bytes} + {blobs_bytes} bytes: larger than the limit of {MAX_JSON_BYTES} + {MAX_BLOBS_BYTES}")
         end = _HEAD.size + json_bytes + blobs_bytes
-        if len(self._have) < end:
+        if len(self._buffer) < end:
             return None
-        whole = bytes(memoryview(self._have)[_HEAD.size : end])
-        del self._have[:end]
+        whole = bytes(memoryview(self._buffer)[_HEAD.size : end])
+        del self._buffer[:end]
         return _parse(whole[:json_bytes], memoryview(whole)[json_bytes:])
 
 
@@ -81,9 +89,9 @@ def _parse(text: bytes, rest: memoryview) -> Message:
         value = json.loads(text)
         lengths = value.pop("blobs")
         if sum(lengths) != len(rest) or any(length < 0 for length in lengths):
-            raise ValueError(f"byte strings of {lengths} in {len(rest)} bytes")
+            raise ValueError(f"byte strings of lengths {lengths} in {len(rest)} bytes")
     except (ValueError, AttributeError, KeyError, TypeError) as error:
-        raise Corrupt(f"message that is not one: {error}") from error
+        raise Corrupt(f"invalid message: {error}") from error
     blobs, at = [], 0
     for length in lengths:
         blobs.append(bytes(rest[at : at + length]))

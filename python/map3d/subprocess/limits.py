@@ -1,4 +1,4 @@
-"""Limits that a child puts on itself before it touches anything of a user's: memory, processor, files, network."""
+"""Limits that a subprocess sets on itself before it opens user data: memory, CPU time, open files, network."""
 
 import ctypes
 import math
@@ -17,7 +17,7 @@ _CLONE_NEWNET: Final = 0x40000000
 
 @dataclass(frozen=True)
 class Limits:
-    """None: unlimited. `wall_s` and `cpu_s` are for each question; `wall_s` is watched by the parent, the rest by the kernel."""
+    """None means unlimited. `wall_s` and `cpu_s` apply to each request. The parent enforces `wall_s`; the kernel enforces the others."""
 
     address_space_bytes: int | None = None
     cpu_s: int | None = None
@@ -33,7 +33,7 @@ class Limits:
         return cls(**value)
 
     def apply(self) -> dict[str, Any]:
-        """Limits this process for good; returns what could be done: {"network": "cut" | "open"}."""
+        """Sets the limits of this process, irrevocably. Returns {"network": "cut" | "open"}: "open" where the system does not allow cutting it."""
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         cut = not self.network and _cut_network()
         for what, value in ((resource.RLIMIT_AS, self.address_space_bytes), (resource.RLIMIT_NOFILE, self.open_files)):
@@ -42,7 +42,7 @@ class Limits:
         return {"network": "cut" if cut else "open"}
 
     def renew(self) -> None:
-        """Grants `cpu_s` of processor time from now on, for the next question."""
+        """Allows `cpu_s` of CPU time for the next request."""
         if self.cpu_s is not None:
             used = resource.getrusage(resource.RUSAGE_SELF)
             hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
@@ -51,7 +51,7 @@ class Limits:
 
 
 def die_with_parent(parent_pid: int) -> None:
-    """The kernel kills this process when its parent ends, however that ends (Linux)."""
+    """Asks the kernel to kill this process when its parent ends (Linux only)."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
     if os.getppid() != parent_pid:
@@ -65,7 +65,7 @@ def _lower(what: int, value: int) -> None:
 
 
 def _cut_network() -> bool:
-    """Leaves the network's namespace, as root at once, else through a user namespace; False where the system allows neither."""
+    """Leaves the network namespace: directly as root, else through a user namespace. Returns False where the system allows neither."""
     if sys.platform != "linux":
         return False
     unshare = ctypes.CDLL(None, use_errno=True).unshare

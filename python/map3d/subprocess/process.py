@@ -1,4 +1,4 @@
-"""A child process as its parent sees it: start it, ask it, know why it died."""
+"""The parent's side of a subprocess: starts it, sends requests, and explains why it ended."""
 
 import contextlib
 import fcntl
@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import IO, Any, Final
 
-from map3d.errors import ChildDied, ChildRefused, Corrupt, LimitExceeded
+from map3d.errors import Corrupt, LimitExceeded, SubprocessDied, SubprocessStartFailed, SubprocessTimedOut
 from map3d.subprocess.channel import Channel, Message
 from map3d.subprocess.limits import Limits
 
@@ -23,16 +23,16 @@ _ONE_THREAD: Final = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MALL
 
 @dataclass(frozen=True)
 class Failure:
-    """An exception in the child, which lives on: its class name and text."""
+    """An exception that the subprocess raised and survived: its class name and text."""
 
     kind: str
     message: str
 
 
-class Child:
-    """One long-lived child. `entry` ("module:function") names what it does: function(setup) → work; work(question, blobs, tell) → (answer, blobs).
+class Subprocess:
+    """A long-lived subprocess. `entry` ("module:function") names the function that takes `setup` and returns a `Handler`.
 
-    Not for several threads at once. The child dies when the thread that started it ends. Making one raises ChildDied when it is gone at once.
+    Not thread-safe. The subprocess dies when the thread that started it ends. The constructor raises SubprocessDied when it ends at once.
     """
 
     def __init__(self, entry: str, setup: Mapping[str, Any], *, limits: Limits | None = None, environment: Mapping[str, str] | None = None) -> None:
@@ -40,7 +40,7 @@ class Child:
         self._stderr: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 - closed by close()
         child_reads, parent_writes = os.pipe()
         parent_reads, child_writes = os.pipe()
-        _widen(child_writes)
+        _enlarge(child_writes)
         self._channel = Channel(parent_reads, parent_writes)
         try:
             self._process = subprocess.Popen(
@@ -56,8 +56,8 @@ class Child:
             os.close(child_reads)
             os.close(child_writes)
         try:
-            self._say({"setup": dict(setup), "limits": self.limits.to_json()})
-        except ChildDied:
+            self._send({"setup": dict(setup), "limits": self.limits.to_json()})
+        except SubprocessDied:
             self.close()
             raise
 
@@ -66,100 +66,104 @@ class Child:
         return self._process.pid
 
     def wait_ready(self, timeout_s: float) -> dict[str, Any]:
-        """What the child says when its entry has been called; raises ChildRefused when that fails, ChildDied when it ends or takes longer."""
-        message = self._hear(timeout_s)
+        """Waits until the entry function has returned; returns what `Limits.apply` returned in the subprocess.
+
+        Raises SubprocessStartFailed when the function raises, SubprocessDied when the subprocess ends, SubprocessTimedOut.
+        """
+        message = self._receive(timeout_s)
         if message is None:
             self.kill()
-            raise ChildDied(f"child was not ready within {timeout_s:g} s{self._tail()}")
+            raise SubprocessTimedOut(f"the subprocess was not ready within {timeout_s:g} s{self._last_output()}")
         if "ready" not in message.value:
             self.kill()
             failure = message.value.get("error", {})
-            raise ChildRefused(f"child could not start: {failure.get('kind')}: {failure.get('message')}")
+            raise SubprocessStartFailed(f"the subprocess could not start: {failure.get('kind')}: {failure.get('message')}")
         ready: dict[str, Any] = message.value["ready"]
         return ready
 
-    def ask(
-        self, question: Mapping[str, Any], *, wall_s: float | None, every_s: float = 1.0, meanwhile: Callable[[Any], None] | None = None
+    def request(
+        self, value: Mapping[str, Any], *, wall_s: float | None, every_s: float = 1.0, on_progress: Callable[[Any], None] | None = None
     ) -> Message | Failure:
-        """The child's answer, or the exception that it met.
+        """Sends a request and waits for the response, or for the exception that the handler raised.
 
-        `meanwhile` is called every `every_s` seconds with None, and with whatever the child tells on the way; when it raises, the child is killed
-        and the exception goes on. Raises ChildDied when the child ends, hangs beyond `wall_s` or talks nonsense, LimitExceeded when a limit ended it.
+        Calls `on_progress` with each progress report, and with None at least every `every_s` seconds. When it raises, the subprocess is killed and
+        the exception propagates. Raises SubprocessDied when the subprocess ends or sends an invalid message, SubprocessTimedOut after `wall_s`,
+        LimitExceeded when a limit ended it.
         """
-        self._say({"question": dict(question)})
+        self._send({"request": dict(value)})
         end = None if wall_s is None else time.monotonic() + wall_s
         try:
             while True:
-                left = every_s if end is None else min(every_s, max(end - time.monotonic(), 0.0))
-                message = self._hear(left)
+                wait_s = every_s if end is None else min(every_s, max(end - time.monotonic(), 0.0))
+                message = self._receive(wait_s)
                 if message is None and end is not None and time.monotonic() >= end:
-                    raise ChildDied(f"child gave no answer within {wall_s:g} s of wall time")
-                if message is None or "told" in message.value:
-                    if meanwhile is not None:
-                        meanwhile(None if message is None else message.value["told"])
+                    raise SubprocessTimedOut(f"the subprocess did not respond within {wall_s:g} s")
+                if message is None or "progress" in message.value:
+                    if on_progress is not None:
+                        on_progress(None if message is None else message.value["progress"])
                 elif "error" in message.value:
                     return Failure(str(message.value["error"].get("kind")), str(message.value["error"].get("message")))
                 else:
-                    return Message(message.value["answer"], message.blobs)
+                    return Message(message.value["response"], message.blobs)
         except BaseException:
             self.kill()
             raise
 
     def kill(self) -> None:
-        """Ends the child at once, whatever it does."""
+        """Ends the subprocess at once."""
         if self._process.poll() is None:
             self._process.kill()
         self._process.wait()
 
     def close(self) -> None:
-        """Ends the child and frees everything; it may be called twice."""
+        """Ends the subprocess and frees its resources; may be called twice."""
         self.kill()
         self._channel.close()
         self._stderr.close()
 
-    def _say(self, value: dict[str, Any]) -> None:
+    def _send(self, value: dict[str, Any]) -> None:
         try:
             self._channel.send(value)
         except BrokenPipeError as error:
-            raise self._obituary() from error
+            raise self._exit_error() from error
 
-    def _hear(self, timeout_s: float) -> Message | None:
+    def _receive(self, timeout_s: float) -> Message | None:
         try:
             message = self._channel.receive(timeout_s)
         except EOFError as error:
-            raise self._obituary() from error
+            raise self._exit_error() from error
         except Corrupt as error:
             self.kill()
-            raise ChildDied(f"child sent a {error}") from error
-        if message is not None and not {"ready", "told", "error", "answer"} & set(message.value):
+            raise SubprocessDied(f"the subprocess was killed: {error}") from error
+        if message is not None and not {"ready", "progress", "error", "response"} & set(message.value):
             self.kill()
-            raise ChildDied("child sent a message without meaning")
+            raise SubprocessDied(f"the subprocess was killed: message of unknown type with keys {sorted(message.value)[:5]}")
         return message
 
-    def _obituary(self) -> ChildDied | LimitExceeded:
+    def _exit_error(self) -> SubprocessDied | LimitExceeded:
         try:
             status = self._process.wait(timeout=5)
         except subprocess.TimeoutExpired:
             self.kill()
-            return ChildDied("child closed its pipe and went on; it was killed")
-        tail = self._tail()
+            return SubprocessDied("the subprocess was killed: it closed its pipe without ending")
+        output = self._last_output()
         if status == -signal.SIGXCPU:
-            return LimitExceeded(f"child used up its {self.limits.cpu_s} s of processor time")
-        if self.limits.address_space_bytes is not None and ("memory allocation of" in tail or "MemoryError" in tail):
-            return LimitExceeded(f"child met its limit of {self.limits.address_space_bytes >> 20} MiB of address space{tail}")
-        how = f"ended by {_signal_name(-status)}" if status < 0 else f"ended with exit status {status}"
-        return ChildDied(f"child {how} without an answer{tail}")
+            return LimitExceeded(f"the subprocess reached its limit of {self.limits.cpu_s} s of CPU time")
+        if self.limits.address_space_bytes is not None and ("memory allocation of" in output or "MemoryError" in output):
+            return LimitExceeded(f"the subprocess reached its limit of {self.limits.address_space_bytes >> 20} MiB of address space{output}")
+        how = f"was ended by {_signal_name(-status)}" if status < 0 else f"ended with exit status {status}"
+        return SubprocessDied(f"the subprocess {how} before it responded{output}")
 
-    def _tail(self) -> str:
-        """The last line that the child wrote to its error output, if any."""
+    def _last_output(self) -> str:
+        """Returns ": " and the last line that the subprocess printed, or an empty string."""
         size = self._stderr.seek(0, os.SEEK_END)
         self._stderr.seek(max(size - TAIL_BYTES, 0))
         lines = self._stderr.read().decode("utf-8", "replace").strip().splitlines()
         return f": {lines[-1].strip()}" if lines else ""
 
 
-def _widen(pipe: int) -> None:
-    """Blocks are some megabytes: fewer, larger reads. Where the system does not allow it, nothing is lost but speed."""
+def _enlarge(pipe: int) -> None:
+    """Enlarges the pipe's buffer where the system allows it: blocks are some megabytes, and larger reads are faster."""
     if hasattr(fcntl, "F_SETPIPE_SZ"):
         with contextlib.suppress(OSError):
             fcntl.fcntl(pipe, fcntl.F_SETPIPE_SZ, PIPE_BYTES)

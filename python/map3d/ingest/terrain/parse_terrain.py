@@ -13,26 +13,26 @@ from map3d.ingest.crs import LOCAL, is_local, parse_crs, scene_crs
 from map3d.ingest.crs_transformer import choose_target
 from map3d.ingest.terrain.raster_georeference import open_raster
 from map3d.ingest.terrain.terrain_import import TerrainOptions, import_terrain
-from map3d.subprocess import Tell, Work
+from map3d.subprocess import Handler, ReportProgress
 
 IMAGE_BANDS: Final = (3, 4)
 
 
-def open_terrain(_setup: Mapping[str, Any]) -> Work:
-    def work(question: dict[str, Any], _blobs: list[bytes], tell: Tell) -> tuple[dict[str, Any], list[bytes]]:
-        return _import(question, tell), []
+def open_terrain(_setup: Mapping[str, Any]) -> Handler:
+    def work(question: dict[str, Any], _blobs: list[bytes], report_progress: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
+        return _import(question, report_progress), []
 
     return work
 
 
-def _import(question: Mapping[str, Any], tell: Tell) -> dict[str, Any]:
+def _import(question: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
     """`question`: {"paths", "folder", "name", "crs", "scene_crs"}; see map3d.ingest.parse_document for the answer."""
     rasters, damaged = usable([Path(path) for path in question["paths"]], strict=question["reader"]["strict"])
     dem, ortho = tell_apart(rasters)
     target = _target(dem or ortho, question["scene_crs"])
 
     def progress(_stage: str, done: int, total: int) -> bool:
-        tell({"done": done, "total": total})
+        report_progress({"done": done, "total": total})
         return True
 
     report = import_terrain(dem, ortho, Path(question["folder"]), target, TerrainOptions(name=question["name"]), progress)
