@@ -1,4 +1,4 @@
-"""Laws that only hold when several processes fight for the same jobs."""
+"""Leases with several processes that compete for the same jobs."""
 
 import json
 import os
@@ -13,7 +13,7 @@ import pytest
 from map3d.catalogue import JobResult, PlannedJob, SceneRecord, State
 from map3d.catalogue.sqlite import SqliteCatalogue
 from map3d.types import BlockId
-from tests.catalogue.homes import rendering
+from tests.catalogue.implementations import rendering
 
 PROCESSES, JOBS = 4, 200
 
@@ -37,7 +37,7 @@ import sys, time
 from pathlib import Path
 from map3d.catalogue.sqlite import SqliteCatalogue
 
-from tests.catalogue.homes import rendering
+from tests.catalogue.implementations import rendering
 
 lease = SqliteCatalogue(Path(sys.argv[1]), lease_s=float(sys.argv[2])).lease("town-a", "held")
 print(lease.fence, flush=True)
@@ -65,7 +65,7 @@ def test_processes_never_lease_a_job_twice(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
-def test_a_job_of_a_dead_or_frozen_process_comes_back(tmp_path: Path, number: signal.Signals) -> None:
+def test_job_of_a_dead_or_suspended_process_is_leased_again(tmp_path: Path, number: signal.Signals) -> None:
     path = tmp_path / "catalogue.sqlite"
     catalogue = prepared(path, 1, lease_s=1)
     holder = subprocess.Popen([sys.executable, "-c", HOLD_ONE, str(path), "1"], stdout=subprocess.PIPE, text=True)

@@ -6,10 +6,10 @@ from collections.abc import Callable
 import pytest
 
 from map3d.catalogue import Catalogue, Job, JobResult, Lease, PlannedJob, State
-from map3d.catalogue.states import MAX_ATTEMPTS, TRANSITIONS, Event
+from map3d.catalogue.states import MAX_ATTEMPTS, TRANSITIONS, JobEvent
 from map3d.errors import StaleFence
 from map3d.types import BlockId
-from tests.catalogue.homes import LEASE_S
+from tests.catalogue.implementations import LEASE_S
 
 TOP = BlockId(0, 0, 0)
 RESULT = JobResult(version=1, empty=False, tiles=3, base_tiles=1, bytes=100, seconds=0.5)
@@ -45,7 +45,7 @@ def test_jobs_are_leased_in_morton_order_with_rising_fences(catalogue: Catalogue
     assert again.attempt == 1
 
 
-def test_a_reduce_job_waits_for_all_blocks_below(catalogue: Catalogue) -> None:
+def test_reduce_job_waits_for_all_blocks_below(catalogue: Catalogue) -> None:
     catalogue.plan("town-a", [reduce(), base(0), base(1)])
     first, second = take(catalogue), take(catalogue)
     assert catalogue.lease("town-a", "w") is None
@@ -55,7 +55,7 @@ def test_a_reduce_job_waits_for_all_blocks_below(catalogue: Catalogue) -> None:
     assert take(catalogue).block == TOP
 
 
-def test_a_quarantined_block_keeps_its_reduce_job_waiting(catalogue: Catalogue) -> None:
+def test_quarantined_block_keeps_its_reduce_job_waiting(catalogue: Catalogue) -> None:
     catalogue.plan("town-a", [reduce(), base(0)])
     for attempt in range(1, MAX_ATTEMPTS + 1):
         lease = take(catalogue)
@@ -68,7 +68,7 @@ def test_a_quarantined_block_keeps_its_reduce_job_waiting(catalogue: Catalogue) 
     assert (counts[State.WAITING], counts[State.QUARANTINED]) == (1, 1)
 
 
-def test_a_lease_goes_on_from_a_place_and_begins_again_at_the_first(catalogue: Catalogue) -> None:
+def test_lease_starts_at_a_morton_number_and_wraps_around(catalogue: Catalogue) -> None:
     catalogue.plan("town-a", [reduce(), *map(base, range(4))])
     third = 2
     taken = [catalogue.lease("town-a", "w", third) for _ in range(4)]
@@ -83,7 +83,7 @@ def test_a_lease_goes_on_from_a_place_and_begins_again_at_the_first(catalogue: C
     assert [lease.block.x for lease in after if lease is not None] == [3, 0, 1, 2], "what failed comes last"
 
 
-def test_retry_gives_a_quarantined_job_three_new_attempts(catalogue: Catalogue) -> None:
+def test_retry_allows_a_quarantined_job_three_more_attempts(catalogue: Catalogue) -> None:
     catalogue.plan("town-a", [base(0), base(1)])
     while (lease := catalogue.lease("town-a", "w")) is not None:
         catalogue.fail(lease, "bad")
@@ -100,7 +100,7 @@ def test_failed_jobs_go_to_the_end_of_the_queue(catalogue: Catalogue) -> None:
     assert take(catalogue).block.x == 0
 
 
-def test_a_killed_workers_job_comes_back(catalogue: Catalogue) -> None:
+def test_job_of_a_killed_worker_is_leased_again(catalogue: Catalogue) -> None:
     catalogue.plan("town-a", [base()])
     first = take(catalogue)
     assert catalogue.lease("town-a", "other") is None
@@ -111,7 +111,7 @@ def test_a_killed_workers_job_comes_back(catalogue: Catalogue) -> None:
 
 
 @pytest.mark.parametrize("word", ["heartbeat", "done", "fail", "release"])
-def test_a_stale_fence_is_refused(catalogue: Catalogue, word: str) -> None:
+def test_stale_fence_is_refused(catalogue: Catalogue, word: str) -> None:
     catalogue.plan("town-a", [base()])
     stale = take(catalogue)
     time.sleep(LEASE_S + 0.1)
@@ -124,7 +124,7 @@ def test_a_stale_fence_is_refused(catalogue: Catalogue, word: str) -> None:
 
 
 @pytest.mark.parametrize("word", ["heartbeat", "done", "fail", "release"])
-def test_a_lease_that_ran_out_is_refused_even_if_nobody_took_the_job(catalogue: Catalogue, word: str) -> None:
+def test_expired_lease_is_refused_even_when_the_job_is_free(catalogue: Catalogue, word: str) -> None:
     catalogue.plan("town-a", [base()])
     lease = take(catalogue)
     time.sleep(LEASE_S + 0.1)
@@ -132,7 +132,7 @@ def test_a_lease_that_ran_out_is_refused_even_if_nobody_took_the_job(catalogue: 
         say(catalogue, word, lease)
 
 
-def test_heartbeats_hold_a_lease(catalogue: Catalogue) -> None:
+def test_heartbeats_renew_a_lease(catalogue: Catalogue) -> None:
     catalogue.plan("town-a", [base()])
     lease = take(catalogue)
     for _ in range(6):
@@ -142,7 +142,7 @@ def test_heartbeats_hold_a_lease(catalogue: Catalogue) -> None:
     assert only(catalogue).state is State.DONE
 
 
-def test_a_lease_that_runs_out_thrice_quarantines(catalogue: Catalogue) -> None:
+def test_lease_that_expires_three_times_quarantines_the_job(catalogue: Catalogue) -> None:
     catalogue.plan("town-a", [base()])
     for _ in range(MAX_ATTEMPTS):
         take(catalogue)
@@ -151,13 +151,13 @@ def test_a_lease_that_runs_out_thrice_quarantines(catalogue: Catalogue) -> None:
     assert "lease expired" in (only(catalogue, State.QUARANTINED).reason or "")
 
 
-def test_what_a_done_job_left_is_kept(catalogue: Catalogue) -> None:
+def test_result_of_a_done_job_is_stored(catalogue: Catalogue) -> None:
     catalogue.plan("town-a", [base()])
     catalogue.done(take(catalogue), RESULT)
     assert only(catalogue).result == RESULT
 
 
-def test_only_changed_keys_open_jobs_again(catalogue: Catalogue) -> None:
+def test_only_changed_keys_reopen_jobs(catalogue: Catalogue) -> None:
     assert catalogue.plan("town-a", [base(0), base(1)]).added == 2
     for _ in range(2):
         catalogue.done(take(catalogue), RESULT)
@@ -169,7 +169,7 @@ def test_only_changed_keys_open_jobs_again(catalogue: Catalogue) -> None:
     assert (lease.block.x, lease.key, lease.attempt) == (0, "new", 1)
 
 
-def test_a_changed_key_makes_the_running_lease_stale(catalogue: Catalogue) -> None:
+def test_changed_key_makes_the_running_lease_stale(catalogue: Catalogue) -> None:
     catalogue.plan("town-a", [base(0)])
     lease = take(catalogue)
     catalogue.plan("town-a", [base(0, "new")])
@@ -177,7 +177,7 @@ def test_a_changed_key_makes_the_running_lease_stale(catalogue: Catalogue) -> No
         catalogue.done(lease, RESULT)
 
 
-def test_a_reduce_job_whose_key_changed_waits_again(catalogue: Catalogue) -> None:
+def test_reduce_job_with_a_changed_key_waits_again(catalogue: Catalogue) -> None:
     catalogue.plan("town-a", [reduce(), base(0), base(1)])
     while (lease := catalogue.lease("town-a", "w")) is not None:
         catalogue.done(lease, RESULT)
@@ -189,7 +189,7 @@ def test_a_reduce_job_whose_key_changed_waits_again(catalogue: Catalogue) -> Non
     assert take(catalogue).kind == "reduce"
 
 
-def test_a_reduce_job_over_done_blocks_opens_at_once(catalogue: Catalogue) -> None:
+def test_reduce_job_above_done_blocks_opens_at_once(catalogue: Catalogue) -> None:
     catalogue.plan("town-a", [reduce(), base(0)])
     while (lease := catalogue.lease("town-a", "w")) is not None:
         catalogue.done(lease, RESULT)
@@ -197,7 +197,7 @@ def test_a_reduce_job_over_done_blocks_opens_at_once(catalogue: Catalogue) -> No
     assert take(catalogue).kind == "reduce"
 
 
-def test_the_content_version_rises_once_it_was_announced(catalogue: Catalogue) -> None:
+def test_content_version_increases_after_it_was_announced(catalogue: Catalogue) -> None:
     catalogue.plan("town-a", [base(0)])
     catalogue.plan("town-a", [base(0, "k2")])
     assert catalogue.rendering("town-a").content_version == 1
@@ -211,10 +211,10 @@ def test_the_content_version_rises_once_it_was_announced(catalogue: Catalogue) -
     assert catalogue.rendering("town-a").content_version == 2
 
 
-def test_every_event_is_refused_in_the_states_the_table_does_not_list(open_home: Callable[..., Catalogue], catalogue: Catalogue) -> None:
-    """Brings a job into each state and says each word of a lease holder."""
-    words = {"heartbeat": Event.HEARTBEAT, "done": Event.DONE, "fail": Event.FAIL, "release": Event.RELEASE}
-    seen: dict[State, set[Event]] = {}
+def test_events_are_refused_in_states_that_the_table_does_not_list(open_catalogue: Callable[..., Catalogue], catalogue: Catalogue) -> None:
+    """Brings a job into each state and sends each event of a lease holder."""
+    words = {"heartbeat": JobEvent.HEARTBEAT, "done": JobEvent.DONE, "fail": JobEvent.FAIL, "release": JobEvent.RELEASE}
+    seen: dict[State, set[JobEvent]] = {}
     for x, state in enumerate((State.TODO, State.LEASED, State.DONE, State.QUARANTINED)):
         seen[state] = {event for n, (word, event) in enumerate(words.items()) if accepted(catalogue, 10 * x + n, state, word)}
     assert seen == {state: {event for event in words.values() if (state, event) in TRANSITIONS} for state in seen}

@@ -1,4 +1,4 @@
-"""Scenes, assets and renderings are kept as they were given."""
+"""Scenes, assets and renderings."""
 
 import dataclasses
 from collections.abc import Callable
@@ -10,17 +10,17 @@ from map3d.catalogue import AssetRecord, Catalogue, PlannedJob, SceneCrs, SceneR
 from map3d.catalogue.sqlite import SqliteCatalogue
 from map3d.errors import AlreadyExists, BadName, NotFound, StoreError, UnknownVersion
 from map3d.types import BlockId, Layer, Sun, ViewAngles
-from tests.catalogue.homes import rendering
+from tests.catalogue.implementations import rendering
 
 UTM = SceneCrs(25832, "PROJCRS[…]", "ETRS89 / UTM zone 32N", "DHHN2016 height")
 
 
-def test_what_is_kept_comes_back_equal(catalogue: Catalogue, open_home: Callable[..., Catalogue]) -> None:
+def test_records_round_trip(catalogue: Catalogue, open_catalogue: Callable[..., Catalogue]) -> None:
     scene = SceneRecord("b", "Title", "© someone", UTM, (691000.0, 5336000.125, 0.0), {"merge_faces": False}, "abc")
     asset = AssetRecord("b", "x", "/data/x.gml", "citygml", "d", "s", {"triangles": 5})
     catalogue.create_scene(scene)
     catalogue.put_asset(asset)
-    again = open_home()
+    again = open_catalogue()
     assert again.scene("b") == scene
     assert again.assets("b") == [asset]
     assert again.rendering("town-a") == rendering()
@@ -28,17 +28,17 @@ def test_what_is_kept_comes_back_equal(catalogue: Catalogue, open_home: Callable
     assert [kept.name for kept in again.renderings("b")] == []
 
 
-def test_names_are_taken_once(catalogue: Catalogue) -> None:
+def test_names_are_unique(catalogue: Catalogue) -> None:
     with pytest.raises(AlreadyExists, match="town"):
         catalogue.create_scene(SceneRecord("town"))
     with pytest.raises(AlreadyExists, match="--regrid"):
         catalogue.create_rendering(rendering())
 
 
-def test_what_is_not_there_is_named_with_what_is(catalogue: Catalogue) -> None:
-    with pytest.raises(NotFound, match="'twon'; there is town"):
+def test_unknown_name_lists_the_existing_ones(catalogue: Catalogue) -> None:
+    with pytest.raises(NotFound, match="'twon'; existing scenes: town"):
         catalogue.scene("twon")
-    with pytest.raises(NotFound, match="'x'; there is town-a"):
+    with pytest.raises(NotFound, match="'x'; existing renderings: town-a"):
         catalogue.rendering("x")
     with pytest.raises(NotFound):
         catalogue.create_rendering(dataclasses.replace(rendering("other"), scene="nowhere"))
@@ -56,20 +56,20 @@ def test_names_that_could_leave_the_workspace_are_refused(catalogue: Catalogue, 
         Workspace(tmp_path).scene_folder(name)
 
 
-def test_the_first_to_pin_a_scene_wins(catalogue: Catalogue) -> None:
+def test_first_caller_pins_the_scene(catalogue: Catalogue) -> None:
     assert catalogue.pin_scene("town", crs=UTM).crs == UTM
     assert catalogue.pin_scene("town", origin=(1.0, 2.0, 3.0)).origin == (1.0, 2.0, 3.0)
     other = catalogue.pin_scene("town", crs=SceneCrs(None, None, "local metres"), origin=(0.0, 0.0, 0.0))
     assert (other.crs, other.origin) == (UTM, (1.0, 2.0, 3.0))
 
 
-def test_an_asset_is_replaced_by_its_name(catalogue: Catalogue) -> None:
+def test_asset_with_the_same_name_is_replaced(catalogue: Catalogue) -> None:
     for digest in ("old", "new"):
         catalogue.put_asset(AssetRecord("town", "x", "", "obj", digest, ""))
     assert [asset.digest for asset in catalogue.assets("town")] == ["new"]
 
 
-def test_regrid_forgets_jobs_and_raises_the_version(catalogue: Catalogue) -> None:
+def test_regrid_removes_jobs_and_increments_the_version(catalogue: Catalogue) -> None:
     catalogue.plan("town-a", [PlannedJob("0-45", BlockId(0, 0, 0), "base", 0, "k", None)])
     stale = catalogue.lease("town-a", "w")
     assert stale is not None
@@ -84,7 +84,7 @@ def test_regrid_forgets_jobs_and_raises_the_version(catalogue: Catalogue) -> Non
     assert catalogue.count_jobs("town-a")[State.LEASED] == 1
 
 
-def test_a_view_that_is_added_leaves_jobs_and_views_as_they_are(catalogue: Catalogue) -> None:
+def test_added_view_keeps_jobs_and_other_views(catalogue: Catalogue) -> None:
     catalogue.plan("town-a", [PlannedJob("0-45", BlockId(0, 0, 0), "base", 0, "k", None)])
     before = catalogue.rendering("town-a")
     added = dataclasses.replace(before.frames[0], angles=ViewAngles(90, 45))
@@ -97,7 +97,7 @@ def test_a_view_that_is_added_leaves_jobs_and_views_as_they_are(catalogue: Catal
         catalogue.add_frames("other", [added])
 
 
-def test_layers_that_are_added_are_a_pass_of_their_own_and_leave_jobs_as_they_are(catalogue: Catalogue) -> None:
+def test_added_layers_are_a_new_pass_and_keep_jobs(catalogue: Catalogue) -> None:
     catalogue.plan("town-a", [PlannedJob("0-45", BlockId(0, 0, 0), "base", 0, "k", None)])
     before = catalogue.rendering("town-a")
     sun = Sun("2026-06-21T13:00:00Z", 196.2, 64.1, (-0.1, -0.4, 0.9))
@@ -113,7 +113,7 @@ def test_layers_that_are_added_are_a_pass_of_their_own_and_leave_jobs_as_they_ar
         catalogue.add_pass("other", added)
 
 
-def test_a_catalogue_of_another_version_is_refused_naming_both(tmp_path: Path) -> None:
+def test_catalogue_of_another_version_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "catalogue.sqlite"
     home = SqliteCatalogue(path)
     with home._database.transaction() as db:
@@ -123,13 +123,13 @@ def test_a_catalogue_of_another_version_is_refused_naming_both(tmp_path: Path) -
         SqliteCatalogue(path)
 
 
-def test_a_file_that_is_no_catalogue_is_refused(tmp_path: Path) -> None:
+def test_file_that_is_not_a_catalogue_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "catalogue.sqlite"
     path.write_bytes(b"not a database at all" * 100)
     with pytest.raises(StoreError, match=r"catalogue\.sqlite"):
         SqliteCatalogue(path)
 
 
-def test_no_workspace_says_what_to_do(tmp_path: Path) -> None:
+def test_missing_workspace_says_what_to_do(tmp_path: Path) -> None:
     with pytest.raises(NotFound, match="create-scene"):
         Workspace(tmp_path / "nowhere").open_catalogue()

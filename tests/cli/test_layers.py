@@ -67,23 +67,23 @@ def test_a_second_layer_of_a_kind_has_another_name_and_comes_in_another_pass(tow
     ("options", "says"),
     [
         (("--layers", "sun"), "--time 2026"),
-        (("--layers", "sun", "--time", "2026-06-21T15:00", *PLACE), "which zone"),
+        (("--layers", "sun", "--time", "2026-06-21T15:00", *PLACE), "missing time zone"),
         (("--layers", "sun", "--time", "yesterday"), "not a date and time"),
-        (("--layers", "sun", *TIME), "local metres"),
+        (("--layers", "sun", *TIME), "has local coordinates"),
         (("--layers", "sun", "--time", "2026-12-21T02:00+01:00", *PLACE), "below the horizon"),
         (("--layers", "sun", *TIME, "--place", "48.76"), "not LATITUDE,LONGITUDE"),
         (("--layers", "sun", "--sun", "high"), "not AZIMUTH,ELEVATION"),
         (("--layers", "sun16", *PLACE), "--date 2026"),
         (("--layers", "sun16", *PLACE, "--date", "21.6.2026"), "not a date"),
         (("--layers", "ao", "--ao-radius", "300"), "0.5"),
-        (("--layers", "depth2", *TIME), "none of them is asked for"),
+        (("--layers", "depth2", *TIME), "add such a layer to --layers"),
         (("--layers", "moonlight"), "sun, sun16, ao, depth2, picture"),
-        (("--layers", "a=sun,b=sun", *TIME, *PLACE), "each name and kind once"),
+        (("--layers", "a=sun,b=sun", *TIME, *PLACE), "each name and kind only once"),
         (("--layers", "A=ao",), "layer name 'A'"),
         ((), "--layers"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_meant_is_refused_and_changes_nothing(town: Run, options: tuple[str, ...], says: str) -> None:
+def test_invalid_layers_are_refused_and_change_nothing(town: Run, options: tuple[str, ...], says: str) -> None:
     before = passes(town, "view")
     for verb in (("add-layers", "view"), *((NEW,) if options else ())):
         status, out, err = town(*verb, *options)

@@ -84,7 +84,7 @@ def test_scenes_are_made_and_shown(run: Run) -> None:
 def test_what_is_not_there_is_named_with_what_is(run: Run) -> None:
     run("create-scene", "town")
     status, _, err = run("show", "scene", "twon")
-    assert (status, "there is town" in err) == (2, True)
+    assert (status, "existing scenes: town" in err) == (2, True)
     for arguments in (("render", "x"), ("estimate", "x"), ("retry", "x"), ("verify", "x"), ("show", "jobs", "x"), ("show", "quarantine", "x")):
         status, _, err = run(*arguments)
         assert (status, "no rendering 'x'" in err) == (2, True), arguments

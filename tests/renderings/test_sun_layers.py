@@ -1,4 +1,4 @@
-"""What layers of light are asked for and become: directions in the scene's own axes, whatever its coordinate system."""
+"""Requests for sun and ambient occlusion layers, and the sun directions in the axes of various coordinate systems."""
 
 import itertools
 import math
@@ -13,7 +13,7 @@ from map3d.catalogue import SceneCrs, SceneRecord
 from map3d.errors import BadRequest
 from map3d.geometry.sun import Place, SunAngles, sun_angles
 from map3d.ingest.crs import LOCAL, parse_crs, scene_crs
-from map3d.renderings.grid_north import Grid
+from map3d.renderings.grid_north import GridNorth
 from map3d.renderings.layers import LayerRequest
 from map3d.renderings.sun_layers import LightRequest
 from map3d.types import Box, Layer, Sun
@@ -25,7 +25,7 @@ LOCAL_SCENE = SceneRecord("town", crs=LOCAL, origin=(0.0, 0.0, 0.0))
 
 
 def scene_at(code: str, longitude_deg: float, latitude_deg: float) -> SceneRecord:
-    """Its box's middle lies there."""
+    """Returns a scene whose box is centred there."""
     crs = parse_crs(code)
     x, y = Transformer.from_crs("EPSG:4326", crs, always_xy=True).transform(longitude_deg, latitude_deg)
     return SceneRecord("town", crs=scene_crs(crs), origin=(x - 100.0, y - 100.0, 0.0))
@@ -49,15 +49,15 @@ def sun_of(scene: SceneRecord, light: LightRequest) -> Sun:
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("azimuth_deg", [0.0, 37.0, 180.0, 271.5])
-def test_directions_of_a_conformal_grid_are_turned_by_its_meridian_convergence(
+def test_azimuths_in_a_conformal_grid_differ_by_the_meridian_convergence(
     code: str, longitude_deg: float, latitude_deg: float, azimuth_deg: float
 ) -> None:
     scene = scene_at(code, longitude_deg, latitude_deg)
-    turned_deg = Proj(CRS(code).to_2d() if "+" not in code else CRS("EPSG:25832")).get_factors(longitude_deg, latitude_deg).meridian_convergence
+    convergence_deg = Proj(CRS(code).to_2d() if "+" not in code else CRS("EPSG:25832")).get_factors(longitude_deg, latitude_deg).meridian_convergence
     direction = sun_of(scene, LightRequest(sun=SunAngles(azimuth_deg, 30.0))).direction
-    a, e = math.radians(azimuth_deg - turned_deg), math.radians(30.0)
+    a, e = math.radians(azimuth_deg - convergence_deg), math.radians(30.0)
     assert direction == pytest.approx((math.sin(a) * math.cos(e), math.cos(a) * math.cos(e), math.sin(e)), abs=5e-5), (
-        "datums are turned by some seconds"
+        "datums differ by some arc seconds"
     )
 
 
@@ -69,7 +69,7 @@ def test_directions_of_a_conformal_grid_are_turned_by_its_meridian_convergence(
     ],
 )  # fmt: skip
 def test_shadows_fall_along_the_geodesic_away_from_the_sun(code: str, longitude_deg: float, latitude_deg: float) -> None:
-    """Where a mast's shadow ends on the ground is found on the earth, then in the grid: also where angles are not kept, or axes point south."""
+    """Computes the tip of a mast's shadow on the ellipsoid and projects it: also where angles are distorted or axes point south."""
     scene = scene_at(code, longitude_deg, latitude_deg)
     sun = sun_of(scene, LightRequest(sun=SunAngles(123.0, 40.0)))
     to_grid = Transformer.from_crs("EPSG:4326", code, always_xy=True)
@@ -80,28 +80,28 @@ def test_shadows_fall_along_the_geodesic_away_from_the_sun(code: str, longitude_
     assert np.linalg.norm(sun.direction) == pytest.approx(1.0, abs=1e-12)
 
 
-def test_where_axes_point_south_and_west_noon_comes_from_behind() -> None:
-    """Cape Town in Lo19: x grows to the west, y to the south; the sun of noon stands in the north."""
+def test_noon_sun_is_in_the_north_of_cape_town_where_axes_point_south_and_west() -> None:
+    """In Lo19, x grows to the west and y to the south."""
     sun = sun_of(scene_at("EPSG:2048", 18.4, -33.9), LightRequest(time=datetime(2026, 6, 21, 10, 48, tzinfo=UTC)))
     assert sun.azimuth_deg == pytest.approx(0.0, abs=1.0) or sun.azimuth_deg == pytest.approx(360.0, abs=1.0)
     assert sun.direction[1] < -0.8
 
 
-def test_a_time_is_looked_up_where_the_scenes_middle_lies() -> None:
+def test_sun_position_is_that_of_the_scene_centre() -> None:
     sun = sun_of(scene_at("EPSG:25832", 15.9, 48.2), LightRequest(time=TIME.replace(microsecond=999_999)))
     expected = sun_angles(Place(48.2, 15.9), TIME)
     assert (sun.time, sun.azimuth_deg, sun.elevation_deg) == ("2026-06-21T13:00:00Z", *map(pytest.approx, expected))
     assert math.degrees(math.asin(sun.direction[2])) == pytest.approx(sun.elevation_deg)
 
 
-def test_a_scene_in_local_metres_has_its_north_along_y() -> None:
+def test_local_scene_has_north_along_y() -> None:
     sun = sun_of(LOCAL_SCENE, LightRequest(time=TIME, place=Place(48.2, 15.9)))
     a, e = map(math.radians, sun_angles(Place(48.2, 15.9), TIME))
     assert sun.direction == pytest.approx((math.sin(a) * math.cos(e), math.cos(a) * math.cos(e), math.sin(e)))
     assert sun_of(LOCAL_SCENE, LightRequest(sun=SunAngles(90.0, 45.0))) == Sun(None, 90.0, 45.0, pytest.approx((0.5**0.5, 0.0, 0.5**0.5), abs=1e-12))
 
 
-def test_a_day_has_sixteen_suns_with_their_times() -> None:
+def test_day_has_sixteen_suns_with_their_times() -> None:
     suns = only(LayerRequest(("sun16",), light=LightRequest(day=DAY)).layers(scene_at("EPSG:25832", 11.4, 48.7), BOX)).suns
     assert [sun.time for sun in suns] == [f"2026-06-21T{hour:02}:00:00Z" for hour in range(4, 20)]
     heights = [sun.elevation_deg for sun in suns]
@@ -109,7 +109,7 @@ def test_a_day_has_sixteen_suns_with_their_times() -> None:
     assert all(later.azimuth_deg > sun.azimuth_deg for sun, later in itertools.pairwise(suns))
 
 
-def test_a_night_is_part_of_a_day_but_lights_no_layer_alone() -> None:
+def test_sun_below_the_horizon_is_part_of_a_day_but_refused_as_a_single_sun() -> None:
     scene = scene_at("EPSG:25833", 20.0, 68.0)
     suns = only(LayerRequest(("sun16",), light=LightRequest(day=date(2026, 12, 21))).layers(scene, BOX)).suns
     assert all(sun.elevation_deg < 0 for sun in suns)
@@ -117,7 +117,7 @@ def test_a_night_is_part_of_a_day_but_lights_no_layer_alone() -> None:
         sun_of(scene, LightRequest(time=datetime(2026, 12, 21, 11, tzinfo=UTC)))
 
 
-def test_a_request_has_what_its_kinds_need_and_keeps_their_order() -> None:
+def test_layers_have_the_parameters_of_their_kinds_in_the_order_of_kinds() -> None:
     light = LightRequest(time=TIME, day=DAY, radius_m=7.5, place=Place(48.0, 11.0))
     names = ("picture", "depth2", "behind=depth", "ao", "hours=sun16", "noon=sun", "color")
     layers = LayerRequest(names, "jpeg", 70, light).layers(LOCAL_SCENE, BOX)
@@ -156,19 +156,19 @@ def test_a_request_has_what_its_kinds_need_and_keeps_their_order() -> None:
         (("ao",), LightRequest(radius_m=math.nan), "0.5 to 200"),
     ],
 )
-def test_what_is_missing_or_of_no_use_is_refused(names: tuple[str, ...], light: LightRequest, says: str) -> None:
+def test_missing_or_unused_options_are_refused(names: tuple[str, ...], light: LightRequest, says: str) -> None:
     with pytest.raises(BadRequest, match=says):
         LayerRequest(names, light=light).layers(LOCAL_SCENE, BOX)
 
 
-def test_a_place_beside_a_coordinate_system_is_refused() -> None:
+def test_place_for_a_located_scene_is_refused() -> None:
     with pytest.raises(BadRequest, match="leave --place out"):
         sun_of(scene_at("EPSG:25832", 9.0, 48.0), LightRequest(time=TIME, place=Place(48.0, 9.0)))
 
 
-def test_a_point_that_a_system_does_not_have_is_refused() -> None:
+def test_point_outside_the_coordinate_system_is_refused() -> None:
     with pytest.raises(BadRequest, match="no point"):
-        Grid(CRS("EPSG:25832").to_wkt(), 1e9, 1e9)
+        GridNorth(CRS("EPSG:25832").to_wkt(), 1e9, 1e9)
     lost = replace(LOCAL_SCENE, crs=SceneCrs(25832, CRS("EPSG:25832").to_wkt(), "ETRS89 / UTM zone 32N"), origin=(1e9, 1e9, 0.0))
     with pytest.raises(BadRequest, match="no point"):
         sun_of(lost, LightRequest(time=TIME))

@@ -1,4 +1,4 @@
-"""The catalogue: scenes, assets, renderings and jobs (spec/catalogue.md). One contract, homes beside it."""
+"""The catalogue: scenes, assets, renderings and jobs (spec/catalogue.md). One contract with one or more implementations."""
 
 from map3d.catalogue.contract import HEARTBEAT_S, LEASE_S, Catalogue
 from map3d.catalogue.records import (

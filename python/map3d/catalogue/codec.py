@@ -1,4 +1,4 @@
-"""Records as rows and JSON text, and back. Shared by the homes."""
+"""Converts records to rows and JSON text, and back; shared by all implementations of the catalogue."""
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
@@ -10,7 +10,7 @@ from map3d.geometry.frames import PinnedFrame
 from map3d.types import Box, Layer, Vec3, ViewAngles
 
 RowLike = Mapping[str, Any] | Any
-"""Something indexed by column name."""
+"""A row, indexed by column name."""
 
 
 def dump_crs(crs: SceneCrs | None) -> str | None:
@@ -75,7 +75,7 @@ def load_rendering(row: RowLike) -> RenderingRecord:
 
 
 def load_frame(value: Mapping[str, Any]) -> PinnedFrame:
-    """The inverse of `PinnedFrame.to_json`; its layers are those of the rendering's passes."""
+    """Reverses `PinnedFrame.to_json`; the layers come from the rendering's passes."""
     numbers = {name: value[name] for name in ("u0_m", "v0_m", "d0_m", "size_m", "tile_px", "zmax")}
     return PinnedFrame(angles=ViewAngles(value["look_at_deg"], value["pitch_deg"]), **numbers)
 

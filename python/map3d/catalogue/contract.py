@@ -1,4 +1,4 @@
-"""The contract of catalogues: scenes, assets, renderings, jobs (spec/catalogue.md). The tests in tests/catalogue run on every home."""
+"""The contract of catalogues: scenes, assets, renderings, jobs (spec/catalogue.md). tests/catalogue checks every implementation."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Protocol
@@ -13,10 +13,10 @@ HEARTBEAT_S = 15.0
 
 
 class Catalogue(Protocol):
-    """Safe to share between threads and between processes. Time is the database's."""
+    """Safe to share between threads and between processes. All times are on the database's clock."""
 
     lease_s: float
-    """For how long a lease or heartbeat holds."""
+    """Seconds after which a lease expires unless a heartbeat renews it."""
 
     def close(self) -> None: ...
 
@@ -26,80 +26,80 @@ class Catalogue(Protocol):
         """Raises AlreadyExists."""
 
     def scene(self, name: str) -> SceneRecord:
-        """Raises NotFound, naming the scenes there are."""
+        """Returns the scene. Raises NotFound, naming the existing scenes."""
 
     def scenes(self) -> list[SceneRecord]:
-        """By name."""
+        """Returns all scenes, ordered by name."""
 
     def pin_scene(self, name: str, crs: SceneCrs | None = None, origin: Vec3 | None = None) -> SceneRecord:
-        """Sets what is still None and returns what then holds: the first to pin wins. The same system with its vertical part named counts as new
-        as long as the scene has no asset."""
+        """Sets `crs` and `origin` where they are still None, and returns the scene: the first caller wins. While the scene has no asset, the same
+        coordinate system with a vertical part replaces one without."""
 
-    def set_built(self, name: str, fingerprint: str) -> None: ...
+    def set_built(self, name: str, digest: str) -> None: ...
 
     def put_asset(self, asset: AssetRecord) -> None:
-        """Adds an asset or replaces the one of that name."""
+        """Adds an asset, or replaces the asset with the same name."""
 
     def assets(self, scene: str) -> list[AssetRecord]:
-        """By name."""
+        """Returns the assets of a scene, ordered by name."""
 
     # -- renderings -------------------------------------------------------------------------------------------------------------
 
     def create_rendering(self, rendering: RenderingRecord) -> None:
-        """Raises AlreadyExists, NotFound (the scene)."""
+        """Raises AlreadyExists, or NotFound when the scene does not exist."""
 
     def rendering(self, name: str) -> RenderingRecord:
-        """Raises NotFound, naming the renderings there are."""
+        """Returns the rendering. Raises NotFound, naming the existing renderings."""
 
     def renderings(self, scene: str | None = None) -> list[RenderingRecord]:
-        """By name."""
+        """Returns the renderings of a scene, or all of them, ordered by name."""
 
     def regrid(self, rendering: RenderingRecord) -> RenderingRecord:
-        """Puts `rendering` (pinned anew) in place of the one of its name: no jobs, content version one up; returns it as kept."""
+        """Replaces the rendering with the same name, removes its jobs and increments its content version; returns the stored record."""
 
     def add_frames(self, name: str, frames: Sequence[PinnedFrame]) -> RenderingRecord:
-        """Adds views to a rendering and returns it as kept; its jobs stay. Raises NotFound, AlreadyExists for a view that it has."""
+        """Adds views to a rendering and returns the stored record; its jobs stay. Raises NotFound, AlreadyExists for an existing view."""
 
     def add_pass(self, name: str, layers: Sequence[Layer]) -> RenderingRecord:
-        """Adds layers to a rendering, as a pass of their own, and returns it as kept; its jobs stay. Raises NotFound, AlreadyExists for a name that
-        it has."""
+        """Adds layers to a rendering as a new pass and returns the stored record; its jobs stay. Raises NotFound, AlreadyExists for an existing
+        name."""
 
     def announce(self, name: str, version: int) -> None:
-        """A manifest of this content version may have been seen by clients."""
+        """Records that clients may have seen a manifest with this content version."""
 
     # -- jobs -------------------------------------------------------------------------------------------------------------------
 
     def plan(self, rendering: str, jobs: Iterable[PlannedJob]) -> PlanCounts:
-        """Adds jobs, reopens those whose key changed, keeps the rest; all in one transaction.
+        """Adds jobs, reopens those whose key changed, and leaves the others, in one transaction.
 
-        A base job opens as todo; a reduce job as waiting, or todo when all blocks below are done. If jobs are open afterwards and the content
-        version has been announced, it is raised by one.
+        A base job opens as todo; a reduce job as waiting, or as todo when all blocks below are done. Increments the content version when jobs are
+        open afterwards and the version has been announced.
         """
 
     def lease(self, rendering: str, worker: str, start: int = 0) -> Lease | None:
-        """Takes the next job, in one atomic statement; None when there is none to take now. Expired leases are given back first.
+        """Leases the next job in one atomic statement, after expiring overdue leases. Returns None when no job is available now.
 
-        By fewest attempts, level, track; among these the first at or behind Morton number `start`, else the first of all: so a worker can stay where
-        it is.
+        The order is: fewest attempts, lowest level, first track; among these the first job with Morton number `start` or greater, else the first.
+        A worker passes the number of its last block to stay in the same region.
         """
 
     def heartbeat(self, lease: Lease) -> None:
-        """Holds the lease for another `lease_s`; raises StaleFence."""
+        """Renews the lease for another `lease_s`; raises StaleFence."""
 
     def done(self, lease: Lease, result: JobResult) -> None:
-        """Raises StaleFence. Wakes the reduce job above when it was the last one below it."""
+        """Marks the job as done, and opens the reduce job above when all blocks below it are done; raises StaleFence."""
 
     def fail(self, lease: Lease, reason: str) -> State:
-        """Raises StaleFence. Returns todo, or quarantined after the third attempt."""
+        """Returns the new state: todo, or quarantined after the third attempt. Raises StaleFence."""
 
     def release(self, lease: Lease) -> None:
-        """Gives a job back that was not tried to its end (the worker stops): its attempt does not count. Raises StaleFence."""
+        """Releases a job whose worker stops before finishing it; the attempt does not count. Raises StaleFence."""
 
     def retry(self, rendering: str, blocks: Iterable[tuple[str, BlockId]] | None = None) -> int:
-        """Quarantined jobs (all, or those of these tracks and blocks) become todo with no attempts; returns how many."""
+        """Reopens quarantined jobs (all, or those of these tracks and blocks) with no attempts; returns their number."""
 
     def jobs(self, rendering: str, track: str | None = None, state: State | None = None) -> Iterator[Job]:
-        """By track, level, Morton order."""
+        """Returns the jobs, ordered by track, level and Morton number."""
 
     def count_jobs(self, rendering: str) -> dict[State, int]:
-        """All states, also those with none. Expired leases count as what they became."""
+        """Returns the number of jobs in every state, after expiring overdue leases."""

@@ -1,4 +1,4 @@
-"""What the catalogue keeps, as plain values."""
+"""The records of the catalogue, as plain values."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,7 +16,7 @@ WINDOW = "window"
 
 @dataclass(frozen=True)
 class SceneCrs:
-    """A scene's coordinate system as the manifest names it. A local one has neither code nor WKT."""
+    """A scene's coordinate system as the manifest states it. A local system has neither EPSG code nor WKT."""
 
     epsg: int | None
     wkt: str | None
@@ -30,9 +30,9 @@ class SceneCrs:
 
 @dataclass(frozen=True)
 class SceneRecord:
-    """`crs` and `origin` are None until pinned by `create-scene --crs` or the first asset; then they never change.
+    """`crs` and `origin` are None until `create-scene --crs` or the first asset pins them; afterwards they never change.
 
-    `built` is the fingerprint of what the scene index was built from, None before the first build.
+    `built` is the digest of everything that the last build depended on, None before the first build.
     """
 
     name: str
@@ -46,7 +46,7 @@ class SceneRecord:
 
 @dataclass(frozen=True)
 class AssetRecord:
-    """One source document after import. `digest` covers the imported asset, `source_digest` the files it was made from."""
+    """One imported source document. `digest` covers the imported asset, `source_digest` its source files."""
 
     scene: str
     name: str
@@ -59,7 +59,7 @@ class AssetRecord:
 
 @dataclass(frozen=True)
 class Track:
-    """One pass of one view (spec/pyramid.md §8), with jobs, a tile store and block versions of its own. In the store `layers` are numbered from 0."""
+    """One pass of one view (spec/pyramid.md §8), with its own jobs, tile store and block versions. The store numbers `layers` from 0."""
 
     frame: PinnedFrame
     number: int
@@ -72,11 +72,13 @@ class Track:
 
 @dataclass(frozen=True)
 class RenderingRecord:
-    """A scene seen. `box` is the scene's local box that the frames were pinned from. All frames share size, levels and tile size.
+    """Views, layers and resolution of a scene. `box`: the scene's local box from which the frames were pinned. All frames share size, levels and tile
+    size.
 
-    `passes`: the layers made with the rendering, then those of each time that some were added; no name twice.
+    `passes`: the original layers, then the layers of each later addition; names are unique.
 
-    `content_version` is that of the next tiles to change; `announced_version` the last one that a manifest told clients of, 0 before the first.
+    `content_version`: version of the next tiles to change. `announced_version`: the last version that a manifest announced to clients, 0 before the
+    first.
     """
 
     name: str
@@ -93,12 +95,12 @@ class RenderingRecord:
 
     @property
     def layers(self) -> tuple[Layer, ...]:
-        """Of all passes."""
+        """Returns the layers of all passes."""
         return tuple(layer for layers in self.passes for layer in layers)
 
     @property
     def tracks(self) -> tuple[Track, ...]:
-        """Every pass of every view, the passes of a view after one another."""
+        """Returns every pass of every view; the passes of one view are consecutive."""
         return tuple(track for frame in self.frames for track in self.tracks_of(frame))
 
     def tracks_of(self, frame: PinnedFrame) -> tuple[Track, ...]:
@@ -118,7 +120,7 @@ class RenderingRecord:
 
     @property
     def window(self) -> Window | None:
-        """What the frames were pinned to instead of all of `box`; kept among the options."""
+        """Returns the window that the frames were pinned to instead of all of `box`; it is stored in `options`."""
         return Window(**self.options[WINDOW]) if WINDOW in self.options else None
 
     def frame(self, view: str) -> PinnedFrame | None:
@@ -127,8 +129,8 @@ class RenderingRecord:
 
 @dataclass(frozen=True)
 class PlannedJob:
-    """A block that should be there. `order` is the root's Morton number, `parent` the reduce block that takes its seam (None at the top),
-    `key` says what its bytes depend on."""
+    """A block that should exist. `order`: Morton number of its root tile. `parent`: the reduce block that takes its seam, None at the top.
+    `key`: hash of everything that its bytes depend on."""
 
     track: str
     block: BlockId
@@ -140,7 +142,7 @@ class PlannedJob:
 
 @dataclass(frozen=True)
 class PlanCounts:
-    """Counts of jobs by what planning did to them."""
+    """The number of jobs that planning added, changed or kept."""
 
     added: int = 0
     changed: int = 0
@@ -149,8 +151,8 @@ class PlanCounts:
 
 @dataclass(frozen=True)
 class JobResult:
-    """What a done job leaves in the catalogue. `version`: the content version in which the block's bytes last changed; `tiles`: of all layers,
-    `base_tiles`: of one layer at level zmax; `bytes`: encoded; `seconds`: what the child needed."""
+    """The result of a done job. `version`: the content version in which the block's bytes last changed; `tiles`: number of tiles of all layers;
+    `base_tiles`: of one layer at level zmax; `bytes`: encoded size; `seconds`: time that the subprocess took."""
 
     version: int
     empty: bool
@@ -162,7 +164,7 @@ class JobResult:
 
 @dataclass(frozen=True)
 class Job:
-    """A job as it stands. `expires_s` is on the database's clock; `result` only when done once."""
+    """The current state of a job. `expires_s` is on the database's clock; `result` is None until the job was done once."""
 
     rendering: str
     track: str
@@ -180,7 +182,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Lease:
-    """A worker's claim. Every later word about the job carries `fence`; `content_version` is what changed tiles are to be stamped with."""
+    """A worker's claim on a job. Every later call about the job passes `fence`; changed tiles get `content_version`."""
 
     rendering: str
     track: str

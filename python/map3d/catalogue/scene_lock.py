@@ -1,4 +1,4 @@
-"""One process at a time changes a scene."""
+"""The lock of a scene: only one process at a time changes it."""
 
 import fcntl
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ from map3d.catalogue import Workspace
 
 @contextmanager
 def scene_lock(workspace: Workspace, scene: str) -> Iterator[None]:
-    """Held while a scene's assets, registry or built files are changed; the kernel lets go of it when the process ends."""
+    """Locks the scene while its assets, registry or built files change; the kernel releases the lock when the process ends."""
     folder = workspace.scene_folder(scene)
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / ".lock").open("w") as file:

@@ -32,7 +32,7 @@ CREATE TABLE rendering(name TEXT PRIMARY KEY, scene TEXT NOT NULL REFERENCES sce
 
 
 class SqliteCatalogue(SqliteJobs):
-    """A `Catalogue`; the file is made if it is not there."""
+    """Implements `Catalogue`; creates the file when it does not exist."""
 
     def __init__(self, path: Path, *, lease_s: float = LEASE_S) -> None:
         super().__init__(Database(path, _SCHEMA, VERSION), lease_s)
@@ -72,9 +72,9 @@ class SqliteCatalogue(SqliteJobs):
             db.execute("UPDATE scene SET crs = ?, origin = ? WHERE name = ?", values)
             return _scene(db, name)
 
-    def set_built(self, name: str, fingerprint: str) -> None:
+    def set_built(self, name: str, digest: str) -> None:
         with self._database.transaction() as db:
-            db.execute("UPDATE scene SET built = ? WHERE name = ?", (fingerprint, name))
+            db.execute("UPDATE scene SET built = ? WHERE name = ?", (digest, name))
 
     def put_asset(self, asset: AssetRecord) -> None:
         check_name(asset.name, "asset")
@@ -94,7 +94,7 @@ class SqliteCatalogue(SqliteJobs):
             _scene(db, rendering.scene)
             row = codec.dump_rendering(rendering)
             if db.execute("INSERT OR IGNORE INTO rendering VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", row).rowcount == 0:
-                raise AlreadyExists(f"rendering {rendering.name}: exists already; choose another name, or give --regrid to pin it anew")
+                raise AlreadyExists(f"rendering {rendering.name}: exists already; choose another name, or use --regrid to replace its frames")
 
     def rendering(self, name: str) -> RenderingRecord:
         with self._database.reading() as db:
@@ -117,8 +117,8 @@ class SqliteCatalogue(SqliteJobs):
     def add_frames(self, name: str, frames: Sequence[PinnedFrame]) -> RenderingRecord:
         with self._database.transaction() as db:
             before = _rendering(db, name)
-            if known := {frame.id for frame in before.frames} & {frame.id for frame in frames}:
-                raise AlreadyExists(f"rendering {name}: has the view {', '.join(sorted(known))} already")
+            if duplicates := {frame.id for frame in before.frames} & {frame.id for frame in frames}:
+                raise AlreadyExists(f"rendering {name}: view {', '.join(sorted(duplicates))} exists already")
             after = replace(before, frames=(*before.frames, *frames))
             db.execute("UPDATE rendering SET frames = ? WHERE name = ?", (codec.dump_frames(after.frames), name))
             return after
@@ -126,8 +126,8 @@ class SqliteCatalogue(SqliteJobs):
     def add_pass(self, name: str, layers: Sequence[Layer]) -> RenderingRecord:
         with self._database.transaction() as db:
             before = _rendering(db, name)
-            if known := {layer.name for layer in before.layers} & {layer.name for layer in layers}:
-                raise AlreadyExists(f"rendering {name}: has the layer {', '.join(sorted(known))} already")
+            if duplicates := {layer.name for layer in before.layers} & {layer.name for layer in layers}:
+                raise AlreadyExists(f"rendering {name}: layer {', '.join(sorted(duplicates))} exists already")
             after = replace(before, passes=(*before.passes, tuple(layers)))
             db.execute("UPDATE rendering SET passes = ? WHERE name = ?", (codec.dump_passes(after.passes), name))
             return after
@@ -140,24 +140,24 @@ class SqliteCatalogue(SqliteJobs):
 def _scene(db: sqlite3.Connection, name: str) -> SceneRecord:
     row = db.execute("SELECT * FROM scene WHERE name = ?", (name,)).fetchone()
     if row is None:
-        raise NotFound(f"no scene {name!r}; there is {_names(db, 'scene')}")
+        raise NotFound(f"no scene {name!r}; existing scenes: {_names(db, 'scene')}")
     return codec.load_scene(row)
 
 
 def _rendering(db: sqlite3.Connection, name: str) -> RenderingRecord:
     row = db.execute("SELECT * FROM rendering WHERE name = ?", (name,)).fetchone()
     if row is None:
-        raise NotFound(f"no rendering {name!r}; there is {_names(db, 'rendering')}")
+        raise NotFound(f"no rendering {name!r}; existing renderings: {_names(db, 'rendering')}")
     return codec.load_rendering(row)
 
 
 def _names(db: sqlite3.Connection, table: str) -> str:
     names = [row[0] for row in db.execute(f"SELECT name FROM {table} ORDER BY name LIMIT 21")]
-    return ", ".join(names[:20]) + (", …" if len(names) > 20 else "") if names else "none yet"
+    return ", ".join(names[:20]) + (", …" if len(names) > 20 else "") if names else "none"
 
 
 def _adds_heights(before: SceneCrs, crs: SceneCrs | None) -> bool:
-    """Whether `crs` is the same system with its heights named."""
+    """Whether `crs` is the same system with a vertical part added."""
     return crs is not None and before.vertical is None and crs.vertical is not None and (before.epsg, before.name) == (crs.epsg, crs.name)
 
 

@@ -1,17 +1,17 @@
-"""Jobs in SQLite: every transition of states.py is one statement that checks what it starts from. Time is SQLite's own."""
+"""Jobs in SQLite: every transition of states.py is one statement that checks the state it starts from. Times are on SQLite's clock."""
 
 import sqlite3
 from collections.abc import Iterable, Iterator
 from typing import Any, Final
 
 from map3d.catalogue.records import Job, JobResult, Lease, PlanCounts, PlannedJob
-from map3d.catalogue.states import MAX_ATTEMPTS, OPEN, Event, State, next_state, sources
+from map3d.catalogue.states import MAX_ATTEMPTS, OPEN, JobEvent, State, next_state, sources
 from map3d.database import NOW, Database
 from map3d.errors import NotFound, StaleFence
 from map3d.types import BlockId
 
-FENCES_A_VERSION: Final = 1 << 20
-"""New jobs start at content version times this, so that a job of a pinned-anew rendering never gets a fence that an older job of its name had."""
+FENCES_PER_VERSION: Final = 1 << 20
+"""New jobs start with this times the content version, so that after --regrid no job gets a fence that an earlier job of the same block had."""
 
 JOB_SCHEMA: Final = """
 CREATE TABLE job(rendering TEXT NOT NULL REFERENCES rendering(name), track TEXT NOT NULL, z INTEGER NOT NULL, x INTEGER NOT NULL, y INTEGER NOT NULL,
@@ -26,11 +26,11 @@ CREATE INDEX job_parent ON job(rendering, track, parent_z, parent_x, parent_y)
 _AT: Final = "rendering = :rendering AND track = :track AND z = :z AND x = :x AND y = :y"
 _ALL_BELOW_DONE: Final = f"""NOT EXISTS (SELECT 1 FROM job AS below WHERE below.rendering = job.rendering AND below.track = job.track
   AND below.parent_z = job.z AND below.parent_x = job.x AND below.parent_y = job.y AND below.state <> '{State.DONE}')"""
-_AFTER_FAILURE: Final = f"CASE WHEN attempts >= {MAX_ATTEMPTS} THEN '{State.QUARANTINED}' ELSE '{next_state(State.LEASED, Event.FAIL)}' END"
+_AFTER_FAILURE: Final = f"CASE WHEN attempts >= {MAX_ATTEMPTS} THEN '{State.QUARANTINED}' ELSE '{next_state(State.LEASED, JobEvent.FAIL)}' END"
 _EXPIRE: Final = f"""UPDATE job SET state = {_AFTER_FAILURE}, worker = NULL, expires = NULL, reason = 'lease expired (worker ' || worker || ')'
   WHERE state = '{State.LEASED}' AND expires < {NOW}"""
 _NEXT: Final = f"""SELECT {{columns}} FROM job WHERE rendering = :rendering AND state = '{State.TODO}' ORDER BY attempts, z, track, morton LIMIT 1"""
-_LEASE: Final = f"""UPDATE job SET state = '{next_state(State.TODO, Event.LEASE)}', attempts = attempts + 1, fence = fence + 1, worker = :worker,
+_LEASE: Final = f"""UPDATE job SET state = '{next_state(State.TODO, JobEvent.LEASE)}', attempts = attempts + 1, fence = fence + 1, worker = :worker,
   expires = {NOW} + :lease_s
   WHERE rowid = coalesce(
     (SELECT rowid FROM job WHERE rendering = :rendering AND state = '{State.TODO}' AND morton >= :start
@@ -41,7 +41,7 @@ _HELD: Final = f"{_AT} AND state = '{State.LEASED}' AND fence = :fence AND expir
 
 
 class SqliteJobs:
-    """The jobs' half of the SQLite catalogue."""
+    """The job methods of the SQLite catalogue."""
 
     def __init__(self, database: Database, lease_s: float) -> None:
         self._database = database
@@ -50,12 +50,12 @@ class SqliteJobs:
     def plan(self, rendering: str, jobs: Iterable[PlannedJob]) -> PlanCounts:
         with self._database.transaction() as db:
             content_version, announced = _versions(db, rendering)
-            known = {(row["track"], row["z"], row["x"], row["y"]): row["key"] for row in _job_rows(db, rendering)}
+            keys = {(row["track"], row["z"], row["x"], row["y"]): row["key"] for row in _job_rows(db, rendering)}
             added, changed, kept = [], [], 0
             for job in jobs:
-                key = known.get((job.track, *job.block))
+                key = keys.get((job.track, *job.block))
                 if key is None:
-                    added.append({**_planned_row(rendering, job), "fence": content_version * FENCES_A_VERSION})
+                    added.append({**_planned_row(rendering, job), "fence": content_version * FENCES_PER_VERSION})
                 elif key != job.key:
                     changed.append(_planned_row(rendering, job))
                 else:
@@ -78,7 +78,7 @@ class SqliteJobs:
 
     def done(self, lease: Lease, result: JobResult) -> None:
         numbers = {name: getattr(result, name) for name in ("version", "empty", "tiles", "base_tiles", "bytes", "seconds")}
-        change = f"state = '{next_state(State.LEASED, Event.DONE)}', worker = NULL, expires = NULL, reason = NULL, "
+        change = f"state = '{next_state(State.LEASED, JobEvent.DONE)}', worker = NULL, expires = NULL, reason = NULL, "
         self._move(lease, change + ", ".join(f"{name} = :{name}" for name in numbers), wake=True, **numbers)
 
     def fail(self, lease: Lease, reason: str) -> State:
@@ -86,10 +86,10 @@ class SqliteJobs:
         return State(row["state"])
 
     def release(self, lease: Lease) -> None:
-        self._move(lease, f"state = '{next_state(State.LEASED, Event.RELEASE)}', attempts = attempts - 1, worker = NULL, expires = NULL")
+        self._move(lease, f"state = '{next_state(State.LEASED, JobEvent.RELEASE)}', attempts = attempts - 1, worker = NULL, expires = NULL")
 
     def retry(self, rendering: str, blocks: Iterable[tuple[str, BlockId]] | None = None) -> int:
-        change = f"UPDATE job SET state = '{State.TODO}', attempts = 0 WHERE state IN ({_quoted(sources(Event.RETRY))})"
+        change = f"UPDATE job SET state = '{State.TODO}', attempts = 0 WHERE state IN ({_quoted(sources(JobEvent.RETRY))})"
         with self._database.transaction() as db:
             content_version, announced = _versions(db, rendering)
             if blocks is None:
@@ -115,7 +115,7 @@ class SqliteJobs:
         return {state: found.get(state, 0) for state in State}
 
     def _move(self, lease: Lease, change: str, *, wake: bool = False, **values: Any) -> sqlite3.Row:
-        """One transition out of a held lease; raises StaleFence when it is not held any more."""
+        """Moves a leased job to another state; raises StaleFence when the lease is no longer held."""
         place = {**_place(lease.rendering, lease.track, lease.block), "fence": lease.fence}
         with self._database.transaction() as db:
             row: sqlite3.Row | None = db.execute(f"UPDATE job SET {change} WHERE {_HELD} RETURNING *", {**place, **values}).fetchone()
@@ -134,14 +134,14 @@ def _add(db: sqlite3.Connection, rows: list[dict[str, Any]]) -> None:
 
 
 def _reopen(db: sqlite3.Connection, rows: list[dict[str, Any]]) -> None:
-    """The fence goes up too, so that whoever still renders the old state is refused."""
+    """Increments the fence too, so that a worker that still renders the old state loses its lease."""
     change = "key = :key, state = :state, attempts = 0, fence = fence + 1, worker = NULL, expires = NULL, reason = NULL"
     db.executemany(f"UPDATE job SET {change} WHERE {_AT}", rows)
 
 
 def _wake_above(db: sqlite3.Connection, row: sqlite3.Row) -> None:
     place = {"rendering": row["rendering"], "track": row["track"], "z": row["parent_z"], "x": row["parent_x"], "y": row["parent_y"]}
-    after = next_state(State.WAITING, Event.BELOW_DONE)
+    after = next_state(State.WAITING, JobEvent.BELOW_DONE)
     db.execute(f"UPDATE job SET state = '{after}' WHERE {_AT} AND state = '{State.WAITING}' AND {_ALL_BELOW_DONE}", place)
 
 
@@ -163,9 +163,10 @@ def _job_rows(db: sqlite3.Connection, rendering: str) -> list[sqlite3.Row]:
 
 def _holder(db: sqlite3.Connection, place: dict[str, Any]) -> str:
     row = db.execute(f"SELECT state, fence, worker FROM job WHERE {_AT}", place).fetchone()
-    return (
-        "there is no such job" if row is None else f"it is {row['state']} at fence {row['fence']}" + (f" by {row['worker']}" if row["worker"] else "")
-    )
+    if row is None:
+        return "the job no longer exists"
+    worker = f", leased by {row['worker']}" if row["worker"] else ""
+    return f"the job is {row['state']} with fence {row['fence']}{worker}"
 
 
 def _planned_row(rendering: str, job: PlannedJob) -> dict[str, Any]:

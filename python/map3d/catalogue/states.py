@@ -1,4 +1,4 @@
-"""States of a job and what moves it from one to the next: the table of spec/catalogue.md, in code. Homes take the words from here."""
+"""The states of a job and the transitions between them: the table of spec/catalogue.md in code."""
 
 from enum import StrEnum
 from typing import Final
@@ -14,7 +14,7 @@ class State(StrEnum):
     QUARANTINED = "quarantined"
 
 
-class Event(StrEnum):
+class JobEvent(StrEnum):
     BELOW_DONE = "below done"
     LEASE = "lease"
     HEARTBEAT = "heartbeat"
@@ -27,34 +27,34 @@ class Event(StrEnum):
 
 
 OPEN: Final = (State.WAITING, State.TODO, State.LEASED)
-"""States of jobs that still want work."""
+"""The states of unfinished jobs."""
 
-TRANSITIONS: Final[dict[tuple[State, Event], State]] = {
-    (State.WAITING, Event.BELOW_DONE): State.TODO,
-    (State.WAITING, Event.KEY_CHANGED): State.TODO,
-    (State.TODO, Event.LEASE): State.LEASED,
-    (State.TODO, Event.KEY_CHANGED): State.TODO,
-    (State.LEASED, Event.HEARTBEAT): State.LEASED,
-    (State.LEASED, Event.DONE): State.DONE,
-    (State.LEASED, Event.FAIL): State.TODO,
-    (State.LEASED, Event.EXPIRE): State.TODO,
-    (State.LEASED, Event.RELEASE): State.TODO,
-    (State.LEASED, Event.KEY_CHANGED): State.TODO,
-    (State.DONE, Event.KEY_CHANGED): State.TODO,
-    (State.QUARANTINED, Event.RETRY): State.TODO,
-    (State.QUARANTINED, Event.KEY_CHANGED): State.TODO,
+TRANSITIONS: Final[dict[tuple[State, JobEvent], State]] = {
+    (State.WAITING, JobEvent.BELOW_DONE): State.TODO,
+    (State.WAITING, JobEvent.KEY_CHANGED): State.TODO,
+    (State.TODO, JobEvent.LEASE): State.LEASED,
+    (State.TODO, JobEvent.KEY_CHANGED): State.TODO,
+    (State.LEASED, JobEvent.HEARTBEAT): State.LEASED,
+    (State.LEASED, JobEvent.DONE): State.DONE,
+    (State.LEASED, JobEvent.FAIL): State.TODO,
+    (State.LEASED, JobEvent.EXPIRE): State.TODO,
+    (State.LEASED, JobEvent.RELEASE): State.TODO,
+    (State.LEASED, JobEvent.KEY_CHANGED): State.TODO,
+    (State.DONE, JobEvent.KEY_CHANGED): State.TODO,
+    (State.QUARANTINED, JobEvent.RETRY): State.TODO,
+    (State.QUARANTINED, JobEvent.KEY_CHANGED): State.TODO,
 }
 
 
-def next_state(state: State, event: Event, attempts: int = 0) -> State | None:
-    """The state after `event`, None when the event is refused. A third failed attempt quarantines. For reduce jobs a changed key means waiting
-    until the blocks below are done, which the home decides."""
+def next_state(state: State, event: JobEvent, attempts: int = 0) -> State | None:
+    """Returns the state after `event`, None when the event is refused. A third failed attempt quarantines the job. The catalogue itself decides
+    whether a reduce job with a changed key is todo or waits for the blocks below."""
     after = TRANSITIONS.get((state, event))
-    if event in (Event.FAIL, Event.EXPIRE) and after is not None and attempts >= MAX_ATTEMPTS:
+    if event in (JobEvent.FAIL, JobEvent.EXPIRE) and after is not None and attempts >= MAX_ATTEMPTS:
         return State.QUARANTINED
     return after
 
 
-def sources(event: Event) -> tuple[State, ...]:
-    """The states that `event` is accepted in."""
+def sources(event: JobEvent) -> tuple[State, ...]:
+    """Returns the states in which `event` is accepted."""
     return tuple(state for state, accepted in TRANSITIONS if accepted is event)

@@ -1,4 +1,4 @@
-"""Where things lie in a workspace (spec/scene.md)."""
+"""Paths in a workspace (spec/scene.md)."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +11,7 @@ from map3d.types import check_name
 
 @dataclass(frozen=True)
 class Workspace:
-    """The folder in which map3d keeps catalogue, scenes and renderings. Names are checked, so that no path leaves it."""
+    """The folder of catalogue, scenes and renderings. Names are checked, so that no path leaves the folder."""
 
     root: Path
 
@@ -38,12 +38,12 @@ class Workspace:
         return self.rendering_folder(rendering) / f"{track}.sqlite"
 
     def create(self) -> "Workspace":
-        """Makes the folder if it is not there."""
+        """Creates the folder when it does not exist."""
         self.root.mkdir(parents=True, exist_ok=True)
         return self
 
     def open_catalogue(self, *, lease_s: float = LEASE_S) -> Catalogue:
-        """Raises NotFound where there is no workspace."""
+        """Opens the catalogue. Raises NotFound when the workspace does not exist."""
         if not self.root.is_dir():
-            raise NotFound(f"no workspace at {self.root}: create a scene first (map3d create-scene), or name the folder with --workspace")
+            raise NotFound(f"no workspace at {self.root}: create a scene first with map3d create-scene, or name another folder with --workspace")
         return SqliteCatalogue(self.catalogue_path, lease_s=lease_s)

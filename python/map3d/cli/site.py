@@ -65,7 +65,7 @@ def command(
             added = add_changed(
                 workspace, catalogue, request, lambda name, n, of: bar.update(task, description=f"importing {name}", completed=n, total=of)
             )
-        click.echo(f"{len(added.added)} files imported, {len(added.unchanged)} unchanged, {len(added.failed)} not usable")
+        click.echo(f"{len(added.imported)} files imported, {len(added.unchanged)} unchanged, {len(added.failed)} not usable")
         for _, reason in added.failed:
             click.echo(f"not added: {reason}", err=True)
         _tell_faults(catalogue, request.name)

@@ -1,1 +1,1 @@
-"""Renderings: creating and planning them, estimating and building what they need, rendering one block, writing the manifest."""
+"""Renderings: builds the scene, creates, plans and estimates a rendering, renders its blocks and writes the manifest."""

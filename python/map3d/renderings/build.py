@@ -31,7 +31,7 @@ BUILD_BYTES: Final = 2 << 30
 def is_stale(workspace: Workspace, catalogue: Catalogue, scene: str) -> bool:
     """Whether the scene index is missing or older than the assets."""
     record = catalogue.scene(scene)
-    return record.built != fingerprint(catalogue, record) or not (workspace.scene_folder(scene) / "scene.json").is_file()
+    return record.built != scene_digest(catalogue, record) or not (workspace.scene_folder(scene) / "scene.json").is_file()
 
 
 def build(
@@ -43,7 +43,7 @@ def build(
         assets = catalogue.assets(scene)
         if not assets or record.origin is None:
             raise BadRequest(f"scene {scene} has no files yet; add some with map3d add-files {scene} FILE…")
-        mark = fingerprint(catalogue, record)
+        digest = scene_digest(catalogue, record)
         folder = workspace.scene_folder(scene)
         with Registry(workspace.registry_path(scene)) as registry:
             ground = registry.scene_object(GROUND, "terrain")
@@ -57,12 +57,12 @@ def build(
             }
             report: dict[str, Any] = json.loads(_core.build_scene(str(folder), json.dumps(request), progress))
             registry.set_scene_object(ground, object_box(folder, ground) if report.get("ground_plane_triangles") else None)
-        catalogue.set_built(scene, mark)
+        catalogue.set_built(scene, digest)
         return report
 
 
-def fingerprint(catalogue: Catalogue, record: SceneRecord) -> str:
-    """Of all that a build depends on."""
+def scene_digest(catalogue: Catalogue, record: SceneRecord) -> str:
+    """Returns a digest of everything that a build depends on."""
     assets = [(asset.name, asset.digest) for asset in catalogue.assets(record.name)]
     text = json.dumps([assets, record.origin, {**OPTIONS, **record.options}, _core.__version__], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]

@@ -1,4 +1,4 @@
-"""create-rendering: pins the frames of a rendering to a scene as it is now."""
+"""Creates renderings: pins the frames of the views to the current extent of the scene."""
 
 import math
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ COARSEST_M: Final = 1e6
 
 @dataclass(frozen=True)
 class RenderingRequest:
-    """`res_m` or `levels`. `window`: x, y of its middle in the scene's CRS, and its side."""
+    """Exactly one of `res_m` and `levels` is set. `window`: (x, y) of its centre in the scene's CRS and the length of its side, metres."""
 
     scene: str
     name: str
@@ -34,7 +34,7 @@ class RenderingRequest:
     window: tuple[float, float, float] | None = None
 
     def check(self, catalogue: Catalogue) -> None:
-        """Raises BadRequest for what can be told before the scene is built, NotFound."""
+        """Checks everything that does not depend on the built scene; raises BadRequest, NotFound."""
         check_name(self.name, "rendering")
         scene = catalogue.scene(self.scene)
         for view in self.views:
@@ -42,7 +42,7 @@ class RenderingRequest:
         if self.window is not None:
             Window(*self.window)
         if (self.res_m is None) == (self.levels is None):
-            raise BadRequest("say how fine: --res METRES a pixel, or --levels N")
+            raise BadRequest("missing resolution: give either --res METRES_PER_PIXEL or --levels N")
         if self.regrid:
             catalogue.rendering(self.name)
         else:
@@ -51,10 +51,10 @@ class RenderingRequest:
 
 
 def create_rendering(workspace: Workspace, catalogue: Catalogue, request: RenderingRequest) -> RenderingRecord:
-    """Pins the frames to the box of the scene, which must be built as it is now. Raises BadRequest, NotFound."""
+    """Pins the frames to the box of the scene, whose build must be up to date. Raises BadRequest, NotFound."""
     request.check(catalogue)
     if is_stale(workspace, catalogue, request.scene):
-        raise BadRequest(f"scene {request.scene} has changed since it was built; build it first")
+        raise BadRequest(f"scene {request.scene} has changed since its last build; build it first")
     box = open_scene(workspace, request.scene).box
     window = _local_window(catalogue, request)
     res_m = choose_res(box, request)
@@ -72,43 +72,43 @@ def create_rendering(workspace: Workspace, catalogue: Catalogue, request: Render
         options,
     )
     if request.regrid:
-        kept = catalogue.regrid(record)
-        _remove_stores(workspace, kept)
-        return kept
+        stored = catalogue.regrid(record)
+        _remove_stores(workspace, stored)
+        return stored
     catalogue.create_rendering(record)
     return record
 
 
 def add_views(catalogue: Catalogue, name: str, views: Sequence[ViewAngles]) -> RenderingRecord:
-    """Pins further views of a rendering as if it had been created with them; what is there stays as it is.
+    """Adds views with the frames that they would have had from the start; existing views do not change.
 
-    Raises NotFound, BadRequest for a view that is there, OutsideFrame for one that the rendering's square cannot hold.
+    Raises NotFound, BadRequest for a view that exists already, OutsideFrame for one that does not fit the rendering's square.
     """
     record = catalogue.rendering(name)
     frames = [pin_beside(record.frames[0], record.box, view, record.window) for view in views]
     ids = [frame.id for frame in (*record.frames, *frames)]
-    if twice := sorted({view for view in ids if ids.count(view) > 1}):
-        raise BadRequest(f"rendering {name}: view {', '.join(twice)} is there already, or given twice")
+    if duplicates := sorted({view for view in ids if ids.count(view) > 1}):
+        raise BadRequest(f"rendering {name}: view {', '.join(duplicates)} exists already or is given twice")
     return catalogue.add_frames(name, frames)
 
 
 def add_layers(catalogue: Catalogue, name: str, request: LayerRequest) -> RenderingRecord:
-    """Adds layers to a rendering, as a pass of their own; what is there stays as it is.
+    """Adds layers to a rendering as a new pass; existing layers do not change.
 
-    Raises NotFound, BadRequest for a name that is there, and what `LayerRequest.layers` raises.
+    Raises NotFound, BadRequest for a name that exists already, and the errors of `LayerRequest.layers`.
     """
     record = catalogue.rendering(name)
     scene = catalogue.scene(record.scene)
-    if twice := sorted({layer.name for layer in record.layers} & set(request.check(scene))):
-        raise BadRequest(f"rendering {name}: layer {', '.join(twice)} is there already; give the new one another name, as NAME=KIND")
+    if duplicates := sorted({layer.name for layer in record.layers} & set(request.check(scene))):
+        raise BadRequest(f"rendering {name}: layer {', '.join(duplicates)} exists already; give the new one another name, as NAME=KIND")
     return catalogue.add_pass(name, request.layers(scene, record.box))
 
 
 def choose_res(box: Box, request: RenderingRequest) -> float:
-    """The resolution asked for; for a number of levels the finest that needs no more, to three digits; a window is kept exactly."""
+    """Returns the requested resolution, or the finest that fits `levels`: rounded up to three digits, exact for a window."""
     if request.res_m is not None:
         return request.res_m
-    assert request.levels is not None, "one of the two is given"
+    assert request.levels is not None, "checked: res_m or levels is set"
     if request.window is not None:
         return request.window[2] / (request.tile_px * 2.0 ** (request.levels - 1))
     extent_m = _extent_m(box, request)
@@ -121,12 +121,12 @@ def _local_window(catalogue: Catalogue, request: RenderingRequest) -> Window | N
         return None
     x_m, y_m, size_m = request.window
     origin = catalogue.scene(request.scene).origin
-    assert origin is not None, "a built scene has one"
+    assert origin is not None, "a built scene has an origin"
     return Window(x_m - origin[0], y_m - origin[1], size_m)
 
 
 def _extent_m(box: Box, request: RenderingRequest) -> float:
-    """What `pin` needs a square to hold, to a part in a million: the least tile of one level that does."""
+    """Returns the side of the smallest square that `pin` accepts for all views, by bisection."""
     low, high = 0.0, COARSEST_M
     while high - low > 1e-9 * high:
         middle = (low + high) / 2
@@ -144,11 +144,11 @@ def _rounded_up(value: float) -> float:
 
 def _check_free(catalogue: Catalogue, name: str) -> None:
     if any(record.name == name for record in catalogue.renderings()):
-        raise BadRequest(f"rendering {name}: exists already; choose another name, or give --regrid to pin it anew and render everything again")
+        raise BadRequest(f"rendering {name}: exists already; choose another name, or use --regrid to replace its frames and render everything again")
 
 
 def _remove_stores(workspace: Workspace, record: RenderingRecord) -> None:
-    """Tiles of the frames before; views and passes that are no longer wanted go too."""
+    """Removes all tile stores of the rendering, including those of views and passes that it no longer has."""
     folder = workspace.rendering_folder(record.name)
     if folder.is_dir():
         for path in folder.glob("*.sqlite*"):

@@ -1,4 +1,4 @@
-"""Where a grid's point lies on earth, and how true directions run in the grid there."""
+"""Grid north: the meridian convergence of a projected coordinate system."""
 
 import math
 from typing import Final
@@ -13,24 +13,24 @@ STEP_M: Final = 100.0
 WGS84: Final = "EPSG:4326"
 
 
-class Grid:
-    """A projected system around one of its points.
+class GridNorth:
+    """Converts true azimuths to grid azimuths at one point of a projected coordinate system.
 
-    A direction is looked up by a step that way and one back, which holds for every projection: also where axes point south and west, longitudes count
-    from Paris, or angles are not kept.
+    Takes a step on the ellipsoid in both directions and projects it, so that it works for every projection: also where axes point south or west,
+    longitudes count from Paris, or angles are distorted.
     """
 
     def __init__(self, wkt: str, x: float, y: float) -> None:
-        """Raises BadRequest where the system has no such point."""
+        """Raises BadRequest when the point is outside the coordinate system."""
         flat = horizontal(parse_crs(wkt))
         longitude_deg, latitude_deg = Transformer.from_crs(flat, WGS84, always_xy=True).transform(x, y)
         if not (math.isfinite(longitude_deg) and math.isfinite(latitude_deg)):
-            raise BadRequest(f"{flat.name} has no point {x:g}, {y:g}: where the scene lies is not known, so the sun over it is neither")
+            raise BadRequest(f"{flat.name} has no point {x:g}, {y:g}: cannot locate the scene, so the sun's position is unknown")
         self.place = Place(latitude_deg, longitude_deg)
         self._to_grid = Transformer.from_crs(WGS84, flat, always_xy=True)
 
     def grid_azimuth_deg(self, azimuth_deg: float) -> float:
-        """Clockwise from +y, 0 ≤ a < 360, of an azimuth from true north: less by the meridian convergence."""
+        """Returns the azimuth clockwise from +y, 0 ≤ a < 360: the true azimuth less the meridian convergence."""
         ahead, back = self._step(azimuth_deg), self._step(azimuth_deg + 180.0)
         return math.degrees(math.atan2(ahead[0] - back[0], ahead[1] - back[1])) % 360.0
 

@@ -1,4 +1,4 @@
-"""Which layers are asked for, and what becomes of the wish."""
+"""Turns a request for layers into the layers of a rendering."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -14,8 +14,8 @@ LOSSY: Final = ("webp", "jpeg")
 
 @dataclass(frozen=True)
 class LayerRequest:
-    """`names`: KIND or NAME=KIND each; `color` and `quality`: format of the layers color and picture; `light`: what layers of light need; `small`:
-    encoding takes its time for fewer bytes."""
+    """`names`: KIND or NAME=KIND each; `color`, `quality`: format of the layers color and picture; `light`: parameters of sun and ambient occlusion
+    layers; `small`: spends more time on encoding to save bytes."""
 
     names: Sequence[str] = DEFAULT_LAYERS
     color: str = "webp"
@@ -24,17 +24,19 @@ class LayerRequest:
     small: bool = False
 
     def check(self, scene: SceneRecord) -> dict[str, LayerKind]:
-        """Name → kind, in the order of LAYER_KINDS; raises BadRequest for what can be told before the scene is built."""
-        wanted = [_name_and_kind(text) for text in self.names]
-        kinds = [kind for _, kind in wanted]
-        if not wanted or len(set(kinds)) != len(kinds) or len(dict(wanted)) != len(wanted):
-            named = ", ".join(self.names) or "none"
-            raise BadRequest(f"layers {named}: name at least one, each name and kind once; map3d add-layers adds another one of a kind")
+        """Returns name → kind, in the order of LAYER_KINDS. Raises BadRequest; does not need a built scene."""
+        pairs = [_name_and_kind(text) for text in self.names]
+        kinds = [kind for _, kind in pairs]
+        if not pairs or len(set(kinds)) != len(kinds) or len(dict(pairs)) != len(pairs):
+            given = ", ".join(self.names) or "none"
+            raise BadRequest(
+                f"layers {given}: give at least one, and each name and kind only once; map3d add-layers adds a second layer of the same kind"
+            )
         self.light.check(kinds, scene)
-        return dict(sorted(wanted, key=lambda item: LAYER_KINDS.index(item[1])))
+        return dict(sorted(pairs, key=lambda item: LAYER_KINDS.index(item[1])))
 
     def layers(self, scene: SceneRecord, box: Box) -> tuple[Layer, ...]:
-        """As a rendering keeps them; `box`: the scene's local one, in whose middle the sun is looked up. Raises BadRequest, BadName."""
+        """Returns the layers; the sun's position is computed for the centre of `box`, the scene's local box. Raises BadRequest, BadName."""
         return tuple(self._layer(name, kind, scene, box) for name, kind in self.check(scene).items())
 
     def _layer(self, name: str, kind: LayerKind, scene: SceneRecord, box: Box) -> Layer:
@@ -46,7 +48,7 @@ class LayerRequest:
 
 def _name_and_kind(text: str) -> tuple[str, LayerKind]:
     name, _, kind = text.rpartition("=")
-    for known in LAYER_KINDS:
-        if kind == known:
-            return (name if "=" in text else known), known
-    raise BadRequest(f"layer {text!r} is not known; write KIND or NAME=KIND, with one of {', '.join(LAYER_KINDS)}")
+    for valid in LAYER_KINDS:
+        if kind == valid:
+            return (name if "=" in text else valid), valid
+    raise BadRequest(f"unknown layer {text!r}; write KIND or NAME=KIND, with one of {', '.join(LAYER_KINDS)}")

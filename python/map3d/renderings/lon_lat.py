@@ -1,4 +1,4 @@
-"""Longitudes and latitudes of a scene's local coordinates, and back, as polynomials: a client evaluates them without a library of projections."""
+"""Polynomials between a scene's local coordinates and longitude and latitude, so that clients need no projection library."""
 
 import math
 from functools import lru_cache
@@ -16,16 +16,16 @@ from map3d.types import Box, Vec3
 WGS84: Final = "EPSG:4326"
 DEGREES: Final = range(2, 8)
 ENOUGH_M: Final = 0.0005
-"""The least degree with such an error is taken."""
+"""The lowest degree whose error is below this is used."""
 NODES, CHECKS = 16, 23
-"""A side of the grids for the fit and for its error."""
+"""Points along a side of the grids for the fit and for measuring its error."""
 MARGIN, MARGIN_M = 0.25, 500.0
 METRES_A_DEGREE: Final = 111_320.0
 Points = NDArray[np.float64]
 
 
 def geographic_of(scene: SceneRecord, box: Box) -> Geographic | None:
-    """Of the box and a margin around it; None where the scene's coordinate system does not say where it lies. `box`: local."""
+    """Fits the polynomials to the local `box` with a margin; returns None when the coordinate system does not locate the scene."""
     crs = scene.crs
     return None if crs is None or crs.wkt is None or scene.origin is None else _fitted(crs.wkt, scene.origin, box)
 
@@ -41,7 +41,7 @@ def _fitted(wkt: str, origin: Vec3, box: Box) -> Geographic | None:
     center = (round(lon, 9), round(lat, 9))
 
     def degrees(unit: Points) -> Points:
-        """Beyond the centre, of places in units."""
+        """Returns (longitude, latitude) relative to the centre, for points in units of `unit_m`."""
         lon, lat = to_degrees.transform(origin[0] + middle[0] + unit[:, 0] * unit_m, origin[1] + middle[1] + unit[:, 1] * unit_m)
         return np.stack([(np.asarray(lon) - center[0] + 180.0) % 360.0 - 180.0, np.asarray(lat) - center[1]], axis=1)
 
@@ -51,7 +51,7 @@ def _fitted(wkt: str, origin: Vec3, box: Box) -> Geographic | None:
         return None
     unit_deg = round(float(np.abs(there).max()), 9)
     a_degree = METRES_A_DEGREE * np.array([math.cos(math.radians(center[1])), 1.0])
-    made = None
+    fitted = None
     for degree in DEGREES:
         to, back = _fit(nodes, there, degree, 14), _fit(there / unit_deg, nodes * unit_m, degree, 7)
         errors = (
@@ -59,10 +59,10 @@ def _fitted(wkt: str, origin: Vec3, box: Box) -> Geographic | None:
             _terms(tested / unit_deg, degree) @ back - checks * unit_m,
         )
         error_m = max(float(np.abs(e).max()) for e in errors)
-        made = Geographic(middle, center, unit_m, unit_deg, degree, _rows(to), _rows(back), round(error_m, 6))
+        fitted = Geographic(middle, center, unit_m, unit_deg, degree, _rows(to), _rows(back), round(error_m, 6))
         if error_m < ENOUGH_M:
             break
-    return made
+    return fitted
 
 
 def _grid(side: Points) -> Points:
@@ -71,13 +71,13 @@ def _grid(side: Points) -> Points:
 
 
 def _terms(places: Points, degree: int) -> Points:
-    """1, x, y, x², xy, y², … a row each."""
+    """Returns one row 1, x, y, x², xy, y², … per point."""
     x, y = places[:, 0], places[:, 1]
     return np.stack([x ** (total - k) * y**k for total in range(degree + 1) for k in range(total + 1)], axis=1)
 
 
 def _fit(places: Points, values: Points, degree: int, digits: int) -> Points:
-    """Rounded, so that every machine finds the same."""
+    """Returns the coefficients, rounded so that they are the same on every machine."""
     return np.round(np.linalg.lstsq(_terms(places, degree), values, rcond=None)[0], digits) + 0.0
 
 

@@ -17,12 +17,12 @@ from map3d.tiles.store import TileStore
 from map3d.types import BlockId, Box, Vec3
 
 Planned = Mapping[str, Occupancy]
-"""View → tiles of level zmax that open base blocks of its first pass may yet fill."""
+"""View → tiles of level zmax that open base blocks of its first pass may still fill."""
 
 
 def write_manifest(workspace: Workspace, catalogue: Catalogue, rendering: str, box: Box, planned: Planned | None = None) -> Manifest:
-    """Says what is in the stores now; what open blocks may yet hold is added from `planned`. The content version counts as announced from before
-    the file is seen. `box`: local, of the scene's content."""
+    """Writes the manifest of the stored tiles and of the `planned` ones. Announces the content version before the file becomes visible. `box`: the
+    local box of the scene's content."""
     record = catalogue.rendering(rendering)
     manifest = current_manifest(workspace, catalogue, record, box, planned or {})
     catalogue.announce(rendering, record.content_version)
@@ -53,18 +53,18 @@ def current_manifest(workspace: Workspace, catalogue: Catalogue, record: Renderi
 
 
 def _start(record: RenderingRecord, box: Box) -> Vec3 | None:
-    """The middle of a rendering's window; None, which is the box's middle, without one."""
+    """Returns the centre of the rendering's window, None without a window: viewers then start at the centre of the box."""
     window = record.window
     return None if window is None else (window.x_m, window.y_m, (box[0][2] + box[1][2]) / 2)
 
 
 def stored_occupancy(store: TileStore) -> Occupancy:
-    """Exact: the tiles of level zmax that are in the store, whatever their layer."""
+    """Returns the tiles of level zmax in the store; every layer has the same."""
     return Occupancy.from_tiles(store.shape.zmax, store.list_places(store.shape.zmax))
 
 
 def _view(workspace: Workspace, record: RenderingRecord, frame: PinnedFrame, planned: Occupancy | None) -> ViewFacts:
-    """Every pass has the same tiles: those of the first tell."""
+    """Takes the occupancy from the first pass, since every pass has the same tiles."""
     occupancy, versions = Occupancy.from_tiles(frame.zmax, ()), []
     for track in record.tracks_of(frame):
         path = workspace.store_path(record.name, track.id)
@@ -83,14 +83,14 @@ def _crs(scene: SceneRecord) -> CrsFacts:
 
 
 def _origin(record: SceneRecord) -> Vec3:
-    """Raises BadRequest while nothing was imported."""
+    """Raises BadRequest while the scene has no files."""
     if record.origin is None:
         raise BadRequest(f"scene {record.name} has no files yet; add some with map3d add-files {record.name} FILE…")
     return record.origin
 
 
 def _write(path: Path, data: bytes) -> None:
-    """Whole or not at all, and durably."""
+    """Writes atomically and durably."""
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_name(f".{path.name}.{os.getpid()}.new")
     with draft.open("wb") as file:

@@ -1,4 +1,4 @@
-"""`map3d site`: a folder of files becomes a rendering in steps that can each be repeated."""
+"""`map3d site`: turns a folder of files into a rendering, in steps that can each be repeated."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -19,15 +19,15 @@ from map3d.renderings.plan import planned_occupancy
 from map3d.types import Layer, ViewAngles
 
 RESOLUTIONS_M: Final = (0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
-MOST_BASE_TILES: Final = 30_000
-"""Of all views together: some minutes on a small machine."""
+MAX_BASE_TILES: Final = 30_000
+"""For all views together: some minutes on a small machine."""
 
 _PROBE_LEVEL: Final = 8
 
 
 @dataclass(frozen=True)
 class SiteRequest:
-    """`res_m` None: chosen by `choose_res`."""
+    """`choose_res` selects the resolution when `res_m` is None."""
 
     name: str
     sources: Path
@@ -40,60 +40,69 @@ class SiteRequest:
 
 
 @dataclass(frozen=True)
-class Added:
-    """What an import step did: assets taken over now, unchanged from before, and failures with their reasons."""
+class ImportSummary:
+    """The assets that were imported or unchanged, and (file, reason) of those that failed."""
 
-    added: list[str]
+    imported: list[str]
     unchanged: list[str]
     failed: list[tuple[str, str]]
 
 
-def add_changed(workspace: Workspace, catalogue: Catalogue, request: SiteRequest, tell: Callable[[str, int, int], None]) -> Added:
-    """Makes the scene if need be and imports what is new or has changed; a broken file costs itself alone. Raises BadRequest when none is usable."""
+def add_changed(workspace: Workspace, catalogue: Catalogue, request: SiteRequest, report: Callable[[str, int, int], None]) -> ImportSummary:
+    """Creates the scene when it does not exist, and imports new and changed files; a broken file is reported and skipped. Raises BadRequest when no
+    file is usable."""
     if not any(scene.name == request.name for scene in catalogue.scenes()):
         catalogue.create_scene(SceneRecord(request.name, request.title, request.attribution))
-    have = {asset.name: asset.source_digest for asset in catalogue.assets(request.name)}
-    done = Added([], [], [])
-    sources = find_sources([request.sources], None, lambda path, why: done.failed.append((str(path), why)))
-    if done.failed and request.options.strict:
-        raise UnknownFormat(done.failed[0][1])
+    digests = {asset.name: asset.source_digest for asset in catalogue.assets(request.name)}
+    summary = ImportSummary([], [], [])
+    sources = find_sources([request.sources], None, lambda path, reason: summary.failed.append((str(path), reason)))
+    if summary.failed and request.options.strict:
+        raise UnknownFormat(summary.failed[0][1])
     with Parsers() as parsers:
         for number, source in enumerate(sources):
-            tell(source.paths[0].name, number, len(sources))
-            _add(workspace, catalogue, request, source, have, done, parsers)
-    if not done.added and not done.unchanged:
-        raise BadRequest(f"{request.sources}: none of its {len(sources)} files could be used; the first: {done.failed[0][1]}")
-    return done
+            report(source.paths[0].name, number, len(sources))
+            _add(workspace, catalogue, request, source, digests, summary, parsers)
+    if not summary.imported and not summary.unchanged:
+        raise BadRequest(f"{request.sources}: none of its {len(sources)} files is usable; first error: {summary.failed[0][1]}")
+    return summary
 
 
 def _add(
-    workspace: Workspace, catalogue: Catalogue, request: SiteRequest, source: Source, have: dict[str, str], done: Added, parsers: Parsers
+    workspace: Workspace,
+    catalogue: Catalogue,
+    request: SiteRequest,
+    source: Source,
+    digests: dict[str, str],
+    summary: ImportSummary,
+    parsers: Parsers,
 ) -> None:
-    if have.get(source.name) == source_digest(source):
-        done.unchanged.append(source.name)
+    if digests.get(source.name) == source_digest(source):
+        summary.unchanged.append(source.name)
         return
     try:
         import_file(workspace, catalogue, request.name, source, request.options, parsers=parsers)
-        done.added.append(source.name)
+        summary.imported.append(source.name)
     except Map3dError as error:
         if request.options.strict:
             raise
-        done.failed.append((str(source.paths[0]), str(error)))
+        summary.failed.append((str(source.paths[0]), str(error)))
 
 
 def make_rendering(workspace: Workspace, catalogue: Catalogue, request: SiteRequest) -> RenderingRecord:
-    """The rendering of the site, made if it is not there; its scene must be built."""
+    """Returns the rendering of the site, and creates it when it does not exist; its scene must be built."""
     for record in catalogue.renderings(request.name):
         if record.name == request.name:
             return record
     res_m = request.res_m or choose_res(workspace, request)
     layers = LayerRequest(color=request.color)
-    wanted = RenderingRequest(request.name, request.name, request.views, res_m, layers=layers, title=request.title, attribution=request.attribution)
-    return create_rendering(workspace, catalogue, wanted)
+    rendering = RenderingRequest(
+        request.name, request.name, request.views, res_m, layers=layers, title=request.title, attribution=request.attribution
+    )
+    return create_rendering(workspace, catalogue, rendering)
 
 
 def choose_res(workspace: Workspace, request: SiteRequest) -> float:
-    """The finest of RESOLUTIONS_M at which the scene needs no more than MOST_BASE_TILES, going by the area that it covers in every view."""
+    """Returns the finest of RESOLUTIONS_M with at most MAX_BASE_TILES base tiles, estimated from the area that the scene covers in each view."""
     scene = open_scene(workspace, request.name)
     box, tile_px, covered_m2 = scene.box, 256, 0.0
     frames = pin(box, tile_px, RESOLUTIONS_M[0], request.views)
@@ -104,6 +113,6 @@ def choose_res(workspace: Workspace, request: SiteRequest) -> float:
         side_m = frame.size_m / 2.0**level
         covered_m2 += planned_occupancy(scene, probe, frame, level).count(level) * side_m**2
     for res_m in RESOLUTIONS_M:
-        if covered_m2 / (res_m * tile_px) ** 2 <= MOST_BASE_TILES:
+        if covered_m2 / (res_m * tile_px) ** 2 <= MAX_BASE_TILES:
             return res_m
     return RESOLUTIONS_M[-1]

@@ -1,4 +1,4 @@
-"""What layers of light need beside their kind: suns and the reach of ambient occlusion."""
+"""Parameters of sun and ambient occlusion layers: the suns and the radius."""
 
 import math
 from collections.abc import Collection
@@ -18,8 +18,8 @@ RADIUS_M: Final = 20.0
 
 @dataclass(frozen=True)
 class LightRequest:
-    """`time` (with its zone) or `sun` (its angles): of the layers sun and picture; `day`: of sun16; `radius_m`: of ambient occlusion, None for the
-    usual; `place`: where a scene in local coordinates lies, whose y axis then points north."""
+    """`time` (with time zone) or `sun` (angles): for the layers sun and picture. `day`: for the layer sun16. `radius_m`: of ambient occlusion, None
+    selects the default. `place`: the position of a scene in local coordinates, whose y axis points north."""
 
     time: datetime | None = None
     sun: SunAngles | None = None
@@ -28,37 +28,35 @@ class LightRequest:
     place: Place | None = None
 
     def check(self, kinds: Collection[str], scene: SceneRecord) -> None:
-        """Raises BadRequest for what is missing, and for what nothing uses."""
+        """Raises BadRequest for missing options and for options that no layer of `kinds` uses."""
         one, day, radius = any(kind in kinds for kind in ONE_SUN), DAY in kinds, any(kind in kinds for kind in RADIUS_KINDS)
         if one and (self.time is None) == (self.sun is None):
-            raise BadRequest(f"{_named(ONE_SUN, kinds)}: say where the sun is, either by --time 2026-06-21T15:00+02:00 or by --sun AZIMUTH,ELEVATION")
+            raise BadRequest(f"{_named(ONE_SUN, kinds)}: give the sun either as --time 2026-06-21T15:00+02:00 or as --sun AZIMUTH,ELEVATION")
         if day and self.day is None:
-            raise BadRequest("layer sun16: say of which day, e.g. --date 2026-06-21")
+            raise BadRequest("layer sun16: missing day; give it as in --date 2026-06-21")
         if self.time is not None and self.time.tzinfo is None:
-            raise BadRequest(f"time {self.time.isoformat()}: say of which zone, e.g. {self.time.isoformat()}+02:00, or Z for UTC")
+            raise BadRequest(f"time {self.time.isoformat()}: missing time zone; write e.g. {self.time.isoformat()}+02:00, or Z for UTC")
         for given, used, option, kind in (
             (self.time or self.sun, one, "--time and --sun", ONE_SUN),
             (self.day, day, "--date", (DAY,)),
             (self.radius_m, radius, "--ao-radius", RADIUS_KINDS),
         ):
             if given is not None and not used:
-                raise BadRequest(f"{option}: of the layers {' and '.join(kind)} only; none of them is asked for")
+                raise BadRequest(f"{option}: used only by {' and '.join(kind)}; add such a layer to --layers, or leave the option out")
         self._check_place(scene, needed=day or (one and self.sun is None))
         self._check_sun()
 
     def suns(self, kind: str, scene: SceneRecord, box: Box) -> tuple[Sun, ...]:
-        """Of a layer of that kind, in the middle of the scene's local box. Raises BadRequest for a sun that does not shine."""
+        """Returns the suns of a layer of this kind, for the centre of the scene's local box. Raises BadRequest for a sun below the horizon."""
         if kind not in (*ONE_SUN, DAY):
             return ()
-        ground = Ground(scene, box, self.place)
+        location = SceneLocation(scene, box, self.place)
         if kind == DAY:
             assert self.day is not None, "checked"
-            return tuple(ground.sun_at(time) for time in hours_of(ground.place, self.day))
-        sun = ground.sun(self.sun) if self.sun is not None else ground.sun_at(self._whole_second())
+            return tuple(location.sun_at(time) for time in hours_of(location.place, self.day))
+        sun = location.sun(self.sun) if self.sun is not None else location.sun_at(self._whole_second())
         if sun.elevation_deg <= 0:
-            raise BadRequest(
-                f"at {sun.time} the sun is {-sun.elevation_deg:.1f} degrees below the horizon there and lights nothing; choose another --time"
-            )
+            raise BadRequest(f"at {sun.time} the sun is {-sun.elevation_deg:.1f} degrees below the horizon; choose another --time")
         return (sun,)
 
     def radius_of(self, kind: str) -> float | None:
@@ -70,7 +68,7 @@ class LightRequest:
 
     def _check_sun(self) -> None:
         if self.sun is not None and not (0 <= self.sun.azimuth_deg < 360 and 0 < self.sun.elevation_deg <= 90):
-            raise BadRequest(f"sun {self.sun.azimuth_deg:g}, {self.sun.elevation_deg:g}: need 0 ≤ azimuth < 360 and 0 < elevation ≤ 90 degrees")
+            raise BadRequest(f"sun {self.sun.azimuth_deg:g}, {self.sun.elevation_deg:g}: expected 0 ≤ azimuth < 360 and 0 < elevation ≤ 90 degrees")
 
     def _check_place(self, scene: SceneRecord, needed: bool) -> None:
         local = scene.crs is None or scene.crs.is_local
@@ -78,23 +76,21 @@ class LightRequest:
             self.place.checked()
         if self.place is not None and not local:
             assert scene.crs is not None, "not local"
-            raise BadRequest(f"--place: the coordinate system of scene {scene.name}, {scene.crs.name}, says already where it lies; leave --place out")
+            raise BadRequest(f"--place: scene {scene.name} is already located by its coordinate system {scene.crs.name}; leave --place out")
         if needed and local and self.place is None:
-            raise BadRequest(
-                f"scene {scene.name} is in local metres: say where it lies with --place LATITUDE,LONGITUDE, or give --sun AZIMUTH,ELEVATION"
-            )
+            raise BadRequest(f"scene {scene.name} has local coordinates: give its --place LATITUDE,LONGITUDE, or the sun as --sun AZIMUTH,ELEVATION")
 
 
-class Ground:
-    """Where on earth a scene lies, and how its axes lie there."""
+class SceneLocation:
+    """The position of a scene on earth and the orientation of its axes."""
 
     def __init__(self, scene: SceneRecord, box: Box, place: Place | None) -> None:
-        """Raises BadRequest when the scene's system cannot tell."""
-        from map3d.renderings.grid_north import Grid
+        """Raises BadRequest when the scene's coordinate system does not cover its position."""
+        from map3d.renderings.grid_north import GridNorth
 
         origin = scene.origin or (0.0, 0.0, 0.0)
         x, y = (origin[k] + (box[0][k] + box[1][k]) / 2 for k in (0, 1))
-        self._grid = None if scene.crs is None or scene.crs.wkt is None else Grid(scene.crs.wkt, x, y)
+        self._grid = None if scene.crs is None or scene.crs.wkt is None else GridNorth(scene.crs.wkt, x, y)
         self._place = place if self._grid is None else self._grid.place
 
     @property
@@ -111,10 +107,10 @@ class Ground:
 
 
 def _direction(azimuth_deg: float, elevation_deg: float) -> Vec3:
-    """Unit vector; azimuth clockwise from +y."""
+    """Returns the unit vector; the azimuth is clockwise from +y."""
     a, e = math.radians(azimuth_deg), math.radians(elevation_deg)
     return (math.sin(a) * math.cos(e), math.cos(a) * math.cos(e), math.sin(e))
 
 
-def _named(kinds: Collection[str], among: Collection[str]) -> str:
-    return "layer " + " and ".join(kind for kind in kinds if kind in among)
+def _named(kinds: Collection[str], requested: Collection[str]) -> str:
+    return "layer " + " and ".join(kind for kind in kinds if kind in requested)

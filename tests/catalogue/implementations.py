@@ -1,4 +1,4 @@
-"""The homes of the catalogue, and a rendering to fill them with."""
+"""The implementations of the catalogue, and a rendering to store in them."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -16,7 +16,7 @@ def _sqlite(folder: Path) -> Callable[[float], Catalogue]:
     return lambda lease_s: SqliteCatalogue(folder / "catalogue.sqlite", lease_s=lease_s)
 
 
-HOMES = {"sqlite": _sqlite}
+IMPLEMENTATIONS = {"sqlite": _sqlite}
 
 
 def rendering(name: str = "town-a") -> RenderingRecord:
