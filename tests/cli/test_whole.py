@@ -157,14 +157,14 @@ def wait_for(town: Workspace, done: int, process: "subprocess.Popen[bytes]") -> 
     ("statement", "says"),
     [
         ("UPDATE blob SET bytes = x'00' WHERE hash = (SELECT hash FROM tile WHERE layer = 0 LIMIT 1)", "hash"),
-        ("DELETE FROM tile WHERE layer = 1 AND z = (SELECT max(z) FROM tile) AND x = (SELECT max(x) FROM tile)", "differ in having it"),
+        ("DELETE FROM tile WHERE layer = 1 AND z = (SELECT max(z) FROM tile) AND x = (SELECT max(x) FROM tile)", "only one of the layers"),
         ("UPDATE block SET key = 'other' WHERE z = 0", "the catalogue says"),
         ("UPDATE block SET seam = x'4D334447' WHERE z > 0", "seam"),
         ("DELETE FROM block WHERE z = 0", "not stored"),
         ("DELETE FROM tile WHERE z = 0", "parent is missing"),
     ],
 )
-def test_verify_finds_what_was_changed_behind_its_back(run: Run, town: Workspace, statement: str, says: str) -> None:
+def test_verify_finds_changes_to_the_store(run: Run, town: Workspace, statement: str, says: str) -> None:
     run("render", "view")
     with sqlite3.connect(town.store_path("view", "0-45")) as db:
         assert db.execute(statement).rowcount > 0
@@ -184,7 +184,7 @@ def test_verify_finds_a_broken_chunk_and_a_stale_manifest(run: Run, town: Worksp
     status, out, _ = run("verify")
     assert status == 1
     assert "checksum" in out
-    assert "content_version is not what" in out
+    assert "content_version differs" in out
 
 
 def test_verify_says_when_blocks_are_not_done(run: Run, town: Workspace) -> None:

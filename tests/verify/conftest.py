@@ -1,4 +1,4 @@
-"""Published folders are made as in tests/publish."""
+"""Published folders, from the fixtures of tests/publish."""
 
 from tests.publish.conftest import built_viewer, finished, out, workspace
 

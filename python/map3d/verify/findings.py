@@ -1,4 +1,4 @@
-"""What a check found wrong."""
+"""The problems that a verification found."""
 
 from dataclasses import dataclass, field
 from typing import Final
@@ -8,8 +8,8 @@ MAX_LINES: Final = 1000
 
 @dataclass
 class Findings:
-    """`wrong`: one line each that says where, what is there and what should be; the first MAX_LINES, `total` counts all. `counted`: what was looked
-    at."""
+    """`wrong`: the first MAX_LINES problems, one line each: where, found, expected. `total`: the number of all problems. `counted`: the number of
+    checked things by kind."""
 
     wrong: list[str] = field(default_factory=list)
     total: int = 0
@@ -20,5 +20,5 @@ class Findings:
         if len(self.wrong) < MAX_LINES:
             self.wrong.append(line)
 
-    def count(self, what: str, number: int = 1) -> None:
-        self.counted[what] = self.counted.get(what, 0) + number
+    def count(self, kind: str, number: int = 1) -> None:
+        self.counted[kind] = self.counted.get(kind, 0) + number

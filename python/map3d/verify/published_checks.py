@@ -1,4 +1,4 @@
-"""Checks a published folder against itself, and against the workspace it came from if that is at hand."""
+"""Verifies a published folder: its consistency, and optionally its tiles against the workspace that it was published from."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -24,66 +24,67 @@ SHOWN: Final = 10
 
 
 @dataclass(frozen=True)
-class Verified:
-    """Counts of what was found right."""
+class VerifiedCounts:
+    """The number of verified files, archives and tiles."""
 
     files: int
     archives: int
     tiles: int
 
 
-def verify_published(folder: Path, workspace: Workspace | None = None) -> Verified:
-    """Raises NotFound, Corrupt (the manifest), VerifyFailed with what is wrong. With `workspace`, every tile is compared with the store's."""
+def verify_published(folder: Path, workspace: Workspace | None = None) -> VerifiedCounts:
+    """Verifies the folder, and compares every tile with the store when `workspace` is given. Raises NotFound, Corrupt for an invalid manifest,
+    VerifyFailed with the problems found."""
     try:
         manifest = Manifest.load((folder / FILE_NAME).read_bytes(), str(folder / FILE_NAME))
     except FileNotFoundError as error:
-        raise NotFound(f"{folder}: no published rendering there") from error
-    wrong = [f"{name} is missing" for name in (PAGE, SEARCH, ATTRIBUTES, CHECKSUMS) if not (folder / name).is_file()]
-    files, bad = _check_sums(folder)
-    wrong += bad
+        raise NotFound(f"{folder}: not a published rendering") from error
+    problems = [f"{name} is missing" for name in (PAGE, SEARCH, ATTRIBUTES, CHECKSUMS) if not (folder / name).is_file()]
+    files, added_problems = _check_sums(folder)
+    problems += added_problems
     archives = tiles = 0
     for view in manifest.views:
         for number, layers in enumerate(manifest.passes):
             track = None if workspace is None else workspace.store_path(manifest.name, track_id(view.frame.id, number))
             for layer in layers:
-                found, bad = _check_layer(folder, view, layer, track)
-                archives, tiles, wrong = archives + (found > 0), tiles + found, wrong + bad
-    if wrong:
-        more = f", and {len(wrong) - SHOWN} more" if len(wrong) > SHOWN else ""
-        raise VerifyFailed(f"{folder}: {'; '.join(wrong[:SHOWN])}{more}; publish it again")
-    return Verified(files, archives, tiles)
+                found, added_problems = _check_layer(folder, view, layer, track)
+                archives, tiles, problems = archives + (found > 0), tiles + found, problems + added_problems
+    if problems:
+        more = f", and {len(problems) - SHOWN} more" if len(problems) > SHOWN else ""
+        raise VerifyFailed(f"{folder}: {'; '.join(problems[:SHOWN])}{more}; publish it again")
+    return VerifiedCounts(files, archives, tiles)
 
 
 def _check_sums(folder: Path) -> tuple[int, list[str]]:
     path = folder / CHECKSUMS
     lines = path.read_text().splitlines() if path.is_file() else []
-    wrong = []
+    problems = []
     for line in lines:
         digest, _, name = line.partition("  ")
         file = folder / name
         if not file.is_file():
-            wrong.append(f"{name} is missing")
+            problems.append(f"{name} is missing")
         elif _digest(file) != digest:
-            wrong.append(f"{name} has other content than was published")
-    return len(lines) - len(wrong), wrong
+            problems.append(f"{name} has changed since it was published")
+    return len(lines) - len(problems), problems
 
 
 def _check_layer(folder: Path, view: ViewFacts, layer: Layer, track: Path | None) -> tuple[int, list[str]]:
-    """`track`: the tile store to compare with."""
+    """Returns the number of tiles and the problems. `track`: the tile store to compare with."""
     name = (view.archives or {}).get(layer.name)
     if name is None:
         count = view.occupancy.count()
-        return 0, [f"view {view.frame.id}: no archive of layer {layer.name} for {count} tiles"] if count else []
+        return 0, [f"view {view.frame.id}: no archive for {count} tiles of layer {layer.name}"] if count else []
     with ExitStack() as opened:
         store = None if track is None else opened.enter_context(SqliteTileStore(track, read_only=True))
         try:
             archive = Archive(folder / name)
-            wrong = [] if archive.is_of(layer) else [f"{name}: its tiles are not {layer.format}"]
+            problems = [] if archive.is_of(layer) else [f"{name}: its tiles are not {layer.format}"]
             seen: set[TileId] = set()
-            wrong += _check_tiles(archive, name, layer, store, seen)
+            problems += _check_tiles(archive, name, layer, store, seen)
         except Corrupt as error:
             return 0, [str(error)]
-    return len(seen), wrong + _check_occupancy(name, view.occupancy, seen)
+    return len(seen), problems + _check_occupancy(name, view.occupancy, seen)
 
 
 def _check_tiles(archive: Archive, name: str, layer: Layer, store: TileStore | None, seen: set[TileId]) -> Iterator[str]:
@@ -93,14 +94,14 @@ def _check_tiles(archive: Archive, name: str, layer: Layer, store: TileStore | N
         if not data.startswith(FIRST_BYTES[layer.format]):
             yield f"{name}: tile {tile.z}/{tile.x}/{tile.y} is not {layer.format}"
         if store is not None and store.get_tile(number, *tile) != data:
-            yield f"{name}: tile {tile.z}/{tile.x}/{tile.y} is not the store's"
+            yield f"{name}: tile {tile.z}/{tile.x}/{tile.y} differs from the store"
 
 
 def _check_occupancy(name: str, occupancy: Occupancy, seen: set[TileId]) -> list[str]:
     expected = {tile for z in range(occupancy.zmax + 1) for tile in occupancy.tiles(z)}
-    lost, added = expected - seen, seen - expected
-    return ([f"{name}: {len(lost)} tiles are missing"] if lost else []) + (
-        [f"{name}: {len(added)} tiles that the manifest does not know"] if added else []
+    missing, added = expected - seen, seen - expected
+    return ([f"{name}: {len(missing)} tiles are missing"] if missing else []) + (
+        [f"{name}: {len(added)} tiles are not in the manifest"] if added else []
     )
 
 

@@ -1,4 +1,4 @@
-"""`map3d verify`: believes nothing that it can count again."""
+"""`map3d verify`: recomputes everything that can be recomputed, for scenes and renderings."""
 
 from collections.abc import Callable, Mapping
 
@@ -18,19 +18,19 @@ from map3d.verify.findings import Findings
 from map3d.verify.track_checks import check_track
 
 Progress = Callable[[str, int, int], None]
-"""(what, done, total)."""
+"""(stage, done, total)."""
 
 
 def verify_scene(workspace: Workspace, catalogue: Catalogue, scene: str, findings: Findings, progress: Progress) -> None:
-    """Checksums of all files, the scene index, ids against the registry."""
+    """Checks the checksums of all files, the scene index, and the ids against the registry."""
     folder = workspace.scene_folder(scene)
     if not catalogue.assets(scene):
         return
     files = list(binary_files(folder))
     for done, path in enumerate(files, 1):
-        wrong = check_file(path)
-        if wrong:
-            findings.add(wrong)
+        problem = check_file(path)
+        if problem:
+            findings.add(problem)
         progress(f"files of {scene}", done, len(files))
     findings.count("scene files", len(files))
     if (folder / "scene.json").is_file():
@@ -44,10 +44,10 @@ def verify_scene(workspace: Workspace, catalogue: Catalogue, scene: str, finding
 
 
 def verify_rendering(workspace: Workspace, catalogue: Catalogue, name: str, findings: Findings, progress: Progress) -> None:
-    """Jobs against the plan, tiles against jobs, every tile, seam and parent, the manifest."""
+    """Checks jobs against the plan, stored blocks against jobs, every tile, seam and parent, and the manifest."""
     record = catalogue.rendering(name)
     if is_stale(workspace, catalogue, record.scene):
-        findings.add(f"scene {record.scene}: its files changed since it was built; run map3d render {name}")
+        findings.add(f"scene {record.scene}: its files have changed since the last build; run map3d render {name}")
         return
     scene = open_scene(workspace, record.scene)
     _check_plan(catalogue, record, scene, findings)
@@ -61,33 +61,33 @@ def verify_rendering(workspace: Workspace, catalogue: Catalogue, name: str, find
 
 
 def _check_plan(catalogue: Catalogue, record: RenderingRecord, scene: _core.Scene, findings: Findings) -> None:
-    """Every block that the scene asks for is a job, done, with the key that it has now."""
+    """Checks that every block with content has a job that is done with the current key."""
     jobs = {(job.track, job.block): job for job in catalogue.jobs(record.name)}
-    known: dict[str, list[BlockId]] = {}
+    blocks: dict[str, list[BlockId]] = {}
     for job in jobs.values():
         if job.kind == "base":
-            known.setdefault(job.track, []).append(job.block)
-    planned = plan_jobs(scene, record, known)
-    for wanted in planned:
-        found = jobs.pop((wanted.track, wanted.block), None)
+            blocks.setdefault(job.track, []).append(job.block)
+    planned = plan_jobs(scene, record, blocks)
+    for expected in planned:
+        found = jobs.pop((expected.track, expected.block), None)
         if found is None:
-            findings.add(f"{record.name} {wanted.track} block {wanted.block}: the scene has content there, no job")
-        elif found.key != wanted.key:
-            findings.add(f"{record.name} {wanted.track} block {wanted.block}: rendered from an older scene; run map3d render {record.name}")
+            findings.add(f"{record.name} {expected.track} block {expected.block}: has content but no job")
+        elif found.key != expected.key:
+            findings.add(f"{record.name} {expected.track} block {expected.block}: rendered from an older scene; run map3d render {record.name}")
         elif found.state is not State.DONE:
-            why = f" ({found.reason})" if found.reason else ""
-            findings.add(f"{record.name} {wanted.track} block {wanted.block}: {found.state}, not done{why}")
+            reason = f" ({found.reason})" if found.reason else ""
+            findings.add(f"{record.name} {expected.track} block {expected.block}: {found.state} instead of done{reason}")
     for track, block in jobs:
-        findings.add(f"{record.name} {track} block {block}: a job that no plan asks for")
+        findings.add(f"{record.name} {track} block {block}: a job outside the plan")
     findings.count("blocks", len(planned))
 
 
 def _check_passes(record: RenderingRecord, found: Mapping[str, set[TileId] | None], findings: Findings) -> None:
-    """Every pass of a view has the same tiles, unless nothing of it is rendered yet. `found`: of each track, the first pass first."""
+    """Checks that every rendered pass of a view has the same tiles. `found`: the tiles by track, starting with the first pass."""
     (first, tiles), *later = found.items()
     for track, others in later:
         for tile in sorted(tiles ^ others) if tiles is not None and others is not None else ():
-            findings.add(f"{record.name} tile {tile.z}/{tile.x}/{tile.y}: tracks {first} and {track} differ in having it")
+            findings.add(f"{record.name} tile {tile.z}/{tile.x}/{tile.y}: exists in only one of the tracks {first} and {track}")
 
 
 def _is_complete(catalogue: Catalogue, record: RenderingRecord) -> bool:
@@ -102,10 +102,10 @@ def _check_manifest(workspace: Workspace, catalogue: Catalogue, record: Renderin
     try:
         found = Manifest.load(path.read_bytes(), str(path)).to_json()
     except (OSError, Map3dError) as error:
-        findings.add(f"{path}: cannot be read: {error}")
+        findings.add(f"{path}: cannot read the manifest: {error}")
         return
     expected = current_manifest(workspace, catalogue, record, scene.box, {}).to_json()
     for key in sorted(set(found) | set(expected)):
         if found.get(key) != expected.get(key):
-            findings.add(f"{path}: {key} is not what the catalogue and the stores say; run map3d render {record.name}")
+            findings.add(f"{path}: {key} differs from the catalogue and the tile stores; run map3d render {record.name}")
     findings.count("manifests")

@@ -31,27 +31,27 @@ def check_track(
     findings: Findings,
     progress: Progress,
 ) -> set[TileId] | None:
-    """`ids`: of all objects in the registry, sorted. Returns the tiles that are there; None: not one block is done."""
+    """Checks one track. `ids`: the sorted ids of all registered objects. Returns the stored tiles, None when no block is done."""
     jobs = {job.block: job for job in catalogue.jobs(record.name, track.id)}
     path = workspace.store_path(record.name, track.id)
     if not path.is_file():
         if any(job.state is State.DONE for job in jobs.values()):
-            findings.add(f"{path}: not there, though jobs of it are done")
+            findings.add(f"{path}: missing, although jobs of this track are done")
         return None
     with SqliteTileStore(path, read_only=True) as store:
-        check = _TrackCheck(f"{record.name} {track.id}", store, track, jobs, findings, progress)
+        checker = _TrackChecker(f"{record.name} {track.id}", store, track, jobs, findings, progress)
         for line in store.check():
             findings.add(f"{path}: {line}")
-        check.blocks()
-        tiles = check.tile_names()
-        check.pyramid(tiles, planned_occupancy(scene, record, track.frame))
-        check.images(tiles, ids)
-        check.reduces()
+        checker.check_blocks()
+        tiles = checker.collect_tiles()
+        checker.check_pyramid(tiles, planned_occupancy(scene, record, track.frame))
+        checker.check_images(tiles, ids)
+        checker.check_reduce_blocks()
     return tiles if any(job.state is State.DONE for job in jobs.values()) else None
 
 
 @dataclass
-class _TrackCheck:
+class _TrackChecker:
     where: str
     store: SqliteTileStore
     track: Track
@@ -59,23 +59,24 @@ class _TrackCheck:
     findings: Findings
     progress: Progress
 
-    def blocks(self) -> None:
-        """Done jobs and stored blocks are the same, with the same keys, versions and counts; seams are whole."""
+    def check_blocks(self) -> None:
+        """Checks that done jobs and stored blocks match in key, version and number of tiles, and that seams are intact."""
         stored = {block.id: block for block in self.store.list_blocks()}
         for block, job in self.jobs.items():
             if job.state is State.DONE:
                 self._check_block(job, stored.get(block))
         for block in stored.keys() - self.jobs.keys():
-            self.findings.add(f"{self.where} block {block}: stored, no job stands for it")
+            self.findings.add(f"{self.where} block {block}: stored without a job")
 
     def _check_block(self, job: Job, stored: StoredBlock | None) -> None:
         where, result = f"{self.where} block {job.block}", job.result
         if stored is None or result is None:
-            self.findings.add(f"{where}: done, its tiles are not stored; run map3d retry")
+            self.findings.add(f"{where}: done but not stored; run map3d retry")
             return
         if (stored.key, stored.version, stored.tiles) != (job.key, result.version, result.tiles):
-            have, want = f"{stored.key} v{stored.version} {stored.tiles} tiles", f"{job.key} v{result.version} {result.tiles} tiles"
-            self.findings.add(f"{where}: stored is {have}, the catalogue says {want}")
+            found = f"{stored.key} v{stored.version} with {stored.tiles} tiles"
+            expected = f"{job.key} v{result.version} with {result.tiles} tiles"
+            self.findings.add(f"{where}: the store has {found}, the catalogue says {expected}")
         seam = self.store.get_seam(job.block)
         if (seam is None) != (stored.tiles == 0):
             self.findings.add(f"{where}: {stored.tiles} tiles and {'no' if seam is None else 'a'} seam")
@@ -83,28 +84,28 @@ class _TrackCheck:
             self._try(where, lambda: check_seam(seam, self.track.frame.tile_px, self.track.layers))
             self.findings.count("seams")
 
-    def tile_names(self) -> set[TileId]:
-        """Of the first layer; the others must have the same."""
+    def collect_tiles(self) -> set[TileId]:
+        """Returns the stored tiles and checks that all layers have the same."""
         sets = [set(self.store.list_tiles(layer)) for layer in range(len(self.track.layers))]
         for layer, names in zip(self.track.layers, sets, strict=True):
             for tile in sorted(names ^ sets[0]):
-                self.findings.add(f"{self.where} {_name(tile)}: layer {layer.name} and layer {self.track.layers[0].name} differ in having it")
+                self.findings.add(f"{self.where} {_name(tile)}: exists in only one of the layers {layer.name} and {self.track.layers[0].name}")
         return set.union(*sets)
 
-    def pyramid(self, tiles: set[TileId], planned: Occupancy) -> None:
-        """Over every tile there is its parent, under every tile above zmax a child, no base tile where the scene has nothing."""
+    def check_pyramid(self, tiles: set[TileId], planned: Occupancy) -> None:
+        """Checks that every tile has its parent, every tile above level zmax has a child, and base tiles exist only where the scene has content."""
         for tile in sorted(tiles):
             above = parent(tile)
             if above is not None and above not in tiles and self._is_done(above):
                 self.findings.add(f"{self.where} {_name(tile)}: its parent is missing")
             if tile.z < self.track.frame.zmax:
                 if not any(child in tiles for child in children(tile)):
-                    self.findings.add(f"{self.where} {_name(tile)}: has content, none of its children has")
+                    self.findings.add(f"{self.where} {_name(tile)}: has content, but none of its children has")
             elif tile not in planned:
                 self.findings.add(f"{self.where} {_name(tile)}: has content where the scene has none")
 
-    def images(self, tiles: set[TileId], ids: NDArray[np.uint32]) -> None:
-        """Every image decodes to its size; every id is in the registry."""
+    def check_images(self, tiles: set[TileId], ids: NDArray[np.uint32]) -> None:
+        """Checks that every image decodes to its size and that every id is registered."""
         for done, tile in enumerate(sorted(tiles), 1):
             for number, layer in enumerate(self.track.layers):
                 data = self.store.get_tile(number, *tile)
@@ -122,8 +123,8 @@ class _TrackCheck:
         self.findings.count("tiles", len(tiles))
         self.findings.count("images", len(tiles) * len(self.track.layers))
 
-    def reduces(self) -> None:
-        """Reduces every done reduce block again from its seams: the tiles must be those that are stored."""
+    def check_reduce_blocks(self) -> None:
+        """Reduces every done reduce block again from its seams, and compares the result with the stored tiles."""
         text = frame_text(self.track)
         for block, job in self.jobs.items():
             if job.kind == "reduce" and job.state is State.DONE:
@@ -134,18 +135,18 @@ class _TrackCheck:
                 ]
                 levels = block_level(block.z, self.track.frame.zmax).levels
                 self._try(f"{self.where} block {block}", lambda: self._compare(block, _core.reduce_block(text, *block, levels, seams)))  # noqa: B023
-                self.findings.count("reduced again")
+                self.findings.count("reduced blocks")
 
-    def _compare(self, block: BlockId, made: _core.Block) -> None:
-        for layer, z, x, y, data in made.tiles:
+    def _compare(self, block: BlockId, reduced: _core.Block) -> None:
+        for layer, z, x, y, data in reduced.tiles:
             if self.store.get_tile(layer, z, x, y) != data:
-                self.findings.add(f"{self.where} {z}/{x}/{y} {self.track.layers[layer].name}: not what its seams reduce to")
-        if self.store.get_seam(block) != made.seam:
-            self.findings.add(f"{self.where} block {block}: its seam is not what the seams below reduce to")
+                self.findings.add(f"{self.where} {z}/{x}/{y} {self.track.layers[layer].name}: differs from the reduced seams")
+        if self.store.get_seam(block) != reduced.seam:
+            self.findings.add(f"{self.where} block {block}: its seam differs from the reduced seams below")
 
     def _check_ids(self, tile: TileId, unknown: NDArray[np.uint32]) -> None:
         if len(unknown):
-            self.findings.add(f"{self.where} {_name(tile)}: ids {unknown[:5].tolist()} that the registry does not have")
+            self.findings.add(f"{self.where} {_name(tile)}: unregistered ids {unknown[:5].tolist()}")
 
     def _is_done(self, tile: TileId) -> bool:
         job = self.jobs.get(block_of(tile, self.track.frame.zmax))
