@@ -60,8 +60,8 @@ wheel: build ## build dist/map3d-*.whl: abi3, manylinux, with the viewer inside
 
 # -- use -----------------------------------------------------------------------------------------------------------------------------
 
-demo: build ## make a town, render it in 4 directions, serve it on a free port
-	$(BIN)/python -m map3d.demo demo
+demo: build ## generate a town, render it, serve it on a free port and print the address of its map
+	$(BIN)/map3d demo --folder demo
 
 # -- test ----------------------------------------------------------------------------------------------------------------------------
 

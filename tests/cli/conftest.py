@@ -1,4 +1,4 @@
-"""The command line in this process, in an own workspace and folder."""
+"""The command line in this process, with its own workspace and folder."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from tests.cli.towns import Run
 
 @pytest.fixture
 def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Run:
-    """(status, output, errors) of a command line."""
+    """Runs a command line and returns (status, output, errors)."""
     monkeypatch.setenv("MAP3D_WORKSPACE", str(tmp_path / "workspace"))
     monkeypatch.chdir(tmp_path)
 

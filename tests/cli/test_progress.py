@@ -1,4 +1,4 @@
-"""What a log says of a long operation."""
+"""The log lines of long operations."""
 
 import io
 
@@ -7,7 +7,7 @@ from rich.console import Console
 from map3d.cli.progress import LoggedProgress, line, show_stage
 
 
-def test_a_line_tells_how_much_is_done_how_fast_and_what_is_left() -> None:
+def test_line_shows_count_rate_and_remaining_time() -> None:
     shown = io.StringIO()
     with LoggedProgress(Console(file=shown, width=200), every_s=0.0) as bar:
         task = bar.add_task("rendering", total=120, rate="10 base tiles/s")
@@ -18,21 +18,21 @@ def test_a_line_tells_how_much_is_done_how_fast_and_what_is_left() -> None:
     assert text.count("\n") == 1
 
 
-def test_short_operations_leave_no_line() -> None:
+def test_short_operation_prints_no_line() -> None:
     shown = io.StringIO()
     with LoggedProgress(Console(file=shown)) as bar:
         bar.update(bar.add_task("planning", total=3), completed=3)
     assert shown.getvalue() == ""
 
 
-def test_what_has_no_number_tells_its_time() -> None:
+def test_task_without_count_shows_elapsed_time() -> None:
     bar = LoggedProgress(Console(file=io.StringIO()))
     bar.add_task("1 of 3: town.gml", total=None)
     bar.tasks[0].start_time = bar.get_time() - 75
     assert line(bar.tasks[0]) == "1 of 3: town.gml: 75 s"
 
 
-def test_each_stage_has_a_rate_of_its_own() -> None:
+def test_each_stage_has_its_own_rate() -> None:
     shown = io.StringIO()
     with LoggedProgress(Console(file=shown, width=200), every_s=0.0) as bar:
         task = bar.add_task("building", total=None)

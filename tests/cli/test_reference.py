@@ -1,4 +1,4 @@
-"""docs/cli.md says what the commands say."""
+"""docs/cli.md equals the help of the commands."""
 
 import importlib.util
 from pathlib import Path
@@ -6,10 +6,10 @@ from pathlib import Path
 DOCS = Path(__file__).parents[2] / "docs"
 
 
-def test_the_reference_is_the_commands_own_help() -> None:
+def test_reference_is_up_to_date() -> None:
     spec = importlib.util.spec_from_file_location("make_cli", DOCS / "make_cli.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    assert (DOCS / "cli.md").read_text(encoding="utf-8") == module.reference(), "make docs writes it anew"
+    assert (DOCS / "cli.md").read_text(encoding="utf-8") == module.reference(), "run python docs/make_cli.py"

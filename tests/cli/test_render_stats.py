@@ -11,13 +11,13 @@ from tests.cli.towns import Run, write_town
 STAGES = {"visibility", "shade", "light", "reduce", "encode", "seam"}
 
 
-def test_nothing_rendered_is_all_zero() -> None:
+def test_summary_without_rendered_blocks_is_zero() -> None:
     found = summary({})
     assert set(found["seconds"].values()) == {0.0}
     assert found["caches"]["chunk"] == {"hits": 0, "misses": 0, "hit_rate": None}
 
 
-def test_hit_rates_are_shares_of_what_was_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+def test_hit_rate_is_hits_per_request(capsys: pytest.CaptureFixture[str]) -> None:
     found = summary({"shade_s": 3.0, "encode_s": 1.0, "chunk_hits": 30, "chunk_misses": 10, "texture_hits": 1})
     assert found["seconds"]["shade"] == 3.0
     assert found["caches"]["chunk"]["hit_rate"] == 0.75
@@ -29,7 +29,7 @@ def test_hit_rates_are_shares_of_what_was_asked_for(capsys: pytest.CaptureFixtur
 
 
 @pytest.mark.whole
-def test_a_render_tells_its_stages_and_caches(run: Run, tmp_path: Path) -> None:
+def test_render_prints_stages_and_caches(run: Run, tmp_path: Path) -> None:
     pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
     run("create-scene", "town")
     assert run("add-files", "town", str(write_town(tmp_path / "files")))[0] == 0

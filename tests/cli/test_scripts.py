@@ -1,4 +1,4 @@
-"""The three scripts of the first system of this kind, as they are installed beside the interpreter."""
+"""The three scripts with the names of map3d's predecessor, as installed next to the interpreter."""
 
 import os
 import subprocess
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.whole
 SCRIPTS = Path(sys.executable).parent
 
 
-def test_the_scripts_make_a_scene_that_renders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+def test_scripts_create_a_scene_that_renders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setenv("MAP3D_WORKSPACE", str(tmp_path / "workspace"))
     monkeypatch.chdir(tmp_path)
     write_teatime(tmp_path / "files")
@@ -32,7 +32,7 @@ def test_the_scripts_make_a_scene_that_renders(tmp_path: Path, monkeypatch: pyte
     assert "teatime is complete" in capfd.readouterr().out
 
 
-def test_what_a_script_cannot_do_it_says_as_the_command_line_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_script_reports_errors_like_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MAP3D_WORKSPACE", str(tmp_path / "workspace"))
     done = subprocess.run([SCRIPTS / "addFilesToScene.py", "nowhere", "nothing.obj"], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (2, "")

@@ -1,8 +1,9 @@
-"""What every verb does before any scene is built: help, refusals, listings."""
+"""Help, errors and listings of the verbs, without a built scene."""
 
 import json
 from pathlib import Path
 
+import click
 import pytest
 
 from map3d import __version__
@@ -13,14 +14,14 @@ from tests.cli.towns import Run
 
 
 @pytest.mark.parametrize("verb", sorted(VERBS))
-def test_every_verb_has_a_help_that_says_what_it_does(run: Run, verb: str) -> None:
+def test_every_verb_and_option_has_a_help_text(run: Run, verb: str) -> None:
     status, out, err = run(verb, "--help")
     assert (status, err) == (0, "")
     assert out.startswith(f"Usage: map3d {verb}")
     assert all(not line.strip().startswith("--") or len(line.split()) > 1 for line in out.splitlines())
 
 
-def test_help_lists_the_verbs_in_the_order_of_work(run: Run) -> None:
+def test_help_lists_the_verbs_in_the_order_of_use(run: Run) -> None:
     for arguments in ((), ("--help",), ("-h",)):
         status, out, _ = run(*arguments)
         assert status == 0
@@ -40,17 +41,17 @@ def test_version(run: Run) -> None:
         (("render", "x", "--workers", "0"), 2, "--workers"),
         (("render", "x"), 2, "create-scene"),
         (("show", "scenes"), 2, "create-scene"),
-        (("show", "jobs"), 2, "give a name"),
+        (("show", "jobs"), 2, "missing NAME"),
         (("serve",), 2, "create-scene"),
         (("verify",), 2, "create-scene"),
         (("create-scene", "Bad Name"), 2, "scene name"),
         (("create-scene", "a", "--crs", "EPSG:4326"), 2, "projected"),
         (("create-scene", "a", "--crs", "nonsense"), 2, "--crs"),
         (("add-files", "a"), 2, "FILES"),
-        (("create-rendering", "a", "b", "--view", "north"), 2, "look-at/pitch"),
+        (("create-rendering", "a", "b", "--view", "north"), 2, "e.g. 45-22.5 or 45/22.5"),
     ],
 )
-def test_errors_are_one_line_that_says_what_to_do(run: Run, arguments: tuple[str, ...], status: int, says: str) -> None:
+def test_error_is_one_line_that_says_what_to_do(run: Run, arguments: tuple[str, ...], status: int, says: str) -> None:
     got, _, err = run(*arguments)
     assert got == status
     assert err.startswith("map3d: ")
@@ -59,14 +60,14 @@ def test_errors_are_one_line_that_says_what_to_do(run: Run, arguments: tuple[str
     assert "Traceback" not in err
 
 
-def test_tracebacks_come_only_when_asked_for(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_traceback_is_printed_only_on_request(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MAP3D_DEBUG", "1")
     _, _, err = run("show", "scenes")
     assert "Traceback" in err
     assert err.splitlines()[-1].startswith("map3d: ")
 
 
-def test_scenes_are_made_and_shown(run: Run) -> None:
+def test_created_scenes_are_shown(run: Run) -> None:
     assert run("create-scene", "town", "--crs", "urn:adv:crs:ETRS89_UTM32*DE_DHHN2016_NH", "--title", "Town", "--no-merge-faces")[0] == 0
     status, _, err = run("create-scene", "town")
     assert (status, "exists already" in err) == (2, True)
@@ -81,7 +82,7 @@ def test_scenes_are_made_and_shown(run: Run) -> None:
     assert json.loads(run("show", "renderings", "--json")[1]) == []
 
 
-def test_what_is_not_there_is_named_with_what_is(run: Run) -> None:
+def test_unknown_name_lists_the_existing_ones(run: Run) -> None:
     run("create-scene", "town")
     status, _, err = run("show", "scene", "twon")
     assert (status, "existing scenes: town" in err) == (2, True)
@@ -90,7 +91,7 @@ def test_what_is_not_there_is_named_with_what_is(run: Run) -> None:
         assert (status, "no rendering 'x'" in err) == (2, True), arguments
 
 
-def test_files_of_unknown_type_are_refused_naming_the_known_ones(run: Run, tmp_path: Path) -> None:
+def test_file_of_unknown_format_is_refused_naming_the_known_formats(run: Run, tmp_path: Path) -> None:
     run("create-scene", "town")
     (tmp_path / "a.skp").write_bytes(b"\xff\xfe\xff\x0eSketchUp")
     status, _, err = run("add-files", "town", "a.skp")
@@ -99,13 +100,13 @@ def test_files_of_unknown_type_are_refused_naming_the_known_ones(run: Run, tmp_p
     assert (status, "no such file" in err) == (2, True)
 
 
-def test_a_scene_without_files_cannot_be_seen(run: Run) -> None:
+def test_scene_without_files_is_refused(run: Run) -> None:
     run("create-scene", "town")
     status, _, err = run("create-rendering", "town", "r", "--res", "1")
     assert (status, "add-files" in err) == (2, True)
 
 
-def test_resolution_must_be_given_one_way(run: Run) -> None:
+def test_conflicting_options_are_refused(run: Run) -> None:
     run("create-scene", "town")
     for arguments in (("--view", "0/45", "--directions", "4"), ("--layers", "color,colour"), ("--layers", "id,id")):
         status, _, err = run("create-rendering", "town", "r", "--res", "1", *arguments)
@@ -120,17 +121,25 @@ def test_sizes(text: str, size: int) -> None:
 
 
 @pytest.mark.parametrize("text", ["", "-1", "many", "1X", "0", "1e9"])
-def test_what_is_no_size(text: str) -> None:
+def test_invalid_size(text: str) -> None:
     with pytest.raises(Exception, match="not a size"):
         Bytes().convert(text, None, None)
 
 
-def test_views() -> None:
-    assert View().convert("45/22.5", None, None) == ViewAngles(45.0, 22.5)
-    assert View().convert("90", None, None) == ViewAngles(90.0, 45.0)
+@pytest.mark.parametrize(
+    ("text", "view"), [("45-22.5", (45.0, 22.5)), ("45/22.5", (45.0, 22.5)), ("90", (90.0, 45.0)), ("0-90", (0.0, 90.0)), ("359.5/1", (359.5, 1.0))]
+)
+def test_views(text: str, view: tuple[float, float]) -> None:
+    assert View().convert(text, None, None) == ViewAngles(*view)
 
 
-def test_old_names_are_the_same_verbs(run: Run, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("text", ["", "north", "45-", "45/22/5", "45-22-5", "-45/22", "360-45", "0-0", "0-91", "nan/45", "45/nan"])
+def test_invalid_view(text: str) -> None:
+    with pytest.raises(click.BadParameter):
+        View().convert(text, None, None)
+
+
+def test_scripts_run_the_same_verbs(run: Run, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     from map3d.cli import scripts
 
     for function, verb in (

@@ -1,14 +1,14 @@
-"""A small town of boxes as OBJ files, and what runs a command line on it."""
+"""A small town of boxes as OBJ files, and the type of the `run` fixture."""
 
 from collections.abc import Callable
 from pathlib import Path
 
 Run = Callable[..., tuple[int, str, str]]
-"""(status, output, errors) of a command line's words."""
+"""Takes the words of a command line; returns (status, output, errors)."""
 
 
 def house(x: float, y: float, height: float) -> str:
-    """A box of 8 × 10 m."""
+    """Returns a box of 8 × 10 m as OBJ."""
     corners = [(x + dx, y + dy, z) for z in (0.0, height) for dy in (0.0, 10.0) for dx in (0.0, 8.0)]
     faces = [(1, 3, 4, 2), (5, 6, 8, 7), (1, 2, 6, 5), (2, 4, 8, 6), (4, 3, 7, 8), (3, 1, 5, 7)]
     lines = [f"v {a} {b} {c}" for a, b, c in corners] + ["f " + " ".join(map(str, face)) for face in faces]
@@ -16,7 +16,7 @@ def house(x: float, y: float, height: float) -> str:
 
 
 def write_town(folder: Path, side: int = 4) -> Path:
-    """side × side houses, 40 m apart."""
+    """Writes side × side houses, 40 m apart."""
     folder.mkdir(parents=True, exist_ok=True)
     for i in range(side):
         for j in range(side):

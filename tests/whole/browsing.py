@@ -52,8 +52,8 @@ def served(workspace: Path) -> Iterator[str]:
     assert server.stdout is not None
     try:
         for line in server.stdout:
-            if found := re.search(r"http://\S+?(?=/?\s*$)", line):
-                yield found[0].rstrip("/")
+            if found := re.search(r"http://[^\s/]+", line):
+                yield found[0]
                 break
         else:
             pytest.fail("the server ended without an address")

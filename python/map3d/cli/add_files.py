@@ -17,21 +17,21 @@ from map3d.errors import BadRequest, Map3dError, UnknownFormat
 @click.command("add-files")
 @click.argument("scene")
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--crs", help="The files' coordinate system, where they do not say or say wrong; 'local' for plain metres.")
-@click.option("--name", help="Name of the asset.  [default: that of the file]")
+@click.option("--crs", help="Coordinate system of the files, where they do not state it or state it wrongly; 'local' for local metres.")
+@click.option("--name", help="Name of the asset.  [default: name of the file]")
 @click.option("--up", type=click.Choice(["y", "z"]), default="z", show_default=True, help="OBJ: the axis that points up.")
-@click.option("--split", type=click.Choice(["file", "group"]), default="file", show_default=True, help="OBJ: what is one object.")
+@click.option("--split", type=click.Choice(["file", "group"]), default="file", show_default=True, help="OBJ: the part that becomes one object.")
 @click.option("--theme", help="CityGML: the appearance theme to use.  [default: the first in the file]")
 @click.option("--lod", help="CityGML: the level of detail to use.  [default: the best of each object]")
-@click.option("--strict", is_flag=True, help="Stop at the first fault instead of skipping and counting it.")
+@click.option("--strict", is_flag=True, help="Stop at the first problem instead of skipping and counting it.")
 @click.option("--parse-memory", "parse_memory_bytes", type=Bytes(), help="Memory of the process that reads a file.  [default: 1G; 2G above 100 MB]")
-@click.option("--parse-cpu", "parse_cpu_s", type=click.IntRange(1), help="Seconds of processor time to read a file.  [default: 60 for each 100 MB]")
+@click.option("--parse-cpu", "parse_cpu_s", type=click.IntRange(1), help="Seconds of CPU time to read a file.  [default: 60 per 100 MB]")
 @json_option
 @workspace_option
 def command(workspace: Workspace, scene: str, files: Sequence[Path], as_json: bool, name: str | None, **options: Any) -> None:
-    """Add FILES to SCENE: CityGML, OBJ, and GeoTIFF rasters of elevation and imagery; of a folder every file that can be read.
+    """Import FILES into SCENE: CityGML, OBJ, and GeoTIFF rasters of elevation and imagery. For a folder, import every file in a known format.
 
-    A file of a name that is there already replaces what was imported from it; objects keep their ids.
+    A file with the name of an existing asset replaces that asset; its objects keep their ids.
     """
     from map3d.ingest.import_options import ImportOptions
     from map3d.ingest.importing import import_file
@@ -40,11 +40,11 @@ def command(workspace: Workspace, scene: str, files: Sequence[Path], as_json: bo
 
     done: list[Any] = []
     failed: list[tuple[str, str]] = []
-    sources = find_sources(files, name, lambda path, why: failed.append((str(path), why)))
+    sources = find_sources(files, name, lambda path, reason: failed.append((str(path), reason)))
     if failed and options["strict"]:
         raise UnknownFormat(failed[0][1])
     if name is not None and len(sources) > 1:
-        raise BadRequest(f"--name {name}: there are {len(sources)} files; name one at a time")
+        raise BadRequest(f"--name {name}: applies to a single file, got {len(sources)}")
     catalogue = workspace.open_catalogue()
     try:
         catalogue.scene(scene)
@@ -84,7 +84,7 @@ def _print(scene: str, done: Sequence[Any], failed: Sequence[tuple[str, str]]) -
         for warning in item.report.get("warnings", [])[:8]:
             click.echo(f"{item.asset}: {warning['count']:,} × {warning['reason']}, e.g. {warning['example']}")
     for _, text in failed:
-        click.echo(f"not added: {text}", err=True)
+        click.echo(f"not imported: {text}", err=True)
     if done:
         click.echo(f"next: map3d create-rendering {scene} NAME --res METRES")
 

@@ -15,15 +15,15 @@ from map3d.renderings.layers import LayerRequest
 @json_option
 @workspace_option
 def command(workspace: Workspace, rendering: str, layers: LayerRequest, as_json: bool) -> None:
-    """Add layers to RENDERING, in all of its views. Nothing is rendered yet, and what is there stays as it is."""
+    """Add layers to all views of RENDERING. Existing layers do not change. Run map3d render afterwards."""
     from map3d.renderings.create import add_layers
 
     catalogue = workspace.open_catalogue()
     try:
-        made = add_layers(catalogue, rendering, layers)
+        record = add_layers(catalogue, rendering, layers)
     finally:
         catalogue.close()
     if as_json:
-        print_json(made)
+        print_json(record)
         return
-    click.echo(f"rendering {rendering}: {len(made.layers)} layers; next: map3d render {rendering}")
+    click.echo(f"rendering {rendering}: {len(record.layers)} layers; next: map3d render {rendering}")

@@ -10,19 +10,19 @@ from map3d.types import ViewAngles
 
 @click.command("add-views")
 @click.argument("rendering")
-@click.option("--view", "views", type=View(), multiple=True, required=True, help="A view as look-at/pitch in degrees; may be given more than once.")
+@click.option("--view", "views", type=View(), multiple=True, required=True, help="Look-at angle and pitch in degrees, e.g. 45-22.5; repeatable.")
 @json_option
 @workspace_option
 def command(workspace: Workspace, rendering: str, views: tuple[ViewAngles, ...], as_json: bool) -> None:
-    """Add views to RENDERING. Nothing is rendered yet, and what is there stays as it is."""
+    """Add views to RENDERING. Existing views do not change. Run map3d render afterwards."""
     from map3d.renderings.create import add_views
 
     catalogue = workspace.open_catalogue()
     try:
-        made = add_views(catalogue, rendering, views)
+        record = add_views(catalogue, rendering, views)
     finally:
         catalogue.close()
     if as_json:
-        print_json(made)
+        print_json(record)
         return
-    click.echo(f"rendering {rendering}: {len(made.frames)} views; next: map3d render {rendering}")
+    click.echo(f"rendering {rendering}: {len(record.frames)} views; next: map3d render {rendering}")

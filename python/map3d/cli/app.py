@@ -1,4 +1,4 @@
-"""The group of all verbs, and what becomes of errors."""
+"""The group of all verbs, and the handling of errors."""
 
 import importlib
 import os
@@ -25,13 +25,14 @@ VERBS: Final = {
     "site": "site",
     "verify": "verify",
     "show": "show",
+    "demo": "demo",
     "make-town": "make_town",
     "teatime": "teatime",
 }
 
 
 class Verbs(click.Group):
-    """Loads a verb's module when it is asked for, and lists the verbs in the order of work."""
+    """Loads the module of a verb on first use, and lists the verbs in the order of a typical workflow."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(VERBS)
@@ -46,27 +47,29 @@ class Verbs(click.Group):
 @click.group(cls=Verbs, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 @click.version_option(__version__, prog_name="map3d")
 def cli() -> None:
-    """Turns 3D city models into oblique image tiles that any phone can show.
+    """Turn 3D city models into oblique image tiles that any phone can show.
 
     \b
-    The usual way:
-      map3d create-scene town                           a place for files
-      map3d add-files town buildings.gml terrain.tif    CityGML, OBJ, GeoTIFF
-      map3d create-rendering town town-4 --res 0.2      what to see of it
-      map3d render town-4                               make the tiles
-      map3d serve                                       look at them
+    Typical use:
+      map3d create-scene town                           create an empty scene
+      map3d add-files town buildings.gml terrain.tif    import CityGML, OBJ, GeoTIFF
+      map3d create-rendering town town-4 --res 0.2      choose views and resolution
+      map3d render town-4                               render the tiles
+      map3d serve town-4                                open the map in a browser
 
-    Or all of it at once: map3d site FOLDER -o OUT
+    \b
+    All steps at once:     map3d site FOLDER -o OUT
+    With a generated town: map3d demo
     """
 
 
 def main() -> None:
-    """Runs the command line and ends the process: 0 done, 1 failed, 2 asked for something impossible, 130 interrupted."""
+    """Runs the command line and exits: 0 success, 1 failure, 2 invalid request, 130 interrupted."""
     sys.exit(run(sys.argv[1:]))
 
 
 def run(arguments: list[str]) -> int:
-    """The exit status. Errors are one line that says what to do; with MAP3D_DEBUG set, a traceback."""
+    """Runs the command line and returns the exit status. Prints errors on one line; with MAP3D_DEBUG set, prints a traceback too."""
     try:
         status: Any = cli.main(arguments, prog_name="map3d", standalone_mode=False)
         return status if isinstance(status, int) else 0
@@ -79,7 +82,7 @@ def run(arguments: list[str]) -> int:
         click.echo(f"map3d: {error.format_message()}{_see(error)}", err=True)
         return error.exit_code
     except (click.Abort, KeyboardInterrupt):
-        click.echo("map3d: stopped; give the same command again to go on", err=True)
+        click.echo("map3d: stopped; re-run the command to resume", err=True)
         return 130
     except BaseException as error:
         if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
@@ -96,9 +99,9 @@ def _see(error: click.ClickException) -> str:
 
 
 def _line(error: BaseException) -> str:
-    """A panic of the compiled core is no Exception, but as much a bug as one."""
+    """Returns the error as one line. A panic of the compiled core is a BaseException and is reported as a bug, like any unexpected exception."""
     if isinstance(error, Map3dError) or any(base.__name__ in ("CoreError", "TownError") for base in type(error).__mro__):
         return str(error)
     if isinstance(error, ImportError) and "map3d._core" in str(error):
-        return f"the compiled core is not there ({error}); install map3d with pip, or run `maturin develop --release` in a checkout"
-    return f"{type(error).__name__}: {error} (set MAP3D_DEBUG=1 to see where; this is a bug of map3d)"
+        return f"cannot import the compiled core ({error}); install map3d with pip, or run `make build` in a checkout"
+    return f"{type(error).__name__}: {error} (this is a bug in map3d; set MAP3D_DEBUG=1 for a traceback)"

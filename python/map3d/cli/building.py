@@ -1,4 +1,4 @@
-"""Building a scene with a bar, and its counted report as a table; on standard error, since it is a step on the way."""
+"""Builds a scene with a progress bar and prints the build report; on standard error, since the build is only one step of a verb."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,7 +14,7 @@ from map3d.cli.progress import progress_bar, show_stage
 def build_with_progress(
     workspace: Workspace, catalogue: Catalogue, scene: str, *, threads: int, max_memory_bytes: int | None = None
 ) -> dict[str, Any] | None:
-    """Builds the scene if its files changed; then its report."""
+    """Builds the scene if its files have changed, prints the report and returns it; returns None if the scene is up to date."""
     from map3d.renderings.build import BUILD_BYTES, build, is_stale
 
     if not is_stale(workspace, catalogue, scene):
@@ -33,13 +33,13 @@ def build_with_progress(
 
 
 def show_report(scene: str, report: Mapping[str, Any]) -> None:
-    """What was read, optimised and written, and what went wrong with images."""
-    note = console()
+    """Prints the counts of the build and the problems with images."""
+    log = console()
     table = Table("count", "", title=f"built {scene}", title_justify="left", box=None, pad_edge=False, show_header=False)
     table.columns[0].justify = "right"
     for name, count in report.items():
         if isinstance(count, int) and count:
             table.add_row(f"{count:,}", name.replace("_", " "))
-    note.print(table)
+    log.print(table)
     for reason, example in report.get("texture_warnings", {}).items():
-        note.print(f"{reason}: {example}")
+        log.print(f"{reason}: {example}")

@@ -32,54 +32,53 @@ class WindowText(click.ParamType):  # type: ignore[type-arg]
 @click.command("create-rendering")
 @click.argument("scene")
 @click.argument("name")
-@click.option("--view", "views", type=View(), multiple=True, help="A view as look-at/pitch in degrees, e.g. 45/22.5; may be given more than once.")
-@click.option("--directions", type=click.IntRange(1, 360), help="Instead of --view: so many views around, evenly.  [default: 4]")
-@click.option("--pitch", type=float, multiple=True, help="Pitch of --directions; 90 looks straight down.  [default: 45]")
-@click.option("--res", "res_m", type=float, help="Metres a pixel at the deepest level.")
-@click.option("--levels", type=click.IntRange(1, 27), help="Instead of --res: how many levels.")
+@click.option("--view", "views", type=View(), multiple=True, help="Look-at angle and pitch in degrees, e.g. 45-22.5; repeatable.")
+@click.option("--directions", type=click.IntRange(1, 360), help="Instead of --view: number of evenly spaced look-at angles.  [default: 4]")
+@click.option("--pitch", type=float, multiple=True, help="Pitch for --directions, in degrees; 90 looks straight down; repeatable.  [default: 45]")
+@click.option("--res", "res_m", type=float, help="Metres per pixel at the deepest level.")
+@click.option("--levels", type=click.IntRange(1, 27), help="Instead of --res: number of levels.")
 @click.option(
     "--window",
     type=WindowText(),
-    help="Show less than the whole scene: a square of SIZE metres in each view, around the ground point X, Y of the scene's coordinate system. "
-    "Content outside is left out.",
+    help="Render only a square of SIZE metres in each view, centred on the ground point X, Y in the scene's coordinate system.",
 )
 @layer_options()
-@click.option("--tile-size", type=click.Choice(["256", "512"]), default="256", show_default=True, help="Pixels of a tile's side.")
-@click.option("--title", default="", help="What people read.")
-@click.option("--attribution", default="", help="Whom to credit.  [default: the scene's]")
-@click.option("--regrid", is_flag=True, help="Pin an existing rendering anew to the scene as it is now; everything is rendered again.")
+@click.option("--tile-size", type=click.Choice(["256", "512"]), default="256", show_default=True, help="Side of a tile in pixels.")
+@click.option("--title", default="", help="Display title.  [default: the scene's]")
+@click.option("--attribution", default="", help="Attribution text.  [default: the scene's]")
+@click.option("--regrid", is_flag=True, help="Replace the frames of an existing rendering to fit the current scene; everything is rendered again.")
 @json_option
 @workspace_option
 def command(
     workspace: Workspace, scene: str, name: str, views: tuple[ViewAngles, ...], directions: int | None, as_json: bool, **options: Any
 ) -> None:
-    """Make the rendering NAME of SCENE: which views, layers and resolution. Nothing is rendered yet.
+    """Create the rendering NAME of SCENE with its views, layers and resolution. Run map3d render afterwards.
 
-    A view's look-at angle 0 looks north, 45 north-west, 90 west; its pitch is how far it looks below the horizon. The frame of each view is
-    pinned now and never moves, so that later additions do not renumber any tile.
+    Look-at angle 0 looks north, 45 north-west, 90 west; the pitch is the angle below the horizon. The frame of each view is fixed now, so that
+    later additions do not renumber any tile.
     """
     from map3d.renderings.create import RenderingRequest, create_rendering
 
     if views and (directions or options["pitch"]):
-        raise BadRequest("give either --view or --directions and --pitch")
-    chosen = views or around(directions or 4, options.pop("pitch") or (45.0,))
+        raise BadRequest("give either --view, or --directions and --pitch")
+    chosen = views or views_around(directions or 4, options.pop("pitch") or (45.0,))
     options.pop("pitch", None)
     request = RenderingRequest(scene, name, chosen, tile_px=int(options.pop("tile_size")), **options)
     catalogue = workspace.open_catalogue()
     try:
         request.check(catalogue)
         built = build_with_progress(workspace, catalogue, scene, threads=cores())
-        made = create_rendering(workspace, catalogue, request)
+        record = create_rendering(workspace, catalogue, request)
     finally:
         catalogue.close()
     if as_json:
-        print_json({**asdict(made), "build": built})
+        print_json({**asdict(record), "build": built})
         return
-    levels, side = made.zmax + 1, made.tile_px << made.zmax
-    click.echo(f"rendering {name}: {len(made.frames)} views, {levels} levels, {made.res_m:g} m a pixel, {side:,} px across at the deepest level")
+    levels, side = record.zmax + 1, record.tile_px << record.zmax
+    click.echo(f"rendering {name}: {len(record.frames)} views, {levels} levels, {record.res_m:g} m per pixel, {side:,} px wide at the deepest level")
     click.echo(f"next: map3d estimate {name}, or map3d render {name}")
 
 
-def around(directions: int, pitches: tuple[float, ...]) -> tuple[ViewAngles, ...]:
-    """Views all around, from north counter-clockwise; straight down one is enough."""
+def views_around(directions: int, pitches: tuple[float, ...]) -> tuple[ViewAngles, ...]:
+    """Returns views at evenly spaced look-at angles, counter-clockwise from north; only one at pitch 90, which looks straight down."""
     return tuple(ViewAngles(360.0 * k / directions, pitch) for pitch in pitches for k in range(1 if pitch == 90 else directions))

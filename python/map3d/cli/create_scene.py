@@ -8,8 +8,8 @@ from map3d.cli.output import print_json
 
 SWITCHES = {
     "merge-vertices": "merge duplicate vertices",
-    "merge-faces": "drop duplicate faces of one object and material",
-    "drop-degenerate": "drop triangles without area",
+    "merge-faces": "drop duplicate faces of the same object and material",
+    "drop-degenerate": "drop triangles with zero area",
     "merge-materials": "merge equal materials",
     "drop-untextured": "drop faces without a texture",
 }
@@ -18,17 +18,21 @@ _ON = ("merge-vertices", "merge-faces", "drop-degenerate", "merge-materials")
 
 def _switches(command: click.decorators.FC) -> click.decorators.FC:
     for name, effect in reversed(SWITCHES.items()):
-        command = click.option(f"--{name}/--no-{name}", default=name in _ON, show_default=True, help=f"When building: {effect}.")(command)
+        command = click.option(f"--{name}/--no-{name}", default=name in _ON, show_default=True, help=f"Build step: {effect}.")(command)
     return command
 
 
 @click.command("create-scene")
 @click.argument("name")
-@click.option("--crs", help="Coordinate system, e.g. EPSG:25832; 'local' for plain metres.  [default: that of the first file]")
-@click.option("--title", default="", help="What people read.")
-@click.option("--attribution", default="", help="Whom to credit on the map.")
+@click.option("--crs", help="Coordinate system, e.g. EPSG:25832; 'local' for local metres.  [default: that of the first file]")
+@click.option("--title", default="", help="Display title.")
+@click.option("--attribution", default="", help="Attribution text.")
 @click.option(
-    "--ground-plane", type=click.Choice(["auto", "on", "off"]), default="auto", show_default=True, help="A plane below scenes without terrain."
+    "--ground-plane",
+    type=click.Choice(["auto", "on", "off"]),
+    default="auto",
+    show_default=True,
+    help="Ground plane; auto adds it to scenes without terrain.",
 )
 @_switches
 @json_option
@@ -36,7 +40,7 @@ def _switches(command: click.decorators.FC) -> click.decorators.FC:
 def command(
     workspace: Workspace, name: str, crs: str | None, title: str, attribution: str, ground_plane: str, as_json: bool, **switches: bool
 ) -> None:
-    """Make an empty scene NAME; the workspace is made if it is not there."""
+    """Create an empty scene NAME, and the workspace if it does not exist."""
     from map3d.ingest.importing import parse_scene_crs
 
     pinned = None if crs is None else parse_scene_crs(crs)
@@ -51,4 +55,4 @@ def command(
         print_json(scene)
     else:
         system = "that of the first file" if scene.crs is None else scene.crs.name
-        click.echo(f"scene {name} made in {workspace.root} (coordinate system: {system}); next: map3d add-files {name} FILE…")
+        click.echo(f"created scene {name} in {workspace.root} (coordinate system: {system}); next: map3d add-files {name} FILE…")

@@ -16,9 +16,9 @@ from map3d.cli.output import print_json, size_text, time_text
 @json_option
 @workspace_option
 def command(workspace: Workspace, rendering: str, workers: int, as_json: bool) -> None:
-    """Say how many tiles, bytes and minutes RENDERING will take, before any of it is done.
+    """Estimate the tiles, bytes and minutes of RENDERING before it is rendered.
 
-    Of a rendering that is there, what changed since counts as still to render. The scene is built first if its files changed.
+    Missing and changed blocks count as still to render. Builds the scene first if its files have changed.
     """
     from map3d.renderings.cost_estimate import estimate
 
@@ -35,4 +35,4 @@ def command(workspace: Workspace, rendering: str, workers: int, as_json: bool) -
         f"{rendering}: about {found.base_tiles:,} base tiles, {found.tiles:,} tiles on all levels, {found.images:,} images, {size_text(found.bytes)}"
     )
     click.echo(f"still to render: {found.open_tiles:,} base tiles, about {time_text(found.seconds)} with {found.workers} workers")
-    click.echo(f"from {found.how}")
+    click.echo(f"estimated from {found.how}")

@@ -13,38 +13,38 @@ from map3d.cli.progress import progress_bar
 
 
 @click.command("make-town")
-@click.option("-o", "--out", type=click.Path(path_type=Path), required=True, help="Folder to write into; a town begun there is completed.")
-@click.option("--style", type=click.Choice(["town", "roman"]), default="town", show_default=True)
-@click.option("--buildings", type=click.IntRange(1), default=300, show_default=True)
-@click.option("--seed", type=int, default=1, show_default=True, help="Another seed, another town; the same seed, the same bytes.")
-@click.option("--files", type=click.IntRange(1), default=1, show_default=True, help="Over how many CityGML files.")
+@click.option("-o", "--out", type=click.Path(path_type=Path), required=True, help="Output folder; an unfinished town in it is completed.")
+@click.option("--style", type=click.Choice(["town", "roman"]), default="town", show_default=True, help="Style of streets and buildings.")
+@click.option("--buildings", type=click.IntRange(1), default=300, show_default=True, help="Number of buildings.")
+@click.option("--seed", type=int, default=1, show_default=True, help="Seed of the random generator; the same seed gives the same bytes.")
+@click.option("--files", type=click.IntRange(1), default=1, show_default=True, help="Number of CityGML files.")
 @click.option("--texture-px", type=int, help="Side of a texture atlas.  [default: 1024; 512 below 100 buildings]")
-@click.option("--textures", type=click.IntRange(1), help="How many atlases in all.  [default: one for two buildings]")
-@click.option("--ortho-px", type=click.IntRange(1), help="Least side of the orthophoto in pixels.  [default: by size]")
-@click.option("--formats", default="citygml", show_default=True, help="citygml, obj, or both with a comma.")
-@click.option("--terrain/--no-terrain", default=True, show_default=True)
-@click.option("--trees/--no-trees", default=True, show_default=True)
-@click.option("--crs", default="EPSG:25832", show_default=True)
-@click.option("--workers", type=click.IntRange(1), default=cores, show_default="one for each core")
-@click.option("--estimate", is_flag=True, help="Only say what the town will take on the disk, to about 15 %; nothing is written.")
+@click.option("--textures", type=click.IntRange(1), help="Number of texture atlases.  [default: one per two buildings]")
+@click.option("--ortho-px", type=click.IntRange(1), help="Minimum side of the orthophoto in pixels.  [default: depends on the size of the town]")
+@click.option("--formats", default="citygml", show_default=True, help="citygml, obj, or citygml,obj.")
+@click.option("--terrain/--no-terrain", default=True, show_default=True, help="Write elevation and orthophoto.")
+@click.option("--trees/--no-trees", default=True, show_default=True, help="Write trees.")
+@click.option("--crs", default="EPSG:25832", show_default=True, help="Coordinate system of the files.")
+@click.option("--workers", type=click.IntRange(1), default=cores, show_default="one per core", help="Number of parallel processes.")
+@click.option("--estimate", is_flag=True, help="Only print the disk space that the town needs, within about 15 %; write nothing.")
 @json_option
 def command(out: Path, formats: str, workers: int, estimate: bool, as_json: bool, **spec: Any) -> None:
-    """Make a town to try map3d with: textured buildings, terrain, trees, of any size.
+    """Generate a town of any size for trying map3d: textured buildings, terrain, trees.
 
-    What is complete stays when it is interrupted; the same command again makes the rest.
+    If interrupted, re-run it to complete the town.
     """
     from map3d_town import TownSpec, estimate_town, make_town
 
     town = TownSpec(formats=tuple(part.strip() for part in formats.split(",")), **spec)
     if estimate:
         need = estimate_town(town)
-        text = f"about {size_text(need.disk_bytes)}: {need.textures:,} textures, orthophoto {need.ortho_side_px:,} px across"
+        text = f"about {size_text(need.disk_bytes)}: {need.textures:,} textures, orthophoto {need.ortho_side_px:,} px wide"
         print_json(asdict(need)) if as_json else click.echo(text)
         return
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with progress_bar(*columns) as bar:
-        task = bar.add_task("making a town", total=None)
-        report = make_town(out, town, lambda what, done, total: bar.update(task, description=what, completed=done, total=total), workers)
+        task = bar.add_task("generating a town", total=None)
+        report = make_town(out, town, lambda stage, done, total: bar.update(task, description=stage, completed=done, total=total), workers)
     if as_json:
         print_json(asdict(report))
     else:

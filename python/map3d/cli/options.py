@@ -1,4 +1,4 @@
-"""Options that several verbs share, and how their values are read."""
+"""Options that several verbs share, and the types of their values."""
 
 import os
 import re
@@ -9,6 +9,8 @@ from typing import Any, Final, TypeVar
 import click
 
 from map3d.catalogue import Workspace
+from map3d.errors import BadRequest
+from map3d.geometry.views import parse_view
 from map3d.types import ViewAngles
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -17,7 +19,7 @@ _UNITS: Final = {"": 1, "k": 1 << 10, "m": 1 << 20, "g": 1 << 30, "t": 1 << 40}
 
 
 def workspace_option(command: Command) -> Command:
-    """`-w`: passed as a Workspace."""
+    """Adds `-w`, passed as a Workspace."""
     return click.option(
         "-w",
         "--workspace",
@@ -27,7 +29,7 @@ def workspace_option(command: Command) -> Command:
         show_envvar=True,
         metavar="FOLDER",
         callback=lambda _ctx, _param, value: Workspace(Path(value)),
-        help="Where map3d keeps scenes and renderings.",
+        help="Folder of scenes and renderings.",
     )(command)
 
 
@@ -36,7 +38,7 @@ def json_option(command: Command) -> Command:
 
 
 class Bytes(click.ParamType):  # type: ignore[type-arg]
-    """A number of bytes such as 512M or 2G."""
+    """A number of bytes, e.g. 512M or 2G."""
 
     name = "size"
 
@@ -45,37 +47,34 @@ class Bytes(click.ParamType):  # type: ignore[type-arg]
             return value
         match = re.fullmatch(r"([0-9]+(?:\.[0-9]+)?)\s*([kmgt]?)i?b?", str(value).strip().lower())
         if match is None or float(match[1]) <= 0:
-            self.fail(f"{value!r} is not a size; write it like 512M or 2G", param, ctx)
+            self.fail(f"{value!r} is not a size; write e.g. 512M or 2G", param, ctx)
         return int(float(match[1]) * _UNITS[match[2]])
 
 
 class View(click.ParamType):  # type: ignore[type-arg]
-    """LOOK-AT/PITCH in degrees, e.g. 45/22.5."""
+    """A look-at angle and a pitch in degrees, e.g. 45-22.5 or 45/22.5."""
 
-    name = "look-at/pitch"
+    name = "view"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> ViewAngles:
         if isinstance(value, ViewAngles):
             return value
-        look_at, slash, pitch = str(value).partition("/")
         try:
-            return ViewAngles(float(look_at), float(pitch) if slash else 45.0)
-        except ValueError:
-            self.fail(f"{value!r} is not a view; write look-at/pitch in degrees, e.g. 45/22.5 (0 looks north, 45 north-west)", param, ctx)
+            return parse_view(str(value))
+        except BadRequest as error:
+            self.fail(str(error), param, ctx)
 
 
 def cores() -> int:
-    """Processor cores that this process may use."""
+    """Returns the number of CPU cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def workers_option(command: Command) -> Command:
     return click.option(
-        "--workers", type=click.IntRange(1, 512), default=cores, show_default="one for each core", help="How many processes render at a time."
+        "--workers", type=click.IntRange(1, 512), default=cores, show_default="one per core", help="Number of parallel render processes."
     )(command)
 
 
 def max_memory_option(command: Command) -> Command:
-    return click.option("--max-memory", type=Bytes(), help="Memory for all workers together, e.g. 2G.  [default: 512M of cache for each worker]")(
-        command
-    )
+    return click.option("--max-memory", type=Bytes(), help="Memory for all workers together, e.g. 2G.  [default: 512M of cache per worker]")(command)

@@ -1,4 +1,4 @@
-"""Printing: text and tables for people, one JSON document for programs."""
+"""Output: text and tables for people, one JSON document for programs."""
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
@@ -11,7 +11,7 @@ from rich.table import Table
 
 
 def console() -> Console:
-    """For progress and notes: standard error, so that standard output can be piped."""
+    """Returns the console for progress and messages: standard error, so that standard output can be piped."""
     return Console(stderr=True, highlight=False, soft_wrap=True)
 
 
@@ -20,7 +20,7 @@ def print_json(value: Any) -> None:
 
 
 def print_table(columns: Sequence[str], rows: Iterable[Sequence[Any]], title: str | None = None) -> None:
-    """Numbers are set to the right."""
+    """Prints a table; columns of numbers are right-aligned."""
     listed = [list(row) for row in rows]
     table = Table(*columns, title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
     for index, column in enumerate(table.columns):
@@ -32,7 +32,7 @@ def print_table(columns: Sequence[str], rows: Iterable[Sequence[Any]], title: st
 
 
 def counts_text(counts: Mapping[Any, int]) -> str:
-    """`12 done, 3 todo`, without zeros."""
+    """Returns the counts as in `12 done, 3 todo`, without zeros."""
     return ", ".join(f"{count:,} {name}" for name, count in counts.items() if count) or "none"
 
 

@@ -1,4 +1,4 @@
-"""How far a long operation is: a bar on a terminal, a line now and then in a log."""
+"""Progress of long operations: a bar on a terminal, an occasional line in a log."""
 
 import time
 from typing import Any, Final
@@ -12,20 +12,20 @@ LINE_EVERY_S: Final = 20.0
 
 
 def progress_bar(*columns: ProgressColumn) -> Progress:
-    """On standard error; a bar is gone when its operation is done. In a log an operation that takes long says every `LINE_EVERY_S` where it is."""
+    """Returns a progress display on standard error: a bar that disappears at the end, or in a log one line every `LINE_EVERY_S`."""
     shown = console()
     return Progress(*columns, console=shown, transient=True) if shown.is_terminal else LoggedProgress(shown)
 
 
 def show_stage(bar: Progress, task_id: TaskID, stage: str, done: int, total: int | None) -> None:
-    """How far a stage of an operation is. Each has a clock of its own, so that its rate and the time left are its own too."""
+    """Shows the progress of one stage. Each stage restarts the clock, so that rate and remaining time are those of the stage."""
     if bar.tasks[bar.task_ids.index(task_id)].description != stage:
         bar.reset(task_id, description=stage)
     bar.update(task_id, completed=done, total=total)
 
 
 class LoggedProgress(Progress):
-    """Prints `rendering: 40 of 120, 1.3/s, 62 s left, 10 base tiles/s` instead of drawing."""
+    """Prints lines such as `rendering: 40 of 120, 1.3/s, 62 s left, 10 base tiles/s` instead of drawing a bar."""
 
     def __init__(self, shown: Console, every_s: float = LINE_EVERY_S) -> None:
         super().__init__(console=shown, disable=True)
@@ -41,7 +41,7 @@ class LoggedProgress(Progress):
 
 
 def line(task: Task) -> str:
-    """A task in words: how many of how many, the rate, the time left as far as they are known, and what its fields say."""
+    """Returns the progress of a task as text: count, total, rate and remaining time as far as they are known, and its fields."""
     done = f"{task.completed:,.0f} of {task.total:,.0f}" if task.total else f"{task.completed:,.0f}"
     parts = [done] if task.completed or task.total else [time_text(task.elapsed or 0.0)]
     if task.completed and task.elapsed:

@@ -14,22 +14,22 @@ from map3d.cli.progress import progress_bar, show_stage
 
 @click.command("publish")
 @click.argument("rendering")
-@click.option("-o", "--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder to write.")
-@click.option("--replace", is_flag=True, help="Put it in place of an earlier one of that name.")
-@click.option("--allow-incomplete", is_flag=True, help="Publish though blocks are missing.")
+@click.option("-o", "--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Output folder.")
+@click.option("--replace", is_flag=True, help="Replace an earlier published folder.")
+@click.option("--allow-incomplete", is_flag=True, help="Publish even if blocks are missing.")
 @json_option
 @workspace_option
 def command(workspace: Workspace, rendering: str, out: Path, replace: bool, allow_incomplete: bool, as_json: bool) -> None:
-    """Write RENDERING as a folder of static files: tiles, objects, viewer. Copy it to any web server that answers range requests."""
+    """Publish RENDERING as a folder of static files: tiles, objects, viewer. Copy it to any web server that supports range requests."""
     done = publish_with_progress(workspace, rendering, out, replace=replace, allow_incomplete=allow_incomplete)
     if as_json:
         print_json(done)
     else:
-        click.echo(f"{rendering}: {done.tiles:,} images in {done.archives} archives, {size_text(done.bytes)} in {out}")
+        click.echo(f"published {rendering} to {out}: {done.tiles:,} images in {done.archives} archives, {size_text(done.bytes)}")
 
 
 def publish_with_progress(workspace: Workspace, rendering: str, out: Path, **how: bool) -> Any:
-    """What was published."""
+    """Publishes with a progress bar and returns a `Published`."""
     from map3d.publish import publish
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())

@@ -1,4 +1,4 @@
-"""What `map3d render --stats` says: where the time went, and how often the caches had what was asked for."""
+"""`map3d render --stats`: the time of each stage and the hit rates of the caches."""
 
 from collections.abc import Mapping
 from typing import Any, Final
@@ -10,7 +10,7 @@ CACHES: Final = ("chunk", "texture")
 
 
 def summary(stats: Mapping[str, float]) -> dict[str, Any]:
-    """Seconds of all children together by stage; hits, misses and hit rate (None when never asked) by cache; all zero when nothing was rendered."""
+    """Returns the seconds of all subprocesses by stage, and hits, misses and hit rate of each cache; a rate is None when the cache was not used."""
     caches = {}
     for name in CACHES:
         hits, misses = int(stats.get(f"{name}_hits", 0)), int(stats.get(f"{name}_misses", 0))
@@ -20,7 +20,7 @@ def summary(stats: Mapping[str, float]) -> dict[str, Any]:
 
 
 def print_summary(found: Mapping[str, Any]) -> None:
-    """Two tables for people."""
+    """Prints the summary as tables."""
     total = sum(found["seconds"].values())
     print_table(
         ("stage", "seconds", "share"),
@@ -32,4 +32,4 @@ def print_summary(found: Mapping[str, Any]) -> None:
         rows.append((name, counts["hits"], counts["misses"], rate))
     print_table(("cache", "hits", "misses", "hit rate"), rows)
     textures = found["caches"]["texture"]
-    print_table(("images decoded", "texture levels put out of the cache"), [(textures["decoded"], textures["evicted"])])
+    print_table(("images decoded", "texture levels evicted"), [(textures["decoded"], textures["evicted"])])

@@ -12,7 +12,7 @@ from map3d.cli.output import print_json
 @json_option
 @workspace_option
 def command(workspace: Workspace, rendering: str, as_json: bool) -> None:
-    """Give quarantined blocks of RENDERING three new attempts."""
+    """Allow three more attempts for the quarantined blocks of RENDERING."""
     catalogue = workspace.open_catalogue()
     try:
         count = catalogue.retry(rendering)
@@ -21,4 +21,4 @@ def command(workspace: Workspace, rendering: str, as_json: bool) -> None:
     if as_json:
         print_json({"retried": count})
     else:
-        click.echo(f"{count:,} blocks are to be tried again" + (f"; next: map3d render {rendering}" if count else ""))
+        click.echo(f"reopened {count:,} blocks" + (f"; next: map3d render {rendering}" if count else ""))

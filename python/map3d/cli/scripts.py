@@ -1,4 +1,4 @@
-"""createScene.py, addFilesToScene.py, createRendering.py: the verbs under the names of the first system of this kind."""
+"""createScene.py, addFilesToScene.py, createRendering.py: three verbs under the names of map3d's predecessor."""
 
 import sys
 

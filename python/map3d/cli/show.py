@@ -17,9 +17,17 @@ TOPICS = ("scenes", "scene", "renderings", "rendering", "report", "jobs", "quara
 @json_option
 @workspace_option
 def command(workspace: Workspace, topic: str, name: str | None, as_json: bool) -> None:
-    """Show what is there: scenes, scene NAME, renderings, rendering NAME, report SCENE (of imports), jobs RENDERING, quarantine RENDERING."""
+    """Show scenes, renderings, import reports and jobs.
+
+    \b
+    scenes, renderings          list all of them (renderings is the default)
+    scene NAME, rendering NAME  show one of them
+    report SCENE                show what its imports skipped, and their warnings
+    jobs RENDERING              count the blocks by state, and list the leased and quarantined ones
+    quarantine RENDERING        list the blocks that failed three times, with reasons
+    """
     if name is None and topic not in ("scenes", "renderings"):
-        raise BadRequest(f"map3d show {topic}: of which? give a name; map3d show scenes and map3d show renderings list them")
+        raise BadRequest(f"map3d show {topic}: missing NAME; map3d show scenes and map3d show renderings list the names")
     catalogue = workspace.open_catalogue()
     try:
         _SHOW[topic](catalogue, name or "", as_json)
@@ -57,7 +65,7 @@ def _renderings(catalogue: Catalogue, _name: str, as_json: bool) -> None:
         print_json([{"rendering": item, "jobs": catalogue.count_jobs(item.name)} for item in renderings])
         return
     rows = [(item.name, item.scene, len(item.frames), item.zmax + 1, item.res_m, counts_text(catalogue.count_jobs(item.name))) for item in renderings]
-    print_table(("rendering", "scene", "views", "levels", "m a pixel", "blocks"), rows)
+    print_table(("rendering", "scene", "views", "levels", "m per pixel", "blocks"), rows)
 
 
 def _rendering(catalogue: Catalogue, name: str, as_json: bool) -> None:
@@ -66,7 +74,8 @@ def _rendering(catalogue: Catalogue, name: str, as_json: bool) -> None:
         print_json({"rendering": item, "jobs": counts})
         return
     click.echo(
-        f"{name} of scene {item.scene}: {item.zmax + 1} levels, {item.res_m:g} m a pixel, tiles of {item.tile_px} px, version {item.content_version}"
+        f"{name} of scene {item.scene}: {item.zmax + 1} levels, {item.res_m:g} m per pixel, "
+        f"tiles of {item.tile_px} px, content version {item.content_version}"
     )
     click.echo(f"views: {', '.join(view_id(frame.angles) for frame in item.frames)}")
     for number, layers in enumerate(item.passes):
@@ -111,10 +120,10 @@ def _quarantine(catalogue: Catalogue, name: str, as_json: bool) -> None:
         print_json(jobs)
         return
     if not jobs:
-        click.echo(f"no block of {name} is quarantined")
+        click.echo(f"{name} has no quarantined blocks")
         return
-    print_table(("track", "block", "kind", "why"), [(job.track, job.block, job.kind, job.reason) for job in jobs])
-    click.echo(f"try them again with: map3d retry {name} && map3d render {name}")
+    print_table(("track", "block", "kind", "reason"), [(job.track, job.block, job.kind, job.reason) for job in jobs])
+    click.echo(f"to try them again: map3d retry {name} && map3d render {name}")
 
 
 _SHOW = {

@@ -8,7 +8,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 
 from map3d.catalogue import Catalogue, Workspace
 from map3d.cli.building import build_with_progress
-from map3d.cli.create_rendering import around
+from map3d.cli.create_rendering import views_around
 from map3d.cli.options import View, max_memory_option, workers_option, workspace_option
 from map3d.cli.output import size_text
 from map3d.cli.progress import progress_bar
@@ -19,27 +19,31 @@ from map3d.types import COLOR_FORMATS, ViewAngles
 
 @click.command("site")
 @click.argument("folder", type=click.Path(path_type=Path, exists=True))
-@click.option("-o", "--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder for the finished site.")
-@click.option("--name", help="Of scene and rendering.  [default: the folder's]")
-@click.option("--title", help="What people read.  [default: the folder's name]")
-@click.option("--attribution", default="", help="Whom to credit on the map.")
+@click.option("-o", "--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Output folder of the site.")
+@click.option("--name", help="Name of scene and rendering.  [default: from the folder]")
+@click.option("--title", help="Display title.  [default: name of the folder]")
+@click.option("--attribution", default="", help="Attribution text.")
 @click.option(
-    "--view", "views", type=View(), multiple=True, help="A view as look-at/pitch, e.g. 45/22.5; more than once.  [default: 4 around, pitch 45]"
+    "--view",
+    "views",
+    type=View(),
+    multiple=True,
+    help="Look-at angle and pitch, e.g. 45-22.5; repeatable.  [default: 4 angles, pitch 45]",
 )
-@click.option("--res", "res_m", type=float, help="Metres a pixel.  [default: by the size of the scene, so that it takes minutes]")
-@click.option("--color", type=click.Choice(list(COLOR_FORMATS)), default="webp", show_default=True, help="Format of the colour layer.")
-@click.option("--crs", help="The files' coordinate system, where they do not say.")
+@click.option("--res", "res_m", type=float, help="Metres per pixel.  [default: depends on the size of the scene, so that rendering takes minutes]")
+@click.option("--color", type=click.Choice(list(COLOR_FORMATS)), default="webp", show_default=True, help="Image format of the layer color.")
+@click.option("--crs", help="Coordinate system of the files, where they do not state it.")
 @click.option("--up", type=click.Choice(["y", "z"]), default="z", show_default=True, help="OBJ: the axis that points up.")
-@click.option("--strict", is_flag=True, help="Stop at the first fault.")
+@click.option("--strict", is_flag=True, help="Stop at the first problem instead of skipping it.")
 @workers_option
 @max_memory_option
 @workspace_option
 def command(
     workspace: Workspace, folder: Path, out: Path, views: tuple[ViewAngles, ...], workers: int, max_memory: int | None, **options: Any
 ) -> None:
-    """Make a site of all files in FOLDER: import, build, render, publish.
+    """Turn all files in FOLDER into a static web site: import, build, render, publish.
 
-    Stopped at any point, the same command goes on; run again after files have changed, it does only what changed.
+    You can stop it at any time; re-run it to resume. Re-run it after files change; only the changes are processed.
     """
     from map3d.ingest.import_options import ImportOptions
     from map3d.ingest.sources import asset_name
@@ -51,7 +55,7 @@ def command(
     request = SiteRequest(
         name=options["name"] or asset_name(folder.resolve().stem),
         sources=folder,
-        views=views or around(4, (45.0,)),
+        views=views or views_around(4, (45.0,)),
         res_m=options["res_m"],
         title=title,
         attribution=options["attribution"],
@@ -62,30 +66,30 @@ def command(
     try:
         with progress_bar(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()) as bar:
             task = bar.add_task("importing", total=None)
-            added = add_changed(
+            summary = add_changed(
                 workspace, catalogue, request, lambda name, n, of: bar.update(task, description=f"importing {name}", completed=n, total=of)
             )
-        click.echo(f"{len(added.imported)} files imported, {len(added.unchanged)} unchanged, {len(added.failed)} not usable")
-        for _, reason in added.failed:
-            click.echo(f"not added: {reason}", err=True)
-        _tell_faults(catalogue, request.name)
+        click.echo(f"imported {len(summary.imported)} files, {len(summary.unchanged)} unchanged, {len(summary.failed)} failed")
+        for _, reason in summary.failed:
+            click.echo(f"not imported: {reason}", err=True)
+        _print_problems(catalogue, request.name)
         build_with_progress(workspace, catalogue, request.name, threads=workers, max_memory_bytes=max_memory)
         record = make_rendering(workspace, catalogue, request)
-        click.echo(f"rendering {record.name}: {len(record.frames)} views, {record.zmax + 1} levels, {record.res_m:g} m a pixel")
-        outcome = render_with_progress(Run(workspace, catalogue, record.name, RunSettings(workers, max_memory)))
+        click.echo(f"rendering {record.name}: {len(record.frames)} views, {record.zmax + 1} levels, {record.res_m:g} m per pixel")
+        result = render_with_progress(Run(workspace, catalogue, record.name, RunSettings(workers, max_memory)))
     finally:
         catalogue.close()
-    print_result(record.name, outcome)
-    if not outcome.complete:
-        raise click.exceptions.Exit(130 if outcome.stopped else 1)
+    print_result(record.name, result)
+    if not result.complete:
+        raise click.exceptions.Exit(130 if result.stopped else 1)
     done = publish_with_progress(workspace, record.name, out, replace=True)
-    click.echo(f"the site is in {out}, {size_text(done.bytes)}; copy it to any web server that answers range requests")
+    click.echo(f"wrote the site to {out}, {size_text(done.bytes)}; copy it to any web server that supports range requests")
 
 
-def _tell_faults(catalogue: Catalogue, scene: str) -> None:
-    """How much in the files was skipped or is worth a look."""
+def _print_problems(catalogue: Catalogue, scene: str) -> None:
+    """Prints how many elements were skipped, and the number of warnings."""
     reports = [asset.report for asset in catalogue.assets(scene)]
     skipped = sum(sum(report.get("skipped", {}).values()) for report in reports)
-    noted = sum(warning["count"] for report in reports for warning in report.get("warnings", []) if not warning["reason"].startswith("skipped: "))
-    if skipped or noted:
-        click.echo(f"{skipped:,} things in the files were skipped, {noted:,} noted; map3d show report {scene} tells which")
+    warnings = sum(warning["count"] for report in reports for warning in report.get("warnings", []) if not warning["reason"].startswith("skipped: "))
+    if skipped or warnings:
+        click.echo(f"skipped {skipped:,} elements; {warnings:,} warnings; map3d show report {scene} lists them")

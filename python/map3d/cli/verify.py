@@ -13,13 +13,14 @@ from map3d.cli.progress import progress_bar, show_stage
 
 @click.command("verify")
 @click.argument("renderings", nargs=-1)
-@click.option("--published", type=click.Path(path_type=Path, exists=True, file_okay=False), help="Check a published folder instead.")
+@click.option("--published", type=click.Path(path_type=Path, exists=True, file_okay=False), help="Verify a published folder instead.")
 @json_option
 @workspace_option
 def command(workspace: Workspace, renderings: tuple[str, ...], published: Path | None, as_json: bool) -> None:
-    """Count everything again: files against checksums, blocks against the plan, every tile, seam and id. All RENDERINGS unless named.
+    """Verify RENDERINGS, or all renderings and scenes.
 
-    Ends with status 1 and a list when anything is wrong.
+    Compares files with checksums and blocks with the plan, and checks every tile, seam and id. Lists the problems found and exits with status 1
+    if there are any.
     """
     if published is not None:
         _verify_published(published, as_json)
@@ -35,8 +36,8 @@ def command(workspace: Workspace, renderings: tuple[str, ...], published: Path |
         with progress_bar(*columns) as bar:
             task = bar.add_task("verifying", total=None)
 
-            def progress(what: str, done: int, total: int) -> None:
-                show_stage(bar, task, what, done, total)
+            def progress(stage: str, done: int, total: int) -> None:
+                show_stage(bar, task, stage, done, total)
 
             scenes = {record.scene for record in chosen} if renderings else {scene.name for scene in catalogue.scenes()}
             for scene in sorted(scenes):
@@ -48,10 +49,10 @@ def command(workspace: Workspace, renderings: tuple[str, ...], published: Path |
     if as_json:
         print_json(findings)
     else:
-        click.echo(f"looked at {counts_text(findings.counted)}")
+        click.echo(f"checked {counts_text(findings.counted)}")
         for line in findings.wrong:
             click.echo(line)
-        click.echo("everything is as it should be" if not findings.total else f"{findings.total:,} things are wrong")
+        click.echo(f"{findings.total:,} problems found" if findings.total else "no problems found")
     if findings.total:
         raise click.exceptions.Exit(1)
 
@@ -63,4 +64,4 @@ def _verify_published(folder: Path, as_json: bool) -> None:
     if as_json:
         print_json(found)
     else:
-        click.echo(f"{folder}: everything is as it should be")
+        click.echo(f"{folder}: no problems found")

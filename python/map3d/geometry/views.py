@@ -14,6 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from map3d.errors import BadRequest
 from map3d.types import Vec3, ViewAngles
 
+DEFAULT_PITCH_DEG: Final = 45.0
+
 _EXACT: Final = {0.0: (1.0, 0.0), 90.0: (0.0, 1.0), 180.0: (-1.0, 0.0), 270.0: (0.0, -1.0)}
 _COS_HALF: Final = {60.0: 0.5, 300.0: 0.5, 120.0: -0.5, 240.0: -0.5}
 _SIN_HALF: Final = {30.0: 0.5, 150.0: 0.5, 210.0: -0.5, 330.0: -0.5}
@@ -92,6 +94,15 @@ def parse_view_id(text: str) -> ViewAngles:
     if angles is None or view_id(angles) != text:
         raise BadRequest(f"view {text[:64]!r}: not a view id; write <look-at>-<pitch> in shortest decimal form, e.g. 45-22.5")
     return angles
+
+
+def parse_view(text: str) -> ViewAngles:
+    """Returns the angles of a view that a user wrote as `45-22.5`, `45/22.5`, or `45` with the default pitch. Raises BadRequest."""
+    look_at, separator, pitch = text.partition("/" if "/" in text else "-")
+    try:
+        return check_angles(ViewAngles(float(look_at), float(pitch) if separator else DEFAULT_PITCH_DEG))
+    except ValueError as error:
+        raise BadRequest(f"view {text[:64]!r}: write look-at angle and pitch in degrees, e.g. 45-22.5 or 45/22.5") from error
 
 
 def _shortest(value: float) -> str:

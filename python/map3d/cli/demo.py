@@ -1,0 +1,61 @@
+"""map3d demo."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+import click
+
+from map3d.catalogue import Workspace
+from map3d.cli.app import run
+
+TOWN: Final = ("--buildings", "120", "--seed", "7")
+RES_M: Final = "0.15"
+TITLE: Final = ("--title", "A generated town")
+NAME: Final = "demo"
+SCENE: Final = "town"
+
+
+@click.command("demo")
+@click.option("--folder", type=click.Path(path_type=Path, file_okay=False), default=Path("map3d-demo"), show_default=True, help="Output folder.")
+@click.option("--port", type=click.IntRange(0, 65535), default=0, show_default="a free port", help="Port to listen on.")
+@click.option("--no-serve", is_flag=True, help="Stop after rendering.")
+def command(folder: Path, port: int, no_serve: bool) -> None:
+    """Generate a town, render it, serve it and print the address of its map.
+
+    You can stop it at any time; re-run it to resume.
+    """
+    workspace = Workspace(folder / "workspace").create()
+    for title, arguments in remaining_steps(workspace, folder / "town"):
+        _run(title, [*arguments])
+    where = ("--workspace", str(workspace.root))
+    if no_serve:
+        click.echo(f"next: map3d serve {NAME} --workspace {workspace.root}")
+    else:
+        _run("serving the map; press Ctrl-C to stop", ["serve", NAME, "--port", str(port), *where])
+
+
+def remaining_steps(workspace: Workspace, files: Path) -> Iterator[tuple[str, list[str]]]:
+    """Yields (description, command line) of each step up to rendering, without the steps that an earlier run has completed."""
+    where = ["--workspace", str(workspace.root)]
+    yield f"generating a town in {files}", ["make-town", "-o", str(files), *TOWN]
+    catalogue = workspace.open_catalogue()
+    try:
+        assets = {scene.name: catalogue.assets(scene.name) for scene in catalogue.scenes()}
+        renderings = {rendering.name for rendering in catalogue.renderings()}
+    finally:
+        catalogue.close()
+    if SCENE not in assets:
+        yield "creating a scene", ["create-scene", SCENE, *TITLE, *where]
+    if not assets.get(SCENE):
+        yield "importing the town's files", ["add-files", SCENE, str(files), *where]
+    if NAME not in renderings:
+        yield "building the scene and creating a rendering", ["create-rendering", SCENE, NAME, "--directions", "4", "--res", RES_M, *TITLE, *where]
+    yield "rendering the tiles", ["render", NAME, *where]
+
+
+def _run(title: str, arguments: list[str]) -> None:
+    click.echo(f"== {title}: map3d {' '.join(arguments)}")
+    status = run(arguments)
+    if status:
+        raise click.exceptions.Exit(status)
