@@ -22,7 +22,7 @@ tools:
 	@missing=""; \
 	need() { command -v $$1 >/dev/null 2>&1 || missing="$$missing\n  $$1: $$2"; }; \
 	need cargo "Rust stable (rustup)"; need node "Node.js 20 or newer"; need npm "npm, with Node.js"; need cc "apt install build-essential"; \
-	need cmake "apt install cmake"; need nasm "apt install nasm"; need $(PYTHON) "Python 3.11 or newer"; \
+	need $(PYTHON) "Python 3.11 or newer"; \
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || missing="$$missing\n  python: 3.11 or newer (PYTHON=… names another)"; \
 	$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || missing="$$missing\n  venv: apt install python3-venv"; \
 	if [ -n "$$missing" ]; then echo; echo -e "Missing on this machine:$$missing"; exit 1; fi

@@ -1,31 +1,57 @@
-//! Codecs side by side: milliseconds of CPU time and bytes per tile and layer, for the G-buffers in seam files.
+//! Measures codecs: milliseconds of CPU time and bytes per tile and layer for the G-buffers in seam files; nanoseconds per pixel to decode any other
+//! file.
 //!
-//! `cargo run --release -p map3d-image --example codecs -- tiles/*.seam` (`map3d-render`'s example `tiles` writes such files with `--save`).
+//! `cargo run --release -p map3d-image --example codecs -- tiles/*.seam textures/*.jpg` (`map3d-render`'s example `tiles` writes seams with `--save`).
+
+use std::path::Path;
 
 use map3d_base::{LayerFormat, LayerKind, LayerSpec};
-use map3d_image::GBuffer;
+use map3d_image::decode::decode;
 use map3d_image::encode::{Deflate, Encoder, Filter, bytes_from_normals, bytes_from_u32, color_from_linear, encode_jpeg, encode_png, encode_webp};
 use map3d_image::seam::read_seam;
+use map3d_image::{GBuffer, ImageLimits};
 
 /// A way to encode a layer of a tile.
 type Codec = (String, Box<dyn Fn(&GBuffer) -> Vec<u8>>);
 
 fn main() {
-    let tiles: Vec<GBuffer> =
-        std::env::args().skip(1).map(|path| read_seam(&path, &std::fs::read(&path).expect("readable")).expect("a seam")).collect();
-    assert!(!tiles.is_empty(), "give seam files");
-    println!("{} tiles of {} px", tiles.len(), tiles[0].width);
+    let (seams, images): (Vec<_>, Vec<_>) = std::env::args().skip(1).partition(|path| path.ends_with(".seam"));
+    assert!(!seams.is_empty() || !images.is_empty(), "give seam files or images");
+    measure_encoding(&seams);
+    measure_decoding(&images);
+}
+
+fn measure_encoding(seams: &[String]) {
+    let tiles: Vec<GBuffer> = seams.iter().map(|path| read_seam(path, &std::fs::read(path).expect("readable")).expect("a seam")).collect();
+    let Some(first) = tiles.first() else { return };
+    println!("{} tiles of {} px", tiles.len(), first.width);
     for (name, codec) in codecs() {
-        let mut best = f64::INFINITY;
-        let mut bytes = 0;
-        for _ in 0..5 {
-            let start = cpu_s();
-            bytes = tiles.iter().map(|g| codec(g).len()).sum::<usize>();
-            best = best.min(cpu_s() - start);
-        }
+        let (seconds, bytes) = best_of_five(|| tiles.iter().map(|g| codec(g).len()).sum::<usize>());
         let n = tiles.len() as f64;
-        println!("{name:42} {:8.3} ms {:9.1} KB", best * 1e3 / n, bytes as f64 / n / 1e3);
+        println!("{name:42} {:8.3} ms {:9.1} KB", seconds * 1e3 / n, bytes as f64 / n / 1e3);
     }
+}
+
+fn measure_decoding(images: &[String]) {
+    let files: Vec<Vec<u8>> = images.iter().map(|path| std::fs::read(path).expect("readable")).collect();
+    if files.is_empty() {
+        return;
+    }
+    let limits = ImageLimits::default();
+    let decoded = |bytes: &Vec<u8>| decode(Path::new("image"), bytes, &limits).map_or(0, |image| image.pixels.len());
+    let (seconds, pixels) = best_of_five(|| files.iter().map(decoded).sum::<usize>());
+    println!("decode {} files, {:.1} Mpx {:24.3} ns/px", files.len(), pixels as f64 / 1e6, seconds * 1e9 / pixels as f64);
+}
+
+/// Returns the least CPU seconds of five runs, and the result of the last one.
+fn best_of_five(work: impl Fn() -> usize) -> (f64, usize) {
+    let (mut best, mut result) = (f64::INFINITY, 0);
+    for _ in 0..5 {
+        let start = cpu_s();
+        result = work();
+        best = best.min(cpu_s() - start);
+    }
+    (best, result)
 }
 
 fn codecs() -> Vec<Codec> {
@@ -37,7 +63,12 @@ fn codecs() -> Vec<Codec> {
             Box::new(move |g| encode_webp(&color_from_linear((g.width, g.height), &g.color), quality, false).expect("webp")),
         ));
     }
-    out.push(("color jpeg q85".into(), Box::new(|g| encode_jpeg(&color_from_linear((g.width, g.height), &g.color), 85, false).expect("jpeg"))));
+    for small in [false, true] {
+        out.push((
+            format!("color jpeg q85{}", if small { " small" } else { "" }),
+            Box::new(move |g| encode_jpeg(&color_from_linear((g.width, g.height), &g.color), 85, small).expect("jpeg")),
+        ));
+    }
     for filter in [Filter::None, Filter::Sub, Filter::Up, Filter::Average, Filter::Paeth] {
         for deflate in [Deflate::Fast, Deflate::Matching, Deflate::Thorough] {
             let png = move |g: &GBuffer, channels, bytes: &[u8]| encode_png((g.width, g.height), channels, bytes, filter, deflate);

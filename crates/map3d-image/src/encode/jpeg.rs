@@ -1,23 +1,19 @@
-//! JPEG by libjpeg-turbo: 4:4:4; alpha is left out.
+//! Encodes JPEG with libjpeg-turbo-rs, which writes the same bytes as libjpeg-turbo: 4:4:4, alpha ignored.
 
+use libjpeg_turbo_rs::{Encoder, PixelFormat, Subsampling};
 use map3d_base::{Error, Result};
 
 use crate::raster::Raster;
 
-/// `quality` 1..=100; `small`: with codes of its own, progressive.
+/// `quality` 1..=100; `small`: progressive, with Huffman tables made for the image.
 pub fn encode_jpeg(image: &Raster, quality: u8, small: bool) -> Result<Vec<u8>> {
-    let fail = |e: turbojpeg::Error| Error::argument(format!("jpeg {} × {}: {e}", image.width, image.height));
-    let mut encoder = turbojpeg::Compressor::new().map_err(fail)?;
-    encoder.set_quality(i32::from(quality)).map_err(fail)?;
-    encoder.set_subsamp(turbojpeg::Subsamp::None).map_err(fail)?;
-    encoder.set_optimize(small).map_err(fail)?;
-    encoder.set_progressive(small).map_err(fail)?;
-    let pixels = turbojpeg::Image {
-        pixels: image.pixels.as_flattened(),
-        width: image.width as usize,
-        pitch: image.width as usize * 4,
-        height: image.height as usize,
-        format: turbojpeg::PixelFormat::RGBA,
-    };
-    encoder.compress_to_vec(pixels).map_err(fail)
+    let (width, height) = (image.width as usize, image.height as usize);
+    Encoder::new(image.pixels.as_flattened(), width, height, PixelFormat::Rgba)
+        .quality(quality)
+        .force_baseline(true)
+        .subsampling(Subsampling::S444)
+        .optimize_huffman(small)
+        .progressive(small)
+        .encode()
+        .map_err(|e| Error::argument(format!("jpeg {width} × {height}: {e}")))
 }

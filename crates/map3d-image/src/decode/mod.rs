@@ -1,5 +1,7 @@
 //! Source images to sRGB bytes. Sizes are checked in the header, before anything is decoded; a damaged image is an error, never a panic.
 
+mod jpeg;
+
 use std::io::Cursor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -23,12 +25,9 @@ impl Default for ImageLimits {
     }
 }
 
-/// More scans than any honest progressive JPEG has.
-const MAX_JPEG_SCANS: u32 = 200;
-
 /// Width and height as the header states them; nothing is decoded. `path` is for messages.
 pub fn probe(path: &Path, bytes: &[u8], limits: &ImageLimits) -> Result<(u32, u32)> {
-    let (width, height) = guarded(path, || if is_jpeg(bytes) { jpeg_size(path, bytes) } else { other_size(path, bytes) })?;
+    let (width, height) = guarded(path, || if jpeg::is_jpeg(bytes) { jpeg::size(path, bytes) } else { other_size(path, bytes) })?;
     check(path, width, height, limits)?;
     Ok((width, height))
 }
@@ -36,7 +35,7 @@ pub fn probe(path: &Path, bytes: &[u8], limits: &ImageLimits) -> Result<(u32, u3
 /// Decodes JPEG, PNG, GIF (first frame), BMP, TIFF, WebP or TGA, known by its first bytes.
 pub fn decode(path: &Path, bytes: &[u8], limits: &ImageLimits) -> Result<Raster> {
     let (width, height) = probe(path, bytes, limits)?;
-    let raster = guarded(path, || if is_jpeg(bytes) { decode_jpeg(path, bytes, width, height) } else { decode_other(path, bytes, limits) })?;
+    let raster = guarded(path, || if jpeg::is_jpeg(bytes) { jpeg::decode(path, bytes, width, height) } else { decode_other(path, bytes, limits) })?;
     if (raster.width, raster.height) != (width, height) {
         return Err(Error::format(path, format!("decodes to {} × {} px, its header says {width} × {height}", raster.width, raster.height)));
     }
@@ -66,64 +65,6 @@ fn guarded<T>(path: &Path, work: impl FnOnce() -> Result<T>) -> Result<T> {
 
 fn damaged(path: &Path, cause: impl std::fmt::Display) -> Error {
     Error::format(path, format!("damaged or unknown image: {cause}"))
-}
-
-fn is_jpeg(bytes: &[u8]) -> bool {
-    bytes.starts_with(&[0xFF, 0xD8, 0xFF])
-}
-
-fn jpeg_size(path: &Path, bytes: &[u8]) -> Result<(u32, u32)> {
-    let mut decoder = zune_jpeg::JpegDecoder::new_with_options(Cursor::new(bytes), lenient());
-    decoder.decode_headers().map_err(|e| damaged(path, e))?;
-    let info = decoder.info().ok_or_else(|| damaged(path, "no frame header"))?;
-    Ok((u32::from(info.width), u32::from(info.height)))
-}
-
-/// libjpeg-turbo first; what it refuses (CMYK, a missing end) zune-jpeg may still read.
-fn decode_jpeg(path: &Path, bytes: &[u8], width: u32, height: u32) -> Result<Raster> {
-    match turbo(bytes, width, height) {
-        Some(raster) => Ok(raster),
-        None => zune(path, bytes),
-    }
-}
-
-fn turbo(bytes: &[u8], width: u32, height: u32) -> Option<Raster> {
-    let mut decoder = turbojpeg::Decompressor::new().ok()?;
-    decoder.set_scan_limit(MAX_JPEG_SCANS).ok()?;
-    let header = decoder.read_header(bytes).ok()?;
-    if (header.width, header.height) != (width as usize, height as usize) {
-        return None;
-    }
-    let mut pixels = vec![[0u8; 4]; header.width * header.height];
-    let output = turbojpeg::Image {
-        pixels: pixels.as_flattened_mut(),
-        width: header.width,
-        pitch: header.width * 4,
-        height: header.height,
-        format: turbojpeg::PixelFormat::RGBA,
-    };
-    decoder.decompress(bytes, output).ok()?;
-    Some(Raster::new(width, height, pixels))
-}
-
-fn zune(path: &Path, bytes: &[u8]) -> Result<Raster> {
-    let mut decoder = zune_jpeg::JpegDecoder::new_with_options(Cursor::new(bytes), lenient());
-    let rgba = decoder.decode().map_err(|e| damaged(path, e))?;
-    let info = decoder.info().ok_or_else(|| damaged(path, "no frame header"))?;
-    let (width, height) = (u32::from(info.width), u32::from(info.height));
-    if rgba.len() != width as usize * height as usize * 4 {
-        return Err(damaged(path, format!("{} bytes for {width} × {height} px", rgba.len())));
-    }
-    Ok(Raster::new(width, height, bytemuck::cast_slice(&rgba).to_vec()))
-}
-
-fn lenient() -> zune_jpeg::zune_core::options::DecoderOptions {
-    zune_jpeg::zune_core::options::DecoderOptions::default()
-        .set_strict_mode(false)
-        .set_max_width(65_535)
-        .set_max_height(65_535)
-        .jpeg_set_max_scans(MAX_JPEG_SCANS as usize)
-        .jpeg_set_out_colorspace(zune_jpeg::zune_core::colorspace::ColorSpace::RGBA)
 }
 
 /// TGA has no magic: it is what remains.
