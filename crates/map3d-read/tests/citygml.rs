@@ -153,6 +153,9 @@ fn every_top_level_feature_type_is_converted() {
         ("PlantCover", Rank::Other, "plant_cover"),
         ("GenericCityObject", Rank::Other, "generic_city_object"),
         ("SomethingOfAnExtension", Rank::Other, "something_of_an_extension"),
+        ("RoofSurface", Rank::Other, "roof_surface"),
+        ("Window", Rank::Other, "window"),
+        ("BuildingInstallation", Rank::Other, "building_installation"),
     ] {
         let text = model(&format!(
             "<core:cityObjectMember><x:{element} xmlns:x='y' gml:id='o'>{}</x:{element}></core:cityObjectMember>",
@@ -162,6 +165,15 @@ fn every_top_level_feature_type_is_converted() {
         assert_eq!(document.count(), 2, "{element}");
         assert_eq!((document.objects[0].class.as_str(), document.triangles()[0].rank), (class, rank), "{element}");
     }
+}
+
+#[test]
+fn top_level_rooms_are_objects_without_triangles() {
+    let part = format!("<x><BuildingPart gml:id='p'>{}</BuildingPart></x>", at_lod(1, &square("q", 1)));
+    let document =
+        read_text(&model(&format!("<core:cityObjectMember><Room gml:id='r'>{}{part}</Room></core:cityObjectMember>", at_lod(1, &square("p", 1)))));
+    let objects: Vec<_> = document.objects.iter().map(|o| (o.name.as_str(), o.parent)).collect();
+    assert_eq!((objects, document.count()), (vec![("r", None), ("p", Some(0))], 0));
 }
 
 #[test]

@@ -36,11 +36,7 @@ pub struct CityObjectParser<'a> {
 impl CityObjectParser<'_> {
     /// Reads the current element as a top-level city object.
     pub fn read_city_object(&mut self) -> Result<()> {
-        let kind = match classify_feature(self.xml.local_name()) {
-            FeatureKind::Unknown => FeatureKind::Object,
-            known => known,
-        };
-        self.read_feature(kind, None)
+        self.read_feature(classify_feature(self.xml.local_name()), None)
     }
 
     fn read_feature(&mut self, kind: FeatureKind, parent: Option<u32>) -> Result<()> {
@@ -55,11 +51,14 @@ impl CityObjectParser<'_> {
         let type_name = self.xml.local_name().to_owned();
         let gml_id = self.xml.attribute("id").unwrap_or_default();
         let id = if gml_id.is_empty() { ids::NONE } else { hash_id(&gml_id) };
+        let is_interior_kind = kind == FeatureKind::Interior;
+        // A top-level feature of any other type, such as a surface without a building, is an object too.
+        let kind = if parent.is_none() && kind != FeatureKind::Part { FeatureKind::Object } else { kind };
         let is_object = matches!(kind, FeatureKind::Object | FeatureKind::Part);
         let name = if is_object { gml_id.trim().to_owned() } else { String::new() };
         let parent_feature = parent.map(|p| &self.city_object.features[p as usize]);
         let rank = parent_feature.map_or_else(|| rank_object(&type_name), |p| rank_feature(kind, &type_name, p.rank));
-        let is_interior = kind == FeatureKind::Interior || parent_feature.is_some_and(|p| p.is_interior);
+        let is_interior = is_interior_kind || parent_feature.is_some_and(|p| p.is_interior);
         let relief_lod = parent_feature.and_then(|p| p.relief_lod);
         let number = self.city_object.features.len() as u32;
         if id != ids::NONE {
