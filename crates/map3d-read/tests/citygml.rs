@@ -9,7 +9,7 @@ use map3d_read::ReadOptions;
 use serde_json::json;
 
 #[test]
-fn positions_are_read_in_every_encoding() {
+fn positions_are_read_in_every_notation() {
     let ring_of = |inner: &str| format!("<gml:Polygon><gml:exterior><gml:LinearRing>{inner}</gml:LinearRing></gml:exterior></gml:Polygon>");
     let pos = ["0 0 1", "2 0 1", "2 2 1", "0 2 1", "0 0 1"].map(|p| format!("<gml:pos>{p}</gml:pos>")).concat();
     let points = ["0 0 1", "2 0 1", "2 2 1", "0 2 1", "0 0 1"]

@@ -196,7 +196,7 @@ impl Appearances {
     }
 
     /// Iterates over the bindings of a target in the selected theme, in document order.
-    pub fn bindings_of(&self, target: Id) -> impl Iterator<Item = TargetBinding> + '_ {
+    pub fn theme_bindings(&self, target: Id) -> impl Iterator<Item = TargetBinding> + '_ {
         let first = self.targets.get(&target).map_or(NO_BINDING, |list| list.first);
         let next = move |number: &u32| Some(self.bindings.get(*number as usize)?.next);
         std::iter::successors(Some(first), next)

@@ -89,7 +89,7 @@ impl GeometryArena {
     }
 
     /// Returns the rings of a polygon; other nodes have none.
-    pub fn rings_of(&self, kind: NodeKind) -> &[Ring] {
+    pub fn polygon_rings(&self, kind: NodeKind) -> &[Ring] {
         match kind {
             NodeKind::Polygon { first_ring, rings } => &self.rings[first_ring as usize..(first_ring + rings) as usize],
             NodeKind::Group | NodeKind::XLink(_) => &[],

@@ -51,7 +51,7 @@ impl MaterialResolver {
         for id in target_ids {
             for appearances in sources.iter_mut().filter(|a| !a.is_empty()) {
                 let is_front = |b: &TargetBinding| appearances.surface_data[b.surface_data as usize].is_front;
-                let bindings: Vec<TargetBinding> = appearances.bindings_of(*id).filter(is_front).collect();
+                let bindings: Vec<TargetBinding> = appearances.theme_bindings(*id).filter(is_front).collect();
                 for binding in bindings {
                     let Some(surface_data) = self.resolve_surface_data(appearances, binding.surface_data, report)? else { continue };
                     if !surface_data.material.textured {

@@ -43,7 +43,7 @@ impl SharedGeometry {
         let kind = match node.kind {
             NodeKind::Polygon { rings, .. } => {
                 let first_ring = self.geometry.rings.len() as u32;
-                for ring in from.rings_of(node.kind) {
+                for ring in from.polygon_rings(node.kind) {
                     let start = self.geometry.points.len() as u32;
                     self.geometry.points.extend_from_slice(from.ring_points(ring));
                     self.geometry.rings.push(Ring { id: ring.id, start, end: self.geometry.points.len() as u32 });

@@ -89,7 +89,7 @@ impl Tessellator {
         report: &mut ReportBuilder,
     ) -> Result<()> {
         let arena = geometry.geometry;
-        let rings = arena.rings_of(arena.node(polygon.node).kind).iter();
+        let rings = arena.polygon_rings(arena.node(polygon.node).kind).iter();
         let rings: Vec<RingPoints> = rings.map(|r| RingPoints { id: r.id, points: arena.ring_points(r) }).collect();
         let material = self.resolve_material(geometry, polygon.node, &rings, surface, sources, report)?;
         if material.invisible {
