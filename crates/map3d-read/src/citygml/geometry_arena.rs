@@ -18,7 +18,7 @@ pub enum NodeKind {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub struct Node {
+pub struct GeometryNode {
     pub id: Id,
     pub parent: NodeId,
     pub first_child: NodeId,
@@ -39,7 +39,7 @@ pub struct Ring {
 
 #[derive(Default)]
 pub struct GeometryArena {
-    pub nodes: Vec<Node>,
+    pub nodes: Vec<GeometryNode>,
     pub rings: Vec<Ring>,
     pub points: Vec<Vec3>,
     pub by_id: IdMap<NodeId>,
@@ -61,7 +61,7 @@ impl GeometryArena {
     /// Adds a node. A duplicate id keeps referring to its first node.
     pub fn add(&mut self, id: Id, parent: NodeId, kind: NodeKind) -> NodeId {
         let number = self.nodes.len() as NodeId;
-        self.nodes.push(Node { id, parent, first_child: NO_NODE, last_child: NO_NODE, next_sibling: NO_NODE, kind, reversed: false });
+        self.nodes.push(GeometryNode { id, parent, first_child: NO_NODE, last_child: NO_NODE, next_sibling: NO_NODE, kind, reversed: false });
         if id != ids::NONE {
             self.by_id.entry(id).or_insert(number);
         }
@@ -76,7 +76,7 @@ impl GeometryArena {
         number
     }
 
-    pub fn node(&self, number: NodeId) -> &Node {
+    pub fn node(&self, number: NodeId) -> &GeometryNode {
         &self.nodes[number as usize]
     }
 
