@@ -39,7 +39,7 @@ def run(run: Run) -> Run:
         ("empty.obj", b"", 2, ("empty.obj: an empty file", "OBJ")),
         ("nothing.obj", WHOLE_FILES["nothing.obj"], 1, ("nothing.obj: no triangle in it could be used", "1 × index out of range")),
         ("cut.tif", WHOLE_FILES["cut.tif"], 1, ("cut.tif: not a GTiff raster, or damaged",)),
-        ("bomb.gml", WHOLE_FILES["bomb.gml"], 1, ("bomb.gml: a document type definition is refused", "remove it")),
+        ("bomb.gml", WHOLE_FILES["bomb.gml"], 1, ("bomb.gml: a document type definition is not allowed", "remove it")),
         ("head.gml", citygml().encode()[:300], 1, ("head.gml: no triangle in it could be used",)),
     ],
 )
@@ -87,7 +87,7 @@ def test_a_truncated_document_gives_what_stands_before_the_cut(run: Run, tmp_pat
     (tmp_path / "a.gml").write_text(truncated())
     status, out, err = run("add-files", "town", "a.gml", "--crs", "local")
     assert (status, err) == (0, "")
-    assert "document broken; what comes after is lost, e.g. " in out
+    assert "malformed document; the rest is ignored, e.g. " in out
     assert "at byte" in out
     with Registry(Workspace(tmp_path / "workspace").registry_path("town")) as registry:
         assert {"one", "two"} <= {item.name for item in registry.objects()}

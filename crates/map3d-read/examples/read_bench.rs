@@ -1,4 +1,4 @@
-//! Reads documents and prints what is in them and how fast, by the processor's clock: `cargo run --release --example read_bench -- FILE…`
+//! Reads documents and prints their contents and the CPU time: `cargo run --release -p map3d-read --example read_bench -- FILE…`
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -15,14 +15,14 @@ fn main() {
 
 fn bench(path: &Path) -> map3d_base::Result<()> {
     let format = detect_format(path)?;
-    let (wall, start) = (Instant::now(), processor_time());
+    let (wall, start) = (Instant::now(), read_cpu_time());
     let mut reader = open(path, format, &ReadOptions::default())?;
     let (mut triangles, mut vertices) = (0, 0);
     while let Some(batch) = reader.next_batch()? {
         triangles += batch.triangles.len();
         vertices += batch.positions.len();
     }
-    let seconds = processor_time().checked_sub(start).filter(|d| !d.is_zero()).unwrap_or_else(|| wall.elapsed()).as_secs_f64();
+    let seconds = read_cpu_time().checked_sub(start).filter(|d| !d.is_zero()).unwrap_or_else(|| wall.elapsed()).as_secs_f64();
     let megabytes = std::fs::metadata(path).map_or(0, |m| m.len()) as f64 / 1e6;
     let image_bytes: u64 = reader.textures().iter().filter_map(|t| std::fs::metadata(&t.path).ok()).map(|m| m.len()).sum();
     println!(
@@ -46,8 +46,8 @@ fn bench(path: &Path) -> map3d_base::Result<()> {
     Ok(())
 }
 
-/// Of this thread, where the system tells; else zero.
-fn processor_time() -> Duration {
+/// Returns the CPU time of this thread, or zero if the system does not report it.
+fn read_cpu_time() -> Duration {
     let stat = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
     Duration::from_nanos(stat.split_whitespace().next().and_then(|n| n.parse().ok()).unwrap_or(0))
 }

@@ -1,4 +1,4 @@
-//! The only place that opens files named by users' data: inside the asset's folder, whatever the name says.
+//! Resolves file names from user data. Only this module opens such files, and only inside the asset's folder.
 
 use std::collections::HashMap;
 use std::ffi::OsString;
@@ -9,47 +9,47 @@ use map3d_base::{Error, Result};
 
 const MAX_NAME_BYTES: usize = 1024;
 
-/// Why a name leads to no file.
+/// The reason why a name does not resolve to a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Refusal {
-    Missing,
-    Outside,
+pub enum FileError {
+    NotFound,
+    OutsideFolder,
     Url,
     NotAFile,
-    BadName,
+    InvalidName,
 }
 
-impl Refusal {
-    /// As reports name it.
+impl FileError {
+    /// Returns the reason as written to reports.
     pub fn reason(self) -> &'static str {
         match self {
-            Self::Missing => "file not found",
-            Self::Outside => "file outside of the asset's folder refused",
-            Self::Url => "file at a URL not fetched",
+            Self::NotFound => "file not found",
+            Self::OutsideFolder => "file outside the asset's folder not read",
+            Self::Url => "URL not fetched",
             Self::NotAFile => "not a regular file",
-            Self::BadName => "file name unusable",
+            Self::InvalidName => "invalid file name",
         }
     }
 }
 
-/// A file inside the folder; `tolerated` says what about the name was not quite right.
+/// A file inside the folder. `oddity` describes how the name deviates from the file's actual name.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Found {
+pub struct LocatedFile {
     pub path: PathBuf,
-    pub tolerated: Option<&'static str>,
+    pub oddity: Option<&'static str>,
 }
 
-/// The folder that a document's names may lead to.
+/// The folder in which a document's file names are resolved.
 pub struct AssetFolder {
     root: PathBuf,
     base: PathBuf,
-    /// Lower-cased name → name on disk, of folders that were searched.
+    /// Directory listings read so far: lower-case name → name on disk.
     listings: HashMap<PathBuf, HashMap<String, OsString>>,
 }
 
 impl AssetFolder {
-    /// Of a document; names are relative to its folder and may lead anywhere inside `root` (none: that same folder).
-    pub fn of_document(document: &Path, root: Option<&Path>) -> Result<Self> {
+    /// Names are relative to the document's folder and may lead anywhere inside `root` (by default, the document's folder).
+    pub fn for_document(document: &Path, root: Option<&Path>) -> Result<Self> {
         let base = match document.parent() {
             Some(p) if !p.as_os_str().is_empty() => p,
             _ => Path::new("."),
@@ -62,109 +62,109 @@ impl AssetFolder {
         Ok(Self { root, base, listings: HashMap::new() })
     }
 
-    /// The file that a name in the document means. Backslashes, percent-encoding and another case of letters are tolerated.
-    pub fn find(&mut self, name: &str) -> std::result::Result<Found, Refusal> {
+    /// Finds the file that a name in the document refers to. Accepts backslashes, percent-encoding and differences in case.
+    pub fn find(&mut self, name: &str) -> std::result::Result<LocatedFile, FileError> {
         let name = name.trim();
         if name.is_empty() || name.len() > MAX_NAME_BYTES || name.contains('\0') {
-            return Err(Refusal::BadName);
+            return Err(FileError::InvalidName);
         }
         let name = strip_file_scheme(name)?;
         let slashed = name.replace('\\', "/");
-        let decoded = percent_decoded(&slashed);
+        let decoded = decode_percent(&slashed);
         let spellings = [(name, None), (&slashed, Some("backslashes in a file name")), (&decoded, Some("percent-encoded file name"))];
-        let mut refusal = Refusal::Missing;
-        for (spelling, tolerated) in spellings {
-            match self.inside(&self.base.join(spelling)) {
-                Ok(path) => return Ok(Found { path, tolerated }),
-                Err(Refusal::Missing) => {}
-                Err(other) => refusal = other,
+        let mut error = FileError::NotFound;
+        for (spelling, oddity) in spellings {
+            match self.canonicalize_inside(&self.base.join(spelling)) {
+                Ok(path) => return Ok(LocatedFile { path, oddity }),
+                Err(FileError::NotFound) => {}
+                Err(other) => error = other,
             }
         }
-        if refusal != Refusal::Missing {
-            return Err(refusal);
+        if error != FileError::NotFound {
+            return Err(error);
         }
-        let path = self.any_case(&slashed).or_else(|| self.any_case(&decoded)).ok_or(Refusal::Missing)?;
-        Ok(Found { path: self.inside(&path)?, tolerated: Some("file name in another case") })
+        let path = self.find_ignoring_case(&slashed).or_else(|| self.find_ignoring_case(&decoded)).ok_or(FileError::NotFound)?;
+        Ok(LocatedFile { path: self.canonicalize_inside(&path)?, oddity: Some("file name with different case") })
     }
 
-    /// The canonical path, if it is a regular file under the root.
-    fn inside(&self, path: &Path) -> std::result::Result<PathBuf, Refusal> {
+    /// Returns the canonical path of a regular file under the root.
+    fn canonicalize_inside(&self, path: &Path) -> std::result::Result<PathBuf, FileError> {
         let Ok(path) = fs::canonicalize(path) else {
-            return Err(if self.leaves_root(path) { Refusal::Outside } else { Refusal::Missing });
+            return Err(if self.is_lexically_outside(path) { FileError::OutsideFolder } else { FileError::NotFound });
         };
         if !path.starts_with(&self.root) {
-            return Err(Refusal::Outside);
+            return Err(FileError::OutsideFolder);
         }
-        if path.is_file() { Ok(path) } else { Err(Refusal::NotAFile) }
+        if path.is_file() { Ok(path) } else { Err(FileError::NotAFile) }
     }
 
-    /// By its words alone: whether a path climbs out of the root. Says the same of files that exist and of those that do not.
-    fn leaves_root(&self, path: &Path) -> bool {
-        let mut plain = PathBuf::new();
-        for part in path.components() {
-            match part {
+    /// Returns true if a path leaves the root, without file system access: the answer does not reveal whether the file exists.
+    fn is_lexically_outside(&self, path: &Path) -> bool {
+        let mut normalized = PathBuf::new();
+        for component in path.components() {
+            match component {
                 Component::ParentDir => {
-                    plain.pop();
+                    normalized.pop();
                 }
                 Component::CurDir => {}
-                other => plain.push(other),
+                other => normalized.push(other),
             }
         }
-        !plain.starts_with(&self.root)
+        !normalized.starts_with(&self.root)
     }
 
-    /// Follows a relative path word by word, ignoring case.
-    fn any_case(&mut self, name: &str) -> Option<PathBuf> {
-        let mut at = self.base.clone();
-        for part in Path::new(name).components() {
-            match part {
+    /// Follows a relative path component by component, ignoring case.
+    fn find_ignoring_case(&mut self, name: &str) -> Option<PathBuf> {
+        let mut path = self.base.clone();
+        for component in Path::new(name).components() {
+            match component {
                 Component::Normal(word) => {
-                    let exact = at.join(word);
-                    at = if exact.exists() { exact } else { at.join(self.listed(&at, &word.to_string_lossy())?) };
+                    let exact = path.join(word);
+                    path = if exact.exists() { exact } else { path.join(self.find_entry(&path, &word.to_string_lossy())?) };
                 }
                 Component::ParentDir => {
-                    at.pop();
+                    path.pop();
                 }
                 Component::CurDir => {}
                 _ => return None,
             }
-            if !at.starts_with(&self.root) {
+            if !path.starts_with(&self.root) {
                 return None;
             }
         }
-        Some(at)
+        Some(path)
     }
 
-    fn listed(&mut self, folder: &Path, word: &str) -> Option<OsString> {
-        let listing = self.listings.entry(folder.to_path_buf()).or_insert_with(|| list(folder));
-        listing.get(&word.to_lowercase()).cloned()
+    fn find_entry(&mut self, folder: &Path, name: &str) -> Option<OsString> {
+        let listing = self.listings.entry(folder.to_path_buf()).or_insert_with(|| list_folder(folder));
+        listing.get(&name.to_lowercase()).cloned()
     }
 }
 
-/// Of names that differ in case only, the first in byte order is taken.
-fn list(folder: &Path) -> HashMap<String, OsString> {
+/// Maps lower-case names to names on disk. Of names that differ only in case, the first in byte order wins.
+fn list_folder(folder: &Path) -> HashMap<String, OsString> {
     let Ok(entries) = fs::read_dir(folder) else { return HashMap::new() };
     let mut names: Vec<OsString> = entries.filter_map(|e| Some(e.ok()?.file_name())).collect();
     names.sort_unstable_by(|a, b| b.cmp(a));
     names.into_iter().map(|n| (n.to_string_lossy().to_lowercase(), n)).collect()
 }
 
-/// `file:` is dropped; any other scheme is a URL. A single letter before the colon is a drive of another system.
-fn strip_file_scheme(name: &str) -> std::result::Result<&str, Refusal> {
+/// Removes `file:`; any other scheme is a URL. A single letter before the colon is a Windows drive.
+fn strip_file_scheme(name: &str) -> std::result::Result<&str, FileError> {
     let Some((scheme, rest)) = name.split_once(':') else { return Ok(name) };
     if scheme.eq_ignore_ascii_case("file") {
         return Ok(rest.strip_prefix("//").unwrap_or(rest));
     }
     let is_scheme = scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c));
     match (is_scheme, scheme.len()) {
-        (true, 1) => Err(Refusal::Outside),
-        (true, 2..) if rest.starts_with("//") || scheme.eq_ignore_ascii_case("data") || scheme.eq_ignore_ascii_case("urn") => Err(Refusal::Url),
+        (true, 1) => Err(FileError::OutsideFolder),
+        (true, 2..) if rest.starts_with("//") || scheme.eq_ignore_ascii_case("data") || scheme.eq_ignore_ascii_case("urn") => Err(FileError::Url),
         _ => Ok(name),
     }
 }
 
-/// Bytes %XX decoded; what is no valid UTF-8 afterwards stays as it was.
-fn percent_decoded(name: &str) -> String {
+/// Decodes `%XX`. Returns the name unchanged if the result is not valid UTF-8.
+fn decode_percent(name: &str) -> String {
     let bytes = name.as_bytes();
     let mut out = Vec::with_capacity(bytes.len());
     let mut at = 0;

@@ -1,4 +1,4 @@
-//! Images that a document names: found, checked by their header, and keyed by their bytes.
+//! Image files of a document: located, checked by their header, and identified by the hash of their bytes.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -11,87 +11,86 @@ use sha2::{Digest, Sha256};
 
 use crate::asset_folder::AssetFolder;
 use crate::options::ReadOptions;
-use crate::report::Log;
+use crate::report_builder::ReportBuilder;
 
-/// An image to be copied into the asset. `key`: first 32 hex digits of the SHA-256 of its bytes; `extension` says what the bytes are, whatever the name says.
+/// An image to be copied into the asset.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Texture {
+pub struct ImageFile {
     pub path: PathBuf,
+    /// File extension for the detected image type; may differ from the extension of `path`.
     pub extension: &'static str,
+    /// The first 32 hex digits of the SHA-256 of the file's bytes.
     pub key: String,
     pub width_px: u32,
     pub height_px: u32,
-    /// Some texels are transparent.
+    /// True if any texel is not opaque. Detected for PNG only.
     pub transparent: bool,
 }
 
-/// All images of one document.
+/// All images of one document, each stored once.
 #[derive(Default)]
-pub struct Textures {
-    files: Vec<Texture>,
+pub struct ImageFiles {
+    files: Vec<ImageFile>,
+    /// Index into `files` by name in the document; `None` for unusable images.
     by_name: HashMap<String, Option<usize>>,
     by_key: HashMap<String, usize>,
 }
 
-impl Textures {
-    pub fn files(&self) -> &[Texture] {
+impl ImageFiles {
+    pub fn files(&self) -> &[ImageFile] {
         &self.files
     }
 
-    /// The image that a name means, or `None` after a warning.
-    pub fn get(&mut self, name: &str, folder: &mut AssetFolder, options: &ReadOptions, log: &mut Log) -> Result<Option<&Texture>> {
+    /// Returns the image that a name in the document refers to. Returns `None` after a warning if the image is unusable.
+    pub fn get(&mut self, name: &str, folder: &mut AssetFolder, options: &ReadOptions, report: &mut ReportBuilder) -> Result<Option<&ImageFile>> {
         if !self.by_name.contains_key(name) {
-            let number = self.load(name, folder, options, log)?;
-            self.by_name.insert(name.to_owned(), number);
+            let index = self.load(name, folder, options, report)?;
+            self.by_name.insert(name.to_owned(), index);
         } else if self.by_name[name].is_none() {
-            log.warn("image not usable", name)?;
+            report.warn("unusable image", name)?;
         }
         Ok(self.by_name[name].map(|n| &self.files[n]))
     }
 
-    fn load(&mut self, name: &str, folder: &mut AssetFolder, options: &ReadOptions, log: &mut Log) -> Result<Option<usize>> {
-        let found = match folder.find(name) {
-            Ok(found) => found,
-            Err(refusal) => {
-                log.warn(&format!("image: {}", refusal.reason()), name)?;
+    fn load(&mut self, name: &str, folder: &mut AssetFolder, options: &ReadOptions, report: &mut ReportBuilder) -> Result<Option<usize>> {
+        let file = match folder.find(name) {
+            Ok(file) => file,
+            Err(error) => {
+                report.warn(&format!("image: {}", error.reason()), name)?;
                 return Ok(None);
             }
         };
-        if let Some(oddity) = found.tolerated {
-            log.note(oddity, name);
+        if let Some(oddity) = file.oddity {
+            report.note(oddity, name);
         }
-        match inspect(&found.path, options) {
-            Ok(texture) => Ok(Some(self.keep(texture))),
-            Err(why) => {
-                log.warn(&format!("image: {why}"), name)?;
+        match inspect(&file.path, options) {
+            Ok(image) => Ok(Some(self.add(image))),
+            Err(reason) => {
+                report.warn(&format!("image: {reason}"), name)?;
                 Ok(None)
             }
         }
     }
 
-    /// Takes over an image that another document brought.
-    pub fn adopt(&mut self, texture: &Texture) {
-        self.keep(texture.clone());
-    }
-
-    fn keep(&mut self, texture: Texture) -> usize {
-        *self.by_key.entry(texture.key.clone()).or_insert_with(|| {
-            self.files.push(texture);
+    /// Adds an image unless one with the same bytes exists. Returns its index.
+    pub fn add(&mut self, image: ImageFile) -> usize {
+        *self.by_key.entry(image.key.clone()).or_insert_with(|| {
+            self.files.push(image);
             self.files.len() - 1
         })
     }
 }
 
-/// Checks the header before the bytes are taken; the error is a reason for the report.
-fn inspect(path: &Path, options: &ReadOptions) -> std::result::Result<Texture, String> {
+/// Reads and checks the header, then hashes the file. The error is the reason for the report.
+fn inspect(path: &Path, options: &ReadOptions) -> std::result::Result<ImageFile, String> {
     let unreadable = |e: std::io::Error| format!("unreadable ({})", e.kind());
     let mut file = BufReader::new(File::open(path).map_err(unreadable)?);
-    let kind = imagesize::reader_type(&mut file).map_err(|_| "of an unknown format")?;
-    let extension = extension_of(kind).ok_or("of an unsupported format")?;
-    let size = kind.reader_size(&mut file).map_err(|_| "with a broken header")?;
+    let kind = imagesize::reader_type(&mut file).map_err(|_| "unknown format")?;
+    let extension = extension_for(kind).ok_or("unsupported format")?;
+    let size = kind.reader_size(&mut file).map_err(|_| "invalid header")?;
     let (width, height) = (size.width as u64, size.height as u64);
     if width == 0 || height == 0 {
-        return Err("of no size".into());
+        return Err("no pixels".into());
     }
     if width.max(height) > options.max_image_side_px {
         return Err(format!("side over the limit max_image_side_px = {}", options.max_image_side_px));
@@ -99,17 +98,17 @@ fn inspect(path: &Path, options: &ReadOptions) -> std::result::Result<Texture, S
     if width * height > options.max_image_px {
         return Err(format!("pixels over the limit max_image_px = {}", options.max_image_px));
     }
-    Ok(Texture {
+    Ok(ImageFile {
         path: path.to_path_buf(),
         extension,
-        key: key_of(path).map_err(unreadable)?,
+        key: compute_key(path).map_err(unreadable)?,
         width_px: width as u32,
         height_px: height as u32,
-        transparent: extension == "png" && png_is_transparent(path),
+        transparent: extension == "png" && is_png_transparent(path),
     })
 }
 
-fn extension_of(kind: ImageType) -> Option<&'static str> {
+fn extension_for(kind: ImageType) -> Option<&'static str> {
     Some(match kind {
         ImageType::Jpeg => "jpg",
         ImageType::Png => "png",
@@ -122,7 +121,7 @@ fn extension_of(kind: ImageType) -> Option<&'static str> {
     })
 }
 
-fn key_of(path: &Path) -> std::io::Result<String> {
+fn compute_key(path: &Path) -> std::io::Result<String> {
     let mut file = File::open(path)?;
     let mut digest = Sha256::new();
     let mut buffer = vec![0; 1 << 16];
@@ -134,8 +133,8 @@ fn key_of(path: &Path) -> std::io::Result<String> {
     }
 }
 
-/// Whether a PNG has a texel that is not opaque; read row by row. A broken image counts as opaque: whoever decodes it will say so.
-fn png_is_transparent(path: &Path) -> bool {
+/// Returns true if any texel of a PNG is not opaque. Reads row by row. Treats a damaged image as opaque: the scene build reports it when it decodes it.
+fn is_png_transparent(path: &Path) -> bool {
     let Ok(file) = File::open(path) else { return false };
     let mut decoder = png::Decoder::new(BufReader::new(file));
     decoder.set_transformations(png::Transformations::normalize_to_color8() | png::Transformations::ALPHA);

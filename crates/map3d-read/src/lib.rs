@@ -1,25 +1,25 @@
-//! Readers: source documents (OBJ, CityGML) to batches of triangles in source coordinates, with materials, objects and a report.
+//! Reads source documents (OBJ, CityGML) into batches of triangles in source coordinates, with materials, objects and a report.
 //!
-//! Bad input is data: a broken polygon or a missing image is skipped, counted and reported; with `strict` the first one is an error.
+//! Bad input is data: a broken polygon or a missing image is skipped, counted and reported. With `strict`, the first one is an error.
 
 mod asset_folder;
 mod citygml;
 mod detect;
 mod document;
 mod image_file;
-mod import;
-mod materials;
-mod mend;
+mod material_table;
 mod obj;
+mod open;
 mod options;
-mod report;
-mod text;
+mod report_builder;
+mod t_junctions;
+mod text_input;
 mod triangulate;
 
-pub use asset_folder::{AssetFolder, Found, Refusal};
+pub use asset_folder::{AssetFolder, FileError, LocatedFile};
 pub use detect::{Format, detect_format};
-pub use document::{DocumentReader, open};
-pub use image_file::Texture;
-pub use import::{import, write_tables};
+pub use document::DocumentReader;
+pub use image_file::ImageFile;
+pub use open::{open, write_tables};
 pub use options::{ReadOptions, Split, Up};
-pub use triangulate::{Fault, Triangulator};
+pub use triangulate::{Coverage, PolygonError, Triangulator};

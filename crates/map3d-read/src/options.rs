@@ -1,11 +1,11 @@
-//! What a caller may choose, and the limits of one document.
+//! Options and limits for reading one document.
 
 use std::path::PathBuf;
 
 use map3d_base::{Error, Result};
 use serde::Deserialize;
 
-/// Axis of an OBJ that points up; with `y`, (x, y, z) becomes (x, −z, y).
+/// The axis of an OBJ that points up. `Y` turns (x, y, z) into (x, −z, y).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Up {
@@ -14,7 +14,7 @@ pub enum Up {
     Z,
 }
 
-/// What becomes one object of an OBJ.
+/// The part of an OBJ that becomes one object.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Split {
@@ -23,26 +23,26 @@ pub enum Split {
     Group,
 }
 
-/// Options of one document; the limits are those of the safety rules and may be raised by name.
+/// Options for one document. The limits guard against hostile input; raise one by its name for large data.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ReadOptions {
     pub up: Up,
     pub split: Split,
-    /// Appearance theme of a CityGML document; none: the first in the file.
+    /// CityGML appearance theme; by default, the first in the file.
     pub theme: Option<String>,
-    /// Level of detail of a CityGML document; none: the best of each object.
+    /// CityGML level of detail, 0 to 4; by default, the finest of each object.
     pub lod: Option<String>,
-    /// The first broken part is an error.
+    /// Makes the first broken part an error.
     pub strict: bool,
-    /// Folder that names in the document may lead to; none: the document's own.
+    /// Folder that file names in the document may lead to; by default, the document's own.
     pub folder: Option<PathBuf>,
     pub max_image_side_px: u64,
     pub max_image_px: u64,
     pub max_ring_vertices: u64,
     pub max_triangles: u64,
     pub max_instances: u64,
-    /// Memory for appearances that stand outside of the city objects.
+    /// Memory for appearances outside city objects, and for those of one city object.
     pub max_appearance_bytes: u64,
     /// Memory for the geometry of one city object.
     pub max_object_bytes: u64,
@@ -69,7 +69,7 @@ impl Default for ReadOptions {
 }
 
 impl ReadOptions {
-    /// From JSON; an absent member has its default, an unknown one is an error.
+    /// Parses options from JSON. Absent members have their defaults; unknown members are an error.
     pub fn from_json(text: &str) -> Result<Self> {
         serde_json::from_str(text).map_err(|e| Error::argument(format!("reader options: {e}")))
     }

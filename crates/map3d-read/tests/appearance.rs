@@ -1,13 +1,14 @@
-//! CityGML appearances: themes, materials, textures of every kind, and how they pass down.
+//! CityGML appearances: themes, materials, all types of textures, and inheritance.
 
-mod reading;
+mod documents;
 
+use documents::{Folder, ParsedDocument, read_with};
 use map3d_base::asset::Wrap;
 use map3d_read::{Format, ReadOptions};
-use reading::{Folder, Reading, read_with};
 
-/// A building of one square (0 0) … (2 2), its polygon `p` in the surface `s` of the wall `w`, with appearances in the model and in the building.
-fn read(outside: &str, inside: &str, options: &ReadOptions) -> Reading {
+/// Reads a building `b` with one square from (0 0) to (2 2): polygon `p` in the MultiSurface `s` of the wall `w`.
+/// `outside` and `inside`: appearances in the model and in the building.
+fn read(outside: &str, inside: &str, options: &ReadOptions) -> ParsedDocument {
     let folder = Folder::new("appearance");
     folder.put_png("t.png", 8, 4, [200, 100, 50, 255]);
     folder.put_png("u.png", 4, 4, [1, 2, 3, 255]);
@@ -56,56 +57,60 @@ fn texture(more: &str, target: &str, coordinates: &str) -> String {
 
 const UVS: &str = "0 0 1 0 1 1 0 1 0 0";
 
-fn defaults(outside: &str, inside: &str) -> Reading {
+fn read_with_defaults(outside: &str, inside: &str) -> ParsedDocument {
     read(outside, inside, &ReadOptions::default())
 }
 
-fn diffuse(reading: &Reading) -> [f32; 4] {
-    reading.material_of(0).diffuse
+fn diffuse(document: &ParsedDocument) -> [f32; 4] {
+    document.material_of(0).diffuse
 }
 
 const RED: [f32; 4] = [1.0, 0.0, 0.0, 1.0];
 const GREEN: [f32; 4] = [0.0, 1.0, 0.0, 1.0];
 
 #[test]
-fn appearances_are_found_wherever_they_stand_and_whatever_they_target() {
+fn appearances_may_be_anywhere_and_target_any_ancestor() {
     for target in ["p", "s", "c", "w", "b"] {
         let red = color("1 0 0", &[target]);
-        assert_eq!(diffuse(&defaults(&member("a", &red), "")), RED, "after, {target}");
-        assert_eq!(diffuse(&defaults("", &property("a", &red))), RED, "inside, {target}");
+        assert_eq!(diffuse(&read_with_defaults(&member("a", &red), "")), RED, "after, {target}");
+        assert_eq!(diffuse(&read_with_defaults("", &property("a", &red))), RED, "inside, {target}");
     }
-    let nowhere = defaults(&member("a", &color("1 0 0", &["other"])), "");
+    let nowhere = read_with_defaults(&member("a", &color("1 0 0", &["other"])), "");
     assert_ne!(diffuse(&nowhere), RED);
 }
 
 #[test]
-fn the_nearest_wins_and_a_texture_beats_a_colour() {
+fn nearest_appearance_wins_and_textures_win_over_colours() {
     let both = color("0 1 0", &["s"]) + "|" + &color("1 0 0", &["p"]);
-    assert_eq!(diffuse(&defaults(&member("a", &both), "")), RED);
-    let inside_first = defaults(&member("a", &color("0 1 0", &["p"])), &property("a", &color("1 0 0", &["p"])));
-    assert_eq!(diffuse(&inside_first), RED, "the building's own before the model's");
-    let textured = defaults(&member("a", &(color("1 0 0", &["p"]) + "|" + &texture("", "s", UVS))), "");
+    assert_eq!(diffuse(&read_with_defaults(&member("a", &both), "")), RED);
+    let inside_first = read_with_defaults(&member("a", &color("0 1 0", &["p"])), &property("a", &color("1 0 0", &["p"])));
+    assert_eq!(diffuse(&inside_first), RED, "the building's appearance wins over the model's");
+    let textured = read_with_defaults(&member("a", &(color("1 0 0", &["p"]) + "|" + &texture("", "s", UVS))), "");
     assert!(textured.material_of(0).texture.is_some());
     assert_eq!(diffuse(&textured), [1.0; 4]);
 }
 
 #[test]
-fn the_first_theme_is_drawn_unless_another_is_asked_for() {
+fn first_theme_is_used_unless_another_is_requested() {
     let two = member("summer", &color("1 0 0", &["p"])) + &member("winter", &color("0 1 0", &["p"]));
-    let asked = |theme: Option<&str>| read(&two, "", &ReadOptions { theme: theme.map(str::to_owned), ..ReadOptions::default() });
-    assert_eq!(diffuse(&asked(None)), RED);
-    assert_eq!(diffuse(&asked(Some("summer"))), RED);
-    assert_eq!(diffuse(&asked(Some("winter"))), GREEN);
-    assert_eq!(diffuse(&asked(Some("spring"))), [0.8, 0.8, 0.8, 1.0]);
-    assert!(asked(None).report.warnings.iter().any(|w| w.reason == "appearance theme drawn" && w.example == "summer"));
-    assert_eq!(asked(None).warned("another theme"), 1);
+    let read_theme = |theme: Option<&str>| read(&two, "", &ReadOptions { theme: theme.map(str::to_owned), ..ReadOptions::default() });
+    assert_eq!(diffuse(&read_theme(None)), RED);
+    assert_eq!(diffuse(&read_theme(Some("summer"))), RED);
+    assert_eq!(diffuse(&read_theme(Some("winter"))), GREEN);
+    assert_eq!(diffuse(&read_theme(Some("spring"))), [0.8, 0.8, 0.8, 1.0]);
+    assert!(read_theme(None).report.warnings.iter().any(|w| w.reason == "appearance theme used" && w.example == "summer"));
+    assert_eq!(read_theme(None).warned("another theme"), 1);
     let inside = read("", &(property("x", &color("1 0 0", &["p"])) + &property("y", &color("0 1 0", &["p"]))), &ReadOptions::default());
     assert_eq!(diffuse(&inside), RED);
-    assert_eq!(diffuse(&defaults("<appearanceMember><Appearance><surfaceDataMember>".to_owned().as_str(), "")), [0.8, 0.8, 0.8, 1.0], "broken off");
+    assert_eq!(
+        diffuse(&read_with_defaults("<appearanceMember><Appearance><surfaceDataMember>".to_owned().as_str(), "")),
+        [0.8, 0.8, 0.8, 1.0],
+        "truncated"
+    );
 }
 
 #[test]
-fn themes_share_surface_data_and_mappings_by_reference() {
+fn themes_share_surface_data_and_parameterizations_by_xlink() {
     let summer = member(
         "summer",
         &("<X3DMaterial gml:id='m'><diffuseColor>1 0 0</diffuseColor><target>#p</target></X3DMaterial>".to_owned()
@@ -116,14 +121,14 @@ fn themes_share_surface_data_and_mappings_by_reference() {
     let options = ReadOptions { theme: Some("winter".into()), ..ReadOptions::default() };
     assert_eq!(diffuse(&read(&(summer.clone() + &winter("#m")), "", &options)), RED);
     assert_eq!(diffuse(&read(&(winter("#m") + &summer), "", &options)), RED);
-    let borrowed = "<ParameterizedTexture><imageURI>u.png</imageURI><target uri='#p' xlink:href='#list'/></ParameterizedTexture>";
-    let reading = read(&(summer + &winter(borrowed)), "", &options);
-    assert_eq!(reading.triangles()[0].uvs, Some([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]));
+    let sharing = "<ParameterizedTexture><imageURI>u.png</imageURI><target uri='#p' xlink:href='#list'/></ParameterizedTexture>";
+    let document = read(&(summer + &winter(sharing)), "", &options);
+    assert_eq!(document.triangles()[0].uvs, Some([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]));
 }
 
 #[test]
-fn colours_and_transparency() {
-    let with = |inner: &str| defaults(&member("a", &format!("<X3DMaterial>{inner}<target>#p</target></X3DMaterial>")), "");
+fn colours_and_transparency_are_read() {
+    let with = |inner: &str| read_with_defaults(&member("a", &format!("<X3DMaterial>{inner}<target>#p</target></X3DMaterial>")), "");
     assert_eq!(diffuse(&with("")), [0.8, 0.8, 0.8, 1.0]);
     assert_eq!(diffuse(&with("<diffuseColor>0.5 2 nan</diffuseColor><transparency>0.25</transparency>")), [0.5, 1.0, 0.0, 0.75]);
     let invisible = with("<transparency>1</transparency>");
@@ -133,7 +138,7 @@ fn colours_and_transparency() {
 }
 
 #[test]
-fn wrap_modes_and_border_colours() {
+fn wrap_modes_and_border_colours_are_read() {
     let border = "<wrapMode>border</wrapMode><borderColor>1 0.5 0 1</borderColor>";
     for (more, wrap, color) in [
         ("", Wrap::Wrap, [0.0; 4]),
@@ -143,9 +148,9 @@ fn wrap_modes_and_border_colours() {
         ("<wrapMode>clamp</wrapMode>", Wrap::Clamp, [0.0; 4]),
         (border, Wrap::Border, [1.0, 0.5, 0.0, 1.0]),
     ] {
-        let reading = defaults(&member("a", &texture(more, "p", "5 5 6 5 6 6 5 6 5 5")), "");
-        assert_eq!((reading.material_of(0).wrap, reading.material_of(0).border), (wrap, color));
-        let least = reading.triangles()[0].uvs.expect("textured")[0];
+        let document = read_with_defaults(&member("a", &texture(more, "p", "5 5 6 5 6 6 5 6 5 5")), "");
+        assert_eq!((document.material_of(0).wrap, document.material_of(0).border), (wrap, color));
+        let least = document.triangles()[0].uvs.expect("textured")[0];
         let expected = match wrap {
             Wrap::Wrap => [0.0, 0.0],
             Wrap::Mirror => [1.0, 1.0],
@@ -156,85 +161,85 @@ fn wrap_modes_and_border_colours() {
 }
 
 #[test]
-fn equal_looks_are_one_material() {
-    let reading = defaults(&member("a", &(texture("", "p", UVS) + "|" + &texture("", "q", UVS))), "");
-    assert_eq!((reading.materials.len(), reading.textures.len()), (1, 1));
+fn equal_surface_data_share_one_material() {
+    let document = read_with_defaults(&member("a", &(texture("", "p", UVS) + "|" + &texture("", "q", UVS))), "");
+    assert_eq!((document.materials.len(), document.textures.len()), (1, 1));
 }
 
 #[test]
-fn rings_without_usable_coordinates_fall_back_to_the_colour() {
+fn rings_without_valid_texture_coordinates_fall_back_to_the_colour() {
     for (coordinates, textured) in [(UVS, true), ("0 0 1 0 1 1 0 1", true), ("0 0 1 0 1 1", false), ("0 0 1 0 1", false), ("a b", false), ("", false)]
     {
-        let reading = defaults(&member("a", &(texture("", "p", coordinates) + "|" + &color("1 0 0", &["p"]))), "");
-        assert_eq!(reading.material_of(0).texture.is_some(), textured, "{coordinates}: {:?}", reading.report);
-        assert!(textured || diffuse(&reading) == RED);
-        assert!(textured || reading.warned("texture") > 0);
+        let document = read_with_defaults(&member("a", &(texture("", "p", coordinates) + "|" + &color("1 0 0", &["p"]))), "");
+        assert_eq!(document.material_of(0).texture.is_some(), textured, "{coordinates}: {:?}", document.report);
+        assert!(textured || diffuse(&document) == RED);
+        assert!(textured || document.warned("texture") > 0);
     }
-    let unhashed = texture("", "p", UVS).replace("'#p'", "'p'").replace("'#r'", "'r'");
-    assert!(defaults(&member("a", &unhashed), "").material_of(0).texture.is_some());
+    let without_number_sign = texture("", "p", UVS).replace("'#p'", "'p'").replace("'#r'", "'r'");
+    assert!(read_with_defaults(&member("a", &without_number_sign), "").material_of(0).texture.is_some());
 }
 
 #[test]
 fn missing_images_fall_back_to_the_colour() {
     let missing = texture("", "p", UVS).replace("t.png", "nowhere.png");
-    let reading = defaults(&member("a", &(missing + "|" + &color("1 0 0", &["p"]))), "");
-    assert_eq!((diffuse(&reading), reading.warned("image: file not found")), (RED, 1));
+    let document = read_with_defaults(&member("a", &(missing + "|" + &color("1 0 0", &["p"]))), "");
+    assert_eq!((diffuse(&document), document.warned("image: file not found")), (RED, 1));
 }
 
 #[test]
-fn transparent_texels_cut_out() {
-    let reading = defaults(&member("a", &texture("", "p", UVS).replace("t.png", "clear.png")), "");
-    assert!(reading.material_of(0).cutout);
+fn transparent_texels_make_a_cutout_material() {
+    let document = read_with_defaults(&member("a", &texture("", "p", UVS).replace("t.png", "clear.png")), "");
+    assert!(document.material_of(0).cutout);
 }
 
 #[test]
-fn texture_coordinates_by_matrix() {
+fn texture_coordinates_are_computed_by_matrix() {
     let generated = "<ParameterizedTexture><imageURI>t.png</imageURI><wrapMode>clamp</wrapMode><target uri='#p'><TexCoordGen><worldToTexture>0.5 0 0 0.25 0 0.25 0 0 0 0 0 1</worldToTexture></TexCoordGen></target></ParameterizedTexture>";
-    let reading = defaults(&member("a", generated), "");
-    assert_eq!(reading.triangles()[0].uvs, Some([[0.25, 0.0], [1.25, 0.0], [1.25, 0.5]]));
+    let document = read_with_defaults(&member("a", generated), "");
+    assert_eq!(document.triangles()[0].uvs, Some([[0.25, 0.0], [1.25, 0.0], [1.25, 0.5]]));
     let perspective = generated.replace("0 0 0 1<", "0 0 0 2<");
-    assert_eq!(defaults(&member("a", &perspective), "").triangles()[0].uvs, Some([[0.125, 0.0], [0.625, 0.0], [0.625, 0.25]]));
+    assert_eq!(read_with_defaults(&member("a", &perspective), "").triangles()[0].uvs, Some([[0.125, 0.0], [0.625, 0.0], [0.625, 0.25]]));
     let short = generated.replace("0 0 0 1<", "0 0 0<");
-    assert!(defaults(&member("a", &short), "").material_of(0).texture.is_none());
+    assert!(read_with_defaults(&member("a", &short), "").material_of(0).texture.is_none());
 }
 
 #[test]
-fn georeferenced_textures_by_reference_point_or_world_file() {
+fn georeferenced_textures_use_reference_point_or_world_file() {
     let georeferenced = |more: &str| {
         format!("<GeoreferencedTexture><imageURI>u.png</imageURI><wrapMode>none</wrapMode>{more}<target>#p</target></GeoreferencedTexture>")
     };
     let point = "<referencePoint><gml:Point><gml:pos>0.25 1.75</gml:pos></gml:Point></referencePoint><orientation>0.5 0 0 -0.5</orientation>";
     for more in [point, ""] {
-        let reading = defaults(&member("a", &georeferenced(more)), "");
-        assert_eq!(reading.triangles()[0].uvs, Some([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]), "{more}");
+        let document = read_with_defaults(&member("a", &georeferenced(more)), "");
+        assert_eq!(document.triangles()[0].uvs, Some([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]), "{more}");
     }
-    let lost = defaults(&member("a", &georeferenced("").replace("u.png", "t.png")), "");
-    assert!(lost.material_of(0).texture.is_none());
-    assert_eq!(lost.warned("without reference point"), 1);
+    let unplaced = read_with_defaults(&member("a", &georeferenced("").replace("u.png", "t.png")), "");
+    assert!(unplaced.material_of(0).texture.is_none());
+    assert_eq!(unplaced.warned("without reference point"), 1);
 }
 
 #[test]
-fn coordinates_of_polygons_with_holes_stay_with_their_points() {
+fn texture_coordinates_of_polygons_with_holes_stay_with_their_points() {
     let folder = Folder::new("holes");
     folder.put_png("t.png", 8, 8, [1, 1, 1, 255]);
-    // u = x / 10, v = y / 10 on every ring, so the same must hold on every triangle.
+    // u = x / 10, v = y / 10 on every ring, and therefore on every triangle.
     let (outer, inner) = ("0 0 10 0 10 10 0 10 0 0", "2 2 2 5 5 5 5 2 2 2");
-    let space = |flat: &str| flat.split(' ').collect::<Vec<_>>().chunks(2).map(|p| format!("{} {} 3", p[0], p[1])).collect::<Vec<_>>().join(" ");
+    let to_3d = |flat: &str| flat.split(' ').collect::<Vec<_>>().chunks(2).map(|p| format!("{} {} 3", p[0], p[1])).collect::<Vec<_>>().join(" ");
     let tenth = |flat: &str| flat.split(' ').map(|v| (v.parse::<f64>().expect("a number") / 10.0).to_string()).collect::<Vec<_>>().join(" ");
     let text = format!(
         "<CityModel xmlns:gml='g'><cityObjectMember><Building><lod2MultiSurface><gml:Polygon gml:id='p'><gml:exterior><gml:LinearRing gml:id='r0'><gml:posList>{}</gml:posList></gml:LinearRing></gml:exterior>\
          <gml:interior><gml:LinearRing gml:id='r1'><gml:posList>{}</gml:posList></gml:LinearRing></gml:interior></gml:Polygon></lod2MultiSurface></Building></cityObjectMember>\
          <appearanceMember><Appearance><surfaceDataMember><ParameterizedTexture><imageURI>t.png</imageURI><wrapMode>clamp</wrapMode><target uri='#p'><TexCoordList><textureCoordinates ring='#r1'>{}</textureCoordinates>\
          <textureCoordinates ring='#r0'>{}</textureCoordinates></TexCoordList></target></ParameterizedTexture></surfaceDataMember></Appearance></appearanceMember></CityModel>",
-        space(outer),
-        space(inner),
+        to_3d(outer),
+        to_3d(inner),
         tenth(inner),
         tenth(outer),
     );
     let path = folder.put("a.gml", text);
-    let reading = read_with(&path, Format::CityGml, &ReadOptions::default()).expect("readable");
-    assert_eq!((reading.count(), reading.area()), (8, 91.0));
-    for t in reading.triangles() {
+    let document = read_with(&path, Format::CityGml, &ReadOptions::default()).expect("readable");
+    assert_eq!((document.count(), document.area()), (8, 91.0));
+    for t in document.triangles() {
         for (corner, uv) in t.corners.iter().zip(t.uvs.expect("textured")) {
             assert_eq!([(corner[0] / 10.0) as f32, (corner[1] / 10.0) as f32], uv);
         }
@@ -242,9 +247,9 @@ fn coordinates_of_polygons_with_holes_stay_with_their_points() {
 }
 
 #[test]
-fn appearances_over_their_limit_are_refused() {
+fn appearances_over_the_limit_are_an_error() {
     let folder = Folder::new("limit");
     let path = folder.put("a.gml", format!("<CityModel>{}</CityModel>", member("a", &texture("", "p", UVS))));
     let options = ReadOptions { max_appearance_bytes: 10, ..ReadOptions::default() };
-    assert!(reading::is_limit_error(read_with(&path, Format::CityGml, &options), "max_appearance_bytes"));
+    assert!(documents::is_limit_error(read_with(&path, Format::CityGml, &options), "max_appearance_bytes"));
 }

@@ -1,35 +1,35 @@
-//! CityGML that is broken, hostile or too large: counted or refused, and nothing else is lost.
+//! Broken, hostile or too large CityGML: the fault is counted or an error, everything else is read.
 
-mod reading;
+mod documents;
 
+use documents::city_model::{at_lod, building, member, model, multi_surface, polygon, read_text, square, try_text};
+use documents::{Folder, is_format_error, is_limit_error, read_with};
 use map3d_read::{Format, ReadOptions};
-use reading::city::{at_lod, building, member, model, multi_surface, polygon, read_text, square, try_text};
-use reading::{Folder, is_format_error, is_limit_error, read_with};
 use serde_json::json;
 
 #[test]
-fn broken_polygons_are_counted_and_never_cost_the_building() {
+fn broken_polygons_are_skipped_and_counted() {
     for (case, points, reason) in [
         ("no points", "", "fewer than 3"),
         ("one point", "0 0 0", "fewer than 3"),
         ("two points", "0 0 0 1 1 1 0 0 0", "fewer than 3"),
-        ("one point often", "1 1 1 1 1 1 1 1 1 1 1 1", "fewer than 3"),
+        ("one point repeated", "1 1 1 1 1 1 1 1 1 1 1 1", "fewer than 3"),
         ("on a line", "0 0 0 1 1 1 2 2 2 0 0 0", "without area"),
-        ("words", "0 0 a 1 1 1 2 2 2", "cannot be read"),
-        ("numbers left over", "0 0 0 1 1 1 2 2", "cannot be read"),
+        ("words", "0 0 a 1 1 1 2 2 2", "unreadable"),
+        ("numbers left over", "0 0 0 1 1 1 2 2", "unreadable"),
         ("not a number", "0 0 0 nan 1 1 2 2 0 0 0 0", "not a finite"),
         ("infinite", "0 0 0 1e999 1 1 2 2 0 0 0 0", "not a finite"),
-        ("commas", "0,0,0 1,1,1 2,2,0", "cannot be read"),
+        ("commas", "0,0,0 1,1,1 2,2,0", "unreadable"),
     ] {
         let members = member(&polygon("bad", points)) + &member(&square("good", 1));
-        let reading = read_text(&building(&format!("<bldg:lod2MultiSurface>{}</bldg:lod2MultiSurface>", multi_surface(&members))));
-        assert_eq!((reading.count(), reading.area()), (2, 4.0), "{case}");
-        assert_eq!(reading.skipped(reason), 1, "{case}: {:?}", reading.report);
+        let document = read_text(&building(&format!("<bldg:lod2MultiSurface>{}</bldg:lod2MultiSurface>", multi_surface(&members))));
+        assert_eq!((document.count(), document.area()), (2, 4.0), "{case}");
+        assert_eq!(document.skipped(reason), 1, "{case}: {:?}", document.report);
     }
 }
 
 #[test]
-fn strict_refuses_the_first_fault() {
+fn first_fault_is_an_error_with_strict() {
     let strict = ReadOptions { strict: true, ..ReadOptions::default() };
     let text = building(&at_lod(2, &polygon("p", "0 0 0 1 1 1 0 0 0")));
     assert!(is_format_error(try_text(&text, &strict), "fewer than 3"));
@@ -37,32 +37,32 @@ fn strict_refuses_the_first_fault() {
 }
 
 #[test]
-fn references_to_nothing_and_to_other_documents_are_reported() {
+fn unresolved_and_external_references_are_reported() {
     let body = |href: &str| {
         building(&format!(
             "{}<bldg:lod2Solid><gml:Solid><gml:exterior xlink:href=\"{href}\"/></gml:Solid></bldg:lod2Solid>",
             at_lod(2, &square("a", 1))
         ))
     };
-    assert_eq!(read_text(&body("#nothing")).warned("leads nowhere"), 1);
+    assert_eq!(read_text(&body("#nothing")).warned("unresolved reference"), 1);
     assert_eq!(read_text(&body("other.gml#a")).warned("another document"), 1);
 }
 
 #[test]
-fn references_in_a_circle_are_refused_and_end() {
+fn cycles_of_references_are_skipped_and_counted() {
     let group = |id: &str, inner: &str| format!("<gml:CompositeSurface gml:id='{id}'>{inner}</gml:CompositeSurface>");
     let to = |id: &str| format!("<gml:surfaceMember xlink:href='#{id}'/>");
     let itself = group("a", &(to("a") + &member(&square("p", 1))));
     let two = group("a", &(to("b") + &member(&square("p", 1)))) + &group("b", &to("a"));
     for (case, inner) in [("itself", member(&itself)), ("two", format!("<gml:surfaceMembers>{two}</gml:surfaceMembers>"))] {
-        let reading = read_text(&building(&format!("<bldg:lod2MultiSurface>{}</bldg:lod2MultiSurface>", multi_surface(&inner))));
-        assert_eq!(reading.area(), 4.0, "{case}");
-        assert!(reading.skipped("refers to itself") > 0, "{case}");
+        let document = read_text(&building(&format!("<bldg:lod2MultiSurface>{}</bldg:lod2MultiSurface>", multi_surface(&inner))));
+        assert_eq!(document.area(), 4.0, "{case}");
+        assert!(document.skipped("refers to itself") > 0, "{case}");
     }
 }
 
 #[test]
-fn references_that_double_at_every_step_cost_nothing() {
+fn references_that_double_at_every_level_are_read_in_linear_time() {
     let mut groups = member(&square("p", 1));
     for k in 0..60 {
         let target = if k == 0 { "p".to_owned() } else { format!("g{}", k - 1) };
@@ -73,13 +73,13 @@ fn references_that_double_at_every_step_cost_nothing() {
     let chain: String = (0..20_000)
         .map(|k| member(&format!("<gml:CompositeSurface gml:id='c{k}'><gml:surfaceMember xlink:href='#c{}'/></gml:CompositeSurface>", k + 1)))
         .collect();
-    let reading =
+    let document =
         read_text(&building(&format!("<bldg:lod2MultiSurface>{}</bldg:lod2MultiSurface>", multi_surface(&(chain + &member(&square("c20000", 1)))))));
-    assert_eq!(reading.area(), 4.0);
+    assert_eq!(document.area(), 4.0);
 }
 
 #[test]
-fn broken_documents_keep_what_came_before() {
+fn objects_before_malformed_xml_are_read() {
     let whole = model(
         &(0..3)
             .map(|k| {
@@ -91,22 +91,22 @@ fn broken_documents_keep_what_came_before() {
     let cut = whole.rfind("posList").expect("a posList");
     let strict = ReadOptions { strict: true, ..ReadOptions::default() };
     for text in [whole[..cut].to_owned(), format!("{}wrong{}", &whole[..cut], &whole[cut + 7..]), format!("{}<{}", &whole[..cut], &whole[cut..])] {
-        let reading = read_text(&text);
-        assert_eq!((reading.objects.len(), reading.count()), (2, 4));
-        assert_eq!(reading.warned("document broken"), 1, "{:?}", reading.report);
+        let document = read_text(&text);
+        assert_eq!((document.objects.len(), document.count()), (2, 4));
+        assert_eq!(document.warned("malformed document"), 1, "{:?}", document.report);
         assert!(is_format_error(try_text(&text, &strict), "byte"));
     }
 }
 
 #[test]
-fn what_is_no_city_model_is_refused() {
+fn documents_without_a_city_model_are_an_error() {
     for text in ["", "text", "<html/>", "<?xml version='1.0'?>", "<!-- -->", "<CityModel", "<a><CityModel/></a>"] {
         assert!(try_text(text, &ReadOptions::default()).is_err(), "{text}");
     }
 }
 
 #[test]
-fn document_types_and_entities_are_refused() {
+fn document_types_and_custom_entities_are_an_error() {
     let entity = building("<gml:name>&secret;</gml:name>");
     assert!(is_format_error(try_text(&entity, &ReadOptions::default()), "entity &secret;"));
     let dtd = "<!DOCTYPE a [<!ENTITY x SYSTEM \"file:///etc/passwd\">]><CityModel/>";
@@ -114,8 +114,8 @@ fn document_types_and_entities_are_refused() {
 }
 
 #[test]
-fn elements_nest_up_to_the_limit() {
-    // Root, member, building, property and what stands in it.
+fn elements_may_nest_up_to_the_limit() {
+    // Four levels: root, member, building, property.
     let nested = |n: usize| {
         format!("<CityModel><cityObjectMember><Building><x>{}{}</x></Building></cityObjectMember></CityModel>", "<y>".repeat(n), "</y>".repeat(n))
     };
@@ -131,32 +131,34 @@ fn elements_nest_up_to_the_limit() {
 }
 
 #[test]
-fn limits_are_met_one_above() {
+fn limits_are_inclusive() {
     let text = building(&at_lod(2, &(square("a", 1) + &square("b", 2))));
-    for (limit, sound) in [(4, true), (3, false)] {
+    for (limit, is_ok) in [(4, true), (3, false)] {
         let result = try_text(&text, &ReadOptions { max_triangles: limit, ..ReadOptions::default() });
-        assert!(if sound { result.is_ok() } else { is_limit_error(result, "max_triangles") });
+        assert!(if is_ok { result.is_ok() } else { is_limit_error(result, "max_triangles") });
     }
     for (limit, triangles) in [(4, 4), (3, 0)] {
-        let reading = try_text(&text, &ReadOptions { max_ring_vertices: limit, ..ReadOptions::default() }).expect("readable");
-        assert_eq!(reading.count(), triangles);
+        let document = try_text(&text, &ReadOptions { max_ring_vertices: limit, ..ReadOptions::default() }).expect("readable");
+        assert_eq!(document.count(), triangles);
     }
     let small = ReadOptions { max_object_bytes: 100, ..ReadOptions::default() };
     assert!(is_limit_error(try_text(&text, &small), "max_object_bytes"));
 }
 
 #[test]
-fn other_encodings_are_read() {
+fn documents_in_other_encodings_are_read() {
     let text = building("<gml:name>Mühle</gml:name>");
     let latin: Vec<u8> = text.replace("UTF-8", "ISO-8859-1").chars().map(|c| c as u8).collect();
     let utf16: Vec<u8> =
         "\u{feff}".chars().chain(text.replace("UTF-8", "UTF-16").chars()).collect::<String>().encode_utf16().flat_map(u16::to_le_bytes).collect();
-    let lying: Vec<u8> = text.chars().map(|c| c as u8).collect();
-    let marked = [&[0xEF, 0xBB, 0xBF], text.as_bytes()].concat();
-    for (bytes, name) in [(text.clone().into_bytes(), "Mühle"), (latin, "Mühle"), (utf16, "Mühle"), (marked, "Mühle"), (lying, "M\u{fffd}hle")] {
+    let mislabelled: Vec<u8> = text.chars().map(|c| c as u8).collect();
+    let with_bom = [&[0xEF, 0xBB, 0xBF], text.as_bytes()].concat();
+    for (bytes, name) in
+        [(text.clone().into_bytes(), "Mühle"), (latin, "Mühle"), (utf16, "Mühle"), (with_bom, "Mühle"), (mislabelled, "M\u{fffd}hle")]
+    {
         let folder = Folder::new("encodings");
         let path = folder.put("a.gml", bytes);
-        let reading = read_with(&path, Format::CityGml, &ReadOptions::default()).expect("readable");
-        assert_eq!(reading.objects[0].attributes["name"], json!(name));
+        let document = read_with(&path, Format::CityGml, &ReadOptions::default()).expect("readable");
+        assert_eq!(document.objects[0].attributes["name"], json!(name));
     }
 }

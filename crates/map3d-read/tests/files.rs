@@ -1,12 +1,12 @@
-//! Names in users' data lead to files in the asset's folder, and nowhere else; image headers are checked first.
+//! File names in user data resolve only inside the asset's folder; image headers are checked before the image is used.
 
-mod reading;
+mod documents;
 
-use map3d_read::{AssetFolder, Format, ReadOptions, Refusal, detect_format};
-use reading::{Folder, Reading, png, read_with};
+use documents::{Folder, ParsedDocument, encode_png, read_with};
+use map3d_read::{AssetFolder, FileError, Format, ReadOptions, detect_format};
 
 #[test]
-fn names_lead_inside_of_the_folder_only() {
+fn names_resolve_only_inside_the_folder() {
     let outer = Folder::new("names");
     outer.put("secret.png", "x");
     outer.put("inner/a b.png", "x");
@@ -17,7 +17,7 @@ fn names_lead_inside_of_the_folder_only() {
     std::os::unix::fs::symlink(outer.0.join("inner/Sub/C.PNG"), outer.0.join("inner/good-link.png")).expect("link");
     let absolute = outer.0.join("inner/a b.png");
     let secret = outer.0.join("secret.png");
-    let mut folder = AssetFolder::of_document(&document, None).expect("folder");
+    let mut folder = AssetFolder::for_document(&document, None).expect("folder");
     for name in [
         "a b.png",
         " a b.png ",
@@ -35,51 +35,51 @@ fn names_lead_inside_of_the_folder_only() {
     ] {
         assert!(folder.find(name).is_ok(), "{name}: {:?}", folder.find(name));
     }
-    for (name, refusal) in [
-        ("../secret.png", Refusal::Outside),
-        ("..\\secret.png", Refusal::Outside),
-        ("%2e%2e/secret.png", Refusal::Outside),
-        ("../missing.png", Refusal::Outside),
-        ("link.png", Refusal::Outside),
-        (secret.to_str().expect("utf-8"), Refusal::Outside),
-        ("/etc/passwd", Refusal::Outside),
-        ("C:\\texture.png", Refusal::Outside),
-        ("http://host.example/a.png", Refusal::Url),
-        ("HTTPS://host.example/a.png", Refusal::Url),
-        ("data:image/png;base64,AA", Refusal::Url),
-        ("missing.png", Refusal::Missing),
-        ("Sub", Refusal::NotAFile),
-        (".", Refusal::NotAFile),
-        ("", Refusal::BadName),
-        ("a\0b", Refusal::BadName),
+    for (name, error) in [
+        ("../secret.png", FileError::OutsideFolder),
+        ("..\\secret.png", FileError::OutsideFolder),
+        ("%2e%2e/secret.png", FileError::OutsideFolder),
+        ("../missing.png", FileError::OutsideFolder),
+        ("link.png", FileError::OutsideFolder),
+        (secret.to_str().expect("utf-8"), FileError::OutsideFolder),
+        ("/etc/passwd", FileError::OutsideFolder),
+        ("C:\\texture.png", FileError::OutsideFolder),
+        ("http://host.example/a.png", FileError::Url),
+        ("HTTPS://host.example/a.png", FileError::Url),
+        ("data:image/png;base64,AA", FileError::Url),
+        ("missing.png", FileError::NotFound),
+        ("Sub", FileError::NotAFile),
+        (".", FileError::NotAFile),
+        ("", FileError::InvalidName),
+        ("a\0b", FileError::InvalidName),
     ] {
-        assert_eq!(folder.find(name), Err(refusal), "{name}");
+        assert_eq!(folder.find(name), Err(error), "{name}");
     }
-    assert_eq!(folder.find(&"x".repeat(1025)), Err(Refusal::BadName));
+    assert_eq!(folder.find(&"x".repeat(1025)), Err(FileError::InvalidName));
 }
 
 #[test]
-fn a_wider_folder_lets_names_climb_as_far_as_that() {
+fn names_may_lead_up_to_the_given_folder() {
     let outer = Folder::new("wider");
     outer.put("textures/a.png", "x");
     let document = outer.put("models/doc.obj", "");
-    let mut folder = AssetFolder::of_document(&document, Some(&outer.0)).expect("folder");
+    let mut folder = AssetFolder::for_document(&document, Some(&outer.0)).expect("folder");
     assert!(folder.find("../textures/a.png").is_ok());
     assert!(folder.find("../TEXTURES/A.PNG").is_ok());
-    assert_eq!(folder.find("../../etc/passwd"), Err(Refusal::Outside));
+    assert_eq!(folder.find("../../etc/passwd"), Err(FileError::OutsideFolder));
 }
 
 #[test]
-fn a_pipe_is_not_opened() {
+fn pipes_are_not_opened() {
     let folder = Folder::new("pipe");
     let document = folder.put("doc.obj", "");
     let made = std::process::Command::new("mkfifo").arg(folder.0.join("pipe.png")).status();
     if made.is_ok_and(|status| status.success()) {
-        assert_eq!(AssetFolder::of_document(&document, None).expect("folder").find("pipe.png"), Err(Refusal::NotAFile));
+        assert_eq!(AssetFolder::for_document(&document, None).expect("folder").find("pipe.png"), Err(FileError::NotAFile));
     }
 }
 
-fn with_image(bytes: &[u8], options: &ReadOptions) -> Reading {
+fn read_with_image(bytes: &[u8], options: &ReadOptions) -> ParsedDocument {
     let folder = Folder::new("image");
     folder.put("t.png", bytes);
     folder.put("a.mtl", "newmtl m\nmap_Kd t.png\n");
@@ -88,42 +88,42 @@ fn with_image(bytes: &[u8], options: &ReadOptions) -> Reading {
 }
 
 #[test]
-fn images_over_a_limit_are_not_taken_over() {
-    let image = png(40, 20, [1, 2, 3, 255]);
-    for (side, pixels, taken) in [(40, 800, true), (39, 800, false), (40, 799, false)] {
+fn images_over_a_limit_are_skipped() {
+    let image = encode_png(40, 20, [1, 2, 3, 255]);
+    for (side, pixels, is_used) in [(40, 800, true), (39, 800, false), (40, 799, false)] {
         let options = ReadOptions { max_image_side_px: side, max_image_px: pixels, ..ReadOptions::default() };
-        let reading = with_image(&image, &options);
-        assert_eq!(reading.textures.len() == 1, taken, "{side} {pixels}");
-        assert_eq!(reading.count(), 1);
-        assert_eq!(reading.warned("limit max_image"), u64::from(!taken));
+        let document = read_with_image(&image, &options);
+        assert_eq!(document.textures.len() == 1, is_used, "{side} {pixels}");
+        assert_eq!(document.count(), 1);
+        assert_eq!(document.warned("limit max_image"), u64::from(!is_used));
     }
 }
 
 #[test]
-fn what_is_no_image_is_not_taken_over() {
-    let image = png(4, 4, [1, 2, 3, 255]);
+fn invalid_images_are_skipped() {
+    let image = encode_png(4, 4, [1, 2, 3, 255]);
     let huge_header = {
         let mut b = image.clone();
         b[16..20].copy_from_slice(&[0x7F, 0xFF, 0xFF, 0xFF]);
         b
     };
     for bytes in [&b""[..], b"text", &image[..10], &huge_header, b"GIF89a", b"\xFF\xD8\xFF"] {
-        let reading = with_image(bytes, &ReadOptions::default());
-        assert_eq!((reading.textures.len(), reading.count()), (0, 1), "{bytes:?}");
-        assert_eq!(reading.warned("image:"), 1);
+        let document = read_with_image(bytes, &ReadOptions::default());
+        assert_eq!((document.textures.len(), document.count()), (0, 1), "{bytes:?}");
+        assert_eq!(document.warned("image:"), 1);
     }
 }
 
 #[test]
-fn an_image_has_the_extension_of_its_bytes() {
+fn image_extension_follows_the_content() {
     let mut jpeg = vec![0xFF, 0xD8, 0xFF, 0xC0, 0, 17, 8, 0, 5, 0, 7, 3];
     jpeg.resize(200, 0);
-    let reading = with_image(&jpeg, &ReadOptions::default());
-    assert_eq!((reading.textures[0].extension, reading.textures[0].width_px, reading.textures[0].height_px), ("jpg", 7, 5));
+    let document = read_with_image(&jpeg, &ReadOptions::default());
+    assert_eq!((document.textures[0].extension, document.textures[0].width_px, document.textures[0].height_px), ("jpg", 7, 5));
 }
 
 #[test]
-fn formats_are_known_by_their_content() {
+fn formats_are_detected_by_content() {
     let folder = Folder::new("detect");
     let utf16: Vec<u8> = "\u{feff}v 0 0 0\nf 1 1 1\n".encode_utf16().flat_map(u16::to_be_bytes).collect();
     for (bytes, expected) in [

@@ -1,43 +1,35 @@
-//! Damaged documents: whatever is cut, flipped, doubled or shuffled, the answer is an error or a reading, never a panic.
+//! Randomly damaged documents give an error or a document, never a panic.
 
-mod reading;
+mod documents;
 
 use std::time::Instant;
 
+use documents::random::Random;
+use documents::{Folder, read_with};
 use map3d_read::{Format, ReadOptions, Split};
-use reading::{Folder, read_with};
 
 const CITY: &str = include_str!("data/all_constructs.gml");
 const HOUSE: &str = include_str!("data/all_statements.obj");
 const LIBRARY: &str = include_str!("data/all_statements.mtl");
 
-struct Numbers(u64);
-
-impl Numbers {
-    fn below(&mut self, n: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((self.0 >> 33) as usize) % n.max(1)
-    }
-}
-
-fn damaged(text: &[u8], numbers: &mut Numbers) -> Vec<u8> {
+fn damage(text: &[u8], random: &mut Random) -> Vec<u8> {
     let mut bytes = text.to_vec();
-    let at = numbers.below(bytes.len());
-    let length = 1 + numbers.below(200.min(bytes.len() - at));
-    match numbers.below(6) {
+    let at = random.below(bytes.len());
+    let length = 1 + random.below(200.min(bytes.len() - at));
+    match random.below(6) {
         0 => bytes.truncate(at),
-        1 => bytes[at] = numbers.below(256) as u8,
+        1 => bytes[at] = random.below(256) as u8,
         2 => drop(bytes.drain(at..at + length)),
         3 => {
             let piece = bytes[at..at + length].to_vec();
-            let to = numbers.below(bytes.len());
+            let to = random.below(bytes.len());
             bytes.splice(to..to, piece);
         }
-        4 => bytes[at..at + length].fill(b"0 9<>\"-#&/"[numbers.below(10)]),
+        4 => bytes[at..at + length].fill(b"0 9<>\"-#&/"[random.below(10)]),
         _ => {
             let digits: Vec<usize> = (0..bytes.len()).filter(|i| bytes[*i].is_ascii_digit()).collect();
             for _ in 0..8 {
-                bytes[digits[numbers.below(digits.len())]] = b"0123456789-.e"[numbers.below(13)];
+                bytes[digits[random.below(digits.len())]] = b"0123456789-.e"[random.below(13)];
             }
         }
     }
@@ -55,9 +47,9 @@ fn damaged_city_models_never_panic() {
     let folder = Folder::new("mutated-city");
     folder.put_png("t.png", 4, 4, [1, 2, 3, 200]);
     folder.put("lamp.obj", "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n");
-    let mut numbers = Numbers(1);
+    let mut random = Random(1);
     for case in 0..500 {
-        let path = folder.put("a.gml", damaged(CITY.as_bytes(), &mut numbers));
+        let path = folder.put("a.gml", damage(CITY.as_bytes(), &mut random));
         read_quickly(&path, Format::CityGml, &ReadOptions { strict: case % 10 == 0, ..ReadOptions::default() });
     }
 }
@@ -66,10 +58,10 @@ fn damaged_city_models_never_panic() {
 fn damaged_objs_never_panic() {
     let folder = Folder::new("mutated-obj");
     folder.put_png("t.png", 4, 4, [1, 2, 3, 200]);
-    let mut numbers = Numbers(2);
+    let mut random = Random(2);
     for case in 0..500 {
-        folder.put("all_statements.mtl", damaged(LIBRARY.as_bytes(), &mut numbers));
-        let path = folder.put("a.obj", damaged(HOUSE.as_bytes(), &mut numbers));
+        folder.put("all_statements.mtl", damage(LIBRARY.as_bytes(), &mut random));
+        let path = folder.put("a.obj", damage(HOUSE.as_bytes(), &mut random));
         let split = if case % 2 == 0 { Split::File } else { Split::Group };
         read_quickly(&path, Format::Obj, &ReadOptions { split, strict: case % 10 == 0, ..ReadOptions::default() });
     }
@@ -80,16 +72,16 @@ fn damaged_images_never_panic() {
     let folder = Folder::new("mutated-image");
     folder.put("a.mtl", "newmtl m\nmap_Kd t.png\n");
     let path = folder.put("a.obj", "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n");
-    let image = reading::png(16, 16, [1, 2, 3, 4]);
-    let mut numbers = Numbers(3);
+    let image = documents::encode_png(16, 16, [1, 2, 3, 4]);
+    let mut random = Random(3);
     for _ in 0..200 {
-        folder.put("t.png", damaged(&image, &mut numbers));
+        folder.put("t.png", damage(&image, &mut random));
         read_quickly(&path, Format::Obj, &ReadOptions::default());
     }
 }
 
 #[test]
-fn the_undamaged_documents_are_read_in_full() {
+fn undamaged_documents_are_read_completely() {
     let folder = Folder::new("undamaged");
     folder.put_png("t.png", 4, 4, [1, 2, 3, 200]);
     folder.put("lamp.obj", "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n");

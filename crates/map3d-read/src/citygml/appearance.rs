@@ -1,99 +1,136 @@
-//! Appearances as parsed: which surface data bear on which ids. Compact, for one file may texture tens of millions of rings.
+//! Appearances as parsed: surface data and the ids that they target. Stored compactly, because one file may texture tens of millions of rings.
 
 use map3d_base::Vec3;
 use map3d_base::asset::Wrap;
 
-use super::georeference::Georeference;
+use super::geo_transform::GeoTransform;
 use super::ids::{self, Id, IdMap};
 
-/// A texture or a colour.
+/// The type of a surface data element and its properties.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Look {
-    /// sRGB and opacity.
-    Color([f32; 4]),
-    Texture {
-        image: String,
-        wrap: Wrap,
-        border: [f32; 4],
-        placed: Placement,
+pub enum SurfaceDataKind {
+    /// `diffuse`: sRGB and opacity.
+    X3DMaterial {
+        diffuse: [f32; 4],
     },
-    /// Neither; counted when it was parsed.
-    Nothing,
+    Texture(TextureProperties),
+    Unsupported,
 }
 
-/// How a texture finds its coordinates.
+/// Properties of a ParameterizedTexture or GeoreferencedTexture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TextureProperties {
+    pub image: String,
+    pub wrap: Wrap,
+    /// sRGB and opacity.
+    pub border: [f32; 4],
+    pub placement: TexturePlacement,
+}
+
+/// The source of a texture's coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Placement {
-    /// Each target brings its own.
-    ByTarget,
-    World(Georeference),
-    /// By a world file beside the image.
+pub enum TexturePlacement {
+    /// Each target has a parameterization.
+    Parameterized,
+    Georeferenced(GeoTransform),
+    /// A world file next to the image.
     WorldFile,
 }
 
 #[derive(Clone, Debug)]
 pub struct SurfaceData {
-    pub look: Look,
-    pub front: bool,
+    pub kind: SurfaceDataKind,
+    pub is_front: bool,
+    /// Belongs to an appearance of the selected theme.
     pub in_theme: bool,
-    /// Made ready by the painter when first used; `Some(None)`: unusable.
-    pub ready: Option<Option<Ready>>,
+    pub resolution: Resolution,
 }
 
-/// A look as the table of materials has it.
+/// Surface data are resolved when they are first used.
+#[derive(Clone, Copy, Debug, Default)]
+pub enum Resolution {
+    #[default]
+    Unresolved,
+    Unusable,
+    Resolved(ResolvedSurfaceData),
+}
+
+/// Surface data whose material is in the material table.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ready {
-    pub material: u32,
-    pub wrap: Wrap,
-    pub textured: bool,
-    pub invisible: bool,
-    pub world: Option<Georeference>,
+pub struct ResolvedSurfaceData {
+    pub material: ResolvedMaterial,
+    /// Set for georeferenced textures.
+    pub geo_transform: Option<GeoTransform>,
+    /// Width and height of the image.
     pub size_px: [u32; 2],
 }
 
+/// An entry of the material table and its properties that matter for triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Mapping {
-    None,
-    /// Index into `matrices`.
-    Matrix(u32),
-    /// Range of `rings`, sorted by id.
-    Rings {
-        first: u32,
-        count: u32,
-    },
-    /// A mapping that stands elsewhere.
-    Named(Id),
+pub struct ResolvedMaterial {
+    pub index: u32,
+    pub wrap: Wrap,
+    pub textured: bool,
+    /// Fully transparent.
+    pub invisible: bool,
 }
 
+/// How texture coordinates are assigned to a target (`TextureParameterization`).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Parameterization {
+    None,
+    /// Index into `matrices`.
+    TexCoordGen(u32),
+    TexCoordList(TexCoordRange),
+    /// A parameterization defined elsewhere in the document.
+    XLink(Id),
+}
+
+/// A range of `rings`, sorted by id.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TexCoordRange {
+    first: u32,
+    count: u32,
+}
+
+/// Links a target to surface data.
 #[derive(Clone, Copy, Debug)]
-pub struct Binding {
-    pub data: u32,
-    pub mapping: Mapping,
+pub struct TargetBinding {
+    pub surface_data: u32,
+    pub parameterization: Parameterization,
+    /// Next binding of the same target.
     next: u32,
 }
 
+/// First and last binding of a target.
+#[derive(Clone, Copy)]
+struct BindingList {
+    first: u32,
+    last: u32,
+}
+
+/// Texture coordinates of a ring: a range of `uvs`.
 #[derive(Clone, Copy, Debug)]
-pub struct RingUvs {
+pub struct RingTexCoords {
     pub ring: Id,
     pub start: u32,
     pub count: u32,
 }
 
-const LAST: u32 = u32::MAX;
+const NO_BINDING: u32 = u32::MAX;
 
 #[derive(Default)]
 pub struct Appearances {
-    pub data: Vec<SurfaceData>,
-    pub data_by_id: IdMap<u32>,
-    /// Surface data that an appearance of the theme refers to.
-    pub linked: Vec<Id>,
-    bindings: Vec<Binding>,
-    /// First and last binding of a target.
-    targets: IdMap<(u32, u32)>,
-    pub rings: Vec<RingUvs>,
+    pub surface_data: Vec<SurfaceData>,
+    surface_data_by_id: IdMap<u32>,
+    /// Surface data that appearances of the selected theme refer to by XLink.
+    pub theme_xlinks: Vec<Id>,
+    bindings: Vec<TargetBinding>,
+    targets: IdMap<BindingList>,
+    pub rings: Vec<RingTexCoords>,
     pub uvs: Vec<[f32; 2]>,
     matrices: Vec<[f64; 12]>,
-    named: IdMap<Mapping>,
+    parameterizations_by_id: IdMap<Parameterization>,
 }
 
 impl Appearances {
@@ -105,88 +142,114 @@ impl Appearances {
         self.bindings.is_empty()
     }
 
-    pub fn bytes(&self) -> u64 {
-        let fixed = size_of_val(&*self.data) + size_of_val(&*self.bindings) + size_of_val(&*self.rings) + size_of_val(&*self.uvs);
-        (fixed + self.targets.len() * 24 + self.matrices.len() * 96 + self.named.len() * 32) as u64
+    /// Returns the memory in use, approximately.
+    pub fn byte_count(&self) -> u64 {
+        let lists = size_of_val(&*self.surface_data) + size_of_val(&*self.bindings) + size_of_val(&*self.rings) + size_of_val(&*self.uvs);
+        (lists + self.targets.len() * 24 + self.matrices.len() * 96 + self.parameterizations_by_id.len() * 32) as u64
     }
 
-    pub fn add_data(&mut self, id: Id, data: SurfaceData) -> u32 {
-        let number = self.data.len() as u32;
-        self.data.push(data);
+    pub fn add_surface_data(&mut self, id: Id, surface_data: SurfaceData) -> u32 {
+        let number = self.surface_data.len() as u32;
+        self.surface_data.push(surface_data);
         if id != ids::NONE {
-            self.data_by_id.entry(id).or_insert(number);
+            self.surface_data_by_id.entry(id).or_insert(number);
         }
         number
     }
 
-    pub fn bind(&mut self, target: Id, data: u32, mapping: Mapping) {
+    /// Appends a binding to a target's list.
+    pub fn bind(&mut self, target: Id, surface_data: u32, parameterization: Parameterization) {
         let number = self.bindings.len() as u32;
-        self.bindings.push(Binding { data, mapping, next: LAST });
-        let ends = self.targets.entry(target).or_insert((number, number));
-        if ends.1 != number {
-            self.bindings[ends.1 as usize].next = number;
-            ends.1 = number;
+        self.bindings.push(TargetBinding { surface_data, parameterization, next: NO_BINDING });
+        let list = self.targets.entry(target).or_insert(BindingList { first: number, last: number });
+        if list.last != number {
+            self.bindings[list.last as usize].next = number;
+            list.last = number;
         }
     }
 
-    pub fn name_mapping(&mut self, id: Id, mapping: Mapping) {
+    /// Makes a parameterization available to XLinks; the first with an id wins.
+    pub fn register_parameterization(&mut self, id: Id, parameterization: Parameterization) {
         if id != ids::NONE {
-            self.named.entry(id).or_insert(mapping);
+            self.parameterizations_by_id.entry(id).or_insert(parameterization);
         }
     }
 
-    pub fn add_matrix(&mut self, matrix: [f64; 12]) -> Mapping {
+    pub fn add_matrix(&mut self, matrix: [f64; 12]) -> Parameterization {
         self.matrices.push(matrix);
-        Mapping::Matrix(self.matrices.len() as u32 - 1)
+        Parameterization::TexCoordGen(self.matrices.len() as u32 - 1)
     }
 
-    /// Makes the rings since `first` a mapping.
-    pub fn close_rings(&mut self, first: usize) -> Mapping {
+    /// Completes a TexCoordList with the rings added since `first`.
+    pub fn finish_tex_coord_list(&mut self, first: usize) -> Parameterization {
         self.rings[first..].sort_by_key(|r| r.ring);
-        Mapping::Rings { first: first as u32, count: (self.rings.len() - first) as u32 }
+        Parameterization::TexCoordList(TexCoordRange { first: first as u32, count: (self.rings.len() - first) as u32 })
     }
 
-    /// Marks what appearances of the theme refer to.
-    pub fn resolve_links(&mut self) {
-        for id in std::mem::take(&mut self.linked) {
-            if let Some(number) = self.data_by_id.get(&id) {
-                self.data[*number as usize].in_theme = true;
+    /// Marks the surface data that appearances of the selected theme refer to by XLink.
+    pub fn resolve_theme_xlinks(&mut self) {
+        for id in std::mem::take(&mut self.theme_xlinks) {
+            if let Some(number) = self.surface_data_by_id.get(&id) {
+                self.surface_data[*number as usize].in_theme = true;
             }
         }
     }
 
-    /// Bindings of a target in the order of the document, of the chosen theme.
-    pub fn of_target(&self, target: Id) -> impl Iterator<Item = Binding> + '_ {
-        let first = self.targets.get(&target).map_or(LAST, |ends| ends.0);
-        let follow = move |at: &u32| Some(self.bindings.get(*at as usize)?.next);
-        std::iter::successors(Some(first), follow)
-            .map_while(|at| self.bindings.get(at as usize).copied())
-            .filter(|b| self.data[b.data as usize].in_theme)
+    /// Iterates over the bindings of a target in the selected theme, in document order.
+    pub fn theme_bindings(&self, target: Id) -> impl Iterator<Item = TargetBinding> + '_ {
+        let first = self.targets.get(&target).map_or(NO_BINDING, |list| list.first);
+        let next = move |number: &u32| Some(self.bindings.get(*number as usize)?.next);
+        std::iter::successors(Some(first), next)
+            .map_while(|number| self.bindings.get(number as usize).copied())
+            .filter(|b| self.surface_data[b.surface_data as usize].in_theme)
     }
 
-    /// A mapping with its names followed; `Mapping::None` when a name leads nowhere.
-    pub fn mapping(&self, mapping: Mapping) -> Mapping {
-        match mapping {
-            Mapping::Named(id) => match self.named.get(&id) {
-                Some(Mapping::Named(_)) | None => Mapping::None,
-                Some(found) => *found,
+    /// Follows an XLink to its parameterization; returns `Parameterization::None` if it cannot be resolved.
+    pub fn resolve_parameterization(&self, parameterization: Parameterization) -> Parameterization {
+        match parameterization {
+            Parameterization::XLink(id) => match self.parameterizations_by_id.get(&id) {
+                Some(Parameterization::XLink(_)) | None => Parameterization::None,
+                Some(resolved) => *resolved,
             },
-            found => found,
+            resolved => resolved,
         }
     }
 
-    /// Texture coordinates that a mapping has for a ring.
-    pub fn uvs_of_ring(&self, first: u32, count: u32, ring: Id) -> Option<&[[f32; 2]]> {
-        let rings = &self.rings[first as usize..(first + count) as usize];
+    /// Returns the texture coordinates of a ring in a TexCoordList.
+    pub fn find_ring_uvs(&self, range: TexCoordRange, ring: Id) -> Option<&[[f32; 2]]> {
+        let rings = &self.rings[range.first as usize..(range.first + range.count) as usize];
         let at = rings.partition_point(|r| r.ring < ring);
         let found = rings.get(at).filter(|r| r.ring == ring && ring != ids::NONE)?;
         Some(&self.uvs[found.start as usize..(found.start + found.count) as usize])
     }
 
-    /// (s, t) of a point by a worldToTexture matrix.
+    /// Projects a point to (s, t) with a worldToTexture matrix.
     pub fn project(&self, matrix: u32, p: Vec3) -> [f64; 2] {
         let m = &self.matrices[matrix as usize];
         let row = |k: usize| m[4 * k] * p[0] + m[4 * k + 1] * p[1] + m[4 * k + 2] * p[2] + m[4 * k + 3];
         [row(0) / row(2), row(1) / row(2)]
+    }
+}
+
+/// Selects the appearance theme: the requested one or, by default, the first in the file.
+#[derive(Clone, Debug, Default)]
+pub struct ThemeSelection {
+    pub requested: Option<String>,
+    pub first: Option<String>,
+    /// The file has more than one theme.
+    pub has_several: bool,
+}
+
+impl ThemeSelection {
+    /// Registers a theme. Must be called for all themes in document order.
+    pub fn register(&mut self, name: &str) {
+        match &self.first {
+            None => self.first = Some(name.to_owned()),
+            Some(first) => self.has_several |= first != name,
+        }
+    }
+
+    pub fn selected(&self) -> Option<&str> {
+        self.requested.as_deref().or(self.first.as_deref())
     }
 }

@@ -1,74 +1,61 @@
-//! app:Appearance into the compact form.
+//! Parses app:Appearance elements.
 
 use std::io::BufRead;
 
 use map3d_base::asset::Wrap;
-use map3d_base::{Error, Result, Vec3};
+use map3d_base::{Result, Vec3};
 
-use super::appearance::{Appearances, Look, Mapping, Placement, RingUvs, SurfaceData};
-use super::coordinates::parse_list;
-use super::georeference::Georeference;
-use super::ids::{self, Id, Target, id_of, target_of};
-use super::implicit::point;
-use super::xml::Xml;
-use crate::report::Log;
+use super::appearance::{
+    Appearances, Parameterization, Resolution, RingTexCoords, SurfaceData, SurfaceDataKind, TexturePlacement, TextureProperties, ThemeSelection,
+};
+use super::coordinates::parse_numbers;
+use super::geo_transform::GeoTransform;
+use super::geometry_parser::read_point;
+use super::ids::{self, Id, Reference, parse_reference};
+use super::xml_reader::XmlReader;
+use crate::report_builder::{LimitCheck, ReportBuilder};
 
-/// Colours of X3D materials that say nothing.
-const DEFAULT_DIFFUSE: [f32; 3] = [0.8; 3];
-
-/// Which theme is drawn: the asked one, else the first that the file has.
-#[derive(Clone, Debug, Default)]
-pub struct Theme {
-    pub asked: Option<String>,
-    pub first: Option<String>,
-    /// The file has more than one.
-    pub several: bool,
-}
-
-impl Theme {
-    /// Called with every theme in the order of the file.
-    pub fn see(&mut self, name: &str) {
-        match &self.first {
-            None => self.first = Some(name.to_owned()),
-            Some(first) => self.several |= first != name,
-        }
-    }
-
-    pub fn chosen(&self) -> Option<&str> {
-        self.asked.as_deref().or(self.first.as_deref())
-    }
-}
+/// Diffuse colour of an X3DMaterial without one, as defined by CityGML.
+const DEFAULT_DIFFUSE: f32 = 0.8;
 
 pub struct AppearanceParser<'a, R> {
-    pub xml: &'a mut Xml<R>,
-    pub log: &'a mut Log,
-    pub into: &'a mut Appearances,
-    pub theme: &'a mut Theme,
+    pub xml: &'a mut XmlReader<R>,
+    pub report: &'a mut ReportBuilder,
+    pub appearances: &'a mut Appearances,
+    pub theme: &'a mut ThemeSelection,
+    /// Limit on the memory of `appearances`.
     pub max_bytes: u64,
+    /// Buffers for numbers and text.
     pub values: &'a mut Vec<f64>,
     pub text: &'a mut String,
 }
 
-/// What the elements of one piece of surface data said.
+/// A target of surface data and its parameterization.
+struct SurfaceDataTarget {
+    target: Id,
+    parameterization: Parameterization,
+}
+
+/// The properties of one surface data element.
 #[derive(Default)]
-struct Parts {
-    back: bool,
+struct SurfaceDataProperties {
+    is_back: bool,
     image: Option<String>,
     wrap: Option<Wrap>,
     border: Option<[f32; 4]>,
     diffuse: Option<[f32; 4]>,
     transparency: f32,
-    reference: Option<Vec3>,
+    reference_point: Option<Vec3>,
     orientation: Option<[f64; 4]>,
-    targets: Vec<(Id, Mapping)>,
+    targets: Vec<SurfaceDataTarget>,
 }
 
 impl<R: BufRead> AppearanceParser<'_, R> {
-    /// The property that has just started and holds an Appearance (or refers to one, which is read where it stands).
-    pub fn property(&mut self) -> Result<()> {
+    /// Reads the current property and the appearances in it. An appearance that it refers to by XLink is read where it is defined.
+    pub fn read_property(&mut self) -> Result<()> {
         while self.xml.next_child()? {
-            if self.xml.local() == "Appearance" {
-                self.appearance()?;
+            if self.xml.local_name() == "Appearance" {
+                self.read_appearance()?;
             } else {
                 self.xml.skip()?;
             }
@@ -76,82 +63,75 @@ impl<R: BufRead> AppearanceParser<'_, R> {
         Ok(())
     }
 
-    fn appearance(&mut self) -> Result<()> {
-        let first = self.into.data.len();
-        let mut linked = Vec::new();
-        let mut name = String::new();
+    fn read_appearance(&mut self) -> Result<()> {
+        let first = self.appearances.surface_data.len();
+        let mut xlinks = Vec::new();
+        let mut theme = String::new();
         while self.xml.next_child()? {
-            match self.xml.local() {
-                "theme" => name = self.xml.whole_text()?,
+            match self.xml.local_name() {
+                "theme" => theme = self.xml.read_text()?,
                 "surfaceDataMember" | "surfaceData" => {
-                    if let Some(Target::Here(id)) = self.xml.attribute("href").map(|h| target_of(&h)) {
-                        linked.push(id);
+                    if let Some(Reference::Internal(id)) = self.xml.attribute("href").map(|h| parse_reference(&h)) {
+                        xlinks.push(id);
                     }
                     while self.xml.next_child()? {
-                        self.surface_data()?;
+                        self.read_surface_data()?;
                     }
                 }
                 _ => self.xml.skip()?,
             }
         }
-        self.theme.see(&name);
-        if self.theme.chosen() == Some(&name) {
-            self.into.data[first..].iter_mut().for_each(|d| d.in_theme = true);
-            self.into.linked.extend(linked);
+        self.theme.register(&theme);
+        if self.theme.selected() == Some(&theme) {
+            self.appearances.surface_data[first..].iter_mut().for_each(|d| d.in_theme = true);
+            self.appearances.theme_xlinks.extend(xlinks);
         } else {
-            self.log.note("appearance of another theme not drawn", name);
+            self.report.note("appearance of another theme ignored", theme);
         }
         Ok(())
     }
 
-    fn surface_data(&mut self) -> Result<()> {
-        let local = self.xml.local().to_owned();
-        let id = self.xml.attribute("id").map_or(ids::NONE, |id| id_of(&id));
-        let mut parts = Parts::default();
+    fn read_surface_data(&mut self) -> Result<()> {
+        let type_name = self.xml.local_name().to_owned();
+        let id = self.xml.gml_id();
+        let mut properties = SurfaceDataProperties::default();
         while self.xml.next_child()? {
-            self.part(&mut parts)?;
+            self.read_surface_data_property(&mut properties)?;
         }
-        let targets = std::mem::take(&mut parts.targets);
-        let front = !parts.back;
-        let look = look(&local, parts);
-        if look == Look::Nothing {
-            self.log.warn("surface data that cannot be drawn", local)?;
+        let targets = std::mem::take(&mut properties.targets);
+        let is_front = !properties.is_back;
+        let kind = build_kind(&type_name, properties);
+        if kind == SurfaceDataKind::Unsupported {
+            self.report.warn("unsupported surface data", type_name)?;
         }
-        if !front {
-            self.log.note("appearance of back sides not drawn", local_name(&look));
+        if !is_front {
+            self.report.note("appearance of back sides ignored", describe(&kind));
         }
-        let data = self.into.add_data(id, SurfaceData { look, front, in_theme: false, ready: None });
-        targets.into_iter().for_each(|(target, mapping)| self.into.bind(target, data, mapping));
-        self.check_size()
+        let number = self.appearances.add_surface_data(id, SurfaceData { kind, is_front, in_theme: false, resolution: Resolution::Unresolved });
+        targets.into_iter().for_each(|t| self.appearances.bind(t.target, number, t.parameterization));
+        let got = self.appearances.byte_count();
+        self.report.check_limit(LimitCheck { what: "appearances, bytes", got, limit: "max_appearance_bytes", value: self.max_bytes })
     }
 
-    fn check_size(&self) -> Result<()> {
-        let (got, value) = (self.into.bytes(), self.max_bytes);
-        if got <= value {
-            return Ok(());
-        }
-        Err(Error::Limit { path: self.log.path().to_path_buf(), what: "appearances, bytes", got, limit: "max_appearance_bytes", value })
-    }
-
-    fn part(&mut self, parts: &mut Parts) -> Result<()> {
-        match self.xml.local() {
-            "isFront" => parts.back = matches!(self.xml.whole_text()?.as_str(), "false" | "0"),
-            "imageURI" => parts.image = Some(self.xml.whole_text()?).filter(|name| !name.is_empty()),
-            "wrapMode" => parts.wrap = self.wrap_mode()?,
-            "borderColor" => parts.border = self.color()?,
-            "diffuseColor" => parts.diffuse = self.color()?,
-            "transparency" => parts.transparency = self.xml.whole_text()?.parse().unwrap_or(0.0),
-            "referencePoint" => parts.reference = point(self.xml)?,
-            "orientation" => parts.orientation = self.numbers()?.and_then(|v| v.try_into().ok()),
-            "target" => self.target(parts)?,
-            "textureParameterization" => self.association(parts)?,
+    fn read_surface_data_property(&mut self, properties: &mut SurfaceDataProperties) -> Result<()> {
+        match self.xml.local_name() {
+            "isFront" => properties.is_back = matches!(self.xml.read_text()?.as_str(), "false" | "0"),
+            "imageURI" => properties.image = Some(self.xml.read_text()?).filter(|name| !name.is_empty()),
+            "wrapMode" => properties.wrap = self.read_wrap_mode()?,
+            "borderColor" => properties.border = self.read_color()?,
+            "diffuseColor" => properties.diffuse = self.read_color()?,
+            "transparency" => properties.transparency = self.xml.read_text()?.parse().unwrap_or(0.0),
+            "referencePoint" => properties.reference_point = read_point(self.xml)?,
+            "orientation" => properties.orientation = self.read_numbers()?.and_then(|v| v.try_into().ok()),
+            "target" => self.read_target(properties)?,
+            "textureParameterization" => self.read_texture_association(properties)?,
             _ => self.xml.skip()?,
         }
         Ok(())
     }
 
-    fn wrap_mode(&mut self) -> Result<Option<Wrap>> {
-        let text = self.xml.whole_text()?;
+    fn read_wrap_mode(&mut self) -> Result<Option<Wrap>> {
+        let text = self.xml.read_text()?;
         Ok(match text.to_ascii_lowercase().as_str() {
             "none" => Some(Wrap::None),
             "wrap" => Some(Wrap::Wrap),
@@ -159,160 +139,165 @@ impl<R: BufRead> AppearanceParser<'_, R> {
             "clamp" => Some(Wrap::Clamp),
             "border" => Some(Wrap::Border),
             _ => {
-                self.log.warn("unknown wrap mode", text)?;
+                self.report.warn("unknown wrap mode", text)?;
                 None
             }
         })
     }
 
-    fn numbers(&mut self) -> Result<Option<Vec<f64>>> {
+    fn read_numbers(&mut self) -> Result<Option<Vec<f64>>> {
         let mut values = Vec::new();
-        Ok(parse_list(&self.xml.whole_text()?, &mut values).map(|()| values))
+        Ok(parse_numbers(&self.xml.read_text()?, &mut values).map(|()| values))
     }
 
-    /// Red, green, blue and perhaps opacity.
-    fn color(&mut self) -> Result<Option<[f32; 4]>> {
-        let values = self.numbers()?.unwrap_or_default();
+    /// Reads red, green, blue and an optional opacity.
+    fn read_color(&mut self) -> Result<Option<[f32; 4]>> {
+        let values = self.read_numbers()?.unwrap_or_default();
         let channel = |k: usize| values.get(k).map(|v: &f64| if v.is_finite() { v.clamp(0.0, 1.0) as f32 } else { 0.0 });
         Ok(channel(2).map(|blue| [channel(0).unwrap_or(0.0), channel(1).unwrap_or(0.0), blue, channel(3).unwrap_or(1.0)]))
     }
 
-    /// `<target uri="#a">mapping</target>` or `<target>#a</target>`.
-    fn target(&mut self, parts: &mut Parts) -> Result<()> {
-        let uri = self.xml.attribute("uri").map(|uri| target_of(&uri));
-        let named = self.xml.attribute("href").map(|href| target_of(&href));
+    /// Reads `<target uri="#a">parameterization</target>` or `<target>#a</target>`.
+    fn read_target(&mut self, properties: &mut SurfaceDataProperties) -> Result<()> {
+        let uri = self.xml.attribute("uri").map(|uri| parse_reference(&uri));
+        let xlink = self.xml.attribute("href").map(|href| parse_reference(&href));
         if uri.is_none() {
-            let text = self.xml.whole_text()?;
-            return self.add_target(Some(target_of(&text)).filter(|_| !text.is_empty()), Mapping::None, parts);
+            let text = self.xml.read_text()?;
+            return self.add_target(Some(parse_reference(&text)).filter(|_| !text.is_empty()), Parameterization::None, properties);
         }
-        let mut mapping = match named {
-            Some(Target::Here(id)) => Mapping::Named(id),
-            _ => Mapping::None,
+        let mut parameterization = match xlink {
+            Some(Reference::Internal(id)) => Parameterization::XLink(id),
+            _ => Parameterization::None,
         };
         while self.xml.next_child()? {
-            mapping = self.mapping()?;
+            parameterization = self.read_parameterization()?;
         }
-        self.add_target(uri, mapping, parts)
+        self.add_target(uri, parameterization, properties)
     }
 
-    fn add_target(&mut self, target: Option<Target>, mapping: Mapping, parts: &mut Parts) -> Result<()> {
+    fn add_target(&mut self, target: Option<Reference>, parameterization: Parameterization, properties: &mut SurfaceDataProperties) -> Result<()> {
         match target {
-            Some(Target::Here(id)) => {
-                parts.targets.push((id, mapping));
+            Some(Reference::Internal(target)) => {
+                properties.targets.push(SurfaceDataTarget { target, parameterization });
                 Ok(())
             }
-            Some(Target::OtherDocument) => self.log.warn("appearance of another document's surfaces", "target"),
+            Some(Reference::External) => self.report.warn("appearance target in another document", "target"),
             None => Ok(()),
         }
     }
 
-    /// CityGML 3.0: target and mapping side by side in a TextureAssociation.
-    fn association(&mut self, parts: &mut Parts) -> Result<()> {
+    /// Reads a TextureAssociation of CityGML 3.0: target and parameterization are siblings.
+    fn read_texture_association(&mut self, properties: &mut SurfaceDataProperties) -> Result<()> {
         while self.xml.next_child()? {
-            let (mut target, mut mapping) = (None, Mapping::None);
+            let (mut target, mut parameterization) = (None, Parameterization::None);
             while self.xml.next_child()? {
-                if self.xml.local() == "target" {
-                    target = Some(target_of(&self.xml.whole_text()?));
+                if self.xml.local_name() == "target" {
+                    target = Some(parse_reference(&self.xml.read_text()?));
                     continue;
                 }
                 while self.xml.next_child()? {
-                    mapping = self.mapping()?;
+                    parameterization = self.read_parameterization()?;
                 }
             }
-            self.add_target(target, mapping, parts)?;
+            self.add_target(target, parameterization, properties)?;
         }
         Ok(())
     }
 
-    fn mapping(&mut self) -> Result<Mapping> {
-        let id = self.xml.attribute("id").map_or(ids::NONE, |id| id_of(&id));
-        let mapping = match self.xml.local() {
-            "TexCoordList" => self.tex_coord_list()?,
-            "TexCoordGen" => self.tex_coord_gen()?,
+    fn read_parameterization(&mut self) -> Result<Parameterization> {
+        let id = self.xml.gml_id();
+        let parameterization = match self.xml.local_name() {
+            "TexCoordList" => self.read_tex_coord_list()?,
+            "TexCoordGen" => self.read_tex_coord_gen()?,
             other => {
-                let other = other.to_owned();
-                self.log.warn("unknown texture mapping", other)?;
+                self.report.warn("unknown texture parameterization", other)?;
                 self.xml.skip()?;
-                Mapping::None
+                Parameterization::None
             }
         };
-        self.into.name_mapping(id, mapping);
-        Ok(mapping)
+        self.appearances.register_parameterization(id, parameterization);
+        Ok(parameterization)
     }
 
-    fn tex_coord_list(&mut self) -> Result<Mapping> {
-        let first = self.into.rings.len();
-        // In CityGML 3.0 the rings stand in elements of their own, in the same order.
-        let mut named_after = first;
+    fn read_tex_coord_list(&mut self) -> Result<Parameterization> {
+        let first = self.appearances.rings.len();
+        // In CityGML 3.0, `ring` elements follow the coordinates in the same order.
+        let mut next_ring = first;
         while self.xml.next_child()? {
-            if self.xml.local() == "ring" {
-                let ring = self.xml.whole_text()?;
-                if let (Target::Here(id), Some(entry)) = (target_of(&ring), self.into.rings.get_mut(named_after)) {
+            if self.xml.local_name() == "ring" {
+                let ring = self.xml.read_text()?;
+                if let (Reference::Internal(id), Some(entry)) = (parse_reference(&ring), self.appearances.rings.get_mut(next_ring)) {
                     entry.ring = id;
                 }
-                named_after += 1;
+                next_ring += 1;
                 continue;
             }
-            let ring = match self.xml.attribute("ring").map(|ring| target_of(&ring)) {
-                Some(Target::Here(id)) => id,
+            let ring = match self.xml.attribute("ring").map(|ring| parse_reference(&ring)) {
+                Some(Reference::Internal(id)) => id,
                 _ => ids::NONE,
             };
-            self.tex_coords(ring)?;
+            self.read_tex_coords(ring)?;
         }
-        Ok(self.into.close_rings(first))
+        Ok(self.appearances.finish_tex_coord_list(first))
     }
 
-    fn tex_coords(&mut self, ring: Id) -> Result<()> {
+    fn read_tex_coords(&mut self, ring: Id) -> Result<()> {
         self.text.clear();
         self.xml.append_text(self.text)?;
         self.values.clear();
-        let start = self.into.uvs.len() as u32;
-        if parse_list(self.text, self.values).is_none() || !self.values.len().is_multiple_of(2) {
-            return self.log.warn("texture coordinates that cannot be read", self.text.chars().take(40).collect::<String>());
+        let start = self.appearances.uvs.len() as u32;
+        if parse_numbers(self.text, self.values).is_none() || !self.values.len().is_multiple_of(2) {
+            return self.report.warn("unreadable texture coordinates", self.text.chars().take(40).collect::<String>());
         }
-        self.into.uvs.extend(self.values.as_chunks::<2>().0.iter().map(|uv| uv.map(|v| v as f32)));
-        self.into.rings.push(RingUvs { ring, start, count: self.into.uvs.len() as u32 - start });
+        self.appearances.uvs.extend(self.values.as_chunks::<2>().0.iter().map(|uv| uv.map(|v| v as f32)));
+        self.appearances.rings.push(RingTexCoords { ring, start, count: self.appearances.uvs.len() as u32 - start });
         Ok(())
     }
 
-    fn tex_coord_gen(&mut self) -> Result<Mapping> {
-        let mut mapping = Mapping::None;
+    fn read_tex_coord_gen(&mut self) -> Result<Parameterization> {
+        let mut parameterization = Parameterization::None;
         while self.xml.next_child()? {
-            let matrix = self.numbers()?.and_then(|v| <[f64; 12]>::try_from(v).ok());
+            let matrix = self.read_numbers()?.and_then(|v| <[f64; 12]>::try_from(v).ok());
             match matrix {
-                Some(matrix) => mapping = self.into.add_matrix(matrix),
-                None => self.log.warn("worldToTexture matrix that cannot be read", "TexCoordGen")?,
+                Some(matrix) => parameterization = self.appearances.add_matrix(matrix),
+                None => self.report.warn("unreadable worldToTexture matrix", "TexCoordGen")?,
             }
         }
-        Ok(mapping)
+        Ok(parameterization)
     }
 }
 
-fn local_name(look: &Look) -> String {
-    match look {
-        Look::Texture { image, .. } => image.clone(),
-        Look::Color(_) | Look::Nothing => "X3DMaterial".into(),
+/// Describes surface data in the report: the image of a texture, else the type.
+fn describe(kind: &SurfaceDataKind) -> String {
+    match kind {
+        SurfaceDataKind::Texture(texture) => texture.image.clone(),
+        SurfaceDataKind::X3DMaterial { .. } | SurfaceDataKind::Unsupported => "X3DMaterial".into(),
     }
 }
 
-fn look(local: &str, parts: Parts) -> Look {
-    let placed = match (local, parts.reference, parts.orientation) {
-        ("GeoreferencedTexture", Some(reference), Some(orientation)) => match Georeference::new(reference, orientation) {
-            Some(world) => Placement::World(world),
-            None => Placement::WorldFile,
-        },
-        ("GeoreferencedTexture", ..) => Placement::WorldFile,
-        _ => Placement::ByTarget,
-    };
-    match (local, parts.image) {
+fn build_kind(type_name: &str, properties: SurfaceDataProperties) -> SurfaceDataKind {
+    let placement = choose_placement(type_name, &properties);
+    match (type_name, properties.image) {
         ("X3DMaterial", _) => {
-            let [r, g, b, _] = parts.diffuse.unwrap_or([DEFAULT_DIFFUSE[0], DEFAULT_DIFFUSE[1], DEFAULT_DIFFUSE[2], 1.0]);
-            let opacity = if parts.transparency.is_finite() { 1.0 - parts.transparency.clamp(0.0, 1.0) } else { 1.0 };
-            Look::Color([r, g, b, opacity])
+            let [r, g, b, _] = properties.diffuse.unwrap_or([DEFAULT_DIFFUSE; 4]);
+            let opacity = if properties.transparency.is_finite() { 1.0 - properties.transparency.clamp(0.0, 1.0) } else { 1.0 };
+            SurfaceDataKind::X3DMaterial { diffuse: [r, g, b, opacity] }
         }
-        ("ParameterizedTexture" | "GeoreferencedTexture", Some(image)) => {
-            Look::Texture { image, wrap: parts.wrap.unwrap_or_default(), border: parts.border.unwrap_or([0.0; 4]), placed }
-        }
-        _ => Look::Nothing,
+        ("ParameterizedTexture" | "GeoreferencedTexture", Some(image)) => SurfaceDataKind::Texture(TextureProperties {
+            image,
+            wrap: properties.wrap.unwrap_or_default(),
+            border: properties.border.unwrap_or([0.0; 4]),
+            placement,
+        }),
+        _ => SurfaceDataKind::Unsupported,
     }
+}
+
+/// Chooses the source of texture coordinates. A GeoreferencedTexture without a usable reference point and orientation needs a world file.
+fn choose_placement(type_name: &str, properties: &SurfaceDataProperties) -> TexturePlacement {
+    if type_name != "GeoreferencedTexture" {
+        return TexturePlacement::Parameterized;
+    }
+    let geo_transform = properties.reference_point.zip(properties.orientation).and_then(|(point, orientation)| GeoTransform::new(point, orientation));
+    geo_transform.map_or(TexturePlacement::WorldFile, TexturePlacement::Georeferenced)
 }

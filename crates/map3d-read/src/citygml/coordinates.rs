@@ -1,9 +1,9 @@
-//! Numbers of posList, pos and coordinates.
+//! Parses the numbers of `posList`, `pos` and `coordinates`.
 
 use map3d_base::Vec3;
 
-/// Appends the numbers of a list separated by white space; `None`: something there is no number.
-pub fn parse_list(text: &str, out: &mut Vec<f64>) -> Option<()> {
+/// Appends the numbers of a list separated by white space; returns `None` if a word is not a number.
+pub fn parse_numbers(text: &str, out: &mut Vec<f64>) -> Option<()> {
     let mut rest = text.as_bytes();
     loop {
         rest = rest.trim_ascii_start();
@@ -19,10 +19,10 @@ pub fn parse_list(text: &str, out: &mut Vec<f64>) -> Option<()> {
     }
 }
 
-/// Appends points of `dimension` numbers each; of two, z is 0. `None`: unreadable, or numbers are left over.
+/// Appends points with `dimension` numbers each; z is 0 if `dimension` is 2. Returns `None` if the text is invalid or numbers are left over.
 pub fn parse_points(text: &str, dimension: usize, values: &mut Vec<f64>, out: &mut Vec<Vec3>) -> Option<()> {
     values.clear();
-    parse_list(text, values)?;
+    parse_numbers(text, values)?;
     append_points(values, dimension, out)
 }
 
@@ -34,25 +34,25 @@ fn append_points(values: &[f64], dimension: usize, out: &mut Vec<Vec3>) -> Optio
     Some(())
 }
 
-/// Separators of a `coordinates` element, by default `x,y,z x,y,z` with points in numbers.
+/// Separators of a `coordinates` element; by default `x,y,z x,y,z` with decimal points.
 pub struct Separators {
     pub decimal: char,
-    pub within: char,
-    pub between: char,
+    pub coordinate: char,
+    pub tuple: char,
 }
 
 impl Default for Separators {
     fn default() -> Self {
-        Self { decimal: '.', within: ',', between: ' ' }
+        Self { decimal: '.', coordinate: ',', tuple: ' ' }
     }
 }
 
-/// Appends the points of a `coordinates` element.
+/// Appends the points of a `coordinates` element; returns `None` if it is invalid.
 pub fn parse_coordinates(text: &str, separators: &Separators, out: &mut Vec<Vec3>) -> Option<()> {
-    let is = |c: char, separator: char| c == separator || (separator == ' ' && c.is_whitespace());
-    for tuple in text.trim().split(|c| is(c, separators.between)).filter(|t| !t.is_empty()) {
+    let matches = |c: char, separator: char| c == separator || (separator == ' ' && c.is_whitespace());
+    for tuple in text.trim().split(|c| matches(c, separators.tuple)).filter(|t| !t.is_empty()) {
         let mut values = Vec::with_capacity(3);
-        for word in tuple.split(|c| is(c, separators.within)).map(str::trim).filter(|w| !w.is_empty()) {
+        for word in tuple.split(|c| matches(c, separators.coordinate)).map(str::trim).filter(|w| !w.is_empty()) {
             let word = if separators.decimal == '.' { word.to_owned() } else { word.replace(separators.decimal, ".") };
             values.push(word.parse().ok()?);
         }
@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lists_of_numbers() {
+    fn numbers_are_separated_by_white_space() {
         for (text, expected) in [
             ("1 2.5 -3e2", Some(vec![1.0, 2.5, -300.0])),
             ("\n 1\t2 ", Some(vec![1.0, 2.0])),
@@ -76,22 +76,22 @@ mod tests {
             ("1.0.0", None),
         ] {
             let mut out = Vec::new();
-            assert_eq!(parse_list(text, &mut out).map(|()| out), expected, "{text:?}");
+            assert_eq!(parse_numbers(text, &mut out).map(|()| out), expected, "{text:?}");
         }
     }
 
     #[test]
-    fn coordinates_with_any_separators() {
-        let read = |text: &str, separators: &Separators| {
+    fn coordinates_may_use_any_separators() {
+        let parse = |text: &str, separators: &Separators| {
             let mut out = Vec::new();
             parse_coordinates(text, separators, &mut out).map(|()| out)
         };
         let expected = Some(vec![[1.5, 2.0, 3.0], [4.0, 5.0, 6.0]]);
-        assert_eq!(read(" 1.5,2,3\n4,5,6 ", &Separators::default()), expected);
-        assert_eq!(read("1,5;2;3 4;5;6", &Separators { decimal: ',', within: ';', between: ' ' }), expected);
-        assert_eq!(read("1.5 2 3,4 5 6", &Separators { decimal: '.', within: ' ', between: ',' }), expected);
-        assert_eq!(read("1,2 3,4", &Separators::default()), Some(vec![[1.0, 2.0, 0.0], [3.0, 4.0, 0.0]]));
-        assert_eq!(read("1,2,3,4", &Separators::default()), None);
-        assert_eq!(read("1,x", &Separators::default()), None);
+        assert_eq!(parse(" 1.5,2,3\n4,5,6 ", &Separators::default()), expected);
+        assert_eq!(parse("1,5;2;3 4;5;6", &Separators { decimal: ',', coordinate: ';', tuple: ' ' }), expected);
+        assert_eq!(parse("1.5 2 3,4 5 6", &Separators { decimal: '.', coordinate: ' ', tuple: ',' }), expected);
+        assert_eq!(parse("1,2 3,4", &Separators::default()), Some(vec![[1.0, 2.0, 0.0], [3.0, 4.0, 0.0]]));
+        assert_eq!(parse("1,2,3,4", &Separators::default()), None);
+        assert_eq!(parse("1,x", &Separators::default()), None);
     }
 }

@@ -1,25 +1,27 @@
-//! GML surfaces and solids into the arena.
+//! Parses GML surfaces and solids into the arena.
 
-use map3d_base::{Error, Result, Vec3};
+use std::io::BufRead;
+
+use map3d_base::{Result, Vec3};
 
 use super::coordinates::{Separators, parse_coordinates, parse_points};
-use super::geometry::{Geometry, NO_NODE, NodeId, Ring, Shape};
-use super::ids::{self, Id, Target, id_of, target_of};
-use super::xml::{Step, Xml};
-use crate::report::Log;
+use super::geometry_arena::{GeometryArena, NodeId, NodeKind, Ring};
+use super::ids::{self, Reference, parse_reference};
+use super::xml_reader::{XmlEvent, XmlReader};
+use crate::report_builder::{LimitCheck, ReportBuilder};
 
-/// Elements that are surfaces, or groups of them.
-pub fn is_surface(local: &str) -> bool {
-    is_polygon(local) || is_group(local)
+/// Returns true for polygons, surfaces, solids and aggregates of them.
+pub fn is_surface(local_name: &str) -> bool {
+    is_polygon(local_name) || is_group(local_name)
 }
 
-fn is_polygon(local: &str) -> bool {
-    matches!(local, "Polygon" | "Triangle" | "Rectangle" | "PolygonPatch")
+fn is_polygon(local_name: &str) -> bool {
+    matches!(local_name, "Polygon" | "Triangle" | "Rectangle" | "PolygonPatch")
 }
 
-fn is_group(local: &str) -> bool {
+fn is_group(local_name: &str) -> bool {
     matches!(
-        local,
+        local_name,
         "MultiSurface"
             | "CompositeSurface"
             | "OrientableSurface"
@@ -37,10 +39,10 @@ fn is_group(local: &str) -> bool {
     )
 }
 
-/// Points, curves and the like: nothing to draw.
-pub fn is_thin(local: &str) -> bool {
+/// Returns true for points and curves, which are not converted.
+pub fn is_point_or_curve(local_name: &str) -> bool {
     matches!(
-        local,
+        local_name,
         "Point"
             | "MultiPoint"
             | "LineString"
@@ -53,183 +55,194 @@ pub fn is_thin(local: &str) -> bool {
     )
 }
 
-/// Parses geometry from where `xml` stands.
+/// Parses geometry at the current position of `xml`.
 pub struct GeometryParser<'a> {
-    pub xml: &'a mut Xml,
-    pub log: &'a mut Log,
-    pub geometry: &'a mut Geometry,
+    pub xml: &'a mut XmlReader,
+    pub report: &'a mut ReportBuilder,
+    pub geometry: &'a mut GeometryArena,
+    /// Limit on the memory of `geometry`.
     pub max_bytes: u64,
+    /// Buffers for numbers and text.
     pub values: &'a mut Vec<f64>,
     pub text: &'a mut String,
 }
 
 impl GeometryParser<'_> {
-    /// The property element that has just started: a reference, or geometry inside. `None`: nothing to draw.
-    pub fn property(&mut self, parent: NodeId, dimension: usize) -> Result<Option<NodeId>> {
-        let linked = self.link(parent)?;
-        let mut first = linked;
+    /// Reads the current property element: an XLink or geometry. Returns its first node, or `None` if there is nothing to convert.
+    pub fn read_property(&mut self, parent: NodeId, dimension: usize) -> Result<Option<NodeId>> {
+        let mut first = self.read_xlink(parent)?;
         while self.xml.next_child()? {
-            let node = self.element(parent, dimension)?;
+            let node = self.read_element(parent, dimension)?;
             first = first.or(node);
         }
         Ok(first)
     }
 
-    fn link(&mut self, parent: NodeId) -> Result<Option<NodeId>> {
+    fn read_xlink(&mut self, parent: NodeId) -> Result<Option<NodeId>> {
         let Some(href) = self.xml.attribute("href") else { return Ok(None) };
-        match target_of(&href) {
-            Target::Here(id) => Ok(Some(self.geometry.add(ids::NONE, parent, Shape::Link(id)))),
-            Target::OtherDocument => {
+        match parse_reference(&href) {
+            Reference::Internal(id) => Ok(Some(self.geometry.add(ids::NONE, parent, NodeKind::XLink(id)))),
+            Reference::External => {
                 let href = href.into_owned();
-                self.log.warn("reference to another document not followed", href)?;
+                self.report.warn("reference to another document not followed", href)?;
                 Ok(None)
             }
         }
     }
 
-    /// The geometry element that has just started, to its end.
-    pub fn element(&mut self, parent: NodeId, dimension: usize) -> Result<Option<NodeId>> {
-        let dimension = self.dimension().unwrap_or(dimension);
-        let local = self.xml.local();
-        if is_polygon(local) {
-            self.polygon(parent, dimension).map(Some)
-        } else if is_group(local) {
-            self.group(parent, dimension).map(Some)
+    /// Reads the current geometry element.
+    fn read_element(&mut self, parent: NodeId, dimension: usize) -> Result<Option<NodeId>> {
+        let dimension = self.parse_dimension().unwrap_or(dimension);
+        let local_name = self.xml.local_name();
+        if is_polygon(local_name) {
+            self.read_polygon(parent, dimension).map(Some)
+        } else if is_group(local_name) {
+            self.read_group(parent, dimension).map(Some)
         } else {
-            let (thin, local) = (is_thin(local), local.to_owned());
-            self.log.report.skip(if thin { "points and lines" } else { "geometry of other kinds" }, 1);
-            if !thin {
-                self.log.note("geometry element not drawn", local);
+            if is_point_or_curve(local_name) {
+                self.report.omit("points and lines");
+            } else {
+                self.report.omit("unsupported geometry type");
+                self.report.note("unsupported geometry element", local_name);
             }
             self.xml.skip()?;
             Ok(None)
         }
     }
 
-    fn dimension(&self) -> Option<usize> {
+    fn parse_dimension(&self) -> Option<usize> {
         self.xml.attribute("srsDimension")?.trim().parse().ok()
     }
 
-    fn id(&self) -> Id {
-        self.xml.attribute("id").map_or(ids::NONE, |id| id_of(&id))
-    }
-
-    fn group(&mut self, parent: NodeId, dimension: usize) -> Result<NodeId> {
-        let node = self.geometry.add(self.id(), parent, Shape::Group);
-        self.geometry.nodes[node as usize].flip = self.xml.attribute("orientation").is_some_and(|o| o.trim() == "-");
+    fn read_group(&mut self, parent: NodeId, dimension: usize) -> Result<NodeId> {
+        let node = self.geometry.add(self.xml.gml_id(), parent, NodeKind::Group);
+        self.geometry.nodes[node as usize].reversed = self.xml.attribute("orientation").is_some_and(|o| o.trim() == "-");
         while self.xml.next_child()? {
-            match self.xml.local() {
+            match self.xml.local_name() {
                 "boundedBy" | "name" | "description" | "metaDataProperty" | "controlPoint" => self.xml.skip()?,
                 "appearance" => {
-                    self.log.note("appearance of a TexturedSurface (CityGML 1.0) not drawn", "TexturedSurface");
+                    self.report.note("appearance of a TexturedSurface (CityGML 1.0) ignored", "TexturedSurface");
                     self.xml.skip()?;
                 }
                 _ => {
-                    self.property(node, dimension)?;
+                    self.read_property(node, dimension)?;
                 }
             }
         }
         Ok(node)
     }
 
-    fn polygon(&mut self, parent: NodeId, dimension: usize) -> Result<NodeId> {
-        let id = self.id();
+    fn read_polygon(&mut self, parent: NodeId, dimension: usize) -> Result<NodeId> {
+        let id = self.xml.gml_id();
         let first_ring = self.geometry.rings.len() as u32;
-        let mut sound = true;
+        let mut valid = true;
         while self.xml.next_child()? {
-            match self.xml.local() {
-                "exterior" | "interior" | "outerBoundaryIs" | "innerBoundaryIs" => sound &= self.boundary(dimension)?,
+            match self.xml.local_name() {
+                "exterior" | "interior" | "outerBoundaryIs" | "innerBoundaryIs" => valid &= self.read_boundary(dimension)?,
                 _ => self.xml.skip()?,
             }
         }
         self.check_size()?;
         let rings = self.geometry.rings.len() as u32 - first_ring;
-        if !sound {
+        if !valid {
             let at = self.xml.position();
-            self.log.skip("polygon whose coordinates cannot be read", || format!("before byte {at}"))?;
+            self.report.skip("polygon with unreadable coordinates", || format!("before byte {at}"))?;
             self.geometry.rings.truncate(first_ring as usize);
-            return Ok(self.geometry.add(id, parent, Shape::Group));
+            return Ok(self.geometry.add(id, parent, NodeKind::Group));
         }
-        Ok(self.geometry.add(id, parent, Shape::Polygon { first_ring, rings }))
+        Ok(self.geometry.add(id, parent, NodeKind::Polygon { first_ring, rings }))
     }
 
     fn check_size(&self) -> Result<()> {
-        let (got, value) = (self.geometry.bytes(), self.max_bytes);
-        if got <= value {
-            return Ok(());
-        }
-        Err(Error::Limit { path: self.log.path().to_path_buf(), what: "geometry of one city object, bytes", got, limit: "max_object_bytes", value })
+        let got = self.geometry.byte_count();
+        self.report.check_limit(LimitCheck { what: "geometry of one city object, bytes", got, limit: "max_object_bytes", value: self.max_bytes })
     }
 
-    /// One exterior or interior: a LinearRing, or a Ring of curves. False: coordinates that cannot be read.
-    fn boundary(&mut self, dimension: usize) -> Result<bool> {
-        let mut sound = true;
+    /// Reads the current exterior or interior: a LinearRing, or a Ring of curves. Returns false if coordinates are unreadable.
+    fn read_boundary(&mut self, dimension: usize) -> Result<bool> {
+        let mut valid = true;
         while self.xml.next_child()? {
-            let id = self.id();
+            let id = self.xml.gml_id();
             let start = self.geometry.points.len() as u32;
-            let dimension = self.dimension().unwrap_or(dimension);
-            sound &= self.ring_points(dimension)?;
+            let dimension = self.parse_dimension().unwrap_or(dimension);
+            valid &= self.read_ring_points(dimension)?;
             let end = self.geometry.points.len() as u32;
             self.geometry.rings.push(Ring { id, start, end });
         }
-        Ok(sound)
+        Ok(valid)
     }
 
-    /// All positions inside the open element, at any depth.
-    fn ring_points(&mut self, dimension: usize) -> Result<bool> {
-        let mut sound = true;
+    /// Reads all positions in the current element, at any depth.
+    fn read_ring_points(&mut self, dimension: usize) -> Result<bool> {
+        let mut valid = true;
         let depth = self.xml.depth();
         while self.xml.depth() >= depth {
             match self.xml.next_tag()? {
-                Step::Start => sound &= self.positions(dimension)?,
-                Step::Eof => break,
-                Step::End | Step::Text => {}
+                XmlEvent::Start => valid &= self.read_positions(dimension)?,
+                XmlEvent::Eof => break,
+                XmlEvent::End | XmlEvent::Text => {}
             }
         }
-        Ok(sound)
+        Ok(valid)
     }
 
-    /// If the element that has just started holds positions, reads it to its end.
-    fn positions(&mut self, dimension: usize) -> Result<bool> {
-        let dimension = self.dimension().unwrap_or(dimension);
-        match self.xml.local() {
+    /// Reads the current element to its end if it holds positions; enters any other.
+    fn read_positions(&mut self, dimension: usize) -> Result<bool> {
+        let dimension = self.parse_dimension().unwrap_or(dimension);
+        match self.xml.local_name() {
             "posList" | "pos" => {
                 self.text.clear();
                 self.xml.append_text(self.text)?;
                 Ok(parse_points(self.text, dimension, self.values, &mut self.geometry.points).is_some())
             }
             "coordinates" => {
-                let separators = self.separators();
+                let separators = self.parse_separators();
                 self.text.clear();
                 self.xml.append_text(self.text)?;
                 Ok(parse_coordinates(self.text, &separators, &mut self.geometry.points).is_some())
             }
-            "coord" => self.coord(),
+            "coord" => self.read_coord(),
             _ => Ok(true),
         }
     }
 
-    fn separators(&self) -> Separators {
+    fn parse_separators(&self) -> Separators {
         let default = Separators::default();
-        let one = |name, otherwise| self.xml.attribute(name).and_then(|v| v.chars().next()).unwrap_or(otherwise);
-        Separators { decimal: one("decimal", default.decimal), within: one("cs", default.within), between: one("ts", default.between) }
+        let parse = |name, otherwise| self.xml.attribute(name).and_then(|v| v.chars().next()).unwrap_or(otherwise);
+        Separators { decimal: parse("decimal", default.decimal), coordinate: parse("cs", default.coordinate), tuple: parse("ts", default.tuple) }
     }
 
-    fn coord(&mut self) -> Result<bool> {
+    fn read_coord(&mut self) -> Result<bool> {
         let mut point: Vec3 = [0.0; 3];
-        let mut sound = true;
+        let mut valid = true;
         while self.xml.next_child()? {
-            let axis = ["X", "Y", "Z"].iter().position(|name| *name == self.xml.local());
-            let value = self.xml.whole_text()?.parse();
+            let axis = ["X", "Y", "Z"].iter().position(|name| *name == self.xml.local_name());
+            let value = self.xml.read_text()?.parse();
             match (axis, value) {
                 (Some(axis), Ok(value)) => point[axis] = value,
-                _ => sound = false,
+                _ => valid = false,
             }
         }
         self.geometry.points.push(point);
-        Ok(sound)
+        Ok(valid)
     }
 }
 
-/// Geometry of a property outside of any other node.
-pub const TOP: NodeId = NO_NODE;
+/// Reads the current element and returns the last valid position in it.
+pub fn read_point<R: BufRead>(xml: &mut XmlReader<R>) -> Result<Option<Vec3>> {
+    let mut found = None;
+    let depth = xml.depth();
+    while xml.depth() >= depth {
+        match xml.next_event()? {
+            XmlEvent::Start if matches!(xml.local_name(), "pos" | "coordinates") => {
+                let text = xml.read_text()?.replace(',', " ");
+                let (mut values, mut points) = (Vec::new(), Vec::new());
+                let dimension = text.split_whitespace().count();
+                found = parse_points(&text, dimension, &mut values, &mut points).and(points.first().copied()).or(found);
+            }
+            XmlEvent::Eof => break,
+            _ => {}
+        }
+    }
+    Ok(found)
+}

@@ -1,44 +1,46 @@
-//! Identifiers and references as 64-bit hashes: a document may have tens of millions.
+//! Identifiers and references, stored as 64-bit hashes because a document may have tens of millions.
 
 use std::collections::{HashMap, HashSet};
 use std::hash::{BuildHasherDefault, Hasher};
 
 use twox_hash::XxHash3_64;
 
-/// Hash of a gml:id; `NONE` where there is no id.
+/// Hash of a gml:id; `NONE` for an element without one.
 pub type Id = u64;
 pub const NONE: Id = 0;
 
-pub type IdMap<V> = HashMap<Id, V, BuildHasherDefault<AsItIs>>;
-pub type IdSet = HashSet<Id, BuildHasherDefault<AsItIs>>;
+pub type IdMap<V> = HashMap<Id, V, BuildHasherDefault<IdentityHasher>>;
+pub type IdSet = HashSet<Id, BuildHasherDefault<IdentityHasher>>;
 
-pub fn id_of(text: &str) -> Id {
+pub fn hash_id(text: &str) -> Id {
     XxHash3_64::oneshot(text.trim().as_bytes()).max(1)
 }
 
-/// What a reference leads to.
+/// A reference to an element by its id.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Target {
-    Here(Id),
-    OtherDocument,
+pub enum Reference {
+    /// To an element of the same document.
+    Internal(Id),
+    /// To another document.
+    External,
 }
 
-/// `#id`, or the bare id that some writers put there. `other.gml#id` leads out of the document.
-pub fn target_of(href: &str) -> Target {
+/// Parses `#id` or, as some writers produce, a bare `id`. `other.gml#id` and URLs are external.
+pub fn parse_reference(href: &str) -> Reference {
     let href = href.trim();
     match href.split_once('#') {
-        Some(("", id)) => Target::Here(id_of(id)),
-        Some(_) => Target::OtherDocument,
-        None if href.contains("://") => Target::OtherDocument,
-        None => Target::Here(id_of(href)),
+        Some(("", id)) => Reference::Internal(hash_id(id)),
+        Some(_) => Reference::External,
+        None if href.contains("://") => Reference::External,
+        None => Reference::Internal(hash_id(href)),
     }
 }
 
-/// Ids are hashes already.
+/// Returns ids unchanged: they are hashes already.
 #[derive(Default)]
-pub struct AsItIs(u64);
+pub struct IdentityHasher(u64);
 
-impl Hasher for AsItIs {
+impl Hasher for IdentityHasher {
     fn finish(&self) -> u64 {
         self.0
     }
@@ -57,10 +59,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn references_are_read_with_and_without_hash() {
-        assert_eq!(target_of("#a"), Target::Here(id_of("a")));
-        assert_eq!(target_of(" a "), Target::Here(id_of("a")));
-        assert_eq!(target_of("b.gml#a"), Target::OtherDocument);
-        assert_eq!(target_of("http://x.y/z"), Target::OtherDocument);
+    fn references_may_omit_the_number_sign() {
+        assert_eq!(parse_reference("#a"), Reference::Internal(hash_id("a")));
+        assert_eq!(parse_reference(" a "), Reference::Internal(hash_id("a")));
+        assert_eq!(parse_reference("b.gml#a"), Reference::External);
+        assert_eq!(parse_reference("http://x.y/z"), Reference::External);
     }
 }

@@ -1,30 +1,31 @@
-//! CityGML 1.0 and 2.0 (names are read without their namespace, so that much of 3.0 is understood too).
+//! Reads CityGML 1.0 and 2.0. Element names are matched without their namespace, so much of 3.0 is read too.
 //!
-//! Two passes over the file. The first (`survey`) keeps the CRS, the themes, appearances that stand outside of city objects, and the ids
-//! that are referred to from another city object. The second (`reader`) holds one city object at a time.
+//! The file is read twice. The first pass (`pre_scan`) collects the CRS, the themes, appearances outside city objects, and the ids that other
+//! city objects refer to. The second pass (`citygml_reader`) parses and converts one city object at a time.
 
 mod address;
 mod appearance;
 mod appearance_parser;
 mod attributes;
-mod canvas;
+mod city_object;
+mod city_object_parser;
+mod citygml_reader;
+mod converter;
 mod coordinates;
-mod draw;
-mod feature;
-mod feature_parser;
-mod geometry;
+mod feature_types;
+mod geo_transform;
+mod geometry_arena;
 mod geometry_parser;
-mod georeference;
 mod ids;
-mod implicit;
-mod kinds;
-mod lod;
-mod paint;
-mod prototypes;
-mod reader;
-mod scan;
-mod shared;
-mod survey;
-mod xml;
+mod implicit_geometry;
+mod lod_selection;
+mod material_resolver;
+mod polygons;
+mod pre_scan;
+mod prototype_table;
+mod shared_geometry;
+mod tag_scanner;
+mod tessellate;
+mod xml_reader;
 
-pub use reader::CityGmlReader;
+pub use citygml_reader::CityGmlReader;

@@ -1,44 +1,44 @@
-//! Corners of faces.
+//! Parses the vertex references of faces.
 
-use super::lines::words;
+use super::line_reader::words;
 
-/// Numbers of position, texture coordinate and normal, counted from 0.
+/// Zero-based indices of a face vertex's position, texture coordinate and normal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Corner {
+pub struct FaceVertex {
     pub position: u32,
     pub uv: Option<u32>,
     pub normal: Option<u32>,
 }
 
-/// How many of each the file has given so far; negative numbers count back from here.
+/// Numbers of positions, texture coordinates and normals read so far; negative references count back from them.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Counts {
+pub struct ElementCounts {
     pub positions: usize,
     pub uvs: usize,
     pub normals: usize,
 }
 
-/// Parses `1 2/3 4//5 -1/-1/-1 …`; `None`: a corner cannot be read. Numbers may be larger than what the file has given so far.
-pub fn parse_face(rest: &[u8], counts: Counts, corners: &mut Vec<Corner>) -> Option<()> {
-    corners.clear();
+/// Parses `1 2/3 4//5 -1/-1/-1 …`; returns `None` if a reference is invalid. References may point to vertices that the file defines later.
+pub fn parse_face(rest: &[u8], counts: ElementCounts, vertices: &mut Vec<FaceVertex>) -> Option<()> {
+    vertices.clear();
     for word in words(rest) {
-        corners.push(parse_corner(word, counts)?);
+        vertices.push(parse_vertex(word, counts)?);
     }
     Some(())
 }
 
-fn parse_corner(word: &[u8], counts: Counts) -> Option<Corner> {
+fn parse_vertex(word: &[u8], counts: ElementCounts) -> Option<FaceVertex> {
     let mut parts = word.split(|b| *b == b'/');
-    let position = index(parts.next()?, counts.positions)?;
+    let position = parse_index(parts.next()?, counts.positions)?;
     let mut other = |count| match parts.next() {
         None | Some(b"") => Some(None),
-        Some(part) => index(part, count).map(Some),
+        Some(part) => parse_index(part, count).map(Some),
     };
-    Some(Corner { position, uv: other(counts.uvs)?, normal: other(counts.normals)? })
+    Some(FaceVertex { position, uv: other(counts.uvs)?, normal: other(counts.normals)? })
 }
 
-/// 1 is the first, −1 the last so far; 0 and what lies before the first become a number that no file reaches.
-fn index(part: &[u8], count: usize) -> Option<u32> {
+/// 1 is the first element, −1 the last so far. 0 and references before the first become `u32::MAX`, which is always out of range.
+fn parse_index(part: &[u8], count: usize) -> Option<u32> {
     let n: i64 = std::str::from_utf8(part).ok()?.parse().ok()?;
     let at = if n < 0 { n + count as i64 } else { n - 1 };
     Some(u32::try_from(at).unwrap_or(u32::MAX))
@@ -49,23 +49,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn corners_are_read_in_every_spelling() {
-        let counts = Counts { positions: 4, uvs: 3, normals: 2 };
-        let corner = |position, uv, normal| Some(Corner { position, uv, normal });
+    fn vertex_references_have_one_to_three_indices() {
+        let counts = ElementCounts { positions: 4, uvs: 3, normals: 2 };
+        let vertex = |position, uv, normal| Some(FaceVertex { position, uv, normal });
         for (word, expected) in [
-            ("1", corner(0, None, None)),
-            ("2/3", corner(1, Some(2), None)),
-            ("2//1", corner(1, None, Some(0))),
-            ("2/1/", corner(1, Some(0), None)),
-            ("-1/-3/-2", corner(3, Some(0), Some(0))),
-            ("9", corner(8, None, None)),
-            ("0", corner(u32::MAX, None, None)),
-            ("-5", corner(u32::MAX, None, None)),
+            ("1", vertex(0, None, None)),
+            ("2/3", vertex(1, Some(2), None)),
+            ("2//1", vertex(1, None, Some(0))),
+            ("2/1/", vertex(1, Some(0), None)),
+            ("-1/-3/-2", vertex(3, Some(0), Some(0))),
+            ("9", vertex(8, None, None)),
+            ("0", vertex(u32::MAX, None, None)),
+            ("-5", vertex(u32::MAX, None, None)),
             ("a", None),
             ("1.5", None),
-            ("99999999999", corner(u32::MAX, None, None)),
+            ("99999999999", vertex(u32::MAX, None, None)),
         ] {
-            assert_eq!(parse_corner(word.as_bytes(), counts), expected, "{word}");
+            assert_eq!(parse_vertex(word.as_bytes(), counts), expected, "{word}");
         }
     }
 }

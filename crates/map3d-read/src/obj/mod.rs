@@ -1,10 +1,10 @@
-//! Wavefront OBJ with MTL.
+//! Reads Wavefront OBJ with MTL.
 
+mod batch_builder;
 mod face;
-mod lines;
+mod face_material;
+mod line_reader;
 mod mtl;
-mod palette;
-mod pending;
-mod reader;
+mod obj_reader;
 
-pub use reader::ObjReader;
+pub use obj_reader::ObjReader;

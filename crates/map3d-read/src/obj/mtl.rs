@@ -1,4 +1,4 @@
-//! MTL libraries: diffuse colour, opacity, colour map and opacity map of named materials.
+//! Reads MTL material libraries: diffuse colour, opacity, colour map and opacity map of named materials.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -6,111 +6,112 @@ use std::path::Path;
 
 use map3d_base::Result;
 
-use super::lines::{Lines, number, numbers, split_word};
+use super::line_reader::{LineReader, numbers, parse_number, split_word};
 use crate::asset_folder::AssetFolder;
-use crate::report::Log;
-use crate::text::name_of;
+use crate::report_builder::ReportBuilder;
+use crate::text_input::decode_name;
 
-/// A `map_…` statement: an image and how texture coordinates become its own, `scale · uv + offset`.
+/// A `map_…` statement: an image and the transformation of texture coordinates, `scale · uv + offset`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MapStatement {
+pub struct TextureMap {
+    /// File name of the image.
     pub name: String,
     pub clamp: bool,
     pub scale: [f64; 2],
     pub offset: [f64; 2],
 }
 
-/// What a material statement says; `None` where it is silent.
+/// A material definition; `None` for statements that it does not have.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct MtlEntry {
+pub struct MtlMaterial {
     pub diffuse: Option<[f32; 3]>,
     pub opacity: Option<f32>,
-    pub color_map: Option<MapStatement>,
-    pub opacity_map: Option<MapStatement>,
+    pub color_map: Option<TextureMap>,
+    pub opacity_map: Option<TextureMap>,
 }
 
-/// Materials of all libraries of a document; a name's first definition counts.
+/// Materials of all libraries of a document. The first definition of a name wins.
 #[derive(Default)]
-pub struct Library {
-    entries: HashMap<String, MtlEntry>,
+pub struct MaterialLibrary {
+    materials: HashMap<String, MtlMaterial>,
 }
 
-impl Library {
-    pub fn get(&self, name: &str) -> Option<&MtlEntry> {
-        self.entries.get(name)
+impl MaterialLibrary {
+    pub fn get(&self, name: &str) -> Option<&MtlMaterial> {
+        self.materials.get(name)
     }
 
-    /// Reads what a `mtllib` line names: one file whose name has spaces, or several files.
-    pub fn load_statement(&mut self, rest: &[u8], folder: &mut AssetFolder, log: &mut Log) -> Result<()> {
-        let whole = name_of(rest).trim_matches('"').to_owned();
+    /// Loads the files that a `mtllib` line names: one file whose name contains spaces, or several files.
+    pub fn load_statement(&mut self, rest: &[u8], folder: &mut AssetFolder, report: &mut ReportBuilder) -> Result<()> {
+        let whole = decode_name(rest).trim_matches('"').to_owned();
         if whole.is_empty() {
-            return log.warn("mtllib without a file name", String::new());
+            return report.warn("mtllib without a file name", String::new());
         }
         if folder.find(&whole).is_ok() || !whole.contains(char::is_whitespace) {
-            return self.load_named(&whole, folder, log);
+            return self.load_named(&whole, folder, report);
         }
         let several: Vec<&str> = whole.split_whitespace().collect();
         if several.iter().all(|name| folder.find(name).is_err()) {
-            return self.load_named(&whole, folder, log);
+            return self.load_named(&whole, folder, report);
         }
-        several.into_iter().try_for_each(|name| self.load_named(name, folder, log))
+        several.into_iter().try_for_each(|name| self.load_named(name, folder, report))
     }
 
-    fn load_named(&mut self, name: &str, folder: &mut AssetFolder, log: &mut Log) -> Result<()> {
+    fn load_named(&mut self, name: &str, folder: &mut AssetFolder, report: &mut ReportBuilder) -> Result<()> {
         match folder.find(name) {
-            Ok(found) => {
-                if let Some(oddity) = found.tolerated {
-                    log.note(oddity, name);
+            Ok(file) => {
+                if let Some(oddity) = file.oddity {
+                    report.note(oddity, name);
                 }
                 let slashed = name.replace('\\', "/");
                 let prefix = slashed.rsplit_once('/').map_or("", |(prefix, _)| prefix);
-                self.load(&found.path, prefix, folder, log)
+                self.load(&file.path, prefix, folder, report)
             }
-            Err(refusal) => log.warn(&format!("material library: {}", refusal.reason()), name),
+            Err(error) => report.warn(&format!("material library: {}", error.reason()), name),
         }
     }
 
-    /// `prefix`: folder of the library, seen from the document; images are looked for there first.
-    fn load(&mut self, path: &Path, prefix: &str, folder: &mut AssetFolder, log: &mut Log) -> Result<()> {
-        let mut lines = Lines::open(path)?;
-        let mut current: Option<(String, MtlEntry)> = None;
+    /// `prefix`: folder of the library, relative to the document; images are searched there first.
+    fn load(&mut self, path: &Path, prefix: &str, folder: &mut AssetFolder, report: &mut ReportBuilder) -> Result<()> {
+        let mut lines = LineReader::open(path)?;
+        let mut current: Option<(String, MtlMaterial)> = None;
         while let Some(line) = lines.next_line()? {
             let (word, rest) = split_word(line);
             if word.eq_ignore_ascii_case(b"newmtl") {
-                self.keep(current.replace((name_of(rest).into_owned(), MtlEntry::default())), log);
-            } else if let Some((_, entry)) = &mut current {
-                statement(entry, word, rest, prefix, folder);
+                self.add(current.replace((decode_name(rest).into_owned(), MtlMaterial::default())), report);
+            } else if let Some((_, material)) = &mut current {
+                apply_statement(material, word, rest, prefix, folder);
             }
         }
-        self.keep(current, log);
+        self.add(current, report);
         Ok(())
     }
 
-    fn keep(&mut self, finished: Option<(String, MtlEntry)>, log: &mut Log) {
-        let Some((name, entry)) = finished else { return };
-        match self.entries.entry(name) {
-            Entry::Occupied(first) => log.note("material defined more than once; the first counts", first.key().as_str()),
+    fn add(&mut self, finished: Option<(String, MtlMaterial)>, report: &mut ReportBuilder) {
+        let Some((name, material)) = finished else { return };
+        match self.materials.entry(name) {
+            Entry::Occupied(first) => report.note("material defined more than once; using the first", first.key().as_str()),
             Entry::Vacant(slot) => {
-                slot.insert(entry);
+                slot.insert(material);
             }
         }
     }
 }
 
-fn statement(entry: &mut MtlEntry, word: &[u8], rest: &[u8], prefix: &str, folder: &mut AssetFolder) {
-    let mut map = || map_statement(rest).map(|map| beside_library(map, prefix, folder));
+fn apply_statement(material: &mut MtlMaterial, word: &[u8], rest: &[u8], prefix: &str, folder: &mut AssetFolder) {
+    let mut map = || parse_texture_map(rest).map(|map| prefer_library_folder(map, prefix, folder));
     match word.to_ascii_lowercase().as_slice() {
-        b"kd" => entry.diffuse = color(rest).or(entry.diffuse),
-        b"d" => entry.opacity = numbers(rest.strip_prefix(b"-halo").unwrap_or(rest)).next().map(|v| v.clamp(0.0, 1.0) as f32),
-        b"tr" if entry.opacity.is_none() => entry.opacity = numbers(rest).next().map(|v| (1.0 - v).clamp(0.0, 1.0) as f32),
-        b"map_kd" => entry.color_map = map(),
-        b"map_d" => entry.opacity_map = map(),
+        b"kd" => material.diffuse = parse_color(rest).or(material.diffuse),
+        b"d" => material.opacity = numbers(rest.strip_prefix(b"-halo").unwrap_or(rest)).next().map(|v| v.clamp(0.0, 1.0) as f32),
+        b"tr" if material.opacity.is_none() => material.opacity = numbers(rest).next().map(|v| (1.0 - v).clamp(0.0, 1.0) as f32),
+        b"map_kd" => material.color_map = map(),
+        b"map_d" => material.opacity_map = map(),
         _ => {}
     }
 }
 
-/// One number is a grey; CIE XYZ and spectral curves are not colours we know.
-fn color(rest: &[u8]) -> Option<[f32; 3]> {
+/// A single number is a grey value. CIE XYZ and spectral curves are not supported.
+fn parse_color(rest: &[u8]) -> Option<[f32; 3]> {
     let values: Vec<f32> = numbers(rest).take(3).map(|v| if v.is_finite() { v.clamp(0.0, 1.0) as f32 } else { 0.8 }).collect();
     match values[..] {
         [grey] => Some([grey; 3]),
@@ -119,9 +120,9 @@ fn color(rest: &[u8]) -> Option<[f32; 3]> {
     }
 }
 
-/// Options, then the file's name, which may have spaces.
-fn map_statement(rest: &[u8]) -> Option<MapStatement> {
-    let mut map = MapStatement { name: String::new(), clamp: false, scale: [1.0; 2], offset: [0.0; 2] };
+/// Parses options, then the file name, which may contain spaces.
+fn parse_texture_map(rest: &[u8]) -> Option<TextureMap> {
+    let mut map = TextureMap { name: String::new(), clamp: false, scale: [1.0; 2], offset: [0.0; 2] };
     let mut rest = rest;
     while rest.first() == Some(&b'-') {
         let (option, after) = split_word(rest);
@@ -131,23 +132,23 @@ fn map_statement(rest: &[u8]) -> Option<MapStatement> {
                 map.clamp = value.eq_ignore_ascii_case(b"on");
                 after
             }
-            b"-s" => up_to_three(after, &mut map.scale),
-            b"-o" => up_to_three(after, &mut map.offset),
-            b"-t" => up_to_three(after, &mut [0.0; 2]),
+            b"-s" => parse_up_to_three(after, &mut map.scale),
+            b"-o" => parse_up_to_three(after, &mut map.offset),
+            b"-t" => parse_up_to_three(after, &mut [0.0; 2]),
             b"-mm" => split_word(split_word(after).1).1,
             b"-blendu" | b"-blendv" | b"-cc" | b"-bm" | b"-boost" | b"-texres" | b"-imfchan" | b"-type" => split_word(after).1,
             _ => break,
         };
     }
-    map.name = name_of(rest).trim_matches('"').to_owned();
+    map.name = decode_name(rest).trim_matches('"').to_owned();
     (!map.name.is_empty()).then_some(map)
 }
 
-/// Reads one to three numbers; the last word of the line is never taken, it is the file's name.
-fn up_to_three<'a>(mut rest: &'a [u8], values: &mut [f64; 2]) -> &'a [u8] {
+/// Parses one to three numbers; keeps the first two. Never consumes the last word of the line, which is the file name.
+fn parse_up_to_three<'a>(mut rest: &'a [u8], values: &mut [f64; 2]) -> &'a [u8] {
     for k in 0..3 {
         let (word, after) = split_word(rest);
-        let Some(value) = number(word).filter(|v| v.is_finite() && !after.is_empty()) else { break };
+        let Some(value) = parse_number(word).filter(|v| v.is_finite() && !after.is_empty()) else { break };
         if let Some(slot) = values.get_mut(k) {
             *slot = value;
         }
@@ -156,10 +157,11 @@ fn up_to_three<'a>(mut rest: &'a [u8], values: &mut [f64; 2]) -> &'a [u8] {
     rest
 }
 
-fn beside_library(mut map: MapStatement, prefix: &str, folder: &mut AssetFolder) -> MapStatement {
-    let beside = format!("{prefix}/{}", map.name);
-    if !prefix.is_empty() && folder.find(&beside).is_ok() {
-        map.name = beside;
+/// Prefers an image in the library's folder to one in the document's folder.
+fn prefer_library_folder(mut map: TextureMap, prefix: &str, folder: &mut AssetFolder) -> TextureMap {
+    let name = format!("{prefix}/{}", map.name);
+    if !prefix.is_empty() && folder.find(&name).is_ok() {
+        map.name = name;
     }
     map
 }
@@ -169,7 +171,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn options_of_maps_are_told_from_their_names() {
+    fn texture_map_options_are_separated_from_the_file_name() {
         for (line, name, clamp, scale, offset) in [
             ("a b.png", "a b.png", false, [1.0, 1.0], [0.0, 0.0]),
             ("-clamp on a.png", "a.png", true, [1.0, 1.0], [0.0, 0.0]),
@@ -178,9 +180,9 @@ mod tests {
             ("-mm 0 1 -blendu off -texres 512 -imfchan m a.png", "a.png", false, [1.0, 1.0], [0.0, 0.0]),
             ("-x.png", "-x.png", false, [1.0, 1.0], [0.0, 0.0]),
         ] {
-            let expected = MapStatement { name: name.into(), clamp, scale, offset };
-            assert_eq!(map_statement(line.as_bytes()), Some(expected), "{line}");
+            let expected = TextureMap { name: name.into(), clamp, scale, offset };
+            assert_eq!(parse_texture_map(line.as_bytes()), Some(expected), "{line}");
         }
-        assert_eq!(map_statement(b"-clamp on"), None);
+        assert_eq!(parse_texture_map(b"-clamp on"), None);
     }
 }

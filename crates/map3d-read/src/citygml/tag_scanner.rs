@@ -1,18 +1,17 @@
-//! A quick look at the tags of a document, without its text and without checks: what is not well-formed is found in the second pass.
+//! Scans the tags of a document quickly, without its text and without checks. The second pass reports malformed XML.
 
 use std::io::{self, BufRead, Read};
 
 use memchr::{memchr, memchr3, memmem};
 
-use crate::text::Input;
+use crate::text_input::TextInput;
 
 const BUFFER_BYTES: usize = 1 << 17;
-/// A longer tag or comment is not looked at; the second pass meets it too.
+/// Scanning ends at a longer tag or comment.
 const MAX_TAG_BYTES: usize = 1 << 24;
 
-/// What was found. The text of a start tag is at hand until the next step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Tag {
+pub enum TagKind {
     Start,
     Empty,
     End,
@@ -20,55 +19,55 @@ pub enum Tag {
     Doctype,
 }
 
-/// Tags one after the other. Reading on from it (`BufRead`) begins at the tag that was found last, itself included.
-pub struct Scanner {
-    source: Input,
+/// Returns the tags one after another. As a `BufRead`, continues with the current tag.
+pub struct TagScanner {
+    source: TextInput,
     buffer: Vec<u8>,
     start: usize,
     end: usize,
-    /// Bytes of the tag that was found last.
+    /// Length of the current tag.
     tag_bytes: usize,
 }
 
-impl Scanner {
-    pub fn new(source: Input) -> Self {
+impl TagScanner {
+    pub fn new(source: TextInput) -> Self {
         Self { source, buffer: vec![0; BUFFER_BYTES], start: 0, end: 0, tag_bytes: 0 }
     }
 
-    /// The next tag; `None` at the end of the document (or where it breaks off).
-    pub fn next_tag(&mut self) -> io::Result<Option<Tag>> {
+    /// Moves to the next tag; returns `None` at the end of the document or where it is truncated.
+    pub fn next_tag(&mut self) -> io::Result<Option<TagKind>> {
         self.start += std::mem::take(&mut self.tag_bytes);
         loop {
             if !self.skip_to_tag()? {
                 return Ok(None);
             }
-            let head = self.at_least(9)?;
-            let (ending, tag): (&[u8], _) = match head {
+            let head = self.peek(9)?;
+            let (ending, kind): (&[u8], _) = match head {
                 h if h.starts_with(b"<!--") => (b"-->", None),
                 h if h.starts_with(b"<![CDATA[") => (b"]]>", None),
                 h if h.starts_with(b"<?") => (b"?>", None),
-                h if h.starts_with(b"<!") => return Ok(Some(Tag::Doctype)),
-                h if h.starts_with(b"</") => (b">", Some(Tag::End)),
-                _ => (b"", Some(Tag::Start)),
+                h if h.starts_with(b"<!") => return Ok(Some(TagKind::Doctype)),
+                h if h.starts_with(b"</") => (b">", Some(TagKind::End)),
+                _ => (b"", Some(TagKind::Start)),
             };
             let found = self.find(|bytes| match ending {
-                b"" => end_of_tag(bytes),
+                b"" => find_tag_end(bytes),
                 b">" => memchr(b'>', bytes).map(|at| at + 1),
                 _ => memmem::find(bytes, ending).map(|at| at + ending.len()),
             })?;
             let Some(length) = found else { return Ok(None) };
-            match tag {
+            match kind {
                 None => self.start += length,
-                Some(tag) => {
+                Some(kind) => {
                     self.tag_bytes = length;
-                    let empty = tag == Tag::Start && self.buffer[self.start + length - 2] == b'/';
-                    return Ok(Some(if empty { Tag::Empty } else { tag }));
+                    let is_empty = kind == TagKind::Start && self.buffer[self.start + length - 2] == b'/';
+                    return Ok(Some(if is_empty { TagKind::Empty } else { kind }));
                 }
             }
         }
     }
 
-    /// What stands between the brackets of the start tag that was found last: name and attributes.
+    /// Returns the name and attributes of the current tag, without brackets.
     pub fn tag(&self) -> &[u8] {
         let tag = &self.buffer[self.start..self.start + self.tag_bytes];
         let tag = tag.strip_prefix(b"<").unwrap_or(tag);
@@ -76,7 +75,7 @@ impl Scanner {
         tag.strip_suffix(b"/").unwrap_or(tag)
     }
 
-    /// Puts a `<` at the beginning of the buffer; false at the end of the document.
+    /// Moves to the next `<`; returns false at the end of the document.
     fn skip_to_tag(&mut self) -> io::Result<bool> {
         loop {
             match memchr(b'<', &self.buffer[self.start..self.end]) {
@@ -86,32 +85,32 @@ impl Scanner {
                 }
                 None => self.start = self.end,
             }
-            if self.more()? == 0 {
+            if self.read_more()? == 0 {
                 return Ok(false);
             }
         }
     }
 
-    /// The bytes at hand, this many if the document has them.
-    fn at_least(&mut self, n: usize) -> io::Result<&[u8]> {
-        while self.end - self.start < n && self.more()? > 0 {}
+    /// Returns the buffered bytes: at least `n`, unless the document ends.
+    fn peek(&mut self, n: usize) -> io::Result<&[u8]> {
+        while self.end - self.start < n && self.read_more()? > 0 {}
         Ok(&self.buffer[self.start..self.end])
     }
 
-    /// Reads on until `find` finds something in the bytes at hand.
+    /// Reads more bytes until `find` returns a position in the buffered bytes.
     fn find(&mut self, find: impl Fn(&[u8]) -> Option<usize>) -> io::Result<Option<usize>> {
         loop {
             if let Some(at) = find(&self.buffer[self.start..self.end]) {
                 return Ok(Some(at));
             }
-            if self.end - self.start > MAX_TAG_BYTES || self.more()? == 0 {
+            if self.end - self.start > MAX_TAG_BYTES || self.read_more()? == 0 {
                 return Ok(None);
             }
         }
     }
 
-    /// Reads more behind the bytes at hand, which move to the front; the buffer grows when they fill it.
-    fn more(&mut self) -> io::Result<usize> {
+    /// Moves the buffered bytes to the front and reads more; doubles the buffer when it is full.
+    fn read_more(&mut self) -> io::Result<usize> {
         self.buffer.copy_within(self.start..self.end, 0);
         (self.start, self.end) = (0, self.end - self.start);
         if self.end == self.buffer.len() {
@@ -123,8 +122,8 @@ impl Scanner {
     }
 }
 
-/// Behind the `>` that is not in quotes.
-fn end_of_tag(bytes: &[u8]) -> Option<usize> {
+/// Returns the position after the first `>` outside quotes.
+fn find_tag_end(bytes: &[u8]) -> Option<usize> {
     let mut at = 0;
     loop {
         at += memchr3(b'>', b'"', b'\'', &bytes[at..])?;
@@ -135,7 +134,7 @@ fn end_of_tag(bytes: &[u8]) -> Option<usize> {
     }
 }
 
-impl Read for Scanner {
+impl Read for TagScanner {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         let n = self.fill_buf()?.read(out)?;
         self.consume(n);
@@ -143,10 +142,10 @@ impl Read for Scanner {
     }
 }
 
-impl BufRead for Scanner {
+impl BufRead for TagScanner {
     fn fill_buf(&mut self) -> io::Result<&[u8]> {
         self.tag_bytes = 0;
-        self.at_least(1)
+        self.peek(1)
     }
 
     fn consume(&mut self, n: usize) {

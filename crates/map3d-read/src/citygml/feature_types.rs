@@ -1,28 +1,28 @@
-//! What the elements of CityGML are to us.
+//! Classifies CityGML feature types (element names): kind, class rank, default colour, class name.
 
 use map3d_base::asset::Rank;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// An object with an id and attributes of its own.
+pub enum FeatureKind {
+    /// A city object with its own id and attributes.
     Object,
-    /// An object that is a piece of the object above it.
+    /// A city object that is part of its parent object.
     Part,
-    /// A wall, a roof, ... of the object above it.
+    /// A boundary surface of the parent object: wall, roof, traffic area, …
     Surface,
     /// A door or window.
     Opening,
-    /// A balcony, chimney, dormer, ...
+    /// A balcony, chimney, dormer, …
     Installation,
-    /// Inside a building: not drawn.
+    /// Inside a building; not converted.
     Interior,
-    /// Not of CityGML: what it holds is looked through.
+    /// Not a CityGML feature type, but may contain features.
     Unknown,
 }
 
-pub fn kind_of(local: &str) -> Kind {
-    match local {
-        "BuildingPart" | "BridgePart" | "TunnelPart" => Kind::Part,
+pub fn classify_feature(type_name: &str) -> FeatureKind {
+    match type_name {
+        "BuildingPart" | "BridgePart" | "TunnelPart" => FeatureKind::Part,
         "Building"
         | "Bridge"
         | "Tunnel"
@@ -39,7 +39,7 @@ pub fn kind_of(local: &str) -> Kind {
         | "GenericCityObject"
         | "CityObjectGroup"
         | "ReliefFeature"
-        | "Waterway" => Kind::Object,
+        | "Waterway" => FeatureKind::Object,
         "WallSurface"
         | "RoofSurface"
         | "GroundSurface"
@@ -54,10 +54,10 @@ pub fn kind_of(local: &str) -> Kind {
         | "TINRelief"
         | "MassPointRelief"
         | "BreaklineRelief"
-        | "RasterRelief" => Kind::Surface,
-        "Window" | "Door" | "WindowSurface" | "DoorSurface" => Kind::Opening,
+        | "RasterRelief" => FeatureKind::Surface,
+        "Window" | "Door" | "WindowSurface" | "DoorSurface" => FeatureKind::Opening,
         "BuildingInstallation" | "BridgeInstallation" | "TunnelInstallation" | "BridgeConstructionElement" | "BuildingConstructiveElement" => {
-            Kind::Installation
+            FeatureKind::Installation
         }
         "Room"
         | "BuildingRoom"
@@ -71,34 +71,39 @@ pub fn kind_of(local: &str) -> Kind {
         | "IntTunnelInstallation"
         | "InteriorWallSurface"
         | "CeilingSurface"
-        | "FloorSurface" => Kind::Interior,
-        _ => Kind::Unknown,
+        | "FloorSurface" => FeatureKind::Interior,
+        _ => FeatureKind::Unknown,
     }
 }
 
-/// Class rank of the surfaces of an object.
-pub fn rank_of_object(local: &str) -> Rank {
-    match local {
+/// Returns the class rank of a city object's surfaces.
+pub fn rank_object(type_name: &str) -> Rank {
+    match type_name {
         "Road" | "Railway" | "Track" | "Square" | "TransportationComplex" | "WaterBody" | "Waterway" => Rank::Road,
         "LandUse" | "ReliefFeature" => Rank::Terrain,
         _ => Rank::Other,
     }
 }
 
-/// Class rank of a feature below one of rank `above`.
-pub fn rank_below(kind: Kind, local: &str, above: Rank) -> Rank {
+/// Returns the class rank of a feature from its kind, type and parent's rank.
+pub fn rank_feature(kind: FeatureKind, type_name: &str, parent: Rank) -> Rank {
     match kind {
-        Kind::Object | Kind::Part => rank_of_object(local),
-        Kind::Opening => Rank::Opening,
-        Kind::Installation => Rank::Installation,
-        Kind::Surface if local == "GroundSurface" && above == Rank::Other => Rank::Ground,
-        Kind::Surface | Kind::Interior | Kind::Unknown => above,
+        FeatureKind::Object | FeatureKind::Part => rank_object(type_name),
+        FeatureKind::Opening => Rank::Opening,
+        FeatureKind::Installation => Rank::Installation,
+        FeatureKind::Surface if type_name == "GroundSurface" && parent == Rank::Other => Rank::Ground,
+        FeatureKind::Surface | FeatureKind::Interior | FeatureKind::Unknown => parent,
     }
 }
 
-/// Colours (sRGB) of surfaces for which the document gives none.
-pub fn default_color(local: &str) -> Option<(&'static str, [f32; 3])> {
-    Some(match local {
+/// A material for surfaces without an appearance. `color`: sRGB.
+pub struct DefaultMaterial {
+    pub name: &'static str,
+    pub color: [f32; 3],
+}
+
+pub fn find_default_material(type_name: &str) -> Option<DefaultMaterial> {
+    let (name, color) = match type_name {
         "RoofSurface" => ("default roof", [0.72, 0.42, 0.35]),
         "GroundSurface" => ("default ground", [0.6, 0.58, 0.55]),
         "Window" | "WindowSurface" => ("default window", [0.55, 0.66, 0.76]),
@@ -108,14 +113,15 @@ pub fn default_color(local: &str) -> Option<(&'static str, [f32; 3])> {
         "PlantCover" | "SolitaryVegetationObject" | "AuxiliaryTrafficArea" => ("default vegetation", [0.42, 0.58, 0.35]),
         "LandUse" | "ReliefFeature" | "TINRelief" => ("default terrain", [0.66, 0.68, 0.58]),
         _ => return None,
-    })
+    };
+    Some(DefaultMaterial { name, color })
 }
 
-/// `SolitaryVegetationObject` → `solitary_vegetation_object`.
-pub fn class_of(local: &str) -> String {
-    let mut class = String::with_capacity(local.len() + 4);
+/// Converts a type name to a class name: `SolitaryVegetationObject` → `solitary_vegetation_object`.
+pub fn to_class_name(type_name: &str) -> String {
+    let mut class = String::with_capacity(type_name.len() + 4);
     let mut previous_lower = false;
-    for c in local.chars() {
+    for c in type_name.chars() {
         if c.is_uppercase() && previous_lower {
             class.push('_');
         }
@@ -130,15 +136,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn classes_are_words_in_lower_case() {
-        for (local, class) in [("Building", "building"), ("BuildingPart", "building_part"), ("TINRelief", "tinrelief"), ("LandUse", "land_use")] {
-            assert_eq!(class_of(local), class);
+    fn class_names_are_snake_case() {
+        for (type_name, class) in [("Building", "building"), ("BuildingPart", "building_part"), ("TINRelief", "tinrelief"), ("LandUse", "land_use")] {
+            assert_eq!(to_class_name(type_name), class);
         }
     }
 
     #[test]
     fn ranks_follow_the_glossary() {
-        for (local, above, rank) in [
+        for (type_name, parent, rank) in [
             ("Window", Rank::Other, Rank::Opening),
             ("Door", Rank::Installation, Rank::Opening),
             ("RoofSurface", Rank::Installation, Rank::Installation),
@@ -148,7 +154,7 @@ mod tests {
             ("TrafficArea", Rank::Road, Rank::Road),
             ("TINRelief", Rank::Terrain, Rank::Terrain),
         ] {
-            assert_eq!(rank_below(kind_of(local), local, above), rank, "{local}");
+            assert_eq!(rank_feature(classify_feature(type_name), type_name, parent), rank, "{type_name}");
         }
     }
 }

@@ -1,8 +1,8 @@
-//! City models in a few words.
+//! Builds small city models.
 
 use map3d_read::{Format, ReadOptions};
 
-use super::{Folder, Reading, read_with};
+use super::{Folder, ParsedDocument, read_with};
 
 pub fn model(body: &str) -> String {
     format!(
@@ -20,13 +20,13 @@ pub fn building(body: &str) -> String {
     model(&format!(r#"<core:cityObjectMember><bldg:Building gml:id="b1">{body}</bldg:Building></core:cityObjectMember>"#))
 }
 
-pub fn try_text(text: &str, options: &ReadOptions) -> map3d_base::Result<Reading> {
+pub fn try_text(text: &str, options: &ReadOptions) -> map3d_base::Result<ParsedDocument> {
     let folder = Folder::new("citygml");
     let path = folder.put("town.gml", text);
     read_with(&path, Format::CityGml, options)
 }
 
-pub fn read_text(text: &str) -> Reading {
+pub fn read_text(text: &str) -> ParsedDocument {
     try_text(text, &ReadOptions::default()).expect("readable")
 }
 
@@ -46,7 +46,7 @@ pub fn member(inner: &str) -> String {
     format!("<gml:surfaceMember>{inner}</gml:surfaceMember>")
 }
 
-/// A square of area 4 at height z.
+/// Returns a square with area 4 at height z.
 pub fn square(id: &str, z: u32) -> String {
     polygon(id, &format!("0 0 {z} 2 0 {z} 2 2 {z} 0 2 {z} 0 0 {z}"))
 }

@@ -1,7 +1,8 @@
-//! Documents written to a folder of their own and read to the end.
+//! Writes documents to temporary folders and reads them completely.
 #![allow(dead_code)]
 
-pub mod city;
+pub mod city_model;
+pub mod random;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,9 +11,9 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use map3d_base::asset::{AssetReport, Batch, Instance, Material, Object, Rank};
 use map3d_base::vec3::{length, triangle_normal};
 use map3d_base::{Error, Result, Vec3};
-use map3d_read::{Format, ReadOptions, Texture, open};
+use map3d_read::{Format, ImageFile, ReadOptions, open};
 
-/// A folder that goes away with its test.
+/// A temporary folder, removed when dropped.
 pub struct Folder(pub PathBuf);
 
 impl Folder {
@@ -32,9 +33,9 @@ impl Folder {
         path
     }
 
-    /// A PNG of one colour (red, green, blue, alpha).
+    /// Writes a PNG of one colour (red, green, blue, alpha).
     pub fn put_png(&self, name: &str, width: u32, height: u32, texel: [u8; 4]) -> PathBuf {
-        self.put(name, png(width, height, texel))
+        self.put(name, encode_png(width, height, texel))
     }
 }
 
@@ -44,7 +45,8 @@ impl Drop for Folder {
     }
 }
 
-pub fn png(width: u32, height: u32, texel: [u8; 4]) -> Vec<u8> {
+/// Encodes a PNG of one colour.
+pub fn encode_png(width: u32, height: u32, texel: [u8; 4]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(png::ColorType::Rgba);
@@ -54,19 +56,19 @@ pub fn png(width: u32, height: u32, texel: [u8; 4]) -> Vec<u8> {
     bytes
 }
 
-/// All that a document gave.
+/// The complete contents of a document.
 #[derive(Debug)]
-pub struct Reading {
+pub struct ParsedDocument {
     pub batches: Vec<Batch>,
     pub objects: Vec<Object>,
     pub materials: Vec<Material>,
     pub instances: Vec<Instance>,
-    pub textures: Vec<Texture>,
+    pub textures: Vec<ImageFile>,
     pub srs_name: Option<String>,
     pub report: AssetReport,
 }
 
-/// One triangle with all that belongs to it.
+/// One triangle and its attributes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Triangle {
     pub corners: [Vec3; 3],
@@ -77,15 +79,15 @@ pub struct Triangle {
     pub prototype: u32,
 }
 
-pub fn read_with(path: &Path, format: Format, options: &ReadOptions) -> Result<Reading> {
+pub fn read_with(path: &Path, format: Format, options: &ReadOptions) -> Result<ParsedDocument> {
     let mut reader = open(path, format, options)?;
     let mut batches = Vec::new();
     while let Some(batch) = reader.next_batch()? {
-        check(&batch);
+        check_batch(&batch);
         batches.push(batch);
     }
-    assert!(reader.next_batch()?.is_none(), "the end stays the end");
-    let reading = Reading {
+    assert!(reader.next_batch()?.is_none(), "no batch after the end");
+    let document = ParsedDocument {
         batches,
         objects: reader.objects().to_vec(),
         materials: reader.materials().to_vec(),
@@ -94,11 +96,11 @@ pub fn read_with(path: &Path, format: Format, options: &ReadOptions) -> Result<R
         srs_name: reader.srs_name().map(str::to_owned),
         report: reader.report().clone(),
     };
-    reading.check_indices();
-    Ok(reading)
+    document.check_indices();
+    Ok(document)
 }
 
-fn check(batch: &Batch) {
+fn check_batch(batch: &Batch) {
     let n = batch.triangles.len();
     assert!(n > 0, "batches are not empty");
     assert_eq!([batch.materials.len(), batch.objects.len(), batch.ranks.len()], [n; 3]);
@@ -107,7 +109,7 @@ fn check(batch: &Batch) {
     assert!(batch.triangles.as_flattened().iter().all(|v| (*v as usize) < batch.positions.len()));
 }
 
-impl Reading {
+impl ParsedDocument {
     fn check_indices(&self) {
         for batch in &self.batches {
             assert!(batch.materials.iter().all(|m| (*m as usize) < self.materials.len()), "materials exist");
@@ -127,8 +129,8 @@ impl Reading {
     }
 
     pub fn triangles(&self) -> Vec<Triangle> {
-        let of_batch = |b: &Batch| -> Vec<Triangle> {
-            let one = |(i, t): (usize, &[u32; 3])| Triangle {
+        let batch_triangles = |b: &Batch| -> Vec<Triangle> {
+            let triangle = |(i, t): (usize, &[u32; 3])| Triangle {
                 corners: t.map(|v| b.positions[v as usize]),
                 uvs: b.uvs.get(i).copied(),
                 material: b.materials[i],
@@ -136,9 +138,9 @@ impl Reading {
                 rank: b.ranks[i],
                 prototype: b.prototype,
             };
-            b.triangles.iter().enumerate().map(one).collect()
+            b.triangles.iter().enumerate().map(triangle).collect()
         };
-        self.batches.iter().flat_map(of_batch).collect()
+        self.batches.iter().flat_map(batch_triangles).collect()
     }
 
     pub fn count(&self) -> usize {
@@ -146,13 +148,15 @@ impl Reading {
     }
 
     pub fn area(&self) -> f64 {
-        self.triangles().iter().map(|t| area(t.corners)).sum()
+        self.triangles().iter().map(|t| compute_area(t.corners)).sum()
     }
 
+    /// Returns the number of warnings whose reason contains a text.
     pub fn warned(&self, reason: &str) -> u64 {
         self.report.warnings.iter().filter(|w| w.reason.contains(reason)).map(|w| w.count).sum()
     }
 
+    /// Returns the number of skipped parts whose reason contains a text.
     pub fn skipped(&self, reason: &str) -> u64 {
         self.report.skipped.iter().filter(|(r, _)| r.contains(reason)).map(|(_, n)| n).sum()
     }
@@ -162,7 +166,7 @@ impl Reading {
     }
 }
 
-pub fn area(corners: [Vec3; 3]) -> f64 {
+pub fn compute_area(corners: [Vec3; 3]) -> f64 {
     length(triangle_normal(corners)) / 2.0
 }
 

@@ -1,12 +1,12 @@
-//! The table of materials: equal ones are stored once.
+//! The document's material table: equal materials are stored once.
 
 use std::collections::HashMap;
 
 use map3d_base::asset::{Material, Wrap};
 
-/// Everything that makes two materials differ in a picture.
+/// The properties by which two materials are compared: all but the name. Floats are compared by their bits.
 #[derive(Clone, PartialEq, Eq, Hash)]
-struct Look {
+struct MaterialKey {
     diffuse: [u32; 4],
     texture: Option<String>,
     alpha: Option<String>,
@@ -17,33 +17,33 @@ struct Look {
 #[derive(Default)]
 pub struct MaterialTable {
     materials: Vec<Material>,
-    by_look: HashMap<Look, u32>,
+    by_key: HashMap<MaterialKey, u32>,
 }
 
 impl MaterialTable {
-    pub fn all(&self) -> &[Material] {
+    pub fn materials(&self) -> &[Material] {
         &self.materials
     }
 
-    /// Index of a material that looks like this; the first one's name is kept.
-    pub fn index_of(&mut self, material: Material) -> u32 {
-        let look = Look {
+    /// Returns the index of an equal material, or adds this one. The name of the first of equal materials is kept.
+    pub fn add(&mut self, material: Material) -> u32 {
+        let key = MaterialKey {
             diffuse: material.diffuse.map(f32::to_bits),
             texture: material.texture.clone(),
             alpha: material.alpha.clone(),
             wrap: material.wrap,
             border: material.border.map(f32::to_bits),
         };
-        *self.by_look.entry(look).or_insert_with(|| {
+        *self.by_key.entry(key).or_insert_with(|| {
             self.materials.push(material);
             self.materials.len() as u32 - 1
         })
     }
 }
 
-/// Subtracts from a triangle's texture coordinates (float64, before they lose digits) what its wrap mode lets be subtracted:
-/// whole numbers when the image repeats, even ones when it is mirrored, nothing otherwise.
-pub fn shifted_uvs(uvs: [[f64; 2]; 3], wrap: Wrap) -> [[f32; 2]; 3] {
+/// Shifts a triangle's texture coordinates towards zero by a multiple of the texture's period, then rounds them to float32.
+/// The period is 1 for a repeated image and 2 for a mirrored one; other wrap modes do not shift.
+pub fn shift_uvs(uvs: [[f64; 2]; 3], wrap: Wrap) -> [[f32; 2]; 3] {
     let period = match wrap {
         Wrap::Wrap => 1.0,
         Wrap::Mirror => 2.0,

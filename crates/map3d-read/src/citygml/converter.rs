@@ -1,0 +1,299 @@
+//! Converts parsed city objects to batches, objects and instances.
+
+use std::collections::VecDeque;
+
+use map3d_base::asset::{Batch, Instance, Object, Rank};
+use map3d_base::{Result, Vec3};
+
+use super::appearance::Appearances;
+use super::city_object::{CityObject, Representation};
+use super::feature_types::to_class_name;
+use super::geometry_arena::NodeId;
+use super::ids::{self, Id, IdSet};
+use super::implicit_geometry::PrototypeSource;
+use super::lod_selection::{representations_at, select_lods};
+use super::material_resolver::MaterialResolver;
+use super::polygons::{CollectedPolygons, LinkedGeometry, OrientedPolygon, UnresolvedXLink, VisitState, XLinkIndex, collect_polygons};
+use super::prototype_table::{PrototypePlacement, PrototypeTable, read_library_object};
+use super::shared_geometry::{DeferredXLink, SharedGeometry};
+use super::tessellate::{MaterialSources, Tessellator, ThematicSurface};
+use crate::asset_folder::AssetFolder;
+use crate::detect::{Format, detect_format};
+use crate::options::ReadOptions;
+use crate::report_builder::{LimitCheck, ReportBuilder};
+
+const BATCH_TRIANGLES: usize = 1 << 14;
+
+pub struct FeatureConverter {
+    pub resolver: MaterialResolver,
+    tessellator: Tessellator,
+    /// Appearances outside city objects.
+    document_appearances: Appearances,
+    /// Ids that other city objects refer to.
+    referenced_ids: IdSet,
+    lod: Option<u8>,
+    shared: SharedGeometry,
+    pub objects: Vec<Object>,
+    prototypes: PrototypeTable,
+    /// Completed batches.
+    pub batches: VecDeque<Batch>,
+}
+
+/// The state of one city object's conversion.
+struct ConversionContext<'a> {
+    city_object: &'a mut CityObject,
+    xlinks: XLinkIndex,
+    visits: Vec<VisitState>,
+    /// For each feature that is an object or part: its index in the asset.
+    object_numbers: Vec<u32>,
+}
+
+impl ConversionContext<'_> {
+    /// Returns the index in the asset of the object that a feature belongs to.
+    fn object_number(&self, feature: u32) -> u32 {
+        self.object_numbers[self.city_object.find_object(feature) as usize]
+    }
+}
+
+impl FeatureConverter {
+    /// `scale`: metres per unit of each axis; `lod`: the requested level of detail.
+    pub fn new(
+        folder: AssetFolder,
+        options: &ReadOptions,
+        scale: Vec3,
+        lod: Option<u8>,
+        document_appearances: Appearances,
+        referenced_ids: IdSet,
+    ) -> Self {
+        Self {
+            resolver: MaterialResolver::new(folder, options.clone()),
+            tessellator: Tessellator::new(scale, options.clone()),
+            document_appearances,
+            referenced_ids,
+            lod,
+            shared: SharedGeometry::default(),
+            objects: Vec::new(),
+            prototypes: PrototypeTable::default(),
+            batches: VecDeque::new(),
+        }
+    }
+
+    /// Converts a city object at its selected level of detail. Surfaces, openings and installations come before objects and parts: a polygon that
+    /// both contain gets the class of its surface.
+    pub fn convert(&mut self, city_object: &mut CityObject, report: &mut ReportBuilder) -> Result<()> {
+        if city_object.features.is_empty() {
+            return Ok(());
+        }
+        city_object.appearances.resolve_theme_xlinks();
+        city_object.expose_shared_interiors();
+        let lods = select_lods(city_object, self.lod);
+        let object_numbers = self.add_objects(city_object, &lods);
+        let xlinks = XLinkIndex::build(&city_object.geometry);
+        let visits = vec![VisitState::Unvisited; city_object.geometry.nodes.len()];
+        let mut context = ConversionContext { city_object, xlinks, visits, object_numbers };
+        for objects in [false, true] {
+            for (f, lod) in lods.iter().enumerate() {
+                let feature = &context.city_object.features[f];
+                if feature.is_object() != objects || feature.representations.is_empty() {
+                    continue;
+                }
+                match *lod {
+                    Some(_) if feature.is_interior => report.omit("interior surfaces of a building"),
+                    Some(lod) => self.convert_feature(&mut context, f as u32, lod, report)?,
+                    None => {}
+                }
+            }
+        }
+        self.shared.copy_referenced(&context.city_object.geometry, &context.visits, &self.referenced_ids);
+        self.complete_batch(BATCH_TRIANGLES);
+        Ok(())
+    }
+
+    /// Adds the objects and parts of a city object to the asset; returns their indices by feature.
+    fn add_objects(&mut self, city_object: &mut CityObject, lods: &[Option<u8>]) -> Vec<u32> {
+        let mut numbers = vec![u32::MAX; city_object.features.len()];
+        for f in 0..city_object.features.len() {
+            let feature = &city_object.features[f];
+            let parent = feature.parent.map(|p| numbers[city_object.find_object(p) as usize]);
+            if !feature.is_object() {
+                continue;
+            }
+            numbers[f] = self.objects.len() as u32;
+            let lod = find_object_lod(city_object, lods, f as u32);
+            let feature = &mut city_object.features[f];
+            let class = to_class_name(&feature.type_name);
+            let name = if feature.name.is_empty() { format!("{class}-{}", numbers[f] + 1) } else { std::mem::take(&mut feature.name) };
+            let attributes = std::mem::take(&mut feature.attributes);
+            self.objects.push(Object { name, class, parent, lod, attributes });
+        }
+        numbers
+    }
+
+    fn convert_feature(&mut self, context: &mut ConversionContext, f: u32, lod: u8, report: &mut ReportBuilder) -> Result<()> {
+        let representations: Vec<Representation> = representations_at(&context.city_object.features[f as usize].representations, lod).collect();
+        for representation in representations {
+            match representation {
+                Representation::Surfaces(node) | Representation::RoofEdge(node) => {
+                    let collected = collect_polygons(&context.city_object.geometry, &mut context.visits, node, false);
+                    report.skip_many("geometry that refers to itself", collected.cycles, || "a cycle of references".to_owned())?;
+                    self.tessellate_feature(context, f, &collected.polygons, report)?;
+                    self.defer_xlinks(context, f, &collected.unresolved);
+                }
+                Representation::Implicit(index) => self.convert_implicit_geometry(context, f, index, report)?,
+            }
+        }
+        Ok(())
+    }
+
+    fn tessellate_feature(
+        &mut self,
+        context: &mut ConversionContext,
+        f: u32,
+        polygons: &[OrientedPolygon],
+        report: &mut ReportBuilder,
+    ) -> Result<()> {
+        let object = context.object_number(f);
+        let object_feature = context.city_object.find_object(f);
+        let feature_ids: Vec<Id> = context.city_object.with_ancestors(f).map(|a| context.city_object.features[a as usize].id).collect();
+        let CityObject { features, geometry, appearances, .. } = &mut *context.city_object;
+        let surface = ThematicSurface {
+            object,
+            rank: features[f as usize].rank,
+            type_names: [&features[f as usize].type_name, &features[object_feature as usize].type_name],
+            feature_ids: &feature_ids,
+            object_name: &self.objects[object as usize].name,
+        };
+        let mut sources = MaterialSources { resolver: &mut self.resolver, appearances: [appearances, &mut self.document_appearances] };
+        let geometry = LinkedGeometry { geometry, xlinks: &context.xlinks };
+        polygons.iter().try_for_each(|polygon| self.tessellator.add_polygon(geometry, *polygon, &surface, &mut sources, report))
+    }
+
+    /// Keeps XLinks to geometry of other city objects until the end of the document.
+    fn defer_xlinks(&mut self, context: &ConversionContext, f: u32, unresolved: &[UnresolvedXLink]) {
+        let object = context.object_number(f);
+        let rank = context.city_object.features[f as usize].rank;
+        let defer = |link: &UnresolvedXLink| DeferredXLink { target: link.target, reversed: link.reversed, object, rank };
+        self.shared.deferred.extend(unresolved.iter().map(defer));
+    }
+
+    /// After the last city object: converts geometry that other city objects refer to and that its owner did not convert.
+    pub fn convert_deferred(&mut self, report: &mut ReportBuilder) -> Result<()> {
+        for link in std::mem::take(&mut self.shared.deferred) {
+            let Some(node) = self.shared.geometry.by_id.get(&link.target).copied() else {
+                report.warn("unresolved reference", self.objects[link.object as usize].name.as_str())?;
+                continue;
+            };
+            let collected = collect_polygons(&self.shared.geometry, &mut self.shared.visits, node, link.reversed);
+            self.tessellate_shared(&collected.polygons, link.object, link.rank, report)?;
+        }
+        self.complete_batch(1);
+        Ok(())
+    }
+
+    fn tessellate_shared(&mut self, polygons: &[OrientedPolygon], object: u32, rank: Rank, report: &mut ReportBuilder) -> Result<()> {
+        let object_name = &self.objects[object as usize].name;
+        let surface = ThematicSurface { object, rank, type_names: ["", ""], feature_ids: &[ids::NONE], object_name };
+        let mut no_appearances = Appearances::default();
+        let mut sources = MaterialSources { resolver: &mut self.resolver, appearances: [&mut no_appearances, &mut self.document_appearances] };
+        let geometry = LinkedGeometry { geometry: &self.shared.geometry, xlinks: &XLinkIndex::default() };
+        polygons.iter().try_for_each(|polygon| self.tessellator.add_polygon(geometry, *polygon, &surface, &mut sources, report))
+    }
+
+    /// Queues the current batch if it has at least `min_triangles`, and at least one.
+    fn complete_batch(&mut self, min_triangles: usize) {
+        if self.tessellator.triangle_count() >= min_triangles.max(1) {
+            self.batches.push_back(self.tessellator.take());
+        }
+    }
+
+    /// Adds a placement; converts its prototype if that is new and available now.
+    fn convert_implicit_geometry(&mut self, context: &mut ConversionContext, f: u32, index: u32, report: &mut ReportBuilder) -> Result<()> {
+        let implicit = context.city_object.implicit_geometries[index as usize].clone();
+        let object = context.object_number(f);
+        let key = self.prototypes.build_key(&implicit, &context.city_object.geometry);
+        let instance = Instance { prototype: 0, object, transform: implicit.transform };
+        self.prototypes.placements.push(PrototypePlacement { key, instance });
+        let (got, value) = (self.prototypes.placements.len() as u64, self.resolver.options.max_instances);
+        report.check_limit(LimitCheck { what: "number of instances", got, limit: "max_instances", value })?;
+        if self.prototypes.find(key).is_some() {
+            return Ok(());
+        }
+        match &implicit.prototype {
+            PrototypeSource::Library(name) => self.convert_library_object(name, object, key, report),
+            PrototypeSource::Geometry(node) => match context.city_object.geometry.resolve_xlink(*node) {
+                Some(node) => self.convert_prototype(context, f, key, node, report),
+                None => Ok(()),
+            },
+        }
+    }
+
+    fn convert_prototype(&mut self, context: &mut ConversionContext, f: u32, key: Id, node: NodeId, report: &mut ReportBuilder) -> Result<()> {
+        let geometry = &context.city_object.geometry;
+        let CollectedPolygons { polygons, .. } = collect_polygons(geometry, &mut vec![VisitState::Unvisited; geometry.nodes.len()], node, false);
+        self.complete_batch(1);
+        self.tessellate_feature(context, f, &polygons, report)?;
+        let prototype = self.tessellator.take();
+        self.add_prototype(key, vec![prototype]);
+        Ok(())
+    }
+
+    fn convert_shared_prototype(&mut self, key: Id, node: NodeId, object: u32, report: &mut ReportBuilder) -> Result<()> {
+        let geometry = &self.shared.geometry;
+        let CollectedPolygons { polygons, .. } = collect_polygons(geometry, &mut vec![VisitState::Unvisited; geometry.nodes.len()], node, false);
+        self.complete_batch(1);
+        self.tessellate_shared(&polygons, object, Rank::Other, report)?;
+        let prototype = self.tessellator.take();
+        self.add_prototype(key, vec![prototype]);
+        Ok(())
+    }
+
+    /// Converts a prototype in its own file; only OBJ is supported.
+    fn convert_library_object(&mut self, name: &str, object: u32, key: Id, report: &mut ReportBuilder) -> Result<()> {
+        let file = match self.resolver.folder.find(name) {
+            Ok(file) => file,
+            Err(error) => return report.warn(&format!("library object: {}", error.reason()), name),
+        };
+        if !matches!(detect_format(&file.path), Ok(Format::Obj)) {
+            return report.warn("library object: unsupported format", name);
+        }
+        let batches = read_library_object(&file.path, object, &mut self.resolver)?;
+        self.add_prototype(key, batches);
+        Ok(())
+    }
+
+    fn add_prototype(&mut self, key: Id, mut batches: Vec<Batch>) {
+        self.prototypes.register(key, &mut batches);
+        self.batches.extend(batches.into_iter().filter(|b| !b.triangles.is_empty()));
+    }
+
+    /// After the last city object: converts prototypes that are defined in other city objects, then returns the instances with their prototypes'
+    /// numbers.
+    pub fn finish_instances(&mut self, report: &mut ReportBuilder) -> Result<Vec<Instance>> {
+        let placements = std::mem::take(&mut self.prototypes.placements);
+        for PrototypePlacement { key, instance } in &placements {
+            let node = self.shared.geometry.by_id.get(key).copied();
+            if let (Some(node), None) = (node, self.prototypes.find(*key)) {
+                self.convert_shared_prototype(*key, node, instance.object, report)?;
+            }
+        }
+        let mut instances = Vec::with_capacity(placements.len());
+        for PrototypePlacement { key, instance } in placements {
+            match self.prototypes.find(key) {
+                Some(prototype) => instances.push(Instance { prototype, ..instance }),
+                None => report.skip("implicit geometry without a prototype", || self.objects[instance.object as usize].name.clone())?,
+            }
+        }
+        Ok(instances)
+    }
+}
+
+/// Returns the finest level of detail at which an object's features are converted.
+fn find_object_lod(city_object: &CityObject, lods: &[Option<u8>], object: u32) -> Option<String> {
+    let feature_lod = |f: u32| {
+        let feature = &city_object.features[f as usize];
+        let lod = lods[f as usize].filter(|l| feature.representations.iter().any(|r| r.lod == *l));
+        lod.filter(|_| !feature.is_interior && city_object.find_object(f) == object)
+    };
+    let finest = (object..city_object.features.len() as u32).filter_map(feature_lod).max();
+    finest.map(|lod| lod.to_string())
+}

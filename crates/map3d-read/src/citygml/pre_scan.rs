@@ -1,0 +1,142 @@
+//! The first pass: collects what must be known before the first city object is converted.
+//!
+//! Memory: appearances outside city objects in their compact form (about 16 bytes per vertex of a textured ring, limited by
+//! `max_appearance_bytes`), and 8 bytes per id that another city object refers to.
+
+use std::borrow::Cow;
+use std::path::Path;
+
+use map3d_base::{Error, Result};
+
+use super::appearance::{Appearances, ThemeSelection};
+use super::appearance_parser::AppearanceParser;
+use super::ids::{IdSet, Reference, hash_id, parse_reference};
+use super::tag_scanner::{TagKind, TagScanner};
+use super::xml_reader::{XmlEvent, XmlReader, local_part, parse_attributes, unescape_lossy, unsupported};
+use crate::options::ReadOptions;
+use crate::report_builder::ReportBuilder;
+use crate::text_input::open_xml;
+
+#[derive(Default)]
+pub struct PreScan {
+    pub srs_name: Option<String>,
+    pub theme: ThemeSelection,
+    /// Appearances outside city objects.
+    pub appearances: Appearances,
+    /// Ids that a city object refers to but does not define.
+    pub referenced_ids: IdSet,
+}
+
+impl PreScan {
+    /// Scans the whole document. A truncated document is scanned up to its end.
+    pub fn run(path: &Path, options: &ReadOptions, report: &mut ReportBuilder) -> Result<Self> {
+        let io = |e| Error::storage(path, e);
+        let mut scan = Self { theme: ThemeSelection { requested: options.theme.clone(), ..ThemeSelection::default() }, ..Self::default() };
+        let mut scanner = TagScanner::new(open_xml(path)?);
+        let mut references = ObjectReferences::default();
+        let (mut depth, mut has_elements) = (0usize, false);
+        while let Some(kind) = scanner.next_tag().map_err(io)? {
+            match kind {
+                TagKind::Doctype => return Err(unsupported(path, "a document type definition")),
+                TagKind::End => depth = depth.saturating_sub(1),
+                TagKind::Start | TagKind::Empty => {
+                    has_elements = true;
+                    let text = std::str::from_utf8(scanner.tag()).map_or_else(|_| String::from_utf8_lossy(scanner.tag()), Cow::Borrowed);
+                    let (name, attributes) = text.split_at(text.bytes().position(|b| b.is_ascii_whitespace()).unwrap_or(text.len()));
+                    let name = local_part(name);
+                    if depth == 0 && name != "CityModel" {
+                        return Err(Error::format(path, format!("the root element is {name:?}; expected CityModel")));
+                    }
+                    scan.scan_attributes(attributes, &mut references, report);
+                    let parse: Option<Parse> = match (kind, name) {
+                        (TagKind::Start, "appearanceMember") if depth == 1 => Some(Self::parse_appearance_member),
+                        (TagKind::Start, "theme") => Some(Self::parse_theme),
+                        _ => None,
+                    };
+                    match parse {
+                        Some(parse) => scanner = parse(&mut scan, scanner, options, report)?,
+                        None => depth += usize::from(kind == TagKind::Start),
+                    }
+                }
+            }
+            if depth <= 1 {
+                references.finish_object(&mut scan.referenced_ids);
+            }
+        }
+        if !has_elements {
+            return Err(Error::format(path, "no XML element; expected a CityGML document"));
+        }
+        references.finish_object(&mut scan.referenced_ids);
+        scan.appearances.resolve_theme_xlinks();
+        Ok(scan)
+    }
+
+    fn scan_attributes(&mut self, attributes: &str, references: &mut ObjectReferences, report: &mut ReportBuilder) {
+        for (name, value) in parse_attributes(attributes) {
+            match name {
+                "id" => {
+                    references.ids.insert(hash_id(&unescape_lossy(value)));
+                }
+                "href" => {
+                    if let Reference::Internal(id) = parse_reference(&unescape_lossy(value)) {
+                        references.targets.push(id);
+                    }
+                }
+                "srsName" => self.register_srs_name(&unescape_lossy(value), report),
+                _ => {}
+            }
+        }
+    }
+
+    fn register_srs_name(&mut self, name: &str, report: &mut ReportBuilder) {
+        match &self.srs_name {
+            None if !name.trim().is_empty() => self.srs_name = Some(name.to_owned()),
+            Some(first) if first.trim() != name.trim() => report.note("more than one coordinate system; using the first", name),
+            _ => {}
+        }
+    }
+
+    /// Parses the current appearanceMember; the scanner continues after it. The second pass reports a malformed one.
+    fn parse_appearance_member(&mut self, scanner: TagScanner, options: &ReadOptions, report: &mut ReportBuilder) -> Result<TagScanner> {
+        let mut xml = XmlReader::new(scanner, report.path());
+        let max_bytes = options.max_appearance_bytes;
+        let (values, text) = (&mut Vec::new(), &mut String::new());
+        let parsed = xml.next_event().and_then(|_| {
+            AppearanceParser { xml: &mut xml, report, appearances: &mut self.appearances, theme: &mut self.theme, max_bytes, values, text }
+                .read_property()
+        });
+        match parsed {
+            Err(e) if !xml.is_malformed() => Err(e),
+            _ => Ok(xml.into_inner()),
+        }
+    }
+
+    /// Parses the current theme; the scanner continues after it.
+    fn parse_theme(&mut self, scanner: TagScanner, _: &ReadOptions, report: &mut ReportBuilder) -> Result<TagScanner> {
+        let mut xml = XmlReader::new(scanner, report.path());
+        if let Ok(XmlEvent::Start) = xml.next_event()
+            && let Ok(name) = xml.read_text()
+        {
+            self.theme.register(&name);
+        }
+        Ok(xml.into_inner())
+    }
+}
+
+/// Parses the current element instead of scanning it.
+type Parse = fn(&mut PreScan, TagScanner, &ReadOptions, &mut ReportBuilder) -> Result<TagScanner>;
+
+/// Ids and references in the current city object.
+#[derive(Default)]
+struct ObjectReferences {
+    ids: IdSet,
+    targets: Vec<u64>,
+}
+
+impl ObjectReferences {
+    /// Keeps the references to ids outside the city object, and starts the next one.
+    fn finish_object(&mut self, referenced_ids: &mut IdSet) {
+        referenced_ids.extend(self.targets.drain(..).filter(|t| !self.ids.contains(t)));
+        self.ids.clear();
+    }
+}
