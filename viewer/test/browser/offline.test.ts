@@ -184,15 +184,15 @@ test.each(rows)("the page keeps itself and what is in view: %s", async (name, op
   };
   const before = await open();
   expect(await page.evaluate(async () => [await caches.keys(), (await navigator.serviceWorker.getRegistrations()).length])).toEqual([[], 0]);
-  await page.locator("#keep").click();
-  await page.locator("#offline-keep:enabled").waitFor();
+  await page.locator("#save-offline").click();
+  await page.locator("#offline-save:enabled").waitFor();
   await page.screenshot({ path: `${OUT}/offline-${name}.png` });
-  expect(await page.locator("#offline-note").innerText()).toMatch(/^≈ [\d.,]+.?(MB|Mo) · (room for|Platz für|place pour) /);
+  expect(await page.locator("#offline-note").innerText()).toMatch(/^≈ [\d.,]+.?(MB|Mo) · .*(available|verfügbar|disponibles)$/);
   await page.route(/\/tiles\/.*\/normal\//, async (route) => {
     await new Promise((done) => setTimeout(done, 60));
     await route.continue();
   });
-  await page.locator("#offline-keep").click();
+  await page.locator("#offline-save").click();
   await page.waitForFunction(() => (document.getElementById("offline-progress") as HTMLProgressElement).value > 0.4);
   await page.screenshot({ path: `${OUT}/offline-${name}-working.png` });
   await page.unroute(/\/tiles\/.*\/normal\//);
@@ -208,12 +208,12 @@ test.each(rows)("the page keeps itself and what is in view: %s", async (name, op
     await page.screenshot({ path: `${OUT}/offline-${name}-without.png` });
   });
   await page.locator("#info .close").click();
-  await page.locator("#keep").click();
-  await page.locator("#offline-kept button").waitFor();
-  await page.locator("#offline-keep:enabled").waitFor();
+  await page.locator("#save-offline").click();
+  await page.locator("#offline-areas button").waitFor();
+  await page.locator("#offline-save:enabled").waitFor();
   await page.screenshot({ path: `${OUT}/offline-${name}-kept.png` });
-  await page.locator("#offline-kept button").click();
-  await page.waitForFunction(() => document.querySelector("#offline-kept li") === null);
+  await page.locator("#offline-areas button").click();
+  await page.waitForFunction(() => document.querySelector("#offline-areas li") === null);
   expect(await page.evaluate(() => caches.keys())).toEqual([]);
   expect(problems.filter((text) => !FAILED.test(text))).toEqual([]);
   await page.context().close();
