@@ -7,7 +7,7 @@ function points(count: number, side: number, seed = 3): Float64Array {
 }
 
 describe("groups", () => {
-  test.each([[1, 10], [500, 10], [500, 60], [500, 1e6], [3000, 3]])("of %d points with radius %d part them, within the radius of their first, whose distances are larger", (count, radius) => {
+  test.each([[1, 10], [500, 10], [500, 60], [500, 1e6], [3000, 3]])("%d points with radius %d: groups are a partition, members are within the radius of their seed, seeds are farther apart", (count, radius) => {
     const uv = points(count, 1000);
     const groups = groupPoints(uv, radius);
     const apart = (a: number, b: number): number => Math.hypot((uv[2 * a] as number) - (uv[2 * b] as number), (uv[2 * a + 1] as number) - (uv[2 * b + 1] as number));
