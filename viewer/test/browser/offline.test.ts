@@ -150,11 +150,11 @@ test("without room, without a worker in reach, and without a host that answers, 
     const full = (key: string): Promise<void> => (key.includes("/depth/") ? Promise.reject(new DOMException("no room", "QuotaExceededError")) : Promise.resolve());
     Object.assign(globalThis, { full: () => Object.defineProperty(Cache.prototype, "put", { ...put, value: full }), roomy: () => Object.defineProperty(Cache.prototype, "put", put) });
   });
-  expect(await failed("(full(), map3d.downloadArea(map, { files: [] }))")).toMatch(/^StorageError: the browser could not keep http.*\/depth\/.*\(QuotaExceededError\): its room for this site is used up/);
+  expect(await failed("(full(), map3d.downloadArea(map, { files: [] }))")).toMatch(/^StorageError: storage is full: could not save http.*\/depth\/.*\(QuotaExceededError\); save a smaller area/);
   await page.evaluate("void roomy()");
-  expect(await failed("(navigator.storage.estimate = async () => ({ quota: 1000, usage: 990 }), map3d.downloadArea(map, { files: [] }))")).toMatch(/^StorageError: the area needs about [\d.]+ MB, the browser keeps 0\.0 MB more/);
+  expect(await failed("(navigator.storage.estimate = async () => ({ quota: 1000, usage: 990 }), map3d.downloadArea(map, { files: [] }))")).toMatch(/^StorageError: not enough storage: the area needs about [\d.]+ MB, 0\.0 MB are available/);
   await page.evaluate("delete navigator.storage.estimate");
-  expect(await failed('map3d.registerWorker("/nowhere/map3d-worker.js")')).toMatch(/^StorageError: \/nowhere\/map3d-worker\.js cannot be registered/);
+  expect(await failed('map3d.registerWorker("/nowhere/map3d-worker.js")')).toMatch(/^StorageError: cannot register \/nowhere\/map3d-worker\.js/);
   expect(await failed('map3d.downloadArea(map, { files: ["/nowhere.css"] })')).toMatch(/^FetchError: .*\/nowhere\.css: HTTP 404/);
   expect(await failed("map3d.listAreas().then((areas) => areas.every(({ complete }) => !complete))")).toBe("true");
   bed.server.failures.set("/90-45/normal/", 3);
