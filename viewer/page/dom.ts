@@ -1,21 +1,21 @@
-/** An element of index.html. */
+/** Returns an element of index.html. */
 export function byId(id: string): HTMLElement {
   const found = document.getElementById(id);
-  if (!found) throw new Error(`index.html has no element "${id}"; take the index.html of the same release`);
+  if (!found) throw new Error(`index.html has no element "${id}"; use the index.html of the same release`);
   return found;
 }
 
-/** An input of index.html. */
+/** Returns an input of index.html. */
 export function inputById(id: string): HTMLInputElement {
   const found = byId(id);
-  if (!(found instanceof HTMLInputElement)) throw new Error(`element "${id}" of index.html is no input`);
+  if (!(found instanceof HTMLInputElement)) throw new Error(`element "${id}" of index.html is not an input`);
   return found;
 }
 
-/** An element with text, never HTML. */
+/** Creates an element with text content. */
 export function withText<K extends keyof HTMLElementTagNameMap>(tag: K, text: string, classes = ""): HTMLElementTagNameMap[K] {
-  const made = document.createElement(tag);
-  made.textContent = text;
-  if (classes) made.className = classes;
-  return made;
+  const created = document.createElement(tag);
+  created.textContent = text;
+  if (classes) created.className = classes;
+  return created;
 }

@@ -1,40 +1,40 @@
 import { imageLayer, type map } from "./map3d.mjs";
 import { byId } from "./dom";
 
-/** Base URLs of the other epochs, `?with=` (given again for more); a name without a slash is a rendering beside the first. */
-export function othersOf(base: string): string[] {
-  const asked = new URLSearchParams(location.search).getAll("with").filter((url) => url !== "");
-  return asked.map((url) => (url.includes("/") ? url : `${base.replace(/\/+$/, "")}/../${url}`));
+/** Base URLs of the other epochs: `?with=`, which can be repeated. A name without a slash is a sibling folder of the first rendering. */
+export function otherEpochs(base: string): string[] {
+  const requested = new URLSearchParams(location.search).getAll("with").filter((url) => url !== "");
+  return requested.map((url) => (url.includes("/") ? url : `${base.replace(/\/+$/, "")}/../${url}`));
 }
 
-/** A slider from the first rendering to the others. What cannot be shown is left out; the map has said why. @param changed told what is shown when it is not the first any more */
-export async function bindEpochs(view: map, first: imageLayer, others: readonly string[], asked: number, changed: (layer: imageLayer, index: number) => void): Promise<void> {
-  const ready = await Promise.allSettled(others.map((url) => added(view, url)));
-  const layers = [first, ...ready.flatMap((one) => (one.status === "fulfilled" ? [one.value] : []))];
+/** Adds a slider over all epochs. Skips renderings that cannot be loaded; the map reports why. @param initial index of the epoch to show first  @param onChange called with the newly shown layer */
+export async function bindEpochs(view: map, first: imageLayer, others: readonly string[], initial: number, onChange: (layer: imageLayer, index: number) => void): Promise<void> {
+  const results = await Promise.allSettled(others.map((url) => addLayer(view, url)));
+  const layers = [first, ...results.flatMap((result) => (result.status === "fulfilled" ? [result.value] : []))];
   if (layers.length < 2) return;
   const { epochs } = await import("./map3d-compare.mjs");
-  const shown = asked < layers.length ? asked : 0;
+  const shown = initial < layers.length ? initial : 0;
   byId("epochs").hidden = false;
   new epochs(layers.map((layer) => ({ layer, label: labelOf(layer, layers) })), { shown, container: byId("epochs") })
-    .on("change", ({ epoch, index }) => { changed(epoch.layer, index); })
+    .on("change", ({ epoch, index }) => { onChange(epoch.layer, index); })
     .addTo(view);
   byId("modes").addEventListener("change", () => { for (const layer of layers) layer.setMode(first.mode); });
-  if (shown > 0) changed(layers[shown] ?? first, shown);
+  if (shown > 0) onChange(layers[shown] ?? first, shown);
 }
 
-function added(view: map, url: string): Promise<imageLayer> {
-  return new Promise((done, failed) => {
+function addLayer(view: map, url: string): Promise<imageLayer> {
+  return new Promise((resolve, reject) => {
     const layer = new imageLayer(url, { opacity: 0 });
-    layer.once("ready", () => { done(layer); });
+    layer.once("ready", () => { resolve(layer); });
     layer.once("error", ({ error }) => {
       view.discard(layer);
-      failed(error);
+      reject(error);
     });
     layer.addTo(view);
   });
 }
 
-/** Its title, unless another one has the same. */
+/** The title if it is unique, else the name. */
 function labelOf(layer: imageLayer, layers: readonly imageLayer[]): string {
   const { title = "", name = "" } = layer.rendering?.json ?? {};
   return title !== "" && layers.every((other) => other === layer || other.rendering?.json.title !== title) ? title : name;

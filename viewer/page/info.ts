@@ -1,16 +1,16 @@
 import type { Attribute, ClickEvent } from "./map3d.mjs";
 import { withText } from "./dom";
-import { say } from "./i18n";
+import { message } from "./i18n";
 
-/** What is known of the chosen object. All of it is text. */
+/** Shows the selected object's name, position and attributes, as text. */
 export class InfoPanel {
   units: { crs: string; vertical: string | null } = { crs: "", vertical: null };
   readonly #box: HTMLElement;
-  readonly #closed: () => void;
+  readonly #onClose: () => void;
 
-  constructor(box: HTMLElement, closed: () => void) {
+  constructor(box: HTMLElement, onClose: () => void) {
     this.#box = box;
-    this.#closed = closed;
+    this.#onClose = onClose;
     addEventListener("keydown", (event) => {
       if (event.key === "Escape" && !box.hidden) this.close();
     });
@@ -18,35 +18,35 @@ export class InfoPanel {
 
   close(): void {
     this.#box.hidden = true;
-    this.#closed();
+    this.#onClose();
   }
 
-  /** @param behind shows the object from the other side */
-  show(event: ClickEvent, behind?: () => void): void {
-    const rows = [...this.#places(event), ...Object.entries(event.attributes ?? {}).map(([name, value]) => [name, written(value)] as const)];
+  /** @param viewFromBehind shows the object from behind */
+  show(event: ClickEvent, viewFromBehind?: () => void): void {
+    const rows = [...this.#positionRows(event), ...Object.entries(event.attributes ?? {}).map(([name, value]) => [name, formatValue(value)] as const)];
     const list = document.createElement("dl");
     for (const [name, value] of rows) list.append(withText("dt", name), withText("dd", value));
-    const kind = [event.class, event.id > 0 ? `id ${String(event.id)}` : "", event.approximate ? say("approximate") : ""];
-    const title = withText("h2", event.name ?? (event.id > 0 ? `${say("object")} ${String(event.id)}` : say("point")));
-    this.#box.replaceChildren(title, ...(behind ? [behindButton(behind)] : []), withText("p", kind.filter(Boolean).join(" · "), "note"), list, this.#closeButton());
+    const kind = [event.class, event.id > 0 ? `id ${String(event.id)}` : "", event.approximate ? message("approximate") : ""];
+    const title = withText("h2", event.name ?? (event.id > 0 ? `${message("object")} ${String(event.id)}` : message("point")));
+    this.#box.replaceChildren(title, ...(viewFromBehind ? [behindButton(viewFromBehind)] : []), withText("p", kind.filter(Boolean).join(" · "), "note"), list, this.#closeButton());
     this.#box.hidden = false;
     this.#box.scrollTop = 0;
   }
 
-  #places({ position }: ClickEvent): (readonly [string, string])[] {
+  #positionRows({ position }: ClickEvent): (readonly [string, string])[] {
     if (!position) return [];
     const [x, y, z] = position.map((part) => part.toFixed(2));
     const height = this.units.vertical ? ` (${this.units.vertical})` : "";
     return [
-      [say("position"), `${x ?? ""}, ${y ?? ""}`],
-      [say("height"), `${z ?? ""} m${height}`],
+      [message("position"), `${x ?? ""}, ${y ?? ""}`],
+      [message("height"), `${z ?? ""} m${height}`],
     ];
   }
 
   #closeButton(): HTMLButtonElement {
     const button = withText("button", "", "close");
     button.type = "button";
-    button.setAttribute("aria-label", say("close"));
+    button.setAttribute("aria-label", message("close"));
     const ns = "http://www.w3.org/2000/svg";
     const [svg, path] = [document.createElementNS(ns, "svg"), document.createElementNS(ns, "path")];
     svg.setAttribute("viewBox", "0 0 24 24");
@@ -60,14 +60,14 @@ export class InfoPanel {
   }
 }
 
-function behindButton(behind: () => void): HTMLButtonElement {
-  const button = withText("button", say("behind"), "behind");
+function behindButton(viewFromBehind: () => void): HTMLButtonElement {
+  const button = withText("button", message("viewFromBehind"), "behind");
   button.type = "button";
-  button.addEventListener("click", behind);
+  button.addEventListener("click", viewFromBehind);
   return button;
 }
 
-function written(value: Attribute): string {
+function formatValue(value: Attribute): string {
   if (value === null) return "–";
-  return typeof value === "boolean" ? say(value ? "yes" : "no") : String(value);
+  return typeof value === "boolean" ? message(value ? "yes" : "no") : String(value);
 }

@@ -1,13 +1,13 @@
 import { chooseUtcOffset, type imageLayer, type Light, type map, type Rendering } from "./map3d.mjs";
 import { byId, inputById } from "./dom";
 
-/** Where nothing is known of the place: a summer day's sun from east over south to west, highest at 13 o'clock. */
+/** A summer sun for scenes of unknown location: from east over south to west, highest at 13:00. */
 export function lightAt(hour: number): Pick<Light, "azimuth_deg" | "altitude_deg"> {
   const day = (hour - 6) / 14;
   return { azimuth_deg: 75 + 210 * day, altitude_deg: 14 + 46 * Math.sin(Math.PI * day) };
 }
 
-/** The slider moves the light through a day, that of the date where the scene's place is known; it rests while nothing is lit. */
+/** Binds the time slider, which moves the light through the selected day. It is disabled while the mode is not lit. */
 export function bindLight(view: map, layer: imageLayer, first?: Date): void {
   const { rendering } = layer;
   if (!rendering) return;
@@ -22,7 +22,7 @@ export function bindLight(view: map, layer: imageLayer, first?: Date): void {
   });
 }
 
-function bindDay(view: map, rendering: Rendering, asked: Date | undefined): void {
+function bindDay(view: map, rendering: Rendering, requested: Date | undefined): void {
   const [time, day] = [inputById("time"), inputById("day")];
   const zone = (): number => chooseUtcOffset(rendering.json.geographic?.lon_lat[0] ?? 0, -new Date(`${day.value}T12:00`).getTimezoneOffset() / 60);
   const moment = (hour: number): Date => new Date(Date.parse(`${day.value}T00:00Z`) + (hour - zone()) * 3_600_000);
@@ -33,17 +33,17 @@ function bindDay(view: map, rendering: Rendering, asked: Date | undefined): void
   };
   [time.min, time.max, time.step] = ["0", "24", String(1 / 12)];
   byId("days").hidden = false;
-  const first = asked ?? firstMoment(rendering);
+  const first = requested ?? firstMoment(rendering);
   day.value = first.toISOString().slice(0, 10);
-  // By the clock there it may be the day before or after.
+  // The local date there can be the day before or after.
   const local = new Date(first.getTime() + zone() * 3_600_000);
   day.value = local.toISOString().slice(0, 10);
-  const known = asked !== undefined || rendering.json.layers.some(({ suns }) => suns?.[0]?.time);
+  const known = requested !== undefined || rendering.json.layers.some(({ suns }) => suns?.[0]?.time);
   time.valueAsNumber = known ? local.getUTCHours() + local.getUTCMinutes() / 60 : 14;
   let dragged = false;
   time.addEventListener("pointerdown", () => { dragged = true; });
   time.addEventListener("keydown", () => { dragged = false; });
-  // A finger is good for quarters of an hour, keys for five minutes.
+  // Dragging moves in steps of 15 minutes, keys in steps of 5 minutes.
   time.addEventListener("input", () => {
     if (dragged) time.valueAsNumber = Math.round(4 * time.valueAsNumber) / 4;
     show();
@@ -52,7 +52,7 @@ function bindDay(view: map, rendering: Rendering, asked: Date | undefined): void
   show();
 }
 
-/** When the shadows are of that the rendering has; today without any. */
+/** A time for which the rendering has shadows; now if it has none. */
 function firstMoment({ json }: Rendering): Date {
   const suns = [...json.layers].sort((a, b) => Number(b.kind === "sun") - Number(a.kind === "sun")).flatMap(({ suns: of }) => of ?? []);
   const times = suns.flatMap(({ time }) => (time === null ? [] : [new Date(time)])).filter((time) => !Number.isNaN(time.getTime()));

@@ -1,15 +1,15 @@
-import type { Address } from "./address";
+import type { Permalink } from "./permalink";
 import { byId } from "./dom";
-import { toast } from "./messages";
-import { say } from "./i18n";
+import { toast } from "./toast";
+import { message } from "./i18n";
 
-/** A button that passes on the address of what is seen: by the device's own means, else through the clipboard. */
-export function bindShare(address: Address): void {
+/** Binds the button that shares the permalink: with the device's share dialog, or through the clipboard. */
+export function bindShare(permalink: Permalink): void {
   byId("share").addEventListener("click", () => {
-    address.write();
+    permalink.write();
     share(document.title, location.href).catch((reason: unknown) => {
-      // Closing the device's dialog is an answer, too.
-      if (!(reason instanceof DOMException && reason.name === "AbortError")) toast(`${say("copyThis")}: ${location.href}`);
+      // An AbortError means that the user closed the dialog.
+      if (!(reason instanceof DOMException && reason.name === "AbortError")) toast(`${message("copyLink")}: ${location.href}`);
     });
   });
 }
@@ -20,5 +20,5 @@ async function share(title: string, url: string): Promise<void> {
     return;
   }
   await (navigator as Navigator).clipboard.writeText(url);
-  toast(say("copied"));
+  toast(message("linkCopied"));
 }

@@ -3,70 +3,71 @@ import { selectTranslation } from "../core/i18n";
 import { sub, type Vec2, type Vec3 } from "../core/vec";
 import { uvdFromLocal } from "../geo/axes";
 import { MapLayer, marker, UsageError, type map, type Relief } from "../map3d";
-import { groupsOf, spread, type Group } from "./groups";
+import { groupPoints, spiderOffsets, type MarkerGroup } from "./groups";
 import { STYLES } from "./styles";
 
 export interface ClusterOptions {
-  /** Markers that lie within so many CSS pixels of another join it. Default 56. */
+  /** Cluster radius in CSS pixels. Default 56. */
   radius_px?: number;
-  /** Any CSS colour; default the map's accent. */
+  /** Any CSS colour. Default: the map's accent colour. */
   color?: string;
-  /** What a cluster is called; read aloud. Default says how many there are. */
+  /** Returns the accessible name of a cluster. Default: the number of its markers. */
   label?: (markers: readonly marker[]) => string;
 }
 
 export interface ClusterEvents {
   /** A cluster was clicked. */
   click: { markers: readonly marker[]; position: Vec3 };
-  /** Markers of one place were spread, or joined again. */
+  /** The markers of a cluster were spread, because no zoom level separates them. */
   spread: { markers: readonly marker[] };
+  /** Spread markers were joined again. */
   join: object;
 }
 
-const WORDS = {
-  en: (count: string) => `${count} places here`,
-  de: (count: string) => `${count} Orte hier`,
-  fr: (count: string) => `${count} lieux ici`,
+const MESSAGES = {
+  en: (count: string) => `${count} markers`,
+  de: (count: string) => `${count} Markierungen`,
+  fr: (count: string) => `${count} repères`,
 };
-/** Around the screen, CSS pixels. */
+/** Clusters this far outside the screen are kept, CSS pixels. */
 const MARGIN_PX = 60;
-/** Between markers that are spread. */
-const APART_PX = 48;
+/** Distance between spread markers, CSS pixels. */
+const SPREAD_PX = 48;
 const SVG = "http://www.w3.org/2000/svg";
 
-interface Shown {
+interface VisibleItem {
   readonly item: marker;
-  readonly group: Group;
+  readonly group: MarkerGroup;
 }
 
 /**
- * Markers that lie close together on the screen join into one with their number; a click on it comes nearer, or, where that does not part them, spreads them. Groups are those of a
- * whole zoom level, so that they stay while the picture moves; only what is in view has elements in the page.
+ * Combines markers that are close together on the screen. A click zooms to where they separate, or spreads them if no zoom level separates them.
+ * Clusters are computed per integer zoom level, so that they stay stable while the map moves. Only clusters in view have page elements.
  */
 export class cluster extends MapLayer<map, ClusterEvents> {
   readonly options: Required<Omit<ClusterOptions, "color" | "label">> & Pick<ClusterOptions, "color" | "label">;
   #markers: readonly marker[];
-  #groups = new Map<number, Group[]>();
+  #groups = new Map<number, MarkerGroup[]>();
   #uv = new Float64Array();
   #view = "";
-  /** By what they show: the first member and the level. */
-  #shown = new Map<string, Shown>();
+  /** Items on the map, by seed and level. */
+  #shown = new Map<string, VisibleItem>();
   #spread: { readonly key: string; readonly markers: readonly marker[]; readonly shifts: readonly Vec2[]; readonly legs: SVGSVGElement; readonly zoom: number } | undefined;
 
-  /** @param markers they are added to maps by the cluster, not by the page */
+  /** @param markers the cluster adds them to the map; do not add them yourself */
   constructor(markers: readonly marker[] = [], options: ClusterOptions = {}) {
     super();
     this.options = { radius_px: 56, ...options };
-    if (!(this.options.radius_px > 0)) throw new UsageError(`radius_px is a number above 0, got ${String(this.options.radius_px)}`);
+    if (!(this.options.radius_px > 0)) throw new UsageError(`radius_px must be greater than 0, got ${String(this.options.radius_px)}`);
     this.#markers = [...markers];
   }
 
-  /** All markers, in the order in which they were given. */
+  /** All markers, in the given order. */
   get markers(): readonly marker[] {
     return this.#markers;
   }
 
-  /** In place of those before; also when some have moved. */
+  /** Replaces all markers. Call it, too, after markers have moved. */
   setMarkers(markers: readonly marker[]): this {
     this.#clear();
     this.#markers = [...markers];
@@ -77,41 +78,41 @@ export class cluster extends MapLayer<map, ClusterEvents> {
 
   protected onAdd(map: map): void {
     adoptStyles(document, STYLES);
-    map.frameEvents.on("draw", this.#place);
+    map.frameEvents.on("draw", this.#update);
     map.on("preclick", this.#join);
-    map.container.addEventListener("keydown", this.#pressed);
-    this.#place();
+    map.container.addEventListener("keydown", this.#onKeyDown);
+    this.#update();
   }
 
   protected onRemove(map: map): void {
     this.#clear();
-    map.frameEvents.off("draw", this.#place);
+    map.frameEvents.off("draw", this.#update);
     map.off("preclick", this.#join);
-    map.container.removeEventListener("keydown", this.#pressed);
+    map.container.removeEventListener("keydown", this.#onKeyDown);
   }
 
-  readonly #place = (): void => {
+  readonly #update = (): void => {
     const [map, relief] = [this.map, this.map?.relief];
     if (!map || !relief) return;
-    this.#turn(relief);
+    this.#updateView(relief);
     if (this.#spread && Math.abs(map.zoom - this.#spread.zoom) > 1e-6) this.#join();
     const level = Math.floor(map.zoom + 1e-6);
-    const wanted = new Map<string, Group>();
-    const far = metresAt(relief, map.zoom);
+    const inView = new Map<string, MarkerGroup>();
+    const px_m = metresAt(relief, map.zoom);
     const { camera } = relief;
-    const [w, h] = [(camera.width / 2 + MARGIN_PX) * far, (camera.height / 2 + MARGIN_PX) * far];
-    for (const group of this.#groupsAt(relief, level)) if (Math.abs(group.u - camera.u) <= w && Math.abs(group.v - camera.v) <= h) wanted.set(`${String(group.members[0])} ${group.members.length > 1 ? String(level) : ""}`, group);
+    const [w, h] = [(camera.width / 2 + MARGIN_PX) * px_m, (camera.height / 2 + MARGIN_PX) * px_m];
+    for (const group of this.#groupsAt(relief, level)) if (Math.abs(group.u - camera.u) <= w && Math.abs(group.v - camera.v) <= h) inView.set(`${String(group.members[0])} ${group.members.length > 1 ? String(level) : ""}`, group);
     for (const [key, { item }] of [...this.#shown]) {
-      if (wanted.has(key)) continue;
+      if (inView.has(key)) continue;
       map.discard(item);
       this.#shown.delete(key);
     }
-    for (const [key, group] of wanted) if (!this.#shown.has(key)) this.#show(map, key, group);
+    for (const [key, group] of inView) if (!this.#shown.has(key)) this.#show(map, key, group);
     this.#drawLegs();
   };
 
-  /** Another view of the rendering: places lie elsewhere. */
-  #turn({ camera, origin }: Relief): void {
+  /** Recomputes the positions of the markers in U and V when the view changes. */
+  #updateView({ camera, origin }: Relief): void {
     const view = [camera.frame.id, ...origin].join(" ");
     if (view === this.#view) return;
     this.#clear();
@@ -121,61 +122,61 @@ export class cluster extends MapLayer<map, ClusterEvents> {
     this.#markers.forEach(({ position }, k) => { this.#uv.set(uvdFromLocal(camera.frame.axes, sub(position, origin)).slice(0, 2), 2 * k); });
   }
 
-  #groupsAt(relief: Relief, level: number): Group[] {
-    const groups = this.#groups.get(level) ?? groupsOf(this.#uv, this.options.radius_px * metresAt(relief, level));
+  #groupsAt(relief: Relief, level: number): MarkerGroup[] {
+    const groups = this.#groups.get(level) ?? groupPoints(this.#uv, this.options.radius_px * metresAt(relief, level));
     this.#groups.set(level, groups);
     return groups;
   }
 
-  #show(map: map, key: string, group: Group): void {
-    const markers = this.#of(group);
+  #show(map: map, key: string, group: MarkerGroup): void {
+    const markers = this.#markersOf(group);
     const [first] = markers;
     if (!first) return;
-    const item = markers.length === 1 ? first : this.#joined(map, key, group, markers);
+    const item = markers.length === 1 ? first : this.#clusterMarker(map, key, group, markers);
     this.#shown.set(key, { item, group });
     map.add(item);
   }
 
-  #of({ members }: Group): marker[] {
+  #markersOf({ members }: MarkerGroup): marker[] {
     return members.flatMap((member) => this.#markers[member] ?? []);
   }
 
-  #joined(map: map, key: string, group: Group, markers: readonly marker[]): marker {
+  #clusterMarker(map: map, key: string, group: MarkerGroup, markers: readonly marker[]): marker {
     const { label, color } = this.options;
     const count = markers.length.toLocaleString(map.language);
     const position = [0, 1, 2].map((k) => markers.reduce((sum, one) => sum + (one.position[k] as number), 0) / markers.length) as unknown as Vec3;
-    const item = new marker(label?.(markers) ?? selectTranslation(WORDS, map.language)(count), position, { showLabel: false, icon: element("span", "map3d-cluster", {}, count), ...(color !== undefined && { color }) });
+    const item = new marker(label?.(markers) ?? selectTranslation(MESSAGES, map.language)(count), position, { showLabel: false, icon: element("span", "map3d-cluster", {}, count), ...(color !== undefined && { color }) });
     return item.on("click", () => {
       item.select(false);
       this.fire("click", { markers, position });
-      this.#open(map, key, group, position);
+      this.#expand(map, key, group, position);
     });
   }
 
-  /** Comes as near as parts the group; spreads it where nothing does. */
-  #open(map: map, key: string, group: Group, position: Vec3): void {
+  /** Zooms to the first level that separates the group, or spreads it. */
+  #expand(map: map, key: string, group: MarkerGroup, position: Vec3): void {
     const relief = map.relief;
     if (!relief) return;
     const [, greatest] = map.zoomLimits;
-    const own = new Float64Array(group.members.flatMap((member) => [...this.#uv.subarray(2 * member, 2 * member + 2)]));
+    const uv = new Float64Array(group.members.flatMap((member) => [...this.#uv.subarray(2 * member, 2 * member + 2)]));
     for (let level = Math.floor(map.zoom + 1e-6) + 1; level <= greatest; level++) {
-      if (groupsOf(own, this.options.radius_px * metresAt(relief, level)).length > 1) return void map.flyTo(position, level);
+      if (groupPoints(uv, this.options.radius_px * metresAt(relief, level)).length > 1) return void map.flyTo(position, level);
     }
-    const open = this.#spread?.key === key;
+    const wasSpread = this.#spread?.key === key;
     this.#join();
-    if (!open) this.#spreadOut(map, key, this.#of(group), map.project(position) ?? [0, 0]);
+    if (!wasSpread) this.#spreadOut(map, key, this.#markersOf(group), map.project(position) ?? [0, 0]);
   }
 
-  /** Around a place of the screen. */
+  /** Spreads markers around a point of the screen. */
   #spreadOut(map: map, key: string, markers: readonly marker[], [x, y]: Vec2): void {
     const legs = document.createElementNS(SVG, "svg");
     legs.setAttribute("class", "map3d-legs");
     legs.setAttribute("aria-hidden", "true");
     legs.append(...markers.map(() => document.createElementNS(SVG, "line")));
     map.overlayPane.prepend(legs);
-    const places = spread(markers.length, APART_PX);
+    const offsets = spiderOffsets(markers.length, SPREAD_PX);
     const shifts = markers.map(({ position }, k): Vec2 => {
-      const [[dx, dy], at] = [places[k] ?? [0, 0], map.project(position) ?? [x, y]];
+      const [[dx, dy], at] = [offsets[k] ?? [0, 0], map.project(position) ?? [x, y]];
       return [x + dx - at[0], y + dy - at[1]];
     });
     this.#spread = { key, markers, shifts, legs, zoom: map.zoom };
@@ -194,15 +195,15 @@ export class cluster extends MapLayer<map, ClusterEvents> {
   }
 
   readonly #join = (): void => {
-    const open = this.#spread;
-    if (!open) return;
+    const spread = this.#spread;
+    if (!spread) return;
     this.#spread = undefined;
-    open.legs.remove();
-    for (const one of open.markers) this.map?.discard(one.setOffset([0, 0]));
+    spread.legs.remove();
+    for (const one of spread.markers) this.map?.discard(one.setOffset([0, 0]));
     this.fire("join", {});
   };
 
-  readonly #pressed = ({ key }: KeyboardEvent): void => {
+  readonly #onKeyDown = ({ key }: KeyboardEvent): void => {
     if (key === "Escape") this.#join();
   };
 
@@ -213,5 +214,5 @@ export class cluster extends MapLayer<map, ClusterEvents> {
   }
 }
 
-/** Metres a CSS pixel at a zoom. */
+/** Metres per CSS pixel at a zoom level. */
 const metresAt = ({ pixel_m, level }: Relief, zoom: number): number => pixel_m * 2 ** (level - zoom);

@@ -1,2 +1,2 @@
-/** map3d-cluster: markers that lie close together join into one. */
+/** map3d-cluster: combines markers that are close together. */
 export { cluster, type ClusterEvents, type ClusterOptions } from "./cluster";

@@ -4,30 +4,30 @@ import { MapLayer, type imageLayer, type map } from "../map3d";
 import { STYLES } from "./styles";
 import { getCompareMessages } from "./i18n";
 
-/** A state of the city. */
+/** A state of the city at one time. */
 export interface Epoch {
   readonly layer: imageLayer;
-  /** Such as a year. */
+  /** Label, such as a year. */
   readonly label: string;
 }
 
-/** Of an `epochs`. */
+/** Options of `epochs`. */
 export interface EpochsOptions {
-  /** Number of the one that is shown first. Default the last. */
+  /** Index of the epoch to show first. Default: the last. */
   shown?: number;
-  /** How long the one before fades. Default 250; 0 where the user wants no movement. */
+  /** Duration of the cross-fade. Default 250; 0 under `prefers-reduced-motion`. */
   fade_ms?: number;
-  /** Where the slider goes. Default the map's lower edge. */
+  /** Element for the slider. Default: the map, at its lower edge. */
   container?: HTMLElement;
 }
 
-/** Of an `epochs`. */
+/** Events of `epochs`. */
 export interface EpochsEvents {
-  /** Another one was chosen. */
+  /** The shown epoch has changed. */
   change: { epoch: Epoch; index: number };
 }
 
-/** A slider over layers of which one is shown; the one before stays until the next is complete, then it fades. Adds the layers to the map. */
+/** A slider that shows one of several layers. The previous layer stays until the next one is complete, then fades out. Adds the layers to the map. */
 export class epochs extends MapLayer<map, EpochsEvents> {
   readonly #list: readonly Epoch[];
   readonly #fade_ms: number;
@@ -36,13 +36,13 @@ export class epochs extends MapLayer<map, EpochsEvents> {
   readonly #slider: HTMLInputElement;
   readonly #name = element("output", "");
   #shown: number;
-  #leaving: (() => void) | undefined;
+  #endFade: (() => void) | undefined;
 
-  /** @throws UsageError without at least two epochs, or when the one to show first is none of them */
+  /** @throws UsageError for fewer than two epochs, or when `shown` is out of range */
   constructor(list: readonly Epoch[], { shown = list.length - 1, fade_ms = 250, container }: EpochsOptions = {}) {
     super();
-    if (list.length < 2) throw new UsageError("epochs need at least two layers");
-    if (!Object.hasOwn(list, shown)) throw new UsageError(`epoch ${String(shown)} is none of 0 to ${String(list.length - 1)}`);
+    if (list.length < 2) throw new UsageError(`epochs needs at least two layers, got ${String(list.length)}`);
+    if (!Object.hasOwn(list, shown)) throw new UsageError(`epoch ${String(shown)} is out of range 0 to ${String(list.length - 1)}`);
     this.#list = list;
     this.#shown = shown;
     this.#fade_ms = fade_ms;
@@ -54,79 +54,79 @@ export class epochs extends MapLayer<map, EpochsEvents> {
     this.#box = element("div", "map3d-epochs", {}, this.#name, this.#slider, element("div", "", { "aria-hidden": "true" }, ...ends));
   }
 
-  /** Number of the one that is shown. */
+  /** Index of the shown epoch. */
   get shown(): number {
     return this.#shown;
   }
 
-  /** Shows another one. @throws UsageError */
+  /** Shows an epoch. @throws UsageError when the index is out of range */
   show(index: number): this {
     const epoch = this.#list[index];
-    if (!epoch) throw new UsageError(`epoch ${String(index)} is none of 0 to ${String(this.#list.length - 1)}`);
+    if (!epoch) throw new UsageError(`epoch ${String(index)} is out of range 0 to ${String(this.#list.length - 1)}`);
     if (index === this.#shown) return this;
     const before = this.#shown;
     this.#shown = index;
-    this.#label();
-    this.#change(before);
+    this.#updateLabel();
+    this.#switchFrom(before);
     return this.fire("change", { epoch, index });
   }
 
   protected onAdd(map: map): void {
     adoptStyles(document, STYLES);
     this.#slider.setAttribute("aria-label", getCompareMessages(map.language).time);
-    this.#label();
+    this.#updateLabel();
     this.#list.forEach(({ layer }, k) => layer.setOpacity(k === this.#shown ? 1 : 0).addTo(map));
     (this.#container ?? map.overlayPane).append(this.#box);
   }
 
   protected onRemove(map: map): void {
-    this.#leaving?.();
+    this.#endFade?.();
     this.#box.remove();
     for (const { layer } of this.#list) map.discard(layer.setOpacity(1));
   }
 
-  #label(): void {
+  #updateLabel(): void {
     const label = this.#list[this.#shown]?.label ?? "";
     this.#slider.value = String(this.#shown);
     this.#slider.setAttribute("aria-valuetext", label);
     this.#name.textContent = label;
   }
 
-  /** The new one comes; the old ones go when it is here. */
-  #change(before: number): void {
+  /** Shows the new layer at once and hides the old one when the new one is complete. */
+  #switchFrom(before: number): void {
     const map = this.map;
     if (!map) return;
-    this.#leaving?.();
+    this.#endFade?.();
     const [next, old] = [this.#list[this.#shown]?.layer, this.#list[before]?.layer];
     for (const { layer } of this.#list) if (layer !== next && layer !== old) layer.setOpacity(0);
     next?.setOpacity(1);
-    if (old) this.#leave(map, old);
+    if (old) this.#fadeOut(map, old);
   }
 
-  #leave(map: map, old: imageLayer): void {
+  #fadeOut(map: map, old: imageLayer): void {
     const fade_ms = matchMedia("(prefers-reduced-motion: reduce)").matches ? 0 : this.#fade_ms;
     let frame = 0;
     const end = (): void => {
       map.off("idle", start);
       cancelAnimationFrame(frame);
       old.setOpacity(0);
-      this.#leaving = undefined;
+      this.#endFade = undefined;
     };
     const start = (): void => {
       map.off("idle", start);
       const from = performance.now();
       const step = (now: number): void => {
-        const left = fade_ms > 0 ? 1 - (now - from) / fade_ms : 0;
-        if (left <= 0) {
+        const opacity = fade_ms > 0 ? 1 - (now - from) / fade_ms : 0;
+        if (opacity <= 0) {
           end();
           return;
         }
-        old.setOpacity(Math.min(left, 0.99));
+        old.setOpacity(Math.min(opacity, 0.99));
         frame = requestAnimationFrame(step);
       };
       step(from);
     };
-    this.#leaving = end;
+    this.#endFade = end;
     map.on("idle", start);
   }
 }

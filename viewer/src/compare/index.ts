@@ -1,3 +1,3 @@
-/** map3d-compare: two renderings side by side, and times one after another. */
+/** map3d-compare: compares renderings with a swipe divider or a time slider. */
 export { swipe, type Layers, type SwipeEvents, type SwipeOptions } from "./swipe";
 export { epochs, type Epoch, type EpochsEvents, type EpochsOptions } from "./epochs";

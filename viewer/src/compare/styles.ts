@@ -1,4 +1,4 @@
-/** Of the border of a swipe and the slider of epochs; colours are the map's. */
+/** Styles of the swipe divider and the epochs slider; colours come from the map. */
 export const STYLES = `
 .map3d-swipe { position: absolute; top: 0; bottom: 0; width: 44px; margin-left: -22px; padding: 0; border: 0; background: none; cursor: ew-resize; pointer-events: auto; touch-action: none; outline: none; }
 .map3d-swipe::before { content: ""; position: absolute; left: 20.5px; top: 0; bottom: 0; width: 3px; background: #fff; box-shadow: 0 0 0 1px rgb(0 0 0 / 0.22), 0 0 10px rgb(0 0 0 / 0.25); }

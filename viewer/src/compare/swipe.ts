@@ -6,18 +6,18 @@ import { STYLES } from "./styles";
 import { getCompareMessages } from "./i18n";
 
 export interface SwipeOptions {
-  /** Where the border stands, 0 (left edge) to 1. Default 0.5. */
+  /** Position of the divider: 0 is the left edge, 1 the right. Default 0.5. */
   at?: number;
-  /** What stands at the border's left and right. */
+  /** Labels left and right of the divider. */
   names?: readonly [left: string, right: string];
 }
 
 export interface SwipeEvents {
-  /** The border has moved. */
+  /** The divider has moved. */
   change: { at: number };
 }
 
-/** One layer, or several that are shown together. */
+/** One layer, or several layers on the same side. */
 export type Layers = imageLayer | readonly imageLayer[];
 
 const ARROWS = "M9 7l-5 5 5 5M15 7l5 5-5 5";
@@ -25,10 +25,10 @@ const STEP = 0.02;
 
 const list = (layers: Layers): readonly imageLayer[] => (Array.isArray(layers) ? (layers as readonly imageLayer[]) : [layers as imageLayer]);
 
-/** Some layers left of a border, others right of it; the border can be moved by pointer and by arrow keys. Other layers of the map stay whole. */
+/** Shows some layers left of a divider and others right of it. A pointer or the arrow keys move the divider. Other layers of the map are not clipped. */
 export class swipe extends MapLayer<map, SwipeEvents> {
   readonly #sides: readonly [readonly imageLayer[], readonly imageLayer[]];
-  readonly #border: HTMLElement;
+  readonly #divider: HTMLElement;
   #at: number;
 
   /** @throws UsageError when a layer is on both sides */
@@ -37,18 +37,18 @@ export class swipe extends MapLayer<map, SwipeEvents> {
     this.#sides = [list(left), list(right)];
     if (this.#sides[0].some((layer) => this.#sides[1].includes(layer))) throw new UsageError("a layer cannot be on both sides of a swipe");
     this.#at = clamp(at, 0, 1);
-    this.#border = element("div", "map3d-swipe", { role: "slider", tabindex: "0", "aria-orientation": "horizontal", "aria-valuemin": "0", "aria-valuemax": "100" }, ...(names ?? []).map((name) => element("span", "map3d-swipe-name", {}, name)), icon(ARROWS));
-    if (names) this.#border.setAttribute("aria-description", names.join(" | "));
-    this.#border.addEventListener("pointerdown", (event) => { this.#grab(event); });
-    this.#border.addEventListener("keydown", (event) => { this.#press(event); });
+    this.#divider = element("div", "map3d-swipe", { role: "slider", tabindex: "0", "aria-orientation": "horizontal", "aria-valuemin": "0", "aria-valuemax": "100" }, ...(names ?? []).map((name) => element("span", "map3d-swipe-name", {}, name)), icon(ARROWS));
+    if (names) this.#divider.setAttribute("aria-description", names.join(" | "));
+    this.#divider.addEventListener("pointerdown", (event) => { this.#startDrag(event); });
+    this.#divider.addEventListener("keydown", (event) => { this.#onKeyDown(event); });
   }
 
-  /** Where the border stands, 0 (left edge) to 1. */
+  /** Position of the divider: 0 is the left edge, 1 the right. */
   get at(): number {
     return this.#at;
   }
 
-  /** Moves the border: 0 is the left edge, 1 the right. */
+  /** Moves the divider: 0 is the left edge, 1 the right. */
   setAt(at: number): this {
     const next = clamp(at, 0, 1);
     if (!(next !== this.#at)) return this;
@@ -59,44 +59,44 @@ export class swipe extends MapLayer<map, SwipeEvents> {
 
   protected onAdd(map: map): void {
     adoptStyles(document, STYLES);
-    this.#border.setAttribute("aria-label", getCompareMessages(map.language).border);
-    map.overlayPane.append(this.#border);
+    this.#divider.setAttribute("aria-label", getCompareMessages(map.language).divider);
+    map.overlayPane.append(this.#divider);
     this.#apply();
   }
 
   protected onRemove(): void {
-    this.#border.remove();
+    this.#divider.remove();
     for (const layer of this.#sides.flat()) layer.setClip(null);
   }
 
   #apply(): void {
-    this.#border.style.left = `${String(100 * this.#at)}%`;
-    this.#border.setAttribute("aria-valuenow", String(Math.round(100 * this.#at)));
+    this.#divider.style.left = `${String(100 * this.#at)}%`;
+    this.#divider.setAttribute("aria-valuenow", String(Math.round(100 * this.#at)));
     if (!this.map) return;
     for (const layer of this.#sides[0]) layer.setClip([0, 0, this.#at, 1]);
     for (const layer of this.#sides[1]) layer.setClip([this.#at, 0, 1, 1]);
   }
 
-  #grab(event: PointerEvent): void {
+  #startDrag(event: PointerEvent): void {
     if (event.button !== 0) return;
-    const border = this.#border;
-    border.setPointerCapture(event.pointerId);
-    const { left, width } = border.getBoundingClientRect();
-    const off = event.clientX - (left + width / 2);
+    const divider = this.#divider;
+    divider.setPointerCapture(event.pointerId);
+    const { left, width } = divider.getBoundingClientRect();
+    const offset_px = event.clientX - (left + width / 2);
     const move = ({ clientX }: PointerEvent): void => {
       const box = this.map?.container.getBoundingClientRect();
-      if (box) this.setAt((clientX - off - box.left) / box.width);
+      if (box) this.setAt((clientX - offset_px - box.left) / box.width);
     };
     const end = (): void => {
-      border.removeEventListener("pointermove", move);
+      divider.removeEventListener("pointermove", move);
     };
-    border.addEventListener("pointermove", move);
-    border.addEventListener("lostpointercapture", end, { once: true });
+    divider.addEventListener("pointermove", move);
+    divider.addEventListener("lostpointercapture", end, { once: true });
     event.preventDefault();
-    border.focus({ preventScroll: true });
+    divider.focus({ preventScroll: true });
   }
 
-  #press(event: KeyboardEvent): void {
+  #onKeyDown(event: KeyboardEvent): void {
     const to = { ArrowLeft: this.#at - STEP, ArrowRight: this.#at + STEP, ArrowDown: this.#at - STEP, ArrowUp: this.#at + STEP, PageDown: this.#at - 5 * STEP, PageUp: this.#at + 5 * STEP, Home: 0, End: 1 }[event.key];
     if (to === undefined || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();

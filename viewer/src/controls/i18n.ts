@@ -7,45 +7,45 @@ export interface ControlMessages {
   readonly unavailable: string;
   readonly insecure: string;
   readonly outside: string;
-  readonly placeless: string;
+  readonly notGeoreferenced: string;
   readonly overview: string;
   readonly move: string;
 }
 
 const EN: ControlMessages = {
-  locate: "Show where I am",
-  here: (accuracy) => `You are here, ± ${accuracy}`,
-  denied: "Your browser does not tell where you are. Allow it in the settings of this page.",
-  unavailable: "Your device does not know where it is just now. Try again.",
-  insecure: "Browsers tell where you are on pages with https only.",
-  outside: "You are outside of this map.",
-  placeless: "It is not known where on earth this map lies.",
+  locate: "Show my location",
+  here: (accuracy) => `You are here (± ${accuracy})`,
+  denied: "Location access is blocked. Allow it in your browser’s settings for this page.",
+  unavailable: "Your location is unavailable. Try again.",
+  insecure: "Your location is only available on secure (https) pages.",
+  outside: "Your location is outside this map.",
+  notGeoreferenced: "Your location can’t be shown, because this map has no geographic coordinates.",
   overview: "Overview map",
-  move: "Overview: arrow keys move the view",
+  move: "Overview map: use the arrow keys to move the view",
 };
 
 const DE: ControlMessages = {
-  locate: "Zeigen, wo ich bin",
-  here: (accuracy) => `Sie sind hier, ± ${accuracy}`,
-  denied: "Ihr Browser sagt nicht, wo Sie sind. Erlauben Sie es in den Einstellungen dieser Seite.",
-  unavailable: "Ihr Gerät weiß gerade nicht, wo es ist. Versuchen Sie es noch einmal.",
-  insecure: "Browser sagen nur auf Seiten mit https, wo Sie sind.",
-  outside: "Sie sind außerhalb dieser Karte.",
-  placeless: "Es ist nicht bekannt, wo auf der Erde diese Karte liegt.",
+  locate: "Meinen Standort anzeigen",
+  here: (accuracy) => `Sie sind hier (± ${accuracy})`,
+  denied: "Der Zugriff auf Ihren Standort ist blockiert. Erlauben Sie ihn in den Browsereinstellungen für diese Seite.",
+  unavailable: "Ihr Standort ist nicht verfügbar. Versuchen Sie es noch einmal.",
+  insecure: "Ihr Standort ist nur auf sicheren Seiten (https) verfügbar.",
+  outside: "Ihr Standort liegt außerhalb dieser Karte.",
+  notGeoreferenced: "Ihr Standort kann nicht angezeigt werden, weil diese Karte keine geografischen Koordinaten hat.",
   overview: "Übersichtskarte",
-  move: "Übersicht: Pfeiltasten bewegen den Ausschnitt",
+  move: "Übersichtskarte: Ausschnitt mit den Pfeiltasten verschieben",
 };
 
 const FR: ControlMessages = {
-  locate: "Montrer où je suis",
-  here: (accuracy) => `Vous êtes ici, ± ${accuracy}`,
-  denied: "Votre navigateur ne dit pas où vous êtes. Permettez-le dans les réglages de cette page.",
-  unavailable: "Votre appareil ne sait pas où il est pour l’instant. Réessayez.",
-  insecure: "Les navigateurs ne disent où vous êtes que sur des pages en https.",
-  outside: "Vous êtes en dehors de cette carte.",
-  placeless: "On ne sait pas où cette carte se trouve sur terre.",
-  overview: "Carte d’ensemble",
-  move: "Vue d’ensemble : les flèches déplacent la vue",
+  locate: "Afficher ma position",
+  here: (accuracy) => `Vous êtes ici (± ${accuracy})`,
+  denied: "L’accès à votre position est bloqué. Autorisez-le dans les réglages du navigateur pour cette page.",
+  unavailable: "Votre position n’est pas disponible. Réessayez.",
+  insecure: "Votre position n’est disponible que sur les pages sécurisées (https).",
+  outside: "Votre position est en dehors de cette carte.",
+  notGeoreferenced: "Votre position ne peut pas être affichée, car cette carte n’a pas de coordonnées géographiques.",
+  overview: "Carte d’aperçu",
+  move: "Carte d’aperçu : utilisez les touches fléchées pour déplacer la vue",
 };
 
 export const getControlMessages = (language: string): ControlMessages => selectTranslation({ en: EN, de: DE, fr: FR }, language);

@@ -1,3 +1,3 @@
-/** map3d-controls: where the reader is, and an overview of the whole. */
+/** map3d-controls: shows the reader's location and an overview map. */
 export { locate, type Located, type LocateEvents, type LocateOptions } from "./locate";
 export { overview, type OverviewOptions } from "./overview";

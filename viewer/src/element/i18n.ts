@@ -5,10 +5,10 @@ interface ElementMessages {
   readonly failed: string;
 }
 
-const WORDS = {
-  en: { map: "Map", failed: "The map cannot be shown." },
-  de: { map: "Karte", failed: "Die Karte kann nicht gezeigt werden." },
-  fr: { map: "Carte", failed: "La carte ne peut pas être affichée." },
+const MESSAGES = {
+  en: { map: "Map", failed: "Couldn’t load the map." },
+  de: { map: "Karte", failed: "Die Karte konnte nicht geladen werden." },
+  fr: { map: "Carte", failed: "Impossible de charger la carte." },
 };
 
-export const getElementMessages = (language: string): ElementMessages => selectTranslation(WORDS, language);
+export const getElementMessages = (language: string): ElementMessages => selectTranslation(MESSAGES, language);

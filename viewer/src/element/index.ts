@@ -1,14 +1,14 @@
-/** map3d-element: the map as elements of a page, `<map-3d>`, `<map-3d-layer>` and `<map-3d-marker>`. Importing it registers them. */
+/** map3d-element: the custom elements `<map-3d>`, `<map-3d-layer>` and `<map-3d-marker>`. Importing it registers them. */
 import { layerElement } from "./layerElement";
 import { mapElement, type MapElementEvents } from "./mapElement";
 import { markerElement } from "./markerElement";
 
 export { layerElement, mapElement, markerElement, type MapElementEvents };
-export type { part, Place } from "./part";
+export type { part, ElementHost } from "./part";
 
 const ELEMENTS = { "map-3d": mapElement, "map-3d-layer": layerElement, "map-3d-marker": markerElement };
 
-// Not where there is no page (a server that renders); a second copy leaves the first one's elements as they are.
+// Skipped without a DOM (server-side rendering). A second copy of this script keeps the elements of the first.
 if ("customElements" in globalThis) for (const [name, element] of Object.entries(ELEMENTS)) if (!customElements.get(name)) customElements.define(name, element);
 
 declare global {

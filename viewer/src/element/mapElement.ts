@@ -1,16 +1,16 @@
 import { map, type Addable, type imageLayer, type Light, type MapEvents, type MapOptions, type Vec3 } from "../map3d";
 import { isOn, light, number, PageElement, position, time, words } from "./attributes";
-import { Frame } from "./frame";
-import { followLayer, layerOf } from "./layerElement";
-import type { part, Place } from "./part";
+import { ElementContent } from "./elementContent";
+import { updateLayer, createLayer } from "./layerElement";
+import type { part, ElementHost } from "./part";
 
-/** The map's events as the element fires them: `map-click`, `map-ready`, …, with the event's fields as `detail`. They bubble. */
+/** Events of the element: the map's events with the prefix `map-` and their fields in `detail`. They bubble. */
 export type MapElementEvents = { [K in keyof MapEvents as `map-${K}`]: CustomEvent<MapEvents[K]> };
 
-type Tell = <K extends keyof MapEvents>(type: K, fields: MapEvents[K]) => void;
+type FireEvent = <K extends keyof MapEvents>(type: K, fields: MapEvents[K]) => void;
 
-/** What a map looked like when it ended, for the one that comes after; attributes that have changed since go before. */
-interface Left {
+/** State of a removed map, restored by the next one. Attributes that change in between take precedence. */
+interface SavedState {
   center?: Vec3 | undefined;
   zoom?: number | undefined;
   direction?: string | undefined;
@@ -18,23 +18,23 @@ interface Left {
   time?: Date | undefined;
 }
 
-/** Attributes that a map keeps from its making on. */
-const MAKING: ReadonlySet<string> = new Set(["src", "language", "label", "controls", "attribution", "drawer", "hover"]);
-/** Attributes that are followed at once. */
-const FOLLOWED = ["direction", "center", "zoom", "light", "time", "mode", "opacity", "background"];
+/** Changes of these attributes create a new map. */
+const RECREATING: ReadonlySet<string> = new Set(["src", "language", "label", "controls", "attribution", "drawer", "hover"]);
+/** Changes of these attributes are applied to the map. */
+const APPLIED = ["direction", "center", "zoom", "light", "time", "mode", "opacity", "background"];
 
-/** A map that tells its element of all that it fires. */
-class toldMap extends map {
-  readonly tell: Tell | undefined;
+/** A map that forwards its events to its element. */
+class forwardingMap extends map {
+  readonly forward: FireEvent | undefined;
 
-  constructor(target: HTMLElement, options: MapOptions, tell: Tell) {
+  constructor(target: HTMLElement, options: MapOptions, forward: FireEvent) {
     super(target, options);
-    this.tell = tell;
+    this.forward = forward;
   }
 
   override fire<K extends keyof MapEvents>(type: K, fields: MapEvents[K]): this {
     super.fire(type, fields);
-    this.tell?.(type, fields);
+    this.forward?.(type, fields);
     return this;
   }
 
@@ -44,127 +44,127 @@ class toldMap extends map {
 }
 
 /**
- * `<map-3d src="…">`: a map as an element. Its height is the style sheet's, 24rem unless given. Inside it: `<map-3d-layer>`, `<map-3d-marker>`, and a sentence
- * that is shown where nothing can be drawn. Attributes can change at any time; what they cannot mean is an event `map-error`, and ignored.
+ * `<map-3d src="…">`: a map as an element, 24rem high unless a style sheet sets its height. It can contain `<map-3d-layer>`, `<map-3d-marker>` and fallback
+ * content, which is shown when no map can be drawn. Attributes can change at any time; an invalid value fires `map-error` and is ignored.
  */
-export class mapElement extends PageElement implements Place {
+export class mapElement extends PageElement implements ElementHost {
   /** @internal */
-  static readonly observedAttributes: readonly string[] = [...MAKING, ...FOLLOWED];
-  #frame: Frame | undefined;
+  static readonly observedAttributes: readonly string[] = [...RECREATING, ...APPLIED];
+  #content: ElementContent | undefined;
   #map: map | null = null;
   #base: imageLayer | null = null;
   #failed = new WeakSet<imageLayer>();
   #drawn = false;
-  /** The map has a view. */
+  /** True once the map has a view. */
   #ready = false;
-  /** A new map is to be made, once the script that changes attributes has ended. */
-  #stale = false;
-  /** Another rendering is to be shown: the view of the one before says nothing. */
-  #other = false;
-  #left: Left = {};
+  /** A new map is created after the current script, which may change more attributes. */
+  #renewScheduled = false;
+  /** `src` has changed, so the saved view does not apply. */
+  #srcChanged = false;
+  #saved: SavedState = {};
 
-  /** null while the element is not in the page. */
+  /** The map; null while the element is not in the page. */
   get map(): map | null {
     return this.#map;
   }
 
-  /** That of `src` first, then those of `<map-3d-layer>`, then those that scripts have added. */
+  /** The layer of `src`, then those of `<map-3d-layer>`, then those that scripts have added. */
   get layers(): readonly imageLayer[] {
     return this.#map?.layers ?? [];
   }
 
-  /** A picture is seen or to come; else what stands inside the element is shown. */
+  /** True while the map is shown, false while the fallback content is. */
   get drawn(): boolean {
     return this.#drawn;
   }
 
   /** @internal */
   connectedCallback(): void {
-    if (!this.#map) this.#begin();
+    if (!this.#map) this.#create();
   }
 
-  /** @internal The map stays when the element is only put elsewhere. */
+  /** @internal Keeps the map when the element is only moved. */
   disconnectedCallback(): void {
     queueMicrotask(() => {
-      if (!this.isConnected) this.#end();
+      if (!this.isConnected) this.#destroy();
     });
   }
 
   /** @internal */
   attributeChangedCallback(name: string): void {
-    if (name === "src") this.#other = true;
-    if (!this.#map) this.#left = { ...this.#left, [name]: undefined, ...(name === "light" && { time: undefined }) };
-    else if (MAKING.has(name)) this.#renewSoon();
-    else if (this.#ready) this.#try(() => { this.#follow(name); });
-    else this.#renewSoon();
+    if (name === "src") this.#srcChanged = true;
+    if (!this.#map) this.#saved = { ...this.#saved, [name]: undefined, ...(name === "light" && { time: undefined }) };
+    else if (RECREATING.has(name)) this.#scheduleRenew();
+    else if (this.#ready) this.#try(() => { this.#apply(name); });
+    else this.#scheduleRenew();
   }
 
   /** @internal */
   report(reason: unknown): void {
-    this.#tell("error", { error: reason instanceof Error ? reason : new Error(String(reason)) });
+    this.#dispatch("error", { error: reason instanceof Error ? reason : new Error(String(reason)) });
   }
 
   /** @internal */
   watch(layer: imageLayer): void {
     layer.on("error", () => {
       if (!layer.rendering) this.#failed.add(layer);
-      this.#judge();
+      this.#updateContent();
     });
     layer.on("ready", () => {
       this.#failed.delete(layer);
-      this.#judge();
+      this.#updateContent();
     });
-    this.#judge();
+    this.#updateContent();
   }
 
-  // The map's life
+  // Lifecycle
 
-  #begin(): void {
-    if (this.#other) this.#left = {};
-    this.#other = false;
-    this.#frame ??= new Frame(this);
+  #create(): void {
+    if (this.#srcChanged) this.#saved = {};
+    this.#srcChanged = false;
+    this.#content ??= new ElementContent(this);
     const options = this.#options();
-    this.#map = new toldMap(this.#frame.lay(options.language), options, this.#tell);
-    if (words(this, "src").length > 0) this.#try(() => { this.#base = layerOf(this); });
+    this.#map = new forwardingMap(this.#content.createContainer(options.language), options, this.#dispatch);
+    if (words(this, "src").length > 0) this.#try(() => { this.#base = createLayer(this); });
     if (this.#base) this.#map.add(this.#base);
     if (this.#base) this.watch(this.#base);
     for (const each of this.#parts("map-3d-layer")) each.enter(this);
-    this.#judge();
+    this.#updateContent();
   }
 
-  #end(): void {
-    const ended = this.#map;
-    if (!ended) return;
-    if (this.#ready) this.#left = { center: ended.center ?? undefined, zoom: ended.zoom, direction: ended.direction, light: ended.light, time: ended.time ?? undefined };
+  #destroy(): void {
+    const map = this.#map;
+    if (!map) return;
+    if (this.#ready) this.#saved = { center: map.center ?? undefined, zoom: map.zoom, direction: map.direction, light: map.light, time: map.time ?? undefined };
     for (const each of this.#parts("map-3d-layer, map-3d-marker")) each.leave();
-    ended.remove();
-    this.#frame?.clear();
+    map.remove();
+    this.#content?.clear();
     this.#map = this.#base = null;
     this.#ready = this.#drawn = false;
   }
 
-  #renewSoon(): void {
-    if (this.#stale) return;
-    this.#stale = true;
+  #scheduleRenew(): void {
+    if (this.#renewScheduled) return;
+    this.#renewScheduled = true;
     queueMicrotask(() => {
-      this.#stale = false;
+      this.#renewScheduled = false;
       if (!this.#map) return;
-      this.#end();
-      this.#begin();
+      this.#destroy();
+      this.#create();
     });
   }
 
-  /** Shows the map, or what stands in for it; then what markers have inside is a part of that. */
-  #judge(): void {
+  /** Shows the map or the fallback content, which includes the content of the markers. */
+  #updateContent(): void {
     const map = this.#map;
     if (!map) return;
-    const before = this.#drawn;
+    const wasDrawn = this.#drawn;
     this.#drawn = map.drawer !== null && map.layers.some((layer) => !this.#failed.has(layer));
-    if (this.#drawn !== before) for (const each of this.#parts("map-3d-marker")) each.enter(this);
-    this.#frame?.show(this.#drawn, map.language);
+    if (this.#drawn !== wasDrawn) for (const each of this.#parts("map-3d-marker")) each.enter(this);
+    this.#content?.show(this.#drawn, map.language);
   }
 
-  /** Those that are registered already; the others come by themselves. */
+  /** Parts that are already defined; the others add themselves. */
   #parts(selector: string): part<Addable<map>>[] {
     return [...this.querySelectorAll<part<Addable<map>>>(selector)].filter((element) => "enter" in element);
   }
@@ -172,13 +172,13 @@ export class mapElement extends PageElement implements Place {
   // Attributes
 
   #options(): MapOptions {
-    const left = this.#left;
+    const saved = this.#saved;
     const [language, drawer, background] = ["language", "drawer", "background"].map((name) => this.getAttribute(name) ?? undefined);
     const all = {
-      center: left.center ?? this.#try(() => position(this, "center")),
-      zoom: left.zoom ?? this.#try(() => number(this, "zoom")),
-      direction: left.direction ?? this.getAttribute("direction") ?? undefined,
-      light: left.light ?? this.#try(() => light(this)),
+      center: saved.center ?? this.#try(() => position(this, "center")),
+      zoom: saved.zoom ?? this.#try(() => number(this, "zoom")),
+      direction: saved.direction ?? this.getAttribute("direction") ?? undefined,
+      light: saved.light ?? this.#try(() => light(this)),
       drawer: drawer as MapOptions["drawer"],
       controls: isOn(this, "controls"),
       attribution: isOn(this, "attribution"),
@@ -189,23 +189,23 @@ export class mapElement extends PageElement implements Place {
     return Object.fromEntries(Object.entries(all).filter(([, value]) => value !== undefined));
   }
 
-  /** Brings an attribute's new value to the map; one that was taken away changes nothing, except that of a layer. @throws UsageError */
-  #follow(name: string): void {
+  /** Applies a changed attribute to the map. A removed attribute changes nothing, except for those of the layer. @throws UsageError */
+  #apply(name: string): void {
     const map = this.#map as map;
     const value = this.getAttribute(name);
-    if (this.#base && (name === "mode" || name === "opacity")) followLayer(this, this.#base, name);
+    if (this.#base && (name === "mode" || name === "opacity")) updateLayer(this, this.#base, name);
     else if (value === null) return;
     else if (name === "direction") map.setDirection(value);
     else if (name === "background") map.setBackground(value);
     else if (name === "zoom") map.setZoom(number(this, name) ?? map.zoom);
-    else if (name === "center") given(position(this, name), (center) => map.setView(center));
-    else if (name === "light") given(light(this), (part) => map.setLight(part));
-    else if (name === "time") given(time(this), (moment) => map.setTime(moment));
+    else if (name === "center") ifDefined(position(this, name), (center) => map.setView(center));
+    else if (name === "light") ifDefined(light(this), (part) => map.setLight(part));
+    else if (name === "time") ifDefined(time(this), (time) => map.setTime(time));
   }
 
-  #try<T>(act: () => T): T | undefined {
+  #try<T>(action: () => T): T | undefined {
     try {
-      return act();
+      return action();
     } catch (reason) {
       this.report(reason);
       return undefined;
@@ -214,24 +214,24 @@ export class mapElement extends PageElement implements Place {
 
   // Events
 
-  readonly #tell: Tell = (type, fields) => {
-    if (type === "ready") this.#begun();
+  readonly #dispatch: FireEvent = (type, fields) => {
+    if (type === "ready") this.#onReady();
     const event = new CustomEvent(`map-${type}`, { detail: fields, bubbles: true, composed: true, cancelable: type === "error" });
-    const quiet = !this.dispatchEvent(event);
-    if ("error" in fields && !quiet) console.warn(`map3d: ${fields.error.message}`);
+    const handled = !this.dispatchEvent(event);
+    if ("error" in fields && !handled) console.warn(`map3d: ${fields.error.message}`);
   };
 
-  /** The map has a view. Light of a moment needs to know where on earth that is. */
-  #begun(): void {
+  /** Applies the saved time once the map is ready: the sun's position needs the location of the scene. */
+  #onReady(): void {
     this.#ready = true;
-    const { light: lit, time: moment } = this.#left;
-    if (moment) this.#try(() => this.#map?.setTime(moment));
-    else if (!lit) this.#try(() => { this.#follow("time"); });
-    this.#left = {};
-    this.#judge();
+    const { light: savedLight, time: savedTime } = this.#saved;
+    if (savedTime) this.#try(() => this.#map?.setTime(savedTime));
+    else if (!savedLight) this.#try(() => { this.#apply("time"); });
+    this.#saved = {};
+    this.#updateContent();
   }
 }
 
-const given = <T>(value: T | undefined, act: (value: T) => unknown): void => {
-  if (value !== undefined) act(value);
+const ifDefined = <T>(value: T | undefined, action: (value: T) => unknown): void => {
+  if (value !== undefined) action(value);
 };

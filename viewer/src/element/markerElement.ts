@@ -1,30 +1,30 @@
 import { marker, UsageError } from "../map3d";
 import { position } from "./attributes";
-import { part, type Place } from "./part";
+import { part, type ElementHost } from "./part";
 
 /**
- * `<map-3d-marker position="x y z" label="…" color="…" open>` inside `<map-3d>`: a labelled position of the scene's CRS, metres. What is inside is shown in
- * a popup, which `open` opens at once; it is moved there, not copied, and comes back when the marker leaves the map.
+ * `<map-3d-marker position="x y z" label="…" color="…" open>` inside `<map-3d>`: a labelled position in the scene's CRS, metres. Its content is shown in a
+ * popup, which `open` opens at once. The content is moved to the popup, not copied, and moves back when the marker leaves the map.
  */
 export class markerElement extends part<marker> {
   /** @internal */
   static readonly observedAttributes = ["position", "label", "color", "open"];
   #body: HTMLElement | null = null;
-  #watch: MutationObserver | null = null;
+  #observer: MutationObserver | null = null;
 
-  /** null while it is on no map. */
+  /** The marker; null while the element is not on a map. */
   get marker(): marker | null {
     return this.item;
   }
 
-  protected make(): marker {
+  protected create(): marker {
     const [label, at, color] = [this.getAttribute("label")?.trim() ?? "", position(this, "position"), this.getAttribute("color")];
-    if (label === "") throw new UsageError("a <map-3d-marker> needs a label, which is shown and read aloud");
-    if (!at) throw new UsageError(`<map-3d-marker label="${label}"> needs a position: x, y and z of the scene's CRS, such as "691000 5336000 520"`);
+    if (label === "") throw new UsageError("<map-3d-marker> needs the attribute label, its visible and accessible name");
+    if (!at) throw new UsageError(`<map-3d-marker label="${label}"> needs the attribute position: x, y and z in the scene's CRS, such as "691000 5336000 520"`);
     return new marker(label, at, color === null ? {} : { color });
   }
 
-  protected follow(item: marker, name: string): boolean {
+  protected update(item: marker, name: string): boolean {
     const [label, at] = [this.getAttribute("label")?.trim() ?? "", position(this, "position")];
     if (label === "" || !at || name === "color") return false;
     if (name === "label") item.setLabel(label);
@@ -34,32 +34,32 @@ export class markerElement extends part<marker> {
     return true;
   }
 
-  protected override fits(place: Place): boolean {
-    return place.map !== null && place.drawn;
+  protected override isReady(host: ElementHost): boolean {
+    return host.map !== null && host.drawn;
   }
 
   protected added(item: marker): void {
     this.#body ??= document.createElement("div");
-    this.#watch = new MutationObserver(() => { this.#gather(item); });
-    this.#watch.observe(this, { childList: true });
-    this.#gather(item);
+    this.#observer = new MutationObserver(() => { this.#moveContent(item); });
+    this.#observer.observe(this, { childList: true });
+    this.#moveContent(item);
   }
 
-  protected taken(): void {
-    this.#watch?.disconnect();
-    this.#watch = null;
+  protected removed(): void {
+    this.#observer?.disconnect();
+    this.#observer = null;
     if (this.#body) this.append(...this.#body.childNodes);
   }
 
-  /** Takes what is inside, also what comes later, into the popup. */
-  #gather(item: marker): void {
+  /** Moves the element's content to the popup, now and when it changes. */
+  #moveContent(item: marker): void {
     const body = this.#body;
     if (!body) return;
-    const first = !filled(body);
+    const wasEmpty = !hasContent(body);
     body.append(...this.childNodes);
-    if (first && filled(body)) item.bindPopup(body);
-    if (first && filled(body) && this.hasAttribute("open")) item.openPopup();
+    if (wasEmpty && hasContent(body)) item.bindPopup(body);
+    if (wasEmpty && hasContent(body) && this.hasAttribute("open")) item.openPopup();
   }
 }
 
-const filled = (body: HTMLElement): boolean => body.childElementCount > 0 || body.textContent.trim() !== "";
+const hasContent = (body: HTMLElement): boolean => body.childElementCount > 0 || body.textContent.trim() !== "";

@@ -1,97 +1,97 @@
 import type { Addable, imageLayer, map } from "../map3d";
 import { PageElement } from "./attributes";
 
-/** What a part sees of the `<map-3d>` around it. */
-export interface Place {
-  /** null while it is not in the page. */
+/** The `<map-3d>` that contains a part. */
+export interface ElementHost {
+  /** null while the element is not in the page. */
   readonly map: map | null;
-  /** A picture is seen or to come, not what stands in for it. */
+  /** True while the map, not the fallback content, is shown. */
   readonly drawn: boolean;
-  /** @internal Learns from a layer whether there will be a picture. */
+  /** @internal Observes whether a layer loads. */
   watch(layer: imageLayer): void;
-  /** @internal Tells of an error by the event `map-error`. */
+  /** @internal Fires the event `map-error`. */
   report(reason: unknown): void;
 }
 
-/** An element inside `<map-3d>` that puts something on its map. */
+/** An element inside `<map-3d>` that adds an item to its map. */
 export abstract class part<T extends Addable<map>> extends PageElement {
   #item: T | null = null;
-  #place: Place | null = null;
-  #waits = false;
+  #host: ElementHost | null = null;
+  #scheduled = false;
 
-  /** What it has put on the map. */
+  /** The item on the map. */
   protected get item(): T | null {
     return this.#item;
   }
 
-  /** From the attributes. @throws UsageError */
-  protected abstract make(): T;
-  /** Brings an attribute's new value to what is on the map; false: it has to be made anew. */
-  protected abstract follow(item: T, name: string): boolean;
-  /** It is on the map. */
-  protected abstract added(item: T, place: Place): void;
-  /** It is on no map. */
-  protected abstract taken(): void;
+  /** Creates the item from the attributes. @throws UsageError */
+  protected abstract create(): T;
+  /** Applies a changed attribute to the item. @returns false when the item must be created again */
+  protected abstract update(item: T, name: string): boolean;
+  /** Called after the item was added to the map. */
+  protected abstract added(item: T, host: ElementHost): void;
+  /** Called after the item was removed from the map. */
+  protected abstract removed(): void;
 
-  /** May it be on the map now? */
-  protected fits(place: Place): boolean {
-    return place.map !== null;
+  /** Can the item be on the map now? */
+  protected isReady(host: ElementHost): boolean {
+    return host.map !== null;
   }
 
   /** @internal */
   connectedCallback(): void {
-    this.#settleSoon();
+    this.#scheduleUpdate();
   }
 
   /** @internal */
   disconnectedCallback(): void {
-    this.#settleSoon();
+    this.#scheduleUpdate();
   }
 
   /** @internal */
   attributeChangedCallback(name: string): void {
-    const place = this.#place;
-    if (!place) return;
+    const host = this.#host;
+    if (!host) return;
     try {
-      if (!this.#item || !this.follow(this.#item, name)) this.enter(place);
+      if (!this.#item || !this.update(this.#item, name)) this.enter(host);
     } catch (reason) {
-      place.report(reason);
+      host.report(reason);
     }
   }
 
-  /** @internal Goes onto the map, anew if it is there. */
-  enter(place: Place): void {
+  /** @internal Adds the item to the map; creates it again if it is there. */
+  enter(host: ElementHost): void {
     this.leave();
-    this.#place = place;
-    if (!this.fits(place)) return;
+    this.#host = host;
+    if (!this.isReady(host)) return;
     try {
-      this.#item = this.make();
-      place.map?.add(this.#item);
-      this.added(this.#item, place);
+      this.#item = this.create();
+      host.map?.add(this.#item);
+      this.added(this.#item, host);
     } catch (reason) {
-      place.report(reason);
+      host.report(reason);
     }
   }
 
   /** @internal */
   leave(): void {
-    const [item, map] = [this.#item, this.#place?.map];
-    this.#item = this.#place = null;
+    const [item, map] = [this.#item, this.#host?.map];
+    this.#item = this.#host = null;
     if (item) map?.discard(item);
-    this.taken();
+    this.removed();
   }
 
-  /** After the script that is running, which may go on to set attributes, or put the element elsewhere. */
-  #settleSoon(): void {
-    if (this.#waits) return;
-    this.#waits = true;
+  /** Runs after the current script, which may set more attributes or move the element. */
+  #scheduleUpdate(): void {
+    if (this.#scheduled) return;
+    this.#scheduled = true;
     queueMicrotask(() => {
-      this.#waits = false;
-      const around = this.isConnected ? this.closest<HTMLElement & Partial<Place>>("map-3d") : null;
-      const place = around?.map ? (around as HTMLElement & Place) : null;
-      if (place === this.#place) return;
+      this.#scheduled = false;
+      const around = this.isConnected ? this.closest<HTMLElement & Partial<ElementHost>>("map-3d") : null;
+      const host = around?.map ? (around as HTMLElement & ElementHost) : null;
+      if (host === this.#host) return;
       this.leave();
-      if (place) this.enter(place);
+      if (host) this.enter(host);
     });
   }
 }

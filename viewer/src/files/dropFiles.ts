@@ -3,103 +3,103 @@ import { adoptStyles, element, iconButton } from "../core/dom";
 import { asError } from "../core/errors";
 import { add } from "../core/vec";
 import { MapLayer, imageLayer, type ImageLayerOptions, type map } from "../map3d";
-import { FilesError, filesSource, named } from "./filesSource";
-import { Dropped, MANIFEST, type Folder } from "./folder";
+import { FilesError, filesSource, joinPaths } from "./filesSource";
+import { DroppedEntries, MANIFEST, type Folder } from "./folder";
 import { STYLES } from "./styles";
 import { getFilesMessages } from "./i18n";
 
-/** Of a `dropFiles`. */
+/** Options of `dropFiles`. */
 export interface DropOptions {
-  /** BCP 47. Default the map's. */
+  /** BCP 47 tag. Default: the map's. */
   language?: string;
-  /** A button that opens the browser's file chooser. Default true. */
+  /** Adds a button that opens the browser's file chooser. Default true. */
   button?: boolean;
-  /** What takes drops. Default the map; a page around it may lie over its edges. */
+  /** Element that accepts drops. Default: the map. */
   target?: HTMLElement;
-  /** Of the layer that is made. */
+  /** Options of the new layer. */
   layer?: ImageLayerOptions;
-  /** A layer of the map whose place the first files take. Default none: they are shown with what is there. */
+  /** Layer that the first opened folder replaces. Default: none, so that the folder is added to the map's layers. */
   instead?: imageLayer;
 }
 
-/** What a `dropFiles` fires. */
+/** Events of `dropFiles`. */
 export interface DropEvents {
-  /** A rendering has been dropped or chosen; it is on the map. */
+  /** A folder was dropped or chosen, and is on the map. */
   dropped: { layer: imageLayer };
-  /** Files that cannot be shown; the map is as before. Said beside the button, too. */
+  /** The files cannot be shown, and the map is unchanged. The message is shown beside the button, too. */
   error: { error: Error };
 }
 
 const FOLDER = "M3 7a2 2 0 0 1 2-2h4l2 2h8a2 2 0 0 1 2 2v8a2 2 0 0 1-2 2H5a2 2 0 0 1-2-2zM12 10.5v5M9.5 13h5";
-const SHOWN_MS = 12_000;
+const MESSAGE_MS = 12_000;
 
-/** Shows renderings from files: a published folder that is dropped on the map, or chosen. The next one takes the place of the one before. */
+/** Shows a published folder that is dropped on the map or chosen with a button. Each opened folder replaces the previous one. */
 export class dropFiles extends MapLayer<map, DropEvents> {
   readonly options: DropOptions;
-  readonly #said = element("p", "map3d-status", { role: "status" });
+  readonly #status = element("p", "map3d-status", { role: "status" });
   readonly #input = element("input", "", { type: "file", multiple: "", webkitdirectory: "", hidden: "", tabindex: "-1" });
   readonly #over = element("div", "map3d-drop", { "aria-hidden": "true" });
   #box: HTMLElement | undefined;
-  #ending = new AbortController();
+  #listeners = new AbortController();
   #layer: imageLayer | undefined;
-  #asked = 0;
+  #request = 0;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(options: DropOptions = {}) {
     super();
     this.options = options;
     this.#input.addEventListener("change", () => {
-      void this.#take(Promise.resolve([...(this.#input.files ?? [])]));
+      void this.#openAndReport(Promise.resolve([...(this.#input.files ?? [])]));
       this.#input.value = "";
     });
   }
 
-  /** The rendering that was opened last; undefined before. */
+  /** The layer of the folder that was opened last; undefined before. */
   get layer(): imageLayer | undefined {
     return this.#layer;
   }
 
-  /** Shows files as if they had been dropped. @throws FilesError, ManifestError or what else is wrong with them; the map is as before */
+  /** Opens files as if they were dropped. On an error the map is unchanged. @throws FilesError, ManifestError, FetchError or DecodeError */
   async open(files: Iterable<File> | Folder): Promise<imageLayer> {
-    const at = ++this.#asked;
+    const request = ++this.#request;
     const source = filesSource(files);
     await source.manifest();
     const map = this.map;
-    if (!map || at !== this.#asked) throw new DOMException("other files were opened meanwhile, or the map is gone", "AbortError");
+    if (!map || request !== this.#request) throw new DOMException("other files were opened in the meantime, or the map was removed", "AbortError");
     const [before, layer] = [this.#layer ?? this.options.instead, new imageLayer(source, this.options.layer)];
     before?.remove();
     if (map.layers.length === 0) map.resetView();
     try {
-      await shown(layer, map);
+      await addLayer(layer, map);
     } catch (reason) {
       layer.remove();
       before?.addTo(map);
       throw reason;
     }
     this.#layer = layer;
-    fit(map, layer);
+    fitToLayer(map, layer);
     this.fire("dropped", { layer });
     return layer;
   }
 
   protected onAdd(map: map): void {
     adoptStyles(document, STYLES);
-    const words = getFilesMessages(this.options.language ?? map.language);
-    this.#over.textContent = words.drop;
-    this.#input.setAttribute("aria-label", words.open);
+    const messages = getFilesMessages(this.options.language ?? map.language);
+    this.#over.textContent = messages.drop;
+    this.#input.setAttribute("aria-label", messages.open);
     map.container.append(this.#over, this.#input);
     if (this.options.button ?? true) {
-      const button = iconButton("", words.open, FOLDER);
+      const button = iconButton("", messages.open, FOLDER);
       button.addEventListener("click", () => { this.#input.click(); });
-      this.#box = addPanelButton(map, button, this.#said);
+      this.#box = addPanelButton(map, button, this.#status);
     }
-    this.#ending = new AbortController();
-    this.#listen(this.options.target ?? map.container, this.#ending.signal);
+    this.#listeners = new AbortController();
+    this.#listen(this.options.target ?? map.container, this.#listeners.signal);
   }
 
   protected onRemove(): void {
-    this.#asked++;
-    this.#ending.abort();
+    this.#request++;
+    this.#listeners.abort();
     this.#say("");
     for (const part of [this.#box, this.#over, this.#input]) part?.remove();
     this.#layer?.remove();
@@ -107,10 +107,10 @@ export class dropFiles extends MapLayer<map, DropEvents> {
   }
 
   #listen(target: HTMLElement, signal: AbortSignal): void {
-    const over = (on: boolean): void => { this.#over.toggleAttribute("data-over", on); };
-    const listen = (type: "dragenter" | "dragover" | "drop", act: (event: DragEvent) => void): void => {
+    const over = (active: boolean): void => { this.#over.toggleAttribute("data-over", active); };
+    const listen = (type: "dragenter" | "dragover" | "drop", handle: (event: DragEvent) => void): void => {
       target.addEventListener(type, (event) => {
-        if (event.dataTransfer?.types.includes("Files") === true) act(event);
+        if (event.dataTransfer?.types.includes("Files") === true) handle(event);
       }, { signal });
     };
     for (const type of ["dragenter", "dragover"] as const) {
@@ -126,55 +126,55 @@ export class dropFiles extends MapLayer<map, DropEvents> {
     listen("drop", (event) => {
       event.preventDefault();
       over(false);
-      if (event.dataTransfer) void this.#take(filesOf(event.dataTransfer));
+      if (event.dataTransfer) void this.#openAndReport(filesOf(event.dataTransfer));
     });
   }
 
-  async #take(files: Promise<Iterable<File> | Folder>): Promise<void> {
+  async #openAndReport(files: Promise<Iterable<File> | Folder>): Promise<void> {
     this.#say("");
     try {
       await this.open(await files);
     } catch (reason) {
       const error = asError(reason);
-      if (error.name !== "AbortError") this.#failed(error);
+      if (error.name !== "AbortError") this.#fail(error);
     }
   }
 
-  #failed(error: Error): void {
-    const words = getFilesMessages(this.options.language ?? this.map?.language ?? "en");
-    this.#say(error instanceof FilesError ? words[error.problem](named(error.paths)) : `${words.failed}: ${error.message}`);
-    this.#timer = setTimeout(() => { this.#say(""); }, SHOWN_MS);
+  #fail(error: Error): void {
+    const messages = getFilesMessages(this.options.language ?? this.map?.language ?? "en");
+    this.#say(error instanceof FilesError ? messages[error.problem](joinPaths(error.paths)) : `${messages.failed}: ${error.message}`);
+    this.#timer = setTimeout(() => { this.#say(""); }, MESSAGE_MS);
     this.fire("error", { error });
   }
 
   #say(text: string): void {
     clearTimeout(this.#timer);
-    this.#said.textContent = text;
+    this.#status.textContent = text;
   }
 }
 
-/** Puts a layer on a map; settles when its manifest has been taken or refused. */
-function shown(layer: imageLayer, map: map): Promise<void> {
+/** Adds a layer to a map; settles when its manifest is read or rejected. */
+function addLayer(layer: imageLayer, map: map): Promise<void> {
   return new Promise((resolve, reject) => {
     layer.once("ready", () => { resolve(); }).once("error", ({ error }) => { reject(error); });
     layer.addTo(map);
   });
 }
 
-function fit(map: map, { rendering }: imageLayer): void {
+function fitToLayer(map: map, { rendering }: imageLayer): void {
   if (!rendering) return;
   const { origin, box: [low, high] } = rendering.json;
   map.fitBounds([add(origin, low), add(origin, high)]);
 }
 
-/** What was dropped. Folders have to be asked for before the event ends. @throws FilesError */
+/** Returns the dropped files, or the dropped folder. The entries must be read before the event ends. @throws FilesError */
 function filesOf({ items, files }: DataTransfer): Promise<Iterable<File> | Folder> {
   const entries = Array.from(items, (item) => item.webkitGetAsEntry()).filter((entry) => entry !== null);
   if (entries.length === 0) return Promise.resolve([...files]);
-  return new Dropped(entries).search().then((found) => {
-    const [folder, ...more] = found.values();
+  return new DroppedEntries(entries).findFolders().then((folders) => {
+    const [folder, ...more] = folders.values();
     if (!folder) throw new FilesError("none");
-    if (more.length > 0) throw new FilesError("several", [...found.keys()].map((path) => path + MANIFEST));
+    if (more.length > 0) throw new FilesError("several", [...folders.keys()].map((path) => path + MANIFEST));
     return folder;
   });
 }

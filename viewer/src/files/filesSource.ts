@@ -1,45 +1,45 @@
 import { Archive, FetchError, Map3dError, readManifest, type LayerInfo, type Rendering, type Source, type Tile, type View } from "../map3d";
-import { basesOf, folderOf, isInside, MANIFEST, pathOf, type Folder } from "./folder";
+import { findManifestFolders, isInside, MANIFEST, relativePath, subfolder, type Folder } from "./folder";
 import { getFilesMessages, type FilesProblem } from "./i18n";
 
-/** Files that are no whole rendering. */
+/** The files are not a complete published rendering. */
 export class FilesError extends Map3dError {
   override name = "FilesError";
   readonly problem: FilesProblem;
-  /** Those it is about. */
+  /** The affected paths. */
   readonly paths: readonly string[];
 
   constructor(problem: FilesProblem, paths: readonly string[] = []) {
-    super(getFilesMessages("en")[problem](named(paths)));
+    super(getFilesMessages("en")[problem](joinPaths(paths)));
     [this.problem, this.paths] = [problem, paths];
   }
 }
 
-const NAMED = 3;
+const MAX_PATHS = 3;
 
-/** The first few. */
-export const named = (paths: readonly string[]): string => paths.slice(0, NAMED).join(", ") + (paths.length > NAMED ? `, … (${String(paths.length)})` : "");
+/** Joins the first few paths. */
+export const joinPaths = (paths: readonly string[]): string => paths.slice(0, MAX_PATHS).join(", ") + (paths.length > MAX_PATHS ? `, … (${String(paths.length)})` : "");
 
-/** Whole files that are parsed, and parts of archives, are at most this large; beyond, they are none of ours. */
-const [JSON_BYTES, PART_BYTES] = [256 << 20, 64 << 20] as const;
+/** Largest accepted JSON file and archive part. Larger ones do not come from map3d. */
+const [MAX_JSON_BYTES, MAX_PART_BYTES] = [256 << 20, 64 << 20] as const;
 
 /**
- * A published rendering in files that a page was given, such as those of an input with `webkitdirectory`. Files are read in parts, as they are needed.
- * @throws FilesError when they have no rendering.json, or several
+ * Reads a published rendering from files, such as those of an input with `webkitdirectory`. Files are read in parts, as needed.
+ * @throws FilesError when there is no rendering.json, or more than one
  */
 export function filesSource(files: Iterable<File> | Folder): Source {
   if ("file" in files) return new FilesSource(files);
-  const all = new Map(Array.from(files, (file) => [pathOf(file), file]));
-  const [base, ...more] = basesOf(all.keys());
+  const all = new Map(Array.from(files, (file) => [relativePath(file), file]));
+  const [base, ...more] = findManifestFolders(all.keys());
   if (base === undefined) throw new FilesError("none");
   if (more.length > 0) throw new FilesError("several", [base, ...more].map((path) => path + MANIFEST));
-  return new FilesSource(folderOf(all, base));
+  return new FilesSource(subfolder(all, base));
 }
 
 class FilesSource implements Source {
   readonly #folder: Folder;
   readonly #archives = new Map<string, Archive>();
-  /** Archives as they were when the manifest was read. */
+  /** Files of the archives when the manifest was read. */
   readonly #files = new Map<string, Blob>();
   #manifest: Promise<Rendering> | undefined;
 
@@ -54,11 +54,11 @@ class FilesSource implements Source {
   async json(path: string): Promise<unknown> {
     const file = await this.#file(path);
     if (!file) return null;
-    if (file.size > JSON_BYTES) throw new FetchError(`${path}: has ${String(file.size)} bytes, expected at most ${String(JSON_BYTES)}`);
+    if (file.size > MAX_JSON_BYTES) throw new FetchError(`${path}: expected at most ${String(MAX_JSON_BYTES)} bytes, got ${String(file.size)}`);
     try {
       return JSON.parse(new TextDecoder().decode(await read(file, path))) as unknown;
     } catch (reason) {
-      throw reason instanceof SyntaxError ? new FetchError(`${path}: expected JSON, got ${String(file.size)} bytes that are not`) : reason;
+      throw reason instanceof SyntaxError ? new FetchError(`${path}: expected JSON, got ${String(file.size)} bytes of invalid JSON`) : reason;
     }
   }
 
@@ -66,7 +66,7 @@ class FilesSource implements Source {
     const archive = view.archives?.[layer.name];
     if (archive !== undefined) return this.#archive(archive).tile({ z, x, y }, signal);
     const path = [view.id, layer.name, z, x, y].join("/");
-    const file = await this.#need(path);
+    const file = await this.#requireFile(path);
     signal?.throwIfAborted();
     return read(file, path);
   }
@@ -89,23 +89,23 @@ class FilesSource implements Source {
     const known = this.#archives.get(path);
     if (known) return known;
     const archive = new Archive(path, async (offset, length, signal) => {
-      const whole = this.#files.get(path) ?? (await this.#need(path));
+      const whole = this.#files.get(path) ?? (await this.#requireFile(path));
       signal?.throwIfAborted();
-      // The first part may reach beyond the end of a small archive; no other does.
-      if (offset > 0 && (length > PART_BYTES || offset + length > whole.size)) throw new FetchError(`${path}: has ${String(whole.size)} bytes and names ${String(length)} at ${String(offset)}; copy it again`);
+      // Only the first part may reach beyond the end of a small archive.
+      if (offset > 0 && (length > MAX_PART_BYTES || offset + length > whole.size)) throw new FetchError(`${path}: expected ${String(length)} bytes at ${String(offset)}, but the file has ${String(whole.size)} bytes; copy the file again`);
       return read(whole.slice(offset, offset + length), path);
     });
     this.#archives.set(path, archive);
     return archive;
   }
 
-  async #need(path: string): Promise<Blob> {
+  async #requireFile(path: string): Promise<Blob> {
     const file = await this.#file(path);
     if (!file) throw new FilesError("missing", [path]);
     return file;
   }
 
-  /** Names come from files of others: what is not below the folder is not there. */
+  /** Returns null for a path outside the folder: paths come from untrusted files. */
   async #file(path: string): Promise<Blob | null> {
     try {
       return isInside(path) ? await this.#folder.file(path) : null;
@@ -119,7 +119,7 @@ async function read(blob: Blob, path: string): Promise<ArrayBuffer> {
   try {
     return await blob.arrayBuffer();
   } catch {
-    // NotReadableError, or NotFoundError: browsers refuse files that are other ones by now.
+    // NotReadableError or NotFoundError: browsers refuse to read files that have changed.
     throw new FilesError("changed", [path]);
   }
 }

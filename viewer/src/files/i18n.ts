@@ -1,6 +1,6 @@
 import { selectTranslation } from "../core/i18n";
 
-/** No rendering.json among the files, several, files that it names are missing, or a file cannot be read any more. */
+/** No rendering.json among the files, more than one, missing files, or a file that has changed since it was opened. */
 export type FilesProblem = "none" | "several" | "missing" | "changed";
 
 interface FilesMessages extends Record<FilesProblem, (paths: string) => string> {
@@ -10,33 +10,33 @@ interface FilesMessages extends Record<FilesProblem, (paths: string) => string> 
 }
 
 const EN: FilesMessages = {
-  open: "Open a map folder from this device",
-  drop: "Drop the folder of a published map here",
-  failed: "This cannot be shown",
-  none: () => "There is no rendering.json among these files. Take the whole folder of a published map.",
-  several: (paths) => `There are several maps: ${paths}. Take one folder.`,
-  missing: (paths) => `Files of this map are missing: ${paths}. Take the whole folder.`,
-  changed: (paths) => `${paths} has changed or moved since it was opened. Open the folder again.`,
+  open: "Open map folder",
+  drop: "Drop a map folder here to open it",
+  failed: "Couldn’t open the map",
+  none: () => "This is not a map folder: it has no rendering.json. Choose the complete folder of a published map.",
+  several: (paths) => `This folder contains several maps: ${paths}. Choose the folder of one map.`,
+  missing: (paths) => `Some files of this map are missing: ${paths}. Choose the complete folder.`,
+  changed: (paths) => `The file ${paths} has changed or moved. Open the folder again.`,
 };
 
 const DE: FilesMessages = {
-  open: "Kartenordner von diesem Gerät öffnen",
-  drop: "Den Ordner einer veröffentlichten Karte hier ablegen",
-  failed: "Das kann nicht gezeigt werden",
-  none: () => "Unter diesen Dateien ist keine rendering.json. Nehmen Sie den ganzen Ordner einer veröffentlichten Karte.",
-  several: (paths) => `Das sind mehrere Karten: ${paths}. Nehmen Sie einen Ordner.`,
-  missing: (paths) => `Dateien dieser Karte fehlen: ${paths}. Nehmen Sie den ganzen Ordner.`,
-  changed: (paths) => `${paths} wurde seit dem Öffnen geändert oder verschoben. Öffnen Sie den Ordner noch einmal.`,
+  open: "Kartenordner öffnen",
+  drop: "Kartenordner zum Öffnen hier ablegen",
+  failed: "Die Karte konnte nicht geöffnet werden",
+  none: () => "Das ist kein Kartenordner: Die Datei rendering.json fehlt. Wählen Sie den vollständigen Ordner einer veröffentlichten Karte.",
+  several: (paths) => `Dieser Ordner enthält mehrere Karten: ${paths}. Wählen Sie den Ordner einer einzelnen Karte.`,
+  missing: (paths) => `Dateien dieser Karte fehlen: ${paths}. Wählen Sie den vollständigen Ordner.`,
+  changed: (paths) => `Die Datei ${paths} wurde geändert oder verschoben. Öffnen Sie den Ordner noch einmal.`,
 };
 
 const FR: FilesMessages = {
-  open: "Ouvrir un dossier de carte de cet appareil",
-  drop: "Déposez ici le dossier d’une carte publiée",
-  failed: "Ceci ne peut pas être montré",
-  none: () => "Il n’y a pas de rendering.json parmi ces fichiers. Prenez le dossier entier d’une carte publiée.",
-  several: (paths) => `Il y a plusieurs cartes : ${paths}. Prenez un seul dossier.`,
-  missing: (paths) => `Des fichiers de cette carte manquent : ${paths}. Prenez le dossier entier.`,
-  changed: (paths) => `${paths} a changé ou a été déplacé depuis son ouverture. Ouvrez le dossier à nouveau.`,
+  open: "Ouvrir un dossier de carte",
+  drop: "Déposez un dossier de carte ici pour l’ouvrir",
+  failed: "Impossible d’ouvrir la carte",
+  none: () => "Ce n’est pas un dossier de carte : le fichier rendering.json manque. Choisissez le dossier complet d’une carte publiée.",
+  several: (paths) => `Ce dossier contient plusieurs cartes : ${paths}. Choisissez le dossier d’une seule carte.`,
+  missing: (paths) => `Des fichiers de cette carte manquent : ${paths}. Choisissez le dossier complet.`,
+  changed: (paths) => `Le fichier ${paths} a été modifié ou déplacé. Ouvrez de nouveau le dossier.`,
 };
 
 export const getFilesMessages = (language: string): FilesMessages => selectTranslation({ en: EN, de: DE, fr: FR }, language);

@@ -1,4 +1,4 @@
-/** Of what is seen while files are dragged over a map; colours are the map's. */
+/** Styles of the drop hint; colours come from the map. */
 export const STYLES = `
 .map3d-drop { position: absolute; inset: 0; z-index: 6; display: grid; place-content: center; padding: 40px; text-align: center; text-wrap: balance; font-size: 17px; font-weight: 550; pointer-events: none; visibility: hidden; opacity: 0; transition: opacity 0.12s; }
 .map3d-drop::before { content: ""; position: absolute; inset: 12px; z-index: -1; border: 2px dashed var(--map3d-accent); border-radius: 16px; background: var(--map3d-panel); }

@@ -1,34 +1,34 @@
 import { adoptStyles } from "../core/dom";
 import { add, type Box3, type Vec2, type Vec3 } from "../core/vec";
 import { MapLayer, FetchError, UsageError, type map, type marker, type Relief } from "../map3d";
-import { Drawing } from "./drawing";
-import { anchorOf, hit } from "./hit";
-import { FeatureList } from "./list";
-import { readGeojson, type Feature, type Shape, type Skipped } from "./parse";
-import { placing, worldOf } from "./place";
-import { placedShape, type Occlusion, type Placed, type Spot } from "./placed";
-import { filledStyle, type FeatureStyle } from "./style";
+import { FeatureRenderer } from "./featureRenderer";
+import { anchorOf, hitTest } from "./hitTest";
+import { FeatureList } from "./featureList";
+import { readGeojson, type Feature, type FeatureShape, type Skipped } from "./parse";
+import { coordinateTransform, worldOf } from "./coordinates";
+import { placeFeature, type Occlusion, type PlacedFeature, type FeatureDot } from "./placedFeature";
+import { resolveStyle, type FeatureStyle } from "./style";
 import { STYLES } from "./styles";
 import { getGeojsonMessages } from "./i18n";
 
 export interface GeojsonOptions {
-  /** Of all features, or of each. */
+  /** Style of all features, or a function of the feature. */
   style?: FeatureStyle | ((feature: Feature) => FeatureStyle);
-  /** What stands for a point, at its position: a marker, or null for a dot. Default dots. */
+  /** Returns a marker for a point, or null for a dot. Default: dots. */
   pointToMarker?: (feature: Feature, position: Vec3) => marker | null;
-  /** false: the feature is left out. */
+  /** Returns false for features to leave out. */
   filter?: (feature: Feature) => boolean;
   /** Called for each feature that is shown. */
   onEachFeature?: (feature: Feature) => void;
-  /** What lies behind buildings: not shown, shown pale and dashed, or shown as if nothing stood before it. Default "fade". */
+  /** Parts behind buildings: hidden, pale and dashed, or drawn as if nothing covered them. Default "fade". */
   occlusion?: Occlusion;
-  /** What coordinates are: longitude and latitude (RFC 7946), or metres of the scene's CRS. Default "lonlat". */
+  /** Coordinates: longitude and latitude (RFC 7946), or metres in the scene's CRS. Default "lonlat". */
   crs?: "lonlat" | "scene";
-  /** "absolute": coordinates with a height stand at it, in the scene's heights; "ground": all lie on the surface that is seen. Default "absolute". */
+  /** "absolute" uses given heights, in the scene's vertical CRS; "ground" drapes all features on the visible surface. Default "absolute". */
   height?: "absolute" | "ground";
-  /** What a feature is called, for keyboards and screen readers. Default its property name or title, its id or its number. */
+  /** Returns the accessible name of a feature. Default: its property `name` or `title`, its id or its number. */
   name?: (feature: Feature) => string;
-  /** false: no events of features, and no list of them. Default true. */
+  /** false disables events of features and the keyboard list. Default true. */
   interactive?: boolean;
 }
 
@@ -36,70 +36,70 @@ export interface FeatureEvent {
   readonly feature: Feature;
   /** CSS pixels. */
   readonly point: Vec2;
-  /** Of the surface there; null where none is known. */
+  /** World position of the surface there; null where it is not known. */
   readonly position: Vec3 | null;
 }
 
 export interface GeojsonEvents {
   /** The features are on the map. */
   ready: { features: readonly Feature[]; skipped: Skipped };
-  /** All that is in view is drawn, as far as the surface is known. */
+  /** All features in view are drawn, as far as the surface is known. */
   load: object;
-  /** The map's "error" says so, too. */
+  /** The features cannot be loaded. The map fires "error", too. */
   error: { error: Error };
-  /** Clicked, tapped, or Enter pressed on its name. */
+  /** A feature was clicked or tapped, or Enter was pressed on its name. */
   click: FeatureEvent;
   mouseover: FeatureEvent;
   mouseout: FeatureEvent;
 }
 
-/** GeoJSON on the map: points, lines and polygons on the surface, or at heights of their own, hidden behind what stands before them. */
+/** Shows GeoJSON on the map: points, lines and polygons, draped on the surface or at their own heights, and hidden behind buildings. */
 export class geojson extends MapLayer<map, GeojsonEvents> {
   readonly needs = ["depth"] as const;
   readonly options: GeojsonOptions;
   readonly #data: unknown;
-  readonly #drawing = new Drawing();
+  readonly #renderer = new FeatureRenderer();
   #style: GeojsonOptions["style"];
   #load: AbortController | undefined;
-  #placed: readonly Placed[] = [];
-  #markers: { marker: marker; spot: Spot; height: number }[] = [];
+  #placed: readonly PlacedFeature[] = [];
+  #markers: { marker: marker; dot: FeatureDot; height: number }[] = [];
   #list: FeatureList | undefined;
   #origin: Vec3 = [0, 0, 0];
   #bounds: Box3 | null = null;
-  #over: Placed | null = null;
+  #hovered: PlacedFeature | null = null;
   #next = 0;
   #done = false;
 
-  /** @param data GeoJSON, or where it is to be fetched */
+  /** @param data GeoJSON, or its URL */
   constructor(data: object | string, options: GeojsonOptions = {}) {
     super();
     this.#data = data;
     this.options = options;
     this.#style = options.style;
-    this.#drawing.occlusion = options.occlusion ?? "fade";
+    this.#renderer.occlusion = options.occlusion ?? "fade";
   }
 
-  /** Features that are shown; none before "ready". */
+  /** The shown features; empty before "ready". */
   get features(): readonly Feature[] {
     return this.#placed.map(({ feature }) => feature);
   }
 
-  /** What pointToMarker made. */
+  /** The markers that `pointToMarker` returned. */
   get markers(): readonly marker[] {
     return this.#markers.map(({ marker }) => marker);
   }
 
-  /** Box of the features, world coordinates, for fitBounds; those without a height lie at all heights of the scene. null before "ready", and without features. */
+  /** Bounding box of the features, world coordinates, for `fitBounds`; draped features span all heights of the scene. null before "ready", and without features. */
   get bounds(): Box3 | null {
     return this.#bounds;
   }
 
-  /** In place of the style before. @throws UsageError for numbers and colours that are none */
+  /** Replaces the style. @throws UsageError for invalid numbers and colours */
   setStyle(style: GeojsonOptions["style"]): this {
     const styles = this.#placed.map(({ feature }) => this.#styleOf(feature, style));
     this.#style = style;
     this.#placed.forEach((placed, k) => (placed.style = styles[k] ?? placed.style));
-    this.#drawing.restyle();
+    this.#renderer.restyle();
     this.#done = false;
     this.#draw();
     return this;
@@ -107,11 +107,11 @@ export class geojson extends MapLayer<map, GeojsonEvents> {
 
   protected onAdd(map: map): void {
     adoptStyles(document, STYLES);
-    map.overlayPane.prepend(this.#drawing.canvas);
+    map.overlayPane.prepend(this.#renderer.canvas);
     map.frameEvents.on("draw", this.#draw);
-    if (this.options.interactive !== false) map.on("preclick", this.#clicked).on("mousemove", this.#moved).on("moveend", this.#named).on("idle", this.#named);
+    if (this.options.interactive !== false) map.on("preclick", this.#onClick).on("mousemove", this.#onMouseMove).on("moveend", this.#updateList).on("idle", this.#updateList);
     const load = (this.#load = new AbortController());
-    this.#begin(map, load.signal).catch((reason: unknown) => {
+    this.#start(map, load.signal).catch((reason: unknown) => {
       if (load.signal.aborted) return;
       const error = reason instanceof Error ? reason : new Error(String(reason));
       this.fire("error", { error });
@@ -122,102 +122,102 @@ export class geojson extends MapLayer<map, GeojsonEvents> {
   protected onRemove(map: map): void {
     this.#load?.abort();
     cancelAnimationFrame(this.#next);
-    this.#leave();
+    this.#clearHover();
     map.frameEvents.off("draw", this.#draw);
-    map.off("preclick", this.#clicked).off("mousemove", this.#moved).off("moveend", this.#named).off("idle", this.#named);
-    this.#drawing.canvas.remove();
+    map.off("preclick", this.#onClick).off("mousemove", this.#onMouseMove).off("moveend", this.#updateList).off("idle", this.#updateList);
+    this.#renderer.canvas.remove();
     this.#list?.box.remove();
     for (const { marker } of this.#markers) map.discard(marker);
     this.#list = undefined;
     [this.#markers, this.#placed] = [[], []];
   }
 
-  async #begin(map: map, signal: AbortSignal): Promise<void> {
-    const data = typeof this.#data === "string" ? await fetched(this.#data, signal) : this.#data;
+  async #start(map: map, signal: AbortSignal): Promise<void> {
+    const data = typeof this.#data === "string" ? await fetchJson(this.#data, signal) : this.#data;
     const { crs = "lonlat", filter } = this.options;
     const { shapes, skipped } = readGeojson(data, crs === "lonlat");
     if (!map.relief) await new Promise<void>((ready) => map.once("ready", () => { ready(); }));
     const { relief } = map;
     if (signal.aborted || !relief) return;
-    this.#place(map, relief, filter ? shapes.filter(({ feature }) => filter(feature)) : shapes, crs);
+    this.#addFeatures(map, relief, filter ? shapes.filter(({ feature }) => filter(feature)) : shapes, crs);
     this.fire("ready", { features: this.features, skipped });
     map.layerContext?.requestFrame();
   }
 
-  #place(map: map, relief: Relief, shapes: readonly Shape[], crs: "lonlat" | "scene"): void {
-    const place = placing(map, relief.origin, crs);
+  #addFeatures(map: map, relief: Relief, shapes: readonly FeatureShape[], crs: "lonlat" | "scene"): void {
+    const transform = coordinateTransform(map, relief.origin, crs);
     const { height, pointToMarker, onEachFeature, interactive, name = nameOf } = this.options;
     this.#origin = relief.origin;
-    this.#placed = shapes.flatMap((shape) => placedShape(shape, place, height === "ground", this.#styleOf(shape.feature)) ?? []);
+    this.#placed = shapes.flatMap((shape) => placeFeature(shape, transform, height === "ground", this.#styleOf(shape.feature)) ?? []);
     this.#bounds = boundsOf(this.#placed, relief);
-    if (pointToMarker) this.#placed = this.#placed.map((placed) => this.#marked(map, relief, placed, pointToMarker));
-    this.#drawing.set(this.#placed);
-    const words = getGeojsonMessages(map.language);
+    if (pointToMarker) this.#placed = this.#placed.map((placed) => this.#addMarkers(map, relief, placed, pointToMarker));
+    this.#renderer.set(this.#placed);
+    const messages = getGeojsonMessages(map.language);
     const numbers = new Map(this.#placed.map((placed, k) => [placed, k + 1]));
     if (interactive !== false) {
-      const press = (placed: Placed): void => { this.#fire("click", placed, anchorOf(placed, map.relief ?? relief) ?? [0, 0]); };
-      this.#list = new FeatureList(words.features, (placed) => name(placed.feature) || words.feature(String(numbers.get(placed) ?? 0)), (placed) => { this.#choose(placed); }, press);
+      const press = (placed: PlacedFeature): void => { this.#fire("click", placed, anchorOf(placed, map.relief ?? relief) ?? [0, 0]); };
+      this.#list = new FeatureList(messages.features, (placed) => name(placed.feature) || messages.feature(String(numbers.get(placed) ?? 0)), (placed) => { this.#focus(placed); }, press);
       map.overlayPane.append(this.#list.box);
     }
     if (onEachFeature) for (const { feature } of this.#placed) onEachFeature(feature);
   }
 
-  /** The feature with markers in place of dots. */
-  #marked(map: map, relief: Relief, placed: Placed, make: NonNullable<GeojsonOptions["pointToMarker"]>): Placed {
-    const spots = placed.spots.filter((spot) => {
-      const made = make(placed.feature, worldOf(this.#origin, spot.position, relief.heights[0]));
-      if (made) this.#markers.push({ marker: made, spot, height: NaN });
-      if (made) map.add(made);
-      return !made;
+  /** Replaces dots of a feature with markers. */
+  #addMarkers(map: map, relief: Relief, placed: PlacedFeature, make: NonNullable<GeojsonOptions["pointToMarker"]>): PlacedFeature {
+    const dots = placed.dots.filter((dot) => {
+      const marker = make(placed.feature, worldOf(this.#origin, dot.position, relief.heights[0]));
+      if (marker) this.#markers.push({ marker, dot, height: NaN });
+      if (marker) map.add(marker);
+      return !marker;
     });
-    return { ...placed, spots };
+    return { ...placed, dots };
   }
 
-  #styleOf(feature: Feature, style = this.#style): Placed["style"] {
+  #styleOf(feature: Feature, style = this.#style): PlacedFeature["style"] {
     const { container } = this.map ?? {};
     const accent = (container && getComputedStyle(container).getPropertyValue("--map3d-accent").trim()) || "#0e7490";
-    return filledStyle((typeof style === "function" ? style(feature) : style) ?? {}, accent);
+    return resolveStyle((typeof style === "function" ? style(feature) : style) ?? {}, accent);
   }
 
   readonly #draw = (): void => {
     const { map } = this;
     const relief = map?.relief;
     if (!relief || this.#placed.length === 0) return;
-    // What is known lies in the plane of the view that comes.
-    this.#drawing.canvas.style.visibility = map.inTransition ? "hidden" : "";
+    // The results are in U and V of the next view, so they do not fit the frames of a transition.
+    this.#renderer.canvas.style.visibility = map.inTransition ? "hidden" : "";
     this.#landMarkers(relief);
-    const done = this.#drawing.frame(relief);
+    const done = this.#renderer.frame(relief);
     cancelAnimationFrame(this.#next);
     if (!done) this.#next = requestAnimationFrame(this.#draw);
     else if (!this.#done) this.fire("load", {});
     this.#done = done;
   };
 
-  /** Markers of points without a height come onto the surface as soon as it is seen. */
+  /** Moves markers of points without a height to the surface as soon as it is visible. */
   #landMarkers(relief: Relief): void {
-    for (const held of this.#markers) {
-      const { marker, spot } = held;
-      if (!spot.draped || !spot.settle(relief) || spot.position[2] === held.height) continue;
-      held.height = spot.position[2];
-      marker.setPosition(add(this.#origin, spot.position));
+    for (const entry of this.#markers) {
+      const { marker, dot } = entry;
+      if (!dot.draped || !dot.updateHeight(relief) || dot.position[2] === entry.height) continue;
+      entry.height = dot.position[2];
+      marker.setPosition(add(this.#origin, dot.position));
     }
   }
 
-  readonly #clicked = ({ point }: { point: Vec2 }): void => {
-    const placed = this.#hit(point);
+  readonly #onClick = ({ point }: { point: Vec2 }): void => {
+    const placed = this.#featureAt(point);
     if (placed) this.#fire("click", placed, point);
   };
 
-  readonly #moved = ({ point }: { point: Vec2 }): void => {
-    const placed = this.#hit(point);
-    if (placed === this.#over) return;
-    if (this.#over) this.#fire("mouseout", this.#over, point);
-    this.#over = placed;
+  readonly #onMouseMove = ({ point }: { point: Vec2 }): void => {
+    const placed = this.#featureAt(point);
+    if (placed === this.#hovered) return;
+    if (this.#hovered) this.#fire("mouseout", this.#hovered, point);
+    this.#hovered = placed;
     this.map?.container.classList.toggle("map3d-over", placed !== null);
     if (placed) this.#fire("mouseover", placed, point);
   };
 
-  readonly #named = (): void => {
+  readonly #updateList = (): void => {
     const relief = this.map?.relief;
     if (!relief) return;
     this.#list?.show(this.#placed.flatMap((placed) => {
@@ -226,27 +226,27 @@ export class geojson extends MapLayer<map, GeojsonEvents> {
     }));
   };
 
-  #leave(): void {
-    if (this.#over) this.map?.container.classList.remove("map3d-over");
-    this.#over = null;
+  #clearHover(): void {
+    if (this.#hovered) this.map?.container.classList.remove("map3d-over");
+    this.#hovered = null;
   }
 
-  #choose(placed: Placed | null): void {
-    this.#drawing.choose(placed);
+  #focus(placed: PlacedFeature | null): void {
+    this.#renderer.setFocus(placed);
     this.#draw();
   }
 
-  #hit(point: Vec2): Placed | null {
+  #featureAt(point: Vec2): PlacedFeature | null {
     const relief = this.map?.relief;
-    return relief ? hit(this.#placed, relief, point, this.#drawing.occlusion) : null;
+    return relief ? hitTest(this.#placed, relief, point, this.#renderer.occlusion) : null;
   }
 
-  #fire(type: "click" | "mouseover" | "mouseout", { feature }: Placed, point: Vec2): void {
+  #fire(type: "click" | "mouseover" | "mouseout", { feature }: PlacedFeature, point: Vec2): void {
     this.fire(type, { feature, point, position: this.map?.findSurfaceAt(point) ?? null });
   }
 }
 
-async function fetched(url: string, signal: AbortSignal): Promise<unknown> {
+async function fetchJson(url: string, signal: AbortSignal): Promise<unknown> {
   const answer = await fetch(url, { signal }).catch((reason: unknown) => {
     throw new FetchError(`${url}: ${String(reason)}`);
   });
@@ -255,7 +255,7 @@ async function fetched(url: string, signal: AbortSignal): Promise<unknown> {
   try {
     return JSON.parse(text) as unknown;
   } catch (reason) {
-    throw new UsageError(`${url} is no JSON: ${String(reason)}`);
+    throw new UsageError(`${url}: invalid JSON:  ${String(reason)}`);
   }
 }
 
@@ -264,7 +264,7 @@ function nameOf({ id, properties }: Feature): string {
   return String(name ?? "").slice(0, 120);
 }
 
-function boundsOf(placed: readonly Placed[], { origin, heights }: Relief): Box3 | null {
+function boundsOf(placed: readonly PlacedFeature[], { origin, heights }: Relief): Box3 | null {
   const [low, high]: [number[], number[]] = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];
   const take = (position: readonly number[], draped: boolean): void => {
     for (const z of draped ? heights : [position[2] as number]) {
@@ -274,9 +274,9 @@ function boundsOf(placed: readonly Placed[], { origin, heights }: Relief): Box3 
       });
     }
   };
-  for (const { lines, spots } of placed) {
+  for (const { lines, dots } of placed) {
     for (const { path } of lines) for (const point of path.points) take(point, path.draped);
-    for (const { position, draped } of spots) take(position, draped);
+    for (const { position, draped } of dots) take(position, draped);
   }
   return low[0] === Infinity ? null : [add(origin, low as unknown as Vec3), add(origin, high as unknown as Vec3)];
 }

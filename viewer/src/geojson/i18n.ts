@@ -5,10 +5,10 @@ interface GeojsonMessages {
   readonly feature: (number: string) => string;
 }
 
-const WORDS = {
+const MESSAGES = {
   en: { features: "Features on the map", feature: (number: string) => `Feature ${number}` },
   de: { features: "Objekte auf der Karte", feature: (number: string) => `Objekt ${number}` },
   fr: { features: "Objets sur la carte", feature: (number: string) => `Objet ${number}` },
 };
 
-export const getGeojsonMessages = (language: string): GeojsonMessages => selectTranslation(WORDS, language);
+export const getGeojsonMessages = (language: string): GeojsonMessages => selectTranslation(MESSAGES, language);

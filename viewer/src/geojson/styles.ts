@@ -1,4 +1,4 @@
-/** Of features; colours are the map's. */
+/** Styles of features; colours come from the map. */
 export const STYLES = `
 .map3d-geojson { position: absolute; inset: 0; width: 100%; height: 100%; z-index: -1; }
 .map3d-overlay:has(> .map3d-geojson) { isolation: isolate; }

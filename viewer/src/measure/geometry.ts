@@ -1,32 +1,33 @@
 import { add, dot, sub, type Vec3 } from "../core/vec";
 
-/** Of a line over points of a surface; metres. */
+/** Measurements of a line; metres. */
 export interface LineMeasure {
+  /** Length in 3D. */
   readonly length_m: number;
-  /** The same seen from above. */
+  /** Length seen from above. */
   readonly horizontal_m: number;
-  /** From the first point to the last; negative downwards. */
+  /** Height difference from the first point to the last; negative downwards. */
   readonly rise_m: number;
-  /** Lengths from point to point. */
+  /** Length of each segment. */
   readonly steps_m: readonly number[];
 }
 
-/** Of a polygon in space. */
+/** Measurements of a polygon in 3D. */
 export interface AreaMeasure {
-  /** Of the polygon seen along its normal. */
+  /** Area seen along the normal. */
   readonly area_m2: number;
-  /** Seen from above. */
+  /** Area seen from above. */
   readonly footprint_m2: number;
   readonly perimeter_m: number;
-  /** Unit, upwards or sideways; zeros where the polygon has no area. */
+  /** Unit normal, never downwards; zeros for a polygon without area. */
   readonly normal: Vec3;
-  /** Of the surface against the horizontal: 0 a floor, 90 a wall. */
+  /** Angle to the horizontal: 0 for a floor, 90 for a wall. */
   readonly slope_deg: number;
-  /** Greatest distance of a corner from the plane through the middle. */
+  /** Greatest distance of a corner from the mean plane. */
   readonly unevenness_m: number;
 }
 
-/** Of a line from point to point; zeros for less than two. */
+/** Measures a line through points; zeros for fewer than two points. */
 export function measureLine(points: readonly Vec3[]): LineMeasure {
   const steps = points.slice(1).map((point, k) => sub(point, points[k] as Vec3));
   const steps_m = steps.map((step) => Math.hypot(...step));
@@ -39,18 +40,18 @@ export function measureLine(points: readonly Vec3[]): LineMeasure {
   };
 }
 
-/** By Newell's sum over the edges, which takes corners that do not quite lie in a plane. */
+/** Measures a polygon by Newell's method, which accepts corners that are not exactly coplanar. */
 export function measureArea(points: readonly Vec3[]): AreaMeasure {
   const closed = points.length > 0 ? [...points, points[0] as Vec3] : [];
   const perimeter_m = total(measureLine(closed).steps_m);
-  // About one of the corners, so that large world coordinates leave no noise.
-  const own = points.map((point) => sub(point, points[0] as Vec3));
-  const doubled = own.reduce<Vec3>((sum, point, k) => add(sum, cross(point, own[(k + 1) % own.length] as Vec3)), [0, 0, 0]);
+  // Relative to the first corner, since large world coordinates lose precision.
+  const local = points.map((point) => sub(point, points[0] as Vec3));
+  const doubled = local.reduce<Vec3>((sum, point, k) => add(sum, cross(point, local[(k + 1) % local.length] as Vec3)), [0, 0, 0]);
   const length = Math.hypot(...doubled);
   if (length < 1e-9) return { area_m2: 0, footprint_m2: 0, perimeter_m, normal: [0, 0, 0], slope_deg: 0, unevenness_m: 0 };
   const sign = doubled[2] < 0 ? -1 : 1;
   const normal = doubled.map((part) => (sign * part) / length) as unknown as Vec3;
-  const heights = own.map((point) => dot(point, normal));
+  const heights = local.map((point) => dot(point, normal));
   const middle = total(heights) / heights.length;
   return {
     area_m2: length / 2,

@@ -1,4 +1,4 @@
-/** map3d-measure: lengths, heights, areas, faces and profiles on the surface. */
+/** map3d-measure: measures lengths, heights, areas, faces and profiles on the surface. */
 export { measure, type Corner, type MeasureEvents, type MeasureOptions } from "./measure";
 export { measureProfile, type Profile, type ProfileOptions } from "./profile";
 export { measureFace, type Face, type FaceOptions } from "./face";

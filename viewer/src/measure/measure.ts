@@ -3,78 +3,78 @@ import { asError } from "../core/errors";
 import type { Vec3 } from "../core/vec";
 import { MapLayer, type ClickEvent, type map } from "../map3d";
 import { measureArea, measureLine, type AreaMeasure, type LineMeasure } from "./geometry";
-import { Chart } from "./chart";
+import { ProfileChart } from "./profileChart";
 import { measureFace, type Face } from "./face";
-import { along, measureProfile, type Profile } from "./profile";
-import { Sketch, type Note } from "./sketch";
+import { samplePoints, measureProfile, type Profile } from "./profile";
+import { MeasureOverlay, type MeasureLabel } from "./measureOverlay";
 import { STYLES } from "./styles";
 import { MeasureMessages } from "./i18n";
 
 export interface MeasureOptions {
-  /** A line over the surface; the face under the first corner, then a polygon; or the heights along a line. Default "line". */
+  /** "line" measures a polyline, "area" a face (one corner) or a polygon, "profile" the heights along a line. Default "line". */
   kind?: "line" | "area" | "profile";
-  /** BCP 47, of the numbers. Default the map's. */
+  /** BCP 47 tag for numbers. Default: the map's. */
   language?: string;
 }
 
-/** A corner: where the surface was clicked. */
+/** A corner: a clicked position on the surface. */
 export interface Corner {
   /** World coordinates. */
   readonly position: Vec3;
-  /** Read above the deepest level, so only about right. */
+  /** Read above the deepest level. */
   readonly approximate: boolean;
 }
 
 export interface MeasureEvents {
-  /** A corner came or went. */
+  /** The corners have changed. */
   change: { corners: readonly Corner[]; line: LineMeasure; area: AreaMeasure };
-  /** The face under the only corner is known; null: nothing flat is there. */
+  /** The face at the single corner is known; null when the surface there is not flat. */
   face: { face: Face | null };
-  /** The heights along the corners are known. */
+  /** The heights along the line are known. */
   profile: { profile: Profile };
 }
 
 /**
- * Measures on the surface: each click sets a corner; Backspace takes the last one back, Escape all. Positions are those of the deepest level, whatever
- * level is shown.
+ * Measures on the surface. Each click adds a corner; Backspace removes the last one, Escape all. Positions are read from the deepest level, whatever level
+ * is shown.
  */
 export class measure extends MapLayer<map, MeasureEvents> {
   readonly options: Required<Omit<MeasureOptions, "language">> & Pick<MeasureOptions, "language">;
-  #words = new MeasureMessages(undefined);
-  readonly #sketch = new Sketch();
-  readonly #chart = new Chart((at) => { this.#walk(at); });
+  #messages = new MeasureMessages(undefined);
+  readonly #overlay = new MeasureOverlay();
+  readonly #chart = new ProfileChart((at) => { this.#onCursorMove(at); });
   #corners: readonly Corner[] = [];
   #profile: Profile | null = null;
   #face: Face | null = null;
   #direction = "";
-  #reading = new AbortController();
+  #abortReading = new AbortController();
 
   constructor({ kind = "line", ...options }: MeasureOptions = {}) {
     super();
     this.options = { kind, ...options };
   }
 
-  /** In the order in which they were set. */
+  /** Corners in the order of clicks. */
   get corners(): readonly Corner[] {
     return this.#corners;
   }
 
-  /** Of the corners as a line. */
+  /** Measurements of the line through the corners. */
   get line(): LineMeasure {
     return measureLine(this.#points());
   }
 
-  /** Of the corners as a polygon; zeros for less than three. */
+  /** Measurements of the polygon of the corners; zeros for fewer than three. */
   get area(): AreaMeasure {
     return measureArea(this.#points());
   }
 
-  /** Heights along the corners; null while they are not known, and for another kind. */
+  /** Heights along the line; null until they are known, and for other kinds. */
   get profile(): Profile | null {
     return this.#profile;
   }
 
-  /** Of the surface under the only corner, for the kind "area"; null while it is not known, or nothing flat is there. */
+  /** The face at the single corner, for the kind "area"; null until it is known, and when the surface is not flat. */
   get face(): Face | null {
     return this.#face;
   }
@@ -87,60 +87,60 @@ export class measure extends MapLayer<map, MeasureEvents> {
     return this.fire("change", { corners, line: this.line, area: this.area });
   }
 
-  /** Takes the last corner back. */
+  /** Removes the last corner. */
   undo(): this {
     return this.setCorners(this.#corners.slice(0, -1));
   }
 
-  /** Takes all corners back. */
+  /** Removes all corners. */
   clear(): this {
     return this.setCorners([]);
   }
 
   protected onAdd(map: map): void {
-    this.#words = new MeasureMessages(this.options.language ?? map.language);
+    this.#messages = new MeasureMessages(this.options.language ?? map.language);
     adoptStyles(document, STYLES);
-    map.overlayPane.append(this.#sketch.box);
-    map.frameEvents.on("move", this.#place);
-    map.on("click", this.#clicked);
-    map.container.addEventListener("keydown", this.#pressed);
+    map.overlayPane.append(this.#overlay.box);
+    map.frameEvents.on("move", this.#updateOverlay);
+    map.on("click", this.#onClick);
+    map.container.addEventListener("keydown", this.#onKeyDown);
     this.#draw();
-    map.on("moveend", this.#turned);
+    map.on("moveend", this.#onMoveEnd);
     void this.#read();
   }
 
   protected onRemove(map: map): void {
-    map.frameEvents.off("move", this.#place);
-    map.off("click", this.#clicked);
-    map.container.removeEventListener("keydown", this.#pressed);
-    map.off("moveend", this.#turned);
-    this.#reading.abort();
-    this.#sketch.box.remove();
+    map.frameEvents.off("move", this.#updateOverlay);
+    map.off("click", this.#onClick);
+    map.container.removeEventListener("keydown", this.#onKeyDown);
+    map.off("moveend", this.#onMoveEnd);
+    this.#abortReading.abort();
+    this.#overlay.box.remove();
     this.#closeChart();
   }
 
-  readonly #clicked = ({ position, approximate }: ClickEvent): void => {
+  readonly #onClick = ({ position, approximate }: ClickEvent): void => {
     if (position) this.setCorners([...this.#corners, { position, approximate }]);
   };
 
-  readonly #pressed = ({ key }: KeyboardEvent): void => {
+  readonly #onKeyDown = ({ key }: KeyboardEvent): void => {
     if (key === "Backspace") this.undo();
     else if (key === "Escape") this.clear();
   };
 
-  /** What is seen along the line is another in another direction. */
-  readonly #turned = (): void => {
-    const seen = this.map?.direction ?? "";
-    if (this.options.kind === "profile" && seen !== this.#direction) void this.#read();
+  /** Reads the profile again in another view, where other parts of the surface are visible. */
+  readonly #onMoveEnd = (): void => {
+    const direction = this.map?.direction ?? "";
+    if (this.options.kind === "profile" && direction !== this.#direction) void this.#read();
   };
 
-  /** Reads what the corners alone do not tell: the heights along them, or the face under the only one. */
+  /** Reads the heights along the line, or the face at the single corner. */
   async #read(): Promise<void> {
-    this.#reading.abort();
+    this.#abortReading.abort();
     [this.#profile, this.#face] = [null, null];
     const { map, options: { kind } } = this;
     const count = this.#corners.length;
-    const { signal } = (this.#reading = new AbortController());
+    const { signal } = (this.#abortReading = new AbortController());
     if (kind !== "profile" || count < 2) this.#closeChart();
     if (!map) return;
     this.#direction = map.direction;
@@ -162,68 +162,68 @@ export class measure extends MapLayer<map, MeasureEvents> {
     const profile = await measureProfile(map, this.#points(), { signal });
     if (signal.aborted) return;
     this.#profile = profile;
-    const places = along(this.#points(), profile.heights_m.length);
-    this.#sketch.follow(places.map(({ place: [x, y] }, k) => (Number.isNaN(profile.heights_m[k]) ? null : [x, y, profile.heights_m[k] as number])));
-    this.#place();
-    this.#chart.set(profile, this.#words, profile.approximate ? "≈ " : "");
+    const samples = samplePoints(this.#points(), profile.heights_m.length);
+    this.#overlay.setCourse(samples.map(({ position: [x, y] }, k) => (Number.isNaN(profile.heights_m[k]) ? null : [x, y, profile.heights_m[k] as number])));
+    this.#updateOverlay();
+    this.#chart.set(profile, this.#messages, profile.approximate ? "≈ " : "");
     map.overlayPane.append(this.#chart.box);
     this.fire("profile", { profile });
   }
 
-  /** A pointer may be over it. */
+  /** Removes the chart and the mark of its cursor. */
   #closeChart(): void {
     this.#chart.box.remove();
-    this.#sketch.mark(null);
+    this.#overlay.mark(null);
   }
 
-  /** Marks the place on the map that the reader of the profile is at. */
-  #walk(at: number | null): void {
+  /** Marks the position of the chart's cursor on the map. */
+  #onCursorMove(at: number | null): void {
     const { heights_m } = this.#profile ?? {};
     const height = at === null ? NaN : (heights_m?.[at] ?? NaN);
-    const { place } = (at !== null && heights_m && along(this.#points(), heights_m.length)[at]) || {};
-    this.#sketch.mark(place && !Number.isNaN(height) ? [place[0], place[1], height] : null);
-    this.#place();
+    const { position } = (at !== null && heights_m && samplePoints(this.#points(), heights_m.length)[at]) || {};
+    this.#overlay.mark(position && !Number.isNaN(height) ? [position[0], position[1], height] : null);
+    this.#updateOverlay();
   }
 
   #points(): Vec3[] {
     return this.#corners.map(({ position }) => position);
   }
 
-  readonly #place = (): void => {
-    this.#sketch.place((world) => this.map?.project(world) ?? null);
+  readonly #updateOverlay = (): void => {
+    this.#overlay.update((world) => this.map?.project(world) ?? null);
   };
 
   #draw(): void {
     const points = this.#points();
-    this.#sketch.set(points, this.options.kind === "area", this.options.kind === "area" ? this.#areaNotes(points) : this.#lineNotes(points));
-    if (this.#face) this.#sketch.follow(this.#face.outline.flatMap((loop) => [...loop, loop[0] as Vec3, null]));
-    this.#place();
+    this.#overlay.set(points, this.options.kind === "area", this.options.kind === "area" ? this.#areaLabels(points) : this.#lineLabels(points));
+    if (this.#face) this.#overlay.setCourse(this.#face.outline.flatMap((loop) => [...loop, loop[0] as Vec3, null]));
+    this.#updateOverlay();
   }
 
-  #lineNotes(points: readonly Vec3[]): Note[] {
+  #lineLabels(points: readonly Vec3[]): MeasureLabel[] {
     const last = points.at(-1);
     if (!last || points.length < 2) return [];
     const { length_m, rise_m, steps_m } = this.line;
-    const steps = steps_m.length < 2 ? [] : steps_m.map((step, k) => ({ at: between(points[k] as Vec3, points[k + 1] as Vec3), text: this.#words.length(step), main: false }));
-    return [...steps, { at: last, text: `${this.#about()}${this.#words.length(length_m)}  ${this.#words.rise(rise_m)}`, main: true }];
+    const steps = steps_m.length < 2 ? [] : steps_m.map((step, k) => ({ at: mix(points[k] as Vec3, points[k + 1] as Vec3), text: this.#messages.length(step), main: false }));
+    return [...steps, { at: last, text: `${this.#prefix()}${this.#messages.length(length_m)}  ${this.#messages.rise(rise_m)}`, main: true }];
   }
 
-  #areaNotes(points: readonly Vec3[]): Note[] {
+  #areaLabels(points: readonly Vec3[]): MeasureLabel[] {
     const [first] = points;
     if (this.#face && first) return [{ at: first, text: this.#areaText(this.#face, this.#face), main: true }];
     if (points.length < 3) return [];
-    const middle = points.reduce<Vec3>((sum, point) => between(sum, point, 1 / points.length, 1), [0, 0, 0]);
+    const middle = points.reduce<Vec3>((sum, point) => mix(sum, point, 1 / points.length, 1), [0, 0, 0]);
     return [{ at: middle, text: this.#areaText(this.area, {}), main: true }];
   }
 
   #areaText({ area_m2, slope_deg }: Pick<AreaMeasure, "area_m2" | "slope_deg">, { hidden = false, approximate = false }: Partial<Face>): string {
-    return `${approximate ? "≈ " : this.#about()}${hidden ? "≥ " : ""}${this.#words.area(area_m2)}  ∠ ${slope_deg.toFixed(0)}°`;
+    return `${approximate ? "≈ " : this.#prefix()}${hidden ? "≥ " : ""}${this.#messages.area(area_m2)}  ∠ ${slope_deg.toFixed(0)}°`;
   }
 
-  /** Said before a number that is not exact. */
-  #about(): string {
+  /** Prefix of approximate numbers. */
+  #prefix(): string {
     return this.#corners.some(({ approximate }) => approximate) ? "≈ " : "";
   }
 }
 
-const between = (a: Vec3, b: Vec3, share = 0.5, rest = 1 - share): Vec3 => [a[0] * rest + b[0] * share, a[1] * rest + b[1] * share, a[2] * rest + b[2] * share];
+const mix = (a: Vec3, b: Vec3, share = 0.5, rest = 1 - share): Vec3 => [a[0] * rest + b[0] * share, a[1] * rest + b[1] * share, a[2] * rest + b[2] * share];

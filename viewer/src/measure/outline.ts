@@ -1,23 +1,23 @@
-type Corner = readonly [column: number, row: number];
+type PixelCorner = readonly [column: number, row: number];
 
-/** From a place in rows of so many to those above, right, below and left. */
+/** Index offsets to the pixels above, right, below and left, for rows of a width. */
 export const stepsOf = (width: number): readonly number[] => [-width, 1, width, -1];
 
-/** A corner may lie so far off the line that takes its place: pixels. A staircase of pixels becomes a line. */
-const OFF_PX = 1.4;
+/** Simplification tolerance in pixels. A staircase of pixels becomes a line. */
+const TOLERANCE_PX = 1.4;
 
 /**
- * Borders of a mask (rows of `width` pixels, 1 for those that belong to it, none of them at its edge) as closed loops of pixel corners, clockwise, those
- * of holes the other way round; what is too thin for three corners is left out.
+ * Traces the borders of a mask (rows of `width` pixels, 1 inside; pixels at the edge must be 0) as closed loops of pixel corners: clockwise, holes
+ * counter-clockwise. Leaves out loops with fewer than three corners.
  */
-export function loopsOf(mask: Uint8Array, width: number): Corner[][] {
+export function loopsOf(mask: Uint8Array, width: number): PixelCorner[][] {
   const ways = bordersOf(mask, width);
-  const loops: Corner[][] = [];
-  for (let at = 0; at < ways.length; at++) while (ways[at]) loops.push(simplified(walk(ways, at, width)));
+  const loops: PixelCorner[][] = [];
+  for (let at = 0; at < ways.length; at++) while (ways[at]) loops.push(simplifyLoop(followBorder(ways, at, width)));
   return loops.filter((loop) => loop.length > 2);
 }
 
-/** Bits of the ways (as of `stepsOf`) that borders take from each pixel's upper left corner, with the mask at the right hand. */
+/** Returns, for each pixel's upper left corner, bits of the directions (in the order of `stepsOf`) in which a border continues with the mask on its right. */
 function bordersOf(mask: Uint8Array, width: number): Uint8Array {
   const ways = new Uint8Array(mask.length);
   const corners = [width, 0, 1, width + 1];
@@ -28,9 +28,9 @@ function bordersOf(mask: Uint8Array, width: number): Uint8Array {
   return ways;
 }
 
-/** Goes round a border and takes it away; where two meet, to the right, so that pixels which touch at a corner are apart. */
-function walk(ways: Uint8Array, start: number, width: number): Corner[] {
-  const corners: Corner[] = [];
+/** Follows a border and clears it. Turns right where two borders meet, so that pixels that only touch at a corner are separate. */
+function followBorder(ways: Uint8Array, start: number, width: number): PixelCorner[] {
+  const corners: PixelCorner[] = [];
   let [at, before] = [start, 0];
   do {
     const open = ways[at] as number;
@@ -43,21 +43,21 @@ function walk(ways: Uint8Array, start: number, width: number): Corner[] {
   return corners;
 }
 
-/** After Douglas and Peucker, from the corner that is farthest from the first. */
-function simplified(loop: readonly Corner[]): Corner[] {
-  const [first] = loop as [Corner];
+/** Simplifies a loop by Douglas–Peucker, split at the corner farthest from the first. */
+function simplifyLoop(loop: readonly PixelCorner[]): PixelCorner[] {
+  const [first] = loop as [PixelCorner];
   const half = farthest(loop, (corner) => Math.hypot(corner[0] - first[0], corner[1] - first[1]));
-  return [...thinned(loop.slice(0, half + 1)), ...thinned([...loop.slice(half), first])];
+  return [...simplifyLine(loop.slice(0, half + 1)), ...simplifyLine([...loop.slice(half), first])];
 }
 
-/** Without the last corner. */
-function thinned(line: readonly Corner[]): Corner[] {
-  const [a, b] = [line[0] as Corner, line.at(-1) as Corner];
+/** Simplifies a line. Omits the last corner. */
+function simplifyLine(line: readonly PixelCorner[]): PixelCorner[] {
+  const [a, b] = [line[0] as PixelCorner, line.at(-1) as PixelCorner];
   const [dx, dy] = [b[0] - a[0], b[1] - a[1]];
-  const off = ([x, y]: Corner): number => Math.abs((x - a[0]) * dy - (y - a[1]) * dx);
-  const half = farthest(line, off);
-  if (off(line[half] as Corner) <= OFF_PX * Math.hypot(dx, dy)) return [a];
-  return [...thinned(line.slice(0, half + 1)), ...thinned(line.slice(half))];
+  const area = ([x, y]: PixelCorner): number => Math.abs((x - a[0]) * dy - (y - a[1]) * dx);
+  const half = farthest(line, area);
+  if (area(line[half] as PixelCorner) <= TOLERANCE_PX * Math.hypot(dx, dy)) return [a];
+  return [...simplifyLine(line.slice(0, half + 1)), ...simplifyLine(line.slice(half))];
 }
 
-const farthest = (line: readonly Corner[], far: (corner: Corner) => number): number => line.reduce((best, corner, k) => (far(corner) > far(line[best] as Corner) ? k : best), 0);
+const farthest = (line: readonly PixelCorner[], far: (corner: PixelCorner) => number): number => line.reduce((best, corner, k) => (far(corner) > far(line[best] as PixelCorner) ? k : best), 0);

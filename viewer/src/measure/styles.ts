@@ -1,4 +1,4 @@
-/** Of measurements; colours are the map's. */
+/** Styles of measurements; colours come from the map. */
 export const STYLES = `
 .map3d-measure { position: absolute; inset: 0; }
 .map3d-measure svg { position: absolute; inset: 0; width: 100%; height: 100%; overflow: visible; }
@@ -19,7 +19,7 @@ export const STYLES = `
 .map3d-profile path.map3d-profile-fill { fill: var(--map3d-accent); fill-opacity: 0.16; }
 .map3d-profile-grid { stroke: var(--map3d-faint); stroke-opacity: 0.3; stroke-width: 1; stroke-dasharray: 2 3; }
 .map3d-profile-heights span { position: absolute; right: 0; transform: translateY(-100%); font-size: 11px; font-variant-numeric: tabular-nums; color: var(--map3d-faint); pointer-events: none; }
-.map3d-profile-hand { position: absolute; top: 0; bottom: 0; width: 0; border-left: 1.5px solid var(--map3d-ink); pointer-events: none; }
-.map3d-profile-said { margin-top: 4px; font-size: 13px; font-weight: 600; white-space: pre; font-variant-numeric: tabular-nums; overflow: hidden; text-overflow: ellipsis; }
+.map3d-profile-cursor { position: absolute; top: 0; bottom: 0; width: 0; border-left: 1.5px solid var(--map3d-ink); pointer-events: none; }
+.map3d-profile-readout { margin-top: 4px; font-size: 13px; font-weight: 600; white-space: pre; font-variant-numeric: tabular-nums; overflow: hidden; text-overflow: ellipsis; }
 @media (forced-colors: active) { .map3d-measure path, .map3d-measure circle { forced-color-adjust: none; } .map3d-measure span { border: 1px solid CanvasText; } }
 `;

@@ -1,10 +1,10 @@
 import { linkProgram } from "../core/gl";
 import { RECT_VERTEX } from "../core/shaders";
-import type { Part } from "./place";
+import type { ScreenRect } from "./projection";
 import { FRAGMENT } from "./shaders";
 
-/** Puts a picture with depth onto the screen, a pixel for a pixel. */
-export class Composite {
+/** Copies an image with depth to the screen, pixel for pixel. */
+export class CompositePass {
   readonly #gl: WebGL2RenderingContext;
   readonly #program: WebGLProgram;
 
@@ -14,8 +14,8 @@ export class Composite {
     this.#program = linkProgram(gl, "model", RECT_VERTEX, FRAGMENT);
   }
 
-  /** @param screen its width and height, device pixels */
-  paint(color: WebGLTexture, depth: WebGLTexture, { x, y, width, height }: Part, screen: { width: number; height: number }, soft: boolean): void {
+  /** Draws the image. @param rect where it goes on the screen  @param screen size in device pixels */
+  draw(color: WebGLTexture, depth: WebGLTexture, { x, y, width, height }: ScreenRect, screen: { width: number; height: number }, soft: boolean): void {
     const gl = this.#gl;
     const at = (name: string): WebGLUniformLocation | null => gl.getUniformLocation(this.#program, name);
     gl.useProgram(this.#program);

@@ -1,28 +1,28 @@
 import { add, sub, type Box3, type Vec2, type Vec3 } from "../core/vec";
 import { MapLayer, FetchError, UsageError, type map } from "../map3d";
-import { contentsOf, freed, isBoned, type Contents } from "./contents";
-import { Models, type Member } from "./models";
-import type { Action, ThreeClip, ModelLoader, Mixer, ThreeNode, Three } from "./three";
+import { readModelContents, disposeGpuResources, isSkinned, type ModelContents } from "./modelContents";
+import { ModelRenderer, type SceneModel } from "./modelRenderer";
+import type { ThreeAction, ThreeClip, ModelLoader, ThreeMixer, ThreeNode, Three } from "./threeTypes";
 
-/** How a model begins. */
+/** Options of `modelLayer`. */
 export interface ModelLayerOptions {
-  /** Where its own origin stands: world coordinates. */
+  /** World position of the model's origin. */
   position: Vec3;
-  /** By how much it is turned clockwise, seen from above. At 0 its x points to the east, and its z, where the front of a glTF is, to the south. Default 0. */
+  /** Clockwise rotation, seen from above. At 0 the model's x axis points east, and its z axis (the front of a glTF) south. Default 0. */
   heading_deg?: number;
-  /** Metres a unit of it. Default 1. */
+  /** Metres per unit of the model. Default 1. */
   scale?: number;
-  /** Its axis that points to the sky: glTF has "y". Default "y". */
+  /** The model's up axis; "y" in glTF. Default "y". */
   up?: "y" | "z";
-  /** What reads the file, e.g. three.js's GLTFLoader: the class, or one of it. Any loader whose `loadAsync` gives an Object3D, or `{ scene, animations }`. */
+  /** Loader for a URL, such as three.js's GLTFLoader: the class or an instance. `loadAsync` must return an Object3D or `{ scene, animations }`. */
   loader?: ModelLoader | (new () => ModelLoader);
-  /** Clips that play from the beginning, by name; true: all, unless the reader wants no movement. Default true. */
+  /** Animations that play at once, by name; true for all. None play under `prefers-reduced-motion`. Default true. */
   play?: boolean | string | readonly string[];
 }
 
-/** Of `play`. */
+/** Options of `play`. */
 export interface PlayOptions {
-  /** false: once, and stays as it ends. Default true. */
+  /** false plays once and stays at the end. Default true. */
   loop?: boolean;
 }
 
@@ -32,31 +32,32 @@ export interface ModelClick<T extends Three = Three> {
   readonly point: Vec2;
   /** World position on the model's surface. */
   readonly position: Vec3;
-  /** What of the model was hit. */
+  /** The part of the model that was hit. */
   readonly object: InstanceType<T["Object3D"]>;
-  /** As three.js's Raycaster gives it; its numbers are local, from the scene's origin. */
+  /** Result of three.js's Raycaster, in coordinates relative to the scene's origin. */
   readonly intersection: ReturnType<InstanceType<T["Raycaster"]>["intersectObjects"]>[number];
 }
 
-/** What a modelLayer fires. */
+/** Events of `modelLayer`. */
 export interface ModelLayerEvents<T extends Three = Three> {
   /** The model is on the map. */
   ready: { object: InstanceType<T["Object3D"]>; clips: readonly string[] };
-  /** Clicked or tapped where nothing stands before it. The map's own "click" tells, as ever, of the images there. */
+  /** The visible part of the model was clicked or tapped. The map's own "click" still reports the images there. */
   click: ModelClick<T>;
-  /** The map's "error" says so, too. */
+  /** The model cannot be loaded or drawn. The map fires "error", too. */
   error: { error: Error };
 }
 
+/** A URL, an Object3D, or the result of GLTFLoader. */
 export type ModelSource<T extends Three> = string | InstanceType<T["Object3D"]> | { readonly scene: InstanceType<T["Object3D"]>; readonly animations?: readonly ThreeClip[] };
 
-/** three.js's lights count in today's units from here on. */
-const OLDEST = 155;
+/** First release of three.js with the light units that are used here. */
+const MIN_REVISION = 155;
 const RAD = Math.PI / 180;
 
-const still = (): boolean => matchMedia("(prefers-reduced-motion: reduce)").matches;
+const reducedMotion = (): boolean => matchMedia("(prefers-reduced-motion: reduce)").matches;
 
-/** A polygonal object among the images: hidden by what stands before it, lit by the map's light. The page hands in its own three.js, which draws it. */
+/** A 3D model between the images: buildings hide it, it hides buildings, and the map's light lights it. The page passes in its own three.js, which draws it. */
 export class modelLayer<T extends Three = Three> extends MapLayer<map, ModelLayerEvents<T>> {
   readonly needs = ["depth"] as const;
   readonly options: Readonly<ModelLayerOptions>;
@@ -66,157 +67,157 @@ export class modelLayer<T extends Three = Three> extends MapLayer<map, ModelLaye
   #position: Vec3;
   #heading_deg: number;
   #scale: number;
-  #loading: Promise<Contents> | undefined;
-  #contents: Contents | undefined;
-  #mixer: Mixer | undefined;
-  #actions: Action[] = [];
-  /** What plays as soon as it is here. */
-  #wanted: { names: readonly string[]; loop: boolean } | null = null;
-  #boned = false;
-  readonly #member: Member;
+  #loading: Promise<ModelContents> | undefined;
+  #contents: ModelContents | undefined;
+  #mixer: ThreeMixer | undefined;
+  #actions: ThreeAction[] = [];
+  /** Animations to play once the model is loaded. */
+  #pending: { names: readonly string[]; loop: boolean } | null = null;
+  #skinned = false;
+  readonly #sceneModel: SceneModel;
 
-  /** @param three the page's three.js, r155 or newer  @param source where a model is to be fetched, an Object3D, or what GLTFLoader made  @throws UsageError */
+  /** @param three the page's three.js, r155 or newer  @param source a URL, an Object3D, or the result of GLTFLoader  @throws UsageError */
   constructor(three: T, source: ModelSource<T>, options: ModelLayerOptions) {
     super();
-    if (!(parseInt(three.REVISION) >= OLDEST)) throw new UsageError(`a modelLayer needs three.js r${OLDEST} or newer, got ${three.REVISION ? `r${three.REVISION}` : typeof three}`);
-    if (typeof source === "string" && !options.loader) throw new UsageError(`a modelLayer that fetches "${source}" needs a loader, e.g. { loader: GLTFLoader }`);
+    if (!(parseInt(three.REVISION) >= MIN_REVISION)) throw new UsageError(`a modelLayer needs three.js r${MIN_REVISION} or newer, got ${three.REVISION ? `r${three.REVISION}` : typeof three}`);
+    if (typeof source === "string" && !options.loader) throw new UsageError(`a modelLayer needs a loader for "${source}", e.g. { loader: GLTFLoader }`);
     this.#three = three;
     this.#source = source;
     this.options = options;
-    this.#position = checkedPosition(options.position);
-    this.#heading_deg = checked(options.heading_deg ?? 0, "heading_deg");
-    this.#scale = checkedScale(options.scale ?? 1);
+    this.#position = checkPosition(options.position);
+    this.#heading_deg = checkNumber(options.heading_deg ?? 0, "heading_deg");
+    this.#scale = checkScale(options.scale ?? 1);
     const { play = true } = options;
-    if (play !== false && !still()) this.#wanted = { names: play === true ? [] : [play].flat(), loop: true };
+    if (play !== false && !reducedMotion()) this.#pending = { names: play === true ? [] : [play].flat(), loop: true };
     this.#pivot = new three.Group();
-    this.#member = this.#made();
+    this.#sceneModel = this.#createSceneModel();
   }
 
-  /** What stands in the scene; change it as three.js has it, then call `redraw`. null before "ready". */
+  /** The model's Object3D; call `redraw` after changing it. null before "ready". */
   get object(): InstanceType<T["Object3D"]> | null {
     return (this.#contents?.object as InstanceType<T["Object3D"]> | undefined) ?? null;
   }
 
-  /** Names of its animations; none before "ready". */
+  /** Names of its animations; empty before "ready". */
   get clips(): readonly string[] {
     return this.#contents?.clips.map(({ name }) => name) ?? [];
   }
 
-  /** World coordinates. */
+  /** World position of the model's origin. */
   get position(): Vec3 {
     return this.#position;
   }
 
-  /** Degrees clockwise. */
+  /** Clockwise rotation. */
   get heading_deg(): number {
     return this.#heading_deg;
   }
 
-  /** Metres a unit of the model. */
+  /** Metres per unit of the model. */
   get scale(): number {
     return this.#scale;
   }
 
-  /** Is one of its animations under way? */
+  /** True while an animation plays. */
   get playing(): boolean {
     return this.#actions.some((action) => action.isRunning());
   }
 
-  /** Box around it, world coordinates, for fitBounds; null before "ready". */
+  /** Bounding box, world coordinates, for `fitBounds`; null before "ready". */
   get bounds(): Box3 | null {
     const [box] = this.#boxes(this.#position);
     return box ? [add(this.#position, box[0]), add(this.#position, box[1])] : null;
   }
 
-  /** World coordinates. @throws UsageError for what are no three numbers */
+  /** Moves the model. @throws UsageError unless the position is three numbers */
   setPosition(position: Vec3): this {
-    this.#position = checkedPosition(position);
+    this.#position = checkPosition(position);
     return this.redraw();
   }
 
-  /** Degrees clockwise. @throws UsageError for what is no number */
+  /** Rotates the model. @throws UsageError unless the heading is a number */
   setHeading(heading_deg: number): this {
-    this.#heading_deg = checked(heading_deg, "heading_deg");
+    this.#heading_deg = checkNumber(heading_deg, "heading_deg");
     return this.redraw();
   }
 
-  /** Metres a unit of the model. @throws UsageError unless it is above 0 */
+  /** Scales the model. @throws UsageError unless the scale is greater than 0 */
   setScale(scale: number): this {
-    this.#scale = checkedScale(scale);
+    this.#scale = checkScale(scale);
     return this.redraw();
   }
 
-  /** Plays animations; without names all of them. Before "ready" it waits. @throws UsageError for a name that it does not have */
+  /** Plays animations; all of them without names. Before "ready", they play once the model is loaded. @throws UsageError for an unknown name */
   play(names: string | readonly string[] = [], { loop = true }: PlayOptions = {}): this {
-    const wanted = { names: [names].flat(), loop };
-    if (this.#contents) this.#start(this.#contents, wanted);
-    else this.#wanted = wanted;
+    const pending = { names: [names].flat(), loop };
+    if (this.#contents) this.#playClips(this.#contents, pending);
+    else this.#pending = pending;
     return this.redraw();
   }
 
-  /** Ends all animations; the model stands as before them. */
+  /** Stops all animations and resets the model to its initial pose. */
   stop(): this {
-    this.#wanted = null;
+    this.#pending = null;
     for (const action of this.#actions.splice(0)) action.stop();
     return this.redraw();
   }
 
-  /** Shows what the page has changed of `object`. */
+  /** Redraws the map after changes to `object`. */
   redraw(): this {
     this.map?.layerContext?.requestFrame();
     return this;
   }
 
   protected onAdd(map: map): void {
-    this.#begin(map).catch((reason: unknown) => {
+    this.#start(map).catch((reason: unknown) => {
       if (this.map === map) this.#fail(map, reason instanceof Error ? reason : new Error(String(reason)));
     });
   }
 
   protected onRemove(map: map): void {
-    if (this.#contents) freed(this.#contents.object); // while the renderer still knows what it has of it
-    Models.remove(map, this.#three, this.#member);
+    if (this.#contents) disposeGpuResources(this.#contents.object); // before the renderer is disposed of, which knows its GPU resources
+    ModelRenderer.remove(map, this.#three, this.#sceneModel);
   }
 
-  async #begin(map: map): Promise<void> {
-    if (map.drawer === null) return; // the map has said why
+  async #start(map: map): Promise<void> {
+    if (map.drawer === null) return; // the map has reported the error
     this.#loading ??= this.#load();
     const contents = await this.#loading.catch((reason: unknown) => {
-      this.#loading = undefined; // put on a map again, it is tried again
+      this.#loading = undefined; // adding the layer again retries
       throw reason;
     });
-    // A context that is lost makes nothing.
-    if (map.canvas.getContext("webgl2")?.isContextLost()) await new Promise<void>((back) => map.once("contextrestored", () => { back(); }));
+    // A lost context cannot create resources.
+    if (map.canvas.getContext("webgl2")?.isContextLost()) await new Promise<void>((resolve) => map.once("contextrestored", () => { resolve(); }));
     if (this.map !== map) return;
-    this.#contents ??= this.#placed(contents);
-    Models.add(map, this.#three, this.#member);
+    this.#contents ??= this.#addToPivot(contents);
+    ModelRenderer.add(map, this.#three, this.#sceneModel);
     map.layerContext?.requestFrame();
     this.fire("ready", { object: contents.object as InstanceType<T["Object3D"]>, clips: this.clips });
-    const wanted = this.#wanted;
-    this.#wanted = null;
-    if (wanted) this.#start(contents, wanted);
+    const pending = this.#pending;
+    this.#pending = null;
+    if (pending) this.#playClips(contents, pending);
   }
 
-  async #load(): Promise<Contents> {
+  async #load(): Promise<ModelContents> {
     const source = this.#source;
     const { loader } = this.options;
-    if (typeof source !== "string" || !loader) return contentsOf(source, "the source of a modelLayer");
+    if (typeof source !== "string" || !loader) return readModelContents(source, "the source of a modelLayer");
     const reader = typeof loader === "function" ? new loader() : loader;
-    const made = await reader.loadAsync(source).catch((reason: unknown) => {
+    const loaded = await reader.loadAsync(source).catch((reason: unknown) => {
       throw new FetchError(`${source}: ${reason instanceof Error ? reason.message : String(reason)}`, (reason as { response?: Response } | null)?.response?.status);
     });
-    return contentsOf(made, source);
+    return readModelContents(loaded, source);
   }
 
-  #placed(contents: Contents): Contents {
+  #addToPivot(contents: ModelContents): ModelContents {
     this.#pivot.add(contents.object);
-    contents.object.traverse((node) => (this.#boned ||= isBoned(node)));
+    contents.object.traverse((node) => (this.#skinned ||= isSkinned(node)));
     return contents;
   }
 
-  #start({ object, clips }: Contents, { names, loop }: { names: readonly string[]; loop: boolean }): void {
+  #playClips({ object, clips }: ModelContents, { names, loop }: { names: readonly string[]; loop: boolean }): void {
     const unknown = names.find((name) => !clips.some((clip) => clip.name === name));
-    if (unknown !== undefined) throw new UsageError(`animation "${unknown}" is none of ${clips.map(({ name }) => `"${name}"`).join(", ") || "none"}`);
+    if (unknown !== undefined) throw new UsageError(`unknown animation "${unknown}"; the model has ${clips.map(({ name }) => `"${name}"`).join(", ") || "none"}`);
     const mixer = (this.#mixer ??= new this.#three.AnimationMixer(object as never));
     for (const clip of clips.filter(({ name }) => names.length === 0 || names.includes(name))) {
       const action = mixer.clipAction(clip);
@@ -232,7 +233,7 @@ export class modelLayer<T extends Three = Three> extends MapLayer<map, ModelLaye
     map.layerContext?.report(error);
   }
 
-  #made(): Member {
+  #createSceneModel(): SceneModel {
     const listening = (): boolean => this.listens("click");
     return {
       pivot: this.#pivot,
@@ -254,7 +255,7 @@ export class modelLayer<T extends Three = Three> extends MapLayer<map, ModelLaye
     };
   }
 
-  /** Places the model by an origin (world) and measures it: local boxes, none before "ready". What bones move may be as large again to all sides. */
+  /** Places the model relative to an origin (world) and returns its local bounding box, none before "ready". The box of a skinned mesh is enlarged by its own size on all sides. */
   #boxes(origin: Vec3): Box3[] {
     if (!this.#contents) return [];
     this.#pivot.position.set(...sub(this.#position, origin));
@@ -264,22 +265,22 @@ export class modelLayer<T extends Three = Three> extends MapLayer<map, ModelLaye
     box.setFromObject(this.#pivot);
     if (box.isEmpty()) return [];
     const [low, high]: Box3 = [[box.min.x, box.min.y, box.min.z], [box.max.x, box.max.y, box.max.z]];
-    const size = this.#boned ? sub(high, low) : ([0, 0, 0] as const);
+    const size = this.#skinned ? sub(high, low) : ([0, 0, 0] as const);
     return [[sub(low, size), add(high, size)]];
   }
 }
 
-function checked(value: number, name: string): number {
-  if (!Number.isFinite(value)) throw new UsageError(`${name} is to be a number, got ${String(value)}`);
+function checkNumber(value: number, name: string): number {
+  if (!Number.isFinite(value)) throw new UsageError(`${name} must be a number, got ${String(value)}`);
   return value;
 }
 
-function checkedScale(scale: number): number {
-  if (!(checked(scale, "scale") > 0)) throw new UsageError(`scale is to be above 0, got ${scale}`);
+function checkScale(scale: number): number {
+  if (!(checkNumber(scale, "scale") > 0)) throw new UsageError(`scale must be greater than 0, got ${scale}`);
   return scale;
 }
 
-function checkedPosition(position: Vec3): Vec3 {
+function checkPosition(position: Vec3): Vec3 {
   const [x, y, z] = position;
-  return [checked(x, "position x"), checked(y, "position y"), checked(z, "position z")];
+  return [checkNumber(x, "position x"), checkNumber(y, "position y"), checkNumber(z, "position z")];
 }

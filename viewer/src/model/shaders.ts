@@ -1,10 +1,10 @@
-/** As the images are drawn: light becomes sRGB at last, and pixels that are covered in part have the depth of the nearest around them. */
+/** Converts linear light to sRGB at the end, as for images. Partly covered pixels get the nearest depth around them. */
 export const FRAGMENT = `#version 300 es
 precision highp float;
 precision highp sampler2D;
 uniform sampler2D u_color; // linear, premultiplied
 uniform sampler2D u_depth;
-uniform ivec2 u_corner;   // left bottom
+uniform ivec2 u_corner;   // bottom left
 uniform bool u_soft;
 out vec4 o_color;
 

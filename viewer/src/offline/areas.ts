@@ -1,34 +1,34 @@
-import { CACHE, RECORD } from "./keys";
-import { StorageError } from "./keeper";
-import type { FilledArea } from "./plan";
+import { CACHE, RECORD } from "./cacheKeys";
+import { StorageError } from "./offlineCache";
+import type { FilledArea } from "./areaPlan";
 
-/** An area that is kept, or was begun. Its fields are options of `downloadArea`, which goes on with it or brings it up to date. */
+/** A saved or incomplete area. Pass it to `downloadArea` to resume or update it. */
 export interface StoredArea extends FilledArea {
   readonly name: string;
-  /** Of the renderings. */
+  /** Titles of its renderings. */
   readonly title: string;
-  /** Everything is there. */
+  /** False for a download that was interrupted. */
   readonly complete: boolean;
-  /** When it was finished, or begun; ISO 8601. */
+  /** Time of completion, or of the start while incomplete; ISO 8601. */
   readonly stored: string;
   readonly tiles: number;
   readonly bytes: number;
 }
 
-/** The caches of this site. @throws StorageError where there are none */
+/** Returns the Cache Storage of this site. @throws StorageError where it is not available */
 export function storage(): CacheStorage {
-  if (!("caches" in globalThis)) throw new StorageError("this browser keeps nothing here: pages need https, or localhost");
+  if (!("caches" in globalThis)) throw new StorageError("offline storage is not available; the page must be served over https or from localhost");
   return caches;
 }
 
-/** Areas of this site, the latest first. */
+/** Lists the areas saved by this site, the latest first. */
 export async function listAreas(): Promise<StoredArea[]> {
   const names = (await storage().keys()).filter((name) => name.startsWith(CACHE));
   const areas = await Promise.all(names.map((name) => readArea(name.slice(CACHE.length))));
   return areas.flatMap((area) => area ?? []).sort((a, b) => (a.stored < b.stored ? 1 : -1));
 }
 
-/** null when there is none of that name. */
+/** Returns an area by its name, or null. */
 export async function readArea(name: string): Promise<StoredArea | null> {
   const record = await storage().match(RECORD, { cacheName: CACHE + name });
   return record ? ((await record.json()) as StoredArea) : null;
@@ -38,5 +38,5 @@ export async function writeArea(cache: Cache, area: StoredArea): Promise<void> {
   await cache.put(RECORD, new Response(JSON.stringify(area), { headers: { "content-type": "application/json" } }));
 }
 
-/** Frees the room of an area. @returns false when there is none of that name */
+/** Deletes an area. @returns false when there is none of that name */
 export const removeArea = (name: string): Promise<boolean> => storage().delete(CACHE + name);

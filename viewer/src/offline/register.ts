@@ -1,20 +1,20 @@
 import { asError } from "../core/errors";
-import { StorageError } from "./keeper";
+import { StorageError } from "./offlineCache";
 
-/** Can this page be opened without a network? Browsers have service workers on pages with https, and on localhost. */
+/** Can this page be saved for offline use? Browsers support service workers on https pages and on localhost only. */
 export const canKeep = (): boolean => isSecureContext && "serviceWorker" in navigator && "caches" in globalThis;
 
 /**
- * Registers map3d-worker.js, which lies on the page's own host and serves the pages of its folder and below.
- * @throws StorageError where it cannot be
+ * Registers the service worker map3d-worker.js, which must be on the page's own host, in its folder or above.
+ * @throws StorageError when it cannot be registered
  */
 export async function registerWorker(url = "map3d-worker.js"): Promise<ServiceWorkerRegistration> {
-  if (!canKeep()) throw new StorageError("this page cannot be kept: browsers have service workers on pages with https, and on localhost");
+  if (!canKeep()) throw new StorageError("offline use is not available; the page must be served over https or from localhost");
   try {
     const { scope } = await navigator.serviceWorker.register(new URL(url, document.baseURI));
-    if (!location.href.startsWith(scope)) throw new StorageError(`it serves ${scope} only; let it lie in this page's folder or above`);
+    if (!location.href.startsWith(scope)) throw new StorageError(`its scope is ${scope}, which does not contain this page; put it into the page's folder or above`);
     return await navigator.serviceWorker.ready;
   } catch (reason) {
-    throw new StorageError(`${url} cannot be registered: ${asError(reason).message}`);
+    throw new StorageError(`cannot register ${url}:  ${asError(reason).message}`);
   }
 }

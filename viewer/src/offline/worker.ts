@@ -1,94 +1,94 @@
-/** map3d-worker: answers from kept areas when the network does not. It changes nothing that is kept. A service worker of one's own may import it. */
-import { CACHE, isVersioned, pageKey, partOf, pieceKey, rangeOf, RECORD, tagOf } from "./keys";
+/** map3d-worker: serves saved areas when the network is unavailable. It never changes them. A page's own service worker can import it. */
+import { CACHE, isVersioned, pageKey, rangeResponse, rangeKey, rangeOf, RECORD, tagOf } from "./cacheKeys";
 
-interface Waiting extends Event {
+interface LifecycleEvent extends Event {
   waitUntil(done: Promise<unknown>): void;
 }
 
-interface Asked extends Event {
+interface RequestEvent extends Event {
   readonly request: Request;
   respondWith(answer: Promise<Response>): void;
 }
 
-interface Scope {
+interface WorkerScope {
   readonly clients: { claim(): Promise<void> };
   skipWaiting(): Promise<void>;
-  addEventListener(type: "install" | "activate", listener: (event: Waiting) => void): void;
-  addEventListener(type: "fetch", listener: (event: Asked) => void): void;
+  addEventListener(type: "install" | "activate", listener: (event: LifecycleEvent) => void): void;
+  addEventListener(type: "fetch", listener: (event: RequestEvent) => void): void;
 }
 
-/** After a failure what is kept is taken at once for a while; and a network that says nothing is waited for no longer than this. */
-const [FAILED_MS, PATIENCE_MS, ORDER_MS] = [5000, 4000, 2000] as const;
+/** Time after a failure in which the cache is used first, longest wait for the network, and lifetime of the list of areas. */
+const [CACHE_FIRST_MS, TIMEOUT_MS, LIST_MS] = [5000, 4000, 2000] as const;
 
-const scope = globalThis as unknown as Scope;
-/** Of archives that the network has answered for: their states. */
+const scope = globalThis as unknown as WorkerScope;
+/** Current version of each archive, as the network has reported it. */
 const tags = new Map<string, string>();
-let failedUntil = 0;
-let order: { readonly until: number; readonly names: Promise<string[]> } | undefined;
+let cacheFirstUntil = 0;
+let cacheList: { readonly until: number; readonly names: Promise<string[]> } | undefined;
 
 scope.addEventListener("install", (event) => { event.waitUntil(scope.skipWaiting()); });
 scope.addEventListener("activate", (event) => { event.waitUntil(scope.clients.claim()); });
 scope.addEventListener("fetch", (event) => {
   const { request } = event;
-  if (request.method === "GET" && request.url.startsWith("http") && request.cache !== "only-if-cached") event.respondWith(answer(request));
+  if (request.method === "GET" && request.url.startsWith("http") && request.cache !== "only-if-cached") event.respondWith(respond(request));
 });
 
-async function answer(request: Request): Promise<Response> {
-  // Somebody wants to know what the network has now.
+async function respond(request: Request): Promise<Response> {
+  // The caller asks for the current state of the network.
   if (request.cache === "reload" && request.mode !== "navigate") return fetch(request);
   const range = rangeOf(request.headers);
-  if (range !== undefined) return piece(request, range);
-  if (isVersioned(request.url)) return (await kept(request.url)) ?? fetch(request);
-  return networkFirst(request, () => kept(request.mode === "navigate" ? pageKey(request.url) : withoutHash(request.url)));
+  if (range !== undefined) return respondRange(request, range);
+  if (isVersioned(request.url)) return (await findCached(request.url)) ?? fetch(request);
+  return networkFirst(request, () => findCached(request.mode === "navigate" ? pageKey(request.url) : withoutHash(request.url)));
 }
 
-/** A part of an archive: kept ones hold as long as the archive is the same; without the network they go together anyway. */
-async function piece(request: Request, range: string): Promise<Response> {
+/** Responds with a part of an archive. Cached parts are valid while the archive is unchanged; offline, they all belong to the same version. */
+async function respondRange(request: Request, range: string): Promise<Response> {
   const url = withoutHash(request.url);
-  const found = await kept(pieceKey(url, range));
+  const found = await findCached(rangeKey(url, range));
   const tag = found && tagOf(found.headers);
-  if (found && tag && tag === tags.get(url)) return partOf(found, range);
-  const made = await networkFirst(request, () => Promise.resolve(found));
-  if (made === found) return partOf(found, range);
-  if (made.status === 206) tags.set(url, tagOf(made.headers));
-  return made;
+  if (found && tag && tag === tags.get(url)) return rangeResponse(found, range);
+  const response = await networkFirst(request, () => Promise.resolve(found));
+  if (response === found) return rangeResponse(found, range);
+  if (response.status === 206) tags.set(url, tagOf(response.headers));
+  return response;
 }
 
-/** The network's answer, unless there is none, or none in time, and something is kept. */
+/** Returns the network's response, or the cached one if the network fails or does not respond in time. */
 async function networkFirst(request: Request, find: () => Promise<Response | undefined>): Promise<Response> {
-  if (Date.now() < failedUntil) {
+  if (Date.now() < cacheFirstUntil) {
     const found = await find();
     if (found) return found;
   }
-  const asked = fetch(request);
+  const pending = fetch(request);
   let timer: ReturnType<typeof setTimeout> | undefined;
-  const late = new Promise<null>((resolve) => { timer = setTimeout(() => { resolve(null); }, PATIENCE_MS); });
-  const got = await Promise.race([asked, late]).catch(() => null);
+  const timeout = new Promise<null>((resolve) => { timer = setTimeout(() => { resolve(null); }, TIMEOUT_MS); });
+  const response = await Promise.race([pending, timeout]).catch(() => null);
   clearTimeout(timer);
-  if (got && got.status < 500) return got;
+  if (response && response.status < 500) return response;
   const found = request.signal.aborted ? undefined : await find();
-  if (!found) return got ?? asked;
-  asked.catch(() => undefined);
-  failedUntil = Date.now() + FAILED_MS;
+  if (!found) return response ?? pending;
+  pending.catch(() => undefined);
+  cacheFirstUntil = Date.now() + CACHE_FIRST_MS;
   return found;
 }
 
-async function kept(key: string): Promise<Response | undefined> {
-  for (const name of await areas()) {
-    const found = await caches.match(key, { cacheName: name, ignoreVary: true }); // opening it would make one that was removed
+async function findCached(key: string): Promise<Response | undefined> {
+  for (const name of await listCaches()) {
+    const found = await caches.match(key, { cacheName: name, ignoreVary: true }); // open() would create a deleted cache again
     if (found) return found;
   }
   return undefined;
 }
 
-/** Their caches, the latest first: its manifest is the one that counts. */
-function areas(): Promise<string[]> {
+/** Names of the area caches, the latest first, since its manifest takes precedence. */
+function listCaches(): Promise<string[]> {
   const now = Date.now();
-  if (!order || now > order.until) order = { until: now + ORDER_MS, names: ordered() };
-  return order.names;
+  if (!cacheList || now > cacheList.until) cacheList = { until: now + LIST_MS, names: sortedCaches() };
+  return cacheList.names;
 }
 
-async function ordered(): Promise<string[]> {
+async function sortedCaches(): Promise<string[]> {
   const names = (await caches.keys()).filter((name) => name.startsWith(CACHE));
   const times = await Promise.all(names.map(async (name) => {
     const record = await caches.match(RECORD, { cacheName: name });

@@ -1,2 +1,2 @@
-/** map3d-orbit: a change of direction is a movement. */
+/** map3d-orbit: animates changes of the view. */
 export { orbit, type OrbitOptions } from "./orbit";

@@ -1,9 +1,9 @@
-/** Texels of a side of the cells that are moved; each is two triangles. */
+/** Side of a warped cell in texels; each cell is two triangles. */
 export const STEP = 2;
 
 /**
- * Moves the cells of a picture by their depth: parallel projection makes it one matrix for all. Cells whose corners lie far apart in depth are torn: they
- * get the colour of the farthest corner and lie behind all that is whole, so that they show only where no picture knows better.
+ * Warps the cells of an image by their depth; with parallel projection, one matrix transforms all cells. A cell whose corners differ much in depth is torn:
+ * it gets the colour of its farthest corner and is drawn behind all other cells, so that it only fills gaps.
  */
 export const WARP_VERTEX = `#version 300 es
 precision highp float;
@@ -12,12 +12,12 @@ precision highp sampler2D;
 uniform sampler2D u_depth;
 uniform ivec2 u_size;
 uniform int u_columns;    // cells in a row
-uniform mat3 u_turn;      // U, V, D there from U, V, D here; about the pivot
-uniform vec3 u_grid;      // U and V of the first texel's middle, about the pivot; metres a texel
-uniform vec2 u_range;     // D at depth 0, about the pivot, and D a unit
-uniform float u_tear;     // difference of depths in a torn cell
-uniform vec4 u_place;     // clip units a metre; the pivot in clip space
-uniform vec2 u_deep;      // share at D 0 about the pivot there, and a metre
+uniform mat3 u_turn;      // from U, V, D of the image to U, V, D of the view; about the pivot
+uniform vec3 u_grid;      // U and V of the first texel's centre, about the pivot; metres per texel
+uniform vec2 u_range;     // D at depth 0, about the pivot; metres per unit of depth
+uniform float u_tear;     // depth difference above which a cell is torn
+uniform vec4 u_place;     // clip units per metre; the pivot in clip space
+uniform vec2 u_deep;      // depth of the pivot in the view; depth per metre
 out vec2 v_texel;
 
 ivec2 inside(ivec2 at) { return min(at, u_size - 1); }
@@ -61,14 +61,14 @@ void main() { o_color = texture(u_color, v_texel / vec2(textureSize(u_color, 0))
 export const MIX_VERTEX = `#version 300 es
 void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }`;
 
-/** Where both pictures show the same surface they are mixed; else the nearer is seen, and what is torn only where nothing is whole. */
+/** Blends both images where they show the same surface; elsewhere shows the nearer one. Torn cells only fill gaps. */
 export const MIX_FRAGMENT = `#version 300 es
 precision highp float;
 precision highp sampler2D;
 uniform sampler2D u_colorA, u_colorB, u_depthA, u_depthB;
-uniform float u_share;    // of B
-uniform float u_tie;      // difference of depths of one surface
-uniform vec2 u_pixel;     // shares of the screen
+uniform float u_share;    // weight of B
+uniform float u_tie;      // largest depth difference on the same surface
+uniform vec2 u_pixel;     // size of a pixel, as a fraction of the screen
 out vec4 o_color;
 void main() {
   vec2 at = gl_FragCoord.xy * u_pixel;

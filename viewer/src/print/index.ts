@@ -1,2 +1,2 @@
-/** map3d-print: a map's view as a picture of any size, with what belongs to it. */
+/** map3d-print: exports the current view as an image of any size, with title, legend, scale bar, north arrow and attribution. */
 export { exportPicture, LONGEST_SIDE_PX, type PictureLegend, type PictureOptions } from "./picture";

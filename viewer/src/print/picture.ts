@@ -1,94 +1,96 @@
 import { DrawError, UsageError, type map } from "../map3d";
-import { Furniture } from "./furniture";
-import { paintPieces, type Watch } from "./pieces";
+import { Decorations } from "./decorations";
+import { drawPieces, type PieceOptions } from "./pieces";
 
-/** What colours stand for; a `theme` is one. */
+/** A legend; a `theme` has this shape. */
 export interface PictureLegend {
   readonly title: string;
   readonly classes: readonly { readonly label: string; readonly color: string }[];
-  /** Those that are shown. Default: all classes. */
+  /** The classes to show. Default: all. */
   readonly chosen?: PictureLegend["classes"];
 }
 
-export interface PictureOptions extends Watch {
-  /** Picture pixels; of one of them follows the other. Default: the map's CSS pixels times `scale`. What the map shows is seen whole; a picture of other proportions shows more. */
+export interface PictureOptions extends PieceOptions {
+  /** Size in pixels; give one to keep the map's aspect ratio. Default: the map's CSS size times `scale`. The picture contains the whole view; with another aspect ratio it shows more. */
   width_px?: number;
   height_px?: number;
-  /** Picture pixels a CSS pixel of the map, where no size is given. Default 2. */
+  /** Picture pixels per CSS pixel of the map, if no size is given. Default 2. */
   scale?: number;
-  /** Text, in the left top corner. Default none. */
+  /** Title, in the top left corner. Default: none. */
   title?: string;
-  /** In the left bottom corner. Default none. */
+  /** Legend, in the bottom left corner. Default: none. */
   legend?: PictureLegend;
-  /** Default: the layers'. */
+  /** Attribution text. Default: that of the layers. */
   attribution?: string;
-  /** Default true. */
+  /** Draw a scale bar. Default true. */
   scaleBar?: boolean;
-  /** Default true. */
+  /** Draw a north arrow. Default true. */
   northArrow?: boolean;
-  /** The map's markers, with their labels. Default true. */
+  /** Draw the map's markers and labels. Default true. */
   markers?: boolean;
-  /** Any CSS colour; "transparent": none. Default: the map's. */
+  /** Any CSS colour, "transparent" for none. Default: that of the map. */
   background?: string;
-  /** Picture pixels a CSS pixel of texts; 300 dpi are 3.125. Default: as large as beside the map. */
+  /** Picture pixels per CSS pixel of text; 3.125 for 300 dpi. Default: the scale of the map. */
   textScale?: number;
-  /** Stops it: the promise is rejected with the signal's reason. */
+  /** Aborts the export; the promise rejects with the signal's reason. */
   signal?: AbortSignal;
-  /** Called with pieces that are done, and all. */
+  /** Called after each piece with the number of finished pieces and their total. */
   progress?: (done: number, total: number) => void;
 }
 
+/** Largest width and height of a picture. */
 export const LONGEST_SIDE_PX = 8192;
 
 /**
- * What a map shows as a PNG picture of any size up to 8,192 pixels a side, with tiles as fine as that needs, in the map's looks.
- * @throws UsageError for sizes out of range or what is no colour; FetchError, DecodeError when a tile cannot be had; DrawError when the browser has no room
+ * Exports the current view of a map as a PNG image of up to 8,192 pixels per side, with the map's styles, light and highlights, and tiles as fine as the size
+ * needs. @throws UsageError for a size out of range or an invalid colour; FetchError or DecodeError when a tile fails; DrawError when the browser has too little
+ * memory
  */
 export async function exportPicture(shown: map, options: PictureOptions = {}): Promise<Blob> {
   const { clientWidth, clientHeight } = shown.canvas;
-  const { width_px, height_px, scale: wanted = (width_px ?? NaN) / clientWidth || (height_px ?? NaN) / clientHeight || 2 } = options;
-  const [width, height] = [width_px ?? Math.round(clientWidth * wanted), height_px ?? Math.round(clientHeight * wanted)];
+  const { width_px, height_px, scale: requested = (width_px ?? NaN) / clientWidth || (height_px ?? NaN) / clientHeight || 2 } = options;
+  const [width, height] = [width_px ?? Math.round(clientWidth * requested), height_px ?? Math.round(clientHeight * requested)];
   for (const [name, side] of [["width", width], ["height", height]] as const) checkSide(name, side);
   const scale = Math.min(width / clientWidth, height / clientHeight);
-  const context = contextOf(width, height);
-  paintBackground(context, options.background ?? getComputedStyle(shown.container).backgroundColor);
-  const furniture = new Furniture(shown, context, scale, options.textScale ?? scale);
-  const credit = options.attribution ?? shown.attributions.join(" · ");
-  await paintPieces(shown, { width, height, scale }, context, options);
-  furniture.begin();
-  if (options.markers ?? true) furniture.markers();
-  if (options.northArrow ?? true) furniture.northArrow();
-  if (options.title) furniture.title(options.title);
-  furniture.foot(options.legend, options.scaleBar ?? true, credit);
-  return encoded(context.canvas);
+  const context = createContext(width, height);
+  fillBackground(context, options.background ?? getComputedStyle(shown.container).backgroundColor);
+  const decorations = new Decorations(shown, context, scale, options.textScale ?? scale);
+  const attribution = options.attribution ?? shown.attributions.join(" · ");
+  await drawPieces(shown, { width, height, scale }, context, options);
+  decorations.begin();
+  if (options.markers ?? true) decorations.markers();
+  if (options.northArrow ?? true) decorations.northArrow();
+  if (options.title) decorations.title(options.title);
+  decorations.footer(options.legend, options.scaleBar ?? true, attribution);
+  return encodePng(context.canvas);
 }
 
 function checkSide(name: string, side: number): void {
-  if (!Number.isInteger(side) || side < 1 || side > LONGEST_SIDE_PX) throw new UsageError(`a picture's ${name} is a whole number from 1 to ${String(LONGEST_SIDE_PX)} pixels, got ${String(side)}`);
+  if (!Number.isInteger(side) || side < 1 || side > LONGEST_SIDE_PX) throw new UsageError(`the picture's ${name} must be a whole number from 1 to ${String(LONGEST_SIDE_PX)} pixels, got ${String(side)}`);
 }
 
-/** @throws DrawError when there is no room; browsers do not say so themselves, they draw nothing */
-function contextOf(width: number, height: number): CanvasRenderingContext2D {
+/** Creates a canvas and checks that it works: without enough memory, browsers silently draw nothing. @throws DrawError */
+function createContext(width: number, height: number): CanvasRenderingContext2D {
   const canvas = document.createElement("canvas");
   [canvas.width, canvas.height] = [width, height];
   const context = canvas.getContext("2d");
   context?.fillRect(width - 1, height - 1, 1, 1);
-  if (context?.getImageData(width - 1, height - 1, 1, 1).data[3] !== 255) throw new DrawError(`this browser has no room for a picture of ${String(width)} × ${String(height)} pixels; take a smaller one`);
+  if (context?.getImageData(width - 1, height - 1, 1, 1).data[3] !== 255) throw new DrawError(`the browser has too little memory for a picture of ${String(width)} × ${String(height)} pixels; choose a smaller size`);
   context.clearRect(0, 0, width, height);
   return context;
 }
 
-function paintBackground(context: CanvasRenderingContext2D, color: string): void {
-  if (!CSS.supports("color", color)) throw new UsageError(`background "${color}" is no colour`);
+function fillBackground(context: CanvasRenderingContext2D, color: string): void {
+  if (!CSS.supports("color", color)) throw new UsageError(`background must be a CSS colour, got "${color}"`);
   context.fillStyle = color;
   context.fillRect(0, 0, context.canvas.width, context.canvas.height);
 }
 
-function encoded(canvas: HTMLCanvasElement): Promise<Blob> {
+function encodePng(canvas: HTMLCanvasElement): Promise<Blob> {
   return new Promise((resolve, reject) => {
     canvas.toBlob((blob) => {
       if (blob) resolve(blob);
-      else reject(new DrawError(`this browser cannot write a picture of ${String(canvas.width)} × ${String(canvas.height)} pixels; take a smaller one`));
+      else reject(new DrawError(`the browser could not encode a picture of ${String(canvas.width)} × ${String(canvas.height)} pixels; choose a smaller size`));
     }, "image/png");
   });
 }

@@ -1,2 +1,2 @@
-/** map3d-shade: shadows and occlusion from what is seen. */
+/** map3d-shade: screen-space shadows and ambient occlusion. */
 export { shade, type ShadeOptions } from "./shade";

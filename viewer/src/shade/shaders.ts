@@ -1,7 +1,7 @@
-/** Samples of a disc; turns of the spiral that they lie on. */
+/** Samples on a disc, and turns of their spiral. */
 const SAMPLES = 16;
 const TURNS = 7;
-/** Steps of a ray towards the sun, each longer than the one before. */
+/** Steps of a ray towards the sun, and their growth factor. */
 const STEPS = 56;
 const GROWTH = 1.115;
 
@@ -16,28 +16,27 @@ out vec4 o_shares;
 `;
 
 /**
- * Places are in metres along right, up and forward. Occlusion is the estimator of McGuire, Mara and Luebke, "Scalable
- * Ambient Obscurance" (2012); shadows are found by walking over the depths towards the sun. What is not seen casts
- * none, and what is seen counts as solid for THICK metres behind its surface.
+ * Positions are in metres along right, up and forward. Occlusion uses the estimator of McGuire, Mara and Luebke, "Scalable Ambient Obscurance" (2012).
+ * Shadows come from ray marching the depth image towards the sun. Hidden objects cast no shadow; visible ones count as u_thick metres thick.
  */
 export const SHARES = `${HEAD}
 uniform sampler2D u_depth;
-uniform float u_px;       // metres a pixel
+uniform float u_px;       // metres per pixel
 uniform float u_span;     // metres from depth 0 to 1
-uniform vec3 u_sun;       // unit, towards it; 0: not asked for
-uniform float u_radius;   // metres; 0: not asked for
+uniform vec3 u_sun;       // unit vector towards the sun; 0 disables shadows
+uniform float u_radius;   // metres; 0 disables occlusion
 uniform float u_thick;    // metres
 
 float depthAt(ivec2 at) { return texelFetch(u_depth, clamp(at, ivec2(0), textureSize(u_depth, 0) - 1), 0).r; }
 vec3 placeOf(ivec2 at, float depth) { return vec3(vec2(at) * u_px, depth * u_span); }
 
-/** How D changes over a pixel: of the two sides, what changes less. */
+/** Change of D per pixel: the smaller one of both sides. */
 float slope(float before, float here, float after) {
   float a = here - before, b = after - here;
   return (abs(a) < abs(b) ? a : b) * u_span / u_px;
 }
 
-/** 0 to 15, all of them in each 4 × 4 pixels. */
+/** Dither pattern: each value from 0 to 15 once per 4 × 4 pixels. */
 float pattern(ivec2 at) {
   ivec2 p = at & 3;
   return float((p.x ^ p.y) & 1) * 8.0 + float(p.x & 1) * 4.0 + float(((p.x ^ p.y) >> 1) & 1) * 2.0 + float((p.x >> 1) & 1);
@@ -83,10 +82,10 @@ void main() {
   if (u_sun != vec3(0.0) && dot(normal, u_sun) > 0.0) o_shares.g = sunOf(at, place, normal, jitter);
 }`;
 
-/** Means over 4 × 4 pixels, in which each pattern occurs once, of what lies at the same depth. */
+/** Averages pixels of similar depth over 4 × 4 pixels, which contain each value of the pattern once. */
 export const SMOOTH = `${HEAD}
 uniform sampler2D u_shares;
-uniform float u_same;     // share of the range that a surface may change by within a pixel
+uniform float u_same;     // largest depth change per pixel on one surface, as a fraction of the range
 float depthIn(vec4 shares) { return (shares.b * 65280.0 + shares.a * 255.0) / 65535.0; }
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy), last = textureSize(u_shares, 0) - 1;

@@ -1,62 +1,62 @@
 import { floorToRound } from "../core/lengths";
 import type { AttributeInfo, AttributeValue } from "../map3d";
 
-/** A group of objects that have one colour. */
+/** Objects of one colour. */
 export interface ThemeClass {
-  /** As the legend says it. */
+  /** Label in the legend. */
   readonly label: string;
   /** #rrggbb */
   readonly color: string;
   readonly ids: readonly number[];
 }
 
-export interface Classes {
+export interface Classification {
   readonly classes: readonly ThemeClass[];
-  /** They follow each other, as numbers do. */
+  /** The classes have an order, such as ranges of numbers. */
   readonly ordered: boolean;
 }
 
-/** Light to dark, readable in grey and by the colour-blind. */
+/** Sequential palette, light to dark; readable in greyscale and with colour blindness. */
 export const RAMP: readonly string[] = ["#fbe3a8", "#f2b077", "#d97568", "#9d4772", "#4f2a6d"];
-/** Told apart by the colour-blind; after Okabe and Ito. */
+/** Categorical palette after Okabe and Ito, distinguishable with colour blindness. */
 export const HUES: readonly string[] = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442"];
-export const REST = "#8f9296";
+export const OTHER_COLOR = "#8f9296";
 
 export interface ClassOptions {
   readonly classes: number;
   readonly colors: readonly string[] | undefined;
   readonly language: string | undefined;
-  /** What those are called that have no class of their own. */
-  readonly rest: string;
+  /** Label of values without their own class. */
+  readonly otherLabel: string;
 }
 
 type Entry = readonly [id: number, value: AttributeValue];
 
-/** Numbers by size, everything else by value. Text that is always a number counts as such. */
-export function classify(info: Pick<AttributeInfo, "type">, column: ReadonlyMap<number, AttributeValue>, options: ClassOptions): Classes {
+/** Classifies numbers by range and everything else by value. Text counts as numbers if all values are numeric. */
+export function classify(info: Pick<AttributeInfo, "type">, column: ReadonlyMap<number, AttributeValue>, options: ClassOptions): Classification {
   const entries = [...column];
   const variety = new Set(entries.map(([, value]) => value)).size;
   const numbers = info.type === "boolean" ? null : entries.map(([id, value]) => [id, typeof value === "string" && value.trim() === "" ? NaN : Number(value)] as const);
   const numeric = numbers?.every(([, value]) => Number.isFinite(value)) === true;
-  if (numeric && variety > options.classes && (info.type === "number" || variety > 12)) return { classes: bySize(numbers, options), ordered: true };
+  if (numeric && variety > options.classes && (info.type === "number" || variety > 12)) return { classes: classifyByRange(numbers, options), ordered: true };
   const ordered = numeric && info.type === "number";
-  const found = byValue(entries, ordered, options);
-  return { classes: found, ordered: ordered && found.length <= 6 };
+  const classes = classifyByValue(entries, ordered, options);
+  return { classes, ordered: ordered && classes.length <= 6 };
 }
 
-/** As many objects in each class, as round bounds allow. */
-function bySize(entries: readonly (readonly [number, number])[], { classes, colors, language }: ClassOptions): ThemeClass[] {
+/** Classes of about equal counts, with rounded bounds. */
+function classifyByRange(entries: readonly (readonly [number, number])[], { classes, colors, language }: ClassOptions): ThemeClass[] {
   const sorted = entries.map(([, value]) => value).sort((a, b) => a - b);
-  const bounds = breaksOf(sorted, classes);
+  const bounds = classBounds(sorted, classes);
   const format = numberFormat(sorted, language);
   const groups = [...bounds, Infinity].map<number[]>(() => []);
   for (const [id, value] of entries) groups[bounds.filter((bound) => value >= bound).length]?.push(id);
-  const ramp = rampOf(colors ?? RAMP, groups.length);
+  const ramp = interpolateRamp(colors ?? RAMP, groups.length);
   return groups.map((ids, k) => ({ ids, color: ramp[k] as string, label: rangeLabel(bounds[k - 1], bounds[k], format) }));
 }
 
-/** Lower bounds of all classes but the first. */
-export function breaksOf(sorted: readonly number[], classes: number): number[] {
+/** Returns the lower bounds of all classes but the first. */
+export function classBounds(sorted: readonly number[], classes: number): number[] {
   const at = (share: number): number => sorted[Math.min(Math.floor(share * sorted.length), sorted.length - 1)] ?? 0;
   const [least, most] = [sorted[0] ?? 0, sorted.at(-1) ?? 0];
   const step = floorToRound((at(0.95) - at(0.05) || most - least) / (4 * classes));
@@ -69,39 +69,39 @@ function rangeLabel(from: number | undefined, to: number | undefined, format: (v
   return to === undefined ? `≥ ${format(from)}` : `${format(from)}–${format(to)}`;
 }
 
-/** Whole numbers that may be years have no separators. */
+/** Formats numbers; integers that could be years have no thousands separators. */
 function numberFormat(sorted: readonly number[], language: string | undefined): (value: number) => string {
   const years = sorted.every((value) => Number.isInteger(value)) && (sorted[0] ?? 0) >= 0 && (sorted.at(-1) ?? 0) < 10_000;
   const numbers = new Intl.NumberFormat(language, { useGrouping: !years, maximumSignificantDigits: 6 });
   return (value) => numbers.format(value);
 }
 
-/** The most frequent values, and what is left. */
-function byValue(entries: readonly Entry[], ordered: boolean, { colors, language, rest }: ClassOptions): ThemeClass[] {
+/** The most frequent values, and one class for the others. */
+function classifyByValue(entries: readonly Entry[], ordered: boolean, { colors, language, otherLabel }: ClassOptions): ThemeClass[] {
   const groups = new Map<AttributeValue, number[]>();
   for (const [id, value] of entries) {
     const group = groups.get(value);
     if (group) group.push(id);
     else groups.set(value, [id]);
   }
-  const palette = colors ?? (ordered ? rampOf(RAMP, groups.size) : HUES);
+  const palette = colors ?? (ordered ? interpolateRamp(RAMP, groups.size) : HUES);
   const frequent = [...groups].sort((a, b) => b[1].length - a[1].length || compare(a[0], b[0], language));
-  const [kept, left] = frequent.length <= palette.length ? [frequent, []] : [frequent.slice(0, palette.length), frequent.slice(palette.length)];
+  const [kept, others] = frequent.length <= palette.length ? [frequent, []] : [frequent.slice(0, palette.length), frequent.slice(palette.length)];
   if (ordered) kept.sort((a, b) => compare(a[0], b[0], language));
   const named = kept.map(([value, ids], k) => ({ ids, color: palette[k] as string, label: String(value) }));
-  return left.length === 0 ? named : [...named, { ids: left.flatMap(([, ids]) => ids), color: REST, label: rest }];
+  return others.length === 0 ? named : [...named, { ids: others.flatMap(([, ids]) => ids), color: OTHER_COLOR, label: otherLabel }];
 }
 
 const compare = (a: AttributeValue, b: AttributeValue, language: string | undefined): number =>
   typeof a === "number" && typeof b === "number" ? a - b : String(a).localeCompare(String(b), language, { numeric: true });
 
-/** So many colours, evenly along a ramp; between its own by mixing. */
-export function rampOf(ramp: readonly string[], count: number): string[] {
+/** Returns evenly spaced colours along a ramp, by linear interpolation. */
+export function interpolateRamp(ramp: readonly string[], count: number): string[] {
   return Array.from({ length: count }, (_, k) => {
     const at = count === 1 ? 0 : (k / (count - 1)) * (ramp.length - 1);
     const [from, to] = [ramp[Math.floor(at)] as string, ramp[Math.ceil(at)] as string];
-    const part = (color: string, place: number): number => parseInt(color.slice(1 + 2 * place, 3 + 2 * place), 16);
-    const mixed = [0, 1, 2].map((place) => Math.round(part(from, place) + (part(to, place) - part(from, place)) * (at - Math.floor(at))));
-    return `#${mixed.map((byte) => byte.toString(16).padStart(2, "0")).join("")}`;
+    const channel = (color: string, place: number): number => parseInt(color.slice(1 + 2 * place, 3 + 2 * place), 16);
+    const bytes = [0, 1, 2].map((place) => Math.round(channel(from, place) + (channel(to, place) - channel(from, place)) * (at - Math.floor(at))));
+    return `#${bytes.map((byte) => byte.toString(16).padStart(2, "0")).join("")}`;
   });
 }

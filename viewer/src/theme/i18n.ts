@@ -1,15 +1,15 @@
 import { selectTranslation } from "../core/i18n";
 
 interface ThemeMessages {
-  readonly rest: string;
+  readonly other: string;
   readonly yes: string;
   readonly no: string;
 }
 
-const WORDS = {
-  en: { rest: "Other", yes: "Yes", no: "No" },
-  de: { rest: "Andere", yes: "Ja", no: "Nein" },
-  fr: { rest: "Autres", yes: "Oui", no: "Non" },
+const TRANSLATIONS = {
+  en: { other: "Other", yes: "Yes", no: "No" },
+  de: { other: "Andere", yes: "Ja", no: "Nein" },
+  fr: { other: "Autres", yes: "Oui", no: "Non" },
 };
 
-export const getThemeMessages = (language: string): ThemeMessages => selectTranslation(WORDS, language);
+export const getThemeMessages = (language: string): ThemeMessages => selectTranslation(TRANSLATIONS, language);

@@ -1,15 +1,15 @@
 import { element } from "../core/dom";
-import type { Classes } from "./classes";
+import type { Classification } from "./classes";
 
-/** Colours and what they stand for. A class that is pressed is shown with the others that are; with none pressed all are shown. */
+/** A legend with a toggle button per class. Shows only the pressed classes; all if none is pressed. */
 export class Legend {
   readonly box: HTMLFieldSetElement;
-  readonly #chosen = new Set<number>();
+  readonly #pressed = new Set<number>();
   readonly #buttons: readonly HTMLButtonElement[];
-  readonly #changed: (chosen: ReadonlySet<number>) => void;
+  readonly #onChange: (pressed: ReadonlySet<number>) => void;
 
-  constructor(title: string, { classes, ordered }: Classes, changed: (chosen: ReadonlySet<number>) => void) {
-    this.#changed = changed;
+  constructor(title: string, { classes, ordered }: Classification, onChange: (pressed: ReadonlySet<number>) => void) {
+    this.#onChange = onChange;
     this.#buttons = classes.map(({ label, color }, k) => {
       const swatch = element("i", "");
       swatch.style.background = color;
@@ -22,9 +22,9 @@ export class Legend {
   }
 
   #toggle(k: number): void {
-    if (!this.#chosen.delete(k)) this.#chosen.add(k);
-    this.#buttons.forEach((button, at) => { button.setAttribute("aria-pressed", String(this.#chosen.has(at))); });
-    this.box.classList.toggle("map3d-legend-chosen", this.#chosen.size > 0);
-    this.#changed(this.#chosen);
+    if (!this.#pressed.delete(k)) this.#pressed.add(k);
+    this.#buttons.forEach((button, at) => { button.setAttribute("aria-pressed", String(this.#pressed.has(at))); });
+    this.box.classList.toggle("map3d-legend-filtered", this.#pressed.size > 0);
+    this.#onChange(this.#pressed);
   }
 }

@@ -50,7 +50,7 @@ test.each(["webgl", "canvas"])("%s: a swipe shows one layer at each side, by poi
   expect(differences(half, before, 250, WIDE)).toBeGreaterThan(1000);
   expect(bed.server.requests.filter((path) => path.includes("/depth/"))).toEqual([]);
 
-  const border = page.getByRole("slider", { name: "Border between the left and the right picture" });
+  const border = page.getByRole("slider", { name: "Drag to compare" });
   const { x, y, width, height } = (await border.boundingBox()) as { x: number; y: number; width: number; height: number };
   expect(width).toBeGreaterThanOrEqual(44);
   await page.mouse.move(x + width / 2, y + height / 2);

@@ -57,7 +57,7 @@ test("who saves data gets coarser tiles on a dense screen, no ids for hovering, 
     await page.goto(`${bed.server.origin}/?rendering=${bed.url("town")}`);
     await page.waitForFunction(() => location.hash.length > 5);
     await page.waitForTimeout(1500);
-    expect(await page.locator("#saving").isVisible()).toBe(kind === "saved");
+    expect(await page.locator("#data-saver").isVisible()).toBe(kind === "saved");
     if (kind === "saved") await page.screenshot({ path: `${OUT}/saving.png` });
     await page.context().close();
   }

@@ -23,13 +23,13 @@ test("the reader is shown on the surface with a circle as large as the accuracy;
     const g = globalThis as unknown as Controlled;
     g.control = new g.map3d.locate().addTo(g.map);
   });
-  const button = page.getByRole("button", { name: "Zeigen, wo ich bin" });
+  const button = page.getByRole("button", { name: "Meinen Standort anzeigen" });
   for (const [x, y, z] of [[-80, -60, 0], [-45, 0, 34], [32, 26, 62]] as const) {
     const [longitude, latitude] = await page.evaluate((world) => (globalThis as Global).map.lonLat(world) as [number, number], [ORIGIN[0] + x, ORIGIN[1] + y, ORIGIN[2]] as const);
     await page.context().setGeolocation({ longitude, latitude, accuracy: 12 });
     await button.click();
     await page.waitForSelector(".map3d-accuracy");
-    expect(await page.locator(".map3d-marker").getAttribute("aria-label")).toBe("Sie sind hier, ± 12 m");
+    expect(await page.locator(".map3d-marker").getAttribute("aria-label")).toBe("Sie sind hier (± 12 m)");
     await page.waitForTimeout(500);
     const [center, zoom, circle, wide] = await page.evaluate(() => {
       const { map } = globalThis as Global;
@@ -48,11 +48,11 @@ test("the reader is shown on the surface with a circle as large as the accuracy;
   for (const [longitude, latitude] of [[13.4, 52.5], [11.6, 48.15], [-120, -30]] as const) {
     await page.context().setGeolocation({ longitude, latitude, accuracy: 30 });
     await button.click();
-    await said(page, "Sie sind außerhalb dieser Karte.");
+    await said(page, "Ihr Standort liegt außerhalb dieser Karte.");
   }
   await page.context().clearPermissions();
   await button.click();
-  await said(page, "Ihr Browser sagt nicht, wo Sie sind. Erlauben Sie es in den Einstellungen dieser Seite.");
+  await said(page, "Der Zugriff auf Ihren Standort ist blockiert. Erlauben Sie ihn in den Browsereinstellungen für diese Seite.");
   await page.screenshot({ path: `${OUT}/locate-denied.png` });
   await page.evaluate(() => (globalThis as unknown as Controlled).control.remove());
   expect(await button.count() + await page.locator(".map3d-status").count()).toBe(0);
@@ -64,7 +64,7 @@ test("the reader is shown on the surface with a circle as large as the accuracy;
     const g = globalThis as unknown as Controlled;
     new g.map3d.locate().addTo(g.map).toggle();
   });
-  await said(other, "It is not known where on earth this map lies.");
+  await said(other, "Your location can’t be shown, because this map has no geographic coordinates.");
   await other.context().close();
 });
 

@@ -83,7 +83,7 @@ test.each(["loose", "archives"] as const)("a folder (%s) that is dropped or chos
   await page.screenshot({ path: `${OUT}/files-${kind}.png` });
 
   const chooser = page.waitForEvent("filechooser");
-  await page.getByRole("button", { name: "Open a map folder from this device" }).press("Enter");
+  await page.getByRole("button", { name: "Open map folder" }).press("Enter");
   await (await chooser).setFiles(FOLDERS[kind]);
   await rested(page, 2);
   expect((await pixels(page)).equals(wanted)).toBe(true);
@@ -121,7 +121,7 @@ test("another city takes the place of the one before, wherever it lies", async (
   await page.context().close();
 });
 
-test.each([["en", "Drop the folder"], ["de", "Den Ordner"], ["fr", "Déposez ici"]])("while files are over the map it says what to do, in %s, and stops when they leave", async (language, words) => {
+test.each([["en", "Drop a map folder"], ["de", "Kartenordner zum"], ["fr", "Déposez un dossier"]])("while files are over the map it says what to do, in %s, and stops when they leave", async (language, words) => {
   const { page, problems } = await start({ language });
   const over = page.locator(".map3d-drop");
   expect(await over.isVisible()).toBe(false);
@@ -152,9 +152,9 @@ test("what cannot be shown is said, and the map stays as it was", async () => {
   await rested(page);
   const before = await pixels(page);
   const rows: [string[], RegExp][] = [
-    [[other], /^There is no rendering\.json among these files/],
-    [[FOLDERS.loose, dirname(broken)], /^There are several maps: town\/rendering\.json, map3d-folder-\w+\/broken\/rendering\.json/],
-    [[broken], /^Files of this map are missing: 180-45\/id\.pmtiles\. Take the whole folder/],
+    [[other], /^This is not a map folder: it has no rendering\.json/],
+    [[FOLDERS.loose, dirname(broken)], /^This folder contains several maps: town\/rendering\.json, map3d-folder-\w+\/broken\/rendering\.json/],
+    [[broken], /^Some files of this map are missing: 180-45\/id\.pmtiles\. Choose the complete folder/],
   ];
   for (const [paths, words] of rows) {
     await drag(page, paths, "dropped");
@@ -164,7 +164,7 @@ test("what cannot be shown is said, and the map stays as it was", async () => {
   await page.screenshot({ path: `${OUT}/files-missing.png` });
   writeFileSync(join(broken, "rendering.json"), JSON.stringify({ map3d: "rendering", version: 9 }));
   await drag(page, [broken], "dropped");
-  await expect.poll(() => said(page), { timeout: 20_000 }).toMatch(/^This cannot be shown: rendering\.json: has version 9/);
+  await expect.poll(() => said(page), { timeout: 20_000 }).toMatch(/^Couldn’t open the map: rendering\.json: has version 9/);
   expect((await pixels(page)).equals(before)).toBe(true);
   expect(await page.evaluate("[dropped.length, errors.length, map.layers.length]")).toEqual([1, 4, 1]);
   expect(problems).toEqual([]);
@@ -192,7 +192,7 @@ test("a made-up drop of files without folders is taken by their names; taken off
     data.items.add(new File([text], "rendering.json", { type: "application/json" }));
     (globalThis as Global).map.canvas.dispatchEvent(new DragEvent("drop", { bubbles: true, cancelable: true, dataTransfer: data }));
   }, json);
-  await expect.poll(() => said(page), { timeout: 20_000 }).toMatch(/^Files of this map are missing: https:\/\/evil\.example\/color\.pmtiles/);
-  expect(await page.evaluate("(tool.remove(), document.querySelectorAll('.map3d-drop, .map3d-status, input').length)")).toBe(0);
+  await expect.poll(() => said(page), { timeout: 20_000 }).toMatch(/^Some files of this map are missing: https:\/\/evil\.example\/color\.pmtiles/);
+  expect(await page.evaluate("(tool.remove(), document.querySelectorAll('.map3d-drop, .map3d-said, input').length)")).toBe(0);
   await page.context().close();
 });

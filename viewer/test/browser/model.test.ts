@@ -304,7 +304,7 @@ test("a glTF plays its clips and stops; what stands still draws no frames; who w
     } catch (error) {
       return (error as Error).message;
     }
-  })).toBe('animation "down" is none of "up"');
+  })).toBe('unknown animation "down"; the model has "up"');
   expect(problems).toEqual([]);
   await page.context().close();
 

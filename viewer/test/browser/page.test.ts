@@ -161,7 +161,7 @@ test("tools measure where the map is clicked, and nothing is chosen meanwhile", 
   expect(await page.locator(".map3d-measure-main").textContent()).toMatch(/^\d+\.\d+ m {2}[↑↓±] \d+\.\d\d m$/);
   expect(await page.locator("#info").isHidden()).toBe(true);
   await page.locator("#measure-profile").tap();
-  expect(await page.locator("#hint").textContent()).toBe("Click where the line begins and ends.");
+  expect(await page.locator("#hint").textContent()).toBe("Click the start and the end of the line.");
   await page.touchscreen.tap(130, 380);
   await page.waitForFunction(() => document.querySelectorAll(".map3d-measure circle").length === 1);
   await page.waitForTimeout(600);
@@ -181,12 +181,12 @@ for (const [name, options] of [["desk", DESK], ["phone", PHONE]] as const) {
   test(`${name}: objects have colours by an attribute; the legend filters; the address keeps it`, async () => {
     const { page, problems } = await open(options);
     if (name === "phone") {
-      expect(await page.locator("#by").isVisible()).toBe(false);
+      expect(await page.locator("#color-by").isVisible()).toBe(false);
       await page.locator("#more").tap();
     }
-    const names = await page.locator("#by option").allTextContents();
+    const names = await page.locator("#color-by option").allTextContents();
     expect(names).toEqual(["–", "Class", "measuredHeight", "roofType"]);
-    await page.selectOption("#by", { label: "measuredHeight" });
+    await page.selectOption("#color-by", { label: "measuredHeight" });
     await page.waitForSelector("#legend button");
     await page.waitForTimeout(1200);
     await page.screenshot({ path: `${OUT}/${name}-colors.png` });
@@ -200,9 +200,9 @@ for (const [name, options] of [["desk", DESK], ["phone", PHONE]] as const) {
     const { page: other } = await bed.openPage(options);
     await other.goto(page.url());
     await other.waitForSelector("#legend button");
-    expect(await other.locator("#by").inputValue()).toBe("measuredHeight");
+    expect(await other.locator("#color-by").inputValue()).toBe("measuredHeight");
     if (name === "phone") await page.locator("#more").tap();
-    await page.selectOption("#by", { label: "–" });
+    await page.selectOption("#color-by", { label: "–" });
     await page.waitForFunction(() => !location.hash.includes("by=") && document.querySelector("#legend button") === null);
     expect(problems).toEqual([]);
     await page.context().close();
@@ -229,22 +229,22 @@ test.each([
 
 test("what is in view can be listed and chosen by keys alone", async () => {
   const { page, problems } = await open(DESK);
-  await page.locator("#list-seen").focus();
+  await page.locator("#list-in-view").focus();
   await page.keyboard.press("Shift+Tab");
   await page.keyboard.press("Tab");
   await page.screenshot({ path: `${OUT}/desk-skip.png` });
   await page.keyboard.press("Enter");
-  await page.waitForSelector("#seen li");
+  await page.waitForSelector("#in-view li");
   await page.screenshot({ path: `${OUT}/desk-seen.png` });
-  const names = await page.locator("#seen button").allTextContents();
+  const names = await page.locator("#in-view button").allTextContents();
   expect([...names].sort()).toEqual(["Chapel", "Ground", "School <b>old</b>", "Tower", "Town hall"]);
   expect(names[0]).toBe("Ground");
   await page.keyboard.press("Escape");
-  expect(await page.locator("#seen").isHidden()).toBe(true);
+  expect(await page.locator("#in-view").isHidden()).toBe(true);
   expect(await page.evaluate(() => document.activeElement?.id)).toBe("list-seen");
   await page.keyboard.press("Enter");
-  await page.waitForSelector("#seen li");
-  await page.locator("#seen button", { hasText: "Tower" }).focus();
+  await page.waitForSelector("#in-view li");
+  await page.locator("#in-view button", { hasText: "Tower" }).focus();
   await page.keyboard.press("Enter");
   await page.waitForSelector("#info:not([hidden])");
   expect(await page.locator("#info h2").textContent()).toBe("Tower");

@@ -88,7 +88,7 @@ test("title, legend, markers, scale bar and attribution stand on it; what is ask
   };
   expect([has([255, 0, 0, 255]), has([0, 255, 0, 255])]).toEqual([true, true]);
   expect(await failed({ width_px: 9000, height_px: 20 })).toBe("UsageError: a picture's width is a whole number from 1 to 8192 pixels, got 9000");
-  expect(await failed({ background: "url(x)" })).toBe('UsageError: background "url(x)" is no colour');
+  expect(await failed({ background: "url(x)" })).toBe('UsageError: background must be a CSS colour, got "url(x)"');
   expect(await failed({ scale: 4, stop: true })).toBe("Error: enough");
   expect(await page.locator(".map3d").count()).toBe(1);
   await page.context().close();
@@ -103,7 +103,7 @@ test.each([["desk", DESK], ["phone", PHONE]] as const)("%s: the page saves and p
   await page.goto(`${bed.server.origin}/?rendering=${bed.url("fine")}`);
   await page.waitForSelector("#make-picture");
   if (name === "phone") await page.locator("#more").tap();
-  await page.selectOption("#by", { label: "measuredHeight" });
+  await page.selectOption("#color-by", { label: "measuredHeight" });
   await page.waitForSelector("#legend button");
   if (name === "phone") await page.locator("#more").tap();
   await page.locator("#make-picture").click();
@@ -130,10 +130,10 @@ test.each([["desk", DESK], ["phone", PHONE]] as const)("%s: the page saves and p
   await page.locator("#make-picture").click();
   await page.selectOption("#picture-size", { index: 3 });
   await page.locator("#picture-save").click();
-  await page.waitForSelector("#picture-working:not([hidden])");
+  await page.waitForSelector("#picture-busy:not([hidden])");
   await page.screenshot({ path: `${OUT}/${name}-picture-working.png` });
   await page.keyboard.press("Escape");
-  await page.waitForSelector("#picture-working", { state: "hidden" });
+  await page.waitForSelector("#picture-busy", { state: "hidden" });
   await page.locator("#make-picture").click();
   expect(await page.locator("#picture-save").isEnabled()).toBe(true);
   expect(problems).toEqual([]);

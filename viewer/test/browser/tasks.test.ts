@@ -137,7 +137,7 @@ test("share a view", async () => {
   await page.waitForSelector("#info:not([hidden])");
   await hand.tap("#share");
   await page.waitForSelector(".toast");
-  expect(await page.locator(".toast p").textContent()).toBe("The link is copied");
+  expect(await page.locator(".toast p").textContent()).toBe("Link copied to clipboard.");
   const link = await page.evaluate(() => navigator.clipboard.readText());
   expect(link).toBe(page.url());
   const { page: other } = await bed.openPage(PHONE);
@@ -195,7 +195,7 @@ test("read an attribute", async () => {
   await hand.tap(placeOf(page, [-45, -4, 34]));
   await page.waitForSelector("#info:not([hidden])");
   const rows = await page.locator("#info dl").evaluate((list) => Object.fromEntries([...list.querySelectorAll("dt")].map((name) => [name.textContent, name.nextElementSibling?.textContent])));
-  expect(rows).toMatchObject({ measuredHeight: "34", roofType: "3100", listed: "yes" });
+  expect(rows).toMatchObject({ measuredHeight: "34", roofType: "3100", listed: "Yes" });
   expect(await page.locator("#info dd").last().isVisible()).toBe(true);
   await end(opened, "attribute");
 });
@@ -204,7 +204,7 @@ test("colour by year", async () => {
   const opened = await open();
   const { page, hand } = opened;
   await hand.tap("#more");
-  await hand.choose("#by", "yearOfConstruction");
+  await hand.choose("#color-by", "yearOfConstruction");
   await page.waitForSelector("#legend button");
   await page.waitForTimeout(1500);
   const classes = await page.locator("#legend button").evaluateAll((buttons) => buttons.map((button) => {

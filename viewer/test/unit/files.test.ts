@@ -1,6 +1,6 @@
 import { beforeAll, describe, expect, test, vi } from "vitest";
 import { filesSource } from "../../src/files/filesSource";
-import { basesOf, isInside } from "../../src/files/folder";
+import { findManifestFolders, isInside } from "../../src/files/folder";
 import { HttpSource, type Source } from "../../src/map3d";
 import { tileName, type Tile } from "../../src/geo/frame";
 import { published } from "../fixture/folder";
@@ -62,14 +62,14 @@ test("no byte is read beyond those of the tile and the directories", async () =>
   expect(read).toEqual([16384, bytes?.byteLength]);
 });
 
-describe("what is no whole rendering is refused in words", () => {
+describe("an incomplete rendering is rejected with a message", () => {
   const rows: [string, () => unknown, RegExp, string?][] = [
-    ["nothing", () => filesSource([]), /no rendering\.json among these files/, "none"],
+    ["nothing", () => filesSource([]), /it has no rendering\.json/, "none"],
     ["a picture", () => filesSource([new File(["x"], "cat.jpg")]), /no rendering\.json/, "none"],
     ["two folders", () => filesSource([...chosen(town, "a/"), ...chosen(town, "b/")]), /several maps: a\/rendering\.json, b\/rendering\.json/, "several"],
     ["another JSON", () => filesSource([new File(["{}"], "rendering.json")]).manifest(), /"map3d": "rendering" is missing/],
-    ["no JSON", () => filesSource([new File(["<html>"], "rendering.json")]).manifest(), /rendering\.json: expected JSON, got 6 bytes/],
-    ["without an archive", () => filesSource(chosen(archived).filter((file) => !file.webkitRelativePath.endsWith("90-45/id.pmtiles"))).manifest(), /missing: 90-45\/id\.pmtiles\. Take the whole folder/, "missing"],
+    ["no JSON", () => filesSource([new File(["<html>"], "rendering.json")]).manifest(), /rendering\.json: expected JSON, got 6 bytes of invalid JSON/],
+    ["without an archive", () => filesSource(chosen(archived).filter((file) => !file.webkitRelativePath.endsWith("90-45/id.pmtiles"))).manifest(), /missing: 90-45\/id\.pmtiles\. Choose the complete folder/, "missing"],
     ["without most archives", () => filesSource(chosen(archived).filter((file) => !file.name.endsWith(".pmtiles"))).manifest(), /missing: 0-45\/color\.pmtiles, 0-45\/normal\.pmtiles, 0-45\/id\.pmtiles, … \(16\)/, "missing"],
   ];
   test.each(rows)("%s", async (_, act, message, problem) => {
@@ -89,7 +89,7 @@ describe("what is no whole rendering is refused in words", () => {
     const source = filesSource(cut);
     const { views, json } = await source.manifest();
     const error = (await refusal(() => source.tile([...views.values()][0] as never, json.layers[0] as never, { z: 3, x: 3, y: 3 }))) as Error;
-    expect(error.message).toMatch(/0-45\/color\.pmtiles: (has 300 bytes and names \d+ at \d+; copy it again|no PMTiles)|ends too early/);
+    expect(error.message).toMatch(/0-45\/color\.pmtiles: (expected \d+ bytes at \d+, but the file has 300 bytes; copy the file again|no PMTiles)|ends too early/);
   });
 });
 
@@ -109,8 +109,8 @@ test("names that lead out of the folder are not there", async () => {
 });
 
 test("manifests are found where they are, not inside of one another", () => {
-  expect(basesOf(["rendering.json", "a/rendering.json"])).toEqual([""]);
-  expect(basesOf(["x/a/rendering.json", "x/a/b/rendering.json", "x/c/rendering.json", "x/notrendering.json"])).toEqual(["x/a/", "x/c/"]);
+  expect(findManifestFolders(["rendering.json", "a/rendering.json"])).toEqual([""]);
+  expect(findManifestFolders(["x/a/rendering.json", "x/a/b/rendering.json", "x/c/rendering.json", "x/notrendering.json"])).toEqual(["x/a/", "x/c/"]);
 });
 
 test("a source over HTTP asks what it was given", async () => {

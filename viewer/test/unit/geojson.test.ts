@@ -3,11 +3,11 @@ import type { Vec2, Vec3 } from "../../src/core/vec";
 import { localFromUvd, uvdFromLocal } from "../../src/geo/axes";
 import { pixelM, tileName, type Frame, type Tile } from "../../src/geo/frame";
 import { readManifest, type LayerInfo, type View } from "../../src/geo/manifest";
-import { Area } from "../../src/geojson/area";
-import { fillHeights, landing } from "../../src/geojson/drape";
+import { PolygonIndex } from "../../src/geojson/polygonIndex";
+import { fillHeights, drapedHeight } from "../../src/geojson/drape";
 import { readGeojson } from "../../src/geojson/parse";
-import { placing } from "../../src/geojson/place";
-import { clipped, runsOf } from "../../src/geojson/runs";
+import { coordinateTransform } from "../../src/geojson/coordinates";
+import { clipped, sectionsOf } from "../../src/geojson/lineSections";
 import type { imageLayer } from "../../src/map/imageLayer";
 import { Relief } from "../../src/map/relief";
 import { renderTown } from "../fixture/rendering";
@@ -47,7 +47,7 @@ const PX = pixelM((rendering.views.get("0-45") as View).frame, 3);
 const WHOLE: readonly [Vec2, Vec2] = [[-300, -300], [300, 300]];
 
 describe("relief", () => {
-  test("knows the depth of each pixel's surface, and that nothing is beside the model", () => {
+  test("depth is exact at each pixel, and infinite outside the model", () => {
     const relief = reliefOf([layerOf()]);
     const { frame } = relief.camera;
     for (let k = 0; k < 400; k++) {
@@ -60,7 +60,7 @@ describe("relief", () => {
     expect(relief.depthAt(1e9, 0)).toBe(Infinity);
   });
 
-  test.each(["0-45", "90-45"])("%s: what lies on the seen surface is not hidden by it, what lies well behind is", (direction) => {
+  test.each(["0-45", "90-45"])("%s: points on the visible surface are not hidden, points well behind it are", (direction) => {
     const relief = reliefOf([layerOf()], direction);
     const { frame } = relief.camera;
     let tested = 0;
@@ -76,7 +76,7 @@ describe("relief", () => {
     expect(tested).toBeGreaterThan(800);
   });
 
-  test("hidden objects, layers that are not seen and what is not known hide nothing; a tile that is missing is read above", () => {
+  test("hidden objects, invisible layers and unknown depths hide nothing; a missing tile is read from a level above", () => {
     const tower: Vec3 = [32, 40, 5];
     const covers = (...layers: imageLayer[]): boolean => reliefOf(layers).covers([ORIGIN[0] + tower[0], ORIGIN[1] + tower[1], ORIGIN[2] + tower[2]]);
     expect(covers(layerOf())).toBe(true);
@@ -96,52 +96,52 @@ describe("relief", () => {
 
 describe("draping", () => {
   const relief = reliefOf([layerOf()]);
-  test.each([[-80, -60, 0], [-45, -4, 34], [32, 26, 62], [30, -30, 16], [80, 70, 0], [500, 0, NaN]] as const)("over %d, %d lies %d", (x, y, height) => {
-    const z = landing(relief, x, y);
+  test.each([[-80, -60, 0], [-45, -4, 34], [32, 26, 62], [30, -30, 16], [80, 70, 0], [500, 0, NaN]] as const)("the draped height at %d, %d is %d", (x, y, height) => {
+    const z = drapedHeight(relief, x, y);
     if (Number.isNaN(height)) expect(z).toBeNaN();
     else expect(z).toBeCloseTo(height, 1);
   });
 
-  test("what a building hides has no height, what is not loaded none yet", () => {
-    expect(landing(relief, 32, 45)).toBeNaN();
-    expect(landing(reliefOf([Object.assign(layerOf(), { tiles: { get: () => undefined } })]), 0, 0)).toBeNull();
+  test("a point behind a building has height NaN, an unloaded one null", () => {
+    expect(drapedHeight(relief, 32, 45)).toBeNaN();
+    expect(drapedHeight(reliefOf([Object.assign(layerOf(), { tiles: { get: () => undefined } })]), 0, 0)).toBeNull();
   });
 
-  test("heights between those that are known", () => {
+  test("missing heights are interpolated", () => {
     const points: Vec3[] = [[0, 0, NaN], [1, 0, 2], [2, 0, NaN], [3, 0, 4], [4, 0, NaN]];
     expect(fillHeights(points)).toBe(true);
     expect(points.map(([, , z]) => z)).toEqual([2, 2, 3, 4, 4]);
     expect(fillHeights([[0, 0, NaN]])).toBe(false);
   });
 
-  test("a line climbs what it crosses, and goes behind what stands before it", () => {
-    const runs = runsOf({ points: [[-90, 26, NaN], [90, 26, NaN]], draped: true }, relief, WHOLE, true);
+  test("a draped line climbs over buildings and is hidden behind them", () => {
+    const sections = sectionsOf({ points: [[-90, 26, NaN], [90, 26, NaN]], draped: true }, relief, WHOLE, true);
     const { axes } = relief.camera.frame;
     const [top] = [uvdFromLocal(axes, [32, 26, 62])];
-    expect(runs.some(({ hidden, uv }) => !hidden && uv.some((value, k) => k % 2 === 1 && Math.abs(value - top[1]) < PX))).toBe(true);
-    expect(runs.some(({ hidden, uv }) => hidden && (uv[0] ?? 0) < -55 && (uv.at(-2) ?? 0) > -35), "behind the hall").toBe(true);
+    expect(sections.some(({ hidden, uv }) => !hidden && uv.some((value, k) => k % 2 === 1 && Math.abs(value - top[1]) < PX))).toBe(true);
+    expect(sections.some(({ hidden, uv }) => hidden && (uv[0] ?? 0) < -55 && (uv.at(-2) ?? 0) > -35), "behind the hall").toBe(true);
   });
 });
 
-test("a wire is hidden just where the model stands before it, by the model's own rays", () => {
+test("a line at a fixed height is hidden exactly where rays hit the model first", () => {
   const relief = reliefOf([layerOf()]);
   const { frame } = relief.camera;
   const [from, to] = ([[-90, 70, 12], [90, 70, 12]] as const).map((point) => uvdFromLocal(frame.axes, point)) as [Vec3, Vec3];
-  const runs = runsOf({ points: [[-90, 70, 12], [90, 70, 12]], draped: false }, relief, WHOLE, true);
+  const sections = sectionsOf({ points: [[-90, 70, 12], [90, 70, 12]], draped: false }, relief, WHOLE, true);
   let wrong = 0;
   for (let k = 0; k < 1000; k++) {
     const at = from.map((value, axis) => value + ((to[axis] as number) - value) * ((k + 0.5) / 1000)) as unknown as Vec3;
     const hit = trace(frame, at[0], at[1]);
     const hidden = hit !== null && frame.d0 + hit.d < at[2] - 0.1;
-    const run = runs.find(({ uv }) => at[0] >= Math.min(uv[0] ?? 0, uv.at(-2) ?? 0) && at[0] <= Math.max(uv[0] ?? 0, uv.at(-2) ?? 0));
-    if (run?.hidden !== hidden) wrong++;
+    const section = sections.find(({ uv }) => at[0] >= Math.min(uv[0] ?? 0, uv.at(-2) ?? 0) && at[0] <= Math.max(uv[0] ?? 0, uv.at(-2) ?? 0));
+    if (section?.hidden !== hidden) wrong++;
   }
-  expect(runs.filter(({ hidden }) => hidden).length).toBeGreaterThan(0);
+  expect(sections.filter(({ hidden }) => hidden).length).toBeGreaterThan(0);
   expect(wrong * (180 / 1000), "metres, of at most six ends").toBeLessThan(6 * PX);
 });
 
 describe("geometry", () => {
-  test("segments are cut at a rectangle", () => {
+  test("segments are clipped to a rectangle", () => {
     const square = [[0, 0], [10, 10]] as const;
     expect(clipped([-10, 5], [10, 5], square)).toEqual([0.5, 1]);
     expect(clipped([5, 5], [5, 5], square)).toEqual([0, 1]);
@@ -149,23 +149,23 @@ describe("geometry", () => {
     expect(clipped([-1e300, 5], [1e300, 5], square)?.every(Number.isFinite) ?? true).toBe(true);
   });
 
-  test("a polygon with a hole has what the sum over all edges says", () => {
+  test("the index of a polygon with a hole agrees with the crossing sum over all edges", () => {
     const rings = [Array.from({ length: 57 }, (_, k): Vec2 => [Math.cos(k / 9.07) * (5 + (k % 3)), Math.sin(k / 9.07) * (5 + (k % 3))]), [[-1, -1], [1, -1], [1, 1], [-1, 1]] as Vec2[]];
-    const area = new Area(rings);
+    const area = new PolygonIndex(rings);
     const plain = (x: number, y: number): boolean => rings.flatMap((ring) => ring.map((a, k) => [a, ring[(k + 1) % ring.length] as Vec2] as const))
       .filter(([[ax, ay], [bx, by]]) => ay > y !== by > y && x < ax + ((bx - ax) * (y - ay)) / (by - ay)).length % 2 === 1;
     for (let k = 0; k < 3000; k++) {
       const [x, y] = [random(-8, 8), random(-8, 8)];
-      expect(area.has(x, y)).toBe(plain(x, y));
+      expect(area.contains(x, y)).toBe(plain(x, y));
     }
-    expect(area.has(0, 0)).toBe(false);
-    expect(new Area([[[0, 0], [1, 0], [2, 0]]]).has(1, 0)).toBe(false);
+    expect(area.contains(0, 0)).toBe(false);
+    expect(new PolygonIndex([[[0, 0], [1, 0], [2, 0]]]).contains(1, 0)).toBe(false);
   });
 });
 
 describe("GeoJSON", () => {
   const read = (data: unknown): ReturnType<typeof readGeojson> => readGeojson(data, true);
-  test("all kinds of geometries, holes, collections, foreign members", () => {
+  test("reads all geometry types, holes, collections and foreign members", () => {
     const ring = [[0, 0], [1, 0], [1, 1], [0, 0]];
     const { shapes, skipped } = read({ type: "FeatureCollection", crs: { odd: true }, features: [
       { type: "Feature", id: 7, properties: { a: 1 }, foreign: 1, geometry: { type: "GeometryCollection", geometries: [{ type: "Point", coordinates: [1, 2, 3, 4] }, { type: "MultiLineString", coordinates: [[[0, 0], [1, 1]], [[2, 2], [3, 3]]] }] } },
@@ -179,7 +179,7 @@ describe("GeoJSON", () => {
     expect(read({ type: "Point", coordinates: [1, 2] }).shapes[0]?.points[0]?.[2]).toBeNaN();
   });
 
-  test("what is no geometry is skipped and counted; the rest stays", () => {
+  test("invalid geometries are skipped and counted; the others stay", () => {
     let deep: unknown = { type: "Point", coordinates: [0, 0] };
     for (let k = 0; k < 50_000; k++) deep = { type: "GeometryCollection", geometries: [deep] };
     const geometries: unknown[] = [
@@ -195,24 +195,24 @@ describe("GeoJSON", () => {
     expect((({}) as { polluted?: boolean }).polluted).toBeUndefined();
   });
 
-  test.each([[null], [5], ["text"], [[]], [{ type: "Topology" }], [{ type: "FeatureCollection" }], [{}]])("%j is no GeoJSON", (data) => {
-    expect(() => read(data)).toThrow(/GeoJSON is/);
+  test.each([[null], [5], ["text"], [[]], [{ type: "Topology" }], [{ type: "FeatureCollection" }], [{}]])("%j is not GeoJSON", (data) => {
+    expect(() => read(data)).toThrow(/GeoJSON must be/);
   });
 
-  test("far places go straight on from the scene's middle; without a place on earth there is an error", () => {
+  test("far coordinates are extrapolated linearly; without geographic coordinates there is an error", () => {
     const map = { lonLat: (): Vec2 => [11.5, 48.1], fromLonLat: ([lon, lat]: Vec2): Vec2 => [691000 + (lon - 11.5) * 75_000 + 1e3 * (lon - 11.5) ** 9, 5336000 + (lat - 48.1) * 111_000] };
-    const place = placing(map, ORIGIN, "lonlat");
+    const place = coordinateTransform(map, ORIGIN, "lonlat");
     expect(place([11.51, 48.1, 520])?.map(Math.round)).toEqual([750, 0, 20]);
     const far = place([31.5, 48.1, NaN]) as Vec3;
     expect(far[0]).toBeGreaterThan(1.4e6);
     expect(far[0]).toBeLessThan(1.7e6);
     expect(place([371.51, 48.1, 520])?.map(Math.round)).toEqual([750, 0, 20]);
-    expect(placing(map, ORIGIN, "scene")([1e200, 0, 0])).toBeNull();
-    expect(() => placing({ lonLat: () => null, fromLonLat: () => null }, ORIGIN, "lonlat")).toThrow(/crs: "scene"/);
+    expect(coordinateTransform(map, ORIGIN, "scene")([1e200, 0, 0])).toBeNull();
+    expect(() => coordinateTransform({ lonLat: () => null, fromLonLat: () => null }, ORIGIN, "lonlat")).toThrow(/crs: "scene"/);
   });
 });
 
-test("local positions and back", () => {
+test("local positions round-trip", () => {
   const { axes } = (rendering.views.get("0-45") as View).frame;
   expect(localFromUvd(axes, uvdFromLocal(axes, [1, 2, 3])).map((value) => Math.round(value * 1e9) / 1e9)).toEqual([1, 2, 3]);
 });

@@ -1,7 +1,7 @@
 import { readFileSync } from "node:fs";
 import { resolve } from "node:path";
 import { expect, test } from "vitest";
-import { chooseLanguage, KEYS } from "../../page/i18n";
+import { chooseLanguage, MESSAGE_KEYS } from "../../page/i18n";
 import { getMapMessages } from "../../src/core/i18n";
 import { windOf } from "../../src/ui/controls";
 
@@ -11,15 +11,15 @@ test.each([
   [["EN-us"], "EN-us"],
   [["ja", "zh"], "en"],
   [[], "en"],
-])("of %j the page speaks %s", (wanted, language) => {
-  expect(chooseLanguage(wanted)).toBe(language);
+])("for %j the page chooses %s", (requested, language) => {
+  expect(chooseLanguage(requested)).toBe(language);
 });
 
-test("the page's markup asks for words that there are", () => {
+test("the page markup uses only known messages", () => {
   const html = readFileSync(resolve(import.meta.dirname, "../../page/index.html"), "utf8");
-  const asked = [...html.matchAll(/data-say(?:-label|-hint)?="([^"]*)"/g)].map(([, key]) => key ?? "");
-  expect(asked.length).toBeGreaterThan(10);
-  expect(asked.filter((key) => !KEYS.has(key))).toEqual([]);
+  const keys = [...html.matchAll(/data-i18n(?:-label|-placeholder)?="([^"]*)"/g)].map(([, key]) => key ?? "");
+  expect(keys.length).toBeGreaterThan(10);
+  expect(keys.filter((key) => !MESSAGE_KEYS.has(key))).toEqual([]);
 });
 
 test.each(["en", "de", "fr", "de-AT", "it", ""])("%s: every control has a name, every wind another", (language) => {

@@ -2,7 +2,7 @@ import { describe, expect, test } from "vitest";
 import type { Box3 } from "../../src/core/vec";
 import { screenFromLocal, type Camera } from "../../src/geo/camera";
 import { DEFAULT_LIGHT, towardsLight } from "../../src/geo/light";
-import { depthsOf, groundOf, lampsOf, partOf } from "../../src/model/place";
+import { depthRangeOf, screenRectCorner, threeLighting, screenRectOf } from "../../src/model/projection";
 import { BOX, framesOf } from "../fixture/town";
 
 const frame = framesOf(BOX, 128, 0.38, [[0, 45]]).frames[0] as Camera["frame"];
@@ -12,31 +12,31 @@ const HOUSE: Box3 = [[-5, -5, 0], [5, 5, 10]];
 describe("a part of the screen", () => {
   test.each([1, 1.5, 3])("holds what boxes show, at %d device pixels a CSS pixel", (dpr) => {
     const screen = { camera: CAMERA, width: 500 * dpr, height: 400 * dpr, dpr };
-    const part = partOf([HOUSE], screen);
+    const part = screenRectOf([HOUSE], screen);
     if (!part) throw new Error("nothing is seen");
     expect([part.x, part.y, part.width, part.height].every(Number.isInteger)).toBe(true);
     for (const corner of HOUSE) {
       const [x, y] = screenFromLocal(CAMERA, corner).map((at) => at * dpr) as [number, number];
       expect(x > part.x && x < part.x + part.width && y > part.y && y < part.y + part.height).toBe(true);
     }
-    const [u, v, px] = groundOf(part, screen);
+    const [u, v, px] = screenRectCorner(part, screen);
     expect(u).toBeCloseTo((part.x - 250 * dpr) * px, 9);
     expect(v).toBeCloseTo((200 * dpr - part.y) * px, 9);
   });
 
   test("never leaves the screen, and is none where nothing is seen", () => {
     const screen = { camera: CAMERA, width: 500, height: 400, dpr: 1 };
-    const all = partOf([[[-1e4, -1e4, -1e4], [1e4, 1e4, 1e4]]], screen);
+    const all = screenRectOf([[[-1e4, -1e4, -1e4], [1e4, 1e4, 1e4]]], screen);
     expect(all).toEqual({ x: 0, y: 0, width: 500, height: 400 });
-    const edge = partOf([[[90, -5, 0], [200, 5, 10]]], screen);
+    const edge = screenRectOf([[[90, -5, 0], [200, 5, 10]]], screen);
     expect(edge && edge.x + edge.width).toBe(500);
-    expect(partOf([[[300, 0, 0], [310, 10, 10]]], screen)).toBe(null);
-    expect(partOf([], screen)).toBe(null);
+    expect(screenRectOf([[[300, 0, 0], [310, 10, 10]]], screen)).toBe(null);
+    expect(screenRectOf([], screen)).toBe(null);
   });
 
   test("keeps its size while what it shows moves a little", () => {
     const sizes = [0, 1, 2.5].map((x) => {
-      const { width, height } = partOf([[[x - 5, -5, 0], [x + 5, 5, 10]]], { camera: CAMERA, width: 500, height: 400, dpr: 1 }) ?? {};
+      const { width, height } = screenRectOf([[[x - 5, -5, 0], [x + 5, 5, 10]]], { camera: CAMERA, width: 500, height: 400, dpr: 1 }) ?? {};
       return `${String(width)} ${String(height)}`;
     });
     expect(new Set(sizes).size).toBe(1);
@@ -45,14 +45,14 @@ describe("a part of the screen", () => {
 
 test("depths of boxes are those of their corners", () => {
   const half = Math.SQRT1_2;
-  const [near, far] = depthsOf([HOUSE], frame) ?? [0, 0];
+  const [near, far] = depthRangeOf([HOUSE], frame) ?? [0, 0];
   expect(near).toBeCloseTo(half * (-5 - 10), 9);
   expect(far).toBeCloseTo(half * 5, 9);
-  expect(depthsOf([], frame)).toBe(null);
+  expect(depthRangeOf([], frame)).toBe(null);
 });
 
 test("lamps are π times the images' light; unlit, white from everywhere", () => {
-  const lamps = lampsOf({ ...DEFAULT_LIGHT, sun_rgb: [1, 0.5, 0.2] });
+  const lamps = threeLighting({ ...DEFAULT_LIGHT, sun_rgb: [1, 0.5, 0.2] });
   expect(lamps).toEqual({ sky_rgb: [1, 1, 1], sky: Math.PI * 0.42, sun_rgb: [1, 0.5, 0.2], sun: Math.PI * 0.76, towards: towardsLight(DEFAULT_LIGHT) });
-  expect(lampsOf({ ...DEFAULT_LIGHT, sky_rgb: [0, 0, 1], lit: false })).toMatchObject({ sky_rgb: [1, 1, 1], sky: Math.PI, sun: 0 });
+  expect(threeLighting({ ...DEFAULT_LIGHT, sky_rgb: [0, 0, 1], lit: false })).toMatchObject({ sky_rgb: [1, 1, 1], sky: Math.PI, sun: 0 });
 });

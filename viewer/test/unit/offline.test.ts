@@ -5,8 +5,8 @@ import { PAGE_FILES } from "../../page/offline";
 import { projectedBox } from "../../src/geo/camera";
 import { tileName, type Tile } from "../../src/geo/frame";
 import { readManifest } from "../../src/geo/manifest";
-import { isVersioned, pageKey, partOf, pieceKey, rangeOf } from "../../src/offline/keys";
-import { filled, tilesIn, tilesOf, type AreaOptions } from "../../src/offline/plan";
+import { isVersioned, pageKey, rangeResponse, rangeKey, rangeOf } from "../../src/offline/cacheKeys";
+import { resolveOptions, tilesIn, tilesOf, type AreaOptions } from "../../src/offline/areaPlan";
 import type { map } from "../../src/map3d";
 import { coverOf, type Rect } from "../../src/tiles/cover";
 import { ORIGIN } from "../fixture/town";
@@ -26,7 +26,7 @@ function* random(seed: number): Generator<number, never> {
 
 /** A map that shows the town. */
 const shown = { layers: [{ rendering: town }], container: { clientWidth: 100, clientHeight: 50 }, unproject: () => [ORIGIN[0], ORIGIN[1] + 20, ORIGIN[2] - 2], pick: () => Promise.resolve({ position: [ORIGIN[0], ORIGIN[1], ORIGIN[2] - 2 + 20] }), metresPerPixel: 0.1 } as unknown as map;
-const planned = async (options: AreaOptions): Promise<string[]> => [...tilesOf(town, await filled(shown, options))].map(({ view, layer, tile }) => `${view.id}/${layer.name}/${tileName(tile)}`).sort();
+const planned = async (options: AreaOptions): Promise<string[]> => [...tilesOf(town, await resolveOptions(shown, options))].map(({ view, layer, tile }) => `${view.id}/${layer.name}/${tileName(tile)}`).sort();
 
 describe("tiles of an area", () => {
   const views = [...town.views.values()];
@@ -69,7 +69,7 @@ describe("tiles of an area", () => {
     // A point 20 m above the ground at 45 degrees: beside 10 m by 5 m / sin 45°, ground 20 m to each side.
     // Looking there from the south at the ground, if the surface is not known: 20 m further north, which is looked at from the side, too.
     const around = 20 + 2.5 * Math.SQRT2;
-    expect((await filled(shown, {})).bounds.flat().map((part, k) => part - (ORIGIN[k % 3] ?? 0)).map((part) => Number(part.toFixed(3)))).toEqual([-around, -around, -2, around, 25, 62].map((part) => Number(part.toFixed(3))));
+    expect((await resolveOptions(shown, {})).bounds.flat().map((part, k) => part - (ORIGIN[k % 3] ?? 0)).map((part) => Number(part.toFixed(3)))).toEqual([-around, -around, -2, around, 25, 62].map((part) => Number(part.toFixed(3))));
     for (const view of views) {
       const { axes } = view.frame;
       const [u, v] = [axes.right[2] * 18, axes.up[2] * 18];
@@ -81,15 +81,15 @@ describe("tiles of an area", () => {
   });
 
   test.each<[AreaOptions, RegExp]>([
-    [{ layers: ["colour"] }, /"colour" is none of the map's layers: color, normal, id, depth/],
-    [{ directions: ["1-2"] }, /"1-2" is none of the map's directions: 0-45/],
-    [{ levels: [4, 2] }, /levels go from 0 upwards, got 4 to 2/],
+    [{ layers: ["colour"] }, /unknown layer "colour"; the map has color, normal, id, depth/],
+    [{ directions: ["1-2"] }, /unknown direction "1-2"; the map has 0-45/],
+    [{ levels: [4, 2] }, /levels must be a range from 0 upwards, got 4 to 2/],
   ])("%o is refused", async (options, message) => {
-    await expect(filled(shown, options)).rejects.toThrow(message);
+    await expect(resolveOptions(shown, options)).rejects.toThrow(message);
   });
 
   test("a map without a manifest is refused", async () => {
-    await expect(filled({ layers: [] } as unknown as map, {})).rejects.toThrow(/shows nothing yet/);
+    await expect(resolveOptions({ layers: [] } as unknown as map, {})).rejects.toThrow(/is not ready/);
   });
 });
 
@@ -102,12 +102,12 @@ test("the page keeps whatever it imports", () => {
 
 describe("keys", () => {
   test("pieces, versions and pages", async () => {
-    expect(pieceKey("https://h/a.pmtiles", "0-9")).toBe("https://h/a.pmtiles?map3d-range=0-9");
-    expect(pieceKey("https://h/a?b", "0-9")).toBe("https://h/a?b&map3d-range=0-9");
+    expect(rangeKey("https://h/a.pmtiles", "0-9")).toBe("https://h/a.pmtiles?map3d-range=0-9");
+    expect(rangeKey("https://h/a?b", "0-9")).toBe("https://h/a?b&map3d-range=0-9");
     expect([rangeOf(new Headers({ Range: "bytes=5-8" })), rangeOf(new Headers({ Range: "bytes=5-" })), rangeOf(new Headers())]).toEqual(["5-8", undefined, undefined]);
     expect(["https://h/0/0/0?v=3", "https://h/0/0/0", "https://h/x?v=a", "https://h/?v=3#x"].map(isVersioned)).toEqual([true, false, false, false]);
     expect([pageKey("https://h/town/index.html?rendering=x#1"), pageKey("https://h/town/"), pageKey("https://h/a.html?x")]).toEqual(["https://h/town/", "https://h/town/", "https://h/a.html"]);
-    const part = await partOf(new Response("abcd", { headers: { "content-type": "x/y" } }), "10-99");
+    const part = await rangeResponse(new Response("abcd", { headers: { "content-type": "x/y" } }), "10-99");
     expect([part.status, part.headers.get("content-range"), await part.text()]).toEqual([206, "bytes 10-13/*", "abcd"]);
   });
 });

@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
 import type { Vec3 } from "../../src/core/vec";
 import { uvdFromLocal } from "../../src/geo/axes";
-import { along, heightAt } from "../../src/measure/profile";
+import { samplePoints, heightAt } from "../../src/measure/profile";
 import { BOX, framesOf, THINGS, trace } from "../fixture/town";
 
 const PX = 0.2;
@@ -41,9 +41,9 @@ describe("heights of a cut, by rays of every pixel", () => {
 });
 
 test("places lie at equal distances from corner to corner, ends included", () => {
-  const places = along([[0, 0, 5], [30, 0, 9], [30, 40, 1]], 8);
+  const places = samplePoints([[0, 0, 5], [30, 0, 9], [30, 40, 1]], 8);
   expect(places.map(({ distance_m }) => distance_m)).toEqual([0, 10, 20, 30, 40, 50, 60, 70]);
-  expect(places.map(({ place: [x, y] }) => [x, y])).toEqual([[0, 0], [10, 0], [20, 0], [30, 0], [30, 10], [30, 20], [30, 30], [30, 40]]);
-  expect(along([[1, 1, 1], [1, 1, 4]], 3).map(({ place: [x, y] }) => [x, y])).toEqual([[1, 1], [1, 1], [1, 1]]);
-  expect(along([[0, 0, 0]], 5)).toEqual([]);
+  expect(places.map(({ position: [x, y] }) => [x, y])).toEqual([[0, 0], [10, 0], [20, 0], [30, 0], [30, 10], [30, 20], [30, 30], [30, 40]]);
+  expect(samplePoints([[1, 1, 1], [1, 1, 4]], 3).map(({ position: [x, y] }) => [x, y])).toEqual([[1, 1], [1, 1], [1, 1]]);
+  expect(samplePoints([[0, 0, 0]], 5)).toEqual([]);
 });

@@ -1,8 +1,8 @@
 import { describe, expect, test } from "vitest";
-import { breaksOf, classify, HUES, RAMP, rampOf, REST, type ClassOptions } from "../../src/theme/classes";
+import { classBounds, classify, HUES, RAMP, interpolateRamp, OTHER_COLOR, type ClassOptions } from "../../src/theme/classes";
 import type { AttributeValue } from "../../src/map3d";
 
-const OPTIONS: ClassOptions = { classes: 5, colors: undefined, language: "en", rest: "Other" };
+const OPTIONS: ClassOptions = { classes: 5, colors: undefined, language: "en", otherLabel: "Other" };
 const column = (values: readonly AttributeValue[]): Map<number, AttributeValue> => new Map(values.map((value, k) => [k + 1, value]));
 const upTo = (count: number, valueOf: (k: number) => AttributeValue): Map<number, AttributeValue> => column(Array.from({ length: count }, (_, k) => valueOf(k)));
 
@@ -45,7 +45,7 @@ describe("numbers", () => {
   });
 
   test.each([[[1, 1, 1, 1, 1, 1, 1, 9]], [[0, 0, 0, 0, 0, 0, 1e-9]], [[-5, -4, -3, -2, -1, 0, 1]], [[1e15, 2e15, 3e15, 4e15, 5e15, 6e15]]])("bounds rise and leave no class empty: %j", (values) => {
-    const bounds = breaksOf(values, 5);
+    const bounds = classBounds(values, 5);
     expect([...new Set(bounds)].sort((a, b) => a - b)).toEqual(bounds);
     for (const bound of bounds) expect(values.some((value) => value < bound) && values.some((value) => value >= bound)).toBe(true);
   });
@@ -55,7 +55,7 @@ describe("values", () => {
   test("have hues by how frequent they are; what is left is the rest", () => {
     const { classes } = classify({ type: "text" }, upTo(60, (k) => "abcdefghijk"[Math.floor(Math.sqrt(2 * k))] ?? "k"), OPTIONS);
     expect(classes.length).toBe(HUES.length + 1);
-    expect(classes.at(-1)).toMatchObject({ label: "Other", color: REST });
+    expect(classes.at(-1)).toMatchObject({ label: "Other", color: OTHER_COLOR });
     const counts = classes.slice(0, -1).map(({ ids }) => ids.length);
     expect(counts).toEqual([...counts].sort((a, b) => b - a));
     expect(classes.reduce((sum, { ids }) => sum + ids.length, 0)).toBe(60);
@@ -63,7 +63,7 @@ describe("values", () => {
 
   test("take the colours that are given", () => {
     const { classes } = classify({ type: "text" }, column(["x", "y", "z"]), { ...OPTIONS, colors: ["#111111", "#222222"] });
-    expect(classes.map(({ label, color }) => [label, color])).toEqual([["x", "#111111"], ["y", "#222222"], ["Other", REST]]);
+    expect(classes.map(({ label, color }) => [label, color])).toEqual([["x", "#111111"], ["y", "#222222"], ["Other", OTHER_COLOR]]);
   });
 
   test("without any there are no classes", () => {
@@ -73,7 +73,7 @@ describe("values", () => {
 });
 
 test("ramps keep their ends and mix between", () => {
-  expect(rampOf(["#000000", "#ffffff"], 3)).toEqual(["#000000", "#808080", "#ffffff"]);
-  expect(rampOf(RAMP, 1)).toEqual([RAMP[0]]);
-  expect(rampOf(RAMP, 5)).toEqual([...RAMP]);
+  expect(interpolateRamp(["#000000", "#ffffff"], 3)).toEqual(["#000000", "#808080", "#ffffff"]);
+  expect(interpolateRamp(RAMP, 1)).toEqual([RAMP[0]]);
+  expect(interpolateRamp(RAMP, 5)).toEqual([...RAMP]);
 });

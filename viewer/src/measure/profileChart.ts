@@ -5,72 +5,72 @@ import type { Profile } from "./profile";
 import type { MeasureMessages } from "./i18n";
 
 const NS = "http://www.w3.org/2000/svg";
-/** Of the drawing, in its own units; it is stretched to the box. */
+/** Size of the SVG view box, which is stretched to the element. */
 const [WIDTH, HEIGHT] = [400, 100];
-const LINES = 3;
+const GRID_LINES = 3;
 
-/** A profile as a drawing, on which a pointer or the arrow keys walk along the line. */
-export class Chart {
+/** Chart of a profile. A pointer or the arrow keys move a cursor along the line. */
+export class ProfileChart {
   readonly box = element("div", "map3d-profile", { role: "slider", tabindex: "0" });
   readonly #svg = document.createElementNS(NS, "svg");
   readonly #heights = element("div", "map3d-profile-heights");
-  readonly #said = element("div", "map3d-profile-said");
-  readonly #hand = element("div", "map3d-profile-hand");
-  readonly #walk: (at: number | null) => void;
+  readonly #readout = element("div", "map3d-profile-readout");
+  readonly #cursor = element("div", "map3d-profile-cursor");
+  readonly #onMove: (at: number | null) => void;
   #profile: Profile | undefined;
-  #words: MeasureMessages | undefined;
+  #messages: MeasureMessages | undefined;
   #range: readonly [number, number] = [0, 1];
   #at: number | null = null;
 
-  /** @param walk told the number of the place that the reader is at; null: nowhere */
-  constructor(walk: (at: number | null) => void) {
-    this.#walk = walk;
+  /** @param onMove called with the index of the sample at the cursor, null without a cursor */
+  constructor(onMove: (at: number | null) => void) {
+    this.#onMove = onMove;
     this.#svg.setAttribute("viewBox", `0 0 ${String(WIDTH)} ${String(HEIGHT)}`);
     this.#svg.setAttribute("preserveAspectRatio", "none");
     this.#svg.setAttribute("aria-hidden", "true");
-    const field = element("div", "map3d-profile-field", {}, this.#svg, this.#heights, this.#hand);
-    this.box.append(field, this.#said);
-    this.box.addEventListener("pointermove", ({ clientX }) => { this.#goTo(clientX); });
-    this.box.addEventListener("pointerdown", ({ clientX }) => { this.#goTo(clientX); });
+    const field = element("div", "map3d-profile-field", {}, this.#svg, this.#heights, this.#cursor);
+    this.box.append(field, this.#readout);
+    this.box.addEventListener("pointermove", ({ clientX }) => { this.#moveTo(clientX); });
+    this.box.addEventListener("pointerdown", ({ clientX }) => { this.#moveTo(clientX); });
     this.box.addEventListener("pointerleave", () => { this.#show(null); });
     this.box.addEventListener("blur", () => { this.#show(null); });
-    this.box.addEventListener("keydown", (event) => { this.#key(event); });
+    this.box.addEventListener("keydown", (event) => { this.#onKeyDown(event); });
     for (const type of ["pointerdown", "wheel", "click", "dblclick"]) this.box.addEventListener(type, (event) => { event.stopPropagation(); });
   }
 
-  /** The number of the place that the reader is at. */
+  /** Index of the sample at the cursor; null without a cursor. */
   get at(): number | null {
     return this.#at;
   }
 
-  /** @param about said before numbers that are not exact */
-  set(profile: Profile, words: MeasureMessages, about: string): void {
-    [this.#profile, this.#words, this.#at] = [profile, words, null];
+  /** Shows a profile. @param prefix text before the length, such as "≈ " */
+  set(profile: Profile, messages: MeasureMessages, prefix: string): void {
+    [this.#profile, this.#messages, this.#at] = [profile, messages, null];
     const known = [...profile.heights_m].filter((height) => !Number.isNaN(height));
     const [low, high] = known.length > 0 ? [Math.min(...known), Math.max(...known)] : [0, 1];
-    const room = Math.max(0.08 * (high - low), 0.5);
-    this.#range = [low - room, high + room];
-    this.#svg.replaceChildren(...this.#grid(words), path("map3d-profile-fill", this.#shape(true)), path("map3d-profile-line", this.#shape(false)));
+    const margin = Math.max(0.08 * (high - low), 0.5);
+    this.#range = [low - margin, high + margin];
+    this.#svg.replaceChildren(...this.#grid(messages), path("map3d-profile-fill", this.#shape(true)), path("map3d-profile-line", this.#shape(false)));
     const length = profile.distances_m.at(-1) ?? 0;
-    const text = known.length > 0 ? `${about}${words.length(length)}  ${words.range(low, high)}${known.length < profile.heights_m.length ? `  ${words.partHidden}` : ""}` : words.allHidden;
-    for (const [name, value] of Object.entries({ "aria-label": words.profile, "aria-valuemin": "0", "aria-valuemax": length.toFixed(2), "aria-valuenow": "0", "aria-valuetext": text })) this.box.setAttribute(name, value);
-    this.box.dataset["rest"] = text;
+    const text = known.length > 0 ? `${prefix}${messages.length(length)}  ${messages.range(low, high)}${known.length < profile.heights_m.length ? `  ${messages.partHidden}` : ""}` : messages.allHidden;
+    for (const [name, value] of Object.entries({ "aria-label": messages.profile, "aria-valuemin": "0", "aria-valuemax": length.toFixed(2), "aria-valuenow": "0", "aria-valuetext": text })) this.box.setAttribute(name, value);
+    this.box.dataset["summary"] = text;
     this.#show(null);
   }
 
-  #grid(words: MeasureMessages): SVGElement[] {
+  #grid(messages: MeasureMessages): SVGElement[] {
     const [low, high] = this.#range;
-    const step = floorToRound((high - low) / LINES) * ((high - low) / LINES / floorToRound((high - low) / LINES) >= 2 ? 2 : 1);
+    const step = floorToRound((high - low) / GRID_LINES) * ((high - low) / GRID_LINES / floorToRound((high - low) / GRID_LINES) >= 2 ? 2 : 1);
     const heights = Array.from({ length: Math.max(0, Math.floor(high / step) - Math.ceil(low / step) + 1) }, (_, k) => (Math.ceil(low / step) + k) * step);
     this.#heights.replaceChildren(...heights.map((height) => {
-      const label = element("span", "", {}, words.height(height));
+      const label = element("span", "", {}, messages.height(height));
       label.style.top = `${this.#y(height).toFixed(1)}%`;
       return label;
     }));
     return heights.map((height) => path("map3d-profile-grid", `M0 ${this.#y(height).toFixed(2)}H${String(WIDTH)}`));
   }
 
-  /** One piece for each stretch that is seen. */
+  /** Returns an SVG path with one part for each visible stretch of the line. */
   #shape(filled: boolean): string {
     const { heights_m = new Float64Array() } = this.#profile ?? {};
     let [shape, start] = ["", -1];
@@ -97,13 +97,13 @@ export class Chart {
     return (HEIGHT * (high - height)) / (high - low);
   }
 
-  #goTo(clientX: number): void {
+  #moveTo(clientX: number): void {
     const { left, width } = this.#svg.getBoundingClientRect();
     const last = (this.#profile?.heights_m.length ?? 0) - 1;
     if (last > 0 && width > 0) this.#show(clamp(Math.round((last * (clientX - left)) / width), 0, last));
   }
 
-  #key(event: KeyboardEvent): void {
+  #onKeyDown(event: KeyboardEvent): void {
     const last = (this.#profile?.heights_m.length ?? 0) - 1;
     const step = Math.max(1, Math.round(last / 100));
     const to: Record<string, number> = { ArrowLeft: (this.#at ?? step) - step, ArrowRight: (this.#at ?? -step) + step, Home: 0, End: last };
@@ -115,24 +115,24 @@ export class Chart {
   }
 
   #show(at: number | null): void {
-    const [profile, words] = [this.#profile, this.#words];
-    if (!profile || !words) return;
+    const [profile, messages] = [this.#profile, this.#messages];
+    if (!profile || !messages) return;
     this.#at = at;
-    this.#hand.hidden = at === null;
-    const text = at === null ? (this.box.dataset["rest"] ?? "") : words.placeOf(profile.distances_m[at] ?? 0, profile.heights_m[at] ?? NaN);
-    this.#said.textContent = text;
+    this.#cursor.hidden = at === null;
+    const text = at === null ? (this.box.dataset["summary"] ?? "") : messages.formatSample(profile.distances_m[at] ?? 0, profile.heights_m[at] ?? NaN);
+    this.#readout.textContent = text;
     if (at !== null) {
-      this.#hand.style.left = `${((100 * this.#x(at)) / WIDTH).toFixed(2)}%`;
+      this.#cursor.style.left = `${((100 * this.#x(at)) / WIDTH).toFixed(2)}%`;
       this.box.setAttribute("aria-valuenow", (profile.distances_m[at] ?? 0).toFixed(2));
       this.box.setAttribute("aria-valuetext", text);
     }
-    this.#walk(at);
+    this.#onMove(at);
   }
 }
 
 function path(classes: string, d: string): SVGPathElement {
-  const made = document.createElementNS(NS, "path");
-  made.setAttribute("class", classes);
-  made.setAttribute("d", d);
-  return made;
+  const element = document.createElementNS(NS, "path");
+  element.setAttribute("class", classes);
+  element.setAttribute("d", d);
+  return element;
 }

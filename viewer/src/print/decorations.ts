@@ -8,60 +8,61 @@ const HALO = "rgb(255 255 255 / 0.9)";
 /** CSS pixels. */
 const [MARGIN, PAD, SWATCH, ROW] = [16, 12, 16, 24] as const;
 
-interface Pin {
+interface MarkerPin {
   readonly x: number;
   readonly y: number;
   readonly label: string;
   readonly color: string;
 }
 
-/** What lies over a picture: title, legend, scale bar and the like. Lengths are CSS pixels, which `unit` scales. */
-export class Furniture {
+/** Draws title, legend, scale bar, north arrow, markers and attribution over a picture. Lengths are CSS pixels, scaled by `unit`. */
+export class Decorations {
   readonly #context: CanvasRenderingContext2D;
   readonly #unit: number;
   readonly #lookAt_deg: number;
-  /** Of the ground across the picture, a CSS pixel of texts. */
+  /** Metres across the picture per CSS pixel of text. */
   readonly #unit_m: number;
-  readonly #markers: readonly Pin[];
+  readonly #markers: readonly MarkerPin[];
   readonly #width: number;
   readonly #height: number;
 
-  /** What is said is of the map as it is now. @param scale picture pixels a CSS pixel of the map  @param unit picture pixels a CSS pixel of texts */
+  /** Copies the current state of the map. @param scale picture pixels per CSS pixel of the map  @param unit picture pixels per CSS pixel of text */
   constructor(map: map, context: CanvasRenderingContext2D, scale: number, unit: number) {
     [this.#context, this.#unit] = [context, unit];
     [this.#width, this.#height] = [context.canvas.width / unit, context.canvas.height / unit];
     this.#lookAt_deg = map.lookAt_deg;
     this.#unit_m = (map.metresPerPixel / scale) * unit;
     const accent = getComputedStyle(map.container).getPropertyValue("--map3d-accent") || INK;
-    const place = (part: number, own: number, whole: number): number => ((part - own / 2) * scale) / unit + whole / 2;
+    const toPicture = (at: number, mapSize: number, pictureSize: number): number => ((at - mapSize / 2) * scale) / unit + pictureSize / 2;
     this.#markers = map.markers.flatMap(({ label, position, options: { color = accent, showLabel } }) => {
       const at = map.project(position);
-      return at ? [{ x: place(at[0], map.canvas.clientWidth, this.#width), y: place(at[1], map.canvas.clientHeight, this.#height), label: showLabel ? label : "", color }] : [];
+      return at ? [{ x: toPicture(at[0], map.canvas.clientWidth, this.#width), y: toPicture(at[1], map.canvas.clientHeight, this.#height), label: showLabel ? label : "", color }] : [];
     });
   }
 
-  /** From here on the canvas is measured in units. */
+  /** Switches the canvas to CSS pixels. */
   begin(): this {
     this.#context.setTransform(this.#unit, 0, 0, this.#unit, 0, 0);
     this.#context.textBaseline = "middle";
     return this;
   }
 
+  /** Draws the title in the top left corner. */
   title(text: string): void {
-    const lines = this.#wrapped(text, 18, 600, this.#width * 0.6);
+    const lines = this.#wrap(text, 18, 600, this.#width * 0.6);
     const width = Math.max(...lines.map((line) => this.#widthOf(line, 18, 600)));
     this.#panel(MARGIN, MARGIN, width + 2 * PAD, lines.length * ROW + PAD);
     lines.forEach((line, k) => { this.#text(line, MARGIN + PAD, MARGIN + PAD / 2 + (k + 0.5) * ROW, 18, 600); });
   }
 
-  /** Legend, scale bar and attribution, from the bottom upwards. */
-  foot(legend: PictureLegend | undefined, scaleBar: boolean, attribution: string): void {
-    const high = this.#attribution(attribution, scaleBar ? SCALE_BAR_MAX_PX + 2 * MARGIN : MARGIN);
+  /** Draws legend, scale bar and attribution, from the bottom up. */
+  footer(legend: PictureLegend | undefined, scaleBar: boolean, attribution: string): void {
+    const height = this.#attribution(attribution, scaleBar ? SCALE_BAR_MAX_PX + 2 * MARGIN : MARGIN);
     if (scaleBar) this.#scaleBar(this.#height - MARGIN);
-    if (legend) this.#legend(legend, this.#height - MARGIN - Math.max(high, scaleBar ? 24 : 0));
+    if (legend) this.#legend(legend, this.#height - MARGIN - Math.max(height, scaleBar ? 24 : 0));
   }
 
-  /** Points to where north is on the screen, as the map's compass does. */
+  /** Draws the north arrow in the top right corner. */
   northArrow(): void {
     const context = this.#context;
     context.save();
@@ -81,11 +82,12 @@ export class Furniture {
     context.restore();
   }
 
+  /** Draws the markers of the map. */
   markers(): void {
     for (const pin of this.#markers) if (pin.x >= 0 && pin.y >= 0 && pin.x <= this.#width && pin.y <= this.#height) this.#pin(pin);
   }
 
-  #pin({ x, y, label, color }: Pin): void {
+  #pin({ x, y, label, color }: MarkerPin): void {
     const context = this.#context;
     if (label !== "") {
       context.fillStyle = color;
@@ -105,7 +107,7 @@ export class Furniture {
   /** @returns its height */
   #attribution(text: string, left: number): number {
     if (text === "") return 0;
-    const lines = this.#wrapped(text, 11, 400, this.#width - left - MARGIN);
+    const lines = this.#wrap(text, 11, 400, this.#width - left - MARGIN);
     const width = Math.max(...lines.map((line) => this.#widthOf(line, 11, 400)));
     const height = lines.length * 15 + 6;
     this.#context.fillStyle = PANEL;
@@ -122,7 +124,7 @@ export class Furniture {
     const length = metres / this.#unit_m;
     context.beginPath();
     for (const [x, y] of [[0, -7], [0, 0], [length, 0], [length, -7]] as const) context.lineTo(MARGIN + x, bottom + y);
-    this.#strokeOnAnything(1.5);
+    this.#strokeWithHalo(1.5);
     context.textAlign = "center";
     context.font = `500 12px ${FONT}`;
     [context.strokeStyle, context.lineWidth] = [HALO, 3];
@@ -136,7 +138,7 @@ export class Furniture {
     const width = Math.min(Math.max(this.#widthOf(title, 13, 600), ...labels.map((label) => this.#widthOf(label, 13, 400) + SWATCH + 9)), this.#width * 0.5);
     const top = bottom - (chosen.length + 1) * ROW - PAD;
     this.#panel(MARGIN, top, width + 2 * PAD, bottom - top);
-    this.#text(this.#cut(title, 13, 600, width), MARGIN + PAD, top + PAD / 2 + ROW / 2, 13, 600);
+    this.#text(this.#truncate(title, 13, 600, width), MARGIN + PAD, top + PAD / 2 + ROW / 2, 13, 600);
     chosen.forEach(({ label, color }, k) => {
       const middle = top + PAD / 2 + (k + 1.5) * ROW;
       this.#context.fillStyle = color;
@@ -146,7 +148,7 @@ export class Furniture {
       this.#context.roundRect(MARGIN + PAD, middle - SWATCH / 2, SWATCH, SWATCH, 4);
       this.#context.fill();
       this.#context.stroke();
-      this.#text(this.#cut(label, 13, 400, width - SWATCH - 9), MARGIN + PAD + SWATCH + 9, middle, 13, 400);
+      this.#text(this.#truncate(label, 13, 400, width - SWATCH - 9), MARGIN + PAD + SWATCH + 9, middle, 13, 400);
     });
   }
 
@@ -167,8 +169,8 @@ export class Furniture {
     this.#context.fillText(text, x, y);
   }
 
-  /** The path as a dark line with a white rim. */
-  #strokeOnAnything(width: number): void {
+  /** Strokes the path as a dark line with a white outline. */
+  #strokeWithHalo(width: number): void {
     const context = this.#context;
     context.lineJoin = "round";
     for (const [color, wide] of [[HALO, width + 3], [INK, width]] as const) {
@@ -182,19 +184,19 @@ export class Furniture {
     return this.#context.measureText(text).width;
   }
 
-  #cut(text: string, size: number, weight: number, width: number): string {
+  #truncate(text: string, size: number, weight: number, width: number): string {
     if (this.#widthOf(text, size, weight) <= width) return text;
     const letters = Array.from(text);
     while (letters.length > 0 && this.#widthOf(`${letters.join("")}…`, size, weight) > width) letters.pop();
     return `${letters.join("")}…`;
   }
 
-  #wrapped(text: string, size: number, weight: number, width: number): string[] {
+  #wrap(text: string, size: number, weight: number, width: number): string[] {
     const lines: string[] = [];
     for (const word of text.split(/\s+/)) {
       const longer = lines.length > 0 ? `${lines.at(-1) ?? ""} ${word}` : word;
       if (lines.length > 0 && this.#widthOf(longer, size, weight) <= width) lines[lines.length - 1] = longer;
-      else lines.push(this.#cut(word, size, weight, width));
+      else lines.push(this.#truncate(word, size, weight, width));
     }
     return lines;
   }

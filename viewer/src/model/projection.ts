@@ -4,14 +4,14 @@ import { cssPixelM, type Camera } from "../geo/camera";
 import type { Frame } from "../geo/frame";
 import { towardsLight, type Light } from "../geo/light";
 
-/** Least and greatest D of boxes (local), metres; null without any. */
-export function depthsOf(boxes: readonly Box3[], { axes }: Frame): Vec2 | null {
+/** Returns the range of D of local boxes, metres; null without boxes. */
+export function depthRangeOf(boxes: readonly Box3[], { axes }: Frame): Vec2 | null {
   const all = boxes.flatMap((box) => corners(box).map((corner) => uvdFromLocal(axes, corner)[2]));
   return all.length === 0 ? null : [Math.min(...all), Math.max(...all)];
 }
 
-/** A part of the screen: device pixels from the left top. */
-export interface Part {
+/** A rectangle of the screen: device pixels from the top left. */
+export interface ScreenRect {
   readonly x: number;
   readonly y: number;
   readonly width: number;
@@ -26,13 +26,13 @@ interface Screen {
   readonly dpr: number;
 }
 
-/** Sizes are multiples of it, so that what moves a little needs no other textures. */
-const STEP_PX = 128;
-/** Room for what is drawn thicker than it is. */
-const ROOM_PX = 4;
+/** Sizes are multiples of this, so that small movements do not need new textures. */
+const SIZE_STEP_PX = 128;
+/** Margin for lines and points, which are drawn thicker than their boxes. */
+const MARGIN_PX = 4;
 
-/** The part of the screen that boxes (local) are seen in; null when that is none. */
-export function partOf(boxes: readonly Box3[], { camera, width, height, dpr }: Screen): Part | null {
+/** Returns the rectangle of the screen that contains local boxes; null when they are out of view. */
+export function screenRectOf(boxes: readonly Box3[], { camera, width, height, dpr }: Screen): ScreenRect | null {
   const px = cssPixelM(camera) / dpr;
   const points = boxes.flatMap((box) => corners(box).map((corner) => uvdFromLocal(camera.frame.axes, corner)));
   const [left, top] = cornerOf(camera);
@@ -41,40 +41,40 @@ export function partOf(boxes: readonly Box3[], { camera, width, height, dpr }: S
   return across && down && { x: across[0], width: across[1], y: down[0], height: down[1] };
 }
 
-/** U and V of a part's left top corner, and metres a device pixel. */
-export function groundOf({ x, y }: Part, { camera, dpr }: Screen): readonly [u: number, v: number, px_m: number] {
+/** Returns U and V of a rectangle's top left corner, and metres per device pixel. */
+export function screenRectCorner({ x, y }: ScreenRect, { camera, dpr }: Screen): readonly [u: number, v: number, px_m: number] {
   const px = cssPixelM(camera) / dpr;
   const [left, top] = cornerOf(camera);
   return [left + x * px, top - y * px, px];
 }
 
-/** U and V of the screen's left top corner. */
+/** Returns U and V of the screen's top left corner. */
 function cornerOf(camera: Camera): Vec2 {
   const px = cssPixelM(camera);
   return [camera.u - (camera.width / 2) * px, camera.v + (camera.height / 2) * px];
 }
 
-/** First pixel and how many of a screen's; null: all lie outside. */
+/** Returns the first pixel and the number of pixels within the screen; null when all are outside. */
 function spanOf(values: readonly number[], screen: number): Vec2 | null {
-  const low = Math.max(0, Math.floor(Math.min(...values)) - ROOM_PX);
-  const high = Math.min(screen, Math.ceil(Math.max(...values)) + ROOM_PX);
+  const low = Math.max(0, Math.floor(Math.min(...values)) - MARGIN_PX);
+  const high = Math.min(screen, Math.ceil(Math.max(...values)) + MARGIN_PX);
   if (!(low < high)) return null;
-  const size = Math.min(screen, STEP_PX * Math.ceil((high - low) / STEP_PX));
+  const size = Math.min(screen, SIZE_STEP_PX * Math.ceil((high - low) / SIZE_STEP_PX));
   return [Math.min(low, screen - size), size];
 }
 
-/** The images' light for three.js, which divides by π what falls on a surface. */
-export interface Lamps {
+/** The map's light in three.js's units; three.js divides irradiance by π. */
+export interface ThreeLighting {
   readonly sky_rgb: Vec3;
   readonly sky: number;
   readonly sun_rgb: Vec3;
   readonly sun: number;
-  /** Unit, local. */
+  /** Unit vector towards the sun, local. */
   readonly towards: Vec3;
 }
 
-/** Where the images show colours as they are stored, white light from everywhere does so. */
-export function lampsOf(light: Readonly<Light>): Lamps {
+/** Converts the map's light. An unlit map shows stored colours, which uniform white light reproduces. */
+export function threeLighting(light: Readonly<Light>): ThreeLighting {
   const { lit, sky_rgb, sun_rgb, ambient, diffuse } = light;
   return { sky_rgb: lit ? sky_rgb : [1, 1, 1], sky: Math.PI * (lit ? ambient : 1), sun_rgb, sun: lit ? Math.PI * diffuse : 0, towards: towardsLight(light) };
 }

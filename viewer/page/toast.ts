@@ -1,16 +1,16 @@
 import { byId, withText } from "./dom";
-import { say } from "./i18n";
+import { message } from "./i18n";
 
-const SHOWN = 3;
-const LASTS_MS = 12_000;
+const MAX_TOASTS = 3;
+const DURATION_MS = 12_000;
 
-/** Says what went wrong, for a while. The same words are not said twice at once. */
+/** Shows a message for a while, unless the same one is visible already. */
 export function toast(text: string): void {
   const toasts = byId("toasts");
   if ([...toasts.children].some((child) => child.firstElementChild?.textContent === text)) return;
-  while (toasts.children.length >= SHOWN) toasts.firstElementChild?.remove();
+  while (toasts.children.length >= MAX_TOASTS) toasts.firstElementChild?.remove();
   const box = withText("div", "", "toast");
-  const close = withText("button", say("close"));
+  const close = withText("button", message("close"));
   close.type = "button";
   close.addEventListener("click", () => {
     box.remove();
@@ -19,15 +19,15 @@ export function toast(text: string): void {
   toasts.append(box);
   setTimeout(() => {
     box.remove();
-  }, LASTS_MS);
+  }, DURATION_MS);
 }
 
-/** Says that there is nothing to show, and why. */
-export function fail(title: string, why: string): void {
+/** Shows an error in place of the map. */
+export function showFailure(title: string, reason: string): void {
   document.querySelector(".failed")?.remove();
   const box = withText("div", "", "failed");
   box.setAttribute("role", "alert");
-  box.append(withText("h2", title), withText("p", why));
+  box.append(withText("h2", title), withText("p", reason));
   document.body.append(box);
   byId("head").hidden = true;
 }

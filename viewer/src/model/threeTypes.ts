@@ -1,4 +1,4 @@
-/** What is used of three.js: any build since r155 has it, and the page's own types stay whatever they are. */
+/** The parts of three.js that are used here. Any build since r155 has them; the page keeps its own three.js types. */
 export interface Three {
   readonly REVISION: string;
   readonly LoopOnce: number;
@@ -10,15 +10,15 @@ export interface Three {
   readonly Group: new () => ThreeNode;
   readonly Object3D: new () => ThreeNode;
   readonly OrthographicCamera: new () => ThreeCamera;
-  readonly AmbientLight: new () => Lamp;
-  readonly DirectionalLight: new () => Lamp;
-  readonly Vector3: new (x: number, y: number, z: number) => Vector;
-  readonly Box3: new () => Box;
+  readonly AmbientLight: new () => ThreeLight;
+  readonly DirectionalLight: new () => ThreeLight;
+  readonly Vector3: new (x: number, y: number, z: number) => ThreeVector;
+  readonly Box3: new () => ThreeBox;
   readonly Raycaster: new () => ThreeRaycaster;
-  readonly AnimationMixer: new (root: never) => Mixer;
+  readonly AnimationMixer: new (root: never) => ThreeMixer;
 }
 
-export interface Vector {
+export interface ThreeVector {
   readonly x: number;
   readonly y: number;
   readonly z: number;
@@ -27,9 +27,9 @@ export interface Vector {
 
 /** An Object3D. */
 export interface ThreeNode {
-  readonly position: Vector;
+  readonly position: ThreeVector;
   readonly rotation: { set(x: number, y: number, z: number, order: "ZYX"): unknown };
-  readonly scale: Vector;
+  readonly scale: ThreeVector;
   readonly parent: ThreeNode | null;
   readonly animations: readonly ThreeClip[];
   visible: boolean;
@@ -39,7 +39,7 @@ export interface ThreeNode {
   traverse(visit: (node: ThreeNode) => void): void;
 }
 
-export interface Lamp extends ThreeNode {
+export interface ThreeLight extends ThreeNode {
   readonly color: { setRGB(r: number, g: number, b: number): unknown };
   intensity: number;
 }
@@ -73,7 +73,7 @@ export interface ThreeTarget {
 
 /** A WebGLRenderer. */
 export interface ThreeRenderer {
-  /** `__webglTexture` of a texture that has been drawn to. */
+  /** Returns `{ __webglTexture }` of a texture that has been rendered to. */
   readonly properties: { get(texture: object): unknown };
   setClearColor(color: number, alpha: number): void;
   setRenderTarget(target: ThreeTarget | null): void;
@@ -82,43 +82,43 @@ export interface ThreeRenderer {
   dispose(): void;
 }
 
-export interface Box {
-  readonly min: Vector;
-  readonly max: Vector;
+export interface ThreeBox {
+  readonly min: ThreeVector;
+  readonly max: ThreeVector;
   setFromObject(node: ThreeNode): unknown;
   isEmpty(): boolean;
 }
 
-/** An intersection, as a Raycaster finds it. */
+/** An intersection of a Raycaster. */
 export interface ThreeHit {
   readonly object: ThreeNode;
-  readonly point: Vector;
+  readonly point: ThreeVector;
 }
 
 /** A Raycaster. */
 export interface ThreeRaycaster {
   readonly params: { readonly Line: { threshold: number }; readonly Points: { threshold: number } };
   camera: unknown;
-  set(origin: Vector, direction: Vector): void;
+  set(origin: ThreeVector, direction: ThreeVector): void;
   intersectObjects(nodes: ThreeNode[], recursive: boolean): readonly ThreeHit[];
 }
 
-export interface Mixer {
-  clipAction(clip: ThreeClip): Action;
+export interface ThreeMixer {
+  clipAction(clip: ThreeClip): ThreeAction;
   update(seconds: number): unknown;
 }
 
-export interface Action {
+export interface ThreeAction {
   clampWhenFinished: boolean;
-  reset(): Action;
-  setLoop(mode: never, repetitions: number): Action;
-  play(): Action;
-  stop(): Action;
+  reset(): ThreeAction;
+  setLoop(mode: never, repetitions: number): ThreeAction;
+  play(): ThreeAction;
+  stop(): ThreeAction;
   isRunning(): boolean;
 }
 
-/** GLTFLoader, or any other of three.js. */
+/** A loader of three.js, such as GLTFLoader. */
 export interface ModelLoader {
-  /** An Object3D, or `{ scene, animations }`. */
+  /** Returns an Object3D, or `{ scene, animations }`. */
   loadAsync(url: string): Promise<unknown>;
 }

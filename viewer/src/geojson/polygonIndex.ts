@@ -1,17 +1,17 @@
 import type { Vec2 } from "../core/vec";
 
-/** Edges a band holds, about. */
-const PER_BAND = 2;
-const MOST_BANDS = 4096;
+/** Average number of edges per band. */
+const EDGES_PER_BAND = 2;
+const MAX_BANDS = 4096;
 
-/** A polygon with holes in a plane: tells quickly what lies in it (even–odd; a point on an edge counts for one of the two sides). */
-export class Area {
-  /** Least and greatest corner. */
+/** Point-in-polygon index of a plane polygon with holes, by the even–odd rule. A point on an edge belongs to one of the two sides. */
+export class PolygonIndex {
+  /** Corners of the bounding box. */
   readonly low: Vec2;
   readonly high: Vec2;
-  /** Edges as x0, y0, x1, y1, by bands of y. */
+  /** Edges as x0, y0, x1, y1, sorted into bands of y. */
   readonly #bands: readonly Float64Array[];
-  readonly #perBand: number;
+  readonly #bandHeight: number;
 
   constructor(rings: readonly (readonly Vec2[])[]) {
     let [x0, y0, x1, y1] = [Infinity, Infinity, -Infinity, -Infinity];
@@ -20,14 +20,14 @@ export class Area {
     }
     [this.low, this.high] = [[x0, y0], [x1, y1]];
     const edges = rings.reduce((sum, ring) => sum + ring.length, 0);
-    const count = Math.max(1, Math.min(MOST_BANDS, Math.ceil(edges / PER_BAND)));
-    this.#perBand = (y1 - y0) / count || 1;
-    this.#bands = this.#sorted(rings, count);
+    const count = Math.max(1, Math.min(MAX_BANDS, Math.ceil(edges / EDGES_PER_BAND)));
+    this.#bandHeight = (y1 - y0) / count || 1;
+    this.#bands = this.#sortEdges(rings, count);
   }
 
-  has(x: number, y: number): boolean {
+  contains(x: number, y: number): boolean {
     if (!(x >= this.low[0] && x <= this.high[0] && y >= this.low[1] && y <= this.high[1])) return false;
-    const band = this.#bands[Math.min(Math.floor((y - this.low[1]) / this.#perBand), this.#bands.length - 1)] as Float64Array;
+    const band = this.#bands[Math.min(Math.floor((y - this.low[1]) / this.#bandHeight), this.#bands.length - 1)] as Float64Array;
     let inside = false;
     for (let k = 0; k < band.length; k += 4) {
       const [y0, y1] = [band[k + 1] as number, band[k + 3] as number];
@@ -38,9 +38,9 @@ export class Area {
     return inside;
   }
 
-  #sorted(rings: readonly (readonly Vec2[])[], count: number): Float64Array[] {
+  #sortEdges(rings: readonly (readonly Vec2[])[], count: number): Float64Array[] {
     const bands: number[][] = Array.from({ length: count }, () => []);
-    const bandOf = (y: number): number => Math.min(Math.max(Math.floor((y - this.low[1]) / this.#perBand), 0), count - 1);
+    const bandOf = (y: number): number => Math.min(Math.max(Math.floor((y - this.low[1]) / this.#bandHeight), 0), count - 1);
     for (const ring of rings) {
       for (const [k, from] of ring.entries()) {
         const to = ring[(k + 1) % ring.length] as Vec2;

@@ -4,11 +4,11 @@ import type { map } from "../map3d";
 const NS = "http://www.w3.org/2000/svg";
 const CORNERS = 64;
 
-/** A level circle of so many metres, which follows the picture. */
-export class Circle {
+/** A horizontal circle on the map that shows the accuracy of a position. */
+export class AccuracyCircle {
   readonly #svg = document.createElementNS(NS, "svg");
   readonly #path = this.#svg.appendChild(document.createElementNS(NS, "path"));
-  #leave: () => void = () => undefined;
+  #stopFollowing: () => void = () => undefined;
 
   constructor() {
     this.#svg.setAttribute("class", "map3d-accuracy");
@@ -16,9 +16,9 @@ export class Circle {
   }
 
   addTo(map: map, [x, y, z]: Vec3, radius_m: number): void {
-    const around = Array.from({ length: CORNERS }, (_, k) => (2 * Math.PI * k) / CORNERS).map((angle): Vec3 => [x + radius_m * Math.cos(angle), y + radius_m * Math.sin(angle), z]);
-    const place = (): void => {
-      const points = around.flatMap((point) => {
+    const corners = Array.from({ length: CORNERS }, (_, k) => (2 * Math.PI * k) / CORNERS).map((angle): Vec3 => [x + radius_m * Math.cos(angle), y + radius_m * Math.sin(angle), z]);
+    const update = (): void => {
+      const points = corners.flatMap((point) => {
         const at = map.project(point);
         return at ? [`${at[0].toFixed(1)} ${at[1].toFixed(1)}`] : [];
       });
@@ -26,13 +26,13 @@ export class Circle {
     };
     this.remove();
     map.overlayPane.prepend(this.#svg);
-    map.frameEvents.on("move", place);
-    this.#leave = () => { map.frameEvents.off("move", place); };
-    place();
+    map.frameEvents.on("move", update);
+    this.#stopFollowing = () => { map.frameEvents.off("move", update); };
+    update();
   }
 
   remove(): void {
-    this.#leave();
+    this.#stopFollowing();
     this.#svg.remove();
   }
 }

@@ -1,0 +1,50 @@
+import type { imageLayer, map } from "./map3d.mjs";
+import { byId, withText } from "./dom";
+import { message } from "./i18n";
+import { toast } from "./toast";
+
+const MAX_ROWS = 30;
+
+/** Binds the list of objects in view, largest first: for screen readers and keyboards. */
+export function bindInViewList(view: map, layer: () => imageLayer, select: (id: number) => void): void {
+  const [button, box] = [byId("list-in-view"), byId("in-view")];
+  const close = (): void => {
+    box.hidden = true;
+    button.setAttribute("aria-expanded", "false");
+  };
+  button.hidden = false;
+  button.addEventListener("click", () => {
+    objectsInView(view, layer()).then((rows) => {
+      box.replaceChildren(withText("h2", message("inView")), rows.length > 0 ? listOf(rows, (id) => { close(); select(id); }) : withText("p", message("noObjects"), "note"));
+      box.hidden = false;
+      button.setAttribute("aria-expanded", "true");
+      (box.querySelector("button") ?? box).focus();
+    }, (reason: unknown) => { toast(String(reason)); });
+  });
+  box.addEventListener("keydown", (event) => {
+    if (event.key !== "Escape") return;
+    event.stopPropagation();
+    close();
+    button.focus();
+  });
+}
+
+type Row = readonly [id: number, name: string];
+
+async function objectsInView(view: map, layer: imageLayer): Promise<Row[]> {
+  const visible = (await view.objectsInView()).filter((object) => object.layer === layer).slice(0, MAX_ROWS);
+  return Promise.all(visible.map(async ({ id }) => [id, (await layer.object(id))?.name ?? `${message("object")} ${String(id)}`] as const));
+}
+
+function listOf(rows: readonly Row[], select: (id: number) => void): HTMLElement {
+  const list = document.createElement("ol");
+  for (const [id, name] of rows) {
+    const button = withText("button", name);
+    button.type = "button";
+    button.addEventListener("click", () => { select(id); });
+    const row = document.createElement("li");
+    row.append(button);
+    list.append(row);
+  }
+  return list;
+}
