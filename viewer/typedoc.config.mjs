@@ -1,6 +1,6 @@
 import { ENTRIES } from "./scripts/entries.mjs";
 
-/** The reference: every public name of the core and of the entries, each with a sentence. */
+/** The API reference: all public names of the core and the entries, each documented. */
 export default {
   name: "map3d.js",
   entryPoints: ["src/map3d.ts", ...Object.values(ENTRIES)],
@@ -13,9 +13,9 @@ export default {
   excludeExternals: true,
   disableSources: true,
   hideGenerator: true,
-  // Parts of public types that say enough where they are used.
-  intentionallyNotExported: ["Steered", "SurfaceEvents", "Camera", "Frame", "Rect", "FilledOptions", "GeographicJson", "SunJson", "ViewJson", "Occupancy", "ThreeNode", "ThreeRenderer", "ThreeTarget", "ThreeCamera", "ThreeRaycaster", "Lamp", "Vector", "Box", "Mixer"],
-  // Fields have a sentence where their name and type do not say it all.
+  // Types that are used only as parts of public types.
+  intentionallyNotExported: ["Camera", "Frame", "Rect", "FilledOptions", "GeographicJson", "SunJson", "ViewJson", "Occupancy", "ThreeNode", "ThreeRenderer", "ThreeTarget", "ThreeCamera", "ThreeRaycaster", "ThreeLight", "ThreeVector", "ThreeBox", "ThreeMixer"],
+  // Fields need a comment only if their name and type are not enough.
   requiredToBeDocumented: ["Class", "Interface", "TypeAlias", "Function", "Variable", "Enum", "EnumMember", "Method", "Accessor"],
   validation: { notExported: true, invalidLink: true, invalidPath: false, rewrittenLink: true, notDocumented: true, unusedMergeModuleWith: true },
   treatWarningsAsErrors: true,

@@ -354,8 +354,8 @@ test("what cannot be is refused by name: no WebGL, no loader, no file, no number
       done(said);
     });
   }), ORIGIN);
-  const canvas = "a modelLayer needs WebGL, and this map draws on a 2D canvas (map.drawer tells): show a marker there, or nothing";
-  expect(errors).toEqual(['a modelLayer that fetches "/a.glb" needs a loader, e.g. { loader: GLTFLoader }', "position y is to be a number, got NaN", "scale is to be above 0, got 0", "a modelLayer needs three.js r155 or newer, got r124", "UsageError", canvas]);
+  const canvas = "a modelLayer needs WebGL, but this map draws on a 2D canvas; check map.drawer and show a marker instead";
+  expect(errors).toEqual(['a modelLayer needs a loader for "/a.glb", e.g. { loader: GLTFLoader }', "position y must be a number, got NaN", "scale must be greater than 0, got 0", "a modelLayer needs three.js r155 or newer, got r124", "UsageError", canvas]);
   expect(await page.evaluate(() => (globalThis as Global).errors)).toEqual([canvas]);
   await settled(page, () => (globalThis as Modelling).map.panBy(0, 0).setLight({}), null);
   expect(before.equals(await picture(page))).toBe(true);

@@ -87,7 +87,7 @@ test("title, legend, markers, scale bar and attribution stand on it; what is ask
     return false;
   };
   expect([has([255, 0, 0, 255]), has([0, 255, 0, 255])]).toEqual([true, true]);
-  expect(await failed({ width_px: 9000, height_px: 20 })).toBe("UsageError: a picture's width is a whole number from 1 to 8192 pixels, got 9000");
+  expect(await failed({ width_px: 9000, height_px: 20 })).toBe("UsageError: the picture's width must be a whole number from 1 to 8192 pixels, got 9000");
   expect(await failed({ background: "url(x)" })).toBe('UsageError: background must be a CSS colour, got "url(x)"');
   expect(await failed({ scale: 4, stop: true })).toBe("Error: enough");
   expect(await page.locator(".map3d").count()).toBe(1);
