@@ -1,4 +1,4 @@
-// Builds dist/: map3d.js (a global), map3d.mjs (a module), entries beside them, map3d-full with all in one, the service worker, the page that shows a rendering, and type declarations.
+// Builds dist/: map3d.js (script), map3d.mjs (module), the entries, map3d-full (everything), the service worker, the ready-made page, and type declarations.
 import { execFileSync } from "node:child_process";
 import { cpSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { dirname, join, resolve } from "node:path";
@@ -11,20 +11,20 @@ const dist = join(root, "dist");
 const shared = { bundle: true, minify: true, target: "es2022", legalComments: "none", logLevel: "warning" };
 const banner = { js: "/*! map3d, Apache-2.0 */" };
 
-/** `import code from "worker:./x.ts"`: the bundled source text of a worker. */
+/** Resolves `import code from "worker:./x.ts"` to the bundled source of a worker. */
 const workers = {
   name: "workers",
   setup(build) {
     build.onResolve({ filter: /^worker:/ }, ({ path, resolveDir }) => ({ path: resolve(resolveDir, path.slice("worker:".length)), namespace: "worker" }));
     build.onLoad({ filter: /.*/, namespace: "worker" }, async ({ path }) => {
-      const made = await esbuild.build({ ...shared, entryPoints: [path], format: "iife", write: false, metafile: true });
-      const watchFiles = Object.keys(made.metafile.inputs).map((file) => resolve(file));
-      return { contents: made.outputFiles[0].text, loader: "text", watchFiles };
+      const result = await esbuild.build({ ...shared, entryPoints: [path], format: "iife", write: false, metafile: true });
+      const watchFiles = Object.keys(result.metafile.inputs).map((file) => resolve(file));
+      return { contents: result.outputFiles[0].text, loader: "text", watchFiles };
     });
   },
 };
 
-/** Shaders without comments and indentation. */
+/** Removes comments and indentation from shaders. */
 const shaders = {
   name: "shaders",
   setup(build) {
@@ -33,7 +33,7 @@ const shaders = {
 };
 const plugins = [workers, shaders];
 
-/** Entries beside the core use it by its public names: as a module from map3d.mjs, in a script from the global. */
+/** Lets entries import the core's public names: modules from map3d.mjs, scripts from the global `map3d`. */
 const coreAs = (how) => ({
   name: "core",
   setup(build) {
@@ -46,7 +46,7 @@ async function bundle(entry, name, options) {
   await esbuild.build({ ...shared, banner, entryPoints: [join(root, entry)], outfile: join(dist, name), plugins, ...options });
 }
 
-/** The core and all entries in one file. */
+/** Bundles the core and all entries in one file. */
 async function bundleFull(name, options) {
   const contents = ["src/map3d.ts", ...Object.values(ENTRIES)].map((file) => `export * from "./${file}";\n`).join("");
   await esbuild.build({ ...shared, banner, stdin: { contents, resolveDir: root }, outfile: join(dist, name), plugins, ...options });
@@ -72,7 +72,7 @@ async function build() {
   writeDeclarations();
 }
 
-/** Declarations name their files with extensions, which every kind of module resolution understands. */
+/** Writes the declarations, with file extensions in imports for all kinds of module resolution. */
 function writeDeclarations() {
   const types = join(dist, "types");
   for (const file of readdirSync(types, { recursive: true }).filter((name) => name.endsWith(".d.ts"))) {

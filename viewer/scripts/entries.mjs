@@ -1,4 +1,4 @@
-/** Bundles beside the core, `map3d-<name>`: what each exports. `map3d-full` has the core and all of them. */
+/** Optional bundles `map3d-<name>` and their source files. `map3d-full` contains the core and all of them. */
 export const ENTRIES = {
   cluster: "src/cluster/index.ts",
   compare: "src/compare/index.ts",

@@ -1,4 +1,4 @@
-// Serves the examples with a small made-up town, rendered at the start, until it is ended.
+// Serves the examples with a small made-up town, rendered at start.
 import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { dirname, join, resolve } from "node:path";
 import { fileURLToPath, pathToFileURL } from "node:url";
@@ -6,11 +6,11 @@ import * as esbuild from "esbuild";
 
 const root = resolve(dirname(fileURLToPath(import.meta.url)), "..");
 const contents = 'export { renderTown } from "./test/fixture/rendering"; export { TestServer } from "./test/fixture/server";';
-// The fixture finds dist/ and examples/ from where its source lies.
+// The fixture finds dist/ and examples/ relative to its source folder.
 const define = { "import.meta.dirname": JSON.stringify(join(root, "test/fixture")) };
-const made = await esbuild.build({ stdin: { contents, resolveDir: root }, bundle: true, platform: "node", format: "esm", write: false, define });
+const result = await esbuild.build({ stdin: { contents, resolveDir: root }, bundle: true, platform: "node", format: "esm", write: false, define });
 const folder = mkdtempSync(join(root, "node_modules/.examples-"));
-writeFileSync(join(folder, "fixture.mjs"), made.outputFiles[0].text);
+writeFileSync(join(folder, "fixture.mjs"), result.outputFiles[0].text);
 const { renderTown, TestServer } = await import(pathToFileURL(join(folder, "fixture.mjs")).href);
 rmSync(folder, { recursive: true });
 

@@ -1,4 +1,4 @@
-// Prints gzipped sizes of what is delivered; fails when a bundle is over its budget, or has none.
+// Prints the gzipped sizes of dist/; fails when a bundle exceeds its budget or has none.
 import { readdirSync, readFileSync, statSync } from "node:fs";
 import { dirname, join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
@@ -6,7 +6,7 @@ import { gzipSync } from "node:zlib";
 import { ENTRIES } from "./entries.mjs";
 
 const dist = resolve(dirname(fileURLToPath(import.meta.url)), "../dist");
-/** Gzipped KB of `map3d` and `map3d-<entry>`, as a module and as a script. */
+/** Budgets of `map3d` and `map3d-<entry>` (module and script), gzipped KB. */
 const BUDGET = {
   core: 50,
   cluster: 4,
@@ -24,9 +24,9 @@ const BUDGET = {
   theme: 4,
   full: 130,
 };
-/** Of the service worker, `map3d-worker.js`. */
+/** Budget of the service worker, `map3d-worker.js`. */
 const WORKER = 2;
-/** The core, all entries and the page, once each. */
+/** Budget of the core, all entries and the page together. */
 const TOTAL = 130;
 
 const bundles = new Map(["core", ...Object.keys(ENTRIES), "full"].flatMap((name) => ["mjs", "js"].map((end) => [name === "core" ? `map3d.${end}` : `map3d-${name}.${end}`, BUDGET[name] * 1024])));
@@ -42,6 +42,6 @@ const total = rows.filter(({ name }) => !scripts.includes(name) && name !== "map
 console.log(`everything     ${String(total).padStart(24)} gz of ${TOTAL * 1024}`);
 if (total > TOTAL * 1024) over.push("everything");
 if (over.length > 0) {
-  console.error(`over budget, or without one: ${over.join(", ")}`);
+  console.error(`over budget or without a budget:  ${over.join(", ")}`);
   process.exit(1);
 }

@@ -73,7 +73,7 @@ const POINTS: Readonly<Record<string, (page: Page, picture: Buffer) => Promise<v
     expect(length).toBeLessThan(34.2);
   },
   sun: async (page, afternoon) => {
-    expect(await text(page, "output")).toMatch(/^15:00: sun \d+° high/);
+    expect(await text(page, "output")).toMatch(/^15:00: sun at altitude \d+°/);
     await page.locator("#hour").fill("23");
     expect(await text(page, "output")).toBe("23:00: the sun has set");
     expect(afternoon.equals(await still(page))).toBe(false);
@@ -103,7 +103,7 @@ const POINTS: Readonly<Record<string, (page: Page, picture: Buffer) => Promise<v
     await page.getByLabel(/Language|Sprache|Langue/).selectOption("de");
     await page.getByRole("button", { name: "Drehen" }).click();
     await page.waitForFunction(() => location.hash.startsWith("#90-45/"));
-    await page.getByRole("button", { name: "Näher" }).click();
+    await page.getByRole("button", { name: "Vergrößern" }).click();
     await still(page);
     const address = page.url();
     await page.goto("about:blank");
@@ -117,7 +117,7 @@ const POINTS: Readonly<Record<string, (page: Page, picture: Buffer) => Promise<v
   model: async (page, standing) => {
     await page.mouse.click(400, 338);
     await page.getByText("base, 502.0 m").waitFor();
-    await page.getByRole("button", { name: "Turn the crane" }).click();
+    await page.getByRole("button", { name: "Rotate the crane" }).click();
     await page.waitForTimeout(1000);
     expect(standing.equals(await page.screenshot())).toBe(false);
     await page.getByRole("button", { name: "Stop the crane" }).click();
@@ -128,7 +128,7 @@ const POINTS: Readonly<Record<string, (page: Page, picture: Buffer) => Promise<v
     const chooser = page.waitForEvent("filechooser");
     await page.getByRole("button", { name: "Open map folder" }).click();
     await (await chooser).setFiles(folder);
-    await page.getByText("A small town: 4 directions, read from your device.").waitFor();
+    await page.getByText("A small town: 4 views, opened from your device.").waitFor();
     expect((await still(page)).equals(before)).toBe(false);
     expect(await page.evaluate("[map.layers.length, files.layer.source === map.layers[0].source]")).toEqual([1, true]);
     rmSync(dirname(folder), { recursive: true });
