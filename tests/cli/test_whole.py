@@ -232,19 +232,19 @@ def test_site_of_a_folder_processes_only_changes_when_re_run(run: Run, tmp_path:
     files, out = write_town(tmp_path / "Little Town", 2), tmp_path / "site"
     status, text, err = run("site", str(files), "-o", str(out), "--res", "0.2")
     assert status == 0, err
-    assert "4 files imported" in text
+    assert "imported 4 files" in text
     assert (out / "rendering.json").is_file()
     assert run("verify", "--published", str(out))[0] == 0
     (files / "house-0-0.obj").write_text(house(0.0, 0.0, 9.0))
     (files / "broken.obj").write_text("v 0 0 0\nv nan nan nan\nf 1 2 9\n")
     status, text, err = run("site", str(files), "-o", str(out), "--res", "0.2")
     assert status == 0, err
-    assert "1 files imported, 3 unchanged, 1 not usable" in text
-    assert "were skipped" not in text
+    assert "imported 1 file, 3 unchanged, 1 failed" in text
+    assert "skipped" not in text
     with (files / "house-0-0.obj").open("a") as more:
         more.write("f 1 2 99\n")
     status, text, err = run("site", str(files), "-o", str(out), "--res", "0.2")
-    assert "1 things in the files were skipped, 0 noted; map3d show report little-town tells which" in text
+    assert "skipped 1 element; 0 warnings; map3d show report little-town lists them" in text
     assert Manifest.load((out / "rendering.json").read_bytes()).content_version == 2
 
 
