@@ -1,4 +1,4 @@
-"""Files that are broken in one way each, beside what is whole in them."""
+"""Files that are each broken in one way but contain usable parts."""
 
 import io
 from collections.abc import Callable
@@ -23,7 +23,7 @@ _BOMB = '<!DOCTYPE bomb [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;"><
 
 
 def citygml(names: tuple[str, ...] = ("one", "two", "three"), *, dtd: str = "") -> str:
-    """A wall of 8 m for each building, in a row 60 m north; no coordinate system."""
+    """Returns a document with a wall of 8 m per building, in a row 60 m to the north, without a coordinate system."""
     walls = "".join(_BUILDING.format(name=name, x=20 * k, x2=20 * k + 8) for k, name in enumerate(names))
     return _HEAD.format(dtd=dtd) + walls + "</core:CityModel>\n"
 
@@ -41,7 +41,7 @@ def png() -> bytes:
 
 
 def textured(folder: Path, name: str, x: float, image: bytes | None) -> None:
-    """`name`.obj: a house whose material names `name`.jpg; None: which is not there."""
+    """Writes `name`.obj: a house with the texture `name`.jpg, which is missing when `image` is None."""
     lines = house(x, 0, 8).splitlines()
     vertices = [line for line in lines if line.startswith("v")]
     faces = ["f " + " ".join(f"{v}/{k}" for k, v in enumerate(line.split()[1:], 1)) for line in lines if line.startswith("f")]
@@ -53,14 +53,14 @@ def textured(folder: Path, name: str, x: float, image: bytes | None) -> None:
 
 
 def elevation(path: Path) -> None:
-    """A plain of 200 m at height −1."""
+    """Writes a plain of 200 m at height −1."""
     transform = rasterio.Affine(10, 0, -60, 0, -10, 140)
     with rasterio.open(path, "w", driver="GTiff", width=20, height=20, count=1, dtype="float32", transform=transform) as raster:
         raster.write(np.full((1, 20, 20), -1, np.float32))
 
 
 def house_with(extra: str, x: float = 0.0) -> Callable[[Path], object]:
-    """A whole house, and lines of an OBJ that are not."""
+    """Returns a function that writes a complete house and invalid OBJ lines."""
     return lambda path: path.write_text(house(x, 0, 8) + extra)
 
 
@@ -70,7 +70,7 @@ BAD_LINES = {
     "before": "f -1 -2 -99\n",
     "nan": "v nan 0 0\nv 1 -inf 1\nf 1 2 9\nf 1 2 10\n",
 }
-"""Each costs the faces that it names, and nothing else."""
+"""Lines that invalidate only their own faces."""
 
 DAMAGED_IMAGES: dict[str, bytes | None] = {
     "missing": None,
@@ -79,9 +79,9 @@ DAMAGED_IMAGES: dict[str, bytes | None] = {
     "lying": png(),
     "text": b"no image at all",
 }
-"""What lies where a JPEG is named. `lying` is an image all the same."""
+"""The bytes of a file named as JPEG. `lying` is a valid image in another format."""
 
-WHOLE_FILES: dict[str, bytes] = {
+USELESS_FILES: dict[str, bytes] = {
     "empty.obj": b"",
     "empty.gml": b"",
     "empty.tif": b"",
@@ -90,10 +90,10 @@ WHOLE_FILES: dict[str, bytes] = {
     "nothing.obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 7 8 9\n",
     "bomb.gml": citygml(("&c;",), dtd=_BOMB).encode(),
 }
-"""Nothing in them can be used."""
+"""Files without any usable part."""
 
 
 def truncated() -> str:
-    """The last of three buildings is cut off."""
+    """Returns a document whose third building is cut off."""
     text = citygml()
     return text[: text.index('gml:id="three"') + 200]

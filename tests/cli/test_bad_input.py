@@ -1,4 +1,4 @@
-"""Bad input through the whole command line: what is said, what it costs, and that all else arrives and is rendered."""
+"""Bad input on the command line: error messages, skipped parts, and the rendering of all usable parts."""
 
 import json
 from pathlib import Path
@@ -9,7 +9,7 @@ import pytest
 from map3d.catalogue import Workspace
 from map3d.registry import Registry
 from map3d.tiles.sqlite_store import SqliteTileStore
-from tests.cli.bad_files import BAD_LINES, DAMAGED_IMAGES, WHOLE_FILES, citygml, elevation, house_with, jpeg, textured, truncated
+from tests.cli.bad_files import BAD_LINES, DAMAGED_IMAGES, USELESS_FILES, citygml, elevation, house_with, jpeg, textured, truncated
 from tests.cli.towns import Run, house
 
 core = pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.whole
 
 @pytest.fixture
 def run(run: Run) -> Run:
-    """Whatever comes in, no traceback comes out. The scene `town` is there."""
+    """Runs a command line and checks that it prints no traceback. Creates the scene `town`."""
 
     def call(*arguments: str) -> tuple[int, str, str]:
         status, out, err = run(*arguments)
@@ -37,21 +37,19 @@ def run(run: Run) -> Run:
         ("a.gml", b"<html></html>", 2, ("a.gml: XML with the root html", "CityGML")),
         ("empty.gml", b"", 2, ("empty.gml: an empty file", "CityGML")),
         ("empty.obj", b"", 2, ("empty.obj: an empty file", "OBJ")),
-        ("nothing.obj", WHOLE_FILES["nothing.obj"], 1, ("nothing.obj: no triangle in it could be used", "1 × index out of range")),
-        ("cut.tif", WHOLE_FILES["cut.tif"], 1, ("cut.tif: not a GTiff raster, or damaged",)),
-        ("bomb.gml", WHOLE_FILES["bomb.gml"], 1, ("bomb.gml: a document type definition is not allowed", "remove it")),
+        ("nothing.obj", USELESS_FILES["nothing.obj"], 1, ("nothing.obj: no triangle in it could be used", "1 × index out of range")),
+        ("cut.tif", USELESS_FILES["cut.tif"], 1, ("cut.tif: not a GTiff raster, or damaged",)),
+        ("bomb.gml", USELESS_FILES["bomb.gml"], 1, ("bomb.gml: a document type definition is not allowed", "remove it")),
         ("head.gml", citygml().encode()[:300], 1, ("head.gml: no triangle in it could be used",)),
     ],
 )
-def test_a_file_of_which_nothing_can_be_used_is_refused_in_one_line(
-    run: Run, tmp_path: Path, name: str, data: bytes, status: int, says: tuple[str, ...]
-) -> None:
+def test_useless_file_is_refused_in_one_line(run: Run, tmp_path: Path, name: str, data: bytes, status: int, says: tuple[str, ...]) -> None:
     (tmp_path / name).write_bytes(data)
     got, out, err = run("add-files", "town", name)
     assert (got, out) == (status, "")
     assert err.startswith("map3d: ")
     assert err.count("\n") == 1
-    assert err.count(str(tmp_path / name)) <= 1, "its path is said once"
+    assert err.count(str(tmp_path / name)) <= 1, "the message contains the path once"
     assert "Error" not in err
     assert "Failed:" not in err
     assert [part for part in says if part not in err] == []
@@ -59,7 +57,7 @@ def test_a_file_of_which_nothing_can_be_used_is_refused_in_one_line(
 
 
 @pytest.mark.parametrize("names", [(), ("notes.txt",), ("empty.gml",)])
-def test_a_folder_without_known_files_is_refused_and_says_why(run: Run, tmp_path: Path, names: tuple[str, ...]) -> None:
+def test_folder_without_usable_files_is_refused(run: Run, tmp_path: Path, names: tuple[str, ...]) -> None:
     (tmp_path / "folder").mkdir()
     for name in names:
         (tmp_path / "folder" / name).touch()
@@ -70,7 +68,7 @@ def test_a_folder_without_known_files_is_refused_and_says_why(run: Run, tmp_path
 
 
 @pytest.mark.parametrize("name", sorted(BAD_LINES))
-def test_bad_lines_cost_their_faces_alone(run: Run, tmp_path: Path, name: str) -> None:
+def test_invalid_lines_skip_only_their_faces(run: Run, tmp_path: Path, name: str) -> None:
     house_with(BAD_LINES[name])(tmp_path / "a.obj")
     bad = sum(line.startswith("f") for line in BAD_LINES[name].splitlines())
     status, out, err = run("add-files", "town", "a.obj", "--json")
@@ -83,7 +81,7 @@ def test_bad_lines_cost_their_faces_alone(run: Run, tmp_path: Path, name: str) -
     assert (status, err.count("\n"), "line " in err) == (1, 1, True)
 
 
-def test_a_truncated_document_gives_what_stands_before_the_cut(run: Run, tmp_path: Path) -> None:
+def test_truncated_document_is_read_up_to_the_cut(run: Run, tmp_path: Path) -> None:
     (tmp_path / "a.gml").write_text(truncated())
     status, out, err = run("add-files", "town", "a.gml", "--crs", "local")
     assert (status, err) == (0, "")
@@ -95,7 +93,7 @@ def test_a_truncated_document_gives_what_stands_before_the_cut(run: Run, tmp_pat
 
 @pytest.fixture
 def messy(tmp_path: Path) -> Path:
-    """A folder in which nearly every file has something wrong with it."""
+    """A folder in which nearly every file has a defect."""
     folder = tmp_path / "messy"
     folder.mkdir()
     (folder / "good.obj").write_text(house(0, 30, 8))
@@ -103,7 +101,7 @@ def messy(tmp_path: Path) -> Path:
         house_with(lines, x=20.0 * k)(folder / f"{name}.obj")
     for k, (name, image) in enumerate({**DAMAGED_IMAGES, "sound": jpeg()}.items()):
         textured(folder, name, 20.0 * (k + len(BAD_LINES)), image)
-    for name, data in WHOLE_FILES.items():
+    for name, data in USELESS_FILES.items():
         (folder / name).write_bytes(data)
     (folder / "truncated.gml").write_text(truncated())
     elevation(folder / "plain.tif")
@@ -111,7 +109,7 @@ def messy(tmp_path: Path) -> Path:
 
 
 def ids_in_tiles(workspace: Workspace) -> set[int]:
-    """Of the deepest level."""
+    """Returns the object ids in the tiles of the deepest level."""
     seen: set[int] = set()
     with SqliteTileStore(workspace.store_path("view", "0-45"), read_only=True) as store:
         number = [layer.kind for layer in store.shape.layers].index("id")
@@ -122,16 +120,16 @@ def ids_in_tiles(workspace: Workspace) -> set[int]:
     return seen
 
 
-def test_all_that_is_whole_in_a_messy_folder_is_rendered(run: Run, tmp_path: Path, messy: Path) -> None:
+def test_all_usable_parts_of_a_messy_folder_are_rendered(run: Run, tmp_path: Path, messy: Path) -> None:
     status, out, err = run("add-files", "town", str(messy), "--crs", "local", "--json")
     assert (status, err) == (1, "")
     answer = json.loads(out)
-    assert sorted(Path(item["source"]).name for item in answer["failed"]) == sorted({*WHOLE_FILES} - {"cut.tif"})
+    assert sorted(Path(item["source"]).name for item in answer["failed"]) == sorted({*USELESS_FILES} - {"cut.tif"})
     assert all(Path(item["source"]).name in item["error"] for item in answer["failed"])
     reports = {item["asset"]: item["report"] for item in answer["imported"]}
     assert set(reports) == {"good", "messy", "truncated", "sound", *BAD_LINES, *DAMAGED_IMAGES}
     warned = {name: " ".join(f"{w['reason']} {w['example']}" for w in report["warnings"]) for name, report in reports.items()}
-    assert "cut.tif" in warned["messy"], "the elevation model is used without the raster beside it"
+    assert "cut.tif" in warned["messy"], "the elevation model is imported without the damaged raster"
     assert "file not found missing.jpg" in warned["missing"]
     assert "unknown format zero.jpg" in warned["zero"]
     assert "unknown format text.jpg" in warned["text"]
@@ -140,7 +138,7 @@ def test_all_that_is_whole_in_a_messy_folder_is_rendered(run: Run, tmp_path: Pat
     status, out, err = run("create-rendering", "town", "view", "--res", "0.2", "--view", "0/45", "--json")
     assert status == 0, err
     built = json.loads(out)["build"]
-    assert built["materials_without_their_texture"] == 1, "the cut image is found out when it is decoded"
+    assert built["materials_without_their_texture"] == 1, "decoding detects the cut image"
     assert "damaged" in str(built["texture_warnings"])
     status, out, err = run("render", "view", "--json")
     assert (status, json.loads(out)["complete"]) == (0, True), err
@@ -152,7 +150,7 @@ def test_all_that_is_whole_in_a_messy_folder_is_rendered(run: Run, tmp_path: Pat
     assert run("verify")[0] == 0
 
 
-def test_strict_takes_nothing_from_a_folder_with_a_file_that_cannot_be_read(run: Run, messy: Path) -> None:
+def test_strict_imports_nothing_from_a_folder_with_an_unreadable_file(run: Run, messy: Path) -> None:
     status, out, err = run("add-files", "town", str(messy), "--strict")
     assert (status, out, err.count("\n")) == (2, "", 1)
     assert "empty.gml: an empty file" in err

@@ -1,4 +1,4 @@
-"""After a change: what is rendered again, and that the tiles are those of a render from nothing."""
+"""Incremental rendering: only affected blocks are rendered again, and the tiles equal those of a render from scratch."""
 
 import json
 import shutil
@@ -25,7 +25,7 @@ Blocks = dict[tuple[str, str], str]
 
 @pytest.fixture
 def town(run: Run, tmp_path: Path) -> Workspace:
-    """A finished rendering `view` of the scene `town`: houses, each a file, on terrain that is one of them."""
+    """A complete rendering `view` of the scene `town`: one file per house, and one for the ground."""
     assert run("create-scene", "town")[0] == 0
     files = write_town(tmp_path / "files")
     (files / "ground.obj").write_text("v -60 -60 -1\nv 190 -60 -1\nv 190 190 -1\nv -60 190 -1\nf 1 2 3 4\n")
@@ -36,7 +36,7 @@ def town(run: Run, tmp_path: Path) -> Workspace:
 
 
 def keys(workspace: Workspace) -> Blocks:
-    """(view, block) → key of base blocks in the stores."""
+    """Returns (view, block) → key of the stored base blocks."""
     found = {}
     for path in workspace.rendering_folder("view").glob("*.sqlite"):
         with SqliteTileStore(path, read_only=True) as store:
@@ -45,15 +45,15 @@ def keys(workspace: Workspace) -> Blocks:
     return found
 
 
-def seeing(workspace: Workspace, box: Box) -> set[tuple[str, str]]:
-    """Base blocks whose beam meets a local box, and those that touch one."""
+def blocks_seeing(workspace: Workspace, box: Box) -> set[tuple[str, str]]:
+    """Returns the base blocks whose beam intersects or touches a local box."""
     catalogue = workspace.open_catalogue()
     frames = catalogue.rendering("view").frames
     catalogue.close()
-    return {(frame.id, name) for frame in frames for name in _seeing(frame, box)}
+    return {(frame.id, name) for frame in frames for name in _blocks_seeing(frame, box)}
 
 
-def _seeing(frame: PinnedFrame, box: Box) -> list[str]:
+def _blocks_seeing(frame: PinnedFrame, box: Box) -> list[str]:
     root = block_levels(frame.zmax)[0].root
     corners = [(x, y, z) for x in (box[0][0], box[1][0]) for y in (box[0][1], box[1][1]) for z in (box[0][2], box[1][2])]
     i, j, _ = frame.level_pixel_from_local(root, corners)
@@ -70,8 +70,8 @@ def box_of(workspace: Workspace, name: str) -> Box:
     return box
 
 
-def from_nothing(run: Run, workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
-    """Digests of the same registry and frames, built and rendered in a workspace that has nothing of either yet."""
+def render_from_scratch(run: Run, workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
+    """Builds and renders the same registry and frames in a workspace without chunks and tiles; returns the digests."""
     copy = workspace.root.with_name("again")
     shutil.rmtree(copy, ignore_errors=True)
     shutil.copytree(workspace.root, copy)
@@ -88,13 +88,13 @@ def from_nothing(run: Run, workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 
 
 def render(run: Run) -> int:
-    """How many jobs were done."""
+    """Renders and returns the number of jobs done."""
     status, out, err = run("render", "view", "--json")
     assert status == 0, err
     return int(json.loads(out)["statistics"]["done"])
 
 
-def test_a_changed_added_or_removed_house_renders_what_sees_it_and_gives_the_tiles_of_a_render_from_nothing(
+def test_changed_added_or_removed_house_renders_only_affected_blocks_and_equals_a_render_from_scratch(
     run: Run, town: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = keys(town)
@@ -105,22 +105,22 @@ def test_a_changed_added_or_removed_house_renders_what_sees_it_and_gives_the_til
     assert render(run) > 0
     after = keys(town)
     changed = {place for place in after if before.get(place) != after[place]}
-    assert changed <= seeing(town, old) | seeing(town, box_of(town, "house-1-1"))
+    assert changed <= blocks_seeing(town, old) | blocks_seeing(town, box_of(town, "house-1-1"))
     assert 0 < len(changed) < len(after) / 2
-    assert digest(town) == from_nothing(run, town, monkeypatch)
-    # One file with two houses, of which one goes again.
+    assert digest(town) == render_from_scratch(run, town, monkeypatch)
+    # One file with two houses; then one of them is removed.
     path.write_text("o a\n" + house(43.0, 40.0, 9.5) + "o b\n" + _shifted(house(60.0, 62.0, 4.0)))
     assert run("add-files", "town", str(path), "--split", "group")[0] == 0
     assert render(run) > 0
-    assert digest(town) == from_nothing(run, town, monkeypatch)
+    assert digest(town) == render_from_scratch(run, town, monkeypatch)
     path.write_text("o a\n" + house(43.0, 40.0, 9.5))
     assert run("add-files", "town", str(path), "--split", "group")[0] == 0
     assert render(run) > 0
-    assert digest(town) == from_nothing(run, town, monkeypatch)
+    assert digest(town) == render_from_scratch(run, town, monkeypatch)
 
 
 def _shifted(text: str) -> str:
-    """Faces of a second house in a file: its vertices are the last eight."""
+    """Returns the house with relative vertex indices, for a second house in a file."""
     return (
         text.replace("f 1 3 4 2", "f -8 -6 -5 -7")
         .replace("f 5 6 8 7", "f -4 -3 -1 -2")
@@ -131,7 +131,7 @@ def _shifted(text: str) -> str:
     )
 
 
-def test_an_unchanged_scene_renders_nothing_and_a_file_given_again_changes_nothing(run: Run, town: Workspace, tmp_path: Path) -> None:
+def test_unchanged_scene_or_file_renders_nothing(run: Run, town: Workspace, tmp_path: Path) -> None:
     before, tiles = keys(town), digest(town)
     assert render(run) == 0
     assert run("add-files", "town", str(tmp_path / "files" / "house-2-1.obj"))[0] == 0
@@ -139,7 +139,7 @@ def test_an_unchanged_scene_renders_nothing_and_a_file_given_again_changes_nothi
     assert (keys(town), digest(town)) == (before, tiles)
 
 
-def test_a_view_that_is_added_is_rendered_alone_and_is_as_if_it_had_been_there(run: Run, town: Workspace) -> None:
+def test_added_view_is_rendered_alone_and_equals_one_created_at_first(run: Run, town: Workspace) -> None:
     before, tiles = keys(town), digest(town)
     status, _, err = run("add-views", "view", "--view", "200/60")
     assert status == 0, err
@@ -155,7 +155,7 @@ def test_a_view_that_is_added_is_rendered_alone_and_is_as_if_it_had_been_there(r
     assert run("verify")[0] == 0
 
 
-def test_layers_that_are_added_are_rendered_alone_and_are_as_if_they_had_been_there(run: Run, town: Workspace) -> None:
+def test_added_layers_are_rendered_alone_and_equal_those_created_at_first(run: Run, town: Workspace) -> None:
     assert run("create-rendering", "town", "less", "--res", "0.05", *VIEWS, "--layers", "color,id,depth")[0] == 0
     assert run("render", "less")[0] == 0
     before = contents(town, "less")
@@ -174,7 +174,7 @@ def test_layers_that_are_added_are_rendered_alone_and_are_as_if_they_had_been_th
     assert (status, json.loads(out)["statistics"]["done"]) == (0, len({(track, block) for track, block, *_ in before if block})), err
     after = contents(town, "less")
     assert {place: after[place] for place in before} == before
-    # Beside a rendering that had them all from the start.
+    # Compare with a rendering that had all layers from the start.
     assert run("verify", "less")[0] == 0
     assert layers_of(town, "less") == layers_of(town, "view")
     assert run("add-views", "less", "--view", "200/60")[0] == 0
@@ -187,7 +187,7 @@ def test_layers_that_are_added_are_rendered_alone_and_are_as_if_they_had_been_th
         db.execute("DELETE FROM tile WHERE (z, x, y) IN (SELECT z, x, y FROM tile ORDER BY z DESC LIMIT 1)")
     status, out, _ = run("verify", "less")
     assert (status, "exists in only one of the tracks 0-45 and 0-45+1" in out) == (1, True)
-    # Pinned anew they are one pass again.
+    # After --regrid they are one pass.
     assert run("create-rendering", "town", "less", "--res", "0.05", *VIEWS, "--regrid")[0] == 0
     assert run("render", "less")[0] == 0
     assert not list(town.rendering_folder("less").glob("*+1.sqlite"))
@@ -195,7 +195,7 @@ def test_layers_that_are_added_are_rendered_alone_and_are_as_if_they_had_been_th
 
 
 def contents(workspace: Workspace, rendering: str) -> dict[tuple[object, ...], object]:
-    """All that lies in the stores: tiles with their bytes, blocks with key, version and seam."""
+    """Returns the contents of the stores: tiles with their bytes, blocks with key, version and seam."""
     found: dict[tuple[object, ...], object] = {}
     for path in workspace.rendering_folder(rendering).glob("*.sqlite"):
         with SqliteTileStore(path, read_only=True) as store:
@@ -206,7 +206,7 @@ def contents(workspace: Workspace, rendering: str) -> dict[tuple[object, ...], o
 
 
 def layers_of(workspace: Workspace, rendering: str) -> dict[tuple[str, str], dict[TileId, bytes | None]]:
-    """(view, layer) → tiles, from whichever track has them."""
+    """Returns (view, layer) → tiles, from all tracks."""
     found = {}
     for path in workspace.rendering_folder(rendering).glob("*.sqlite"):
         with SqliteTileStore(path, read_only=True) as store:
@@ -215,7 +215,7 @@ def layers_of(workspace: Workspace, rendering: str) -> dict[tuple[str, str], dic
     return found
 
 
-def test_an_estimate_knows_what_a_change_makes_stale(run: Run, town: Workspace, tmp_path: Path) -> None:
+def test_estimate_counts_blocks_that_a_change_affects(run: Run, town: Workspace, tmp_path: Path) -> None:
     whole = json.loads(run("estimate", "view", "--json")[1])
     assert whole["open_tiles"] == 0
     path = tmp_path / "files" / "house-3-0.obj"

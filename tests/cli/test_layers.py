@@ -1,4 +1,4 @@
-"""Layers of light on the command line: what is asked for is what the rendering keeps; nothing is rendered here."""
+"""Sun and ambient occlusion layers on the command line: the rendering stores the requested layers. Nothing is rendered here."""
 
 import json
 from pathlib import Path
@@ -32,7 +32,7 @@ def passes(run: Run, rendering: str) -> list[list[dict[str, Any]]]:
     return found
 
 
-def test_layers_of_light_are_kept_with_their_suns_and_reach(town: Run) -> None:
+def test_layers_are_stored_with_suns_and_radius(town: Run) -> None:
     more = ("--layers", "color,noon=sun,sun16,ao,picture", *TIME, *PLACE, "--date", "2026-06-21", "--ao-radius", "12.5", "--color", "jpeg")
     assert town(*NEW, *more)[0] == 0
     ((color, noon, day, ao, picture),) = passes(town, "new")
@@ -47,7 +47,7 @@ def test_layers_of_light_are_kept_with_their_suns_and_reach(town: Run) -> None:
     assert noon["suns"][0]["direction"][1] < 0 < noon["suns"][0]["direction"][2]
 
 
-def test_a_second_layer_of_a_kind_has_another_name_and_comes_in_another_pass(town: Run) -> None:
+def test_second_layer_of_the_same_kind_has_another_name_and_pass(town: Run) -> None:
     assert town("add-layers", "view", "--layers", "sun,depth2", *TIME, *PLACE)[0] == 0
     assert town("add-layers", "view", "--layers", "sun", "--sun", "280,12")[0] == 2, "the name is taken"
     status, out, err = town("add-layers", "view", "--layers", "evening=sun", "--sun", "280,12")

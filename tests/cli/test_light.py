@@ -1,4 +1,4 @@
-"""Layers of light, rendered: a house on a plain, seen from above, with shadows where geometry says."""
+"""Rendered sun and ambient occlusion layers: a house on a plain, seen from above, compared with computed shadows."""
 
 import io
 import json
@@ -56,7 +56,7 @@ class Plain:
             catalogue.close()
 
     def tiles(self, name: str) -> dict[tuple[str, str], dict[TileId, bytes]]:
-        """(view, layer) → its tiles."""
+        """Returns (view, layer) → tiles."""
         found = {}
         record = self.record(name)
         for track in record.tracks:
@@ -66,18 +66,18 @@ class Plain:
                     found[track.frame.id, layer.name] = {tile: data for tile, data in listed.items() if data is not None}
         return found
 
-    def looker(self, name: str) -> Callable[..., np.ndarray]:
-        """look(layer, x, y, z=0): the pixel's bytes at a local point, straight from above."""
+    def pixel_reader(self, name: str) -> Callable[..., np.ndarray]:
+        """Returns read_pixel(layer, x, y, z=0), which returns the bytes of the pixel at a local point in the view from above."""
         frame, tiles = self.record(name).frames[0], self.tiles(name)
 
-        def look(layer: str, x: float, y: float, z: float = 0.0) -> np.ndarray:
+        def read_pixel(layer: str, x: float, y: float, z: float = 0.0) -> np.ndarray:
             px, py, _ = frame.level_pixel_from_local(frame.zmax, [x, y, z])
             column, row = int(px) // frame.tile_px, int(py) // frame.tile_px
             with Image.open(io.BytesIO(tiles[frame.id, layer][TileId(frame.zmax, column, row)])) as image:
                 pixels = np.asarray(image)
             return np.atleast_1d(pixels[int(py) % frame.tile_px, int(px) % frame.tile_px])
 
-        return look
+        return read_pixel
 
 
 @pytest.fixture
@@ -92,7 +92,7 @@ def plain(run: Run, tmp_path: Path) -> Plain:
 
 
 def number(pixel: np.ndarray) -> int:
-    """Little-endian."""
+    """Returns the little-endian number."""
     return int.from_bytes(pixel.tobytes(), "little")
 
 
@@ -101,7 +101,7 @@ def linear(byte: np.ndarray) -> np.ndarray:
     return np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
 
 
-def test_small_tiles_show_the_same_in_fewer_bytes(plain: Plain) -> None:
+def test_small_tiles_have_equal_pixels_and_fewer_bytes(plain: Plain) -> None:
     layers = ("--layers", "color,normal,id,depth,sun", *EAST_45)
     plain.make("quick", *layers)
     plain.make("small", *layers, "--small")
@@ -114,18 +114,18 @@ def test_small_tiles_show_the_same_in_fewer_bytes(plain: Plain) -> None:
         assert sum(map(len, small[place].values())) < sum(map(len, tiles.values())), place
 
 
-def test_a_shadow_is_as_long_as_the_house_is_high_at_45_degrees(plain: Plain) -> None:
+def test_shadow_at_45_degrees_is_as_long_as_the_house_is_high(plain: Plain) -> None:
     plain.make("r", "--layers", "sun", *EAST_45)
-    look = plain.looker("r")
+    read_pixel = plain.pixel_reader("r")
     for x in (-0.5, -5.0, -9.5):
-        assert look("sun", x, 5.0).tolist() == [0], "to the west of the wall"
+        assert read_pixel("sun", x, 5.0).tolist() == [0], "to the west of the wall"
     for x, y, z in ((-10.5, 5.0, 0.0), (15.0, 5.0, 0.0), (-5.0, -0.5, 0.0), (-5.0, 10.5, 0.0), (4.0, 5.0, HEIGHT_M)):
-        assert look("sun", x, y, z).tolist() == [255]
+        assert read_pixel("sun", x, y, z).tolist() == [255]
 
 
-def test_each_bit_of_a_day_is_the_shadow_of_its_hour(plain: Plain) -> None:
+def test_each_bit_of_sun16_is_the_shadow_of_one_hour(plain: Plain) -> None:
     plain.make("r", "--layers", "sun16", *DAY)
-    look = plain.looker("r")
+    read_pixel = plain.pixel_reader("r")
     frame = plain.record("r").frames[0]
     (suns,) = (layer.suns for layer in plain.record("r").layers)
     pixel_m = frame.pixel_m(frame.zmax)
@@ -134,15 +134,15 @@ def test_each_bit_of_a_day_is_the_shadow_of_its_hour(plain: Plain) -> None:
     middles = [(frame.u0_m + (i + 0.5) * pixel_m, frame.v0_m - (j + 0.5) * pixel_m, 0.0) for i, j in places]
     ground = [(x, y, z) for x, y, z in middles if not (-0.5 < x < 8.5 and -0.5 < y < 10.5)]
     assert len(ground) > 50
-    bits = [number(look("sun16", *place)) for place in ground]
+    bits = [number(read_pixel("sun16", *place)) for place in ground]
     for hour, sun in enumerate(suns):
-        expected = [sun.direction[2] > 0 and not _meets_house(place, sun.direction) for place in ground]
+        expected = [sun.direction[2] > 0 and not _hits_house(place, sun.direction) for place in ground]
         assert [bit >> hour & 1 == 1 for bit in bits] == expected, sun.time
         assert not sun.direction[2] > 0.3 or {True, False} == set(expected)
 
 
-def _meets_house(place: Vec3, direction: Vec3) -> bool:
-    """Whether a ray from there, 1/64 m above, meets the box: by slabs."""
+def _hits_house(place: Vec3, direction: Vec3) -> bool:
+    """Whether a ray from 1/64 m above the point hits the box (slab test)."""
     near, far = 0.0, np.inf
     for at, step, high in zip((*place[:2], place[2] + 1 / 64), direction, (8.0, 10.0, HEIGHT_M), strict=True):
         first, last = sorted(((0.0 - at) / step, (high - at) / step))
@@ -150,37 +150,37 @@ def _meets_house(place: Vec3, direction: Vec3) -> bool:
     return bool(near < far)
 
 
-def test_corners_are_darker_than_the_plain_and_a_small_radius_sees_less(plain: Plain) -> None:
+def test_corners_are_darker_than_the_plain_and_less_so_with_a_small_radius(plain: Plain) -> None:
     plain.make("r", "--layers", "ao", "--ao-radius", "30")
     plain.add("r", "--layers", "near=ao", "--ao-radius", "2")
-    look = plain.looker("r")
-    foot, away = int(look("ao", -0.5, 5.0)[0]), int(look("ao", -60.0, 60.0)[0])
+    read_pixel = plain.pixel_reader("r")
+    foot, away = int(read_pixel("ao", -0.5, 5.0)[0]), int(read_pixel("ao", -60.0, 60.0)[0])
     assert 100 < foot < 190
     assert away == 255
-    assert int(look("ao", 4.0, 5.0, HEIGHT_M)[0]) == 255, "the roof is open"
-    assert int(look("near", -5.0, 5.0)[0]) == 255 > int(look("ao", -5.0, 5.0)[0])
+    assert int(read_pixel("ao", 4.0, 5.0, HEIGHT_M)[0]) == 255, "the roof is open"
+    assert int(read_pixel("near", -5.0, 5.0)[0]) == 255 > int(read_pixel("ao", -5.0, 5.0)[0])
 
 
-def test_behind_the_roof_lies_the_ground_and_behind_the_ground_nothing(plain: Plain) -> None:
+def test_depth2_is_the_ground_behind_the_roof_and_empty_behind_the_ground(plain: Plain) -> None:
     plain.make("r", "--layers", "depth,depth2")
-    look = plain.looker("r")
-    roof = number(look("depth2", 4.0, 5.0, HEIGHT_M)) - number(look("depth", 4.0, 5.0, HEIGHT_M))
+    read_pixel = plain.pixel_reader("r")
+    roof = number(read_pixel("depth2", 4.0, 5.0, HEIGHT_M)) - number(read_pixel("depth", 4.0, 5.0, HEIGHT_M))
     assert roof == pytest.approx(HEIGHT_M * 1024, abs=2)
-    assert number(look("depth2", -30.0, 5.0)) == NOTHING
+    assert number(read_pixel("depth2", -30.0, 5.0)) == NOTHING
 
 
-def test_the_picture_is_the_colour_lit_by_sun_and_sky(plain: Plain) -> None:
+def test_picture_is_color_lit_by_sun_and_sky(plain: Plain) -> None:
     plain.make("r", "--layers", "color,sun,ao,picture", *EAST_45)
-    look = plain.looker("r")
+    read_pixel = plain.pixel_reader("r")
     for x, y, z in ((-5.0, 5.0, 0.0), (-30.0, 5.0, 0.0), (4.0, 5.0, HEIGHT_M)):
-        lit, open_ = look("sun", x, y, z)[0] / 255, look("ao", x, y, z)[0] / 255
+        lit, open_ = read_pixel("sun", x, y, z)[0] / 255, read_pixel("ao", x, y, z)[0] / 255
         light = 0.42 * open_ + 0.76 * 0.5**0.5 * lit
-        color, picture = look("color", x, y, z), look("picture", x, y, z)
+        color, picture = read_pixel("color", x, y, z), read_pixel("picture", x, y, z)
         assert np.minimum(linear(color[:3]) * light, 1.0) == pytest.approx(linear(picture[:3]), abs=0.02)
         assert picture[3:].tolist() == color[3:].tolist(), "coverage, where the tile has any"
 
 
-def test_layers_are_the_same_whether_made_with_a_rendering_or_added(plain: Plain) -> None:
+def test_added_layers_equal_those_created_with_the_rendering(plain: Plain) -> None:
     light = ("--time", "2026-06-21T15:00+02:00", *DAY, "--ao-radius", "10")
     plain.make("whole", "--layers", LAYERS, *light)
     plain.make("less")

@@ -38,7 +38,7 @@ def town(run: Run, tmp_path: Path) -> Workspace:
 
 
 def digest(workspace: Workspace, rendering: str = "view") -> dict[str, str]:
-    """View → hash over every tile and seam."""
+    """Returns view → hash over every tile and seam."""
     found = {}
     for path in sorted(workspace.rendering_folder(rendering).glob("*.sqlite")):
         total = hashlib.sha256()
@@ -55,9 +55,9 @@ def digest(workspace: Workspace, rendering: str = "view") -> dict[str, str]:
 def test_files_become_tiles_that_verify(run: Run, town: Workspace) -> None:
     status, out, err = run("render", "view", "--json")
     assert status == 0, err
-    outcome = json.loads(out)
-    assert outcome["complete"]
-    assert outcome["statistics"]["failed_attempts"] == 0
+    result = json.loads(out)
+    assert result["complete"]
+    assert result["statistics"]["failed_attempts"] == 0
     manifest = Manifest.load(town.manifest_path("view").read_bytes())
     assert manifest.complete
     assert [view.frame.id for view in manifest.views] == ["0-45", "90-30"]
@@ -83,7 +83,7 @@ def test_ids_in_tiles_are_those_of_the_registry(run: Run, town: Workspace) -> No
     assert seen - {0} <= set(known)
 
 
-def test_a_second_render_does_nothing(run: Run, town: Workspace) -> None:
+def test_second_render_does_nothing(run: Run, town: Workspace) -> None:
     run("render", "view")
     before = (digest(town), town.manifest_path("view").read_bytes())
     status, out, _ = run("render", "view", "--json")
@@ -91,16 +91,16 @@ def test_a_second_render_does_nothing(run: Run, town: Workspace) -> None:
     assert (digest(town), town.manifest_path("view").read_bytes()) == before
 
 
-def test_a_changed_house_renders_little_and_gives_the_tiles_of_a_full_render(run: Run, town: Workspace, tmp_path: Path) -> None:
+def test_changed_house_renders_few_blocks_and_equals_a_full_render(run: Run, town: Workspace, tmp_path: Path) -> None:
     whole = json.loads(run("render", "view", "--json")[1])["statistics"]["done"]
     changed = tmp_path / "files" / "house-0-0.obj"
     changed.write_text(house(0.0, 0.0, 11.0))
     assert run("add-files", "town", str(changed))[0] == 0
     status, out, err = run("render", "view", "--json")
     assert status == 0, err
-    outcome = json.loads(out)
-    assert 0 < outcome["statistics"]["done"] < whole / 2
-    assert outcome["content_version"] == 2
+    result = json.loads(out)
+    assert 0 < result["statistics"]["done"] < whole / 2
+    assert result["content_version"] == 2
     assert run("verify")[0] == 0
     incremental = digest(town)
     assert run("create-rendering", "town", "view", "--res", "0.05", *VIEWS, "--regrid")[0] == 0
@@ -109,7 +109,7 @@ def test_a_changed_house_renders_little_and_gives_the_tiles_of_a_full_render(run
         pytest.fail("the incremental tiles differ from those of a full render")
 
 
-def test_content_that_leaves_the_frame_is_refused_until_regrid(run: Run, town: Workspace, tmp_path: Path) -> None:
+def test_content_outside_the_frame_is_refused_until_regrid(run: Run, town: Workspace, tmp_path: Path) -> None:
     run("render", "view")
     before = digest(town)
     far = tmp_path / "far.obj"
@@ -123,7 +123,7 @@ def test_content_that_leaves_the_frame_is_refused_until_regrid(run: Run, town: W
     assert run("verify")[0] == 0
 
 
-def test_a_killed_render_goes_on_and_ends_the_same(run: Run, town: Workspace) -> None:
+def test_killed_render_resumes_and_ends_with_the_same_tiles(run: Run, town: Workspace) -> None:
     run("render", "view")
     undisturbed = digest(town)
     for path in town.rendering_folder("view").iterdir():
@@ -192,22 +192,22 @@ def test_verify_says_when_blocks_are_not_done(run: Run, town: Workspace) -> None
     assert (status, "no job" in out) == (1, True)
 
 
-def test_estimates_are_of_the_right_size(run: Run, town: Workspace) -> None:
+def test_estimate_is_close_to_the_result(run: Run, town: Workspace) -> None:
     status, out, err = run("estimate", "view", "--json", "--workers", "2")
     assert status == 0, err
     before = json.loads(out)
     assert "sample" in before["how"]
-    outcome = json.loads(run("render", "view", "--json")[1])
-    assert before["base_tiles"] == pytest.approx(outcome["statistics"]["base_tiles"], rel=0.35)
-    assert before["bytes"] == pytest.approx(outcome["statistics"]["bytes"], rel=0.5)
+    result = json.loads(run("render", "view", "--json")[1])
+    assert before["base_tiles"] == pytest.approx(result["statistics"]["base_tiles"], rel=0.35)
+    assert before["bytes"] == pytest.approx(result["statistics"]["bytes"], rel=0.5)
     assert before["seconds"] > 0
     after = json.loads(run("estimate", "view", "--json")[1])
     assert after["open_tiles"] == 0
     assert "recorded" in after["how"]
-    assert after["base_tiles"] == outcome["statistics"]["base_tiles"]
+    assert after["base_tiles"] == result["statistics"]["base_tiles"]
 
 
-def test_levels_and_layers_are_as_asked(run: Run, town: Workspace) -> None:
+def test_levels_and_layers_are_as_requested(run: Run, town: Workspace) -> None:
     asked = ("--levels", "4", "--directions", "2", "--pitch", "30", "--pitch", "90", "--layers", "id,color", "--color", "jpeg", "--tile-size", "512")
     status, out, err = run("create-rendering", "town", "other", *asked, "--json")
     assert status == 0, err
@@ -222,7 +222,7 @@ def test_levels_and_layers_are_as_asked(run: Run, town: Workspace) -> None:
     assert run("verify", "other")[0] == 0
 
 
-def test_a_folder_becomes_a_site_and_only_changes_are_done_again(run: Run, tmp_path: Path) -> None:
+def test_site_of_a_folder_processes_only_changes_when_re_run(run: Run, tmp_path: Path) -> None:
     from map3d.tiles.viewer_files import viewer_folder
 
     try:
@@ -232,23 +232,23 @@ def test_a_folder_becomes_a_site_and_only_changes_are_done_again(run: Run, tmp_p
     files, out = write_town(tmp_path / "Little Town", 2), tmp_path / "site"
     status, text, err = run("site", str(files), "-o", str(out), "--res", "0.2")
     assert status == 0, err
-    assert "4 files imported" in text
+    assert "imported 4 files" in text
     assert (out / "rendering.json").is_file()
     assert run("verify", "--published", str(out))[0] == 0
     (files / "house-0-0.obj").write_text(house(0.0, 0.0, 9.0))
     (files / "broken.obj").write_text("v 0 0 0\nv nan nan nan\nf 1 2 9\n")
     status, text, err = run("site", str(files), "-o", str(out), "--res", "0.2")
     assert status == 0, err
-    assert "1 files imported, 3 unchanged, 1 not usable" in text
-    assert "were skipped" not in text
+    assert "imported 1 file, 3 unchanged, 1 failed" in text
+    assert "skipped" not in text
     with (files / "house-0-0.obj").open("a") as more:
         more.write("f 1 2 99\n")
     status, text, err = run("site", str(files), "-o", str(out), "--res", "0.2")
-    assert "1 things in the files were skipped, 0 noted; map3d show report little-town tells which" in text
+    assert "skipped 1 element; 0 warnings; map3d show report little-town lists them" in text
     assert Manifest.load((out / "rendering.json").read_bytes()).content_version == 2
 
 
-def test_a_workspace_can_be_moved(run: Run, town: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_workspace_can_be_moved(run: Run, town: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run("render", "view")
     moved = tmp_path / "elsewhere"
     shutil.move(town.root, moved)

@@ -1,4 +1,4 @@
-"""A rendering of less than its scene: the same tiles, and every verb that follows."""
+"""Renderings of a window: the tiles equal those of the whole scene, and all verbs work."""
 
 import json
 from pathlib import Path
@@ -18,7 +18,7 @@ RES = 0.0625
 TILE_M = 256 * RES
 WINDOW_M = 64.0
 VIEWS = ("--view", "0/30", "--view", "90/30", "--view", "0/90")
-"""sin 30° is exactly one half: ground points that are 32 m apart lie whole tiles apart in each of these views."""
+"""sin 30° is exactly one half, so ground points 32 m apart are whole tiles apart in each of these views."""
 
 
 @pytest.fixture
@@ -37,7 +37,7 @@ def rendered(run: Run, workspace: Workspace, name: str, *options: str) -> Manife
 
 
 def window_of(whole: Manifest, dx: float, dy: float, size_m: float = WINDOW_M) -> str:
-    """A window moved from the middle of the scene, in the scene's CRS."""
+    """Returns a window shifted from the centre of the scene, in the scene's CRS."""
     middle = (np.array(whole.box[0]) + whole.box[1]) / 2 + whole.origin
     return f"{middle[0] + dx!r},{middle[1] + dy!r},{size_m}".replace("np.float64(", "").replace(")", "")
 
@@ -48,7 +48,7 @@ def base_tiles(workspace: Workspace, manifest: Manifest, view: str, layer: int) 
         return {(tile.x, tile.y): store.get_tile(layer, *tile) or b"" for tile in tiles}
 
 
-def test_tiles_in_a_window_are_those_of_the_whole_rendering(run: Run, scene: Workspace) -> None:
+def test_tiles_in_a_window_equal_those_of_the_whole_rendering(run: Run, scene: Workspace) -> None:
     whole = rendered(run, scene, "whole")
     part = rendered(run, scene, "part", "--window", window_of(whole, 32, 32))
     assert (part.zmax, part.views[0].frame.size_m) == (2, WINDOW_M)
@@ -65,7 +65,7 @@ def test_tiles_in_a_window_are_those_of_the_whole_rendering(run: Run, scene: Wor
             assert ours == {place: data for place, data in theirs.items() if 0 <= place[0] < 4 and 0 <= place[1] < 4}
 
 
-def test_a_window_verifies_publishes_and_is_estimated(run: Run, scene: Workspace, tmp_path: Path) -> None:
+def test_window_can_be_verified_published_and_estimated(run: Run, scene: Workspace, tmp_path: Path) -> None:
     whole = rendered(run, scene, "whole")
     part = rendered(run, scene, "part", "--window", window_of(whole, 32, 32))
     assert run("verify", "part")[0] == 0
@@ -80,8 +80,8 @@ def test_a_window_verifies_publishes_and_is_estimated(run: Run, scene: Workspace
     assert run("verify", "--published", str(tmp_path / "folder"))[0] == 0
 
 
-def test_a_window_is_full_where_the_scene_goes_on_beyond_it(run: Run, tmp_path: Path) -> None:
-    """A floor of 400 m, seen at 45 degrees: every base tile of a window of 256 m has content."""
+def test_window_inside_the_scene_is_filled_completely(run: Run, tmp_path: Path) -> None:
+    """A floor of 400 m at pitch 45: every base tile of a window of 256 m has content."""
     (tmp_path / "floor.obj").write_text("v 0 0 0\nv 400 0 0\nv 400 400 0\nv 0 400 0\nf 1 2 3 4\n")
     assert run("create-scene", "town", "--ground-plane", "off")[0] == 0
     assert run("add-files", "town", str(tmp_path / "floor.obj"))[0] == 0
@@ -92,7 +92,7 @@ def test_a_window_is_full_where_the_scene_goes_on_beyond_it(run: Run, tmp_path: 
     assert manifest.views[0].occupancy.count() == 1 + 4 + 16
 
 
-def test_content_added_beside_a_window_changes_no_tile_and_inside_it_some(run: Run, scene: Workspace, tmp_path: Path) -> None:
+def test_only_content_added_inside_the_window_changes_tiles(run: Run, scene: Workspace, tmp_path: Path) -> None:
     part = rendered(run, scene, "part", "--window", "20,20,64")
     before = {view.frame.id: base_tiles(scene, part, view.frame.id, 0) for view in part.views}
     for name, x, y in (("far", 3000.0, 20.0), ("near", 20.0, 20.0)):
@@ -104,19 +104,19 @@ def test_content_added_beside_a_window_changes_no_tile_and_inside_it_some(run: R
         assert (after == before) == (name == "far")
 
 
-def test_levels_and_a_window_keep_its_side(run: Run, scene: Workspace) -> None:
+def test_window_with_levels_keeps_its_side(run: Run, scene: Workspace) -> None:
     status, out, err = run("create-rendering", "town", "part", "--levels", "3", "--window", "60,60,77.7", "--json")
     assert status == 0, err
-    made = json.loads(out)
-    assert {frame["size_m"] for frame in made["frames"]} == {77.7}
-    assert made["options"]["window"]["size_m"] == 77.7
+    record = json.loads(out)
+    assert {frame["size_m"] for frame in record["frames"]} == {77.7}
+    assert record["options"]["window"]["size_m"] == 77.7
 
 
 @pytest.mark.parametrize(
     ("window", "says"),
     [("1,2", "X,Y,SIZE"), ("a,b,c", "X,Y,SIZE"), ("60,60,0", "positive"), ("60,60,nan", "positive"), ("9000,60,64", "beside the scene")],
 )
-def test_windows_without_meaning_are_refused(run: Run, scene: Workspace, window: str, says: str) -> None:
+def test_invalid_windows_are_refused(run: Run, scene: Workspace, window: str, says: str) -> None:
     status, _, err = run("create-rendering", "town", "part", "--res", "0.25", "--window", window)
     assert status == 2
     assert says in err.splitlines()[-1]

@@ -11,7 +11,7 @@ BLOCK = BlockId(1, 1, 0)
 GOOD = [StoredTile(layer, *tile, b"x") for tile in ((1, 1, 0), (2, 3, 1), (3, 7, 3)) for layer in (0, 1)]
 
 
-def test_a_whole_block_and_an_empty_one_pass() -> None:
+def test_complete_and_empty_blocks_pass() -> None:
     check_rendered(SHAPE, BLOCK, GOOD, b"seam")
     check_rendered(SHAPE, BLOCK, [], None)
 
@@ -28,6 +28,6 @@ def test_a_whole_block_and_an_empty_one_pass() -> None:
         ([], b"s", "a seam"),
     ],
 )
-def test_a_block_that_cannot_be_is_refused(tiles: list[StoredTile], seam: bytes | None, says: str) -> None:
+def test_inconsistent_block_is_refused(tiles: list[StoredTile], seam: bytes | None, says: str) -> None:
     with pytest.raises(Corrupt, match=says):
         check_rendered(SHAPE, BLOCK, tiles, seam)

@@ -1,4 +1,4 @@
-"""Longitudes and latitudes by polynomials, against PROJ."""
+"""Polynomials for longitude and latitude, compared with PROJ."""
 
 import math
 
@@ -32,7 +32,7 @@ def value(coefficients, p, q, degree):
 
 
 def lon_lat(g: Geographic, x: float, y: float) -> tuple[float, float]:
-    """As spec/manifest.md says."""
+    """Evaluates the polynomials as in spec/manifest.md."""
     p, q = ((v - c) / g.unit_m for v, c in zip((x, y), g.local, strict=True))
     lon, lat = (c + value(row, p, q, g.degree) for c, row in zip(g.lon_lat, g.to, strict=True))
     return lon, lat
@@ -50,7 +50,7 @@ def scene(code: int, origin) -> SceneRecord:
 
 
 @pytest.mark.parametrize("name", PLACES)
-def test_polynomials_are_those_of_proj_to_a_millimetre(name):
+def test_polynomials_equal_proj_within_a_millimetre(name):
     code, origin, half_m = PLACES[name]
     box = ((-half_m, -0.7 * half_m, 0.0), (half_m, 0.9 * half_m, 80.0))
     geographic = geographic_of(scene(code, origin), box)
@@ -65,11 +65,11 @@ def test_polynomials_are_those_of_proj_to_a_millimetre(name):
         assert math.dist(local(geographic, near, expected[1]), (x, y)) < 0.001
 
 
-def test_a_scene_in_local_metres_lies_nowhere():
+def test_local_scene_has_no_longitude_and_latitude():
     box = ((-1.0, -1.0, 0.0), (1.0, 1.0, 1.0))
     assert geographic_of(SceneRecord("pot", crs=SceneCrs(None, None, LOCAL_CRS_NAME), origin=(0.0, 0.0, 0.0)), box) is None
     assert geographic_of(SceneRecord("empty"), box) is None
 
 
-def test_a_place_that_the_system_does_not_know_lies_nowhere():
+def test_position_outside_the_coordinate_system_has_no_longitude_and_latitude():
     assert geographic_of(scene(25832, (1e12, 1e12, 0.0)), ((-1.0, -1.0, 0.0), (1.0, 1.0, 1.0))) is None

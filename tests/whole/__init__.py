@@ -1,1 +1,1 @@
-"""From files to a click in a real browser."""
+"""Tests from files to a click in a real browser."""

@@ -1,7 +1,7 @@
-// Opens a served rendering and clicks on world positions. Asked: origin, rendering, view, positions, picture. Answers: clicks: [{ id, name, position, approximate, attributes }].
-import { look, openMap } from "./chromium.mjs";
+// Opens a served rendering and clicks on world positions. Parameters: origin, rendering, view, positions, picture. Result: clicks: [{ id, name, position, approximate, attributes }].
+import { runPage, openMap } from "./chromium.mjs";
 
-await look(async (page, { origin, rendering, view, positions, picture }) => {
+await runPage(async (page, { origin, rendering, view, positions, picture }) => {
   await openMap(page, { origin, rendering, view });
   await page.screenshot({ path: picture });
   const clicks = [];
@@ -9,7 +9,7 @@ await look(async (page, { origin, rendering, view, positions, picture }) => {
     const at = await page.evaluate(async (world) => {
       const { map } = globalThis;
       map.setView(world, 0);
-      await new Promise((done) => setTimeout(done, 600)); // longer than two taps of a double tap lie apart
+      await new Promise((done) => setTimeout(done, 600)); // longer than the interval of a double tap
       globalThis.clicked = new Promise((done, failed) => {
         map.once("click", ({ id, name, position, approximate, attributes }) => done({ id, name, position, approximate, attributes }));
         setTimeout(() => failed(new Error(`no click event at ${map.project(world)} after 20 s`)), 20_000);

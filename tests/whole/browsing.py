@@ -1,4 +1,4 @@
-"""Scripts that look at pages in Chromium, and the command line as its own process."""
+"""Runs scripts in Chromium and the command line as a separate process."""
 
 import json
 import os
@@ -19,10 +19,10 @@ SCRIPT_S = 120
 
 
 def browse(script: str, **asked: Any) -> dict[str, Any]:
-    """What the script of this folder answers."""
+    """Runs a script of this folder and returns its result."""
     node = shutil.which("node")
-    assert node, "Node.js is not there"
-    assert PLAYWRIGHT.is_dir(), "make .cache/npm puts playwright-core there"
+    assert node, "Node.js is missing"
+    assert PLAYWRIGHT.is_dir(), "playwright-core is missing; run make .cache/npm"
     command = [node, str(Path(__file__).with_name(script)), str(PLAYWRIGHT), json.dumps(asked)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=SCRIPT_S, check=False)
     if done.returncode:
@@ -32,14 +32,14 @@ def browse(script: str, **asked: Any) -> dict[str, Any]:
 
 
 def picture(name: str) -> str:
-    """Where a screenshot of that name goes."""
+    """Returns the path for a screenshot."""
     folder = ROOT / "tests" / ".out"
     folder.mkdir(exist_ok=True)
     return str(folder / name)
 
 
 def command(*arguments: str | Path) -> list[str]:
-    """The command line as its own process."""
+    """Returns the arguments that run the command line as a separate process."""
     return [sys.executable, "-m", "map3d", *map(str, arguments)]
 
 
@@ -56,7 +56,7 @@ def served(workspace: Path) -> Iterator[str]:
                 yield found[0]
                 break
         else:
-            pytest.fail("the server ended without an address")
+            pytest.fail("the server exited without printing an address")
     finally:
         server.terminate()
         server.wait(20)

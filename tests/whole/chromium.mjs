@@ -1,10 +1,10 @@
-// Chromium with software WebGL2 and one page in it. Arguments: playwright-core's folder, a JSON document of what is asked.
-// A script calls `look` with what it wants to do in the page; what that returns is printed as JSON, with `problems`: what the page complained of.
-const [folder, given] = process.argv.slice(2);
+// Runs one page in Chromium with software WebGL2. Arguments: the folder of playwright-core, a JSON document with the parameters of the script.
+// A script passes its actions to `runPage`, which prints their result as JSON, with `problems`: the errors and warnings of the page.
+const [folder, parametersJson] = process.argv.slice(2);
 
 const ARGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"];
 
-/** Chromium by playwright-core in a folder; `hosts`: names → addresses with ports. */
+/** Starts Chromium with the playwright-core in `library`; `hosts`: host name → address with port. */
 export async function launch(library, hosts = {}) {
   const { chromium } = await import(`${library}/index.mjs`);
   const rules = Object.entries(hosts).map(([name, address]) => `MAP ${name} ${address}`);
@@ -12,24 +12,24 @@ export async function launch(library, hosts = {}) {
   return chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args });
 }
 
-/** In a page: without a GPU, too, maps draw with WebGL, as they do for most readers. */
+/** For use in a page: makes maps draw with WebGL even without a GPU. */
 export function anyWebGL() {
-  const own = HTMLCanvasElement.prototype.getContext;
+  const getContext = HTMLCanvasElement.prototype.getContext;
   HTMLCanvasElement.prototype.getContext = function (kind, options) {
-    return own.call(this, kind, options && { ...options, failIfMajorPerformanceCaveat: false });
+    return getContext.call(this, kind, options && { ...options, failIfMajorPerformanceCaveat: false });
   };
-  const tell = WebGL2RenderingContext.prototype.getParameter;
+  const getParameter = WebGL2RenderingContext.prototype.getParameter;
   WebGL2RenderingContext.prototype.getParameter = function (name) {
-    return name === 0x9246 ? "a GPU" : tell.call(this, name); // UNMASKED_RENDERER_WEBGL
+    return name === 0x9246 ? "a GPU" : getParameter.call(this, name); // UNMASKED_RENDERER_WEBGL
   };
 }
 
-/** `act(page, asked)`; `asked.hosts`: names → addresses with ports; `asked.size`: of the window. */
-export async function look(act) {
-  const asked = JSON.parse(given);
-  const browser = await launch(folder, asked.hosts);
+/** Calls `act(page, parameters)`. `parameters.hosts`: host name → address with port; `parameters.size`: size of the window. */
+export async function runPage(act) {
+  const parameters = JSON.parse(parametersJson);
+  const browser = await launch(folder, parameters.hosts);
   try {
-    const [width, height] = asked.size ?? [1000, 700];
+    const [width, height] = parameters.size ?? [1000, 700];
     const context = await browser.newContext({ viewport: { width, height }, reducedMotion: "reduce" });
     await context.addInitScript(anyWebGL);
     const page = await context.newPage();
@@ -38,17 +38,17 @@ export async function look(act) {
     page.on("pageerror", (error) => problems.push(error.message));
     page.on("console", (message) => ["error", "warning"].includes(message.type()) && problems.push(message.text()));
     page.on("requestfailed", (request) => {
-      const why = request.failure()?.errorText;
-      if (why !== "net::ERR_ABORTED") problems.push(`${request.url()}: ${why}`); // the viewer gives up what is no longer in view
+      const reason = request.failure()?.errorText;
+      if (reason !== "net::ERR_ABORTED") problems.push(`${request.url()}: ${reason}`); // the viewer aborts requests for tiles that have left the view
     });
-    const answer = await act(page, asked);
-    console.log(JSON.stringify({ ...answer, problems }));
+    const result = await act(page, parameters);
+    console.log(JSON.stringify({ ...result, problems }));
   } finally {
     await browser.close();
   }
 }
 
-/** A map over the whole window, at rest: `globalThis.map` and `globalThis.layer`. */
+/** Opens a map that fills the window, as `globalThis.map` and `globalThis.layer`, and waits until it is idle. */
 export async function openMap(page, { origin, rendering, view, options = {} }) {
   await page.goto(`${origin}/view/${rendering}/`);
   await page.addScriptTag({ url: `${origin}/view/${rendering}/map3d.js` });

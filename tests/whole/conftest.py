@@ -1,4 +1,4 @@
-"""One town for all: made, imported, rendered and served by the command line."""
+"""One town for all tests: generated, imported, rendered and served by the command line."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,7 +12,7 @@ from tests.whole.browsing import served
 
 @pytest.fixture(scope="session")
 def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A rendering `town` of a scene `town` in four directions."""
+    """A rendering `town` of a scene `town` with four look-at angles."""
     files, root = tmp_path_factory.mktemp("files"), tmp_path_factory.mktemp("workspace")
     make_town(files, TownSpec(buildings=12, seed=5, texture_px=256, trees=False), None)
     where = ["-w", str(root)]

@@ -1,4 +1,4 @@
-"""What the core itself sees of a rendering: its G-buffers, without tiles, server or browser."""
+"""G-buffers of a rendering, computed by the core without tiles, server or browser."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,12 +14,12 @@ from map3d.registry import Registry
 from map3d.renderings.plan import frame_text
 from map3d.types import TileId
 
-LEAST_PIXELS = 400
-"""Of a building that is clicked at."""
+MIN_PIXELS = 400
+"""Minimum size of a building to click."""
 
 
-class Known(NamedTuple):
-    """An object that the core sees at a world position, which is a pixel's centre."""
+class VisibleObject(NamedTuple):
+    """An object and the world position of one of its pixels, at the pixel's centre."""
 
     id: int
     name: str
@@ -27,7 +27,7 @@ class Known(NamedTuple):
 
 
 class CoreView:
-    """One view of a rendering, traced anew."""
+    """One view of a rendering, traced again."""
 
     def __init__(self, workspace: Path, rendering: str, view: str) -> None:
         catalogue = Workspace(workspace).open_catalogue()
@@ -39,12 +39,12 @@ class CoreView:
         self._registry = workspace / "scenes" / self.record.scene / "registry.sqlite"
 
     def tiles(self) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
-        """(x, y, G-buffer) of every tile of the deepest level that may hold something."""
+        """Yields (x, y, G-buffer) of every tile of the deepest level that may have content."""
         for y, x in np.argwhere(self._scene.occupied(self._text, self.frame.zmax)):
             yield int(x), int(y), self._scene.gbuffer(self._text, int(x), int(y))
 
     def mosaic(self, kind: str) -> NDArray[Any]:
-        """(side, side) of all tiles of the deepest level; 0 where nothing can be."""
+        """Returns the (side, side) array of the whole deepest level; 0 in tiles without content."""
         px = self.record.tile_px
         whole = np.zeros((px << self.frame.zmax, px << self.frame.zmax), np.uint32)
         for x, y, buffer in self.tiles():
@@ -52,24 +52,24 @@ class CoreView:
         return whole
 
     def pixel_of(self, position: list[float]) -> tuple[int, int]:
-        """(column, row) of the whole deepest level."""
+        """Returns (column, row) in the whole deepest level."""
         column, row, _ = self.frame.level_pixel_from_local(self.frame.zmax, np.array(position) - self._scene.origin)
         return int(column), int(row)
 
-    def known(self, kind: str | None, count: int) -> list[Known]:
-        """Objects of a class with many pixels in one tile, each at the pixel nearest to their middle. None: any class."""
-        found: dict[int, Known] = {}
+    def find_objects(self, kind: str | None, count: int) -> list[VisibleObject]:
+        """Returns objects of a class (None: any) with many pixels in one tile, each at the pixel nearest to its middle."""
+        found: dict[int, VisibleObject] = {}
         with Registry(self._registry) as registry:
             for x, y, buffer in self.tiles():
                 for number in map(int, np.unique(buffer["id"])):
                     item = registry.get(number) if number and number not in found else None
                     rows, columns = np.nonzero(buffer["id"] == number)
-                    if item is None or len(rows) < LEAST_PIXELS or (kind and item.kind.lower() != kind):
+                    if item is None or len(rows) < MIN_PIXELS or (kind and item.kind.lower() != kind):
                         continue
                     middle = np.argmin((rows - np.median(rows)) ** 2 + (columns - np.median(columns)) ** 2)
                     j, i = int(rows[middle]), int(columns[middle])
                     local = self.frame.local_from_pixel(TileId(self.frame.zmax, x, y), i, j, buffer["depth"][j, i])
-                    found[number] = Known(number, item.name, (local + self._scene.origin).tolist())
+                    found[number] = VisibleObject(number, item.name, (local + self._scene.origin).tolist())
                 if len(found) >= count:
                     break
         return list(found.values())[:count]

@@ -1,8 +1,8 @@
-// Opens a page that makes `map` and `layer` itself. Asked: hosts, page, picture, positions: world positions to click at.
-// Answers: hosts: tiles asked of each; markers: [label, x, y]; points: where the positions lie on the screen; shot: the picture's own pixels there; clicks.
-import { look } from "./chromium.mjs";
+// Opens a page that creates `map` and `layer` itself. Parameters: hosts, page, picture (path of the screenshot), positions (world positions to click).
+// Result: hosts: number of tiles by host; markers: labels; points: screen positions of `positions`; clicks.
+import { runPage } from "./chromium.mjs";
 
-await look(async (page, { page: address, picture, positions }) => {
+await runPage(async (page, { page: address, picture, positions }) => {
   const hosts = {};
   page.on("response", (response) => {
     const { hostname, pathname } = new URL(response.url());
@@ -18,7 +18,7 @@ await look(async (page, { page: address, picture, positions }) => {
   }, positions);
   const clicks = [];
   for (const [x, y] of points) {
-    await page.waitForTimeout(600); // longer than two taps of a double tap lie apart
+    await page.waitForTimeout(600); // longer than the interval of a double tap
     await page.evaluate(() => {
       globalThis.clicked = new Promise((done) => globalThis.map.once("click", ({ id, name, position, approximate }) => done({ id, name, position, approximate })));
     });

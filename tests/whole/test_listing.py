@@ -1,4 +1,4 @@
-"""Listing 1 of the paper (Christen & Nebiker 2015), as it stands there, on the tea time scene: four tile hosts, two markers, no options."""
+"""Listing 1 of the paper (Christen & Nebiker 2015), unchanged, on the teatime scene: four tile hosts, two markers, no options."""
 
 import shutil
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.browser
 
 TILE_HOSTS = [f"t{number}.3dmaps.ch" for number in (1, 2, 3, 4)]
 BODY, CUBE_TOP, GROUND = [0.0, 0.0, 18.0], [80.5, 11.5, 21.0], [45.0, -20.0, 0.0]
-"""Inside the teapot's body; on the cube; beside both."""
+"""Inside the teapot's body; on the cube; on the ground next to both."""
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def teatime(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """The address (host and port) that serves the page with the listing."""
+    """Serves the page with the listing; yields host and port."""
     folder = tmp_path_factory.mktemp("page")
     shutil.copy(Path(__file__).with_name("listing.html"), folder)
     shutil.copy(viewer_folder() / "map3d.js", folder)
@@ -48,7 +48,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         yield urlsplit(address).netloc
 
 
-def test_the_listing_of_the_paper_runs_as_it_stands(teatime: Path, page: str) -> None:
+def test_listing_of_the_paper_runs_unchanged(teatime: Path, page: str) -> None:
     shot = picture("listing.png")
     with served(teatime) as origin:
         hosts = {"www.3dmaps.ch": page} | dict.fromkeys(TILE_HOSTS, urlsplit(origin).netloc)
@@ -59,7 +59,7 @@ def test_the_listing_of_the_paper_runs_as_it_stands(teatime: Path, page: str) ->
     pixels = np.asarray(Image.open(shot).convert("RGB")).astype(int)
     teapot, cube, ground = (pixels[round(y) + 3, round(x) + 3] for x, y in answer["points"])
     assert teapot[1] > 1.4 * max(teapot[0], teapot[2]), "the teapot is green"
-    assert cube[1] > cube[0] > 1.2 * cube[2], "the cube is of a yellower green"
+    assert cube[1] > cube[0] > 1.2 * cube[2], "the cube is a yellower green"
     assert np.ptp(ground) < 30, "the ground is grey"
     on_teapot, on_cube, on_ground = answer["clicks"]
     with Registry(teatime / "scenes" / "teatime" / "registry.sqlite") as registry:

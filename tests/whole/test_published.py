@@ -1,4 +1,4 @@
-"""What `map3d site` and `map3d publish` write, opened from a static host; a site that was stopped twice on the way."""
+"""Folders written by `map3d site` and `map3d publish`, opened from a static host; one site run is stopped twice."""
 
 import os
 import re
@@ -18,7 +18,7 @@ from map3d.types import TileId
 from map3d_town.teatime import write_teatime
 from tests.publish.hosts import static_host
 from tests.whole.browsing import browse, command, picture
-from tests.whole.core_pixels import CoreView, Known
+from tests.whole.core_pixels import CoreView, VisibleObject
 
 pytestmark = pytest.mark.browser
 
@@ -33,7 +33,7 @@ def teatime(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def site(files: Path, root: Path) -> list[str]:
-    """The command that makes `root`/out of `files` by `root`/workspace."""
+    """Returns the command that publishes `files` as `root`/out, with the workspace `root`/workspace."""
     return command("site", files, "-o", root / "out", "-w", root / "workspace", "--res", "0.05")
 
 
@@ -55,11 +55,11 @@ def blocks_done(root: Path) -> int:
 
 
 def stopped_after(files: Path, root: Path, blocks: int, number: signal.Signals) -> int:
-    """Starts the command in a process group of its own, as a shell does; signals all of it once so many blocks are done. Its status."""
+    """Runs the command in its own process group, as a shell does, and sends it a signal after `blocks` blocks; returns its exit status."""
     process = subprocess.Popen(site(files, root), process_group=0, stderr=subprocess.DEVNULL)
     deadline_s = time.monotonic() + 60
     while blocks_done(root) < blocks:
-        assert process.poll() is None, "it ended before it could be stopped"
+        assert process.poll() is None, "the command ended before it could be stopped"
         assert time.monotonic() < deadline_s
         time.sleep(0.01)
     os.killpg(process.pid, number)
@@ -67,7 +67,7 @@ def stopped_after(files: Path, root: Path, blocks: int, number: signal.Signals) 
 
 
 def let_leases_expire(root: Path) -> None:
-    """As if a minute went by: what was killed cannot give its blocks back."""
+    """Makes all leases overdue, since a killed process cannot release its blocks."""
     catalogue = Workspace(root / "workspace").open_catalogue()
     with catalogue._database.transaction() as db:
         db.execute("UPDATE job SET expires = expires - 3600 WHERE state = 'leased'")
@@ -75,11 +75,11 @@ def let_leases_expire(root: Path) -> None:
 
 
 def tiles_of(folder: Path) -> dict[str, list[tuple[TileId, bytes]]]:
-    """By archive. Archives themselves also say in which run a block was rendered."""
+    """Returns the tiles by archive; the archives themselves also differ in block versions."""
     return {str(path.relative_to(folder)): list(Archive(path).tiles()) for path in sorted(folder.rglob("*.pmtiles"))}
 
 
-def test_a_site_that_was_stopped_and_killed_goes_on_and_has_the_bytes_of_an_undisturbed_one(teatime: Path, undisturbed: Path, tmp_path: Path) -> None:
+def test_stopped_and_killed_site_resumes_and_has_the_same_tiles(teatime: Path, undisturbed: Path, tmp_path: Path) -> None:
     assert stopped_after(teatime, tmp_path, 4, signal.SIGINT) == 130
     done = blocks_done(tmp_path)
     assert not (tmp_path / "out").exists()
@@ -88,12 +88,12 @@ def test_a_site_that_was_stopped_and_killed_goes_on_and_has_the_bytes_of_an_undi
     let_leases_expire(tmp_path)
     subprocess.run(site(teatime, tmp_path), check=True)
     assert run(["verify", "--published", str(tmp_path / "out")]) == 0
-    want, got = tiles_of(undisturbed / "out"), tiles_of(tmp_path / "out")
-    assert len(want) == 16
-    assert [name for name in want | got if want.get(name) != got.get(name)] == []
+    expected, got = tiles_of(undisturbed / "out"), tiles_of(tmp_path / "out")
+    assert len(expected) == 16
+    assert [name for name in expected | got if expected.get(name) != got.get(name)] == []
 
 
-def visit(folder: Path, view: CoreView, known: Known, label: str, name: str) -> dict[str, Any]:
+def visit(folder: Path, view: CoreView, known: VisibleObject, label: str, name: str) -> dict[str, Any]:
     with static_host(folder) as address:
         return browse(
             "published.mjs",
@@ -107,9 +107,9 @@ def visit(folder: Path, view: CoreView, known: Known, label: str, name: str) -> 
         )
 
 
-def test_a_site_of_files_without_attributes_is_whole(undisturbed: Path) -> None:
+def test_site_of_files_without_attributes_works(undisturbed: Path) -> None:
     view = CoreView(undisturbed / "workspace", "teatime", "0-45")
-    known = next(place for place in view.known(None, 9) if place.name == "teapot")
+    known = next(place for place in view.find_objects(None, 9) if place.name == "teapot")
     seen = visit(undisturbed / "out", view, known, "cube", "site")
     assert seen["problems"] == []
     assert (seen["title"], seen["clicked"]["name"], seen["found"]["name"]) == ("teatime", "teapot", "cube")
@@ -117,10 +117,10 @@ def test_a_site_of_files_without_attributes_is_whole(undisturbed: Path) -> None:
     assert seen["ranges"] > 10
 
 
-def test_a_published_town_shows_finds_and_tells_its_buildings(workspace: Path, tmp_path: Path) -> None:
+def test_published_town_can_be_clicked_and_searched(workspace: Path, tmp_path: Path) -> None:
     assert run(["publish", "town", "-o", str(tmp_path / "out"), "-w", str(workspace)]) == 0
     view = CoreView(workspace, "town", "90-45")
-    known, other = view.known("building", 2)
+    known, other = view.find_objects("building", 2)
     seen = visit(tmp_path / "out", view, known, other.name, "published")
     assert seen["problems"] == []
     assert seen["clicked"]["name"] == known.name

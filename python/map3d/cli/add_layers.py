@@ -5,7 +5,7 @@ import click
 from map3d.catalogue import Workspace
 from map3d.cli.layer_options import layer_options
 from map3d.cli.options import json_option, workspace_option
-from map3d.cli.output import print_json
+from map3d.cli.output import plural, print_json
 from map3d.renderings.layers import LayerRequest
 
 
@@ -26,4 +26,4 @@ def command(workspace: Workspace, rendering: str, layers: LayerRequest, as_json:
     if as_json:
         print_json(record)
         return
-    click.echo(f"rendering {rendering}: {len(record.layers)} layers; next: map3d render {rendering}")
+    click.echo(f"rendering {rendering}: {plural(len(record.layers), 'layer')}; next: map3d render {rendering}")

@@ -4,7 +4,7 @@ import click
 
 from map3d.catalogue import Workspace
 from map3d.cli.options import View, json_option, workspace_option
-from map3d.cli.output import print_json
+from map3d.cli.output import plural, print_json
 from map3d.types import ViewAngles
 
 
@@ -25,4 +25,4 @@ def command(workspace: Workspace, rendering: str, views: tuple[ViewAngles, ...],
     if as_json:
         print_json(record)
         return
-    click.echo(f"rendering {rendering}: {len(record.frames)} views; next: map3d render {rendering}")
+    click.echo(f"rendering {rendering}: {plural(len(record.frames), 'view')}; next: map3d render {rendering}")

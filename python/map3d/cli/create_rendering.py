@@ -9,7 +9,7 @@ from map3d.catalogue import Workspace
 from map3d.cli.building import build_with_progress
 from map3d.cli.layer_options import layer_options
 from map3d.cli.options import View, cores, json_option, workspace_option
-from map3d.cli.output import print_json
+from map3d.cli.output import plural, print_json
 from map3d.errors import BadRequest
 from map3d.types import ViewAngles
 
@@ -75,7 +75,9 @@ def command(
         print_json({**asdict(record), "build": built})
         return
     levels, side = record.zmax + 1, record.tile_px << record.zmax
-    click.echo(f"rendering {name}: {len(record.frames)} views, {levels} levels, {record.res_m:g} m per pixel, {side:,} px wide at the deepest level")
+    click.echo(
+        f"rendering {name}: {plural(len(record.frames), 'view')}, {plural(levels, 'level')}, {record.res_m:g} m per pixel, {side:,} px wide at the deepest level"
+    )
     click.echo(f"next: map3d estimate {name}, or map3d render {name}")
 
 

@@ -7,7 +7,7 @@ import click
 from map3d.catalogue import Workspace
 from map3d.cli.building import build_with_progress
 from map3d.cli.options import json_option, workers_option, workspace_option
-from map3d.cli.output import print_json, size_text, time_text
+from map3d.cli.output import plural, print_json, size_text, time_text
 
 
 @click.command("estimate")
@@ -32,7 +32,7 @@ def command(workspace: Workspace, rendering: str, workers: int, as_json: bool) -
         print_json({**asdict(found), "build": built})
         return
     click.echo(
-        f"{rendering}: about {found.base_tiles:,} base tiles, {found.tiles:,} tiles on all levels, {found.images:,} images, {size_text(found.bytes)}"
+        f"{rendering}: about {plural(found.base_tiles, 'base tile')}, {plural(found.tiles, 'tile')} on all levels, {plural(found.images, 'image')}, {size_text(found.bytes)}"
     )
-    click.echo(f"still to render: {found.open_tiles:,} base tiles, about {time_text(found.seconds)} with {found.workers} workers")
+    click.echo(f"still to render: {plural(found.open_tiles, 'base tile')}, about {time_text(found.seconds)} with {plural(found.workers, 'worker')}")
     click.echo(f"estimated from {found.how}")

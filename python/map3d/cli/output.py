@@ -36,6 +36,11 @@ def counts_text(counts: Mapping[Any, int]) -> str:
     return ", ".join(f"{count:,} {name}" for name, count in counts.items() if count) or "none"
 
 
+def plural(count: int, noun: str) -> str:
+    """Returns the count with its noun: `1 file`, `2 files`."""
+    return f"{count:,} {noun}" if count == 1 else f"{count:,} {noun}s"
+
+
 def size_text(size: float) -> str:
     for unit in ("bytes", "kB", "MB", "GB"):
         if size < 1000:

@@ -8,7 +8,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemaini
 
 from map3d.catalogue import Workspace
 from map3d.cli.options import json_option, workspace_option
-from map3d.cli.output import print_json, size_text
+from map3d.cli.output import plural, print_json, size_text
 from map3d.cli.progress import progress_bar, show_stage
 
 
@@ -25,7 +25,7 @@ def command(workspace: Workspace, rendering: str, out: Path, replace: bool, allo
     if as_json:
         print_json(done)
     else:
-        click.echo(f"published {rendering} to {out}: {done.tiles:,} images in {done.archives} archives, {size_text(done.bytes)}")
+        click.echo(f"published {rendering} to {out}: {plural(done.tiles, 'image')} in {plural(done.archives, 'archive')}, {size_text(done.bytes)}")
 
 
 def publish_with_progress(workspace: Workspace, rendering: str, out: Path, **how: bool) -> Any:

@@ -10,7 +10,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from map3d.catalogue import Workspace
 from map3d.cli.building import build_with_progress
 from map3d.cli.options import json_option, max_memory_option, workers_option, workspace_option
-from map3d.cli.output import console, counts_text, print_json, size_text
+from map3d.cli.output import console, counts_text, plural, print_json, size_text
 from map3d.cli.progress import progress_bar
 from map3d.cli.render_stats import print_summary, summary
 
@@ -85,7 +85,9 @@ def _work(run: "Run", plan: "RunPlan") -> "RunResult":
                     "stopping: releasing current blocks" if event.at_once else "stopping after the current blocks; press Ctrl-C again to stop at once"
                 )
             elif isinstance(event, Waiting):
-                bar.console.print(f"waiting for {event.jobs:,} blocks leased by another run; the leases of a killed run expire within a minute")
+                bar.console.print(
+                    f"waiting for {plural(event.jobs, 'block')} leased by another run; the leases of a killed run expire within a minute"
+                )
             elif isinstance(event, WorkerExited) and event.reason:
                 bar.console.print(f"worker {event.worker} exited: {event.reason}")
 
@@ -94,19 +96,21 @@ def _work(run: "Run", plan: "RunPlan") -> "RunResult":
 
 def print_result(rendering: str, result: "RunResult") -> None:
     done = result.statistics
-    click.echo(f"rendered {done.done:,} blocks: {done.base_tiles:,} base tiles, {done.tiles:,} images, {size_text(done.bytes)}")
+    click.echo(
+        f"rendered {plural(done.done, 'block')}: {plural(done.base_tiles, 'base tile')}, {plural(done.tiles, 'image')}, {size_text(done.bytes)}"
+    )
     if result.complete:
         version = result.content_version
         click.echo(f"{rendering} is complete (content version {version}); next: map3d serve {rendering}, or map3d publish {rendering} -o FOLDER")
         return
     if result.quarantined_jobs:
         click.echo(
-            f"{result.quarantined_jobs:,} blocks failed three times; run map3d show quarantine {rendering} for the reasons, "
+            f"{plural(result.quarantined_jobs, 'block')} failed three times; run map3d show quarantine {rendering} for the reasons, "
             f"then map3d retry {rendering}",
             err=True,
         )
     if result.open_jobs:
-        click.echo(f"{result.open_jobs:,} blocks remain; resume with map3d render {rendering}", err=True)
+        click.echo(f"remaining: {plural(result.open_jobs, 'block')}; resume with map3d render {rendering}", err=True)
 
 
 def _bar(last: Any) -> Progress:

@@ -4,7 +4,7 @@ import click
 
 from map3d.catalogue import Workspace
 from map3d.cli.options import json_option, workspace_option
-from map3d.cli.output import print_json
+from map3d.cli.output import plural, print_json
 
 
 @click.command("retry")
@@ -21,4 +21,4 @@ def command(workspace: Workspace, rendering: str, as_json: bool) -> None:
     if as_json:
         print_json({"retried": count})
     else:
-        click.echo(f"reopened {count:,} blocks" + (f"; next: map3d render {rendering}" if count else ""))
+        click.echo(f"reopened {plural(count, 'block')}" + (f"; next: map3d render {rendering}" if count else ""))

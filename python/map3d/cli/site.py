@@ -1,7 +1,7 @@
 """map3d site."""
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
@@ -10,11 +10,14 @@ from map3d.catalogue import Catalogue, Workspace
 from map3d.cli.building import build_with_progress
 from map3d.cli.create_rendering import views_around
 from map3d.cli.options import View, max_memory_option, workers_option, workspace_option
-from map3d.cli.output import size_text
+from map3d.cli.output import plural, size_text
 from map3d.cli.progress import progress_bar
 from map3d.cli.publish import publish_with_progress
 from map3d.cli.render import print_result, render_with_progress
 from map3d.types import COLOR_FORMATS, ViewAngles
+
+if TYPE_CHECKING:
+    from map3d.renderings.site_steps import SiteRequest
 
 
 @click.command("site")
@@ -45,37 +48,16 @@ def command(
 
     You can stop it at any time; re-run it to resume. Re-run it after files change; only the changes are processed.
     """
-    from map3d.ingest.import_options import ImportOptions
-    from map3d.ingest.sources import asset_name
     from map3d.jobs.run import Run, RunSettings
-    from map3d.renderings.site_steps import SiteRequest, add_changed, make_rendering
+    from map3d.renderings.site_steps import create_site_rendering
 
-    title = options["title"] or folder.resolve().stem
-    reading = ImportOptions(crs=options["crs"], up=options["up"], strict=options["strict"])
-    request = SiteRequest(
-        name=options["name"] or asset_name(folder.resolve().stem),
-        sources=folder,
-        views=views or views_around(4, (45.0,)),
-        res_m=options["res_m"],
-        title=title,
-        attribution=options["attribution"],
-        color=options["color"],
-        options=reading,
-    )
+    request = _site_request(folder, views, **options)
     catalogue = workspace.create().open_catalogue()
     try:
-        with progress_bar(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()) as bar:
-            task = bar.add_task("importing", total=None)
-            summary = add_changed(
-                workspace, catalogue, request, lambda name, n, of: bar.update(task, description=f"importing {name}", completed=n, total=of)
-            )
-        click.echo(f"imported {len(summary.imported)} files, {len(summary.unchanged)} unchanged, {len(summary.failed)} failed")
-        for _, reason in summary.failed:
-            click.echo(f"not imported: {reason}", err=True)
-        _print_problems(catalogue, request.name)
+        _import_files(workspace, catalogue, request)
         build_with_progress(workspace, catalogue, request.name, threads=workers, max_memory_bytes=max_memory)
-        record = make_rendering(workspace, catalogue, request)
-        click.echo(f"rendering {record.name}: {len(record.frames)} views, {record.zmax + 1} levels, {record.res_m:g} m per pixel")
+        record = create_site_rendering(workspace, catalogue, request)
+        click.echo(f"rendering {record.name}: {plural(len(record.frames), 'view')}, {plural(record.zmax + 1, 'level')}, {record.res_m:g} m per pixel")
         result = render_with_progress(Run(workspace, catalogue, record.name, RunSettings(workers, max_memory)))
     finally:
         catalogue.close()
@@ -86,10 +68,44 @@ def command(
     click.echo(f"wrote the site to {out}, {size_text(done.bytes)}; copy it to any web server that supports range requests")
 
 
+def _site_request(folder: Path, views: tuple[ViewAngles, ...], **options: Any) -> "SiteRequest":
+    from map3d.ingest.import_options import ImportOptions
+    from map3d.ingest.sources import asset_name
+    from map3d.renderings.site_steps import SiteRequest
+
+    folder_name = folder.resolve().stem
+    return SiteRequest(
+        name=options["name"] or asset_name(folder_name),
+        sources=folder,
+        views=views or views_around(4, (45.0,)),
+        res_m=options["res_m"],
+        title=options["title"] or folder_name,
+        attribution=options["attribution"],
+        color=options["color"],
+        options=ImportOptions(crs=options["crs"], up=options["up"], strict=options["strict"]),
+    )
+
+
+def _import_files(workspace: Workspace, catalogue: Catalogue, request: "SiteRequest") -> None:
+    from map3d.renderings.site_steps import import_changed_files
+
+    with progress_bar(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()) as bar:
+        task = bar.add_task("importing", total=None)
+
+        def report(name: str, done: int, total: int) -> None:
+            bar.update(task, description=f"importing {name}", completed=done, total=total)
+
+        summary = import_changed_files(workspace, catalogue, request, report)
+    click.echo(f"imported {plural(len(summary.imported), 'file')}, {len(summary.unchanged)} unchanged, {len(summary.failed)} failed")
+    for _, reason in summary.failed:
+        click.echo(f"not imported: {reason}", err=True)
+    _print_problems(catalogue, request.name)
+
+
 def _print_problems(catalogue: Catalogue, scene: str) -> None:
     """Prints how many elements were skipped, and the number of warnings."""
     reports = [asset.report for asset in catalogue.assets(scene)]
     skipped = sum(sum(report.get("skipped", {}).values()) for report in reports)
     warnings = sum(warning["count"] for report in reports for warning in report.get("warnings", []) if not warning["reason"].startswith("skipped: "))
     if skipped or warnings:
-        click.echo(f"skipped {skipped:,} elements; {warnings:,} warnings; map3d show report {scene} lists them")
+        click.echo(f"skipped {plural(skipped, 'element')}; {plural(warnings, 'warning')}; map3d show report {scene} lists them")

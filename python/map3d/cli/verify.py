@@ -7,7 +7,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemaini
 
 from map3d.catalogue import Workspace
 from map3d.cli.options import json_option, workspace_option
-from map3d.cli.output import counts_text, print_json
+from map3d.cli.output import counts_text, plural, print_json
 from map3d.cli.progress import progress_bar, show_stage
 
 
@@ -52,7 +52,7 @@ def command(workspace: Workspace, renderings: tuple[str, ...], published: Path |
         click.echo(f"checked {counts_text(findings.counted)}")
         for line in findings.wrong:
             click.echo(line)
-        click.echo(f"{findings.total:,} problems found" if findings.total else "no problems found")
+        click.echo(f"{plural(findings.total, 'problem')} found" if findings.total else "no problems found")
     if findings.total:
         raise click.exceptions.Exit(1)
 

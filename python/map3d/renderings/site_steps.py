@@ -48,7 +48,7 @@ class ImportSummary:
     failed: list[tuple[str, str]]
 
 
-def add_changed(workspace: Workspace, catalogue: Catalogue, request: SiteRequest, report: Callable[[str, int, int], None]) -> ImportSummary:
+def import_changed_files(workspace: Workspace, catalogue: Catalogue, request: SiteRequest, report: Callable[[str, int, int], None]) -> ImportSummary:
     """Creates the scene when it does not exist, and imports new and changed files; a broken file is reported and skipped. Raises BadRequest when no
     file is usable."""
     if not any(scene.name == request.name for scene in catalogue.scenes()):
@@ -61,13 +61,13 @@ def add_changed(workspace: Workspace, catalogue: Catalogue, request: SiteRequest
     with Parsers() as parsers:
         for number, source in enumerate(sources):
             report(source.paths[0].name, number, len(sources))
-            _add(workspace, catalogue, request, source, digests, summary, parsers)
+            _import_changed(workspace, catalogue, request, source, digests, summary, parsers)
     if not summary.imported and not summary.unchanged:
         raise BadRequest(f"{request.sources}: none of its {len(sources)} files is usable; first error: {summary.failed[0][1]}")
     return summary
 
 
-def _add(
+def _import_changed(
     workspace: Workspace,
     catalogue: Catalogue,
     request: SiteRequest,
@@ -88,7 +88,7 @@ def _add(
         summary.failed.append((str(source.paths[0]), str(error)))
 
 
-def make_rendering(workspace: Workspace, catalogue: Catalogue, request: SiteRequest) -> RenderingRecord:
+def create_site_rendering(workspace: Workspace, catalogue: Catalogue, request: SiteRequest) -> RenderingRecord:
     """Returns the rendering of the site, and creates it when it does not exist; its scene must be built."""
     for record in catalogue.renderings(request.name):
         if record.name == request.name:
