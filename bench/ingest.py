@@ -13,7 +13,7 @@ from rich.table import Table
 
 from map3d import _core
 from map3d.ingest.import_options import ImportOptions
-from map3d.ingest.parse_document import open_import
+from map3d.ingest.parse_document import open_document_parser
 from map3d.ingest.sources import Source, find_sources
 
 from .scene import CACHE, _do
@@ -57,7 +57,7 @@ def of_document(path: Path) -> list[Row]:
     question = _question(source, asset)
     reader = json.dumps(question["reader"])
     read_s, _ = spent(lambda: sum(batch.triangle_count for batch in _core.Reader(str(path), source.format, reader)))
-    import_s, _ = spent(lambda: open_import({})(question, [], lambda _told: None))
+    import_s, _ = spent(lambda: open_document_parser({})(question, [], lambda _told: None))
     rows = [Row(f"{path.name}: read", size, "MB", read_s), Row(f"{path.name}: import", size, "MB", import_s)]
     try:
         return rows + _built(path.name, scene, source)

@@ -32,7 +32,7 @@ def run(run: Run) -> Run:
 @pytest.mark.parametrize(
     ("name", "data", "status", "says"),
     [
-        ("model.skp", b"\xff\xfe\xff\x0eSketchUp", 2, ("model.skp: a file of unknown type", "CityGML", "OBJ")),
+        ("model.skp", b"\xff\xfe\xff\x0eSketchUp", 2, ("model.skp: a file of unknown format", "CityGML", "OBJ")),
         ("a.zip", b"PK\x03\x04", 2, ("a.zip: a ZIP archive", "map3d reads")),
         ("a.gml", b"<html></html>", 2, ("a.gml: XML with the root html", "CityGML")),
         ("empty.gml", b"", 2, ("empty.gml: an empty file", "CityGML")),
@@ -63,7 +63,7 @@ def test_folder_without_usable_files_is_refused(run: Run, tmp_path: Path, names:
         (tmp_path / "folder" / name).touch()
     status, _, err = run("add-files", "town", "folder")
     assert (status, err.count("\n")) == (2, 1)
-    assert "folder: no file in it that map3d can read" in err
+    assert "folder: no readable file in this folder" in err
     assert ("empty.gml: an empty file" in err) == ("empty.gml" in names)
 
 

@@ -1,4 +1,4 @@
-"""Children that misbehave while they parse."""
+"""Parser subprocesses that misbehave."""
 
 import os
 import time
@@ -10,60 +10,60 @@ from map3d.subprocess import Handler, ReportProgress
 
 
 def open_greedy(_setup: Mapping[str, Any]) -> Handler:
-    """Takes more memory than it may."""
+    """Allocates more memory than allowed."""
 
-    def work(_question: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
+    def handle(_request: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
         return {"size": len(bytearray(8 << 30))}, []
 
-    return work
+    return handle
 
 
 def open_busy(_setup: Mapping[str, Any]) -> Handler:
-    """Computes for ever."""
+    """Computes without end."""
 
-    def work(_question: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
+    def handle(_request: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
         while True:
             pass
 
-    return work
+    return handle
 
 
 def open_asleep(_setup: Mapping[str, Any]) -> Handler:
-    """Waits for ever."""
+    """Sleeps without end."""
 
-    def work(_question: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
+    def handle(_request: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
         time.sleep(3600)
         return {}, []
 
-    return work
+    return handle
 
 
 def open_crash(_setup: Mapping[str, Any]) -> Handler:
-    """Dies."""
+    """Aborts."""
 
-    def work(_question: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
+    def handle(_request: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
         os.abort()
 
-    return work
+    return handle
 
 
 def open_curious(_setup: Mapping[str, Any]) -> Handler:
-    """Tries what it must not be able to do, and says what happened."""
+    """Tries to use the network and returns the outcome."""
 
-    def work(question: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
+    def handle(request: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
         import socket
 
         try:
-            socket.create_connection(("127.0.0.1", question["port"]), timeout=2).close()
+            socket.create_connection(("127.0.0.1", request["port"]), timeout=2).close()
         except OSError:
             return {"network": "cut"}, []
         return {"network": "open"}, []
 
-    return work
+    return handle
 
 
-def many_files(folder: Path) -> int:
-    """How many files can be open at a time."""
+def count_open_files(folder: Path) -> int:
+    """Returns the number of files that can be open at once."""
     opened = []
     try:
         while len(opened) < 100_000:
@@ -77,19 +77,19 @@ def many_files(folder: Path) -> int:
 
 
 def open_hoarder(_setup: Mapping[str, Any]) -> Handler:
-    def work(question: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
-        return {"files": many_files(Path(question["folder"]))}, []
+    def handle(request: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
+        return {"files": count_open_files(Path(request["folder"]))}, []
 
-    return work
+    return handle
 
 
 def open_worker(_setup: Mapping[str, Any]) -> Handler:
-    """Uses as much processor time as it is asked to."""
+    """Uses the requested processor time."""
 
-    def work(question: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
-        end = time.process_time() + question["cpu_s"]
+    def handle(request: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
+        end = time.process_time() + request["cpu_s"]
         while time.process_time() < end:
             pass
         return {}, []
 
-    return work
+    return handle

@@ -90,10 +90,10 @@ def test_a_new_folder_takes_the_place_of_the_old_one(tmp_path: Path) -> None:
         (((-180.0, -20.0, -80.0), (-170.0, 20.0, 15.0)), (-200.0, 0.0, -100.0)),
     ],
 )
-def test_origins_are_whole_hundreds_near_the_content(box: object, origin: tuple[float, float, float]) -> None:
+def test_origins_are_multiples_of_100_m_near_the_content(box: object, origin: tuple[float, float, float]) -> None:
     assert choose_origin([None, box]) == origin  # type: ignore[list-item]
     assert all(value * 2**12 == int(value * 2**12) for value in origin)
 
 
-def test_no_content_no_matter() -> None:
+def test_no_content_has_origin_zero() -> None:
     assert choose_origin([]) == (0.0, 0.0, 0.0)

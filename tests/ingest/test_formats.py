@@ -1,4 +1,4 @@
-"""Formats are told by content."""
+"""Formats are detected by content."""
 
 from pathlib import Path
 
@@ -26,34 +26,34 @@ OBJ = "# made by hand\nmtllib a.mtl\no thing\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3
         ("big.tif", b"MM\0+rest", "raster"),
     ],
 )
-def test_formats_are_told_by_content(tmp_path: Path, name: str, content: bytes, format: str) -> None:
+def test_formats_are_detected_by_content(tmp_path: Path, name: str, content: bytes, format: str) -> None:
     path = tmp_path / name
     path.write_bytes(content)
     assert detect_format(path) == format
 
 
 @pytest.mark.parametrize(
-    ("content", "is_what"),
+    ("content", "description"),
     [
         (b"", "an empty file"),
         (b"glTF\2\0\0\0", "glTF"),
         (b'{"type": "CityJSON"}', "JSON"),
-        (b"<html><body/></html>", "XML with the root html"),
+        (b"<html><body/></html>", "XML with root element html"),
         (b"<!-- only a comment -->", "XML without a root"),
         (b"PK\3\4", "ZIP"),
-        (b"just some words\nand more\n", "unknown type"),
-        (b"v 0 0 0\0\0\0", "unknown type"),
+        (b"just some words\nand more\n", "unknown format"),
+        (b"v 0 0 0\0\0\0", "unknown format"),
     ],
 )
-def test_what_is_not_known_is_refused_naming_what_is(tmp_path: Path, content: bytes, is_what: str) -> None:
+def test_unknown_formats_are_refused_with_the_list_of_readable_ones(tmp_path: Path, content: bytes, description: str) -> None:
     path = tmp_path / "a.gml"
     path.write_bytes(content)
     with pytest.raises(UnknownFormat, match="map3d reads CityGML") as refused:
         detect_format(path)
-    assert is_what in str(refused.value)
+    assert description in str(refused.value)
     assert "\n" not in str(refused.value)
 
 
-def test_a_file_that_cannot_be_read_is_not_found(tmp_path: Path) -> None:
+def test_a_missing_file_is_not_found(tmp_path: Path) -> None:
     with pytest.raises(NotFound):
         detect_format(tmp_path / "nothing")

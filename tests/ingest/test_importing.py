@@ -1,4 +1,4 @@
-"""Whole imports of hand-written files."""
+"""Imports of hand-written files."""
 
 import json
 from collections.abc import Iterator
@@ -75,7 +75,7 @@ def test_an_obj_in_local_metres(workspace: Workspace, catalogue: Catalogue, tmp_
     assert [path.name for path in folder.parent.iterdir()] == ["house-1"]
 
 
-def test_citygml_pins_system_and_origin(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
+def test_the_first_citygml_file_pins_crs_and_origin(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
     add(workspace, catalogue, tmp_path / "a.gml", gml(("B1", UTM_RING, UTM)))
     scene = catalogue.scene("town")
     assert scene.crs is not None
@@ -84,26 +84,26 @@ def test_citygml_pins_system_and_origin(workspace: Workspace, catalogue: Catalog
     assert boxes(workspace)["B1"] == ((10.0, 10.0, 10.0), (20.0, 20.0, 15.0))
 
 
-def test_the_origin_stays_for_later_files(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
+def test_later_files_keep_the_origin(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
     add(workspace, catalogue, tmp_path / "a.gml", gml(("B1", UTM_RING, UTM)))
     add(workspace, catalogue, tmp_path / "b.gml", gml(("B2", UTM_RING.replace("6910", "6950"), UTM)))
     assert catalogue.scene("town").origin == (691_000.0, 5_336_000.0, 500.0)
     assert boxes(workspace)["B2"] == ((4010.0, 10.0, 10.0), (4020.0, 20.0, 15.0))
 
 
-def test_geographic_coordinates_come_into_the_scenes_system(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
+def test_geographic_coordinates_are_transformed_to_the_scenes_crs(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
     add(workspace, catalogue, tmp_path / "a.gml", gml(("B1", LAT_LON_RING, ' srsName="urn:ogc:def:crs:EPSG::4979"')))
     scene = catalogue.scene("town")
     assert scene.crs is not None
     assert scene.crs.name == "WGS 84 / UTM zone 32N"
     ((low, high),) = boxes(workspace).values()  # type: ignore[misc]
-    assert high[0] - low[0] == pytest.approx(7.44 + 0.35, abs=0.6)  # 0.0001° of longitude at 48° north, turned by the convergence
+    assert high[0] - low[0] == pytest.approx(7.44 + 0.35, abs=0.6)  # 0.0001° of longitude at 48° north, rotated by the meridian convergence
     assert high[1] - low[1] == pytest.approx(11.12 + 0.25, abs=0.6)
     report = catalogue.assets("town")[0].report
-    assert "kept" in report["placing"]["heights"]
+    assert "unchanged" in report["placing"]["heights"]
 
 
-def test_ids_stay_when_a_file_is_added_again(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
+def test_ids_stay_when_a_file_is_imported_again(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
     add(workspace, catalogue, tmp_path / "a.gml", gml(("B1", UTM_RING, UTM), ("B2", UTM_RING, UTM)))
     with Registry(workspace.registry_path("town")) as registry:
         before = registry.ids_of("a")
@@ -116,7 +116,7 @@ def test_ids_stay_when_a_file_is_added_again(workspace: Workspace, catalogue: Ca
     assert after["B3"] not in before.values()
 
 
-def test_a_broken_building_costs_only_itself(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
+def test_a_broken_building_is_skipped_and_counted(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
     text = gml(("B1", "1 2 3 4 5", UTM), ("B2", UTM_RING, UTM), ("B3", "0 0 0 0 0 0 0 0 0 0 0 0", UTM))
     done = add(workspace, catalogue, tmp_path / "a.gml", text)
     assert list(boxes(workspace)) == ["B2"]
@@ -129,14 +129,14 @@ def test_a_broken_building_costs_only_itself(workspace: Workspace, catalogue: Ca
 def test_a_failed_import_leaves_the_earlier_asset(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
     add(workspace, catalogue, tmp_path / "a.gml", gml(("B1", UTM_RING, UTM)))
     before = (boxes(workspace), catalogue.assets("town"))
-    with pytest.raises(ImportFailed, match="no triangle"):
+    with pytest.raises(ImportFailed, match="no usable triangle"):
         add(workspace, catalogue, tmp_path / "a.gml", gml(("B1", "0 0 0 0 0 0", UTM)))
     with pytest.raises(ImportFailed):
         add(workspace, catalogue, tmp_path / "a.gml", gml(("B1", UTM_RING, UTM))[:500])
     assert (boxes(workspace), catalogue.assets("town")) == before
 
 
-def test_a_file_that_names_no_system_needs_one_named(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
+def test_a_file_without_a_crs_needs_the_crs_option(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
     text = gml(("B1", UTM_RING, ""))
     with pytest.raises(CrsError, match="--crs"):
         add(workspace, catalogue, tmp_path / "a.gml", text)
@@ -147,14 +147,14 @@ def test_a_file_that_names_no_system_needs_one_named(workspace: Workspace, catal
     assert crs.epsg == 25832
 
 
-def test_an_unknown_system_says_what_to_do(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
+def test_an_unknown_crs_error_names_the_crs_option(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
     text = gml(("B1", UTM_RING, ' srsName="urn:adv:crs:NOWHERE"'))
     with pytest.raises(CrsError, match=r"NOWHERE.*--crs"):
         add(workspace, catalogue, tmp_path / "a.gml", text)
     add(workspace, catalogue, tmp_path / "a.gml", text, ImportOptions(crs="EPSG:25832"))
 
 
-def test_georeferenced_files_do_not_go_into_a_local_scene(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
+def test_a_local_scene_refuses_georeferenced_files(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
     add(workspace, catalogue, tmp_path / "a.obj", BOX_OBJ)
     with pytest.raises(CrsError, match="another scene"):
         add(workspace, catalogue, tmp_path / "b.gml", gml(("B1", UTM_RING, UTM)))
@@ -166,11 +166,11 @@ def test_files_far_from_the_scene_are_refused(workspace: Workspace, catalogue: C
         add(workspace, catalogue, tmp_path / "b.obj", BOX_OBJ.replace("v 2", "v 200000002").replace("v 0", "v 200000000"))
 
 
-def test_there_must_be_a_scene(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
+def test_importing_into_an_absent_scene_raises_not_found(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
     with pytest.raises(NotFound):
         add(workspace, catalogue, tmp_path / "a.obj", BOX_OBJ, scene="nowhere")
 
 
-def test_y_up_is_turned(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
+def test_y_up_files_are_rotated(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
     add(workspace, catalogue, tmp_path / "a.obj", BOX_OBJ, ImportOptions(up="y"))
     assert list(boxes(workspace).values()) == [((0.0, -4.0, 0.0), (2.0, 0.0, 3.0))]

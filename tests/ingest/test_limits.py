@@ -1,4 +1,4 @@
-"""A parser that misbehaves costs its own import, within its limits, and is told by a typed error that names the limit."""
+"""A misbehaving parser fails only its own import, and a typed error names the limit that it exceeded."""
 
 import dataclasses
 import socket
@@ -12,7 +12,7 @@ from map3d.catalogue import Catalogue, SceneRecord, Workspace
 from map3d.errors import ImportFailed, LimitExceeded
 from map3d.ingest.import_options import BIG_FILE_BYTES, GIB, ImportOptions
 from map3d.ingest.importing import import_file
-from map3d.ingest.parser_process import Parsers
+from map3d.ingest.parser_process import ParserProcess
 from map3d.ingest.sources import Source, find_sources
 from map3d.subprocess import Limits, Message, Subprocess
 
@@ -44,11 +44,11 @@ def source(tmp_path: Path) -> Source:
         ("open_greedy", ImportOptions(), LimitExceeded, "1024 MiB of address space.*--parse-memory"),
         ("open_greedy", ImportOptions(parse_memory_bytes=3 << 30), LimitExceeded, "3072 MiB of address space"),
         ("open_busy", ImportOptions(parse_cpu_s=1), LimitExceeded, "1 s of CPU time.*--parse-cpu"),
-        ("open_asleep", ImportOptions(parse_cpu_s=1), LimitExceeded, "not read within 14 s.*--parse-cpu"),
+        ("open_asleep", ImportOptions(parse_cpu_s=1), LimitExceeded, "took longer than 14 s.*--parse-cpu"),
         ("open_crash", ImportOptions(), ImportFailed, "SIGABRT"),
     ],
 )
-def test_a_parser_out_of_bounds_is_ended_and_explained(
+def test_a_parser_over_its_limits_is_ended_with_an_explanation(
     workspace: Workspace, catalogue: Catalogue, source: Source, entry: str, options: ImportOptions, error: type[Exception], says: str
 ) -> None:
     begun = time.monotonic()
@@ -60,7 +60,7 @@ def test_a_parser_out_of_bounds_is_ended_and_explained(
     assert list((workspace.scene_folder("town") / "assets").iterdir()) == []
 
 
-def test_a_parser_has_no_network_where_the_system_allows_that() -> None:
+def test_a_parser_has_no_network_where_the_system_supports_it() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         child = Subprocess("tests.ingest.misbehaving_parsers:open_curious", {}, limits=Limits(network=False))
         applied = child.wait_ready(30)
@@ -70,7 +70,7 @@ def test_a_parser_has_no_network_where_the_system_allows_that() -> None:
     assert answer.value["network"] == applied["network"]
 
 
-def test_a_parser_has_few_files(tmp_path: Path) -> None:
+def test_a_parser_can_open_few_files(tmp_path: Path) -> None:
     child = Subprocess("tests.ingest.misbehaving_parsers:open_hoarder", {}, limits=Limits(open_files=64))
     child.wait_ready(30)
     answer = child.request({"folder": str(tmp_path)}, wall_s=10)
@@ -92,7 +92,7 @@ def test_limits_grow_with_the_file(tmp_path: Path, size: int, memory: int, cpu_s
     assert (raised.address_space_bytes, raised.cpu_s) == (5 * GIB, 7)
 
 
-def test_processor_time_is_granted_anew_for_every_file() -> None:
+def test_the_processor_time_limit_restarts_for_every_file() -> None:
     child = Subprocess("tests.ingest.misbehaving_parsers:open_worker", {}, limits=Limits(cpu_s=1))
     child.wait_ready(30)
     for _ in range(4):
@@ -102,15 +102,15 @@ def test_processor_time_is_granted_anew_for_every_file() -> None:
     child.close()
 
 
-def test_one_parser_serves_many_files_until_one_fails() -> None:
-    with Parsers() as parsers:
+def test_one_process_parses_many_files_until_one_fails() -> None:
+    with ParserProcess() as parser:
         limits = Limits(open_files=64)
-        first, _ = parsers.get("tests.subprocess.echo:open_echo", limits)
-        assert parsers.get("tests.subprocess.echo:open_echo", limits)[0] is first
-        with parsers:
+        first, _ = parser.get("tests.subprocess.echo:open_echo", limits)
+        assert parser.get("tests.subprocess.echo:open_echo", limits)[0] is first
+        with parser:
             pass
-        assert isinstance(first.request({}, wall_s=10), Message), "an inner user does not end it"
-        parsers.drop()
-        second, _ = parsers.get("tests.subprocess.echo:open_echo", limits)
+        assert isinstance(first.request({}, wall_s=10), Message), "an inner with block does not end it"
+        parser.stop()
+        second, _ = parser.get("tests.subprocess.echo:open_echo", limits)
         assert second is not first
-        assert parsers.get("tests.subprocess.echo:open_echo", Limits(open_files=65))[0] is not second
+        assert parser.get("tests.subprocess.echo:open_echo", Limits(open_files=65))[0] is not second

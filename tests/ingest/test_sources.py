@@ -1,4 +1,4 @@
-"""Which files are asked for, and what their assets are called."""
+"""Search for source documents, and the names of their assets."""
 
 from pathlib import Path
 
@@ -23,34 +23,34 @@ def fill(folder: Path) -> Path:
     return folder
 
 
-def test_a_folder_gives_every_file_that_can_be_read_once_in_order(tmp_path: Path) -> None:
+def test_a_folder_yields_every_readable_file_once_in_order(tmp_path: Path) -> None:
     found = find_sources([fill(tmp_path)])
     assert [(source.name, source.format) for source in found] == [("b", "obj"), ("b-2", "obj"), ("b-3", "obj"), ("c-d", "obj"), ("terrain", "raster")]
     assert [path.name for path in found[-1].paths] == ["dem.tif", "ortho.tif"]
     assert find_sources([tmp_path]) == found
 
 
-def test_a_folder_without_anything_to_read_is_refused(tmp_path: Path) -> None:
+def test_a_folder_without_a_readable_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("v 1 2 3")
-    with pytest.raises(UnknownFormat, match="no file in it that map3d can read;"):
+    with pytest.raises(UnknownFormat, match="no readable file in this folder;"):
         find_sources([tmp_path])
     (tmp_path / "town.zip").write_bytes(b"PK\x03\x04")
-    with pytest.raises(UnknownFormat, match=r"can read \(.*town.zip: a ZIP archive\);"):
+    with pytest.raises(UnknownFormat, match=r"no readable file in this folder \(found .*town.zip: a ZIP archive\);"):
         find_sources([tmp_path])
 
 
-def test_files_whose_names_promise_more_than_they_hold_are_told(tmp_path: Path) -> None:
+def test_unreadable_files_with_a_known_suffix_are_reported(tmp_path: Path) -> None:
     fill(tmp_path)
     for name, data in (("a/empty.gml", b""), ("words.OBJ", b"no lines of an OBJ"), ("page.xml", b"<html/>"), ("data.json", b"{}")):
         (tmp_path / name).write_bytes(data)
-    told: list[tuple[str, str]] = []
-    found = find_sources([tmp_path], None, lambda path, why: told.append((path.name, why)))
+    reported: list[tuple[str, str]] = []
+    found = find_sources([tmp_path], None, lambda path, why: reported.append((path.name, why)))
     assert len(found) == 5
-    assert [name for name, _ in told] == ["empty.gml", "words.OBJ"]
-    assert [why.partition(";")[0].rpartition(": ")[2] for _, why in told] == ["an empty file", "a file of unknown type"]
+    assert [name for name, _ in reported] == ["empty.gml", "words.OBJ"]
+    assert [why.partition(";")[0].rpartition(": ")[2] for _, why in reported] == ["an empty file", "a file of unknown format"]
 
 
-def test_a_named_file_of_unknown_type_is_refused_even_beside_others(tmp_path: Path) -> None:
+def test_a_given_file_of_unknown_format_is_refused(tmp_path: Path) -> None:
     fill(tmp_path)
     with pytest.raises(UnknownFormat, match=r"notes\.odt"):
         find_sources([tmp_path / "b.obj", tmp_path / "notes.odt"])
@@ -65,11 +65,11 @@ def test_a_given_name_is_used(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "name"), [("LoD2_32_691", "lod2_32_691"), ("Käse & Brot.v2", "k-se-brot-v2"), ("--", "asset"), ("a" * 99, "a" * 64), ("_x", "x")]
 )
-def test_names_are_made_of_what_names_may_have(text: str, name: str) -> None:
+def test_asset_names_contain_only_valid_characters(text: str, name: str) -> None:
     assert asset_name(text) == name
 
 
-def test_the_digest_follows_document_and_materials(tmp_path: Path) -> None:
+def test_the_source_digest_covers_document_and_materials(tmp_path: Path) -> None:
     path = tmp_path / "a.obj"
     path.write_text("mtllib other.mtl\n" + OBJ)
     (source,) = find_sources([path])
@@ -88,7 +88,7 @@ def digest_of(path: Path) -> str:
     return source_digest(source)
 
 
-def test_the_digest_follows_images_that_are_named_and_no_others(tmp_path: Path) -> None:
+def test_the_source_digest_covers_only_referenced_images(tmp_path: Path) -> None:
     textures = tmp_path / "textures"
     textures.mkdir()
     for name in ("wall & roof.jpg", "door.png", "other.jpg"):

@@ -11,8 +11,9 @@ from pyproj import CRS, Geod, Proj, Transformer
 
 from map3d.catalogue import SceneCrs, SceneRecord
 from map3d.errors import BadRequest
+from map3d.geometry.crs import parse_crs
 from map3d.geometry.sun import Place, SunAngles, sun_angles
-from map3d.ingest.crs import LOCAL, parse_crs, scene_crs
+from map3d.ingest.scene_crs import LOCAL, to_scene_crs
 from map3d.renderings.grid_north import GridNorth
 from map3d.renderings.layers import LayerRequest
 from map3d.renderings.sun_layers import LightRequest
@@ -28,7 +29,7 @@ def scene_at(code: str, longitude_deg: float, latitude_deg: float) -> SceneRecor
     """Returns a scene whose box is centred there."""
     crs = parse_crs(code)
     x, y = Transformer.from_crs("EPSG:4326", crs, always_xy=True).transform(longitude_deg, latitude_deg)
-    return SceneRecord("town", crs=scene_crs(crs), origin=(x - 100.0, y - 100.0, 0.0))
+    return SceneRecord("town", crs=to_scene_crs(crs), origin=(x - 100.0, y - 100.0, 0.0))
 
 
 def only(layers: tuple[Layer, ...]) -> Layer:

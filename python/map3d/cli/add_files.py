@@ -35,7 +35,7 @@ def command(workspace: Workspace, scene: str, files: Sequence[Path], as_json: bo
     """
     from map3d.ingest.import_options import ImportOptions
     from map3d.ingest.importing import import_file
-    from map3d.ingest.parser_process import Parsers
+    from map3d.ingest.parser_process import ParserProcess
     from map3d.ingest.sources import find_sources
 
     done: list[Any] = []
@@ -49,12 +49,12 @@ def command(workspace: Workspace, scene: str, files: Sequence[Path], as_json: bo
     try:
         catalogue.scene(scene)
         columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-        with Parsers() as parsers, progress_bar(*columns) as bar:
+        with ParserProcess() as parser, progress_bar(*columns) as bar:
             for number, source in enumerate(sources, 1):
                 task = bar.add_task(f"{number} of {len(sources)}: {source.paths[0].name}")
                 try:
                     show = _show(bar, task, source.paths[0].name)
-                    done.append(import_file(workspace, catalogue, scene, source, ImportOptions(**options), show, parsers=parsers))
+                    done.append(import_file(workspace, catalogue, scene, source, ImportOptions(**options), show, parser=parser))
                 except Map3dError as error:
                     if options["strict"] or len(sources) + len(failed) == 1:
                         raise

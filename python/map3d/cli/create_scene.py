@@ -41,7 +41,7 @@ def command(
     workspace: Workspace, name: str, crs: str | None, title: str, attribution: str, ground_plane: str, as_json: bool, **switches: bool
 ) -> None:
     """Create an empty scene NAME, and the workspace if it does not exist."""
-    from map3d.ingest.importing import parse_scene_crs
+    from map3d.ingest.scene_crs import parse_scene_crs
 
     pinned = None if crs is None else parse_scene_crs(crs)
     catalogue = workspace.create().open_catalogue()

@@ -1,4 +1,4 @@
-"""Which system an asset's coordinates are in, and how they come into the scene's."""
+"""Determines the CRS of an asset's coordinates and transforms them to the scene's."""
 
 from typing import Any, Final
 
@@ -9,74 +9,75 @@ from pyproj.crs import CompoundCRS
 
 from map3d.catalogue import SceneCrs
 from map3d.errors import CrsError
-from map3d.ingest.crs import LOCAL, is_local, parse_crs, scene_crs, vertical
-from map3d.ingest.crs_transformer import Points, Projection, choose_target
+from map3d.geometry.crs import is_local, parse_crs, vertical_crs
+from map3d.ingest.crs_transformer import CrsTransformer, Points, choose_scene_crs
+from map3d.ingest.scene_crs import LOCAL, to_scene_crs
 
-LOCAL_NAME: Final = "local"
-_MAY_BE_UNNAMED: Final = ("obj",)
+_FORMATS_WITHOUT_CRS: Final = ("obj",)
 
 
-class Placing:
-    """Brings the positions of one asset into the scene's system; if the scene has none yet, the first positions decide it."""
+class AssetReprojector:
+    """Transforms the positions of one asset to the scene's CRS. While the scene has none, the first positions determine it."""
 
-    def __init__(self, format: str, named: str | None, scene: str | None) -> None:
-        """`named`: what the user or the source calls the asset's system; `scene`: the scene's as text, "local", or None while it has none.
+    def __init__(self, format: str, asset_crs: str | None, scene_crs: str | None) -> None:
+        """`asset_crs`: the name given by the user or the file, None without one; `scene_crs`: WKT, "local", or None while the scene has no CRS.
 
-        Raises CrsError where the two cannot go together.
+        Raises CrsError if the two are incompatible.
         """
-        self._format, self.named = format, named
-        self._scene_is_local = scene is not None and is_local(scene)
-        self._target = None if scene is None or self._scene_is_local else CRS.from_user_input(scene)
-        self._source = None if named is None or is_local(named) else parse_crs(named)
-        self._projection: Projection | None = None
+        self._format, self._asset_crs = format, asset_crs
+        self._scene_is_local = scene_crs is not None and is_local(scene_crs)
+        self._target = None if scene_crs is None or self._scene_is_local else CRS.from_user_input(scene_crs)
+        self._source = None if asset_crs is None or is_local(asset_crs) else parse_crs(asset_crs)
+        self._transformer: CrsTransformer | None = None
         if self._source is not None and self._scene_is_local:
             raise CrsError(
-                f"the file is in {self._source.name}, the scene in local metres; put it into another scene, or give --crs local to take it as it is"
+                f"the file is in {self._source.name}, but the scene is in local metres; "
+                "add the file to another scene, or give --crs local to keep its coordinates as they are"
             )
 
-    def world(self, points: Points) -> Points:
-        """(n, 3) world coordinates; raises CrsError when it is not known what the points are."""
+    def to_world(self, points: Points) -> Points:
+        """Returns (n, 3) world coordinates. Raises CrsError if the CRS of the points is unknown."""
         if self._source is None:
-            self._check_unnamed()
+            self._check_crs_is_optional()
             return points
-        if self._projection is None:
-            self._target = self._target or _with_height(choose_target(self._source, points), self._source)
-            self._projection = Projection(self._source, self._target)
-        return self._projection.world(points)
+        if self._transformer is None:
+            self._target = self._target or _with_vertical_crs(choose_scene_crs(self._source, points), self._source)
+            self._transformer = CrsTransformer(self._source, self._target)
+        return self._transformer.to_world(points)
 
-    def world_transforms(self, transforms: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(m, 12) prototype → world."""
+    def transforms_to_world(self, transforms: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Converts (m, 12) prototype-to-source transforms to prototype-to-world."""
         if self._source is None:
             return transforms
-        if self._projection is None and len(transforms):
-            self.world(transforms.reshape(-1, 3, 4)[:, :, 3])
-        return transforms if self._projection is None else self._projection.world_transforms(transforms)
+        if self._transformer is None and len(transforms):
+            self.to_world(transforms.reshape(-1, 3, 4)[:, :, 3])
+        return transforms if self._transformer is None else self._transformer.transforms_to_world(transforms)
 
     @property
-    def proposed(self) -> SceneCrs | None:
-        """What the scene's system is to be, if it has none; None when nothing was placed."""
+    def proposed_crs(self) -> SceneCrs | None:
+        """The CRS for a scene that has none; None before any position was transformed."""
         if self._target is not None:
-            return scene_crs(self._target)
+            return to_scene_crs(self._target)
         return LOCAL if self._source is None else None
 
     @property
     def report(self) -> dict[str, Any]:
-        if self._projection is not None:
-            return self._projection.report
+        if self._transformer is not None:
+            return self._transformer.report
         return {
-            "from": self.named or "no system named",
+            "from": self._asset_crs or "no CRS named",
             "to": self._target.name if self._target is not None else LOCAL.name,
-            "operation": "none: taken as they are",
+            "operation": "none: coordinates are unchanged",
         }
 
-    def _check_unnamed(self) -> None:
-        if self.named is None and self._format not in _MAY_BE_UNNAMED and not self._scene_is_local:
-            raise CrsError("the file does not name its coordinate system; name it with --crs, e.g. --crs EPSG:25832, or --crs local for plain metres")
+    def _check_crs_is_optional(self) -> None:
+        if self._asset_crs is None and self._format not in _FORMATS_WITHOUT_CRS and not self._scene_is_local:
+            raise CrsError("the file does not name its CRS; name it with --crs, e.g. --crs EPSG:25832, or --crs local for plain metres")
 
 
-def _with_height(target: CRS, source: CRS) -> CRS:
-    """The scene takes over the vertical system of its first asset."""
-    height = vertical(source)
-    if height is None or target.is_compound:
+def _with_vertical_crs(target: CRS, source: CRS) -> CRS:
+    """The scene adopts the vertical CRS of its first asset."""
+    vertical = vertical_crs(source)
+    if vertical is None or target.is_compound:
         return target
-    return CompoundCRS(name=f"{target.name} + {height.name}", components=[target, height])
+    return CompoundCRS(name=f"{target.name} + {vertical.name}", components=[target, vertical])

@@ -1,4 +1,4 @@
-"""What a user may choose for an import, and the limits of the child that parses (all may be raised by name)."""
+"""Options of an import and the limits of the subprocess that parses; the user can raise each limit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,16 +9,16 @@ from map3d.subprocess import Limits
 
 GIB: Final = 1 << 30
 BIG_FILE_BYTES: Final = 100_000_000
-CPU_S_A_BIG_FILE: Final = 60
-CPU_S_A_BIG_RASTER: Final = 600
+CPU_S_PER_BIG_FILE: Final = 60
+CPU_S_PER_BIG_RASTER: Final = 600
 """Rasters are compressed and become triangles and textures."""
 OPEN_FILES: Final = 256
 
 
 @dataclass(frozen=True)
 class ImportOptions:
-    """`crs`: the file's system where the file does not say or says wrong, "local" for plain metres. `up`, `split`: OBJ; `theme`, `lod`: CityGML.
-    None for a limit: its default."""
+    """`crs`: overrides the CRS that the file names, or supplies a missing one; "local" for plain metres. `up`, `split`: OBJ only.
+    `theme`, `lod`: CityGML only. A limit of None means its default."""
 
     crs: str | None = None
     up: str = "z"
@@ -31,7 +31,7 @@ class ImportOptions:
     parse_cpu_s: int | None = None
 
     def reader_options(self, format: str, limits: Limits) -> dict[str, Any]:
-        """As the core's Reader takes them."""
+        """Returns the options of the core's Reader."""
         options: dict[str, Any] = {"strict": self.strict}
         if format == "obj":
             options |= {"up": self.up, "split": self.split}
@@ -42,10 +42,13 @@ class ImportOptions:
         return options
 
     def limits(self, paths: Sequence[Path], format: str) -> Limits:
-        """1 GiB, 2 GiB for big files; 60 s of processor time for every 100 MB begun (rasters: 2 GiB, 600 s); four times that and ten seconds on
-        the clock."""
+        """Returns the limits for files of this size and format.
+
+        Memory: 1 GiB; 2 GiB for rasters and files over 100 MB. Processor time: 60 s (rasters: 600 s) per 100 MB or part of it. Wall time: four
+        times the processor time plus 10 s.
+        """
         size = sum(path.stat().st_size for path in paths)
         raster = format == "raster"
-        cpu_s = self.parse_cpu_s or (CPU_S_A_BIG_RASTER if raster else CPU_S_A_BIG_FILE) * max(1, -(-size // BIG_FILE_BYTES))
+        cpu_s = self.parse_cpu_s or (CPU_S_PER_BIG_RASTER if raster else CPU_S_PER_BIG_FILE) * max(1, -(-size // BIG_FILE_BYTES))
         memory = self.parse_memory_bytes or (2 * GIB if raster or size > BIG_FILE_BYTES else GIB)
         return Limits(address_space_bytes=memory, cpu_s=cpu_s, wall_s=10.0 + 4.0 * cpu_s, open_files=OPEN_FILES, network=False)

@@ -1,4 +1,4 @@
-"""Import: one source document becomes an asset of a scene, read by a limited child, put in place in one step."""
+"""Imports one source document as an asset of a scene: a limited subprocess parses it, and one atomic step puts the asset in place."""
 
 import os
 import shutil
@@ -12,26 +12,26 @@ from map3d.catalogue import AssetRecord, Catalogue, SceneCrs, SceneRecord, Works
 from map3d.catalogue.scene_lock import scene_lock
 from map3d.errors import CrsError, ImportFailed, LimitExceeded, Map3dError, SubprocessDied, SubprocessTimedOut
 from map3d.ingest.asset import asset_digest, new_objects, put_in_place, read_objects, world_boxes, write_ids, write_report
-from map3d.ingest.crs import LOCAL, is_local, parse_crs, scene_crs
 from map3d.ingest.import_options import ImportOptions
-from map3d.ingest.parser_process import Parsers
+from map3d.ingest.parser_process import ParserProcess
+from map3d.ingest.scene_crs import LOCAL
 from map3d.ingest.sources import Source, source_digest
 from map3d.registry import Registry
 from map3d.subprocess import Failure, Limits
 from map3d.types import Box, Vec3
 
-ENTRIES: Final = {"raster": "map3d.ingest.terrain.parse_terrain:open_terrain"}
-IMPORT_ENTRY: Final = "map3d.ingest.parse_document:open_import"
+PARSER_ENTRIES: Final = {"raster": "map3d.ingest.terrain.parse_terrain:open_terrain_parser"}
+DOCUMENT_PARSER_ENTRY: Final = "map3d.ingest.parse_document:open_document_parser"
 ORIGIN_STEP_M: Final = 100.0
 MAX_FROM_ORIGIN_M: Final = 1e8
 
-Progress = Callable[[str], None]
-"""Called with how far the reading is, as text."""
+OnProgress = Callable[[str], None]
+"""Called with the number of triangles or tiles read so far, as text."""
 
 
 @dataclass(frozen=True)
 class Imported:
-    """What an import did. `report`: counts by reason and how the coordinates were placed."""
+    """Result of an import. `report`: counts by reason, and how the coordinates were transformed."""
 
     asset: str
     source: str
@@ -48,16 +48,16 @@ def import_file(
     scene: str,
     source: Source,
     options: ImportOptions,
-    progress: Progress | None = None,
+    progress: OnProgress | None = None,
     *,
-    parsers: Parsers | None = None,
+    parser: ParserProcess | None = None,
     entry: str | None = None,
 ) -> Imported:
-    """Adds a source document to a scene, or replaces the asset of its name. What went wrong in parts is counted in the report.
+    """Adds a source document to a scene, or replaces the asset of the same name. The report counts partial failures.
 
-    `parsers`: children to use again when there are many files; else one is started for this file.
+    `parser`: a subprocess to reuse for many files; by default a new one parses this file.
 
-    Raises ImportFailed (nothing usable, or the first fault under `strict`), LimitExceeded, CrsError. Until the last step the scene is as before.
+    Raises ImportFailed (nothing usable, or the first fault under `strict`), LimitExceeded, CrsError. Until the last step the scene is unchanged.
     """
     record = catalogue.scene(scene)
     final = workspace.asset_folder(scene, source.name)
@@ -66,28 +66,23 @@ def import_file(
     shutil.rmtree(draft, ignore_errors=True)
     draft.mkdir(parents=True)
     try:
-        with parsers or Parsers() as kept:
-            answer = _read(record, source, options, draft, progress, kept, entry or ENTRIES.get(source.format, IMPORT_ENTRY))
-        report = answer["report"]
+        with parser or ParserProcess() as running:
+            parsed = _parse(record, source, options, draft, progress, running, entry or PARSER_ENTRIES.get(source.format, DOCUMENT_PARSER_ENTRY))
+        report = parsed["report"]
         if not report["triangles"]:
-            raise ImportFailed(f"{source.paths[0]}: no triangle in it could be used{_reasons(report)}")
+            raise ImportFailed(f"{source.paths[0]}: no usable triangle in the file{_list_skipped(report)}")
         with scene_lock(workspace, scene):
-            proposed = None if answer["crs"] is None else SceneCrs(**answer["crs"])
-            return _adopt(workspace, catalogue, record, source, draft, report, proposed, digest)
+            proposed = None if parsed["crs"] is None else SceneCrs(**parsed["crs"])
+            return _add_to_scene(workspace, catalogue, record, source, draft, report, proposed, digest)
     finally:
         shutil.rmtree(draft, ignore_errors=True)
 
 
-def parse_scene_crs(text: str) -> SceneCrs:
-    """A scene's system as the user names it; raises CrsError unless projected in metres, or "local"."""
-    return LOCAL if is_local(text) else scene_crs(parse_crs(text))
-
-
-def _read(
-    record: SceneRecord, source: Source, options: ImportOptions, draft: Path, progress: Progress | None, parsers: Parsers, entry: str
+def _parse(
+    record: SceneRecord, source: Source, options: ImportOptions, draft: Path, progress: OnProgress | None, parser: ParserProcess, entry: str
 ) -> dict[str, Any]:
     limits = options.limits(source.paths, source.format)
-    question = {
+    request = {
         "path": str(source.paths[0].absolute()),
         "paths": [str(path.absolute()) for path in source.paths],
         "name": source.name,
@@ -98,26 +93,26 @@ def _read(
         "scene_crs": _crs_text(record.crs),
     }
     try:
-        child, applied = parsers.get(entry, limits)
-        message = child.request(question, wall_s=limits.wall_s, on_progress=lambda counts: counts and progress and progress(_told(counts)))
+        subprocess, applied = parser.get(entry, limits)
+        message = subprocess.request(request, wall_s=limits.wall_s, on_progress=lambda counts: counts and progress and progress(_progress_text(counts)))
     except (SubprocessDied, LimitExceeded) as error:
-        parsers.drop()
-        raise _explained(source, limits, error) from error
+        parser.stop()
+        raise _parser_error(source, limits, error) from error
     except BaseException:
-        parsers.drop()
+        parser.stop()
         raise
     if isinstance(message, Failure):
-        raise _failure(source, message)
-    answer: dict[str, Any] = message.value
-    answer["report"]["parser"] = {**applied, "address_space_bytes": limits.address_space_bytes, "cpu_s": limits.cpu_s}
-    return answer
+        raise _failure_error(source, message)
+    response: dict[str, Any] = message.value
+    response["report"]["parser"] = {**applied, "address_space_bytes": limits.address_space_bytes, "cpu_s": limits.cpu_s}
+    return response
 
 
-def _told(told: Mapping[str, int]) -> str:
-    return f"{told['triangles']:,} triangles" if "triangles" in told else f"{told['done']} of {told['total']} tiles"
+def _progress_text(done: Mapping[str, int]) -> str:
+    return f"{done['triangles']:,} triangles" if "triangles" in done else f"{done['done']} of {done['total']} tiles"
 
 
-def _adopt(
+def _add_to_scene(
     workspace: Workspace,
     catalogue: Catalogue,
     before: SceneRecord,
@@ -125,50 +120,53 @@ def _adopt(
     draft: Path,
     report: dict[str, Any],
     proposed: SceneCrs | None,
-    digest: str,
+    source_digest: str,
 ) -> Imported:
     scene, lines = before.name, read_objects(draft)
     boxes = world_boxes(draft, len(lines))
-    record = _pinned(catalogue, before, proposed, boxes)
-    assert record.origin is not None, "pinned above"
-    _check_near(source, boxes, record.origin)
+    record = _pin_scene(catalogue, before, proposed, boxes)
+    assert record.origin is not None, "the scene is pinned"
+    _check_distance(source, boxes, record.origin)
     with Registry(workspace.registry_path(scene)) as registry:
         ids = registry.put_asset(source.name, new_objects(lines, boxes, record.origin))
     write_ids(draft, ids)
     write_report(draft, report)
     final = workspace.asset_folder(scene, source.name)
     replaced = final.exists()
-    content = asset_digest(draft)
+    digest = asset_digest(draft)
     put_in_place(draft, final)
-    catalogue.put_asset(AssetRecord(scene, source.name, str(source.paths[0].absolute()), source.format, content, digest, report))
+    catalogue.put_asset(AssetRecord(scene, source.name, str(source.paths[0].absolute()), source.format, digest, source_digest, report))
     return Imported(source.name, str(source.paths[0]), source.format, len(lines), report["triangles"], replaced, report)
 
 
-def _pinned(catalogue: Catalogue, before: SceneRecord, proposed: SceneCrs | None, boxes: list[Box | None]) -> SceneRecord:
+def _pin_scene(catalogue: Catalogue, before: SceneRecord, proposed: SceneCrs | None, boxes: list[Box | None]) -> SceneRecord:
     record = catalogue.pin_scene(before.name, crs=proposed or LOCAL, origin=choose_origin(boxes))
     if before.crs is None and record.crs is not None and proposed is not None and record.crs.wkt != proposed.wkt:
-        raise CrsError(f"scene {before.name} was given the system {record.crs.name} meanwhile, the file was read for {proposed.name}; add it again")
+        raise CrsError(
+            f"scene {before.name}: another import set its CRS to {record.crs.name} while this file was read for {proposed.name}; add the file again"
+        )
     return record
 
 
 def choose_origin(boxes: list[Box | None]) -> Vec3:
-    """The middle of the content at its foot, in whole steps of 100 m: exact on the scene's lattice of 2^-12 m."""
-    have = [box for box in boxes if box is not None]
-    if not have:
+    """Returns the horizontal centre and the lowest height of the content, rounded to 100 m: exact on the scene's lattice of 2^-12 m."""
+    content = [box for box in boxes if box is not None]
+    if not content:
         return (0.0, 0.0, 0.0)
-    x, y = (_rounded((min(box[0][k] for box in have) + max(box[1][k] for box in have)) / 2) for k in (0, 1))
-    return (x, y, _rounded(min(box[0][2] for box in have)))
+    x, y = (_round_to_step((min(box[0][k] for box in content) + max(box[1][k] for box in content)) / 2) for k in (0, 1))
+    return (x, y, _round_to_step(min(box[0][2] for box in content)))
 
 
-def _rounded(value: float) -> float:
+def _round_to_step(value: float) -> float:
     return round(value / ORIGIN_STEP_M) * ORIGIN_STEP_M + 0.0
 
 
-def _check_near(source: Source, boxes: list[Box | None], origin: Vec3) -> None:
+def _check_distance(source: Source, boxes: list[Box | None], origin: Vec3) -> None:
     for box in boxes:
         if box is not None and max(abs(corner[k] - origin[k]) for corner in box for k in range(3)) > MAX_FROM_ORIGIN_M:
             raise LimitExceeded(
-                f"{source.paths[0]}: content at {box[0]}, more than {MAX_FROM_ORIGIN_M:g} m from the scene's origin {origin}; is its --crs right?"
+                f"{source.paths[0]}: content at {box[0]} is more than {MAX_FROM_ORIGIN_M:g} m from the scene's origin {origin}; "
+                "check the file's CRS (--crs)"
             )
 
 
@@ -178,20 +176,20 @@ def _crs_text(crs: SceneCrs | None) -> str | None:
     return "local" if crs.wkt is None else crs.wkt
 
 
-def _reasons(report: Mapping[str, Any]) -> str:
+def _list_skipped(report: Mapping[str, Any]) -> str:
     skipped = ", ".join(f"{count} × {reason}" for reason, count in sorted(report.get("skipped", {}).items()))
     return f" (skipped: {skipped})" if skipped else ""
 
 
-def _explained(source: Source, limits: Limits, error: SubprocessDied | LimitExceeded) -> ImportFailed | LimitExceeded:
+def _parser_error(source: Source, limits: Limits, error: SubprocessDied | LimitExceeded) -> ImportFailed | LimitExceeded:
     if isinstance(error, LimitExceeded):
-        return LimitExceeded(f"{source.paths[0]}: {error}; raise it with --parse-memory or --parse-cpu")
+        return LimitExceeded(f"{source.paths[0]}: {error}; raise the limit with --parse-memory or --parse-cpu")
     if isinstance(error, SubprocessTimedOut) and limits.wall_s is not None:
-        return LimitExceeded(f"{source.paths[0]}: not read within {limits.wall_s:g} s; raise it with --parse-cpu")
-    return ImportFailed(f"{source.paths[0]}: the parser broke down and nothing was taken over: {error}")
+        return LimitExceeded(f"{source.paths[0]}: parsing took longer than {limits.wall_s:g} s; raise the limit with --parse-cpu")
+    return ImportFailed(f"{source.paths[0]}: the parser crashed and nothing was imported: {error}")
 
 
-def _failure(source: Source, failure: Failure) -> Map3dError:
+def _failure_error(source: Source, failure: Failure) -> Map3dError:
     kinds: dict[str, type[Map3dError]] = {"CrsError": CrsError, "LimitError": LimitExceeded, "LimitExceeded": LimitExceeded}
     text = failure.message if str(source.paths[0]) in failure.message else f"{source.paths[0]}: {failure.message}"
     if failure.kind in kinds:

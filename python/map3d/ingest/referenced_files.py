@@ -1,4 +1,7 @@
-"""Which files a document names: material libraries, images, library objects. For noticing changes only: what is read of them, the core decides."""
+"""Finds the files that a document references: material libraries, images, library objects.
+
+The result only detects changes. The core decides which of these files it reads.
+"""
 
 import mmap
 import re
@@ -8,51 +11,51 @@ from pathlib import Path
 from typing import Final
 from urllib.parse import unquote
 
-# Each part is bounded or excludes what follows it, so that hostile files cost no more than their length.
-_IN_XML: Final = (b"imageURI>", b"libraryObject>")
-_LONGEST: Final = 4096
-_IN_OBJ: Final = re.compile(rb"^mtllib[ \t]([^\r\n]{1,4096})", re.MULTILINE)
-_IN_MTL: Final = re.compile(rb"^[ \t]{0,64}(?:map_\w{1,16}|bump|disp|decal|norm|refl)[ \t]([^\r\n]{1,4096})", re.MULTILINE | re.IGNORECASE)
+# Every pattern is bounded or excludes what follows it, so that a hostile file costs no more than its length.
+_CITYGML_TAGS: Final = (b"imageURI>", b"libraryObject>")
+_MAX_NAME_BYTES: Final = 4096
+_OBJ_LIBRARY: Final = re.compile(rb"^mtllib[ \t]([^\r\n]{1,4096})", re.MULTILINE)
+_MTL_IMAGE: Final = re.compile(rb"^[ \t]{0,64}(?:map_\w{1,16}|bump|disp|decal|norm|refl)[ \t]([^\r\n]{1,4096})", re.MULTILINE | re.IGNORECASE)
 
 
-def named_files(path: Path) -> set[Path]:
-    """Those that are there, inside the document's folder."""
+def find_referenced_files(path: Path) -> set[Path]:
+    """Returns the referenced files that exist inside the document's folder."""
     folder = path.parent.resolve()
     if path.suffix.lower() != ".obj":
-        return set(_found(path, _elements, [folder]))
-    libraries = set(_found(path, _matches(_IN_OBJ), [folder]))
-    return libraries | {image for library in libraries for image in _found(library, _matches(_IN_MTL), [library.parent, folder])}
+        return set(_existing_files(path, _find_elements, [folder]))
+    libraries = set(_existing_files(path, _match(_OBJ_LIBRARY), [folder]))
+    return libraries | {image for library in libraries for image in _existing_files(library, _match(_MTL_IMAGE), [library.parent, folder])}
 
 
-def _matches(pattern: re.Pattern[bytes]) -> Callable[[mmap.mmap], Iterator[bytes]]:
+def _match(pattern: re.Pattern[bytes]) -> Callable[[mmap.mmap], Iterator[bytes]]:
     return lambda text: (match[1] for match in pattern.finditer(text))
 
 
-def _elements(text: mmap.mmap) -> Iterator[bytes]:
-    """What stands in the elements of those names; by plain search, since city models are large and names in them few."""
-    for tag in _IN_XML:
+def _find_elements(text: mmap.mmap) -> Iterator[bytes]:
+    """Yields the content of the elements that hold file names. A plain search is fast enough: city models are large and such elements rare."""
+    for tag in _CITYGML_TAGS:
         at = text.find(tag)
         while at >= 0:
             start = at + len(tag)
-            end = text.find(b"<", start, start + _LONGEST + 1)
+            end = text.find(b"<", start, start + _MAX_NAME_BYTES + 1)
             if end > start and b">" not in (name := text[start:end]):
                 yield name
             at = text.find(tag, start)
 
 
-def _found(path: Path, names_in: Callable[[mmap.mmap], Iterator[bytes]], folders: Sequence[Path]) -> Iterator[Path]:
+def _existing_files(path: Path, find_names: Callable[[mmap.mmap], Iterator[bytes]], folders: Sequence[Path]) -> Iterator[Path]:
     with path.open("rb") as file:
         if path.stat().st_size == 0:
             return
         with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as text:
-            names = {name.strip() for name in names_in(text)}
+            names = {name.strip() for name in find_names(text)}
     for name in names:
         for folder in folders:
-            yield from _inside(folder, name.decode("utf-8", "replace"))
+            yield from _resolve(folder, name.decode("utf-8", "replace"))
 
 
-def _inside(folder: Path, text: str) -> Iterator[Path]:
-    """The name as it stands, decoded as a reference, or one of a few words, of which the first may be options."""
+def _resolve(folder: Path, text: str) -> Iterator[Path]:
+    """Tries the name as written, URL-decoded, and word by word (the first words of an MTL statement may be options)."""
     plain = unescape(text).replace("\\", "/")
     for name in {plain, unquote(plain), *plain.split(maxsplit=16)}:
         try:

@@ -1,4 +1,4 @@
-"""Which files an import is asked for, what their assets are called, and whether they changed."""
+"""Finds the source documents of an import, names their assets, and detects whether they changed."""
 
 import hashlib
 import re
@@ -7,74 +7,76 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from map3d.errors import NotFound, UnknownFormat
-from map3d.ingest.formats import KNOWN, Format, detect_format
-from map3d.ingest.referenced_files import named_files
+from map3d.ingest.formats import READABLE_FORMATS, Format, detect_format
+from map3d.ingest.referenced_files import find_referenced_files
 
-_PASSED_OVER = (".mtl", ".jpg", ".jpeg", ".png", ".bmp", ".gif", ".tga", ".txt", ".md", ".json", ".pdf", ".html", ".prj", ".tfw", ".xsd", ".sqlite")
-_PROMISING = (".gml", ".citygml", ".obj", ".tif", ".tiff")
-"""A file of such a name is meant to be read; one that cannot be is worth a word."""
+_COMPANION_SUFFIXES = (
+    ".mtl", ".jpg", ".jpeg", ".png", ".bmp", ".gif", ".tga", ".txt", ".md", ".json", ".pdf", ".html", ".prj", ".tfw", ".xsd", ".sqlite",
+)  # fmt: skip
+_SOURCE_SUFFIXES = (".gml", ".citygml", ".obj", ".tif", ".tiff")
+"""A file with such a name ought to be readable; if it is not, the user hears of it."""
 
-Refuse = Callable[[Path, str], None]
-"""Called with a file of a folder that will not be read, and why."""
+OnUnreadable = Callable[[Path, str], None]
+"""Called with an unreadable file of a folder and the reason."""
 
 
 @dataclass(frozen=True)
 class Source:
-    """`paths`: the document; for terrain its rasters."""
+    """`paths`: the document; for terrain, its rasters."""
 
     name: str
     format: Format
     paths: tuple[Path, ...]
 
 
-def find_sources(paths: Iterable[Path], name: str | None = None, refuse: Refuse | None = None) -> list[Source]:
-    """Files as named; of folders every file of a known format, however deep, in order of their names. Rasters are one terrain for each folder.
+def find_sources(paths: Iterable[Path], name: str | None = None, on_unreadable: OnUnreadable | None = None) -> list[Source]:
+    """Returns the given files, and every file of a known format below the given folders, sorted by path. The rasters of a folder are one source.
 
-    `refuse` hears of files in folders whose names promise what their content is not.
+    `on_unreadable` is called for files in folders whose suffix announces a known format that their content is not.
 
-    Raises UnknownFormat for a named file of unknown type and for a folder that has nothing to read; NotFound.
+    Raises UnknownFormat for a given file of unknown format and for a folder without any readable file; NotFound.
     """
     found: list[tuple[Path, Format]] = []
     for path in paths:
         if path.is_dir():
-            found += _in_folder(path, refuse or (lambda *_: None))
+            found += _search_folder(path, on_unreadable or (lambda *_: None))
         elif path.exists():
             found.append((path, detect_format(path)))
         else:
             raise NotFound(f"{path}: no such file or folder")
-    return _named(_grouped(found), name)
+    return _name_sources(_group_rasters(found), name)
 
 
 def source_digest(source: Source) -> str:
-    """Over the document's bytes, the files beside it whose names begin with its stem, and the libraries and images that it names."""
+    """Computes the digest of the document, the files beside it whose names begin with its stem, and the libraries and images that it references."""
     total = hashlib.sha256()
     for path in source.paths:
-        for part in [path, *_companions(path)]:
+        for part in [path, *_find_companions(path)]:
             total.update(part.name.encode())
             with part.open("rb") as file:
                 total.update(hashlib.file_digest(file, "sha256").digest())
     return total.hexdigest()[:32]
 
 
-def _in_folder(folder: Path, refuse: Refuse) -> list[tuple[Path, Format]]:
+def _search_folder(folder: Path, on_unreadable: OnUnreadable) -> list[tuple[Path, Format]]:
     found, unknown = [], []
     for path in sorted(path for path in folder.rglob("*") if path.is_file() and not path.name.startswith(".")):
-        if path.suffix.lower() in _PASSED_OVER:
+        if path.suffix.lower() in _COMPANION_SUFFIXES:
             continue
         try:
             found.append((path, detect_format(path)))
         except UnknownFormat as error:
             unknown.append((path, str(error)))
     if not found:
-        why = f" ({unknown[0][1].partition(';')[0]})" if unknown else ""
-        raise UnknownFormat(f"{folder}: no file in it that map3d can read{why}; it reads {KNOWN}")
-    for path, text in unknown:
-        if path.suffix.lower() in _PROMISING:
-            refuse(path, text)
+        example = f" (found {unknown[0][1].partition(';')[0]})" if unknown else ""
+        raise UnknownFormat(f"{folder}: no readable file in this folder{example}; map3d reads {READABLE_FORMATS}")
+    for path, reason in unknown:
+        if path.suffix.lower() in _SOURCE_SUFFIXES:
+            on_unreadable(path, reason)
     return found
 
 
-def _grouped(found: Sequence[tuple[Path, Format]]) -> list[tuple[Format, tuple[Path, ...]]]:
+def _group_rasters(found: Sequence[tuple[Path, Format]]) -> list[tuple[Format, tuple[Path, ...]]]:
     rasters: dict[Path, list[Path]] = {}
     groups: list[tuple[Format, tuple[Path, ...]]] = []
     for path, format in found:
@@ -85,8 +87,8 @@ def _grouped(found: Sequence[tuple[Path, Format]]) -> list[tuple[Format, tuple[P
     return groups + [("raster", tuple(paths)) for paths in rasters.values()]
 
 
-def _named(groups: Sequence[tuple[Format, tuple[Path, ...]]], name: str | None) -> list[Source]:
-    """Names from the files', numbered where two would be the same."""
+def _name_sources(groups: Sequence[tuple[Format, tuple[Path, ...]]], name: str | None) -> list[Source]:
+    """Names sources after their files and numbers duplicates."""
     taken: set[str] = set()
     sources = []
     for format, paths in groups:
@@ -100,15 +102,15 @@ def _named(groups: Sequence[tuple[Format, tuple[Path, ...]]], name: str | None) 
 
 
 def asset_name(text: str) -> str:
-    """The text as a name: lower case, other characters become dashes."""
+    """Converts text to a valid name: lower case, any other character becomes a dash."""
     plain = re.sub(r"[^a-z0-9_-]+", "-", text.lower()).strip("-_")
     return plain[:64] or "asset"
 
 
-def _companions(path: Path) -> list[Path]:
-    beside = {other.resolve() for other in path.parent.glob(f"{_escaped(path.stem)}.*") if other.is_file()}
-    return sorted((beside | named_files(path)) - {path.resolve()})
+def _find_companions(path: Path) -> list[Path]:
+    beside = {other.resolve() for other in path.parent.glob(f"{_escape_glob(path.stem)}.*") if other.is_file()}
+    return sorted((beside | find_referenced_files(path)) - {path.resolve()})
 
 
-def _escaped(stem: str) -> str:
+def _escape_glob(stem: str) -> str:
     return re.sub(r"([\[\]*?])", r"[\1]", stem)

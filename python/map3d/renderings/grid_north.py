@@ -6,8 +6,8 @@ from typing import Final
 from pyproj import Geod, Transformer
 
 from map3d.errors import BadRequest
+from map3d.geometry.crs import horizontal_crs, parse_crs
 from map3d.geometry.sun import Place
-from map3d.ingest.crs import horizontal, parse_crs
 
 STEP_M: Final = 100.0
 WGS84: Final = "EPSG:4326"
@@ -22,7 +22,7 @@ class GridNorth:
 
     def __init__(self, wkt: str, x: float, y: float) -> None:
         """Raises BadRequest when the point is outside the coordinate system."""
-        flat = horizontal(parse_crs(wkt))
+        flat = horizontal_crs(parse_crs(wkt))
         longitude_deg, latitude_deg = Transformer.from_crs(flat, WGS84, always_xy=True).transform(x, y)
         if not (math.isfinite(longitude_deg) and math.isfinite(latitude_deg)):
             raise BadRequest(f"{flat.name} has no point {x:g}, {y:g}: cannot locate the scene, so the sun's position is unknown")

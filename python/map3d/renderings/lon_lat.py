@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pyproj import Transformer
 
 from map3d.catalogue import SceneRecord
-from map3d.ingest.crs import horizontal, parse_crs
+from map3d.geometry.crs import horizontal_crs, parse_crs
 from map3d.tiles.manifest import Geographic
 from map3d.types import Box, Vec3
 
@@ -32,7 +32,7 @@ def geographic_of(scene: SceneRecord, box: Box) -> Geographic | None:
 
 @lru_cache(maxsize=16)
 def _fitted(wkt: str, origin: Vec3, box: Box) -> Geographic | None:
-    to_degrees = Transformer.from_crs(horizontal(parse_crs(wkt)), WGS84, always_xy=True)
+    to_degrees = Transformer.from_crs(horizontal_crs(parse_crs(wkt)), WGS84, always_xy=True)
     middle = (round((box[0][0] + box[1][0]) / 2, 3), round((box[0][1] + box[1][1]) / 2, 3))
     unit_m = round(max(box[1][k] - box[0][k] for k in (0, 1)) / 2 * (1 + MARGIN) + MARGIN_M, 3)
     lon, lat = to_degrees.transform(origin[0] + middle[0], origin[1] + middle[1])

@@ -10,7 +10,7 @@ from map3d.errors import BadRequest, Map3dError, UnknownFormat
 from map3d.geometry.frames import pin
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import import_file
-from map3d.ingest.parser_process import Parsers
+from map3d.ingest.parser_process import ParserProcess
 from map3d.ingest.sources import Source, find_sources, source_digest
 from map3d.renderings.build import open_scene
 from map3d.renderings.create import RenderingRequest, create_rendering
@@ -58,10 +58,10 @@ def import_changed_files(workspace: Workspace, catalogue: Catalogue, request: Si
     sources = find_sources([request.sources], None, lambda path, reason: summary.failed.append((str(path), reason)))
     if summary.failed and request.options.strict:
         raise UnknownFormat(summary.failed[0][1])
-    with Parsers() as parsers:
+    with ParserProcess() as parser:
         for number, source in enumerate(sources):
             report(source.paths[0].name, number, len(sources))
-            _import_changed(workspace, catalogue, request, source, digests, summary, parsers)
+            _import_changed(workspace, catalogue, request, source, digests, summary, parser)
     if not summary.imported and not summary.unchanged:
         raise BadRequest(f"{request.sources}: none of its {len(sources)} files is usable; first error: {summary.failed[0][1]}")
     return summary
@@ -74,13 +74,13 @@ def _import_changed(
     source: Source,
     digests: dict[str, str],
     summary: ImportSummary,
-    parsers: Parsers,
+    parser: ParserProcess,
 ) -> None:
     if digests.get(source.name) == source_digest(source):
         summary.unchanged.append(source.name)
         return
     try:
-        import_file(workspace, catalogue, request.name, source, request.options, parsers=parsers)
+        import_file(workspace, catalogue, request.name, source, request.options, parser=parser)
         summary.imported.append(source.name)
     except Map3dError as error:
         if request.options.strict:

@@ -1,4 +1,4 @@
-"""Small rasters written for tests, and a writer that keeps what it is given."""
+"""Small test rasters, and a writer that records its meshes."""
 
 import json
 import warnings
@@ -35,25 +35,25 @@ def from_bounds(west, south, east, north, columns, rows):
 
 
 def pixel_of(transform, x, y):
-    """(column, row) whole pixel that holds (x, y)."""
+    """Returns the (column, row) of the pixel that contains (x, y)."""
     a, b, c, d, e, f = (~transform)[:6]
     return int(a * x + b * y + c), int(d * x + e * y + f)
 
 
 def hills(rows, columns):
-    """(1, rows, columns) float32 heights."""
+    """Returns (1, rows, columns) float32 heights."""
     y, x = np.mgrid[0:rows, 0:columns]
     return (20 * np.sin(x / 7) * np.cos(y / 5) + 0.1 * x)[None].astype(np.float32)
 
 
 def colours(rows, columns):
-    """(3, rows, columns) uint8: red tells the column, green the row."""
+    """Returns (3, rows, columns) uint8: red encodes the column, green the row."""
     y, x = np.mgrid[0:rows, 0:columns]
     return np.stack([x * 255 // max(columns - 1, 1), y * 255 // max(rows - 1, 1), np.full_like(x, 128)]).astype(np.uint8)
 
 
-class KeepingWriter:
-    """Stands for the core's AssetWriter."""
+class RecordingWriter:
+    """Replaces the core's AssetWriter."""
 
     def __init__(self):
         self.meshes, self.materials, self.objects, self.finished = [], None, None, False
@@ -81,5 +81,5 @@ class KeepingWriter:
         return sum(len(mesh[1]) for mesh in self.meshes)
 
     def soup(self):
-        """(t, 3, 3) of all triangles."""
+        """Returns the (t, 3, 3) corners of all triangles."""
         return np.concatenate([positions[triangles] for positions, triangles, *_ in self.meshes])

@@ -1,4 +1,4 @@
-"""Terrain through the compiled core: what lies in the asset folder (spec/scene.md)."""
+"""Terrain import with the compiled core: files of the asset folder (spec/scene.md)."""
 
 import json
 
@@ -20,7 +20,7 @@ def folder(tmp_path):
     return tmp_path / "asset"
 
 
-def test_the_asset_folder_is_whole(folder):
+def test_the_asset_folder_is_complete(folder):
     assert {path.name for path in folder.iterdir()} == {"mesh.m3a", "materials.json", "objects.jsonl", "report.json", "textures"}
     report = json.loads((folder / "report.json").read_text())
     assert (report["format"], report["objects"], report["skipped"]) == ("terrain", 12, {})
@@ -32,7 +32,7 @@ def test_the_asset_folder_is_whole(folder):
     assert keys == {path.stem for path in (folder / "textures").iterdir()}
 
 
-def test_the_mesh_holds_every_triangle(folder):
+def test_the_mesh_contains_every_triangle(folder):
     data = (folder / "mesh.m3a").read_bytes()
     assert data[:4] == b"M3DA"
     vertices, triangles = np.frombuffer(data, "<u8", 2, 16)

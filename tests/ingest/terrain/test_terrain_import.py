@@ -14,8 +14,9 @@ from rasterio.enums import ColorInterp
 from rasterio.shutil import copy
 
 from map3d.errors import BadRequest, CrsError, ImportFailed, LimitExceeded, NotFound, Stopped
-from map3d.ingest.terrain.terrain_import import TerrainOptions, import_terrain, terrain_import
-from tests.ingest.terrain.rasters import NORTH, WEST, KeepingWriter, colours, from_bounds, hills, pixel_of, write
+from map3d.ingest.terrain import terrain_import
+from map3d.ingest.terrain.terrain_import import TerrainOptions, import_terrain
+from tests.ingest.terrain.rasters import NORTH, WEST, RecordingWriter, colours, from_bounds, hills, pixel_of, write
 
 UTM = CRS.from_epsg(25832)
 NAN_LAYER = float(np.float32(-3.4e38))
@@ -27,7 +28,7 @@ def folder(tmp_path):
 
 
 def run(dem, ortho, folder, crs=UTM, **options):
-    writer = KeepingWriter()
+    writer = RecordingWriter()
     report = import_terrain(dem, ortho, folder, crs, TerrainOptions(**options), writer=writer)
     assert writer.finished
     assert json.loads((folder / "report.json").read_text()) == report
@@ -41,12 +42,12 @@ def pixels(path, mode=None):
 
 
 def sides(folder):
-    """Of all textures, in pixels."""
+    """Returns the sides of all textures in pixels."""
     return [side for path in (folder / "textures").iterdir() for side in pixels(path).shape[:2]]
 
 
 def sample(folder, material, uv):
-    """The texel that holds a UV, as the specification reads it: v up, (0, 0) lower left."""
+    """Returns the texel at a texture coordinate: v up, (0, 0) lower left."""
     image = pixels(next((folder / "textures").glob(f"{material['texture']}.*")), "RGB")
     height, width = image.shape[:2]
     return image[min(int((1 - uv[1]) * height), height - 1), min(int(uv[0] * width), width - 1)]
@@ -57,7 +58,7 @@ def up_triangles(writer):
     return np.cross(soup[:, 1] - soup[:, 0], soup[:, 2] - soup[:, 0])[:, 2] > 0
 
 
-def test_heights_lie_at_pixel_centres_and_the_ground_reaches_the_edge(tmp_path, folder):
+def test_heights_are_at_pixel_centres_and_terrain_reaches_the_edge(tmp_path, folder):
     data = hills(20, 30)
     writer, _ = run(write(tmp_path / "dem.tif", data, 2.0), None, folder)
     points = {(x, y): z for positions, *_ in writer.meshes for x, y, z in positions.tolist()}
@@ -70,7 +71,7 @@ def test_heights_lie_at_pixel_centres_and_the_ground_reaches_the_edge(tmp_path, 
 
 
 @pytest.mark.parametrize("error", [0.0, 0.5])
-def test_tiles_share_their_border_vertices_without_cracks(tmp_path, folder, error):
+def test_tiles_share_border_vertices_without_cracks(tmp_path, folder, error):
     writer, _ = run(write(tmp_path / "dem.tif", hills(70, 90), 1.0), None, folder, tile_cells=16, max_error_m=error)
     assert len(writer.objects) == 5 * 6
     soup = writer.soup()
@@ -83,7 +84,7 @@ def test_tiles_share_their_border_vertices_without_cracks(tmp_path, folder, erro
     assert up_triangles(writer).all()
 
 
-def test_objects_are_terrain_tiles_named_by_their_place(tmp_path, folder):
+def test_objects_are_terrain_tiles_named_by_row_and_column(tmp_path, folder):
     writer, report = run(write(tmp_path / "dem.tif", hills(20, 40)), None, folder, tile_cells=32, name="ground")
     assert [one["name"] for one in writer.objects] == ["ground-0-0", "ground-0-1"]
     assert {one["class"] for one in writer.objects} == {"terrain"}
@@ -93,7 +94,7 @@ def test_objects_are_terrain_tiles_named_by_their_place(tmp_path, folder):
     assert "25832" in report["crs"]
 
 
-def test_ground_without_a_photo_has_one_plain_material(tmp_path, folder):
+def test_terrain_without_a_photo_has_one_untextured_material(tmp_path, folder):
     writer, _ = run(write(tmp_path / "dem.tif", hills(20, 40)), None, folder, tile_cells=16, ground=(255, 0, 51))
     assert len(writer.materials) == 1
     assert (writer.materials[0]["texture"], writer.materials[0]["diffuse"]) == (None, [1.0, 0.0, 0.2, 1.0])
@@ -102,7 +103,7 @@ def test_ground_without_a_photo_has_one_plain_material(tmp_path, folder):
 
 
 def check_colours(writer, folder, colour_at, tolerance=6):
-    """Every corner shows the colour that the photo has at its place."""
+    """Checks that every corner has the photo's colour at its position."""
     for positions, triangles, uvs, material, *_ in writer.meshes:
         for corner, uv in list(zip(positions[triangles].reshape(-1, 3), uvs.reshape(-1, 2), strict=True))[::17]:
             expected = colour_at(corner[0], corner[1])
@@ -111,7 +112,7 @@ def check_colours(writer, folder, colour_at, tolerance=6):
 
 
 @pytest.mark.parametrize("texture_px", [128, 2048])
-def test_the_photo_lies_where_it_belongs(tmp_path, folder, texture_px):
+def test_the_photo_is_georeferenced_correctly(tmp_path, folder, texture_px):
     photo = colours(300, 400)
     dem, ortho = write(tmp_path / "dem.tif", hills(30, 40), 2.0), write(tmp_path / "ortho.tif", photo, 0.2)
     writer, _ = run(dem, ortho, folder, texture_px=texture_px)
@@ -139,7 +140,7 @@ def test_texture_tiles_overlap_so_that_no_seam_shows(tmp_path, folder):
         assert (texels <= np.array(size) - 7.9).all()
 
 
-def test_a_photo_in_another_crs_is_draped_rightly(tmp_path, folder):
+def test_a_photo_in_another_crs_is_draped_correctly(tmp_path, folder):
     photo = colours(200, 200)
     to_lonlat = Transformer.from_crs(25832, 4326, always_xy=True)
     west, south = to_lonlat.transform(WEST - 20, NORTH - 120)
@@ -155,7 +156,7 @@ def test_a_photo_in_another_crs_is_draped_rightly(tmp_path, folder):
     check_colours(writer, folder, colour_at)
 
 
-def test_a_dem_in_degrees_is_brought_into_the_scenes_crs(tmp_path, folder):
+def test_a_dem_in_degrees_is_transformed_to_the_scenes_crs(tmp_path, folder):
     west, south, east, north = 11.5, 48.1, 11.51, 48.105
     place = from_bounds(west, south, east, north, 20, 10)
     dem = write(tmp_path / "dem.tif", hills(10, 20), crs="EPSG:4326", transform=place)
@@ -166,12 +167,12 @@ def test_a_dem_in_degrees_is_brought_into_the_scenes_crs(tmp_path, folder):
     nearest = found[np.argmin(np.hypot(found[:, 0] - x, found[:, 1] - y))]
     np.testing.assert_allclose(nearest[:2], [x, y], atol=1e-6)
     assert nearest[2] == hills(10, 20)[0, 0, 0]
-    assert report["projection"]["heights"] == "kept"
+    assert report["projection"]["heights"] == "unchanged"
     assert up_triangles(writer).all()
 
 
 @pytest.mark.parametrize("transform", [Affine(1, 0, WEST, 0, 1, NORTH), Affine(0, 1, WEST, 1, 0, NORTH), Affine(0.8, 0.6, WEST, 0.6, -0.8, NORTH)])
-def test_rasters_that_are_turned_or_mirrored_face_up_too(tmp_path, folder, transform):
+def test_rotated_and_mirrored_rasters_face_up(tmp_path, folder, transform):
     dem, ortho = (write(tmp_path / name, data, transform=transform) for name, data in (("dem.tif", hills(12, 17)), ("ortho.tif", colours(12, 17))))
     writer, _ = run(dem, ortho, folder)
     assert up_triangles(writer).all()
@@ -183,12 +184,12 @@ def test_rasters_that_are_turned_or_mirrored_face_up_too(tmp_path, folder, trans
     check_colours(writer, folder, colour_at, tolerance=25)
 
 
-@pytest.mark.parametrize("gap", ["nodata", "nan", "wild", "mask"])
-def test_where_there_is_no_height_there_is_no_ground(tmp_path, folder, gap):
+@pytest.mark.parametrize("gap", ["nodata", "nan", "implausible", "mask"])
+def test_gaps_in_the_dem_are_gaps_in_the_terrain(tmp_path, folder, gap):
     data = hills(30, 30)
     hole = np.zeros((30, 30), dtype=bool)
     hole[10:15, 5:20] = True
-    data[0, hole] = {"nodata": -9999, "nan": np.nan, "wild": 1e30, "mask": 0}[gap]
+    data[0, hole] = {"nodata": -9999, "nan": np.nan, "implausible": 1e30, "mask": 0}[gap]
     dem = write(tmp_path / "dem.tif", data, nodata=-9999 if gap == "nodata" else None)
     if gap == "mask":
         with rasterio.open(dem, "r+") as raster:
@@ -199,22 +200,22 @@ def test_where_there_is_no_height_there_is_no_ground(tmp_path, folder, gap):
     assert not hole[np.clip(rows, 0, 29), np.clip(columns, 0, 29)].any()
     assert len(points) == 32 * 32 - 75
     assert report["skipped"] == {"no_height": 75}
-    assert bool(report["warnings"]) == (gap == "wild")
+    assert bool(report["warnings"]) == (gap == "implausible")
 
 
-def test_a_raster_of_gaps_alone_gives_no_object(tmp_path, folder):
+def test_a_raster_of_gaps_has_no_object(tmp_path, folder):
     writer, report = run(write(tmp_path / "dem.tif", np.full((1, 8, 8), -1, np.int16), nodata=-1), None, folder)
     assert (writer.meshes, writer.objects, writer.materials) == ([], [], [])
     assert report["triangles"] == 0
 
 
-def test_a_raster_of_one_pixel_is_ground_too(tmp_path, folder):
+def test_a_raster_of_one_pixel_is_terrain(tmp_path, folder):
     writer, _ = run(write(tmp_path / "dem.tif", np.full((1, 1, 1), 7, np.float32), 10.0), None, folder)
     assert writer.triangle_count == 8
     assert np.unique(writer.soup()[..., 2]).tolist() == [7.0]
 
 
-def test_where_the_photo_ends_the_ground_has_its_own_colour(tmp_path, folder):
+def test_terrain_outside_the_photo_has_the_ground_colour(tmp_path, folder):
     photo = np.full((3, 100, 50), 200, np.uint8)
     dem, ortho = write(tmp_path / "dem.tif", hills(50, 50), 2.0), write(tmp_path / "ortho.tif", photo, 1.0)
     writer, report = run(dem, ortho, folder, tile_cells=16, ground=(10, 20, 30))
@@ -230,7 +231,7 @@ def writer_without(writer, material):
     return writer
 
 
-def test_a_photo_alone_lies_flat_and_is_cut_out_where_it_shows_nothing(tmp_path, folder):
+def test_a_photo_without_dem_is_flat_and_transparent_in_gaps(tmp_path, folder):
     photo = colours(100, 100)
     photo[:, :50, :50] = 0
     writer, report = run(None, write(tmp_path / "ortho.tif", photo, nodata=0), folder, height_m=12.5)
@@ -301,13 +302,13 @@ def test_a_palette_is_looked_up(tmp_path, folder):
 
 
 @pytest.mark.parametrize(("unit", "metres"), [("ft", 0.3048), ("US survey foot", 1200 / 3937), ("m", 1.0), (None, 1.0)])
-def test_heights_are_brought_to_metres(tmp_path, folder, unit, metres):
+def test_heights_are_converted_to_metres(tmp_path, folder, unit, metres):
     writer, report = run(write(tmp_path / "dem.tif", np.full((1, 4, 4), 100, np.float32), units=unit and [unit]), None, folder)
     assert np.unique(writer.soup()[..., 2]) == pytest.approx([100 * metres])
     assert report["warnings"] == []
 
 
-def test_an_unknown_unit_is_told(tmp_path, folder):
+def test_an_unknown_unit_is_a_warning(tmp_path, folder):
     _, report = run(write(tmp_path / "dem.tif", hills(4, 4), units=["furlong"]), None, folder)
     assert report["warnings"][0]["example"] == "furlong"
 
@@ -317,20 +318,20 @@ def test_scaled_integers_are_heights(tmp_path, folder):
     assert np.unique(writer.soup()[..., 2]) == pytest.approx([123.4])
 
 
-def test_a_raster_without_crs_is_taken_for_the_scenes_and_told(tmp_path, folder):
+def test_a_raster_without_crs_is_assumed_in_the_scenes_with_a_warning(tmp_path, folder):
     writer, report = run(write(tmp_path / "dem.tif", hills(4, 4), crs=None), None, folder)
     assert writer.soup()[..., 0].min() == WEST
     assert report["warnings"][0]["reason"].startswith("raster without CRS")
     assert report["crs"] is None
 
 
-def test_degrees_do_not_fit_a_local_scene(tmp_path, folder):
+def test_a_local_scene_refuses_degrees(tmp_path, folder):
     dem = write(tmp_path / "dem.tif", hills(4, 4), crs="EPSG:4326", transform=from_bounds(11, 48, 12, 49, 4, 4))
     with pytest.raises(CrsError, match="--crs"):
         run(dem, None, folder, crs=None)
 
 
-def test_metres_fit_a_local_scene(tmp_path, folder):
+def test_a_local_scene_accepts_metres(tmp_path, folder):
     writer, _ = run(write(tmp_path / "dem.tif", hills(4, 4)), None, folder, crs=None)
     assert writer.soup()[..., 1].max() == NORTH
 
@@ -355,19 +356,19 @@ def test_an_absent_raster_is_not_found(tmp_path, folder):
 
 
 @pytest.mark.parametrize("data", [b"", b"II*\0garbage", b"<VRTDataset/>", b"\x89PNG\r\n\x1a\n"])
-def test_what_is_no_raster_is_refused(tmp_path, folder, data):
+def test_invalid_rasters_are_refused(tmp_path, folder, data):
     (tmp_path / "dem.tif").write_bytes(data)
     with pytest.raises(ImportFailed):
         run(tmp_path / "dem.tif", None, folder)
 
 
-def test_a_raster_that_lies_nowhere_is_refused(tmp_path, folder):
+def test_a_raster_without_georeference_is_refused(tmp_path, folder):
     Image.fromarray(np.zeros((4, 4, 3), np.uint8)).save(tmp_path / "ortho.png")
     with pytest.raises(ImportFailed, match="georeference"):
         run(None, tmp_path / "ortho.png", folder)
 
 
-def test_a_photo_with_a_world_file_lies_where_that_says(tmp_path, folder):
+def test_a_world_file_georeferences_a_photo(tmp_path, folder):
     Image.fromarray(np.moveaxis(colours(30, 40), 0, -1)).save(tmp_path / "ortho.png")
     (tmp_path / "ortho.pgw").write_text(f"0.5\n0\n0\n-0.5\n{WEST + 0.25}\n{NORTH - 0.25}\n")
     writer, _ = run(None, tmp_path / "ortho.png", folder)
@@ -390,7 +391,7 @@ def test_a_truncated_raster_fails_with_its_name(tmp_path, folder):
         run(dem, None, folder)
 
 
-def test_too_many_triangles_are_refused_with_what_to_do(tmp_path, folder, monkeypatch):
+def test_too_many_triangles_are_refused_with_advice(tmp_path, folder, monkeypatch):
     dem = write(tmp_path / "dem.tif", hills(20, 20))
     triangles = 2 * 21 * 21
     for limit in (triangles, triangles + 1):
@@ -401,18 +402,18 @@ def test_too_many_triangles_are_refused_with_what_to_do(tmp_path, folder, monkey
         run(dem, None, folder)
 
 
-def test_the_user_can_stop_it(tmp_path, folder):
+def test_the_user_can_stop_the_import(tmp_path, folder):
     seen = []
     dem = write(tmp_path / "dem.tif", hills(40, 40))
     with pytest.raises(Stopped):
-        import_terrain(dem, None, folder, UTM, TerrainOptions(tile_cells=8), lambda *step: seen.append(step) or len(seen) < 3, KeepingWriter())
+        import_terrain(dem, None, folder, UTM, TerrainOptions(tile_cells=8), lambda *step: seen.append(step) or len(seen) < 3, RecordingWriter())
     assert seen == [("terrain", done, 36) for done in range(3)]
 
 
 @pytest.mark.parametrize(
     "options", [{"max_error_m": -1.0}, {"max_error_m": np.nan}, {"tile_cells": 100}, {"tile_cells": 0}, {"texture_px": 8}, {"height_m": np.inf}]
 )
-def test_options_without_meaning_are_refused(options):
+def test_invalid_options_are_refused(options):
     with pytest.raises(BadRequest):
         TerrainOptions(**options)
 

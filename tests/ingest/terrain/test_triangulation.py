@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from map3d.errors import BadRequest
-from map3d.ingest.terrain.triangulation import all_triangles, facing_up, few_triangles, used_vertices
+from map3d.ingest.terrain.triangulation import compact_vertices, orient_up, triangulate_all, triangulate_sparse
 
 SIDES = [1, 2, 4, 16, 64]
 
@@ -15,14 +15,14 @@ def grid(side, seed=0, gaps=0.0):
     return heights
 
 
-def places(heights):
+def vertex_positions(heights):
     rows, columns = heights.shape
     y, x = np.mgrid[0:rows, 0:columns]
     return np.stack([x.ravel(), -y.ravel(), heights.ravel()], axis=-1).astype(np.float64)
 
 
 def doubled_areas(heights, triangles):
-    a, b, c = (places(heights)[triangles[:, k], :2] for k in range(3))
+    a, b, c = (vertex_positions(heights)[triangles[:, k], :2] for k in range(3))
     return (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
 
 
@@ -32,9 +32,9 @@ def edges(triangles):
 
 
 def interpolated(heights, triangles):
-    """Heights at the grid's vertices as the triangles have them; NaN where no triangle is."""
+    """Returns the heights of the triangles at the grid's vertices; NaN outside all triangles."""
     found = np.full(heights.size, np.nan)
-    points = places(heights)
+    points = vertex_positions(heights)
     for a, b, c in points[triangles.astype(int)]:
         low, high = np.minimum(np.minimum(a, b), c)[:2], np.maximum(np.maximum(a, b), c)[:2]
         xs, ys = np.meshgrid(np.arange(low[0], high[0] + 1), np.arange(low[1], high[1] + 1))
@@ -49,16 +49,16 @@ def interpolated(heights, triangles):
 @pytest.mark.parametrize("side", SIDES)
 def test_all_triangles_cover_the_square_once(side):
     heights = grid(side)
-    triangles = all_triangles(heights)
+    triangles = triangulate_all(heights)
     assert len(triangles) == 2 * side * side
     assert np.abs(doubled_areas(heights, triangles)).sum() == pytest.approx(2 * side * side)
 
 
 @pytest.mark.parametrize("side", SIDES)
 @pytest.mark.parametrize("error", [0.0, 0.05, 0.5, 5.0, 1e9])
-def test_few_triangles_cover_the_square_once_without_cracks(side, error):
+def test_sparse_triangles_cover_the_square_once_without_cracks(side, error):
     heights = grid(side)
-    triangles = few_triangles(heights, error)
+    triangles = triangulate_sparse(heights, error)
     assert np.abs(doubled_areas(heights, triangles)).sum() == pytest.approx(2 * side * side)
     _, uses = edges(triangles)
     assert uses.max() <= 2
@@ -68,25 +68,25 @@ def test_few_triangles_cover_the_square_once_without_cracks(side, error):
 @pytest.mark.parametrize("error", [0.05, 0.3, 2.0])
 def test_no_height_differs_by_more_than_the_error(error):
     heights = grid(32)
-    assert np.abs(interpolated(heights, few_triangles(heights, error)) - heights).max() <= error + 1e-9
+    assert np.abs(interpolated(heights, triangulate_sparse(heights, error)) - heights).max() <= error + 1e-9
 
 
-def test_a_plane_needs_hardly_more_than_its_border():
+def test_a_plane_needs_few_triangles_beyond_its_border():
     y, x = np.mgrid[0:65, 0:65]
-    triangles = few_triangles(0.5 * x + 0.25 * y, 0.01)
+    triangles = triangulate_sparse(0.5 * x + 0.25 * y, 0.01)
     assert len(triangles) < 2 * 64 * 64 / 6
 
 
 def test_a_greater_error_needs_fewer_triangles():
     heights = grid(64)
-    counts = [len(few_triangles(heights, error)) for error in (0.0, 0.5, 1.0, 4.0)]
+    counts = [len(triangulate_sparse(heights, error)) for error in (0.0, 0.5, 1.0, 4.0)]
     assert counts == sorted(counts, reverse=True)
     assert counts[0] > 2 * counts[-1]
 
 
-def test_the_border_is_kept_so_that_neighbours_fit():
+def test_all_border_vertices_stay_so_that_neighbours_match():
     heights = grid(32)
-    used, _ = used_vertices(few_triangles(heights, 100.0))
+    used, _ = compact_vertices(triangulate_sparse(heights, 100.0))
     border = np.zeros((33, 33), dtype=bool)
     border[[0, -1]] = border[:, [0, -1]] = True
     assert set(np.flatnonzero(border)) <= set(used.tolist())
@@ -94,9 +94,9 @@ def test_the_border_is_kept_so_that_neighbours_fit():
 
 @pytest.mark.parametrize("gaps", [0.02, 0.3, 1.0])
 @pytest.mark.parametrize("error", [0.1, 10.0])
-def test_gaps_are_the_same_with_few_and_with_all(gaps, error):
+def test_sparse_triangles_keep_all_gaps(gaps, error):
     heights = grid(32, seed=5, gaps=gaps)
-    few, every = few_triangles(heights, error), all_triangles(heights)
+    few, every = triangulate_sparse(heights, error), triangulate_all(heights)
     assert np.isfinite(heights.ravel()[few]).all()
     assert np.isfinite(heights.ravel()[every]).all()
     there = interpolated(heights, few)
@@ -104,33 +104,32 @@ def test_gaps_are_the_same_with_few_and_with_all(gaps, error):
     assert np.nanmax(np.abs(there - heights), initial=0.0) <= error + 1e-9
 
 
-def test_a_cell_that_misses_a_corner_keeps_a_triangle():
+def test_a_cell_without_one_corner_keeps_a_triangle():
     for row, column in [(0, 0), (0, 1), (1, 0), (1, 1)]:
         heights = np.zeros((2, 2))
         heights[row, column] = np.nan
-        assert len(all_triangles(heights)) == 1
+        assert len(triangulate_all(heights)) == 1
     heights = np.array([[np.nan, 0.0], [0.0, np.nan]])
-    assert len(all_triangles(heights)) == 0
+    assert len(triangulate_all(heights)) == 0
 
 
-def test_cells_are_cut_along_the_smaller_step():
+def test_cells_are_split_along_the_smaller_height_difference():
     ridge = np.array([[0.0, 5.0], [5.0, 0.0]])
-    assert {1, 2} <= set(all_triangles(ridge)[0].tolist()) & set(all_triangles(ridge)[1].tolist()) or {0, 3} <= set(all_triangles(ridge)[0].tolist())
-    shared = set(all_triangles(ridge)[0].tolist()) & set(all_triangles(ridge)[1].tolist())
-    assert shared in ({1, 2}, {0, 3})
+    first, second = (set(triangle) for triangle in triangulate_all(ridge).tolist())
+    assert first & second in ({1, 2}, {0, 3})
 
 
-def test_triangles_face_up_whatever_the_axes():
+def test_triangles_face_up_for_any_axis_directions():
     heights = grid(4)
-    triangles = all_triangles(heights)
+    triangles = triangulate_all(heights)
     for signs in [(1, 1), (-1, 1), (1, -1), (-1, -1)]:
-        positions = places(heights) * [*signs, 1]
-        turned = facing_up(positions, triangles)
+        positions = vertex_positions(heights) * [*signs, 1]
+        turned = orient_up(positions, triangles)
         normals = np.cross(positions[turned[:, 1]] - positions[turned[:, 0]], positions[turned[:, 2]] - positions[turned[:, 0]])
         assert (normals[:, 2] > 0).all()
 
 
 @pytest.mark.parametrize("shape", [(4, 4), (5, 9), (1, 1), (6, 6)])
-def test_grids_that_cannot_be_halved_are_refused(shape):
+def test_grids_without_2k_plus_1_vertices_are_refused(shape):
     with pytest.raises(BadRequest):
-        few_triangles(np.zeros(shape), 1.0)
+        triangulate_sparse(np.zeros(shape), 1.0)

@@ -1,4 +1,4 @@
-"""Texture tiles cut from an orthophoto in windows: 8-bit RGB, painted in the ground's colour (or cut out) where the photo has nothing."""
+"""Cuts texture tiles from an orthophoto, window by window: 8-bit RGB. Gaps get the ground colour or become transparent."""
 
 import io
 from dataclasses import dataclass
@@ -16,13 +16,12 @@ from map3d.errors import ImportFailed
 
 MARGIN_PX: Final = 8
 ALIGN_PX: Final = 8
-REACH_PX: Final = MARGIN_PX + ALIGN_PX
-"""How far colours reach beyond what the photo shows, so that its rim keeps its own."""
+EXTEND_PX: Final = MARGIN_PX + ALIGN_PX
+"""Distance by which colours extend into gaps, so that filtering at the edge of a gap does not mix in the ground colour."""
 
 JPEG_QUALITY: Final = 90
 SAMPLE_PX: Final = 1024
-"""Side of the overview from which the range of values is taken."""
-
+"""Side of the overview that determines the range of values."""
 
 Colours = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
@@ -30,7 +29,8 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class TextureTile:
-    """An image and where it lies: pixel (0, 0)'s corner at photo position (left, top); `scale` image pixels per photo pixel (across, down)."""
+    """A texture image in its photo: the upper left corner is at photo position (left, top); `scale` is image pixels per photo pixel (x, y).
+    `key` is the digest of the file, `cutout` tells that it has transparent pixels."""
 
     key: str
     left: int
@@ -40,68 +40,68 @@ class TextureTile:
     cutout: bool
 
     def uvs(self, columns: NDArray[np.float64], rows: NDArray[np.float64]) -> NDArray[np.float32]:
-        """(n, 2) of photo positions; (0, 0) is the image's lower left corner, texel centres lie at (i + ½)/size."""
+        """Returns (n, 2) texture coordinates of photo positions: (0, 0) is the lower left corner, texel centres are at (i + ½)/size."""
         u = (columns - self.left) * self.scale[0] / self.size_px[0]
         v = 1.0 - (rows - self.top) * self.scale[1] / self.size_px[1]
         return np.stack([u, v], axis=-1).astype(np.float32)
 
 
 class Orthophoto:
-    """The colours of an open raster. `stretch`: the values that become 0 and 255; None: found from the data type and the data."""
+    """Colours of an open raster. `stretch`: the values mapped to 0 and 255; None derives them from data type and data."""
 
     def __init__(self, dataset: Any, ground: tuple[int, int, int], max_side_px: int, stretch: tuple[float, float] | None = None) -> None:
         self.dataset = dataset
         self._ground = np.array(ground, dtype=np.uint8)
         self._max_side_px = max_side_px
-        self._bands = _colour_bands(dataset)
-        self._whole = all(flags == [MaskFlags.all_valid] for flags in dataset.mask_flag_enums)
-        self._palette = _palette(dataset) if len(self._bands) == 1 else None
+        self._bands = _find_colour_bands(dataset)
+        self._has_no_gaps = all(flags == [MaskFlags.all_valid] for flags in dataset.mask_flag_enums)
+        self._palette = _read_palette(dataset) if len(self._bands) == 1 else None
         self.stretch = (0.0, 255.0) if self._palette is not None else stretch or self._find_stretch()
 
     def cut(self, box: tuple[float, float, float, float], folder: Path, *, cutout: bool) -> TextureTile | None:
-        """Writes the texture of photo positions (left, top, right, bottom) into `folder`; None where the photo has nothing at all.
+        """Writes the texture of photo positions (left, top, right, bottom) into `folder`; returns None if the photo has no pixel there.
 
-        `cutout`: what the photo does not show becomes transparent; else it takes the ground's colour. Next to what is shown it takes that one's.
+        `cutout`: gaps become transparent; otherwise they get the ground colour. Near photo pixels, gaps get the colour of the nearest one.
         """
-        left, top, right, bottom = _aligned(box)
+        left, top, right, bottom = _align(box)
         width, height = self._image_side(right - left), self._image_side(bottom - top)
-        colour, shown = self._read(left, top, right - left, bottom - top, width, height)
-        if not shown.any():
+        colour, covered = self._read(left, top, right - left, bottom - top, width, height)
+        if not covered.any():
             return None
-        holed = cutout and not shown.all()
-        data = _png(colour, shown) if holed else _jpeg(colour)
+        transparent = cutout and not covered.all()
+        data = _encode_png(colour, covered) if transparent else _encode_jpeg(colour)
         key = sha256(data).hexdigest()[:32]
-        (folder / f"{key}.{'png' if holed else 'jpg'}").write_bytes(data)
-        return TextureTile(key, left, top, (width / (right - left), height / (bottom - top)), (width, height), holed)
+        (folder / f"{key}.{'png' if transparent else 'jpg'}").write_bytes(data)
+        return TextureTile(key, left, top, (width / (right - left), height / (bottom - top)), (width, height), transparent)
 
     def _image_side(self, pixels: int) -> int:
         return min(pixels, self._max_side_px)
 
     def _read(self, left: int, top: int, width: int, height: int, out_width: int, out_height: int) -> tuple[Colours, Mask]:
-        """(h, w, 3) colours of a window, (h, w) where the photo shows any. Beyond the photo its rim goes on a little, and all counts as shown."""
+        """Returns (h, w, 3) colours of a window and the (h, w) mask of covered pixels. Outside the photo, edge pixels repeat and count as covered."""
         x0, y0 = max(left, 0), max(top, 0)
         x1, y1 = min(left + width, self.dataset.width), min(top + height, self.dataset.height)
         if x0 >= x1 or y0 >= y1:
             return np.zeros((out_height, out_width, 3), dtype=np.uint8), np.zeros((out_height, out_width), dtype=bool)
-        columns = _span(x0 - left, x1 - left, out_width / width, out_width)
-        rows = _span(y0 - top, y1 - top, out_height / height, out_height)
-        colour, shown = self._read_inside(Window(x0, y0, x1 - x0, y1 - y0), len(rows), len(columns))
-        return _widen(_spread(colour, shown, self._ground), shown, rows, columns, (out_height, out_width), self._ground)
+        columns = _to_image_pixels(x0 - left, x1 - left, out_width / width, out_width)
+        rows = _to_image_pixels(y0 - top, y1 - top, out_height / height, out_height)
+        colour, covered = self._read_inside(Window(x0, y0, x1 - x0, y1 - y0), len(rows), len(columns))
+        return _pad(_fill_gaps(colour, covered, self._ground), covered, rows, columns, (out_height, out_width), self._ground)
 
     def _read_inside(self, window: Window, rows: int, columns: int) -> tuple[Colours, Mask]:
         resampling = Resampling.nearest if self._palette is not None else Resampling.average
         try:
             data = self.dataset.read(self._bands, window=window, out_shape=(len(self._bands), rows, columns), resampling=resampling)
-            mask = None if self._whole else self.dataset.dataset_mask(window=window, out_shape=(rows, columns), resampling=Resampling.nearest)
+            mask = None if self._has_no_gaps else self.dataset.dataset_mask(window=window, out_shape=(rows, columns), resampling=Resampling.nearest)
         except Exception as error:
-            raise ImportFailed(f"{self.dataset.name}: cannot read {window}: {error}") from error
-        shown = np.ones((rows, columns), dtype=bool) if mask is None else mask > 0
+            raise ImportFailed(f"{self.dataset.name}: cannot read {window}; the file may be damaged: {error}") from error
+        covered = np.ones((rows, columns), dtype=bool) if mask is None else mask > 0
         if data.dtype.kind == "f":
-            shown &= np.isfinite(data).all(axis=0)
-        return np.moveaxis(self._to_bytes(data), 0, -1), shown
+            covered &= np.isfinite(data).all(axis=0)
+        return np.moveaxis(self._to_bytes(data), 0, -1), covered
 
     def _to_bytes(self, data: NDArray[Any]) -> Colours:
-        """(3, h, w)."""
+        """Returns (3, h, w)."""
         if self._palette is not None:
             return np.ascontiguousarray(np.moveaxis(self._palette[np.clip(data[0], 0, len(self._palette) - 1).astype(np.intp)], -1, 0))
         low, high = self.stretch
@@ -112,7 +112,7 @@ class Orthophoto:
         return data if len(data) == 3 else np.repeat(data[:1], 3, axis=0)
 
     def _find_stretch(self) -> tuple[float, float]:
-        """Bytes as they are; real numbers within [0, 1] or [0, 255] likewise; else from the 0.5th to the 99.5th percentile of all bands."""
+        """Returns the full range for bytes, [0, 1] or [0, 255] for values within; otherwise the 0.5th to the 99.5th percentile of all bands."""
         if self.dataset.dtypes[self._bands[0] - 1] == "uint8":
             return 0.0, 255.0
         shape = (min(self.dataset.height, SAMPLE_PX), min(self.dataset.width, SAMPLE_PX))
@@ -126,83 +126,83 @@ class Orthophoto:
         return (low, high) if high > low else (low, low + 1.0)
 
 
-def _colour_bands(dataset: Any) -> list[int]:
-    """Numbers of the red, green and blue band, by their declared meaning, else by order; or of the one grey band."""
-    meaning = list(dataset.colorinterp)
-    rgb = [meaning.index(band) + 1 for band in (ColorInterp.red, ColorInterp.green, ColorInterp.blue) if band in meaning]
+def _find_colour_bands(dataset: Any) -> list[int]:
+    """Returns the numbers of the red, green and blue band, declared or by order; or of the single grey band."""
+    declared = list(dataset.colorinterp)
+    rgb = [declared.index(band) + 1 for band in (ColorInterp.red, ColorInterp.green, ColorInterp.blue) if band in declared]
     if len(rgb) == 3:
         return rgb
-    visible = [number for number, band in enumerate(meaning, 1) if band is not ColorInterp.alpha]
+    visible = [number for number, band in enumerate(declared, 1) if band is not ColorInterp.alpha]
     return visible[:3] if len(visible) >= 3 else visible[:1]
 
 
-def _palette(dataset: Any) -> Colours | None:
+def _read_palette(dataset: Any) -> Colours | None:
     if dataset.colorinterp[0] is not ColorInterp.palette:
         return None
     entries = dataset.colormap(1)
     return np.array([entries.get(number, (0, 0, 0, 0))[:3] for number in range(max(entries) + 1)], dtype=np.uint8)
 
 
-def _aligned(box: tuple[float, float, float, float]) -> tuple[int, int, int, int]:
-    """With a margin, so that filtering near a tile's border meets the neighbour's pixels; on whole blocks of a JPEG."""
+def _align(box: tuple[float, float, float, float]) -> tuple[int, int, int, int]:
+    """Adds a margin, so that filtering near a tile's border reads the neighbour's pixels, and rounds to whole JPEG blocks."""
     left, top = (int((value - MARGIN_PX) // ALIGN_PX) * ALIGN_PX for value in box[:2])
     right, bottom = (-int((-value - MARGIN_PX) // ALIGN_PX) * ALIGN_PX for value in box[2:])
     return left, top, right, bottom
 
 
-def _spread(colour: Colours, shown: Mask, ground: Colours) -> Colours:
-    """Texels that are not shown take the colour of the nearest shown one in their row, else in their column, if it is near; else the ground's."""
-    if shown.all():
+def _fill_gaps(colour: Colours, covered: Mask, ground: Colours) -> Colours:
+    """Gives each gap texel the colour of the nearest covered one in its row, else in its column, within EXTEND_PX; else the ground colour."""
+    if covered.all():
         return colour
-    out, known = colour.copy(), shown.copy()
+    out, known = colour.copy(), covered.copy()
     for flip in (False, True):
-        picture, have = (out.swapaxes(0, 1), known.swapaxes(0, 1)) if flip else (out, known)
-        nearest = _nearest_in_row(have)
+        image, have = (out.swapaxes(0, 1), known.swapaxes(0, 1)) if flip else (out, known)
+        nearest = _find_nearest_in_row(have)
         take = ~have & (nearest >= 0)
-        picture[take] = picture[np.nonzero(take)[0], nearest[take]]
+        image[take] = image[np.nonzero(take)[0], nearest[take]]
         have |= take
     out[~known] = ground
     return out
 
 
-def _nearest_in_row(have: Mask) -> NDArray[np.int32]:
-    """(h, w) column of the nearest true of the row, -1 where it is farther than the reach."""
+def _find_nearest_in_row(have: Mask) -> NDArray[np.int32]:
+    """Returns the (h, w) column of the nearest true pixel in the row, -1 beyond EXTEND_PX."""
     columns = np.arange(have.shape[1], dtype=np.int32)
     far = np.int32(1 << 24)
     before = np.maximum.accumulate(np.where(have, columns, -far), axis=1)
     after = np.minimum.accumulate(np.where(have, columns, far)[:, ::-1], axis=1)[:, ::-1]
     nearest = np.where(columns - before <= after - columns, before, after)
-    return np.where(np.abs(nearest - columns) <= REACH_PX, nearest, np.int32(-1)).astype(np.int32)
+    return np.where(np.abs(nearest - columns) <= EXTEND_PX, nearest, np.int32(-1)).astype(np.int32)
 
 
-def _span(first: int, last: int, scale: float, count: int) -> range:
-    """The image pixels, at least one, of photo pixels [first, last)."""
+def _to_image_pixels(first: int, last: int, scale: float, count: int) -> range:
+    """Returns the image pixels of photo pixels [first, last), at least one."""
     begin = min(round(first * scale), count - 1)
     return range(begin, min(max(round(last * scale), begin + 1), count))
 
 
-def _widen(colour: Colours, shown: Mask, rows: range, columns: range, shape: tuple[int, int], ground: Colours) -> tuple[Colours, Mask]:
-    """The piece at `rows` and `columns` of an image of that shape: around it its rim, and farther out the ground."""
+def _pad(colour: Colours, covered: Mask, rows: range, columns: range, shape: tuple[int, int], ground: Colours) -> tuple[Colours, Mask]:
+    """Puts the colours at `rows` and `columns` of an image of `shape`, repeats their edge for EXTEND_PX, and fills the rest with ground colour."""
     if colour.shape[:2] == shape:
-        return colour, shown
+        return colour, covered
     spans = zip((rows, columns), shape, strict=True)
     row_of, column_of = (np.clip(np.arange(count), span.start, span.stop - 1) - span.start for span, count in spans)
-    wide, far = colour[row_of][:, column_of], np.ones(shape, dtype=bool)
-    far[max(rows.start - REACH_PX, 0) : rows.stop + REACH_PX, max(columns.start - REACH_PX, 0) : columns.stop + REACH_PX] = False
-    wide[far] = ground
-    known = np.ones(shape, dtype=bool) if shown.any() else np.zeros(shape, dtype=bool)
-    known[rows.start : rows.stop, columns.start : columns.stop] = shown
-    return wide, known
+    padded, far = colour[row_of][:, column_of], np.ones(shape, dtype=bool)
+    far[max(rows.start - EXTEND_PX, 0) : rows.stop + EXTEND_PX, max(columns.start - EXTEND_PX, 0) : columns.stop + EXTEND_PX] = False
+    padded[far] = ground
+    known = np.ones(shape, dtype=bool) if covered.any() else np.zeros(shape, dtype=bool)
+    known[rows.start : rows.stop, columns.start : columns.stop] = covered
+    return padded, known
 
 
-def _jpeg(colour: Colours) -> bytes:
+def _encode_jpeg(colour: Colours) -> bytes:
     stream = io.BytesIO()
     Image.fromarray(colour, "RGB").save(stream, "JPEG", quality=JPEG_QUALITY)
     return stream.getvalue()
 
 
-def _png(colour: Colours, shown: Mask) -> bytes:
+def _encode_png(colour: Colours, covered: Mask) -> bytes:
     stream = io.BytesIO()
-    alpha = np.where(shown, 255, 0).astype(np.uint8)[..., None]
+    alpha = np.where(covered, 255, 0).astype(np.uint8)[..., None]
     Image.fromarray(np.concatenate([colour, alpha], axis=-1), "RGBA").save(stream, "PNG", compress_level=6)
     return stream.getvalue()

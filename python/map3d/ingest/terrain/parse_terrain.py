@@ -1,4 +1,4 @@
-"""What the limited child of a terrain import does: tells elevation from imagery, settles the system, has the asset written."""
+"""Entry point of the limited subprocess that imports terrain: classifies the rasters, determines the scene's CRS, writes the asset folder."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -9,8 +9,9 @@ import numpy as np
 from pyproj import CRS
 
 from map3d.errors import ImportFailed
-from map3d.ingest.crs import LOCAL, is_local, parse_crs, scene_crs
-from map3d.ingest.crs_transformer import choose_target
+from map3d.geometry.crs import is_local, parse_crs
+from map3d.ingest.crs_transformer import choose_scene_crs
+from map3d.ingest.scene_crs import LOCAL, to_scene_crs
 from map3d.ingest.terrain.raster_georeference import open_raster
 from map3d.ingest.terrain.terrain_import import TerrainOptions, import_terrain
 from map3d.subprocess import Handler, ReportProgress
@@ -18,62 +19,62 @@ from map3d.subprocess import Handler, ReportProgress
 IMAGE_BANDS: Final = (3, 4)
 
 
-def open_terrain(_setup: Mapping[str, Any]) -> Handler:
-    def work(question: dict[str, Any], _blobs: list[bytes], report_progress: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
-        return _import(question, report_progress), []
+def open_terrain_parser(_setup: Mapping[str, Any]) -> Handler:
+    def handle(request: dict[str, Any], _blobs: list[bytes], report_progress: ReportProgress) -> tuple[dict[str, Any], list[bytes]]:
+        return _parse(request, report_progress), []
 
-    return work
+    return handle
 
 
-def _import(question: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
-    """`question`: {"paths", "folder", "name", "crs", "scene_crs"}; see map3d.ingest.parse_document for the answer."""
-    rasters, damaged = usable([Path(path) for path in question["paths"]], strict=question["reader"]["strict"])
-    dem, ortho = tell_apart(rasters)
-    target = _target(dem or ortho, question["scene_crs"])
+def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
+    """`request`: {"paths", "folder", "name", "crs", "scene_crs", "reader"}; the response is that of map3d.ingest.parse_document."""
+    rasters, faults = open_rasters([Path(path) for path in request["paths"]], strict=request["reader"]["strict"])
+    dem, ortho = classify_rasters(rasters)
+    target = _choose_target(dem or ortho, request["scene_crs"])
 
-    def progress(_stage: str, done: int, total: int) -> bool:
+    def on_tile(_stage: str, done: int, total: int) -> bool:
         report_progress({"done": done, "total": total})
         return True
 
-    report = import_terrain(dem, ortho, Path(question["folder"]), target, TerrainOptions(name=question["name"]), progress)
-    proposed = LOCAL if target is None else scene_crs(target)
-    placing = {"from": report["crs"] and CRS.from_user_input(report["crs"]).name, "to": proposed.name, **report["projection"]}
-    if damaged:
-        report["warnings"].append({"reason": "raster left out", "count": len(damaged), "example": damaged[0]})
-    return {"report": {**report, "placing": placing}, "crs": asdict(proposed)}
+    terrain = import_terrain(dem, ortho, Path(request["folder"]), target, TerrainOptions(name=request["name"]), on_tile)
+    proposed = LOCAL if target is None else to_scene_crs(target)
+    placing = {"from": terrain["crs"] and CRS.from_user_input(terrain["crs"]).name, "to": proposed.name, **terrain["projection"]}
+    if faults:
+        terrain["warnings"].append({"reason": "raster skipped", "count": len(faults), "example": faults[0]})
+    return {"report": {**terrain, "placing": placing}, "crs": asdict(proposed)}
 
 
-def usable(paths: Sequence[Path], *, strict: bool) -> tuple[list[Path], list[str]]:
-    """The rasters that can be opened, and why the others cannot. Raises ImportFailed when there is none, or the first fault under `strict`."""
-    good: list[Path] = []
+def open_rasters(paths: Sequence[Path], *, strict: bool) -> tuple[list[Path], list[str]]:
+    """Returns the readable rasters, and the faults of the others. Raises ImportFailed if none is readable, or at the first fault under `strict`."""
+    readable: list[Path] = []
     faults: list[ImportFailed] = []
     for path in paths:
         try:
             open_raster(path).close()
-            good.append(path)
+            readable.append(path)
         except ImportFailed as error:
             faults.append(error)
-    if faults and (strict or not good):
+    if faults and (strict or not readable):
         raise faults[0]
-    return good, [str(error) for error in faults]
+    return readable, [str(error) for error in faults]
 
 
-def tell_apart(paths: Sequence[Path]) -> tuple[Path | None, Path | None]:
-    """(elevation model, imagery): imagery has three or four bands of bytes, elevation one band. Raises ImportFailed when there are two of a kind."""
+def classify_rasters(paths: Sequence[Path]) -> tuple[Path | None, Path | None]:
+    """Returns (elevation model, imagery). Imagery has three or four bands, or bytes. Raises ImportFailed for two rasters of one kind."""
     found: dict[str, Path] = {}
     for path in paths:
         with open_raster(path) as raster:
             kind = "imagery" if raster.count in IMAGE_BANDS or raster.dtypes[0] == "uint8" else "elevation"
         if kind in found:
-            raise ImportFailed(f"{path}: a second raster of {kind} beside {found[kind].name}; add one elevation model and one image at a time")
+            raise ImportFailed(f"{path}: second {kind} raster after {found[kind].name}; add at most one elevation model and one image at a time")
         found[kind] = path
     return found.get("elevation"), found.get("imagery")
 
 
-def _target(raster: Path | None, scene: str | None) -> CRS | None:
-    """The scene's system; if it has none yet, the raster's own where that is projected in metres, else the UTM zone of its place."""
-    if scene is not None:
-        return None if is_local(scene) else CRS.from_user_input(scene)
+def _choose_target(raster: Path | None, scene_crs: str | None) -> CRS | None:
+    """Returns the scene's CRS. If it has none yet: the raster's own if projected in metres, else its UTM zone; None without any CRS."""
+    if scene_crs is not None:
+        return None if is_local(scene_crs) else CRS.from_user_input(scene_crs)
     assert raster is not None, "a source has a path"
     with open_raster(raster) as data:
         if data.crs is None:
@@ -82,4 +83,4 @@ def _target(raster: Path | None, scene: str | None) -> CRS | None:
         left, bottom, right, top = data.bounds
     corners = np.array([(left, bottom, 0.0), (right, top, 0.0)])
     north_first = own.is_geographic and own.axis_info[0].direction == "north"
-    return choose_target(own, corners[:, [1, 0, 2]] if north_first else corners)
+    return choose_scene_crs(own, corners[:, [1, 0, 2]] if north_first else corners)

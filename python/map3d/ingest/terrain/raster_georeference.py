@@ -1,4 +1,4 @@
-"""Where a raster lies: from its pixels to the scene's CRS and to another raster's pixels. Only the plane is reprojected, heights stay."""
+"""Georeferencing of rasters: from pixels to the scene's CRS and to the pixels of another raster. Only x and y are transformed, never heights."""
 
 import warnings
 from pathlib import Path
@@ -12,7 +12,7 @@ from pyproj.exceptions import CRSError as ProjError
 from rasterio.errors import NotGeoreferencedWarning, RasterioError
 
 from map3d.errors import CrsError, ImportFailed, NotFound
-from map3d.ingest.crs import horizontal
+from map3d.geometry.crs import horizontal_crs
 
 Array = NDArray[np.float64]
 DRIVERS: Final = {
@@ -26,50 +26,54 @@ DRIVERS: Final = {
     b"\xff\xd8\xff": "JPEG",
     b"ncols": "AAIGrid",
 }
-"""First bytes → GDAL driver. Only formats that name no further files: a virtual raster could read whatever its author likes."""
+"""First bytes → GDAL driver. Formats that reference other files are excluded: a virtual raster could read any file."""
 
 
 def open_raster(path: Path) -> Any:
-    """An open rasterio dataset with a place on the ground; raises NotFound, ImportFailed."""
+    """Opens a georeferenced raster with rasterio. Raises NotFound, ImportFailed."""
     if not path.is_file():
         raise NotFound(f"{path}: no such raster")
-    driver = _driver(path)
+    driver = _find_driver(path)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", NotGeoreferencedWarning)
             dataset = rasterio.open(path, driver=driver)
     except NotGeoreferencedWarning as error:
-        raise ImportFailed(f"{path}: the raster does not say where it lies; give it a georeference (gdal_translate -a_ullr)") from error
+        raise ImportFailed(f"{path}: the raster has no georeference; add one with gdal_translate -a_ullr") from error
     except (RasterioError, OSError) as error:
-        raise ImportFailed(f"{path}: not a {driver} raster, or damaged: {error}") from error
+        raise ImportFailed(f"{path}: not a valid {driver} raster: {error}") from error
     if dataset.count < 1 or dataset.transform.is_degenerate:
         dataset.close()
-        raise ImportFailed(f"{path}: the raster has no bands, or its pixels no area")
+        raise ImportFailed(f"{path}: the raster has no bands, or its pixels have no area")
     return dataset
 
 
-def _driver(path: Path) -> str:
+def _find_driver(path: Path) -> str:
     with path.open("rb") as file:
         head = file.read(16)
-    for first, driver in DRIVERS.items():
-        if head.lower().startswith(first) if first.isalpha() else head.startswith(first):
+    for magic, driver in DRIVERS.items():
+        if head.lower().startswith(magic) if magic.isalpha() else head.startswith(magic):
             return driver
-    raise ImportFailed(f"{path}: not a raster that map3d reads ({', '.join(sorted(set(DRIVERS.values())))}); convert it with gdal_translate -of COG")
+    raise ImportFailed(
+        f"{path}: unknown raster format; map3d reads {', '.join(sorted(set(DRIVERS.values())))}; convert it with gdal_translate -of COG"
+    )
 
 
-def crs_of(dataset: Any, scene_crs: CRS | None) -> CRS | None:
-    """The raster's own horizontal CRS, the scene's when it has none; None in a local scene. Raises CrsError."""
+def raster_crs(dataset: Any, scene_crs: CRS | None) -> CRS | None:
+    """Returns the raster's horizontal CRS; the scene's if the raster has none; None in a local scene. Raises CrsError."""
     try:
         own = None if dataset.crs is None else CRS.from_user_input(dataset.crs)
     except ProjError as error:
         raise CrsError(f"{dataset.name}: unknown CRS: {error}") from error
     if scene_crs is None and own is not None and own.is_geographic:
-        raise CrsError(f"{dataset.name}: is in degrees ({own.name}), the scene in metres of no known CRS; give the scene a projected CRS (--crs)")
-    return scene_crs if own is None or scene_crs is None else horizontal(own)
+        raise CrsError(
+            f"{dataset.name}: the raster is in degrees ({own.name}), but the scene is in local metres; give the scene a projected CRS (--crs)"
+        )
+    return scene_crs if own is None or scene_crs is None else horizontal_crs(own)
 
 
-class Place:
-    """A raster's pixel positions (row, column; 0 the upper or left edge) in the plane of its CRS."""
+class RasterGeoreference:
+    """Converts between pixel positions (row, column; 0 is the upper or left edge) and the plane of the raster's CRS."""
 
     def __init__(self, dataset: Any, crs: CRS | None) -> None:
         self._affine = dataset.transform
@@ -80,30 +84,31 @@ class Place:
         return c + columns * a + rows * b, f + columns * d + rows * e
 
     def pixels_from_plane(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """(rows, columns)."""
+        """Returns (rows, columns)."""
         a, b, c, d, e, f = (~self._affine)[:6]
         return f + x * d + y * e, c + x * a + y * b
 
 
-class WayTo:
-    """Coordinates of one CRS in another; infinite where that has none. Raises CrsError when there is no way."""
+class PlaneTransformer:
+    """Transforms x and y between two CRSs; infinite outside the target's range. Without either CRS, coordinates stay unchanged."""
 
     def __init__(self, source: CRS | None, target: CRS | None) -> None:
+        """Raises CrsError if no transformation is known."""
         self._transformer: Transformer | None = None
-        target = None if target is None else horizontal(target)
+        target = None if target is None else horizontal_crs(target)
         if source is None or target is None or source.equals(target):
             return
         try:
             self._transformer = Transformer.from_crs(source, target, always_xy=True)
         except ProjError as error:
-            raise CrsError(f"no way from {source.name} to {target.name}: {error}") from error
+            raise CrsError(f"no transformation from {source.name} to {target.name} is known; choose another scene CRS with --crs: {error}") from error
 
     @property
     def description(self) -> str:
-        return "none: the same system" if self._transformer is None else str(self._transformer.description)
+        return "none: same CRS" if self._transformer is None else str(self._transformer.description)
 
     def __call__(self, x: Array, y: Array) -> tuple[Array, Array]:
         if self._transformer is None:
             return x, y
-        across, up = self._transformer.transform(x, y)
-        return np.asarray(across, dtype=np.float64), np.asarray(up, dtype=np.float64)
+        east, north = self._transformer.transform(x, y)
+        return np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64)

@@ -1,13 +1,13 @@
-"""Names of coordinate systems."""
+"""Parsing of CRS names."""
 
 import pytest
 
 from map3d.errors import CrsError
-from map3d.ingest.crs import horizontal, parse_crs, scene_crs, vertical, vertical_name
+from map3d.geometry.crs import horizontal_crs, parse_crs, vertical_crs, vertical_crs_name
 
 
 @pytest.mark.parametrize(
-    ("name", "flat", "height"),
+    ("name", "horizontal", "vertical"),
     [
         ("EPSG:25832", 25832, None),
         ("epsg:25832", 25832, None),
@@ -35,11 +35,11 @@ from map3d.ingest.crs import horizontal, parse_crs, scene_crs, vertical, vertica
         (" EPSG:4326 ", 4326, None),
     ],
 )
-def test_names_mean_what_they_say(name: str, flat: int, height: int | None) -> None:
+def test_names_have_a_horizontal_and_a_vertical_part(name: str, horizontal: int, vertical: int | None) -> None:
     crs = parse_crs(name)
-    above = vertical(crs)
-    assert horizontal(crs).to_epsg() == flat
-    assert (None if above is None else above.to_epsg()) == height
+    height = vertical_crs(crs)
+    assert horizontal_crs(crs).to_epsg() == horizontal
+    assert (None if height is None else height.to_epsg()) == vertical
 
 
 @pytest.mark.parametrize(
@@ -50,22 +50,6 @@ def test_unknown_names_say_what_to_do(name: str) -> None:
         parse_crs(name)
 
 
-def test_a_scene_takes_projected_metres_only() -> None:
-    found = scene_crs(parse_crs("urn:adv:crs:ETRS89_UTM32*DE_DHHN2016_NH"))
-    assert (found.epsg, found.name, found.vertical) == (25832, "ETRS89 / UTM zone 32N", "DHHN2016 height")
-    assert found.wkt is not None
-    assert not found.is_local
-    for name in ("EPSG:4326", "EPSG:4979", "EPSG:2263"):
-        with pytest.raises(CrsError, match="projected coordinate system in metres"):
-            scene_crs(parse_crs(name))
-
-
-def test_heights_above_an_ellipsoid_have_a_name() -> None:
-    assert vertical_name(parse_crs("EPSG:4979")) == "ellipsoidal height (WGS 84)"
-    assert vertical_name(parse_crs("EPSG:25832")) is None
-
-
-def test_a_scenes_system_survives_being_written_down() -> None:
-    first = scene_crs(parse_crs("EPSG:25832+7837"))
-    assert first.wkt is not None
-    assert scene_crs(parse_crs(first.wkt)) == first
+def test_ellipsoidal_heights_have_a_name() -> None:
+    assert vertical_crs_name(parse_crs("EPSG:4979")) == "ellipsoidal height (WGS 84)"
+    assert vertical_crs_name(parse_crs("EPSG:25832")) is None
