@@ -34,7 +34,7 @@ def run(run: Run) -> Run:
     [
         ("model.skp", b"\xff\xfe\xff\x0eSketchUp", 2, ("model.skp: a file of unknown format", "CityGML", "OBJ")),
         ("a.zip", b"PK\x03\x04", 2, ("a.zip: a ZIP archive", "map3d reads")),
-        ("a.gml", b"<html></html>", 2, ("a.gml: XML with the root html", "CityGML")),
+        ("a.gml", b"<html></html>", 2, ("a.gml: XML with root element html", "CityGML")),
         ("empty.gml", b"", 2, ("empty.gml: an empty file", "CityGML")),
         ("empty.obj", b"", 2, ("empty.obj: an empty file", "OBJ")),
         ("nothing.obj", USELESS_FILES["nothing.obj"], 1, ("nothing.obj: no triangle in it could be used", "1 × index out of range")),

@@ -398,7 +398,7 @@ def test_too_many_triangles_are_refused_with_advice(tmp_path, folder, monkeypatc
         monkeypatch.setattr(terrain_import, "MAX_TRIANGLES", limit)
         run(dem, None, folder)
     monkeypatch.setattr(terrain_import, "MAX_TRIANGLES", triangles - 1)
-    with pytest.raises(LimitExceeded, match="--max-error"):
+    with pytest.raises(LimitExceeded, match="gdal_translate"):
         run(dem, None, folder)
 
 

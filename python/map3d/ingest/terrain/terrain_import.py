@@ -37,6 +37,7 @@ OnTile = Callable[[str, int, int], bool]
 CLASS: Final = "terrain"
 RANK: Final = 0
 MAX_TRIANGLES: Final = 200_000_000
+REDUCE_RASTER: Final = "split the raster, or reduce its resolution with gdal_translate -tr"
 GDAL_CACHE_MB: Final = 64
 FLAT_TILE_CELLS: Final = 8
 UNITS_M: Final = {"m": 1.0, "metre": 1.0, "meter": 1.0, "metres": 1.0, "meters": 1.0, "ft": 0.3048, "foot": 0.3048, "feet": 0.3048}
@@ -141,7 +142,7 @@ class _TerrainBuilder:
             photo_crs = raster_crs(ortho, scene_crs)
             self._photo_georeference = RasterGeoreference(ortho, photo_crs)
             self._photo_from_base = PlaneTransformer(crs, photo_crs)
-        self._heights: HeightField = ConstantHeightField(options.height_m) if self._flat else RasterHeightField(dem, self._height_unit_m(dem))
+        self._height_field: HeightField = ConstantHeightField(options.height_m) if self._flat else RasterHeightField(dem, self._height_unit_m(dem))
         self._grid = self._create_grid()
         self._warn_about_missing_crs(dem, ortho, scene_crs)
 
@@ -158,7 +159,7 @@ class _TerrainBuilder:
     def report(self, counts: dict[str, Any], content: _TerrainContent) -> dict[str, Any]:
         """Adds counts and warnings about the rasters to the counts of the core."""
         warnings = [*counts.get("warnings", []), *self._warnings]
-        implausible = getattr(self._heights, "implausible", 0)
+        implausible = getattr(self._height_field, "implausible", 0)
         for reason, count in (("heights beyond ±100 km count as gaps", implausible), ("tiles outside the photo", content.untextured_tiles)):
             if count:
                 warnings.append({"reason": reason, "count": count, "example": Path(self._base.name).name})
@@ -175,7 +176,7 @@ class _TerrainBuilder:
         rows, columns = self._grid.positions(tile)
         row_of, column_of = (grid.ravel() for grid in np.meshgrid(rows, columns, indexing="ij"))
         x, y = self._scene_from_base(*self._georeference.plane_from_pixels(row_of, column_of))
-        heights = self._heights.heights(rows, columns)
+        heights = self._height_field.heights(rows, columns)
         heights[~np.isfinite(x + y).reshape(heights.shape)] = np.nan
         content.gaps += int(np.isnan(heights).sum())
         used, triangles = compact_vertices(self._triangulate(heights))
@@ -190,7 +191,7 @@ class _TerrainBuilder:
         self._update_counts(content, len(triangles), texture)
         material = self._add_material(content, texture, tile)
         writer.append_mesh(positions, triangles, uvs, material, len(content.objects), RANK)
-        content.objects.append({"name": self._name(tile), "class": CLASS, "parent": None, "lod": None, "attributes": {}})
+        content.objects.append({"name": self._tile_name(tile), "class": CLASS, "parent": None, "lod": None, "attributes": {}})
 
     def _triangulate(self, heights: NDArray[np.float64]) -> Triangles:
         if self._options.max_error_m == 0:
@@ -216,15 +217,18 @@ class _TerrainBuilder:
     def _update_counts(self, content: _TerrainContent, triangles: int, texture: TextureTile | None) -> None:
         content.triangles += triangles
         if content.triangles > MAX_TRIANGLES:
-            raise LimitExceeded(
-                f"the terrain has more than {MAX_TRIANGLES:,} triangles, the limit of an asset; allow a greater height error (--max-error)"
-            )
+            raise LimitExceeded(f"{self._base.name}: more than {MAX_TRIANGLES:,} triangles, the limit of an asset; {REDUCE_RASTER}")
         content.untextured_tiles += self._photo is not None and texture is None
 
     def _add_material(self, content: _TerrainContent, texture: TextureTile | None, tile: GridTile) -> int:
         if texture is None and content.untextured_material is not None:
             return content.untextured_material
-        row: dict[str, Any] = {"name": self._name(tile) if texture else "ground", "diffuse": [1.0, 1.0, 1.0, 1.0], "texture": None, "alpha": None}
+        row: dict[str, Any] = {
+            "name": self._tile_name(tile) if texture else "ground",
+            "diffuse": [1.0, 1.0, 1.0, 1.0],
+            "texture": None,
+            "alpha": None,
+        }
         row |= {"wrap": "clamp", "border": [0.0, 0.0, 0.0, 0.0], "cutout": False}
         if texture is None:
             row["diffuse"] = [*(value / 255 for value in self._options.ground), 1.0]
@@ -234,7 +238,7 @@ class _TerrainBuilder:
         content.materials.append(row)
         return len(content.materials) - 1
 
-    def _name(self, tile: GridTile) -> str:
+    def _tile_name(self, tile: GridTile) -> str:
         return f"{self._options.name}-{tile.row}-{tile.column}"
 
     def _create_grid(self) -> VertexGrid:
@@ -251,9 +255,7 @@ class _TerrainBuilder:
             cells //= 2
         grid = VertexGrid(pixel_centre_positions(height, parts), pixel_centre_positions(width, parts), cells)
         if self._options.max_error_m == 0 and 2 * grid.cell_count > MAX_TRIANGLES:
-            raise LimitExceeded(
-                f"{self._base.name}: {2 * grid.cell_count:,} triangles, the limit of an asset is {MAX_TRIANGLES:,}; allow a --max-error"
-            )
+            raise LimitExceeded(f"{self._base.name}: {2 * grid.cell_count:,} triangles, the limit of an asset is {MAX_TRIANGLES:,}; {REDUCE_RASTER}")
         return grid
 
     def _photo_px_per_cell(self) -> float:
