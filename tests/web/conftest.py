@@ -13,7 +13,7 @@ from tests.web.workspaces import make_workspace
 
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory) -> Workspace:
-    """Made once; for tests that change nothing in it."""
+    """A workspace for read-only tests."""
     return make_workspace(tmp_path_factory.mktemp("finished") / "ws")
 
 
@@ -23,7 +23,7 @@ def workspace(finished, tmp_path) -> Workspace:
 
 
 class Client:
-    """Asks the app without a network."""
+    """Sends requests to the app without a network."""
 
     def __init__(self, app: App) -> None:
         self.app = app

@@ -1,7 +1,7 @@
 from map3d.web.byte_lru import ENTRY_BYTES, ByteLru
 
 
-def test_the_least_recently_used_goes_first():
+def test_the_least_recently_used_entry_is_evicted_first():
     cache = ByteLru(10 * ENTRY_BYTES)
     for key in range(10):
         cache.put(key, key, 0)
@@ -10,7 +10,7 @@ def test_the_least_recently_used_goes_first():
     assert (cache.get(0), cache.get(1), cache.get(10)) == (0, None, 10)
 
 
-def test_it_never_holds_more_than_its_capacity():
+def test_the_cache_never_exceeds_its_capacity():
     cache = ByteLru(20_000)
     for key in range(500):
         cache.put(key % 37, key, key * 13 % 1500)
@@ -18,14 +18,14 @@ def test_it_never_holds_more_than_its_capacity():
         assert cache.used_bytes == sum(cost for _, cost in cache._entries.values())
 
 
-def test_what_is_too_large_is_not_kept():
+def test_too_large_values_are_not_stored():
     cache = ByteLru(80 * ENTRY_BYTES)
     cache.put("small", 1, 0)
     cache.put("large", 2, 10 * ENTRY_BYTES)
     assert (cache.get("small"), cache.get("large"), len(cache)) == (1, None, 1)
 
 
-def test_putting_again_counts_once():
+def test_replacing_an_entry_counts_it_once():
     cache = ByteLru(100_000)
     cache.put("a", 1, 100)
     cache.put("a", 2, 50)

@@ -1,6 +1,11 @@
 import asyncio
+import html
 import json
+import os
 import re
+from importlib.resources import files
+from pathlib import Path
+from urllib.parse import unquote
 
 import pytest
 
@@ -15,7 +20,7 @@ from tests.web.workspaces import rendering_record
 
 @pytest.fixture
 def built_viewer(tmp_path, monkeypatch):
-    """Stands for the viewer's files, which a checkout may not have built."""
+    """Replaces the viewer's files, which may not be built."""
     folder = tmp_path / "package" / "viewer"
     (folder / "assets").mkdir(parents=True)
     (folder / "index.html").write_text("<!doctype html><script src=map3d.js></script>")
@@ -24,54 +29,56 @@ def built_viewer(tmp_path, monkeypatch):
     return folder
 
 
-def test_only_get_and_head_exist(client):
-    rules = list(client.app.site.url_map.iter_rules())
-    assert {"pages.renderings", "pages.view", "pages.healthz", "documents.manifest", "static"} <= {rule.endpoint for rule in rules}
+def test_all_routes_allow_only_get_and_head(client):
+    rules = list(client.app.flask.url_map.iter_rules())
+    assert {"pages.home", "pages.renderings", "pages.view", "pages.icon", "pages.healthz", "documents.manifest", "static"} <= {
+        rule.endpoint for rule in rules
+    }
     assert {method for rule in rules for method in rule.methods} == {"GET", "HEAD"}
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "PATCH", "OPTIONS", "TRACE"])
-def test_no_route_takes_another_method(client, method):
-    for rule in client.app.site.url_map.iter_rules():
-        answer = client.request(method, re.sub("<[^>]*>", "x", rule.rule))
-        assert answer.status_code == 405, rule
-        assert answer.headers["cache-control"] == "no-store"
+def test_other_methods_are_405(client, method):
+    for rule in client.app.flask.url_map.iter_rules():
+        response = client.request(method, re.sub("<[^>]*>", "x", rule.rule))
+        assert response.status_code == 405, rule
+        assert response.headers["cache-control"] == "no-store"
 
 
-def test_the_manifest_is_that_of_the_rendering(client, workspace):
-    answer = client.get("/tiles/tea/rendering.json")
-    assert answer.content == workspace.manifest_path("tea").read_bytes()
-    assert answer.headers["content-type"] == "application/json"
-    assert answer.headers["cache-control"] == "no-cache"
-    assert answer.headers["access-control-allow-origin"] == "*"
-    assert client.get("/tiles/tea/rendering.json", headers={"if-none-match": answer.headers["etag"]}).status_code == 304
-    assert client.get("/view/tea/rendering.json").content == answer.content
+def test_the_manifest_is_served_as_stored(client, workspace):
+    response = client.get("/tiles/tea/rendering.json")
+    assert response.content == workspace.manifest_path("tea").read_bytes()
+    assert response.headers["content-type"] == "application/json"
+    assert response.headers["cache-control"] == "no-cache"
+    assert response.headers["access-control-allow-origin"] == "*"
+    assert client.get("/tiles/tea/rendering.json", headers={"if-none-match": response.headers["etag"]}).status_code == 304
+    assert client.get("/view/tea/rendering.json").content == response.content
 
 
 @pytest.mark.parametrize(
     "path",
     ["rendering.json", "objects/0.json", "objects/search.json", "objects/attributes.json", "objects/columns/x.json", "0-45/color/0/0/0", "nonsense"],
 )
-def test_any_origin_may_read_answers_and_refusals(client, path):
+def test_any_origin_may_read_documents_and_errors(client, path):
     for base, status in (("/tiles/tea", (200, 204, 404)), ("/tiles/nowhere", (404,))):
-        answer = client.get(f"{base}/{path}")
-        assert answer.status_code in status
-        assert answer.headers["access-control-allow-origin"] == "*"
+        response = client.get(f"{base}/{path}")
+        assert response.status_code in status
+        assert response.headers["access-control-allow-origin"] == "*"
 
 
 @pytest.mark.parametrize("base", ["/tiles/tea", "/view/tea"])
-def test_objects_come_by_shard(client, base):
-    answer = client.get(f"{base}/objects/0.json")
-    value = answer.json()
+def test_objects_are_served_by_shard(client, base):
+    response = client.get(f"{base}/objects/0.json")
+    value = response.json()
     assert (value["map3d"], value["version"], value["shard"]) == ("objects", 1, 0)
     assert value["objects"]["1"]["name"] == "House <1>"
     assert value["objects"]["1"]["attributes"] == {"address": "Main Street 1", "height": 9.5}
     assert value["objects"]["2"]["parent"] == 1
-    assert answer.headers["access-control-allow-origin"] == "*"
-    assert client.get(f"{base}/objects/0.json", headers={"if-none-match": answer.headers["etag"]}).status_code == 304
+    assert response.headers["access-control-allow-origin"] == "*"
+    assert client.get(f"{base}/objects/0.json", headers={"if-none-match": response.headers["etag"]}).status_code == 304
 
 
-def test_new_objects_are_found_at_once(client, workspace):
+def test_new_objects_are_found_immediately(client, workspace):
     before = client.get("/tiles/tea/objects/search.json").json()["entries"]
     with Registry(workspace.registry_path("town")) as registry:
         registry.put_asset("more", [NewObject("Tower", "building", box=((0.0, 0.0, 0.0), (2.0, 2.0, 50.0)))])
@@ -79,7 +86,7 @@ def test_new_objects_are_found_at_once(client, workspace):
     assert client.get("/tiles/tea/objects/search.json").json()["entries"][2] == [4, "Tower", [1.0, 1.0, 50.0]]
 
 
-def test_large_documents_are_compressed_for_who_can_read_that(client, workspace):
+def test_large_documents_are_compressed_on_request(client, workspace):
     with Registry(workspace.registry_path("town")) as registry:
         registry.put_asset("more", [NewObject(f"House {n}", "building", box=((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))) for n in range(100)])
     plain, packed = (client.get("/tiles/tea/objects/0.json", headers={"accept-encoding": name}) for name in ("identity", "gzip"))
@@ -91,13 +98,13 @@ def test_large_documents_are_compressed_for_who_can_read_that(client, workspace)
     assert client.get("/tiles/tea/objects/0.json", headers={"if-none-match": packed.headers["etag"]}).status_code == 304
 
 
-def test_scripts_have_the_type_that_browsers_insist_on(client, built_viewer):
+def test_modules_have_a_javascript_media_type(client, built_viewer):
     (built_viewer / "map3d.mjs").write_text("export {}")
     assert "javascript" in client.get("/view/tea/map3d.mjs").headers["content-type"]
     assert client.get("/view/none/map3d.mjs").status_code == 404
 
 
-def test_the_viewers_files_are_compressed_for_who_can_read_that(client, built_viewer):
+def test_the_viewers_files_are_compressed_on_request(client, built_viewer):
     text = "export const a = 1;\n" * 500
     (built_viewer / "map3d.mjs").write_text(text)
     plain, packed = (client.get("/view/tea/map3d.mjs", headers={"accept-encoding": name}) for name in ("identity", "gzip"))
@@ -106,8 +113,8 @@ def test_the_viewers_files_are_compressed_for_who_can_read_that(client, built_vi
     assert packed.headers["content-encoding"] == "gzip"
     assert int(packed.headers["content-length"]) < len(text) / 20
     assert plain.headers["vary"] == packed.headers["vary"] == "Accept-Encoding"
-    for answer in (plain, packed):
-        again = client.get("/view/tea/map3d.mjs", headers={"if-none-match": answer.headers["etag"]})
+    for response in (plain, packed):
+        again = client.get("/view/tea/map3d.mjs", headers={"if-none-match": response.headers["etag"]})
         assert (again.status_code, again.content) == (304, b"")
 
 
@@ -122,7 +129,7 @@ def test_objects_are_found_by_label(client, base):
 
 
 @pytest.mark.parametrize("base", ["/tiles/tea", "/view/tea"])
-def test_attributes_come_by_column(client, base):
+def test_attributes_are_served_by_column(client, base):
     index = client.get(f"{base}/objects/attributes.json").json()
     assert [(row["of"], row["name"]) for row in index["attributes"]] == [
         ("object", "class"),
@@ -130,54 +137,108 @@ def test_attributes_come_by_column(client, base):
         ("attributes", "address"),
         ("attributes", "height"),
     ]
-    answer = client.get(f"{base}/objects/columns/{index['attributes'][3]['column']}.json")
-    assert answer.json() == {"map3d": "column", "version": 1, "name": "height", "of": "attributes", "ids": [1, 2], "values": [9.5, 9.5]}
-    assert answer.headers["access-control-allow-origin"] == "*"
+    response = client.get(f"{base}/objects/columns/{index['attributes'][3]['column']}.json")
+    assert response.json() == {"map3d": "column", "version": 1, "name": "height", "of": "attributes", "ids": [1, 2], "values": [9.5, 9.5]}
+    assert response.headers["access-control-allow-origin"] == "*"
 
 
 @pytest.mark.parametrize("column", ["0" * 16, "0" * 15, "..%2fsearch", "ABCDEF0123456789", "x" * 5000])
-def test_a_column_that_is_not_there_is_404(client, column):
+def test_an_unknown_column_is_404(client, column):
     assert client.get(f"/tiles/tea/objects/columns/{column}.json").status_code == 404
 
 
 @pytest.mark.parametrize("shard", ["01", "-1", "x", "99999999", "1e3", "%D9%A1"])
-def test_a_shard_that_cannot_be_is_404(client, shard):
+def test_an_invalid_shard_is_404(client, shard):
     assert client.get(f"/tiles/tea/objects/{shard}.json").status_code == 404
 
 
-def test_a_scene_without_objects_has_none_to_show(client, workspace):
+def test_a_scene_without_objects_is_404(client, workspace):
     workspace.registry_path("town").unlink()
     assert client.get("/tiles/tea/objects/0.json").status_code == 404
     assert not workspace.registry_path("town").exists()
 
 
 @pytest.mark.parametrize("path", ["/tiles/none/rendering.json", "/tiles/..%2f/rendering.json", "/tiles/A/rendering.json", "/nothing", "/view/none/"])
-def test_what_is_not_there_is_404_and_never_cached(client, path):
-    answer = client.get(path)
-    assert (answer.status_code, answer.headers["cache-control"]) == (404, "no-store")
+def test_missing_pages_are_404_and_never_cached(client, path):
+    response = client.get(path)
+    assert (response.status_code, response.headers["cache-control"]) == (404, "no-store")
 
 
-def test_the_list_shows_renderings_with_previews(client, workspace):
-    text = client.get("/").text
-    assert 'href="/view/tea/"' in text
-    assert 'src="/tiles/tea/0-45/color/0/0/0"' in text
-    assert "2 views, 12 tiles" in text
+def test_home_redirects_to_the_only_rendering(client):
+    for method in ("GET", "HEAD"):
+        response = client.request(method, "/")
+        assert (response.status_code, response.headers["location"], response.headers["cache-control"]) == (302, "/view/tea/", "no-store")
 
 
-def test_titles_are_text_and_never_html(client):
-    text = client.get("/").text
+def test_home_lists_several_renderings(client, workspace):
+    home = workspace.open_catalogue()
+    home.create_rendering(rendering_record("new"))
+    home.close()
+    response = client.get("/")
+    assert (response.status_code, response.headers["cache-control"]) == (200, "no-store")
+    assert response.text == client.get("/renderings").text
+
+
+def test_home_lists_a_single_rendering_without_tiles(client, workspace):
+    workspace.manifest_path("tea").unlink()
+    response = client.get("/")
+    assert response.status_code == 200
+    assert "map3d render tea" in response.text
+
+
+def test_the_list_describes_renderings(client, workspace):
+    os.utime(workspace.manifest_path("tea"), (1_790_000_000, 1_790_000_000))
+    text = client.get("/renderings").text
+    assert '<a href="/view/tea/">' in text
+    assert "2 views · 4 layers · " in text
+    assert "Complete" in text
+    assert '<time datetime="2026-09-21T14:13:20Z"' in text
+    assert "21 September 2026" in text
+    assert "© Somebody" in text
+
+
+def test_an_incomplete_rendering_is_marked(client, workspace):
+    path = workspace.manifest_path("tea")
+    path.write_text(path.read_text().replace('"complete": true', '"complete": false'))
+    assert ">Incomplete<" in client.get("/renderings").text
+
+
+def test_all_tiles_of_a_preview_are_served_as_immutable(client):
+    tiles = re.findall('<image href="([^"]+)"', client.get("/renderings").text)
+    assert tiles
+    for tile in tiles:
+        response = client.get(html.unescape(tile))
+        assert (response.status_code, "immutable" in response.headers["cache-control"]) == (200, True)
+
+
+@pytest.mark.parametrize(("file", "media_type"), [("favicon.svg", "image/svg+xml"), ("favicon.ico", "image/")])
+def test_icons_are_served(client, file, media_type):
+    response = client.get(f"/{file}")
+    assert (response.status_code, response.headers["content-type"].startswith(media_type)) == (200, True)
+
+
+def test_the_viewers_page_embeds_the_same_icon():
+    page = (Path(__file__).parents[2] / "viewer" / "page" / "index.html").read_text()
+    (embedded,) = re.findall('<link rel="icon" href="data:image/svg\\+xml,([^"]+)">', page)
+    icon = files("map3d") / "web" / "static" / "favicon.svg"
+    assert unquote(embedded).replace("'", '"') == icon.read_text().replace("\n", "")
+
+
+def test_titles_are_escaped(client):
+    text = client.get("/renderings").text
     assert "Tea &lt;time&gt;" in text
     assert "<time>" not in text
 
 
-def test_a_rendering_without_tiles_or_with_a_damaged_manifest_is_listed_too(client, workspace):
+def test_renderings_without_tiles_or_with_a_damaged_manifest_are_listed(client, workspace):
     home = workspace.open_catalogue()
     home.create_rendering(rendering_record("new"))
     home.close()
     workspace.manifest_path("tea").write_text("{")
-    text = client.get("/").text
-    assert "nothing rendered yet" in text
-    assert "cannot be read" in text
+    text = client.get("/renderings").text
+    assert "Not rendered yet" in text
+    assert "Unreadable" in text
+    assert "<a href" not in text
 
 
 def test_a_workspace_without_renderings_says_what_to_do(tmp_path):
@@ -187,17 +248,17 @@ def test_a_workspace_without_renderings_says_what_to_do(tmp_path):
     home.create_scene(SceneRecord("town"))
     home.close()
     app = create_app(tmp_path)
-    assert "map3d create-rendering" in app.site.test_client().get("/").text
+    assert "map3d create-rendering" in app.flask.test_client().get("/").text
     asyncio.run(app.close())
 
 
 def test_no_page_has_inline_script_or_style(client, built_viewer):
-    for path in ("/", "/view/tea/", "/healthz"):
+    for path in ("/", "/renderings", "/view/tea/", "/healthz"):
         policy = client.get(path).headers["content-security-policy"]
         assert "default-src 'self'" in policy
         assert "unsafe" not in policy
         assert client.get(path).headers["x-content-type-options"] == "nosniff"
-    assert not re.search(r"<style|style=|<script(?![^>]*src)| on\w+=", client.get("/").text)
+    assert not re.search(r"<style|style=|<script(?![^>]*src)| on\w+=", client.get("/renderings").text)
 
 
 def test_the_viewers_page_and_files_are_served(client, built_viewer):
@@ -212,22 +273,22 @@ def test_nothing_outside_the_viewer_is_served(client, built_viewer, file):
     assert client.get(f"/view/tea/{file}").status_code == 404
 
 
-def test_a_viewer_that_is_not_built_is_said_clearly(client, tmp_path, monkeypatch):
+def test_a_missing_viewer_is_503_with_advice(client, tmp_path, monkeypatch):
     monkeypatch.setattr(viewer_files, "files", lambda _: tmp_path / "nowhere")
-    answer = client.get("/view/tea/")
-    assert (answer.status_code, answer.headers["cache-control"]) == (503, "no-store")
-    assert "make build" in answer.text
+    response = client.get("/view/tea/")
+    assert (response.status_code, response.headers["cache-control"]) == (503, "no-store")
+    assert "make build" in response.text
 
 
-def test_it_is_alive(client):
-    answer = client.get("/healthz")
-    assert (answer.status_code, answer.text) == (200, "ok\n")
+def test_the_health_check_answers(client):
+    response = client.get("/healthz")
+    assert (response.status_code, response.text) == (200, "ok\n")
 
 
-def test_an_unexpected_error_is_500_without_its_text(client, monkeypatch):
+def test_an_unexpected_error_is_500_without_details(client, monkeypatch):
     monkeypatch.setattr("map3d.web.page_routes.catalogue", lambda: 1 / 0)
-    answer = client.get("/healthz")
-    assert (answer.status_code, answer.text) == (500, "internal error\n")
+    response = client.get("/healthz")
+    assert (response.status_code, response.text) == (500, "internal server error; see the server log\n")
 
 
 @pytest.mark.parametrize(
@@ -237,16 +298,16 @@ def test_an_unexpected_error_is_500_without_its_text(client, monkeypatch):
         (Corrupt("/p"), 500), (Map3dError("/p"), 500), (ValueError("/p"), 500),
     ],
 )  # fmt: skip
-def test_the_table_of_statuses(error, status):
+def test_statuses_of_exceptions(error, status):
     got, text = status_of(error)
     assert got == status
     assert "/p" not in text
 
 
-def test_no_workspace_is_not_found(tmp_path):
+def test_a_missing_workspace_is_not_found(tmp_path):
     with pytest.raises(NotFound, match="create-scene"):
         create_app(tmp_path / "none")
 
 
-def test_the_manifest_on_the_wire_is_json(client):
+def test_the_served_manifest_is_json(client):
     assert json.loads(client.get("/tiles/tea/rendering.json").text)["name"] == "tea"

@@ -1,4 +1,4 @@
-"""The service as it is run: granian, a real port, processes."""
+"""The service with granian, a real port and several processes."""
 
 import os
 import signal
@@ -11,7 +11,7 @@ import pytest
 
 from map3d.errors import BadRequest, NotFound
 from map3d.types import TileId
-from map3d.web.server import free_port, serve
+from map3d.web.server import find_port, serve
 from tests.web.workspaces import every_tile, tile_bytes
 
 SCRIPT = """
@@ -39,11 +39,12 @@ def address(request, finished, tmp_path):
         process.stdout.close()
 
 
-def test_it_serves_all_there_is(address):
+def test_everything_is_served(address):
     with httpx.Client(base_url=address) as client:
         assert client.get("/healthz").text == "ok\n"
         assert client.get("/tiles/tea/rendering.json").json()["name"] == "tea"
-        assert "Tea" in client.get("/").text
+        assert "Tea" in client.get("/renderings").text
+        assert client.get("/").headers["location"] == "/view/tea/"
         for tile in every_tile():
             path = f"/tiles/tea/0-45/depth/{tile.z}/{tile.x}/{tile.y}"
             assert client.get(path).content == client.get(f"{path}?v=1").content == tile_bytes("0-45", "depth", tile)
@@ -62,7 +63,7 @@ def _ask(address, request):
 
 
 @pytest.mark.parametrize("address", [1], indirect=True)
-def test_odd_requests_are_refused_without_an_error_of_ours(address):
+def test_malformed_requests_are_client_errors(address):
     tile = b"/tiles/tea/0-45/color/0/0/0"
     for target in (b"/?\xd9\xa1", b"/\xff", b"/%ff%fe", b"/%00", tile + b"?v=\xff", tile + b"%zz", b"//" + tile, b"/tiles/tea/%ff/color/0/0/0", b"*"):
         for method in (b"GET", b"HEAD", b"POST", b"FOO"):
@@ -71,27 +72,27 @@ def test_odd_requests_are_refused_without_an_error_of_ours(address):
             assert 200 <= int(head[9:12]) < 500, (method, target)
 
 
-def test_a_taken_port_is_refused():
+def test_a_port_in_use_is_refused():
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
         with pytest.raises(BadRequest, match="--port"):
-            free_port("127.0.0.1", port)
+            find_port("127.0.0.1", port)
 
 
 @pytest.mark.parametrize(("host", "port"), [("127.0.0.1", 70000), ("no-such-host.invalid", 0)])
-def test_an_address_that_is_none_is_refused(host, port):
+def test_an_invalid_address_is_refused(host, port):
     with pytest.raises(BadRequest):
-        free_port(host, port)
+        find_port(host, port)
 
 
-def test_a_free_port_is_free():
-    port = free_port("127.0.0.1", 0)
+def test_port_zero_finds_a_free_port():
+    port = find_port("127.0.0.1", 0)
     assert port > 0
-    assert free_port("127.0.0.1", port) == port
+    assert find_port("127.0.0.1", port) == port
 
 
-def test_no_workspace_is_said_before_anything_starts(tmp_path):
+def test_a_missing_workspace_is_refused_before_the_server_starts(tmp_path):
     with pytest.raises(NotFound):
         serve(tmp_path / "none")

@@ -1,4 +1,4 @@
-"""Small workspaces with tiles of made-up bytes, for tests of what hands tiles out."""
+"""Small workspaces with synthetic tiles, for tests of serving and publishing."""
 
 from map3d.catalogue import RenderingRecord, SceneCrs, SceneRecord, Workspace
 from map3d.geometry.frames import pin
@@ -28,14 +28,14 @@ OBJECTS = (
 
 def rendering_record(name="tea"):
     frames = tuple(pin(BOX, 256, 0.1, VIEWS))
-    return RenderingRecord(name, "town", 0.1, (LAYERS,), frames, BOX, title="Tea <time>", attribution="© somebody")
+    return RenderingRecord(name, "town", 0.1, (LAYERS,), frames, BOX, title="Tea <time>", attribution="© Somebody")
 
 
 FIRST_BYTES = {"webp": b"RIFF", "png": b"\x89PNG\r\n\x1a\n", "jpeg": b"\xff\xd8\xff"}
 
 
 def tile_bytes(view, layer, tile, salt=""):
-    """Begin as images do. Some are equal, as tiles of plain ground are."""
+    """Returns bytes with the signature of an image. Some tiles are equal, like tiles of plain ground."""
     kind = next(one.format for one in (*LAYERS, *ADDED) if one.name == layer)
     return FIRST_BYTES[kind] + f"{salt}{view}/{layer}/{tile.z}/{tile.x % 2}/{tile.y}".encode() * (1 + tile.x % 3)
 
@@ -51,7 +51,7 @@ def put_block(store, view, block, occupancy, version=1, salt=""):
 
 
 def make_workspace(root, name="tea", version=1):
-    """A workspace with one finished rendering of two views."""
+    """Creates a workspace with one complete rendering of two views."""
     workspace = Workspace(root).create()
     record = rendering_record(name)
     catalogue = workspace.open_catalogue()
@@ -69,7 +69,7 @@ def make_workspace(root, name="tea", version=1):
 
 
 def add_pass(workspace, name="tea", version=2):
-    """The layers ADDED, rendered."""
+    """Adds and renders the layers ADDED."""
     catalogue = workspace.open_catalogue()
     record = catalogue.add_pass(name, ADDED)
     catalogue.close()
@@ -88,7 +88,7 @@ def _put_pass(workspace, record, number, version):
 
 
 def manifest_of(record, occupancy, *versions):
-    """`versions`: of each pass."""
+    """`versions`: one for each pass."""
     blocks = [BlockId(*tile) for level in block_levels(ZMAX) for tile in occupancy.tiles(level.root)]
     return Manifest(
         name=record.name,

@@ -1,4 +1,4 @@
-"""The web service: tiles by a thin ASGI route, everything else by Flask behind it. Read-only; no logic of its own."""
+"""Web service: a thin ASGI route serves tiles, Flask serves everything else. Read-only, without logic of its own."""
 
 from map3d.web.asgi_app import create_app
 from map3d.web.server import serve

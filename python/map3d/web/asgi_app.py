@@ -1,4 +1,4 @@
-"""The ASGI app: tile URLs go to the thin route, all else to Flask."""
+"""The ASGI app: dispatches tile URLs to the tile route, all others to Flask."""
 
 import string
 from collections.abc import Awaitable, Callable
@@ -11,12 +11,12 @@ from a2wsgi import WSGIMiddleware
 from map3d.catalogue.workspace import Workspace
 from map3d.errors import NotFound
 from map3d.web import document_routes
-from map3d.web.flask_app import create_site
+from map3d.web.flask_app import create_flask_app
 from map3d.web.tile_route import DEFAULT_CACHE_BYTES, Receive, Scope, Send, TileRoute
 
 FLASK_THREADS: Final = 8
 _QUERY_SAFE: Final = string.punctuation
-"""What of a query is left as it is; the bridge to Flask takes ASCII only."""
+"""Characters of a query that stay unquoted. The bridge to Flask accepts only ASCII."""
 
 
 class App:
@@ -24,26 +24,26 @@ class App:
 
     def __init__(self, workspace: Workspace, cache_bytes: int = DEFAULT_CACHE_BYTES) -> None:
         self.tiles = TileRoute(workspace, cache_bytes)
-        self.site = create_site(workspace)
-        self._site_asgi: Callable[..., Awaitable[Any]] = WSGIMiddleware(cast(Any, self.site.wsgi_app), workers=FLASK_THREADS)
+        self.flask = create_flask_app(workspace)
+        self._flask_asgi: Callable[..., Awaitable[Any]] = WSGIMiddleware(cast(Any, self.flask.wsgi_app), workers=FLASK_THREADS)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "http":
-            if self.tiles.owns(scope["path"]):
+            if self.tiles.matches(scope["path"]):
                 await self.tiles(scope, receive, send)
             else:
-                await self._site_asgi({**scope, "query_string": quote(scope["query_string"], safe=_QUERY_SAFE).encode()}, receive, send)
+                await self._flask_asgi({**scope, "query_string": quote(scope["query_string"], safe=_QUERY_SAFE).encode()}, receive, send)
         elif scope["type"] == "lifespan":
-            await self._live(receive, send)
+            await self._handle_lifespan(receive, send)
         elif scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1000})
 
     async def close(self) -> None:
         await self.tiles.close()
-        with self.site.app_context():
+        with self.flask.app_context():
             document_routes.close()
 
-    async def _live(self, receive: Receive, send: Send) -> None:
+    async def _handle_lifespan(self, receive: Receive, send: Send) -> None:
         while True:
             event = (await receive())["type"]
             if event == "lifespan.shutdown":
@@ -54,8 +54,8 @@ class App:
 
 
 def create_app(workspace: Workspace | Path, *, cache_bytes: int = DEFAULT_CACHE_BYTES) -> App:
-    """The app of a workspace; raises NotFound when there is none."""
+    """Creates the app of a workspace. Raises NotFound if the folder does not exist."""
     home = workspace if isinstance(workspace, Workspace) else Workspace(workspace)
     if not home.root.is_dir():
-        raise NotFound(f"no workspace at {home.root}: create a scene first (map3d create-scene), or name the folder with --workspace")
+        raise NotFound(f"no workspace at {home.root}; create a scene first (map3d create-scene), or name another folder with --workspace")
     return App(home, cache_bytes)

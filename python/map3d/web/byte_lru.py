@@ -1,4 +1,4 @@
-"""A cache bounded by bytes; the least recently used entry goes first. Not shared between threads."""
+"""A least-recently-used cache, bounded by bytes. Not thread-safe."""
 
 from collections import OrderedDict
 from collections.abc import Hashable
@@ -8,7 +8,7 @@ K = TypeVar("K", bound=Hashable)
 V = TypeVar("V")
 
 ENTRY_BYTES: Final = 1024
-"""Counted for an entry beside its own bytes, so that many small ones are bounded too."""
+"""Overhead counted per entry, which also bounds the number of small entries."""
 
 
 class ByteLru(Generic[K, V]):
@@ -28,7 +28,7 @@ class ByteLru(Generic[K, V]):
         return entry[0]
 
     def put(self, key: K, value: V, size_bytes: int) -> None:
-        """An entry larger than an eighth of the capacity is not kept."""
+        """Stores the value, unless its size exceeds an eighth of the capacity."""
         self.discard(key)
         cost = size_bytes + ENTRY_BYTES
         if cost * 8 > self.capacity_bytes:

@@ -1,4 +1,4 @@
-"""Text compressed for who can read that."""
+"""Compresses text responses."""
 
 import gzip
 from functools import lru_cache
@@ -6,13 +6,13 @@ from typing import Final
 
 from flask import Response, request
 
-PACK_FROM_BYTES: Final = 1024
-_TEXT: Final = ("text/", "application/json", "application/javascript")
+MIN_BYTES: Final = 1024
+_TEXT_TYPES: Final = ("text/", "application/json", "application/javascript", "image/svg+xml")
 
 
-def pack(response: Response) -> Response:
-    """The response, compressed if it is text of some length and the client takes gzip. Its ETag becomes a weak one: the same text, other bytes."""
-    if response.status_code != 200 or not (response.mimetype or "").startswith(_TEXT):
+def compress(response: Response) -> Response:
+    """Compresses the response if it is text of at least MIN_BYTES and the client accepts gzip. Its ETag becomes weak: same text, other bytes."""
+    if response.status_code != 200 or not (response.mimetype or "").startswith(_TEXT_TYPES):
         return response
     response.headers["Vary"] = "Accept-Encoding"
     etag, _ = response.get_etag()
@@ -22,13 +22,13 @@ def pack(response: Response) -> Response:
         return response
     response.direct_passthrough = False
     data = response.get_data()
-    if len(data) < PACK_FROM_BYTES:
+    if len(data) < MIN_BYTES:
         return response
-    response.set_data(_packed(data))
+    response.set_data(_gzip(data))
     response.headers["Content-Encoding"] = "gzip"
     return response
 
 
 @lru_cache(maxsize=32)
-def _packed(data: bytes) -> bytes:
+def _gzip(data: bytes) -> bytes:
     return gzip.compress(data, compresslevel=6, mtime=0)

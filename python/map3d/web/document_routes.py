@@ -1,6 +1,6 @@
-"""The JSON documents beside the tiles: manifest, attribute shards and columns, search index (spec/manifest.md).
+"""Routes of the JSON documents of a rendering: manifest, attribute shards and columns, search index (spec/manifest.md).
 
-They stand under /tiles/<rendering>/ and under /view/<rendering>/, whose page reads them as its own folder's, as in a published folder.
+Each is available under /tiles/<rendering>/ and under /view/<rendering>/, where the viewer's page finds it in its own folder, as in a published one.
 """
 
 import re
@@ -17,18 +17,18 @@ from map3d.errors import NotFound
 from map3d.registry import Registry
 from map3d.tiles.manifest import FILE_NAME, dump_document
 from map3d.types import check_name
-from map3d.web.compression import pack
+from map3d.web.compression import compress
 
 documents = Blueprint("documents", __name__)
-_opening: Final = Lock()
+_open_lock: Final = Lock()
 
-Stamp = tuple[tuple[int, int, int], ...]
+FileState = tuple[tuple[int, int, int], ...]
+"""(inode, time of change, size) of the database and its write-ahead log."""
 
-_NUMBER: Final = re.compile(r"0|[1-9][0-9]{0,6}", re.ASCII)
-"""Of a shard: ids are 32 bits, so shards have at most seven digits."""
+_SHARD: Final = re.compile(r"0|[1-9][0-9]{0,6}", re.ASCII)
+"""Shard numbers have at most seven digits, because ids have 32 bits."""
 
-_KEY: Final = re.compile(r"[0-9a-f]{16}", re.ASCII)
-"""Of a column."""
+_COLUMN: Final = re.compile(r"[0-9a-f]{16}", re.ASCII)
 
 
 @documents.get(f"/tiles/<rendering>/{FILE_NAME}")
@@ -36,42 +36,42 @@ _KEY: Final = re.compile(r"[0-9a-f]{16}", re.ASCII)
 def manifest(rendering: str) -> Response:
     path = workspace().manifest_path(check_name(rendering, "rendering"))
     try:
-        return json_answer(path.read_bytes())
+        return json_response(path.read_bytes())
     except FileNotFoundError as error:
-        raise NotFound(f"rendering {rendering!r} is not there, or nothing of it is rendered yet") from error
+        raise NotFound(f"no rendering {rendering!r}, or it has no tiles yet; run: map3d render {rendering}") from error
 
 
 @documents.get("/tiles/<rendering>/objects/<shard>.json")
 @documents.get("/view/<rendering>/objects/<shard>.json")
 def shard(rendering: str, shard: str) -> Response:
-    if not _NUMBER.fullmatch(shard):
-        raise NotFound(f"no shard {shard[:64]!r}: shards have plain numbers")
+    if not _SHARD.fullmatch(shard):
+        raise NotFound(f"no shard {shard[:64]!r}; shard names are plain numbers")
     with Registry(registry_path(rendering)) as objects:
-        return json_answer(dump_document(objects.shard(int(shard))))
+        return json_response(dump_document(objects.shard(int(shard))))
 
 
 @documents.get("/tiles/<rendering>/objects/search.json")
 @documents.get("/view/<rendering>/objects/search.json")
 def search(rendering: str) -> Response:
     path = registry_path(rendering)
-    return json_answer(_search_bytes(path, _stamp(path)))
+    return json_response(_search_bytes(path, _file_state(path)))
 
 
 @documents.get("/tiles/<rendering>/objects/attributes.json")
 @documents.get("/view/<rendering>/objects/attributes.json")
 def attributes(rendering: str) -> Response:
     path = registry_path(rendering)
-    return json_answer(_index_bytes(path, _stamp(path)))
+    return json_response(_index_bytes(path, _file_state(path)))
 
 
 @documents.get("/tiles/<rendering>/objects/columns/<column>.json")
 @documents.get("/view/<rendering>/objects/columns/<column>.json")
 def column(rendering: str, column: str) -> Response:
     path = registry_path(rendering)
-    data = _column_bytes(path, column, _stamp(path)) if _KEY.fullmatch(column) else None
+    data = _column_bytes(path, column, _file_state(path)) if _COLUMN.fullmatch(column) else None
     if data is None:
-        raise NotFound(f"no column {column[:64]!r}: objects/attributes.json lists those there are")
-    return json_answer(data)
+        raise NotFound(f"no column {column[:64]!r}; objects/attributes.json lists the columns")
+    return json_response(data)
 
 
 def workspace() -> Workspace:
@@ -80,58 +80,58 @@ def workspace() -> Workspace:
 
 
 def catalogue() -> Catalogue:
-    """Opened at the first question, then kept."""
-    with _opening:
-        held: Catalogue | None = current_app.extensions.get("map3d.catalogue")
-        if held is None:
-            held = current_app.extensions["map3d.catalogue"] = workspace().open_catalogue()
-    return held
+    """Returns the catalogue of the current app, opened on first use."""
+    with _open_lock:
+        opened: Catalogue | None = current_app.extensions.get("map3d.catalogue")
+        if opened is None:
+            opened = current_app.extensions["map3d.catalogue"] = workspace().open_catalogue()
+    return opened
 
 
 def close() -> None:
-    """Of the app in whose context it is called."""
-    held: Catalogue | None = current_app.extensions.pop("map3d.catalogue", None)
-    if held is not None:
-        held.close()
+    """Closes the catalogue of the current app."""
+    opened: Catalogue | None = current_app.extensions.pop("map3d.catalogue", None)
+    if opened is not None:
+        opened.close()
 
 
 def registry_path(rendering: str) -> Path:
-    """Of the rendering's scene; raises NotFound."""
+    """Returns the registry of the rendering's scene. Raises NotFound."""
     path = workspace().registry_path(catalogue().rendering(check_name(rendering, "rendering")).scene)
     if not path.is_file():
-        raise NotFound(f"the scene of rendering {rendering!r} has no objects yet")
+        raise NotFound(f"the scene of rendering {rendering!r} has no objects yet; run: map3d add-files")
     return path
 
 
-def json_answer(data: bytes) -> Response:
-    """With an ETag, to be asked for anew each time; compressed for who can read that."""
+def json_response(data: bytes) -> Response:
+    """Returns the document with an ETag that clients revalidate on each request; compressed if the client accepts it."""
     response = Response(data, mimetype="application/json")
     response.set_etag(sha256(data).hexdigest()[:32], weak=True)
     response.headers["Cache-Control"] = "no-cache"
     response.make_conditional(request)
-    return pack(response)
+    return compress(response)
 
 
 @lru_cache(maxsize=4)
-def _search_bytes(path: Path, _state: Stamp) -> bytes:
+def _search_bytes(path: Path, _state: FileState) -> bytes:
     with Registry(path) as objects:
         return dump_document(objects.search())
 
 
 @lru_cache(maxsize=4)
-def _index_bytes(path: Path, _state: Stamp) -> bytes:
+def _index_bytes(path: Path, _state: FileState) -> bytes:
     with Registry(path) as objects:
         return dump_document(objects.attribute_index())
 
 
 @lru_cache(maxsize=4)
-def _column_bytes(path: Path, column: str, _state: Stamp) -> bytes | None:
+def _column_bytes(path: Path, column: str, _state: FileState) -> bytes | None:
     with Registry(path) as objects:
         found = objects.column(column)
     return None if found is None else dump_document(found)
 
 
-def _stamp(path: Path) -> Stamp:
-    """Differs once the registry has changed."""
+def _file_state(path: Path) -> FileState:
+    """Returns a value that differs after each change of the registry."""
     log = path.with_name(path.name + "-wal")
     return tuple((stat.st_ino, stat.st_mtime_ns, stat.st_size) for stat in (one.stat() for one in (path, log) if one.is_file()) if stat.st_size)

@@ -1,4 +1,4 @@
-"""The Flask app: pages and documents. It has GET and HEAD only."""
+"""The Flask app: pages and documents, with GET and HEAD only."""
 
 from typing import Any
 
@@ -19,8 +19,8 @@ CONTENT_SECURITY_POLICY = (
 MAX_REQUEST_BYTES = 64 << 10
 
 
-class Site(Flask):
-    """Flask without the OPTIONS method that it would add to every route."""
+class ReadOnlyFlask(Flask):
+    """Flask without the OPTIONS method that it adds to every route."""
 
     def add_url_rule(
         self, rule: str, endpoint: str | None = None, view_func: Any = None, provide_automatic_options: bool | None = None, **options: Any
@@ -28,19 +28,19 @@ class Site(Flask):
         super().add_url_rule(rule, endpoint, view_func, provide_automatic_options=False, **options)
 
 
-def create_site(workspace: Workspace) -> Flask:
-    site = Site("map3d.web", static_folder="static", static_url_path="/static")
-    site.config["MAX_CONTENT_LENGTH"] = MAX_REQUEST_BYTES
-    site.config["WORKSPACE"] = workspace
-    site.url_map.merge_slashes = False
-    site.register_blueprint(pages)
-    site.register_blueprint(documents)
-    site.register_error_handler(Exception, _refuse)
-    site.after_request(_protect)
-    return site
+def create_flask_app(workspace: Workspace) -> Flask:
+    app = ReadOnlyFlask("map3d.web", static_folder="static", static_url_path="/static")
+    app.config["MAX_CONTENT_LENGTH"] = MAX_REQUEST_BYTES
+    app.config["WORKSPACE"] = workspace
+    app.url_map.merge_slashes = False
+    app.register_blueprint(pages)
+    app.register_blueprint(documents)
+    app.register_error_handler(Exception, _error_response)
+    app.after_request(_add_security_headers)
+    return app
 
 
-def _refuse(error: Exception) -> Response:
+def _error_response(error: Exception) -> Response:
     if isinstance(error, HTTPException):
         response = Response.force_type(error.get_response(), request.environ)
         if (error.code or 500) < 400:
@@ -52,9 +52,9 @@ def _refuse(error: Exception) -> Response:
     return response
 
 
-def _protect(response: Response) -> Response:
+def _add_security_headers(response: Response) -> Response:
     if request.path.startswith(PREFIXES):
-        response.headers["Access-Control-Allow-Origin"] = "*"  # on refusals too: a page of another origin learns why
+        response.headers["Access-Control-Allow-Origin"] = "*"  # also on errors, so that pages of other origins can read the reason
     response.headers["X-Content-Type-Options"] = "nosniff"
     response.headers["Content-Security-Policy"] = CONTENT_SECURITY_POLICY
     response.headers["Referrer-Policy"] = "same-origin"

@@ -1,4 +1,4 @@
-"""The one table of exceptions and HTTP statuses. An error is never cached, and never tells paths of the server."""
+"""Maps exceptions to HTTP statuses. Error responses are never cached and never contain paths of the server."""
 
 import logging
 from typing import Final
@@ -15,15 +15,15 @@ STATUS: Final[tuple[tuple[type[Exception], int, str | None], ...]] = (
     (LimitExceeded, 413, None),
     (BadRequest, 400, None),
     (ViewerMissing, 503, None),
-    (StoreError, 503, "the store cannot be read now; try again"),
-    (Map3dError, 500, "the server's data is damaged; its log says where"),
-    (Exception, 500, "internal error"),
+    (StoreError, 503, "the tile store is temporarily unavailable; try again"),
+    (Map3dError, 500, "the server's data is damaged; see the server log"),
+    (Exception, 500, "internal server error; see the server log"),
 )
-"""First match wins. (exception, status, what the client is told; None: the exception's own text)."""
+"""(exception, status, text for the client; None for the exception's own text). The first match counts."""
 
 
 def status_of(error: Exception) -> tuple[int, str]:
-    """The status and the text for the client; logs what is the server's fault."""
+    """Returns the status and the text for the client. Logs server errors."""
     status, text = next((status, text) for kind, status, text in STATUS if isinstance(error, kind))
     if status >= 500:
         log.error("%s", error, exc_info=not isinstance(error, Map3dError))

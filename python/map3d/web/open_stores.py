@@ -1,4 +1,4 @@
-"""The tile stores of a workspace as they are asked for; a store that was put in place of another is noticed."""
+"""Opens the tile stores of a workspace on demand, and reopens a store whose file was replaced."""
 
 import threading
 import time
@@ -15,14 +15,14 @@ from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.types import Layer
 
 RECHECK_S: Final = 1.0
-"""How long a store is trusted to be still the file of its name."""
+"""Interval between checks that a store is still the file at its path."""
 
 MAX_OPEN: Final = 256
 
 
 @dataclass(eq=False)
 class OpenStore:
-    """A store with the identity of its file."""
+    """An open store and the identity (device, inode) of its file."""
 
     store: SqliteTileStore
     identity: tuple[int, int]
@@ -30,27 +30,27 @@ class OpenStore:
 
     @cached_property
     def layers(self) -> dict[str, tuple[int, Layer]]:
-        """name → (number, layer)."""
+        """Layer name → (number, layer)."""
         return {layer.name: (number, layer) for number, layer in enumerate(self.store.shape.layers)}
 
     def is_current(self, now_s: float) -> bool:
-        """False once the file is gone or another one lies in its place."""
+        """Whether the file at the path is still the one that is open."""
         if now_s - self.checked_s < RECHECK_S:
             return True
         self.checked_s = now_s
         return _identity(self.store) == self.identity
 
 
-class Stores:
-    """Safe to share between threads."""
+class OpenStores:
+    """Thread-safe."""
 
     def __init__(self, workspace: Workspace) -> None:
         self._workspace = workspace
         self._open: dict[tuple[str, str], OpenStore] = {}
         self._lock = threading.Lock()
 
-    def of_view(self, rendering: str, view: str) -> Iterator[OpenStore]:
-        """The stores of a view's tracks, pass by pass; none: there is no such rendering, or no such view of it."""
+    def stores_of_view(self, rendering: str, view: str) -> Iterator[OpenStore]:
+        """Yields the stores of a view's tracks, pass by pass; none if the rendering or the view does not exist."""
         try:
             parse_view_id(view)
         except BadRequest:
@@ -62,17 +62,17 @@ class Stores:
             yield opened
 
     def _get(self, rendering: str, track: str) -> OpenStore | None:
-        """None: there is none. Reads the disk at most once in a while."""
+        """Returns None without a store. Checks the file at most every RECHECK_S."""
         key = (rendering, track)
         with self._lock:
-            held = self._open.get(key)
-            if held is not None and held.is_current(time.monotonic()):
-                return held
-            if held is not None:
+            known = self._open.get(key)
+            if known is not None and known.is_current(time.monotonic()):
+                return known
+            if known is not None:
                 self._open.pop(key).store.close()
             opened = self._try_open(rendering, track)
             if opened is not None:
-                self._make_room()
+                self._evict()
                 self._open[key] = opened
             return opened
 
@@ -89,7 +89,7 @@ class Stores:
         identity = _identity(store)
         return None if identity is None else OpenStore(store, identity, time.monotonic())
 
-    def _make_room(self) -> None:
+    def _evict(self) -> None:
         while len(self._open) >= MAX_OPEN:
             oldest = next(iter(self._open))
             self._open.pop(oldest).store.close()

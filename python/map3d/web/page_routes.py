@@ -1,74 +1,105 @@
-"""The pages: the list of renderings, the viewer of one, and whether the service is alive."""
+"""Pages: the list of renderings, the viewer of one rendering, icons, and the health check."""
 
 from dataclasses import dataclass
+from datetime import UTC, datetime
 
-from flask import Blueprint, Response, render_template, send_from_directory
+from flask import Blueprint, Response, current_app, redirect, render_template, send_from_directory
+from werkzeug import Response as WerkzeugResponse
 
 from map3d.catalogue import RenderingRecord
 from map3d.errors import Map3dError
 from map3d.tiles.manifest import Manifest
+from map3d.tiles.preview import Preview, choose_preview
 from map3d.tiles.viewer_files import PAGE, viewer_folder
 from map3d.types import check_name
-from map3d.web.compression import pack
+from map3d.web.compression import compress
 from map3d.web.document_routes import catalogue, workspace
 from map3d.web.http_errors import status_of
 
 pages = Blueprint("pages", __name__)
 
+ICON_MAX_AGE_S = 86_400
+
 
 @dataclass(frozen=True)
-class Card:
-    """A rendering in the list. `preview`: URL of its smallest colour tile, None when there is none yet."""
+class ListedRendering:
+    """A rendering in the list. `state`: complete, incomplete, empty (nothing rendered yet) or unreadable. `changed`: time of the last manifest."""
 
     name: str
     title: str
     attribution: str
     state: str
-    preview: str | None
+    size: str = ""
+    views: int = 0
+    layers: int = 0
+    changed: datetime | None = None
+    preview: Preview | None = None
 
 
 @pages.get("/")
-def renderings() -> str:
-    return render_template("renderings.html", cards=[_card(record) for record in catalogue().renderings()])
+def home() -> WerkzeugResponse:
+    """Redirects to the map if the workspace has exactly one rendering with tiles; otherwise lists the renderings."""
+    records = catalogue().renderings()
+    if len(records) == 1 and workspace().manifest_path(records[0].name).is_file():
+        return _without_cache(redirect(f"/view/{records[0].name}/"))
+    return renderings()
+
+
+@pages.get("/renderings")
+def renderings() -> WerkzeugResponse:
+    listed = sorted((_describe(record) for record in catalogue().renderings()), key=lambda item: (item.changed is None, item.title.casefold()))
+    return _without_cache(compress(Response(render_template("renderings.html", renderings=listed), mimetype="text/html")))
 
 
 @pages.get("/view/<rendering>/")
 def view(rendering: str) -> Response:
     catalogue().rendering(check_name(rendering, "rendering"))
-    return pack(send_from_directory(viewer_folder(), PAGE, max_age=0))
+    return compress(send_from_directory(viewer_folder(), PAGE, max_age=0))
 
 
 @pages.get("/view/<rendering>/<path:file>")
 def viewer_file(rendering: str, file: str) -> Response:
     catalogue().rendering(check_name(rendering, "rendering"))
-    return pack(send_from_directory(viewer_folder(), file, max_age=0))
+    return compress(send_from_directory(viewer_folder(), file, max_age=0))
+
+
+@pages.get("/favicon.ico", defaults={"file": "favicon.ico"})
+@pages.get("/favicon.svg", defaults={"file": "favicon.svg"})
+def icon(file: str) -> Response:
+    return compress(send_from_directory(current_app.static_folder or "", file, max_age=ICON_MAX_AGE_S))
 
 
 @pages.get("/healthz")
-def healthz() -> Response:
-    """200 while the catalogue can be read."""
+def healthz() -> WerkzeugResponse:
+    """Answers 200 while the catalogue is readable."""
     catalogue().renderings()
-    response = Response("ok\n", mimetype="text/plain")
+    return _without_cache(Response("ok\n", mimetype="text/plain"))
+
+
+def _without_cache(response: WerkzeugResponse) -> WerkzeugResponse:
     response.headers["Cache-Control"] = "no-store"
     return response
 
 
-def _card(record: RenderingRecord) -> Card:
-    title, attribution = record.title or record.name, record.attribution
+def _describe(record: RenderingRecord) -> ListedRendering:
+    name, title, attribution = record.name, record.title or record.name, record.attribution
+    path = workspace().manifest_path(name)
     try:
-        manifest = Manifest.load(workspace().manifest_path(record.name).read_bytes())
+        manifest = Manifest.load(path.read_bytes(), str(path))
+        changed = datetime.fromtimestamp(path.stat().st_mtime, UTC)
+        size = _size_text(sum(file.stat().st_size for file in path.parent.iterdir() if file.is_file()))
     except FileNotFoundError:
-        return Card(record.name, title, attribution, "nothing rendered yet", None)
+        return ListedRendering(name, title, attribution, "empty")
     except (Map3dError, OSError) as error:
-        status_of(error if isinstance(error, Map3dError) else Map3dError(f"rendering {record.name}: {error}"))
-        return Card(record.name, title, attribution, "its manifest cannot be read; the log says why", None)
-    views = len(manifest.views)
-    tiles = sum(one.occupancy.count(manifest.zmax) for one in manifest.views)
-    state = f"{views} view{'s' if views != 1 else ''}, {tiles:,} tiles of the deepest level" + ("" if manifest.complete else ", not complete yet")
-    return Card(record.name, title, attribution, state, _preview(manifest))
+        status_of(error if isinstance(error, Map3dError) else Map3dError(f"rendering {name}: {error}"))
+        return ListedRendering(name, title, attribution, "unreadable")
+    state = "complete" if manifest.complete else "incomplete"
+    return ListedRendering(name, title, attribution, state, size, len(manifest.views), len(manifest.layers), changed, choose_preview(manifest))
 
 
-def _preview(manifest: Manifest) -> str | None:
-    color = next((layer.name for layer in manifest.layers if layer.kind == "color"), None)
-    view = next((one for one in manifest.views if one.occupancy.count(0)), None)
-    return None if color is None or view is None else f"/tiles/{manifest.name}/{view.frame.id}/{color}/0/0/0"
+def _size_text(size: float) -> str:
+    for unit in ("kB", "MB", "GB"):
+        size /= 1000
+        if size < 999.5:
+            return f"{size:.0f} {unit}" if size >= 10 or unit == "kB" else f"{size:.1f} {unit}"
+    return f"{size / 1000:.1f} TB"

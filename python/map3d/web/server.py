@@ -1,4 +1,4 @@
-"""Runs the app under granian."""
+"""Runs the app with granian."""
 
 import socket
 import threading
@@ -29,12 +29,12 @@ def serve(
     cache_bytes: int = DEFAULT_CACHE_BYTES,
     on_ready: Callable[[str], Any] = print,
 ) -> None:
-    """Serves until it is interrupted; from the main thread only. Port 0: a free one is chosen. `on_ready` is given the address once it answers.
+    """Serves until interrupted; call it from the main thread. Port 0 chooses a free port. Calls `on_ready` with the address once the server answers.
 
-    Each of `workers` processes has a cache of its own of `cache_bytes`. Raises NotFound (no workspace), BadRequest (the port is taken).
+    Each of the `workers` processes has its own cache of `cache_bytes`. Raises NotFound (no workspace), BadRequest (port in use).
     """
     create_app(workspace)
-    chosen = free_port(host, port)
+    chosen = find_port(host, port)
     server = Server(
         target="map3d",
         address=host,
@@ -52,8 +52,8 @@ def serve(
     server.serve(target_loader=partial(_load, workspace.absolute(), cache_bytes), wrap_loader=False)
 
 
-def free_port(host: str, port: int) -> int:
-    """`port` if nobody listens there, a free one for 0; raises BadRequest. (Two servers on one port would share its requests unnoticed.)"""
+def find_port(host: str, port: int) -> int:
+    """Returns `port`, or a free one for 0. Raises BadRequest if the port is in use: two servers on one port would silently share its requests."""
     try:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
         with socket.socket(family) as probe:
@@ -61,7 +61,7 @@ def free_port(host: str, port: int) -> int:
             probe.bind((host, port))
             return int(probe.getsockname()[1])
     except (OSError, OverflowError) as error:
-        raise BadRequest(f"cannot listen at {host} port {port}: {error}; choose another with --port, or 0 for a free one") from error
+        raise BadRequest(f"cannot listen on {host} port {port}: {error}; choose another port with --port, or 0 for a free one") from error
 
 
 def _load(workspace: Path, cache_bytes: int) -> App:

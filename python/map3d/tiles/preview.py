@@ -1,0 +1,117 @@
+"""Chooses a preview of a rendering: a window of one view's colour layer that the content fills, and the tiles that it shows."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from map3d.tiles.manifest import Manifest, ViewFacts, block_version
+from map3d.tiles.occupancy import Occupancy
+from map3d.types import COLOR_KINDS, TileId
+
+ASPECT: Final = 1.6
+MIN_WIDTH_PX: Final = 640
+"""The preview takes the first level at which its window is this wide."""
+GRID_LEVEL: Final = 6
+"""Level whose occupied tiles determine the window."""
+COVERED: Final = 0.98
+"""Share of inner cells in a window that content covers."""
+SMALLEST_CROP: Final = 0.4
+"""Narrowest window, as a share of the widest one."""
+
+
+@dataclass(frozen=True)
+class PreviewTile:
+    """A tile at pixel (x, y) of its level; `version` is that of its block."""
+
+    tile: TileId
+    x: int
+    y: int
+    version: int
+
+
+@dataclass(frozen=True)
+class Preview:
+    """`window`: (left, top, width, height) in pixels of the tiles' level."""
+
+    view: str
+    layer: str
+    tile_px: int
+    window: tuple[float, float, float, float]
+    tiles: tuple[PreviewTile, ...]
+
+
+@dataclass(frozen=True)
+class _Window:
+    """Centre and width in the unit square of a pyramid; y points down."""
+
+    x: float
+    y: float
+    width: float
+
+    @property
+    def height(self) -> float:
+        return self.width / ASPECT
+
+    def covered_share(self, grid: NDArray[np.bool_]) -> float:
+        """Returns the share of occupied cells; cells outside the grid count as empty."""
+        side = len(grid)
+        columns, rows = (_cells(centre, size, side) for centre, size in ((self.x, self.width), (self.y, self.height)))
+        inside = grid[max(rows.start, 0) : rows.stop, max(columns.start, 0) : columns.stop]
+        return float(inside.sum()) / (len(rows) * len(columns))
+
+
+def choose_preview(manifest: Manifest) -> Preview | None:
+    """Returns None while no tile of a colour layer exists."""
+    view = next((view for view in manifest.views if view.occupancy.count(0)), None)
+    found = next(((number, layer) for number, layers in enumerate(manifest.passes) for layer in layers if layer.kind in COLOR_KINDS), None)
+    if view is None or found is None:
+        return None
+    number, layer = found
+    window = _choose_window(_occupied_grid(view.occupancy))
+    z = next((z for z in range(manifest.zmax) if window.width * 2**z * manifest.tile_px >= MIN_WIDTH_PX), manifest.zmax)
+    side_px = 2**z * manifest.tile_px
+    pixels = (window.width * side_px, window.height * side_px)
+    left, top = window.x * side_px - pixels[0] / 2, window.y * side_px - pixels[1] / 2
+    return Preview(view.frame.id, layer.name, manifest.tile_px, (left, top, *pixels), _find_tiles(view, number, z, window, manifest.tile_px))
+
+
+def _occupied_grid(occupancy: Occupancy) -> NDArray[np.bool_]:
+    z = min(occupancy.zmax, GRID_LEVEL)
+    grid = np.zeros((2**z, 2**z), dtype=bool)
+    for tile in occupancy.tiles(z):
+        grid[tile.y, tile.x] = True
+    return grid
+
+
+def _choose_window(grid: NDArray[np.bool_]) -> _Window:
+    """Returns the largest centred window that content covers; if there is none, the window that contains all content."""
+    rows, columns = (np.flatnonzero(grid.any(axis=axis)) for axis in (1, 0))
+    (top, bottom), (left, right) = ((line[0] / len(grid), (line[-1] + 1) / len(grid)) for line in (rows, columns))
+    x, y, width, height = (left + right) / 2, (top + bottom) / 2, right - left, bottom - top
+    inner = _erode(grid)
+    crops = (_Window(x, y, min(width, height * ASPECT) * scale) for scale in np.arange(1.0, SMALLEST_CROP, -0.05))
+    return next((crop for crop in crops if crop.covered_share(inner) >= COVERED), _Window(x, y, max(width, height * ASPECT)))
+
+
+def _erode(grid: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Keeps the cells whose eight neighbours are occupied: content may fill the others only partly."""
+    padded = np.pad(grid, 1)
+    n = len(grid)
+    inner = grid.copy()
+    for row in range(3):
+        for column in range(3):
+            inner &= padded[row : row + n, column : column + n]
+    return inner
+
+
+def _find_tiles(view: ViewFacts, number: int, z: int, window: _Window, tile_px: int) -> tuple[PreviewTile, ...]:
+    columns, rows = (_cells(centre, size, 2**z) for centre, size in ((window.x, window.width), (window.y, window.height)))
+    tiles = (TileId(z, x, y) for y in rows for x in columns)
+    return tuple(PreviewTile(tile, tile.x * tile_px, tile.y * tile_px, block_version(view, tile, number)) for tile in tiles if tile in view.occupancy)
+
+
+def _cells(centre: float, size: float, count: int) -> range:
+    """Returns the cells of `count` along the unit length that an interval touches."""
+    return range(int(np.floor((centre - size / 2) * count + 1e-9)), int(np.ceil((centre + size / 2) * count - 1e-9)))

@@ -1,0 +1,78 @@
+"""Windows of previews: filled by content, or containing all of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from map3d.geometry.frames import pin
+from map3d.tiles.manifest import CrsFacts, Manifest, ViewFacts
+from map3d.tiles.occupancy import Occupancy
+from map3d.tiles.preview import ASPECT, MIN_WIDTH_PX, choose_preview
+from map3d.types import BlockId, Layer, TileId, ViewAngles
+
+BOX = ((0.0, 0.0, 0.0), (1000.0, 1000.0, 20.0))
+FRAME = pin(BOX, 256, 0.1, [ViewAngles(0, 45)])[0]
+SIDE = 2**FRAME.zmax
+
+
+def manifest_of(grid):
+    view = ViewFacts(FRAME, Occupancy.from_grid(grid), ({BlockId(0, 0, 0): 7},))
+    layers = (Layer("normal", "normal", "png"), Layer("color", "color", "webp"))
+    return Manifest("x", 7, True, CrsFacts("local metres"), (0.0, 0.0, 0.0), BOX, (layers,), (view,))
+
+
+def grid_of(shape):
+    y, x = (np.mgrid[0:SIDE, 0:SIDE] + 0.5) / SIDE
+    return {
+        "rectangle": (abs(x - 0.5) < 0.4) & (abs(y - 0.5) < 0.3),
+        "rhombus": abs(x - 0.5) / 0.45 + abs(y - 0.5) / 0.35 < 1,
+        "tall": (abs(x - 0.5) < 0.1) & (abs(y - 0.5) < 0.45),
+    }[shape]
+
+
+@pytest.mark.parametrize("shape", ["rectangle", "rhombus", "tall"])
+def test_connected_content_fills_the_window(shape):
+    grid = grid_of(shape)
+    preview = choose_preview(manifest_of(grid))
+    left, top, width, height = preview.window
+    assert width / height == pytest.approx(ASPECT)
+    assert MIN_WIDTH_PX <= width < 2 * MIN_WIDTH_PX
+    scale = SIDE / 2 ** preview.tiles[0].tile.z / 256
+    rows, columns = (slice(int(first * scale), int((first + size) * scale)) for first, size in ((top, height), (left, width)))
+    assert grid[rows, columns].mean() > 0.97
+
+
+def test_separate_objects_lie_inside_the_window():
+    grid = np.zeros((SIDE, SIDE), bool)
+    grid[SIDE // 4, SIDE // 4] = grid[SIDE // 2, 3 * SIDE // 4] = True
+    preview = choose_preview(manifest_of(grid))
+    left, top, width, height = preview.window
+    side_px = 256 * 2 ** preview.tiles[0].tile.z
+    assert left <= 0.25 * side_px
+    assert left + width >= 0.75 * side_px
+    assert top <= 0.25 * side_px
+    assert top + height >= 0.5 * side_px
+
+
+def test_a_preview_has_the_tiles_that_its_window_shows():
+    preview = choose_preview(manifest_of(grid_of("rectangle")))
+    left, top, width, height = preview.window
+    assert (preview.view, preview.layer, preview.tile_px) == ("0-45", "color", 256)
+    assert {tile.version for tile in preview.tiles} == {7}
+    assert all(left - 256 < tile.x < left + width and top - 256 < tile.y < top + height for tile in preview.tiles)
+    assert {(tile.tile.x * 256, tile.tile.y * 256) for tile in preview.tiles} == {(tile.x, tile.y) for tile in preview.tiles}
+    assert len(preview.tiles) <= 24
+
+
+def test_a_small_rendering_shows_its_deepest_level():
+    frame = replace(FRAME, zmax=0)
+    manifest = replace(manifest_of(grid_of("tall")), views=(ViewFacts(frame, Occupancy.from_tiles(0, [(0, 0)]), ({BlockId(0, 0, 0): 1},)),))
+    assert [tile.tile for tile in choose_preview(manifest).tiles] == [TileId(0, 0, 0)]
+
+
+def test_no_tiles_or_no_colour_layer_have_no_preview():
+    manifest = manifest_of(np.zeros((SIDE, SIDE), bool))
+    assert choose_preview(manifest) is None
+    full = manifest_of(grid_of("tall"))
+    assert choose_preview(replace(full, passes=((Layer("normal", "normal", "png"),),))) is None
