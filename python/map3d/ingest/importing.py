@@ -94,7 +94,9 @@ def _parse(
     }
     try:
         subprocess, applied = parser.get(entry, limits)
-        message = subprocess.request(request, wall_s=limits.wall_s, on_progress=lambda counts: counts and progress and progress(_progress_text(counts)))
+        message = subprocess.request(
+            request, wall_s=limits.wall_s, on_progress=lambda counts: counts and progress and progress(_progress_text(counts))
+        )
     except (SubprocessDied, LimitExceeded) as error:
         parser.stop()
         raise _parser_error(source, limits, error) from error
