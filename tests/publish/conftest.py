@@ -10,7 +10,7 @@ from tests.web.workspaces import make_workspace
 
 @pytest.fixture(autouse=True)
 def built_viewer(tmp_path, monkeypatch):
-    """Stands for the viewer's files, which a checkout may not have built."""
+    """Replaces the viewer's files, which may not be built."""
     folder = tmp_path / "package" / "viewer"
     (folder / "assets").mkdir(parents=True)
     (folder / "index.html").write_text("<!doctype html><script src=map3d.js></script>")
@@ -24,7 +24,7 @@ def built_viewer(tmp_path, monkeypatch):
 
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory):
-    """Made once; for tests that change nothing in it."""
+    """A workspace for read-only tests."""
     return make_workspace(tmp_path_factory.mktemp("finished") / "ws")
 
 

@@ -1,4 +1,4 @@
-"""A static host with range requests, as small as it can be."""
+"""A minimal static host with range requests."""
 
 import re
 import threading
@@ -27,7 +27,7 @@ class RangeHandler(SimpleHTTPRequestHandler):
 
 @contextmanager
 def static_host(folder):
-    """Yields the address."""
+    """Serves the folder and yields the address."""
     with ThreadingHTTPServer(("127.0.0.1", 0), partial(RangeHandler, directory=str(folder))) as server:
         thread = threading.Thread(target=server.serve_forever)
         thread.start()

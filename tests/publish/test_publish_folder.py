@@ -11,7 +11,6 @@ from pmtiles.tile import Compression, TileType, zxy_to_tileid
 
 from map3d.errors import AlreadyExists, BadRequest, Corrupt, NotFound, Stopped
 from map3d.publish import publish
-from map3d.publish import publish_folder as folder_module
 from map3d.registry import Registry
 from map3d.tiles import viewer_files
 from map3d.tiles.manifest import Manifest
@@ -33,9 +32,18 @@ def tiles_of(path):
     return {zxy: bytes(data) for zxy, data in all_tiles(MemorySource(path.read_bytes()))}
 
 
-def test_the_folder_is_whole(workspace, out):
+def test_the_folder_is_complete(workspace, out):
     done = publish(workspace, "tea", out)
-    names = {"rendering.json", "README.txt", "checksums.sha256", "index.html", "assets/worker.js", "objects/0.json", "objects/search.json"}
+    names = {
+        "rendering.json",
+        "README.txt",
+        "favicon.ico",
+        "checksums.sha256",
+        "index.html",
+        "assets/worker.js",
+        "objects/0.json",
+        "objects/search.json",
+    }
     names |= {f"{view}/{layer.name}.pmtiles" for view in VIEWS for layer in LAYERS}
     index = json.loads((out / "objects" / "attributes.json").read_text())
     names |= {"objects/attributes.json", *(f"objects/columns/{row['column']}.json" for row in index["attributes"])}
@@ -52,7 +60,7 @@ def test_every_tile_is_byte_identical_to_the_stores(workspace, out):
             assert tiles_of(out / view / f"{layer.name}.pmtiles") == {tuple(tile): tile_bytes(view, layer.name, tile) for tile in every_tile()}
 
 
-def test_layers_that_were_added_are_published_beside_those_before(workspace, out):
+def test_added_layers_are_published(workspace, out):
     publish(workspace, "tea", out)
     before = {view: (out / view / "color.pmtiles").read_bytes() for view in VIEWS}
     add_pass(workspace)
@@ -69,7 +77,7 @@ def test_layers_that_were_added_are_published_beside_those_before(workspace, out
     assert (found.archives, found.tiles) == (12, len(every_tile()) * 12)
 
 
-def test_tiles_are_in_order_and_equal_ones_stored_once(workspace, out):
+def test_tiles_are_sorted_and_equal_ones_stored_once(workspace, out):
     publish(workspace, "tea", out)
     path = out / "0-45" / "color.pmtiles"
     header = Reader(MemorySource(path.read_bytes())).header()
@@ -82,12 +90,12 @@ def test_tiles_are_in_order_and_equal_ones_stored_once(workspace, out):
     assert (header["min_zoom"], header["max_zoom"]) == (0, ZMAX)
 
 
-def test_archives_say_what_they_are(workspace, out):
+def test_archives_describe_their_layer(workspace, out):
     publish(workspace, "tea", out)
     for layer, kind in (("color", TileType.WEBP), ("depth", TileType.PNG)):
         reader = Reader(MemorySource((out / "0-45" / f"{layer}.pmtiles").read_bytes()))
         assert (reader.header()["tile_type"], reader.header()["tile_compression"]) == (kind, Compression.NONE)
-        assert reader.metadata()["attribution"] == "© somebody"
+        assert reader.metadata()["attribution"] == "© Somebody"
         assert reader.metadata()["map3d"]["layer"] == layer
 
 
@@ -100,7 +108,7 @@ def test_the_manifest_names_the_archives_and_nothing_else_differs(workspace, out
     assert got == original
 
 
-def test_objects_are_those_of_the_registry(workspace, out):
+def test_objects_equal_those_of_the_registry(workspace, out):
     publish(workspace, "tea", out)
     with Registry(workspace.registry_path("town")) as registry:
         assert json.loads((out / "objects" / "0.json").read_text()) == json.loads(json.dumps(registry.shard(0)))
@@ -112,7 +120,7 @@ def test_objects_are_those_of_the_registry(workspace, out):
             assert json.loads((out / "objects" / "columns" / f"{key}.json").read_text()) == column
 
 
-def test_a_static_host_with_ranges_is_enough(workspace, out):
+def test_a_static_host_with_range_requests_suffices(workspace, out):
     publish(workspace, "tea", out)
     with static_host(out) as address, httpx.Client(base_url=address) as client:
         manifest = Manifest.load(client.get("/rendering.json").content)
@@ -123,9 +131,9 @@ def test_a_static_host_with_ranges_is_enough(workspace, out):
 
                 def ranges(offset, length, path=path, asked=asked):
                     asked.append(length)
-                    answer = client.get(f"/{path}", headers={"Range": f"bytes={offset}-{offset + length - 1}"})
-                    assert answer.status_code == 206
-                    return answer.content
+                    response = client.get(f"/{path}", headers={"Range": f"bytes={offset}-{offset + length - 1}"})
+                    assert response.status_code == 206
+                    return response.content
 
                 reader = Reader(ranges)
                 for tile in every_tile()[::5]:
@@ -133,12 +141,12 @@ def test_a_static_host_with_ranges_is_enough(workspace, out):
                 assert reader.get(ZMAX, 15, 0) is None
 
 
-def test_the_readme_tells_of_ranges(workspace, out):
+def test_the_readme_explains_range_requests(workspace, out):
     publish(workspace, "tea", out)
     text = (out / "README.txt").read_text()
     assert "range requests" in text
     assert "http.server" in text
-    assert text.startswith("Tea <time>\n© somebody\n")
+    assert text.startswith("Tea <time>\n© Somebody\n")
 
 
 def test_sha256sum_can_check_a_copy(workspace, out):
@@ -155,7 +163,7 @@ def test_publishing_twice_gives_equal_bytes(workspace, out):
     assert contents(out) == contents(out.with_name("again"))
 
 
-def test_what_is_there_is_replaced_only_when_allowed(workspace, out):
+def test_a_published_folder_is_replaced_only_on_request(workspace, out):
     publish(workspace, "tea", out)
     (out / "mark").touch()
     with pytest.raises(AlreadyExists, match="--replace"):
@@ -166,23 +174,23 @@ def test_what_is_there_is_replaced_only_when_allowed(workspace, out):
     assert not list(out.parent.glob(".public*"))
 
 
-def test_a_folder_of_something_else_is_never_replaced(workspace, out):
+def test_other_folders_are_never_replaced(workspace, out):
     out.mkdir()
     (out / "thesis.txt").write_text("irreplaceable")
-    with pytest.raises(AlreadyExists, match="no published rendering"):
+    with pytest.raises(AlreadyExists, match="not a published rendering"):
         publish(workspace, "tea", out, replace=True)
     assert contents(out) == {"thesis.txt": b"irreplaceable"}
 
 
-def test_an_empty_folder_may_be_filled(workspace, out):
+def test_an_empty_folder_is_filled(workspace, out):
     out.mkdir()
     publish(workspace, "tea", out)
     assert (out / "index.html").is_file()
 
 
-def test_a_stopped_publishing_goes_on_where_it_stopped(workspace, out):
+def test_a_stopped_publish_resumes(workspace, out):
     seen = []
-    with pytest.raises(Stopped, match="go on"):
+    with pytest.raises(Stopped, match="to resume"):
         publish(workspace, "tea", out, progress=lambda *step: seen.append(step) or len(seen) < 4)
     assert not out.exists()
     done = publish(workspace, "tea", out)
@@ -190,7 +198,7 @@ def test_a_stopped_publishing_goes_on_where_it_stopped(workspace, out):
     assert verify_published(out, workspace).archives == 8
 
 
-def test_a_killed_publishing_leaves_nothing_under_its_name(workspace, out, tmp_path, built_viewer):
+def test_a_killed_publish_leaves_no_folder(workspace, out, tmp_path, built_viewer):
     script = (
         "import os, sys; from pathlib import Path\n"
         "from map3d.catalogue import Workspace; from map3d.publish import publish; from map3d.tiles import viewer_files\n"
@@ -207,7 +215,7 @@ def test_a_killed_publishing_leaves_nothing_under_its_name(workspace, out, tmp_p
     assert contents(out) == contents(reference)
 
 
-def test_archives_of_other_tiles_are_not_taken_up(workspace, out):
+def test_archives_of_other_tiles_are_not_reused(workspace, out):
     with pytest.raises(Stopped):
         publish(workspace, "tea", out, progress=lambda stage, done, total: done < total / 2)
     with SqliteTileStore(workspace.store_path("tea", "0-45")) as store:
@@ -217,7 +225,7 @@ def test_archives_of_other_tiles_are_not_taken_up(workspace, out):
     verify_published(out, workspace)
 
 
-def test_damaged_archives_are_not_taken_up(workspace, out):
+def test_damaged_archives_are_not_reused(workspace, out):
     with pytest.raises(Stopped):
         publish(workspace, "tea", out, progress=lambda stage, done, total: done < total / 2)
     draft = out.with_name(".public.publishing")
@@ -227,7 +235,7 @@ def test_damaged_archives_are_not_taken_up(workspace, out):
     verify_published(out, workspace)
 
 
-def test_tiles_that_change_meanwhile_are_noticed(workspace, out):
+def test_tiles_that_change_during_publishing_are_detected(workspace, out):
     def render_on(*_):
         with SqliteTileStore(workspace.store_path("tea", "0-45")) as store:
             put_block(store, "0-45", BlockId(1, 0, 0), Occupancy.from_tiles(ZMAX, OCCUPIED), version=2, salt="new")
@@ -238,7 +246,7 @@ def test_tiles_that_change_meanwhile_are_noticed(workspace, out):
     assert not out.exists()
 
 
-def test_an_incomplete_rendering_must_be_allowed(workspace, out):
+def test_an_incomplete_rendering_needs_permission(workspace, out):
     path = workspace.manifest_path("tea")
     path.write_text(path.read_text().replace('"complete": true', '"complete": false'))
     with pytest.raises(BadRequest, match="map3d render"):
@@ -259,20 +267,19 @@ def test_an_empty_layer_has_no_archive(workspace, out):
     verify_published(out, workspace)
 
 
-def test_what_is_not_there_cannot_be_published(workspace, out):
+def test_an_unknown_rendering_is_not_found(workspace, out):
     with pytest.raises(NotFound):
         publish(workspace, "none", out)
 
 
-def test_without_the_viewer_nothing_is_begun(workspace, out, tmp_path, monkeypatch):
+def test_without_the_viewer_nothing_is_written(workspace, out, tmp_path, monkeypatch):
     monkeypatch.setattr(viewer_files, "files", lambda _: tmp_path / "nowhere")
     with pytest.raises(viewer_files.ViewerMissing, match="make build"):
         publish(workspace, "tea", out)
     assert not list(out.parent.glob(".public*"))
 
 
-def test_progress_counts_every_tile(workspace, out, monkeypatch):
-    monkeypatch.setattr(folder_module, "verify_published", None, raising=False)
+def test_progress_counts_every_tile(workspace, out):
     seen = []
     publish(workspace, "tea", out, progress=lambda *step: seen.append(step) or True)
     total = len(every_tile()) * 8

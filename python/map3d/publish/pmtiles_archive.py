@@ -1,4 +1,4 @@
-"""One pyramid as a PMTiles archive: tiles in the order of their ids, equal tiles once, the tile numbers of the pyramid unchanged."""
+"""Reads and writes one pyramid as a PMTiles archive: tiles sorted by id, equal tiles stored once, tile coordinates unchanged."""
 
 import itertools
 import os
@@ -20,27 +20,27 @@ _reading: Any = pmtiles.reader
 _writing: Any = pmtiles.writer
 
 TILE_TYPES: Final = {"webp": TileType.WEBP, "png": TileType.PNG, "jpeg": TileType.JPEG}
-PER_STEP: Final = 256
+TILES_PER_STEP: Final = 256
 LEAF_ENTRIES: Final = 256
-"""Tiles of a leaf directory, 0.9 kB or so: who looks at one place of a large pyramid reads four or five of them. Doubled until the root fits."""
+"""Tiles per leaf directory, about 0.9 kB. A client that shows one area of a large pyramid reads four or five. Doubled until the root fits."""
 
-Step = Callable[[int], None]
-"""Told of every few tiles written; stops the work by raising."""
+OnTilesWritten = Callable[[int], None]
+"""Called with the number of tiles written since the last call. Stops the work by raising."""
 
 
-def write_archive(store: TileStore, layer: int, path: Path, metadata: dict[str, Any], step: Step) -> int:
-    """Writes the archive and returns how many tiles it has; it appears under `path` when whole and durable. A pyramid without tiles has none."""
+def write_archive(store: TileStore, layer: int, path: Path, metadata: dict[str, Any], on_tiles_written: OnTilesWritten) -> int:
+    """Writes the archive, which appears under `path` once complete and durable. Returns the number of tiles; without tiles it writes nothing."""
     ids = sorted(zxy_to_tileid(*tile) for tile in store.list_tiles(layer))
     if not ids:
         return 0
     draft = path.with_name(path.name + ".part")
     path.parent.mkdir(parents=True, exist_ok=True)
     with draft.open("wb") as file, tempfile.TemporaryFile(dir=path.parent) as data:
-        writer = _writer(file, data)
+        writer = _create_writer(file, data)
         for done, tile_id in enumerate(ids, 1):
-            _write_tile(writer, tile_id, _tile(store, layer, TileId(*tileid_to_zxy(tile_id))))
-            if done % PER_STEP == 0 or done == len(ids):
-                step((done - 1) % PER_STEP + 1)
+            _write_tile(writer, tile_id, _read_tile(store, layer, TileId(*tileid_to_zxy(tile_id))))
+            if done % TILES_PER_STEP == 0 or done == len(ids):
+                on_tiles_written((done - 1) % TILES_PER_STEP + 1)
         with _small_leaves():
             writer.finalize({"tile_type": TILE_TYPES[store.shape.layers[layer].format], "tile_compression": Compression.NONE}, metadata)
         file.flush()
@@ -50,10 +50,10 @@ def write_archive(store: TileStore, layer: int, path: Path, metadata: dict[str, 
 
 
 class Archive:
-    """A written archive, open for reading."""
+    """A PMTiles archive, open for reading."""
 
     def __init__(self, path: Path) -> None:
-        """Raises Corrupt unless it is an archive of raster tiles."""
+        """Raises Corrupt unless the file is a PMTiles archive."""
         self.path = path
         try:
             with path.open("rb") as file:
@@ -64,8 +64,8 @@ class Archive:
         except Exception as error:
             raise Corrupt(f"{path}: not a PMTiles archive: {type(error).__name__}: {error}") from error
 
-    def is_of(self, layer: Layer) -> bool:
-        """Whether it says that its tiles are of the layer's format."""
+    def has_format_of(self, layer: Layer) -> bool:
+        """Whether the header declares the layer's format."""
         return bool(self._header["tile_type"] == TILE_TYPES[layer.format] and self._header["tile_compression"] == Compression.NONE)
 
     @property
@@ -73,19 +73,19 @@ class Archive:
         return bool(self._header["clustered"])
 
     def tiles(self) -> Iterator[tuple[TileId, bytes]]:
-        """In the order of their ids; raises Corrupt where one reaches beyond the file."""
+        """Yields the tiles by id. Raises Corrupt if a directory or the length of the file is wrong."""
         end = self._header["tile_data_offset"] + self._header["tile_data_length"]
         try:
             if end != self.path.stat().st_size:
-                raise Corrupt(f"{self.path}: is {self.path.stat().st_size} bytes, expected {end}; copy it again")
+                raise Corrupt(f"{self.path}: the file has {self.path.stat().st_size} bytes, expected {end}; copy it again")
             for (z, x, y), data in _reading.traverse(self._source, self._header, self._header["root_offset"], self._header["root_length"]):
                 yield TileId(z, x, y), data
         except (OSError, EOFError, ValueError, IndexError) as error:
-            raise Corrupt(f"{self.path}: a directory is damaged: {error}") from error
+            raise Corrupt(f"{self.path}: damaged directory; publish or copy the archive again: {error}") from error
 
 
-def _writer(file: BinaryIO, data: IO[bytes]) -> Any:
-    """Keeps tile data beside the archive, not in the system's temporary folder."""
+def _create_writer(file: BinaryIO, data: IO[bytes]) -> Any:
+    """Buffers tile data in `data`, beside the archive, instead of the system's temporary folder."""
     writer = _writing.Writer(file)
     writer.tile_f.close()
     writer.tile_f = data
@@ -94,17 +94,17 @@ def _writer(file: BinaryIO, data: IO[bytes]) -> Any:
 
 @contextmanager
 def _small_leaves() -> Iterator[None]:
-    """The writer's own leaves begin at 4,096 entries, 13 kB each, for the sake of whole planets."""
-    its_own = _writing.optimize_directories
-    _writing.optimize_directories = _directories
+    """Replaces the library's directories, whose leaves start at 4,096 entries (13 kB), by smaller ones."""
+    original = _writing.optimize_directories
+    _writing.optimize_directories = _build_directories
     try:
         yield
     finally:
-        _writing.optimize_directories = its_own
+        _writing.optimize_directories = original
 
 
-def _directories(entries: list[Entry], root_bytes: int) -> tuple[bytes, bytes, int]:
-    """Root and leaf directories, and how many leaves; the root is shorter than `root_bytes`."""
+def _build_directories(entries: list[Entry], root_bytes: int) -> tuple[bytes, bytes, int]:
+    """Returns the root directory, the leaf directories and their number. The root is shorter than `root_bytes`."""
     whole: bytes = _writing.serialize_directory(entries)
     if len(whole) < root_bytes:
         return whole, b"", 0
@@ -116,7 +116,7 @@ def _directories(entries: list[Entry], root_bytes: int) -> tuple[bytes, bytes, i
 
 
 def _write_tile(writer: Any, tile_id: int, data: bytes) -> None:
-    """As the writer's own, which knows equal tiles by a hash of 64 bits that differs from run to run; by their content's hash here."""
+    """Deduplicates by content hash. The library uses a 64-bit hash that differs from run to run."""
     digest = content_hash(data)
     found = writer.hash_to_offset.get(digest)
     if found is None:
@@ -131,8 +131,8 @@ def _write_tile(writer: Any, tile_id: int, data: bytes) -> None:
     writer.addressed_tiles += 1
 
 
-def _tile(store: TileStore, layer: int, tile: TileId) -> bytes:
+def _read_tile(store: TileStore, layer: int, tile: TileId) -> bytes:
     data = store.get_tile(layer, *tile)
     if data is None:
-        raise Corrupt(f"tile {layer}: {tile.z}/{tile.x}/{tile.y} was removed while it was published; publish again")
+        raise Corrupt(f"tile {layer}: {tile.z}/{tile.x}/{tile.y} was removed during publishing; publish again")
     return data

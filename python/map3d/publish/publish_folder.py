@@ -1,6 +1,6 @@
-"""Publishing (spec/manifest.md): manifest, archives, attribute shards and viewer in one folder that any static host with range requests can serve.
+"""Publishes a rendering (spec/manifest.md): manifest, archives, attribute shards and viewer in one folder for any static host with range requests.
 
-The folder grows under a hidden name beside its place and is renamed when whole. What was finished before a stop is kept and used again.
+The draft has a hidden name beside the final folder and is renamed once complete. After a stop, the next attempt reuses the finished archives.
 """
 
 import json
@@ -16,7 +16,6 @@ from map3d.catalogue import Workspace
 from map3d.errors import AlreadyExists, BadRequest, Corrupt, NotFound, Stopped, StoreError
 from map3d.geometry.views import track_id
 from map3d.publish.pmtiles_archive import Archive, write_archive
-from map3d.publish.readme import README, readme
 from map3d.registry import Registry
 from map3d.tiles.manifest import ATTRIBUTES, COLUMNS, FILE_NAME, SEARCH, SHARDS, Manifest, ViewFacts, dump_document
 from map3d.tiles.sqlite_store import SqliteTileStore
@@ -24,17 +23,37 @@ from map3d.tiles.store import TileStore
 from map3d.tiles.viewer_files import viewer_files, viewer_folder
 from map3d.types import Layer
 
-Progress = Callable[[str, int, int], bool]
+OnTiles = Callable[[str, int, int], bool]
 """(stage, done, total) → False to stop."""
 
 CHECKSUMS: Final = "checksums.sha256"
+README: Final = "README.txt"
+ICON: Final = "favicon.ico"
+_ICON_PATH: Final = Path(__file__).parents[1] / "web" / "static" / ICON
 ARCHIVE_VERSION: Final = 1
-"""Raised when archives of the same tiles change, so that unfinished folders of before are not taken up."""
+"""Incremented when archives of the same tiles change, so that archives of older drafts are not reused."""
+
+_README_TEXT: Final = """{title}
+{attribution}
+This folder is a self-contained map of oblique views, rendered with map3d. Copy it to any web host and open index.html there.
+
+The host must
+- serve range requests (HTTP "Range"). nginx, Apache, Caddy and S3-compatible hosts do; `python -m http.server` does not, so the map stays empty.
+  To view the map on your own machine: `caddy file-server --listen :8000`, or nginx with `root` set to this folder.
+- send *.pmtiles uncompressed: they contain compressed images.
+To use the tiles from pages on other hosts, send `Access-Control-Allow-Origin: *` and allow the request header `Range`.
+
+rendering.json           views, layers, levels, coordinate system
+<view>/<layer>.pmtiles   tiles of one view and layer
+objects/                 attributes of the objects, and the search index
+index.html, *.js         the viewer
+checksums.sha256         to check a copy, run: sha256sum -c checksums.sha256
+"""
 
 
 @dataclass(frozen=True)
 class Published:
-    """What was published. `kept`: archives that an earlier, stopped attempt had finished."""
+    """Counts of a published folder. `kept`: archives reused from a stopped attempt."""
 
     folder: Path
     tiles: int
@@ -50,57 +69,57 @@ def publish(
     *,
     replace: bool = False,
     allow_incomplete: bool = False,
-    progress: Progress | None = None,
+    progress: OnTiles | None = None,
 ) -> Published:
-    """Writes the folder `out`. `replace`: an earlier one of that name gives way, at the very end.
+    """Writes the folder `out`. With `replace`, the last step replaces an existing published folder.
 
-    Raises NotFound, AlreadyExists, BadRequest (not complete), Corrupt (changed meanwhile), Stopped, StoreError, and ViewerMissing before any work.
+    Raises NotFound, AlreadyExists, BadRequest (incomplete), Corrupt (tiles changed meanwhile), Stopped, StoreError; ViewerMissing before any work.
     """
     out = out.absolute()
     viewer_folder()
-    manifest = _manifest(workspace, rendering, allow_incomplete)
-    _check_place(out, replace)
+    manifest = _read_manifest(workspace, rendering, allow_incomplete)
+    _check_target(out, replace)
     draft = out.with_name(f".{out.name}.publishing")
     try:
         draft.mkdir(parents=True, exist_ok=True)
-        work = _Work(workspace, manifest, draft, progress or (lambda *_: True))
-        done = work.write()
-        _put_in_place(draft, out)
+        writer = _FolderWriter(workspace, manifest, draft, progress or (lambda *_: True))
+        writer.write()
+        _replace_folder(draft, out)
     except OSError as error:
-        raise StoreError(f"{draft}: cannot write: {error}") from error
-    return Published(out, done.tiles, done.archives, done.kept, sum(path.stat().st_size for path in out.rglob("*") if path.is_file()))
+        raise StoreError(f"{draft}: cannot write the folder: {error}") from error
+    return Published(out, writer.tiles, writer.archives, writer.kept, sum(path.stat().st_size for path in out.rglob("*") if path.is_file()))
 
 
-class _Work:
-    """The folder under its hidden name."""
+class _FolderWriter:
+    """Writes the draft folder."""
 
-    def __init__(self, workspace: Workspace, manifest: Manifest, draft: Path, progress: Progress) -> None:
+    def __init__(self, workspace: Workspace, manifest: Manifest, draft: Path, progress: OnTiles) -> None:
         self._workspace, self._manifest, self._draft, self._progress = workspace, manifest, draft, progress
         self.tiles = self.archives = self.kept = self._done = 0
         self._total = sum(view.occupancy.count() for view in manifest.views) * len(manifest.layers)
         self._files: dict[str, str] = {}
 
-    def write(self) -> "_Work":
+    def write(self) -> None:
         archives = {view.frame.id: self._write_view(view) for view in self._manifest.views}
-        scene = self._scene()
+        scene = self._find_scene()
         with Registry(self._workspace.registry_path(scene)) as registry:
             for shard in registry.shards():
-                self._put(SHARDS.format(shard=shard["shard"]), dump_document(shard))
-            self._put(SEARCH, dump_document(registry.search()))
-            self._put(ATTRIBUTES, dump_document(registry.attribute_index()))
+                self._write_file(SHARDS.format(shard=shard["shard"]), dump_document(shard))
+            self._write_file(SEARCH, dump_document(registry.search()))
+            self._write_file(ATTRIBUTES, dump_document(registry.attribute_index()))
             for key, column in registry.columns():
-                self._put(COLUMNS.format(column=key), dump_document(column))
+                self._write_file(COLUMNS.format(column=key), dump_document(column))
+        self._write_file(ICON, _ICON_PATH.read_bytes())
         for file in viewer_files():
-            self._put(file.as_posix(), (viewer_folder() / file).read_bytes())
-        self._put(README, readme(self._manifest).encode())
-        self._put(FILE_NAME, self._manifest.with_archives(archives).dump())
+            self._write_file(file.as_posix(), (viewer_folder() / file).read_bytes())
+        self._write_file(README, _readme(self._manifest).encode())
+        self._write_file(FILE_NAME, self._manifest.with_archives(archives).dump())
         lines = [f"{digest}  {name}\n" for name, digest in sorted(self._files.items())]
-        self._put(CHECKSUMS, "".join(lines).encode())
-        self._remove_others()
-        return self
+        self._write_file(CHECKSUMS, "".join(lines).encode())
+        self._remove_leftovers()
 
     def _write_view(self, view: ViewFacts) -> dict[str, str]:
-        """Layer → path of its archive."""
+        """Returns the archive path of each layer."""
         paths = {}
         for number, layers in enumerate(self._manifest.passes):
             track = self._workspace.store_path(self._manifest.name, track_id(view.frame.id, number))
@@ -109,27 +128,29 @@ class _Work:
                     name = f"{view.frame.id}/{layer.name}.pmtiles"
                     if self._write_archive(store, layer, view.frame.id, self._draft / name):
                         paths[layer.name] = name
-                        self._files[name] = _digest(self._draft / name)
+                        self._files[name] = _file_digest(self._draft / name)
                         self.archives += 1
         return paths
 
     def _write_archive(self, store: TileStore, layer: Layer, view: str, path: Path) -> int:
         metadata = self._metadata(store, layer, view)
         number = store.shape.number_of(layer.name)
-        tiles = _tiles_of_finished(path, metadata)
+        tiles = _count_finished_tiles(path, metadata)
         if tiles:
             self.kept += 1
-            self._step(tiles)
+            self._advance(tiles)
         else:
-            tiles = write_archive(store, number, path, metadata, self._step)
+            tiles = write_archive(store, number, path, metadata, self._advance)
         if self._metadata(store, layer, view) != metadata:
             path.unlink(missing_ok=True)
-            raise Corrupt(f"rendering {self._manifest.name}, view {view}: tiles changed meanwhile; publish again when nothing renders")
+            raise Corrupt(
+                f"rendering {self._manifest.name}, view {view}: tiles changed during publishing; wait until no render runs, then publish again"
+            )
         self.tiles += tiles
         return tiles
 
     def _metadata(self, store: TileStore, layer: Layer, view: str) -> dict[str, Any]:
-        """`content` tells archives of other tiles apart."""
+        """Returns the archive's metadata; `content` is the digest of everything that its tiles depend on."""
         blocks = [(str(block.id), block.key, block.version, block.tiles) for block in store.list_blocks()]
         content = sha256(json.dumps([ARCHIVE_VERSION, layer.name, layer.format, blocks]).encode()).hexdigest()
         facts = {"rendering": self._manifest.name, "view": view, "layer": layer.name, "content": content}
@@ -137,12 +158,12 @@ class _Work:
         description = "Oblique image tiles in the view's own plane, not on the globe: see rendering.json."
         return {"name": f"{title}: {layer.name}", "attribution": self._manifest.attribution, "description": description, "map3d": facts}
 
-    def _step(self, tiles: int) -> None:
+    def _advance(self, tiles: int) -> None:
         self._done += tiles
         if not self._progress("publish", self._done, max(self._total, self._done)):
-            raise Stopped(f"publishing stopped after {self._done:,} tiles; publish again to go on where it stopped")
+            raise Stopped(f"publishing stopped after {self._done:,} tiles; publish again to resume")
 
-    def _put(self, name: str, data: bytes) -> None:
+    def _write_file(self, name: str, data: bytes) -> None:
         path = self._draft / name
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("wb") as file:
@@ -151,15 +172,15 @@ class _Work:
             os.fsync(file.fileno())
         self._files[name] = sha256(data).hexdigest()
 
-    def _remove_others(self) -> None:
-        """What an earlier attempt left and this one does not have."""
+    def _remove_leftovers(self) -> None:
+        """Removes the files of earlier attempts that this one did not write."""
         for path in sorted(self._draft.rglob("*"), reverse=True):
             if path.is_file() and path.relative_to(self._draft).as_posix() not in self._files:
                 path.unlink()
             elif path.is_dir() and not any(path.iterdir()):
                 path.rmdir()
 
-    def _scene(self) -> str:
+    def _find_scene(self) -> str:
         catalogue = self._workspace.open_catalogue()
         try:
             return catalogue.rendering(self._manifest.name).scene
@@ -167,28 +188,28 @@ class _Work:
             catalogue.close()
 
 
-def _manifest(workspace: Workspace, rendering: str, allow_incomplete: bool) -> Manifest:
+def _read_manifest(workspace: Workspace, rendering: str, allow_incomplete: bool) -> Manifest:
     path = workspace.manifest_path(rendering)
     try:
         manifest = Manifest.load(path.read_bytes(), str(path))
     except FileNotFoundError as error:
-        raise NotFound(f"rendering {rendering!r} is not there, or nothing of it is rendered yet: map3d render {rendering}") from error
+        raise NotFound(f"no rendering {rendering!r}, or it has no tiles yet; run: map3d render {rendering}") from error
     if not manifest.complete and not allow_incomplete:
-        raise BadRequest(f"rendering {rendering!r} is not complete; render it first (map3d render {rendering}), or give --allow-incomplete")
+        raise BadRequest(f"rendering {rendering!r} is incomplete; render it first (map3d render {rendering}), or give --allow-incomplete")
     return manifest
 
 
-def _check_place(out: Path, replace: bool) -> None:
+def _check_target(out: Path, replace: bool) -> None:
     if not out.exists() or (out.is_dir() and not any(out.iterdir())):
         return
     if not out.is_dir() or not (out / FILE_NAME).is_file():
-        raise AlreadyExists(f"{out}: is there already and is no published rendering; name another folder")
+        raise AlreadyExists(f"{out}: exists and is not a published rendering; name another folder")
     if not replace:
-        raise AlreadyExists(f"{out}: is published already; replace it with --replace, or name another folder")
+        raise AlreadyExists(f"{out}: already contains a published rendering; replace it with --replace, or name another folder")
 
 
-def _tiles_of_finished(path: Path, metadata: dict[str, Any]) -> int:
-    """How many tiles a finished archive of the same content has; 0 when there is none."""
+def _count_finished_tiles(path: Path, metadata: dict[str, Any]) -> int:
+    """Returns the number of tiles in a finished archive of the same content; 0 without one."""
     if not path.is_file():
         return 0
     try:
@@ -198,7 +219,7 @@ def _tiles_of_finished(path: Path, metadata: dict[str, Any]) -> int:
         return 0
 
 
-def _digest(path: Path) -> str:
+def _file_digest(path: Path) -> str:
     digest = sha256()
     with path.open("rb") as file:
         while chunk := file.read(1 << 20):
@@ -206,10 +227,15 @@ def _digest(path: Path) -> str:
     return digest.hexdigest()
 
 
-def _put_in_place(draft: Path, out: Path) -> None:
+def _replace_folder(draft: Path, out: Path) -> None:
     old = out.with_name(f".{out.name}.old")
     shutil.rmtree(old, ignore_errors=True)
     if out.exists():
         out.rename(old)
     draft.rename(out)
     shutil.rmtree(old, ignore_errors=True)
+
+
+def _readme(manifest: Manifest) -> str:
+    attribution = f"{manifest.attribution}\n" if manifest.attribution else ""
+    return _README_TEXT.format(title=manifest.title or manifest.name, attribution=attribution)

@@ -12,7 +12,7 @@ from map3d.errors import Corrupt, NotFound, VerifyFailed
 from map3d.geometry.views import track_id
 from map3d.publish.pmtiles_archive import Archive
 from map3d.publish.publish_folder import CHECKSUMS
-from map3d.tiles.manifest import ATTRIBUTES, FILE_NAME, SEARCH, Manifest, ViewFacts
+from map3d.tiles.manifest import ATTRIBUTES, FILE_NAME, SEARCH, Manifest, ManifestView
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.store import TileStore
@@ -69,7 +69,7 @@ def _check_sums(folder: Path) -> tuple[int, list[str]]:
     return len(lines) - len(problems), problems
 
 
-def _check_layer(folder: Path, view: ViewFacts, layer: Layer, track: Path | None) -> tuple[int, list[str]]:
+def _check_layer(folder: Path, view: ManifestView, layer: Layer, track: Path | None) -> tuple[int, list[str]]:
     """Returns the number of tiles and the problems. `track`: the tile store to compare with."""
     name = (view.archives or {}).get(layer.name)
     if name is None:
@@ -79,7 +79,7 @@ def _check_layer(folder: Path, view: ViewFacts, layer: Layer, track: Path | None
         store = None if track is None else opened.enter_context(SqliteTileStore(track, read_only=True))
         try:
             archive = Archive(folder / name)
-            problems = [] if archive.is_of(layer) else [f"{name}: its tiles are not {layer.format}"]
+            problems = [] if archive.has_format_of(layer) else [f"{name}: its tiles are not {layer.format}"]
             seen: set[TileId] = set()
             problems += _check_tiles(archive, name, layer, store, seen)
         except Corrupt as error:
@@ -88,7 +88,7 @@ def _check_layer(folder: Path, view: ViewFacts, layer: Layer, track: Path | None
 
 
 def _check_tiles(archive: Archive, name: str, layer: Layer, store: TileStore | None, seen: set[TileId]) -> Iterator[str]:
-    number = 0 if store is None else store.shape.number_of(layer.name)
+    number = 0 if store is None else store.shape.layer_number(layer.name)
     for tile, data in archive.tiles():
         seen.add(tile)
         if not data.startswith(FIRST_BYTES[layer.format]):
