@@ -106,10 +106,10 @@ def test_geographic_coordinates_are_transformed_to_the_scenes_crs(workspace: Wor
 def test_ids_stay_when_a_file_is_imported_again(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
     add(workspace, catalogue, tmp_path / "a.gml", gml(("B1", UTM_RING, UTM), ("B2", UTM_RING, UTM)))
     with Registry(workspace.registry_path("town")) as registry:
-        before = registry.ids_of("a")
+        before = registry.ids_by_name("a")
     done = add(workspace, catalogue, tmp_path / "a.gml", gml(("B3", UTM_RING, UTM), ("B2", UTM_RING, UTM)))
     with Registry(workspace.registry_path("town")) as registry:
-        after = registry.ids_of("a")
+        after = registry.ids_by_name("a")
         assert registry.get(before["B1"]) is None
     assert done.replaced
     assert after["B2"] == before["B2"]

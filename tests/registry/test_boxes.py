@@ -5,7 +5,7 @@ import numpy as np
 from map3d.registry.boxes import object_boxes
 
 
-def test_boxes_are_those_of_brute_force() -> None:
+def test_boxes_match_brute_force() -> None:
     chance = np.random.default_rng(1)
     points = chance.normal(size=(50, 3))
     triangles = chance.integers(0, 50, size=(200, 3), dtype=np.uint32)
@@ -20,6 +20,6 @@ def test_boxes_are_those_of_brute_force() -> None:
             assert np.all(boxes[number, 1] == -np.inf)
 
 
-def test_no_triangles_no_boxes() -> None:
+def test_objects_without_triangles_have_no_box() -> None:
     boxes = object_boxes(np.zeros((0, 3)), np.zeros((0, 3), np.uint32), np.zeros(0, np.uint32), 2)
     assert np.all(np.isinf(boxes))

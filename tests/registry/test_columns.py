@@ -1,4 +1,4 @@
-"""Attributes column by column: what the index tells, and what the columns have."""
+"""Attributes by column: the index and the columns."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -35,14 +35,14 @@ def row_of(registry: Registry, name: str) -> dict[str, Any]:
     return found
 
 
-def test_a_column_has_what_the_objects_have(registry: Registry) -> None:
+def test_a_column_has_the_values_of_the_objects(registry: Registry) -> None:
     values = [12.5, 9, -3, 1e300, 2**70, "text", "1000", "", True, False, 'a"b\0\u20ac']
     ids = registry.put_asset("a", [thing(str(k), {"value": value, "other": k}) for k, value in enumerate(values)]).tolist()
     found = column_of(registry, "value")
     assert [(type(found[number]), found[number]) for number in ids] == [(type(value), value) for value in values]
 
 
-def test_the_index_counts(registry: Registry) -> None:
+def test_the_index_counts_values(registry: Registry) -> None:
     registry.put_asset(
         "a", [thing("x", {"height": 3, "year": "1900"}), thing("y", {"height": 7.5, "year": None}), thing("z", {"height": 3, "flag": True})]
     )
@@ -69,7 +69,7 @@ def test_values_of_several_types_are_mixed(registry: Registry) -> None:
     assert "min" not in row
 
 
-def test_parts_have_what_their_whole_says(registry: Registry) -> None:
+def test_children_inherit_the_values_of_their_ancestors(registry: Registry) -> None:
     objects = [
         thing("house", {"year": 1900}),
         thing("wing", {}, 0),
@@ -83,25 +83,25 @@ def test_parts_have_what_their_whole_says(registry: Registry) -> None:
     assert shed not in column_of(registry, "year")
 
 
-def test_class_and_asset_are_columns_beside_attributes_of_that_name(registry: Registry) -> None:
+def test_class_and_asset_are_separate_from_attributes_of_the_same_name(registry: Registry) -> None:
     (one,) = registry.put_asset("a", [thing("x", {"class": "own"}, kind="bridge")]).tolist()
     assert column_of(registry, "class", "object") == {one: "bridge"}
     assert column_of(registry, "asset", "object") == {one: "a"}
     assert column_of(registry, "class") == {one: "own"}
 
 
-def test_objects_that_left_are_in_no_column(registry: Registry) -> None:
+def test_removed_objects_are_in_no_column(registry: Registry) -> None:
     registry.put_asset("a", [thing("x", {"old": 1})])
     registry.put_asset("a", [thing("y", {"new": 1})])
     assert [row["name"] for row in registry.attribute_index()["attributes"]] == ["class", "asset", "new"]
     assert registry.column(column_key("attributes", "old")) is None
 
 
-def test_columns_are_the_same_however_many_are_held_at_once(registry: Registry, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_columns_do_not_depend_on_the_memory_limit(registry: Registry, monkeypatch: pytest.MonkeyPatch) -> None:
     registry.put_asset("a", [thing(str(k), {"b": k, "c": str(k), "d": None if k else 1}) for k in range(5)])
     whole = dict(registry.columns())
     assert whole == {row["column"]: registry.column(row["column"]) for row in registry.attribute_index()["attributes"]}
-    monkeypatch.setattr(columns_module, "VALUES_AT_ONCE", 6)
+    monkeypatch.setattr(columns_module, "VALUES_IN_MEMORY", 6)
     assert dict(registry.columns()) == whole
     assert len(whole) == 5
 
@@ -112,8 +112,8 @@ def test_an_empty_registry_has_no_columns(registry: Registry) -> None:
     assert registry.column("0" * 16) is None
 
 
-def test_what_few_objects_have_is_left_out_and_counted(registry: Registry, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(columns_module, "MOST_COLUMNS", 2)
+def test_rare_attributes_are_omitted_and_counted(registry: Registry, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(columns_module, "MAX_COLUMNS", 2)
     registry.put_asset("a", [thing("x", {"b": 1, "c": 1, "a": 1}), thing("y", {"c": 1})])
     index = registry.attribute_index()
     assert [row["name"] for row in index["attributes"]] == ["class", "asset", "a", "c"]

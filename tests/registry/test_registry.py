@@ -1,4 +1,4 @@
-"""Laws of ids, shards and the search index."""
+"""Ids, shards and the search index."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -7,7 +7,7 @@ import pytest
 
 from map3d.errors import LimitExceeded
 from map3d.registry import NewObject, Registry
-from map3d.registry.schema import MAX_ID
+from map3d.registry.registry import MAX_ID
 from map3d.types import Box
 
 UNIT: Box = ((0.0, 0.0, 0.0), (2.0, 4.0, 6.0))
@@ -23,7 +23,7 @@ def things(*names: str) -> list[NewObject]:
     return [NewObject(name, "building", box=UNIT) for name in names]
 
 
-def test_ids_are_positive_and_unique_over_assets(registry: Registry) -> None:
+def test_ids_are_positive_and_unique_across_assets(registry: Registry) -> None:
     first = registry.put_asset("a", things("x", "y"))
     second = registry.put_asset("b", things("x", "y"))
     ids = [*first.tolist(), *second.tolist()]
@@ -32,7 +32,7 @@ def test_ids_are_positive_and_unique_over_assets(registry: Registry) -> None:
     assert first.dtype == "uint32"
 
 
-def test_ids_stay_over_reimports_in_any_order(registry: Registry) -> None:
+def test_ids_survive_reimports_in_any_order(registry: Registry) -> None:
     before = dict(zip("xyz", registry.put_asset("a", things("x", "y", "z")).tolist(), strict=True))
     after = dict(zip("zwx", registry.put_asset("a", things("z", "w", "x")).tolist(), strict=True))
     assert (after["x"], after["z"]) == (before["x"], before["z"])
@@ -50,13 +50,13 @@ def test_an_object_that_returns_gets_its_id_back(registry: Registry) -> None:
     assert first == again != other
 
 
-def test_objects_of_one_name_are_told_apart(registry: Registry) -> None:
+def test_objects_with_the_same_name_have_different_ids(registry: Registry) -> None:
     ids = registry.put_asset("a", things("x", "x", "x"))
     assert len(set(ids.tolist())) == 3
     assert registry.put_asset("a", things("x", "x", "x")).tolist() == ids.tolist()
 
 
-def test_a_parents_box_holds_its_parts(registry: Registry) -> None:
+def test_a_parents_box_contains_its_children(registry: Registry) -> None:
     parts = [
         NewObject("part", "building", parent=1, box=((1.0, 1.0, 1.0), (9.0, 2.0, 2.0))),
         NewObject("whole", "building"),
@@ -71,13 +71,13 @@ def test_a_parents_box_holds_its_parts(registry: Registry) -> None:
     assert inner.parent == whole
 
 
-def test_a_ring_of_parents_ends(registry: Registry) -> None:
+def test_a_cycle_of_parents_terminates(registry: Registry) -> None:
     ring = [NewObject("a", "building", parent=1, box=UNIT), NewObject("b", "building", parent=0)]
     ids = registry.put_asset("a", ring).tolist()
     assert [registry.get(number) is not None for number in ids] == [True, True]
 
 
-def test_shards_hold_the_ids_of_their_thousand(registry: Registry) -> None:
+def test_shards_contain_1024_ids_each(registry: Registry) -> None:
     registry.put_asset("a", [NewObject(f"n{k}", "tree") for k in range(2500)])
     documents = list(registry.shards())
     assert [document["shard"] for document in documents] == registry.shard_numbers() == [0, 1, 2]
@@ -86,7 +86,7 @@ def test_shards_hold_the_ids_of_their_thousand(registry: Registry) -> None:
     assert registry.shard(77) == {"map3d": "objects", "version": 1, "shard": 77, "objects": {}}
 
 
-def test_a_shard_says_what_the_spec_says(registry: Registry) -> None:
+def test_a_shard_matches_the_specification(registry: Registry) -> None:
     attributes = {"roofType": "1000", "height": 12.5, "storeys": 3, "new": True, "none": None, "bad": float("nan"), "list": [1, "é"]}
     (number,) = registry.put_asset("a", [NewObject("x", "building", attributes=attributes, box=UNIT)]).tolist()
     assert registry.shard(0)["objects"][str(number)] == {
@@ -121,12 +121,12 @@ def test_the_search_index_is_sorted_by_label_then_id(registry: Registry) -> None
         ({"name": 5, "address": None}, "id1"),
     ],
 )
-def test_labels_are_name_and_address(registry: Registry, attributes: dict[str, object], label: str) -> None:
+def test_labels_combine_name_and_address(registry: Registry, attributes: dict[str, object], label: str) -> None:
     registry.put_asset("a", [NewObject("id1", "building", attributes=attributes, box=UNIT)])
     assert registry.search()["entries"][0][1] == label
 
 
-def test_ids_are_not_given_beyond_the_last(registry: Registry) -> None:
+def test_ids_end_at_the_maximum(registry: Registry) -> None:
     with registry._database.transaction() as db:
         db.execute("INSERT INTO object(id, asset, name, occurrence, class, attributes, present) VALUES (?, 'z', 'z', 0, 'z', '{}', 0)", (MAX_ID,))
     with pytest.raises(LimitExceeded, match=str(MAX_ID)):
@@ -138,12 +138,12 @@ def test_a_failed_import_leaves_the_earlier_objects(registry: Registry) -> None:
     registry.put_asset("a", things("x"))
     with pytest.raises(IndexError):
         registry.put_asset("a", [NewObject("y", "building", parent=5)])
-    assert list(registry.ids_of("a")) == ["x"]
+    assert list(registry.ids_by_name("a")) == ["x"]
 
 
-def test_the_scenes_own_object_is_there_when_told(registry: Registry) -> None:
-    ground = registry.scene_object("ground", "terrain")
-    assert registry.scene_object("ground", "terrain") == ground
+def test_a_scene_object_is_present_once_set(registry: Registry) -> None:
+    ground = registry.get_or_create_scene_object("ground", "terrain")
+    assert registry.get_or_create_scene_object("ground", "terrain") == ground
     assert registry.count() == 0
     registry.set_scene_object(ground, UNIT)
     assert registry.count() == 1

@@ -6,7 +6,7 @@ import pytest
 
 from map3d.errors import BadName, BadRequest, Corrupt, UnknownVersion
 from map3d.geometry.frames import pin
-from map3d.tiles.manifest import CrsFacts, Geographic, Manifest, ViewFacts, block_version
+from map3d.tiles.manifest import Geographic, Manifest, ManifestCrs, ManifestView, block_version
 from map3d.tiles.occupancy import Occupancy
 from map3d.types import BlockId, Layer, Sun, TileId, ViewAngles
 
@@ -24,14 +24,14 @@ def manifest():
     return Manifest(
         name="teatime",
         title="Tea “time” ☕",
-        attribution="© somebody",
+        attribution="© Somebody",
         content_version=3,
         complete=True,
-        crs=CrsFacts("ETRS89 / UTM zone 32N", 25832, "PROJCRS[…]", "DHHN92 height"),
+        crs=ManifestCrs("ETRS89 / UTM zone 32N", 25832, "PROJCRS[…]", "DHHN92 height"),
         origin=(691000.0, 5336000.0, 500.0),
         box=BOX,
         passes=(LAYERS,),
-        views=tuple(ViewFacts(frame, occupancy, (versions,)) for frame in frames),
+        views=tuple(ManifestView(frame, occupancy, (versions,)) for frame in frames),
         objects=54,
     )
 
@@ -42,14 +42,14 @@ def test_a_manifest_reads_back(manifest):
     assert again.dump() == manifest.dump()
 
 
-PLACE = Geographic(
+GEOGRAPHIC = Geographic(
     (5.0, 5.0), (11.5, 48.1), 656.25, 0.0087, 1, ((0.0, 0.0087, 0.0001), (0.0, 0.0001, 0.0058)), ((0.0, 650.0, 1.0), (0.0, 1.0, 970.0)), 0.01
 )
 
 
-def test_where_it_lies_reads_back(manifest):
-    placed = replace(manifest, geographic=PLACE)
-    assert Manifest.load(placed.dump()).geographic == PLACE
+def test_the_geographic_position_reads_back(manifest):
+    placed = replace(manifest, geographic=GEOGRAPHIC)
+    assert Manifest.load(placed.dump()).geographic == GEOGRAPHIC
     assert b"geographic" not in manifest.dump()
 
 
@@ -65,12 +65,12 @@ LIGHT = (
 
 @pytest.fixture
 def added(manifest):
-    """With a pass that was added and is only begun."""
+    """A manifest with a second, partly rendered pass."""
     views = tuple(replace(view, versions=(*view.versions, {BlockId(1, 1, 1): 4})) for view in manifest.views)
     return replace(manifest, passes=(*manifest.passes, LIGHT), views=views)
 
 
-def test_layers_of_light_say_where_the_sun_stands_and_how_far_they_reach(added):
+def test_light_layers_have_suns_and_radii(added):
     layers = {layer["name"]: layer for layer in json.loads(added.dump())["layers"]}
     noon = {"time": "2026-06-21T13:00:00Z", "azimuth_deg": 196.2, "elevation_deg": 64.1, "direction": [-0.1, -0.4, 0.9]}
     png = {"format": "png", "media_type": "image/png"}
@@ -86,7 +86,7 @@ def test_layers_of_light_say_where_the_sun_stands_and_how_far_they_reach(added):
     assert Manifest.load(added.dump()).passes == added.passes
 
 
-def test_layers_that_were_added_have_versions_of_their_own(added):
+def test_added_layers_have_their_own_versions(added):
     value = json.loads(added.dump())
     assert [layer["name"] for layer in value["layers"]] == ["color", "normal", "id", "depth", "evening", "day", "ao", "behind", "picture"]
     assert (value["views"][0]["version"], value["views"][0]["versions"]) == (3, {"1/1/1": 2})
@@ -108,14 +108,14 @@ def test_layers_that_were_added_have_versions_of_their_own(added):
     ],
 )
 @pytest.mark.parametrize("view", [0, 1])
-def test_passes_that_do_not_fit_are_corrupt(added, view, passes):
+def test_inconsistent_passes_are_corrupt(added, view, passes):
     value = json.loads(added.dump())
     value["views"][view]["passes"] = passes
     with pytest.raises(Corrupt):
         Manifest.load(json.dumps(value))
 
 
-def test_the_document_is_that_of_the_specification(manifest):
+def test_the_document_matches_the_specification(manifest):
     value = json.loads(manifest.dump())
     assert (value["map3d"], value["version"], value["size_m"]) == ("rendering", 1, 409.6)
     assert value["start"] == {"local": [5.0, 5.0, 11.25]}
@@ -132,9 +132,9 @@ def test_the_document_is_that_of_the_specification(manifest):
     assert value["objects"] == {"count": 54, "shard_size": 1024} | files
 
 
-def test_the_schema_names_every_member(manifest, added):
+def test_the_schema_lists_every_member(manifest, added):
     archives = {view.frame.id: {"color": f"{view.frame.id}/color.pmtiles"} for view in manifest.views}
-    value = replace(added, geographic=PLACE).with_archives(archives).to_json()
+    value = replace(added, geographic=GEOGRAPHIC).with_archives(archives).to_json()
     schema = SCHEMA["properties"]
     assert set(schema) == set(value) == {*SCHEMA["required"], "geographic"}
     assert set(schema["views"]["items"]["properties"]) == set(value["views"][0])
@@ -143,7 +143,7 @@ def test_the_schema_names_every_member(manifest, added):
     assert set(schema["objects"]["properties"]) == set(value["objects"])
 
 
-def test_the_schema_accepts_it(manifest, added):
+def test_the_schema_accepts_manifests(manifest, added):
     jsonschema = pytest.importorskip("jsonschema")
     jsonschema.Draft202012Validator.check_schema(SCHEMA)
     jsonschema.validate(manifest.to_json(), SCHEMA)
@@ -152,7 +152,7 @@ def test_the_schema_accepts_it(manifest, added):
         jsonschema.validate({**manifest.to_json(), "version": 2}, SCHEMA)
 
 
-def test_archives_are_told_of_published_folders_only(manifest):
+def test_only_published_folders_have_archives(manifest):
     archives = {view.frame.id: {"color": f"{view.frame.id}/color.pmtiles"} for view in manifest.views}
     published = Manifest.load(manifest.with_archives(archives).dump())
     assert published.view("45-22.5").archives == {"color": "45-22.5/color.pmtiles"}
@@ -166,7 +166,7 @@ def test_a_tile_has_the_version_of_its_block(manifest):
 
 
 def test_a_rendering_without_tiles_has_a_manifest(manifest):
-    empty = replace(manifest, complete=False, objects=0, views=(ViewFacts(manifest.views[0].frame, Occupancy.from_tiles(4, []), ({},)),))
+    empty = replace(manifest, complete=False, objects=0, views=(ManifestView(manifest.views[0].frame, Occupancy.from_tiles(4, []), ({},)),))
     assert Manifest.load(empty.dump()).views[0].occupancy.count() == 0
 
 
@@ -178,7 +178,7 @@ def test_another_version_is_refused_with_both_numbers(manifest):
 @pytest.mark.parametrize(
     "data", [b"", b"{", b"[]", b"null", b'{"map3d": "search", "version": 1}', b'{"map3d": "rendering", "version": 1}', b"\xff", b"[" * 100000]
 )
-def test_what_is_no_manifest_is_corrupt(data):
+def test_other_documents_are_corrupt(data):
     with pytest.raises(Corrupt):
         Manifest.load(data)
 
@@ -204,7 +204,7 @@ def test_what_is_no_manifest_is_corrupt(data):
         (("crs",), None),
     ],
 )
-def test_a_manifest_with_a_wrong_member_is_corrupt(manifest, where, value):
+def test_a_manifest_with_an_invalid_member_is_corrupt(manifest, where, value):
     document = manifest.to_json()
     inner = document
     for step in where[:-1]:
@@ -214,12 +214,12 @@ def test_a_manifest_with_a_wrong_member_is_corrupt(manifest, where, value):
         Manifest.load(json.dumps(document))
 
 
-def test_a_manifest_of_what_does_not_fit_is_not_built(manifest):
+def test_inconsistent_manifests_are_refused(manifest):
     with pytest.raises(BadName):
         replace(manifest, name="Tea Time")
     with pytest.raises(BadRequest):
         replace(manifest, views=())
     with pytest.raises(BadRequest, match="2 passes"):
         replace(manifest, passes=(*manifest.passes, LAYERS[:1]))
-    with pytest.raises(BadRequest, match="one size"):
-        replace(manifest, views=(*manifest.views, ViewFacts(pin(BOX, 256, 0.3, [ViewAngles(90, 45)])[0], Occupancy.from_tiles(3, []), ({},))))
+    with pytest.raises(BadRequest, match="differ in size"):
+        replace(manifest, views=(*manifest.views, ManifestView(pin(BOX, 256, 0.3, [ViewAngles(90, 45)])[0], Occupancy.from_tiles(3, []), ({},))))

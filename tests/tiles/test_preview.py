@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from map3d.geometry.frames import pin
-from map3d.tiles.manifest import CrsFacts, Manifest, ViewFacts
+from map3d.tiles.manifest import Manifest, ManifestCrs, ManifestView
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.preview import ASPECT, MIN_WIDTH_PX, choose_preview
 from map3d.types import BlockId, Layer, TileId, ViewAngles
@@ -17,9 +17,9 @@ SIDE = 2**FRAME.zmax
 
 
 def manifest_of(grid):
-    view = ViewFacts(FRAME, Occupancy.from_grid(grid), ({BlockId(0, 0, 0): 7},))
+    view = ManifestView(FRAME, Occupancy.from_grid(grid), ({BlockId(0, 0, 0): 7},))
     layers = (Layer("normal", "normal", "png"), Layer("color", "color", "webp"))
-    return Manifest("x", 7, True, CrsFacts("local metres"), (0.0, 0.0, 0.0), BOX, (layers,), (view,))
+    return Manifest("x", 7, True, ManifestCrs("local metres"), (0.0, 0.0, 0.0), BOX, (layers,), (view,))
 
 
 def grid_of(shape):
@@ -67,7 +67,7 @@ def test_a_preview_has_the_tiles_that_its_window_shows():
 
 def test_a_small_rendering_shows_its_deepest_level():
     frame = replace(FRAME, zmax=0)
-    manifest = replace(manifest_of(grid_of("tall")), views=(ViewFacts(frame, Occupancy.from_tiles(0, [(0, 0)]), ({BlockId(0, 0, 0): 1},)),))
+    manifest = replace(manifest_of(grid_of("tall")), views=(ManifestView(frame, Occupancy.from_tiles(0, [(0, 0)]), ({BlockId(0, 0, 0): 1},)),))
     assert [tile.tile for tile in choose_preview(manifest).tiles] == [TileId(0, 0, 0)]
 
 

@@ -54,7 +54,7 @@ def test_the_tables_are_those_of_the_specification(path, store):
     assert columns["meta"] == ["key", "value"]
 
 
-def test_bytes_that_no_tile_has_are_removed(path, store):
+def test_unused_blobs_are_deleted(path, store):
     store.put_block(BLOCK, "a", 1, [tile(b"old")], b"s")
     store.put_block(BLOCK, "b", 2, [tile(b"new")], b"s")
     assert rows(path, "SELECT bytes FROM blob") == [(b"new",)]
@@ -69,25 +69,25 @@ def test_equal_tiles_are_stored_once(tmp_path):
     assert rows(path, "SELECT count(*) FROM tile") == [(16,)]
 
 
-def test_a_failed_put_leaves_all_as_it_was(store, monkeypatch):
+def test_a_failed_put_changes_nothing(store, monkeypatch):
     store.put_block(BLOCK, "a", 1, [tile(b"old")], b"s")
 
     def fail(*_):
         raise sqlite3.OperationalError("disk I/O error")
 
-    monkeypatch.setattr("map3d.tiles.sqlite_store._put_tiles", fail)
+    monkeypatch.setattr("map3d.tiles.sqlite_store._insert_tiles", fail)
     with pytest.raises(StoreError, match="disk I/O error"):
         store.put_block(BLOCK, "b", 2, [tile(b"new")], b"t")
     assert store.get_tile(0, 0, 0, 0) == b"old"
     assert store.get_block(BLOCK).key == "a"
 
 
-def test_a_writer_killed_within_a_put_leaves_the_old_block(path, store):
+def test_a_writer_killed_during_a_put_leaves_the_old_block(path, store):
     store.put_block(BLOCK, "a", 1, [tile(b"old")], b"s")
     script = (
         "import os, sys; from pathlib import Path; import map3d.tiles.sqlite_store as home\n"
         "from map3d.tiles.store import StoredTile; from map3d.types import BlockId\n"
-        "home._forget_blobs = lambda *_: os.kill(os.getpid(), 9)\n"
+        "home._delete_unused_blobs = lambda *_: os.kill(os.getpid(), 9)\n"
         "home.SqliteTileStore(Path(sys.argv[1])).put_block(BlockId(0, 0, 0), 'b', 2, [StoredTile(0, 0, 0, 0, b'new')], b't')\n"
     )
     done = subprocess.run([sys.executable, "-c", script, str(path)], check=False, env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)})
@@ -97,7 +97,7 @@ def test_a_writer_killed_within_a_put_leaves_the_old_block(path, store):
     assert store.check() == []
 
 
-def test_a_store_in_a_folder_that_cannot_be_written_is_read(path, store, monkeypatch):
+def test_a_store_in_a_read_only_folder_is_readable(path, store, monkeypatch):
     store.put_block(BLOCK, "a", 1, [tile(b"tile")], b"s")
     store.close()
     before = sorted(path.parent.iterdir())
@@ -107,7 +107,7 @@ def test_a_store_in_a_folder_that_cannot_be_written_is_read(path, store, monkeyp
         assert sorted(path.parent.iterdir()) == before
 
 
-def test_a_full_disk_is_a_typed_error(store):
+def test_a_full_disk_raises_store_error(store):
     store._connections.current().execute("PRAGMA max_page_count = 20")
     with pytest.raises(StoreError, match="full"):
         store.put_block(BLOCK, "a", 1, [tile(bytes(1 << 20))], b"s")
@@ -122,8 +122,8 @@ def test_another_version_is_refused_with_both_numbers(path, store):
         SqliteTileStore(path)
 
 
-@pytest.mark.parametrize("data", [b"", b"not a database, but long enough to be taken for one" * 40])
-def test_a_file_that_is_no_store_is_corrupt(path, data):
+@pytest.mark.parametrize("data", [b"", b"not a database, but long enough to look like one" * 40])
+def test_a_file_that_is_not_a_store_is_corrupt(path, data):
     path.write_bytes(data)
     with pytest.raises((Corrupt, StoreError)):
         SqliteTileStore(path)
@@ -131,7 +131,7 @@ def test_a_file_that_is_no_store_is_corrupt(path, data):
 
 
 @pytest.mark.parametrize("value", ["", "{}", '[{"name": "color"}]', '[{"name": "color", "kind": "color", "format": "gif"}]'])
-def test_a_store_that_does_not_say_its_layers_is_corrupt(path, store, value):
+def test_a_store_with_invalid_layers_is_corrupt(path, store, value):
     with sqlite3.connect(path) as db:
         db.execute("UPDATE meta SET value = ? WHERE key = 'layers'", (value,))
     db.close()
@@ -148,16 +148,16 @@ def test_check_finds_changed_and_lost_bytes(path, store):
     with db:
         db.execute("DELETE FROM blob")
     assert store.check() == ["1 tiles without bytes"]
-    with pytest.raises(Corrupt, match="missing"):
+    with pytest.raises(Corrupt, match="has no bytes"):
         store.get_tile(0, 0, 0, 0)
     with db:
         db.execute("DELETE FROM tile")
     db.close()
-    assert store.check() == ["block 0/0/0: 1 tiles recorded, 0 there"]
+    assert store.check() == ["block 0/0/0: expected 1 tiles, found 0"]
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
-def test_a_forked_child_has_connections_of_its_own(store):
+def test_a_forked_process_has_its_own_connections(store):
     store.put_block(BLOCK, "a", 1, [tile(b"tile")], b"s")
     mine = store._connections.current()
     child = os.fork()
@@ -168,7 +168,7 @@ def test_a_forked_child_has_connections_of_its_own(store):
     assert store.get_tile(0, 0, 0, 0) == b"tile"
 
 
-def test_a_store_knows_its_layers_again_with_all_that_belongs_to_them(tmp_path):
+def test_layers_read_back_with_all_their_properties(tmp_path):
     sun = Sun("2026-06-21T13:00:00Z", 196.2, 64.1, (-0.1, -0.4, 0.9))
     shape = StoreShape(256, 2, (Layer("picture", "picture", "jpeg", 70, (sun,), 12.5), Layer("day", "sun16", "png", suns=(sun, sun))))
     SqliteTileStore.create(tmp_path / "light.sqlite", shape).close()

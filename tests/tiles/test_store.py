@@ -1,4 +1,4 @@
-"""The contract of a tile store; every home passes it."""
+"""The tests that every implementation of a tile store passes."""
 
 import multiprocessing
 import threading
@@ -14,12 +14,12 @@ from map3d.types import BlockId, Layer
 LAYERS = (Layer("color", "color", "webp", 80), Layer("normal", "normal", "png"), Layer("id", "id", "png"), Layer("depth", "depth", "png"))
 SHAPE = StoreShape(tile_px=256, zmax=4, layers=LAYERS)
 BLOCK = BlockId(1, 1, 0)
-HOMES = {"sqlite": SqliteTileStore}
+STORES = {"sqlite": SqliteTileStore}
 
 
-@pytest.fixture(params=sorted(HOMES))
-def home(request):
-    return HOMES[request.param]
+@pytest.fixture(params=sorted(STORES))
+def store_class(request):
+    return STORES[request.param]
 
 
 @pytest.fixture
@@ -28,8 +28,8 @@ def path(tmp_path):
 
 
 @pytest.fixture
-def store(home, path):
-    with home.create(path, SHAPE) as made:
+def store(store_class, path):
+    with store_class.create(path, SHAPE) as made:
         yield made
 
 
@@ -49,7 +49,7 @@ def test_a_new_store_is_empty(store):
     assert store.get_block(BLOCK) is None
 
 
-def test_what_was_put_is_got(store):
+def test_stored_tiles_read_back(store):
     tiles = content(BLOCK)
     assert store.put_block(BLOCK, "key", 1, tiles, b"seam") == StoredBlock(BLOCK, "key", 1, len(tiles))
     assert read(store, tiles) == [tile.data for tile in tiles]
@@ -57,7 +57,7 @@ def test_what_was_put_is_got(store):
     assert store.get_block(BLOCK) == StoredBlock(BLOCK, "key", 1, len(tiles))
 
 
-def test_tiles_that_were_not_put_are_none(store):
+def test_missing_tiles_are_none(store):
     store.put_block(BLOCK, "key", 1, content(BLOCK, layers=[0]), b"seam")
     assert store.get_tile(1, 1, 1, 0) is None
     assert store.get_tile(0, 1, 0, 0) is None
@@ -81,7 +81,7 @@ def test_replacing_a_block_removes_its_old_tiles(store):
     assert len(list(store.list_tiles(0))) == len(content(other, layers=[0])) + 5
 
 
-def test_equal_bytes_keep_their_version(store):
+def test_equal_blocks_keep_their_version(store):
     tiles = content(BLOCK)
     store.put_block(BLOCK, "a", 1, tiles, b"seam")
     assert store.put_block(BLOCK, "b", 2, list(reversed(tiles)), b"seam").version == 1
@@ -90,7 +90,7 @@ def test_equal_bytes_keep_their_version(store):
     assert store.put_block(BLOCK, "c", 4, tiles[1:], b"other seam").version == 4
 
 
-def test_equal_tiles_of_different_blocks_outlive_each_other(store):
+def test_removing_a_block_keeps_equal_tiles_of_other_blocks(store):
     other = BlockId(1, 0, 0)
     one, two = StoredTile(0, 1, 1, 0, b"same"), StoredTile(0, 1, 0, 0, b"same")
     store.put_block(BLOCK, "k", 1, [one], b"s")
@@ -107,7 +107,7 @@ def test_a_removed_block_is_gone(store):
     assert list(store.list_tiles(0)) == []
 
 
-def test_blocks_are_listed_deepest_first_in_morton_order(store):
+def test_blocks_are_listed_deepest_first_sort_by_morton(store):
     ids = [BlockId(0, 0, 0), BlockId(1, 1, 1), BlockId(1, 0, 1), BlockId(1, 1, 0), BlockId(1, 0, 0)]
     for block in ids:
         store.put_block(block, "k", 1, content(block), b"s")
@@ -115,12 +115,12 @@ def test_blocks_are_listed_deepest_first_in_morton_order(store):
     assert list(store.list_tiles(2)) == sorted(tile[1:4] for block in ids for tile in content(block, layers=[2]))
 
 
-def test_places_of_a_level_are_those_of_its_tiles(store):
-    assert store.list_places(store.shape.zmax) == []
+def test_tile_positions_of_a_level_are_those_of_its_tiles(store):
+    assert store.list_tile_positions(store.shape.zmax) == []
     for block in (BlockId(1, 1, 1), BlockId(1, 0, 1), BlockId(0, 0, 0)):
         store.put_block(block, "k", 1, content(block), b"s")
     for z in range(store.shape.zmax + 1):
-        assert sorted(store.list_places(z)) == sorted((tile.x, tile.y) for tile in store.list_tiles(0) if tile.z == z)
+        assert sorted(store.list_tile_positions(z)) == sorted((tile.x, tile.y) for tile in store.list_tiles(0) if tile.z == z)
 
 
 @pytest.mark.parametrize(
@@ -138,36 +138,36 @@ def test_places_of_a_level_are_those_of_its_tiles(store):
         (BlockId(2, 0, 0), 1, []),
     ],
 )
-def test_what_is_not_the_blocks_is_refused_wholly(store, block, version, tiles):
+def test_blocks_with_invalid_tiles_are_refused(store, block, version, tiles):
     store.put_block(BLOCK, "k", 1, content(BLOCK), b"s")
     with pytest.raises(BadRequest):
         store.put_block(block, "bad", version, tiles, b"bad")
     assert read(store, content(BLOCK)) == [tile.data for tile in content(BLOCK)]
 
 
-def test_a_store_opened_again_has_its_shape_and_tiles(home, path, store):
+def test_shape_and_tiles_survive_reopening(store_class, path, store):
     store.put_block(BLOCK, "k", 7, content(BLOCK), b"s")
-    for again in (home(path), home(path, read_only=True), home.open_or_create(path, SHAPE)):
+    for again in (store_class(path), store_class(path, read_only=True), store_class.open_or_create(path, SHAPE)):
         with again:
             assert again.shape == SHAPE
             assert read(again, content(BLOCK)) == [tile.data for tile in content(BLOCK)]
 
 
-def test_a_store_is_not_made_twice_nor_with_another_shape(home, path, store):
+def test_creating_a_store_twice_or_with_another_shape_fails(store_class, path, store):
     with pytest.raises(AlreadyExists):
-        home.create(path, SHAPE)
+        store_class.create(path, SHAPE)
     with pytest.raises(BadRequest, match="--regrid"):
-        home.open_or_create(path, StoreShape(512, 4, LAYERS))
+        store_class.open_or_create(path, StoreShape(512, 4, LAYERS))
 
 
-def test_an_absent_store_is_not_found(home, path):
+def test_an_absent_store_is_not_found(store_class, path):
     with pytest.raises(NotFound):
-        home(path)
+        store_class(path)
     assert not path.exists()
 
 
-def test_reading_only_means_it(home, path, store):
-    with home(path, read_only=True) as reader, pytest.raises(BadRequest, match="reading only"):
+def test_a_read_only_store_refuses_writes(store_class, path, store):
+    with store_class(path, read_only=True) as reader, pytest.raises(BadRequest, match="reading only"):
         reader.put_block(BLOCK, "k", 1, [], None)
 
 
@@ -177,18 +177,18 @@ def test_a_closed_store_can_be_used_again(store):
     assert store.get_seam(BLOCK) == b"s"
 
 
-def _write_versions(home, path, rounds):
-    with home(path) as store:
+def _write_versions(store_class, path, rounds):
+    with store_class(path) as store:
         for version in range(1, rounds + 1):
             store.put_block(BLOCK, str(version), version, content(BLOCK, f"{version}/"), str(version).encode())
 
 
-def test_readers_beside_a_writer_see_blocks_wholly(home, path, store):
+def test_readers_see_complete_blocks_while_a_writer_runs(store_class, path, store):
     store.put_block(BLOCK, "0", 1, content(BLOCK, "1/"), b"1")
-    writer = multiprocessing.get_context("spawn").Process(target=_write_versions, args=(home, path, 25))
+    writer = multiprocessing.get_context("spawn").Process(target=_write_versions, args=(store_class, path, 25))
     writer.start()
     probes = [tile[:4] for tile in content(BLOCK)[::37]]
-    with home(path, read_only=True) as reader:
+    with store_class(path, read_only=True) as reader:
         while writer.is_alive():
             before = int(reader.get_seam(BLOCK))
             versions = {int(reader.get_tile(*probe).split(b"/")[0]) for probe in probes}
@@ -199,10 +199,10 @@ def test_readers_beside_a_writer_see_blocks_wholly(home, path, store):
     assert store.get_seam(BLOCK) == b"25"
 
 
-def test_writers_of_many_processes_lose_nothing(home, path, store):
+def test_concurrent_writers_lose_nothing(store_class, path, store):
     spawn = multiprocessing.get_context("spawn")
     blocks = [BlockId(1, x, y) for x in (0, 1) for y in (0, 1)]
-    writers = [spawn.Process(target=_write_one, args=(home, path, block)) for block in blocks]
+    writers = [spawn.Process(target=_write_one, args=(store_class, path, block)) for block in blocks]
     for writer in writers:
         writer.start()
     for writer in writers:
@@ -212,8 +212,8 @@ def test_writers_of_many_processes_lose_nothing(home, path, store):
         assert read(store, content(block)) == [tile.data for tile in content(block)]
 
 
-def _write_one(home, path, block):
-    with home(path) as store:
+def _write_one(store_class, path, block):
+    with store_class(path) as store:
         store.put_block(block, "k", 1, content(block), b"s")
 
 
@@ -222,10 +222,10 @@ def test_threads_share_a_store(store):
     store.put_block(BLOCK, "k", 1, tiles, b"s")
     wrong = []
 
-    def look():
+    def read_all():
         wrong.extend(tile for tile in tiles if store.get_tile(*tile[:4]) != tile.data)
 
-    threads = [threading.Thread(target=look) for _ in range(4)]
+    threads = [threading.Thread(target=read_all) for _ in range(4)]
     for thread in threads:
         thread.start()
     for thread in threads:

@@ -27,7 +27,7 @@ def change(path, find, put):
 
 def test_published_folder_has_no_problems(workspace, folder):
     done = verify_published(folder)
-    assert (done.files, done.archives, done.tiles) == (14 + 1 + 4, 8, 8 * len(every_tile()))
+    assert (done.files, done.archives, done.tiles) == (15 + 1 + 4, 8, 8 * len(every_tile()))
     assert verify_published(folder, workspace) == done
 
 

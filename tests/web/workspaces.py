@@ -3,7 +3,7 @@
 from map3d.catalogue import RenderingRecord, SceneCrs, SceneRecord, Workspace
 from map3d.geometry.frames import pin
 from map3d.registry import NewObject, Registry
-from map3d.tiles.manifest import CrsFacts, Manifest, ViewFacts
+from map3d.tiles.manifest import Manifest, ManifestCrs, ManifestView
 from map3d.tiles.naming import block_levels, block_of
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
@@ -96,11 +96,11 @@ def manifest_of(record, occupancy, *versions):
         attribution=record.attribution,
         content_version=max(versions),
         complete=True,
-        crs=CrsFacts("UTM 32N", 25832),
+        crs=ManifestCrs("UTM 32N", 25832),
         origin=(691000.0, 5336000.0, 500.0),
         box=BOX,
         passes=record.passes,
-        views=tuple(ViewFacts(frame, occupancy, tuple(dict.fromkeys(blocks, version) for version in versions)) for frame in record.frames),
+        views=tuple(ManifestView(frame, occupancy, tuple(dict.fromkeys(blocks, version) for version in versions)) for frame in record.frames),
         objects=3,
     )
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from map3d.errors import Corrupt, StoreError
 from map3d.registry import NewObject
-from map3d.registry.boxes import object_boxes, united
+from map3d.registry.boxes import object_boxes, unite_boxes
 from map3d.types import Box, Vec3
 
 MAGIC: Final = b"M3DA"
@@ -84,7 +84,7 @@ def world_boxes(folder: Path, count: int) -> list[Box | None]:
         number = instance["prototype"]
         if number not in frames:
             frames[number] = _whole(_boxes(mesh, mesh.prototypes, number, count))
-        boxes[instance["object"]] = united(boxes[instance["object"]], _moved(frames[number], instance["transform"]))
+        boxes[instance["object"]] = unite_boxes(boxes[instance["object"]], _moved(frames[number], instance["transform"]))
     return boxes
 
 

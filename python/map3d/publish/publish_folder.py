@@ -17,7 +17,7 @@ from map3d.errors import AlreadyExists, BadRequest, Corrupt, NotFound, Stopped, 
 from map3d.geometry.views import track_id
 from map3d.publish.pmtiles_archive import Archive, write_archive
 from map3d.registry import Registry
-from map3d.tiles.manifest import ATTRIBUTES, COLUMNS, FILE_NAME, SEARCH, SHARDS, Manifest, ViewFacts, dump_document
+from map3d.tiles.manifest import ATTRIBUTES, COLUMNS, FILE_NAME, SEARCH, SHARDS, Manifest, ManifestView, dump_document
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.store import TileStore
 from map3d.tiles.viewer_files import viewer_files, viewer_folder
@@ -118,7 +118,7 @@ class _FolderWriter:
         self._write_file(CHECKSUMS, "".join(lines).encode())
         self._remove_leftovers()
 
-    def _write_view(self, view: ViewFacts) -> dict[str, str]:
+    def _write_view(self, view: ManifestView) -> dict[str, str]:
         """Returns the archive path of each layer."""
         paths = {}
         for number, layers in enumerate(self._manifest.passes):

@@ -1,4 +1,4 @@
-"""Boxes of objects from an asset's mesh, and of parents from their parts."""
+"""Computes the boxes of objects from a mesh, and of parents from their children."""
 
 from collections.abc import Mapping
 
@@ -9,7 +9,7 @@ from map3d.types import Box
 
 
 def object_boxes(points: NDArray[np.float64], triangles: NDArray[np.uint32], objects: NDArray[np.uint32], count: int) -> NDArray[np.float64]:
-    """(count, 2, 3) least and greatest corners per object, of (n, 3) points, (t, 3) triangles and (t,) object numbers; +inf, −inf without any."""
+    """Returns (count, 2, 3) lower and upper corners for (n, 3) points, (t, 3) triangles and (t,) object indices; +inf, −inf without triangles."""
     boxes = np.empty((count, 2, 3), dtype=np.float64)
     boxes[:, 0], boxes[:, 1] = np.inf, -np.inf
     if len(triangles) == 0:
@@ -22,8 +22,8 @@ def object_boxes(points: NDArray[np.float64], triangles: NDArray[np.uint32], obj
     return boxes
 
 
-def united(a: Box | None, b: Box | None) -> Box | None:
-    """The least box that holds both."""
+def unite_boxes(a: Box | None, b: Box | None) -> Box | None:
+    """Returns the smallest box that contains both."""
     if a is None or b is None:
         return a or b
     low = tuple(min(pair) for pair in zip(a[0], b[0], strict=True))
@@ -31,14 +31,14 @@ def united(a: Box | None, b: Box | None) -> Box | None:
     return ((low[0], low[1], low[2]), (high[0], high[1], high[2]))
 
 
-def with_parts(boxes: Mapping[int, Box | None], parents: Mapping[int, int]) -> dict[int, Box | None]:
-    """Every object's box grown by those of its parts, however deep. A ring of parents is cut where it closes."""
-    grown = dict(boxes)
+def include_children(boxes: Mapping[int, Box | None], parents: Mapping[int, int]) -> dict[int, Box | None]:
+    """Extends the box of every object by those of all its descendants. Cycles of parents are broken."""
+    extended = dict(boxes)
     for number, box in boxes.items():
         seen = {number}
         above = parents.get(number)
         while above is not None and above not in seen:
-            grown[above] = united(grown.get(above), box)
+            extended[above] = unite_boxes(extended.get(above), box)
             seen.add(above)
             above = parents.get(above)
-    return grown
+    return extended

@@ -1,4 +1,4 @@
-"""Attributes column by column (spec/manifest.md): what one attribute says of all objects, for colouring and filtering them."""
+"""Attributes by column (spec/manifest.md): the values of one attribute for all objects, for colouring and filtering."""
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -7,54 +7,56 @@ from typing import Any, Final
 
 from map3d.registry.objects import Attribute, RegisteredObject
 
-MOST_COLUMNS: Final = 1000
-"""Those of most objects; a source with a name of its own for every object would else have as many files as objects."""
+MAX_COLUMNS: Final = 1000
+"""The attributes with the most values have columns. Otherwise a source with different attribute names per object would have a file per object."""
 
-MOST_VARIETY: Final = 1000
-"""Different values are counted up to here."""
+MAX_VARIETY: Final = 1000
+"""Distinct values are counted up to this number."""
 
-VALUES_AT_ONCE: Final = 2_000_000
-"""As many values are held in memory while columns are written."""
+VALUES_IN_MEMORY: Final = 2_000_000
+"""Limit of the values in memory while columns are written."""
 
 OF_OBJECT: Final = "object"
 OF_ATTRIBUTES: Final = "attributes"
 _FIELDS: Final[Mapping[str, Callable[[RegisteredObject], str]]] = {"class": lambda item: item.kind, "asset": lambda item: item.asset}
-"""What every object has besides its attributes."""
+"""Fields that every object has besides its attributes."""
 
 Objects = Callable[[], Iterable[RegisteredObject]]
-Source = tuple[str, str]
-"""OF_OBJECT or OF_ATTRIBUTES, and a name."""
+ColumnId = tuple[str, str]
+"""OF_OBJECT or OF_ATTRIBUTES, and the name of the field or attribute."""
 
 
 def column_key(of: str, name: str) -> str:
-    """Names a column's file; the same wherever the attribute is."""
+    """Returns the name of a column's file, which depends only on the attribute."""
     return sha256(f"{of}\0{name}".encode("utf-8", "surrogatepass")).hexdigest()[:16]
 
 
 def attribute_index(objects: Iterable[RegisteredObject]) -> dict[str, Any]:
-    """The document that lists the columns: fields first, then attributes by name."""
-    found: dict[Source, _Survey] = {}
+    """Returns the document that lists the columns: fields first, then attributes by name."""
+    found: dict[ColumnId, _ColumnStatistics] = {}
     for item in objects:
-        for source, value in _values(item):
-            found.setdefault(source, _Survey()).count(value)
-    fields = [source for source in found if source[0] == OF_OBJECT]
-    attributes = sorted((source for source in found if source[0] == OF_ATTRIBUTES), key=lambda source: (-found[source].objects, source[1]))
-    rows = [found[source].to_json(source) for source in [*fields, *sorted(attributes[:MOST_COLUMNS])]]
-    return {"map3d": "attributes", "version": 1, "attributes": rows, "left_out": max(len(attributes) - MOST_COLUMNS, 0)}
+        for column_id, value in _values(item):
+            found.setdefault(column_id, _ColumnStatistics()).count(value)
+    fields = [column_id for column_id in found if column_id[0] == OF_OBJECT]
+    attributes = sorted(
+        (column_id for column_id in found if column_id[0] == OF_ATTRIBUTES), key=lambda column_id: (-found[column_id].objects, column_id[1])
+    )
+    rows = [found[column_id].to_json(column_id) for column_id in [*fields, *sorted(attributes[:MAX_COLUMNS])]]
+    return {"map3d": "attributes", "version": 1, "attributes": rows, "left_out": max(len(attributes) - MAX_COLUMNS, 0)}
 
 
 def column(objects: Objects, key: str) -> dict[str, Any] | None:
-    """A column's document; None when no attribute has this key."""
-    sources = {source for item in objects() for source, _ in _values(item) if column_key(*source) == key}
-    return next((document for _, document in _columns(objects, sources)), None)
+    """Returns a column's document; None if no attribute has this key."""
+    column_ids = {column_id for item in objects() for column_id, _ in _values(item) if column_key(*column_id) == key}
+    return next((document for _, document in _columns(objects, column_ids)), None)
 
 
 def columns(objects: Objects) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Keys and documents of all columns that are listed."""
-    batch: list[Source] = []
+    """Yields the keys and documents of all listed columns."""
+    batch: list[ColumnId] = []
     held = 0
     for row in attribute_index(objects())["attributes"]:
-        if batch and held + row["objects"] > VALUES_AT_ONCE:
+        if batch and held + row["objects"] > VALUES_IN_MEMORY:
             yield from _columns(objects, batch)
             batch, held = [], 0
         batch.append((row["of"], row["name"]))
@@ -63,8 +65,8 @@ def columns(objects: Objects) -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 @dataclass
-class _Survey:
-    """What is known of an attribute's values."""
+class _ColumnStatistics:
+    """Statistics of an attribute's values."""
 
     objects: int = 0
     kinds: set[str] = field(default_factory=set)
@@ -79,41 +81,43 @@ class _Survey:
         if isinstance(value, int | float) and kind == "number":
             self.low = value if self.low is None else min(self.low, value)
             self.high = value if self.high is None else max(self.high, value)
-        if len(self.different) < MOST_VARIETY:
+        if len(self.different) < MAX_VARIETY:
             self.different.add((kind, value))
 
-    def to_json(self, source: Source) -> dict[str, Any]:
-        of, name = source
+    def to_json(self, column_id: ColumnId) -> dict[str, Any]:
+        of, name = column_id
         kind = "mixed" if len(self.kinds) > 1 else min(self.kinds)
         row = {"name": name, "of": of, "column": column_key(of, name), "type": kind, "objects": self.objects, "variety": len(self.different)}
         return row | ({"min": self.low, "max": self.high} if kind == "number" else {})
 
 
-def _values(item: RegisteredObject) -> Iterator[tuple[Source, Attribute]]:
+def _values(item: RegisteredObject) -> Iterator[tuple[ColumnId, Attribute]]:
     yield from (((OF_OBJECT, name), read(item)) for name, read in _FIELDS.items())
     yield from (((OF_ATTRIBUTES, name), value) for name, value in item.attributes.items() if value is not None)
 
 
-def _columns(objects: Objects, sources: Collection[Source]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Objects without a value have that of the nearest one they are part of."""
-    own: dict[Source, dict[int, Attribute]] = {source: {} for source in sources}
+def _columns(objects: Objects, column_ids: Collection[ColumnId]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yields keys and documents. Objects without a value inherit that of the nearest ancestor."""
+    own: dict[ColumnId, dict[int, Attribute]] = {column_id: {} for column_id in column_ids}
     parents: dict[int, int] = {}
     for item in objects() if own else ():
         if item.parent is not None:
             parents[item.id] = item.parent
-        for source, value in _values(item):
-            if source in own:
-                own[source][item.id] = value
+        for column_id, value in _values(item):
+            if column_id in own:
+                own[column_id][item.id] = value
     for (of, name), values in own.items():
         every = values | {
-            number: values[above] for number in parents if number not in values and (above := _nearest(number, parents, values)) in values
+            number: values[above]
+            for number in parents
+            if number not in values and (above := _find_ancestor_with_value(number, parents, values)) in values
         }
         ids = sorted(every)
         yield column_key(of, name), {"map3d": "column", "version": 1, "name": name, "of": of, "ids": ids, "values": [every[number] for number in ids]}
 
 
-def _nearest(number: int, parents: Mapping[int, int], values: Mapping[int, Attribute]) -> int:
-    """The nearest object above that has a value; without one any without."""
+def _find_ancestor_with_value(number: int, parents: Mapping[int, int], values: Mapping[int, Attribute]) -> int:
+    """Returns the nearest ancestor that has a value; an ancestor without value if there is none."""
     seen = {number}
     while number not in values and parents.get(number, number) not in seen:
         number = parents[number]

@@ -1,4 +1,4 @@
-"""Objects as the registry takes and gives them."""
+"""Objects before and after registration."""
 
 import json
 from collections.abc import Mapping
@@ -12,8 +12,8 @@ Attribute = str | float | int | bool | None
 
 @dataclass(frozen=True)
 class NewObject:
-    """A line of objects.jsonl with its box. `parent`: position among the objects of the same import, None at the top. `box`: local, None without
-    geometry of its own."""
+    """A line of objects.jsonl with its box. `parent`: index among the objects of the same import, None at the top. `box`: local, None without own
+    geometry."""
 
     name: str
     kind: str
@@ -25,7 +25,7 @@ class NewObject:
 
 @dataclass(frozen=True)
 class RegisteredObject:
-    """`kind` is the object's class, `parent` its parent's id, `box` local and with all its parts, None when nothing of it has geometry."""
+    """`kind`: the object's class; `parent`: the parent's id; `box`: local, including all descendants, None without any geometry."""
 
     id: int
     asset: str
@@ -38,13 +38,13 @@ class RegisteredObject:
 
     @property
     def label(self) -> str:
-        """Name and address, for searching; what people call it comes first: `St. Martin (DEBY_LOD2_1), Marktplatz 1`."""
-        called, address = (_text(self.attributes.get(key)) for key in ("name", "address"))
-        name = f"{called} ({self.name})" if called and called != self.name else self.name
+        """Name and address for the search index, common name first: `St. Martin (DEBY_LOD2_1), Marktplatz 1`."""
+        common_name, address = (_text(self.attributes.get(key)) for key in ("name", "address"))
+        name = f"{common_name} ({self.name})" if common_name and common_name != self.name else self.name
         return f"{name}, {address}" if address else name
 
     def to_json(self) -> dict[str, Any]:
-        """As in an attribute shard."""
+        """Returns the object's entry in an attribute shard."""
         return {
             "name": self.name,
             "class": self.kind,
@@ -56,7 +56,7 @@ class RegisteredObject:
 
 
 def plain_attributes(attributes: Mapping[str, Any]) -> dict[str, Attribute]:
-    """Attributes as clients get them: string, number, boolean or null. Anything else becomes its JSON text; NaN and infinities become null."""
+    """Converts attributes to strings, numbers, booleans or null. Other values become JSON text; NaN and infinities become null."""
     return {str(key): _plain(value) for key, value in attributes.items()}
 
 

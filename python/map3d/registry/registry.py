@@ -1,4 +1,8 @@
-"""registry.sqlite of a scene: gives ids that stay over re-imports, and hands objects out by shard and for searching."""
+"""registry.sqlite of a scene: assigns ids that survive re-imports, and returns objects by shard, by column and for searching.
+
+`object.id` is AUTOINCREMENT: ids are never reused. An object is identified by asset, name and, for duplicate names, its occurrence. Objects
+that a re-import no longer contains stay with present = 0, so that they get their id back if they return.
+"""
 
 import json
 from collections import Counter
@@ -12,16 +16,24 @@ from numpy.typing import NDArray
 
 from map3d.database import Database
 from map3d.errors import LimitExceeded
-from map3d.registry.boxes import with_parts
+from map3d.registry.boxes import include_children
 from map3d.registry.columns import attribute_index, column, columns
 from map3d.registry.objects import NewObject, RegisteredObject, plain_attributes
-from map3d.registry.schema import MAX_ID, SCHEMA, VERSION
 from map3d.types import Box
 
 SHARD_SIZE: Final = 1024
 _PAGE: Final = 4096
 SCENE_ASSET: Final = "_scene"
-"""Stands for objects that belong to the scene and not to an asset, such as its ground plane; no asset can have this name."""
+"""Asset name of the scene's own objects, such as its ground plane. Real assets cannot have this name."""
+
+VERSION: Final = 1
+MAX_ID: Final = 0xFFFFFFFF
+_SCHEMA: Final = """
+CREATE TABLE object(id INTEGER PRIMARY KEY AUTOINCREMENT, asset TEXT NOT NULL, name TEXT NOT NULL, occurrence INTEGER NOT NULL,
+  class TEXT NOT NULL, parent INTEGER, lod TEXT, attributes TEXT NOT NULL, present INTEGER NOT NULL,
+  x0 REAL, y0 REAL, z0 REAL, x1 REAL, y1 REAL, z1 REAL, UNIQUE(asset, name, occurrence));
+CREATE INDEX object_asset ON object(asset, present)
+"""
 
 _UPSERT: Final = """INSERT INTO object(asset, name, occurrence, class, lod, attributes, present, x0, y0, z0, x1, y1, z1)
   VALUES (:asset, :name, :occurrence, :class, :lod, :attributes, 1, :x0, :y0, :z0, :x1, :y1, :z1)
@@ -31,14 +43,14 @@ _UPSERT: Final = """INSERT INTO object(asset, name, occurrence, class, lod, attr
 
 
 class Registry:
-    """Safe to share between threads and processes."""
+    """Threads and processes may share it."""
 
     def __init__(self, path: Path) -> None:
-        """Opens the file, made if absent."""
-        self._database = Database(path, SCHEMA, VERSION)
+        """Opens the file, or creates it."""
+        self._database = Database(path, _SCHEMA, VERSION)
 
     def put_asset(self, asset: str, objects: Sequence[NewObject]) -> NDArray[np.uint32]:
-        """Takes the objects of an import in place of the asset's earlier ones, all or none; returns their ids, in order. Raises LimitExceeded."""
+        """Replaces the objects of an asset in one transaction and returns their ids, in order. Raises LimitExceeded."""
         seen: Counter[str] = Counter()
         ids = np.zeros(len(objects), dtype=np.uint32)
         with self._database.transaction() as db:
@@ -46,35 +58,37 @@ class Registry:
             for index, item in enumerate(objects):
                 (number,) = db.execute(_UPSERT, _row(asset, item, seen[item.name])).fetchone()
                 if number > MAX_ID:
-                    raise LimitExceeded(f"asset {asset}: object {index} would get id {number}; ids go up to {MAX_ID}, and none is ever used again")
+                    raise LimitExceeded(
+                        f"asset {asset}: object {index} needs id {number}, but ids end at {MAX_ID} and are never reused; start a new scene"
+                    )
                 seen[item.name] += 1
                 ids[index] = number
             parents = [(int(ids[item.parent]), int(ids[index])) for index, item in enumerate(objects) if item.parent is not None]
             db.executemany("UPDATE object SET parent = ? WHERE id = ?", parents)
-            _widen_parents(db, asset)
+            _extend_parent_boxes(db, asset)
         return ids
 
-    def scene_object(self, name: str, kind: str) -> int:
-        """The id of an object of the scene itself; made absent, see `set_scene_object`."""
+    def get_or_create_scene_object(self, name: str, kind: str) -> int:
+        """Returns the id of one of the scene's own objects. A new one is not present until `set_scene_object`."""
         with self._database.transaction() as db:
             values = (SCENE_ASSET, name, 0, kind, "{}", 0)
             db.execute("INSERT OR IGNORE INTO object(asset, name, occurrence, class, attributes, present) VALUES (?, ?, ?, ?, ?, ?)", values)
             return int(db.execute("SELECT id FROM object WHERE asset = ? AND name = ?", (SCENE_ASSET, name)).fetchone()[0])
 
     def set_scene_object(self, number: int, box: Box | None) -> None:
-        """Whether the scene has this object now, and where (local)."""
+        """Sets the local box of a scene object; None removes the object."""
         with self._database.transaction() as db:
             change = "UPDATE object SET present = ?, x0 = ?, y0 = ?, z0 = ?, x1 = ?, y1 = ?, z1 = ? WHERE id = ?"
             db.execute(change, (box is not None, *_corners(box), number))
 
     def get(self, number: int) -> RegisteredObject | None:
-        """None: no such object, or no longer there."""
+        """Returns None if the object never existed or is no longer present."""
         with self._database.reading() as db:
             row = db.execute("SELECT * FROM object WHERE id = ? AND present", (number,)).fetchone()
-        return None if row is None else _load(row)
+        return None if row is None else _to_object(row)
 
-    def ids_of(self, asset: str) -> dict[str, int]:
-        """Name → id of the objects that are there; of several with a name the first."""
+    def ids_by_name(self, asset: str) -> dict[str, int]:
+        """Returns name → id of the present objects; for duplicate names, the first."""
         with self._database.reading() as db:
             rows = db.execute("SELECT name, id FROM object WHERE asset = ? AND present ORDER BY occurrence DESC", (asset,))
             return {row["name"]: row["id"] for row in rows}
@@ -84,7 +98,7 @@ class Registry:
             return int(db.execute("SELECT count(*) FROM object WHERE present").fetchone()[0])
 
     def objects(self) -> Iterator[RegisteredObject]:
-        """All that are there, by id; read in pages, so that nothing is held in between."""
+        """Yields all present objects by id. Reads in pages, so that no transaction stays open in between."""
         last = 0
         while True:
             with self._database.reading() as db:
@@ -92,40 +106,40 @@ class Registry:
             if not rows:
                 return
             last = rows[-1]["id"]
-            yield from map(_load, rows)
+            yield from map(_to_object, rows)
 
     def shard_numbers(self) -> list[int]:
-        """Of the shards that have an object, rising."""
+        """Returns the numbers of the shards with objects, ascending."""
         with self._database.reading() as db:
             return [row[0] for row in db.execute(f"SELECT DISTINCT id / {SHARD_SIZE} FROM object WHERE present ORDER BY 1")]
 
     def shard(self, number: int) -> dict[str, Any]:
-        """The document of an attribute shard (spec/manifest.md); without objects where there are none."""
+        """Returns an attribute shard (spec/manifest.md), possibly without objects."""
         with self._database.reading() as db:
             between = (number * SHARD_SIZE, (number + 1) * SHARD_SIZE - 1)
             rows = db.execute("SELECT * FROM object WHERE present AND id BETWEEN ? AND ? ORDER BY id", between).fetchall()
-        return {"map3d": "objects", "version": 1, "shard": number, "objects": {str(row["id"]): _load(row).to_json() for row in rows}}
+        return {"map3d": "objects", "version": 1, "shard": number, "objects": {str(row["id"]): _to_object(row).to_json() for row in rows}}
 
     def shards(self) -> Iterator[dict[str, Any]]:
-        """The documents of all shards that have an object."""
+        """Returns all attribute shards with objects."""
         return (self.shard(number) for number in self.shard_numbers())
 
     def search(self) -> dict[str, Any]:
-        """The document of the search index (spec/manifest.md): every object that has a box."""
+        """Returns the search index (spec/manifest.md): every object with a box."""
         entries = [(item.label, item.id, item.box) for item in self.objects() if item.box is not None]
         entries.sort(key=lambda entry: entry[:2])
         return {"map3d": "search", "version": 1, "entries": [[number, label, _top_centre(box)] for label, number, box in entries]}
 
     def attribute_index(self) -> dict[str, Any]:
-        """The document that lists the attributes' columns (spec/manifest.md)."""
+        """Returns the list of attribute columns (spec/manifest.md)."""
         return attribute_index(self.objects())
 
     def column(self, key: str) -> dict[str, Any] | None:
-        """The document of a column; None when there is none with this key."""
+        """Returns a column; None if no column has this key."""
         return column(self.objects, key)
 
     def columns(self) -> Iterator[tuple[str, dict[str, Any]]]:
-        """Keys and documents of all columns that are listed."""
+        """Yields the keys and documents of all listed columns."""
         return columns(self.objects)
 
     def close(self) -> None:
@@ -148,12 +162,12 @@ def _corners(box: Box | None) -> tuple[float | None, ...]:
     return (None,) * 6 if box is None else (*box[0], *box[1])
 
 
-def _widen_parents(db: Any, asset: str) -> None:
-    """A parent's box holds its parts'."""
+def _extend_parent_boxes(db: Any, asset: str) -> None:
+    """Extends the boxes of parents by those of their children."""
     rows = db.execute("SELECT id, parent, x0, y0, z0, x1, y1, z1 FROM object WHERE asset = ? AND present", (asset,)).fetchall()
     boxes = {row["id"]: _box(row) for row in rows}
-    widened = with_parts(boxes, {row["id"]: row["parent"] for row in rows if row["parent"] is not None})
-    changed = [(*_corners(box), number) for number, box in widened.items() if box != boxes[number]]
+    extended = include_children(boxes, {row["id"]: row["parent"] for row in rows if row["parent"] is not None})
+    changed = [(*_corners(box), number) for number, box in extended.items() if box != boxes[number]]
     db.executemany("UPDATE object SET x0 = ?, y0 = ?, z0 = ?, x1 = ?, y1 = ?, z1 = ? WHERE id = ?", changed)
 
 
@@ -161,7 +175,7 @@ def _box(row: Any) -> Box | None:
     return None if row["x0"] is None else ((row["x0"], row["y0"], row["z0"]), (row["x1"], row["y1"], row["z1"]))
 
 
-def _load(row: Any) -> RegisteredObject:
+def _to_object(row: Any) -> RegisteredObject:
     texts = {"name": row["name"], "kind": row["class"], "asset": row["asset"], "lod": row["lod"]}
     return RegisteredObject(id=row["id"], parent=row["parent"], attributes=json.loads(row["attributes"]), box=_box(row), **texts)
 

@@ -46,7 +46,7 @@ def build(
         digest = scene_digest(catalogue, record)
         folder = workspace.scene_folder(scene)
         with Registry(workspace.registry_path(scene)) as registry:
-            ground = registry.scene_object(GROUND, "terrain")
+            ground = registry.get_or_create_scene_object(GROUND, "terrain")
             request = {
                 "assets": [asset.name for asset in assets],
                 "origin": record.origin,

@@ -10,7 +10,7 @@ from map3d.errors import BadRequest
 from map3d.geometry.frames import PinnedFrame
 from map3d.registry import Registry
 from map3d.renderings.lon_lat import geographic_of
-from map3d.tiles.manifest import CrsFacts, Manifest, ViewFacts
+from map3d.tiles.manifest import Manifest, ManifestCrs, ManifestView
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.store import TileStore
@@ -60,10 +60,10 @@ def _start(record: RenderingRecord, box: Box) -> Vec3 | None:
 
 def stored_occupancy(store: TileStore) -> Occupancy:
     """Returns the tiles of level zmax in the store; every layer has the same."""
-    return Occupancy.from_tiles(store.shape.zmax, store.list_places(store.shape.zmax))
+    return Occupancy.from_tiles(store.shape.zmax, store.list_tile_positions(store.shape.zmax))
 
 
-def _view(workspace: Workspace, record: RenderingRecord, frame: PinnedFrame, planned: Occupancy | None) -> ViewFacts:
+def _view(workspace: Workspace, record: RenderingRecord, frame: PinnedFrame, planned: Occupancy | None) -> ManifestView:
     """Takes the occupancy from the first pass, since every pass has the same tiles."""
     occupancy, versions = Occupancy.from_tiles(frame.zmax, ()), []
     for track in record.tracks_of(frame):
@@ -74,12 +74,12 @@ def _view(workspace: Workspace, record: RenderingRecord, frame: PinnedFrame, pla
                 occupancy = occupancy if track.number else stored_occupancy(store)
                 blocks = {block.id: block.version for block in store.list_blocks()}
         versions.append(blocks)
-    return ViewFacts(frame, occupancy if planned is None else occupancy | planned, tuple(versions))
+    return ManifestView(frame, occupancy if planned is None else occupancy | planned, tuple(versions))
 
 
-def _crs(scene: SceneRecord) -> CrsFacts:
+def _crs(scene: SceneRecord) -> ManifestCrs:
     crs = scene.crs
-    return CrsFacts(LOCAL_CRS_NAME) if crs is None else CrsFacts(crs.name, crs.epsg, crs.wkt, crs.vertical)
+    return ManifestCrs(LOCAL_CRS_NAME) if crs is None else ManifestCrs(crs.name, crs.epsg, crs.wkt, crs.vertical)
 
 
 def _origin(record: SceneRecord) -> Vec3:

@@ -13,7 +13,7 @@ import xxhash
 from map3d.errors import Corrupt
 from map3d.ingest.asset import read_objects
 from map3d.registry import Registry
-from map3d.registry.boxes import united
+from map3d.registry.boxes import unite_boxes
 from map3d.types import Box
 
 HEADER_BYTES: Final = {b"M3DA": 64, b"M3DC": 64, b"M3DI": 64, b"M3DT": 64}
@@ -60,7 +60,7 @@ def object_box(folder: Path, number: int) -> Box | None:
             table = np.frombuffer(file.read(), _CHUNK_OBJECT)
         for row in table[table["id"] == number]:
             low, high = (row["box"].reshape(2, 3).astype(np.float64) + origin).tolist()
-            found = united(found, ((low[0], low[1], low[2]), (high[0], high[1], high[2])))
+            found = unite_boxes(found, ((low[0], low[1], low[2]), (high[0], high[1], high[2])))
     return found
 
 

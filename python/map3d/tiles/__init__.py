@@ -1,1 +1,1 @@
-"""Names of tiles and blocks, the tile store, occupancy and the manifest. Knows no scene."""
+"""Tile and block names, the tile store, occupancy, the manifest and previews. Independent of scenes."""

@@ -1,4 +1,4 @@
-"""The manifest `rendering.json` (spec/manifest.md): built from given facts, written the same for the same facts, read with version refusal."""
+"""The manifest `rendering.json` (spec/manifest.md). Equal manifests have equal bytes; reading checks the version."""
 
 import json
 from collections import Counter
@@ -9,12 +9,12 @@ from typing import Any, Final, Self
 from map3d.errors import BadRequest, Corrupt, Map3dError, UnknownVersion
 from map3d.geometry.frames import PinnedFrame
 from map3d.geometry.views import parse_view_id
+from map3d.registry.registry import SHARD_SIZE
 from map3d.tiles.naming import block_level, block_levels, block_of, parse_tile
 from map3d.tiles.occupancy import Occupancy
 from map3d.types import DEPTH_KINDS, DEPTH_UNIT_M, BlockId, Box, Layer, TileId, Vec3, ViewAngles, check_name
 
 VERSION: Final = 1
-SHARD_SIZE: Final = 1024
 FILE_NAME: Final = "rendering.json"
 SHARDS: Final = "objects/{shard}.json"
 SEARCH: Final = "objects/search.json"
@@ -23,8 +23,8 @@ COLUMNS: Final = "objects/columns/{column}.json"
 
 
 @dataclass(frozen=True)
-class CrsFacts:
-    """The scene's CRS as clients see it; `epsg` and `vertical` None when unknown, `wkt` None for a local CRS."""
+class ManifestCrs:
+    """The scene's CRS. `epsg` and `vertical` are None if unknown, `wkt` is None for a local CRS."""
 
     name: str
     epsg: int | None = None
@@ -34,8 +34,8 @@ class CrsFacts:
 
 @dataclass(frozen=True)
 class Geographic:
-    """WGS 84 of local x, y, by polynomials with the terms 1, x, y, x², xy, y², … up to `degree` (spec/manifest.md). `error_m`: greatest error
-    either way, within `unit_m` of `local`."""
+    """Polynomials between local x, y and WGS 84, with the terms 1, x, y, x², xy, y², … up to `degree` (spec/manifest.md). `error_m`: greatest
+    error in both directions, within `unit_m` of `local`."""
 
     local: tuple[float, float]
     lon_lat: tuple[float, float]
@@ -55,16 +55,16 @@ class Geographic:
             unit_m=float(row["unit_m"]),
             unit_deg=float(row["unit_deg"]),
             degree=int(row["degree"]),
-            to=_terms(to),
-            back=_terms(back),
+            to=_parse_polynomials(to),
+            back=_parse_polynomials(back),
             error_m=float(row["error_m"]),
         )
 
 
 @dataclass(frozen=True)
-class ViewFacts:
-    """A view's frame and content. `versions`: for each pass those of every block that is in its store. `archives`: layer → path, published folders
-    only."""
+class ManifestView:
+    """A view's frame and content. `versions`: for each pass, the version of every block in its store. `archives`: layer → path, only in published
+    folders."""
 
     frame: PinnedFrame
     occupancy: Occupancy
@@ -74,16 +74,16 @@ class ViewFacts:
 
 @dataclass(frozen=True)
 class Manifest:
-    """All facts that a client needs. `box`: local, of the content; `start`: local, None for the box's centre."""
+    """Everything that a client needs. `box`: of the content, local; `start`: local, None for the centre of the box."""
 
     name: str
     content_version: int
     complete: bool
-    crs: CrsFacts
+    crs: ManifestCrs
     origin: Vec3
     box: Box
     passes: tuple[tuple[Layer, ...], ...]
-    views: tuple[ViewFacts, ...]
+    views: tuple[ManifestView, ...]
     title: str = ""
     attribution: str = ""
     start: Vec3 | None = None
@@ -94,15 +94,15 @@ class Manifest:
     def __post_init__(self) -> None:
         check_name(self.name, "rendering")
         if not self.passes or not all(self.passes) or not self.views:
-            raise BadRequest(f"rendering {self.name}: a manifest needs layers and views")
+            raise BadRequest(f"rendering {self.name}: the manifest has no layers or no views")
         if any(len(view.versions) != len(self.passes) for view in self.views):
-            raise BadRequest(f"rendering {self.name}: every view needs the versions of {len(self.passes)} passes")
+            raise BadRequest(f"rendering {self.name}: expected block versions of {len(self.passes)} passes in every view")
         if len({(view.frame.size_m, view.frame.tile_px, view.frame.zmax, view.occupancy.zmax - view.frame.zmax) for view in self.views}) != 1:
-            raise BadRequest(f"rendering {self.name}: all views must have one size, tile size and depth")
+            raise BadRequest(f"rendering {self.name}: the views differ in size, tile size or zmax")
 
     @property
     def layers(self) -> tuple[Layer, ...]:
-        """Of all passes."""
+        """The layers of all passes."""
         return tuple(layer for layers in self.passes for layer in layers)
 
     @property
@@ -113,11 +113,11 @@ class Manifest:
     def tile_px(self) -> int:
         return self.views[0].frame.tile_px
 
-    def view(self, view_id: str) -> ViewFacts | None:
+    def view(self, view_id: str) -> ManifestView | None:
         return next((view for view in self.views if view.frame.id == view_id), None)
 
     def with_archives(self, archives: Mapping[str, Mapping[str, str]]) -> Self:
-        """The same for a published folder: view id → layer → path of its archive."""
+        """Returns the manifest of a published folder. `archives`: view id → layer → path."""
         return replace(self, views=tuple(replace(view, archives=archives[view.frame.id]) for view in self.views))
 
     def to_json(self) -> dict[str, Any]:
@@ -153,13 +153,13 @@ class Manifest:
         }
 
     def dump(self) -> bytes:
-        """UTF-8, the same bytes for the same facts."""
+        """Serializes to UTF-8; equal manifests have equal bytes."""
         return (json.dumps(self.to_json(), ensure_ascii=False, indent=1, allow_nan=False) + "\n").encode()
 
     @classmethod
     def load(cls, data: bytes | str, where: str = FILE_NAME) -> Self:
-        """Reads a manifest; raises Corrupt, UnknownVersion. `where` is for the message."""
-        value = _document(data, where)
+        """Parses a manifest. Raises Corrupt, UnknownVersion, with `where` in the message."""
+        value = _parse_document(data, where)
         try:
             passes = _load_passes(value)
             shape = {"size_m": float(value["size_m"]), "tile_px": int(value["tile_px"]), "zmax": int(value["zmax"])}
@@ -167,31 +167,31 @@ class Manifest:
                 name=value["name"],
                 content_version=int(value["content_version"]),
                 complete=bool(value["complete"]),
-                crs=CrsFacts(**{key: value["crs"][key] for key in ("name", "epsg", "wkt", "vertical")}),
-                origin=_vec3(value["origin"]),
-                box=(_vec3(value["box"][0]), _vec3(value["box"][1])),
+                crs=ManifestCrs(**{key: value["crs"][key] for key in ("name", "epsg", "wkt", "vertical")}),
+                origin=_parse_vec3(value["origin"]),
+                box=(_parse_vec3(value["box"][0]), _parse_vec3(value["box"][1])),
                 passes=passes,
                 views=tuple(_load_view(row, shape, passes) for row in value["views"]),
                 title=value["title"],
                 attribution=value["attribution"],
-                start=_vec3(value["start"]["local"]),
+                start=_parse_vec3(value["start"]["local"]),
                 samples=int(value["samples"]),
                 objects=int(value["objects"]["count"]),
                 geographic=Geographic.load(value["geographic"]) if "geographic" in value else None,
             )
         except (KeyError, TypeError, ValueError, IndexError, AttributeError, Map3dError) as error:
-            raise Corrupt(f"{where}: not a manifest of map3d: {type(error).__name__}: {error}") from error
+            raise Corrupt(f"{where}: invalid manifest: {type(error).__name__}: {error}") from error
 
 
-def _document(data: bytes | str, where: str) -> dict[str, Any]:
+def _parse_document(data: bytes | str, where: str) -> dict[str, Any]:
     try:
         value = json.loads(data)
     except (ValueError, RecursionError) as error:
         raise Corrupt(f"{where}: not JSON: {error}") from error
     if not isinstance(value, dict) or value.get("map3d") != "rendering":
-        raise Corrupt(f"{where}: not a rendering's manifest")
+        raise Corrupt(f"{where}: not the manifest of a rendering")
     if value.get("version") != VERSION:
-        raise UnknownVersion(f"{where}: manifest of version {value.get('version')}; this map3d reads version {VERSION}")
+        raise UnknownVersion(f"{where}: manifest version {value.get('version')}; this map3d reads version {VERSION}")
     return value
 
 
@@ -206,7 +206,7 @@ def _layer_json(layer: Layer) -> dict[str, Any]:
     return row
 
 
-def _view_json(view: ViewFacts, passes: Sequence[Sequence[Layer]]) -> dict[str, Any]:
+def _view_json(view: ManifestView, passes: Sequence[Sequence[Layer]]) -> dict[str, Any]:
     frame, (first, *later) = view.frame, view.versions
     row: dict[str, Any] = {
         "id": frame.id,
@@ -225,69 +225,69 @@ def _view_json(view: ViewFacts, passes: Sequence[Sequence[Layer]]) -> dict[str, 
 
 
 def _versions_json(versions: Mapping[BlockId, int]) -> dict[str, Any]:
-    common = _commonest(versions)
+    common = _most_common_version(versions)
     return {"version": common, "versions": {str(block): version for block, version in sorted(versions.items()) if version != common}}
 
 
-def _commonest(versions: Mapping[BlockId, int]) -> int:
-    """Of equally common ones the greatest; 1 when there are none."""
+def _most_common_version(versions: Mapping[BlockId, int]) -> int:
+    """Returns the greatest of the most common versions; 1 without versions."""
     counts = Counter(versions.values())
     return max(counts, key=lambda version: (counts[version], version), default=1)
 
 
 def _load_passes(value: Mapping[str, Any]) -> tuple[tuple[Layer, ...], ...]:
-    """The first view says which layers were added later."""
+    """Returns the layers by pass; the first view lists the layers that were added later."""
     layers = {row["name"]: Layer.load(row) for row in value["layers"]}
     if len(layers) != len(value["layers"]):
-        raise Corrupt("a layer is there twice")
+        raise Corrupt("two layers have the same name")
     later = [tuple(layers.pop(name) for name in added["layers"]) for added in value["views"][0].get("passes", ())]
     return (tuple(layers.values()), *later)
 
 
-def _load_view(row: Mapping[str, Any], shape: Mapping[str, Any], passes: Sequence[Sequence[Layer]]) -> ViewFacts:
-    """Every block whose root tile is occupied gets a version; empty blocks that are not named are not told by a manifest."""
+def _load_view(row: Mapping[str, Any], shape: Mapping[str, Any], passes: Sequence[Sequence[Layer]]) -> ManifestView:
+    """Gives every block with an occupied root tile a version. The manifest omits other blocks unless it lists their version."""
     angles = ViewAngles(row["look_at_deg"], row["pitch_deg"])
     if parse_view_id(row["id"]) != angles:
-        raise Corrupt(f"view {row['id']}: its angles are {angles.look_at_deg} and {angles.pitch_deg}")
+        raise Corrupt(f"view {row['id']}: the angles {angles.look_at_deg} and {angles.pitch_deg} do not match its id")
     frame = PinnedFrame(angles=angles, u0_m=float(row["u0_m"]), v0_m=float(row["v0_m"]), d0_m=float(row["d0_m"]), **shape)
     occupancy = Occupancy.decode(frame.zmax, row["occupancy"])
     later = row.get("passes", [])
     if [added["layers"] for added in later] != [[layer.name for layer in layers] for layers in passes[1:]]:
-        raise Corrupt(f"view {row['id']}: its passes are not those of the first view")
-    return ViewFacts(frame, occupancy, tuple(_load_versions(part, occupancy) for part in (row, *later)), row.get("archives"))
+        raise Corrupt(f"view {row['id']}: the passes differ from those of the first view")
+    return ManifestView(frame, occupancy, tuple(_load_versions(part, occupancy) for part in (row, *later)), row.get("archives"))
 
 
 def _load_versions(row: Mapping[str, Any], occupancy: Occupancy) -> dict[BlockId, int]:
-    named = {_block(text, occupancy.zmax): int(version) for text, version in row["versions"].items()}
-    return {**dict.fromkeys(_blocks(occupancy), int(row["version"])), **named}
+    listed = {_parse_block(text, occupancy.zmax): int(version) for text, version in row["versions"].items()}
+    return {**dict.fromkeys(_occupied_blocks(occupancy), int(row["version"])), **listed}
 
 
-def _blocks(occupancy: Occupancy) -> list[BlockId]:
+def _occupied_blocks(occupancy: Occupancy) -> list[BlockId]:
     return [BlockId(*tile) for level in block_levels(occupancy.zmax) for tile in occupancy.tiles(level.root)]
 
 
-def _block(text: str, zmax: int) -> BlockId:
+def _parse_block(text: str, zmax: int) -> BlockId:
     tile = parse_tile(*text.split("/"))
     if tile is None:
-        raise Corrupt(f"versions: {text!r} is not the name of a block")
+        raise Corrupt(f"versions: {text!r} is not a block")
     block_level(tile.z, zmax)
     return BlockId(*tile)
 
 
-def _terms(value: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def _parse_polynomials(value: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
     first, second = (tuple(float(c) for c in row) for row in value)
     return first, second
 
 
-def _vec3(value: Any) -> Vec3:
+def _parse_vec3(value: Any) -> Vec3:
     x, y, z = (float(number) for number in value)
     return (x, y, z)
 
 
-def block_version(view: ViewFacts, tile: TileId, number: int = 0) -> int:
-    """The version to ask a tile's URL with, for a layer of pass `number`."""
+def block_version(view: ManifestView, tile: TileId, number: int = 0) -> int:
+    """Returns the version for a tile's URL, for a layer of pass `number`."""
     versions = view.versions[number]
-    return versions.get(block_of(tile, view.frame.zmax), _commonest(versions))
+    return versions.get(block_of(tile, view.frame.zmax), _most_common_version(versions))
 
 
 def dump_document(document: Mapping[str, Any]) -> bytes:

@@ -12,7 +12,7 @@ BLOCK_LEVELS: Final = 3
 
 
 class BlockLevel(NamedTuple):
-    """All blocks whose roots lie at level `root`; each holds `levels` levels of tiles, the root's first."""
+    """All blocks rooted at level `root`. Each contains `levels` levels of tiles, starting with the root's."""
 
     root: int
     levels: int
@@ -20,15 +20,15 @@ class BlockLevel(NamedTuple):
 
 
 def check_tile(tile: TileId) -> TileId:
-    """`tile` if it exists in a pyramid of 26 levels; raises BadRequest."""
+    """Returns `tile`. Raises BadRequest unless its numbers are possible."""
     z, x, y = tile
     if not (0 <= z <= MAX_LEVEL and 0 <= x < 2**z and 0 <= y < 2**z):
-        raise BadRequest(f"tile {z}/{x}/{y}: need 0 ≤ z ≤ {MAX_LEVEL} and 0 ≤ x, y < 2^z")
+        raise BadRequest(f"tile {z}/{x}/{y} is out of range; expected 0 ≤ z ≤ {MAX_LEVEL} and 0 ≤ x, y < 2^z")
     return tile
 
 
 def parse_tile(z: str, x: str, y: str) -> TileId | None:
-    """The tile of three plain ASCII numbers without sign or leading zeros; None for anything else, and for tiles that cannot exist."""
+    """Parses three plain ASCII numbers without signs or leading zeros. Returns None for anything else and for tiles out of range."""
     level = _parse_number(z, 2)
     column, row = _parse_number(x, 8), _parse_number(y, 8)
     if level is None or column is None or row is None or level > MAX_LEVEL:
@@ -37,41 +37,41 @@ def parse_tile(z: str, x: str, y: str) -> TileId | None:
 
 
 def parent(tile: TileId) -> TileId | None:
-    """None above level 0."""
+    """Returns None at level 0."""
     return TileId(tile.z - 1, tile.x // 2, tile.y // 2) if tile.z > 0 else None
 
 
 def children(tile: TileId) -> tuple[TileId, TileId, TileId, TileId]:
-    """Top left, top right, bottom left, bottom right."""
+    """Returns the top left, top right, bottom left and bottom right child."""
     z, x, y = tile.z + 1, 2 * tile.x, 2 * tile.y
     return TileId(z, x, y), TileId(z, x + 1, y), TileId(z, x, y + 1), TileId(z, x + 1, y + 1)
 
 
 def ancestor(tile: TileId, z: int) -> TileId:
-    """The tile of level z ≤ tile.z that covers it."""
+    """Returns the tile of level z ≤ tile.z that covers `tile`. Raises BadRequest."""
     if not 0 <= z <= tile.z:
-        raise BadRequest(f"tile {tile.z}/{tile.x}/{tile.y} has no ancestor of level {z}")
+        raise BadRequest(f"tile {tile.z}/{tile.x}/{tile.y} has no ancestor at level {z}; expected 0 to {tile.z}")
     return TileId(z, tile.x >> (tile.z - z), tile.y >> (tile.z - z))
 
 
 def morton(x: int, y: int) -> int:
-    """Bits of x and y interleaved, x in the even bits."""
+    """Interleaves the bits of x and y, with x in the even bits."""
     return _spread(x) | _spread(y) << 1
 
 
 def from_morton(number: int) -> tuple[int, int]:
-    """(x, y)."""
+    """Returns (x, y)."""
     return _gather(number), _gather(number >> 1)
 
 
-def in_morton_order(tiles: Iterable[TileId]) -> list[TileId]:
-    """By level, then Morton number."""
+def sort_by_morton(tiles: Iterable[TileId]) -> list[TileId]:
+    """Sorts by level, then by Morton number."""
     return sorted(tiles, key=lambda tile: (tile.z, morton(tile.x, tile.y)))
 
 
 @lru_cache(maxsize=64)
 def block_levels(zmax: int) -> tuple[BlockLevel, ...]:
-    """Deepest first: the base blocks, then the reduce blocks up to the one rooted at level 0."""
+    """Returns the base blocks, then the reduce blocks up to the one rooted at level 0."""
     root = max(zmax - BLOCK_LEVELS, 0)
     levels = [BlockLevel(root, zmax - root + 1, "base")]
     while root > 0:
@@ -82,24 +82,25 @@ def block_levels(zmax: int) -> tuple[BlockLevel, ...]:
 
 
 def block_level(root: int, zmax: int) -> BlockLevel:
-    """The level of blocks rooted at level `root`; raises BadRequest when no block is rooted there."""
+    """Returns the blocks rooted at level `root`. Raises BadRequest if there are none."""
     for level in block_levels(zmax):
         if level.root == root:
             return level
-    raise BadRequest(f"no block of a pyramid with zmax {zmax} is rooted at level {root}")
+    roots = ", ".join(str(level.root) for level in block_levels(zmax))
+    raise BadRequest(f"no block is rooted at level {root} in a pyramid with zmax {zmax}; root levels are {roots}")
 
 
 def block_of(tile: TileId, zmax: int) -> BlockId:
-    """The one block that holds the tile; raises BadRequest below zmax."""
+    """Returns the block that contains the tile. Raises BadRequest below zmax."""
     check_tile(tile)
     for level in block_levels(zmax):
         if level.root <= tile.z < level.root + level.levels:
             return BlockId(*ancestor(tile, level.root))
-    raise BadRequest(f"tile {tile.z}/{tile.x}/{tile.y} lies below the deepest level, {zmax}")
+    raise BadRequest(f"tile {tile.z}/{tile.x}/{tile.y} is below the deepest level, {zmax}")
 
 
 def tiles_of_block(block: BlockId, zmax: int) -> Iterator[TileId]:
-    """Every tile that the block may hold, by level, in Morton order."""
+    """Yields every possible tile of the block, by level, in Morton order."""
     check_tile(TileId(*block))
     levels = block_level(block.z, zmax).levels
     for down in range(levels):
@@ -109,7 +110,7 @@ def tiles_of_block(block: BlockId, zmax: int) -> Iterator[TileId]:
 
 
 def blocks_below(block: BlockId, zmax: int) -> list[BlockId]:
-    """The blocks whose seams a reduce block takes, in Morton order; none for a base block."""
+    """Returns the blocks whose seams a reduce block reads, in Morton order; none for a base block."""
     level = block_level(block.z, zmax)
     if level.kind == "base":
         return []
@@ -119,13 +120,13 @@ def blocks_below(block: BlockId, zmax: int) -> list[BlockId]:
 
 
 def block_above(block: BlockId, zmax: int) -> BlockId | None:
-    """The reduce block that takes this block's seam; None for the one rooted at level 0."""
+    """Returns the reduce block that reads this block's seam; None for the block rooted at level 0."""
     block_level(block.z, zmax)
     return block_of(TileId(block.z - 1, block.x // 2, block.y // 2), zmax) if block.z > 0 else None
 
 
-def _parse_number(text: str, most_digits: int) -> int | None:
-    if not (0 < len(text) <= most_digits and text.isascii() and text.isdigit()) or (len(text) > 1 and text[0] == "0"):
+def _parse_number(text: str, max_digits: int) -> int | None:
+    if not (0 < len(text) <= max_digits and text.isascii() and text.isdigit()) or (len(text) > 1 and text[0] == "0"):
         return None
     return int(text)
 

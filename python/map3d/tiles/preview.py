@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from map3d.tiles.manifest import Manifest, ViewFacts, block_version
+from map3d.tiles.manifest import Manifest, ManifestView, block_version
 from map3d.tiles.occupancy import Occupancy
 from map3d.types import COLOR_KINDS, TileId
 
@@ -106,7 +106,7 @@ def _erode(grid: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return inner
 
 
-def _find_tiles(view: ViewFacts, number: int, z: int, window: _Window, tile_px: int) -> tuple[PreviewTile, ...]:
+def _find_tiles(view: ManifestView, number: int, z: int, window: _Window, tile_px: int) -> tuple[PreviewTile, ...]:
     columns, rows = (_cells(centre, size, 2**z) for centre, size in ((window.x, window.width), (window.y, window.height)))
     tiles = (TileId(z, x, y) for y in rows for x in columns)
     return tuple(PreviewTile(tile, tile.x * tile_px, tile.y * tile_px, block_version(view, tile, number)) for tile in tiles if tile in view.occupancy)

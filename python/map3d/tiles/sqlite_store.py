@@ -1,4 +1,4 @@
-"""The tile store in one SQLite file per rendering and track (spec/catalogue.md): WAL, synchronous=FULL, one transaction a block."""
+"""A tile store in SQLite, one file per track (spec/catalogue.md): WAL, synchronous=FULL, one transaction per block."""
 
 import json
 import os
@@ -33,12 +33,12 @@ CREATE TABLE meta(key TEXT PRIMARY KEY, value TEXT NOT NULL);
 
 
 class SqliteTileStore:
-    """A `TileStore`; safe to share between threads (a connection each) and to inherit by fork."""
+    """A `TileStore` that threads and forked processes may share; each has its own connection."""
 
     def __init__(self, path: Path, *, read_only: bool = False) -> None:
-        """Opens an existing store; raises NotFound, UnknownVersion, Corrupt, StoreError."""
+        """Opens an existing store. Raises NotFound, UnknownVersion, Corrupt, StoreError."""
         if not path.is_file():
-            raise NotFound(f"{path}: no tile store there; render the rendering first")
+            raise NotFound(f"{path}: no such tile store; render the rendering first")
         self.path = path
         self._read_only = read_only
         self._connections = Connections(path, lambda: _connect(path, read_only))
@@ -50,32 +50,32 @@ class SqliteTileStore:
 
     @classmethod
     def create(cls, path: Path, shape: StoreShape) -> Self:
-        """Makes a new, empty store; raises AlreadyExists. A half-made one is never seen under `path`."""
+        """Creates an empty store, atomically. Raises AlreadyExists, StoreError."""
         if path.exists():
-            raise AlreadyExists(f"{path}: there is a tile store already")
+            raise AlreadyExists(f"{path}: the tile store already exists")
         draft = path.with_name(f".{path.name}.{os.getpid()}.{threading.get_ident()}.new")
         draft.unlink(missing_ok=True)
         try:
             _write_empty(draft, shape)
             os.link(draft, path)
         except FileExistsError as error:
-            raise AlreadyExists(f"{path}: there is a tile store already") from error
+            raise AlreadyExists(f"{path}: the tile store already exists") from error
         except (OSError, sqlite3.Error) as error:
-            raise StoreError(f"{path}: cannot make a tile store: {error}") from error
+            raise StoreError(f"{path}: cannot create the tile store: {error}") from error
         finally:
             draft.unlink(missing_ok=True)
         return cls(path)
 
     @classmethod
     def open_or_create(cls, path: Path, shape: StoreShape) -> Self:
-        """Opens the store, made if absent; raises BadRequest when an existing one has another shape."""
+        """Opens the store, or creates it. Raises BadRequest if an existing store has a different shape."""
         try:
             return cls.create(path, shape)
         except AlreadyExists:
             store = cls(path)
         if store.shape != shape:
             store.close()
-            raise BadRequest(f"{path}: made for {store.shape}, asked for {shape}; use --regrid to render anew")
+            raise BadRequest(f"{path}: the store has {store.shape}, expected {shape}; use --regrid to render from scratch")
         return store
 
     @property
@@ -87,14 +87,14 @@ class SqliteTileStore:
         hashed = [(tile, content_hash(tile.data)) for tile in tiles]
         with self._transaction() as db:
             old = _block_row(db, block)
-            before = _tiles_of(db, self._shape, block) if old else {}
+            before = _tile_hashes(db, self._shape, block) if old else {}
             now = {tuple(tile[:4]): digest for tile, digest in hashed}
             if old and before == now and old["seam"] == seam:
                 version = old["version"]
             else:
-                _forget_tiles(db, before)
-                _put_tiles(db, block, hashed)
-                _forget_blobs(db, set(before.values()) - set(now.values()))
+                _delete_tiles(db, before)
+                _insert_tiles(db, block, hashed)
+                _delete_unused_blobs(db, set(before.values()) - set(now.values()))
             db.execute("INSERT OR REPLACE INTO block VALUES (?, ?, ?, ?, ?, ?, ?, ?)", (str(block), *block, key, version, len(tiles), seam))
         return StoredBlock(block, key, version, len(tiles))
 
@@ -102,10 +102,10 @@ class SqliteTileStore:
         with self._transaction() as db:
             if _block_row(db, block) is None:
                 return False
-            before = _tiles_of(db, self._shape, block)
-            _forget_tiles(db, before)
+            before = _tile_hashes(db, self._shape, block)
+            _delete_tiles(db, before)
             db.execute("DELETE FROM block WHERE id = ?", (str(block),))
-            _forget_blobs(db, set(before.values()))
+            _delete_unused_blobs(db, set(before.values()))
         return True
 
     def get_tile(self, layer: int, z: int, x: int, y: int) -> bytes | None:
@@ -114,7 +114,7 @@ class SqliteTileStore:
                 "SELECT blob.bytes FROM tile LEFT JOIN blob USING (hash) WHERE layer = ? AND z = ? AND x = ? AND y = ?", (layer, z, x, y)
             ).fetchone()
         if row is not None and row[0] is None:
-            raise Corrupt(f"{self.path}: tile {layer}: {z}/{x}/{y} is listed, its bytes are missing; remove the file and render again")
+            raise Corrupt(f"{self.path}: tile {layer}: {z}/{x}/{y} has no bytes; remove the file and render again")
         return None if row is None else bytes(row[0])
 
     def get_seam(self, block: BlockId) -> bytes | None:
@@ -139,12 +139,12 @@ class SqliteTileStore:
             for row in cursor:
                 yield TileId(*row)
 
-    def list_places(self, z: int) -> list[tuple[int, int]]:
+    def list_tile_positions(self, z: int) -> list[tuple[int, int]]:
         with self._reading() as db:
             return db.execute("SELECT x, y FROM tile WHERE layer = 0 AND z = ?", (z,)).fetchall()
 
     def check(self) -> list[str]:
-        """What is wrong with the file, one line each; reads all of it."""
+        """Reads the whole file and returns its faults, one line each."""
         with self._reading() as db:
             wrong = [row[0] for row in db.execute("PRAGMA integrity_check") if row[0] != "ok"]
             lost = db.execute("SELECT count(*) FROM tile WHERE hash NOT IN (SELECT hash FROM blob)").fetchone()[0]
@@ -153,10 +153,10 @@ class SqliteTileStore:
             miscounted = [row for row in db.execute(sums) if row[1] != row[2]]
         wrong += [f"{lost} tiles without bytes"] if lost else []
         wrong += [f"{bad} tiles whose bytes do not match their hash"] if bad else []
-        return wrong + [f"block {name}: {expected} tiles recorded, {got} there" for name, expected, got in miscounted]
+        return wrong + [f"block {name}: expected {expected} tiles, found {got}" for name, expected, got in miscounted]
 
     def close(self) -> None:
-        """Closes the connections of all threads; the store can be used again afterwards."""
+        """Closes the connections of all threads. The store stays usable."""
         self._connections.close()
 
     def __enter__(self) -> Self:
@@ -170,7 +170,7 @@ class SqliteTileStore:
 
     def _transaction(self) -> AbstractContextManager[sqlite3.Connection]:
         if self._read_only:
-            raise BadRequest(f"{self.path}: opened for reading only")
+            raise BadRequest(f"{self.path}: the store is open for reading only")
         return self._connections.transaction()
 
     def _read_shape(self) -> StoreShape:
@@ -182,16 +182,16 @@ class SqliteTileStore:
         except (sqlite3.DatabaseError, KeyError, ValueError) as error:
             raise Corrupt(f"{self.path}: not a tile store: {error}") from error
         if version != FORMAT_VERSION:
-            raise UnknownVersion(f"{self.path}: tile store of version {version}; this map3d reads version {FORMAT_VERSION}")
+            raise UnknownVersion(f"{self.path}: tile store version {version}; this map3d reads version {FORMAT_VERSION}")
         try:
             layers = tuple(Layer.load(row) for row in json.loads(meta["layers"]))
             return StoreShape(int(meta["tile_px"]), int(meta["zmax"]), layers)
         except (KeyError, ValueError, TypeError, Map3dError) as error:
-            raise Corrupt(f"{self.path}: the tile store does not say what it holds: {error}") from error
+            raise Corrupt(f"{self.path}: invalid tile store metadata: {error}") from error
 
 
 def _connect(path: Path, read_only: bool) -> sqlite3.Connection:
-    """Readers of a WAL file must share memory beside it, unless nobody can write there."""
+    """Readers of a WAL file need a shared-memory file beside it, unless the folder is read-only."""
     mode = "rw" if not read_only else "ro&immutable=1" if _is_frozen(path) else "ro"
     quoted = path.absolute().as_uri()
     connection = sqlite3.connect(f"{quoted}?mode={mode}", uri=True, timeout=BUSY_TIMEOUT_S, isolation_level=None, check_same_thread=False)
@@ -211,7 +211,7 @@ def _is_frozen(path: Path) -> bool:
 
 
 def _write_empty(path: Path, shape: StoreShape) -> None:
-    """The finished file has no WAL beside it, so that it can be linked to its name."""
+    """Leaves no WAL file behind, so that the file can be linked to its final name."""
     layers = [asdict(layer) for layer in shape.layers]
     meta = {"version": FORMAT_VERSION, "tile_px": shape.tile_px, "zmax": shape.zmax, "layers": json.dumps(layers)}
     connection = sqlite3.connect(path, isolation_level=None)
@@ -232,8 +232,8 @@ def _block_row(db: sqlite3.Connection, block: BlockId) -> dict[str, Any] | None:
     return None if row is None else {"version": row[0], "seam": row[1]}
 
 
-def _tiles_of(db: sqlite3.Connection, shape: StoreShape, block: BlockId) -> dict[tuple[int, ...], bytes]:
-    """(layer, z, x, y) → hash of the block's tiles, column by column through the primary key."""
+def _tile_hashes(db: sqlite3.Connection, shape: StoreShape, block: BlockId) -> dict[tuple[int, ...], bytes]:
+    """Returns (layer, z, x, y) → hash of the block's tiles. Queries column by column to use the primary key."""
     query = "SELECT layer, z, x, y, hash FROM tile WHERE layer = ? AND z = ? AND x = ? AND y BETWEEN ? AND ?"
     found: dict[tuple[int, ...], bytes] = {}
     for layer in range(len(shape.layers)):
@@ -245,17 +245,17 @@ def _tiles_of(db: sqlite3.Connection, shape: StoreShape, block: BlockId) -> dict
     return found
 
 
-def _put_tiles(db: sqlite3.Connection, block: BlockId, hashed: Sequence[tuple[StoredTile, bytes]]) -> None:
+def _insert_tiles(db: sqlite3.Connection, block: BlockId, hashed: Sequence[tuple[StoredTile, bytes]]) -> None:
     db.executemany("INSERT OR IGNORE INTO blob VALUES (?, ?)", ((digest, tile.data) for tile, digest in hashed))
     rows = ((tile.layer, tile.z, tile.x, tile.y, str(block), digest) for tile, digest in hashed)
     db.executemany("INSERT INTO tile VALUES (?, ?, ?, ?, ?, ?)", rows)
 
 
-def _forget_tiles(db: sqlite3.Connection, tiles: dict[tuple[int, ...], bytes]) -> None:
+def _delete_tiles(db: sqlite3.Connection, tiles: dict[tuple[int, ...], bytes]) -> None:
     db.executemany("DELETE FROM tile WHERE layer = ? AND z = ? AND x = ? AND y = ?", tiles)
 
 
-def _forget_blobs(db: sqlite3.Connection, hashes: set[bytes]) -> None:
-    """Those that no tile has any more."""
+def _delete_unused_blobs(db: sqlite3.Connection, hashes: set[bytes]) -> None:
+    """Deletes the blobs that no tile references."""
     query = "DELETE FROM blob WHERE hash = ?1 AND NOT EXISTS (SELECT 1 FROM tile WHERE hash = ?1)"
     db.executemany(query, ((digest,) for digest in sorted(hashes)))

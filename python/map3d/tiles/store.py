@@ -1,4 +1,4 @@
-"""The contract of a tile store (spec/catalogue.md). One store holds the layers of one track of a rendering; every home passes the same tests."""
+"""The interface of a tile store (spec/catalogue.md). A store contains the layers of one track. All implementations pass the same tests."""
 
 import hashlib
 from collections.abc import Iterator, Sequence
@@ -15,7 +15,7 @@ HASH_BYTES: Final = 16
 
 
 class StoredTile(NamedTuple):
-    """An encoded tile; `layer` is its number in the order of the store's layers."""
+    """An encoded tile; `layer` is its index in the store's layers."""
 
     layer: int
     z: int
@@ -26,7 +26,7 @@ class StoredTile(NamedTuple):
 
 @dataclass(frozen=True)
 class StoreShape:
-    """What a store is made for; fixed when it is created."""
+    """Fixed when the store is created."""
 
     tile_px: int
     zmax: int
@@ -34,19 +34,19 @@ class StoreShape:
 
     def __post_init__(self) -> None:
         if not (self.layers and 0 <= self.zmax <= MAX_LEVEL and self.tile_px > 0):
-            raise BadRequest(f"a tile store needs layers, zmax 0 to {MAX_LEVEL} and a tile size; got {self}")
+            raise BadRequest(f"invalid tile store: expected layers, zmax 0 to {MAX_LEVEL} and a tile size, got {self}")
 
     def number_of(self, layer: str) -> int:
-        """Of a layer of this name; raises NotFound."""
+        """Returns the index of the layer. Raises NotFound."""
         for number, known in enumerate(self.layers):
             if known.name == layer:
                 return number
-        raise NotFound(f"a tile store without layer {layer!r}; it has {', '.join(known.name for known in self.layers)}")
+        raise NotFound(f"no layer {layer!r} in the tile store; its layers are {', '.join(known.name for known in self.layers)}")
 
 
 @dataclass(frozen=True)
 class StoredBlock:
-    """A block as it lies in the store. `version`: the content version in which its bytes last changed; `tiles`: how many it has."""
+    """A block in the store. `version`: the content version in which its bytes last changed; `tiles`: number of tiles of all layers."""
 
     id: BlockId
     key: str
@@ -55,35 +55,35 @@ class StoredBlock:
 
 
 class TileStore(Protocol):
-    """Readers and writers may be in different processes; a reader sees a block wholly or not at all. Failures raise StoreError."""
+    """Readers and writers may be different processes. A reader sees either all tiles of a block or none. Failures raise StoreError."""
 
     @property
     def shape(self) -> StoreShape: ...
 
     def put_block(self, block: BlockId, key: str, version: int, tiles: Sequence[StoredTile], seam: bytes | None) -> StoredBlock:
-        """Commits a block in one step, in place of what it held before; durable on return. Raises BadRequest for tiles that are not the block's.
+        """Replaces a block in one transaction, durable on return. Raises BadRequest for tiles of other blocks.
 
-        Returns the block as stored: of equal tiles and seam, the version they already had is kept.
+        Returns the block as stored: if tiles and seam are equal to the old ones, it keeps the old version.
         """
 
     def get_tile(self, layer: int, z: int, x: int, y: int) -> bytes | None:
-        """None: empty, or its block is not there yet."""
+        """Returns None if the tile is empty or its block is missing."""
 
     def get_seam(self, block: BlockId) -> bytes | None: ...
 
     def get_block(self, block: BlockId) -> StoredBlock | None: ...
 
     def list_blocks(self) -> list[StoredBlock]:
-        """By root level, deepest first, then Morton order."""
+        """Sorted by root level, deepest first, then in Morton order."""
 
     def list_tiles(self, layer: int) -> Iterator[TileId]:
-        """Every stored tile of a layer, by level, then column, then row."""
+        """Yields all stored tiles of a layer, sorted by level, column and row."""
 
-    def list_places(self, z: int) -> list[tuple[int, int]]:
-        """Columns and rows of the stored tiles of a level, in any order: a tile has all layers."""
+    def list_tile_positions(self, z: int) -> list[tuple[int, int]]:
+        """Returns (column, row) of the stored tiles of a level, in any order. Every tile has all layers."""
 
     def remove_block(self, block: BlockId) -> bool:
-        """False: there was none."""
+        """Returns False if the block was not stored."""
 
     def close(self) -> None: ...
 
@@ -93,24 +93,24 @@ class TileStore(Protocol):
 
 
 def content_hash(data: bytes) -> bytes:
-    """16 bytes; equal for equal tiles. Also the ETag of a served tile."""
+    """Returns 16 bytes that are equal for equal tiles. Also the ETag of a served tile."""
     return hashlib.blake2b(data, digest_size=HASH_BYTES).digest()
 
 
 def check_block(shape: StoreShape, block: BlockId, version: int, tiles: Sequence[StoredTile]) -> None:
-    """Raises BadRequest unless the tiles are all of the block, each once, none of 0 bytes."""
+    """Raises BadRequest unless all tiles belong to the block, are unique and have content."""
     block_level(block.z, shape.zmax)
     if version < 1:
-        raise BadRequest(f"block {block}: version {version}; versions count from 1")
+        raise BadRequest(f"block {block}: version {version} is out of range; versions start at 1")
     seen: set[tuple[int, int, int, int]] = set()
     for layer, z, x, y, data in tiles:
         name = f"block {block}: tile {layer}: {z}/{x}/{y}"
         if not 0 <= layer < len(shape.layers):
-            raise BadRequest(f"{name}: no such layer; the store has {len(shape.layers)}")
+            raise BadRequest(f"{name}: no layer {layer}; the store has layers 0 to {len(shape.layers) - 1}")
         if block_of(TileId(z, x, y), shape.zmax) != block:
             raise BadRequest(f"{name} belongs to another block")
         if not data:
-            raise BadRequest(f"{name} has no bytes; an empty tile is left out")
+            raise BadRequest(f"{name} has no bytes; omit empty tiles")
         if (layer, z, x, y) in seen:
-            raise BadRequest(f"{name} is given twice")
+            raise BadRequest(f"{name} occurs twice")
         seen.add((layer, z, x, y))
