@@ -134,7 +134,7 @@ class _FolderWriter:
 
     def _write_archive(self, store: TileStore, layer: Layer, view: str, path: Path) -> int:
         metadata = self._metadata(store, layer, view)
-        number = store.shape.number_of(layer.name)
+        number = store.shape.layer_number(layer.name)
         tiles = _count_finished_tiles(path, metadata)
         if tiles:
             self.kept += 1

@@ -36,7 +36,7 @@ class StoreShape:
         if not (self.layers and 0 <= self.zmax <= MAX_LEVEL and self.tile_px > 0):
             raise BadRequest(f"invalid tile store: expected layers, zmax 0 to {MAX_LEVEL} and a tile size, got {self}")
 
-    def number_of(self, layer: str) -> int:
+    def layer_number(self, layer: str) -> int:
         """Returns the index of the layer. Raises NotFound."""
         for number, known in enumerate(self.layers):
             if known.name == layer:
