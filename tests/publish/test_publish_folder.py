@@ -95,7 +95,7 @@ def test_archives_describe_their_layer(workspace, out):
     for layer, kind in (("color", TileType.WEBP), ("depth", TileType.PNG)):
         reader = Reader(MemorySource((out / "0-45" / f"{layer}.pmtiles").read_bytes()))
         assert (reader.header()["tile_type"], reader.header()["tile_compression"]) == (kind, Compression.NONE)
-        assert reader.metadata()["attribution"] == "© Somebody"
+        assert reader.metadata()["attribution"] == "© City of Tea"
         assert reader.metadata()["map3d"]["layer"] == layer
 
 
@@ -146,7 +146,7 @@ def test_the_readme_explains_range_requests(workspace, out):
     text = (out / "README.txt").read_text()
     assert "range requests" in text
     assert "http.server" in text
-    assert text.startswith("Tea <time>\n© Somebody\n")
+    assert text.startswith("Tea <time>\n© City of Tea\n")
 
 
 def test_sha256sum_can_check_a_copy(workspace, out):

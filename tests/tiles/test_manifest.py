@@ -24,7 +24,7 @@ def manifest():
     return Manifest(
         name="teatime",
         title="Tea “time” ☕",
-        attribution="© Somebody",
+        attribution="© City of Tea",
         content_version=3,
         complete=True,
         crs=ManifestCrs("ETRS89 / UTM zone 32N", 25832, "PROJCRS[…]", "DHHN92 height"),

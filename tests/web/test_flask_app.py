@@ -194,7 +194,7 @@ def test_the_list_describes_renderings(client, workspace):
     assert "Complete" in text
     assert '<time datetime="2026-09-21T14:13:20Z"' in text
     assert "21 September 2026" in text
-    assert "© Somebody" in text
+    assert "© City of Tea" in text
 
 
 def test_an_incomplete_rendering_is_marked(client, workspace):

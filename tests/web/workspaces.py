@@ -28,7 +28,7 @@ OBJECTS = (
 
 def rendering_record(name="tea"):
     frames = tuple(pin(BOX, 256, 0.1, VIEWS))
-    return RenderingRecord(name, "town", 0.1, (LAYERS,), frames, BOX, title="Tea <time>", attribution="© Somebody")
+    return RenderingRecord(name, "town", 0.1, (LAYERS,), frames, BOX, title="Tea <time>", attribution="© City of Tea")
 
 
 FIRST_BYTES = {"webp": b"RIFF", "png": b"\x89PNG\r\n\x1a\n", "jpeg": b"\xff\xd8\xff"}

@@ -32,7 +32,7 @@ def _match(pattern: re.Pattern[bytes]) -> Callable[[mmap.mmap], Iterator[bytes]]
 
 
 def _find_elements(text: mmap.mmap) -> Iterator[bytes]:
-    """Yields the content of the elements that hold file names. A plain search is fast enough: city models are large and such elements rare."""
+    """Yields the content of the elements that contain file names. It uses plain search, because city models are large and such elements rare."""
     for tag in _CITYGML_TAGS:
         at = text.find(tag)
         while at >= 0:

@@ -14,7 +14,7 @@ _COMPANION_SUFFIXES = (
     ".mtl", ".jpg", ".jpeg", ".png", ".bmp", ".gif", ".tga", ".txt", ".md", ".json", ".pdf", ".html", ".prj", ".tfw", ".xsd", ".sqlite",
 )  # fmt: skip
 _SOURCE_SUFFIXES = (".gml", ".citygml", ".obj", ".tif", ".tiff")
-"""A file with such a name ought to be readable; if it is not, the user hears of it."""
+"""Files with these suffixes are reported if they are unreadable."""
 
 OnUnreadable = Callable[[Path, str], None]
 """Called with an unreadable file of a folder and the reason."""

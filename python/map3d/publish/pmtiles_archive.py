@@ -105,9 +105,9 @@ def _small_leaves() -> Iterator[None]:
 
 def _build_directories(entries: list[Entry], root_bytes: int) -> tuple[bytes, bytes, int]:
     """Returns the root directory, the leaf directories and their number. The root is shorter than `root_bytes`."""
-    whole: bytes = _writing.serialize_directory(entries)
-    if len(whole) < root_bytes:
-        return whole, b"", 0
+    root_only: bytes = _writing.serialize_directory(entries)
+    if len(root_only) < root_bytes:
+        return root_only, b"", 0
     for doubling in itertools.count():
         root, leaves, count = _writing.build_roots_leaves(entries, LEAF_ENTRIES << doubling)
         if len(root) < root_bytes:

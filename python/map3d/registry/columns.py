@@ -54,13 +54,13 @@ def column(objects: Objects, key: str) -> dict[str, Any] | None:
 def columns(objects: Objects) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yields the keys and documents of all listed columns."""
     batch: list[ColumnId] = []
-    held = 0
+    values = 0
     for row in attribute_index(objects())["attributes"]:
-        if batch and held + row["objects"] > VALUES_IN_MEMORY:
+        if batch and values + row["objects"] > VALUES_IN_MEMORY:
             yield from _columns(objects, batch)
-            batch, held = [], 0
+            batch, values = [], 0
         batch.append((row["of"], row["name"]))
-        held += row["objects"]
+        values += row["objects"]
     yield from _columns(objects, batch)
 
 

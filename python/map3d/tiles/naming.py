@@ -1,4 +1,4 @@
-"""Names of tiles and blocks (spec/pyramid.md §3 and §8): parents, children, Morton order, which block holds a tile."""
+"""Tile and block names (spec/pyramid.md §3 and §8): parents, children, Morton order, the block of a tile."""
 
 from collections.abc import Iterable, Iterator
 from functools import lru_cache

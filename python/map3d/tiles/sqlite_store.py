@@ -192,7 +192,7 @@ class SqliteTileStore:
 
 def _connect(path: Path, read_only: bool) -> sqlite3.Connection:
     """Readers of a WAL file need a shared-memory file beside it, unless the folder is read-only."""
-    mode = "rw" if not read_only else "ro&immutable=1" if _is_frozen(path) else "ro"
+    mode = "rw" if not read_only else "ro&immutable=1" if _is_in_read_only_folder(path) else "ro"
     quoted = path.absolute().as_uri()
     connection = sqlite3.connect(f"{quoted}?mode={mode}", uri=True, timeout=BUSY_TIMEOUT_S, isolation_level=None, check_same_thread=False)
     try:
@@ -206,7 +206,7 @@ def _connect(path: Path, read_only: bool) -> sqlite3.Connection:
     return connection
 
 
-def _is_frozen(path: Path) -> bool:
+def _is_in_read_only_folder(path: Path) -> bool:
     return not os.access(path.parent, os.W_OK) and not path.with_name(path.name + "-wal").exists()
 
 

@@ -30,7 +30,7 @@ Mask = NDArray[np.bool_]
 @dataclass(frozen=True)
 class TextureTile:
     """A texture image in its photo: the upper left corner is at photo position (left, top); `scale` is image pixels per photo pixel (x, y).
-    `key` is the digest of the file, `cutout` tells that it has transparent pixels."""
+    `key` is the digest of the file; `cutout`: it has transparent pixels."""
 
     key: str
     left: int

@@ -33,8 +33,8 @@ def triangulate_all(heights: Heights) -> Triangles:
         np.where(from_top_left[:, None], np.stack([tl, br, tr], axis=1), np.stack([tr, bl, br], axis=1)),
     )
     triangles = np.stack(pairs, axis=1).reshape(-1, 3)
-    whole: Triangles = triangles[valid[triangles].all(axis=1)]
-    return whole
+    complete: Triangles = triangles[valid[triangles].all(axis=1)]
+    return complete
 
 
 def triangulate_sparse(heights: Heights, max_error_m: float) -> Triangles:

@@ -66,11 +66,11 @@ class VertexGrid:
 
 def pixel_centre_positions(count: int, parts: int = 1) -> NDArray[np.float64]:
     """Returns edge, centres, edge, with each interval split into `parts`."""
-    whole = np.concatenate([[0.0], np.arange(count) + 0.5, [float(count)]])
+    positions = np.concatenate([[0.0], np.arange(count) + 0.5, [float(count)]])
     if parts == 1:
-        return whole
-    inner = (whole[:-1, None] + np.diff(whole)[:, None] * np.arange(parts) / parts).ravel()
-    return np.append(inner, whole[-1])
+        return positions
+    inner = (positions[:-1, None] + np.diff(positions)[:, None] * np.arange(parts) / parts).ravel()
+    return np.append(inner, positions[-1])
 
 
 def regular_positions(count: int, step: float) -> NDArray[np.float64]:

@@ -1,0 +1,23 @@
+// Opens the list of renderings. Request: origin, path, size, pictures: file names for the light and the dark scheme.
+// Response: url, titles, images: whether each preview tile decodes, overflow: whether the page is wider than the window, requests: paths of failed requests.
+import { look } from "./chromium.mjs";
+
+await look(async (page, { origin, path, pictures }) => {
+  const requests = [];
+  page.on("response", (response) => response.status() >= 400 && requests.push(new URL(response.url()).pathname));
+  await page.goto(`${origin}${path}`, { waitUntil: "networkidle" });
+  for (const [scheme, picture] of Object.entries(pictures)) {
+    await page.emulateMedia({ colorScheme: scheme });
+    await page.screenshot({ path: picture });
+  }
+  const found = await page.evaluate(async () => ({
+    url: location.pathname,
+    titles: [...document.querySelectorAll("h2")].map((title) => title.textContent),
+    images: await Promise.all([...document.querySelectorAll("image")].map(async (image) => {
+      const response = await fetch(image.href.baseVal);
+      return (await createImageBitmap(await response.blob())).width > 0;
+    })),
+    overflow: document.documentElement.scrollWidth > innerWidth,
+  }));
+  return { ...found, requests };
+});
