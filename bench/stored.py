@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from map3d.tiles.sqlite_store import SqliteTileStore
-from map3d.tiles.store import content_hash
+from map3d.tiles.tile_store import content_hash
 
 
 @dataclass(frozen=True)

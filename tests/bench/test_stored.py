@@ -10,7 +10,7 @@ from bench.stored import of_archive, of_store
 
 from map3d.publish.pmtiles_archive import write_archive
 from map3d.tiles.sqlite_store import SqliteTileStore
-from map3d.tiles.store import StoredTile, StoreShape
+from map3d.tiles.tile_store import StoredTile, StoreShape
 from map3d.types import BlockId, Layer
 
 SAME, OTHER = b"s" * 500, b"o" * 300

@@ -2,7 +2,7 @@ import pytest
 
 from map3d.errors import Corrupt
 from map3d.renderings.block_check import check_rendered
-from map3d.tiles.store import StoredTile, StoreShape
+from map3d.tiles.tile_store import StoredTile, StoreShape
 from map3d.types import BlockId, Layer
 
 LAYERS = (Layer("color", "color", "webp", 80), Layer("id", "id", "png"))

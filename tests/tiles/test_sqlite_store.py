@@ -11,7 +11,7 @@ import pytest
 
 from map3d.errors import BadRequest, Corrupt, StoreError, UnknownVersion
 from map3d.tiles.sqlite_store import SqliteTileStore
-from map3d.tiles.store import StoredTile, StoreShape
+from map3d.tiles.tile_store import StoredTile, StoreShape
 from map3d.types import BlockId, Layer, Sun
 
 SHAPE = StoreShape(256, 0, (Layer("color", "color", "png"),))
@@ -86,7 +86,7 @@ def test_a_writer_killed_during_a_put_leaves_the_old_block(path, store):
     store.put_block(BLOCK, "a", 1, [tile(b"old")], b"s")
     script = (
         "import os, sys; from pathlib import Path; import map3d.tiles.sqlite_store as home\n"
-        "from map3d.tiles.store import StoredTile; from map3d.types import BlockId\n"
+        "from map3d.tiles.tile_store import StoredTile; from map3d.types import BlockId\n"
         "home._delete_unused_blobs = lambda *_: os.kill(os.getpid(), 9)\n"
         "home.SqliteTileStore(Path(sys.argv[1])).put_block(BlockId(0, 0, 0), 'b', 2, [StoredTile(0, 0, 0, 0, b'new')], b't')\n"
     )

@@ -7,7 +7,7 @@ from map3d.tiles.manifest import Manifest, ManifestCrs, ManifestView
 from map3d.tiles.naming import block_levels, block_of
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
-from map3d.tiles.store import StoredTile, StoreShape
+from map3d.tiles.tile_store import StoredTile, StoreShape
 from map3d.types import BlockId, Layer, TileId, ViewAngles
 
 BOX = ((-120.0, -80.0, 0.0), (130.0, 90.0, 22.5))

@@ -1,8 +1,8 @@
-// Opens the list of renderings. Request: origin, path, size, pictures: file names for the light and the dark scheme.
-// Response: url, titles, images: whether each preview tile decodes, overflow: whether the page is wider than the window, requests: paths of failed requests.
-import { look } from "./chromium.mjs";
+// Opens the list of renderings. Parameters: origin, path, size, pictures: file names for the light and the dark scheme.
+// Result: url, titles, images: whether each preview tile decodes, overflow: whether the page is wider than the window, requests: paths of failed requests.
+import { runPage } from "./chromium.mjs";
 
-await look(async (page, { origin, path, pictures }) => {
+await runPage(async (page, { origin, path, pictures }) => {
   const requests = [];
   page.on("response", (response) => response.status() >= 400 && requests.push(new URL(response.url()).pathname));
   await page.goto(`${origin}${path}`, { waitUntil: "networkidle" });

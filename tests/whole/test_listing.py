@@ -52,18 +52,16 @@ def test_listing_of_the_paper_runs_unchanged(teatime: Path, page: str) -> None:
     shot = picture("listing.png")
     with served(teatime) as origin:
         hosts = {"www.3dmaps.ch": page} | dict.fromkeys(TILE_HOSTS, urlsplit(origin).netloc)
-        response = browse(
-            "listing.mjs", hosts=hosts, page="http://www.3dmaps.ch/listing.html", picture=screenshot, positions=[BODY, CUBE_TOP, GROUND]
-        )
-    assert response["problems"] == []
-    assert sorted(response["hosts"]) == TILE_HOSTS
-    assert sorted(response["markers"]) == ["Green Cube", "Green Teapot"]
-    pixels = np.asarray(Image.open(screenshot).convert("RGB")).astype(int)
-    teapot, cube, ground = (pixels[round(y) + 3, round(x) + 3] for x, y in response["points"])
+        answer = browse("listing.mjs", hosts=hosts, page="http://www.3dmaps.ch/listing.html", picture=shot, positions=[BODY, CUBE_TOP, GROUND])
+    assert answer["problems"] == []
+    assert sorted(answer["hosts"]) == TILE_HOSTS
+    assert sorted(answer["markers"]) == ["Green Cube", "Green Teapot"]
+    pixels = np.asarray(Image.open(shot).convert("RGB")).astype(int)
+    teapot, cube, ground = (pixels[round(y) + 3, round(x) + 3] for x, y in answer["points"])
     assert teapot[1] > 1.4 * max(teapot[0], teapot[2]), "the teapot is green"
     assert cube[1] > cube[0] > 1.2 * cube[2], "the cube is a yellower green"
     assert np.ptp(ground) < 30, "the ground is grey"
-    on_teapot, on_cube, on_ground = response["clicks"]
+    on_teapot, on_cube, on_ground = answer["clicks"]
     with Registry(teatime / "scenes" / "teatime" / "registry.sqlite") as registry:
         ids = {item.name: item.id for item in registry.objects()}
     assert (on_teapot["id"], on_teapot["name"], on_teapot["approximate"]) == (ids["teapot"], "teapot", False)

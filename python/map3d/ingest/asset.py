@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from map3d.errors import Corrupt, StoreError
 from map3d.registry import NewObject
-from map3d.registry.boxes import object_boxes, unite_boxes
+from map3d.registry.object_boxes import object_boxes, unite_boxes
 from map3d.types import Box, Vec3
 
 MAGIC: Final = b"M3DA"

@@ -13,7 +13,7 @@ import pmtiles.writer
 from pmtiles.tile import Compression, Entry, TileType, tileid_to_zxy, zxy_to_tileid
 
 from map3d.errors import Corrupt
-from map3d.tiles.store import TileStore, content_hash
+from map3d.tiles.tile_store import TileStore, content_hash
 from map3d.types import Layer, TileId
 
 _reading: Any = pmtiles.reader

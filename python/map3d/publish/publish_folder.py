@@ -19,7 +19,7 @@ from map3d.publish.pmtiles_archive import Archive, write_archive
 from map3d.registry import Registry
 from map3d.tiles.manifest import ATTRIBUTES, COLUMNS, FILE_NAME, SEARCH, SHARDS, Manifest, ManifestView, dump_document
 from map3d.tiles.sqlite_store import SqliteTileStore
-from map3d.tiles.store import TileStore
+from map3d.tiles.tile_store import TileStore
 from map3d.tiles.viewer_files import viewer_files, viewer_folder
 from map3d.types import Layer
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from hashlib import sha256
 from typing import Any, Final
 
-from map3d.registry.objects import Attribute, RegisteredObject
+from map3d.registry.registered_objects import Attribute, RegisteredObject
 
 MAX_COLUMNS: Final = 1000
 """The attributes with the most values have columns. Otherwise a source with different attribute names per object would have a file per object."""

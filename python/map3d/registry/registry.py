@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from map3d.database import Database
 from map3d.errors import LimitExceeded
-from map3d.registry.boxes import include_children
 from map3d.registry.columns import attribute_index, column, columns
-from map3d.registry.objects import NewObject, RegisteredObject, plain_attributes
+from map3d.registry.object_boxes import include_children
+from map3d.registry.registered_objects import NewObject, RegisteredObject, plain_attributes
 from map3d.types import Box
 
 SHARD_SIZE: Final = 1024

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from map3d.errors import Corrupt
 from map3d.tiles.naming import block_of, parent
-from map3d.tiles.store import StoredTile, StoreShape
+from map3d.tiles.tile_store import StoredTile, StoreShape
 from map3d.types import BlockId, TileId
 
 

@@ -13,7 +13,7 @@ from map3d.renderings.lon_lat import geographic_of
 from map3d.tiles.manifest import Manifest, ManifestCrs, ManifestView
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
-from map3d.tiles.store import TileStore
+from map3d.tiles.tile_store import TileStore
 from map3d.types import BlockId, Box, Vec3
 
 Planned = Mapping[str, Occupancy]

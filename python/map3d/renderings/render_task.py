@@ -10,7 +10,7 @@ from map3d.renderings.block_check import check_rendered
 from map3d.subprocess import Message, Subprocess
 from map3d.tiles.naming import block_level
 from map3d.tiles.sqlite_store import SqliteTileStore
-from map3d.tiles.store import StoredTile, StoreShape, TileStore
+from map3d.tiles.tile_store import StoredTile, StoreShape, TileStore
 
 RENDER_ENTRY: Final = "map3d.renderings.block_renderer:open_renderer"
 CACHE_BYTES: Final = 512 << 20

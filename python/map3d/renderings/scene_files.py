@@ -13,7 +13,7 @@ import xxhash
 from map3d.errors import Corrupt
 from map3d.ingest.asset import read_objects
 from map3d.registry import Registry
-from map3d.registry.boxes import unite_boxes
+from map3d.registry.object_boxes import unite_boxes
 from map3d.types import Box
 
 HEADER_BYTES: Final = {b"M3DA": 64, b"M3DC": 64, b"M3DI": 64, b"M3DT": 64}

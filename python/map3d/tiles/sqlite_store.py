@@ -14,7 +14,7 @@ from typing import Any, Final, Self
 from map3d.database import BUSY_TIMEOUT_S, Connections
 from map3d.errors import AlreadyExists, BadRequest, Corrupt, Map3dError, NotFound, StoreError, UnknownVersion
 from map3d.tiles.naming import block_level, morton
-from map3d.tiles.store import FORMAT_VERSION, StoredBlock, StoredTile, StoreShape, check_block, content_hash
+from map3d.tiles.tile_store import FORMAT_VERSION, StoredBlock, StoredTile, StoreShape, check_block, content_hash
 from map3d.types import BlockId, Layer, TileId
 
 APPLICATION_ID: Final = 0x4D334454  # "M3DT"

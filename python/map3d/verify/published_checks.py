@@ -15,7 +15,7 @@ from map3d.publish.publish_folder import CHECKSUMS
 from map3d.tiles.manifest import ATTRIBUTES, FILE_NAME, SEARCH, Manifest, ManifestView
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
-from map3d.tiles.store import TileStore
+from map3d.tiles.tile_store import TileStore
 from map3d.tiles.viewer_files import PAGE
 from map3d.types import Layer, TileId
 

@@ -13,7 +13,7 @@ from map3d.renderings.plan import frame_text, planned_occupancy
 from map3d.tiles.naming import block_level, block_of, blocks_below, children, parent
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
-from map3d.tiles.store import StoredBlock
+from map3d.tiles.tile_store import StoredBlock
 from map3d.types import BlockId, TileId
 from map3d.verify.decode import check_seam, decode_tile, ids_of
 from map3d.verify.findings import Findings

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from map3d.catalogue.workspace import Workspace
 from map3d.tiles.naming import block_of, parse_tile
-from map3d.tiles.store import StoredBlock, content_hash
+from map3d.tiles.tile_store import StoredBlock, content_hash
 from map3d.types import TileId
 from map3d.web.byte_lru import ByteLru
 from map3d.web.http_errors import status_of

@@ -18,9 +18,9 @@ from pyproj import CRS
 
 from map3d.errors import BadRequest, LimitExceeded, Stopped
 from map3d.geometry.crs import vertical_unit_m
+from map3d.ingest.terrain.grid_triangulation import Triangles, compact_vertices, orient_up, triangulate_all, triangulate_sparse
 from map3d.ingest.terrain.orthophoto import ALIGN_PX, MARGIN_PX, Orthophoto, TextureTile
 from map3d.ingest.terrain.raster_georeference import PlaneTransformer, RasterGeoreference, open_raster, raster_crs
-from map3d.ingest.terrain.triangulation import Triangles, compact_vertices, orient_up, triangulate_all, triangulate_sparse
 from map3d.ingest.terrain.vertex_grid import (
     ConstantHeightField,
     GridTile,

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from map3d.errors import BadRequest
-from map3d.ingest.terrain.triangulation import compact_vertices, orient_up, triangulate_all, triangulate_sparse
+from map3d.ingest.terrain.grid_triangulation import compact_vertices, orient_up, triangulate_all, triangulate_sparse
 
 SIDES = [1, 2, 4, 16, 64]
 

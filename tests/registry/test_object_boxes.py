@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from map3d.registry.boxes import object_boxes
+from map3d.registry.object_boxes import object_boxes
 
 
 def test_boxes_match_brute_force() -> None:

@@ -8,7 +8,7 @@ import pytest
 from map3d.errors import AlreadyExists, BadRequest, NotFound
 from map3d.tiles.naming import tiles_of_block
 from map3d.tiles.sqlite_store import SqliteTileStore
-from map3d.tiles.store import StoredBlock, StoredTile, StoreShape
+from map3d.tiles.tile_store import StoredBlock, StoredTile, StoreShape
 from map3d.types import BlockId, Layer
 
 LAYERS = (Layer("color", "color", "webp", 80), Layer("normal", "normal", "png"), Layer("id", "id", "png"), Layer("depth", "depth", "png"))
