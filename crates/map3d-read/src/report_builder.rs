@@ -23,6 +23,7 @@ pub struct LimitCheck {
 }
 
 impl LimitCheck {
+    #[inline]
     pub fn triangles(got: u64, options: &ReadOptions) -> Self {
         Self { what: "number of triangles", got, limit: "max_triangles", value: options.max_triangles }
     }

@@ -32,6 +32,7 @@ impl BatchBuilder {
     }
 
     /// `positions`: all positions of the document so far.
+    #[inline]
     pub fn push(&mut self, positions: &[Vec3], triangle: FaceTriangle) {
         if self.indices.len() < positions.len() {
             self.indices.resize(positions.len(), UNUSED);
