@@ -21,14 +21,14 @@ export class InfoPanel {
     this.#onClose();
   }
 
-  /** @param viewFromBehind shows the object from behind */
-  show(event: ClickEvent, viewFromBehind?: () => void): void {
+  /** @param showBack shows the object from behind */
+  show(event: ClickEvent, showBack?: () => void): void {
     const rows = [...this.#positionRows(event), ...Object.entries(event.attributes ?? {}).map(([name, value]) => [name, formatValue(value)] as const)];
     const list = document.createElement("dl");
     for (const [name, value] of rows) list.append(withText("dt", name), withText("dd", value));
     const kind = [event.class, event.id > 0 ? `id ${String(event.id)}` : "", event.approximate ? message("approximate") : ""];
     const title = withText("h2", event.name ?? (event.id > 0 ? `${message("object")} ${String(event.id)}` : message("point")));
-    this.#box.replaceChildren(title, ...(viewFromBehind ? [behindButton(viewFromBehind)] : []), withText("p", kind.filter(Boolean).join(" · "), "note"), list, this.#closeButton());
+    this.#box.replaceChildren(title, ...(showBack ? [behindButton(showBack)] : []), withText("p", kind.filter(Boolean).join(" · "), "note"), list, this.#closeButton());
     this.#box.hidden = false;
     this.#box.scrollTop = 0;
   }
@@ -60,10 +60,10 @@ export class InfoPanel {
   }
 }
 
-function behindButton(viewFromBehind: () => void): HTMLButtonElement {
-  const button = withText("button", message("viewFromBehind"), "behind");
+function behindButton(showBack: () => void): HTMLButtonElement {
+  const button = withText("button", message("showBack"), "behind");
   button.type = "button";
-  button.addEventListener("click", viewFromBehind);
+  button.addEventListener("click", showBack);
   return button;
 }
 

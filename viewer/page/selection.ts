@@ -67,11 +67,11 @@ export class Selection {
       return;
     }
     if (event.id > 0 && !NOT_HIGHLIGHTED.has(event.class ?? "")) this.#layer.highlight(event.id);
-    this.#info.show(event, event.id > 0 && !NOT_HIGHLIGHTED.has(event.class ?? "") ? this.#viewFromBehind(event) : undefined);
+    this.#info.show(event, event.id > 0 && !NOT_HIGHLIGHTED.has(event.class ?? "") ? this.#showBack(event) : undefined);
   }
 
   /** Returns an action that shows the object from behind; undefined when no view has the opposite direction. */
-  #viewFromBehind({ id, position }: ClickEvent): (() => void) | undefined {
+  #showBack({ id, position }: ClickEvent): (() => void) | undefined {
     const { directions, direction, lookAt_deg } = this.#view;
     const pitch = directions.find((view) => view.id === direction)?.pitchDeg;
     const opposite = directions.find(({ lookAtDeg, pitchDeg }) => pitchDeg === pitch && (lookAtDeg + 180) % 360 === lookAt_deg % 360);
