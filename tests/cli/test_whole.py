@@ -203,7 +203,7 @@ def test_estimate_is_close_to_the_result(run: Run, town: Workspace) -> None:
     assert before["seconds"] > 0
     after = json.loads(run("estimate", "view", "--json")[1])
     assert after["open_tiles"] == 0
-    assert "recorded" in after["how"]
+    assert "rendered blocks" in after["how"]
     assert after["base_tiles"] == result["statistics"]["base_tiles"]
 
 

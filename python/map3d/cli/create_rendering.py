@@ -75,9 +75,8 @@ def command(
         print_json({**asdict(record), "build": built})
         return
     levels, side = record.zmax + 1, record.tile_px << record.zmax
-    click.echo(
-        f"rendering {name}: {plural(len(record.frames), 'view')}, {plural(levels, 'level')}, {record.res_m:g} m per pixel, {side:,} px wide at the deepest level"
-    )
+    shape = f"{plural(len(record.frames), 'view')}, {plural(levels, 'level')}"
+    click.echo(f"rendering {name}: {shape}, {record.res_m:g} m per pixel, {side:,} px wide at the deepest level")
     click.echo(f"next: map3d estimate {name}, or map3d render {name}")
 
 

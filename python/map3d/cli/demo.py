@@ -1,5 +1,6 @@
 """map3d demo."""
 
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
@@ -27,12 +28,11 @@ def command(folder: Path, port: int, no_serve: bool) -> None:
     """
     workspace = Workspace(folder / "workspace").create()
     for title, arguments in remaining_steps(workspace, folder / "town"):
-        _run(title, [*arguments])
-    where = ("--workspace", str(workspace.root))
+        _run(title, arguments)
     if no_serve:
         click.echo(f"next: map3d serve {NAME} --workspace {workspace.root}")
     else:
-        _run("serving the map; press Ctrl-C to stop", ["serve", NAME, "--port", str(port), *where])
+        _run("serving the map; press Ctrl-C to stop", ["serve", NAME, "--port", str(port), "--workspace", str(workspace.root)])
 
 
 def remaining_steps(workspace: Workspace, files: Path) -> Iterator[tuple[str, list[str]]]:
@@ -55,7 +55,7 @@ def remaining_steps(workspace: Workspace, files: Path) -> Iterator[tuple[str, li
 
 
 def _run(title: str, arguments: list[str]) -> None:
-    click.echo(f"== {title}: map3d {' '.join(arguments)}")
+    click.echo(f"== {title}: map3d {shlex.join(arguments)}")
     status = run(arguments)
     if status:
         raise click.exceptions.Exit(status)

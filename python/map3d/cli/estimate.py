@@ -31,8 +31,8 @@ def command(workspace: Workspace, rendering: str, workers: int, as_json: bool) -
     if as_json:
         print_json({**asdict(found), "build": built})
         return
-    click.echo(
-        f"{rendering}: about {plural(found.base_tiles, 'base tile')}, {plural(found.tiles, 'tile')} on all levels, {plural(found.images, 'image')}, {size_text(found.bytes)}"
-    )
-    click.echo(f"still to render: {plural(found.open_tiles, 'base tile')}, about {time_text(found.seconds)} with {plural(found.workers, 'worker')}")
+    tiles = f"{plural(found.base_tiles, 'base tile')}, {plural(found.tiles, 'tile')} on all levels"
+    click.echo(f"{rendering}: about {tiles}, {plural(found.images, 'image')}, {size_text(found.bytes)}")
+    workers_text = plural(found.workers, "worker")
+    click.echo(f"still to render: {plural(found.open_tiles, 'base tile')}, about {time_text(found.seconds)} with {workers_text}")
     click.echo(f"estimated from {found.how}")

@@ -85,9 +85,8 @@ def _work(run: "Run", plan: "RunPlan") -> "RunResult":
                     "stopping: releasing current blocks" if event.at_once else "stopping after the current blocks; press Ctrl-C again to stop at once"
                 )
             elif isinstance(event, Waiting):
-                bar.console.print(
-                    f"waiting for {plural(event.jobs, 'block')} leased by another run; the leases of a killed run expire within a minute"
-                )
+                blocks = plural(event.jobs, "block")
+                bar.console.print(f"waiting for {blocks} leased by another run; the leases of a killed run expire within a minute")
             elif isinstance(event, WorkerExited) and event.reason:
                 bar.console.print(f"worker {event.worker} exited: {event.reason}")
 
@@ -96,9 +95,8 @@ def _work(run: "Run", plan: "RunPlan") -> "RunResult":
 
 def print_result(rendering: str, result: "RunResult") -> None:
     done = result.statistics
-    click.echo(
-        f"rendered {plural(done.done, 'block')}: {plural(done.base_tiles, 'base tile')}, {plural(done.tiles, 'image')}, {size_text(done.bytes)}"
-    )
+    tiles = f"{plural(done.base_tiles, 'base tile')}, {plural(done.tiles, 'image')}"
+    click.echo(f"rendered {plural(done.done, 'block')}: {tiles}, {size_text(done.bytes)}")
     if result.complete:
         version = result.content_version
         click.echo(f"{rendering} is complete (content version {version}); next: map3d serve {rendering}, or map3d publish {rendering} -o FOLDER")
