@@ -1,20 +1,18 @@
 //! SIMD lanes: one trait for integers and one for floats, an implementation for each instruction set, and the dispatch between them.
 
 mod dispatch;
-mod floats;
-mod ints;
 mod scalar;
+mod traits;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 #[cfg(target_arch = "x86_64")]
 mod x86_floats;
 
 pub(crate) use dispatch::{Kernel, dispatch};
-#[cfg(test)]
-pub(crate) use floats::FloatLanes;
-pub(crate) use floats::Floats;
-pub(crate) use ints::Lanes;
 pub(crate) use scalar::Scalar;
+#[cfg(test)]
+pub(crate) use traits::FloatLanes;
+pub(crate) use traits::{Floats, Lanes};
 
 /// Returns the mask of the lanes that equal a value, for code outside of a `Kernel`.
 #[inline(always)]

@@ -2,8 +2,8 @@
 
 use map3d_base::Isa;
 
-use super::ints::Lanes;
 use super::scalar::Scalar;
+use super::traits::Lanes;
 #[cfg(target_arch = "x86_64")]
 use super::x86::{Avx2, Avx512};
 
@@ -17,7 +17,7 @@ pub(crate) trait Kernel {
 pub(crate) fn dispatch<K: Kernel>(kernel: K, isa: Isa) {
     match isa {
         Isa::Scalar => kernel.run::<Scalar>(),
-        // SAFETY: the constructors of `BeamTracer` and `RayPackets` refuse an instruction set that the processor does not report.
+        // SAFETY: `BeamTracer::with_isa` and `SceneRegion::packets_along` refuse an instruction set that the processor does not report.
         #[cfg(target_arch = "x86_64")]
         Isa::Avx2 => unsafe { run_avx2(kernel) },
         // SAFETY: as above.

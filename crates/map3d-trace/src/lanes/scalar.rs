@@ -1,7 +1,6 @@
 //! Lanes as arrays, for processors without AVX2.
 
-use super::floats::{FloatLanes, Floats};
-use super::ints::Lanes;
+use super::traits::{FloatLanes, Floats, Lanes};
 
 #[derive(Clone, Copy)]
 pub(crate) struct Scalar([i32; 16]);

@@ -6,7 +6,7 @@
 
 use std::arch::x86_64::*;
 
-use super::ints::Lanes;
+use super::traits::Lanes;
 
 /// See `lanes::equal_lanes`. All x86-64 processors have SSE2.
 #[inline(always)]

@@ -7,7 +7,7 @@
 
 use std::arch::x86_64::*;
 
-use super::floats::{FloatLanes, Floats};
+use super::traits::{FloatLanes, Floats};
 use super::x86::{Avx2, Avx512};
 
 impl FloatLanes for Avx2 {
