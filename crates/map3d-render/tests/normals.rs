@@ -9,10 +9,10 @@ use map3d_base::asset::Instance;
 use map3d_base::vec3::{cross, dot, normalized, scale, triangle_normal};
 use town::reference::{ReferenceTriangle, ReferenceView};
 use town::scenes::Lcg;
-use town::{Face, Town, frame, new_folder};
+use town::{SoupFace, Town, frame, new_folder};
 
 /// Returns a hemisphere, open below, with the normals of a sphere; every second face has the opposite winding.
-fn hemisphere() -> Vec<Face> {
+fn hemisphere() -> Vec<SoupFace> {
     let point = |i: usize, j: usize| {
         let (t, a) = (PI / 2.0 * i as f64 / 5.0, TAU * j as f64 / 12.0);
         [t.sin() * a.cos(), t.sin() * a.sin(), t.cos()]
@@ -23,24 +23,24 @@ fn hemisphere() -> Vec<Face> {
         let quad = if i == 0 { vec![[c[0], c[1], c[2]]] } else { vec![[c[0], c[1], c[2]], [c[2], c[0], c[3]]] };
         for (k, t) in quad.into_iter().enumerate() {
             let t = if k == 0 { t } else { [t[1], t[0], t[2]] };
-            out.push(Face { normals: Some(t.map(|p| p.map(|c| c as f32))), ..Face::new(t) });
+            out.push(SoupFace { normals: Some(t.map(|p| p.map(|c| c as f32))), ..SoupFace::new(t) });
         }
     }
     out
 }
 
 /// Returns random faces; two of three have shading normals that deviate by up to 55°.
-fn random_faces(random: &mut Lcg) -> Vec<Face> {
+fn random_faces(random: &mut Lcg) -> Vec<SoupFace> {
     let mut out = Vec::new();
     while out.len() < 12 {
-        let face = Face::new([random.point(1.5), random.point(1.5), random.point(1.5)]);
+        let face = SoupFace::new([random.point(1.5), random.point(1.5), random.point(1.5)]);
         let Some(n) = normalized(triangle_normal(face.corners)) else { continue };
         let tilted = |random: &mut Lcg| {
             let to = random.point(0.48);
             normalized([0, 1, 2].map(|k| n[k] + to[k])).expect("the deviation is shorter than the normal").map(|c| c as f32)
         };
         let normals = (out.len() % 3 != 0).then(|| [tilted(random), tilted(random), tilted(random)]);
-        out.push(Face { normals, ..face });
+        out.push(SoupFace { normals, ..face });
     }
     out
 }
@@ -72,7 +72,7 @@ fn transposed_times(rows: &[Vec3; 3], n: Vec3) -> Vec3 {
 }
 
 /// Returns the normal × 32767 at a pixel's centre, or `None` if rounding may turn it, or on a sliver, which magnifies the error.
-fn expected(view: &ReferenceView, t: &ReferenceTriangle, source: &Face, at: [i128; 2]) -> Option<Vec3> {
+fn expected(view: &ReferenceView, t: &ReferenceTriangle, source: &SoupFace, at: [i128; 2]) -> Option<Vec3> {
     let Some(given) = source.normals else { return Some(scale(t.normal, 32_767.0)) };
     let rows = t.transform.as_ref().map(inverse);
     let corners = given.map(|n| {

@@ -11,13 +11,13 @@ const RADIUS_M: f64 = 20.0;
 const DIRECTIONS: usize = 64;
 
 /// A visible point.
-struct SurfacePoint {
+struct VisiblePoint {
     at: Vec3,
     normal: Vec3,
 }
 
 /// The points of a sub-tile in squares of 8 × 8 pixels, each ordered in squares of 4 × 4.
-type Squares = Vec<Vec<Option<SurfacePoint>>>;
+type Squares = Vec<Vec<Option<VisiblePoint>>>;
 
 /// The packets of a sub-tile.
 struct SubtilePackets {
@@ -129,7 +129,7 @@ fn visible_points(tracer: &mut BeamTracer, frame: &Frame, [x, y]: [u64; 2]) -> S
         let surface = vis.surface(vis.center_slot(i, j)?);
         let (u, v) = (frame.u0_m + (x as f64 + i as f64 + 0.5) * pixel, frame.v0_m - (y as f64 + j as f64 + 0.5) * pixel);
         let at = axes.local_from_uvd([u, v, frame.d0_m + f64::from(vis.center_depth(i, j)) / DEPTH_UNITS_PER_M]);
-        Some(SurfacePoint { at, normal: surface.normal.map(f64::from) })
+        Some(VisiblePoint { at, normal: surface.normal.map(f64::from) })
     };
     let order = |k: usize| (k % 4 + k / 16 % 2 * 4, k / 4 % 4 + k / 32 * 4);
     let square = |s: usize| (0..64).map(order).map(|(i, j)| point(s % squares * 8 + i, s / squares * 8 + j)).collect();
@@ -142,7 +142,7 @@ fn bounds(squares: &Squares) -> Box3 {
     out
 }
 
-fn origins_of(square: &[Option<SurfacePoint>], center: Vec3, lift_m: f64) -> PacketOrigins {
+fn origins_of(square: &[Option<VisiblePoint>], center: Vec3, lift_m: f64) -> PacketOrigins {
     let mut out = PacketOrigins::default();
     for (k, p) in square.iter().enumerate() {
         if let Some(p) = p {

@@ -8,7 +8,7 @@ use map3d_scene::SceneStore;
 use map3d_trace::{BeamTracer, IgnoreCutouts, Isa, Pixel, SUBTILE_PX};
 use reference::ReferenceView;
 use reference::comparison::{BeamComparison, HoleState, SampleCounts};
-use scenes::{Face, Lcg, RANKS, Soup, build, frame, mixed_soup, new_folder};
+use scenes::{Lcg, RANKS, Soup, SoupFace, build, frame, mixed_soup, new_folder};
 
 fn compare(store: &SceneStore, frame: &Frame) -> SampleCounts {
     BeamComparison { store, frame, cutout: &IgnoreCutouts, hole_state: &|_, _| HoleState::Covered }.run()
@@ -78,7 +78,7 @@ fn winner_rule_holds_for_instances_and_many_chunks() {
         soup.add([[x, y, 0.0], [x + 900.0, y + 50.0, 5.0], [x, y + 800.0, -5.0]], 100 + k, RANKS[0]);
     }
     soup.add([[-2000.0, -900.0, -30.0], [2500.0, -900.0, -30.0], [0.0, 3000.0, -31.0]], 90, RANKS[0]);
-    soup.prototypes = vec![(0..12).map(|_| Face::new([random.point(2.0), random.point(2.0), random.point(2.0)])).collect()];
+    soup.prototypes = vec![(0..12).map(|_| SoupFace::new([random.point(2.0), random.point(2.0), random.point(2.0)])).collect()];
     for k in 0..8 {
         let (a, s) = (random.between(0.0, std::f64::consts::TAU), random.between(0.5, 3.0));
         let (c, n, p) = (a.cos() * s, a.sin() * s, random.point(12.0));

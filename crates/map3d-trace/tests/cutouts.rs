@@ -16,7 +16,7 @@ use map3d_trace::{
 };
 use reference::comparison::{BeamComparison, HoleState, SampleCounts};
 use reference::{ReferenceTriangle, ReferenceView, TexturePoint};
-use scenes::{Face, Lcg, RANKS, Soup, build, frame, mixed_soup, new_folder};
+use scenes::{Lcg, RANKS, Soup, SoupFace, build, frame, mixed_soup, new_folder};
 
 const CHEQUERED: u32 = 1;
 const DOTTED: u32 = 2;
@@ -70,7 +70,7 @@ fn uv_at(p: Vec3, per_m: f64) -> [f64; 2] {
     [(p[0] + 0.3 * p[2]) * per_m, (p[1] + 0.9 * p[2]) * per_m]
 }
 
-fn set_material(face: &mut Face, material: u32, per_m: f64) {
+fn set_material(face: &mut SoupFace, material: u32, per_m: f64) {
     face.material = material;
     face.uv = face.corners.map(|c| uv_at(c, per_m).map(|v| v as f32));
 }
@@ -135,7 +135,7 @@ fn highest_covering_rank_wins_behind_a_hole() {
 }
 
 /// A trunk and three crossed quads of leaves.
-fn tree() -> Vec<Face> {
+fn tree() -> Vec<SoupFace> {
     let mut soup = Soup::default();
     soup.quad([[-0.2, 0.0, 0.0], [0.2, 0.0, 0.0], [0.2, 0.0, 2.0], [-0.2, 0.0, 2.0]], 0, Rank::Other);
     for k in 0..3 {

@@ -6,7 +6,7 @@ use map3d_base::Vec3;
 use map3d_base::asset::{Instance, Rank, Wrap};
 use map3d_image::Raster;
 
-use crate::town::{Face, Town, bricks};
+use crate::town::{SoupFace, Town, bricks};
 
 pub struct GoldenPicture {
     pub name: &'static str,
@@ -81,7 +81,7 @@ fn leaves() -> Raster {
 }
 
 /// A trunk and two crossed quads.
-fn tree(trunk: u32, crown: u32) -> Vec<Face> {
+fn tree(trunk: u32, crown: u32) -> Vec<SoupFace> {
     let mut town = Town::default();
     for (dx, dy) in [(0.2, 0.0), (0.0, 0.2)] {
         town.panel([[-dx, -dy, 0.0], [dx, dy, 0.0], [dx, dy, 2.0], [-dx, -dy, 2.0]], [[0.0; 2]; 4], trunk, 0);
@@ -151,7 +151,7 @@ fn brick_court() -> Town {
     town
 }
 
-fn ball(is_smooth: bool) -> Vec<Face> {
+fn ball(is_smooth: bool) -> Vec<SoupFace> {
     let point = |i: usize, j: usize| {
         let (t, a) = (PI * i as f64 / 8.0, TAU * j as f64 / 16.0);
         // Rounded, so that the picture does not depend on the library's sine.
@@ -162,7 +162,7 @@ fn ball(is_smooth: bool) -> Vec<Face> {
         let c = [point(i, j), point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)];
         for t in [[c[0], c[1], c[2]], [c[0], c[2], c[3]]].into_iter().filter(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) {
             let normals = is_smooth.then(|| t.map(|p| p.map(|c| c as f32)));
-            out.push(Face { normals, ..Face::new(t) });
+            out.push(SoupFace { normals, ..SoupFace::new(t) });
         }
     }
     out

@@ -12,7 +12,7 @@ use map3d_base::{Frame, LayerFormat, LayerKind, LayerSpec, Vec3};
 use map3d_image::Raster;
 use map3d_render::RenderScene;
 
-pub use scenes::{Face, Soup as Town, TempFolder, new_folder};
+pub use scenes::{Soup as Town, SoupFace, TempFolder, new_folder};
 
 impl Town {
     pub fn flat(&mut self, rgb: [f32; 3]) -> u32 {
@@ -29,13 +29,13 @@ impl Town {
     }
 
     pub fn face(&mut self, corners: [Vec3; 3], material: u32, object: u32) {
-        self.faces.push(Face { material, object, ..Face::new(corners) });
+        self.faces.push(SoupFace { material, object, ..SoupFace::new(corners) });
     }
 
     /// Adds a quadrilateral with texture coordinates.
     pub fn panel(&mut self, c: [Vec3; 4], uv: [[f32; 2]; 4], material: u32, object: u32) {
         for k in [[0, 1, 2], [0, 2, 3]] {
-            self.faces.push(Face { uv: k.map(|i| uv[i]), material, object, ..Face::new(k.map(|i| c[i])) });
+            self.faces.push(SoupFace { uv: k.map(|i| uv[i]), material, object, ..SoupFace::new(k.map(|i| c[i])) });
         }
     }
 

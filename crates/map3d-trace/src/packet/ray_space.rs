@@ -20,17 +20,17 @@ pub(crate) struct RaySpacePart {
     shift: [f64; 3],
     /// The sums of shift and positions are exact in float32.
     is_exact: bool,
-    rows: [PointRow; 3],
+    rows: [RaySpaceRow; 3],
 }
 
 /// A coordinate in ray space, affine over shifted positions.
 #[derive(Clone, Copy)]
-struct PointRow {
+struct RaySpaceRow {
     coefficients: [f32; 3],
     constant: f32,
 }
 
-impl PointRow {
+impl RaySpaceRow {
     #[inline(always)]
     fn evaluate<F: Floats<8>>(&self, p: [F; 3]) -> F {
         let m = self.coefficients;
@@ -50,7 +50,7 @@ impl RaySpacePart {
             None => {
                 let shift = [0, 1, 2].map(|k| origin[k] - center[k]);
                 let is_near = |k: usize| [shift[k], bounds.lo[k] - center[k], bounds.hi[k] - center[k]].iter().all(|v| v.abs() <= EXACT_REACH_M);
-                let rows = axes.map(|m| PointRow { coefficients: m.map(|v| v as f32), constant: 0.0 });
+                let rows = axes.map(|m| RaySpaceRow { coefficients: m.map(|v| v as f32), constant: 0.0 });
                 Self { boxes, shift, is_exact: (0..3).all(is_near), rows }
             }
             // The placement of an instance is part of the rows.
@@ -60,7 +60,7 @@ impl RaySpacePart {
                     let rotated = [column(m, 0), column(m, 1), column(m, 2)];
                     let moved = [0, 1, 2].map(|k| t[4 * k + 3] - center[k]);
                     let constant: f64 = (0..3).map(|k| m[k] * moved[k] + rotated[k] * origin[k]).sum();
-                    PointRow { coefficients: rotated.map(|v| v as f32), constant: constant as f32 }
+                    RaySpaceRow { coefficients: rotated.map(|v| v as f32), constant: constant as f32 }
                 };
                 Self { boxes, shift: [0.0; 3], is_exact: true, rows: axes.map(row) }
             }

@@ -195,8 +195,8 @@ impl RayLanes {
         let b = &self.group_bounds;
         let mut near = [0u32; GROUPS];
         for g in 0..GROUPS {
-            let right = (t.box_right.hi >= b.right_lo[g]) & (t.box_right.lo <= b.right_hi[g]);
-            near[g] = u32::from(right & (t.box_up.hi >= b.up_lo[g]) & (t.box_up.lo <= b.up_hi[g])) << g;
+            let right = (t.box_right.max >= b.right_lo[g]) & (t.box_right.min <= b.right_hi[g]);
+            near[g] = u32::from(right & (t.box_up.max >= b.up_lo[g]) & (t.box_up.min <= b.up_hi[g])) << g;
         }
         near[0] | near[1] | near[2] | near[3]
     }
@@ -218,15 +218,15 @@ impl RayLanes {
 
         // Distance along the rays on the triangle's plane, clamped to the triangle's range.
         let along = F::splat(t.along[0]).sub(x0.mul(F::splat(t.slope[0]))).sub(y0.mul(F::splat(t.slope[1])));
-        let along = along.max(F::splat(t.box_along.lo)).min(F::splat(t.box_along.hi));
+        let along = along.max(F::splat(t.box_along.min)).min(F::splat(t.box_along.max));
         let within = along.greater(F::load(&self.near[g])) & F::load(&self.far[g]).at_least(along);
 
         // For a triangle seen nearly edge-on, rounding can put a point outside of its box inside all edges. Such hits would depend on the other rays of the
         // packet, so reject them.
         let mut mask = inside & within;
         if mask != 0 {
-            mask &= F::splat(t.box_right.hi).at_least(px) & px.at_least(F::splat(t.box_right.lo));
-            mask &= F::splat(t.box_up.hi).at_least(py) & py.at_least(F::splat(t.box_up.lo));
+            mask &= F::splat(t.box_right.max).at_least(px) & px.at_least(F::splat(t.box_right.min));
+            mask &= F::splat(t.box_up.max).at_least(py) & py.at_least(F::splat(t.box_up.min));
         }
         GroupHits { mask, along }
     }
@@ -267,16 +267,16 @@ fn cross<F: Floats<GROUP>>(ax: F, ay: F, bx: F, by: F) -> F {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Interval {
-    lo: f32,
-    hi: f32,
+struct MinMax {
+    min: f32,
+    max: f32,
 }
 
-impl Interval {
+impl MinMax {
     #[inline(always)]
     fn of(v: [f32; 3]) -> Self {
         let (lo, hi) = if v[0] < v[1] { (v[0], v[1]) } else { (v[1], v[0]) };
-        Self { lo: if v[2] < lo { v[2] } else { lo }, hi: if v[2] > hi { v[2] } else { hi } }
+        Self { min: if v[2] < lo { v[2] } else { lo }, max: if v[2] > hi { v[2] } else { hi } }
     }
 }
 
@@ -288,9 +288,9 @@ pub(super) struct RaySpaceTriangle {
     along: [f32; 3],
     /// Change of `along` per metre to the right and up.
     slope: [f32; 2],
-    box_right: Interval,
-    box_up: Interval,
-    box_along: Interval,
+    box_right: MinMax,
+    box_up: MinMax,
+    box_along: MinMax,
 }
 
 impl RaySpaceTriangle {
@@ -301,7 +301,7 @@ impl RaySpaceTriangle {
         let (bx, by, bz) = (right[2] - right[0], up[2] - up[0], along[2] - along[0]);
         let inverse = 1.0 / (ax * by - ay * bx);
         let slope = [(az * by - ay * bz) * inverse, (ax * bz - az * bx) * inverse];
-        let (box_right, box_up, box_along) = (Interval::of(right), Interval::of(up), Interval::of(along));
+        let (box_right, box_up, box_along) = (MinMax::of(right), MinMax::of(up), MinMax::of(along));
         (slope[0].is_finite() & slope[1].is_finite()).then_some(Self { right, up, along, slope, box_right, box_up, box_along })
     }
 }

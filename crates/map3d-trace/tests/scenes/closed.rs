@@ -3,7 +3,7 @@
 use map3d_base::Vec3;
 use map3d_base::asset::{Instance, Rank};
 
-use super::{Face, Lcg, Soup};
+use super::{Lcg, Soup, SoupFace};
 
 /// Returns a closed sphere whose corners are jittered along the radius.
 pub fn sphere_mesh(radius: f64, rings: usize, random: &mut Lcg, at: Vec3) -> Vec<[Vec3; 3]> {
@@ -65,7 +65,7 @@ pub fn soup_from(triangles: &[[Vec3; 3]], far: bool) -> Soup {
 pub fn as_prototypes(triangles: &[[Vec3; 3]]) -> Soup {
     let mut soup = Soup::default();
     for (k, half) in triangles.chunks(triangles.len().div_ceil(3)).enumerate() {
-        soup.prototypes.push(half.iter().map(|t| Face::new(*t)).collect());
+        soup.prototypes.push(half.iter().map(|t| SoupFace::new(*t)).collect());
         let transform = [0.96, -0.3, 0.1, 0.2, 0.28, 1.1, 0.0, -0.1, 0.0, 0.2, -1.2, 0.3];
         soup.instances.push(Instance { prototype: k as u32 + 1, object: k as u32, transform });
     }

@@ -40,7 +40,7 @@ impl Lcg {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub struct Face {
+pub struct SoupFace {
     pub corners: [Vec3; 3],
     pub uv: [[f32; 2]; 3],
     pub normals: Option<[[f32; 3]; 3]>,
@@ -50,7 +50,7 @@ pub struct Face {
     pub rank: Rank,
 }
 
-impl Face {
+impl SoupFace {
     pub fn new(corners: [Vec3; 3]) -> Self {
         Self { corners, uv: [[0.0; 2]; 3], normals: None, material: 0, object: 0, rank: Rank::Other }
     }
@@ -59,9 +59,9 @@ impl Face {
 /// One asset as a triangle soup. Without materials, all faces are grey.
 #[derive(Default)]
 pub struct Soup {
-    pub faces: Vec<Face>,
+    pub faces: Vec<SoupFace>,
     /// Element k is prototype k + 1.
-    pub prototypes: Vec<Vec<Face>>,
+    pub prototypes: Vec<Vec<SoupFace>>,
     pub instances: Vec<Instance>,
     pub materials: Vec<Material>,
     /// The texture of each material.
@@ -70,7 +70,7 @@ pub struct Soup {
 
 impl Soup {
     pub fn add(&mut self, corners: [Vec3; 3], object: u32, rank: Rank) {
-        self.faces.push(Face { object, rank, ..Face::new(corners) });
+        self.faces.push(SoupFace { object, rank, ..SoupFace::new(corners) });
     }
 
     /// Adds a quadrilateral.
@@ -80,7 +80,7 @@ impl Soup {
     }
 
     /// Returns the faces in the order of the asset.
-    pub fn all_faces(&self) -> impl Iterator<Item = &Face> {
+    pub fn all_faces(&self) -> impl Iterator<Item = &SoupFace> {
         self.faces.iter().chain(self.prototypes.iter().flatten())
     }
 
@@ -125,7 +125,7 @@ impl Soup {
     }
 }
 
-fn batch(faces: &[Face], prototype: u32, with_normals: bool) -> Batch {
+fn batch(faces: &[SoupFace], prototype: u32, with_normals: bool) -> Batch {
     let mut batch = Batch { prototype, ..Batch::default() };
     for face in faces {
         let first = batch.positions.len() as u32;
