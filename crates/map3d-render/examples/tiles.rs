@@ -1,7 +1,7 @@
-//! Milliseconds per tile by stage, and bytes per layer, of a built scene.
+//! Measures milliseconds per tile by stage and bytes per layer, on a built scene.
 //!
 //! `cargo run --release -p map3d-render --example tiles -- <scene folder> [--look-at 45] [--pitch 45] [--res 0.2] [--tiles 400] [--color webp|png|jpeg]
-//! [--layers color,normal,id,depth,sun,sun16,ao,depth2,picture] [--rounds 3] [--save folder]`. Times are CPU time of the one thread; the median round is printed.
+//! [--layers color,normal,id,depth,sun,sun16,ao,depth2,picture] [--rounds 3] [--save folder]`. Times are CPU times of one thread. Prints the median and the fastest round.
 
 use std::path::PathBuf;
 
@@ -25,7 +25,7 @@ fn main() {
         _ => LayerFormat::Webp,
     };
     let quality = if color == LayerFormat::Jpeg { 85 } else { 80 };
-    let f = pinned(
+    let f = pinned_frame(
         &scene.store().bounds(),
         number("--look-at", 45.0),
         number("--pitch", 45.0),
@@ -34,7 +34,7 @@ fn main() {
     );
     let tiles = middle_tiles(&scene, &f, number("--tiles", 400.0) as usize);
     println!("{} triangles, zmax {}, {} tiles, color {color:?} q{quality}", scene.store().triangle_count(), f.zmax, tiles.len());
-    let mut rounds: Vec<Round> = (0..number("--rounds", 3.0) as usize + 1).map(|_| round(&scene, &f, &tiles, None)).skip(1).collect();
+    let mut rounds: Vec<RoundStats> = (0..number("--rounds", 3.0) as usize + 1).map(|_| round(&scene, &f, &tiles, None)).skip(1).collect();
     if let Some(folder) = option("--save") {
         round(&scene, &f, &tiles, Some(PathBuf::from(folder)));
     }
@@ -46,7 +46,7 @@ fn main() {
     println!("{:?}", scene.stats());
 }
 
-/// Suns from sunrise to sunset of a summer's day.
+/// Returns suns from sunrise to sunset of a summer day.
 fn suns(count: usize) -> Vec<Vec3> {
     let at = |k: usize| {
         let (azimuth, altitude) =
@@ -69,13 +69,13 @@ fn layers(names: &str, color: LayerFormat, quality: u8) -> Vec<LayerSpec> {
         "ao" => LayerSpec { radius_m: 20.0, ..LayerSpec::new(LayerKind::Ao, LayerFormat::Png) },
         "depth2" => LayerSpec::new(LayerKind::Depth2, LayerFormat::Png),
         "picture" => LayerSpec { quality, suns: afternoon.clone(), radius_m: 20.0, ..LayerSpec::new(LayerKind::Picture, color) },
-        other => panic!("no layer {other}"),
+        other => panic!("unknown layer {other}"),
     };
     names.split(',').map(layer).collect()
 }
 
-/// As create-rendering pins it (spec/pyramid.md §2), for one view.
-fn pinned(bounds: &Box3, look_at_deg: f64, pitch_deg: f64, res_m: f64, layers: Vec<LayerSpec>) -> Frame {
+/// Pins the frame of one view as `map3d create-rendering` does (spec/pyramid.md §2).
+fn pinned_frame(bounds: &Box3, look_at_deg: f64, pitch_deg: f64, res_m: f64, layers: Vec<LayerSpec>) -> Frame {
     let (c, h) = (bounds.center(), bounds.half_extents());
     let h = [h[0] * 1.05, h[1] * 1.05, (h[2] * 1.05).max(h[2] + 100.0)];
     let (sin, cos) = pitch_deg.to_radians().sin_cos();
@@ -98,7 +98,7 @@ fn pinned(bounds: &Box3, look_at_deg: f64, pitch_deg: f64, res_m: f64, layers: V
     f
 }
 
-/// Tiles with content around the middle of the square, in Morton order.
+/// Returns tiles with content around the middle of the square, in Morton order.
 fn middle_tiles(scene: &RenderScene, f: &Frame, count: usize) -> Vec<Tile> {
     let n = 1u32 << f.zmax;
     let mut renderer = TileRenderer::new(scene, f).expect("a frame");
@@ -112,7 +112,7 @@ fn middle_tiles(scene: &RenderScene, f: &Frame, count: usize) -> Vec<Tile> {
 }
 
 #[derive(Default)]
-struct Round {
+struct RoundStats {
     tiles: usize,
     visibility_s: f64,
     shade_s: f64,
@@ -124,7 +124,7 @@ struct Round {
     setups: u64,
 }
 
-impl Round {
+impl RoundStats {
     fn total(&self) -> f64 {
         self.visibility_s + self.shade_s + self.light_s + self.reduce_s + self.encode_s.iter().sum::<f64>()
     }
@@ -141,17 +141,17 @@ impl Round {
             ms(self.encode_s.iter().sum()),
             ms(self.total())
         );
-        println!("shades per px {:.3}, surfaces set up per tile {:.0}", self.shades as f64 / n / 65_536.0, self.setups as f64 / n);
+        println!("shades per px {:.3}, prepared surfaces per tile {:.0}", self.shades as f64 / n / 65_536.0, self.setups as f64 / n);
         for (k, spec) in layers.iter().enumerate() {
             println!("  {:?} {:?}: {:.3} ms, {:.1} KB", spec.kind, spec.format, ms(self.encode_s[k]), self.bytes[k] as f64 / n / 1e3);
         }
     }
 }
 
-fn round(scene: &RenderScene, f: &Frame, tiles: &[Tile], save: Option<PathBuf>) -> Round {
+fn round(scene: &RenderScene, f: &Frame, tiles: &[Tile], save: Option<PathBuf>) -> RoundStats {
     let mut renderer = TileRenderer::new(scene, f).expect("a frame");
     let mut encoder = Encoder::new();
-    let mut out = Round { tiles: tiles.len(), encode_s: vec![0.0; f.layers.len()], bytes: vec![0; f.layers.len()], ..Round::default() };
+    let mut out = RoundStats { tiles: tiles.len(), encode_s: vec![0.0; f.layers.len()], bytes: vec![0; f.layers.len()], ..RoundStats::default() };
     let mut siblings: Vec<GBuffer> = Vec::new();
     for (number, t) in tiles.iter().enumerate() {
         let Some(g) = renderer.tile(t.x, t.y).expect("renders") else { continue };

@@ -1,4 +1,4 @@
-//! Builds a synthetic town as a scene, for the example `tiles`: 1.8 × 1.8 km of houses with windows, trees and a terrain, 64 textures of 1024² px
+//! Builds a synthetic town for the example `tiles`: 1.8 × 1.8 km of houses with windows, trees and a terrain, 64 textures of 1024² px
 //! (5 cm texels), about a million triangles or ten.
 //!
 //! `cargo run --release -p map3d-render --example town -- <folder> [windows per wall, default 6]`
@@ -39,7 +39,7 @@ fn main() {
     println!("{} triangles, {} objects", report.triangles, town.object + 1);
 }
 
-/// Bricks or grass under noise of several sizes.
+/// Creates textures of bricks or grass with noise of several sizes.
 fn textures(writer: &mut AssetWriter) -> Vec<Material> {
     let hash = |x: u32, y: u32, k: u32| {
         let h = (x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA77) ^ k.wrapping_mul(0xC2B2_AE3D)).wrapping_mul(0x2C1B_3C6D);
@@ -73,13 +73,13 @@ struct Town {
 }
 
 impl Town {
-    /// In [lo, hi).
+    /// Returns a random number in [lo, hi).
     fn between(&mut self, lo: f64, hi: f64) -> f64 {
         self.random = self.random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         lo + (hi - lo) * ((self.random >> 33) as f64 / f64::from(1u32 << 31))
     }
 
-    /// A four-cornered face, counter-clockwise, textured in its own plane.
+    /// Adds a counter-clockwise quadrilateral, textured in its own plane.
     fn quad(&mut self, c: [Vec3; 4], material: u32, rank: Rank) {
         let across = normalized(sub(c[1], c[0])).expect("has a length");
         let normal = normalized(cross(across, sub(c[3], c[0]))).expect("has an area");
@@ -113,7 +113,7 @@ impl Town {
         }
     }
 
-    /// Walls with `windows`² recessed windows each, and a gabled roof.
+    /// Adds walls with `windows`² recessed windows each, and a gabled roof.
     fn house(&mut self, k: u32, windows: u32) {
         self.object += 1;
         let (w, d) = (self.between(6.0, 9.3), self.between(6.0, 9.3));
@@ -148,7 +148,7 @@ impl Town {
         }
     }
 
-    /// A blob of 48 faces.
+    /// Adds a round crown of 48 faces.
     fn tree(&mut self) {
         self.object += 1;
         let (x, y, r) = (self.between(-890.0, 890.0), self.between(-890.0, 890.0), self.between(1.5, 3.5));

@@ -1,4 +1,5 @@
-//! Blocks: the unit of a job. Tiles are rendered in Morton order and reduced as soon as four siblings are there, so that memory stays a few tiles a level.
+//! Blocks: the unit of a job. Tiles are rendered in Morton order and reduced as soon as four siblings are complete, so that memory holds only a few tiles
+//! per level.
 
 use std::collections::HashMap;
 
@@ -10,9 +11,9 @@ use map3d_image::{Arrays, GBuffer, reduce};
 
 use crate::clock::CpuClock;
 use crate::scene::RenderScene;
-use crate::tile::{TileRenderer, check_tile};
+use crate::tile::TileRenderer;
 
-/// One layer of one tile as sent.
+/// One layer of one tile, encoded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EncodedTile {
     /// Index into the frame's layers.
@@ -21,12 +22,12 @@ pub struct EncodedTile {
     pub bytes: Vec<u8>,
 }
 
-/// Seconds of the thread's CPU time by stage, and counts.
+/// The thread's CPU time by stage in seconds, and counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BlockStats {
     pub visibility_s: f64,
     pub shade_s: f64,
-    /// Of rays: suns, ambient occlusion, second surfaces.
+    /// Ray packets: suns, ambient occlusion, second surfaces.
     pub light_s: f64,
     pub reduce_s: f64,
     pub encode_s: f64,
@@ -35,98 +36,112 @@ pub struct BlockStats {
     pub traced_tiles: u64,
     /// Tiles of all levels with content.
     pub tiles: u64,
-    /// (pixel, surface) pairs shaded.
+    /// Shaded (pixel, surface) pairs.
     pub shades: u64,
-    /// Surfaces set up.
+    /// Prepared surfaces.
     pub setups: u64,
 }
 
-/// What a job yields. Tiles without content are not listed; each tile listed has all layers of the frame.
+/// The result of a job. Empty tiles are not listed; each listed tile has all layers of the frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Block {
     pub tiles: Vec<EncodedTile>,
-    /// `None`: the block has no content.
+    /// `None` for an empty block.
     pub seam: Option<Vec<u8>>,
     pub stats: BlockStats,
 }
 
-/// Where the deepest tiles of a block come from.
-trait Leaves {
-    /// Level of the deepest tiles that the source yields.
-    fn level(&self) -> u8;
-    fn tile(&mut self, tile: Tile) -> Result<Option<GBuffer>>;
-    /// Whether the source's own tiles are part of the block, or of the blocks below.
-    fn owned(&self) -> bool;
+impl RenderScene {
+    /// Renders a base block: its tiles in all layers of the frame, and its seam.
+    pub fn render_block(&self, frame: &Frame, root: Tile) -> Result<Block> {
+        frame.validate()?;
+        check_tile(root)?;
+        let level = block_levels(frame.zmax)[0].0;
+        if root.z != level {
+            return Err(Error::argument(format!("base blocks of zmax {} have their roots at level {level}, got level {}", frame.zmax, root.z)));
+        }
+        let mut source = RenderedTiles { renderer: TileRenderer::new(self, frame)?, zmax: frame.zmax, count: 0 };
+        let mut block = build_block(frame, root, &mut source)?;
+        let RenderedTiles { renderer, count, .. } = source;
+        (block.stats.visibility_s, block.stats.shade_s, block.stats.traced_tiles) = (renderer.visibility_s, renderer.shade_s, count);
+        block.stats.light_s = renderer.light_s;
+        (block.stats.shades, block.stats.setups) = renderer.shade_counts();
+        Ok(block)
+    }
 }
 
-pub(crate) fn render_block(scene: &RenderScene, frame: &Frame, root: Tile) -> Result<Block> {
-    frame.validate()?;
-    check_root(frame, root, block_levels(frame.zmax)[0].0)?;
-    let mut leaves = Traced(TileRenderer::new(scene, frame)?, frame.zmax, 0);
-    let mut block = build(frame, root, &mut leaves)?;
-    let Traced(renderer, _, traced) = leaves;
-    (block.stats.visibility_s, block.stats.shade_s, block.stats.traced_tiles) = (renderer.visibility_s, renderer.shade_s, traced);
-    block.stats.light_s = renderer.light_s;
-    (block.stats.shades, block.stats.setups) = renderer.shade_counts();
-    Ok(block)
-}
-
-/// A reduce block of `levels` levels; seams: those that exist of the blocks rooted at level `root.z + levels`, by (x, y).
+/// Builds a reduce block of `levels` levels from the seams, by (x, y), of the blocks with roots at level `root.z + levels`. Blocks without a seam are empty.
 pub fn reduce_block(frame: &Frame, root: Tile, levels: u8, seams: &[(u32, u32, &[u8])]) -> Result<Block> {
     frame.validate()?;
     check_tile(root)?;
     if !(1..=map3d_base::tile::BLOCK_DEPTH).contains(&levels) || root.z + levels > frame.zmax {
-        return Err(Error::argument(format!("reduce block at level {} of {levels} levels, zmax is {}", root.z, frame.zmax)));
+        return Err(Error::argument(format!("reduce block at level {} of {levels} levels is out of range: zmax is {}", root.z, frame.zmax)));
     }
-    let mut by_place = HashMap::new();
+    let mut by_tile = HashMap::new();
     for (x, y, bytes) in seams {
-        if (x >> levels, y >> levels) != (root.x, root.y) || by_place.insert((*x, *y), *bytes).is_some() {
-            return Err(Error::argument(format!("seam ({x}, {y}) is not below ({}, {}, {}), or there twice", root.z, root.x, root.y)));
+        if (x >> levels, y >> levels) != (root.x, root.y) || by_tile.insert((*x, *y), *bytes).is_some() {
+            return Err(Error::argument(format!("seam ({x}, {y}) is given twice or is not below tile ({}, {}, {})", root.z, root.x, root.y)));
         }
     }
-    build(frame, root, &mut Seams { by_place, level: root.z + levels, side: frame.tile_px, arrays: Arrays::of(&frame.layers) })
+    build_block(frame, root, &mut SeamTiles { by_tile, level: root.z + levels, side: frame.tile_px, arrays: Arrays::of(&frame.layers) })
 }
 
-fn check_root(frame: &Frame, root: Tile, level: u8) -> Result<()> {
-    check_tile(root)?;
-    match root.z == level {
+/// Fails for a tile outside of its level.
+fn check_tile(tile: Tile) -> Result<()> {
+    let count = 1u64 << tile.z.min(map3d_base::tile::MAX_LEVEL);
+    match tile.z <= map3d_base::tile::MAX_LEVEL && u64::from(tile.x) < count && u64::from(tile.y) < count {
         true => Ok(()),
-        false => Err(Error::argument(format!("base blocks of zmax {} are rooted at level {level}, not {}", frame.zmax, root.z))),
+        false => Err(Error::argument(format!("tile ({}, {}, {}) is out of range", tile.z, tile.x, tile.y))),
     }
 }
 
-fn build(frame: &Frame, root: Tile, leaves: &mut impl Leaves) -> Result<Block> {
-    let mut work = Work { frame, encoder: Encoder::new(), block: Block::default() };
-    let seam = work.node(root, leaves)?;
+fn build_block(frame: &Frame, root: Tile, source: &mut impl TileSource) -> Result<Block> {
+    let mut builder = BlockBuilder { frame, encoder: Encoder::new(), block: Block::default() };
+    let seam = builder.build_tile(root, source)?;
     let mut clock = CpuClock::start();
-    work.block.seam = seam.map(|g| write_seam(&g));
-    work.block.stats.seam_s = clock.lap_s();
-    Ok(work.block)
+    builder.block.seam = seam.map(|g| write_seam(&g));
+    builder.block.stats.seam_s = clock.lap_s();
+    Ok(builder.block)
 }
 
-struct Work<'a> {
+/// The source of a block's deepest tiles.
+trait TileSource {
+    /// The level of the tiles that the source yields.
+    fn level(&self) -> u8;
+    /// Returns `None` for an empty tile.
+    fn tile(&mut self, tile: Tile) -> Result<Option<GBuffer>>;
+    /// Whether the source's tiles are part of the block; otherwise they belong to the blocks below.
+    fn is_in_block(&self) -> bool;
+}
+
+struct BlockBuilder<'a> {
     frame: &'a Frame,
     encoder: Encoder,
     block: Block,
 }
 
-impl Work<'_> {
-    /// The G-buffer of a tile from what lies below it, in Morton order; encodes it if it is the block's own.
-    fn node(&mut self, tile: Tile, leaves: &mut impl Leaves) -> Result<Option<GBuffer>> {
-        if tile.z == leaves.level() {
-            let g = leaves.tile(tile)?;
-            if let Some(g) = g.as_ref().filter(|_| leaves.owned()) {
+impl BlockBuilder<'_> {
+    /// Returns the G-buffer of a tile and encodes it if it is part of the block. Tiles above the source are reduced from their children, in Morton order.
+    fn build_tile(&mut self, tile: Tile, source: &mut impl TileSource) -> Result<Option<GBuffer>> {
+        // The deepest level.
+        if tile.z == source.level() {
+            let g = source.tile(tile)?;
+            if let Some(g) = g.as_ref().filter(|_| source.is_in_block()) {
                 self.encode(tile, g)?;
             }
             return Ok(g);
         }
+
+        // The children.
         let mut children: [Option<GBuffer>; 4] = [const { None }; 4];
-        for (child, place) in children.iter_mut().zip(tile.children()) {
-            *child = self.node(place, leaves)?;
+        for (g, child) in children.iter_mut().zip(tile.children()) {
+            *g = self.build_tile(child, source)?;
         }
         if children.iter().all(Option::is_none) {
             return Ok(None);
         }
+
+        // The tile itself.
         let mut clock = CpuClock::start();
         let parent = reduce(children.each_ref().map(Option::as_ref), self.frame.tile_px);
         self.block.stats.reduce_s += clock.lap_s();
@@ -146,50 +161,55 @@ impl Work<'_> {
     }
 }
 
-/// Base tiles: renderer, zmax, tiles with content so far.
-struct Traced<'s>(TileRenderer<'s>, u8, u64);
+/// Base tiles, rendered.
+struct RenderedTiles<'s> {
+    renderer: TileRenderer<'s>,
+    zmax: u8,
+    /// Tiles with content so far.
+    count: u64,
+}
 
-impl Leaves for Traced<'_> {
+impl TileSource for RenderedTiles<'_> {
     fn level(&self) -> u8 {
-        self.1
+        self.zmax
     }
 
     fn tile(&mut self, tile: Tile) -> Result<Option<GBuffer>> {
-        let g = self.0.tile(tile.x, tile.y)?;
-        self.2 += u64::from(g.is_some());
+        let g = self.renderer.tile(tile.x, tile.y)?;
+        self.count += u64::from(g.is_some());
         Ok(g)
     }
 
-    fn owned(&self) -> bool {
+    fn is_in_block(&self) -> bool {
         true
     }
 }
 
-/// Root tiles of the blocks below, which have encoded them.
-struct Seams<'a> {
-    by_place: HashMap<(u32, u32), &'a [u8]>,
+/// Root tiles of the blocks below, read from their seams.
+struct SeamTiles<'a> {
+    by_tile: HashMap<(u32, u32), &'a [u8]>,
     level: u8,
     side: u32,
     arrays: Arrays,
 }
 
-impl Leaves for Seams<'_> {
+impl TileSource for SeamTiles<'_> {
     fn level(&self) -> u8 {
         self.level
     }
 
     fn tile(&mut self, tile: Tile) -> Result<Option<GBuffer>> {
-        let Some(bytes) = self.by_place.get(&(tile.x, tile.y)) else { return Ok(None) };
+        let Some(bytes) = self.by_tile.get(&(tile.x, tile.y)) else { return Ok(None) };
         let name = format!("seam {}/{}/{}", tile.z, tile.x, tile.y);
         let g = read_seam(&name, bytes)?;
         match (g.width, g.height) == (self.side, self.side) {
             false => Err(Error::format(name, format!("{} × {} px, expected {}", g.width, g.height, self.side))),
-            true if g.arrays() != self.arrays => Err(Error::format(name, "it has not the arrays of the frame's layers")),
+            true if g.arrays() != self.arrays => Err(Error::format(name, "arrays do not match the frame's layers")),
             true => Ok(Some(g)),
         }
     }
 
-    fn owned(&self) -> bool {
+    fn is_in_block(&self) -> bool {
         false
     }
 }

@@ -1,8 +1,8 @@
-//! CPU time of the calling thread, for stage statistics only: no output depends on it.
+//! CPU time of the calling thread, for statistics of stages only: no output depends on it.
 
 use rustix::time::{ClockId, clock_gettime};
 
-/// A stop watch on the thread's CPU time.
+/// A stopwatch of the thread's CPU time.
 #[derive(Clone, Copy, Debug)]
 pub struct CpuClock(f64);
 
@@ -11,7 +11,7 @@ impl CpuClock {
         Self(now_s())
     }
 
-    /// Seconds since the start or the last lap.
+    /// Returns the seconds since the start or the last lap.
     pub fn lap_s(&mut self) -> f64 {
         let now = now_s();
         let lap = now - self.0;

@@ -1,4 +1,4 @@
-//! Cut-outs by the alpha of the scene's textures (spec/pyramid.md §4).
+//! Cut-outs by the alpha channel of the scene's textures (spec/pyramid.md §4).
 
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -8,9 +8,9 @@ use map3d_base::asset::Wrap;
 use map3d_scene::MaterialRecord;
 use map3d_texture::sample::{AlphaSampler, UvMap};
 use map3d_texture::{Level, Texture, TextureCache, TextureKey};
-use map3d_trace::{Affine, Cutout, CutoutSample, Stencil};
+use map3d_trace::{Affine, Cutout, CutoutMask, CutoutSample};
 
-/// Wrap mode of a material record.
+/// Returns the wrap mode of a material record.
 pub(crate) fn wrap_of(material: &MaterialRecord) -> Wrap {
     match material.wrap {
         1 => Wrap::Mirror,
@@ -21,16 +21,16 @@ pub(crate) fn wrap_of(material: &MaterialRecord) -> Wrap {
     }
 }
 
-/// Tests samples against the filtered alpha of a texture. A texture that cannot be read counts as opaque and as a failure, which the
-/// renderer turns into an error when the beam is done.
+/// Tests samples against the filtered alpha of a texture. A texture that cannot be read counts as opaque and as a failure, which the renderer reports as an
+/// error after the beam.
 pub struct TextureCutout<'a> {
     cache: &'a TextureCache,
     failures: AtomicU64,
-    last: RefCell<Option<Last>>,
+    recent: RefCell<Option<RecentLevel>>,
 }
 
-/// Samples come surface by surface: the level of the last one is at hand.
-struct Last {
+/// The texture level of the last sample; consecutive samples usually belong to one surface.
+struct RecentLevel {
     key: TextureKey,
     footprint: [[f32; 2]; 2],
     texture: Arc<Texture>,
@@ -40,27 +40,31 @@ struct Last {
 
 impl<'a> TextureCutout<'a> {
     pub fn new(cache: &'a TextureCache) -> Self {
-        Self { cache, failures: AtomicU64::new(0), last: RefCell::new(None) }
+        Self { cache, failures: AtomicU64::new(0), recent: RefCell::new(None) }
     }
 
-    /// Samples that met a texture that cannot be read.
+    /// Returns the number of samples whose texture could not be read.
     pub fn failures(&self) -> u64 {
         self.failures.load(Ordering::Relaxed)
     }
 
+    /// Returns the texture level for a sample's footprint.
     fn level(&self, material: &MaterialRecord, sample: &CutoutSample) -> map3d_base::Result<Arc<Level>> {
-        let mut last = self.last.borrow_mut();
-        if let Some(l) = last.as_ref().filter(|l| l.key == material.texture && l.footprint == sample.footprint) {
-            return Ok(l.level.clone());
+        // Same texture and footprint.
+        let mut recent = self.recent.borrow_mut();
+        if let Some(r) = recent.as_ref().filter(|r| r.key == material.texture && r.footprint == sample.footprint) {
+            return Ok(r.level.clone());
         }
-        let texture = match last.as_ref().filter(|l| l.key == material.texture) {
-            Some(l) => l.texture.clone(),
+
+        // Same texture, perhaps another level.
+        let texture = match recent.as_ref().filter(|r| r.key == material.texture) {
+            Some(r) => r.texture.clone(),
             None => self.cache.texture(&material.texture)?,
         };
         let number = AlphaSampler::level_for(&texture, &uv_map(sample));
-        let held = last.as_ref().filter(|l| l.key == material.texture && l.number == number).map(|l| l.level.clone());
-        let level = held.map_or_else(|| self.cache.level(&texture, number), Ok)?;
-        *last = Some(Last { key: material.texture, footprint: sample.footprint, texture, number, level: level.clone() });
+        let same = recent.as_ref().filter(|r| r.key == material.texture && r.number == number).map(|r| r.level.clone());
+        let level = same.map_or_else(|| self.cache.level(&texture, number), Ok)?;
+        *recent = Some(RecentLevel { key: material.texture, footprint: sample.footprint, texture, number, level: level.clone() });
         Ok(level)
     }
 }
@@ -84,22 +88,22 @@ impl Cutout for TextureCutout<'_> {
         }
     }
 
-    fn stencil(&self, material: &MaterialRecord, [u, v]: &[Affine; 2]) -> Option<Box<dyn Stencil>> {
+    fn prepare(&self, material: &MaterialRecord, [u, v]: &[Affine; 2]) -> Option<Box<dyn CutoutMask>> {
         if !material.is_textured() {
             return None;
         }
         let origin = CutoutSample { uv: [u.at0, v.at0], footprint: [[u.dx, v.dx], [u.dy, v.dy]] };
         let level = self.level(material, &origin).ok()?;
-        Some(Box::new(AlphaStencil(AlphaSampler::with(level, &uv_map(&origin), wrap_of(material), material.border[3]))))
+        Some(Box::new(AlphaMask(AlphaSampler::with(level, &uv_map(&origin), wrap_of(material), material.border[3]))))
     }
 }
 
-/// A surface's alpha.
-struct AlphaStencil(AlphaSampler);
+/// The alpha channel of one surface.
+struct AlphaMask(AlphaSampler);
 
-impl Stencil for AlphaStencil {
-    fn covered(&self, i: usize, j: usize, asked: u32) -> u32 {
-        self.0.covered(i as i32, j as i32, asked)
+impl CutoutMask for AlphaMask {
+    fn covered(&self, i: usize, j: usize, candidates: u32) -> u32 {
+        self.0.covered(i as i32, j as i32, candidates)
     }
 
     fn covers(&self, uv: [f32; 2]) -> bool {

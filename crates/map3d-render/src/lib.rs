@@ -1,16 +1,18 @@
-//! Rendering: what beams meet is shaded to G-buffers, reduced and encoded as blocks (spec/pyramid.md §4–§8).
+//! Rendering: the visible surfaces of tiles are shaded to G-buffers, reduced and encoded as blocks (spec/pyramid.md §4–§8, §10).
 
 mod block;
 mod clock;
 mod cutout;
+mod fragments;
 mod light;
-mod paint;
+mod material;
+mod query;
 mod scene;
-mod seen;
 mod shade;
 mod tile;
 
 pub use block::{Block, BlockStats, EncodedTile, reduce_block};
 pub use cutout::TextureCutout;
-pub use scene::{Pick, RenderScene, SceneStats};
+pub use query::Pick;
+pub use scene::{RenderScene, SceneStats};
 pub use tile::TileRenderer;

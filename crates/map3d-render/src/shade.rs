@@ -1,74 +1,93 @@
-//! Resolve and shade: each (pixel, surface) once, at the centroid of the samples that the surface covers there. Neighbours in a row that show one
-//! surface are shaded together.
+//! Resolve and shading: each (pixel, surface) pair is shaded once, at the centroid of the samples that the surface covers in the pixel. Neighbouring pixels
+//! of a row that show one surface are shaded together.
+
+use std::ops::Range;
 
 use map3d_base::samples::SAMPLES;
 use map3d_base::{Error, Isa, Result};
 use map3d_image::GBuffer;
 use map3d_texture::TextureCache;
-use map3d_trace::visbuf::{MIXED, NOTHING};
-use map3d_trace::{SUBTILE_PX, VisBuf};
+use map3d_trace::{MIXED, NOTHING, SUBTILE_PX, VisBuf};
 
-use crate::paint::{Palette, Shaded};
-use crate::seen::{Seen, Share};
+use crate::fragments::{Fragment, FragmentBuffer};
+use crate::material::{MaterialCache, PreparedSurface};
 
-/// Shades sub-tiles; buffers are kept.
+/// Shades sub-tiles. Keep one per thread to reuse its buffers.
 pub struct Shader {
-    palette: Palette,
-    /// What the pixels of the sub-tile in hand show, if somebody asks.
-    seen: Seen,
-    keeps_seen: bool,
-    /// Surfaces of the sub-tile in hand, and where each slot's stands among them.
-    surfaces: Vec<Shaded>,
-    of_slot: Vec<u32>,
-    /// (pixel, surface) pairs shaded.
+    materials: MaterialCache,
+    /// Fragments of the current sub-tile; empty unless `keeps_fragments`.
+    fragments: FragmentBuffer,
+    keeps_fragments: bool,
+    /// Prepared surfaces of the current sub-tile.
+    surfaces: Vec<PreparedSurface>,
+    /// Index into `surfaces` of each slot, or `NOT_PREPARED`.
+    surface_of_slot: Vec<u32>,
+    /// Shaded (pixel, surface) pairs.
     pub shades: u64,
-    /// Surfaces set up.
+    /// Prepared surfaces.
     pub setups: u64,
 }
 
-/// A slot whose surface has not been set up.
-const UNKNOWN: u32 = u32::MAX;
+const NOT_PREPARED: u32 = u32::MAX;
 
-/// A sub-tile on its way into the G-buffer, whose pixel `corner` is the sub-tile's first.
-struct Scene<'a> {
+/// A sub-tile and the G-buffer that it is shaded into.
+struct SubtileTarget<'a> {
     vis: &'a VisBuf,
-    cache: &'a TextureCache,
+    textures: &'a TextureCache,
     g: &'a mut GBuffer,
+    /// The sub-tile's first pixel in the G-buffer: left, top.
     corner: (usize, usize),
 }
 
+impl SubtileTarget<'_> {
+    /// Returns the index of pixel (i, j) in the G-buffer.
+    #[inline(always)]
+    fn index(&self, i: usize, j: usize) -> usize {
+        (self.corner.1 + j) * self.g.width as usize + self.corner.0 + i
+    }
+}
+
 impl Shader {
-    /// `keeps_seen`: `seen` is asked for.
-    pub fn new(isa: Isa, keeps_seen: bool) -> Self {
-        Self { palette: Palette::new(isa), seen: Seen::default(), keeps_seen, surfaces: Vec::new(), of_slot: Vec::new(), shades: 0, setups: 0 }
+    /// `keeps_fragments`: the caller needs `fragments`.
+    pub fn new(isa: Isa, keeps_fragments: bool) -> Self {
+        Self {
+            materials: MaterialCache::new(isa),
+            fragments: FragmentBuffer::default(),
+            keeps_fragments,
+            surfaces: Vec::new(),
+            surface_of_slot: Vec::new(),
+            shades: 0,
+            setups: 0,
+        }
     }
 
-    /// Shades a sub-tile into the arrays that the G-buffer has; its pixel `corner` (left, top) is the sub-tile's first.
-    pub fn subtile(&mut self, vis: &VisBuf, cache: &TextureCache, g: &mut GBuffer, corner: (usize, usize)) -> Result<()> {
+    /// Shades a sub-tile into the arrays of the G-buffer; `corner` (left, top) is the sub-tile's first pixel there.
+    pub fn shade_subtile(&mut self, vis: &VisBuf, textures: &TextureCache, g: &mut GBuffer, corner: (usize, usize)) -> Result<()> {
         self.surfaces.clear();
-        self.seen.clear();
-        self.of_slot.clear();
-        self.of_slot.resize(vis.slot_count(), UNKNOWN);
-        let done = self.rows(&mut Scene { vis, cache, g, corner });
-        self.palette.held.release();
+        self.fragments.clear();
+        self.surface_of_slot.clear();
+        self.surface_of_slot.resize(vis.slot_count(), NOT_PREPARED);
+        let done = self.shade_rows(&mut SubtileTarget { vis, textures, g, corner });
+        self.materials.held.release();
         done
     }
 
-    fn rows(&mut self, scene: &mut Scene) -> Result<()> {
+    /// Splits each row into runs of pixels with one slot, and pixels with several.
+    fn shade_rows(&mut self, target: &mut SubtileTarget) -> Result<()> {
         for j in 0..SUBTILE_PX {
-            let row = scene.vis.row(j);
+            let row = target.vis.row(j);
             let mut i = 0;
             while i < SUBTILE_PX {
                 let slot = row[i];
                 let mut end = i + 1;
                 if slot == MIXED {
-                    self.mixed(scene, i, j)?;
+                    self.shade_mixed_pixel(target, i, j)?;
                 } else {
                     while end < SUBTILE_PX && row[end] == slot {
                         end += 1;
                     }
                     if slot != NOTHING {
-                        self.run(scene, slot, i, end, j)?;
+                        self.shade_run(target, slot, i..end, j)?;
                     }
                 }
                 i = end;
@@ -77,102 +96,119 @@ impl Shader {
         Ok(())
     }
 
+    /// Returns the prepared surface of a slot.
     #[inline(always)]
-    fn surface(&mut self, scene: &Scene, slot: u32) -> Result<&Shaded> {
-        let at = match self.of_slot[slot as usize] {
-            UNKNOWN => self.set_up(scene, slot)?,
-            known => known,
+    fn surface(&mut self, target: &SubtileTarget, slot: u32) -> Result<&PreparedSurface> {
+        let index = match self.surface_of_slot[slot as usize] {
+            NOT_PREPARED => self.prepare(target, slot)?,
+            index => index,
         };
-        Ok(&self.surfaces[at as usize])
+        Ok(&self.surfaces[index as usize])
     }
 
     #[inline(never)]
-    fn set_up(&mut self, scene: &Scene, slot: u32) -> Result<u32> {
-        let (surface, depth) = scene.vis.surface_and_depth(slot);
-        let chunk = scene.vis.chunk(surface.chunk);
+    fn prepare(&mut self, target: &SubtileTarget, slot: u32) -> Result<u32> {
+        let (surface, depth) = target.vis.surface_and_depth(slot);
+        let chunk = target.vis.chunk(surface.chunk);
         let material = chunk.materials().get(surface.material as usize);
-        let material = material.ok_or_else(|| Error::format(chunk.path(), format!("material {} of a triangle", surface.material)))?;
-        let at = self.surfaces.len() as u32;
-        self.surfaces.push(Shaded::new(&mut self.palette, scene.cache, material, &surface, depth, !scene.g.color.is_empty())?);
-        self.of_slot[slot as usize] = at;
+        let material = material.ok_or_else(|| {
+            let (number, count) = (surface.material, chunk.materials().len());
+            Error::format(chunk.path(), format!("a triangle has material {number}, but the chunk has {count} materials; rebuild the scene"))
+        })?;
+        let index = self.surfaces.len() as u32;
+        let needs_color = !target.g.color.is_empty();
+        self.surfaces.push(PreparedSurface::new(&mut self.materials, target.textures, material, &surface, depth, needs_color)?);
+        self.surface_of_slot[slot as usize] = index;
         self.setups += 1;
-        Ok(at)
+        Ok(index)
     }
 
-    /// Pixels i..end of row j, all of whose samples meet one surface.
+    /// Shades pixels of row j whose samples all show one surface.
     #[inline(always)]
-    fn run(&mut self, scene: &mut Scene, slot: u32, i: usize, end: usize, j: usize) -> Result<()> {
-        self.shades += (end - i) as u64;
-        let shaded = self.surface(scene, slot)?;
-        let first = (scene.corner.1 + j) * scene.g.width as usize + scene.corner.0 + i;
-        let pixels = first..first + end - i;
-        shaded.depth.row(i, j, &mut scene.g.depth[pixels.clone()]);
-        scene.g.id[pixels.clone()].fill(shaded.id);
-        if !scene.g.normal.is_empty() {
-            shaded.normals(i, j, &mut scene.g.normal[pixels.clone()]);
+    fn shade_run(&mut self, target: &mut SubtileTarget, slot: u32, columns: Range<usize>, j: usize) -> Result<()> {
+        self.shades += columns.len() as u64;
+        let surface = self.surface(target, slot)?;
+        let i = columns.start;
+        let first = target.index(i, j);
+        let pixels = first..first + columns.len();
+        surface.depth.row(i, j, &mut target.g.depth[pixels.clone()]);
+        target.g.id[pixels.clone()].fill(surface.id);
+        if !target.g.normal.is_empty() {
+            surface.normals(i, j, &mut target.g.normal[pixels.clone()]);
         }
-        if !scene.g.color.is_empty() {
-            shaded.paint.row(i, j, &mut scene.g.color[pixels.clone()]);
+        if !target.g.color.is_empty() {
+            surface.color.row(i, j, &mut target.g.color[pixels.clone()]);
         }
-        if self.keeps_seen {
-            self.seen.push_run(j, i, end, self.of_slot[slot as usize]);
+        if self.keeps_fragments {
+            self.fragments.push_run(j, i, columns.end, self.surface_of_slot[slot as usize]);
         }
         Ok(())
     }
 
-    /// A pixel on an edge: colours weighed by the samples they cover; id, normal and depth of sample 0.
+    /// Shades a pixel on an edge: the mean of the surfaces' colours, weighted by their samples; id, normal and depth of sample 0.
     #[inline(always)]
-    fn mixed(&mut self, scene: &mut Scene, i: usize, j: usize) -> Result<()> {
-        let slots = scene.vis.mixed(i, j);
-        let at = (scene.corner.1 + j) * scene.g.width as usize + scene.corner.0 + i;
+    fn shade_mixed_pixel(&mut self, target: &mut SubtileTarget, i: usize, j: usize) -> Result<()> {
+        let slots = target.vis.mixed(i, j);
+        let at = target.index(i, j);
+
+        // Shade each surface at the centroid of its samples.
         let mut sum = [0u32; 4];
-        let first = self.seen.shares.len();
-        let mut todo = !VisBuf::samples_of(slots, NOTHING) & 0xFFFF;
-        while todo != 0 {
-            let slot = slots[todo.trailing_zeros() as usize & 15];
-            let own = VisBuf::samples_of(slots, slot);
-            todo &= !own;
-            let (x, y) = centroid(own);
+        let first = self.fragments.fragments.len();
+        let mut rest = !VisBuf::samples_of(slots, NOTHING) & 0xFFFF;
+        while rest != 0 {
+            let slot = slots[rest.trailing_zeros() as usize & 15];
+            let covered = VisBuf::samples_of(slots, slot);
+            rest &= !covered;
+            let (x, y) = centroid(covered);
             self.shades += 1;
-            let shaded = self.surface(scene, slot)?;
-            let color = shaded.paint.at((i as i32) << 8 | x, (j as i32) << 8 | y);
-            let weight = own.count_ones();
+            let surface = self.surface(target, slot)?;
+            let color = surface.color.at((i as i32) << 8 | x, (j as i32) << 8 | y);
+            let weight = covered.count_ones();
             (0..3).for_each(|c| sum[c] += u32::from(color[c]) * weight);
             sum[3] += 65_535 * weight;
-            if self.keeps_seen {
-                let (at, surface) = ([x, y].map(|v| v as u8), self.of_slot[slot as usize]);
-                self.seen.shares.push(Share { at, samples: weight as u8, surface, color });
+            if self.keeps_fragments {
+                let (centroid, surface) = ([x, y].map(|v| v as u8), self.surface_of_slot[slot as usize]);
+                self.fragments.fragments.push(Fragment { centroid, samples: weight as u8, surface, color });
             }
         }
-        if self.keeps_seen {
-            self.seen.end_pixel(j, i, first);
+        if self.keeps_fragments {
+            self.fragments.finish_pixel(j, i, first);
         }
-        if !scene.g.color.is_empty() {
-            scene.g.color[at] = sum.map(|c| ((c + 8) >> 4) as u16);
+
+        // Resolve the colour over all 16 samples.
+        if !target.g.color.is_empty() {
+            target.g.color[at] = sum.map(|c| ((c + 8) >> 4) as u16);
         }
+
+        // The other arrays show the pixel's centre.
         if slots[0] != NOTHING {
-            let shaded = self.surface(scene, slots[0])?;
-            scene.g.id[at] = shaded.id;
-            scene.g.depth[at] = shaded.depth.units(i, j);
-            if !scene.g.normal.is_empty() {
-                scene.g.normal[at] = shaded.normal_at(i, j);
+            let surface = self.surface(target, slots[0])?;
+            target.g.id[at] = surface.id;
+            target.g.depth[at] = surface.depth.units(i, j);
+            if !target.g.normal.is_empty() {
+                target.g.normal[at] = surface.normal_at(i, j);
             }
         }
         Ok(())
     }
 
-    /// What the pixels of the sub-tile shaded last show, with the surfaces that they name. Nothing unless asked for.
-    pub fn seen(&self) -> (&Seen, &[Shaded]) {
-        (&self.seen, &self.surfaces)
+    /// The fragments of the sub-tile shaded last; empty unless `new` was called with `keeps_fragments`.
+    pub fn fragments(&self) -> &FragmentBuffer {
+        &self.fragments
     }
 
-    /// The surface of the sub-tile shaded last that a slot stands for.
-    pub fn surface_of(&self, slot: u32) -> &Shaded {
-        &self.surfaces[self.of_slot[slot as usize] as usize]
+    /// The surfaces of the sub-tile shaded last, which `fragments` refers to.
+    pub fn surfaces(&self) -> &[PreparedSurface] {
+        &self.surfaces
+    }
+
+    /// Returns the surface of a slot in the sub-tile shaded last.
+    pub fn surface_of_slot(&self, slot: u32) -> &PreparedSurface {
+        &self.surfaces[self.surface_of_slot[slot as usize] as usize]
     }
 }
 
-/// Sums of the x and y (in sixteenths) of the samples of masks of eight, the first and the last eight samples apart: x | y << 16.
+/// Sums of the x and y (in 1/16 px) of the samples of a mask of eight, for the first and for the last eight samples: x | y << 16.
 const SUMS: [[u32; 256]; 2] = {
     let mut out = [[0; 256]; 2];
     let mut mask = 0;
@@ -191,8 +227,8 @@ const SUMS: [[u32; 256]; 2] = {
     out
 };
 
-/// ⌈2^16 / n⌉: what it multiplies, below 4096, is divided by n exactly.
-const SHARE: [u32; 32] = {
+/// ⌈2^16 / n⌉. Multiplying a number below 4096 by it and shifting right by 16 divides by n exactly.
+const RECIPROCAL: [u32; 32] = {
     let mut out = [0; 32];
     let mut n = 1;
     while n < 17 {
@@ -202,8 +238,8 @@ const SHARE: [u32; 32] = {
     out
 };
 
-/// Mean of some samples in 1/256 px from the pixel's corner, to the nearest. Samples stand for the centres of strata around the pixel's centre:
-/// all sixteen together give (128, 128).
+/// Returns the mean position of a mask's samples in 1/256 px from the pixel's corner, rounded to the nearest. All sixteen samples together represent the
+/// whole pixel: (128, 128).
 #[inline(always)]
 fn centroid(mask: u32) -> (i32, i32) {
     let n = mask.count_ones();
@@ -211,7 +247,7 @@ fn centroid(mask: u32) -> (i32, i32) {
         return (128, 128);
     }
     let sums = SUMS[0][mask as usize & 255] + SUMS[1][mask as usize >> 8 & 255];
-    let mean = |sum: u32| (((sum * 16 + n / 2) * SHARE[n as usize & 31]) >> 16) as i32;
+    let mean = |sum: u32| (((sum * 16 + n / 2) * RECIPROCAL[n as usize & 31]) >> 16) as i32;
     (mean(sums & 0xFFFF), mean(sums >> 16))
 }
 
@@ -220,7 +256,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn centroids_are_means_to_the_nearest() {
+    fn centroid_is_the_rounded_mean() {
         for mask in 1..0xFFFFu32 {
             let chosen: Vec<u32> = (0..16).filter(|k| mask >> k & 1 == 1).collect();
             let mean = |axis: fn(&(u8, u8)) -> u8| {

@@ -1,4 +1,4 @@
-//! Blocks: no seams between tiles, reduction the same by either way, the same bytes on any thread.
+//! Blocks: pixels do not depend on tiling, reduction does not depend on blocks, bytes do not depend on threads.
 
 mod town;
 
@@ -11,9 +11,9 @@ use map3d_image::GBuffer;
 use map3d_image::encode::{bytes_from_u32, decode_png};
 use map3d_image::seam::read_seam;
 use map3d_render::{Block, RenderScene, TileRenderer, reduce_block};
-use town::{Folder, Town, all_layers, bricks, frame, new_folder};
+use town::{TempFolder, Town, all_layers, bricks, frame, new_folder};
 
-fn scene(name: &str) -> (Folder, RenderScene) {
+fn scene(name: &str) -> (TempFolder, RenderScene) {
     let mut town = Town::default();
     let (brick, red) = (town.textured(bricks(128), Wrap::Mirror), town.flat([0.9, 0.1, 0.05]));
     town.ground(70.0, 9.0, brick, 0);
@@ -32,13 +32,13 @@ fn tile_of(block: &Block, layer: usize, tile: Tile) -> Option<&[u8]> {
 
 const ROOT: Tile = Tile { z: 0, x: 0, y: 0 };
 
-/// The frame of `f` with tiles twice as large, one level fewer: the same pixels.
+/// Returns the frame with tiles twice as large and one level less: the same pixels.
 fn with_large_tiles(f: &Frame) -> Frame {
     Frame { tile_px: 512, zmax: f.zmax - 1, ..f.clone() }
 }
 
 #[test]
-fn pixels_do_not_depend_on_how_they_are_tiled() {
+fn pixels_do_not_depend_on_tiling() {
     let (_folder, scene) = scene("tiling");
     for (look_at, pitch) in [(0.0, 45.0), (33.0, 22.5)] {
         let f = frame(look_at, pitch, 160.0, 2);
@@ -69,7 +69,7 @@ fn crop(g: &GBuffer, left: u32, top: u32) -> GBuffer {
 }
 
 #[test]
-fn a_block_holds_its_tiles_of_all_layers_and_a_seam() {
+fn block_has_its_tiles_in_all_layers_and_a_seam() {
     let (_folder, scene) = scene("block");
     let f = frame(0.0, 45.0, 160.0, 2);
     let block = scene.render_block(&f, ROOT).expect("renders");
@@ -94,9 +94,9 @@ fn a_block_holds_its_tiles_of_all_layers_and_a_seam() {
     assert_eq!(decode_png(tile_of(&block, 3, ROOT).expect("root")).expect("sound").pixels, bytes_from_u32(&seam.depth));
 }
 
-/// zmax 3 as one base block, and as four base blocks of the quadrants' frames joined by a reduce block.
+/// A reduce block of four base blocks gives the same root as reducing their seams directly.
 #[test]
-fn reduction_through_seams_is_reduction() {
+fn reduction_through_seams_equals_direct_reduction() {
     let (_folder, scene) = scene("seams");
     let f = frame(30.0, 45.0, 160.0, 3);
     let whole = scene.render_block(&f, ROOT).expect("renders");
@@ -120,30 +120,30 @@ fn reduction_through_seams_is_reduction() {
 }
 
 #[test]
-fn reduce_blocks_refuse_what_does_not_fit() {
-    let (_folder, scene) = scene("refuse");
+fn reduce_block_rejects_wrong_seams() {
+    let (_folder, scene) = scene("wrong-seams");
     let f = frame(0.0, 45.0, 160.0, 4);
     let seam = scene.render_block(&f, Tile { z: 1, x: 0, y: 0 }).expect("renders").seam.expect("content");
-    assert!(reduce_block(&f, ROOT, 1, &[(0, 0, &seam), (0, 0, &seam)]).is_err(), "twice");
-    assert!(reduce_block(&f, ROOT, 1, &[(2, 0, &seam)]).is_err(), "elsewhere");
+    assert!(reduce_block(&f, ROOT, 1, &[(0, 0, &seam), (0, 0, &seam)]).is_err(), "given twice");
+    assert!(reduce_block(&f, ROOT, 1, &[(2, 0, &seam)]).is_err(), "outside of the block");
     assert!(reduce_block(&f, ROOT, 1, &[(0, 0, &seam[..seam.len() - 1])]).is_err(), "damaged");
     assert!(reduce_block(&Frame { tile_px: 512, ..f.clone() }, ROOT, 1, &[(0, 0, &seam)]).is_err(), "another tile size");
     assert!(reduce_block(&f, ROOT, 4, &[]).is_err() && reduce_block(&f, ROOT, 0, &[]).is_err());
-    assert!(scene.render_block(&f, ROOT).is_err(), "base blocks are rooted at zmax − 3");
+    assert!(scene.render_block(&f, ROOT).is_err(), "the root of a base block is at level zmax − 3");
     let nothing = reduce_block(&f, ROOT, 1, &[]).expect("reduces");
     assert_eq!((nothing.tiles.len(), nothing.seam), (0, None));
 }
 
 #[test]
-fn blocks_without_content_are_empty() {
-    let (_folder, scene) = scene("void");
+fn block_without_content_is_empty() {
+    let (_folder, scene) = scene("empty");
     let f = Frame { u0_m: 5_000.0, ..frame(0.0, 45.0, 160.0, 3) };
     let block = scene.render_block(&f, ROOT).expect("renders");
     assert_eq!((block.tiles.len(), block.seam, block.stats.traced_tiles), (0, None, 0));
 }
 
 #[test]
-fn threads_and_formats_make_no_difference_to_bytes() {
+fn bytes_do_not_depend_on_threads() {
     let (folder, first) = scene("threads");
     for color in [LayerFormat::Webp, LayerFormat::Jpeg, LayerFormat::Png] {
         let f = Frame { layers: all_layers(color), ..frame(10.0, 30.0, 160.0, 4) };

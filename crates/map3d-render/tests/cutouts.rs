@@ -6,16 +6,16 @@ use map3d_base::Vec3;
 use map3d_base::asset::Wrap;
 use map3d_image::Raster;
 use map3d_render::TextureCutout;
-use town::brute::contest::{Contest, Presence};
-use town::brute::{Known, Place};
+use town::reference::comparison::{BeamComparison, HoleState};
+use town::reference::{ReferenceTriangle, TexturePoint};
 use town::scenes::RANKS;
 use town::{Town, frame, new_folder};
 
 const SIDE: i64 = 64;
-/// Texels in a cell of the chequer.
+/// Side of a chequer cell in texels.
 const CELL: i64 = 8;
 
-/// A chequer with specks of 1, 2 and 4 texels the other way round, so that each level has holes of its own.
+/// A chequer with inverted specks of 1, 2 and 4 texels, so that the holes differ between levels.
 fn is_hole(x: i64, y: i64) -> bool {
     let speck = |size: i64| ((x / size) * 7 + (y / size) * 13 + (x / size) * (y / size)) % 11 == 3;
     ((x / CELL + y / CELL) % 2 == 1) ^ speck(1) ^ speck(2) ^ speck(4)
@@ -26,7 +26,7 @@ fn chequer() -> Raster {
     Raster::new(SIDE as u32, SIDE as u32, (0..SIDE * SIDE).map(|k| [90, 140, 60, alpha(k)]).collect())
 }
 
-/// Alpha of texel (x, y) of a level as the wrap mode has it; the border is transparent, what lies beyond `Wrap::None` is not.
+/// Returns the alpha of texel (x, y) of a level in a wrap mode. Outside of the texture, `Wrap::Border` is transparent and `Wrap::None` opaque.
 fn texel(wrap: u8, level: u32, x: i64, y: i64) -> f64 {
     let side = SIDE >> level;
     let mirrored = |i: i64| if i.rem_euclid(2 * side) < side { i.rem_euclid(side) } else { side - 1 - i.rem_euclid(side) };
@@ -40,45 +40,45 @@ fn texel(wrap: u8, level: u32, x: i64, y: i64) -> f64 {
     if !(0..side).contains(&x) || !(0..side).contains(&y) {
         return if wrap == 3 { 0.0 } else { 1.0 };
     }
-    let there = (0..size * size).filter(|k| !is_hole(x * size + k % size, y * size + k / size)).count();
-    there as f64 / (size * size) as f64
+    let opaque = (0..size * size).filter(|k| !is_hole(x * size + k % size, y * size + k / size)).count();
+    opaque as f64 / (size * size) as f64
 }
 
-/// Bilinear, at the level whose texels are about a quarter pixel; unsure beyond level 3, where little is left to see.
-fn presence(t: &Known, place: &Place) -> Presence {
+/// Filters bilinearly at the level whose texels are about a quarter pixel; uncertain beyond level 3, where few holes remain.
+fn hole_state(t: &ReferenceTriangle, point: &TexturePoint) -> HoleState {
     let side = SIDE as f64;
-    let [a, b] = place.footprint;
+    let [a, b] = point.footprint;
     let wanted = ((a[0] * b[1] - a[1] * b[0]).abs().sqrt() * side / 4.0).log2().max(0.0);
     let (level, size) = (wanted.round() as u32, side / wanted.round().exp2());
     if level > 3 {
-        return Presence::Unsure;
+        return HoleState::Uncertain;
     }
-    let (x, y) = (place.uv[0] * size - 0.5, (1.0 - place.uv[1]) * size - 0.5);
+    let (x, y) = (point.uv[0] * size - 0.5, (1.0 - point.uv[1]) * size - 0.5);
     let (fx, fy) = (x - x.floor(), y - y.floor());
     let at = |i: i64, j: i64| texel(t.material.wrap, level, x.floor() as i64 + i, y.floor() as i64 + j);
     let alpha = (at(0, 0) * (1.0 - fx) + at(1, 0) * fx) * (1.0 - fy) + (at(0, 1) * (1.0 - fx) + at(1, 1) * fx) * fy;
-    // Taps lie on 1/128 of a texel, and each level rounds alpha to a byte.
-    let room = f64::from(level) / 510.0 + 2.0 / 256.0 + (place.room[0] + place.room[1]) * size + 1.0 / 1024.0;
-    match (alpha - 0.5).abs() > room && (wanted - wanted.floor() - 0.5).abs() > 1e-4 {
-        true if alpha > 0.5 => Presence::There,
-        true => Presence::Gone,
-        false => Presence::Unsure,
+    // Taps are quantised to 1/128 texel, and each level rounds alpha to a byte.
+    let tolerance = f64::from(level) / 510.0 + 2.0 / 256.0 + (point.tolerance[0] + point.tolerance[1]) * size + 1.0 / 1024.0;
+    match (alpha - 0.5).abs() > tolerance && (wanted - wanted.floor() - 0.5).abs() > 1e-4 {
+        true if alpha > 0.5 => HoleState::Covered,
+        true => HoleState::Hole,
+        false => HoleState::Uncertain,
     }
 }
 
-/// Panels at all angles, with the texture from `least` to `most` times a metre.
+/// Returns panels at random angles that repeat the texture `least` to `most` times per metre.
 fn screens(wrap: Wrap, [least, most]: [f64; 2]) -> Town {
     let mut town = Town::default();
     let (grey, cut) = (town.flat([0.6; 3]), town.textured(chequer(), wrap));
     town.panel([[-30.0, -30.0, -9.0], [30.0, -30.0, -9.0], [30.0, 30.0, -9.0], [-30.0, 30.0, -9.0]], [[0.0; 2]; 4], grey, 0);
-    let mut dice = town::scenes::Dice(17);
+    let mut random = town::scenes::Lcg(17);
     for k in 1..14u32 {
-        let (at, size, repeats) = (dice.point(7.0), dice.between(5.0, 9.0), dice.between(least, most));
-        let (a, b) = (dice.point(1.0), dice.point(1.0));
+        let (at, size, repeats) = (random.point(7.0), random.between(5.0, 9.0), random.between(least, most));
+        let (a, b) = (random.point(1.0), random.point(1.0));
         let axes = [a, map3d_base::vec3::cross(a, b)].map(|v| map3d_base::vec3::normalized(v).expect("a direction"));
         let point = |s: f64, t: f64| -> Vec3 { [0, 1, 2].map(|k| at[k] + axes[0][k] * s * size + axes[1][k] * t * size) };
         let span = (repeats * size) as f32;
-        let from = dice.between(-0.4, 0.3) as f32;
+        let from = random.between(-0.4, 0.3) as f32;
         let uv = [[from, from], [from + span, from], [from + span, from + span], [from, from + span]];
         town.panel([point(-0.5, -0.5), point(0.5, -0.5), point(0.5, 0.5), point(-0.5, 0.5)], uv, if k % 4 == 0 { grey } else { cut }, k);
     }
@@ -87,8 +87,8 @@ fn screens(wrap: Wrap, [least, most]: [f64; 2]) -> Town {
 }
 
 #[test]
-fn texels_decide_which_samples_are_there() {
-    // 64 texels a repeat, some 11 pixels a metre: the second and third take coarser levels.
+fn beams_agree_with_brute_force_at_the_holes_of_textures() {
+    // With 64 texels per repeat and about 11 pixels per metre, the second and third row use coarser levels.
     let wraps = [
         (Wrap::Wrap, [0.06, 0.15]),
         (Wrap::Wrap, [0.9, 1.9]),
@@ -104,10 +104,10 @@ fn texels_decide_which_samples_are_there() {
         for (look_at, pitch) in [(0.0, 90.0), (130.0, 35.0)] {
             let cutout = TextureCutout::new(scene.textures());
             let frame = frame(look_at, pitch, 24.0, 0);
-            let tally = Contest { store: scene.store(), frame: &frame, cutout: &cutout, presence: &presence }.run();
+            let counts = BeamComparison { store: scene.store(), frame: &frame, cutout: &cutout, hole_state: &hole_state }.run();
             assert_eq!(cutout.failures(), 0);
-            assert!(tally.cut * 100 > tally.met && tally.holes * 100 > tally.met, "{wrap:?}: few holes: {tally:?}");
-            assert!(tally.unsure * 25 < tally.met, "{wrap:?}: too near the edge of a hole: {tally:?}");
+            assert!(counts.cutouts * 100 > counts.covered && counts.holes * 100 > counts.covered, "{wrap:?}: few holes: {counts:?}");
+            assert!(counts.uncertain * 25 < counts.covered, "{wrap:?}: too many samples at edges of holes: {counts:?}");
         }
     }
 }

@@ -1,8 +1,8 @@
-//! Golden pictures: tiny scenes look as they did, to the last bit. When a change is meant, `MAP3D_BLESS=1 cargo test -p map3d-render --test golden` keeps
-//! the new pictures: look at them, and say why in the commit.
+//! Golden pictures: tiny scenes are compared to the last bit. After an intended change, `MAP3D_BLESS=1 cargo test -p map3d-render --test golden` stores the
+//! new pictures; check them and give the reason in the commit.
 //!
-//! `golden/<scene>-<look at>-<pitch>.png` holds four quarters of 128 × 128 pixels, from the middle of a tile: colour as sent and normals as sent; below
-//! them ids (each id its own colour) and depths (red steps by 1/4 m, green by 2^-10 m). `golden/digests.txt` has a checksum over the G-buffer's full bits.
+//! `golden/<scene>-<look at>-<pitch>.png` has four quarters of 128 × 128 pixels from the middle of a tile: colours and normals as sent; below them ids
+//! (a colour per id) and depths (red in steps of 1/4 m, green of 2^-10 m). `golden/digests.txt` has a checksum of all bits of each G-buffer.
 
 #[path = "golden/pictures.rs"]
 mod pictures;
@@ -22,7 +22,7 @@ use town::{frame, new_folder};
 const SIDE: usize = 128;
 const QUARTERS: [&str; 4] = ["colour", "normal", "id", "depth"];
 
-/// The middle of a tile of 256 pixels.
+/// Returns the middle of a tile of 256 pixels.
 fn middle(g: &GBuffer) -> GBuffer {
     let mut out = GBuffer::empty(SIDE as u32, SIDE as u32);
     for y in 0..SIDE {
@@ -35,7 +35,7 @@ fn middle(g: &GBuffer) -> GBuffer {
     out
 }
 
-/// Over all bits.
+/// Returns a checksum of all bits.
 fn digest(g: &GBuffer) -> String {
     let color = g.color.iter().flatten().flat_map(|v| v.to_le_bytes());
     let normal = g.normal.iter().flatten().flat_map(|v| v.to_le_bytes());
@@ -43,7 +43,7 @@ fn digest(g: &GBuffer) -> String {
     format!("{:016x}", checksum(&color.chain(normal).chain(numbers).collect::<Vec<u8>>()))
 }
 
-/// Each id below 2^24 has its own colour.
+/// Returns a unique colour for an id below 2^24.
 fn id_color(id: u32) -> [u8; 4] {
     assert!(id < 1 << 24);
     let [r, g, b, _] = id.wrapping_mul(0x9E_3779).to_le_bytes();
@@ -77,29 +77,29 @@ fn quarters(g: &GBuffer) -> Raster {
     Raster::new(2 * SIDE as u32, 2 * SIDE as u32, (0..4 * SIDE * SIDE).map(pixel).collect())
 }
 
-/// Every picture by name, with its digest.
-fn drawn() -> BTreeMap<String, (Raster, String)> {
+/// Returns all pictures by name, with their digests.
+fn render_all() -> BTreeMap<String, (Raster, String)> {
     let mut out = BTreeMap::new();
     for picture in PICTURES {
         let (folder, town) = (new_folder(picture.name), (picture.scene)());
         let scene = town.open(&folder);
         for &(look_at, pitch) in picture.views {
             let f = Frame { d0_m: -40.0, ..frame(look_at, pitch, 2.0 * picture.metres, 0) };
-            let g = middle(&drawn_by_all(&scene, &f));
+            let g = middle(&render_with_all_isas(&scene, &f));
             out.insert(format!("{}-{look_at}-{pitch}", picture.name), (quarters(&g), digest(&g)));
         }
     }
     out
 }
 
-/// Tile (0, 0), the same bits with every instruction set that this machine has.
-fn drawn_by_all(scene: &RenderScene, frame: &Frame) -> GBuffer {
-    let by = |isa: Isa| TileRenderer::with_isa(scene, frame, isa).expect("a frame").tile(0, 0).expect("renders").expect("has content");
-    let plain = by(Isa::Scalar);
+/// Renders tile (0, 0) with all instruction sets of this machine and checks that their bits are equal.
+fn render_with_all_isas(scene: &RenderScene, frame: &Frame) -> GBuffer {
+    let render = |isa: Isa| TileRenderer::with_isa(scene, frame, isa).expect("a frame").tile(0, 0).expect("renders").expect("has content");
+    let scalar = render(Isa::Scalar);
     for isa in Isa::available() {
-        assert!(by(isa) == plain, "{isa:?} draws other bits");
+        assert!(render(isa) == scalar, "{isa:?} differs from scalar");
     }
-    plain
+    scalar
 }
 
 fn golden_folder() -> PathBuf {
@@ -118,69 +118,71 @@ fn read(path: &Path) -> Option<Raster> {
     Some(Raster::new(image.width, image.height, image.pixels.as_chunks::<4>().0.to_vec()))
 }
 
-fn bless(drawn: &BTreeMap<String, (Raster, String)>) {
-    let old = golden_pictures().into_iter().filter(|name| !drawn.contains_key(name));
+fn bless(rendered: &BTreeMap<String, (Raster, String)>) {
+    let old = golden_pictures().into_iter().filter(|name| !rendered.contains_key(name));
     old.for_each(|name| std::fs::remove_file(golden_folder().join(name + ".png")).expect("old picture"));
     let mut lines = String::new();
-    for (name, (image, digest)) in drawn {
+    for (name, (image, digest)) in rendered {
         write(&golden_folder().join(format!("{name}.png")), image);
         lines += &format!("{name} {digest}\n");
     }
     std::fs::write(golden_folder().join("digests.txt"), lines).expect("digests");
 }
 
-/// Names of the pictures kept.
+/// Returns the names of the stored pictures.
 fn golden_pictures() -> Vec<String> {
     let entries = std::fs::read_dir(golden_folder()).expect("golden pictures");
     let names = entries.map(|e| e.expect("entry").file_name().into_string().expect("UTF-8"));
     names.filter_map(|n| n.strip_suffix(".png").map(str::to_owned)).collect()
 }
 
-/// What differs, quarter by quarter, in words; also written beside each other as pictures.
+/// Describes the differences of each quarter, and writes got, golden and difference as pictures.
 fn differences(name: &str, got: &Raster, golden: &Raster) -> String {
     let side = got.width as usize;
     let differ = |k: &usize| got.pixels[*k] != golden.pixels[*k];
-    let mut words = Vec::new();
+    let mut lines = Vec::new();
     for (q, quarter) in QUARTERS.iter().enumerate() {
         let inside = |k: &usize| (*k % side / SIDE, *k / side / SIDE) == (q % 2, q / 2);
         let all: Vec<usize> = (0..side * side).filter(inside).filter(differ).collect();
         if let Some(k) = all.first() {
             let at = (k % side % SIDE, k / side % SIDE);
-            words.push(format!("{quarter}: {} pixels, first {at:?}: {:?}, was {:?}", all.len(), got.pixels[*k], golden.pixels[*k]));
+            lines.push(format!("{quarter}: {} pixels, first {at:?}: {:?}, was {:?}", all.len(), got.pixels[*k], golden.pixels[*k]));
         }
     }
-    if words.is_empty() {
-        return "only in bits that the pictures do not show".into();
+    if lines.is_empty() {
+        return "only bits that the pictures do not show".into();
     }
-    let shown = |k: usize| if differ(&k) { [255, 255, 255, 255] } else { golden.pixels[k].map(|c| c / 4).map(|c| c.max(1)) };
-    let difference = Raster::new(got.width, got.height, (0..side * side).map(shown).collect());
+    let mark = |k: usize| if differ(&k) { [255, 255, 255, 255] } else { golden.pixels[k].map(|c| c / 4).map(|c| c.max(1)) };
+    let difference = Raster::new(got.width, got.height, (0..side * side).map(mark).collect());
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("golden");
-    [("got", got), ("golden", golden), ("difference", &difference)].iter().for_each(|(what, i)| write(&folder.join(format!("{name}.{what}.png")), i));
-    format!("{}\n  pictures: {}/{name}.*.png", words.join("\n  "), folder.display())
+    [("got", got), ("golden", golden), ("difference", &difference)]
+        .iter()
+        .for_each(|(suffix, i)| write(&folder.join(format!("{name}.{suffix}.png")), i));
+    format!("{}\n  pictures: {}/{name}.*.png", lines.join("\n  "), folder.display())
 }
 
 #[test]
-fn tiny_scenes_look_as_they_did() {
-    let drawn = drawn();
+fn tiny_scenes_match_their_golden_pictures() {
+    let rendered = render_all();
     if std::env::var_os("MAP3D_BLESS").is_some_and(|v| v == "1") {
-        return bless(&drawn);
+        return bless(&rendered);
     }
     let digests = std::fs::read_to_string(golden_folder().join("digests.txt")).expect("digests");
-    let kept: BTreeMap<&str, &str> = digests.lines().filter_map(|l| l.split_once(' ')).collect();
-    let mut faults = Vec::new();
-    for (name, (image, digest)) in &drawn {
+    let stored: BTreeMap<&str, &str> = digests.lines().filter_map(|l| l.split_once(' ')).collect();
+    let mut failures = Vec::new();
+    for (name, (image, digest)) in &rendered {
         match read(&golden_folder().join(format!("{name}.png"))) {
-            None => faults.push(format!("{name}: no such golden picture")),
-            Some(golden) if *image != golden || kept.get(&name[..]) != Some(&&digest[..]) => {
-                faults.push(format!("{name}\n  {}", differences(name, image, &golden)));
+            None => failures.push(format!("{name}: the golden picture is missing")),
+            Some(golden) if *image != golden || stored.get(&name[..]) != Some(&&digest[..]) => {
+                failures.push(format!("{name}\n  {}", differences(name, image, &golden)));
             }
             Some(_) => {}
         }
     }
-    faults.extend(golden_pictures().into_iter().filter(|n| !drawn.contains_key(n)).map(|n| format!("{n}: a golden picture of no scene")));
+    failures.extend(golden_pictures().into_iter().filter(|n| !rendered.contains_key(n)).map(|n| format!("{n}: golden picture without a scene")));
     assert!(
-        faults.is_empty(),
-        "\n{}\nIf this is meant: MAP3D_BLESS=1 cargo test -p map3d-render --test golden, and look at the pictures.",
-        faults.join("\n")
+        failures.is_empty(),
+        "\n{}\nIf the change is intended: MAP3D_BLESS=1 cargo test -p map3d-render --test golden, then check the pictures.",
+        failures.join("\n")
     );
 }

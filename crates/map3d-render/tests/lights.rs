@@ -1,4 +1,4 @@
-//! Suns, ambient occlusion, second surfaces and pictures (spec/pyramid.md §10), against single rays and by their laws.
+//! Suns, ambient occlusion, second surfaces and pictures (spec/pyramid.md §10): against single rays, and laws of their own.
 
 mod town;
 
@@ -6,7 +6,7 @@ use map3d_base::vec3::{dot, normalized, scale};
 use map3d_base::{DEPTH_NOTHING, DEPTH_UNITS_PER_M, Frame, Isa, LayerFormat, LayerKind, LayerSpec, RAY_LIFT_M, Vec3, vec3};
 use map3d_image::{Arrays, GBuffer};
 use map3d_render::{RenderScene, TileRenderer};
-use town::{Folder, Town, frame, new_folder, waves};
+use town::{TempFolder, Town, frame, new_folder, waves};
 
 const AFTERNOON: Vec3 = [0.6, -0.48, 0.64];
 const RADIUS_M: f64 = 12.0;
@@ -26,8 +26,8 @@ fn layer(kind: LayerKind) -> LayerSpec {
     out
 }
 
-/// A courtyard: ground, a long house, a tower, and a roof on thin walls.
-fn courtyard(name: &str) -> (Folder, RenderScene) {
+/// A courtyard: ground, a long house, a tower and a low building.
+fn courtyard(name: &str) -> (TempFolder, RenderScene) {
     let mut town = Town::default();
     let (wall, red) = (town.textured(waves(64), map3d_base::asset::Wrap::Wrap), town.flat([0.9, 0.1, 0.05]));
     town.ground(60.0, 9.0, wall, 0);
@@ -56,7 +56,7 @@ const ALL: [LayerKind; 9] = [
     LayerKind::Picture,
 ];
 
-/// Pixels whose neighbours show the same object: far from edges.
+/// Returns the pixels whose neighbours show the same object.
 fn inner(g: &GBuffer) -> impl Iterator<Item = usize> {
     let w = g.width as usize;
     let same = move |p: usize, q: usize| g.id[p] == g.id[q];
@@ -64,7 +64,7 @@ fn inner(g: &GBuffer) -> impl Iterator<Item = usize> {
     all.filter(move |p| g.id[*p] != 0 && [1, 2, w, 2 * w].iter().all(|d| same(*p, p - d) && same(*p, p + d)))
 }
 
-/// Local point and geometric normal (faces of this town are flat) of a pixel.
+/// Returns the local point and the geometric normal of a pixel; the faces of this town have no shading normals.
 fn point(f: &Frame, g: &GBuffer, p: usize) -> (Vec3, Vec3) {
     let tile = map3d_base::tile::Tile { z: 0, x: 0, y: 0 };
     let (u, v) = f.uv_of_pixel(tile, p as u32 % g.width, p as u32 / g.width);
@@ -76,7 +76,7 @@ fn lifted((at, n): (Vec3, Vec3)) -> Vec3 {
     vec3::add(at, scale(n, RAY_LIFT_M))
 }
 
-/// Whether single rays say that a sun lights a point; `None` near the edge of a shadow.
+/// Returns whether single rays from a point reach a sun, or `None` near the edge of a shadow.
 fn is_lit(scene: &RenderScene, (at, n): (Vec3, Vec3), sun: Vec3) -> Option<bool> {
     if dot(n, sun) <= 0.0 || sun[2] <= 0.0 {
         return Some(false);
@@ -88,7 +88,7 @@ fn is_lit(scene: &RenderScene, (at, n): (Vec3, Vec3), sun: Vec3) -> Option<bool>
 }
 
 #[test]
-fn suns_light_what_single_rays_reach() {
+fn suns_light_the_points_from_which_single_rays_reach_them() {
     let (_folder, scene) = courtyard("suns");
     for (look_at, pitch) in [(20.0, 45.0), (200.0, 30.0), (0.0, 90.0)] {
         let f = with_layers(&frame(look_at, pitch, 80.0, 0), &ALL);
@@ -111,13 +111,13 @@ fn suns_light_what_single_rays_reach() {
         assert!(checked > 2_000 && dark > 200 && checked - dark > 200, "{dark} of {checked} dark");
         let night = suns.iter().map(|s| u16::from(s[2] <= 0.0)).enumerate().fold(0, |mask, (k, n)| mask | n << k);
         assert!(night != 0 && g.sun16.iter().all(|bits| bits & night == 0), "suns below the horizon");
-        assert!(g.color.iter().zip(&g.sun).all(|(c, sun)| c[3] != 0 || *sun == 255), "where nothing is, nothing is dark");
+        assert!(g.color.iter().zip(&g.sun).all(|(c, sun)| c[3] != 0 || *sun == 255), "empty pixels are lit");
     }
 }
 
-/// By single rays in many more directions.
+/// Compares with single rays in many more directions.
 #[test]
-fn ambient_occlusion_is_the_mean_openness() {
+fn ambient_occlusion_is_the_mean_visibility() {
     let (_folder, scene) = courtyard("ao");
     let f = with_layers(&frame(20.0, 45.0, 80.0, 0), &ALL);
     let g = scene.gbuffer(&f, 0, 0).expect("renders");
@@ -131,14 +131,14 @@ fn ambient_occlusion_is_the_mean_openness() {
     let (mut worst, mut sum, mut count, mut darkest) = (0f64, 0.0, 0, 255u8);
     for p in inner(&g).step_by(431) {
         let (at, n) = point(&f, &g, p);
-        let (mut open, mut all) = (0.0, 0.0);
+        let (mut visible, mut total) = (0.0, 0.0);
         for d in directions.iter().filter(|d| dot(**d, n) > 0.0) {
             let ray = map3d_trace::Ray { origin: lifted((at, n)), direction: *d, width_m: 0.0 };
-            let hit = rays.closest(&ray, &map3d_trace::Opaque).expect("ray");
-            let share = hit.map_or(1.0, |h| (h.distance_m / RADIUS_M).min(1.0));
-            (open, all) = (open + dot(*d, n) * share * share, all + dot(*d, n));
+            let hit = rays.closest_hit(&ray, &map3d_trace::IgnoreCutouts).expect("ray");
+            let distance = hit.map_or(1.0, |h| (h.distance_m / RADIUS_M).min(1.0));
+            (visible, total) = (visible + dot(*d, n) * distance * distance, total + dot(*d, n));
         }
-        let error = (f64::from(g.ao[p]) / 255.0 - open / all).abs();
+        let error = (f64::from(g.ao[p]) / 255.0 - visible / total).abs();
         (worst, sum, count, darkest) = (worst.max(error), sum + error, count + 1, darkest.min(g.ao[p]));
     }
     assert!(count > 60 && darkest < 190, "{count} points, the darkest {darkest}");
@@ -146,7 +146,7 @@ fn ambient_occlusion_is_the_mean_openness() {
 }
 
 #[test]
-fn the_second_surface_is_what_lies_behind() {
+fn second_surface_is_the_next_hit_of_a_single_ray() {
     let (_folder, scene) = courtyard("behind");
     let f = with_layers(&frame(20.0, 40.0, 80.0, 0), &ALL);
     let g = scene.gbuffer(&f, 0, 0).expect("renders");
@@ -156,7 +156,7 @@ fn the_second_surface_is_what_lies_behind() {
     for p in inner(&g).step_by(5) {
         let (at, _) = point(&f, &g, p);
         let ray = |near_m: f64| map3d_trace::Ray { origin: vec3::add(at, scale(forward, near_m)), direction: forward, width_m: 0.0 };
-        let hit = rays.closest(&ray(0.0635), &map3d_trace::Opaque).expect("ray");
+        let hit = rays.closest_hit(&ray(0.0635), &map3d_trace::IgnoreCutouts).expect("ray");
         match hit {
             None => {
                 assert_eq!(g.depth2[p], DEPTH_NOTHING, "pixel {p}");
@@ -164,13 +164,13 @@ fn the_second_surface_is_what_lies_behind() {
             }
             Some(h) => {
                 let expected = f64::from(g.depth[p]) + (0.0635 + h.distance_m) * DEPTH_UNITS_PER_M;
-                // Single rays start from a depth that is rounded.
+                // Single rays start at a rounded depth.
                 if (f64::from(g.depth2[p]) - expected).abs() <= 2.0 {
                     found += 1;
                 } else {
-                    let side = rays.closest(
+                    let side = rays.closest_hit(
                         &map3d_trace::Ray { origin: vec3::add(ray(0.0635).origin, scale(f.axes().right, 0.02)), ..ray(0.0) },
-                        &map3d_trace::Opaque,
+                        &map3d_trace::IgnoreCutouts,
                     );
                     let shifted = side.expect("ray").map_or(f64::INFINITY, |s| s.distance_m);
                     assert!((shifted - h.distance_m).abs() > 0.5, "pixel {p}: {} for {expected}", g.depth2[p]);
@@ -182,7 +182,7 @@ fn the_second_surface_is_what_lies_behind() {
 }
 
 #[test]
-fn a_picture_is_the_colour_under_its_light() {
+fn picture_is_colour_times_light() {
     let (_folder, scene) = courtyard("picture");
     let f = with_layers(&frame(20.0, 45.0, 80.0, 0), &ALL);
     let g = scene.gbuffer(&f, 0, 0).expect("renders");
@@ -204,9 +204,9 @@ fn a_picture_is_the_colour_under_its_light() {
     assert!(g.color.iter().zip(&g.picture).all(|(a, b)| a[3] == b[3]), "coverage");
 }
 
-/// Suns and ambient occlusion are means over a pixel's samples, so no pixel on an edge is darker or lighter than what it shows.
+/// Suns and ambient occlusion are means over a pixel's samples, so a pixel on an edge is neither darker nor lighter than its surfaces.
 #[test]
-fn edges_lie_between_their_sides() {
+fn edge_pixels_are_between_their_neighbours() {
     let (_folder, scene) = courtyard("edges");
     let f = with_layers(&frame(20.0, 45.0, 80.0, 0), &ALL);
     let g = scene.gbuffer(&f, 0, 0).expect("renders");
@@ -222,7 +222,7 @@ fn edges_lie_between_their_sides() {
 }
 
 #[test]
-fn a_pass_has_only_its_own_arrays_and_they_are_the_same() {
+fn pass_has_only_its_own_arrays_with_equal_values() {
     let (_folder, scene) = courtyard("pass");
     let f = frame(200.0, 45.0, 80.0, 0);
     let whole = scene.gbuffer(&with_layers(&f, &ALL), 0, 0).expect("renders");
@@ -240,16 +240,16 @@ fn a_pass_has_only_its_own_arrays_and_they_are_the_same() {
 }
 
 #[test]
-fn light_does_not_depend_on_instruction_sets() {
+fn light_does_not_depend_on_the_instruction_set() {
     let (_folder, scene) = courtyard("isa");
     let f = with_layers(&frame(75.0, 35.0, 80.0, 0), &ALL);
-    let draw = |isa| TileRenderer::with_isa(&scene, &f, isa).expect("frame").tile(0, 0).expect("renders").expect("content");
-    let all: Vec<GBuffer> = Isa::available().into_iter().map(draw).collect();
+    let render = |isa| TileRenderer::with_isa(&scene, &f, isa).expect("frame").tile(0, 0).expect("renders").expect("content");
+    let all: Vec<GBuffer> = Isa::available().into_iter().map(render).collect();
     assert!(all.iter().all(|g| *g == all[0]));
 }
 
 #[test]
-fn light_does_not_depend_on_how_it_is_tiled() {
+fn light_does_not_depend_on_tiling() {
     let (_folder, scene) = courtyard("tiling");
     let small = with_layers(&frame(33.0, 40.0, 120.0, 1), &LIGHTS);
     let large = Frame { tile_px: 512, zmax: 0, ..small.clone() };
@@ -266,7 +266,7 @@ fn light_does_not_depend_on_how_it_is_tiled() {
     }
 }
 
-/// A key reaches as far as shadows and ambient occlusion do.
+/// Block keys cover objects that cast a shadow or occlude ambient light.
 #[test]
 fn keys_change_where_a_shadow_falls() {
     let block = |k: u32| [k % 8, k / 8];
@@ -302,17 +302,17 @@ fn keys_change_where_a_shadow_falls() {
 }
 
 #[test]
-fn frames_whose_lights_make_no_sense_are_refused() {
+fn frames_with_invalid_lights_are_rejected() {
     let f = frame(0.0, 45.0, 80.0, 0);
-    let refused = |spec: LayerSpec| Frame { layers: vec![spec], ..f.clone() }.validate().is_err();
-    assert!(refused(LayerSpec { suns: vec![], ..layer(LayerKind::Sun) }));
-    assert!(refused(LayerSpec { suns: vec![AFTERNOON; 2], ..layer(LayerKind::Sun) }));
-    assert!(refused(LayerSpec { suns: vec![[0.0, 0.0, 2.0]], ..layer(LayerKind::Sun) }));
-    assert!(refused(LayerSpec { suns: vec![[f64::NAN, 0.0, 1.0]], ..layer(LayerKind::Sun) }));
-    assert!(refused(LayerSpec { suns: vec![AFTERNOON; 17], ..layer(LayerKind::Sun16) }));
-    assert!(refused(LayerSpec { suns: vec![AFTERNOON], ..layer(LayerKind::Depth2) }));
+    let is_rejected = |spec: LayerSpec| Frame { layers: vec![spec], ..f.clone() }.validate().is_err();
+    assert!(is_rejected(LayerSpec { suns: vec![], ..layer(LayerKind::Sun) }));
+    assert!(is_rejected(LayerSpec { suns: vec![AFTERNOON; 2], ..layer(LayerKind::Sun) }));
+    assert!(is_rejected(LayerSpec { suns: vec![[0.0, 0.0, 2.0]], ..layer(LayerKind::Sun) }));
+    assert!(is_rejected(LayerSpec { suns: vec![[f64::NAN, 0.0, 1.0]], ..layer(LayerKind::Sun) }));
+    assert!(is_rejected(LayerSpec { suns: vec![AFTERNOON; 17], ..layer(LayerKind::Sun16) }));
+    assert!(is_rejected(LayerSpec { suns: vec![AFTERNOON], ..layer(LayerKind::Depth2) }));
     for radius_m in [0.0, -1.0, f64::NAN, f64::INFINITY, 1001.0] {
-        assert!(refused(LayerSpec { radius_m, ..layer(LayerKind::Ao) }), "{radius_m}");
+        assert!(is_rejected(LayerSpec { radius_m, ..layer(LayerKind::Ao) }), "{radius_m}");
     }
     assert!(Frame { layers: vec![layer(LayerKind::Ao), layer(LayerKind::Ao)], ..f.clone() }.validate().is_err());
     assert!(with_layers(&f, &ALL).validate().is_ok());

@@ -1,4 +1,4 @@
-//! Base tiles against a plain renderer.
+//! Base tiles against the reference renderer.
 
 mod town;
 
@@ -6,7 +6,7 @@ use map3d_base::asset::{Rank, Wrap};
 use map3d_base::{DEPTH_NOTHING, Frame};
 use map3d_image::srgb::BYTE;
 use map3d_image::{GBuffer, Raster};
-use town::plain::{Met, Plain};
+use town::reference_renderer::{ReferenceRenderer, SampleHit};
 use town::{Town, bricks, frame, new_folder, waves};
 
 const VIEWS: [(f64, f64); 5] = [(0.0, 45.0), (45.0, 22.5), (117.3, 10.0), (200.0, 90.0), (290.0, 60.0)];
@@ -21,8 +21,8 @@ fn houses() -> Town {
     town
 }
 
-/// Pixels (i, j) of the only tile, thinned out.
-fn some_pixels(step: usize) -> impl Iterator<Item = (u32, u32)> {
+/// Returns every `step`-th pixel (i, j) of a tile.
+fn sampled_pixels(step: usize) -> impl Iterator<Item = (u32, u32)> {
     (0..65_536usize).step_by(step).map(|p| (p as u32 % 256, p as u32 / 256))
 }
 
@@ -30,36 +30,36 @@ fn at(i: u32, j: u32) -> usize {
     (j * 256 + i) as usize
 }
 
-fn same_center(g: &GBuffer, met: Option<&Met>, (i, j): (u32, u32)) {
+fn assert_same_center(g: &GBuffer, hit: Option<&SampleHit>, (i, j): (u32, u32)) {
     let p = at(i, j);
-    let Some(met) = met else {
+    let Some(hit) = hit else {
         assert_eq!((g.id[p], g.depth[p], g.normal[p]), (0, DEPTH_NOTHING, [0; 3]), "({i}, {j})");
         return;
     };
-    assert_eq!(g.id[p], met.id, "({i}, {j}): {met:?}");
-    assert!(g.depth[p].abs_diff(met.depth) <= 1, "({i}, {j}): {} {met:?}", g.depth[p]);
-    assert!((0..3).all(|k| (f64::from(g.normal[p][k]) - met.normal[k] * 32_767.0).abs() <= 2.0), "({i}, {j}): {:?} {met:?}", g.normal[p]);
+    assert_eq!(g.id[p], hit.id, "({i}, {j}): {hit:?}");
+    assert!(g.depth[p].abs_diff(hit.depth) <= 1, "({i}, {j}): {} {hit:?}", g.depth[p]);
+    assert!((0..3).all(|k| (f64::from(g.normal[p][k]) - hit.normal[k] * 32_767.0).abs() <= 2.0), "({i}, {j}): {:?} {hit:?}", g.normal[p]);
 }
 
 #[test]
-fn ids_depths_and_normals_are_those_of_the_plain_renderer() {
-    let (folder, town) = (new_folder("plain"), houses());
+fn ids_depths_and_normals_agree_with_the_reference() {
+    let (folder, town) = (new_folder("reference"), houses());
     let scene = town.open(&folder);
     for (look_at, pitch) in VIEWS {
         let f = frame(look_at, pitch, 64.0, 0);
-        let (g, plain) = (scene.gbuffer(&f, 0, 0).expect("renders"), Plain::new(&scene, &town, &f));
+        let (g, reference) = (scene.gbuffer(&f, 0, 0).expect("renders"), ReferenceRenderer::new(&scene, &town, &f));
         let mut seen = 0;
-        for (i, j) in some_pixels(7) {
-            let met = plain.pixel_sample(i, j, 0);
-            seen += usize::from(met.is_some());
-            same_center(&g, met.as_ref(), (i, j));
+        for (i, j) in sampled_pixels(7) {
+            let hit = reference.pixel_sample(i, j, 0);
+            seen += usize::from(hit.is_some());
+            assert_same_center(&g, hit.as_ref(), (i, j));
         }
         assert!(seen > 800, "{look_at} {pitch}: {seen} pixels with content");
     }
 }
 
 #[test]
-fn flat_colours_are_the_mean_of_the_samples() {
+fn constant_colours_are_the_mean_of_the_samples() {
     let mut town = Town::default();
     let colors = [[0.9, 0.1, 0.05], [0.1, 0.2, 0.9], [0.3, 0.9, 0.4], [1.0, 1.0, 1.0]].map(|c| town.flat(c));
     town.house([-12.0, -9.0], [7.3, 6.1, 9.7], colors[0], 1);
@@ -70,13 +70,13 @@ fn flat_colours_are_the_mean_of_the_samples() {
     let scene = town.open(&folder);
     for (look_at, pitch) in VIEWS {
         let f = frame(look_at, pitch, 64.0, 0);
-        let (g, plain) = (scene.gbuffer(&f, 0, 0).expect("renders"), Plain::new(&scene, &town, &f));
+        let (g, reference) = (scene.gbuffer(&f, 0, 0).expect("renders"), ReferenceRenderer::new(&scene, &town, &f));
         let mut edges = 0;
-        for (i, j) in some_pixels(5) {
-            let mets: Vec<Option<Met>> = (0..16).map(|k| plain.pixel_sample(i, j, k)).collect();
-            let hits = mets.iter().flatten().count();
+        for (i, j) in sampled_pixels(5) {
+            let samples: Vec<Option<SampleHit>> = (0..16).map(|k| reference.pixel_sample(i, j, k)).collect();
+            let hits = samples.iter().flatten().count();
             edges += usize::from(hits > 0 && hits < 16);
-            let sum = mets.iter().flatten().map(|m| plain.color(m)).fold([0.0; 3], |s, c| [0, 1, 2].map(|k| s[k] + c[k]));
+            let sum = samples.iter().flatten().map(|m| reference.color(m)).fold([0.0; 3], |s, c| [0, 1, 2].map(|k| s[k] + c[k]));
             let got = g.color[at(i, j)];
             assert!((0..3).all(|c| (f64::from(got[c]) - sum[c] / 16.0).abs() <= 1.0), "({i}, {j}): {got:?} {sum:?}");
             assert_eq!(got[3], ((65_535 * hits + 8) / 16) as u16);
@@ -85,15 +85,15 @@ fn flat_colours_are_the_mean_of_the_samples() {
     }
 }
 
-/// PSNR in sRGB over pixels that are wholly covered, and the ratio of gradient energies.
-fn compare(g: &GBuffer, plain: &Plain, side: u32, n: i128) -> (f64, f64) {
+/// Returns the PSNR in sRGB over wholly covered pixels, and the ratio of gradient energies.
+fn compare(g: &GBuffer, reference: &ReferenceRenderer, side: u32, n: i128) -> (f64, f64) {
     let byte = |c: f64| f64::from(BYTE[c.round().clamp(0.0, 65_535.0) as usize]);
     let (mut square, mut count, mut gradients) = (0.0, 0.0, [0.0; 2]);
     let mut row: Vec<Option<[[f64; 3]; 2]>> = vec![None; side as usize];
     for j in 0..side {
         for i in 0..side {
             let (i, j) = (i + (256 - side) / 2, j + (256 - side) / 2);
-            let (exact, cover) = plain.mean(i, j, n);
+            let (exact, cover) = reference.mean(i, j, n);
             let got = g.color[at(i, j)];
             let now = (cover == 1.0 && got[3] == 65_535).then(|| [[0, 1, 2].map(|c| byte(f64::from(got[c]))), exact.map(byte)]);
             let x = (i - (256 - side) / 2) as usize;
@@ -118,7 +118,7 @@ fn compare(g: &GBuffer, plain: &Plain, side: u32, n: i128) -> (f64, f64) {
 
 #[test]
 fn textures_are_neither_blurred_nor_aliased() {
-    // Bright lines one texel wide are the hardest case, at 4.4 texels a pixel: 32 dB.
+    // Bright lines one texel wide at 4.4 texels per pixel are the hardest case: 32 dB.
     for (image, repeats, least_db) in [(waves(256), 8.0, 40.0), (bricks(256), 5.3, 31.0)] {
         let mut town = Town::default();
         let material = town.textured(image, Wrap::Wrap);
@@ -129,7 +129,7 @@ fn textures_are_neither_blurred_nor_aliased() {
             let size = 100.0 * f64::from(pitch as f32).to_radians().sin().max(0.2);
             let f = frame(20.0, pitch, size, 0);
             let g = scene.gbuffer(&f, 0, 0).expect("renders");
-            let (psnr, gradient) = compare(&g, &Plain::new(&scene, &town, &f), 40, 24);
+            let (psnr, gradient) = compare(&g, &ReferenceRenderer::new(&scene, &town, &f), 40, 24);
             eprintln!("pitch {pitch}, {repeats} repeats: PSNR {psnr:.1} dB, gradient energy {gradient:.3}");
             assert!(psnr >= least_db, "pitch {pitch}, {repeats} repeats: PSNR {psnr:.1} dB");
             assert!((gradient - 1.0).abs() <= 0.1, "pitch {pitch}, {repeats} repeats: gradient energy {gradient:.3}");
@@ -137,9 +137,9 @@ fn textures_are_neither_blurred_nor_aliased() {
     }
 }
 
-/// Magenta around the island that the faces use never shows, however small the texture gets.
+/// The atlas is magenta around the region that the faces use; no footprint may show it.
 #[test]
-fn atlases_show_no_background_at_any_footprint() {
+fn atlas_background_never_shows() {
     let mut image = Raster::filled(128, 128, [255, 0, 255, 255]);
     for y in 40..80 {
         (24..100).for_each(|x| image.pixels[y * 128 + x] = [60, 170, 40, 255]);
@@ -161,7 +161,7 @@ fn atlases_show_no_background_at_any_footprint() {
 }
 
 #[test]
-fn cut_outs_let_through_what_lies_behind() {
+fn cutout_shows_the_surface_behind_its_hole() {
     let mut image = Raster::filled(64, 64, [40, 200, 40, 255]);
     for y in 16..48 {
         (16..48).for_each(|x| image.pixels[y * 64 + x] = [0, 0, 0, 0]);
@@ -177,16 +177,16 @@ fn cut_outs_let_through_what_lies_behind() {
     let g = scene.gbuffer(&f, 0, 0).expect("renders");
     assert_eq!((g.id[at(128, 128)], g.id[at(80, 128)]), (2, 1));
     let through = g.id.iter().filter(|id| **id == 2).count();
-    assert!((3900..4300).contains(&through), "a quarter of the leaf is open: {through} of 16,384 px");
+    assert!((3900..4300).contains(&through), "a quarter of the leaf is a hole: {through} of 16,384 px");
     let edge = g.color[at(128, 100)];
-    assert!(edge[0] > edge[1], "the wall is seen: {edge:?}");
+    assert!(edge[0] > edge[1], "the wall does not show: {edge:?}");
     let pick = scene.pick(&f, 0.0, 0.0).expect("a ray").expect("a hit");
     assert_eq!(pick.id, 2);
     assert!(pick.position[2].abs() < 1e-6);
 }
 
 #[test]
-fn shading_normals_bend_and_face_the_viewer() {
+fn shading_normals_are_interpolated_and_face_the_viewer() {
     let mut town = Town::default();
     let grey = town.flat([0.5; 3]);
     town.face([[-10.0, -10.0, 0.0], [10.0, -10.0, 0.0], [0.0, 10.0, 0.0]], grey, 0);
@@ -199,11 +199,11 @@ fn shading_normals_bend_and_face_the_viewer() {
     let (left, middle, right) = (g.normal[at(92, 166)], g.normal[at(128, 128)], g.normal[at(163, 166)]);
     assert!(left[0] < -12_000 && middle[0].abs() < 300 && right[0] > 12_000, "{left:?} {middle:?} {right:?}");
     let backwards = g.normal[at(128, 75)];
-    assert!(backwards[2] > 32_000, "turned to the seen side: {backwards:?}");
+    assert!(backwards[2] > 32_000, "not turned to the visible side: {backwards:?}");
 }
 
 #[test]
-fn higher_ranks_win_on_coplanar_faces() {
+fn higher_rank_wins_among_coplanar_faces() {
     let mut town = Town::default();
     let (wall, door) = (town.flat([0.8; 3]), town.flat([0.3, 0.2, 0.1]));
     town.panel([[-8.0, 0.0, 0.0], [8.0, 0.0, 0.0], [8.0, 0.0, 10.0], [-8.0, 0.0, 10.0]], [[0.0; 2]; 4], wall, 0);
@@ -215,18 +215,18 @@ fn higher_ranks_win_on_coplanar_faces() {
     for look_at in [0.0, 30.0, 160.0] {
         let f = frame(look_at, 30.0, 24.0, 0);
         let g = scene.gbuffer(&f, 0, 0).expect("renders");
-        let (plain, mut doors) = (Plain::new(&scene, &town, &f), 0);
-        for (i, j) in some_pixels(11) {
-            let met = plain.pixel_sample(i, j, 0);
-            doors += usize::from(met.as_ref().is_some_and(|m| m.id == 2));
-            same_center(&g, met.as_ref(), (i, j));
+        let (reference, mut doors) = (ReferenceRenderer::new(&scene, &town, &f), 0);
+        for (i, j) in sampled_pixels(11) {
+            let hit = reference.pixel_sample(i, j, 0);
+            doors += usize::from(hit.as_ref().is_some_and(|m| m.id == 2));
+            assert_same_center(&g, hit.as_ref(), (i, j));
         }
         assert!(doors > 100);
     }
 }
 
 #[test]
-fn empty_tiles_and_bad_arguments() {
+fn invalid_arguments_fail_and_empty_tiles_do_not() {
     let (folder, town) = (new_folder("empty"), houses());
     let scene = town.open(&folder);
     let far = Frame { u0_m: 10_000.0, ..frame(0.0, 45.0, 64.0, 0) };
@@ -239,13 +239,13 @@ fn empty_tiles_and_bad_arguments() {
 }
 
 #[test]
-fn picks_agree_with_pixels() {
+fn pick_agrees_with_pixels() {
     let (folder, town) = (new_folder("pick"), houses());
     let scene = town.open(&folder);
     let f = frame(45.0, 30.0, 64.0, 0);
     let g = scene.gbuffer(&f, 0, 0).expect("renders");
     let mut hits = 0;
-    for (i, j) in some_pixels(331) {
+    for (i, j) in sampled_pixels(331) {
         let (u, v) = f.uv_of_pixel(map3d_base::tile::Tile { z: 0, x: 0, y: 0 }, i, j);
         match scene.pick(&f, u, v).expect("a ray") {
             None => assert_eq!(g.id[at(i, j)], 0, "({i}, {j})"),

@@ -1,38 +1,39 @@
-//! Rays from what a view shows: millions a second of thread CPU time, single rays and bundles, shadow rays towards a sun, ambient occlusion, and what
-//! lies behind. `ray_bench <scene folder> [tiles] [metres a pixel] [instruction set]`
+//! Measures rays from the visible points of a view, in millions per second of thread CPU time: ray packets towards a sun, for ambient occlusion and for the
+//! second surface, and single rays towards a sun. `ray_bench <scene folder> [tiles] [metres per pixel] [instruction set]`
 
 use std::path::PathBuf;
 
 use map3d_base::{Box3, DEPTH_UNITS_PER_M, Frame, RAY_LIFT_M, Vec3, vec3};
 use map3d_scene::SceneStore;
-use map3d_trace::{BeamTracer, Isa, Opaque, Openness, Patch, Ray, Rays, SUBTILE_PX, Surroundings};
+use map3d_trace::{AmbientOcclusion, BeamTracer, IgnoreCutouts, Isa, PacketOrigins, Ray, Rays, SUBTILE_PX, SceneRegion};
 
 const RADIUS_M: f64 = 20.0;
 const DIRECTIONS: usize = 64;
 
-struct Point {
+/// A visible point.
+struct VisiblePoint {
     at: Vec3,
     normal: Vec3,
 }
 
-/// Blocks of 8 × 8 pixels of a sub-tile, each row by row in blocks of 4 × 4.
-type Blocks = Vec<Vec<Option<Point>>>;
+/// The points of a sub-tile in squares of 8 × 8 pixels, each ordered in squares of 4 × 4.
+type Squares = Vec<Vec<Option<VisiblePoint>>>;
 
-/// A sub-tile ready for bundles.
-struct Ready {
-    blocks: Blocks,
+/// The packets of a sub-tile.
+struct SubtilePackets {
+    squares: Squares,
     bounds: Box3,
     center: Vec3,
-    lifted: Vec<Patch>,
-    flat: Vec<Patch>,
+    lifted: Vec<PacketOrigins>,
+    flat: Vec<PacketOrigins>,
 }
 
-impl Ready {
-    fn new(blocks: Blocks) -> Self {
-        let bounds = bounds(&blocks);
-        let center = Surroundings::center_near(bounds.center());
-        let patches = |lift_m: f64| blocks.iter().map(|b| patch_of(b, center, lift_m)).collect();
-        Self { bounds, center, lifted: patches(RAY_LIFT_M), flat: patches(0.0), blocks }
+impl SubtilePackets {
+    fn new(squares: Squares) -> Self {
+        let bounds = bounds(&squares);
+        let center = SceneRegion::snap_center(bounds.center());
+        let packets = |lift_m: f64| squares.iter().map(|s| origins_of(s, center, lift_m)).collect();
+        Self { bounds, center, lifted: packets(RAY_LIFT_M), flat: packets(0.0), squares }
     }
 }
 
@@ -44,22 +45,24 @@ fn main() {
     let store = SceneStore::open(&folder, 8 << 30).expect("scene");
     println!("{} triangles, {} parts", store.triangle_count(), store.parts().len());
     let frame = frame(&store, pixel_m);
-    let patches = patches(&store, &frame, tiles);
-    let points: usize = patches.iter().flat_map(|p| &p.blocks).flatten().flatten().count();
-    println!("{points} points of {} sub-tiles", patches.len());
+    let subtiles = trace_subtiles(&store, &frame, tiles);
+    let points: usize = subtiles.iter().flat_map(|p| &p.squares).flatten().flatten().count();
+    println!("{points} points of {} sub-tiles", subtiles.len());
     let suns = [[0.6, -0.3, 0.74], [0.8, -0.55, 0.24]];
     let only = arguments.next();
     for isa in Isa::available().into_iter().filter(|i| only.as_ref().is_none_or(|o| format!("{i:?}").eq_ignore_ascii_case(o))) {
         for sun in suns {
-            report(&format!("{isa:?} bundles, sun {:.2}", sun[2]), points, || {
-                patches.iter().map(|p| sun_bundles(&store, p, sun, isa)).fold((0, 0), add)
+            report(&format!("{isa:?} packets, sun {:.2}", sun[2]), points, || {
+                subtiles.iter().map(|p| trace_sun(&store, p, sun, isa)).fold((0, 0), add)
             });
         }
-        report(&format!("{isa:?} bundles, ao"), points, || patches.iter().map(|p| ambient(&store, p, isa)).fold((0, 0), add));
-        report(&format!("{isa:?} bundles, behind"), points, || patches.iter().map(|p| behind(&store, p, &frame, isa)).fold((0, 0), add));
+        report(&format!("{isa:?} packets, ao"), points, || subtiles.iter().map(|p| trace_ao(&store, p, isa)).fold((0, 0), add));
+        report(&format!("{isa:?} packets, second surface"), points, || {
+            subtiles.iter().map(|p| trace_second_surface(&store, p, &frame, isa)).fold((0, 0), add)
+        });
     }
     for sun in suns {
-        report(&format!("single rays, sun {:.2}", sun[2]), points, || patches.iter().map(|p| single(&store, p, sun)).fold((0, 0), add));
+        report(&format!("single rays, sun {:.2}", sun[2]), points, || subtiles.iter().map(|p| trace_single_rays(&store, p, sun)).fold((0, 0), add));
     }
 }
 
@@ -67,8 +70,8 @@ fn add(a: (usize, usize), b: (usize, usize)) -> (usize, usize) {
     (a.0 + b.0, a.1 + b.1)
 }
 
-/// `work` gives rays and hits; the least of some rounds counts.
-fn report(what: &str, points: usize, work: impl Fn() -> (usize, usize)) {
+/// Prints the fastest of five rounds; `work` returns the numbers of rays and hits.
+fn report(name: &str, points: usize, work: impl Fn() -> (usize, usize)) {
     let mut best = f64::INFINITY;
     let (mut rays, mut hits) = (0, 0);
     for _ in 0..5 {
@@ -78,19 +81,19 @@ fn report(what: &str, points: usize, work: impl Fn() -> (usize, usize)) {
     }
     let (rate, tile_ms) = (rays as f64 / best * 1e3, best / 1e6 / (points as f64 / 65_536.0));
     println!(
-        "{what}: {rate:.1} M rays/s, {tile_ms:.2} ms a tile, {:.2} rays a point, {:.1} % hit",
+        "{name}: {rate:.1} M rays/s, {tile_ms:.2} ms per tile, {:.2} rays per point, {:.1} % hit",
         rays as f64 / points as f64,
         hits as f64 * 100.0 / rays as f64
     );
 }
 
-/// Nanoseconds that this thread has run.
+/// Returns the CPU time of this thread in nanoseconds.
 fn thread_ns() -> u64 {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux");
     text.split(' ').next().and_then(|n| n.parse().ok()).expect("nanoseconds")
 }
 
-/// Pitch 45°, looking north-west, centred on the scene.
+/// Returns a frame of view 45-45 that is centred on the scene.
 fn frame(store: &SceneStore, pixel_m: f64) -> Frame {
     let size = store.bounds().half_extents();
     let zmax = ((3.0 * size[0].max(size[1])) / (256.0 * pixel_m)).log2().ceil().max(0.0) as u8;
@@ -101,7 +104,7 @@ fn frame(store: &SceneStore, pixel_m: f64) -> Frame {
     frame
 }
 
-fn patches(store: &SceneStore, frame: &Frame, tiles: usize) -> Vec<Ready> {
+fn trace_subtiles(store: &SceneStore, frame: &Frame, tiles: usize) -> Vec<SubtilePackets> {
     let mut tracer = BeamTracer::new(store, frame).expect("tracer");
     let middle = (256u64 << frame.zmax) / 2;
     let side = (tiles as f64).sqrt().ceil() as u64;
@@ -111,90 +114,96 @@ fn patches(store: &SceneStore, frame: &Frame, tiles: usize) -> Vec<Ready> {
         let corner = [middle - side / 2 * step + k % side * step, middle - side / 2 * step + k / side * step];
         for sub in 0..16u64 {
             let at = [corner[0] + sub % 4 * 64, corner[1] + sub / 4 * 64];
-            out.push(patch(&mut tracer, frame, at));
+            out.push(visible_points(&mut tracer, frame, at));
         }
     }
-    out.retain(|p: &Blocks| p.iter().flatten().any(Option::is_some));
-    out.into_iter().map(Ready::new).collect()
+    out.retain(|p: &Squares| p.iter().flatten().any(Option::is_some));
+    out.into_iter().map(SubtilePackets::new).collect()
 }
 
-fn patch(tracer: &mut BeamTracer, frame: &Frame, [x, y]: [u64; 2]) -> Blocks {
-    let vis = tracer.trace(x, y, &Opaque).expect("trace");
+fn visible_points(tracer: &mut BeamTracer, frame: &Frame, [x, y]: [u64; 2]) -> Squares {
+    let vis = tracer.trace(x, y, &IgnoreCutouts).expect("trace");
     let (axes, pixel) = (frame.axes(), frame.pixel_m(frame.zmax));
-    let blocks = SUBTILE_PX / 8;
+    let squares = SUBTILE_PX / 8;
     let point = |i: usize, j: usize| {
         let surface = vis.surface(vis.center_slot(i, j)?);
         let (u, v) = (frame.u0_m + (x as f64 + i as f64 + 0.5) * pixel, frame.v0_m - (y as f64 + j as f64 + 0.5) * pixel);
         let at = axes.local_from_uvd([u, v, frame.d0_m + f64::from(vis.center_depth(i, j)) / DEPTH_UNITS_PER_M]);
-        Some(Point { at, normal: surface.normal.map(f64::from) })
+        Some(VisiblePoint { at, normal: surface.normal.map(f64::from) })
     };
     let order = |k: usize| (k % 4 + k / 16 % 2 * 4, k / 4 % 4 + k / 32 * 4);
-    let block = |b: usize| (0..64).map(order).map(|(i, j)| point(b % blocks * 8 + i, b / blocks * 8 + j)).collect();
-    (0..blocks * blocks).map(block).collect()
+    let square = |s: usize| (0..64).map(order).map(|(i, j)| point(s % squares * 8 + i, s / squares * 8 + j)).collect();
+    (0..squares * squares).map(square).collect()
 }
 
-fn bounds(patch: &Blocks) -> Box3 {
+fn bounds(squares: &Squares) -> Box3 {
     let mut out = Box3::EMPTY;
-    patch.iter().flatten().flatten().for_each(|p| out.add_point(p.at));
+    squares.iter().flatten().flatten().for_each(|p| out.add_point(p.at));
     out
 }
 
-fn patch_of(block: &[Option<Point>], center: Vec3, lift_m: f64) -> Patch {
-    let mut out = Patch::default();
-    for (k, p) in block.iter().enumerate() {
+fn origins_of(square: &[Option<VisiblePoint>], center: Vec3, lift_m: f64) -> PacketOrigins {
+    let mut out = PacketOrigins::default();
+    for (k, p) in square.iter().enumerate() {
         if let Some(p) = p {
-            out.put(k, vec3::sub(vec3::add(p.at, vec3::scale(p.normal, lift_m)), center), p.normal);
+            out.set(k, vec3::sub(vec3::add(p.at, vec3::scale(p.normal, lift_m)), center), p.normal);
         }
     }
     out
 }
 
-fn sun_bundles(store: &SceneStore, ready: &Ready, sun: Vec3, isa: Isa) -> (usize, usize) {
+fn trace_sun(store: &SceneStore, subtile: &SubtilePackets, sun: Vec3, isa: Isa) -> (usize, usize) {
     let sun = vec3::normalized(sun).expect("a sun");
-    let around = Surroundings::ahead(store, ready.center, &ready.bounds, sun).expect("parts");
-    let mut bundles = around.along(sun, 0.2, isa).expect("bundles");
+    let region = SceneRegion::open_ahead(store, subtile.center, &subtile.bounds, sun).expect("parts");
+    let mut packets = region.packets_along(sun, 0.2, isa).expect("packets");
     let mut count = (0, 0);
-    for patch in &ready.lifted {
-        let shadow = bundles.any_hit(patch, 1e6, &Opaque);
-        count = add(count, (shadow.sent.count_ones() as usize, shadow.hit.count_ones() as usize));
+    for origins in &subtile.lifted {
+        let result = packets.any_hit(origins, 1e6, &IgnoreCutouts);
+        count = add(count, (result.sent.count_ones() as usize, result.hit.count_ones() as usize));
     }
     count
 }
 
-fn ambient(store: &SceneStore, ready: &Ready, isa: Isa) -> (usize, usize) {
-    let around = Surroundings::within(store, ready.center, &ready.bounds, RADIUS_M).expect("parts");
-    let mut sums = vec![Openness::default(); ready.lifted.len()];
+fn trace_ao(store: &SceneStore, subtile: &SubtilePackets, isa: Isa) -> (usize, usize) {
+    let region = SceneRegion::open_within(store, subtile.center, &subtile.bounds, RADIUS_M).expect("parts");
+    let mut sums = vec![AmbientOcclusion::default(); subtile.lifted.len()];
     let mut count = (0, 0);
     for n in 0..DIRECTIONS {
         let z = 1.0 - (2.0 * n as f64 + 1.0) / DIRECTIONS as f64;
         let turn = n as f64 * std::f64::consts::PI * (3.0 - 5f64.sqrt());
         let r = (1.0 - z * z).sqrt();
-        let mut bundles = around.along([r * turn.cos(), r * turn.sin(), z], 0.2, isa).expect("bundles");
-        for (patch, sums) in ready.lifted.iter().zip(&mut sums) {
-            bundles.add_open(patch, RADIUS_M, &Opaque, sums);
-            count = add(count, (patch.there().count_ones() as usize / 2, 0));
+        let mut packets = region.packets_along([r * turn.cos(), r * turn.sin(), z], 0.2, isa).expect("packets");
+        for (origins, sums) in subtile.lifted.iter().zip(&mut sums) {
+            packets.accumulate_ao(origins, RADIUS_M, &IgnoreCutouts, sums);
+            count = add(count, (origins.mask().count_ones() as usize / 2, 0));
         }
     }
     count
 }
 
-fn behind(store: &SceneStore, ready: &Ready, frame: &Frame, isa: Isa) -> (usize, usize) {
+fn trace_second_surface(store: &SceneStore, subtile: &SubtilePackets, frame: &Frame, isa: Isa) -> (usize, usize) {
     let forward = frame.axes().forward;
-    let around = Surroundings::ahead(store, ready.center, &ready.bounds, forward).expect("parts");
-    let mut bundles = around.along(forward, 0.2, isa).expect("bundles");
+    let region = SceneRegion::open_ahead(store, subtile.center, &subtile.bounds, forward).expect("parts");
+    let mut packets = region.packets_along(forward, 0.2, isa).expect("packets");
     let mut count = (0, 0);
-    for patch in &ready.flat {
-        count = add(count, (patch.there().count_ones() as usize, bundles.nearest(patch, 1.0 / 16.0, &Opaque).of_point.iter().flatten().count()));
+    for origins in &subtile.flat {
+        count = add(
+            count,
+            (
+                origins.mask().count_ones() as usize,
+                packets.closest_hits(origins, 1.0 / 16.0, &IgnoreCutouts).triangle_of_ray.iter().flatten().count(),
+            ),
+        );
     }
     count
 }
 
-fn single(store: &SceneStore, ready: &Ready, sun: Vec3) -> (usize, usize) {
+fn trace_single_rays(store: &SceneStore, subtile: &SubtilePackets, sun: Vec3) -> (usize, usize) {
     let rays = Rays::new(store);
     let mut count = (0, 0);
-    for p in ready.blocks.iter().flatten().flatten().step_by(16).filter(|p| vec3::dot(p.normal, sun) > 0.0) {
+    for p in subtile.squares.iter().flatten().flatten().step_by(16).filter(|p| vec3::dot(p.normal, sun) > 0.0) {
         let origin = vec3::add(p.at, vec3::scale(p.normal, RAY_LIFT_M));
-        let hit = rays.any_hit(&Ray { origin, direction: sun, width_m: 0.0 }, 1e6, &Opaque).expect("ray");
+        let hit = rays.any_hit(&Ray { origin, direction: sun, width_m: 0.0 }, 1e6, &IgnoreCutouts).expect("ray");
         count = add(count, (1, usize::from(hit)));
     }
     count

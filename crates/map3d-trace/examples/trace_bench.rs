@@ -1,6 +1,6 @@
-//! Visibility alone: milliseconds of thread CPU time per 256² tile at 16 samples, median, on a synthetic town or on a scene's folder.
+//! Measures beams alone: the median thread CPU time in milliseconds per tile of 256² pixels with 16 samples, on a synthetic town or on a scene's folder.
 //!
-//! `trace_bench [triangles in millions | scene folder] [tiles]`; with MAP3D_KEEP set, the town stays in the temporary folder.
+//! `trace_bench [triangles in millions | scene folder] [tiles]`; with MAP3D_KEEP set, the town is kept in the temporary folder.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use map3d_base::asset::{AssetReport, AssetWriter, Batch, Material, Materials, Ob
 use map3d_base::{Frame, Vec3};
 use map3d_scene::SceneStore;
 use map3d_scene::builder::{BuildOptions, BuildRequest, GroundPlane, build_scene};
-use map3d_trace::{BeamTracer, Isa, Opaque, SUBTILE_PX};
+use map3d_trace::{BeamTracer, IgnoreCutouts, Isa, SUBTILE_PX};
 
 const TOWN_M: f64 = 1800.0;
 const PIXEL_M: f64 = 0.2;
@@ -17,16 +17,16 @@ const REPEATS: usize = 20;
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
-    let what = arguments.next().unwrap_or_else(|| "1".into());
+    let source = arguments.next().unwrap_or_else(|| "1".into());
     let tiles: usize = arguments.next().and_then(|t| t.parse().ok()).unwrap_or(200);
-    let (folder, made) = match what.parse::<f64>() {
+    let (folder, made) = match source.parse::<f64>() {
         Ok(millions) => (make_town(millions), true),
-        Err(_) => (PathBuf::from(what), false),
+        Err(_) => (PathBuf::from(source), false),
     };
     let store = SceneStore::open(&folder, 8 << 30).expect("scene");
     println!("{} triangles, {} parts", store.triangle_count(), store.parts().len());
     for isa in Isa::available() {
-        // Scalar takes its time.
+        // Scalar is slow.
         measure(&store, isa, if isa == Isa::Scalar { tiles / 4 } else { tiles });
     }
     if made && std::env::var_os("MAP3D_KEEP").is_none() {
@@ -34,7 +34,7 @@ fn main() {
     }
 }
 
-/// Nanoseconds that this thread has run.
+/// Returns the CPU time of this thread in nanoseconds.
 fn thread_ns() -> u64 {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux");
     text.split(' ').next().and_then(|n| n.parse().ok()).expect("nanoseconds")
@@ -50,7 +50,7 @@ fn measure(store: &SceneStore, isa: Isa, tiles: usize) {
         for k in 0..tiles.div_ceil(5) {
             let n = k * 61 + 7;
             let (x, y) = (first + n % side, first + n / side % side);
-            // The kernel's clock ticks every few milliseconds, so a tile is traced many times over; the first warms the caches.
+            // The kernel's clock ticks every few milliseconds, so each tile is traced many times; the first run warms the caches.
             tile(&mut tracer, x, y);
             let before = thread_ns();
             (0..REPEATS).for_each(|_| tile(&mut tracer, x, y));
@@ -65,12 +65,12 @@ fn measure(store: &SceneStore, isa: Isa, tiles: usize) {
 fn tile(tracer: &mut BeamTracer, x: usize, y: usize) {
     for top in (0..TILE_PX).step_by(SUBTILE_PX) {
         for left in (0..TILE_PX).step_by(SUBTILE_PX) {
-            tracer.trace((x * TILE_PX + left) as u64, (y * TILE_PX + top) as u64, &Opaque).expect("trace");
+            tracer.trace((x * TILE_PX + left) as u64, (y * TILE_PX + top) as u64, &IgnoreCutouts).expect("trace");
         }
     }
 }
 
-/// Pitch 45°, centred on the scene.
+/// Returns a frame at pitch 45° that is centred on the scene.
 fn town_frame(store: &SceneStore, look_at_deg: f64) -> Frame {
     let zmax = 6;
     let size_m = TILE_PX as f64 * PIXEL_M * f64::from(1 << zmax);
@@ -80,11 +80,11 @@ fn town_frame(store: &SceneStore, look_at_deg: f64) -> Frame {
     frame
 }
 
-/// Repeatable numbers in [0, 1).
-struct Dice(u64);
+/// A linear congruential generator of numbers in [0, 1).
+struct Lcg(u64);
 
-impl Dice {
-    fn roll(&mut self) -> f64 {
+impl Lcg {
+    fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 40) as f64 / f64::from(1 << 24)
     }
@@ -93,7 +93,7 @@ impl Dice {
 struct Town {
     batch: Batch,
     object: u32,
-    dice: Dice,
+    random: Lcg,
 }
 
 impl Town {
@@ -111,7 +111,7 @@ impl Town {
         self.triangle([c[0], c[2], c[3]], rank);
     }
 
-    /// Walls and lid.
+    /// Adds a box without a bottom.
     fn block(&mut self, at: Vec3, size: Vec3, turn: f64, rank: Rank) {
         let corner = |x: f64, y: f64, z: f64| {
             let (c, s) = (turn.cos(), turn.sin());
@@ -126,11 +126,11 @@ impl Town {
         self.quad(ring.map(|(x, y)| corner(x, y, h)), rank);
     }
 
-    /// A gabled house with windows that stand out from its walls; `detail` windows along a side and floor.
+    /// Adds a gabled house with windows that protrude from its walls: `detail` windows per side and floor.
     fn house(&mut self, x: f64, y: f64, detail: usize) {
         self.object += 1;
-        let (w, d, h) = (8.0 + 10.0 * self.dice.roll(), 8.0 + 6.0 * self.dice.roll(), 6.0 + 12.0 * self.dice.roll());
-        let turn = (self.dice.roll() * 4.0).floor() * 0.4;
+        let (w, d, h) = (8.0 + 10.0 * self.random.next(), 8.0 + 6.0 * self.random.next(), 6.0 + 12.0 * self.random.next());
+        let turn = (self.random.next() * 4.0).floor() * 0.4;
         self.block([x, y, 0.0], [w, d, h], turn, Rank::Other);
         let corner = |x1: f64, y1: f64, z: f64| {
             let (c, s) = (turn.cos(), turn.sin());
@@ -152,10 +152,10 @@ impl Town {
         }
     }
 
-    /// A ball of leaves.
+    /// Adds a spherical tree crown.
     fn tree(&mut self, x: f64, y: f64, rings: usize) {
         self.object += 1;
-        let (radius, height) = (1.5 + 2.0 * self.dice.roll(), 4.0 + 3.0 * self.dice.roll());
+        let (radius, height) = (1.5 + 2.0 * self.random.next(), 4.0 + 3.0 * self.random.next());
         let point = |i: usize, j: usize| {
             let (t, a) = (std::f64::consts::PI * i as f64 / rings as f64, std::f64::consts::TAU * (j % (2 * rings)) as f64 / (2 * rings) as f64);
             let r = radius * (0.85 + 0.15 * ((i * 7 + j % (2 * rings) * 13) % 5) as f64 / 4.0);
@@ -182,22 +182,22 @@ impl Town {
     }
 }
 
-/// About as many million triangles as asked for: the same town, in finer detail.
+/// Builds a town of about `millions` million triangles: always the same town, in finer detail.
 fn make_town(millions: f64) -> PathBuf {
     let folder = std::env::temp_dir().join(format!("map3d-trace-bench-{}", std::process::id()));
     let asset = folder.join("assets/town");
     let mut writer = AssetWriter::create(&asset).expect("asset");
-    let mut town = Town { batch: Batch::default(), object: 0, dice: Dice(1) };
+    let mut town = Town { batch: Batch::default(), object: 0, random: Lcg(1) };
     let finer = millions.sqrt();
     town.terrain((300.0 * finer) as usize);
     let grid = 76;
     for k in 0..grid * grid {
         let spacing = TOWN_M / grid as f64;
-        let (x, y) = ((k % grid) as f64 * spacing + 3.0 * town.dice.roll(), (k / grid) as f64 * spacing + 3.0 * town.dice.roll());
+        let (x, y) = ((k % grid) as f64 * spacing + 3.0 * town.random.next(), (k / grid) as f64 * spacing + 3.0 * town.random.next());
         town.house(x, y, (2.0 * millions).round() as usize);
     }
     for _ in 0..5000 {
-        let (x, y) = (TOWN_M * town.dice.roll(), TOWN_M * town.dice.roll());
+        let (x, y) = (TOWN_M * town.random.next(), TOWN_M * town.random.next());
         town.tree(x, y, (4.0 * finer) as usize);
     }
     writer.append(&town.batch).expect("append");
@@ -217,5 +217,9 @@ fn build(folder: &Path) {
     let report = build_scene(folder, &request, &mut |_, _, _| true).expect("build");
     let bytes: u64 = std::fs::read_dir(folder.join("chunks")).expect("chunks").map(|f| f.expect("file").metadata().expect("size").len()).sum();
     let per = |v: f64| v / report.triangles as f64;
-    println!("built in {:.2} s of wall time, one thread; {:.1} bytes a triangle with its record", started.elapsed().as_secs_f64(), per(bytes as f64));
+    println!(
+        "built in {:.2} s of wall time, one thread; {:.1} bytes per triangle with its record",
+        started.elapsed().as_secs_f64(),
+        per(bytes as f64)
+    );
 }

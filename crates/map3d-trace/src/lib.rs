@@ -1,23 +1,27 @@
-//! Tracing: beams (all samples of a square of pixels at once) and rays through the chunks of a scene. The rules are those of spec/pyramid.md §4.
+//! Tracing: beams (all samples of a square of pixels at once), ray packets and single rays through the chunks of a scene. The rules are those of
+//! spec/pyramid.md §4.
 //!
-//! `BeamTracer::trace` fills a `VisBuf`: which surface each of the 16 samples of each pixel meets. `Rays` answers single rays by the same rules.
+//! `BeamTracer::trace` fills a `VisBuf`, which holds the surface that each of the 16 samples of each pixel shows. `Rays` and `RayPackets` trace rays by the
+//! same rules.
 
 pub mod beam;
-pub mod bundle;
+mod boxes;
 pub mod cutout;
+mod depth_key;
+mod depth_plane;
 mod lanes;
 pub mod occupancy;
-pub mod plane;
+pub mod packet;
+mod part;
+mod projection;
 pub mod ray;
 pub mod surface;
-pub mod visbuf;
 
-pub use beam::BeamTracer;
-pub use bundle::{Bundles, Nearest, Openness, Patch, RAYS, Shadow, Surroundings};
-pub use cutout::{Cutout, CutoutSample, Opaque, Stencil};
+pub use beam::{BeamTracer, MIXED, NOTHING, Pixel, SUBTILE_PX, VisBuf};
+pub use cutout::{Cutout, CutoutMask, CutoutSample, IgnoreCutouts};
+pub use depth_plane::DepthPlane;
 pub use map3d_base::Isa;
 pub use occupancy::{block_key, occupied};
-pub use plane::DepthPlane;
+pub use packet::{AmbientOcclusion, ClosestHits, HitMask, PACKET_SIZE, PacketOrigins, RayPackets, SceneRegion};
 pub use ray::{Hit, Ray, Rays};
-pub use surface::{Affine, Surface};
-pub use visbuf::{Pixel, SUBTILE_PX, VisBuf};
+pub use surface::{Affine, SurfaceAttributes};

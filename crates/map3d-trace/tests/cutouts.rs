@@ -1,25 +1,27 @@
-//! Surfaces with holes against brute force, which evaluates the same holes in float64.
+//! Cut-outs against brute force, which evaluates the same holes in float64.
 
-mod brute;
+mod reference;
 mod scenes;
 
 use std::cell::RefCell;
 use std::f64::consts::TAU;
 
-use brute::contest::{Contest, Presence, Tally};
-use brute::{Eye, Known, Place};
 use map3d_base::asset::{Instance, Material, Rank};
 use map3d_base::vec3::{add, scale, sub};
 use map3d_base::{Frame, Vec3};
 use map3d_image::Raster;
 use map3d_scene::{MaterialRecord, SceneStore};
-use map3d_trace::{Affine, BeamTracer, Cutout, CutoutSample, Isa, Opaque, Patch, RAYS, Ray, Rays, SUBTILE_PX, Stencil, Surroundings};
-use scenes::{Dice, Face, RANKS, Soup, build, frame, mixed_soup, new_folder};
+use map3d_trace::{
+    Affine, BeamTracer, Cutout, CutoutMask, CutoutSample, IgnoreCutouts, Isa, PACKET_SIZE, PacketOrigins, Ray, Rays, SUBTILE_PX, SceneRegion,
+};
+use reference::comparison::{BeamComparison, HoleState, SampleCounts};
+use reference::{ReferenceTriangle, ReferenceView, TexturePoint};
+use scenes::{Lcg, RANKS, Soup, SoupFace, build, frame, mixed_soup, new_folder};
 
 const CHEQUERED: u32 = 1;
 const DOTTED: u32 = 2;
 
-/// Material 0 is opaque, the others have holes, told apart by their diffuse red.
+/// Material 0 is opaque; the others have holes and differ in their diffuse red.
 fn with_materials(mut soup: Soup) -> Soup {
     let holes = Raster::new(2, 1, vec![[255; 4], [255, 255, 255, 0]]);
     soup.materials = [0.0, 1.0, 0.2].map(|red| Material { diffuse: [red, 1.0, 1.0, 1.0], cutout: red > 0.0, ..Material::default() }).into();
@@ -27,8 +29,8 @@ fn with_materials(mut soup: Soup) -> Soup {
     soup
 }
 
-/// How far inside a surface (u, v) lies; negative in a hole. Chequers have 4 × 4 cells a unit; dots are round, one a unit.
-fn inside(material: &MaterialRecord, uv: [f64; 2]) -> f64 {
+/// Returns the distance of (u, v) from the edge of the nearest hole, negative in a hole. Chequers have 4 × 4 cells per unit; dots are round, one per unit.
+fn distance_to_hole(material: &MaterialRecord, uv: [f64; 2]) -> f64 {
     let folded = |v: f64, n: f64| (v * n).rem_euclid(1.0);
     if material.diffuse[0] == 255 {
         let edge = uv.map(|c| folded(c, 4.0).min(1.0 - folded(c, 4.0)) / 4.0);
@@ -42,86 +44,88 @@ struct Holes;
 
 impl Cutout for Holes {
     fn covers(&self, material: &MaterialRecord, sample: &CutoutSample) -> bool {
-        assert!(material.is_cutout(), "asked about an opaque material");
-        inside(material, sample.uv.map(f64::from)) >= 0.0
+        assert!(material.is_cutout(), "called for an opaque material");
+        distance_to_hole(material, sample.uv.map(f64::from)) >= 0.0
     }
 }
 
-fn presence(t: &Known, place: &Place) -> Presence {
-    let depth = inside(&t.material, place.uv);
-    match depth.abs() > place.room[0] + place.room[1] {
-        true if depth > 0.0 => Presence::There,
-        true => Presence::Gone,
-        false => Presence::Unsure,
+fn hole_state(t: &ReferenceTriangle, point: &TexturePoint) -> HoleState {
+    let distance = distance_to_hole(&t.material, point.uv);
+    match distance.abs() > point.tolerance[0] + point.tolerance[1] {
+        true if distance > 0.0 => HoleState::Covered,
+        true => HoleState::Hole,
+        false => HoleState::Uncertain,
     }
 }
 
-fn compare(store: &SceneStore, frame: &Frame) -> Tally {
-    let tally = Contest { store, frame, cutout: &Holes, presence: &presence }.run();
-    assert!(tally.unsure * 50 < tally.met, "too near the edge of a hole: {tally:?}");
-    assert!(tally.cut * 20 > tally.met && tally.holes * 20 > tally.met, "few holes: {tally:?}");
-    tally
+fn compare(store: &SceneStore, frame: &Frame) -> SampleCounts {
+    let counts = BeamComparison { store, frame, cutout: &Holes, hole_state: &hole_state }.run();
+    assert!(counts.uncertain * 50 < counts.covered, "too many samples at edges of holes: {counts:?}");
+    assert!(counts.cutouts * 20 > counts.covered && counts.holes * 20 > counts.covered, "few holes: {counts:?}");
+    counts
 }
 
-/// Texture coordinates at a local point, `per_m` units a metre.
+/// Returns the texture coordinates of a local point, `per_m` units per metre.
 fn uv_at(p: Vec3, per_m: f64) -> [f64; 2] {
     [(p[0] + 0.3 * p[2]) * per_m, (p[1] + 0.9 * p[2]) * per_m]
 }
 
-fn spread(face: &mut Face, material: u32, per_m: f64) {
+fn set_material(face: &mut SoupFace, material: u32, per_m: f64) {
     face.material = material;
     face.uv = face.corners.map(|c| uv_at(c, per_m).map(|v| v as f32));
 }
 
-/// Two of three faces have holes of all sizes.
-fn perforated(soup: Soup, dice: &mut Dice) -> Soup {
+/// Gives two of three faces holes of various sizes.
+fn with_holes(soup: Soup, random: &mut Lcg) -> Soup {
     let mut soup = with_materials(soup);
     for (k, face) in soup.faces.iter_mut().enumerate().filter(|(k, _)| k % 3 != 0) {
-        spread(face, CHEQUERED + k as u32 % 2, [0.05, 0.2, 0.7][dice.below(3) as usize]);
+        set_material(face, CHEQUERED + k as u32 % 2, [0.05, 0.2, 0.7][random.below(3) as usize]);
     }
     soup
 }
 
 #[test]
-fn beams_see_through_holes_and_nowhere_else() {
+fn beams_pass_through_holes_only() {
     for (seed, (look_at, pitch)) in [(0.0, 90.0), (45.0, 45.0), (123.4, 22.5), (270.0, 10.0)].into_iter().enumerate() {
-        let mut dice = Dice(seed as u64 + 31);
+        let mut random = Lcg(seed as u64 + 31);
         let folder = new_folder("holes");
-        let soup = mixed_soup(&mut dice, 120);
-        let store = build(&folder, &perforated(soup, &mut dice));
-        let tally = compare(&store, &frame(look_at, pitch, 40.0));
-        assert!(tally.met > 150_000 && tally.close * 4 < tally.met, "{tally:?}");
+        let soup = mixed_soup(&mut random, 120);
+        let store = build(&folder, &with_holes(soup, &mut random));
+        let counts = compare(&store, &frame(look_at, pitch, 40.0));
+        assert!(counts.covered > 150_000 && counts.close * 4 < counts.covered, "{counts:?}");
     }
 }
 
 #[test]
-fn behind_a_hole_the_highest_rank_that_is_there_wins() {
+fn highest_covering_rank_wins_behind_a_hole() {
     let mut soup = Soup::default();
-    let mut dice = Dice(5);
+    let mut random = Lcg(5);
     for _ in 0..4 {
         for (k, rank) in RANKS.into_iter().enumerate() {
-            let (x, y) = (dice.between(-8.0, 2.0), dice.between(-8.0, 2.0));
+            let (x, y) = (random.between(-8.0, 2.0), random.between(-8.0, 2.0));
             let point = |dx: f64, dy: f64| [x + dx, y + dy, (x + dx) * 0.25 + (y + dy) * 0.5];
             soup.quad([point(0.0, 0.0), point(7.0, 0.5), point(7.0, 8.0), point(0.0, 7.0)], k as u32, rank);
         }
     }
     let folder = new_folder("ranks");
-    let store = build(&folder, &perforated(soup, &mut dice));
+    let store = build(&folder, &with_holes(soup, &mut random));
     for (look_at, pitch) in [(0.0, 90.0), (45.0, 45.0), (200.0, 12.0)] {
         let frame = frame(look_at, pitch, 40.0);
-        let (eye, mut seen) = (Eye::new(&frame), [0; 6]);
-        let all = eye.know(&store);
+        let (view, mut seen) = (ReferenceView::new(&frame), [0; 6]);
+        let all = view.triangles(&store);
         let mut tracer = BeamTracer::new(&store, &frame).expect("tracer");
         let result = tracer.trace(96, 96, &Holes).expect("trace");
         for p in 0..SUBTILE_PX * SUBTILE_PX {
             let (i, j) = (p % SUBTILE_PX, p / SUBTILE_PX);
-            let at = Eye::sample([96 + i, 96 + j], 0);
-            let state = |t: &Known| if t.material.is_cutout() { presence(t, &eye.place(t, at).expect("not edge-on")) } else { Presence::There };
-            let here: Vec<(u8, Presence)> = all.iter().filter(|t| t.covers(at)).map(|t| (t.rank, state(t))).collect();
-            if here.iter().any(|h| h.1 == Presence::Unsure) {
+            let at = ReferenceView::sample([96 + i, 96 + j], 0);
+            let state_of = |t: &ReferenceTriangle| {
+                if t.material.is_cutout() { hole_state(t, &view.texture_point(t, at).expect("not edge-on")) } else { HoleState::Covered }
+            };
+            let here: Vec<(u8, HoleState)> = all.iter().filter(|t| t.covers(at)).map(|t| (t.rank, state_of(t))).collect();
+            if here.iter().any(|h| h.1 == HoleState::Uncertain) {
                 continue;
             }
-            let highest = here.iter().filter(|h| h.1 == Presence::There).map(|h| h.0).max();
+            let highest = here.iter().filter(|h| h.1 == HoleState::Covered).map(|h| h.0).max();
             let got = result.center_slot(i, j).map(|slot| result.surface(slot).rank);
             assert_eq!(got, highest, "pixel ({i}, {j}) from {look_at} / {pitch}: {here:?}");
             got.iter().for_each(|rank| seen[usize::from(*rank)] += 1);
@@ -130,8 +134,8 @@ fn behind_a_hole_the_highest_rank_that_is_there_wins() {
     }
 }
 
-/// A trunk and three crossed boards of leaves.
-fn tree() -> Vec<Face> {
+/// A trunk and three crossed quads of leaves.
+fn tree() -> Vec<SoupFace> {
     let mut soup = Soup::default();
     soup.quad([[-0.2, 0.0, 0.0], [0.2, 0.0, 0.0], [0.2, 0.0, 2.0], [-0.2, 0.0, 2.0]], 0, Rank::Other);
     for k in 0..3 {
@@ -146,21 +150,21 @@ fn tree() -> Vec<Face> {
     soup.faces
 }
 
-/// Turned, scaled by each axis its own way, every second one mirrored.
-fn planted(dice: &mut Dice, object: u32) -> Instance {
-    let (s, c) = dice.between(0.0, TAU).sin_cos();
-    let scales = [0, 1, 2].map(|_| dice.between(0.4, 2.5));
+/// Returns a placement that rotates, scales each axis differently, and mirrors every second instance.
+fn random_placement(random: &mut Lcg, object: u32) -> Instance {
+    let (s, c) = random.between(0.0, TAU).sin_cos();
+    let scales = [0, 1, 2].map(|_| random.between(0.4, 2.5));
     let mirror = if object.is_multiple_of(2) { -1.0 } else { 1.0 };
-    let (a, b, at) = (scales[0] * mirror, scales[1], dice.point(12.0));
+    let (a, b, at) = (scales[0] * mirror, scales[1], random.point(12.0));
     Instance { prototype: 1, object, transform: [c * a, -s * b, 0.0, at[0], s * a, c * b, 0.1, at[1], 0.0, 0.05, scales[2], at[2] / 4.0] }
 }
 
 #[test]
-fn trees_keep_their_holes_wherever_they_are_planted() {
-    let mut dice = Dice(11);
-    let mut soup = with_materials(mixed_soup(&mut dice, 20));
+fn instances_keep_their_holes() {
+    let mut random = Lcg(11);
+    let mut soup = with_materials(mixed_soup(&mut random, 20));
     soup.prototypes = vec![tree()];
-    soup.instances = (0..30).map(|k| planted(&mut dice, 100 + k)).collect();
+    soup.instances = (0..30).map(|k| random_placement(&mut random, 100 + k)).collect();
     let folder = new_folder("trees");
     let store = build(&folder, &soup);
     for (look_at, pitch) in [(30.0, 45.0), (180.0, 90.0), (311.0, 15.0)] {
@@ -169,9 +173,9 @@ fn trees_keep_their_holes_wherever_they_are_planted() {
 }
 
 #[test]
-fn holes_do_not_shift_where_chunks_meet() {
+fn holes_do_not_shift_at_chunk_borders() {
     let mut soup = Soup::default();
-    // A carpet across the middle, where four cells meet; above it and below it sheets so large that they are split.
+    // A grid of quads across the middle, where four cells meet, between quads so large that they are split.
     for k in 0..100u32 {
         let (x, y) = (f64::from(k % 10) * 4.0 - 21.3, f64::from(k / 10) * 4.0 - 18.7);
         let z = |x: f64, y: f64| (x * 0.4).sin() + y * 0.1;
@@ -181,30 +185,33 @@ fn holes_do_not_shift_where_chunks_meet() {
     soup.quad([[-3000.0, -2500.0, 9.0], [3100.0, -2700.0, 9.0], [2900.0, 2600.0, 9.0], [-2800.0, 2900.0, 9.0]], 200, Rank::Other);
     soup.quad([[-9900.0, -9500.0, -9.0], [9100.0, -9900.0, -9.0], [9900.0, 9600.0, -9.0], [-9800.0, 9900.0, -9.0]], 201, Rank::Other);
     let mut soup = with_materials(soup);
-    soup.faces.iter_mut().enumerate().filter(|(k, _)| k % 4 != 0 || *k >= 200).for_each(|(k, f)| spread(f, CHEQUERED + k as u32 % 2, 0.125));
+    soup.faces.iter_mut().enumerate().filter(|(k, _)| k % 4 != 0 || *k >= 200).for_each(|(k, f)| set_material(f, CHEQUERED + k as u32 % 2, 0.125));
     let folder = new_folder("borders");
     let store = build(&folder, &soup);
-    let at_home = |b: &map3d_base::Box3| (0..2).all(|k| b.lo[k] < 20.0 && b.hi[k] > -20.0);
-    assert!(store.parts().iter().filter(|p| at_home(&p.bounds)).count() >= 4, "the carpet lies in several chunks");
-    // Whole numbers may be subtracted from a triangle's coordinates, nothing else.
+    let in_middle = |b: &map3d_base::Box3| (0..2).all(|k| b.lo[k] < 20.0 && b.hi[k] > -20.0);
+    assert!(store.parts().iter().filter(|p| in_middle(&p.bounds)).count() >= 4, "the grid is in one chunk");
+    // Only whole numbers may be subtracted from a triangle's texture coordinates.
     let is_whole = |v: f64| (v - v.round()).abs() < 1e-3;
-    let in_place = |t: &Known| (0..3).all(|c| (0..2).all(|k| is_whole(t.uv[c][k] - uv_at(t.corners[c], 0.125)[k])));
+    let is_shifted_by_integers = |t: &ReferenceTriangle| (0..3).all(|c| (0..2).all(|k| is_whole(t.uv[c][k] - uv_at(t.corners[c], 0.125)[k])));
     let view = frame(0.0, 90.0, 40.0);
-    assert!(Eye::new(&view).know(&store).iter().all(|t| !t.material.is_cutout() || in_place(t)), "pieces of long triangles keep their coordinates");
+    assert!(
+        ReferenceView::new(&view).triangles(&store).iter().all(|t| !t.material.is_cutout() || is_shifted_by_integers(t)),
+        "splitting changed texture coordinates"
+    );
     for (look_at, pitch) in [(30.0, 45.0), (0.0, 90.0), (77.0, 14.0)] {
-        let tally = compare(&store, &frame(look_at, pitch, 40.0));
-        assert!(tally.met > 150_000, "{tally:?}");
+        let counts = compare(&store, &frame(look_at, pitch, 40.0));
+        assert!(counts.covered > 150_000, "{counts:?}");
     }
 }
 
 #[test]
-fn fences_seen_nearly_edge_on_have_their_holes_too() {
+fn triangles_seen_nearly_edge_on_keep_their_holes() {
     let (look_at, pitch) = (30.0, 40.0);
     let frame = frame(look_at, pitch, 24.0);
     let axes = frame.axes();
     let mut soup = Soup::default();
     for k in 0..60u32 {
-        // Planes that hold the line of sight, but for a turn of 6° down to nothing.
+        // Planes along the line of sight, rotated by 6° down to 0°.
         let turn: f64 = if k % 10 == 9 { 0.0 } else { 0.1 * 0.1f64.powf(f64::from(k % 10) / 2.0) };
         let along: Vec3 = [0, 1, 2].map(|a| axes.forward[a] * turn.cos() + axes.right[a] * turn.sin());
         let from = [f64::from(k % 12) * 1.6 - 9.0, f64::from(k / 12) * 1.5 - 4.0, f64::from(k % 7) * 0.5];
@@ -213,17 +220,17 @@ fn fences_seen_nearly_edge_on_have_their_holes_too() {
     }
     soup.quad([[-30.0, -30.0, -8.0], [30.0, -30.0, -8.0], [30.0, 30.0, -8.0], [-30.0, 30.0, -8.0]], 90, Rank::Terrain);
     let mut soup = with_materials(soup);
-    soup.faces.iter_mut().filter(|f| f.object != 90).for_each(|f| spread(f, CHEQUERED + f.object % 2, 0.2));
+    soup.faces.iter_mut().filter(|f| f.object != 90).for_each(|f| set_material(f, CHEQUERED + f.object % 2, 0.2));
     let folder = new_folder("edge-on");
-    let tally = Contest { store: &build(&folder, &soup), frame: &frame, cutout: &Holes, presence: &presence }.run();
-    assert!(tally.cut > 2_000 && tally.holes > 2_000 && tally.unsure * 200 < tally.met, "{tally:?}");
+    let counts = BeamComparison { store: &build(&folder, &soup), frame: &frame, cutout: &Holes, hole_state: &hole_state }.run();
+    assert!(counts.cutouts > 2_000 && counts.holes > 2_000 && counts.uncertain * 200 < counts.covered, "{counts:?}");
 }
 
-/// Notes what it is asked.
+/// Records the samples that it is called with.
 #[derive(Default)]
-struct Asked(RefCell<Vec<CutoutSample>>);
+struct RecordedSamples(RefCell<Vec<CutoutSample>>);
 
-impl Cutout for Asked {
+impl Cutout for RecordedSamples {
     fn covers(&self, _: &MaterialRecord, sample: &CutoutSample) -> bool {
         self.0.borrow_mut().push(*sample);
         true
@@ -231,7 +238,7 @@ impl Cutout for Asked {
 }
 
 #[test]
-fn footprints_are_the_change_over_a_pixel() {
+fn footprint_is_the_change_over_a_pixel() {
     let mut soup = Soup::default();
     soup.add([[-9.0, -8.0, 1.0], [10.0, -5.0, 3.0], [-2.0, 11.0, -4.0]], 0, Rank::Other);
     let mut soup = with_materials(soup);
@@ -241,24 +248,24 @@ fn footprints_are_the_change_over_a_pixel() {
     let store = build(&folder, &soup);
     for (look_at, pitch) in [(0.0, 90.0), (33.0, 50.0), (250.0, 25.0)] {
         let frame = frame(look_at, pitch, 40.0);
-        let (eye, asked) = (Eye::new(&frame), Asked::default());
-        BeamTracer::new(&store, &frame).expect("tracer").trace(96, 96, &asked).expect("trace");
-        let known = &eye.know(&store)[0];
-        let expected = eye.place(known, Eye::sample([128, 128], 0)).expect("not edge-on").footprint;
+        let (view, recorded) = (ReferenceView::new(&frame), RecordedSamples::default());
+        BeamTracer::new(&store, &frame).expect("tracer").trace(96, 96, &recorded).expect("trace");
+        let triangle = &view.triangles(&store)[0];
+        let expected = view.texture_point(triangle, ReferenceView::sample([128, 128], 0)).expect("not edge-on").footprint;
         let near = |s: &CutoutSample| (0..2).all(|a| (0..2).all(|b| (f64::from(s.footprint[a][b]) - expected[a][b]).abs() < 1e-6));
-        let asked = asked.0.into_inner();
-        assert!(asked.len() > 10_000 && asked.iter().all(near), "{} samples, {:?}, expected {expected:?}", asked.len(), asked.first());
+        let recorded = recorded.0.into_inner();
+        assert!(recorded.len() > 10_000 && recorded.iter().all(near), "{} samples, {:?}, expected {expected:?}", recorded.len(), recorded.first());
     }
 }
 
 #[test]
-fn rays_pass_through_the_same_holes() {
-    let mut dice = Dice(21);
+fn rays_agree_with_beams_at_holes() {
+    let mut random = Lcg(21);
     let folder = new_folder("rays");
-    let soup = mixed_soup(&mut dice, 60);
-    let mut soup = perforated(soup, &mut dice);
+    let soup = mixed_soup(&mut random, 60);
+    let mut soup = with_holes(soup, &mut random);
     soup.prototypes = vec![tree()];
-    soup.instances = (0..10).map(|k| planted(&mut dice, 100 + k)).collect();
+    soup.instances = (0..10).map(|k| random_placement(&mut random, 100 + k)).collect();
     let store = build(&folder, &soup);
     let rays = Rays::new(&store);
     let frame = frame(33.0, 40.0, 40.0);
@@ -271,34 +278,34 @@ fn rays_pass_through_the_same_holes() {
             let (i, j) = (p % SUBTILE_PX, p / SUBTILE_PX);
             let (u, v) = (frame.u0_m + (left as f64 + i as f64 + 0.5) * pixel_m, frame.v0_m - (top as f64 + j as f64 + 0.5) * pixel_m);
             let ray = Ray { origin: axes.local_from_uvd([u, v, frame.d0_m]), direction: scale(axes.forward, 3.0), width_m: pixel_m };
-            let hit = rays.closest(&ray, &Holes).expect("ray");
+            let hit = rays.closest_hit(&ray, &Holes).expect("ray");
             let expected = result.center_slot(i, j).map(|slot| result.surface(slot).object_id);
             compared += 1;
             differ += u32::from(hit.map(|h| h.object_id) != expected);
         }
     }
-    // Only where an edge, or the edge of a hole, passes within a lattice step of the pixel's centre.
+    // They may differ where an edge or the edge of a hole is within a lattice step of the pixel's centre.
     assert!(compared > 2_000 && differ * 100 < compared, "{differ} of {compared} differ");
 }
 
-/// Sets surfaces up before it is asked.
-struct HolesInAdvance;
+/// Supports only prepared surfaces.
+struct PreparedHoles;
 
-struct Stretched(MaterialRecord, [[f32; 2]; 2]);
+struct PreparedHoleMask(MaterialRecord, [[f32; 2]; 2]);
 
-impl Cutout for HolesInAdvance {
+impl Cutout for PreparedHoles {
     fn covers(&self, _: &MaterialRecord, _: &CutoutSample) -> bool {
-        panic!("a surface that is not set up");
+        panic!("called for a surface that is not prepared");
     }
 
-    fn stencil(&self, material: &MaterialRecord, [u, v]: &[Affine; 2]) -> Option<Box<dyn Stencil>> {
-        Some(Box::new(Stretched(*material, [[u.dx, v.dx], [u.dy, v.dy]])))
+    fn prepare(&self, material: &MaterialRecord, [u, v]: &[Affine; 2]) -> Option<Box<dyn CutoutMask>> {
+        Some(Box::new(PreparedHoleMask(*material, [[u.dx, v.dx], [u.dy, v.dy]])))
     }
 }
 
-impl Stencil for Stretched {
+impl CutoutMask for PreparedHoleMask {
     fn covered(&self, _: usize, _: usize, _: u32) -> u32 {
-        panic!("rays are not the samples of a pixel");
+        panic!("called with pixel samples for a ray");
     }
 
     fn covers(&self, uv: [f32; 2]) -> bool {
@@ -307,30 +314,30 @@ impl Stencil for Stretched {
 }
 
 #[test]
-fn bundles_pass_through_the_holes_of_surfaces_that_are_set_up() {
-    let mut dice = Dice(77);
-    let folder = new_folder("stencils");
-    let soup = mixed_soup(&mut dice, 60);
-    let mut soup = perforated(soup, &mut dice);
+fn packets_give_equal_results_for_prepared_cutouts() {
+    let mut random = Lcg(77);
+    let folder = new_folder("prepared");
+    let soup = mixed_soup(&mut random, 60);
+    let mut soup = with_holes(soup, &mut random);
     soup.prototypes = vec![tree()];
-    soup.instances = (0..10).map(|k| planted(&mut dice, 100 + k)).collect();
+    soup.instances = (0..10).map(|k| random_placement(&mut random, 100 + k)).collect();
     let store = build(&folder, &soup);
-    let around = Surroundings::gather(&store, [0.0; 3], |_| true).expect("parts");
+    let region = SceneRegion::open(&store, [0.0; 3], |_| true).expect("parts");
     let (mut hit, mut passed) = (0, 0);
     for _ in 0..40 {
-        let (from, towards) = (dice.point(30.0), dice.point(10.0));
+        let (from, towards) = (random.point(30.0), random.point(10.0));
         let direction = sub(towards, from);
-        let mut patch = Patch::default();
-        (0..RAYS).for_each(|k| patch.put(k, add(from, dice.point(4.0)), direction));
+        let mut origins = PacketOrigins::default();
+        (0..PACKET_SIZE).for_each(|k| origins.set(k, add(from, random.point(4.0)), direction));
         for isa in Isa::available() {
-            let mut bundles = around.along(direction, 0.1, isa).expect("bundles");
-            let holes = bundles.any_hit(&patch, 1e6, &Holes);
-            assert_eq!(holes, bundles.any_hit(&patch, 1e6, &HolesInAdvance));
-            let nearest = bundles.nearest(&patch, 0.0, &Holes);
-            let in_advance = bundles.nearest(&patch, 0.0, &HolesInAdvance);
-            assert_eq!((nearest.of_point, nearest.triangles), (in_advance.of_point, in_advance.triangles));
+            let mut packets = region.packets_along(direction, 0.1, isa).expect("packets");
+            let holes = packets.any_hit(&origins, 1e6, &Holes);
+            assert_eq!(holes, packets.any_hit(&origins, 1e6, &PreparedHoles));
+            let closest = packets.closest_hits(&origins, 0.0, &Holes);
+            let prepared = packets.closest_hits(&origins, 0.0, &PreparedHoles);
+            assert_eq!((closest.triangle_of_ray, closest.triangles), (prepared.triangle_of_ray, prepared.triangles));
             hit += holes.hit.count_ones();
-            passed += (bundles.any_hit(&patch, 1e6, &Opaque).hit & !holes.hit).count_ones();
+            passed += (packets.any_hit(&origins, 1e6, &IgnoreCutouts).hit & !holes.hit).count_ones();
         }
     }
     assert!(hit > 500 && passed > 100, "{hit} hit, {passed} passed through holes");

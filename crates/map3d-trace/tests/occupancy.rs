@@ -6,11 +6,11 @@ use map3d_base::asset::Rank;
 use map3d_base::tile::Tile;
 use map3d_scene::SceneStore;
 use map3d_trace::occupancy::{block_keys, occupied_within};
-use map3d_trace::{BeamTracer, Opaque, SUBTILE_PX, block_key, occupied};
-use scenes::{Dice, Soup, build, frame, new_folder, open, rebuild};
+use map3d_trace::{BeamTracer, IgnoreCutouts, SUBTILE_PX, block_key, occupied};
+use scenes::{Lcg, Soup, build, frame, new_folder, open, rebuild};
 
 fn houses(seed: u64) -> Soup {
-    let mut dice = Dice(seed);
+    let mut dice = Lcg(seed);
     let mut soup = Soup::default();
     for k in 0..40 {
         let (x, y) = (dice.between(-45.0, 45.0), dice.between(-45.0, 45.0));
@@ -36,7 +36,7 @@ fn occupancy_never_misses_what_a_beam_meets() {
         let tile_px = 256 << (2 - level);
         for top in (0..1024).step_by(SUBTILE_PX) {
             for left in (0..1024).step_by(SUBTILE_PX) {
-                if !tracer.trace(left as u64, top as u64, &Opaque).expect("trace").is_empty() {
+                if !tracer.trace(left as u64, top as u64, &IgnoreCutouts).expect("trace").is_empty() {
                     met[top / tile_px * side + left / tile_px] = true;
                 }
             }
@@ -63,7 +63,7 @@ fn an_empty_scene_occupies_nothing() {
     let frame = frame(0.0, 45.0, 64.0);
     assert!(occupied(&store, &frame, 3).expect("occupied").iter().all(|f| !f));
     let mut tracer = BeamTracer::new(&store, &frame).expect("tracer");
-    assert!(tracer.trace(0, 0, &Opaque).expect("trace").is_empty());
+    assert!(tracer.trace(0, 0, &IgnoreCutouts).expect("trace").is_empty());
 }
 
 #[test]

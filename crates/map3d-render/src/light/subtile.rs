@@ -1,61 +1,66 @@
-//! A sub-tile in hand: what its pixels show, and where that lies.
+//! A shaded sub-tile as input of light: its visible surfaces and their local points.
 
 use map3d_base::Vec3;
-use map3d_trace::visbuf::{MIXED, NOTHING};
-use map3d_trace::{Cutout, SUBTILE_PX, VisBuf};
+use map3d_trace::{Cutout, MIXED, NOTHING, SUBTILE_PX, VisBuf};
 
-use super::place::{Locator, Place};
-use crate::paint::Shaded;
-use crate::seen::{Seen, Shows};
+use super::unprojection::{SubtilePosition, Unprojection};
+use crate::fragments::{FragmentBuffer, RunContent};
+use crate::material::PreparedSurface;
 use crate::shade::Shader;
 
-pub(super) struct Subtile<'a> {
+pub(super) struct ShadedSubtile<'a> {
     pub vis: &'a VisBuf,
     pub shader: &'a Shader,
-    pub seen: &'a Seen,
-    pub shaded: &'a [Shaded],
-    pub place: Place,
-    pub locator: Locator,
+    pub buffer: &'a FragmentBuffer,
+    pub surfaces: &'a [PreparedSurface],
+    pub position: SubtilePosition,
+    pub unprojection: Unprojection,
     pub cutout: &'a dyn Cutout,
 }
 
-impl Subtile<'_> {
-    /// Local point and geometric normal of a share of pixel (i, j).
-    pub fn share(&self, [i, j]: [usize; 2], share: usize) -> (Vec3, Vec3) {
-        let share = &self.seen.shares[share];
-        let surface = &self.shaded[share.surface as usize];
-        let [x, y] = [i as f64 + f64::from(share.at[0]) / 256.0, j as f64 + f64::from(share.at[1]) / 256.0];
-        (self.locator.at(x, y, &surface.depth), surface.geometric_normal())
+/// A local point and the geometric unit normal of its surface.
+#[derive(Clone, Copy)]
+pub(super) struct SurfacePoint {
+    pub position: Vec3,
+    pub normal: Vec3,
+}
+
+impl ShadedSubtile<'_> {
+    /// Returns the centroid of a fragment of pixel (i, j).
+    pub fn fragment_point(&self, [i, j]: [usize; 2], fragment: usize) -> SurfacePoint {
+        let fragment = &self.buffer.fragments[fragment];
+        let surface = &self.surfaces[fragment.surface as usize];
+        let [x, y] = [i as f64 + f64::from(fragment.centroid[0]) / 256.0, j as f64 + f64::from(fragment.centroid[1]) / 256.0];
+        SurfacePoint { position: self.unprojection.point(x, y, &surface.depth), normal: surface.geometric_normal() }
     }
 
-    /// The first point, in the order of pixels; `None`: the sub-tile shows nothing.
-    pub fn first(&self) -> Option<Vec3> {
-        let run = self.seen.runs.first()?;
-        let pixel = [run.first, run.row].map(usize::from);
-        Some(match run.shows {
-            Shows::One(surface) => self.center(pixel, &self.shaded[surface as usize]),
-            Shows::Several { first, .. } => self.share(pixel, first as usize).0,
+    /// Returns the local point of a surface at the centre of pixel (i, j).
+    pub fn center_point(&self, [i, j]: [usize; 2], surface: &PreparedSurface) -> Vec3 {
+        self.unprojection.point(i as f64 + 0.5, j as f64 + 0.5, &surface.depth)
+    }
+
+    /// Returns the first local point in the order of pixels, or `None` for an empty sub-tile.
+    pub fn first_point(&self) -> Option<Vec3> {
+        let run = self.buffer.runs.first()?;
+        Some(match run.content {
+            RunContent::Surface(surface) => self.center_point(run.pixel(), &self.surfaces[surface as usize]),
+            RunContent::Fragments { first, .. } => self.fragment_point(run.pixel(), first as usize).position,
         })
     }
 
-    /// Local point of a surface at the centre of pixel (i, j).
-    pub fn center(&self, [i, j]: [usize; 2], surface: &Shaded) -> Vec3 {
-        self.locator.at(i as f64 + 0.5, j as f64 + 0.5, &surface.depth)
-    }
-
-    /// The runs of pixels whose centres show one surface: first pixel (i, j), how many, which.
-    pub fn center_runs(&self, mut each: impl FnMut([usize; 2], usize, &Shaded)) {
+    /// Calls `visit` for each run of pixels whose centres show one surface: first pixel (i, j), number of pixels, surface.
+    pub fn for_each_center_run(&self, mut visit: impl FnMut([usize; 2], usize, &PreparedSurface)) {
         for j in 0..SUBTILE_PX {
             let row = self.vis.row(j);
-            let slot = |i: usize| if row[i] == MIXED { self.vis.mixed(i, j)[0] } else { row[i] };
+            let slot_of = |i: usize| if row[i] == MIXED { self.vis.mixed(i, j)[0] } else { row[i] };
             let mut first = 0;
             while first < SUBTILE_PX {
-                let (shown, mut end) = (slot(first), first + 1);
-                while end < SUBTILE_PX && slot(end) == shown {
+                let (slot, mut end) = (slot_of(first), first + 1);
+                while end < SUBTILE_PX && slot_of(end) == slot {
                     end += 1;
                 }
-                if shown != NOTHING {
-                    each([first, j], end - first, self.shader.surface_of(shown));
+                if slot != NOTHING {
+                    visit([first, j], end - first, self.shader.surface_of_slot(slot));
                 }
                 first = end;
             }

@@ -1,4 +1,4 @@
-//! The scenes of the golden pictures: each a few metres wide, around the origin.
+//! The scenes of the golden pictures, each a few metres wide and centred on the origin.
 
 use std::f64::consts::{PI, TAU};
 
@@ -6,27 +6,27 @@ use map3d_base::Vec3;
 use map3d_base::asset::{Instance, Rank, Wrap};
 use map3d_image::Raster;
 
-use crate::town::{Face, Town, bricks};
+use crate::town::{SoupFace, Town, bricks};
 
-pub struct Picture {
+pub struct GoldenPicture {
     pub name: &'static str,
     pub scene: fn() -> Town,
-    /// Of the picture's side.
+    /// Side of the picture.
     pub metres: f64,
     /// Look-at angle and pitch.
     pub views: &'static [(f64, f64)],
 }
 
-pub const PICTURES: [Picture; 6] = [
-    Picture { name: "atlas-cube", scene: atlas_cube, metres: 11.0, views: &[(0.0, 30.0), (30.0, 45.0), (210.0, 60.0)] },
-    Picture { name: "trees", scene: trees, metres: 14.0, views: &[(0.0, 30.0), (45.0, 22.5), (45.0, 90.0)] },
-    Picture { name: "signs", scene: signs, metres: 13.0, views: &[(0.0, 30.0), (45.0, 45.0), (300.0, 10.0)] },
-    Picture { name: "bricks", scene: brick_court, metres: 8.0, views: &[(0.0, 90.0), (20.0, 10.0)] },
-    Picture { name: "balls", scene: balls, metres: 10.0, views: &[(0.0, 45.0), (90.0, 90.0)] },
-    Picture { name: "gable", scene: gabled_house, metres: 14.0, views: &[(45.0, 45.0), (200.0, 60.0)] },
+pub const PICTURES: [GoldenPicture; 6] = [
+    GoldenPicture { name: "atlas-cube", scene: atlas_cube, metres: 11.0, views: &[(0.0, 30.0), (30.0, 45.0), (210.0, 60.0)] },
+    GoldenPicture { name: "trees", scene: trees, metres: 14.0, views: &[(0.0, 30.0), (45.0, 22.5), (45.0, 90.0)] },
+    GoldenPicture { name: "signs", scene: signs, metres: 13.0, views: &[(0.0, 30.0), (45.0, 45.0), (300.0, 10.0)] },
+    GoldenPicture { name: "bricks", scene: brick_court, metres: 8.0, views: &[(0.0, 90.0), (20.0, 10.0)] },
+    GoldenPicture { name: "balls", scene: balls, metres: 10.0, views: &[(0.0, 45.0), (90.0, 90.0)] },
+    GoldenPicture { name: "gable", scene: gabled_house, metres: 14.0, views: &[(45.0, 45.0), (200.0, 60.0)] },
 ];
 
-/// Four pictures in one: an F on yellow, an R on blue, stripes, a ramp; magenta between them.
+/// Four images in one: an F on yellow, an R on blue, stripes, a ramp; magenta between them.
 fn atlas() -> Raster {
     const F: [u8; 7] = [0b11111, 0b10000, 0b10000, 0b11110, 0b10000, 0b10000, 0b10000];
     const R: [u8; 7] = [0b11110, 0b10001, 0b10001, 0b11110, 0b10100, 0b10010, 0b10001];
@@ -69,19 +69,19 @@ fn atlas_cube() -> Town {
     town
 }
 
-/// Round leaves on nothing.
+/// Round leaves on a transparent background.
 fn leaves() -> Raster {
     let pixel = |k: usize| {
         let (x, y) = ((k % 32) as i32 * 2 - 31, (k / 32) as i32 * 2 - 31);
         let (i, j) = (k % 8, k / 32 % 8);
-        let is_there = x * x + y * y < 31 * 31 && (i + j) % 8 < 5;
-        [50 + (k * 7 % 40) as u8, 110 + (k * 13 % 60) as u8, 40, if is_there { 255 } else { 0 }]
+        let is_opaque = x * x + y * y < 31 * 31 && (i + j) % 8 < 5;
+        [50 + (k * 7 % 40) as u8, 110 + (k * 13 % 60) as u8, 40, if is_opaque { 255 } else { 0 }]
     };
     Raster::new(32, 32, (0..1024).map(pixel).collect())
 }
 
-/// A trunk and two crossed boards.
-fn tree(trunk: u32, crown: u32) -> Vec<Face> {
+/// A trunk and two crossed quads.
+fn tree(trunk: u32, crown: u32) -> Vec<SoupFace> {
     let mut town = Town::default();
     for (dx, dy) in [(0.2, 0.0), (0.0, 0.2)] {
         town.panel([[-dx, -dy, 0.0], [dx, dy, 0.0], [dx, dy, 2.0], [-dx, -dy, 2.0]], [[0.0; 2]; 4], trunk, 0);
@@ -93,7 +93,7 @@ fn tree(trunk: u32, crown: u32) -> Vec<Face> {
     town.faces
 }
 
-/// One as it is, one turned by 30° and small, one mirrored and stretched.
+/// Three trees: one unchanged, one rotated by 30° and small, one mirrored and stretched.
 fn trees() -> Town {
     let mut town = Town::default();
     let (grass, trunk, crown) = (town.flat([0.45, 0.62, 0.35]), town.flat([0.36, 0.25, 0.18]), town.textured(leaves(), Wrap::Clamp));
@@ -110,14 +110,14 @@ fn trees() -> Town {
     town
 }
 
-/// Opaque letters on nothing.
+/// IgnoreCutouts letters on nothing.
 fn letters() -> Raster {
     let mut image = atlas();
     image.pixels.iter_mut().filter(|p| p[0] > 200).for_each(|p| p[3] = 0);
     image
 }
 
-/// A wall with a door and a sign with holes over both, a road on the ground: all coplanar, told apart by rank.
+/// A wall with a door, signs with holes over both, and a road on the ground: coplanar faces that differ in rank.
 fn signs() -> Town {
     let mut town = Town::default();
     let colors = [[0.85, 0.8, 0.7], [0.45, 0.25, 0.15], [0.5, 0.6, 0.4], [0.35, 0.35, 0.38]];
@@ -151,10 +151,10 @@ fn brick_court() -> Town {
     town
 }
 
-fn ball(is_smooth: bool) -> Vec<Face> {
+fn ball(is_smooth: bool) -> Vec<SoupFace> {
     let point = |i: usize, j: usize| {
         let (t, a) = (PI * i as f64 / 8.0, TAU * j as f64 / 16.0);
-        // On a grid, so that no library's sine matters.
+        // Rounded, so that the picture does not depend on the library's sine.
         [t.sin() * a.cos(), t.sin() * a.sin(), t.cos()].map(|c| (c * 256.0).round() / 256.0)
     };
     let mut out = Vec::new();
@@ -162,7 +162,7 @@ fn ball(is_smooth: bool) -> Vec<Face> {
         let c = [point(i, j), point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)];
         for t in [[c[0], c[1], c[2]], [c[0], c[2], c[3]]].into_iter().filter(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) {
             let normals = is_smooth.then(|| t.map(|p| p.map(|c| c as f32)));
-            out.push(Face { normals, ..Face::new(t) });
+            out.push(SoupFace { normals, ..SoupFace::new(t) });
         }
     }
     out
@@ -179,7 +179,7 @@ fn balls() -> Town {
     town
 }
 
-/// Walls, gables and a roof without texture, 20 cm above the walls; in one slope a hole through which the floor is seen.
+/// Walls, gables and a roof 20 cm above the walls, without textures; the floor shows through a hole in one slope.
 fn gabled_house() -> Town {
     let mut town = Town::default();
     let colors = [[0.5, 0.58, 0.42], [0.86, 0.83, 0.76], [0.62, 0.24, 0.18], [0.3, 0.5, 0.75]];
@@ -194,7 +194,7 @@ fn gabled_house() -> Town {
         town.panel([[x0, y0, -3.0], [x1, y1, -3.0], [x1, y1, 0.3], [x0, y0, 0.3]], none, wall, 2 + k as u32);
     }
     [-3.0, 3.0].into_iter().for_each(|x| town.face([[x, -3.0, 0.3], [x, 3.0, 0.3], [x, 0.0, 2.8]], wall, 6));
-    // Along the eaves, and from eaves (0) to ridge (1).
+    // x along the eaves; t from the eaves (0) to the ridge (1).
     let slope = |side: f64, x: f64, t: f64| [x, side * (3.6 - 3.6 * t), 3.0 * t];
     town.panel([(-3.4, 0.0), (3.4, 0.0), (3.4, 1.0), (-3.4, 1.0)].map(|(x, t)| slope(1.0, x, t)), none, roof, 7);
     for [x0, t0, x1, t1] in [[-3.4, 0.0, 3.4, 0.3], [-3.4, 0.7, 3.4, 1.0], [-3.4, 0.3, -1.0, 0.7], [1.5, 0.3, 3.4, 0.7]] {

@@ -1,9 +1,9 @@
-//! Small scenes with materials and textures, built like real ones, and a plain float64 renderer to compare with.
+//! Small scenes with materials and textures, built by the same code as real ones, and a brute-force renderer in float64.
 #![allow(dead_code)]
 
-#[path = "../../../map3d-trace/tests/brute/mod.rs"]
-pub mod brute;
-pub mod plain;
+#[path = "../../../map3d-trace/tests/reference/mod.rs"]
+pub mod reference;
+pub mod reference_renderer;
 #[path = "../../../map3d-trace/tests/scenes/mod.rs"]
 pub mod scenes;
 
@@ -12,7 +12,7 @@ use map3d_base::{Frame, LayerFormat, LayerKind, LayerSpec, Vec3};
 use map3d_image::Raster;
 use map3d_render::RenderScene;
 
-pub use scenes::{Face, Folder, Soup as Town, new_folder};
+pub use scenes::{Soup as Town, SoupFace, TempFolder, new_folder};
 
 impl Town {
     pub fn flat(&mut self, rgb: [f32; 3]) -> u32 {
@@ -29,17 +29,17 @@ impl Town {
     }
 
     pub fn face(&mut self, corners: [Vec3; 3], material: u32, object: u32) {
-        self.faces.push(Face { material, object, ..Face::new(corners) });
+        self.faces.push(SoupFace { material, object, ..SoupFace::new(corners) });
     }
 
-    /// A four-cornered face with texture coordinates.
+    /// Adds a quadrilateral with texture coordinates.
     pub fn panel(&mut self, c: [Vec3; 4], uv: [[f32; 2]; 4], material: u32, object: u32) {
         for k in [[0, 1, 2], [0, 2, 3]] {
-            self.faces.push(Face { uv: k.map(|i| uv[i]), material, object, ..Face::new(k.map(|i| c[i])) });
+            self.faces.push(SoupFace { uv: k.map(|i| uv[i]), material, object, ..SoupFace::new(k.map(|i| c[i])) });
         }
     }
 
-    /// A box on the ground, each side its own object.
+    /// Adds a box on the ground; each side is an object.
     pub fn house(&mut self, [x, y]: [f64; 2], [w, d, h]: [f64; 3], material: u32, object: u32) {
         let (x1, y1) = (x + w, y + d);
         let uv = |w: f64, h: f64| [[0.0, 0.0], [w as f32 / 4.0, 0.0], [w as f32 / 4.0, h as f32 / 4.0], [0.0, h as f32 / 4.0]];
@@ -56,7 +56,7 @@ impl Town {
     }
 
     /// Writes, builds and opens the scene.
-    pub fn open(&self, folder: &Folder) -> RenderScene {
+    pub fn open(&self, folder: &TempFolder) -> RenderScene {
         scenes::rebuild(folder, self);
         RenderScene::open(&folder.0, 64 << 20).expect("open")
     }
@@ -67,12 +67,12 @@ pub fn all_layers(color: LayerFormat) -> Vec<LayerSpec> {
     vec![LayerSpec::new(LayerKind::Color, color), png(LayerKind::Normal), png(LayerKind::Id), png(LayerKind::Depth)]
 }
 
-/// A square of `size_m` centred on the origin.
+/// Returns a frame of `size_m` centred on the origin.
 pub fn frame(look_at_deg: f64, pitch_deg: f64, size_m: f64, zmax: u8) -> Frame {
     Frame { zmax, layers: all_layers(LayerFormat::Png), ..scenes::frame(look_at_deg, pitch_deg, size_m) }
 }
 
-/// Bricks of several colours with mortar, `side` texels square.
+/// Returns bricks of several colours with mortar, `side` texels square.
 pub fn bricks(side: u32) -> Raster {
     let pixel = |i: u32| {
         let (x, y) = (i % side, i / side);
@@ -87,7 +87,7 @@ pub fn bricks(side: u32) -> Raster {
     Raster::new(side, side, (0..side * side).map(pixel).collect())
 }
 
-/// A picture without sharp edges.
+/// Returns an image without sharp edges.
 pub fn waves(side: u32) -> Raster {
     let tau = std::f64::consts::TAU / f64::from(side);
     let pixel = |i: u32| {

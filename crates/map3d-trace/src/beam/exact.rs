@@ -1,18 +1,43 @@
-//! The slow path, exact for every triangle: corners very far away, or seen so nearly edge-on that its depth does not fit fixed point.
+//! The exact path, slow but valid for every triangle: those with very distant corners, and those seen so nearly edge-on that their depth does not fit
+//! fixed point.
 
 use map3d_base::DEPTH_NOTHING;
-use map3d_base::samples::SAMPLES;
 
-use super::buffer::FAR;
-use super::canvas::{Candidate, Canvas};
-use super::project::depth_of_plane;
-use super::shape::{Edge, PixelBox, area2};
+use super::edges::{TriangleEdges, covered_samples};
+use super::key_plane::KeyBounds;
+use super::pixels::{PixelBox, SUBTILE_PX, SnappedCorners, sample_position};
+use super::rasterizer::{Candidate, Rasterizer};
+use super::sample_buffer::FAR;
 use crate::lanes::Lanes;
-use crate::visbuf::SUBTILE_PX;
+use crate::projection::depth_at;
 
-/// Whether a point in steps lies inside the snapped triangle, by the top-left rule.
-pub(crate) fn covers(s: &[[i64; 2]; 3], point: [i64; 2]) -> bool {
-    let area = area2(s);
+/// A triangle on the exact path.
+pub(crate) struct ExactTriangle<'a> {
+    pub snapped: &'a SnappedCorners,
+    /// Not snapped.
+    pub pixel: &'a [[f64; 3]; 3],
+    pub bias: i64,
+}
+
+impl ExactTriangle<'_> {
+    /// Returns the mask of the samples of pixel (i, j) that are inside, however distant the corners are.
+    fn covered(&self, i: i32, j: i32) -> u32 {
+        (0..16).filter(|k| is_inside(self.snapped, sample_position(i, j, *k))).fold(0, |mask, k| mask | 1 << k)
+    }
+
+    /// Returns the depth key at a point in lattice steps.
+    fn depth_key(&self, point: [i64; 2]) -> i32 {
+        let depth = depth_at(self.pixel, point[0] as f64 / 256.0, point[1] as f64 / 256.0);
+        let units = (depth + 0.5).floor().clamp(0.0, f64::from(DEPTH_NOTHING - 1)) as i64;
+        (units - self.bias - (1 << 31)).clamp(i64::from(i32::MIN), i64::from(FAR) - 1) as i32
+    }
+}
+
+/// Returns whether a point is inside the snapped triangle, by the top-left rule.
+fn is_inside(s: &SnappedCorners, point: [i64; 2]) -> bool {
+    // Twice the signed area, positive for corners that run clockwise on the screen.
+    let e = |k: usize, axis: usize| i128::from(s[k][axis] - s[0][axis]);
+    let area = e(1, 0) * e(2, 1) - e(1, 1) * e(2, 0);
     if area == 0 {
         return false;
     }
@@ -25,16 +50,16 @@ pub(crate) fn covers(s: &[[i64; 2]; 3], point: [i64; 2]) -> bool {
     })
 }
 
-impl Canvas<'_> {
-    /// Draws a triangle sample by sample. `edges`: those of a triangle whose corners are near, to tell its samples at once.
+impl Rasterizer<'_> {
+    /// Draws a triangle sample by sample. `edges`: those of a triangle with near corners, for a fast coverage test.
     #[cold]
     #[inline(never)]
-    pub fn draw_exact<L: Lanes>(&mut self, candidate: &Candidate, b: &PixelBox, exact: &Exact, edges: Option<&[Edge<L>; 3]>) {
-        for j in b.y0..=b.y1 {
-            for i in b.x0..=b.x1 {
+    pub fn draw_exact<L: Lanes>(&mut self, candidate: &Candidate, pixels: &PixelBox, triangle: &ExactTriangle, edges: Option<&TriangleEdges<L>>) {
+        for j in pixels.y0..=pixels.y1 {
+            for i in pixels.x0..=pixels.x1 {
                 let covered = match edges {
-                    Some([e, f, g]) => !e.samples(i, j).or(f.samples(i, j)).or(g.samples(i, j)).negative() & 0xFFFF,
-                    None => exact.covered(i, j),
+                    Some(edges) => covered_samples(edges, i, j),
+                    None => triangle.covered(i, j),
                 };
                 if covered == 0 {
                     continue;
@@ -44,37 +69,11 @@ impl Canvas<'_> {
                 while rest != 0 {
                     let k = rest.trailing_zeros() as usize;
                     rest &= rest - 1;
-                    keys[k] = exact_key(exact.pixel, sample(i, j, k), exact.bias);
+                    keys[k] = triangle.depth_key(sample_position(i, j, k));
                 }
                 let near = keys.into_iter().fold(FAR, i32::min);
-                self.merge(candidate, j as usize * SUBTILE_PX + i as usize, covered, L::load(&keys), (near, FAR));
+                self.merge(candidate, j as usize * SUBTILE_PX + i as usize, covered, L::load(&keys), KeyBounds { near, far: FAR });
             }
         }
     }
-}
-
-/// What the slow path needs of a triangle.
-pub(crate) struct Exact<'a> {
-    pub snapped: &'a [[i64; 2]; 3],
-    pub pixel: &'a [[f64; 3]; 3],
-    pub bias: i64,
-}
-
-impl Exact<'_> {
-    /// Samples of pixel (i, j) inside, however far the corners are.
-    fn covered(&self, i: i32, j: i32) -> u32 {
-        (0..16).filter(|k| covers(self.snapped, sample(i, j, *k))).fold(0, |mask, k| mask | 1 << k)
-    }
-}
-
-/// In steps.
-fn sample(i: i32, j: i32, k: usize) -> [i64; 2] {
-    let (x, y) = SAMPLES[k];
-    [i64::from(i) * 256 + i64::from(x) * 16, i64::from(j) * 256 + i64::from(y) * 16]
-}
-
-fn exact_key(pixel: &[[f64; 3]; 3], point: [i64; 2], bias: i64) -> i32 {
-    let depth = depth_of_plane(pixel, point[0] as f64 / 256.0, point[1] as f64 / 256.0);
-    let units = (depth + 0.5).floor().clamp(0.0, f64::from(DEPTH_NOTHING - 1)) as i64;
-    (units - bias - (1 << 31)).clamp(i64::from(i32::MIN), i64::from(FAR) - 1) as i32
 }

@@ -1,14 +1,14 @@
-//! Lanes in vector registers. One of this crate's two files with `unsafe`, beside `x86_floats`.
+//! Integer lanes in vector registers. One of the two files of this crate with `unsafe` intrinsics; the other is `x86_floats`.
 //!
-//! SAFETY, for every block here: the intrinsics need AVX2 (`Avx2`) or AVX-512 F and VL (`Avx512`). These types are named only by `beam::dispatch` and
-//! `bundle::dispatch`, after their callers have asked for them. Loads and stores go through references to arrays of exactly the bytes they touch, without alignment demands.
+//! SAFETY, for all blocks here: the intrinsics need AVX2 (`Avx2`) or AVX-512 F and VL (`Avx512`). Only `dispatch` names these types, after the processor
+//! has reported the instruction set. Loads and stores go through references to arrays of exactly the bytes that they touch and demand no alignment.
 #![allow(clippy::undocumented_unsafe_blocks)]
 
 use std::arch::x86_64::*;
 
-use super::Lanes;
+use super::traits::Lanes;
 
-/// See `super::equal_lanes`. SSE2 is part of x86-64.
+/// See `lanes::equal_lanes`. All x86-64 processors have SSE2.
 #[inline(always)]
 pub(super) fn equal_lanes(lanes: &[u32; 16], value: u32) -> u32 {
     let quarter = |k: usize| unsafe { _mm_cmpeq_epi32(_mm_loadu_si128(lanes[4 * k..].as_ptr().cast()), _mm_set1_epi32(value as i32)) };

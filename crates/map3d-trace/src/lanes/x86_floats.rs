@@ -1,19 +1,30 @@
-//! Float lanes in vector registers, the second of this crate's two files with `unsafe`.
+//! Float lanes in vector registers. One of the two files of this crate with `unsafe` intrinsics; the other is `x86`.
 //!
-//! SAFETY, for every block here: the intrinsics need AVX2 (`Eight`, `TwoEights`) or AVX-512 F (`Sixteen`). These types are named only by `FloatLanes` of
-//! `Avx2` and `Avx512`, which the two `dispatch` modules name after their callers have asked for the instruction set. Loads and stores go through
-//! references to arrays of exactly the bytes they touch, without alignment demands.
+//! SAFETY, for all blocks here: the intrinsics need AVX2 (`F32x8`, `TwoF32x8`) or AVX-512 F (`F32x16`). Only `FloatLanes` of `Avx2` and `Avx512` names
+//! these types, and only `dispatch` names those two, after the processor has reported the instruction set. Loads and stores go through references to
+//! arrays of exactly the bytes that they touch and demand no alignment.
 #![allow(clippy::undocumented_unsafe_blocks)]
 
 use std::arch::x86_64::*;
 
-use super::floats::Floats;
+use super::traits::{FloatLanes, Floats};
+use super::x86::{Avx2, Avx512};
+
+impl FloatLanes for Avx2 {
+    type Floats8 = F32x8;
+    type Floats16 = TwoF32x8;
+}
+
+impl FloatLanes for Avx512 {
+    type Floats8 = F32x8;
+    type Floats16 = F32x16;
+}
 
 /// One 256-bit register.
 #[derive(Clone, Copy)]
-pub(crate) struct Eight(__m256);
+pub(crate) struct F32x8(__m256);
 
-impl Floats<8> for Eight {
+impl Floats<8> for F32x8 {
     #[inline(always)]
     fn splat(value: f32) -> Self {
         Self(unsafe { _mm256_set1_ps(value) })
@@ -94,7 +105,7 @@ impl Floats<8> for Eight {
 
 /// Two 256-bit registers.
 #[derive(Clone, Copy)]
-pub(crate) struct TwoEights(Eight, Eight);
+pub(crate) struct TwoF32x8(F32x8, F32x8);
 
 #[inline(always)]
 fn halves(from: &[f32; 16]) -> (&[f32; 8], &[f32; 8]) {
@@ -108,16 +119,16 @@ fn halves_mut(to: &mut [f32; 16]) -> (&mut [f32; 8], &mut [f32; 8]) {
     (low.try_into().expect("half of 16"), high.try_into().expect("half of 16"))
 }
 
-impl Floats<16> for TwoEights {
+impl Floats<16> for TwoF32x8 {
     #[inline(always)]
     fn splat(value: f32) -> Self {
-        Self(Eight::splat(value), Eight::splat(value))
+        Self(F32x8::splat(value), F32x8::splat(value))
     }
 
     #[inline(always)]
     fn load(from: &[f32; 16]) -> Self {
         let (low, high) = halves(from);
-        Self(Eight::load(low), Eight::load(high))
+        Self(F32x8::load(low), F32x8::load(high))
     }
 
     #[inline(always)]
@@ -182,9 +193,9 @@ impl Floats<16> for TwoEights {
 
 /// One 512-bit register.
 #[derive(Clone, Copy)]
-pub(crate) struct Sixteen(__m512);
+pub(crate) struct F32x16(__m512);
 
-impl Floats<16> for Sixteen {
+impl Floats<16> for F32x16 {
     #[inline(always)]
     fn splat(value: f32) -> Self {
         Self(unsafe { _mm512_set1_ps(value) })

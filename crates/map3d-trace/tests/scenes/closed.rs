@@ -1,19 +1,19 @@
-//! Closed meshes: no ray or beam gets through them.
+//! Closed meshes, which no ray or beam passes.
 
 use map3d_base::Vec3;
 use map3d_base::asset::{Instance, Rank};
 
-use super::{Dice, Face, Soup};
+use super::{Lcg, Soup, SoupFace};
 
-/// A closed ball of triangles whose corners are jittered along their radius.
-pub fn ball(radius: f64, rings: usize, dice: &mut Dice, at: Vec3) -> Vec<[Vec3; 3]> {
+/// Returns a closed sphere whose corners are jittered along the radius.
+pub fn sphere_mesh(radius: f64, rings: usize, random: &mut Lcg, at: Vec3) -> Vec<[Vec3; 3]> {
     let columns = 2 * rings;
     let mut points = vec![vec![[0.0; 3]; columns]; rings + 1];
     for (i, row) in points.iter_mut().enumerate() {
-        let pole = radius * dice.between(0.9, 1.1);
+        let pole = radius * random.between(0.9, 1.1);
         for (j, p) in row.iter_mut().enumerate() {
             let (t, a) = (std::f64::consts::PI * i as f64 / rings as f64, std::f64::consts::TAU * j as f64 / columns as f64);
-            let r = if i == 0 || i == rings { pole } else { radius * dice.between(0.9, 1.1) };
+            let r = if i == 0 || i == rings { pole } else { radius * random.between(0.9, 1.1) };
             let ring = if i == 0 || i == rings { 0.0 } else { t.sin() };
             *p = [at[0] + r * ring * a.cos(), at[1] + r * ring * a.sin(), at[2] + r * t.cos()];
         }
@@ -22,7 +22,7 @@ pub fn ball(radius: f64, rings: usize, dice: &mut Dice, at: Vec3) -> Vec<[Vec3; 
     for i in 0..rings {
         for j in 0..columns {
             let k = (j + 1) % columns;
-            // At a pole one of the two is a point.
+            // At a pole one of the two triangles is a point.
             if i + 1 < rings {
                 out.push([points[i][j], points[i + 1][j], points[i + 1][k]]);
             }
@@ -34,8 +34,8 @@ pub fn ball(radius: f64, rings: usize, dice: &mut Dice, at: Vec3) -> Vec<[Vec3; 
     out
 }
 
-/// A closed box of `count` × `count` squares a side, along the axes: seen along them, its edges fall on samples.
-pub fn crate_of(half: f64, count: usize) -> Vec<[Vec3; 3]> {
+/// Returns a closed axis-aligned box with `count` × `count` squares per side. In views along the axes its edges are on samples.
+pub fn box_mesh(half: f64, count: usize) -> Vec<[Vec3; 3]> {
     let step = 2.0 * half / count as f64;
     let mut out = Vec::new();
     for (side, k) in (0..6).flat_map(|side| (0..count * count).map(move |k| (side, k))) {
@@ -50,22 +50,22 @@ pub fn crate_of(half: f64, count: usize) -> Vec<[Vec3; 3]> {
     out
 }
 
-pub fn soup_of(triangles: &[[Vec3; 3]], far: bool) -> Soup {
+/// `far`: adds distant triangles, which enlarge the square so that the mesh is cut into several cells.
+pub fn soup_from(triangles: &[[Vec3; 3]], far: bool) -> Soup {
     let mut soup = Soup::default();
     triangles.iter().for_each(|t| soup.add(*t, 0, Rank::Other));
     if far {
-        // Widens the square, so that what lies in the middle is cut into several cells.
         soup.add([[30_000.0, 30_000.0, 0.0], [30_001.0, 30_000.0, 0.0], [30_000.0, 30_001.0, 0.0]], 1, Rank::Other);
         soup.add([[-30_000.0, -30_000.0, 0.0], [-30_001.0, -30_000.0, 0.0], [-30_000.0, -30_001.0, 0.0]], 1, Rank::Other);
     }
     soup
 }
 
-/// Turned, mirrored and stretched, each part a prototype of its own that meets the next at its edges.
-pub fn planted(triangles: &[[Vec3; 3]]) -> Soup {
+/// Returns the mesh as three instances with a common placement that rotates, mirrors and stretches them.
+pub fn as_prototypes(triangles: &[[Vec3; 3]]) -> Soup {
     let mut soup = Soup::default();
     for (k, half) in triangles.chunks(triangles.len().div_ceil(3)).enumerate() {
-        soup.prototypes.push(half.iter().map(|t| Face::new(*t)).collect());
+        soup.prototypes.push(half.iter().map(|t| SoupFace::new(*t)).collect());
         let transform = [0.96, -0.3, 0.1, 0.2, 0.28, 1.1, 0.0, -0.1, 0.0, 0.2, -1.2, 0.3];
         soup.instances.push(Instance { prototype: k as u32 + 1, object: k as u32, transform });
     }

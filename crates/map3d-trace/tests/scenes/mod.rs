@@ -1,4 +1,4 @@
-//! Small synthetic scenes, built like real ones. The tests of map3d-render use them too.
+//! Small synthetic scenes, built by the same code as real ones. The tests of map3d-render use them too.
 #![allow(dead_code)]
 
 pub mod closed;
@@ -15,17 +15,17 @@ use map3d_scene::builder::{BuildOptions, BuildRequest, GroundPlane, build_scene}
 
 pub const RANKS: [Rank; 6] = [Rank::Terrain, Rank::Road, Rank::Ground, Rank::Other, Rank::Installation, Rank::Opening];
 
-/// Repeatable numbers.
-pub struct Dice(pub u64);
+/// A linear congruential generator: repeatable pseudo-random numbers.
+pub struct Lcg(pub u64);
 
-impl Dice {
+impl Lcg {
     pub fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         let x = self.0 ^ (self.0 >> 33);
         x.wrapping_mul(0xff51_afd7_ed55_8ccd) >> 16
     }
 
-    /// In [lo, hi).
+    /// Returns a number in [lo, hi).
     pub fn between(&mut self, lo: f64, hi: f64) -> f64 {
         lo + (hi - lo) * (self.next() as f64 / (1u64 << 48) as f64)
     }
@@ -40,7 +40,7 @@ impl Dice {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub struct Face {
+pub struct SoupFace {
     pub corners: [Vec3; 3],
     pub uv: [[f32; 2]; 3],
     pub normals: Option<[[f32; 3]; 3]>,
@@ -50,41 +50,41 @@ pub struct Face {
     pub rank: Rank,
 }
 
-impl Face {
+impl SoupFace {
     pub fn new(corners: [Vec3; 3]) -> Self {
         Self { corners, uv: [[0.0; 2]; 3], normals: None, material: 0, object: 0, rank: Rank::Other }
     }
 }
 
-/// One asset. Without any material all faces are grey.
+/// One asset as a triangle soup. Without materials, all faces are grey.
 #[derive(Default)]
 pub struct Soup {
-    pub faces: Vec<Face>,
-    /// Of prototype k + 1.
-    pub prototypes: Vec<Vec<Face>>,
+    pub faces: Vec<SoupFace>,
+    /// Element k is prototype k + 1.
+    pub prototypes: Vec<Vec<SoupFace>>,
     pub instances: Vec<Instance>,
     pub materials: Vec<Material>,
-    /// Image of each material.
+    /// The texture of each material.
     pub images: Vec<Option<Raster>>,
 }
 
 impl Soup {
     pub fn add(&mut self, corners: [Vec3; 3], object: u32, rank: Rank) {
-        self.faces.push(Face { object, rank, ..Face::new(corners) });
+        self.faces.push(SoupFace { object, rank, ..SoupFace::new(corners) });
     }
 
-    /// A four-cornered face.
+    /// Adds a quadrilateral.
     pub fn quad(&mut self, c: [Vec3; 4], object: u32, rank: Rank) {
         self.add([c[0], c[1], c[2]], object, rank);
         self.add([c[0], c[2], c[3]], object, rank);
     }
 
-    /// Faces of the asset in its order.
-    pub fn all_faces(&self) -> impl Iterator<Item = &Face> {
+    /// Returns the faces in the order of the asset.
+    pub fn all_faces(&self) -> impl Iterator<Item = &SoupFace> {
         self.faces.iter().chain(self.prototypes.iter().flatten())
     }
 
-    /// Position among all faces of what a chunk calls triangle `source` of an object, or of the prototype that the object places.
+    /// Returns the index in `all_faces` of triangle `source` of an object or, with `is_placed`, of the prototype that the object places.
     pub fn face_number(&self, object_id: u32, source: u32, is_placed: bool) -> usize {
         let object = object_id - 1;
         if !is_placed {
@@ -96,7 +96,7 @@ impl Soup {
     }
 
     /// Writes the asset `soup`.
-    pub fn write(&self, folder: &Folder) {
+    pub fn write(&self, folder: &TempFolder) {
         let asset = folder.0.join("assets/soup");
         let mut writer = AssetWriter::create(&asset).expect("asset");
         let materials = self.write_materials(&mut writer);
@@ -125,7 +125,7 @@ impl Soup {
     }
 }
 
-fn batch(faces: &[Face], prototype: u32, with_normals: bool) -> Batch {
+fn batch(faces: &[SoupFace], prototype: u32, with_normals: bool) -> Batch {
     let mut batch = Batch { prototype, ..Batch::default() };
     for face in faces {
         let first = batch.positions.len() as u32;
@@ -142,25 +142,25 @@ fn batch(faces: &[Face], prototype: u32, with_normals: bool) -> Batch {
     batch
 }
 
-/// Random triangles of all sizes, slivers, walls seen edge-on, stacks of coplanar faces.
-pub fn mixed_soup(dice: &mut Dice, count: usize) -> Soup {
+/// Returns random triangles of all sizes, slivers, vertical triangles and stacks of coplanar faces.
+pub fn mixed_soup(random: &mut Lcg, count: usize) -> Soup {
     let mut soup = Soup::default();
     for k in 0..count {
         let object = k as u32 / 2;
-        let rank = RANKS[dice.below(6) as usize];
-        let at = dice.point(16.0);
-        let size = [0.02, 0.2, 1.0, 4.0, 20.0, 300.0][dice.below(6) as usize];
-        let corner = |dice: &mut Dice| {
-            let e = dice.point(size);
+        let rank = RANKS[random.below(6) as usize];
+        let at = random.point(16.0);
+        let size = [0.02, 0.2, 1.0, 4.0, 20.0, 300.0][random.below(6) as usize];
+        let corner = |random: &mut Lcg| {
+            let e = random.point(size);
             [at[0] + e[0], at[1] + e[1], at[2] + e[2]]
         };
-        let mut t = [corner(dice), corner(dice), corner(dice)];
-        match dice.below(8) {
+        let mut t = [corner(random), corner(random), corner(random)];
+        match random.below(8) {
             // A sliver.
             0 => t[2] = [0, 1, 2].map(|a| (t[0][a] + t[1][a]) / 2.0 + 0.002),
-            // Upright, so that some views see it edge-on.
+            // Vertical, so that some views see it edge-on.
             1 => t = [t[0], t[1], [t[0][0], t[0][1], t[0][2] + size]],
-            // Flat, to lie on others of the same height.
+            // Horizontal at one of few heights, so that faces are coplanar.
             2 | 3 => t.iter_mut().for_each(|c| c[2] = (at[2] / 4.0).floor() * 4.0),
             _ => {}
         }
@@ -170,41 +170,41 @@ pub fn mixed_soup(dice: &mut Dice, count: usize) -> Soup {
 }
 
 /// A scene's folder; removed when dropped.
-pub struct Folder(pub PathBuf);
+pub struct TempFolder(pub PathBuf);
 
-impl Drop for Folder {
+impl Drop for TempFolder {
     fn drop(&mut self) {
         let _ = std::fs::remove_dir_all(&self.0);
     }
 }
 
-pub fn new_folder(name: &str) -> Folder {
+pub fn new_folder(name: &str) -> TempFolder {
     static NUMBER: AtomicU32 = AtomicU32::new(0);
     let number = NUMBER.fetch_add(1, Ordering::Relaxed);
     let path = std::env::temp_dir().join(format!("map3d-{}-{name}-{}-{number}", env!("CARGO_CRATE_NAME"), std::process::id()));
     let _ = std::fs::remove_dir_all(&path);
     std::fs::create_dir_all(&path).expect("temporary folder");
-    Folder(path)
+    TempFolder(path)
 }
 
-/// Writes and builds a soup.
-pub fn rebuild(folder: &Folder, soup: &Soup) {
+/// Writes and builds a scene.
+pub fn rebuild(folder: &TempFolder, soup: &Soup) {
     soup.write(folder);
     let options = BuildOptions { ground_plane: GroundPlane::Off, merge_faces: false, ..BuildOptions::default() };
     let request = BuildRequest { assets: vec!["soup".into()], origin: [0.0; 3], options, ground_id: 0, threads: 1, max_memory_bytes: 0 };
     build_scene(&folder.0, &request, &mut |_, _, _| true).expect("build");
 }
 
-pub fn build(folder: &Folder, soup: &Soup) -> SceneStore {
+pub fn build(folder: &TempFolder, soup: &Soup) -> SceneStore {
     rebuild(folder, soup);
     open(folder)
 }
 
-pub fn open(folder: &Folder) -> SceneStore {
+pub fn open(folder: &TempFolder) -> SceneStore {
     SceneStore::open(&folder.0, 1 << 30).expect("open")
 }
 
-/// A square of `size_m` centred on the origin, 256 pixels wide.
+/// Returns a frame of `size_m` centred on the origin, 256 pixels wide.
 pub fn frame(look_at_deg: f64, pitch_deg: f64, size_m: f64) -> Frame {
     let (u0_m, v0_m) = (-size_m / 2.0, size_m / 2.0);
     Frame { look_at_deg, pitch_deg, u0_m, v0_m, d0_m: -5000.0, size_m, tile_px: 256, zmax: 0, layers: vec![] }
