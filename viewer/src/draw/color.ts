@@ -1,8 +1,10 @@
 import { UsageError } from "../core/errors";
-import type { Rgb } from "./drawer";
+
+/** sRGB, 0..1 each. */
+export type Rgb = readonly [number, number, number];
 
 /** Reads `#rgb`, `#rrggbb` or `rgb(r g b)`. @throws UsageError */
-export function readColor(text: string): Rgb {
+export function parseColor(text: string): Rgb {
   const hex = /^#([0-9a-f]{3}|[0-9a-f]{6})$/i.exec(text.trim())?.[1];
   if (hex) {
     const long = hex.length === 3 ? hex.replace(/./g, "$&$&") : hex;

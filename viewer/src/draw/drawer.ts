@@ -5,16 +5,14 @@ import type { LayerKind } from "../geo/manifest";
 import type { Light } from "../geo/light";
 import type { Shadow } from "../geo/shadows";
 import type { TileData } from "../tiles/tileData";
-import type { Clip, Depths } from "./combine";
+import type { Rgb } from "./color";
+import type { Clip, DepthMapping } from "./depthMapping";
 import type { DrawStyles } from "./drawStyle";
 import type { LightEstimator } from "./lightEstimator";
 
 /** How a layer is shown: lit colour, colour or picture as stored, or a data layer in false colours. */
 export type Mode = "lit" | "color" | "picture" | "normal" | "id" | "depth";
 export const MODES: readonly Mode[] = ["lit", "color", "picture", "normal", "id", "depth"];
-
-/** sRGB, 0..1 each. */
-export type Rgb = readonly [number, number, number];
 
 /** A rectangle of the screen and the tile whose pixels fill it. Device pixels, y down; quads of a pass are disjoint. */
 export interface Quad {
@@ -34,7 +32,7 @@ export interface TileAccess {
   /** null: empty, or kept by the drawer; undefined: not in memory. */
   data(kind: LayerKind, tile: Tile): TileData | null | undefined;
   /** The drawer has its own copy: ours need not be kept. */
-  taken(kind: LayerKind, tile: Tile): void;
+  onUploaded(kind: LayerKind, tile: Tile): void;
 }
 
 /** One image layer in a frame. */
@@ -47,16 +45,16 @@ export interface Pass {
   /** Colours by object id. */
   readonly highlight: ReadonlyMap<number, Rgb>;
   /** How objects are shown; null: all as they are. */
-  readonly finishes: DrawStyles | null;
+  readonly drawStyles: DrawStyles | null;
   /** Light that was rendered; drawn where its tiles are here. */
-  readonly baked: BakedLight;
+  readonly bakedLight: BakedLight;
   /** True when colour has no alpha, so that the id layer says what is covered. */
   readonly masked: boolean;
   readonly opacity: number;
   /** null: it is painted over what was painted before, whatever lies nearer. */
-  readonly depths: Depths | null;
+  readonly depths: DepthMapping | null;
   /** Where its depths lie, alone or with others; null: it has none. */
-  readonly relief: Depths | null;
+  readonly relief: DepthMapping | null;
   /** The part of the map that it is seen in. */
   readonly clip: Clip | null;
   /** Depth values that get the first and the last false colour. */
@@ -90,13 +88,13 @@ export interface CustomLayer {
   render(gl: WebGL2RenderingContext, setting: FrameState, soft: boolean): void;
 }
 
-export interface FrameSpec extends FrameState {
+export interface FrameContent extends FrameState {
   readonly passes: readonly Pass[];
   readonly customLayers: readonly CustomLayer[];
   /** WebGL only: finds light that was not rendered; while the camera moves, what was found last does. */
-  readonly shade?: { readonly by: LightEstimator; readonly moving: boolean } | null;
+  readonly lighting?: { readonly by: LightEstimator; readonly moving: boolean } | null;
   /** WebGL only: where to draw in place of the canvas, with the depth of all passes as a share of a range of D. */
-  readonly into?: { readonly framebuffer: WebGLFramebuffer; readonly range: Vec2 };
+  readonly target?: { readonly framebuffer: WebGLFramebuffer; readonly range: Vec2 };
 }
 
 export interface DrawerEvents {
@@ -119,26 +117,26 @@ export interface Drawer {
   readonly gl: WebGL2RenderingContext | null;
   /** What one who debugs should know; mostly empty. */
   readonly note: string;
-  draw(frame: FrameSpec): void;
+  draw(frame: FrameContent): void;
   /** The tile has left the cache. */
   release(key: string): void;
   destroy(): void;
 }
 
 /** Layers without which a tile cannot be shown in a mode; `combined` by depth with others. */
-export function neededKinds(mode: Mode, masked: boolean, combined: boolean): LayerKind[] {
-  const shown = shownKinds(mode, masked);
+export function listRequiredKinds(mode: Mode, masked: boolean, combined: boolean): LayerKind[] {
+  const shown = listShownKinds(mode, masked);
   return combined && mode !== "depth" ? [...shown, "depth"] : shown;
 }
 
-function shownKinds(mode: Mode, masked: boolean): LayerKind[] {
+function listShownKinds(mode: Mode, masked: boolean): LayerKind[] {
   if (mode === "lit") return masked ? ["color", "normal", "id"] : ["color", "normal"];
   if (mode === "color" || mode === "picture") return masked ? [mode, "id"] : [mode];
   return [mode];
 }
 
 /** Layers that a mode shows when they are here. */
-export function bakedKinds(mode: Mode, { shadow, occlusion }: BakedLight): LayerKind[] {
+export function listBakedLightKinds(mode: Mode, { shadow, occlusion }: BakedLight): LayerKind[] {
   if (mode !== "lit") return [];
   return [...(shadow ? [shadow.layer.kind as LayerKind] : []), ...(occlusion ? ["ao" as const] : [])];
 }

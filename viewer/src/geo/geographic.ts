@@ -13,7 +13,7 @@ export interface GeographicJson {
 
 /** Longitude and latitude (WGS 84, degrees) of a local place. */
 export function lonLatFromLocal({ local, lon_lat, unit_m, degree, to }: GeographicJson, [x, y]: Vec2 | Vec3): Vec2 {
-  const terms = termsOf((x - local[0]) / unit_m, (y - local[1]) / unit_m, degree);
+  const terms = computeTerms((x - local[0]) / unit_m, (y - local[1]) / unit_m, degree);
   const lon = lon_lat[0] + sum(to[0], terms);
   return [lon > 180 ? lon - 360 : lon < -180 ? lon + 360 : lon, lon_lat[1] + sum(to[1], terms)];
 }
@@ -21,7 +21,7 @@ export function lonLatFromLocal({ local, lon_lat, unit_m, degree, to }: Geograph
 /** Local x and y of a longitude and latitude. */
 export function localFromLonLat({ local, lon_lat, unit_deg, degree, back }: GeographicJson, [lon, lat]: Vec2): Vec2 {
   const east = ((((lon - lon_lat[0] + 180) % 360) + 360) % 360) - 180;
-  const terms = termsOf(east / unit_deg, (lat - lon_lat[1]) / unit_deg, degree);
+  const terms = computeTerms(east / unit_deg, (lat - lon_lat[1]) / unit_deg, degree);
   return [local[0] + sum(back[0], terms), local[1] + sum(back[1], terms)];
 }
 
@@ -42,7 +42,7 @@ const E2 = 0.00669437999014;
 const STEP_DEG = 1e-4;
 
 /** 1, p, q, p², pq, q², … */
-function termsOf(p: number, q: number, degree: number): number[] {
+function computeTerms(p: number, q: number, degree: number): number[] {
   const terms: number[] = [];
   for (let total = 0; total <= degree; total++) for (let k = 0; k <= total; k++) terms.push(p ** (total - k) * q ** k);
   return terms;

@@ -32,7 +32,7 @@ export function towardsLight({ azimuth_deg, altitude_deg }: Pick<Light, "azimuth
 
 
 /** The light with numbers brought into their ranges. */
-export function validLight(light: Light): Light {
+export function clampLight(light: Light): Light {
   return {
     lit: light.lit,
     azimuth_deg: ((light.azimuth_deg % 360) + 360) % 360,

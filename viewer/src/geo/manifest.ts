@@ -29,17 +29,17 @@ export interface SunJson {
   readonly direction: Vec3;
 }
 
-interface Versions {
+interface BlockVersions {
   version: number;
   versions?: Record<string, number>;
 }
 
 /** Layers that were added later, with versions of their own. */
-interface PassJson extends Versions {
+interface PassJson extends BlockVersions {
   layers: string[];
 }
 
-interface ViewJson extends FrameJson, Versions {
+interface ViewJson extends FrameJson, BlockVersions {
   occupancy: string;
   passes?: PassJson[];
   archives?: Record<string, string>;
@@ -93,17 +93,17 @@ export interface Rendering {
   readonly layers: ReadonlyMap<string, LayerInfo>;
 }
 
-const READS = 1;
+const SUPPORTED_VERSION = 1;
 
 /** @throws ManifestError naming the file, what was expected and what came. */
 export function readManifest(value: unknown, where: string): Rendering {
-  const json = checked(value, where);
-  const views = new Map(json.views.map((view) => [view.id, viewOf(view, json)]));
+  const json = checkManifest(value, where);
+  const views = new Map(json.views.map((view) => [view.id, makeView(view, json)]));
   const layers = new Map([...json.layers].reverse().map((layer) => [layer.kind, layer]));
   return { json, views, layers };
 }
 
-function viewOf(view: ViewJson, json: ManifestJson): View {
+function makeView(view: ViewJson, json: ManifestJson): View {
   const passes = new Map(view.passes?.flatMap((pass) => pass.layers.map((name) => [name, pass] as const)));
   return {
     id: view.id,
@@ -117,18 +117,18 @@ function viewOf(view: ViewJson, json: ManifestJson): View {
   };
 }
 
-function checked(value: unknown, where: string): ManifestJson {
+function checkManifest(value: unknown, where: string): ManifestJson {
   const json = value as Partial<ManifestJson> | null;
   const refuse = (why: string): never => {
     throw new ManifestError(`${where}: ${why}`);
   };
   if (!json || typeof json !== "object" || json.map3d !== "rendering") return refuse('is no rendering.json ("map3d": "rendering" is missing)');
-  if (json.version !== READS) return refuse(`has version ${String(json.version)}, this viewer reads version ${String(READS)}; take the viewer of the same release`);
+  if (json.version !== SUPPORTED_VERSION) return refuse(`has version ${String(json.version)}, this viewer reads version ${String(SUPPORTED_VERSION)}; take the viewer of the same release`);
   const wrong = FIELDS.find(([name, ok]) => !ok(json[name]));
   if (wrong) return refuse(`field "${wrong[0]}" is missing or malformed, got ${(JSON.stringify(json[wrong[0]]) as string | undefined ?? "nothing").slice(0, 80)}`);
   const full = json as ManifestJson;
-  const odd = full.views.find((view) => !viewOk(view));
-  const lost = full.views.find((view) => !passesOk(view.passes));
+  const odd = full.views.find((view) => !isView(view));
+  const lost = full.views.find((view) => !arePasses(view.passes));
   if (odd) return refuse(`view ${JSON.stringify(odd.id)} lacks its frame or occupancy`);
   if (lost) return refuse(`view ${lost.id} has passes without layers or version`);
   return full;
@@ -144,24 +144,24 @@ const FIELDS: [keyof ManifestJson, (v: unknown) => boolean][] = [
   ["tile_px", (v) => Number.isInteger(v) && Number(v) > 0 && Number(v) <= 4096],
   ["zmax", isLevel],
   ["size_m", (v) => isNumber(v) && Number(v) > 0],
-  ["layers", (v) => Array.isArray(v) && v.length > 0 && v.every(layerOk)],
+  ["layers", (v) => Array.isArray(v) && v.length > 0 && v.every(isLayer)],
   ["views", (v) => Array.isArray(v) && v.length > 0],
-  ["geographic", geographicOk],
+  ["geographic", isGeographic],
 ];
 
-function layerOk(value: unknown): boolean {
+function isLayer(value: unknown): boolean {
   const layer = value as Partial<LayerInfo> | null;
-  return typeof layer?.name === "string" && typeof layer.kind === "string" && typeof layer.format === "string" && sunsOk(layer.suns);
+  return typeof layer?.name === "string" && typeof layer.kind === "string" && typeof layer.format === "string" && areSuns(layer.suns);
 }
 
-function sunsOk(value: unknown): boolean {
+function areSuns(value: unknown): boolean {
   return value === undefined || (Array.isArray(value) && value.every((sun: Partial<SunJson> | null) => isPoint(sun?.direction)));
 }
 
 const isPair = (v: unknown): boolean => Array.isArray(v) && v.length === 2 && v.every(isNumber);
 const isTerms = (v: unknown, degree: number): boolean => Array.isArray(v) && v.length === (degree + 1) * (degree + 2) / 2 && v.every(isNumber);
 
-function geographicOk(value: unknown): boolean {
+function isGeographic(value: unknown): boolean {
   const place = value as Partial<GeographicJson> | undefined | null;
   if (place === undefined) return true;
   if (!place || !isPair(place.local) || !isPair(place.lon_lat) || !(Number(place.unit_m) > 0) || !(Number(place.unit_deg) > 0)) return false;
@@ -170,12 +170,12 @@ function geographicOk(value: unknown): boolean {
   return Number.isInteger(degree) && degree >= 1 && degree <= 16 && rows.every((row) => isTerms(row, degree));
 }
 
-function passesOk(value: unknown): boolean {
+function arePasses(value: unknown): boolean {
   const ok = (pass: Partial<PassJson> | null): boolean => Array.isArray(pass?.layers) && isNumber(pass.version);
   return value === undefined || (Array.isArray(value) && value.every(ok));
 }
 
-function viewOk(view: Partial<ViewJson>): boolean {
+function isView(view: Partial<ViewJson>): boolean {
   const numbers = [view.look_at_deg, view.pitch_deg, view.u0_m, view.v0_m, view.d0_m, view.version];
   return typeof view.id === "string" && typeof view.occupancy === "string" && numbers.every(isNumber);
 }

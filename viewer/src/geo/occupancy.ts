@@ -12,7 +12,7 @@ export class Occupancy {
   /** @param base64 breadth-first quadtree bits, least significant bit first. */
   constructor(base64: string, zmax: number) {
     this.zmax = zmax;
-    const read = bitReader(base64);
+    const read = makeBitReader(base64);
     this.#root = read() === 1;
     let count = this.#root ? 1 : 0;
     for (let z = 0; z < zmax; z++) count = this.#readLevel(count, read);
@@ -26,7 +26,7 @@ export class Occupancy {
       const quarter = (Math.floor(x / 2 ** shift) & 1) | ((Math.floor(y / 2 ** shift) & 1) << 1);
       const bits = this.#bits[level]?.[node] ?? 0;
       if (!((bits >> quarter) & 1)) return false;
-      node = (this.#first[level]?.[node] ?? 0) + ones(bits & ((1 << quarter) - 1));
+      node = (this.#first[level]?.[node] ?? 0) + countBits(bits & ((1 << quarter) - 1));
     }
     return true;
   }
@@ -39,7 +39,7 @@ export class Occupancy {
       const four = read() | (read() << 1) | (read() << 2) | (read() << 3);
       bits[node] = four;
       first[node] = next;
-      next += ones(four);
+      next += countBits(four);
     }
     this.#bits.push(bits);
     this.#first.push(first);
@@ -47,11 +47,11 @@ export class Occupancy {
   }
 }
 
-function ones(four: number): number {
+function countBits(four: number): number {
   return (four & 1) + ((four >> 1) & 1) + ((four >> 2) & 1) + ((four >> 3) & 1);
 }
 
-function bitReader(base64: string): () => number {
+function makeBitReader(base64: string): () => number {
   const bytes = atob(base64);
   let at = 0;
   return () => {

@@ -25,7 +25,7 @@ export function findShadow(layers: readonly LayerInfo[], towards: Vec3): Shadow 
     const many = layer.kind === "sun16";
     for (const [first, sun] of layer.kind === "sun" || many ? suns.entries() : []) {
       const next = suns[first + 1];
-      const [apart, share] = many && next ? between(sun, next, towards) : [angle(sun, towards), 0];
+      const [apart, share] = many && next ? measureArc(sun, next, towards) : [angle(sun, towards), 0];
       if (apart >= least || apart > (many ? NEAR_RAD : SAME_RAD)) continue;
       [least, best] = [apart, { layer, first, second: share > 0 ? first + 1 : first, share }];
     }
@@ -34,7 +34,7 @@ export function findShadow(layers: readonly LayerInfo[], towards: Vec3): Shadow 
 }
 
 /** How far a direction is from the way between two, and how far along it. */
-function between(from: Vec3, to: Vec3, towards: Vec3): [apart_rad: number, share: number] {
+function measureArc(from: Vec3, to: Vec3, towards: Vec3): [apart_rad: number, share: number] {
   const whole = angle(from, to);
   const normal = cross(from, to);
   const length = Math.hypot(...normal);

@@ -5,9 +5,9 @@ import { depthAtHeight, localFromUvd, uvdFromLocal } from "../geo/axes";
 import { cssPixelM, projectedBox, screenFromLocal, uvFromScreen, zoomedAt, zoomToFit, type Camera } from "../geo/camera";
 import { localFromLonLat, lonLatFromLocal } from "../geo/geographic";
 import type { Rendering, View } from "../geo/manifest";
-import { discord } from "./agreement";
-import { neighbourView, tiltedView } from "./directions";
-import { limited, zoomLimits } from "./limits";
+import { findIncompatibility } from "./compatibility";
+import { findNeighbourView, findTiltedView } from "./neighbourViews";
+import { limitCamera, computeZoomLimits } from "./limits";
 import { Motion } from "./motion";
 import type { FilledOptions, MapEvents } from "./options";
 import type { ViewState } from "./layerContext";
@@ -17,7 +17,7 @@ import type { Size } from "./viewport";
 const FLIGHT_MS = 700;
 const STEP_MS = 220;
 /** Two fingers turned so far turn the view to the next direction. */
-const TWIST_RAD = (28 * Math.PI) / 180;
+const ROTATION_STEP_RAD = (28 * Math.PI) / 180;
 
 /** Of `fitBounds`. */
 export interface FitOptions {
@@ -42,18 +42,18 @@ export abstract class CameraController extends Evented<MapEvents> {
   protected transitionCamera: Camera | null = null;
   #pending: (() => void)[] = [];
   /** Clockwise, since the last turn. */
-  #twist_rad = 0;
+  #rotation_rad = 0;
 
   protected abstract get size(): Size;
   protected abstract requestFrame(): void;
   protected abstract report(error: Error): void;
   /** World position of the surface in the middle as far as it is in memory. */
-  protected abstract surfaceInTheMiddle(viewState: ViewState): Vec3 | null;
+  protected abstract findCenterSurface(viewState: ViewState): Vec3 | null;
 
   /** The surface in the middle of the screen as far as it is known, else the ground there; null before "ready". */
   get center(): Vec3 | null {
     const viewState = this.getViewState();
-    return viewState && (this.surfaceInTheMiddle(viewState) ?? this.unproject(this.middle()));
+    return viewState && (this.findCenterSurface(viewState) ?? this.unproject(this.screenCenter()));
   }
 
   /** At whole numbers a tile pixel of that level is one CSS pixel. */
@@ -68,7 +68,7 @@ export abstract class CameraController extends Evented<MapEvents> {
 
   /** Least and greatest. */
   get zoomLimits(): [number, number] {
-    return this.camera && this.reference ? zoomLimits(this.camera, this.reference.json.box) : [0, 0];
+    return this.camera && this.reference ? computeZoomLimits(this.camera, this.reference.json.box) : [0, 0];
   }
 
   /** The view's id, e.g. "45-22.5". */
@@ -88,22 +88,22 @@ export abstract class CameraController extends Evented<MapEvents> {
 
   /** Puts a world position in the middle, at once. */
   setView(position: Vec3, zoom?: number): this {
-    return this.#go((camera, rendering) => cameraAt(camera, rendering, position, zoom), 0);
+    return this.#moveTo((camera, rendering) => centerCamera(camera, rendering, position, zoom), 0);
   }
 
   /** Brings a world position to the middle, smoothly unless the reader wants no movement. */
   flyTo(position: Vec3, zoom?: number, { duration_ms = FLIGHT_MS }: { duration_ms?: number } = {}): this {
-    return this.#go((camera, rendering) => cameraAt(camera, rendering, position, zoom), duration_ms);
+    return this.#moveTo((camera, rendering) => centerCamera(camera, rendering, position, zoom), duration_ms);
   }
 
   /** Shows a box of world coordinates as large as it fits. */
   fitBounds([low, high]: Box3, { padding_px = 24, duration_ms = 0, maxZoom = Infinity }: FitOptions = {}): this {
-    return this.#go((camera, { json: { origin } }) => fitted(camera, [sub(low, origin), sub(high, origin)], padding_px, maxZoom), duration_ms);
+    return this.#moveTo((camera, { json: { origin } }) => fitCamera(camera, [sub(low, origin), sub(high, origin)], padding_px, maxZoom), duration_ms);
   }
 
   /** At once, about the middle; brought into `zoomLimits`. */
   setZoom(zoom: number): this {
-    return this.#go((camera) => ({ ...camera, zoom }), 0);
+    return this.#moveTo((camera) => ({ ...camera, zoom }), 0);
   }
 
   /** One level nearer, smoothly. */
@@ -117,10 +117,10 @@ export abstract class CameraController extends Evented<MapEvents> {
   }
 
   /** Zooms smoothly by levels about a point of the screen, its middle unless given. */
-  zoomBy(delta: number, anchor: Vec2 = this.middle()): this {
+  zoomBy(delta: number, anchor: Vec2 = this.screenCenter()): this {
     const camera = this.camera;
     if (!camera) return this;
-    if (still()) return this.setCamera(zoomedAt(camera, clamp(camera.zoom + delta, ...this.zoomLimits), anchor));
+    if (prefersReducedMotion()) return this.setCamera(zoomedAt(camera, clamp(camera.zoom + delta, ...this.zoomLimits), anchor));
     this.motion.zoomBy(camera, delta, anchor, this.zoomLimits);
     return this;
   }
@@ -133,7 +133,7 @@ export abstract class CameraController extends Evented<MapEvents> {
 
   /** Moves the picture by CSS pixels: at once, or smoothly. */
   panBy(dx: number, dy: number, { smooth = false }: { smooth?: boolean } = {}): this {
-    return this.camera ? this.#go((camera) => panned(camera, dx, dy), smooth ? STEP_MS : 0, smooth) : this;
+    return this.camera ? this.#moveTo((camera) => panCamera(camera, dx, dy), smooth ? STEP_MS : 0, smooth) : this;
   }
 
   /** Another view of the rendering; the point in the middle stays there, highlights and markers stay on their objects. @throws UsageError */
@@ -141,19 +141,19 @@ export abstract class CameraController extends Evented<MapEvents> {
     return this.whenReady((camera, rendering) => {
       const view = rendering.views.get(direction);
       if (!view) throw new UsageError(`view "${direction}" is none of ${[...rendering.views.keys()].join(", ")}`);
-      if (view.frame !== camera.frame) this.#turn(view, camera, rendering);
+      if (view.frame !== camera.frame) this.#switchView(view, camera, rendering);
     });
   }
 
   /** The next direction of the same pitch, +1 counter-clockwise. */
   rotate(step: number): this {
-    return this.whenReady((camera, rendering) => this.setDirection(neighbourView(rendering, camera.frame, step)));
+    return this.whenReady((camera, rendering) => this.setDirection(findNeighbourView(rendering, camera.frame, step)));
   }
 
   /** The next pitch of the nearest direction, +1 steeper; nothing when there is none. */
   tilt(step: number): this {
     return this.whenReady((camera, rendering) => {
-      const view = tiltedView(rendering, camera.frame, step);
+      const view = findTiltedView(rendering, camera.frame, step);
       if (view !== null) this.setDirection(view);
     });
   }
@@ -165,7 +165,7 @@ export abstract class CameraController extends Evented<MapEvents> {
 
   /** World position on the ground (height of the content's lowest point) under CSS pixels; null in level views. */
   unproject(point: Vec2): Vec3 | null {
-    return this.camera && this.reference ? groundAt(this.camera, this.reference, point) : null;
+    return this.camera && this.reference ? findGround(this.camera, this.reference, point) : null;
   }
 
   /** Longitude and latitude (WGS 84, degrees) of a world position; null before "ready", and where the scene's place on earth is not known. */
@@ -193,10 +193,10 @@ export abstract class CameraController extends Evented<MapEvents> {
   /** @internal Turns the picture clockwise under a hand; to the next direction when it has been turned far enough, unless a turner follows the hand. */
   rotateBy(rad: number): void {
     if (this.transition?.rotateBy(rad)) return;
-    this.#twist_rad += rad;
-    if (Math.abs(this.#twist_rad) < TWIST_RAD) return;
-    this.rotate(Math.sign(this.#twist_rad));
-    this.#twist_rad = 0;
+    this.#rotation_rad += rad;
+    if (Math.abs(this.#rotation_rad) < ROTATION_STEP_RAD) return;
+    this.rotate(Math.sign(this.#rotation_rad));
+    this.#rotation_rad = 0;
   }
 
   /** @internal A change of direction is under way. */
@@ -211,7 +211,7 @@ export abstract class CameraController extends Evented<MapEvents> {
 
   /** @internal The hand has left. */
   endGesture(): void {
-    this.#twist_rad = 0;
+    this.#rotation_rad = 0;
     this.transition?.endGesture();
   }
 
@@ -222,7 +222,7 @@ export abstract class CameraController extends Evented<MapEvents> {
 
   /** @internal */
   startInertia(velocity: Vec2): void {
-    if (!still()) this.motion.glide(velocity);
+    if (!prefersReducedMotion()) this.motion.startInertia(velocity);
   }
 
   /** @internal */
@@ -253,32 +253,32 @@ export abstract class CameraController extends Evented<MapEvents> {
     return this.motion.moving || this.transitionCamera !== null;
   }
 
-  protected middle(): Vec2 {
+  protected screenCenter(): Vec2 {
     return [this.size.width / 2, this.size.height / 2];
   }
 
   protected setCamera(camera: Camera): this {
-    this.camera = this.reference ? limited(camera, this.reference.json.box) : camera;
+    this.camera = this.reference ? limitCamera(camera, this.reference.json.box) : camera;
     this.requestFrame();
     return this;
   }
 
   /** The camera for this moment of a movement. */
-  protected stepCamera(now_ms: number): void {
+  protected advanceCamera(now_ms: number): void {
     const camera = this.camera;
     const next = camera && this.motion.step(now_ms, camera);
-    if (next && next !== camera) this.camera = this.reference ? limited(next, this.reference.json.box) : next;
+    if (next && next !== camera) this.camera = this.reference ? limitCamera(next, this.reference.json.box) : next;
     this.transitionCamera = (this.camera && this.transition?.step(now_ms, this.camera)) ?? null;
   }
 
   /** @throws UsageError when a manifest does not go with the first */
-  protected admit(rendering: Rendering): void {
-    const why = this.reference ? discord(this.reference, rendering) : null;
+  protected checkCompatible(rendering: Rendering): void {
+    const why = this.reference ? findIncompatibility(this.reference, rendering) : null;
     if (why !== null) throw new UsageError(`rendering "${rendering.json.name}" cannot be shown on this map: ${why}`);
   }
 
   /** The first manifest gives the map its view. */
-  protected begin(rendering: Rendering): void {
+  protected initializeView(rendering: Rendering): void {
     const { width, height } = this.size;
     const { json, views } = rendering;
     const { direction, center, zoom } = this.options;
@@ -286,16 +286,16 @@ export abstract class CameraController extends Evented<MapEvents> {
     if (!view) return;
     if (direction !== undefined && !views.has(direction)) this.report(new UsageError(`view "${direction}" is none of ${[...views.keys()].join(", ")}`));
     this.reference = rendering;
-    const whole = fitted({ frame: view.frame, u: 0, v: 0, zoom: 0, width, height }, json.box, Math.min(width, height) * 0.04, json.zmax);
+    const whole = fitCamera({ frame: view.frame, u: 0, v: 0, zoom: 0, width, height }, json.box, Math.min(width, height) * 0.04, json.zmax);
     const start = center ?? (json.start && add(json.origin, json.start.local));
-    this.setCamera(start ? cameraAt(whole, rendering, start, zoom) : { ...whole, zoom: zoom ?? whole.zoom });
-    for (const act of this.#pending.splice(0)) this.#attempt(act);
+    this.setCamera(start ? centerCamera(whole, rendering, start, zoom) : { ...whole, zoom: zoom ?? whole.zoom });
+    for (const act of this.#pending.splice(0)) this.#runPending(act);
     this.fire("ready", {});
     this.fire("directionchange", { direction: this.direction });
   }
 
   /** What was called before there was a manifest fails like what comes later, but has nobody to tell but the map. */
-  #attempt(act: () => void): void {
+  #runPending(act: () => void): void {
     try {
       act();
     } catch (reason) {
@@ -312,46 +312,46 @@ export abstract class CameraController extends Evented<MapEvents> {
     return this;
   }
 
-  #go(to: (camera: Camera, rendering: Rendering) => Camera, duration_ms: number, stops = true): this {
+  #moveTo(to: (camera: Camera, rendering: Rendering) => Camera, duration_ms: number, stops = true): this {
     return this.whenReady((camera, rendering) => {
-      const target = limited(to(camera, rendering), rendering.json.box);
+      const target = limitCamera(to(camera, rendering), rendering.json.box);
       if (stops) this.motion.stop();
-      if (duration_ms <= 0 || still()) this.setCamera(target);
+      if (duration_ms <= 0 || prefersReducedMotion()) this.setCamera(target);
       else this.motion.fly(camera, target, duration_ms);
     });
   }
 
-  #turn(view: View, camera: Camera, rendering: Rendering): void {
+  #switchView(view: View, camera: Camera, rendering: Rendering): void {
     const held = this.center;
     const turned = { ...camera, frame: view.frame };
     this.motion.stop();
-    this.setCamera(held ? cameraAt(turned, rendering, held) : fitted(turned, rendering.json.box, 0, camera.zoom));
+    this.setCamera(held ? centerCamera(turned, rendering, held) : fitCamera(turned, rendering.json.box, 0, camera.zoom));
     this.transition?.start(camera, held ? sub(held, rendering.json.origin) : mid(rendering.json.box));
     this.fire("directionchange", { direction: view.id });
   }
 }
 
 /** Does the user want no movement? */
-const still = (): boolean => matchMedia("(prefers-reduced-motion: reduce)").matches;
+const prefersReducedMotion = (): boolean => matchMedia("(prefers-reduced-motion: reduce)").matches;
 
-function cameraAt(camera: Camera, { json }: Rendering, position: Vec3, zoom = camera.zoom): Camera {
+function centerCamera(camera: Camera, { json }: Rendering, position: Vec3, zoom = camera.zoom): Camera {
   const [u, v] = uvdFromLocal(camera.frame.axes, sub(position, json.origin));
   return { ...camera, u, v, zoom };
 }
 
-function panned(camera: Camera, dx: number, dy: number): Camera {
+function panCamera(camera: Camera, dx: number, dy: number): Camera {
   const px = cssPixelM(camera);
   return { ...camera, u: camera.u - dx * px, v: camera.v + dy * px };
 }
 
 /** The camera that shows a local box. */
-function fitted(camera: Camera, box: Box3, padding: number, maxZoom: number): Camera {
+function fitCamera(camera: Camera, box: Box3, padding: number, maxZoom: number): Camera {
   const [low, high] = projectedBox(camera.frame, box);
   const [u, v] = uvdFromLocal(camera.frame.axes, mid(box));
   return { ...camera, u, v, zoom: Math.min(zoomToFit(camera, high[0] - low[0], high[1] - low[1], padding), maxZoom) };
 }
 
-function groundAt(camera: Camera, { json }: Rendering, point: Vec2): Vec3 | null {
+function findGround(camera: Camera, { json }: Rendering, point: Vec2): Vec3 | null {
   const [u, v] = uvFromScreen(camera, point);
   const d = depthAtHeight(camera.frame.axes, v, json.box[0][2]);
   return d === null ? null : add(json.origin, localFromUvd(camera.frame.axes, [u, v, d]));

@@ -17,21 +17,21 @@ export class FrameLoop {
     if (soon && this.#handle > 0) this.#timer ??= setTimeout(() => { this.#run(performance.now()); }, SOON_MS);
   }
 
-  get waiting(): boolean {
+  get pending(): boolean {
     return this.#handle !== 0;
   }
 
   stop(): void {
-    this.#forget();
+    this.#cancel();
     this.#handle = -1; // a removed map asks for no more frames
   }
 
   #run(now_ms: number): void {
-    this.#forget();
+    this.#cancel();
     this.#draw(now_ms);
   }
 
-  #forget(): void {
+  #cancel(): void {
     cancelAnimationFrame(this.#handle);
     clearTimeout(this.#timer);
     this.#timer = undefined;

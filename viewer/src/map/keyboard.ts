@@ -1,6 +1,6 @@
 import type { GestureTarget } from "./gestures";
 
-export interface Turned extends GestureTarget {
+export interface KeyboardTarget extends GestureTarget {
   panBy(dx: number, dy: number, options?: { smooth?: boolean }): unknown;
   /** +1: the next direction counter-clockwise, which turns the picture clockwise. */
   rotate(step: number): unknown;
@@ -15,7 +15,7 @@ const TURN: Record<string, number> = { "[": 1, "]": -1, q: 1, e: -1 };
 const TILT: Record<string, number> = { PageUp: 1, PageDown: -1 };
 
 /** Arrows move, + and − zoom, q and e (or [ and ]) turn, Page Up and Page Down look steeper or flatter. Keys count while the map itself has the focus. */
-export function listenToKeys(map: Turned, signal: AbortSignal): void {
+export function listenToKeys(map: KeyboardTarget, signal: AbortSignal): void {
   const { container } = map;
   container.tabIndex = 0;
   const pressed = (event: KeyboardEvent): void => {

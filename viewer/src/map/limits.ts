@@ -7,7 +7,7 @@ const OUT = 1.2;
 const IN = 2;
 
 /** Least and greatest zoom: everything small in the middle; a tile pixel four CSS pixels wide. */
-export function zoomLimits(camera: Camera, box: Box3): [number, number] {
+export function computeZoomLimits(camera: Camera, box: Box3): [number, number] {
   const [low, high] = projectedBox(camera.frame, box);
   const all = zoomToFit(camera, high[0] - low[0], high[1] - low[1], 0);
   const deepest = camera.frame.zmax + IN;
@@ -15,8 +15,8 @@ export function zoomLimits(camera: Camera, box: Box3): [number, number] {
 }
 
 /** The camera within its limits: the screen's middle stays over the content. */
-export function limited(camera: Camera, box: Box3): Camera {
+export function limitCamera(camera: Camera, box: Box3): Camera {
   const [low, high] = projectedBox(camera.frame, box);
-  const zoom = clamp(camera.zoom, ...zoomLimits(camera, box));
+  const zoom = clamp(camera.zoom, ...computeZoomLimits(camera, box));
   return { ...camera, zoom, u: clamp(camera.u, low[0], high[0]), v: clamp(camera.v, low[1], high[1]) };
 }

@@ -1,29 +1,30 @@
 import { adoptStyles, element } from "../core/dom";
 import { asError, UsageError } from "../core/errors";
 import { Evented } from "../core/events";
-import type { Addable, LayerHost, OverlayHost, OverlayEvents } from "../core/overlayHost";
+import type { Addable, LayerHost } from "../core/mapLayer";
+import type { OverlayHost, OverlayEvents } from "../core/overlayHost";
 import type { Vec2, Vec3 } from "../core/vec";
 import { findLanguage } from "../core/i18n";
 import type { CustomLayer } from "../draw/drawer";
 import type { Camera } from "../geo/camera";
 import { computeDaylight } from "../geo/daylight";
-import { DEFAULT_LIGHT, validLight, type Light } from "../geo/light";
+import { DEFAULT_LIGHT, clampLight, type Light } from "../geo/light";
 import type { LightEstimator } from "../draw/lightEstimator";
 import type { LayerKind } from "../geo/manifest";
 import { marker } from "../overlay/marker";
-import { attributionLine } from "../ui/attribution";
-import { controls } from "../ui/controls";
-import { scaleBar } from "../ui/scaleBar";
+import { createAttribution } from "../ui/attribution";
+import { createControls } from "../ui/controls";
+import { createScaleBar } from "../ui/scaleBar";
 import { DebugTiles } from "../ui/debugTiles";
 import { STYLES } from "../ui/styles";
 import { FrameLoop } from "./frameLoop";
 import { Gestures, type GestureTarget } from "./gestures";
 import { imageLayer } from "./imageLayer";
-import { objectsIn, type VisibleObject } from "./inView";
+import { findVisibleObjects, type VisibleObject } from "./visibleObjects";
 import { listenToKeys } from "./keyboard";
 import { DEFAULTS, savesData, type ClickEvent, type FilledOptions, type MapOptions } from "./options";
-import { Painter } from "./painter";
-import { NOTHING, pickExactly, pickLoaded, type Pick } from "./picker";
+import { FrameRenderer } from "./frameRenderer";
+import { EMPTY_PICK, pickExactly, pickLoaded, type Pick } from "./picker";
 import { Relief } from "./relief";
 import type { ViewState, LayerContext } from "./layerContext";
 import { CameraController } from "./cameraController";
@@ -36,26 +37,26 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   /** Tells markers and popups that places on the screen have changed. */
   readonly frameEvents = new Evented<OverlayEvents>();
   readonly #viewport: Viewport;
-  readonly #painter: Painter | null;
+  readonly #renderer: FrameRenderer | null;
   readonly #loop = new FrameLoop((now) => { this.#frame(now); });
   readonly #items = new Set<Addable<map>>();
-  readonly #ending = new AbortController();
+  readonly #abort = new AbortController();
   readonly #debug = new DebugTiles();
   #gestures: Gestures | undefined;
   #layers: imageLayer[] = [];
   #light: Readonly<Light>;
   #time: Date | null = null;
-  #drawn: Camera | undefined;
+  #drawnCamera: Camera | undefined;
   #relief: Relief | undefined;
-  #shade: LightEstimator | null = null;
+  #lightEstimator: LightEstimator | null = null;
   /** Something besides the camera has changed since the last frame. */
   #dirty = true;
   /** The picture has not moved since the last "moveend". */
-  #resting = true;
+  #atRest = true;
   #loaded = false;
-  #clicks = 0;
-  #names = 0;
-  #hover: Vec2 | null = null;
+  #clickCount = 0;
+  #nameCount = 0;
+  #hoverPoint: Vec2 | null = null;
 
   /** @param target the id of a canvas, or the element  @throws UsageError when there is none */
   constructor(target: string | HTMLElement, options: MapOptions = {}) {
@@ -63,13 +64,13 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     const { dataSaver = DEFAULTS.dataSaver } = options;
     this.options = { ...DEFAULTS, ...options, dataSaver: dataSaver === "auto" ? savesData() : dataSaver };
     const spared = this.options.dataSaver ? { shadows: false, occlusion: false } : {};
-    this.#light = validLight({ ...DEFAULT_LIGHT, ...spared, ...options.light });
+    this.#light = clampLight({ ...DEFAULT_LIGHT, ...spared, ...options.light });
     adoptStyles(document, STYLES);
-    this.#viewport = new Viewport(target, () => { this.#resized(); });
+    this.#viewport = new Viewport(target, () => { this.#onResize(); });
     if (options.background !== undefined) this.setBackground(options.background);
-    this.#painter = this.#makePainter();
-    this.#listen();
-    this.#dress();
+    this.#renderer = this.#createRenderer();
+    this.#addListeners();
+    this.#addControls();
   }
 
   // Things on the map
@@ -79,7 +80,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     if (this.#items.has(item)) return this;
     this.#items.add(item);
     if (item instanceof imageLayer) this.#layers = [...this.#layers, item];
-    if (item instanceof marker) item.on("select", this.#selected);
+    if (item instanceof marker) item.on("select", this.#onMarkerSelect);
     item.attachTo(this);
     return this.#redraw();
   }
@@ -88,7 +89,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   discard(item: Addable<map>): this {
     if (!this.#items.delete(item)) return this;
     this.#layers = this.#layers.filter((layer) => layer !== item);
-    if (item instanceof marker) item.off("select", this.#selected);
+    if (item instanceof marker) item.off("select", this.#onMarkerSelect);
     item.detachFrom(this);
     return this.#redraw();
   }
@@ -96,9 +97,9 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   /** Ends the map; the canvas stands in the page as before. */
   remove(): this {
     this.#loop.stop();
-    this.#ending.abort();
+    this.#abort.abort();
     for (const item of [...this.#items]) this.discard(item);
-    this.#painter?.destroy();
+    this.#renderer?.destroy();
     this.#viewport.destroy();
     return this.fire("remove", {});
   }
@@ -130,12 +131,12 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
 
   /** What draws: "webgl" or "canvas"; null when nothing can. */
   get drawer(): "webgl" | "canvas" | null {
-    return this.#painter?.drawer.name ?? null;
+    return this.#renderer?.drawer.name ?? null;
   }
 
   /** @internal What the picture is seen in: the canvas, or an element below it; null when nothing can be drawn. */
   get drawerElement(): HTMLElement | null {
-    return this.#painter?.drawer.element ?? null;
+    return this.#renderer?.drawer.element ?? null;
   }
 
   get language(): string {
@@ -161,7 +162,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   /** Changes parts of the light; numbers are brought into their ranges. Another direction ends the light of a time. */
   setLight(light: Partial<Light>): this {
     if (light.azimuth_deg !== undefined || light.altitude_deg !== undefined) this.#time = null;
-    return this.#relight(light);
+    return this.#updateLight(light);
   }
 
   /** The time that the light is of; null when it was set otherwise. */
@@ -174,13 +175,13 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     return this.whenReady((_, { json }) => {
       if (!json.geographic) throw new UsageError(`rendering "${json.name}" does not say where on earth it lies, so the sun's place is not known; use setLight`);
       this.#time = time;
-      this.#relight(computeDaylight(time, json.geographic));
+      this.#updateLight(computeDaylight(time, json.geographic));
     });
   }
 
   /** @internal What finds light that was not rendered. */
   setLightEstimator(shade: LightEstimator | null): this {
-    this.#shade = shade;
+    this.#lightEstimator = shade;
     return this.#redraw();
   }
 
@@ -196,8 +197,8 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     return this.#redraw();
   }
 
-  #relight(light: Partial<Light>): this {
-    this.#light = validLight({ ...this.#light, ...light });
+  #updateLight(light: Partial<Light>): this {
+    this.#light = clampLight({ ...this.#light, ...light });
     this.fire("lightchange", { light: this.#light });
     return this.#redraw();
   }
@@ -206,32 +207,32 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
 
   /** What lies under CSS pixels, exactly: the deepest level's tile is fetched. Approximate when that fails. */
   async pick(point: Vec2): Promise<Pick> {
-    const sight = this.getViewState();
-    if (!sight) return NOTHING;
+    const viewState = this.getViewState();
+    if (!viewState) return EMPTY_PICK;
     try {
-      return await pickExactly(this.#layers, sight, point);
+      return await pickExactly(this.#layers, viewState, point);
     } catch {
       // The tile's own error has been reported when it failed.
-      return { ...(pickLoaded(this.#layers, sight, point) ?? NOTHING), approximate: true };
+      return { ...(pickLoaded(this.#layers, viewState, point) ?? EMPTY_PICK), approximate: true };
     }
   }
 
   /** Objects of all layers that are seen, the largest of each layer first; those below the topmost layer count as if they were not hidden by it. */
   async objectsInView(): Promise<readonly (VisibleObject & { readonly layer: imageLayer })[]> {
-    const sight = this.getViewState();
-    if (!sight) return [];
-    const found = await Promise.all([...this.#layers].reverse().map(async (layer) => (await objectsIn(layer, sight)).map((seen) => ({ ...seen, layer }))));
+    const viewState = this.getViewState();
+    if (!viewState) return [];
+    const found = await Promise.all([...this.#layers].reverse().map(async (layer) => (await findVisibleObjects(layer, viewState)).map((seen) => ({ ...seen, layer }))));
     return found.flat();
   }
 
   /** What the tiles in memory tell of a point; null when they tell nothing. */
   pickLoaded(point: Vec2): Pick | null {
-    const sight = this.getViewState();
-    return sight && pickLoaded(this.#layers, sight, point);
+    const viewState = this.getViewState();
+    return viewState && pickLoaded(this.#layers, viewState, point);
   }
 
   isOccluded(world: Vec3): boolean {
-    return this.relief?.covers(world) ?? false;
+    return this.relief?.isPositionOccluded(world) ?? false;
   }
 
   findSurfaceAt(point: Vec2): Vec3 | null {
@@ -240,20 +241,20 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
 
   /** @internal Depths of the picture that was drawn last, of items that need them; null before "ready". */
   get relief(): Relief | null {
-    const sight = this.getViewState();
-    if (this.#relief?.camera !== sight?.camera) this.#relief = undefined;
-    this.#relief ??= sight ? new Relief(this.#layers, sight) : undefined;
+    const viewState = this.getViewState();
+    if (this.#relief?.camera !== viewState?.camera) this.#relief = undefined;
+    this.#relief ??= viewState ? new Relief(this.#layers, viewState) : undefined;
     return this.#relief ?? null;
   }
 
   /** @internal Depths of a rectangle (U and V), from the deepest level that takes at most so many tiles; `ids`: object ids, too. */
-  fetchRelief(sight: ViewState, rect: Rect, most: number, ids = false): ReturnType<typeof Relief.fetch> {
-    return Relief.fetch(this.#layers, sight, rect, most, ids);
+  fetchRelief(viewState: ViewState, rect: Rect, most: number, ids = false): ReturnType<typeof Relief.fetch> {
+    return Relief.fetch(this.#layers, viewState, rect, most, ids);
   }
 
   /** Bytes of decoded tiles in memory. */
   get cacheBytes(): number {
-    return this.#painter?.cacheBytes ?? 0;
+    return this.#renderer?.cacheBytes ?? 0;
   }
 
   // What gestures and layers call
@@ -261,32 +262,32 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   /** @internal */
   tap(point: Vec2): void {
     this.#deselectMarkers();
-    void this.#click(point);
+    void this.#fireClick(point);
   }
 
   /** @internal */
   hover(point: Vec2): void {
     if (!this.listens("mousemove")) return;
-    this.#hover = point;
+    this.#hoverPoint = point;
     this.#loop.request();
   }
 
   /** @internal Something else is seen among the layers by its depth; `on` false: no longer. */
   toggleCustomLayer(guest: CustomLayer, on = true): this {
-    this.#painter?.customLayers[on ? "add" : "delete"](guest);
+    this.#renderer?.customLayers[on ? "add" : "delete"](guest);
     return this.#redraw();
   }
 
   /** @internal undefined when the map cannot draw. */
   get layerContext(): LayerContext | undefined {
-    const painter = this.#painter;
+    const painter = this.#renderer;
     return painter === null ? undefined : {
-      tileResources: painter.shared,
-      createName: () => `layer${String(this.#names++)}`,
-      dropTiles: (layer) => { painter.forget(`${layer}/`); },
-      checkCompatible: (rendering) => { this.admit(rendering); },
+      tileResources: painter.tileResources,
+      createName: () => `layer${String(this.#nameCount++)}`,
+      dropTiles: (layer) => { painter.dropTiles(`${layer}/`); },
+      checkCompatible: (rendering) => { this.checkCompatible(rendering); },
       onManifest: (rendering) => {
-        if (!this.camera) this.begin(rendering);
+        if (!this.camera) this.initializeView(rendering);
         this.#redraw();
       },
       requestFrame: () => { this.#redraw(); },
@@ -302,8 +303,8 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     this.#loop.request();
   }
 
-  protected surfaceInTheMiddle(sight: ViewState): Vec3 | null {
-    return pickLoaded(this.#layers, sight, this.middle())?.position ?? null;
+  protected findCenterSurface(viewState: ViewState): Vec3 | null {
+    return pickLoaded(this.#layers, viewState, this.screenCenter())?.position ?? null;
   }
 
   protected report(error: Error): void {
@@ -315,11 +316,11 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
 
   #frame(now: number): void {
     const turned = this.transitionCamera !== null;
-    this.stepCamera(now);
-    if (this.#hover) this.#fireHover(this.#hover);
+    this.advanceCamera(now);
+    if (this.#hoverPoint) this.#fireHover(this.#hoverPoint);
     try {
-      if (this.#dirty || this.camera !== this.#drawn || turned || this.transitionCamera) this.#draw(turned || this.transitionCamera !== null);
-      else this.#settle();
+      if (this.#dirty || this.camera !== this.#drawnCamera || turned || this.transitionCamera) this.#draw(turned || this.transitionCamera !== null);
+      else this.#comeToRest();
     } catch (reason) {
       this.report(asError(reason));
     }
@@ -327,47 +328,47 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
 
   /** @param turning places on the screen are others even when the camera is not */
   #draw(turning: boolean): void {
-    const sight = this.getViewState();
-    if (!sight || !this.#painter || this.size.width === 0) return;
-    const [before, changed] = [this.#drawn, this.#dirty];
-    [this.#drawn, this.#dirty, this.#relief] = [sight.camera, false, undefined];
-    const moving = before !== undefined && before !== sight.camera;
-    const { plans, complete } = this.#painter.paint(sight, { layers: this.#layers, light: this.#light, kinds: this.#kindsRead(), shade: this.#shade, moving }, this.transitionCamera && ((scene) => { this.transition?.draw({ ...scene, camera: sight.camera, changed }); }));
-    this.#debug.update(plans, sight.dpr, this.#painter.drawer);
-    if (before !== sight.camera || turning) this.#moved(before, sight.camera);
+    const viewState = this.getViewState();
+    if (!viewState || !this.#renderer || this.size.width === 0) return;
+    const [before, tilesChanged] = [this.#drawnCamera, this.#dirty];
+    [this.#drawnCamera, this.#dirty, this.#relief] = [viewState.camera, false, undefined];
+    const moving = before !== undefined && before !== viewState.camera;
+    const { plans, complete } = this.#renderer.render(viewState, { layers: this.#layers, light: this.#light, requiredKinds: this.#findRequiredKinds(), lightEstimator: this.#lightEstimator, moving }, this.transitionCamera && ((scene) => { this.transition?.draw({ ...scene, camera: viewState.camera, tilesChanged }); }));
+    this.#debug.update(plans, viewState.dpr, this.#renderer.drawer);
+    if (before !== viewState.camera || turning) this.#fireMove(before, viewState.camera);
     this.frameEvents.fire("draw", {});
-    if (this.#shade && moving) this.#redraw();
-    if (this.moving || !this.#resting || complete) this.#loop.request();
-    if (complete) this.#complete();
+    if (this.#lightEstimator && moving) this.#redraw();
+    if (this.moving || !this.#atRest || complete) this.#loop.request();
+    if (complete) this.#fireLoad();
   }
 
   /** Layers that somebody reads, besides those that are shown. */
-  #kindsRead(): LayerKind[] {
+  #findRequiredKinds(): LayerKind[] {
     return [...new Set([...(this.options.hover && !this.options.dataSaver ? ["id" as const] : []), ...[...this.#items].flatMap(({ needs }) => needs ?? [])])];
   }
 
-  #moved(before: Camera | undefined, { zoom }: Camera): void {
-    this.#resting = false;
+  #fireMove(before: Camera | undefined, { zoom }: Camera): void {
+    this.#atRest = false;
     this.frameEvents.fire("move", {});
     this.fire("move", {});
     if (before?.zoom !== zoom) this.fire("zoom", { zoom });
   }
 
-  #complete(): void {
+  #fireLoad(): void {
     if (this.#loaded) return;
     this.#loaded = true;
     this.fire("load", {});
   }
 
   /** Nothing is left to draw. */
-  #settle(): void {
+  #comeToRest(): void {
     if (this.moving) {
       this.#loop.request();
       return;
     }
-    if (!this.#resting) this.fire("moveend", {});
-    this.#resting = true;
-    if (!this.#painter?.busy && this.#loaded) this.fire("idle", {});
+    if (!this.#atRest) this.fire("moveend", {});
+    this.#atRest = true;
+    if (!this.#renderer?.busy && this.#loaded) this.fire("idle", {});
   }
 
   #redraw(): this {
@@ -377,7 +378,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     return this;
   }
 
-  #resized(): void {
+  #onResize(): void {
     const { width, height } = this.size;
     if (this.camera && (this.camera.width !== width || this.camera.height !== height)) this.setCamera({ ...this.camera, width, height });
     this.fire("resize", { width, height });
@@ -386,13 +387,13 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
 
   // Making
 
-  #makePainter(): Painter | null {
+  #createRenderer(): FrameRenderer | null {
     try {
-      return new Painter(this.#viewport, this.options, {
+      return new FrameRenderer(this.#viewport, this.options, {
         lost: () => this.fire("contextlost", {}),
         restored: () => this.fire("contextrestored", {}).#redraw(),
         replaced: () => {
-          this.#steer();
+          this.#listenToGestures();
           this.fire("contextrestored", {}).#redraw();
         },
         changed: () => this.#redraw(),
@@ -406,29 +407,29 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     }
   }
 
-  #dress(): void {
+  #addControls(): void {
     const { controlPane, overlayPane } = this.#viewport;
     overlayPane.append(this.#debug.pane);
-    if (this.options.controls) controlPane.append(controls(this), scaleBar(this));
-    if (this.options.attribution) controlPane.append(attributionLine(this));
+    if (this.options.controls) controlPane.append(createControls(this), createScaleBar(this));
+    if (this.options.attribution) controlPane.append(createAttribution(this));
   }
 
-  #listen(): void {
-    const { signal } = this.#ending;
-    this.#steer();
+  #addListeners(): void {
+    const { signal } = this.#abort;
+    this.#listenToGestures();
     signal.addEventListener("abort", () => { this.#gestures?.destroy(); });
     listenToKeys(this, signal);
-    window.addEventListener("online", () => { this.#retry(); }, { signal });
+    window.addEventListener("online", () => { this.#retryFailedTiles(); }, { signal });
   }
 
   /** Listens to hands on the canvas that is there now. */
-  #steer(): void {
+  #listenToGestures(): void {
     this.#gestures?.destroy();
     this.#gestures = new Gestures(this, this.canvas);
   }
 
-  #retry(): void {
-    for (const layer of this.#layers) layer.tiles?.forgive();
+  #retryFailedTiles(): void {
+    for (const layer of this.#layers) layer.tiles?.clearFailures();
     this.#redraw();
   }
 
@@ -438,25 +439,25 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     for (const item of this.#items) if (item instanceof marker && item !== but) item.select(false);
   }
 
-  readonly #selected = ({ marker: chosen }: { marker: marker }): void => {
+  readonly #onMarkerSelect = ({ marker: chosen }: { marker: marker }): void => {
     this.#deselectMarkers(chosen);
     this.fire("select", { marker: chosen });
   };
 
   #fireHover(point: Vec2): void {
-    this.#hover = null;
-    this.fire("mousemove", { ...(this.pickLoaded(point) ?? NOTHING), point });
+    this.#hoverPoint = null;
+    this.fire("mousemove", { ...(this.pickLoaded(point) ?? EMPTY_PICK), point });
   }
 
-  async #click(point: Vec2): Promise<void> {
-    const number = ++this.#clicks;
-    this.fire("preclick", { ...(this.pickLoaded(point) ?? { ...NOTHING, approximate: true }), point });
+  async #fireClick(point: Vec2): Promise<void> {
+    const number = ++this.#clickCount;
+    this.fire("preclick", { ...(this.pickLoaded(point) ?? { ...EMPTY_PICK, approximate: true }), point });
     const pick = await this.pick(point);
-    const event = await this.#described({ ...pick, point });
-    if (number === this.#clicks && !this.#ending.signal.aborted) this.fire("click", event);
+    const event = await this.#addAttributes({ ...pick, point });
+    if (number === this.#clickCount && !this.#abort.signal.aborted) this.fire("click", event);
   }
 
-  async #described(event: ClickEvent): Promise<ClickEvent> {
+  async #addAttributes(event: ClickEvent): Promise<ClickEvent> {
     try {
       const object = await event.layer?.object(event.id);
       return object ? { ...event, name: object.name, class: object.class, attributes: object.attributes } : event;

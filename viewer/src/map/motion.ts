@@ -2,14 +2,14 @@ import { clamp, type Vec2 } from "../core/vec";
 import { cssPixelM, zoomedAt, type Camera } from "../geo/camera";
 
 /** A movement under way: gives the camera at a time, null when it has ended. */
-type Movement = (now_ms: number, camera: Camera) => Camera | null;
+type CameraAnimation = (now_ms: number, camera: Camera) => Camera | null;
 
 const FRICTION_MS = 260;
 const WHEEL_MS = 70;
 
 /** Moves the camera over time: flights, wheel zoom, inertia. One movement at a time; a new one takes over. */
 export class Motion {
-  #movement: Movement | null = null;
+  #animation: CameraAnimation | null = null;
   #wheel: { zoom: number; anchor: Vec2 } | null = null;
   readonly #changed: () => void;
 
@@ -19,25 +19,25 @@ export class Motion {
   }
 
   get moving(): boolean {
-    return this.#movement !== null;
+    return this.#animation !== null;
   }
 
   stop(): void {
-    this.#movement = null;
+    this.#animation = null;
     this.#wheel = null;
   }
 
   /** The camera for this moment. */
   step(now_ms: number, camera: Camera): Camera {
-    const next = this.#movement?.(now_ms, camera);
-    if (this.#movement && !next) this.stop();
+    const next = this.#animation?.(now_ms, camera);
+    if (this.#animation && !next) this.stop();
     return next ?? camera;
   }
 
   /** Straight to another camera of the same view, slowing at both ends; a fixed point stays fixed. */
   fly(from: Camera, to: Camera, duration_ms: number): void {
     const steep = to.zoom - from.zoom;
-    this.#begin((share, camera) => {
+    this.#runTimed((share, camera) => {
       const t = share * share * (3 - 2 * share);
       const way = Math.abs(steep) < 1e-6 ? t : (1 - 2 ** (-steep * t)) / (1 - 2 ** -steep);
       return { ...camera, u: from.u + (to.u - from.u) * way, v: from.v + (to.v - from.v) * way, zoom: from.zoom + steep * t };
@@ -59,7 +59,7 @@ export class Motion {
   }
 
   /** Lets the picture glide on after a drag. Velocity in CSS pixels a millisecond. */
-  glide(velocity: Vec2): void {
+  startInertia(velocity: Vec2): void {
     let last = performance.now();
     let [vx, vy] = velocity;
     this.#run((now, camera) => {
@@ -73,7 +73,7 @@ export class Motion {
     });
   }
 
-  #begin(at: (share: number, camera: Camera) => Camera, duration_ms: number): void {
+  #runTimed(at: (share: number, camera: Camera) => Camera, duration_ms: number): void {
     const start = performance.now();
     let ended = false;
     this.#run((now, camera) => {
@@ -85,8 +85,8 @@ export class Motion {
     this.#wheel = null;
   }
 
-  #run(movement: Movement): void {
-    this.#movement = movement;
+  #run(movement: CameraAnimation): void {
+    this.#animation = movement;
     this.#changed();
   }
 }

@@ -1,5 +1,4 @@
-import { readColor } from "../draw/color";
-import type { Rgb } from "../draw/drawer";
+import { parseColor, type Rgb } from "../draw/color";
 import type { DrawStyle, DrawStyles } from "../draw/drawStyle";
 
 /** How a layer's objects are shown. What is not said stays as it is. */
@@ -15,10 +14,10 @@ export interface ObjectStyle {
 }
 
 /** null: all as they are. */
-export function finishesOf({ colors, only, others = "dimmed", hidden }: ObjectStyle): DrawStyles | null {
+export function makeDrawStyles({ colors, only, others = "dimmed", hidden }: ObjectStyle): DrawStyles | null {
   const read = new Map<string, Rgb>();
   const rgbOf = (color: string): Rgb => {
-    const rgb = read.get(color) ?? readColor(color);
+    const rgb = read.get(color) ?? parseColor(color);
     read.set(color, rgb);
     return rgb;
   };

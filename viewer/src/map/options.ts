@@ -45,10 +45,10 @@ export interface MapOptions {
 }
 
 /** Those without a default of their own. */
-type Left = "center" | "zoom" | "direction" | "light" | "background" | "language" | "pixelRatio" | "cacheBytes";
-export type FilledOptions = MapOptions & Required<Omit<MapOptions, Left | "dataSaver">> & { dataSaver: boolean };
+type WithoutDefault = "center" | "zoom" | "direction" | "light" | "background" | "language" | "pixelRatio" | "cacheBytes";
+export type FilledOptions = MapOptions & Required<Omit<MapOptions, WithoutDefault | "dataSaver">> & { dataSaver: boolean };
 
-export const DEFAULTS: Required<Omit<MapOptions, Left>> = {
+export const DEFAULTS: Required<Omit<MapOptions, WithoutDefault>> = {
   controls: true,
   attribution: true,
   hover: false,

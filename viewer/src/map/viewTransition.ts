@@ -25,7 +25,7 @@ export interface TransitionFrame {
   /** What the map looks along. */
   readonly camera: Camera;
   /** Tiles have come since the last frame. */
-  readonly changed: boolean;
+  readonly tilesChanged: boolean;
   /** All that the camera's view shows is here. */
   readonly complete: boolean;
   /** Least and greatest D of all that is on the map. */

@@ -9,7 +9,7 @@ export interface Size {
   readonly dpr: number;
 }
 
-const PLACEMENT = ["top", "right", "bottom", "left", "z-index", "flex-grow", "flex-shrink", "flex-basis", "align-self", "justify-self", "grid-area", "order"];
+const LAYOUT_PROPERTIES = ["top", "right", "bottom", "left", "z-index", "flex-grow", "flex-shrink", "flex-basis", "align-self", "justify-self", "grid-area", "order"];
 
 /** The map's place in the page: the canvas, wrapped in a container that takes the canvas's place in the layout. */
 export class Viewport {
@@ -25,7 +25,7 @@ export class Viewport {
   constructor(target: string | HTMLElement, resized: () => void) {
     const found = typeof target === "string" ? document.getElementById(target) : target;
     if (!found) throw new UsageError(`no element has the id "${typeof target === "string" ? target : ""}"; give the id of a <canvas> that is in the page`);
-    ({ container: this.container, canvas: this.#canvas, unwrap: this.#unwrap } = found instanceof HTMLCanvasElement ? wrap(found) : fill(found));
+    ({ container: this.container, canvas: this.#canvas, unwrap: this.#unwrap } = found instanceof HTMLCanvasElement ? wrapCanvas(found) : fillElement(found));
     this.container.append(this.overlayPane, this.controlPane);
     this.#size = this.#measure();
     this.#observer = new ResizeObserver(() => {
@@ -72,7 +72,7 @@ export class Viewport {
   }
 }
 
-interface Wrapped {
+interface WrappedCanvas {
   container: HTMLElement;
   canvas: HTMLCanvasElement;
   /** Undoes it for the canvas that is there now. */
@@ -83,7 +83,7 @@ interface Wrapped {
  * Puts a container where the canvas was. A side that the page gives in per cent, or not at all, becomes the
  * container's; a side that it gives as a length (px, vh, …) stays the canvas's own, and the container follows.
  */
-function wrap(canvas: HTMLCanvasElement): Wrapped {
+function wrapCanvas(canvas: HTMLCanvasElement): WrappedCanvas {
   const container = element("div", "map3d");
   const before = canvas.style.cssText;
   canvas.style.display = "none"; // so that computed sizes are those of the style sheet, not of the layout
@@ -91,10 +91,10 @@ function wrap(canvas: HTMLCanvasElement): Wrapped {
   const out = style.position === "absolute" || style.position === "fixed";
   container.style.position = out ? style.position : "relative";
   container.style.margin = style.margin;
-  for (const name of PLACEMENT) container.style.setProperty(name, style.getPropertyValue(name));
+  for (const name of LAYOUT_PROPERTIES) container.style.setProperty(name, style.getPropertyValue(name));
   const sides = (["width", "height"] as const).map((side) => [side, style[side]] as const);
   canvas.style.cssText = `${before};display:block;position:static;margin:0;`;
-  for (const [side, value] of sides) placeSide(container, canvas, side, value);
+  for (const [side, value] of sides) sizeSide(container, canvas, side, value);
   canvas.replaceWith(container);
   container.append(canvas);
   const unwrap = (last: HTMLCanvasElement): void => {
@@ -104,14 +104,14 @@ function wrap(canvas: HTMLCanvasElement): Wrapped {
   return { container, canvas, unwrap };
 }
 
-function placeSide(container: HTMLElement, canvas: HTMLCanvasElement, side: "width" | "height", value: string): void {
+function sizeSide(container: HTMLElement, canvas: HTMLCanvasElement, side: "width" | "height", value: string): void {
   const own = !value.includes("%") && value !== "auto";
   container.style[side] = own ? "fit-content" : value === "auto" ? `${String(canvas[side])}px` : value;
   if (!own) canvas.style[side] = "100%";
 }
 
 /** An element that is no canvas becomes the container itself. */
-function fill(container: HTMLElement): Wrapped {
+function fillElement(container: HTMLElement): WrappedCanvas {
   const canvas = element("canvas", "");
   canvas.style.cssText = "display:block;width:100%;height:100%";
   container.classList.add("map3d");

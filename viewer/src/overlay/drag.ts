@@ -6,7 +6,7 @@ const STEP_PX = 10;
 const KEYS: Readonly<Record<string, Vec2>> = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
 /** Moves something that has a position over the surface: under the pointer, or by arrow keys. Where no surface is known it stays. */
-export function listenToDrags(handle: HTMLElement, map: OverlayHost, position: () => Vec3, tell: (type: "dragstart" | "drag" | "dragend", position: Vec3) => void): void {
+export function enableDragging(handle: HTMLElement, map: OverlayHost, position: () => Vec3, tell: (type: "dragstart" | "drag" | "dragend", position: Vec3) => void): void {
   let hand: { readonly id: number; readonly from: Vec2; readonly grip: Vec2; moved: boolean } | undefined;
   const place = (x: number, y: number): void => {
     const on = map.findSurfaceAt([x, y]);

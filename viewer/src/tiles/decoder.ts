@@ -1,9 +1,9 @@
 import workerCode from "worker:./decode.worker.ts";
 import { DecodeError } from "../core/errors";
-import type { Reply, Task } from "./decode.worker";
+import type { DecodeResponse, DecodeRequest } from "./decodeMessages";
 import type { TileData } from "./tileData";
 
-interface Waiting {
+interface PendingDecode {
   resolve(data: TileData): void;
   reject(reason: Error): void;
 }
@@ -13,62 +13,62 @@ const IDLE_MS = 2000;
 
 /** Decodes tiles in workers made from a blob, so that the viewer is one file. A page's CSP must allow `worker-src blob:`. */
 export class Decoder {
-  readonly #waiting = new Map<number, Waiting>();
+  readonly #pending = new Map<number, PendingDecode>();
   readonly #workers: Worker[] = [];
   readonly #size: number;
   #url: string | undefined;
-  #tickets = 0;
-  #ending: ReturnType<typeof setTimeout> | undefined;
+  #requestCount = 0;
+  #idleTimer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(workers: number) {
     this.#size = Math.max(1, workers);
   }
 
   decode(kind: string, mediaType: string, bytes: ArrayBuffer): Promise<TileData> {
-    const ticket = this.#tickets++;
-    const worker = this.#workers[ticket % this.#size] ?? this.#start();
-    clearTimeout(this.#ending);
+    const id = this.#requestCount++;
+    const worker = this.#workers[id % this.#size] ?? this.#startWorker();
+    clearTimeout(this.#idleTimer);
     return new Promise((resolve, reject) => {
-      this.#waiting.set(ticket, { resolve, reject });
-      const task: Task = { ticket, kind, mediaType, bytes };
+      this.#pending.set(id, { resolve, reject });
+      const task: DecodeRequest = { id, kind, mediaType, bytes };
       worker.postMessage(task, [bytes]);
     });
   }
 
   stop(): void {
-    this.#end();
+    this.#endWorkers();
     if (this.#url) URL.revokeObjectURL(this.#url);
-    this.#fail("the map was removed");
+    this.#rejectAll("the map was removed");
   }
 
-  #end(): void {
-    clearTimeout(this.#ending);
+  #endWorkers(): void {
+    clearTimeout(this.#idleTimer);
     for (const worker of this.#workers.splice(0)) worker.terminate();
   }
 
-  #start(): Worker {
+  #startWorker(): Worker {
     this.#url ??= URL.createObjectURL(new Blob([workerCode], { type: "text/javascript" }));
     const worker = new Worker(this.#url, { name: "map3d decoder" });
-    worker.onmessage = ({ data }: MessageEvent<Reply>) => {
+    worker.onmessage = ({ data }: MessageEvent<DecodeResponse>) => {
       this.#settle(data);
     };
     worker.onerror = (event) => {
-      this.#fail(`the tile decoder cannot run: ${event.message || "blocked; the page's Content-Security-Policy needs worker-src blob:"}`);
+      this.#rejectAll(`the tile decoder cannot run: ${event.message || "blocked; the page's Content-Security-Policy needs worker-src blob:"}`);
     };
     this.#workers.push(worker);
     return worker;
   }
 
-  #settle(reply: Reply): void {
-    const waiting = this.#waiting.get(reply.ticket);
-    this.#waiting.delete(reply.ticket);
+  #settle(reply: DecodeResponse): void {
+    const waiting = this.#pending.get(reply.id);
+    this.#pending.delete(reply.id);
     if ("error" in reply) waiting?.reject(new DecodeError(reply.error));
     else waiting?.resolve(reply.data);
-    if (this.#waiting.size === 0) this.#ending = setTimeout(() => { this.#end(); }, IDLE_MS);
+    if (this.#pending.size === 0) this.#idleTimer = setTimeout(() => { this.#endWorkers(); }, IDLE_MS);
   }
 
-  #fail(why: string): void {
-    for (const waiting of this.#waiting.values()) waiting.reject(new DecodeError(why));
-    this.#waiting.clear();
+  #rejectAll(why: string): void {
+    for (const waiting of this.#pending.values()) waiting.reject(new DecodeError(why));
+    this.#pending.clear();
   }
 }

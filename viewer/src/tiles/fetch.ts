@@ -12,7 +12,7 @@ export interface FetchOptions {
   /** Wait before the second try; doubled each time. */
   backoff_ms?: number | undefined;
   /** Default the browser's fetch. */
-  ask?: FetchFunction | undefined;
+  fetch?: FetchFunction | undefined;
 }
 
 /**
@@ -28,7 +28,7 @@ export async function fetchBytes(urls: readonly string[], options: FetchOptions 
       return await fetchOnce(url, options);
     } catch (reason) {
       options.signal?.throwIfAborted();
-      if (attempt + 1 >= attempts || !passing(reason)) throw reason;
+      if (attempt + 1 >= attempts || !isTransient(reason)) throw reason;
     }
     await wait(backoff_ms * 2 ** attempt, options.signal);
   }
@@ -44,11 +44,11 @@ export async function fetchJson(urls: readonly string[], options: FetchOptions =
   }
 }
 
-async function fetchOnce(url: string, { signal, range, ask = fetch }: FetchOptions): Promise<ArrayBuffer | null> {
+async function fetchOnce(url: string, { signal, range, fetch: request = fetch }: FetchOptions): Promise<ArrayBuffer | null> {
   const headers = range ? { Range: `bytes=${String(range[0])}-${String(range[0] + range[1] - 1)}` } : undefined;
   let answer: Response;
   try {
-    answer = await ask(url, { ...(signal && { signal }), ...(headers && { headers }) });
+    answer = await request(url, { ...(signal && { signal }), ...(headers && { headers }) });
   } catch (reason) {
     throw new FetchError(`${url}: no answer (${reason instanceof Error ? reason.message : String(reason)})`);
   }
@@ -58,7 +58,7 @@ async function fetchOnce(url: string, { signal, range, ask = fetch }: FetchOptio
   return answer.arrayBuffer();
 }
 
-function passing(reason: unknown): boolean {
+function isTransient(reason: unknown): boolean {
   const status = reason instanceof FetchError ? reason.status : 0;
   return status === 0 || status === 429 || status >= 500;
 }

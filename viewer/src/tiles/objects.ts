@@ -47,7 +47,7 @@ interface Column {
 }
 
 type Shard = Readonly<Record<string, ObjectInfo>>;
-const SHARDS_KEPT = 64;
+const MAX_SHARDS = 64;
 
 /** Attributes of objects by id, fetched a shard at a time. */
 export class Objects {
@@ -55,7 +55,7 @@ export class Objects {
   readonly #json: ManifestJson;
   readonly #shards = new Map<number, Promise<Shard>>();
   /** What has been fetched, or is on the way. */
-  readonly #kept = new Map<string, Promise<unknown>>();
+  readonly #files = new Map<string, Promise<unknown>>();
 
   constructor(source: Pick<Source, "json">, json: ManifestJson) {
     this.#source = source;
@@ -63,10 +63,10 @@ export class Objects {
   }
 
   /** null when the rendering has no attributes of this object. */
-  async get(id: number): Promise<ObjectInfo | null> {
+  async find(id: number): Promise<ObjectInfo | null> {
     const { objects } = this.#json;
     if (!objects || id <= 0) return null;
-    const shard = await this.#shard(Math.floor(id / objects.shard_size), objects.shards);
+    const shard = await this.#fetchShard(Math.floor(id / objects.shard_size), objects.shards);
     return Object.hasOwn(shard, String(id)) ? (shard[String(id)] ?? null) : null;
   }
 
@@ -74,14 +74,14 @@ export class Objects {
   search(): Promise<readonly SearchEntry[]> {
     const path = this.#json.objects?.search;
     if (path === undefined) return Promise.resolve([]);
-    return this.#once<{ entries: SearchEntry[] }>(path, "search").then((file) => file?.entries ?? []);
+    return this.#fetchOnce<{ entries: SearchEntry[] }>(path, "search").then((file) => file?.entries ?? []);
   }
 
   /** All attributes; none when the rendering does not list them. */
   attributes(): Promise<readonly AttributeInfo[]> {
     const path = this.#json.objects?.attributes;
     if (path === undefined) return Promise.resolve([]);
-    return this.#once<{ attributes: AttributeInfo[] }>(path, "attributes").then((file) => file?.attributes ?? []);
+    return this.#fetchOnce<{ attributes: AttributeInfo[] }>(path, "attributes").then((file) => file?.attributes ?? []);
   }
 
   /** Values by id; none when there is no such column. */
@@ -92,24 +92,24 @@ export class Objects {
     return new Map((file?.ids ?? []).slice(0, values.length).map((id, k) => [id, values[k] as AttributeValue]));
   }
 
-  #shard(number: number, template: string): Promise<Shard> {
+  #fetchShard(number: number, template: string): Promise<Shard> {
     const known = this.#shards.get(number);
     if (known) return known;
     const shard = this.#fetch<{ objects: Shard }>(template.replace("{shard}", String(number)), "objects").then((file) => file?.objects ?? {});
     this.#shards.set(number, shard);
     shard.catch(() => this.#shards.delete(number));
     const oldest = this.#shards.keys().next();
-    if (this.#shards.size > SHARDS_KEPT && !oldest.done) this.#shards.delete(oldest.value);
+    if (this.#shards.size > MAX_SHARDS && !oldest.done) this.#shards.delete(oldest.value);
     return shard;
   }
 
   /** A file that is kept; one that could not be had is asked for again. */
-  #once<T>(path: string, what: string): Promise<T | null> {
-    const known = this.#kept.get(path) as Promise<T | null> | undefined;
+  #fetchOnce<T>(path: string, what: string): Promise<T | null> {
+    const known = this.#files.get(path) as Promise<T | null> | undefined;
     if (known) return known;
     const file = this.#fetch<T>(path, what);
-    this.#kept.set(path, file);
-    file.catch(() => this.#kept.delete(path));
+    this.#files.set(path, file);
+    file.catch(() => this.#files.delete(path));
     return file;
   }
 

@@ -4,7 +4,7 @@ import type { Tile } from "../geo/frame";
 /** Reads `length` bytes of an archive from `offset`. */
 export type ReadRange = (offset: number, length: number, signal?: AbortSignal) => Promise<ArrayBuffer>;
 
-interface Entry {
+interface DirectoryEntry {
   readonly id: number;
   readonly offset: number;
   readonly length: number;
@@ -12,7 +12,7 @@ interface Entry {
   readonly run: number;
 }
 
-interface Header {
+interface ArchiveHeader {
   readonly root: readonly [number, number];
   readonly leaves: number;
   readonly tiles: number;
@@ -44,8 +44,8 @@ export function tileId({ z, x, y }: Tile): number {
 export class Archive {
   readonly #read: ReadRange;
   readonly #name: string;
-  readonly #directories = new Map<number, Promise<Entry[]>>();
-  #header: Promise<Header> | undefined;
+  readonly #directories = new Map<number, Promise<DirectoryEntry[]>>();
+  #header: Promise<ArchiveHeader> | undefined;
 
   constructor(name: string, read: ReadRange) {
     this.#name = name;
@@ -58,20 +58,20 @@ export class Archive {
     const id = tileId(tile);
     let [offset, length] = header.root;
     for (let depth = 0; depth < DEPTH_LIMIT; depth++) {
-      const entry = find(await this.#directory(header, offset, length), id);
+      const entry = findEntry(await this.#directory(header, offset, length), id);
       if (!entry) return null;
-      if (entry.run > 0) return this.#unpack(await this.#read(header.tiles + entry.offset, entry.length, signal), header.compression);
+      if (entry.run > 0) return this.#decompress(await this.#read(header.tiles + entry.offset, entry.length, signal), header.compression);
       [offset, length] = [header.leaves + entry.offset, entry.length];
     }
     throw new FetchError(`${this.#name}: directories are nested deeper than ${String(DEPTH_LIMIT)}`);
   }
 
-  async #open(): Promise<Header> {
+  async #open(): Promise<ArchiveHeader> {
     try {
       const bytes = await this.#read(0, FIRST_READ_BYTES);
       const header = readHeader(bytes, this.#name);
       const [offset, length] = header.root;
-      if (offset + length <= bytes.byteLength) void this.#keep(header, offset, Promise.resolve(bytes.slice(offset, offset + length)));
+      if (offset + length <= bytes.byteLength) void this.#parseDirectory(header, offset, Promise.resolve(bytes.slice(offset, offset + length)));
       return header;
     } catch (reason) {
       this.#header = undefined;
@@ -79,25 +79,25 @@ export class Archive {
     }
   }
 
-  #directory(header: Header, offset: number, length: number): Promise<Entry[]> {
-    return this.#directories.get(offset) ?? this.#keep(header, offset, this.#read(offset, length));
+  #directory(header: ArchiveHeader, offset: number, length: number): Promise<DirectoryEntry[]> {
+    return this.#directories.get(offset) ?? this.#parseDirectory(header, offset, this.#read(offset, length));
   }
 
-  #keep(header: Header, offset: number, bytes: Promise<ArrayBuffer>): Promise<Entry[]> {
-    const entries = bytes.then((packed) => this.#unpack(packed, header.internal)).then((plain) => readDirectory(new Uint8Array(plain)));
+  #parseDirectory(header: ArchiveHeader, offset: number, bytes: Promise<ArrayBuffer>): Promise<DirectoryEntry[]> {
+    const entries = bytes.then((packed) => this.#decompress(packed, header.internal)).then((plain) => readDirectory(new Uint8Array(plain)));
     this.#directories.set(offset, entries);
     entries.catch(() => this.#directories.delete(offset));
     return entries;
   }
 
-  async #unpack(bytes: ArrayBuffer, compression: number): Promise<ArrayBuffer> {
+  async #decompress(bytes: ArrayBuffer, compression: number): Promise<ArrayBuffer> {
     if (compression <= 1) return bytes;
     if (compression !== 2) throw new FetchError(`${this.#name}: compression ${String(compression)}; this viewer reads 1 (none) and 2 (gzip)`);
     return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
   }
 }
 
-function readHeader(bytes: ArrayBuffer, name: string): Header {
+function readHeader(bytes: ArrayBuffer, name: string): ArchiveHeader {
   const view = new DataView(bytes);
   if (bytes.byteLength < HEADER_BYTES || view.getUint32(0) !== 0x504d5469 || view.getUint8(7) !== 3) {
     throw new FetchError(`${name}: no PMTiles archive of version 3`);
@@ -106,7 +106,7 @@ function readHeader(bytes: ArrayBuffer, name: string): Header {
   return { root: [long(8), long(16)], leaves: long(40), tiles: long(56), internal: view.getUint8(97), compression: view.getUint8(98) };
 }
 
-function readDirectory(bytes: Uint8Array): Entry[] {
+function readDirectory(bytes: Uint8Array): DirectoryEntry[] {
   let at = 0;
   const varint = (): number => {
     for (let value = 0, place = 1; ; place *= 128) {
@@ -120,11 +120,11 @@ function readDirectory(bytes: Uint8Array): Entry[] {
   const n = varint();
   if (n > bytes.length) throw new FetchError(`a PMTiles directory of ${String(bytes.length)} bytes claims ${String(n)} entries`);
   const [steps, runs, lengths, offsets] = [column(n), column(n), column(n), column(n)];
-  return entriesOf(steps, runs, lengths, offsets);
+  return makeEntries(steps, runs, lengths, offsets);
 }
 
-function entriesOf(steps: number[], runs: number[], lengths: number[], offsets: number[]): Entry[] {
-  const entries: Entry[] = [];
+function makeEntries(steps: number[], runs: number[], lengths: number[], offsets: number[]): DirectoryEntry[] {
+  const entries: DirectoryEntry[] = [];
   let id = 0;
   steps.forEach((step, k) => {
     id += step;
@@ -136,7 +136,7 @@ function entriesOf(steps: number[], runs: number[], lengths: number[], offsets: 
 }
 
 /** The last entry at or before the id, when it holds it. */
-function find(entries: Entry[], id: number): Entry | null {
+function findEntry(entries: DirectoryEntry[], id: number): DirectoryEntry | null {
   let [low, high] = [0, entries.length];
   while (low < high) {
     const middle = (low + high) >> 1;

@@ -4,14 +4,14 @@ import { DecodeError } from "../core/errors";
 type Channels = 1 | 2 | 3 | 4;
 
 /** Pixels row by row from the top. */
-export interface Pixels {
+export interface DecodedPng {
   readonly width: number;
   readonly height: number;
   readonly channels: Channels;
   readonly data: Uint8Array<ArrayBuffer>;
 }
 
-interface Header {
+interface PngHeader {
   width: number;
   height: number;
   channels: Channels;
@@ -29,7 +29,7 @@ const SIDE_LIMIT = 4096;
  * verified, those of the chunks are not.
  * @throws DecodeError
  */
-export async function decodePng(bytes: Uint8Array<ArrayBuffer>): Promise<Pixels> {
+export async function decodePng(bytes: Uint8Array<ArrayBuffer>): Promise<DecodedPng> {
   const { header, parts } = readChunks(bytes);
   const { width, height, channels } = header;
   const stride = width * channels;
@@ -39,11 +39,11 @@ export async function decodePng(bytes: Uint8Array<ArrayBuffer>): Promise<Pixels>
   return { width, height, channels, data: raw.subarray(0, height * stride) };
 }
 
-function readChunks(bytes: Uint8Array<ArrayBuffer>): { header: Header; parts: Uint8Array<ArrayBuffer>[] } {
+function readChunks(bytes: Uint8Array<ArrayBuffer>): { header: PngHeader; parts: Uint8Array<ArrayBuffer>[] } {
   if (!SIGNATURE.every((byte, k) => bytes[k] === byte)) throw new DecodeError(`no PNG: ${String(bytes.length)} bytes without its signature`);
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const parts: Uint8Array<ArrayBuffer>[] = [];
-  let header: Header | undefined;
+  let header: PngHeader | undefined;
   for (let at = 8; at + 12 <= bytes.length; ) {
     const length = view.getUint32(at);
     const name = String.fromCharCode(...bytes.subarray(at + 4, at + 8));
@@ -57,7 +57,7 @@ function readChunks(bytes: Uint8Array<ArrayBuffer>): { header: Header; parts: Ui
   return { header, parts };
 }
 
-function readHeader(view: DataView, at: number, length: number): Header {
+function readHeader(view: DataView, at: number, length: number): PngHeader {
   if (length !== 13) throw new DecodeError(`IHDR of ${String(length)} bytes, expected 13`);
   const [width, height] = [view.getUint32(at), view.getUint32(at + 4)];
   const [depth, type, interlace] = [view.getUint8(at + 8), view.getUint8(at + 9), view.getUint8(at + 12)];
@@ -134,11 +134,11 @@ const paeth: Unfilter = (out, from, to, n, c, above) => {
   for (let i = 0; i < c; i++) out[to + i] = (out[from + i] as number) + (out[to + i - n] as number);
   for (let i = c; i < n; i++) {
     const at = to + i;
-    out[at] = (out[from + i] as number) + nearest(out[at - c] as number, out[at - n] as number, out[at - n - c] as number);
+    out[at] = (out[from + i] as number) + predictPaeth(out[at - c] as number, out[at - n] as number, out[at - n - c] as number);
   }
 };
 
-function nearest(a: number, b: number, c: number): number {
+function predictPaeth(a: number, b: number, c: number): number {
   const pa = Math.abs(b - c);
   const pb = Math.abs(a - c);
   const pc = Math.abs(a + b - 2 * c);

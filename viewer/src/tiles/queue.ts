@@ -1,9 +1,9 @@
-export interface Job {
+export interface TileRequest {
   readonly key: string;
   run(signal: AbortSignal): Promise<void>;
 }
 
-interface Running {
+interface RunningRequest {
   readonly abort: AbortController;
   readonly done: Promise<void>;
   /** Somebody waits for it: not to be aborted when it leaves the view. */
@@ -11,10 +11,10 @@ interface Running {
 }
 
 /** Runs what is wanted, at most `limit` jobs at once, and aborts what is wanted no longer. */
-export class Queue {
-  readonly #running = new Map<string, Running>();
+export class RequestQueue {
+  readonly #running = new Map<string, RunningRequest>();
   readonly #limit: number;
-  #waiting: Job[] = [];
+  #waiting: TileRequest[] = [];
 
   constructor(limit: number) {
     this.#limit = limit;
@@ -25,7 +25,7 @@ export class Queue {
   }
 
   /** All that is wanted from now on, most urgent first. */
-  want(jobs: readonly Job[]): void {
+  setRequests(jobs: readonly TileRequest[]): void {
     const keys = new Map([...jobs].reverse().map((job) => [job.key, job]));
     for (const [key, running] of [...this.#running]) {
       if (keys.has(key) || running.kept) continue;
@@ -37,7 +37,7 @@ export class Queue {
   }
 
   /** Runs a job at once, beside the limit; joins it when it runs already. Settles when it has ended. */
-  need(job: Job): Promise<void> {
+  runNow(job: TileRequest): Promise<void> {
     const running = this.#running.get(job.key) ?? this.#start(job);
     this.#waiting = this.#waiting.filter((other) => other.key !== job.key);
     running.kept = true;
@@ -52,13 +52,13 @@ export class Queue {
     }
   }
 
-  #start(job: Job): Running {
+  #start(job: TileRequest): RunningRequest {
     const abort = new AbortController();
     const done = job.run(abort.signal).finally(() => {
       if (this.#running.get(job.key) === running) this.#running.delete(job.key);
       this.#fill();
     });
-    const running: Running = { abort, done, kept: false };
+    const running: RunningRequest = { abort, done, kept: false };
     this.#running.set(job.key, running);
     return running;
   }

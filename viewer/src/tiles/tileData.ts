@@ -13,9 +13,9 @@ export type TileData =
   /** values: a bit for each sun */
   | { readonly kind: "sun16"; readonly width: number; readonly height: number; readonly values: Uint16Array<ArrayBuffer> };
 
-type Kind = TileData["kind"];
+type TileKind = TileData["kind"];
 /** Bytes of a pixel in a layer's PNG; none for pictures that the browser decodes. */
-const CHANNELS: Readonly<Record<Kind, number>> = { color: 0, picture: 0, normal: 3, id: 4, depth: 4, depth2: 4, sun: 1, ao: 1, sun16: 2 };
+const CHANNELS: Readonly<Record<TileKind, number>> = { color: 0, picture: 0, normal: 3, id: 4, depth: 4, depth2: 4, sun: 1, ao: 1, sun16: 2 };
 
 export const NO_DEPTH = 0xffffffff;
 
@@ -31,16 +31,16 @@ export async function decodeTile(kind: string, mediaType: string, bytes: ArrayBu
   return { kind, width, height, values: new Uint32Array(data.buffer, data.byteOffset, data.byteLength / 4) };
 }
 
-const isKind = (kind: string): kind is Kind => Object.hasOwn(CHANNELS, kind);
+const isKind = (kind: string): kind is TileKind => Object.hasOwn(CHANNELS, kind);
 
 /**
  * What of a tile is moved to another thread. Pictures are copied: WebKitGTK 2.50 gives WebGL nothing of one that has been moved.
  */
-export function transferable(data: TileData): Transferable[] {
+export function listTransferables(data: TileData): Transferable[] {
   return "bitmap" in data ? [] : [data.values.buffer];
 }
 
-export const bytesOf = (data: TileData): number => data.width * data.height * (CHANNELS[data.kind] || 4);
+export const computeBytes = (data: TileData): number => data.width * data.height * (CHANNELS[data.kind] || 4);
 
 async function decodeColor(kind: "color" | "picture", mediaType: string, bytes: ArrayBuffer): Promise<TileData> {
   const blob = new Blob([bytes], { type: mediaType });

@@ -1,7 +1,7 @@
 import { tileName, type Tile } from "../geo/frame";
 
 /** A base URL without its trailing slash; "." and relative ones are taken from `page`. */
-export function baseUrl(url: string, page: string): string {
+export function normalizeBaseUrl(url: string, page: string): string {
   const full = new URL(url === "" ? "." : url, page);
   full.hash = "";
   full.search = "";
@@ -9,7 +9,7 @@ export function baseUrl(url: string, page: string): string {
 }
 
 /** The host (an index) that serves a tile: always the same one, so that caches work; neighbours differ. */
-export const hostOf = ({ z, x, y }: Tile, hosts: number): number => (x + 2 * y + z) % hosts;
+export const chooseHost = ({ z, x, y }: Tile, hosts: number): number => (x + 2 * y + z) % hosts;
 
 /** `<base>/<view>/<layer>/<z>/<x>/<y>?v=<block version>` */
 export function tileUrl(base: string, view: string, layer: string, tile: Tile, version: number): string {
@@ -18,6 +18,6 @@ export function tileUrl(base: string, view: string, layer: string, tile: Tile, v
 
 /** All places to ask for a tile, its own host first: the others are asked when that one fails. */
 export function tileUrls(bases: readonly string[], view: string, layer: string, tile: Tile, version: number): string[] {
-  const first = hostOf(tile, bases.length);
+  const first = chooseHost(tile, bases.length);
   return bases.map((_, k) => tileUrl(bases[(first + k) % bases.length] ?? "", view, layer, tile, version));
 }

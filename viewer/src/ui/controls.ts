@@ -2,7 +2,7 @@ import { element, iconButton } from "../core/dom";
 import { getMapMessages, type MapMessages } from "../core/i18n";
 
 /** What the buttons need of a map. */
-export interface Steering {
+export interface ControlledMap {
   readonly zoom: number;
   readonly zoomLimits: readonly [number, number];
   readonly lookAt_deg: number;
@@ -25,14 +25,14 @@ const PART = "M9 4v5H4M20 9h-5V4M15 20v-5h5M4 15h5v5";
 const RIGHT = "M20 10a8 8 0 1 0-2.3 7.6M20 4v6h-6";
 
 /** Zoom buttons, a compass with buttons that turn the view when there are several, and one that fills the screen where that can be done. */
-export function controls(map: Steering): HTMLElement {
+export function createControls(map: ControlledMap): HTMLElement {
   const words = getMapMessages(map.language);
   const whole = document.fullscreenEnabled ? [screenGroup(map, words)] : [];
   return element("div", "map3d-buttons", {}, ...whole, turnGroup(map, words), zoomGroup(map, words));
 }
 
 /** The whole page fills the screen, with all that lies on the map. */
-function screenGroup({ container }: Steering, words: MapMessages): HTMLElement {
+function screenGroup({ container }: ControlledMap, words: MapMessages): HTMLElement {
   const button = iconButton("", words.fill, WHOLE);
   const group = element("div", "map3d-group", { role: "group", "aria-label": words.screen }, button);
   const isWhole = (): boolean => document.fullscreenElement !== null;
@@ -49,7 +49,7 @@ function screenGroup({ container }: Steering, words: MapMessages): HTMLElement {
   return group;
 }
 
-function zoomGroup(map: Steering, words: MapMessages): HTMLElement {
+function zoomGroup(map: ControlledMap, words: MapMessages): HTMLElement {
   const [inward, outward] = [iconButton("", words.zoomIn, PLUS), iconButton("", words.zoomOut, MINUS)];
   inward.addEventListener("click", () => map.zoomIn());
   outward.addEventListener("click", () => map.zoomOut());
@@ -61,7 +61,7 @@ function zoomGroup(map: Steering, words: MapMessages): HTMLElement {
   return element("div", "map3d-group", { role: "group", "aria-label": words.zoom }, inward, outward);
 }
 
-function turnGroup(map: Steering, words: MapMessages): HTMLElement {
+function turnGroup(map: ControlledMap, words: MapMessages): HTMLElement {
   const [left, right, compass] = [iconButton("", words.left, LEFT), iconButton("", words.right, RIGHT), compassButton(words)];
   const group = element("div", "map3d-group", { role: "group", "aria-label": words.direction }, compass, left, right);
   left.addEventListener("click", () => map.rotate(1));
@@ -72,7 +72,7 @@ function turnGroup(map: Steering, words: MapMessages): HTMLElement {
   });
   map.on("directionchange", () => {
     (compass.firstElementChild as SVGElement).style.transform = `rotate(${String(map.lookAt_deg)}deg)`;
-    compass.setAttribute("aria-label", words.looking(words.winds[windOf(map.lookAt_deg)] as string));
+    compass.setAttribute("aria-label", words.looking(words.winds[computeWind(map.lookAt_deg)] as string));
     left.hidden = right.hidden = map.directions.length < 2;
   });
   return group;
@@ -91,6 +91,6 @@ function compassButton({ north }: MapMessages): HTMLButtonElement {
 }
 
 /** The wind's place among the eight, counter-clockwise from north, of a look-at angle. */
-export const windOf = (lookAtDeg: number): number => Math.round((((lookAtDeg % 360) + 360) % 360) / 45) % 8;
+export const computeWind = (lookAtDeg: number): number => Math.round((((lookAtDeg % 360) + 360) % 360) / 45) % 8;
 
 const fromNorth = (deg: number): number => Math.min(deg, 360 - deg);

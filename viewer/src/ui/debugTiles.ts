@@ -5,10 +5,10 @@ import type { LayerInfo, View } from "../geo/manifest";
 import type { LayerTiles } from "../tiles/layerTiles";
 
 /** What a layer paints. */
-interface Painted {
+interface DebugLayer {
   readonly view: View;
   readonly layers: ReadonlyMap<string, LayerInfo>;
-  readonly store: Pick<LayerTiles, "sent">;
+  readonly store: Pick<LayerTiles, "getTransfer">;
   readonly quads: readonly Quad[];
 }
 
@@ -30,17 +30,17 @@ export class DebugTiles {
     if (!on) this.pane.replaceChildren();
   }
 
-  update(plans: readonly Painted[], dpr: number, { name, note }: Pick<Drawer, "name" | "note">): void {
+  update(plans: readonly DebugLayer[], dpr: number, { name, note }: Pick<Drawer, "name" | "note">): void {
     if (!this.#on) return;
     const boxes = plans.flatMap((plan) => plan.quads.map((quad) => outline(plan, quad, dpr)));
     this.pane.replaceChildren(...boxes, element("p", "", {}, note ? `${name}: ${note}` : name));
   }
 }
 
-function outline({ view, layers, store }: Painted, { from, rect: [left, top, right, bottom], scale }: Quad, dpr: number): HTMLElement {
+function outline({ view, layers, store }: DebugLayer, { from, rect: [left, top, right, bottom], scale }: Quad, dpr: number): HTMLElement {
   const now = performance.now();
   const told = [...layers.values()].flatMap((layer) => {
-    const sent = store.sent(view, layer, from);
+    const sent = store.getTransfer(view, layer, from);
     return sent ? [`${layer.name} ${(sent.bytes / 1000).toFixed(1)} kB, ${((now - sent.at_ms) / 1000).toFixed(0)} s`] : [];
   });
   const box = element("div", "", {}, [`${tileName(from)} × ${(1 / scale).toFixed(2)}`, ...told].join("\n"));

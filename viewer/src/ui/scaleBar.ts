@@ -3,7 +3,7 @@ import { SCALE_BAR_MAX_PX, formatLength, floorToRound } from "../core/lengths";
 import { getMapMessages } from "../core/i18n";
 
 /** What the bar needs of a map. */
-export interface Scaled {
+export interface ScaledMap {
   /** Metres a CSS pixel, across the screen; 0 while there is nothing to see. */
   readonly metresPerPixel: number;
   readonly language: string;
@@ -11,7 +11,7 @@ export interface Scaled {
 }
 
 /** A bar as long as a round number of metres. It holds across the screen everywhere; upwards the ground is foreshortened. */
-export function scaleBar(map: Scaled): HTMLElement {
+export function createScaleBar(map: ScaledMap): HTMLElement {
   const words = getMapMessages(map.language);
   const text = element("span", "");
   const bar = element("div", "map3d-scale", { role: "img" }, text);

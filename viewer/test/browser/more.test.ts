@@ -210,7 +210,7 @@ test("a pick whose deepest tile cannot be had is approximate", async () => {
     const view = layer.rendering?.views.get("0-45");
     for (const kind of ["id", "depth"]) {
       const info = layer.rendering?.layers.get(kind);
-      if (view && info) await layer.tiles?.need(view, info, { z: 0, x: 0, y: 0 });
+      if (view && info) await layer.tiles?.fetch(view, info, { z: 0, x: 0, y: 0 });
     }
     const { id, position, approximate } = await map.pick(map.project([x - 45, y - 4, z + 34]) as [number, number]);
     return { id, position, approximate };

@@ -3,7 +3,7 @@ import { resolve } from "node:path";
 import { expect, test } from "vitest";
 import { chooseLanguage, MESSAGE_KEYS } from "../../page/i18n";
 import { getMapMessages } from "../../src/core/i18n";
-import { windOf } from "../../src/ui/controls";
+import { computeWind } from "../../src/ui/controls";
 
 test.each([
   [["de-CH", "en"], "de-CH"],
@@ -32,5 +32,5 @@ test.each(["en", "de", "fr", "de-AT", "it", ""])("%s: every control has a name, 
 
 test("winds count counter-clockwise", () => {
   const { winds } = getMapMessages("en");
-  expect([0, 45, 90, 179, 270, 340, -90, 720].map((deg) => winds[windOf(deg)])).toEqual(["north", "north-west", "west", "south", "east", "north", "east", "north"]);
+  expect([0, 45, 90, 179, 270, 340, -90, 720].map((deg) => winds[computeWind(deg)])).toEqual(["north", "north-west", "west", "south", "east", "north", "east", "north"]);
 });

@@ -3,11 +3,11 @@ import { PMTiles, zxyToTileId, type Source as PmSource } from "pmtiles";
 import { gzipSync } from "node:zlib";
 import { makeFrame, type Tile } from "../../src/geo/frame";
 import { Cache } from "../../src/tiles/cache";
-import { coverOf, fromTheMiddle, levelFor, standsFor, type Rect } from "../../src/tiles/cover";
+import { findCover, sortFromCenter, computeLevel, findFallbacks, type Rect } from "../../src/tiles/cover";
 import { fetchBytes } from "../../src/tiles/fetch";
 import { Archive, tileId } from "../../src/tiles/pmtiles";
-import { Queue, type Job } from "../../src/tiles/queue";
-import { baseUrl, hostOf, tileUrl, tileUrls } from "../../src/tiles/url";
+import { RequestQueue, type TileRequest } from "../../src/tiles/queue";
+import { normalizeBaseUrl, chooseHost, tileUrl, tileUrls } from "../../src/tiles/url";
 
 const frame = makeFrame({ id: "0-45", look_at_deg: 0, pitch_deg: 45, u0_m: -512, v0_m: 512, d0_m: 0 }, 1024, 256, 4);
 const area = ({ z }: Tile): number => (frame.size / 2 ** z) ** 2;
@@ -16,7 +16,7 @@ describe("cover", () => {
   const rect: Rect = [[-100.5, -333], [260.25, 120]];
 
   test.each([0, 1, 2, 3, 4])("tiles of level %i partition the viewport", (level) => {
-    const tiles = coverOf(frame, () => true, level, rect);
+    const tiles = findCover(frame, () => true, level, rect);
     const tile_m = frame.size / 2 ** level;
     for (let k = 0; k < 400; k++) {
       const [u, v] = [rect[0][0] + ((k * 0.618) % 1) * (rect[1][0] - rect[0][0]), rect[0][1] + ((k * 0.414) % 1) * (rect[1][1] - rect[0][1])];
@@ -31,30 +31,30 @@ describe("cover", () => {
 
   test("none lies outside the occupancy, or the square", () => {
     const occupied = ({ x, y }: Tile): boolean => (x + y) % 2 === 0;
-    const tiles = coverOf(frame, occupied, 3, [[-5000, -5000], [5000, 5000]]);
+    const tiles = findCover(frame, occupied, 3, [[-5000, -5000], [5000, 5000]]);
     expect(tiles).toHaveLength(32);
     expect(tiles.every(occupied)).toBe(true);
   });
 
   test("a viewport beside the square has no tiles", () => {
-    expect(coverOf(frame, () => true, 4, [[600, 600], [700, 700]])).toEqual([]);
+    expect(findCover(frame, () => true, 4, [[600, 600], [700, 700]])).toEqual([]);
   });
 
   test("the middle comes first", () => {
-    const ordered = fromTheMiddle(frame, coverOf(frame, () => true, 2, [[-512, -512], [512, 512]]), [[256, 256], [512, 512]]);
+    const ordered = sortFromCenter(frame, findCover(frame, () => true, 2, [[-512, -512], [512, 512]]), [[256, 256], [512, 512]]);
     expect(ordered[0]).toEqual({ z: 2, x: 3, y: 0 });
   });
 });
 
 describe("level", () => {
   test.each([[1, 1, 2], [0.5, 1, 3], [0.7, 1, 3], [0.72, 1, 2], [0.01, 1, 4], [1000, 1, 0]])("a device pixel of %d m at ratio %d shows level %d", (px, dpr, level) => {
-    expect(levelFor(frame, px, dpr)).toBe(level);
+    expect(computeLevel(frame, px, dpr)).toBe(level);
   });
 
   test("on dense screens a tile pixel covers one to two device pixels", () => {
     for (let zoom = 0.05; zoom < 4; zoom += 0.05) {
       const device = 4 / 2 ** zoom;
-      const scale = 4 / 2 ** levelFor(frame, device, 3) / device;
+      const scale = 4 / 2 ** computeLevel(frame, device, 3) / device;
       expect(scale).toBeGreaterThan(0.999);
       expect(scale).toBeLessThan(2.001);
     }
@@ -67,21 +67,21 @@ describe("stand-ins", () => {
   const tile = { z: 3, x: 5, y: 2 };
 
   test("a tile that is ready stands for itself", () => {
-    expect(standsFor(tile, all, all)).toEqual([{ area: tile, from: tile }]);
+    expect(findFallbacks(tile, all, all)).toEqual([{ area: tile, from: tile }]);
   });
 
   test("else the nearest ancestor does", () => {
-    expect(standsFor(tile, only("1/1/0", "0/0/0"), all)).toEqual([{ area: tile, from: { z: 1, x: 1, y: 0 } }]);
+    expect(findFallbacks(tile, only("1/1/0", "0/0/0"), all)).toEqual([{ area: tile, from: { z: 1, x: 1, y: 0 } }]);
   });
 
   test("children that are ready come before ancestors; together all fill the tile once", () => {
-    const stands = standsFor(tile, only("4/10/4", "5/23/11", "1/1/0"), all);
+    const stands = findFallbacks(tile, only("4/10/4", "5/23/11", "1/1/0"), all);
     expect(stands.reduce((sum, stand) => sum + area(stand.area), 0)).toBeCloseTo(area(tile), 6);
     expect(stands.map(({ from }) => from.z).sort()).toEqual([1, 1, 1, 1, 1, 4, 5].sort());
   });
 
   test("nothing is ready: nothing is drawn", () => {
-    expect(standsFor(tile, () => false, all)).toEqual([]);
+    expect(findFallbacks(tile, () => false, all)).toEqual([]);
   });
 });
 
@@ -90,7 +90,7 @@ describe("cache", () => {
     const dropped: string[] = [];
     const cache = new Cache<number>(100, (key) => dropped.push(key));
     for (let k = 0; k < 50; k++) {
-      cache.tick();
+      cache.startTick();
       cache.set(String(k), k, 7 + (k % 5));
       expect(cache.bytes).toBeLessThanOrEqual(100);
     }
@@ -103,15 +103,15 @@ describe("cache", () => {
     cache.set("a", 1, 10);
     cache.set("b", 2, 10);
     cache.set("c", 3, 10);
-    cache.tick();
+    cache.startTick();
     cache.get("a");
     cache.set("d", 4, 10);
     expect([cache.peek("a"), cache.peek("b"), cache.peek("d")]).toEqual([1, undefined, 4]);
     cache.set("e", 5, 100);
     expect(cache.peek("a")).toBe(1);
     expect(cache.bytes).toBe(120);
-    cache.tick();
-    cache.tick();
+    cache.startTick();
+    cache.startTick();
     expect(cache.bytes).toBeLessThanOrEqual(30);
   });
 
@@ -120,12 +120,12 @@ describe("cache", () => {
     const cache = new Cache<number>(30, (key) => dropped.push(key));
     for (const key of ["a", "b", "c", "d", "e"]) cache.set(key, 1, 20);
     for (let k = 0; k < 3; k++) {
-      cache.tick();
+      cache.startTick();
       for (const key of ["e", "d", "c", "b", "a"]) expect(cache.get(key)).toBe(1);
     }
-    cache.tick();
+    cache.startTick();
     cache.get("c");
-    cache.tick();
+    cache.startTick();
     expect([dropped.length, cache.peek("c")]).toEqual([4, 1]);
   });
 
@@ -146,14 +146,14 @@ describe("URLs", () => {
   });
 
   test.each([["http://t1/tiles/teatime/", "http://t1/tiles/teatime"], [".", "http://p/a"], ["", "http://p/a"], ["../b", "http://p/b"], ["/c/?x=1#y", "http://p/c"]])("base %s", (url, want) => {
-    expect(baseUrl(url, "http://p/a/index.html")).toBe(want);
+    expect(normalizeBaseUrl(url, "http://p/a/index.html")).toBe(want);
   });
 
   test("a tile always has the same host, neighbours others, and all hosts are used", () => {
-    const hosts = [0, 1, 2, 3].map((x) => hostOf({ z: 5, x, y: 9 }, 4));
+    const hosts = [0, 1, 2, 3].map((x) => chooseHost({ z: 5, x, y: 9 }, 4));
     expect(new Set(hosts).size).toBe(4);
-    expect(hostOf({ z: 5, x: 2, y: 9 }, 4)).toBe(hosts[2]);
-    expect(hostOf({ z: 5, x: 2, y: 10 }, 4)).not.toBe(hosts[2]);
+    expect(chooseHost({ z: 5, x: 2, y: 9 }, 4)).toBe(hosts[2]);
+    expect(chooseHost({ z: 5, x: 2, y: 10 }, 4)).not.toBe(hosts[2]);
     expect(new Set(tileUrls(["http://a", "http://b"], "0-45", "id", { z: 0, x: 0, y: 0 }, 1)).size).toBe(2);
   });
 });
@@ -204,9 +204,9 @@ describe("fetch", () => {
 });
 
 describe("queue", () => {
-  const world = (): { started: string[]; aborted: string[]; end: Map<string, () => void>; job: (key: string) => Job } => {
+  const world = (): { started: string[]; aborted: string[]; end: Map<string, () => void>; job: (key: string) => TileRequest } => {
     const [started, aborted, end] = [[] as string[], [] as string[], new Map<string, () => void>()];
-    const job = (key: string): Job => ({
+    const job = (key: string): TileRequest => ({
       key,
       run: (signal) => {
         started.push(key);
@@ -220,8 +220,8 @@ describe("queue", () => {
 
   test("at most the limit runs at once, in order, each once", async () => {
     const { started, end, job } = world();
-    const queue = new Queue(2);
-    queue.want(["a", "b", "a", "c"].map(job));
+    const queue = new RequestQueue(2);
+    queue.setRequests(["a", "b", "a", "c"].map(job));
     expect(started).toEqual(["a", "b"]);
     end.get("a")?.();
     await turn();
@@ -230,18 +230,18 @@ describe("queue", () => {
 
   test("what is wanted no longer is aborted, unless somebody waits for it", () => {
     const { started, aborted, job } = world();
-    const queue = new Queue(4);
-    queue.want([job("a"), job("b")]);
-    void queue.need(job("b"));
-    queue.want([job("c")]);
+    const queue = new RequestQueue(4);
+    queue.setRequests([job("a"), job("b")]);
+    void queue.runNow(job("b"));
+    queue.setRequests([job("c")]);
     expect([started, aborted]).toEqual([["a", "b", "c"], ["a"]]);
   });
 
   test("it is busy until all has ended", async () => {
     const { end, job } = world();
-    const queue = new Queue(1);
+    const queue = new RequestQueue(1);
     expect(queue.busy).toBe(false);
-    queue.want([job("a")]);
+    queue.setRequests([job("a")]);
     expect(queue.busy).toBe(true);
     end.get("a")?.();
     await turn();

@@ -1,6 +1,6 @@
 import { NO_DEPTH } from "../../tiles/tileData";
 import type { Tile } from "../../geo/frame";
-import { cornerOf, firstOf, type Depths } from "../combine";
+import { computeCorner, computeDepthAtZero, type DepthMapping } from "../depthMapping";
 
 /** A tile of another layer that may hide pixels of this one. */
 export interface Mask {
@@ -18,17 +18,17 @@ export interface Mask {
 }
 
 /** Where a tile of another layer lies on one of this; null when they do not meet. */
-export function maskOf(own: Depths, tile: Tile, other: Depths, above: Tile, names: Pick<Mask, "depth" | "color">): Mask | null {
-  const [[u, v, px], [otherU, otherV, otherPx]] = [cornerOf(own, tile), cornerOf(other, above)];
+export function makeMask(own: DepthMapping, tile: Tile, other: DepthMapping, above: Tile, names: Pick<Mask, "depth" | "color">): Mask | null {
+  const [[u, v, px], [otherU, otherV, otherPx]] = [computeCorner(own, tile), computeCorner(other, above)];
   const [side, otherSide] = [own.frame.tilePx * px, other.frame.tilePx * otherPx];
   if (u + side <= otherU || otherU + otherSide <= u || v - side >= otherV || otherV - otherSide >= v) return null;
   const step = px / otherPx;
   const at = (from: number): number => from / otherPx + step / 2;
-  return { ...names, x: at(u - otherU), y: at(otherV - v), step, unit: own.unit_m / other.unit_m, first: (firstOf(own) - firstOf(other)) / other.unit_m };
+  return { ...names, x: at(u - otherU), y: at(otherV - v), step, unit: own.unit_m / other.unit_m, first: (computeDepthAtZero(own) - computeDepthAtZero(other)) / other.unit_m };
 }
 
 /** A tile that masks, as the worker has it; rows from the top. */
-export interface Masking {
+export interface MaskLayers {
   readonly mask: Mask;
   readonly width: number;
   readonly height: number;
@@ -38,8 +38,8 @@ export interface Masking {
 }
 
 /** Calls for each pixel that something of another layer hides. A pixel that is covered in part but has no depth takes that of the nearest beside it. */
-export function eachHidden(width: number, height: number, depth: Uint32Array, masks: readonly Masking[], act: (at: number) => void): void {
-  const nearest = beside(width, depth);
+export function forEachHidden(width: number, height: number, depth: Uint32Array, masks: readonly MaskLayers[], act: (at: number) => void): void {
+  const nearest = makeDepthReader(width, depth);
   for (const { mask, depth: other, color, ...size } of masks) {
     for (let j = 0; j < height; j++) {
       const y = Math.floor(mask.y + j * mask.step);
@@ -56,7 +56,7 @@ export function eachHidden(width: number, height: number, depth: Uint32Array, ma
   }
 }
 
-function beside(width: number, depth: Uint32Array): (at: number) => number {
+function makeDepthReader(width: number, depth: Uint32Array): (at: number) => number {
   const steps = [-1, 1, -width, width, -width - 1, -width + 1, width - 1, width + 1];
   return (at) => {
     const own = depth[at] as number;

@@ -1,6 +1,6 @@
 import { linkProgram } from "../../core/gl";
 import { RECT_VERTEX } from "../../core/shaders";
-import { fragment, variantName, type Variant } from "./shader";
+import { makeFragmentShader, variantName, type ShaderVariant } from "./shader";
 
 /** A linked program and where its uniforms are; those it does not use are null, which WebGL ignores. */
 export interface Program {
@@ -11,7 +11,7 @@ export interface Program {
 const UNITS = ["u_color", "u_normal", "u_id", "u_depth", "u_table", "u_ao", "u_shadow", "u_finishes", "u_shares"] as const;
 
 /** Texture unit of a sampler. */
-export const unitOf = (sampler: (typeof UNITS)[number]): number => UNITS.indexOf(sampler);
+export const textureUnit = (sampler: (typeof UNITS)[number]): number => UNITS.indexOf(sampler);
 
 /** Programs by variant, compiled when first asked for. */
 export class Programs {
@@ -23,7 +23,7 @@ export class Programs {
   }
 
   /** The program of a variant, in use from now on. @throws DrawError with the compiler's log */
-  use(variant: Variant): Program {
+  use(variant: ShaderVariant): Program {
     const name = variantName(variant);
     const program = this.#known.get(name) ?? this.#link(variant, name);
     this.#known.set(name, program);
@@ -31,8 +31,8 @@ export class Programs {
     return program;
   }
 
-  #link(variant: Variant, name: string): Program {
-    return this.#withUniforms(linkProgram(this.#gl, name, RECT_VERTEX, fragment(variant)));
+  #link(variant: ShaderVariant, name: string): Program {
+    return this.#withUniforms(linkProgram(this.#gl, name, RECT_VERTEX, makeFragmentShader(variant)));
   }
 
   #withUniforms(handle: WebGLProgram): Program {
@@ -46,7 +46,7 @@ export class Programs {
       return place;
     };
     gl.useProgram(handle);
-    for (const sampler of UNITS) gl.uniform1i(at(sampler), unitOf(sampler));
+    for (const sampler of UNITS) gl.uniform1i(at(sampler), textureUnit(sampler));
     return { handle, at };
   }
 }

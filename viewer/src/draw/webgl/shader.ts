@@ -1,30 +1,30 @@
 import type { Mode } from "../drawer";
-import { PAINT, PALE } from "../drawStyle";
+import { TINT_OPACITY, DIM_GREY } from "../drawStyle";
 import { GUTTER } from "./textures";
 
 /** What a program is made for; each combination is compiled when it is first drawn. */
-export interface Variant {
+export interface ShaderVariant {
   readonly mode: Mode;
   readonly masked: boolean;
   readonly highlight: boolean;
   /** Objects are not all shown as they are. */
-  readonly finish: boolean;
+  readonly styled: boolean;
   /** The layer with shadows, if any. */
   readonly shadow: "sun" | "sun16" | null;
   readonly occlusion: boolean;
   /** Takes part in a picture that several layers make by depth. */
   readonly combined: boolean;
   /** Light comes from the shares that were found for the whole picture. */
-  readonly shaded: boolean;
+  readonly estimatedLight: boolean;
 }
 
-export const variantName = (v: Variant): string =>
-  [v.mode, v.masked && "masked", v.highlight && "highlight", v.finish && "finish", v.shadow, v.occlusion && "ao", v.combined && "combined", v.shaded && "shaded"].filter(Boolean).join("+");
+export const variantName = (v: ShaderVariant): string =>
+  [v.mode, v.masked && "masked", v.highlight && "highlight", v.styled && "finish", v.shadow, v.occlusion && "ao", v.combined && "combined", v.estimatedLight && "shaded"].filter(Boolean).join("+");
 
-export function fragment({ mode, masked, highlight, finish, shadow, occlusion, combined, shaded }: Variant): string {
-  const names = [`MODE_${mode === "picture" ? "COLOR" : mode.toUpperCase()}`, masked && "MASKED", highlight && "HIGHLIGHT", finish && "FINISH", shadow && `SHADOW_${shadow.toUpperCase()}`, occlusion && "OCCLUSION", combined && "COMBINED", shaded && "SHADED"];
+export function makeFragmentShader({ mode, masked, highlight, styled, shadow, occlusion, combined, estimatedLight }: ShaderVariant): string {
+  const names = [`MODE_${mode === "picture" ? "COLOR" : mode.toUpperCase()}`, masked && "MASKED", highlight && "HIGHLIGHT", styled && "FINISH", shadow && `SHADOW_${shadow.toUpperCase()}`, occlusion && "OCCLUSION", combined && "COMBINED", estimatedLight && "SHADED"];
   const defines = names.filter(Boolean).map((name) => `#define ${String(name)}`);
-  return ["#version 300 es", ...defines, HEAD, FIND, DEPTH, SHADED, COLOR, FALSE_COLOR, HIGHLIGHT, COMBINED, MAIN].join("\n");
+  return ["#version 300 es", ...defines, HEAD, ID_LOOKUP, DEPTH, SHADED, COLOR, FALSE_COLOR, HIGHLIGHT, COMBINED, MAIN].join("\n");
 }
 
 const HEAD = `
@@ -55,7 +55,7 @@ ivec2 inside(ivec2 at) { return clamp(at, ivec2(0), ivec2(u_size - 1)) + GUTTER;
 `;
 
 /** Tables of ids with open addressing: R is the id, G its word; an empty place ends the search. */
-const FIND = `
+const ID_LOOKUP = `
 #if defined(HIGHLIGHT) || defined(FINISH)
 /** one: the only id and its word; id 0: see the table. mask: places − 1. */
 uint find(usampler2D table, uint id, uint mask, int probes, uvec2 one) {
@@ -85,8 +85,8 @@ uniform uint u_others;    // of ids that are not in the table
 vec4 finished(vec4 c, uint id) {
   uint word = find(u_finishes, id, u_finishMask, u_finishProbes, u_finishOne);
   uint kind = (word == 0u && id != 0u ? u_others : word) >> 24;
-  if (kind == 1u) c.rgb = mix(c.rgb, rgbOf(word), ${String(PAINT)});
-  else if (kind == 3u) c.rgb = mix(vec3(dot(c.rgb, vec3(0.2126, 0.7152, 0.0722))), vec3(${String(PALE[0])}), ${String(PALE[1])});
+  if (kind == 1u) c.rgb = mix(c.rgb, rgbOf(word), ${String(TINT_OPACITY)});
+  else if (kind == 3u) c.rgb = mix(vec3(dot(c.rgb, vec3(0.2126, 0.7152, 0.0722))), vec3(${String(DIM_GREY[0])}), ${String(DIM_GREY[1])});
   else if (kind == 4u) c.a = 0.0;
   return c;
 }

@@ -16,7 +16,7 @@ export interface TileTexture {
 export type Neighbour = (dx: number, dy: number) => string;
 
 /** Tile textures by the name of their data. */
-export class Textures {
+export class TileTextures {
   readonly #gl: WebGL2RenderingContext;
   readonly #known = new Map<string, TileTexture>();
   readonly #reader: WebGLFramebuffer;
@@ -34,7 +34,7 @@ export class Textures {
   upload(key: string, data: TileData, neighbour: Neighbour): TileTexture {
     const tile = this.#create(data);
     this.#known.set(key, tile);
-    for (const [dx, dy] of AROUND) {
+    for (const [dx, dy] of NEIGHBOURS) {
       const other = this.#known.get(neighbour(dx, dy));
       if (!other || other.width !== tile.width || other.height !== tile.height) continue;
       this.#copyEdge(other, tile, dx, dy);
@@ -106,10 +106,10 @@ export class Textures {
     gl.framebufferTexture2D(gl.READ_FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, from.texture, 0);
     gl.activeTexture(gl.TEXTURE0 + SPARE_UNIT);
     gl.bindTexture(gl.TEXTURE_2D, to.texture);
-    const [toX, fromX, w] = along(dx, to.width);
-    const [toY, fromY, h] = along(dy, to.height);
+    const [toX, fromX, w] = edgeSpan(dx, to.width);
+    const [toY, fromY, h] = edgeSpan(dy, to.height);
     gl.copyTexSubImage2D(gl.TEXTURE_2D, 0, toX, toY, fromX, fromY, w, h);
-    to.filled[side(dx, dy)] = BEST;
+    to.filled[gutterIndex(dx, dy)] = FROM_NEIGHBOUR;
     if (dx === 0 || dy === 0) this.#copyCorners(to, dx, dy, fromX, fromY);
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, null);
   }
@@ -119,10 +119,10 @@ export class Textures {
     const quality = dx === 0 ? 2 : 1;
     for (const end of [-1, 1]) {
       const [cx, cy] = dx === 0 ? [end, dy] : [dx, end];
-      if ((to.filled[side(cx, cy)] ?? 0) >= quality) continue;
-      to.filled[side(cx, cy)] = quality;
-      const [toX] = along(cx, to.width);
-      const [toY] = along(cy, to.height);
+      if ((to.filled[gutterIndex(cx, cy)] ?? 0) >= quality) continue;
+      to.filled[gutterIndex(cx, cy)] = quality;
+      const [toX] = edgeSpan(cx, to.width);
+      const [toY] = edgeSpan(cy, to.height);
       const sourceX = dx === 0 ? (end < 0 ? GUTTER : to.width) : fromX;
       const sourceY = dy === 0 ? (end < 0 ? GUTTER : to.height) : fromY;
       this.#gl.copyTexSubImage2D(this.#gl.TEXTURE_2D, 0, toX, toY, sourceX, sourceY, GUTTER, GUTTER);
@@ -130,17 +130,17 @@ export class Textures {
   }
 }
 
-const BEST = 3;
+const FROM_NEIGHBOUR = 3;
 
 /** A unit that no sampler uses. */
 export const SPARE_UNIT = 9;
 
-const AROUND = [-1, 0, 1].flatMap((dy) => [-1, 0, 1].map((dx) => [dx, dy] as const)).filter(([dx, dy]) => dx !== 0 || dy !== 0);
+const NEIGHBOURS = [-1, 0, 1].flatMap((dy) => [-1, 0, 1].map((dx) => [dx, dy] as const)).filter(([dx, dy]) => dx !== 0 || dy !== 0);
 
-const side = (dx: number, dy: number): number => dx + 1 + 3 * (dy + 1);
+const gutterIndex = (dx: number, dy: number): number => dx + 1 + 3 * (dy + 1);
 
 /** First texel to write, first texel to read in the other tile, and how many, along one axis. */
-function along(step: number, size: number): [number, number, number] {
+function edgeSpan(step: number, size: number): [number, number, number] {
   if (step < 0) return [0, size, GUTTER];
   if (step > 0) return [size + GUTTER, GUTTER, GUTTER];
   return [GUTTER, GUTTER, size];
@@ -150,7 +150,7 @@ function along(step: number, size: number): [number, number, number] {
  * Texels that may be read in all of a tile's textures, gutter included where it is filled: least x, least y, greatest x, greatest y; −1 and size are
  * the first of the gutter.
  */
-export function boundsOf(textures: readonly TileTexture[]): [number, number, number, number] {
+export function computeReadableBounds(textures: readonly TileTexture[]): [number, number, number, number] {
   const { width = 0, height = 0 } = textures[0] ?? {};
   const more = (place: number): number => (textures.every(({ filled }) => filled[place]) ? GUTTER : 0);
   return [-more(3), -more(1), width - 1 + more(5), height - 1 + more(7)];

@@ -1,5 +1,5 @@
 /** What frames are drawn in that need depth: most do not, and then the canvas has no buffer for it. Pixels are copied to the canvas as they are. */
-export class DeepCanvas {
+export class OffscreenTarget {
   readonly #gl: WebGL2RenderingContext;
   readonly #framebuffer: WebGLFramebuffer;
   readonly #buffers: readonly WebGLRenderbuffer[];
@@ -22,7 +22,7 @@ export class DeepCanvas {
   }
 
   /** Puts the picture on the canvas, which is bound then. */
-  show(): void {
+  copyToCanvas(): void {
     const { width, height } = this;
     const gl = this.#gl;
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.#framebuffer);

@@ -1,9 +1,9 @@
 import type { Frame, Tile } from "../geo/frame";
-import type { Stand } from "../tiles/cover";
+import type { TileFallback } from "../tiles/cover";
 import type { Quad } from "./drawer";
 
 /** Where the screen lies in a view: U and V of its left top corner, metres a device pixel. */
-export interface Screen {
+export interface ScreenPosition {
   readonly left: number;
   readonly top: number;
   readonly px_m: number;
@@ -13,7 +13,7 @@ export interface Screen {
  * Places tiles on the screen. An edge has the same number whichever tile or level it is computed for, so quads meet
  * without a gap. Where a tile pixel is a device pixel, edges are moved to whole pixels, so that bytes come out as stored.
  */
-export function placeQuads(frame: Frame, screen: Screen, stands: readonly Stand[], level: number): Quad[] {
+export function placeQuads(frame: Frame, screen: ScreenPosition, stands: readonly TileFallback[], level: number): Quad[] {
   const exact = frame.size / 2 ** level / screen.px_m;
   const whole = Math.abs(exact - frame.tilePx) < 1e-4;
   const atLevel = whole ? frame.tilePx : exact;

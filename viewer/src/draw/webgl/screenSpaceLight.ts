@@ -1,13 +1,13 @@
 import { dot, type Vec2, type Vec3 } from "../../core/vec";
 import { cssPixelM, type Camera } from "../../geo/camera";
 import { towardsLight } from "../../geo/light";
-import { rangeOf } from "../combine";
-import type { FrameSpec, Pass } from "../drawer";
-import { DepthPicture } from "./depthPicture";
-import { unitOf, type Program } from "./program";
+import { joinDepthRanges } from "../depthMapping";
+import type { FrameContent, Pass } from "../drawer";
+import { DepthTarget } from "./depthTarget";
+import { textureUnit, type Program } from "./program";
 
 /** What was found for a frame. */
-interface Shares {
+interface EstimatedLight {
   readonly texture: WebGLTexture;
   readonly range: Vec2;
   /** For whom it was found, and device pixels a pixel of it. */
@@ -19,13 +19,13 @@ interface Shares {
 }
 
 /** Draws a pass into what is bound, with its depth as a share of a range of D. */
-type DrawDepths = (frame: FrameSpec, pass: Pass, range: Vec2) => void;
+type DrawDepths = (frame: FrameContent, pass: Pass, range: Vec2) => void;
 
 /** Has light found that was not rendered (see draw/shade.ts), and tells the shader where it lies. */
-export class FoundLight {
+export class ScreenSpaceLight {
   readonly #gl: WebGL2RenderingContext;
-  #picture: DepthPicture | undefined;
-  #shares: Shares | null = null;
+  #depthTarget: DepthTarget | undefined;
+  #result: EstimatedLight | null = null;
 
   constructor(gl: WebGL2RenderingContext) {
     this.#gl = gl;
@@ -33,35 +33,35 @@ export class FoundLight {
 
   /** Of D, that depths of the frame are to be shares of; null when nothing was found. */
   get range(): Vec2 | null {
-    return this.#shares?.range ?? null;
+    return this.#result?.range ?? null;
   }
 
   /** Makes ready what the frame shows; nothing where all that is wanted was rendered. */
-  find(frame: FrameSpec, draw: DrawDepths): void {
-    const { shade, camera } = frame;
+  update(frame: FrameContent, draw: DrawDepths): void {
+    const { lighting, camera } = frame;
     const step = Math.max(1, frame.dpr);
-    const last = this.#shares;
-    if (!shade || !frame.passes.some((pass) => isWanting(frame, pass))) this.#shares = null;
-    else if (!shade.moving || frame.into || last?.camera.frame !== camera.frame || last.step !== step) this.#shares = this.#found(frame, shade, step, draw);
+    const last = this.#result;
+    if (!lighting || !frame.passes.some((pass) => needsEstimate(frame, pass))) this.#result = null;
+    else if (!lighting.moving || frame.target || last?.camera.frame !== camera.frame || last.step !== step) this.#result = this.#estimate(frame, lighting, step, draw);
   }
 
   /** Does a pass need what was found? */
-  lights(frame: FrameSpec, pass: Pass): boolean {
-    return this.#shares !== null && isWanting(frame, pass);
+  appliesTo(frame: FrameContent, pass: Pass): boolean {
+    return this.#result !== null && needsEstimate(frame, pass);
   }
 
   free(): void {
-    this.#picture?.free();
-    this.#picture = undefined;
-    this.#shares = null;
+    this.#depthTarget?.free();
+    this.#depthTarget = undefined;
+    this.#result = null;
   }
 
   /** Sets the program's uniforms but those of depth. */
-  bind(program: Program, frame: FrameSpec, { baked }: Pass): void {
-    const [gl, shares] = [this.#gl, this.#shares];
+  bind(program: Program, frame: FrameContent, { bakedLight }: Pass): void {
+    const [gl, shares] = [this.#gl, this.#result];
     if (!shares) return;
     const { texture, camera, step, height, same } = shares;
-    gl.activeTexture(gl.TEXTURE0 + unitOf("u_shares"));
+    gl.activeTexture(gl.TEXTURE0 + textureUnit("u_shares"));
     gl.bindTexture(gl.TEXTURE_2D, texture);
     const now = frame.camera;
     const [px, times] = [cssPixelM(camera), frame.dpr / step];
@@ -69,16 +69,16 @@ export class FoundLight {
     const [x, y] = [(now.u - camera.u) / px + camera.width / 2 - (larger * now.width) / 2, (camera.v - now.v) / px + camera.height / 2 - (larger * now.height) / 2];
     gl.uniform4f(program.at("u_onto"), larger / step, x * times, y * times, height);
     gl.uniform1f(program.at("u_same"), same);
-    gl.uniform2i(program.at("u_found"), Number(frame.light.occlusion && !baked.occlusion), Number(hasShadows(frame) && !baked.shadow));
+    gl.uniform2i(program.at("u_found"), Number(frame.light.occlusion && !bakedLight.occlusion), Number(hasShadows(frame) && !bakedLight.shadow));
   }
 
-  #found(frame: FrameSpec, { by }: NonNullable<FrameSpec["shade"]>, step: number, draw: DrawDepths): Shares {
+  #estimate(frame: FrameContent, { by }: NonNullable<FrameContent["lighting"]>, step: number, draw: DrawDepths): EstimatedLight {
     const gl = this.#gl;
     const { light, camera } = frame;
     const [width, height] = [Math.ceil(frame.width / step), Math.ceil(frame.height / step)];
-    const range = frame.into?.range ?? (rangeOf(frame.passes.flatMap(({ relief }) => relief ?? []), guestRanges(frame)) as Vec2);
+    const range = frame.target?.range ?? (joinDepthRanges(frame.passes.flatMap(({ relief }) => relief ?? []), listCustomLayerRanges(frame)) as Vec2);
     const px_m = (cssPixelM(camera) * step) / frame.dpr;
-    const picture = this.#pictureOf(width, height);
+    const picture = this.#getDepthTarget(width, height);
     gl.bindFramebuffer(gl.FRAMEBUFFER, picture.framebuffer);
     gl.viewport(0, 0, width, height);
     gl.depthMask(true);
@@ -86,7 +86,7 @@ export class FoundLight {
     gl.clear(gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LEQUAL);
-    for (const pass of frame.passes) if (pass.relief && pass.opacity === 1) draw({ ...frame, width, height }, depthsAlone(pass, step), range);
+    for (const pass of frame.passes) if (pass.relief && pass.opacity === 1) draw({ ...frame, width, height }, makeDepthPass(pass, step), range);
     const { right, up, forward } = camera.frame.axes;
     const towards = towardsLight(light);
     const sun: Vec3 | null = hasShadows(frame) ? [dot(right, towards), dot(up, towards), dot(forward, towards)] : null;
@@ -95,29 +95,29 @@ export class FoundLight {
     return { texture, range, camera, step, height, same: (2 * px_m) / (range[1] - range[0]) + 1 / 65535 };
   }
 
-  #pictureOf(width: number, height: number): DepthPicture {
-    if (this.#picture?.width === width && this.#picture.height === height) return this.#picture;
-    this.#picture?.free();
-    return (this.#picture = new DepthPicture(this.#gl, width, height));
+  #getDepthTarget(width: number, height: number): DepthTarget {
+    if (this.#depthTarget?.width === width && this.#depthTarget.height === height) return this.#depthTarget;
+    this.#depthTarget?.free();
+    return (this.#depthTarget = new DepthTarget(this.#gl, width, height));
   }
 }
 
 /** Least and greatest D of a frame's guests. */
-export const guestRanges = ({ customLayers, camera }: FrameSpec): Vec2[] => customLayers.flatMap((guest) => {
+export const listCustomLayerRanges = ({ customLayers, camera }: FrameContent): Vec2[] => customLayers.flatMap((guest) => {
   const range = guest.getDepthRange(camera.frame);
   return range ? [range] : [];
 });
 
-const hasShadows = ({ light }: FrameSpec): boolean => light.shadows && light.altitude_deg > 0;
+const hasShadows = ({ light }: FrameContent): boolean => light.shadows && light.altitude_deg > 0;
 
 /** Is there light that was not rendered, and a way to find it? */
-function isWanting(frame: FrameSpec, { mode, relief, baked }: Pass): boolean {
-  const { light, shade } = frame;
-  return shade !== undefined && shade !== null && relief !== null && mode === "lit" && light.lit && ((light.occlusion && !baked.occlusion) || (hasShadows(frame) && !baked.shadow));
+function needsEstimate(frame: FrameContent, { mode, relief, bakedLight }: Pass): boolean {
+  const { light, lighting } = frame;
+  return lighting !== undefined && lighting !== null && relief !== null && mode === "lit" && light.lit && ((light.occlusion && !bakedLight.occlusion) || (hasShadows(frame) && !bakedLight.shadow));
 }
 
 /** A pass that draws depths alone, on a screen whose pixels are `step` times as large. */
-function depthsAlone(pass: Pass, step: number): Pass {
+function makeDepthPass(pass: Pass, step: number): Pass {
   const quads = pass.quads.map(({ from, rect: [left, top, right, bottom], origin: [x, y], scale }) => ({ from, rect: [left / step, top / step, right / step, bottom / step] as const, origin: [x / step, y / step] as const, scale: scale * step }));
   return { ...pass, mode: "depth", quads, highlight: new Map(), depths: pass.relief };
 }

@@ -1,118 +1,118 @@
-import type { Rgb } from "../drawer";
-import { packFinish, PAINT, PALE, type DrawStyles } from "../drawStyle";
-import type { Look } from "./look";
-import { lightOn, type Lamp, type Shades } from "./lightOn";
-import { eachHidden, type Masking } from "./mask";
+import type { Rgb } from "../color";
+import { packStyle, TINT_OPACITY, DIM_GREY, type DrawStyles } from "../drawStyle";
+import type { ShadingOptions } from "./shadingOptions";
+import { computeTileLight, type Lamp, type LightLayers } from "./tileLight";
+import { forEachHidden, type MaskLayers } from "./mask";
 
 /** A tile's layers; pixels row by row from the top. */
-export interface Layers {
+export interface TileLayers {
   readonly width: number;
   readonly height: number;
   /** RGBA, straight alpha. */
   readonly color?: Uint8ClampedArray | undefined;
-  readonly shades?: Shades | undefined;
+  readonly lightLayers?: LightLayers | undefined;
   readonly id?: Uint32Array | undefined;
   readonly depth?: Uint32Array | undefined;
 }
 
 /** Of the tiles to the left, to the right, above and below, as far as they are here. */
-export type Beside<T> = readonly (T | undefined)[];
+export type Neighbours<T> = readonly (T | undefined)[];
 
-export interface Around {
-  readonly shades: Beside<Shades>;
-  readonly id: Beside<Uint32Array>;
+export interface TileNeighbours {
+  readonly lightLayers: Neighbours<LightLayers>;
+  readonly id: Neighbours<Uint32Array>;
   /** Tiles of other layers that may hide this one's pixels. */
-  readonly masks: readonly Masking[];
+  readonly masks: readonly MaskLayers[];
 }
 
 /** What is said of objects by id. */
-export interface Said {
+export interface StylesById {
   readonly colors: ReadonlyMap<number, Rgb> | undefined;
-  readonly finishes: DrawStyles | undefined;
+  readonly styles: DrawStyles | undefined;
 }
 
 type Bytes = Uint8ClampedArray<ArrayBuffer>;
 
 /** RGBA with straight alpha: what the fragment shader of the WebGL drawer makes at the middle of each tile pixel. */
-export function shade(look: Look, layers: Layers, around: Around, { colors, finishes }: Said): Bytes {
+export function shadeTile(look: ShadingOptions, layers: TileLayers, around: TileNeighbours, { colors, styles }: StylesById): Bytes {
   const out: Bytes = new Uint8ClampedArray(layers.width * layers.height * 4);
-  if (look.mode === "normal") showNormals(out, layers);
-  else if (look.mode === "id") showIds(out, layers);
-  else if (look.mode === "depth") showDepths(out, layers, look.depthRange ?? [0, 1]);
-  else showColors(out, look, layers, around, finishes);
-  if (colors && layers.id) highlight(out, look, layers, around, colors);
-  if (layers.depth) eachHidden(layers.width, layers.height, layers.depth, around.masks, (at) => (out[4 * at + 3] = 0));
+  if (look.mode === "normal") paintNormals(out, layers);
+  else if (look.mode === "id") paintIds(out, layers);
+  else if (look.mode === "depth") paintDepths(out, layers, look.depthRange ?? [0, 1]);
+  else paintColors(out, look, layers, around, styles);
+  if (colors && layers.id) paintHighlights(out, look, layers, around, colors);
+  if (layers.depth) forEachHidden(layers.width, layers.height, layers.depth, around.masks, (at) => (out[4 * at + 3] = 0));
   return out;
 }
 
 /** Linear light of an sRGB byte, 0..65535. */
-const LINEAR = Float32Array.from({ length: 256 }, (_, byte) => 65535 * linear(byte / 255));
+const LINEAR = Float32Array.from({ length: 256 }, (_, byte) => 65535 * toLinear(byte / 255));
 /** sRGB byte of linear light, 0..65535. */
-const BYTE = Uint8ClampedArray.from({ length: 65536 }, (_, light) => 255 * srgb(light / 65535));
+const BYTE = Uint8ClampedArray.from({ length: 65536 }, (_, light) => 255 * toSrgb(light / 65535));
 
-function linear(c: number): number {
+function toLinear(c: number): number {
   return c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4;
 }
 
-function srgb(c: number): number {
+function toSrgb(c: number): number {
   return c <= 0.0031308 ? c * 12.92 : 1.055 * c ** (1 / 2.4) - 0.055;
 }
 
-function showColors(out: Bytes, look: Look, layers: Layers, around: Around, finishes: DrawStyles | undefined): void {
+function paintColors(out: Bytes, look: ShadingOptions, layers: TileLayers, around: TileNeighbours, finishes: DrawStyles | undefined): void {
   const { color = out, id } = layers;
   out.set(color);
   for (let at = 0; look.masked && id && at < id.length; at++) out[4 * at + 3] = id[at] === 0 ? 0 : 255;
-  if (finishes && id) finish(out, id, finishes);
-  if (!look.light || !layers.shades) return;
-  const shares = lightOn(look.light, layers.width, layers.height, layers.shades, around.shades);
-  const [red, green, blue] = ([0, 1, 2] as const).map((channel) => strengthIn(look.light as Lamp, channel)) as [Strength, Strength, Strength];
+  if (finishes && id) applyStyles(out, id, finishes);
+  if (!look.light || !layers.lightLayers) return;
+  const shares = computeTileLight(look.light, layers.width, layers.height, layers.lightLayers, around.lightLayers);
+  const [red, green, blue] = ([0, 1, 2] as const).map((channel) => makeLightMixer(look.light as Lamp, channel)) as [LightMixer, LightMixer, LightMixer];
   for (let at = 0, k = 0; at < shares.length; at += 2, k += 4) {
     const [sky, sun] = [shares[at] as number, shares[at + 1] as number];
-    out[k] = litByte(out[k] as number, red(sky, sun));
-    out[k + 1] = litByte(out[k + 1] as number, green(sky, sun));
-    out[k + 2] = litByte(out[k + 2] as number, blue(sky, sun));
+    out[k] = lightByte(out[k] as number, red(sky, sun));
+    out[k + 1] = lightByte(out[k + 1] as number, green(sky, sun));
+    out[k + 2] = lightByte(out[k + 2] as number, blue(sky, sun));
   }
 }
 
 /** As the shader's `finished`. */
-function finish(out: Bytes, id: Uint32Array, finishes: DrawStyles): void {
-  eachFinished(id, finishes, (at, word) => {
+function applyStyles(out: Bytes, id: Uint32Array, finishes: DrawStyles): void {
+  forEachStyled(id, finishes, (at, word) => {
     const k = 4 * at;
     const kind = word >>> 24;
     if (kind === 4) out[k + 3] = 0;
-    const grey = kind === 3 ? (0.2126 * (out[k] as number) + 0.7152 * (out[k + 1] as number) + 0.0722 * (out[k + 2] as number)) * (1 - PALE[1]) + 255 * PALE[0] * PALE[1] : 0;
+    const grey = kind === 3 ? (0.2126 * (out[k] as number) + 0.7152 * (out[k + 1] as number) + 0.0722 * (out[k + 2] as number)) * (1 - DIM_GREY[1]) + 255 * DIM_GREY[0] * DIM_GREY[1] : 0;
     for (let c = 0; c < 3 && (kind === 1 || kind === 3); c++) {
       const own = out[k + c] as number;
-      out[k + c] = kind === 3 ? grey : own + (((word >> (8 * c)) & 255) - own) * PAINT;
+      out[k + c] = kind === 3 ? grey : own + (((word >> (8 * c)) & 255) - own) * TINT_OPACITY;
     }
   });
 }
 
 /** Pixels of objects that are not shown as they are: where, and the finish as the shader has it. */
-export function eachFinished(id: Uint32Array, { byId, others }: DrawStyles, act: (at: number, word: number) => void): void {
+export function forEachStyled(id: Uint32Array, { byId, others }: DrawStyles, act: (at: number, word: number) => void): void {
   let [last, word] = [0, 0];
   for (let at = 0; at < id.length; at++) {
     const own = id[at] as number;
-    if (own !== last) [last, word] = [own, own === 0 ? 0 : packFinish(byId.get(own) ?? others)];
+    if (own !== last) [last, word] = [own, own === 0 ? 0 : packStyle(byId.get(own) ?? others)];
     if (own !== 0 && word >>> 24 !== 2) act(at, word);
   }
 }
 
-type Strength = (sky: number, sun: number) => number;
+type LightMixer = (sky: number, sun: number) => number;
 
 /** Linear light in a channel, of shares of the sky's and the sun's. */
-export function strengthIn({ sky, beam }: Lamp, channel: 0 | 1 | 2): Strength {
+export function makeLightMixer({ sky, beam }: Lamp, channel: 0 | 1 | 2): LightMixer {
   const [of, from] = [sky[channel], beam[channel]];
   return (share, lit) => of * share + from * lit;
 }
 
-function litByte(byte: number, strength: number): number {
+function lightByte(byte: number, strength: number): number {
   const light = (LINEAR[byte] as number) * strength + 0.5;
   return BYTE[light < 65535 ? light | 0 : 65535] as number;
 }
 
-function showNormals(out: Bytes, { shades }: Layers): void {
-  const normal = shades?.normal;
+function paintNormals(out: Bytes, { lightLayers }: TileLayers): void {
+  const normal = lightLayers?.normal;
   for (let k = 0, from = 0; normal && k < out.length; k += 4, from += 3) {
     const [r, g, b] = [normal[from] as number, normal[from + 1] as number, normal[from + 2] as number];
     out[k] = r;
@@ -122,18 +122,18 @@ function showNormals(out: Bytes, { shades }: Layers): void {
   }
 }
 
-function showIds(out: Bytes, { id }: Layers): void {
+function paintIds(out: Bytes, { id }: TileLayers): void {
   const words = new Uint32Array(out.buffer);
   let [last, word] = [0, 0];
   for (let at = 0; id && at < words.length; at++) {
     const own = id[at] as number;
-    if (own !== last) [last, word] = [own, own === 0 ? 0 : packed(colorOfId(own))];
+    if (own !== last) [last, word] = [own, own === 0 ? 0 : packRgba(computeIdColor(own))];
     words[at] = word;
   }
 }
 
 /** Pale, and the same for an id everywhere. */
-export function colorOfId(id: number): Rgb {
+export function computeIdColor(id: number): Rgb {
   const h = Math.imul(id, 0x9e3779b9) >>> 0;
   const grey = 0.5 + (0.4 * ((h >>> 12) & 1023)) / 1023;
   const hue = (shift: number): number => 0.5 + 0.5 * Math.cos(6.2831853 * ((h >>> 22) / 1024 + shift));
@@ -144,7 +144,7 @@ const NEAR: Rgb = [0.99, 0.91, 0.7];
 const MIDDLE: Rgb = [0.36, 0.62, 0.62];
 const FAR: Rgb = [0.16, 0.18, 0.36];
 
-function showDepths(out: Bytes, { depth }: Layers, [first, last]: readonly [number, number]): void {
+function paintDepths(out: Bytes, { depth }: TileLayers, [first, last]: readonly [number, number]): void {
   for (let at = 0, k = 0; depth && at < depth.length; at++, k += 4) {
     const d = depth[at] as number;
     if (d === 0xffffffff) continue;
@@ -158,8 +158,8 @@ function showDepths(out: Bytes, { depth }: Layers, [first, last]: readonly [numb
   }
 }
 
-function highlight(out: Bytes, look: Look, layers: Layers, around: Around, colors: ReadonlyMap<number, Rgb>): void {
-  eachHighlighted(look, layers, around, colors, (at, tint, rim) => {
+function paintHighlights(out: Bytes, look: ShadingOptions, layers: TileLayers, around: TileNeighbours, colors: ReadonlyMap<number, Rgb>): void {
+  forEachHighlighted(look, layers, around, colors, (at, tint, rim) => {
     const k = 4 * at;
     const [r, g, b] = out[k + 3] === 0 ? [0, 0, 0] : [out[k] as number, out[k + 1] as number, out[k + 2] as number];
     const grey = (0.2126 * r + 0.7152 * g + 0.0722 * b) / 255;
@@ -172,10 +172,10 @@ function highlight(out: Bytes, look: Look, layers: Layers, around: Around, color
 }
 
 /** Pixels of objects that have a colour: where, which, and whether another object is near. */
-export function eachHighlighted(look: Look, layers: Layers, around: Around, colors: ReadonlyMap<number, Rgb>, act: (at: number, tint: Rgb, rim: boolean) => void): void {
+export function forEachHighlighted(look: ShadingOptions, layers: TileLayers, around: TileNeighbours, colors: ReadonlyMap<number, Rgb>, act: (at: number, tint: Rgb, rim: boolean) => void): void {
   const { width, height, id } = layers;
   if (!id) return;
-  const idAt = idsAround(width, height, id, around.id);
+  const idAt = makeIdReader(width, height, id, around.id);
   const [more, less] = look.rim;
   let last = 0;
   let tint: Rgb | undefined;
@@ -190,20 +190,20 @@ export function eachHighlighted(look: Look, layers: Layers, around: Around, colo
 }
 
 /** Pixels of the tiles beside it that are looked at; the WebGL drawer's gutter. */
-const REACH = 2;
+const GUTTER_PX = 2;
 
 /** The id at a pixel of the tile or, beyond one edge of it, of the tile there; without that, of the tile's edge. */
-function idsAround(width: number, height: number, id: Uint32Array, [left, right, above, below]: Beside<Uint32Array>): (x: number, y: number) => number {
+function makeIdReader(width: number, height: number, id: Uint32Array, [left, right, above, below]: Neighbours<Uint32Array>): (x: number, y: number) => number {
   return (x, y) => {
-    if (x < 0) return left ? (left[y * width + width + Math.max(x, -REACH)] as number) : (id[y * width] as number);
-    if (x >= width) return right ? (right[y * width + Math.min(x - width, REACH - 1)] as number) : (id[y * width + width - 1] as number);
-    if (y < 0) return above ? (above[(height + Math.max(y, -REACH)) * width + x] as number) : (id[x] as number);
-    if (y >= height) return below ? (below[Math.min(y - height, REACH - 1) * width + x] as number) : (id[(height - 1) * width + x] as number);
+    if (x < 0) return left ? (left[y * width + width + Math.max(x, -GUTTER_PX)] as number) : (id[y * width] as number);
+    if (x >= width) return right ? (right[y * width + Math.min(x - width, GUTTER_PX - 1)] as number) : (id[y * width + width - 1] as number);
+    if (y < 0) return above ? (above[(height + Math.max(y, -GUTTER_PX)) * width + x] as number) : (id[x] as number);
+    if (y >= height) return below ? (below[Math.min(y - height, GUTTER_PX - 1) * width + x] as number) : (id[(height - 1) * width + x] as number);
     return id[y * width + x] as number;
   };
 }
 
 /** Little-endian RGBA, opaque. */
-export function packed([r, g, b]: Rgb): number {
+export function packRgba([r, g, b]: Rgb): number {
   return (Math.round(255 * r) | (Math.round(255 * g) << 8) | (Math.round(255 * b) << 16) | (255 << 24)) >>> 0;
 }

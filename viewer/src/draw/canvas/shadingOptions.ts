@@ -4,10 +4,10 @@ import type { LayerKind } from "../../geo/manifest";
 import type { Vec2, Vec3 } from "../../core/vec";
 import type { Shadow } from "../../geo/shadows";
 import type { Mask } from "./mask";
-import { neededKinds, type BakedLight, type FrameSpec, type Mode, type Pass } from "../drawer";
+import { listRequiredKinds, type BakedLight, type FrameContent, type Mode, type Pass } from "../drawer";
 
 /** Of lit tiles. */
-interface Lamp {
+interface TileLight {
   /** Unit vector towards the sun. */
   readonly sun: Vec3;
   /** Linear light, RGB: everywhere, and of the sun on a surface that faces it. */
@@ -18,14 +18,14 @@ interface Lamp {
 }
 
 /** All that a tile's picture depends on besides the tile. */
-export interface Look {
+export interface ShadingOptions {
   readonly mode: Mode;
   readonly masked: boolean;
-  readonly light: Lamp | null;
+  readonly light: TileLight | null;
   /** Under this name the worker has the colours of highlighted ids. */
   readonly highlight: string | null;
   /** Under this name it has the finishes of objects. */
-  readonly finish: string | null;
+  readonly styles: string | null;
   /** A highlight's rim: pixels to the right and below, to the left and above (negative), at which the id differs. */
   readonly rim: Vec2;
   readonly depthRange: Vec2 | null;
@@ -36,52 +36,52 @@ export interface Look {
 }
 
 /** Kinds that a picture is made from. Without ids neither highlights nor finishes are shown. */
-export function kindsOf(look: Look): LayerKind[] {
-  const needed = neededKinds(look.mode, look.masked, look.combined);
-  return [...needed, ...bakedKindsOf(look), ...((look.highlight !== null || look.finish !== null) && !needed.includes("id") ? ["id" as const] : [])];
+export function listKinds(look: ShadingOptions): LayerKind[] {
+  const needed = listRequiredKinds(look.mode, look.masked, look.combined);
+  return [...needed, ...listBakedKinds(look), ...((look.highlight !== null || look.styles !== null) && !needed.includes("id") ? ["id" as const] : [])];
 }
 
 /** Rendered light; what is not here is done without. */
-function bakedKindsOf({ light }: Look): LayerKind[] {
+function listBakedKinds({ light }: ShadingOptions): LayerKind[] {
   return [...(light?.shadow ? [light.shadow.kind] : []), ...(light?.occlusion ? ["ao" as const] : [])];
 }
 
 /** The look of a picture for which some layers are not here. */
-export function lookWith(look: Look, has: (kind: LayerKind) => boolean): Look {
-  const { light, highlight, finish } = look;
+export function restrictOptions(look: ShadingOptions, has: (kind: LayerKind) => boolean): ShadingOptions {
+  const { light, highlight, styles } = look;
   const lamp = light && { ...light, occlusion: light.occlusion && has("ao"), shadow: light.shadow && has(light.shadow.kind) ? light.shadow : null };
-  return { ...look, light: lamp, highlight: has("id") ? highlight : null, finish: has("id") ? finish : null };
+  return { ...look, light: lamp, highlight: has("id") ? highlight : null, styles: has("id") ? styles : null };
 }
 
 /** Kinds of which the pixels beyond the tile's edge count, too. */
-export function kindsBeside(look: Look): LayerKind[] {
-  return [...(look.light ? ["normal" as const, ...bakedKindsOf(look)] : []), ...(look.highlight === null ? [] : ["id" as const])];
+export function listNeighbourKinds(look: ShadingOptions): LayerKind[] {
+  return [...(look.light ? ["normal" as const, ...listBakedKinds(look)] : []), ...(look.highlight === null ? [] : ["id" as const])];
 }
 
 /** Names of the pass's highlighted ids and of its finishes. */
-export interface Names {
+export interface IdTableNames {
   readonly highlight: string | null;
-  readonly finish: string | null;
+  readonly styles: string | null;
 }
 
 /** @param scale texels a device pixel */
-export function lookOf({ light, dpr }: Pick<FrameSpec, "light" | "dpr">, pass: Pass, scale: number, { highlight, finish }: Names): Look {
+export function makeShadingOptions({ light, dpr }: Pick<FrameContent, "light" | "dpr">, pass: Pass, scale: number, { highlight, styles }: IdTableNames): ShadingOptions {
   const mode = pass.mode === "lit" && !light.lit ? "color" : pass.mode;
   const colored = mode === "lit" || mode === "color" || mode === "picture";
   return {
     mode,
     masked: pass.masked && colored,
-    light: mode === "lit" ? lampOf(light, pass.baked) : null,
+    light: mode === "lit" ? makeTileLight(light, pass.bakedLight) : null,
     highlight,
-    finish: colored ? finish : null,
-    rim: highlight === null ? [0, 0] : rimOf(Math.max(1, 1.25 * dpr * scale)),
+    styles: colored ? styles : null,
+    rim: highlight === null ? [0, 0] : computeRim(Math.max(1, 1.25 * dpr * scale)),
     depthRange: mode === "depth" ? pass.depthRange : null,
     combined: pass.depths !== null,
     masks: [],
   };
 }
 
-function lampOf(light: Readonly<Light>, { shadow, occlusion }: BakedLight): Lamp {
+function makeTileLight(light: Readonly<Light>, { shadow, occlusion }: BakedLight): TileLight {
   const scaled = (rgb: Vec3, by: number): Vec3 => [rgb[0] * by, rgb[1] * by, rgb[2] * by];
   return {
     sun: towardsLight(light),
@@ -93,4 +93,4 @@ function lampOf(light: Readonly<Light>, { shadow, occlusion }: BakedLight): Lamp
 }
 
 /** From a pixel's middle. */
-const rimOf = (width: number): Vec2 => [Math.floor(0.5 + width), Math.floor(0.5 - width)];
+const computeRim = (width: number): Vec2 => [Math.floor(0.5 + width), Math.floor(0.5 - width)];

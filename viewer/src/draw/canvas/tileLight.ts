@@ -1,9 +1,9 @@
-import type { Look } from "./look";
+import type { ShadingOptions } from "./shadingOptions";
 
-export type Lamp = NonNullable<Look["light"]>;
+export type Lamp = NonNullable<ShadingOptions["light"]>;
 
 /** Layers of a tile that its light depends on; of equal size. */
-export interface Shades {
+export interface LightLayers {
   /** RGB8 */
   readonly normal: Uint8Array;
   readonly ao?: Uint8Array | undefined;
@@ -16,33 +16,33 @@ export interface Shades {
  * neighbour's, as the shader has it (draw/webgl/shader.ts says why). Where a tile beside it is not here, the pixel's own light stands for it.
  * @param beside tiles to the left, to the right, above, below  @returns good until the next call
  */
-export function lightOn(lamp: Lamp, width: number, height: number, shades: Shades, beside: readonly (Shades | undefined)[]): Float32Array {
+export function computeTileLight(lamp: Lamp, width: number, height: number, shades: LightLayers, beside: readonly (LightLayers | undefined)[]): Float32Array {
   const wide = width + 2;
-  const own = (room[0] = sized(room[0], 2 * wide * (height + 2))).fill(NONE);
-  const row = rowLighter(lamp, own);
+  const own = (buffers[0] = resizeBuffer(buffers[0], 2 * wide * (height + 2))).fill(NONE);
+  const row = makeRowLighter(lamp, own);
   for (let y = 0; y < height; y++) row(shades, y * width, 1, wide * (y + 1) + 1, 1, width);
   const [left, right, above, below] = beside;
   if (left) row(left, width - 1, width, wide, wide, height);
   if (right) row(right, 0, width, 2 * wide - 1, wide, height);
   if (above) row(above, (height - 1) * width, 1, 1, 1, width);
   if (below) row(below, 0, 1, wide * (height + 1) + 1, 1, width);
-  return spread(own, width, height);
+  return spreadLight(own, width, height);
 }
 
 /** Used again for each tile: what is thrown away stays in a worker's memory for long. */
-const room = [new Float32Array(0), new Float32Array(0)] as [Float32Array, Float32Array];
+const buffers = [new Float32Array(0), new Float32Array(0)] as [Float32Array, Float32Array];
 
-const sized = (is: Float32Array, length: number): Float32Array => (is.length === length ? is : new Float32Array(length));
+const resizeBuffer = (is: Float32Array, length: number): Float32Array => (is.length === length ? is : new Float32Array(length));
 
 /** Where there is no normal. */
 const NONE = -1;
 /** What a pixel without a normal gets of the sun. */
 const UNKNOWN = 0.5;
 
-type Row = (shades: Shades, from: number, step: number, to: number, stride: number, count: number) => void;
+type RowLighter = (shades: LightLayers, from: number, step: number, to: number, stride: number, count: number) => void;
 
 /** Lambert's law on a row or column of normals; equal ones in a row, which are common, are lit once. */
-function rowLighter({ sun, shadow: suns }: Lamp, out: Float32Array): Row {
+function makeRowLighter({ sun, shadow: suns }: Lamp, out: Float32Array): RowLighter {
   let [last, cosine] = [0, NONE];
   return ({ normal, ao, shadow }, from, step, to, stride, count) => {
     for (let k = 0, p = from; k < count; k++, p += step, to += stride) {
@@ -55,19 +55,19 @@ function rowLighter({ sun, shadow: suns }: Lamp, out: Float32Array): Row {
       }
       if (cosine < 0) continue;
       out[2 * to] = ao ? (ao[p] as number) / 255 : 1;
-      out[2 * to + 1] = shadow && suns ? cosine * unshaded(suns, shadow[p] as number) : cosine;
+      out[2 * to + 1] = shadow && suns ? cosine * computeSunShare(suns, shadow[p] as number) : cosine;
     }
   };
 }
 
-function unshaded({ kind, first, second, share }: NonNullable<Lamp["shadow"]>, value: number): number {
+function computeSunShare({ kind, first, second, share }: NonNullable<Lamp["shadow"]>, value: number): number {
   return kind === "sun" ? value / 255 : ((value >> first) & 1) * (1 - share) + ((value >> second) & 1) * share;
 }
 
 /** @param own with a border of one pixel */
-function spread(own: Float32Array, width: number, height: number): Float32Array {
+function spreadLight(own: Float32Array, width: number, height: number): Float32Array {
   const row = 2 * (width + 2);
-  const out = (room[1] = sized(room[1], 2 * width * height));
+  const out = (buffers[1] = resizeBuffer(buffers[1], 2 * width * height));
   const or = (at: number, k: number, instead: number): number => ((own[at] as number) < 0 ? instead : (own[at + k] as number));
   for (let y = 0, to = 0; y < height; y++) {
     for (let x = 0, at = row * (y + 1) + 2; x < width; x++, at += 2, to += 2) {
