@@ -27,5 +27,5 @@ export type { FetchFunction } from "./tiles/fetch";
 export type { Attribute, AttributeInfo, AttributeValue, ObjectInfo, SearchEntry } from "./tiles/objects";
 export { chooseUtcOffset } from "./geo/daylight";
 
-/** Of the viewer; manifests of version 1 are read. */
+/** Version of the viewer, which reads manifests of version 1. */
 export const version = "0.1.0";

@@ -3,7 +3,7 @@ import { clamp, type Vec3 } from "../core/vec";
 import { localAzimuth, type GeographicJson } from "./geographic";
 import type { Light } from "./light";
 
-/** How the light falls at a time on the middle of a scene, through the standard atmosphere. */
+/** Computes sun and sky for a time at the scene's centre. */
 export function computeDaylight(time: Date, geographic: GeographicJson): Pick<Light, "azimuth_deg" | "altitude_deg" | "sun_rgb" | "sky_rgb"> {
   const [lon, lat] = geographic.lon_lat;
   const { azimuth, altitude } = getPosition(time, lat, lon);
@@ -11,8 +11,8 @@ export function computeDaylight(time: Date, geographic: GeographicJson): Pick<Li
 }
 
 /**
- * Colours of sun and sky over the sun's altitude: white at noon, warm when it is low, blue after it has set. By night what is left of the light is
- * enough to know the town again, as in a photograph that was exposed for long.
+ * Computes the colours of sun and sky from the sun's altitude: white at noon, warm near the horizon, blue after sunset. The light left at night
+ * keeps the town recognisable, as in a long exposure.
  */
 export function computeSkyColors(altitude_deg: number): { sun_rgb: Vec3; sky_rgb: Vec3 } {
   const at = (table: readonly ColorStop[]): Vec3 => {
@@ -27,15 +27,15 @@ export function computeSkyColors(altitude_deg: number): { sun_rgb: Vec3; sky_rgb
 type ColorStop = readonly [altitude_deg: number, rgb: Vec3];
 
 const WHITE: Vec3 = [1, 1, 1];
-/** Factors of the diffuse light. */
+/** Factors of the diffuse light, by altitude. */
 const SUN: readonly ColorStop[] = [[-1, [0, 0, 0]], [0.5, [0.42, 0.17, 0.06]], [4, [0.92, 0.58, 0.3]], [12, [1.04, 0.88, 0.68]], [30, WHITE]];
-/** Factors of the ambient light. */
+/** Factors of the ambient light, by altitude. */
 const SKY: readonly ColorStop[] = [[-12, [0.14, 0.18, 0.31]], [-6, [0.22, 0.28, 0.46]], [0, [0.6, 0.62, 0.74]], [8, [0.9, 0.93, 1]], [30, WHITE]];
 
-/** The zone in which a place's clock may be read, in hours from UTC: the page's own if that is near its longitude, else the longitude's. */
-export function chooseUtcOffset(lon: number, own_h: number): number {
-  return Math.abs(own_h - lon / 15) <= MAX_OFFSET_FROM_SUN_H ? own_h : Math.round(lon / 15);
+/** Returns the UTC offset, in hours, for clocks at a longitude: the browser's own if it is plausible there, else the offset of solar time. */
+export function chooseUtcOffset(lon: number, browser_h: number): number {
+  return Math.abs(browser_h - lon / 15) <= MAX_OFFSET_FROM_SUN_H ? browser_h : Math.round(lon / 15);
 }
 
-/** Clocks of a state are at most so far from the sun's. */
+/** Official time differs from solar time by at most this much. */
 const MAX_OFFSET_FROM_SUN_H = 2.6;

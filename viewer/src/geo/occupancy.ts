@@ -1,15 +1,15 @@
 import { ManifestError } from "../core/errors";
 import type { Tile } from "./frame";
 
-/** Which tiles of a view have content: spec/manifest.md. Five bytes a tile. */
+/** The set of a view's tiles that have content: spec/manifest.md. Takes five bytes per tile. */
 export class Occupancy {
-  /** Per level, for each occupied tile in Morton order: its four children bits, and the rank of its first child. */
+  /** By level, for each occupied tile in Morton order: a bit for each child, and the index of its first child. */
   readonly #bits: Uint8Array[] = [];
   readonly #first: Uint32Array[] = [];
   readonly zmax: number;
   readonly #root: boolean;
 
-  /** @param base64 breadth-first quadtree bits, least significant bit first. */
+  /** @param base64 breadth-first quadtree bits, least significant bit first */
   constructor(base64: string, zmax: number) {
     this.zmax = zmax;
     const read = makeBitReader(base64);
@@ -55,7 +55,7 @@ function makeBitReader(base64: string): () => number {
   const bytes = atob(base64);
   let at = 0;
   return () => {
-    if (at >= bytes.length * 8) throw new ManifestError(`occupancy ends after ${String(bytes.length)} bytes; the quadtree goes on. Write rendering.json anew.`);
+    if (at >= bytes.length * 8) throw new ManifestError(`occupancy ends after ${String(bytes.length)} bytes, before its quadtree is complete; write rendering.json again`);
     const bit = (bytes.charCodeAt(at >> 3) >> (at & 7)) & 1;
     at++;
     return bit;

@@ -1,18 +1,18 @@
 import type { Frame } from "../geo/frame";
 import type { ManifestJson, Rendering, View } from "../geo/manifest";
 
-/** The view of a rendering that looks as a frame does, whatever its id. */
+/** Finds the view of a rendering with the look-at angle and pitch of a frame, whatever its id. */
 export function findMatchingView(rendering: Rendering, { lookAtDeg, pitchDeg }: Frame): View | undefined {
   return [...rendering.views.values()].find(({ frame }) => frame.lookAtDeg === lookAtDeg && frame.pitchDeg === pitchDeg);
 }
 
-/** Why a rendering cannot be shown with another that is on the map: none when it can. Origins, squares and resolutions may differ. */
+/** Explains why two renderings cannot share a map; null when they can. Origins, squares and resolutions may differ. */
 export function findIncompatibility(first: Rendering, other: Rendering): string | null {
   const [a, b] = [first.json, other.json];
-  if (!isSameCrs(a.crs, b.crs)) return `it has the CRS "${formatCrs(b.crs)}", the map has "${formatCrs(a.crs)}"`;
-  if (a.crs.vertical && b.crs.vertical && a.crs.vertical !== b.crs.vertical) return `its heights are ${b.crs.vertical}, those of the map ${a.crs.vertical}`;
+  if (!isSameCrs(a.crs, b.crs)) return `its CRS is "${formatCrs(b.crs)}", but the map's is "${formatCrs(a.crs)}"`;
+  if (a.crs.vertical && b.crs.vertical && a.crs.vertical !== b.crs.vertical) return `its heights are ${b.crs.vertical}, but the map's are ${a.crs.vertical}`;
   if ([...first.views.values()].some(({ frame }) => findMatchingView(other, frame))) return null;
-  return `it has no direction of the map: ${[...other.views.keys()].join(", ")} for ${[...first.views.keys()].join(", ")}`;
+  return `it has none of the map's views: it has ${[...other.views.keys()].join(", ")}, the map has ${[...first.views.keys()].join(", ")}`;
 }
 
 type Crs = ManifestJson["crs"];

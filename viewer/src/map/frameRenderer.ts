@@ -20,7 +20,7 @@ import type { Viewport } from "./viewport";
 export interface FrameRendererEvents {
   lost(): void;
   restored(): void;
-  /** Another canvas has taken the place of the map's; the picture comes back. */
+  /** Another canvas has replaced the map's; drawing continues there. */
   replaced(): void;
   changed(): void;
   failed(error: Error): void;
@@ -28,33 +28,34 @@ export interface FrameRendererEvents {
 
 export type TransitionScene = Omit<TransitionFrame, "camera" | "tilesChanged">;
 
-/** A context that has not come back after this time is lost for good. */
+/** A context that is not restored by then is lost for good. */
 const RESTORE_MS = 5000;
-/** Of tiles that are kept, for each device pixel, and at least. On dense screens tile pixels are fewer, see `levelFor`. */
-const [KEPT_BYTES, KEPT_DENSE_BYTES, LEAST_BYTES] = [60, 20, 24e6];
+/** Default cache size: bytes per device pixel, on dense screens (whose tiles have fewer pixels, see `computeLevel`), and the minimum. */
+const [PIXEL_BYTES, DENSE_PIXEL_BYTES, MIN_BYTES] = [60, 20, 24e6];
 
+/** The result of a frame. */
 export interface FrameResult {
   readonly plans: readonly LayerPlan[];
-  /** Nothing is missing in view. */
+  /** Whether nothing is missing in view. */
   readonly complete: boolean;
 }
 
-/** What a frame shows. */
+/** The input of a frame. */
 export interface FrameInput {
   readonly layers: readonly imageLayer[];
   readonly light: Readonly<Light>;
-  /** Layers that are read, besides those that are shown. */
+  /** Kinds of tiles to fetch in addition to those shown. */
   readonly requiredKinds: readonly LayerKind[];
-  /** Finds light that was not rendered. */
+  /** Estimates light that was not rendered. */
   readonly lightEstimator: LightEstimator | null;
-  /** The picture is under way: what is costly may be rough. */
+  /** Whether the view is moving, so that costly parts may be approximate. */
   readonly moving: boolean;
 }
 
-/** Makes a frame: asks the layers what they want, fetches it, has it drawn. Owns tiles and drawer. */
+/** Renders frames: plans each layer, requests its tiles, and lets the drawer draw. Owns tiles and drawer. */
 export class FrameRenderer {
   readonly tileResources: TileResources;
-  /** What is seen among the layers. */
+  /** Layers that are not made of tiles. */
   readonly customLayers = new Set<CustomLayer>();
   readonly #viewport: Viewport;
   readonly #cache: Cache<CachedTile>;
@@ -63,7 +64,7 @@ export class FrameRenderer {
   readonly #options: FilledOptions;
   readonly #events: FrameRendererEvents;
   #drawer: Drawer;
-  /** Guests are shown: from when the depth of all that was in view was here, so that no tile had to wait for its own. */
+  /** Custom layers are shown once all depths in view have loaded, so that no tile has to wait for its own. */
   #showsCustomLayers = false;
   #restoreTimer: ReturnType<typeof setTimeout> | undefined;
 
@@ -73,7 +74,7 @@ export class FrameRenderer {
     this.#options = options;
     this.#events = events;
     this.#drawer = this.#createDrawer(options.drawer);
-    this.#cache = new Cache<CachedTile>(options.cacheBytes ?? LEAST_BYTES, (key, { data }) => {
+    this.#cache = new Cache<CachedTile>(options.cacheBytes ?? MIN_BYTES, (key, { data }) => {
       if (data && "bitmap" in data) data.bitmap.close();
       this.#drawer.release(key);
     });
@@ -94,12 +95,12 @@ export class FrameRenderer {
     return this.#cache.bytes;
   }
 
-  /** @param turn paints a movement, where that can be done, in place of the frame */
-  render(viewState: ViewState, input: FrameInput, turn: ((scene: TransitionScene) => void) | null): FrameResult {
+  /** Renders a frame. @param transition draws a view transition instead, where WebGL is available */
+  render(viewState: ViewState, input: FrameInput, transition: ((scene: TransitionScene) => void) | null): FrameResult {
     const { layers, light, requiredKinds, lightEstimator, moving } = input;
     this.#viewport.fitCanvas(viewState.dpr);
     const { width, height } = this.#viewport.canvas;
-    this.#cache.setLimit(this.#options.cacheBytes ?? Math.max(LEAST_BYTES, (viewState.dpr >= DENSE_DPR ? KEPT_DENSE_BYTES : KEPT_BYTES) * width * height));
+    this.#cache.setLimit(this.#options.cacheBytes ?? Math.max(MIN_BYTES, (viewState.dpr >= DENSE_DPR ? DENSE_PIXEL_BYTES : PIXEL_BYTES) * width * height));
     this.#cache.startTick();
     const { gl } = this.#drawer;
     this.#showsCustomLayers &&= this.customLayers.size > 0 && gl !== null;
@@ -112,8 +113,8 @@ export class FrameRenderer {
     const before = (layer: imageLayer): number | null => (combined.includes(layer) ? combined.indexOf(layer) : null);
     this.#queue.setRequests(planned.flatMap(({ plan }) => plan.requests));
     const complete = !layers.some((layer) => layer.isLoading) && planned.every(({ plan }) => plan.complete);
-    if (turn && gl) turn({ gl, width, height, complete, getDepthRange: (frame) => computeSceneDepthRange(viewState, frame, layers, customLayers), drawView: (camera, range, framebuffer) => { this.#drawView({ ...viewState, camera, dpr: 1 }, input, customLayers, { range, framebuffer }); } });
-    else this.#drawer.draw({ camera: viewState.camera, width, height, dpr: viewState.dpr, light, customLayers, lighting: lightEstimator && { by: lightEstimator, moving }, passes: planned.map(({ layer, plan }) => layer.makePass(plan, viewState, before(layer))) });
+    if (transition && gl) transition({ gl, width, height, complete, getDepthRange: (frame) => computeSceneDepthRange(viewState, frame, layers, customLayers), drawView: (camera, range, framebuffer) => { this.#drawView({ ...viewState, camera, dpr: 1 }, input, customLayers, { range, framebuffer }); } });
+    else this.#drawer.draw({ camera: viewState.camera, width, height, dpr: viewState.dpr, light, customLayers, lighting: lightEstimator && { estimator: lightEstimator, moving }, passes: planned.map(({ layer, plan }) => layer.makePass(plan, viewState, before(layer))) });
     if (complete && gl && this.customLayers.size > 0 && !this.#showsCustomLayers) {
       this.#showsCustomLayers = true;
       this.#events.changed();
@@ -121,7 +122,7 @@ export class FrameRenderer {
     return { plans: planned.map(({ plan }) => plan), complete: complete && !this.#drawer.busy };
   }
 
-  /** What is in memory, with the depth of all layers that have any. */
+  /** Draws a view from the tiles in memory, with the depth of all layers that have any. */
   #drawView(viewState: ViewState, { layers, light, lightEstimator }: FrameInput, customLayers: readonly CustomLayer[], target: NonNullable<FrameContent["target"]>): void {
     const { camera } = viewState;
     const { width, height } = camera;
@@ -129,10 +130,10 @@ export class FrameRenderer {
       const plan = layer.plan(viewState, light, [], true);
       return plan ? [layer.makePass(plan, viewState, k)] : [];
     });
-    this.#drawer.draw({ camera, width, height, dpr: 1, light, customLayers, lighting: lightEstimator && { by: lightEstimator, moving: false }, passes, target });
+    this.#drawer.draw({ camera, width, height, dpr: 1, light, customLayers, lighting: lightEstimator && { estimator: lightEstimator, moving: false }, passes, target });
   }
 
-  /** Forgets the tiles of a layer that has left. */
+  /** Drops the tiles of a removed layer. */
   dropTiles(prefix: string): void {
     this.#cache.prune((key) => key.startsWith(prefix));
   }
@@ -160,7 +161,7 @@ export class FrameRenderer {
       return new WebGLDrawer(canvas, { preserve, requireGpu: kind === "auto" }, events);
     } catch (reason) {
       if (kind === "webgl") throw reason;
-      // A canvas that has tried WebGL gives nothing else.
+      // A canvas that has tried WebGL may refuse another context.
       if (canvas.getContext("2d") === null) this.#viewport.replaceCanvas();
       return new CanvasDrawer(this.#viewport.canvas, preserve, events);
     }
@@ -178,7 +179,7 @@ export class FrameRenderer {
     this.#events.restored();
   }
 
-  /** A canvas that had WebGL gives no 2D context: a fresh one takes its place. */
+  /** Continues on a new canvas, since one that had WebGL refuses a 2D context. */
   #switchToCanvas(): void {
     this.#drawer.destroy();
     this.#viewport.replaceCanvas();
@@ -187,7 +188,7 @@ export class FrameRenderer {
     this.#events.replaced();
   }
 
-  /** Forgets the tiles that only the drawer had. */
+  /** Drops tiles that only the drawer had. */
   #dropUploadedTiles(): void {
     this.#cache.prune((_, { data, empty }) => data === null && !empty);
   }

@@ -1,18 +1,18 @@
 import type { Vec2 } from "../core/vec";
 
-/** What gestures do to a map. Screen positions in CSS pixels from the container's top left corner. */
+/** A map as controlled by gestures. Screen positions are CSS pixels from the container's top left corner. */
 export interface GestureTarget {
   readonly container: HTMLElement;
-  /** A hand is on the map: movements stop. */
+  /** A gesture has started: stops movements. */
   startGesture(): void;
   panBy(dx: number, dy: number): unknown;
   startInertia(velocity: Vec2): void;
-  /** At once, without smoothing. */
+  /** Zooms at once, without animation. */
   pinch(factor: number, anchor: Vec2): unknown;
   zoomBy(delta: number, anchor: Vec2): unknown;
-  /** Turns the picture clockwise. */
+  /** Rotates the picture clockwise. */
   rotateBy(rad: number): void;
-  /** No hand is on the map any more. */
+  /** The last pointer was released. */
   endGesture(): void;
   tap(at: Vec2): void;
   hover(at: Vec2): void;
@@ -27,10 +27,10 @@ const TAP_PX = 6;
 const DOUBLE_TAP_MS = 320;
 const DOUBLE_TAP_PX = 28;
 const VELOCITY_MS = 90;
-/** A drag with the right button turns the picture by so much a pixel. */
+/** Rotation per pixel of a drag with the right button. */
 const ROTATION_RAD_PER_PX = (0.4 * Math.PI) / 180;
 
-/** Mouse, touch and pen on the canvas: drag, pinch, wheel, tap, double tap. */
+/** Handles mouse, pointer and pen on the canvas: drag, pinch, wheel, tap, double tap. */
 export class Gestures {
   readonly #map: GestureTarget;
   readonly #canvas: HTMLCanvasElement;
@@ -38,7 +38,7 @@ export class Gestures {
   readonly #listeners = new AbortController();
   #recentPoints: { at: Vec2; ms: number }[] = [];
   #moved = false;
-  /** Where the right button was last, while it is down. */
+  /** Last position of a drag with the right button. */
   #rotatingFrom: Vec2 | null = null;
   #lastTap: { at: Vec2; ms: number } | null = null;
 
@@ -77,40 +77,40 @@ export class Gestures {
   }
 
   #move(event: PointerEvent): void {
-    const touch = this.#pointers.get(event.pointerId);
+    const pointer = this.#pointers.get(event.pointerId);
     const at = this.#toScreen(event);
     if (this.#rotatingFrom) {
       this.#map.rotateBy((at[0] - this.#rotatingFrom[0]) * ROTATION_RAD_PER_PX);
       this.#rotatingFrom = at;
       return;
     }
-    if (!touch) {
+    if (!pointer) {
       if (event.pointerType === "mouse") this.#map.hover(at);
       return;
     }
-    if (!this.#moved && Math.hypot(at[0] - touch.start[0], at[1] - touch.start[1]) < TAP_PX) return;
+    if (!this.#moved && Math.hypot(at[0] - pointer.start[0], at[1] - pointer.start[1]) < TAP_PX) return;
     this.#moved = true;
     this.#map.container.classList.add("map3d-dragging");
     const other = [...this.#pointers].find(([id]) => id !== event.pointerId)?.[1];
-    if (other) this.#pinch(touch, other, at);
-    else this.#drag(touch, at, event);
-    touch.at = at;
+    if (other) this.#pinch(pointer, other, at);
+    else this.#drag(pointer, at, event);
+    pointer.at = at;
   }
 
-  #drag(touch: Pointer, at: Vec2, event: PointerEvent): void {
-    this.#map.panBy(at[0] - touch.at[0], at[1] - touch.at[1]);
-    // Where frames are slow, one event stands for several: the hand's speed is known from them all, and from when they were, not when they are told.
+  #drag(pointer: Pointer, at: Vec2, event: PointerEvent): void {
+    this.#map.panBy(at[0] - pointer.at[0], at[1] - pointer.at[1]);
+    // When frames are slow, one event combines several: their own positions and times give the pointer's speed.
     const all = "getCoalescedEvents" in event ? event.getCoalescedEvents() : [];
     const points = (all.length > 0 ? all : [event]).map((each) => ({ at: this.#toScreen(each), ms: each.timeStamp }));
     this.#recentPoints = [...this.#recentPoints, ...points].filter(({ ms }) => event.timeStamp - ms < VELOCITY_MS);
   }
 
-  #pinch(touch: Pointer, other: Pointer, at: Vec2): void {
-    const before = Math.hypot(touch.at[0] - other.at[0], touch.at[1] - other.at[1]);
-    const after = Math.hypot(at[0] - other.at[0], at[1] - other.at[1]);
-    this.#map.panBy((at[0] - touch.at[0]) / 2, (at[1] - touch.at[1]) / 2);
-    if (before > 0 && after > 0) this.#map.pinch(after / before, [(at[0] + other.at[0]) / 2, (at[1] + other.at[1]) / 2]);
-    this.#rotate(touch.at, other.at, at);
+  #pinch(pointer: Pointer, other: Pointer, at: Vec2): void {
+    const startDistance = Math.hypot(pointer.at[0] - other.at[0], pointer.at[1] - other.at[1]);
+    const distance = Math.hypot(at[0] - other.at[0], at[1] - other.at[1]);
+    this.#map.panBy((at[0] - pointer.at[0]) / 2, (at[1] - pointer.at[1]) / 2);
+    if (startDistance > 0 && distance > 0) this.#map.pinch(distance / startDistance, [(at[0] + other.at[0]) / 2, (at[1] + other.at[1]) / 2]);
+    this.#rotate(pointer.at, other.at, at);
   }
 
   #rotate(from: Vec2, other: Vec2, to: Vec2): void {
@@ -119,20 +119,20 @@ export class Gestures {
     this.#map.rotateBy(turned - 2 * Math.PI * Math.round(turned / (2 * Math.PI)));
   }
 
-  #up(event: PointerEvent, meant: boolean): void {
-    if (this.#rotatingFrom && (event.button === 2 || !meant)) {
+  #up(event: PointerEvent, completed: boolean): void {
+    if (this.#rotatingFrom && (event.button === 2 || !completed)) {
       this.#rotatingFrom = null;
       this.#map.endGesture();
     }
-    const touch = this.#pointers.get(event.pointerId);
-    if (!touch) return;
+    const pointer = this.#pointers.get(event.pointerId);
+    if (!pointer) return;
     this.#pointers.delete(event.pointerId);
     if (this.#pointers.size > 0) return;
     this.#map.endGesture();
     this.#map.container.classList.remove("map3d-dragging");
-    if (!meant) return;
+    if (!completed) return;
     if (this.#moved) this.#glide(event.timeStamp);
-    else this.#tap(touch.at, event.timeStamp);
+    else this.#tap(pointer.at, event.timeStamp);
   }
 
   #glide(now: number): void {

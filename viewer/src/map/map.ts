@@ -34,7 +34,7 @@ import type { Rect } from "../tiles/cover";
 /** A map in a canvas of the page. World coordinates are those of the scene's CRS, in metres. */
 export class map extends CameraController implements OverlayHost, LayerHost<map>, GestureTarget {
   readonly options: FilledOptions;
-  /** Tells markers and popups that places on the screen have changed. */
+  /** Events after which markers and popups update their positions. */
   readonly frameEvents = new Evented<OverlayEvents>();
   readonly #viewport: Viewport;
   readonly #renderer: FrameRenderer | null;
@@ -49,22 +49,22 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   #drawnCamera: Camera | undefined;
   #relief: Relief | undefined;
   #lightEstimator: LightEstimator | null = null;
-  /** Something besides the camera has changed since the last frame. */
+  /** Whether anything besides the camera has changed since the last frame. */
   #dirty = true;
-  /** The picture has not moved since the last "moveend". */
+  /** Whether the view has not moved since the last "moveend". */
   #atRest = true;
   #loaded = false;
   #clickCount = 0;
   #nameCount = 0;
   #hoverPoint: Vec2 | null = null;
 
-  /** @param target the id of a canvas, or the element  @throws UsageError when there is none */
+  /** @param target the id of a canvas, or an element  @throws UsageError when there is none */
   constructor(target: string | HTMLElement, options: MapOptions = {}) {
     super();
     const { dataSaver = DEFAULTS.dataSaver } = options;
     this.options = { ...DEFAULTS, ...options, dataSaver: dataSaver === "auto" ? savesData() : dataSaver };
-    const spared = this.options.dataSaver ? { shadows: false, occlusion: false } : {};
-    this.#light = clampLight({ ...DEFAULT_LIGHT, ...spared, ...options.light });
+    const withoutShadows = this.options.dataSaver ? { shadows: false, occlusion: false } : {};
+    this.#light = clampLight({ ...DEFAULT_LIGHT, ...withoutShadows, ...options.light });
     adoptStyles(document, STYLES);
     this.#viewport = new Viewport(target, () => { this.#onResize(); });
     if (options.background !== undefined) this.setBackground(options.background);
@@ -73,9 +73,9 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     this.#addControls();
   }
 
-  // Things on the map
+  // Layers, markers and popups
 
-  /** Puts a layer, marker or popup on the map. */
+  /** Adds a layer, marker or popup. */
   add(item: Addable<map>): this {
     if (this.#items.has(item)) return this;
     this.#items.add(item);
@@ -85,7 +85,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     return this.#redraw();
   }
 
-  /** Takes a layer, marker or popup off the map. */
+  /** Removes a layer, marker or popup. */
   discard(item: Addable<map>): this {
     if (!this.#items.delete(item)) return this;
     this.#layers = this.#layers.filter((layer) => layer !== item);
@@ -94,7 +94,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     return this.#redraw();
   }
 
-  /** Ends the map; the canvas stands in the page as before. */
+  /** Removes the map; the canvas is left in the page as it was before. */
   remove(): this {
     this.#loop.stop();
     this.#abort.abort();
@@ -104,37 +104,37 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     return this.fire("remove", {});
   }
 
-  /** Its image layers, the lowest first. */
+  /** The map's image layers, lowest first. */
   get layers(): readonly imageLayer[] {
     return this.#layers;
   }
 
-  /** Whose data is shown. */
+  /** Attribution texts of all layers. */
   get attributions(): readonly string[] {
     return [...new Set(this.#layers.map(({ attribution }) => attribution).filter((text) => text !== ""))];
   }
 
-  /** @internal Markers on it. */
+  /** @internal */
   get markers(): readonly marker[] {
     return [...this.#items].filter((item) => item instanceof marker);
   }
 
-  /** What the canvas lies in, with markers, popups and controls. */
+  /** The element that contains the canvas, markers, popups and controls. */
   get container(): HTMLElement {
     return this.#viewport.container;
   }
 
-  /** The one that is there now: when WebGL is lost for good, another takes its place. */
+  /** The current canvas; a new one replaces it when WebGL is lost for good. */
   get canvas(): HTMLCanvasElement {
     return this.#viewport.canvas;
   }
 
-  /** What draws: "webgl" or "canvas"; null when nothing can. */
+  /** The current drawer: "webgl" or "canvas"; null when the browser supports neither. */
   get drawer(): "webgl" | "canvas" | null {
     return this.#renderer?.drawer.name ?? null;
   }
 
-  /** @internal What the picture is seen in: the canvas, or an element below it; null when nothing can be drawn. */
+  /** @internal The element that shows the picture: the canvas, or an element below it; null when nothing can be drawn. */
   get drawerElement(): HTMLElement | null {
     return this.#renderer?.drawer.element ?? null;
   }
@@ -147,51 +147,51 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     return this.#viewport.overlayPane;
   }
 
-  /** @internal Holds buttons. */
+  /** @internal Contains the buttons. */
   get controlPane(): HTMLElement {
     return this.#viewport.controlPane;
   }
 
-  // Looks
+  // Light and background
 
-  /** What the picture is lit by. */
+  /** The current light. */
   get light(): Readonly<Light> {
     return this.#light;
   }
 
-  /** Changes parts of the light; numbers are brought into their ranges. Another direction ends the light of a time. */
+  /** Changes properties of the light; clamps numbers to their ranges. Setting azimuth or altitude ends the light of `setTime`. */
   setLight(light: Partial<Light>): this {
     if (light.azimuth_deg !== undefined || light.altitude_deg !== undefined) this.#time = null;
     return this.#updateLight(light);
   }
 
-  /** The time that the light is of; null when it was set otherwise. */
+  /** The time of the light; null when it was not set by `setTime`. */
   get time(): Date | null {
     return this.#time;
   }
 
-  /** Light of a moment at the scene's place, with the colours of the day, and shadows where the rendering has them. */
+  /** Sets the light to a time at the scene's position: the colours of the day, and shadows where the rendering has them. */
   setTime(time: Date): this {
     return this.whenReady((_, { json }) => {
-      if (!json.geographic) throw new UsageError(`rendering "${json.name}" does not say where on earth it lies, so the sun's place is not known; use setLight`);
+      if (!json.geographic) throw new UsageError(`cannot locate rendering "${json.name}" on earth, so the sun's position is unknown; use setLight instead`);
       this.#time = time;
       this.#updateLight(computeDaylight(time, json.geographic));
     });
   }
 
-  /** @internal What finds light that was not rendered. */
+  /** @internal Sets the estimator of light that was not rendered. */
   setLightEstimator(shade: LightEstimator | null): this {
     this.#lightEstimator = shade;
     return this.#redraw();
   }
 
-  /** Any CSS background; the same as the custom property --map3d-background. */
+  /** Sets the background, any CSS background; same as the custom property --map3d-background. */
   setBackground(background: string): this {
     this.container.style.setProperty("--map3d-background", background);
     return this;
   }
 
-  /** Outlines and names of the tiles that are shown. */
+  /** Shows outlines and names of the drawn tiles. */
   debug(on = true): this {
     this.#debug.show(on);
     return this.#redraw();
@@ -203,21 +203,21 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     return this.#redraw();
   }
 
-  // Asking
+  // Queries
 
-  /** What lies under CSS pixels, exactly: the deepest level's tile is fetched. Approximate when that fails. */
+  /** Picks the object under CSS pixels, exactly: fetches a tile of the deepest level. Approximate if that fails. */
   async pick(point: Vec2): Promise<Pick> {
     const viewState = this.getViewState();
     if (!viewState) return EMPTY_PICK;
     try {
       return await pickExactly(this.#layers, viewState, point);
     } catch {
-      // The tile's own error has been reported when it failed.
+      // The tile's error was reported when it failed.
       return { ...(pickLoaded(this.#layers, viewState, point) ?? EMPTY_PICK), approximate: true };
     }
   }
 
-  /** Objects of all layers that are seen, the largest of each layer first; those below the topmost layer count as if they were not hidden by it. */
+  /** Lists the visible objects of all layers, topmost layer first and the largest of each layer first. Ignores occlusion between layers. */
   async objectsInView(): Promise<readonly (VisibleObject & { readonly layer: imageLayer })[]> {
     const viewState = this.getViewState();
     if (!viewState) return [];
@@ -225,7 +225,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     return found.flat();
   }
 
-  /** What the tiles in memory tell of a point; null when they tell nothing. */
+  /** Picks from the tiles in memory; null when none covers the point. */
   pickLoaded(point: Vec2): Pick | null {
     const viewState = this.getViewState();
     return viewState && pickLoaded(this.#layers, viewState, point);
@@ -239,7 +239,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     return this.relief?.positionAt(point) ?? null;
   }
 
-  /** @internal Depths of the picture that was drawn last, of items that need them; null before "ready". */
+  /** @internal Depths of the last picture, for items that need them; null before "ready". */
   get relief(): Relief | null {
     const viewState = this.getViewState();
     if (this.#relief?.camera !== viewState?.camera) this.#relief = undefined;
@@ -247,17 +247,17 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     return this.#relief ?? null;
   }
 
-  /** @internal Depths of a rectangle (U and V), from the deepest level that takes at most so many tiles; `ids`: object ids, too. */
-  fetchRelief(viewState: ViewState, rect: Rect, most: number, ids = false): ReturnType<typeof Relief.fetch> {
-    return Relief.fetch(this.#layers, viewState, rect, most, ids);
+  /** @internal Fetches the depths of a rectangle (U and V) from the deepest level where it has at maxTiles `maxTiles` tiles. @param ids reads object ids as well */
+  fetchRelief(viewState: ViewState, rect: Rect, maxTiles: number, ids = false): ReturnType<typeof Relief.fetch> {
+    return Relief.fetch(this.#layers, viewState, rect, maxTiles, ids);
   }
 
-  /** Bytes of decoded tiles in memory. */
+  /** Size of the decoded tiles in memory, bytes. */
   get cacheBytes(): number {
     return this.#renderer?.cacheBytes ?? 0;
   }
 
-  // What gestures and layers call
+  // Called by gestures and layers
 
   /** @internal */
   tap(point: Vec2): void {
@@ -272,19 +272,19 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     this.#loop.request();
   }
 
-  /** @internal Something else is seen among the layers by its depth; `on` false: no longer. */
-  toggleCustomLayer(guest: CustomLayer, on = true): this {
-    this.#renderer?.customLayers[on ? "add" : "delete"](guest);
+  /** @internal Adds a custom layer; `on` false: removes it. */
+  toggleCustomLayer(layer: CustomLayer, on = true): this {
+    this.#renderer?.customLayers[on ? "add" : "delete"](layer);
     return this.#redraw();
   }
 
   /** @internal undefined when the map cannot draw. */
   get layerContext(): LayerContext | undefined {
-    const painter = this.#renderer;
-    return painter === null ? undefined : {
-      tileResources: painter.tileResources,
+    const renderer = this.#renderer;
+    return renderer === null ? undefined : {
+      tileResources: renderer.tileResources,
       createName: () => `layer${String(this.#nameCount++)}`,
-      dropTiles: (layer) => { painter.dropTiles(`${layer}/`); },
+      dropTiles: (layer) => { renderer.dropTiles(`${layer}/`); },
       checkCompatible: (rendering) => { this.checkCompatible(rendering); },
       onManifest: (rendering) => {
         if (!this.camera) this.initializeView(rendering);
@@ -315,43 +315,43 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   // Frames
 
   #frame(now: number): void {
-    const turned = this.transitionCamera !== null;
+    const wasInTransition = this.transitionCamera !== null;
     this.advanceCamera(now);
     if (this.#hoverPoint) this.#fireHover(this.#hoverPoint);
     try {
-      if (this.#dirty || this.camera !== this.#drawnCamera || turned || this.transitionCamera) this.#draw(turned || this.transitionCamera !== null);
+      if (this.#dirty || this.camera !== this.#drawnCamera || wasInTransition || this.transitionCamera) this.#draw(wasInTransition || this.transitionCamera !== null);
       else this.#comeToRest();
     } catch (reason) {
       this.report(asError(reason));
     }
   }
 
-  /** @param turning places on the screen are others even when the camera is not */
-  #draw(turning: boolean): void {
+  /** @param inTransition screen positions change even if the camera does not */
+  #draw(inTransition: boolean): void {
     const viewState = this.getViewState();
     if (!viewState || !this.#renderer || this.size.width === 0) return;
-    const [before, tilesChanged] = [this.#drawnCamera, this.#dirty];
+    const [lastCamera, tilesChanged] = [this.#drawnCamera, this.#dirty];
     [this.#drawnCamera, this.#dirty, this.#relief] = [viewState.camera, false, undefined];
-    const moving = before !== undefined && before !== viewState.camera;
+    const moving = lastCamera !== undefined && lastCamera !== viewState.camera;
     const { plans, complete } = this.#renderer.render(viewState, { layers: this.#layers, light: this.#light, requiredKinds: this.#findRequiredKinds(), lightEstimator: this.#lightEstimator, moving }, this.transitionCamera && ((scene) => { this.transition?.draw({ ...scene, camera: viewState.camera, tilesChanged }); }));
     this.#debug.update(plans, viewState.dpr, this.#renderer.drawer);
-    if (before !== viewState.camera || turning) this.#fireMove(before, viewState.camera);
+    if (lastCamera !== viewState.camera || inTransition) this.#fireMove(lastCamera, viewState.camera);
     this.frameEvents.fire("draw", {});
     if (this.#lightEstimator && moving) this.#redraw();
     if (this.moving || !this.#atRest || complete) this.#loop.request();
     if (complete) this.#fireLoad();
   }
 
-  /** Layers that somebody reads, besides those that are shown. */
+  /** Lists kinds of tiles that are read, in addition to those shown. */
   #findRequiredKinds(): LayerKind[] {
     return [...new Set([...(this.options.hover && !this.options.dataSaver ? ["id" as const] : []), ...[...this.#items].flatMap(({ needs }) => needs ?? [])])];
   }
 
-  #fireMove(before: Camera | undefined, { zoom }: Camera): void {
+  #fireMove(lastCamera: Camera | undefined, { zoom }: Camera): void {
     this.#atRest = false;
     this.frameEvents.fire("move", {});
     this.fire("move", {});
-    if (before?.zoom !== zoom) this.fire("zoom", { zoom });
+    if (lastCamera?.zoom !== zoom) this.fire("zoom", { zoom });
   }
 
   #fireLoad(): void {
@@ -360,7 +360,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     this.fire("load", {});
   }
 
-  /** Nothing is left to draw. */
+  /** Called when there is nothing left to draw. */
   #comeToRest(): void {
     if (this.moving) {
       this.#loop.request();
@@ -373,7 +373,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
 
   #redraw(): this {
     this.#dirty = true;
-    // Until the first picture is whole, what has come is to be passed on at once. WebGL must not run ahead of what the GPU can do.
+    // The first picture shows tiles as soon as they arrive. WebGL must not run ahead of the GPU.
     this.#loop.request(!this.#loaded && this.drawer === "canvas" && !document.hidden);
     return this;
   }
@@ -385,7 +385,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     this.#redraw();
   }
 
-  // Making
+  // Setup
 
   #createRenderer(): FrameRenderer | null {
     try {
@@ -422,7 +422,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     window.addEventListener("online", () => { this.#retryFailedTiles(); }, { signal });
   }
 
-  /** Listens to hands on the canvas that is there now. */
+  /** Listens to gestures on the current canvas. */
   #listenToGestures(): void {
     this.#gestures?.destroy();
     this.#gestures = new Gestures(this, this.canvas);
@@ -435,13 +435,13 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
 
   // Events
 
-  #deselectMarkers(but?: marker): void {
-    for (const item of this.#items) if (item instanceof marker && item !== but) item.select(false);
+  #deselectMarkers(except?: marker): void {
+    for (const item of this.#items) if (item instanceof marker && item !== except) item.select(false);
   }
 
-  readonly #onMarkerSelect = ({ marker: chosen }: { marker: marker }): void => {
-    this.#deselectMarkers(chosen);
-    this.fire("select", { marker: chosen });
+  readonly #onMarkerSelect = ({ marker: selected }: { marker: marker }): void => {
+    this.#deselectMarkers(selected);
+    this.fire("select", { marker: selected });
   };
 
   #fireHover(point: Vec2): void {
@@ -450,11 +450,11 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   }
 
   async #fireClick(point: Vec2): Promise<void> {
-    const number = ++this.#clickCount;
+    const clickNumber = ++this.#clickCount;
     this.fire("preclick", { ...(this.pickLoaded(point) ?? { ...EMPTY_PICK, approximate: true }), point });
     const pick = await this.pick(point);
     const event = await this.#addAttributes({ ...pick, point });
-    if (number === this.#clickCount && !this.#abort.signal.aborted) this.fire("click", event);
+    if (clickNumber === this.#clickCount && !this.#abort.signal.aborted) this.fire("click", event);
   }
 
   async #addAttributes(event: ClickEvent): Promise<ClickEvent> {

@@ -1,7 +1,7 @@
 import type { Frame } from "../geo/frame";
 import type { Rendering } from "../geo/manifest";
 
-/** The view `step` directions further counter-clockwise, of the same pitch; the same view when there is no other. */
+/** Finds the view of the same pitch `step` directions counter-clockwise; the same view when it is the only one. */
 export function findNeighbourView(rendering: Rendering, frame: Frame, step: number): string {
   const frames = [...rendering.views.values()].map((view) => view.frame);
   const ring = frames.filter(({ pitchDeg }) => pitchDeg === frame.pitchDeg).sort((a, b) => a.lookAtDeg - b.lookAtDeg);
@@ -9,10 +9,10 @@ export function findNeighbourView(rendering: Rendering, frame: Frame, step: numb
   return ring[(((at + step) % ring.length) + ring.length) % ring.length]?.id ?? frame.id;
 }
 
-/** The view of the next pitch, +1 steeper, whose direction is nearest; null when no pitch is left. */
+/** Finds the view of the next pitch, +1 steeper, with the nearest look-at angle; null when there is no further pitch. */
 export function findTiltedView(rendering: Rendering, frame: Frame, step: number): string | null {
-  const beyond = [...rendering.views.values()].map((view) => view.frame).filter(({ pitchDeg }) => Math.sign(pitchDeg - frame.pitchDeg) === Math.sign(step));
-  const turn = ({ lookAtDeg }: Frame): number => Math.abs((((lookAtDeg - frame.lookAtDeg + 180) % 360) + 360) % 360 - 180);
-  const [best] = beyond.sort((a, b) => Math.abs(a.pitchDeg - frame.pitchDeg) - Math.abs(b.pitchDeg - frame.pitchDeg) || turn(a) - turn(b));
+  const candidates = [...rendering.views.values()].map((view) => view.frame).filter(({ pitchDeg }) => Math.sign(pitchDeg - frame.pitchDeg) === Math.sign(step));
+  const angle = ({ lookAtDeg }: Frame): number => Math.abs((((lookAtDeg - frame.lookAtDeg + 180) % 360) + 360) % 360 - 180);
+  const [best] = candidates.sort((a, b) => Math.abs(a.pitchDeg - frame.pitchDeg) - Math.abs(b.pitchDeg - frame.pitchDeg) || angle(a) - angle(b));
   return best?.id ?? null;
 }

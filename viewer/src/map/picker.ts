@@ -10,74 +10,74 @@ import type { imageLayer } from "./imageLayer";
 import { DEPTH_UNIT_M, computeCenter } from "./layerPlan";
 import type { ViewState } from "./layerContext";
 
-/** What lies under a pixel. */
+/** The object under a point. */
 export interface Pick {
-  /** Object id; 0: nothing is there. */
+  /** Object id; 0: none. */
   readonly id: number;
-  /** World coordinates of the surface; null where nothing is, or its depth is not known (yet). */
+  /** World coordinates of the surface; null where there is none, or its depth is unknown. */
   readonly position: Vec3 | null;
-  /** true: read from a tile above the deepest level, so only about right. */
+  /** true: read from a tile above the deepest level, and therefore inexact. */
   readonly approximate: boolean;
   readonly layer: imageLayer | null;
 }
 
 export const EMPTY_PICK: Pick = { id: 0, position: null, approximate: false, layer: null };
 
-/** What is exact: from the deepest level, whose tiles are fetched when they are not here. */
-export async function pickExactly(layers: readonly imageLayer[], sight: ViewState, at: Vec2): Promise<Pick> {
-  for (const group of groupsAt(layers, sight, at)) {
-    const picks = await Promise.all(group.map((layer) => pickFromLayer(layer, sight, at)));
-    const pick = findNearest(picks, group, sight);
+/** Picks exactly, from the deepest level; fetches its tiles if necessary. */
+export async function pickExactly(layers: readonly imageLayer[], viewState: ViewState, at: Vec2): Promise<Pick> {
+  for (const group of groupsAt(layers, viewState, at)) {
+    const picks = await Promise.all(group.map((layer) => pickFromLayer(layer, viewState, at)));
+    const pick = findNearest(picks, group, viewState);
     if (pick) return pick;
   }
   return EMPTY_PICK;
 }
 
-async function pickFromLayer(layer: imageLayer, sight: ViewState, at: Vec2): Promise<Pick | null> {
-  const spot = findViewPoint(layer, sight, at);
-  const pixel = spot && pixelAt(spot.view.frame, spot.view.frame.zmax, ...spot.uv);
+async function pickFromLayer(layer: imageLayer, viewState: ViewState, at: Vec2): Promise<Pick | null> {
+  const viewPoint = findViewPoint(layer, viewState, at);
+  const pixel = viewPoint && pixelAt(viewPoint.view.frame, viewPoint.view.frame.zmax, ...viewPoint.uv);
   if (!pixel) return null;
-  const [ids, depths] = await Promise.all([fetchTile(layer, spot.view, "id", pixel.tile), fetchTile(layer, spot.view, "depth", pixel.tile)]);
-  return readPick(layer, spot.view, pixel, ids, depths);
+  const [ids, depths] = await Promise.all([fetchTile(layer, viewPoint.view, "id", pixel.tile), fetchTile(layer, viewPoint.view, "depth", pixel.tile)]);
+  return readPick(layer, viewPoint.view, pixel, ids, depths);
 }
 
-/** What the tiles in memory tell, finest first; null when they tell nothing. */
-export function pickLoaded(layers: readonly imageLayer[], sight: ViewState, at: Vec2): Pick | null {
+/** Picks from the tiles in memory, finest first; null when none covers the point. */
+export function pickLoaded(layers: readonly imageLayer[], viewState: ViewState, at: Vec2): Pick | null {
   let nothing: Pick | null = null;
-  for (const group of groupsAt(layers, sight, at)) {
-    const picks = group.map((layer) => pickLoadedFromLayer(layer, sight, at));
-    const pick = findNearest(picks.map((found) => (found?.layer ? found : null)), group, sight);
+  for (const group of groupsAt(layers, viewState, at)) {
+    const picks = group.map((layer) => pickLoadedFromLayer(layer, viewState, at));
+    const pick = findNearest(picks.map((found) => (found?.layer ? found : null)), group, viewState);
     if (pick) return pick;
     nothing ??= picks.find((found) => found !== null) ?? null;
   }
   return nothing;
 }
 
-/** Of the finest tile in memory; without a layer: nothing is there. */
-function pickLoadedFromLayer(layer: imageLayer, sight: ViewState, at: Vec2): Pick | null {
-  const spot = findViewPoint(layer, sight, at);
-  if (!spot) return null;
-  const { frame } = spot.view;
+/** Picks from a layer's finest tile in memory; a pick without a layer: nothing is there. */
+function pickLoadedFromLayer(layer: imageLayer, viewState: ViewState, at: Vec2): Pick | null {
+  const viewPoint = findViewPoint(layer, viewState, at);
+  if (!viewPoint) return null;
+  const { frame } = viewPoint.view;
   for (let z = frame.zmax; z >= 0; z--) {
-    const pixel = pixelAt(frame, z, ...spot.uv);
+    const pixel = pixelAt(frame, z, ...viewPoint.uv);
     if (!pixel) return null;
-    const ids = findLoadedTile(layer, spot.view, "id", pixel.tile);
-    if (ids) return readPick(layer, spot.view, pixel, ids, findLoadedTile(layer, spot.view, "depth", pixel.tile)) ?? { ...EMPTY_PICK, approximate: z < frame.zmax };
+    const ids = findLoadedTile(layer, viewPoint.view, "id", pixel.tile);
+    if (ids) return readPick(layer, viewPoint.view, pixel, ids, findLoadedTile(layer, viewPoint.view, "depth", pixel.tile)) ?? { ...EMPTY_PICK, approximate: z < frame.zmax };
   }
   return null;
 }
 
-/** Layers that show something at a point, uppermost first; those of a group hide each other by depth. */
+/** Groups the layers that are visible at a point, topmost first; the layers of a group hide each other by depth. */
 function groupsAt(layers: readonly imageLayer[], { camera }: ViewState, [x, y]: Vec2): (readonly imageLayer[])[] {
   const point: Vec2 = [x / camera.width, y / camera.height];
   return [...groupByDepth(layers.filter((layer) => layer.showsAt(point)))].reverse();
 }
 
-/** Of what a group shows at a point, by the drawers' rule. */
+/** Finds the pick of a group that the drawers show. */
 function findNearest(picks: readonly (Pick | null)[], group: readonly imageLayer[], { camera: { frame, zoom }, origin }: ViewState): Pick | null {
-  const far = (pick: Pick, k: number): number => (pick.position ? dot(frame.axes.forward, sub(pick.position, origin)) - computeBias(frame, zoom, k) : Infinity);
-  const found = picks.flatMap((pick, k) => (pick ? [{ pick, far: group.length > 1 ? far(pick, k) : 0 }] : []));
-  return found.reduce<(typeof found)[0] | null>((best, one) => (best && best.far < one.far ? best : one), null)?.pick ?? null;
+  const depth = (pick: Pick, k: number): number => (pick.position ? dot(frame.axes.forward, sub(pick.position, origin)) - computeBias(frame, zoom, k) : Infinity);
+  const found = picks.flatMap((pick, k) => (pick ? [{ pick, depth: group.length > 1 ? depth(pick, k) : 0 }] : []));
+  return found.reduce<(typeof found)[0] | null>((best, one) => (best && best.depth < one.depth ? best : one), null)?.pick ?? null;
 }
 
 interface ViewPoint {
@@ -85,11 +85,11 @@ interface ViewPoint {
   readonly uv: Vec2;
 }
 
-function findViewPoint(layer: imageLayer, sight: ViewState, [x, y]: Vec2): ViewPoint | null {
-  const { camera } = sight;
+function findViewPoint(layer: imageLayer, viewState: ViewState, [x, y]: Vec2): ViewPoint | null {
+  const { camera } = viewState;
   const view = layer.findView(camera.frame);
   if (!view || !layer.rendering) return null;
-  const [u, v] = computeCenter(view.frame, sight, layer.rendering);
+  const [u, v] = computeCenter(view.frame, viewState, layer.rendering);
   const px = cssPixelM(camera);
   return { view, uv: [u + (x - camera.width / 2) * px, v - (y - camera.height / 2) * px] };
 }
@@ -110,7 +110,7 @@ interface TilePixel {
   j: number;
 }
 
-/** null when nothing is there. */
+/** Reads a pick from tile data; null when nothing is there. */
 function readPick(layer: imageLayer, view: View, pixel: TilePixel, ids: TileData | null, depths: TileData | null): Pick | null {
   const id = readValue(ids, pixel);
   const depth = readValue(depths, pixel) ?? NO_DEPTH;
@@ -122,7 +122,7 @@ function readValue(data: TileData | null, { i, j }: TilePixel): number | undefin
   return data?.kind === "id" || data?.kind === "depth" ? data.values[j * data.width + i] : undefined;
 }
 
-/** World coordinates of a pixel's centre. */
+/** Computes the world coordinates of a pixel's centre. */
 function computePosition(layer: imageLayer, { frame }: View, { tile, i, j }: TilePixel, depth: number): Vec3 | null {
   const rendering = layer.rendering;
   if (!rendering || depth === NO_DEPTH) return null;

@@ -10,30 +10,30 @@ import type { imageLayer } from "./imageLayer";
 import { DEPTH_UNIT_M } from "./layerPlan";
 import type { ViewState } from "./layerContext";
 
-/** Surfaces that go on from a pixel to the next are at most so steep: metres of depth a metre across. */
+/** Steepest continuous surface: metres of depth per metre across. */
 const MAX_SLOPE = 8;
 const MIN_BIAS_M = 0.05;
 
 /**
- * How deep the seen surface lies, for many points of one picture, from the tiles in memory. U, V and D are metres in the camera's frame, local to
- * the camera's origin. Of several layers the nearest surface counts; what is hidden, and layers that are not seen, do not.
+ * Depths of the visible surface, read from the tiles in memory for many points of one picture. U, V and D are metres in the camera's frame, from
+ * the camera's origin. Of several layers, the nearest surface counts; hidden objects and invisible layers do not.
  */
 export class Relief {
   readonly camera: Camera;
   readonly origin: Vec3;
   readonly dpr: number;
-  /** The level whose tiles are read first. */
+  /** The level that is read first. */
   readonly level: number;
-  /** Metres a pixel of that level. */
+  /** Metres per pixel of that level. */
   readonly pixel_m: number;
-  /** Least and greatest height of what the layers hold, local. */
+  /** Minimum and maximum height of the layers' content, local. */
   readonly heights: Vec2;
   readonly #layers: readonly LayerDepths[];
   readonly #bias_m: number;
 
-  /** @param ids object ids are read, too, for `idAt` */
-  constructor(layers: readonly imageLayer[], sight: ViewState, ids = false) {
-    const { camera, origin, dpr, finer } = sight;
+  /** @param ids reads object ids as well, for `idAt` */
+  constructor(layers: readonly imageLayer[], viewState: ViewState, ids = false) {
+    const { camera, origin, dpr, finer } = viewState;
     [this.camera, this.origin, this.dpr] = [camera, origin, dpr];
     const px = cssPixelM(camera) / dpr;
     this.level = computeLevel(camera.frame, px, dpr, finer);
@@ -41,51 +41,51 @@ export class Relief {
     const { up, forward } = camera.frame.axes;
     this.#bias_m = MIN_BIAS_M + (this.pixel_m / 2) * (1 + up[2] / Math.max(-forward[2], 0.05));
     const shown = layers.filter((layer) => layer.options.opacity > 0);
-    this.#layers = shown.flatMap((layer) => LayerDepths.create(layer, sight, px, ids) ?? []);
+    this.#layers = shown.flatMap((layer) => LayerDepths.create(layer, viewState, px, ids) ?? []);
     const heights = shown.flatMap(({ rendering }) => rendering?.json.box.map(([, , z]) => z + rendering.json.origin[2] - origin[2]) ?? []);
     this.heights = heights.length > 0 ? [Math.min(...heights), Math.max(...heights)] : [0, 0];
   }
 
   /**
-   * Of a rectangle (U and V of the sight's frame) at the deepest level whose tiles in it are no more than so many; they are fetched. What cannot be
-   * had is read from what is in memory: `approximate` then, and where the level is not the deepest.
+   * Fetches the depths of a rectangle (U and V of the camera's frame) at the deepest level where it has at maxTiles `maxTiles` tiles. Missing
+   * tiles are replaced by those in memory; the result is `approximate` then, and where the level is not the deepest.
    */
-  static async fetch(layers: readonly imageLayer[], sight: ViewState, [low, high]: Rect, most: number, ids = false): Promise<{ relief: Relief; approximate: boolean }> {
-    const { frame } = sight.camera;
+  static async fetch(layers: readonly imageLayer[], viewState: ViewState, [low, high]: Rect, maxTiles: number, ids = false): Promise<{ relief: Relief; approximate: boolean }> {
+    const { frame } = viewState.camera;
     const across = (z: number): number => (((high[0] - low[0]) * 2 ** z) / frame.size + 1) * (((high[1] - low[1]) * 2 ** z) / frame.size + 1);
     let zoom = frame.zmax;
-    while (zoom > 0 && across(zoom) > most) zoom--;
-    const relief = new Relief(layers, { ...sight, camera: { ...sight.camera, zoom }, dpr: 1, finer: 0 }, ids);
-    await Promise.allSettled(relief.#layers.flatMap((sheet) => sheet.fetch([low, high])));
-    relief.#layers.forEach((sheet) => { sheet.clearPatches(); });
-    // Some may have failed, or be gone from memory before the last had come.
-    return { relief, approximate: zoom < frame.zmax || !relief.#layers.every((sheet) => sheet.isLoaded([low, high])) };
+    while (zoom > 0 && across(zoom) > maxTiles) zoom--;
+    const relief = new Relief(layers, { ...viewState, camera: { ...viewState.camera, zoom }, dpr: 1, finer: 0 }, ids);
+    await Promise.allSettled(relief.#layers.flatMap((layer) => layer.fetch([low, high])));
+    relief.#layers.forEach((layer) => { layer.clearPatches(); });
+    // Tiles may have failed, or have been dropped before the last one arrived.
+    return { relief, approximate: zoom < frame.zmax || !relief.#layers.every((layer) => layer.isLoaded([low, high])) };
   }
 
-  /** Of the nearest surface; Infinity where nothing is, NaN where that is not known (yet). */
+  /** Returns D of the nearest surface; Infinity where there is none, NaN where it is unknown. */
   depthAt(u: number, v: number): number {
     let nearest = Infinity;
-    for (const sheet of this.#layers) {
-      const depth = sheet.depthAt(u, v);
+    for (const layer of this.#layers) {
+      const depth = layer.depthAt(u, v);
       if (Number.isNaN(depth)) return NaN;
       if (depth < nearest) nearest = depth;
     }
     return nearest;
   }
 
-  /** Object id of the nearest surface; 0 where nothing is, or ids are not read. */
+  /** Returns the object id of the nearest surface; 0 where there is none, or ids are not read. */
   idAt(u: number, v: number): number {
     let [nearest, id] = [Infinity, 0];
-    for (const sheet of this.#layers) {
-      const depth = sheet.depthAt(u, v);
-      if (depth < nearest) [nearest, id] = [depth, sheet.id];
+    for (const layer of this.#layers) {
+      const depth = layer.depthAt(u, v);
+      if (depth < nearest) [nearest, id] = [depth, layer.id];
     }
     return id;
   }
 
   /**
-   * Does a surface lie before a point? A point on a surface is not hidden by it: the farthest of the 3 × 3 pixels around counts, as far as they go on from
-   * the point's own (steps of up to 8 pixels), and 5 cm, half a pixel and what level ground rises in half a pixel more. Where nothing is known, nothing hides.
+   * Whether a surface lies in front of a point. A surface does not hide its own points: counts the farthest of the 3 × 3 pixels around, as far as they continue
+   * the point's own pixel (steps of up to 8 pixels), with a tolerance of 5 cm, half a pixel, and the rise of level ground over half a pixel. Unknown depths hide nothing.
    */
   isOccluded(u: number, v: number, d: number): boolean {
     const own = this.depthAt(u, v);
@@ -93,31 +93,31 @@ export class Relief {
     if (!(own < near)) return false;
     const farthest = own + MAX_SLOPE * this.pixel_m;
     for (let k = 0; k < 9; k++) {
-      const beside = this.depthAt(u + ((k % 3) - 1) * this.pixel_m, v + (Math.floor(k / 3) - 1) * this.pixel_m);
-      if (beside >= near && beside <= farthest) return false;
+      const neighbour = this.depthAt(u + ((k % 3) - 1) * this.pixel_m, v + (Math.floor(k / 3) - 1) * this.pixel_m);
+      if (neighbour >= near && neighbour <= farthest) return false;
     }
     return true;
   }
 
-  /** Does something that is seen lie before a world position? */
+  /** Whether a visible surface lies in front of a world position. */
   isPositionOccluded(world: Vec3): boolean {
     return this.isOccluded(...uvdFromLocal(this.camera.frame.axes, sub(world, this.origin)));
   }
 
-  /** World position of the surface under CSS pixels; null where nothing is, or nothing is known. */
+  /** Returns the world position of the surface under CSS pixels; null where there is none, or it is unknown. */
   positionAt(point: Vec2): Vec3 | null {
     const [u, v] = uvFromScreen(this.camera, point);
     const d = this.depthAt(u, v);
     return Number.isFinite(d) ? add(this.origin, localFromUvd(this.camera.frame.axes, [u, v, d])) : null;
   }
 
-  /** What the depths of a rectangle (U, V) are read from: as long as the list has the same members, they are the same. */
+  /** Lists what a rectangle's depths (U, V) are read from: while the list has the same members, the depths are the same. */
   sources(rect: Rect): unknown[] {
-    return this.#layers.flatMap((sheet) => sheet.sources(rect));
+    return this.#layers.flatMap((layer) => layer.sources(rect));
   }
 }
 
-/** What the depths of a tile are read from: its own pixels or an ancestor's, those of its children, or none. */
+/** The source of a tile's depths: its own pixels or an ancestor's, those of its children, or none. */
 type Patch = "empty" | "unknown" | ChildPatches | PixelPatch;
 
 interface ChildPatches {
@@ -130,11 +130,11 @@ interface PixelPatch {
   readonly tile: Tile;
   readonly px: number;
   readonly depths: Uint32Array;
-  /** null: nobody reads them. */
+  /** null: not read. */
   readonly ids: Uint32Array | null;
 }
 
-/** Levels below the shown one that are looked into. */
+/** Number of levels below the shown one that are searched. */
 const CHILD_LEVELS = 2;
 
 /** A layer's depths in the camera's frame. */
@@ -144,21 +144,21 @@ class LayerDepths {
   readonly #fetchTile: (kind: "depth" | "id", tile: Tile) => Promise<unknown>;
   readonly #read: (kind: "depth" | "id", tile: Tile) => Uint32Array | "empty" | undefined;
   readonly #level: number;
-  /** Tiles along a side of the level. */
+  /** Tiles per side of the level. */
   readonly #tilesPerSide: number;
   readonly #unit_m: number;
-  /** From the camera's U, V and D to the layer's. */
+  /** Offset from the camera's U, V and D to the layer's. */
   readonly #shift: Vec3;
   readonly #patches = new Map<number, Patch>();
   readonly #ids: boolean;
   #last = -1;
   #patch: Patch = "empty";
-  /** Of the object whose depth was read last. */
+  /** Id of the object whose depth was read last. */
   id = 0;
 
-  static create(layer: imageLayer, sight: ViewState, px: number, ids: boolean): LayerDepths | null {
-    const [view, { rendering, tiles }] = [layer.findView(sight.camera.frame), layer];
-    return view && tiles && rendering?.layers.has("depth") ? new LayerDepths(layer, view, rendering, tiles, sight, px, ids) : null;
+  static create(layer: imageLayer, viewState: ViewState, px: number, ids: boolean): LayerDepths | null {
+    const [view, { rendering, tiles }] = [layer.findView(viewState.camera.frame), layer];
+    return view && tiles && rendering?.layers.has("depth") ? new LayerDepths(layer, view, rendering, tiles, viewState, px, ids) : null;
   }
 
   private constructor(layer: imageLayer, view: View, { json, layers }: Rendering, store: LayerTiles, { origin, dpr, finer }: ViewState, px: number, ids: boolean) {
@@ -193,13 +193,13 @@ class LayerDepths {
     return this.#readDepth(this.#patch, right, down);
   }
 
-  /** Tiles that a rectangle is read from. */
+  /** Fetches the tiles of a rectangle. */
   fetch([low, high]: Rect): Promise<unknown>[] {
     const kinds = this.#readsIds ? (["depth", "id"] as const) : (["depth"] as const);
     return this.#tilesIn([low, high]).flatMap((tile) => kinds.map((kind) => this.#fetchTile(kind, tile)));
   }
 
-  /** Are they all in memory, at the shown level? */
+  /** Whether they are all in memory, at the shown level. */
   isLoaded(rect: Rect): boolean {
     return this.#tilesIn(rect).every((tile) => {
       const patch = this.#getPatch(tile);
@@ -211,7 +211,7 @@ class LayerDepths {
     return this.#ids || this.#layer.drawStyles !== null;
   }
 
-  /** Reads anew what it has looked up. */
+  /** Forgets patches, so that they are looked up again. */
   clearPatches(): void {
     this.#patches.clear();
     this.#last = -1;

@@ -4,22 +4,22 @@ import type { imageLayer } from "./imageLayer";
 import { computeCenter } from "./layerPlan";
 import type { ViewState } from "./layerContext";
 
-/** An object that is seen, and how much of it. */
+/** A visible object and its share of the screen. */
 export interface VisibleObject {
   readonly id: number;
-  /** Share of the screen. */
+  /** Fraction of the screen that it covers. */
   readonly share: number;
 }
 
-/** Objects of a layer that are seen, the largest first. Fetches the id tiles of the level that is shown. @throws what a fetch threw */
-export async function findVisibleObjects(layer: imageLayer, sight: ViewState): Promise<VisibleObject[]> {
-  const { camera, dpr, finer } = sight;
+/** Finds the visible objects of a layer, the largest first. Fetches the id tiles of the shown level. @throws the error of a fetch */
+export async function findVisibleObjects(layer: imageLayer, viewState: ViewState): Promise<VisibleObject[]> {
+  const { camera, dpr, finer } = viewState;
   const [view, info] = [layer.findView(camera.frame), layer.rendering?.layers.get("id")];
   const { rendering, tiles } = layer;
   if (!view || !rendering || !info || !tiles) return [];
   const { frame } = view;
   const px = cssPixelM(camera);
-  const rect = computeViewRect(...computeCenter(frame, sight, rendering), camera, px);
+  const rect = computeViewRect(...computeCenter(frame, viewState, rendering), camera, px);
   const level = computeLevel(frame, px / dpr, dpr, finer);
   const pixel_m = frame.size / (frame.tilePx * 2 ** level);
   const counts = new Map<number, number>();
@@ -38,6 +38,6 @@ export async function findVisibleObjects(layer: imageLayer, sight: ViewState): P
       }
     }
   }
-  const whole = ((right - left) * (top - bottom)) / pixel_m ** 2;
-  return [...counts].map(([id, count]) => ({ id, share: count / whole })).sort((a, b) => b.share - a.share || a.id - b.id);
+  const pixelCount = ((right - left) * (top - bottom)) / pixel_m ** 2;
+  return [...counts].map(([id, count]) => ({ id, share: count / pixelCount })).sort((a, b) => b.share - a.share || a.id - b.id);
 }

@@ -8,10 +8,10 @@ interface PendingDecode {
   reject(reason: Error): void;
 }
 
-/** Workers that have had nothing to do for so long are ended: what they have thrown away (the buffers of each zlib stream above all) goes with them. Others start in milliseconds. */
+/** Idle workers end after this time, which frees their garbage (above all the buffers of zlib streams). New ones start within milliseconds. */
 const IDLE_MS = 2000;
 
-/** Decodes tiles in workers made from a blob, so that the viewer is one file. A page's CSP must allow `worker-src blob:`. */
+/** Decodes tiles in workers, created from a blob so that the viewer is one file. A page's CSP must allow `worker-src blob:`. */
 export class Decoder {
   readonly #pending = new Map<number, PendingDecode>();
   readonly #workers: Worker[] = [];
@@ -30,15 +30,15 @@ export class Decoder {
     clearTimeout(this.#idleTimer);
     return new Promise((resolve, reject) => {
       this.#pending.set(id, { resolve, reject });
-      const task: DecodeRequest = { id, kind, mediaType, bytes };
-      worker.postMessage(task, [bytes]);
+      const request: DecodeRequest = { id, kind, mediaType, bytes };
+      worker.postMessage(request, [bytes]);
     });
   }
 
   stop(): void {
     this.#endWorkers();
     if (this.#url) URL.revokeObjectURL(this.#url);
-    this.#rejectAll("the map was removed");
+    this.#rejectAll("the map has been removed");
   }
 
   #endWorkers(): void {
@@ -53,22 +53,22 @@ export class Decoder {
       this.#settle(data);
     };
     worker.onerror = (event) => {
-      this.#rejectAll(`the tile decoder cannot run: ${event.message || "blocked; the page's Content-Security-Policy needs worker-src blob:"}`);
+      this.#rejectAll(`cannot run the tile decoder: ${event.message || "the worker is blocked; add worker-src blob: to the page's Content-Security-Policy"}`);
     };
     this.#workers.push(worker);
     return worker;
   }
 
-  #settle(reply: DecodeResponse): void {
-    const waiting = this.#pending.get(reply.id);
-    this.#pending.delete(reply.id);
-    if ("error" in reply) waiting?.reject(new DecodeError(reply.error));
-    else waiting?.resolve(reply.data);
+  #settle(response: DecodeResponse): void {
+    const pending = this.#pending.get(response.id);
+    this.#pending.delete(response.id);
+    if ("error" in response) pending?.reject(new DecodeError(response.error));
+    else pending?.resolve(response.data);
     if (this.#pending.size === 0) this.#idleTimer = setTimeout(() => { this.#endWorkers(); }, IDLE_MS);
   }
 
-  #rejectAll(why: string): void {
-    for (const waiting of this.#pending.values()) waiting.reject(new DecodeError(why));
+  #rejectAll(message: string): void {
+    for (const pending of this.#pending.values()) pending.reject(new DecodeError(message));
     this.#pending.clear();
   }
 }

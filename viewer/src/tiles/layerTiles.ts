@@ -7,11 +7,11 @@ import type { TileRequest, RequestQueue } from "./queue";
 import type { Source } from "./source";
 import { computeBytes, type TileData } from "./tileData";
 
-/** A tile in memory. `data` is null when the tile is empty, or when the drawer keeps it for us. */
+/** A tile in memory. `data` is null when the tile is empty, or when only the drawer has it. */
 export interface CachedTile {
   data: TileData | null;
   readonly empty: boolean;
-  /** As it was sent, and when it came (performance.now). */
+  /** Bytes received, and when (performance.now). */
   readonly transfer: { readonly bytes: number; readonly at_ms: number };
 }
 
@@ -23,7 +23,7 @@ export interface TileResources {
 
 const RETRY_AFTER_MS = 15_000;
 
-/** The tiles of one rendering: fetched, decoded, kept. */
+/** Fetches, decodes and keeps the tiles of one image layer. */
 export class LayerTiles {
   readonly #name: string;
   readonly #source: Source;
@@ -31,43 +31,43 @@ export class LayerTiles {
   readonly #failed = new Map<string, { readonly at_ms: number; readonly error: Error }>();
   readonly #onArrival: (error: Error | null) => void;
 
-  /** @param name unique in the map  @param arrived called after each tile, with what went wrong */
-  constructor(name: string, source: Source, shared: TileResources, arrived: (error: Error | null) => void) {
+  /** @param name unique on the map  @param onArrival called after each tile, with the error if it failed */
+  constructor(name: string, source: Source, resources: TileResources, onArrival: (error: Error | null) => void) {
     this.#name = name;
     this.#source = source;
-    this.#resources = shared;
-    this.#onArrival = arrived;
+    this.#resources = resources;
+    this.#onArrival = onArrival;
   }
 
   key(view: View, layer: LayerInfo, tile: Tile): string {
     return `${this.#name}/${view.id}/${layer.name}/${tileName(tile)}`;
   }
 
-  /** The tile if it is in memory, which counts as use. */
+  /** Returns a tile in memory and counts it as used. */
   get(view: View, layer: LayerInfo, tile: Tile): CachedTile | undefined {
     return this.#resources.cache.get(this.key(view, layer, tile));
   }
 
-  /** How large a tile in memory was as it came, and when; not a use. */
+  /** Returns a tile's transfer without counting it as used. */
   getTransfer(view: View, layer: LayerInfo, tile: Tile): CachedTile["transfer"] | undefined {
     return this.#resources.cache.peek(this.key(view, layer, tile))?.transfer;
   }
 
-  /** The drawer has a copy of the tile; ours is let go. Ids and depths are to be kept: picks read them. */
+  /** Releases the data of a tile that the drawer has copied. Ids and depths must be kept for picking. */
   releaseData(view: View, layer: LayerInfo | undefined, tile: Tile): void {
-    const stored = layer && this.get(view, layer, tile);
-    if (!stored) return;
-    if (stored.data && "bitmap" in stored.data) stored.data.bitmap.close();
-    stored.data = null;
+    const loaded = layer && this.get(view, layer, tile);
+    if (!loaded) return;
+    if (loaded.data && "bitmap" in loaded.data) loaded.data.bitmap.close();
+    loaded.data = null;
   }
 
-  /** True when a tile could not be had a short time ago. */
+  /** Whether fetching a tile failed a short time ago. */
   hasFailed(view: View, layer: LayerInfo, tile: Tile): boolean {
     const failure = this.#failed.get(this.key(view, layer, tile));
     return failure !== undefined && performance.now() - failure.at_ms < RETRY_AFTER_MS;
   }
 
-  /** Forgets failures, so that tiles are asked for again. */
+  /** Forgets failures, so that their tiles are requested again. */
   clearFailures(): void {
     this.#failed.clear();
   }
@@ -77,15 +77,15 @@ export class LayerTiles {
     return { key, run: (signal) => this.#load(key, view, layer, tile, signal) };
   }
 
-  /** The decoded tile, fetched unless in memory; null when it is empty. @throws what the fetch threw */
+  /** Returns a decoded tile, fetched if it is not in memory; null when it is empty. @throws the error of the fetch */
   async fetch(view: View, layer: LayerInfo, tile: Tile): Promise<TileData | null> {
     if (!view.occupancy.has(tile)) return null;
-    const held = this.get(view, layer, tile);
-    if (held && (held.data || held.empty)) return held.data;
+    const cached = this.get(view, layer, tile);
+    if (cached && (cached.data || cached.empty)) return cached.data;
     await this.#resources.queue.runNow(this.makeRequest(view, layer, tile));
-    const stored = this.get(view, layer, tile);
-    if (!stored) throw this.#failed.get(this.key(view, layer, tile))?.error ?? new FetchError(`${this.key(view, layer, tile)}: the fetch was given up`);
-    return stored.data;
+    const loaded = this.get(view, layer, tile);
+    if (!loaded) throw this.#failed.get(this.key(view, layer, tile))?.error ?? new FetchError(`${this.key(view, layer, tile)}: the request was aborted`);
+    return loaded.data;
   }
 
   async #load(key: string, view: View, layer: LayerInfo, tile: Tile, signal: AbortSignal): Promise<void> {

@@ -8,7 +8,7 @@ interface DirectoryEntry {
   readonly id: number;
   readonly offset: number;
   readonly length: number;
-  /** Tiles in a row that share these bytes; 0: a leaf directory. */
+  /** Number of consecutive tiles that share these bytes; 0: a leaf directory. */
   readonly run: number;
 }
 
@@ -24,7 +24,7 @@ const HEADER_BYTES = 127;
 const FIRST_READ_BYTES = 16384;
 const DEPTH_LIMIT = 4;
 
-/** The tile's number along the Hilbert curves of all levels: PMTiles v3. */
+/** Returns a tile's id along the Hilbert curves of all levels: PMTiles v3. */
 export function tileId({ z, x, y }: Tile): number {
   let id = (4 ** z - 1) / 3;
   let [a, b] = [x, y];
@@ -40,7 +40,7 @@ export function tileId({ z, x, y }: Tile): number {
   return id;
 }
 
-/** Reads tiles of a PMTiles v3 archive by ranges. Directories are kept: two bytes or so a tile. */
+/** Reads tiles of a PMTiles v3 archive by byte ranges. Keeps its directories: about two bytes per tile. */
 export class Archive {
   readonly #read: ReadRange;
   readonly #name: string;
@@ -52,7 +52,7 @@ export class Archive {
     this.#read = read;
   }
 
-  /** The tile's bytes, null when it is not in the archive. */
+  /** Returns a tile's bytes; null when it is not in the archive. */
   async tile(tile: Tile, signal?: AbortSignal): Promise<ArrayBuffer | null> {
     const header = await (this.#header ??= this.#open());
     const id = tileId(tile);
@@ -92,7 +92,7 @@ export class Archive {
 
   async #decompress(bytes: ArrayBuffer, compression: number): Promise<ArrayBuffer> {
     if (compression <= 1) return bytes;
-    if (compression !== 2) throw new FetchError(`${this.#name}: compression ${String(compression)}; this viewer reads 1 (none) and 2 (gzip)`);
+    if (compression !== 2) throw new FetchError(`${this.#name}: unsupported compression ${String(compression)}; expected 1 (none) or 2 (gzip)`);
     return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
   }
 }
@@ -100,7 +100,7 @@ export class Archive {
 function readHeader(bytes: ArrayBuffer, name: string): ArchiveHeader {
   const view = new DataView(bytes);
   if (bytes.byteLength < HEADER_BYTES || view.getUint32(0) !== 0x504d5469 || view.getUint8(7) !== 3) {
-    throw new FetchError(`${name}: no PMTiles archive of version 3`);
+    throw new FetchError(`${name}: not a PMTiles archive of version 3`);
   }
   const long = (at: number): number => Number(view.getBigUint64(at, true));
   return { root: [long(8), long(16)], leaves: long(40), tiles: long(56), internal: view.getUint8(97), compression: view.getUint8(98) };
@@ -111,7 +111,7 @@ function readDirectory(bytes: Uint8Array): DirectoryEntry[] {
   const varint = (): number => {
     for (let value = 0, place = 1; ; place *= 128) {
       const byte = bytes[at++];
-      if (byte === undefined) throw new FetchError("a PMTiles directory ends too early");
+      if (byte === undefined) throw new FetchError("a PMTiles directory is truncated");
       value += (byte & 127) * place;
       if (byte < 128) return value;
     }
@@ -135,7 +135,7 @@ function makeEntries(steps: number[], runs: number[], lengths: number[], offsets
   return entries;
 }
 
-/** The last entry at or before the id, when it holds it. */
+/** Finds the entry that contains an id. */
 function findEntry(entries: DirectoryEntry[], id: number): DirectoryEntry | null {
   let [low, high] = [0, entries.length];
   while (low < high) {

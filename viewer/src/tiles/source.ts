@@ -5,29 +5,29 @@ import { fetchBytes, fetchJson, type FetchFunction, type FetchOptions } from "./
 import { Archive } from "./pmtiles";
 import { normalizeBaseUrl, tileUrls } from "./url";
 
-/** Where a rendering comes from: its manifest, what lies beside it, and its encoded tiles. Several layers may share one. */
+/** The origin of a rendering: its manifest, the files next to it, and its encoded tiles. Several layers may share one. */
 export interface Source {
-  /** The checked manifest. @throws ManifestError, FetchError */
+  /** Returns the checked manifest. @throws ManifestError, FetchError */
   manifest(signal?: AbortSignal): Promise<Rendering>;
-  /** A file beside the manifest, parsed; null when there is none. @throws FetchError */
+  /** Returns a parsed file from the manifest's folder; null when it does not exist. @throws FetchError */
   json(path: string): Promise<unknown>;
-  /** The encoded tile, which the caller owns; null when it is empty. @throws FetchError, or the signal's reason */
+  /** Returns the encoded tile, owned by the caller; null when it is empty. @throws FetchError, or the signal's reason */
   tile(view: View, layer: LayerInfo, tile: Tile, signal?: AbortSignal): Promise<ArrayBuffer | null>;
 }
 
-/** A rendering behind URLs: tile URLs over several hosts, or archives when the manifest names them. */
+/** Reads a rendering over HTTP: tiles spread over several hosts, or archives if the manifest lists them. */
 export class HttpSource implements Source {
-  /** Base URLs, in full. */
+  /** Absolute base URLs. */
   readonly bases: readonly string[];
   readonly #fetch: FetchFunction | undefined;
   readonly #archives = new Map<string, Archive>();
 
-  /** @param ask in place of the browser's fetch  @throws UsageError without a URL */
-  constructor(urls: string | readonly string[], ask?: FetchFunction) {
+  /** @param fetch replaces the browser's fetch  @throws UsageError without a URL */
+  constructor(urls: string | readonly string[], fetch?: FetchFunction) {
     const list = typeof urls === "string" ? [urls] : urls;
     if (list.length === 0) throw new UsageError("an imageLayer needs at least one base URL, e.g. \"https://host/tiles/teatime\"");
     this.bases = list.map((url) => normalizeBaseUrl(url, document.baseURI));
-    this.#fetch = ask;
+    this.#fetch = fetch;
   }
 
   async json(path: string): Promise<unknown> {

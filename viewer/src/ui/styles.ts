@@ -1,4 +1,4 @@
-/** The viewer's own style sheet. Pages restyle it through the custom properties. */
+/** The viewer's style sheet. Pages adapt it through the custom properties. */
 export const STYLES = `
 .map3d {
   --map3d-accent: #0e7490;

@@ -196,7 +196,7 @@ test("a broken tile is named in an error; the rest is shown", async () => {
   const { page } = await bed.start(name, { zoom: 3.5 });
   const errors = await page.evaluate(() => (globalThis as Global).errors);
   expect(errors.length).toBe(1);
-  expect(errors[0]).toMatch(/tile 0-45\/normal\/3\/3\/4: no PNG: 3 bytes/);
+  expect(errors[0]).toMatch(/tile 0-45\/normal\/3\/3\/4: not a PNG: 3 bytes/);
   await page.context().close();
 });
 
@@ -312,7 +312,7 @@ test("what is asked before the manifest is here and cannot be done is said, and 
     new g.map3d.imageLayer(url).addTo(view);
   }), bed.url("town"));
   expect(said[0]).toHaveLength(1);
-  expect(said[0][0]).toMatch(/^view "5-5" is none of 0-45, /);
+  expect(said[0][0]).toMatch(/^unknown view "5-5"; the rendering has 0-45, /);
   expect(said[1]).toBe("90-45");
   await page.context().close();
 });

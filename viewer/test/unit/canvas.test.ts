@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
 import type { Pass } from "../../src/draw/drawer";
-import { listNeighbourKinds, listKinds, makeShadingOptions, type ShadingOptions } from "../../src/draw/canvas/shadingOptions";
-import { computeTileLight, type Lamp, type LightLayers } from "../../src/draw/canvas/tileLight";
+import { listNeighbourKinds, listKinds, makeShadingOptions, type ShadingOptions, type TileLight } from "../../src/draw/canvas/shadingOptions";
+import { computeTileLight, type LightLayers } from "../../src/draw/canvas/tileLight";
 import type { DrawStyles } from "../../src/draw/drawStyle";
 import { computeIdColor, shadeTile, type TileNeighbours, type StylesById } from "../../src/draw/canvas/shadeTile";
 import { findArea, makeGrid } from "../../src/draw/canvas/tileMosaic";
@@ -9,7 +9,7 @@ import { placeQuads } from "../../src/draw/quads";
 import { makeFrame } from "../../src/geo/frame";
 import { DEFAULT_LIGHT, towardsLight } from "../../src/geo/light";
 
-const LAMP: Lamp = { sun: towardsLight(DEFAULT_LIGHT), sky: [0.42, 0.42, 0.42], beam: [0.76, 0.76, 0.76], occlusion: false, shadow: null };
+const LAMP: TileLight = { sun: towardsLight(DEFAULT_LIGHT), sky: [0.42, 0.42, 0.42], beam: [0.76, 0.76, 0.76], occlusion: false, shadow: null };
 const LOOK: ShadingOptions = { mode: "id", masked: false, light: null, highlight: null, styles: null, rim: [0, 0], depthRange: null, combined: false, masks: [] };
 const UNSAID: StylesById = { colors: undefined, styles: undefined };
 const ALONE: TileNeighbours = { lightLayers: [], id: [], masks: [] };
@@ -49,7 +49,7 @@ describe("light", () => {
 
   test("is dimmed by occlusion and shadows, each pixel by its own", () => {
     const shades = (ao: number, suns: number): LightLayers => ({ ...bytes(UP), ao: Uint8Array.of(ao), shadow: Uint16Array.of(suns) });
-    const lamp: Lamp = { ...LAMP, occlusion: true, shadow: { kind: "sun16", first: 3, second: 4, share: 0.25 } };
+    const lamp: TileLight = { ...LAMP, occlusion: true, shadow: { kind: "sun16", first: 3, second: 4, share: 0.25 } };
     const [sky, sun] = computeTileLight(lamp, 1, 1, shades(255, 0b01000), [shades(51, 0b10000), shades(51, 0), shades(255, 0b11000), undefined]);
     expect(sky).toBeCloseTo(0.5 + (0.2 + 0.2 + 1 + 1) / 8, 6);
     expect(sun).toBeCloseTo(strength(UP) * (0.75 / 2 + (0.25 + 0 + 1 + 0.75) / 8), 6);

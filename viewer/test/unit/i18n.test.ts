@@ -22,11 +22,11 @@ test("the page markup uses only known messages", () => {
   expect(keys.filter((key) => !MESSAGE_KEYS.has(key))).toEqual([]);
 });
 
-test.each(["en", "de", "fr", "de-AT", "it", ""])("%s: every control has a name, every wind another", (language) => {
-  const { looking, scale, winds, ...names } = getMapMessages(language);
+test.each(["en", "de", "fr", "de-AT", "it", ""])("%s: every control has a name, every wind a different one", (language) => {
+  const { facing, scale, winds, ...names } = getMapMessages(language);
   expect(Object.values(names).every((name) => name.trim() !== "")).toBe(true);
   expect(new Set(winds).size).toBe(8);
-  for (const wind of winds) expect(looking(wind)).toContain(wind);
+  for (const wind of winds) expect(facing(wind)).toContain(wind);
   expect(scale("20 m")).toContain("20 m");
 });
 

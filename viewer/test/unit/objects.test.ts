@@ -27,7 +27,7 @@ test("what could not be fetched is asked for again; what could is kept", async (
 });
 
 test("a file of another kind or version is refused by name; one that is not there is empty", async () => {
-  await expect(new Objects(sourceOf({ map3d: "search", version: 2, entries: [] }), json).search()).rejects.toThrow('objects/search.json: expected map3d "search" of version 1, got search 2');
+  await expect(new Objects(sourceOf({ map3d: "search", version: 2, entries: [] }), json).search()).rejects.toThrow('objects/search.json: expected map3d "search" version 1, got "search" version 2');
   expect(await new Objects(sourceOf(null), json).attributes()).toEqual([]);
   expect(await new Objects(sourceOf({ map3d: "objects", version: 1, objects: {} }), json).find(5)).toBeNull();
 });

@@ -60,17 +60,17 @@ describe("a PNG that is none of ours is refused", () => {
     return new Uint8Array(Buffer.concat([good.subarray(0, 33), head, body, Buffer.alloc(4)]));
   };
   test.each([
-    ["empty", new Uint8Array(0), /no PNG/],
-    ["a JPEG", Uint8Array.of(0xff, 0xd8, 0xff), /no PNG/],
-    ["cut off", good.slice(0, 60), /ends within/],
-    ["no pixels", good.slice(0, 33), /without IHDR or IDAT/],
+    ["empty", new Uint8Array(0), /not a PNG/],
+    ["a JPEG", Uint8Array.of(0xff, 0xd8, 0xff), /not a PNG/],
+    ["cut off", good.slice(0, 60), /is truncated/],
+    ["no pixels", good.slice(0, 33), /no IHDR or no IDAT/],
     ["16 bits", changed(24, 16), /16 bits/],
     ["palette", changed(25, 3), /colour type 3/],
     ["interlaced", changed(28, 1), /interlace 1/],
-    ["huge", changed(16, 0x7f), /tiles have 1 to 4096/],
+    ["huge", changed(16, 0x7f), /expected 1 to 4096/],
     ["no width", changed(19, 0), /PNG of 0 × 8/],
-    ["too few pixels", withPixels(new Uint8Array(100)), /do not have the 264 bytes/],
-    ["too many pixels", withPixels(new Uint8Array(265)), /do not have the 264 bytes/],
+    ["too few pixels", withPixels(new Uint8Array(100)), /does not have the 264 bytes/],
+    ["too many pixels", withPixels(new Uint8Array(265)), /does not have the 264 bytes/],
     ["unknown filter", withPixels(new Uint8Array(264).fill(9)), /filter 9/],
     ["broken stream", changed(45, 0xff), /zlib|264 bytes|filter/],
   ])("%s", async (_, bytes, message) => {
@@ -102,6 +102,6 @@ describe("data", () => {
   });
 
   test("an id tile without alpha is refused", async () => {
-    await expect(decodeTile("id", "image/png", encodePng(1, 1, 3, new Uint8Array(3)).buffer)).rejects.toThrow(/an? id tile has 4 bytes a pixel, got 3/);
+    await expect(decodeTile("id", "image/png", encodePng(1, 1, 3, new Uint8Array(3)).buffer)).rejects.toThrow(/id tiles have 4 bytes per pixel, got 3/);
   });
 });

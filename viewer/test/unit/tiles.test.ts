@@ -293,6 +293,6 @@ describe("PMTiles", () => {
   });
 
   test("a file that is no archive is refused", async () => {
-    await expect(new Archive("x.pmtiles", () => Promise.resolve(new ArrayBuffer(200))).tile({ z: 0, x: 0, y: 0 })).rejects.toThrow(/no PMTiles/);
+    await expect(new Archive("x.pmtiles", () => Promise.resolve(new ArrayBuffer(200))).tile({ z: 0, x: 0, y: 0 })).rejects.toThrow(/not a PMTiles/);
   });
 });

@@ -82,10 +82,10 @@ describe("renderings on one map", () => {
   });
 
   test("are refused with the reason", () => {
-    expect(findIncompatibility(rendering({}), rendering({ epsg: 2056, name: "LV95" }))).toMatch(/CRS "EPSG:2056 LV95".*"EPSG:25832 UTM 32"/);
-    expect(findIncompatibility(rendering({ epsg: null, name: "a" }), rendering({ epsg: null, name: "b" }))).toMatch(/CRS "b"/);
+    expect(findIncompatibility(rendering({}), rendering({ epsg: 2056, name: "LV95" }))).toMatch(/CRS is "EPSG:2056 LV95".*"EPSG:25832 UTM 32"/);
+    expect(findIncompatibility(rendering({ epsg: null, name: "a" }), rendering({ epsg: null, name: "b" }))).toMatch(/CRS is "b"/);
     expect(findIncompatibility(rendering({ epsg: null, wkt: "A" }), rendering({ epsg: null, wkt: "B" }))).toMatch(/CRS/);
     expect(findIncompatibility(rendering({ vertical: "DHHN2016" }), rendering({ vertical: "NAP" }))).toMatch(/heights are NAP.*DHHN2016/);
-    expect(findIncompatibility(rendering({}), rendering({}, [[0, 30]]))).toMatch(/no direction of the map: 0:30 for 0:45/);
+    expect(findIncompatibility(rendering({}), rendering({}, [[0, 30]]))).toMatch(/none of the map's views: it has 0:30, the map has 0:45/);
   });
 });

@@ -22,7 +22,7 @@ interface WantedTile {
   readonly distance: number;
 }
 
-/** Draws on 2D canvases. A worker shades the tiles; until a tile is ready, others fallback in for it. */
+/** Draws on 2D canvases. A worker shades the tiles; until a tile is ready, others take its place. */
 export class CanvasDrawer implements Drawer {
   readonly name = "canvas";
   readonly gl = null;
@@ -134,16 +134,16 @@ export class CanvasDrawer implements Drawer {
   /** Makes a request; an up-to-date picture has an empty urgency. */
   #makeRequest(passes: readonly Pass[], pass: Pass, picture: TilePicture, { from, options, layers, distance }: WantedTile): PictureRequest {
     const { tiles } = pass;
-    const shown = { ...restrictOptions(options, (kind) => layers[kind] !== undefined), masks: this.#findMasks(passes, pass, from) };
+    const restricted = { ...restrictOptions(options, (kind) => layers[kind] !== undefined), masks: this.#findMasks(passes, pass, from) };
     const neighbours: Partial<Record<LayerKind, string[]>> = {};
     let edges = 0;
-    for (const [number, kind] of listNeighbourKinds(shown).entries()) {
+    for (const [number, kind] of listNeighbourKinds(restricted).entries()) {
       const keys = NEIGHBOURS.map(([dx, dy]) => tiles.key(kind, { z: from.z, x: from.x + dx, y: from.y + dy }));
       keys.forEach((key, k) => (edges |= this.#uploaded.has(key) ? 1 << (k + 4 * number) : 0));
       neighbours[kind] = keys;
     }
-    const text = JSON.stringify(shown);
-    return { picture, options: text, edges, request: { options: shown, layers, neighbours }, urgency: computeUrgency(picture, text, edges, distance) };
+    const text = JSON.stringify(restricted);
+    return { picture, options: text, edges, request: { options: restricted, layers, neighbours }, urgency: computeUrgency(picture, text, edges, distance) };
   }
 
   /** Finds tiles of other layers that may hide parts of this tile. */

@@ -1,49 +1,49 @@
 import type { Rgb } from "../color";
 import { TINT_OPACITY, DIM_GREY, type DrawStyles } from "../drawStyle";
-import type { ShadingOptions } from "./shadingOptions";
-import { computeTileLight, type Lamp } from "./tileLight";
+import type { ShadingOptions, TileLight } from "./shadingOptions";
+import { computeTileLight } from "./tileLight";
 import { forEachHidden } from "./mask";
 import { forEachStyled, forEachHighlighted, packRgba, makeLightMixer, type TileNeighbours, type TileLayers, type StylesById } from "./shadeTile";
 
 /**
- * A colour tile's picture made by compositing alone, for browsers that do not let pixels be read exactly. Light
- * multiplies sRGB values by its 2.2nd root, which stays within a few bytes of linear light.
+ * Shades a colour tile by compositing alone, for browsers that do not return pixels exactly. Light
+ * multiplies sRGB values by its 2.2nd root, which stays within a few bytes of the result in linear light.
  */
-export function composeTile(look: ShadingOptions, bitmap: ImageBitmap, layers: TileLayers, around: TileNeighbours, { colors, styles }: StylesById): ImageBitmap {
+export function composeTile(options: ShadingOptions, bitmap: ImageBitmap, layers: TileLayers, neighbours: TileNeighbours, { colors, styles }: StylesById): ImageBitmap {
   const { width, height } = layers;
   const context = makeContext(width, height);
   context.drawImage(bitmap, 0, 0);
   const hidden = styles && layers.id ? applyStyles(context, layers.id, styles) : null;
-  if (look.light && layers.lightLayers) applyLight(context, look.light, computeTileLight(look.light, width, height, layers.lightLayers, around.lightLayers));
+  if (options.light && layers.lightLayers) applyLight(context, options.light, computeTileLight(options.light, width, height, layers.lightLayers, neighbours.lightLayers));
   context.globalCompositeOperation = "destination-in";
-  context.drawImage(look.masked && layers.id ? makeImage(width, height, (at) => (layers.id?.[at] ? 0xff000000 : 0)) : bitmap, 0, 0);
+  context.drawImage(options.masked && layers.id ? makeImage(width, height, (at) => (layers.id?.[at] ? 0xff000000 : 0)) : bitmap, 0, 0);
   if (hidden) {
     context.globalCompositeOperation = "destination-out";
     context.drawImage(hidden, 0, 0);
   }
-  if (colors) applyHighlights(context, look, layers, around, colors);
-  if (layers.depth && around.masks.length > 0) {
+  if (colors) applyHighlights(context, options, layers, neighbours, colors);
+  if (layers.depth && neighbours.masks.length > 0) {
     const behind = new Uint32Array(width * height);
-    forEachHidden(width, height, layers.depth, around.masks, (at) => (behind[at] = 0xff000000));
+    forEachHidden(width, height, layers.depth, neighbours.masks, (at) => (behind[at] = 0xff000000));
     context.globalCompositeOperation = "destination-out";
     context.drawImage(makeImage(width, height, (at) => behind[at] ?? 0), 0, 0);
   }
   return context.canvas.transferToImageBitmap();
 }
 
-/** Colours and greys laid over; what is hidden comes back as an image, since alpha is spoilt until the end. */
-function applyStyles(context: OffscreenCanvasRenderingContext2D, id: Uint32Array, finishes: DrawStyles): OffscreenCanvas {
+/** Draws tints and greys. Returns hidden pixels as an image, since alpha is not valid until the end. */
+function applyStyles(context: OffscreenCanvasRenderingContext2D, id: Uint32Array, styles: DrawStyles): OffscreenCanvas {
   const { width, height } = context.canvas;
   const [paints, pale, hidden] = [new Uint32Array(id.length), new Uint32Array(id.length), new Uint32Array(id.length)];
-  forEachStyled(id, finishes, (at, word) => {
+  forEachStyled(id, styles, (at, word) => {
     const kind = word >>> 24;
     (kind === 1 ? paints : kind === 3 ? pale : hidden)[at] = kind === 1 ? (word | 0xff000000) >>> 0 : packRgba([DIM_GREY[0], DIM_GREY[0], DIM_GREY[0]]);
   });
-  const greyed = makeGreyCopy(context.canvas);
-  greyed.globalCompositeOperation = "destination-in";
-  greyed.drawImage(makeImage(width, height, (at) => pale[at] ?? 0), 0, 0);
+  const greyCopy = makeGreyCopy(context.canvas);
+  greyCopy.globalCompositeOperation = "destination-in";
+  greyCopy.drawImage(makeImage(width, height, (at) => pale[at] ?? 0), 0, 0);
   context.globalCompositeOperation = "source-atop";
-  drawOver(context, greyed.canvas, 1);
+  drawOver(context, greyCopy.canvas, 1);
   drawOver(context, makeImage(width, height, (at) => pale[at] ?? 0), DIM_GREY[1]);
   drawOver(context, makeImage(width, height, (at) => paints[at] ?? 0), TINT_OPACITY);
   return makeImage(width, height, (at) => hidden[at] ?? 0);
@@ -61,15 +61,15 @@ function makeImage(width: number, height: number, word: (at: number) => number):
   return context.canvas;
 }
 
-/** Light up to 1 multiplies; what is above 1 divides by its inverse, which "color-dodge" does. Alpha is spoilt. */
-function applyLight(context: OffscreenCanvasRenderingContext2D, lamp: Lamp, shares: Float32Array): void {
+/** Multiplies by light up to 1; above 1 divides by the inverse with "color-dodge". Invalidates alpha. */
+function applyLight(context: OffscreenCanvasRenderingContext2D, light: TileLight, shares: Float32Array): void {
   const { width, height } = context.canvas;
   const roots = ([0, 1, 2] as const).map((channel) => {
-    const strength = makeLightMixer(lamp, channel);
+    const strength = makeLightMixer(light, channel);
     return Float32Array.from({ length: width * height }, (_, at) => strength(shares[2 * at] as number, shares[2 * at + 1] as number) ** (1 / 2.2));
   });
   const wordOf = (at: number, byte: (root: number) => number): number => packRgba(roots.map((root) => byte(root[at] ?? 1)) as unknown as Rgb);
-  // Drawn upon themselves, pixels in part covered become opaque and keep their colour, as blending wants it.
+  // Draws partly covered pixels over themselves until they are opaque with the same colour, as blending needs.
   context.globalCompositeOperation = "source-over";
   for (let k = 0; k < 8; k++) context.drawImage(context.canvas, 0, 0);
   context.globalCompositeOperation = "multiply";
@@ -79,11 +79,11 @@ function applyLight(context: OffscreenCanvasRenderingContext2D, lamp: Lamp, shar
   context.drawImage(makeImage(width, height, (at) => wordOf(at, (root) => Math.max(1 - 1 / root, 0))), 0, 0);
 }
 
-/** tint × (½ + 0.65 grey) over 28 % of the colour; the rim on top, opaque. */
-function applyHighlights(context: OffscreenCanvasRenderingContext2D, look: ShadingOptions, layers: TileLayers, around: TileNeighbours, colors: ReadonlyMap<number, Rgb>): void {
+/** Draws tint × (½ + 0.65 grey) over 28 % of the colour, and the opaque rim on top. */
+function applyHighlights(context: OffscreenCanvasRenderingContext2D, options: ShadingOptions, layers: TileLayers, neighbours: TileNeighbours, colors: ReadonlyMap<number, Rgb>): void {
   const { width, height } = layers;
   const [bodies, rims] = [new Uint32Array(width * height), new Uint32Array(width * height)];
-  forEachHighlighted(look, layers, around, colors, (at, color, rim) => {
+  forEachHighlighted(options, layers, neighbours, colors, (at, color, rim) => {
     (rim ? rims : bodies)[at] = packRgba(color);
   });
   const tints = makeImage(width, height, (at) => bodies[at] ?? 0);

@@ -3,7 +3,7 @@ import type { Clip } from "../depthMapping";
 import type { FrameState } from "../drawer";
 import { getContext2d, TileMosaic, type Grid, type MosaicTile } from "./tileMosaic";
 
-/** What a pass shows. */
+/** The tiles of a pass, ready to be composed. */
 export interface ComposedPass {
   readonly grid: Grid;
   readonly tiles: readonly MosaicTile[];
@@ -12,26 +12,26 @@ export interface ComposedPass {
   readonly clip: Clip | null;
 }
 
-/** How passes come to be seen. */
+/** Shows the passes of a frame. */
 export interface Compositor {
-  /** What they are seen in. */
+  /** The element that shows them. */
   readonly element: HTMLElement;
-  /** All of a frame, the lowest first. */
+  /** Shows all passes of a frame, the lowest first. */
   show(screen: FrameState, passes: readonly ComposedPass[]): void;
   remove(): void;
 }
 
-/** Painted on a canvas, whose pixels can be read. */
+/** Draws passes on a canvas, whose pixels can be read. */
 export class CanvasCompositor implements Compositor {
   readonly #context: CanvasRenderingContext2D;
-  readonly #sheet = new TileMosaic();
+  readonly #mosaic = new TileMosaic();
   readonly #listeners = new AbortController();
 
-  /** @param lost the browser has lost what was drawn  @throws DrawError */
+  /** @param lost called when the browser has lost the content  @throws DrawError */
   constructor(canvas: HTMLCanvasElement, lost: () => void) {
     this.#context = getContext2d(canvas);
-    for (const each of [canvas, this.#sheet.canvas]) each.addEventListener("contextrestored", () => {
-      this.#sheet.invalidate();
+    for (const each of [canvas, this.#mosaic.canvas]) each.addEventListener("contextrestored", () => {
+      this.#mosaic.invalidate();
       lost();
     }, { signal: this.#listeners.signal });
   }
@@ -51,11 +51,11 @@ export class CanvasCompositor implements Compositor {
 
   remove(): void {
     this.#listeners.abort();
-    this.#sheet.empty();
+    this.#mosaic.empty();
   }
 
   #paint(screen: FrameState, { grid, tiles, smooth, opacity, clip }: ComposedPass): void {
-    const window = this.#sheet.update(screen, grid, tiles, smooth, 0);
+    const window = this.#mosaic.update(screen, grid, tiles, smooth, 0);
     if (!window) return;
     const [[x0, y0, x1, y1], { left, top, px }, context] = [window, grid, this.#context];
     if (clip) {
@@ -66,14 +66,14 @@ export class CanvasCompositor implements Compositor {
     }
     context.imageSmoothingEnabled = smooth && px !== 1;
     context.globalAlpha = opacity;
-    context.drawImage(this.#sheet.canvas, 0, 0, x1 - x0, y1 - y0, left + x0 * px, top + y0 * px, (x1 - x0) * px, (y1 - y0) * px);
+    context.drawImage(this.#mosaic.canvas, 0, 0, x1 - x0, y1 - y0, left + x0 * px, top + y0 * px, (x1 - x0) * px, (y1 - y0) * px);
   }
 }
 
-/** Pixels of the level beyond what is seen that are there when the picture is moved. */
+/** Margin of level pixels around the visible window, ready for movements. */
 const MARGIN_PX = 64;
 
-/** Page styles for any canvas or block (widths, margins, frames) must not reach what is so styled. */
+/** Shields the elements from the page's styles for canvases and blocks (widths, margins, borders). */
 const RESET_CSS = "all:initial;position:absolute;pointer-events:none;";
 
 function makeBlock(name: string): HTMLElement {
@@ -82,13 +82,13 @@ function makeBlock(name: string): HTMLElement {
   return made;
 }
 
-/** Elements of the page, below a canvas: the browser moves and scales what has not changed, which takes a quarter of the work that painting does, and memory for pixels of the level alone. */
+/** Places mosaics as elements below the canvas: the browser moves and scales unchanged ones, which takes a quarter of the work of drawing, and needs memory for the level's pixels only. */
 export class CssCompositor implements Compositor {
   readonly element = makeBlock("map3d-mosaics");
   readonly #lost: () => void;
-  readonly #layers: { readonly box: HTMLElement; readonly sheet: TileMosaic }[] = [];
+  readonly #layers: { readonly box: HTMLElement; readonly mosaic: TileMosaic }[] = [];
 
-  /** @param lost the browser has lost what was drawn  @throws DrawError */
+  /** @param lost called when the browser has lost the content  @throws DrawError */
   constructor(canvas: HTMLCanvasElement, lost: () => void) {
     this.#lost = lost;
     this.#getLayer(0);
@@ -99,43 +99,43 @@ export class CssCompositor implements Compositor {
 
   show(screen: FrameState, passes: readonly ComposedPass[]): void {
     passes.forEach((pass, k) => { this.#show(screen, pass, this.#getLayer(k)); });
-    for (const { box, sheet } of this.#layers.splice(passes.length)) {
+    for (const { box, mosaic } of this.#layers.splice(passes.length)) {
       box.remove();
-      sheet.empty();
+      mosaic.empty();
     }
   }
 
   remove(): void {
     this.element.remove();
-    for (const { sheet } of this.#layers) sheet.empty();
+    for (const { mosaic } of this.#layers) mosaic.empty();
   }
 
-  #show(screen: FrameState, { grid, tiles, smooth, opacity, clip }: ComposedPass, { box, sheet }: { box: HTMLElement; sheet: TileMosaic }): void {
-    const [x, y] = sheet.update(screen, grid, tiles, smooth, MARGIN_PX) ?? [0, 0];
+  #show(screen: FrameState, { grid, tiles, smooth, opacity, clip }: ComposedPass, { box, mosaic }: { box: HTMLElement; mosaic: TileMosaic }): void {
+    const [x, y] = mosaic.update(screen, grid, tiles, smooth, MARGIN_PX) ?? [0, 0];
     const [scale, css] = [grid.px / screen.dpr, (at: number): string => `${String(at / screen.dpr)}px`];
-    const { canvas } = sheet;
+    const { canvas } = mosaic;
     Object.assign(canvas.style, { width: `${String(canvas.width)}px`, height: `${String(canvas.height)}px`, transform: `translate(${css(grid.left + x * grid.px)}, ${css(grid.top + y * grid.px)}) scale(${String(scale)})`, imageRendering: smooth ? "auto" : "pixelated" });
     const [left, top, right, bottom] = computeClip(clip ?? [0, 0, 1, 1], screen);
     Object.assign(box.style, { opacity: String(opacity), clipPath: clip ? `inset(${css(top)} ${css(screen.width - right)} ${css(screen.height - bottom)} ${css(left)})` : "" });
   }
 
-  #getLayer(k: number): { box: HTMLElement; sheet: TileMosaic } {
+  #getLayer(k: number): { box: HTMLElement; mosaic: TileMosaic } {
     const known = this.#layers[k];
     if (known) return known;
-    const place = { box: makeBlock(""), sheet: new TileMosaic() };
-    place.sheet.canvas.style.cssText = `${RESET_CSS}left:0;top:0;transform-origin:0 0;will-change:transform`;
-    place.sheet.canvas.addEventListener("contextrestored", () => {
-      place.sheet.invalidate();
+    const layer = { box: makeBlock(""), mosaic: new TileMosaic() };
+    layer.mosaic.canvas.style.cssText = `${RESET_CSS}left:0;top:0;transform-origin:0 0;will-change:transform`;
+    layer.mosaic.canvas.addEventListener("contextrestored", () => {
+      layer.mosaic.invalidate();
       this.#lost();
     });
-    place.box.append(place.sheet.canvas);
-    this.element.append(place.box);
-    this.#layers.push(place);
-    return place;
+    layer.box.append(layer.mosaic.canvas);
+    this.element.append(layer.box);
+    this.#layers.push(layer);
+    return layer;
   }
 }
 
-/** Left, top, right, bottom in whole device pixels. */
+/** Computes a clip in whole device pixels: left, top, right, bottom. */
 function computeClip([left, top, right, bottom]: Clip, { width, height }: FrameState): [number, number, number, number] {
   return [Math.round(left * width), Math.round(top * height), Math.round(right * width), Math.round(bottom * height)];
 }

@@ -1,10 +1,10 @@
 import type { Rgb } from "../color";
 import { packStyle, TINT_OPACITY, DIM_GREY, type DrawStyles } from "../drawStyle";
-import type { ShadingOptions } from "./shadingOptions";
-import { computeTileLight, type Lamp, type LightLayers } from "./tileLight";
+import type { ShadingOptions, TileLight } from "./shadingOptions";
+import { computeTileLight, type LightLayers } from "./tileLight";
 import { forEachHidden, type MaskLayers } from "./mask";
 
-/** A tile's layers; pixels row by row from the top. */
+/** A tile's layers; pixels by rows from the top. */
 export interface TileLayers {
   readonly width: number;
   readonly height: number;
@@ -15,7 +15,7 @@ export interface TileLayers {
   readonly depth?: Uint32Array | undefined;
 }
 
-/** Of the tiles to the left, to the right, above and below, as far as they are here. */
+/** Values of the tiles to the left, to the right, above and below, where loaded. */
 export type Neighbours<T> = readonly (T | undefined)[];
 
 export interface TileNeighbours {
@@ -25,7 +25,7 @@ export interface TileNeighbours {
   readonly masks: readonly MaskLayers[];
 }
 
-/** What is said of objects by id. */
+/** Highlight colours and styles of objects. */
 export interface StylesById {
   readonly colors: ReadonlyMap<number, Rgb> | undefined;
   readonly styles: DrawStyles | undefined;
@@ -33,15 +33,15 @@ export interface StylesById {
 
 type Bytes = Uint8ClampedArray<ArrayBuffer>;
 
-/** RGBA with straight alpha: what the fragment shader of the WebGL drawer makes at the middle of each tile pixel. */
-export function shadeTile(look: ShadingOptions, layers: TileLayers, around: TileNeighbours, { colors, styles }: StylesById): Bytes {
+/** Shades a tile to RGBA with straight alpha, like the WebGL drawer's fragment shader at the centre of each tile pixel. */
+export function shadeTile(options: ShadingOptions, layers: TileLayers, neighbours: TileNeighbours, { colors, styles }: StylesById): Bytes {
   const out: Bytes = new Uint8ClampedArray(layers.width * layers.height * 4);
-  if (look.mode === "normal") paintNormals(out, layers);
-  else if (look.mode === "id") paintIds(out, layers);
-  else if (look.mode === "depth") paintDepths(out, layers, look.depthRange ?? [0, 1]);
-  else paintColors(out, look, layers, around, styles);
-  if (colors && layers.id) paintHighlights(out, look, layers, around, colors);
-  if (layers.depth) forEachHidden(layers.width, layers.height, layers.depth, around.masks, (at) => (out[4 * at + 3] = 0));
+  if (options.mode === "normal") paintNormals(out, layers);
+  else if (options.mode === "id") paintIds(out, layers);
+  else if (options.mode === "depth") paintDepths(out, layers, options.depthRange ?? [0, 1]);
+  else paintColors(out, options, layers, neighbours, styles);
+  if (colors && layers.id) paintHighlights(out, options, layers, neighbours, colors);
+  if (layers.depth) forEachHidden(layers.width, layers.height, layers.depth, neighbours.masks, (at) => (out[4 * at + 3] = 0));
   return out;
 }
 
@@ -58,14 +58,14 @@ function toSrgb(c: number): number {
   return c <= 0.0031308 ? c * 12.92 : 1.055 * c ** (1 / 2.4) - 0.055;
 }
 
-function paintColors(out: Bytes, look: ShadingOptions, layers: TileLayers, around: TileNeighbours, finishes: DrawStyles | undefined): void {
+function paintColors(out: Bytes, options: ShadingOptions, layers: TileLayers, neighbours: TileNeighbours, styles: DrawStyles | undefined): void {
   const { color = out, id } = layers;
   out.set(color);
-  for (let at = 0; look.masked && id && at < id.length; at++) out[4 * at + 3] = id[at] === 0 ? 0 : 255;
-  if (finishes && id) applyStyles(out, id, finishes);
-  if (!look.light || !layers.lightLayers) return;
-  const shares = computeTileLight(look.light, layers.width, layers.height, layers.lightLayers, around.lightLayers);
-  const [red, green, blue] = ([0, 1, 2] as const).map((channel) => makeLightMixer(look.light as Lamp, channel)) as [LightMixer, LightMixer, LightMixer];
+  for (let at = 0; options.masked && id && at < id.length; at++) out[4 * at + 3] = id[at] === 0 ? 0 : 255;
+  if (styles && id) applyStyles(out, id, styles);
+  if (!options.light || !layers.lightLayers) return;
+  const shares = computeTileLight(options.light, layers.width, layers.height, layers.lightLayers, neighbours.lightLayers);
+  const [red, green, blue] = ([0, 1, 2] as const).map((channel) => makeLightMixer(options.light as TileLight, channel)) as [LightMixer, LightMixer, LightMixer];
   for (let at = 0, k = 0; at < shares.length; at += 2, k += 4) {
     const [sky, sun] = [shares[at] as number, shares[at + 1] as number];
     out[k] = lightByte(out[k] as number, red(sky, sun));
@@ -74,9 +74,9 @@ function paintColors(out: Bytes, look: ShadingOptions, layers: TileLayers, aroun
   }
 }
 
-/** As the shader's `finished`. */
-function applyStyles(out: Bytes, id: Uint32Array, finishes: DrawStyles): void {
-  forEachStyled(id, finishes, (at, word) => {
+/** Applies styles like the shader's `applyStyle`. */
+function applyStyles(out: Bytes, id: Uint32Array, styles: DrawStyles): void {
+  forEachStyled(id, styles, (at, word) => {
     const k = 4 * at;
     const kind = word >>> 24;
     if (kind === 4) out[k + 3] = 0;
@@ -88,7 +88,7 @@ function applyStyles(out: Bytes, id: Uint32Array, finishes: DrawStyles): void {
   });
 }
 
-/** Pixels of objects that are not shown as they are: where, and the finish as the shader has it. */
+/** Calls `act` with the index and packed style of each pixel whose object is not plain. */
 export function forEachStyled(id: Uint32Array, { byId, others }: DrawStyles, act: (at: number, word: number) => void): void {
   let [last, word] = [0, 0];
   for (let at = 0; at < id.length; at++) {
@@ -100,8 +100,8 @@ export function forEachStyled(id: Uint32Array, { byId, others }: DrawStyles, act
 
 type LightMixer = (sky: number, sun: number) => number;
 
-/** Linear light in a channel, of shares of the sky's and the sun's. */
-export function makeLightMixer({ sky, beam }: Lamp, channel: 0 | 1 | 2): LightMixer {
+/** Returns a function that mixes skylight and sunlight in a channel. */
+export function makeLightMixer({ sky, beam }: TileLight, channel: 0 | 1 | 2): LightMixer {
   const [of, from] = [sky[channel], beam[channel]];
   return (share, lit) => of * share + from * lit;
 }
@@ -132,7 +132,7 @@ function paintIds(out: Bytes, { id }: TileLayers): void {
   }
 }
 
-/** Pale, and the same for an id everywhere. */
+/** Computes a pale colour, always the same for an id. */
 export function computeIdColor(id: number): Rgb {
   const h = Math.imul(id, 0x9e3779b9) >>> 0;
   const grey = 0.5 + (0.4 * ((h >>> 12) & 1023)) / 1023;
@@ -158,8 +158,8 @@ function paintDepths(out: Bytes, { depth }: TileLayers, [first, last]: readonly 
   }
 }
 
-function paintHighlights(out: Bytes, look: ShadingOptions, layers: TileLayers, around: TileNeighbours, colors: ReadonlyMap<number, Rgb>): void {
-  forEachHighlighted(look, layers, around, colors, (at, tint, rim) => {
+function paintHighlights(out: Bytes, options: ShadingOptions, layers: TileLayers, neighbours: TileNeighbours, colors: ReadonlyMap<number, Rgb>): void {
+  forEachHighlighted(options, layers, neighbours, colors, (at, tint, rim) => {
     const k = 4 * at;
     const [r, g, b] = out[k + 3] === 0 ? [0, 0, 0] : [out[k] as number, out[k + 1] as number, out[k + 2] as number];
     const grey = (0.2126 * r + 0.7152 * g + 0.0722 * b) / 255;
@@ -171,12 +171,12 @@ function paintHighlights(out: Bytes, look: ShadingOptions, layers: TileLayers, a
   });
 }
 
-/** Pixels of objects that have a colour: where, which, and whether another object is near. */
-export function forEachHighlighted(look: ShadingOptions, layers: TileLayers, around: TileNeighbours, colors: ReadonlyMap<number, Rgb>, act: (at: number, tint: Rgb, rim: boolean) => void): void {
+/** Calls `act` for each highlighted pixel with its index, its colour, and whether it is near another object. */
+export function forEachHighlighted(options: ShadingOptions, layers: TileLayers, neighbours: TileNeighbours, colors: ReadonlyMap<number, Rgb>, act: (at: number, tint: Rgb, rim: boolean) => void): void {
   const { width, height, id } = layers;
   if (!id) return;
-  const idAt = makeIdReader(width, height, id, around.id);
-  const [more, less] = look.rim;
+  const idAt = makeIdReader(width, height, id, neighbours.id);
+  const [more, less] = options.rim;
   let last = 0;
   let tint: Rgb | undefined;
   for (let y = 0, at = 0; y < height; y++) {
@@ -189,10 +189,10 @@ export function forEachHighlighted(look: ShadingOptions, layers: TileLayers, aro
   }
 }
 
-/** Pixels of the tiles beside it that are looked at; the WebGL drawer's gutter. */
+/** Number of pixels read beyond the edges, like the WebGL drawer's gutter. */
 const GUTTER_PX = 2;
 
-/** The id at a pixel of the tile or, beyond one edge of it, of the tile there; without that, of the tile's edge. */
+/** Returns a function that reads ids, also beyond one edge of the tile; without a neighbour there, it repeats the edge. */
 function makeIdReader(width: number, height: number, id: Uint32Array, [left, right, above, below]: Neighbours<Uint32Array>): (x: number, y: number) => number {
   return (x, y) => {
     if (x < 0) return left ? (left[y * width + width + Math.max(x, -GUTTER_PX)] as number) : (id[y * width] as number);
@@ -203,7 +203,7 @@ function makeIdReader(width: number, height: number, id: Uint32Array, [left, rig
   };
 }
 
-/** Little-endian RGBA, opaque. */
+/** Packs an opaque colour as little-endian RGBA. */
 export function packRgba([r, g, b]: Rgb): number {
   return (Math.round(255 * r) | (Math.round(255 * g) << 8) | (Math.round(255 * b) << 16) | (255 << 24)) >>> 0;
 }

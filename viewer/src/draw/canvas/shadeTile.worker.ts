@@ -11,7 +11,7 @@ import { composeTile } from "./composeTile";
 const scope = self as unknown as { onmessage: (event: MessageEvent<ShadeMessage>) => void; postMessage: (response: ShadeResponse, transfer?: Transferable[]) => void };
 
 const values = new Map<string, WorkerValue>();
-/** Pixels of the colour tiles, once they have been read. */
+/** Pixels of colour tiles that have been read back. */
 const pixelCache = new Map<string, Uint8ClampedArray>();
 
 const reader = new OffscreenCanvas(64, 64).getContext("2d", { willReadFrequently: true }) as OffscreenCanvasRenderingContext2D;
@@ -24,7 +24,7 @@ scope.onmessage = ({ data: message }) => {
   else answer(message);
 };
 
-/** Some browsers answer with other pixels than were drawn, so that users cannot be told apart. */
+/** Tests whether the browser returns the pixels that were drawn; some alter them against fingerprinting. */
 function testReadback(): boolean {
   const known = new ImageData(64, 64);
   for (let k = 0; k < known.data.length; k++) known.data[k] = k % 4 === 3 ? 255 : Math.imul(k, 0x9e3779b9) >>> 24;
@@ -82,7 +82,7 @@ function findTile(name: string | undefined): TileData | undefined {
   return value && "kind" in value ? value : undefined;
 }
 
-/** What the light of a tile depends on; none when a part that the options asks for is not here. */
+/** Collects the layers that light a tile; undefined when a required one is missing. */
 function loadLightLayers({ light }: ShadingOptions, normal: string | undefined, ao: string | undefined, shadow: string | undefined): LightLayers | undefined {
   const [n, o, s] = [findTile(normal), light?.occlusion ? findTile(ao) : undefined, light?.shadow ? findTile(shadow) : undefined];
   if (n?.kind !== "normal" || (light?.occlusion && o?.kind !== "ao") || (light?.shadow && s?.kind !== light.shadow.kind)) return undefined;

@@ -6,65 +6,65 @@ import type { Shadow } from "../../geo/shadows";
 import type { Mask } from "./mask";
 import { listRequiredKinds, type BakedLight, type FrameContent, type Mode, type Pass } from "../drawer";
 
-/** Of lit tiles. */
-interface TileLight {
+/** The light on a tile. */
+export interface TileLight {
   /** Unit vector towards the sun. */
   readonly sun: Vec3;
-  /** Linear light, RGB: everywhere, and of the sun on a surface that faces it. */
+  /** Linear light, RGB: ambient, and of the sun on a surface that faces it. */
   readonly sky: Vec3;
   readonly beam: Vec3;
   readonly occlusion: boolean;
   readonly shadow: (Omit<Shadow, "layer"> & { readonly kind: "sun" | "sun16" }) | null;
 }
 
-/** All that a tile's picture depends on besides the tile. */
+/** Everything besides the tile's data that determines its picture. */
 export interface ShadingOptions {
   readonly mode: Mode;
   readonly masked: boolean;
   readonly light: TileLight | null;
-  /** Under this name the worker has the colours of highlighted ids. */
+  /** Name of the highlight colours in the worker. */
   readonly highlight: string | null;
-  /** Under this name it has the finishes of objects. */
+  /** Name of the styles in the worker. */
   readonly styles: string | null;
-  /** A highlight's rim: pixels to the right and below, to the left and above (negative), at which the id differs. */
+  /** Offsets at which another id makes a highlight's rim: to the right and below, to the left and above (negative). */
   readonly rim: Vec2;
   readonly depthRange: Vec2 | null;
-  /** Other layers may hide it. */
+  /** Whether other layers may hide it. */
   readonly combined: boolean;
-  /** Tiles of theirs that lie over it. */
+  /** Tiles of other layers that overlap it. */
   readonly masks: readonly Mask[];
 }
 
-/** Kinds that a picture is made from. Without ids neither highlights nor finishes are shown. */
-export function listKinds(look: ShadingOptions): LayerKind[] {
-  const needed = listRequiredKinds(look.mode, look.masked, look.combined);
-  return [...needed, ...listBakedKinds(look), ...((look.highlight !== null || look.styles !== null) && !needed.includes("id") ? ["id" as const] : [])];
+/** Lists the layers that a picture uses. Without ids neither highlights nor styles are shown. */
+export function listKinds(options: ShadingOptions): LayerKind[] {
+  const needed = listRequiredKinds(options.mode, options.masked, options.combined);
+  return [...needed, ...listBakedKinds(options), ...((options.highlight !== null || options.styles !== null) && !needed.includes("id") ? ["id" as const] : [])];
 }
 
-/** Rendered light; what is not here is done without. */
+/** Lists the layers of baked light; missing ones are skipped. */
 function listBakedKinds({ light }: ShadingOptions): LayerKind[] {
   return [...(light?.shadow ? [light.shadow.kind] : []), ...(light?.occlusion ? ["ao" as const] : [])];
 }
 
-/** The look of a picture for which some layers are not here. */
-export function restrictOptions(look: ShadingOptions, has: (kind: LayerKind) => boolean): ShadingOptions {
-  const { light, highlight, styles } = look;
-  const lamp = light && { ...light, occlusion: light.occlusion && has("ao"), shadow: light.shadow && has(light.shadow.kind) ? light.shadow : null };
-  return { ...look, light: lamp, highlight: has("id") ? highlight : null, styles: has("id") ? styles : null };
+/** Restricts the options to the layers that are loaded. */
+export function restrictOptions(options: ShadingOptions, has: (kind: LayerKind) => boolean): ShadingOptions {
+  const { light, highlight, styles } = options;
+  const tileLight = light && { ...light, occlusion: light.occlusion && has("ao"), shadow: light.shadow && has(light.shadow.kind) ? light.shadow : null };
+  return { ...options, light: tileLight, highlight: has("id") ? highlight : null, styles: has("id") ? styles : null };
 }
 
-/** Kinds of which the pixels beyond the tile's edge count, too. */
-export function listNeighbourKinds(look: ShadingOptions): LayerKind[] {
-  return [...(look.light ? ["normal" as const, ...listBakedKinds(look)] : []), ...(look.highlight === null ? [] : ["id" as const])];
+/** Lists the layers whose pixels beyond the tile's edges matter. */
+export function listNeighbourKinds(options: ShadingOptions): LayerKind[] {
+  return [...(options.light ? ["normal" as const, ...listBakedKinds(options)] : []), ...(options.highlight === null ? [] : ["id" as const])];
 }
 
-/** Names of the pass's highlighted ids and of its finishes. */
+/** Names of a pass's highlight colours and styles in the worker. */
 export interface IdTableNames {
   readonly highlight: string | null;
   readonly styles: string | null;
 }
 
-/** @param scale texels a device pixel */
+/** Makes the options for a tile of a pass. @param scale texels per device pixel */
 export function makeShadingOptions({ light, dpr }: Pick<FrameContent, "light" | "dpr">, pass: Pass, scale: number, { highlight, styles }: IdTableNames): ShadingOptions {
   const mode = pass.mode === "lit" && !light.lit ? "color" : pass.mode;
   const colored = mode === "lit" || mode === "color" || mode === "picture";
@@ -92,5 +92,5 @@ function makeTileLight(light: Readonly<Light>, { shadow, occlusion }: BakedLight
   };
 }
 
-/** From a pixel's middle. */
+/** Computes the offsets from a pixel's centre. */
 const computeRim = (width: number): Vec2 => [Math.floor(0.5 + width), Math.floor(0.5 - width)];

@@ -1,27 +1,26 @@
-import type { ShadingOptions } from "./shadingOptions";
+import type { TileLight } from "./shadingOptions";
 
-export type Lamp = NonNullable<ShadingOptions["light"]>;
 
-/** Layers of a tile that its light depends on; of equal size. */
+/** The layers of a tile that light it, all of the same size. */
 export interface LightLayers {
   /** RGB8 */
   readonly normal: Uint8Array;
   readonly ao?: Uint8Array | undefined;
-  /** Of the lamp's shadow: a share of light, or a bit for each sun. */
+  /** Fraction of sunlight, or one bit per sun. */
   readonly shadow?: Uint8Array | Uint16Array | undefined;
 }
 
 /**
- * Shares of the sky's and of the sun's light on each pixel of a tile, in pairs: half by the pixel's own normal, occlusion and shadow, an eighth by each
- * neighbour's, as the shader has it (draw/webgl/shader.ts says why). Where a tile beside it is not here, the pixel's own light stands for it.
- * @param beside tiles to the left, to the right, above, below  @returns good until the next call
+ * Computes the fractions of skylight and sunlight on each pixel of a tile, in pairs: half from the pixel's own normal, occlusion and shadow, an eighth from each
+ * neighbour's, like the shader (draw/webgl/shader.ts explains why). Where a neighbouring tile is missing, uses the pixel's own light.
+ * @param neighbours tiles to the left, to the right, above and below  @returns a buffer that is valid until the next call
  */
-export function computeTileLight(lamp: Lamp, width: number, height: number, shades: LightLayers, beside: readonly (LightLayers | undefined)[]): Float32Array {
+export function computeTileLight(light: TileLight, width: number, height: number, layers: LightLayers, neighbours: readonly (LightLayers | undefined)[]): Float32Array {
   const wide = width + 2;
   const own = (buffers[0] = resizeBuffer(buffers[0], 2 * wide * (height + 2))).fill(NONE);
-  const row = makeRowLighter(lamp, own);
-  for (let y = 0; y < height; y++) row(shades, y * width, 1, wide * (y + 1) + 1, 1, width);
-  const [left, right, above, below] = beside;
+  const row = makeRowLighter(light, own);
+  for (let y = 0; y < height; y++) row(layers, y * width, 1, wide * (y + 1) + 1, 1, width);
+  const [left, right, above, below] = neighbours;
   if (left) row(left, width - 1, width, wide, wide, height);
   if (right) row(right, 0, width, 2 * wide - 1, wide, height);
   if (above) row(above, (height - 1) * width, 1, 1, 1, width);
@@ -29,20 +28,20 @@ export function computeTileLight(lamp: Lamp, width: number, height: number, shad
   return spreadLight(own, width, height);
 }
 
-/** Used again for each tile: what is thrown away stays in a worker's memory for long. */
+/** Reused for each tile: garbage stays in a worker's memory for long. */
 const buffers = [new Float32Array(0), new Float32Array(0)] as [Float32Array, Float32Array];
 
-const resizeBuffer = (is: Float32Array, length: number): Float32Array => (is.length === length ? is : new Float32Array(length));
+const resizeBuffer = (buffer: Float32Array, length: number): Float32Array => (buffer.length === length ? buffer : new Float32Array(length));
 
-/** Where there is no normal. */
+/** Light of pixels without a normal. */
 const NONE = -1;
-/** What a pixel without a normal gets of the sun. */
+/** Fraction of sunlight on pixels without a normal. */
 const UNKNOWN = 0.5;
 
-type RowLighter = (shades: LightLayers, from: number, step: number, to: number, stride: number, count: number) => void;
+type RowLighter = (layers: LightLayers, from: number, step: number, to: number, stride: number, count: number) => void;
 
-/** Lambert's law on a row or column of normals; equal ones in a row, which are common, are lit once. */
-function makeRowLighter({ sun, shadow: suns }: Lamp, out: Float32Array): RowLighter {
+/** Returns a function that applies Lambert's law to a row or column of normals; computes runs of equal normals once. */
+function makeRowLighter({ sun, shadow: suns }: TileLight, out: Float32Array): RowLighter {
   let [last, cosine] = [0, NONE];
   return ({ normal, ao, shadow }, from, step, to, stride, count) => {
     for (let k = 0, p = from; k < count; k++, p += step, to += stride) {
@@ -60,11 +59,11 @@ function makeRowLighter({ sun, shadow: suns }: Lamp, out: Float32Array): RowLigh
   };
 }
 
-function computeSunShare({ kind, first, second, share }: NonNullable<Lamp["shadow"]>, value: number): number {
+function computeSunShare({ kind, first, second, share }: NonNullable<TileLight["shadow"]>, value: number): number {
   return kind === "sun" ? value / 255 : ((value >> first) & 1) * (1 - share) + ((value >> second) & 1) * share;
 }
 
-/** @param own with a border of one pixel */
+/** Spreads light to neighbouring pixels. @param own light with a border of one pixel */
 function spreadLight(own: Float32Array, width: number, height: number): Float32Array {
   const row = 2 * (width + 2);
   const out = (buffers[1] = resizeBuffer(buffers[1], 2 * width * height));

@@ -4,31 +4,31 @@ import { DrawError } from "../../core/errors";
 import type { Pass, FrameState } from "../drawer";
 import type { TileImage } from "./shadeMessages";
 
-/** Where the tile pixels of the shown level lie on the screen. */
+/** The position of a level's pixels on the screen. */
 export interface Grid {
   readonly level: number;
   readonly tilePx: number;
-  /** Device pixels of the level's first pixel. */
+  /** Position of the level's first pixel, device pixels. */
   readonly left: number;
   readonly top: number;
-  /** Device pixels a tile pixel. */
+  /** Device pixels per tile pixel. */
   readonly px: number;
 }
 
-/** null when the pass paints nothing. */
+/** Computes a pass's grid; null when it has no quads. */
 export function makeGrid({ quads: [quad], level }: Pass, tilePx: number): Grid | null {
   if (!quad) return null;
   const side = tilePx / quad.scale;
   return { level, tilePx, left: quad.origin[0] - quad.from.x * side, top: quad.origin[1] - quad.from.y * side, px: 2 ** (quad.from.z - level) / quad.scale };
 }
 
-/** The square that a rectangle of the screen is. */
+/** Finds the tile that covers a rectangle of the screen. */
 export function findArea({ level, tilePx, left, top, px }: Grid, [x0, y0, x1]: readonly number[]): Tile {
   const side = (x1 ?? 0) - (x0 ?? 0);
   return { z: level + Math.round(Math.log2((tilePx * px) / side)), x: Math.round(((x0 ?? 0) - left) / side), y: Math.round(((y0 ?? 0) - top) / side) };
 }
 
-/** Left, top, right, bottom in pixels of the level; whole, and the same for an edge whichever tile it belongs to. */
+/** Computes a tile's window: integers, and the same for an edge whichever tile it belongs to. */
 function computeWindow({ level, tilePx }: Grid, { z, x, y }: Tile): PixelWindow {
   const side = tilePx * 2 ** (level - z);
   return [Math.round(x * side), Math.round(y * side), Math.round((x + 1) * side), Math.round((y + 1) * side)];
@@ -38,26 +38,26 @@ export interface MosaicTile extends TileFallback {
   readonly image: TileImage;
 }
 
-/** Left, top, right, bottom: pixels of a level. */
+/** Left, top, right and bottom in pixels of a level. */
 export type PixelWindow = readonly [number, number, number, number];
 
 type ScreenSize = Pick<FrameState, "width" | "height">;
 
-/** What a sheet holds. */
+/** The current content of a mosaic. */
 interface MosaicContent {
   readonly grid: Grid;
   readonly smooth: boolean;
   readonly window: PixelWindow;
-  /** By their area. */
+  /** Tiles by area. */
   readonly tiles: Map<string, MosaicTile>;
 }
 
-/** A canvas has sides of whole multiples, so that it need not change with each picture. */
+/** Canvas sizes are multiples of this, so that they rarely change. */
 const SIDE_STEP_PX = 32;
 
 /**
- * Tiles put together at whole pixels of their level, to be seen scaled as one picture: no seam can show, since there is
- * none. A border of nothing around them keeps their outer edges as soft as inner ones.
+ * A canvas with the visible tiles at whole pixels of their level, shown scaled as one picture, so that seams cannot
+ * appear. A transparent border keeps the outer edges as soft as inner ones.
  */
 export class TileMosaic {
   readonly #context: CanvasRenderingContext2D;
@@ -73,41 +73,41 @@ export class TileMosaic {
   }
 
   /**
-   * Puts together what is seen of the pieces and so many pixels `beyond`; what it holds already stays as it is.
-   * @param smooth mixes colours between pixels; ids and the like are not to be mixed  @returns what the canvas holds, from its left top corner on; null: nothing is seen
+   * Draws the visible tiles and `margin` pixels around them; keeps what is already there.
+   * @param smooth interpolates between pixels; not for ids and the like  @returns the window of the canvas's content, from its top left corner; null: nothing is visible
    */
-  update(screen: ScreenSize, grid: Grid, pieces: readonly MosaicTile[], smooth: boolean, beyond: number): PixelWindow | null {
-    const seen = computeVisibleWindow(screen, grid, 0);
-    if (!seen) return this.empty();
-    const held = this.#content && containsWindow(this.#content, seen, grid, smooth) ? this.#content : this.#restart(grid, smooth, computeVisibleWindow(screen, grid, beyond) ?? seen);
-    const wanted = new Map(pieces.filter(({ area }) => intersects(computeWindow(grid, area), held.window)).map((piece) => [makeKey(piece), piece]));
-    for (const [key, { area }] of held.tiles) {
+  update(screen: ScreenSize, grid: Grid, tiles: readonly MosaicTile[], smooth: boolean, margin: number): PixelWindow | null {
+    const visible = computeVisibleWindow(screen, grid, 0);
+    if (!visible) return this.empty();
+    const content = this.#content && containsWindow(this.#content, visible, grid, smooth) ? this.#content : this.#restart(grid, smooth, computeVisibleWindow(screen, grid, margin) ?? visible);
+    const wanted = new Map(tiles.filter(({ area }) => intersects(computeWindow(grid, area), content.window)).map((tile) => [makeKey(tile), tile]));
+    for (const [key, { area }] of content.tiles) {
       if (wanted.has(key)) continue;
       this.#clear(grid, area);
-      held.tiles.delete(key);
+      content.tiles.delete(key);
     }
     const drawables: Drawables = new Map();
-    for (const [key, piece] of wanted) {
-      if (held.tiles.get(key)?.image === piece.image) continue;
-      this.#drawTile(grid, held.window, piece, drawables);
-      held.tiles.set(key, piece);
+    for (const [key, tile] of wanted) {
+      if (content.tiles.get(key)?.image === tile.image) continue;
+      this.#drawTile(grid, content.window, tile, drawables);
+      content.tiles.set(key, tile);
     }
-    return held.window;
+    return content.window;
   }
 
-  /** What it held is gone. */
+  /** Forgets the content, which the browser has lost. */
   invalidate(): void {
     this.#content = null;
   }
 
-  /** Gives its memory back. */
+  /** Clears it and frees its memory. */
   empty(): null {
     Object.assign(this.canvas, { width: 0, height: 0 });
     this.#content = null;
     return null;
   }
 
-  /** Nothing yet. */
+  /** Clears the canvas for a new window. */
   #restart(grid: Grid, smooth: boolean, window: PixelWindow): MosaicContent {
     const [{ canvas }, [x0, y0, x1, y1]] = [this, window];
     const side = (is: number, need: number): number => (is < need || is > 2 * need ? Math.ceil(need / SIDE_STEP_PX) * SIDE_STEP_PX : is);
@@ -136,7 +136,7 @@ export class TileMosaic {
     else this.#context.drawImage(toDrawable(image, drawables), x0, y0, x1 - x0, y1 - y0);
   }
 
-  /** Part of an ancestor, with the pixels around it, so that what is beside it goes on smoothly. */
+  /** Draws part of an ancestor, with a margin of pixels, so that it joins its neighbours smoothly. */
   #drawAncestorPart(area: Tile, from: Tile, image: ImageBitmap | OffscreenCanvas, [x0, y0, x1, y1]: PixelWindow): void {
     const context = this.#context;
     const parts = 2 ** (area.z - from.z);
@@ -156,7 +156,7 @@ export class TileMosaic {
 
 type Drawables = Map<TileImage, ImageBitmap | OffscreenCanvas>;
 
-/** Pixels in a form that can be drawn scaled. @param known made before: one tile may stand in for many */
+/** Converts an image to a form that can be drawn scaled. @param known earlier conversions: one tile may fill many areas */
 function toDrawable(image: TileImage, known: Drawables): ImageBitmap | OffscreenCanvas {
   const made = known.get(image) ?? ("data" in image ? makeCanvas(image) : image);
   known.set(image, made);
@@ -169,25 +169,25 @@ function makeCanvas(image: ImageData): OffscreenCanvas {
   return canvas;
 }
 
-/** @throws DrawError when the canvas has another context already, or the browser no 2D canvas */
+/** Returns a canvas's 2D context. @throws DrawError when the canvas has another context, or the browser has no 2D canvas */
 export function getContext2d(canvas: HTMLCanvasElement): CanvasRenderingContext2D {
   const context = canvas.getContext("2d");
-  if (!context) throw new DrawError("this browser offers neither WebGL2 nor a 2D canvas, of which the map needs one to draw; update it");
+  if (!context) throw new DrawError("this browser supports neither WebGL2 nor the 2D canvas, and the map needs one of them; update the browser");
   return context;
 }
 
-/** What is seen of the level, so much beyond, and one pixel more; null: nothing. */
-function computeVisibleWindow({ width, height }: ScreenSize, { level, tilePx, left, top, px }: Grid, beyond: number): PixelWindow | null {
+/** Computes the visible window of the level, with `margin` pixels and one more; null: nothing is visible. */
+function computeVisibleWindow({ width, height }: ScreenSize, { level, tilePx, left, top, px }: Grid, margin: number): PixelWindow | null {
   const side = tilePx * 2 ** level;
-  const [x0, y0] = [left, top].map((at) => Math.max(0, Math.floor(-at / px) - beyond) - 1) as [number, number];
-  const [x1, y1] = [Math.min(side, Math.ceil((width - left) / px) + beyond) + 1, Math.min(side, Math.ceil((height - top) / px) + beyond) + 1];
+  const [x0, y0] = [left, top].map((at) => Math.max(0, Math.floor(-at / px) - margin) - 1) as [number, number];
+  const [x1, y1] = [Math.min(side, Math.ceil((width - left) / px) + margin) + 1, Math.min(side, Math.ceil((height - top) / px) + margin) + 1];
   return x1 - x0 > 2 && y1 - y0 > 2 ? [x0, y0, x1, y1] : null;
 }
 
 const intersects = (a: PixelWindow, b: PixelWindow): boolean => a[0] < b[2] && a[1] < b[3] && a[2] > b[0] && a[3] > b[1];
 
-/** Is there room for all that is seen? */
-const containsWindow = ({ grid, smooth, window }: MosaicContent, seen: PixelWindow, now: Grid, smoothNow: boolean): boolean =>
-  grid.level === now.level && grid.tilePx === now.tilePx && smooth === smoothNow && seen[0] >= window[0] && seen[1] >= window[1] && seen[2] <= window[2] && seen[3] <= window[3];
+/** Whether the content covers the visible window on the same grid. */
+const containsWindow = ({ grid, smooth, window }: MosaicContent, visible: PixelWindow, now: Grid, smoothNow: boolean): boolean =>
+  grid.level === now.level && grid.tilePx === now.tilePx && smooth === smoothNow && visible[0] >= window[0] && visible[1] >= window[1] && visible[2] <= window[2] && visible[3] <= window[3];
 
 const makeKey = ({ area }: MosaicTile): string => `${String(area.z)}/${String(area.x)}/${String(area.y)}`;

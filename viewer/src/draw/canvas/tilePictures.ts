@@ -6,21 +6,21 @@ const close = (image: TileImage | undefined): void => {
   if (image && "close" in image) image.close();
 };
 
-/** A tile's picture, as far as one has been made. */
+/** The picture of a tile; `image` is undefined until it is first shaded. */
 export interface TilePicture {
   readonly name: string;
-  /** Names of the data that the worker has for it. */
+  /** Names of its data in the worker. */
   readonly inputs: Set<string>;
   image: TileImage | undefined;
-  /** The look that was made last, or tried. */
+  /** The options of the last image, or of the last attempt. */
   options: string;
-  /** Bit by bit, the tiles beside it that were here then. */
+  /** A bit for each neighbouring tile that it used. */
   edges: number;
-  /** When that was: tickets count up. */
+  /** Ticket of the last request; tickets increase. */
   ticket: number;
 }
 
-/** A picture to make; the least urgency comes first. None: it is there. */
+/** A request for a picture. Smaller urgencies come first; an empty one needs no work. */
 export interface PictureRequest {
   readonly picture: TilePicture;
   readonly options: string;
@@ -30,15 +30,15 @@ export interface PictureRequest {
 }
 
 export interface TilePicturesEvents {
-  /** A picture is new. */
+  /** A picture is ready. */
   made(): void;
   failed(error: Error): void;
 }
 
-/** Orders at the worker at once: one in the making, one waiting, so that it is never idle. */
+/** Requests sent to the worker at once: one in progress, one waiting, so that it is never idle. */
 const MAX_REQUESTS = 2;
 
-/** Has tile pictures made by a worker and keeps them. The worker comes from a blob, as the decoder's do. */
+/** Keeps tile pictures, shaded by a worker. The worker is created from a blob, like those of the decoder. */
 export class TilePictures {
   readonly #events: TilePicturesEvents;
   readonly #pictures = new Map<string, TilePicture>();
@@ -53,12 +53,12 @@ export class TilePictures {
     this.#events = events;
   }
 
-  /** Something is being made, or to be made. */
+  /** Whether requests are running or waiting. */
   get busy(): boolean {
     return this.#running.size + this.#waiting.length > 0;
   }
 
-  /** Colours are lit by compositing, since this browser does not let pixels be read as they are. */
+  /** Whether colours are lit by compositing, because the browser does not return pixels exactly. */
   get usesCompositing(): boolean {
     return this.#readsExactly === false;
   }
@@ -67,14 +67,14 @@ export class TilePictures {
     return this.#pictures.get(name);
   }
 
-  /** The picture's place; empty at first. */
+  /** Returns a picture, created without an image if it is new. */
   getOrCreate(name: string): TilePicture {
     const known = this.#pictures.get(name) ?? { name, inputs: new Set<string>(), image: undefined, options: "", edges: 0, ticket: 0 };
     this.#pictures.set(name, known);
     return known;
   }
 
-  /** Gives the worker data to make pictures from. */
+  /** Stores a value in the worker. */
   put(name: string, value: WorkerValue, transfer: Transferable[] = []): void {
     this.#post({ put: name, value }, transfer);
   }
@@ -83,11 +83,11 @@ export class TilePictures {
     if (this.#worker) this.#post({ drop: name });
   }
 
-  /** All that is wanted from now on. */
-  setRequests(wishes: PictureRequest[]): void {
-    const making = new Map([...this.#running.values()].map((wish) => [wish.picture, wish]));
-    const open = ({ picture, options, edges }: PictureRequest): boolean => making.get(picture)?.options !== options || ((making.get(picture)?.edges ?? 0) & edges) !== edges;
-    this.#waiting = this.#stopped ? [] : wishes.filter(open).sort((a, b) => compare(a.urgency, b.urgency));
+  /** Replaces the waiting requests. */
+  setRequests(requests: PictureRequest[]): void {
+    const running = new Map([...this.#running.values()].map((request) => [request.picture, request]));
+    const isOutdated = ({ picture, options, edges }: PictureRequest): boolean => running.get(picture)?.options !== options || ((running.get(picture)?.edges ?? 0) & edges) !== edges;
+    this.#waiting = this.#stopped ? [] : requests.filter(isOutdated).sort((a, b) => compare(a.urgency, b.urgency));
     this.#fill();
   }
 
@@ -97,12 +97,12 @@ export class TilePictures {
     this.#waiting = this.#waiting.filter(({ picture }) => picture.name !== name);
   }
 
-  /** Forgets pictures that nobody will see as they are. */
+  /** Drops the images of pictures that a predicate selects. */
   prune(stale: (picture: TilePicture) => boolean): void {
     for (const picture of this.#pictures.values()) {
       if (!picture.image || !stale(picture)) continue;
       close(picture.image);
-      Object.assign(picture, { image: undefined, look: "" });
+      Object.assign(picture, { image: undefined, options: "" });
     }
   }
 
@@ -117,18 +117,18 @@ export class TilePictures {
 
   #fill(): void {
     while (this.#running.size < MAX_REQUESTS) {
-      const wish = this.#waiting.shift();
-      if (!wish) return;
+      const request = this.#waiting.shift();
+      if (!request) return;
       const ticket = ++this.#tickets;
-      this.#running.set(ticket, wish);
-      this.#post({ ...wish.request, ticket });
+      this.#running.set(ticket, request);
+      this.#post({ ...request.request, ticket });
     }
   }
 
-  #post(task: ShadeMessage, transfer: Transferable[] = []): void {
+  #post(message: ShadeMessage, transfer: Transferable[] = []): void {
     if (this.#stopped) return;
     this.#worker ??= this.#start();
-    this.#worker.postMessage(task, transfer);
+    this.#worker.postMessage(message, transfer);
   }
 
   #start(): Worker {
@@ -140,22 +140,22 @@ export class TilePictures {
     };
     worker.onerror = (event) => {
       this.stop();
-      this.#events.failed(new DrawError(`the map's pictures cannot be made: ${event.message || "the worker is blocked; the page's Content-Security-Policy needs worker-src blob:"}`));
+      this.#events.failed(new DrawError(`cannot shade tiles: ${event.message || "the worker is blocked; add worker-src blob: to the page's Content-Security-Policy"}`));
     };
     return worker;
   }
 
-  #settle(reply: Exclude<ShadeResponse, { readsExactly: boolean }>): void {
-    const wish = this.#running.get(reply.ticket);
-    this.#running.delete(reply.ticket);
-    if (wish) this.#store(wish, reply);
+  #settle(response: Exclude<ShadeResponse, { readsExactly: boolean }>): void {
+    const request = this.#running.get(response.ticket);
+    this.#running.delete(response.ticket);
+    if (request) this.#store(request, response);
     this.#fill();
     this.#events.made();
   }
 
-  #store({ picture, options, edges }: PictureRequest, reply: Exclude<ShadeResponse, { readsExactly: boolean }>): void {
-    if ("error" in reply) this.#events.failed(new DrawError(`tile ${picture.name}: ${reply.error}`));
-    const image = "picture" in reply ? reply.picture : undefined;
+  #store({ picture, options, edges }: PictureRequest, response: Exclude<ShadeResponse, { readsExactly: boolean }>): void {
+    if ("error" in response) this.#events.failed(new DrawError(`tile ${picture.name}: ${response.error}`));
+    const image = "picture" in response ? response.picture : undefined;
     if (this.#pictures.get(picture.name) !== picture) {
       close(image);
       return;
@@ -164,7 +164,7 @@ export class TilePictures {
       close(picture.image);
       picture.image = image;
     }
-    Object.assign(picture, { options, edges, ticket: reply.ticket });
+    Object.assign(picture, { options, edges, ticket: response.ticket });
   }
 }
 

@@ -4,7 +4,7 @@ import { SPARE_UNIT } from "./textures";
 
 type Values = ReadonlyMap<number, unknown>;
 
-/** Tables by object id on the GPU, made from maps when they are first used; another map is another table. */
+/** Tables by object id as textures, uploaded when first used. */
 export class IdTextures {
   readonly #gl: WebGL2RenderingContext;
   readonly #known = new Map<Values, { table: IdTable; texture: WebGLTexture }>();
@@ -13,18 +13,18 @@ export class IdTextures {
     this.#gl = gl;
   }
 
-  /** @param uniforms sampler, mask, probes and the only entry  @param pack a value as a word */
-  bind<V>(program: Program, [sampler, mask, probes, one]: readonly ["u_table" | "u_finishes", string, string, string], values: ReadonlyMap<number, V>, pack: (value: V) => number): void {
+  /** Binds a table, made from the values if it is new. @param uniforms sampler, mask, probes and the single entry  @param pack converts a value to uint32 */
+  bind<V>(program: Program, [sampler, mask, probes, single]: readonly ["u_table" | "u_styles", string, string, string], values: ReadonlyMap<number, V>, pack: (value: V) => number): void {
     const gl = this.#gl;
     const { table, texture } = this.#known.get(values) ?? this.#upload(values, buildIdTable(values, pack));
     gl.activeTexture(gl.TEXTURE0 + textureUnit(sampler));
     gl.bindTexture(gl.TEXTURE_2D, texture);
     gl.uniform1ui(program.at(mask), table.mask);
     gl.uniform1i(program.at(probes), table.probes);
-    gl.uniform2ui(program.at(one), ...table.single);
+    gl.uniform2ui(program.at(single), ...table.single);
   }
 
-  /** Frees those of all other maps. */
+  /** Frees the tables of all other maps. */
   freeAllBut(used: ReadonlySet<Values>): void {
     for (const [values, { texture }] of this.#known) {
       if (used.has(values)) continue;

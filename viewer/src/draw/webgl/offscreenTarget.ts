@@ -1,4 +1,4 @@
-/** What frames are drawn in that need depth: most do not, and then the canvas has no buffer for it. Pixels are copied to the canvas as they are. */
+/** A framebuffer for frames that need a depth buffer, which the canvas does not have. */
 export class OffscreenTarget {
   readonly #gl: WebGL2RenderingContext;
   readonly #framebuffer: WebGLFramebuffer;
@@ -21,7 +21,7 @@ export class OffscreenTarget {
     return this.#framebuffer;
   }
 
-  /** Puts the picture on the canvas, which is bound then. */
+  /** Copies the picture to the canvas, which is bound afterwards. */
   copyToCanvas(): void {
     const { width, height } = this;
     const gl = this.#gl;

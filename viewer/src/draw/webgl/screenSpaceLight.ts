@@ -6,22 +6,22 @@ import type { FrameContent, Pass } from "../drawer";
 import { DepthTarget } from "./depthTarget";
 import { textureUnit, type Program } from "./program";
 
-/** What was found for a frame. */
+/** The light estimated for a frame. */
 interface EstimatedLight {
   readonly texture: WebGLTexture;
   readonly range: Vec2;
-  /** For whom it was found, and device pixels a pixel of it. */
+  /** The frame's camera, and device pixels per pixel of the estimate. */
   readonly camera: Camera;
   readonly step: number;
   readonly height: number;
-  /** Of the range: what counts as the same depth. */
-  readonly same: number;
+  /** Fraction of the range that counts as the same depth. */
+  readonly tolerance: number;
 }
 
-/** Draws a pass into what is bound, with its depth as a share of a range of D. */
+/** Draws a pass into the bound framebuffer, with its depth as a fraction of a range of D. */
 type DrawDepths = (frame: FrameContent, pass: Pass, range: Vec2) => void;
 
-/** Has light found that was not rendered (see draw/shade.ts), and tells the shader where it lies. */
+/** Computes screen-space shadows and ambient occlusion (see draw/lightEstimator.ts) and binds them for the shader. */
 export class ScreenSpaceLight {
   readonly #gl: WebGL2RenderingContext;
   #depthTarget: DepthTarget | undefined;
@@ -31,12 +31,12 @@ export class ScreenSpaceLight {
     this.#gl = gl;
   }
 
-  /** Of D, that depths of the frame are to be shares of; null when nothing was found. */
+  /** Range of D of the frame's depths; null when nothing was estimated. */
   get range(): Vec2 | null {
     return this.#result?.range ?? null;
   }
 
-  /** Makes ready what the frame shows; nothing where all that is wanted was rendered. */
+  /** Estimates the frame's light unless all of it was rendered. */
   update(frame: FrameContent, draw: DrawDepths): void {
     const { lighting, camera } = frame;
     const step = Math.max(1, frame.dpr);
@@ -45,7 +45,7 @@ export class ScreenSpaceLight {
     else if (!lighting.moving || frame.target || last?.camera.frame !== camera.frame || last.step !== step) this.#result = this.#estimate(frame, lighting, step, draw);
   }
 
-  /** Does a pass need what was found? */
+  /** Whether a pass uses the estimate. */
   appliesTo(frame: FrameContent, pass: Pass): boolean {
     return this.#result !== null && needsEstimate(frame, pass);
   }
@@ -56,23 +56,23 @@ export class ScreenSpaceLight {
     this.#result = null;
   }
 
-  /** Sets the program's uniforms but those of depth. */
+  /** Sets the program's uniforms, except for those of depth. */
   bind(program: Program, frame: FrameContent, { bakedLight }: Pass): void {
-    const [gl, shares] = [this.#gl, this.#result];
-    if (!shares) return;
-    const { texture, camera, step, height, same } = shares;
-    gl.activeTexture(gl.TEXTURE0 + textureUnit("u_shares"));
+    const [gl, result] = [this.#gl, this.#result];
+    if (!result) return;
+    const { texture, camera, step, height, tolerance } = result;
+    gl.activeTexture(gl.TEXTURE0 + textureUnit("u_estimate"));
     gl.bindTexture(gl.TEXTURE_2D, texture);
     const now = frame.camera;
-    const [px, times] = [cssPixelM(camera), frame.dpr / step];
-    const larger = cssPixelM(now) / px;
-    const [x, y] = [(now.u - camera.u) / px + camera.width / 2 - (larger * now.width) / 2, (camera.v - now.v) / px + camera.height / 2 - (larger * now.height) / 2];
-    gl.uniform4f(program.at("u_onto"), larger / step, x * times, y * times, height);
-    gl.uniform1f(program.at("u_same"), same);
-    gl.uniform2i(program.at("u_found"), Number(frame.light.occlusion && !bakedLight.occlusion), Number(hasShadows(frame) && !bakedLight.shadow));
+    const [px, scale] = [cssPixelM(camera), frame.dpr / step];
+    const zoomRatio = cssPixelM(now) / px;
+    const [x, y] = [(now.u - camera.u) / px + camera.width / 2 - (zoomRatio * now.width) / 2, (camera.v - now.v) / px + camera.height / 2 - (zoomRatio * now.height) / 2];
+    gl.uniform4f(program.at("u_estimateMap"), zoomRatio / step, x * scale, y * scale, height);
+    gl.uniform1f(program.at("u_tolerance"), tolerance);
+    gl.uniform2i(program.at("u_estimated"), Number(frame.light.occlusion && !bakedLight.occlusion), Number(hasShadows(frame) && !bakedLight.shadow));
   }
 
-  #estimate(frame: FrameContent, { by }: NonNullable<FrameContent["lighting"]>, step: number, draw: DrawDepths): EstimatedLight {
+  #estimate(frame: FrameContent, { estimator }: NonNullable<FrameContent["lighting"]>, step: number, draw: DrawDepths): EstimatedLight {
     const gl = this.#gl;
     const { light, camera } = frame;
     const [width, height] = [Math.ceil(frame.width / step), Math.ceil(frame.height / step)];
@@ -90,9 +90,9 @@ export class ScreenSpaceLight {
     const { right, up, forward } = camera.frame.axes;
     const towards = towardsLight(light);
     const sun: Vec3 | null = hasShadows(frame) ? [dot(right, towards), dot(up, towards), dot(forward, towards)] : null;
-    const texture = by.estimateLight({ gl, depth: picture.texture, width, height, px_m, range, sun, occlusion: light.occlusion });
+    const texture = estimator.estimateLight({ gl, depth: picture.texture, width, height, px_m, range, sun, occlusion: light.occlusion });
     gl.disable(gl.DEPTH_TEST);
-    return { texture, range, camera, step, height, same: (2 * px_m) / (range[1] - range[0]) + 1 / 65535 };
+    return { texture, range, camera, step, height, tolerance: (2 * px_m) / (range[1] - range[0]) + 1 / 65535 };
   }
 
   #getDepthTarget(width: number, height: number): DepthTarget {
@@ -102,21 +102,21 @@ export class ScreenSpaceLight {
   }
 }
 
-/** Least and greatest D of a frame's guests. */
-export const listCustomLayerRanges = ({ customLayers, camera }: FrameContent): Vec2[] => customLayers.flatMap((guest) => {
-  const range = guest.getDepthRange(camera.frame);
+/** Lists the ranges of D of a frame's custom layers. */
+export const listCustomLayerRanges = ({ customLayers, camera }: FrameContent): Vec2[] => customLayers.flatMap((layer) => {
+  const range = layer.getDepthRange(camera.frame);
   return range ? [range] : [];
 });
 
 const hasShadows = ({ light }: FrameContent): boolean => light.shadows && light.altitude_deg > 0;
 
-/** Is there light that was not rendered, and a way to find it? */
+/** Whether a pass lacks rendered light that can be estimated. */
 function needsEstimate(frame: FrameContent, { mode, relief, bakedLight }: Pass): boolean {
   const { light, lighting } = frame;
   return lighting !== undefined && lighting !== null && relief !== null && mode === "lit" && light.lit && ((light.occlusion && !bakedLight.occlusion) || (hasShadows(frame) && !bakedLight.shadow));
 }
 
-/** A pass that draws depths alone, on a screen whose pixels are `step` times as large. */
+/** Makes a pass that draws depths only, with pixels `step` times as large. */
 function makeDepthPass(pass: Pass, step: number): Pass {
   const quads = pass.quads.map(({ from, rect: [left, top, right, bottom], origin: [x, y], scale }) => ({ from, rect: [left / step, top / step, right / step, bottom / step] as const, origin: [x / step, y / step] as const, scale: scale * step }));
   return { ...pass, mode: "depth", quads, highlight: new Map(), depths: pass.relief };

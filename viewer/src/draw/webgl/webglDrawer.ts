@@ -15,26 +15,26 @@ const SAMPLERS = {
   color: "u_color", picture: "u_color", normal: "u_normal", id: "u_id", depth: "u_depth", depth2: "u_depth", sun: "u_shadow", sun16: "u_shadow", ao: "u_ao",
 } as const;
 
-/** What is drawn of a quad. */
+/** The textures of a quad. */
 interface QuadTextures {
   readonly quad: Quad;
-  /** Those without which nothing is drawn; absent: not here. */
+  /** Required textures; undefined: not loaded. */
   readonly textures: readonly (readonly [LayerKind, TileTexture | undefined])[];
-  /** Baked light that is here. */
+  /** Loaded textures of baked light. */
   readonly bakedLight: readonly (readonly [LayerKind, TileTexture])[];
   readonly ids: TileTexture | undefined;
-  /** Where the pass is shaded, and depths are here. */
+  /** Depths for the light estimate, if used and loaded. */
   readonly depth: TileTexture | undefined;
 }
 
 export interface WebGLOptions {
-  /** Keep the picture readable after a frame: for tests and screenshots; costs memory. */
+  /** Keeps the picture readable after a frame, for tests and screenshots; costs memory. */
   preserve: boolean;
-  /** Not where the processor would do the work of the GPU, which a canvas without WebGL does with a ninth of it. */
+  /** Refuses software rendering, which takes nine times the CPU of the canvas drawer. */
   requireGpu: boolean;
 }
 
-/** Draws with WebGL2: one quad a tile, light and highlights in the shader. */
+/** Draws with WebGL2: one quad per tile; shades and highlights in the shader. */
 export class WebGLDrawer implements Drawer {
   readonly name = "webgl";
   readonly busy = false;
@@ -44,15 +44,15 @@ export class WebGLDrawer implements Drawer {
   readonly #listeners = new AbortController();
   #programs: Programs;
   #textures: TileTextures;
-  #tables: IdTextures;
+  #idTextures: IdTextures;
   #screenSpaceLight: ScreenSpaceLight;
   #offscreen: OffscreenTarget | undefined;
 
-  /** @throws DrawError when the browser has no WebGL2, or none that is quick */
+  /** @throws DrawError when the browser has no WebGL2, or none on a GPU where that is required */
   constructor(canvas: HTMLCanvasElement, options: WebGLOptions, events: DrawerEvents) {
     const settings: WebGLContextAttributes = { alpha: true, premultipliedAlpha: true, antialias: false, depth: false, stencil: false, preserveDrawingBuffer: options.preserve, failIfMajorPerformanceCaveat: options.requireGpu };
     const gl = canvas.getContext("webgl2", settings);
-    if (!gl) throw new DrawError("this browser offers no WebGL2, which the map needs to draw; update it or switch hardware acceleration on");
+    if (!gl) throw new DrawError("this browser does not support WebGL2, which the map needs; update it or enable hardware acceleration");
     if (options.requireGpu && isSoftware(gl)) {
       gl.getExtension("WEBGL_lose_context")?.loseContext();
       throw new DrawError("this browser draws WebGL2 without a GPU");
@@ -61,7 +61,7 @@ export class WebGLDrawer implements Drawer {
     this.#canvas = canvas;
     this.#programs = new Programs(gl);
     this.#textures = new TileTextures(gl);
-    this.#tables = new IdTextures(gl);
+    this.#idTextures = new IdTextures(gl);
     this.#screenSpaceLight = new ScreenSpaceLight(gl);
     this.#listen(events);
   }
@@ -77,18 +77,18 @@ export class WebGLDrawer implements Drawer {
     this.#screenSpaceLight.update(frame, (coarse, pass, range) => { this.#drawPass(coarse, pass, range, false); });
     const combined = frame.passes.filter(({ depths }) => depths);
     const range = frame.target?.range ?? this.#screenSpaceLight.range ?? joinDepthRanges(combined.flatMap(({ depths }) => depths ?? []), listCustomLayerRanges(frame));
-    const lead = Math.max(0, ...combined.map(({ depths, level }) => (depths ? computeCustomLayerBias(depths.frame, level) : 0)));
-    if (range) for (const guest of frame.customLayers) guest.prerender(gl, frame, [range[0] + lead, range[1] + lead]);
-    const deep = this.#getOffscreen(frame, combined.length + frame.customLayers.length > 0);
-    this.#clear(frame, frame.target?.framebuffer ?? deep?.framebuffer ?? null);
+    const bias = Math.max(0, ...combined.map(({ depths, level }) => (depths ? computeCustomLayerBias(depths.frame, level) : 0)));
+    if (range) for (const layer of frame.customLayers) layer.prerender(gl, frame, [range[0] + bias, range[1] + bias]);
+    const offscreen = this.#getOffscreen(frame, combined.length + frame.customLayers.length > 0);
+    this.#clear(frame, frame.target?.framebuffer ?? offscreen?.framebuffer ?? null);
     for (const pass of frame.passes) {
       if (!pass.depths) this.#drawPass(frame, pass, null, false);
       else if (pass === combined[0]) this.#drawCombined(frame, combined, range);
     }
     if (combined.length === 0) this.#drawCombined(frame, [], range);
     gl.disable(gl.SCISSOR_TEST);
-    if (!frame.target) deep?.copyToCanvas();
-    this.#tables.freeAllBut(new Set(frame.passes.flatMap(({ highlight, drawStyles }) => [highlight, ...(drawStyles ? [drawStyles.byId] : [])])));
+    if (!frame.target) offscreen?.copyToCanvas();
+    this.#idTextures.freeAllBut(new Set(frame.passes.flatMap(({ highlight, drawStyles }) => [highlight, ...(drawStyles ? [drawStyles.byId] : [])])));
   }
 
   release(key: string): void {
@@ -98,12 +98,12 @@ export class WebGLDrawer implements Drawer {
   destroy(): void {
     this.#listeners.abort();
     this.#textures.clear();
-    this.#tables.freeAllBut(new Set());
+    this.#idTextures.freeAllBut(new Set());
     this.#screenSpaceLight.free();
     this.#offscreen?.free();
   }
 
-  /** What the frame is drawn in when it needs depth; kept from frame to frame as long as they do. */
+  /** Returns the target for a frame that needs depth; keeps it from frame to frame while it is needed. */
   #getOffscreen({ target, width, height }: FrameContent, needed: boolean): OffscreenTarget | undefined {
     if (target || (needed && this.#offscreen?.width === width && this.#offscreen.height === height)) return this.#offscreen;
     this.#offscreen?.free();
@@ -123,7 +123,7 @@ export class WebGLDrawer implements Drawer {
     gl.depthFunc(gl.LEQUAL);
   }
 
-  /** Passes and guests that hide each other by depth: all that is solid, then edges and what lets through. */
+  /** Draws passes and custom layers that hide each other by depth: first all opaque pixels, then edges and translucent passes. */
   #drawCombined(frame: FrameContent, passes: readonly Pass[], range: Vec2 | null): void {
     const gl = this.gl;
     if (!range) return;
@@ -138,15 +138,15 @@ export class WebGLDrawer implements Drawer {
 
   #drawCustomLayers(frame: FrameContent, soft: boolean): void {
     this.gl.disable(this.gl.SCISSOR_TEST);
-    for (const guest of frame.customLayers) guest.render(this.gl, frame, soft);
+    for (const layer of frame.customLayers) layer.render(this.gl, frame, soft);
   }
 
-  /** @param range of D, of what is drawn together  @param soft only what lets through */
+  /** @param range minimum and maximum D of the combined passes; null: not combined  @param soft draws only edges and translucent passes */
   #drawPass(frame: FrameContent, pass: Pass, range: Vec2 | null, soft: boolean): void {
     this.#setScissor(frame, pass);
     const mode: Mode = pass.mode === "lit" && !frame.light.lit ? "color" : pass.mode;
     const shaded = mode === "lit" && this.#screenSpaceLight.appliesTo(frame, pass);
-    // All are uploaded before the first is drawn, so that gutters have their neighbours' pixels.
+    // Uploads all before drawing the first, so that gutters have their neighbours' pixels.
     for (const ready of pass.quads.map((quad) => this.#collectTextures(pass, mode, quad, shaded))) {
       const { quad, textures, bakedLight, ids, depth } = ready;
       if (textures.some(([, texture]) => !texture)) continue;
@@ -220,7 +220,7 @@ export class WebGLDrawer implements Drawer {
 
   #setDepths(program: Program, depths: DepthMapping, { from }: Quad, [near, far]: Vec2, soft: boolean): void {
     this.gl.uniform2f(program.at("u_depths"), (computeDepthAtZero(depths) - near) / (far - near), depths.unit_m / (far - near));
-    this.gl.uniform1ui(program.at("u_steep"), computeMaxStep(depths, from.z));
+    this.gl.uniform1ui(program.at("u_maxStep"), computeMaxStep(depths, from.z));
     this.gl.uniform1i(program.at("u_soft"), Number(soft));
   }
 
@@ -239,9 +239,9 @@ export class WebGLDrawer implements Drawer {
     const gl = this.gl;
     this.#bind("id", ids);
     gl.uniform1f(program.at("u_rim"), Math.max(1, 1.25 * dpr * quad.scale));
-    if (highlight.size > 0) this.#tables.bind(program, ["u_table", "u_mask", "u_probes", "u_one"], highlight, packColor);
+    if (highlight.size > 0) this.#idTextures.bind(program, ["u_table", "u_mask", "u_probes", "u_single"], highlight, packColor);
     if (!drawStyles) return;
-    this.#tables.bind(program, ["u_finishes", "u_finishMask", "u_finishProbes", "u_finishOne"], drawStyles.byId, packStyle);
+    this.#idTextures.bind(program, ["u_styles", "u_styleMask", "u_styleProbes", "u_styleSingle"], drawStyles.byId, packStyle);
     gl.uniform1ui(program.at("u_others"), packStyle(drawStyles.others));
   }
 
@@ -254,7 +254,7 @@ export class WebGLDrawer implements Drawer {
     const restored = (): void => {
       this.#programs = new Programs(this.gl);
       this.#textures = new TileTextures(this.gl);
-      this.#tables = new IdTextures(this.gl);
+      this.#idTextures = new IdTextures(this.gl);
       this.#screenSpaceLight = new ScreenSpaceLight(this.gl);
       this.#offscreen = undefined;
       events.restored();
@@ -264,12 +264,12 @@ export class WebGLDrawer implements Drawer {
   }
 }
 
-/** Does the processor do the work of the GPU? Browsers tell by the flag above when that is their own choice, and by name otherwise. */
+/** Whether WebGL runs on the CPU. Browsers report it by the flag above if they chose so themselves, and by the renderer's name otherwise. */
 function isSoftware(gl: WebGL2RenderingContext): boolean {
-  const open = String(gl.getParameter(gl.RENDERER));
-  // Some keep the name for those who ask twice.
-  const told = open === "WebKit WebGL" ? gl.getExtension("WEBGL_debug_renderer_info") : null;
-  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(told ? String(gl.getParameter(told.UNMASKED_RENDERER_WEBGL)) : open);
+  const renderer = String(gl.getParameter(gl.RENDERER));
+  // WebKit hides the name behind this extension.
+  const debugInfo = renderer === "WebKit WebGL" ? gl.getExtension("WEBGL_debug_renderer_info") : null;
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(debugInfo ? String(gl.getParameter(debugInfo.UNMASKED_RENDERER_WEBGL)) : renderer);
 }
 
 const scaled = ([x, y, z]: Vec3, by: number): Vec3 => [x * by, y * by, z * by];
