@@ -30,7 +30,7 @@ const VELOCITY_MS = 90;
 /** Rotation per pixel of a drag with the right button. */
 const ROTATION_RAD_PER_PX = (0.4 * Math.PI) / 180;
 
-/** Handles mouse, pointer and pen on the canvas: drag, pinch, wheel, tap, double tap. */
+/** Handles mouse, touch and pen on the canvas: drag, pinch, wheel, tap, double tap. */
 export class Gestures {
   readonly #map: GestureTarget;
   readonly #canvas: HTMLCanvasElement;

@@ -19,9 +19,9 @@ import type { ImageLayerHost, LayerContext, ViewState } from "./layerContext";
 
 /** Options of an image layer. */
 export interface ImageLayerOptions {
-  /** lit | color | picture | normal | id | depth. Default "lit". */
+  /** One of lit | color | picture | normal | id | depth. Default "lit". */
   mode?: Mode;
-  /** 0..1. Default 1. */
+  /** Opacity, 0 to 1. Default 1. */
   opacity?: number;
   /** Default colour of highlights. Default "#e4572e". */
   highlightColor?: string;
@@ -39,7 +39,7 @@ export interface ImageLayerEvents {
   error: { error: Error };
 }
 
-/** A rendering on the map, from base URLs or another source. Several base URLs stand for hosts with the same tiles; requests are spread over them by tile. */
+/** A rendering on the map, from base URLs or another source. Several base URLs are hosts with the same tiles; requests are spread over them by tile. */
 export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
   readonly options: Required<Omit<ImageLayerOptions, "attribution">> & Pick<ImageLayerOptions, "attribution">;
   /** Its source. */

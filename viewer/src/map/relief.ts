@@ -47,7 +47,7 @@ export class Relief {
   }
 
   /**
-   * Fetches the depths of a rectangle (U and V of the camera's frame) at the deepest level where it has at maxTiles `maxTiles` tiles. Missing
+   * Fetches the depths of a rectangle (U and V of the camera's frame) at the deepest level where it has at most `maxTiles` tiles. Missing
    * tiles are replaced by those in memory; the result is `approximate` then, and where the level is not the deepest.
    */
   static async fetch(layers: readonly imageLayer[], viewState: ViewState, [low, high]: Rect, maxTiles: number, ids = false): Promise<{ relief: Relief; approximate: boolean }> {

@@ -12,7 +12,7 @@ export function enableDragging(handle: HTMLElement, map: OverlayHost, position: 
     const surface = map.findSurfaceAt([x, y]);
     if (surface) onDrag("drag", surface);
   };
-  handle.classList.add("map3d-marker-loose");
+  handle.classList.add("map3d-marker-draggable");
   handle.setAttribute("aria-keyshortcuts", Object.keys(KEYS).join(" "));
   handle.addEventListener("pointerdown", (event) => {
     const at = map.project(position());

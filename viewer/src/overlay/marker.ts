@@ -124,14 +124,14 @@ export class marker extends PositionedLayer<MarkerEvents> {
     const { clientWidth, clientHeight } = map.container;
     const inView = at && at[0] > -80 && at[1] > -10 && at[0] < clientWidth + 80 && at[1] < clientHeight + 80;
     button.hidden = !inView || (occluded && this.options.occlusion === "hide");
-    button.classList.toggle("map3d-marker-behind", occluded);
+    button.classList.toggle("map3d-marker-occluded", occluded);
     if (at) button.style.transform = `translate(${(at[0] + this.#offset[0]).toFixed(1)}px, ${(at[1] + this.#offset[1]).toFixed(1)}px)`;
   }
 
   #createButton(map: OverlayHost): HTMLButtonElement {
     const { color, icon, showLabel, draggable } = this.options;
     const button = element("button", "map3d-marker", { type: "button" }, icon === undefined ? element("span", "map3d-marker-stem") : element("span", "map3d-marker-icon", {}, icon), element("span", "map3d-marker-label"));
-    button.classList.toggle("map3d-marker-quiet", !showLabel);
+    button.classList.toggle("map3d-marker-hover-label", !showLabel);
     if (color !== undefined) button.style.setProperty("--map3d-marker", color);
     button.addEventListener("click", () => { this.#onClick(); });
     if (draggable) enableDragging(button, map, () => this.position, (type, position) => { this.#onDrag(type, position); });

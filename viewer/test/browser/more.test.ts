@@ -79,7 +79,7 @@ test("a double click zooms at the pointer; the buttons zoom and turn", async () 
   await page.waitForFunction(() => (globalThis as Global).map.zoom < 3.85);
   await page.getByRole("button", { name: "Turn view clockwise", exact: true }).click();
   expect(await page.evaluate(() => (globalThis as Global).map.direction)).toBe("270-45");
-  await page.getByRole("button", { name: /look north/ }).click();
+  await page.getByRole("button", { name: /reset to north/ }).click();
   expect(await page.evaluate(() => (globalThis as Global).map.direction)).toBe("0-45");
   await page.context().close();
 });

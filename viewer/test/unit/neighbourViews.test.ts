@@ -8,14 +8,14 @@ const views = new Map(VIEWS.map(([lookAtDeg, pitchDeg]) => [`${String(lookAtDeg)
 const rendering = { views } as unknown as Rendering;
 const frame = (id: string): Parameters<typeof findTiltedView>[1] => (rendering.views.get(id) as unknown as { frame: Parameters<typeof findTiltedView>[1] }).frame;
 
-test("turning goes round among the views of one pitch", () => {
+test("rotating cycles through the views of one pitch", () => {
   expect(findNeighbourView(rendering, frame("270-30"), 1)).toBe("0-30");
   expect(findNeighbourView(rendering, frame("0-30"), -1)).toBe("270-30");
   expect(findNeighbourView(rendering, frame("0-60"), 1)).toBe("180-60");
   expect(findNeighbourView(rendering, frame("0-90"), 1)).toBe("0-90");
 });
 
-test("tilting takes the next pitch, in the nearest direction that has it", () => {
+test("tilting switches to the next pitch in the nearest direction", () => {
   expect(findTiltedView(rendering, frame("270-30"), 1)).toMatch(/^(0|180)-60$/);
   expect(findTiltedView(rendering, frame("180-30"), 1)).toBe("180-60");
   expect(findTiltedView(rendering, frame("180-60"), 1)).toBe("0-90");
@@ -24,6 +24,6 @@ test("tilting takes the next pitch, in the nearest direction that has it", () =>
   expect(findTiltedView(rendering, frame("90-30"), -1)).toBeNull();
 });
 
-test.each([[110, 100], [99, 50], [49, 20], [19.9, 10], [5, 5], [0.3, 0.2], [1, 1]])("below %d the round number is %d", (value, round) => {
+test.each([[110, 100], [99, 50], [49, 20], [19.9, 10], [5, 5], [0.3, 0.2], [1, 1]])("%d rounds down to %d", (value, round) => {
   expect(floorToRound(value)).toBeCloseTo(round, 12);
 });

@@ -5,7 +5,7 @@ import { makeDrawStyles, isHidden, type ObjectStyle } from "../../src/map/object
 
 const RED = [1, 0, 0];
 
-describe("a style says how each object is shown", () => {
+describe("an object style", () => {
   const rows: [string, ObjectStyle, Record<number, unknown>, string][] = [
     ["colours alone leave the others as they are", { colors: new Map([[5, "#ff0000"]]) }, { 5: RED }, "plain"],
     ["only dims the others", { only: [5, 6] }, { 5: "plain", 6: "plain" }, "dimmed"],
@@ -21,29 +21,29 @@ describe("a style says how each object is shown", () => {
     expect(Object.fromEntries(found?.byId ?? [])).toEqual(byId);
   });
 
-  test("nothing said: no style at all", () => {
+  test("is null when it is empty", () => {
     expect(makeDrawStyles({})).toBe(null);
     expect(makeDrawStyles({ colors: new Map() })).toBe(null);
   });
 
-  test("what is no colour is refused", () => {
+  test("refuses an invalid colour", () => {
     expect(() => makeDrawStyles({ colors: new Map([[1, "url(x)"]]) })).toThrow(/url\(x\)/);
   });
 
-  test("nothing is never hidden", () => {
+  test("never hides the absence of an object", () => {
     const none = makeDrawStyles({ only: [5], others: "hidden" });
     expect([isHidden(none, 0), isHidden(none, 5), isHidden(none, 6), isHidden(null, 6)]).toEqual([false, false, true, false]);
   });
 });
 
-test("words of finishes differ, and are never 0", () => {
+test("packed styles are distinct and never 0", () => {
   const words = (["plain", "dimmed", "hidden", [0, 0, 0], [1, 1, 1]] as const).map(packStyle);
   expect(new Set(words).size).toBe(5);
   expect(words.every((word) => word >>> 24 > 0 && word >>> 24 < 8)).toBe(true);
   expect(packStyle([1, 0, 0])).toBe(packColor([1, 0, 0]));
 });
 
-test("every id of a table is found within its probes", () => {
+test("every id of a table is found within the longest search", () => {
   const ids = Array.from({ length: 5000 }, (_, k) => (Math.imul(k + 1, 0x85ebca6b) >>> 0) || 1);
   const table = buildIdTable(new Map(ids.map((id, k) => [id, k + 1])), (word) => word);
   ids.forEach((id, k) => {

@@ -13,26 +13,26 @@ const own: DepthMapping = { frame: makeFrame(VIEW, 100, 16, 2), shift: [0, 0, 0]
 const other: DepthMapping = { frame: makeFrame({ ...VIEW, u0_m: -70, v0_m: 61, d0_m: -1200 }, 170, 16, 3), shift: [7.25, -3.5, 11], unit_m: 1 / 512, bias_m: 0.5, range: [-950, -700] };
 
 describe("a mask", () => {
-  test("asks for the pixel that lies at the middle of this one, at any level and origin", () => {
+  test("reads the pixel at the centre of each pixel, at any level and origin", () => {
     const [tile, above] = [{ z: 1, x: 0, y: 1 }, { z: 3, x: 2, y: 3 }];
     const mask = makeMask(own, tile, other, above, { depth: "d", color: null });
-    if (!mask) throw new Error("they meet");
+    if (!mask) throw new Error("the tiles overlap");
     const [u0, v0, px] = computeCorner(other, above);
     for (const [i, j] of [[0, 0], [3, 5], [9, 1], [15, 15]] as const) {
       const [u, v] = uvOfPixel(own.frame, tile, i, j);
       expect(Math.floor(mask.x + i * mask.step)).toBe(Math.floor((u - u0) / px));
       expect(Math.floor(mask.y + j * mask.step)).toBe(Math.floor((v0 - v) / px));
     }
-    // A D of −900 m in both: what is here counts as behind by the other's lead.
+    // D is −900 m in both: the bias puts this layer behind the other.
     const [here, there] = [(-900 + 1000) * 1024, (-900 - 11 + 1200) * 512];
     expect((here * mask.unit + mask.first - there) / 512).toBeCloseTo(0.5, 9);
   });
 
-  test("there is none for tiles that do not meet", () => {
+  test("does not exist for tiles that do not overlap", () => {
     expect(makeMask(own, { z: 2, x: 0, y: 0 }, other, { z: 3, x: 7, y: 7 }, { depth: "d", color: null })).toBeNull();
   });
 
-  test("hides what lies behind covered pixels only; edges without a depth take that of the nearest beside", () => {
+  test("hides only what is behind covered pixels; edges without a depth take the nearest one around them", () => {
     const depth = Uint32Array.of(10, 30, NO_DEPTH, 50);
     const color = Uint8ClampedArray.from([0, 0, 0, 255, 0, 0, 0, 255, 0, 0, 0, 255, 0, 0, 0, 100]);
     const mask = { depth: "d", color: "c", x: 0.5, y: 0.5, step: 1, unit: 1, first: 0 };
@@ -42,7 +42,7 @@ describe("a mask", () => {
   });
 });
 
-test("of equally near layers the later leads, by a pixel each", () => {
+test("the later of two equally near layers is visible, by a bias of one pixel each", () => {
   expect(computeBias(own.frame, 1, 0)).toBe(0);
   expect(computeBias(own.frame, 1, 2)).toBeCloseTo(2 * pixelM(own.frame, 1), 12);
   const [near, far] = joinDepthRanges([own, other]) ?? [0, 0];
@@ -51,13 +51,13 @@ test("of equally near layers the later leads, by a pixel each", () => {
   expect(joinDepthRanges([])).toBeNull();
 });
 
-test("clips meet where they have a point in common", () => {
+test("clips overlap if they have a point in common", () => {
   expect(overlaps(null, [0, 0, 0.1, 1])).toBe(true);
   expect(overlaps([0, 0, 0.5, 1], [0.5, 0, 1, 1])).toBe(false);
   expect(overlaps([0, 0, 0.51, 1], [0.5, 0.9, 1, 1])).toBe(true);
 });
 
-test("layers that combine make one group where the first of them is", () => {
+test("combined layers form one group at the position of the first", () => {
   const layer = (name: string, combines: boolean, clip: Clip | null = null): imageLayer => ({ name, isCombinable: combines, clip }) as unknown as imageLayer;
   const [a, b, c, d] = [layer("a", false), layer("b", true), layer("c", false), layer("d", true)];
   expect(groupByDepth([a, b, c, d])).toEqual([[a], [b, d], [c]]);
@@ -75,13 +75,13 @@ describe("renderings on one map", () => {
     layers: new Map(),
   });
 
-  test("go together when CRS, heights and a direction are the same, whatever views are called", () => {
+  test("are compatible if they share CRS, heights and a view, whatever the views' ids", () => {
     expect(findIncompatibility(rendering({}), rendering({ name: "ETRS89 / UTM zone 32N" }))).toBeNull();
     expect(findIncompatibility(rendering({}), rendering({}, [[90, 45], [0, 45]]))).toBeNull();
     expect(findIncompatibility(rendering({ epsg: null }), rendering({ epsg: null }))).toBeNull();
   });
 
-  test("are refused with the reason", () => {
+  test("are refused with a reason", () => {
     expect(findIncompatibility(rendering({}), rendering({ epsg: 2056, name: "LV95" }))).toMatch(/CRS is "EPSG:2056 LV95".*"EPSG:25832 UTM 32"/);
     expect(findIncompatibility(rendering({ epsg: null, name: "a" }), rendering({ epsg: null, name: "b" }))).toMatch(/CRS is "b"/);
     expect(findIncompatibility(rendering({ epsg: null, wkt: "A" }), rendering({ epsg: null, wkt: "B" }))).toMatch(/CRS/);
