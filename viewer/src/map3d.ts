@@ -3,19 +3,19 @@ export { map } from "./map/map";
 export { imageLayer, type ImageLayerEvents, type ImageLayerOptions } from "./map/imageLayer";
 export { marker, type MarkerEvents, type MarkerOptions } from "./overlay/marker";
 export { popup, type PopupEvents, type PopupOptions } from "./overlay/popup";
-export { MapLayer } from "./core/mapLayer";
+export { MapLayer, type Addable, type LayerHost } from "./core/mapLayer";
 export { Evented, type FiredEvent, type Listener } from "./core/events";
 export { DecodeError, DrawError, FetchError, ManifestError, Map3dError, UsageError } from "./core/errors";
 export type { ClickEvent, HoverEvent, MapEvents, MapOptions } from "./map/options";
 export type { FitOptions } from "./map/cameraController";
 export type { ObjectStyle } from "./map/objectStyle";
-export type { VisibleObject } from "./map/inView";
+export type { VisibleObject } from "./map/visibleObjects";
 export type { Pick } from "./map/picker";
 export type { TransitionFrame, ViewTransition } from "./map/viewTransition";
 export type { Relief } from "./map/relief";
-export type { Addable, LayerHost, OverlayHost } from "./core/overlayHost";
+export type { OverlayHost } from "./core/overlayHost";
 export type { Box3, Vec2, Vec3 } from "./core/vec";
-export type { Clip } from "./draw/combine";
+export type { Clip } from "./draw/depthMapping";
 export type { CustomLayer, Mode, FrameState } from "./draw/drawer";
 export type { DepthImage, LightEstimator } from "./draw/lightEstimator";
 export type { Light } from "./geo/light";
@@ -27,5 +27,5 @@ export type { FetchFunction } from "./tiles/fetch";
 export type { Attribute, AttributeInfo, AttributeValue, ObjectInfo, SearchEntry } from "./tiles/objects";
 export { chooseUtcOffset } from "./geo/daylight";
 
-/** Of the viewer; manifests of version 1 are read. */
+/** Version of the viewer, which reads manifests of version 1. */
 export const version = "0.1.0";

@@ -1,15 +1,15 @@
 type Child = Node | string;
 
-/** An element with classes, attributes and children; strings become text, never HTML. */
+/** Creates an element; strings among its children become text, never HTML. */
 export function element<K extends keyof HTMLElementTagNameMap>(tag: K, classes: string, attributes: Record<string, string> = {}, ...children: Child[]): HTMLElementTagNameMap[K] {
-  const made = document.createElement(tag);
-  if (classes) made.className = classes;
-  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
-  made.append(...children);
-  return made;
+  const created = document.createElement(tag);
+  if (classes) created.className = classes;
+  for (const [name, value] of Object.entries(attributes)) created.setAttribute(name, value);
+  created.append(...children);
+  return created;
 }
 
-/** A button with an icon drawn as an SVG path (24 × 24, stroked) and a name that is read aloud. */
+/** Creates a button with an icon, an SVG path (24 × 24, stroked), and an accessible name. */
 export function iconButton(classes: string, label: string, path: string): HTMLButtonElement {
   const button = element("button", classes, { type: "button", "aria-label": label, title: label });
   button.append(icon(path));
@@ -28,7 +28,7 @@ export function icon(path: string): SVGSVGElement {
 
 const adopted = new WeakMap<Document, Set<string>>();
 
-/** Adds a style sheet of the viewer to a document, once. A constructed sheet, which a CSP without inline styles allows. */
+/** Adds a style sheet to a document, once. A constructed sheet, which a CSP without inline styles allows. */
 export function adoptStyles(document: Document, css: string): void {
   const known = adopted.get(document) ?? new Set();
   if (known.has(css)) return;

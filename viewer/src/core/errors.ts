@@ -1,9 +1,9 @@
-/** Base of every error map3d raises. */
+/** Base class of all errors of map3d. */
 export class Map3dError extends Error {
   override name = "Map3dError";
 }
 
-/** rendering.json is missing, of another version, or breaks its contract. */
+/** rendering.json is missing, has another version, or is malformed. */
 export class ManifestError extends Map3dError {
   override name = "ManifestError";
 }
@@ -11,7 +11,7 @@ export class ManifestError extends Map3dError {
 /** A tile, archive or attribute file could not be fetched. */
 export class FetchError extends Map3dError {
   override name = "FetchError";
-  /** HTTP status, 0 when no answer came. */
+  /** HTTP status; 0 when the server did not answer. */
   readonly status: number;
   constructor(message: string, status = 0) {
     super(message);
@@ -19,17 +19,17 @@ export class FetchError extends Map3dError {
   }
 }
 
-/** Bytes that are not what the manifest says they are. */
+/** A tile's bytes do not match the manifest. */
 export class DecodeError extends Map3dError {
   override name = "DecodeError";
 }
 
-/** The browser cannot draw: no WebGL2, a shader refused. */
+/** The browser cannot draw: it lacks WebGL2, or a shader failed to compile. */
 export class DrawError extends Map3dError {
   override name = "DrawError";
 }
 
-/** A caller's misuse: an unknown element, view, or number out of range. */
+/** Wrong use of the API: an unknown element or view, or a number out of range. */
 export class UsageError extends Map3dError {
   override name = "UsageError";
 }

@@ -1,18 +1,18 @@
-/** What a listener gets: the event's own fields, its name and who fired it. */
+/** The argument of a listener: the event's fields, its type and its source. */
 export type FiredEvent<T> = T & { type: string; target: unknown };
-/** Called with each event. */
+/** A function that receives events. */
 export type Listener<T> = (event: FiredEvent<T>) => void;
 
-/** An event source. `E` maps event names to the fields of the event. Methods return `this`. */
+/** An event source. `E` maps event types to their fields. Methods return `this`. */
 export class Evented<E extends object> {
   readonly #listeners = new Map<keyof E, Map<unknown, Listener<never>>>();
 
-  /** Calls a listener at each event of a type; the same listener once only. */
+  /** Adds a listener for a type of event; adding it again has no effect. */
   on<K extends keyof E>(type: K, listener: Listener<E[K]>): this {
     return this.#add(type, listener, listener);
   }
 
-  /** Calls a listener at the next event of a type. */
+  /** Adds a listener that is called once. */
   once<K extends keyof E>(type: K, listener: Listener<E[K]>): this {
     return this.#add(type, listener, (event: FiredEvent<E[K]>) => {
       this.off(type, listener);
@@ -20,21 +20,21 @@ export class Evented<E extends object> {
     });
   }
 
-  /** Without a listener: all listeners of that type. */
+  /** Removes a listener; without one, all listeners of that type. */
   off<K extends keyof E>(type: K, listener?: Listener<E[K]>): this {
     if (listener) this.#listeners.get(type)?.delete(listener);
     else this.#listeners.delete(type);
     return this;
   }
 
-  /** Calls the listeners of a type now, in the order in which they came. */
+  /** Fires an event: calls its listeners in the order in which they were added. */
   fire<K extends keyof E>(type: K, fields: E[K]): this {
     const event = { ...fields, type: String(type), target: this };
     for (const listener of [...(this.#listeners.get(type)?.values() ?? [])]) (listener as Listener<E[K]>)(event);
     return this;
   }
 
-  /** Does anybody listen? */
+  /** Whether an event has listeners. */
   listens(type: keyof E): boolean {
     return (this.#listeners.get(type)?.size ?? 0) > 0;
   }

@@ -1,6 +1,6 @@
 import { DrawError } from "./errors";
 
-/** A linked program. @param name of the program, for its error  @throws DrawError with the compiler's log, or when the context is lost */
+/** Compiles and links a program. @param name for error messages  @throws DrawError with the compiler's log, or when the context is lost */
 export function linkProgram(gl: WebGL2RenderingContext, name: string, vertex: string, fragment: string): WebGLProgram {
   const program = gl.createProgram();
   for (const [type, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]] as const) {
@@ -9,7 +9,7 @@ export function linkProgram(gl: WebGL2RenderingContext, name: string, vertex: st
     gl.shaderSource(shader, source);
     gl.compileShader(shader);
     gl.attachShader(program, shader);
-    gl.deleteShader(shader); // goes with the program
+    gl.deleteShader(shader); // freed with the program
   }
   gl.linkProgram(program);
   if (gl.getProgramParameter(program, gl.LINK_STATUS) || gl.isContextLost()) return program;
@@ -17,7 +17,7 @@ export function linkProgram(gl: WebGL2RenderingContext, name: string, vertex: st
   throw new DrawError(`shader ${name}: ${[gl.getProgramInfoLog(program), ...logs].join(" ").trim()}`);
 }
 
-/** An empty texture of one level, clamped at its edges, bound to the active unit. @param format stored, e.g. gl.RGBA8  @param width texels  @param height texels  @param filter between texels */
+/** Creates an empty texture without mipmaps, clamped at its edges and bound to the active unit. @param format internal format, e.g. gl.RGBA8  @param width texels  @param height texels  @param filter minification and magnification */
 export function makeTexture(gl: WebGL2RenderingContext, format: number, width: number, height: number, filter: number = gl.NEAREST): WebGLTexture {
   const texture = gl.createTexture();
   gl.bindTexture(gl.TEXTURE_2D, texture);

@@ -1,18 +1,18 @@
-/** What the map says itself: names of controls, read aloud or shown. */
+/** Texts of the map itself: names of controls, read aloud or shown. */
 export interface MapMessages {
   readonly zoom: string;
   readonly zoomIn: string;
   readonly zoomOut: string;
   readonly direction: string;
-  readonly left: string;
-  readonly right: string;
+  readonly rotateLeft: string;
+  readonly rotateRight: string;
   readonly north: string;
-  readonly looking: (wind: string) => string;
-  /** Counter-clockwise from north, by 45 degrees. */
+  readonly facing: (wind: string) => string;
+  /** Counter-clockwise from north, in steps of 45°. */
   readonly winds: readonly string[];
-  readonly screen: string;
-  readonly fill: string;
-  readonly leave: string;
+  readonly fullScreen: string;
+  readonly enterFullScreen: string;
+  readonly exitFullScreen: string;
   readonly scale: (length: string) => string;
   readonly details: string;
   readonly close: string;
@@ -23,14 +23,14 @@ const EN: MapMessages = {
   zoomIn: "Zoom in",
   zoomOut: "Zoom out",
   direction: "Direction",
-  left: "Turn view counter-clockwise",
-  right: "Turn view clockwise",
-  north: "Look north",
-  looking: (wind) => `Looking ${wind}; look north`,
+  rotateLeft: "Turn view counter-clockwise",
+  rotateRight: "Turn view clockwise",
+  north: "Reset to north",
+  facing: (wind) => `Facing ${wind}; reset to north`,
   winds: ["north", "north-west", "west", "south-west", "south", "south-east", "east", "north-east"],
-  screen: "Screen",
-  fill: "Fill the screen",
-  leave: "Leave the whole screen",
+  fullScreen: "Full screen",
+  enterFullScreen: "Enter full screen",
+  exitFullScreen: "Exit full screen",
   scale: (length) => `Scale: ${length}`,
   details: "Details",
   close: "Close",
@@ -41,51 +41,51 @@ const DE: MapMessages = {
   zoomIn: "Vergrößern",
   zoomOut: "Verkleinern",
   direction: "Blickrichtung",
-  left: "Ansicht gegen den Uhrzeigersinn drehen",
-  right: "Ansicht im Uhrzeigersinn drehen",
-  north: "Nach Norden blicken",
-  looking: (wind) => `Blick nach ${wind}; nach Norden blicken`,
+  rotateLeft: "Ansicht gegen den Uhrzeigersinn drehen",
+  rotateRight: "Ansicht im Uhrzeigersinn drehen",
+  north: "Nach Norden ausrichten",
+  facing: (wind) => `Blick nach ${wind}; nach Norden ausrichten`,
   winds: ["Norden", "Nordwesten", "Westen", "Südwesten", "Süden", "Südosten", "Osten", "Nordosten"],
-  screen: "Bildschirm",
-  fill: "Bildschirm füllen",
-  leave: "Vollbild verlassen",
+  fullScreen: "Vollbild",
+  enterFullScreen: "Vollbildmodus aktivieren",
+  exitFullScreen: "Vollbildmodus beenden",
   scale: (length) => `Maßstab: ${length}`,
-  details: "Einzelheiten",
+  details: "Details",
   close: "Schließen",
 };
 
 const FR: MapMessages = {
   zoom: "Zoom",
-  zoomIn: "Agrandir",
-  zoomOut: "Réduire",
-  direction: "Direction du regard",
-  left: "Tourner la vue vers la gauche",
-  right: "Tourner la vue vers la droite",
-  north: "Regarder vers le nord",
-  looking: (wind) => `Vue vers ${wind} ; regarder vers le nord`,
+  zoomIn: "Zoom avant",
+  zoomOut: "Zoom arrière",
+  direction: "Orientation",
+  rotateLeft: "Faire pivoter la vue dans le sens antihoraire",
+  rotateRight: "Faire pivoter la vue dans le sens horaire",
+  north: "Orienter vers le nord",
+  facing: (wind) => `Vue vers ${wind} ; orienter vers le nord`,
   winds: ["le nord", "le nord-ouest", "l’ouest", "le sud-ouest", "le sud", "le sud-est", "l’est", "le nord-est"],
-  screen: "Écran",
-  fill: "Plein écran",
-  leave: "Quitter le plein écran",
+  fullScreen: "Plein écran",
+  enterFullScreen: "Passer en plein écran",
+  exitFullScreen: "Quitter le plein écran",
   scale: (length) => `Échelle : ${length}`,
   details: "Détails",
   close: "Fermer",
 };
 
-/** The languages that are known. */
+/** One value for each supported language. */
 export interface Translations<T> {
   readonly en: T;
   readonly de: T;
   readonly fr: T;
 }
 
-/** English where a language (BCP 47) is not known. */
-export const selectTranslation = <T>(known: Translations<T>, language: string): T => {
+/** Returns the translation into a language (BCP 47); English for any other language. */
+export const selectTranslation = <T>(translations: Translations<T>, language: string): T => {
   const short = language.slice(0, 2).toLowerCase();
-  return short === "de" || short === "fr" ? known[short] : known.en;
+  return short === "de" || short === "fr" ? translations[short] : translations.en;
 };
 
 export const getMapMessages = (language: string): MapMessages => selectTranslation({ en: EN, de: DE, fr: FR }, language);
 
-/** What the page around an element is written in, else what the browser's user reads. */
+/** Returns the language of the page around an element, or else the browser's. */
 export const findLanguage = (element: Element): string => element.closest<HTMLElement>("[lang]:not([lang=''])")?.lang ?? navigator.language;

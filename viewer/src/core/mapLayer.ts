@@ -1,17 +1,34 @@
 import { Evented } from "./events";
-import type { Addable, LayerHost } from "./overlayHost";
 
-/** Base of what is put on a map: on one at a time. `E` maps its events to their fields. */
+/** Anything that can be added to a map. */
+export interface Addable<M> {
+  /** Kinds of tiles that it reads: while it is on the map, the map fetches them for everything in view. */
+  readonly needs?: readonly ("id" | "depth")[];
+  /** @internal Called by the map, once. */
+  attachTo(map: M): void;
+  /** @internal Called by the map, once. */
+  detachFrom(map: M): void;
+}
+
+/** A map as seen by what is added to it. */
+export interface LayerHost<M> {
+  /** Adds a layer; does nothing if it is on the map already. */
+  add(item: Addable<M>): unknown;
+  /** Removes a layer; does nothing if it is not on the map. */
+  discard(item: Addable<M>): unknown;
+}
+
+/** Base class of everything that is added to a map, like Leaflet's Layer; it is on one map at a time. `E` maps its events to their fields. */
 export abstract class MapLayer<M extends LayerHost<M>, E extends object> extends Evented<E> implements Addable<M> {
   #map: M | undefined;
 
-  /** Puts it on a map. */
+  /** Adds it to a map. */
   addTo(map: M): this {
     map.add(this);
     return this;
   }
 
-  /** Takes it off its map, with all that it showed there. */
+  /** Removes it, and everything it shows, from its map. */
   remove(): this {
     this.#map?.discard(this);
     return this;
@@ -29,14 +46,14 @@ export abstract class MapLayer<M extends LayerHost<M>, E extends object> extends
     this.#map = undefined;
   }
 
-  /** The map that it is on. */
+  /** Its map, while it is on one. */
   protected get map(): M | undefined {
     return this.#map;
   }
 
-  /** It is on a map now. */
+  /** Called when it is added to a map. */
   protected abstract onAdd(map: M): void;
 
-  /** It leaves the map; `map` tells still which. */
+  /** Called when it is removed; `this.map` is still set. */
   protected abstract onRemove(map: M): void;
 }

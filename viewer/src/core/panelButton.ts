@@ -9,11 +9,11 @@ const STYLES = `
 @media (forced-colors: active) { .map3d-status { border: 1px solid CanvasText; } }
 `;
 
-/** Puts a button on top of a map's others, with something that opens beside it. */
-export function addPanelButton({ controlPane }: { readonly controlPane: HTMLElement }, button: HTMLButtonElement, opens: HTMLElement): HTMLElement {
+/** Adds a button above a map's other buttons, with a panel that panel next to it. */
+export function addPanelButton({ controlPane }: { readonly controlPane: HTMLElement }, button: HTMLButtonElement, panel: HTMLElement): HTMLElement {
   adoptStyles(document, STYLES);
   const column = controlPane.querySelector(".map3d-buttons") ?? controlPane.appendChild(element("div", "map3d-buttons"));
-  const box = element("div", "map3d-panel-button", {}, element("div", "map3d-group", {}, button), opens);
+  const box = element("div", "map3d-panel-button", {}, element("div", "map3d-group", {}, button), panel);
   column.prepend(box);
   return box;
 }

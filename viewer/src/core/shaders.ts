@@ -1,4 +1,4 @@
-/** A rectangle of the screen, as a strip of four vertices without attributes. */
+/** Draws a rectangle of the screen as a strip of four vertices without attributes. */
 export const RECT_VERTEX = `#version 300 es
 uniform vec4 u_rect; // left, top, right, bottom in clip space
 void main() {

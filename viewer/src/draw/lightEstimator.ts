@@ -1,27 +1,27 @@
 import type { Vec2, Vec3 } from "../core/vec";
 
-/** What is seen, by depth alone. */
+/** The visible surfaces as a depth image. */
 export interface DepthImage {
   readonly gl: WebGL2RenderingContext;
-  /** Of each pixel, as a share of `range`; 1 where nothing is. A depth texture, the lowest row first. */
+  /** Depth of each pixel as a fraction of `range`; 1 where there is no surface. A depth texture, bottom row first. */
   readonly depth: WebGLTexture;
   readonly width: number;
   readonly height: number;
-  /** Metres a pixel. */
+  /** Metres per pixel. */
   readonly px_m: number;
-  /** Least and greatest D, metres. */
+  /** Minimum and maximum D, metres. */
   readonly range: Vec2;
-  /** Unit, towards the sun: along right, up and forward of the view; null: nothing of it is asked for. */
+  /** Unit vector towards the sun along the view's right, up and forward axes; null: estimate no shadows. */
   readonly sun: Vec3 | null;
-  /** Is the light that is everywhere asked for? */
+  /** Whether to estimate ambient occlusion. */
   readonly occlusion: boolean;
 }
 
-/** Finds from depths how much light reaches what is seen. */
+/** Estimates from depths how much light reaches the visible surfaces. */
 export interface LightEstimator {
   /**
-   * RGBA8 texture as large as the depths: red is the share of the sky's light, green of the sun's; blue and alpha are the
-   * high and the low byte of the depth that they are of. It lasts until the next call.
+   * Returns an RGBA8 texture of the size of the depth image: red is the fraction of skylight, green of sunlight; blue and alpha are the
+   * high and low byte of the pixel's depth. Valid until the next call.
    */
-  estimateLight(seen: DepthImage): WebGLTexture;
+  estimateLight(depths: DepthImage): WebGLTexture;
 }

@@ -1,6 +1,6 @@
 import { dot, type Vec3 } from "../core/vec";
 
-/** The axes of a view in local coordinates: right, up, forward (away from the viewer). Orthonormal. */
+/** The axes of a view in local coordinates: right, up, and forward (away from the viewer). Orthonormal. */
 export interface Axes {
   readonly right: Vec3;
   readonly up: Vec3;
@@ -12,26 +12,26 @@ const HALF_SIN: Record<number, number> = { 30: 0.5, 150: 0.5, 210: -0.5, 330: -0
 const HALF_COS: Record<number, number> = { 60: 0.5, 300: 0.5, 120: -0.5, 240: -0.5 };
 type Vec2 = readonly [number, number];
 
-/** (cos, sin) of degrees; exact at multiples of 90° and where one of them is one half. */
+/** Returns cosine and sine of an angle; exact at multiples of 90° and where one of them is ±½. */
 export function cosSin(deg: number): Vec2 {
   const turn = ((deg % 360) + 360) % 360;
   const rad = (turn * Math.PI) / 180;
   return EXACT[turn] ?? [HALF_COS[turn] ?? Math.cos(rad), HALF_SIN[turn] ?? Math.sin(rad)];
 }
 
-/** Axes of look-at angle (counter-clockwise from north) and pitch (below the horizon). spec/pyramid.md §1. */
+/** Computes the axes of a view from its look-at angle (counter-clockwise from north) and pitch (below the horizon), in degrees. spec/pyramid.md §1. */
 export function computeAxes(lookAtDeg: number, pitchDeg: number): Axes {
   const [ca, sa] = cosSin(lookAtDeg);
   const [cp, sp] = cosSin(pitchDeg);
   return { right: [ca, sa, 0], up: [-sp * sa, sp * ca, cp], forward: [-cp * sa, cp * ca, -sp] };
 }
 
-/** Shortest decimal form, e.g. `45-22.5`. */
+/** Returns a view's id in its shortest decimal form, e.g. `45-22.5`. */
 export function viewId(lookAtDeg: number, pitchDeg: number): string {
   return `${String(lookAtDeg)}-${String(pitchDeg)}`;
 }
 
-/** View coordinates U, V, D (metres) of a local point. */
+/** Transforms a local point to view coordinates U, V, D (metres). */
 export function uvdFromLocal({ right, up, forward }: Axes, local: Vec3): Vec3 {
   return [dot(right, local), dot(up, local), dot(forward, local)];
 }
@@ -44,7 +44,7 @@ export function localFromUvd({ right, up, forward }: Axes, [u, v, d]: Vec3): Vec
   ];
 }
 
-/** D of the point with these U and V whose local height is z; null when the view is level. */
+/** Returns D of the point with this V and local height z; null when the view is level. */
 export function depthAtHeight({ up, forward }: Axes, v: number, z: number): number | null {
   return Math.abs(forward[2]) < 1e-9 ? null : (z - v * up[2]) / forward[2];
 }

@@ -3,18 +3,18 @@ import { corners } from "../core/vec";
 import { uvdFromLocal } from "./axes";
 import { pixelM, type Frame } from "./frame";
 
-/** Where the map looks: the middle of the screen in U and V, and how large. Screen: CSS pixels from the top left. */
+/** A view's camera: the frame, U and V of the screen's centre, and the zoom. Screen positions are CSS pixels from the top left. */
 export interface Camera {
   readonly frame: Frame;
   readonly u: number;
   readonly v: number;
-  /** At whole numbers a tile pixel of that level is one CSS pixel. */
+  /** At an integer zoom, one tile pixel of that level is one CSS pixel. */
   readonly zoom: number;
   readonly width: number;
   readonly height: number;
 }
 
-/** Metres a CSS pixel. */
+/** Metres per CSS pixel. */
 export const cssPixelM = (camera: Camera): number => pixelM(camera.frame, camera.zoom);
 
 export function uvFromScreen(camera: Camera, [x, y]: Vec2): Vec2 {
@@ -32,14 +32,14 @@ export function screenFromLocal(camera: Camera, local: Vec3): Vec2 {
   return screenFromUv(camera, [u, v]);
 }
 
-/** The camera at another zoom that shows the same point under `anchor`. */
+/** Changes the zoom and keeps the point under `anchor` in place. */
 export function zoomedAt(camera: Camera, zoom: number, anchor: Vec2): Camera {
   const [u, v] = uvFromScreen(camera, anchor);
   const px = pixelM(camera.frame, zoom);
   return { ...camera, zoom, u: u - (anchor[0] - camera.width / 2) * px, v: v + (anchor[1] - camera.height / 2) * px };
 }
 
-/** [[least U, least V], [greatest U, greatest V]] of a local box. */
+/** Projects a local box: [[min U, min V], [max U, max V]]. */
 export function projectedBox(frame: Frame, box: Box3): readonly [Vec2, Vec2] {
   const points = corners(box).map((corner) => uvdFromLocal(frame.axes, corner));
   const [us, vs] = [points.map((p) => p[0]), points.map((p) => p[1])];
@@ -49,7 +49,7 @@ export function projectedBox(frame: Frame, box: Box3): readonly [Vec2, Vec2] {
   ];
 }
 
-/** The largest zoom at which width × height metres fit the screen with `padding` CSS pixels at each side. */
+/** Returns the largest zoom at which width × height metres fit the screen with `padding` CSS pixels on each side. */
 export function zoomToFit(camera: Camera, width_m: number, height_m: number, padding: number): number {
   const across = Math.max(camera.width - 2 * padding, 1);
   const down = Math.max(camera.height - 2 * padding, 1);

@@ -3,7 +3,7 @@ import { clamp, type Vec3 } from "../core/vec";
 import { localAzimuth, type GeographicJson } from "./geographic";
 import type { Light } from "./light";
 
-/** How the light falls at a time on the middle of a scene, through the standard atmosphere. */
+/** Computes sun and sky for a time at the scene's centre. */
 export function computeDaylight(time: Date, geographic: GeographicJson): Pick<Light, "azimuth_deg" | "altitude_deg" | "sun_rgb" | "sky_rgb"> {
   const [lon, lat] = geographic.lon_lat;
   const { azimuth, altitude } = getPosition(time, lat, lon);
@@ -11,31 +11,31 @@ export function computeDaylight(time: Date, geographic: GeographicJson): Pick<Li
 }
 
 /**
- * Colours of sun and sky over the sun's altitude: white at noon, warm when it is low, blue after it has set. By night what is left of the light is
- * enough to know the town again, as in a photograph that was exposed for long.
+ * Computes the colours of sun and sky from the sun's altitude: white at noon, warm near the horizon, blue after sunset. The light left at night
+ * keeps the town recognisable, as in a long exposure.
  */
 export function computeSkyColors(altitude_deg: number): { sun_rgb: Vec3; sky_rgb: Vec3 } {
-  const at = (table: readonly Stop[]): Vec3 => {
+  const at = (table: readonly ColorStop[]): Vec3 => {
     const next = table.findIndex(([altitude]) => altitude >= altitude_deg);
-    const [high, low] = [table[next < 0 ? table.length - 1 : next] as Stop, table[Math.max((next < 0 ? table.length : next) - 1, 0)] as Stop];
+    const [high, low] = [table[next < 0 ? table.length - 1 : next] as ColorStop, table[Math.max((next < 0 ? table.length : next) - 1, 0)] as ColorStop];
     const share = high[0] === low[0] ? 0 : clamp((altitude_deg - low[0]) / (high[0] - low[0]), 0, 1);
     return [0, 1, 2].map((k) => low[1][k as 0] + (high[1][k as 0] - low[1][k as 0]) * share) as unknown as Vec3;
   };
   return { sun_rgb: at(SUN), sky_rgb: at(SKY) };
 }
 
-type Stop = readonly [altitude_deg: number, rgb: Vec3];
+type ColorStop = readonly [altitude_deg: number, rgb: Vec3];
 
 const WHITE: Vec3 = [1, 1, 1];
-/** Factors of the diffuse light. */
-const SUN: readonly Stop[] = [[-1, [0, 0, 0]], [0.5, [0.42, 0.17, 0.06]], [4, [0.92, 0.58, 0.3]], [12, [1.04, 0.88, 0.68]], [30, WHITE]];
-/** Factors of the ambient light. */
-const SKY: readonly Stop[] = [[-12, [0.14, 0.18, 0.31]], [-6, [0.22, 0.28, 0.46]], [0, [0.6, 0.62, 0.74]], [8, [0.9, 0.93, 1]], [30, WHITE]];
+/** Factors of the diffuse light, by altitude. */
+const SUN: readonly ColorStop[] = [[-1, [0, 0, 0]], [0.5, [0.42, 0.17, 0.06]], [4, [0.92, 0.58, 0.3]], [12, [1.04, 0.88, 0.68]], [30, WHITE]];
+/** Factors of the ambient light, by altitude. */
+const SKY: readonly ColorStop[] = [[-12, [0.14, 0.18, 0.31]], [-6, [0.22, 0.28, 0.46]], [0, [0.6, 0.62, 0.74]], [8, [0.9, 0.93, 1]], [30, WHITE]];
 
-/** The zone in which a place's clock may be read, in hours from UTC: the page's own if that is near its longitude, else the longitude's. */
-export function chooseUtcOffset(lon: number, own_h: number): number {
-  return Math.abs(own_h - lon / 15) <= OWN_ZONE_H ? own_h : Math.round(lon / 15);
+/** Returns the UTC offset, in hours, for clocks at a longitude: the browser's own if it is plausible there, else the offset of solar time. */
+export function chooseUtcOffset(lon: number, browser_h: number): number {
+  return Math.abs(browser_h - lon / 15) <= MAX_OFFSET_FROM_SUN_H ? browser_h : Math.round(lon / 15);
 }
 
-/** Clocks of a state are at most so far from the sun's. */
-const OWN_ZONE_H = 2.6;
+/** Official time differs from solar time by at most this much. */
+const MAX_OFFSET_FROM_SUN_H = 2.6;

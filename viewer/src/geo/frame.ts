@@ -1,14 +1,14 @@
 import type { Vec2 } from "../core/vec";
 import { computeAxes, type Axes } from "./axes";
 
-/** A tile's number in its pyramid: spec/pyramid.md §3. */
+/** A tile's address in its pyramid: spec/pyramid.md §3. */
 export interface Tile {
   readonly z: number;
   readonly x: number;
   readonly y: number;
 }
 
-/** The pinned square of a view and its division into tiles. Metres, local frame of the rendering. */
+/** The pinned square of a view, which its tiles divide. Metres, local frame of the rendering. */
 export interface Frame {
   readonly id: string;
   readonly lookAtDeg: number;
@@ -17,7 +17,7 @@ export interface Frame {
   readonly u0: number;
   readonly v0: number;
   readonly d0: number;
-  /** Side of the square. */
+  /** Side length of the square. */
   readonly size: number;
   readonly tilePx: number;
   readonly zmax: number;
@@ -38,16 +38,16 @@ export function makeFrame(view: FrameJson, size: number, tilePx: number, zmax: n
   return { id, lookAtDeg, pitchDeg, axes, u0, v0, d0, size, tilePx, zmax };
 }
 
-/** Metres a pixel at level z (which may be fractional). */
+/** Metres per pixel at level z (which may be fractional). */
 export const pixelM = (frame: Frame, z: number): number => frame.size / (frame.tilePx * 2 ** z);
 
-/** U and V of the centre of pixel (i, j) of a tile. */
+/** Returns U and V of the centre of a tile's pixel (i, j). */
 export function uvOfPixel(frame: Frame, tile: Tile, i: number, j: number): Vec2 {
   const px = pixelM(frame, tile.z);
   return [frame.u0 + (tile.x * frame.tilePx + i + 0.5) * px, frame.v0 - (tile.y * frame.tilePx + j + 0.5) * px];
 }
 
-/** The tile of level z and the pixel in it that hold (U, V); null outside the square. */
+/** Finds the tile of level z, and its pixel, at (U, V); null outside the square. */
 export function pixelAt(frame: Frame, z: number, u: number, v: number): { tile: Tile; i: number; j: number } | null {
   const px = pixelM(frame, z);
   const [column, row, side] = [Math.floor((u - frame.u0) / px), Math.floor((frame.v0 - v) / px), frame.tilePx * 2 ** z];
@@ -56,10 +56,10 @@ export function pixelAt(frame: Frame, z: number, u: number, v: number): { tile: 
   return { tile: { z, x, y }, i: column - x * frame.tilePx, j: row - y * frame.tilePx };
 }
 
-/** The ancestor `up` levels above. */
+/** Returns a tile's ancestor `up` levels above. */
 export const ancestor = ({ z, x, y }: Tile, up: number): Tile => ({ z: z - up, x: Math.floor(x / 2 ** up), y: Math.floor(y / 2 ** up) });
 
-/** In the order TL, TR, BL, BR. */
+/** Returns a tile's children in the order TL, TR, BL, BR. */
 export function childrenOf({ z, x, y }: Tile): [Tile, Tile, Tile, Tile] {
   const [x2, y2] = [2 * x, 2 * y];
   return [
@@ -70,21 +70,21 @@ export function childrenOf({ z, x, y }: Tile): [Tile, Tile, Tile, Tile] {
   ];
 }
 
-/** Bits of x and y interleaved, x in the even bits; exact up to level 26. */
+/** Interleaves the bits of x and y, x in the even bits; exact up to level 26. */
 export function morton(x: number, y: number): number {
   let code = 0;
   for (let bit = 0, place = 1; bit < 26; bit++, place *= 4) code += place * (((x >> bit) & 1) + 2 * ((y >> bit) & 1));
   return code;
 }
 
-/** Root level of the block that holds the tiles of level z. spec/pyramid.md §8. */
+/** Returns the root level of the blocks that hold level z. spec/pyramid.md §8. */
 export function blockLevel(z: number, zmax: number): number {
   let root = Math.max(zmax - 3, 0);
   while (z < root) root = Math.max(root - 3, 0);
   return root;
 }
 
-/** The block's root tile. */
+/** Returns the root tile of a tile's block. */
 export const blockRoot = (tile: Tile, zmax: number): Tile => ancestor(tile, tile.z - blockLevel(tile.z, zmax));
 
 export const tileName = ({ z, x, y }: Tile): string => `${String(z)}/${String(x)}/${String(y)}`;

@@ -1,24 +1,24 @@
 import { clamp, type Vec3 } from "../core/vec";
 
-/** Light from one side and from everywhere, as Lambert has it. */
+/** Lambertian light: directional sunlight and ambient skylight. */
 export interface Light {
-  /** false: colours are shown as they are stored. */
+  /** false: colours are shown as stored. */
   lit: boolean;
-  /** Where the light comes from, degrees clockwise from north. */
+  /** Azimuth of the light source, degrees clockwise from north. */
   azimuth_deg: number;
   /** Degrees above the horizon. */
   altitude_deg: number;
-  /** Light everywhere, 0..1. */
+  /** Ambient light, 0..1. */
   ambient: number;
-  /** Light on a surface that faces the sun; linear light, added to ambient. */
+  /** Light on a surface that faces the sun, added to ambient; linear. */
   diffuse: number;
-  /** Colour of the sun's light: factors of diffuse. */
+  /** Colour of the sunlight: factors of diffuse. */
   sun_rgb: Vec3;
-  /** Colour of the light that is everywhere: factors of ambient. */
+  /** Colour of the skylight: factors of ambient. */
   sky_rgb: Vec3;
-  /** Shadows of the rendering's layers sun and sun16, where they were made for this sun. */
+  /** Shows shadows from the layers sun and sun16 where they match the sun's position. */
   shadows: boolean;
-  /** The rendering's layer ao dims the light that is everywhere. */
+  /** Darkens ambient light by the layer ao. */
   occlusion: boolean;
 }
 
@@ -30,9 +30,8 @@ export function towardsLight({ azimuth_deg, altitude_deg }: Pick<Light, "azimuth
   return [Math.sin(azimuth) * Math.cos(altitude), Math.cos(azimuth) * Math.cos(altitude), Math.sin(altitude)];
 }
 
-
-/** The light with numbers brought into their ranges. */
-export function validLight(light: Light): Light {
+/** Clamps a light's numbers to their ranges. */
+export function clampLight(light: Light): Light {
   return {
     lit: light.lit,
     azimuth_deg: ((light.azimuth_deg % 360) + 360) % 360,

@@ -6,104 +6,104 @@ import { Occupancy } from "./occupancy";
 
 export type LayerKind = "color" | "normal" | "id" | "depth" | "sun" | "sun16" | "ao" | "depth2" | "picture";
 
-/** A layer of the manifest, such as colour. */
+/** A layer listed in the manifest, such as colour. */
 export interface LayerInfo {
   readonly name: string;
   readonly kind: string;
   readonly format: string;
   readonly media_type: string;
   readonly unit_m?: number;
-  /** Of sun, sun16 and picture. */
+  /** Only for sun, sun16 and picture. */
   readonly suns?: readonly SunJson[];
   readonly radius_m?: number;
 }
 
-/** A sun that a layer was made for. */
+/** A sun position for which a layer was rendered. */
 export interface SunJson {
-  /** ISO 8601 in UTC; null when the sun was given by its angles. */
+  /** ISO 8601 in UTC; null when the sun was given by angles. */
   readonly time: string | null;
-  /** From true north. */
+  /** Clockwise from true north. */
   readonly azimuth_deg: number;
   readonly elevation_deg: number;
-  /** Unit vector towards it, local axes. */
+  /** Unit vector towards the sun, local axes. */
   readonly direction: Vec3;
 }
 
-interface Versions {
+interface BlockVersions {
   version: number;
   versions?: Record<string, number>;
 }
 
-/** Layers that were added later, with versions of their own. */
-interface PassJson extends Versions {
+/** Layers that were added later, with their own block versions. */
+interface PassJson extends BlockVersions {
   layers: string[];
 }
 
-interface ViewJson extends FrameJson, Versions {
+interface ViewJson extends FrameJson, BlockVersions {
   occupancy: string;
   passes?: PassJson[];
   archives?: Record<string, string>;
 }
 
-/** rendering.json as sent: spec/manifest.md. */
+/** The content of rendering.json: spec/manifest.md. */
 export interface ManifestJson {
   map3d: string;
   version: number;
-  /** The last part of its base URL. */
+  /** Last segment of the base URL. */
   name: string;
   title: string;
   attribution: string;
-  /** Grows with every change of what is shown. */
+  /** Increases with every change of the content. */
   content_version: number;
-  /** Everything has been rendered. */
+  /** Whether all tiles have been rendered. */
   complete: boolean;
   crs: { epsg: number | null; wkt: string | null; name: string; vertical: string | null };
-  /** Where it lies on earth; absent when that is not known. */
+  /** Position on earth; absent when unknown. */
   geographic?: GeographicJson;
   /** World coordinates of the local origin, metres. */
   origin: Vec3;
-  /** Of what is shown, local. */
+  /** Bounding box of the content, local. */
   box: Box3;
   start?: { local: Vec3 };
   tile_px: number;
-  /** The deepest level. */
+  /** Deepest level. */
   zmax: number;
-  /** Side of level 0's only tile. */
+  /** Side length of the tile of level 0. */
   size_m: number;
   layers: LayerInfo[];
   views: ViewJson[];
   objects?: { count: number; shard_size: number; shards: string; search: string; attributes?: string; columns?: string };
 }
 
-/** A view of a rendering: its frame, what is occupied, versions of its blocks. */
+/** A view of a rendering: its frame, its occupied tiles and the versions of its blocks. */
 export interface View {
   readonly id: string;
   readonly frame: Frame;
   readonly occupancy: Occupancy;
   readonly archives: Readonly<Record<string, string>> | undefined;
-  /** The version of the block that holds the tile of a layer. */
+  /** Returns the version of the block that holds a layer's tile. */
   versionOf(tile: Tile, layer: LayerInfo): number;
 }
 
-/** A manifest that has been checked. */
+/** A checked manifest. */
 export interface Rendering {
   readonly json: ManifestJson;
   readonly views: ReadonlyMap<string, View>;
-  /** First layer of each kind. */
+  /** The first layer of each kind. */
   readonly layers: ReadonlyMap<string, LayerInfo>;
 }
 
-const READS = 1;
+const SUPPORTED_VERSION = 1;
 
-/** @throws ManifestError naming the file, what was expected and what came. */
+/** Checks a parsed manifest. @throws ManifestError with the file, what was expected and what it contains */
 export function readManifest(value: unknown, where: string): Rendering {
-  const json = checked(value, where);
-  const views = new Map(json.views.map((view) => [view.id, viewOf(view, json)]));
+  const json = checkManifest(value, where);
+  const views = new Map(json.views.map((view) => [view.id, makeView(view, json)]));
   const layers = new Map([...json.layers].reverse().map((layer) => [layer.kind, layer]));
   return { json, views, layers };
 }
 
-function viewOf(view: ViewJson, json: ManifestJson): View {
+function makeView(view: ViewJson, json: ManifestJson): View {
   const passes = new Map(view.passes?.flatMap((pass) => pass.layers.map((name) => [name, pass] as const)));
   return {
     id: view.id,
@@ -117,20 +117,20 @@ function viewOf(view: ViewJson, json: ManifestJson): View {
   };
 }
 
-function checked(value: unknown, where: string): ManifestJson {
+function checkManifest(value: unknown, where: string): ManifestJson {
   const json = value as Partial<ManifestJson> | null;
-  const refuse = (why: string): never => {
+  const fail = (why: string): never => {
     throw new ManifestError(`${where}: ${why}`);
   };
-  if (!json || typeof json !== "object" || json.map3d !== "rendering") return refuse('is no rendering.json ("map3d": "rendering" is missing)');
-  if (json.version !== READS) return refuse(`has version ${String(json.version)}, this viewer reads version ${String(READS)}; take the viewer of the same release`);
+  if (!json || typeof json !== "object" || json.map3d !== "rendering") return fail('is not a rendering.json: "map3d": "rendering" is missing');
+  if (json.version !== SUPPORTED_VERSION) return fail(`has version ${String(json.version)}, but this viewer reads version ${String(SUPPORTED_VERSION)}; use the viewer of the same release`);
   const wrong = FIELDS.find(([name, ok]) => !ok(json[name]));
-  if (wrong) return refuse(`field "${wrong[0]}" is missing or malformed, got ${(JSON.stringify(json[wrong[0]]) as string | undefined ?? "nothing").slice(0, 80)}`);
+  if (wrong) return fail(`field "${wrong[0]}" is missing or malformed, got ${(JSON.stringify(json[wrong[0]]) as string | undefined ?? "nothing").slice(0, 80)}`);
   const full = json as ManifestJson;
-  const odd = full.views.find((view) => !viewOk(view));
-  const lost = full.views.find((view) => !passesOk(view.passes));
-  if (odd) return refuse(`view ${JSON.stringify(odd.id)} lacks its frame or occupancy`);
-  if (lost) return refuse(`view ${lost.id} has passes without layers or version`);
+  const badView = full.views.find((view) => !isView(view));
+  const badPasses = full.views.find((view) => !arePasses(view.passes));
+  if (badView) return fail(`view ${JSON.stringify(badView.id)} lacks a frame or occupancy`);
+  if (badPasses) return fail(`view ${badPasses.id} has a pass without layers or version`);
   return full;
 }
 
@@ -144,38 +144,38 @@ const FIELDS: [keyof ManifestJson, (v: unknown) => boolean][] = [
   ["tile_px", (v) => Number.isInteger(v) && Number(v) > 0 && Number(v) <= 4096],
   ["zmax", isLevel],
   ["size_m", (v) => isNumber(v) && Number(v) > 0],
-  ["layers", (v) => Array.isArray(v) && v.length > 0 && v.every(layerOk)],
+  ["layers", (v) => Array.isArray(v) && v.length > 0 && v.every(isLayer)],
   ["views", (v) => Array.isArray(v) && v.length > 0],
-  ["geographic", geographicOk],
+  ["geographic", isGeographic],
 ];
 
-function layerOk(value: unknown): boolean {
+function isLayer(value: unknown): boolean {
   const layer = value as Partial<LayerInfo> | null;
-  return typeof layer?.name === "string" && typeof layer.kind === "string" && typeof layer.format === "string" && sunsOk(layer.suns);
+  return typeof layer?.name === "string" && typeof layer.kind === "string" && typeof layer.format === "string" && areSuns(layer.suns);
 }
 
-function sunsOk(value: unknown): boolean {
+function areSuns(value: unknown): boolean {
   return value === undefined || (Array.isArray(value) && value.every((sun: Partial<SunJson> | null) => isPoint(sun?.direction)));
 }
 
 const isPair = (v: unknown): boolean => Array.isArray(v) && v.length === 2 && v.every(isNumber);
 const isTerms = (v: unknown, degree: number): boolean => Array.isArray(v) && v.length === (degree + 1) * (degree + 2) / 2 && v.every(isNumber);
 
-function geographicOk(value: unknown): boolean {
-  const place = value as Partial<GeographicJson> | undefined | null;
-  if (place === undefined) return true;
-  if (!place || !isPair(place.local) || !isPair(place.lon_lat) || !(Number(place.unit_m) > 0) || !(Number(place.unit_deg) > 0)) return false;
-  const degree = Number(place.degree);
-  const rows = [place.to, place.back].flatMap((pair: readonly unknown[] | undefined) => (Array.isArray(pair) ? [pair[0], pair[1]] as unknown[] : [null]));
+function isGeographic(value: unknown): boolean {
+  const geographic = value as Partial<GeographicJson> | undefined | null;
+  if (geographic === undefined) return true;
+  if (!geographic || !isPair(geographic.local) || !isPair(geographic.lon_lat) || !(Number(geographic.unit_m) > 0) || !(Number(geographic.unit_deg) > 0)) return false;
+  const degree = Number(geographic.degree);
+  const rows = [geographic.to, geographic.back].flatMap((pair: readonly unknown[] | undefined) => (Array.isArray(pair) ? [pair[0], pair[1]] as unknown[] : [null]));
   return Number.isInteger(degree) && degree >= 1 && degree <= 16 && rows.every((row) => isTerms(row, degree));
 }
 
-function passesOk(value: unknown): boolean {
+function arePasses(value: unknown): boolean {
   const ok = (pass: Partial<PassJson> | null): boolean => Array.isArray(pass?.layers) && isNumber(pass.version);
   return value === undefined || (Array.isArray(value) && value.every(ok));
 }
 
-function viewOk(view: Partial<ViewJson>): boolean {
+function isView(view: Partial<ViewJson>): boolean {
   const numbers = [view.look_at_deg, view.pitch_deg, view.u0_m, view.v0_m, view.d0_m, view.version];
   return typeof view.id === "string" && typeof view.occupancy === "string" && numbers.every(isNumber);
 }

@@ -1,18 +1,18 @@
 import { ManifestError } from "../core/errors";
 import type { Tile } from "./frame";
 
-/** Which tiles of a view have content: spec/manifest.md. Five bytes a tile. */
+/** The set of a view's tiles that have content: spec/manifest.md. Takes five bytes per tile. */
 export class Occupancy {
-  /** Per level, for each occupied tile in Morton order: its four children bits, and the rank of its first child. */
+  /** By level, for each occupied tile in Morton order: a bit for each child, and the index of its first child. */
   readonly #bits: Uint8Array[] = [];
   readonly #first: Uint32Array[] = [];
   readonly zmax: number;
   readonly #root: boolean;
 
-  /** @param base64 breadth-first quadtree bits, least significant bit first. */
+  /** @param base64 breadth-first quadtree bits, least significant bit first */
   constructor(base64: string, zmax: number) {
     this.zmax = zmax;
-    const read = bitReader(base64);
+    const read = makeBitReader(base64);
     this.#root = read() === 1;
     let count = this.#root ? 1 : 0;
     for (let z = 0; z < zmax; z++) count = this.#readLevel(count, read);
@@ -26,7 +26,7 @@ export class Occupancy {
       const quarter = (Math.floor(x / 2 ** shift) & 1) | ((Math.floor(y / 2 ** shift) & 1) << 1);
       const bits = this.#bits[level]?.[node] ?? 0;
       if (!((bits >> quarter) & 1)) return false;
-      node = (this.#first[level]?.[node] ?? 0) + ones(bits & ((1 << quarter) - 1));
+      node = (this.#first[level]?.[node] ?? 0) + countBits(bits & ((1 << quarter) - 1));
     }
     return true;
   }
@@ -39,7 +39,7 @@ export class Occupancy {
       const four = read() | (read() << 1) | (read() << 2) | (read() << 3);
       bits[node] = four;
       first[node] = next;
-      next += ones(four);
+      next += countBits(four);
     }
     this.#bits.push(bits);
     this.#first.push(first);
@@ -47,15 +47,15 @@ export class Occupancy {
   }
 }
 
-function ones(four: number): number {
+function countBits(four: number): number {
   return (four & 1) + ((four >> 1) & 1) + ((four >> 2) & 1) + ((four >> 3) & 1);
 }
 
-function bitReader(base64: string): () => number {
+function makeBitReader(base64: string): () => number {
   const bytes = atob(base64);
   let at = 0;
   return () => {
-    if (at >= bytes.length * 8) throw new ManifestError(`occupancy ends after ${String(bytes.length)} bytes; the quadtree goes on. Write rendering.json anew.`);
+    if (at >= bytes.length * 8) throw new ManifestError(`occupancy ends after ${String(bytes.length)} bytes, before its quadtree is complete; write rendering.json again`);
     const bit = (bytes.charCodeAt(at >> 3) >> (at & 7)) & 1;
     at++;
     return bit;

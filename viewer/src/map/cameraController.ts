@@ -1,13 +1,13 @@
 import { asError, UsageError } from "../core/errors";
 import { Evented } from "../core/events";
-import { add, clamp, dot, mid, sub, type Box3, type Vec2, type Vec3 } from "../core/vec";
+import { add, clamp, dot, boxCenter, sub, type Box3, type Vec2, type Vec3 } from "../core/vec";
 import { depthAtHeight, localFromUvd, uvdFromLocal } from "../geo/axes";
 import { cssPixelM, projectedBox, screenFromLocal, uvFromScreen, zoomedAt, zoomToFit, type Camera } from "../geo/camera";
 import { localFromLonLat, lonLatFromLocal } from "../geo/geographic";
 import type { Rendering, View } from "../geo/manifest";
-import { discord } from "./agreement";
-import { neighbourView, tiltedView } from "./directions";
-import { limited, zoomLimits } from "./limits";
+import { findIncompatibility } from "./compatibility";
+import { findNeighbourView, findTiltedView } from "./neighbourViews";
+import { limitCamera, computeZoomLimits } from "./limits";
 import { Motion } from "./motion";
 import type { FilledOptions, MapEvents } from "./options";
 import type { ViewState } from "./layerContext";
@@ -16,67 +16,67 @@ import type { Size } from "./viewport";
 
 const FLIGHT_MS = 700;
 const STEP_MS = 220;
-/** Two fingers turned so far turn the view to the next direction. */
-const TWIST_RAD = (28 * Math.PI) / 180;
+/** A rotation by two fingers that switches to the next direction. */
+const ROTATION_STEP_RAD = (28 * Math.PI) / 180;
 
-/** Of `fitBounds`. */
+/** Options of `fitBounds`. */
 export interface FitOptions {
-  /** Free room at each side. Default 24. */
+  /** Padding on each side. Default 24. */
   padding_px?: number;
-  /** Default 0: at once. */
+  /** Duration of the animation. Default 0: none. */
   duration_ms?: number;
-  /** Default: the map's greatest. */
+  /** Upper limit of the zoom. Default: the map's. */
   maxZoom?: number;
 }
 
-/** Where a map looks: its camera, and all that moves it. Calls before the first manifest is here wait for it. */
+/** The map's camera and everything that moves it. Calls before the first manifest has loaded wait for it. */
 export abstract class CameraController extends Evented<MapEvents> {
   abstract readonly options: FilledOptions;
   protected readonly motion = new Motion(() => { this.requestFrame(); });
   protected camera: Camera | undefined;
-  /** The first layer's manifest; its origin is that of the camera. */
+  /** The first layer's rendering, whose origin the camera uses. */
   protected reference: Rendering | undefined;
-  /** Makes movements of changes of direction; null: they are cuts. */
+  /** Animates changes of view; null: views switch at once. */
   protected transition: ViewTransition | null = null;
-  /** What is seen while a change of direction is a movement. */
+  /** The camera of a running view transition. */
   protected transitionCamera: Camera | null = null;
   #pending: (() => void)[] = [];
-  /** Clockwise, since the last turn. */
-  #twist_rad = 0;
+  /** Clockwise rotation since the last switch of views. */
+  #rotation_rad = 0;
 
   protected abstract get size(): Size;
   protected abstract requestFrame(): void;
   protected abstract report(error: Error): void;
-  /** World position of the surface in the middle as far as it is in memory. */
-  protected abstract surfaceInTheMiddle(viewState: ViewState): Vec3 | null;
+  /** Finds the world position of the surface at the screen's centre, if it is in memory. */
+  protected abstract findCenterSurface(viewState: ViewState): Vec3 | null;
 
-  /** The surface in the middle of the screen as far as it is known, else the ground there; null before "ready". */
+  /** World position of the surface at the screen's centre if known, else of the ground there; null before "ready". */
   get center(): Vec3 | null {
     const viewState = this.getViewState();
-    return viewState && (this.surfaceInTheMiddle(viewState) ?? this.unproject(this.middle()));
+    return viewState && (this.findCenterSurface(viewState) ?? this.unproject(this.screenCenter()));
   }
 
-  /** At whole numbers a tile pixel of that level is one CSS pixel. */
+  /** Zoom level: at an integer, one tile pixel of that level is one CSS pixel. */
   get zoom(): number {
     return this.camera?.zoom ?? 0;
   }
 
-  /** Of the ground across the screen, a CSS pixel; 0 before "ready". */
+  /** Metres per CSS pixel across the screen; 0 before "ready". */
   get metresPerPixel(): number {
     return this.camera ? cssPixelM(this.camera) : 0;
   }
 
-  /** Least and greatest. */
+  /** Minimum and maximum zoom. */
   get zoomLimits(): [number, number] {
-    return this.camera && this.reference ? zoomLimits(this.camera, this.reference.json.box) : [0, 0];
+    return this.camera && this.reference ? computeZoomLimits(this.camera, this.reference.json.box) : [0, 0];
   }
 
-  /** The view's id, e.g. "45-22.5". */
+  /** Id of the current view, e.g. "45-22.5". */
   get direction(): string {
     return this.camera?.frame.id ?? this.options.direction ?? "";
   }
 
-  /** Degrees counter-clockwise from north. */
+  /** Look-at angle, degrees counter-clockwise from north. */
   get lookAt_deg(): number {
     return this.camera?.frame.lookAtDeg ?? 0;
   }
@@ -86,41 +86,41 @@ export abstract class CameraController extends Evented<MapEvents> {
     return [...(this.reference?.views.values() ?? [])].map(({ frame }) => frame);
   }
 
-  /** Puts a world position in the middle, at once. */
+  /** Centres the map on a world position, at once. */
   setView(position: Vec3, zoom?: number): this {
-    return this.#go((camera, rendering) => cameraAt(camera, rendering, position, zoom), 0);
+    return this.#moveTo((camera, rendering) => centerCamera(camera, rendering, position, zoom), 0);
   }
 
-  /** Brings a world position to the middle, smoothly unless the reader wants no movement. */
+  /** Flies to a world position; jumps there if the user prefers reduced motion. */
   flyTo(position: Vec3, zoom?: number, { duration_ms = FLIGHT_MS }: { duration_ms?: number } = {}): this {
-    return this.#go((camera, rendering) => cameraAt(camera, rendering, position, zoom), duration_ms);
+    return this.#moveTo((camera, rendering) => centerCamera(camera, rendering, position, zoom), duration_ms);
   }
 
-  /** Shows a box of world coordinates as large as it fits. */
+  /** Fits a box of world coordinates into the map. */
   fitBounds([low, high]: Box3, { padding_px = 24, duration_ms = 0, maxZoom = Infinity }: FitOptions = {}): this {
-    return this.#go((camera, { json: { origin } }) => fitted(camera, [sub(low, origin), sub(high, origin)], padding_px, maxZoom), duration_ms);
+    return this.#moveTo((camera, { json: { origin } }) => fitCamera(camera, [sub(low, origin), sub(high, origin)], padding_px, maxZoom), duration_ms);
   }
 
-  /** At once, about the middle; brought into `zoomLimits`. */
+  /** Sets the zoom at once, about the screen's centre and within `zoomLimits`. */
   setZoom(zoom: number): this {
-    return this.#go((camera) => ({ ...camera, zoom }), 0);
+    return this.#moveTo((camera) => ({ ...camera, zoom }), 0);
   }
 
-  /** One level nearer, smoothly. */
+  /** Zooms in by one level, smoothly. */
   zoomIn(): this {
     return this.zoomBy(1);
   }
 
-  /** One level further, smoothly. */
+  /** Zooms out by one level, smoothly. */
   zoomOut(): this {
     return this.zoomBy(-1);
   }
 
-  /** Zooms smoothly by levels about a point of the screen, its middle unless given. */
-  zoomBy(delta: number, anchor: Vec2 = this.middle()): this {
+  /** Zooms smoothly by levels about a point of the screen; default: its centre. */
+  zoomBy(delta: number, anchor: Vec2 = this.screenCenter()): this {
     const camera = this.camera;
     if (!camera) return this;
-    if (still()) return this.setCamera(zoomedAt(camera, clamp(camera.zoom + delta, ...this.zoomLimits), anchor));
+    if (prefersReducedMotion()) return this.setCamera(zoomedAt(camera, clamp(camera.zoom + delta, ...this.zoomLimits), anchor));
     this.motion.zoomBy(camera, delta, anchor, this.zoomLimits);
     return this;
   }
@@ -131,50 +131,50 @@ export abstract class CameraController extends Evented<MapEvents> {
     return camera ? this.setCamera(zoomedAt(camera, clamp(camera.zoom + Math.log2(factor), ...this.zoomLimits), anchor)) : this;
   }
 
-  /** Moves the picture by CSS pixels: at once, or smoothly. */
+  /** Moves the picture by CSS pixels, at once or smoothly. */
   panBy(dx: number, dy: number, { smooth = false }: { smooth?: boolean } = {}): this {
-    return this.camera ? this.#go((camera) => panned(camera, dx, dy), smooth ? STEP_MS : 0, smooth) : this;
+    return this.camera ? this.#moveTo((camera) => panCamera(camera, dx, dy), smooth ? STEP_MS : 0, smooth) : this;
   }
 
-  /** Another view of the rendering; the point in the middle stays there, highlights and markers stay on their objects. @throws UsageError */
+  /** Switches to another view of the rendering; the point at the centre stays there. @throws UsageError for an unknown view */
   setDirection(direction: string): this {
     return this.whenReady((camera, rendering) => {
       const view = rendering.views.get(direction);
-      if (!view) throw new UsageError(`view "${direction}" is none of ${[...rendering.views.keys()].join(", ")}`);
-      if (view.frame !== camera.frame) this.#turn(view, camera, rendering);
+      if (!view) throw new UsageError(`unknown view "${direction}"; the rendering has ${[...rendering.views.keys()].join(", ")}`);
+      if (view.frame !== camera.frame) this.#switchView(view, camera, rendering);
     });
   }
 
-  /** The next direction of the same pitch, +1 counter-clockwise. */
+  /** Switches to the next direction of the same pitch, +1 counter-clockwise. */
   rotate(step: number): this {
-    return this.whenReady((camera, rendering) => this.setDirection(neighbourView(rendering, camera.frame, step)));
+    return this.whenReady((camera, rendering) => this.setDirection(findNeighbourView(rendering, camera.frame, step)));
   }
 
-  /** The next pitch of the nearest direction, +1 steeper; nothing when there is none. */
+  /** Switches to the next pitch in the nearest direction, +1 steeper; does nothing if there is none. */
   tilt(step: number): this {
     return this.whenReady((camera, rendering) => {
-      const view = tiltedView(rendering, camera.frame, step);
+      const view = findTiltedView(rendering, camera.frame, step);
       if (view !== null) this.setDirection(view);
     });
   }
 
-  /** CSS pixels of a world position; null before "ready". */
+  /** Projects a world position to CSS pixels; null before "ready". */
   project(world: Vec3): Vec2 | null {
     return this.camera && this.reference ? screenFromLocal(this.transitionCamera ?? this.camera, sub(world, this.reference.json.origin)) : null;
   }
 
-  /** World position on the ground (height of the content's lowest point) under CSS pixels; null in level views. */
+  /** Returns the world position under CSS pixels on the ground (the height of the content's lowest point); null in level views. */
   unproject(point: Vec2): Vec3 | null {
-    return this.camera && this.reference ? groundAt(this.camera, this.reference, point) : null;
+    return this.camera && this.reference ? findGround(this.camera, this.reference, point) : null;
   }
 
-  /** Longitude and latitude (WGS 84, degrees) of a world position; null before "ready", and where the scene's place on earth is not known. */
+  /** Converts a world position to longitude and latitude (WGS 84, degrees); null before "ready", and where the scene's position on earth is unknown. */
   lonLat(world: Vec3): Vec2 | null {
     const json = this.reference?.json;
     return json?.geographic ? lonLatFromLocal(json.geographic, sub(world, json.origin)) : null;
   }
 
-  /** World x and y of a longitude and latitude; null as with lonLat. */
+  /** Converts longitude and latitude to world x and y; null as with lonLat. */
   fromLonLat(lonLat: Vec2): Vec2 | null {
     const json = this.reference?.json;
     if (!json?.geographic) return null;
@@ -183,35 +183,35 @@ export abstract class CameraController extends Evented<MapEvents> {
   }
 
   /** @internal */
-  setTransition(turner: ViewTransition | null): this {
-    this.transition = turner;
+  setTransition(transition: ViewTransition | null): this {
+    this.transition = transition;
     this.transitionCamera = null;
     this.requestFrame();
     return this;
   }
 
-  /** @internal Turns the picture clockwise under a hand; to the next direction when it has been turned far enough, unless a turner follows the hand. */
+  /** @internal Rotates the picture clockwise with the pointer: by the view transition, or to the next direction once it has been rotated far enough. */
   rotateBy(rad: number): void {
     if (this.transition?.rotateBy(rad)) return;
-    this.#twist_rad += rad;
-    if (Math.abs(this.#twist_rad) < TWIST_RAD) return;
-    this.rotate(Math.sign(this.#twist_rad));
-    this.#twist_rad = 0;
+    this.#rotation_rad += rad;
+    if (Math.abs(this.#rotation_rad) < ROTATION_STEP_RAD) return;
+    this.rotate(Math.sign(this.#rotation_rad));
+    this.#rotation_rad = 0;
   }
 
-  /** @internal A change of direction is under way. */
+  /** @internal Whether a view transition is running. */
   get inTransition(): boolean {
     return this.transitionCamera !== null;
   }
 
-  /** @internal The turner shows something else now. */
+  /** @internal Requests a frame for a view transition. */
   requestTransitionFrame(): void {
     this.requestFrame();
   }
 
-  /** @internal The hand has left. */
+  /** @internal */
   endGesture(): void {
-    this.#twist_rad = 0;
+    this.#rotation_rad = 0;
     this.transition?.endGesture();
   }
 
@@ -222,18 +222,18 @@ export abstract class CameraController extends Evented<MapEvents> {
 
   /** @internal */
   startInertia(velocity: Vec2): void {
-    if (!still()) this.motion.glide(velocity);
+    if (!prefersReducedMotion()) this.motion.startInertia(velocity);
   }
 
   /** @internal */
   getViewState(): ViewState | null {
     const { pixelRatio, maxPixelRatio, finer, dataSaver } = this.options;
     const dpr = pixelRatio ?? Math.min(this.size.dpr, maxPixelRatio);
-    const spared = dataSaver && dpr >= 1.5 ? 1 : 0;
-    return this.camera && this.reference ? { camera: this.camera, origin: this.reference.json.origin, dpr, finer: finer - spared } : null;
+    const coarser = dataSaver && dpr >= 1.5 ? 1 : 0;
+    return this.camera && this.reference ? { camera: this.camera, origin: this.reference.json.origin, dpr, finer: finer - coarser } : null;
   }
 
-  /** @internal As another map's camera, whose origin is given, without limits. */
+  /** @internal Sets the camera to another map's, with its origin, without limits. */
   syncCamera(camera: Camera, origin: Vec3): this {
     const { width, height } = this.size;
     const shift = sub(origin, this.reference?.json.origin ?? origin);
@@ -243,7 +243,7 @@ export abstract class CameraController extends Evented<MapEvents> {
     return this;
   }
 
-  /** @internal The next manifest gives the map its view, as the first one did. */
+  /** @internal Lets the next manifest set the view, as the first one did. */
   resetView(): void {
     this.motion.stop();
     this.camera = this.reference = undefined;
@@ -253,105 +253,105 @@ export abstract class CameraController extends Evented<MapEvents> {
     return this.motion.moving || this.transitionCamera !== null;
   }
 
-  protected middle(): Vec2 {
+  protected screenCenter(): Vec2 {
     return [this.size.width / 2, this.size.height / 2];
   }
 
   protected setCamera(camera: Camera): this {
-    this.camera = this.reference ? limited(camera, this.reference.json.box) : camera;
+    this.camera = this.reference ? limitCamera(camera, this.reference.json.box) : camera;
     this.requestFrame();
     return this;
   }
 
-  /** The camera for this moment of a movement. */
-  protected stepCamera(now_ms: number): void {
+  /** Advances animation and view transition to a time. */
+  protected advanceCamera(now_ms: number): void {
     const camera = this.camera;
     const next = camera && this.motion.step(now_ms, camera);
-    if (next && next !== camera) this.camera = this.reference ? limited(next, this.reference.json.box) : next;
+    if (next && next !== camera) this.camera = this.reference ? limitCamera(next, this.reference.json.box) : next;
     this.transitionCamera = (this.camera && this.transition?.step(now_ms, this.camera)) ?? null;
   }
 
-  /** @throws UsageError when a manifest does not go with the first */
-  protected admit(rendering: Rendering): void {
-    const why = this.reference ? discord(this.reference, rendering) : null;
-    if (why !== null) throw new UsageError(`rendering "${rendering.json.name}" cannot be shown on this map: ${why}`);
+  /** @throws UsageError when a rendering cannot be combined with the first */
+  protected checkCompatible(rendering: Rendering): void {
+    const reason = this.reference ? findIncompatibility(this.reference, rendering) : null;
+    if (reason !== null) throw new UsageError(`rendering "${rendering.json.name}" cannot be shown on this map: ${reason}`);
   }
 
-  /** The first manifest gives the map its view. */
-  protected begin(rendering: Rendering): void {
+  /** Sets the initial view from the first manifest. */
+  protected initializeView(rendering: Rendering): void {
     const { width, height } = this.size;
     const { json, views } = rendering;
     const { direction, center, zoom } = this.options;
     const view = views.get(direction ?? "") ?? [...views.values()][0];
     if (!view) return;
-    if (direction !== undefined && !views.has(direction)) this.report(new UsageError(`view "${direction}" is none of ${[...views.keys()].join(", ")}`));
+    if (direction !== undefined && !views.has(direction)) this.report(new UsageError(`unknown view "${direction}"; the rendering has ${[...views.keys()].join(", ")}`));
     this.reference = rendering;
-    const whole = fitted({ frame: view.frame, u: 0, v: 0, zoom: 0, width, height }, json.box, Math.min(width, height) * 0.04, json.zmax);
+    const fitted = fitCamera({ frame: view.frame, u: 0, v: 0, zoom: 0, width, height }, json.box, Math.min(width, height) * 0.04, json.zmax);
     const start = center ?? (json.start && add(json.origin, json.start.local));
-    this.setCamera(start ? cameraAt(whole, rendering, start, zoom) : { ...whole, zoom: zoom ?? whole.zoom });
-    for (const act of this.#pending.splice(0)) this.#attempt(act);
+    this.setCamera(start ? centerCamera(fitted, rendering, start, zoom) : { ...fitted, zoom: zoom ?? fitted.zoom });
+    for (const action of this.#pending.splice(0)) this.#runPending(action);
     this.fire("ready", {});
     this.fire("directionchange", { direction: this.direction });
   }
 
-  /** What was called before there was a manifest fails like what comes later, but has nobody to tell but the map. */
-  #attempt(act: () => void): void {
+  /** Runs a call that waited for the manifest; its errors are reported by the map. */
+  #runPending(action: () => void): void {
     try {
-      act();
+      action();
     } catch (reason) {
       this.report(asError(reason));
     }
   }
 
-  protected whenReady(act: (camera: Camera, rendering: Rendering) => void): this {
+  protected whenReady(action: (camera: Camera, rendering: Rendering) => void): this {
     const run = (): void => {
-      if (this.camera && this.reference) act(this.camera, this.reference);
+      if (this.camera && this.reference) action(this.camera, this.reference);
     };
     if (this.camera) run();
     else this.#pending.push(run);
     return this;
   }
 
-  #go(to: (camera: Camera, rendering: Rendering) => Camera, duration_ms: number, stops = true): this {
+  #moveTo(to: (camera: Camera, rendering: Rendering) => Camera, duration_ms: number, stops = true): this {
     return this.whenReady((camera, rendering) => {
-      const target = limited(to(camera, rendering), rendering.json.box);
+      const target = limitCamera(to(camera, rendering), rendering.json.box);
       if (stops) this.motion.stop();
-      if (duration_ms <= 0 || still()) this.setCamera(target);
+      if (duration_ms <= 0 || prefersReducedMotion()) this.setCamera(target);
       else this.motion.fly(camera, target, duration_ms);
     });
   }
 
-  #turn(view: View, camera: Camera, rendering: Rendering): void {
-    const held = this.center;
-    const turned = { ...camera, frame: view.frame };
+  #switchView(view: View, camera: Camera, rendering: Rendering): void {
+    const center = this.center;
+    const target = { ...camera, frame: view.frame };
     this.motion.stop();
-    this.setCamera(held ? cameraAt(turned, rendering, held) : fitted(turned, rendering.json.box, 0, camera.zoom));
-    this.transition?.start(camera, held ? sub(held, rendering.json.origin) : mid(rendering.json.box));
+    this.setCamera(center ? centerCamera(target, rendering, center) : fitCamera(target, rendering.json.box, 0, camera.zoom));
+    this.transition?.start(camera, center ? sub(center, rendering.json.origin) : boxCenter(rendering.json.box));
     this.fire("directionchange", { direction: view.id });
   }
 }
 
-/** Does the user want no movement? */
-const still = (): boolean => matchMedia("(prefers-reduced-motion: reduce)").matches;
+/** Whether the user prefers reduced motion. */
+const prefersReducedMotion = (): boolean => matchMedia("(prefers-reduced-motion: reduce)").matches;
 
-function cameraAt(camera: Camera, { json }: Rendering, position: Vec3, zoom = camera.zoom): Camera {
+function centerCamera(camera: Camera, { json }: Rendering, position: Vec3, zoom = camera.zoom): Camera {
   const [u, v] = uvdFromLocal(camera.frame.axes, sub(position, json.origin));
   return { ...camera, u, v, zoom };
 }
 
-function panned(camera: Camera, dx: number, dy: number): Camera {
+function panCamera(camera: Camera, dx: number, dy: number): Camera {
   const px = cssPixelM(camera);
   return { ...camera, u: camera.u - dx * px, v: camera.v + dy * px };
 }
 
-/** The camera that shows a local box. */
-function fitted(camera: Camera, box: Box3, padding: number, maxZoom: number): Camera {
+/** Fits a local box into the camera. */
+function fitCamera(camera: Camera, box: Box3, padding: number, maxZoom: number): Camera {
   const [low, high] = projectedBox(camera.frame, box);
-  const [u, v] = uvdFromLocal(camera.frame.axes, mid(box));
+  const [u, v] = uvdFromLocal(camera.frame.axes, boxCenter(box));
   return { ...camera, u, v, zoom: Math.min(zoomToFit(camera, high[0] - low[0], high[1] - low[1], padding), maxZoom) };
 }
 
-function groundAt(camera: Camera, { json }: Rendering, point: Vec2): Vec3 | null {
+function findGround(camera: Camera, { json }: Rendering, point: Vec2): Vec3 | null {
   const [u, v] = uvFromScreen(camera, point);
   const d = depthAtHeight(camera.frame.axes, v, json.box[0][2]);
   return d === null ? null : add(json.origin, localFromUvd(camera.frame.axes, [u, v, d]));

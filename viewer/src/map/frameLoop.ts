@@ -1,7 +1,7 @@
-/** How long a frame that is wanted soon waits for the browser. */
+/** How long an urgent frame waits for the browser. */
 const SOON_MS = 20;
 
-/** Draws when something has changed, and never else. */
+/** Draws a frame after each request; never without one. */
 export class FrameLoop {
   #handle = 0;
   #timer: ReturnType<typeof setTimeout> | undefined;
@@ -11,27 +11,27 @@ export class FrameLoop {
     this.#draw = draw;
   }
 
-  /** @param soon does not wait for a browser that is slow to show pictures, as it is while a page opens */
+  /** Requests a frame. @param soon does not wait for a browser that is slow to draw, as while a page loads */
   request(soon = false): void {
     this.#handle ||= requestAnimationFrame((now) => { this.#run(now); });
     if (soon && this.#handle > 0) this.#timer ??= setTimeout(() => { this.#run(performance.now()); }, SOON_MS);
   }
 
-  get waiting(): boolean {
+  get pending(): boolean {
     return this.#handle !== 0;
   }
 
   stop(): void {
-    this.#forget();
-    this.#handle = -1; // a removed map asks for no more frames
+    this.#cancel();
+    this.#handle = -1; // ignores requests from now on
   }
 
   #run(now_ms: number): void {
-    this.#forget();
+    this.#cancel();
     this.#draw(now_ms);
   }
 
-  #forget(): void {
+  #cancel(): void {
     cancelAnimationFrame(this.#handle);
     clearTimeout(this.#timer);
     this.#timer = undefined;

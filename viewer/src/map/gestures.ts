@@ -1,24 +1,24 @@
 import type { Vec2 } from "../core/vec";
 
-/** What gestures do to a map. Screen positions in CSS pixels from the container's top left corner. */
+/** A map as controlled by gestures. Screen positions are CSS pixels from the container's top left corner. */
 export interface GestureTarget {
   readonly container: HTMLElement;
-  /** A hand is on the map: movements stop. */
+  /** A gesture has started: stops movements. */
   startGesture(): void;
   panBy(dx: number, dy: number): unknown;
   startInertia(velocity: Vec2): void;
-  /** At once, without smoothing. */
+  /** Zooms at once, without animation. */
   pinch(factor: number, anchor: Vec2): unknown;
   zoomBy(delta: number, anchor: Vec2): unknown;
-  /** Turns the picture clockwise. */
+  /** Rotates the picture clockwise. */
   rotateBy(rad: number): void;
-  /** No hand is on the map any more. */
+  /** The last pointer was released. */
   endGesture(): void;
   tap(at: Vec2): void;
   hover(at: Vec2): void;
 }
 
-interface Touch {
+interface Pointer {
   at: Vec2;
   readonly start: Vec2;
 }
@@ -27,19 +27,19 @@ const TAP_PX = 6;
 const DOUBLE_TAP_MS = 320;
 const DOUBLE_TAP_PX = 28;
 const VELOCITY_MS = 90;
-/** A drag with the right button turns the picture by so much a pixel. */
-const TURN_RAD = (0.4 * Math.PI) / 180;
+/** Rotation per pixel of a drag with the right button. */
+const ROTATION_RAD_PER_PX = (0.4 * Math.PI) / 180;
 
-/** Mouse, touch and pen on the canvas: drag, pinch, wheel, tap, double tap. */
+/** Handles mouse, touch and pen on the canvas: drag, pinch, wheel, tap, double tap. */
 export class Gestures {
   readonly #map: GestureTarget;
   readonly #canvas: HTMLCanvasElement;
-  readonly #touches = new Map<number, Touch>();
+  readonly #pointers = new Map<number, Pointer>();
   readonly #listeners = new AbortController();
-  #trail: { at: Vec2; ms: number }[] = [];
+  #recentPoints: { at: Vec2; ms: number }[] = [];
   #moved = false;
-  /** Where the right button was last, while it is down. */
-  #turning: Vec2 | null = null;
+  /** Last position of a drag with the right button. */
+  #rotatingFrom: Vec2 | null = null;
   #lastTap: { at: Vec2; ms: number } | null = null;
 
   constructor(map: GestureTarget, canvas: HTMLCanvasElement) {
@@ -58,85 +58,85 @@ export class Gestures {
     this.#listeners.abort();
   }
 
-  #place(event: MouseEvent): Vec2 {
+  #toScreen(event: MouseEvent): Vec2 {
     const box = this.#canvas.getBoundingClientRect();
     return [event.clientX - box.left, event.clientY - box.top];
   }
 
   #down(event: PointerEvent): void {
-    const at = this.#place(event);
-    if (event.pointerType === "mouse" && event.button === 2) this.#turning = at;
+    const at = this.#toScreen(event);
+    if (event.pointerType === "mouse" && event.button === 2) this.#rotatingFrom = at;
     else if (event.pointerType === "mouse" && event.button !== 0) return;
     this.#canvas.setPointerCapture(event.pointerId);
-    if (this.#turning) return;
+    if (this.#rotatingFrom) return;
     this.#map.startGesture();
-    if (this.#touches.size === 0) this.#moved = false;
+    if (this.#pointers.size === 0) this.#moved = false;
     else this.#moved = true;
-    this.#touches.set(event.pointerId, { at, start: at });
-    this.#trail = [];
+    this.#pointers.set(event.pointerId, { at, start: at });
+    this.#recentPoints = [];
   }
 
   #move(event: PointerEvent): void {
-    const touch = this.#touches.get(event.pointerId);
-    const at = this.#place(event);
-    if (this.#turning) {
-      this.#map.rotateBy((at[0] - this.#turning[0]) * TURN_RAD);
-      this.#turning = at;
+    const pointer = this.#pointers.get(event.pointerId);
+    const at = this.#toScreen(event);
+    if (this.#rotatingFrom) {
+      this.#map.rotateBy((at[0] - this.#rotatingFrom[0]) * ROTATION_RAD_PER_PX);
+      this.#rotatingFrom = at;
       return;
     }
-    if (!touch) {
+    if (!pointer) {
       if (event.pointerType === "mouse") this.#map.hover(at);
       return;
     }
-    if (!this.#moved && Math.hypot(at[0] - touch.start[0], at[1] - touch.start[1]) < TAP_PX) return;
+    if (!this.#moved && Math.hypot(at[0] - pointer.start[0], at[1] - pointer.start[1]) < TAP_PX) return;
     this.#moved = true;
     this.#map.container.classList.add("map3d-dragging");
-    const other = [...this.#touches].find(([id]) => id !== event.pointerId)?.[1];
-    if (other) this.#pinch(touch, other, at);
-    else this.#drag(touch, at, event);
-    touch.at = at;
+    const other = [...this.#pointers].find(([id]) => id !== event.pointerId)?.[1];
+    if (other) this.#pinch(pointer, other, at);
+    else this.#drag(pointer, at, event);
+    pointer.at = at;
   }
 
-  #drag(touch: Touch, at: Vec2, event: PointerEvent): void {
-    this.#map.panBy(at[0] - touch.at[0], at[1] - touch.at[1]);
-    // Where frames are slow, one event stands for several: the hand's speed is known from them all, and from when they were, not when they are told.
+  #drag(pointer: Pointer, at: Vec2, event: PointerEvent): void {
+    this.#map.panBy(at[0] - pointer.at[0], at[1] - pointer.at[1]);
+    // When frames are slow, one event combines several: their own positions and times give the pointer's speed.
     const all = "getCoalescedEvents" in event ? event.getCoalescedEvents() : [];
-    const points = (all.length > 0 ? all : [event]).map((each) => ({ at: this.#place(each), ms: each.timeStamp }));
-    this.#trail = [...this.#trail, ...points].filter(({ ms }) => event.timeStamp - ms < VELOCITY_MS);
+    const points = (all.length > 0 ? all : [event]).map((each) => ({ at: this.#toScreen(each), ms: each.timeStamp }));
+    this.#recentPoints = [...this.#recentPoints, ...points].filter(({ ms }) => event.timeStamp - ms < VELOCITY_MS);
   }
 
-  #pinch(touch: Touch, other: Touch, at: Vec2): void {
-    const before = Math.hypot(touch.at[0] - other.at[0], touch.at[1] - other.at[1]);
-    const after = Math.hypot(at[0] - other.at[0], at[1] - other.at[1]);
-    this.#map.panBy((at[0] - touch.at[0]) / 2, (at[1] - touch.at[1]) / 2);
-    if (before > 0 && after > 0) this.#map.pinch(after / before, [(at[0] + other.at[0]) / 2, (at[1] + other.at[1]) / 2]);
-    this.#twist(touch.at, other.at, at);
+  #pinch(pointer: Pointer, other: Pointer, at: Vec2): void {
+    const startDistance = Math.hypot(pointer.at[0] - other.at[0], pointer.at[1] - other.at[1]);
+    const distance = Math.hypot(at[0] - other.at[0], at[1] - other.at[1]);
+    this.#map.panBy((at[0] - pointer.at[0]) / 2, (at[1] - pointer.at[1]) / 2);
+    if (startDistance > 0 && distance > 0) this.#map.pinch(distance / startDistance, [(at[0] + other.at[0]) / 2, (at[1] + other.at[1]) / 2]);
+    this.#rotate(pointer.at, other.at, at);
   }
 
-  #twist(from: Vec2, other: Vec2, to: Vec2): void {
+  #rotate(from: Vec2, other: Vec2, to: Vec2): void {
     const angle = ([x, y]: Vec2): number => Math.atan2(y - other[1], x - other[0]);
     const turned = angle(to) - angle(from);
     this.#map.rotateBy(turned - 2 * Math.PI * Math.round(turned / (2 * Math.PI)));
   }
 
-  #up(event: PointerEvent, meant: boolean): void {
-    if (this.#turning && (event.button === 2 || !meant)) {
-      this.#turning = null;
+  #up(event: PointerEvent, completed: boolean): void {
+    if (this.#rotatingFrom && (event.button === 2 || !completed)) {
+      this.#rotatingFrom = null;
       this.#map.endGesture();
     }
-    const touch = this.#touches.get(event.pointerId);
-    if (!touch) return;
-    this.#touches.delete(event.pointerId);
-    if (this.#touches.size > 0) return;
+    const pointer = this.#pointers.get(event.pointerId);
+    if (!pointer) return;
+    this.#pointers.delete(event.pointerId);
+    if (this.#pointers.size > 0) return;
     this.#map.endGesture();
     this.#map.container.classList.remove("map3d-dragging");
-    if (!meant) return;
-    if (this.#moved) this.#release(event.timeStamp);
-    else this.#tap(touch.at, event.timeStamp);
+    if (!completed) return;
+    if (this.#moved) this.#glide(event.timeStamp);
+    else this.#tap(pointer.at, event.timeStamp);
   }
 
-  #release(now: number): void {
-    const recent = this.#trail.filter(({ ms }) => now - ms < VELOCITY_MS);
+  #glide(now: number): void {
+    const recent = this.#recentPoints.filter(({ ms }) => now - ms < VELOCITY_MS);
     const [first, last] = [recent[0], recent.at(-1)];
     const ms = first && last ? last.ms - first.ms : 0;
     if (!first || !last || ms < 10) return;
@@ -156,6 +156,6 @@ export class Gestures {
     event.preventDefault();
     const lines = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 24 : event.deltaMode === WheelEvent.DOM_DELTA_PAGE ? 240 : 1;
     const pixels = Math.max(-240, Math.min(240, event.deltaY * lines));
-    this.#map.zoomBy(-pixels / (event.ctrlKey ? 80 : 260), this.#place(event));
+    this.#map.zoomBy(-pixels / (event.ctrlKey ? 80 : 260), this.#toScreen(event));
   }
 }

@@ -1,9 +1,9 @@
 import { MapLayer } from "../core/mapLayer";
 import { asError, UsageError } from "../core/errors";
 import type { Vec2 } from "../core/vec";
-import { readColor } from "../draw/color";
-import type { Clip } from "../draw/combine";
-import { bakedKinds, MODES, neededKinds, type BakedLight, type Mode, type Pass, type Rgb, type TileAccess } from "../draw/drawer";
+import { parseColor, type Rgb } from "../draw/color";
+import type { Clip } from "../draw/depthMapping";
+import { listBakedLightKinds, MODES, listRequiredKinds, type BakedLight, type Mode, type Pass, type TileAccess } from "../draw/drawer";
 import type { DrawStyles } from "../draw/drawStyle";
 import type { Frame, Tile } from "../geo/frame";
 import { towardsLight, type Light } from "../geo/light";
@@ -12,323 +12,322 @@ import { findShadow } from "../geo/shadows";
 import { Objects, type AttributeInfo, type AttributeValue, type ObjectInfo, type SearchEntry } from "../tiles/objects";
 import { HttpSource, type Source } from "../tiles/source";
 import { LayerTiles } from "../tiles/layerTiles";
-import { viewLike } from "./agreement";
-import { depthRangeOf, depthsOf, planLayer, type LayerPlan } from "./layerPlan";
-import type { map } from "./map";
-import { finishesOf, isHidden, type ObjectStyle } from "./objectStyle";
-import type { ViewState, LayerContext } from "./layerContext";
+import { findMatchingView } from "./compatibility";
+import { computeDepthRange, makeDepthMapping, planLayer, type LayerPlan } from "./layerPlan";
+import { makeDrawStyles, isHidden, type ObjectStyle } from "./objectStyle";
+import type { ImageLayerHost, LayerContext, ViewState } from "./layerContext";
 
-/** How a layer begins; all can be left out. */
+/** Options of an image layer. */
 export interface ImageLayerOptions {
-  /** lit | color | picture | normal | id | depth. Default "lit". */
+  /** One of lit | color | picture | normal | id | depth. Default "lit". */
   mode?: Mode;
-  /** 0..1. Default 1. */
+  /** Opacity, 0 to 1. Default 1. */
   opacity?: number;
-  /** Colour of highlights that name none. Default "#e4572e". */
+  /** Default colour of highlights. Default "#e4572e". */
   highlightColor?: string;
-  /** Overrides the manifest's. */
+  /** Overrides the manifest's attribution. */
   attribution?: string;
-  /** Where several layers show something, what is nearest is seen. false: it is painted over layers that were added before. Default true. */
+  /** Combines the layer with others by depth, so that the nearest surface is visible. false: draws it over earlier layers. Default true. */
   combine?: boolean;
 }
 
-/** What a layer fires. */
+/** Events of an image layer. */
 export interface ImageLayerEvents {
-  /** The manifest has been read. */
+  /** The manifest has loaded. */
   ready: { rendering: Rendering };
-  /** The map's "error" says so, too. */
+  /** An error, which the map's "error" reports as well. */
   error: { error: Error };
 }
 
-/** A rendering on the map, from base URLs or another source. Several base URLs are several hosts with the same tiles; requests are spread over them by tile. */
-export class imageLayer extends MapLayer<map, ImageLayerEvents> {
+/** A rendering on the map, from base URLs or another source. Several base URLs are hosts with the same tiles; requests are spread over them by tile. */
+export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
   readonly options: Required<Omit<ImageLayerOptions, "attribution">> & Pick<ImageLayerOptions, "attribution">;
-  /** Where it comes from. */
+  /** Its source. */
   readonly source: Source;
   #mode: Mode;
-  #stage: LayerContext | undefined;
+  #context: LayerContext | undefined;
   #name = "";
-  #store: LayerTiles | undefined;
+  #tiles: LayerTiles | undefined;
   #rendering: Rendering | undefined;
   #objects: Objects | undefined;
   #colors: ReadonlyMap<number, Rgb> = new Map();
-  #finishes: DrawStyles | null = null;
-  /** Those of #colors that are not hidden. */
-  #shown: ReadonlyMap<number, Rgb> = new Map();
+  #drawStyles: DrawStyles | null = null;
+  /** The colours of #colors whose objects are not hidden. */
+  #shownColors: ReadonlyMap<number, Rgb> = new Map();
   #clip: Clip | null = null;
-  /** There will be no manifest. */
+  /** Whether loading the manifest has failed. */
   #failed = false;
 
-  /** @param urls base URLs, or another source  @throws UsageError without one, or for a mode that is unknown */
+  /** @param urls base URLs, or another source  @throws UsageError without a URL, or for an unknown mode */
   constructor(urls: string | readonly string[] | Source, options: ImageLayerOptions = {}) {
     super();
     this.options = { mode: "lit", opacity: 1, highlightColor: "#e4572e", combine: true, ...options };
-    this.#mode = checkedMode(this.options.mode);
+    this.#mode = checkMode(this.options.mode);
     this.source = typeof urls === "object" && "tile" in urls ? urls : new HttpSource(urls);
   }
 
-  /** @internal The same rendering with the same looks, for another map. */
+  /** @internal Makes a layer of the same rendering with the same styles, for another map. */
   copy(): imageLayer {
-    const made = new imageLayer(this.source, { ...this.options, mode: this.#mode });
-    made.#finishes = this.#finishes;
-    return made.#setColors(this.#colors);
+    const copy = new imageLayer(this.source, { ...this.options, mode: this.#mode });
+    copy.#drawStyles = this.#drawStyles;
+    return copy.#setColors(this.#colors);
   }
 
-  /** The manifest; undefined until it has been read. */
+  /** The checked manifest; undefined until it has loaded. */
   get rendering(): Rendering | undefined {
     return this.#rendering;
   }
 
-  /** Whose data it is: the option's, else the manifest's; "" before "ready". */
+  /** Attribution text: the option's, else the manifest's; "" before "ready". */
   get attribution(): string {
     return this.options.attribution ?? this.#rendering?.json.attribution ?? "";
   }
 
-  /** How it is shown. */
+  /** The current mode. */
   get mode(): Mode {
     return this.#mode;
   }
 
-  /** Shows it otherwise. @throws UsageError for a mode that is unknown; one whose layers the rendering lacks is the map's "error" */
+  /** Sets the mode. @throws UsageError for an unknown mode; a mode whose layers the rendering lacks is reported by the map's "error" */
   setMode(mode: Mode): this {
-    this.#mode = checkedMode(mode);
+    this.#mode = checkMode(mode);
     this.#checkLayers();
     return this.#redraw();
   }
 
-  /** 0..1 */
+  /** Sets the opacity, 0 to 1. */
   setOpacity(opacity: number): this {
     this.options.opacity = Math.min(Math.max(opacity, 0), 1);
     return this.#redraw();
   }
 
-  /** 0 to 1. */
+  /** Opacity, 0 to 1. */
   get opacity(): number {
     return this.options.opacity;
   }
 
-  /** Shows the layer in a part of the map only: left, top, right, bottom in shares of its width and height; null: in all of it. */
+  /** Shows the layer in a part of the map only: left, top, right, bottom in fractions of its width and height; null: everywhere. */
   setClip(clip: Clip | null): this {
     this.#clip = clip;
     return this.#redraw();
   }
 
-  /** The part of the map that it is shown in; null: all of it. */
+  /** The part of the map where it is shown; null: everywhere. */
   get clip(): Clip | null {
     return this.#clip;
   }
 
-  /** Shows objects in a colour (#rrggbb), besides those that are highlighted already. */
+  /** Highlights objects in a colour (#rrggbb), in addition to those already highlighted. */
   highlight(ids: number | Iterable<number>, { color = this.options.highlightColor }: { color?: string } = {}): this {
-    const rgb = readColor(color);
+    const rgb = parseColor(color);
     const colors = new Map(this.#colors);
     for (const id of typeof ids === "number" ? [ids] : ids) colors.set(id >>> 0, rgb);
     return this.#setColors(colors);
   }
 
-  /** Without ids: all highlights. */
+  /** Removes the highlights of some objects; without ids, all highlights. */
   clearHighlight(ids?: number | Iterable<number>): this {
-    const gone = new Set(typeof ids === "number" ? [ids] : (ids ?? this.#colors.keys()));
-    return this.#setColors(new Map([...this.#colors].filter(([id]) => !gone.has(id))));
+    const cleared = new Set(typeof ids === "number" ? [ids] : (ids ?? this.#colors.keys()));
+    return this.#setColors(new Map([...this.#colors].filter(([id]) => !cleared.has(id))));
   }
 
-  /** Highlighted object ids. */
+  /** Ids of the highlighted objects. */
   get highlighted(): number[] {
     return [...this.#colors.keys()];
   }
 
-  /** Colours, dims and hides objects, in place of the style before; {} shows all as they are. @throws UsageError for what is no colour */
+  /** Tints, dims and hides objects; replaces the previous style. {} resets all. @throws UsageError for an invalid colour */
   setStyle(style: ObjectStyle): this {
-    this.#finishes = finishesOf(style);
+    this.#drawStyles = makeDrawStyles(style);
     return this.#setColors(this.#colors);
   }
 
   /** @internal */
   isHidden(id: number): boolean {
-    return isHidden(this.#finishes, id);
+    return isHidden(this.#drawStyles, id);
   }
 
-  /** @internal What `hides` goes by; null: all is shown. Another object whenever it has changed. */
+  /** @internal The styles behind `isHidden`; null: all objects are plain. A new object after each change. */
   get drawStyles(): DrawStyles | null {
-    return this.#finishes;
+    return this.#drawStyles;
   }
 
-  /** Name, class and attributes of an object; null when nothing is known of it. */
+  /** Returns name, class and attributes of an object; null when it is unknown. */
   async object(id: number): Promise<ObjectInfo | null> {
-    return (await this.#objects?.get(id)) ?? null;
+    return (await this.#objects?.find(id)) ?? null;
   }
 
-  /** Attributes that the objects have, for `column`; none when the rendering does not list them. */
+  /** Lists the objects' attributes, for `column`; empty when the rendering does not list them. */
   async attributes(): Promise<readonly AttributeInfo[]> {
     return (await this.#objects?.attributes()) ?? [];
   }
 
-  /** What an attribute says of all objects, by id. */
+  /** Returns an attribute's values for all objects, by id. */
   async column({ column }: Pick<AttributeInfo, "column">): Promise<ReadonlyMap<number, AttributeValue>> {
     return (await this.#objects?.column(column)) ?? new Map<number, AttributeValue>();
   }
 
-  /** The search index: id, label, local position. */
+  /** Returns the search index: id, label, local position. */
   async searchIndex(): Promise<readonly SearchEntry[]> {
     return (await this.#objects?.search()) ?? [];
   }
 
-  protected onAdd(map: map): void {
-    const stage = map.layerContext;
-    if (!stage) return; // the map has said why
-    this.#stage = stage;
-    this.#name = stage.createName();
+  protected onAdd(map: ImageLayerHost): void {
+    const context = map.layerContext;
+    if (!context) return; // the map has reported why
+    this.#context = context;
+    this.#name = context.createName();
     const failed = (error: Error): void => {
-      if (this.#stage !== stage) return;
+      if (this.#context !== context) return;
       this.#failed = !this.#rendering;
       this.fire("error", { error });
-      stage.report(error);
+      context.report(error);
     };
-    this.#store = new LayerTiles(this.#name, this.source, stage.tileResources, (error) => {
+    this.#tiles = new LayerTiles(this.#name, this.source, context.tileResources, (error) => {
       if (error) failed(error);
-      stage.requestFrame();
+      context.requestFrame();
     });
     this.source.manifest().then((rendering) => {
-      if (this.#stage === stage) this.#begin(rendering, stage);
+      if (this.#context === context) this.#start(rendering, context);
     }).catch((reason: unknown) => { failed(asError(reason)); });
   }
 
   protected onRemove(): void {
-    this.#stage?.dropTiles(this.#name);
-    this.#stage = this.#store = this.#rendering = this.#objects = undefined;
+    this.#context?.dropTiles(this.#name);
+    this.#context = this.#tiles = this.#rendering = this.#objects = undefined;
   }
 
-  /** @internal The layer's view that looks as a frame does. */
+  /** @internal Finds the layer's view with a frame's look-at angle and pitch. */
   findView(frame: Frame): View | undefined {
-    return this.#rendering && viewLike(this.#rendering, frame);
+    return this.#rendering && findMatchingView(this.#rendering, frame);
   }
 
-  /** @internal Its manifest is on the way. */
-  get loading(): boolean {
+  /** @internal Whether its manifest is loading. */
+  get isLoading(): boolean {
     return !this.#rendering && !this.#failed;
   }
 
-  /** @internal Rendered light that it shows in a light; null before its manifest is here. */
+  /** @internal Returns the rendered light that it shows for a light; null before its manifest has loaded. */
   getBakedLight(light: Readonly<Light>): BakedLight | null {
-    return this.#rendering ? this.#baked(this.#rendering, light) : null;
+    return this.#rendering ? this.#findBakedLight(this.#rendering, light) : null;
   }
 
-  /** @internal Something of it can hide what other layers show. */
-  get combines(): boolean {
+  /** @internal Whether it can be combined with other layers by depth. */
+  get isCombinable(): boolean {
     return this.options.combine && this.options.opacity > 0 && this.#rendering?.layers.has("depth") === true;
   }
 
-  /** @internal It shows something at a point (shares of the map's width and height). */
-  shows([x, y]: Vec2): boolean {
+  /** @internal Whether it is visible at a point (fractions of the map's width and height). */
+  showsAt([x, y]: Vec2): boolean {
     const [left, top, right, bottom] = this.#clip ?? [0, 0, 1, 1];
     return this.options.opacity > 0 && x >= left && x < right && y >= top && y < bottom;
   }
 
   /** @internal */
   get tiles(): LayerTiles | undefined {
-    return this.#store;
+    return this.#tiles;
   }
 
-  /** @internal What to paint and to fetch; `kinds` are read by others. */
-  plan(sight: ViewState, light: Readonly<Light>, kinds: readonly LayerKind[], combined: boolean): LayerPlan | null {
-    const view = this.findView(sight.camera.frame);
-    if (!view || !this.#rendering || !this.#store || this.options.opacity === 0) return null;
-    const mode = this.#shownMode(this.#rendering);
-    const needed = neededKinds(mode, this.#masked(this.#rendering), combined);
-    const baked = this.#baked(this.#rendering, light);
-    const ids: LayerKind[] = this.#shown.size > 0 || this.#finishes ? ["id"] : [];
+  /** @internal Plans what to draw and to fetch. @param kinds read by others */
+  plan(viewState: ViewState, light: Readonly<Light>, kinds: readonly LayerKind[], combined: boolean): LayerPlan | null {
+    const view = this.findView(viewState.camera.frame);
+    if (!view || !this.#rendering || !this.#tiles || this.options.opacity === 0) return null;
+    const mode = this.#effectiveMode(this.#rendering);
+    const needed = listRequiredKinds(mode, this.#needsMask(this.#rendering), combined);
+    const bakedLight = this.#findBakedLight(this.#rendering, light);
+    const ids: LayerKind[] = this.#shownColors.size > 0 || this.#drawStyles ? ["id"] : [];
     const read = [...new Set([...ids, ...kinds])].filter((kind) => !needed.includes(kind));
-    const extra = [...(light.lit ? bakedKinds(mode, baked) : []), ...read];
-    return planLayer(sight, this.#rendering, view, this.#store, { baked, layers: layersWith(this.#rendering, baked), needed, extra });
+    const extra = [...(light.lit ? listBakedLightKinds(mode, bakedLight) : []), ...read];
+    return planLayer(viewState, this.#rendering, view, this.#tiles, { bakedLight, layers: withShadowLayer(this.#rendering, bakedLight), needed, extra });
   }
 
-  /** @internal @param before layers with which it is combined and that were added before; null: it is not combined */
-  pass(plan: LayerPlan, { origin }: ViewState, before: number | null): Pass {
+  /** @internal Makes its pass of a frame. @param before number of combined layers added before it; null: it is not combined */
+  makePass(plan: LayerPlan, { origin }: ViewState, before: number | null): Pass {
     const rendering = this.#rendering as Rendering;
     return {
-      mode: this.#shownMode(rendering),
+      mode: this.#effectiveMode(rendering),
       level: plan.level,
       quads: plan.quads,
-      tiles: this.#access(plan.view, plan.layers),
-      baked: plan.baked,
-      highlight: this.#shown,
-      finishes: this.#finishes,
-      masked: this.#masked(rendering),
+      tiles: this.#makeTileAccess(plan.view, plan.layers),
+      bakedLight: plan.bakedLight,
+      highlight: this.#shownColors,
+      drawStyles: this.#drawStyles,
+      masked: this.#needsMask(rendering),
       opacity: this.options.opacity,
-      depths: before === null ? null : depthsOf(rendering, plan, origin, before),
-      relief: rendering.layers.has("depth") ? depthsOf(rendering, plan, origin, before ?? 0) : null,
+      depths: before === null ? null : makeDepthMapping(rendering, plan, origin, before),
+      relief: rendering.layers.has("depth") ? makeDepthMapping(rendering, plan, origin, before ?? 0) : null,
       clip: this.#clip,
-      depthRange: depthRangeOf(rendering, plan.view),
+      depthRange: computeDepthRange(rendering, plan.view),
     };
   }
 
   #setColors(colors: ReadonlyMap<number, Rgb>): this {
     this.#colors = colors;
-    this.#shown = new Map([...colors].filter(([id]) => !this.isHidden(id)));
+    this.#shownColors = new Map([...colors].filter(([id]) => !this.isHidden(id)));
     return this.#redraw();
   }
 
-  #begin(rendering: Rendering, stage: LayerContext): void {
-    stage.checkCompatible(rendering);
+  #start(rendering: Rendering, context: LayerContext): void {
+    context.checkCompatible(rendering);
     this.#rendering = rendering;
     this.#objects = new Objects(this.source, rendering.json);
-    stage.onManifest(rendering);
+    context.onManifest(rendering);
     this.#checkLayers();
     this.fire("ready", { rendering });
   }
 
   #checkLayers(): void {
-    const [rendering, stage] = [this.#rendering, this.#stage];
-    if (!rendering || !stage) return;
-    const missing = neededKinds(this.#shownMode(rendering), this.#masked(rendering), false).filter((kind) => !rendering.layers.has(kind));
-    if (missing.length > 0) stage.report(new UsageError(`mode "${this.#mode}" needs the layer ${missing.join(", ")}, which rendering "${rendering.json.name}" does not have`));
+    const [rendering, context] = [this.#rendering, this.#context];
+    if (!rendering || !context) return;
+    const missing = listRequiredKinds(this.#effectiveMode(rendering), this.#needsMask(rendering), false).filter((kind) => !rendering.layers.has(kind));
+    if (missing.length > 0) context.report(new UsageError(`mode "${this.#mode}" needs the layer ${missing.join(", ")}, which the rendering "${rendering.json.name}" lacks`));
   }
 
-  /** Without normals nothing can be lit. */
-  #shownMode(rendering: Rendering): Mode {
+  /** Without normals, "lit" falls back to "color". */
+  #effectiveMode(rendering: Rendering): Mode {
     return this.#mode === "lit" && !rendering.layers.has("normal") ? "color" : this.#mode;
   }
 
-  #masked(rendering: Rendering): boolean {
+  #needsMask(rendering: Rendering): boolean {
     return rendering.layers.get(this.#mode === "picture" ? "picture" : "color")?.format === "jpeg";
   }
 
-  /** Rendered light that suits a light. */
-  #baked({ layers, json }: Rendering, light: Readonly<Light>): BakedLight {
+  /** Finds the rendered light that matches a light. */
+  #findBakedLight({ layers, json }: Rendering, light: Readonly<Light>): BakedLight {
     const shadow = light.shadows && light.altitude_deg > 0 ? findShadow(json.layers, towardsLight(light)) : null;
     return { shadow, occlusion: light.occlusion && layers.has("ao") };
   }
 
-  #access(view: View, layers: ReadonlyMap<string, LayerInfo>): TileAccess {
-    const store = this.#store as LayerTiles;
+  #makeTileAccess(view: View, layers: ReadonlyMap<string, LayerInfo>): TileAccess {
+    const tiles = this.#tiles as LayerTiles;
     const stored = (kind: LayerKind, tile: Tile): ReturnType<LayerTiles["get"]> => {
       const layer = layers.get(kind);
-      return layer && store.get(view, layer, tile);
+      return layer && tiles.get(view, layer, tile);
     };
     return {
       key: (kind, tile) => {
         const layer = layers.get(kind);
-        return layer ? store.key(view, layer, tile) : "";
+        return layer ? tiles.key(view, layer, tile) : "";
       },
       data: (kind, tile) => stored(kind, tile)?.data,
-      taken: (kind, tile) => {
-        if (kind !== "id" && kind !== "depth") store.surrender(view, layers.get(kind), tile);
+      onUploaded: (kind, tile) => {
+        if (kind !== "id" && kind !== "depth") tiles.releaseData(view, layers.get(kind), tile);
       },
     };
   }
 
   #redraw(): this {
-    this.#stage?.requestFrame();
+    this.#context?.requestFrame();
     return this;
   }
 }
 
-/** A rendering's layers by kind, with the one that has the shadows. */
-function layersWith({ layers }: Rendering, { shadow }: BakedLight): ReadonlyMap<string, LayerInfo> {
+/** Returns a rendering's layers by kind, with the given layer of shadows. */
+function withShadowLayer({ layers }: Rendering, { shadow }: BakedLight): ReadonlyMap<string, LayerInfo> {
   return shadow && layers.get(shadow.layer.kind) !== shadow.layer ? new Map([...layers, [shadow.layer.kind, shadow.layer]]) : layers;
 }
 
-function checkedMode(mode: Mode): Mode {
-  if (!MODES.includes(mode)) throw new UsageError(`mode "${mode}" is unknown; take one of ${MODES.join(", ")}`);
+function checkMode(mode: Mode): Mode {
+  if (!MODES.includes(mode)) throw new UsageError(`unknown mode "${mode}"; use one of ${MODES.join(", ")}`);
   return mode;
 }

@@ -1,8 +1,8 @@
 import type { GestureTarget } from "./gestures";
 
-export interface Turned extends GestureTarget {
+export interface KeyboardTarget extends GestureTarget {
   panBy(dx: number, dy: number, options?: { smooth?: boolean }): unknown;
-  /** +1: the next direction counter-clockwise, which turns the picture clockwise. */
+  /** +1: the next direction counter-clockwise. */
   rotate(step: number): unknown;
   /** +1: steeper. */
   tilt(step: number): unknown;
@@ -14,19 +14,19 @@ const ZOOM: Record<string, number> = { "+": 1, "=": 1, "-": -1, _: -1 };
 const TURN: Record<string, number> = { "[": 1, "]": -1, q: 1, e: -1 };
 const TILT: Record<string, number> = { PageUp: 1, PageDown: -1 };
 
-/** Arrows move, + and − zoom, q and e (or [ and ]) turn, Page Up and Page Down look steeper or flatter. Keys count while the map itself has the focus. */
-export function listenToKeys(map: Turned, signal: AbortSignal): void {
+/** Handles keys while the map itself has the focus: arrows pan, + and − zoom, q and e (or [ and ]) rotate, Page Up and Page Down change the pitch. */
+export function listenToKeys(map: KeyboardTarget, signal: AbortSignal): void {
   const { container } = map;
   container.tabIndex = 0;
-  const pressed = (event: KeyboardEvent): void => {
+  const onKey = (event: KeyboardEvent): void => {
     if (event.target !== container || event.ctrlKey || event.metaKey || event.altKey) return;
-    const [pan, zoom, turn, tilt] = [PAN[event.key], ZOOM[event.key], TURN[event.key], TILT[event.key]];
+    const [pan, zoom, rotation, tilt] = [PAN[event.key], ZOOM[event.key], TURN[event.key], TILT[event.key]];
     if (pan) map.panBy(pan[0] * STEP_PX, pan[1] * STEP_PX, { smooth: true });
     else if (zoom !== undefined) map.zoomBy(zoom, [container.clientWidth / 2, container.clientHeight / 2]);
-    else if (turn !== undefined) map.rotate(turn);
+    else if (rotation !== undefined) map.rotate(rotation);
     else if (tilt !== undefined) map.tilt(tilt);
     else return;
     event.preventDefault();
   };
-  container.addEventListener("keydown", pressed, { signal });
+  container.addEventListener("keydown", onKey, { signal });
 }

@@ -1,29 +1,37 @@
+import type { LayerHost } from "../core/mapLayer";
 import type { Vec3 } from "../core/vec";
 import type { Camera } from "../geo/camera";
 import type { Rendering } from "../geo/manifest";
 import type { TileResources } from "../tiles/layerTiles";
 
-/** What an image layer gets from the map it is on. */
+/** What a map offers to its image layers. */
 export interface LayerContext {
   readonly tileResources: TileResources;
-  /** A name for the layer's tiles that no other layer of the map has. */
+  /** Returns a name for the layer's tiles, unique on the map. */
   createName(): string;
-  /** A layer has left: its tiles can go. */
+  /** Drops the tiles of a removed layer. */
   dropTiles(layer: string): void;
-  /** @throws UsageError when a manifest does not go with what is on the map */
+  /** @throws UsageError when a rendering cannot be combined with those on the map */
   checkCompatible(rendering: Rendering): void;
-  /** The layer's manifest is here. */
+  /** Called when the layer's manifest has loaded. */
   onManifest(rendering: Rendering): void;
-  /** A frame is needed. */
   requestFrame(): void;
   report(error: Error): void;
 }
 
-/** The camera, and the origin (world) that its U and V refer to. */
+/** A map as seen by its image layers. */
+export interface ImageLayerHost extends LayerHost<ImageLayerHost> {
+  /** undefined when the map cannot draw. */
+  readonly layerContext: LayerContext | undefined;
+}
+
+/** The camera with the origin of its U and V, and the screen's resolution. */
 export interface ViewState {
   readonly camera: Camera;
+  /** World coordinates. */
   readonly origin: Vec3;
+  /** Device pixels per CSS pixel. */
   readonly dpr: number;
-  /** Levels by which tiles are finer than is usual for the pixels; negative: coarser. */
+  /** Levels by which tiles are finer than the pixels call for; negative: coarser. */
   readonly finer: number;
 }

@@ -1,15 +1,15 @@
 import { clamp, type Vec2 } from "../core/vec";
 import { cssPixelM, zoomedAt, type Camera } from "../geo/camera";
 
-/** A movement under way: gives the camera at a time, null when it has ended. */
-type Movement = (now_ms: number, camera: Camera) => Camera | null;
+/** Computes the camera at a time; null when the animation has ended. */
+type CameraAnimation = (now_ms: number, camera: Camera) => Camera | null;
 
 const FRICTION_MS = 260;
 const WHEEL_MS = 70;
 
-/** Moves the camera over time: flights, wheel zoom, inertia. One movement at a time; a new one takes over. */
+/** Animates the camera: flights, wheel zoom, inertia. A new animation replaces the current one. */
 export class Motion {
-  #movement: Movement | null = null;
+  #animation: CameraAnimation | null = null;
   #wheel: { zoom: number; anchor: Vec2 } | null = null;
   readonly #changed: () => void;
 
@@ -19,32 +19,32 @@ export class Motion {
   }
 
   get moving(): boolean {
-    return this.#movement !== null;
+    return this.#animation !== null;
   }
 
   stop(): void {
-    this.#movement = null;
+    this.#animation = null;
     this.#wheel = null;
   }
 
-  /** The camera for this moment. */
+  /** Computes the camera at a time. */
   step(now_ms: number, camera: Camera): Camera {
-    const next = this.#movement?.(now_ms, camera);
-    if (this.#movement && !next) this.stop();
+    const next = this.#animation?.(now_ms, camera);
+    if (this.#animation && !next) this.stop();
     return next ?? camera;
   }
 
-  /** Straight to another camera of the same view, slowing at both ends; a fixed point stays fixed. */
+  /** Flies straight to another camera of the same view, slowing at both ends; a common fixed point stays fixed. */
   fly(from: Camera, to: Camera, duration_ms: number): void {
-    const steep = to.zoom - from.zoom;
-    this.#begin((share, camera) => {
+    const zoomDelta = to.zoom - from.zoom;
+    this.#runTimed((share, camera) => {
       const t = share * share * (3 - 2 * share);
-      const way = Math.abs(steep) < 1e-6 ? t : (1 - 2 ** (-steep * t)) / (1 - 2 ** -steep);
-      return { ...camera, u: from.u + (to.u - from.u) * way, v: from.v + (to.v - from.v) * way, zoom: from.zoom + steep * t };
+      const progress = Math.abs(zoomDelta) < 1e-6 ? t : (1 - 2 ** (-zoomDelta * t)) / (1 - 2 ** -zoomDelta);
+      return { ...camera, u: from.u + (to.u - from.u) * progress, v: from.v + (to.v - from.v) * progress, zoom: from.zoom + zoomDelta * t };
     }, duration_ms);
   }
 
-  /** Zooms by `delta` levels about a point of the screen; calls in a row add up. */
+  /** Zooms by `delta` levels about a point of the screen; successive calls add up. */
   zoomBy(camera: Camera, delta: number, anchor: Vec2, limits: readonly [number, number]): void {
     const zoom = clamp((this.#wheel?.zoom ?? camera.zoom) + delta, ...limits);
     this.#wheel = { zoom, anchor };
@@ -52,14 +52,14 @@ export class Motion {
     this.#run((now, at) => {
       const share = 1 - Math.exp(-Math.max(now - last, 4) / WHEEL_MS);
       last = now;
-      const left = zoom - at.zoom;
-      if (Math.abs(left) < 0.002) return at.zoom === zoom ? null : zoomedAt(at, zoom, anchor);
-      return zoomedAt(at, at.zoom + left * share, anchor);
+      const remaining = zoom - at.zoom;
+      if (Math.abs(remaining) < 0.002) return at.zoom === zoom ? null : zoomedAt(at, zoom, anchor);
+      return zoomedAt(at, at.zoom + remaining * share, anchor);
     });
   }
 
-  /** Lets the picture glide on after a drag. Velocity in CSS pixels a millisecond. */
-  glide(velocity: Vec2): void {
+  /** Continues a drag with inertia. Velocity in CSS pixels per millisecond. */
+  startInertia(velocity: Vec2): void {
     let last = performance.now();
     let [vx, vy] = velocity;
     this.#run((now, camera) => {
@@ -67,13 +67,13 @@ export class Motion {
       last = now;
       const px = cssPixelM(camera);
       const next = { ...camera, u: camera.u - vx * dt * px, v: camera.v + vy * dt * px };
-      const slower = Math.exp(-dt / FRICTION_MS);
-      [vx, vy] = [vx * slower, vy * slower];
+      const decay = Math.exp(-dt / FRICTION_MS);
+      [vx, vy] = [vx * decay, vy * decay];
       return Math.hypot(vx, vy) < 0.02 ? null : next;
     });
   }
 
-  #begin(at: (share: number, camera: Camera) => Camera, duration_ms: number): void {
+  #runTimed(at: (share: number, camera: Camera) => Camera, duration_ms: number): void {
     const start = performance.now();
     let ended = false;
     this.#run((now, camera) => {
@@ -85,8 +85,8 @@ export class Motion {
     this.#wheel = null;
   }
 
-  #run(movement: Movement): void {
-    this.#movement = movement;
+  #run(animation: CameraAnimation): void {
+    this.#animation = animation;
     this.#changed();
   }
 }

@@ -1,24 +1,23 @@
-import { readColor } from "../draw/color";
-import type { Rgb } from "../draw/drawer";
+import { parseColor, type Rgb } from "../draw/color";
 import type { DrawStyle, DrawStyles } from "../draw/drawStyle";
 
-/** How a layer's objects are shown. What is not said stays as it is. */
+/** Styles of a layer's objects. Objects that are not mentioned stay plain. */
 export interface ObjectStyle {
-  /** Colours (#rrggbb) by id; light falls on them. */
+  /** Tints (#rrggbb) by object id; they are lit. */
   colors?: ReadonlyMap<number, string>;
-  /** Only these are shown as they are, or in their colours; see `others`. */
+  /** Only these objects are plain or tinted; see `others`. */
   only?: Iterable<number>;
-  /** What becomes of the objects that are not in `only`. Default "dimmed". */
+  /** Style of the objects that are not in `only`. Default "dimmed". */
   others?: "dimmed" | "hidden";
-  /** These are not shown, and cannot be picked. */
+  /** Objects that are not drawn and cannot be picked. */
   hidden?: Iterable<number>;
 }
 
-/** null: all as they are. */
-export function finishesOf({ colors, only, others = "dimmed", hidden }: ObjectStyle): DrawStyles | null {
+/** Converts a style; null: all objects are plain. */
+export function makeDrawStyles({ colors, only, others = "dimmed", hidden }: ObjectStyle): DrawStyles | null {
   const read = new Map<string, Rgb>();
   const rgbOf = (color: string): Rgb => {
-    const rgb = read.get(color) ?? readColor(color);
+    const rgb = read.get(color) ?? parseColor(color);
     read.set(color, rgb);
     return rgb;
   };
@@ -29,4 +28,4 @@ export function finishesOf({ colors, only, others = "dimmed", hidden }: ObjectSt
   return only || byId.size > 0 ? { byId, others: only ? others : "plain" } : null;
 }
 
-export const isHidden = (finishes: DrawStyles | null, id: number): boolean => finishes !== null && id !== 0 && (finishes.byId.get(id) ?? finishes.others) === "hidden";
+export const isHidden = (styles: DrawStyles | null, id: number): boolean => styles !== null && id !== 0 && (styles.byId.get(id) ?? styles.others) === "hidden";

@@ -4,51 +4,51 @@ import type { Pick } from "./picker";
 import type { Attribute } from "../tiles/objects";
 import type { marker } from "../overlay/marker";
 
-/** How a map begins; all can be left out. */
+/** Options of a map. */
 export interface MapOptions {
-  /** Where to look first, world coordinates. Default: the rendering's start. */
+  /** Initial centre, world coordinates. Default: the rendering's start. */
   center?: Vec3;
-  /** Default: everything fits. */
+  /** Initial zoom. Default: fits everything. */
   zoom?: number;
-  /** View id such as "45-22.5". Default: the manifest's first view. */
+  /** Id of the initial view, such as "45-22.5". Default: the manifest's first view. */
   direction?: string;
-  /** Default: from the south-west, 48° high. */
+  /** Default: from the south-west, 48° above the horizon. */
   light?: Partial<Light>;
-  /** CSS background behind the model. Default: the style sheet's paper, light or dark. */
+  /** CSS background behind the model. Default: the style sheet's, light or dark. */
   background?: string;
   /** Shows buttons and compass. Default true. */
   controls?: boolean;
   /** Shows the attribution. Default true. */
   attribution?: boolean;
-  /** Fetches ids of what is seen, so that "mousemove" tells what lies under the pointer. Default false. */
+  /** Fetches the ids of everything in view, so that "mousemove" reports the object under the pointer. Default false. */
   hover?: boolean;
-  /** Bytes of decoded tiles to keep. What is in view stays, however much that is. Default: 60 for each device pixel of the map, 20 on dense screens, whose tiles have fewer; at least 24 MB. */
+  /** Size of the cache of decoded tiles. Tiles in view are always kept. Default: 60 bytes per device pixel of the map, 20 on dense screens, whose tiles have fewer pixels; at least 24 MB. */
   cacheBytes?: number;
-  /** Tile requests at once. Default 12. */
+  /** Maximum number of concurrent tile requests. Default 12. */
   concurrency?: number;
-  /** Decoding threads. Default 2. */
+  /** Number of decoding threads. Default 2. */
   workers?: number;
-  /** Device pixels a CSS pixel are at most this. Default 3. */
+  /** Upper limit of device pixels per CSS pixel. Default 3. */
   maxPixelRatio?: number;
-  /** Device pixels a CSS pixel, whatever the screen has. Default: those of the screen, up to `maxPixelRatio`. */
+  /** Device pixels per CSS pixel. Default: those of the screen, up to `maxPixelRatio`. */
   pixelRatio?: number;
-  /** Fewer bytes: coarser tiles on dense screens, no ids for hovering, shadows and occlusion once they are asked for. "auto": where the browser's user saves data. Default "auto". */
+  /** Saves data: coarser tiles on dense screens, no ids for hovering, shadows and occlusion only on request. "auto": if the user has enabled it in the browser. Default "auto". */
   dataSaver?: boolean | "auto";
-  /** @internal Tiles of so many levels more than usual. Default 0. */
+  /** @internal Shows tiles of this many levels more. Default 0. */
   finer?: number;
-  /** Of controls and numbers, BCP 47; English, German and French are known. Default: that of the page around the map (its `lang`), else the browser's. */
+  /** Language of controls and numbers, BCP 47; English, German and French are supported. Default: that of the page around the map (its `lang`), else the browser's. */
   language?: string;
-  /** "webgl" needs WebGL2; "canvas" does without; "auto" takes WebGL2 where a GPU draws it, else the canvas, which is much quicker than WebGL without one. Default "auto". */
+  /** "webgl" requires WebGL2; "canvas" works without it; "auto" uses WebGL2 on a GPU, else the canvas, which is much faster than WebGL without a GPU. Default "auto". */
   drawer?: "auto" | "webgl" | "canvas";
-  /** Keeps the picture readable between frames (screenshots, tests). Default false. */
+  /** Keeps the picture readable between frames (for screenshots and tests). Default false. */
   preserveDrawingBuffer?: boolean;
 }
 
-/** Those without a default of their own. */
-type Left = "center" | "zoom" | "direction" | "light" | "background" | "language" | "pixelRatio" | "cacheBytes";
-export type FilledOptions = MapOptions & Required<Omit<MapOptions, Left | "dataSaver">> & { dataSaver: boolean };
+/** Options without a fixed default. */
+type WithoutDefault = "center" | "zoom" | "direction" | "light" | "background" | "language" | "pixelRatio" | "cacheBytes";
+export type FilledOptions = MapOptions & Required<Omit<MapOptions, WithoutDefault | "dataSaver">> & { dataSaver: boolean };
 
-export const DEFAULTS: Required<Omit<MapOptions, Left>> = {
+export const DEFAULTS: Required<Omit<MapOptions, WithoutDefault>> = {
   controls: true,
   attribution: true,
   hover: false,
@@ -61,10 +61,11 @@ export const DEFAULTS: Required<Omit<MapOptions, Left>> = {
   finer: 0,
 };
 
-/** Does the browser's user want fewer bytes (Save-Data, or reduced data)? */
+/** Whether the user wants to save data (Save-Data, or prefers-reduced-data). */
 export const savesData = (): boolean =>
   (navigator as { connection?: { saveData?: boolean } }).connection?.saveData === true || matchMedia("(prefers-reduced-data: reduce)").matches;
 
+/** A click, and the picked object. */
 export interface ClickEvent extends Pick {
   /** CSS pixels from the container's top left corner. */
   readonly point: readonly [number, number];
@@ -74,44 +75,45 @@ export interface ClickEvent extends Pick {
   readonly attributes?: Readonly<Record<string, Attribute>>;
 }
 
+/** A movement of the pointer, and the object under it. */
 export interface HoverEvent extends Pick {
   readonly point: readonly [number, number];
 }
 
-/** What a map fires, and the fields of each event. */
+/** Events of a map, and their fields. */
 export interface MapEvents {
-  /** The first layer's manifest is here: the map has a view. */
+  /** The first layer's manifest has loaded: the map has a view. */
   ready: object;
-  /** The first complete view has been drawn. Once. */
+  /** The first complete view has been drawn. Fires once. */
   load: object;
-  /** Everything in view is drawn and nothing moves. */
+  /** Everything in view is drawn, and nothing moves. */
   idle: object;
-  /** The view has changed; fired with each frame that shows it. */
+  /** The view has changed; fires with each frame that shows it. */
   move: object;
-  /** The view rests. */
+  /** The view has come to rest. */
   moveend: object;
-  /** After a change, with "move". */
+  /** The zoom has changed; fires with "move". */
   zoom: { zoom: number };
-  /** Another view of the rendering is shown; its id. */
+  /** The map has switched to another view of the rendering; its id. */
   directionchange: { direction: string };
-  /** By setLight or setTime. */
+  /** The light has been changed by setLight or setTime. */
   lightchange: { light: Readonly<Light> };
-  /** At once after a click, from what is in memory. */
+  /** Fires immediately on a click, with data in memory. */
   preclick: ClickEvent;
-  /** With exact values and attributes, once they are here. */
+  /** Fires after a click, once exact values and attributes have loaded. */
   click: ClickEvent;
-  /** The pointer moves; from what is in memory (see the option `hover`). */
+  /** The pointer has moved; with data in memory (see the option `hover`). */
   mousemove: HoverEvent;
-  /** A marker was selected. */
+  /** A marker has been selected. */
   select: { marker: marker };
-  /** CSS pixels. */
+  /** The map's size has changed, CSS pixels. */
   resize: { width: number; height: number };
-  /** Something could not be fetched, read or drawn; the map goes on. Without a listener it is a warning in the console. */
+  /** Something could not be fetched, read or drawn; the map continues. Without a listener, it is logged as a warning. */
   error: { error: Error };
-  /** The browser has taken WebGL away. */
+  /** The WebGL context is lost. */
   contextlost: object;
-  /** All is drawn again, by WebGL or without it. */
+  /** Drawing works again, with WebGL or without it. */
   contextrestored: object;
-  /** The map has ended. */
+  /** The map has been removed. */
   remove: object;
 }

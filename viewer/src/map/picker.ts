@@ -1,129 +1,129 @@
 import { add, dot, sub, type Vec2, type Vec3 } from "../core/vec";
-import { leadOf } from "../draw/combine";
+import { computeBias } from "../draw/depthMapping";
 import { localFromUvd } from "../geo/axes";
 import { cssPixelM } from "../geo/camera";
 import { pixelAt, uvOfPixel, type Tile } from "../geo/frame";
 import type { LayerKind, View } from "../geo/manifest";
 import { NO_DEPTH, type TileData } from "../tiles/tileData";
-import { groupsOf } from "./combined";
+import { groupByDepth } from "./depthGroups";
 import type { imageLayer } from "./imageLayer";
-import { DEPTH_UNIT_M, middleIn } from "./layerPlan";
+import { DEPTH_UNIT_M, computeCenter } from "./layerPlan";
 import type { ViewState } from "./layerContext";
 
-/** What lies under a pixel. */
+/** The object under a point. */
 export interface Pick {
-  /** Object id; 0: nothing is there. */
+  /** Object id; 0: none. */
   readonly id: number;
-  /** World coordinates of the surface; null where nothing is, or its depth is not known (yet). */
+  /** World coordinates of the surface; null where there is none, or its depth is unknown. */
   readonly position: Vec3 | null;
-  /** true: read from a tile above the deepest level, so only about right. */
+  /** true: read from a tile above the deepest level, and therefore inexact. */
   readonly approximate: boolean;
   readonly layer: imageLayer | null;
 }
 
-export const NOTHING: Pick = { id: 0, position: null, approximate: false, layer: null };
+export const EMPTY_PICK: Pick = { id: 0, position: null, approximate: false, layer: null };
 
-/** What is exact: from the deepest level, whose tiles are fetched when they are not here. */
-export async function pickExactly(layers: readonly imageLayer[], sight: ViewState, at: Vec2): Promise<Pick> {
-  for (const group of shownGroups(layers, sight, at)) {
-    const picks = await Promise.all(group.map((layer) => pickFrom(layer, sight, at)));
-    const pick = nearest(picks, group, sight);
+/** Picks exactly, from the deepest level; fetches its tiles if necessary. */
+export async function pickExactly(layers: readonly imageLayer[], viewState: ViewState, at: Vec2): Promise<Pick> {
+  for (const group of groupsAt(layers, viewState, at)) {
+    const picks = await Promise.all(group.map((layer) => pickFromLayer(layer, viewState, at)));
+    const pick = findNearest(picks, group, viewState);
     if (pick) return pick;
   }
-  return NOTHING;
+  return EMPTY_PICK;
 }
 
-async function pickFrom(layer: imageLayer, sight: ViewState, at: Vec2): Promise<Pick | null> {
-  const spot = spotOf(layer, sight, at);
-  const pixel = spot && pixelAt(spot.view.frame, spot.view.frame.zmax, ...spot.uv);
+async function pickFromLayer(layer: imageLayer, viewState: ViewState, at: Vec2): Promise<Pick | null> {
+  const viewPoint = findViewPoint(layer, viewState, at);
+  const pixel = viewPoint && pixelAt(viewPoint.view.frame, viewPoint.view.frame.zmax, ...viewPoint.uv);
   if (!pixel) return null;
-  const [ids, depths] = await Promise.all([need(layer, spot.view, "id", pixel.tile), need(layer, spot.view, "depth", pixel.tile)]);
-  return read(layer, spot.view, pixel, ids, depths);
+  const [ids, depths] = await Promise.all([fetchTile(layer, viewPoint.view, "id", pixel.tile), fetchTile(layer, viewPoint.view, "depth", pixel.tile)]);
+  return readPick(layer, viewPoint.view, pixel, ids, depths);
 }
 
-/** What the tiles in memory tell, finest first; null when they tell nothing. */
-export function pickLoaded(layers: readonly imageLayer[], sight: ViewState, at: Vec2): Pick | null {
+/** Picks from the tiles in memory, finest first; null when none covers the point. */
+export function pickLoaded(layers: readonly imageLayer[], viewState: ViewState, at: Vec2): Pick | null {
   let nothing: Pick | null = null;
-  for (const group of shownGroups(layers, sight, at)) {
-    const picks = group.map((layer) => loadedFrom(layer, sight, at));
-    const pick = nearest(picks.map((found) => (found?.layer ? found : null)), group, sight);
+  for (const group of groupsAt(layers, viewState, at)) {
+    const picks = group.map((layer) => pickLoadedFromLayer(layer, viewState, at));
+    const pick = findNearest(picks.map((found) => (found?.layer ? found : null)), group, viewState);
     if (pick) return pick;
     nothing ??= picks.find((found) => found !== null) ?? null;
   }
   return nothing;
 }
 
-/** Of the finest tile in memory; without a layer: nothing is there. */
-function loadedFrom(layer: imageLayer, sight: ViewState, at: Vec2): Pick | null {
-  const spot = spotOf(layer, sight, at);
-  if (!spot) return null;
-  const { frame } = spot.view;
+/** Picks from a layer's finest tile in memory; a pick without a layer: nothing is there. */
+function pickLoadedFromLayer(layer: imageLayer, viewState: ViewState, at: Vec2): Pick | null {
+  const viewPoint = findViewPoint(layer, viewState, at);
+  if (!viewPoint) return null;
+  const { frame } = viewPoint.view;
   for (let z = frame.zmax; z >= 0; z--) {
-    const pixel = pixelAt(frame, z, ...spot.uv);
+    const pixel = pixelAt(frame, z, ...viewPoint.uv);
     if (!pixel) return null;
-    const ids = loaded(layer, spot.view, "id", pixel.tile);
-    if (ids) return read(layer, spot.view, pixel, ids, loaded(layer, spot.view, "depth", pixel.tile)) ?? { ...NOTHING, approximate: z < frame.zmax };
+    const ids = findLoadedTile(layer, viewPoint.view, "id", pixel.tile);
+    if (ids) return readPick(layer, viewPoint.view, pixel, ids, findLoadedTile(layer, viewPoint.view, "depth", pixel.tile)) ?? { ...EMPTY_PICK, approximate: z < frame.zmax };
   }
   return null;
 }
 
-/** Layers that show something at a point, uppermost first; those of a group hide each other by depth. */
-function shownGroups(layers: readonly imageLayer[], { camera }: ViewState, [x, y]: Vec2): (readonly imageLayer[])[] {
+/** Groups the layers that are visible at a point, topmost first; the layers of a group hide each other by depth. */
+function groupsAt(layers: readonly imageLayer[], { camera }: ViewState, [x, y]: Vec2): (readonly imageLayer[])[] {
   const point: Vec2 = [x / camera.width, y / camera.height];
-  return [...groupsOf(layers.filter((layer) => layer.shows(point)))].reverse();
+  return [...groupByDepth(layers.filter((layer) => layer.showsAt(point)))].reverse();
 }
 
-/** Of what a group shows at a point, by the drawers' rule. */
-function nearest(picks: readonly (Pick | null)[], group: readonly imageLayer[], { camera: { frame, zoom }, origin }: ViewState): Pick | null {
-  const far = (pick: Pick, k: number): number => (pick.position ? dot(frame.axes.forward, sub(pick.position, origin)) - leadOf(frame, zoom, k) : Infinity);
-  const found = picks.flatMap((pick, k) => (pick ? [{ pick, far: group.length > 1 ? far(pick, k) : 0 }] : []));
-  return found.reduce<(typeof found)[0] | null>((best, one) => (best && best.far < one.far ? best : one), null)?.pick ?? null;
+/** Finds the pick of a group that the drawers show. */
+function findNearest(picks: readonly (Pick | null)[], group: readonly imageLayer[], { camera: { frame, zoom }, origin }: ViewState): Pick | null {
+  const depth = (pick: Pick, k: number): number => (pick.position ? dot(frame.axes.forward, sub(pick.position, origin)) - computeBias(frame, zoom, k) : Infinity);
+  const found = picks.flatMap((pick, k) => (pick ? [{ pick, depth: group.length > 1 ? depth(pick, k) : 0 }] : []));
+  return found.reduce<(typeof found)[0] | null>((best, one) => (best && best.depth < one.depth ? best : one), null)?.pick ?? null;
 }
 
-interface Spot {
+interface ViewPoint {
   readonly view: View;
   readonly uv: Vec2;
 }
 
-function spotOf(layer: imageLayer, sight: ViewState, [x, y]: Vec2): Spot | null {
-  const { camera } = sight;
+function findViewPoint(layer: imageLayer, viewState: ViewState, [x, y]: Vec2): ViewPoint | null {
+  const { camera } = viewState;
   const view = layer.findView(camera.frame);
   if (!view || !layer.rendering) return null;
-  const [u, v] = middleIn(view.frame, sight, layer.rendering);
+  const [u, v] = computeCenter(view.frame, viewState, layer.rendering);
   const px = cssPixelM(camera);
   return { view, uv: [u + (x - camera.width / 2) * px, v - (y - camera.height / 2) * px] };
 }
 
-async function need(layer: imageLayer, view: View, kind: LayerKind, tile: Tile): Promise<TileData | null> {
+async function fetchTile(layer: imageLayer, view: View, kind: LayerKind, tile: Tile): Promise<TileData | null> {
   const info = layer.rendering?.layers.get(kind);
-  return info && layer.tiles ? layer.tiles.need(view, info, tile) : null;
+  return info && layer.tiles ? layer.tiles.fetch(view, info, tile) : null;
 }
 
-function loaded(layer: imageLayer, view: View, kind: LayerKind, tile: Tile): TileData | null {
+function findLoadedTile(layer: imageLayer, view: View, kind: LayerKind, tile: Tile): TileData | null {
   const info = layer.rendering?.layers.get(kind);
   return (info && layer.tiles?.get(view, info, tile)?.data) ?? null;
 }
 
-interface Pixel {
+interface TilePixel {
   tile: Tile;
   i: number;
   j: number;
 }
 
-/** null when nothing is there. */
-function read(layer: imageLayer, view: View, pixel: Pixel, ids: TileData | null, depths: TileData | null): Pick | null {
-  const id = valueAt(ids, pixel);
-  const depth = valueAt(depths, pixel) ?? NO_DEPTH;
+/** Reads a pick from tile data; null when nothing is there. */
+function readPick(layer: imageLayer, view: View, pixel: TilePixel, ids: TileData | null, depths: TileData | null): Pick | null {
+  const id = readValue(ids, pixel);
+  const depth = readValue(depths, pixel) ?? NO_DEPTH;
   if ((!id && depth === NO_DEPTH) || layer.isHidden(id ?? 0)) return null;
-  return { id: id ?? 0, position: positionOf(layer, view, pixel, depth), approximate: pixel.tile.z < view.frame.zmax, layer };
+  return { id: id ?? 0, position: computePosition(layer, view, pixel, depth), approximate: pixel.tile.z < view.frame.zmax, layer };
 }
 
-function valueAt(data: TileData | null, { i, j }: Pixel): number | undefined {
+function readValue(data: TileData | null, { i, j }: TilePixel): number | undefined {
   return data?.kind === "id" || data?.kind === "depth" ? data.values[j * data.width + i] : undefined;
 }
 
-/** World coordinates of a pixel's centre. */
-function positionOf(layer: imageLayer, { frame }: View, { tile, i, j }: Pixel, depth: number): Vec3 | null {
+/** Computes the world coordinates of a pixel's centre. */
+function computePosition(layer: imageLayer, { frame }: View, { tile, i, j }: TilePixel, depth: number): Vec3 | null {
   const rendering = layer.rendering;
   if (!rendering || depth === NO_DEPTH) return null;
   const unit = rendering.layers.get("depth")?.unit_m ?? DEPTH_UNIT_M;

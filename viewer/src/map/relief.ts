@@ -3,173 +3,173 @@ import { localFromUvd, uvdFromLocal } from "../geo/axes";
 import { cssPixelM, uvFromScreen, type Camera } from "../geo/camera";
 import { ancestor, childrenOf, pixelM, type Tile } from "../geo/frame";
 import type { Rendering, View } from "../geo/manifest";
-import { coverOf, levelFor, type Rect } from "../tiles/cover";
+import { findCover, computeLevel, type Rect } from "../tiles/cover";
 import type { LayerTiles } from "../tiles/layerTiles";
 import { NO_DEPTH } from "../tiles/tileData";
 import type { imageLayer } from "./imageLayer";
 import { DEPTH_UNIT_M } from "./layerPlan";
 import type { ViewState } from "./layerContext";
 
-/** Surfaces that go on from a pixel to the next are at most so steep: metres of depth a metre across. */
-const STEEPEST = 8;
-const LEAST_BIAS_M = 0.05;
+/** Steepest continuous surface: metres of depth per metre across. */
+const MAX_SLOPE = 8;
+const MIN_BIAS_M = 0.05;
 
 /**
- * How deep the seen surface lies, for many points of one picture, from the tiles in memory. U, V and D are metres in the camera's frame, local to
- * the camera's origin. Of several layers the nearest surface counts; what is hidden, and layers that are not seen, do not.
+ * Depths of the visible surface, read from the tiles in memory for many points of one picture. U, V and D are metres in the camera's frame, from
+ * the camera's origin. Of several layers, the nearest surface counts; hidden objects and invisible layers do not.
  */
 export class Relief {
   readonly camera: Camera;
   readonly origin: Vec3;
   readonly dpr: number;
-  /** The level whose tiles are read first. */
+  /** The level that is read first. */
   readonly level: number;
-  /** Metres a pixel of that level. */
+  /** Metres per pixel of that level. */
   readonly pixel_m: number;
-  /** Least and greatest height of what the layers hold, local. */
+  /** Minimum and maximum height of the layers' content, local. */
   readonly heights: Vec2;
-  readonly #sheets: readonly Sheet[];
+  readonly #layers: readonly LayerDepths[];
   readonly #bias_m: number;
 
-  /** @param ids object ids are read, too, for `idAt` */
-  constructor(layers: readonly imageLayer[], sight: ViewState, ids = false) {
-    const { camera, origin, dpr, finer } = sight;
+  /** @param ids reads object ids as well, for `idAt` */
+  constructor(layers: readonly imageLayer[], viewState: ViewState, ids = false) {
+    const { camera, origin, dpr, finer } = viewState;
     [this.camera, this.origin, this.dpr] = [camera, origin, dpr];
     const px = cssPixelM(camera) / dpr;
-    this.level = levelFor(camera.frame, px, dpr, finer);
+    this.level = computeLevel(camera.frame, px, dpr, finer);
     this.pixel_m = pixelM(camera.frame, this.level);
     const { up, forward } = camera.frame.axes;
-    this.#bias_m = LEAST_BIAS_M + (this.pixel_m / 2) * (1 + up[2] / Math.max(-forward[2], 0.05));
+    this.#bias_m = MIN_BIAS_M + (this.pixel_m / 2) * (1 + up[2] / Math.max(-forward[2], 0.05));
     const shown = layers.filter((layer) => layer.options.opacity > 0);
-    this.#sheets = shown.flatMap((layer) => Sheet.of(layer, sight, px, ids) ?? []);
+    this.#layers = shown.flatMap((layer) => LayerDepths.create(layer, viewState, px, ids) ?? []);
     const heights = shown.flatMap(({ rendering }) => rendering?.json.box.map(([, , z]) => z + rendering.json.origin[2] - origin[2]) ?? []);
     this.heights = heights.length > 0 ? [Math.min(...heights), Math.max(...heights)] : [0, 0];
   }
 
   /**
-   * Of a rectangle (U and V of the sight's frame) at the deepest level whose tiles in it are no more than so many; they are fetched. What cannot be
-   * had is read from what is in memory: `approximate` then, and where the level is not the deepest.
+   * Fetches the depths of a rectangle (U and V of the camera's frame) at the deepest level where it has at most `maxTiles` tiles. Missing
+   * tiles are replaced by those in memory; the result is `approximate` then, and where the level is not the deepest.
    */
-  static async fetch(layers: readonly imageLayer[], sight: ViewState, [low, high]: Rect, most: number, ids = false): Promise<{ relief: Relief; approximate: boolean }> {
-    const { frame } = sight.camera;
+  static async fetch(layers: readonly imageLayer[], viewState: ViewState, [low, high]: Rect, maxTiles: number, ids = false): Promise<{ relief: Relief; approximate: boolean }> {
+    const { frame } = viewState.camera;
     const across = (z: number): number => (((high[0] - low[0]) * 2 ** z) / frame.size + 1) * (((high[1] - low[1]) * 2 ** z) / frame.size + 1);
     let zoom = frame.zmax;
-    while (zoom > 0 && across(zoom) > most) zoom--;
-    const relief = new Relief(layers, { ...sight, camera: { ...sight.camera, zoom }, dpr: 1, finer: 0 }, ids);
-    await Promise.allSettled(relief.#sheets.flatMap((sheet) => sheet.fetch([low, high])));
-    relief.#sheets.forEach((sheet) => { sheet.forget(); });
-    // Some may have failed, or be gone from memory before the last had come.
-    return { relief, approximate: zoom < frame.zmax || !relief.#sheets.every((sheet) => sheet.holds([low, high])) };
+    while (zoom > 0 && across(zoom) > maxTiles) zoom--;
+    const relief = new Relief(layers, { ...viewState, camera: { ...viewState.camera, zoom }, dpr: 1, finer: 0 }, ids);
+    await Promise.allSettled(relief.#layers.flatMap((layer) => layer.fetch([low, high])));
+    relief.#layers.forEach((layer) => { layer.clearPatches(); });
+    // Tiles may have failed, or have been dropped before the last one arrived.
+    return { relief, approximate: zoom < frame.zmax || !relief.#layers.every((layer) => layer.isLoaded([low, high])) };
   }
 
-  /** Of the nearest surface; Infinity where nothing is, NaN where that is not known (yet). */
+  /** Returns D of the nearest surface; Infinity where there is none, NaN where it is unknown. */
   depthAt(u: number, v: number): number {
     let nearest = Infinity;
-    for (const sheet of this.#sheets) {
-      const depth = sheet.depthAt(u, v);
+    for (const layer of this.#layers) {
+      const depth = layer.depthAt(u, v);
       if (Number.isNaN(depth)) return NaN;
       if (depth < nearest) nearest = depth;
     }
     return nearest;
   }
 
-  /** Object id of the nearest surface; 0 where nothing is, or ids are not read. */
+  /** Returns the object id of the nearest surface; 0 where there is none, or ids are not read. */
   idAt(u: number, v: number): number {
     let [nearest, id] = [Infinity, 0];
-    for (const sheet of this.#sheets) {
-      const depth = sheet.depthAt(u, v);
-      if (depth < nearest) [nearest, id] = [depth, sheet.id];
+    for (const layer of this.#layers) {
+      const depth = layer.depthAt(u, v);
+      if (depth < nearest) [nearest, id] = [depth, layer.id];
     }
     return id;
   }
 
   /**
-   * Does a surface lie before a point? A point on a surface is not hidden by it: the farthest of the 3 × 3 pixels around counts, as far as they go on from
-   * the point's own (steps of up to 8 pixels), and 5 cm, half a pixel and what level ground rises in half a pixel more. Where nothing is known, nothing hides.
+   * Whether a surface lies in front of a point. A surface does not hide its own points: counts the farthest of the 3 × 3 pixels around, as far as they continue
+   * the point's own pixel (steps of up to 8 pixels), with a tolerance of 5 cm, half a pixel, and the rise of level ground over half a pixel. Unknown depths hide nothing.
    */
   isOccluded(u: number, v: number, d: number): boolean {
     const own = this.depthAt(u, v);
     const near = d - this.#bias_m;
     if (!(own < near)) return false;
-    const farthest = own + STEEPEST * this.pixel_m;
+    const farthest = own + MAX_SLOPE * this.pixel_m;
     for (let k = 0; k < 9; k++) {
-      const beside = this.depthAt(u + ((k % 3) - 1) * this.pixel_m, v + (Math.floor(k / 3) - 1) * this.pixel_m);
-      if (beside >= near && beside <= farthest) return false;
+      const neighbour = this.depthAt(u + ((k % 3) - 1) * this.pixel_m, v + (Math.floor(k / 3) - 1) * this.pixel_m);
+      if (neighbour >= near && neighbour <= farthest) return false;
     }
     return true;
   }
 
-  /** Does something that is seen lie before a world position? */
-  covers(world: Vec3): boolean {
+  /** Whether a visible surface lies in front of a world position. */
+  isPositionOccluded(world: Vec3): boolean {
     return this.isOccluded(...uvdFromLocal(this.camera.frame.axes, sub(world, this.origin)));
   }
 
-  /** World position of the surface under CSS pixels; null where nothing is, or nothing is known. */
+  /** Returns the world position of the surface under CSS pixels; null where there is none, or it is unknown. */
   positionAt(point: Vec2): Vec3 | null {
     const [u, v] = uvFromScreen(this.camera, point);
     const d = this.depthAt(u, v);
     return Number.isFinite(d) ? add(this.origin, localFromUvd(this.camera.frame.axes, [u, v, d])) : null;
   }
 
-  /** What the depths of a rectangle (U, V) are read from: as long as the list has the same members, they are the same. */
+  /** Lists what a rectangle's depths (U, V) are read from: while the list has the same members, the depths are the same. */
   sources(rect: Rect): unknown[] {
-    return this.#sheets.flatMap((sheet) => sheet.sources(rect));
+    return this.#layers.flatMap((layer) => layer.sources(rect));
   }
 }
 
-/** What the depths of a tile are read from: its own pixels or an ancestor's, those of its children, or none. */
-type Patch = "empty" | "unknown" | Quarters | Pixels;
+/** The source of a tile's depths: its own pixels or an ancestor's, those of its children, or none. */
+type Patch = "empty" | "unknown" | ChildPatches | PixelPatch;
 
-interface Quarters {
+interface ChildPatches {
   readonly tile: Tile;
   /** TL, TR, BL, BR. */
   readonly children: readonly Patch[];
 }
 
-interface Pixels {
+interface PixelPatch {
   readonly tile: Tile;
   readonly px: number;
   readonly depths: Uint32Array;
-  /** null: nobody reads them. */
+  /** null: not read. */
   readonly ids: Uint32Array | null;
 }
 
-/** Levels below the shown one that are looked into. */
-const DOWN = 2;
+/** Number of levels below the shown one that are searched. */
+const CHILD_LEVELS = 2;
 
 /** A layer's depths in the camera's frame. */
-class Sheet {
+class LayerDepths {
   readonly #layer: imageLayer;
   readonly #view: View;
-  readonly #need: (kind: "depth" | "id", tile: Tile) => Promise<unknown>;
+  readonly #fetchTile: (kind: "depth" | "id", tile: Tile) => Promise<unknown>;
   readonly #read: (kind: "depth" | "id", tile: Tile) => Uint32Array | "empty" | undefined;
   readonly #level: number;
-  /** Tiles along a side of the level. */
-  readonly #side: number;
+  /** Tiles per side of the level. */
+  readonly #tilesPerSide: number;
   readonly #unit_m: number;
-  /** From the camera's U, V and D to the layer's. */
+  /** Offset from the camera's U, V and D to the layer's. */
   readonly #shift: Vec3;
   readonly #patches = new Map<number, Patch>();
   readonly #ids: boolean;
   #last = -1;
   #patch: Patch = "empty";
-  /** Of the object whose depth was read last. */
+  /** Id of the object whose depth was read last. */
   id = 0;
 
-  static of(layer: imageLayer, sight: ViewState, px: number, ids: boolean): Sheet | null {
-    const [view, { rendering, tiles }] = [layer.findView(sight.camera.frame), layer];
-    return view && tiles && rendering?.layers.has("depth") ? new Sheet(layer, view, rendering, tiles, sight, px, ids) : null;
+  static create(layer: imageLayer, viewState: ViewState, px: number, ids: boolean): LayerDepths | null {
+    const [view, { rendering, tiles }] = [layer.findView(viewState.camera.frame), layer];
+    return view && tiles && rendering?.layers.has("depth") ? new LayerDepths(layer, view, rendering, tiles, viewState, px, ids) : null;
   }
 
   private constructor(layer: imageLayer, view: View, { json, layers }: Rendering, store: LayerTiles, { origin, dpr, finer }: ViewState, px: number, ids: boolean) {
     [this.#layer, this.#view, this.#ids] = [layer, view, ids && layers.has("id")];
-    this.#level = levelFor(view.frame, px, dpr, finer);
-    this.#side = 2 ** this.#level;
+    this.#level = computeLevel(view.frame, px, dpr, finer);
+    this.#tilesPerSide = 2 ** this.#level;
     this.#unit_m = layers.get("depth")?.unit_m ?? DEPTH_UNIT_M;
     this.#shift = uvdFromLocal(view.frame.axes, sub(origin, json.origin));
-    this.#need = async (kind, tile) => {
+    this.#fetchTile = async (kind, tile) => {
       const info = layers.get(kind);
-      return info && store.need(view, info, tile);
+      return info && store.fetch(view, info, tile);
     };
     this.#read = (kind, tile) => {
       const info = layers.get(kind);
@@ -180,7 +180,7 @@ class Sheet {
 
   depthAt(u: number, v: number): number {
     const { frame } = this.#view;
-    const side = this.#side;
+    const side = this.#tilesPerSide;
     const right = u + this.#shift[0] - frame.u0;
     const down = frame.v0 - v - this.#shift[1];
     const x = Math.floor((right * side) / frame.size);
@@ -188,21 +188,21 @@ class Sheet {
     if (!(x >= 0 && y >= 0 && x < side && y < side)) return Infinity;
     if (y * side + x !== this.#last) {
       this.#last = y * side + x;
-      this.#patch = this.#patchOf({ z: this.#level, x, y });
+      this.#patch = this.#getPatch({ z: this.#level, x, y });
     }
-    return this.#valueOf(this.#patch, right, down);
+    return this.#readDepth(this.#patch, right, down);
   }
 
-  /** Tiles that a rectangle is read from. */
+  /** Fetches the tiles of a rectangle. */
   fetch([low, high]: Rect): Promise<unknown>[] {
     const kinds = this.#readsIds ? (["depth", "id"] as const) : (["depth"] as const);
-    return this.#tilesIn([low, high]).flatMap((tile) => kinds.map((kind) => this.#need(kind, tile)));
+    return this.#tilesIn([low, high]).flatMap((tile) => kinds.map((kind) => this.#fetchTile(kind, tile)));
   }
 
-  /** Are they all in memory, at the shown level? */
-  holds(rect: Rect): boolean {
+  /** Whether they are all in memory, at the shown level. */
+  isLoaded(rect: Rect): boolean {
     return this.#tilesIn(rect).every((tile) => {
-      const patch = this.#patchOf(tile);
+      const patch = this.#getPatch(tile);
       return patch === "empty" || (typeof patch === "object" && "depths" in patch && patch.tile.z === this.#level);
     });
   }
@@ -211,8 +211,8 @@ class Sheet {
     return this.#ids || this.#layer.drawStyles !== null;
   }
 
-  /** Reads anew what it has looked up. */
-  forget(): void {
+  /** Forgets patches, so that they are looked up again. */
+  clearPatches(): void {
     this.#patches.clear();
     this.#last = -1;
   }
@@ -220,21 +220,21 @@ class Sheet {
   #tilesIn([low, high]: Rect): Tile[] {
     const { frame, occupancy } = this.#view;
     const [du, dv] = this.#shift;
-    return coverOf(frame, (tile) => occupancy.has(tile), this.#level, [[low[0] + du, low[1] + dv], [high[0] + du, high[1] + dv]]);
+    return findCover(frame, (tile) => occupancy.has(tile), this.#level, [[low[0] + du, low[1] + dv], [high[0] + du, high[1] + dv]]);
   }
 
   sources(rect: Rect): unknown[] {
     const of = (patch: Patch): unknown[] => (typeof patch === "string" ? [patch] : "children" in patch ? patch.children.flatMap(of) : [patch.depths]);
-    return [this.#layer.drawStyles, ...this.#tilesIn(rect).flatMap((tile) => of(this.#patchOf(tile)))];
+    return [this.#layer.drawStyles, ...this.#tilesIn(rect).flatMap((tile) => of(this.#getPatch(tile)))];
   }
 
-  #valueOf(patch: Patch, right: number, down: number): number {
+  #readDepth(patch: Patch, right: number, down: number): number {
     if (typeof patch === "string") return patch === "empty" ? Infinity : NaN;
     const { tilePx, d0, size } = this.#view.frame;
     const { z, x, y } = patch.tile;
     if ("children" in patch) {
       const half = size / 2 ** (z + 1);
-      return this.#valueOf(patch.children[(right >= (2 * x + 1) * half ? 1 : 0) + (down >= (2 * y + 1) * half ? 2 : 0)] as Patch, right, down);
+      return this.#readDepth(patch.children[(right >= (2 * x + 1) * half ? 1 : 0) + (down >= (2 * y + 1) * half ? 2 : 0)] as Patch, right, down);
     }
     const i = clamp(Math.floor(right / patch.px) - x * tilePx, 0, tilePx - 1);
     const j = clamp(Math.floor(down / patch.px) - y * tilePx, 0, tilePx - 1);
@@ -244,34 +244,34 @@ class Sheet {
     return d0 + depth * this.#unit_m - this.#shift[2];
   }
 
-  #patchOf(tile: Tile): Patch {
-    const at = tile.y * this.#side + tile.x;
-    const patch = this.#patches.get(at) ?? this.#found(tile);
+  #getPatch(tile: Tile): Patch {
+    const at = tile.y * this.#tilesPerSide + tile.x;
+    const patch = this.#patches.get(at) ?? this.#findPatch(tile);
     this.#patches.set(at, patch);
     return patch;
   }
 
-  #found(tile: Tile): Patch {
-    const below = this.#below(tile, DOWN);
+  #findPatch(tile: Tile): Patch {
+    const below = this.#findChildPatch(tile, CHILD_LEVELS);
     if (below) return below;
     for (let up = 1; up <= tile.z; up++) {
-      const above = this.#own(ancestor(tile, up));
+      const above = this.#findOwnPatch(ancestor(tile, up));
       if (above) return above;
     }
     return "unknown";
   }
 
-  #own(tile: Tile): Patch | undefined {
+  #findOwnPatch(tile: Tile): Patch | undefined {
     if (!this.#view.occupancy.has(tile)) return "empty";
     const [depths, ids] = [this.#read("depth", tile), this.#readsIds ? this.#read("id", tile) : null];
     if (depths === "empty" || ids === "empty") return "empty";
     return depths && ids !== undefined ? { tile, px: pixelM(this.#view.frame, tile.z), depths, ids } : undefined;
   }
 
-  #below(tile: Tile, down: number): Patch | undefined {
-    const own = this.#own(tile);
+  #findChildPatch(tile: Tile, down: number): Patch | undefined {
+    const own = this.#findOwnPatch(tile);
     if (own ?? (down === 0 || tile.z === this.#view.frame.zmax)) return own;
-    const children = childrenOf(tile).map((child) => this.#below(child, down - 1));
+    const children = childrenOf(tile).map((child) => this.#findChildPatch(child, down - 1));
     return children.every((child) => child !== undefined) ? { tile, children } : undefined;
   }
 }

@@ -2,34 +2,34 @@ import type { Vec2, Vec3 } from "../core/vec";
 import type { Camera } from "../geo/camera";
 import type { Frame } from "../geo/frame";
 
-/** Makes a movement of a change of direction. */
+/** Animates the change from one view to another. */
 export interface ViewTransition {
-  /** The map has looked along `from` and looks along another view now; `pivot` (local, of the map's origin) stays where it is on the screen. */
+  /** Starts an animation from a camera to the map's new view; `pivot` (local, from the map's origin) stays in place on the screen. */
   start(from: Camera, pivot: Vec3): void;
-  /** Two fingers, or a drag, turn the picture clockwise by so much. @returns false when they only count steps */
+  /** Rotates the picture clockwise with the pointer. @returns false when the map should switch views itself */
   rotateBy(rad: number): boolean;
-  /** The hand has left. */
+  /** The last pointer was released. */
   endGesture(): void;
-  /** What is to be seen at a time, of a map that looks along `camera`; null: just that. */
+  /** Computes the camera of the animation at a time, for a map with this camera; null: no animation. */
   step(now_ms: number, camera: Camera): Camera | null;
-  /** Paints the movement. */
+  /** Draws the animation. */
   draw(scene: TransitionFrame): void;
 }
 
-/** What a turner paints with. */
+/** What a view transition draws with. */
 export interface TransitionFrame {
   readonly gl: WebGL2RenderingContext;
-  /** Of the canvas, device pixels. */
+  /** Size of the canvas, device pixels. */
   readonly width: number;
   readonly height: number;
-  /** What the map looks along. */
+  /** The map's camera. */
   readonly camera: Camera;
-  /** Tiles have come since the last frame. */
-  readonly changed: boolean;
-  /** All that the camera's view shows is here. */
+  /** Whether tiles have arrived since the last frame. */
+  readonly tilesChanged: boolean;
+  /** Whether all tiles of the camera's view are in memory. */
   readonly complete: boolean;
-  /** Least and greatest D of all that is on the map. */
+  /** Computes the minimum and maximum D of the map's content. */
   getDepthRange(frame: Frame): Vec2;
-  /** Draws what is in memory of a camera's view, one pixel for a CSS pixel of it, with depth as a share of a range of D. */
+  /** Draws a camera's view from the tiles in memory, one pixel per CSS pixel, with depth as a fraction of a range of D. */
   drawView(camera: Camera, range: Vec2, into: WebGLFramebuffer): void;
 }

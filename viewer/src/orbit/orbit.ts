@@ -151,7 +151,7 @@ export class orbit extends MapLayer<map, object> implements ViewTransition {
     transition.complete = frame.complete;
     transition.images ??= [renderRgbd(frame, warp, transition.from, camera.frame, null), renderRgbd(frame, warp, camera, transition.from.frame, null)];
     const second = transition.images[1];
-    if (frame.changed || hasMoved(second.source, camera)) transition.images[1] = renderRgbd(frame, warp, camera, transition.from.frame, second);
+    if (frame.tilesChanged || hasMoved(second.source, camera)) transition.images[1] = renderRgbd(frame, warp, camera, transition.from.frame, second);
     const intermediate = intermediateCamera(camera, transition);
     const [a, b] = [angularDistance(transition.current, anglesOf(transition.from.frame)), angularDistance(transition.current, anglesOf(camera.frame))];
     const share = a + b > 0 ? a / (a + b) : 1;

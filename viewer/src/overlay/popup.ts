@@ -1,95 +1,77 @@
 import { element, iconButton } from "../core/dom";
-import { Evented } from "../core/events";
 import { getMapMessages } from "../core/i18n";
-import type { Addable, LayerHost, OverlayHost } from "../core/overlayHost";
+import type { OverlayHost } from "../core/overlayHost";
 import type { Vec3 } from "../core/vec";
+import { PositionedLayer } from "./positionedLayer";
 
-/** How a popup looks. */
+/** Options of a popup. */
 export interface PopupOptions {
-  /** Pixels above the position. Default 14. */
+  /** Distance above the position, CSS pixels. Default 14. */
   offset_px?: number;
-  /** Shows a button that closes it. Default true. */
+  /** Shows a close button. Default true. */
   closeButton?: boolean;
 }
 
-/** What a popup fires. */
+/** Events of a popup. */
 export interface PopupEvents {
-  /** It came onto a map. */
+  /** It was added to a map. */
   open: object;
-  /** It left its map, by its button, Escape or a script. */
+  /** It was removed: by its button, Escape or a script. */
   close: object;
 }
 
 const CLOSE = "M6 6l12 12M18 6L6 18";
 
 /** A box with text or DOM content that points at a position (world coordinates). */
-export class popup extends Evented<PopupEvents> implements Addable<OverlayHost> {
+export class popup extends PositionedLayer<PopupEvents> {
   readonly options: Required<PopupOptions>;
   readonly #box: HTMLElement;
   readonly #body: HTMLElement;
-  #position: Vec3;
-  #map: (OverlayHost & Partial<LayerHost<OverlayHost>>) | undefined;
-  #place = (): void => {
-    this.#update();
-  };
 
   constructor(content: string | Node, position: Vec3 = [0, 0, 0], options: PopupOptions = {}) {
-    super();
+    super(position);
     this.options = { offset_px: 14, closeButton: true, ...options };
-    this.#position = position;
     this.#body = element("div", "map3d-popup-body");
     this.#box = element("div", "map3d-popup", { role: "dialog" }, this.#body);
     if (this.options.closeButton) this.#addCloseButton();
     this.setContent(content);
   }
 
-  /** Opens it on a map. */
-  addTo(map: LayerHost<OverlayHost>): this {
-    map.add(this);
-    return this;
-  }
-
-  /** Closes it. */
-  remove(): this {
-    this.#map?.discard?.(this);
-    return this;
-  }
-
-  /** It is on a map. */
+  /** Whether it is on a map. */
   get isOpen(): boolean {
-    return this.#map !== undefined;
+    return this.map !== undefined;
   }
 
-  /** Text is shown as text, never as HTML. */
+  /** Sets the content; strings are shown as text, never as HTML. */
   setContent(content: string | Node): this {
     this.#body.replaceChildren(content);
     return this;
   }
 
-  /** World coordinates. */
-  setPosition(position: Vec3): this {
-    this.#position = position;
-    this.#update();
-    return this;
+  /** @internal */
+  override detachFrom(map: OverlayHost): void {
+    super.detachFrom(map);
+    this.fire("close", {}); // no longer on the map, so that a listener may open it again
   }
 
-  attachTo(map: OverlayHost): void {
-    this.#map = map;
+  protected onAdd(map: OverlayHost): void {
     const { details, close } = getMapMessages(map.language);
     this.#box.setAttribute("aria-label", details);
     const button = this.#box.querySelector(".map3d-popup-close");
     for (const name of ["aria-label", "title"]) button?.setAttribute(name, close);
-    map.overlayPane.append(this.#box);
-    map.frameEvents.on("move", this.#place);
-    this.#update();
+    this.showElement(map, this.#box, "move");
     this.fire("open", {});
   }
 
-  detachFrom(map: OverlayHost): void {
-    map.frameEvents.off("move", this.#place);
+  protected override onRemove(map: OverlayHost): void {
+    super.onRemove(map);
     this.#box.remove();
-    this.#map = undefined;
-    this.fire("close", {});
+  }
+
+  protected placeElement(map: OverlayHost): void {
+    const at = map.project(this.position);
+    this.#box.hidden = !at;
+    if (at) this.#box.style.transform = `translate(${at[0].toFixed(1)}px, ${(at[1] - this.options.offset_px).toFixed(1)}px) translate(-50%, -100%)`;
   }
 
   #addCloseButton(): void {
@@ -99,11 +81,5 @@ export class popup extends Evented<PopupEvents> implements Addable<OverlayHost> 
     this.#box.addEventListener("keydown", (event) => {
       if (event.key === "Escape") this.remove();
     });
-  }
-
-  #update(): void {
-    const at = this.#map?.project(this.#position);
-    this.#box.hidden = !at;
-    if (at) this.#box.style.transform = `translate(${at[0].toFixed(1)}px, ${(at[1] - this.options.offset_px).toFixed(1)}px) translate(-50%, -100%)`;
   }
 }

@@ -1,21 +1,21 @@
-interface Held<V> {
+interface CacheEntry<V> {
   readonly value: V;
   readonly bytes: number;
-  /** Tick of the last use. */
+  /** Tick of the most recent use. */
   used: number;
 }
 
-/** Keeps the most recently used values within a number of bytes. What was used in the current tick, or in the last before it has been asked for again, is never dropped. */
+/** Keeps the most recently used values up to a number of bytes. Never drops values that were used in the current tick, or in the previous one before the current tick has asked for them. */
 export class Cache<V> {
-  readonly #held = new Map<string, Held<V>>();
+  readonly #entries = new Map<string, CacheEntry<V>>();
   #limit_bytes: number;
-  readonly #dropped: (key: string, value: V) => void;
+  readonly #onDrop: (key: string, value: V) => void;
   #tick = 0;
   #bytes = 0;
 
-  constructor(limit_bytes: number, dropped: (key: string, value: V) => void) {
+  constructor(limit_bytes: number, onDrop: (key: string, value: V) => void) {
     this.#limit_bytes = limit_bytes;
-    this.#dropped = dropped;
+    this.#onDrop = onDrop;
   }
 
   get bytes(): number {
@@ -23,60 +23,60 @@ export class Cache<V> {
   }
 
   get size(): number {
-    return this.#held.size;
+    return this.#entries.size;
   }
 
-  /** Keeps so many bytes from the next tick on. */
-  limit(bytes: number): void {
+  /** Sets the limit, which applies from the next tick on. */
+  setLimit(bytes: number): void {
     this.#limit_bytes = bytes;
   }
 
-  /** A new tick: what is used from now on is safe until the one after it has begun. */
-  tick(): void {
+  /** Starts a tick: values used from now on are safe until the next one has started. */
+  startTick(): void {
     this.#trim();
     this.#tick++;
   }
 
-  /** The value, which counts as use. */
+  /** Returns the value and counts it as used. */
   get(key: string): V | undefined {
-    const held = this.#held.get(key);
-    if (!held) return undefined;
-    if (held.used !== this.#tick) {
-      held.used = this.#tick;
-      this.#held.delete(key);
-      this.#held.set(key, held);
+    const entry = this.#entries.get(key);
+    if (!entry) return undefined;
+    if (entry.used !== this.#tick) {
+      entry.used = this.#tick;
+      this.#entries.delete(key);
+      this.#entries.set(key, entry);
     }
-    return held.value;
+    return entry.value;
   }
 
-  /** The value, without counting as use. */
+  /** Returns the value without counting it as used. */
   peek(key: string): V | undefined {
-    return this.#held.get(key)?.value;
+    return this.#entries.get(key)?.value;
   }
 
   set(key: string, value: V, bytes: number): void {
     this.delete(key);
-    this.#held.set(key, { value, bytes, used: this.#tick });
+    this.#entries.set(key, { value, bytes, used: this.#tick });
     this.#bytes += bytes;
     this.#trim();
   }
 
   delete(key: string): void {
-    const held = this.#held.get(key);
-    if (!held) return;
-    this.#held.delete(key);
-    this.#bytes -= held.bytes;
-    this.#dropped(key, held.value);
+    const entry = this.#entries.get(key);
+    if (!entry) return;
+    this.#entries.delete(key);
+    this.#bytes -= entry.bytes;
+    this.#onDrop(key, entry.value);
   }
 
-  /** Drops what the predicate names. */
+  /** Drops the values that a predicate selects. */
   prune(unwanted: (key: string, value: V) => boolean): void {
-    for (const [key, held] of [...this.#held]) if (unwanted(key, held.value)) this.delete(key);
+    for (const [key, entry] of [...this.#entries]) if (unwanted(key, entry.value)) this.delete(key);
   }
 
   #trim(): void {
-    for (const [key, held] of this.#held) {
-      if (this.#bytes <= this.#limit_bytes || held.used === this.#tick) return;
+    for (const [key, entry] of this.#entries) {
+      if (this.#bytes <= this.#limit_bytes || entry.used === this.#tick) return;
       this.delete(key);
     }
   }

@@ -3,11 +3,11 @@ import { clamp } from "../core/vec";
 import type { Camera } from "../geo/camera";
 import { ancestor, childrenOf, type Frame, type Tile } from "../geo/frame";
 
-/** [[least U, least V], [greatest U, greatest V]], metres. */
+/** [[min U, min V], [max U, max V]], metres. */
 export type Rect = readonly [Vec2, Vec2];
 
-/** What a screen shows whose middle lies at U and V; `px` metres a CSS pixel. */
-export function rectAround(u: number, v: number, { width, height }: Pick<Camera, "width" | "height">, px: number): Rect {
+/** Computes the rectangle that a screen centred on U and V shows, at `px` metres per CSS pixel. */
+export function computeViewRect(u: number, v: number, { width, height }: Pick<Camera, "width" | "height">, px: number): Rect {
   const [w, h] = [(width / 2) * px, (height / 2) * px];
   return [
     [u - w, v - h],
@@ -15,20 +15,20 @@ export function rectAround(u: number, v: number, { width, height }: Pick<Camera,
   ];
 }
 
-/** Device pixels a CSS pixel from which a screen is dense. */
-export const DENSE = 1.5;
+/** From this many device pixels per CSS pixel on, a screen counts as dense. */
+export const DENSE_DPR = 1.5;
 
 /**
- * The level to show when a device pixel is `devicePx_m` metres wide. On dense screens a tile pixel covers one to two
- * device pixels, which nobody sees there and which saves bytes; else 0.7 to 1.4. `finer`: so many levels more.
+ * Computes the level to show when a device pixel is `devicePx_m` metres wide. On dense screens a tile pixel covers one to two
+ * device pixels, which is not visible there and saves bytes; on others 0.7 to 1.4. `finer`: additional levels.
  */
-export function levelFor(frame: Frame, devicePx_m: number, dpr: number, finer = 0): number {
+export function computeLevel(frame: Frame, devicePx_m: number, dpr: number, finer = 0): number {
   const exact = Math.log2(frame.size / (frame.tilePx * devicePx_m)) + finer;
-  return clamp(Math.floor(exact + (dpr >= DENSE ? 0.001 : 0.5)), 0, frame.zmax);
+  return clamp(Math.floor(exact + (dpr >= DENSE_DPR ? 0.001 : 0.5)), 0, frame.zmax);
 }
 
-/** Occupied tiles of a level that meet the rectangle, row by row. Together they partition what is occupied of it. */
-export function coverOf(frame: Frame, occupied: (tile: Tile) => boolean, level: number, [low, high]: Rect): Tile[] {
+/** Finds the occupied tiles of a level that intersect a rectangle, row by row. */
+export function findCover(frame: Frame, occupied: (tile: Tile) => boolean, level: number, [low, high]: Rect): Tile[] {
   const tile_m = frame.size / 2 ** level;
   const last = 2 ** level - 1;
   const [x0, x1] = [Math.floor((low[0] - frame.u0) / tile_m), Math.ceil((high[0] - frame.u0) / tile_m) - 1];
@@ -43,32 +43,32 @@ export function coverOf(frame: Frame, occupied: (tile: Tile) => boolean, level: 
   return tiles;
 }
 
-/** Nearest to the rectangle's middle first. */
-export function fromTheMiddle(frame: Frame, tiles: readonly Tile[], [low, high]: Rect): Tile[] {
+/** Sorts tiles by their distance from the rectangle's centre. */
+export function sortFromCenter(frame: Frame, tiles: readonly Tile[], [low, high]: Rect): Tile[] {
   const [u, v] = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2];
-  const far = ({ z, x, y }: Tile): number => {
+  const distance = ({ z, x, y }: Tile): number => {
     const tile_m = frame.size / 2 ** z;
     return Math.hypot(frame.u0 + (x + 0.5) * tile_m - u, frame.v0 - (y + 0.5) * tile_m - v);
   };
-  return [...tiles].sort((a, b) => far(a) - far(b));
+  return [...tiles].sort((a, b) => distance(a) - distance(b));
 }
 
-/** Where a cover tile's pixels come from: `from` is the tile itself, an ancestor, or a descendant that covers `area`. */
-export interface Stand {
-  /** The square that is painted. */
+/** A tile whose pixels fill an area: the tile itself, an ancestor, or a descendant that covers the area. */
+export interface TileFallback {
+  /** The area to draw. */
   readonly area: Tile;
-  /** The tile whose pixels are shown there. */
+  /** The tile whose pixels are drawn there. */
   readonly from: Tile;
 }
 
 /**
- * What to paint for one cover tile: itself when ready, else ready children, else the nearest ready ancestor. The
- * areas are disjoint and lie in the tile, so nothing is blended twice.
+ * Finds the tiles to draw for one tile of the cover: itself if ready, else ready descendants, else the nearest ready ancestor. The
+ * areas are disjoint and within the tile, so that nothing is blended twice.
  */
-export function standsFor(tile: Tile, ready: (tile: Tile) => boolean, occupied: (tile: Tile) => boolean, down = 2): Stand[] {
+export function findFallbacks(tile: Tile, ready: (tile: Tile) => boolean, occupied: (tile: Tile) => boolean, down = 2): TileFallback[] {
   if (ready(tile)) return [{ area: tile, from: tile }];
   if (down > 0 && hasReadyBelow(tile, ready, occupied, down)) {
-    return childrenOf(tile).filter(occupied).flatMap((child) => standsFor(child, ready, occupied, down - 1));
+    return childrenOf(tile).filter(occupied).flatMap((child) => findFallbacks(child, ready, occupied, down - 1));
   }
   for (let up = 1; up <= tile.z; up++) {
     const from = ancestor(tile, up);

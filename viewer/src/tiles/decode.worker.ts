@@ -1,24 +1,16 @@
-import { decodeTile, transferable, type TileData } from "./tileData";
+import type { DecodeRequest, DecodeResponse } from "./decodeMessages";
+import { decodeTile, listTransferables } from "./tileData";
 
-export interface Task {
-  readonly ticket: number;
-  readonly kind: string;
-  readonly mediaType: string;
-  readonly bytes: ArrayBuffer;
-}
+const scope = self as unknown as { onmessage: (event: MessageEvent<DecodeRequest>) => void; postMessage: (response: DecodeResponse, transfer: Transferable[]) => void };
 
-export type Reply = { readonly ticket: number; readonly data: TileData } | { readonly ticket: number; readonly error: string };
-
-const scope = self as unknown as { onmessage: (event: MessageEvent<Task>) => void; postMessage: (reply: Reply, transfer: Transferable[]) => void };
-
-scope.onmessage = ({ data: { ticket, kind, mediaType, bytes } }) => {
+scope.onmessage = ({ data: { id, kind, mediaType, bytes } }) => {
   decodeTile(kind, mediaType, bytes).then(
     (data) => {
-      scope.postMessage({ ticket, data }, transferable(data));
+      scope.postMessage({ id, data }, listTransferables(data));
       if ("bitmap" in data) data.bitmap.close();
     },
     (reason: unknown) => {
-      scope.postMessage({ ticket, error: reason instanceof Error ? reason.message : String(reason) }, []);
+      scope.postMessage({ id, error: reason instanceof Error ? reason.message : String(reason) }, []);
     },
   );
 };

@@ -1,74 +1,74 @@
 import workerCode from "worker:./decode.worker.ts";
 import { DecodeError } from "../core/errors";
-import type { Reply, Task } from "./decode.worker";
+import type { DecodeResponse, DecodeRequest } from "./decodeMessages";
 import type { TileData } from "./tileData";
 
-interface Waiting {
+interface PendingDecode {
   resolve(data: TileData): void;
   reject(reason: Error): void;
 }
 
-/** Workers that have had nothing to do for so long are ended: what they have thrown away (the buffers of each zlib stream above all) goes with them. Others start in milliseconds. */
+/** Idle workers end after this time, which frees their garbage (above all the buffers of zlib streams). New ones start within milliseconds. */
 const IDLE_MS = 2000;
 
-/** Decodes tiles in workers made from a blob, so that the viewer is one file. A page's CSP must allow `worker-src blob:`. */
+/** Decodes tiles in workers, created from a blob so that the viewer is one file. A page's CSP must allow `worker-src blob:`. */
 export class Decoder {
-  readonly #waiting = new Map<number, Waiting>();
+  readonly #pending = new Map<number, PendingDecode>();
   readonly #workers: Worker[] = [];
   readonly #size: number;
   #url: string | undefined;
-  #tickets = 0;
-  #ending: ReturnType<typeof setTimeout> | undefined;
+  #requestCount = 0;
+  #idleTimer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(workers: number) {
     this.#size = Math.max(1, workers);
   }
 
   decode(kind: string, mediaType: string, bytes: ArrayBuffer): Promise<TileData> {
-    const ticket = this.#tickets++;
-    const worker = this.#workers[ticket % this.#size] ?? this.#start();
-    clearTimeout(this.#ending);
+    const id = this.#requestCount++;
+    const worker = this.#workers[id % this.#size] ?? this.#startWorker();
+    clearTimeout(this.#idleTimer);
     return new Promise((resolve, reject) => {
-      this.#waiting.set(ticket, { resolve, reject });
-      const task: Task = { ticket, kind, mediaType, bytes };
-      worker.postMessage(task, [bytes]);
+      this.#pending.set(id, { resolve, reject });
+      const request: DecodeRequest = { id, kind, mediaType, bytes };
+      worker.postMessage(request, [bytes]);
     });
   }
 
   stop(): void {
-    this.#end();
+    this.#endWorkers();
     if (this.#url) URL.revokeObjectURL(this.#url);
-    this.#fail("the map was removed");
+    this.#rejectAll("the map has been removed");
   }
 
-  #end(): void {
-    clearTimeout(this.#ending);
+  #endWorkers(): void {
+    clearTimeout(this.#idleTimer);
     for (const worker of this.#workers.splice(0)) worker.terminate();
   }
 
-  #start(): Worker {
+  #startWorker(): Worker {
     this.#url ??= URL.createObjectURL(new Blob([workerCode], { type: "text/javascript" }));
     const worker = new Worker(this.#url, { name: "map3d decoder" });
-    worker.onmessage = ({ data }: MessageEvent<Reply>) => {
+    worker.onmessage = ({ data }: MessageEvent<DecodeResponse>) => {
       this.#settle(data);
     };
     worker.onerror = (event) => {
-      this.#fail(`the tile decoder cannot run: ${event.message || "blocked; the page's Content-Security-Policy needs worker-src blob:"}`);
+      this.#rejectAll(`cannot run the tile decoder: ${event.message || "the worker is blocked; add worker-src blob: to the page's Content-Security-Policy"}`);
     };
     this.#workers.push(worker);
     return worker;
   }
 
-  #settle(reply: Reply): void {
-    const waiting = this.#waiting.get(reply.ticket);
-    this.#waiting.delete(reply.ticket);
-    if ("error" in reply) waiting?.reject(new DecodeError(reply.error));
-    else waiting?.resolve(reply.data);
-    if (this.#waiting.size === 0) this.#ending = setTimeout(() => { this.#end(); }, IDLE_MS);
+  #settle(response: DecodeResponse): void {
+    const pending = this.#pending.get(response.id);
+    this.#pending.delete(response.id);
+    if ("error" in response) pending?.reject(new DecodeError(response.error));
+    else pending?.resolve(response.data);
+    if (this.#pending.size === 0) this.#idleTimer = setTimeout(() => { this.#endWorkers(); }, IDLE_MS);
   }
 
-  #fail(why: string): void {
-    for (const waiting of this.#waiting.values()) waiting.reject(new DecodeError(why));
-    this.#waiting.clear();
+  #rejectAll(message: string): void {
+    for (const pending of this.#pending.values()) pending.reject(new DecodeError(message));
+    this.#pending.clear();
   }
 }

@@ -1,23 +1,23 @@
 import { FetchError } from "../core/errors";
 
-/** What answers requests: the browser's fetch, or something that keeps what it got. */
+/** The browser's fetch, or a replacement for it. */
 export type FetchFunction = (url: string, init: RequestInit) => Promise<Response>;
 
 export interface FetchOptions {
   signal?: AbortSignal | undefined;
-  /** First byte and length. */
+  /** First byte and number of bytes. */
   range?: readonly [number, number] | undefined;
-  /** Tries in all. */
+  /** Maximum number of attempts. Default 4. */
   attempts?: number | undefined;
-  /** Wait before the second try; doubled each time. */
+  /** Wait before the second attempt; doubles each time. Default 250. */
   backoff_ms?: number | undefined;
-  /** Default the browser's fetch. */
-  ask?: FetchFunction | undefined;
+  /** Default: the browser's fetch. */
+  fetch?: FetchFunction | undefined;
 }
 
 /**
- * Fetches bytes; null when there is nothing (204). Network errors, 429 and 5xx are tried again, at the next of
- * `urls` each time, with growing waits.
+ * Fetches bytes; null for 204 (no content). Retries network errors, 429 and 5xx with growing waits, each time at the next
+ * of `urls`.
  * @throws FetchError with the status; the signal's reason when aborted.
  */
 export async function fetchBytes(urls: readonly string[], options: FetchOptions = {}): Promise<ArrayBuffer | null> {
@@ -28,7 +28,7 @@ export async function fetchBytes(urls: readonly string[], options: FetchOptions 
       return await fetchOnce(url, options);
     } catch (reason) {
       options.signal?.throwIfAborted();
-      if (attempt + 1 >= attempts || !passing(reason)) throw reason;
+      if (attempt + 1 >= attempts || !isTransient(reason)) throw reason;
     }
     await wait(backoff_ms * 2 ** attempt, options.signal);
   }
@@ -40,25 +40,25 @@ export async function fetchJson(urls: readonly string[], options: FetchOptions =
   try {
     return JSON.parse(new TextDecoder().decode(bytes)) as unknown;
   } catch {
-    throw new FetchError(`${urls[0] ?? ""}: expected JSON, got ${String(bytes.byteLength)} bytes that are not`, 200);
+    throw new FetchError(`${urls[0] ?? ""}: expected JSON, got ${String(bytes.byteLength)} bytes that do not parse`, 200);
   }
 }
 
-async function fetchOnce(url: string, { signal, range, ask = fetch }: FetchOptions): Promise<ArrayBuffer | null> {
+async function fetchOnce(url: string, { signal, range, fetch: request = fetch }: FetchOptions): Promise<ArrayBuffer | null> {
   const headers = range ? { Range: `bytes=${String(range[0])}-${String(range[0] + range[1] - 1)}` } : undefined;
-  let answer: Response;
+  let response: Response;
   try {
-    answer = await ask(url, { ...(signal && { signal }), ...(headers && { headers }) });
+    response = await request(url, { ...(signal && { signal }), ...(headers && { headers }) });
   } catch (reason) {
-    throw new FetchError(`${url}: no answer (${reason instanceof Error ? reason.message : String(reason)})`);
+    throw new FetchError(`${url}: no response (${reason instanceof Error ? reason.message : String(reason)})`);
   }
-  if (answer.status === 204) return null;
-  if (!answer.ok) throw new FetchError(`${url}: HTTP ${String(answer.status)}`, answer.status);
-  if (range && answer.status !== 206) throw new FetchError(`${url}: the server ignores range requests (HTTP ${String(answer.status)}, expected 206); take one that answers them, such as nginx, Apache or Caddy`, answer.status);
-  return answer.arrayBuffer();
+  if (response.status === 204) return null;
+  if (!response.ok) throw new FetchError(`${url}: HTTP ${String(response.status)}`, response.status);
+  if (range && response.status !== 206) throw new FetchError(`${url}: the server ignores range requests (HTTP ${String(response.status)}, expected 206); use one that supports them, such as nginx, Apache or Caddy`, response.status);
+  return response.arrayBuffer();
 }
 
-function passing(reason: unknown): boolean {
+function isTransient(reason: unknown): boolean {
   const status = reason instanceof FetchError ? reason.status : 0;
   return status === 0 || status === 429 || status >= 500;
 }

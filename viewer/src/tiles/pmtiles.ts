@@ -4,15 +4,15 @@ import type { Tile } from "../geo/frame";
 /** Reads `length` bytes of an archive from `offset`. */
 export type ReadRange = (offset: number, length: number, signal?: AbortSignal) => Promise<ArrayBuffer>;
 
-interface Entry {
+interface DirectoryEntry {
   readonly id: number;
   readonly offset: number;
   readonly length: number;
-  /** Tiles in a row that share these bytes; 0: a leaf directory. */
+  /** Number of consecutive tiles that share these bytes; 0: a leaf directory. */
   readonly run: number;
 }
 
-interface Header {
+interface ArchiveHeader {
   readonly root: readonly [number, number];
   readonly leaves: number;
   readonly tiles: number;
@@ -24,7 +24,7 @@ const HEADER_BYTES = 127;
 const FIRST_READ_BYTES = 16384;
 const DEPTH_LIMIT = 4;
 
-/** The tile's number along the Hilbert curves of all levels: PMTiles v3. */
+/** Returns a tile's id along the Hilbert curves of all levels: PMTiles v3. */
 export function tileId({ z, x, y }: Tile): number {
   let id = (4 ** z - 1) / 3;
   let [a, b] = [x, y];
@@ -40,38 +40,38 @@ export function tileId({ z, x, y }: Tile): number {
   return id;
 }
 
-/** Reads tiles of a PMTiles v3 archive by ranges. Directories are kept: two bytes or so a tile. */
+/** Reads tiles of a PMTiles v3 archive by byte ranges. Keeps its directories: about two bytes per tile. */
 export class Archive {
   readonly #read: ReadRange;
   readonly #name: string;
-  readonly #directories = new Map<number, Promise<Entry[]>>();
-  #header: Promise<Header> | undefined;
+  readonly #directories = new Map<number, Promise<DirectoryEntry[]>>();
+  #header: Promise<ArchiveHeader> | undefined;
 
   constructor(name: string, read: ReadRange) {
     this.#name = name;
     this.#read = read;
   }
 
-  /** The tile's bytes, null when it is not in the archive. */
+  /** Returns a tile's bytes; null when it is not in the archive. */
   async tile(tile: Tile, signal?: AbortSignal): Promise<ArrayBuffer | null> {
     const header = await (this.#header ??= this.#open());
     const id = tileId(tile);
     let [offset, length] = header.root;
     for (let depth = 0; depth < DEPTH_LIMIT; depth++) {
-      const entry = find(await this.#directory(header, offset, length), id);
+      const entry = findEntry(await this.#directory(header, offset, length), id);
       if (!entry) return null;
-      if (entry.run > 0) return this.#unpack(await this.#read(header.tiles + entry.offset, entry.length, signal), header.compression);
+      if (entry.run > 0) return this.#decompress(await this.#read(header.tiles + entry.offset, entry.length, signal), header.compression);
       [offset, length] = [header.leaves + entry.offset, entry.length];
     }
     throw new FetchError(`${this.#name}: directories are nested deeper than ${String(DEPTH_LIMIT)}`);
   }
 
-  async #open(): Promise<Header> {
+  async #open(): Promise<ArchiveHeader> {
     try {
       const bytes = await this.#read(0, FIRST_READ_BYTES);
       const header = readHeader(bytes, this.#name);
       const [offset, length] = header.root;
-      if (offset + length <= bytes.byteLength) void this.#keep(header, offset, Promise.resolve(bytes.slice(offset, offset + length)));
+      if (offset + length <= bytes.byteLength) void this.#parseDirectory(header, offset, Promise.resolve(bytes.slice(offset, offset + length)));
       return header;
     } catch (reason) {
       this.#header = undefined;
@@ -79,39 +79,39 @@ export class Archive {
     }
   }
 
-  #directory(header: Header, offset: number, length: number): Promise<Entry[]> {
-    return this.#directories.get(offset) ?? this.#keep(header, offset, this.#read(offset, length));
+  #directory(header: ArchiveHeader, offset: number, length: number): Promise<DirectoryEntry[]> {
+    return this.#directories.get(offset) ?? this.#parseDirectory(header, offset, this.#read(offset, length));
   }
 
-  #keep(header: Header, offset: number, bytes: Promise<ArrayBuffer>): Promise<Entry[]> {
-    const entries = bytes.then((packed) => this.#unpack(packed, header.internal)).then((plain) => readDirectory(new Uint8Array(plain)));
+  #parseDirectory(header: ArchiveHeader, offset: number, bytes: Promise<ArrayBuffer>): Promise<DirectoryEntry[]> {
+    const entries = bytes.then((packed) => this.#decompress(packed, header.internal)).then((plain) => readDirectory(new Uint8Array(plain)));
     this.#directories.set(offset, entries);
     entries.catch(() => this.#directories.delete(offset));
     return entries;
   }
 
-  async #unpack(bytes: ArrayBuffer, compression: number): Promise<ArrayBuffer> {
+  async #decompress(bytes: ArrayBuffer, compression: number): Promise<ArrayBuffer> {
     if (compression <= 1) return bytes;
-    if (compression !== 2) throw new FetchError(`${this.#name}: compression ${String(compression)}; this viewer reads 1 (none) and 2 (gzip)`);
+    if (compression !== 2) throw new FetchError(`${this.#name}: unsupported compression ${String(compression)}; expected 1 (none) or 2 (gzip)`);
     return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
   }
 }
 
-function readHeader(bytes: ArrayBuffer, name: string): Header {
+function readHeader(bytes: ArrayBuffer, name: string): ArchiveHeader {
   const view = new DataView(bytes);
   if (bytes.byteLength < HEADER_BYTES || view.getUint32(0) !== 0x504d5469 || view.getUint8(7) !== 3) {
-    throw new FetchError(`${name}: no PMTiles archive of version 3`);
+    throw new FetchError(`${name}: not a PMTiles archive of version 3`);
   }
   const long = (at: number): number => Number(view.getBigUint64(at, true));
   return { root: [long(8), long(16)], leaves: long(40), tiles: long(56), internal: view.getUint8(97), compression: view.getUint8(98) };
 }
 
-function readDirectory(bytes: Uint8Array): Entry[] {
+function readDirectory(bytes: Uint8Array): DirectoryEntry[] {
   let at = 0;
   const varint = (): number => {
     for (let value = 0, place = 1; ; place *= 128) {
       const byte = bytes[at++];
-      if (byte === undefined) throw new FetchError("a PMTiles directory ends too early");
+      if (byte === undefined) throw new FetchError("a PMTiles directory is truncated");
       value += (byte & 127) * place;
       if (byte < 128) return value;
     }
@@ -120,11 +120,11 @@ function readDirectory(bytes: Uint8Array): Entry[] {
   const n = varint();
   if (n > bytes.length) throw new FetchError(`a PMTiles directory of ${String(bytes.length)} bytes claims ${String(n)} entries`);
   const [steps, runs, lengths, offsets] = [column(n), column(n), column(n), column(n)];
-  return entriesOf(steps, runs, lengths, offsets);
+  return makeEntries(steps, runs, lengths, offsets);
 }
 
-function entriesOf(steps: number[], runs: number[], lengths: number[], offsets: number[]): Entry[] {
-  const entries: Entry[] = [];
+function makeEntries(steps: number[], runs: number[], lengths: number[], offsets: number[]): DirectoryEntry[] {
+  const entries: DirectoryEntry[] = [];
   let id = 0;
   steps.forEach((step, k) => {
     id += step;
@@ -135,8 +135,8 @@ function entriesOf(steps: number[], runs: number[], lengths: number[], offsets: 
   return entries;
 }
 
-/** The last entry at or before the id, when it holds it. */
-function find(entries: Entry[], id: number): Entry | null {
+/** Finds the entry that contains an id. */
+function findEntry(entries: DirectoryEntry[], id: number): DirectoryEntry | null {
   let [low, high] = [0, entries.length];
   while (low < high) {
     const middle = (low + high) >> 1;

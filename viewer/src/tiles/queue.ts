@@ -1,20 +1,20 @@
-export interface Job {
+export interface TileRequest {
   readonly key: string;
   run(signal: AbortSignal): Promise<void>;
 }
 
-interface Running {
+interface RunningRequest {
   readonly abort: AbortController;
   readonly done: Promise<void>;
-  /** Somebody waits for it: not to be aborted when it leaves the view. */
-  kept: boolean;
+  /** A caller waits for it: it is not aborted when it leaves the view. */
+  pinned: boolean;
 }
 
-/** Runs what is wanted, at most `limit` jobs at once, and aborts what is wanted no longer. */
-export class Queue {
-  readonly #running = new Map<string, Running>();
+/** Runs the wanted requests, at most `limit` at once, and aborts those that are no longer wanted. */
+export class RequestQueue {
+  readonly #running = new Map<string, RunningRequest>();
   readonly #limit: number;
-  #waiting: Job[] = [];
+  #waiting: TileRequest[] = [];
 
   constructor(limit: number) {
     this.#limit = limit;
@@ -24,42 +24,42 @@ export class Queue {
     return this.#running.size + this.#waiting.length > 0;
   }
 
-  /** All that is wanted from now on, most urgent first. */
-  want(jobs: readonly Job[]): void {
-    const keys = new Map([...jobs].reverse().map((job) => [job.key, job]));
+  /** Replaces the wanted requests, most urgent first. */
+  setRequests(requests: readonly TileRequest[]): void {
+    const keys = new Map([...requests].reverse().map((request) => [request.key, request]));
     for (const [key, running] of [...this.#running]) {
-      if (keys.has(key) || running.kept) continue;
+      if (keys.has(key) || running.pinned) continue;
       this.#running.delete(key);
       running.abort.abort();
     }
-    this.#waiting = jobs.filter((job) => keys.get(job.key) === job && !this.#running.has(job.key));
+    this.#waiting = requests.filter((request) => keys.get(request.key) === request && !this.#running.has(request.key));
     this.#fill();
   }
 
-  /** Runs a job at once, beside the limit; joins it when it runs already. Settles when it has ended. */
-  need(job: Job): Promise<void> {
-    const running = this.#running.get(job.key) ?? this.#start(job);
-    this.#waiting = this.#waiting.filter((other) => other.key !== job.key);
-    running.kept = true;
+  /** Runs a request at once, regardless of the limit, or joins it if it is running. Settles when it has ended. */
+  runNow(request: TileRequest): Promise<void> {
+    const running = this.#running.get(request.key) ?? this.#start(request);
+    this.#waiting = this.#waiting.filter((other) => other.key !== request.key);
+    running.pinned = true;
     return running.done;
   }
 
   #fill(): void {
     while (this.#running.size < this.#limit) {
-      const job = this.#waiting.shift();
-      if (!job) return;
-      this.#start(job);
+      const request = this.#waiting.shift();
+      if (!request) return;
+      this.#start(request);
     }
   }
 
-  #start(job: Job): Running {
+  #start(request: TileRequest): RunningRequest {
     const abort = new AbortController();
-    const done = job.run(abort.signal).finally(() => {
-      if (this.#running.get(job.key) === running) this.#running.delete(job.key);
+    const done = request.run(abort.signal).finally(() => {
+      if (this.#running.get(request.key) === running) this.#running.delete(request.key);
       this.#fill();
     });
-    const running: Running = { abort, done, kept: false };
-    this.#running.set(job.key, running);
+    const running: RunningRequest = { abort, done, pinned: false };
+    this.#running.set(request.key, running);
     return running;
   }
 }

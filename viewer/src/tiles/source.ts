@@ -3,37 +3,37 @@ import type { Tile } from "../geo/frame";
 import { readManifest, type LayerInfo, type Rendering, type View } from "../geo/manifest";
 import { fetchBytes, fetchJson, type FetchFunction, type FetchOptions } from "./fetch";
 import { Archive } from "./pmtiles";
-import { baseUrl, tileUrls } from "./url";
+import { normalizeBaseUrl, tileUrls } from "./url";
 
-/** Where a rendering comes from: its manifest, what lies beside it, and its encoded tiles. Several layers may share one. */
+/** The origin of a rendering: its manifest, the files next to it, and its encoded tiles. Several layers may share one. */
 export interface Source {
-  /** The checked manifest. @throws ManifestError, FetchError */
+  /** Returns the checked manifest. @throws ManifestError, FetchError */
   manifest(signal?: AbortSignal): Promise<Rendering>;
-  /** A file beside the manifest, parsed; null when there is none. @throws FetchError */
+  /** Returns a parsed file from the manifest's folder; null when it does not exist. @throws FetchError */
   json(path: string): Promise<unknown>;
-  /** The encoded tile, which the caller owns; null when it is empty. @throws FetchError, or the signal's reason */
+  /** Returns the encoded tile, owned by the caller; null when it is empty. @throws FetchError, or the signal's reason */
   tile(view: View, layer: LayerInfo, tile: Tile, signal?: AbortSignal): Promise<ArrayBuffer | null>;
 }
 
-/** A rendering behind URLs: tile URLs over several hosts, or archives when the manifest names them. */
+/** Reads a rendering over HTTP: tiles spread over several hosts, or archives if the manifest lists them. */
 export class HttpSource implements Source {
-  /** Base URLs, in full. */
+  /** Absolute base URLs. */
   readonly bases: readonly string[];
-  readonly #ask: FetchFunction | undefined;
+  readonly #fetch: FetchFunction | undefined;
   readonly #archives = new Map<string, Archive>();
 
-  /** @param ask in place of the browser's fetch  @throws UsageError without a URL */
-  constructor(urls: string | readonly string[], ask?: FetchFunction) {
+  /** @param fetch replaces the browser's fetch  @throws UsageError without a URL */
+  constructor(urls: string | readonly string[], fetch?: FetchFunction) {
     const list = typeof urls === "string" ? [urls] : urls;
     if (list.length === 0) throw new UsageError("an imageLayer needs at least one base URL, e.g. \"https://host/tiles/teatime\"");
-    this.bases = list.map((url) => baseUrl(url, document.baseURI));
-    this.#ask = ask;
+    this.bases = list.map((url) => normalizeBaseUrl(url, document.baseURI));
+    this.#fetch = fetch;
   }
 
   async json(path: string): Promise<unknown> {
     const urls = this.#urls(path);
     try {
-      return await fetchJson(urls, this.#with({ attempts: Math.max(4, urls.length) }));
+      return await fetchJson(urls, this.#withFetch({ attempts: Math.max(4, urls.length) }));
     } catch (reason) {
       if (reason instanceof FetchError && reason.status === 404) return null;
       throw reason;
@@ -42,29 +42,29 @@ export class HttpSource implements Source {
 
   async manifest(signal?: AbortSignal): Promise<Rendering> {
     const urls = this.#urls("rendering.json");
-    return readManifest(await fetchJson(urls, this.#with({ signal, attempts: Math.max(3, urls.length) })), urls[0] ?? "");
+    return readManifest(await fetchJson(urls, this.#withFetch({ signal, attempts: Math.max(3, urls.length) })), urls[0] ?? "");
   }
 
   tile(view: View, layer: LayerInfo, tile: Tile, signal?: AbortSignal): Promise<ArrayBuffer | null> {
     const archive = view.archives?.[layer.name];
-    if (archive !== undefined) return this.#archive(archive).tile(tile, signal);
-    return fetchBytes(tileUrls(this.bases, view.id, layer.name, tile, view.versionOf(tile, layer)), this.#with({ signal }));
+    if (archive !== undefined) return this.#openArchive(archive).tile(tile, signal);
+    return fetchBytes(tileUrls(this.bases, view.id, layer.name, tile, view.versionOf(tile, layer)), this.#withFetch({ signal }));
   }
 
   #urls(path: string): string[] {
     return this.bases.map((base) => `${base}/${path}`);
   }
 
-  #with(options: FetchOptions): FetchOptions {
-    return { ...options, ask: this.#ask };
+  #withFetch(options: FetchOptions): FetchOptions {
+    return { ...options, fetch: this.#fetch };
   }
 
-  #archive(path: string): Archive {
+  #openArchive(path: string): Archive {
     const known = this.#archives.get(path);
     if (known) return known;
     const urls = this.#urls(path);
     const archive = new Archive(path, async (offset, length, signal) => {
-      const bytes = await fetchBytes(urls, this.#with({ range: [offset, length], signal }));
+      const bytes = await fetchBytes(urls, this.#withFetch({ range: [offset, length], signal }));
       if (!bytes) throw new FetchError(`${urls[0] ?? path}: no content`, 204);
       return bytes;
     });

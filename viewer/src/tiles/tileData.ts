@@ -1,46 +1,46 @@
 import { DecodeError } from "../core/errors";
 import { decodePng } from "./png";
 
-/** A decoded tile. Rows from the top. */
+/** A decoded tile; rows from the top. */
 export type TileData =
   | { readonly kind: "color" | "picture"; readonly width: number; readonly height: number; readonly bitmap: ImageBitmap }
-  /** values: RGB8 as stored */
+  /** Values: RGB8 as stored. */
   | { readonly kind: "normal"; readonly width: number; readonly height: number; readonly values: Uint8Array<ArrayBuffer> }
-  /** values: one uint32 a pixel */
+  /** Values: one uint32 per pixel. */
   | { readonly kind: "id" | "depth" | "depth2"; readonly width: number; readonly height: number; readonly values: Uint32Array<ArrayBuffer> }
-  /** values: share of light, 255 all */
+  /** Values: share of light, 255 for full light. */
   | { readonly kind: "sun" | "ao"; readonly width: number; readonly height: number; readonly values: Uint8Array<ArrayBuffer> }
-  /** values: a bit for each sun */
+  /** Values: one bit per sun. */
   | { readonly kind: "sun16"; readonly width: number; readonly height: number; readonly values: Uint16Array<ArrayBuffer> };
 
-type Kind = TileData["kind"];
-/** Bytes of a pixel in a layer's PNG; none for pictures that the browser decodes. */
-const CHANNELS: Readonly<Record<Kind, number>> = { color: 0, picture: 0, normal: 3, id: 4, depth: 4, depth2: 4, sun: 1, ao: 1, sun16: 2 };
+type TileKind = TileData["kind"];
+/** Bytes per pixel in a layer's PNG; 0 for pictures that the browser decodes. */
+const CHANNELS: Readonly<Record<TileKind, number>> = { color: 0, picture: 0, normal: 3, id: 4, depth: 4, depth2: 4, sun: 1, ao: 1, sun16: 2 };
 
 export const NO_DEPTH = 0xffffffff;
 
 /** @throws DecodeError */
 export async function decodeTile(kind: string, mediaType: string, bytes: ArrayBuffer): Promise<TileData> {
-  if (!isKind(kind)) throw new DecodeError(`layers of kind "${kind}" are unknown to this viewer`);
+  if (!isKind(kind)) throw new DecodeError(`unknown layer kind "${kind}"`);
   if (kind === "color" || kind === "picture") return decodeColor(kind, mediaType, bytes);
   const { width, height, channels, data } = await decodePng(new Uint8Array(bytes));
-  if (channels !== CHANNELS[kind]) throw new DecodeError(`a ${kind} tile has ${String(CHANNELS[kind])} bytes a pixel, got ${String(channels)}`);
-  // Little-endian, which is how memory is read on every machine that runs a browser.
+  if (channels !== CHANNELS[kind]) throw new DecodeError(`${kind} tiles have ${String(CHANNELS[kind])} bytes per pixel, got ${String(channels)}`);
+  // The values are little-endian, as memory is on every machine that runs a browser.
   if (kind === "sun16") return { kind, width, height, values: new Uint16Array(data.buffer, data.byteOffset, data.byteLength / 2) };
   if (kind === "normal" || kind === "sun" || kind === "ao") return { kind, width, height, values: data };
   return { kind, width, height, values: new Uint32Array(data.buffer, data.byteOffset, data.byteLength / 4) };
 }
 
-const isKind = (kind: string): kind is Kind => Object.hasOwn(CHANNELS, kind);
+const isKind = (kind: string): kind is TileKind => Object.hasOwn(CHANNELS, kind);
 
 /**
- * What of a tile is moved to another thread. Pictures are copied: WebKitGTK 2.50 gives WebGL nothing of one that has been moved.
+ * Lists the parts of a tile to transfer to another thread. Bitmaps are copied: WebKitGTK 2.50 uploads nothing to WebGL from a transferred one.
  */
-export function transferable(data: TileData): Transferable[] {
+export function listTransferables(data: TileData): Transferable[] {
   return "bitmap" in data ? [] : [data.values.buffer];
 }
 
-export const bytesOf = (data: TileData): number => data.width * data.height * (CHANNELS[data.kind] || 4);
+export const computeBytes = (data: TileData): number => data.width * data.height * (CHANNELS[data.kind] || 4);
 
 async function decodeColor(kind: "color" | "picture", mediaType: string, bytes: ArrayBuffer): Promise<TileData> {
   const blob = new Blob([bytes], { type: mediaType });

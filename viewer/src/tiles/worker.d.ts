@@ -1,4 +1,4 @@
-/** A worker's bundled source text; the build resolves it (scripts/build.mjs). */
+/** The bundled source text of a worker, resolved by the build (scripts/build.mjs). */
 declare module "worker:*" {
   const code: string;
   export default code;

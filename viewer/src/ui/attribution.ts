@@ -1,13 +1,13 @@
 import { element } from "../core/dom";
 
-/** What the line needs of a map. */
-export interface Credited {
+/** A map as seen by the attribution line. */
+export interface AttributedMap {
   readonly attributions: readonly string[];
   on(type: "ready" | "load", listener: () => void): unknown;
 }
 
-/** A quiet line that names whose data is shown. */
-export function attributionLine(map: Credited): HTMLElement {
+/** Creates the line that credits the data's sources. */
+export function createAttribution(map: AttributedMap): HTMLElement {
   const line = element("p", "map3d-attribution");
   const write = (): void => {
     line.textContent = map.attributions.join(" · ");

@@ -1,4 +1,4 @@
-/** The viewer's own style sheet. Pages restyle it through the custom properties. */
+/** The viewer's style sheet. Pages adapt it through the custom properties. */
 export const STYLES = `
 .map3d {
   --map3d-accent: #0e7490;
@@ -71,9 +71,9 @@ export const STYLES = `
 .map3d-marker-selected .map3d-marker-label { background: var(--map3d-marker, var(--map3d-accent)); color: #fff; }
 .map3d-marker:has(> .map3d-marker-icon)::before { display: none; }
 .map3d-marker-icon { position: absolute; left: 50%; top: 50%; transform: translate(-50%, -50%); }
-.map3d-marker-behind { opacity: 0.38; }
-.map3d-marker-loose { touch-action: none; cursor: grab !important; }
-.map3d-marker-quiet:not(:hover, :focus-visible, .map3d-marker-selected) > :not(.map3d-marker-icon) { display: none; }
+.map3d-marker-occluded { opacity: 0.38; }
+.map3d-marker-draggable { touch-action: none; cursor: grab !important; }
+.map3d-marker-hover-label:not(:hover, :focus-visible, .map3d-marker-selected) > :not(.map3d-marker-icon) { display: none; }
 
 .map3d-popup { position: absolute; left: 0; top: 0; z-index: 3; min-width: 60px; max-width: min(300px, 80vw); padding: 10px 14px; border-radius: 12px; background: var(--map3d-panel); box-shadow: var(--map3d-shadow); pointer-events: auto; }
 .map3d-popup::after { content: ""; position: absolute; left: 50%; bottom: -5px; width: 10px; height: 10px; margin-left: -5px; background: inherit; clip-path: polygon(0 50%, 100% 50%, 50% 100%); }

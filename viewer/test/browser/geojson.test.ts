@@ -120,7 +120,7 @@ test("a marker that is dragged lands on the surface; one behind a building is pa
     for (const type of ["dragstart", "drag", "dragend", "click"] as const) g.pin.on(type, () => g.told.push(type));
     new g.map3d.marker("Hidden", behind as unknown as Vec3, { occlusion: "fade" }).addTo(g.map);
   }, [world(-80, -60, 0), world(32, 45, 1)]);
-  expect(await page.locator(".map3d-marker-behind").allTextContents()).toEqual(["Hidden"]);
+  expect(await page.locator(".map3d-marker-occluded").allTextContents()).toEqual(["Hidden"]);
   const [from, to] = await page.evaluate((places) => places.map((place) => (globalThis as Global).map.project(place as unknown as Vec3) as [number, number]), [world(-80, -60, 0), world(-45, -4, 34)]) as [[number, number], [number, number]];
   await page.mouse.move(...from);
   await page.mouse.down();

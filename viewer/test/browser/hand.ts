@@ -1,6 +1,6 @@
 import type { Page } from "playwright-core";
 import type { Vec2 } from "../../src/core/vec";
-import { decodePng, type Pixels } from "../../src/tiles/png";
+import { decodePng, type DecodedPng } from "../../src/tiles/png";
 
 /** Actions that a task may take after opening. */
 export const MOST = 3;
@@ -56,4 +56,4 @@ export class Hand {
 }
 
 /** The pixels of a PNG file. */
-export const decoded = (png: Uint8Array): Promise<Pixels> => decodePng(Uint8Array.from(png));
+export const decoded = (png: Uint8Array): Promise<DecodedPng> => decodePng(Uint8Array.from(png));

@@ -79,7 +79,7 @@ test("a double click zooms at the pointer; the buttons zoom and turn", async () 
   await page.waitForFunction(() => (globalThis as Global).map.zoom < 3.85);
   await page.getByRole("button", { name: "Turn view clockwise", exact: true }).click();
   expect(await page.evaluate(() => (globalThis as Global).map.direction)).toBe("270-45");
-  await page.getByRole("button", { name: /look north/ }).click();
+  await page.getByRole("button", { name: /reset to north/ }).click();
   expect(await page.evaluate(() => (globalThis as Global).map.direction)).toBe("0-45");
   await page.context().close();
 });
@@ -196,7 +196,7 @@ test("a broken tile is named in an error; the rest is shown", async () => {
   const { page } = await bed.start(name, { zoom: 3.5 });
   const errors = await page.evaluate(() => (globalThis as Global).errors);
   expect(errors.length).toBe(1);
-  expect(errors[0]).toMatch(/tile 0-45\/normal\/3\/3\/4: no PNG: 3 bytes/);
+  expect(errors[0]).toMatch(/tile 0-45\/normal\/3\/3\/4: not a PNG: 3 bytes/);
   await page.context().close();
 });
 
@@ -210,7 +210,7 @@ test("a pick whose deepest tile cannot be had is approximate", async () => {
     const view = layer.rendering?.views.get("0-45");
     for (const kind of ["id", "depth"]) {
       const info = layer.rendering?.layers.get(kind);
-      if (view && info) await layer.tiles?.need(view, info, { z: 0, x: 0, y: 0 });
+      if (view && info) await layer.tiles?.fetch(view, info, { z: 0, x: 0, y: 0 });
     }
     const { id, position, approximate } = await map.pick(map.project([x - 45, y - 4, z + 34]) as [number, number]);
     return { id, position, approximate };
@@ -312,7 +312,7 @@ test("what is asked before the manifest is here and cannot be done is said, and 
     new g.map3d.imageLayer(url).addTo(view);
   }), bed.url("town"));
   expect(said[0]).toHaveLength(1);
-  expect(said[0][0]).toMatch(/^view "5-5" is none of 0-45, /);
+  expect(said[0][0]).toMatch(/^unknown view "5-5"; the rendering has 0-45, /);
   expect(said[1]).toBe("90-45");
   await page.context().close();
 });

@@ -212,7 +212,7 @@ for (const [name, options] of [["desk", DESK], ["phone", PHONE]] as const) {
 
 test.each([
   ["de-CH", ["Suchen", "Vergrößern", "Licht", "Strecke messen"]],
-  ["fr-FR", ["Rechercher", "Agrandir", "Lumière", "Mesurer une ligne"]],
+  ["fr-FR", ["Rechercher", "Zoom avant", "Lumière", "Mesurer une ligne"]],
 ])("a reader of %s is spoken to in that language, numbers and all", async (locale, [search, zoomIn, lit, line]) => {
   const { page, problems } = await open({ ...DESK, locale });
   expect(await page.evaluate(() => document.documentElement.lang)).toBe(locale);

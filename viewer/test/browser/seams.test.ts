@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 import type { Page } from "playwright-core";
-import { levelFor } from "../../src/tiles/cover";
+import { computeLevel } from "../../src/tiles/cover";
 import { makeFrame } from "../../src/geo/frame";
 import { renderPainted, type Paint } from "../fixture/rendering";
 import { compareTo, stitch, type Errors } from "../fixture/stitched";
@@ -54,7 +54,7 @@ async function errorsAt(page: Page, way: Way, dpr: number, zoom: number, middle:
   }, [zoom, middle as [number, number, number]] as const);
   expect(await page.evaluate(() => (globalThis as Global).map.zoom)).toBe(zoom);
   const [x, y] = await cornerOf(page);
-  const level = levelFor(frame, frame.size / (TILE * 2 ** zoom) / dpr, dpr);
+  const level = computeLevel(frame, frame.size / (TILE * 2 ** zoom) / dpr, dpr);
   return compareTo(levels[level] as (typeof levels)[0], { left: x * dpr, top: y * dpr, px: dpr * 2 ** (zoom - level) }, await seen(page, way), VIEWPORT.width * dpr);
 }
 

@@ -7,7 +7,7 @@ import { uvdFromLocal } from "../../src/geo/axes";
 import { screenFromLocal, type Camera } from "../../src/geo/camera";
 import { computeDaylight } from "../../src/geo/daylight";
 import { towardsLight } from "../../src/geo/light";
-import type { Pixels } from "../../src/tiles/png";
+import type { DecodedPng } from "../../src/tiles/png";
 import { renderTown, type Fixture } from "../fixture/rendering";
 import { BOX, framesOf, ORIGIN, PLACE, THINGS, TOWN, trace, type Thing } from "../fixture/town";
 import { TestBed } from "./bed";
@@ -302,7 +302,7 @@ function shaded(from: Vec3, light: Vec3): boolean {
   });
 }
 
-function pixel({ width, channels, data }: Pixels, [x, y]: Vec2): number[] {
+function pixel({ width, channels, data }: DecodedPng, [x, y]: Vec2): number[] {
   const at = channels * (Math.round(y * DENSITY) * width + Math.round(x * DENSITY));
   return [...data.subarray(at, at + 3)];
 }

@@ -110,7 +110,7 @@ test("a rendering in another CRS is refused by name, and the first one stays", a
   const before = await picture(page);
   await page.evaluate(addPlan, [bed.url("abroad"), {}] as const);
   await page.waitForFunction(() => (globalThis as Global).errors.length > 0);
-  expect(await page.evaluate(() => (globalThis as Global).errors)).toEqual(['rendering "abroad" cannot be shown on this map: it has the CRS "EPSG:2056 CH1903+ / LV95", the map has "EPSG:25832 ETRS89 / UTM zone 32N"']);
+  expect(await page.evaluate(() => (globalThis as Global).errors)).toEqual([`rendering "abroad" cannot be shown on this map: its CRS is "EPSG:2056 CH1903+ / LV95", but the map's is "EPSG:25832 ETRS89 / UTM zone 32N"`]);
   await settled(page, () => (globalThis as Global).map.setLight({ lit: false }), null);
   expect(before.equals(await picture(page))).toBe(true);
   await page.context().close();

@@ -154,7 +154,7 @@ test("random data tiles arrive bit for bit", async () => {
     const values = async (kind: string): Promise<number[]> => {
       const info = layer.rendering?.layers.get(kind);
       if (!view || !store || !info) throw new Error("not ready");
-      const data = await store.need(view, info, { z: 0, x: 0, y: 0 });
+      const data = await store.fetch(view, info, { z: 0, x: 0, y: 0 });
       return data && "values" in data ? [...data.values] : [];
     };
     return { ids: await values("id"), depths: await values("depth") };

@@ -77,7 +77,7 @@ for (const { name, perturbs, start, missing } of OTHERS) {
         const [view, store] = [layer.rendering?.views.get("0-45"), layer.tiles];
         const values = async (kind: string): Promise<number[]> => {
           const info = layer.rendering?.layers.get(kind);
-          const data = view && store && info ? await store.need(view, info, { z: 0, x: 0, y: 0 }) : null;
+          const data = view && store && info ? await store.fetch(view, info, { z: 0, x: 0, y: 0 }) : null;
           return data && "values" in data ? [...data.values] : [];
         };
         return { ids: await values("id"), depths: await values("depth") };

@@ -14,8 +14,8 @@ const { geographic, points } = JSON.parse(readFileSync(resolve(import.meta.dirna
   geographic: GeographicJson; points: { local: Vec2; lon_lat: Vec2; back: Vec2 }[];
 };
 
-describe("places on earth", () => {
-  test.each(points)("$local has the longitude and latitude of the vectors, and back", ({ local, lon_lat, back }) => {
+describe("positions on earth", () => {
+  test.each(points)("$local converts to the longitude and latitude of the vectors, and back", ({ local, lon_lat, back }) => {
     const [lon, lat] = lonLatFromLocal(geographic, local);
     expect(((lon - lon_lat[0] + 540) % 360) - 180).toBeCloseTo(0, 10);
     expect(Math.abs(lon)).toBeLessThanOrEqual(180);
@@ -23,7 +23,7 @@ describe("places on earth", () => {
     localFromLonLat(geographic, [lon, lat]).forEach((part, k) => { expect(part).toBeCloseTo(back[k as 0], 6); });
   });
 
-  test.each([[0, 358.086618], [90, 88.086618], [196.2, 194.286618], [275, 273.086618]])("an azimuth of %d° in UTM is less by the meridian convergence", (azimuth, expected) => {
+  test.each([[0, 358.086618], [90, 88.086618], [196.2, 194.286618], [275, 273.086618]])("an azimuth of %d° is reduced by the meridian convergence in UTM", (azimuth, expected) => {
     expect(localAzimuth(PLACE, PLACE.lon_lat, azimuth)).toBeCloseTo(expected, 3);
   });
 });
@@ -37,13 +37,13 @@ const SUNS: [number, number, string, number, number][] = [
   [69.6492, 18.9553, "2027-06-10T23:30:00Z", 10.652045, 3.290796],
 ];
 
-test.each(SUNS)("the sun over %d, %d at %s stands where an almanac has it, to a thirtieth of a degree", (lat, lon, time, azimuth, elevation) => {
+test.each(SUNS)("the sun over %d, %d at %s matches an almanac to a thirtieth of a degree", (lat, lon, time, azimuth, elevation) => {
   const sun = getPosition(new Date(time), lat, lon);
   expect(Math.abs(sun.azimuth - azimuth)).toBeLessThan(0.033);
   expect(Math.abs(sun.altitude - elevation)).toBeLessThan(0.033);
 });
 
-test("daylight comes from the sun's place in the grid, white at noon and blue by night", () => {
+test("daylight comes from the sun's azimuth in the grid, white at noon and blue at night", () => {
   const noon = computeDaylight(new Date("2026-06-21T11:15:00Z"), PLACE);
   expect(noon.altitude_deg).toBeGreaterThan(64);
   expect(noon.sun_rgb).toEqual([1, 1, 1]);
@@ -52,7 +52,7 @@ test("daylight comes from the sun's place in the grid, white at noon and blue by
   expect(night.sky_rgb[2]).toBeGreaterThan(1.3 * night.sky_rgb[0]);
 });
 
-test("light grows with the sun's altitude, without jumps", () => {
+test("light increases with the sun's altitude, without jumps", () => {
   for (let altitude = -20; altitude < 60; altitude += 0.1) {
     const [low, high] = [computeSkyColors(altitude), computeSkyColors(altitude + 0.1)];
     high.sky_rgb.forEach((part, k) => {
@@ -63,26 +63,26 @@ test("light grows with the sun's altitude, without jumps", () => {
   }
 });
 
-test("a clock is the reader's near home, the sun's elsewhere", () => {
+test("clocks show the user's time zone near home and solar time elsewhere", () => {
   expect(chooseUtcOffset(11.4, 2)).toBe(2);
   expect(chooseUtcOffset(-8.6, 1)).toBe(1);
   expect(chooseUtcOffset(151.2, 1)).toBe(10);
 });
 
-describe("shadows that suit a light", () => {
+describe("shadows that match a light", () => {
   const sun = (azimuth_deg: number, altitude_deg: number): { time: null; azimuth_deg: number; elevation_deg: number; direction: Vec3 } => ({ time: null, azimuth_deg, elevation_deg: altitude_deg, direction: towardsLight({ azimuth_deg, altitude_deg }) });
   const layer = (name: string, kind: string, suns: ReturnType<typeof sun>[]): LayerInfo => ({ name, kind, format: "png", media_type: "image/png", suns });
   const hours = layer("day", "sun16", [sun(90, 20), sun(110, 32), sun(135, 42), sun(165, 48)]);
   const noon = layer("noon", "sun", [sun(200, 50)]);
   const at = (azimuth_deg: number, altitude_deg: number): ReturnType<typeof findShadow> => findShadow([hours, noon, layer("color", "color", [])], towardsLight({ azimuth_deg, altitude_deg }));
 
-  test("the single sun where the light is its own", () => {
+  test("a single sun if it is the light's", () => {
     expect(at(200, 50)).toMatchObject({ layer: noon, first: 0, second: 0, share: 0 });
     expect(at(200.5, 50.3)?.layer).toBe(noon);
     expect(at(204, 50)).toBeNull();
   });
 
-  test("two hours of a day between which the light stands, each as much as it is near", () => {
+  test("two hours of a day around the light, weighted by nearness", () => {
     const found = at(121.6, 37.6);
     expect(found).toMatchObject({ layer: hours, first: 1, second: 2 });
     expect(found?.share).toBeCloseTo(0.5, 1);
@@ -90,7 +90,7 @@ describe("shadows that suit a light", () => {
     expect(at(109.99, 32)).toMatchObject({ first: 0, second: 1 });
   });
 
-  test("none for a light from elsewhere", () => {
+  test("none for a light from another direction", () => {
     expect(at(300, 30)).toBeNull();
     expect(at(110, 55)).toBeNull();
     expect(at(90, 5)).toBeNull();

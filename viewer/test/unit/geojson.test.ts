@@ -78,7 +78,7 @@ describe("relief", () => {
 
   test("hidden objects, invisible layers and unknown depths hide nothing; a missing tile is read from a level above", () => {
     const tower: Vec3 = [32, 40, 5];
-    const covers = (...layers: imageLayer[]): boolean => reliefOf(layers).covers([ORIGIN[0] + tower[0], ORIGIN[1] + tower[1], ORIGIN[2] + tower[2]]);
+    const covers = (...layers: imageLayer[]): boolean => reliefOf(layers).isPositionOccluded([ORIGIN[0] + tower[0], ORIGIN[1] + tower[1], ORIGIN[2] + tower[2]]);
     expect(covers(layerOf())).toBe(true);
     expect(covers(layerOf({ hidden: 2_000_000_001 }))).toBe(false);
     expect(covers(layerOf({ opacity: 0 }))).toBe(false);

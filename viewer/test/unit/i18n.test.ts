@@ -3,7 +3,7 @@ import { resolve } from "node:path";
 import { expect, test } from "vitest";
 import { chooseLanguage, MESSAGE_KEYS } from "../../page/i18n";
 import { getMapMessages } from "../../src/core/i18n";
-import { windOf } from "../../src/ui/controls";
+import { computeWind } from "../../src/ui/controls";
 
 test.each([
   [["de-CH", "en"], "de-CH"],
@@ -22,15 +22,15 @@ test("the page markup uses only known messages", () => {
   expect(keys.filter((key) => !MESSAGE_KEYS.has(key))).toEqual([]);
 });
 
-test.each(["en", "de", "fr", "de-AT", "it", ""])("%s: every control has a name, every wind another", (language) => {
-  const { looking, scale, winds, ...names } = getMapMessages(language);
+test.each(["en", "de", "fr", "de-AT", "it", ""])("%s: every control has a name, every wind a different one", (language) => {
+  const { facing, scale, winds, ...names } = getMapMessages(language);
   expect(Object.values(names).every((name) => name.trim() !== "")).toBe(true);
   expect(new Set(winds).size).toBe(8);
-  for (const wind of winds) expect(looking(wind)).toContain(wind);
+  for (const wind of winds) expect(facing(wind)).toContain(wind);
   expect(scale("20 m")).toContain("20 m");
 });
 
 test("winds count counter-clockwise", () => {
   const { winds } = getMapMessages("en");
-  expect([0, 45, 90, 179, 270, 340, -90, 720].map((deg) => winds[windOf(deg)])).toEqual(["north", "north-west", "west", "south", "east", "north", "east", "north"]);
+  expect([0, 45, 90, 179, 270, 340, -90, 720].map((deg) => winds[computeWind(deg)])).toEqual(["north", "north-west", "west", "south", "east", "north", "east", "north"]);
 });

@@ -31,22 +31,22 @@ describe("versions", () => {
     expect(rendering.views.get("0-45")?.versionOf(tile, info)).toBe(version);
   });
 
-  test("without passes all layers have those of the view", () => {
+  test("without passes all layers have the view's versions", () => {
     const view = read(document({ passes: undefined })).views.get("0-45");
     expect(view?.versionOf({ z: 4, x: 0, y: 15 }, layer("ao"))).toBe(2);
   });
 
-  test.each([[null], ["ao"], [[null]], [[{ layers: ["ao"] }]], [[{ layers: "ao", version: 1 }]], [[{ version: 1 }]]])("passes that are %o are refused", (passes) => {
+  test.each([[null], ["ao"], [[null]], [[{ layers: ["ao"] }]], [[{ layers: "ao", version: 1 }]], [[{ version: 1 }]]])("passes %o are refused", (passes) => {
     expect(() => read(document({ passes }))).toThrow(ManifestError);
   });
 });
 
 describe("layers", () => {
-  test("the first of a kind counts", () => {
+  test("the first layer of a kind is used", () => {
     expect(read(document()).layers.get("depth")?.name).toBe("depth");
   });
 
-  test("kinds that nobody knows are left alone", () => {
+  test("unknown kinds are ignored", () => {
     const json = document();
     const rendering = read({ ...json, layers: [layer("x", "moonlight"), ...json.layers] });
     expect([...rendering.layers.keys()].sort()).toEqual(["ao", "color", "depth", "id", "moonlight", "sun"]);

@@ -1,11 +1,11 @@
 import { describe, expect, test } from "vitest";
-import { packColor, packFinish } from "../../src/draw/drawStyle";
-import { idTable } from "../../src/draw/webgl/idTable";
-import { finishesOf, isHidden, type ObjectStyle } from "../../src/map/objectStyle";
+import { packColor, packStyle } from "../../src/draw/drawStyle";
+import { buildIdTable } from "../../src/draw/webgl/idTable";
+import { makeDrawStyles, isHidden, type ObjectStyle } from "../../src/map/objectStyle";
 
 const RED = [1, 0, 0];
 
-describe("a style says how each object is shown", () => {
+describe("an object style", () => {
   const rows: [string, ObjectStyle, Record<number, unknown>, string][] = [
     ["colours alone leave the others as they are", { colors: new Map([[5, "#ff0000"]]) }, { 5: RED }, "plain"],
     ["only dims the others", { only: [5, 6] }, { 5: "plain", 6: "plain" }, "dimmed"],
@@ -16,41 +16,41 @@ describe("a style says how each object is shown", () => {
     ["large ids are themselves", { hidden: [3_900_000_007] }, { 3_900_000_007: "hidden" }, "plain"],
   ];
   test.each(rows)("%s", (_, style, byId, others) => {
-    const found = finishesOf(style);
+    const found = makeDrawStyles(style);
     expect(found?.others).toBe(others);
     expect(Object.fromEntries(found?.byId ?? [])).toEqual(byId);
   });
 
-  test("nothing said: no style at all", () => {
-    expect(finishesOf({})).toBe(null);
-    expect(finishesOf({ colors: new Map() })).toBe(null);
+  test("is null when it is empty", () => {
+    expect(makeDrawStyles({})).toBe(null);
+    expect(makeDrawStyles({ colors: new Map() })).toBe(null);
   });
 
-  test("what is no colour is refused", () => {
-    expect(() => finishesOf({ colors: new Map([[1, "url(x)"]]) })).toThrow(/url\(x\)/);
+  test("refuses an invalid colour", () => {
+    expect(() => makeDrawStyles({ colors: new Map([[1, "url(x)"]]) })).toThrow(/url\(x\)/);
   });
 
-  test("nothing is never hidden", () => {
-    const none = finishesOf({ only: [5], others: "hidden" });
+  test("never hides the absence of an object", () => {
+    const none = makeDrawStyles({ only: [5], others: "hidden" });
     expect([isHidden(none, 0), isHidden(none, 5), isHidden(none, 6), isHidden(null, 6)]).toEqual([false, false, true, false]);
   });
 });
 
-test("words of finishes differ, and are never 0", () => {
-  const words = (["plain", "dimmed", "hidden", [0, 0, 0], [1, 1, 1]] as const).map(packFinish);
+test("packed styles are distinct and never 0", () => {
+  const words = (["plain", "dimmed", "hidden", [0, 0, 0], [1, 1, 1]] as const).map(packStyle);
   expect(new Set(words).size).toBe(5);
   expect(words.every((word) => word >>> 24 > 0 && word >>> 24 < 8)).toBe(true);
-  expect(packFinish([1, 0, 0])).toBe(packColor([1, 0, 0]));
+  expect(packStyle([1, 0, 0])).toBe(packColor([1, 0, 0]));
 });
 
-test("every id of a table is found within its probes", () => {
+test("every id of a table is found within the longest search", () => {
   const ids = Array.from({ length: 5000 }, (_, k) => (Math.imul(k + 1, 0x85ebca6b) >>> 0) || 1);
-  const table = idTable(new Map(ids.map((id, k) => [id, k + 1])), (word) => word);
+  const table = buildIdTable(new Map(ids.map((id, k) => [id, k + 1])), (word) => word);
   ids.forEach((id, k) => {
     let place = (Math.imul(id, 0x9e3779b9) >>> 7) & table.mask;
     let probe = 1;
-    for (; table.places[2 * place] !== id; probe++) place = (place + 1) & table.mask;
-    expect(table.places[2 * place + 1]).toBe(k + 1);
+    for (; table.slots[2 * place] !== id; probe++) place = (place + 1) & table.mask;
+    expect(table.slots[2 * place + 1]).toBe(k + 1);
     expect(probe).toBeLessThanOrEqual(table.probes);
   });
 });

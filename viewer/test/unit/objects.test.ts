@@ -17,7 +17,7 @@ function sourceOf(...answers: unknown[]): { json: (path: string) => Promise<unkn
   };
 }
 
-test("what could not be fetched is asked for again; what could is kept", async () => {
+test("failed files are fetched again; fetched files are kept", async () => {
   const source = sourceOf(new Error("no answer"), { map3d: "search", version: 1, entries: [[7, "Hall", [0, 0, 0]]] });
   const objects = new Objects(source, json);
   await expect(objects.search()).rejects.toThrow("no answer");
@@ -26,8 +26,8 @@ test("what could not be fetched is asked for again; what could is kept", async (
   expect(source.asked).toEqual(["objects/search.json", "objects/search.json"]);
 });
 
-test("a file of another kind or version is refused by name; one that is not there is empty", async () => {
-  await expect(new Objects(sourceOf({ map3d: "search", version: 2, entries: [] }), json).search()).rejects.toThrow('objects/search.json: expected map3d "search" of version 1, got search 2');
+test("a file of another type or version is refused by name; a missing file is empty", async () => {
+  await expect(new Objects(sourceOf({ map3d: "search", version: 2, entries: [] }), json).search()).rejects.toThrow('objects/search.json: expected map3d "search" version 1, got "search" version 2');
   expect(await new Objects(sourceOf(null), json).attributes()).toEqual([]);
-  expect(await new Objects(sourceOf({ map3d: "objects", version: 1, objects: {} }), json).get(5)).toBeNull();
+  expect(await new Objects(sourceOf({ map3d: "objects", version: 1, objects: {} }), json).find(5)).toBeNull();
 });

@@ -8,7 +8,7 @@ import { readManifest } from "../../src/geo/manifest";
 import { isVersioned, pageKey, rangeResponse, rangeKey, rangeOf } from "../../src/offline/cacheKeys";
 import { resolveOptions, tilesIn, tilesOf, type AreaOptions } from "../../src/offline/areaPlan";
 import type { map } from "../../src/map3d";
-import { coverOf, type Rect } from "../../src/tiles/cover";
+import { findCover, type Rect } from "../../src/tiles/cover";
 import { ORIGIN } from "../fixture/town";
 import { renderTown } from "../fixture/rendering";
 
@@ -42,7 +42,7 @@ describe("tiles of an area", () => {
       const rect: Rect = [[u, v - h], [u + w, v]];
       const least = Math.floor(next.next().value * 3);
       const levels = [least, least + Math.floor(next.next().value * 6)] as const;
-      const brute = every(frame.zmax).filter((tile) => tile.z >= levels[0] && tile.z <= levels[1] && occupancy.has(tile) && (tile.z <= 1 || coverOf(frame, () => true, tile.z, rect).some((other) => other.x === tile.x && other.y === tile.y)));
+      const brute = every(frame.zmax).filter((tile) => tile.z >= levels[0] && tile.z <= levels[1] && occupancy.has(tile) && (tile.z <= 1 || findCover(frame, () => true, tile.z, rect).some((other) => other.x === tile.x && other.y === tile.y)));
       expect(names(tilesIn(view, rect, levels))).toEqual(names(brute));
     }
   });
@@ -62,7 +62,7 @@ describe("tiles of an area", () => {
     const few = await planned({ bounds, layers: ["id"], directions: ["90-45"], levels: [3, 3] });
     const view = town.views.get("90-45");
     const rect = projectedBox((view as (typeof views)[0]).frame, [[24, 18, 0], [40, 34, 62]]);
-    expect(few).toEqual(coverOf((view as (typeof views)[0]).frame, (tile) => view?.occupancy.has(tile) === true, 3, rect).map((tile) => `90-45/id/${tileName(tile)}`).sort());
+    expect(few).toEqual(findCover((view as (typeof views)[0]).frame, (tile) => view?.occupancy.has(tile) === true, 3, rect).map((tile) => `90-45/id/${tileName(tile)}`).sort());
     expect(await planned({ bounds })).toHaveLength(new Set(await planned({ bounds })).size);
     expect(new Set((await planned({})).map((name) => name.split("/").slice(0, 2).join("/"))).size).toBe(16);
     expect((await planned({})).length).toBeLessThan((await planned({ bounds: [[0, 0, 0], [1e7, 1e7, 1e4]] })).length);
@@ -75,7 +75,7 @@ describe("tiles of an area", () => {
       const [u, v] = [axes.right[2] * 18, axes.up[2] * 18];
       const rect: Rect = [[u - 5, v - 2.5], [u + 5, v + 2.5]];
       const kept = new Set(await planned({ directions: [view.id], layers: ["id"] }));
-      for (const { z, x, y } of coverOf(view.frame, (tile) => view.occupancy.has(tile), view.frame.zmax, rect)) expect(kept.has(`${view.id}/id/${String(z)}/${String(x)}/${String(y)}`)).toBe(true);
+      for (const { z, x, y } of findCover(view.frame, (tile) => view.occupancy.has(tile), view.frame.zmax, rect)) expect(kept.has(`${view.id}/id/${String(z)}/${String(x)}/${String(y)}`)).toBe(true);
     }
     expect(await planned({ bounds: [[0, 0, 0], [10, 10, 10]] })).toEqual([]);
   });

@@ -15,7 +15,7 @@ function noise(length: number, seed: number): Uint8Array {
 describe("PNG", () => {
   for (const channels of [1, 2, 3, 4] as const) {
     for (const filter of [0, 1, 2, 3, 4, "mixed"] as const) {
-      test(`${String(channels)} channels, filter ${String(filter)}: random bytes come back bit for bit`, async () => {
+      test(`${String(channels)} channels, filter ${String(filter)}: random bytes are restored bit for bit`, async () => {
         const [width, height] = [37, 29];
         const data = noise(width * height * channels, 7 * channels);
         const made = await decodePng(encodePng(width, height, channels, data, (row) => (filter === "mixed" ? row % 5 : filter)));
@@ -45,7 +45,7 @@ describe("PNG", () => {
   });
 });
 
-describe("a PNG that is none of ours is refused", () => {
+describe("an unsupported PNG is refused", () => {
   const good = encodePng(8, 8, 4, noise(256, 1));
   const changed = (at: number, value: number): Uint8Array<ArrayBuffer> => {
     const copy = good.slice();
@@ -60,17 +60,17 @@ describe("a PNG that is none of ours is refused", () => {
     return new Uint8Array(Buffer.concat([good.subarray(0, 33), head, body, Buffer.alloc(4)]));
   };
   test.each([
-    ["empty", new Uint8Array(0), /no PNG/],
-    ["a JPEG", Uint8Array.of(0xff, 0xd8, 0xff), /no PNG/],
-    ["cut off", good.slice(0, 60), /ends within/],
-    ["no pixels", good.slice(0, 33), /without IHDR or IDAT/],
+    ["empty", new Uint8Array(0), /not a PNG/],
+    ["a JPEG", Uint8Array.of(0xff, 0xd8, 0xff), /not a PNG/],
+    ["cut off", good.slice(0, 60), /is truncated/],
+    ["no pixels", good.slice(0, 33), /no IHDR or no IDAT/],
     ["16 bits", changed(24, 16), /16 bits/],
     ["palette", changed(25, 3), /colour type 3/],
     ["interlaced", changed(28, 1), /interlace 1/],
-    ["huge", changed(16, 0x7f), /tiles have 1 to 4096/],
+    ["huge", changed(16, 0x7f), /expected 1 to 4096/],
     ["no width", changed(19, 0), /PNG of 0 × 8/],
-    ["too few pixels", withPixels(new Uint8Array(100)), /do not have the 264 bytes/],
-    ["too many pixels", withPixels(new Uint8Array(265)), /do not have the 264 bytes/],
+    ["too few pixels", withPixels(new Uint8Array(100)), /does not have the 264 bytes/],
+    ["too many pixels", withPixels(new Uint8Array(265)), /does not have the 264 bytes/],
     ["unknown filter", withPixels(new Uint8Array(264).fill(9)), /filter 9/],
     ["broken stream", changed(45, 0xff), /zlib|264 bytes|filter/],
   ])("%s", async (_, bytes, message) => {
@@ -83,25 +83,25 @@ describe("a PNG that is none of ours is refused", () => {
 describe("data", () => {
   const file = JSON.parse(readFileSync(resolve(import.meta.dirname, "../../../spec/vectors/data.json"), "utf8")) as { uint32: { value: number; rgba: number[] }[]; normal: { rgb: number[] }[] };
 
-  test.each(["id", "depth"])("%s values are those of the vectors", async (kind) => {
+  test.each(["id", "depth"])("%s values match the vectors", async (kind) => {
     const bytes = Uint8Array.from(file.uint32.flatMap(({ rgba }) => rgba));
     const tile = await decodeTile(kind, "image/png", encodePng(file.uint32.length, 1, 4, bytes).buffer);
     expect(tile.kind === "id" || tile.kind === "depth" ? [...tile.values] : []).toEqual(file.uint32.map(({ value }) => value));
   });
 
-  test("normals stay the bytes of the vectors", async () => {
+  test("normals keep the bytes of the vectors", async () => {
     const bytes = Uint8Array.from(file.normal.flatMap(({ rgb }) => rgb));
     const tile = await decodeTile("normal", "image/png", encodePng(file.normal.length, 1, 3, bytes).buffer);
     expect(tile.kind === "normal" ? [...tile.values] : []).toEqual([...bytes]);
   });
 
-  test.each([1, 2] as const)("a tile of %i bytes a pixel is none of the kinds that have 3 or 4", async (channels) => {
+  test.each([1, 2] as const)("a tile of %i bytes per pixel is refused for kinds that have 3 or 4", async (channels) => {
     for (const kind of ["normal", "id", "depth"]) {
       await expect(decodeTile(kind, "image/png", encodePng(1, 1, channels, new Uint8Array(channels)).buffer)).rejects.toThrow(DecodeError);
     }
   });
 
   test("an id tile without alpha is refused", async () => {
-    await expect(decodeTile("id", "image/png", encodePng(1, 1, 3, new Uint8Array(3)).buffer)).rejects.toThrow(/an? id tile has 4 bytes a pixel, got 3/);
+    await expect(decodeTile("id", "image/png", encodePng(1, 1, 3, new Uint8Array(3)).buffer)).rejects.toThrow(/id tiles have 4 bytes per pixel, got 3/);
   });
 });

@@ -13,7 +13,7 @@ const vectors = <T>(name: string): T => JSON.parse(readFileSync(resolve(import.m
 interface ViewRow { look_at_deg: number; pitch_deg: number; id: string; right: Vec3; up: Vec3; forward: Vec3; points: { local: Vec3; uvd: Vec3 }[] }
 
 describe("views", () => {
-  test.each(vectors<ViewRow[]>("views"))("view $id has the axes, and points the coordinates, of the vectors", (row) => {
+  test.each(vectors<ViewRow[]>("views"))("the axes of view $id and its coordinates of points match the vectors", (row) => {
     const axes = computeAxes(row.look_at_deg, row.pitch_deg);
     expect(viewId(row.look_at_deg, row.pitch_deg)).toBe(row.id);
     for (const name of ["right", "up", "forward"] as const) row[name].forEach((part, k) => { expect(axes[name][k as 0]).toBeCloseTo(part, 15); });
@@ -23,7 +23,7 @@ describe("views", () => {
     }
   });
 
-  test("the point at a height has that height", () => {
+  test("the point at a given height has that height", () => {
     const axes = computeAxes(37.5, 22.5);
     const d = depthAtHeight(axes, 12.5, 42) ?? NaN;
     expect(localFromUvd(axes, [3, 12.5, d])[2]).toBeCloseTo(42, 9);
@@ -51,19 +51,19 @@ describe("tiles", () => {
     for (const child of childrenOf({ z: 5, x: 17, y: 30 })) expect(ancestor(child, 1)).toEqual({ z: 5, x: 17, y: 30 });
   });
 
-  test("outside the square there is no pixel", () => {
+  test("no pixel is outside the square", () => {
     expect(pixelAt(frame, 2, frame.u0 - 0.01, frame.v0 - 1)).toBeNull();
     expect(pixelAt(frame, 2, frame.u0 + frame.size, frame.v0 - 1)).toBeNull();
     expect(pixelAt(frame, 2, NaN, 0)).toBeNull();
   });
 
-  test("Morton numbers are exact at level 26", () => {
+  test("Morton codes are exact at level 26", () => {
     expect(morton(2 ** 26 - 1, 2 ** 26 - 1)).toBe(4 ** 26 - 1);
   });
 });
 
 describe("blocks", () => {
-  test.each(vectors<{ zmax: number; blocks: [number, number, string][] }[]>("blocks"))("zmax $zmax: each level lies in the block of the vectors", ({ zmax, blocks }) => {
+  test.each(vectors<{ zmax: number; blocks: [number, number, string][] }[]>("blocks"))("zmax $zmax: each level is in the block of the vectors", ({ zmax, blocks }) => {
     for (const [root, levels] of blocks) for (let z = root; z < root + levels; z++) expect(blockLevel(z, zmax)).toBe(root);
   });
 
@@ -75,7 +75,7 @@ describe("blocks", () => {
 
 describe("frames", () => {
   interface Row { box: Box3; tile_px: number; res_m: number; views_deg: [number, number][]; pinned: { zmax: number; size_m: number; views: FrameJson[] } }
-  test.each(vectors<Row[]>("frames"))("the fixture pins $box as the vectors do", (row) => {
+  test.each(vectors<Row[]>("frames"))("the fixture pins $box like the vectors", (row) => {
     const { size, zmax, numbers } = pin(row.box, row.tile_px, row.res_m, row.views_deg);
     expect([size, zmax]).toEqual([row.pinned.size_m, row.pinned.zmax]);
     numbers.forEach((view, k) => {
@@ -97,7 +97,7 @@ describe("occupancy", () => {
     expect(encodeOccupancy(zmax, ({ z, x, y }) => has(z, x, y))).toBe(base64);
   });
 
-  test("bits that end too early are refused", () => {
+  test("truncated bits are refused", () => {
     expect(() => new Occupancy("/w==", 6)).toThrow(/occupancy ends after 1 bytes/);
   });
 });

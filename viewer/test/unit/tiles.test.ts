@@ -3,11 +3,11 @@ import { PMTiles, zxyToTileId, type Source as PmSource } from "pmtiles";
 import { gzipSync } from "node:zlib";
 import { makeFrame, type Tile } from "../../src/geo/frame";
 import { Cache } from "../../src/tiles/cache";
-import { coverOf, fromTheMiddle, levelFor, standsFor, type Rect } from "../../src/tiles/cover";
+import { findCover, sortFromCenter, computeLevel, findFallbacks, type Rect } from "../../src/tiles/cover";
 import { fetchBytes } from "../../src/tiles/fetch";
 import { Archive, tileId } from "../../src/tiles/pmtiles";
-import { Queue, type Job } from "../../src/tiles/queue";
-import { baseUrl, hostOf, tileUrl, tileUrls } from "../../src/tiles/url";
+import { RequestQueue, type TileRequest } from "../../src/tiles/queue";
+import { normalizeBaseUrl, chooseHost, tileUrl, tileUrls } from "../../src/tiles/url";
 
 const frame = makeFrame({ id: "0-45", look_at_deg: 0, pitch_deg: 45, u0_m: -512, v0_m: 512, d0_m: 0 }, 1024, 256, 4);
 const area = ({ z }: Tile): number => (frame.size / 2 ** z) ** 2;
@@ -16,7 +16,7 @@ describe("cover", () => {
   const rect: Rect = [[-100.5, -333], [260.25, 120]];
 
   test.each([0, 1, 2, 3, 4])("tiles of level %i partition the viewport", (level) => {
-    const tiles = coverOf(frame, () => true, level, rect);
+    const tiles = findCover(frame, () => true, level, rect);
     const tile_m = frame.size / 2 ** level;
     for (let k = 0; k < 400; k++) {
       const [u, v] = [rect[0][0] + ((k * 0.618) % 1) * (rect[1][0] - rect[0][0]), rect[0][1] + ((k * 0.414) % 1) * (rect[1][1] - rect[0][1])];
@@ -29,68 +29,68 @@ describe("cover", () => {
     }
   });
 
-  test("none lies outside the occupancy, or the square", () => {
+  test("no tile is outside the occupancy or the square", () => {
     const occupied = ({ x, y }: Tile): boolean => (x + y) % 2 === 0;
-    const tiles = coverOf(frame, occupied, 3, [[-5000, -5000], [5000, 5000]]);
+    const tiles = findCover(frame, occupied, 3, [[-5000, -5000], [5000, 5000]]);
     expect(tiles).toHaveLength(32);
     expect(tiles.every(occupied)).toBe(true);
   });
 
-  test("a viewport beside the square has no tiles", () => {
-    expect(coverOf(frame, () => true, 4, [[600, 600], [700, 700]])).toEqual([]);
+  test("a viewport outside the square has no tiles", () => {
+    expect(findCover(frame, () => true, 4, [[600, 600], [700, 700]])).toEqual([]);
   });
 
-  test("the middle comes first", () => {
-    const ordered = fromTheMiddle(frame, coverOf(frame, () => true, 2, [[-512, -512], [512, 512]]), [[256, 256], [512, 512]]);
+  test("tiles at the centre come first", () => {
+    const ordered = sortFromCenter(frame, findCover(frame, () => true, 2, [[-512, -512], [512, 512]]), [[256, 256], [512, 512]]);
     expect(ordered[0]).toEqual({ z: 2, x: 3, y: 0 });
   });
 });
 
 describe("level", () => {
   test.each([[1, 1, 2], [0.5, 1, 3], [0.7, 1, 3], [0.72, 1, 2], [0.01, 1, 4], [1000, 1, 0]])("a device pixel of %d m at ratio %d shows level %d", (px, dpr, level) => {
-    expect(levelFor(frame, px, dpr)).toBe(level);
+    expect(computeLevel(frame, px, dpr)).toBe(level);
   });
 
   test("on dense screens a tile pixel covers one to two device pixels", () => {
     for (let zoom = 0.05; zoom < 4; zoom += 0.05) {
       const device = 4 / 2 ** zoom;
-      const scale = 4 / 2 ** levelFor(frame, device, 3) / device;
+      const scale = 4 / 2 ** computeLevel(frame, device, 3) / device;
       expect(scale).toBeGreaterThan(0.999);
       expect(scale).toBeLessThan(2.001);
     }
   });
 });
 
-describe("stand-ins", () => {
+describe("fallbacks", () => {
   const all = (): boolean => true;
   const only = (...names: string[]) => ({ z, x, y }: Tile): boolean => names.includes(`${String(z)}/${String(x)}/${String(y)}`);
   const tile = { z: 3, x: 5, y: 2 };
 
-  test("a tile that is ready stands for itself", () => {
-    expect(standsFor(tile, all, all)).toEqual([{ area: tile, from: tile }]);
+  test("a ready tile is drawn itself", () => {
+    expect(findFallbacks(tile, all, all)).toEqual([{ area: tile, from: tile }]);
   });
 
-  test("else the nearest ancestor does", () => {
-    expect(standsFor(tile, only("1/1/0", "0/0/0"), all)).toEqual([{ area: tile, from: { z: 1, x: 1, y: 0 } }]);
+  test("otherwise the nearest ancestor is drawn", () => {
+    expect(findFallbacks(tile, only("1/1/0", "0/0/0"), all)).toEqual([{ area: tile, from: { z: 1, x: 1, y: 0 } }]);
   });
 
-  test("children that are ready come before ancestors; together all fill the tile once", () => {
-    const stands = standsFor(tile, only("4/10/4", "5/23/11", "1/1/0"), all);
+  test("ready children precede ancestors; together they fill the tile exactly once", () => {
+    const stands = findFallbacks(tile, only("4/10/4", "5/23/11", "1/1/0"), all);
     expect(stands.reduce((sum, stand) => sum + area(stand.area), 0)).toBeCloseTo(area(tile), 6);
     expect(stands.map(({ from }) => from.z).sort()).toEqual([1, 1, 1, 1, 1, 4, 5].sort());
   });
 
-  test("nothing is ready: nothing is drawn", () => {
-    expect(standsFor(tile, () => false, all)).toEqual([]);
+  test("without ready tiles nothing is drawn", () => {
+    expect(findFallbacks(tile, () => false, all)).toEqual([]);
   });
 });
 
 describe("cache", () => {
-  test("it never holds more bytes than its limit once a tick has passed", () => {
+  test("never exceeds its limit after a tick", () => {
     const dropped: string[] = [];
     const cache = new Cache<number>(100, (key) => dropped.push(key));
     for (let k = 0; k < 50; k++) {
-      cache.tick();
+      cache.startTick();
       cache.set(String(k), k, 7 + (k % 5));
       expect(cache.bytes).toBeLessThanOrEqual(100);
     }
@@ -98,38 +98,38 @@ describe("cache", () => {
     expect(dropped[0]).toBe("0");
   });
 
-  test("what was used last stays; what is in use now is never dropped", () => {
+  test("keeps the most recently used values and never drops those in use", () => {
     const cache = new Cache<number>(30, () => undefined);
     cache.set("a", 1, 10);
     cache.set("b", 2, 10);
     cache.set("c", 3, 10);
-    cache.tick();
+    cache.startTick();
     cache.get("a");
     cache.set("d", 4, 10);
     expect([cache.peek("a"), cache.peek("b"), cache.peek("d")]).toEqual([1, undefined, 4]);
     cache.set("e", 5, 100);
     expect(cache.peek("a")).toBe(1);
     expect(cache.bytes).toBe(120);
-    cache.tick();
-    cache.tick();
+    cache.startTick();
+    cache.startTick();
     expect(cache.bytes).toBeLessThanOrEqual(30);
   });
 
-  test("what is in use tick after tick stays, though it is more than the limit", () => {
+  test("keeps values in use tick after tick, even beyond the limit", () => {
     const dropped: string[] = [];
     const cache = new Cache<number>(30, (key) => dropped.push(key));
     for (const key of ["a", "b", "c", "d", "e"]) cache.set(key, 1, 20);
     for (let k = 0; k < 3; k++) {
-      cache.tick();
+      cache.startTick();
       for (const key of ["e", "d", "c", "b", "a"]) expect(cache.get(key)).toBe(1);
     }
-    cache.tick();
+    cache.startTick();
     cache.get("c");
-    cache.tick();
+    cache.startTick();
     expect([dropped.length, cache.peek("c")]).toEqual([4, 1]);
   });
 
-  test("a value set anew replaces the old one and its bytes", () => {
+  test("replaces a value and its bytes when it is set again", () => {
     const cache = new Cache<number>(100, () => undefined);
     cache.set("a", 1, 60);
     cache.set("a", 2, 20);
@@ -141,19 +141,19 @@ describe("cache", () => {
 });
 
 describe("URLs", () => {
-  test("a tile's URL is the specification's", () => {
+  test("a tile's URL matches the specification", () => {
     expect(tileUrl("https://a.example/tiles/teatime", "45-22.5", "color", { z: 3, x: 1, y: 6 }, 4)).toBe("https://a.example/tiles/teatime/45-22.5/color/3/1/6?v=4");
   });
 
   test.each([["http://t1/tiles/teatime/", "http://t1/tiles/teatime"], [".", "http://p/a"], ["", "http://p/a"], ["../b", "http://p/b"], ["/c/?x=1#y", "http://p/c"]])("base %s", (url, want) => {
-    expect(baseUrl(url, "http://p/a/index.html")).toBe(want);
+    expect(normalizeBaseUrl(url, "http://p/a/index.html")).toBe(want);
   });
 
-  test("a tile always has the same host, neighbours others, and all hosts are used", () => {
-    const hosts = [0, 1, 2, 3].map((x) => hostOf({ z: 5, x, y: 9 }, 4));
+  test("a tile always has the same host, its neighbours have others, and all hosts are used", () => {
+    const hosts = [0, 1, 2, 3].map((x) => chooseHost({ z: 5, x, y: 9 }, 4));
     expect(new Set(hosts).size).toBe(4);
-    expect(hostOf({ z: 5, x: 2, y: 9 }, 4)).toBe(hosts[2]);
-    expect(hostOf({ z: 5, x: 2, y: 10 }, 4)).not.toBe(hosts[2]);
+    expect(chooseHost({ z: 5, x: 2, y: 9 }, 4)).toBe(hosts[2]);
+    expect(chooseHost({ z: 5, x: 2, y: 10 }, 4)).not.toBe(hosts[2]);
     expect(new Set(tileUrls(["http://a", "http://b"], "0-45", "id", { z: 0, x: 0, y: 0 }, 1)).size).toBe(2);
   });
 });
@@ -170,26 +170,26 @@ describe("fetch", () => {
     return asked;
   };
 
-  test("what passes is tried again, at the next host", async () => {
+  test("transient failures are retried at the next host", async () => {
     const asked = answers(503, new TypeError("reset"), 200);
     expect((await fetchBytes(["a", "b"], { backoff_ms: 1 }))?.byteLength).toBe(2);
     expect(asked).toEqual(["a", "b", "a"]);
   });
 
-  test("404 is final, 204 is nothing", async () => {
+  test("404 is final, 204 means empty", async () => {
     const asked = answers(404, 204);
     await expect(fetchBytes(["a"], { backoff_ms: 1 })).rejects.toMatchObject({ status: 404 });
     expect(await fetchBytes(["a"])).toBeNull();
     expect(asked).toHaveLength(2);
   });
 
-  test("tries end", async () => {
+  test("the number of attempts is limited", async () => {
     const asked = answers(500, 500, 500, 500);
     await expect(fetchBytes(["a"], { backoff_ms: 1, attempts: 3 })).rejects.toThrow("HTTP 500");
     expect(asked).toHaveLength(3);
   });
 
-  test("an abort ends the waiting", async () => {
+  test("an abort ends the wait", async () => {
     answers(503);
     const abort = new AbortController();
     const fetching = fetchBytes(["a"], { backoff_ms: 60_000, signal: abort.signal });
@@ -197,16 +197,16 @@ describe("fetch", () => {
     await expect(fetching).rejects.toMatchObject({ name: "AbortError" });
   });
 
-  test("a server that ignores ranges is named", async () => {
+  test("a server that ignores range requests is reported", async () => {
     answers(200);
     await expect(fetchBytes(["a"], { range: [0, 5] })).rejects.toThrow(/ignores range/);
   });
 });
 
 describe("queue", () => {
-  const world = (): { started: string[]; aborted: string[]; end: Map<string, () => void>; job: (key: string) => Job } => {
+  const world = (): { started: string[]; aborted: string[]; end: Map<string, () => void>; job: (key: string) => TileRequest } => {
     const [started, aborted, end] = [[] as string[], [] as string[], new Map<string, () => void>()];
-    const job = (key: string): Job => ({
+    const job = (key: string): TileRequest => ({
       key,
       run: (signal) => {
         started.push(key);
@@ -218,30 +218,30 @@ describe("queue", () => {
   };
   const turn = (): Promise<void> => new Promise((done) => setTimeout(done, 0));
 
-  test("at most the limit runs at once, in order, each once", async () => {
+  test("runs requests in order, each once, and not more than the limit at once", async () => {
     const { started, end, job } = world();
-    const queue = new Queue(2);
-    queue.want(["a", "b", "a", "c"].map(job));
+    const queue = new RequestQueue(2);
+    queue.setRequests(["a", "b", "a", "c"].map(job));
     expect(started).toEqual(["a", "b"]);
     end.get("a")?.();
     await turn();
     expect(started).toEqual(["a", "b", "c"]);
   });
 
-  test("what is wanted no longer is aborted, unless somebody waits for it", () => {
+  test("aborts requests that are no longer wanted, unless a caller waits for them", () => {
     const { started, aborted, job } = world();
-    const queue = new Queue(4);
-    queue.want([job("a"), job("b")]);
-    void queue.need(job("b"));
-    queue.want([job("c")]);
+    const queue = new RequestQueue(4);
+    queue.setRequests([job("a"), job("b")]);
+    void queue.runNow(job("b"));
+    queue.setRequests([job("c")]);
     expect([started, aborted]).toEqual([["a", "b", "c"], ["a"]]);
   });
 
-  test("it is busy until all has ended", async () => {
+  test("is busy until all requests have ended", async () => {
     const { end, job } = world();
-    const queue = new Queue(1);
+    const queue = new RequestQueue(1);
     expect(queue.busy).toBe(false);
-    queue.want([job("a")]);
+    queue.setRequests([job("a")]);
     expect(queue.busy).toBe(true);
     end.get("a")?.();
     await turn();
@@ -250,7 +250,7 @@ describe("queue", () => {
 });
 
 describe("PMTiles", () => {
-  test("tile numbers are those of the reference reader, up to level 26", () => {
+  test("tile ids match the reference reader up to level 26", () => {
     for (let z = 0; z <= 26; z++) {
       for (const [a, b] of [[0, 0], [0.3, 0.9], [0.77, 0.11], [0.999999, 0.999999]] as const) {
         const [x, y] = [Math.floor(a * 2 ** z), Math.floor(b * 2 ** z)];
@@ -275,7 +275,7 @@ describe("PMTiles", () => {
     return new Uint8Array(Buffer.concat([header, root, leaf, tiles]));
   }
 
-  test("every tile is what the reference reader finds", async () => {
+  test("every tile matches the reference reader", async () => {
     const bytes = archive();
     const part = (offset: number, length: number): Promise<ArrayBuffer> => Promise.resolve(bytes.slice(offset, offset + length).buffer);
     const mine = new Archive("x.pmtiles", part);
@@ -292,7 +292,7 @@ describe("PMTiles", () => {
     expect(await mine.tile({ z: 3, x: 0, y: 0 })).toBeNull();
   });
 
-  test("a file that is no archive is refused", async () => {
-    await expect(new Archive("x.pmtiles", () => Promise.resolve(new ArrayBuffer(200))).tile({ z: 0, x: 0, y: 0 })).rejects.toThrow(/no PMTiles/);
+  test("a file that is not an archive is refused", async () => {
+    await expect(new Archive("x.pmtiles", () => Promise.resolve(new ArrayBuffer(200))).tile({ z: 0, x: 0, y: 0 })).rejects.toThrow(/not a PMTiles/);
   });
 });

@@ -1,71 +1,71 @@
 import { describe, expect, test } from "vitest";
-import { cornerOf, leadOf, meet, rangeOf, type Clip, type Depths } from "../../src/draw/combine";
-import { eachHidden, maskOf } from "../../src/draw/canvas/mask";
+import { computeCorner, computeBias, overlaps, joinDepthRanges, type Clip, type DepthMapping } from "../../src/draw/depthMapping";
+import { forEachHidden, makeMask } from "../../src/draw/canvas/mask";
 import { makeFrame, pixelM, uvOfPixel } from "../../src/geo/frame";
 import type { ManifestJson, Rendering } from "../../src/geo/manifest";
-import { discord } from "../../src/map/agreement";
-import { combinedOf, groupsOf } from "../../src/map/combined";
+import { findIncompatibility } from "../../src/map/compatibility";
+import { findCombinedLayers, groupByDepth } from "../../src/map/depthGroups";
 import type { imageLayer } from "../../src/map/imageLayer";
 import { NO_DEPTH } from "../../src/tiles/tileData";
 
 const VIEW = { id: "0-45", look_at_deg: 0, pitch_deg: 45, u0_m: -50, v0_m: 40, d0_m: -1000 };
-const own: Depths = { frame: makeFrame(VIEW, 100, 16, 2), shift: [0, 0, 0], unit_m: 1 / 1024, lead_m: 0, range: [-900, -800] };
-const other: Depths = { frame: makeFrame({ ...VIEW, u0_m: -70, v0_m: 61, d0_m: -1200 }, 170, 16, 3), shift: [7.25, -3.5, 11], unit_m: 1 / 512, lead_m: 0.5, range: [-950, -700] };
+const own: DepthMapping = { frame: makeFrame(VIEW, 100, 16, 2), shift: [0, 0, 0], unit_m: 1 / 1024, bias_m: 0, range: [-900, -800] };
+const other: DepthMapping = { frame: makeFrame({ ...VIEW, u0_m: -70, v0_m: 61, d0_m: -1200 }, 170, 16, 3), shift: [7.25, -3.5, 11], unit_m: 1 / 512, bias_m: 0.5, range: [-950, -700] };
 
 describe("a mask", () => {
-  test("asks for the pixel that lies at the middle of this one, at any level and origin", () => {
+  test("reads the pixel at the centre of each pixel, at any level and origin", () => {
     const [tile, above] = [{ z: 1, x: 0, y: 1 }, { z: 3, x: 2, y: 3 }];
-    const mask = maskOf(own, tile, other, above, { depth: "d", color: null });
-    if (!mask) throw new Error("they meet");
-    const [u0, v0, px] = cornerOf(other, above);
+    const mask = makeMask(own, tile, other, above, { depth: "d", color: null });
+    if (!mask) throw new Error("the tiles overlap");
+    const [u0, v0, px] = computeCorner(other, above);
     for (const [i, j] of [[0, 0], [3, 5], [9, 1], [15, 15]] as const) {
       const [u, v] = uvOfPixel(own.frame, tile, i, j);
       expect(Math.floor(mask.x + i * mask.step)).toBe(Math.floor((u - u0) / px));
       expect(Math.floor(mask.y + j * mask.step)).toBe(Math.floor((v0 - v) / px));
     }
-    // A D of −900 m in both: what is here counts as behind by the other's lead.
+    // D is −900 m in both: the bias puts this layer behind the other.
     const [here, there] = [(-900 + 1000) * 1024, (-900 - 11 + 1200) * 512];
     expect((here * mask.unit + mask.first - there) / 512).toBeCloseTo(0.5, 9);
   });
 
-  test("there is none for tiles that do not meet", () => {
-    expect(maskOf(own, { z: 2, x: 0, y: 0 }, other, { z: 3, x: 7, y: 7 }, { depth: "d", color: null })).toBeNull();
+  test("does not exist for tiles that do not overlap", () => {
+    expect(makeMask(own, { z: 2, x: 0, y: 0 }, other, { z: 3, x: 7, y: 7 }, { depth: "d", color: null })).toBeNull();
   });
 
-  test("hides what lies behind covered pixels only; edges without a depth take that of the nearest beside", () => {
+  test("hides only what is behind covered pixels; edges without a depth take the nearest one around them", () => {
     const depth = Uint32Array.of(10, 30, NO_DEPTH, 50);
     const color = Uint8ClampedArray.from([0, 0, 0, 255, 0, 0, 0, 255, 0, 0, 0, 255, 0, 0, 0, 100]);
     const mask = { depth: "d", color: "c", x: 0.5, y: 0.5, step: 1, unit: 1, first: 0 };
     const hidden: number[] = [];
-    eachHidden(4, 1, depth, [{ mask, width: 4, height: 1, depth: Uint32Array.of(20, 20, 20, 20), color }], (at) => hidden.push(at));
+    forEachHidden(4, 1, depth, [{ mask, width: 4, height: 1, depth: Uint32Array.of(20, 20, 20, 20), color }], (at) => hidden.push(at));
     expect(hidden).toEqual([1, 2]);
   });
 });
 
-test("of equally near layers the later leads, by a pixel each", () => {
-  expect(leadOf(own.frame, 1, 0)).toBe(0);
-  expect(leadOf(own.frame, 1, 2)).toBeCloseTo(2 * pixelM(own.frame, 1), 12);
-  const [near, far] = rangeOf([own, other]) ?? [0, 0];
+test("the later of two equally near layers is visible, by a bias of one pixel each", () => {
+  expect(computeBias(own.frame, 1, 0)).toBe(0);
+  expect(computeBias(own.frame, 1, 2)).toBeCloseTo(2 * pixelM(own.frame, 1), 12);
+  const [near, far] = joinDepthRanges([own, other]) ?? [0, 0];
   expect(near).toBeLessThan(-950.5);
   expect(far).toBeGreaterThan(-700);
-  expect(rangeOf([])).toBeNull();
+  expect(joinDepthRanges([])).toBeNull();
 });
 
-test("clips meet where they have a point in common", () => {
-  expect(meet(null, [0, 0, 0.1, 1])).toBe(true);
-  expect(meet([0, 0, 0.5, 1], [0.5, 0, 1, 1])).toBe(false);
-  expect(meet([0, 0, 0.51, 1], [0.5, 0.9, 1, 1])).toBe(true);
+test("clips overlap if they have a point in common", () => {
+  expect(overlaps(null, [0, 0, 0.1, 1])).toBe(true);
+  expect(overlaps([0, 0, 0.5, 1], [0.5, 0, 1, 1])).toBe(false);
+  expect(overlaps([0, 0, 0.51, 1], [0.5, 0.9, 1, 1])).toBe(true);
 });
 
-test("layers that combine make one group where the first of them is", () => {
-  const layer = (name: string, combines: boolean, clip: Clip | null = null): imageLayer => ({ name, combines, clip }) as unknown as imageLayer;
+test("combined layers form one group at the position of the first", () => {
+  const layer = (name: string, combines: boolean, clip: Clip | null = null): imageLayer => ({ name, isCombinable: combines, clip }) as unknown as imageLayer;
   const [a, b, c, d] = [layer("a", false), layer("b", true), layer("c", false), layer("d", true)];
-  expect(groupsOf([a, b, c, d])).toEqual([[a], [b, d], [c]]);
-  expect(combinedOf([a, b, c])).toEqual([]);
-  expect(groupsOf([a, b, c])).toEqual([[a], [b], [c]]);
+  expect(groupByDepth([a, b, c, d])).toEqual([[a], [b, d], [c]]);
+  expect(findCombinedLayers([a, b, c])).toEqual([]);
+  expect(groupByDepth([a, b, c])).toEqual([[a], [b], [c]]);
   const [left, right] = [layer("left", true, [0, 0, 0.4, 1]), layer("right", true, [0.4, 0, 1, 1])];
-  expect(combinedOf([left, right])).toEqual([]);
-  expect(combinedOf([left, b, right])).toEqual([left, b, right]);
+  expect(findCombinedLayers([left, right])).toEqual([]);
+  expect(findCombinedLayers([left, b, right])).toEqual([left, b, right]);
 });
 
 describe("renderings on one map", () => {
@@ -75,17 +75,17 @@ describe("renderings on one map", () => {
     layers: new Map(),
   });
 
-  test("go together when CRS, heights and a direction are the same, whatever views are called", () => {
-    expect(discord(rendering({}), rendering({ name: "ETRS89 / UTM zone 32N" }))).toBeNull();
-    expect(discord(rendering({}), rendering({}, [[90, 45], [0, 45]]))).toBeNull();
-    expect(discord(rendering({ epsg: null }), rendering({ epsg: null }))).toBeNull();
+  test("are compatible if they share CRS, heights and a view, whatever the views' ids", () => {
+    expect(findIncompatibility(rendering({}), rendering({ name: "ETRS89 / UTM zone 32N" }))).toBeNull();
+    expect(findIncompatibility(rendering({}), rendering({}, [[90, 45], [0, 45]]))).toBeNull();
+    expect(findIncompatibility(rendering({ epsg: null }), rendering({ epsg: null }))).toBeNull();
   });
 
-  test("are refused with the reason", () => {
-    expect(discord(rendering({}), rendering({ epsg: 2056, name: "LV95" }))).toMatch(/CRS "EPSG:2056 LV95".*"EPSG:25832 UTM 32"/);
-    expect(discord(rendering({ epsg: null, name: "a" }), rendering({ epsg: null, name: "b" }))).toMatch(/CRS "b"/);
-    expect(discord(rendering({ epsg: null, wkt: "A" }), rendering({ epsg: null, wkt: "B" }))).toMatch(/CRS/);
-    expect(discord(rendering({ vertical: "DHHN2016" }), rendering({ vertical: "NAP" }))).toMatch(/heights are NAP.*DHHN2016/);
-    expect(discord(rendering({}), rendering({}, [[0, 30]]))).toMatch(/no direction of the map: 0:30 for 0:45/);
+  test("are refused with a reason", () => {
+    expect(findIncompatibility(rendering({}), rendering({ epsg: 2056, name: "LV95" }))).toMatch(/CRS is "EPSG:2056 LV95".*"EPSG:25832 UTM 32"/);
+    expect(findIncompatibility(rendering({ epsg: null, name: "a" }), rendering({ epsg: null, name: "b" }))).toMatch(/CRS is "b"/);
+    expect(findIncompatibility(rendering({ epsg: null, wkt: "A" }), rendering({ epsg: null, wkt: "B" }))).toMatch(/CRS/);
+    expect(findIncompatibility(rendering({ vertical: "DHHN2016" }), rendering({ vertical: "NAP" }))).toMatch(/heights are NAP.*DHHN2016/);
+    expect(findIncompatibility(rendering({}), rendering({}, [[0, 30]]))).toMatch(/none of the map's views: it has 0:30, the map has 0:45/);
   });
 });

@@ -1,44 +1,44 @@
 import type { Tile } from "../../geo/frame";
 import type { LayerKind } from "../../geo/manifest";
-import { standsFor } from "../../tiles/cover";
-import { neededKinds, type Drawer, type DrawerEvents, type FrameSpec, type Pass, type Quad } from "../drawer";
-import { meet } from "../combine";
+import { findFallbacks } from "../../tiles/cover";
+import { listRequiredKinds, type Drawer, type DrawerEvents, type FrameContent, type Pass, type Quad } from "../drawer";
+import { overlaps } from "../depthMapping";
 import type { DrawStyles } from "../drawStyle";
-import { kindsBeside, kindsOf, lookOf, lookWith, type Look } from "./look";
-import { maskOf, type Mask } from "./mask";
-import { Pictures, type Image, type Picture, type Wish } from "./pictures";
-import type { Order } from "./shade.worker";
-import { areaOf, gridOf, type Grid, type Piece } from "./sheet";
-import { Laid, Painted, type Showing, type Shown } from "./showing";
+import { listNeighbourKinds, listKinds, makeShadingOptions, restrictOptions, type ShadingOptions } from "./shadingOptions";
+import { makeMask, type Mask } from "./mask";
+import { TilePictures, type TilePicture, type PictureRequest } from "./tilePictures";
+import type { ShadeRequest, TileImage } from "./shadeMessages";
+import { findArea, makeGrid, type Grid, type MosaicTile } from "./tileMosaic";
+import { CssCompositor, CanvasCompositor, type Compositor, type ComposedPass } from "./compositor";
 
-type Named = Pass["highlight"] | DrawStyles;
+type IdValues = Pass["highlight"] | DrawStyles;
 
-/** A tile that is to be seen. */
-interface Wanted {
+/** A visible tile. */
+interface WantedTile {
   readonly from: Tile;
-  readonly look: Look;
-  readonly layers: Order["layers"];
-  /** From the middle of the screen, device pixels. */
-  readonly far: number;
+  readonly options: ShadingOptions;
+  readonly layers: ShadeRequest["layers"];
+  /** Distance from the screen's centre, device pixels. */
+  readonly distance: number;
 }
 
-/** Draws on a 2D canvas. A worker makes the tiles' pictures; what is not made yet is stood in for by what is. */
+/** Draws on 2D canvases. A worker shades the tiles; until a tile is ready, others take its place. */
 export class CanvasDrawer implements Drawer {
   readonly name = "canvas";
   readonly gl = null;
-  readonly #showing: Showing;
-  readonly #pictures: Pictures;
-  /** Data that the worker has, and the picture it is for. */
-  readonly #given = new Map<string, Picture>();
-  /** Highlights and finishes that the worker has, and their names. */
-  readonly #named = new Map<Named, string>();
+  readonly #compositor: Compositor;
+  readonly #pictures: TilePictures;
+  /** The worker's data, each with the picture that uses it. */
+  readonly #uploaded = new Map<string, TilePicture>();
+  /** The worker's highlights and styles, with their names. */
+  readonly #valueNames = new Map<IdValues, string>();
   #tilePx = 0;
-  #names = 0;
+  #nameCount = 0;
 
-  /** @param preserve the canvas itself is painted, so that its pixels can be read  @throws DrawError when the canvas has another context already, or the browser no 2D canvas */
+  /** @param preserve draws on the canvas itself, so that its pixels can be read  @throws DrawError when the canvas has another context, or the browser has no 2D canvas */
   constructor(canvas: HTMLCanvasElement, preserve: boolean, events: DrawerEvents) {
-    this.#showing = new (preserve ? Painted : Laid)(canvas, () => { events.changed(); });
-    this.#pictures = new Pictures({ made: () => { events.changed(); }, failed: (error) => { events.failed(error); } });
+    this.#compositor = new (preserve ? CanvasCompositor : CssCompositor)(canvas, () => { events.changed(); });
+    this.#pictures = new TilePictures({ made: () => { events.changed(); }, failed: (error) => { events.failed(error); } });
   }
 
   get busy(): boolean {
@@ -46,145 +46,145 @@ export class CanvasDrawer implements Drawer {
   }
 
   get note(): string {
-    return this.#pictures.composed ? "light by compositing: this browser changes pixels that are read" : "";
+    return this.#pictures.usesCompositing ? "lighting by compositing: this browser alters pixels on readback" : "";
   }
 
   get element(): HTMLElement {
-    return this.#showing.element;
+    return this.#compositor.element;
   }
 
-  draw(frame: FrameSpec): void {
-    const wanted = frame.passes.map((pass) => [pass, this.#giveAll(frame, pass)] as const);
-    this.#showing.show(frame, wanted.flatMap(([pass, tiles]) => this.#shownOf(pass, tiles)));
-    const wishes = wanted.flatMap(([pass, tiles]) => [...tiles].map(([name, tile]) => this.#wish(frame.passes, pass, this.#pictures.of(name), tile)));
-    this.#pictures.want(wishes.filter(({ urgency }) => urgency.length > 0));
-    this.#dropNamed(frame.passes);
+  draw(frame: FrameContent): void {
+    const wanted = frame.passes.map((pass) => [pass, this.#uploadPass(frame, pass)] as const);
+    this.#compositor.show(frame, wanted.flatMap(([pass, tiles]) => this.#composePass(pass, tiles)));
+    const requests = wanted.flatMap(([pass, tiles]) => [...tiles].map(([name, tile]) => this.#makeRequest(frame.passes, pass, this.#pictures.getOrCreate(name), tile)));
+    this.#pictures.setRequests(requests.filter(({ urgency }) => urgency.length > 0));
+    this.#dropUnused(frame.passes);
     if (this.busy) return;
-    const [seen, looks] = [new Set(wishes.map(({ picture }) => picture)), new Set(wishes.map(({ look }) => look))];
-    this.#pictures.prune((picture) => !seen.has(picture) && !looks.has(picture.look));
+    const [seen, current] = [new Set(requests.map(({ picture }) => picture)), new Set(requests.map(({ options }) => options))];
+    this.#pictures.prune((picture) => !seen.has(picture) && !current.has(picture.options));
   }
 
   release(key: string): void {
-    const picture = this.#given.get(key);
+    const picture = this.#uploaded.get(key);
     if (!picture) return;
-    this.#given.delete(key);
+    this.#uploaded.delete(key);
     this.#pictures.drop(key);
-    picture.parts.delete(key);
-    if (picture.parts.size === 0) this.#pictures.forget(picture.name);
+    picture.inputs.delete(key);
+    if (picture.inputs.size === 0) this.#pictures.forget(picture.name);
   }
 
   destroy(): void {
     this.#pictures.stop();
-    this.#showing.remove();
-    this.#given.clear();
+    this.#compositor.remove();
+    this.#uploaded.clear();
   }
 
-  /** Gives the worker what it has not. @returns the tiles that are to be seen, by the name of their picture */
-  #giveAll(frame: FrameSpec, pass: Pass): Map<string, Wanted> {
-    const names = { highlight: pass.highlight.size > 0 ? this.#nameOf(pass.highlight) : null, finish: pass.finishes && this.#nameOf(pass.finishes) };
-    const wanted = new Map<string, Wanted>();
+  /** Sends the worker missing data. @returns the visible tiles by picture name */
+  #uploadPass(frame: FrameContent, pass: Pass): Map<string, WantedTile> {
+    const names = { highlight: pass.highlight.size > 0 ? this.#uploadValues(pass.highlight) : null, styles: pass.drawStyles && this.#uploadValues(pass.drawStyles) };
+    const wanted = new Map<string, WantedTile>();
     for (const { from, rect, scale } of pass.quads) {
-      const name = nameIn(pass, from);
-      const far = Math.hypot((rect[0] + rect[2] - frame.width) / 2, (rect[1] + rect[3] - frame.height) / 2);
+      const name = makeName(pass, from);
+      const distance = Math.hypot((rect[0] + rect[2] - frame.width) / 2, (rect[1] + rect[3] - frame.height) / 2);
       const known = wanted.get(name);
-      const look = known?.look ?? lookOf(frame, pass, scale, names);
-      const layers = known?.layers ?? this.#give(pass, look, from);
-      if (layers) wanted.set(name, { from, look, layers, far: Math.min(far, known?.far ?? far) });
+      const options = known?.options ?? makeShadingOptions(frame, pass, scale, names);
+      const layers = known?.layers ?? this.#uploadTile(pass, options, from);
+      if (layers) wanted.set(name, { from, options, layers, distance: Math.min(distance, known?.distance ?? distance) });
     }
     return wanted;
   }
 
-  /** Gives the worker a tile's data. @returns its names; null when there is nothing to show */
-  #give(pass: Pass, look: Look, tile: Tile): Order["layers"] | null {
-    const picture = this.#pictures.of(nameIn(pass, tile));
+  /** Sends the worker a tile's data. @returns the names of its layers; null when a required layer is missing */
+  #uploadTile(pass: Pass, options: ShadingOptions, tile: Tile): ShadeRequest["layers"] | null {
+    const picture = this.#pictures.getOrCreate(makeName(pass, tile));
     const layers: Partial<Record<LayerKind, string>> = {};
-    for (const kind of kindsOf(look)) {
+    for (const kind of listKinds(options)) {
       const key = pass.tiles.key(kind, tile);
-      const data = this.#given.has(key) ? null : pass.tiles.data(kind, tile);
+      const data = this.#uploaded.has(key) ? null : pass.tiles.data(kind, tile);
       if (data) {
         this.#tilePx = data.width;
         this.#pictures.put(key, data, "bitmap" in data ? [data.bitmap] : data.kind === "normal" ? [data.values.buffer] : []);
-        this.#given.set(key, picture);
-        picture.parts.add(key);
-        pass.tiles.taken(kind, tile);
+        this.#uploaded.set(key, picture);
+        picture.inputs.add(key);
+        pass.tiles.onUploaded(kind, tile);
       }
-      if (this.#given.has(key)) layers[kind] = key;
+      if (this.#uploaded.has(key)) layers[kind] = key;
     }
-    return neededKinds(look.mode, look.masked, look.combined).every((kind) => layers[kind] !== undefined) ? layers : null;
+    return listRequiredKinds(options.mode, options.masked, options.combined).every((kind) => layers[kind] !== undefined) ? layers : null;
   }
 
-  #shownOf(pass: Pass, wanted: ReadonlyMap<string, Wanted>): Shown[] {
+  #composePass(pass: Pass, wanted: ReadonlyMap<string, WantedTile>): ComposedPass[] {
     const { mode, opacity, clip, quads } = pass;
-    const grid = gridOf(pass, this.#tilePx);
+    const grid = makeGrid(pass, this.#tilePx);
     if (!grid || this.#tilePx === 0) return [];
-    const pieces = quads.filter(({ from }) => wanted.has(nameIn(pass, from))).flatMap((quad) => this.#piecesFor(pass, grid, quad));
-    return pieces.length > 0 ? [{ grid, pieces, smooth: mode === "lit" || mode === "color" || mode === "picture", opacity, clip }] : [];
+    const mosaic = quads.filter(({ from }) => wanted.has(makeName(pass, from))).flatMap((quad) => this.#findMosaicTiles(pass, grid, quad));
+    return mosaic.length > 0 ? [{ grid, tiles: mosaic, smooth: mode === "lit" || mode === "color" || mode === "picture", opacity, clip }] : [];
   }
 
-  /** What stands for a quad: the picture of its tile, or of tiles below or above it that have one. */
-  #piecesFor(pass: Pass, grid: Grid, { from, rect }: Quad): Piece[] {
-    const area = areaOf(grid, rect);
-    const shown = (tile: Tile): Image | undefined => this.#pictures.get(nameIn(pass, tile))?.image;
-    const own = shown(from);
+  /** Finds the pictures that fill a quad: its own, or those of descendants or of an ancestor. */
+  #findMosaicTiles(pass: Pass, grid: Grid, { from, rect }: Quad): MosaicTile[] {
+    const area = findArea(grid, rect);
+    const imageOf = (tile: Tile): TileImage | undefined => this.#pictures.get(makeName(pass, tile))?.image;
+    const own = imageOf(from);
     if (own) return [{ area, from, image: own }];
-    const stands = standsFor(area, (tile) => shown(tile) !== undefined, () => true, area.z > grid.level ? 0 : 2);
-    return stands.map((stand) => ({ ...stand, image: shown(stand.from) as Image }));
+    const fallbacks = findFallbacks(area, (tile) => imageOf(tile) !== undefined, () => true, area.z > grid.level ? 0 : 2);
+    return fallbacks.map((fallback) => ({ ...fallback, image: imageOf(fallback.from) as TileImage }));
   }
 
-  /** One without urgency is fulfilled. */
-  #wish(passes: readonly Pass[], pass: Pass, picture: Picture, { from, look, layers, far }: Wanted): Wish {
+  /** Makes a request; an up-to-date picture has an empty urgency. */
+  #makeRequest(passes: readonly Pass[], pass: Pass, picture: TilePicture, { from, options, layers, distance }: WantedTile): PictureRequest {
     const { tiles } = pass;
-    const shown = { ...lookWith(look, (kind) => layers[kind] !== undefined), masks: this.#masksOver(passes, pass, from) };
-    const beside: Partial<Record<LayerKind, string[]>> = {};
+    const restricted = { ...restrictOptions(options, (kind) => layers[kind] !== undefined), masks: this.#findMasks(passes, pass, from) };
+    const neighbours: Partial<Record<LayerKind, string[]>> = {};
     let edges = 0;
-    for (const [number, kind] of kindsBeside(shown).entries()) {
-      const keys = BESIDE.map(([dx, dy]) => tiles.key(kind, { z: from.z, x: from.x + dx, y: from.y + dy }));
-      keys.forEach((key, k) => (edges |= this.#given.has(key) ? 1 << (k + 4 * number) : 0));
-      beside[kind] = keys;
+    for (const [number, kind] of listNeighbourKinds(restricted).entries()) {
+      const keys = NEIGHBOURS.map(([dx, dy]) => tiles.key(kind, { z: from.z, x: from.x + dx, y: from.y + dy }));
+      keys.forEach((key, k) => (edges |= this.#uploaded.has(key) ? 1 << (k + 4 * number) : 0));
+      neighbours[kind] = keys;
     }
-    const text = JSON.stringify(shown);
-    return { picture, look: text, edges, order: { look: shown, layers, beside }, urgency: urgencyOf(picture, text, edges, far) };
+    const text = JSON.stringify(restricted);
+    return { picture, options: text, edges, request: { options: restricted, layers, neighbours }, urgency: computeUrgency(picture, text, edges, distance) };
   }
 
-  /** Tiles of other layers that may hide parts of one of this. */
-  #masksOver(passes: readonly Pass[], { depths, clip, tiles }: Pass, from: Tile): Mask[] {
+  /** Finds tiles of other layers that may hide parts of this tile. */
+  #findMasks(passes: readonly Pass[], { depths, clip, tiles }: Pass, from: Tile): Mask[] {
     if (!depths) return [];
-    const others = passes.filter((other) => other.tiles !== tiles && other.depths && other.opacity === 1 && meet(clip, other.clip));
+    const others = passes.filter((other) => other.tiles !== tiles && other.depths && other.opacity === 1 && overlaps(clip, other.clip));
     return others.flatMap((other) => {
       const above = new Map(other.quads.map((quad) => [other.tiles.key("depth", quad.from), quad.from]));
       return [...above].flatMap(([depth, tile]) => {
         const color = other.tiles.key(other.mode === "picture" ? "picture" : "color", tile);
-        const mask = other.depths && this.#given.has(depth) ? maskOf(depths, from, other.depths, tile, { depth, color: other.masked || !this.#given.has(color) ? null : color }) : null;
+        const mask = other.depths && this.#uploaded.has(depth) ? makeMask(depths, from, other.depths, tile, { depth, color: other.masked || !this.#uploaded.has(color) ? null : color }) : null;
         return mask ? [mask] : [];
       });
     });
   }
 
-  #nameOf(said: Named): string {
-    const known = this.#named.get(said);
+  #uploadValues(values: IdValues): string {
+    const known = this.#valueNames.get(values);
     if (known !== undefined) return known;
-    const name = `said ${String(this.#names++)}`;
-    this.#pictures.put(name, said);
-    this.#named.set(said, name);
+    const name = `values${String(this.#nameCount++)}`;
+    this.#pictures.put(name, values);
+    this.#valueNames.set(values, name);
     return name;
   }
 
-  #dropNamed(passes: readonly Pass[]): void {
-    for (const [said, name] of this.#named) {
-      if (passes.some(({ highlight, finishes }) => highlight === said || finishes === said)) continue;
+  #dropUnused(passes: readonly Pass[]): void {
+    for (const [values, name] of this.#valueNames) {
+      if (passes.some(({ highlight, drawStyles }) => highlight === values || drawStyles === values)) continue;
       this.#pictures.drop(name);
-      this.#named.delete(said);
+      this.#valueNames.delete(values);
     }
   }
 }
 
-const BESIDE = [[-1, 0], [1, 0], [0, -1], [0, 1]] as const;
+const NEIGHBOURS = [[-1, 0], [1, 0], [0, -1], [0, 1]] as const;
 
-/** Name of a tile's picture, whatever it shows. */
-const nameIn = ({ tiles, mode }: Pass, tile: Tile): string => tiles.key("color", tile) || tiles.key(mode === "lit" ? "color" : mode, tile);
+/** The name of a tile's picture, whatever its mode. */
+const makeName = ({ tiles, mode }: Pass, tile: Tile): string => tiles.key("color", tile) || tiles.key(mode === "lit" ? "color" : mode, tile);
 
-/** First what has no picture, then what looks otherwise (the longest first), then edges; from the middle of the screen. */
-function urgencyOf(picture: Picture, look: string, edges: number, far: number): number[] {
-  if (picture.look !== look) return picture.image ? [1, picture.ticket, far] : [0, 0, far];
-  return (edges & ~picture.edges) === 0 ? [] : [2, 0, far];
+/** Missing pictures come first, then outdated ones (oldest first), then edges; all from the screen's centre outwards. */
+function computeUrgency(picture: TilePicture, options: string, edges: number, distance: number): number[] {
+  if (picture.options !== options) return picture.image ? [1, picture.ticket, distance] : [0, 0, distance];
+  return (edges & ~picture.edges) === 0 ? [] : [2, 0, distance];
 }

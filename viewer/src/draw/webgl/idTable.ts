@@ -1,40 +1,40 @@
-/** Ids and a word for each in a table with open addressing, as the shader searches it. */
+/** A hash table of ids with one word each, with open addressing as the shader searches it. */
 export interface IdTable {
-  /** Places in pairs: id, word (never 0). */
-  readonly places: Uint32Array;
-  /** Number of places − 1; a power of two − 1. */
+  /** Pairs of id and word (never 0). */
+  readonly slots: Uint32Array;
+  /** Number of slots − 1; a power of two − 1. */
   readonly mask: number;
-  /** The longest search. */
+  /** Length of the longest search. */
   readonly probes: number;
-  /** The single entry, when there is just one. */
-  readonly one: readonly [number, number];
+  /** The entry if existing is just one; else zeros. */
+  readonly single: readonly [number, number];
 }
 
-export function idTable<T>(values: ReadonlyMap<number, T>, wordOf: (value: T) => number): IdTable {
+export function buildIdTable<T>(values: ReadonlyMap<number, T>, pack: (value: T) => number): IdTable {
   const ids = [...values].filter(([id]) => id > 0);
   const size = 2 ** Math.ceil(Math.log2(Math.max(ids.length * 2, 16)));
-  const places = new Uint32Array(size * 2);
+  const slots = new Uint32Array(size * 2);
   let probes = 1;
-  for (const [id, value] of ids) probes = Math.max(probes, insert(places, size - 1, id, wordOf(value)));
+  for (const [id, value] of ids) probes = Math.max(probes, insert(slots, size - 1, id, pack(value)));
   const first = ids.length === 1 ? ids[0] : undefined;
-  return { places, mask: size - 1, probes: probes + 1, one: first ? [first[0], wordOf(first[1])] : [0, 0] };
+  return { slots, mask: size - 1, probes: probes + 1, single: first ? [first[0], pack(first[1])] : [0, 0] };
 }
 
-/** Width and height of the texture that holds a table. */
-export function tableShape({ mask }: IdTable): [number, number] {
+/** Computes width and height of the texture for a table. */
+export function computeTextureSize({ mask }: IdTable): [number, number] {
   const width = Math.min(mask + 1, 1024);
   return [width, (mask + 1) / width];
 }
 
-function insert(places: Uint32Array, mask: number, id: number, word: number): number {
-  let place = (Math.imul(id, 0x9e3779b9) >>> 7) & mask;
+function insert(slots: Uint32Array, mask: number, id: number, word: number): number {
+  let slot = (Math.imul(id, 0x9e3779b9) >>> 7) & mask;
   for (let probe = 1; ; probe++) {
-    const there = places[2 * place];
-    if (there === 0 || there === id) {
-      places[2 * place] = id;
-      places[2 * place + 1] = word;
+    const existing = slots[2 * slot];
+    if (existing === 0 || existing === id) {
+      slots[2 * slot] = id;
+      slots[2 * slot + 1] = word;
       return probe;
     }
-    place = (place + 1) & mask;
+    slot = (slot + 1) & mask;
   }
 }

@@ -1,19 +1,19 @@
 import { linkProgram } from "../../core/gl";
 import { RECT_VERTEX } from "../../core/shaders";
-import { fragment, variantName, type Variant } from "./shader";
+import { makeFragmentShader, variantName, type ShaderVariant } from "./shader";
 
-/** A linked program and where its uniforms are; those it does not use are null, which WebGL ignores. */
+/** A linked program and the locations of its uniforms; null, which WebGL ignores, for unused ones. */
 export interface Program {
   readonly handle: WebGLProgram;
   at(uniform: string): WebGLUniformLocation | null;
 }
 
-const UNITS = ["u_color", "u_normal", "u_id", "u_depth", "u_table", "u_ao", "u_shadow", "u_finishes", "u_shares"] as const;
+const UNITS = ["u_color", "u_normal", "u_id", "u_depth", "u_table", "u_ao", "u_shadow", "u_styles", "u_estimate"] as const;
 
-/** Texture unit of a sampler. */
-export const unitOf = (sampler: (typeof UNITS)[number]): number => UNITS.indexOf(sampler);
+/** Returns the texture unit of a sampler. */
+export const textureUnit = (sampler: (typeof UNITS)[number]): number => UNITS.indexOf(sampler);
 
-/** Programs by variant, compiled when first asked for. */
+/** Programs by variant, compiled when first used. */
 export class Programs {
   readonly #gl: WebGL2RenderingContext;
   readonly #known = new Map<string, Program>();
@@ -22,8 +22,8 @@ export class Programs {
     this.#gl = gl;
   }
 
-  /** The program of a variant, in use from now on. @throws DrawError with the compiler's log */
-  use(variant: Variant): Program {
+  /** Makes a variant's program current. @throws DrawError with the compiler's log */
+  use(variant: ShaderVariant): Program {
     const name = variantName(variant);
     const program = this.#known.get(name) ?? this.#link(variant, name);
     this.#known.set(name, program);
@@ -31,22 +31,22 @@ export class Programs {
     return program;
   }
 
-  #link(variant: Variant, name: string): Program {
-    return this.#withUniforms(linkProgram(this.#gl, name, RECT_VERTEX, fragment(variant)));
+  #link(variant: ShaderVariant, name: string): Program {
+    return this.#withUniforms(linkProgram(this.#gl, name, RECT_VERTEX, makeFragmentShader(variant)));
   }
 
   #withUniforms(handle: WebGLProgram): Program {
     const gl = this.#gl;
-    const places = new Map<string, WebGLUniformLocation | null>();
+    const locations = new Map<string, WebGLUniformLocation | null>();
     const at = (uniform: string): WebGLUniformLocation | null => {
-      const known = places.get(uniform);
+      const known = locations.get(uniform);
       if (known !== undefined) return known;
-      const place = gl.getUniformLocation(handle, uniform);
-      places.set(uniform, place);
-      return place;
+      const location = gl.getUniformLocation(handle, uniform);
+      locations.set(uniform, location);
+      return location;
     };
     gl.useProgram(handle);
-    for (const sampler of UNITS) gl.uniform1i(at(sampler), unitOf(sampler));
+    for (const sampler of UNITS) gl.uniform1i(at(sampler), textureUnit(sampler));
     return { handle, at };
   }
 }

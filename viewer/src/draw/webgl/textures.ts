@@ -1,6 +1,6 @@
 import type { TileData } from "../../tiles/tileData";
 
-/** Texels around a tile that hold its neighbours' pixels: one for filtering, one for the light that is spread at edges. */
+/** Texels around a tile that hold its neighbours' pixels: one for filtering, one for light spread at edges. */
 export const GUTTER = 2;
 
 /** A tile on the GPU, with its gutter. */
@@ -8,15 +8,15 @@ export interface TileTexture {
   readonly texture: WebGLTexture;
   readonly width: number;
   readonly height: number;
-  /** How well each part of the gutter is filled, at (dx + 1) + 3 (dy + 1): 0 not at all, 3 from the tile that lies there. */
+  /** How each part of the gutter was filled, at (dx + 1) + 3 (dy + 1): 0 not at all, 3 from the tile there. */
   readonly filled: number[];
 }
 
-/** Name of the same layer's tile dx columns to the right and dy rows down. */
+/** Returns the key of the same layer's tile dx columns to the right and dy rows down. */
 export type Neighbour = (dx: number, dy: number) => string;
 
-/** Tile textures by the name of their data. */
-export class Textures {
+/** Tile textures by key. */
+export class TileTextures {
   readonly #gl: WebGL2RenderingContext;
   readonly #known = new Map<string, TileTexture>();
   readonly #reader: WebGLFramebuffer;
@@ -30,11 +30,11 @@ export class Textures {
     return this.#known.get(key);
   }
 
-  /** Uploads a tile and exchanges edge pixels with those of its neighbours that are here. */
+  /** Uploads a tile and exchanges edge pixels with its loaded neighbours. */
   upload(key: string, data: TileData, neighbour: Neighbour): TileTexture {
     const tile = this.#create(data);
     this.#known.set(key, tile);
-    for (const [dx, dy] of AROUND) {
+    for (const [dx, dy] of NEIGHBOURS) {
       const other = this.#known.get(neighbour(dx, dy));
       if (!other || other.width !== tile.width || other.height !== tile.height) continue;
       this.#copyEdge(other, tile, dx, dy);
@@ -76,7 +76,7 @@ export class Textures {
     const gl = this.#gl;
     const { width, height } = data;
     const [, format, type] = this.#formatOf(data.kind);
-    // Guests upload in other ways.
+    // Custom layers may have changed these.
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     gl.pixelStorei(gl.UNPACK_FLIP_Y_WEBGL, false);
     gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, false);
@@ -85,7 +85,7 @@ export class Textures {
     else gl.texSubImage2D(gl.TEXTURE_2D, 0, GUTTER, GUTTER, width, height, format, type, data.values);
   }
 
-  /** Stored format, format and type of what is uploaded. */
+  /** Returns the internal format, and the format and type of the upload. */
   #formatOf(kind: TileData["kind"]): [stored: number, format: number, type: number] {
     const gl = this.#gl;
     switch (kind) {
@@ -99,30 +99,30 @@ export class Textures {
     }
   }
 
-  /** Fills `to`'s gutter towards (dx, dy) with the nearest pixels of `from`, which lies there. */
+  /** Fills `to`'s gutter towards (dx, dy) with the nearest pixels of `from`, the tile there. */
   #copyEdge(from: TileTexture, to: TileTexture, dx: number, dy: number): void {
     const gl = this.#gl;
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.#reader);
     gl.framebufferTexture2D(gl.READ_FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, from.texture, 0);
     gl.activeTexture(gl.TEXTURE0 + SPARE_UNIT);
     gl.bindTexture(gl.TEXTURE_2D, to.texture);
-    const [toX, fromX, w] = along(dx, to.width);
-    const [toY, fromY, h] = along(dy, to.height);
+    const [toX, fromX, w] = edgeSpan(dx, to.width);
+    const [toY, fromY, h] = edgeSpan(dy, to.height);
     gl.copyTexSubImage2D(gl.TEXTURE_2D, 0, toX, toY, fromX, fromY, w, h);
-    to.filled[side(dx, dy)] = BEST;
+    to.filled[gutterIndex(dx, dy)] = FROM_NEIGHBOUR;
     if (dx === 0 || dy === 0) this.#copyCorners(to, dx, dy, fromX, fromY);
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, null);
   }
 
-  /** Without the tile across a corner, the corner comes from the tile above or below, else beside: whichever came first. */
+  /** Fills a corner from the tile above or below, or else from the one at the side, until the diagonal tile is loaded. */
   #copyCorners(to: TileTexture, dx: number, dy: number, fromX: number, fromY: number): void {
     const quality = dx === 0 ? 2 : 1;
     for (const end of [-1, 1]) {
       const [cx, cy] = dx === 0 ? [end, dy] : [dx, end];
-      if ((to.filled[side(cx, cy)] ?? 0) >= quality) continue;
-      to.filled[side(cx, cy)] = quality;
-      const [toX] = along(cx, to.width);
-      const [toY] = along(cy, to.height);
+      if ((to.filled[gutterIndex(cx, cy)] ?? 0) >= quality) continue;
+      to.filled[gutterIndex(cx, cy)] = quality;
+      const [toX] = edgeSpan(cx, to.width);
+      const [toY] = edgeSpan(cy, to.height);
       const sourceX = dx === 0 ? (end < 0 ? GUTTER : to.width) : fromX;
       const sourceY = dy === 0 ? (end < 0 ? GUTTER : to.height) : fromY;
       this.#gl.copyTexSubImage2D(this.#gl.TEXTURE_2D, 0, toX, toY, sourceX, sourceY, GUTTER, GUTTER);
@@ -130,27 +130,27 @@ export class Textures {
   }
 }
 
-const BEST = 3;
+const FROM_NEIGHBOUR = 3;
 
-/** A unit that no sampler uses. */
+/** A texture unit that no sampler uses. */
 export const SPARE_UNIT = 9;
 
-const AROUND = [-1, 0, 1].flatMap((dy) => [-1, 0, 1].map((dx) => [dx, dy] as const)).filter(([dx, dy]) => dx !== 0 || dy !== 0);
+const NEIGHBOURS = [-1, 0, 1].flatMap((dy) => [-1, 0, 1].map((dx) => [dx, dy] as const)).filter(([dx, dy]) => dx !== 0 || dy !== 0);
 
-const side = (dx: number, dy: number): number => dx + 1 + 3 * (dy + 1);
+const gutterIndex = (dx: number, dy: number): number => dx + 1 + 3 * (dy + 1);
 
-/** First texel to write, first texel to read in the other tile, and how many, along one axis. */
-function along(step: number, size: number): [number, number, number] {
+/** Returns the first texel to write, the first to read in the other tile, and their number, along one axis. */
+function edgeSpan(step: number, size: number): [number, number, number] {
   if (step < 0) return [0, size, GUTTER];
   if (step > 0) return [size + GUTTER, GUTTER, GUTTER];
   return [GUTTER, GUTTER, size];
 }
 
 /**
- * Texels that may be read in all of a tile's textures, gutter included where it is filled: least x, least y, greatest x, greatest y; −1 and size are
- * the first of the gutter.
+ * Computes the texels that may be read in all of a tile's textures, including the filled gutter: min x, min y, max x, max y; −1 and size are
+ * the first texels of the gutter.
  */
-export function boundsOf(textures: readonly TileTexture[]): [number, number, number, number] {
+export function computeReadableBounds(textures: readonly TileTexture[]): [number, number, number, number] {
   const { width = 0, height = 0 } = textures[0] ?? {};
   const more = (place: number): number => (textures.every(({ filled }) => filled[place]) ? GUTTER : 0);
   return [-more(3), -more(1), width - 1 + more(5), height - 1 + more(7)];

@@ -2,39 +2,39 @@ import { DrawError } from "../../core/errors";
 import type { Vec2, Vec3 } from "../../core/vec";
 import { towardsLight } from "../../geo/light";
 import type { LayerKind } from "../../geo/manifest";
-import { bakedKinds, neededKinds, type Drawer, type DrawerEvents, type FrameSpec, type Mode, type Pass, type Quad } from "../drawer";
-import { firstOf, guestLead, rangeOf, steepOf, type Depths } from "../combine";
-import { packColor, packFinish } from "../drawStyle";
-import { DeepCanvas } from "./deepCanvas";
-import { FoundLight, guestRanges } from "./foundLight";
-import { Programs, unitOf, type Program } from "./program";
-import { Tables } from "./tables";
-import { boundsOf, Textures, type TileTexture } from "./textures";
+import { listBakedLightKinds, listRequiredKinds, type Drawer, type DrawerEvents, type FrameContent, type Mode, type Pass, type Quad } from "../drawer";
+import { computeDepthAtZero, computeCustomLayerBias, joinDepthRanges, computeMaxStep, type DepthMapping } from "../depthMapping";
+import { packColor, packStyle } from "../drawStyle";
+import { OffscreenTarget } from "./offscreenTarget";
+import { ScreenSpaceLight, listCustomLayerRanges } from "./screenSpaceLight";
+import { Programs, textureUnit, type Program } from "./program";
+import { IdTextures } from "./idTextures";
+import { computeReadableBounds, TileTextures, type TileTexture } from "./textures";
 
 const SAMPLERS = {
   color: "u_color", picture: "u_color", normal: "u_normal", id: "u_id", depth: "u_depth", depth2: "u_depth", sun: "u_shadow", sun16: "u_shadow", ao: "u_ao",
 } as const;
 
-/** What is drawn of a quad. */
-interface Ready {
+/** The textures of a quad. */
+interface QuadTextures {
   readonly quad: Quad;
-  /** Those without which nothing is drawn; absent: not here. */
+  /** Required textures; undefined: not loaded. */
   readonly textures: readonly (readonly [LayerKind, TileTexture | undefined])[];
-  /** Baked light that is here. */
-  readonly baked: readonly (readonly [LayerKind, TileTexture])[];
+  /** Loaded textures of baked light. */
+  readonly bakedLight: readonly (readonly [LayerKind, TileTexture])[];
   readonly ids: TileTexture | undefined;
-  /** Where the pass is shaded, and depths are here. */
+  /** Depths for the light estimate, if used and loaded. */
   readonly depth: TileTexture | undefined;
 }
 
 export interface WebGLOptions {
-  /** Keep the picture readable after a frame: for tests and screenshots; costs memory. */
+  /** Keeps the picture readable after a frame, for tests and screenshots; costs memory. */
   preserve: boolean;
-  /** Not where the processor would do the work of the GPU, which a canvas without WebGL does with a ninth of it. */
-  quick: boolean;
+  /** Refuses software rendering, which takes nine times the CPU of the canvas drawer. */
+  requireGpu: boolean;
 }
 
-/** Draws with WebGL2: one quad a tile, light and highlights in the shader. */
+/** Draws with WebGL2: one quad per tile; shades and highlights in the shader. */
 export class WebGLDrawer implements Drawer {
   readonly name = "webgl";
   readonly busy = false;
@@ -43,52 +43,52 @@ export class WebGLDrawer implements Drawer {
   readonly #canvas: HTMLCanvasElement;
   readonly #listeners = new AbortController();
   #programs: Programs;
-  #textures: Textures;
-  #tables: Tables;
-  #found: FoundLight;
-  #deep: DeepCanvas | undefined;
+  #textures: TileTextures;
+  #idTextures: IdTextures;
+  #screenSpaceLight: ScreenSpaceLight;
+  #offscreen: OffscreenTarget | undefined;
 
-  /** @throws DrawError when the browser has no WebGL2, or none that is quick */
+  /** @throws DrawError when the browser has no WebGL2, or none on a GPU where that is required */
   constructor(canvas: HTMLCanvasElement, options: WebGLOptions, events: DrawerEvents) {
-    const settings: WebGLContextAttributes = { alpha: true, premultipliedAlpha: true, antialias: false, depth: false, stencil: false, preserveDrawingBuffer: options.preserve, failIfMajorPerformanceCaveat: options.quick };
+    const settings: WebGLContextAttributes = { alpha: true, premultipliedAlpha: true, antialias: false, depth: false, stencil: false, preserveDrawingBuffer: options.preserve, failIfMajorPerformanceCaveat: options.requireGpu };
     const gl = canvas.getContext("webgl2", settings);
-    if (!gl) throw new DrawError("this browser offers no WebGL2, which the map needs to draw; update it or switch hardware acceleration on");
-    if (options.quick && isSoftware(gl)) {
+    if (!gl) throw new DrawError("this browser does not support WebGL2, which the map needs; update it or enable hardware acceleration");
+    if (options.requireGpu && isSoftware(gl)) {
       gl.getExtension("WEBGL_lose_context")?.loseContext();
       throw new DrawError("this browser draws WebGL2 without a GPU");
     }
     this.gl = gl;
     this.#canvas = canvas;
     this.#programs = new Programs(gl);
-    this.#textures = new Textures(gl);
-    this.#tables = new Tables(gl);
-    this.#found = new FoundLight(gl);
-    this.#watch(events);
+    this.#textures = new TileTextures(gl);
+    this.#idTextures = new IdTextures(gl);
+    this.#screenSpaceLight = new ScreenSpaceLight(gl);
+    this.#listen(events);
   }
 
   get element(): HTMLElement {
     return this.#canvas;
   }
 
-  draw(frame: FrameSpec): void {
+  draw(frame: FrameContent): void {
     const gl = this.gl;
     if (gl.isContextLost()) return;
     gl.disable(gl.CULL_FACE);
-    this.#found.find(frame, (coarse, pass, range) => { this.#drawPass(coarse, pass, range, false); });
+    this.#screenSpaceLight.update(frame, (coarse, pass, range) => { this.#drawPass(coarse, pass, range, false); });
     const combined = frame.passes.filter(({ depths }) => depths);
-    const range = frame.into?.range ?? this.#found.range ?? rangeOf(combined.flatMap(({ depths }) => depths ?? []), guestRanges(frame));
-    const lead = Math.max(0, ...combined.map(({ depths, level }) => (depths ? guestLead(depths.frame, level) : 0)));
-    if (range) for (const guest of frame.customLayers) guest.prerender(gl, frame, [range[0] + lead, range[1] + lead]);
-    const deep = this.#deepFor(frame, combined.length + frame.customLayers.length > 0);
-    this.#begin(frame, frame.into?.framebuffer ?? deep?.framebuffer ?? null);
+    const range = frame.target?.range ?? this.#screenSpaceLight.range ?? joinDepthRanges(combined.flatMap(({ depths }) => depths ?? []), listCustomLayerRanges(frame));
+    const bias = Math.max(0, ...combined.map(({ depths, level }) => (depths ? computeCustomLayerBias(depths.frame, level) : 0)));
+    if (range) for (const layer of frame.customLayers) layer.prerender(gl, frame, [range[0] + bias, range[1] + bias]);
+    const offscreen = this.#getOffscreen(frame, combined.length + frame.customLayers.length > 0);
+    this.#clear(frame, frame.target?.framebuffer ?? offscreen?.framebuffer ?? null);
     for (const pass of frame.passes) {
       if (!pass.depths) this.#drawPass(frame, pass, null, false);
-      else if (pass === combined[0]) this.#drawTogether(frame, combined, range);
+      else if (pass === combined[0]) this.#drawCombined(frame, combined, range);
     }
-    if (combined.length === 0) this.#drawTogether(frame, [], range);
+    if (combined.length === 0) this.#drawCombined(frame, [], range);
     gl.disable(gl.SCISSOR_TEST);
-    if (!frame.into) deep?.show();
-    this.#tables.keep(new Set(frame.passes.flatMap(({ highlight, finishes }) => [highlight, ...(finishes ? [finishes.byId] : [])])));
+    if (!frame.target) offscreen?.copyToCanvas();
+    this.#idTextures.freeAllBut(new Set(frame.passes.flatMap(({ highlight, drawStyles }) => [highlight, ...(drawStyles ? [drawStyles.byId] : [])])));
   }
 
   release(key: string): void {
@@ -98,19 +98,19 @@ export class WebGLDrawer implements Drawer {
   destroy(): void {
     this.#listeners.abort();
     this.#textures.clear();
-    this.#tables.keep(new Set());
-    this.#found.free();
-    this.#deep?.free();
+    this.#idTextures.freeAllBut(new Set());
+    this.#screenSpaceLight.free();
+    this.#offscreen?.free();
   }
 
-  /** What the frame is drawn in when it needs depth; kept from frame to frame as long as they do. */
-  #deepFor({ into, width, height }: FrameSpec, needed: boolean): DeepCanvas | undefined {
-    if (into || (needed && this.#deep?.width === width && this.#deep.height === height)) return this.#deep;
-    this.#deep?.free();
-    return (this.#deep = needed ? new DeepCanvas(this.gl, width, height) : undefined);
+  /** Returns the target for a frame that needs depth; keeps it from frame to frame while it is needed. */
+  #getOffscreen({ target, width, height }: FrameContent, needed: boolean): OffscreenTarget | undefined {
+    if (target || (needed && this.#offscreen?.width === width && this.#offscreen.height === height)) return this.#offscreen;
+    this.#offscreen?.free();
+    return (this.#offscreen = needed ? new OffscreenTarget(this.gl, width, height) : undefined);
   }
 
-  #begin({ width, height }: FrameSpec, framebuffer: WebGLFramebuffer | null): void {
+  #clear({ width, height }: FrameContent, framebuffer: WebGLFramebuffer | null): void {
     const gl = this.gl;
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     gl.viewport(0, 0, width, height);
@@ -123,63 +123,63 @@ export class WebGLDrawer implements Drawer {
     gl.depthFunc(gl.LEQUAL);
   }
 
-  /** Passes and guests that hide each other by depth: all that is solid, then edges and what lets through. */
-  #drawTogether(frame: FrameSpec, passes: readonly Pass[], range: Vec2 | null): void {
+  /** Draws passes and custom layers that hide each other by depth: first all opaque pixels, then edges and translucent passes. */
+  #drawCombined(frame: FrameContent, passes: readonly Pass[], range: Vec2 | null): void {
     const gl = this.gl;
     if (!range) return;
     gl.enable(gl.DEPTH_TEST);
     for (const pass of passes) if (pass.opacity === 1) this.#drawPass(frame, pass, range, false);
-    this.#drawGuests(frame, false);
-    gl.depthMask(frame.into !== undefined);
+    this.#drawCustomLayers(frame, false);
+    gl.depthMask(frame.target !== undefined);
     for (const pass of passes) this.#drawPass(frame, pass, range, true);
-    this.#drawGuests(frame, true);
+    this.#drawCustomLayers(frame, true);
     gl.disable(gl.DEPTH_TEST);
   }
 
-  #drawGuests(frame: FrameSpec, soft: boolean): void {
+  #drawCustomLayers(frame: FrameContent, soft: boolean): void {
     this.gl.disable(this.gl.SCISSOR_TEST);
-    for (const guest of frame.customLayers) guest.render(this.gl, frame, soft);
+    for (const layer of frame.customLayers) layer.render(this.gl, frame, soft);
   }
 
-  /** @param range of D, of what is drawn together  @param soft only what lets through */
-  #drawPass(frame: FrameSpec, pass: Pass, range: Vec2 | null, soft: boolean): void {
-    this.#clip(frame, pass);
+  /** @param range minimum and maximum D of the combined passes; null: not combined  @param soft draws only edges and translucent passes */
+  #drawPass(frame: FrameContent, pass: Pass, range: Vec2 | null, soft: boolean): void {
+    this.#setScissor(frame, pass);
     const mode: Mode = pass.mode === "lit" && !frame.light.lit ? "color" : pass.mode;
-    const shaded = mode === "lit" && this.#found.lights(frame, pass);
-    // All are uploaded before the first is drawn, so that gutters have their neighbours' pixels.
-    for (const ready of pass.quads.map((quad) => this.#readyOf(pass, mode, quad, shaded))) {
-      const { quad, textures, baked, ids, depth } = ready;
+    const shaded = mode === "lit" && this.#screenSpaceLight.appliesTo(frame, pass);
+    // Uploads all before drawing the first, so that gutters have their neighbours' pixels.
+    for (const ready of pass.quads.map((quad) => this.#collectTextures(pass, mode, quad, shaded))) {
+      const { quad, textures, bakedLight, ids, depth } = ready;
       if (textures.some(([, texture]) => !texture)) continue;
-      const has = (kind: LayerKind): boolean => baked.some(([other]) => other === kind);
+      const has = (kind: LayerKind): boolean => bakedLight.some(([other]) => other === kind);
       const shadow = has("sun") ? "sun" : has("sun16") ? "sun16" : null;
-      const finish = ids !== undefined && pass.finishes !== null;
-      const program = this.#programs.use({ mode, masked: pass.masked, highlight: ids !== undefined && pass.highlight.size > 0, finish, shadow, occlusion: has("ao"), combined: range !== null, shaded: depth !== undefined });
-      for (const [kind, texture] of [...textures, ...baked]) this.#bind(kind, texture);
-      if (depth && pass.relief && this.#found.range) {
+      const styled = ids !== undefined && pass.drawStyles !== null;
+      const program = this.#programs.use({ mode, masked: pass.masked, highlight: ids !== undefined && pass.highlight.size > 0, styled, shadow, occlusion: has("ao"), combined: range !== null, estimatedLight: depth !== undefined });
+      for (const [kind, texture] of [...textures, ...bakedLight]) this.#bind(kind, texture);
+      if (depth && pass.relief && this.#screenSpaceLight.range) {
         this.#bind("depth", depth);
-        this.#setDepths(program, pass.relief, quad, this.#found.range, false);
-        this.#found.bind(program, frame, pass);
+        this.#setDepths(program, pass.relief, quad, this.#screenSpaceLight.range, false);
+        this.#screenSpaceLight.bind(program, frame, pass);
       }
       if (range && pass.depths) this.#setDepths(program, pass.depths, quad, range, soft);
       if (ids) this.#bindIds(program, pass, quad, ids, frame.dpr);
-      this.#drawQuad(frame, pass, quad, program, [...textures, ...baked, ["id", ids] as const, ["depth", depth] as const].flatMap(([, texture]) => texture ?? []));
+      this.#drawQuad(frame, pass, quad, program, [...textures, ...bakedLight, ["id", ids] as const, ["depth", depth] as const].flatMap(([, texture]) => texture ?? []));
     }
   }
 
-  #readyOf(pass: Pass, mode: Mode, quad: Quad, shaded: boolean): Ready {
+  #collectTextures(pass: Pass, mode: Mode, quad: Quad, shaded: boolean): QuadTextures {
     return {
       quad,
-      textures: neededKinds(mode, pass.masked, pass.depths !== null).map((kind) => [kind, this.#textureOf(pass, kind, quad)] as const),
-      baked: bakedKinds(mode, pass.baked).flatMap((kind) => {
-        const texture = this.#textureOf(pass, kind, quad);
+      textures: listRequiredKinds(mode, pass.masked, pass.depths !== null).map((kind) => [kind, this.#getTexture(pass, kind, quad)] as const),
+      bakedLight: listBakedLightKinds(mode, pass.bakedLight).flatMap((kind) => {
+        const texture = this.#getTexture(pass, kind, quad);
         return texture ? [[kind, texture] as const] : [];
       }),
-      depth: shaded ? this.#textureOf(pass, "depth", quad) : undefined,
-      ids: pass.highlight.size > 0 || pass.finishes ? this.#textureOf(pass, "id", quad) : undefined,
+      depth: shaded ? this.#getTexture(pass, "depth", quad) : undefined,
+      ids: pass.highlight.size > 0 || pass.drawStyles ? this.#getTexture(pass, "id", quad) : undefined,
     };
   }
 
-  #textureOf(pass: Pass, kind: LayerKind, { from }: Quad): TileTexture | undefined {
+  #getTexture(pass: Pass, kind: LayerKind, { from }: Quad): TileTexture | undefined {
     const key = pass.tiles.key(kind, from);
     const known = this.#textures.get(key);
     if (known) return known;
@@ -187,17 +187,17 @@ export class WebGLDrawer implements Drawer {
     if (!data) return undefined;
     const neighbour = (dx: number, dy: number): string => pass.tiles.key(kind, { z: from.z, x: from.x + dx, y: from.y + dy });
     const texture = this.#textures.upload(key, data, neighbour);
-    pass.tiles.taken(kind, from);
+    pass.tiles.onUploaded(kind, from);
     return texture;
   }
 
   #bind(kind: LayerKind, texture: TileTexture | undefined): void {
     const gl = this.gl;
-    gl.activeTexture(gl.TEXTURE0 + unitOf(SAMPLERS[kind]));
+    gl.activeTexture(gl.TEXTURE0 + textureUnit(SAMPLERS[kind]));
     gl.bindTexture(gl.TEXTURE_2D, texture?.texture ?? null);
   }
 
-  #drawQuad(frame: FrameSpec, pass: Pass, quad: Quad, program: Program, textures: readonly TileTexture[]): void {
+  #drawQuad(frame: FrameContent, pass: Pass, quad: Quad, program: Program, textures: readonly TileTexture[]): void {
     const gl = this.gl;
     const { width, height, light } = frame;
     const [left, top, right, bottom] = quad.rect;
@@ -207,24 +207,24 @@ export class WebGLDrawer implements Drawer {
     gl.uniform2f(program.at("u_origin"), ...quad.origin);
     gl.uniform1f(program.at("u_scale"), quad.scale);
     gl.uniform1i(program.at("u_size"), textures[0]?.width ?? 0);
-    gl.uniform4i(program.at("u_bounds"), ...boundsOf(textures));
+    gl.uniform4i(program.at("u_bounds"), ...computeReadableBounds(textures));
     gl.uniform1f(program.at("u_opacity"), pass.opacity);
     gl.uniform3f(program.at("u_sun"), ...towardsLight(light));
     gl.uniform3f(program.at("u_sky"), ...scaled(light.sky_rgb, light.ambient));
     gl.uniform3f(program.at("u_beam"), ...scaled(light.sun_rgb, light.diffuse));
-    gl.uniform2ui(program.at("u_suns"), pass.baked.shadow?.first ?? 0, pass.baked.shadow?.second ?? 0);
-    gl.uniform1f(program.at("u_share"), pass.baked.shadow?.share ?? 0);
+    gl.uniform2ui(program.at("u_suns"), pass.bakedLight.shadow?.first ?? 0, pass.bakedLight.shadow?.second ?? 0);
+    gl.uniform1f(program.at("u_share"), pass.bakedLight.shadow?.share ?? 0);
     gl.uniform2f(program.at("u_range"), ...pass.depthRange);
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
   }
 
-  #setDepths(program: Program, depths: Depths, { from }: Quad, [near, far]: Vec2, soft: boolean): void {
-    this.gl.uniform2f(program.at("u_depths"), (firstOf(depths) - near) / (far - near), depths.unit_m / (far - near));
-    this.gl.uniform1ui(program.at("u_steep"), steepOf(depths, from.z));
+  #setDepths(program: Program, depths: DepthMapping, { from }: Quad, [near, far]: Vec2, soft: boolean): void {
+    this.gl.uniform2f(program.at("u_depths"), (computeDepthAtZero(depths) - near) / (far - near), depths.unit_m / (far - near));
+    this.gl.uniform1ui(program.at("u_maxStep"), computeMaxStep(depths, from.z));
     this.gl.uniform1i(program.at("u_soft"), Number(soft));
   }
 
-  #clip({ width, height }: FrameSpec, { clip }: Pass): void {
+  #setScissor({ width, height }: FrameContent, { clip }: Pass): void {
     const gl = this.gl;
     if (!clip) {
       gl.disable(gl.SCISSOR_TEST);
@@ -235,17 +235,17 @@ export class WebGLDrawer implements Drawer {
     gl.scissor(left, height - bottom, Math.max(0, right - left), Math.max(0, bottom - top));
   }
 
-  #bindIds(program: Program, { highlight, finishes }: Pass, quad: Quad, ids: TileTexture, dpr: number): void {
+  #bindIds(program: Program, { highlight, drawStyles }: Pass, quad: Quad, ids: TileTexture, dpr: number): void {
     const gl = this.gl;
     this.#bind("id", ids);
     gl.uniform1f(program.at("u_rim"), Math.max(1, 1.25 * dpr * quad.scale));
-    if (highlight.size > 0) this.#tables.bind(program, ["u_table", "u_mask", "u_probes", "u_one"], highlight, packColor);
-    if (!finishes) return;
-    this.#tables.bind(program, ["u_finishes", "u_finishMask", "u_finishProbes", "u_finishOne"], finishes.byId, packFinish);
-    gl.uniform1ui(program.at("u_others"), packFinish(finishes.others));
+    if (highlight.size > 0) this.#idTextures.bind(program, ["u_table", "u_mask", "u_probes", "u_single"], highlight, packColor);
+    if (!drawStyles) return;
+    this.#idTextures.bind(program, ["u_styles", "u_styleMask", "u_styleProbes", "u_styleSingle"], drawStyles.byId, packStyle);
+    gl.uniform1ui(program.at("u_others"), packStyle(drawStyles.others));
   }
 
-  #watch(events: DrawerEvents): void {
+  #listen(events: DrawerEvents): void {
     const { signal } = this.#listeners;
     const lost = (event: Event): void => {
       event.preventDefault();
@@ -253,10 +253,10 @@ export class WebGLDrawer implements Drawer {
     };
     const restored = (): void => {
       this.#programs = new Programs(this.gl);
-      this.#textures = new Textures(this.gl);
-      this.#tables = new Tables(this.gl);
-      this.#found = new FoundLight(this.gl);
-      this.#deep = undefined;
+      this.#textures = new TileTextures(this.gl);
+      this.#idTextures = new IdTextures(this.gl);
+      this.#screenSpaceLight = new ScreenSpaceLight(this.gl);
+      this.#offscreen = undefined;
       events.restored();
     };
     this.#canvas.addEventListener("webglcontextlost", lost, { signal });
@@ -264,12 +264,12 @@ export class WebGLDrawer implements Drawer {
   }
 }
 
-/** Does the processor do the work of the GPU? Browsers tell by the flag above when that is their own choice, and by name otherwise. */
+/** Whether WebGL runs on the CPU. Browsers report it by the flag above if they chose so themselves, and by the renderer's name otherwise. */
 function isSoftware(gl: WebGL2RenderingContext): boolean {
-  const open = String(gl.getParameter(gl.RENDERER));
-  // Some keep the name for those who ask twice.
-  const told = open === "WebKit WebGL" ? gl.getExtension("WEBGL_debug_renderer_info") : null;
-  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(told ? String(gl.getParameter(told.UNMASKED_RENDERER_WEBGL)) : open);
+  const renderer = String(gl.getParameter(gl.RENDERER));
+  // WebKit hides the name behind this extension.
+  const debugInfo = renderer === "WebKit WebGL" ? gl.getExtension("WEBGL_debug_renderer_info") : null;
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(debugInfo ? String(gl.getParameter(debugInfo.UNMASKED_RENDERER_WEBGL)) : renderer);
 }
 
 const scaled = ([x, y, z]: Vec3, by: number): Vec3 => [x * by, y * by, z * by];

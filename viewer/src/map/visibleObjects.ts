@@ -1,31 +1,31 @@
 import { cssPixelM } from "../geo/camera";
-import { coverOf, levelFor, rectAround } from "../tiles/cover";
+import { findCover, computeLevel, computeViewRect } from "../tiles/cover";
 import type { imageLayer } from "./imageLayer";
-import { middleIn } from "./layerPlan";
+import { computeCenter } from "./layerPlan";
 import type { ViewState } from "./layerContext";
 
-/** An object that is seen, and how much of it. */
+/** A visible object and its share of the screen. */
 export interface VisibleObject {
   readonly id: number;
-  /** Share of the screen. */
+  /** Fraction of the screen that it covers. */
   readonly share: number;
 }
 
-/** Objects of a layer that are seen, the largest first. Fetches the id tiles of the level that is shown. @throws what a fetch threw */
-export async function objectsIn(layer: imageLayer, sight: ViewState): Promise<VisibleObject[]> {
-  const { camera, dpr, finer } = sight;
+/** Finds the visible objects of a layer, the largest first. Fetches the id tiles of the shown level. @throws the error of a fetch */
+export async function findVisibleObjects(layer: imageLayer, viewState: ViewState): Promise<VisibleObject[]> {
+  const { camera, dpr, finer } = viewState;
   const [view, info] = [layer.findView(camera.frame), layer.rendering?.layers.get("id")];
   const { rendering, tiles } = layer;
   if (!view || !rendering || !info || !tiles) return [];
   const { frame } = view;
   const px = cssPixelM(camera);
-  const rect = rectAround(...middleIn(frame, sight, rendering), camera, px);
-  const level = levelFor(frame, px / dpr, dpr, finer);
+  const rect = computeViewRect(...computeCenter(frame, viewState, rendering), camera, px);
+  const level = computeLevel(frame, px / dpr, dpr, finer);
   const pixel_m = frame.size / (frame.tilePx * 2 ** level);
   const counts = new Map<number, number>();
   const [[left, bottom], [right, top]] = rect;
-  const cover = coverOf(frame, (tile) => view.occupancy.has(tile), level, rect);
-  for (const [tile, data] of await Promise.all(cover.map(async (tile) => [tile, await tiles.need(view, info, tile)] as const))) {
+  const cover = findCover(frame, (tile) => view.occupancy.has(tile), level, rect);
+  for (const [tile, data] of await Promise.all(cover.map(async (tile) => [tile, await tiles.fetch(view, info, tile)] as const))) {
     if (data?.kind !== "id") continue;
     const [u, v] = [frame.u0 + tile.x * frame.tilePx * pixel_m, frame.v0 - tile.y * frame.tilePx * pixel_m];
     const inside = (from: number, to: number): [number, number] => [Math.max(0, Math.round(from / pixel_m)), Math.min(frame.tilePx, Math.round(to / pixel_m))];
@@ -38,6 +38,6 @@ export async function objectsIn(layer: imageLayer, sight: ViewState): Promise<Vi
       }
     }
   }
-  const whole = ((right - left) * (top - bottom)) / pixel_m ** 2;
-  return [...counts].map(([id, count]) => ({ id, share: count / whole })).sort((a, b) => b.share - a.share || a.id - b.id);
+  const pixelCount = ((right - left) * (top - bottom)) / pixel_m ** 2;
+  return [...counts].map(([id, count]) => ({ id, share: count / pixelCount })).sort((a, b) => b.share - a.share || a.id - b.id);
 }

@@ -1,5 +1,5 @@
-/** What frames are drawn in that need depth: most do not, and then the canvas has no buffer for it. Pixels are copied to the canvas as they are. */
-export class DeepCanvas {
+/** A framebuffer for frames that need a depth buffer, which the canvas does not have. */
+export class OffscreenTarget {
   readonly #gl: WebGL2RenderingContext;
   readonly #framebuffer: WebGLFramebuffer;
   readonly #buffers: readonly WebGLRenderbuffer[];
@@ -21,8 +21,8 @@ export class DeepCanvas {
     return this.#framebuffer;
   }
 
-  /** Puts the picture on the canvas, which is bound then. */
-  show(): void {
+  /** Copies the picture to the canvas, which is bound afterwards. */
+  copyToCanvas(): void {
     const { width, height } = this;
     const gl = this.#gl;
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.#framebuffer);

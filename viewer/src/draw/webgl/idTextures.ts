@@ -1,11 +1,11 @@
-import { idTable, tableShape, type IdTable } from "./idTable";
-import { unitOf, type Program } from "./program";
+import { buildIdTable, computeTextureSize, type IdTable } from "./idTable";
+import { textureUnit, type Program } from "./program";
 import { SPARE_UNIT } from "./textures";
 
 type Values = ReadonlyMap<number, unknown>;
 
-/** Tables by object id on the GPU, made from maps when they are first used; another map is another table. */
-export class Tables {
+/** Tables by object id as textures, uploaded when first used. */
+export class IdTextures {
   readonly #gl: WebGL2RenderingContext;
   readonly #known = new Map<Values, { table: IdTable; texture: WebGLTexture }>();
 
@@ -13,19 +13,19 @@ export class Tables {
     this.#gl = gl;
   }
 
-  /** @param uniforms sampler, mask, probes and the only entry  @param pack a value as a word */
-  bind<V>(program: Program, [sampler, mask, probes, one]: readonly ["u_table" | "u_finishes", string, string, string], values: ReadonlyMap<number, V>, pack: (value: V) => number): void {
+  /** Binds a table, made from the values if it is new. @param uniforms sampler, mask, probes and the single entry  @param pack converts a value to uint32 */
+  bind<V>(program: Program, [sampler, mask, probes, single]: readonly ["u_table" | "u_styles", string, string, string], values: ReadonlyMap<number, V>, pack: (value: V) => number): void {
     const gl = this.#gl;
-    const { table, texture } = this.#known.get(values) ?? this.#upload(values, idTable(values, pack));
-    gl.activeTexture(gl.TEXTURE0 + unitOf(sampler));
+    const { table, texture } = this.#known.get(values) ?? this.#upload(values, buildIdTable(values, pack));
+    gl.activeTexture(gl.TEXTURE0 + textureUnit(sampler));
     gl.bindTexture(gl.TEXTURE_2D, texture);
     gl.uniform1ui(program.at(mask), table.mask);
     gl.uniform1i(program.at(probes), table.probes);
-    gl.uniform2ui(program.at(one), ...table.one);
+    gl.uniform2ui(program.at(single), ...table.single);
   }
 
-  /** Frees those of all other maps. */
-  keep(used: ReadonlySet<Values>): void {
+  /** Frees the tables of all other maps. */
+  freeAllBut(used: ReadonlySet<Values>): void {
     for (const [values, { texture }] of this.#known) {
       if (used.has(values)) continue;
       this.#gl.deleteTexture(texture);
@@ -36,12 +36,12 @@ export class Tables {
   #upload(values: Values, table: IdTable): { table: IdTable; texture: WebGLTexture } {
     const gl = this.#gl;
     const texture = gl.createTexture();
-    const [width, height] = tableShape(table);
+    const [width, height] = computeTextureSize(table);
     gl.activeTexture(gl.TEXTURE0 + SPARE_UNIT);
     gl.bindTexture(gl.TEXTURE_2D, texture);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RG32UI, width, height, 0, gl.RG_INTEGER, gl.UNSIGNED_INT, table.places);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RG32UI, width, height, 0, gl.RG_INTEGER, gl.UNSIGNED_INT, table.slots);
     this.#known.set(values, { table, texture });
     return { table, texture };
   }

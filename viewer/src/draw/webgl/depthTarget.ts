@@ -1,7 +1,7 @@
 import { makeTexture } from "../../core/gl";
 
-/** Depths of what a frame shows, a pixel for each CSS pixel of it, as a texture. */
-export class DepthPicture {
+/** A framebuffer with a depth texture only. */
+export class DepthTarget {
   readonly framebuffer: WebGLFramebuffer;
   readonly texture: WebGLTexture;
   readonly #gl: WebGL2RenderingContext;

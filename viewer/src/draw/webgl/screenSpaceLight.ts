@@ -1,0 +1,123 @@
+import { dot, type Vec2, type Vec3 } from "../../core/vec";
+import { cssPixelM, type Camera } from "../../geo/camera";
+import { towardsLight } from "../../geo/light";
+import { joinDepthRanges } from "../depthMapping";
+import type { FrameContent, Pass } from "../drawer";
+import { DepthTarget } from "./depthTarget";
+import { textureUnit, type Program } from "./program";
+
+/** The light estimated for a frame. */
+interface EstimatedLight {
+  readonly texture: WebGLTexture;
+  readonly range: Vec2;
+  /** The frame's camera, and device pixels per pixel of the estimate. */
+  readonly camera: Camera;
+  readonly step: number;
+  readonly height: number;
+  /** Fraction of the range that counts as the same depth. */
+  readonly tolerance: number;
+}
+
+/** Draws a pass into the bound framebuffer, with its depth as a fraction of a range of D. */
+type DrawDepths = (frame: FrameContent, pass: Pass, range: Vec2) => void;
+
+/** Computes screen-space shadows and ambient occlusion (see draw/lightEstimator.ts) and binds them for the shader. */
+export class ScreenSpaceLight {
+  readonly #gl: WebGL2RenderingContext;
+  #depthTarget: DepthTarget | undefined;
+  #result: EstimatedLight | null = null;
+
+  constructor(gl: WebGL2RenderingContext) {
+    this.#gl = gl;
+  }
+
+  /** Range of D of the frame's depths; null when nothing was estimated. */
+  get range(): Vec2 | null {
+    return this.#result?.range ?? null;
+  }
+
+  /** Estimates the frame's light unless all of it was rendered. */
+  update(frame: FrameContent, draw: DrawDepths): void {
+    const { lighting, camera } = frame;
+    const step = Math.max(1, frame.dpr);
+    const last = this.#result;
+    if (!lighting || !frame.passes.some((pass) => needsEstimate(frame, pass))) this.#result = null;
+    else if (!lighting.moving || frame.target || last?.camera.frame !== camera.frame || last.step !== step) this.#result = this.#estimate(frame, lighting, step, draw);
+  }
+
+  /** Whether a pass uses the estimate. */
+  appliesTo(frame: FrameContent, pass: Pass): boolean {
+    return this.#result !== null && needsEstimate(frame, pass);
+  }
+
+  free(): void {
+    this.#depthTarget?.free();
+    this.#depthTarget = undefined;
+    this.#result = null;
+  }
+
+  /** Sets the program's uniforms, except for those of depth. */
+  bind(program: Program, frame: FrameContent, { bakedLight }: Pass): void {
+    const [gl, result] = [this.#gl, this.#result];
+    if (!result) return;
+    const { texture, camera, step, height, tolerance } = result;
+    gl.activeTexture(gl.TEXTURE0 + textureUnit("u_estimate"));
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    const now = frame.camera;
+    const [px, scale] = [cssPixelM(camera), frame.dpr / step];
+    const zoomRatio = cssPixelM(now) / px;
+    const [x, y] = [(now.u - camera.u) / px + camera.width / 2 - (zoomRatio * now.width) / 2, (camera.v - now.v) / px + camera.height / 2 - (zoomRatio * now.height) / 2];
+    gl.uniform4f(program.at("u_estimateMap"), zoomRatio / step, x * scale, y * scale, height);
+    gl.uniform1f(program.at("u_tolerance"), tolerance);
+    gl.uniform2i(program.at("u_estimated"), Number(frame.light.occlusion && !bakedLight.occlusion), Number(hasShadows(frame) && !bakedLight.shadow));
+  }
+
+  #estimate(frame: FrameContent, { estimator }: NonNullable<FrameContent["lighting"]>, step: number, draw: DrawDepths): EstimatedLight {
+    const gl = this.#gl;
+    const { light, camera } = frame;
+    const [width, height] = [Math.ceil(frame.width / step), Math.ceil(frame.height / step)];
+    const range = frame.target?.range ?? (joinDepthRanges(frame.passes.flatMap(({ relief }) => relief ?? []), listCustomLayerRanges(frame)) as Vec2);
+    const px_m = (cssPixelM(camera) * step) / frame.dpr;
+    const picture = this.#getDepthTarget(width, height);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, picture.framebuffer);
+    gl.viewport(0, 0, width, height);
+    gl.depthMask(true);
+    gl.disable(gl.SCISSOR_TEST);
+    gl.clear(gl.DEPTH_BUFFER_BIT);
+    gl.enable(gl.DEPTH_TEST);
+    gl.depthFunc(gl.LEQUAL);
+    for (const pass of frame.passes) if (pass.relief && pass.opacity === 1) draw({ ...frame, width, height }, makeDepthPass(pass, step), range);
+    const { right, up, forward } = camera.frame.axes;
+    const towards = towardsLight(light);
+    const sun: Vec3 | null = hasShadows(frame) ? [dot(right, towards), dot(up, towards), dot(forward, towards)] : null;
+    const texture = estimator.estimateLight({ gl, depth: picture.texture, width, height, px_m, range, sun, occlusion: light.occlusion });
+    gl.disable(gl.DEPTH_TEST);
+    return { texture, range, camera, step, height, tolerance: (2 * px_m) / (range[1] - range[0]) + 1 / 65535 };
+  }
+
+  #getDepthTarget(width: number, height: number): DepthTarget {
+    if (this.#depthTarget?.width === width && this.#depthTarget.height === height) return this.#depthTarget;
+    this.#depthTarget?.free();
+    return (this.#depthTarget = new DepthTarget(this.#gl, width, height));
+  }
+}
+
+/** Lists the ranges of D of a frame's custom layers. */
+export const listCustomLayerRanges = ({ customLayers, camera }: FrameContent): Vec2[] => customLayers.flatMap((layer) => {
+  const range = layer.getDepthRange(camera.frame);
+  return range ? [range] : [];
+});
+
+const hasShadows = ({ light }: FrameContent): boolean => light.shadows && light.altitude_deg > 0;
+
+/** Whether a pass lacks rendered light that can be estimated. */
+function needsEstimate(frame: FrameContent, { mode, relief, bakedLight }: Pass): boolean {
+  const { light, lighting } = frame;
+  return lighting !== undefined && lighting !== null && relief !== null && mode === "lit" && light.lit && ((light.occlusion && !bakedLight.occlusion) || (hasShadows(frame) && !bakedLight.shadow));
+}
+
+/** Makes a pass that draws depths only, with pixels `step` times as large. */
+function makeDepthPass(pass: Pass, step: number): Pass {
+  const quads = pass.quads.map(({ from, rect: [left, top, right, bottom], origin: [x, y], scale }) => ({ from, rect: [left / step, top / step, right / step, bottom / step] as const, origin: [x / step, y / step] as const, scale: scale * step }));
+  return { ...pass, mode: "depth", quads, highlight: new Map(), depths: pass.relief };
+}
