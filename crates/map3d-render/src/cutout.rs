@@ -80,7 +80,7 @@ impl Cutout for TextureCutout<'_> {
             return true;
         }
         match self.level(material, sample) {
-            Ok(level) => AlphaSampler::with(level, &uv_map(sample), wrap_of(material), material.border[3]).covers(0, 0),
+            Ok(level) => AlphaSampler::new(level, &uv_map(sample), wrap_of(material), material.border[3]).covers(0, 0),
             Err(_) => {
                 self.failures.fetch_add(1, Ordering::Relaxed);
                 true
@@ -94,7 +94,7 @@ impl Cutout for TextureCutout<'_> {
         }
         let origin = CutoutSample { uv: [u.at0, v.at0], footprint: [[u.dx, v.dx], [u.dy, v.dy]] };
         let level = self.level(material, &origin).ok()?;
-        Some(Box::new(AlphaMask(AlphaSampler::with(level, &uv_map(&origin), wrap_of(material), material.border[3]))))
+        Some(Box::new(AlphaMask(AlphaSampler::new(level, &uv_map(&origin), wrap_of(material), material.border[3]))))
     }
 }
 
@@ -103,10 +103,10 @@ struct AlphaMask(AlphaSampler);
 
 impl CutoutMask for AlphaMask {
     fn covered(&self, i: usize, j: usize, candidates: u32) -> u32 {
-        self.0.covered(i as i32, j as i32, candidates)
+        self.0.covered_samples(i as i32, j as i32, candidates)
     }
 
     fn covers(&self, uv: [f32; 2]) -> bool {
-        self.0.covers_at(uv.map(f64::from))
+        self.0.covers_uv(uv.map(f64::from))
     }
 }

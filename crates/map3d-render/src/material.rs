@@ -3,7 +3,7 @@
 use map3d_base::{Isa, Result, Vec3};
 use map3d_image::srgb::LINEAR16;
 use map3d_scene::MaterialRecord;
-use map3d_texture::sample::{Outside, POSITION_BITS, Sampler, TapPlans, UvMap};
+use map3d_texture::sample::{POSITION_BITS, Sampler, SurfaceColors, TapPlanCache, UvMap};
 use map3d_texture::{HeldTextures, TextureCache};
 use map3d_trace::{Affine, DepthPlane, SurfaceAttributes};
 
@@ -12,13 +12,13 @@ use crate::cutout::wrap_of;
 /// Textures and sampling plans that the surfaces of a sub-tile share.
 pub struct MaterialCache {
     pub held: HeldTextures,
-    plans: TapPlans,
+    plans: TapPlanCache,
 }
 
 impl MaterialCache {
     /// `isa`: an instruction set that this machine supports.
     pub fn new(isa: Isa) -> Self {
-        Self { held: HeldTextures::default(), plans: TapPlans::new(isa) }
+        Self { held: HeldTextures::default(), plans: TapPlanCache::new(isa) }
     }
 }
 
@@ -41,10 +41,10 @@ impl DiffuseColor {
         // The mip level and the filter taps follow from the footprint of a pixel, which is the same over the whole surface.
         let texture = materials.held.texture(textures, &material.texture)?;
         let (file, uv) = (&texture.file, uv_map(uv));
-        let plan = materials.plans.of(uv.jacobian(file.width, file.height), file.levels);
+        let plan = materials.plans.plan(uv.jacobian(file.width, file.height), file.levels);
         let level = materials.held.level(textures, &texture, plan.level)?;
-        let outside = Outside { diffuse, border: material.border };
-        Ok(Self::Textured(Sampler::new(level, plan, file.has_alpha, &uv, wrap_of(material), outside)))
+        let colors = SurfaceColors { diffuse, border: material.border };
+        Ok(Self::Textured(Sampler::new(level, plan, file.has_alpha, &uv, wrap_of(material), colors)))
     }
 
     /// Returns the colour at a position in 2^-8 px from the sub-tile's corner.
@@ -64,7 +64,7 @@ impl DiffuseColor {
         match self {
             Self::Unused => {}
             Self::Constant([r, g, b]) => out.fill([*r, *g, *b, 65_535]),
-            Self::Textured(sampler) => sampler.row((i as i32) << POSITION_BITS | HALF, (j as i32) << POSITION_BITS | HALF, out),
+            Self::Textured(sampler) => sampler.sample_row((i as i32) << POSITION_BITS | HALF, (j as i32) << POSITION_BITS | HALF, out),
         }
     }
 }

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use map3d_base::asset::Wrap;
 use map3d_image::Raster;
 use map3d_image::srgb::{BYTE, LINEAR16};
-use map3d_texture::sample::{Outside, Sampler, TapPlan, Tuning, UvMap, footprint};
+use map3d_texture::sample::{Sampler, SurfaceColors, TapPlan, Tuning, UvMap, compute_footprint};
 use map3d_texture::{Level, LinearRaster, first_mip, level_count, next_mip};
 
 const SIDE: u32 = 256;
@@ -122,8 +122,8 @@ struct Row {
 }
 
 fn measure(pyramid: &Pyramid, uv: &UvMap, exact: &[[u16; 3]], tuning: &Tuning) -> Row {
-    let plan = footprint(uv.jacobian(SIDE, SIDE), level_count(SIDE, SIDE), tuning);
-    let white = Outside { diffuse: [255; 4], border: [255; 4] };
+    let plan = compute_footprint(uv.jacobian(SIDE, SIDE), level_count(SIDE, SIDE), tuning);
+    let white = SurfaceColors { diffuse: [255; 4], border: [255; 4] };
     let taps = Arc::new(TapPlan::new(&plan));
     let sampler = Sampler::new(pyramid.levels[plan.level as usize].clone(), taps, false, uv, Wrap::Wrap, white);
     let render = || -> Vec<[u16; 3]> { (0..PIXELS * PIXELS).map(|i| sampler.sample(i % PIXELS * 256 + 128, i / PIXELS * 256 + 128)).collect() };

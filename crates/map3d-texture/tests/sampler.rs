@@ -10,9 +10,9 @@ use map3d_base::samples::SAMPLES;
 use map3d_image::Raster;
 use map3d_image::srgb::{BYTE, LINEAR16};
 use map3d_texture::Level;
-use map3d_texture::sample::{AlphaSampler, Footprint, Outside, POSITION_BITS, Sampler, TapPlan, Tuning, UvMap, footprint};
+use map3d_texture::sample::{AlphaSampler, Footprint, POSITION_BITS, Sampler, SurfaceColors, TapPlan, Tuning, UvMap, compute_footprint};
 
-const WHITE: Outside = Outside { diffuse: [255; 4], border: [9, 200, 60, 255] };
+const WHITE: SurfaceColors = SurfaceColors { diffuse: [255; 4], border: [9, 200, 60, 255] };
 
 fn point() -> Footprint {
     Footprint { level: 0, taps: vec![[0.0; 2]] }
@@ -67,10 +67,10 @@ fn white_stays_white_and_diffuse_multiplies() {
     let level = Arc::new(Level::from_raster(Raster::filled(16, 16, [255; 4])));
     for scale in [0.3, 1.0, 2.3, 9.0, 40.0] {
         let uv = UvMap { u: [0.1, scale / 16.0, 0.01], v: [0.2, 0.02, scale / 16.0] };
-        let plan = footprint(uv.jacobian(16, 16), 1, &Tuning::default());
+        let plan = compute_footprint(uv.jacobian(16, 16), 1, &Tuning::default());
         let white = Sampler::new(level.clone(), made(&plan), false, &uv, Wrap::Wrap, WHITE);
         assert_eq!(white.sample(77, 1234), [65_535; 3], "{} taps", plan.taps.len());
-        let tinted = Sampler::new(level.clone(), made(&plan), false, &uv, Wrap::Wrap, Outside { diffuse: [200, 100, 0, 255], ..WHITE });
+        let tinted = Sampler::new(level.clone(), made(&plan), false, &uv, Wrap::Wrap, SurfaceColors { diffuse: [200, 100, 0, 255], ..WHITE });
         assert_eq!(bytes(tinted.sample(77, 1234)), [200, 100, 0]);
     }
 }
@@ -87,10 +87,10 @@ fn transparent_texels_lend_no_colour() {
 #[test]
 fn coverage_is_alpha_of_a_half() {
     let image = Raster::new(4, 1, vec![[0; 4], [0; 4], [9, 9, 9, 255], [9, 9, 9, 255]]);
-    let alpha = AlphaSampler::with(Arc::new(Level::from_raster(image.clone())), &one_to_one(4, 1), Wrap::Clamp, 0);
+    let alpha = AlphaSampler::new(Arc::new(Level::from_raster(image.clone())), &one_to_one(4, 1), Wrap::Clamp, 0);
     let covered: Vec<i32> = (0..1024).filter(|x| alpha.covers(*x, 128)).collect();
     assert!(covered[0].abs_diff(512) <= 2 && covered.len() == (1024 - covered[0]) as usize, "{:?}", covered.first());
-    let border = |a| AlphaSampler::with(Arc::new(Level::from_raster(image.clone())), &one_to_one(4, 1), Wrap::Border, a).covers(2000, 128);
+    let border = |a| AlphaSampler::new(Arc::new(Level::from_raster(image.clone())), &one_to_one(4, 1), Wrap::Border, a).covers(2000, 128);
     assert!(border(255) && !border(0));
 }
 
@@ -105,12 +105,12 @@ fn samples_of_a_pixel_are_covered_as_one_by_one() {
     for wrap in [Wrap::Wrap, Wrap::Mirror, Wrap::Clamp, Wrap::Border, Wrap::None] {
         let slopes = [0; 4].map(|_| (random.unit() - 0.5) / 4.0);
         let map = UvMap { u: [random.unit(), slopes[0], slopes[1]], v: [random.unit(), slopes[2], slopes[3]] };
-        let stencil = AlphaSampler::with(level.clone(), &map, wrap, 77);
+        let stencil = AlphaSampler::new(level.clone(), &map, wrap, 77);
         for (i, j) in (0..256).map(|p| (p % 16, p / 16)) {
             let position = |c: i32, s: u8| (c << POSITION_BITS) + i32::from(s) * (1 << (POSITION_BITS - 4));
             let expected = SAMPLES.iter().enumerate().fold(0, |m, (k, (x, y))| m | u32::from(stencil.covers(position(i, *x), position(j, *y))) << k);
-            assert_eq!(stencil.covered(i, j, 0xFFFF), expected, "{wrap:?} ({i}, {j})");
-            assert_eq!(stencil.covered(i, j, 0x5A5A), expected & 0x5A5A);
+            assert_eq!(stencil.covered_samples(i, j, 0xFFFF), expected, "{wrap:?} ({i}, {j})");
+            assert_eq!(stencil.covered_samples(i, j, 0x5A5A), expected & 0x5A5A);
             counts[0] += expected.count_ones();
             counts[1] += 16 - expected.count_ones();
         }
@@ -126,11 +126,11 @@ fn a_place_is_covered_as_the_origin_of_a_map_that_begins_there() {
     let mut covered = 0;
     for wrap in [Wrap::Wrap, Wrap::Mirror, Wrap::Clamp, Wrap::Border, Wrap::None] {
         let map = |u: f64, v: f64| UvMap { u: [u, 0.03, -0.01], v: [v, 0.02, 0.05] };
-        let sampler = AlphaSampler::with(level.clone(), &map(0.3, -4.2), wrap, 90);
+        let sampler = AlphaSampler::new(level.clone(), &map(0.3, -4.2), wrap, 90);
         for k in 0..2_000 {
             let place = if k == 0 { [f64::NAN, 1.0] } else { [0, 1].map(|_| (random.unit() - 0.5) * [1.5, 9.0, 4e9][k % 3]) };
-            let expected = AlphaSampler::with(level.clone(), &map(place[0], place[1]), wrap, 90).covers(0, 0);
-            assert_eq!(sampler.covers_at(place), expected, "{wrap:?} {place:?}");
+            let expected = AlphaSampler::new(level.clone(), &map(place[0], place[1]), wrap, 90).covers(0, 0);
+            assert_eq!(sampler.covers_uv(place), expected, "{wrap:?} {place:?}");
             covered += u32::from(expected);
         }
     }
@@ -155,7 +155,7 @@ fn samples_come_near_the_exact_integral() {
     for _ in 0..40 {
         let mut part = |s: f64| (random.unit() - 0.5) * s / 64.0;
         let uv = UvMap { u: [0.3, part(5.0), part(5.0)], v: [0.6, part(5.0), part(5.0)] };
-        let plan = footprint(uv.jacobian(64, 64), 1, &Tuning::default());
+        let plan = compute_footprint(uv.jacobian(64, 64), 1, &Tuning::default());
         let sampler = Sampler::new(level.clone(), made(&plan), false, &uv, Wrap::Wrap, WHITE);
         for (x, y) in [(0.5, 0.5), (7.5, 3.5), (30.5, 60.5)] {
             let exact = integral(&image, &uv, x, y);

@@ -5,25 +5,25 @@ use std::sync::Arc;
 use map3d_base::asset::Wrap;
 use map3d_base::samples::SAMPLES;
 
-use crate::sample::grid::Grid;
-use crate::sample::sampler::{POSITION_BITS, UvMap};
-use crate::sample::tap::{FULL, TAP_BITS, WEIGHT_BITS, single};
+use crate::sample::tap::{FULL, TAP_BITS, WEIGHT_BITS, sum_single_tap};
+use crate::sample::texel_map::{TexelMap, TexelPoint};
+use crate::sample::uv_map::{POSITION_BITS, UvMap};
 use crate::store::{AlphaCell, Level, Texture};
 
-/// Positions a 1/16 pixel.
-const STEP: i32 = 1 << (POSITION_BITS - 4);
+/// A sixteenth of a pixel in positions.
+const SIXTEENTH: i32 = 1 << (POSITION_BITS - 4);
 
-/// Whether a cut-out surface covers a sample: alpha ≥ ½, filtered at about a sample's footprint (a quarter pixel).
+/// Tests whether a cut-out surface covers a sample: alpha ≥ ½, filtered over about a sample's footprint (a quarter pixel).
 pub struct AlphaSampler {
-    grid: Grid,
+    map: TexelMap,
     /// From a pixel's origin to its samples.
-    steps: [[i64; 2]; 16],
+    sample_offsets: [TexelPoint; 16],
     /// Alpha outside the texture; `FULL` = 1.
     outside: u32,
 }
 
 impl AlphaSampler {
-    /// The level whose texels are about as large as a sample's footprint.
+    /// Returns the level whose texels are about as large as a sample's footprint.
     pub fn level_for(texture: &Texture, uv: &UvMap) -> u32 {
         let file = &texture.file;
         let [a, b] = uv.jacobian(file.width, file.height);
@@ -31,32 +31,36 @@ impl AlphaSampler {
         if side > 1.0 && side.is_finite() { (side.log2().round() as u32).min(file.levels - 1) } else { 0 }
     }
 
-    pub fn with(level: Arc<Level>, uv: &UvMap, wrap: Wrap, border_alpha: u8) -> Self {
+    pub fn new(level: Arc<Level>, uv: &UvMap, wrap: Wrap, border_alpha: u8) -> Self {
         let alpha = if wrap == Wrap::Border { border_alpha } else { 255 };
-        let grid = Grid::new(level, wrap, uv);
-        let steps = SAMPLES.map(|(x, y)| grid.step(i32::from(x) * STEP, i32::from(y) * STEP));
-        Self { grid, steps, outside: (u32::from(alpha) * FULL + 127) / 255 }
+        let map = TexelMap::new(level, wrap, uv);
+        let sample_offsets = SAMPLES.map(|(x, y)| map.change(i32::from(x) * SIXTEENTH, i32::from(y) * SIXTEENTH));
+        Self { map, sample_offsets, outside: (u32::from(alpha) * FULL + 127) / 255 }
     }
 
-    /// At a position in 2^-8 px from the map's origin.
+    /// Whether the surface covers a position in 2^-8 px from the map's origin.
     #[inline(always)]
     pub fn covers(&self, x: i32, y: i32) -> bool {
-        self.covers_texel(self.grid.at(x, y))
+        self.covers_texel(self.map.at(x, y))
     }
 
-    /// Those of the `asked` samples of pixel (i, j) that are covered; bit k is sample k.
-    pub fn covered(&self, i: i32, j: i32, asked: u32) -> u32 {
-        let [x, y] = self.grid.far_at(i << POSITION_BITS, j << POSITION_BITS);
-        let mut rest = asked & 0xFFFF;
+    /// Whether the surface covers texture coordinates (u right, v up), as `covers` says for the origin of a map that begins there.
+    pub fn covers_uv(&self, [u, v]: [f64; 2]) -> bool {
+        self.covers_texel(self.map.of_uv(u, v))
+    }
+
+    /// Returns those of the given samples of pixel (i, j) that the surface covers; bit k is sample k.
+    pub fn covered_samples(&self, i: i32, j: i32, samples: u32) -> u32 {
+        let origin = self.map.unwrapped_at(i << POSITION_BITS, j << POSITION_BITS);
+        let mut rest = samples & 0xFFFF;
         let mut covered = 0;
         while rest != 0 {
             let k = rest.trailing_zeros();
             rest &= rest - 1;
-            let [dx, dy] = self.steps[k as usize];
-            let texel = self.grid.home([x.wrapping_add(dx), y.wrapping_add(dy)]);
-            let is_covered = match self.grid.cell(texel) {
-                AlphaCell::Clear => false,
-                AlphaCell::Solid => true,
+            let texel = self.map.into_first_period(origin.offset(self.sample_offsets[k as usize]));
+            let is_covered = match self.map.alpha_cell(texel) {
+                AlphaCell::Transparent => false,
+                AlphaCell::Opaque => true,
                 AlphaCell::Mixed => self.covers_texel(texel),
             };
             covered |= u32::from(is_covered) << k;
@@ -64,15 +68,10 @@ impl AlphaSampler {
         covered
     }
 
-    /// At texture coordinates (u right, v up): as a sampler whose map has them for its origin covers that.
-    pub fn covers_at(&self, [u, v]: [f64; 2]) -> bool {
-        self.covers_texel(self.grid.of_uv(u, v))
-    }
-
     #[inline(always)]
-    fn covers_texel(&self, texel: [i64; 2]) -> bool {
-        let ([upper, lower], weights, outside) = self.grid.tap(texel);
-        let around = (outside * self.outside) >> (2 * WEIGHT_BITS - TAP_BITS);
-        (single(upper, lower, 3, weights) + around) * 2 >= FULL << TAP_BITS
+    fn covers_texel(&self, texel: TexelPoint) -> bool {
+        let tap = self.map.tap(texel);
+        let around = (tap.outside * self.outside) >> (2 * WEIGHT_BITS - TAP_BITS);
+        (sum_single_tap(tap.texels, 3, tap.weights) + around) * 2 >= FULL << TAP_BITS
     }
 }

@@ -1,14 +1,15 @@
-//! Sampling a texture over pixels (spec/pyramid.md §5: in linear light).
+//! Samples a texture over pixels, in linear light (spec/pyramid.md §5).
 
 mod alpha;
 mod footprint;
-mod grid;
 mod plan;
 mod sampler;
 mod tap;
-mod wide;
+mod texel_map;
+mod uv_map;
 
 pub use alpha::AlphaSampler;
-pub use footprint::{Footprint, MAX_TAPS, Tuning, footprint};
-pub use plan::{TapPlan, TapPlans};
-pub use sampler::{Outside, POSITION_BITS, Sampler, UvMap};
+pub use footprint::{Footprint, MAX_TAPS, Tuning, compute_footprint};
+pub use plan::{TapPlan, TapPlanCache};
+pub use sampler::{Sampler, SurfaceColors};
+pub use uv_map::{POSITION_BITS, UvMap};

@@ -1,174 +1,186 @@
-//! A texture on one surface of one view: level, taps and coordinates are fixed when it is set up; a sample is integers only.
+//! The colour of a textured surface over pixels: footprint → level → taps → sum.
+//!
+//! Setting up a sampler fixes the level and the taps (`footprint`, `plan`) and the texel coordinates (`texel_map`); sampling then uses integers only.
 
 use std::sync::Arc;
 
+use map3d_base::Isa;
 use map3d_base::asset::Wrap;
-
-use crate::sample::grid::{Grid, TEXEL_BITS};
-use crate::sample::plan::TapPlan;
-use crate::sample::tap::{FULL, PLACE_BITS, Placed, PlainSum, TAP_BITS, TapSum, WEIGHT_BITS};
-use crate::sample::wide;
-use crate::store::Level;
 use map3d_image::srgb::LINEAR16;
 
-/// Positions are given in 2^-POSITION_BITS pixel.
-pub const POSITION_BITS: u32 = 8;
+use crate::sample::plan::TapPlan;
+#[cfg(target_arch = "x86_64")]
+use crate::sample::tap::Avx2Accumulator;
+use crate::sample::tap::{FULL, ResolvedTaps, ScalarAccumulator, TAP_BITS, TapAccumulator, WEIGHT_BITS};
+use crate::sample::texel_map::{TexelMap, TexelPoint};
+use crate::sample::uv_map::{POSITION_BITS, UvMap};
+use crate::store::Level;
 
-/// Texture coordinates over pixels (u right, v up, whole images): value at the origin, change per pixel to the right, per pixel down.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct UvMap {
-    pub u: [f64; 3],
-    pub v: [f64; 3],
-}
-
-impl UvMap {
-    /// Texels of level 0 (right, down) per pixel to the right and per pixel down.
-    pub fn jacobian(&self, width: u32, height: u32) -> [[f64; 2]; 2] {
-        let (w, h) = (f64::from(width), f64::from(height));
-        [[self.u[1] * w, -self.v[1] * h], [self.u[2] * w, -self.v[2] * h]]
-    }
-}
-
-/// What multiplies the texture, and what lies outside of it with `Wrap::Border` and `Wrap::None`. sRGB bytes.
+/// sRGB colours of a textured surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Outside {
+pub struct SurfaceColors {
+    /// Multiplies the texture; with `Wrap::None` also shows outside it.
     pub diffuse: [u8; 4],
+    /// Shows outside the texture with `Wrap::Border`.
     pub border: [u8; 4],
 }
 
-/// Colour of a textured surface over whole pixels.
+/// Samples the colour of one textured surface in one view.
 pub struct Sampler {
-    grid: Grid,
+    map: TexelMap,
     plan: Arc<TapPlan>,
     has_alpha: bool,
     /// Linear light.
     diffuse: [u16; 3],
+    /// Linear light outside the texture.
     outside: [u16; 3],
 }
 
 impl Sampler {
-    /// `level`: the plan's, of the texture.
-    pub fn new(level: Arc<Level>, plan: Arc<TapPlan>, has_alpha: bool, uv: &UvMap, wrap: Wrap, outside: Outside) -> Self {
+    /// `level`: the plan's level of the texture.
+    pub fn new(level: Arc<Level>, plan: Arc<TapPlan>, has_alpha: bool, uv: &UvMap, wrap: Wrap, colors: SurfaceColors) -> Self {
         let linear = |c: [u8; 4]| [c[0], c[1], c[2]].map(|b| LINEAR16[b as usize]);
-        let around = if wrap == Wrap::Border { outside.border } else { outside.diffuse };
-        Self { grid: Grid::new(level, wrap, uv), plan, has_alpha, diffuse: linear(outside.diffuse), outside: linear(around) }
+        let outside = if wrap == Wrap::Border { colors.border } else { colors.diffuse };
+        Self { map: TexelMap::new(level, wrap, uv), plan, has_alpha, diffuse: linear(colors.diffuse), outside: linear(outside) }
     }
 
-    /// Linear light, 16 bits, of the pixel's square around a position (2^-8 px from the map's origin).
+    /// Returns linear light, 16 bits, of a pixel's square around a position (2^-8 px from the map's origin).
     #[inline]
     pub fn sample(&self, x: i32, y: i32) -> [u16; 3] {
-        wide::sample(self.plan.isa, self, x, y)
+        match self.plan.isa {
+            Isa::Scalar => self.sample_with::<ScalarAccumulator>(x, y),
+            // SAFETY: a plan is made only with an instruction set that the processor has; both have AVX2.
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx2 | Isa::Avx512 => unsafe { self.sample_avx2(x, y) },
+        }
     }
 
-    /// A row of pixels, the first around (x, y); full coverage.
+    /// Samples a row of pixels, the first around (x, y); coverage is full.
     #[inline]
-    pub fn row(&self, x: i32, y: i32, out: &mut [[u16; 4]]) {
-        wide::row(self.plan.isa, self, x, y, out);
+    pub fn sample_row(&self, x: i32, y: i32, out: &mut [[u16; 4]]) {
+        match self.plan.isa {
+            Isa::Scalar => self.sample_row_with::<ScalarAccumulator>(x, y, out),
+            // SAFETY: as above.
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx2 | Isa::Avx512 => unsafe { self.sample_row_avx2(x, y, out) },
+        }
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+    fn sample_avx2(&self, x: i32, y: i32) -> [u16; 3] {
+        self.sample_with::<Avx2Accumulator>(x, y)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+    fn sample_row_avx2(&self, x: i32, y: i32, out: &mut [[u16; 4]]) {
+        self.sample_row_with::<Avx2Accumulator>(x, y, out);
     }
 
     #[inline(always)]
-    pub(super) fn sample_with<S: TapSum>(&self, x: i32, y: i32) -> [u16; 3] {
-        let t = self.grid.at(x, y);
-        match self.grid.is_inside(t, &self.plan.reach) {
-            true => self.inner::<S>(t),
-            false => self.outer(t),
+    fn sample_with<A: TapAccumulator>(&self, x: i32, y: i32) -> [u16; 3] {
+        let t = self.map.at(x, y);
+        match self.map.is_inside(t, &self.plan.extent) {
+            true => self.sum_inside::<A>(t),
+            false => self.sum_at_edge(t),
         }
     }
 
     #[inline(always)]
-    pub(super) fn row_with<S: TapSum>(&self, x: i32, y: i32, out: &mut [[u16; 4]]) {
+    fn sample_row_with<A: TapAccumulator>(&self, x: i32, y: i32, out: &mut [[u16; 4]]) {
         let Some(last) = out.len().checked_sub(1) else { return };
-        let ([tx, ty], far) = (self.grid.at(x, y), self.grid.far_at(x, y));
-        // Both ends in one period and inside: so is all between them.
-        let end = self.grid.far_at(x + ((last as i32) << POSITION_BITS), y);
-        let end = [end[0].wrapping_sub(far[0]).wrapping_add(tx), end[1].wrapping_sub(far[1]).wrapping_add(ty)];
-        if self.grid.is_inside([tx, ty], &self.plan.reach) && self.grid.is_inside(end, &self.plan.reach) {
-            self.inner_row::<S>([tx, ty], out);
-        } else {
-            for (k, pixel) in out.iter_mut().enumerate() {
-                let [r, g, b] = self.sample_with::<S>(x + ((k as i32) << POSITION_BITS), y);
-                *pixel = [r, g, b, 65_535];
-            }
+        // The row is inside where both its ends are, within one period.
+        let (start, unwrapped) = (self.map.at(x, y), self.map.unwrapped_at(x, y));
+        let end = self.map.unwrapped_at(x + ((last as i32) << POSITION_BITS), y).minus(unwrapped).offset(start);
+        if self.map.is_inside(start, &self.plan.extent) && self.map.is_inside(end, &self.plan.extent) {
+            return self.sum_row_inside::<A>(start, out);
+        }
+        // Otherwise each pixel decides for itself.
+        for (k, pixel) in out.iter_mut().enumerate() {
+            let [r, g, b] = self.sample_with::<A>(x + ((k as i32) << POSITION_BITS), y);
+            *pixel = [r, g, b, 65_535];
         }
     }
 
+    /// Sums taps that all lie inside the texture.
     #[inline(always)]
-    fn inner<S: TapSum>(&self, t: [i64; 2]) -> [u16; 3] {
-        let (mut sum, mut placed) = (S::new(), Placed::NONE);
+    fn sum_inside<A: TapAccumulator>(&self, t: TexelPoint) -> [u16; 3] {
+        let (mut sum, mut taps) = (A::new(), ResolvedTaps::NONE);
         for batch in &self.plan.batches {
-            self.grid.place::<S>(batch, t, &mut placed);
-            self.grid.add(&placed, &mut sum);
+            self.map.resolve::<A>(batch, t, &mut taps);
+            self.map.accumulate(&taps, &mut sum);
         }
-        self.finished(sum.channels())
+        self.color_inside(sum.channels())
     }
 
-    /// A row of pixels that are all inside, the first around a place. Each batch is placed while the one before it is added.
+    /// Samples a row of pixels whose taps all lie inside, the first around `t`. Resolves each batch while the one before it is added.
     #[inline(always)]
-    fn inner_row<S: TapSum>(&self, [mut tx, mut ty]: [i64; 2], out: &mut [[u16; 4]]) {
-        let [dx, dy] = self.grid.pixel_step();
+    fn sum_row_inside<A: TapAccumulator>(&self, mut t: TexelPoint, out: &mut [[u16; 4]]) {
+        let change = self.map.pixel_change();
         let batches = self.plan.batches.as_slice();
-        let mut ring = [Placed::NONE; 2];
-        self.grid.place::<S>(&batches[0], [tx, ty], &mut ring[0]);
+        let mut ring = [ResolvedTaps::NONE; 2];
+        self.map.resolve::<A>(&batches[0], t, &mut ring[0]);
         let mut turn = 0;
         for pixel in out {
-            let next = [tx.wrapping_add(dx), ty.wrapping_add(dy)];
-            let mut sum = S::new();
+            let next = t.offset(change);
+            let mut sum = A::new();
+            // By index: an iterator over the batches costs a third more time here.
             for k in 1..batches.len() {
-                self.grid.place::<S>(&batches[k], [tx, ty], &mut ring[(turn + 1) & 1]);
-                self.grid.add(&ring[turn & 1], &mut sum);
+                self.map.resolve::<A>(&batches[k], t, &mut ring[(turn + 1) & 1]);
+                self.map.accumulate(&ring[turn & 1], &mut sum);
                 turn += 1;
             }
-            // That of the pixel after the last is not used: its place may be outside.
-            self.grid.place::<S>(&batches[0], next, &mut ring[(turn + 1) & 1]);
-            self.grid.add(&ring[turn & 1], &mut sum);
+            // The batch of the pixel after the last one may lie outside; it is not used.
+            self.map.resolve::<A>(&batches[0], next, &mut ring[(turn + 1) & 1]);
+            self.map.accumulate(&ring[turn & 1], &mut sum);
             turn += 1;
-            let [r, g, b] = self.finished(sum.channels());
+            let [r, g, b] = self.color_inside(sum.channels());
             *pixel = [r, g, b, 65_535];
-            [tx, ty] = next;
+            t = next;
         }
     }
 
-    #[inline(always)]
-    fn finished(&self, channels: [u32; 4]) -> [u16; 3] {
-        match self.has_alpha {
-            false => self.full(channels),
-            true => self.mixed(channels, 0),
-        }
-    }
-
-    /// Taps that may fall over the texture's edges, one by one.
+    /// Sums taps that may cross the edges of the texture, one by one.
     #[inline(never)]
-    fn outer(&self, t: [i64; 2]) -> [u16; 3] {
-        let mut sum = PlainSum::new();
+    fn sum_at_edge(&self, t: TexelPoint) -> [u16; 3] {
+        let mut sum = ScalarAccumulator::new();
         let mut outside = 0;
         for batch in &self.plan.batches {
             for k in 0..batch.count {
-                let at = |c: i64, d: i32| (c >> (TEXEL_BITS - PLACE_BITS)).saturating_add(i64::from(d)) << (TEXEL_BITS - PLACE_BITS);
-                let ([upper, lower], weights, beyond) = self.grid.tap([at(t[0], batch.x[k]), at(t[1], batch.y[k])]);
-                sum.add(upper, lower, weights);
-                outside += beyond;
+                let tap = self.map.tap(t.offset_by_tap(batch.x[k], batch.y[k]));
+                sum.add(tap.texels, tap.weights);
+                outside += tap.outside;
             }
-            sum.settle();
+            sum.flush();
         }
         match outside == 0 && !self.has_alpha {
-            true => self.full(sum.channels()),
-            false => self.mixed(sum.channels(), outside),
+            true => self.opaque_color(sum.channels()),
+            false => self.blended_color(sum.channels(), outside),
         }
     }
 
-    /// An opaque sum.
     #[inline(always)]
-    fn full(&self, channels: [u32; 4]) -> [u16; 3] {
+    fn color_inside(&self, channels: [u32; 4]) -> [u16; 3] {
+        match self.has_alpha {
+            false => self.opaque_color(channels),
+            true => self.blended_color(channels, 0),
+        }
+    }
+
+    /// Scales a sum of opaque texels and multiplies it by the diffuse colour.
+    #[inline(always)]
+    fn opaque_color(&self, channels: [u32; 4]) -> [u16; 3] {
         let (scale, mut out) = (self.plan.scale, [0; 3]);
         for c in 0..3 {
-            out[c] = multiplied(((u64::from(channels[c]) * scale + (1 << 39)) >> 40) as u32, self.diffuse[c]);
+            out[c] = multiply(((u64::from(channels[c]) * scale + (1 << 39)) >> 40) as u32, self.diffuse[c]);
         }
         out
     }
 
-    /// Weighs by alpha, and with what lies outside the texture.
+    /// Divides a sum by its alpha, with the weight that falls outside the texture.
     #[inline(never)]
-    fn mixed(&self, channels: [u32; 4], outside: u32) -> [u16; 3] {
+    fn blended_color(&self, channels: [u32; 4], outside: u32) -> [u16; 3] {
         let around = (u64::from(outside) * u64::from(FULL)) >> (2 * WEIGHT_BITS - TAP_BITS);
         let total = u64::from(channels[3]) + around;
         if total == 0 {
@@ -183,6 +195,6 @@ impl Sampler {
 }
 
 #[inline(always)]
-fn multiplied(c: u32, d: u16) -> u16 {
+fn multiply(c: u32, d: u16) -> u16 {
     if d == 65_535 { c as u16 } else { ((u64::from(c) * u64::from(d) + 32_767) / 65_535) as u16 }
 }

@@ -1,97 +1,140 @@
-//! Bilinear taps in integers, the same on every machine: texels are bytes q that stand for linear light q², weights have 14 bits, sums 24.
+//! Bilinear taps in integers, equal on every machine: a texel's byte q is the square root of its linear light q², weights have 14 bits, sums 24.
+
+use bytemuck::{Pod, Zeroable};
 
 /// Bits of a tap's position within a texel.
 pub const WEIGHT_BITS: u32 = 7;
-/// Fraction bits of the taps' places.
-pub const PLACE_BITS: u32 = 16;
+/// A whole texel in weights.
+pub const WEIGHT_ONE: u32 = 1 << WEIGHT_BITS;
+/// Fraction bits of the positions of taps.
+pub const TAP_POSITION_BITS: u32 = 16;
 /// A tap adds a texel's 15 bits times 2^TAP_BITS.
 pub const TAP_BITS: u32 = 9;
 /// Linear light of a full texel in a sum: 255² in 15 bits.
 pub const FULL: u32 = 255 * 255 / 2;
-/// Taps between two calls of `settle`, at most: so many full ones fit 32 bits.
+/// Most taps between two calls of `flush`: the sum of this many full ones fits 32 bits.
 pub const BATCH: usize = 8;
 
-const ONE: u32 = 1 << WEIGHT_BITS;
 const DROP: u32 = 2 * WEIGHT_BITS - TAP_BITS;
 
-/// Weights of a tap's left and right texels, together 2^14; the upper texel's in the lower 16 bits.
-pub type Weights = [i32; 2];
-
-/// At fractions in 1/128 texel.
-#[inline(always)]
-pub fn weights(fx: u32, fy: u32) -> Weights {
-    let (gx, gy) = (ONE - fx, ONE - fy);
-    [((gx * gy) | ((gx * fy) << 16)) as i32, ((fx * gy) | ((fx * fy) << 16)) as i32]
+/// Weights of a tap's texels, together 2^14; the upper texel's weight is in the lower 16 bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct BilinearWeights {
+    left: i32,
+    right: i32,
 }
 
-/// Two texels side by side.
-pub type Pair = [[u8; 4]; 2];
+impl BilinearWeights {
+    #[inline(always)]
+    fn upper_left(self) -> u32 {
+        self.left as u32 & 0xFFFF
+    }
+
+    #[inline(always)]
+    fn lower_left(self) -> u32 {
+        self.left as u32 >> 16
+    }
+
+    #[inline(always)]
+    fn upper_right(self) -> u32 {
+        self.right as u32 & 0xFFFF
+    }
+
+    #[inline(always)]
+    fn lower_right(self) -> u32 {
+        self.right as u32 >> 16
+    }
+}
+
+/// Returns the weights at fractions in 1/128 texel.
+#[inline(always)]
+pub fn bilinear_weights(fx: u32, fy: u32) -> BilinearWeights {
+    let (gx, gy) = (WEIGHT_ONE - fx, WEIGHT_ONE - fy);
+    BilinearWeights { left: ((gx * gy) | ((gx * fy) << 16)) as i32, right: ((fx * gy) | ((fx * fy) << 16)) as i32 }
+}
+
+/// The four texels of a bilinear tap, each pair from left to right.
+#[derive(Clone, Copy)]
+pub struct TexelQuad {
+    pub upper: [[u8; 4]; 2],
+    pub lower: [[u8; 4]; 2],
+}
 
 /// Texels and weights of a batch of taps.
 #[derive(Clone, Copy)]
-pub struct Placed {
+pub struct ResolvedTaps {
     /// Numbers of the upper left texels.
-    pub at: [i32; BATCH],
-    pub weights: [Weights; BATCH],
+    pub texel: [i32; BATCH],
+    pub weights: [BilinearWeights; BATCH],
     pub count: usize,
 }
 
-impl Placed {
-    pub const NONE: Self = Self { at: [0; BATCH], weights: [[0; 2]; BATCH], count: 0 };
+impl ResolvedTaps {
+    pub const NONE: Self = Self { texel: [0; BATCH], weights: [BilinearWeights { left: 0, right: 0 }; BATCH], count: 0 };
 }
 
-/// A sum of taps: four channels.
-pub trait TapSum: Copy {
+/// Sums bilinear taps in four channels.
+pub trait TapAccumulator: Copy {
     fn new() -> Self;
-    /// Adds a bilinear tap of an upper and a lower pair, with weights as of `weights`.
-    fn add(&mut self, upper: Pair, lower: Pair, weights: Weights);
-    /// To be called after every `BATCH` taps, and at the end.
-    fn settle(&mut self);
+    /// Adds a bilinear tap.
+    fn add(&mut self, texels: TexelQuad, weights: BilinearWeights);
+    /// Adds the batch to the total; call it after every `BATCH` taps and at the end.
+    fn flush(&mut self);
     fn channels(self) -> [u32; 4];
-    /// Finds texels and weights of taps at offsets (right, down) from a place, in a level that is `width` texels wide.
-    fn place(right: &[i32; BATCH], down: &[i32; BATCH], center: [i32; 2], width: i32, out: &mut Placed);
+    /// Finds texels and weights of taps at offsets (right, down) from a centre, in a level that is `width` texels vector.
+    fn resolve(right: &[i32; BATCH], down: &[i32; BATCH], center: [i32; 2], width: i32, out: &mut ResolvedTaps);
 }
 
-/// Linear light of a texel's byte in 15 bits.
+/// Returns the linear light of a texel's byte in 15 bits.
 #[inline(always)]
 fn linear(q: u8) -> u32 {
     (u32::from(q) * u32::from(q)) >> 1
 }
 
-/// One channel of a single bilinear tap, as a sum has it.
+/// Weighs one channel of a tap: sums of the left and of the right texels.
 #[inline(always)]
-pub fn single(upper: Pair, lower: Pair, channel: usize, weights: Weights) -> u32 {
-    let w = |k: usize| weights[k / 2] as u32 >> (16 * (k % 2)) & 0xFFFF;
-    let left = linear(upper[0][channel]) * w(0) + linear(lower[0][channel]) * w(1);
-    let right = linear(upper[1][channel]) * w(2) + linear(lower[1][channel]) * w(3);
+fn weighted_columns(texels: TexelQuad, channel: usize, w: BilinearWeights) -> [u32; 2] {
+    let (upper, lower) = (texels.upper, texels.lower);
+    [
+        linear(upper[0][channel]) * w.upper_left() + linear(lower[0][channel]) * w.lower_left(),
+        linear(upper[1][channel]) * w.upper_right() + linear(lower[1][channel]) * w.lower_right(),
+    ]
+}
+
+/// Returns what an accumulator holds in one channel after a single tap.
+#[inline(always)]
+pub fn sum_single_tap(texels: TexelQuad, channel: usize, weights: BilinearWeights) -> u32 {
+    let [left, right] = weighted_columns(texels, channel, weights);
     (left >> DROP) + (right >> DROP)
 }
 
-/// On any machine.
+/// Works on any machine.
 #[derive(Clone, Copy)]
-pub struct PlainSum {
+pub struct ScalarAccumulator {
+    /// The batch: sums of left and of right texels, kept apart as the vectors do.
     left: [u32; 4],
     right: [u32; 4],
     total: [u32; 4],
 }
 
-impl TapSum for PlainSum {
+impl TapAccumulator for ScalarAccumulator {
     #[inline(always)]
     fn new() -> Self {
         Self { left: [0; 4], right: [0; 4], total: [0; 4] }
     }
 
     #[inline(always)]
-    fn add(&mut self, upper: Pair, lower: Pair, weights: Weights) {
+    fn add(&mut self, texels: TexelQuad, weights: BilinearWeights) {
         for c in 0..4 {
-            let w = |k: usize| weights[k / 2] as u32 >> (16 * (k % 2)) & 0xFFFF;
-            self.left[c] = self.left[c].wrapping_add(linear(upper[0][c]) * w(0) + linear(lower[0][c]) * w(1));
-            self.right[c] = self.right[c].wrapping_add(linear(upper[1][c]) * w(2) + linear(lower[1][c]) * w(3));
+            let [left, right] = weighted_columns(texels, c, weights);
+            self.left[c] = self.left[c].wrapping_add(left);
+            self.right[c] = self.right[c].wrapping_add(right);
         }
     }
 
     #[inline(always)]
-    fn settle(&mut self) {
+    fn flush(&mut self) {
         for c in 0..4 {
             self.total[c] += (self.left[c] >> DROP) + (self.right[c] >> DROP);
         }
@@ -104,77 +147,77 @@ impl TapSum for PlainSum {
     }
 
     #[inline(always)]
-    fn place(right: &[i32; BATCH], down: &[i32; BATCH], center: [i32; 2], width: i32, out: &mut Placed) {
+    fn resolve(right: &[i32; BATCH], down: &[i32; BATCH], center: [i32; 2], width: i32, out: &mut ResolvedTaps) {
         for k in 0..BATCH {
             let (x, y) = (center[0].wrapping_add(right[k]), center[1].wrapping_add(down[k]));
-            out.at[k] = (y >> PLACE_BITS).wrapping_mul(width).wrapping_add(x >> PLACE_BITS);
-            let fraction = |c: i32| (c >> (PLACE_BITS - WEIGHT_BITS)) as u32 & (ONE - 1);
-            out.weights[k] = weights(fraction(x), fraction(y));
+            out.texel[k] = (y >> TAP_POSITION_BITS).wrapping_mul(width).wrapping_add(x >> TAP_POSITION_BITS);
+            let fraction = |c: i32| (c >> (TAP_POSITION_BITS - WEIGHT_BITS)) as u32 & (WEIGHT_ONE - 1);
+            out.weights[k] = bilinear_weights(fraction(x), fraction(y));
         }
     }
 }
 
 #[cfg(target_arch = "x86_64")]
-pub use wide::WideSum;
+pub use avx2::Avx2Accumulator;
 
 #[cfg(target_arch = "x86_64")]
-mod wide {
+mod avx2 {
     use std::arch::x86_64::*;
 
-    use super::{BATCH, DROP, ONE, PLACE_BITS, Pair, Placed, TapSum, WEIGHT_BITS, Weights};
+    use super::{BATCH, BilinearWeights, DROP, ResolvedTaps, TAP_POSITION_BITS, TapAccumulator, TexelQuad, WEIGHT_BITS, WEIGHT_ONE};
 
-    /// In 256-bit registers. SAFETY, for every block here: needs AVX2; the type is named only in `sample::wide`, whose functions run after the
-    /// processor was asked. Nothing is read or written through pointers but the locals named.
+    /// Works in 256-bit registers. SAFETY, for every block here: needs AVX2; only functions of `Sampler` with that target feature name the type, and
+    /// they run after a check of the processor. Pointers reach only the locals that are named.
     #[derive(Clone, Copy)]
-    pub struct WideSum {
-        /// Channels 0 to 3, each of the left and of the right column.
-        part: __m256i,
+    pub struct Avx2Accumulator {
+        /// Channels 0 to 3 of the batch, for each the sum of the left and of the right texels.
+        batch: __m256i,
         total: __m256i,
     }
 
-    impl TapSum for WideSum {
+    impl TapAccumulator for Avx2Accumulator {
         #[inline(always)]
         fn new() -> Self {
             // SAFETY: see the type.
-            unsafe { Self { part: _mm256_setzero_si256(), total: _mm256_setzero_si256() } }
+            unsafe { Self { batch: _mm256_setzero_si256(), total: _mm256_setzero_si256() } }
         }
 
         #[inline(always)]
-        fn add(&mut self, upper: Pair, lower: Pair, weights: Weights) {
+        fn add(&mut self, texels: TexelQuad, weights: BilinearWeights) {
             // SAFETY: see the type.
             unsafe {
                 // Bytes: channel by channel the texels TL, BL, TR, BR.
                 let order = _mm_setr_epi8(0, 8, 4, 12, 1, 9, 5, 13, 2, 10, 6, 14, 3, 11, 7, 15);
-                let texels = _mm_set_epi64x(bytemuck::cast(lower), bytemuck::cast(upper));
-                let q = _mm256_cvtepu8_epi16(_mm_shuffle_epi8(texels, order));
+                let rows = _mm_set_epi64x(bytemuck::cast(texels.lower), bytemuck::cast(texels.upper));
+                let q = _mm256_cvtepu8_epi16(_mm_shuffle_epi8(rows, order));
                 let linear = _mm256_srli_epi16::<1>(_mm256_mullo_epi16(q, q));
-                self.part = _mm256_add_epi32(self.part, _mm256_madd_epi16(linear, _mm256_set1_epi64x(bytemuck::cast(weights))));
+                self.batch = _mm256_add_epi32(self.batch, _mm256_madd_epi16(linear, _mm256_set1_epi64x(bytemuck::cast(weights))));
             }
         }
 
         #[inline(always)]
-        fn settle(&mut self) {
+        fn flush(&mut self) {
             // SAFETY: see the type.
             unsafe {
-                self.total = _mm256_add_epi32(self.total, _mm256_srli_epi32::<{ DROP as i32 }>(self.part));
-                self.part = _mm256_setzero_si256();
+                self.total = _mm256_add_epi32(self.total, _mm256_srli_epi32::<{ DROP as i32 }>(self.batch));
+                self.batch = _mm256_setzero_si256();
             }
         }
 
         #[inline(always)]
-        fn place(right: &[i32; BATCH], down: &[i32; BATCH], center: [i32; 2], width: i32, out: &mut Placed) {
+        fn resolve(right: &[i32; BATCH], down: &[i32; BATCH], center: [i32; 2], width: i32, out: &mut ResolvedTaps) {
             // SAFETY: see the type; loads and stores go through references to arrays of the bytes they touch.
             unsafe {
                 let x = _mm256_add_epi32(_mm256_set1_epi32(center[0]), _mm256_loadu_si256(right.as_ptr().cast()));
                 let y = _mm256_add_epi32(_mm256_set1_epi32(center[1]), _mm256_loadu_si256(down.as_ptr().cast()));
-                let rows = _mm256_mullo_epi32(_mm256_srai_epi32::<{ PLACE_BITS as i32 }>(y), _mm256_set1_epi32(width));
-                let at = _mm256_add_epi32(rows, _mm256_srai_epi32::<{ PLACE_BITS as i32 }>(x));
-                _mm256_storeu_si256(out.at.as_mut_ptr().cast(), at);
-                let (mask, one) = (_mm256_set1_epi32(ONE as i32 - 1), _mm256_set1_epi32(ONE as i32));
-                let fx = _mm256_and_si256(_mm256_srli_epi32::<{ (PLACE_BITS - WEIGHT_BITS) as i32 }>(x), mask);
-                let fy = _mm256_and_si256(_mm256_srli_epi32::<{ (PLACE_BITS - WEIGHT_BITS) as i32 }>(y), mask);
+                let rows = _mm256_mullo_epi32(_mm256_srai_epi32::<{ TAP_POSITION_BITS as i32 }>(y), _mm256_set1_epi32(width));
+                let at = _mm256_add_epi32(rows, _mm256_srai_epi32::<{ TAP_POSITION_BITS as i32 }>(x));
+                _mm256_storeu_si256(out.texel.as_mut_ptr().cast(), at);
+                let (mask, one) = (_mm256_set1_epi32(WEIGHT_ONE as i32 - 1), _mm256_set1_epi32(WEIGHT_ONE as i32));
+                let fx = _mm256_and_si256(_mm256_srli_epi32::<{ (TAP_POSITION_BITS - WEIGHT_BITS) as i32 }>(x), mask);
+                let fy = _mm256_and_si256(_mm256_srli_epi32::<{ (TAP_POSITION_BITS - WEIGHT_BITS) as i32 }>(y), mask);
                 let (gx, gy) = (_mm256_sub_epi32(one, fx), _mm256_sub_epi32(one, fy));
-                // 16-bit products: the upper texel's weight below the lower one's.
+                // 16-bit products: the upper texel's weight in the lower half.
                 let rows = _mm256_or_si256(gy, _mm256_slli_epi32::<16>(fy));
                 let left = _mm256_mullo_epi16(_mm256_or_si256(gx, _mm256_slli_epi32::<16>(gx)), rows);
                 let right = _mm256_mullo_epi16(_mm256_or_si256(fx, _mm256_slli_epi32::<16>(fx)), rows);
@@ -210,33 +253,33 @@ mod tests {
 
     #[test]
     #[cfg(target_arch = "x86_64")]
-    fn both_ways_of_adding_are_equal() {
+    fn vector_sums_equal_scalar_sums() {
         #[target_feature(enable = "avx2")]
         fn compare() {
             let mut state = 1;
-            let (mut wide, mut plain) = (WideSum::new(), PlainSum::new());
+            let (mut vector, mut scalar) = (Avx2Accumulator::new(), ScalarAccumulator::new());
             for k in 0..256 {
                 let mut pair = || [(); 2].map(|()| [(); 4].map(|()| if k < 16 { 255 } else { random(&mut state) as u8 }));
-                let (upper, lower) = (pair(), pair());
-                let w = weights(random(&mut state) % ONE, random(&mut state) % ONE);
-                wide.add(upper, lower, w);
-                plain.add(upper, lower, w);
+                let texels = TexelQuad { upper: pair(), lower: pair() };
+                let w = bilinear_weights(random(&mut state) % WEIGHT_ONE, random(&mut state) % WEIGHT_ONE);
+                vector.add(texels, w);
+                scalar.add(texels, w);
                 if k % BATCH == BATCH - 1 {
-                    wide.settle();
-                    plain.settle();
+                    vector.flush();
+                    scalar.flush();
                 }
             }
-            assert_eq!(wide.channels(), plain.channels());
+            assert_eq!(vector.channels(), scalar.channels());
         }
         if is_x86_feature_detected!("avx2") {
-            // SAFETY: just asked.
+            // SAFETY: checked above.
             unsafe { compare() }
         }
     }
 
     #[test]
     #[cfg(target_arch = "x86_64")]
-    fn both_ways_of_placing_are_equal() {
+    fn vector_taps_equal_scalar_taps() {
         #[target_feature(enable = "avx2")]
         fn compare() {
             let mut state = 7;
@@ -244,28 +287,29 @@ mod tests {
                 let mut offsets = || [(); BATCH].map(|()| (random(&mut state) as i32) - (1 << 23));
                 let (right, down) = (offsets(), offsets());
                 let center = [1 << 28, 1 << 27].map(|c: i32| c + random(&mut state) as i32);
-                let (mut wide, mut plain) = (Placed::NONE, Placed::NONE);
-                WideSum::place(&right, &down, center, 16_384, &mut wide);
-                PlainSum::place(&right, &down, center, 16_384, &mut plain);
-                assert_eq!((wide.at, wide.weights), (plain.at, plain.weights));
+                let (mut vector, mut scalar) = (ResolvedTaps::NONE, ResolvedTaps::NONE);
+                Avx2Accumulator::resolve(&right, &down, center, 16_384, &mut vector);
+                ScalarAccumulator::resolve(&right, &down, center, 16_384, &mut scalar);
+                assert_eq!((vector.texel, vector.weights), (scalar.texel, scalar.weights));
             }
         }
         if is_x86_feature_detected!("avx2") {
-            // SAFETY: just asked.
+            // SAFETY: checked above.
             unsafe { compare() }
         }
     }
 
     #[test]
     fn a_full_texel_weighs_one() {
-        let (pair, w) = ([[255, 0, 2, 255]; 2], weights(77, 3));
-        let mut sum = PlainSum::new();
-        sum.add(pair, pair, w);
-        sum.settle();
+        let pair = [[255, 0, 2, 255]; 2];
+        let (texels, w) = (TexelQuad { upper: pair, lower: pair }, bilinear_weights(77, 3));
+        let mut sum = ScalarAccumulator::new();
+        sum.add(texels, w);
+        sum.flush();
         for (c, got) in sum.channels().into_iter().enumerate() {
             let exact = linear(pair[0][c]) << TAP_BITS;
             assert!(exact - got <= 1, "channel {c}: {got}, exact {exact}");
-            assert_eq!(single(pair, pair, c, w), got);
+            assert_eq!(sum_single_tap(texels, c, w), got);
         }
     }
 }

@@ -19,10 +19,10 @@ pub struct Level {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AlphaCell {
     /// Less than a half.
-    Clear,
+    Transparent,
     Mixed,
     /// More than a half.
-    Solid,
+    Opaque,
 }
 
 impl Level {
@@ -85,7 +85,7 @@ impl Level {
     /// Of the texel with a number and its neighbours to the right and below; it must have both.
     #[inline(always)]
     pub(crate) fn alpha_cell(&self, texel: usize) -> AlphaCell {
-        self.cells.as_ref().map_or(AlphaCell::Solid, |cells| cells[texel])
+        self.cells.as_ref().map_or(AlphaCell::Opaque, |cells| cells[texel])
     }
 
     pub(super) fn bytes(&self) -> u64 {
@@ -97,8 +97,8 @@ impl AlphaCell {
     /// Of one texel; its alpha is clearly below or above a half, so that no rounding of a tap's sum matters.
     fn of([.., root]: [u8; 4]) -> Self {
         match root {
-            0..=170 => Self::Clear,
-            190.. => Self::Solid,
+            0..=170 => Self::Transparent,
+            190.. => Self::Opaque,
             _ => Self::Mixed,
         }
     }

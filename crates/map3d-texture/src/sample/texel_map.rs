@@ -1,0 +1,241 @@
+//! Maps pixel positions to texels of a level, and gathers the texels of bilinear taps.
+
+use std::sync::Arc;
+
+use map3d_base::asset::Wrap;
+
+use crate::sample::plan::{TapBatch, TapExtent};
+use crate::sample::tap::{
+    BATCH, BilinearWeights, ResolvedTaps, TAP_POSITION_BITS, TapAccumulator, TexelQuad, WEIGHT_BITS, WEIGHT_ONE, bilinear_weights,
+};
+use crate::sample::uv_map::{POSITION_BITS, UvMap};
+use crate::store::{AlphaCell, Level};
+use crate::wrap::wrap_texel;
+
+/// Fraction bits of texel coordinates.
+const TEXEL_BITS: u32 = 32;
+/// From texel coordinates to positions of taps.
+const TAP_SHIFT: u32 = TEXEL_BITS - TAP_POSITION_BITS;
+
+/// Texel coordinates in 2^-TEXEL_BITS texel, right and down; whole numbers are texel centres. Also the distance between two points.
+#[derive(Clone, Copy)]
+pub(super) struct TexelPoint {
+    pub x: i64,
+    pub y: i64,
+}
+
+impl TexelPoint {
+    #[inline(always)]
+    pub fn offset(self, by: Self) -> Self {
+        Self { x: self.x.wrapping_add(by.x), y: self.y.wrapping_add(by.y) }
+    }
+
+    #[inline(always)]
+    pub fn minus(self, other: Self) -> Self {
+        Self { x: self.x.wrapping_sub(other.x), y: self.y.wrapping_sub(other.y) }
+    }
+
+    /// Adds the offset of a tap in 2^-TAP_POSITION_BITS texel; drops the finer bits.
+    #[inline(always)]
+    pub fn offset_by_tap(self, x: i32, y: i32) -> Self {
+        let add = |c: i64, d: i32| (c >> TAP_SHIFT).saturating_add(i64::from(d)) << TAP_SHIFT;
+        Self { x: add(self.x, x), y: add(self.y, y) }
+    }
+}
+
+/// A texel coordinate as an affine function of pixel positions.
+struct Line {
+    start: i64,
+    /// Change per position to the right.
+    right: i64,
+    /// Change per position down.
+    down: i64,
+}
+
+impl Line {
+    #[inline(always)]
+    fn at(&self, x: i32, y: i32) -> i64 {
+        self.start.wrapping_add(self.right.wrapping_mul(i64::from(x))).wrapping_add(self.down.wrapping_mul(i64::from(y)))
+    }
+
+    fn change(&self, x: i32, y: i32) -> i64 {
+        self.right.wrapping_mul(i64::from(x)).wrapping_add(self.down.wrapping_mul(i64::from(y)))
+    }
+}
+
+/// A bilinear tap, which may cross the edges of the texture.
+pub(super) struct Tap {
+    pub texels: TexelQuad,
+    pub weights: BilinearWeights,
+    /// Weight (of 2^14) that falls outside a texture that does not continue beyond its edges.
+    pub outside: u32,
+}
+
+/// Affine texel coordinates over the pixels of one surface, on one level.
+pub(super) struct TexelMap {
+    level: Arc<Level>,
+    wrap: Wrap,
+    x: Line,
+    y: Line,
+    /// Size of the texture where it repeats (`Wrap::Wrap`), else 0.
+    period: TexelPoint,
+}
+
+impl TexelMap {
+    pub fn new(level: Arc<Level>, wrap: Wrap, uv: &UvMap) -> Self {
+        let (w, h) = (f64::from(level.width), f64::from(level.height));
+        let per_position = 1.0 / f64::from(1u32 << POSITION_BITS);
+        let start = texel_of_uv(&level, wrap, uv.u[0], uv.v[0]);
+        let x = Line { start: start.x, right: fixed(uv.u[1] * w * per_position), down: fixed(uv.u[2] * w * per_position) };
+        let y = Line { start: start.y, right: fixed(-uv.v[1] * h * per_position), down: fixed(-uv.v[2] * h * per_position) };
+        let repeats = |n: u32| if wrap == Wrap::Wrap { i64::from(n) << TEXEL_BITS } else { 0 };
+        let period = TexelPoint { x: repeats(level.width), y: repeats(level.height) };
+        Self { level, wrap, x, y, period }
+    }
+
+    /// Returns the texel coordinates of texture coordinates: those of the origin of a map that begins there.
+    pub fn of_uv(&self, u: f64, v: f64) -> TexelPoint {
+        self.into_first_period(texel_of_uv(&self.level, self.wrap, u, v))
+    }
+
+    /// Returns the texel coordinates of a position, in the first period of a texture that repeats.
+    #[inline(always)]
+    pub fn at(&self, x: i32, y: i32) -> TexelPoint {
+        self.into_first_period(self.unwrapped_at(x, y))
+    }
+
+    /// Returns the texel coordinates of a position, in any period.
+    #[inline(always)]
+    pub fn unwrapped_at(&self, x: i32, y: i32) -> TexelPoint {
+        TexelPoint { x: self.x.at(x, y), y: self.y.at(x, y) }
+    }
+
+    #[inline(always)]
+    pub fn into_first_period(&self, t: TexelPoint) -> TexelPoint {
+        TexelPoint { x: modulo_period(t.x, self.period.x), y: modulo_period(t.y, self.period.y) }
+    }
+
+    /// Returns the change of texel coordinates over a distance of positions.
+    pub fn change(&self, x: i32, y: i32) -> TexelPoint {
+        TexelPoint { x: self.x.change(x, y), y: self.y.change(x, y) }
+    }
+
+    /// Returns the change from a pixel to the next one on its right.
+    #[inline(always)]
+    pub fn pixel_change(&self) -> TexelPoint {
+        TexelPoint { x: self.x.right << POSITION_BITS, y: self.y.right << POSITION_BITS }
+    }
+
+    /// Returns the alpha that a bilinear tap finds; `Mixed` at the edges of the texture.
+    #[inline(always)]
+    pub fn alpha_cell(&self, t: TexelPoint) -> AlphaCell {
+        let (x, y) = (t.x >> TEXEL_BITS, t.y >> TEXEL_BITS);
+        let (w, h) = (i64::from(self.level.width), i64::from(self.level.height));
+        let is_inside = (x as u64) < (w - 1) as u64 && (y as u64) < (h - 1) as u64;
+        if is_inside { self.level.alpha_cell((y * w + x) as usize) } else { AlphaCell::Mixed }
+    }
+
+    /// Whether all taps around a point touch only texels that have a right and a lower neighbour.
+    #[inline(always)]
+    pub fn is_inside(&self, t: TexelPoint, taps: &TapExtent) -> bool {
+        let inside = |t: i64, [least, greatest]: [i32; 2], n: u32| {
+            let t = t >> TAP_SHIFT;
+            t + i64::from(least) >= 0 && (t + i64::from(greatest)) >> TAP_POSITION_BITS < i64::from(n) - 1
+        };
+        inside(t.x, taps.x, self.level.width) && inside(t.y, taps.y, self.level.height)
+    }
+
+    /// Finds the texels and weights of a batch of taps around a point for which `is_inside` holds; elsewhere the result must not be used.
+    #[inline(always)]
+    pub fn resolve<A: TapAccumulator>(&self, batch: &TapBatch, t: TexelPoint, out: &mut ResolvedTaps) {
+        let center = [(t.x >> TAP_SHIFT) as i32, (t.y >> TAP_SHIFT) as i32];
+        A::resolve(&batch.x, &batch.y, center, self.level.width as i32, out);
+        out.count = batch.count;
+    }
+
+    /// Adds a batch of resolved taps.
+    #[inline(always)]
+    pub fn accumulate<A: TapAccumulator>(&self, taps: &ResolvedTaps, sum: &mut A) {
+        for k in 0..taps.count.min(BATCH) {
+            sum.add(self.quad(taps.texel[k] as usize), taps.weights[k]);
+        }
+        sum.flush();
+    }
+
+    /// Returns a bilinear tap at any point.
+    #[inline(always)]
+    pub fn tap(&self, t: TexelPoint) -> Tap {
+        let fraction = |t: i64| (t >> (TEXEL_BITS - WEIGHT_BITS)) as u32 & (WEIGHT_ONE - 1);
+        let (fx, fy) = (fraction(t.x), fraction(t.y));
+        let (x, y) = (t.x >> TEXEL_BITS, t.y >> TEXEL_BITS);
+        let (texels, outside) = match self.is_inside(t, &TapExtent::POINT) {
+            true => (self.quad(y as usize * self.level.width as usize + x as usize), 0),
+            false => self.edge_quad([x, y], [fx, fy]),
+        };
+        Tap { texels, weights: bilinear_weights(fx, fy), outside }
+    }
+
+    /// Returns a texel with its right and lower neighbours.
+    #[inline(always)]
+    fn quad(&self, texel: usize) -> TexelQuad {
+        let w = self.level.width as usize;
+        let rows = &self.level.texels[texel..][..w + 2];
+        TexelQuad { upper: [rows[0], rows[1]], lower: [rows[w], rows[w + 1]] }
+    }
+
+    /// Returns a texel with its right and lower neighbours as the wrap mode continues the texture, and the weight that falls outside.
+    #[inline(never)]
+    fn edge_quad(&self, [ix, iy]: [i64; 2], [fx, fy]: [u32; 2]) -> (TexelQuad, u32) {
+        let (w, h) = (self.level.width, self.level.height);
+        let columns = [self.wrapped(ix, w), self.wrapped(ix.saturating_add(1), w)];
+        let rows = [self.wrapped(iy, h), self.wrapped(iy.saturating_add(1), h)];
+        let mut outside = 0;
+        let mut texel = |column: usize, row: usize| match (columns[column], rows[row]) {
+            (Some(x), Some(y)) => self.level.texels[y as usize * w as usize + x as usize],
+            _ => {
+                outside += (if column == 0 { WEIGHT_ONE - fx } else { fx }) * (if row == 0 { WEIGHT_ONE - fy } else { fy });
+                [0; 4]
+            }
+        };
+        let quad = TexelQuad { upper: [texel(0, 0), texel(1, 0)], lower: [texel(0, 1), texel(1, 1)] };
+        (quad, outside)
+    }
+
+    /// `wrap_texel` without a division for texels near the texture.
+    fn wrapped(&self, i: i64, n: u32) -> Option<u32> {
+        let size = i64::from(n);
+        match self.wrap {
+            Wrap::Wrap if i < 0 && i >= -size => Some((i + size) as u32),
+            Wrap::Wrap if i >= size && i < 2 * size => Some((i - size) as u32),
+            _ if (0..size).contains(&i) => Some(i as u32),
+            wrap => wrap_texel(i, n, wrap),
+        }
+    }
+}
+
+/// Reduces to [0, period); a period of 0 leaves the coordinate as it is.
+#[inline(always)]
+fn modulo_period(t: i64, period: i64) -> i64 {
+    match period & (period - 1) == 0 {
+        true => t & period.wrapping_sub(1),
+        false if (0..period).contains(&t) => t,
+        false => t.rem_euclid(period),
+    }
+}
+
+fn fixed(texels: f64) -> i64 {
+    let unit = (1u64 << TEXEL_BITS) as f64;
+    if texels.is_finite() { (texels * unit).clamp(-4e18, 4e18).round() as i64 } else { 0 }
+}
+
+/// Returns the texel coordinates of texture coordinates, less whole periods so that they stay small.
+fn texel_of_uv(level: &Level, wrap: Wrap, u: f64, v: f64) -> TexelPoint {
+    let reduced = |c: f64| match wrap {
+        Wrap::Wrap => c - c.floor(),
+        Wrap::Mirror => c - 2.0 * (c / 2.0).floor(),
+        _ => c,
+    };
+    let half_weight = 0.5 / f64::from(WEIGHT_ONE);
+    let texel = |c: f64, n: u32| fixed(reduced(c) * f64::from(n) - 0.5 + half_weight);
+    TexelPoint { x: texel(u, level.width), y: texel(1.0 - v, level.height) }
+}
