@@ -66,29 +66,29 @@ fn step_down(down: &mut [i16], offsets: &mut [i16], up: &[i16], gaps: &[Range<us
 }
 
 /// A column whose source is the nearest from `start` on.
-struct Part {
+struct Parabola {
     column: i32,
     start: i32,
 }
 
 /// Lower envelope of the parabolas (x − i)² + offset(i)² over part of a row.
-fn lower_envelope(parts: &mut Vec<Part>, offsets: &[i16], from: usize, end: usize, far: i16) {
-    parts.clear();
+fn lower_envelope(parabolas: &mut Vec<Parabola>, offsets: &[i16], from: usize, end: usize, far: i16) {
+    parabolas.clear();
     for (i, offset) in (from as i32..).zip(&offsets[from..end]) {
         if offset.abs() >= far {
             continue;
         }
         let square = i32::from(*offset).pow(2);
         let mut start = i32::MIN;
-        while let Some(top) = parts.last() {
+        while let Some(top) = parabolas.last() {
             start = overtakes(top.column, i32::from(offsets[top.column as usize]).pow(2), i, square);
             if start > top.start {
                 break;
             }
-            parts.pop();
+            parabolas.pop();
             start = i32::MIN;
         }
-        parts.push(Part { column: i, start });
+        parabolas.push(Parabola { column: i, start });
     }
 }
 
@@ -101,15 +101,15 @@ fn overtakes(a: i32, a_square: i32, b: i32, b_square: i32) -> i32 {
 }
 
 /// Every source is a used texel, and those are never written.
-fn copy_nearest(image: &mut Raster, y: usize, gap: &Range<usize>, offsets: &[i16], parts: &[Part], far: i16) {
+fn copy_nearest(image: &mut Raster, y: usize, gap: &Range<usize>, offsets: &[i16], parabolas: &[Parabola], far: i16) {
     let (w, far) = (image.width as usize, i32::from(far));
-    for (k, part) in parts.iter().enumerate() {
-        let next = parts.get(k + 1).map_or(i32::MAX, |p| p.start);
-        let from = part.start.max(part.column - far).max(gap.start as i32) as usize;
-        let end = next.min(part.column + far).min(gap.end as i32).max(0) as usize;
+    for (k, parabola) in parabolas.iter().enumerate() {
+        let next = parabolas.get(k + 1).map_or(i32::MAX, |p| p.start);
+        let from = parabola.start.max(parabola.column - far).max(gap.start as i32) as usize;
+        let end = next.min(parabola.column + far).min(gap.end as i32).max(0) as usize;
         if from < end {
-            let row = (y as i32 + i32::from(offsets[part.column as usize])) as usize;
-            let color = image.pixels[row * w + part.column as usize];
+            let row = (y as i32 + i32::from(offsets[parabola.column as usize])) as usize;
+            let color = image.pixels[row * w + parabola.column as usize];
             match end - from {
                 1 => image.pixels[y * w + from] = color,
                 _ => image.pixels[y * w..][from..end].fill(color),

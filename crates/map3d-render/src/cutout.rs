@@ -4,22 +4,10 @@ use std::cell::RefCell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use map3d_base::asset::Wrap;
 use map3d_scene::MaterialRecord;
 use map3d_texture::sample::{AlphaSampler, UvMap};
 use map3d_texture::{Level, Texture, TextureCache, TextureKey};
 use map3d_trace::{Affine, Cutout, CutoutMask, CutoutSample};
-
-/// Returns the wrap mode of a material record.
-pub(crate) fn wrap_of(material: &MaterialRecord) -> Wrap {
-    match material.wrap {
-        1 => Wrap::Mirror,
-        2 => Wrap::Clamp,
-        3 => Wrap::Border,
-        4 => Wrap::None,
-        _ => Wrap::Wrap,
-    }
-}
 
 /// Tests samples against the filtered alpha of a texture. A texture that cannot be read counts as opaque and as a failure, which the renderer reports as an
 /// error after the beam.
@@ -80,7 +68,7 @@ impl Cutout for TextureCutout<'_> {
             return true;
         }
         match self.level(material, sample) {
-            Ok(level) => AlphaSampler::new(level, &uv_map(sample), wrap_of(material), material.border[3]).covers(0, 0),
+            Ok(level) => AlphaSampler::new(level, &uv_map(sample), material.wrap_mode(), material.border[3]).covers(0, 0),
             Err(_) => {
                 self.failures.fetch_add(1, Ordering::Relaxed);
                 true
@@ -94,7 +82,7 @@ impl Cutout for TextureCutout<'_> {
         }
         let origin = CutoutSample { uv: [u.at0, v.at0], footprint: [[u.dx, v.dx], [u.dy, v.dy]] };
         let level = self.level(material, &origin).ok()?;
-        Some(Box::new(AlphaMask(AlphaSampler::new(level, &uv_map(&origin), wrap_of(material), material.border[3]))))
+        Some(Box::new(AlphaMask(AlphaSampler::new(level, &uv_map(&origin), material.wrap_mode(), material.border[3]))))
     }
 }
 

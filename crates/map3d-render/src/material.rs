@@ -4,21 +4,19 @@ use map3d_base::{Isa, Result, Vec3};
 use map3d_image::srgb::LINEAR16;
 use map3d_scene::MaterialRecord;
 use map3d_texture::sample::{POSITION_BITS, Sampler, SurfaceColors, TapPlanCache, UvMap};
-use map3d_texture::{HeldTextures, TextureCache};
+use map3d_texture::{LocalTextureCache, TextureCache};
 use map3d_trace::{Affine, DepthPlane, SurfaceAttributes};
-
-use crate::cutout::wrap_of;
 
 /// Textures and sampling plans that the surfaces of a sub-tile share.
 pub struct MaterialCache {
-    pub held: HeldTextures,
+    pub held: LocalTextureCache,
     plans: TapPlanCache,
 }
 
 impl MaterialCache {
     /// `isa`: an instruction set that this machine supports.
     pub fn new(isa: Isa) -> Self {
-        Self { held: HeldTextures::default(), plans: TapPlanCache::new(isa) }
+        Self { held: LocalTextureCache::default(), plans: TapPlanCache::new(isa) }
     }
 }
 
@@ -44,7 +42,7 @@ impl DiffuseColor {
         let plan = materials.plans.plan(uv.jacobian(file.width, file.height), file.levels);
         let level = materials.held.level(textures, &texture, plan.level)?;
         let colors = SurfaceColors { diffuse, border: material.border };
-        Ok(Self::Textured(Sampler::new(level, plan, file.has_alpha, &uv, wrap_of(material), colors)))
+        Ok(Self::Textured(Sampler::new(level, plan, file.has_alpha, &uv, material.wrap_mode(), colors)))
     }
 
     /// Returns the colour at a position in 2^-8 px from the sub-tile's corner.

@@ -68,7 +68,7 @@ impl Shader {
         self.surface_of_slot.clear();
         self.surface_of_slot.resize(vis.slot_count(), NOT_PREPARED);
         let done = self.shade_rows(&mut SubtileTarget { vis, textures, g, corner });
-        self.materials.held.release();
+        self.materials.held.clear();
         done
     }
 

@@ -1,7 +1,11 @@
-//! Builds a scene from its assets: optimised, snapped, cut into cells, each cell with its tree in a file of its own (spec/scene.md).
+//! Builds a scene from its assets: optimises and snaps triangles, sorts them into cells and writes each cell with its BVH to a file (spec/scene.md).
 
+mod asset_summary;
 mod assets;
+mod buckets;
+mod build;
 mod cells;
+mod chunk_cache;
 mod chunks;
 mod encode;
 mod files;
@@ -10,20 +14,16 @@ mod materials;
 mod prototypes;
 mod report;
 mod request;
-mod run;
-mod shelf;
-mod source;
-mod spill;
-mod survey;
+mod summarize;
 mod textures;
 mod triangle;
+mod triangle_source;
 mod unpack;
-mod vertices;
 
-pub use encode::{ChunkFile, Input, encode_chunk};
+pub use build::build_scene;
+pub use encode::{ChunkFile, ChunkInput, encode_chunk};
 pub use report::BuildReport;
 pub use request::{BuildOptions, BuildRequest, GroundPlane};
-pub use run::build_scene;
 pub use triangle::BuildTriangle;
 
 /// (stage, done, total) → false to stop.

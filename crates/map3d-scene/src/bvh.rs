@@ -41,7 +41,7 @@ impl Aabb {
         e[0] * e[1] + e[1] * e[2] + e[2] * e[0]
     }
 
-    pub fn six(&self) -> [f32; 6] {
+    pub fn to_array(&self) -> [f32; 6] {
         [self.lo[0], self.lo[1], self.lo[2], self.hi[0], self.hi[1], self.hi[2]]
     }
 }
@@ -69,7 +69,7 @@ pub fn build(boxes: &[Aabb]) -> Tree {
         let mut node = empty_node();
         let mut inner = Vec::new();
         for (k, child) in children.iter().enumerate() {
-            let bounds = binary.nodes[*child as usize].bounds.six();
+            let bounds = binary.nodes[*child as usize].bounds.to_array();
             (0..6).for_each(|a| node.bounds[a][k] = bounds[a]);
             node.child[k] = match binary.nodes[*child as usize].kind {
                 Kind::Leaf { start, end } => LEAF_BIT | tree.push_leaf(&binary.order[start as usize..end as usize]),

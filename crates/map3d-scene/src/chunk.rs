@@ -1,4 +1,4 @@
-//! A chunk file, mapped as it lies on disk; every index has been checked.
+//! Memory-mapped chunk files.
 
 use std::path::{Path, PathBuf};
 
@@ -24,7 +24,7 @@ pub(crate) struct Sections {
 }
 
 impl Sections {
-    pub fn of(header: &ChunkHeader) -> Self {
+    pub fn of_header(header: &ChunkHeader) -> Self {
         let nodes = size_of::<ChunkHeader>();
         let leaves = nodes + header.nodes as usize * size_of::<Node>();
         let triangles = leaves + header.leaves as usize * size_of::<Leaf>();
@@ -54,23 +54,23 @@ impl Chunk {
         Ok(chunk)
     }
 
-    /// Maps again a chunk that this process has validated before; the caller compares its checksum with what it was.
+    /// Maps a chunk that this process has validated before; the caller compares checksums.
     pub(crate) fn open_trusted(path: &Path) -> Result<Self> {
         Self::map(path, false)
     }
 
-    /// Maps a chunk of which only few pages will be read.
-    pub(crate) fn outline(path: &Path) -> Result<Outline> {
+    /// Maps a chunk of which the caller reads only a few pages.
+    pub(crate) fn open_lazily(path: &Path) -> Result<LazyChunk> {
         let chunk = Self::map(path, false)?;
         chunk.validate_objects()?;
-        Ok(Outline(chunk))
+        Ok(LazyChunk(chunk))
     }
 
     fn map(path: &Path, with_checksum: bool) -> Result<Self> {
         let map = file::map(path)?;
         file::check_header(path, &map, CHUNK_MAGIC, VERSION, with_checksum)?;
         let header = *file::section::<ChunkHeader>(path, &map, 0, 1)?.first().ok_or_else(|| Error::format(path, "no header"))?;
-        let sections = Sections::of(&header);
+        let sections = Sections::of_header(&header);
         if sections.end != map.len() {
             return Err(Error::format(path, format!("{} bytes, expected {}", map.len(), sections.end)));
         }
@@ -105,38 +105,38 @@ impl Chunk {
         self.header.flags & FLAG_CUTOUT != 0
     }
 
-    fn part<T: bytemuck::Pod>(&self, offset: usize, count: u32) -> &[T] {
+    fn section<T: bytemuck::Pod>(&self, offset: usize, count: u32) -> &[T] {
         bytemuck::cast_slice(&self.map[offset..offset + count as usize * size_of::<T>()])
     }
 
     /// Node 0 is the root.
     pub fn nodes(&self) -> &[Node] {
-        self.part(self.sections.nodes, self.header.nodes)
+        self.section(self.sections.nodes, self.header.nodes)
     }
 
     pub fn leaves(&self) -> &[Leaf] {
-        self.part(self.sections.leaves, self.header.leaves)
+        self.section(self.sections.leaves, self.header.leaves)
     }
 
     pub fn triangles(&self) -> &[TriangleRecord] {
-        self.part(self.sections.triangles, self.header.triangles)
+        self.section(self.sections.triangles, self.header.triangles)
     }
 
     /// Empty when no triangle of the chunk has shading normals.
     pub fn normals(&self) -> &[CornerNormals] {
         let has = self.header.flags & FLAG_NORMALS != 0;
-        self.part(self.sections.normals, if has { self.header.triangles } else { 0 })
+        self.section(self.sections.normals, if has { self.header.triangles } else { 0 })
     }
 
     pub fn materials(&self) -> &[MaterialRecord] {
-        self.part(self.sections.materials, self.header.materials)
+        self.section(self.sections.materials, self.header.materials)
     }
 
     pub fn objects(&self) -> &[ChunkObject] {
-        self.part(self.sections.objects, self.header.objects)
+        self.section(self.sections.objects, self.header.objects)
     }
 
-    /// Checks every index, number and box, so that readers need not.
+    /// Validates every index, number and box.
     pub fn validate(&self) -> Result<()> {
         let fail = |what: String| Err(Error::format(&self.path, what));
         let h = &self.header;
@@ -167,7 +167,7 @@ impl Chunk {
         }
     }
 
-    /// Each node and leaf is reached exactly once, children lie in their boxes, each triangle lies in one leaf.
+    /// Checks that each node and leaf is reached exactly once, that boxes contain their children and that each triangle is in one leaf.
     fn validate_tree(&self) -> Result<()> {
         let (nodes, leaves) = (self.nodes(), self.leaves());
         let (mut seen_node, mut seen_leaf) = (vec![false; nodes.len()], vec![false; leaves.len()]);
@@ -204,11 +204,11 @@ impl Chunk {
     }
 }
 
-/// A chunk mapped for a look at its boxes: what is asked for is checked when it is asked for, the rest is not read.
+/// A mapped chunk whose nodes and leaves are validated when they are read; the rest is not read.
 #[derive(Debug)]
-pub struct Outline(Chunk);
+pub struct LazyChunk(Chunk);
 
-impl Outline {
+impl LazyChunk {
     pub fn origin(&self) -> Vec3 {
         self.0.header.origin
     }
@@ -221,7 +221,7 @@ impl Outline {
         self.0.objects()
     }
 
-    /// Children come after their parents, so that a walk down ends.
+    /// Returns a node after a check that its children follow it, so that a traversal ends.
     pub fn node(&self, number: u32) -> Result<&Node> {
         let node = self.0.nodes().get(number as usize).ok_or_else(|| self.fail("node", number))?;
         match node.child.iter().all(|c| *c == EMPTY || c & LEAF_BIT != 0 || *c > number) {

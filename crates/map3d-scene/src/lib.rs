@@ -1,4 +1,4 @@
-//! Scenes: assets to chunks with a BVH (`builder`), and chunks memory-mapped for tracing (`SceneStore`). File formats: spec/scene.md.
+//! Scenes: builds chunks with a BVH from assets (`builder`) and maps them for tracing (`SceneStore`). File formats: spec/scene.md.
 
 pub mod builder;
 pub mod bvh;
@@ -10,7 +10,7 @@ pub mod records;
 pub mod store;
 pub mod top;
 
-pub use chunk::{Chunk, Outline};
+pub use chunk::{Chunk, LazyChunk};
 pub use index::SceneIndex;
 pub use records::{ChunkObject, InstanceRecord, Leaf, MaterialRecord, Node, TriangleRecord};
-pub use store::{Part, SceneStore, StoreStats};
+pub use store::{ScenePart, SceneStore, StoreStats};

@@ -1,6 +1,7 @@
-//! The records of chunk and instance files, as they lie on disk (spec/scene.md): little-endian, plain data.
+//! The records of chunk and instance files as on disk (spec/scene.md): little-endian, plain data.
 
 use bytemuck::{Pod, Zeroable};
+use map3d_base::asset::Wrap;
 
 pub const CHUNK_MAGIC: &[u8; 4] = b"M3DC";
 pub const INSTANCES_MAGIC: &[u8; 4] = b"M3DI";
@@ -34,15 +35,15 @@ pub struct ChunkHeader {
     pub objects: u32,
     pub materials: u32,
     pub flags: u32,
-    /// Hash of the triangles that were sorted together and what else their chunks depend on; zeros in a prototype.
+    /// Hash of the sorting cell's content; zeros in a prototype.
     pub input: [u64; 2],
-    /// How many chunks those triangles became.
+    /// Chunks of the same sorting cell.
     pub parts: u32,
     pub padding: [u8; 20],
 }
 
 impl ChunkHeader {
-    /// The box in the frame of `origin`'s coordinates.
+    /// Returns the box in the frame of `origin`'s coordinates.
     pub fn placed_bounds(&self) -> [[f64; 3]; 2] {
         let (o, b) = (self.origin, self.bounds.map(f64::from));
         let corner = |k: usize| [o[0] + b[k], o[1] + b[k + 1], o[2] + b[k + 2]];
@@ -95,7 +96,7 @@ pub struct MaterialRecord {
     /// sRGB and opacity.
     pub diffuse: [u8; 4],
     pub border: [u8; 4],
-    /// 0 wrap, 1 mirror, 2 clamp, 3 border, 4 none.
+    /// Code of `WRAP_MODES`.
     pub wrap: u8,
     pub flags: u8,
     pub padding: [u8; 6],
@@ -104,7 +105,20 @@ pub struct MaterialRecord {
     pub reserved: [u8; 32],
 }
 
+/// Wrap modes by their code.
+pub const WRAP_MODES: [Wrap; 5] = [Wrap::Wrap, Wrap::Mirror, Wrap::Clamp, Wrap::Border, Wrap::None];
+
+/// Returns the code of a wrap mode.
+pub fn wrap_code(wrap: Wrap) -> u8 {
+    WRAP_MODES.iter().position(|w| *w == wrap).expect("WRAP_MODES has every mode") as u8
+}
+
 impl MaterialRecord {
+    /// Returns the wrap mode; `Wrap::Wrap` for an unknown code.
+    pub fn wrap_mode(&self) -> Wrap {
+        WRAP_MODES.get(usize::from(self.wrap)).copied().unwrap_or(Wrap::Wrap)
+    }
+
     pub fn is_textured(&self) -> bool {
         self.flags & MATERIAL_TEXTURED != 0
     }
@@ -123,7 +137,7 @@ pub struct ChunkObject {
     pub rank: u32,
     /// min x, y, z, max x, y, z, relative to the chunk's origin.
     pub bounds: [f32; 6],
-    /// Over geometry, materials and texture keys, independent of the chunk's other content.
+    /// Hash of geometry, materials and texture keys, independent of the chunk's other content.
     pub content: [u64; 2],
     pub reserved: [u64; 2],
 }

@@ -1,4 +1,4 @@
-//! A built scene, opened for tracing: chunks are mapped as they are needed, the least recently used go first. Safe to share between threads.
+//! A scene opened for tracing: maps chunks when they are needed and unmaps the least recently used. Safe to share between threads.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -6,15 +6,15 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use map3d_base::{Box3, Error, Result, Vec3};
 
-use crate::chunk::{Chunk, Outline};
+use crate::chunk::{Chunk, LazyChunk};
 use crate::index::{ChunkEntry, SceneIndex};
 use crate::instances;
 use crate::records::InstanceRecord;
 use crate::top::TopLevel;
 
-/// Something a beam or ray can meet: a chunk where it lies, or a prototype where an instance places it.
+/// A chunk in its place, or a prototype placed by an instance: a leaf of the top-level tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Part {
+pub struct ScenePart {
     /// Number for `SceneStore::chunk`.
     pub chunk: u32,
     /// Index into `SceneStore::instances`; `None`: the chunk is local as it is.
@@ -31,10 +31,10 @@ pub struct StoreStats {
     pub chunk_misses: u64,
 }
 
-/// A mapped chunk and when it was last asked for.
+/// A mapped chunk and the time of its last use.
 struct Slot {
     chunk: Option<Arc<Chunk>>,
-    used: u64,
+    last_used: u64,
     validated: bool,
 }
 
@@ -48,17 +48,17 @@ pub struct SceneStore {
     folder: PathBuf,
     index: SceneIndex,
     instances: Vec<InstanceRecord>,
-    parts: Vec<Part>,
+    parts: Vec<ScenePart>,
     top: TopLevel,
-    cap_bytes: u64,
+    capacity_bytes: u64,
     slots: Mutex<Slots>,
     hits: AtomicU64,
     misses: AtomicU64,
 }
 
 impl SceneStore {
-    /// Opens `scene.json` and `instances.m3i`; chunks are opened when they are first asked for. `cap_bytes` bounds the mapped bytes.
-    pub fn open(folder: &Path, cap_bytes: u64) -> Result<Self> {
+    /// Opens `scene.json` and `instances.m3i`; opens chunks when they are first needed. `capacity_bytes` limits the mapped bytes.
+    pub fn open(folder: &Path, capacity_bytes: u64) -> Result<Self> {
         let index = SceneIndex::read(folder)?;
         let instances = match index.instances.count {
             0 => Vec::new(),
@@ -71,14 +71,14 @@ impl SceneStore {
         let parts = parts_of(&index, &instances);
         let top = TopLevel::build(&parts.iter().map(|p| p.bounds).collect::<Vec<_>>());
         let files = index.chunks.len() + index.prototypes.len();
-        let slots = (0..files).map(|_| Slot { chunk: None, used: 0, validated: false }).collect();
+        let slots = (0..files).map(|_| Slot { chunk: None, last_used: 0, validated: false }).collect();
         Ok(Self {
             folder: folder.to_path_buf(),
             index,
             instances,
             parts,
             top,
-            cap_bytes,
+            capacity_bytes,
             slots: Mutex::new(Slots { slots, clock: 0, bytes: 0 }),
             hits: AtomicU64::new(0),
             misses: AtomicU64::new(0),
@@ -103,12 +103,12 @@ impl SceneStore {
         self.index.bounds.map_or(Box3::EMPTY, |[lo, hi]| Box3 { lo, hi })
     }
 
-    /// Instances not counted.
+    /// Returns the number of triangles; a prototype counts once.
     pub fn triangle_count(&self) -> u64 {
         self.index.chunks.iter().chain(&self.index.prototypes).map(|c| c.triangles).sum()
     }
 
-    pub fn parts(&self) -> &[Part] {
+    pub fn parts(&self) -> &[ScenePart] {
         &self.parts
     }
 
@@ -116,7 +116,7 @@ impl SceneStore {
         &self.instances
     }
 
-    /// Numbers of parts in tree leaves that `meets` lets through: a superset of those whose boxes meet.
+    /// Writes to `out` the numbers of the parts in tree leaves that `meets` accepts: a superset of the parts whose boxes it accepts.
     pub fn candidate_parts(&self, meets: impl FnMut(&Box3) -> bool, out: &mut Vec<u32>) {
         self.top.candidates(meets, out);
     }
@@ -127,13 +127,13 @@ impl SceneStore {
         self.index.chunks.get(k).unwrap_or_else(|| &self.index.prototypes[k - self.index.chunks.len()])
     }
 
-    /// A chunk, mapped now if it is not. The mapping lives as long as the caller keeps the `Arc`.
+    /// Returns a chunk, mapping it if necessary. The mapping lives as long as the caller keeps the `Arc`.
     pub fn chunk(&self, number: u32) -> Result<Arc<Chunk>> {
         let mut slots = self.lock();
         slots.clock += 1;
         let clock = slots.clock;
         let slot = &mut slots.slots[number as usize];
-        slot.used = clock;
+        slot.last_used = clock;
         if let Some(chunk) = &slot.chunk {
             self.hits.fetch_add(1, Ordering::Relaxed);
             return Ok(chunk.clone());
@@ -142,15 +142,15 @@ impl SceneStore {
         drop(slots);
         self.misses.fetch_add(1, Ordering::Relaxed);
         let chunk = Arc::new(self.open_chunk(number, validated)?);
-        Ok(self.keep(number, chunk))
+        Ok(self.insert(number, chunk))
     }
 
-    /// A look at a chunk's boxes without reading the rest of it; not kept.
-    pub fn outline(&self, number: u32) -> Result<Outline> {
+    /// Opens a chunk for reading a few of its boxes; does not cache it.
+    pub fn open_lazily(&self, number: u32) -> Result<LazyChunk> {
         let path = self.folder.join(&self.entry(number).file);
-        let outline = Chunk::outline(&path)?;
-        self.check_hash(number, path, outline.checksum())?;
-        Ok(outline)
+        let chunk = Chunk::open_lazily(&path)?;
+        self.check_hash(number, path, chunk.checksum())?;
+        Ok(chunk)
     }
 
     fn open_chunk(&self, number: u32, validated: bool) -> Result<Chunk> {
@@ -168,8 +168,8 @@ impl SceneStore {
         Ok(())
     }
 
-    /// Stores a chunk unless another thread was faster; unmaps the least recently used over the cap.
-    fn keep(&self, number: u32, chunk: Arc<Chunk>) -> Arc<Chunk> {
+    /// Stores a chunk unless another thread did so first; unmaps the least recently used ones over the capacity.
+    fn insert(&self, number: u32, chunk: Arc<Chunk>) -> Arc<Chunk> {
         let mut slots = self.lock();
         let slot = &mut slots.slots[number as usize];
         slot.validated = true;
@@ -178,9 +178,9 @@ impl SceneStore {
         }
         slot.chunk = Some(chunk.clone());
         slots.bytes += chunk.bytes() as u64;
-        while slots.bytes > self.cap_bytes {
+        while slots.bytes > self.capacity_bytes {
             let mapped = slots.slots.iter_mut().enumerate().filter(|(k, s)| s.chunk.is_some() && *k != number as usize);
-            let Some((_, oldest)) = mapped.min_by_key(|(_, s)| s.used) else { break };
+            let Some((_, oldest)) = mapped.min_by_key(|(_, s)| s.last_used) else { break };
             let gone = oldest.chunk.take().map_or(0, |c| c.bytes() as u64);
             slots.bytes -= gone;
         }
@@ -202,9 +202,9 @@ impl SceneStore {
     }
 }
 
-fn parts_of(index: &SceneIndex, instances: &[InstanceRecord]) -> Vec<Part> {
-    let chunks = index.chunks.iter().zip(0..).map(|(c, k)| Part { chunk: k, instance: None, bounds: c.box3() });
-    let placed = instances.iter().zip(0..).map(|(i, k)| Part {
+fn parts_of(index: &SceneIndex, instances: &[InstanceRecord]) -> Vec<ScenePart> {
+    let chunks = index.chunks.iter().zip(0..).map(|(c, k)| ScenePart { chunk: k, instance: None, bounds: c.box3() });
+    let placed = instances.iter().zip(0..).map(|(i, k)| ScenePart {
         chunk: index.chunks.len() as u32 + i.prototype,
         instance: Some(k),
         bounds: instances::placed_box(&i.transform, &index.prototypes[i.prototype as usize].box3()),

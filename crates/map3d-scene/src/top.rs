@@ -16,7 +16,7 @@ impl TopLevel {
         Self { tree: bvh::build(&boxes.iter().map(outward).collect::<Vec<_>>()) }
     }
 
-    /// Numbers of the boxes in leaves that `meets` lets through; a superset of the boxes that do, in tree order.
+    /// Writes to `out` the numbers of the boxes in leaves that `meets` accepts, in tree order: a superset of the boxes that it accepts.
     pub fn candidates(&self, mut meets: impl FnMut(&Box3) -> bool, out: &mut Vec<u32>) {
         out.clear();
         let mut stack = if self.tree.nodes.is_empty() { vec![] } else { vec![0u32] };

@@ -1,15 +1,15 @@
-//! Builds: what becomes of assets, and that the same assets give the same bytes.
+//! Builds convert assets to chunks; the same assets give the same bytes.
 
-mod camp;
+mod fixture;
 
-use camp::{Face, batch, bytes_of, camp, new_folder, request, run, tent, world, write_asset, write_faces};
+use fixture::{Face, batch, bytes_of, new_folder, request, run, tent, tent_grid, world, write_asset, write_faces};
 use map3d_base::Error;
 use map3d_base::asset::{Instance, Material, Materials, Rank};
 use map3d_scene::builder::{BuildOptions, BuildRequest, GroundPlane, build_scene};
 use map3d_scene::{Chunk, SceneStore};
 
 #[test]
-fn an_empty_scene_is_a_scene() {
+fn an_empty_scene_can_be_built_and_opened() {
     let folder = new_folder();
     write_faces(&folder.0, &[]);
     assert_eq!(run(&folder, &request()).triangles, 0);
@@ -20,7 +20,7 @@ fn an_empty_scene_is_a_scene() {
 }
 
 #[test]
-fn one_triangle_is_kept_to_the_lattice() {
+fn one_triangle_is_snapped_to_the_lattice() {
     let folder = new_folder();
     let t = [[1.0 / 4096.0, 0.0, 0.0], [3.00001, 0.0, 0.0], [0.0, 4.0, 1.5]];
     write_faces(&folder.0, &[(world(t), 0, 0, Rank::Ground)]);
@@ -63,11 +63,11 @@ fn each_optimisation_is_counted_and_can_be_switched_off() {
 }
 
 #[test]
-fn builds_are_equal_bytes_whatever_the_threads_and_the_memory() {
+fn builds_are_equal_with_any_number_of_threads_and_any_memory() {
     let folders = [new_folder(), new_folder()];
-    folders.iter().for_each(|f| write_faces(&f.0, &camp()));
+    folders.iter().for_each(|f| write_faces(&f.0, &tent_grid()));
     run(&folders[0], &request());
-    // 4 KiB: everything is spilled to files.
+    // 4 KiB: all triangles go to files.
     let report = run(&folders[1], &BuildRequest { threads: 1, max_memory_bytes: 4096, ..request() });
     assert_eq!((report.triangles, report.chunks_kept), (1200, 0));
     assert!(report.chunks > 20, "{} chunks", report.chunks);
@@ -81,10 +81,10 @@ fn builds_are_equal_bytes_whatever_the_threads_and_the_memory() {
 #[test]
 fn a_local_edit_rewrites_one_chunk() {
     let folder = new_folder();
-    write_faces(&folder.0, &camp());
+    write_faces(&folder.0, &tent_grid());
     run(&folder, &request());
     let before = bytes_of(&folder);
-    let mut edited = camp();
+    let mut edited = tent_grid();
     edited.extend(tent(5500.0, 5500.0, 400));
     write_faces(&folder.0, &edited);
     let report = run(&folder, &request());
@@ -136,9 +136,9 @@ fn prototypes_are_stored_once_and_placed() {
 }
 
 #[test]
-fn a_build_that_is_stopped_says_so_and_the_next_one_finishes() {
+fn a_stopped_build_is_an_error_and_the_next_one_finishes() {
     let folder = new_folder();
-    write_faces(&folder.0, &camp());
+    write_faces(&folder.0, &tent_grid());
     let stopped = build_scene(&folder.0, &request(), &mut |stage, done, _| stage != "chunks" || done < 8);
     assert!(matches!(stopped, Err(Error::Interrupted)));
     assert!(!folder.0.join("scene.json").exists() && !folder.0.join("spill").exists());
@@ -172,23 +172,23 @@ fn a_damaged_chunk_is_refused() {
 }
 
 #[test]
-fn an_outline_refuses_what_leads_nowhere_or_back() {
+fn a_lazy_chunk_rejects_invalid_references() {
     let folder = new_folder();
     write_faces(&folder.0, &tent(0.0, 0.0, 0));
     run(&folder, &request());
     let path = std::fs::read_dir(folder.0.join("chunks")).expect("list").next().expect("a chunk").expect("entry").path();
     let good = std::fs::read(&path).expect("read");
-    let outline = || SceneStore::open(&folder.0, 1 << 20).expect("open").outline(0);
-    let sound = outline().expect("an outline");
+    let open_lazily = || SceneStore::open(&folder.0, 1 << 20).expect("open").open_lazily(0);
+    let sound = open_lazily().expect("a chunk");
     assert_eq!((sound.objects().len(), sound.objects()[0].id), (1, 10));
     assert!(sound.node(0).is_ok() && sound.leaf(0).is_ok() && sound.node(1).is_err() && sound.leaf(9).is_err());
-    // A root that is its own child; a file that is cut; one of another build; an object without an id.
+    // A root that is its own child; a truncated file; a file of another build; an object without an id.
     let with = |at: usize, value: u32| [&good[..at], &value.to_le_bytes(), &good[at + 4..]].concat();
     std::fs::write(&path, with(128 + 192, 0)).expect("write");
-    assert!(outline().expect("opens").node(0).is_err());
+    assert!(open_lazily().expect("opens").node(0).is_err());
     for bad in [good[..good.len() - 64].to_vec(), with(8, 7), with(good.len() - 64, 0)] {
         std::fs::write(&path, bad).expect("write");
-        assert!(matches!(outline(), Err(Error::Format { .. })));
+        assert!(matches!(open_lazily(), Err(Error::Format { .. })));
     }
 }
 
@@ -209,9 +209,9 @@ fn broken_requests_and_assets_are_typed_errors() {
 }
 
 #[test]
-fn few_mapped_bytes_still_serve_all_chunks() {
+fn a_small_capacity_serves_all_chunks() {
     let folder = new_folder();
-    write_faces(&folder.0, &camp());
+    write_faces(&folder.0, &tent_grid());
     run(&folder, &request());
     let store = SceneStore::open(&folder.0, 4096).expect("open");
     for _ in 0..2 {

@@ -10,8 +10,8 @@ use common::{Random, folder, noise, png};
 use map3d_base::asset::{AssetMesh, AssetReport, AssetWriter, Batch, Material, Materials, Rank, Wrap};
 use map3d_image::{ImageLimits, PixelMask, Raster, fill_unmarked};
 use map3d_texture::{
-    Level, LinearRaster, TextureAsset, TextureCache, TextureFile, TextureKeys, build_textures, first_mip, hex, layout, level_count, mark_triangle,
-    next_mip, premultiplied, prune_textures, texture_key, texture_path, write,
+    Level, LinearRaster, TextureAsset, TextureCache, TextureFile, TextureKeys, build_textures, encode_texture, first_mip, hex, level_count,
+    mark_triangle, next_mip, premultiplied, prune_textures, texture_key, texture_path, write_texture,
 };
 
 // -- usage masks
@@ -219,7 +219,7 @@ fn transparent_texels_lend_no_colour() {
 
 fn stored(dir: &Path, image: &[u8], alpha: &[u8], mask: &PixelMask) -> TextureFile {
     let path = texture_path(dir, &texture_key(image, alpha, &mask.to_runs()));
-    write(&path, &layout(&path, image, alpha, mask, &ImageLimits::default()).expect("sound")).expect("written");
+    write_texture(&path, &encode_texture(&path, image, alpha, mask, &ImageLimits::default()).expect("sound")).expect("written");
     TextureFile::open(&path).expect("opens")
 }
 
@@ -387,12 +387,12 @@ fn missing_and_damaged_images_are_counted_and_absent() {
     let gone = town.materials[2].texture.clone().expect("a key");
     std::fs::remove_file(dir.join("a/textures").join(format!("{gone}.png"))).expect("removed");
     let keys = build(&[&town], &dir.join("out"), 2);
-    assert_eq!((keys.by_source.len(), keys.missing.values().map(|m| m.0).sum::<u64>()), (1, 2), "{:?}", keys.missing);
+    assert_eq!((keys.by_source.len(), keys.missing.values().map(|m| m.count).sum::<u64>()), (1, 2), "{:?}", keys.missing);
     town.materials[0].texture = Some("../../etc/passwd".into());
     let mesh = AssetMesh::open(&town.folder.join("mesh.m3a")).expect("mesh");
     let assets = [TextureAsset { folder: &town.folder, mesh: &mesh, materials: &town.materials }];
     let keys = build_textures(&assets, &dir.join("out"), 1, &|_, _, _| true).expect("built");
-    assert_eq!(keys.missing.values().map(|m| m.0).sum::<u64>(), 2, "names that leave the folder are no names of images");
+    assert_eq!(keys.missing.values().map(|m| m.count).sum::<u64>(), 2, "a name that leaves the folder names no image");
     std::fs::remove_dir_all(dir).expect("clean up");
 }
 

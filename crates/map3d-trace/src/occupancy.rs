@@ -9,7 +9,7 @@ use std::collections::hash_map::Entry;
 use map3d_base::{Box3, Error, Frame, Result, Vec3, ViewAxes};
 use map3d_scene::instances::{place, placed_box};
 use map3d_scene::records::{EMPTY, LEAF_BIT};
-use map3d_scene::{Leaf, Outline, Part, SceneStore};
+use map3d_scene::{LazyChunk, Leaf, ScenePart, SceneStore};
 
 pub use keys::{block_key, block_keys};
 
@@ -45,23 +45,23 @@ pub fn occupied_within(scene: &SceneStore, frame: &Frame, level: u8, block_level
 /// The outlines of prototypes stay open, since many instances ask for them; a chunk is asked for once.
 #[derive(Default)]
 struct Outlines {
-    prototypes: HashMap<u32, Outline>,
-    chunk: Option<Outline>,
+    prototypes: HashMap<u32, LazyChunk>,
+    chunk: Option<LazyChunk>,
 }
 
 impl Outlines {
-    fn get(&mut self, scene: &SceneStore, part: &Part) -> Result<&Outline> {
+    fn get(&mut self, scene: &SceneStore, part: &ScenePart) -> Result<&LazyChunk> {
         if part.instance.is_none() {
-            return Ok(self.chunk.insert(scene.outline(part.chunk)?));
+            return Ok(self.chunk.insert(scene.open_lazily(part.chunk)?));
         }
         Ok(match self.prototypes.entry(part.chunk) {
             Entry::Occupied(known) => known.into_mut(),
-            Entry::Vacant(free) => free.insert(scene.outline(part.chunk)?),
+            Entry::Vacant(free) => free.insert(scene.open_lazily(part.chunk)?),
         })
     }
 }
 
-fn descend(chunk: &Outline, transform: Option<&[f64; 12]>, view: &TileView, flags: &mut Flags) -> Result<()> {
+fn descend(chunk: &LazyChunk, transform: Option<&[f64; 12]>, view: &TileView, flags: &mut Flags) -> Result<()> {
     let origin = chunk.origin();
     let mut stack = vec![0u32];
     while let Some(child) = stack.pop() {

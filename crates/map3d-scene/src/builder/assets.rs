@@ -1,4 +1,4 @@
-//! The assets of a scene: opened when they are needed, meshes stay mapped files; and what earlier builds remember of them.
+//! The assets of a scene, opened when they are needed, with meshes as mapped files; and their summaries from earlier builds.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -8,65 +8,67 @@ use map3d_base::{Error, Result};
 use twox_hash::XxHash3_128;
 
 use super::BuildRequest;
+use super::asset_summary::{AssetSummary, EXTENSION};
 use super::files::prune;
-use super::survey::{EXTENSION, Survey};
 
-/// Raised when surveys or chunks would come out differently from the same assets.
+/// Incremented when the same assets would yield other summaries or chunks.
 pub(super) const BUILD_FORMAT: u32 = 2;
 const FOLDER: &str = "build";
 
 /// The assets of a request, by number.
 pub(super) struct Assets {
     entries: Vec<Entry>,
-    surveys_at: PathBuf,
-    /// Surveys that assets had before they changed or went.
-    former: Vec<Survey>,
+    summaries_folder: PathBuf,
+    /// Summaries of assets before they changed or were removed.
+    previous: Vec<AssetSummary>,
 }
 
 struct Entry {
     folder: PathBuf,
-    mark: String,
+    digest: String,
     opened: Option<Asset>,
-    survey: Option<Survey>,
-    /// The survey was made by this build.
+    summary: Option<AssetSummary>,
+    /// This build computed the summary.
     is_new: bool,
 }
 
 impl Assets {
-    /// Looks at all assets without opening them; those whose survey still holds need not be opened.
+    /// Reads the digests of all assets without opening them; an asset whose summary is valid need not be opened.
     pub fn load(folder: &Path, request: &BuildRequest) -> Result<Self> {
-        let surveys_at = folder.join(FOLDER);
-        let mut out = Self { entries: Vec::new(), surveys_at, former: Vec::new() };
+        let summaries_folder = folder.join(FOLDER);
+        let mut out = Self { entries: Vec::new(), summaries_folder, previous: Vec::new() };
         for name in &request.assets {
             let place = folder.join("assets").join(name);
-            let mark = mark_of(&place, request)?;
-            let survey = Survey::read(&out.path_of(name));
-            let holds = survey.as_ref().is_some_and(|s| s.facts.mark == mark && s.facts.prototypes.iter().all(|p| folder.join(p).exists()));
-            let (survey, former) = if holds { (survey, None) } else { (None, survey) };
-            out.former.extend(former);
-            out.entries.push(Entry { folder: place, mark, opened: None, survey, is_new: false });
+            let digest = compute_digest(&place, request)?;
+            let summary = AssetSummary::read(&out.summary_path(name));
+            let is_valid =
+                summary.as_ref().is_some_and(|s| s.details.digest == digest && s.details.prototypes.iter().all(|p| folder.join(p).exists()));
+            let (summary, previous) = if is_valid { (summary, None) } else { (None, summary) };
+            out.previous.extend(previous);
+            out.entries.push(Entry { folder: place, digest, opened: None, summary, is_new: false });
         }
-        out.former.extend(out.gone(&request.assets)?);
+        out.previous.extend(out.read_removed(&request.assets)?);
         Ok(out)
     }
 
-    /// Surveys of assets that the request does not name.
-    fn gone(&self, names: &[String]) -> Result<Vec<Survey>> {
-        let Ok(entries) = std::fs::read_dir(&self.surveys_at) else { return Ok(Vec::new()) };
-        let names: BTreeSet<PathBuf> = names.iter().map(|n| self.path_of(n)).collect();
-        let paths: Vec<PathBuf> = entries.map(|e| e.map(|e| e.path()).map_err(|e| Error::storage(&self.surveys_at, e))).collect::<Result<_>>()?;
-        Ok(paths.iter().filter(|p| !names.contains(*p)).filter_map(|p| Survey::read(p)).collect())
+    /// Reads the summaries of assets that the request does not name.
+    fn read_removed(&self, names: &[String]) -> Result<Vec<AssetSummary>> {
+        let Ok(entries) = std::fs::read_dir(&self.summaries_folder) else { return Ok(Vec::new()) };
+        let names: BTreeSet<PathBuf> = names.iter().map(|n| self.summary_path(n)).collect();
+        let paths: Vec<PathBuf> =
+            entries.map(|e| e.map(|e| e.path()).map_err(|e| Error::storage(&self.summaries_folder, e))).collect::<Result<_>>()?;
+        Ok(paths.iter().filter(|p| !names.contains(*p)).filter_map(|p| AssetSummary::read(p)).collect())
     }
 
-    fn path_of(&self, name: &str) -> PathBuf {
-        self.surveys_at.join(format!("{name}.{EXTENSION}"))
+    fn summary_path(&self, name: &str) -> PathBuf {
+        self.summaries_folder.join(format!("{name}.{EXTENSION}"))
     }
 
     pub fn len(&self) -> usize {
         self.entries.len()
     }
 
-    /// Opens an asset, if it is not yet.
+    /// Opens an asset unless it is open.
     pub fn open(&mut self, k: usize) -> Result<&Asset> {
         if self.entries[k].opened.is_none() {
             self.entries[k].opened = Some(Asset::open(self.entries[k].folder.clone())?);
@@ -74,7 +76,7 @@ impl Assets {
         Ok(self.get(k))
     }
 
-    /// One that was opened.
+    /// Returns an asset that is open.
     pub fn get(&self, k: usize) -> &Asset {
         self.entries[k].opened.as_ref().expect("opened before")
     }
@@ -83,57 +85,57 @@ impl Assets {
         self.entries.iter_mut().for_each(|e| e.opened = None);
     }
 
-    pub fn survey(&self, k: usize) -> Option<&Survey> {
-        self.entries[k].survey.as_ref()
+    pub fn summary(&self, k: usize) -> Option<&AssetSummary> {
+        self.entries[k].summary.as_ref()
     }
 
-    /// In the order of the assets, of those that have one.
-    pub fn surveys(&self) -> impl Iterator<Item = &Survey> {
-        self.entries.iter().filter_map(|e| e.survey.as_ref())
+    /// Returns the summaries in the order of the assets, skipping assets without one.
+    pub fn summaries(&self) -> impl Iterator<Item = &AssetSummary> {
+        self.entries.iter().filter_map(|e| e.summary.as_ref())
     }
 
-    pub fn former(&self) -> impl Iterator<Item = &Survey> {
-        self.former.iter()
+    pub fn previous(&self) -> impl Iterator<Item = &AssetSummary> {
+        self.previous.iter()
     }
 
     pub fn is_new(&self, k: usize) -> bool {
         self.entries[k].is_new
     }
 
-    /// What the assets were before: surveys that still hold, and former ones.
-    pub fn before(&self) -> impl Iterator<Item = &Survey> {
-        self.entries.iter().filter(|e| !e.is_new).filter_map(|e| e.survey.as_ref()).chain(&self.former)
+    /// Returns the summaries of the last build: those still valid, and previous ones.
+    pub fn of_last_build(&self) -> impl Iterator<Item = &AssetSummary> {
+        self.entries.iter().filter(|e| !e.is_new).filter_map(|e| e.summary.as_ref()).chain(&self.previous)
     }
 
-    pub fn without_survey(&self) -> Vec<usize> {
-        (0..self.len()).filter(|k| self.survey(*k).is_none()).collect()
+    pub fn without_summary(&self) -> Vec<usize> {
+        (0..self.len()).filter(|k| self.summary(*k).is_none()).collect()
     }
 
-    /// Makes the surveys that no longer hold former ones.
-    pub fn drop_surveys(&mut self, is_outdated: impl Fn(&Survey) -> bool) {
-        let outdated = self.entries.iter_mut().filter(|e| e.survey.as_ref().is_some_and(&is_outdated));
-        self.former.extend(outdated.filter_map(|e| e.survey.take()));
+    /// Moves outdated summaries to the previous ones.
+    pub fn invalidate(&mut self, is_outdated: impl Fn(&AssetSummary) -> bool) {
+        let outdated = self.entries.iter_mut().filter(|e| e.summary.as_ref().is_some_and(&is_outdated));
+        self.previous.extend(outdated.filter_map(|e| e.summary.take()));
     }
 
-    /// Keeps a survey for this build and, on disk, for the next.
-    pub fn keep(&mut self, k: usize, mut survey: Survey) -> Result<()> {
+    /// Stores a summary for this build and, on disk, for the next one.
+    pub fn store(&mut self, k: usize, mut summary: AssetSummary) -> Result<()> {
         let entry = &mut self.entries[k];
-        survey.facts.mark.clone_from(&entry.mark);
+        summary.details.digest.clone_from(&entry.digest);
         let name = entry.folder.file_name().and_then(|n| n.to_str()).unwrap_or_default();
-        survey.write(&self.surveys_at.join(format!("{name}.{EXTENSION}")))?;
-        (entry.survey, entry.is_new) = (Some(survey), true);
+        summary.write(&self.summaries_folder.join(format!("{name}.{EXTENSION}")))?;
+        (entry.summary, entry.is_new) = (Some(summary), true);
         Ok(())
     }
 
-    /// Removes surveys of assets that are gone, once nothing of them is left.
+    /// Removes the summaries of assets that the scene no longer has.
     pub fn prune(&self) -> Result<()> {
         let names: BTreeSet<&str> = self.entries.iter().filter_map(|e| e.folder.file_name()?.to_str()).collect();
-        prune(&self.surveys_at, |file| file.strip_suffix(EXTENSION).and_then(|f| f.strip_suffix('.')).is_some_and(|name| names.contains(name)))
+        prune(&self.summaries_folder, |file| file.strip_suffix(EXTENSION).and_then(|f| f.strip_suffix('.')).is_some_and(|name| names.contains(name)))
     }
 }
 
-/// Hash over all that a survey depends on but the keys of textures: the mesh by the checksum in its head.
-fn mark_of(folder: &Path, request: &BuildRequest) -> Result<String> {
+/// Hashes all that a summary depends on except the keys of textures; the mesh counts by the checksum in its header.
+fn compute_digest(folder: &Path, request: &BuildRequest) -> Result<String> {
     let mut hash = XxHash3_128::with_seed(u64::from(BUILD_FORMAT));
     let mut write = |bytes: &[u8]| {
         hash.write(&(bytes.len() as u64).to_le_bytes());
@@ -204,7 +206,7 @@ fn read_ids(path: &Path) -> Result<Vec<u32>> {
     }
     let ids: Vec<u32> = bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
     match ids.iter().position(|id| *id == 0) {
-        Some(k) => Err(Error::format(path, format!("object {k} has the id 0, which means nothing"))),
+        Some(k) => Err(Error::format(path, format!("object {k} has id 0, expected a positive id"))),
         None => Ok(ids),
     }
 }

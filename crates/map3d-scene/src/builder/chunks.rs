@@ -1,4 +1,4 @@
-//! Sorts triangles into the cells that have to be built, and writes their chunks.
+//! Sorts triangles into the cells to build, and writes their chunks.
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -7,87 +7,89 @@ use map3d_base::{Error, Result};
 use rayon::prelude::*;
 use twox_hash::XxHash3_128;
 
+use super::asset_summary::halves;
+use super::buckets::TriangleBuckets;
 use super::cells::{Quadtree, slab, slab_center};
-use super::encode::{Input, encode_chunk};
+use super::chunk_cache::{CHUNKS, CachedChunk, ChunkCache};
+use super::encode::{ChunkInput, encode_chunk};
 use super::files::write_if_changed;
-use super::shelf::{CHUNKS, OnShelf, Shelf};
-use super::source::Source;
-use super::spill::Spill;
-use super::survey::halves;
 use super::triangle::BuildTriangle;
-use super::unpack::{MoreMaterials, unpack};
+use super::triangle_source::TriangleSource;
+use super::unpack::{MaterialTable, unpack_chunk};
 use super::{BuildReport, BuildRequest, Progress};
 use crate::index::{Cell, ChunkEntry};
 use crate::lattice::snap;
 use crate::records::MaterialRecord;
 
-/// What encoding one cell takes at most, generously.
+/// Upper bound of the memory that encoding one cell takes.
 const CELL_MEMORY_BYTES: u64 = 160 << 20;
 
-/// What goes into a sorting cell: triangles, the sum of their hashes, then the hash of all that its chunks depend on.
+/// The content of a sorting cell.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Sorted {
-    count: u64,
+pub(super) struct CellContent {
+    triangles: u64,
+    /// Sum of the triangles' hashes modulo 2^128.
     sum: u128,
+    /// Hash of all that the chunks of the cell depend on.
     input: [u64; 2],
 }
 
-impl Sorted {
+impl CellContent {
     pub fn add(&mut self, count: u64, sum: u128) {
-        self.count += count;
+        self.triangles += count;
         self.sum = self.sum.wrapping_add(sum);
     }
 
-    pub fn settle(&mut self, format: u32, merge_faces: bool, cell: Cell, square: [f64; 3]) {
+    pub fn compute_input(&mut self, format: u32, merge_faces: bool, cell: Cell, square: [f64; 3]) {
         let mut hash = XxHash3_128::with_seed(u64::from(format));
         hash.write(env!("CARGO_PKG_VERSION").as_bytes());
         hash.write(&[u8::from(merge_faces)]);
         hash.write(bytemuck::bytes_of(&cell));
         hash.write(bytemuck::bytes_of(&square));
-        hash.write(&self.count.to_le_bytes());
+        hash.write(&self.triangles.to_le_bytes());
         hash.write(&self.sum.to_le_bytes());
         self.input = halves(hash.finish_128());
     }
 }
 
-/// What is done about a sorting cell.
-enum Plan {
-    Keep(Vec<OnShelf>),
-    /// Built from the chunks that it had, with the objects of changed assets exchanged.
-    Patch(Vec<OnShelf>),
-    /// Built from all assets that meet it.
+/// The way to get the chunks of a sorting cell.
+enum CellPlan {
+    Reuse(Vec<CachedChunk>),
+    /// Build it from its earlier chunks, with the objects of changed assets replaced.
+    Patch(Vec<CachedChunk>),
+    /// Build it from all assets that have triangles in it.
     Build,
 }
 
-/// A sorting cell with its chunks.
+/// The chunks of a sorting cell.
 #[derive(Default)]
-pub(super) struct Written {
+pub(super) struct CellChunks {
     pub entries: Vec<ChunkEntry>,
     pub kept: u64,
     pub duplicate_faces: u64,
 }
 
-/// Builds the cells that are not on the shelf.
-pub(super) struct Writer<'a> {
+/// Builds the cells whose chunks the cache does not have.
+pub(super) struct ChunkWriter<'a> {
     folder: &'a Path,
     request: &'a BuildRequest,
     tree: &'a Quadtree,
-    sorted: &'a [Sorted],
-    plans: Vec<Plan>,
-    spill: Spill,
+    contents: &'a [CellContent],
+    plans: Vec<CellPlan>,
+    buckets: TriangleBuckets,
 }
 
-impl<'a> Writer<'a> {
-    /// `before`: what went into the cells when their chunks were made.
-    pub fn new(folder: &'a Path, request: &'a BuildRequest, tree: &'a Quadtree, sorted: &'a [Sorted], before: &[Sorted]) -> Result<Self> {
-        let shelf = Shelf::look(folder)?;
-        let plan = |((cell, now), before): ((&Cell, &Sorted), &Sorted)| {
-            let patched = || shelf.find(*cell, before.input).filter(|_| request.options.merge_materials).map_or(Plan::Build, Plan::Patch);
-            shelf.find(*cell, now.input).map_or_else(patched, Plan::Keep)
+impl<'a> ChunkWriter<'a> {
+    /// `before`: the contents when the cached chunks were built.
+    pub fn new(folder: &'a Path, request: &'a BuildRequest, tree: &'a Quadtree, contents: &'a [CellContent], before: &[CellContent]) -> Result<Self> {
+        let cache = ChunkCache::scan(folder)?;
+        let plan = |((cell, now), before): ((&Cell, &CellContent), &CellContent)| {
+            let patched = || cache.find(*cell, before.input).filter(|_| request.options.merge_materials).map_or(CellPlan::Build, CellPlan::Patch);
+            cache.find(*cell, now.input).map_or_else(patched, CellPlan::Reuse)
         };
-        let plans = tree.sorting_cells().iter().zip(sorted).zip(before).map(plan).collect();
-        let spill = Spill::new(&folder.join("spill"), request.memory_bytes() / 4)?;
-        Ok(Self { folder, request, tree, sorted, plans, spill })
+        let plans = tree.sorting_cells().iter().zip(contents).zip(before).map(plan).collect();
+        let buckets = TriangleBuckets::new(&folder.join("spill"), request.memory_bytes() / 4)?;
+        Ok(Self { folder, request, tree, contents, plans, buckets })
     }
 
     /// Whether a cell of the counting level needs the triangles of an asset.
@@ -97,26 +99,26 @@ impl<'a> Writer<'a> {
 
     fn home(&self, number: u32, is_changed: bool) -> Option<usize> {
         self.tree.home(number).filter(|home| match self.plans[*home] {
-            Plan::Keep(_) => false,
-            Plan::Patch(_) => is_changed,
-            Plan::Build => true,
+            CellPlan::Reuse(_) => false,
+            CellPlan::Patch(_) => is_changed,
+            CellPlan::Build => true,
         })
     }
 
-    /// Takes the placed triangles of some assets, each with whether it changed.
-    pub fn sort(&mut self, source: &Source, changed: &[bool], progress: Progress) -> Result<()> {
+    /// Sorts the triangles of some assets into their cells; `changed`: whether each asset changed.
+    pub fn sort(&mut self, source: &TriangleSource, changed: &[bool], progress: Progress) -> Result<()> {
         let total: u64 = source.assets.iter().map(|a| a.mesh.triangles().len() as u64).sum();
         let mut before = 0;
         for (number, asset) in source.assets.iter().enumerate() {
-            let (mut failure, mut uncounted) = (None, BuildReport::default());
+            let (mut failure, mut ignored) = (None, BuildReport::default());
             let mut put = |_: u32, t: &BuildTriangle| {
                 if failure.is_none() {
                     failure = self.push(t, changed[number]).err();
                 }
             };
-            let went_on = source.stream(number, |p| p == 0, &mut uncounted, &mut put, &mut |n| progress("sort", before + n, total));
+            let completed = source.stream(number, |p| p == 0, &mut ignored, &mut put, &mut |n| progress("sort", before + n, total));
             failure.map_or(Ok(()), Err)?;
-            if !went_on {
+            if !completed {
                 return Err(Error::Interrupted);
             }
             before += asset.mesh.triangles().len() as u64;
@@ -125,50 +127,50 @@ impl<'a> Writer<'a> {
         Ok(())
     }
 
-    /// Takes a triangle, if its cell has to be built.
+    /// Adds a triangle if its cell needs it.
     pub fn push(&mut self, t: &BuildTriangle, is_changed: bool) -> Result<()> {
         match self.home(self.tree.square.number(t), is_changed) {
-            Some(home) => self.spill.push(self.tree.sorting_cells()[home], t),
+            Some(home) => self.buckets.push(self.tree.sorting_cells()[home], t),
             None => Ok(()),
         }
     }
 
-    /// Encodes and writes the chunks, a few at a time; all chunks of all cells come back. `exchanged`: objects of changed assets, now and before.
-    pub fn write(self, materials: &[MaterialRecord], exchanged: &HashSet<u32>, progress: Progress) -> Result<Vec<Written>> {
+    /// Encodes and writes the chunks in batches; returns the chunks of all cells. `changed_objects`: objects of changed assets, now and before.
+    pub fn write(self, materials: &[MaterialRecord], changed_objects: &HashSet<u32>, progress: Progress) -> Result<Vec<CellChunks>> {
         let fitting = (self.request.memory_bytes() / 2 / CELL_MEMORY_BYTES).max(1) as usize;
         let threads = self.request.thread_count().min(fitting);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| Error::argument(format!("threads: {e}")))?;
-        let (kept, stale): (Vec<usize>, Vec<usize>) = (0..self.plans.len()).partition(|n| matches!(self.plans[*n], Plan::Keep(_)));
-        let mut out: Vec<Written> = kept.into_iter().map(|n| self.kept(n)).collect();
+        let (kept, stale): (Vec<usize>, Vec<usize>) = (0..self.plans.len()).partition(|n| matches!(self.plans[*n], CellPlan::Reuse(_)));
+        let mut out: Vec<CellChunks> = kept.into_iter().map(|n| self.reuse(n)).collect();
         for (k, batch) in stale.chunks(threads).enumerate() {
             if !progress("chunks", (k * threads) as u64, stale.len() as u64) {
                 return Err(Error::Interrupted);
             }
-            let one = |n: &usize| self.one(*n, MoreMaterials::new(materials), exchanged);
-            let done: Vec<Written> = pool.install(|| batch.par_iter().map(one).collect::<Result<_>>())?;
+            let one = |n: &usize| self.build_cell(*n, MaterialTable::new(materials), changed_objects);
+            let done: Vec<CellChunks> = pool.install(|| batch.par_iter().map(one).collect::<Result<_>>())?;
             out.extend(done);
         }
         Ok(out)
     }
 
-    fn kept(&self, number: usize) -> Written {
-        let Plan::Keep(files) = &self.plans[number] else { return Written::default() };
+    fn reuse(&self, number: usize) -> CellChunks {
+        let CellPlan::Reuse(files) = &self.plans[number] else { return CellChunks::default() };
         let entries: Vec<ChunkEntry> = files.iter().map(|f| f.entry.clone()).collect();
-        self.written(number, entries.len() as u64, entries)
+        self.cell_chunks(number, entries.len() as u64, entries)
     }
 
-    fn written(&self, number: usize, kept: u64, entries: Vec<ChunkEntry>) -> Written {
+    fn cell_chunks(&self, number: usize, kept: u64, entries: Vec<ChunkEntry>) -> CellChunks {
         let there: u64 = entries.iter().map(|e| e.triangles).sum();
-        Written { kept, duplicate_faces: self.sorted[number].count.saturating_sub(there), entries }
+        CellChunks { kept, duplicate_faces: self.contents[number].triangles.saturating_sub(there), entries }
     }
 
-    /// The chunks of one sorting cell.
-    fn one(&self, number: usize, mut materials: MoreMaterials, exchanged: &HashSet<u32>) -> Result<Written> {
+    /// Builds the chunks of one sorting cell.
+    fn build_cell(&self, number: usize, mut materials: MaterialTable, changed_objects: &HashSet<u32>) -> Result<CellChunks> {
         let cell = self.tree.sorting_cells()[number];
-        let mut triangles = self.spill.load(cell)?;
-        if let Plan::Patch(files) = &self.plans[number] {
+        let mut triangles = self.buckets.load(cell)?;
+        if let CellPlan::Patch(files) = &self.plans[number] {
             for file in files {
-                unpack(&self.folder.join(&file.entry.file), &mut materials, |id| !exchanged.contains(&id), &mut triangles)?;
+                unpack_chunk(&self.folder.join(&file.entry.file), &mut materials, |id| !changed_objects.contains(&id), &mut triangles)?;
             }
         }
         let mut groups = Vec::new();
@@ -176,19 +178,19 @@ impl<'a> Writer<'a> {
             triangles.sort_by_key(slab);
             groups.extend(triangles.chunk_by(|a, b| slab(a) == slab(b)).map(|group| (cell, group.to_vec())));
         }
-        let input = Input { hash: self.sorted[number].input, parts: groups.len() as u32 };
+        let input = ChunkInput { hash: self.contents[number].input, parts: groups.len() as u32 };
         let (mut entries, mut kept) = (Vec::new(), 0);
         for (cell, triangles) in groups {
-            let (entry, is_kept) = self.chunk(cell, triangles, input, &materials.records)?;
+            let (entry, is_kept) = self.write_chunk(cell, triangles, input, &materials.records)?;
             kept += u64::from(is_kept);
             entries.push(entry);
         }
-        self.spill.forget(cell)?;
-        Ok(self.written(number, kept, entries))
+        self.buckets.remove(cell)?;
+        Ok(self.cell_chunks(number, kept, entries))
     }
 
-    /// The entry, and whether the file held these very bytes.
-    fn chunk(&self, cell: Cell, triangles: Vec<BuildTriangle>, input: Input, materials: &[MaterialRecord]) -> Result<(ChunkEntry, bool)> {
+    /// Writes a chunk; returns its entry and whether the file already had these bytes.
+    fn write_chunk(&self, cell: Cell, triangles: Vec<BuildTriangle>, input: ChunkInput, materials: &[MaterialRecord]) -> Result<(ChunkEntry, bool)> {
         let slab = slab(&triangles[0]);
         let [x, y] = self.tree.square.center(cell);
         let origin = snap([x, y, slab_center(slab)]);

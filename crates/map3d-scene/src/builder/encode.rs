@@ -1,4 +1,4 @@
-//! Triangles of a cell or prototype → the bytes of a chunk file.
+//! Encodes the triangles of a cell or prototype as a chunk file.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
@@ -12,7 +12,7 @@ use crate::bvh::{self, Aabb, Tree};
 use crate::lattice::{Point, STEPS_PER_M, metres};
 use crate::records::{CHUNK_MAGIC, ChunkHeader, ChunkObject, EMPTY, FLAG_CUTOUT, FLAG_NORMALS, Leaf, MaterialRecord, TriangleRecord, VERSION};
 
-/// A chunk file's bytes and what the scene index says of it.
+/// The bytes of a chunk file and its values in the scene index.
 #[derive(Clone, Debug)]
 pub struct ChunkFile {
     pub bytes: Vec<u8>,
@@ -23,21 +23,21 @@ pub struct ChunkFile {
     pub hash: u64,
 }
 
-/// Where the triangles of a chunk are from, kept in its header: hash, and the number of chunks that were made of the same input.
+/// The input of a chunk, as its header states it: a hash, and the number of chunks built from the same input.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Input {
+pub struct ChunkInput {
     pub hash: [u64; 2],
     pub parts: u32,
 }
 
-/// Encodes at least one triangle; `origin` is a lattice point within reach of all corners. `materials` are the build's.
-/// The bytes do not depend on the order of the triangles, nor on how the build numbers materials and assets.
+/// Encodes at least one triangle; `origin` is a lattice point at most 4,096 m from all corners, `materials` are the build's.
+/// The bytes depend neither on the order of the triangles nor on the build's numbers of materials and assets.
 pub fn encode_chunk(
     mut triangles: Vec<BuildTriangle>,
     origin: Point,
     materials: &[MaterialRecord],
     merge_faces: bool,
-    input: Input,
+    input: ChunkInput,
 ) -> Result<ChunkFile> {
     triangles.sort_by_key(|t| (t.object_id, t.asset, t.source, t.corners));
     if merge_faces {
@@ -46,7 +46,7 @@ pub fn encode_chunk(
     let positions = positions(&triangles, origin)?;
     let boxes: Vec<Aabb> = positions.iter().map(|p| Aabb::of_points(p)).collect();
     let tree = bvh::build(&boxes);
-    let objects = Objects::of(&triangles, &boxes, materials);
+    let objects = Objects::of_triangles(&triangles, &boxes, materials);
     let used = used_materials(&triangles, materials);
     let mut body = Body { header: header(origin, &tree, &boxes), bytes: Vec::new() };
     (body.header.input, body.header.parts) = (input.hash, input.parts);
@@ -57,7 +57,7 @@ pub fn encode_chunk(
     Ok(body.finish())
 }
 
-/// The first of each set of faces with the same object, material and corners stays.
+/// Keeps the first of the faces with the same object, material and corners.
 fn drop_duplicates(triangles: &mut Vec<BuildTriangle>) {
     let mut seen = HashSet::with_capacity(triangles.len());
     triangles.retain(|t| {
@@ -99,7 +99,7 @@ fn header(origin: Point, tree: &Tree, boxes: &[Aabb]) -> ChunkHeader {
         magic: *CHUNK_MAGIC,
         version: VERSION,
         origin: metres(origin),
-        bounds: bounds.six(),
+        bounds: bounds.to_array(),
         nodes: tree.nodes.len() as u32,
         leaves: tree.leaves.len() as u32,
         triangles: tree.order.len() as u32,
@@ -107,7 +107,7 @@ fn header(origin: Point, tree: &Tree, boxes: &[Aabb]) -> ChunkHeader {
     }
 }
 
-/// Objects by id, with what the file says of each.
+/// Objects by id, and their records.
 struct Objects {
     numbers: BTreeMap<u32, u32>,
     records: Vec<ChunkObject>,
@@ -115,7 +115,7 @@ struct Objects {
 
 impl Objects {
     /// `triangles` are sorted by object.
-    fn of(triangles: &[BuildTriangle], boxes: &[Aabb], materials: &[MaterialRecord]) -> Self {
+    fn of_triangles(triangles: &[BuildTriangle], boxes: &[Aabb], materials: &[MaterialRecord]) -> Self {
         let (mut numbers, mut records) = (BTreeMap::new(), Vec::new());
         let mut start = 0;
         for group in triangles.chunk_by(|a, b| a.object_id == b.object_id) {
@@ -126,7 +126,7 @@ impl Objects {
             records.push(ChunkObject {
                 id: group[0].object_id,
                 rank: u32::from(group[0].rank),
-                bounds: bounds.six(),
+                bounds: bounds.to_array(),
                 content: content_hash(group, materials),
                 reserved: [0; 2],
             });
@@ -135,7 +135,7 @@ impl Objects {
     }
 }
 
-/// Over all that a rendering sees of the triangles; independent of chunk and file.
+/// Hashes all that is visible of the triangles; independent of chunk and file.
 pub(super) fn content_hash(triangles: &[BuildTriangle], materials: &[MaterialRecord]) -> [u64; 2] {
     let mut hash = XxHash3_128::with_seed(0);
     for t in triangles {

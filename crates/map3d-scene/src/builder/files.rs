@@ -1,11 +1,11 @@
-//! Writes files of a scene so that a reader never sees half of one, and leaves alone what would not change.
+//! Writes the files of a scene atomically, and only when they change.
 
 use std::fs;
 use std::path::Path;
 
 use map3d_base::{Error, Result};
 
-/// Writes elsewhere and renames; returns false when the file holds these very bytes already.
+/// Writes a temporary file and renames it; returns false when the file already has these bytes.
 pub(super) fn write_if_changed(path: &Path, bytes: &[u8]) -> Result<bool> {
     if fs::metadata(path).is_ok_and(|m| m.len() == bytes.len() as u64) && fs::read(path).is_ok_and(|old| old == bytes) {
         return Ok(false);
@@ -21,7 +21,7 @@ pub(super) fn write_if_changed(path: &Path, bytes: &[u8]) -> Result<bool> {
     Ok(true)
 }
 
-/// Removes files of a folder that `keep` does not name.
+/// Removes the files of a folder that `keep` rejects.
 pub(super) fn prune(folder: &Path, keep: impl Fn(&str) -> bool) -> Result<()> {
     let entries = match fs::read_dir(folder) {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),

@@ -1,4 +1,4 @@
-//! The ground plane of scenes without terrain: a little larger than the content, at the height of its ground.
+//! The ground plane of scenes without terrain: slightly larger than the content, at the height of its ground surfaces.
 
 use bytemuck::Zeroable;
 use map3d_base::asset::Rank;
@@ -12,7 +12,7 @@ const GRID_M: f64 = 700.0;
 const MARGIN: f64 = 0.05;
 const MIN_MARGIN_M: f64 = 10.0;
 
-/// What the content tells of its ground.
+/// Extent and ground height of content.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct GroundLevel {
     pub bounds: Box3,
@@ -33,14 +33,14 @@ impl GroundLevel {
         }
     }
 
-    /// Of both contents together.
+    /// Adds other content.
     pub fn merge(&mut self, other: &Self) {
         self.bounds.add_box(&other.bounds);
         self.has_terrain |= other.has_terrain;
         self.ground_m = self.ground_m.min(other.ground_m);
     }
 
-    /// Triangles of the plane; `asset` is a number of its own.
+    /// Returns the triangles of the plane; `asset` is a number that no asset has.
     pub fn plane(&self, asset: u32, object_id: u32, material: u32) -> Result<Vec<BuildTriangle>> {
         if object_id == 0 {
             return Err(Error::argument("build request: ground_id is 0, but the scene needs a ground plane; register an object for it"));
@@ -61,7 +61,7 @@ impl GroundLevel {
         Ok(out)
     }
 
-    /// Grid lines along an axis.
+    /// Returns the grid lines along an axis.
     fn lines(&self, axis: usize) -> Vec<f64> {
         let (lo, hi) = (self.bounds.lo[axis], self.bounds.hi[axis]);
         let margin = ((hi - lo) * MARGIN).max(MIN_MARGIN_M);
@@ -77,7 +77,7 @@ mod tests {
     use crate::lattice::is_long;
 
     #[test]
-    fn the_plane_reaches_over_the_box_in_short_edges() {
+    fn the_plane_extends_beyond_the_box_and_has_short_edges() {
         let bounds = Box3 { lo: [0.0, -50.0, 3.0], hi: [4000.0, 50.0, 90.0] };
         let level = GroundLevel { bounds, has_terrain: false, ground_m: 5.0 };
         let plane = level.plane(1, 9, 0).expect("an id is given");
@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn a_plane_without_an_object_is_refused() {
+    fn a_plane_needs_an_object() {
         let level = GroundLevel { bounds: Box3 { lo: [0.0; 3], hi: [1.0; 3] }, has_terrain: false, ground_m: 0.0 };
         assert!(level.plane(1, 0, 0).is_err());
     }

@@ -1,25 +1,25 @@
-//! Materials of all assets as chunk records; equal ones become one.
+//! Converts the materials of all assets to chunk records and merges equal ones.
 
 use std::collections::HashMap;
 
-use map3d_base::asset::{Material, Wrap};
+use map3d_base::asset::Material;
 use map3d_texture::TextureKeys;
 
+use super::asset_summary::record_hash;
 use super::assets::Asset;
-use super::survey::record_hash;
-use crate::records::{MATERIAL_CUTOUT, MATERIAL_TEXTURED, MaterialRecord};
+use crate::records::{MATERIAL_CUTOUT, MATERIAL_TEXTURED, MaterialRecord, wrap_code};
 
 pub(super) struct BuildMaterials {
     pub records: Vec<MaterialRecord>,
     /// Per asset: the asset's material → index into `records`.
     numbers: Vec<Vec<u32>>,
-    /// Of each record.
+    /// Hash of each record.
     hashes: Vec<u64>,
     /// Per asset: materials that name an image that is missing or broken.
     pub without_their_texture: Vec<u64>,
 }
 
-/// sRGB of the ground plane: a calm, light grey.
+/// sRGB of the ground plane: light grey.
 const GROUND: [u8; 4] = [200, 198, 192, 255];
 
 impl BuildMaterials {
@@ -69,7 +69,7 @@ impl BuildMaterials {
         self.hashes[number as usize]
     }
 
-    /// Of each of an asset's materials.
+    /// Returns the hashes of an asset's materials.
     pub fn hashes_of(&self, asset: usize) -> Vec<u64> {
         self.numbers[asset].iter().map(|n| self.hash(*n)).collect()
     }
@@ -85,13 +85,7 @@ fn record_of(material: &Material, textures: &TextureKeys) -> MaterialRecord {
     MaterialRecord {
         diffuse: material.diffuse.map(byte),
         border: material.border.map(byte),
-        wrap: match material.wrap {
-            Wrap::Wrap => 0,
-            Wrap::Mirror => 1,
-            Wrap::Clamp => 2,
-            Wrap::Border => 3,
-            Wrap::None => 4,
-        },
+        wrap: wrap_code(material.wrap),
         flags: if texture.is_some() { MATERIAL_TEXTURED } else { 0 } | if cutout { MATERIAL_CUTOUT } else { 0 },
         padding: [0; 6],
         texture: texture.map_or([0; 16], |t| t.key),

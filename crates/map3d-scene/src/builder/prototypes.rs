@@ -1,23 +1,28 @@
-//! Prototypes become chunks in a frame of their own; their placements become instance records.
+//! Converts prototypes to chunks in their own frames, and their placements to instance records.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use map3d_base::{Box3, Result, Vec3};
 use twox_hash::XxHash3_128;
 
-use super::encode::{ChunkFile, Input, content_hash, encode_chunk};
+use super::encode::{ChunkFile, ChunkInput, content_hash, encode_chunk};
 use super::report::BuildReport;
-use super::source::Source;
 use super::triangle::BuildTriangle;
+use super::triangle_source::TriangleSource;
 use crate::index::ChunkEntry;
 use crate::lattice::Point;
 use crate::records::InstanceRecord;
 
-/// An asset's prototype number → triangles; ordered, so that numbers are the same in every build.
+/// Triangles by the asset's prototype number; ordered, so that every build numbers them alike.
 pub(super) type Prototypes = BTreeMap<u32, Vec<BuildTriangle>>;
 
-/// All prototypes of an asset that an instance places; `None`: stopped.
-pub(super) fn collect(source: &Source, number: usize, report: &mut BuildReport, go_on: &mut dyn FnMut(u64) -> bool) -> Option<Prototypes> {
+/// Collects the prototypes of an asset that have instances; `None` when `keep_going` returned false.
+pub(super) fn collect(
+    source: &TriangleSource,
+    number: usize,
+    report: &mut BuildReport,
+    keep_going: &mut dyn FnMut(u64) -> bool,
+) -> Option<Prototypes> {
     let mut out = Prototypes::new();
     let asset = source.assets[number];
     if asset.instances.is_empty() {
@@ -25,22 +30,22 @@ pub(super) fn collect(source: &Source, number: usize, report: &mut BuildReport, 
     }
     let placed: BTreeSet<u32> = asset.instances.iter().map(|i| i.prototype).collect();
     let mut put = |prototype: u32, t: &BuildTriangle| out.entry(prototype).or_default().push(*t);
-    source.stream(number, |p| p > 0 && placed.contains(&p), report, &mut put, go_on).then_some(out)
+    source.stream(number, |p| p > 0 && placed.contains(&p), report, &mut put, keep_going).then_some(out)
 }
 
-/// The chunk of a prototype; its origin is the middle of its box.
-pub(super) fn encode(triangles: &[BuildTriangle], source: &Source) -> Result<ChunkFile> {
+/// Encodes the chunk of a prototype; its origin is the middle of its box.
+pub(super) fn encode(triangles: &[BuildTriangle], source: &TriangleSource) -> Result<ChunkFile> {
     let corners = || triangles.iter().flat_map(|t| t.corners);
     let middle = |k: usize| {
         let (lo, hi) = (corners().map(|c| c[k]).min().unwrap_or(0), corners().map(|c| c[k]).max().unwrap_or(0));
         lo + (hi - lo) / 2
     };
     let origin: Point = [middle(0), middle(1), middle(2)];
-    encode_chunk(triangles.to_vec(), origin, &source.materials.records, source.options.merge_faces, Input::default())
+    encode_chunk(triangles.to_vec(), origin, &source.materials.records, source.options.merge_faces, ChunkInput::default())
 }
 
-/// Instances of an asset's prototypes that have triangles, in its order; they name prototypes by their place in `prototypes`.
-pub(super) fn instances(source: &Source, number: usize, prototypes: &Prototypes, report: &mut BuildReport) -> Vec<InstanceRecord> {
+/// Returns the instances of an asset's prototypes that have triangles, in the order of the asset; `prototype` is an index into `prototypes`.
+pub(super) fn instances(source: &TriangleSource, number: usize, prototypes: &Prototypes, report: &mut BuildReport) -> Vec<InstanceRecord> {
     let known: BTreeMap<u32, (u32, [u64; 2])> =
         prototypes.iter().zip(0..).map(|((key, t), k)| (*key, (k, content_hash(t, &source.materials.records)))).collect();
     let asset = source.assets[number];
@@ -73,7 +78,7 @@ fn instance_hash(content: &[u64; 2], object_id: u32, transform: &[f64; 12]) -> [
     [value as u64, (value >> 64) as u64]
 }
 
-/// Box of all instances, local.
+/// Returns the local box of all instances.
 pub(super) fn placed_bounds(records: &[InstanceRecord], entries: &[ChunkEntry]) -> Box3 {
     let boxes: Vec<Box3> = entries.iter().map(ChunkEntry::box3).collect();
     let mut out = Box3::EMPTY;

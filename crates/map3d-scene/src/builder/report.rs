@@ -1,10 +1,10 @@
-//! Counts of what was built and optimised away.
+//! Counts of what a build wrote and what it optimised away.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// Written to `scene.json` and handed to the caller; every count is there, also when it is 0.
+/// Part of `scene.json`, and returned to the caller; contains every count, even 0.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct BuildReport {
@@ -17,7 +17,7 @@ pub struct BuildReport {
     pub duplicate_vertices: u64,
     pub merged_materials: u64,
     pub untextured_faces: u64,
-    /// Triangles more, because edges over 1,024 m were split.
+    /// Additional triangles from splitting edges over 1,024 m.
     pub split_triangles: u64,
     pub ground_plane_triangles: u64,
     /// Materials whose image is missing or broken; they show their diffuse colour.
@@ -30,12 +30,12 @@ pub struct BuildReport {
     pub instances: u64,
     /// Instances of prototypes that have no triangles.
     pub instances_of_nothing: u64,
-    /// Reason → an example, for what went wrong with images.
+    /// By reason, the number of images that failed and an example.
     pub texture_warnings: BTreeMap<String, String>,
 }
 
 impl BuildReport {
-    /// Adds what was counted while an asset was read.
+    /// Adds the counts of an asset.
     pub(super) fn add(&mut self, asset: &Self) {
         self.triangles_read += asset.triangles_read;
         self.degenerate_triangles += asset.degenerate_triangles;
@@ -47,7 +47,7 @@ impl BuildReport {
         self.instances_of_nothing += asset.instances_of_nothing;
     }
 
-    /// The counts by name.
+    /// Returns the counts by name.
     pub fn counts(&self) -> BTreeMap<String, u64> {
         let value = serde_json::to_value(self).expect("counts are plain data");
         let object = value.as_object().expect("a struct is an object");

@@ -1,4 +1,4 @@
-//! What to build, as the caller asks for it in JSON.
+//! The request for a build, in JSON.
 
 use map3d_base::{Error, Result, Vec3};
 use serde::{Deserialize, Serialize};
@@ -12,7 +12,7 @@ pub struct BuildRequest {
     pub origin: Vec3,
     #[serde(default)]
     pub options: BuildOptions,
-    /// Object of the ground plane; needed when one is made.
+    /// Object of the ground plane; required when the build makes one.
     #[serde(default)]
     pub ground_id: u32,
     /// 0: one per core.
@@ -26,15 +26,15 @@ pub struct BuildRequest {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct BuildOptions {
-    /// Chunks store positions, so equal vertices are one anyway; this counts them.
+    /// Counts equal vertices. (Chunks store positions and no vertex indices.)
     pub merge_vertices: bool,
-    /// Faces of the same object and material with the same three corners, whichever way round, become one.
+    /// Merges faces of the same object and material with the same three corners in any order.
     pub merge_faces: bool,
-    /// Triangles without area after snapping go.
+    /// Drops triangles without area after snapping.
     pub drop_degenerate: bool,
-    /// Equal materials become one.
+    /// Merges equal materials.
     pub merge_materials: bool,
-    /// Triangles without a texture go.
+    /// Drops triangles without a texture.
     pub drop_untextured: bool,
     pub ground_plane: GroundPlane,
 }

@@ -1,10 +1,10 @@
-//! A triangle on its way into a chunk: snapped, with its edges short enough.
+//! A triangle before it becomes part of a chunk: snapped, with short edges.
 
 use bytemuck::{Pod, Zeroable};
 
 use crate::lattice::{Point, STEPS_PER_M, has_no_area, is_long, midpoint};
 
-/// Plain data, so that it can be spilled to a file as it is.
+/// Plain data, so that it can be written to a file as it is.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct BuildTriangle {
@@ -20,18 +20,18 @@ pub struct BuildTriangle {
     pub object_id: u32,
     /// Number among its object's triangles in the asset; a prototype's: among the prototype's.
     pub source: u32,
-    /// Index of its asset among those that are read.
+    /// Index of its asset among the open ones.
     pub asset: u32,
     pub padding2: u32,
 }
 
 const _: () = assert!(size_of::<BuildTriangle>() == 136);
 
-/// Deeper than any coordinate the gate lets pass can need.
+/// More than any valid coordinates need.
 const MAX_SPLITS: u32 = 40;
 
 impl BuildTriangle {
-    /// Three times the centroid's x and y in metres, exact for all coordinates that pass the gate.
+    /// Returns the centroid in metres; the sum before the division is exact for all valid coordinates.
     pub fn centroid_m(&self) -> [f64; 3] {
         [0, 1, 2].map(|k| self.corners.iter().map(|c| c[k]).sum::<i64>() as f64 / (3.0 * STEPS_PER_M))
     }
@@ -44,7 +44,7 @@ impl BuildTriangle {
         self.normals != [[0; 3]; 3]
     }
 
-    /// Hands on the triangle in pieces without long edges; returns how many. Each long edge is split at its own midpoint, whatever triangle it is in.
+    /// Passes on the triangle in pieces without long edges; returns their number. Splits each long edge at its midpoint, so that neighbours match.
     pub fn split(&self, out: &mut dyn FnMut(&Self)) -> u64 {
         self.split_to_depth(MAX_SPLITS, out)
     }
@@ -77,7 +77,7 @@ impl BuildTriangle {
         Corner { point: self.corners[k], uv: self.uv[k], normal: self.normals[k] }
     }
 
-    /// Halfway along the edge from corner k.
+    /// Returns the middle of the edge from corner k.
     fn middle(&self, k: usize) -> Corner {
         let (a, b) = (self.corner(k), self.corner((k + 1) % 3));
         let normal = [0, 1, 2].map(|i| ((i32::from(a.normal[i]) + i32::from(b.normal[i])) / 2) as i16);
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn a_short_triangle_stays_as_it_is() {
+    fn a_short_triangle_is_not_split() {
         let t = triangle([[0, 0, 0], [1024, 0, 0], [512, 700, 0]]);
         assert_eq!(pieces(&t), vec![t]);
     }

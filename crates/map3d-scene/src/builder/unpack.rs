@@ -1,4 +1,4 @@
-//! A chunk back into the triangles that it was made of, but for faces that were dropped because others are equal.
+//! Converts a chunk back to the triangles that it was built from, without the duplicates that were dropped.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -11,13 +11,13 @@ use crate::chunk::Chunk;
 use crate::lattice::{Point, snap};
 use crate::records::MaterialRecord;
 
-/// Materials that grow by those of chunks; equal records are one.
-pub(super) struct MoreMaterials {
+/// Material records by number; equal records have one number.
+pub(super) struct MaterialTable {
     pub records: Vec<MaterialRecord>,
     numbers: HashMap<MaterialRecord, u32>,
 }
 
-impl MoreMaterials {
+impl MaterialTable {
     pub fn new(records: &[MaterialRecord]) -> Self {
         Self { records: records.to_vec(), numbers: records.iter().copied().zip(0..).collect() }
     }
@@ -30,8 +30,8 @@ impl MoreMaterials {
     }
 }
 
-/// The triangles of the objects that `wanted` lets through.
-pub(super) fn unpack(path: &Path, materials: &mut MoreMaterials, wanted: impl Fn(u32) -> bool, out: &mut Vec<BuildTriangle>) -> Result<()> {
+/// Appends the triangles of the objects that `wanted` accepts.
+pub(super) fn unpack_chunk(path: &Path, materials: &mut MaterialTable, wanted: impl Fn(u32) -> bool, out: &mut Vec<BuildTriangle>) -> Result<()> {
     let chunk = Chunk::open(path, true)?;
     let numbers: Vec<u32> = chunk.materials().iter().map(|m| materials.number(m)).collect();
     let objects: Vec<Option<u32>> = chunk.objects().iter().map(|o| Some(o.id).filter(|id| wanted(*id))).collect();

@@ -1,4 +1,4 @@
-//! Textures of a scene: every image that a material names, with the mask of what the scene uses of it, becomes one `.m3t`.
+//! Builds the textures of a scene: each image that a material names, with the mask of the texels that the scene uses, becomes one `.m3t` file.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
@@ -18,15 +18,19 @@ use map3d_image::PixelMask;
 /// (stage, done, total) → false to stop.
 pub type Progress<'a> = dyn Fn(&str, u64, u64) -> bool + Sync + 'a;
 
-/// An asset as the build sees it. `folder` holds `textures/`.
+/// An asset whose textures are built. `folder` holds `textures/`.
 pub struct TextureAsset<'a> {
     pub folder: &'a Path,
     pub mesh: &'a AssetMesh,
     pub materials: &'a [Material],
 }
 
-/// What a material names: keys of its image and of its alpha image, one of them at least.
-pub type TextureSource = (Option<String>, Option<String>);
+/// The images of a material, by their keys in the asset; at least one of them.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct TextureSource {
+    pub image: Option<String>,
+    pub alpha: Option<String>,
+}
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TextureInfo {
@@ -36,43 +40,51 @@ pub struct TextureInfo {
     pub has_alpha: bool,
 }
 
-/// The textures of a scene. A source that is absent has no sound image; `missing` counts why.
+/// Images of one kind of failure.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct MissingImages {
+    pub count: u64,
+    pub example: String,
+}
+
+/// The textures of a scene. A source without a sound image is absent and counted in `missing`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TextureKeys {
     pub by_source: BTreeMap<TextureSource, TextureInfo>,
-    /// Reason → (count, first example).
-    pub missing: BTreeMap<String, (u64, String)>,
-    /// Files that were there already.
+    /// By reason.
+    pub missing: BTreeMap<String, MissingImages>,
+    /// Files that existed already.
     pub kept: u64,
     pub written: u64,
 }
 
 impl TextureKeys {
     pub fn get(&self, material: &Material) -> Option<&TextureInfo> {
-        self.by_source.get(&source_of(material)?)
+        self.by_source.get(&texture_source(material)?)
     }
 }
 
-/// The texture that a material names, if any.
-pub fn source_of(material: &Material) -> Option<TextureSource> {
-    (material.texture.is_some() || material.alpha.is_some()).then(|| (material.texture.clone(), material.alpha.clone()))
+/// Returns the images that a material names, if any.
+pub fn texture_source(material: &Material) -> Option<TextureSource> {
+    let has_image = material.texture.is_some() || material.alpha.is_some();
+    has_image.then(|| TextureSource { image: material.texture.clone(), alpha: material.alpha.clone() })
 }
 
-/// Builds the textures that the assets use into `out_dir` (`<aa>/<key>.m3t`); a file that is there already is kept. `threads` = 0: as many as cores.
-/// Memory: one image per thread, and the runs of the masks of images that several assets share.
+/// Builds the textures that the assets use into `out_dir` (`<aa>/<key>.m3t`); keeps files that exist. `threads` = 0: one per core.
+/// Holds in memory one image per thread, and the runs of the masks of images that several assets share.
 pub fn build_textures(assets: &[TextureAsset], out_dir: &Path, threads: usize, progress: &Progress) -> Result<TextureKeys> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| Error::argument(format!("threads: {e}")))?;
-    let build = Build::plan(assets, out_dir, progress);
+    let build = TextureBuild::new(assets, out_dir, progress);
     pool.install(|| {
         for (number, asset) in assets.iter().enumerate() {
-            build.asset(number, asset)?;
+            build.build_asset(number, asset)?;
             asset.mesh.release();
         }
         Ok(build.result.into_inner().expect("no thread panicked"))
     })
 }
 
-/// Removes texture files that no key names; returns how many.
+/// Removes texture files that no key names; returns their number.
 pub fn prune_textures(out_dir: &Path, keys: &TextureKeys) -> Result<u64> {
     let wanted: BTreeSet<PathBuf> = keys.by_source.values().map(|info| texture_path(out_dir, &info.key)).collect();
     let list = |folder: &Path| -> Result<Vec<PathBuf>> {
@@ -92,12 +104,12 @@ pub fn prune_textures(out_dir: &Path, keys: &TextureKeys) -> Result<u64> {
     Ok(removed)
 }
 
-struct Build<'a> {
+struct TextureBuild<'a> {
     out_dir: &'a Path,
     progress: &'a Progress<'a>,
-    /// The last asset that uses each source: then its texture is made.
+    /// The last asset that uses each source: its texture is written then.
     last_use: HashMap<TextureSource, usize>,
-    /// Runs of the masks of sources that a later asset uses too.
+    /// Runs of the masks of sources that a later asset also uses.
     pending: Mutex<HashMap<TextureSource, Vec<u8>>>,
     result: Mutex<TextureKeys>,
     done: AtomicU64,
@@ -105,19 +117,16 @@ struct Build<'a> {
     stopped: AtomicBool,
 }
 
-/// Triangles of one asset that use one source.
-type Uses = Vec<u32>;
+/// Masks after which the resident pages of an asset's mesh are dropped.
+const MASKS_PER_RELEASE: u64 = 64;
 
-/// Sources after whose masks the memory of an asset's mesh is let go of.
-const RELEASED: u64 = 64;
-
-impl<'a> Build<'a> {
-    fn plan(assets: &[TextureAsset], out_dir: &'a Path, progress: &'a Progress<'a>) -> Self {
+impl<'a> TextureBuild<'a> {
+    fn new(assets: &[TextureAsset], out_dir: &'a Path, progress: &'a Progress<'a>) -> Self {
         let mut last_use = HashMap::new();
         for (number, asset) in assets.iter().enumerate() {
             let used: BTreeSet<u32> = asset.mesh.materials().iter().copied().collect();
             let materials = used.iter().filter_map(|m| asset.materials.get(*m as usize));
-            last_use.extend(materials.filter_map(source_of).map(|source| (source, number)));
+            last_use.extend(materials.filter_map(texture_source).map(|source| (source, number)));
             asset.mesh.release();
         }
         Self {
@@ -132,28 +141,34 @@ impl<'a> Build<'a> {
         }
     }
 
-    fn asset(&self, number: usize, asset: &TextureAsset) -> Result<()> {
+    fn build_asset(&self, number: usize, asset: &TextureAsset) -> Result<()> {
         let images = image_files(asset.folder)?;
-        let uses = uses_by_source(asset);
-        uses.into_par_iter().try_for_each(|(source, triangles)| {
+        triangles_by_source(asset).into_par_iter().try_for_each(|(source, triangles)| {
             if self.stopped.load(Ordering::Relaxed) {
                 return Err(Error::Interrupted);
             }
-            self.source(number, asset, &images, source, &triangles)
+            self.build_source(number, asset, &images, source, &triangles)
         })
     }
 
-    fn source(&self, number: usize, asset: &TextureAsset, images: &HashMap<String, PathBuf>, source: TextureSource, uses: &Uses) -> Result<()> {
+    fn build_source(
+        &self,
+        number: usize,
+        asset: &TextureAsset,
+        images: &HashMap<String, PathBuf>,
+        source: TextureSource,
+        triangles: &[u32],
+    ) -> Result<()> {
         let last = self.last_use[&source] == number;
-        match self.one(asset, images, &source, uses, last) {
+        match self.add_uses(asset, images, &source, triangles, last) {
             Ok(None) => return Ok(()),
-            Ok(Some((info, written))) => {
+            Ok(Some(texture)) => {
                 let mut result = self.result.lock().expect("no thread panicked");
-                result.by_source.insert(source, info);
-                *(if written { &mut result.written } else { &mut result.kept }) += 1;
+                result.by_source.insert(source, texture.info);
+                *(if texture.is_new { &mut result.written } else { &mut result.kept }) += 1;
             }
             Err(Error::Storage { path, source: cause }) if path.starts_with(self.out_dir) => return Err(Error::Storage { path, source: cause }),
-            Err(cause) if last => self.miss(&source, &cause),
+            Err(cause) if last => self.count_missing(&source, &cause),
             Err(_) => return Ok(()),
         }
         let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
@@ -164,73 +179,79 @@ impl<'a> Build<'a> {
         Ok(())
     }
 
-    /// Adds one asset's triangles to a source's mask; at its last asset makes the file: (info, written?).
-    fn one(
+    /// Adds one asset's triangles to a source's mask; with the last asset writes the file.
+    fn add_uses(
         &self,
         asset: &TextureAsset,
         images: &HashMap<String, PathBuf>,
         source: &TextureSource,
-        uses: &Uses,
+        triangles: &[u32],
         last: bool,
-    ) -> Result<Option<(TextureInfo, bool)>> {
+    ) -> Result<Option<BuiltTexture>> {
         let limits = ImageLimits::default();
-        let (path, image) = read_image(asset.folder, images, source.0.as_deref())?;
-        let (alpha_path, alpha) = read_image(asset.folder, images, source.1.as_deref())?;
+        let (path, image) = read_image(asset.folder, images, source.image.as_deref())?;
+        let (alpha_path, alpha) = read_image(asset.folder, images, source.alpha.as_deref())?;
         let path = if image.is_empty() { alpha_path } else { path };
         let (width, height) = source::probe(&path, &image, &alpha, &limits)?;
         let before = self.pending.lock().expect("no thread panicked").remove(source);
         let mut mask = before.and_then(|runs| PixelMask::from_runs(width, height, &runs)).unwrap_or_else(|| PixelMask::empty(width, height));
         let uvs = asset.mesh.uvs();
-        for triangle in uses.iter().map(|t| *t as usize) {
+        for triangle in triangles.iter().map(|t| *t as usize) {
             if mask.is_full() {
                 break;
             }
             mark_triangle(&mut mask, uvs[triangle], asset.materials[asset.mesh.materials()[triangle] as usize].wrap);
         }
-        if self.masks.fetch_add(1, Ordering::Relaxed) % RELEASED == RELEASED - 1 {
+        if self.masks.fetch_add(1, Ordering::Relaxed) % MASKS_PER_RELEASE == MASKS_PER_RELEASE - 1 {
             asset.mesh.release();
         }
         if !last {
             self.pending.lock().expect("no thread panicked").insert(source.clone(), mask.to_runs());
             return Ok(None);
         }
-        self.make(&path, &image, &alpha, &mask).map(Some)
+        self.write(&path, &image, &alpha, &mask).map(Some)
     }
 
-    fn make(&self, path: &Path, image: &[u8], alpha: &[u8], mask: &PixelMask) -> Result<(TextureInfo, bool)> {
+    fn write(&self, path: &Path, image: &[u8], alpha: &[u8], mask: &PixelMask) -> Result<BuiltTexture> {
         let runs = if mask.is_full() { Vec::new() } else { mask.to_runs() };
         let key = texture_key(image, alpha, &runs);
         let target = texture_path(self.out_dir, &key);
         let info = |f: &TextureFile| TextureInfo { key, width: f.width, height: f.height, has_alpha: f.has_alpha };
         if let Ok(file) = TextureFile::open_header(&target) {
-            return Ok((info(&file), false));
+            return Ok(BuiltTexture { info: info(&file), is_new: false });
         }
-        let bytes = file::layout(path, image, alpha, mask, &ImageLimits::default())?;
-        file::write(&target, &bytes)?;
-        Ok((info(&TextureFile::open_header(&target)?), true))
+        let bytes = file::encode_texture(path, image, alpha, mask, &ImageLimits::default())?;
+        file::write_texture(&target, &bytes)?;
+        Ok(BuiltTexture { info: info(&TextureFile::open_header(&target)?), is_new: true })
     }
 
-    fn miss(&self, source: &TextureSource, cause: &Error) {
+    fn count_missing(&self, source: &TextureSource, cause: &Error) {
         let reason = match cause {
             Error::Limit { .. } => "texture image over a limit",
             Error::Storage { .. } => "texture image cannot be read",
             _ => "texture image is missing or damaged",
         };
-        let name = source.0.as_deref().or(source.1.as_deref()).unwrap_or_default();
+        let name = source.image.as_deref().or(source.alpha.as_deref()).unwrap_or_default();
         let mut result = self.result.lock().expect("no thread panicked");
-        let entry = result.missing.entry(reason.to_owned()).or_insert((0, String::new()));
-        entry.0 += 1;
+        let entry = result.missing.entry(reason.to_owned()).or_default();
+        entry.count += 1;
         let example = format!("{name}: {cause}");
         // The least of the messages, so that the report does not depend on the order of threads.
-        if entry.1.is_empty() || example < entry.1 {
-            entry.1 = example;
+        if entry.example.is_empty() || example < entry.example {
+            entry.example = example;
         }
     }
 }
 
-/// Triangles of an asset grouped by texture, in source order.
-fn uses_by_source(asset: &TextureAsset) -> Vec<(TextureSource, Uses)> {
-    let sources: Vec<Option<TextureSource>> = asset.materials.iter().map(source_of).collect();
+/// A texture of the build.
+struct BuiltTexture {
+    info: TextureInfo,
+    is_new: bool,
+}
+
+/// Groups the triangles of an asset by texture, in the order of the asset.
+fn triangles_by_source(asset: &TextureAsset) -> Vec<(TextureSource, Vec<u32>)> {
+    let sources: Vec<Option<TextureSource>> = asset.materials.iter().map(texture_source).collect();
     let mut numbers: BTreeMap<&TextureSource, usize> = BTreeMap::new();
     let slots: Vec<Option<usize>> = sources
         .iter()
@@ -242,17 +263,21 @@ fn uses_by_source(asset: &TextureAsset) -> Vec<(TextureSource, Uses)> {
     let slot_of = |material: &u32| slots.get(*material as usize).copied().flatten();
     let mut counts = vec![0; numbers.len()];
     asset.mesh.materials().iter().filter_map(slot_of).for_each(|slot| counts[slot] += 1);
-    let mut groups: Vec<Uses> = counts.into_iter().map(Vec::with_capacity).collect();
+    let mut groups: Vec<Vec<u32>> = counts.into_iter().map(Vec::with_capacity).collect();
     for (triangle, material) in asset.mesh.materials().iter().enumerate() {
         if let Some(slot) = slot_of(material) {
             groups[slot].push(triangle as u32);
         }
     }
     asset.mesh.release();
-    numbers.into_iter().map(|(source, slot)| (source.clone(), std::mem::take(&mut groups[slot]))).filter(|(_, uses)| !uses.is_empty()).collect()
+    numbers
+        .into_iter()
+        .map(|(source, slot)| (source.clone(), std::mem::take(&mut groups[slot])))
+        .filter(|(_, triangles)| !triangles.is_empty())
+        .collect()
 }
 
-/// Image files of an asset by key (their names without extension).
+/// Returns the image files of an asset by key (their names without extension).
 fn image_files(folder: &Path) -> Result<HashMap<String, PathBuf>> {
     let folder = folder.join("textures");
     if !folder.exists() {
@@ -264,7 +289,7 @@ fn image_files(folder: &Path) -> Result<HashMap<String, PathBuf>> {
     Ok(files.into_iter().filter_map(|p| Some((p.file_stem()?.to_str()?.to_owned(), p))).collect())
 }
 
-/// Path and bytes of an image of the asset; empty bytes where the material names none.
+/// Returns path and bytes of an image of the asset; empty bytes when the material names none.
 fn read_image(folder: &Path, images: &HashMap<String, PathBuf>, key: Option<&str>) -> Result<(PathBuf, Vec<u8>)> {
     let Some(key) = key else { return Ok((folder.to_path_buf(), Vec::new())) };
     let path = images.get(key).ok_or_else(|| Error::format(folder.join("textures").join(key), "no such image in the asset"))?;

@@ -1,6 +1,7 @@
-//! Levels ready to sample, under a cap of bytes. A surface asks once for its level and then holds it; no lock is taken per sample.
+//! Caches of levels ready to sample: one shared by all threads, limited in bytes, and one per thread that needs no lock.
 
 use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};
@@ -10,7 +11,7 @@ use map3d_base::{Error, Result};
 use crate::store::file::{TextureFile, TextureKey, texture_path};
 use crate::store::level::Level;
 
-/// A texture of the store, opened and checked.
+/// An open texture file whose checksum has been verified.
 #[derive(Debug)]
 pub struct Texture {
     pub key: TextureKey,
@@ -24,30 +25,35 @@ pub struct CacheStats {
     pub bytes: u64,
     pub levels: u64,
     pub evicted: u64,
-    /// Times a source image was decoded (levels 0 and 1).
+    /// Decoded source images (levels 0 and 1).
     pub decoded: u64,
 }
 
-type Made<T> = Arc<OnceLock<std::result::Result<Arc<T>, String>>>;
+/// A value that the first thread to need it computes, or its error.
+type Shared<T> = Arc<OnceLock<std::result::Result<Arc<T>, String>>>;
+/// Texture and level.
+type LevelKey = (TextureKey, u32);
 
 struct Entry {
-    made: Made<Level>,
+    level: Shared<Level>,
+    /// 0 until the level is computed.
     bytes: u64,
-    used: u64,
+    last_used: u64,
 }
 
 #[derive(Default)]
 struct Levels {
-    entries: HashMap<(TextureKey, u32), Entry>,
+    entries: HashMap<LevelKey, Entry>,
     bytes: u64,
     clock: u64,
 }
 
-/// Shared by all threads of a scene. The cap is kept by dropping the least recently used levels; a level that is in use or alone stays.
+/// Shared by all threads of a scene. Drops the least recently used levels over its capacity, but not the level that was added last; a level in use
+/// stays alive until its users drop it.
 pub struct TextureCache {
     folder: PathBuf,
-    cap_bytes: u64,
-    textures: Mutex<HashMap<TextureKey, Made<Texture>>>,
+    capacity_bytes: u64,
+    textures: Mutex<HashMap<TextureKey, Shared<Texture>>>,
     levels: Mutex<Levels>,
     hits: AtomicU64,
     misses: AtomicU64,
@@ -57,10 +63,10 @@ pub struct TextureCache {
 
 impl TextureCache {
     /// `folder`: a scene's `textures/`.
-    pub fn new(folder: PathBuf, cap_bytes: u64) -> Self {
+    pub fn new(folder: PathBuf, capacity_bytes: u64) -> Self {
         Self {
             folder,
-            cap_bytes,
+            capacity_bytes,
             textures: Mutex::default(),
             levels: Mutex::default(),
             hits: AtomicU64::new(0),
@@ -70,28 +76,28 @@ impl TextureCache {
         }
     }
 
-    /// Opens a texture; its file is read and checked the first time. A damaged one stays an error.
+    /// Opens a texture; reads and verifies its file the first time. A damaged file remains an error.
     pub fn texture(&self, key: &TextureKey) -> Result<Arc<Texture>> {
-        let made = self.textures.lock().expect("no thread panicked").entry(*key).or_default().clone();
+        let shared = self.textures.lock().expect("no thread panicked").entry(*key).or_default().clone();
         let path = || texture_path(&self.folder, key);
-        let texture = made.get_or_init(|| TextureFile::open(&path()).map(|file| Arc::new(Texture { key: *key, file })).map_err(|e| e.to_string()));
+        let texture = shared.get_or_init(|| TextureFile::open(&path()).map(|file| Arc::new(Texture { key: *key, file })).map_err(|e| e.to_string()));
         texture.clone().map_err(|what| Error::Format { path: path(), what })
     }
 
-    /// A level of a texture; made once, however many threads ask.
+    /// Returns a level of a texture; the first thread to ask computes it.
     pub fn level(&self, texture: &Texture, level: u32) -> Result<Arc<Level>> {
-        let name = (texture.key, level);
-        let made = self.slot(name);
-        let mut fresh = false;
-        let result = made.get_or_init(|| {
-            fresh = true;
-            self.make(texture, level).map(Arc::new).map_err(|e| e.to_string())
+        let key = (texture.key, level);
+        let shared = self.slot(key);
+        let mut is_new = false;
+        let result = shared.get_or_init(|| {
+            is_new = true;
+            self.compute(texture, level).map(Arc::new).map_err(|e| e.to_string())
         });
-        let counter = if fresh { &self.misses } else { &self.hits };
+        let counter = if is_new { &self.misses } else { &self.hits };
         counter.fetch_add(1, Ordering::Relaxed);
         let result = result.clone().map_err(|what| Error::Format { path: texture_path(&self.folder, &texture.key), what })?;
-        if fresh {
-            self.account(name, result.bytes());
+        if is_new {
+            self.add_bytes(key, result.bytes());
         }
         Ok(result)
     }
@@ -108,27 +114,27 @@ impl TextureCache {
         }
     }
 
-    fn slot(&self, name: (TextureKey, u32)) -> Made<Level> {
+    fn slot(&self, key: LevelKey) -> Shared<Level> {
         let mut levels = self.levels.lock().expect("no thread panicked");
         levels.clock += 1;
         let clock = levels.clock;
-        let entry = levels.entries.entry(name).or_insert_with(|| Entry { made: Made::default(), bytes: 0, used: 0 });
-        entry.used = clock;
-        entry.made.clone()
+        let entry = levels.entries.entry(key).or_insert_with(|| Entry { level: Shared::default(), bytes: 0, last_used: 0 });
+        entry.last_used = clock;
+        entry.level.clone()
     }
 
-    fn make(&self, texture: &Texture, level: u32) -> Result<Level> {
+    fn compute(&self, texture: &Texture, level: u32) -> Result<Level> {
         if level < 2 {
             self.decoded.fetch_add(1, Ordering::Relaxed);
         }
         match level {
             0 => {
                 let image = texture.file.level_0()?;
-                if self.has_first(texture) {
+                if self.has_level_1(texture) {
                     return Ok(Level::from_raster(image));
                 }
                 let (level_0, level_1) = Level::first_two(image);
-                self.keep_first(texture, level_1);
+                self.insert_level_1(texture, level_1);
                 Ok(level_0)
             }
             1 => Ok(Level::first_two(texture.file.level_0()?).1),
@@ -136,45 +142,102 @@ impl TextureCache {
         }
     }
 
-    /// Is level 1 there, or none to be had?
-    fn has_first(&self, texture: &Texture) -> bool {
+    /// Whether level 1 is in the cache already, or does not exist.
+    fn has_level_1(&self, texture: &Texture) -> bool {
         texture.file.levels == 1 || self.slot((texture.key, 1)).get().is_some()
     }
 
-    /// Level 1 comes with level 0: most views need both, and the source is decoded only once.
-    fn keep_first(&self, texture: &Texture, level_1: Level) {
-        let name = (texture.key, 1);
-        let first = Arc::new(level_1);
-        let bytes = first.bytes();
-        if self.slot(name).set(Ok(first)).is_ok() {
-            self.account(name, bytes);
+    /// Keeps the level 1 that was computed together with level 0: most views need both, and this decodes the source only once.
+    fn insert_level_1(&self, texture: &Texture, level_1: Level) {
+        let key = (texture.key, 1);
+        let level_1 = Arc::new(level_1);
+        let bytes = level_1.bytes();
+        if self.slot(key).set(Ok(level_1)).is_ok() {
+            self.add_bytes(key, bytes);
         }
     }
 
-    /// Books a new level and drops the least recently used ones while over the cap.
-    fn account(&self, name: (TextureKey, u32), bytes: u64) {
+    /// Counts the bytes of a new level and drops the least recently used ones over the capacity.
+    fn add_bytes(&self, key: LevelKey, bytes: u64) {
         let mut levels = self.levels.lock().expect("no thread panicked");
-        if let Some(entry) = levels.entries.get_mut(&name) {
+        if let Some(entry) = levels.entries.get_mut(&key) {
             entry.bytes = bytes;
             levels.bytes += bytes;
         }
-        if levels.bytes > self.cap_bytes {
-            self.evict(&mut levels, name);
+        if levels.bytes > self.capacity_bytes {
+            self.evict(&mut levels, key);
         }
     }
 
-    /// Down to nine tenths of the cap, so that a full cache does not sort at every miss.
-    fn evict(&self, levels: &mut Levels, keep: (TextureKey, u32)) {
-        let mut order: Vec<(u64, (TextureKey, u32))> =
-            levels.entries.iter().filter(|(name, e)| e.bytes > 0 && **name != keep).map(|(name, e)| (e.used, *name)).collect();
+    /// Drops levels until nine tenths of the capacity remain, so that a full cache does not sort at every miss.
+    fn evict(&self, levels: &mut Levels, keep: LevelKey) {
+        let mut order: Vec<(u64, LevelKey)> =
+            levels.entries.iter().filter(|(key, e)| e.bytes > 0 && **key != keep).map(|(key, e)| (e.last_used, *key)).collect();
         order.sort_unstable();
-        for (_, name) in order {
-            if levels.bytes <= self.cap_bytes / 10 * 9 {
+        for (_, key) in order {
+            if levels.bytes <= self.capacity_bytes / 10 * 9 {
                 break;
             }
-            let entry = levels.entries.remove(&name).expect("listed above");
+            let entry = levels.entries.remove(&key).expect("listed above");
             levels.bytes -= entry.bytes;
             self.evicted.fetch_add(1, Ordering::Relaxed);
         }
     }
+}
+
+/// What one thread uses while it shades a sub-tile: asks the shared cache once per texture and level. Levels stay alive here even when the shared
+/// cache drops them.
+#[derive(Default)]
+pub struct LocalTextureCache {
+    textures: HashMap<TextureKey, Arc<Texture>, KeyHash>,
+    levels: HashMap<LevelKey, Arc<Level>, KeyHash>,
+}
+
+impl LocalTextureCache {
+    pub fn texture(&mut self, cache: &TextureCache, key: &TextureKey) -> Result<Arc<Texture>> {
+        if let Some(texture) = self.textures.get(key) {
+            return Ok(texture.clone());
+        }
+        let texture = cache.texture(key)?;
+        self.textures.insert(*key, texture.clone());
+        Ok(texture)
+    }
+
+    pub fn level(&mut self, cache: &TextureCache, texture: &Texture, level: u32) -> Result<Arc<Level>> {
+        if let Some(level) = self.levels.get(&(texture.key, level)) {
+            return Ok(level.clone());
+        }
+        let shared = cache.level(texture, level)?;
+        self.levels.insert((texture.key, level), shared.clone());
+        Ok(shared)
+    }
+
+    pub fn clear(&mut self) {
+        self.textures.clear();
+        self.levels.clear();
+    }
+}
+
+type KeyHash = BuildHasherDefault<KeyHasher>;
+
+/// Takes the last bytes of a key, which is a hash already.
+#[derive(Default)]
+struct KeyHasher(u64);
+
+impl Hasher for KeyHasher {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        if let Some(tail) = bytes.last_chunk::<8>() {
+            self.0 ^= u64::from_le_bytes(*tail);
+        }
+    }
+
+    fn write_u32(&mut self, level: u32) {
+        self.0 = self.0.rotate_left(7) ^ u64::from(level);
+    }
+
+    fn write_usize(&mut self, _length: usize) {}
 }

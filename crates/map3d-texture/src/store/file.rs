@@ -1,4 +1,4 @@
-//! `.m3t` files (spec/scene.md, Texture): the source bytes, the usage mask, and levels ≥ 2 ready to sample.
+//! `.m3t` files (spec/scene.md, Texture): the source bytes, the usage mask, and levels ≥ 2.
 
 use std::fs::{self, File};
 use std::os::unix::fs::FileExt;
@@ -18,28 +18,31 @@ const VERSION: u32 = 1;
 const FLAG_ALPHA: u32 = 1;
 const FLAG_MASK: u32 = 2;
 const SECTIONS: usize = 16;
+const IMAGE_SECTION: usize = 0;
+const ALPHA_SECTION: usize = 1;
+const MASK_SECTION: usize = 2;
 const TABLE_BYTES: usize = SECTIONS * 16;
 /// The section of level 2.
 const FIRST_LEVEL_SECTION: usize = 3;
-/// Texels around a used one, in those of level 0, that samples of levels 0 and 1 can meet: half a pixel of `MAX_TAPS` texels of level 1 to the side
-/// of the triangle, half a footprint beyond it, both along a diagonal.
+/// Greatest distance from a used texel, in texels of level 0, at which levels 0 and 1 are sampled: half a pixel of `MAX_TAPS` texels of level 1 to
+/// the side of the triangle and half a footprint beyond it, both along a diagonal.
 const SAMPLED_REACH: u32 = 64;
 
 /// Binary key of a texture: xxh3-128.
 pub type TextureKey = [u8; 16];
 
-/// Lower-case hex of a key, as in file names.
+/// Returns a key in lower-case hex, as in file names.
 pub fn hex(key: &TextureKey) -> String {
     key.iter().map(|b| format!("{b:02x}")).collect()
 }
 
-/// `<folder>/<aa>/<key>.m3t`.
+/// Returns `<folder>/<aa>/<key>.m3t`.
 pub fn texture_path(folder: &Path, key: &TextureKey) -> PathBuf {
     let name = hex(key);
     folder.join(&name[..2]).join(format!("{name}.m3t"))
 }
 
-/// Key over image, alpha image and usage mask (its runs; none when every texel is used), each after its length as u64.
+/// Computes the key of an image, an alpha image and the runs of a usage mask (none when every texel is used), each after its length as u64.
 pub fn texture_key(image: &[u8], alpha: &[u8], runs: &[u8]) -> TextureKey {
     let mut hash = twox_hash::XxHash3_128::with_seed(0);
     for part in [image, alpha, runs] {
@@ -49,10 +52,10 @@ pub fn texture_key(image: &[u8], alpha: &[u8], runs: &[u8]) -> TextureKey {
     hash.finish_128().to_be_bytes()
 }
 
-/// Decodes a texture and lays it out as a file's bytes.
-pub fn layout(path: &Path, image: &[u8], alpha: &[u8], mask: &PixelMask, limits: &ImageLimits) -> Result<Vec<u8>> {
+/// Decodes a texture and returns its file's bytes.
+pub fn encode_texture(path: &Path, image: &[u8], alpha: &[u8], mask: &PixelMask, limits: &ImageLimits) -> Result<Vec<u8>> {
     let masked = !mask.is_full();
-    let level_0 = source::level_0(path, image, alpha, masked.then_some((mask, u32::MAX)), limits)?;
+    let level_0 = source::decode_level_0(path, image, alpha, masked.then_some((mask, u32::MAX)), limits)?;
     let levels = level_count(level_0.width, level_0.height);
     let mut sections = vec![image.to_vec(), alpha.to_vec(), if masked { mask.to_runs() } else { Vec::new() }];
     let mut mip = first_mip(&level_0);
@@ -84,8 +87,8 @@ fn assemble(numbers: [u32; 4], sections: &[Vec<u8>]) -> Vec<u8> {
     out
 }
 
-/// Writes under another name, then renames: a reader never sees half a file.
-pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+/// Writes a temporary file and renames it, so that a reader never sees half a file.
+pub fn write_texture(path: &Path, bytes: &[u8]) -> Result<()> {
     let folder = path.parent().expect("texture_path has a folder");
     fs::create_dir_all(folder).map_err(|e| Error::storage(folder, e))?;
     let part = path.with_extension("m3t.part");
@@ -106,14 +109,14 @@ pub struct TextureFile {
 }
 
 impl TextureFile {
-    /// Opens and checks everything, the checksum too.
+    /// Opens a file and verifies its checksum.
     pub fn open(path: &Path) -> Result<Self> {
         let bytes = fs::read(path).map_err(|e| Error::storage(path, e))?;
         file::check_header(path, &bytes, MAGIC, VERSION, true)?;
         Self::parse(path, &bytes, bytes.len() as u64)
     }
 
-    /// Opens without reading the sections: for a file whose checksum need not be believed yet.
+    /// Opens a file without reading its sections or verifying the checksum.
     pub fn open_header(path: &Path) -> Result<Self> {
         let file = File::open(path).map_err(|e| Error::storage(path, e))?;
         let length = file.metadata().map_err(|e| Error::storage(path, e))?.len();
@@ -156,7 +159,7 @@ impl TextureFile {
         Ok(())
     }
 
-    /// A level ≥ 2 as it is stored.
+    /// Reads a level ≥ 2.
     pub fn stored_level(&self, level: u32) -> Result<Raster> {
         assert!((2..self.levels).contains(&level), "level {level} is not stored");
         let bytes = self.section(FIRST_LEVEL_SECTION + level as usize - 2)?;
@@ -164,21 +167,21 @@ impl TextureFile {
         Ok(Raster::new(w, h, bytemuck::cast_slice(&bytes).to_vec()))
     }
 
-    /// Level 0: decoded, and filled as far as levels 0 and 1 are sampled.
+    /// Decodes level 0 and fills its unused texels as far as levels 0 and 1 are sampled.
     pub fn level_0(&self) -> Result<Raster> {
-        let (image, alpha) = (self.section(0)?, self.section(1)?);
+        let (image, alpha) = (self.section(IMAGE_SECTION)?, self.section(ALPHA_SECTION)?);
         let mask = if self.masked { Some(self.mask()?) } else { None };
         let limits = ImageLimits::default();
         if source::probe(&self.path, &image, &alpha, &limits)? != (self.width, self.height) {
-            return Err(Error::format(&self.path, "its image has another size than its header says"));
+            return Err(Error::format(&self.path, "its image and its header differ in size"));
         }
-        source::level_0(&self.path, &image, &alpha, mask.as_ref().map(|m| (m, SAMPLED_REACH)), &limits)
+        source::decode_level_0(&self.path, &image, &alpha, mask.as_ref().map(|m| (m, SAMPLED_REACH)), &limits)
     }
 
-    /// Any level as sRGB bytes.
+    /// Returns any level as sRGB bytes.
     pub fn level(&self, level: u32) -> Result<Raster> {
         match level {
-            l if l >= self.levels => Err(Error::argument(format!("level {l} of {}: it has {} levels", self.path.display(), self.levels))),
+            l if l >= self.levels => Err(Error::argument(format!("level {l} of {}: expected 0 to {}", self.path.display(), self.levels - 1))),
             0 => self.level_0(),
             1 => Ok(first_mip(&self.level_0()?).to_raster()),
             _ => self.stored_level(level),
@@ -186,8 +189,9 @@ impl TextureFile {
     }
 
     fn mask(&self) -> Result<PixelMask> {
-        let runs = self.section(2)?;
-        PixelMask::from_runs(self.width, self.height, &runs).ok_or_else(|| Error::format(&self.path, "the runs of its usage mask do not add up"))
+        let runs = self.section(MASK_SECTION)?;
+        PixelMask::from_runs(self.width, self.height, &runs)
+            .ok_or_else(|| Error::format(&self.path, "the runs of its usage mask do not add up to the image"))
     }
 
     fn section(&self, k: usize) -> Result<Vec<u8>> {

@@ -4,18 +4,18 @@ use crate::store::mips::{LinearRaster, first_mip, premultiplied};
 use map3d_image::Raster;
 use map3d_image::srgb::{ROOT, ROOT_OF_RGB};
 
-/// A level as bytes q of √(linear light): q² / 255² is the light, premultiplied by alpha; alpha likewise. Finer than sRGB bytes in shadows and
-/// lights, at most a third coarser between; four bytes a texel are what the memory can carry. Rows top to bottom.
+/// A level as bytes q = 255·√(linear light), premultiplied by alpha, and alpha likewise: finer than sRGB bytes in shadows and lights, at most a third
+/// coarser between, in four bytes per texel. Rows top to bottom.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Level {
     pub width: u32,
     pub height: u32,
     pub texels: Vec<[u8; 4]>,
-    /// Of each texel with its right and lower neighbours; absent where no texel is transparent.
+    /// For each texel with its right and lower neighbours; `None` when every texel is opaque.
     cells: Option<Vec<AlphaCell>>,
 }
 
-/// What bilinear taps between four texels have of alpha.
+/// The alpha of all bilinear taps between four texels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AlphaCell {
     /// Less than a half.
@@ -50,7 +50,7 @@ impl Level {
         Self::new(linear.width, linear.height, linear.pixels.iter().map(texel).collect())
     }
 
-    /// The next level: the root of the mean light of four texels each. `None` for odd sides.
+    /// Computes the next level: the root of the mean light of four texels. `None` for odd sides.
     pub fn halved(&self) -> Option<Self> {
         let (w, h) = (self.width as usize, self.height as usize);
         if w % 2 == 1 || h % 2 == 1 {
@@ -74,7 +74,7 @@ impl Level {
         Some(Self::new(self.width / 2, self.height / 2, texels))
     }
 
-    /// Levels 0 and 1 of an image.
+    /// Computes levels 0 and 1 of an image.
     pub(super) fn first_two(image: Raster) -> (Self, Self) {
         let odd = (image.width % 2 == 1 || image.height % 2 == 1).then(|| Self::from_linear(&first_mip(&image)));
         let level_0 = Self::from_raster(image);
@@ -82,7 +82,7 @@ impl Level {
         (level_0, level_1)
     }
 
-    /// Of the texel with a number and its neighbours to the right and below; it must have both.
+    /// Returns the cell of a texel, which must have a right and a lower neighbour.
     #[inline(always)]
     pub(crate) fn alpha_cell(&self, texel: usize) -> AlphaCell {
         self.cells.as_ref().map_or(AlphaCell::Opaque, |cells| cells[texel])
@@ -94,8 +94,8 @@ impl Level {
 }
 
 impl AlphaCell {
-    /// Of one texel; its alpha is clearly below or above a half, so that no rounding of a tap's sum matters.
-    fn of([.., root]: [u8; 4]) -> Self {
+    /// Classifies one texel; the thresholds keep clear of a half, so that the rounding of a tap's sum does not matter.
+    fn of_texel([.., root]: [u8; 4]) -> Self {
         match root {
             0..=170 => Self::Transparent,
             190.. => Self::Opaque,
@@ -108,9 +108,9 @@ impl AlphaCell {
     }
 }
 
-/// In the last row and column mixed.
+/// Returns the cells of all texels; `Mixed` in the last row and column.
 fn alpha_cells(width: usize, texels: &[[u8; 4]]) -> Vec<AlphaCell> {
-    let alone: Vec<AlphaCell> = texels.iter().map(|t| AlphaCell::of(*t)).collect();
+    let alone: Vec<AlphaCell> = texels.iter().map(|t| AlphaCell::of_texel(*t)).collect();
     let mut cells = vec![AlphaCell::Mixed; texels.len()];
     for (out, rows) in cells.chunks_exact_mut(width).zip(alone.windows(2 * width).step_by(width)) {
         let (upper, lower) = rows.split_at(width);
@@ -126,10 +126,10 @@ fn square(q: u8) -> i32 {
     i32::from(q) * i32::from(q)
 }
 
-/// The root of a quarter of a sum of four squares, halves upwards.
+/// Returns the root of a quarter of a sum of four squares, halves rounded up.
 #[inline(always)]
 fn mean_root(sum: i32) -> u8 {
-    // 2^23 leaves no place for a fraction. Roots of whole quarters that are not halves are at least 4.9e-4 away from one.
+    // Adding 2^23 drops the fraction. A root that is not a half is at least 4.9e-4 away from one, so 2e-4 rounds only halves up.
     let rounded = (sum as f32 * 0.25).sqrt() + 2e-4 + 8_388_608.0;
     rounded.to_bits() as u8
 }

@@ -1,4 +1,4 @@
-//! Mip levels: each the area-weighted mean, in linear light and weighed by alpha, of what it covers in the level before (spec/scene.md, Texture).
+//! Mip levels: a texel is the area-weighted mean, in linear light and premultiplied by alpha, of the level before (spec/scene.md, Texture).
 
 use map3d_image::Raster;
 use map3d_image::srgb::{BYTE, LINEAR16};
@@ -11,7 +11,7 @@ pub struct LinearRaster {
     pub pixels: Vec<[u16; 4]>,
 }
 
-/// Levels of an image: down to 1 × 1.
+/// Returns the number of levels of an image, down to 1 × 1.
 pub fn level_count(width: u32, height: u32) -> u32 {
     width.max(height).max(1).ilog2() + 1
 }
@@ -20,7 +20,7 @@ pub fn level_size(width: u32, height: u32, level: u32) -> (u32, u32) {
     ((width >> level).max(1), (height >> level).max(1))
 }
 
-/// Level 1 of an image that is level 0.
+/// Computes level 1 from level 0.
 pub fn first_mip(image: &Raster) -> LinearRaster {
     let table: &[u16; 256] = &LINEAR16;
     shrink(image.width, image.height, |y, row| {
@@ -30,13 +30,13 @@ pub fn first_mip(image: &Raster) -> LinearRaster {
     })
 }
 
-/// The next level.
+/// Computes the next level.
 pub fn next_mip(image: &LinearRaster) -> LinearRaster {
     let w = image.width as usize;
     shrink(image.width, image.height, |y, row| row.copy_from_slice(&image.pixels[y as usize * w..][..w]))
 }
 
-/// Linear light premultiplied by alpha, of an sRGB pixel with straight alpha.
+/// Returns linear light premultiplied by alpha of an sRGB pixel with straight alpha.
 pub fn premultiplied(p: [u8; 4]) -> [u16; 4] {
     premultiplied_by(&LINEAR16, p)
 }
@@ -53,7 +53,7 @@ fn premultiplied_by(table: &[u16; 256], p: [u8; 4]) -> [u16; 4] {
 }
 
 impl LinearRaster {
-    /// sRGB bytes with straight alpha; black where alpha is 0.
+    /// Converts to sRGB bytes with straight alpha; black where alpha is 0.
     pub fn to_raster(&self) -> Raster {
         let byte = |c: u16, a: u16| {
             let straight = if a == 65_535 { u32::from(c) } else { (u32::from(c) * 65_535 + u32::from(a) / 2) / u32::from(a) };
@@ -67,7 +67,7 @@ impl LinearRaster {
     }
 }
 
-/// Halves an image whose rows `load` writes into a buffer.
+/// Halves an image; `load` writes its rows into a buffer.
 fn shrink(width: u32, height: u32, mut load: impl FnMut(u32, &mut [[u16; 4]])) -> LinearRaster {
     let (nw, nh) = level_size(width, height, 1);
     if width == 2 * nw && height == 2 * nh {
@@ -75,15 +75,15 @@ fn shrink(width: u32, height: u32, mut load: impl FnMut(u32, &mut [[u16; 4]])) -
     }
     let mut pixels = Vec::with_capacity(nw as usize * nh as usize);
     let mut row = vec![[0u16; 4]; width as usize];
-    let columns: Vec<Vec<(usize, u64)>> = (0..nw).map(|x| covered(x, width, nw)).collect();
+    let columns: Vec<Vec<Share>> = (0..nw).map(|x| covered(x, width, nw)).collect();
     let area = u64::from(width) * u64::from(height);
     for y in 0..nh {
         let mut sums = vec![[0u64; 4]; nw as usize];
-        for (source, weight) in covered(y, height, nh) {
-            load(source as u32, &mut row);
-            for (sum, parts) in sums.iter_mut().zip(&columns) {
-                for (x, part) in parts {
-                    (0..4).for_each(|c| sum[c] += u64::from(row[*x][c]) * part * weight);
+        for line in covered(y, height, nh) {
+            load(line.texel as u32, &mut row);
+            for (sum, shares) in sums.iter_mut().zip(&columns) {
+                for column in shares {
+                    (0..4).for_each(|c| sum[c] += u64::from(row[column.texel][c]) * column.part * line.part);
                 }
             }
         }
@@ -92,11 +92,18 @@ fn shrink(width: u32, height: u32, mut load: impl FnMut(u32, &mut [[u16; 4]])) -
     LinearRaster { width: nw, height: nh, pixels }
 }
 
-/// Cells of `n` that cell `i` of `m` covers, with their shares in units of 1/m cell (together n).
-fn covered(i: u32, n: u32, m: u32) -> Vec<(usize, u64)> {
+/// A texel and the part of it, in units of 1/m, that a texel of the next level covers.
+#[derive(Clone, Copy)]
+struct Share {
+    texel: usize,
+    part: u64,
+}
+
+/// Returns the texels of a row of `n` that texel `i` of a row of `m` covers; their parts together are n.
+fn covered(i: u32, n: u32, m: u32) -> Vec<Share> {
     let (i, n, m) = (u64::from(i), u64::from(n), u64::from(m));
     let (from, to) = (i * n, (i + 1) * n);
-    (from / m..to.div_ceil(m)).map(|k| (k as usize, to.min((k + 1) * m) - from.max(k * m))).collect()
+    (from / m..to.div_ceil(m)).map(|k| Share { texel: k as usize, part: to.min((k + 1) * m) - from.max(k * m) }).collect()
 }
 
 fn halve(nw: u32, nh: u32, mut load: impl FnMut(u32, &mut [[u16; 4]])) -> LinearRaster {
@@ -111,7 +118,7 @@ fn halve(nw: u32, nh: u32, mut load: impl FnMut(u32, &mut [[u16; 4]])) -> Linear
     LinearRaster { width: nw, height: nh, pixels }
 }
 
-/// Mean of four texels.
+/// Returns the mean of four texels.
 #[inline(always)]
 fn quarter(top: &[[u16; 4]; 2], bottom: &[[u16; 4]; 2]) -> [u16; 4] {
     let mut out = [0; 4];

@@ -1,18 +1,16 @@
-//! The texture store: from source images to `.m3t` files, and back to levels ready to sample.
+//! The texture store: turns source images into `.m3t` files, and these into levels ready to sample.
 
 mod build;
 mod cache;
 mod file;
-mod held;
 mod level;
 mod mips;
 mod source;
 mod usage;
 
-pub use build::{Progress, TextureAsset, TextureInfo, TextureKeys, TextureSource, build_textures, prune_textures, source_of};
-pub use cache::{CacheStats, Texture, TextureCache};
-pub use file::{TextureFile, TextureKey, hex, layout, texture_key, texture_path, write};
-pub use held::HeldTextures;
+pub use build::{MissingImages, Progress, TextureAsset, TextureInfo, TextureKeys, TextureSource, build_textures, prune_textures, texture_source};
+pub use cache::{CacheStats, LocalTextureCache, Texture, TextureCache};
+pub use file::{TextureFile, TextureKey, encode_texture, hex, texture_key, texture_path, write_texture};
 pub use level::{AlphaCell, Level};
 pub use mips::{LinearRaster, first_mip, level_count, level_size, next_mip, premultiplied};
 pub use usage::mark_triangle;

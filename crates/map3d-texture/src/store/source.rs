@@ -9,7 +9,7 @@ use map3d_image::Raster;
 use map3d_image::decode::{self, ImageLimits};
 use map3d_image::fill_unmarked;
 
-/// Size of a texture: its image's, or its alpha image's where there is no image (then all white).
+/// Returns the size of a texture: that of its image, or of its alpha image when there is no image (the texture is then white).
 pub fn probe(path: &Path, image: &[u8], alpha: &[u8], limits: &ImageLimits) -> Result<(u32, u32)> {
     if !alpha.is_empty() && !image.is_empty() {
         decode::probe(path, alpha, limits)?;
@@ -17,8 +17,9 @@ pub fn probe(path: &Path, image: &[u8], alpha: &[u8], limits: &ImageLimits) -> R
     decode::probe(path, if image.is_empty() { alpha } else { image }, limits)
 }
 
-/// Decodes, merges, fills as far as `reach`. `mask` is absent when every texel is used.
-pub fn level_0(path: &Path, image: &[u8], alpha: &[u8], mask: Option<(&PixelMask, u32)>, limits: &ImageLimits) -> Result<Raster> {
+/// Decodes the image, merges its alpha image, fills texels within a distance of the used ones. `mask`: mask and distance; `None` when every texel is
+/// used.
+pub fn decode_level_0(path: &Path, image: &[u8], alpha: &[u8], mask: Option<(&PixelMask, u32)>, limits: &ImageLimits) -> Result<Raster> {
     let mut raster = match image.is_empty() {
         true => {
             let (width, height) = decode::probe(path, alpha, limits)?;
@@ -35,7 +36,7 @@ pub fn level_0(path: &Path, image: &[u8], alpha: &[u8], mask: Option<(&PixelMask
     Ok(raster)
 }
 
-/// Multiplies alpha by the grey of another image (Rec. 709 luma, times its own alpha), which may differ in size: the nearest texel counts.
+/// Multiplies alpha by the grey of another image (Rec. 709 luma, times its own alpha), which may differ in size: takes its nearest texel.
 fn merge_alpha(raster: &mut Raster, grey: &Raster) {
     let (w, h) = (raster.width as u64, raster.height as u64);
     for (i, pixel) in raster.pixels.iter_mut().enumerate() {

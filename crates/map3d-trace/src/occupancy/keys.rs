@@ -34,7 +34,7 @@ pub fn block_keys(scene: &SceneStore, frame: &Frame, level: u8, blocks: &[[u32; 
             sums.add(&part.bounds, record.object_id, record.content);
             continue;
         }
-        let chunk = scene.outline(part.chunk)?;
+        let chunk = scene.open_lazily(part.chunk)?;
         let o = chunk.origin();
         for object in chunk.objects() {
             let b = [0, 1, 2, 3, 4, 5].map(|k| o[k % 3] + f64::from(object.bounds[k]));

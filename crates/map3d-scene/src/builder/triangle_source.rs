@@ -1,4 +1,4 @@
-//! Streams the triangles of an asset: to local coordinates, snapped, optimised, split.
+//! Streams the triangles of an asset: converts them to local coordinates, snaps, filters and splits them.
 
 use std::collections::HashMap;
 
@@ -11,40 +11,40 @@ use super::request::BuildOptions;
 use super::triangle::BuildTriangle;
 use crate::lattice::snap;
 
-/// Triangles after which the memory of an asset's mesh is let go of; some 60 bytes each.
-const RELEASED: usize = 1 << 20;
-/// Stands for the object in a prototype's chunk: every placement has an object of its own.
+/// Triangles, of about 60 bytes each, after which the resident pages of an asset's mesh are dropped.
+const TRIANGLES_PER_RELEASE: usize = 1 << 20;
+/// Object id in a prototype's chunk; each instance has its own object.
 const PROTOTYPE_ID: u32 = 1;
 
-/// How the triangles of assets become those of chunks.
-pub(super) struct Source<'a> {
+/// Reads the triangles of assets as those of chunks.
+pub(super) struct TriangleSource<'a> {
     pub assets: &'a [&'a Asset],
     pub materials: &'a BuildMaterials,
     pub options: &'a BuildOptions,
     pub origin: Vec3,
 }
 
-impl Source<'_> {
-    /// Hands on the triangles of one asset that are placed as they are (`prototype` 0) or belong to a prototype, in source order.
-    /// Stops at the first `false` of `go_on`, which is asked every 65,536 triangles with the number done.
+impl TriangleSource<'_> {
+    /// Passes on the triangles of one asset in source order, with their prototype (0: none) if `wanted` accepts it. Calls `keep_going` every 65,536
+    /// triangles with the number done; returns false as soon as it does.
     pub fn stream(
         &self,
         number: usize,
         wanted: impl Fn(u32) -> bool,
         report: &mut BuildReport,
         out: &mut dyn FnMut(u32, &BuildTriangle),
-        go_on: &mut dyn FnMut(u64) -> bool,
+        keep_going: &mut dyn FnMut(u64) -> bool,
     ) -> bool {
         let asset = self.assets[number];
-        let mut order = Ordinals::new(asset.ids.len());
+        let mut counters = TriangleCounters::new(asset.ids.len());
         for (i, prototype) in asset.mesh.prototypes().iter().enumerate() {
-            if i % (1 << 16) == 0 && !go_on(i as u64) {
+            if i % (1 << 16) == 0 && !keep_going(i as u64) {
                 return false;
             }
-            if i % RELEASED == 0 {
+            if i % TRIANGLES_PER_RELEASE == 0 {
                 asset.mesh.release();
             }
-            let ordinal = order.next(*prototype, asset.mesh.objects()[i]);
+            let ordinal = counters.next(*prototype, asset.mesh.objects()[i]);
             if !wanted(*prototype) {
                 continue;
             }
@@ -86,13 +86,13 @@ impl Source<'_> {
     }
 }
 
-/// Counts the triangles of each object and each prototype: a number that stays when other objects of the asset come or go.
-struct Ordinals {
+/// Numbers the triangles within each object and each prototype, so that numbers stay when other objects of the asset are added or removed.
+struct TriangleCounters {
     objects: Vec<u32>,
     prototypes: HashMap<u32, u32>,
 }
 
-impl Ordinals {
+impl TriangleCounters {
     fn new(objects: usize) -> Self {
         Self { objects: vec![0; objects], prototypes: HashMap::new() }
     }

@@ -1,4 +1,4 @@
-//! What a build remembers of an asset (spec/scene.md, Survey), so that the next one reads only the assets that changed.
+//! Summaries of assets (spec/scene.md, Survey), so that the next build reads only the assets that changed.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -19,37 +19,39 @@ pub(super) const EXTENSION: &str = "m3v";
 const MAGIC: &[u8; 4] = b"M3DV";
 const VERSION: u32 = 1;
 
-/// Of one asset. Everything follows from the asset, the request and the keys of its textures; `cells` also from the square.
+/// Summary of one asset. Follows from the asset, the request and the keys of its textures; `cells` also from the square.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Survey {
-    pub facts: Facts,
-    /// By cell.
+pub(super) struct AssetSummary {
+    pub details: AssetDetails,
+    /// In the order of cells.
     pub cells: Vec<CellSum>,
-    /// `prototype` counts in `Facts::prototypes`; in the order of the asset.
+    /// `prototype` is an index into `AssetDetails::prototypes`; in the order of the asset.
     pub instances: Vec<InstanceRecord>,
-    /// Of all its objects.
+    /// Ids of all its objects.
     pub ids: Vec<u32>,
 }
 
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub(super) struct Facts {
-    /// Hash of what the survey was made from.
-    pub mark: String,
+pub(super) struct AssetDetails {
+    /// Digest of the input of the summary; the file calls it `mark`.
+    #[serde(rename = "mark")]
+    pub digest: String,
+    /// `GroundLevel` as bits.
     pub level: [u64; 8],
     /// This asset's share of the report.
     pub counts: BuildReport,
-    pub textures: Vec<KnownTexture>,
+    pub textures: Vec<SummaryTexture>,
     /// Hash of each material's record.
     pub materials: Vec<u64>,
     /// Files of prototypes, relative to the scene's folder.
     pub prototypes: Vec<String>,
-    /// Bits of x0, y0, side: what `cells` are cells of.
+    /// x0, y0 and side, as bits, of the square to which `cells` belong.
     pub square: [u64; 3],
 }
 
-/// A texture source that triangles use; without a key its image is missing or broken.
+/// A texture that triangles use; without a key its image is missing or broken.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub(super) struct KnownTexture {
+pub(super) struct SummaryTexture {
     pub texture: Option<String>,
     pub alpha: Option<String>,
     pub key: Option<[u8; 16]>,
@@ -58,14 +60,14 @@ pub(super) struct KnownTexture {
     pub has_alpha: bool,
 }
 
-impl KnownTexture {
+impl SummaryTexture {
     pub fn new(source: TextureSource, info: Option<&TextureInfo>) -> Self {
         let (width, height, has_alpha) = info.map_or((0, 0, false), |i| (i.width, i.height, i.has_alpha));
-        Self { texture: source.0, alpha: source.1, key: info.map(|i| i.key), width, height, has_alpha }
+        Self { texture: source.image, alpha: source.alpha, key: info.map(|i| i.key), width, height, has_alpha }
     }
 
     pub fn source(&self) -> TextureSource {
-        (self.texture.clone(), self.alpha.clone())
+        TextureSource { image: self.texture.clone(), alpha: self.alpha.clone() }
     }
 
     pub fn info(&self) -> Option<TextureInfo> {
@@ -73,7 +75,7 @@ impl KnownTexture {
     }
 }
 
-/// What an asset puts into a cell of the counting level: pieces of triangles, and the sum of their hashes modulo 2^128, whatever their order.
+/// Triangles of an asset in a cell of the counting level, and the sum of their hashes modulo 2^128, which does not depend on their order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct CellSum {
@@ -88,7 +90,7 @@ impl CellSum {
     }
 }
 
-/// Gathers the cells of triangles.
+/// Collects the sums of cells.
 #[derive(Default)]
 pub(super) struct CellSums(HashMap<u32, (u32, u128)>);
 
@@ -114,7 +116,7 @@ pub(super) fn record_hash(record: &MaterialRecord) -> u64 {
     XxHash3_64::oneshot(bytemuck::bytes_of(record))
 }
 
-/// Over all that a chunk holds of a triangle; numbers that only count within a build are left out.
+/// Hashes all that a chunk holds of a triangle, but no numbers that are valid only within a build.
 fn triangle_hash(t: &BuildTriangle, material: u64) -> u128 {
     let plain = BuildTriangle { material: 0, asset: 0, ..*t };
     XxHash3_128::oneshot_with_seed(material, bytemuck::bytes_of(&plain))
@@ -135,8 +137,8 @@ impl GroundLevel {
     }
 }
 
-impl Survey {
-    /// `None` when there is none, or one that cannot be read: then the asset is surveyed anew.
+impl AssetSummary {
+    /// Reads a summary; `None` when it is absent or cannot be read: the asset is then read again.
     pub fn read(path: &Path) -> Option<Self> {
         let bytes = std::fs::read(path).ok()?;
         file::check_header(path, &bytes, MAGIC, VERSION, true).ok()?;
@@ -145,14 +147,14 @@ impl Survey {
         let cells_at = HEADER_BYTES + aligned(text);
         let instances_at = cells_at + aligned(cells.checked_mul(size_of::<CellSum>())?);
         let ids_at = instances_at.checked_add(aligned(instances.checked_mul(size_of::<InstanceRecord>())?))?;
-        let facts = serde_json::from_slice(bytes.get(HEADER_BYTES..HEADER_BYTES.checked_add(text)?)?).ok()?;
+        let details = serde_json::from_slice(bytes.get(HEADER_BYTES..HEADER_BYTES.checked_add(text)?)?).ok()?;
         let (cells, instances) = (records(&bytes, cells_at, cells)?, records(&bytes, instances_at, instances)?);
-        Some(Self { facts, cells, instances, ids: records(&bytes, ids_at, ids)? })
+        Some(Self { details, cells, instances, ids: records(&bytes, ids_at, ids)? })
     }
 
-    /// Not synced to the disk: a survey that is lost or torn is made anew.
+    /// Writes a summary without syncing it to the disk: the next build repeats a lost or torn one.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let text = serde_json::to_vec(&self.facts).expect("facts are plain data");
+        let text = serde_json::to_vec(&self.details).expect("details are plain data");
         let mut bytes = vec![0; HEADER_BYTES];
         for section in [&text[..], bytemuck::cast_slice(&self.cells), bytemuck::cast_slice(&self.instances), bytemuck::cast_slice(&self.ids)] {
             bytes.extend_from_slice(section);
@@ -179,31 +181,31 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_survey_comes_back_as_it_was_and_a_damaged_one_not_at_all() {
-        let path = std::env::temp_dir().join(format!("map3d-survey-{}", std::process::id())).join("a.m3v");
+    fn a_summary_survives_a_round_trip_and_a_damaged_one_is_rejected() {
+        let path = std::env::temp_dir().join(format!("map3d-summary-{}", std::process::id())).join("a.m3v");
         let mut level = GroundLevel::new();
         level.bounds.add_point([1.0 / 3.0, -2e7 / 7.0, 3.0]);
-        let facts = Facts { mark: "m".into(), level: level.to_bits(), materials: vec![7, u64::MAX], ..Facts::default() };
+        let details = AssetDetails { digest: "m".into(), level: level.to_bits(), materials: vec![7, u64::MAX], ..AssetDetails::default() };
         let cell = CellSum { cell: 5, count: 6, sum: [7, 8] };
         let instance = InstanceRecord { object_id: 9, ..InstanceRecord::zeroed() };
-        let survey = Survey { facts, cells: vec![cell], instances: vec![instance], ids: vec![9, 3] };
-        survey.write(&path).expect("write");
-        let back = Survey::read(&path).expect("read");
-        assert_eq!((&back.cells, &back.instances, &back.ids), (&survey.cells, &survey.instances, &survey.ids));
-        assert_eq!(back.facts.materials, [7, u64::MAX]);
-        let found = GroundLevel::from_bits(back.facts.level);
+        let summary = AssetSummary { details, cells: vec![cell], instances: vec![instance], ids: vec![9, 3] };
+        summary.write(&path).expect("write");
+        let back = AssetSummary::read(&path).expect("read");
+        assert_eq!((&back.cells, &back.instances, &back.ids), (&summary.cells, &summary.instances, &summary.ids));
+        assert_eq!(back.details.materials, [7, u64::MAX]);
+        let found = GroundLevel::from_bits(back.details.level);
         assert_eq!((found.bounds.lo, found.ground_m), (level.bounds.lo, f64::INFINITY));
         let good = std::fs::read(&path).expect("read");
         for cut in [0, 10, 64, 100, good.len() - 1] {
             std::fs::write(&path, &good[..cut]).expect("write");
-            assert!(Survey::read(&path).is_none(), "cut at {cut}");
+            assert!(AssetSummary::read(&path).is_none(), "cut at {cut}");
         }
         std::fs::remove_dir_all(path.parent().expect("a folder")).expect("remove");
-        assert!(Survey::read(&path).is_none());
+        assert!(AssetSummary::read(&path).is_none());
     }
 
     #[test]
-    fn sums_do_not_depend_on_order_but_on_every_part() {
+    fn sums_depend_on_every_triangle_and_material_but_not_on_order() {
         let at = |x: i64| BuildTriangle { corners: [[x, 0, 0], [x, 1, 0], [x, 0, 1]], ..BuildTriangle::zeroed() };
         let sum = |all: &[(i64, u64)]| {
             let mut sums = CellSums::default();

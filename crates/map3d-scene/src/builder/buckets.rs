@@ -1,4 +1,4 @@
-//! Triangles sorted into cells in bounded memory: what does not fit goes to a file per cell.
+//! Sorts triangles into cells in bounded memory; what exceeds it is appended to one file per cell.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -10,18 +10,18 @@ use map3d_base::{Error, Result};
 use super::triangle::BuildTriangle;
 use crate::index::Cell;
 
-pub(super) struct Spill {
+pub(super) struct TriangleBuckets {
     folder: PathBuf,
     memory: BTreeMap<Cell, Vec<BuildTriangle>>,
     held: usize,
-    /// Triangles held in memory at most.
+    /// Most triangles in memory.
     limit: usize,
 }
 
-impl Spill {
-    /// Files go to `folder`, which is emptied.
+impl TriangleBuckets {
+    /// Writes files to `folder` and empties it first.
     pub fn new(folder: &Path, memory_bytes: u64) -> Result<Self> {
-        remove(folder)?;
+        remove_folder(folder)?;
         let limit = (memory_bytes as usize / size_of::<BuildTriangle>()).max(1);
         Ok(Self { folder: folder.to_path_buf(), memory: BTreeMap::new(), held: 0, limit })
     }
@@ -47,8 +47,8 @@ impl Spill {
         self.folder.join(format!("{level}_{x}_{y}.spill"))
     }
 
-    /// Frees the disk of a cell that is not needed any more.
-    pub fn forget(&self, cell: Cell) -> Result<()> {
+    /// Removes the file of a cell.
+    pub fn remove(&self, cell: Cell) -> Result<()> {
         let path = self.path(cell);
         match fs::remove_file(&path) {
             Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::storage(&path, e)),
@@ -56,7 +56,7 @@ impl Spill {
         }
     }
 
-    /// All triangles of a cell, in the order they were pushed.
+    /// Returns all triangles of a cell in the order in which they were pushed.
     pub fn load(&self, cell: Cell) -> Result<Vec<BuildTriangle>> {
         let path = self.path(cell);
         let mut out = Vec::new();
@@ -69,14 +69,14 @@ impl Spill {
     }
 }
 
-impl Drop for Spill {
+impl Drop for TriangleBuckets {
     fn drop(&mut self) {
-        // What cannot be removed now is removed by the next build.
+        // The next build removes what remains here.
         let _ = fs::remove_dir_all(&self.folder);
     }
 }
 
-fn remove(folder: &Path) -> Result<()> {
+fn remove_folder(folder: &Path) -> Result<()> {
     match fs::remove_dir_all(folder) {
         Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::storage(folder, e)),
         _ => Ok(()),
@@ -89,20 +89,20 @@ mod tests {
     use bytemuck::Zeroable;
 
     #[test]
-    fn a_forgotten_cell_leaves_the_disk_and_the_others_stay() {
+    fn removing_a_cell_keeps_the_others() {
         let folder = std::env::temp_dir().join(format!("map3d-spill-{}", std::process::id()));
-        let mut spill = Spill::new(&folder, 1).expect("a folder");
+        let mut buckets = TriangleBuckets::new(&folder, 1).expect("a folder");
         let triangle = |x| BuildTriangle { corners: [[x, 0, 0], [x, 1, 0], [x, 0, 1]], ..BuildTriangle::zeroed() };
         let cells = [[1, 0, 0], [1, 1, 0]];
         for k in 0..6 {
-            spill.push(cells[k % 2], &triangle(k as i64)).expect("written");
+            buckets.push(cells[k % 2], &triangle(k as i64)).expect("written");
         }
-        let first = |spill: &Spill, cell| spill.load(cell).expect("read").iter().map(|t| t.corners[0][0]).collect::<Vec<_>>();
-        assert_eq!((first(&spill, cells[0]), first(&spill, cells[1])), (vec![0, 2, 4], vec![1, 3, 5]));
-        spill.forget(cells[0]).expect("removed");
-        spill.forget(cells[0]).expect("nothing to remove");
-        assert_eq!((first(&spill, cells[0]), first(&spill, cells[1])), (vec![], vec![1, 3, 5]));
-        drop(spill);
+        let first = |buckets: &TriangleBuckets, cell| buckets.load(cell).expect("read").iter().map(|t| t.corners[0][0]).collect::<Vec<_>>();
+        assert_eq!((first(&buckets, cells[0]), first(&buckets, cells[1])), (vec![0, 2, 4], vec![1, 3, 5]));
+        buckets.remove(cells[0]).expect("removed");
+        buckets.remove(cells[0]).expect("nothing to remove");
+        assert_eq!((first(&buckets, cells[0]), first(&buckets, cells[1])), (vec![], vec![1, 3, 5]));
+        drop(buckets);
         assert!(!folder.exists());
     }
 }
