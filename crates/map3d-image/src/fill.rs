@@ -9,7 +9,7 @@ use crate::raster::Raster;
 /// Longest side of an image: a distance and the next greater one fit 16 bits.
 const MAX_SIDE: u32 = i16::MAX as u32 - 1;
 
-/// Fills in place. An empty or full mask changes nothing. Texels farther than `reach` from every used one may keep what they have.
+/// Fills in place. An empty or full mask changes nothing. Pixels farther than `reach` from every marked one may keep their colour.
 pub fn fill_unmarked(image: &mut Raster, mask: &PixelMask, reach: u32) {
     assert_eq!((image.width, image.height), (mask.width(), mask.height()), "mask and image differ in size");
     assert!(image.width.max(image.height) <= MAX_SIDE, "{} × {} px", image.width, image.height);
@@ -17,7 +17,7 @@ pub fn fill_unmarked(image: &mut Raster, mask: &PixelMask, reach: u32) {
         return;
     }
     let w = image.width as usize;
-    // Beyond it, nothing is near.
+    // Stands for any greater distance.
     let far = reach.min(MAX_SIDE - 1) as i16 + 1;
     let gaps: Vec<Vec<Range<usize>>> = (0..mask.height()).map(|y| mask.gaps(y)).collect();
     let up = rows_up(w, &gaps, far);
@@ -33,7 +33,7 @@ pub fn fill_unmarked(image: &mut Raster, mask: &PixelMask, reach: u32) {
     }
 }
 
-/// For each texel the rows up to the nearest used one in its column, at most `far`: 0 when it is used itself.
+/// Returns for each pixel the distance up to the nearest marked one in its column, at most `far`; 0 for a marked pixel.
 fn rows_up(w: usize, gaps: &[Vec<Range<usize>>], far: i16) -> Vec<i16> {
     let mut up = vec![0; w * gaps.len()];
     for (y, row) in gaps.iter().enumerate() {
@@ -48,7 +48,8 @@ fn rows_up(w: usize, gaps: &[Vec<Range<usize>>], far: i16) -> Vec<i16> {
     up
 }
 
-/// From the rows down of the row below to those of this row; `offsets`: to the nearer of both, up is negative. Beyond reach `far` or `-far`.
+/// Updates the distances down from those of the row below; `offsets` receives the offset to the nearer of both, negative upwards. `far` or `-far`:
+/// none within reach.
 fn step_down(down: &mut [i16], offsets: &mut [i16], up: &[i16], gaps: &[Range<usize>], far: i16) {
     let mut used_from = 0;
     for gap in gaps {
@@ -65,13 +66,13 @@ fn step_down(down: &mut [i16], offsets: &mut [i16], up: &[i16], gaps: &[Range<us
     offsets[used_from..].fill(0);
 }
 
-/// A column whose source is the nearest from `start` on.
+/// A column whose marked pixel is the nearest from `start` on.
 struct Parabola {
     column: i32,
     start: i32,
 }
 
-/// Lower envelope of the parabolas (x − i)² + offset(i)² over part of a row.
+/// Computes the lower envelope of the parabolas (x − i)² + offset(i)² over part of a row.
 fn lower_envelope(parabolas: &mut Vec<Parabola>, offsets: &[i16], from: usize, end: usize, far: i16) {
     parabolas.clear();
     for (i, offset) in (from as i32..).zip(&offsets[from..end]) {
@@ -92,15 +93,15 @@ fn lower_envelope(parabolas: &mut Vec<Parabola>, offsets: &[i16], from: usize, e
     }
 }
 
-/// The first x at which column b is strictly nearer than column a < b.
+/// Returns the first x at which column b is strictly nearer than column a < b.
 #[inline(always)]
 fn overtakes(a: i32, a_square: i32, b: i32, b_square: i32) -> i32 {
     let numerator = b * b - a * a + b_square - a_square;
-    // Mostly neighbours.
+    // Columns are mostly neighbours.
     if b - a == 1 { (numerator >> 1) + 1 } else { numerator.div_euclid(2 * (b - a)) + 1 }
 }
 
-/// Every source is a used texel, and those are never written.
+/// Copies colours into a gap. Sources are marked pixels, which are never written.
 fn copy_nearest(image: &mut Raster, y: usize, gap: &Range<usize>, offsets: &[i16], parabolas: &[Parabola], far: i16) {
     let (w, far) = (image.width as usize, i32::from(far));
     for (k, parabola) in parabolas.iter().enumerate() {

@@ -2,22 +2,22 @@
 
 use map3d_base::{DEPTH_NOTHING, LayerKind, LayerSpec};
 
-/// Which arrays a G-buffer has. id and depth are always among them.
+/// The set of arrays of a G-buffer. Always contains id and depth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Arrays(u32);
 
 impl Arrays {
     /// Id and depth.
     pub const LEAST: Self = Self(1 << LayerKind::Id as u32 | 1 << LayerKind::Depth as u32);
-    /// Those of a rendering without further layers.
+    /// The arrays of a rendering without further layers.
     pub const STANDARD: Self = Self::LEAST.and(LayerKind::Color).and(LayerKind::Normal);
 
-    /// What a pass of these layers keeps; `STANDARD` without any.
+    /// Returns the arrays of a pass of these layers; `STANDARD` for none.
     pub fn of(layers: &[LayerSpec]) -> Self {
         if layers.is_empty() { Self::STANDARD } else { layers.iter().fold(Self::LEAST, |all, l| all.and(l.kind)) }
     }
 
-    /// With one more.
+    /// Adds one array.
     pub const fn and(self, kind: LayerKind) -> Self {
         Self(self.0 | 1 << kind as u32)
     }
@@ -31,44 +31,44 @@ impl Arrays {
         self.0
     }
 
-    /// `None`: bits without a meaning, or without id and depth.
+    /// Returns `None` for unknown bits, or without id and depth.
     pub fn from_bits(bits: u32) -> Option<Self> {
         (bits >> (LayerKind::Picture as u32 + 1) == 0 && bits & Self::LEAST.0 == Self::LEAST.0).then_some(Self(bits))
     }
 }
 
-/// Rows top to bottom; all arrays hold `width · height` entries, or none where the G-buffer does not have them.
+/// The layers of a tile. Rows top to bottom; an array has `width · height` entries, or none when the G-buffer lacks it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GBuffer {
     pub width: u32,
     pub height: u32,
     /// Linear light R, G, B premultiplied by coverage, then coverage; 65535 = 1.
     pub color: Vec<[u16; 4]>,
-    /// Unit normal × 32767, local axes, of the side that is seen; 0, 0, 0: nothing.
+    /// Unit normal × 32767, local axes, of the visible side; 0, 0, 0: nothing.
     pub normal: Vec<[i16; 3]>,
     /// 0: nothing.
     pub id: Vec<u32>,
     /// Units of 2^-10 m from D0; `DEPTH_NOTHING`: nothing.
     pub depth: Vec<u32>,
-    /// 255: lit, or nothing there.
+    /// 255: lit, or nothing.
     pub sun: Vec<u8>,
     /// Bit k: lit by sun k.
     pub sun16: Vec<u16>,
-    /// 255: open, or nothing there.
+    /// 255: unoccluded, or nothing.
     pub ao: Vec<u8>,
-    /// As depth, of the second surface.
+    /// Like depth, of the second surface.
     pub depth2: Vec<u32>,
-    /// As color, lit.
+    /// Like color, lit.
     pub picture: Vec<[u16; 4]>,
 }
 
 impl GBuffer {
-    /// Nothing anywhere, with the standard arrays.
+    /// Returns an empty G-buffer with the standard arrays.
     pub fn empty(width: u32, height: u32) -> Self {
         Self::with(width, height, Arrays::STANDARD)
     }
 
-    /// Nothing anywhere.
+    /// Returns an empty G-buffer.
     pub fn with(width: u32, height: u32, arrays: Arrays) -> Self {
         let count = |kind| if arrays.has(kind) { width as usize * height as usize } else { 0 };
         Self {
@@ -86,7 +86,7 @@ impl GBuffer {
         }
     }
 
-    /// The arrays that are there.
+    /// Returns the arrays that are present.
     pub fn arrays(&self) -> Arrays {
         let there = [
             (LayerKind::Color, self.color.len()),
@@ -100,26 +100,26 @@ impl GBuffer {
         there.into_iter().filter(|(_, n)| *n > 0).fold(Arrays::LEAST, |all, (kind, _)| all.and(kind))
     }
 
-    /// Lets go of arrays that are not among these.
+    /// Drops all other arrays.
     pub fn keep(&mut self, arrays: Arrays) {
         let Self { color, normal, sun, sun16, ao, depth2, picture, .. } = self;
-        let gone = |kind| !arrays.has(kind);
-        gone(LayerKind::Color).then(|| *color = Vec::new());
-        gone(LayerKind::Normal).then(|| *normal = Vec::new());
-        gone(LayerKind::Sun).then(|| *sun = Vec::new());
-        gone(LayerKind::Sun16).then(|| *sun16 = Vec::new());
-        gone(LayerKind::Ao).then(|| *ao = Vec::new());
-        gone(LayerKind::Depth2).then(|| *depth2 = Vec::new());
-        gone(LayerKind::Picture).then(|| *picture = Vec::new());
+        let is_dropped = |kind| !arrays.has(kind);
+        is_dropped(LayerKind::Color).then(|| *color = Vec::new());
+        is_dropped(LayerKind::Normal).then(|| *normal = Vec::new());
+        is_dropped(LayerKind::Sun).then(|| *sun = Vec::new());
+        is_dropped(LayerKind::Sun16).then(|| *sun16 = Vec::new());
+        is_dropped(LayerKind::Ao).then(|| *ao = Vec::new());
+        is_dropped(LayerKind::Depth2).then(|| *depth2 = Vec::new());
+        is_dropped(LayerKind::Picture).then(|| *picture = Vec::new());
     }
 
-    /// No pixel has any coverage or id.
+    /// Whether no pixel has coverage or an id.
     pub fn is_empty(&self) -> bool {
         self.id.iter().all(|id| *id == 0) && self.color.iter().all(|c| c[3] == 0)
     }
 }
 
-/// A stored normal of a vector of any length; `None` for one without a direction.
+/// Converts a vector of any length to a stored normal; `None` for a vector without a direction.
 pub fn normal_from_vector(n: [f64; 3]) -> Option<[i16; 3]> {
     let unit = map3d_base::vec3::normalized(n)?;
     Some(unit.map(|c| (c * 32_767.0).round() as i16))

@@ -1,14 +1,14 @@
-//! Parents from four children (spec/pyramid.md §7), from unencoded pixels.
+//! Reduces four children to their parent (spec/pyramid.md §7), from unencoded pixels.
 
 use map3d_base::DEPTH_NOTHING;
 
 use crate::gbuffer::{Arrays, GBuffer, normal_from_vector};
 
-/// A mean shorter than this has no direction.
+/// A shorter mean normal has no direction.
 const MIN_MEAN: f64 = 1e-6;
 
-/// The parent of four children in the order TL, TR, BL, BR; `None`: a child without content. All children are `side` × `side` px, even, and have the
-/// same arrays.
+/// Returns the parent of four children in the order TL, TR, BL, BR; `None` is a child without content. All children are `side` × `side` px (even) and
+/// have the same arrays.
 pub fn reduce(children: [Option<&GBuffer>; 4], side: u32) -> GBuffer {
     assert!(side.is_multiple_of(2), "a tile's side is even, not {side}");
     let arrays = children.iter().flatten().next().map_or(Arrays::STANDARD, |c| c.arrays());
@@ -30,24 +30,24 @@ pub fn reduce(children: [Option<&GBuffer>; 4], side: u32) -> GBuffer {
     parent
 }
 
-/// Two rows of a child and the half row of the parent that they make.
+/// Two rows of a child and the half row of the parent to which they reduce.
 struct Rows {
-    /// Of the child.
+    /// Width of the child.
     width: usize,
-    /// Of the half row, in its quadrant.
+    /// Row of the parent within the child's quadrant.
     y: usize,
     /// First pixel of the half row.
     at: usize,
 }
 
 impl Rows {
-    /// 2 × 2 squares, in the order TL, TR, BL, BR.
+    /// Returns the squares of 2 × 2 pixels, each in the order TL, TR, BL, BR.
     fn squares<'a, T: Copy>(&self, array: &'a [T]) -> impl Iterator<Item = [T; 4]> + use<'a, T> {
         let w = self.width;
         pairs(&array[2 * self.y * w..(2 * self.y + 1) * w], &array[(2 * self.y + 1) * w..(2 * self.y + 2) * w])
     }
 
-    /// Of a square of the half row.
+    /// Returns the square of pixel x of the half row.
     fn square<T: Copy>(&self, array: &[T], x: usize) -> [T; 4] {
         let (upper, lower) = (2 * self.y * self.width + 2 * x, (2 * self.y + 1) * self.width + 2 * x);
         [array[upper], array[upper + 1], array[lower], array[lower + 1]]
@@ -57,7 +57,7 @@ impl Rows {
         let is_plain = child.sun16.is_empty() && child.depth2.is_empty();
         for (x, (ids, depths)) in self.squares(&child.id).zip(self.squares(&child.depth)).enumerate() {
             let to = self.at + x;
-            // Most squares show one object: nothing is chosen.
+            // Most squares show one object, so there is no choice to make.
             if is_plain && ids == [ids[0]; 4] {
                 if ids[0] != 0 {
                     (parent.id[to], parent.depth[to]) = (ids[0], depths[0].min(depths[1]).min(depths[2].min(depths[3])));
@@ -67,7 +67,7 @@ impl Rows {
                 }
                 continue;
             }
-            let id = winner(ids, depths);
+            let id = most_frequent_id(ids, depths);
             if id == 0 {
                 continue;
             }
@@ -101,14 +101,14 @@ impl Rows {
     }
 }
 
-/// Over the children that have an id, rounded half up; 255 when none has.
+/// Returns the mean of the children that have an id, rounded half up; 255 when none has.
 fn mean_shade(four: [u8; 4], ids: [u32; 4]) -> u8 {
     let there = (0..4).filter(|k| ids[*k] != 0);
     let (sum, count) = there.fold((0u32, 0u32), |(sum, count), k| (sum + u32::from(four[k]), count + 1));
     if count == 0 { 255 } else { ((2 * sum + count) / (2 * count)) as u8 }
 }
 
-/// 2 × 2 squares of two rows, in the order TL, TR, BL, BR.
+/// Returns the squares of 2 × 2 pixels of two rows, each in the order TL, TR, BL, BR.
 fn pairs<'a, T: Copy>(upper: &'a [T], lower: &'a [T]) -> impl Iterator<Item = [T; 4]> + 'a {
     let squares = upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0);
     squares.map(|(u, l)| [u[0], u[1], l[0], l[1]])
@@ -124,8 +124,8 @@ fn mean_color(four: [[u16; 4]; 4]) -> [u16; 4] {
     out
 }
 
-/// The commonest id; nothing only when three are nothing. Ties: the id with the nearest child, then the first.
-fn winner(ids: [u32; 4], depths: [u32; 4]) -> u32 {
+/// Returns the most frequent id; 0 only when at least three are 0. Ties: the id with the nearest child, then the first.
+fn most_frequent_id(ids: [u32; 4], depths: [u32; 4]) -> u32 {
     if ids == [ids[0]; 4] {
         return ids[0];
     }
@@ -144,7 +144,7 @@ fn winner(ids: [u32; 4], depths: [u32; 4]) -> u32 {
     best.2
 }
 
-/// (child, depth) of the nearest of some children; the first of equals.
+/// Returns child and depth of the nearest of some children; the first of equals.
 fn nearest(of_id: [bool; 4], depths: [u32; 4]) -> (usize, u32) {
     let mut best = (0, DEPTH_NOTHING);
     let mut found = false;
@@ -157,7 +157,7 @@ fn nearest(of_id: [bool; 4], depths: [u32; 4]) -> (usize, u32) {
     best
 }
 
-/// Of a square that shows one object.
+/// Returns the normal of a square that shows one object.
 #[inline(always)]
 fn normal_of_one(normals: [[i16; 3]; 4], depths: [u32; 4]) -> [i16; 3] {
     match normals == [normals[0]; 4] {

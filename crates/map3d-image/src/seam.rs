@@ -1,4 +1,4 @@
-//! Seams: the lossless G-buffer of a block's root tile as a file (spec/pyramid.md §8).
+//! Seam files: the lossless G-buffer of a block's root tile (spec/pyramid.md §8).
 
 use std::io::Read;
 
@@ -14,7 +14,7 @@ const HEADER_BYTES: usize = 20;
 const MAX_SIDE_PX: u32 = 4_096;
 const ZSTD_LEVEL: i32 = 1;
 
-/// The file's bytes.
+/// Encodes a G-buffer.
 pub fn write_seam(g: &GBuffer) -> Vec<u8> {
     let mut out = Vec::new();
     out.extend_from_slice(MAGIC);
@@ -33,7 +33,7 @@ pub fn write_seam(g: &GBuffer) -> Vec<u8> {
     out
 }
 
-/// Reads a seam back; `name` says in messages which it is. Damage, other versions and other sizes are refused.
+/// Decodes a seam; `name` identifies it in messages. Damaged files, other versions and invalid sizes are errors.
 pub fn read_seam(name: &str, bytes: &[u8]) -> Result<GBuffer> {
     let refuse = |what: String| Error::format(name, what);
     if bytes.len() < HEADER_BYTES + 8 || &bytes[..4] != MAGIC {
@@ -53,7 +53,7 @@ pub fn read_seam(name: &str, bytes: &[u8]) -> Result<GBuffer> {
         return Err(refuse(format!("{width} × {height} px, at most {MAX_SIDE_PX}")));
     }
     let Some(arrays) = Arrays::from_bits(number(16)) else {
-        return Err(refuse(format!("arrays {:#x}, of which this program does not know all", number(16))));
+        return Err(refuse(format!("arrays {:#x}, some of them unknown", number(16))));
     };
     let mut g = GBuffer::with(width, height, arrays);
     let mut rest = &body[HEADER_BYTES..];
@@ -67,19 +67,19 @@ pub fn read_seam(name: &str, bytes: &[u8]) -> Result<GBuffer> {
     fill(&mut g.depth2, &mut rest).map_err(&refuse)?;
     fill(&mut g.picture, &mut rest).map_err(&refuse)?;
     if !rest.is_empty() {
-        return Err(refuse(format!("{} bytes too many", rest.len())));
+        return Err(refuse(format!("{} bytes after the last array", rest.len())));
     }
     Ok(g)
 }
 
 #[cfg(target_endian = "big")]
-compile_error!("seams and textures are written as they lie in memory: little-endian machines only");
+compile_error!("seams and textures have the byte order of memory: little-endian machines only");
 
 fn little_endian<T: Pod>(array: &[T]) -> &[u8] {
     bytemuck::cast_slice(array)
 }
 
-/// One array, unless it is not there: length, frame; it must hold exactly the array.
+/// Reads one array (length, zstd frame) unless it is empty; the frame must have exactly its length.
 fn fill<T: Pod>(array: &mut [T], rest: &mut &[u8]) -> std::result::Result<(), String> {
     if array.is_empty() {
         return Ok(());

@@ -5,19 +5,19 @@ use std::sync::LazyLock;
 /// `round(65535·f(b/255))` of each sRGB byte.
 pub static LINEAR16: LazyLock<[u16; 256]> = LazyLock::new(|| std::array::from_fn(|b| scaled(b, 65_535.0)));
 
-/// `round(255·√(v/65535))` of each 16-bit linear value: texels that are filtered.
+/// `round(255·√(v/65535))` of each 16-bit linear value: the bytes of texels ready to filter.
 pub static ROOT: LazyLock<Box<[u8; 65_536]>> = LazyLock::new(|| {
     let byte = |v: usize| ((v as f64 / 65_535.0).sqrt() * 255.0).round() as u8;
     (0..65_536).map(byte).collect::<Vec<u8>>().try_into().expect("65,536 entries")
 });
 
-/// The same of each sRGB byte, where red, green and blue lie in a little-endian RGBA word; together with red an alpha of 255.
+/// `ROOT` of each sRGB byte, at the place of red, green and blue in a little-endian RGBA word; red also sets alpha to 255.
 pub static ROOT_OF_RGB: LazyLock<[[u32; 256]; 3]> = LazyLock::new(|| {
     let at = |k: usize, b: usize| u32::from(ROOT[LINEAR16[b] as usize]) << (8 * k) | if k == 0 { 255 << 24 } else { 0 };
     std::array::from_fn(|k| std::array::from_fn(|b| at(k, b)))
 });
 
-/// The sRGB byte whose linear value is nearest to a 16-bit linear value; the lower byte when two are as near.
+/// The sRGB byte whose linear value is nearest to a 16-bit linear value; the lower byte of two equally near ones.
 pub static BYTE: LazyLock<Box<[u8; 65_536]>> = LazyLock::new(|| {
     let mut table = vec![0; 65_536].into_boxed_slice();
     let mut byte = 0usize;
@@ -30,11 +30,11 @@ pub static BYTE: LazyLock<Box<[u8; 65_536]>> = LazyLock::new(|| {
     table.try_into().expect("65,536 entries")
 });
 
-/// `BYTE` in tables that stay in the first-level cache, for whole images.
+/// `BYTE` in tables that fit the first-level cache, for whole images.
 pub struct ToByte {
-    /// Of each 16 values the byte of the first.
+    /// The byte of each sixteenth value.
     first: [u8; 4_096],
-    /// The least value of the next byte, beyond all for the last. Between two of them lie more than 16 values.
+    /// For each byte the least value of the next byte; 2^16 for the last. Two entries differ by more than 16.
     next: [u32; 256],
 }
 
@@ -54,7 +54,7 @@ impl ToByte {
     }
 }
 
-/// The curve on 0..1: encoded to linear.
+/// Converts from sRGB to linear light, 0..1.
 pub fn linear_from_srgb(c: f64) -> f64 {
     if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
 }
@@ -68,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_byte_comes_back_from_its_linear_value() {
+    fn a_byte_survives_the_round_trip_through_linear_light() {
         assert!((0..=255u8).all(|b| BYTE[LINEAR16[b as usize] as usize] == b));
     }
 

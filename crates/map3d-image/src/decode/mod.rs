@@ -1,4 +1,4 @@
-//! Source images to sRGB bytes. Sizes are checked in the header, before anything is decoded; a damaged image is an error, never a panic.
+//! Decodes source images to sRGB bytes. Checks sizes in the header before decoding; a damaged image is an error, never a panic.
 
 mod jpeg;
 
@@ -11,7 +11,7 @@ use map3d_base::{Error, Result};
 
 use crate::raster::Raster;
 
-/// Limits of one image; the defaults are those of the specification.
+/// Limits of one image; the defaults are the specification's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageLimits {
     pub max_image_side_px: u64,
@@ -25,14 +25,14 @@ impl Default for ImageLimits {
     }
 }
 
-/// Width and height as the header states them; nothing is decoded. `path` is for messages.
+/// Returns width and height as the header states them. `path` is for messages.
 pub fn probe(path: &Path, bytes: &[u8], limits: &ImageLimits) -> Result<(u32, u32)> {
     let (width, height) = guarded(path, || if jpeg::is_jpeg(bytes) { jpeg::size(path, bytes) } else { other_size(path, bytes) })?;
     check(path, width, height, limits)?;
     Ok((width, height))
 }
 
-/// Decodes JPEG, PNG, GIF (first frame), BMP, TIFF, WebP or TGA, known by its first bytes.
+/// Decodes JPEG, PNG, GIF (first frame), BMP, TIFF, WebP or TGA, which it recognises by the first bytes.
 pub fn decode(path: &Path, bytes: &[u8], limits: &ImageLimits) -> Result<Raster> {
     let (width, height) = probe(path, bytes, limits)?;
     let raster = guarded(path, || if jpeg::is_jpeg(bytes) { jpeg::decode(path, bytes, width, height) } else { decode_other(path, bytes, limits) })?;
@@ -58,16 +58,16 @@ fn check(path: &Path, width: u32, height: u32, limits: &ImageLimits) -> Result<(
     }
 }
 
-/// A decoder that panics on hostile bytes costs the image, not the program.
+/// Turns a decoder's panic on damaged data into an error.
 fn guarded<T>(path: &Path, work: impl FnOnce() -> Result<T>) -> Result<T> {
-    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| Err(Error::format(path, "the image decoder gave up on damaged data")))
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| Err(Error::format(path, "the image decoder failed on damaged data")))
 }
 
 fn damaged(path: &Path, cause: impl std::fmt::Display) -> Error {
     Error::format(path, format!("damaged or unknown image: {cause}"))
 }
 
-/// TGA has no magic: it is what remains.
+/// Guesses the format; TGA, which has no magic number, if no other fits.
 fn reader<'a>(path: &Path, bytes: &'a [u8]) -> Result<ImageReader<Cursor<&'a [u8]>>> {
     let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| Error::storage(path, e))?;
     if reader.format().is_none() {
@@ -85,7 +85,7 @@ fn decode_other(path: &Path, bytes: &[u8], limits: &ImageLimits) -> Result<Raste
     let mut bounds = Limits::default();
     bounds.max_image_width = u32::try_from(limits.max_image_side_px).ok();
     bounds.max_image_height = bounds.max_image_width;
-    // A 16-bit or float image takes up to four times the bytes of the result on its way.
+    // Decoding a 16-bit or float image takes up to four times the bytes of the result.
     bounds.max_alloc = Some(limits.max_decoded_bytes.saturating_mul(4));
     reader.limits(bounds);
     let image: DynamicImage = reader.decode().map_err(|e| damaged(path, e))?;

@@ -1,11 +1,11 @@
-//! Colour to sRGB bytes with straight coverage alpha; under alpha 0 the colour of the nearest covered pixel.
+//! Converts colour to sRGB bytes with straight coverage alpha; pixels with alpha 0 take the colour of the nearest covered pixel.
 
 use crate::fill::fill_unmarked;
 use crate::mask::PixelMask;
 use crate::raster::Raster;
 use crate::srgb::{TO_BYTE, ToByte};
 
-/// Linear premultiplied 16-bit colour to sRGB bytes.
+/// Converts linear premultiplied 16-bit colour to sRGB bytes.
 pub fn color_from_linear((width, height): (u32, u32), color: &[[u16; 4]]) -> Raster {
     let table: &ToByte = &TO_BYTE;
     let mut pixels = vec![[0; 4]; color.len()];
@@ -45,9 +45,4 @@ fn fill_uncovered(image: &mut Raster) {
     for (pixel, a) in image.pixels.iter_mut().zip(alpha) {
         pixel[3] = a;
     }
-}
-
-/// Without alpha, for formats that have none.
-pub fn opaque(image: &Raster) -> Vec<[u8; 3]> {
-    image.pixels.iter().map(|p| [p[0], p[1], p[2]]).collect()
 }

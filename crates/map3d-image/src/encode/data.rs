@@ -11,7 +11,7 @@ static NORMAL_BYTE: LazyLock<Box<[u8; 65_536]>> = LazyLock::new(|| {
     (0..65_536).map(byte).collect::<Vec<u8>>().try_into().expect("65,536 entries")
 });
 
-/// R, G, B of each normal; 0, 0, 0 where there is none.
+/// Returns R, G, B of each normal; 0, 0, 0 for none.
 pub fn bytes_from_normals(normals: &[[i16; 3]]) -> Vec<u8> {
     let table: &[u8; 65_536] = &NORMAL_BYTE;
     let mut out = vec![0; normals.len() * 3];
@@ -23,12 +23,12 @@ pub fn bytes_from_normals(normals: &[[i16; 3]]) -> Vec<u8> {
     out
 }
 
-/// R is the least significant byte.
+/// Returns R, G, B, A of each value; R is the least significant byte.
 pub fn bytes_from_u32(values: &[u32]) -> &[u8] {
     bytemuck::cast_slice(values)
 }
 
-/// Grey is the less significant byte, alpha the other.
+/// Returns grey and alpha of each value; grey is the less significant byte.
 pub fn bytes_from_u16(values: &[u16]) -> &[u8] {
     bytemuck::cast_slice(values)
 }

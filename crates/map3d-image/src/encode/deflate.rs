@@ -1,17 +1,17 @@
-//! Deflate, three ways: `Fast` for layers whose filtered bytes are mostly zeros, `Matching` where repeats pay, `Thorough` where bytes count.
+//! Three ways to deflate: `Fast` for layers whose filtered bytes are mostly zeros, `Matching` for layers with repeats, `Thorough` for fewest bytes.
 
-/// Which deflate.
+/// A deflate method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Deflate {
     /// fdeflate: runs of zeros and a fixed code made for PNG.
     Fast,
     /// libdeflate level 1.
     Matching,
-    /// libdeflate level 6: of depth 9 saves a tenth for four times the time.
+    /// libdeflate level 6. Level 9 saves a tenth of the bytes of depth layers, for four times the time.
     Thorough,
 }
 
-/// Compresses to zlib streams; keeps its buffers.
+/// Compresses to zlib streams and reuses its buffers.
 pub struct Deflater {
     matching: libdeflater::Compressor,
     thorough: Option<libdeflater::Compressor>,
@@ -20,12 +20,12 @@ pub struct Deflater {
 
 impl Default for Deflater {
     fn default() -> Self {
-        Self { matching: of_level(1), thorough: None, out: Vec::new() }
+        Self { matching: compressor(1), thorough: None, out: Vec::new() }
     }
 }
 
 impl Deflater {
-    /// A zlib stream of `data`; valid until the next call.
+    /// Returns a zlib stream of `data`, valid until the next call.
     pub fn zlib(&mut self, data: &[u8], deflate: Deflate) -> &[u8] {
         match deflate {
             Deflate::Fast => {
@@ -35,17 +35,17 @@ impl Deflater {
                 compressor.finish().expect("memory");
                 &self.out
             }
-            Deflate::Matching => by_libdeflate(&mut self.matching, data, &mut self.out),
-            Deflate::Thorough => by_libdeflate(self.thorough.get_or_insert_with(|| of_level(6)), data, &mut self.out),
+            Deflate::Matching => compress_with(&mut self.matching, data, &mut self.out),
+            Deflate::Thorough => compress_with(self.thorough.get_or_insert_with(|| compressor(6)), data, &mut self.out),
         }
     }
 }
 
-fn of_level(level: i32) -> libdeflater::Compressor {
-    libdeflater::Compressor::new(libdeflater::CompressionLvl::new(level).expect("a level"))
+fn compressor(level: i32) -> libdeflater::Compressor {
+    libdeflater::Compressor::new(libdeflater::CompressionLvl::new(level).expect("a valid level"))
 }
 
-fn by_libdeflate<'a>(compressor: &mut libdeflater::Compressor, data: &[u8], out: &'a mut Vec<u8>) -> &'a [u8] {
+fn compress_with<'a>(compressor: &mut libdeflater::Compressor, data: &[u8], out: &'a mut Vec<u8>) -> &'a [u8] {
     out.resize(compressor.zlib_compress_bound(data.len()), 0);
     let n = compressor.zlib_compress(data, out).expect("the buffer is as large as the bound");
     &out[..n]

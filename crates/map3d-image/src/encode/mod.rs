@@ -1,4 +1,4 @@
-//! Layers as sent (spec/pyramid.md §6): G-buffer arrays to image bytes. The same array gives the same bytes on every machine.
+//! Encodes G-buffer arrays as the images of layers (spec/pyramid.md §6). The same array gives the same bytes on every machine.
 
 mod color;
 mod data;
@@ -9,7 +9,7 @@ mod webp;
 
 use map3d_base::{Error, LayerFormat, LayerKind, LayerSpec, Result};
 
-pub use color::{color_from_linear, opaque};
+pub use color::color_from_linear;
 pub use data::{bytes_from_normals, bytes_from_u16, bytes_from_u32};
 pub use jpeg::encode_jpeg;
 pub use png::{Deflate, Filter, PngImage, decode_png, encode_png};
@@ -18,7 +18,7 @@ pub use webp::encode_webp;
 use crate::gbuffer::GBuffer;
 use crate::raster::Raster;
 
-/// Encodes layers one after another; keeps its buffers. One per thread.
+/// Encodes layers one after another and reuses its buffers. One per thread.
 #[derive(Default)]
 pub struct Encoder {
     png: png::PngWriter,
@@ -30,16 +30,16 @@ impl Encoder {
         Self::default()
     }
 
-    /// Spends time for fewer bytes. (`layer` does as its layer says.)
+    /// Returns an encoder that spends more time for fewer bytes. (`layer` follows its `LayerSpec` instead.)
     pub fn small() -> Self {
         Self { small: true, ..Self::default() }
     }
 
-    fn png(&mut self, size: (u32, u32), channels: usize, pixels: &[u8], methods: png::Methods) -> Vec<u8> {
-        self.png.write(size, channels, pixels, methods[usize::from(self.small)])
+    fn png(&mut self, size: (u32, u32), channels: usize, pixels: &[u8], methods: png::MethodPair) -> Vec<u8> {
+        self.png.write(size, channels, pixels, if self.small { methods.small } else { methods.quick })
     }
 
-    /// One layer of a G-buffer.
+    /// Encodes one layer of a G-buffer.
     pub fn layer(&mut self, g: &GBuffer, spec: &LayerSpec) -> Result<Vec<u8>> {
         let size = (g.width, g.height);
         self.small = spec.small;
@@ -56,7 +56,7 @@ impl Encoder {
         }
     }
 
-    /// Linear premultiplied colour; `quality` 1..=100 for lossy formats.
+    /// Encodes linear premultiplied colour; `quality` 1..=100 for lossy formats.
     pub fn color(&mut self, size: (u32, u32), color: &[[u16; 4]], format: LayerFormat, quality: u8) -> Result<Vec<u8>> {
         if !(1..=100).contains(&quality) {
             return Err(Error::argument(format!("quality is {quality}, expected 1 to 100")));
@@ -70,7 +70,7 @@ impl Encoder {
         }
     }
 
-    /// Opaque tiles carry no alpha channel.
+    /// Encodes a PNG, without an alpha channel if the tile is opaque.
     fn color_png(&mut self, image: &Raster) -> Vec<u8> {
         let size = (image.width, image.height);
         if image.has_alpha() {
@@ -98,14 +98,14 @@ impl Encoder {
         Ok(self.png(size, 4, bytes_from_u32(depths), png::DEPTH))
     }
 
-    /// One byte a pixel: sun, ambient occlusion.
+    /// Encodes one byte per pixel: sun, ambient occlusion.
     pub fn shade(&mut self, size: (u32, u32), shades: &[u8], format: LayerFormat) -> Result<Vec<u8>> {
-        only_png("of shades", format)?;
+        only_png("sun or ao", format)?;
         check_length(size, shades.len())?;
         Ok(self.png(size, 1, shades, png::SHADE))
     }
 
-    /// A bit a sun.
+    /// Encodes one bit per sun.
     pub fn sun16(&mut self, size: (u32, u32), suns: &[u16], format: LayerFormat) -> Result<Vec<u8>> {
         only_png("sun16", format)?;
         check_length(size, suns.len())?;
@@ -123,6 +123,6 @@ fn only_png(layer: &str, format: LayerFormat) -> Result<()> {
 fn check_length((width, height): (u32, u32), got: usize) -> Result<()> {
     match width as usize * height as usize == got && got > 0 {
         true => Ok(()),
-        false => Err(Error::argument(format!("{got} pixels for an image of {width} × {height}"))),
+        false => Err(Error::argument(format!("{got} pixels, expected {width} × {height}"))),
     }
 }

@@ -1,5 +1,5 @@
-//! PNG, 8-bit, not interlaced, one IDAT, no ancillary chunks. One filter for the whole image and one deflate, chosen per layer by measurement
-//! (`examples/codecs.rs`).
+//! Encodes PNG: 8-bit, not interlaced, one IDAT, no ancillary chunks. The whole image has one filter and one deflate method, chosen per layer by
+//! measurement (`examples/codecs.rs`).
 
 use std::io::Cursor;
 use std::path::Path;
@@ -9,7 +9,7 @@ use map3d_base::{Error, Result};
 pub use crate::encode::deflate::Deflate;
 use crate::encode::deflate::Deflater;
 
-/// PNG's filters; one for all rows.
+/// The filter of all rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Filter {
@@ -20,22 +20,34 @@ pub enum Filter {
     Paeth = 4,
 }
 
-/// How a layer is written.
-pub type Method = (Filter, Deflate);
+/// Filter and compression of an image.
+#[derive(Clone, Copy, Debug)]
+pub struct Method {
+    pub filter: Filter,
+    pub deflate: Deflate,
+}
 
-/// Of a layer's two methods, the quick one and the small one.
-pub type Methods = [Method; 2];
+/// The methods of a layer: the quick one and the one that gives fewer bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct MethodPair {
+    pub quick: Method,
+    pub small: Method,
+}
 
-pub const COLOR: Methods = [(Filter::Up, Deflate::Fast), (Filter::Average, Deflate::Thorough)];
-pub const NORMAL: Methods = [(Filter::Up, Deflate::Fast), (Filter::None, Deflate::Thorough)];
-pub const ID: Methods = [(Filter::Up, Deflate::Fast), (Filter::Up, Deflate::Thorough)];
-pub const DEPTH: Methods = [(Filter::Sub, Deflate::Matching), (Filter::Sub, Deflate::Thorough)];
-pub const SHADE: Methods = [(Filter::Up, Deflate::Fast), (Filter::Sub, Deflate::Thorough)];
-pub const SUN16: Methods = [(Filter::Up, Deflate::Fast), (Filter::None, Deflate::Thorough)];
+const fn methods(quick: (Filter, Deflate), small: (Filter, Deflate)) -> MethodPair {
+    MethodPair { quick: Method { filter: quick.0, deflate: quick.1 }, small: Method { filter: small.0, deflate: small.1 } }
+}
+
+pub const COLOR: MethodPair = methods((Filter::Up, Deflate::Fast), (Filter::Average, Deflate::Thorough));
+pub const NORMAL: MethodPair = methods((Filter::Up, Deflate::Fast), (Filter::None, Deflate::Thorough));
+pub const ID: MethodPair = methods((Filter::Up, Deflate::Fast), (Filter::Up, Deflate::Thorough));
+pub const DEPTH: MethodPair = methods((Filter::Sub, Deflate::Matching), (Filter::Sub, Deflate::Thorough));
+pub const SHADE: MethodPair = methods((Filter::Up, Deflate::Fast), (Filter::Sub, Deflate::Thorough));
+pub const SUN16: MethodPair = methods((Filter::Up, Deflate::Fast), (Filter::None, Deflate::Thorough));
 
 const SIGNATURE: [u8; 8] = [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1A, b'\n'];
 
-/// Writes PNGs; keeps its buffers.
+/// Writes PNGs and reuses its buffers.
 #[derive(Default)]
 pub struct PngWriter {
     filtered: Vec<u8>,
@@ -43,12 +55,12 @@ pub struct PngWriter {
 }
 
 impl PngWriter {
-    /// `pixels`: rows of `width · channels` bytes; 1 channel (grey), 2 (grey, alpha), 3 (RGB) or 4 (RGBA).
-    pub fn write(&mut self, size: (u32, u32), channels: usize, pixels: &[u8], (filter, deflate): Method) -> Vec<u8> {
+    /// Encodes an image. `pixels`: rows of `width · channels` bytes; 1 channel (grey), 2 (grey, alpha), 3 (RGB) or 4 (RGBA).
+    pub fn write(&mut self, size: (u32, u32), channels: usize, pixels: &[u8], method: Method) -> Vec<u8> {
         let row = size.0 as usize * channels;
         assert_eq!(pixels.len(), row * size.1 as usize, "{size:?} × {channels} bytes");
-        filter_rows(&mut self.filtered, pixels, row, channels, filter);
-        let body = self.deflater.zlib(&self.filtered, deflate);
+        filter_rows(&mut self.filtered, pixels, row, channels, method.filter);
+        let body = self.deflater.zlib(&self.filtered, method.deflate);
         let mut header = [0u8; 13];
         header[..4].copy_from_slice(&size.0.to_be_bytes());
         header[4..8].copy_from_slice(&size.1.to_be_bytes());
@@ -63,9 +75,9 @@ impl PngWriter {
     }
 }
 
-/// `PngWriter::write` for a single image.
+/// Encodes a single image; see `PngWriter::write`.
 pub fn encode_png(size: (u32, u32), channels: usize, pixels: &[u8], filter: Filter, deflate: Deflate) -> Vec<u8> {
-    PngWriter::default().write(size, channels, pixels, (filter, deflate))
+    PngWriter::default().write(size, channels, pixels, Method { filter, deflate })
 }
 
 fn chunk(out: &mut Vec<u8>, name: &[u8; 4], body: &[u8]) {
@@ -77,7 +89,7 @@ fn chunk(out: &mut Vec<u8>, name: &[u8; 4], body: &[u8]) {
     out.extend_from_slice(&crc.to_be_bytes());
 }
 
-/// Each row behind its filter's number.
+/// Writes each row after its filter's number.
 fn filter_rows(out: &mut Vec<u8>, pixels: &[u8], row: usize, step: usize, filter: Filter) {
     out.clear();
     out.resize(pixels.len() + pixels.len() / row, 0);
@@ -130,7 +142,7 @@ pub struct PngImage {
     pub pixels: Vec<u8>,
 }
 
-/// Reads an 8-bit PNG, for checks; other depths and palettes are widened to 8-bit channels.
+/// Decodes a PNG, for checks; converts other depths and palettes to 8-bit channels.
 pub fn decode_png(bytes: &[u8]) -> Result<PngImage> {
     let refuse = |e: png::DecodingError| Error::format(Path::new("png"), e.to_string());
     let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), png::Limits { bytes: 512 << 20 });

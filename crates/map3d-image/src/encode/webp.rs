@@ -1,4 +1,4 @@
-//! Lossy WebP by libwebp; alpha lossless. The only place that calls libwebp.
+//! Encodes lossy WebP with lossless alpha. The only file that calls libwebp.
 
 use std::ffi::c_int;
 use std::mem::MaybeUninit;
@@ -11,7 +11,7 @@ use crate::raster::Raster;
 /// libwebp's limit.
 const MAX_SIDE_PX: u32 = 16_383;
 
-/// libwebp's methods: 0 is the quickest; what 5 and 6 save is a hundredth, for as much time again.
+/// libwebp's methods: 0 is the quickest; 5 and 6 save one per cent of the bytes for twice the time.
 const QUICK: c_int = 0;
 const SMALL: c_int = 4;
 
@@ -21,12 +21,12 @@ pub fn encode_webp(image: &Raster, quality: u8, small: bool) -> Result<Vec<u8>> 
         return Err(Error::argument(format!("webp of {} × {} px, expected 1 to {MAX_SIDE_PX}", image.width, image.height)));
     }
     let config = config(quality, if small { SMALL } else { QUICK })?;
-    let mut picture = Picture::import(image)?;
+    let mut picture = WebpPicture::import(image)?;
     picture.encode(&config)
 }
 
 fn config(quality: u8, method: c_int) -> Result<ffi::WebPConfig> {
-    let mut config = ffi::WebPConfig::new().map_err(|()| Error::argument("libwebp has another version than its header"))?;
+    let mut config = ffi::WebPConfig::new().map_err(|()| Error::argument("libwebp's version differs from its header's"))?;
     config.quality = f32::from(quality);
     config.method = method;
     config.exact = 1;
@@ -37,12 +37,12 @@ fn config(quality: u8, method: c_int) -> Result<ffi::WebPConfig> {
     }
 }
 
-/// A libwebp picture that owns its planes.
-struct Picture(Box<ffi::WebPPicture>);
+/// Owns a libwebp picture and its planes.
+struct WebpPicture(Box<ffi::WebPPicture>);
 
-impl Picture {
+impl WebpPicture {
     fn import(image: &Raster) -> Result<Self> {
-        let raw = ffi::WebPPicture::new().map_err(|()| Error::argument("libwebp has another version than its header"))?;
+        let raw = ffi::WebPPicture::new().map_err(|()| Error::argument("libwebp's version differs from its header's"))?;
         let mut picture = Self(Box::new(raw));
         (picture.0.width, picture.0.height) = (image.width as c_int, image.height as c_int);
         let bytes = image.pixels.as_flattened().as_ptr();
@@ -77,7 +77,7 @@ impl Picture {
     }
 }
 
-impl Drop for Picture {
+impl Drop for WebpPicture {
     fn drop(&mut self) {
         // SAFETY: initialised by WebPPicture::new, freed once.
         unsafe { ffi::WebPPictureFree(&mut *self.0) }

@@ -57,7 +57,7 @@ impl AlphaSampler {
         while rest != 0 {
             let k = rest.trailing_zeros();
             rest &= rest - 1;
-            let texel = self.map.into_first_period(origin.offset(self.sample_offsets[k as usize]));
+            let texel = self.map.reduce_to_first_period(origin.offset(self.sample_offsets[k as usize]));
             let is_covered = match self.map.alpha_cell(texel) {
                 AlphaCell::Transparent => false,
                 AlphaCell::Opaque => true,

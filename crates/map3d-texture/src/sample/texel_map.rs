@@ -95,13 +95,13 @@ impl TexelMap {
 
     /// Returns the texel coordinates of texture coordinates: those of the origin of a map that begins there.
     pub fn of_uv(&self, u: f64, v: f64) -> TexelPoint {
-        self.into_first_period(texel_of_uv(&self.level, self.wrap, u, v))
+        self.reduce_to_first_period(texel_of_uv(&self.level, self.wrap, u, v))
     }
 
     /// Returns the texel coordinates of a position, in the first period of a texture that repeats.
     #[inline(always)]
     pub fn at(&self, x: i32, y: i32) -> TexelPoint {
-        self.into_first_period(self.unwrapped_at(x, y))
+        self.reduce_to_first_period(self.unwrapped_at(x, y))
     }
 
     /// Returns the texel coordinates of a position, in any period.
@@ -111,7 +111,7 @@ impl TexelMap {
     }
 
     #[inline(always)]
-    pub fn into_first_period(&self, t: TexelPoint) -> TexelPoint {
+    pub fn reduce_to_first_period(&self, t: TexelPoint) -> TexelPoint {
         TexelPoint { x: modulo_period(t.x, self.period.x), y: modulo_period(t.y, self.period.y) }
     }
 
