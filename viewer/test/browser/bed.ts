@@ -8,7 +8,7 @@ import { BARE, begin } from "./page";
 type Renderings = Readonly<Record<string, Fixture>>;
 type Opened = ReturnType<typeof openPage>;
 
-/** A server with renderings and the bare page, while a file's tests run. */
+/** Serves renderings and the bare page while a file's tests run. */
 export function serve(renderings: Renderings): TestServer {
   const server = new TestServer();
   for (const [name, rendering] of Object.entries(renderings)) server.renderings.set(name, rendering);
@@ -19,12 +19,12 @@ export function serve(renderings: Renderings): TestServer {
   return server;
 }
 
-/** A server and a browser, while a file's tests run. */
+/** A server and a browser while a file's tests run. */
 export class TestBed {
   readonly server: TestServer;
   #browser: Browser | undefined;
 
-  /** @param env of the browser */
+  /** @param env environment variables of the browser */
   constructor(renderings: Renderings, env: Record<string, string> = {}) {
     this.server = serve(renderings);
     beforeAll(async () => { this.#browser = await openBrowser(env); });
@@ -39,14 +39,14 @@ export class TestBed {
     return openPage(this.#browser as Browser, context);
   }
 
-  /** The bare page, without a map. */
+  /** Opens the bare page, without a map. */
   async bare(context: BrowserContextOptions = {}): Opened {
     const opened = await this.openPage(context);
     await opened.page.goto(`${this.server.origin}/bare`);
     return opened;
   }
 
-  /** A page with a map that has drawn its first complete view and rests. Its rendering: a name here, or addresses. */
+  /** Opens a page with a map and waits until it rests. Its rendering is a name here, or addresses. */
   async start(rendering: string | string[], options: object = {}, layer: object = {}, context: BrowserContextOptions = {}): Opened {
     const opened = await this.bare(context);
     await opened.page.evaluate(begin, [typeof rendering === "string" ? this.url(rendering) : rendering, options, layer] as const);

@@ -5,13 +5,13 @@ import { chromium, type Browser, type BrowserContextOptions, type Page } from "p
 export const OUT = resolve(import.meta.dirname, "../../.shots");
 mkdirSync(OUT, { recursive: true });
 
-/** Chromium with software WebGL2. Its path: CHROMIUM, else Debian's. @param env what it is told besides this process's environment */
+/** Opens Chromium with software WebGL2. Path: CHROMIUM, else Debian's. @param env additional environment variables */
 export async function openBrowser(env: Record<string, string> = {}): Promise<Browser> {
   const args = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"];
   return chromium.launch({ executablePath: process.env["CHROMIUM"] ?? "/usr/bin/chromium", headless: true, args, env: { ...process.env, ...env } });
 }
 
-/** These browsers have no GPU: maps that would take WebGL only where there is one shall take it here, too, as most readers' do. */
+/** Hides that these browsers have no GPU, so that maps use WebGL as they do for most users. */
 function anyWebGL(): void {
   const own = Object.getOwnPropertyDescriptor(HTMLCanvasElement.prototype, "getContext")?.value as (kind: string, options?: object) => unknown;
   HTMLCanvasElement.prototype.getContext = function (this: HTMLCanvasElement, kind: string, options?: object) {
@@ -23,7 +23,7 @@ function anyWebGL(): void {
   };
 }
 
-/** A page whose errors and console errors fail the test that looks at them. */
+/** Opens a page and collects its errors and console errors. */
 export async function openPage(browser: Browser, options: BrowserContextOptions = {}): Promise<{ page: Page; problems: string[] }> {
   const context = await browser.newContext({ viewport: { width: 800, height: 600 }, ...options });
   await context.addInitScript(anyWebGL);

@@ -174,7 +174,7 @@ describe("the drawer is chosen", () => {
 
   test.each([
     ["auto", "without WebGL2", withoutWebGL, "canvas", /^$/],
-    ["webgl", "without WebGL2", withoutWebGL, null, /no WebGL2/],
+    ["webgl", "without WebGL2", withoutWebGL, null, /does not support WebGL2/],
     ["auto", "where WebGL2 is slow", slowly, "canvas", /^$/],
     ["webgl", "where WebGL2 is slow", slowly, "webgl", /^$/],
     ["auto", "where the processor draws WebGL2, by its name", named, "canvas", /^$/],
@@ -304,7 +304,7 @@ test("where pixels cannot be read as they are, light is composed instead, nearly
     g.layer = new g.map3d.imageLayer(base).addTo(g.map);
     g.map.once("idle", () => { done(); }).debug();
   }), [bed.url("town"), options] as const);
-  expect(await page.locator(".map3d-debug > p").textContent()).toMatch(/^canvas: light by compositing/);
+  expect(await page.locator(".map3d-debug > p").textContent()).toMatch(/^canvas: lighting by compositing/);
   const lit = differenceOf(await picture(plain), await picture(page));
   await page.screenshot({ path: `${OUT}/canvas-composed.png` });
   expect(lit.most).toBeLessThan(12);

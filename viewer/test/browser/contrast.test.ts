@@ -26,7 +26,7 @@ test.each([
     const channels = (color: string): number[] => (color.match(/[\d.]+/g) ?? []).map(Number);
     const bright = (color: string): number => channels(color).slice(0, 3).map((c) => c / 255).map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4)).reduce((sum, c, k) => sum + c * ([0.2126, 0.7152, 0.0722][k] ?? 0), 0);
     const ratio = (a: string, b: string): number => { const [x, y] = [bright(a), bright(b)].sort((p, q) => q - p) as [number, number]; return (x + 0.05) / (y + 0.05); };
-    /** Opaque: the element's own background over that of those around it. */
+    /** The element's background over those of its ancestors, opaque. */
     const behind = (element: Element | null): string => {
       if (!element) return "rgb(255, 255, 255)";
       const [r = 0, g = 0, b = 0, a = 1] = channels(getComputedStyle(element).backgroundColor);
@@ -49,7 +49,7 @@ test.each([
   await page.context().close();
 });
 
-test("who saves data gets coarser tiles on a dense screen, no ids for hovering, and is told so", async () => {
+test("a user who saves data gets coarser tiles on a dense screen, no ids for hovering, and a notice", async () => {
   const deepest = { saved: 0, full: 0 };
   for (const kind of ["saved", "full"] as const) {
     const { page } = await bed.openPage({ viewport: { width: 390, height: 844 }, deviceScaleFactor: 3, isMobile: true });

@@ -75,7 +75,7 @@ test.each(["/before", "/after"])("%s: attributes and children make a map, and ch
   expect(changed).toMatchObject({ same: true, direction: "180-45", zoom: 3, time: null, azimuth: 90, mode: "depth", labels: ["Hall", "Turm"] });
   expect(changed.errors).toEqual([
     '<map-3d center="here">: center must be three numbers such as "691000 5336000 520"', '<map-3d zoom="1 2">: zoom must be a number', 'view "7-7" is none of 0-45, 90-45, 180-45, 270-45',
-    'mode "pretty" is unknown; take one of lit, color, picture, normal, id, depth', '<map-3d time="noon">: time is a moment such as "2026-06-21T14:00Z", or "now"',
+    'unknown mode "pretty"; use one of lit, color, picture, normal, id, depth', '<map-3d time="noon">: time is a moment such as "2026-06-21T14:00Z", or "now"',
     '<map-3d-marker position="1 2">: position is three numbers such as "691000 5336000 520"',
   ]);
   expect(problems).toEqual([]);

@@ -6,7 +6,7 @@ import type * as Controls from "../../src/controls";
 import type * as Theme from "../../src/theme";
 import { decodePng } from "../../src/tiles/png";
 import { renderTown } from "../fixture/rendering";
-import { differ, judge, TOLERANCE } from "../fixture/golden";
+import { differ, compareWithGolden, TOLERANCE } from "../fixture/golden";
 import { ORIGIN, type Place } from "../fixture/town";
 import { TestBed } from "./bed";
 import { OUT } from "./browser";
@@ -86,7 +86,7 @@ async function overview(page: Page): Promise<void> {
 test.each(Object.entries(scenes))("%s", async (name, { map = {}, layer = {}, context = {}, act }) => {
   const { page, problems } = await bed.start("town", { zoom: 2.9, language: "en", ...map }, layer, { ...STILL, ...WIDE, ...context });
   await act?.(page);
-  expect(await judge(name, await restingShot(page), OUT)).toEqual({ ok: true, why: "" });
+  expect(await compareWithGolden(name, await restingShot(page), OUT)).toEqual({ ok: true, why: "" });
   expect(problems).toEqual([]);
   await page.context().close();
 });
@@ -104,7 +104,7 @@ test.each(Object.entries(pages))("%s", async (name, { context, act }) => {
   await page.waitForFunction(() => location.hash.length > 5);
   await restingShot(page);
   await act(page);
-  expect(await judge(name, await restingShot(page), OUT)).toEqual({ ok: true, why: "" });
+  expect(await compareWithGolden(name, await restingShot(page), OUT)).toEqual({ ok: true, why: "" });
   expect(problems).toEqual([]);
   await page.context().close();
 });

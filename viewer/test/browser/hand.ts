@@ -2,12 +2,12 @@ import type { Page } from "playwright-core";
 import type { Vec2 } from "../../src/core/vec";
 import { decodePng, type DecodedPng } from "../../src/tiles/png";
 
-/** Actions that a task may take after opening. */
-export const MOST = 3;
+/** Maximum number of actions of a task after opening. */
+export const MAX_ACTIONS = 3;
 /** Longer than a double tap. */
 const APART_MS = 600;
 
-/** A reader's hand, whose actions are counted. */
+/** A user whose actions are counted. */
 export class Hand {
   count = 0;
   readonly #page: Page;
@@ -34,13 +34,13 @@ export class Hand {
     return this.#page.keyboard.press(name);
   }
 
-  /** A list of the device's own: a tap opens it, another one chooses. */
+  /** A native select list: one tap opens it, another chooses. */
   async choose(select: string, label: string): Promise<void> {
     this.#act(2);
     await this.#page.selectOption(select, { label });
   }
 
-  /** Along the screen, from a place to another. */
+  /** Drags across the screen. */
   async drag(from: Vec2, to: Vec2): Promise<void> {
     this.#act(1);
     await this.#page.mouse.move(...from);
@@ -51,9 +51,9 @@ export class Hand {
 
   #act(actions: number): void {
     this.count += actions;
-    if (this.count > MOST) throw new Error(`${String(this.count)} actions: a task takes ${String(MOST)} at most`);
+    if (this.count > MAX_ACTIONS) throw new Error(`${String(this.count)} actions; a task may take ${String(MAX_ACTIONS)} at most`);
   }
 }
 
-/** The pixels of a PNG file. */
+/** Decodes a PNG file. */
 export const decoded = (png: Uint8Array): Promise<DecodedPng> => decodePng(Uint8Array.from(png));

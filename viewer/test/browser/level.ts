@@ -2,7 +2,7 @@ import type { Page } from "playwright-core";
 import type { Fixture } from "../fixture/rendering";
 import type { Global } from "./page";
 
-/** Bytes of level 3's pixels in view 0-45, as they were before they were encoded. */
+/** Returns a reader of level 3's pixels in view 0-45, as they were before encoding. */
 export function decodedLevel(town: Fixture, layer: "color" | "normal" | "id"): (x: number, y: number) => Buffer | undefined {
   const tiles = new Map([...town.raw].map(([path, bytes]) => [path, Buffer.from(bytes)]));
   const size = layer === "normal" ? 3 : 4;
@@ -13,7 +13,7 @@ export function decodedLevel(town: Fixture, layer: "color" | "normal" | "id"): (
   };
 }
 
-/** Where the left top corner of the view's square lies on the map, in CSS pixels. */
+/** Returns the position of the view's top left corner on the map, CSS pixels. */
 export const cornerOf = (page: Page): Promise<[number, number]> => page.evaluate(() => {
   const { map, layer } = globalThis as Global;
   const view = layer.rendering?.views.get(map.direction);
@@ -24,16 +24,16 @@ export const cornerOf = (page: Page): Promise<[number, number]> => page.evaluate
   return map.project(world) as [number, number];
 });
 
-/** Canvas pixel of level 3's first pixel. */
+/** Returns the canvas pixel of level 3's first pixel. */
 export const placeOf = async (page: Page): Promise<[number, number]> => {
   const [x, y] = await cornerOf(page);
   return [Math.round(x), Math.round(y)];
 };
 
-/** What a pixel gets of the sky's and of the sun's light. */
+/** Fractions of skylight and sunlight. */
 export type Shares = readonly [sky: number, sun: number];
 
-/** Cosine between a stored normal and the light; null where there is no normal. */
+/** Computes the cosine between a stored normal and the light; null without a normal. */
 export function cosine(stored: Uint8Array, { azimuth_deg, altitude_deg }: { azimuth_deg: number; altitude_deg: number }): number | null {
   if (stored.every((part) => part === 0)) return null;
   const [a, h] = [(azimuth_deg * Math.PI) / 180, (altitude_deg * Math.PI) / 180];
@@ -42,12 +42,12 @@ export function cosine(stored: Uint8Array, { azimuth_deg, altitude_deg }: { azim
   return Math.max(0, n.reduce((sum, part, k) => sum + part * (sun[k] ?? 0), 0) / Math.hypot(...n));
 }
 
-/** Half a pixel's own light and an eighth of each neighbour's; those without a normal count as itself. */
+/** Spreads light: half a pixel's own and an eighth of each neighbour's; neighbours without a normal count as the pixel itself. */
 export function spread(own: Shares, around: readonly (Shares | null)[]): Shares {
   return [0, 1].map((k) => (own[k] ?? 0) / 2 + around.reduce((sum, beside) => sum + ((beside ?? own)[k] ?? 0), 0) / 8) as unknown as Shares;
 }
 
-/** The byte that a stored colour byte becomes under so much light. */
+/** Computes the lit byte of a stored colour byte. */
 export function litByte(byte: number, strength: number): number {
   const c = byte / 255;
   const lit = Math.min((c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4) * strength, 1);

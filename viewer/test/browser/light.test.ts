@@ -12,7 +12,7 @@ const town = renderTown();
 const bed = new TestBed({ town: withBakedLight(town), plain: town });
 
 const BETWEEN = { azimuth_deg: 110 + 0.3 * 25, altitude_deg: 35.6 };
-/** Share of DAY[2], from the map itself in a unit test; here as far as bytes can tell. */
+/** Weight of DAY[2], computed by the map itself in a unit test; here to byte precision. */
 const bits = (share: number) => (x: number, y: number): number => {
   const value = PATTERN.sun16(x, y);
   return ((value >> 1) & 1) * (1 - share) + ((value >> 2) & 1) * share;
@@ -22,7 +22,7 @@ type Share = (x: number, y: number) => number;
 type Row = [name: string, towards: { azimuth_deg: number; altitude_deg: number }, more: Partial<Light>, sky: Share, sun: Share];
 const RGB: Partial<Light> = { sun_rgb: [1, 0.7, 0.4], sky_rgb: [0.5, 0.6, 1] };
 
-describe("rendered light dims what is lit, pixel by pixel", () => {
+describe("rendered light dims lit pixels one by one", () => {
   const noon = { azimuth_deg: NOON.azimuth_deg, altitude_deg: NOON.elevation_deg };
   const hour = { azimuth_deg: DAY[1]?.azimuth_deg ?? 0, altitude_deg: DAY[1]?.elevation_deg ?? 0 };
   const rows: Row[] = [
@@ -61,7 +61,7 @@ describe("rendered light dims what is lit, pixel by pixel", () => {
   });
 });
 
-test("between two hours the picture lies between theirs", async () => {
+test("a time between two hours shows a picture between theirs", async () => {
   const { page, problems } = await bed.start("town", { zoom: 3, light: { ...BETWEEN, occlusion: false } });
   await page.screenshot({ path: `${OUT}/between.png` });
   const mixed = await pixels(page);
@@ -75,7 +75,7 @@ test("between two hours the picture lies between theirs", async () => {
   await page.context().close();
 });
 
-test("tiles of light are asked for when they are shown, after colour and normals, and never without need", async () => {
+test("tiles of light are requested only when shown, after colour and normals", async () => {
   bed.server.requests.length = 0;
   const { page } = await bed.start("town", { light: { shadows: false, occlusion: false } });
   expect(bed.server.requests.filter((url) => /\/(noon|day|ao)\//.test(url))).toEqual([]);
@@ -86,7 +86,7 @@ test("tiles of light are asked for when they are shown, after colour and normals
   await page.context().close();
 });
 
-test("a moment sets the light of the sun over the scene; a direction of one's own forgets it", async () => {
+test("setTime lights the scene by the sun; setting an azimuth ends it", async () => {
   const { page } = await bed.start("plain");
   const [noon, time] = await page.evaluate(() => {
     const { map } = globalThis as Global;
@@ -108,7 +108,7 @@ test("a moment sets the light of the sun over the scene; a direction of one's ow
   await page.context().close();
 });
 
-test("places have longitudes and latitudes, and the other way round", async () => {
+test("positions convert to longitude and latitude, and back", async () => {
   const { page } = await bed.start("plain");
   const [there, back] = await page.evaluate(() => {
     const { map } = globalThis as Global;

@@ -12,7 +12,7 @@ const town = renderTown(64, 0.76);
 const bed = new TestBed({ town, ramp: renderRamp(), published: published(town) });
 const other = serve({ town });
 
-test.each([[4, 2.4], [3.37, 3.4], [2.5, 6.2]])("at zoom %d no seam is seen between tiles", async (zoom, most) => {
+test.each([[4, 2.4], [3.37, 3.4], [2.5, 6.2]])("at zoom %d no seam is visible between tiles", async (zoom, most) => {
   const { page } = await bed.start("ramp", { zoom, light: { lit: false } });
   const got = await pixels(page);
   let steepest = 0;
@@ -28,7 +28,7 @@ test.each([[4, 2.4], [3.37, 3.4], [2.5, 6.2]])("at zoom %d no seam is seen betwe
   await page.context().close();
 });
 
-test("requests are spread over the hosts, each tile always from the same one", async () => {
+test("requests are spread over the hosts, and each tile always has the same host", async () => {
   const second = other.origin;
   [bed.server, other].forEach((each) => (each.requests.length = 0));
   const { page } = await bed.start([bed.url("town"), `${second}/tiles/town`], { zoom: 3 });
@@ -39,7 +39,7 @@ test("requests are spread over the hosts, each tile always from the same one", a
   await page.context().close();
 });
 
-test("a published folder is read from its archives by ranges", async () => {
+test("a published folder is read from its archives by byte ranges", async () => {
   bed.server.requests.length = 0;
   const { page } = await bed.start("published", { zoom: 3 });
   const asked = bed.server.requests.filter((url) => url.startsWith("/tiles/published/"));
@@ -52,7 +52,7 @@ test("a published folder is read from its archives by ranges", async () => {
   await plain.context().close();
 });
 
-test("keys move, zoom and turn while the map has the focus", async () => {
+test("keys pan, zoom and rotate while the map has the focus", async () => {
   const { page } = await bed.start("town", { zoom: 3.8 });
   const state = (): Promise<{ zoom: number; direction: string; x: number }> => page.evaluate((world) => {
     const { map } = globalThis as Global;
@@ -71,7 +71,7 @@ test("keys move, zoom and turn while the map has the focus", async () => {
   await page.context().close();
 });
 
-test("a double click zooms at the pointer; the buttons zoom and turn", async () => {
+test("a double click zooms at the pointer; the buttons zoom and rotate", async () => {
   const { page } = await bed.start("town", { zoom: 3.8 });
   await page.mouse.dblclick(300, 300);
   await page.waitForFunction(() => (globalThis as Global).map.zoom > 4.75);
@@ -84,7 +84,7 @@ test("a double click zooms at the pointer; the buttons zoom and turn", async () 
   await page.context().close();
 });
 
-test("two fingers zoom about what lies between them", async () => {
+test("two fingers zoom about the point between them", async () => {
   const { page } = await bed.start("town", { zoom: 3.8 });
   const session = await page.context().newCDPSession(page);
   const ground = await page.evaluate(() => (globalThis as Global).map.unproject([400, 300]) as [number, number, number]);
@@ -99,7 +99,7 @@ test("two fingers zoom about what lies between them", async () => {
   await page.context().close();
 });
 
-test("hovering names what lies under the pointer", async () => {
+test("hovering reports the object under the pointer", async () => {
   const { page } = await bed.start("town", { hover: true, zoom: 2 });
   const at = await page.evaluate(([x, y, z]) => {
     const { map } = globalThis as Global;
@@ -111,7 +111,7 @@ test("hovering names what lies under the pointer", async () => {
   await page.context().close();
 });
 
-test("the debug overlay names the tiles, and tells their layers' bytes and ages", async () => {
+test("the debug overlay labels tiles with their names and their layers' bytes and ages", async () => {
   const { page } = await bed.start("town", { zoom: 4 });
   await settled(page, () => (globalThis as Global).map.debug(true), null);
   await page.screenshot({ path: `${OUT}/debug.png` });
@@ -120,7 +120,7 @@ test("the debug overlay names the tiles, and tells their layers' bytes and ages"
   await page.context().close();
 });
 
-test("a removed map leaves the canvas, asks for nothing, and another can take its place", async () => {
+test("a removed map restores the canvas, requests nothing, and can be replaced by another", async () => {
   const { page, problems } = await bed.start("town");
   const left = await page.evaluate(async (base) => {
     const g = globalThis as Global;
@@ -136,14 +136,14 @@ test("a removed map leaves the canvas, asks for nothing, and another can take it
   await page.context().close();
 });
 
-test("the canvas follows the window", async () => {
+test("the canvas resizes with the window", async () => {
   const { page } = await bed.start("town");
   await page.setViewportSize({ width: 500, height: 700 });
   await page.waitForFunction(() => (globalThis as Global).map.canvas.width === 500 && (globalThis as Global).map.canvas.height === 700);
   await page.context().close();
 });
 
-test("manifests of another version are refused with both numbers", async () => {
+test("a manifest of another version is refused with both version numbers", async () => {
   bed.server.renderings.set("new", { ...town, json: { ...town.json, version: 9 } });
   const { page } = await bed.bare();
   const message = await page.evaluate((base) => new Promise<string>((done) => {
@@ -156,7 +156,7 @@ test("manifests of another version are refused with both numbers", async () => {
   await page.context().close();
 });
 
-test("the cache keeps its bound while one wanders about", async () => {
+test("the cache stays within its limit while the map moves", async () => {
   const { page } = await bed.start("town", { zoom: 3, cacheBytes: 600_000 });
   const most = await page.evaluate(async () => {
     const { map } = globalThis as Global;
@@ -168,12 +168,12 @@ test("the cache keeps its bound while one wanders about", async () => {
     }
     return greatest;
   });
-  // What is in view may exceed the bound; what is not may not.
+  // Only tiles in view may exceed the limit.
   expect(most).toBeLessThan(600_000 + 64 * 64 * 7 * 80);
   await page.context().close();
 });
 
-test("a view that takes more than the cache may hold comes to rest, and asks for each tile once", async () => {
+test("a view larger than the cache comes to rest and requests each tile once", async () => {
   const from = bed.server.requests.length;
   const { page } = await bed.start("town", { zoom: 3, cacheBytes: 1 });
   await settled(page, () => (globalThis as Global).map.setLight({ azimuth_deg: 12 }), null);
@@ -191,7 +191,7 @@ function changed(name: string, change: (files: Map<string, Uint8Array>) => void,
   return name;
 }
 
-test("a broken tile is named in an error; the rest is shown", async () => {
+test("an error names a broken tile; the others are shown", async () => {
   const name = changed("broken", (files) => files.set("0-45/normal/3/3/4", new Uint8Array([1, 2, 3])));
   const { page } = await bed.start(name, { zoom: 3.5 });
   const errors = await page.evaluate(() => (globalThis as Global).errors);
@@ -200,7 +200,7 @@ test("a broken tile is named in an error; the rest is shown", async () => {
   await page.context().close();
 });
 
-test("a pick whose deepest tile cannot be had is approximate", async () => {
+test("a pick is approximate if its deepest tile cannot be fetched", async () => {
   const name = changed("shallow", (files) => {
     for (const path of files.keys()) if (/\/(id|depth)\/3\//.test(path)) files.set(path, new Uint8Array([0]));
   });
@@ -221,7 +221,7 @@ test("a pick whose deepest tile cannot be had is approximate", async () => {
   await page.context().close();
 });
 
-test("where colour has no alpha, the id layer tells what is covered", async () => {
+test("if colour has no alpha, the id layer tells covered pixels", async () => {
   const layers = town.json.layers.map((layer) => (layer.kind === "color" ? { ...layer, format: "jpeg" } : layer));
   const name = changed("opaque", (files) => {
     for (const [path, bytes] of town.raw) {
@@ -240,7 +240,7 @@ test("where colour has no alpha, the id layer tells what is covered", async () =
   await plain.context().close();
 });
 
-test("markers are reached and chosen by keys; one is selected at a time", async () => {
+test("markers can be focused and selected by keys, one at a time", async () => {
   const { page } = await bed.start("town", { controls: false });
   await page.evaluate(([x, y, z]) => {
     const { map, map3d } = globalThis as Global;
@@ -260,7 +260,7 @@ test("markers are reached and chosen by keys; one is selected at a time", async 
   await page.context().close();
 });
 
-test("a drag that ends in motion glides on, and comes to rest", async () => {
+test("a drag that ends in motion continues with inertia and comes to rest", async () => {
   const { page } = await bed.start("town", { zoom: 4.5 });
   const at = (): Promise<number> => page.evaluate((world) => (globalThis as Global).map.project(world)?.[0] ?? 0, ORIGIN as [number, number, number]);
   await page.evaluate(() => {
@@ -286,7 +286,7 @@ test("a drag that ends in motion glides on, and comes to rest", async () => {
   await page.context().close();
 });
 
-test("objects in view are those whose ids are on the screen, by what they cover", async () => {
+test("objects in view are those with ids on the screen, sorted by area", async () => {
   const { page } = await bed.start("town");
   const whole = await page.evaluate(async () => (await (globalThis as Global).map.objectsInView()).map(({ id, share }) => ({ id, share })));
   expect(whole.map(({ id }) => id).sort((a, b) => a - b)).toEqual([3, 17, 1025, 2_000_000_001, 3_900_000_007]);
@@ -302,7 +302,7 @@ test("objects in view are those whose ids are on the screen, by what they cover"
   await page.context().close();
 });
 
-test("what is asked before the manifest is here and cannot be done is said, and the rest goes on", async () => {
+test("calls before the manifest that fail are reported, and the others run", async () => {
   const { page } = await bed.bare();
   const said = await page.evaluate((url) => new Promise<[string[], string]>((done) => {
     const g = globalThis as Global;

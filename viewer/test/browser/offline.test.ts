@@ -106,7 +106,7 @@ test.each(["town", "published"])("an area of %s: begun, gone on with, opened wit
     }
     await page.evaluate(() => { (globalThis as Global).map.setDirection("0-45").setView([690910, 5335925, 500], 3.5); });
     await expect.poll(() => page.evaluate<string[]>("errors"), { timeout: 20_000 }).not.toEqual([]);
-    expect((await page.evaluate<string[]>("errors"))[0]).toMatch(/no answer/);
+    expect((await page.evaluate<string[]>("errors"))[0]).toMatch(/no response/);
     await page.evaluate((tower) => new Promise<void>((done) => { (globalThis as Global).map.once("idle", () => { done(); }).setView([...tower], 3); }), TOWER);
     expect((await pixels(page)).equals(wanted)).toBe(true);
   });

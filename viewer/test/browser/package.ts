@@ -5,7 +5,7 @@ import { join, resolve } from "node:path";
 
 export const VIEWER = resolve(import.meta.dirname, "../..");
 
-/** A folder with the packed package in its node_modules, as an installation from a registry would leave it. */
+/** A folder with the packed package in its node_modules, as installed from a registry. */
 export class Installation {
   readonly folder = mkdtempSync(join(tmpdir(), "map3d-package-"));
   /** Paths in the package, sorted. */

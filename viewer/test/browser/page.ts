@@ -1,8 +1,8 @@
 import type { Page } from "playwright-core";
-/** Runs in the page: what the tests call. map3d is the global of dist/map3d.js. */
+/** Functions that run in the page. map3d is the global of dist/map3d.js. */
 import type * as M from "../../src/map3d";
 
-/** A bare page with the canvas of the listing. */
+/** A bare page with the canvas of README's example. */
 export const BARE = '<!doctype html><html><head><meta charset="utf-8"><title>test</title><link rel="icon" href="data:,"><link rel="stylesheet" href="/bare.css"></head><body><canvas id="mapcanvas"></canvas><script src="/map3d.js"></script></body></html>';
 
 export interface Started {
@@ -12,7 +12,7 @@ export interface Started {
 
 export type Global = typeof globalThis & Started & { errors: string[]; clicks: M.ClickEvent[]; map3d: typeof M };
 
-/** Makes a map in the bare page and waits until it rests. */
+/** Creates a map in the bare page and waits until it rests. */
 export function begin([urls, mapOptions, layerOptions]: readonly [string | string[], object, object]): Promise<void> {
   return new Promise((done) => {
     const g = globalThis as Global;
@@ -26,7 +26,7 @@ export function begin([urls, mapOptions, layerOptions]: readonly [string | strin
   });
 }
 
-/** Does something in the page and waits until the map rests again. */
+/** Runs a function in the page and waits until the map rests again. */
 export function settled<A>(page: Page, act: (argument: A) => unknown, argument: A): Promise<void> {
   return page.evaluate(([code, given]) => new Promise<void>((done) => {
     (globalThis as Global).map.once("idle", () => { done(); });
@@ -34,7 +34,7 @@ export function settled<A>(page: Page, act: (argument: A) => unknown, argument: 
   }), [`(${act.toString()})`, argument] as const);
 }
 
-/** Pixels of the canvas as RGBA bytes, from the top. */
+/** Returns the canvas's pixels as RGBA bytes, from the top. */
 export async function pixels(page: Page): Promise<Buffer> {
   const text = await page.evaluate(() => {
     const { canvas } = (globalThis as Global).map;
@@ -49,7 +49,7 @@ export async function pixels(page: Page): Promise<Buffer> {
   return Buffer.from(text, "base64");
 }
 
-/** The picture as RGBA bytes with straight alpha, from the top, whatever draws it. */
+/** Returns the picture as RGBA bytes with straight alpha, from the top, whatever the drawer. */
 export async function picture(page: Page): Promise<Buffer> {
   const text = await page.evaluate(() => {
     const { canvas } = (globalThis as Global).map;

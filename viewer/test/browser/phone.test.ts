@@ -9,18 +9,18 @@ import { BARE, picture, type Global } from "./page";
 const bed = new TestBed({ town: renderTown() });
 bed.server.pages.set("/phone", BARE.replace("<title>", '<meta name="viewport" content="width=device-width, initial-scale=1"><title>'));
 const PHONE = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 3, isMobile: true, hasTouch: true, userAgent: devices["iPhone 14"].userAgent };
-/** Times slower than this machine. */
+/** CPU slowdown. */
 const SLOW = 4;
 type Point = readonly [x: number, y: number];
 type World = [number, number, number];
 const GROUND: World = [ORIGIN[0] + 10, ORIGIN[1] + 4, ORIGIN[2]];
 const ROOF: World = [ORIGIN[0] - 45, ORIGIN[1] - 4, ORIGIN[2] + 34];
 
-/** Fingers on the screen. */
+/** Touch input. */
 class Hand {
   constructor(private readonly page: Page, private readonly session: CDPSession) {}
 
-  /** Puts fingers down, moves them through the steps a frame of a fast screen apart, and lifts them, however long the page takes. */
+  /** Puts fingers down, moves them by steps at the frame rate of a fast screen, and lifts them, however long the page takes. */
   async move(steps: readonly (readonly Point[])[]): Promise<void> {
     const [start, sent]: [number, Promise<unknown>[]] = [Date.now() / 1000, []];
     for (const [k, fingers] of [...steps, []].entries()) {
@@ -49,7 +49,7 @@ const resting = (page: Page): Promise<void> => page.evaluate(() => new Promise<v
   });
 }));
 
-test.each(["webgl", "canvas"])("%s: on a slow phone the map opens; fingers drag, fling, pinch, turn, tap and tap twice", async (drawer) => {
+test.each(["webgl", "canvas"])("%s: on a slow phone the map opens; fingers drag, fling, pinch, rotate, tap and double-tap", async (drawer) => {
   const { page, problems } = await bed.openPage(PHONE);
   await page.goto(`${bed.server.origin}/phone`);
   const session = await page.context().newCDPSession(page);
@@ -74,7 +74,7 @@ test.each(["webgl", "canvas"])("%s: on a slow phone the map opens; fingers drag,
   const dragged = await placeOf(page, GROUND);
   expect(Math.hypot(dragged[0] - from[0] - 60, dragged[1] - from[1] + 80)).toBeLessThan(1.5);
 
-  // One that is lifted in motion goes on, and ends.
+  // A finger lifted in motion: inertia, then rest.
   await hand.move(steps(8, (part) => [[300 - 120 * part, 400]]));
   const lifted = await placeOf(page, GROUND);
   await resting(page);
@@ -83,7 +83,7 @@ test.each(["webgl", "canvas"])("%s: on a slow phone the map opens; fingers drag,
   expect(flung[0] - dragged[0]).toBeLessThan(-135);
   expect(Math.abs(flung[1] - dragged[1])).toBeLessThan(2);
 
-  // Two fingers that part by twice: one level more, about what lies between them.
+  // Two fingers spread to twice the distance: one level in, about the point between them.
   await page.evaluate((at) => (globalThis as Global).map.setView(at, 2.4), GROUND);
   await resting(page);
   const [before, between] = [await zoomOf(page), await page.evaluate(() => (globalThis as Global).map.unproject([200, 420]) as World)];
@@ -93,7 +93,7 @@ test.each(["webgl", "canvas"])("%s: on a slow phone the map opens; fingers drag,
   const stayed = await placeOf(page, between);
   expect(Math.hypot(stayed[0] - 200, stayed[1] - 420)).toBeLessThan(3);
 
-  // Two fingers that turn by 40 degrees: the next direction, and back.
+  // Two fingers rotate by 40 degrees: the next direction, and back.
   const turn = (sign: number): Promise<void> => hand.move(steps(10, (part) => {
     const [dx, dy] = [80 * Math.cos(sign * part * 0.7), 80 * Math.sin(sign * part * 0.7)];
     return [[200 - dx, 420 - dy], [200 + dx, 420 + dy]];
@@ -107,7 +107,7 @@ test.each(["webgl", "canvas"])("%s: on a slow phone the map opens; fingers drag,
   expect(await direction()).toBe("0-45");
   expect(await zoomOf(page)).toBeCloseTo(before + 1, 1);
 
-  // A tap picks; two taps zoom in where they are, and pick no second time at the same place.
+  // A tap picks; a double tap zooms in there and does not pick a second time.
   await page.evaluate((at) => (globalThis as Global).map.setView(at, 2), ROOF);
   await resting(page);
   const roof = await placeOf(page, ROOF);

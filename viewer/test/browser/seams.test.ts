@@ -12,10 +12,10 @@ import { picture, settled, type Global } from "./page";
 const [TILE, ZMAX] = [64, 3];
 const ZOOMS = Array.from({ length: 20 }, (_, k) => 1.53 + 0.1737 * k);
 const VIEWPORT = { width: 240, height: 180 };
-/** Middles of the view, metres from the origin: the picture's own, and one near its left top corner. */
+/** Centres of the view, metres from the origin: the picture's own, and one near its top left corner. */
 const MIDDLES = [[1.23, 4.56, 0], [-131.7, 133.3, 0]] as const;
 
-/** Steps between neighbours, so that a pixel too many or too few is seen; a hole that holds a tile; it and the picture are soft at their edges. */
+/** Differences between neighbours reveal a missing or extra pixel; a hole contains a tile; hole and picture have soft edges. */
 const speckled: Paint = (z, x, y) => {
   const side = TILE * 2 ** z;
   const noise = (k: number): number => (Math.imul(Math.imul(x + 1, 0x9e3779b1) ^ Math.imul(y + 7 * k + 1, 0x85ebca6b), 0xc2b2ae35) >>> 24) / 255;
@@ -30,22 +30,22 @@ const levels = Array.from({ length: ZMAX + 1 }, (_, z) => stitch(fixture, z));
 const frame = makeFrame(fixture.json.views[0] as (typeof fixture.json.views)[0], fixture.json.size_m, TILE, ZMAX);
 const bed = new TestBed({ speckled: fixture });
 
-/** Ways to show the picture: that of the page's elements can only be seen, not read. */
+/** Ways to show the picture: CSS-composed elements can be seen only, not read. */
 const WAYS = {
   webgl: { drawer: "webgl" },
   canvas: { drawer: "canvas" },
-  laid: { drawer: "canvas", preserveDrawingBuffer: false, background: "transparent" },
+  css: { drawer: "canvas", preserveDrawingBuffer: false, background: "transparent" },
 } as const;
 type Way = keyof typeof WAYS;
 
 /** RGBA with straight alpha. */
 async function seen(page: Page, way: Way): Promise<Buffer> {
-  if (way !== "laid") return picture(page);
+  if (way !== "css") return picture(page);
   const { channels, data } = await decoded(await page.screenshot({ omitBackground: true }));
   return channels === 4 ? Buffer.from(data) : Buffer.from(Array.from({ length: (4 * data.length) / 3 }, (_, k) => (k % 4 === 3 ? 255 : (data[3 * (k >> 2) + (k % 4)] ?? 0))));
 }
 
-/** How far the map is from the stitched level, at a zoom and a middle. */
+/** Measures how far the map is from the stitched level at a zoom and a centre. */
 async function errorsAt(page: Page, way: Way, dpr: number, zoom: number, middle: readonly number[]): Promise<Errors> {
   await settled(page, ([to, [x, y, z]]) => {
     const { map, layer } = globalThis as Global;
@@ -60,10 +60,10 @@ async function errorsAt(page: Page, way: Way, dpr: number, zoom: number, middle:
 
 const start = (way: Way, dpr: number): ReturnType<TestBed["start"]> => bed.start("speckled", { ...WAYS[way], light: { lit: false }, controls: false, attribution: false }, {}, { viewport: VIEWPORT, deviceScaleFactor: dpr });
 
-/** Levels of 255 that a premultiplied byte may be off: rounding and the shader's snap to pixels; the canvas mixes bytes, with weights of a few bits. */
-const TOLERANCE = { webgl: 1.5, canvas: 4, laid: 4 } as const satisfies Record<Way, number>;
+/** Tolerance of a premultiplied byte: rounding and the shader's snapping to pixels; the canvas interpolates bytes, with weights of a few bits. */
+const TOLERANCE = { webgl: 1.5, canvas: 4, css: 4 } as const satisfies Record<Way, number>;
 
-test.each((["webgl", "canvas", "laid"] as const).flatMap((way) => [1, 1.5, 3].map((dpr) => [way, dpr] as const)))("%s at pixel ratio %d: at twenty zooms the map is the stitched level, tile edges and all", async (way, dpr) => {
+test.each((["webgl", "canvas", "css"] as const).flatMap((way) => [1, 1.5, 3].map((dpr) => [way, dpr] as const)))("%s at pixel ratio %d: at twenty zooms the map equals the stitched level, including tile edges", async (way, dpr) => {
   const { page, problems } = await start(way, dpr);
   let [edges, elsewhere] = [0, 0];
   for (const [k, zoom] of ZOOMS.entries()) {
@@ -77,7 +77,7 @@ test.each((["webgl", "canvas", "laid"] as const).flatMap((way) => [1, 1.5, 3].ma
   await page.context().close();
 });
 
-/** Faults that the test above has to see: what they do to the browser, and how far off that makes the map at least. */
+/** Faults that the test above must detect: what they do to the browser, and how far off the map is then at least. */
 const faults = {
   "quads a device pixel short": ["webgl", 80, () => {
     const set = Object.getOwnPropertyDescriptor(WebGL2RenderingContext.prototype, "uniform4f")?.value as (this: WebGL2RenderingContext, ...given: unknown[]) => void;
@@ -103,8 +103,8 @@ const faults = {
   }],
 } as const satisfies Record<string, readonly [Way, number, () => void]>;
 
-describe("a fault is seen, and seen at tile edges alone", () => {
-  const each = Object.entries(faults).flatMap(([name, [drawer, least, breakIt]]) => (drawer === "canvas" ? ["canvas", "laid"] as const : [drawer]).flatMap((way) => [1, 3].map((dpr) => [name, way, dpr, least, breakIt] as const)));
+describe("a fault is detected, and at tile edges only", () => {
+  const each = Object.entries(faults).flatMap(([name, [drawer, least, breakIt]]) => (drawer === "canvas" ? ["canvas", "css"] as const : [drawer]).flatMap((way) => [1, 3].map((dpr) => [name, way, dpr, least, breakIt] as const)));
   test.each(each)("%s, %s, pixel ratio %d", async (_, way, dpr, least, breakIt) => {
     const { page } = await start(way, dpr);
     await page.evaluate(breakIt);

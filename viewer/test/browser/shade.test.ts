@@ -14,7 +14,7 @@ import { picture, settled, type Global } from "./page";
 const town = renderTown();
 const bed = new TestBed({ town, baked: withBakedLight(town) });
 const [WIDTH, HEIGHT] = [600, 480];
-/** From the left, so that shadows lie beside what casts them; white light from one side alone, and from everywhere alone. */
+/** Light from the left, so that shadows fall beside their casters; sunlight only, and skylight only. */
 const SUN = { azimuth_deg: 280, altitude_deg: 38, ambient: 0.1, diffuse: 0.9, occlusion: false };
 const SKY = { ambient: 1, diffuse: 0, shadows: false };
 const OPTIONS = { center: [ORIGIN[0] - 5, ORIGIN[1], ORIGIN[2]], zoom: 3, direction: "0-45" };
@@ -35,17 +35,17 @@ async function start(options: object, rendering = "town", context: object = VIEW
   return opened;
 }
 
-/** U and V of a CSS pixel's middle. */
+/** U and V of a CSS pixel's centre. */
 async function gridOf(page: Page): Promise<(x: number, y: number) => [number, number]> {
   const [corner, px] = await page.evaluate((origin) => [(globalThis as Global).map.project(origin), (globalThis as Global).map.metresPerPixel] as const, ORIGIN);
   const [x0, y0] = corner as [number, number];
   return (x, y) => [(x + 0.5 - x0) * px, (y0 - y - 0.5) * px];
 }
 
-/** What is seen, and the points around it: local. */
+/** The visible point and the points around it, local. */
 const pointOf = ({ d }: Hit, [u, v]: readonly [number, number]): Vec3 => localFromUvd(frame.axes, [u, v, frame.d0 + d]);
 
-/** Is the sun seen from there, past all boxes? */
+/** Whether the sun is visible from a point, past all boxes. */
 function seesSun(point: Vec3): boolean {
   const axes = computeAxes((540 - SUN.azimuth_deg) % 360, SUN.altitude_deg);
   const sunny: Frame = { ...frame, axes, d0: -2000 };
@@ -54,7 +54,7 @@ function seesSun(point: Vec3): boolean {
   return first === null || first.d + sunny.d0 > d - 0.05;
 }
 
-test("shadows that are found lie where rays to the sun are stopped, for what the picture shows", async () => {
+test("estimated shadows match rays to the sun for all visible points", async () => {
   expect(dot(computeAxes((540 - SUN.azimuth_deg) % 360, SUN.altitude_deg).forward, towardsLight(SUN))).toBeCloseTo(-1, 9);
   const { page, problems } = await start({ light: SUN });
   const bright = await picture(page);
@@ -70,7 +70,7 @@ test("shadows that are found lie where rays to the sun are stopped, for what the
         return hit && { name: `${String(hit.id)} ${String(hit.normal)}`, normal: hit.normal, open: seesSun(pointOf(hit, uv)) };
       });
       const [here] = seen;
-      // Beside an edge, or one of a shadow, a pixel may be either.
+      // At an edge, or the edge of a shadow, a pixel may be either.
       if (!here || dot(here.normal, towardsLight(SUN)) < 0.1 || seen.some((other) => other?.name !== here.name || other.open !== here.open)) continue;
       const dimmed = (dim[4 * (WIDTH * y + x)] ?? 0) < 0.75 * (bright[4 * (WIDTH * y + x)] ?? 0);
       counts[here.open ? (dimmed ? "falsely" : "lit") : dimmed ? "shadow" : "missed"]++;
@@ -84,7 +84,7 @@ test("shadows that are found lie where rays to the sun are stopped, for what the
   await page.context().close();
 });
 
-test("occlusion darkens the ground at the foot of a wall, fading away from it, and leaves roofs and open ground as they are", async () => {
+test("occlusion darkens the ground at the foot of a wall, fades with distance, and leaves roofs and open ground unchanged", async () => {
   const { page } = await start({ light: SKY });
   const bright = await picture(page);
   await settled(page, addShade, {});
@@ -95,7 +95,7 @@ test("occlusion darkens the ground at the foot of a wall, fading away from it, a
     const at = 4 * (WIDTH * Math.round(y) + Math.round(x));
     return (dim[at] ?? 0) / (bright[at] ?? 1);
   };
-  // The town hall's wall towards the viewer stands on y = −22.
+  // The town hall's front wall is at y = −22.
   const [foot, near, open, roof] = await Promise.all([[-45, -23.5, 0], [-45, -32, 0], [-45, -60, 0], [-45, -4, 34]].map((point) => shareAt(point as unknown as Vec3)));
   expect(foot).toBeLessThan(0.88);
   expect(near).toBeGreaterThan((foot ?? 1) + 0.03);
@@ -104,7 +104,7 @@ test("occlusion darkens the ground at the foot of a wall, fading away from it, a
   await page.context().close();
 });
 
-test("after a movement the picture is that of a map opened there; it comes to rest; taken off, nothing is left", async () => {
+test("after a movement the picture equals that of a map opened there and rests; removal leaves nothing behind", async () => {
   const { page } = await start({ light: SUN });
   const bare = await picture(page);
   await settled(page, addShade, {});

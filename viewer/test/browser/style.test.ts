@@ -15,7 +15,7 @@ const VIEWPORT = { viewport: { width: 500, height: 400 } };
 
 type Bytes = readonly number[];
 const grey = ([r = 0, g = 0, b = 0]: Bytes): number => 0.2126 * r + 0.7152 * g + 0.0722 * b;
-/** What becomes of a pixel's colour, by the object's id. */
+/** The styled colour of a pixel, by object id. */
 const expected: Record<number, (color: Bytes) => Bytes> = {
   [HALL]: (color) => [19, 137, 160].map((paint, k) => 0.15 * (color[k] ?? 0) + 0.85 * paint),
   [SCHOOL]: (color) => color.slice(0, 3),
@@ -26,7 +26,7 @@ const expected: Record<number, (color: Bytes) => Bytes> = {
 const style = ([hall, school, tower]: readonly number[]): unknown =>
   (globalThis as Global).layer.setStyle({ colors: new Map([[hall as number, "#1389a0"]]), only: [hall as number, school as number], hidden: [tower as number] });
 
-test.each(["webgl", "canvas"])("%s: every pixel has the finish of its object, and all comes back", async (drawer) => {
+test.each(["webgl", "canvas"])("%s: every pixel has the style of its object, and a reset restores all", async (drawer) => {
   const { page, problems } = await bed.start("town", { zoom: 3, drawer, light: { lit: false } }, {}, VIEWPORT);
   const before = await picture(page);
   await settled(page, style, [HALL, SCHOOL, TOWER]);
@@ -53,7 +53,7 @@ test.each(["webgl", "canvas"])("%s: every pixel has the finish of its object, an
   await page.context().close();
 });
 
-test("lit, both drawers show the same", async () => {
+test("both drawers show the same when lit", async () => {
   const shots: Buffer[] = [];
   for (const drawer of ["webgl", "canvas"]) {
     const { page } = await bed.start("town", { zoom: 3, drawer }, {}, VIEWPORT);
@@ -71,7 +71,7 @@ test("lit, both drawers show the same", async () => {
   expect(a.length).toBe(b.length);
 });
 
-test("what is hidden is not picked, and does not count as seen", async () => {
+test("hidden objects are neither picked nor listed as visible", async () => {
   const { page } = await bed.start("town", { zoom: 3 });
   const top = [ORIGIN[0] + 32, ORIGIN[1] + 26, ORIGIN[2] + 62] as const;
   const idAt = (): Promise<number> => page.evaluate(async (world) => {
@@ -87,7 +87,7 @@ test("what is hidden is not picked, and does not count as seen", async () => {
   await page.context().close();
 });
 
-test("attributes come by column", async () => {
+test("attributes are read by column", async () => {
   const { page } = await bed.start("town");
   const found = await page.evaluate(async () => {
     const { layer } = globalThis as Global;
@@ -102,7 +102,7 @@ test("attributes come by column", async () => {
   await page.context().close();
 });
 
-test("a theme colours, filters by its legend, and leaves all as it was; an unknown attribute is an error", async () => {
+test("a theme colours objects, filters by its legend, and restores all; an unknown attribute is an error", async () => {
   const { page, problems } = await bed.start("town", { zoom: 3 }, {}, VIEWPORT);
   const before = await picture(page);
   await page.addScriptTag({ url: "/map3d-theme.js" });

@@ -12,7 +12,7 @@ import { renderTown, type Fixture } from "../fixture/rendering";
 import { BOX, framesOf, ORIGIN, PLACE, THINGS, TOWN, trace, type Thing } from "../fixture/town";
 import { TestBed } from "./bed";
 import { OUT } from "./browser";
-import { decoded, Hand, MOST } from "./hand";
+import { decoded, Hand, MAX_ACTIONS } from "./hand";
 
 // What people do with a city model on a phone: each in three actions after opening at most.
 const [WIDTH, HEIGHT, DENSITY, PIXEL_M] = [390, 844, 3, 0.38];
@@ -285,7 +285,7 @@ test("print, and save a picture", async () => {
 
 test("a fourth action fails", async () => {
   const opened = await open();
-  for (let k = 0; k < MOST; k++) await opened.hand.key("Tab");
+  for (let k = 0; k < MAX_ACTIONS; k++) await opened.hand.key("Tab");
   expect(() => opened.hand.key("Tab")).toThrow("4 actions");
   await end(opened, "fourth");
 });

@@ -7,7 +7,7 @@ import { TestBed } from "./bed";
 import { OUT } from "./browser";
 import { picture, settled, type Global } from "./page";
 
-/** A house that is planned, with an origin and a resolution of its own: in front of some things, behind others, on the town's ground. */
+/** A planned house with its own origin and resolution: in front of some objects, behind others, on the town's ground. */
 const SHIFT = [13.7, -8.3, 1.5] as const;
 const HOUSE: Thing = { id: 77, name: "Planned house", box: [[-130, -20, -3], [6, 30, 26]], wall: [240, 120, 30], roof: [250, 60, 60] };
 const PLAN: Place = { name: "plan", origin: [ORIGIN[0] + SHIFT[0], ORIGIN[1] + SHIFT[1], ORIGIN[2] + SHIFT[2]], box: [[-130, -30, -3], [20, 40, 30]], things: [HOUSE] };
@@ -23,7 +23,7 @@ const frameIn = ({ json }: Fixture, id = "0-45"): Frame => makeFrame(json.views.
 const [townFrame, planFrame] = [frameIn(town), frameIn(plan)];
 const [du, dv, dd] = uvdFromLocal(townFrame.axes, SHIFT);
 
-/** D of the town and of the house, and what is there, on the ray through U and V of the town. */
+/** D and colours of the town and of the house on the ray through U and V of the town. */
 function hits(u: number, v: number): { town: Hit | null; house: Hit | null; far: [number, number] } {
   const [first, second] = [trace(townFrame, u, v), trace(planFrame, u - du, v - dv, [HOUSE])];
   return { town: first, house: second, far: [first ? first.d + townFrame.d0 : Infinity, second ? second.d + planFrame.d0 + dd : Infinity] };
@@ -34,7 +34,7 @@ const addPlan = ([url, options]: readonly [string, object]): unknown => {
   return (g.plan = new g.map3d.imageLayer(url, options).addTo(g.map));
 };
 
-/** Colours that are seen where the rays of a pixel and of those around it meet the same things in the same order. */
+/** The visible colours where the rays of a pixel and of its neighbours hit the same objects in the same order. */
 async function judged(page: Parameters<typeof picture>[0], opacity: number): Promise<{ wrong: string[]; counts: Record<string, number> }> {
   const [shot, corner, px] = [await picture(page), await page.evaluate(() => (globalThis as Global).map.project([691000, 5336000, 500])), await page.evaluate(() => (globalThis as Global).map.metresPerPixel)];
   const [x0, y0] = corner as [number, number];
@@ -52,7 +52,7 @@ async function judged(page: Parameters<typeof picture>[0], opacity: number): Pro
       else if (first ?? second) counts[first ? "townAlone" : "houseAlone"] = (counts[first ? "townAlone" : "houseAlone"] ?? 0) + 1;
       const got = [...shot.subarray(4 * (500 * y + x), 4 * (500 * y + x) + 4)];
       const plain = (hit: Hit | null): number[] => [...(hit?.color ?? [0, 0, 0]), hit ? 255 : 0];
-      // The house is flat in colour but for its windows and stripes; so are the town's things.
+      // The house has flat colours except for windows and stripes, and so have the town's objects.
       const over = opacity === 1 ? plain(second) : plain(second).map((byte, k) => byte * opacity + (plain(first)[k] ?? 0) * (1 - opacity));
       const want = front ? (first || opacity === 1 ? over : [...plain(second).slice(0, 3), 255 * opacity]) : plain(first);
       if (want.some((byte, k) => Math.abs(byte - (got[k] ?? 0)) > 12) && !nearWindow(all)) wrong.push(`${String(x)}, ${String(y)}: ${got.join(" ")} for ${want.map(Math.round).join(" ")}`);
@@ -65,7 +65,7 @@ async function judged(page: Parameters<typeof picture>[0], opacity: number): Pro
 const nearWindow = (all: readonly ReturnType<typeof hits>[]): boolean =>
   new Set(all.map(({ house }) => String(house?.color.map((byte) => byte >> 4)))).size > 1 || new Set(all.map(({ town: hit }) => String(hit?.color.map((byte) => byte >> 4)))).size > 1;
 
-test.each(["webgl", "canvas"])("%s: of two renderings with origins and resolutions of their own, what is nearer is seen", async (drawer) => {
+test.each(["webgl", "canvas"])("%s: of two renderings with different origins and resolutions, the nearer surface is visible", async (drawer) => {
   const { page, problems } = await bed.start("town", { ...OPTIONS, drawer }, {}, VIEWPORT);
   await page.evaluate(addPlan, [bed.url("plan"), {}] as const);
   await page.waitForFunction(() => (globalThis as unknown as { plan: Global["layer"] }).plan.rendering);
@@ -82,7 +82,7 @@ test.each(["webgl", "canvas"])("%s: of two renderings with origins and resolutio
   await page.context().close();
 });
 
-test("what is picked is what is seen; a clip shows a layer in a part of the map only", async () => {
+test("picks match the visible surface; a clip shows a layer in a part of the map only", async () => {
   const { page, problems } = await bed.start("town", OPTIONS, {}, VIEWPORT);
   await settled(page, addPlan, [bed.url("plan"), {}] as const);
   const pickAt = (world: readonly number[]): Promise<unknown[]> => page.evaluate(async (at) => {
@@ -93,7 +93,7 @@ test("what is picked is what is seen; a clip shows a layer in a part of the map 
   }, world);
   const inTown = (x: number, y: number, z: number): number[] => [ORIGIN[0] + x, ORIGIN[1] + y, ORIGIN[2] + z];
   const near = [true, true, true];
-  // The planned house's roof; the town hall's roof, which hides a part of it; the chapel's roof, a part of which it hides.
+  // The planned house's roof; the town hall's roof, which hides part of it; the chapel's roof, part of which it hides.
   expect(await pickAt(inTown(-8, 5, 27.5))).toEqual([77, "plan", near, true]);
   expect(await pickAt(inTown(-45, 0, 34))).toEqual([17, "town", near, true]);
   const chapel = inTown(-28, 50, 20);
@@ -105,7 +105,7 @@ test("what is picked is what is seen; a clip shows a layer in a part of the map 
   await page.context().close();
 });
 
-test("a rendering in another CRS is refused by name, and the first one stays", async () => {
+test("a rendering in another CRS is refused with a reason, and the first one stays", async () => {
   const { page } = await bed.start("town", OPTIONS, {}, VIEWPORT);
   const before = await picture(page);
   await page.evaluate(addPlan, [bed.url("abroad"), {}] as const);

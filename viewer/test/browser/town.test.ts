@@ -10,7 +10,7 @@ const town = renderTown();
 
 const bed = new TestBed({ town });
 
-/** A page with a map of the town that rests. */
+/** A page with a map of the town at rest. */
 const started = (options: object = {}, layer: object = {}, name = "town"): ReturnType<TestBed["start"]> => bed.start(name, options, layer);
 
 test("the first complete view is drawn without an error", async () => {
@@ -29,7 +29,7 @@ test("the first complete view is drawn without an error", async () => {
   await page.context().close();
 });
 
-test("the listing runs as it stands; markers stand at their 3D positions", async () => {
+test("README's example runs unchanged; markers are at their 3D positions", async () => {
   const { page, problems } = await bed.bare();
   const found = await page.evaluate(async (base) => {
     const { map3d } = globalThis as Global;
@@ -68,7 +68,7 @@ test("a click on a known object gives its id, its name and a position within a p
   await page.context().close();
 });
 
-test("a click on nothing says so", async () => {
+test("a click on nothing reports id 0", async () => {
   const { page } = await started();
   await page.mouse.click(5, 5);
   await page.waitForFunction(() => (globalThis as Global).clicks.length > 0);
@@ -76,7 +76,7 @@ test("a click on nothing says so", async () => {
   await page.context().close();
 });
 
-test("without light, colour bytes come out as they are stored", async () => {
+test("without light, colours are shown exactly as stored", async () => {
   const { page } = await started({ zoom: 3, light: { lit: false } });
   const got = await pixels(page);
   const stored = decodedLevel(town, "color");
@@ -94,7 +94,7 @@ test("without light, colour bytes come out as they are stored", async () => {
   await page.context().close();
 });
 
-test("each pixel is lit as Lambert says, in linear light, half by its own normal and an eighth by each neighbour's", async () => {
+test("each pixel is lit by Lambert's law in linear light, half by its own normal and an eighth by each neighbour's", async () => {
   const light = { azimuth_deg: 200, altitude_deg: 30, ambient: 0.2, diffuse: 0.6 };
   const { page } = await started({ zoom: 3, light });
   const got = await pixels(page);
@@ -165,7 +165,7 @@ test("random data tiles arrive bit for bit", async () => {
   await page.context().close();
 });
 
-test("on the GPU, too, every random id is itself: highlighting a hundred changes a hundred texels", async () => {
+test("random ids are exact on the GPU: highlighting a hundred changes a hundred texels", async () => {
   const noise = renderNoise(9);
   bed.server.renderings.set("noise2", noise);
   const { page } = await started({ zoom: 2 }, {}, "noise2");
@@ -197,7 +197,7 @@ test("idle means no requests and no frames", async () => {
   await page.context().close();
 });
 
-test("only occupied tiles are asked for, with the version of their block", async () => {
+test("only occupied tiles are requested, with the version of their block", async () => {
   bed.server.requests.length = 0;
   const { page } = await started({ zoom: 3 });
   const tiles = bed.server.requests.filter((url) => url.startsWith("/tiles/town/0-45/"));
@@ -210,7 +210,7 @@ test("only occupied tiles are asked for, with the version of their block", async
   await page.context().close();
 });
 
-test("a change of direction keeps the point in the middle, and highlights", async () => {
+test("a change of view keeps the point at the centre and the highlights", async () => {
   const { page } = await started({ zoom: 3, hover: true });
   const kept = await page.evaluate(async () => {
     const { map, layer } = globalThis as Global;
@@ -225,7 +225,7 @@ test("a change of direction keeps the point in the middle, and highlights", asyn
     return { before, after, x, y, highlighted: layer.highlighted, direction: map.direction };
   });
   await page.screenshot({ path: `${OUT}/turned.png` });
-  // The pick has brought the depth under the middle, so the roof itself stays there.
+  // The pick has loaded the depth at the centre, so the roof itself stays there.
   expect(kept.direction).toBe("90-45");
   expect(kept.highlighted).toEqual([17]);
   expect(Math.hypot(kept.x - 400, kept.y - 300)).toBeLessThan(1.5);
@@ -233,7 +233,7 @@ test("a change of direction keeps the point in the middle, and highlights", asyn
   await page.context().close();
 });
 
-test("a server that fails for a while costs time, not tiles", async () => {
+test("a server that fails for a while delays tiles but loses none", async () => {
   bed.server.failures.set("/tiles/town/0-45/normal", 6);
   const { page } = await started();
   expect(await page.evaluate(() => (globalThis as Global).errors)).toEqual([]);
@@ -241,7 +241,7 @@ test("a server that fails for a while costs time, not tiles", async () => {
   await page.context().close();
 });
 
-test("a lost WebGL context comes back with the same picture", async () => {
+test("a restored WebGL context shows the same picture", async () => {
   const { page } = await started();
   const before = await pixels(page);
   await page.evaluate(async () => {
@@ -282,7 +282,7 @@ test("dragging moves the ground with the pointer; the wheel zooms about it", asy
   await page.context().close();
 });
 
-test("without WebGL2 the map says so in an event and in the page", async () => {
+test("without WebGL2 the map reports it in an event and in the page", async () => {
   const { page } = await bed.bare();
   const message = await page.evaluate(() => new Promise<string>((done) => {
     HTMLCanvasElement.prototype.getContext = () => null;

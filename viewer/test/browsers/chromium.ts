@@ -2,7 +2,7 @@ import type { Browser, Page } from "playwright-core";
 import { openBrowser, openPage } from "../browser/browser";
 import { Driver } from "./driver";
 
-/** Chromium, of which the others' pictures are to be the same. Its input is not used. */
+/** Chromium, whose pictures are the reference. It accepts no input. */
 export class Chromium extends Driver {
   private constructor(private readonly browser: Browser, private readonly page: Page, readonly complaints: readonly string[]) {
     super();

@@ -1,20 +1,20 @@
 import { spawn, type ChildProcess, type SpawnOptions } from "node:child_process";
 
-/** Starts a program and reads what it prints until that holds a text. @param fd where it prints: 1, 2, or a further one  @throws Error when it ends before, or after 30 seconds */
+/** Starts a program and reads its output until it matches. @param fd the output: 1, 2, or another one  @throws Error when it ends before, or after 30 seconds */
 export async function startUntil(program: string, args: readonly string[], env: Record<string, string>, fd: 1 | 2 | 3, text: RegExp): Promise<{ child: ChildProcess; found: string }> {
   const stdio: SpawnOptions["stdio"] = [0, 1, 2, 3].map((other) => (other === fd ? "pipe" : "ignore"));
   const child = spawn(program, args, { stdio, env: { ...process.env, ...env } });
   const found = await new Promise<string>((done, fail) => {
-    let said = "";
-    const late = setTimeout(() => { fail(new Error(`${program} did not start in 30 seconds; it said: ${said}`)); }, 30_000);
+    let output = "";
+    const late = setTimeout(() => { fail(new Error(`${program} did not start in 30 seconds; output: ${output}`)); }, 30_000);
     child.stdio[fd]?.on("data", (bytes: Buffer) => {
-      said += bytes.toString();
-      const match = text.exec(said)?.[1];
+      output += bytes.toString();
+      const match = text.exec(output)?.[1];
       if (match === undefined) return;
       clearTimeout(late);
       done(match);
     });
-    child.once("error", fail).once("exit", (code) => { fail(new Error(`${program} ended with ${String(code)}; it said: ${said}`)); });
+    child.once("error", fail).once("exit", (code) => { fail(new Error(`${program} ended with ${String(code)}; output: ${output}`)); });
   });
   return { child, found };
 }
@@ -28,7 +28,7 @@ export async function stop(child: ChildProcess): Promise<void> {
   clearTimeout(late);
 }
 
-/** A screen in memory. */
+/** A virtual screen. */
 export class Display {
   private constructor(readonly name: string, private readonly child: ChildProcess) {}
 

@@ -1,14 +1,14 @@
 import { decodePng } from "../../src/tiles/png";
 
-/** A source of input and what it does, as WebDriver and WebDriver BiDi both have it. */
+/** An input source and its actions, as in WebDriver and WebDriver BiDi. */
 export type Input =
   | { readonly type: "pointer"; readonly id: string; readonly parameters: { readonly pointerType: "mouse" }; readonly actions: readonly object[] }
   | { readonly type: "wheel" | "key"; readonly id: string; readonly actions: readonly object[] };
 
 type Point = readonly [x: number, y: number];
 
-/** RGB bytes, from the top left corner of the page. */
-export interface Shot {
+/** A screenshot: RGB bytes from the page's top left corner. */
+export interface Screenshot {
   readonly width: number;
   readonly height: number;
   readonly rgb: Uint8Array;
@@ -19,7 +19,7 @@ export interface Shot {
 export abstract class Driver {
   abstract open(url: string): Promise<void>;
   abstract perform(inputs: readonly Input[]): Promise<void>;
-  /** What an expression in the page comes to, as JSON; promises are waited for. */
+  /** Evaluates an expression in the page to JSON; awaits promises. */
   abstract run(expression: string): Promise<unknown>;
   abstract close(): Promise<void>;
   protected abstract capture(): Promise<Buffer>;
@@ -28,22 +28,22 @@ export abstract class Driver {
     return (await this.run(`(${act.toString()})(${JSON.stringify(argument)})`)) as Awaited<R>;
   }
 
-  /** Does something in the page and waits until the map rests again. */
+  /** Runs code in the page and waits until the map rests again. */
   async settled<A>(act: (argument: A) => unknown, argument: A): Promise<void> {
     await this.run(`new Promise((done) => { map.once("idle", () => { done(null); }); (${act.toString()})(${JSON.stringify(argument)}); })`);
   }
 
-  /** Waits until something is so. @throws Error after 20 seconds */
+  /** Waits until an expression is true. @throws Error after 20 seconds */
   async until<A>(test: (argument: A) => boolean, argument: A): Promise<void> {
     const end = Date.now() + 20_000;
     while (Date.now() < end) {
       if (await this.evaluate(test, argument)) return;
       await pause(50);
     }
-    throw new Error(`not so after 20 seconds: ${test.toString()}`);
+    throw new Error(`still false after 20 seconds: ${test.toString()}`);
   }
 
-  async shot(): Promise<Shot> {
+  async shot(): Promise<Screenshot> {
     const png = await this.capture();
     const { width, height, channels, data } = await decodePng(new Uint8Array(png));
     const rgb = new Uint8Array(3 * width * height);
@@ -55,7 +55,7 @@ export abstract class Driver {
     await this.#mouse([moveTo(at), DOWN, UP]);
   }
 
-  /** Rests before the button is let go, so that nothing glides on. */
+  /** Rests before it releases the button, to avoid inertia. */
   async drag([x, y]: Point, by: Point): Promise<void> {
     const steps = [0.25, 0.5, 0.75, 1].map((part) => moveTo([x + part * by[0], y + part * by[1]], 30));
     await this.#mouse([moveTo([x, y]), DOWN, ...steps, { type: "pause", duration: 200 }, UP]);

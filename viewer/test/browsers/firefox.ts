@@ -8,7 +8,7 @@ import { Driver, type Input } from "./driver";
 
 export const FIREFOX = process.env["FIREFOX"] ?? "/usr/bin/firefox-esr";
 
-/** Quiet, and nothing asked of the network. */
+/** Preferences: quiet, and no network requests. */
 const PREFERENCES = {
   "app.update.enabled": false, "browser.aboutwelcome.enabled": false, "browser.safebrowsing.malware.enabled": false, "browser.safebrowsing.phishing.enabled": false, "browser.shell.checkDefaultBrowser": false,
   "browser.startup.homepage_override.mstone": "ignore", "datareporting.policy.dataSubmissionEnabled": false, "extensions.update.enabled": false, "network.captive-portal-service.enabled": false,
@@ -26,7 +26,7 @@ interface Message {
 
 /** Firefox over WebDriver BiDi. */
 export class Firefox extends Driver {
-  /** What its console complained of. */
+  /** Errors in its console. */
   readonly complaints: string[] = [];
   readonly #waiting = new Map<number, (message: Message) => void>();
   #context = "";

@@ -5,12 +5,12 @@ import { serve } from "../browser/bed";
 import { begin, type Global } from "../browser/page";
 import { renderNoise, renderTown } from "../fixture/rendering";
 import { ORIGIN, type Place } from "../fixture/town";
-import { OTHERS } from "./browsers";
+import { OTHER_BROWSERS } from "./browsers";
 import { Chromium } from "./chromium";
 import { Display } from "./display";
-import type { Driver, Shot } from "./driver";
+import type { Driver, Screenshot } from "./driver";
 import { HEIGHT, WIDTH, watchedPage, type Watched } from "./page";
-import { difference, shots } from "./scenes";
+import { difference, takeScreenshots } from "./scenes";
 
 const PLAN: Place = { name: "plan", origin: [ORIGIN[0] + 13.7, ORIGIN[1] - 8.3, ORIGIN[2] + 1.5], box: [[-130, -30, -3], [20, 40, 30]], things: [{ id: 77, name: "Planned house", box: [[-130, -20, -3], [6, 30, 26]], wall: [240, 120, 30], roof: [250, 60, 60] }] };
 const [town, noise] = [renderTown(), renderNoise(11)];
@@ -32,24 +32,24 @@ async function started(driver: Driver, rendering: string, options: object): Prom
 const told = (driver: Driver): Promise<string[]> => driver.evaluate(() => [...(globalThis as Watched).problems, ...(globalThis as Global).errors], null);
 const at = (driver: Driver, world: readonly [number, number, number]): Promise<[number, number]> => driver.evaluate((point) => (globalThis as Global).map.project(point) as [number, number], world);
 
-/** Chromium's pictures, by drawer. */
-const wanted = new Map<string, Map<string, Shot>>();
+/** Chromium's pictures by drawer. */
+const wanted = new Map<string, Map<string, Screenshot>>();
 let display: Display | undefined;
 
 beforeAll(async () => {
-  for (const { name, missing } of OTHERS) if (missing !== null) console.warn(`not tested in ${name}: ${missing}`);
-  if (OTHERS.every(({ missing }) => missing !== null)) return;
+  for (const { name, missing } of OTHER_BROWSERS) if (missing !== null) console.warn(`not tested in ${name}: ${missing}`);
+  if (OTHER_BROWSERS.every(({ missing }) => missing !== null)) return;
   display = await Display.open();
   const chromium = await Chromium.start();
   for (const drawer of DRAWERS) {
     await started(chromium, "town", { drawer });
-    wanted.set(drawer, await shots(chromium, url("plan")));
+    wanted.set(drawer, await takeScreenshots(chromium, url("plan")));
   }
   await chromium.close();
 });
 afterAll(() => display?.close());
 
-for (const { name, perturbs, start, missing } of OTHERS) {
+for (const { name, perturbs, start, missing } of OTHER_BROWSERS) {
   describe.skipIf(missing !== null)(name, () => {
     let driver: Awaited<ReturnType<typeof start>> | undefined;
     const its = (): NonNullable<typeof driver> => driver as NonNullable<typeof driver>;
@@ -57,12 +57,12 @@ for (const { name, perturbs, start, missing } of OTHERS) {
     beforeAll(async () => { driver = await start(display as Display); });
     afterAll(() => driver?.close());
 
-    test.each(DRAWERS)("%s: what is shown is what Chromium shows", async (drawer) => {
+    test.each(DRAWERS)("%s: pictures match Chromium's", async (drawer) => {
       await started(its(), "town", { drawer });
       expect(await its().evaluate(() => (globalThis as Global).map.drawer, null)).toBe(drawer);
-      for (const [scene, shot] of await shots(its(), url("plan"))) {
+      for (const [scene, shot] of await takeScreenshots(its(), url("plan"))) {
         writeFileSync(`${OUT}/${name.toLowerCase().replaceAll(" ", "-")}-${drawer}-${scene.replaceAll(" ", "-")}.png`, shot.png);
-        const found = difference(shot, wanted.get(drawer)?.get(scene) as Shot);
+        const found = difference(shot, wanted.get(drawer)?.get(scene) as Screenshot);
         const { most, off } = TOLERANCE[drawer === "webgl" ? "webgl" : toleranceOf(scene, perturbs)];
         expect(found.most, scene).toBeLessThanOrEqual(most);
         expect(found.off, scene).toBeLessThanOrEqual(off);
@@ -87,7 +87,7 @@ for (const { name, perturbs, start, missing } of OTHERS) {
       expect(got.depths.findIndex((depth, k) => depth !== noise.depths[k])).toBe(-1);
     });
 
-    test.skipIf(!perturbs)("pixels that are read from a canvas are not those that were drawn: else this would test nothing", async () => {
+    test.skipIf(!perturbs)("pixels read from a canvas differ from those drawn, or the test would be void", async () => {
       const same = await its().evaluate(() => {
         const context = new OffscreenCanvas(64, 64).getContext("2d") as OffscreenCanvasRenderingContext2D;
         const drawn = new ImageData(Uint8ClampedArray.from({ length: 4 * 64 * 64 }, (_, k) => (k % 4 === 3 ? 255 : (k * 37) & 255)), 64, 64);
@@ -97,7 +97,7 @@ for (const { name, perturbs, start, missing } of OTHERS) {
       expect(same).toBe(false);
     });
 
-    test.each(DRAWERS)("%s: hands and keys move the map; a click picks", async (drawer) => {
+    test.each(DRAWERS)("%s: mouse and keys move the map; a click picks", async (drawer) => {
       await started(its(), "town", { drawer, zoom: 2 });
       const first = await at(its(), ROOF);
       await its().drag(first, [60, -40]);
@@ -123,7 +123,7 @@ for (const { name, perturbs, start, missing } of OTHERS) {
       expect(await complaints()).toEqual([]);
     });
 
-    test("a marker stands where it belongs, and its popup opens; buttons stand within the map", async () => {
+    test("a marker is at its position, and its popup opens; buttons are inside the map", async () => {
       await started(its(), "town", { zoom: 2, controls: true, attribution: true });
       await its().settled((world) => {
         const { map, map3d } = globalThis as Global;
@@ -149,9 +149,9 @@ for (const { name, perturbs, start, missing } of OTHERS) {
 }
 
 /**
- * From Chromium's pictures, of 255, and the share of pixels that differ by more than 2. Measured: WebGL 1; a canvas 0 where a tile pixel is a device
- * pixel, else up to 19 at edges on 1.3 % of the pixels, since browsers scale pictures with weights of their own; where light is composited, 4 on 4.2 %, with
- * both 18 on 23 %.
+ * Maximum difference from Chromium's pictures (of 255), and the fraction of pixels that differ by more than 2. Measured: WebGL 1; a canvas 0 where a tile pixel is a device
+ * pixel, else up to 19 at edges on 1.3 % of the pixels, since browsers scale pictures with their own weights; composited light 4 on 4.2 %,
+ * both together 18 on 23 %.
  */
 const TOLERANCE = { webgl: { most: 2, off: 0 }, whole: { most: 1, off: 0 }, scaled: { most: 32, off: 0.03 }, composed: { most: 8, off: 0.08 }, both: { most: 32, off: 0.4 } } as const;
 const SCALED = ["two layers", "turned", "between"];
@@ -161,5 +161,5 @@ function toleranceOf(scene: string, composed: boolean): keyof typeof TOLERANCE {
   return composed ? "composed" : "whole";
 }
 
-/** As WebDriver has it. */
+/** Key code of WebDriver. */
 const ARROW_RIGHT = "\uE014";

@@ -1,7 +1,7 @@
 import type { TestServer } from "../fixture/server";
 import type { Global } from "../browser/page";
 
-/** A page whose canvas has a size of its own, since browsers' windows do not; it keeps what it is told of errors. */
+/** A page with a canvas of fixed size, since browsers' windows differ; it collects errors. */
 export function watchedPage(server: TestServer): void {
   const head = '<meta charset="utf-8"><title>test</title><link rel="icon" href="data:,"><link rel="stylesheet" href="/watched.css"><script src="/watch.js"></script>';
   server.pages.set("/watched", `<!doctype html><html lang="en"><head>${head}</head><body><canvas id="mapcanvas"></canvas><script src="/map3d.js"></script></body></html>`);

@@ -1,8 +1,8 @@
 import type { Global } from "../browser/page";
-import type { Driver, Shot } from "./driver";
+import type { Driver, Screenshot } from "./driver";
 import { HEIGHT, WIDTH } from "./page";
 
-/** What is done to a map, one after another, and looked at each time. */
+/** Actions on a map, one after another, each followed by a screenshot. */
 const scenes: readonly (readonly [name: string, act: (plan: string) => unknown])[] = [
   ["lit", () => (globalThis as Global).map.setLight({})],
   ["low sun", () => (globalThis as Global).map.setLight({ azimuth_deg: 250, altitude_deg: 12, sun_rgb: [1, 0.7, 0.45] })],
@@ -16,9 +16,9 @@ const scenes: readonly (readonly [name: string, act: (plan: string) => unknown])
   ["between", () => (globalThis as Global).map.setZoom(2.6)],
 ];
 
-/** The map's pictures, scene by scene. @param plan address of the second layer */
-export async function shots(driver: Driver, plan: string): Promise<Map<string, Shot>> {
-  const found = new Map<string, Shot>();
+/** Takes screenshots of all scenes. @param plan address of the second layer */
+export async function takeScreenshots(driver: Driver, plan: string): Promise<Map<string, Screenshot>> {
+  const found = new Map<string, Screenshot>();
   for (const [name, act] of scenes) {
     await driver.settled(act, plan);
     found.set(name, await driver.shot());
@@ -26,14 +26,14 @@ export async function shots(driver: Driver, plan: string): Promise<Map<string, S
   return found;
 }
 
-/** Of RGB bytes of two maps. */
+/** Difference between the RGB bytes of two maps. */
 export interface Difference {
   readonly most: number;
-  /** Share of pixels of which a byte differs by more than 2. */
+  /** Fraction of pixels with a byte that differs by more than 2. */
   readonly off: number;
 }
 
-export function difference(a: Shot, b: Shot): Difference {
+export function difference(a: Screenshot, b: Screenshot): Difference {
   let [most, off] = [0, 0];
   for (let p = 0; p < WIDTH * HEIGHT; p++) {
     const [x, y] = [p % WIDTH, Math.floor(p / WIDTH)];

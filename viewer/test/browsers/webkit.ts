@@ -7,7 +7,7 @@ import { Driver, type Input } from "./driver";
 
 export const WEBKIT_DRIVER = process.env["WEBKIT_DRIVER"] ?? "/usr/bin/WebKitWebDriver";
 
-/** The small browser that comes with WebKitGTK; in Debian beside its library. */
+/** The minimal browser of WebKitGTK; in Debian next to its library. */
 export function miniBrowser(): string | undefined {
   const folders = ["/usr/lib", ...(existsSync("/usr/lib") ? readdirSync("/usr/lib").filter((name) => name.endsWith("-linux-gnu")).map((name) => `/usr/lib/${name}`) : [])];
   const places = folders.flatMap((folder) => ["webkitgtk-6.0", "webkit2gtk-4.1", "webkit2gtk-4.0"].map((name) => `${folder}/${name}/MiniBrowser`));
@@ -24,7 +24,7 @@ export class WebKit extends Driver {
 
   static async start(display: Display): Promise<WebKit> {
     const port = await freePort();
-    // As root there is no sandbox; only pages of this machine are opened.
+    // The sandbox does not work as root; only local pages are opened.
     const env = { ...process.env, DISPLAY: display.name, LIBGL_ALWAYS_SOFTWARE: "1", WEBKIT_DISABLE_SANDBOX_THIS_IS_DANGEROUS: "1" };
     const child = spawn(WEBKIT_DRIVER, [`--port=${String(port)}`], { stdio: "ignore", env });
     const browser = { binary: miniBrowser(), args: ["--automation"] };
@@ -65,12 +65,12 @@ export class WebKit extends Driver {
   }
 }
 
-/** A wheel that turns as far as the last time does nothing: so it stands still in between. */
+/** Repeating a wheel step has no effect, so the wheel pauses in between. */
 function unlikeLast(input: Input): Input {
   return input.type === "wheel" ? { ...input, actions: input.actions.flatMap((action) => [{ ...action, deltaX: 0, deltaY: 0 }, action]) } : input;
 }
 
-/** @throws Error with the driver's words */
+/** @throws Error with the driver's message */
 async function ask(method: string, address: string, body?: object): Promise<unknown> {
   const response = await fetch(address, { method, ...(body && { body: JSON.stringify(body), headers: { "Content-Type": "application/json" } }) });
   const { value } = await response.json() as { value: { error?: string; message?: string } | null };
@@ -78,7 +78,7 @@ async function ask(method: string, address: string, body?: object): Promise<unkn
   return value;
 }
 
-/** Until the driver listens. */
+/** Waits until the driver listens. */
 async function patiently<T>(act: () => Promise<T>): Promise<T> {
   for (let left = 100; ; left--) {
     try {
