@@ -12,13 +12,7 @@ use map3d_trace::{Affine, Cutout, CutoutMask, CutoutSample};
 
 /// Returns the wrap mode of a material record.
 pub(crate) fn wrap_of(material: &MaterialRecord) -> Wrap {
-    match material.wrap {
-        1 => Wrap::Mirror,
-        2 => Wrap::Clamp,
-        3 => Wrap::Border,
-        4 => Wrap::None,
-        _ => Wrap::Wrap,
-    }
+    Wrap::from_code(material.wrap).unwrap_or_default()
 }
 
 /// Tests samples against the filtered alpha of a texture. A texture that cannot be read counts as opaque and as a failure, which the renderer reports as an

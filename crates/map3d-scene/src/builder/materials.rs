@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use map3d_base::asset::{Material, Wrap};
+use map3d_base::asset::Material;
 use map3d_texture::TextureKeys;
 
 use super::assets::Asset;
@@ -85,13 +85,7 @@ fn record_of(material: &Material, textures: &TextureKeys) -> MaterialRecord {
     MaterialRecord {
         diffuse: material.diffuse.map(byte),
         border: material.border.map(byte),
-        wrap: match material.wrap {
-            Wrap::Wrap => 0,
-            Wrap::Mirror => 1,
-            Wrap::Clamp => 2,
-            Wrap::Border => 3,
-            Wrap::None => 4,
-        },
+        wrap: material.wrap as u8,
         flags: if texture.is_some() { MATERIAL_TEXTURED } else { 0 } | if cutout { MATERIAL_CUTOUT } else { 0 },
         padding: [0; 6],
         texture: texture.map_or([0; 16], |t| t.key),

@@ -11,7 +11,7 @@ mod usage;
 
 pub use build::{Progress, TextureAsset, TextureInfo, TextureKeys, TextureSource, build_textures, prune_textures, source_of};
 pub use cache::{CacheStats, Texture, TextureCache};
-pub use file::{TextureFile, TextureKey, hex, layout, texture_key, texture_path, write};
+pub use file::{TEXTURE_MAGIC, TEXTURE_VERSION, TextureFile, TextureKey, hex, layout, texture_key, texture_path, write};
 pub use held::HeldTextures;
 pub use level::{AlphaCell, Level};
 pub use mips::{LinearRaster, first_mip, level_count, level_size, next_mip, premultiplied};
