@@ -116,6 +116,9 @@ fn corners(uvs: &PyReadonlyArray3<f32>, n: usize) -> PyResult<Vec<[[f32; 2]; 3]>
     Ok((0..n).map(|t| [0, 1, 2].map(|c| [uv[[t, c, 0]], uv[[t, c, 1]]])).collect())
 }
 
+/// Boxes of objects, and of prototypes by their numbers.
+type Boxes = (Vec<Option<Corners>>, BTreeMap<u32, Corners>);
+
 /// The mesh of an asset folder, mapped; every index is in range.
 #[pyclass(module = "map3d._core", frozen)]
 pub struct AssetMesh(asset::AssetMesh);
@@ -166,7 +169,7 @@ impl AssetMesh {
     }
 
     /// Boxes of `count` objects in world coordinates, without placed prototypes, and of each prototype in its own frame; None without geometry.
-    fn boxes(&self, py: Python<'_>, count: usize) -> PyResult<(Vec<Option<Corners>>, BTreeMap<u32, Corners>)> {
+    fn boxes(&self, py: Python<'_>, count: usize) -> PyResult<Boxes> {
         let boxes = py.detach(|| self.0.boxes(count)).map_err(to_python)?;
         let prototypes = boxes.prototypes.iter().filter_map(|(k, bounds)| corners_of(bounds).map(|c| (*k, c)));
         Ok((boxes.objects.iter().map(corners_of).collect(), prototypes.collect()))
