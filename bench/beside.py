@@ -1,6 +1,5 @@
 """Peers beside us in the same run, in turns, on the same ground: pictures of one tile, and of 4, 16 and 64 neighbouring tiles at once."""
 
-import json
 import os
 import statistics
 from collections.abc import Callable, Iterator
@@ -53,9 +52,8 @@ class Agreement:
     depth: float
 
 
-def measure(folder: Path, frame: str, tiles: list[Place], shown: Place, pictures: Path | None = None) -> dict[str, Any]:
+def measure(folder: Path, parsed: Frame, tiles: list[Place], shown: Place, pictures: Path | None = None) -> dict[str, Any]:
     """`tiles`: all base tiles with content; the tables are printed. `shown`: the tile that is compared; `pictures`: folder for pictures of it."""
-    parsed: Frame = json.loads(frame)
     with ExitStack() as stack:
         cores = len(os.sched_getaffinity(0))
         ours = stack.enter_context(Crew("map3d", partial(Ours, folder), cores))

@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.table import Table
 
 from map3d import _core
+from map3d.geometry.frames import core_frame
 
 from .scene import prepared
 from .tiles import busy_tiles
@@ -40,7 +41,7 @@ class Row:
 def measure(buildings: int = 300, res_m: float = 0.2, count: int = 48, rounds: int = 3) -> list[dict[str, Any]]:
     """Rows by layer; the table is printed as Markdown. Encoders take turns, each with its least round of processor time."""
     folder, frames = prepared(buildings, res_m, "webp")
-    frame = next(iter(frames.values()))
+    frame = core_frame(next(iter(frames.values())))
     scene = _core.Scene(str(folder), 1 << 30)
     buffers = [scene.gbuffer(frame, *tile) for tile in busy_tiles(scene, frame, count)]
     rows = [row for layer in ("color", *DATA) for row in of_layer(layer, buffers, rounds)]

@@ -17,9 +17,10 @@ import numpy as np
 
 from map3d import _core
 from map3d.catalogue import PlannedJob, Workspace
+from map3d.geometry.frames import core_frame
 from map3d.jobs.run import RunSettings
 from map3d.renderings.build import build, open_scene
-from map3d.renderings.plan import frame_text, plan_jobs
+from map3d.renderings.plan import plan_jobs
 from map3d.subprocess import Handler, Message, ReportProgress, Subprocess
 from map3d.tiles.naming import morton
 
@@ -30,11 +31,11 @@ WORKERS, MAX_MEMORY_BYTES, RUN = 2, 1 << 30, 5
 
 def open_renderer(setup: Mapping[str, Any]) -> Handler:
     """A child that renders blocks and tells how its caches stand, but keeps the tiles to itself."""
-    scene = _core.Scene(setup["scene"], cache_bytes=setup["cache_bytes"])
+    scene, frame = _core.Scene(setup["scene"], cache_bytes=setup["cache_bytes"]), core_frame(setup["frame"])
 
     def handle(request: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], Sequence[bytes]]:
         begun, spent = time.perf_counter(), time.process_time()
-        block = scene.render_block(setup["frame"], *request["block"])
+        block = scene.render_block(frame, *request["block"])
         times = {"wall_s": time.perf_counter() - begun, "cpu_s": time.process_time() - spent}
         return {**times, "stats": block.stats, "scene": scene.stats(), "memory": memory()}, []
 
@@ -72,7 +73,7 @@ def rendered(workspace: Path, rendering: str, blocks: int) -> dict[str, Any]:
     setup = {
         "scene": str(place.scene_folder(record.scene).absolute()),
         "cache_bytes": RunSettings(WORKERS, MAX_MEMORY_BYTES).cache_bytes,
-        "frame": frame_text(record.tracks[0]),
+        "frame": record.tracks[0].frame.to_json(record.tracks[0].layers),
     }
     answers = _answers(setup, chosen(jobs, blocks))
     return {

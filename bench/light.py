@@ -1,6 +1,5 @@
 """What the layers of light cost: processor time a base tile of their rays, beside the visibility and shading that go before them."""
 
-import json
 import math
 from typing import Any, Final
 
@@ -9,9 +8,11 @@ from rich.console import Console
 from rich.table import Table
 
 from map3d import _core
+from map3d.geometry.frames import core_frame
 from map3d.tiles.naming import block_levels
+from map3d.tiles.occupancy import xy_from_morton
 
-from .scene import prepared, zmax
+from .scene import prepared
 
 BUILDINGS: Final = 300
 RES_M: Final = 0.2
@@ -25,10 +26,10 @@ SUNS: Final = 16
 def measure() -> list[dict[str, Any]]:
     """A row a kind; the table is printed."""
     folder, frames = prepared(BUILDINGS, RES_M, "webp")
-    frame = next(iter(frames.values()))
+    fields = next(iter(frames.values()))
     scene = _core.Scene(str(folder))
-    blocks = _full_blocks(scene, frame)
-    rows = [_row(scene, kind, _frame_of(frame, layer), blocks) for kind, layer in layers().items()]
+    blocks = _full_blocks(scene, core_frame(fields))
+    rows = [_row(scene, kind, core_frame({**fields, "layers": [layer]}), blocks) for kind, layer in layers().items()]
     table = Table(title=f"layers of light, ms of processor time a base tile, {scene.triangle_count:,} triangles at {RES_M} m a pixel")
     for column in ("layer", "tiles", "visibility and shading", "rays", "rays, of one sun"):
         table.add_column(column, justify="right")
@@ -52,7 +53,7 @@ def layers() -> dict[str, dict[str, Any]]:
     return {kind: {"kind": kind, "format": "png", **more} for kind, more in options.items()}
 
 
-def _row(scene: _core.Scene, kind: str, frame: str, blocks: list[tuple[int, int, int]]) -> dict[str, Any]:
+def _row(scene: _core.Scene, kind: str, frame: _core.Frame, blocks: list[tuple[int, int, int]]) -> dict[str, Any]:
     """The least of the rounds, after one that warms the caches."""
     rounds = []
     for _ in range(ROUNDS + 1):
@@ -64,18 +65,13 @@ def _row(scene: _core.Scene, kind: str, frame: str, blocks: list[tuple[int, int,
     return {"kind": kind, "tiles": int(tiles), "light_ms": light_ms, "before_ms": before_ms, "suns": len(layers()[kind].get("suns", ()))}
 
 
-def _full_blocks(scene: _core.Scene, frame: str) -> list[tuple[int, int, int]]:
+def _full_blocks(scene: _core.Scene, frame: _core.Frame) -> list[tuple[int, int, int]]:
     """Base blocks with the most tiles that may have content."""
-    root, deepest = block_levels(zmax(frame))[0].root, zmax(frame)
-    flags = scene.occupied(frame, deepest)
-    side = 1 << (deepest - root)
-    counts = flags.reshape(1 << root, side, 1 << root, side).sum(axis=(1, 3))
-    order = np.argsort(-counts, axis=None, kind="stable")[:BLOCKS]
-    return [(root, int(k) % (1 << root), int(k) >> root) for k in order]
-
-
-def _frame_of(frame: str, layer: dict[str, Any]) -> str:
-    return json.dumps({**json.loads(frame), "layers": [layer]})
+    root = block_levels(frame.zmax)[0].root
+    blocks, counts = np.unique(scene.occupied(frame, frame.zmax) >> np.uint64(2 * (frame.zmax - root)), return_counts=True)
+    columns, rows = xy_from_morton(blocks)
+    order = np.lexsort((columns, rows, -counts))[:BLOCKS]
+    return [(root, int(columns[k]), int(rows[k])) for k in order]
 
 
 def _sun(azimuth_deg: float, elevation_deg: float) -> tuple[float, float, float]:

@@ -1,19 +1,20 @@
 """The town that everything is measured on, made once per checkout."""
 
-import json
 import shutil
 from pathlib import Path
+from typing import Any
 
 from map3d.catalogue import Workspace
 from map3d.cli.app import run
 from map3d.errors import UnknownVersion
-from map3d.renderings.plan import frame_text
 
 CACHE = Path(".cache/bench")
+Fields = dict[str, Any]
+"""Fields of a frame: `map3d.geometry.frames.core_frame` makes a `_core.Frame` of them."""
 
 
-def prepared(buildings: int, res_m: float, color: str) -> tuple[Path, dict[str, str]]:
-    """The scene's folder, and the core's frame (JSON) of each view. `color`: format of the colour layer."""
+def prepared(buildings: int, res_m: float, color: str) -> tuple[Path, dict[str, Fields]]:
+    """The scene's folder, and the fields of the core's frame of each view. `color`: format of the colour layer."""
     folder = CACHE / f"town-{buildings}"
     workspace = _current(folder / "workspace")
     where = ["-w", str(workspace.root)]
@@ -31,7 +32,7 @@ def prepared(buildings: int, res_m: float, color: str) -> tuple[Path, dict[str, 
     catalogue = workspace.open_catalogue()
     try:
         record = catalogue.rendering(name)
-        return workspace.root / "scenes" / "town", {track.id: frame_text(track) for track in record.tracks}
+        return workspace.root / "scenes" / "town", {track.id: track.frame.to_json(track.layers) for track in record.tracks}
     finally:
         catalogue.close()
 
@@ -45,10 +46,6 @@ def _current(folder: Path) -> Workspace:
         shutil.rmtree(folder)
         workspace = Workspace(folder).create()
     return workspace
-
-
-def zmax(frame: str) -> int:
-    return int(json.loads(frame)["zmax"])
 
 
 def _do(command: list[str]) -> None:

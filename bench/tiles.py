@@ -1,6 +1,5 @@
 """Non-empty base tiles a second: ours with and without encoding, per core and in total."""
 
-import json
 import multiprocessing
 import os
 import statistics
@@ -12,21 +11,29 @@ from typing import Any
 import numpy as np
 
 from map3d import _core
+from map3d.geometry.frames import core_frame
+from map3d.tiles.occupancy import xy_from_morton
 
 from . import beside
-from .scene import CACHE, prepared, zmax
+from .scene import CACHE, Fields, prepared
 
 Tile = tuple[int, int]
 
 
-def busy_tiles(scene: _core.Scene, frame: str, count: int) -> list[Tile]:
+def busy_tiles(scene: _core.Scene, frame: _core.Frame, count: int) -> list[Tile]:
     """Evenly chosen among the base tiles that have content."""
-    places = [(int(x), int(y)) for y, x in np.argwhere(scene.occupied(frame, zmax(frame)))]
+    places = occupied_tiles(scene, frame)
     chosen = places[:: max(1, len(places) // (2 * count))]
     return with_content(scene, frame, chosen)[:count]
 
 
-def with_content(scene: _core.Scene, frame: str, places: list[Tile]) -> list[Tile]:
+def occupied_tiles(scene: _core.Scene, frame: _core.Frame) -> list[Tile]:
+    """Base tiles that may have content, row by row."""
+    columns, rows = xy_from_morton(scene.occupied(frame, frame.zmax))
+    return sorted(zip(columns.tolist(), rows.tolist(), strict=True), key=lambda tile: tile[::-1])
+
+
+def with_content(scene: _core.Scene, frame: _core.Frame, places: list[Tile]) -> list[Tile]:
     return [tile for tile in places if scene.gbuffer(frame, *tile)["id"].any()]
 
 
@@ -40,21 +47,20 @@ def seconds(work: Callable[[], object], rounds: int = 3) -> float:
     return statistics.median(times)
 
 
-def trace(scene: _core.Scene, frame: str, tiles: list[Tile]) -> None:
+def trace(scene: _core.Scene, frame: _core.Frame, tiles: list[Tile]) -> None:
     for tile in tiles:
         scene.gbuffer(frame, *tile)
 
 
-def trace_and_encode(scene: _core.Scene, frame: str, tiles: list[Tile]) -> None:
-    layers = json.loads(frame)["layers"]
+def trace_and_encode(scene: _core.Scene, frame: _core.Frame, tiles: list[Tile]) -> None:
     for tile in tiles:
         buffer = scene.gbuffer(frame, *tile)
-        for layer in layers:
-            _core.encode_layer(layer["kind"], layer["format"], buffer[layer["kind"]], layer.get("quality", 80))
+        for layer in frame.layers:
+            _core.encode_layer(layer.kind, layer.format, buffer[layer.kind], layer.quality)
 
 
-def _worker(folder: str, frame: str, tiles: list[Tile], ready: Any, go: Any, done: Any) -> None:
-    scene = _core.Scene(folder)
+def _worker(folder: str, fields: Fields, tiles: list[Tile], ready: Any, go: Any, done: Any) -> None:
+    scene, frame = _core.Scene(folder), core_frame(fields)
     trace_and_encode(scene, frame, tiles)
     ready.release()
     go.wait()
@@ -62,12 +68,12 @@ def _worker(folder: str, frame: str, tiles: list[Tile], ready: Any, go: Any, don
     done.release()
 
 
-def all_cores(folder: Path, frame: str, tiles: list[Tile], cores: int) -> float:
+def all_cores(folder: Path, fields: Fields, tiles: list[Tile], cores: int) -> float:
     """Seconds for all tiles, encoded, by one process a core with warm caches."""
     context = multiprocessing.get_context("spawn")
     ready, go, done = context.Semaphore(0), context.Event(), context.Semaphore(0)
     parts = [tiles[k::cores] for k in range(cores)]
-    workers = [context.Process(target=_worker, args=(str(folder), frame, part, ready, go, done)) for part in parts]
+    workers = [context.Process(target=_worker, args=(str(folder), fields, part, ready, go, done)) for part in parts]
     for worker in workers:
         worker.start()
     for _ in workers:
@@ -85,14 +91,15 @@ def all_cores(folder: Path, frame: str, tiles: list[Tile], cores: int) -> float:
 def measure(buildings: int, res_m: float, count: int, color: str) -> dict[str, Any]:
     """One row of the table; tiles a second."""
     folder, frames = prepared(buildings, res_m, color)
-    frame = next(iter(frames.values()))
+    fields = next(iter(frames.values()))
+    frame = core_frame(fields)
     scene = _core.Scene(str(folder), 1 << 30)
     tiles = busy_tiles(scene, frame, count)
     trace(scene, frame, tiles)
     cores = len(os.sched_getaffinity(0))
     plain = len(tiles) / seconds(lambda: trace(scene, frame, tiles))
     encoded = len(tiles) / seconds(lambda: trace_and_encode(scene, frame, tiles))
-    total = len(tiles) / all_cores(folder, frame, tiles, cores)
+    total = len(tiles) / all_cores(folder, fields, tiles, cores)
     return {
         "triangles": scene.triangle_count,
         "tiles": len(tiles),
@@ -107,9 +114,10 @@ def measure(buildings: int, res_m: float, count: int, color: str) -> dict[str, A
 def peers(buildings: int, res_m: float) -> dict[str, Any]:
     """The same town drawn by others, beside us."""
     folder, frames = prepared(buildings, res_m, "webp")
-    frame = next(iter(frames.values()))
+    fields = next(iter(frames.values()))
+    frame = core_frame(fields)
     scene = _core.Scene(str(folder), 1 << 30)
-    places = [(int(x), int(y)) for y, x in np.argwhere(scene.occupied(frame, zmax(frame)))]
+    places = occupied_tiles(scene, frame)
     tiles = with_content(scene, frame, places)
     shown = max(tiles, key=lambda tile: len(np.unique(scene.gbuffer(frame, *tile)["id"])))
-    return beside.measure(folder, frame, tiles, shown, pictures=CACHE / "pictures")
+    return beside.measure(folder, fields, tiles, shown, pictures=CACHE / "pictures")

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from map3d.ingest.asset import Mesh, open_mesh
+from map3d import _core
 
 from .city import PLACE_M, SPECS, City, Place, assets_of
 
@@ -67,15 +67,31 @@ def parts_of(assets: list[Path], origin: Floats) -> list[Part]:
     """The tiles of some asset folders; corners become local to `origin`, (3,) in the scene's CRS."""
     found = []
     for asset in assets:
-        mesh = open_mesh(asset)
-        uvs, materials = _sections(asset, len(mesh.positions), len(mesh.triangles))
+        mesh = Mesh.read(asset / "mesh.m3a")
         given = json.loads((asset / "materials.json").read_text())
         rows, corners = _placed(mesh, given["instances"], origin)
-        group = _groups(mesh.objects[rows], materials[rows], given["materials"])
+        group = _groups(mesh.objects[rows], mesh.materials[rows], given["materials"])
         for number in np.unique(group):
             mine = group == number
-            found.append(Part(corners[mine], uvs[rows[mine]], materials[rows[mine]], given["materials"], asset / "textures"))
+            found.append(Part(corners[mine], mesh.uvs[rows[mine]], mesh.materials[rows[mine]], given["materials"], asset / "textures"))
     return found
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """The arrays of a `_core.AssetMesh`, each copied once."""
+
+    positions: Floats
+    triangles: NDArray[np.uint32]
+    uvs: NDArray[np.float32]
+    materials: NDArray[np.uint32]
+    objects: NDArray[np.uint32]
+    prototypes: NDArray[np.uint32]
+
+    @classmethod
+    def read(cls, path: Path) -> "Mesh":
+        mesh = _core.AssetMesh(str(path))
+        return cls(mesh.positions, mesh.triangles, mesh.uvs, mesh.materials, mesh.objects, mesh.prototypes)
 
 
 def _placed(mesh: Mesh, instances: list[dict[str, Any]], origin: Floats) -> tuple[NDArray[np.int64], Floats]:
@@ -87,16 +103,6 @@ def _placed(mesh: Mesh, instances: list[dict[str, Any]], origin: Floats) -> tupl
         rows.append(own)
         corners.append(mesh.positions[mesh.triangles[own]] @ move[:, :3].T + (move[:, 3] - origin))
     return np.concatenate(rows), np.concatenate(corners)
-
-
-def _sections(asset: Path, vertices: int, triangles: int) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
-    """(nt, 3, 2) texture coordinates and (nt,) materials of a mesh (spec/scene.md)."""
-    data, at, wanted = np.fromfile(asset / "mesh.m3a", np.uint8), 64, []
-    normals = int(data[32:36].view("<u4")[0]) & 1
-    for size in (vertices * 24, triangles * 12, triangles * 24, triangles * 36 * normals, triangles * 4):
-        wanted.append(data[at : at + size])
-        at = -(-(at + size) // 64) * 64
-    return wanted[2].view("<f4").reshape(-1, 3, 2), wanted[4].view("<u4")
 
 
 def _groups(objects: NDArray[np.uint32], materials: NDArray[np.uint32], table: list[dict[str, Any]]) -> NDArray[np.int64]:

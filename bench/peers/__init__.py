@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Frame = dict[str, Any]
-"""As map3d._core takes it: look_at_deg, pitch_deg, u0_m, v0_m, d0_m, size_m, tile_px, zmax."""
+"""Fields of a `_core.Frame`: look_at_deg, pitch_deg, u0_m, v0_m, d0_m, size_m, tile_px, zmax."""
 
 
 class Missing(Exception):

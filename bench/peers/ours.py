@@ -1,12 +1,12 @@
 """map3d beside its peers; what is more than they do: tiles are encoded."""
 
-import json
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from map3d import _core
+from map3d.geometry.frames import core_frame
 
 from . import Frame
 from .parts import srgb_bytes
@@ -18,12 +18,12 @@ class Ours:
 
     def draw(self, frame: Frame, x: int, y: int) -> list[bytes]:
         """All layers that the frame names, encoded."""
-        buffer = self._scene.gbuffer(json.dumps(frame), x, y)
+        buffer = self._scene.gbuffer(core_frame(frame), x, y)
         return [_core.encode_layer(layer["kind"], layer["format"], buffer[layer["kind"]], layer.get("quality", 80)) for layer in frame["layers"]]
 
     def centres(self, frame: Frame, x: int, y: int) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
-        buffer = self._scene.gbuffer(json.dumps(frame), x, y)
+        buffer = self._scene.gbuffer(core_frame(frame), x, y)
         return buffer["id"], np.where(buffer["id"] > 0, buffer["depth"] / 1024.0, np.inf)
 
     def picture(self, frame: Frame, x: int, y: int) -> NDArray[np.uint8]:
-        return srgb_bytes(self._scene.gbuffer(json.dumps(frame), x, y)["color"][..., :3] / 65535.0)
+        return srgb_bytes(self._scene.gbuffer(core_frame(frame), x, y)["color"][..., :3] / 65535.0)

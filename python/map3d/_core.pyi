@@ -1,9 +1,9 @@
-"""The compiled core, `crates/map3d-py`: a thin skin over the Rust crates. The GIL is released in every long call.
+"""The compiled core, `crates/map3d-py`: a thin binding of the Rust crates. Long calls release the GIL.
 
-Structured arguments and results travel as JSON text (serde on the other side); arrays as NumPy. Errors: `CoreError` and its leaves below.
+Documents pass as JSON text, arrays as NumPy, frames as `Frame`. Errors: `CoreError` and its leaves below.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Literal, final
 
 import numpy as np
@@ -13,13 +13,31 @@ __version__: str
 RENDER_FORMAT: int
 """Raised only when rendered bytes change."""
 
+# -- limits (spec/limits.json) --------------------------------------------------------------------------------------------------------
+
+TILE_PX: tuple[int, int]
+"""Sides that a tile may have."""
+DEEPEST_LEVEL: int
+QUALITY: tuple[int, int]
+"""Least and greatest quality of a lossy colour format."""
+MAX_SUNS: int
+"""Of a sun16 layer."""
+AO_RADIUS_M: tuple[float, float]
+"""Least and greatest radius of ambient occlusion."""
+NAME_PATTERN: str
+"""Of a whole name of a scene, asset, rendering or layer."""
+OBJECTS_PER_SHARD: int
+"""Objects whose attributes share a file."""
+
+# -- errors ---------------------------------------------------------------------------------------------------------------------------
+
 class CoreError(Exception): ...
 
 class FormatError(CoreError):
-    """A file is not what it claims to be: truncated, wrong magic, checksum, unknown version, malformed."""
+    """A file is truncated or malformed, or has another magic, version or checksum."""
 
 class LimitError(CoreError):
-    """A limit of SAFETY was met; the message names it, its value and what was asked for."""
+    """The input exceeds a limit; the message names the limit, its value and what was found."""
 
 class InvalidArgument(CoreError):
     """A caller's misuse."""
@@ -36,7 +54,7 @@ class Batch:
     def positions(self) -> NDArray[np.float64]:
         """(n, 3) source coordinates; a copy."""
     def set_positions(self, positions: NDArray[np.float64]) -> None:
-        """Replace them, e.g. reprojected. Same shape."""
+        """Replaces the positions, e.g. by reprojected ones. Same shape."""
     @property
     def prototype(self) -> bool:
         """True: the positions are in a prototype's own frame, not in the source's CRS."""
@@ -48,19 +66,19 @@ class Reader:
     """One source document, parsed as it is iterated. `format`: "obj" | "citygml".
 
     options (JSON): {"up": "y"|"z", "split": "file"|"group" (OBJ), "theme": str|null (CityGML appearance theme; null: the first in the file),
-    "lod": str|null (null: best per object), "strict": bool, "max_image_side_px": 16384, ...limits of SAFETY}
+    "lod": str|null (null: best per object), "strict": bool, "max_image_side_px": 16384, … further limits}
     """
     def __init__(self, path: str, format: str, options: str = "{}") -> None: ...
     @property
     def srs_name(self) -> str | None:
-        """As the source writes it; known before the first batch when the source has it at its head, else after the last."""
+        """The CRS as the source writes it; known before the first batch if the source names it at its head, else after the last."""
     def __iter__(self) -> Iterator[Batch]: ...
     def __next__(self) -> Batch: ...
     def instances(self) -> NDArray[np.float64]:
-        """(m, 12) transforms of the instances (prototype → source CRS), after the last batch."""
+        """Returns (m, 12) transforms of the instances, row-major 3 × 4, prototype → source CRS; complete after the last batch."""
     def set_instances(self, transforms: NDArray[np.float64]) -> None: ...
     def report(self) -> str:
-        """report.json so far (spec/scene.md)."""
+        """Returns report.json so far (spec/scene.md)."""
 
 @final
 class AssetWriter:
@@ -70,18 +88,48 @@ class AssetWriter:
     def append_mesh(
         self, positions: NDArray[np.float64], triangles: NDArray[np.uint32], uvs: NDArray[np.float32] | None, material: int, object: int, rank: int
     ) -> None:
-        """For assets made in Python (terrain): (n,3) world, (t,3), (t,3,2)."""
+        """Appends a mesh made in Python: positions (n, 3) world, triangles (t, 3), uvs (t, 3, 2) or None."""
     def set_tables(self, materials: str, objects: str) -> None:
-        """For assets made in Python: materials.json and objects as a JSON list; textures are put into textures/ by the caller."""
-    def finish(self, reader: Reader | None) -> str:
-        """Closes the files, returns report.json."""
+        """Sets the tables of an asset made in Python: materials.json and a JSON list of objects. The caller puts images into textures/."""
+    def finish(self, reader: Reader | None = None) -> str:
+        """Closes the files and returns report.json. Writes the reader's tables and textures; without a reader, those of `set_tables`."""
+
+@final
+class AssetMesh:
+    """The mesh.m3a of an asset folder, mapped and checked. Arrays are copies; raises FormatError."""
+    def __init__(self, path: str) -> None: ...
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """(nv, 3) world coordinates, those of a prototype in its own frame."""
+    @property
+    def triangles(self) -> NDArray[np.uint32]:
+        """(nt, 3) vertex numbers."""
+    @property
+    def uvs(self) -> NDArray[np.float32]:
+        """(nt, 3, 2) texture coordinates of the corners."""
+    @property
+    def materials(self) -> NDArray[np.uint32]:
+        """(nt,) indices into the asset's materials."""
+    @property
+    def objects(self) -> NDArray[np.uint32]:
+        """(nt,) indices into the asset's objects."""
+    @property
+    def prototypes(self) -> NDArray[np.uint32]:
+        """(nt,) numbers of prototypes; 0 for world geometry."""
+    def boxes(self, count: int) -> tuple[list[_Box | None], dict[int, _Box]]:
+        """Returns the boxes of `count` objects in world coordinates, without placed prototypes and None without geometry, and those of prototypes in
+        their own frame."""
+
+def check_file(path: str) -> None:
+    """Raises FormatError unless a mesh, chunk, instance or texture file has a known version and the checksum of its header."""
 
 # -- build: assets → chunks and textures (map3d-scene, map3d-image) ---------------------------------------------------------------
 
 Progress = Callable[[str, int, int], bool]
-"""(stage, done, total) → False to stop; then `Interrupted` is raised and what is finished stays."""
+"""(stage, done, total) → False to stop; the build then raises `Interrupted` and keeps what it has finished."""
 
-class Interrupted(CoreError): ...
+class Interrupted(CoreError):
+    """A callback asked to stop; what is finished stays."""
 
 def build_scene(folder: str, request: str, progress: Progress | None = None) -> str:
     """Builds chunks/, textures/, instances.m3i and scene.json of a scene folder from its assets; returns the report (JSON). Unchanged chunks and textures are kept.
@@ -92,41 +140,94 @@ def build_scene(folder: str, request: str, progress: Progress | None = None) -> 
 
 # -- tracing and blocks (map3d-trace, map3d-render) --------------------------------------------------------------------------------
 
+_Kind = Literal["color", "normal", "id", "depth", "sun", "sun16", "ao", "depth2", "picture"]
+_Format = Literal["webp", "png", "jpeg"]
+_Vec3 = tuple[float, float, float]
+_Box = tuple[_Vec3, _Vec3]
+
+@final
+class LayerSpec:
+    """How a layer is made and encoded. `suns`: unit vectors towards the suns of sun, sun16, picture; `radius_m`: of ambient occlusion, in ao, picture."""
+    def __init__(
+        self, kind: _Kind, format: _Format, quality: int = 80, small: bool = False, suns: Sequence[Sequence[float]] = ..., radius_m: float = 0.0
+    ) -> None: ...
+    @property
+    def kind(self) -> _Kind: ...
+    @property
+    def format(self) -> _Format: ...
+    @property
+    def quality(self) -> int: ...
+    @property
+    def small(self) -> bool: ...
+    @property
+    def suns(self) -> list[_Vec3]: ...
+    @property
+    def radius_m(self) -> float: ...
+
+@final
+class Frame:
+    """A view's pinned frame (spec/pyramid.md §2) with the layers of a pass. Immutable and valid: raises InvalidArgument."""
+    def __init__(
+        self,
+        look_at_deg: float,
+        pitch_deg: float,
+        u0_m: float,
+        v0_m: float,
+        d0_m: float,
+        size_m: float,
+        tile_px: int,
+        zmax: int,
+        layers: Sequence[LayerSpec] = ...,
+    ) -> None: ...
+    @property
+    def look_at_deg(self) -> float: ...
+    @property
+    def pitch_deg(self) -> float: ...
+    @property
+    def u0_m(self) -> float: ...
+    @property
+    def v0_m(self) -> float: ...
+    @property
+    def d0_m(self) -> float: ...
+    @property
+    def size_m(self) -> float: ...
+    @property
+    def tile_px(self) -> int: ...
+    @property
+    def zmax(self) -> int: ...
+    @property
+    def layers(self) -> list[LayerSpec]: ...
+
 @final
 class Scene:
-    """A built scene, opened for tracing: chunks are memory-mapped as they are needed, textures cached up to `cache_bytes`. Safe to share between threads."""
-    def __init__(self, folder: str, cache_bytes: int = 512 << 20) -> None: ...
+    """A built scene, opened for tracing: chunks are mapped on demand, textures cached up to `cache_bytes`. Threads may share it."""
+    def __init__(self, folder: str, cache_bytes: int = 536870912) -> None: ...
     @property
-    def origin(self) -> tuple[float, float, float]: ...
+    def origin(self) -> _Vec3:
+        """World coordinates of the local origin."""
     @property
-    def box(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        """Local box of all content."""
+    def box(self) -> _Box:
+        """Local box of all content; zeros for an empty scene."""
     @property
     def triangle_count(self) -> int:
-        """Instances not counted."""
-    def occupied(self, frame: str, level: int, within: tuple[int, NDArray[np.uint32]] | None = None) -> NDArray[np.bool_]:
-        """(2^level, 2^level) [y, x]: conservative, from the boxes of BVH nodes. `within`: a level above and (n, 2) columns and rows of its blocks;
-        only they are looked at, outside of them all is False."""
-    def block_key(self, frame: str, z: int, x: int, y: int) -> str:
-        """Hex hash over all that a base block's bytes depend on."""
-    def block_keys(self, frame: str, z: int, blocks: NDArray[np.uint32]) -> list[str]:
-        """The keys of the blocks of level z at (n, 2) columns and rows, each chunk looked at once."""
-    def render_block(self, frame: str, z: int, x: int, y: int) -> Block:
-        """A base block rooted at (z, x, y)."""
-    def gbuffer(self, frame: str, x: int, y: int) -> dict[str, NDArray[Any]]:
-        """One base tile's G-buffer (spec/pyramid.md §5): id, depth and the arrays of the frame's layers; color, normal, id, depth without any."""
-    def pick(self, frame: str, u: float, v: float) -> tuple[int, float, tuple[float, float, float]] | None:
-        """(id, D, local position) of the surface that a single ray at view coordinates (U, V) meets first."""
-    def occluded(self, origins: NDArray[np.float64], direction: tuple[float, float, float], max_distance: float) -> NDArray[np.bool_]:
-        """Any-hit rays from local positions (n, 3)."""
+        """Triangles of all chunks and prototypes; a prototype counts once."""
+    def occupied(self, frame: Frame, level: int, within: tuple[int, NDArray[np.uint32]] | None = None) -> NDArray[np.uint64]:
+        """Returns the tiles of a level that may have content, as sorted Morton numbers. `within`: a level above and (n, 2) columns and rows of its
+        blocks; only their tiles are looked at. Time and memory grow with the occupied tiles, not with the level."""
+    def block_keys(self, frame: Frame, z: int, blocks: NDArray[np.uint32]) -> list[str]:
+        """Returns the keys of the blocks of level z at (n, 2) columns and rows: hex hashes over everything that a base block's bytes depend on."""
+    def render_block(self, frame: Frame, z: int, x: int, y: int) -> Block:
+        """Renders the base block rooted at (z, x, y)."""
+    def gbuffer(self, frame: Frame, x: int, y: int) -> dict[str, NDArray[Any]]:
+        """Renders one base tile's G-buffer (spec/pyramid.md §5): id, depth and the arrays of the frame's layers; color, normal, id, depth without any."""
+    def object_box(self, id: int) -> _Box | None:
+        """Returns the local box of an object; None when the scene does not have it."""
     def stats(self) -> dict[str, int]:
-        """Cache hits, misses, bytes; chunks mapped; triangles tested; ..."""
-
-# frame (JSON): {"look_at_deg", "pitch_deg", "u0_m", "v0_m", "d0_m", "size_m", "tile_px", "zmax", "layers": [{"kind","format","quality"?}]}
+        """Hits, misses and bytes of the caches of chunks and textures."""
 
 @final
 class Block:
-    """What a job yields: encoded tiles and the seam."""
+    """The result of a job: encoded tiles and the seam."""
     @property
     def tiles(self) -> list[tuple[int, int, int, int, bytes]]:
         """(layer number, z, x, y, encoded bytes); tiles without content are not listed."""
@@ -135,27 +236,21 @@ class Block:
         """None: the block has no content."""
     @property
     def stats(self) -> dict[str, float]:
-        """Seconds of visibility, shade, reduce, encode; traced tiles; ..."""
+        """Seconds of processor time by stage, and counts."""
 
-def reduce_block(frame: str, z: int, x: int, y: int, levels: int, seams: list[tuple[int, int, bytes]]) -> Block:
-    """A reduce block of root (z, x, y) with `levels` levels; seams: (x, y, bytes) of blocks rooted at level z + levels."""
+def reduce_block(frame: Frame, z: int, x: int, y: int, levels: int, seams: list[tuple[int, int, bytes]]) -> Block:
+    """Reduces the block rooted at (z, x, y), of `levels` levels. `seams`: (x, y, bytes) of blocks rooted at level z + levels."""
 
-def encode_layer(
-    kind: Literal["color", "normal", "id", "depth", "sun", "sun16", "ao", "depth2", "picture"],
-    format: str,
-    array: NDArray[Any],
-    quality: int = 80,
-    small: bool = False,
-) -> bytes:
-    """One layer of a G-buffer → image bytes; `small` spends time for fewer."""
+def check_seam(frame: Frame, seam: bytes) -> None:
+    """Raises FormatError unless the bytes are a whole seam of a block of this frame's pass (spec/pyramid.md §8)."""
+
+# -- images, for tests and tools ------------------------------------------------------------------------------------------------------
+
+def encode_layer(kind: _Kind, format: _Format, array: NDArray[Any], quality: int = 80, small: bool = False) -> bytes:
+    """Encodes one layer of a G-buffer as an image; `small` trades time for fewer bytes."""
 
 def decode_png(data: bytes) -> NDArray[np.uint8]:
-    """(H, W, C), for checks."""
-
-def reduce_gbuffers(children: list[dict[str, NDArray[Any]] | None]) -> dict[str, NDArray[Any]]:
-    """Parent of up to four children (spec/pyramid.md §7); for tests."""
-
-# -- texture, for tests and tools ---------------------------------------------------------------------------------------------------
+    """Decodes an 8-bit PNG into (H, W, C)."""
 
 def texture_level(path: str, level: int) -> NDArray[np.uint8]:
-    """(H, W, 4) of a .m3t, filled."""
+    """Decodes a level of a .m3t file into (H, W, 4), sRGB with straight alpha, unused texels filled."""

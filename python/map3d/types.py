@@ -1,10 +1,11 @@
-"""Small values that travel between all parts. No I/O, no logic beyond checking themselves."""
+"""Small values that all parts exchange. No I/O, and no logic but their own checks."""
 
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal, NamedTuple
 
+from map3d import _core
 from map3d.errors import BadName, BadRequest
 
 Vec3 = tuple[float, float, float]
@@ -18,21 +19,24 @@ LAYER_KINDS: Final[tuple[LayerKind, ...]] = ("color", "normal", "id", "depth", "
 DEFAULT_LAYERS: Final[tuple[LayerKind, ...]] = ("color", "normal", "id", "depth")
 COLOR_KINDS: Final = ("color", "picture")
 DEPTH_KINDS: Final = ("depth", "depth2")
-SUNS: Final = {"sun": (1, 1), "sun16": (1, 16), "picture": (1, 1)}
-"""How many suns a layer of these kinds has, at least and at most; others have none."""
+SUNS: Final = {"sun": (1, 1), "sun16": (1, _core.MAX_SUNS), "picture": (1, 1)}
+"""Least and greatest number of suns of a layer of these kinds; others have none."""
 RADIUS_KINDS: Final = ("ao", "picture")
-RADIUS_M: Final = (0.5, 200.0)
-"""The least and the greatest radius of ambient occlusion."""
+AO_RADIUS_M: Final = _core.AO_RADIUS_M
+"""Least and greatest radius of ambient occlusion (spec/limits.json, like the other limits of the core)."""
+TILE_PX: Final = _core.TILE_PX
+"""Sides that a tile may have."""
 COLOR_FORMATS: Final = ("webp", "png", "jpeg")
 MEDIA_TYPES: Final = {"webp": "image/webp", "png": "image/png", "jpeg": "image/jpeg"}
 DEPTH_UNIT_M: Final = 2.0**-10
-MAX_LEVEL: Final = 26
+DEEPEST_LEVEL: Final = _core.DEEPEST_LEVEL
+OBJECTS_PER_SHARD: Final = _core.OBJECTS_PER_SHARD
 
-_NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,63}")
+_NAME = re.compile(_core.NAME_PATTERN)
 
 
 def check_name(name: str, what: str) -> str:
-    """`name` if it may name a scene, asset, rendering or layer; raises BadName."""
+    """Returns `name` if it may name a scene, asset, rendering or layer; raises BadName."""
     if not _NAME.fullmatch(name):
         raise BadName(f"{what} name {name!r}: use 1 to 64 of a-z, 0-9, '-' and '_', beginning with a letter or digit")
     return name
@@ -66,8 +70,8 @@ class ViewAngles(NamedTuple):
 
 @dataclass(frozen=True)
 class Sun:
-    """Where the sun stands: `azimuth_deg` clockwise from true north; `direction` towards it, a unit vector in local axes. `time`: UTC, e.g.
-    2026-06-21T13:00:00Z; None when the sun was given by its angles."""
+    """A position of the sun: `azimuth_deg` clockwise from true north; `direction` towards it, a unit vector in local axes. `time`: UTC, e.g.
+    2026-06-21T13:00:00Z; None for a sun given by its angles."""
 
     time: str | None
     azimuth_deg: float
@@ -77,8 +81,8 @@ class Sun:
 
 @dataclass(frozen=True)
 class Layer:
-    """One layer of a rendering as sent. `quality` is for lossy colour formats only (1..100); `suns`: of sun, sun16, picture; `radius_m`: of ambient
-    occlusion, in ao, picture; `small`: encoding takes its time for fewer bytes."""
+    """One layer of a rendering as sent. `quality` (1..100) is for lossy colour formats, `suns` for sun, sun16 and picture, `radius_m`, the radius of
+    ambient occlusion, for ao and picture; `small` trades encoding time for fewer bytes."""
 
     name: str
     kind: LayerKind
@@ -95,16 +99,17 @@ class Layer:
             raise BadRequest(f"layer {self.name}: format {self.format!r} cannot hold {self.kind}; use {' or '.join(allowed)}")
         least, most = SUNS.get(self.kind, (0, 0))
         if not least <= len(self.suns) <= most:
-            raise BadRequest(f"layer {self.name}: {len(self.suns)} suns; of kind {self.kind} it has {least} to {most}")
-        low, high = RADIUS_M
-        if (self.kind in RADIUS_KINDS) != (self.radius_m is not None) or not low <= (self.radius_m or low) <= high:
-            raise BadRequest(
-                f"layer {self.name}: radius {self.radius_m} m; {' and '.join(RADIUS_KINDS)} have one of {low:g} to {high:g}, others none"
-            )
+            expected = f"{least} to {most}" if least < most else f"{most or 'none'}"
+            raise BadRequest(f"layer {self.name}: got {len(self.suns)} suns, expected {expected} for kind {self.kind}")
+        if (self.kind in RADIUS_KINDS) != (self.radius_m is not None):
+            raise BadRequest(f"layer {self.name}: radius is {self.radius_m}; only layers of kind {' and '.join(RADIUS_KINDS)} take one")
+        low, high = AO_RADIUS_M
+        if self.radius_m is not None and not low <= self.radius_m <= high:
+            raise BadRequest(f"layer {self.name}: radius is {self.radius_m:g} m, expected {low:g} to {high:g} m")
 
     @classmethod
     def load(cls, value: Mapping[str, Any]) -> "Layer":
-        """The inverse of `dataclasses.asdict`, also from JSON; what is not a layer's is left out."""
+        """Returns the layer that `dataclasses.asdict` wrote, also from JSON; ignores further keys."""
         suns = tuple(Sun(sun["time"], sun["azimuth_deg"], sun["elevation_deg"], _vec3(sun["direction"])) for sun in value.get("suns", ()))
         return cls(value["name"], value["kind"], value["format"], value.get("quality"), suns, value.get("radius_m"), value.get("small", False))
 

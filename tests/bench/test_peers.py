@@ -113,9 +113,7 @@ def test_a_copy_is_moved_whole_and_has_images_of_its_own(tmp_path: Path) -> None
     writer.set_tables(json.dumps({"materials": [material], "instances": []}), json.dumps(objects))
     writer.finish(None)
     copy_asset(source, tmp_path / "copy", "copy 1", np.array([100.0, 200.0, 0.0]))
-    from map3d.ingest.asset import open_mesh
-
-    assert np.array_equal(open_mesh(tmp_path / "copy").positions, corners + np.array([100.0, 200.0, 0.0]))
+    assert np.array_equal(_core.AssetMesh(str(tmp_path / "copy" / "mesh.m3a")).positions, corners + np.array([100.0, 200.0, 0.0]))
     (other,) = (tmp_path / "copy" / "textures").iterdir()
     assert other.stem != key
     assert json.loads((tmp_path / "copy" / "materials.json").read_text())["materials"][0]["texture"] == other.stem

@@ -114,7 +114,7 @@ def test_window_with_levels_keeps_its_side(run: Run, scene: Workspace) -> None:
 
 @pytest.mark.parametrize(
     ("window", "says"),
-    [("1,2", "X,Y,SIZE"), ("a,b,c", "X,Y,SIZE"), ("60,60,0", "positive"), ("60,60,nan", "positive"), ("9000,60,64", "beside the scene")],
+    [("1,2", "X,Y,SIZE"), ("a,b,c", "X,Y,SIZE"), ("60,60,0", "positive"), ("60,60,nan", "positive"), ("9000,60,64", "does not meet the scene")],
 )
 def test_invalid_windows_are_refused(run: Run, scene: Workspace, window: str, says: str) -> None:
     status, _, err = run("create-rendering", "town", "part", "--res", "0.25", "--window", window)

@@ -101,6 +101,8 @@ def test_a_view_that_joins_takes_over_the_size():
         (256, math.nan, [(0, 45)]),
         (0, 1.0, [(0, 45)]),
         (300, 1.0, [(0, 45)]),
+        (128, 1.0, [(0, 45)]),
+        (1024, 1.0, [(0, 45)]),
         (256, 1.0, []),
         (256, 1.0, [(0, 45), (0.0, 45.0)]),
     ],
@@ -116,7 +118,7 @@ def test_a_box_that_is_none_is_refused(box):
         pin(box, 256, 1.0, [ViewAngles(0, 45)])
 
 
-def test_more_than_26_levels_are_refused():
+def test_levels_beyond_the_deepest_are_refused():
     with pytest.raises(LimitExceeded, match="26"):
         pin(((0, 0, 0), (1e8, 1e8, 1)), 256, 1e-3, [ViewAngles(0, 45)])
 
@@ -128,7 +130,7 @@ def test_the_cores_frame_names_its_layers():
     assert (got["look_at_deg"], got["zmax"], got["size_m"]) == (0, frame.zmax, frame.size_m)
 
 
-def test_the_core_is_told_of_light_by_directions_and_reach_alone():
+def test_layers_of_light_reach_the_core_as_directions_and_radius():
     noon, evening = Sun("2026-06-21T12:00:00Z", 180.0, 60.0, (0.0, -0.5, 0.75**0.5)), Sun(None, 270.0, 0.0, (-1.0, 0.0, 0.0))
     layers = [
         Layer("noon", "sun", "png", suns=(noon,)),
@@ -169,7 +171,7 @@ def test_depths_count_from_where_they_do_without_a_window():
 def test_a_square_town_fills_a_window_of_its_width_times_the_sine_of_the_pitch():
     """Seen at 45 degrees, ground of 1600 m is 1131 m high: a square of that side is full where no horizon ends it."""
     frame = pin(SCENE, 256, 1131 / 2048, [ViewAngles(0, 45)], Window(0.0, 0.0, 1131.0))[0]
-    ground = frame.seen(((-800.0, -800.0, 30.0), (800.0, 800.0, 30.0)))
+    ground = frame.clipped(((-800.0, -800.0, 30.0), (800.0, 800.0, 30.0)))
     assert np.ptp(ground[:, 0]) == pytest.approx(frame.size_m)
     assert np.ptp(ground[:, 1]) > 0.99 * frame.size_m
 
@@ -197,7 +199,7 @@ def test_content_nearer_than_depth_zero_is_refused_inside_a_window_only():
 
 def test_what_a_square_shows_of_a_box_lies_in_both():
     frame = pin(SCENE, 256, 0.25, [ViewAngles(33, 40)], Window(200.0, 100.0, 256.0))[0]
-    seen = frame.seen(SCENE)
+    seen = frame.clipped(SCENE)
     assert len(seen) >= 4
     corner, side = np.array([frame.u0_m, frame.v0_m - frame.size_m]), frame.size_m
     assert seen[:, :2].min(axis=0) == pytest.approx(np.maximum(corner, seen[:, :2].min(axis=0)))
@@ -209,7 +211,7 @@ def test_what_a_square_shows_of_a_box_lies_in_both():
 
 
 def test_a_window_beside_the_scene_is_refused():
-    with pytest.raises(BadRequest, match="beside the scene"):
+    with pytest.raises(BadRequest, match="does not meet the scene"):
         pin(SCENE, 256, 0.25, [ViewAngles(0, 45)], Window(5000.0, 0.0, 128.0))
 
 

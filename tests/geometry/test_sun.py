@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from map3d.errors import BadRequest
-from map3d.geometry.sun import Place, SunAngles, hours_of, sun_angles, time_text
+from map3d.geometry.sun import GeographicPosition, SunAngles, hours_of, sun_angles, time_text
 
-GREENWICH = Place(51.4779, 0.0)
+GREENWICH = GeographicPosition(51.4779, 0.0)
 
 
 def vector(angles: SunAngles) -> np.ndarray:
@@ -30,7 +30,7 @@ def lifted_deg(elevation_deg: float) -> float:
     return 1.02 / 60 / math.tan(math.radians(elevation_deg + 10.3 / (elevation_deg + 5.11)))
 
 
-def almanac(place: Place, time: datetime) -> SunAngles:
+def almanac(place: GeographicPosition, time: datetime) -> SunAngles:
     """Low-precision formula of the Astronomical Almanac (page C5): 0.01° between 1950 and 2050; without refraction."""
     days = (time - datetime(2000, 1, 1, 12, tzinfo=UTC)) / timedelta(days=1)
     mean_deg, anomaly = 280.460 + 0.9856474 * days, math.radians(357.528 + 0.9856003 * days)
@@ -49,7 +49,7 @@ def almanac(place: Place, time: datetime) -> SunAngles:
 
 def test_the_example_of_the_solar_position_algorithm() -> None:
     """Reda and Andreas, NREL/TP-560-34302, table A5.1: azimuth 194.34024°, zenith 50.11162° at 820 mbar and 11 °C."""
-    found = sun_angles(Place(39.742476, -105.1786), datetime(2003, 10, 17, 12, 30, 30, tzinfo=timezone(timedelta(hours=-7))))
+    found = sun_angles(GeographicPosition(39.742476, -105.1786), datetime(2003, 10, 17, 12, 30, 30, tzinfo=timezone(timedelta(hours=-7))))
     assert found.azimuth_deg == pytest.approx(194.34024, abs=1e-3)
     assert found.elevation_deg == pytest.approx(90 - 50.11162, abs=5e-3)
 
@@ -61,7 +61,7 @@ def test_the_example_of_the_solar_position_algorithm() -> None:
     st.datetimes(datetime(1960, 1, 1), datetime(2045, 1, 1), timezones=st.just(UTC)),
 )
 def test_anywhere_at_any_time_it_is_where_the_almanac_says(latitude_deg: float, longitude_deg: float, time: datetime) -> None:
-    place, time = Place(latitude_deg, longitude_deg), time.replace(microsecond=0)
+    place, time = GeographicPosition(latitude_deg, longitude_deg), time.replace(microsecond=0)
     expected = almanac(place, time)
     if expected.elevation_deg > 3:
         lifted = SunAngles(expected.azimuth_deg, expected.elevation_deg + lifted_deg(expected.elevation_deg))
@@ -77,7 +77,7 @@ def test_anywhere_at_any_time_it_is_where_the_almanac_says(latitude_deg: float, 
 def test_at_solstices_and_equinoxes_it_stands_over_tropics_and_equator(time: str, latitude_deg: float) -> None:
     """Times as published for the year 2024, to the minute."""
     moment = datetime.fromisoformat(time)
-    highest = max(sun_angles(Place(latitude_deg, lon / 4), moment).elevation_deg for lon in range(-720, 720))
+    highest = max(sun_angles(GeographicPosition(latitude_deg, lon / 4), moment).elevation_deg for lon in range(-720, 720))
     assert highest > 89.87, "a longitude within an eighth of a degree, on the parallel to 0.02°"
 
 
@@ -105,14 +105,14 @@ def test_the_same_moment_in_any_zone_is_the_same() -> None:
     ("longitude_deg", "offset_h"), [(0.0, 0), (7.4, 0), (7.5, 1), (11.4, 1), (-7.6, -1), (-122.4, -8), (151.2, 10), (180.0, 12), (-180.0, -12)]
 )
 def test_a_day_has_sixteen_full_hours_of_the_longitudes_own_zone(longitude_deg: float, offset_h: int) -> None:
-    hours = hours_of(Place(10.0, longitude_deg), date(2026, 6, 21))
+    hours = hours_of(GeographicPosition(10.0, longitude_deg), date(2026, 6, 21))
     assert len(hours) == 16
     assert hours[0].astimezone(UTC) == datetime(2026, 6, 21, 5, tzinfo=UTC) - timedelta(hours=offset_h)
     assert [after - before for before, after in itertools.pairwise(hours)] == [timedelta(hours=1)] * 15
-    assert max(hours, key=lambda time: sun_angles(Place(40.0, longitude_deg), time).elevation_deg).hour in (12, 13)
+    assert max(hours, key=lambda time: sun_angles(GeographicPosition(40.0, longitude_deg), time).elevation_deg).hour in (12, 13)
 
 
 @pytest.mark.parametrize("place", [(91, 0), (0, 181), (-90.5, 0), (0, -999), (math.nan, 0)])
 def test_places_that_are_none_are_refused(place: tuple[float, float]) -> None:
     with pytest.raises(BadRequest, match="place"):
-        Place(*place).checked()
+        GeographicPosition(*place).checked()

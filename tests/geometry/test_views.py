@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from map3d.errors import BadRequest
-from map3d.geometry.views import axes, check_angles, dot, local_from_uvd, parse_view_id, uvd_from_local, view_id
+from map3d.geometry.views import axes, check_angles, dot, local_from_uvd, parse_view, parse_view_id, uvd_from_local, view_id
 from map3d.types import ViewAngles
 
 VECTORS = json.loads((Path(__file__).parents[2] / "spec" / "vectors" / "views.json").read_text())
@@ -70,6 +70,37 @@ def test_ids_have_no_exponent():
 def test_other_spellings_of_a_view_are_refused(text):
     with pytest.raises(BadRequest):
         parse_view_id(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "angles"),
+    [
+        ("45-22.5", (45, 22.5)),
+        ("45/22.5", (45, 22.5)),
+        ("0/90", (0, 90)),
+        ("45.0/022.50", (45, 22.5)),
+        (" 45 / 22.5 ", (45, 22.5)),
+        ("1e2/4.5e1", (100, 45)),
+        ("315", (315, 45)),
+        ("0", (0, 45)),
+    ],
+)
+def test_a_view_is_parsed_with_a_slash_or_a_hyphen_and_printed_with_a_hyphen(text, angles):
+    assert parse_view(text) == ViewAngles(*angles)
+    assert view_id(parse_view(text)) == view_id(ViewAngles(*angles))
+
+
+@pytest.mark.parametrize("angles", GRID)
+def test_every_view_id_is_a_view(angles):
+    assert parse_view(view_id(angles)) == check_angles(angles)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "/", "-", "45/", "/45", "north", "45/22.5/1", "45-22-1", "360/45", "-45/30", "-45-30", "0/0", "0/91", "nan/45", "0/inf"]
+)
+def test_text_that_is_not_a_view_is_refused(text):
+    with pytest.raises(BadRequest, match=r"view|look-at|pitch"):
+        parse_view(text)
 
 
 @pytest.mark.parametrize("angles", [(-1, 45), (360, 45), (0, 0), (0, 90.1), (math.nan, 45), (0, math.nan), (math.inf, 45)])

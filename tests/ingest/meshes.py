@@ -33,7 +33,8 @@ def write_asset(
     ]
     body = b""
     for part in parts:
-        body += b"\0" * (-len(body) % 64) + part.tobytes()
+        body += part.tobytes()
+        body += b"\0" * (-len(body) % 64)
     head = b"M3DA" + (1).to_bytes(4, "little") + xxhash.xxh3_64_intdigest(body).to_bytes(8, "little")
     head += len(positions).to_bytes(8, "little") + nt.to_bytes(8, "little")
     (folder / "mesh.m3a").write_bytes(head.ljust(64, b"\0") + body)

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from map3d.errors import Corrupt
-from map3d.ingest.asset import asset_digest, new_objects, open_mesh, put_in_place, read_objects, world_boxes, write_ids
+from map3d import _core
+from map3d.ingest.asset import asset_digest, new_objects, put_in_place, read_objects, world_boxes, write_ids
 from map3d.ingest.importing import choose_origin
 from map3d.renderings.scene_files import check_file
 from tests.ingest.meshes import write_asset
@@ -46,8 +46,8 @@ def test_a_mesh_that_is_not_one_is_refused(tmp_path: Path, change: "object") -> 
     folder = write_asset(tmp_path / "a", POINTS, TRIANGLES, [0, 1])
     path = folder / "mesh.m3a"
     path.write_bytes(change(path.read_bytes()))
-    with pytest.raises(Corrupt, match=r"mesh\.m3a"):
-        open_mesh(folder)
+    with pytest.raises(_core.FormatError, match=r"mesh\.m3a"):
+        world_boxes(folder, 2)
     assert check_file(path) is not None
 
 

@@ -16,6 +16,7 @@ from map3d.jobs.timeouts import Timeouts
 from map3d.renderings.create import add_layers, add_views
 from map3d.renderings.layers import LayerRequest
 from map3d.renderings.manifest_writer import stored_occupancy
+from map3d.renderings.plan import planned_occupancy
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.types import BlockId, TileId, ViewAngles
@@ -178,10 +179,9 @@ def test_stopped_run_announces_open_tiles_and_can_be_resumed(workspace: Workspac
     assert not found.complete
     for view in found.views:
         with SqliteTileStore(workspace.store_path("r", view.frame.id), read_only=True) as store:
-            assert view.occupancy == view.occupancy | stored_occupancy(store)
-        zmax = view.frame.zmax
-        planned = scene.occupied("", zmax)
-        assert all(tile in view.occupancy or planned[tile.y, tile.x] for tile in view.occupancy.tiles(zmax))
+            stored, planned = stored_occupancy(store), planned_occupancy(scene, view.frame)
+        assert view.occupancy == view.occupancy | stored
+        assert view.occupancy | planned == planned | stored
     (faults / "slow").unlink()
     _, result = run_all(workspace, catalogue, scene)
     assert result.complete

@@ -1,6 +1,5 @@
 """Scenes for the oracles: built by the command line, as a user would."""
 
-import json
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,7 +12,8 @@ import pytest
 from map3d import _core
 from map3d.catalogue import Workspace
 from map3d.cli.app import run
-from map3d.renderings.plan import frame_text
+from map3d.geometry.frames import core_frame
+from map3d.tiles.occupancy import xy_from_morton
 from map3d_town import TownSpec, make_town
 
 from .asset import Asset, read_asset
@@ -23,7 +23,7 @@ pytest.importorskip("mitsuba", reason="the oracle needs Mitsuba 3: pip install m
 
 @dataclass(frozen=True, eq=False)
 class Built:
-    """A built scene and a rendering of it: frames by view id, as the core takes them."""
+    """A built scene and a rendering of it: fields of frames by view id."""
 
     folder: Path
     scene: _core.Scene
@@ -49,11 +49,12 @@ class Built:
 @cache
 def _busiest(built: Built, view: str) -> list[tuple[int, int]]:
     """Of 64 occupied tiles, evenly chosen: enough to find where the town is."""
-    frame = json.dumps(built.frames[view])
-    places = np.argwhere(built.scene.occupied(frame, built.frames[view]["zmax"]))
-    step = max(1, len(places) // 64)
+    frame = core_frame(built.frames[view])
+    columns, lines = xy_from_morton(built.scene.occupied(frame, frame.zmax))
+    tiles = sorted(zip(lines, columns, strict=True))
+    step = max(1, len(tiles) // 64)
     rows = []
-    for y, x in places[::step]:
+    for y, x in tiles[::step]:
         ids = built.scene.gbuffer(frame, int(x), int(y))["id"]
         rows.append((len(np.unique(ids)) * (ids > 0).mean(), int(x), int(y)))
     return [(x, y) for _, x, y in sorted(rows, reverse=True)]
@@ -99,7 +100,7 @@ def _frames(workspace: Path, rendering: str) -> dict[str, dict]:
     catalogue = Workspace(workspace).open_catalogue()
     try:
         record = catalogue.rendering(rendering)
-        return {track.id: json.loads(frame_text(track)) for track in record.tracks}
+        return {track.id: track.frame.to_json(track.layers) for track in record.tracks}
     finally:
         catalogue.close()
 

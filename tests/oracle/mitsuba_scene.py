@@ -13,7 +13,7 @@ from .asset import Asset
 mi.set_variant("llvm_ad_rgb")
 
 Frame = dict
-"""As map3d._core takes it (JSON): look_at_deg, pitch_deg, u0_m, v0_m, d0_m, size_m, tile_px, zmax."""
+"""Fields of a `_core.Frame`: look_at_deg, pitch_deg, u0_m, v0_m, d0_m, size_m, tile_px, zmax."""
 
 
 @dataclass(frozen=True)

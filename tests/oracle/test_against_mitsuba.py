@@ -1,9 +1,9 @@
 """An independent renderer agrees, at the pixel's centre and over the pixel's box."""
 
-import json
-
 import numpy as np
 import pytest
+
+from map3d.geometry.frames import core_frame
 
 from .compare import edges, gradient_energy, psnr, srgb_from_linear
 from .conftest import Built
@@ -27,7 +27,7 @@ def test_depth_normal_and_id_agree_away_from_edges(pair: tuple[Built, MitsubaSce
     good = {"depth": 0, "id": 0, "normal": 0}
     counted = 0
     for x, y in built.busiest_tiles(view, 4):
-        ours = built.scene.gbuffer(json.dumps(frame), x, y)
+        ours = built.scene.gbuffer(core_frame(frame), x, y)
         theirs = mitsuba.hits(frame, x, y)
         theirs_hit = np.isfinite(theirs.depth)
         grounded = ours["id"] == _ground_id(built)
@@ -49,7 +49,7 @@ def test_colour_is_the_average_over_the_pixels_box(pair: tuple[Built, MitsubaSce
     built, mitsuba = pair
     frame = built.frames[view]
     (tile,) = built.busiest_tiles(view, 1)
-    ours = built.scene.gbuffer(json.dumps(frame), *tile)
+    ours = built.scene.gbuffer(core_frame(frame), *tile)
     theirs = srgb_from_linear(mitsuba.albedo(frame, *tile, samples=1024))
     mine = srgb_from_linear(ours["color"][..., :3] / 65535.0)
     hits = mitsuba.hits(frame, *tile)
@@ -70,7 +70,7 @@ def _ground_id(built: Built) -> int:
         int(i)
         for view in VIEWS
         for x, y in built.busiest_tiles(view, 1)
-        for i in np.unique(built.scene.gbuffer(json.dumps(built.frames[view]), x, y)["id"])
+        for i in np.unique(built.scene.gbuffer(core_frame(built.frames[view]), x, y)["id"])
     }
     strangers = seen - known - {0}
     assert len(strangers) <= 1

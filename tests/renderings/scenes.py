@@ -5,8 +5,10 @@ import json
 
 import numpy as np
 
+from map3d import _core
 from map3d.catalogue import RenderingRecord
 from map3d.geometry.frames import pin
+from map3d.tiles.naming import morton
 from map3d.types import Box, Layer, ViewAngles
 
 LAYERS = (Layer("color", "color", "webp", 80), Layer("id", "id", "png"))
@@ -18,15 +20,13 @@ class SquareScene:
     def __init__(self, content: dict[tuple[float, float], str], box: Box = ((0.0, 0.0, 0.0), (100.0, 100.0, 10.0))) -> None:
         self.content, self.box = content, box
 
-    def occupied(self, frame: str, level: int, within: tuple[int, np.ndarray] | None = None) -> np.ndarray:
-        grid = np.zeros((2**level, 2**level), bool)
-        for u, v in self.content:
-            block = None if within is None else [int(u * 2 ** within[0]), int(v * 2 ** within[0])]
-            grid[int(v * 2**level), int(u * 2**level)] = within is None or block in within[1].tolist()
-        return grid
+    def occupied(self, frame: _core.Frame, level: int, within: tuple[int, np.ndarray] | None = None) -> np.ndarray:
+        z, blocks = (0, [[0, 0]]) if within is None else (within[0], within[1].tolist())
+        mine = [(u, v) for u, v in self.content if [int(u * 2**z), int(v * 2**z)] in blocks]
+        return np.array(sorted({morton(int(u * 2**level), int(v * 2**level)) for u, v in mine}), np.uint64)
 
-    def block_keys(self, frame: str, z: int, blocks: np.ndarray) -> list[str]:
-        return [self._block_key(frame, z, int(x), int(y)) for x, y in blocks]
+    def block_keys(self, frame: _core.Frame, z: int, blocks: np.ndarray) -> list[str]:
+        return [self._block_key(repr(frame), z, int(x), int(y)) for x, y in blocks]
 
     def _block_key(self, frame: str, z: int, x: int, y: int) -> str:
         mine = [name for (u, v), name in sorted(self.content.items()) if (int(u * 2**z), int(v * 2**z)) == (x, y)]

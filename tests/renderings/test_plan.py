@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from map3d.errors import LimitExceeded, OutsideFrame
-from map3d.renderings.plan import plan_jobs, planned_occupancy
+from map3d.errors import OutsideFrame
+from map3d.renderings.plan import plan_jobs
 from map3d.tiles.naming import block_above, block_levels
 from map3d.types import BlockId, Layer, ViewAngles
 from tests.renderings.scenes import SquareScene, rendering
@@ -90,12 +90,6 @@ def test_content_that_left_the_frame_is_refused_naming_regrid() -> None:
     far = SquareScene(CONTENT, box=((0.0, 0.0, 0.0), (900.0, 100.0, 10.0)))
     with pytest.raises(OutsideFrame, match="--regrid"):
         plan_jobs(far, rendering(), {})
-
-
-def test_a_plan_too_deep_is_refused_saying_so() -> None:
-    record = rendering(res_m=0.00002, views=(ViewAngles(0, 45),))
-    with pytest.raises(LimitExceeded, match="--res"):
-        planned_occupancy(SquareScene({}), record, record.frames[0])
 
 
 def test_progress_counts_every_view() -> None:

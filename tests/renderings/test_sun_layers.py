@@ -12,7 +12,7 @@ from pyproj import CRS, Geod, Proj, Transformer
 from map3d.catalogue import SceneCrs, SceneRecord
 from map3d.errors import BadRequest
 from map3d.geometry.crs import parse_crs
-from map3d.geometry.sun import Place, SunAngles, sun_angles
+from map3d.geometry.sun import GeographicPosition, SunAngles, sun_angles
 from map3d.ingest.scene_crs import LOCAL, to_scene_crs
 from map3d.renderings.grid_north import GridNorth
 from map3d.renderings.layers import LayerRequest
@@ -90,14 +90,14 @@ def test_noon_sun_is_in_the_north_of_cape_town_where_axes_point_south_and_west()
 
 def test_sun_position_is_that_of_the_scene_centre() -> None:
     sun = sun_of(scene_at("EPSG:25832", 15.9, 48.2), LightRequest(time=TIME.replace(microsecond=999_999)))
-    expected = sun_angles(Place(48.2, 15.9), TIME)
+    expected = sun_angles(GeographicPosition(48.2, 15.9), TIME)
     assert (sun.time, sun.azimuth_deg, sun.elevation_deg) == ("2026-06-21T13:00:00Z", *map(pytest.approx, expected))
     assert math.degrees(math.asin(sun.direction[2])) == pytest.approx(sun.elevation_deg)
 
 
 def test_local_scene_has_north_along_y() -> None:
-    sun = sun_of(LOCAL_SCENE, LightRequest(time=TIME, place=Place(48.2, 15.9)))
-    a, e = map(math.radians, sun_angles(Place(48.2, 15.9), TIME))
+    sun = sun_of(LOCAL_SCENE, LightRequest(time=TIME, place=GeographicPosition(48.2, 15.9)))
+    a, e = map(math.radians, sun_angles(GeographicPosition(48.2, 15.9), TIME))
     assert sun.direction == pytest.approx((math.sin(a) * math.cos(e), math.cos(a) * math.cos(e), math.sin(e)))
     assert sun_of(LOCAL_SCENE, LightRequest(sun=SunAngles(90.0, 45.0))) == Sun(None, 90.0, 45.0, pytest.approx((0.5**0.5, 0.0, 0.5**0.5), abs=1e-12))
 
@@ -119,7 +119,7 @@ def test_sun_below_the_horizon_is_part_of_a_day_but_refused_as_a_single_sun() ->
 
 
 def test_layers_have_the_parameters_of_their_kinds_in_the_order_of_kinds() -> None:
-    light = LightRequest(time=TIME, day=DAY, radius_m=7.5, place=Place(48.0, 11.0))
+    light = LightRequest(time=TIME, day=DAY, radius_m=7.5, place=GeographicPosition(48.0, 11.0))
     names = ("picture", "depth2", "behind=depth", "ao", "hours=sun16", "noon=sun", "color")
     layers = LayerRequest(names, "jpeg", 70, light).layers(LOCAL_SCENE, BOX)
     assert [(layer.name, layer.kind, layer.format, layer.quality, len(layer.suns), layer.radius_m) for layer in layers] == [
@@ -141,16 +141,16 @@ def test_layers_have_the_parameters_of_their_kinds_in_the_order_of_kinds() -> No
         (("sun",), LightRequest(), "--time"),
         (("picture",), LightRequest(radius_m=5.0), "--time"),
         (("sun",), LightRequest(time=TIME, sun=SunAngles(0, 1)), "either"),
-        (("sun",), LightRequest(time=TIME.replace(tzinfo=None), place=Place(0, 0)), "zone"),
+        (("sun",), LightRequest(time=TIME.replace(tzinfo=None), place=GeographicPosition(0, 0)), "zone"),
         (("sun",), LightRequest(time=TIME), "--place"),
-        (("sun16",), LightRequest(place=Place(0, 0)), "--date"),
+        (("sun16",), LightRequest(place=GeographicPosition(0, 0)), "--date"),
         (("sun16",), LightRequest(day=DAY), "--place"),
-        (("sun",), LightRequest(time=TIME, place=Place(0, 200)), "longitudes"),
+        (("sun",), LightRequest(time=TIME, place=GeographicPosition(0, 200)), "a longitude"),
         (("sun",), LightRequest(sun=SunAngles(360.0, 10.0)), "azimuth"),
         (("sun",), LightRequest(sun=SunAngles(0.0, 0.0)), "elevation"),
         (("sun",), LightRequest(sun=SunAngles(0.0, math.nan)), "elevation"),
         (("color",), LightRequest(time=TIME), "--time and --sun"),
-        (("sun16",), LightRequest(sun=SunAngles(0.0, 10.0), day=DAY, place=Place(0, 0)), "--time and --sun"),
+        (("sun16",), LightRequest(sun=SunAngles(0.0, 10.0), day=DAY, place=GeographicPosition(0, 0)), "--time and --sun"),
         (("ao",), LightRequest(day=DAY), "--date"),
         (("color", "sun"), LightRequest(sun=SunAngles(0.0, 10.0), radius_m=5.0), "--ao-radius"),
         (("ao",), LightRequest(radius_m=0.4), "0.5 to 200"),
@@ -164,7 +164,7 @@ def test_missing_or_unused_options_are_refused(names: tuple[str, ...], light: Li
 
 def test_place_for_a_located_scene_is_refused() -> None:
     with pytest.raises(BadRequest, match="leave --place out"):
-        sun_of(scene_at("EPSG:25832", 9.0, 48.0), LightRequest(time=TIME, place=Place(48.0, 9.0)))
+        sun_of(scene_at("EPSG:25832", 9.0, 48.0), LightRequest(time=TIME, place=GeographicPosition(48.0, 9.0)))
 
 
 def test_point_outside_the_coordinate_system_is_refused() -> None:

@@ -17,7 +17,9 @@ SIDE = 2**FRAME.zmax
 
 
 def manifest_of(grid):
-    view = ManifestView(FRAME, Occupancy.from_grid(grid), ({BlockId(0, 0, 0): 7},))
+    rows, columns = np.nonzero(grid)
+    occupancy = Occupancy.from_tiles(FRAME.zmax, zip(columns, rows, strict=True))
+    view = ManifestView(FRAME, occupancy, ({BlockId(0, 0, 0): 7},))
     layers = (Layer("normal", "normal", "png"), Layer("color", "color", "webp"))
     return Manifest("x", 7, True, ManifestCrs("local metres"), (0.0, 0.0, 0.0), BOX, (layers,), (view,))
 

@@ -4,12 +4,11 @@ import io
 
 import numpy as np
 import pytest
-import xxhash
 from PIL import Image
 
 from map3d.errors import Corrupt
 from map3d.types import Layer, Sun
-from map3d.verify.decode import check_seam, decode_tile, ids_of
+from map3d.verify.decode import decode_tile, ids_of
 
 LAYERS = (Layer("color", "color", "webp", 80), Layer("id", "id", "png"))
 
@@ -65,41 +64,3 @@ def test_ids_are_little_endian_and_nothing_is_left_out() -> None:
     pixels[0, 0] = (4, 3, 2, 1)
     pixels[0, 1] = (7, 0, 0, 0)
     assert ids_of(pixels).tolist() == [7, 0x01020304]
-
-
-def seam(size: int = 256, arrays: int = 0b1101, version: int = 2) -> bytes:
-    body = b"M3DG" + b"".join(value.to_bytes(4, "little") for value in (version, size, size, arrays))
-    body += b"".join((4 + bit).to_bytes(4, "little") + b"zstd" + b"." * bit for bit in range(32) if arrays >> bit & 1)
-    return body + xxhash.xxh3_64_intdigest(body).to_bytes(8, "little")
-
-
-def test_a_whole_seam_passes_and_any_change_does_not() -> None:
-    good = seam()
-    check_seam(good, 256, LAYERS)
-    for at in range(0, len(good), 3):
-        changed = bytearray(good)
-        changed[at] ^= 1
-        with pytest.raises(Corrupt):
-            check_seam(bytes(changed), 256, LAYERS)
-    for broken in (b"", good[:20], good[:-1], good + b"x", seam(512), seam(version=1), seam(version=3)):
-        with pytest.raises(Corrupt):
-            check_seam(broken, 256, LAYERS)
-
-
-@pytest.mark.parametrize(
-    ("kinds", "arrays"),
-    [
-        (("color", "normal", "id", "depth"), 0b000001111),
-        (("normal",), 0b000001110),
-        (("sun",), 0b000011100),
-        (("sun16", "ao"), 0b001101100),
-        (("depth2",), 0b010001100),
-        (("picture", "color"), 0b100001101),
-    ],
-)
-def test_a_seam_has_the_arrays_of_its_layers_and_always_id_and_depth(kinds: tuple[str, ...], arrays: int) -> None:
-    layers = [LIGHT[kind][0] if kind in LIGHT else Layer(f"my-{kind}", kind, "png") for kind in kinds]
-    check_seam(seam(arrays=arrays), 256, layers)
-    for bit in range(10):
-        with pytest.raises(Corrupt, match="seam with arrays"):
-            check_seam(seam(arrays=arrays ^ 1 << bit), 256, layers)

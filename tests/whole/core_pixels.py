@@ -11,7 +11,8 @@ from map3d import _core
 from map3d.catalogue import RenderingRecord, Workspace
 from map3d.geometry.frames import PinnedFrame
 from map3d.registry import Registry
-from map3d.renderings.plan import frame_text
+from map3d.renderings.plan import track_frame
+from map3d.tiles.occupancy import xy_from_morton
 from map3d.types import TileId
 
 MIN_PIXELS = 400
@@ -34,14 +35,15 @@ class CoreView:
         self.record: RenderingRecord = catalogue.rendering(rendering)
         catalogue.close()
         self.frame: PinnedFrame = next(frame for frame in self.record.frames if frame.id == view)
-        self._text = frame_text(self.record.tracks_of(self.frame)[0])
+        self._frame = track_frame(self.record.tracks_of(self.frame)[0])
         self._scene = _core.Scene(str(workspace / "scenes" / self.record.scene))
         self._registry = workspace / "scenes" / self.record.scene / "registry.sqlite"
 
     def tiles(self) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
         """Yields (x, y, G-buffer) of every tile of the deepest level that may have content."""
-        for y, x in np.argwhere(self._scene.occupied(self._text, self.frame.zmax)):
-            yield int(x), int(y), self._scene.gbuffer(self._text, int(x), int(y))
+        columns, rows = xy_from_morton(self._scene.occupied(self._frame, self.frame.zmax))
+        for y, x in sorted(zip(rows.tolist(), columns.tolist(), strict=True)):
+            yield x, y, self._scene.gbuffer(self._frame, x, y)
 
     def mosaic(self, kind: str) -> NDArray[Any]:
         """Returns the (side, side) array of the whole deepest level; 0 in tiles without content."""

@@ -1,4 +1,4 @@
-//! One error type for the whole core; each leaf says what, where, got and expected.
+//! The one error type of the core; each message says what, where, got and expected.
 
 use std::path::{Path, PathBuf};
 
@@ -6,10 +6,10 @@ pub type Result<T> = std::result::Result<T, Error>;
 
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// A file is not what it claims to be.
+    /// A file is truncated or malformed, or has another magic, version or checksum.
     #[error("{path}: {what}")]
     Format { path: PathBuf, what: String },
-    /// A limit was met; raise it by name if the data are honest.
+    /// The input exceeds a limit.
     #[error("{path}: {what} is {got}, over the limit {limit} = {value}")]
     Limit { path: PathBuf, what: &'static str, got: u64, limit: &'static str, value: u64 },
     /// A caller's misuse.

@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 
 pub const HEADER_BYTES: usize = 64;
 pub const ALIGN: usize = 64;
-/// Memory of a mapping that a pass over it lets go of at a time.
+/// Resident bytes of a mapping between two releases in a pass over it.
 pub const RELEASED_BYTES: usize = 1 << 26;
 
 /// Rounds up to the alignment of sections.
@@ -29,12 +29,12 @@ pub fn header_start(magic: &[u8; 4], version: u32, checksum: u64) -> [u8; 16] {
     out
 }
 
-/// Checksum of a body: xxh3-64 with seed 0.
+/// Computes the checksum of a body: xxh3-64 with seed 0.
 pub fn checksum(body: &[u8]) -> u64 {
     XxHash3_64::oneshot(body)
 }
 
-/// The same, letting go of the mapping's memory on the way.
+/// As `checksum`; drops resident pages on the way.
 fn mapped_checksum(map: &Mmap) -> u64 {
     let mut hasher = XxHash3_64::new();
     for piece in map[HEADER_BYTES..].chunks(RELEASED_BYTES) {
@@ -44,20 +44,20 @@ fn mapped_checksum(map: &Mmap) -> u64 {
     hasher.finish()
 }
 
-/// Maps a file read-only. The file must not be changed in place while mapped: map3d's writers write elsewhere and rename.
+/// Maps a file read-only. Nothing may change the file in place while it is mapped: map3d's writers write another file and rename it.
 pub fn map(path: &Path) -> Result<Mmap> {
     let file = File::open(path).map_err(|e| Error::storage(path, e))?;
     // SAFETY: files of a workspace are written once under another name and renamed; a mapping never sees a write.
     unsafe { Mmap::map(&file) }.map_err(|e| Error::storage(path, e))
 }
 
-/// Lets go of the memory that a mapping took up to now; what is looked at again comes back from the file. A failure changes nothing but memory.
+/// Drops resident pages of a mapping; they are re-read on access. A failure costs memory only.
 pub fn release(map: &Mmap) {
-    // SAFETY: the mapping is of a file and read-only, so what is dropped is read again as it was.
+    // SAFETY: the mapping is a read-only one of a file, so dropped pages are read again unchanged.
     let _ = unsafe { map.unchecked_advise(memmap2::UncheckedAdvice::DontNeed) };
 }
 
-/// Checks magic, version and, on demand, the checksum over everything after `HEADER_BYTES`.
+/// Checks magic, version and, if asked, the checksum over everything after `HEADER_BYTES`.
 pub fn check_header(path: &Path, bytes: &[u8], magic: &[u8; 4], version: u32, with_checksum: bool) -> Result<()> {
     if bytes.len() < HEADER_BYTES || &bytes[..4] != magic {
         return Err(Error::format(path, format!("not a {} file", String::from_utf8_lossy(magic))));
@@ -75,6 +75,15 @@ pub fn check_mapped(path: &Path, map: &Mmap, magic: &[u8; 4], version: u32) -> R
     compare(path, map, mapped_checksum(map))
 }
 
+/// Checks magic, version and checksum of a file of any of these formats (magic, version).
+pub fn check_any(path: &Path, formats: &[(&[u8; 4], u32)]) -> Result<()> {
+    let map = map(path)?;
+    match formats.iter().find(|(magic, _)| map.starts_with(*magic)) {
+        Some((magic, version)) => check_mapped(path, &map, magic, *version),
+        None => Err(Error::format(path, format!("not a file of map3d: it begins with {:?}", &map[..map.len().min(4)]))),
+    }
+}
+
 fn compare(path: &Path, bytes: &[u8], actual: u64) -> Result<()> {
     let stored = u64::from_le_bytes(bytes[8..16].try_into().expect("8 bytes"));
     match stored == actual {
@@ -83,7 +92,7 @@ fn compare(path: &Path, bytes: &[u8], actual: u64) -> Result<()> {
     }
 }
 
-/// `count` records of `T` at `offset`, or an error that says the file is too short. `offset` must be aligned for `T`.
+/// Returns `count` records of `T` at `offset`, which must be aligned for `T`; fails for a file that is too short.
 pub fn section<'a, T: Pod>(path: &Path, bytes: &'a [u8], offset: usize, count: usize) -> Result<&'a [T]> {
     let end = count.checked_mul(size_of::<T>()).and_then(|n| offset.checked_add(n));
     let slice = end.and_then(|end| bytes.get(offset..end));

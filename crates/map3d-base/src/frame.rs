@@ -1,9 +1,10 @@
-//! The pinned frame of a view (spec/pyramid.md §2) as the core receives it.
+//! The pinned frame of a view with the layers of a pass (spec/pyramid.md §2, §8).
 
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::tile::{MAX_LEVEL, Tile};
+use crate::limits::{AO_RADIUS_M, DEEPEST_LEVEL, MAX_SUNS, QUALITY, TILE_PX};
+use crate::tile::Tile;
 use crate::vec3::{Vec3, length};
 use crate::view::ViewAxes;
 
@@ -37,13 +38,13 @@ pub struct LayerSpec {
     /// For lossy formats, 1..=100.
     #[serde(default = "default_quality")]
     pub quality: u8,
-    /// Time is spent for fewer bytes.
+    /// Trades encoding time for fewer bytes.
     #[serde(default)]
     pub small: bool,
-    /// Towards the suns of `Sun` and `Picture` (one) and `Sun16` (up to 16), local axes.
+    /// Unit vectors towards the suns, local axes: one for `Sun` and `Picture`, up to 16 for `Sun16`.
     #[serde(default)]
     pub suns: Vec<Vec3>,
-    /// Of `Ao` and `Picture`.
+    /// Radius of ambient occlusion, for `Ao` and `Picture`.
     #[serde(default)]
     pub radius_m: f64,
 }
@@ -52,12 +53,8 @@ fn default_quality() -> u8 {
     80
 }
 
-/// Suns of `Sun16` at most.
-pub const MAX_SUNS: usize = 16;
-const MAX_RADIUS_M: f64 = 1000.0;
-
 impl LayerSpec {
-    /// A layer of quality 80 without suns.
+    /// Returns a layer of quality 80 without suns.
     pub fn new(kind: LayerKind, format: LayerFormat) -> Self {
         Self { kind, format, quality: default_quality(), small: false, suns: Vec::new(), radius_m: 0.0 }
     }
@@ -74,17 +71,22 @@ impl LayerSpec {
         }
         let is_unit = |v: &Vec3| (length(*v) - 1.0).abs() < 1e-6;
         if let Some(sun) = self.suns.iter().find(|s| !is_unit(s)) {
-            return Err(Error::argument(format!("layer {kind:?}: {sun:?} is no unit vector towards a sun")));
+            return Err(Error::argument(format!("layer {kind:?}: {sun:?} is not a unit vector")));
         }
+        let [least, most] = AO_RADIUS_M;
         let has_radius = matches!(kind, LayerKind::Ao | LayerKind::Picture);
-        if has_radius && !(self.radius_m > 0.0 && self.radius_m <= MAX_RADIUS_M) {
-            return Err(Error::argument(format!("layer {kind:?}: radius_m is {}, expected more than 0 and at most {MAX_RADIUS_M}", self.radius_m)));
+        if has_radius && !(least..=most).contains(&self.radius_m) {
+            return Err(Error::argument(format!("layer {kind:?}: radius_m is {}, expected {least} to {most}", self.radius_m)));
+        }
+        let [least, most] = QUALITY;
+        if !(least..=most).contains(&self.quality) {
+            return Err(Error::argument(format!("layer {kind:?}: quality is {}, expected {least} to {most}", self.quality)));
         }
         Ok(())
     }
 }
 
-/// One view's square, pinned when the rendering was created. Local metres.
+/// A view's square, pinned when the rendering was created, and the layers of a pass. Local metres.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Frame {
     pub look_at_deg: f64,
@@ -100,13 +102,6 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Parses and checks a frame given as JSON.
-    pub fn from_json(text: &str) -> Result<Self> {
-        let frame: Self = serde_json::from_str(text).map_err(|e| Error::argument(format!("frame: {e}")))?;
-        frame.validate()?;
-        Ok(frame)
-    }
-
     pub fn validate(&self) -> Result<()> {
         let numbers = [self.look_at_deg, self.pitch_deg, self.u0_m, self.v0_m, self.d0_m, self.size_m];
         if !numbers.iter().all(|v| v.is_finite()) || self.size_m <= 0.0 {
@@ -115,11 +110,11 @@ impl Frame {
         if !(self.pitch_deg > 0.0 && self.pitch_deg <= 90.0) {
             return Err(Error::argument(format!("frame: pitch_deg is {}, expected 0 < pitch <= 90", self.pitch_deg)));
         }
-        if !matches!(self.tile_px, 256 | 512) {
-            return Err(Error::argument(format!("frame: tile_px is {}, expected 256 or 512", self.tile_px)));
+        if !TILE_PX.contains(&self.tile_px) {
+            return Err(Error::argument(format!("frame: tile_px is {}, expected one of {TILE_PX:?}", self.tile_px)));
         }
-        if self.zmax > MAX_LEVEL {
-            return Err(Error::argument(format!("frame: zmax is {}, at most {MAX_LEVEL}", self.zmax)));
+        if self.zmax > DEEPEST_LEVEL {
+            return Err(Error::argument(format!("frame: zmax is {}, expected at most {DEEPEST_LEVEL}", self.zmax)));
         }
         let twice = (1..self.layers.len()).find(|k| self.layers[..*k].iter().any(|l| l.kind == self.layers[*k].kind));
         if let Some(k) = twice {
@@ -128,7 +123,7 @@ impl Frame {
         self.layers.iter().try_for_each(LayerSpec::validate)
     }
 
-    /// The layer of a kind.
+    /// Returns the layer of a kind.
     pub fn layer(&self, kind: LayerKind) -> Option<&LayerSpec> {
         self.layers.iter().find(|l| l.kind == kind)
     }
@@ -137,19 +132,19 @@ impl Frame {
         ViewAxes::new(self.look_at_deg, self.pitch_deg)
     }
 
-    /// Side of a pixel of a level in metres.
+    /// Returns the side of a pixel of a level in metres.
     pub fn pixel_m(&self, z: u8) -> f64 {
         self.size_m / (f64::from(self.tile_px) * f64::from(2u32.pow(u32::from(z))))
     }
 
-    /// Pixel coordinates of level zmax (right, down, from the square's top left corner) and depth units from D0 of a local point.
+    /// Returns pixel coordinates of level zmax (right, down, from the square's top left corner) and depth units from D0 of a local point.
     pub fn pixel_from_local(&self, axes: &ViewAxes, p: Vec3) -> Vec3 {
         let [u, v, d] = axes.uvd_from_local(p);
         let pixel = self.pixel_m(self.zmax);
         [(u - self.u0_m) / pixel, (self.v0_m - v) / pixel, (d - self.d0_m) * crate::DEPTH_UNITS_PER_M]
     }
 
-    /// View coordinates (U, V) of the centre of pixel (i, j) of a tile.
+    /// Returns view coordinates (U, V) of the centre of pixel (i, j) of a tile.
     pub fn uv_of_pixel(&self, tile: Tile, i: u32, j: u32) -> (f64, f64) {
         let px = self.pixel_m(tile.z);
         let column = f64::from(tile.x) * f64::from(self.tile_px) + f64::from(i) + 0.5;

@@ -1,4 +1,4 @@
-//! Instruction sets. Kernels are compiled once for each and chosen at run time; all give equal bytes.
+//! Instruction sets. Each kernel is compiled for all of them and chosen at run time; all give equal bytes.
 
 /// An instruction set that this machine has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -11,7 +11,7 @@ pub enum Isa {
 }
 
 impl Isa {
-    /// All that this machine has, the best last.
+    /// Returns the instruction sets of this machine, the fastest last.
     pub fn available() -> Vec<Self> {
         let mut out = vec![Self::Scalar];
         #[cfg(target_arch = "x86_64")]

@@ -1,11 +1,12 @@
-//! What every part of map3d agrees on: vectors, view frames, tile names, sample positions, asset files, errors.
-//! The pages of `spec/` are the source; this crate does no tracing and knows no image format.
+//! The definitions that all crates share: vectors, view frames, tile names, sample positions, limits, asset files, errors.
+//! The pages of `spec/` are their source; this crate does no tracing and knows no image format.
 
 pub mod asset;
 pub mod error;
 pub mod file;
 pub mod frame;
 pub mod isa;
+pub mod limits;
 pub mod samples;
 pub mod tile;
 pub mod vec3;

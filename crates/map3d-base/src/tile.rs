@@ -1,6 +1,5 @@
 //! Names of tiles and blocks (spec/pyramid.md §3, §8).
 
-pub const MAX_LEVEL: u8 = 26;
 /// Levels between a base block's root and zmax.
 pub const BLOCK_DEPTH: u8 = 3;
 
@@ -23,7 +22,7 @@ impl Tile {
     }
 }
 
-/// Morton number of (x, y): x in the even bits.
+/// Returns the Morton number of (x, y): x in the even bits.
 pub fn morton(x: u32, y: u32) -> u64 {
     spread(x) | spread(y) << 1
 }
@@ -32,7 +31,7 @@ fn spread(v: u32) -> u64 {
     (0..32).fold(0, |acc, bit| acc | (u64::from(v) >> bit & 1) << (2 * bit))
 }
 
-/// Root levels of a pyramid's blocks, deepest first: (root level, levels held). The first is the base blocks'.
+/// Returns (root level, number of levels) of a pyramid's blocks, deepest first: the base blocks, then the reduce blocks.
 pub fn block_levels(zmax: u8) -> Vec<(u8, u8)> {
     let mut root = zmax.saturating_sub(BLOCK_DEPTH);
     let mut steps = vec![(root, zmax - root + 1)];

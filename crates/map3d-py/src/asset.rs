@@ -1,49 +1,17 @@
-//! Batches and asset folders.
+//! Asset folders: written batch by batch, and their meshes read back.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use map3d_base::asset::{self, AssetReport, Materials, Object, Rank};
-use numpy::ndarray::{Array2, ArrayView2};
-use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::ndarray::Array3;
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
+use crate::batch::{Batch, points, rows};
 use crate::errors::{invalid, to_python};
+use crate::frame::{Corners, corners_of};
 use crate::reader::Reader;
-
-/// Triangles of one or more objects, in source order.
-#[pyclass(module = "map3d._core")]
-pub struct Batch(pub asset::Batch);
-
-#[pymethods]
-impl Batch {
-    /// (n, 3) source coordinates; a copy.
-    #[getter]
-    fn positions<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        let flat = self.0.positions.as_flattened().to_vec();
-        Array2::from_shape_vec((self.0.positions.len(), 3), flat).expect("three numbers a point").into_pyarray(py)
-    }
-
-    /// Replaces the positions, e.g. by reprojected ones. Same shape.
-    fn set_positions(&mut self, positions: PyReadonlyArray2<f64>) -> PyResult<()> {
-        let points = points(positions.as_array(), "positions")?;
-        if points.len() != self.0.positions.len() {
-            return Err(invalid(format!("positions: {} points, expected {}", points.len(), self.0.positions.len())));
-        }
-        self.0.positions = points;
-        Ok(())
-    }
-
-    /// True: the positions are in a prototype's own frame, not in the source's CRS.
-    #[getter]
-    fn prototype(&self) -> bool {
-        self.0.prototype > 0
-    }
-
-    #[getter]
-    fn triangle_count(&self) -> usize {
-        self.0.triangles.len()
-    }
-}
 
 /// Tables of an asset that is made in Python.
 #[derive(Default)]
@@ -73,9 +41,9 @@ impl AssetWriter {
         py.detach(|| writer.append(batch)).map_err(to_python)
     }
 
-    /// For assets made in Python: positions (n, 3) world, triangles (t, 3), uvs (t, 3, 2) or None.
+    /// Appends a mesh made in Python: positions (n, 3) world, triangles (t, 3), uvs (t, 3, 2) or None.
     #[pyo3(signature = (positions, triangles, uvs, material, object, rank))]
-    // The six things that a mesh of one material, object and rank is made of.
+    // Three arrays and the three numbers that all triangles share.
     #[allow(clippy::too_many_arguments)]
     fn append_mesh(
         &mut self,
@@ -91,7 +59,7 @@ impl AssetWriter {
         let triangles = points(triangles.as_array(), "triangles")?;
         let n = triangles.len();
         let uvs = uvs.map(|uv| corners(&uv, n)).transpose()?.unwrap_or_default();
-        let rank = rank_of(rank)?;
+        let rank = Rank::from_number(rank).ok_or_else(|| invalid(format!("rank {rank} is out of range 0 to 5")))?;
         let batch = asset::Batch {
             positions,
             triangles,
@@ -105,7 +73,7 @@ impl AssetWriter {
         py.detach(|| writer.append(&batch)).map_err(to_python)
     }
 
-    /// `materials.json` and the objects as a JSON list, for assets made in Python; the caller puts images into `textures/`.
+    /// Sets the tables of an asset made in Python: materials.json and a JSON list of objects. The caller puts images into `textures/`.
     fn set_tables(&mut self, materials: &str, objects: &str) -> PyResult<()> {
         self.tables = Tables {
             materials: serde_json::from_str(materials).map_err(|e| invalid(format!("materials: {e}")))?,
@@ -114,7 +82,7 @@ impl AssetWriter {
         Ok(())
     }
 
-    /// Closes the files; returns report.json. With a reader, its tables and textures are written; without, those of `set_tables`.
+    /// Closes the files and returns report.json. Writes the reader's tables and textures; without a reader, those of `set_tables`.
     #[pyo3(signature = (reader=None))]
     fn finish(&mut self, py: Python<'_>, reader: Option<&Bound<'_, Reader>>) -> PyResult<String> {
         let writer = self.writer.take().ok_or_else(closed)?;
@@ -137,22 +105,7 @@ impl AssetWriter {
 }
 
 fn closed() -> PyErr {
-    invalid("this asset writer is finished")
-}
-
-fn rank_of(rank: u8) -> PyResult<Rank> {
-    [Rank::Terrain, Rank::Road, Rank::Ground, Rank::Other, Rank::Installation, Rank::Opening]
-        .into_iter()
-        .find(|r| *r as u8 == rank)
-        .ok_or_else(|| invalid(format!("rank: {rank}, expected 0..=5")))
-}
-
-/// Rows of three.
-fn points<T: Copy>(array: ArrayView2<T>, what: &str) -> PyResult<Vec<[T; 3]>> {
-    if array.ncols() != 3 {
-        return Err(invalid(format!("{what}: shape {:?}, expected (n, 3)", array.shape())));
-    }
-    Ok(array.rows().into_iter().map(|r| [r[0], r[1], r[2]]).collect())
+    invalid("asset writer: already finished")
 }
 
 fn corners(uvs: &PyReadonlyArray3<f32>, n: usize) -> PyResult<Vec<[[f32; 2]; 3]>> {
@@ -161,4 +114,64 @@ fn corners(uvs: &PyReadonlyArray3<f32>, n: usize) -> PyResult<Vec<[[f32; 2]; 3]>
     }
     let uv = uvs.as_array();
     Ok((0..n).map(|t| [0, 1, 2].map(|c| [uv[[t, c, 0]], uv[[t, c, 1]]])).collect())
+}
+
+/// Boxes of objects, and of prototypes by their numbers.
+type Boxes = (Vec<Option<Corners>>, BTreeMap<u32, Corners>);
+
+/// The mesh of an asset folder, mapped; every index is in range.
+#[pyclass(module = "map3d._core", frozen)]
+pub struct AssetMesh(asset::AssetMesh);
+
+#[pymethods]
+impl AssetMesh {
+    /// Maps a `mesh.m3a` and checks all of it.
+    #[new]
+    fn new(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        py.detach(|| asset::AssetMesh::open(&path)).map(Self).map_err(to_python)
+    }
+
+    /// (nv, 3) world coordinates, those of a prototype in its own frame; a copy, like all arrays of a mesh.
+    #[getter]
+    fn positions<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        rows(py, self.0.positions())
+    }
+
+    /// (nt, 3) vertex numbers.
+    #[getter]
+    fn triangles<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<u32>> {
+        rows(py, self.0.triangles())
+    }
+
+    /// (nt, 3, 2) texture coordinates of the corners.
+    #[getter]
+    fn uvs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray3<f32>> {
+        let flat = self.0.uvs().as_flattened().as_flattened().to_vec();
+        Array3::from_shape_vec((self.0.uvs().len(), 3, 2), flat).expect("six numbers a triangle").into_pyarray(py)
+    }
+
+    /// (nt,) indices into the asset's materials.
+    #[getter]
+    fn materials<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
+        PyArray1::from_slice(py, self.0.materials())
+    }
+
+    /// (nt,) indices into the asset's objects.
+    #[getter]
+    fn objects<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
+        PyArray1::from_slice(py, self.0.objects())
+    }
+
+    /// (nt,) numbers of prototypes; 0 for world geometry.
+    #[getter]
+    fn prototypes<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
+        PyArray1::from_slice(py, self.0.prototypes())
+    }
+
+    /// Boxes of `count` objects in world coordinates, without placed prototypes, and of each prototype in its own frame; None without geometry.
+    fn boxes(&self, py: Python<'_>, count: usize) -> PyResult<Boxes> {
+        let boxes = py.detach(|| self.0.boxes(count)).map_err(to_python)?;
+        let prototypes = boxes.prototypes.iter().filter_map(|(k, bounds)| corners_of(bounds).map(|c| (*k, c)));
+        Ok((boxes.objects.iter().map(corners_of).collect(), prototypes.collect()))
+    }
 }

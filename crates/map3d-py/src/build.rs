@@ -7,24 +7,24 @@ use pyo3::prelude::*;
 
 use crate::errors::{invalid, to_python};
 
-/// Builds a scene's folder; returns the report (JSON). `progress(stage, done, total)` answers False to stop, then `Interrupted` is raised.
+/// Builds a scene's folder and returns the report (JSON). `progress(stage, done, total)` returns False to stop; the build then raises `Interrupted`.
 #[pyfunction]
 #[pyo3(signature = (folder, request, progress=None))]
 pub fn build_scene(py: Python<'_>, folder: PathBuf, request: &str, progress: Option<Py<PyAny>>) -> PyResult<String> {
     let request: BuildRequest = serde_json::from_str(request).map_err(|e| invalid(format!("request: {e}")))?;
     let mut failure = None;
-    let mut ask = |stage: &str, done: u64, total: u64| {
+    let mut report_progress = |stage: &str, done: u64, total: u64| {
         let Some(progress) = &progress else { return true };
-        let answer = Python::attach(|py| {
+        let must_continue = Python::attach(|py| {
             py.check_signals()?;
             progress.call1(py, (stage, done, total))?.is_truthy(py)
         });
-        answer.unwrap_or_else(|error| {
+        must_continue.unwrap_or_else(|error| {
             failure = Some(error);
             false
         })
     };
-    let report = py.detach(|| builder::build_scene(&folder, &request, &mut ask));
+    let report = py.detach(|| builder::build_scene(&folder, &request, &mut report_progress));
     match failure {
         Some(error) => Err(error),
         None => report.map(|r| serde_json::to_string(&r).expect("reports are plain data")).map_err(to_python),

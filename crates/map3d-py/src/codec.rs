@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use map3d_base::{LayerFormat, LayerKind, LayerSpec};
+use map3d_base::LayerKind;
+use map3d_image::GBuffer;
 use map3d_image::encode::{self, Encoder};
-use map3d_image::{Arrays, GBuffer};
 use map3d_texture::TextureFile;
 use numpy::ndarray::{Array2, Array3};
 use numpy::{IntoPyArray, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
@@ -12,8 +12,9 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
 use crate::errors::{invalid, to_python};
+use crate::frame::{parse_format, parse_kind};
 
-/// The arrays that a G-buffer has: color, picture (H, W, 4) uint16, normal (H, W, 3) int16, id, depth, depth2 (H, W) uint32, sun, ao (H, W) uint8, sun16
+/// Returns the arrays that a G-buffer has: color, picture (H, W, 4) uint16, normal (H, W, 3) int16, id, depth, depth2 (H, W) uint32, sun, ao (H, W) uint8, sun16
 /// (H, W) uint16.
 pub fn dict_of<'py>(py: Python<'py>, g: GBuffer) -> PyResult<Bound<'py, PyDict>> {
     let size = (g.height as usize, g.width as usize);
@@ -32,7 +33,7 @@ pub fn dict_of<'py>(py: Python<'py>, g: GBuffer) -> PyResult<Bound<'py, PyDict>>
 
 const SIZES: &str = "a G-buffer's arrays have its size";
 
-/// Unless it is not there.
+/// Sets an array unless the G-buffer lacks it.
 fn set2<T: numpy::Element>(dict: &Bound<'_, PyDict>, name: &str, size: (usize, usize), array: Vec<T>) -> PyResult<()> {
     if array.is_empty() {
         return Ok(());
@@ -66,35 +67,7 @@ fn rows2<T: numpy::Element + Copy>(array: &Bound<'_, PyAny>, what: &str) -> PyRe
     Ok(((w as u32, h as u32), array.as_array().iter().copied().collect()))
 }
 
-/// Id and depth must be there.
-fn gbuffer_of(dict: &Bound<'_, PyDict>) -> PyResult<GBuffer> {
-    let item = |name: &str| dict.get_item(name)?.ok_or_else(|| invalid(format!("G-buffer: no {name}")));
-    let (size, id) = rows2(&item("id")?, "id")?;
-    let fits = |other: (u32, u32), name: &str| if other == size { Ok(()) } else { Err(invalid(format!("G-buffer: {name} differs in size from id"))) };
-    let mut g = GBuffer { id, ..GBuffer::with(0, 0, Arrays::LEAST) };
-    (g.width, g.height) = size;
-    macro_rules! take {
-        ($rows:ident, $name:ident) => {
-            if let Some(array) = dict.get_item(stringify!($name))? {
-                let (size, pixels) = $rows(&array, stringify!($name))?;
-                fits(size, stringify!($name))?;
-                g.$name = pixels;
-            }
-        };
-    }
-    item("depth")?;
-    take!(rows2, depth);
-    take!(rows3, color);
-    take!(rows3, normal);
-    take!(rows2, sun);
-    take!(rows2, sun16);
-    take!(rows2, ao);
-    take!(rows2, depth2);
-    take!(rows3, picture);
-    Ok(g)
-}
-
-/// One layer of a G-buffer as image bytes.
+/// Encodes one layer of a G-buffer as an image.
 #[pyfunction]
 #[pyo3(signature = (kind, format, array, quality=80, small=false))]
 pub fn encode_layer<'py>(
@@ -105,28 +78,21 @@ pub fn encode_layer<'py>(
     quality: u8,
     small: bool,
 ) -> PyResult<Bound<'py, PyBytes>> {
-    let spec = layer_spec(kind, format, quality)?;
+    let (kind, format) = (parse_kind(kind)?, parse_format(format)?);
     let mut encoder = if small { Encoder::small() } else { Encoder::new() };
-    let bytes = match spec.kind {
-        LayerKind::Color | LayerKind::Picture => rows3(array, "color").map(|(size, a)| encoder.color(size, &a, spec.format, quality)),
-        LayerKind::Normal => rows3(array, "normal").map(|(size, a)| encoder.normal(size, &a, spec.format)),
-        LayerKind::Id => rows2(array, "id").map(|(size, a)| encoder.id(size, &a, spec.format)),
-        LayerKind::Depth | LayerKind::Depth2 => rows2(array, "depth").map(|(size, a)| encoder.depth(size, &a, spec.format)),
-        LayerKind::Sun | LayerKind::Ao => rows2(array, "shades").map(|(size, a)| encoder.shade(size, &a, spec.format)),
-        LayerKind::Sun16 => rows2(array, "sun16").map(|(size, a)| encoder.sun16(size, &a, spec.format)),
+    let bytes = match kind {
+        LayerKind::Color | LayerKind::Picture => rows3(array, "color").map(|(size, a)| encoder.color(size, &a, format, quality)),
+        LayerKind::Normal => rows3(array, "normal").map(|(size, a)| encoder.normal(size, &a, format)),
+        LayerKind::Id => rows2(array, "id").map(|(size, a)| encoder.id(size, &a, format)),
+        LayerKind::Depth | LayerKind::Depth2 => rows2(array, "depth").map(|(size, a)| encoder.depth(size, &a, format)),
+        LayerKind::Sun | LayerKind::Ao => rows2(array, "shades").map(|(size, a)| encoder.shade(size, &a, format)),
+        LayerKind::Sun16 => rows2(array, "sun16").map(|(size, a)| encoder.sun16(size, &a, format)),
     }?
     .map_err(to_python)?;
     Ok(PyBytes::new(py, &bytes))
 }
 
-fn layer_spec(kind: &str, format: &str, quality: u8) -> PyResult<LayerSpec> {
-    let named = |name: &str| serde_json::Value::String(name.to_owned());
-    let kind: LayerKind = serde_json::from_value(named(kind)).map_err(|e| invalid(format!("kind: {e}")))?;
-    let format: LayerFormat = serde_json::from_value(named(format)).map_err(|e| invalid(format!("format: {e}")))?;
-    Ok(LayerSpec { quality, ..LayerSpec::new(kind, format) })
-}
-
-/// (H, W, C) of an 8-bit PNG.
+/// Decodes an 8-bit PNG into (H, W, C).
 #[pyfunction]
 pub fn decode_png<'py>(py: Python<'py>, data: &[u8]) -> PyResult<Bound<'py, PyArray3<u8>>> {
     let image = encode::decode_png(data).map_err(to_python)?;
@@ -134,19 +100,7 @@ pub fn decode_png<'py>(py: Python<'py>, data: &[u8]) -> PyResult<Bound<'py, PyAr
     Ok(Array3::from_shape_vec(shape, image.pixels).map_err(|e| invalid(e.to_string()))?.into_pyarray(py))
 }
 
-/// Parent of up to four children in the order TL, TR, BL, BR (spec/pyramid.md §7); at least one must be there.
-#[pyfunction]
-pub fn reduce_gbuffers<'py>(py: Python<'py>, children: Vec<Option<Bound<'py, PyDict>>>) -> PyResult<Bound<'py, PyDict>> {
-    let buffers = children.iter().map(|c| c.as_ref().map(gbuffer_of).transpose()).collect::<PyResult<Vec<_>>>()?;
-    let side = buffers.iter().flatten().map(|g| g.width).next().ok_or_else(|| invalid("children: all four are None"))?;
-    if buffers.len() != 4 || buffers.iter().flatten().any(|g| (g.width, g.height) != (side, side)) {
-        return Err(invalid("children: expected four, square and of one size"));
-    }
-    let [a, b, c, d] = [0, 1, 2, 3].map(|k| buffers[k].as_ref());
-    dict_of(py, map3d_image::reduce([a, b, c, d], side))
-}
-
-/// (H, W, 4) uint8, sRGB with straight alpha, unused texels filled: a level of a .m3t file.
+/// Decodes a level of a .m3t file into (H, W, 4) uint8, sRGB with straight alpha, unused texels filled.
 #[pyfunction]
 pub fn texture_level<'py>(py: Python<'py>, path: PathBuf, level: u32) -> PyResult<Bound<'py, PyArray3<u8>>> {
     let raster = py.detach(|| TextureFile::open(&path)?.level(level)).map_err(to_python)?;

@@ -23,7 +23,7 @@ pub fn to_python(error: Error) -> PyErr {
     }
 }
 
-/// A caller's misuse, from what this skin itself checks.
+/// An `InvalidArgument` that the binding itself raises.
 pub fn invalid(text: impl Into<String>) -> PyErr {
     InvalidArgument::new_err(text.into())
 }

@@ -1,13 +1,18 @@
-//! `map3d._core`: a thin skin over the core's crates. Structured arguments travel as JSON, arrays as NumPy; the GIL is released in every long call.
+//! `map3d._core`: a thin binding of the core's crates. Documents pass as JSON, arrays as NumPy, frames as classes; long calls release the GIL.
 //! The contract is `python/map3d/_core.pyi`.
 
 mod asset;
+mod batch;
+mod block;
 mod build;
 mod codec;
 mod errors;
+mod files;
+mod frame;
 mod reader;
 mod scene;
 
+use map3d_base::limits;
 use pyo3::prelude::*;
 
 #[pymodule]
@@ -15,22 +20,33 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = m.py();
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     m.add("RENDER_FORMAT", map3d_base::RENDER_FORMAT)?;
+    m.add("TILE_PX", (limits::TILE_PX[0], limits::TILE_PX[1]))?;
+    m.add("DEEPEST_LEVEL", limits::DEEPEST_LEVEL)?;
+    m.add("QUALITY", (limits::QUALITY[0], limits::QUALITY[1]))?;
+    m.add("MAX_SUNS", limits::MAX_SUNS)?;
+    m.add("AO_RADIUS_M", (limits::AO_RADIUS_M[0], limits::AO_RADIUS_M[1]))?;
+    m.add("NAME_PATTERN", limits::NAME_PATTERN)?;
+    m.add("OBJECTS_PER_SHARD", limits::OBJECTS_PER_SHARD)?;
     m.add("CoreError", py.get_type::<errors::CoreError>())?;
     m.add("FormatError", py.get_type::<errors::FormatError>())?;
     m.add("LimitError", py.get_type::<errors::LimitError>())?;
     m.add("InvalidArgument", py.get_type::<errors::InvalidArgument>())?;
     m.add("StorageError", py.get_type::<errors::StorageError>())?;
     m.add("Interrupted", py.get_type::<errors::Interrupted>())?;
-    m.add_class::<asset::Batch>()?;
+    m.add_class::<batch::Batch>()?;
     m.add_class::<asset::AssetWriter>()?;
+    m.add_class::<asset::AssetMesh>()?;
     m.add_class::<reader::Reader>()?;
+    m.add_class::<frame::LayerSpec>()?;
+    m.add_class::<frame::Frame>()?;
     m.add_class::<scene::Scene>()?;
-    m.add_class::<scene::Block>()?;
+    m.add_class::<block::Block>()?;
     m.add_function(wrap_pyfunction!(build::build_scene, m)?)?;
-    m.add_function(wrap_pyfunction!(scene::reduce_block, m)?)?;
+    m.add_function(wrap_pyfunction!(block::reduce_block, m)?)?;
+    m.add_function(wrap_pyfunction!(block::check_seam, m)?)?;
+    m.add_function(wrap_pyfunction!(files::check_file, m)?)?;
     m.add_function(wrap_pyfunction!(codec::encode_layer, m)?)?;
     m.add_function(wrap_pyfunction!(codec::decode_png, m)?)?;
-    m.add_function(wrap_pyfunction!(codec::reduce_gbuffers, m)?)?;
     m.add_function(wrap_pyfunction!(codec::texture_level, m)?)?;
     Ok(())
 }

@@ -5,11 +5,10 @@ use std::sync::Mutex;
 
 use map3d_base::asset::{AssetReport, AssetWriter};
 use map3d_read::{DocumentReader, Format, ReadOptions, open, write_tables};
-use numpy::ndarray::Array2;
-use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2};
+use numpy::{PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use crate::asset::Batch;
+use crate::batch::{Batch, rows};
 use crate::errors::{invalid, to_python};
 
 /// One source document, parsed as it is iterated.
@@ -19,7 +18,7 @@ pub struct Reader {
 }
 
 impl Reader {
-    /// Copies images and tables into the asset and closes it.
+    /// Writes images and tables into the asset and closes it.
     pub fn finish_into(&self, writer: AssetWriter) -> map3d_base::Result<AssetReport> {
         write_tables(self.lock().as_ref(), writer)
     }
@@ -45,7 +44,7 @@ impl Reader {
         Ok(Self { document: Mutex::new(document) })
     }
 
-    /// As the source writes it; known before the first batch when the source states one.
+    /// The CRS as the source writes it; known before the first batch if the source names it at its head, else after the last.
     #[getter]
     fn srs_name(&self) -> Option<String> {
         self.lock().srs_name().map(str::to_owned)
@@ -62,8 +61,8 @@ impl Reader {
 
     /// (m, 12) transforms of the instances, row-major 3 × 4, prototype → source CRS; complete after the last batch.
     fn instances<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        let transforms: Vec<f64> = self.lock().instances().iter().flat_map(|i| i.transform).collect();
-        Array2::from_shape_vec((transforms.len() / 12, 12), transforms).expect("twelve numbers an instance").into_pyarray(py)
+        let transforms: Vec<[f64; 12]> = self.lock().instances().iter().map(|i| i.transform).collect();
+        rows(py, &transforms)
     }
 
     fn set_instances(&self, transforms: PyReadonlyArray2<f64>) -> PyResult<()> {

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use map3d_base::limits::{MAX_IMAGE_PX, MAX_IMAGE_SIDE_PX};
 use map3d_base::{Error, Result};
 use serde::Deserialize;
 
@@ -57,8 +58,8 @@ impl Default for ReadOptions {
             lod: None,
             strict: false,
             folder: None,
-            max_image_side_px: 16_384,
-            max_image_px: 128_000_000,
+            max_image_side_px: MAX_IMAGE_SIDE_PX,
+            max_image_px: MAX_IMAGE_PX,
             max_ring_vertices: 1_000_000,
             max_triangles: 200_000_000,
             max_instances: 10_000_000,

@@ -88,8 +88,8 @@ pub fn reduce_block(frame: &Frame, root: Tile, levels: u8, seams: &[(u32, u32, &
 
 /// Fails for a tile outside of its level.
 fn check_tile(tile: Tile) -> Result<()> {
-    let count = 1u64 << tile.z.min(map3d_base::tile::MAX_LEVEL);
-    match tile.z <= map3d_base::tile::MAX_LEVEL && u64::from(tile.x) < count && u64::from(tile.y) < count {
+    let count = 1u64 << tile.z.min(map3d_base::limits::DEEPEST_LEVEL);
+    match tile.z <= map3d_base::limits::DEEPEST_LEVEL && u64::from(tile.x) < count && u64::from(tile.y) < count {
         true => Ok(()),
         false => Err(Error::argument(format!("tile ({}, {}, {}) is out of range", tile.z, tile.x, tile.y))),
     }

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use map3d_base::tile::Tile;
 use map3d_base::{Error, Frame, Result};
 use map3d_scene::{SceneStore, StoreStats};
 use map3d_texture::{CacheStats, TextureCache};
@@ -39,26 +38,19 @@ impl RenderScene {
         SceneStats { chunks: self.store.stats(), textures: self.textures.stats() }
     }
 
-    /// Returns row-major [y, x] flags of the tiles of a level that may have content.
-    pub fn occupied(&self, frame: &Frame, level: u8) -> Result<Vec<bool>> {
-        frame.validate()?;
+    /// Returns the tiles of a level that may have content, as sorted Morton numbers.
+    pub fn occupied(&self, frame: &Frame, level: u8) -> Result<Vec<u64>> {
         map3d_trace::occupied(&self.store, frame, level)
     }
 
-    /// Returns the same flags within blocks of a level above; false outside of them.
-    pub fn occupied_within(&self, frame: &Frame, level: u8, block_level: u8, blocks: &[[u32; 2]]) -> Result<Vec<bool>> {
-        map3d_trace::occupancy::occupied_within(&self.store, frame, level, block_level, blocks)
-    }
-
-    /// Returns a hex hash of everything that a base block's bytes depend on.
-    pub fn block_key(&self, frame: &Frame, root: Tile) -> Result<String> {
-        frame.validate()?;
-        map3d_trace::block_key(&self.store, frame, root)
+    /// Returns those of `occupied` that lie in some blocks of a level above, (x, y) each.
+    pub fn occupied_within(&self, frame: &Frame, level: u8, block_level: u8, blocks: &[[u32; 2]]) -> Result<Vec<u64>> {
+        map3d_trace::occupied_within(&self.store, frame, level, block_level, blocks)
     }
 
     /// Returns the keys of the blocks of a level at (x, y) each.
     pub fn block_keys(&self, frame: &Frame, level: u8, blocks: &[[u32; 2]]) -> Result<Vec<String>> {
-        map3d_trace::occupancy::block_keys(&self.store, frame, level, blocks)
+        map3d_trace::block_keys(&self.store, frame, level, blocks)
     }
 
     /// Fails if a texture could not be read.

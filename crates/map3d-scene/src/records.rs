@@ -105,18 +105,10 @@ pub struct MaterialRecord {
     pub reserved: [u8; 32],
 }
 
-/// Wrap modes by their code.
-pub const WRAP_MODES: [Wrap; 5] = [Wrap::Wrap, Wrap::Mirror, Wrap::Clamp, Wrap::Border, Wrap::None];
-
-/// Returns the code of a wrap mode.
-pub fn wrap_code(wrap: Wrap) -> u8 {
-    WRAP_MODES.iter().position(|w| *w == wrap).expect("WRAP_MODES has every mode") as u8
-}
-
 impl MaterialRecord {
     /// Returns the wrap mode; `Wrap::Wrap` for an unknown code.
     pub fn wrap_mode(&self) -> Wrap {
-        WRAP_MODES.get(usize::from(self.wrap)).copied().unwrap_or(Wrap::Wrap)
+        Wrap::from_code(self.wrap).unwrap_or_default()
     }
 
     pub fn is_textured(&self) -> bool {

@@ -153,6 +153,26 @@ impl SceneStore {
         Ok(chunk)
     }
 
+    /// Returns the local box of an object, conservative for its instances; empty when no chunk and no instance has it.
+    pub fn object_box(&self, id: u32) -> Result<Box3> {
+        let mut found = Box3::EMPTY;
+        for part in &self.parts {
+            if let Some(k) = part.instance {
+                if self.instances[k as usize].object_id == id {
+                    found.add_box(&part.bounds);
+                }
+                continue;
+            }
+            let chunk = self.open_lazily(part.chunk)?;
+            let o = chunk.origin();
+            for object in chunk.objects().iter().filter(|object| object.id == id) {
+                let b = [0, 1, 2, 3, 4, 5].map(|k| o[k % 3] + f64::from(object.bounds[k]));
+                found.add_box(&Box3 { lo: [b[0], b[1], b[2]], hi: [b[3], b[4], b[5]] });
+            }
+        }
+        Ok(found)
+    }
+
     fn open_chunk(&self, number: u32, validated: bool) -> Result<Chunk> {
         let path = self.folder.join(&self.entry(number).file);
         let chunk = if validated { Chunk::open_trusted(&path)? } else { Chunk::open(&path, false)? };

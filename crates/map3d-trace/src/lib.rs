@@ -21,7 +21,7 @@ pub use beam::{BeamTracer, MIXED, NOTHING, Pixel, SUBTILE_PX, VisBuf};
 pub use cutout::{Cutout, CutoutMask, CutoutSample, IgnoreCutouts};
 pub use depth_plane::DepthPlane;
 pub use map3d_base::Isa;
-pub use occupancy::{block_key, occupied};
+pub use occupancy::{block_keys, occupied, occupied_within};
 pub use packet::{AmbientOcclusion, ClosestHits, HitMask, PACKET_SIZE, PacketOrigins, RayPackets, SceneRegion};
 pub use ray::{Hit, Ray, Rays};
 pub use surface::{Affine, SurfaceAttributes};

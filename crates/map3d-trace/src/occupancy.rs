@@ -1,48 +1,47 @@
-//! Which tiles can have content, decided from boxes and never leaving out what can be seen.
+//! Finds the tiles that may have content, conservatively, from boxes and triangles.
 
 mod keys;
 mod reach;
+mod tile_set;
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
+use map3d_base::limits::DEEPEST_LEVEL;
 use map3d_base::{Box3, Error, Frame, Result, Vec3, ViewAxes};
 use map3d_scene::instances::{place, placed_box};
 use map3d_scene::records::{EMPTY, LEAF_BIT};
 use map3d_scene::{LazyChunk, Leaf, ScenePart, SceneStore};
 
-pub use keys::{block_key, block_keys};
+pub use keys::block_keys;
+use tile_set::{TileRange, TileSet};
 
-/// Beyond this the flags would not fit memory.
-const MAX_FLAGS_LEVEL: u8 = 14;
-/// Boxes up to this part of a tile are not looked into.
+/// Boxes up to this part of a tile are marked as a whole.
 const SMALL_TILES: f64 = 0.25;
 
-/// Row-major flags of the 2^level × 2^level tiles of a level: false only where there is nothing.
-pub fn occupied(scene: &SceneStore, frame: &Frame, level: u8) -> Result<Vec<bool>> {
-    let mut flags = Flags::new(frame, level, false)?;
-    flags.mark(scene, frame, level)?;
-    Ok(flags.flags)
+/// Returns the tiles of a level that may have content, as sorted Morton numbers. A tile that is not among them has none.
+pub fn occupied(scene: &SceneStore, frame: &Frame, level: u8) -> Result<Vec<u64>> {
+    occupied_within(scene, frame, level, 0, &[[0, 0]])
 }
 
-/// The same within some blocks of a level above, (x, y) each; false outside of them, where nothing is looked at.
-pub fn occupied_within(scene: &SceneStore, frame: &Frame, level: u8, block_level: u8, blocks: &[[u32; 2]]) -> Result<Vec<bool>> {
-    let mut flags = Flags::new(frame, level, true)?;
-    if block_level > level || blocks.iter().flatten().any(|v| v >> block_level != 0) {
-        return Err(Error::argument(format!("occupancy: a block of level {block_level} does not exist, or lies below level {level}")));
+/// Returns those of `occupied` that lie in some blocks of a level above, (x, y) each; nothing else is looked at.
+pub fn occupied_within(scene: &SceneStore, frame: &Frame, level: u8, block_level: u8, blocks: &[[u32; 2]]) -> Result<Vec<u64>> {
+    frame.validate()?;
+    if level > DEEPEST_LEVEL {
+        return Err(Error::argument(format!("occupancy: level is {level}, expected at most {DEEPEST_LEVEL}")));
     }
-    let (down, side) = (level - block_level, flags.side);
-    let mut inside = vec![false; flags.flags.len()];
-    for [x, y] in blocks {
-        let (x0, y0, count) = ((*x as usize) << down, (*y as usize) << down, 1usize << down);
-        (y0..y0 + count).for_each(|y| inside[y * side + x0..][..count].fill(true));
+    if block_level > level {
+        return Err(Error::argument(format!("occupancy: blocks of level {block_level} are below level {level}")));
     }
-    flags.flags.iter_mut().zip(&inside).for_each(|(f, i)| *f = !i);
-    flags.mark(scene, frame, level)?;
-    Ok(flags.flags.iter().zip(&inside).map(|(f, i)| *f && *i).collect())
+    if let Some([x, y]) = blocks.iter().find(|b| b.iter().any(|v| v >> block_level != 0)) {
+        return Err(Error::argument(format!("occupancy: block {block_level}/{x}/{y} does not exist")));
+    }
+    let mut marker = Marker { view: TileView::new(frame, level), tiles: TileSet::new(level, block_level, blocks) };
+    marker.mark_scene(scene)?;
+    Ok(marker.tiles.numbers())
 }
 
-/// The outlines of prototypes stay open, since many instances ask for them; a chunk is asked for once.
+/// Open outlines: those of prototypes stay open for further instances, of chunks only the last.
 #[derive(Default)]
 struct Outlines {
     prototypes: HashMap<u32, LazyChunk>,
@@ -61,52 +60,16 @@ impl Outlines {
     }
 }
 
-fn descend(chunk: &LazyChunk, transform: Option<&[f64; 12]>, view: &TileView, flags: &mut Flags) -> Result<()> {
-    let origin = chunk.origin();
-    let mut stack = vec![0u32];
-    while let Some(child) = stack.pop() {
-        if child & LEAF_BIT != 0 {
-            mark_leaf(chunk.leaf(child & !LEAF_BIT)?, origin, transform, view, flags);
-            continue;
-        }
-        let node = chunk.node(child)?;
-        for k in (0..8).filter(|k| node.child[*k] != EMPTY) {
-            let b = [0, 1, 2, 3, 4, 5].map(|a| origin[a % 3] + f64::from(node.bounds[a][k]));
-            let bounds = Box3 { lo: [b[0], b[1], b[2]], hi: [b[3], b[4], b[5]] };
-            let rect = view.rect(&transform.map_or(bounds, |t| placed_box(t, &bounds)));
-            if !flags.has_unset(&rect) {
-                continue;
-            }
-            if rect.is_small() {
-                flags.set(&rect);
-            } else {
-                stack.push(node.child[k]);
-            }
-        }
-    }
-    Ok(())
-}
-
-fn mark_leaf(leaf: &Leaf, origin: Vec3, transform: Option<&[f64; 12]>, view: &TileView, flags: &mut Flags) {
-    for lane in (0..8).take_while(|l| leaf.triangle[*l] != EMPTY) {
-        let corners = [0, 3, 6].map(|c| {
-            let p = [0, 1, 2].map(|k| origin[k] + f64::from(leaf.corners[c + k][lane]));
-            view.tiles(transform.map_or(p, |t| place(t, p)))
-        });
-        flags.set_triangle(&corners, view.room);
-    }
-}
-
-/// Local points in tiles of a level.
+/// From local points to tile coordinates of a level.
 struct TileView {
     axes: ViewAxes,
     origin: [f64; 2],
     tile_m: f64,
-    /// Room for snapping and rounding, in tiles.
+    /// Margin for snapping and rounding, in tiles.
     room: f64,
 }
 
-/// In tiles, both ends included.
+/// A rectangle in tiles, both ends included.
 #[derive(Clone, Copy, Debug)]
 struct Rect {
     pub lo: [f64; 2],
@@ -139,74 +102,89 @@ impl TileView {
     }
 }
 
-struct Flags {
-    side: usize,
-    flags: Vec<bool>,
+/// Marks the tiles of a level that may show something.
+struct Marker {
+    view: TileView,
+    tiles: TileSet,
 }
 
-impl Flags {
-    fn new(frame: &Frame, level: u8, value: bool) -> Result<Self> {
-        frame.validate()?;
-        if level > MAX_FLAGS_LEVEL {
-            return Err(Error::argument(format!("occupancy: level is {level}, at most {MAX_FLAGS_LEVEL}")));
-        }
-        Ok(Self { side: 1 << level, flags: vec![value; 1 << (2 * level)] })
-    }
-
-    /// Sets all that may have content and is not set yet.
-    fn mark(&mut self, scene: &SceneStore, frame: &Frame, level: u8) -> Result<()> {
-        let view = TileView::new(frame, level);
+impl Marker {
+    fn mark_scene(&mut self, scene: &SceneStore) -> Result<()> {
         let mut outlines = Outlines::default();
         for part in scene.parts() {
-            let rect = view.rect(&part.bounds);
-            if !self.has_unset(&rect) {
-                continue;
+            if self.must_descend(&part.bounds) {
+                let transform = part.instance.map(|k| scene.instances()[k as usize].transform);
+                self.mark_chunk(outlines.get(scene, part)?, transform.as_ref())?;
             }
-            if rect.is_small() {
-                self.set(&rect);
-                continue;
-            }
-            let transform = part.instance.map(|k| scene.instances()[k as usize].transform);
-            descend(outlines.get(scene, part)?, transform.as_ref(), &view, self)?;
         }
         Ok(())
     }
 
-    /// First and last tile of a rectangle along an axis; `None` outside the square.
-    fn range(&self, rect: &Rect, axis: usize) -> Option<(usize, usize)> {
-        let side = self.side as f64;
-        let meets = rect.hi[axis] >= 0.0 && rect.lo[axis] < side;
-        meets.then(|| (rect.lo[axis].max(0.0) as usize, (rect.hi[axis].min(side - 0.5)) as usize))
+    /// Marks the tiles of a small box at once. Returns whether a larger one meets tiles that are not marked yet.
+    fn must_descend(&mut self, bounds: &Box3) -> bool {
+        let rect = self.view.rect(bounds);
+        let Some(range) = self.range(&rect).filter(|range| self.tiles.has_unmarked(range)) else { return false };
+        if rect.is_small() {
+            self.tiles.mark(&range, |_| true);
+        }
+        !rect.is_small()
     }
 
-    fn tiles(&self, rect: &Rect) -> impl Iterator<Item = (usize, usize)> + use<> {
-        let ranges = self.range(rect, 0).zip(self.range(rect, 1));
-        ranges.into_iter().flat_map(|((x0, x1), (y0, y1))| (y0..=y1).flat_map(move |y| (x0..=x1).map(move |x| (x, y))))
-    }
-
-    fn has_unset(&self, rect: &Rect) -> bool {
-        self.tiles(rect).any(|(x, y)| !self.flags[y * self.side + x])
-    }
-
-    fn set(&mut self, rect: &Rect) {
-        self.tiles(rect).for_each(|(x, y)| self.flags[y * self.side + x] = true);
-    }
-
-    /// Tiles that no edge of the triangle has wholly outside.
-    fn set_triangle(&mut self, c: &[[f64; 2]; 3], room: f64) {
-        let lo = [0, 1].map(|k| c[0][k].min(c[1][k]).min(c[2][k]) - room);
-        let hi = [0, 1].map(|k| c[0][k].max(c[1][k]).max(c[2][k]) + room);
-        let rect = Rect { lo, hi };
-        for (x, y) in self.tiles(&rect) {
-            let tile = Rect { lo: [x as f64 - room, y as f64 - room], hi: [(x + 1) as f64 + room, (y + 1) as f64 + room] };
-            if !(0..3).any(|k| edge_separates(c[k], c[(k + 1) % 3], c[(k + 2) % 3], &tile)) {
-                self.flags[y * self.side + x] = true;
+    fn mark_chunk(&mut self, chunk: &LazyChunk, transform: Option<&[f64; 12]>) -> Result<()> {
+        let origin = chunk.origin();
+        let mut stack = vec![0u32];
+        while let Some(child) = stack.pop() {
+            if child & LEAF_BIT != 0 {
+                self.mark_leaf(chunk.leaf(child & !LEAF_BIT)?, origin, transform);
+                continue;
+            }
+            let node = chunk.node(child)?;
+            for k in (0..8).filter(|k| node.child[*k] != EMPTY) {
+                let b = [0, 1, 2, 3, 4, 5].map(|a| origin[a % 3] + f64::from(node.bounds[a][k]));
+                let bounds = Box3 { lo: [b[0], b[1], b[2]], hi: [b[3], b[4], b[5]] };
+                if self.must_descend(&transform.map_or(bounds, |t| placed_box(t, &bounds))) {
+                    stack.push(node.child[k]);
+                }
             }
         }
+        Ok(())
+    }
+
+    fn mark_leaf(&mut self, leaf: &Leaf, origin: Vec3, transform: Option<&[f64; 12]>) {
+        for lane in (0..8).take_while(|l| leaf.triangle[*l] != EMPTY) {
+            let corners = [0, 3, 6].map(|c| {
+                let p = [0, 1, 2].map(|k| origin[k] + f64::from(leaf.corners[c + k][lane]));
+                self.view.tiles(transform.map_or(p, |t| place(t, p)))
+            });
+            self.mark_triangle(&corners);
+        }
+    }
+
+    /// Marks the tiles that no edge of the triangle has wholly outside.
+    fn mark_triangle(&mut self, c: &[[f64; 2]; 3]) {
+        let room = self.view.room;
+        let lo = [0, 1].map(|k| c[0][k].min(c[1][k]).min(c[2][k]) - room);
+        let hi = [0, 1].map(|k| c[0][k].max(c[1][k]).max(c[2][k]) + room);
+        let Some(range) = self.range(&Rect { lo, hi }) else { return };
+        self.tiles.mark(&range, |tiles| {
+            let [lo, hi] = [0, 1].map(|end| [f64::from(tiles.x[end] + end as u32), f64::from(tiles.y[end] + end as u32)]);
+            let rect = Rect { lo: lo.map(|v| v - room), hi: hi.map(|v| v + room) };
+            !(0..3).any(|k| edge_separates(c[k], c[(k + 1) % 3], c[(k + 2) % 3], &rect))
+        });
+    }
+
+    /// The tiles that a rectangle meets; `None` outside the square.
+    fn range(&self, rect: &Rect) -> Option<TileRange> {
+        let side = f64::from(self.tiles.side());
+        let line = |k: usize| {
+            let meets = rect.hi[k] >= 0.0 && rect.lo[k] < side;
+            meets.then(|| [rect.lo[k].max(0.0) as u32, rect.hi[k].min(side - 0.5) as u32])
+        };
+        Some(TileRange { x: line(0)?, y: line(1)? })
     }
 }
 
-/// Whether a rectangle lies wholly on the far side of the edge a → b from c.
+/// Whether the edge a → b separates a rectangle from the corner c.
 fn edge_separates(a: [f64; 2], b: [f64; 2], c: [f64; 2], rect: &Rect) -> bool {
     let normal = [a[1] - b[1], b[0] - a[0]];
     let side = |p: [f64; 2]| normal[0] * (p[0] - a[0]) + normal[1] * (p[1] - a[1]);

@@ -8,11 +8,11 @@ from typing import Any, cast
 import click
 
 from map3d.cli.options import Command
-from map3d.geometry.sun import Place, SunAngles
+from map3d.geometry.sun import GeographicPosition, SunAngles
 from map3d.renderings.layers import LayerRequest
 from map3d.renderings.sun_layers import RADIUS_M as DEFAULT_RADIUS_M
 from map3d.renderings.sun_layers import LightRequest
-from map3d.types import COLOR_FORMATS, DEFAULT_LAYERS, LAYER_KINDS, RADIUS_M
+from map3d.types import AO_RADIUS_M, COLOR_FORMATS, DEFAULT_LAYERS, LAYER_KINDS
 
 
 class IsoTime(click.ParamType):  # type: ignore[type-arg]
@@ -99,12 +99,12 @@ _OPTIONS: list[Callable[[Any], Any]] = [
     click.option(
         "--ao-radius",
         "radius_m",
-        type=click.FloatRange(*RADIUS_M),
+        type=click.FloatRange(*AO_RADIUS_M),
         help=f"Layers ao and picture: radius of ambient occlusion in metres.  [default: {DEFAULT_RADIUS_M:g}]",
     ),
     click.option(
         "--place",
-        type=Pair("latitude,longitude", "48.76,11.42", Place),
+        type=Pair("latitude,longitude", "48.76,11.42", GeographicPosition),
         help="Sun layers of a scene in local metres: its position on earth, in degrees; the y axis points north.",
     ),
 ]

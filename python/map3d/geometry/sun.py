@@ -1,4 +1,4 @@
-"""Where the sun stands over a place on earth, and the hours of a day that are worth looking at."""
+"""Position of the sun over a place on earth, and the hours of a day."""
 
 import math
 from datetime import UTC, date, datetime, timedelta, timezone
@@ -7,22 +7,25 @@ from typing import Final, NamedTuple
 from map3d.errors import BadRequest
 
 HOURS: Final = range(5, 21)
-"""Of a day, in the place's zone time: sixteen full hours."""
+"""Sixteen full hours of a day, in the place's zone time."""
 
 PRESSURE_MBAR: Final = 1013.25
 TEMPERATURE_C: Final = 15.0
-"""Of the standard atmosphere at sea level, which lifts a low sun by up to half a degree."""
+"""Standard atmosphere at sea level; its refraction lifts a low sun by up to half a degree."""
 
 
-class Place(NamedTuple):
-    """WGS 84, degrees, north and east positive. Raises BadRequest where `checked`."""
+class GeographicPosition(NamedTuple):
+    """WGS 84, degrees, north and east positive."""
 
     latitude_deg: float
     longitude_deg: float
 
-    def checked(self) -> "Place":
+    def checked(self) -> "GeographicPosition":
+        """Returns the position itself; raises BadRequest for one that does not exist."""
         if not (abs(self.latitude_deg) <= 90 and abs(self.longitude_deg) <= 180):
-            raise BadRequest(f"place {self.latitude_deg:g}, {self.longitude_deg:g}: latitudes go from -90 to 90, longitudes from -180 to 180 degrees")
+            raise BadRequest(
+                f"place {self.latitude_deg:g}, {self.longitude_deg:g}: expected a latitude of -90 to 90 and a longitude of -180 to 180 degrees"
+            )
         return self
 
 
@@ -33,8 +36,8 @@ class SunAngles(NamedTuple):
     elevation_deg: float
 
 
-def sun_angles(place: Place, time: datetime) -> SunAngles:
-    """As one sees the sun there, through the standard atmosphere: from there its light comes. `time` has a zone."""
+def sun_angles(place: GeographicPosition, time: datetime) -> SunAngles:
+    """Returns the apparent position of the sun, with the refraction of the standard atmosphere. `time` has a zone."""
     import ephem
 
     observer = ephem.Observer()
@@ -45,12 +48,12 @@ def sun_angles(place: Place, time: datetime) -> SunAngles:
     return SunAngles(round(math.degrees(float(sun.az)), 6) % 360.0, round(math.degrees(float(sun.alt)), 6))
 
 
-def hours_of(place: Place, day: date) -> tuple[datetime, ...]:
-    """HOURS of a day in the zone that the longitude has: whole hours from UTC, so that the sun is near its highest at noon."""
+def hours_of(place: GeographicPosition, day: date) -> tuple[datetime, ...]:
+    """Returns HOURS of a day in the zone of the longitude, a whole number of hours from UTC: the sun is highest near noon."""
     zone = timezone(timedelta(hours=math.floor(place.longitude_deg / 15.0 + 0.5)))
     return tuple(datetime(day.year, day.month, day.day, hour, tzinfo=zone) for hour in HOURS)
 
 
 def time_text(time: datetime) -> str:
-    """UTC to the second, e.g. 2026-06-21T13:00:00Z."""
+    """Formats a time in UTC to the second, e.g. 2026-06-21T13:00:00Z."""
     return time.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")

@@ -1,4 +1,4 @@
-"""Views: the axes of a look-at angle and a pitch, the way between local and view coordinates, view ids (spec/pyramid.md §1).
+"""Views: the axes of a look-at angle and a pitch, local and view coordinates, view ids (spec/pyramid.md §1).
 
 Sums are written out term by term, so that the bits do not depend on a linear algebra library.
 """
@@ -31,7 +31,7 @@ class Axes(NamedTuple):
 
 
 def cos_sin(angle_deg: float) -> tuple[float, float]:
-    """(cos, sin); exact at multiples of 90° and where one of them is a half."""
+    """Returns (cos, sin), exact at multiples of 90° and where one of them is a half."""
     angle_deg %= 360.0
     if angle_deg in _EXACT:
         return _EXACT[angle_deg]
@@ -40,12 +40,12 @@ def cos_sin(angle_deg: float) -> tuple[float, float]:
 
 
 def check_angles(angles: ViewAngles) -> ViewAngles:
-    """`angles` as floats if 0 ≤ look-at < 360 and 0 < pitch ≤ 90; raises BadRequest."""
+    """Returns `angles` as floats if 0 ≤ look-at < 360 and 0 < pitch ≤ 90; raises BadRequest."""
     look_at_deg, pitch_deg = float(angles.look_at_deg), float(angles.pitch_deg)
     if not 0.0 <= look_at_deg < 360.0:
-        raise BadRequest(f"look-at angle {look_at_deg:g}°: must be at least 0 and less than 360 (counter-clockwise from north)")
+        raise BadRequest(f"look-at angle is {look_at_deg:g}°, expected at least 0 and less than 360 (counter-clockwise from north)")
     if not 0.0 < pitch_deg <= 90.0:
-        raise BadRequest(f"pitch {pitch_deg:g}°: must be greater than 0 and at most 90 (90 looks straight down)")
+        raise BadRequest(f"pitch is {pitch_deg:g}°, expected more than 0 and at most 90 (90 looks straight down)")
     return ViewAngles(abs(look_at_deg), pitch_deg)
 
 
@@ -65,35 +65,26 @@ def dot(a: Vec3, b: Vec3) -> float:
 
 
 def uvd_from_local(view: Axes, local: ArrayLike) -> NDArray[np.float64]:
-    """(..., 3) view coordinates U, V, D of (..., 3) local positions, metres."""
+    """Returns (..., 3) view coordinates U, V, D of (..., 3) local positions, metres."""
     x, y, z = _columns(local)
     return np.stack([axis[0] * x + axis[1] * y + axis[2] * z for axis in view], axis=-1)
 
 
 def local_from_uvd(view: Axes, uvd: ArrayLike) -> NDArray[np.float64]:
-    """(..., 3) local positions of (..., 3) view coordinates, metres; the inverse of `uvd_from_local` up to rounding."""
+    """Returns (..., 3) local positions of (..., 3) view coordinates, metres; the inverse of `uvd_from_local` up to rounding."""
     u, v, d = _columns(uvd)
     return np.stack([u * view.right[k] + v * view.up[k] + d * view.forward[k] for k in range(3)], axis=-1)
 
 
 def view_id(angles: ViewAngles) -> str:
-    """`<look-at>-<pitch>`, each in the shortest decimal form that reads back the same."""
+    """Returns `<look-at>-<pitch>`, each in the shortest decimal form that reads back as the same number."""
     look_at_deg, pitch_deg = check_angles(angles)
     return f"{_shortest(look_at_deg)}-{_shortest(pitch_deg)}"
 
 
 def track_id(view: str, number: int) -> str:
-    """Of pass `number` of a view (spec/pyramid.md §8)."""
+    """Returns the id of the track of a view and a pass (spec/pyramid.md §8)."""
     return f"{view}+{number}" if number else view
-
-
-def parse_view_id(text: str) -> ViewAngles:
-    """The angles of a view id; raises BadRequest unless `view_id` would write it just so."""
-    match = _ID.fullmatch(text)
-    angles = ViewAngles(float(match[1]), float(match[2])) if match else None
-    if angles is None or view_id(angles) != text:
-        raise BadRequest(f"view {text[:64]!r}: not a view id; write <look-at>-<pitch> in shortest decimal form, e.g. 45-22.5")
-    return angles
 
 
 def parse_view(text: str) -> ViewAngles:
@@ -105,6 +96,15 @@ def parse_view(text: str) -> ViewAngles:
         raise BadRequest(f"view {text[:64]!r}: write look-at angle and pitch in degrees, e.g. 45-22.5 or 45/22.5") from error
 
 
+def parse_view_id(text: str) -> ViewAngles:
+    """Parses a view id; raises BadRequest unless it is exactly as `view_id` writes it."""
+    match = _ID.fullmatch(text)
+    angles = ViewAngles(float(match[1]), float(match[2])) if match else None
+    if angles is None or view_id(angles) != text:
+        raise BadRequest(f"view {text[:64]!r}: expected <look-at>-<pitch> in shortest decimal form, e.g. 45-22.5")
+    return angles
+
+
 def _shortest(value: float) -> str:
     return str(int(value)) if value == int(value) else format(Decimal(repr(value)), "f")
 
@@ -112,5 +112,5 @@ def _shortest(value: float) -> str:
 def _columns(points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     array = np.asarray(points, dtype=np.float64)
     if array.ndim == 0 or array.shape[-1] != 3:
-        raise BadRequest(f"positions of shape {array.shape}: the last axis must have 3 coordinates")
+        raise BadRequest(f"positions have shape {array.shape}, expected (..., 3 coordinates)")
     return array[..., 0], array[..., 1], array[..., 2]

@@ -135,7 +135,7 @@ class Run:
 
     def _open_occupancy(self, scene: PlannedScene) -> dict[str, Occupancy]:
         """Returns, for each view, the base tiles that open blocks of its first pass may fill; later passes fill the same tiles as the first."""
-        return {frame.id: planned_occupancy(scene, self.record, frame, within=self._open_blocks(frame.id)) for frame in self.record.frames}
+        return {frame.id: planned_occupancy(scene, frame, within=self._open_blocks(frame.id)) for frame in self.record.frames}
 
     def _open_blocks(self, view: str) -> list[BlockId]:
         """Returns the base blocks of the view's first pass that are not done."""

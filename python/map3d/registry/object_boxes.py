@@ -1,25 +1,8 @@
-"""Computes the boxes of objects from a mesh, and of parents from their children."""
+"""Unions of boxes, and boxes of parents from their children."""
 
 from collections.abc import Mapping
 
-import numpy as np
-from numpy.typing import NDArray
-
 from map3d.types import Box
-
-
-def object_boxes(points: NDArray[np.float64], triangles: NDArray[np.uint32], objects: NDArray[np.uint32], count: int) -> NDArray[np.float64]:
-    """Returns (count, 2, 3) lower and upper corners for (n, 3) points, (t, 3) triangles and (t,) object indices; +inf, −inf without triangles."""
-    boxes = np.empty((count, 2, 3), dtype=np.float64)
-    boxes[:, 0], boxes[:, 1] = np.inf, -np.inf
-    if len(triangles) == 0:
-        return boxes
-    order = np.argsort(objects, kind="stable")
-    numbers, starts = np.unique(objects[order], return_index=True)
-    corners = points[triangles[order]]
-    boxes[numbers, 0] = np.minimum.reduceat(corners.min(axis=1), starts)
-    boxes[numbers, 1] = np.maximum.reduceat(corners.max(axis=1), starts)
-    return boxes
 
 
 def unite_boxes(a: Box | None, b: Box | None) -> Box | None:

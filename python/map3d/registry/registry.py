@@ -19,9 +19,8 @@ from map3d.errors import LimitExceeded
 from map3d.registry.columns import attribute_index, column, columns
 from map3d.registry.object_boxes import include_children
 from map3d.registry.registered_objects import NewObject, RegisteredObject, plain_attributes
-from map3d.types import Box
+from map3d.types import OBJECTS_PER_SHARD, Box
 
-SHARD_SIZE: Final = 1024
 _PAGE: Final = 4096
 SCENE_ASSET: Final = "_scene"
 """Asset name of the scene's own objects, such as its ground plane. Real assets cannot have this name."""
@@ -111,12 +110,12 @@ class Registry:
     def shard_numbers(self) -> list[int]:
         """Returns the numbers of the shards with objects, ascending."""
         with self._database.reading() as db:
-            return [row[0] for row in db.execute(f"SELECT DISTINCT id / {SHARD_SIZE} FROM object WHERE present ORDER BY 1")]
+            return [row[0] for row in db.execute(f"SELECT DISTINCT id / {OBJECTS_PER_SHARD} FROM object WHERE present ORDER BY 1")]
 
     def shard(self, number: int) -> dict[str, Any]:
         """Returns an attribute shard (spec/manifest.md), possibly without objects."""
         with self._database.reading() as db:
-            between = (number * SHARD_SIZE, (number + 1) * SHARD_SIZE - 1)
+            between = (number * OBJECTS_PER_SHARD, (number + 1) * OBJECTS_PER_SHARD - 1)
             rows = db.execute("SELECT * FROM object WHERE present AND id BETWEEN ? AND ? ORDER BY id", between).fetchall()
         return {"map3d": "objects", "version": 1, "shard": number, "objects": {str(row["id"]): _to_object(row).to_json() for row in rows}}
 

@@ -1,6 +1,5 @@
 """The subprocess of a render worker: renders base blocks of the scene and reduces seams to reduce blocks. Keeps the scene open between requests."""
 
-import json
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -8,6 +7,7 @@ from typing import Any, Final
 
 from map3d import _core
 from map3d.errors import NotFound
+from map3d.geometry.frames import core_frame
 from map3d.subprocess import Handler, ReportProgress
 from map3d.tiles.naming import blocks_below
 from map3d.tiles.sqlite_store import SqliteTileStore
@@ -35,8 +35,7 @@ def open_renderer(setup: Mapping[str, Any]) -> Handler:
 class _BlockRenderer:
     def __init__(self, setup: Mapping[str, Any]) -> None:
         self._scene = _core.Scene(setup["scene"], cache_bytes=setup["cache_bytes"])
-        self._frames = {track: json.dumps(frame) for track, frame in setup["frames"].items()}
-        self._zmax = {track: int(frame["zmax"]) for track, frame in setup["frames"].items()}
+        self._frames = {track: core_frame(frame) for track, frame in setup["frames"].items()}
         self._paths = {track: Path(path) for track, path in setup["stores"].items()}
         self._stores: dict[str, SqliteTileStore] = {}
         self._counted = dict.fromkeys(COUNTED, 0)
@@ -56,7 +55,7 @@ class _BlockRenderer:
         """Returns (x, y, seam) of each block below that has content."""
         store = self._store(track)
         seams = []
-        for below in blocks_below(block, self._zmax[track]):
+        for below in blocks_below(block, self._frames[track].zmax):
             stored, seam = store.get_block(below), store.get_seam(below)
             if seam is not None:
                 seams.append((below.x, below.y, seam))

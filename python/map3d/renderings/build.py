@@ -10,7 +10,6 @@ from map3d.catalogue import Catalogue, SceneRecord, Workspace
 from map3d.catalogue.scene_lock import scene_lock
 from map3d.errors import BadRequest
 from map3d.registry import Registry
-from map3d.renderings.scene_files import object_box
 
 BuildProgress = Callable[[str, int, int], bool]
 """(stage, done, total) → False to stop."""
@@ -56,7 +55,8 @@ def build(
                 "max_memory_bytes": max_memory_bytes,
             }
             report: dict[str, Any] = json.loads(_core.build_scene(str(folder), json.dumps(request), progress))
-            registry.set_scene_object(ground, object_box(folder, ground) if report.get("ground_plane_triangles") else None)
+            has_ground = report.get("ground_plane_triangles")
+            registry.set_scene_object(ground, open_scene(workspace, scene).object_box(ground) if has_ground else None)
         catalogue.set_built(scene, digest)
         return report
 

@@ -11,7 +11,7 @@ from map3d import _core
 from map3d.catalogue import Catalogue, Job, PlannedJob, RenderingRecord, State, Track, Workspace
 from map3d.errors import BadRequest
 from map3d.renderings.build import is_stale, open_scene
-from map3d.renderings.plan import PlannedScene, frame_text, plan_jobs, planned_occupancy
+from map3d.renderings.plan import PlannedScene, plan_jobs, planned_occupancy, track_frame
 from map3d.tiles.naming import block_levels, morton
 from map3d.tiles.occupancy import Occupancy
 from map3d.types import BlockId
@@ -67,7 +67,7 @@ def estimate(workspace: Workspace, catalogue: Catalogue, name: str, workers: int
     if is_stale(workspace, catalogue, record.scene):
         raise BadRequest(f"scene {record.scene} has changed since its last build; map3d render {name} builds it first")
     scene = open_scene(workspace, record.scene, 256 << 20)
-    plans = {frame.id: planned_occupancy(scene, record, frame) for frame in record.frames}
+    plans = {frame.id: planned_occupancy(scene, frame) for frame in record.frames}
     jobs = {(job.track, job.block): job for job in catalogue.jobs(name)}
     remaining = open_blocks(scene, record, jobs)
     passes = [_estimate_pass(scene, tracks, plans, jobs, remaining) for tracks in zip(*map(record.tracks_of, record.frames), strict=True)]
@@ -108,7 +108,8 @@ def _estimate_pass(
     track_plans = {track.id: plans[track.frame.id] for track in tracks}
     cost = _recorded_cost(list(own_jobs.values()), track_plans) or _sampled_cost(scene, tracks, track_plans)
     tiles = _base_tiles(track_plans, own_jobs, cost)
-    return _PassEstimate(cost, sum(tiles.values()), sum(tiles[job.track, job.block] for job in remaining if job.track in ids))
+    # A conservatively planned block may have no planned base tile.
+    return _PassEstimate(cost, sum(tiles.values()), sum(tiles.get((job.track, job.block), 0.0) for job in remaining if job.track in ids))
 
 
 def _base_tiles(plans: Mapping[str, Occupancy], jobs: Mapping[tuple[str, BlockId], Job], cost: TileCost) -> dict[tuple[str, BlockId], float]:
@@ -142,7 +143,7 @@ def _sampled_cost(scene: _core.Scene, tracks: Sequence[Track], plans: Mapping[st
     size, tiles, planned, count = 0, 0, 0, 0
     started = time.perf_counter()
     for track, block in _spread(blocks):
-        rendered = scene.render_block(frame_text(track), *block)
+        rendered = scene.render_block(track_frame(track), *block)
         size += sum(len(tile[4]) for tile in rendered.tiles)
         tiles += sum(tile[0] == 0 and tile[1] == zmax for tile in rendered.tiles)
         planned += _planned_tiles(plans[track.id], block)

@@ -7,7 +7,7 @@ from pyproj import Geod, Transformer
 
 from map3d.errors import BadRequest
 from map3d.geometry.crs import horizontal_crs, parse_crs
-from map3d.geometry.sun import Place
+from map3d.geometry.sun import GeographicPosition
 
 STEP_M: Final = 100.0
 WGS84: Final = "EPSG:4326"
@@ -26,7 +26,7 @@ class GridNorth:
         longitude_deg, latitude_deg = Transformer.from_crs(flat, WGS84, always_xy=True).transform(x, y)
         if not (math.isfinite(longitude_deg) and math.isfinite(latitude_deg)):
             raise BadRequest(f"{flat.name} has no point {x:g}, {y:g}: cannot locate the scene, so the sun's position is unknown")
-        self.place = Place(latitude_deg, longitude_deg)
+        self.place = GeographicPosition(latitude_deg, longitude_deg)
         self._to_grid = Transformer.from_crs(WGS84, flat, always_xy=True)
 
     def grid_azimuth_deg(self, azimuth_deg: float) -> float:

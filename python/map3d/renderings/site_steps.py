@@ -16,7 +16,7 @@ from map3d.renderings.build import open_scene
 from map3d.renderings.create import RenderingRequest, create_rendering
 from map3d.renderings.layers import LayerRequest
 from map3d.renderings.plan import planned_occupancy
-from map3d.types import Layer, ViewAngles
+from map3d.types import ViewAngles
 
 RESOLUTIONS_M: Final = (0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 MAX_BASE_TILES: Final = 30_000
@@ -106,12 +106,10 @@ def choose_res(workspace: Workspace, request: SiteRequest) -> float:
     scene = open_scene(workspace, request.name)
     box, tile_px, covered_m2 = scene.box, 256, 0.0
     frames = pin(box, tile_px, RESOLUTIONS_M[0], request.views)
-    layers = (Layer("color", "color", "webp", 80),)
-    probe = RenderingRecord(request.name, request.name, RESOLUTIONS_M[0], (layers,), tuple(frames), box)
     for frame in frames:
         level = min(frame.zmax, _PROBE_LEVEL)
         side_m = frame.size_m / 2.0**level
-        covered_m2 += planned_occupancy(scene, probe, frame, level).count(level) * side_m**2
+        covered_m2 += planned_occupancy(scene, frame, level).count(level) * side_m**2
     for res_m in RESOLUTIONS_M:
         if covered_m2 / (res_m * tile_px) ** 2 <= MAX_BASE_TILES:
             return res_m

@@ -8,7 +8,7 @@ from typing import Final
 
 from map3d.catalogue import SceneRecord
 from map3d.errors import BadRequest
-from map3d.geometry.sun import Place, SunAngles, hours_of, sun_angles, time_text
+from map3d.geometry.sun import GeographicPosition, SunAngles, hours_of, sun_angles, time_text
 from map3d.types import RADIUS_KINDS, Box, Sun, Vec3
 
 ONE_SUN: Final = ("sun", "picture")
@@ -25,7 +25,7 @@ class LightRequest:
     sun: SunAngles | None = None
     day: date | None = None
     radius_m: float | None = None
-    place: Place | None = None
+    place: GeographicPosition | None = None
 
     def check(self, kinds: Collection[str], scene: SceneRecord) -> None:
         """Raises BadRequest for missing options and for options that no layer of `kinds` uses."""
@@ -84,7 +84,7 @@ class LightRequest:
 class SceneLocation:
     """The position of a scene on earth and the orientation of its axes."""
 
-    def __init__(self, scene: SceneRecord, box: Box, place: Place | None) -> None:
+    def __init__(self, scene: SceneRecord, box: Box, place: GeographicPosition | None) -> None:
         """Raises BadRequest when the scene's coordinate system does not cover its position."""
         from map3d.renderings.grid_north import GridNorth
 
@@ -94,7 +94,7 @@ class SceneLocation:
         self._place = place if self._grid is None else self._grid.place
 
     @property
-    def place(self) -> Place:
+    def place(self) -> GeographicPosition:
         assert self._place is not None, "checked"
         return self._place
 

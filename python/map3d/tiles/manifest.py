@@ -9,10 +9,9 @@ from typing import Any, Final, Self
 from map3d.errors import BadRequest, Corrupt, Map3dError, UnknownVersion
 from map3d.geometry.frames import PinnedFrame
 from map3d.geometry.views import parse_view_id
-from map3d.registry.registry import SHARD_SIZE
 from map3d.tiles.naming import block_level, block_levels, block_of, parse_tile
 from map3d.tiles.occupancy import Occupancy
-from map3d.types import DEPTH_KINDS, DEPTH_UNIT_M, BlockId, Box, Layer, TileId, Vec3, ViewAngles, check_name
+from map3d.types import DEPTH_KINDS, DEPTH_UNIT_M, OBJECTS_PER_SHARD, BlockId, Box, Layer, TileId, Vec3, ViewAngles, check_name
 
 VERSION: Final = 1
 FILE_NAME: Final = "rendering.json"
@@ -144,7 +143,7 @@ class Manifest:
             "views": [_view_json(view, self.passes) for view in self.views],
             "objects": {
                 "count": self.objects,
-                "shard_size": SHARD_SIZE,
+                "shard_size": OBJECTS_PER_SHARD,
                 "shards": SHARDS,
                 "search": SEARCH,
                 "attributes": ATTRIBUTES,

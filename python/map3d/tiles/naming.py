@@ -5,7 +5,7 @@ from functools import lru_cache
 from typing import Final, NamedTuple
 
 from map3d.errors import BadRequest
-from map3d.types import MAX_LEVEL, BlockId, BlockKind, TileId
+from map3d.types import DEEPEST_LEVEL, BlockId, BlockKind, TileId
 
 BLOCK_LEVELS: Final = 3
 """Levels between the root of a base block and zmax, and between the roots of reduce blocks."""
@@ -22,8 +22,8 @@ class BlockLevel(NamedTuple):
 def check_tile(tile: TileId) -> TileId:
     """Returns `tile`. Raises BadRequest unless its numbers are possible."""
     z, x, y = tile
-    if not (0 <= z <= MAX_LEVEL and 0 <= x < 2**z and 0 <= y < 2**z):
-        raise BadRequest(f"tile {z}/{x}/{y} is out of range; expected 0 ≤ z ≤ {MAX_LEVEL} and 0 ≤ x, y < 2^z")
+    if not (0 <= z <= DEEPEST_LEVEL and 0 <= x < 2**z and 0 <= y < 2**z):
+        raise BadRequest(f"tile {z}/{x}/{y} is out of range; expected 0 ≤ z ≤ {DEEPEST_LEVEL} and 0 ≤ x, y < 2^z")
     return tile
 
 
@@ -31,7 +31,7 @@ def parse_tile(z: str, x: str, y: str) -> TileId | None:
     """Parses three plain ASCII numbers without signs or leading zeros. Returns None for anything else and for tiles out of range."""
     level = _parse_number(z, 2)
     column, row = _parse_number(x, 8), _parse_number(y, 8)
-    if level is None or column is None or row is None or level > MAX_LEVEL:
+    if level is None or column is None or row is None or level > DEEPEST_LEVEL:
         return None
     return TileId(level, column, row) if max(column, row) < 1 << level else None
 

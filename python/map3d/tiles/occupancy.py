@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from map3d.errors import BadRequest, Corrupt
-from map3d.types import MAX_LEVEL, TileId
+from map3d.types import DEEPEST_LEVEL, TileId
 
 Numbers = NDArray[np.uint64]
 """Sorted, unique Morton numbers of one level."""
@@ -20,8 +20,8 @@ class Occupancy:
 
     def __init__(self, zmax: int, base: Numbers) -> None:
         """`base`: Morton numbers of the occupied tiles of level zmax, in any order."""
-        if not 0 <= zmax <= MAX_LEVEL:
-            raise BadRequest(f"occupancy with zmax {zmax}: must be 0 to {MAX_LEVEL}")
+        if not 0 <= zmax <= DEEPEST_LEVEL:
+            raise BadRequest(f"occupancy with zmax {zmax}: must be 0 to {DEEPEST_LEVEL}")
         numbers = _unique(np.asarray(base, dtype=np.uint64))
         if len(numbers) and int(numbers[-1]) >= 4**zmax:
             raise BadRequest(f"occupancy: tile number {int(numbers[-1])} does not exist at level {zmax}")
@@ -34,14 +34,6 @@ class Occupancy:
         if len(xy) and (xy.min() < 0 or xy.max() >= 1 << zmax):
             raise BadRequest(f"occupancy: a column or row is not from 0 to {(1 << zmax) - 1}")
         return cls(zmax, morton_numbers(xy[:, 0], xy[:, 1]))
-
-    @classmethod
-    def from_grid(cls, grid: NDArray[np.bool_]) -> Self:
-        """From a (2^zmax, 2^zmax) array [y, x]."""
-        y, x = np.nonzero(grid)
-        if grid.ndim != 2 or grid.shape[0] != grid.shape[1] or grid.shape[0].bit_count() != 1:
-            raise BadRequest(f"occupancy of shape {grid.shape}: must be square, its side a power of two")
-        return cls(grid.shape[0].bit_length() - 1, morton_numbers(x, y))
 
     @classmethod
     def decode(cls, zmax: int, text: str) -> Self:

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple, Protocol, Self
 
 from map3d.errors import BadRequest, NotFound
 from map3d.tiles.naming import block_level, block_of
-from map3d.types import MAX_LEVEL, BlockId, Layer, TileId
+from map3d.types import DEEPEST_LEVEL, BlockId, Layer, TileId
 
 FORMAT_VERSION: Final = 1
 HASH_BYTES: Final = 16
@@ -33,8 +33,8 @@ class StoreShape:
     layers: tuple[Layer, ...]
 
     def __post_init__(self) -> None:
-        if not (self.layers and 0 <= self.zmax <= MAX_LEVEL and self.tile_px > 0):
-            raise BadRequest(f"invalid tile store: expected layers, zmax 0 to {MAX_LEVEL} and a tile size, got {self}")
+        if not (self.layers and 0 <= self.zmax <= DEEPEST_LEVEL and self.tile_px > 0):
+            raise BadRequest(f"invalid tile store: expected layers, zmax 0 to {DEEPEST_LEVEL} and a tile size, got {self}")
 
     def layer_number(self, layer: str) -> int:
         """Returns the index of the layer. Raises NotFound."""

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 from map3d import _core
 from map3d.catalogue import Catalogue, Job, RenderingRecord, State, Track, Workspace
 from map3d.errors import Corrupt, Map3dError
-from map3d.renderings.plan import frame_text, planned_occupancy
+from map3d.renderings.plan import planned_occupancy, track_frame
 from map3d.tiles.naming import block_level, block_of, blocks_below, children, parent
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.tile_store import StoredBlock
 from map3d.types import BlockId, TileId
-from map3d.verify.decode import check_seam, decode_tile, ids_of
+from map3d.verify.decode import decode_tile, ids_of
 from map3d.verify.findings import Findings
 
 Progress = Callable[[str, int, int], None]
@@ -44,7 +44,7 @@ def check_track(
             findings.add(f"{path}: {line}")
         checker.check_blocks()
         tiles = checker.collect_tiles()
-        checker.check_pyramid(tiles, planned_occupancy(scene, record, track.frame))
+        checker.check_pyramid(tiles, planned_occupancy(scene, track.frame))
         checker.check_images(tiles, ids)
         checker.check_reduce_blocks()
     return tiles if any(job.state is State.DONE for job in jobs.values()) else None
@@ -81,7 +81,7 @@ class _TrackChecker:
         if (seam is None) != (stored.tiles == 0):
             self.findings.add(f"{where}: {stored.tiles} tiles and {'no' if seam is None else 'a'} seam")
         elif seam is not None:
-            self._try(where, lambda: check_seam(seam, self.track.frame.tile_px, self.track.layers))
+            self._try(where, lambda: _core.check_seam(track_frame(self.track), seam))
             self.findings.count("seams")
 
     def collect_tiles(self) -> set[TileId]:
@@ -125,7 +125,7 @@ class _TrackChecker:
 
     def check_reduce_blocks(self) -> None:
         """Reduces every done reduce block again from its seams, and compares the result with the stored tiles."""
-        text = frame_text(self.track)
+        frame = track_frame(self.track)
         for block, job in self.jobs.items():
             if job.kind == "reduce" and job.state is State.DONE:
                 seams = [
@@ -134,7 +134,7 @@ class _TrackChecker:
                     if (seam := self.store.get_seam(below)) is not None
                 ]
                 levels = block_level(block.z, self.track.frame.zmax).levels
-                self._try(f"{self.where} block {block}", lambda: self._compare(block, _core.reduce_block(text, *block, levels, seams)))  # noqa: B023
+                self._try(f"{self.where} block {block}", lambda: self._compare(block, _core.reduce_block(frame, *block, levels, seams)))  # noqa: B023
                 self.findings.count("reduced blocks")
 
     def _compare(self, block: BlockId, reduced: _core.Block) -> None:

@@ -70,10 +70,13 @@ export function childrenOf({ z, x, y }: Tile): [Tile, Tile, Tile, Tile] {
   ];
 }
 
-/** Interleaves the bits of x and y, x in the even bits; exact up to level 26. */
+/** The deepest level that a pyramid may have (spec/limits.json). */
+export const DEEPEST_LEVEL = 26;
+
+/** Interleaves the bits of x and y, x in the even bits; exact up to the deepest level. */
 export function morton(x: number, y: number): number {
   let code = 0;
-  for (let bit = 0, place = 1; bit < 26; bit++, place *= 4) code += place * (((x >> bit) & 1) + 2 * ((y >> bit) & 1));
+  for (let bit = 0, place = 1; bit < DEEPEST_LEVEL; bit++, place *= 4) code += place * (((x >> bit) & 1) + 2 * ((y >> bit) & 1));
   return code;
 }
 

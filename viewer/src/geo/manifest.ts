@@ -1,7 +1,7 @@
 import { ManifestError } from "../core/errors";
 import type { Box3, Vec3 } from "../core/vec";
 import type { GeographicJson } from "./geographic";
-import { blockRoot, makeFrame, tileName, type Frame, type FrameJson, type Tile } from "./frame";
+import { DEEPEST_LEVEL, blockRoot, makeFrame, tileName, type Frame, type FrameJson, type Tile } from "./frame";
 import { Occupancy } from "./occupancy";
 
 export type LayerKind = "color" | "normal" | "id" | "depth" | "sun" | "sun16" | "ao" | "depth2" | "picture";
@@ -136,7 +136,7 @@ function checkManifest(value: unknown, where: string): ManifestJson {
 
 const isNumber = (v: unknown): boolean => typeof v === "number" && Number.isFinite(v);
 const isPoint = (v: unknown): boolean => Array.isArray(v) && v.length === 3 && v.every(isNumber);
-const isLevel = (v: unknown): boolean => Number.isInteger(v) && Number(v) >= 0 && Number(v) <= 26;
+const isLevel = (v: unknown): boolean => Number.isInteger(v) && Number(v) >= 0 && Number(v) <= DEEPEST_LEVEL;
 
 const FIELDS: [keyof ManifestJson, (v: unknown) => boolean][] = [
   ["origin", isPoint],

@@ -1,7 +1,7 @@
 import { add, clamp, sub, type Box3, type Vec2, type Vec3 } from "../core/vec";
 import { depthAtHeight, localFromUvd, uvdFromLocal } from "../geo/axes";
 import { projectedBox } from "../geo/camera";
-import { childrenOf } from "../geo/frame";
+import { DEEPEST_LEVEL, childrenOf } from "../geo/frame";
 import { UsageError, type LayerInfo, type map, type Rendering, type Tile, type View } from "../map3d";
 
 /** The part of a map to save. */
@@ -37,7 +37,7 @@ export async function resolveOptions(shown: map, { bounds, levels, layers, direc
     const unknown = list?.find((name) => !known[what].includes(name));
     if (unknown !== undefined) throw new UsageError(`unknown ${what.slice(0, -1)} "${unknown}"; the map has ${known[what].join(", ")}`);
   }
-  const [least, greatest] = levels ?? [0, 26];
+  const [least, greatest] = levels ?? [0, DEEPEST_LEVEL];
   if (!(least >= 0 && least <= greatest)) throw new UsageError(`levels must be a range from 0 upwards, got ${String(least)} to ${String(greatest)}`);
   return {
     bounds: bounds ?? await boundsInView(shown, renderings, directions ?? known.directions), objects, directions: directions ?? known.directions,

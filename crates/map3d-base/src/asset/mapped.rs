@@ -1,4 +1,4 @@
-//! Reads `mesh.m3a` as it lies on disk.
+//! Maps `mesh.m3a` (spec/scene.md).
 
 use std::path::{Path, PathBuf};
 
@@ -8,12 +8,12 @@ use crate::error::{Error, Result};
 use crate::file::{self, HEADER_BYTES, aligned};
 use crate::vec3::Vec3;
 
-pub(super) const MAGIC: &[u8; 4] = b"M3DA";
-pub(super) const VERSION: u32 = 1;
+pub const MESH_MAGIC: &[u8; 4] = b"M3DA";
+pub const MESH_VERSION: u32 = 1;
 pub(super) const FLAG_NORMALS: u32 = 1;
 pub(super) const SECTIONS: [&str; 8] = ["positions", "triangles", "uvs", "normals", "material", "object", "rank", "prototype"];
 
-/// A mapped asset mesh; every index has been checked.
+/// A mapped asset mesh; every vertex index is in range.
 pub struct AssetMesh {
     path: PathBuf,
     map: Mmap,
@@ -27,7 +27,7 @@ impl AssetMesh {
     /// Maps and validates a `mesh.m3a`, its checksum too.
     pub fn open(path: &Path) -> Result<Self> {
         let map = file::map(path)?;
-        file::check_mapped(path, &map, MAGIC, VERSION)?;
+        file::check_mapped(path, &map, MESH_MAGIC, MESH_VERSION)?;
         let count = |at: usize| usize::try_from(u64::from_le_bytes(map[at..at + 8].try_into().expect("8 bytes")));
         let (Ok(vertices), Ok(triangles)) = (count(16), count(24)) else {
             return Err(Error::format(path, "counts are too large"));
@@ -53,7 +53,11 @@ impl AssetMesh {
         Ok(mesh)
     }
 
-    /// Lets go of the memory that looking at the mesh took; it may be looked at again.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Drops the mesh's resident pages; they are re-read on access.
     pub fn release(&self) {
         file::release(&self.map);
     }
@@ -72,7 +76,7 @@ impl AssetMesh {
         Ok(())
     }
 
-    /// One of the mesh's arrays in order, piece by piece; the memory of a piece is let go of before the next one comes.
+    /// Iterates over one of the mesh's arrays in pieces; drops the resident pages before each.
     pub fn pieces<'a, T>(&'a self, records: &'a [T]) -> impl Iterator<Item = &'a [T]> {
         records.chunks(file::RELEASED_BYTES / size_of::<T>()).inspect(|_| self.release())
     }
@@ -84,7 +88,7 @@ impl AssetMesh {
         }
     }
 
-    /// World coordinates (a prototype's vertices: its own frame).
+    /// World coordinates; those of a prototype are in its own frame.
     pub fn positions(&self) -> &[Vec3] {
         self.part(0, self.vertices)
     }

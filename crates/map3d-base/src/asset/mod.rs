@@ -1,13 +1,15 @@
-//! Assets: what a reader yields and what an asset folder holds (spec/scene.md).
+//! Assets: the batches that a reader yields, and the files of an asset folder (spec/scene.md).
 
-mod gate;
+mod boxes;
 mod mapped;
 mod tables;
+mod validation;
 mod writer;
 
-pub use gate::{GateLimits, Skips, pass};
-pub use mapped::AssetMesh;
+pub use boxes::MeshBoxes;
+pub use mapped::{AssetMesh, MESH_MAGIC, MESH_VERSION};
 pub use tables::{AssetReport, Instance, Material, Materials, Object, Rank, Warning, Wrap};
+pub use validation::{GeometryLimits, SkippedGeometry};
 pub use writer::AssetWriter;
 
 use crate::vec3::Vec3;
@@ -25,8 +27,8 @@ pub struct Batch {
     /// Index into the asset's objects.
     pub objects: Vec<u32>,
     pub ranks: Vec<Rank>,
-    /// 0: placed as it is; k > 0: geometry of prototype k, in its own frame.
+    /// 0: world geometry; k > 0: geometry of prototype k, in its own frame.
     pub prototype: u32,
-    /// Whoever made the batch has subtracted from `uvs` what each material's wrap mode allows: they are written as they are.
+    /// The reader has already moved `uvs` as far as each material's wrap mode allows; the writer keeps them.
     pub uvs_shifted: bool,
 }

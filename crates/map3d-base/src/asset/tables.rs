@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// Class rank: settles coplanar surfaces (spec/glossary.md).
+/// Class rank: decides between coplanar surfaces (spec/glossary.md).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Rank {
@@ -16,16 +16,31 @@ pub enum Rank {
     Opening = 5,
 }
 
-/// What lies outside [0, 1] of a texture.
+impl Rank {
+    /// Returns the rank of a number; `None` for an unknown one.
+    pub fn from_number(number: u8) -> Option<Self> {
+        [Self::Terrain, Self::Road, Self::Ground, Self::Other, Self::Installation, Self::Opening].into_iter().find(|rank| *rank as u8 == number)
+    }
+}
+
+/// How a texture continues outside [0, 1]; the numbers are the codes of chunk files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[repr(u8)]
 pub enum Wrap {
     #[default]
-    Wrap,
-    Mirror,
-    Clamp,
-    Border,
-    None,
+    Wrap = 0,
+    Mirror = 1,
+    Clamp = 2,
+    Border = 3,
+    None = 4,
+}
+
+impl Wrap {
+    /// Returns the mode of a code of a chunk file; `None` for an unknown one.
+    pub fn from_code(code: u8) -> Option<Self> {
+        [Self::Wrap, Self::Mirror, Self::Clamp, Self::Border, Self::None].into_iter().find(|wrap| *wrap as u8 == code)
+    }
 }
 
 /// `texture` and `alpha` are keys: the first 32 hex digits of the SHA-256 of the image's bytes.
@@ -39,7 +54,7 @@ pub struct Material {
     pub wrap: Wrap,
     /// sRGB and opacity, 0..1; used by `Wrap::Border`.
     pub border: [f32; 4],
-    /// Texture or alpha image has transparent texels.
+    /// The texture or the alpha image has transparent texels.
     pub cutout: bool,
 }
 
@@ -78,7 +93,7 @@ pub struct Object {
 pub struct Warning {
     pub reason: String,
     pub count: u64,
-    /// Where it happened first: a name, a line, a file.
+    /// The first occurrence: a name, a line, a file.
     pub example: String,
 }
 
@@ -91,19 +106,19 @@ pub struct AssetReport {
     pub warnings: Vec<Warning>,
     /// The CRS as the source writes it.
     pub crs: Option<String>,
-    /// Box of what was kept, in the coordinates that were written.
+    /// Box of the kept geometry, in the coordinates of mesh.m3a.
     pub box_source: Option<[[f64; 3]; 2]>,
 }
 
 impl AssetReport {
-    /// Counts `n` more of a reason to skip.
+    /// Adds `n` to the count of a reason.
     pub fn skip(&mut self, reason: &str, n: u64) {
         if n > 0 {
             *self.skipped.entry(reason.to_owned()).or_default() += n;
         }
     }
 
-    /// Counts one more of a warning; the first example is kept.
+    /// Counts a warning; keeps its first example.
     pub fn warn(&mut self, reason: &str, example: impl Into<String>) {
         match self.warnings.iter_mut().find(|w| w.reason == reason) {
             Some(w) => w.count += 1,

@@ -1,4 +1,4 @@
-//! Writes an asset folder, batch by batch, in bounded memory: each section grows in a file of its own and they are joined at the end.
+//! Writes an asset folder batch by batch, in bounded memory: each section grows in a file of its own, and `finish` joins them.
 
 use std::collections::HashMap;
 use std::fs::{self, File};
@@ -10,8 +10,9 @@ use bytemuck::NoUninit;
 use sha2::{Digest, Sha256};
 use twox_hash::XxHash3_64;
 
-use super::mapped::{FLAG_NORMALS, MAGIC, SECTIONS, VERSION};
-use super::{AssetReport, Batch, GateLimits, Materials, Object, Skips, pass};
+use super::mapped::{FLAG_NORMALS, MESH_MAGIC, MESH_VERSION, SECTIONS};
+use super::validation::{GeometryLimits, SkippedGeometry, valid_triangles};
+use super::{AssetReport, Batch, Materials, Object};
 use crate::error::{Error, Result};
 use crate::file::{HEADER_BYTES, aligned, header_start};
 use crate::vec3::Box3;
@@ -43,14 +44,14 @@ pub struct AssetWriter {
     vertices: u64,
     triangles: u64,
     any_normals: bool,
-    skips: Skips,
+    skipped: SkippedGeometry,
     bounds: Box3,
-    limits: GateLimits,
+    limits: GeometryLimits,
     textures: HashMap<String, String>,
 }
 
 impl AssetWriter {
-    /// Creates the folder if need be.
+    /// Creates the folder if it does not exist.
     pub fn create(folder: &Path) -> Result<Self> {
         fs::create_dir_all(folder.join("textures")).map_err(|e| Error::storage(folder, e))?;
         let parts = SECTIONS.iter().map(|name| Part::create(folder.join(format!("{name}.part")))).collect::<Result<_>>()?;
@@ -60,17 +61,17 @@ impl AssetWriter {
             vertices: 0,
             triangles: 0,
             any_normals: false,
-            skips: Skips::default(),
+            skipped: SkippedGeometry::default(),
             bounds: Box3::EMPTY,
-            limits: GateLimits::default(),
+            limits: GeometryLimits::default(),
             textures: HashMap::new(),
         })
     }
 
-    /// Appends the sound triangles of a batch; positions are world coordinates (a prototype's: its own frame).
+    /// Appends the valid triangles of a batch; positions are world coordinates, those of a prototype in its own frame.
     pub fn append(&mut self, batch: &Batch) -> Result<()> {
         check_lengths(batch)?;
-        let keep = pass(batch, self.limits, &mut self.skips);
+        let keep = valid_triangles(batch, self.limits, &mut self.skipped);
         let mut number = vec![u32::MAX; batch.positions.len()];
         let mut positions = Vec::new();
         let base = u32::try_from(self.vertices).map_err(|_| self.too_many())?;
@@ -111,7 +112,7 @@ impl AssetWriter {
         self.parts[7].put(&prototypes)
     }
 
-    /// Stores an image's original bytes once; returns its key. `extension` without dot, e.g. `jpg`.
+    /// Stores an image's original bytes once and returns its key. `extension` without dot, e.g. `jpg`.
     pub fn add_texture(&mut self, bytes: &[u8], extension: &str) -> Result<String> {
         let digest = Sha256::digest(bytes);
         let key: String = digest.iter().take(16).map(|b| format!("{b:02x}")).collect();
@@ -122,14 +123,14 @@ impl AssetWriter {
         Ok(key)
     }
 
-    /// Joins the sections, writes the tables; `report` comes back with counts of what was kept and skipped.
+    /// Joins the sections and writes the tables; returns `report` with the counts of kept and skipped geometry.
     pub fn finish(mut self, materials: &Materials, objects: &[Object], mut report: AssetReport) -> Result<AssetReport> {
         self.join()?;
         self.write_json("materials.json", materials)?;
         let lines: Vec<String> = objects.iter().map(|o| serde_json::to_string(o).expect("objects are plain data")).collect();
         let text = if lines.is_empty() { String::new() } else { lines.join("\n") + "\n" };
         self.write("objects.jsonl", text.as_bytes())?;
-        for (reason, count) in self.skips.reasons() {
+        for (reason, count) in self.skipped.reasons() {
             report.skip(reason, count);
         }
         report.objects = objects.len() as u64;
@@ -142,7 +143,7 @@ impl AssetWriter {
     fn uv_of(&mut self, batch: &Batch, i: usize) -> [[f32; 2]; 3] {
         let Some(uv) = batch.uvs.get(i) else { return [[0.0; 2]; 3] };
         if !uv.as_flattened().iter().all(|v| v.is_finite()) {
-            self.skips.bad_uv += 1;
+            self.skipped.bad_uv += 1;
             return [[0.0; 2]; 3];
         }
         if batch.uvs_shifted {
@@ -162,7 +163,7 @@ impl AssetWriter {
         }
     }
 
-    /// Sections in their order, each aligned, checksummed as they are copied; then renamed to `mesh.m3a`.
+    /// Joins the sections in their order, each aligned, computes the checksum on the way, and renames the file to `mesh.m3a`.
     fn join(&mut self) -> Result<()> {
         let target = self.folder.join("mesh.m3a.part");
         let io = |e| Error::storage(&target, e);
@@ -175,7 +176,7 @@ impl AssetWriter {
             }
         }
         let mut header = [0u8; HEADER_BYTES];
-        header[..16].copy_from_slice(&header_start(MAGIC, VERSION, hash.finish()));
+        header[..16].copy_from_slice(&header_start(MESH_MAGIC, MESH_VERSION, hash.finish()));
         header[16..24].copy_from_slice(&self.vertices.to_le_bytes());
         header[24..32].copy_from_slice(&self.triangles.to_le_bytes());
         header[32..36].copy_from_slice(&(u32::from(self.any_normals) * FLAG_NORMALS).to_le_bytes());
@@ -220,10 +221,10 @@ fn copy_part(part: &mut Part, out: &mut impl Write, hash: &mut XxHash3_64) -> Re
 fn check_lengths(batch: &Batch) -> Result<()> {
     let n = batch.triangles.len();
     let optional = |len: usize| len == 0 || len == n;
-    let sound = batch.materials.len() == n
+    let valid = batch.materials.len() == n
         && batch.objects.len() == n
         && batch.ranks.len() == n
         && optional(batch.uvs.len())
         && optional(batch.normals.len());
-    if sound { Ok(()) } else { Err(Error::argument("batch: its per-triangle arrays differ in length")) }
+    if valid { Ok(()) } else { Err(Error::argument("batch: its per-triangle arrays differ in length")) }
 }

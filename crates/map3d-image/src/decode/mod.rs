@@ -7,6 +7,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use image::{DynamicImage, ImageFormat, ImageReader, Limits};
+use map3d_base::limits::{MAX_IMAGE_PX, MAX_IMAGE_SIDE_PX};
 use map3d_base::{Error, Result};
 
 use crate::raster::Raster;
@@ -21,7 +22,7 @@ pub struct ImageLimits {
 
 impl Default for ImageLimits {
     fn default() -> Self {
-        Self { max_image_side_px: 16_384, max_image_px: 128 << 20, max_decoded_bytes: 512 << 20 }
+        Self { max_image_side_px: MAX_IMAGE_SIDE_PX, max_image_px: MAX_IMAGE_PX, max_decoded_bytes: 512 << 20 }
     }
 }
 

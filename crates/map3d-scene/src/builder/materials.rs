@@ -7,7 +7,7 @@ use map3d_texture::TextureKeys;
 
 use super::asset_summary::record_hash;
 use super::assets::Asset;
-use crate::records::{MATERIAL_CUTOUT, MATERIAL_TEXTURED, MaterialRecord, wrap_code};
+use crate::records::{MATERIAL_CUTOUT, MATERIAL_TEXTURED, MaterialRecord};
 
 pub(super) struct BuildMaterials {
     pub records: Vec<MaterialRecord>,
@@ -85,7 +85,7 @@ fn record_of(material: &Material, textures: &TextureKeys) -> MaterialRecord {
     MaterialRecord {
         diffuse: material.diffuse.map(byte),
         border: material.border.map(byte),
-        wrap: wrap_code(material.wrap),
+        wrap: material.wrap as u8,
         flags: if texture.is_some() { MATERIAL_TEXTURED } else { 0 } | if cutout { MATERIAL_CUTOUT } else { 0 },
         padding: [0; 6],
         texture: texture.map_or([0; 16], |t| t.key),

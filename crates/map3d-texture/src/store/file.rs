@@ -13,8 +13,8 @@ use map3d_image::ImageLimits;
 use map3d_image::PixelMask;
 use map3d_image::Raster;
 
-const MAGIC: &[u8; 4] = b"M3DT";
-const VERSION: u32 = 1;
+pub const TEXTURE_MAGIC: &[u8; 4] = b"M3DT";
+pub const TEXTURE_VERSION: u32 = 1;
 const FLAG_ALPHA: u32 = 1;
 const FLAG_MASK: u32 = 2;
 const SECTIONS: usize = 16;
@@ -80,7 +80,7 @@ fn assemble(numbers: [u32; 4], sections: &[Vec<u8>]) -> Vec<u8> {
         out.resize(out.len().next_multiple_of(file::ALIGN), 0);
     }
     let checksum = file::checksum(&out[HEADER_BYTES..]);
-    out[..16].copy_from_slice(&file::header_start(MAGIC, VERSION, checksum));
+    out[..16].copy_from_slice(&file::header_start(TEXTURE_MAGIC, TEXTURE_VERSION, checksum));
     for (k, n) in numbers.into_iter().enumerate() {
         out[16 + 4 * k..20 + 4 * k].copy_from_slice(&n.to_le_bytes());
     }
@@ -112,7 +112,7 @@ impl TextureFile {
     /// Opens a file and verifies its checksum.
     pub fn open(path: &Path) -> Result<Self> {
         let bytes = fs::read(path).map_err(|e| Error::storage(path, e))?;
-        file::check_header(path, &bytes, MAGIC, VERSION, true)?;
+        file::check_header(path, &bytes, TEXTURE_MAGIC, TEXTURE_VERSION, true)?;
         Self::parse(path, &bytes, bytes.len() as u64)
     }
 
@@ -122,7 +122,7 @@ impl TextureFile {
         let length = file.metadata().map_err(|e| Error::storage(path, e))?.len();
         let mut head = vec![0; (HEADER_BYTES + TABLE_BYTES).min(length as usize)];
         file.read_exact_at(&mut head, 0).map_err(|e| Error::storage(path, e))?;
-        file::check_header(path, &head, MAGIC, VERSION, false)?;
+        file::check_header(path, &head, TEXTURE_MAGIC, TEXTURE_VERSION, false)?;
         Self::parse(path, &head, length)
     }
 

@@ -10,7 +10,7 @@ mod usage;
 
 pub use build::{MissingImages, Progress, TextureAsset, TextureInfo, TextureKeys, TextureSource, build_textures, prune_textures, texture_source};
 pub use cache::{CacheStats, LocalTextureCache, Texture, TextureCache};
-pub use file::{TextureFile, TextureKey, encode_texture, hex, texture_key, texture_path, write_texture};
+pub use file::{TEXTURE_MAGIC, TEXTURE_VERSION, TextureFile, TextureKey, encode_texture, hex, texture_key, texture_path, write_texture};
 pub use level::{AlphaCell, Level};
 pub use mips::{LinearRaster, first_mip, level_count, level_size, next_mip, premultiplied};
 pub use usage::mark_triangle;

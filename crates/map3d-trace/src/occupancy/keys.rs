@@ -1,8 +1,9 @@
-//! What the bytes of base blocks depend on, decided from boxes: never less than what can be seen.
+//! Keys of base blocks: hashes over everything that their bytes depend on, decided conservatively from boxes.
 
 use std::collections::HashMap;
 
-use map3d_base::tile::{MAX_LEVEL, Tile};
+use map3d_base::limits::DEEPEST_LEVEL;
+use map3d_base::tile::Tile;
 use map3d_base::{Box3, Error, Frame, RENDER_FORMAT, Result};
 use map3d_scene::SceneStore;
 use twox_hash::XxHash3_128;
@@ -10,17 +11,12 @@ use twox_hash::XxHash3_128;
 use super::reach::Reach;
 use super::{Rect, TileView};
 
-/// Hex hash over all that the bytes of the base block rooted at `root` depend on: the format, the frame, and every object and instance whose box meets
-/// the block's beam, or can throw a shadow into it or close it in.
-pub fn block_key(scene: &SceneStore, frame: &Frame, root: Tile) -> Result<String> {
-    Ok(block_keys(scene, frame, root.z, &[[root.x, root.y]])?.remove(0))
-}
-
-/// The keys of many blocks of one level, (x, y) each; every chunk is looked at once.
+/// Returns the keys of base blocks of one level, (x, y) each: hex hashes over everything that their bytes depend on, which is the format, the frame, and
+/// every object and instance whose box meets the block's beam, throws a shadow into it or occludes ambient light there. Every chunk is opened once.
 pub fn block_keys(scene: &SceneStore, frame: &Frame, level: u8, blocks: &[[u32; 2]]) -> Result<Vec<String>> {
     frame.validate()?;
-    if let Some([x, y]) = blocks.iter().find(|[x, y]| level > MAX_LEVEL || x >> level != 0 || y >> level != 0) {
-        return Err(Error::argument(format!("block ({level}, {x}, {y}): no such tile")));
+    if let Some([x, y]) = blocks.iter().find(|[x, y]| level > DEEPEST_LEVEL || x >> level != 0 || y >> level != 0) {
+        return Err(Error::argument(format!("block {level}/{x}/{y} does not exist")));
     }
     let view = TileView::new(frame, level);
     let reach = Reach::new(frame, &view, &scene.bounds());
@@ -44,14 +40,14 @@ pub fn block_keys(scene: &SceneStore, frame: &Frame, level: u8, blocks: &[[u32; 
     Ok(blocks.iter().zip(&sums.sums).map(|(block, sum)| finish(frame, level, *block, sum)).collect())
 }
 
-/// Of each block: how many contents meet its beam, and the sum of their hashes modulo 2^128, whatever their order.
+/// Per block, the number of contents that meet its beam and the sum of their hashes modulo 2^128, so that their order does not matter.
 struct Sums<'a> {
     view: TileView,
     reach: Reach,
     blocks: &'a [[u32; 2]],
     numbers: HashMap<[u32; 2], Vec<u32>>,
     sums: Vec<(u64, u128)>,
-    /// Columns and rows that have a block.
+    /// First and last column and row with a block.
     span: [[u32; 2]; 2],
 }
 
@@ -63,9 +59,9 @@ impl<'a> Sums<'a> {
         Self { view, reach, blocks, numbers, sums: vec![(0, 0); blocks.len()], span: [end(0), end(1)] }
     }
 
-    /// First and last column and row that a rectangle meets, of those that have a block.
+    /// Returns the first and last column and row with a block that a rectangle meets.
     fn tiles(&self, rect: &Rect) -> [[u32; 2]; 2] {
-        // Where a border lies on that of a tile, both tiles are met.
+        // A rectangle whose border is that of a tile meets both tiles.
         let first = |k: usize| ((rect.lo[k].ceil() - 1.0).max(0.0) as u32).max(self.span[k][0]);
         let last = |k: usize| if rect.hi[k] < 0.0 { None } else { Some((rect.hi[k] as u32).min(self.span[k][1])) };
         [0, 1].map(|k| last(k).map_or([1, 0], |last| [first(k), last]))
@@ -78,7 +74,7 @@ impl<'a> Sums<'a> {
         any
     }
 
-    /// A content that reaches a block in several ways counts several times there, always as many.
+    /// Adds a content to every block that it reaches. One that reaches a block in several ways counts as often there, always the same number of times.
     fn add(&mut self, bounds: &Box3, id: u32, content: [u64; 2]) {
         let mut reached = Vec::new();
         self.reach.each(bounds, self.view.rect(bounds), |rect| reached.push(self.tiles(rect)));

@@ -1,20 +1,20 @@
-//! How far the tiles of a pass depend on what lies outside their beams (spec/pyramid.md §10).
+//! How far the tiles of a pass depend on content outside their beams (spec/pyramid.md §10).
 
 use map3d_base::vec3::dot;
 use map3d_base::{Box3, Frame, LayerKind, RAY_LIFT_M};
 
 use super::{Rect, TileView};
 
-/// A long shadow is followed in steps, so that its rectangles stay small.
+/// A long shadow is split into at most this number of rectangles.
 const STEPS_MAX: f64 = 64.0;
 
-/// What the layers of a pass reach for beyond a beam.
+/// The reach of a pass's layers beyond a beam.
 pub(super) struct Reach {
-    /// In tiles.
+    /// Of ambient occlusion, in tiles.
     radius: f64,
-    /// Of each sun above the horizon: where a shadow goes for each metre of height, in tiles.
+    /// For each sun above the horizon, the shift of a shadow per metre of height, in tiles.
     shadows: Vec<[f64; 2]>,
-    /// The scene's lowest point, local: no shadow falls deeper.
+    /// Height of the scene's lowest point, local: no shadow falls below.
     floor_m: f64,
 }
 
@@ -30,7 +30,8 @@ impl Reach {
         Self { radius: (radius_m + lift_m) / view.tile_m, shadows: suns.filter(|s| s[2] > 0.0).map(shadow).collect(), floor_m: bounds.lo[2] }
     }
 
-    /// Calls `take` with rectangles that together hold all that a box can be seen in, darken or close in; `rect`: where it is seen.
+    /// Calls `take` with rectangles that together cover the tiles in which a box is visible, throws a shadow or occludes ambient light. `rect`: where it is
+    /// visible.
     pub fn each(&self, bounds: &Box3, rect: Rect, mut take: impl FnMut(&Rect)) {
         let rect = Rect { lo: rect.lo.map(|v| v - self.radius), hi: rect.hi.map(|v| v + self.radius) };
         take(&rect);

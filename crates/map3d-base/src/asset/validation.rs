@@ -1,24 +1,24 @@
-//! The one gate through which all geometry passes: what is not finite, not in range or has no area stays outside, counted.
+//! Validation of geometry on its way into an asset: triangles that are not finite, out of range or without area are skipped and counted.
 
 use super::Batch;
 use crate::vec3::{Vec3, length, triangle_normal};
 
 /// Limits of one asset's geometry.
 #[derive(Clone, Copy, Debug)]
-pub struct GateLimits {
+pub struct GeometryLimits {
     /// |coordinate| in metres.
     pub coordinate_m: f64,
 }
 
-impl Default for GateLimits {
+impl Default for GeometryLimits {
     fn default() -> Self {
         Self { coordinate_m: 1e8 }
     }
 }
 
-/// Triangles kept out, by reason.
+/// Skipped triangles and dropped texture coordinates, by reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Skips {
+pub struct SkippedGeometry {
     pub index_out_of_range: u64,
     pub not_finite: u64,
     pub too_far: u64,
@@ -26,8 +26,8 @@ pub struct Skips {
     pub bad_uv: u64,
 }
 
-impl Skips {
-    /// (reason, count) of every reason.
+impl SkippedGeometry {
+    /// Returns (reason, count) of every reason.
     pub fn reasons(&self) -> [(&'static str, u64); 5] {
         [
             ("index out of range", self.index_out_of_range),
@@ -39,25 +39,25 @@ impl Skips {
     }
 }
 
-/// Which triangles of a batch are sound, in order. UVs that are not finite do not cost the triangle: the caller drops the texture there.
-pub fn pass(batch: &Batch, limits: GateLimits, skips: &mut Skips) -> Vec<bool> {
-    batch.triangles.iter().map(|t| is_sound(&batch.positions, *t, limits, skips)).collect()
+/// Returns which triangles of a batch are valid, in order. UVs that are not finite do not make a triangle invalid: the writer drops them.
+pub fn valid_triangles(batch: &Batch, limits: GeometryLimits, skipped: &mut SkippedGeometry) -> Vec<bool> {
+    batch.triangles.iter().map(|t| is_valid(&batch.positions, *t, limits, skipped)).collect()
 }
 
-fn is_sound(positions: &[Vec3], t: [u32; 3], limits: GateLimits, skips: &mut Skips) -> bool {
+fn is_valid(positions: &[Vec3], t: [u32; 3], limits: GeometryLimits, skipped: &mut SkippedGeometry) -> bool {
     let corners = t.map(|v| positions.get(v as usize).copied());
     let [Some(a), Some(b), Some(c)] = corners else {
-        skips.index_out_of_range += 1;
+        skipped.index_out_of_range += 1;
         return false;
     };
     let values = || [a, b, c].into_iter().flatten();
     let area = length(triangle_normal([a, b, c]));
     let counter = if !values().all(f64::is_finite) {
-        &mut skips.not_finite
+        &mut skipped.not_finite
     } else if values().any(|v| v.abs() > limits.coordinate_m) {
-        &mut skips.too_far
+        &mut skipped.too_far
     } else if area == 0.0 || area.is_nan() {
-        &mut skips.zero_area
+        &mut skipped.zero_area
     } else {
         return true;
     };
