@@ -1,6 +1,6 @@
 import type { Rgb } from "./color";
 
-/** How an object is drawn: tinted (and lit), unchanged, pale, or not at all. */
+/** An object's style: a tint (lit), plain, pale, or not drawn. */
 export type DrawStyle = Rgb | "plain" | "dimmed" | "hidden";
 
 /** The draw styles of a layer's objects. */

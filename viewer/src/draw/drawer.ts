@@ -10,7 +10,7 @@ import type { Clip, DepthMapping } from "./depthMapping";
 import type { DrawStyles } from "./drawStyle";
 import type { LightEstimator } from "./lightEstimator";
 
-/** What a layer shows: lit colour, colour or picture as stored, or a data layer in false colours. */
+/** The content of a layer: lit colour, colour or picture as stored, or a data layer in false colours. */
 export type Mode = "lit" | "color" | "picture" | "normal" | "id" | "depth";
 export const MODES: readonly Mode[] = ["lit", "color", "picture", "normal", "id", "depth"];
 

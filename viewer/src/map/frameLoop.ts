@@ -1,4 +1,4 @@
-/** How long an urgent frame waits for the browser. */
+/** Maximum wait of an urgent frame for the browser. */
 const SOON_MS = 20;
 
 /** Draws a frame after each request; never without one. */

@@ -4,7 +4,7 @@ import type { Camera } from "../geo/camera";
 import type { Rendering } from "../geo/manifest";
 import type { TileResources } from "../tiles/layerTiles";
 
-/** What a map offers to its image layers. */
+/** The services of a map for its image layers. */
 export interface LayerContext {
   readonly tileResources: TileResources;
   /** Returns a name for the layer's tiles, unique on the map. */

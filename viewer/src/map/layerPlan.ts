@@ -12,7 +12,7 @@ import type { TileRequest } from "../tiles/queue";
 import type { LayerTiles } from "../tiles/layerTiles";
 import type { ViewState } from "./layerContext";
 
-/** What to draw and to fetch of a layer for a camera. */
+/** The quads to draw and the tiles to fetch of a layer for a camera. */
 export interface LayerPlan {
   readonly view: View;
   readonly bakedLight: BakedLight;

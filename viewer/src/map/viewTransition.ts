@@ -16,7 +16,7 @@ export interface ViewTransition {
   draw(scene: TransitionFrame): void;
 }
 
-/** What a view transition draws with. */
+/** Input and functions for drawing a frame of a view transition. */
 export interface TransitionFrame {
   readonly gl: WebGL2RenderingContext;
   /** Size of the canvas, device pixels. */

@@ -12,23 +12,23 @@ const VIEWPORT = { width: 500, height: 400 };
 
 const bed = new TestBed({ town, ramp: renderRamp(), opaque: opaque(town), broken: broken(town) });
 
-/** The town with colour that has no alpha, as jpeg has it. */
+/** The town with colour without alpha, like JPEG. */
 function opaque({ json, files, raw }: Fixture): Fixture {
   const layers = json.layers.map((layer) => (layer.kind === "color" ? { ...layer, format: "jpeg" } : layer));
   const filled = [...raw].filter(([path]) => path.includes("/color/")).map(([path, bytes]) => [path, encodePng(128, 128, 4, bytes.map((value, at) => (at % 4 === 3 ? 255 : value)))] as const);
   return { json: { ...json, layers }, files: new Map([...files, ...filled]), raw };
 }
 
-/** The town without some tiles: level 2 cannot be read, nor the left half of level 3. */
+/** The town without some tiles: level 2 and the left half of level 3 cannot be read. */
 function broken({ json, files, raw }: Fixture): Fixture {
   const bad = [...files.keys()].filter((path) => /\/(2\/\d+\/\d+|3\/[0-3]\/\d+)$/.test(path));
   return { json, files: new Map([...files, ...bad.map((path) => [path, new Uint8Array([0])] as const)]), raw };
 }
 
 interface Difference {
-  /** Of premultiplied bytes. */
+  /** Largest difference of premultiplied bytes. */
   readonly most: number;
-  /** Share of bytes that differ by more than 2. */
+  /** Fraction of bytes that differ by more than 2. */
   readonly off: number;
 }
 
@@ -56,7 +56,7 @@ async function both(name: string, options: object = {}, layer: object = {}, devi
   return { pages, close: async () => { for (const page of pages) await page.context().close(); } };
 }
 
-/** Does something on both pages and compares what they show then. */
+/** Runs a function on both pages and compares their pictures. */
 async function compared<A>(pages: readonly Page[], act: (argument: A) => unknown, argument: A): Promise<Difference> {
   const shots: Buffer[] = [];
   for (const page of pages) {
@@ -71,7 +71,7 @@ const setZoom = (zoom: number): unknown => (globalThis as Global).map.setZoom(zo
 const MODES = ["color", "normal", "id", "depth", "lit"];
 const CHOSEN = [17, 1025, 3_900_000_007];
 
-describe("where a tile pixel is a device pixel, both drawers differ by no more than rounding", () => {
+describe("if a tile pixel is a device pixel, both drawers agree except for rounding", () => {
   test.each([1, 2])("in every mode, with and without highlights, at pixel ratio %i", async (dpr) => {
     const { pages, close } = await both("town", { zoom: dpr === 1 ? 3 : 2 }, {}, dpr);
     for (const mode of MODES) expect((await compared(pages, setMode, mode)).most, mode).toBeLessThanOrEqual(1.01);
@@ -81,7 +81,7 @@ describe("where a tile pixel is a device pixel, both drawers differ by no more t
     await close();
   });
 
-  test("under another light, and without light", async () => {
+  test("with another light, and without light", async () => {
     const { pages, close } = await both("town");
     for (const light of [{ azimuth_deg: 20, altitude_deg: 10, ambient: 0.1, diffuse: 3 }, { azimuth_deg: 200, diffuse: 0 }, { lit: false }]) {
       expect((await compared(pages, (given) => (globalThis as Global).map.setLight(given), light)).most).toBeLessThanOrEqual(1.01);
@@ -89,14 +89,14 @@ describe("where a tile pixel is a device pixel, both drawers differ by no more t
     await close();
   });
 
-  test("where the id layer tells what is covered", async () => {
+  test("if the id layer tells covered pixels", async () => {
     const { pages, close } = await both("opaque");
     for (const mode of ["color", "lit"]) expect((await compared(pages, setMode, mode)).most).toBeLessThanOrEqual(1.01);
     expect((await compared(pages, (ids) => (globalThis as Global).layer.highlight(ids), CHOSEN)).most).toBeLessThanOrEqual(1.01);
     await close();
   });
 
-  test("with a second layer that lets the first one through", async () => {
+  test("with a translucent second layer", async () => {
     const { pages, close } = await both("town");
     const add = (url: string): unknown => new (globalThis as Global).map3d.imageLayer(url, { mode: "id", opacity: 0.4 }).addTo((globalThis as Global).map);
     expect((await compared(pages, add, bed.url("opaque"))).most).toBeLessThanOrEqual(2.01);
@@ -109,9 +109,9 @@ async function settledAll(pages: readonly Page[], act: () => unknown): Promise<v
   for (const page of pages) await settled(page, act, null);
 }
 
-/** Colours are mixed as sRGB here and in linear light there, so edges between dark and bright differ; false colours are not mixed. */
-describe("at zooms between", () => {
-  test.each([1, 2, 3])("both drawers agree but for edges at pixel ratio %i", async (dpr) => {
+/** The canvas drawer interpolates sRGB and the WebGL drawer linear light, so edges between dark and bright differ; false colours are not interpolated. */
+describe("at fractional zooms", () => {
+  test.each([1, 2, 3])("both drawers agree except for edges at pixel ratio %i", async (dpr) => {
     const { pages, close } = await both("town", {}, {}, dpr);
     for (const mode of ["lit", "id"]) {
       await settledAll(pages, mode === "lit" ? () => (globalThis as Global).layer.setMode("lit") : () => (globalThis as Global).layer.setMode("id"));
@@ -125,7 +125,7 @@ describe("at zooms between", () => {
     await close();
   });
 
-  test.each([[4, 1, 2.4], [3.37, 1, 3.4], [2.5, 1, 6.2], [2.71, 2, 4], [3.9, 3, 2]])("at zoom %d and pixel ratio %i no seam is seen between tiles", async (zoom, dpr, most) => {
+  test.each([[4, 1, 2.4], [3.37, 1, 3.4], [2.5, 1, 6.2], [2.71, 2, 4], [3.9, 3, 2]])("at zoom %d and pixel ratio %i no seam is visible between tiles", async (zoom, dpr, most) => {
     const { page } = await bed.start("ramp", { zoom, light: { lit: false }, drawer: "canvas" }, {}, { deviceScaleFactor: dpr });
     const got = await picture(page);
     const width = 800 * dpr;
@@ -143,7 +143,7 @@ describe("at zooms between", () => {
   });
 });
 
-test("tiles above and below stand in for those that cannot be had", async () => {
+test("ancestors and descendants replace tiles that cannot be fetched", async () => {
   const { pages, close } = await both("broken", {}, { mode: "id" });
   expect((await compared(pages, setMode, "depth")).most).toBeLessThanOrEqual(1.01);
   expect((await compared(pages, setMode, "lit")).off).toBeLessThan(0.03);
@@ -152,7 +152,7 @@ test("tiles above and below stand in for those that cannot be had", async () => 
   await close();
 });
 
-describe("the drawer is chosen", () => {
+describe("the drawer", () => {
   const withoutWebGL = (): void => {
     const original = Object.getOwnPropertyDescriptor(HTMLCanvasElement.prototype, "getContext")?.value as (this: HTMLCanvasElement, kind: string, ...rest: unknown[]) => null;
     HTMLCanvasElement.prototype.getContext = function (this: HTMLCanvasElement, kind: string, ...rest: unknown[]): null {
@@ -160,7 +160,7 @@ describe("the drawer is chosen", () => {
     };
   };
 
-  /** As browsers do whose WebGL is drawn by the processor. */
+  /** Imitates browsers whose WebGL runs on the CPU. */
   const slowly = (): void => {
     const original = Object.getOwnPropertyDescriptor(HTMLCanvasElement.prototype, "getContext")?.value as (this: HTMLCanvasElement, kind: string, options?: object) => null;
     HTMLCanvasElement.prototype.getContext = function (this: HTMLCanvasElement, kind: string, options?: WebGLContextAttributes): null {
@@ -195,7 +195,7 @@ describe("the drawer is chosen", () => {
     await page.context().close();
   });
 
-  test("a context that is lost for good is replaced by a canvas without WebGL; hands still move the map", async () => {
+  test("a canvas without WebGL replaces a context that is lost for good; gestures still move the map", async () => {
     const { page, problems } = await bed.start("town", { zoom: 3 });
     const before = await picture(page);
     const told = await page.evaluate(async () => {
@@ -239,7 +239,7 @@ test("picks are exact", async () => {
   await page.context().close();
 });
 
-test("idle means no frames and no messages to workers", async () => {
+test("an idle map draws no frames and sends no messages to workers", async () => {
   const { page } = await bed.start("town", { drawer: "canvas" });
   const counts = await page.evaluate(() => new Promise<{ resting: number; moving: number }>((done) => {
     let count = 0;
@@ -263,7 +263,7 @@ test("idle means no frames and no messages to workers", async () => {
   await page.context().close();
 });
 
-test("while new light is computed the old picture stays", async () => {
+test("the old picture stays while new light is computed", async () => {
   const { page } = await bed.start("town", { drawer: "canvas" });
   const least = await page.evaluate(() => new Promise<number>((done) => {
     const { map } = globalThis as Global;
@@ -284,7 +284,7 @@ test("while new light is computed the old picture stays", async () => {
   await page.context().close();
 });
 
-test("where pixels cannot be read as they are, light is composed instead, nearly the same", async () => {
+test("if pixels cannot be read exactly, compositing lights nearly the same", async () => {
   const options = { zoom: 3, light: { azimuth_deg: 215, altitude_deg: 48, ambient: 0.42, diffuse: 0.9 } };
   const { page: plain } = await bed.start("town", { ...options, drawer: "webgl" });
   const { page } = await bed.openPage();

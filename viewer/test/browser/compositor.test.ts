@@ -12,7 +12,7 @@ const QUIET = { drawer: "canvas", zoom: 3, controls: false, attribution: false }
 
 type Counting = Global & { counts: { puts: number; draws: number } };
 
-/** Counts what is drawn on canvases of the page from now on. */
+/** Counts draw calls on the page's canvases from now on. */
 function count(): void {
   const g = globalThis as Counting;
   g.counts = { puts: 0, draws: 0 };
@@ -28,7 +28,7 @@ function count(): void {
   };
 }
 
-/** What has been drawn since this was asked last. */
+/** Returns the draw calls since the last call. */
 const counted = (page: Page): Promise<Counting["counts"]> => page.evaluate(() => {
   const g = globalThis as Counting;
   const { counts } = g;
@@ -36,7 +36,7 @@ const counted = (page: Page): Promise<Counting["counts"]> => page.evaluate(() =>
   return counts;
 });
 
-test("what has not changed is moved and scaled, not drawn; other light is drawn, and each tile once", async () => {
+test("unchanged tiles are moved and scaled, not drawn; new light draws each tile once", async () => {
   const { page, problems } = await bed.start("town", { ...QUIET, preserveDrawingBuffer: false });
   await page.evaluate(count);
   await settled(page, () => (globalThis as Global).map.panBy(9, -6), null);
@@ -53,11 +53,11 @@ test("what has not changed is moved and scaled, not drawn; other light is drawn,
   await page.context().close();
 });
 
-test("several layers, half seen and in parts of the map, look as they do when they are painted", async () => {
+test("several layers, translucent and clipped, look the same as on a canvas", async () => {
   const shots: Buffer[] = [];
   for (const preserveDrawingBuffer of [true, false]) {
     const { page, problems } = await bed.start("town", { ...QUIET, preserveDrawingBuffer }, {}, { viewport: { width: 500, height: 400 }, deviceScaleFactor: 2, bypassCSP: true });
-    // What pages say of any canvas or block.
+    // Styles of a page for any canvas or block.
     if (!preserveDrawingBuffer) await page.addStyleTag({ content: "canvas:not(#mapcanvas) { width: 100%; height: 100%; max-width: 90%; margin: 7px; border: 2px solid red; padding: 3px; opacity: 0.5; transition: transform 1s } .map3d-mosaics, .map3d-mosaics div { margin: 9px; padding: 4px; border: 1px solid; transform: scale(0.9) }" });
     await settled(page, (url) => new (globalThis as Global).map3d.imageLayer(url, { mode: "id", opacity: 0.6, combine: false }).addTo((globalThis as Global).map).setClip([0, 0, 0.613, 0.8]), bed.url("later"));
     await settled(page, () => (globalThis as Global).map.setZoom(3.37), null);
@@ -77,7 +77,7 @@ test("several layers, half seen and in parts of the map, look as they do when th
   expect(off / (painted?.data.length ?? 0)).toBeLessThan(0.002); // ids are not mixed: where two meet, the nearest pixel may be the other
 });
 
-test("a change of direction fades: a copy of what was seen lies over what comes", async () => {
+test("a change of view cross-fades: a copy of the old picture covers the new one", async () => {
   const { page, problems } = await bed.start("town", { ...QUIET, preserveDrawingBuffer: false });
   await page.addScriptTag({ url: `${bed.server.origin}/map3d-orbit.js` });
   const seen = await page.evaluate(() => new Promise<readonly (number | boolean)[]>((done) => {
@@ -97,7 +97,7 @@ test("a change of direction fades: a copy of what was seen lies over what comes"
   await page.context().close();
 });
 
-test("a removed map takes its elements along", async () => {
+test("a removed map removes its elements", async () => {
   const { page } = await bed.start("town", { ...QUIET, preserveDrawingBuffer: false });
   expect(await page.locator(".map3d-mosaics").count()).toBe(1);
   await page.evaluate(() => (globalThis as Global).map.remove());

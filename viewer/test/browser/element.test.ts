@@ -74,9 +74,9 @@ test.each(["/before", "/after"])("%s: attributes and children make a map, and ch
   });
   expect(changed).toMatchObject({ same: true, direction: "180-45", zoom: 3, time: null, azimuth: 90, mode: "depth", labels: ["Hall", "Turm"] });
   expect(changed.errors).toEqual([
-    '<map-3d center="here">: center must be three numbers such as "691000 5336000 520"', '<map-3d zoom="1 2">: zoom must be a number', 'view "7-7" is none of 0-45, 90-45, 180-45, 270-45',
-    'unknown mode "pretty"; use one of lit, color, picture, normal, id, depth', '<map-3d time="noon">: time is a moment such as "2026-06-21T14:00Z", or "now"',
-    '<map-3d-marker position="1 2">: position is three numbers such as "691000 5336000 520"',
+    '<map-3d center="here">: center must be three numbers such as "691000 5336000 520"', '<map-3d zoom="1 2">: zoom must be a number', 'unknown view "7-7"; the rendering has 0-45, 90-45, 180-45, 270-45',
+    'unknown mode "pretty"; use one of lit, color, picture, normal, id, depth', '<map-3d time="noon">: time must be a time such as "2026-06-21T14:00Z", or "now"',
+    '<map-3d-marker position="1 2">: position must be three numbers such as "691000 5336000 520"',
   ]);
   expect(problems).toEqual([]);
   await page.context().close();
@@ -131,7 +131,7 @@ test("where nothing can be drawn, what is inside is shown, or a sentence; anothe
   const { page } = await open("/wrong");
   await page.getByText("Unsere Anschrift").waitFor();
   expect(await page.locator("map-3d").first().innerText()).toBe("Unsere Anschrift: Marktplatz 1");
-  await page.getByText("La carte ne peut pas être affichée.").waitFor();
+  await page.getByText("Impossible de charger la carte.").waitFor();
   await page.screenshot({ path: `${OUT}/element-none.png` });
   await page.evaluate(() => new Promise((done) => {
     const element = document.querySelector("map-3d") as Where;

@@ -23,7 +23,7 @@ const LOW = { azimuth_deg: 250, altitude_deg: 12, sun_rgb: [1, 0.7, 0.45], sky_r
 const [HALL, CHAPEL] = [17, 3_900_000_007];
 const places = { hall: [ORIGIN[0] - 45, ORIGIN[1] - 4, ORIGIN[2] + 34], tower: [ORIGIN[0] + 32, ORIGIN[1] + 26, ORIGIN[2] + 62] } as const;
 
-/** The page once two screenshots in a row are equal. */
+/** Takes a screenshot once two in a row are equal. */
 async function restingShot(page: Page): Promise<Buffer> {
   let before: Buffer = Buffer.alloc(0);
   for (let left = 40; left > 0; left--) {
@@ -91,7 +91,7 @@ test.each(Object.entries(scenes))("%s", async (name, { map = {}, layer = {}, con
   await page.context().close();
 });
 
-/** The ready-made page, at a moment that stays. */
+/** The ready-made page, at a fixed time. */
 const pages: Record<string, { context: BrowserContextOptions; act: (page: Page) => Promise<unknown> }> = {
   "page-phone": { context: { viewport: { width: 390, height: 844 }, isMobile: true, hasTouch: true }, act: (page) => page.touchscreen.tap(150, 420).then(() => page.waitForSelector("#info:not([hidden])")) },
   "page-picture": { context: { viewport: { width: 720, height: 520 } }, act: (page) => page.locator("#make-picture").click() },
@@ -109,7 +109,7 @@ test.each(Object.entries(pages))("%s", async (name, { context, act }) => {
   await page.context().close();
 });
 
-test("a golden picture is not that of another scene, nor the same a pixel beside", async () => {
+test("a golden picture differs from another scene and from itself shifted by a pixel", async () => {
   const read = (name: string): ReturnType<typeof decodePng> => decodePng(new Uint8Array(readFileSync(`${GOLDEN}/${name}.png`)));
   const [day, marker, dark] = [await read("day"), await read("marker"), await read("dark")];
   const beside = { ...day, data: new Uint8Array(day.data) };

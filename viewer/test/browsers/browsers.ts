@@ -10,7 +10,7 @@ export interface OtherBrowser {
   /** It alters pixels that are read from a canvas, and reports a pixel ratio of 2. */
   readonly perturbs: boolean;
   readonly start: (display: Display) => Promise<Driver & { readonly complaints: readonly string[] }>;
-  /** What is missing to run it; null if it can run. */
+  /** The missing requirement; null if it can run. */
   readonly missing: string | null;
 }
 

@@ -19,7 +19,7 @@ export interface ShaderVariant {
 }
 
 export const variantName = (v: ShaderVariant): string =>
-  [v.mode, v.masked && "masked", v.highlight && "highlight", v.styled && "finish", v.shadow, v.occlusion && "ao", v.combined && "combined", v.estimatedLight && "shaded"].filter(Boolean).join("+");
+  [v.mode, v.masked && "masked", v.highlight && "highlight", v.styled && "styled", v.shadow, v.occlusion && "ao", v.combined && "combined", v.estimatedLight && "estimated"].filter(Boolean).join("+");
 
 export function makeFragmentShader({ mode, masked, highlight, styled, shadow, occlusion, combined, estimatedLight }: ShaderVariant): string {
   const names = [`MODE_${mode === "picture" ? "COLOR" : mode.toUpperCase()}`, masked && "MASKED", highlight && "HIGHLIGHT", styled && "STYLED", shadow && `SHADOW_${shadow.toUpperCase()}`, occlusion && "OCCLUSION", combined && "COMBINED", estimatedLight && "ESTIMATED"];

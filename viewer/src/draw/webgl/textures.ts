@@ -8,7 +8,7 @@ export interface TileTexture {
   readonly texture: WebGLTexture;
   readonly width: number;
   readonly height: number;
-  /** How each part of the gutter was filled, at (dx + 1) + 3 (dy + 1): 0 not at all, 3 from the tile there. */
+  /** Source of each part of the gutter, at (dx + 1) + 3 (dy + 1): 0 not filled, 3 from the tile there. */
   readonly filled: number[];
 }
 
