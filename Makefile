@@ -1,4 +1,4 @@
-# map3d: `make` lists the verbs.
+# map3d: `make` lists the targets.
 
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
@@ -11,9 +11,9 @@ CACHE := .cache
 RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
 VIEWER := $(shell find viewer/src viewer/page viewer/scripts -type f 2>/dev/null) $(wildcard viewer/*.json viewer/*.ts viewer/*.js viewer/*.mjs)
 
-.PHONY: help demo test test-all test-rust test-python test-viewer test-wheel test-browser browser-suite wheel check check-rust check-python check-viewer bench bench-extent bench-cycles bench-rotterdam bench-viewer peers bless docs reference build clean tools
+.PHONY: help demo test test-all test-rust test-python test-viewer test-wheel test-browser browser-suite wheel check check-words check-rust check-python check-viewer bench bench-extent bench-cycles bench-rotterdam bench-viewer peers bless docs reference build clean tools
 
-help: ## this list
+help: ## list the targets
 	@echo "map3d: 3D city models as oblique image tiles"; echo
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 20
 	@$(MAKE) --no-print-directory -s tools
@@ -65,7 +65,7 @@ demo: build ## generate a town, render it, serve it on a free port and print the
 
 # -- test ----------------------------------------------------------------------------------------------------------------------------
 
-test: test-rust test-python test-viewer test-wheel test-browser ## all quick tests, also in a real browser
+test: test-rust test-python test-viewer test-wheel test-browser ## run all tests, including those in real browsers
 
 test-rust:
 	cargo test --workspace --locked --exclude map3d-py --lib --tests -q
@@ -76,10 +76,10 @@ test-python: build
 test-viewer: $(CACHE)/npm
 	cd viewer && npm test --silent
 
-test-wheel: wheel ## install the wheel into an empty environment, without Rust and Node.js, and run it
+test-wheel: wheel ## install the wheel into an empty environment without Rust and Node.js, and run it
 	$(BIN)/python -m pytest -q -m wheel
 
-test-browser: build ## whole-way tests in Chromium, Firefox and WebKitGTK; skipped, loudly, where a browser is not installed
+test-browser: build ## test in Chromium, Firefox and WebKitGTK; skips browsers that are not installed, and says so
 	@status=0; tests/browsers.sh || status=$$?; \
 	case $$status in 0) $(MAKE) --no-print-directory browser-suite;; 3) ;; *) exit $$status;; esac
 
@@ -87,11 +87,14 @@ browser-suite: build
 	cd viewer && npm run --silent test:browser
 	$(BIN)/python -m pytest -q -m browser
 
-test-all: test ## also what takes long (nothing is marked slow yet)
+test-all: test ## run slow tests, too (none is marked slow yet)
 
 # -- check ---------------------------------------------------------------------------------------------------------------------------
 
-check: check-rust check-python check-viewer ## format, lint, types, sizes
+check: check-words check-rust check-python check-viewer ## check words, format, lint, types and sizes
+
+check-words: $(CACHE)/venv
+	$(BIN)/python docs/check_words.py
 
 check-rust: $(CACHE)/venv
 	cargo fmt --all --check
@@ -108,37 +111,37 @@ check-viewer: $(CACHE)/viewer
 
 # -- keep --------------------------------------------------------------------------------------------------------------------------
 
-bench: build ## speed and memory, peers beside us; then a twentieth of bench-rotterdam
+bench: build ## measure speed and memory beside peers, then a twentieth of bench-rotterdam
 	$(BIN)/python -m bench
 	$(BIN)/python -m bench.rotterdam --scale 20
 
-bench-extent: build ## a town that grows to 75 million triangles, in one memory: an hour, 30 GB of disk
+bench-extent: build ## measure towns of up to 75 million triangles within a fixed memory limit: 1 hour, 30 GB of disk
 	$(BIN)/python -m bench extent --millions 1 3 10 30 75
 
-bench-cycles: requirements/cycles.lock | $(CACHE) ## install Blender (350 MB) in a Python of its own, a further peer of `make bench`
+bench-cycles: requirements/cycles.lock | $(CACHE) ## install Blender (350 MB) in its own Python environment, as another peer of `make bench`
 	$(PYTHON) -m venv $(CACHE)/cycles
 	$(CACHE)/cycles/bin/python -m pip install -q --disable-pip-version-check -r requirements/cycles.lock
 
-bench-viewer: build peers ## map3d.js beside CesiumJS, OpenSeadragon and Leaflet (npm, 230 MB), cities to 10 million triangles: 2 hours and 9 GB of disk
+bench-viewer: build peers ## measure map3d.js beside CesiumJS, OpenSeadragon and Leaflet (npm, 230 MB): 2 hours, 9 GB of disk
 	$(BIN)/python -m bench viewer
 
 peers:
-	cd bench/viewer && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error || echo "NO PEERS: npm could not install them" >&2
+	cd bench/viewer && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error || echo "npm could not install the peers; they are skipped" >&2
 
-bench-rotterdam: build ## a city of 62,000 buildings from nothing to a published folder: hours, 45 GB of disk
+bench-rotterdam: build ## measure a city of 62,000 buildings from files to a published folder: hours, 45 GB of disk
 	$(BIN)/python -m bench.rotterdam
 
-docs: build reference peers ## the pictures (beside CesiumJS: npm, 230 MB) and the command line's reference in docs/; the viewer's reference
+docs: build reference peers ## regenerate the pictures (CesiumJS from npm, 230 MB) and command reference in docs/, and the viewer's reference
 	$(BIN)/python docs/make_cli.py
 	$(BIN)/python docs/pictures/make.py .cache/pictures
 
-reference: $(CACHE)/npm ## the viewer's reference as pages, viewer/reference/
+reference: $(CACHE)/npm ## write the viewer's reference to viewer/reference/
 	cd viewer && npm run --silent docs
 
-bless: $(CACHE)/venv $(CACHE)/npm ## write test vectors and golden pictures anew; look at them, and say why in the commit
+bless: $(CACHE)/venv $(CACHE)/npm ## regenerate test vectors and golden pictures; look at them and say why in the commit
 	$(BIN)/python spec/make_vectors.py
 	MAP3D_BLESS=1 cargo test --locked -q -p map3d-render --test golden
 	cd viewer && npm run --silent bless
 
-clean: ## remove what was built
+clean: ## remove all build output
 	rm -rf $(VENV) $(CACHE) target viewer/node_modules viewer/dist viewer/reference python/map3d/viewer dist demo tests/.out
