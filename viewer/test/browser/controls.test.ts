@@ -16,7 +16,7 @@ type Controlled = Global & { map3d: typeof Controls; control: Controls.locate; o
 const START = { zoom: 3, center: [ORIGIN[0], ORIGIN[1], ORIGIN[2]] };
 const said = (page: Page, text: string): Promise<unknown> => page.waitForFunction((wanted) => document.querySelector(".map3d-status")?.textContent === wanted, text);
 
-test("the reader is shown on the surface with a circle as large as the accuracy; denied, outside and placeless are said", async () => {
+test("the location is shown on the surface with an accuracy circle; denied, outside and missing georeference show messages", async () => {
   const { page, problems } = await bed.start("town", { ...START, zoom: 1, language: "de" }, {}, { permissions: ["geolocation"], reducedMotion: "reduce" });
   await page.addScriptTag({ url: "/map3d-controls.js" });
   await page.evaluate(() => {
@@ -76,7 +76,7 @@ const stateOf = (page: Page): Promise<{ x: number; y: number; width: number; hei
   return { x: frame.x + frame.width / 2 - box.x, y: frame.y + frame.height / 2 - box.y, width: frame.width, height: frame.height, at: map.unproject([clientWidth / 2, clientHeight / 2]) ?? [] };
 });
 
-test("the overview's frame follows the view, and is dragged, clicked and moved by keys; it turns along; on phones only its button is there", async () => {
+test("the overview's frame follows the view, by drag, click and keys; the overview rotates with the map; on phones it starts closed", async () => {
   const { page, problems } = await bed.start("town", { ...START, zoom: 4.5 }, {}, { reducedMotion: "reduce" });
   await page.addScriptTag({ url: "/map3d-controls.js" });
   await page.evaluate(() => new Promise<void>((done) => {
