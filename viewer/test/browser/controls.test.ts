@@ -89,7 +89,7 @@ test("the overview's frame follows the view, by drag, click and keys; the overvi
   await page.screenshot({ path: `${OUT}/overview.png` });
   const first = await stateOf(page);
   expect(first.width / first.height).toBeCloseTo(800 / 600, 1);
-  const hand = await page.locator(".map3d-overview-hand").boundingBox() as { x: number; y: number };
+  const hand = await page.locator(".map3d-overview-pad").boundingBox() as { x: number; y: number };
   const small_m = (await page.evaluate(() => (globalThis as Global).map.metresPerPixel)) * 800 / first.width;
   await page.mouse.move(hand.x + first.x, hand.y + first.y);
   await page.mouse.down();
@@ -104,7 +104,7 @@ test("the overview's frame follows the view, by drag, click and keys; the overvi
   await page.mouse.click(hand.x + 60, hand.y + 90);
   await expect.poll(async () => { const { x, y } = await stateOf(page); return [Math.round(x / 3), Math.round(y / 3)]; }, { timeout: 15_000 }).toEqual([20, 30]);
   const clicked = await stateOf(page);
-  await page.locator(".map3d-overview-hand").focus();
+  await page.locator(".map3d-overview-pad").focus();
   await page.keyboard.press("ArrowRight");
   await expect.poll(async () => (await stateOf(page)).x, { timeout: 15_000 }).toBeGreaterThan(clicked.x + 3);
   await page.evaluate(() => (globalThis as Global).map.setDirection("90-45"));
