@@ -121,7 +121,7 @@ test.each([["desk", DESK], ["phone", PHONE]] as const)("%s: the page saves and p
   await page.emulateMedia({ media: "print" });
   await page.screenshot({ path: `${OUT}/${name}-print.png` });
   const sheet = (await page.locator("#sheet").innerText()).replace(/\s+/g, " ");
-  for (const part of ["A small town", "measuredHeight", "62", "Made by hand", "Coordinates: ETRS89 / UTM zone 32N", String(new Date().getFullYear())]) expect(sheet).toContain(part);
+  for (const part of ["A small town", "measuredHeight", "62", "Made by hand", "Coordinate system: ETRS89 / UTM zone 32N", String(new Date().getFullYear())]) expect(sheet).toContain(part);
   // As when paper has been printed, after which the sheet goes.
   await page.pdf({ path: `${OUT}/${name}-print.pdf`, preferCSSPageSize: true, printBackground: false });
   await page.emulateMedia({ media: null });
