@@ -241,7 +241,7 @@ test("objects in view can be listed and selected with the keyboard alone", async
   expect(names[0]).toBe("Ground");
   await page.keyboard.press("Escape");
   expect(await page.locator("#in-view").isHidden()).toBe(true);
-  expect(await page.evaluate(() => document.activeElement?.id)).toBe("list-seen");
+  expect(await page.evaluate(() => document.activeElement?.id)).toBe("list-in-view");
   await page.keyboard.press("Enter");
   await page.waitForSelector("#in-view li");
   await page.locator("#in-view button", { hasText: "Tower" }).focus();
