@@ -46,7 +46,7 @@ async function bundle(entry, name, options) {
   await esbuild.build({ ...shared, banner, entryPoints: [join(root, entry)], outfile: join(dist, name), plugins, ...options });
 }
 
-/** Bundles the core and all entries in one file. */
+/** Builds one file with the core and all entries. */
 async function bundleFull(name, options) {
   const contents = ["src/map3d.ts", ...Object.values(ENTRIES)].map((file) => `export * from "./${file}";\n`).join("");
   await esbuild.build({ ...shared, banner, stdin: { contents, resolveDir: root }, outfile: join(dist, name), plugins, ...options });

@@ -38,5 +38,5 @@ export async function writeArea(cache: Cache, area: StoredArea): Promise<void> {
   await cache.put(RECORD, new Response(JSON.stringify(area), { headers: { "content-type": "application/json" } }));
 }
 
-/** Deletes an area. @returns false when there is none of that name */
+/** Deletes an area. @returns false when no area has that name */
 export const removeArea = (name: string): Promise<boolean> => storage().delete(CACHE + name);

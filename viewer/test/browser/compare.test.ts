@@ -32,7 +32,7 @@ async function alone(rendering: string, drawer: string): Promise<Buffer> {
 
 const rests = (page: Page): Promise<void> => settled(page, () => (globalThis as Global).map.setLight({}), null);
 
-test.each(["webgl", "canvas"])("%s: a swipe shows one layer at each side, by pointer and by keys, without reading depth", async (drawer) => {
+test.each(["webgl", "canvas"])("%s: a swipe shows one layer on each side, moves by pointer and keys, and loads no depth", async (drawer) => {
   const [before, after] = [await alone("town", drawer), await alone("later", drawer)];
   const { page, problems } = await bed.start("town", { drawer, zoom: 3, center: ORIGIN }, {}, VIEWPORT);
   await page.addScriptTag({ url: "/map3d-compare.js" });
@@ -70,7 +70,7 @@ test.each(["webgl", "canvas"])("%s: a swipe shows one layer at each side, by poi
   await page.context().close();
 });
 
-test("epochs show one layer at a time; the slider names it", async () => {
+test("epochs show one layer at a time, and the slider shows its label", async () => {
   const [before, after] = [await alone("town", "webgl"), await alone("later", "webgl")];
   const { page, problems } = await bed.start("town", { zoom: 3, center: ORIGIN }, {}, VIEWPORT);
   await page.addScriptTag({ url: "/map3d-compare.js" });

@@ -16,7 +16,7 @@ type Controlled = Global & { map3d: typeof Controls; control: Controls.locate; o
 const START = { zoom: 3, center: [ORIGIN[0], ORIGIN[1], ORIGIN[2]] };
 const said = (page: Page, text: string): Promise<unknown> => page.waitForFunction((wanted) => document.querySelector(".map3d-status")?.textContent === wanted, text);
 
-test("the reader is shown on the surface with a circle as large as the accuracy; denied, outside and placeless are said", async () => {
+test("the location is shown on the surface with an accuracy circle; denied, outside and missing georeference show messages", async () => {
   const { page, problems } = await bed.start("town", { ...START, zoom: 1, language: "de" }, {}, { permissions: ["geolocation"], reducedMotion: "reduce" });
   await page.addScriptTag({ url: "/map3d-controls.js" });
   await page.evaluate(() => {
@@ -76,7 +76,7 @@ const stateOf = (page: Page): Promise<{ x: number; y: number; width: number; hei
   return { x: frame.x + frame.width / 2 - box.x, y: frame.y + frame.height / 2 - box.y, width: frame.width, height: frame.height, at: map.unproject([clientWidth / 2, clientHeight / 2]) ?? [] };
 });
 
-test("the overview's frame follows the view, and is dragged, clicked and moved by keys; it turns along; on phones only its button is there", async () => {
+test("the overview's frame follows the view, by drag, click and keys; the overview rotates with the map; on phones it starts closed", async () => {
   const { page, problems } = await bed.start("town", { ...START, zoom: 4.5 }, {}, { reducedMotion: "reduce" });
   await page.addScriptTag({ url: "/map3d-controls.js" });
   await page.evaluate(() => new Promise<void>((done) => {
@@ -89,7 +89,7 @@ test("the overview's frame follows the view, and is dragged, clicked and moved b
   await page.screenshot({ path: `${OUT}/overview.png` });
   const first = await stateOf(page);
   expect(first.width / first.height).toBeCloseTo(800 / 600, 1);
-  const hand = await page.locator(".map3d-overview-hand").boundingBox() as { x: number; y: number };
+  const hand = await page.locator(".map3d-overview-pad").boundingBox() as { x: number; y: number };
   const small_m = (await page.evaluate(() => (globalThis as Global).map.metresPerPixel)) * 800 / first.width;
   await page.mouse.move(hand.x + first.x, hand.y + first.y);
   await page.mouse.down();
@@ -104,7 +104,7 @@ test("the overview's frame follows the view, and is dragged, clicked and moved b
   await page.mouse.click(hand.x + 60, hand.y + 90);
   await expect.poll(async () => { const { x, y } = await stateOf(page); return [Math.round(x / 3), Math.round(y / 3)]; }, { timeout: 15_000 }).toEqual([20, 30]);
   const clicked = await stateOf(page);
-  await page.locator(".map3d-overview-hand").focus();
+  await page.locator(".map3d-overview-pad").focus();
   await page.keyboard.press("ArrowRight");
   await expect.poll(async () => (await stateOf(page)).x, { timeout: 15_000 }).toBeGreaterThan(clicked.x + 3);
   await page.evaluate(() => (globalThis as Global).map.setDirection("90-45"));

@@ -39,7 +39,7 @@ async function openMap(path: string): Promise<{ page: Page; problems: string[] }
   return opened;
 }
 
-test.each(["/before", "/after"])("%s: attributes and children make a map, and changes are followed", async (path) => {
+test.each(["/before", "/after"])("%s: attributes and children create a map and update it", async (path) => {
   const { page, problems } = await openMap(path);
   const state = await page.evaluate(() => {
     const { map, layers } = where();
@@ -82,7 +82,7 @@ test.each(["/before", "/after"])("%s: attributes and children make a map, and ch
   await page.context().close();
 });
 
-test("events bubble as map-…; a map that is taken away ends, and is the same when it comes back", async () => {
+test("events bubble as map-…; removing the element removes the map, inserting it again restores the view", async () => {
   const { page, problems } = await openMap("/after");
   await page.addScriptTag({ url: "/map3d-element.js" }); // a second time
   await page.addScriptTag({ url: "/map3d-full.js" });
@@ -127,7 +127,7 @@ test("events bubble as map-…; a map that is taken away ends, and is the same w
   await page.context().close();
 });
 
-test("where nothing can be drawn, what is inside is shown, or a sentence; another src brings the map", async () => {
+test("without a drawable map the fallback content or a message is shown; another src shows the map", async () => {
   const { page } = await open("/wrong");
   await page.getByText("Unsere Anschrift").waitFor();
   expect(await page.locator("map-3d").first().innerText()).toBe("Unsere Anschrift: Marktplatz 1");

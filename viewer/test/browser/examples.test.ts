@@ -135,7 +135,7 @@ const POINTS: Readonly<Record<string, (page: Page, picture: Buffer) => Promise<v
   },
 };
 
-test("there are eleven, and the page that lists them names all", () => {
+test("the index lists all examples", () => {
   expect(FILES.sort()).toEqual([...ORDER.map((name) => `${name}.html`), "examples.html"].sort());
   const index = readFileSync(join(FOLDER, "examples.html"), "utf8");
   expect([...index.matchAll(/<li><a href="(\w+)\.html">/g)].map(([, name]) => name)).toEqual(ORDER);

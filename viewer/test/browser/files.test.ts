@@ -66,7 +66,7 @@ async function overHttp(): Promise<Buffer> {
   return shown;
 }
 
-test.each(["loose", "archives"] as const)("a folder (%s) that is dropped or chosen shows the same pixels as over HTTP, with picks and attributes", async (kind) => {
+test.each(["loose", "archives"] as const)("a dropped or chosen folder (%s) shows the same pixels, picks and attributes as over HTTP", async (kind) => {
   const wanted = await overHttp();
   bed.server.requests.length = 0;
   const { page, problems } = await start();
@@ -93,7 +93,7 @@ test.each(["loose", "archives"] as const)("a folder (%s) that is dropped or chos
   await page.context().close();
 });
 
-test("what a folder holds can be dropped piece by piece, and a folder around it", async () => {
+test("the files of a folder can be dropped, and so can a parent folder", async () => {
   const { page } = await start();
   const pieces = ["rendering.json", "objects", "0-45", "90-45", "180-45", "270-45"].map((name) => join(FOLDERS.archives, name));
   await drag(page, pieces, "dropped");
@@ -106,7 +106,7 @@ test("what a folder holds can be dropped piece by piece, and a folder around it"
   await page.context().close();
 });
 
-test("another city takes the place of the one before, wherever it lies", async () => {
+test("another city replaces the previous one, wherever it is", async () => {
   const far = { ...town, json: { ...town.json, name: "far", origin: [100, 200, 0] as const, crs: { ...town.json.crs, epsg: 2056, name: "elsewhere" } } };
   const folder = writeFolder(far, "far");
   const { page } = await start();
@@ -121,7 +121,7 @@ test("another city takes the place of the one before, wherever it lies", async (
   await page.context().close();
 });
 
-test.each([["en", "Drop a map folder"], ["de", "Kartenordner zum"], ["fr", "Déposez un dossier"]])("while files are over the map it says what to do, in %s, and stops when they leave", async (language, words) => {
+test.each([["en", "Drop a map folder"], ["de", "Kartenordner zum"], ["fr", "Déposez un dossier"]])("a hint in %s is visible while files are over the map", async (language, words) => {
   const { page, problems } = await start({ language });
   const over = page.locator(".map3d-drop");
   expect(await over.isVisible()).toBe(false);
@@ -142,7 +142,7 @@ test.each([["en", "Drop a map folder"], ["de", "Kartenordner zum"], ["fr", "Dép
   await page.context().close();
 });
 
-test("what cannot be shown is said, and the map stays as it was", async () => {
+test("invalid files show a message and leave the map unchanged", async () => {
   const broken = writeFolder(published(town), "broken");
   unlinkSync(join(broken, "180-45/id.pmtiles"));
   const other = join(dirname(broken), "cat <img src=x onerror=alert(1)>.txt");
@@ -172,7 +172,7 @@ test("what cannot be shown is said, and the map stays as it was", async () => {
   await page.context().close();
 });
 
-test("a file that moves after it was dropped is said to have moved", async () => {
+test("a file that moves after the drop is reported", async () => {
   const folder = writeFolder(published(town), "town");
   const { page } = await start();
   await drag(page, [folder], "dropped");
@@ -184,7 +184,7 @@ test("a file that moves after it was dropped is said to have moved", async () =>
   await page.context().close();
 });
 
-test("a made-up drop of files without folders is taken by their names; taken off the map, nothing is left", async () => {
+test("dropped files without folders are matched by name; removing the control leaves nothing behind", async () => {
   const { page } = await start();
   const json = JSON.stringify({ ...town.json, views: town.json.views.map((view) => ({ ...view, archives: { color: "https://evil.example/color.pmtiles" } })) });
   await page.evaluate((text) => {

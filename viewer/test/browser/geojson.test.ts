@@ -43,7 +43,7 @@ const opacities = (page: Page): Promise<number[]> => page.evaluate(() => {
   return Array.from({ length: data.length / 4 }, (_, k) => data[4 * k + 3] ?? 0);
 });
 
-test.each(["webgl", "canvas"])("%s: a draped polygon covers the pixels whose surface lies in it, and no others; a wire is hidden where the model stands before it", async (drawer) => {
+test.each(["webgl", "canvas"])("%s: a draped polygon covers exactly the pixels whose surface is inside it; a line is hidden where the model is in front of it", async (drawer) => {
   const { page, problems } = await bed.start("town", { zoom: 3, drawer }, {}, VIEWPORT);
   const ring = [[-70, -30], [65, -60], [70, 60], [-5, 5], [-50, 50]] as const;
   await show(page, { type: "Polygon", coordinates: [[...ring, ring[0]].map(([x, y]) => world(x, y))] }, { style: { width: 0, fill: "#ff0000", fillOpacity: 1 } });
@@ -85,7 +85,7 @@ test.each(["webgl", "canvas"])("%s: a draped polygon covers the pixels whose sur
   await page.context().close();
 });
 
-test("features tell of clicks, hands and keys; names are text; all goes away again", async () => {
+test("features fire events for pointer and keyboard; names are text; removing the layer leaves nothing behind", async () => {
   const { page, problems } = await bed.start("town", { zoom: 3 }, {}, VIEWPORT);
   const name = "<img src=x onerror=alert(1)>";
   await show(page, { type: "FeatureCollection", features: [
@@ -111,7 +111,7 @@ test("features tell of clicks, hands and keys; names are text; all goes away aga
   await page.context().close();
 });
 
-test("a marker that is dragged lands on the surface; one behind a building is pale", async () => {
+test("a dragged marker stays on the surface; a marker behind a building is pale", async () => {
   const { page, problems } = await bed.start("town", { zoom: 3 }, {}, VIEWPORT);
   await settled(page, ([from, behind]) => {
     const g = globalThis as unknown as Featured;
@@ -138,7 +138,7 @@ test("a marker that is dragged lands on the surface; one behind a building is pa
   await page.context().close();
 });
 
-test("10,000 markers in clusters: few elements, none lost, the same after a way and back; one place is spread", async () => {
+test("10,000 markers in clusters: few elements, no marker lost, the same after a round trip; equal positions spread", async () => {
   const { page, problems } = await bed.start("town", { zoom: 3 }, {}, VIEWPORT);
   await page.addScriptTag({ url: "/map3d-cluster.js" });
   const ms = await page.evaluate(([x, y, z]) => {

@@ -38,7 +38,7 @@ async function clickAll(page: Page, places: readonly Vec3[], before = 0): Promis
 
 const labels = (page: Page): Promise<string[]> => page.locator(".map3d-measure span").allTextContents();
 
-test("a line from roof to roof is as long as in the model, exact at every zoom, and goes with the picture", async () => {
+test("a line from roof to roof has the length of the model, exact at every zoom, and follows the map", async () => {
   const { page, problems } = await measuring("line");
   await clickAll(page, [[-45, -4, 34], [32, 26, 62], [32, -32, 16]]);
   const line = await page.evaluate(() => (globalThis as unknown as Measuring).tool.line);
@@ -59,7 +59,7 @@ test("a line from roof to roof is as long as in the model, exact at every zoom, 
   await page.context().close();
 });
 
-test("areas of a roof and of a facade are those of the model", async () => {
+test("areas of a roof and a facade agree with the model", async () => {
   const { page } = await measuring("area");
   await clickAll(page, [[-61, -21, 34], [-29, -21, 34], [-29, 13, 34], [-61, 13, 34]]);
   const roof = await page.evaluate(() => (globalThis as unknown as Measuring).tool.area);
@@ -77,7 +77,7 @@ test("areas of a roof and of a facade are those of the model", async () => {
   await page.context().close();
 });
 
-test("one click on a wall or a roof tells its area, outlines it, and says when a part is hidden; the second corner makes it a polygon", async () => {
+test("one click on a wall or a roof measures and outlines the face, and marks a hidden part; a second corner starts a polygon", async () => {
   const { page, problems } = await measuring("area");
   const known = async (): Promise<Measure.Face> => {
     await page.waitForFunction(() => (globalThis as unknown as Measuring).tool.face !== null);
@@ -120,7 +120,7 @@ test("one click on a wall or a roof tells its area, outlines it, and says when a
   await page.context().close();
 });
 
-test("corners are taken back by Backspace, all by Escape; taken off, the tool leaves nothing", async () => {
+test("Backspace removes the last corner, Escape all; removing the tool leaves nothing behind", async () => {
   const { page } = await measuring("line");
   await clickAll(page, [[-45, -4, 34], [32, 26, 62]]);
   await page.locator(".map3d").focus();
@@ -136,7 +136,7 @@ test("corners are taken back by Backspace, all by Escape; taken off, the tool le
   await page.context().close();
 });
 
-test("a profile has the heights of the model, gaps where it is hidden, and is walked along by pointer and keys", async () => {
+test("a profile has the heights of the model and gaps where it is hidden; pointer and keys move its cursor", async () => {
   const { page, problems } = await measuring("profile");
   // Over the town hall (34 m) from the left, on its roof and down its far side.
   await clickAll(page, [[-80, -10, 0], [-45, -10, 34], [0, -10, 0]]);

@@ -92,7 +92,7 @@ async function judged(page: Page, light: Light, { dpr = 1, reach = 1 } = {}): Pr
   return { wrong, ...count };
 }
 
-test("a box is seen exactly where it is nearer than the images, as bright as they are; taken off, the picture is as before", async () => {
+test("a box is visible exactly where it is nearer than the images, with equal brightness; removing it restores the picture", async () => {
   const { page, problems } = await start();
   const before = await picture(page);
   await addBox(page);
@@ -117,7 +117,7 @@ test("a box is seen exactly where it is nearer than the images, as bright as the
   await page.context().close();
 });
 
-test.each([[1, 2], [1, 3.6], [2, 2.6], [2, 4.3]])("at %d device pixels a CSS pixel and zoom %d, too", async (dpr, zoom) => {
+test.each([[1, 2], [1, 3.6], [2, 2.6], [2, 4.3]])("the same at %d device pixels per CSS pixel and zoom %d", async (dpr, zoom) => {
   const { page, problems } = await start({ zoom }, { deviceScaleFactor: dpr });
   await addBox(page);
   await page.screenshot({ path: `${OUT}/model-box-${String(dpr)}-${String(zoom)}.png` });
@@ -129,7 +129,7 @@ test.each([[1, 2], [1, 3.6], [2, 2.6], [2, 4.3]])("at %d device pixels a CSS pix
   await page.context().close();
 });
 
-test.each(["0-45", "90-45"])("a lawn that lies on the ground is seen whole at every zoom, looking along %s", async (direction) => {
+test.each(["0-45", "90-45"])("a lawn on the ground is entirely visible at every zoom in view %s", async (direction) => {
   const { page, problems } = await start({ direction, light: { lit: false } });
   const [x, y] = [-20, -60];
   await settled(page, (position) => {
@@ -151,7 +151,7 @@ test.each(["0-45", "90-45"])("a lawn that lies on the ground is seen whole at ev
   await page.context().close();
 });
 
-test("where light is found from depth, a model that stands out of what the images hold is seen whole", async () => {
+test("with screen-space light, a model that extends beyond the images is entirely visible", async () => {
   const { page, problems } = await start();
   await page.addScriptTag({ url: "/map3d-shade.js" });
   await settled(page, () => { new (globalThis as unknown as { map3d: typeof Shading }).map3d.shade().addTo((globalThis as Global).map); }, null);
@@ -170,7 +170,7 @@ const seenAt = async (page: Page, world: Vec3): Promise<number[]> => {
   return rgbAt(await picture(page), Math.round(x), Math.round(y));
 };
 
-test("a white wall of a model is as bright as the same wall in the images", async () => {
+test("a white wall of a model has the brightness of the same wall in the images", async () => {
   const { page, problems } = await start();
   // The school's south wall, and a model of it beside it, both of one colour.
   await addBox(page, { position: inTown(31, -62, 0) });
@@ -204,7 +204,7 @@ async function clicked(page: Page, world: Vec3): Promise<{ model: { object: stri
   });
 }
 
-test("a click tells the model where nothing stands before it, and the pointer says so; the map's click tells of the images", async () => {
+test("a click on the visible part of a model fires its event and the pointer shows it; the map's click reports the images", async () => {
   const { page, problems } = await start();
   await addBox(page);
   await page.evaluate(() => {
@@ -226,7 +226,7 @@ test("a click tells the model where nothing stands before it, and the pointer sa
   await page.context().close();
 });
 
-test("what is taken off gives back all that it had of the GPU", async () => {
+test("removing a model frees all its GPU resources", async () => {
   const { page, problems } = await start();
   await addBox(page);
   await settled(page, () => (globalThis as Modelling).model.remove(), null);
@@ -281,7 +281,7 @@ const addTriangle = (page: Page, options: object): Promise<void> => page.evaluat
   g.model.on("ready", () => { done(); }).addTo(g.map);
 }), [inTown(-45, -40, 0), options] as const);
 
-test("a glTF plays its clips and stops; what stands still draws no frames; who wants no movement sees none until it is asked for", async () => {
+test("a glTF plays and stops its clips; a still model draws no frames; with reduced motion clips play only on request", async () => {
   const { page, problems } = await start();
   await addTriangle(page, { heading_deg: 0 });
   expect(await page.evaluate(() => [(globalThis as Modelling).model.clips, (globalThis as Modelling).model.playing])).toEqual([["up"], true]);
@@ -331,7 +331,7 @@ test("position, heading and scale in metres of the scene; bounds for fitBounds",
   await page.context().close();
 });
 
-test("what cannot be is refused by name: no WebGL, no loader, no file, no numbers", async () => {
+test("missing WebGL, loader or file and invalid numbers are errors", async () => {
   const { page, problems } = await start({ drawer: "canvas" });
   const before = await picture(page);
   const errors = await page.evaluate((position) => new Promise<string[]>((done) => {
@@ -371,7 +371,7 @@ test("what cannot be is refused by name: no WebGL, no loader, no file, no number
   await other.context().close();
 });
 
-test("a lost context comes back with the model; a map that ends takes it along", async () => {
+test("a restored context has the model; removing the map removes it", async () => {
   const { page } = await start();
   await addBox(page);
   const before = await picture(page);
@@ -390,7 +390,7 @@ test("a lost context comes back with the model; a map that ends takes it along",
   await page.context().close();
 });
 
-test("while the map turns, the model turns along; the turn ends in the picture of a cut", async () => {
+test("the model rotates with the map; the transition ends in the picture of an immediate change", async () => {
   const { page, problems } = await start({ light: { lit: false } });
   await addBox(page);
   await settled(page, () => (globalThis as Global).map.setDirection("90-45"), null);

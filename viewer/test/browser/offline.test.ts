@@ -65,7 +65,7 @@ async function offline(page: Page, act: () => Promise<void>): Promise<void> {
 
 const tilesAsked = (): string[] => bed.server.requests.filter((url) => /\/tiles\/\w+\/\d/.test(url));
 
-test.each(["town", "published"])("an area of %s: begun, gone on with, opened without a network, and removed", async (rendering) => {
+test.each(["town", "published"])("an area of %s can be interrupted, resumed, opened offline and deleted", async (rendering) => {
   const { page, problems } = await bed.openPage({ viewport: { width: 240, height: 180 } });
   await start(page, rendering);
   const wanted = await pixels(page);
@@ -118,7 +118,7 @@ test.each(["town", "published"])("an area of %s: begun, gone on with, opened wit
   await page.context().close();
 });
 
-test("a rendering that has changed is shown as it is now while there is a network, and brought up to date", async () => {
+test("a changed rendering is shown in its new state online, and the saved area is updated", async () => {
   const fixture = bed.server.renderings.get("published");
   if (!fixture) throw new Error("there is a published town");
   const { page } = await bed.openPage();
@@ -141,7 +141,7 @@ test("a rendering that has changed is shown as it is now while there is a networ
   await page.context().close();
 });
 
-test("without room, without a worker in reach, and without a host that answers, it is said", async () => {
+test("full storage, a missing worker and an unreachable host are errors", async () => {
   const { page } = await bed.openPage();
   await start(page, "town");
   const failed = (act: string): Promise<string> => page.evaluate(`(async () => { try { return String(JSON.stringify(await (${act}))); } catch (error) { return error.name + ": " + error.message; } })()`);
@@ -165,7 +165,7 @@ test("without room, without a worker in reach, and without a host that answers, 
 const PHONE = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 3, isMobile: true, hasTouch: true, userAgent: devices["iPhone 14"].userAgent };
 const rows: [string, BrowserContextOptions][] = [["desk", { viewport: { width: 1280, height: 800 } }], ["phone", { ...PHONE, locale: "de-DE" }], ["dark", { ...PHONE, colorScheme: "dark", locale: "fr-FR" }]];
 
-test.each(rows)("the page keeps itself and what is in view: %s", async (name, options) => {
+test.each(rows)("the page saves itself and the view for offline use: %s", async (name, options) => {
   const { page, problems } = await bed.openPage(options);
   page.setDefaultTimeout(30_000);
   const open = async (): Promise<Buffer> => {

@@ -58,7 +58,7 @@ async function agreement(page: Page, shot: Buffer, lookAt: number): Promise<{ ri
   return { right: right / all, shown: shown / all };
 }
 
-test("held between two directions, the picture is that of a ray along it; let go, it turns to the nearest", async () => {
+test("a gesture between two views shows the picture of a ray caster; on release the map turns to the nearest view", async () => {
   const { page, problems } = await start();
   for (const deg of [20, 25]) {
     await twist(page, deg);
@@ -78,7 +78,7 @@ test("held between two directions, the picture is that of a ray along it; let go
   await page.context().close();
 });
 
-test("a turn ends in the picture that a cut shows; markers go along; where no movement is wanted it is a cut, without WebGL a cross-fade", async () => {
+test("a transition ends in the picture of an immediate change; markers move along; with reduced motion it is immediate, without WebGL a cross-fade", async () => {
   const { page, problems } = await start({}, 2500);
   await page.evaluate((origin) => {
     const { map, map3d } = globalThis as Global;

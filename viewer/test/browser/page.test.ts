@@ -20,7 +20,7 @@ async function open(options: object, query = `rendering=${bed.url("town")}`): Pr
 }
 
 for (const [name, options] of [["desk", DESK], ["phone", PHONE], ["dark", { ...DESK, colorScheme: "dark" }]] as const) {
-  test(`${name}: the page opens, finds, shows and closes without a complaint of the browser or its CSP`, async () => {
+  test(`${name}: the page opens, searches, shows and closes an object without browser or CSP errors`, async () => {
     const { page, problems } = await open(options);
     await page.screenshot({ path: `${OUT}/${name}-open.png` });
     expect(await page.title()).toBe("A small town");
@@ -48,7 +48,7 @@ for (const [name, options] of [["desk", DESK], ["phone", PHONE], ["dark", { ...D
   });
 }
 
-test("the light slider and the layer switch change the picture", async () => {
+test("the light slider and the display mode change the picture", async () => {
   const { page } = await open(DESK);
   const shots: string[] = [];
   /** Waits for a picture that has not been there before. */
@@ -72,7 +72,7 @@ test("the light slider and the layer switch change the picture", async () => {
   await page.context().close();
 });
 
-test("a rendering that is not there is said so in words", async () => {
+test("a missing rendering shows a message", async () => {
   const { page } = await bed.openPage(PHONE);
   await page.goto(`${bed.server.origin}/?rendering=/tiles/nowhere`);
   await page.waitForSelector(".failed");
@@ -109,7 +109,7 @@ test("the first phone view costs less than 1 MB with the script and the manifest
   await page.context().close();
 });
 
-test("view, time and choice are in the address; the back button takes a choice back", async () => {
+test("view, time and selection are in the URL; the back button undoes a selection", async () => {
   const { page, problems } = await open(DESK);
   await page.fill("#query", "Tower");
   await page.waitForSelector("#results li");
@@ -134,7 +134,7 @@ test("view, time and choice are in the address; the back button takes a choice b
   await other.context().close();
 });
 
-test("another address on the same page goes there, direction and all", async () => {
+test("changing the URL fragment changes the view", async () => {
   const { page, problems } = await open(DESK);
   const place = "#90-45/691032.0/5336026.0/562.0/4.00";
   await page.evaluate((hash) => { location.hash = hash; }, place);
@@ -148,7 +148,7 @@ test("another address on the same page goes there, direction and all", async () 
   await page.context().close();
 });
 
-test("tools measure where the map is clicked, and nothing is chosen meanwhile", async () => {
+test("tools measure at clicks, which select no objects meanwhile", async () => {
   const { page, problems } = await open(PHONE);
   await page.locator("#measure-line").tap();
   await page.waitForSelector(".map3d-measure", { state: "attached" });
@@ -178,7 +178,7 @@ test("tools measure where the map is clicked, and nothing is chosen meanwhile", 
 });
 
 for (const [name, options] of [["desk", DESK], ["phone", PHONE]] as const) {
-  test(`${name}: objects have colours by an attribute; the legend filters; the address keeps it`, async () => {
+  test(`${name}: objects are coloured by an attribute; the legend filters; the URL keeps it`, async () => {
     const { page, problems } = await open(options);
     if (name === "phone") {
       expect(await page.locator("#color-by").isVisible()).toBe(false);
@@ -212,8 +212,8 @@ for (const [name, options] of [["desk", DESK], ["phone", PHONE]] as const) {
 
 test.each([
   ["de-CH", ["Suchen", "Vergrößern", "Licht", "Strecke messen"]],
-  ["fr-FR", ["Rechercher", "Zoom avant", "Lumière", "Mesurer une ligne"]],
-])("a reader of %s is spoken to in that language, numbers and all", async (locale, [search, zoomIn, lit, line]) => {
+  ["fr-FR", ["Rechercher", "Zoom avant", "Éclairé", "Mesurer une distance"]],
+])("the page uses the language and number format of %s", async (locale, [search, zoomIn, lit, line]) => {
   const { page, problems } = await open({ ...DESK, locale });
   expect(await page.evaluate(() => document.documentElement.lang)).toBe(locale);
   expect(await page.locator("#query").getAttribute("placeholder")).toBe(search);
@@ -227,7 +227,7 @@ test.each([
   await page.context().close();
 });
 
-test("what is in view can be listed and chosen by keys alone", async () => {
+test("objects in view can be listed and selected with the keyboard alone", async () => {
   const { page, problems } = await open(DESK);
   await page.locator("#list-in-view").focus();
   await page.keyboard.press("Shift+Tab");
@@ -241,7 +241,7 @@ test("what is in view can be listed and chosen by keys alone", async () => {
   expect(names[0]).toBe("Ground");
   await page.keyboard.press("Escape");
   expect(await page.locator("#in-view").isHidden()).toBe(true);
-  expect(await page.evaluate(() => document.activeElement?.id)).toBe("list-seen");
+  expect(await page.evaluate(() => document.activeElement?.id)).toBe("list-in-view");
   await page.keyboard.press("Enter");
   await page.waitForSelector("#in-view li");
   await page.locator("#in-view button", { hasText: "Tower" }).focus();

@@ -32,7 +32,7 @@ async function exported(page: Page, options: object, path?: string): Promise<{ w
   return { width, height, bytes: Buffer.from(text, "base64") };
 }
 
-test.each(["webgl", "canvas"])("%s: a picture of the screen's size is what the screen shows; a wider one is put together without seams", async (drawer) => {
+test.each(["webgl", "canvas"])("%s: a picture of the screen's size equals the screen; a wider one has no seams", async (drawer) => {
   const { page, problems } = await bed.start("town", { zoom: 3, drawer }, {}, { viewport: { width: 700, height: 500 } });
   await page.addScriptTag({ url: "/map3d-print.js" });
   await settled(page, (id) => (globalThis as Global).layer.setStyle({ colors: new Map([[id, "#1389a0"]]) }).highlight(1025), 17);
@@ -61,7 +61,7 @@ test.each(["webgl", "canvas"])("%s: a picture of the screen's size is what the s
   await page.context().close();
 });
 
-test("title, legend, markers, scale bar and attribution stand on it; what is asked wrongly is an error; it can be stopped; a lost tile is no picture", async () => {
+test("title, legend, markers, scale bar and attribution are drawn; invalid options, an abort and a failed tile reject", async () => {
   const { page } = await bed.start("fine", { zoom: 1.4 }, {}, { viewport: { width: 400, height: 280 } });
   await page.addScriptTag({ url: "/map3d-print.js" });
   await page.evaluate((at) => {
@@ -97,7 +97,7 @@ test("title, legend, markers, scale bar and attribution stand on it; what is ask
 const DESK = { viewport: { width: 1280, height: 800 } };
 const PHONE = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 3, isMobile: true, hasTouch: true };
 
-test.each([["desk", DESK], ["phone", PHONE]] as const)("%s: the page saves and prints what it shows, with all that belongs to it", async (name, options) => {
+test.each([["desk", DESK], ["phone", PHONE]] as const)("%s: the page saves and prints the view with title, legend and attribution", async (name, options) => {
   const { page, problems } = await bed.openPage({ ...options, acceptDownloads: true });
   await page.addInitScript(() => { window.print = () => { document.title = "printed"; }; });
   await page.goto(`${bed.server.origin}/?rendering=${bed.url("fine")}`);
@@ -121,7 +121,7 @@ test.each([["desk", DESK], ["phone", PHONE]] as const)("%s: the page saves and p
   await page.emulateMedia({ media: "print" });
   await page.screenshot({ path: `${OUT}/${name}-print.png` });
   const sheet = (await page.locator("#sheet").innerText()).replace(/\s+/g, " ");
-  for (const part of ["A small town", "measuredHeight", "62", "Made by hand", "Coordinates: ETRS89 / UTM zone 32N", String(new Date().getFullYear())]) expect(sheet).toContain(part);
+  for (const part of ["A small town", "measuredHeight", "62", "Made by hand", "Coordinate system: ETRS89 / UTM zone 32N", String(new Date().getFullYear())]) expect(sheet).toContain(part);
   // As when paper has been printed, after which the sheet goes.
   await page.pdf({ path: `${OUT}/${name}-print.pdf`, preferCSSPageSize: true, printBackground: false });
   await page.emulateMedia({ media: null });

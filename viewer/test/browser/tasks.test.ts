@@ -179,7 +179,7 @@ test("compare two epochs", async () => {
   await end(opened, "epochs");
 });
 
-test("an epoch that is not there is said so, and the page goes on without it", async () => {
+test("a missing epoch shows a message, and the page works without it", async () => {
   const { page } = await open("&with=nowhere");
   await page.waitForSelector(".toast");
   expect(await page.locator(".toast p").textContent()).toContain("404");

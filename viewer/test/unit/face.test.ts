@@ -70,7 +70,7 @@ function seenOf(frame: Frame, spot: Spot): Vec3[] {
 const areaOf = (outline: Face["outline"]): number => outline.reduce((sum, loop) => sum + measureArea(loop).area_m2, 0);
 
 describe("faces of the town, by rays of every pixel", () => {
-  test.each([[0, 45], [30, 45], [45, 22.5], [180, 60], [120, 30], [90, 90]])("looking %d° at %d°: walls and roofs are as large as in the model, and what is hidden is said", async (lookAt, pitch) => {
+  test.each([[0, 45], [30, 45], [45, 22.5], [180, 60], [120, 30], [90, 90]])("looking %d° at %d°: walls and roofs have the areas of the model, and hidden parts are reported", async (lookAt, pitch) => {
     const frame = frameAt(lookAt, pitch);
     const counts = { whole: 0, hidden: 0 };
     for (const spot of THINGS.slice(1).flatMap(({ box }) => facesOf(box))) {
@@ -98,7 +98,7 @@ describe("faces of the town, by rays of every pixel", () => {
     expect(counts.whole).toBeGreaterThan(3);
   });
 
-  test("the outline lies on the face, the normal is towards the viewer", async () => {
+  test("the outline is on the face, the normal points towards the viewer", async () => {
     const frame = frameAt(30, 45);
     const face = await measureFace(mapOf(frame), add(ORIGIN, [32, 26, 62]));
     for (const [x, y, z] of face?.outline.flat() ?? []) {
@@ -114,8 +114,8 @@ describe("faces of the town, by rays of every pixel", () => {
   });
 });
 
-describe("faces that are harder", () => {
-  test("a place that is hidden, or where nothing is, has no face", async () => {
+describe("difficult faces", () => {
+  test("a hidden or empty position has no face", async () => {
     const frame = frameAt(0, 45);
     expect(await measureFace(mapOf(frame), add(ORIGIN, [-45, 14, 10]))).toBeNull();
     expect(await measureFace(mapOf(frame), add(ORIGIN, [-150, 0, 0]))).toBeNull();
@@ -141,13 +141,13 @@ describe("faces that are harder", () => {
     expect(face?.hidden).toBe(false);
   });
 
-  test("a wall between a roof and the ground is exact to parts of a pixel", async () => {
+  test("a wall between a roof and the ground is exact to a fraction of a pixel", async () => {
     // 54 × 16 m: 14.9 rows of pixels.
     const face = await measureFace(mapOf(frameAt(0, 45, 256, 0.76)), add(ORIGIN, [31, -46, 8]));
     expect(Math.abs((face?.area_m2 ?? 0) / (54 * 16) - 1)).toBeLessThan(0.01);
   });
 
-  test("what takes more than its share of tiles is read from a level above, and says so", async () => {
+  test("a face that needs too many tiles is read from a level above and marked approximate", async () => {
     // A field of 200 × 160 m, 5 m beneath the origin.
     const asked: number[] = [];
     const frame = frameAt(0, 60, 512, 0.1);
@@ -164,7 +164,7 @@ describe("faces that are harder", () => {
   });
 });
 
-test("loops: holes are apart and go round the other way, pixels that touch at a corner are two", () => {
+test("loops: holes are separate and reversed, pixels that touch at a corner are separate", () => {
   const loops = (rows: readonly string[]): ReturnType<typeof loopsOf> => {
     const width = (rows[0] ?? "").length + 2;
     return loopsOf(Uint8Array.from(["", ...rows, ""].map((row) => `.${row.padEnd(width - 2, ".")}.`).join(""), (sign) => (sign === "#" ? 1 : 0)), width);

@@ -42,7 +42,7 @@ describe.each([["loose tiles", town], ["archives", archived]])("a folder of %s",
   });
 });
 
-test("no byte is read beyond those of the tile and the directories", async () => {
+test("only the bytes of the tile and the directories are read", async () => {
   const read: number[] = [];
   const files = chosen(archived).map((file) => {
     if (!file.name.endsWith(".pmtiles")) return file;
@@ -78,13 +78,13 @@ describe("an incomplete rendering is rejected with a message", () => {
     expect((error as { problem?: string }).problem).toBe(problem);
   });
 
-  test("a file that has changed since", async () => {
+  test("a file that has changed since it was opened", async () => {
     const gone = Object.assign(new Blob(), { arrayBuffer: () => Promise.reject(new DOMException("changed", "NotReadableError")) });
     const error = (await refusal(() => filesSource({ file: () => Promise.resolve(gone) }).manifest())) as Error;
     expect(error.message).toContain("rendering.json has changed or moved");
   });
 
-  test("an archive that was cut off, or that names parts of any size", async () => {
+  test("a truncated archive, or one with invalid part sizes", async () => {
     const cut = chosen(archived).map((file) => (file.name === "color.pmtiles" ? Object.defineProperty(new File([file.slice(0, 300)], file.name), "webkitRelativePath", { value: file.webkitRelativePath }) : file));
     const source = filesSource(cut);
     const { views, json } = await source.manifest();
@@ -93,7 +93,7 @@ describe("an incomplete rendering is rejected with a message", () => {
   });
 });
 
-test("names that lead out of the folder are not there", async () => {
+test("paths out of the folder are not found", async () => {
   for (const path of ["../secret", "/etc/passwd", "a/../../b", "https://evil.example/x", "a//b", "a\\b", "", ".", "c:x", "a\0"]) expect(isInside(path), path).toBe(false);
   for (const path of ["rendering.json", "0-45/color.pmtiles", "45-22.5/id/0/0/0", "objects/columns/0f.json"]) expect(isInside(path), path).toBe(true);
   const asked: string[] = [];
@@ -108,12 +108,12 @@ test("names that lead out of the folder are not there", async () => {
   expect(asked).toEqual(["rendering.json"]);
 });
 
-test("manifests are found where they are, not inside of one another", () => {
+test("manifests below another manifest's folder are ignored", () => {
   expect(findManifestFolders(["rendering.json", "a/rendering.json"])).toEqual([""]);
   expect(findManifestFolders(["x/a/rendering.json", "x/a/b/rendering.json", "x/c/rendering.json", "x/notrendering.json"])).toEqual(["x/a/", "x/c/"]);
 });
 
-test("a source over HTTP asks what it was given", async () => {
+test("an HTTP source uses the given fetch function", async () => {
   vi.stubGlobal("document", { baseURI: "https://host.example/page/" });
   const asked: string[] = [];
   const source = new HttpSource(["/town/", "https://other.example/town"], (url) => {

@@ -10,7 +10,7 @@ const CAMERA: Camera = { frame, u: 0, v: 0, zoom: 3, width: 500, height: 400 };
 const HOUSE: Box3 = [[-5, -5, 0], [5, 5, 10]];
 
 describe("a part of the screen", () => {
-  test.each([1, 1.5, 3])("holds what boxes show, at %d device pixels a CSS pixel", (dpr) => {
+  test.each([1, 1.5, 3])("contains the boxes at %d device pixels per CSS pixel", (dpr) => {
     const screen = { camera: CAMERA, width: 500 * dpr, height: 400 * dpr, dpr };
     const part = screenRectOf([HOUSE], screen);
     if (!part) throw new Error("nothing is seen");
@@ -24,7 +24,7 @@ describe("a part of the screen", () => {
     expect(v).toBeCloseTo((200 * dpr - part.y) * px, 9);
   });
 
-  test("never leaves the screen, and is none where nothing is seen", () => {
+  test("is clipped to the screen, and null out of view", () => {
     const screen = { camera: CAMERA, width: 500, height: 400, dpr: 1 };
     const all = screenRectOf([[[-1e4, -1e4, -1e4], [1e4, 1e4, 1e4]]], screen);
     expect(all).toEqual({ x: 0, y: 0, width: 500, height: 400 });
@@ -34,7 +34,7 @@ describe("a part of the screen", () => {
     expect(screenRectOf([], screen)).toBe(null);
   });
 
-  test("keeps its size while what it shows moves a little", () => {
+  test("keeps its size during small movements", () => {
     const sizes = [0, 1, 2.5].map((x) => {
       const { width, height } = screenRectOf([[[x - 5, -5, 0], [x + 5, 5, 10]]], { camera: CAMERA, width: 500, height: 400, dpr: 1 }) ?? {};
       return `${String(width)} ${String(height)}`;
@@ -43,7 +43,7 @@ describe("a part of the screen", () => {
   });
 });
 
-test("depths of boxes are those of their corners", () => {
+test("the depth range of boxes is that of their corners", () => {
   const half = Math.SQRT1_2;
   const [near, far] = depthRangeOf([HOUSE], frame) ?? [0, 0];
   expect(near).toBeCloseTo(half * (-5 - 10), 9);
@@ -51,7 +51,7 @@ test("depths of boxes are those of their corners", () => {
   expect(depthRangeOf([], frame)).toBe(null);
 });
 
-test("lamps are π times the images' light; unlit, white from everywhere", () => {
+test("three.js lights are π times the map's light; unlit, uniform white", () => {
   const lamps = threeLighting({ ...DEFAULT_LIGHT, sun_rgb: [1, 0.5, 0.2] });
   expect(lamps).toEqual({ sky_rgb: [1, 1, 1], sky: Math.PI * 0.42, sun_rgb: [1, 0.5, 0.2], sun: Math.PI * 0.76, towards: towardsLight(DEFAULT_LIGHT) });
   expect(threeLighting({ ...DEFAULT_LIGHT, sky_rgb: [0, 0, 1], lit: false })).toMatchObject({ sky_rgb: [1, 1, 1], sky: Math.PI, sun: 0 });

@@ -31,7 +31,7 @@ const planned = async (options: AreaOptions): Promise<string[]> => [...tilesOf(t
 describe("tiles of an area", () => {
   const views = [...town.views.values()];
 
-  test("are those that a brute force over all tiles finds, for any rectangle and levels", () => {
+  test("equal a brute-force search over all tiles, for any rectangle and levels", () => {
     const next = random(7);
     for (let round = 0; round < 200; round++) {
       const view = views[round % views.length];
@@ -47,7 +47,7 @@ describe("tiles of an area", () => {
     }
   });
 
-  test("of everything are all occupied tiles, of nothing the first levels", () => {
+  test("are all occupied tiles for the whole scene, and the first levels for an empty area", () => {
     for (const view of views) {
       const { frame, occupancy } = view;
       const whole: Rect = [[frame.u0, frame.v0 - frame.size], [frame.u0 + frame.size, frame.v0]];
@@ -57,7 +57,7 @@ describe("tiles of an area", () => {
     }
   });
 
-  test("are of the layers, directions and levels that were asked for; without words those in view from all directions", async () => {
+  test("match the requested layers, directions and levels; by default the view from all directions", async () => {
     const bounds = [[ORIGIN[0] + 24, ORIGIN[1] + 18, ORIGIN[2]], [ORIGIN[0] + 40, ORIGIN[1] + 34, ORIGIN[2] + 62]] as const;
     const few = await planned({ bounds, layers: ["id"], directions: ["90-45"], levels: [3, 3] });
     const view = town.views.get("90-45");
@@ -88,12 +88,12 @@ describe("tiles of an area", () => {
     await expect(resolveOptions(shown, options)).rejects.toThrow(message);
   });
 
-  test("a map without a manifest is refused", async () => {
+  test("a map without a manifest is an error", async () => {
     await expect(resolveOptions({ layers: [] } as unknown as map, {})).rejects.toThrow(/is not ready/);
   });
 });
 
-test("the page keeps whatever it imports", () => {
+test("the page saves all modules that it imports", () => {
   const folder = join(import.meta.dirname, "../../page");
   const imported = readdirSync(folder).filter((file) => file.endsWith(".ts")).flatMap((file) => [...readFileSync(join(folder, file), "utf8").matchAll(/import (?!type)[^;]*?"\.\/(map3d[\w-]*\.mjs)"|import\("\.\/(map3d[\w-]*\.mjs)"\)/g)].map(([, fixed, later]) => fixed ?? later));
   const links = [...readFileSync(join(folder, "index.html"), "utf8").matchAll(/(?:href|src)="([\w.-]+)"/g)].map(([, file]) => file);
@@ -101,7 +101,7 @@ test("the page keeps whatever it imports", () => {
 });
 
 describe("keys", () => {
-  test("pieces, versions and pages", async () => {
+  test("of ranges, versioned tiles and pages", async () => {
     expect(rangeKey("https://h/a.pmtiles", "0-9")).toBe("https://h/a.pmtiles?map3d-range=0-9");
     expect(rangeKey("https://h/a?b", "0-9")).toBe("https://h/a?b&map3d-range=0-9");
     expect([rangeOf(new Headers({ Range: "bytes=5-8" })), rangeOf(new Headers({ Range: "bytes=5-" })), rangeOf(new Headers())]).toEqual(["5-8", undefined, undefined]);

@@ -6,8 +6,8 @@ import { BOX, framesOf, THINGS, trace } from "../fixture/town";
 
 const PX = 0.2;
 
-describe("heights of a cut, by rays of every pixel", () => {
-  test.each([[0, 45], [45, 22.5], [180, 60], [90, 90]])("looking %d° at %d°: the surface that is seen, and no other", (lookAt, pitch) => {
+describe("profile heights agree with rays of every pixel", () => {
+  test.each([[0, 45], [45, 22.5], [180, 60], [90, 90]])("looking %d° at %d°: only the visible surface", (lookAt, pitch) => {
     const [frame] = framesOf(BOX, 256, PX, [[lookAt, pitch]]).frames;
     if (!frame) throw new Error("no frame");
     const middle = (at: number): number => (Math.floor(at / PX) + 0.5) * PX;
@@ -40,7 +40,7 @@ describe("heights of a cut, by rays of every pixel", () => {
   });
 });
 
-test("places lie at equal distances from corner to corner, ends included", () => {
+test("samples are at equal distances, including the ends", () => {
   const places = samplePoints([[0, 0, 5], [30, 0, 9], [30, 40, 1]], 8);
   expect(places.map(({ distance_m }) => distance_m)).toEqual([0, 10, 20, 30, 40, 50, 60, 70]);
   expect(places.map(({ position: [x, y] }) => [x, y])).toEqual([[0, 0], [10, 0], [20, 0], [30, 0], [30, 10], [30, 20], [30, 30], [30, 40]]);

@@ -7,7 +7,7 @@ const column = (values: readonly AttributeValue[]): Map<number, AttributeValue> 
 const upTo = (count: number, valueOf: (k: number) => AttributeValue): Map<number, AttributeValue> => column(Array.from({ length: count }, (_, k) => valueOf(k)));
 
 describe("numbers", () => {
-  test("fall into classes of about as many, with round bounds; every id is in one", () => {
+  test("form classes of about equal counts with rounded bounds; every id is in one class", () => {
     const found = classify({ type: "number" }, upTo(1000, (k) => 2 + 0.04 * k), OPTIONS);
     expect(found.ordered).toBe(true);
     expect(found.classes.map(({ label }) => label)).toEqual(["< 10", "10–18", "18–26", "26–34", "≥ 34"]);
@@ -24,21 +24,21 @@ describe("numbers", () => {
     }
   });
 
-  test("years have no separators, great numbers do, small ones their digits", () => {
+  test("years have no separators, large numbers do, small numbers keep their digits", () => {
     const labels = (values: (k: number) => number): string => classify({ type: "number" }, upTo(100, values), OPTIONS).classes.map(({ label }) => label).join(" ");
     expect(labels((k) => 1900 + k)).toBe("< 1920 1920–1940 1940–1960 1960–1980 ≥ 1980");
     expect(labels((k) => 1000 * k)).toContain("20,000–40,000");
     expect(labels((k) => 0.001 * k)).toContain("0.02–0.04");
   });
 
-  test("written as text count as numbers when there are many, as names when there are few", () => {
+  test("in text are ranges when there are many values, names when there are few", () => {
     expect(classify({ type: "text" }, upTo(100, (k) => String(1900 + k)), OPTIONS).ordered).toBe(true);
     expect(classify({ type: "text" }, upTo(100, (k) => String(1000 + (k % 4))), OPTIONS).ordered).toBe(false);
     expect(classify({ type: "mixed" }, upTo(100, (k) => (k === 7 ? "unknown" : k)), OPTIONS).ordered).toBe(false);
     expect(classify({ type: "text" }, upTo(100, (k) => (k === 7 ? " " : String(k))), OPTIONS).ordered).toBe(false);
   });
 
-  test("few of them are classes of their own, in their order", () => {
+  test("with few values form one ordered class each", () => {
     const { classes, ordered } = classify({ type: "number" }, column([3, 1, 3, 2, 3]), OPTIONS);
     expect(ordered).toBe(true);
     expect(classes.map(({ label, ids }) => [label, ids])).toEqual([["1", [2]], ["2", [4]], ["3", [1, 3, 5]]]);
@@ -52,7 +52,7 @@ describe("numbers", () => {
 });
 
 describe("values", () => {
-  test("have hues by how frequent they are; what is left is the rest", () => {
+  test("get hues by frequency; the others form one class", () => {
     const { classes } = classify({ type: "text" }, upTo(60, (k) => "abcdefghijk"[Math.floor(Math.sqrt(2 * k))] ?? "k"), OPTIONS);
     expect(classes.length).toBe(HUES.length + 1);
     expect(classes.at(-1)).toMatchObject({ label: "Other", color: OTHER_COLOR });
@@ -61,18 +61,18 @@ describe("values", () => {
     expect(classes.reduce((sum, { ids }) => sum + ids.length, 0)).toBe(60);
   });
 
-  test("take the colours that are given", () => {
+  test("use the given colours", () => {
     const { classes } = classify({ type: "text" }, column(["x", "y", "z"]), { ...OPTIONS, colors: ["#111111", "#222222"] });
     expect(classes.map(({ label, color }) => [label, color])).toEqual([["x", "#111111"], ["y", "#222222"], ["Other", OTHER_COLOR]]);
   });
 
-  test("without any there are no classes", () => {
+  test("an empty column has no classes", () => {
     expect(classify({ type: "text" }, new Map(), OPTIONS).classes).toEqual([]);
     expect(classify({ type: "number" }, new Map(), OPTIONS).classes).toEqual([]);
   });
 });
 
-test("ramps keep their ends and mix between", () => {
+test("ramps keep their ends and interpolate", () => {
   expect(interpolateRamp(["#000000", "#ffffff"], 3)).toEqual(["#000000", "#808080", "#ffffff"]);
   expect(interpolateRamp(RAMP, 1)).toEqual([RAMP[0]]);
   expect(interpolateRamp(RAMP, 5)).toEqual([...RAMP]);
