@@ -15,7 +15,7 @@ VIEWER := $(shell find viewer/src viewer/page viewer/scripts -type f 2>/dev/null
 
 help: ## list the targets
 	@echo "map3d: 3D city models as oblique image tiles"; echo
-	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 20
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 26
 	@$(MAKE) --no-print-directory -s tools
 
 tools:
