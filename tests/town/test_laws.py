@@ -48,8 +48,8 @@ def test_solids_face_outward(either: Path) -> None:
     for root in trees(either, "buildings_*.gml"):
         for name, shell in solids(root):
             middle = np.concatenate([r for rings in shell for r in rings]).mean(axis=0)
-            volume = sum(float(normal(r) @ (r[0] - middle)) for rings in shell for r in rings) / 6
-            assert volume > 0.5, name
+            signed_volume = sum(float(normal(r) @ (r[0] - middle)) for rings in shell for r in rings) / 6
+            assert signed_volume > 0.5, name
 
 
 def test_holes_turn_against_their_outer_ring(either: Path) -> None:

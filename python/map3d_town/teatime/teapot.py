@@ -17,7 +17,7 @@ MIRRORS = {"xy": ((1, 1), (-1, 1), (-1, -1), (1, -1)), "y": ((1, 1), (1, -1))}
 
 
 @dataclass(frozen=True)
-class Mesh:
+class ClosedMesh:
     """Points (n, 3), triangles (m, 3) counter-clockwise from outside, unit normals per corner (m, 3, 3)."""
 
     points: Points
@@ -25,7 +25,7 @@ class Mesh:
     normals: Points
 
 
-def teapot(scale: float, steps: int) -> Mesh:
+def teapot(scale: float, steps: int) -> ClosedMesh:
     """The teapot standing on z = 0 around the z axis; `steps` quadrilaterals along each side of a patch."""
     data = json.loads(CONTROL.read_text())
     bodies = [_body(data, names, steps) for names in BODIES]
@@ -33,10 +33,10 @@ def teapot(scale: float, steps: int) -> Mesh:
     points = np.concatenate([b.points for b in bodies])
     points[:, 2] -= points[:, 2].min()
     triangles = np.concatenate([b.triangles + s for b, s in zip(bodies, starts, strict=False)])
-    return Mesh(points * scale, triangles, np.concatenate([b.normals for b in bodies]))
+    return ClosedMesh(points * scale, triangles, np.concatenate([b.normals for b in bodies]))
 
 
-def _body(data: dict, names: tuple[str, ...], steps: int) -> Mesh:  # type: ignore[type-arg]
+def _body(data: dict, names: tuple[str, ...], steps: int) -> ClosedMesh:  # type: ignore[type-arg]
     """The patches of one body with all mirrored copies, welded and closed."""
     control = np.array(data["points"])
     points: list[Points] = []
@@ -50,12 +50,12 @@ def _body(data: dict, names: tuple[str, ...], steps: int) -> Mesh:  # type: igno
                 cells = grid_triangles(steps) + count
                 count += len(points[-1])
                 triangles.append(cells[:, ::-1] if x * y < 0 else cells)
-    welded, faces = weld(np.concatenate(points), np.concatenate(triangles))
+    welded, faces = weld_points(np.concatenate(points), np.concatenate(triangles))
     shared = len(faces)
-    welded, faces = closed(welded, faces)
-    if volume(welded, faces) < 0:
+    welded, faces = close_holes(welded, faces)
+    if signed_volume(welded, faces) < 0:
         faces = faces[:, ::-1]
-    return Mesh(welded, faces, corner_normals(welded, faces, shared))
+    return ClosedMesh(welded, faces, corner_normals(welded, faces, shared))
 
 
 def bezier(control: Points, steps: int) -> Points:
@@ -73,7 +73,7 @@ def grid_triangles(steps: int) -> Indices:
     return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
 
 
-def weld(points: Points, triangles: Indices) -> tuple[Points, Indices]:
+def weld_points(points: Points, triangles: Indices) -> tuple[Points, Indices]:
     """Equal points (to 1e-6) become one; triangles that lose a corner vanish."""
     keys = np.round(points * 1e6).astype(np.int64)
     _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
@@ -82,7 +82,7 @@ def weld(points: Points, triangles: Indices) -> tuple[Points, Indices]:
     return points[first], faces[whole]
 
 
-def rims(triangles: Indices) -> list[list[int]]:
+def find_open_loops(triangles: Indices) -> list[list[int]]:
     """Loops of edges that only one triangle uses, in the direction of the missing neighbour."""
     edges = {(int(t[i]), int(t[(i + 1) % 3])) for t in triangles for i in range(3)}
     follow = {b: a for a, b in edges if (b, a) not in edges}
@@ -95,19 +95,19 @@ def rims(triangles: Indices) -> list[list[int]]:
     return loops
 
 
-def closed(points: Points, triangles: Indices) -> tuple[Points, Indices]:
+def close_holes(points: Points, triangles: Indices) -> tuple[Points, Indices]:
     """The ring between lid and rim is bridged, every other open end gets a cap around a new middle point."""
     extra: list[list[int]] = []
-    loops = rims(triangles)
+    loops = find_open_loops(triangles)
     if len(loops) == 2 and len(loops[0]) == len(loops[1]) and np.ptp(points[[*loops[0], *loops[1]]][:, 2]) < 1e-6:
-        extra, loops = bridge(points, *loops), []
+        extra, loops = bridge_loops(points, *loops), []
     for loop in loops:
         points = np.concatenate([points, points[loop].mean(axis=0)[None]])
         extra += [[loop[i], loop[(i + 1) % len(loop)], len(points) - 1] for i in range(len(loop))]
     return points, np.concatenate([triangles, np.array(extra, dtype=np.int64).reshape(-1, 3)])
 
 
-def bridge(points: Points, a: list[int], b: list[int]) -> list[list[int]]:
+def bridge_loops(points: Points, a: list[int], b: list[int]) -> list[list[int]]:
     """Triangles between two loops that run in opposite directions, beginning where they are nearest."""
     b = b[::-1]
     start = int(np.argmin(np.hypot(*(points[b] - points[a[0]])[:, :2].T)))
@@ -119,7 +119,7 @@ def bridge(points: Points, a: list[int], b: list[int]) -> list[list[int]]:
     return out
 
 
-def volume(points: Points, triangles: Indices) -> float:
+def signed_volume(points: Points, triangles: Indices) -> float:
     """Signed volume, positive when the triangles turn counter-clockwise seen from outside."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
     return float(np.sum(a * np.cross(b, c)) / 6)

@@ -1,0 +1,1 @@
+"""3D models of planned buildings and trees."""

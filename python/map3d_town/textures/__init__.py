@@ -1,0 +1,1 @@
+"""Textures, drawn from designs and noise."""

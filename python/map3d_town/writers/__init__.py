@@ -1,0 +1,1 @@
+"""Writers of CityGML, OBJ and GeoTIFF files."""
