@@ -1,4 +1,4 @@
-"""Polygons in the plane: (n, 2) float64, counter-clockwise, metres, convex unless said otherwise."""
+"""Functions on polygons in the plane: (n, 2) float64, metres, counter-clockwise and convex unless a function accepts others."""
 
 import math
 
@@ -10,29 +10,29 @@ SQUARE = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
 
 
 def area(polygon: Points) -> float:
-    """Signed area, positive when counter-clockwise; any simple polygon."""
+    """Returns the signed area of any simple polygon, positive if counter-clockwise."""
     ahead = _ahead(polygon)
     return float(0.5 * np.sum(polygon[:, 0] * ahead[:, 1] - polygon[:, 1] * ahead[:, 0]))
 
 
 def _ahead(polygon: Points) -> Points:
-    """Each vertex's successor."""
+    """Returns the successor of each vertex."""
     return np.concatenate([polygon[1:], polygon[:1]])
 
 
 def unit(vector: Points) -> Points:
-    """The vector scaled to length 1."""
+    """Returns the vector scaled to length 1."""
     return np.asarray(vector / math.hypot(*vector.tolist()))
 
 
 def left_normal(vector: Points) -> Points:
-    """The vector turned by 90° counter-clockwise."""
+    """Returns the vector rotated by 90° counter-clockwise."""
     x, y = vector.tolist()
     return np.array([-y, x])
 
 
 def without_short_edges(polygon: Points, least_m: float) -> Points:
-    """The polygon with every vertex dropped that is nearer than `least_m` to its predecessor."""
+    """Drops each vertex that is nearer than `least_m` to its predecessor."""
     keep: list[Points] = []
     for point in polygon:
         if not keep or np.hypot(*(point - keep[-1])) >= least_m:
@@ -43,7 +43,7 @@ def without_short_edges(polygon: Points, least_m: float) -> Points:
 
 
 def clip(polygon: Points, at: Points, inward: Points) -> Points:
-    """The part of the polygon where (p - at)·inward >= 0."""
+    """Returns the part of the polygon where (p - at)·inward >= 0."""
     side = (polygon - at) @ inward
     out: list[Points] = []
     for i in range(len(polygon)):
@@ -56,7 +56,7 @@ def clip(polygon: Points, at: Points, inward: Points) -> Points:
 
 
 def inset(polygon: Points, distance_m: float | Points) -> Points:
-    """The polygon with each edge moved inward by its distance; empty when nothing is left."""
+    """Moves each edge inward by its distance. The result may have fewer vertices, or none."""
     distances = np.broadcast_to(np.asarray(distance_m, dtype=float), (len(polygon),))
     out = polygon
     for i in range(len(polygon)):
@@ -72,7 +72,7 @@ def inset(polygon: Points, distance_m: float | Points) -> Points:
 
 
 def offset(polygon: Points, distance_m: float) -> Points:
-    """Each edge moved inward (outward when negative) and met with its neighbours: vertex i stays vertex i."""
+    """Moves all edges inward (outward if negative) and keeps the order of the vertices; see `keeps_its_edges`."""
     forward = _ahead(polygon) - polygon
     forward = forward / np.hypot(forward[:, 0], forward[:, 1])[:, None]
     back = np.concatenate([forward[-1:], forward[:-1]])
@@ -82,14 +82,14 @@ def offset(polygon: Points, distance_m: float) -> Points:
 
 
 def keeps_its_edges(polygon: Points, moved: Points, least_m: float) -> bool:
-    """Whether every edge of `moved = offset(polygon, …)` still runs the same way and is at least `least_m` long."""
+    """Returns whether each edge of `moved = offset(polygon, …)` keeps its direction and is at least `least_m` long."""
     before, after = (_ahead(p) - p for p in (polygon, moved))
     lengths = np.hypot(before[:, 0], before[:, 1])
     return bool(np.all(np.sum(before * after, axis=1) / lengths >= least_m))
 
 
 def contains(polygon: Points, points: Points, margin_m: float = 0.0) -> NDArray[np.bool_]:
-    """Which points lie inside the convex polygon, at least `margin_m` from its edges."""
+    """Returns a mask of the points inside the polygon and at least `margin_m` from its edges."""
     edge = _ahead(polygon) - polygon
     edge /= np.hypot(edge[:, 0], edge[:, 1])[:, None]
     away = points[:, None] - polygon
@@ -97,18 +97,18 @@ def contains(polygon: Points, points: Points, margin_m: float = 0.0) -> NDArray[
 
 
 def rectangle(centre: Points, along: Points, length_m: float, width_m: float) -> Points:
-    """Counter-clockwise; the first edge runs along `along` on the right-hand side."""
+    """Returns a rectangle; its first edge runs along the unit vector `along`, to the right of the centre."""
     return np.asarray(centre + SQUARE @ np.array([along * (length_m / 2), left_normal(along) * (width_m / 2)]))
 
 
 def circle(centre: Points, radius_m: float, corners: int, start_rad: float = 0.0) -> Points:
-    """A regular polygon, counter-clockwise."""
+    """Returns a regular polygon."""
     angle = start_rad + np.arange(corners) * (2 * np.pi / corners)
     return np.asarray(centre + radius_m * np.stack([np.cos(angle), np.sin(angle)], axis=1))
 
 
 def band(line: Points, width_m: float) -> list[Points]:
-    """Quadrilaterals that widen each piece of a polyline to `width_m`."""
+    """Returns a quadrilateral of width `width_m` for each segment of a polyline."""
     a, b = line[:-1], line[1:]
     length = np.hypot(*(b - a).T)
     a, b, length = a[length >= 1e-6], b[length >= 1e-6], length[length >= 1e-6]
@@ -118,5 +118,5 @@ def band(line: Points, width_m: float) -> list[Points]:
 
 
 def split(polygon: Points, at: Points, normal: Points) -> tuple[Points, Points]:
-    """The parts in front of and behind the line through `at`."""
+    """Returns the parts in front of and behind the line through `at`."""
     return clip(polygon, at, normal), clip(polygon, at, -normal)

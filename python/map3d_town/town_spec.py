@@ -1,4 +1,4 @@
-"""What a town shall be like."""
+"""The specification of a town, and a rough estimate of its size."""
 
 from collections.abc import Collection
 from dataclasses import asdict, dataclass, field
@@ -19,7 +19,7 @@ AREA_PER_BUILDING_M2 = 900.0
 
 @dataclass(frozen=True)
 class TownEstimate:
-    """What a town will take: bytes on disk, files, texture images, orthophoto side in pixels (0: none), side of its ground."""
+    """Disk space and counts of a town. `textures`: number of atlases; `ortho_side_px`: 0 without terrain; `extent_m`: side of the square."""
 
     disk_bytes: int
     files: int
@@ -30,13 +30,13 @@ class TownEstimate:
 
 @dataclass(frozen=True)
 class TownSpec:
-    """A town to be made. Equal specs give equal bytes.
+    """The specification of a town. Equal specs give equal bytes.
 
-    `style`: "town" (European) or "roman". `buildings`: how many, exactly, as far as the ground allows. `files`: over how many CityGML
-    files they are split. `texture_px`: side of an atlas; None: 512 below 100 buildings, else 1024. `textures`: how many atlases in
-    all; None: one for every `buildings_per_texture` buildings. `deep_share`: the share of houses whose windows and doors are
-    modelled. `ortho_m`, `dem_m`: pixel sizes; None: by size. `ortho_px`: least side of the orthophoto, which makes its pixels smaller.
-    `east_m`, `north_m`, `height_m`: where the middle lies in `crs`.
+    `style`: "town" (European) or "roman". `buildings`: number of buildings, exact for "town", at most for "roman". `files`: number of
+    CityGML files. `texture_px`: side of an atlas; None: 512 below 100 buildings, else 1024. `textures`: number of atlases; None: one per
+    `buildings_per_texture` buildings. `deep_share`: share of houses whose windows and doors are modelled and recessed. `ortho_m`, `dem_m`:
+    pixel sizes; None: depends on the extent. `ortho_px`: minimum side of the orthophoto; reduces its pixel size. `east_m`, `north_m`,
+    `height_m`: position of the centre in `crs`.
     """
 
     style: str = "town"
@@ -70,11 +70,11 @@ class TownSpec:
             (self.textures is None or 1 <= self.textures <= self.buildings, "textures", self.textures, "1 to the number of buildings"),
             (self.buildings_per_texture >= 1, "buildings_per_texture", self.buildings_per_texture, "at least 1"),
             (0 <= self.deep_share <= 1, "deep_share", self.deep_share, "0 to 1"),
-            (self.crs.startswith("EPSG:") and self.crs[5:].isdigit(), "crs", self.crs, "such as EPSG:25832"),
+            (self.crs.startswith("EPSG:") and self.crs[5:].isdigit(), "crs", self.crs, "a code such as EPSG:25832"),
         ]
-        for fine, name, got, wanted in rules:
-            if not fine:
-                raise TownError(f"{name} is {got!r}; it must be {wanted}")
+        for valid, name, got, expected in rules:
+            if not valid:
+                raise TownError(f"{name} is {got!r}, expected {expected}")
 
     @property
     def atlas_px(self) -> int:
@@ -82,7 +82,7 @@ class TownSpec:
 
     @property
     def texture_count(self) -> int:
-        """How many atlases the whole town has at most."""
+        """Maximum number of atlases of the town."""
         return self.textures or -(-self.buildings // self.buildings_per_texture)
 
     @property
@@ -91,21 +91,21 @@ class TownSpec:
 
     @property
     def projected_epsg(self) -> int:
-        """The code of the horizontal CRS; raises TownError when it is not a projected one."""
+        """EPSG code of the horizontal CRS. Raises TownError if that is not projected."""
         crs = CRS.from_epsg(int(self.crs[5:]))
         flat = crs.sub_crs_list[0] if crs.is_compound else crs
         code = flat.to_epsg()
         if not flat.is_projected or code is None:
-            raise TownError(f"crs is {self.crs!r}; it must be a projected one, such as EPSG:25832")
+            raise TownError(f"crs is {self.crs!r}, expected a projected CRS such as EPSG:25832")
         return int(code)
 
     @property
     def extent_m(self) -> float:
-        """About how long the town's side is."""
+        """Approximate side of the town's square."""
         return float((self.buildings * AREA_PER_BUILDING_M2) ** 0.5 * 1.25 + 180)
 
     def ortho_pixel_m(self, extent_m: float) -> float:
-        """The size of an orthophoto pixel on a ground of that extent."""
+        """Returns the pixel size of the orthophoto of a square of `extent_m`."""
         pixel = self.ortho_m or (0.1 if extent_m < 700 else 0.2 if extent_m < 4000 else 0.25)
         return min(pixel, extent_m / self.ortho_px) if self.ortho_px else pixel
 
@@ -113,7 +113,7 @@ class TownSpec:
         return self.dem_m or (1.0 if extent_m < 4000 else 2.0)
 
     def estimate(self) -> TownEstimate:
-        """What the town will take by rule of thumb, within about a factor of two; `estimate_town` is exact to 15 % and slower."""
+        """Estimates roughly, within a factor of two; `estimate_town` is within 15 % but slower."""
         size = SHARED_BYTES + self.atlas_px**2 * self.texture_count * BYTES_PER_TEXEL * len(self.formats)
         size += sum(BYTES_PER_BUILDING[f] * self.buildings for f in self.formats)
         size += BYTES_PER_DEEP_BUILDING * self.buildings * self.deep_share * len(self.formats)
@@ -125,5 +125,5 @@ class TownSpec:
         return TownEstimate(int(size), files, self.texture_count, ortho, self.extent_m)
 
     def to_json(self) -> dict[str, object]:
-        """The spec as it is kept in town.json."""
+        """Returns the spec as stored in town.json."""
         return {**asdict(self), "formats": list(self.formats)}

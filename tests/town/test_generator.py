@@ -115,7 +115,7 @@ def test_buildings_stand_on_the_terrain(town: Path) -> None:
 
 def redness(picture: np.ndarray, ortho: rasterio.DatasetReader, points: np.ndarray) -> np.ndarray:
     """Red minus green of the orthophoto at points in the CRS; rows count down from the upper edge."""
-    column = ((points[:, 0] - ortho.bounds.left_normal) / ortho.res[0]).astype(int)
+    column = ((points[:, 0] - ortho.bounds.left) / ortho.res[0]).astype(int)
     row = ((ortho.bounds.top - points[:, 1]) / ortho.res[1]).astype(int)
     return np.asarray(picture[0, row, column] - picture[1, row, column])
 

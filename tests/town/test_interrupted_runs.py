@@ -119,7 +119,7 @@ def test_two_runs_in_one_folder_are_refused(tmp_path: Path) -> None:
 
 
 def test_a_town_begun_by_another_version_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "town.json").write_text(json.dumps({"map3d": "town", "version": 1, "spec": SPEC.record(), "files": {}}))
+    (tmp_path / "town.json").write_text(json.dumps({"map3d": "town", "version": 1, "spec": SPEC.to_json(), "files": {}}))
     with pytest.raises(TownError, match="version 1"):
         make_town(tmp_path, SPEC)
 

@@ -58,9 +58,9 @@ def test_tiles_keep_their_places_when_written_in_another_order(tmp_path: Path) -
 
 def test_windows_fit_together_without_a_seam() -> None:
     plan, _ = plan_town(TownSpec(buildings=20))
-    painter = OrthophotoRenderer(plan, 0.5)
-    whole = painter.window(0, 0, 256, 256)
-    parts = [[painter.window(x, y, 128, 128) for x in (0, 128)] for y in (0, 128)]
+    renderer = OrthophotoRenderer(plan, 0.5)
+    whole = renderer.render(0, 0, 256, 256)
+    parts = [[renderer.render(x, y, 128, 128) for x in (0, 128)] for y in (0, 128)]
     same = whole == np.block(parts)
     assert same.mean() > 0.995, "only what the drawing rounds at a window's edge may differ"
 

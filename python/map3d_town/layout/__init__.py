@@ -1,1 +1,1 @@
-"""The plan of a town: streets, blocks, buildings as outlines with profiles, trees, ground."""
+"""Plans a town: streets, blocks, outlines and roof profiles of buildings, trees, ground."""

@@ -1,4 +1,4 @@
-"""What fills the blocks of the town: perimeter blocks, rows, detached houses, slabs, halls, parks."""
+"""Fills blocks with buildings: perimeter blocks, row houses, detached houses, slabs, halls."""
 
 from dataclasses import dataclass, replace
 
@@ -27,7 +27,7 @@ RESIDENTIAL, COMMERCIAL, INDUSTRIAL, GARAGE = "1000", "1150", "1110", "1610"
 
 @dataclass(frozen=True)
 class CityBlock:
-    """A block between streets: a convex outline, counter-clockwise, and the names of the streets along its edges."""
+    """A block between streets: a convex, counter-clockwise outline, the names of the streets along its edges, and its random generator."""
 
     outline: Points
     streets: tuple[str, ...]
@@ -42,7 +42,7 @@ class CityBlock:
 
 @dataclass(frozen=True)
 class PerimeterStyle:
-    """How a perimeter block is built: depth, storeys, lot widths, looks."""
+    """The style of a perimeter block. `gable_fronts`, `mansards`: shares of houses; `ground`: material of the courtyard; ranges are (low, high)."""
 
     depth_m: float
     storeys: tuple[int, int]
@@ -61,7 +61,7 @@ GRUENDER = PerimeterStyle(11.5, (4, 5), 3.35, (11.0, 17.0), ("gruender",), 0.0, 
 
 
 def fill_perimeter(builder: PlanBuilder, block: CityBlock, style: PerimeterStyle) -> bool:
-    """Houses wall to wall along all edges around a courtyard; False when the block is too small for one."""
+    """Adds terraced houses along all edges around a courtyard. Returns False when the block is too small for a courtyard."""
     outline, depth = block.outline, style.depth_m
     inner = offset(outline, depth)
     if not keeps_its_edges(outline, inner, 4.0) or area(inner) < 60:
@@ -84,7 +84,7 @@ def fill_perimeter(builder: PlanBuilder, block: CityBlock, style: PerimeterStyle
 
 
 def _edge_spans(block: CityBlock, inner: Points, i: int, style: PerimeterStyle) -> tuple[float, float]:
-    """Where along edge i the corner houses end and begin."""
+    """Returns the distances along edge i at which the first corner house ends and the second begins."""
     a, b = block.edge(i)
     along, length = unit(b - a), float(np.hypot(*(b - a)))
     first = float((inner[i] - a) @ along)
@@ -99,7 +99,7 @@ def _edge_spans(block: CityBlock, inner: Points, i: int, style: PerimeterStyle) 
 
 
 def _split_into_lots(start: float, end: float, width_m: tuple[float, float], rng: np.random.Generator) -> list[tuple[float, float]]:
-    """The span cut into lots of irregular width."""
+    """Cuts the span into lots of random width."""
     length = end - start
     if length < 1.0:
         return []
@@ -110,7 +110,7 @@ def _split_into_lots(start: float, end: float, width_m: tuple[float, float], rng
 
 
 def _choose_part(style: PerimeterStyle, rng: np.random.Generator, extra: int = 0) -> BuildingPart:
-    """Storeys, look and cover of one house."""
+    """Chooses storeys, facade and roof cover of a house."""
     storeys = int(rng.integers(style.storeys[0], style.storeys[1] + 1)) + extra
     facade_kind = style.facade_kinds[int(rng.integers(len(style.facade_kinds)))]
     cover = style.covers[int(rng.integers(len(style.covers)))]
@@ -138,7 +138,7 @@ def _add_row_house(builder: PlanBuilder, block: CityBlock, a: Points, b: Points,
 
 
 def _add_corner_house(builder: PlanBuilder, block: CityBlock, inner: Points, i: int, spans: list[tuple[float, float]], style: PerimeterStyle) -> None:
-    """A house around corner i, as deep as its neighbours on both streets."""
+    """Adds a house around corner i, as deep as its neighbours on both streets."""
     outline, n = block.outline, len(block.outline)
     corner = outline[i]
     (before, _), (_, after) = block.edge((i - 1) % n), block.edge(i)
@@ -155,7 +155,7 @@ def _add_corner_house(builder: PlanBuilder, block: CityBlock, inner: Points, i: 
 
 
 def _plant_courtyard(builder: PlanBuilder, block: CityBlock, inner: Points) -> None:
-    """Trees, and a shed in larger yards."""
+    """Adds trees, and a shed in larger courtyards."""
     rng = block.rng
     for point in random_points(inner, int(area(inner) / 110), 2.5, rng):
         builder.add_tree(point, "linden", 7.0, rng)
@@ -167,7 +167,7 @@ def _plant_courtyard(builder: PlanBuilder, block: CityBlock, inner: Points) -> N
 
 
 def add_shed(builder: PlanBuilder, ground: Points, rng: np.random.Generator) -> None:
-    """A shed or garage with a flat or shed roof, as a simple solid."""
+    """Adds a shed or garage with a shed roof."""
     part = part_without_outline(2.5, 1, "shed", "flat", roof_type=FLAT)
     profile = ((0.0, 0.0), (1.0, float(rng.uniform(0.2, 0.6))))
     width = float(np.hypot(*(ground[3] - ground[0])))
@@ -175,7 +175,7 @@ def add_shed(builder: PlanBuilder, ground: Points, rng: np.random.Generator) -> 
 
 
 def random_points(polygon: Points, count: int, margin_m: float, rng: np.random.Generator) -> Points:
-    """Random points inside a convex polygon."""
+    """Returns at most `count` random points inside a convex polygon, at least `margin_m` from its edges."""
     if count <= 0 or len(polygon) < 3:
         return np.zeros((0, 2))
     low, high = polygon.min(axis=0), polygon.max(axis=0)
@@ -184,7 +184,7 @@ def random_points(polygon: Points, count: int, margin_m: float, rng: np.random.G
 
 
 def split_into_parcels(outline: Points, target_m2: float, rng: np.random.Generator) -> list[Points]:
-    """The polygon cut across its longest side until the pieces are about as large as wanted."""
+    """Cuts the polygon across its longer direction until the pieces have about the target area."""
     if area(outline) < target_m2 * 1.5:
         return [outline]
     edges = np.roll(outline, -1, axis=0) - outline
@@ -201,7 +201,7 @@ def split_into_parcels(outline: Points, target_m2: float, rng: np.random.Generat
 
 
 def find_street_edge(parcel: Points, outline: Points) -> int:
-    """The longest edge of the parcel that lies on the block's outline, or -1."""
+    """Returns the number of the longest edge of the parcel on the block's outline, or -1."""
     after = np.concatenate([parcel[1:], parcel[:1]])
     middle, length = (parcel + after) / 2, np.hypot(*(after - parcel).T)
     ahead = np.concatenate([outline[1:], outline[:1]]) - outline
@@ -214,7 +214,7 @@ def find_street_edge(parcel: Points, outline: Points) -> int:
 
 
 def fill_villas(builder: PlanBuilder, block: CityBlock) -> None:
-    """Detached houses in gardens."""
+    """Adds detached houses in gardens."""
     builder.add_ground(block.outline, "lawn", "block")
     for parcel in split_into_parcels(block.outline, float(block.rng.uniform(430, 620)), block.rng):
         builder.add_ground(offset(parcel, 0.5), ("lawn", "garden", "lawn_light")[int(block.rng.integers(3))], "parcel")
@@ -225,7 +225,7 @@ def fill_villas(builder: PlanBuilder, block: CityBlock) -> None:
 
 
 def _add_villa(builder: PlanBuilder, block: CityBlock, parcel: Points, edge: int) -> bool:
-    """A house behind its front garden, with a drive, a garage and trees; False when there is no room."""
+    """Adds a house behind a front garden, with a drive, a garage and trees. Returns False when the parcel is too small."""
     rng = block.rng
     a, b = parcel[edge], parcel[(edge + 1) % len(parcel)]
     along = unit(b - a)
@@ -258,7 +258,7 @@ def _add_garage(builder: PlanBuilder, parcel: Points, ground: Points, along: Poi
 
 
 def choose_villa(ground: Points, rng: np.random.Generator) -> BuildingPart:
-    """A house under a gabled, half-hipped, hipped, mansard or flat roof."""
+    """Chooses a house with a gabled, half-hipped, hipped, mansard or flat roof."""
     storeys = int(rng.integers(1, 3))
     part = part_without_outline(storeys * 2.9 + 0.5, storeys, "villa", "tiles" if rng.random() < 0.7 else "dark", overhang_m=0.5)
     choice, width = rng.random(), float(np.hypot(*(ground[3] - ground[0])))
@@ -276,7 +276,7 @@ def choose_villa(ground: Points, rng: np.random.Generator) -> BuildingPart:
 
 
 def fill_rows(builder: PlanBuilder, block: CityBlock) -> None:
-    """Rows of equal houses along the two longest edges, gardens between them."""
+    """Adds rows of equal houses along the two longest edges, with gardens between them."""
     rng, outline = block.rng, block.outline
     builder.add_ground(outline, "lawn", "block")
     inner = offset(outline, 4.0)
@@ -300,7 +300,7 @@ def fill_rows(builder: PlanBuilder, block: CityBlock) -> None:
 
 
 def _row_extent(outline: Points, a: Points, along: Points, inward: Points, length: float, depth: float) -> tuple[float, int]:
-    """Where a row of houses can begin, and how many there are, so that all keep inside and clear of the opposite row."""
+    """Returns the distance at which a row starts and its number of houses, such that it stays in the block and clear of the opposite row."""
     steps = np.arange(0.0, max(length, 0.1), 0.5)
     points = a + steps[:, None] * along
     free = contains(outline, points, 2.0) & contains(outline, points + inward * (depth + 9.0), 1.0)
@@ -312,7 +312,7 @@ def _row_extent(outline: Points, a: Points, along: Points, inward: Points, lengt
 
 
 def fill_slabs(builder: PlanBuilder, block: CityBlock) -> None:
-    """Apartment slabs in parallel on a lawn."""
+    """Adds parallel apartment slabs on a lawn."""
     rng, outline = block.rng, block.outline
     builder.add_ground(outline, "lawn_light", "block")
     along = unit(outline[1] - outline[0])
@@ -339,7 +339,7 @@ def fill_slabs(builder: PlanBuilder, block: CityBlock) -> None:
 
 
 def fill_industry(builder: PlanBuilder, block: CityBlock) -> None:
-    """A hall with saw-tooth or low roof, an office, a paved yard."""
+    """Adds a hall with a saw-tooth or low gabled roof, an office and a paved yard."""
     rng, outline = block.rng, block.outline
     builder.add_ground(outline, "concrete", "block")
     along = unit(outline[1] - outline[0])

@@ -1,4 +1,4 @@
-"""Blocks without houses: parks, orchards, sports grounds, allotments, meadows, car parks."""
+"""Fills blocks without houses: parks, orchards, sports grounds, allotments, meadows."""
 
 import itertools
 
@@ -10,7 +10,7 @@ from map3d_town.polygons_2d import Points, area, contains, inset, left_normal, o
 
 
 def fill_park(builder: PlanBuilder, block: CityBlock) -> None:
-    """Lawn with a path around it, a winding one across, a pond when it is large, and many trees."""
+    """Adds a lawn with a path around it and a winding one across, many trees, and a pond if it is large."""
     rng, outline = block.rng, block.outline
     builder.add_ground(outline, "lawn", "block")
     middle, size = outline.mean(axis=0), float(np.sqrt(area(outline)))
@@ -32,7 +32,7 @@ def fill_park(builder: PlanBuilder, block: CityBlock) -> None:
 
 
 def add_winding_path(builder: PlanBuilder, outline: Points, rng: np.random.Generator) -> None:
-    """A winding path between the middles of two opposite edges."""
+    """Adds a winding path between the midpoints of two opposite edges."""
     n = len(outline)
     first = int(rng.integers(n))
     a = (outline[first] + outline[(first + 1) % n]) / 2
@@ -47,7 +47,7 @@ def add_winding_path(builder: PlanBuilder, outline: Points, rng: np.random.Gener
 
 
 def fill_orchard(builder: PlanBuilder, block: CityBlock) -> None:
-    """Fruit trees in rows on a meadow."""
+    """Adds rows of fruit trees on a meadow."""
     rng, outline = block.rng, block.outline
     builder.add_ground(outline, "meadow", "block")
     for point in grid_points(outline, 8.0, 3.0):
@@ -56,7 +56,7 @@ def fill_orchard(builder: PlanBuilder, block: CityBlock) -> None:
 
 
 def grid_points(outline: Points, step_m: float, margin_m: float) -> Points:
-    """Points in rows along the first edge, inside the outline."""
+    """Returns the points of a grid along the first edge that are inside the outline."""
     along = unit(outline[1] - outline[0])
     axes = np.array([along, left_normal(along)])
     reach = outline @ axes.T
@@ -67,7 +67,7 @@ def grid_points(outline: Points, step_m: float, margin_m: float) -> Points:
 
 
 def fill_sports(builder: PlanBuilder, block: CityBlock) -> bool:
-    """A football pitch with its lines, trees around; False when there is no room."""
+    """Adds a football pitch with trees around it. Returns False when the block is too small."""
     rng, outline = block.rng, block.outline
     first = unit(outline[2] - outline[1])
     for along in (first, left_normal(first), unit(outline[1] - outline[0])):
@@ -84,18 +84,18 @@ def fill_sports(builder: PlanBuilder, block: CityBlock) -> bool:
 
 
 def draw_pitch(builder: PlanBuilder, pitch: Points) -> None:
-    """The pitch: outer lines, middle line, circle, penalty areas."""
+    """Adds the lines of a pitch: outer lines, halfway line, centre circle, penalty areas."""
     a, b, _, d = pitch
     along, across, middle = unit(b - a), unit(d - a), pitch.mean(axis=0)
     length, width = float(np.hypot(*(b - a))), float(np.hypot(*(d - a)))
 
-    def frame(centre: Points, u: float, v: float, material: str = "lawn_light") -> None:
+    def add_outline(centre: Points, u: float, v: float, material: str = "lawn_light") -> None:
         builder.add_ground(rectangle(centre, along, u, v), "mark", "path")
         builder.add_ground(rectangle(centre, along, u - 0.3, v - 0.3), material, "path")
 
-    frame(middle, length, width)
+    add_outline(middle, length, width)
     for sign in (-1, 1):
-        frame(middle + along * sign * (length / 2 - 5.5), 11.0, width * 0.55)
+        add_outline(middle + along * sign * (length / 2 - 5.5), 11.0, width * 0.55)
     ring = np.linspace(0, 2 * np.pi, 32, endpoint=False)
     for radius, material in ((6.2, "mark"), (5.9, "lawn_light")):
         builder.add_ground(middle + radius * (np.cos(ring)[:, None] * along + np.sin(ring)[:, None] * across), material, "path")
@@ -103,7 +103,7 @@ def draw_pitch(builder: PlanBuilder, pitch: Points) -> None:
 
 
 def fill_allotments(builder: PlanBuilder, block: CityBlock) -> None:
-    """Small gardens with huts in the middle of beds and fruit trees."""
+    """Adds small gardens with huts, beds and fruit trees."""
     rng, outline = block.rng, block.outline
     builder.add_ground(outline, "lawn", "block")
     along = unit(outline[1] - outline[0])
@@ -118,14 +118,14 @@ def fill_allotments(builder: PlanBuilder, block: CityBlock) -> None:
 
 
 def fill_meadow(builder: PlanBuilder, block: CityBlock) -> None:
-    """Grass with a few trees."""
+    """Adds a meadow with a few trees."""
     builder.add_ground(block.outline, "meadow", "block")
     for point in random_points(block.outline, int(area(block.outline) / 420), 2.0, block.rng):
         builder.add_tree(point, ("linden", "apple", "chestnut")[int(block.rng.integers(3))], 8.0, block.rng)
 
 
 def fill_green(builder: PlanBuilder, block: CityBlock) -> None:
-    """Something without houses, by chance."""
+    """Fills the block with a random kind of green space."""
     choice = block.rng.random()
     if area(block.outline) < 700 or choice < 0.3:
         fill_park(builder, block)
@@ -140,7 +140,7 @@ def fill_green(builder: PlanBuilder, block: CityBlock) -> None:
 
 
 def fill_belt(builder: PlanBuilder, block: CityBlock) -> None:
-    """A piece of the green belt where the town wall stood: lawn, a walk along its middle, rows of trees."""
+    """Adds a piece of the green belt on the former town wall: lawn, a path along its middle, rows of trees."""
     rng, outline = block.rng, block.outline
     builder.add_ground(outline, "lawn", "block")
     edges = np.roll(outline, -1, axis=0) - outline

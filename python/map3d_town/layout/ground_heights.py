@@ -1,4 +1,4 @@
-"""The shape of the ground: heights above the vertical datum as a smooth function of town coordinates."""
+"""Ground heights as a smooth function of town coordinates."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,13 +9,16 @@ from numpy.typing import ArrayLike, NDArray
 from map3d_town.seeds import rng
 
 DAM_HALF_M = 6.6
-"""Half the width of the dam that carries a road over the river, with its slopes."""
+"""Half the width of the dam that carries a road over the river, slopes included."""
 WAVES = ((900.0, 5.0), (420.0, 2.2), (190.0, 0.8), (75.0, 0.16))
 
 
 @dataclass(frozen=True)
 class Ground:
-    """Gently rolling ground around `level_m`, calmer in the middle, with an optional river bed along a line."""
+    """Gently rolling ground around `level_m`, flatter in the centre, with an optional river bed.
+
+    `waves`: (kx, ky, phase, amplitude); `river`: centre line from west to east; `crossings`: (x, y, unit x, unit y) of roads on dams.
+    """
 
     level_m: float
     waves: tuple[tuple[float, float, float, float], ...]
@@ -24,7 +27,7 @@ class Ground:
     crossings: tuple[tuple[float, float, float, float], ...] = ()
 
     def height(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
-        """Heights in metres at points (x, y); any shape, broadcast."""
+        """Returns heights in metres at points (x, y) of any shapes that broadcast."""
         px, py = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
         total = np.zeros(px.shape)
         for kx, ky, phase, size in self.waves:
@@ -37,7 +40,7 @@ class Ground:
         return np.asarray(total)
 
     def open_water(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-        """0 where a road crosses the river on its dam, 1 elsewhere; a crossing is (x, y, unit x, unit y) of its road."""
+        """Returns 0 on the dam of a road, 1 elsewhere, smooth in between."""
         free = np.ones(x.shape)
         for cx, cy, ux, uy in self.crossings:
             aside, ahead = np.abs((x - cx) * uy - (y - cy) * ux), np.abs((x - cx) * ux + (y - cy) * uy)
@@ -46,12 +49,12 @@ class Ground:
 
     @cached_property
     def _middle(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """The river's line: x, y, and the slope of y over x."""
+        """The river's centre line: x, y, and dy/dx."""
         east, north = np.array(self.river).T
         return east, north, np.gradient(north, east)
 
     def river_distance(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distance to the river's middle line; the line runs from west to east."""
+        """Returns the approximate distance to the river's centre line."""
         east, north, rise = self._middle
         middle, slope = np.interp(x, east, north), np.interp(x, east, rise)
         return np.asarray(np.abs(y - middle) / np.hypot(1.0, slope))
@@ -64,7 +67,7 @@ def make_ground(
     half_m: float = 0.0,
     crossings: tuple[tuple[float, float, float, float], ...] = (),
 ) -> Ground:
-    """The ground of a town, drawn from its seed."""
+    """Returns the random ground of a town."""
     source = rng(seed, "ground")
     waves = []
     for length, size in WAVES:

@@ -1,4 +1,4 @@
-"""The buildings that a town is known by: the church on the market square and the town hall."""
+"""Adds the landmarks of a European town: the market square with its church, and the town hall."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ CHURCH, TOWN_HALL, MONUMENT = "1080", "1130", "1820"
 
 
 def add_market_square(builder: PlanBuilder, outline: Points, rng: np.random.Generator) -> None:
-    """The square with its paving, the church, a fountain and some trees."""
+    """Adds the paved square with church, fountain and trees."""
     builder.add_ground(outline, "plaza", "block")
     angle = float(rng.uniform(-0.5, 0.5))
     along = np.array([np.cos(angle), np.sin(angle)])
@@ -32,7 +32,7 @@ def add_market_square(builder: PlanBuilder, outline: Points, rng: np.random.Gene
 
 
 def _add_church(builder: PlanBuilder, middle: Points, along: Points) -> None:
-    """A nave with aisles, a choir and a western tower with a tall spire."""
+    """Adds a church: a nave with aisles, a choir, and a western tower with a tall spire."""
     across = left_normal(along)
     nave = rectangle(middle, along, 24.0, 9.0)
     side = ("street", "street", "blank", "blank")
@@ -59,7 +59,7 @@ def _stone_part(eave_m: float, storeys: int, cover: str, overhang_m: float) -> B
 
 
 def add_town_hall(builder: PlanBuilder, block: CityBlock) -> bool:
-    """A block of its own around a courtyard, with a clock tower on the side of the square; False without room."""
+    """Adds a town hall around a courtyard, with a clock tower on the market side. Returns False when the block is too small."""
     outline, depth = block.outline, 10.5
     inner = offset(outline, depth)
     if not keeps_its_edges(outline, inner, 3.0) or area(inner) < 30:

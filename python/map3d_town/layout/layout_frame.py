@@ -1,4 +1,4 @@
-"""The frame of a European town's layout: main roads, river, and the deformation of regular rings."""
+"""The frame of a European town's layout: main roads, river, and the warp of regular rings."""
 
 import math
 from dataclasses import dataclass, field
@@ -11,7 +11,11 @@ from map3d_town.seeds import rng
 
 @dataclass
 class LayoutFrame:
-    """How the plain rings are bent into a grown town, and where roads and river run (before bending)."""
+    """Warps regular rings into an irregular town.
+
+    `roads`: angles of the main roads; `river_y`, `river_half_m`: centre line and half width of the river, before the warp. `waves`: (kx, ky,
+    phase, shift in x, shift in y).
+    """
 
     seed: int
     wanted: int
@@ -20,8 +24,8 @@ class LayoutFrame:
     river_half_m: float = 0.0
     waves: list[tuple[float, float, float, float, float]] = field(default_factory=list)
 
-    def bend(self, points: Points) -> Points:
-        """Plain coordinates to town coordinates; smooth, never folding."""
+    def warp(self, points: Points) -> Points:
+        """Converts layout coordinates to town coordinates. The warp is smooth and does not fold."""
         p = np.asarray(points, dtype=float).reshape(-1, 2)
         out = p * np.array([1.07, 0.95])
         for kx, ky, phase, sx, sy in self.waves:

@@ -1,4 +1,4 @@
-"""Bodies from outlines: rows under one ridge, corners, rings, hipped and flat roofs, towers, vaults."""
+"""Makes building parts from outlines: rows, rings, hipped and flat roofs, spires, vaults."""
 
 import math
 from dataclasses import replace
@@ -29,32 +29,32 @@ def saw_tooth_profile(count: int, rise_m: float) -> Profile:
 
 
 def vault_profile(rise_m: float, steps: int = 8) -> Profile:
-    """A round vault over the whole depth."""
+    """Returns the profile of a barrel vault over the whole depth."""
     angles = [math.pi * i / steps for i in range(steps + 1)]
     return tuple((0.5 - 0.5 * math.cos(a), rise_m * math.sin(a)) for a in angles)
 
 
 def dome_profile(rise_m: float, steps: int = 6) -> Profile:
-    """A round dome from the edge (t = 0) to the middle (t = 1)."""
+    """Returns the profile of a dome from its edge (t = 0) to its centre (t = 1)."""
     angles = [math.pi / 2 * i / steps for i in range(steps + 1)]
     return tuple((1 - math.cos(a), rise_m * math.sin(a)) for a in angles)
 
 
 def row_part(a: Points, b: Points, depth_m: float, profile: Profile, part: BuildingPart, sides: tuple[str, str, str, str]) -> BuildingPart:
-    """A body with its eave from a to b (seen from outside: left to right), `sides` = front, back, end at a, end at b."""
+    """Returns a part with its eave from a to b, left to right seen from outside. `sides`: front, back, end at a, end at b."""
     inward = left_normal(unit(b - a)) * depth_m
     return replace(part, front=np.array([a, b]), back=np.array([a + inward, b + inward]), profile=profile, sides=sides)
 
 
 def gable_front_part(a: Points, b: Points, depth_m: float, profile: Profile, part: BuildingPart, sides: tuple[str, str, str, str]) -> BuildingPart:
-    """The same outline with the ridge across: `sides` = side at b, side at a, gable at the front, gable at the back."""
+    """Returns a part like `row_part` with the ridge across. `sides`: side at b, side at a, gable at the front, gable at the back."""
     inward = left_normal(unit(b - a)) * depth_m
     front, back = np.array([b, b + inward]), np.array([a, a + inward])
     return replace(part, front=front, back=back, profile=profile, sides=sides)
 
 
 def hipped_part(rectangle: Points, pitch_deg: float, part: BuildingPart, steep: bool = False) -> BuildingPart:
-    """A hipped roof (a pyramid over a square) on a rectangle whose first edge is a long one; `steep`: mansard below."""
+    """Returns a part with a hipped roof, a pyramid over a square; `steep`: with a mansard below."""
     a, b, c, d = rectangle
     length, width = float(np.hypot(*(b - a))), float(np.hypot(*(d - a)))
     if width > length:
@@ -71,27 +71,27 @@ def hipped_part(rectangle: Points, pitch_deg: float, part: BuildingPart, steep: 
 
 
 def flat_part(polygon: Points, part: BuildingPart, parapet_m: float = 0.55) -> BuildingPart:
-    """A flat roof behind a parapet."""
+    """Returns a part with a flat roof behind a parapet."""
     profile: Profile = ((0.0, parapet_m), (1.0, parapet_m), (1.0, 0.0))
     back = offset(polygon, 0.3)
     return replace(part, front=polygon, back=back, profile=profile, closed=True, overhang_m=0.0, roof_type=FLAT)
 
 
 def spire_part(polygon: Points, profile: Profile, part: BuildingPart) -> BuildingPart:
-    """A roof that rises from a regular outline to a point above its middle."""
+    """Returns a part whose roof rises to a point above the mean of its corners."""
     back = np.repeat(polygon.mean(axis=0)[None, :], len(polygon), axis=0)
     return replace(part, front=polygon, back=back, profile=profile, closed=True, roof_type="1070")
 
 
 def ring_part(polygon: Points, depth_m: float, profile: Profile, part: BuildingPart) -> BuildingPart:
-    """Wings around a courtyard."""
+    """Returns a part of wings around a courtyard."""
     n = len(polygon)
     sides = ("street",) * n + ("yard",) * n
     return replace(part, front=polygon, back=offset(polygon, depth_m), profile=profile, closed=True, hollow=True, sides=sides)
 
 
 def part_without_outline(eave_m: float, storeys: int, facade_kind: str, cover: str, overhang_m: float = 0.0, roof_type: str = GABLE) -> BuildingPart:
-    """A part without an outline yet, for `replace`."""
+    """Returns a part without outline, for use with `replace`."""
     nothing = np.zeros((0, 2))
     return BuildingPart(
         nothing, nothing, (), eave_m, storeys=storeys, facade_kind=facade_kind, cover=cover, overhang_m=overhang_m, roof_type=roof_type

@@ -1,4 +1,4 @@
-"""Parked cars in the orthophoto."""
+"""Adds parked cars to the orthophoto."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ CARS = ("car_white", "car_dark", "car_red", "car_white", "car_dark")
 
 
 def park_cars(builder: PlanBuilder, outline: Points, start: Points, along: Points, length_m: float, rng: np.random.Generator) -> None:
-    """Cars side by side from `start` on, with gaps, where they lie inside the convex outline."""
+    """Adds parking spaces side by side from `start`, some with cars, where they are inside the convex outline."""
     heading = left_normal(along)
     for shift in np.arange(1.3, length_m - 1.3, 2.6):
         centre = start + along * shift

@@ -1,4 +1,4 @@
-"""Roman houses: atrium and peristyle, shops along the street, porticoes."""
+"""Adds Roman houses: atrium and peristyle, shops along the street, porticoes."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ SHOPS_DEEP_M = 5.0
 
 
 def place_columns(line: list[tuple[Points, Points]], step_m: float, radius_m: float, low: float, high: float) -> PlannedInstallations:
-    """Columns at even distances along some lines."""
+    """Returns evenly spaced columns along lines."""
     out = []
     for a, b in line:
         length = float(np.hypot(*(b - a)))
@@ -27,7 +27,7 @@ def place_columns(line: list[tuple[Points, Points]], step_m: float, radius_m: fl
 
 
 def add_portico(builder: PlanBuilder, a: Points, b: Points, depth_m: float, rng: np.random.Generator) -> None:
-    """A walk under a lean-to roof on columns along a street from a to b."""
+    """Adds a walkway under a lean-to roof on columns along a street from a to b."""
     part = replace(part_without_outline(3.9, 1, "roman", "roman", 0.3, roof_type="1010"), lift_m=3.5)
     made = row_part(a, b, depth_m, ((0.0, 0.0), (1.0, 1.0)), part, ("blank", "blank", "blank", "blank"))
     inward = left_normal(unit(b - a)) * 0.35
@@ -35,7 +35,7 @@ def add_portico(builder: PlanBuilder, a: Points, b: Points, depth_m: float, rng:
 
 
 def fill_domus(builder: PlanBuilder, block: CityBlock) -> None:
-    """Shops along the two short sides, between them two or three houses side by side."""
+    """Adds shops along the two short sides, and two or three houses between them."""
     rng, (a, b, c, d) = block.rng, block.outline
     builder.add_ground(block.outline, "yard", "block")
     _add_shops(builder, block, a, b, 0)
@@ -53,7 +53,7 @@ def fill_domus(builder: PlanBuilder, block: CityBlock) -> None:
 
 
 def _add_shops(builder: PlanBuilder, block: CityBlock, a: Points, b: Points, edge: int) -> None:
-    """Tabernae of one or two storeys under one roof line."""
+    """Adds a row of shops (tabernae) of one or two storeys."""
     rng, length, along = block.rng, float(np.hypot(*(b - a))), unit(b - a)
     count = max(2, int(length / 9))
     for i in range(count):
@@ -71,7 +71,7 @@ def _add_shops(builder: PlanBuilder, block: CityBlock, a: Points, b: Points, edg
 
 
 def _add_house(builder: PlanBuilder, outline: Points, block: CityBlock, number: int) -> None:
-    """Atrium with inward roofs in front, rooms and colonnade around a garden behind."""
+    """Adds a house: an atrium with inward roofs in front, behind it rooms and a colonnade around a garden."""
     rng, (a, b, c, d) = block.rng, outline
     share = float(rng.uniform(0.4, 0.46))
     front = np.array([a, a + (b - a) * share, d + (c - d) * share, d])
@@ -94,7 +94,7 @@ def _add_house(builder: PlanBuilder, outline: Points, block: CityBlock, number: 
 
 
 def _lay_courts(builder: PlanBuilder, atrium: Points, garden: Points, rng: np.random.Generator) -> None:
-    """The basin of the atrium; garden beds, a fountain and trees in the peristyle."""
+    """Adds the basin of the atrium, and garden beds, a fountain and trees in the peristyle."""
     builder.add_ground(atrium, "plaza", "parcel")
     middle = atrium.mean(axis=0)
     builder.add_ground(middle + (atrium - middle) * 0.5, "water", "thing")

@@ -1,4 +1,4 @@
-"""Public buildings of a Roman town: forum with temple and basilica, theatre, amphitheatre, baths, market."""
+"""Adds the public buildings of a Roman town: forum with temple and basilica, theatre, amphitheatre, baths, market."""
 
 from dataclasses import replace
 
@@ -14,13 +14,13 @@ PUBLIC, SACRED = "1130", "1080"
 
 
 def podium_part(outline: Points, height_m: float, facade_kind: str, cover: str) -> BuildingPart:
-    """A block with a level top, such as a podium."""
+    """Returns a block with a flat top, such as a podium."""
     part = replace(part_without_outline(height_m, 1, facade_kind, cover, roof_type="1000"), sides=("blank",) * len(outline))
     return replace(part, front=outline, back=offset(outline, 0.6), profile=((0.0, 0.0), (1.0, 0.0)), closed=True)
 
 
 def steps_part(a: Points, b: Points, depth_m: float, rise_m: float, count: int, facade_kind: str) -> BuildingPart:
-    """Stairs that rise from the line a–b inward."""
+    """Returns stairs that rise inward from the line a–b."""
     profile: list[tuple[float, float]] = [(0.0, rise_m / count)]
     for i in range(1, count):
         profile += [(i / count, rise_m * i / count), (i / count, rise_m * (i + 1) / count)]
@@ -30,7 +30,7 @@ def steps_part(a: Points, b: Points, depth_m: float, rise_m: float, count: int, 
 
 
 def add_temple(builder: PlanBuilder, middle: Points, along: Points, size: tuple[float, float]) -> None:
-    """A temple on a podium with stairs at its front (towards `along`) and columns all around."""
+    """Adds a temple on a podium, with stairs at its front (towards `along`) and columns around it."""
     length, width = size
     podium = rectangle(middle, along, length, width)
     right = podium[1], podium[2]
@@ -54,7 +54,7 @@ def add_temple(builder: PlanBuilder, middle: Points, along: Points, size: tuple[
 
 
 def add_forum(builder: PlanBuilder, outline: Points, along: Points, rng: np.random.Generator) -> None:
-    """A paved square between temple (west) and basilica (east), colonnades on the long sides, statues, the curia."""
+    """Adds a paved square between temple (west) and basilica (east), with colonnades on the long sides and statues."""
     builder.add_ground(outline, "plaza", "block")
     across, middle = left_normal(along), outline.mean(axis=0)
     length, width = float(np.hypot(*(outline[1] - outline[0]))), float(np.hypot(*(outline[3] - outline[0])))
@@ -75,7 +75,7 @@ def add_forum(builder: PlanBuilder, outline: Points, along: Points, rng: np.rand
 
 
 def _add_colonnade(builder: PlanBuilder, a: Points, b: Points) -> None:
-    """A hall open towards its left side: a back wall on the line a–b and columns under a pitched roof."""
+    """Adds a hall that is open to the left: a back wall on the line a–b, columns, and a pitched roof."""
     inward = left_normal(unit(b - a))
     wall = row_part(a, b, 0.6, ((0.0, 0.0), (1.0, 0.0)), part_without_outline(5.0, 1, "roman", "paving", roof_type="1000"), ("blank",) * 4)
     lid = replace(part_without_outline(5.4, 1, "temple", "roman", 0.4), lift_m=5.0)
@@ -85,7 +85,7 @@ def _add_colonnade(builder: PlanBuilder, a: Points, b: Points) -> None:
 
 
 def _add_basilica(builder: PlanBuilder, middle: Points, along: Points, length: float) -> None:
-    """A high nave with windows above lower aisles."""
+    """Adds a basilica: a high nave with windows above lower aisles."""
     nave = rectangle(middle, along, length - 6, 9.0)
     parts = [
         row_part(
@@ -107,7 +107,7 @@ def _add_basilica(builder: PlanBuilder, middle: Points, along: Points, length: f
 
 
 def seating_profile(depth_rows: int, fall_m: float) -> tuple[tuple[float, float], ...]:
-    """The profile of a cavea: a rim wall, then rows of seats falling towards the stage; heights relative to the rim."""
+    """Returns the profile of a cavea: a rim wall, then rows of seats down towards the stage; heights are relative to the rim."""
     profile: list[tuple[float, float]] = [(0.0, 0.0), (0.05, 0.0), (0.05, -1.0)]
     for i in range(depth_rows):
         t, h = 0.05 + 0.95 * (i + 1) / depth_rows, -1.0 - fall_m * (i + 1) / depth_rows
@@ -116,7 +116,7 @@ def seating_profile(depth_rows: int, fall_m: float) -> tuple[tuple[float, float]
 
 
 def add_theatre(builder: PlanBuilder, outline: Points, facing: Points, rng: np.random.Generator) -> None:
-    """A half round of seats with arcades outside, the orchestra, a stage building with columns."""
+    """Adds a theatre: a semicircle of seats with arcades outside, the orchestra, a stage building with columns."""
     builder.add_ground(outline, "sand", "block")
     middle = outline.mean(axis=0) + facing * 12.0
     start = np.arctan2(facing[1], facing[0]) + np.pi / 2
@@ -144,7 +144,7 @@ def add_theatre(builder: PlanBuilder, outline: Points, facing: Points, rng: np.r
 
 
 def add_amphitheatre(builder: PlanBuilder, middle: Points, rng: np.random.Generator) -> None:
-    """An oval of seats around a sandy arena, outside the wall."""
+    """Adds an oval of seats around an arena."""
     angle = np.linspace(0, 2 * np.pi, 36, endpoint=False)
     oval = middle + np.stack([46 * np.cos(angle), 37 * np.sin(angle)], axis=1)
     builder.add_ground(middle + (oval - middle) * 1.2, "sand", "block")
@@ -155,15 +155,15 @@ def add_amphitheatre(builder: PlanBuilder, middle: Points, rng: np.random.Genera
 
 
 def add_baths(builder: PlanBuilder, outline: Points, along: Points, rng: np.random.Generator) -> None:
-    """Vaulted halls, a domed hot bath and an exercise court with a pool."""
+    """Adds baths: vaulted halls, a domed hot bath, and an exercise court with a pool."""
     builder.add_ground(outline, "plaza", "block")
     across, middle = left_normal(along), outline.mean(axis=0)
     width = float(np.hypot(*(outline[1] - outline[0])))
     parts = []
     for k, (shift, depth) in enumerate(((6.0, 10.0), (17.0, 11.0))):
         hall = rectangle(middle + across * shift, along, width - 12, depth)
-        facade_kind = part_without_outline(7.0 + k, 2, "baths", "paving", 0.0, roof_type="1120")
-        parts.append(row_part(hall[0], hall[1], depth, vault_profile(depth * 0.36), facade_kind, ("street", "street", "street", "street")))
+        hall_part = part_without_outline(7.0 + k, 2, "baths", "paving", 0.0, roof_type="1120")
+        parts.append(row_part(hall[0], hall[1], depth, vault_profile(depth * 0.36), hall_part, ("street", "street", "street", "street")))
     hot = circle(middle + across * 17 + along * 3, 6.6, 16)
     parts.append(spire_part(hot, dome_profile(6.0), replace(part_without_outline(10.5, 3, "baths", "paving", 0.0), sides=("street",) * 16)))
     _lay_courts = rectangle(middle - across * 15, along, width - 8, 26.0)
@@ -176,7 +176,7 @@ def add_baths(builder: PlanBuilder, outline: Points, along: Points, rng: np.rand
 
 
 def add_macellum(builder: PlanBuilder, outline: Points, along: Points, rng: np.random.Generator) -> None:
-    """The market: shops around a court with a round hall in its middle."""
+    """Adds a market: shops around a court with a round hall in its centre."""
     builder.add_ground(outline, "plaza", "block")
     ground = offset(outline, 3.0)
     _add_shops = ring_part(ground, 6.5, gable_profile(6.5, 22), part_without_outline(5.2, 1, "roman", "roman", 0.35))

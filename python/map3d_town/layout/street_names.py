@@ -1,4 +1,4 @@
-"""Names of streets and towns."""
+"""Names of streets."""
 
 from map3d_town.seeds import rng
 
@@ -12,6 +12,6 @@ VIAE = ("Via Appia", "Via Flaminia", "Via Aurelia", "Via Cassia", "Via Latina", 
 
 
 def street_name(seed: int, number: int) -> str:
-    """The name of the street with that number; the same each time."""
+    """Returns the name of a street; equal arguments give equal names."""
     source = rng(seed, "street", number)
     return FIRST[int(source.integers(len(FIRST)))] + LAST[int(source.choice(len(LAST), p=[0.42, 0.22, 0.2, 0.04, 0.06, 0.06]))]

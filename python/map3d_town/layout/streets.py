@@ -1,4 +1,4 @@
-"""What lies between the blocks: carriageways with their marks, alley trees, the river, fields around the town."""
+"""Adds the ground between the blocks: streets with road markings, rows of trees, the river, fields around the town."""
 
 import itertools
 
@@ -14,10 +14,10 @@ Rings = list[tuple[float, float, str]]
 
 
 def lay_streets(builder: PlanBuilder, frame: LayoutFrame, rings: Rings, reach_m: float, plaza_m: float) -> None:
-    """The town's ground is street wherever nothing else lies; main roads run on to the edge of the map."""
+    """Covers the town with street surface under all other patches; continues main roads to the edge of the map."""
     old = max((outer for _, outer, kind in rings if kind == "old"), default=plaza_m)
-    builder.add_ground(frame.bend(circle(np.zeros(2), reach_m - 1.0, 96)), "asphalt", "town")
-    builder.add_ground(frame.bend(circle(np.zeros(2), old - 1.5, 72)), "cobble", "town")
+    builder.add_ground(frame.warp(circle(np.zeros(2), reach_m - 1.0, 96)), "asphalt", "town")
+    builder.add_ground(frame.warp(circle(np.zeros(2), old - 1.5, 72)), "cobble", "town")
     for angle in frame.roads:
         _lay_main_road(builder, frame, angle, old, reach_m, rings)
     for inner, _, kind in rings:
@@ -28,17 +28,17 @@ def lay_streets(builder: PlanBuilder, frame: LayoutFrame, rings: Rings, reach_m:
 def _lay_main_road(builder: PlanBuilder, frame: LayoutFrame, angle: float, old: float, reach_m: float, rings: Rings) -> None:
     direction = np.array([np.cos(angle), np.sin(angle)])
     start = _lay_dam(builder, frame, direction, old)
-    line = frame.bend(np.arange(start, reach_m * 1.6 + 240, 8.0)[:, None] * direction)
+    line = frame.warp(np.arange(start, reach_m * 1.6 + 240, 8.0)[:, None] * direction)
     for quad in band(line, 9.0):
         builder.add_ground(quad, "asphalt", "bridge")
-    for number, quad in enumerate(band(frame.bend(np.arange(start + 3, reach_m * 1.6 + 240, 3.0)[:, None] * direction), 0.16)):
+    for number, quad in enumerate(band(frame.warp(np.arange(start + 3, reach_m * 1.6 + 240, 3.0)[:, None] * direction), 0.16)):
         if number % 3 == 0:
             builder.add_ground(quad, "mark", "mark")
     source = rng(frame.seed, "alley", int(angle * 1000))
     for distance in np.arange(old + 12, reach_m - 4, 10.5):
         if any(abs(distance - inner) < 11 for inner, _, _ in rings) or is_near_river(frame, direction * distance):
             continue
-        here, ahead = frame.bend(np.array([direction * distance, direction * (distance + 1)]))
+        here, ahead = frame.warp(np.array([direction * distance, direction * (distance + 1)]))
         across = unit(ahead - here)[::-1] * np.array([-1.0, 1.0])
         for side in (-1, 1):
             builder.add_tree(here + across * (5.8 * side), "linden", 8.5, source)
@@ -48,33 +48,33 @@ def _lay_main_road(builder: PlanBuilder, frame: LayoutFrame, angle: float, old: 
 
 
 def _lay_dam(builder: PlanBuilder, frame: LayoutFrame, direction: Points, old: float) -> float:
-    """Masonry where a main road crosses the river; returns where its carriageway starts: at the old town, or before the river."""
+    """Adds the dam where a main road crosses the river. Returns the distance at which the carriageway starts: at the old town or before the river."""
     crossing = _crossing_m(frame, direction)
     if crossing is None:
         return old
     reach = (frame.river_half_m + 8.0) / abs(direction[1])
-    for quad in band(frame.bend(np.linspace(crossing - reach, crossing + reach, 9)[:, None] * direction), 2 * DAM_HALF_M):
+    for quad in band(frame.warp(np.linspace(crossing - reach, crossing + reach, 9)[:, None] * direction), 2 * DAM_HALF_M):
         builder.add_ground(quad, "concrete", "bridge")
     return float(min(old, crossing - reach))
 
 
 def _crossing_m(frame: LayoutFrame, direction: Points) -> float | None:
-    """How far from the middle a main road crosses the river, if it does."""
+    """Returns the distance from the centre at which a main road crosses the river, or None."""
     if direction[1] * frame.river_y <= 0 or abs(direction[1]) < 0.2:
         return None
     return float(frame.river_y / direction[1])
 
 
 def is_near_river(frame: LayoutFrame, plain: Points) -> bool:
-    """Whether a point in plain coordinates lies in the river or on its banks."""
+    """Returns whether a point in layout coordinates is in the river or on its banks."""
     return bool(abs(plain[1] - frame.river_y) < frame.river_half_m + 7)
 
 
 def _lay_zebra_crossing(builder: PlanBuilder, frame: LayoutFrame, direction: Points, distance: float) -> None:
-    """Stripes across a main road."""
+    """Adds a zebra crossing across a main road."""
     if is_near_river(frame, direction * distance):
         return
-    here, ahead = frame.bend(np.array([direction * distance, direction * (distance + 1)]))
+    here, ahead = frame.warp(np.array([direction * distance, direction * (distance + 1)]))
     along = unit(ahead - here)
     across = np.array([-along[1], along[0]])
     for offset in np.arange(-4.0, 4.1, 1.0):
@@ -85,7 +85,7 @@ def _mark_ring_street(builder: PlanBuilder, frame: LayoutFrame, radius: float) -
     count = int(2 * np.pi * radius / 3.0)
     angles = np.linspace(0, 2 * np.pi, count)
     roads = np.array(frame.roads)
-    line = frame.bend(radius * np.stack([np.cos(angles), np.sin(angles)], axis=1))
+    line = frame.warp(radius * np.stack([np.cos(angles), np.sin(angles)], axis=1))
     gaps = np.abs((angles[:, None] - roads + np.pi) % (2 * np.pi) - np.pi).min(axis=1) * radius
     for number, quad in list(enumerate(band(line, 0.14)))[::3]:
         wet = is_near_river(frame, radius * np.array([np.cos(angles[number]), np.sin(angles[number])]))
@@ -94,13 +94,13 @@ def _mark_ring_street(builder: PlanBuilder, frame: LayoutFrame, radius: float) -
 
 
 def river_line(frame: LayoutFrame, reach_m: float) -> Points:
-    """The river's middle from west to east, far beyond the map, in town coordinates."""
+    """Returns the river's centre line from west to east, far beyond the map, in town coordinates."""
     x = np.arange(-(reach_m * 2 + 600), reach_m * 2 + 601, 12.0)
-    return frame.bend(np.stack([x, np.full(len(x), frame.river_y)], axis=1))
+    return frame.warp(np.stack([x, np.full(len(x), frame.river_y)], axis=1))
 
 
 def river_crossings(frame: LayoutFrame) -> tuple[tuple[float, float, float, float], ...]:
-    """Where main roads cross the river: (x, y) and the road's direction, in town coordinates."""
+    """Returns (x, y, unit x, unit y) in town coordinates for each main road that crosses the river: the crossing and the road's direction."""
     found = []
     for angle in frame.roads:
         direction = np.array([np.cos(angle), np.sin(angle)])
@@ -108,7 +108,7 @@ def river_crossings(frame: LayoutFrame) -> tuple[tuple[float, float, float, floa
         if crossing is None:
             continue
         plain = direction * crossing
-        here, ahead = frame.bend(np.array([plain, plain + direction]))
+        here, ahead = frame.warp(np.array([plain, plain + direction]))
         along = unit(ahead - here)
         found.append((float(here[0]), float(here[1]), float(along[0]), float(along[1])))
     return tuple(found)
@@ -132,14 +132,14 @@ def lay_river(builder: PlanBuilder, frame: LayoutFrame, reach_m: float) -> None:
 def _is_far_from_roads(frame: LayoutFrame, point: Points, least_m: float) -> bool:
     for angle in frame.roads:
         direction = np.array([np.cos(angle), np.sin(angle)])
-        line = frame.bend(np.arange(0, 3000, 10.0)[:, None] * direction)
+        line = frame.warp(np.arange(0, 3000, 10.0)[:, None] * direction)
         if np.hypot(*(line - point).T).min() < least_m:
             return False
     return True
 
 
 def lay_fields(builder: PlanBuilder, frame: LayoutFrame, reach_m: float) -> None:
-    """Fields in strips around the town, meadows, groves; they lie below everything else."""
+    """Adds strips of fields, meadows and groves below all other patches."""
     source = rng(frame.seed, "fields")
     radius, size = builder.plan.radius_m, 110.0
     for x in np.arange(-radius, radius, size):
@@ -150,14 +150,14 @@ def lay_fields(builder: PlanBuilder, frame: LayoutFrame, reach_m: float) -> None
             for a, b in itertools.pairwise(edges):
                 strip = corner[0] + (corner - corner[0]) * [1.0, 0.0] + np.array([[0, a], [0, a], [0, b], [0, b]]) * size
                 material = ("meadow", "field_green", "field_gold", "field_brown", "meadow")[int(source.integers(5))]
-                builder.add_ground(frame.bend(strip), material, "field")
+                builder.add_ground(frame.warp(strip), material, "field")
             _plant_grove(builder, frame, corner.mean(axis=0), reach_m, radius, source)
 
 
 def _plant_grove(builder: PlanBuilder, frame: LayoutFrame, middle: Points, reach_m: float, radius: float, source: np.random.Generator) -> None:
     if np.hypot(*middle) < reach_m + 60 or source.random() > 0.3:
         return
-    centre = frame.bend(middle)[0]
+    centre = frame.warp(middle)[0]
     if (
         not _is_far_from_roads(frame, centre, 45)
         or is_near_river(frame, middle - np.array([0, 30]))

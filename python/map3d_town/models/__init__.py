@@ -1,1 +1,1 @@
-"""3D models of planned buildings and trees."""
+"""Builds 3D models of planned buildings and trees."""

@@ -1,4 +1,4 @@
-"""What sits on a shell: dormers, chimneys, columns, balconies, battlements."""
+"""Adds building installations to a shell: dormers, chimneys, columns, balconies, battlements."""
 
 import numpy as np
 
@@ -23,7 +23,7 @@ Installation = tuple[str, list[BoundarySurface]]
 
 
 class RoofSlope:
-    """One roof slope seen along its eave: `at(s, y, z)` = s metres along, y metres inward, z above the slope's foot."""
+    """A roof slope seen along its eave: `at(s, y, z)` is s metres along, y metres inward, z metres above the slope's foot."""
 
     def __init__(self, part_grid: PartGrid, k: int, from_back: bool) -> None:
         i, j = (part_grid.last, part_grid.last - 1) if from_back else (0, 1)
@@ -52,7 +52,7 @@ def add_installations(
     ground_z: float,
     rng: np.random.Generator,
 ) -> None:
-    """Adds to a body what its part and look ask for."""
+    """Adds the installations for a part's facade and roof; with part 0 also the planned ones."""
     part_grid = PartGrid(part, body.base_z, ground_z)
     if part.facade_kind in ("house", "timber", "gruender", "villa", "townhall", "row") and part.cover in ("tiles", "dark", "slate"):
         for slope in slopes(part_grid):
@@ -67,7 +67,7 @@ def add_installations(
 
 
 def slopes(part_grid: PartGrid) -> list[RoofSlope]:
-    """The slopes above the eaves that are long enough to carry something."""
+    """Returns the roof slopes that are large enough for dormers and chimneys."""
     part = part_grid.part
     if part.half_hip_m or (len(part.profile) < 3 and not part_grid.narrows_to_nothing):
         return []
@@ -78,7 +78,7 @@ def slopes(part_grid: PartGrid) -> list[RoofSlope]:
 
 
 def dormers(slope: RoofSlope, design: TexturedFacadeDesign, rng: np.random.Generator) -> list[Installation]:
-    """Dormers in a row, or none: gabled ones on old houses, flat ones elsewhere."""
+    """Returns a row of gabled or flat dormers, or none."""
     chance = 0.65 if design.facade_kind in ("house", "timber", "gruender", "townhall") else 0.3
     if rng.random() > chance:
         return []
@@ -95,7 +95,7 @@ def dormers(slope: RoofSlope, design: TexturedFacadeDesign, rng: np.random.Gener
 
 
 def dormer_front(loop: list[Points], design: TexturedFacadeDesign, width: float, height: float) -> BoundarySurface:
-    """The front of a dormer: a wall with one window."""
+    """Returns the front of a dormer: a wall with one window."""
     front = make_wall(loop, "blank", 0.0, design)
     material = front.faces[0].material
     if isinstance(material, AtlasTexture):
@@ -106,7 +106,7 @@ def dormer_front(loop: list[Points], design: TexturedFacadeDesign, width: float,
 
 
 def flat_dormer(slope: RoofSlope, s: float, y: float, width: float, height: float, design: TexturedFacadeDesign) -> list[BoundarySurface]:
-    """Front, two cheeks and a roof that falls a little towards the front."""
+    """Returns front, two cheeks and a roof with a slight slope to the front."""
     foot = slope.slope * y
     back = y + height / (slope.slope - 0.12)
     low = [slope.at(s, y, foot), slope.at(s + width, y, foot)]
@@ -122,7 +122,7 @@ def flat_dormer(slope: RoofSlope, s: float, y: float, width: float, height: floa
 
 
 def gabled_dormer(slope: RoofSlope, s: float, y: float, width: float, height: float, design: TexturedFacadeDesign) -> list[BoundarySurface]:
-    """Front with a gable, two cheeks, two small roof slopes."""
+    """Returns a gabled front, two cheeks and two small roof slopes."""
     foot, peak = slope.slope * y, 0.75
     mid, back, ridge = s + width / 2, y + height / slope.slope, y + (height + peak) / slope.slope
     low = [slope.at(s, y, foot), slope.at(s + width, y, foot)]
@@ -140,7 +140,7 @@ def gabled_dormer(slope: RoofSlope, s: float, y: float, width: float, height: fl
 
 
 def chimneys(part_grid: PartGrid, rng: np.random.Generator) -> list[Installation]:
-    """One or two chimneys of brick beside the ridge."""
+    """Returns one or two brick chimneys near the ridge."""
     candidates = slopes(part_grid)
     if not candidates:
         return []
@@ -174,7 +174,7 @@ def box(
 
 
 def balconies(part_grid: PartGrid, part: BuildingPart, design: TexturedFacadeDesign) -> list[Installation]:
-    """A stack of balconies on the southern long side of a slab."""
+    """Returns stacks of balconies on the front of a slab."""
     origin, end = part_grid.at(0, 0), part_grid.at(1, 0)
     length = float(np.hypot(*(end - origin)[:2]))
     along = (end - origin) / length
@@ -192,7 +192,7 @@ def balconies(part_grid: PartGrid, part: BuildingPart, design: TexturedFacadeDes
 
 
 def make_planned(building: BuildingPlan, ground_z: float) -> list[Installation]:
-    """What the plan puts in certain places: columns (x, y, radius, low, high) and blocks (x, y, half, low, high)."""
+    """Returns the columns and blocks that the plan defines."""
     fittings: list[Installation] = []
     for kind, (x, y, size, low, high) in building.installations:
         corners = 10 if kind == "column" else 4

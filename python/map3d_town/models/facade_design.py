@@ -1,4 +1,4 @@
-"""The design of facades: which floors, windows, doors and shops a wall has, before anything is painted."""
+"""Designs facades: floors, windows, doors, shops, colours and materials of a building."""
 
 import itertools
 
@@ -24,7 +24,7 @@ ROMAN_WALLS: tuple[Color, ...] = ((226, 206, 172), (196, 92, 62), (214, 160, 88)
 
 
 class TexturedFacadeDesign:
-    """The looks of one building, drawn once from its generator: colours, kind of facade, roof cover."""
+    """The textured design of one building: random colours, traits and roof colour."""
 
     def __init__(self, facade_kind: str, cover: str, storeys: int, eave_m: float, rng: np.random.Generator, deep: bool) -> None:
         self.facade_kind, self.storeys, self.rng, self.deep_openings = facade_kind, storeys, rng, deep
@@ -58,14 +58,14 @@ class TexturedFacadeDesign:
         return AtlasTexture("facade", width_m, height, self.colors, openings, tuple(floors), frozenset(traits))
 
     def floors(self, foot_m: float, height_m: float) -> list[float]:
-        """The heights of the floors above the wall's foot, the ground floor first."""
+        """Returns the heights of the floors above the wall's foot, the ground floor first."""
         out = [foot_m]
         while out[-1] + self.floor_m * 1.15 < height_m and len(out) < 40:
             out.append(out[-1] + self.floor_m * (1.15 if len(out) == 1 else 1.0))
         return out
 
     def openings(self, side: str, width_m: float, outline: Outline, foot_m: float, floors: list[float]) -> tuple[Opening, ...]:
-        """Windows in bays on every floor as far as the outline leaves room; doors and shops on the ground floor."""
+        """Returns the openings that fit the outline: windows in bays on every floor, doors and shops on the ground floor."""
         bays = max(1, int((width_m - 0.5) / self.bay_m))
         shop = side == "shop" or (side == "street" and self.facade_kind in ("house", "gruender") and self.rng.random() < 0.45)
         door = int(self.rng.integers(bays)) if side in ("street", "shop") or self.doors == 0 else -1
@@ -120,7 +120,7 @@ WINDOWS = {
 
 
 def opening_fits(opening: Opening, outline: Outline, width_m: float) -> bool:
-    """Whether the opening lies inside the wall with a margin of 0.25 m at its sides and below its upper edge."""
+    """Returns whether the opening is inside the wall, 0.2 m from its sides and 0.25 m below its upper edge."""
     a, b = opening.left_m, opening.left_m + opening.width_m
     if a < 0.2 or b > width_m - 0.2 or opening.low_m <= 0.05:
         return False
@@ -129,7 +129,7 @@ def opening_fits(opening: Opening, outline: Outline, width_m: float) -> bool:
 
 
 def outline_height(outline: Outline, s: float) -> float:
-    """The height of an outline that runs from left to right, linear between its points, level beyond them."""
+    """Interpolates the height of an outline at `s`; constant beyond its ends."""
     for (a, low), (b, high) in itertools.pairwise(outline):
         if s < b:
             return low if s <= a else low + (high - low) * (s - a) / (b - a)
@@ -137,7 +137,7 @@ def outline_height(outline: Outline, s: float) -> float:
 
 
 def choose_facade_style(facade_kind: str, rng: np.random.Generator) -> tuple[frozenset[str], tuple[Color, ...]]:
-    """The traits of a facade, and its colours: wall, trim, window frame, shutters or accent, ground floor."""
+    """Chooses the traits of a facade and its colours: wall, trim, window frame, shutters or accent, ground floor."""
     traits: set[str] = set()
     wall = vary_color(PLASTERS[rng.integers(len(PLASTERS))], rng)
     trim = TRIMS[rng.integers(len(TRIMS))]
@@ -159,7 +159,7 @@ def choose_facade_style(facade_kind: str, rng: np.random.Generator) -> tuple[fro
 
 
 def apply_special_style(facade_kind: str, wall: Color, rng: np.random.Generator) -> tuple[set[str], Color]:
-    """What public, industrial and Roman buildings have instead."""
+    """Returns extra traits and the wall colour; public, industrial and Roman buildings have their own."""
     if facade_kind == "slab":
         return {"panel"}, vary_color([(224, 222, 214), (206, 196, 180), (190, 200, 204)][rng.integers(3)], rng)
     if facade_kind == "industrial":
@@ -176,14 +176,14 @@ def apply_special_style(facade_kind: str, wall: Color, rng: np.random.Generator)
 
 
 def vary_color(color: Color, rng: np.random.Generator, sample_evenly: float = 7.0) -> Color:
-    """The colour, a little brighter or darker and warmer or colder."""
+    """Varies the brightness and hue of a colour slightly."""
     shift = rng.normal(0, sample_evenly) + rng.normal(0, sample_evenly / 3, 3)
     r, g, b = (int(np.clip(c + d, 8, 250)) for c, d in zip(color, shift, strict=True))
     return r, g, b
 
 
 def choose_roof_color(cover: str, rng: np.random.Generator) -> Color:
-    """A colour for a roof cover: tiles, dark, slate, metal, copper, flat or paving."""
+    """Chooses the colour of a roof cover."""
     if cover == "tiles":
         return vary_color(TILES[rng.integers(len(TILES))], rng)
     if cover == "dark":
@@ -196,7 +196,7 @@ def choose_roof_color(cover: str, rng: np.random.Generator) -> Color:
 
 
 class UntexturedFacadeDesign:
-    """Looks without textures, for sheds and garages."""
+    """The untextured design of sheds and garages."""
 
     deep_openings = False
 

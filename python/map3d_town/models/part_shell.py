@@ -1,4 +1,4 @@
-"""The closed shell of a part: walls, roof and ground polygons whose edges all meet, and the eaves beyond it."""
+"""Builds the shell of a building part, closed walls, roof and ground surface, and the eaves outside it."""
 
 import math
 from typing import Protocol
@@ -27,30 +27,30 @@ EAVES_THICK_M = 0.16
 VERGE_M = 0.28
 REVEAL_M = 0.16
 MARGIN_M = 0.1
-AWAY = np.array([(0.0, -0.06), (0.06, 0.0), (0.0, 0.06), (-0.06, 0.0)])
+REVEAL_ST = np.array([(0.0, -0.06), (0.06, 0.0), (0.0, 0.06), (-0.06, 0.0)])
 NEXT = [1, 2, 3, 0]
 
 
 class FacadeDesign(Protocol):
-    """What a shell asks for the looks of its surfaces."""
+    """Chooses the materials of the surfaces of a shell."""
 
     deep_openings: bool
 
     def wall(self, side: str, width_m: float, outline: Outline, foot_m: float) -> AtlasTexture | RepeatingTexture | PlainMaterial:
-        """The paint of a wall whose upper edge is `outline` [(s, z)], `foot_m` the height of the ground above its foot."""
+        """Returns the material of a wall with the upper edge `outline` [(s, z)]; `foot_m`: height of the ground above the wall's foot."""
 
     def roof(self, width_m: float, height_m: float, slope: float) -> AtlasTexture | RepeatingTexture | PlainMaterial:
-        """The paint of a roof polygon; slope = rise over run."""
+        """Returns the material of a roof face; slope = rise over run."""
 
     def eaves(self) -> PlainMaterial:
-        """The material below and at the edge of the eaves."""
+        """Returns the material of underside and edge of the eaves."""
 
     def opening(self, opening: Opening) -> AtlasTexture | None:
         """None: an opening shows the wall's own paint."""
 
 
 class PartGrid:
-    """The points of a part: `at(k, i)` is where profile point i crosses side line k; `foot(k, back)` the wall's foot."""
+    """The grid of points of a part: `at(k, i)` is profile point i on side line k, `foot(k, i)` the wall's foot below it."""
 
     def __init__(self, part: BuildingPart, base_z: float, ground_z: float) -> None:
         self.part, self.base_z, self.eave_z = part, base_z, ground_z + part.eave_m
@@ -81,7 +81,7 @@ class PartGrid:
 
 
 def snap_points(points: Points) -> Points:
-    """The points, each one that is nearer than 5 mm to an earlier one moved onto it."""
+    """Moves each point within 5 mm of an earlier one onto that one."""
     out = points.copy()
     for k in range(1, len(out)):
         near = np.flatnonzero(np.abs(out[:k] - out[k]).max(axis=1) < 5e-3)
@@ -91,7 +91,7 @@ def snap_points(points: Points) -> Points:
 
 
 def strip_depth(front: Points, back: Points, closed: bool) -> float:
-    """The distance of the back line from the front line of the longest strip."""
+    """Returns the distance between front and back of the longest strip."""
     ahead = np.roll(front, -1, axis=0) if closed else front[1:]
     edges = ahead - front[: len(ahead)]
     k = int(np.argmax(np.hypot(edges[:, 0], edges[:, 1])))
@@ -101,7 +101,7 @@ def strip_depth(front: Points, back: Points, closed: bool) -> float:
 
 
 def build_shell(part: BuildingPart, base_z: float, ground_z: float, design: FacadeDesign) -> PartGeometry:
-    """The body of a part that stands on `base_z`, with the storeys counted from `ground_z`."""
+    """Returns the geometry of a part with its base at `base_z` and its storeys counted from `ground_z`."""
     part_grid = PartGrid(part, base_z, ground_z)
     body = PartGeometry(shell=[], base_z=base_z, top_z=float(part_grid.points[:, :, 2].max()))
     body.shell += _make_long_walls(part_grid, ground_z, design)
@@ -117,7 +117,7 @@ def build_shell(part: BuildingPart, base_z: float, ground_z: float, design: Faca
 
 
 def make_wall(loop: list[Points], side: str, foot_m: float, design: FacadeDesign) -> BoundarySurface:
-    """A wall with the corners `loop`, which begins with the two feet, left and right, seen from outside."""
+    """Returns a wall with the corners `loop`, which starts with the left and right foot, seen from outside."""
     ring = np.array(loop)
     origin, along = ring[0], ring[1] - ring[0]
     width = float(np.hypot(along[0], along[1]))
@@ -134,7 +134,7 @@ def make_wall(loop: list[Points], side: str, foot_m: float, design: FacadeDesign
 
 
 def _cut_opening(surface: BoundarySurface, opening: Opening, origin: Points, along: Points, design: FacadeDesign) -> None:
-    """Cuts the opening out of the wall, sets its leaf back and closes the gap with four reveals."""
+    """Cuts the opening out of the wall, recesses its face and adds four reveals."""
     wall = surface.faces[0]
     a, b = opening.left_m, opening.left_m + opening.width_m
     low, high = opening.low_m, opening.low_m + opening.height_m
@@ -146,7 +146,7 @@ def _cut_opening(surface: BoundarySurface, opening: Opening, origin: Points, alo
     wall.st.append(st[::-1])
     kind = "Door" if opening.kind in ("door", "gate", "shop_door") else "Window"
     surface.openings.append(BoundarySurface(kind, [TexturedFace([inner], [st], wall.material)]))
-    grid, strips = np.concatenate([outer, inner]), np.concatenate([st, st + AWAY, st[NEXT] + AWAY])
+    grid, strips = np.concatenate([outer, inner]), np.concatenate([st, st + REVEAL_ST, st[NEXT] + REVEAL_ST])
     surface.faces += [TexturedFace([grid[[i, j, j + 4, i + 4]]], [strips[[i, j, i + 8, i + 4]]], wall.material) for i, j in enumerate(NEXT)]
 
 
@@ -156,18 +156,18 @@ def _make_long_walls(part_grid: PartGrid, ground_z: float, design: FacadeDesign)
     walls = []
     for k in range(part_grid.strips):
         loop = [part_grid.foot(k, 0), part_grid.foot(k + 1, 0), part_grid.at(k + 1, 0), part_grid.at(k, 0)]
-        walls.append(make_wall(loop, adjacency_of(part, k), foot_m, design))
+        walls.append(make_wall(loop, side_of_wall(part, k), foot_m, design))
     if part.closed and not part.hollow:
         return walls
     for k in range(part_grid.strips):
         loop = [part_grid.foot(k + 1, m), part_grid.foot(k, m), part_grid.at(k, m), part_grid.at(k + 1, m)]
         if np.hypot(*(loop[0] - loop[1])[:2]) > 1e-3:
-            walls.append(make_wall(loop, adjacency_of(part, part_grid.strips + k), foot_m, design))
+            walls.append(make_wall(loop, side_of_wall(part, part_grid.strips + k), foot_m, design))
     return walls
 
 
-def adjacency_of(part: BuildingPart, index: int) -> str:
-    """What stands at the wall of that number, in the order that `Part.sides` documents; "street" when unsaid."""
+def side_of_wall(part: BuildingPart, index: int) -> str:
+    """Returns the side of wall number `index` in the order of `BuildingPart.sides`; the default is "street"."""
     return part.sides[index] if index < len(part.sides) else "street"
 
 
@@ -176,13 +176,13 @@ def _make_end_walls(part_grid: PartGrid, ground_z: float, design: FacadeDesign) 
     foot_m = ground_z - part_grid.base_z
     last, first = _end_outline(part_grid, n), _end_outline(part_grid, 0)
     return [
-        make_wall([part_grid.foot(0, m), part_grid.foot(0, 0), *first], adjacency_of(part, 2 * n), foot_m, design),
-        make_wall([part_grid.foot(n, 0), part_grid.foot(n, m), *last[::-1]], adjacency_of(part, 2 * n + 1), foot_m, design),
+        make_wall([part_grid.foot(0, m), part_grid.foot(0, 0), *first], side_of_wall(part, 2 * n), foot_m, design),
+        make_wall([part_grid.foot(n, 0), part_grid.foot(n, m), *last[::-1]], side_of_wall(part, 2 * n + 1), foot_m, design),
     ]
 
 
 def _end_outline(part_grid: PartGrid, k: int) -> list[Points]:
-    """The points along the top of the end wall at side line k, front to back."""
+    """Returns the points along the top of the end wall at side line k, front to back."""
     if not part_grid.part.half_hip_m:
         return [part_grid.at(k, i) for i in range(part_grid.last + 1)]
     front_cut, back_cut, _ = _half_hip_points(part_grid, k)
@@ -190,7 +190,7 @@ def _end_outline(part_grid: PartGrid, k: int) -> list[Points]:
 
 
 def _half_hip_points(part_grid: PartGrid, k: int) -> tuple[Points, Points, Points]:
-    """Where the half hip begins at the front and the back of end k, and where it meets the ridge."""
+    """Returns the points where the half hip at end k starts at the front and at the back, and where it joins the ridge."""
     rise = part_grid.part.profile[1][1]
     low = 1 - part_grid.part.half_hip_m / rise
     eave, ridge, far = part_grid.at(k, 0), part_grid.at(k, 1), part_grid.at(k, 2)
@@ -225,7 +225,7 @@ def _make_roof_strips(part_grid: PartGrid, design: FacadeDesign) -> list[Boundar
 
 
 def make_roof(loop: list[Points], design: FacadeDesign) -> BoundarySurface:
-    """A roof polygon; the metres of its paint run along its first edge (the eave) and up the slope. Upright: a wall."""
+    """Returns a roof surface, textured along its first edge (the eave) and up the slope. A vertical one becomes a wall."""
     ring = drop_repeated_points(loop)
     if len(ring) < 3:
         return BoundarySurface(ROOF, [])
@@ -241,7 +241,7 @@ def make_roof(loop: list[Points], design: FacadeDesign) -> BoundarySurface:
 
 
 def _texture_axes(ring: Points, normal: Vector) -> tuple[Vector, Vector]:
-    """The directions of a roof's paint: along its first edge, or the longest when that is short, kept level; and up the slope."""
+    """Returns the texture axes of a roof: level along its first edge, or its longest if that is short; and up the slope."""
     edges = [tuple(step) for step in (np.concatenate([ring[1:], ring[:1]]) - ring).tolist()]
     x, y, z = edges[0] if math.hypot(*edges[0][:2]) > 0.3 else _longest_edge(edges)
     length = math.sqrt(x * x + y * y + z * z)
@@ -254,19 +254,19 @@ def _texture_axes(ring: Points, normal: Vector) -> tuple[Vector, Vector]:
 
 
 def _longest_edge(edges: list[Vector]) -> Vector:
-    """The longest edge as seen from above."""
+    """Returns the edge that is longest seen from above."""
     return max(edges, key=lambda edge: math.hypot(edge[0], edge[1]))
 
 
 def drop_repeated_points(loop: list[Points]) -> Points:
-    """The ring without points that repeat their predecessor."""
+    """Drops points that repeat their predecessor."""
     ring = np.array(loop).reshape(-1, 3)
     moved = np.abs(ring - np.concatenate([ring[-1:], ring[:-1]])).max(axis=1) > 1e-3
     return ring if moved.all() else ring[moved]
 
 
 def unit_normal(ring: Points) -> Vector:
-    """The unit normal of a flat ring."""
+    """Returns the unit normal of a flat ring, after Newell."""
     nx = ny = nz = 0.0
     rows = ring.tolist()
     for (ax, ay, az), (bx, by, bz) in zip(rows, rows[1:] + rows[:1], strict=True):
@@ -292,7 +292,7 @@ def _make_ground(part_grid: PartGrid) -> BoundarySurface:
 
 
 def _make_eaves(part_grid: PartGrid, design: FacadeDesign) -> list[BoundarySurface]:
-    """The roof beyond the walls: a slab on every free side."""
+    """Returns the eaves: a slab along each side without neighbour."""
     grid, k0, i0 = _extend_grid(part_grid)
     k1, i1 = k0 + part_grid.strips, i0 + part_grid.last
     inside = {(k, i) for k in range(k0, k1) for i in range(i0, i1)}
@@ -320,12 +320,12 @@ def _make_eaves(part_grid: PartGrid, design: FacadeDesign) -> list[BoundarySurfa
 
 
 def make_untextured(kind: str, ring: Points, material: PlainMaterial) -> BoundarySurface:
-    """A surface without texture."""
+    """Returns an untextured surface of one face."""
     return BoundarySurface(kind, [TexturedFace([ring], [np.zeros((len(ring), 2))], material)])
 
 
 def _extend_grid(part_grid: PartGrid) -> tuple[Points, int, int]:
-    """The grid of profile points with the eaves and verges added, and where the old grid begins in it."""
+    """Returns the grid of points extended by eaves and verges, and the position (k, i) of the original grid in it."""
     part, grid = part_grid.part, part_grid.points
     reach = part.overhang_m / (part_grid.depth_m * max(part.profile[1][0] - part.profile[0][0], 1e-6))
     columns, i0, k0 = [grid], 0, 0
@@ -339,7 +339,7 @@ def _extend_grid(part_grid: PartGrid) -> tuple[Points, int, int]:
     grown = np.concatenate(columns, axis=1)
     if not part.closed:
         n = part_grid.strips
-        before, after = (adjacency_of(part, 2 * n + e) != "party" for e in (0, 1))
+        before, after = (side_of_wall(part, 2 * n + e) != "party" for e in (0, 1))
         first, last = (_unit_along(grown, a, b) for a, b in ((1, 0), (-2, -1)))
         if before:
             grown, k0 = np.concatenate([grown[:1] + first * VERGE_M, grown]), 1
@@ -349,7 +349,7 @@ def _extend_grid(part_grid: PartGrid) -> tuple[Points, int, int]:
 
 
 def _unit_along(grid: Points, a: int, b: int) -> Points:
-    """The level direction from side line a to side line b at their front."""
+    """Returns the horizontal unit vector from side line a to side line b at their front."""
     step = grid[b, 0] - grid[a, 0]
     step[2] = 0
     return np.asarray(step / np.linalg.norm(step))

@@ -15,10 +15,9 @@ SPECIES: dict[str, tuple[float, float, Color, str]] = {
 
 
 def leaf_cards(species: str) -> list[tuple[Points, Points, str]]:
-    """The quadrilaterals of a tree of height 1 on the origin: ring (4, 3), texture coordinates (4, 2), picture name.
+    """Returns the leaf cards of a tree of height 1 at the origin: ring (4, 3), texture coordinates (4, 2), texture name.
 
-    Five upright cards through the trunk at even angles, two leaning ones, and level ones at three heights, so that the crown looks full
-    from the side and from above.
+    Four upright cards through the trunk, and nearly horizontal ones at several heights, so that the crown looks full from all sides.
     """
     radius, trunk_height, _, shape = SPECIES[species]
     low, quads = trunk_height * 0.8, []
@@ -37,7 +36,7 @@ def leaf_cards(species: str) -> list[tuple[Points, Points, str]]:
 
 
 def _levels(shape: str) -> tuple[tuple[float, float], ...]:
-    """Height and width of the level cards, as parts of the crown."""
+    """Returns height and width of the horizontal cards as fractions of the crown."""
     if shape == "cone":
         return ((0.12, 0.95), (0.34, 0.74), (0.56, 0.5), (0.78, 0.26))
     if shape == "column":
@@ -46,7 +45,7 @@ def _levels(shape: str) -> tuple[tuple[float, float], ...]:
 
 
 def trunk_faces(species: str) -> list[Points]:
-    """Six upright quadrilaterals of a tree of height 1."""
+    """Returns the six quadrilaterals of the trunk of a tree of height 1."""
     radius, height = 0.022, SPECIES[species][1] + 0.12
     angle = np.arange(7) * (np.pi / 3)
     low = np.stack([np.cos(angle) * radius, np.sin(angle) * radius, np.full(7, -0.03)], axis=1)

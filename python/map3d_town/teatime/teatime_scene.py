@@ -1,4 +1,4 @@
-"""Writes the tea time scene as OBJ files: one object each, z up, no CRS."""
+"""Writes the teatime scene as OBJ files of one object each, z up, without CRS."""
 
 import os
 from pathlib import Path
@@ -7,7 +7,7 @@ import numpy as np
 
 from map3d_town.teatime.teapot import ClosedMesh, teapot
 
-# height of the teapot 25.2, from spout to handle 52, beside a cube of 21
+# The teapot is 25.2 high and 52 long from spout to handle; the cube has sides of 21.
 TEAPOT_SCALE = 8.0
 TEAPOT_STEPS = 16
 CUBE_CENTRE = (80.5, 11.5, 10.5)
@@ -16,7 +16,7 @@ MTL = "newmtl teapot_green\nKd 0.180 0.560 0.240\n\nnewmtl cube_green\nKd 0.380 
 
 
 def write_teatime(out: Path) -> None:
-    """Writes teapot.obj, cube.obj and teatime.mtl into `out`; the same bytes each time."""
+    """Writes teapot.obj, cube.obj and teatime.mtl into `out`; each run writes the same bytes."""
     out.mkdir(parents=True, exist_ok=True)
     files = {
         "teatime.mtl": MTL,
@@ -30,7 +30,7 @@ def write_teatime(out: Path) -> None:
 
 
 def cube() -> ClosedMesh:
-    """Twelve triangles with flat normals."""
+    """Returns the cube with flat normals."""
     corners = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * (CUBE_SIDE / 2)
     quads = np.array([(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
@@ -41,7 +41,7 @@ def cube() -> ClosedMesh:
 
 
 def obj_text(name: str, material: str, mesh: ClosedMesh) -> str:
-    """An OBJ with normals; equal normals are written once."""
+    """Formats an OBJ with normals; equal normals are written once."""
     rounded = np.round(mesh.normals.reshape(-1, 3), 5) + 0.0
     normals, index = np.unique(rounded, axis=0, return_inverse=True)
     index = index.reshape(-1, 3)

@@ -1,1 +1,1 @@
-"""Textures, drawn from designs and noise."""
+"""Draws textures from facade designs and noise."""

@@ -1,4 +1,4 @@
-"""Paints facades and roofs: (height, width) packed colours, row 0 the upper edge."""
+"""Draws textures of facades and roofs: (height, width) packed, row 0 at the top."""
 
 import itertools
 
@@ -28,14 +28,14 @@ TILE_ROW_M, TILE_COLUMN_M = 0.34, 0.26
 
 
 def draw_texture(texture: AtlasTexture, width_px: int, height_px: int, px_per_m: float, key: int) -> PackedImage:
-    """The picture of a paint; `key` chooses its stains, so that equal facades differ."""
+    """Draws a texture; `key` varies the noise, so equal facades differ."""
     if texture.kind == "roof":
         return draw_roof(texture, width_px, height_px, px_per_m, key)
     return draw_facade(texture, width_px, height_px, px_per_m, key)
 
 
 def draw_roof(texture: AtlasTexture, width_px: int, height_px: int, px_per_m: float, key: int) -> PackedImage:
-    """Tiles, slates, metal sheets with seams, gravel or paving."""
+    """Draws tiles, slates, metal sheets with seams, gravel or paving."""
     cover = next(iter(texture.traits))
     shade, color = crop_noise(width_px, height_px, key), texture.colors[0]
     pattern = roof_pattern(cover, px_per_m)
@@ -50,13 +50,13 @@ def draw_roof(texture: AtlasTexture, width_px: int, height_px: int, px_per_m: fl
 
 
 def seams_px(width_px: int, step_px: float) -> NDArray[np.intp]:
-    """Columns of seams at equal distances from the left edge. (Steps of a fraction may round up to the width itself.)"""
+    """Returns the columns of equally spaced seams, all less than `width_px`."""
     seam = np.arange(0, width_px, step_px).astype(np.intp)
     return seam[seam < width_px]
 
 
 def roof_pattern(cover: str, px_per_m: float) -> GreyImage | None:
-    """What repeats on a cover; None: nothing does."""
+    """Returns the repeating pattern of a roof cover, or None."""
     if cover in ("tiles", "dark", "roman"):
         relief = 1.3 if cover == "roman" else 0.9
         return roof_tile_pattern(px_per_m, TILE_ROW_M, TILE_COLUMN_M * (1.6 if cover == "roman" else 1), relief)
@@ -66,30 +66,30 @@ def roof_pattern(cover: str, px_per_m: float) -> GreyImage | None:
 
 
 def draw_facade(texture: AtlasTexture, width_px: int, height_px: int, px_per_m: float, key: int) -> PackedImage:
-    """A wall with its material, plinth, cornices, beams, windows, doors and shops."""
+    """Draws a wall with plinth, cornices, timber frame, windows, doors and shops."""
     picture = draw_bare_wall(texture, width_px, height_px, px_per_m, key)
-    canvas = FacadeImage(picture, texture, px_per_m)
+    facade = FacadeImage(picture, texture, px_per_m)
     plinth_m = (texture.floors_m[0] if texture.floors_m else 0.0) + 0.45
     if "panel" not in texture.traits and "plain" not in texture.traits:
-        canvas.rows(0, plinth_m, scale_color(texture.colors[0], 0.72), contrast=0.5)
+        facade.draw_strip(0, plinth_m, scale_color(texture.colors[0], 0.72), contrast=0.5)
     if "dado" in texture.traits and "plain" not in texture.traits:
-        canvas.rows(plinth_m, plinth_m + 1.1, (150, 52, 40), contrast=0.5)
+        facade.draw_strip(plinth_m, plinth_m + 1.1, (150, 52, 40), contrast=0.5)
     if "shop" in texture.traits and len(texture.floors_m) > 1:
-        canvas.rows(plinth_m, texture.floors_m[1] - 0.2, texture.colors[4], contrast=0.35)
-        canvas.rows(texture.floors_m[1] - 0.75, texture.floors_m[1] - 0.3, scale_color(texture.colors[4], 0.75), contrast=0.2)
+        facade.draw_strip(plinth_m, texture.floors_m[1] - 0.2, texture.colors[4], contrast=0.35)
+        facade.draw_strip(texture.floors_m[1] - 0.75, texture.floors_m[1] - 0.3, scale_color(texture.colors[4], 0.75), contrast=0.2)
     if texture.traits & {"cornice", "panel"}:
-        canvas.bands()
+        facade.draw_cornices()
     if "timber" in texture.traits and "plain" not in texture.traits:
-        canvas.beams(key)
+        facade.draw_timber_frame(key)
     if "quoins" in texture.traits:
-        canvas.quoins()
+        facade.draw_quoins()
     for number, opening in enumerate(texture.openings):
-        canvas.opening(opening, (key * 7 + number * 5) % 4)
+        facade.draw_opening(opening, (key * 7 + number * 5) % 4)
     return picture
 
 
 def draw_bare_wall(texture: AtlasTexture, width_px: int, height_px: int, px_per_m: float, key: int) -> PackedImage:
-    """The bare wall: plaster, brick, ashlar, ribs or panels, darker towards its foot and under the eaves."""
+    """Draws the bare wall: plaster, brick, ashlar, ribs or panels, darker near its foot and under the eaves."""
     height = (np.arange(height_px, 0, -1) - 0.5) / px_per_m
     dirt = 22 * np.exp(-height / 1.2) + 14 * np.exp(-(texture.height_m - height) / 0.5)
     pattern = wall_pattern(texture.traits, width_px, height_px, px_per_m)
@@ -99,7 +99,7 @@ def draw_bare_wall(texture: AtlasTexture, width_px: int, height_px: int, px_per_
 
 
 def wall_pattern(traits: frozenset[str], width_px: int, height_px: int, px_per_m: float) -> GreyImage | None:
-    """What repeats on a wall, as large as the wall; None on plaster."""
+    """Returns the pattern of a wall, as large as the wall; None for plaster."""
     if "ribs" in traits:
         wave = (128 + 26 * np.sin(np.arange(width_px) * (2 * np.pi / max(2.5, 0.35 * px_per_m)))).astype(np.uint8)
         return np.broadcast_to(wave, (height_px, width_px))
@@ -111,7 +111,7 @@ def wall_pattern(traits: frozenset[str], width_px: int, height_px: int, px_per_m
 
 
 class FacadeImage:
-    """Draws on a facade in metres from its lower left corner."""
+    """The image of a facade; its methods take metres from the lower left corner."""
 
     def __init__(self, picture: PackedImage, texture: AtlasTexture, px_per_m: float) -> None:
         self.picture, self.texture, self.px_per_m = picture, texture, px_per_m
@@ -123,22 +123,22 @@ class FacadeImage:
     def x(self, s_m: float) -> int:
         return min(max(round(s_m * self.px_per_m), 0), self.width_px)
 
-    def rows(self, low_m: float, high_m: float, color: Color, contrast: float = 0.3) -> None:
-        """A horizontal strip over the whole width."""
+    def draw_strip(self, low_m: float, high_m: float, color: Color, contrast: float = 0.3) -> None:
+        """Draws a horizontal strip over the whole width."""
         top, bottom = self.y(high_m), self.y(low_m)
         if bottom > top:
             self.picture[top:bottom] = colorize(crop_noise(self.width_px, bottom - top, top), color, contrast)
 
-    def bands(self) -> None:
-        """A cornice with its shadow at each floor, a thicker one under the eaves."""
+    def draw_cornices(self) -> None:
+        """Draws a cornice with its shadow at each floor, and a thicker one under the eaves."""
         for z in self.texture.floors_m[1:]:
-            self.rows(z - 0.1, z + 0.1, self.texture.colors[1])
-            self.rows(z - 0.2, z - 0.1, scale_color(self.texture.colors[0], 0.7))
+            self.draw_strip(z - 0.1, z + 0.1, self.texture.colors[1])
+            self.draw_strip(z - 0.2, z - 0.1, scale_color(self.texture.colors[0], 0.7))
         if "cornice" in self.texture.traits:
-            self.rows(self.texture.height_m - 0.35, self.texture.height_m, self.texture.colors[1])
+            self.draw_strip(self.texture.height_m - 0.35, self.texture.height_m, self.texture.colors[1])
 
-    def quoins(self) -> None:
-        """Corner stones, long and short by turns."""
+    def draw_quoins(self) -> None:
+        """Draws corner stones, long and short alternately."""
         color = pack_color(self.texture.colors[1])
         step = 0.5
         for number, z in enumerate(np.arange(0, self.texture.height_m, step)):
@@ -147,8 +147,8 @@ class FacadeImage:
             self.picture[top:bottom, :width] = color
             self.picture[top:bottom, self.width_px - width :] = color
 
-    def beams(self, key: int) -> None:
-        """Half-timbering from the first floor up: posts, rails, and braces in some of the panels."""
+    def draw_timber_frame(self, key: int) -> None:
+        """Draws half-timbering from the first floor up: posts, rails, and some braces."""
         image = to_image(self.picture)
         draw = ImageDraw.Draw(image)
         thick = max(1, round(0.2 * self.px_per_m))
@@ -166,21 +166,21 @@ class FacadeImage:
                     draw.line(ends, fill=TIMBER, width=thick)
         self.picture[:] = from_image(image)
 
-    def opening(self, opening: Opening, variant: int) -> None:
-        """A window, arch, door, gate or shop with its surround; shutters where there is room."""
+    def draw_opening(self, opening: Opening, variant: int) -> None:
+        """Draws a window, arch, door, gate or shop with its surround, and shutters if they fit."""
         x0, x1 = self.x(opening.left_m), self.x(opening.left_m + opening.width_m)
         y0, y1 = self.y(opening.low_m + opening.height_m), self.y(opening.low_m)
         if x1 - x0 < 2 or y1 - y0 < 2:
             return
         trim = max(1, round(0.13 * self.px_per_m))
-        self.surround(opening, x0, x1, y0, y1, trim)
+        self.draw_surround(opening, x0, x1, y0, y1, trim)
         stamp = draw_opening_texture(opening.kind, x1 - x0, y1 - y0, self.px_per_m, self.texture.colors, variant)
         self.picture[y0:y1, x0:x1] = stamp
         if "shutters" in self.texture.traits and opening.kind == "window":
-            self.shutters(x0, x1, y0, y1)
+            self.draw_shutters(x0, x1, y0, y1)
 
-    def surround(self, opening: Opening, x0: int, x1: int, y0: int, y1: int, trim: int) -> None:
-        """The frame of stone or wood around an opening, with a sill below a window."""
+    def draw_surround(self, opening: Opening, x0: int, x1: int, y0: int, y1: int, trim: int) -> None:
+        """Draws the stone or wooden frame of an opening, with a sill below a window."""
         if "timber" in self.texture.traits or "panel" in self.texture.traits:
             trim = max(1, trim // 2)
         color = TIMBER if "timber" in self.texture.traits else self.texture.colors[1]
@@ -189,8 +189,8 @@ class FacadeImage:
             sill = min(self.height_px, y1 + trim)
             self.picture[y1:sill, max(0, x0 - trim) : x1 + trim] = pack_color(scale_color(color, 0.85))
 
-    def shutters(self, x0: int, x1: int, y0: int, y1: int) -> None:
-        """Two leaves with slats, open beside the window."""
+    def draw_shutters(self, x0: int, x1: int, y0: int, y1: int) -> None:
+        """Draws two open shutters with slats."""
         width = max(2, (x1 - x0) // 2 - 1)
         slats = 118 + 22 * (np.arange(y1 - y0) % max(2, round(0.09 * self.px_per_m)) == 0)
         leaf_px = colorize(np.broadcast_to(slats[:, None].astype(np.uint8), (y1 - y0, width)), self.texture.colors[3])

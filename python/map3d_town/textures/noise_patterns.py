@@ -1,4 +1,4 @@
-"""Grey patterns and noise, and their colouring. Grey: (height, width) uint8 around 128. Colours: (height, width) uint32, packed (`packed`)."""
+"""Noise and grey patterns, (height, width) uint8 around 128, and their colouring, (height, width) uint32 packed by `pack_color`."""
 
 from functools import lru_cache
 
@@ -16,25 +16,25 @@ PACKED = np.dtype("<u4")
 
 
 def pack_color(color: Color) -> np.uint32:
-    """A colour in one number: red in the lowest byte, the highest one unused. Filling and looking up are several times as fast as with three."""
+    """Packs a colour into one number, red in the lowest byte. This makes fills and look-ups several times faster than three channels."""
     r, g, b = color
     return np.uint32(r | g << 8 | b << 16)
 
 
 def to_image(picture: PackedImage) -> Image.Image:
-    """An RGB image with the picture's pixels."""
+    """Converts a packed image to an RGB image."""
     height, width = picture.shape
     return Image.frombuffer("RGBX", (width, height), np.ascontiguousarray(picture, dtype=PACKED), "raw", "RGBX", 0, 1).convert("RGB")
 
 
 def from_image(image: Image.Image) -> PackedImage:
-    """(height, width) packed, of an RGB image."""
+    """Converts an RGB image to a packed image, (height, width)."""
     return np.frombuffer(image.tobytes("raw", "RGBX"), dtype=PACKED).reshape(image.height, image.width)
 
 
 @lru_cache(maxsize=1)
 def noise_image() -> GreyImage:
-    """(2048, 2048) around 128: grain, blotches and large stains, the same 1024 pixels twice each way; it repeats without a seam."""
+    """Returns (2048, 2048): 2 × 2 copies of a seamless noise of 1024² pixels with fine grain, blotches and large stains."""
     source = rng(1, "noise")
     total = np.zeros((NOISE_PX, NOISE_PX), dtype=np.float32)
     for cells, weight in ((1024, 9.0), (256, 7.0), (32, 8.0), (8, 8.0)):
@@ -44,7 +44,7 @@ def noise_image() -> GreyImage:
 
 
 def _enlarge_periodic(grid: NDArray[np.float32], times: int) -> NDArray[np.float32]:
-    """The grid enlarged, linear between its values, periodic."""
+    """Enlarges a periodic grid with linear interpolation."""
     for axis in (0, 1):
         if times > 1:
             n = grid.shape[axis]
@@ -57,7 +57,7 @@ def _enlarge_periodic(grid: NDArray[np.float32], times: int) -> NDArray[np.float
 
 
 def crop_noise(width_px: int, height_px: int, key: int) -> GreyImage:
-    """A piece of the noise, chosen by the key; a view of it unless it is larger than the noise."""
+    """Returns a piece of the noise at a position that depends on `key`; a view unless it exceeds 1024 pixels."""
     y, x = key * 613 % NOISE_PX, key * 277 % NOISE_PX
     if height_px <= NOISE_PX and width_px <= NOISE_PX:
         return noise_image()[y : y + height_px, x : x + width_px]
@@ -67,7 +67,7 @@ def crop_noise(width_px: int, height_px: int, key: int) -> GreyImage:
 
 @lru_cache(maxsize=4096)
 def color_ramp(color: Color, contrast: float) -> PackedImage:
-    """(512,) packed: entry i is the colour in the grey i − 128, clipped to 0 … 255: the colour itself at 256, darker below and brighter above."""
+    """Returns (512,) packed: entry i is the colour shaded by grey i − 128, clipped to 0 … 255; entry 256 is the colour itself."""
     grey = np.clip(np.arange(512) - 128, 0, 255).astype(np.float32)[:, None]
     value = np.asarray(color, dtype=np.float32) * (1 + (grey - 128) / 128 * contrast)
     r, g, b = np.clip(value, 0, 255).astype(np.uint32).T
@@ -75,35 +75,35 @@ def color_ramp(color: Color, contrast: float) -> PackedImage:
 
 
 def colorize(shade: GreyImage, color: Color, contrast: float = 0.55) -> PackedImage:
-    """A grey picture in the shades of a colour."""
+    """Colours a grey image with the shades of a colour."""
     return np.take(color_ramp(color, contrast)[128:384], shade, mode="clip")
 
 
 def colorize_sum(total: NDArray[np.int16], color: Color, contrast: float) -> PackedImage:
-    """The sum of two greys (256 is the middle) in the shades of a colour."""
+    """Colours the sum of two grey images, with 256 as its mean."""
     return np.take(color_ramp(color, contrast), total, mode="clip")
 
 
 def add_grey(a: GreyImage, b: GreyImage) -> NDArray[np.int16]:
-    """The sum of two greys, for `colored_sum`."""
+    """Returns the sum of two grey images, for `colorize_sum`."""
     return np.add(a, b, dtype=np.int16)
 
 
 def repeat_pattern(pattern: GreyImage, width_px: int, height_px: int, key: int = 0) -> GreyImage:
-    """A pattern laid over an area, beginning at a place chosen by the key."""
+    """Repeats a pattern over an area; `key` shifts it."""
     h, w = pattern.shape[:2]
     wide = np.take(pattern, np.arange(key % w, key % w + width_px) % w, axis=1)
     return np.asarray(np.take(wide, np.arange(key % h, key % h + height_px) % h, axis=0))
 
 
 def blend_grey(a: GreyImage, b: GreyImage) -> GreyImage:
-    """Two greys as one."""
+    """Combines two grey images into one."""
     return np.asarray(np.clip(add_grey(a, b) - 128, 0, 255), dtype=np.uint8)
 
 
 @lru_cache(maxsize=128)
 def roof_tile_pattern(px_per_m: float, row_m: float, column_m: float, relief: float) -> GreyImage:
-    """A pattern of staggered tiles, brighter and darker ones, with a shadow below each row."""
+    """Returns a pattern of staggered tiles of varying tone, with a shadow below each row."""
     rows, columns = 16, 24
     h, w = max(rows, round(rows * row_m * px_per_m)), max(columns, round(columns * column_m * px_per_m))
     y, x = (np.arange(h) + 0.5) * rows / h, (np.arange(w) + 0.5) * columns / w
@@ -117,7 +117,7 @@ def roof_tile_pattern(px_per_m: float, row_m: float, column_m: float, relief: fl
 
 @lru_cache(maxsize=128)
 def masonry_pattern(px_per_m: float, row_m: float, column_m: float, joint: float, spread: float) -> GreyImage:
-    """A pattern of masonry: staggered blocks of differing tone with joints."""
+    """Returns a masonry pattern: staggered blocks of varying tone with joints."""
     rows, columns = 16, 12
     h, w = max(rows * 2, round(rows * row_m * px_per_m)), max(columns * 2, round(columns * column_m * px_per_m))
     y, x = (np.arange(h) + 0.5) * rows / h, (np.arange(w) + 0.5) * columns / w

@@ -1,4 +1,4 @@
-"""Windows, doors and shop fronts, drawn once and stamped onto many facades."""
+"""Draws windows, doors and shop fronts; equal ones are drawn once."""
 
 from functools import lru_cache
 
@@ -10,7 +10,7 @@ from map3d_town.textures.noise_patterns import PackedImage, from_image
 
 
 def draw_opening_texture(kind: str, width: int, height: int, px_per_m: float, colors: tuple[Color, ...], variant: int) -> PackedImage:
-    """The picture of a window, door or shop front; `colors` are those of a facade, of which it needs frame, door and surround at most."""
+    """Draws a window, door or shop front; `colors` are those of a facade."""
     door = colors[3] if kind in ("door", "gate") else None
     around = colors[1] if kind == "arch" else None
     return _draw_cached(kind, width, height, px_per_m, colors[2], door, around, variant)
@@ -20,7 +20,7 @@ def draw_opening_texture(kind: str, width: int, height: int, px_per_m: float, co
 def _draw_cached(
     kind: str, width: int, height: int, px_per_m: float, frame: Color, door: Color | None, around: Color | None, variant: int
 ) -> PackedImage:
-    """Drawn at three times its size; kept by what it depends on, so that thousands of facades share some hundreds."""
+    """Draws with 3 × 3 supersampling. Cached, because thousands of facades share a few hundred openings."""
     image = Image.new("RGB", (width * 3, height * 3), frame)
     draw = ImageDraw.Draw(image)
     bar = max(2.0, 0.07 * px_per_m * 3)
@@ -36,13 +36,13 @@ def _draw_cached(
 
 
 def scale_color(color: Color, factor: float) -> Color:
-    """The colour times a factor."""
+    """Multiplies a colour by a factor."""
     r, g, b = color
     return min(255, int(r * factor)), min(255, int(g * factor)), min(255, int(b * factor))
 
 
 def _draw_panes(draw: ImageDraw.ImageDraw, w: int, h: int, bar: float, across: int, upright: int, variant: int) -> None:
-    """Glass in panes: dark, with a brighter sky in its upper part, and curtains in some."""
+    """Draws dark panes with a brighter reflection of the sky, some with curtains."""
     sky = [(96, 116, 132), (74, 92, 108), (120, 138, 150), (66, 76, 84)][variant]
     for i in range(across):
         for j in range(upright):
@@ -59,7 +59,7 @@ def _draw_panes(draw: ImageDraw.ImageDraw, w: int, h: int, bar: float, across: i
 
 
 def _draw_door(draw: ImageDraw.ImageDraw, w: int, h: int, bar: float, color: Color, kind: str) -> None:
-    """A door with a fanlight and panels, or a gate of boards; `bar` is the width of its frame."""
+    """Draws a door with fanlight and panels, or a gate of boards; `bar`: width of the frame."""
     draw.rectangle([min(bar, w / 3), min(bar, h / 3), max(w - bar, w * 2 / 3), h], fill=color)
     if kind == "gate":
         for i in range(1, 7):

@@ -1,4 +1,4 @@
-"""Materials without texture, and the repeating textures that all buildings share."""
+"""Plain materials, and the repeating textures that all buildings share."""
 
 from map3d_town.textures.noise_patterns import PackedImage, blend_grey, colorize, crop_noise, masonry_pattern, repeat_pattern
 
@@ -11,7 +11,7 @@ DIFFUSE_COLORS: dict[str, tuple[float, float, float]] = {
 
 
 def draw_repeating_texture(name: str) -> PackedImage:
-    """(256, 256) packed: a picture that repeats without a seam; it covers about 4 m of wall (2 m of a chimney)."""
+    """Draws a seamless texture, (256, 256) packed, for 4 m of wall or 2 m of a chimney."""
     px_per_m = REPEATING_TEXTURE_PX / 4.0
     base = crop_noise(1024, 1024, 0)[::4, ::4]
     if name == "brick_red":

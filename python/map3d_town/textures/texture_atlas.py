@@ -1,4 +1,4 @@
-"""Texture atlases: every paint gets an area of its own, what is left stays magenta."""
+"""Packs textures into atlases; unused area stays magenta."""
 
 import io
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ MOST_PX_PER_M, LEAST_PX_PER_M = 40.0, 0.2
 
 @dataclass(frozen=True)
 class TextureAtlas:
-    """The areas (x, y, width, height) in pixels from the upper left corner, by paint; gutters included."""
+    """A square atlas. `areas`: (x, y, width, height) in pixels from the upper left corner, gutters included, by id of the texture."""
 
     side_px: int
     px_per_m: float
@@ -31,7 +31,7 @@ class TextureAtlas:
     textures: tuple[AtlasTexture, ...]
 
     def uv(self, face: TexturedFace) -> list[NDArray[np.float64]]:
-        """Texture coordinates of the face's rings, (0, 0) the lower left corner of the atlas."""
+        """Returns the texture coordinates of the face's rings; (0, 0) is the lower left corner of the atlas."""
         assert isinstance(face.material, AtlasTexture)
         x, y, _, _ = self.areas[id(face.material)]
         scale = self.px_per_m / self.side_px
@@ -40,9 +40,9 @@ class TextureAtlas:
 
 
 def pack_atlas(textures: Sequence[AtlasTexture], side_px: int) -> TextureAtlas:
-    """The finest atlas that holds all paints: shelves, tallest first, at the largest scale that fits.
+    """Packs the textures on shelves, tallest first, at the largest scale that fits.
 
-    Raises TownError when they do not fit at any scale, because of their gutters.
+    Raises TownError if they do not fit at any scale.
     """
     total = sum((p.width_m + 0.2) * (p.height_m + 0.2) for p in textures)
     longest = max(max(p.width_m, p.height_m) for p in textures)
@@ -54,14 +54,14 @@ def pack_atlas(textures: Sequence[AtlasTexture], side_px: int) -> TextureAtlas:
         if areas is not None:
             return TextureAtlas(side_px, float(scale), areas, tuple(textures))
         scale = min(scale * SHRINK, scale - 0.25 if scale > 4 else scale)
-    raise TownError(f"{len(textures)} surfaces do not fit into a texture of {side_px} px; raise texture_px or lower buildings_per_texture")
+    raise TownError(f"{len(textures)} textures do not fit into an atlas of {side_px} px; increase texture_px or reduce buildings_per_texture")
 
 
 def _pack_shelves(textures: Sequence[AtlasTexture], side_px: int, scale: float) -> dict[int, tuple[int, int, int, int]] | None:
-    """Places of all paints at this scale, or None when they do not fit."""
+    """Returns the areas of all textures at this scale, or None if they do not fit."""
     sizes = [(_padded_px(p.height_m, scale), _padded_px(p.width_m, scale), i) for i, p in enumerate(textures)]
     areas = {}
-    spaces: list[list[int]] = []  # what is free below the areas of the shelves: x, y, width, height
+    spaces: list[list[int]] = []  # free areas below the textures on the shelves: x, y, width, height
     x = y = shelf = 0
     for height, width, i in sorted(sizes, key=lambda s: (-s[0], -s[1], s[2])):
         space = next((s for s in spaces if s[2] >= width and s[3] >= height), None)
@@ -89,12 +89,12 @@ def _padded_px(length_m: float, scale: float) -> int:
 
 @lru_cache(maxsize=2)
 def blank_atlas(side_px: int) -> PackedImage:
-    """An atlas without paints."""
+    """Returns an empty atlas."""
     return np.full((side_px, side_px), pack_color(MAGENTA))
 
 
 def draw_atlas(atlas: TextureAtlas, key: int) -> PackedImage:
-    """(side, side) packed: all paints in their places on magenta; the gutters repeat the paint's edge."""
+    """Draws all textures on magenta, (side, side) packed; gutters repeat the edges of the textures."""
     picture = blank_atlas(atlas.side_px).copy()
     g = GUTTER_PX
     for number, texture in enumerate(atlas.textures):
@@ -108,7 +108,7 @@ def draw_atlas(atlas: TextureAtlas, key: int) -> PackedImage:
 
 
 def encode_jpeg(picture: PackedImage, quality: int = QUALITY) -> bytes:
-    """A packed picture as JPEG without chroma subsampling, so that magenta does not bleed far."""
+    """Encodes a packed image as JPEG without chroma subsampling, so magenta does not bleed far."""
     height, width = picture.shape
     buffer = io.BytesIO()
     Image.frombuffer("RGBX", (width, height), picture, "raw", "RGBX", 0, 1).save(buffer, "JPEG", quality=quality, subsampling=0)
@@ -116,7 +116,7 @@ def encode_jpeg(picture: PackedImage, quality: int = QUALITY) -> bytes:
 
 
 def encode_png(picture: NDArray[np.uint8]) -> bytes:
-    """The picture as PNG, RGB or RGBA."""
+    """Encodes an RGB or RGBA image as PNG."""
     buffer = io.BytesIO()
     Image.fromarray(picture).save(buffer, "PNG", compress_level=6)
     return buffer.getvalue()

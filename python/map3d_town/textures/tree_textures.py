@@ -13,7 +13,7 @@ LEAF_PX = 256
 
 
 def draw_leaf_texture(name: str) -> NDArray[np.uint8]:
-    """(256, 256, 4): clusters of leaves in the crown's silhouette; alpha is 0 or 255, colour is leaf-like also where alpha is 0."""
+    """Returns (256, 256, 4) uint8: leaves in the crown's silhouette. Alpha is 0 or 255; transparent pixels have the leaf colour."""
     species, view = name.rsplit("_", 1)
     _, _, color, shape = SPECIES[species]
     source = rng(11, "leaves", name)
@@ -41,7 +41,7 @@ def draw_leaf_texture(name: str) -> NDArray[np.uint8]:
 
 
 def _in_crown(points: Points, shape: str, source: np.random.Generator) -> NDArray[np.bool_]:
-    """Which points lie in the silhouette, with a ragged edge and some holes."""
+    """Returns a mask of the points in the silhouette, with a ragged edge."""
     x, y = (points[:, 0] - 0.5) * 2, points[:, 1]
     ragged = 1 + 0.1 * np.sin(9 * np.arctan2(y - 0.5, x)) + source.normal(0, 0.05, len(x))
     reach = {

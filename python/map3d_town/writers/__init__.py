@@ -1,1 +1,1 @@
-"""Writers of CityGML, OBJ and GeoTIFF files."""
+"""Writes CityGML, OBJ and GeoTIFF files."""

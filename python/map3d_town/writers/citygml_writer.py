@@ -1,4 +1,4 @@
-"""Writes buildings as CityGML 2.0, one after another, so that a file of any size needs little memory."""
+"""Writes buildings as CityGML 2.0 one by one, so memory does not grow with the file."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
@@ -42,14 +42,14 @@ SCHEMAS = {
 
 @dataclass
 class SharedAppearance:
-    """Which polygons carry which repeating texture or material; written once at the end of a file."""
+    """Repeating textures and plain materials with their targets, collected for the end of the file."""
 
     repeating: dict[RepeatingTexture, list[tuple[str, list[str]]]] = field(default_factory=lambda: defaultdict(list))
     plain: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
 
 
 def write_head(out: TextIO, name: str, srs: str, low: Points, high: Points, modules: Iterable[str]) -> None:
-    """The head of a file with its envelope."""
+    """Writes the head of a file with its envelope; `modules`: keys of SCHEMAS."""
     spaces = " ".join(f'xmlns:{k}="{v}"' for k, v in NAMESPACES.items())
     schemas = " ".join(SCHEMAS[m] for m in modules)
     out.write(f'<?xml version="1.0" encoding="UTF-8"?>\n<core:CityModel {spaces} xsi:schemaLocation="{schemas}">\n')
@@ -60,7 +60,7 @@ def write_head(out: TextIO, name: str, srs: str, low: Points, high: Points, modu
 
 
 def write_foot(out: TextIO, shared: SharedAppearance) -> None:
-    """The appearances that many objects share, and the foot of the file."""
+    """Writes the shared appearance and the end of the file."""
     if shared.repeating or shared.plain:
         out.write(f"<app:appearanceMember><app:Appearance><app:theme>{THEME}</app:theme>\n")
         for repeating, targets in sorted(shared.repeating.items(), key=lambda item: (item[0].name, item[0].size_m)):
@@ -72,19 +72,19 @@ def write_foot(out: TextIO, shared: SharedAppearance) -> None:
 
 
 def format_numbers(values: Iterable[float], decimals: int) -> str:
-    """The values with so many decimals, separated by blanks."""
+    """Formats the values with `decimals` decimals, separated by spaces."""
     every = tuple(values)
     return _format(len(every), decimals) % every
 
 
 @lru_cache(maxsize=1024)
 def _format(count: int, decimals: int) -> str:
-    """One format for all numbers of a ring: half a city file is numbers, and this writes them twice as fast as one by one."""
+    """Returns one format string for all numbers of a ring, which is twice as fast as one per number."""
     return " ".join([f"%.{decimals}f"] * count)
 
 
 def format_texture(uri: str, mime: str, mode: str, targets: list[tuple[str, list[str]]]) -> str:
-    """A texture and its targets: polygon id with one ready coordinate list per ring."""
+    """Formats a texture with its targets: polygon id and one formatted coordinate list per ring."""
     parts = [
         "<app:surfaceDataMember><app:ParameterizedTexture>"
         f"<app:imageURI>{uri}</app:imageURI><app:mimeType>{mime}</app:mimeType>"
@@ -98,7 +98,7 @@ def format_texture(uri: str, mime: str, mode: str, targets: list[tuple[str, list
 
 
 def format_material(name: str, ids: list[str]) -> str:
-    """An untextured material and its targets."""
+    """Formats a plain material with its targets."""
     color = format_numbers(DIFFUSE_COLORS[name], 3)
     targets = "\n".join(f"<app:target>#{polygon}</app:target>" for polygon in ids)
     return (
@@ -108,13 +108,13 @@ def format_material(name: str, ids: list[str]) -> str:
 
 
 def format_ring(ring: Points, decimals: int, closed: bool = True) -> str:
-    """The coordinates of a ring, the first one repeated at the end."""
+    """Formats the coordinates of a ring; `closed` repeats the first point."""
     values = ring.ravel().tolist()
     return format_numbers(values + values[: ring.shape[1]] if closed else values, decimals)
 
 
 class BuildingWriter:
-    """Writes one building after another; `shift` moves town coordinates into the CRS."""
+    """Writes buildings; `crs_offset` converts town coordinates to the CRS."""
 
     def __init__(self, out: TextIO, crs_offset: Points, shared: SharedAppearance) -> None:
         self.out, self.crs_offset, self.shared = out, crs_offset, shared
@@ -125,7 +125,7 @@ class BuildingWriter:
         self.building_id = ""
 
     def write(self, model: BuildingModel, atlas: TextureAtlas | None, atlas_uri: str, attributes: BuildingAttributes) -> None:
-        """A building, with parts when it has several bodies, and its own appearance."""
+        """Writes a building with its appearance; several bodies become building parts."""
         self.atlas, self.atlas_uri, self.targets, self.serial = atlas, atlas_uri, [], 0
         self.building_id = attributes.id
         several = len(model.bodies) > 1
@@ -145,14 +145,14 @@ class BuildingWriter:
         out.write(f"{_format_address(attributes)}</bldg:Building></core:cityObjectMember>\n")
 
     def _format_appearance(self) -> str:
-        """The building's share of its atlas."""
+        """Formats the appearance of the current building: its targets in the atlas."""
         if not self.targets:
             return ""
         body = format_texture(self.atlas_uri, "image/jpeg", "none", self.targets)
         return f"<app:appearance><app:Appearance><app:theme>{THEME}</app:theme>{body}</app:Appearance></app:appearance>\n"
 
     def _format_part(self, body: PartGeometry, model: BuildingModel, part: int) -> str:
-        """Everything from the solid to the boundary surfaces, in the order that the schema wants."""
+        """Formats geometry, installations and boundary surfaces in the order of the schema."""
         if model.plan.kind == "shed":
             return self._format_shed(body)
         lod = 3 if model.deep else 2
@@ -169,12 +169,12 @@ class BuildingWriter:
         return f"{whole}{fitted}{bounded}"
 
     def _format_shed(self, body: PartGeometry) -> str:
-        """A simple body: one solid whose polygons stand in place, without boundary surfaces."""
+        """Formats a shed: a solid with inline polygons, without boundary surfaces."""
         members = "".join(f"<gml:surfaceMember>{self._format_polygon(face)}</gml:surfaceMember>" for s in body.shell for face in s.faces)
         return f"<bldg:lod2Solid>{_format_solid(members)}</bldg:lod2Solid>\n"
 
     def _format_lod1(self, body: PartGeometry) -> str:
-        """The block model that a finer building has besides: its ground polygon, raised."""
+        """Formats the LoD1 solid of an LoD3 building: its extruded ground polygon."""
         rings = body.shell[-1].faces[0].rings
         top = float(max(f.rings[0][:, 2].max() for s in body.shell if s.kind == ROOF for f in s.faces)) if body.shell else 0.0
         faces = [TexturedFace(rings, rings, PlainMaterial("block"))]
@@ -189,7 +189,7 @@ class BuildingWriter:
         return f"<bldg:lod1Solid>{_format_solid(members)}</bldg:lod1Solid>\n"
 
     def _format_boundary(self, surface: BoundarySurface, lod: int, shell_ids: list[str] | None) -> str:
-        """A wall, roof or ground with its openings; notes the polygons that belong to the shell."""
+        """Formats a boundary surface with its openings; adds its polygon ids to `shell_ids`."""
         first = self.serial
         polygons = "".join(f"<gml:surfaceMember>{self._format_polygon(face)}</gml:surfaceMember>" for face in surface.faces)
         ids = [f"{self.building_id}_p{i}" for i in range(first, self.serial)]
@@ -209,7 +209,7 @@ class BuildingWriter:
         )
 
     def _format_installation(self, function: str, surfaces: list[BoundarySurface], lod: int) -> str:
-        """A dormer, chimney, balcony, column or merlon."""
+        """Formats a building installation."""
         first = self.serial
         members = "".join(f"<gml:surfaceMember>{self._format_polygon(face)}</gml:surfaceMember>" for s in surfaces for face in s.faces)
         return (
@@ -219,7 +219,7 @@ class BuildingWriter:
         )
 
     def _format_polygon(self, face: TexturedFace) -> str:
-        """A polygon with its id; its looks are noted for later."""
+        """Formats a polygon with a new id, and adds it to the targets of its material."""
         name = f"{self.building_id}_p{self.serial}"
         self.serial += 1
         self._add_target(name, face)
@@ -233,7 +233,7 @@ class BuildingWriter:
         return f'<gml:Polygon gml:id="{name}">{"".join(rings)}</gml:Polygon>'
 
     def _add_target(self, name: str, face: TexturedFace) -> None:
-        """Remembers which texture or material the polygon has."""
+        """Adds the polygon to the targets of its material."""
         if isinstance(face.material, AtlasTexture):
             assert self.atlas is not None
             self.targets.append((name, [format_ring(uv, 6) for uv in self.atlas.uv(face)]))

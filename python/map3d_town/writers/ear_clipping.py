@@ -1,15 +1,15 @@
-"""Cuts polygons with holes into triangles by ear clipping, for formats that know no holes."""
+"""Triangulates polygons with holes by ear clipping, for formats without holes."""
 
 import numpy as np
 
 from map3d_town.polygons_2d import Points
 
-# moves points by less than any drawing shows, so that no three lie on a line; triangles without area are left out
+# A shift of points that is too small to see, but keeps any three from being collinear. Triangles without area are dropped.
 JITTER = 1e-5
 
 
 def triangulate_with_holes(rings: list[Points]) -> list[list[int]]:
-    """Triangles as indices into the concatenated rings; the outer ring keeps its direction."""
+    """Returns triangles as indices into the concatenated rings, with the orientation of the outer ring."""
     real = np.concatenate(rings)
     points = real + JITTER * np.random.default_rng(5).uniform(-1, 1, real.shape)
     starts = np.cumsum([0, *(len(r) for r in rings)])
@@ -29,7 +29,7 @@ def _area(ring: Points) -> float:
 
 
 def _bridge_hole(points: Points, outer: list[int], hole: list[int], loops: list[list[int]]) -> list[int]:
-    """The outer loop with a bridge to the hole's rightmost point, from the nearest point in sight."""
+    """Joins a hole to the outer loop by a bridge from its rightmost point to the nearest visible point."""
     start = max(range(len(hole)), key=lambda i: (points[hole[i], 0], points[hole[i], 1]))
     target = points[hole[start]]
     order = sorted(range(len(outer)), key=lambda i: float(np.hypot(*(points[outer[i]] - target))))
@@ -45,7 +45,7 @@ def _bridge_hole(points: Points, outer: list[int], hole: list[int], loops: list[
 
 
 def _is_in_inner_angle(points: Points, loop: list[int], i: int, target: Points) -> bool:
-    """Whether the target lies in the inner angle of corner i; a corner may be in the loop several times, with an angle each."""
+    """Returns whether the target is in the inner angle of corner i. A point may occur in the loop several times, with different angles."""
     before, here, after = (points[loop[j]] for j in (i - 1, i, (i + 1) % len(loop)))
     sides = (_signed_turn(before, here, target) > 0, _signed_turn(here, after, target) > 0)
     return all(sides) if _signed_turn(before, here, after) > 0 else any(sides)
@@ -56,12 +56,12 @@ def _signed_turn(a: Points, b: Points, c: Points) -> float:
 
 
 def _segments_cross(p: Points, q: Points, a: Points, b: Points) -> bool:
-    """Whether the open segments cross."""
+    """Returns whether the open segments cross."""
     return _signed_turn(p, q, a) * _signed_turn(p, q, b) < 0 and _signed_turn(a, b, p) * _signed_turn(a, b, q) < 0
 
 
 def _clip_ears(points: Points, loop: list[int]) -> list[list[int]]:
-    """Cuts ears off, going round; corners without area are dropped, and where no ear is left the widest corner goes."""
+    """Clips ears around the loop and drops corners without area. If there is no ear, clips the most convex corner."""
     triangles, at, failed = [], 0, 0
     while len(loop) > 3:
         at %= len(loop)
@@ -83,7 +83,7 @@ def _clip_ears(points: Points, loop: list[int]) -> list[list[int]]:
 
 
 def _is_ear(points: Points, loop: list[int], corner: list[int]) -> bool:
-    """Whether no other corner lies in the triangle or on its rim."""
+    """Returns whether no other corner is in the triangle or on its edges."""
     (ax, ay), (bx, by), (cx, cy) = points[corner].tolist()
     others = points[[i for i in loop if i not in corner]]
     x, y = others[:, 0], others[:, 1]

@@ -1,4 +1,4 @@
-"""Writes the ground: orthophoto and elevation as GeoTIFF, window by window, from the plan."""
+"""Writes orthophoto and elevation of a town as GeoTIFF, window by window."""
 
 from collections.abc import Callable
 from functools import lru_cache
@@ -43,7 +43,7 @@ CONTRASTS = {"mark": 0.08, "car_white": 0.05, "car_dark": 0.05, "car_red": 0.05,
 
 @lru_cache(maxsize=2)
 def patterns(px_per_m: float) -> PackedImage:
-    """(materials · 512 · 512,) packed: a picture of each material, repeating."""
+    """Returns (materials · 512 · 512,) packed: a repeating texture for each ground material."""
     return np.concatenate([_pattern(number, name, px_per_m).ravel() for number, name in enumerate(MATERIALS)])
 
 
@@ -61,7 +61,7 @@ def _pattern(number: int, name: str, px_per_m: float) -> PackedImage:
 
 
 class OrthophotoRenderer:
-    """Paints any window of the orthophoto; pixel (0, 0) is the north-western corner of the town's square."""
+    """Renders windows of the orthophoto; pixel (0, 0) is at the north-western corner of the town's square."""
 
     def __init__(self, plan: TownPlan, px_m: float) -> None:
         self.px_m, self.radius_m = px_m, plan.radius_m
@@ -73,14 +73,14 @@ class OrthophotoRenderer:
         self.crowns = np.array([(t.x, t.y, t.height_m) for t in plan.trees]).reshape(-1, 3)
 
     def render(self, x: int, y: int, width: int, height: int) -> PackedImage:
-        """(height, width) packed, of the window whose upper left pixel is (x, y)."""
+        """Renders the window with upper left pixel (x, y), (height, width) packed."""
         west, north = -self.radius_m + x * self.px_m, self.radius_m - y * self.px_m
         picture = _look_up_texels(self._materials(west, north, width, height), x, y, patterns(1 / self.px_m))
-        self.shade(picture, west, north)
+        self._add_tree_shadows(picture, west, north)
         return picture
 
     def _materials(self, west: float, north: float, width: int, height: int) -> GreyImage:
-        """(height, width): the number of the uppermost material."""
+        """Returns (height, width): the number of the topmost material."""
         east, south = west + width * self.px_m, north - height * self.px_m
         mask = Image.new("L", (width, height), 0)
         draw = ImageDraw.Draw(mask)
@@ -91,8 +91,8 @@ class OrthophotoRenderer:
             draw.polygon(px, fill=NUMBERS[patch.material])
         return np.asarray(mask)
 
-    def shade(self, picture: PackedImage, west: float, north: float) -> None:
-        """Darkens the ground under trees, softly."""
+    def _add_tree_shadows(self, picture: PackedImage, west: float, north: float) -> None:
+        """Adds soft shadows of trees."""
         height, width = picture.shape
         if not len(self.crowns):
             return
@@ -110,7 +110,7 @@ class OrthophotoRenderer:
 
 
 def _look_up_texels(materials: GreyImage, x: int, y: int, colors: PackedImage) -> PackedImage:
-    """Each pixel from its material's picture; in rows few enough for the fast memory."""
+    """Looks up the texel of each pixel's material; in strips of rows that fit the CPU cache."""
     height, width = materials.shape
     picture = np.empty((height, width), dtype=PACKED)
     columns = np.arange(x, x + width, dtype=np.intp) % PATTERN_PX
@@ -125,14 +125,14 @@ def _look_up_texels(materials: GreyImage, x: int, y: int, colors: PackedImage) -
 
 
 def north_up(west: float, north: float, px_m: float) -> Affine:
-    """Pixels to CRS coordinates; (west, north) is the outer corner of the first pixel."""
+    """Returns the transform from pixels to the CRS; (west, north) is the outer corner of the first pixel."""
     return Affine(px_m, 0.0, west, 0.0, -px_m, north)
 
 
 def write_ortho(path: Path, plan: TownPlan, px_m: float, side_px: int, epsg: int, east: float, north: float, check: Callable[[], None]) -> None:
-    """The orthophoto: JPEG in a tiled GeoTIFF, written window by window, so that memory does not grow with its size.
+    """Writes the orthophoto as JPEG in a tiled GeoTIFF; memory does not grow with its size.
 
-    `check` is called before each window, and may raise to end the work.
+    Calls `check` before each window; it may raise to stop.
     """
     renderer = OrthophotoRenderer(plan, px_m)
     with JpegTiff(path, side_px, px_m, epsg, east - plan.radius_m, north + plan.radius_m) as out:
@@ -143,7 +143,7 @@ def write_ortho(path: Path, plan: TownPlan, px_m: float, side_px: int, epsg: int
 
 
 def write_dem(path: Path, ground: Ground, radius_m: float, px_m: float, crs: str, east: float, north: float) -> None:
-    """Heights at pixel centres, float32, nodata -9999 (not used)."""
+    """Writes heights at pixel centres, float32. Nodata is -9999, but no pixel has it."""
     side = round(2 * radius_m / px_m)
     profile = {
         "driver": "GTiff", "width": side, "height": side, "count": 1, "dtype": "float32", "crs": crs, "nodata": -9999.0,

@@ -1,6 +1,6 @@
-"""Writes a picture of any size as JPEG in a tiled GeoTIFF, tile by tile: classic while it stays below 4 GiB, else BigTIFF.
+"""Writes images of any size as JPEG in a tiled GeoTIFF, tile by tile: a classic TIFF up to 4.2 GB, a BigTIFF above that.
 
-GDAL writes the same, but some builds of it compress five times slower than Pillow, and it cannot tell beforehand which of the two a picture needs.
+GDAL writes such files too, but some of its builds compress five times slower than Pillow, and it must choose between the two in advance.
 """
 
 import io
@@ -25,11 +25,11 @@ Tag = tuple[int, int, Sequence[float]]
 
 
 class JpegTiff:
-    """A square GeoTIFF of `side_px` while it is written. `epsg`: of a projected CRS in metres; (west, north): the outer corner of pixel (0, 0)."""
+    """A writer of a square GeoTIFF of `side_px`. `epsg`: code of a projected CRS in metres; (west, north): outer corner of pixel (0, 0)."""
 
     def __init__(self, path: Path, side_px: int, px_m: float, epsg: int, west: float, north: float) -> None:
         self.side_px, self.across = side_px, -(-side_px // TILE_PX)
-        self.place = (px_m, epsg, west, north)
+        self.georeference = (px_m, epsg, west, north)
         self.offsets, self.sizes = np.zeros((2, self.across * self.across), dtype=np.int64)
         self.out = path.open("wb")
 
@@ -43,7 +43,7 @@ class JpegTiff:
                 self._finish()
 
     def write(self, x: int, y: int, picture: PackedImage) -> None:
-        """A packed picture whose upper left pixel is (x, y), multiples of the tile's side; at the far edges it may end within a tile."""
+        """Writes a packed image at (x, y), multiples of the tile side. It must fill whole tiles, except at the right and lower edges."""
         for j in range(0, picture.shape[0], TILE_PX):
             for i in range(0, picture.shape[1], TILE_PX):
                 tile = picture[j : j + TILE_PX, i : i + TILE_PX]
@@ -53,7 +53,7 @@ class JpegTiff:
                 self.out.write(data)
 
     def _finish(self) -> None:
-        """The directory behind the tiles, then the header that leads to it."""
+        """Writes the directory after the tiles, then the header."""
         self.out.write(bytes(self.out.tell() % 2))
         start = self.out.tell()
         wide = start > CLASSIC_BYTES
@@ -62,7 +62,7 @@ class JpegTiff:
         self.out.write(struct.pack("<2sHHHQ", b"II", 43, 8, 0, start) if wide else struct.pack("<2sHI8x", b"II", 42, start))
 
     def _make_tags(self, wide: bool) -> list[Tag]:
-        px_m, epsg, west, north = self.place
+        px_m, epsg, west, north = self.georeference
         keys = (1, 1, 0, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, epsg)
         return [
             (256, LONG, [self.side_px]),
@@ -86,27 +86,27 @@ class JpegTiff:
 
 
 def _pad_tile(tile: PackedImage) -> PackedImage:
-    """The tile, its last row and column repeated up to the full size."""
+    """Extends a tile to full size by repeating its last row and column."""
     missing = [(0, TILE_PX - side) for side in tile.shape]
     return np.pad(tile, missing, mode="edge") if tile.shape != (TILE_PX, TILE_PX) else np.ascontiguousarray(tile)
 
 
-def _encode_jpeg(picture: PackedImage, part: int) -> bytes:
-    """Colour halved both ways; `part` 1: the tables that all tiles share, 2: a tile without them."""
+def _encode_jpeg(picture: PackedImage, streamtype: int) -> bytes:
+    """Encodes with 4:2:0 subsampling; `streamtype` 1: only the tables that all tiles share, 2: a tile without them."""
     height, width = picture.shape
     image = Image.frombuffer("RGBX", (width, height), picture, "raw", "RGBX", 0, 1)
     buffer = io.BytesIO()
-    image.save(buffer, "JPEG", quality=QUALITY, subsampling=2, streamtype=part)
+    image.save(buffer, "JPEG", quality=QUALITY, subsampling=2, streamtype=streamtype)
     return buffer.getvalue()
 
 
 def encoded_tile_bytes(picture: PackedImage) -> int:
-    """How many bytes a tile with this picture takes."""
+    """Returns the encoded size of a tile."""
     return len(_encode_jpeg(_pad_tile(picture), 2))
 
 
 def _encode_directory(tags: Sequence[Tag], start: int, wide: bool) -> bytes:
-    """The image file directory at byte `start`, with the values that do not fit into it behind it."""
+    """Encodes the image file directory at byte `start`, followed by the values that do not fit into its entries."""
     count, entry, room, unit = ("<Q", "<HHQ", 8, 20) if wide else ("<H", "<HHI", 4, 12)
     after = start + struct.calcsize(count) + unit * len(tags) + room
     table, values = struct.pack(count, len(tags)), b""

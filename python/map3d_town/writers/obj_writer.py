@@ -1,4 +1,4 @@
-"""Writes a building as OBJ (z up) in CRS coordinates; the materials of all buildings are in one MTL."""
+"""Formats buildings as OBJ with z up, in CRS coordinates, and one MTL for all of them."""
 
 from collections.abc import Iterable
 
@@ -12,7 +12,7 @@ from map3d_town.writers.ear_clipping import triangulate_with_holes
 
 
 def obj_text(model: BuildingModel, name: str, atlas: TextureAtlas | None, atlas_name: str, crs_offset: Points) -> str:
-    """One building: v, vt, faces by material. Polygons with holes are cut into triangles."""
+    """Formats a building: v, vt, faces by material. Polygons with holes are triangulated."""
     lines = ["mtllib town.mtl", f"o {name}"]
     by_material: dict[str, list[TexturedFace]] = {}
     for face in model.faces():
@@ -30,14 +30,14 @@ def obj_text(model: BuildingModel, name: str, atlas: TextureAtlas | None, atlas_
 
 
 def _material_name(face: TexturedFace, atlas_name: str) -> str:
-    """The atlas, the repeating texture or the plain material of a face."""
+    """Returns the name of the face's atlas, repeating texture or plain material."""
     if isinstance(face.material, AtlasTexture):
         return atlas_name
     return face.material.name
 
 
 def _face_arrays(face: TexturedFace, atlas: TextureAtlas | None) -> tuple[Points, Points, list[list[int]]]:
-    """Points, texture coordinates and polygons of a face; one polygon unless it has holes."""
+    """Returns points, texture coordinates and polygons of a face; one polygon unless it has holes."""
     if isinstance(face.material, AtlasTexture):
         assert atlas is not None
         uvs = np.concatenate(atlas.uv(face))
@@ -52,7 +52,7 @@ def _face_arrays(face: TexturedFace, atlas: TextureAtlas | None) -> tuple[Points
 
 
 def mtl_text(atlases: Iterable[str]) -> str:
-    """All materials: atlases, repeating textures, plain ones."""
+    """Formats all materials: atlases, repeating textures, plain materials."""
     lines = []
     for name in atlases:
         lines += [f"newmtl {name}", "Kd 1 1 1", f"map_Kd textures/{name}.jpg", ""]

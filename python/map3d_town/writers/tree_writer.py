@@ -10,7 +10,7 @@ from map3d_town.writers.citygml_writer import SharedAppearance, format_ring, for
 
 
 class TreeWriter:
-    """Writes trees one after another; the first of each species carries the prototype, the others point to it."""
+    """Writes trees; the first tree of a species holds the prototype, the others link to it."""
 
     def __init__(self, out: TextIO, crs_offset: Points, shared: SharedAppearance, prefix: str) -> None:
         self.out, self.shared, self.prefix = out, shared, prefix
@@ -18,7 +18,7 @@ class TreeWriter:
         self.targets: dict[str, list[tuple[str, list[str]]]] = {}
 
     def write(self, tree: PlannedTree, number: int, ground_z: float) -> None:
-        """A solitary vegetation object of height `tree.height_m`."""
+        """Writes a tree as SolitaryVegetationObject."""
         c, s, h = math.cos(tree.turn) * tree.height_m, math.sin(tree.turn) * tree.height_m, tree.height_m
         matrix = f"{c:.6f} {-s:.6f} 0 0 {s:.6f} {c:.6f} 0 0 0 0 {h:.6f} 0 0 0 0 1"
         x, y, z = tree.x + self.crs_offset[0], tree.y + self.crs_offset[1], ground_z + self.crs_offset[2]
@@ -33,7 +33,7 @@ class TreeWriter:
         )
 
     def _format_geometry(self, species: str) -> str:
-        """The prototype the first time, a link to it later."""
+        """Formats the prototype of a species the first time, then a link to it."""
         name = f"{self.prefix}proto_{species}"
         if f"{species}_side" in self.targets:
             return f'<core:relativeGMLGeometry xlink:href="#{name}"/>'
@@ -48,7 +48,7 @@ class TreeWriter:
         return f'<core:relativeGMLGeometry><gml:MultiSurface gml:id="{name}">{"".join(members)}</gml:MultiSurface></core:relativeGMLGeometry>'
 
     def write_leaf_textures(self) -> None:
-        """The leaf textures, once at the end."""
+        """Writes the leaf textures with their targets; call it once, after all trees."""
         if not self.targets:
             return
         body = "".join(format_texture(f"textures/{name}.png", "image/png", "none", targets) for name, targets in sorted(self.targets.items()))
