@@ -1,4 +1,4 @@
-"""Polygons with holes become triangles that cover exactly the same area."""
+"""Laws of ear clipping: the triangles cover the polygon without overlap."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ def test_triangles_cover_the_polygon_once(holes: list[np.ndarray]) -> None:
     assert sum(pieces) == pytest.approx(100 + sum(area(h) for h in holes))
 
 
-def test_a_clockwise_polygon_keeps_its_direction() -> None:
+def test_clockwise_polygon_keeps_its_orientation() -> None:
     rings = [SQUARE[::-1], hole(4, 4, 2)[::-1]]
     points = np.concatenate(rings)
     pieces = [area(points[t]) for t in triangulate_with_holes(rings)]

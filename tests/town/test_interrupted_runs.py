@@ -1,4 +1,4 @@
-"""What is left of a run that was interrupted, killed or crowded out; what the next one does with it."""
+"""Interrupted and killed runs, their resumption, and disk space."""
 
 import json
 import os
@@ -23,18 +23,18 @@ from map3d_town import make_town
 from tests.town.test_interrupted_runs import SPEC
 
 
-def cut_off(_kind, done, _all):
+def interrupt(_kind, done, _all):
     if done == 4:
         sent = int(sys.argv[2])
         os.killpg(0, sent) if sent == signal.SIGINT else os.kill(os.getpid(), sent)
 
 
 if __name__ == "__main__":
-    # A shell ignores it for what it starts in the background, and children inherit that.
+    # A shell ignores SIGINT in background processes, and their children inherit that.
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    make_town(Path(sys.argv[1]), SPEC, cut_off, workers=2)
+    make_town(Path(sys.argv[1]), SPEC, interrupt, workers=2)
 """
-"""Cuts itself off after four jobs, whatever else the machine does."""
+"""Generates the town and sends itself a signal after four jobs."""
 
 
 @pytest.fixture(scope="module")
@@ -48,8 +48,8 @@ def content(folder: Path) -> dict[str, bytes]:
     return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
-def begin(tmp_path: Path, sent: signal.Signals) -> subprocess.Popen[bytes]:
-    """A run of its own, with two workers, that will send itself a signal."""
+def start(tmp_path: Path, sent: signal.Signals) -> subprocess.Popen[bytes]:
+    """Starts SCRIPT, with two workers, in a process group of its own."""
     script = tmp_path / "script.py"
     script.write_text(SCRIPT)
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
@@ -58,7 +58,7 @@ def begin(tmp_path: Path, sent: signal.Signals) -> subprocess.Popen[bytes]:
 
 
 def pids_in_group(group: int) -> list[int]:
-    """Processes of that group that still run, told by /proc; a zombie does not."""
+    """Returns the running processes of a group, without zombies, from /proc."""
     found = []
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
@@ -72,16 +72,16 @@ def pids_in_group(group: int) -> list[int]:
 
 @pytest.mark.skipif(not Path("/proc/self/stat").is_file(), reason="needs /proc")
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGKILL])
-def test_a_run_cut_off_keeps_every_complete_file_and_the_next_one_ends_with_the_same_bytes(
+def test_interrupted_run_keeps_complete_files_and_the_next_one_gives_the_same_bytes(
     sent: signal.Signals, tmp_path: Path, whole: dict[str, bytes]
 ) -> None:
     out = tmp_path / "out"
-    process = begin(tmp_path, sent)
+    process = start(tmp_path, sent)
     process.communicate(timeout=120)
     assert process.returncode != 0
     deadline = time.monotonic() + 20
     while pids_in_group(process.pid):
-        assert time.monotonic() < deadline, "workers outlive their parent"
+        assert time.monotonic() < deadline, "workers still run after their parent ended"
         time.sleep(0.05)
     complete = {name for name in content(out) if not Path(name).name.startswith(".") and name != "town.json"}
     assert 6 <= len(complete) < len(whole) - 1
@@ -93,7 +93,7 @@ def test_a_run_cut_off_keeps_every_complete_file_and_the_next_one_ends_with_the_
     assert content(out) == whole
 
 
-def test_files_noted_in_the_journal_only_are_kept_and_a_line_cut_short_is_not(tmp_path: Path, whole: dict[str, bytes]) -> None:
+def test_files_in_the_journal_are_kept_except_for_an_incomplete_line(tmp_path: Path, whole: dict[str, bytes]) -> None:
     make_town(tmp_path, SPEC)
     path = tmp_path / "town.json"
     record = json.loads(path.read_text())
@@ -105,20 +105,20 @@ def test_files_noted_in_the_journal_only_are_kept_and_a_line_cut_short_is_not(tm
     assert content(tmp_path) == whole
 
 
-def test_the_draft_of_a_killed_run_is_removed(tmp_path: Path, whole: dict[str, bytes]) -> None:
-    draft = tmp_path / "terrain" / f".ortho.tif{PART}"
-    draft.parent.mkdir()
-    draft.write_bytes(b"half")
+def test_partial_file_of_a_killed_run_is_removed(tmp_path: Path, whole: dict[str, bytes]) -> None:
+    partial = tmp_path / "terrain" / f".ortho.tif{PART}"
+    partial.parent.mkdir()
+    partial.write_bytes(b"half")
     make_town(tmp_path, SPEC)
     assert content(tmp_path) == whole
 
 
-def test_two_runs_in_one_folder_are_refused(tmp_path: Path) -> None:
+def test_second_run_in_the_same_folder_raises(tmp_path: Path) -> None:
     with lock_folder(tmp_path), pytest.raises(TownError, match="another process"):
         make_town(tmp_path, SPEC)
 
 
-def test_a_town_begun_by_another_version_is_refused(tmp_path: Path) -> None:
+def test_town_of_another_version_raises(tmp_path: Path) -> None:
     (tmp_path / "town.json").write_text(json.dumps({"map3d": "town", "version": 1, "spec": SPEC.to_json(), "files": {}}))
     with pytest.raises(TownError, match="version 1"):
         make_town(tmp_path, SPEC)
@@ -133,15 +133,15 @@ def test_a_town_begun_by_another_version_is_refused(tmp_path: Path) -> None:
     ],
     ids=["small", "both formats", "roman"],
 )
-def test_the_estimate_is_within_15_percent(spec: TownSpec, tmp_path: Path) -> None:
+def test_estimate_is_within_15_percent(spec: TownSpec, tmp_path: Path) -> None:
     estimate = estimate_town(spec)
     make_town(tmp_path, spec, workers=2)
     truth = sum(path.stat().st_size for path in tmp_path.rglob("*") if path.is_file())
     assert abs(estimate.disk_bytes / truth - 1) < 0.15
 
 
-def test_room_that_the_rule_of_thumb_calls_tight_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Enough by a sample, though not four times the rule of thumb: the town is made. Less than the sample says: refused."""
+def test_tight_disk_space_is_compared_with_a_sample(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The sampled estimate decides when less than four times the rough estimate is free."""
     needed = estimate_town(SPEC).disk_bytes + (64 << 20)
     for free, opening_fits in ((needed + 1000, True), (needed - 1000, False)):
         monkeypatch.setattr("shutil.disk_usage", lambda _, free=free: type("Usage", (), {"free": free})())

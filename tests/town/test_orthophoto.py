@@ -1,4 +1,4 @@
-"""The orthophoto as others read it: with GDAL, whatever its size, in bounded memory."""
+"""The orthophoto: GDAL reads it, at any size; memory is bounded."""
 
 import subprocess
 import sys
@@ -16,7 +16,7 @@ from map3d_town.writers.jpeg_geotiff import JpegTiff
 
 
 def smooth(side: int) -> PackedImage:
-    """A picture that JPEG keeps well: another colour everywhere, without edges."""
+    """Returns smooth gradients, which JPEG changes little."""
     y, x = np.mgrid[0:side, 0:side].astype(np.uint32)
     return np.asarray((x * 200 // side) | (y * 200 // side) << 8 | np.uint32(90 << 16), dtype="<u4")
 
@@ -31,7 +31,7 @@ def write(path: Path, picture: PackedImage) -> None:
 
 @pytest.mark.parametrize("side", [1, 511, 512, 513, 1024, 1300])
 @pytest.mark.parametrize("classic", [True, False])
-def test_gdal_reads_what_was_written(side: int, classic: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_gdal_reads_the_written_image(side: int, classic: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if not classic:
         monkeypatch.setattr("map3d_town.writers.jpeg_geotiff.CLASSIC_BYTES", 0)
     picture = smooth(side)
@@ -46,7 +46,7 @@ def test_gdal_reads_what_was_written(side: int, classic: bool, tmp_path: Path, m
     assert np.abs(read - expected).max() <= 6
 
 
-def test_tiles_keep_their_places_when_written_in_another_order(tmp_path: Path) -> None:
+def test_tiles_may_be_written_in_any_order(tmp_path: Path) -> None:
     colors = [(200, 40, 40), (40, 200, 40), (40, 40, 200), (200, 200, 40)]
     with JpegTiff(tmp_path / "o.tif", 1024, 1.0, 25832, 0.0, 0.0) as out:
         for k in (2, 0, 3, 1):
@@ -56,16 +56,16 @@ def test_tiles_keep_their_places_when_written_in_another_order(tmp_path: Path) -
     assert np.abs(np.array(seen, dtype=int) - np.array(colors)).max() <= 4
 
 
-def test_windows_fit_together_without_a_seam() -> None:
+def test_windows_join_without_a_seam() -> None:
     plan, _ = plan_town(TownSpec(buildings=20))
     renderer = OrthophotoRenderer(plan, 0.5)
     whole = renderer.render(0, 0, 256, 256)
     parts = [[renderer.render(x, y, 128, 128) for x in (0, 128)] for y in (0, 128)]
     same = whole == np.block(parts)
-    assert same.mean() > 0.995, "only what the drawing rounds at a window's edge may differ"
+    assert same.mean() > 0.995, "pixels may differ only by rounding at the edges of windows"
 
 
-def test_an_interrupt_between_windows_ends_the_work(tmp_path: Path) -> None:
+def test_check_between_windows_may_raise(tmp_path: Path) -> None:
     plan, _ = plan_town(TownSpec(buildings=3))
 
     def stop() -> None:
@@ -76,16 +76,16 @@ def test_an_interrupt_between_windows_ends_the_work(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:4978"])
-def test_a_crs_that_is_not_projected_is_refused(crs: str) -> None:
+def test_crs_that_is_not_projected_raises(crs: str) -> None:
     with pytest.raises(TownError, match="projected"):
         _ = TownSpec(crs=crs).projected_epsg
 
 
-def test_the_horizontal_part_of_a_compound_crs_is_recorded() -> None:
+def test_compound_crs_gives_its_horizontal_part() -> None:
     assert TownSpec(crs="EPSG:5555").projected_epsg == 25832
 
 
-HIGH_WATER = """
+PEAK_MEMORY = """
 import sys
 from pathlib import Path
 from map3d_town import TownSpec
@@ -102,6 +102,6 @@ print(next(line.split()[1] for line in open("/proc/self/status") if line.startsw
 def test_memory_does_not_grow_with_the_orthophoto(tmp_path: Path) -> None:
     used = []
     for side in (2048, 8192):
-        run = subprocess.run([sys.executable, "-c", HIGH_WATER, str(tmp_path / "o.tif"), str(side)], capture_output=True, text=True, check=True)
+        run = subprocess.run([sys.executable, "-c", PEAK_MEMORY, str(tmp_path / "o.tif"), str(side)], capture_output=True, text=True, check=True)
         used.append(int(run.stdout) / 1024)
     assert used[1] < used[0] + 24, f"MiB at 2048² and 8192²: {used}"

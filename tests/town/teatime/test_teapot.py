@@ -1,4 +1,4 @@
-"""Laws of the tea time scene."""
+"""Laws of the teatime scene."""
 
 from collections import Counter
 from pathlib import Path
@@ -54,7 +54,7 @@ def test_teapot_and_cube_do_not_touch() -> None:
     assert teapot(8.0, 8).points[:, 0].max() < CUBE_CENTRE[0] - CUBE_SIDE / 2
 
 
-def test_patch_goes_through_its_corners() -> None:
+def test_patch_contains_its_corners() -> None:
     control = np.random.default_rng(1).normal(size=(4, 4, 3))
     surface = bezier(control, 5)
     assert np.allclose(surface[[0, 0, -1, -1], [0, -1, 0, -1]], control[[0, 0, -1, -1], [0, -1, 0, -1]])
