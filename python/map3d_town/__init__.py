@@ -1,7 +1,7 @@
-"""Makes towns: textured CityGML or OBJ with terrain and trees, the same bytes for the same arguments."""
+"""Generates fictional towns: textured CityGML or OBJ with terrain and trees. Equal specs give equal bytes."""
 
-from map3d_town.errors import TownError
-from map3d_town.make import TownReport, estimate_town, make_town
-from map3d_town.spec import Estimate, TownSpec
+from map3d_town.generator import TownReport, estimate_town, make_town
+from map3d_town.town_errors import TownError
+from map3d_town.town_spec import TownEstimate, TownSpec
 
-__all__ = ["Estimate", "TownError", "TownReport", "TownSpec", "estimate_town", "make_town"]
+__all__ = ["TownError", "TownEstimate", "TownReport", "TownSpec", "estimate_town", "make_town"]

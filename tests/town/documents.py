@@ -1,4 +1,4 @@
-"""Reads what the generator wrote, as plainly as possible."""
+"""Reads the CityGML files of the generator with ElementTree."""
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ TOWN = TownSpec(buildings=14, seed=4, files=2, texture_px=256, formats=("citygml
 ROMAN = TownSpec(style="roman", buildings=110, seed=2, texture_px=512, buildings_per_texture=8, terrain=False)
 
 
-def trees(folder: Path, pattern: str = "*.gml") -> list[ET.Element]:
+def parse_files(folder: Path, pattern: str = "*.gml") -> list[ET.Element]:
     found = [ET.parse(path).getroot() for path in sorted((folder / "citygml").glob(pattern))]
     assert found, f"no {pattern} in {folder}"
     return found
@@ -31,18 +31,18 @@ def numbers(text: str | None, columns: int) -> Points:
     return np.array(text.split(), dtype=float).reshape(-1, columns)
 
 
-def rings(polygon: ET.Element) -> dict[str, Points]:
-    """Ring id → (n, 3) with the repeated last point."""
+def rings_of(polygon: ET.Element) -> dict[str, Points]:
+    """Returns rings (n, 3) by id, with the repeated last point."""
     return {ring.attrib[GML + "id"]: numbers(ring.findtext(GML + "posList"), 3) for ring in polygon.iter(GML + "LinearRing")}
 
 
-def polygons(root: ET.Element) -> dict[str, dict[str, Points]]:
-    return {p.attrib[GML + "id"]: rings(p) for p in root.iter(GML + "Polygon")}
+def rings_by_polygon(root: ET.Element) -> dict[str, dict[str, Points]]:
+    return {p.attrib[GML + "id"]: rings_of(p) for p in root.iter(GML + "Polygon")}
 
 
 def solids(root: ET.Element) -> Iterator[tuple[str, list[list[Points]]]]:
-    """(where, polygons of the shell as lists of rings) of every solid, links followed."""
-    every = polygons(root)
+    """Yields (id of the last polygon, polygons of the shell as lists of rings) for each solid; follows links."""
+    every = rings_by_polygon(root)
     for solid in root.iter(GML + "Solid"):
         shell = []
         for member in solid.iter(GML + "surfaceMember"):
@@ -53,7 +53,7 @@ def solids(root: ET.Element) -> Iterator[tuple[str, list[list[Points]]]]:
 
 
 def textures(root: ET.Element) -> Iterator[tuple[str, str, dict[str, Points]]]:
-    """(image, wrap mode, ring id → texture coordinates)."""
+    """Yields (image, wrap mode, texture coordinates by ring id)."""
     for texture in root.iter(APP + "ParameterizedTexture"):
         uri, mode = texture.findtext(APP + "imageURI"), texture.findtext(APP + "wrapMode")
         assert uri
@@ -62,6 +62,6 @@ def textures(root: ET.Element) -> Iterator[tuple[str, str, dict[str, Points]]]:
 
 
 def normal(ring: Points) -> Points:
-    """Newell's normal, its length twice the area."""
+    """Returns Newell's normal; its length is twice the area."""
     centred = ring[:-1] - ring[:-1].mean(axis=0)
     return np.asarray(np.cross(centred, np.roll(centred, -1, axis=0)).sum(axis=0))

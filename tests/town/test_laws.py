@@ -1,4 +1,4 @@
-"""Laws that every town keeps, whatever its style."""
+"""Laws of the CityGML of towns of both styles."""
 
 import itertools
 from collections import Counter
@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.town.documents import APP, BLDG, CORE, GML, XLINK, normal, numbers, polygons, solids, textures, trees
+from tests.town.documents import APP, BLDG, CORE, GML, XLINK, normal, numbers, parse_files, rings_by_polygon, solids, textures
 
 
-def test_rings_are_closed_and_have_an_area(either: Path) -> None:
-    for root in trees(either):
-        for name, rings in polygons(root).items():
+def test_rings_are_closed_and_have_area(either: Path) -> None:
+    for root in parse_files(either):
+        for name, rings in rings_by_polygon(root).items():
             for ring in rings.values():
                 assert len(ring) >= 4, name
                 assert np.array_equal(ring[0], ring[-1]), name
@@ -21,8 +21,8 @@ def test_rings_are_closed_and_have_an_area(either: Path) -> None:
 
 
 def test_polygons_are_flat_within_a_millimetre(either: Path) -> None:
-    for root in trees(either, "buildings_*.gml"):
-        for name, rings in polygons(root).items():
+    for root in parse_files(either, "buildings_*.gml"):
+        for name, rings in rings_by_polygon(root).items():
             outer = next(iter(rings.values()))
             unit = normal(outer) / np.linalg.norm(normal(outer))
             for ring in rings.values():
@@ -31,7 +31,7 @@ def test_polygons_are_flat_within_a_millimetre(either: Path) -> None:
 
 def test_solids_share_each_edge_twice_in_opposite_directions(either: Path) -> None:
     count = 0
-    for root in trees(either, "buildings_*.gml"):
+    for root in parse_files(either, "buildings_*.gml"):
         for name, shell in solids(root):
             edges: Counter[tuple[tuple[float, ...], tuple[float, ...]]] = Counter()
             for rings in shell:
@@ -45,17 +45,17 @@ def test_solids_share_each_edge_twice_in_opposite_directions(either: Path) -> No
 
 
 def test_solids_face_outward(either: Path) -> None:
-    for root in trees(either, "buildings_*.gml"):
+    for root in parse_files(either, "buildings_*.gml"):
         for name, shell in solids(root):
             middle = np.concatenate([r for rings in shell for r in rings]).mean(axis=0)
-            volume = sum(float(normal(r) @ (r[0] - middle)) for rings in shell for r in rings) / 6
-            assert volume > 0.5, name
+            signed_volume = sum(float(normal(r) @ (r[0] - middle)) for rings in shell for r in rings) / 6
+            assert signed_volume > 0.5, name
 
 
-def test_holes_turn_against_their_outer_ring(either: Path) -> None:
+def test_interior_rings_have_the_opposite_orientation(either: Path) -> None:
     holes = 0
-    for root in trees(either, "buildings_*.gml"):
-        for rings in polygons(root).values():
+    for root in parse_files(either, "buildings_*.gml"):
+        for rings in rings_by_polygon(root).values():
             outer, *inner = rings.values()
             for hole in inner:
                 assert normal(hole) @ normal(outer) < 0
@@ -63,9 +63,9 @@ def test_holes_turn_against_their_outer_ring(either: Path) -> None:
     assert holes > 0
 
 
-def test_ids_are_unique_and_links_lead_somewhere(either: Path) -> None:
+def test_ids_are_unique_and_links_resolve(either: Path) -> None:
     ids: Counter[str] = Counter()
-    for root in trees(either):
+    for root in parse_files(either):
         own = [e.attrib[GML + "id"] for e in root.iter() if GML + "id" in e.attrib]
         ids.update(own)
         known = set(own)
@@ -78,33 +78,33 @@ def test_ids_are_unique_and_links_lead_somewhere(either: Path) -> None:
 
 
 def test_every_texture_exists(either: Path) -> None:
-    for root in trees(either):
+    for root in parse_files(either):
         found = list(textures(root))
         assert found
         for uri, _, _ in found:
             assert (either / "citygml" / uri).is_file(), uri
 
 
-def test_every_ring_of_a_target_has_its_coordinates(either: Path) -> None:
-    for root in trees(either):
-        lengths = {ring: len(points) for rings in polygons(root).values() for ring, points in rings.items()}
+def test_every_ring_of_a_target_has_texture_coordinates(either: Path) -> None:
+    for root in parse_files(either):
+        lengths = {ring: len(points) for rings in rings_by_polygon(root).values() for ring, points in rings.items()}
         for _, _, coordinates in textures(root):
             for ring, uv in coordinates.items():
                 assert len(uv) == lengths[ring], ring
                 assert np.array_equal(uv[0], uv[-1]), ring
 
 
-def test_every_polygon_has_a_look(either: Path) -> None:
-    for root in trees(either):
-        looks = {e.attrib["uri"][1:] for e in root.iter(APP + "target") if "uri" in e.attrib}
-        looks |= {e.text[1:] for e in root.iter(APP + "target") if e.text and e.text.startswith("#")}
-        assert set(polygons(root)) <= looks
+def test_every_polygon_has_a_material(either: Path) -> None:
+    for root in parse_files(either):
+        targets = {e.attrib["uri"][1:] for e in root.iter(APP + "target") if "uri" in e.attrib}
+        targets |= {e.text[1:] for e in root.iter(APP + "target") if e.text and e.text.startswith("#")}
+        assert set(rings_by_polygon(root)) <= targets
 
 
-def test_atlas_coordinates_lie_in_the_painted_part(either: Path) -> None:
-    """No texel under a texture coordinate is magenta, and some of each town's atlases stays unused."""
+def test_atlas_coordinates_are_in_the_used_part(either: Path) -> None:
+    """No texel at a texture coordinate is magenta, and each town has unused atlas area."""
     unused = []
-    for root in trees(either, "buildings_*.gml"):
+    for root in parse_files(either, "buildings_*.gml"):
         for uri, mode, coordinates in textures(root):
             if mode != "none":
                 continue
@@ -121,21 +121,21 @@ def test_atlas_coordinates_lie_in_the_painted_part(either: Path) -> None:
     assert np.mean(unused) > 0.03
 
 
-def test_some_repeating_textures_run_beyond_one(either: Path) -> None:
-    largest = [uv.max() for root in trees(either, "buildings_*.gml") for _, mode, c in textures(root) if mode == "wrap" for uv in c.values()]
+def test_some_repeating_textures_have_coordinates_beyond_1(either: Path) -> None:
+    largest = [uv.max() for root in parse_files(either, "buildings_*.gml") for _, mode, c in textures(root) if mode == "wrap" for uv in c.values()]
     assert max(largest) > 1.5
 
 
-def test_buildings_lie_in_the_envelope_of_their_file(either: Path) -> None:
-    for root in trees(either, "buildings_*.gml"):
+def test_buildings_are_in_the_envelope_of_their_file(either: Path) -> None:
+    for root in parse_files(either, "buildings_*.gml"):
         low, high = (numbers(root.findtext(f".//{GML}{c}Corner"), 3)[0] for c in ("lower", "upper"))
-        points = np.concatenate([r for rings in polygons(root).values() for r in rings.values()])
+        points = np.concatenate([r for rings in rings_by_polygon(root).values() for r in rings.values()])
         assert (points >= low).all()
         assert (points <= high).all()
 
 
 def test_buildings_have_attributes(either: Path) -> None:
-    for root in trees(either, "buildings_*.gml"):
+    for root in parse_files(either, "buildings_*.gml"):
         for building in root.iter(BLDG + "Building"):
             assert building.findtext(GML + "name")
             assert building.findtext(BLDG + "function")
@@ -143,7 +143,7 @@ def test_buildings_have_attributes(either: Path) -> None:
 
 
 def test_trees_share_one_prototype_per_species(either: Path) -> None:
-    for root in trees(either, "trees_*.gml"):
+    for root in parse_files(either, "trees_*.gml"):
         own = root.findall(f".//{CORE}relativeGMLGeometry/{GML}MultiSurface")
         every = root.findall(f".//{CORE}relativeGMLGeometry")
         assert 1 <= len(own) < len(every)
@@ -153,7 +153,7 @@ def test_trees_share_one_prototype_per_species(either: Path) -> None:
             assert np.array_equal(m[3], [0, 0, 0, 1])
 
 
-def test_leaf_textures_cut_out(either: Path) -> None:
+def test_leaf_textures_have_transparent_pixels(either: Path) -> None:
     for path in sorted((either / "citygml" / "textures").glob("*.png")):
         alpha = np.asarray(Image.open(path))[..., 3]
         assert set(np.unique(alpha)) == {0, 255}
@@ -161,5 +161,5 @@ def test_leaf_textures_cut_out(either: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["Window", "Door"])
-def test_openings_are_modelled_in_part_of_the_town(town: Path, kind: str) -> None:
-    assert sum(len(list(root.iter(BLDG + kind))) for root in trees(town, "buildings_*.gml")) > 0
+def test_some_buildings_have_modelled_openings(town: Path, kind: str) -> None:
+    assert sum(len(list(root.iter(BLDG + kind))) for root in parse_files(town, "buildings_*.gml")) > 0

@@ -1,4 +1,4 @@
-"""What is written validates against the CityGML 2.0 schemas; they lie beside the data that MAP3D_DATA names."""
+"""The files are valid CityGML 2.0; the schemas are in the folder `standards` next to MAP3D_DATA."""
 
 import os
 from pathlib import Path
@@ -9,7 +9,7 @@ DATA = os.environ.get("MAP3D_DATA")
 MODULES = ("building", "appearance", "generics", "vegetation")
 
 
-@pytest.mark.skipif(not DATA, reason="MAP3D_DATA is not set: the CityGML schemas are not at hand")
+@pytest.mark.skipif(not DATA, reason="set MAP3D_DATA for the CityGML schemas")
 def test_citygml_is_valid(either: Path) -> None:
     etree = pytest.importorskip("lxml.etree")
     home = Path(str(DATA)).resolve().parent / "standards" / "citygml"

@@ -1,5 +1,5 @@
-"""The tea time scene: a green teapot on the origin and a green cube beside it."""
+"""The teatime scene: a green teapot at the origin and a green cube next to it."""
 
-from map3d_town.teatime.scene import write_teatime
+from map3d_town.teatime.teatime_scene import write_teatime
 
 __all__ = ["write_teatime"]

@@ -1,4 +1,4 @@
-"""Laws of the tea time scene."""
+"""Laws of the teatime scene."""
 
 from collections import Counter
 from pathlib import Path
@@ -7,26 +7,26 @@ import numpy as np
 import pytest
 
 from map3d_town.teatime import write_teatime
-from map3d_town.teatime.scene import CUBE_CENTRE, CUBE_SIDE, cube
-from map3d_town.teatime.teapot import Mesh, bezier, teapot, volume
+from map3d_town.teatime.teapot import ClosedMesh, bezier, signed_volume, teapot
+from map3d_town.teatime.teatime_scene import CUBE_CENTRE, CUBE_SIDE, cube
 
 
 @pytest.fixture(scope="module", params=["teapot", "cube"])
-def mesh(request: pytest.FixtureRequest) -> Mesh:
+def mesh(request: pytest.FixtureRequest) -> ClosedMesh:
     return teapot(8.0, 8) if request.param == "teapot" else cube()
 
 
-def test_every_edge_is_shared_by_two_triangles_in_opposite_directions(mesh: Mesh) -> None:
+def test_every_edge_is_shared_by_two_triangles_in_opposite_directions(mesh: ClosedMesh) -> None:
     edges = Counter((int(t[i]), int(t[(i + 1) % 3])) for t in mesh.triangles for i in range(3))
     assert set(edges.values()) == {1}
     assert all((b, a) in edges for a, b in edges)
 
 
-def test_volume_is_positive(mesh: Mesh) -> None:
-    assert volume(mesh.points, mesh.triangles) > 0
+def test_volume_is_positive(mesh: ClosedMesh) -> None:
+    assert signed_volume(mesh.points, mesh.triangles) > 0
 
 
-def test_normals_are_unit_and_agree_with_the_winding(mesh: Mesh) -> None:
+def test_normals_are_unit_and_agree_with_the_winding(mesh: ClosedMesh) -> None:
     assert np.allclose(np.linalg.norm(mesh.normals, axis=2), 1)
     a, b, c = (mesh.points[mesh.triangles[:, i]] for i in range(3))
     flat = np.cross(b - a, c - a)
@@ -54,7 +54,7 @@ def test_teapot_and_cube_do_not_touch() -> None:
     assert teapot(8.0, 8).points[:, 0].max() < CUBE_CENTRE[0] - CUBE_SIDE / 2
 
 
-def test_patch_goes_through_its_corners() -> None:
+def test_patch_contains_its_corners() -> None:
     control = np.random.default_rng(1).normal(size=(4, 4, 3))
     surface = bezier(control, 5)
     assert np.allclose(surface[[0, 0, -1, -1], [0, -1, 0, -1]], control[[0, 0, -1, -1], [0, -1, 0, -1]])

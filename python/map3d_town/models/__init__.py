@@ -1,0 +1,1 @@
+"""Builds 3D models of planned buildings and trees."""

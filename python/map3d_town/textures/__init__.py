@@ -1,0 +1,1 @@
+"""Draws textures from facade designs and noise."""

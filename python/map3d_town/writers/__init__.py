@@ -1,0 +1,1 @@
+"""Writes CityGML, OBJ and GeoTIFF files."""
