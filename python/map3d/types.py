@@ -102,7 +102,7 @@ class Layer:
             expected = f"{least} to {most}" if least < most else f"{most or 'none'}"
             raise BadRequest(f"layer {self.name}: got {len(self.suns)} suns, expected {expected} for kind {self.kind}")
         if (self.kind in RADIUS_KINDS) != (self.radius_m is not None):
-            raise BadRequest(f"layer {self.name}: radius is {self.radius_m}; only layers of kind {' and '.join(RADIUS_KINDS)} take one")
+            raise BadRequest(f"layer {self.name}: radius is {self.radius_m}; only the kinds {' and '.join(RADIUS_KINDS)} take one")
         low, high = AO_RADIUS_M
         if self.radius_m is not None and not low <= self.radius_m <= high:
             raise BadRequest(f"layer {self.name}: radius is {self.radius_m:g} m, expected {low:g} to {high:g} m")

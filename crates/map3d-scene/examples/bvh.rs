@@ -1,4 +1,4 @@
-//! `bvh CHUNK…`: builds the trees of chunk files anew; seconds of one core and bytes, each by the million or by the triangle.
+//! `bvh CHUNK…`: rebuilds the BVH of chunk files; prints CPU seconds per million triangles and bytes per triangle.
 
 use std::path::Path;
 

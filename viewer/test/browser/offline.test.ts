@@ -32,7 +32,7 @@ async function start(page: Page, rendering: string): Promise<void> {
   }), [bed.url(rendering), VIEW] as const);
 }
 
-/** Downloads what is in view; stopped after some tiles when it is told so. */
+/** Downloads the visible area; on request, stops after some tiles. */
 const download = (page: Page, stopAfter = Infinity): Promise<{ area?: Offline.StoredArea; why?: string; progress: Offline.AreaProgress[] }> => page.evaluate(async (most) => {
   const g = globalThis as unknown as Kept;
   const [ending, progress] = [new AbortController(), [] as Offline.AreaProgress[]];
@@ -173,7 +173,7 @@ test.each(rows)("the page saves itself and the view for offline use: %s", async 
     await page.waitForFunction(() => location.hash.length > 5);
     await page.waitForTimeout(1500);
     const { width = 0, height = 0 } = options.viewport ?? {};
-    const shoot = (): Promise<Buffer> => page.screenshot({ clip: { x: width / 2 - 180, y: height / 2 - 160, width: 360, height: 300 } }); // the picture, without what lies over it
+    const shoot = (): Promise<Buffer> => page.screenshot({ clip: { x: width / 2 - 180, y: height / 2 - 160, width: 360, height: 300 } }); // the map without its controls
     for (let last = await shoot(), same = 0, left = 30; ; left--) {
       await page.waitForTimeout(700);
       const next = await shoot();

@@ -108,7 +108,7 @@ describe("a fault is detected, and at tile edges only", () => {
   test.each(each)("%s, %s, pixel ratio %d", async (_, way, dpr, least, breakIt) => {
     const { page } = await start(way, dpr);
     await page.evaluate(breakIt);
-    await errorsAt(page, way, dpr, 1.6, MIDDLES[0]); // other tiles, so that those of the next place are put together anew
+    await errorsAt(page, way, dpr, 1.6, MIDDLES[0]); // other tiles, so that those of the next position are composed from scratch
     const found = await errorsAt(page, way, dpr, 3.2671, MIDDLES[0]);
     expect(found.edges, found.at).toBeGreaterThan(least);
     expect(found.elsewhere).toBeLessThan(TOLERANCE[way]);

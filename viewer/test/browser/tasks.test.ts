@@ -41,7 +41,7 @@ interface Opened {
   readonly problems: string[];
 }
 
-/** The page with the town, at rest; `hash`: as somebody has sent it. */
+/** Opens the page with the town and waits until it is idle; `hash`: the fragment of a shared link. */
 async function open(query = "", hash = ""): Promise<Opened> {
   const { page, problems } = await bed.openPage(PHONE);
   await page.context().grantPermissions(["clipboard-read", "clipboard-write"]);
@@ -120,7 +120,7 @@ test("turn to the back of a building", async () => {
   await page.waitForFunction(() => location.hash.startsWith("#180-45/"));
   await expect.poll(() => offMiddle(placeOf(page, [-45, -4, 17])), { timeout: 20_000 }).toBeLessThan(3);
   expect(await page.locator("#info h2").textContent()).toBe("Town hall");
-  // What lies in the middle is its north wall, seen from the north.
+  // The centre shows its north wall, seen from the north.
   const { frame, u, v } = cameraOf(page);
   expect(trace(frame, u, v)?.id).toBe(17);
   await page.locator("#info .close").tap();
