@@ -112,6 +112,6 @@ fn hit_box(result: &VisBuf, b: &Box3) -> Option<(i32, GroupBox)> {
     let side = SUBTILE_PX as f64;
     let overlaps = x + eu >= 0.0 && x - eu <= side && y + ev >= 0.0 && y - ev <= side;
     let near = (d - ed - frame.d0_m) * DEPTH_UNITS_PER_M - 2.0;
-    let groups = GroupBox::new((x - eu) as f32, (y - ev) as f32, (x + eu) as f32, (y + ev) as f32);
+    let groups = GroupBox::new([(x - eu) as f32, (y - ev) as f32, (x + eu) as f32, (y + ev) as f32]);
     overlaps.then(|| (least_depth_key((near as f32).next_down()), groups))
 }

@@ -42,11 +42,18 @@ impl LoadedPart {
     }
 
     /// Returns the local corners of a leaf's triangle. The sum of a chunk's origin and a position is exact.
+    #[inline(always)]
     pub fn triangle_corners(&self, leaf: &Leaf, lane: usize) -> [Vec3; 3] {
-        let (origin, transform) = (self.chunk.origin(), self.transform());
-        [0, 3, 6].map(|c| {
-            let p = [0, 1, 2].map(|k| origin[k] + f64::from(leaf.corners[c + k][lane]));
-            transform.map_or(p, |t| place(t, p))
-        })
+        let origin = self.chunk.origin();
+        let mut out = [[0.0; 3]; 3];
+        for (c, corner) in out.iter_mut().enumerate() {
+            for k in 0..3 {
+                corner[k] = origin[k] + f64::from(leaf.corners[3 * c + k][lane]);
+            }
+        }
+        if let Some(t) = self.transform() {
+            out.iter_mut().for_each(|p| *p = place(t, *p));
+        }
+        out
     }
 }

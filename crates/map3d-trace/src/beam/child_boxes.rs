@@ -63,6 +63,6 @@ impl ChildBoxes {
 
     #[inline(always)]
     pub fn groups(&self, child: usize) -> GroupBox {
-        GroupBox::new(self.x[0][child], self.y[0][child], self.x[1][child], self.y[1][child])
+        GroupBox::new([self.x[0][child], self.y[0][child], self.x[1][child], self.y[1][child]])
     }
 }

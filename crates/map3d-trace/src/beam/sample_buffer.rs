@@ -33,24 +33,22 @@ pub(crate) struct VisibleTriangle {
     pub tie_break: TieBreak,
 }
 
-/// The groups that a box of pixels overlaps: first and last column and row, both included.
+/// The groups that a box of pixels overlaps: first column and row, last column and row. (Kept as an array, which the compiler copies as one word.)
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct GroupBox {
-    x0: u8,
-    y0: u8,
-    x1: u8,
-    y1: u8,
-}
+pub(crate) struct GroupBox([u8; 4]);
 
 impl GroupBox {
-    pub const ALL: Self = Self { x0: 0, y0: 0, x1: GROUPS_PER_ROW as u8 - 1, y1: GROUPS_PER_ROW as u8 - 1 };
+    pub const ALL: Self = Self([0, 0, GROUPS_PER_ROW as u8 - 1, GROUPS_PER_ROW as u8 - 1]);
 
-    /// Arguments in pixels from the sub-tile's corner.
+    /// `pixels`: least x and y, greatest x and y in pixels from the sub-tile's corner.
     #[inline(always)]
-    pub fn new(x0: f32, y0: f32, x1: f32, y1: f32) -> Self {
+    pub fn new(pixels: [f32; 4]) -> Self {
         const LAST_PX: f32 = (SUBTILE_PX - 1) as f32;
-        let group = |pixel: f32| pixel.clamp(0.0, LAST_PX) as u8 >> 3;
-        Self { x0: group(x0), y0: group(y0), x1: group(x1), y1: group(y1) }
+        let mut out = [0; 4];
+        for k in 0..4 {
+            out[k] = pixels[k].clamp(0.0, LAST_PX) as u8 >> 3;
+        }
+        Self(out)
     }
 }
 
@@ -129,8 +127,9 @@ impl SampleBuffer {
     /// Returns whether a depth key of at least `near` can still win a sample in the groups.
     #[inline(always)]
     pub fn can_win<L: Lanes>(&mut self, near: i32, groups: GroupBox) -> bool {
-        for row in usize::from(groups.y0)..=usize::from(groups.y1) {
-            for column in usize::from(groups.x0)..=usize::from(groups.x1) {
+        let GroupBox([x0, y0, x1, y1]) = groups;
+        for row in usize::from(y0)..=usize::from(y1) {
+            for column in usize::from(x0)..=usize::from(x1) {
                 let group = (row * GROUPS_PER_ROW + column) & 63;
                 if near > self.group_far[group] {
                     continue;
