@@ -151,8 +151,8 @@ def _print(rows: list[PeerRow], agreements: list[PeerAgreement]) -> None:
     for column in ("peer", "px", "pictures", "tiles", "peer", *ours):
         table.add_column(column, justify="left" if column == "peer" and not table.columns else "right")
     for row in rows:
-        beside = [text for color in COLORS for text in (f"{row.ours_per_s[color]:.1f}", f"{row.ratio[color]:.1f} ×")]
-        table.add_row(row.peer, str(row.px), str(row.pictures), str(row.tiles), f"{row.tiles_per_s:.1f}", *beside)
+        cells = [text for color in COLORS for text in (f"{row.ours_per_s[color]:.1f}", f"{row.ratio[color]:.1f} ×")]
+        table.add_row(row.peer, str(row.px), str(row.pictures), str(row.tiles), f"{row.tiles_per_s:.1f}", *cells)
     console = Console(width=140)
     console.print(table)
     for agreement in agreements:
