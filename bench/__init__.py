@@ -1,1 +1,1 @@
-"""Benchmarks: `python -m bench`. Peers stand beside us in the same run; read figures as ratios, machines are shared."""
+"""Benchmarks: `python -m bench`. Peers run in turns with map3d. Read figures as ratios, because machines are shared."""

@@ -1,4 +1,4 @@
-"""`python -m bench [PART …] [--json]`; parts: tiles, light, encoding, ingest, incremental (these, unless some are named), extent, stored, viewer."""
+"""`python -m bench [PART …] [--json]`; parts: tiles, light, encoding, ingest, incremental (the default), extent, stored, viewer."""
 
 import argparse
 import json
@@ -9,35 +9,35 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from . import encoding, extent, incremental, ingest, light, stored, tiles, viewer
-from .scene import CACHE
+from . import encoding, extent, incremental, ingest, light_layers, stored, tiles, viewer
+from .benchmark_scene import CACHE
 
 PARTS = ("tiles", "light", "encoding", "ingest", "incremental")
-ASKED = ("extent", "stored", "viewer")
+ON_REQUEST = ("extent", "stored", "viewer")
 Rows = list[dict[str, Any]]
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="bench", description="Speed, peers beside us in the same run.")
-    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)} (these unless given), {', '.join(ASKED)}")
+    parser = argparse.ArgumentParser(prog="bench", description="Measures speed, with peers in the same run.")
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"{', '.join(PARTS)} (default: these), {', '.join(ON_REQUEST)}")
     parser.add_argument("--millions", type=float, nargs="+", default=extent.MILLIONS, help="extent: sizes in million triangles")
-    parser.add_argument("--buildings", type=int, default=300, help="tiles: of the town")
-    parser.add_argument("--res", type=float, default=0.2, help="tiles: metres a pixel")
-    parser.add_argument("--tiles", type=int, default=48, help="tiles: how many")
-    parser.add_argument("--folders", type=Path, nargs="+", default=[CACHE], help="stored: where renderings or published folders lie")
-    parser.add_argument("--quick", action="store_true", help="viewer: a small town without peers, to see that it works")
-    parser.add_argument("--reps", type=int, default=5, help="viewer: rounds")
+    parser.add_argument("--buildings", type=int, default=300, help="tiles: number of buildings of the town")
+    parser.add_argument("--res", type=float, default=0.2, help="tiles: metres per pixel")
+    parser.add_argument("--tiles", type=int, default=48, help="tiles: number of tiles")
+    parser.add_argument("--folders", type=Path, nargs="+", default=[CACHE], help="stored: folders with renderings or published folders")
+    parser.add_argument("--quick", action="store_true", help="viewer: a small town without peers, as a smoke test")
+    parser.add_argument("--reps", type=int, default=5, help="viewer: number of rounds")
     parser.add_argument("--only", nargs="+", help="viewer: measures, e.g. first frames")
-    parser.add_argument("--free", action="store_true", help="viewer: vsync off, for machines whose browser draws with a GPU")
-    parser.add_argument("--work", type=Path, default=CACHE / "viewer", help="viewer: folder for cities and samples, 9 GB")
+    parser.add_argument("--free", action="store_true", help="viewer: disable vsync, for browsers with a GPU")
+    parser.add_argument("--work", type=Path, default=CACHE / "viewer", help="viewer: folder for cities and samples; needs 9 GB")
     parser.add_argument("--json", action="store_true", help="print one JSON document after the tables")
     options = parser.parse_args()
-    unknown = [part for part in options.parts if part not in PARTS + ASKED]
+    unknown = [part for part in options.parts if part not in PARTS + ON_REQUEST]
     if unknown:
-        parser.error(f"no part {unknown[0]}; there are {', '.join(PARTS + ASKED)}")
+        parser.error(f"unknown part {unknown[0]!r}; choose from {', '.join(PARTS + ON_REQUEST)}")
     measures: dict[str, Callable[[], Rows]] = {
-        "tiles": lambda: of_tiles(options.buildings, options.res, options.tiles),
-        "light": light.measure,
+        "tiles": lambda: measure_tiles(options.buildings, options.res, options.tiles),
+        "light": light_layers.measure,
         "encoding": encoding.measure,
         "ingest": ingest.measure,
         "incremental": incremental.measure,
@@ -50,17 +50,17 @@ def main() -> None:
         print(json.dumps(rows, indent=1, default=str))
 
 
-def of_tiles(buildings: int, res_m: float, count: int) -> Rows:
-    """Rows for both colour formats; the table is printed."""
+def measure_tiles(buildings: int, res_m: float, count: int) -> Rows:
+    """Measures both colour formats and prints the table; returns its rows and those of the peers."""
     rows = [tiles.measure(buildings, res_m, count, color) for color in ("webp", "jpeg")]
-    table = Table(title=f"base tiles a second, 256 px, 16 samples, four layers, {buildings} buildings at {res_m} m a pixel")
+    table = Table(title=f"base tiles per second, 256 px, 16 samples, four layers, {buildings} buildings at {res_m} m per pixel")
     for column in ("triangles", "tiles", "colour", "one core", "one core, encoded", "all cores, encoded"):
         table.add_column(column, justify="right")
     for row in rows:
         rates = [f"{row[key]:.1f}" for key in ("one_core", "one_core_encoded", "all_cores_encoded")]
         table.add_row(f"{row['triangles']:,}", str(row["tiles"]), row["color"], *rates)
     Console().print(table)
-    return [*rows, tiles.peers(buildings, res_m)]
+    return [*rows, tiles.measure_peers(buildings, res_m)]
 
 
 if __name__ == "__main__":

@@ -1,7 +1,6 @@
-"""A large town from one district, placed many times: each place is an asset of its own, moved, with image files of its own.
+"""Builds a large town from translated copies of one district; each copy has its own assets and images.
 
-The images of a copy show the same, but their bytes differ by a comment, so they are other textures to map3d: each is prepared, kept, read and decoded
-for itself.
+The images of copies differ by a JPEG comment, so map3d treats them as different textures and prepares, stores, reads and decodes each.
 """
 
 import hashlib
@@ -21,21 +20,21 @@ HEADER_BYTES = 64
 
 
 @dataclass(frozen=True)
-class Copies:
-    """Puts copies of the assets of one scene of a workspace into another, `pitch_m` apart."""
+class DistrictCopier:
+    """Copies the assets of one scene of a workspace to another, `pitch_m` apart."""
 
     workspace: Workspace
     source: str
     scene: str
     pitch_m: float
 
-    def put(self, catalogue: Catalogue, number: int) -> None:
-        """The copy of this number, 0 …: the first n fill a square as nearly as n allows."""
-        column, row = place(number)
-        self.put_at(catalogue, number, np.array([column * self.pitch_m, row * self.pitch_m, 0.0]))
+    def add_copy(self, catalogue: Catalogue, number: int) -> None:
+        """Adds copy number 0, 1, …; the first n copies fill a square as far as possible."""
+        column, row = copy_position(number)
+        self.add_copy_at(catalogue, number, np.array([column * self.pitch_m, row * self.pitch_m, 0.0]))
 
-    def put_at(self, catalogue: Catalogue, number: int, offset: "np.ndarray[Any, np.dtype[np.float64]]") -> None:
-        """A copy moved by `offset` (metres); a number is a name."""
+    def add_copy_at(self, catalogue: Catalogue, number: int, offset: "np.ndarray[Any, np.dtype[np.float64]]") -> None:
+        """Adds a copy translated by `offset` in metres; `number` gives its name."""
         template = catalogue.scene(self.source)
         origin = catalogue.pin_scene(self.scene, crs=template.crs, origin=template.origin).origin
         assert origin is not None, "the source has assets"
@@ -53,22 +52,22 @@ class Copies:
                 catalogue.put_asset(record)
 
 
-def place(number: int) -> tuple[int, int]:
-    """Column and row: squares of 1, 4, 9, … places grow by an L."""
+def copy_position(number: int) -> tuple[int, int]:
+    """Returns column and row of a copy: the first 1, 4, 9, … copies are squares."""
     side = int(np.sqrt(number))
     rest = number - side * side
     return (side, rest) if rest <= side else (rest - side - 1, side)
 
 
 def copy_asset(source: Path, folder: Path, comment: str, offset: "np.ndarray[Any, np.dtype[np.float64]]") -> None:
-    """An asset folder without ids, moved by `offset` (metres)."""
+    """Copies an asset folder, without ids, translated by `offset` in metres."""
     (folder / "textures").mkdir(parents=True)
-    keys = {path.stem: _other_image(path, folder / "textures", comment) for path in sorted((source / "textures").iterdir())}
+    keys = {path.stem: _copy_image(path, folder / "textures", comment) for path in sorted((source / "textures").iterdir())}
     tables = json.loads((source / "materials.json").read_text(encoding="utf-8"))
     for material in tables["materials"]:
         material["texture"] = keys.get(material["texture"])
         if material["alpha"] is not None:
-            raise SystemExit(f"bench: {source}: has images that cut out; make the town without trees")
+            raise SystemExit(f"bench: {source}: has textures with alpha; generate the town without trees")
     (folder / "materials.json").write_text(json.dumps(tables), encoding="utf-8")
     (folder / "objects.jsonl").write_bytes((source / "objects.jsonl").read_bytes())
     data = np.fromfile(source / "mesh.m3a", np.uint8)
@@ -78,8 +77,8 @@ def copy_asset(source: Path, folder: Path, comment: str, offset: "np.ndarray[Any
     data.tofile(folder / "mesh.m3a")
 
 
-def _other_image(path: Path, folder: Path, comment: str) -> str:
-    """A JPEG with one more comment; returns its key."""
+def _copy_image(path: Path, folder: Path, comment: str) -> str:
+    """Copies a JPEG with an additional comment; returns its key."""
     data = path.read_bytes()
     if data[:2] != b"\xff\xd8":
         raise SystemExit(f"bench: {path}: not a JPEG")

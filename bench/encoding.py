@@ -1,4 +1,4 @@
-"""What a layer of a tile costs in bytes and milliseconds: as the core writes it, and by other encoders. `python -m bench encoding`."""
+"""Bytes and milliseconds per tile and layer, for the core's encoders and others: `python -m bench encoding`."""
 
 import io
 import json
@@ -17,19 +17,19 @@ from rich.table import Table
 from map3d import _core
 from map3d.geometry.frames import core_frame
 
-from .scene import prepared
-from .tiles import busy_tiles
+from .benchmark_scene import prepare_scene
+from .tiles import choose_tiles
 
-Pixels = NDArray[np.uint8]
+TilePixels = NDArray[np.uint8]
 Encode = Callable[[int], bytes]
-"""Number of a tile → image bytes."""
+"""Encodes the tile of a number."""
 QUALITIES = (60, 70, 80, 90)
 DATA = ("normal", "id", "depth")
 
 
 @dataclass(frozen=True)
-class Row:
-    """Means over the tiles; `psnr_db` in sRGB over wholly covered pixels, None where lossless."""
+class EncodingRow:
+    """Means over the tiles; `psnr_db`: in sRGB over fully covered pixels, None if lossless."""
 
     layer: str
     encoder: str
@@ -39,32 +39,34 @@ class Row:
 
 
 def measure(buildings: int = 300, res_m: float = 0.2, count: int = 48, rounds: int = 3) -> list[dict[str, Any]]:
-    """Rows by layer; the table is printed as Markdown. Encoders take turns, each with its least round of processor time."""
-    folder, frames = prepared(buildings, res_m, "webp")
+    """Measures all layers and prints the table, also as Markdown. Encoders take turns; the fastest round counts."""
+    folder, frames = prepare_scene(buildings, res_m, "webp")
     frame = core_frame(next(iter(frames.values())))
     scene = _core.Scene(str(folder), 1 << 30)
-    buffers = [scene.gbuffer(frame, *tile) for tile in busy_tiles(scene, frame, count)]
-    rows = [row for layer in ("color", *DATA) for row in of_layer(layer, buffers, rounds)]
+    buffers = [scene.gbuffer(frame, *tile) for tile in choose_tiles(scene, frame, count)]
+    rows = [row for layer in ("color", *DATA) for row in measure_layer(layer, buffers, rounds)]
     _print(rows, len(buffers))
     return [asdict(row) for row in rows]
 
 
-def of_layer(layer: str, buffers: list[dict[str, NDArray[Any]]], rounds: int) -> list[Row]:
+def measure_layer(layer: str, buffers: list[dict[str, NDArray[Any]]], rounds: int) -> list[EncodingRow]:
     arrays = [buffer[layer] for buffer in buffers]
     pixels = [_core.decode_png(_core.encode_layer(layer, "png", array)) for array in arrays]
-    encoders = _of_color(arrays, pixels) if layer == "color" else _of_data(layer, arrays, pixels)
+    encoders = _color_encoders(arrays, pixels) if layer == "color" else _data_encoders(layer, arrays, pixels)
     numbers = range(len(arrays))
-    spent = {name: min(times) for name, times in _turns(encoders, numbers, rounds).items()}
+    spent = {name: min(times) for name, times in _time_encoders(encoders, numbers, rounds).items()}
     rows = []
     for name, encode in encoders.items():
         done = [encode(number) for number in numbers]
         lossy = layer == "color" and not name.endswith(LOSSLESS)
         quality = np.mean([_psnr(pixels[number], done[number]) for number in numbers]) if lossy else None
-        rows.append(Row(layer, name, float(np.mean([len(data) for data in done])), 1000 * spent[name] / len(done), quality and float(quality)))
+        rows.append(
+            EncodingRow(layer, name, float(np.mean([len(data) for data in done])), 1000 * spent[name] / len(done), quality and float(quality))
+        )
     return rows
 
 
-def _turns(encoders: dict[str, Encode], numbers: range, rounds: int) -> dict[str, list[float]]:
+def _time_encoders(encoders: dict[str, Encode], numbers: range, rounds: int) -> dict[str, list[float]]:
     times: dict[str, list[float]] = {name: [] for name in encoders}
     for _ in range(rounds):
         for name, encode in encoders.items():
@@ -78,7 +80,7 @@ def _turns(encoders: dict[str, Encode], numbers: range, rounds: int) -> dict[str
 LOSSLESS = ("png", "png, small", "lossless", "level 1", "level 6", "level 9")
 
 
-def _of_color(arrays: list[NDArray[Any]], pixels: list[Pixels]) -> dict[str, Encode]:
+def _color_encoders(arrays: list[NDArray[Any]], pixels: list[TilePixels]) -> dict[str, Encode]:
     images = [Image.fromarray(tile) for tile in pixels]
     plain = [image.convert("RGB") for image in images]
     found: dict[str, Encode] = {}
@@ -88,15 +90,15 @@ def _of_color(arrays: list[NDArray[Any]], pixels: list[Pixels]) -> dict[str, Enc
         found[f"core {form} q80 small"] = lambda k, form=form: _core.encode_layer("color", form, arrays[k], 80, True)
     found["core png"] = lambda k: _core.encode_layer("color", "png", arrays[k])
     for method in (0, 4, 6):
-        found[f"Pillow webp q80 method {method}"] = lambda k, method=method: _saved(images[k], "WEBP", quality=80, method=method)
+        found[f"Pillow webp q80 method {method}"] = lambda k, method=method: _encode_with_pillow(images[k], "WEBP", quality=80, method=method)
     for name, sampling in (("4:4:4", 0), ("4:2:0", 2)):
-        found[f"Pillow jpeg q80 {name}"] = lambda k, sampling=sampling: _saved(plain[k], "JPEG", quality=80, subsampling=sampling)
-    found["Pillow jpeg q80 4:2:0 optimised"] = lambda k: _saved(plain[k], "JPEG", quality=80, optimize=True)
-    found["Pillow avif q60 speed 10"] = lambda k: _saved(images[k], "AVIF", quality=60, speed=10, max_threads=1)
-    return found | _exact(images)
+        found[f"Pillow jpeg q80 {name}"] = lambda k, sampling=sampling: _encode_with_pillow(plain[k], "JPEG", quality=80, subsampling=sampling)
+    found["Pillow jpeg q80 4:2:0 optimised"] = lambda k: _encode_with_pillow(plain[k], "JPEG", quality=80, optimize=True)
+    found["Pillow avif q60 speed 10"] = lambda k: _encode_with_pillow(images[k], "AVIF", quality=60, speed=10, max_threads=1)
+    return found | _lossless_encoders(images)
 
 
-def _of_data(layer: str, arrays: list[NDArray[Any]], pixels: list[Pixels]) -> dict[str, Encode]:
+def _data_encoders(layer: str, arrays: list[NDArray[Any]], pixels: list[TilePixels]) -> dict[str, Encode]:
     images = [Image.fromarray(tile) for tile in pixels]
     found: dict[str, Encode] = {
         "core png": lambda k: _core.encode_layer(layer, "png", arrays[k]),
@@ -105,34 +107,34 @@ def _of_data(layer: str, arrays: list[NDArray[Any]], pixels: list[Pixels]) -> di
     raw = [tile.tobytes() for tile in pixels]
     for level in (1, 6, 9):
         found[f"zlib of the raw bytes, level {level}"] = lambda k, level=level: zlib.compress(raw[k], level)
-    return found | _exact(images)
+    return found | _lossless_encoders(images)
 
 
-def _exact(images: list[Image.Image]) -> dict[str, Encode]:
+def _lossless_encoders(images: list[Image.Image]) -> dict[str, Encode]:
     found: dict[str, Encode] = {}
     for level in (1, 6, 9):
-        found[f"Pillow png level {level}"] = lambda k, level=level: _saved(images[k], "PNG", compress_level=level)
+        found[f"Pillow png level {level}"] = lambda k, level=level: _encode_with_pillow(images[k], "PNG", compress_level=level)
     for method in (0, 4):
-        found[f"Pillow webp method {method} lossless"] = lambda k, method=method: _saved(
+        found[f"Pillow webp method {method} lossless"] = lambda k, method=method: _encode_with_pillow(
             images[k], "WEBP", lossless=True, exact=True, method=method, quality=50
         )
     return found
 
 
-def _saved(image: Image.Image, form: str, **options: Any) -> bytes:
+def _encode_with_pillow(image: Image.Image, form: str, **options: Any) -> bytes:
     out = io.BytesIO()
     image.save(out, form, **options)
     return out.getvalue()
 
 
-def _psnr(tile: Pixels, data: bytes) -> float:
+def _psnr(tile: TilePixels, data: bytes) -> float:
     seen = np.array(Image.open(io.BytesIO(data)).convert("RGB"), float)
     covered = tile[..., 3] == 255 if tile.shape[-1] == 4 else np.ones(tile.shape[:2], bool)
     error = ((seen - tile[..., :3])[covered] ** 2).mean()
     return float(10 * np.log10(255**2 / max(error, 1e-9)))
 
 
-def _print(rows: list[Row], count: int) -> None:
+def _print(rows: list[EncodingRow], count: int) -> None:
     table = Table(title=f"encoding, means of {count} tiles, one core", title_justify="left")
     for column in ("layer", "encoder", "bytes", "ms", "PSNR, dB"):
         table.add_column(column, justify="left" if column in ("layer", "encoder") else "right")

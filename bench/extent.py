@@ -1,7 +1,8 @@
-"""Out of core: a town that grows in extent at one density, rendered within a fixed memory. `python -m bench extent`.
+"""Out-of-core rendering of towns of growing extent and equal density within a fixed memory: `python -m bench extent`.
 
-One district of 300 buildings with terrain and textures, without trees, is placed as often as a size asks for (bench/district.py). For each size
-the scene is built from nothing, a rendering planned, and the same number of base blocks rendered by two workers within 1 GiB (bench/extent_work.py).
+Each size consists of copies of one district of 300 buildings with terrain and textures, without trees (bench/district.py). For each size the
+benchmark builds the scene from scratch, plans a rendering, and renders the same number of base blocks in two workers within 1 GiB
+(bench/extent_programs.py).
 """
 
 import json
@@ -17,75 +18,75 @@ from rich.table import Table
 
 from map3d.catalogue import Catalogue, Workspace
 
-from .district import Copies
-from .plot import plot
-from .scene import CACHE, _do
-from .watch import Figures, watched
+from .benchmark_scene import CACHE, run_verb
+from .district import DistrictCopier
+from .resource_monitor import ResourceUsage, run_monitored
+from .svg_plot import plot
 
 MILLIONS = (1, 3, 10)
 BUILDINGS, BLOCKS, RES_M, TEXTURE_PX = 300, 40, 0.04, 512
 BYTES_PER_TRIANGLE, SPARE_BYTES = 380, 1 << 30
-"""Disk at the peak, as measured: assets, textures, chunks, and what the build spills while it makes them."""
+"""Measured peak disk usage of assets, textures, chunks and temporary files of the build."""
 MIB = 1 << 20
 Row = dict[str, Any]
 
 
 def measure(millions: tuple[float, ...] = MILLIONS, folder: Path = CACHE / "extent", plots: Path | None = None, blocks: int = BLOCKS) -> list[Row]:
-    """A row a size, smallest first; the table is printed as Markdown, `plots` is where the pictures go. What was measured before is kept beside."""
+    """Measures each size, prints the table and draws plots into `plots`. Returns the rows, with those of earlier runs in `folder`."""
     kept = folder / "sizes.json"
     rows: list[Row] = json.loads(kept.read_text()) if kept.is_file() else []
-    _check_room(folder, max(millions))
+    _check_disk(folder, max(millions))
     workspace = Workspace(folder / "workspace").create()
     try:
-        _district(workspace, folder)
+        _create_district(workspace, folder)
         for size in sorted(millions):
-            row = _measured(workspace, folder, size, blocks)
+            row = _measure_size(workspace, folder, size, blocks)
             rows = sorted([*(old for old in rows if old["millions"] != size), row], key=lambda row: row["triangles"])
             kept.write_text(json.dumps(rows, indent=1))
-            Console().print(f"{row['triangles']:,} triangles: {row['wall_tile_ms']:.1f} ms a tile, {row['memory_bytes'] / MIB:.0f} MiB")
+            Console().print(f"{row['triangles']:,} triangles: {row['wall_tile_ms']:.1f} ms per tile, {row['memory_bytes'] / MIB:.0f} MiB")
     finally:
         shutil.rmtree(workspace.root)
     _print(rows)
     if plots is not None:
-        draw(rows, plots)
+        draw_plots(rows, plots)
     return rows
 
 
-def _check_room(folder: Path, millions: float) -> None:
+def _check_disk(folder: Path, millions: float) -> None:
     need = int(millions * 1e6 * BYTES_PER_TRIANGLE) + SPARE_BYTES
     folder.mkdir(parents=True, exist_ok=True)
     free = shutil.disk_usage(folder).free
     if free < need:
-        raise SystemExit(f"bench: {need / 1e9:.0f} GB are needed in {folder}, {free / 1e9:.0f} GB are free")
+        raise SystemExit(f"bench: {folder} needs {need / 1e9:.0f} GB, but only {free / 1e9:.0f} GB are free")
 
 
-def _district(workspace: Workspace, folder: Path) -> None:
-    """The scene that is copied, made once."""
+def _create_district(workspace: Workspace, folder: Path) -> None:
+    """Creates the scene of the district, once."""
     town, where = folder / "town", ["-w", str(workspace.root)]
     if not (town / "town.json").is_file():
-        _do(["make-town", "-o", str(town), "--buildings", str(BUILDINGS), "--seed", "7", "--texture-px", str(TEXTURE_PX), "--no-trees"])
+        run_verb(["make-town", "-o", str(town), "--buildings", str(BUILDINGS), "--seed", "7", "--texture-px", str(TEXTURE_PX), "--no-trees"])
     for scene in ("district", "extent"):
-        _do(["create-scene", scene, *where])
-    _do(["add-files", "district", str(town), *where])
+        run_verb(["create-scene", scene, *where])
+    run_verb(["add-files", "district", str(town), *where])
 
 
-def _measured(workspace: Workspace, folder: Path, millions: float, blocks: int) -> Row:
+def _measure_size(workspace: Workspace, folder: Path, millions: float, blocks: int) -> Row:
     pitch_m = json.loads((folder / "town" / "town.json").read_text())["extent_m"]
-    copies = Copies(workspace, "district", "extent", pitch_m)
+    copies = DistrictCopier(workspace, "district", "extent", pitch_m)
     catalogue = workspace.open_catalogue()
     try:
         each = sum(asset.report["triangles"] for asset in catalogue.assets("district"))
-        there = len(catalogue.assets("extent")) // len(catalogue.assets("district"))
+        copied = len(catalogue.assets("extent")) // len(catalogue.assets("district"))
         count = max(1, round(millions * 1e6 / each))
-        for number in range(there, count):
-            copies.put(catalogue, number)
-        _forget_build(workspace, catalogue)
+        for number in range(copied, count):
+            copies.add_copy(catalogue, number)
+        _delete_build(workspace, catalogue)
     finally:
         catalogue.close()
-    name, out, program = f"size-{count}", folder / "answer.json", ["-m", "bench.extent_work"]
-    built = _watched([*program, "build", str(workspace.root), "extent"], folder)
-    _do(["create-rendering", "extent", name, "--res", str(RES_M), "--view", "0/45", "--color", "jpeg", "-w", str(workspace.root)])
-    work = _watched([*program, "render", str(workspace.root), name, str(blocks), str(out)], folder)
+    name, out, program = f"size-{count}", folder / "answer.json", ["-m", "bench.extent_programs"]
+    built = _run_monitored([*program, "build", str(workspace.root), "extent"], folder)
+    run_verb(["create-rendering", "extent", name, "--res", str(RES_M), "--view", "0/45", "--color", "jpeg", "-w", str(workspace.root)])
+    work = _run_monitored([*program, "render", str(workspace.root), name, str(blocks), str(out)], folder)
     answer: Row = json.loads(out.read_text())
     out.unlink()
     figures = {f"build_{key}": value for key, value in asdict(built).items() if key in ("wall_s", "cpu_s", "memory_bytes", "anonymous_bytes")}
@@ -93,8 +94,8 @@ def _measured(workspace: Workspace, folder: Path, millions: float, blocks: int) 
     return {**sizes, **answer, **figures, "memory_bytes": work.memory_bytes, "anonymous_bytes": work.anonymous_bytes}
 
 
-def _forget_build(workspace: Workspace, catalogue: Catalogue) -> None:
-    """So that the next build is one from nothing."""
+def _delete_build(workspace: Workspace, catalogue: Catalogue) -> None:
+    """Deletes the built files, so the next build starts from scratch."""
     scene = workspace.scene_folder("extent")
     for name in ("chunks", "textures", "build"):
         shutil.rmtree(scene / name, ignore_errors=True)
@@ -102,9 +103,9 @@ def _forget_build(workspace: Workspace, catalogue: Catalogue) -> None:
     catalogue.set_built("extent", "")
 
 
-def _watched(words: list[str], folder: Path) -> Figures:
-    figures = Figures()
-    if watched([sys.executable, *words], folder, figures) != 0:
+def _run_monitored(words: list[str], folder: Path) -> ResourceUsage:
+    figures = ResourceUsage()
+    if run_monitored([sys.executable, *words], folder, figures) != 0:
         raise SystemExit(f"bench: {' '.join(words)} failed")
     return figures
 
@@ -113,12 +114,12 @@ COLUMNS = (
     "triangles, M",
     "build, CPU s per M",
     "build, MiB",
-    "of it not files",
+    "of it anonymous",
     "open, s",
     "plan, s",
     "base blocks",
     "render, MiB",
-    "of it not files",
+    "of it anonymous",
     "tile, ms",
     "CPU ms",
     "chunks missed",
@@ -126,8 +127,8 @@ COLUMNS = (
 )
 
 
-def cells(row: Row) -> Iterator[str]:
-    """Of the table."""
+def table_cells(row: Row) -> Iterator[str]:
+    """Yields the cells of a row of the table."""
     million = row["triangles"] / 1e6
     yield f"{million:.1f}"
     yield f"{row['build_cpu_s'] / million:.2f}"
@@ -146,17 +147,17 @@ def cells(row: Row) -> Iterator[str]:
 
 
 def _print(rows: list[Row]) -> None:
-    table = Table(title=f"a town that grows, {BLOCKS} base blocks at {RES_M} m a pixel, two workers, 1 GiB", title_justify="left")
+    table = Table(title=f"towns of growing extent, {BLOCKS} base blocks at {RES_M} m per pixel, two workers, 1 GiB", title_justify="left")
     for column in COLUMNS:
         table.add_column(column, justify="right")
     for row in rows:
-        table.add_row(*cells(row))
+        table.add_row(*table_cells(row))
     Console(width=200).print(table)
-    for line in (COLUMNS, ["---"] * len(COLUMNS), *(list(cells(row)) for row in rows)):
+    for line in (COLUMNS, ["---"] * len(COLUMNS), *(list(table_cells(row)) for row in rows)):
         print(f"| {' | '.join(line)} |")
 
 
-def draw(rows: list[Row], folder: Path) -> None:
+def draw_plots(rows: list[Row], folder: Path) -> None:
     x = [row["triangles"] / 1e6 for row in rows]
 
     def line(key: str, unit: float) -> list[tuple[float, float]]:

@@ -1,4 +1,4 @@
-"""How much room equal tiles would take if each were kept by itself, in stores and published archives. `python -m bench stored --folders FOLDER…`."""
+"""Disk space that stores and published archives save by storing equal tiles once: `python -m bench stored --folders FOLDER…`."""
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
@@ -14,8 +14,8 @@ from map3d.tiles.tile_store import content_hash
 
 
 @dataclass(frozen=True)
-class Row:
-    """`distinct` of the `tiles` differ; `each_bytes` if every tile lay by itself, `kept_bytes` as it is; `entries` of an archive's directories."""
+class DuplicateRow:
+    """Sizes of a layer; `each_bytes`: without, `kept_bytes`: with deduplication; `entries`: number of an archive's directory entries."""
 
     file: str
     layer: str
@@ -27,10 +27,10 @@ class Row:
 
 
 def measure(folders: list[Path]) -> list[dict[str, Any]]:
-    """Rows for each layer of the tile stores and archives below some folders; the table is printed."""
-    rows = [row for folder in folders for path in sorted(folder.rglob("*")) for row in of_file(path)]
+    """Measures each layer of the tile stores and archives in some folders, and prints the table."""
+    rows = [row for folder in folders for path in sorted(folder.rglob("*")) for row in measure_file(path)]
     table = Table(title="equal tiles", title_justify="left")
-    for column in ("file", "layer", "tiles", "distinct", "each by itself, MB", "as kept, MB", "saved", "entries"):
+    for column in ("file", "layer", "tiles", "distinct", "without sharing, MB", "stored, MB", "saved", "entries"):
         table.add_column(column, justify="left" if column in ("file", "layer") else "right")
     for row in rows:
         saved = 1 - row.kept_bytes / row.each_bytes if row.each_bytes else 0.0
@@ -40,15 +40,15 @@ def measure(folders: list[Path]) -> list[dict[str, Any]]:
     return [asdict(row) for row in rows]
 
 
-def of_file(path: Path) -> Iterator[Row]:
+def measure_file(path: Path) -> Iterator[DuplicateRow]:
     if path.suffix == ".pmtiles":
-        yield of_archive(path)
+        yield measure_archive(path)
     elif path.suffix == ".sqlite" and path.parent.parent.name == "renderings":
-        yield from of_store(path)
+        yield from measure_store(path)
 
 
-def of_store(path: Path) -> Iterator[Row]:
-    """By layer. What is kept are the bytes of distinct tiles; the store shares them between layers too."""
+def measure_store(path: Path) -> Iterator[DuplicateRow]:
+    """Yields a row per layer. `kept_bytes` is the size of its distinct tiles, though the store also shares tiles between layers."""
     with SqliteTileStore(path, read_only=True) as store:
         for number, layer in enumerate(store.shape.layers):
             sizes, total, count = {}, 0, 0
@@ -56,15 +56,15 @@ def of_store(path: Path) -> Iterator[Row]:
                 data = store.get_tile(number, *tile) or b""
                 sizes[content_hash(data)] = len(data)
                 total, count = total + len(data), count + 1
-            yield Row(path.name, layer.name, count, len(sizes), total, sum(sizes.values()))
+            yield DuplicateRow(path.name, layer.name, count, len(sizes), total, sum(sizes.values()))
 
 
-def of_archive(path: Path) -> Row:
-    """What is kept is the length of the archive's tile data."""
+def measure_archive(path: Path) -> DuplicateRow:
+    """Returns the row of an archive; `kept_bytes` is the length of its tile data."""
     with path.open("rb") as file:
         source = pmtiles.reader.MmapSource(file)
         header = pmtiles.reader.Reader(source).header()
         tiles = [data for _, data in pmtiles.reader.traverse(source, header, header["root_offset"], header["root_length"])]
     distinct = len({content_hash(data) for data in tiles})
     kept, entries = header["tile_data_length"], header["tile_entries_count"]
-    return Row(path.name, path.parent.name, len(tiles), distinct, sum(map(len, tiles)), kept, entries)
+    return DuplicateRow(path.name, path.parent.name, len(tiles), distinct, sum(map(len, tiles)), kept, entries)

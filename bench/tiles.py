@@ -1,4 +1,4 @@
-"""Non-empty base tiles a second: ours with and without encoding, per core and in total."""
+"""Base tiles with content per second, with and without encoding, on one core and on all."""
 
 import multiprocessing
 import os
@@ -14,17 +14,17 @@ from map3d import _core
 from map3d.geometry.frames import core_frame
 from map3d.tiles.occupancy import xy_from_morton
 
-from . import beside
-from .scene import CACHE, Fields, prepared
+from . import peer_comparison
+from .benchmark_scene import CACHE, FrameFields, prepare_scene
 
 Tile = tuple[int, int]
 
 
-def busy_tiles(scene: _core.Scene, frame: _core.Frame, count: int) -> list[Tile]:
-    """Evenly chosen among the base tiles that have content."""
+def choose_tiles(scene: _core.Scene, frame: _core.Frame, count: int) -> list[Tile]:
+    """Returns evenly spaced base tiles with content."""
     places = occupied_tiles(scene, frame)
     chosen = places[:: max(1, len(places) // (2 * count))]
-    return with_content(scene, frame, chosen)[:count]
+    return tiles_with_content(scene, frame, chosen)[:count]
 
 
 def occupied_tiles(scene: _core.Scene, frame: _core.Frame) -> list[Tile]:
@@ -33,12 +33,12 @@ def occupied_tiles(scene: _core.Scene, frame: _core.Frame) -> list[Tile]:
     return sorted(zip(columns.tolist(), rows.tolist(), strict=True), key=lambda tile: tile[::-1])
 
 
-def with_content(scene: _core.Scene, frame: _core.Frame, places: list[Tile]) -> list[Tile]:
+def tiles_with_content(scene: _core.Scene, frame: _core.Frame, places: list[Tile]) -> list[Tile]:
     return [tile for tile in places if scene.gbuffer(frame, *tile)["id"].any()]
 
 
 def seconds(work: Callable[[], object], rounds: int = 3) -> float:
-    """Median wall time of a call."""
+    """Returns the median wall time of a call."""
     times = []
     for _ in range(rounds):
         begun = time.perf_counter()
@@ -59,7 +59,7 @@ def trace_and_encode(scene: _core.Scene, frame: _core.Frame, tiles: list[Tile]) 
             _core.encode_layer(layer.kind, layer.format, buffer[layer.kind], layer.quality)
 
 
-def _worker(folder: str, fields: Fields, tiles: list[Tile], ready: Any, go: Any, done: Any) -> None:
+def _worker(folder: str, fields: FrameFields, tiles: list[Tile], ready: Any, go: Any, done: Any) -> None:
     scene, frame = _core.Scene(folder), core_frame(fields)
     trace_and_encode(scene, frame, tiles)
     ready.release()
@@ -68,8 +68,8 @@ def _worker(folder: str, fields: Fields, tiles: list[Tile], ready: Any, go: Any,
     done.release()
 
 
-def all_cores(folder: Path, fields: Fields, tiles: list[Tile], cores: int) -> float:
-    """Seconds for all tiles, encoded, by one process a core with warm caches."""
+def all_cores(folder: Path, fields: FrameFields, tiles: list[Tile], cores: int) -> float:
+    """Returns the seconds to trace and encode all tiles in one process per core, with warm caches."""
     context = multiprocessing.get_context("spawn")
     ready, go, done = context.Semaphore(0), context.Event(), context.Semaphore(0)
     parts = [tiles[k::cores] for k in range(cores)]
@@ -89,12 +89,12 @@ def all_cores(folder: Path, fields: Fields, tiles: list[Tile], cores: int) -> fl
 
 
 def measure(buildings: int, res_m: float, count: int, color: str) -> dict[str, Any]:
-    """One row of the table; tiles a second."""
-    folder, frames = prepared(buildings, res_m, color)
+    """Returns a row of the table, in tiles per second."""
+    folder, frames = prepare_scene(buildings, res_m, color)
     fields = next(iter(frames.values()))
     frame = core_frame(fields)
     scene = _core.Scene(str(folder), 1 << 30)
-    tiles = busy_tiles(scene, frame, count)
+    tiles = choose_tiles(scene, frame, count)
     trace(scene, frame, tiles)
     cores = len(os.sched_getaffinity(0))
     plain = len(tiles) / seconds(lambda: trace(scene, frame, tiles))
@@ -111,13 +111,13 @@ def measure(buildings: int, res_m: float, count: int, color: str) -> dict[str, A
     }
 
 
-def peers(buildings: int, res_m: float) -> dict[str, Any]:
-    """The same town drawn by others, beside us."""
-    folder, frames = prepared(buildings, res_m, "webp")
+def measure_peers(buildings: int, res_m: float) -> dict[str, Any]:
+    """Compares with other renderers on the same town."""
+    folder, frames = prepare_scene(buildings, res_m, "webp")
     fields = next(iter(frames.values()))
     frame = core_frame(fields)
     scene = _core.Scene(str(folder), 1 << 30)
     places = occupied_tiles(scene, frame)
-    tiles = with_content(scene, frame, places)
+    tiles = tiles_with_content(scene, frame, places)
     shown = max(tiles, key=lambda tile: len(np.unique(scene.gbuffer(frame, *tile)["id"])))
-    return beside.measure(folder, fields, tiles, shown, pictures=CACHE / "pictures")
+    return peer_comparison.measure(folder, fields, tiles, shown, pictures=CACHE / "pictures")

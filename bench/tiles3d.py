@@ -1,8 +1,7 @@
-"""The same cities as 3D Tiles 1.1: districts as OBJ, made into GLB by npm's obj2gltf and glTF-Transform (bench/viewer/glb.mjs), in a quadtree.
+"""The cities of bench/city.py as 3D Tiles 1.1: a quadtree of GLB files, converted from OBJ by obj2gltf and glTF-Transform (bench/viewer/glb.mjs).
 
-A district is cut as its textures are: what shares an atlas is a tile, and so is each piece of the terrain. Every place has addresses of its own
-(the server finds the district's file behind them), as every place has texels of its own in the renderings. Coordinates: metres east, north and up of
-the scene's origin.
+The buildings that share an atlas are a tile, and so is each piece of terrain. Each cell has its own URLs, which the server maps to the files of its
+district, as each cell has its own texels in the renderings. Coordinates are metres east, north and up of the scene's origin.
 """
 
 import json
@@ -22,7 +21,7 @@ from PIL import Image
 
 from map3d import _core
 
-from .city import PLACE_M, SPECS, City, Place, assets_of
+from .city import CELL_M, SPECS, City, GridCell, assets_of
 
 GLB = Path(__file__).parent / "viewer" / "glb.mjs"
 Floats = NDArray[np.float64]
@@ -30,8 +29,8 @@ Box = tuple[Floats, Floats]
 
 
 @dataclass(frozen=True)
-class Part:
-    """Triangles of one asset: a tile of a district. `corners`: (n, 3, 3) local; `uvs`: (n, 3, 2); `materials`: (n,)."""
+class TilePart:
+    """The triangles of a tile, all of one asset. `corners`: (n, 3, 3) local; `uvs`: (n, 3, 2); `materials`: (n,) indices into `table`."""
 
     corners: Floats
     uvs: NDArray[np.float32]
@@ -46,34 +45,36 @@ class Part:
 
 
 def tileset(city: City, far: bool = False) -> Path:
-    """Writes what is missing of a city's tileset; returns the file to open. `far`: to look at all of it, a district is one mesh in plain colours."""
+    """Writes the missing files of a city's tileset; returns its root file. `far`: for views of the whole city, one plain mesh per district."""
     out = city.folder / "3dtiles"
     out.mkdir(parents=True, exist_ok=True)
-    kinds = sorted(set(city.places.values()))
-    boxes = {kind: _far_district(city.folder, out, kind) if far else write_tileset(parts(city.folder, kind), city.folder, kind) for kind in kinds}
+    kinds = sorted(set(city.cells.values()))
+    boxes = {
+        kind: _far_district(city.folder, out, kind) if far else write_tileset(district_parts(city.folder, kind), city.folder, kind) for kind in kinds
+    }
     path = out / f"{city.name}{'-far' * far}.json"
-    root = _node({at: kind + "-far" * far for at, kind in city.places.items()}, {kind + "-far" * far: box for kind, box in boxes.items()})
+    root = _quadtree_node({at: kind + "-far" * far for at, kind in city.cells.items()}, {kind + "-far" * far: box for kind, box in boxes.items()})
     path.write_text(json.dumps({"asset": {"version": "1.1"}, "geometricError": 2 * root["geometricError"], "root": {**root, "refine": "ADD"}}))
     return path
 
 
-def parts(folder: Path, kind: str) -> list[Part]:
-    """The district's tiles, the largest last."""
+def district_parts(folder: Path, kind: str) -> list[TilePart]:
+    """Returns the tiles of a district."""
     spec = SPECS[kind]
-    return parts_of(assets_of(folder, kind), np.array([spec.east_m, spec.north_m, spec.height_m]))
+    return read_tile_parts(assets_of(folder, kind), np.array([spec.east_m, spec.north_m, spec.height_m]))
 
 
-def parts_of(assets: list[Path], origin: Floats) -> list[Part]:
-    """The tiles of some asset folders; corners become local to `origin`, (3,) in the scene's CRS."""
+def read_tile_parts(assets: list[Path], origin: Floats) -> list[TilePart]:
+    """Returns the tiles of some asset folders, with corners relative to `origin`, (3,) in the scene's CRS."""
     found = []
     for asset in assets:
         mesh = Mesh.read(asset / "mesh.m3a")
         given = json.loads((asset / "materials.json").read_text())
-        rows, corners = _placed(mesh, given["instances"], origin)
-        group = _groups(mesh.objects[rows], mesh.materials[rows], given["materials"])
+        rows, corners = _world_corners(mesh, given["instances"], origin)
+        group = _tile_groups(mesh.objects[rows], mesh.materials[rows], given["materials"])
         for number in np.unique(group):
             mine = group == number
-            found.append(Part(corners[mine], mesh.uvs[rows[mine]], mesh.materials[rows[mine]], given["materials"], asset / "textures"))
+            found.append(TilePart(corners[mine], mesh.uvs[rows[mine]], mesh.materials[rows[mine]], given["materials"], asset / "textures"))
     return found
 
 
@@ -94,8 +95,8 @@ class Mesh:
         return cls(mesh.positions, mesh.triangles, mesh.uvs, mesh.materials, mesh.objects, mesh.prototypes)
 
 
-def _placed(mesh: Mesh, instances: list[dict[str, Any]], origin: Floats) -> tuple[NDArray[np.int64], Floats]:
-    """(n,) numbers and (n, 3, 3) local corners of the triangles as they stand in the scene: those of a prototype once for each instance."""
+def _world_corners(mesh: Mesh, instances: list[dict[str, Any]], origin: Floats) -> tuple[NDArray[np.int64], Floats]:
+    """Returns (n,) numbers and (n, 3, 3) local corners of the triangles, those of prototypes once per instance."""
     rows = [np.flatnonzero(mesh.prototypes == 0)]
     corners = [mesh.positions[mesh.triangles[rows[0]]] - origin]
     for instance in instances:
@@ -105,8 +106,8 @@ def _placed(mesh: Mesh, instances: list[dict[str, Any]], origin: Floats) -> tupl
     return np.concatenate(rows), np.concatenate(corners)
 
 
-def _groups(objects: NDArray[np.uint32], materials: NDArray[np.uint32], table: list[dict[str, Any]]) -> NDArray[np.int64]:
-    """The tile of each triangle: the atlas, or piece of terrain, that most of its object's triangles have."""
+def _tile_groups(objects: NDArray[np.uint32], materials: NDArray[np.uint32], table: list[dict[str, Any]]) -> NDArray[np.int64]:
+    """Returns the tile of each triangle: the atlas or terrain texture of most triangles of its object."""
     own = np.array([index if re.match(r"textures/a\d|terrain", entry["name"]) else -1 for index, entry in enumerate(table)])[materials]
     result = np.zeros(len(objects), np.int64)
     for number in np.unique(objects):
@@ -116,8 +117,8 @@ def _groups(objects: NDArray[np.uint32], materials: NDArray[np.uint32], table: l
     return result
 
 
-def write_obj(part: Part, folder: Path) -> Path:
-    """An OBJ with z up, its MTL and its textures, triangles of a material together, normals of faces."""
+def write_obj(part: TilePart, folder: Path) -> Path:
+    """Writes an OBJ with z up and face normals, its MTL and textures; returns the OBJ."""
     folder.mkdir(parents=True, exist_ok=True)
     normal = np.cross(part.corners[:, 1] - part.corners[:, 0], part.corners[:, 2] - part.corners[:, 0])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -143,10 +144,10 @@ def write_obj(part: Part, folder: Path) -> Path:
     return path
 
 
-def write_tileset(tiles: list[Part], folder: Path, name: str, mipmaps: bool = False) -> Box:
-    """GLBs and the tileset NAME.json of some tiles in `folder`/3dtiles, coordinates as they are; returns the box of all. GLBs that are there stay.
+def write_tileset(tiles: list[TilePart], folder: Path, name: str, mipmaps: bool = False) -> Box:
+    """Writes the missing GLBs and the tileset NAME.json of some tiles in `folder`/3dtiles; returns the bounding box.
 
-    `mipmaps`: textures ask for them, as pictures need; without, as obj2gltf has them.
+    `mipmaps`: enables mipmapping of textures, which obj2gltf does not.
     """
     out = folder / "3dtiles"
     out.mkdir(parents=True, exist_ok=True)
@@ -157,29 +158,29 @@ def write_tileset(tiles: list[Part], folder: Path, name: str, mipmaps: bool = Fa
             jobs.append({"obj": str(obj), "glb": str(out / f"{name}-{number}.glb"), "mipmaps": mipmaps})
     _make_glbs(jobs, name)
     boxes = [part.box for part in tiles]
-    whole = _united(boxes)
-    children = [{**_volume(box, 0.0), "content": {"uri": f"{name}-{number}.glb"}} for number, box in enumerate(boxes)]
-    root = {**_volume(whole), "refine": "ADD", "children": children}
+    whole = _union_boxes(boxes)
+    children = [{**_bounding_volume(box, 0.0), "content": {"uri": f"{name}-{number}.glb"}} for number, box in enumerate(boxes)]
+    root = {**_bounding_volume(whole), "refine": "ADD", "children": children}
     (out / f"{name}.json").write_text(json.dumps({"asset": {"version": "1.1"}, "geometricError": 2 * root["geometricError"], "root": root}))
     return whole
 
 
 def _far_district(folder: Path, out: Path, kind: str) -> Box:
-    """All triangles of a district in one mesh, each in its mean colour, of 256."""
-    tiles, glb = parts(folder, kind), out / f"{kind}-far.glb"
+    """Writes a district as one mesh, each triangle in its mean colour out of 256."""
+    tiles, glb = district_parts(folder, kind), out / f"{kind}-far.glb"
     if not glb.is_file():
-        part = plainly_coloured(tiles, folder / "obj" / f"{kind}-palette")
+        part = with_mean_colors(tiles, folder / "obj" / f"{kind}-palette")
         _make_glbs([{"obj": str(write_obj(part, folder / "obj" / f"{kind}-far")), "glb": str(glb)}], glb.stem)
-    box = _united([part.box for part in tiles])
-    root = {**_volume(box, 0.0), "refine": "ADD", "content": {"uri": glb.name}}
-    (out / f"{kind}-far.json").write_text(json.dumps({"asset": {"version": "1.1"}, "geometricError": PLACE_M, "root": root}))
+    box = _union_boxes([part.box for part in tiles])
+    root = {**_bounding_volume(box, 0.0), "refine": "ADD", "content": {"uri": glb.name}}
+    (out / f"{kind}-far.json").write_text(json.dumps({"asset": {"version": "1.1"}, "geometricError": CELL_M, "root": root}))
     return box
 
 
-def plainly_coloured(tiles: list[Part], folder: Path) -> Part:
-    """One part of them all; its texture, written into `folder`, has 16 × 16 squares of one colour, and a triangle lies in the middle of one."""
+def with_mean_colors(tiles: list[TilePart], folder: Path) -> TilePart:
+    """Joins the tiles; the texture, written into `folder`, is a palette of 16 × 16 squares, and each triangle uses the centre of one."""
     folder.mkdir(parents=True, exist_ok=True)
-    colors = np.concatenate([_colors(part) for part in tiles])
+    colors = np.concatenate([_mean_colors(part) for part in tiles])
     picture = Image.fromarray(colors[None].astype(np.uint8)).quantize(256, dither=Image.Dither.NONE)
     index = np.asarray(picture)[0].astype(np.int64)
     palette = np.zeros((256, 3), np.uint8)
@@ -189,11 +190,11 @@ def plainly_coloured(tiles: list[Part], folder: Path) -> Part:
     uv = np.stack([(index % 16 + 0.5) / 16, 1 - (index // 16 + 0.5) / 16], axis=1).astype(np.float32)
     table = [{"name": "palette", "diffuse": [1, 1, 1, 1], "texture": "palette"}]
     corners = np.concatenate([part.corners for part in tiles])
-    return Part(corners, np.repeat(uv[:, None], 3, axis=1), np.zeros(len(index), np.uint32), table, folder)
+    return TilePart(corners, np.repeat(uv[:, None], 3, axis=1), np.zeros(len(index), np.uint32), table, folder)
 
 
-def _colors(part: Part) -> Floats:
-    """(n, 3) of sRGB 0..255: a triangle's texture, averaged to 64 × 64, at its middle."""
+def _mean_colors(part: TilePart) -> Floats:
+    """Returns (n, 3), sRGB 0..255: the texture at the centre of each triangle, averaged to 64 × 64."""
     result = np.zeros((len(part.corners), 3))
     for index in np.unique(part.materials):
         mine, entry = part.materials == index, part.table[index]
@@ -213,27 +214,27 @@ def _make_glbs(jobs: list[dict[str, Any]], name: str) -> None:
         subprocess.run(["node", str(GLB)], input=json.dumps(jobs), text=True, check=True)
 
 
-def _node(places: Mapping[Place, str], boxes: Mapping[str, Box], number: list[int] | None = None) -> dict[str, Any]:
-    """A quadtree over the places; a leaf is a district's tileset. Nodes above are empty, so that nothing may stand in for what they hold."""
+def _quadtree_node(cells: Mapping[GridCell, str], boxes: Mapping[str, Box], number: list[int] | None = None) -> dict[str, Any]:
+    """Returns a quadtree of cells; a leaf refers to a district's tileset. Inner nodes have no content."""
     counter = [0] if number is None else number
-    placed = {at: _moved(boxes[kind], at) for at, kind in places.items()}
-    whole = _volume(_united(list(placed.values())))
-    if len(places) == 1:
-        kind = next(iter(places.values()))
+    placed = {at: _translate_box(boxes[kind], at) for at, kind in cells.items()}
+    whole = _bounding_volume(_union_boxes(list(placed.values())))
+    if len(cells) == 1:
+        kind = next(iter(cells.values()))
         counter[0] += 1
-        offset = [PLACE_M * step for step in next(iter(places))]
+        offset = [CELL_M * step for step in next(iter(cells))]
         move = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, *offset, 0, 1]
-        leaf = {**_volume(boxes[kind]), "transform": move, "content": {"uri": f"place-{counter[0]}/{kind}.json"}}
+        leaf = {**_bounding_volume(boxes[kind]), "transform": move, "content": {"uri": f"place-{counter[0]}/{kind}.json"}}
         return {**whole, "children": [leaf]}
-    middle = [(min(at[axis] for at in places) + max(at[axis] for at in places)) / 2 for axis in (0, 1)]
-    quarters: dict[tuple[bool, bool], dict[Place, str]] = {}
-    for at, kind in places.items():
+    middle = [(min(at[axis] for at in cells) + max(at[axis] for at in cells)) / 2 for axis in (0, 1)]
+    quarters: dict[tuple[bool, bool], dict[GridCell, str]] = {}
+    for at, kind in cells.items():
         quarters.setdefault((at[0] > middle[0], at[1] > middle[1]), {})[at] = kind
-    return {**whole, "children": [_node(quarter, boxes, counter) for quarter in quarters.values()]}
+    return {**whole, "children": [_quadtree_node(quarter, boxes, counter) for quarter in quarters.values()]}
 
 
-def _volume(box: Box, error: float | None = None) -> dict[str, Any]:
-    """Of a tile; the error of one that shows nothing itself is its diameter."""
+def _bounding_volume(box: Box, error: float | None = None) -> dict[str, Any]:
+    """Returns bounding volume and geometric error of a tile; the default error is its diameter."""
     middle, half = (box[0] + box[1]) / 2, (box[1] - box[0]) / 2
     volume = [*middle, half[0], 0, 0, 0, half[1], 0, 0, 0, half[2]]
     return {
@@ -242,10 +243,10 @@ def _volume(box: Box, error: float | None = None) -> dict[str, Any]:
     }
 
 
-def _moved(box: Box, at: Place) -> Box:
-    offset = np.array([at[0] * PLACE_M, at[1] * PLACE_M, 0.0])
+def _translate_box(box: Box, at: GridCell) -> Box:
+    offset = np.array([at[0] * CELL_M, at[1] * CELL_M, 0.0])
     return box[0] + offset, box[1] + offset
 
 
-def _united(boxes: list[Box]) -> Box:
+def _union_boxes(boxes: list[Box]) -> Box:
     return np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)

@@ -1,7 +1,7 @@
-"""map3d.js beside CesiumJS, OpenSeadragon and Leaflet: `make bench-viewer`, `python -m bench viewer [--quick]`.
+"""Compares map3d.js with CesiumJS, OpenSeadragon and Leaflet: `make bench-viewer`, `python -m bench viewer [--quick]`.
 
 The cities come from bench/city.py, their 3D Tiles from bench/tiles3d.py; bench/viewer/run.mjs drives Chromium and writes a line for every sample,
-so that an interrupted run goes on where it was. Peers are npm packages in bench/viewer; without them only map3d.js is measured, and that is said.
+so an interrupted run can be resumed. Peers are npm packages in bench/viewer; without them it prints a warning and measures map3d.js only.
 """
 
 import json
@@ -18,20 +18,20 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from .city import PLACE_M, RINGS, City, made
+from .city import CELL_M, RINGS, City, publish_cities
 from .tiles3d import tileset
 
 HERE = Path(__file__).parent / "viewer"
 MIB = 1 << 20
 FIRST_BYTES, MEMORY_BYTES, LESS_CPU, BYTES_SPAN, CPU_SPAN = 1_000_000, 150_000_000, 5.0, 0.05, 0.2
-"""The goals: a first view, memory after five minutes, CesiumJS's processor time a frame over ours, how far figures may differ as a city grows."""
-Row = dict[str, Any]
+"""Goals: bytes of a first view, memory after use, CesiumJS's CPU time per frame over ours, changes with the size of the city."""
+SampleRow = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class Wish:
-    """What to measure. `length`: steps of a path; `use_s`, `idle_s`: seconds of use before memory is read, and of nothing after it;
-    `free`: pictures are not held back to the screen's pace (see measures.mjs)."""
+class ViewerRun:
+    """Options of a run. `length`: steps of a path; `use_s`, `idle_s`: seconds of use before, and of idling after memory is measured; `free`: frames
+    are not limited to the screen's rate (see measures.mjs)."""
 
     cities: tuple[str, ...] = tuple(RINGS)
     reps: int = 5
@@ -43,25 +43,25 @@ class Wish:
     only: tuple[str, ...] | None = None
 
 
-QUICK = Wish(cities=("1e4",), reps=1, length=8, use_s=5, idle_s=5, peers=False)
+QUICK = ViewerRun(cities=("1e4",), reps=1, length=8, use_s=5, idle_s=5, peers=False)
 
 
-def measure(quick: bool, reps: int, folder: Path, only: tuple[str, ...] | None, free: bool) -> list[Row]:
-    """All samples; the tables are printed. `only`: measures (see run.mjs)."""
-    wish = QUICK if quick else Wish(reps=reps, peers=peers(), only=only, free=free)
-    cities = list(made(folder, wish.cities))
+def measure(quick: bool, reps: int, folder: Path, only: tuple[str, ...] | None, free: bool) -> list[SampleRow]:
+    """Takes all samples and prints the tables. `only`: names of measures (see run.mjs)."""
+    run = QUICK if quick else ViewerRun(reps=reps, peers=peers_installed(), only=only, free=free)
+    cities = list(publish_cities(folder, run.cities))
     middle = cities[min(2, len(cities) - 1)]
-    if wish.peers:
+    if run.peers:
         for city in cities:
             tileset(city)
         tileset(middle, far=True)
-    samples = _samples(cities, wish, folder)
+    samples = _take_samples(cities, run, folder)
     _print(samples, cities, middle)
     return samples
 
 
-def peers() -> bool:
-    """Are they installed? Says so when not."""
+def peers_installed() -> bool:
+    """Returns whether the peers are installed; prints a warning if not."""
     if (HERE / "node_modules" / "cesium").is_dir():
         return True
     print(
@@ -70,69 +70,69 @@ def peers() -> bool:
     return False
 
 
-def _samples(cities: list[City], wish: Wish, folder: Path) -> list[Row]:
-    out = folder / ("quick.jsonl" if wish == QUICK else "samples.jsonl")
-    if wish == QUICK:
+def _take_samples(cities: list[City], run: ViewerRun, folder: Path) -> list[SampleRow]:
+    out = folder / ("quick.jsonl" if run == QUICK else "samples.jsonl")
+    if run == QUICK:
         out.unlink(missing_ok=True)
     asked = {
         "work": str(folder.absolute()),
         "out": str(out.absolute()),
-        "peers": wish.peers,
-        "cities": wish.cities,
-        "width_m": {city.name: PLACE_M * (2 * RINGS[city.name] + 1) for city in cities},
-        "reps": wish.reps,
-        "length": wish.length,
-        "use_s": wish.use_s,
-        "idle_s": wish.idle_s,
-        "only": wish.only,
-        "free": wish.free,
-        "pictures": wish.peers and wish.only is None,
+        "peers": run.peers,
+        "cities": run.cities,
+        "width_m": {city.name: CELL_M * (2 * RINGS[city.name] + 1) for city in cities},
+        "reps": run.reps,
+        "length": run.length,
+        "use_s": run.use_s,
+        "idle_s": run.idle_s,
+        "only": run.only,
+        "free": run.free,
+        "pictures": run.peers and run.only is None,
     }
     if shutil.which("node") is None:
-        raise SystemExit("bench: needs Node.js")
+        raise SystemExit("bench: Node.js is not installed")
     if subprocess.run(["node", str(HERE / "run.mjs")], input=json.dumps(asked), text=True, check=False).returncode != 0:
-        raise SystemExit("bench: bench/viewer/run.mjs failed; the same command again goes on where it was")
+        raise SystemExit("bench: bench/viewer/run.mjs failed; re-run to resume")
     return [json.loads(line) for line in out.read_text().splitlines()]
 
 
 @dataclass(frozen=True)
 class Samples:
-    """Medians over samples of one measure."""
+    """All samples, with medians per measure, viewer and city."""
 
-    rows: list[Row]
+    rows: list[SampleRow]
 
-    def of(self, measure: str, viewer: str, city: str) -> list[Row]:
+    def of(self, measure: str, viewer: str, city: str) -> list[SampleRow]:
         return [row for row in self.rows if (row["measure"], row["viewer"], row["city"]) == (measure, viewer, city)]
 
     def median(self, measure: str, viewer: str, city: str, *path: str) -> float | None:
-        values = [_at(row, path) for row in self.of(measure, viewer, city)]
+        values = [_value_at(row, path) for row in self.of(measure, viewer, city)]
         return statistics.median(values) if values else None
 
     def viewers(self, measure: str) -> list[str]:
         return list(dict.fromkeys(row["viewer"] for row in self.rows if row["measure"] == measure))
 
     def ratio(self, measure: str, viewer: str, city: str, *path: str) -> float | None:
-        """A viewer's over ours, of as many pixels where both were measured: median over the rounds."""
+        """Returns the median over the rounds of a viewer's figure over ours, at the same resolution if measured."""
         ours = self.of(measure, "map3d-css" if viewer.endswith("-css") else "map3d", city) or self.of(measure, "map3d", city)
         pairs = list(zip(self.of(measure, viewer, city), ours, strict=False))
-        return statistics.median(_at(theirs, path) / _at(ours, path) for theirs, ours in pairs) if pairs else None
+        return statistics.median(_value_at(theirs, path) / _value_at(ours, path) for theirs, ours in pairs) if pairs else None
 
 
-def _at(row: Row, path: Iterable[str]) -> float:
+def _value_at(row: SampleRow, path: Iterable[str]) -> float:
     value: Any = row
     for key in path:
         value = value[key]
     return float(value)
 
 
-def _number(value: float | None, form: str = "{:,.0f}") -> str:
+def _format(value: float | None, form: str = "{:,.0f}") -> str:
     return "" if value is None else form.format(value)
 
 
 Column = tuple[str, Callable[[str, str], str]]
 
 
-def _print(rows: list[Row], cities: list[City], middle: City) -> None:
+def _print(rows: list[SampleRow], cities: list[City], middle: City) -> None:
     samples, names = Samples(rows), [city.name for city in cities]
     triangles = {city.name: city.triangles for city in cities}
     loads = [row["load"] for row in rows]
@@ -140,7 +140,7 @@ def _print(rows: list[Row], cities: list[City], middle: City) -> None:
     for title, measure, columns in _tables(samples):
         shown = [(viewer, name) for viewer in samples.viewers(measure) for name in names if samples.of(measure, viewer, name)]
         if shown:
-            _table(title, ["viewer", "triangles", "rounds", *(name for name, _ in columns)]).fill(
+            MarkdownTable(title, ["viewer", "triangles", "rounds", *(name for name, _ in columns)]).fill(
                 [
                     [viewer, f"{triangles[name]:,}", str(len(samples.of(measure, viewer, name))), *(cell(viewer, name) for _, cell in columns)]
                     for viewer, name in shown
@@ -154,12 +154,12 @@ def _tables(samples: Samples) -> list[tuple[str, str, list[Column]]]:
     def plain(measure: str, form: str, *path: str, unit: float = 1) -> Callable[[str, str], str]:
         def cell(viewer: str, city: str) -> str:
             value = samples.median(measure, viewer, city, *path)
-            return _number(None if value is None else value / unit, form)
+            return _format(None if value is None else value / unit, form)
 
         return cell
 
     def ratio(measure: str, *path: str) -> Callable[[str, str], str]:
-        return lambda viewer, city: "" if viewer.startswith("map3d") else _number(samples.ratio(measure, viewer, city, *path), "{:.1f}")
+        return lambda viewer, city: "" if viewer.startswith("map3d") else _format(samples.ratio(measure, viewer, city, *path), "{:.1f}")
 
     def first(measure: str) -> list[Column]:
         return [
@@ -173,9 +173,9 @@ def _tables(samples: Samples) -> list[tuple[str, str, list[Column]]]:
 
     def frames(measure: str) -> list[Column]:
         return [
-            ("CPU a frame, ms", plain(measure, "{:.1f}", "cpu_ms")),
+            ("CPU per frame, ms", plain(measure, "{:.1f}", "cpu_ms")),
             ("ratio", ratio(measure, "cpu_ms")),
-            ("of it the page, ms", plain(measure, "{:.1f}", "page_ms")),
+            ("page only, ms", plain(measure, "{:.1f}", "page_ms")),
             ("ratio ", ratio(measure, "page_ms")),
             ("frame p50, ms", plain(measure, "{:.0f}", "p50_ms")),
             ("p95, ms", plain(measure, "{:.0f}", "p95_ms")),
@@ -185,25 +185,25 @@ def _tables(samples: Samples) -> list[tuple[str, str, list[Column]]]:
         ("use, s", plain("stays", "{:.0f}", "use_s")),
         ("PSS, MB", plain("stays", "{:.0f}", "used", "pss", unit=1e6)),
         ("beyond the empty page, MB", plain("stays", "{:.0f}", "beyond", "pss", unit=1e6)),
-        ("of it no files", plain("stays", "{:.0f}", "beyond", "anonymous", unit=1e6)),
-        ("after the minute, MB", plain("stays", "{:.0f}", "rested", "pss", unit=1e6)),
+        ("of it anonymous, MB", plain("stays", "{:.0f}", "beyond", "anonymous", unit=1e6)),
+        ("after idling, MB", plain("stays", "{:.0f}", "rested", "pss", unit=1e6)),
         ("idle frames", plain("stays", "{:.0f}", "idle", "frames")),
         ("requests", plain("stays", "{:.0f}", "idle", "requests")),
         ("CPU, ms/s", plain("stays", "{:.0f}", "idle", "cpu_ms_per_s")),
     ]
     return [
         ("first complete view of the district", "first", first("first")),
-        ("the same over 10 Mbit/s, 40 ms", "first-network", first("first-network")),
+        ("first complete view over 10 Mbit/s, 40 ms", "first-network", first("first-network")),
         ("the district: pan, zoom, turn", "frames", frames("frames")),
-        ("all of the city in view", "whole", frames("whole")),
+        ("whole city in view", "whole", frames("whole")),
         ("colour pyramid: first complete view", "color-first", first("color-first")),
         ("colour pyramid: pan", "color-frames", frames("color-frames")),
-        ("memory, and a minute of nothing", "stays", stays),
+        ("memory after use and after a minute idle", "stays", stays),
     ]
 
 
-class _table:
-    """Printed on the terminal, then as Markdown."""
+class MarkdownTable:
+    """A table, printed for the terminal, then as Markdown."""
 
     def __init__(self, title: str, columns: list[str]) -> None:
         self.title, self.columns = title, columns
@@ -221,36 +221,36 @@ class _table:
 
 
 def goals(samples: Samples, names: list[str], middle: str) -> list[str]:
-    """A line for each goal that could be measured: kept or missed."""
+    """Returns a line for each measured goal: kept or missed."""
     lines = []
 
-    def say(what: str, value: float | None, kept: Callable[[float], bool], form: str) -> None:
+    def add_line(what: str, value: float | None, kept: Callable[[float], bool], form: str) -> None:
         if value is not None:
             lines.append(f"{'kept  ' if kept(value) else 'MISSED'} {what}: {form.format(value)}")
 
-    say("first view at most 1 MB", samples.median("first", "map3d", middle, "bytes"), lambda value: value <= FIRST_BYTES, "{:,.0f} bytes")
-    for measure, what in (("frames", "the district"), ("whole", "all of it in view")):
+    add_line("first view at most 1 MB", samples.median("first", "map3d", middle, "bytes"), lambda value: value <= FIRST_BYTES, "{:,.0f} bytes")
+    for measure, what in (("frames", "the district"), ("whole", "whole city in view")):
         for viewer in ("cesium", "cesium-css"):
             value = samples.ratio(measure, viewer, middle, "cpu_ms")
-            say(f"five times less CPU a frame than {viewer}, {what}", value, lambda value: value >= LESS_CPU, "{:.1f} times")
-    say("memory at most 150 MB", samples.median("stays", "map3d", middle, "beyond", "pss"), lambda value: value <= MEMORY_BYTES, "{:,.0f} bytes")
+            add_line(f"five times less CPU per frame than {viewer}, {what}", value, lambda value: value >= LESS_CPU, "{:.1f} times")
+    add_line("memory at most 150 MB", samples.median("stays", "map3d", middle, "beyond", "pss"), lambda value: value <= MEMORY_BYTES, "{:,.0f} bytes")
     for what, measure, whose, path, span in (
         ("bytes", "first", "map3d", ("bytes",), BYTES_SPAN),
         ("requests", "first", "map3d", ("requests",), BYTES_SPAN),
-        ("CPU a frame", "frames", "map3d-css", ("cpu_ms",), CPU_SPAN),
+        ("CPU per frame", "frames", "map3d-css", ("cpu_ms",), CPU_SPAN),
     ):
         values = [value for name in names if (value := samples.median(measure, whose, name, *path)) is not None]
         if len(values) > 1:
             spread = max(abs(value / values[0] - 1) for value in values)
-            say(f"{what} the same as the city grows, within {span:.0%}", spread, lambda value, span=span: value <= span, "{:.1%}")
+            add_line(f"{what} the same as the city grows, within {span:.0%}", spread, lambda value, span=span: value <= span, "{:.1%}")
     for viewer in ("openseadragon", "leaflet"):
         for what, measure, path in (("time to the view", "color-first", ("ms",)), ("frame p95", "color-frames", ("p95_ms",))):
-            say(
+            add_line(
                 f"{what} at least as good as {viewer}'s",
                 samples.ratio(measure, viewer, middle, *path),
                 lambda value: value >= 1,
                 "theirs is {:.2f} of ours",
             )
     for what in ("frames", "requests"):
-        say(f"idle: no {what}", samples.median("stays", "map3d", middle, "idle", what), lambda value: value == 0, "{:.0f}")
+        add_line(f"idle: no {what}", samples.median("stays", "map3d", middle, "idle", what), lambda value: value == 0, "{:.0f}")
     return lines

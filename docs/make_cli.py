@@ -1,4 +1,4 @@
-"""`python docs/make_cli.py`: writes docs/cli.md, the reference of the command line, from the commands' own help."""
+"""`python docs/make_cli.py`: writes docs/cli.md, the reference of the command line, from the help of the commands."""
 
 from pathlib import Path
 from typing import Final

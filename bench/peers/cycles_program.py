@@ -1,8 +1,7 @@
-"""Blender's Cycles: run by a Python that has bpy (requirements/cycles.lock), told by lines of JSON what to draw, answering likewise.
+"""Renders with Blender's Cycles; runs in a Python with bpy (requirements/cycles.lock). Requests and responses are lines of JSON.
 
-First {"parts": file.npz, "looks": […], "cores"}; then {"matrix", "side_m", "px", "samples", "centres", "file"}: draws into a multilayer EXR;
-or {"read": file.exr, "into": file.npz}: what it drew as arrays, for comparing.
-It stands alone: bpy pins its own NumPy, and map3d is not installed there.
+The first is {"parts": file.npz, "materials": […], "cores"}. Then {"matrix", "side_m", "px", "samples", "centres", "file"} draws into a multilayer
+EXR, and {"read": file.exr, "into": file.npz} converts one to arrays for comparison. It does not import map3d, because bpy pins its own NumPy.
 """
 
 import json
@@ -15,22 +14,22 @@ import numpy as np
 FAR_M = 20_000.0
 
 
-def main(answers):
+def main(responses):
     scene = load(json.loads(sys.stdin.readline()))
-    print(json.dumps({"device": f"Blender {bpy.app.version_string}"}), file=answers, flush=True)
+    print(json.dumps({"device": f"Blender {bpy.app.version_string}"}), file=responses, flush=True)
     for line in sys.stdin:
         order = json.loads(line)
         read(order) if "read" in order else draw(scene, order)
-        print("{}", file=answers, flush=True)
+        print("{}", file=responses, flush=True)
 
 
 def load(setup):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     data = np.load(setup["parts"])
-    for number, look in enumerate(setup["looks"]):
-        add_part(scene, number, look, data)
-    settle(scene, setup["cores"])
+    for number, description in enumerate(setup["materials"]):
+        add_part(scene, number, description, data)
+    configure_render(scene, setup["cores"])
     camera = bpy.data.cameras.new("camera")
     camera.type, camera.clip_start, camera.clip_end = "ORTHO", 0.1, FAR_M
     scene.camera = bpy.data.objects.new("camera", camera)
@@ -38,10 +37,10 @@ def load(setup):
     return scene
 
 
-def add_part(scene, number, look, data):
-    """A mesh a material; a Blender object a city object, since only objects have numbers that Cycles does not average."""
+def add_part(scene, number, description, data):
+    """Adds a mesh per city object; Cycles does not average the numbers of objects."""
     corners, uvs, names = (data[f"{kind}{number}"] for kind in ("corners", "uvs", "names"))
-    material = make_material(number, look)
+    material = make_material(number, description)
     for name in np.unique(names):
         own = names == name
         mesh = bpy.data.meshes.new(f"p{number}")
@@ -55,30 +54,30 @@ def add_part(scene, number, look, data):
         mesh.uv_layers.new(name="uv").uv.foreach_set("vector", uvs[own].ravel())
         mesh.materials.append(material)
         mesh.update(calc_edges=True)
-        thing = bpy.data.objects.new(f"p{number}", mesh)
-        thing.pass_index = int(name)
-        scene.collection.objects.link(thing)
+        city_object = bpy.data.objects.new(f"p{number}", mesh)
+        city_object.pass_index = int(name)
+        scene.collection.objects.link(city_object)
 
 
-def make_material(number, look):
-    """Gives the texture's light back as it is: no lamp, no bounce, the quickest way to an unlit colour."""
+def make_material(number, description):
+    """Returns a material that emits its texture: without lamps and bounces the fastest way to an unlit colour."""
     material = bpy.data.materials.new(f"m{number}")
     material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
-    shine, out = nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeOutputMaterial")
-    links.new(shine.outputs[0], out.inputs["Surface"])
-    if look["image"] is None:
-        shine.inputs["Color"].default_value = (*look["diffuse"], 1.0)
+    emission, out = nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeOutputMaterial")
+    links.new(emission.outputs[0], out.inputs["Surface"])
+    if description["image"] is None:
+        emission.inputs["Color"].default_value = (*description["diffuse"], 1.0)
         return material
     texture = nodes.new("ShaderNodeTexImage")
-    texture.image = bpy.data.images.load(look["image"])
-    texture.extension = "REPEAT" if look["repeats"] else "EXTEND"
-    links.new(texture.outputs["Color"], shine.inputs["Color"])
+    texture.image = bpy.data.images.load(description["image"])
+    texture.extension = "REPEAT" if description["repeats"] else "EXTEND"
+    links.new(texture.outputs["Color"], emission.inputs["Color"])
     return material
 
 
-def settle(scene, cores):
+def configure_render(scene, cores):
     scene.render.engine = "CYCLES"
     scene.cycles.device, scene.cycles.max_bounces = "CPU", 0
     scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
@@ -96,7 +95,7 @@ def settle(scene, cores):
 
 
 def draw(scene, order):
-    """`matrix`: 4 × 4 camera → local, row by row."""
+    """Draws into a file. `matrix`: 4 × 4 camera to local, row-major."""
     matrix, side = order["matrix"], order["side_m"]
     camera = scene.camera
     camera.matrix_world = np.array(matrix).reshape(4, 4).T.tolist()
@@ -123,6 +122,6 @@ def read(order):
 
 
 if __name__ == "__main__":
-    answers = os.fdopen(os.dup(1), "w")
+    responses = os.fdopen(os.dup(1), "w")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-    main(answers)
+    main(responses)

@@ -1,4 +1,4 @@
-"""Mitsuba 3 (llvm_ad_rgb, all cores): albedo, depth, normal and triangle as output variables; a camera for each size, moved from square to square."""
+"""Mitsuba 3 (llvm_ad_rgb, all cores): albedo, depth, normal and triangle as output variables; one camera per size, moved from tile to tile."""
 
 import json
 from pathlib import Path
@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from map3d import _core
-from tests.oracle.asset import read_asset
+from tests.oracle.asset_reader import read_asset
 
-from . import Frame, Missing
-from .parts import filled_images, srgb_bytes
+from . import FrameFields, PeerMissing
+from .scene_parts import filled_images, srgb_bytes_from_linear
 
 VARIABLES = "albedo:albedo,depth:depth,normal:sh_normal,triangle:prim_index"
 
@@ -23,7 +23,7 @@ class Mitsuba:
 
             from tests.oracle.mitsuba_scene import MitsubaScene
         except ImportError as error:
-            raise Missing(f"Mitsuba 3 ({error}); pip install -r requirements/peers.lock, apt install libllvm15") from error
+            raise PeerMissing(f"Mitsuba 3 ({error}); pip install -r requirements/peers.lock, apt install libllvm15") from error
         self._mitsuba = mitsuba
         images = filled_images(folder)
         assets = [read_asset(path.parent) for path in sorted(folder.glob("assets/*/mesh.m3a"))]
@@ -33,12 +33,12 @@ class Mitsuba:
         self._samples = samples
         self._cameras: dict[int, tuple[Any, Any]] = {}
 
-    def draw(self, frame: Frame, x: int, y: int) -> NDArray[np.float32]:
-        """(H, W, channels)."""
+    def draw(self, frame: FrameFields, x: int, y: int) -> NDArray[np.float32]:
+        """Returns (H, W, channels)."""
         sensor = self._camera(frame, x, y)
         return np.array(self._mitsuba.render(self._scene.scene, sensor=sensor, integrator=self._integrator, seed=0, spp=self._samples))
 
-    def _camera(self, frame: Frame, x: int, y: int) -> Any:
+    def _camera(self, frame: FrameFields, x: int, y: int) -> Any:
         fresh = self._scene._sensor(frame, x, y, self._samples)
         if frame["tile_px"] not in self._cameras:
             self._cameras[frame["tile_px"]] = fresh, self._mitsuba.traverse(fresh)
@@ -47,12 +47,12 @@ class Mitsuba:
         values.update()
         return sensor
 
-    def centres(self, frame: Frame, x: int, y: int) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
+    def centres(self, frame: FrameFields, x: int, y: int) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
         hits = self._scene.hits(frame, x, y)
         return hits.id, hits.depth
 
-    def picture(self, frame: Frame, x: int, y: int) -> NDArray[np.uint8]:
-        return srgb_bytes(self._scene.albedo(frame, x, y, self._samples))
+    def picture(self, frame: FrameFields, x: int, y: int) -> NDArray[np.uint8]:
+        return srgb_bytes_from_linear(self._scene.albedo(frame, x, y, self._samples))
 
 
 def _image(images: dict[str, Path], material: dict[str, Any]) -> NDArray[np.uint8] | None:

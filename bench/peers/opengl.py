@@ -1,8 +1,8 @@
-"""OpenGL on the processor (Mesa's llvmpipe) through moderngl and EGL.
+"""OpenGL on the CPU (Mesa's llvmpipe) through moderngl and EGL.
 
-Indexed triangles in one buffer, sorted by materials and cells; cells outside the square are not drawn, those in it are drawn from front to back.
-Textures with mip-maps, trilinear, 8 × anisotropic, averaged in linear light. Colour has 16 samples a pixel: 2 × 2 pixels of four samples each, which
-is quicker than 4 × 4 pixels; normal, id and depth are of the pixel's centre, in a pass of their own.
+All indexed triangles are in one buffer, sorted by material and cell; visible cells are drawn from front to back. Textures have mipmaps, are
+filtered trilinearly with 8 × anisotropy, and averaged in linear light. Colour has 16 samples per pixel: 2 × 2 pixels of four samples, which is
+faster than 4 × 4 pixels. A separate pass draws normal, id and depth at pixel centres.
 """
 
 from dataclasses import dataclass
@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import Frame, Missing
-from .parts import Part, Square, depths, linear, parts, square
+from . import FrameFields, PeerMissing
+from .scene_parts import MaterialPart, TileSquare, depth_range, linear_from_srgb, read_parts, tile_square
 
 try:
     import moderngl
@@ -23,10 +23,10 @@ except ImportError as error:
 
 CELL_M = 64.0
 FINER = 2
-"""Pixels of the colour pass on a side of a pixel; times four samples each."""
+"""Pixels of the colour pass per side of a pixel, with four samples each."""
 SRGB8, SRGB8_ALPHA8, FRAMEBUFFER_SRGB = 0x8C41, 0x8C43, 0x8DB9
 MIX = np.array([0x9E3779B97F4A7C15 * (2 * k + 1) ** 9 % 2**64 | 1 for k in range(6)], np.uint64)
-"""Odd factors, by which the six words of a vertex become one number."""
+"""Odd factors that hash the six words of a vertex."""
 VERTEX = np.dtype([("position", "<f4", 3), ("uv", "<f4", 2), ("id", "<u4")])
 
 PLACE = """#version 330
@@ -58,17 +58,17 @@ void main() {
 
 
 @dataclass(frozen=True)
-class Batches:
-    """Runs of triangles of one cell and material: lo, hi (n, 3) their boxes; first, count (n,) corners; look (n,) of materials."""
+class DrawRanges:
+    """Ranges of triangles of one cell and material: boxes lo, hi (n, 3); first and number of corners (n,); material (n,)."""
 
     lo: NDArray[np.float64]
     hi: NDArray[np.float64]
     first: NDArray[np.int64]
     count: NDArray[np.int64]
-    look: NDArray[np.int64]
+    material: NDArray[np.int64]
 
-    def seen(self, at: Square) -> NDArray[np.int64]:
-        """Those that the square may show, from front to back."""
+    def visible(self, at: TileSquare) -> NDArray[np.int64]:
+        """Returns the ranges that the tile may show, from front to back."""
         centre, half = (self.lo + self.hi) / 2, (self.hi - self.lo) / 2
         inside = np.ones(len(self.first), bool)
         for axis, middle in ((at.axes.right, at.u_m), (at.axes.up, at.v_m)):
@@ -81,34 +81,34 @@ class Batches:
 class OpenGL:
     def __init__(self, folder: Path) -> None:
         if moderngl is None:
-            raise Missing(f"OpenGL ({REASON}); pip install -r requirements/peers.lock")
+            raise PeerMissing(f"OpenGL ({REASON}); pip install -r requirements/peers.lock")
         try:
             self._gl = moderngl.create_context(standalone=True, backend="egl")
         except Exception as error:
-            raise Missing(f"OpenGL ({error}); apt install libegl1 libgl1-mesa-dri") from error
+            raise PeerMissing(f"OpenGL ({error}); apt install libegl1 libgl1-mesa-dri") from error
         self.device = str(self._gl.info["GL_RENDERER"])
         if "llvmpipe" not in self.device:
-            raise Missing(f"OpenGL (the device is {self.device}, not llvmpipe); set LIBGL_ALWAYS_SOFTWARE=1")
+            raise PeerMissing(f"OpenGL (the device is {self.device}, not llvmpipe); set LIBGL_ALWAYS_SOFTWARE=1")
         self._gl.enable(moderngl.DEPTH_TEST)
         self._gl.enable_direct(FRAMEBUFFER_SRGB)
-        self._looks: list[tuple[Any, tuple[float, ...]]] = []
+        self._materials: list[tuple[Any, tuple[float, ...]]] = []
         self._load(folder)
         self._targets: dict[int, _Targets] = {}
 
     def _load(self, folder: Path) -> None:
         vertices, indices, batches, at = [], [], [], 0
         corner = 0
-        for part in parts(folder):
+        for part in read_parts(folder):
             for chosen in _cells(part):
                 own, order = _indexed(part, chosen)
                 vertices.append(own)
                 indices.append(order + at)
                 box = own["position"].min(0), own["position"].max(0)
-                batches.append((*box, corner, len(order), len(self._looks)))
+                batches.append((*box, corner, len(order), len(self._materials)))
                 at, corner = at + len(own), corner + len(order)
-            self._looks.append(self._look(part))
+            self._materials.append(self._load_material(part))
         columns = [np.array(column) for column in zip(*batches, strict=True)]
-        self._batches = Batches(columns[0].astype(float), columns[1].astype(float), *columns[2:])
+        self._batches = DrawRanges(columns[0].astype(float), columns[1].astype(float), *columns[2:])
         buffer, index = self._gl.buffer(np.concatenate(vertices).tobytes()), self._gl.buffer(np.concatenate(indices).astype("<u4").tobytes())
         self._color = self._gl.program(vertex_shader=PLACE, fragment_shader=COLOR)
         self._surface = self._gl.program(vertex_shader=PLACE, fragment_shader=SURFACE)
@@ -120,27 +120,27 @@ class OpenGL:
         self._shrinking = self._gl.vertex_array(shrink, [(corners, "2f", "position")])
         self._lo, self._hi = self._batches.lo.min(0), self._batches.hi.max(0)
 
-    def _look(self, part: Part) -> tuple[Any, tuple[float, ...]]:
+    def _load_material(self, part: MaterialPart) -> tuple[Any, tuple[float, ...]]:
         image = np.full((1, 1, 3), 255, np.uint8) if part.image is None else part.image
         texture = self._gl.texture(image.shape[1::-1], 3, np.ascontiguousarray(image[::-1]).tobytes(), alignment=1, internal_format=SRGB8)
         texture.build_mipmaps()
         texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
         texture.anisotropy = 8.0
         texture.repeat_x = texture.repeat_y = part.repeats
-        diffuse = (1.0, 1.0, 1.0) if part.image is not None else tuple(linear(np.array(part.diffuse)).tolist())
+        diffuse = (1.0, 1.0, 1.0) if part.image is not None else tuple(linear_from_srgb(np.array(part.diffuse)).tolist())
         return texture, diffuse
 
-    def draw(self, frame: Frame, x: int, y: int) -> dict[str, NDArray[Any]]:
-        """color (H, W, 4) uint8 sRGB, normal (H, W, 4) uint8, id (H, W) uint32, depth (H, W) float32 of the depth buffer."""
-        at = square(frame, x, y)
-        near, far = depths(self._lo, self._hi, at.axes)
+    def draw(self, frame: FrameFields, x: int, y: int) -> dict[str, NDArray[Any]]:
+        """Returns color (H, W, 4) uint8 sRGB, normal (H, W, 4) uint8, id (H, W) uint32, depth (H, W) float32 of the depth buffer."""
+        at = tile_square(frame, x, y)
+        near, far = depth_range(self._lo, self._hi, at.axes)
         matrix = _clip_from_local(at, near, far).T.astype("<f4").tobytes()
-        seen = self._batches.seen(at)
+        visible = self._batches.visible(at)
         if at.px not in self._targets:
             self._targets[at.px] = _Targets(self._gl, at.px)
         target = self._targets[at.px]
-        self._draw_surfaces(target, matrix, at, seen)
-        self._draw_colors(target, matrix, seen)
+        self._draw_surfaces(target, matrix, at, visible)
+        self._draw_colors(target, matrix, visible)
         shape = (at.px, at.px)
         return {
             "color": np.frombuffer(target.color.read(), np.uint8).reshape(*shape, 4)[::-1],
@@ -149,21 +149,21 @@ class OpenGL:
             "depth": np.frombuffer(target.depth.read(), np.float32).reshape(shape)[::-1],
         }
 
-    def _draw_surfaces(self, target: "_Targets", matrix: bytes, at: Square, seen: NDArray[np.int64]) -> None:
-        """One sample a pixel; runs that follow each other are drawn as one, since no texture tells them apart."""
+    def _draw_surfaces(self, target: "_Targets", matrix: bytes, at: TileSquare, visible: NDArray[np.int64]) -> None:
+        """Draws normal, id and depth with one sample per pixel."""
         target.surfaces.use()
         target.surfaces.clear(depth=1.0)
         self._surface["clip_from_local"].write(matrix)
         self._surface["forward"].value = at.axes.forward
-        for batch in seen:
+        for batch in visible:
             self._surfaces.render(vertices=int(self._batches.count[batch]), first=int(self._batches.first[batch]))
 
-    def _draw_colors(self, target: "_Targets", matrix: bytes, seen: NDArray[np.int64]) -> None:
+    def _draw_colors(self, target: "_Targets", matrix: bytes, visible: NDArray[np.int64]) -> None:
         target.samples.use()
         target.samples.clear(depth=1.0)
         self._color["clip_from_local"].write(matrix)
-        for batch in seen:
-            texture, diffuse = self._looks[self._batches.look[batch]]
+        for batch in visible:
+            texture, diffuse = self._materials[self._batches.material[batch]]
             texture.use(0)
             self._color["diffuse"].value = diffuse
             self._colored.render(vertices=int(self._batches.count[batch]), first=int(self._batches.first[batch]))
@@ -174,18 +174,18 @@ class OpenGL:
         self._shrinking.render(vertices=3)
         self._gl.enable(moderngl.DEPTH_TEST)
 
-    def centres(self, frame: Frame, x: int, y: int) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
+    def centres(self, frame: FrameFields, x: int, y: int) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
         layers = self.draw(frame, x, y)
-        near, far = depths(self._lo, self._hi, square(frame, x, y).axes)
+        near, far = depth_range(self._lo, self._hi, tile_square(frame, x, y).axes)
         depth = near + layers["depth"].astype(float) * (far - near) - frame["d0_m"]
         return layers["id"].copy(), np.where(layers["id"] > 0, depth, np.inf)
 
-    def picture(self, frame: Frame, x: int, y: int) -> NDArray[np.uint8]:
+    def picture(self, frame: FrameFields, x: int, y: int) -> NDArray[np.uint8]:
         return self.draw(frame, x, y)["color"][..., :3].copy()
 
 
 class _Targets:
-    """What a square of `px` pixels is drawn into."""
+    """The framebuffers of images of `px` pixels."""
 
     def __init__(self, gl: Any, px: int) -> None:
         fine = (px * FINER, px * FINER)
@@ -200,26 +200,26 @@ class _Targets:
         self.colors = gl.framebuffer([self.color])
 
 
-def _cells(part: Part) -> list[NDArray[np.int64]]:
-    """Numbers of the part's triangles, cell by cell."""
+def _cells(part: MaterialPart) -> list[NDArray[np.int64]]:
+    """Returns the numbers of the part's triangles by cell."""
     keys = np.floor(part.corners[..., :2].mean(1) / CELL_M).astype(np.int64)
     order = np.lexsort((keys[:, 0], keys[:, 1]))
     cuts = np.flatnonzero(np.any(np.diff(keys[order], axis=0) != 0, axis=1)) + 1
     return np.split(order, cuts)
 
 
-def _indexed(part: Part, chosen: NDArray[np.int64]) -> tuple[NDArray[Any], NDArray[np.int64]]:
-    """Vertices without repetition, and three numbers of them a triangle."""
+def _indexed(part: MaterialPart, chosen: NDArray[np.int64]) -> tuple[NDArray[Any], NDArray[np.int64]]:
+    """Returns the distinct vertices, and three indices per triangle."""
     corners = np.zeros((len(chosen), 3), VERTEX)
     corners["position"], corners["uv"], corners["id"] = part.corners[chosen], part.uvs[chosen], part.ids[chosen][:, None]
     words = corners.ravel().view("<u4").reshape(-1, VERTEX.itemsize // 4).astype(np.uint64)
     mixed = (words * MIX).sum(1, dtype=np.uint64)
     _, first, order = np.unique(mixed, return_index=True, return_inverse=True)
-    assert np.array_equal(words[first][order], words), "two vertices of one mixed number"
+    assert np.array_equal(words[first][order], words), "hash collision of two vertices"
     return corners.ravel()[first], order.ravel()
 
 
-def _clip_from_local(at: Square, near: float, far: float) -> NDArray[np.float64]:
+def _clip_from_local(at: TileSquare, near: float, far: float) -> NDArray[np.float64]:
     matrix, half = np.eye(4), at.side_m / 2
     matrix[0, :3], matrix[0, 3] = np.array(at.axes.right) / half, -at.u_m / half
     matrix[1, :3], matrix[1, 3] = np.array(at.axes.up) / half, -at.v_m / half

@@ -1,17 +1,17 @@
-// Chromium as a phone of 390 × 844 at three device pixels, and what its processes take, from /proc.
+// Chromium as a phone of 390 × 844 CSS pixels with a pixel ratio of 3, and the resource usage of its processes, from /proc.
 import { readdirSync, readFileSync } from "node:fs";
 import { chromium } from "../../viewer/node_modules/playwright-core/index.mjs";
 
 const ARGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"];
-const UNBOUND = ["--disable-frame-rate-limit", "--disable-gpu-vsync"];
+const UNLIMITED = ["--disable-frame-rate-limit", "--disable-gpu-vsync"];
 export const SIZE = { width: 390, height: 844 };
 const TICK_MS = 10; // USER_HZ is 100 on Linux
 
-/** A fresh browser with one page; `unbound`: draws as fast as it can. */
+/** A new browser with one page; `unbound`: without frame rate limit. */
 export class Phone {
   static async open({ unbound = false, dpr = 3 } = {}) {
     const phone = new Phone();
-    phone.server = await chromium.launchServer({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", headless: true, args: unbound ? [...ARGS, ...UNBOUND] : ARGS });
+    phone.server = await chromium.launchServer({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", headless: true, args: unbound ? [...ARGS, ...UNLIMITED] : ARGS });
     phone.process = phone.server.process().pid;
     const browser = await chromium.connect(phone.server.wsEndpoint());
     const context = await browser.newContext({ viewport: SIZE, deviceScaleFactor: dpr, isMobile: true, hasTouch: true });
@@ -38,10 +38,10 @@ export class Phone {
     await this.server.close();
   }
 
-  /** Processor milliseconds so far: of all processes, and of the one that draws for them (with software GL: the rasteriser). */
+  /** CPU milliseconds so far: of all processes, and of the GPU process (with software GL: the rasteriser). */
   cpu() {
     let [all, gpu] = [0, 0];
-    for (const member of family(this.process)) {
+    for (const member of processTree(this.process)) {
       const spent = cpuOf(member);
       all += spent;
       if (read(member, "cmdline").includes("--type=gpu-process")) gpu += spent;
@@ -49,7 +49,7 @@ export class Phone {
     return { all, gpu };
   }
 
-  /** Waits until all that was drawn has gone through the rasteriser, which lags behind the page; the page draws no more meanwhile. */
+  /** Pauses the page until the rasteriser, which lags behind it, has finished; returns the CPU time so far. */
   async settled() {
     await this.page.evaluate(() => globalThis.bench.pause?.(true));
     for (let [last, still, tries] = [this.cpu().all, 0, 0]; still < 3 && tries < 200; tries++) {
@@ -63,10 +63,10 @@ export class Phone {
     return spent;
   }
 
-  /** Bytes of all processes: PSS, and the part of it that is no file. */
+  /** Bytes of all processes: PSS, and its anonymous part. */
   memory() {
     let [pss, anonymous] = [0, 0];
-    for (const member of family(this.process)) {
+    for (const member of processTree(this.process)) {
       const text = read(member, "smaps_rollup");
       const of = (name) => 1024 * Number(new RegExp(`^${name}:\\s+(\\d+)`, "m").exec(text)?.[1] ?? 0);
       pss += of("Pss");
@@ -80,19 +80,19 @@ function read(process, file) {
   try {
     return readFileSync(`/proc/${process}/${file}`, "utf8");
   } catch {
-    return ""; // it has ended
+    return ""; // the process has exited
   }
 }
 
 const statOf = (process) => read(process, "stat").split(") ").at(-1).split(" ");
 
-/** Of a process and its children that have ended. */
+/** CPU milliseconds of a process and its exited children. */
 function cpuOf(process) {
   const fields = statOf(process);
   return fields.length < 15 ? 0 : TICK_MS * [11, 12, 13, 14].reduce((sum, k) => sum + Number(fields[k]), 0);
 }
 
-function family(process) {
+function processTree(process) {
   const children = new Map();
   for (const name of readdirSync("/proc")) {
     if (!/^\d+$/.test(name)) continue;

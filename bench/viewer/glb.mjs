@@ -1,5 +1,5 @@
-// OBJ files as GLB for CesiumJS; standard input: [{ "obj": …, "glb": …, "mipmaps": boolean }]. obj2gltf, then with glTF-Transform (which 3d-tiles-tools brings) what makes
-// them cheapest to send and to draw: plain colours in one palette, one mesh a material, WebP of the quality that our tiles have, meshopt.
+// Converts OBJ files to GLB for CesiumJS. Standard input: [{ "obj": …, "glb": …, "mipmaps": boolean }]. After obj2gltf, glTF-Transform (included in 3d-tiles-tools)
+// reduces size and draw calls: one palette for plain colours, one mesh per material, WebP with the quality of our tiles, meshopt.
 import { readFileSync } from "node:fs";
 import { Logger, NodeIO, TextureInfo } from "@gltf-transform/core";
 import { ALL_EXTENSIONS } from "@gltf-transform/extensions";
@@ -14,9 +14,9 @@ const jobs = JSON.parse(readFileSync(0, "utf8"));
 for (const [number, { obj, glb, mipmaps }] of jobs.entries()) {
   const document = await io.readBinary(await obj2gltf(obj, { binary: true, inputUpAxis: "Z", outputUpAxis: "Y", checkTransparency: true }));
   for (const material of document.getRoot().listMaterials()) {
-    // What lets light through is leaves and the like: cut out, as map3d does.
+    // Transparent textures are leaves; cut them out, as map3d does.
     if (material.getAlphaMode() === "BLEND") material.setAlphaMode("MASK");
-    // obj2gltf's textures ask for none.
+    // obj2gltf does not enable mipmaps.
     if (mipmaps) material.getBaseColorTextureInfo()?.setMinFilter(TextureInfo.MinFilter.LINEAR_MIPMAP_LINEAR);
   }
   document.setLogger(new Logger(Logger.Verbosity.WARN));

@@ -1,4 +1,4 @@
-// What is measured of a page; each answers with numbers that are printed as they are.
+// The measures of a page. Each returns numbers that are printed unchanged.
 import { Phone } from "./browser.mjs";
 
 export const median = (values) => {
@@ -8,7 +8,7 @@ export const median = (values) => {
 
 export const quantile = (values, q) => [...values].sort((a, b) => a - b)[Math.min(values.length - 1, Math.floor(q * values.length))];
 
-/** The first complete view with an empty cache: milliseconds since navigation, of processors, requests, bytes. */
+/** Measures the first complete view with an empty cache: milliseconds since navigation, CPU milliseconds, requests, bytes. */
 export async function first(server, url, network) {
   const phone = await Phone.open();
   try {
@@ -21,13 +21,13 @@ export async function first(server, url, network) {
   }
 }
 
-/** Steps between the stops at which everything along a path is fetched. */
+/** Steps between the stops at which a path's tiles are fetched. */
 const STOP = 4;
 
 /**
- * Frames along a path once all along it has been fetched: processor milliseconds a picture, rasteriser included, median of `walks`. `free`: not held back
- * to the screen's pace. That is for browsers with a GPU: with software GL a picture takes far longer than a screen's, and a page that is not held back
- * runs ahead of the rasteriser, which makes both time and processor time uncertain.
+ * Measures frames along a path whose tiles are all fetched: CPU milliseconds per frame, rasteriser included, median of `walks`. `free`: without frame rate limit,
+ * for browsers with a GPU. With software GL a frame takes much longer than the screen's interval, and an unlimited page runs ahead of the rasteriser, which makes
+ * wall and CPU times unreliable.
  */
 export async function frames(server, url, path, { walks = 1, free = false } = {}) {
   const phone = await Phone.open({ unbound: free });
@@ -44,7 +44,7 @@ export async function frames(server, url, path, { walks = 1, free = false } = {}
   }
 }
 
-/** Once along a path. Pages that draw of their own accord tell how many pictures that were; for others it is a picture a step, at least. */
+/** Walks along a path once. Pages with their own render loop report their number of frames; for others it is at least one per step. */
 async function walk(phone, server, path) {
   const pictures = () => phone.page.evaluate(() => globalThis.bench.pictures?.() ?? 0);
   const [cpu, count, before] = [await phone.settled(), server.count, await pictures()];
@@ -58,8 +58,8 @@ async function walk(phone, server, path) {
 }
 
 /**
- * Memory after some seconds of use, what happens in the idle seconds after that, and memory then. An empty canvas in a browser of its own is read at the same moment:
- * what processes share (the browser's own files) is then divided among the same number for both.
+ * Measures memory after some seconds of use, activity during the idle seconds after that, and memory at their end. Reads an empty canvas in a second browser at the
+ * same moment, so both share the browser's files equally (PSS).
  */
 export async function stays(server, url, emptyUrl, path, { use_s, idle_s }) {
   const [phone, empty] = [await Phone.open(), await Phone.open()];
@@ -70,13 +70,13 @@ export async function stays(server, url, emptyUrl, path, { use_s, idle_s }) {
     await phone.page.evaluate(([steps, seconds]) => globalThis.bench.stroll(steps, seconds), [path.steps, use_s]);
     await phone.page.waitForTimeout(3000);
     await phone.settled();
-    const [used, beside] = [phone.memory(), empty.memory()];
+    const [used, baseline] = [phone.memory(), empty.memory()];
     const [cpu, count, drawn] = [phone.cpu(), server.count, await phone.page.evaluate(() => globalThis.bench.drawn())];
     await phone.page.waitForTimeout(1000 * idle_s);
     const [spent, sent, then] = [phone.cpu(), server.count, await phone.page.evaluate(() => globalThis.bench.drawn())];
     const idle = { s: idle_s, frames: then - drawn, requests: sent.requests - count.requests, cpu_ms_per_s: (spent.all - cpu.all) / idle_s };
     const more = (ours, theirs) => ({ pss: ours.pss - theirs.pss, anonymous: ours.anonymous - theirs.anonymous });
-    return { fresh, used, empty: beside, beyond: more(used, beside), rested: more(phone.memory(), empty.memory()), use_s, idle, ...problems(phone) };
+    return { fresh, used, empty: baseline, beyond: more(used, baseline), rested: more(phone.memory(), empty.memory()), use_s, idle, ...problems(phone) };
   } finally {
     await phone.close();
     await empty.close();

@@ -1,11 +1,11 @@
-// Where the camera goes: steps { x, y, mpp, look } (see pages/common.js). All stay inside the district, which all cities have in the middle.
+// Camera paths: steps { x, y, mpp, look } (see pages/common.js), all inside the central district of the cities.
 
 const START = { x: 0, y: 0, mpp: 0.3, look: 0 };
 const RADIUS_M = 30;
 
 const many = (count, step) => Array.from({ length: count }, (_, k) => step((k + 1) / count));
 
-/** Around a circle, starting and ending in its west. */
+/** A circle that starts and ends at its western point. */
 const circle = (count, from, radius = RADIUS_M) => many(count, (t) => ({ ...from, x: radius * (1 - Math.cos(2 * Math.PI * t)) - radius + from.x, y: radius * Math.sin(2 * Math.PI * t) + from.y }));
 
 const zoomed = (count, from, low, high) => many(count, (t) => {
@@ -13,13 +13,13 @@ const zoomed = (count, from, low, high) => many(count, (t) => {
   return { ...from, mpp: from.mpp * (wave < 0 ? high : 1 / low) ** Math.abs(wave) };
 });
 
-/** The district, as a phone shows it: pan, zoom, turn to the west, pan, turn back. */
+/** The district on a phone: pan, zoom, turn to the west, pan, turn back. */
 export const district = (length) => {
   const [west, n] = [{ ...START, look: 90 }, Math.round(length / 8)];
   return { start: START, steps: [...circle(3 * n, START), ...zoomed(2 * n, START, 1.5, 1.2), ...circle(2 * n, west), ...circle(n, START)] };
 };
 
-/** All of a city of a width in metres. */
+/** A whole city, `width_m` wide. */
 export const whole = (length, width_m) => {
   const from = { x: 0, y: 0, mpp: width_m / 390, look: 0 };
   const n = Math.round(length / 4);

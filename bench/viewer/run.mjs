@@ -1,19 +1,19 @@
-// Runs what Python asks for (bench/viewer.py): standard input is { work, peers, cities, reps, length, use_s, idle_s, free, only, out, pictures }; every sample is a line of
-// `out`, and those that are there already are not taken again. Viewers take turns; rounds come one after another.
+// Takes the samples for bench/viewer.py. Standard input: { work, peers, cities, reps, length, use_s, idle_s, free, only, out, pictures }. Each sample is a line of `out`;
+// existing samples are not taken again. Viewers take turns in each round.
 import { appendFileSync, existsSync, mkdirSync, readFileSync } from "node:fs";
 import { loadavg } from "node:os";
 import { join } from "node:path";
-import { bundled, modules, roots } from "./cesium.mjs";
+import { buildCesium, modules, roots } from "./cesium.mjs";
 import * as measures from "./measures.mjs";
 import * as paths from "./paths.mjs";
 import { Server } from "./server.mjs";
 
 const asked = JSON.parse(readFileSync(0, "utf8"));
 const { cities, work, free } = asked;
-/** What people have on the way, besides this machine alone: 10 Mbit/s, 40 ms there and back. */
+/** A mobile network: 10 Mbit/s, round trip 40 ms. */
 const NETWORK = { latency: 40, downloadThroughput: 10e6 / 8, uploadThroughput: 5e6 / 8 };
 
-if (asked.peers) await bundled(work);
+if (asked.peers) await buildCesium(work);
 const server = new Server(work, { ...roots(work), map3d: join(work, "published", cities[0]), city: join(work, "published"), peers: modules });
 await server.listen();
 
@@ -22,17 +22,17 @@ const district = paths.district(asked.length);
 const pan = paths.pan(asked.length);
 const middle = cities.includes("1e6") ? "1e6" : cities.at(-1);
 const whole = paths.whole(asked.length, asked.width_m[middle]);
-/** With software GL a picture of three device pixels a CSS pixel takes seconds: a few steps must do. */
+/** Short paths, because with software GL a frame at pixel ratio 3 takes seconds. */
 const [districtFew, wholeFew, panFew] = [paths.district(8), paths.whole(8, asked.width_m[middle]), paths.pan(8)];
 const at = ({ start }) => ({ start: JSON.stringify(start) });
 
 const map3d = (city, path, more = {}) => page("map3d", { base: `${server.origin}/city/${city}`, ...at(path), ...more });
 const cesium = (tiles, path, more = {}) => page("cesium", { base: `${server.origin}/3dtiles/${tiles}.json`, ...at(path), ...more });
 const flat = (name) => page(name, { base: `${server.origin}/plain/${middle}`, mode: "color", ...at(pan) });
-/** CesiumJS draws a picture of CSS pixels unless told otherwise, map3d.js one of device pixels; "-css" are pictures of CSS pixels. */
+/** By default CesiumJS draws CSS pixels and map3d.js device pixels; "-css" viewers draw CSS pixels. */
 const [DEVICE, CSS] = [{ resolution: "device" }, { ratio: "1" }];
 
-/** [measure, viewer, city, what to do]; in this order, round after round. */
+/** Yields [measure, viewer, city, function] in the order of a round. */
 function* round() {
   for (const city of cities) {
     yield ["first", "map3d", city, () => measures.first(server, map3d(city, district))];
@@ -54,7 +54,7 @@ function* round() {
   }
 }
 
-/** Once: minutes of use, and a minute of nothing. */
+/** Yields the long measures, taken once: minutes of use, then a minute idle. */
 function* once() {
   const empty = page("empty", at(district));
   const times = { use_s: asked.use_s, idle_s: asked.idle_s };
@@ -91,7 +91,7 @@ for (const [name, url] of asked.pictures ? [["map3d", map3d(middle, district)], 
 }
 server.close();
 if (server.missing.length > 0) {
-  console.error(`bench: the pages asked for what is not there: ${[...new Set(server.missing)].slice(0, 5).join(", ")}`);
+  console.error(`bench: the pages requested missing files: ${[...new Set(server.missing)].slice(0, 5).join(", ")}`);
   process.exit(1);
 }
 process.exit(0);

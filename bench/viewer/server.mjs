@@ -1,5 +1,5 @@
-// Serves cities, their 3D Tiles, the pages and the peers' libraries on a free port, as a static host would: gzip for what is text or geometry, ranges,
-// one connection after another kept alive. Counts requests and all bytes that leave, heads included.
+// Serves cities, their 3D Tiles, the pages and the peers' libraries on a free port like a static host: gzip for text and geometry, range requests, keep-alive.
+// Counts requests and sent bytes, headers included.
 import { open, readFile, stat } from "node:fs/promises";
 import { createServer } from "node:http";
 import { extname, join, normalize } from "node:path";
@@ -10,16 +10,16 @@ const TYPES = { ".html": "text/html", ".js": "text/javascript", ".mjs": "text/ja
 const ZIPPED = new Set([".html", ".js", ".mjs", ".css", ".json", ".wasm", ".glb", ".svg"]);
 
 export class Server {
-  #server = createServer((request, response) => { void this.#answer(request, response); });
+  #server = createServer((request, response) => { void this.#handle(request, response); });
   #sockets = new Set();
-  #gone = 0;
+  #closedBytes = 0;
   #zipped = new Map();
   #archives = new Map();
-  /** Paths that were asked for and are not here. */
+  /** Requested paths that do not exist. */
   missing = [];
   requests = [];
 
-  /** @param roots first part of a path → folder */
+  /** @param roots folder by first part of the path */
   constructor(work, roots) {
     this.work = work;
     this.roots = roots;
@@ -27,7 +27,7 @@ export class Server {
       this.#sockets.add(socket);
       socket.on("close", () => {
         this.#sockets.delete(socket);
-        this.#gone += socket.bytesWritten;
+        this.#closedBytes += socket.bytesWritten;
       });
     });
   }
@@ -42,18 +42,18 @@ export class Server {
     this.#server.close();
   }
 
-  /** All that has left so far. */
+  /** Requests and sent bytes so far. */
   get count() {
-    return { requests: this.requests.length, bytes: [...this.#sockets].reduce((sum, { bytesWritten }) => sum + bytesWritten, this.#gone) };
+    return { requests: this.requests.length, bytes: [...this.#sockets].reduce((sum, { bytesWritten }) => sum + bytesWritten, this.#closedBytes) };
   }
 
-  async #answer(request, response) {
+  async #handle(request, response) {
     const path = decodeURIComponent(new URL(request.url, "http://host").pathname);
     this.requests.push(path);
     try {
       const [, root, ...rest] = normalize(path).split("/");
-      if (root === "plain") await this.#plain(rest, response);
-      else await this.#file(this.#place(root, rest), request, response);
+      if (root === "plain") await this.#serveTile(rest, response);
+      else await this.#file(this.#filePath(root, rest), request, response);
     } catch (reason) {
       if (reason.code !== "ENOENT") console.error(`bench: ${path}: ${reason.stack}`);
       this.missing.push(path);
@@ -61,8 +61,8 @@ export class Server {
     }
   }
 
-  /** Every place of a city has addresses of its own for the files of its kind of district. */
-  #place(root, rest) {
+  /** Returns the file of a path. Each cell of a city has its own URLs for the files of its district. */
+  #filePath(root, rest) {
     const folder = this.roots[root];
     if (!folder) throw Object.assign(new Error(`no ${root}`), { code: "ENOENT" });
     return join(folder, ...(root === "3dtiles" && rest[0].startsWith("place-") ? rest.slice(1) : rest));
@@ -89,8 +89,8 @@ export class Server {
     }
   }
 
-  /** A published city seen as single tiles: /plain/CITY/rendering.json and /plain/CITY/VIEW/LAYER/Z/X/Y. */
-  async #plain([city, ...rest], response) {
+  /** Serves a published city as single tiles: /plain/CITY/rendering.json and /plain/CITY/VIEW/LAYER/Z/X/Y. */
+  async #serveTile([city, ...rest], response) {
     const folder = join(this.work, "published", city);
     const manifest = JSON.parse(await readFile(join(folder, "rendering.json"), "utf8"));
     if (rest[0] === "rendering.json") {

@@ -1,6 +1,6 @@
-"""`python docs/pictures/make.py FOLDER`: the pictures of the documentation, from a made-up town in FOLDER. Stopped, it goes on where it was.
+"""`python docs/pictures/make.py FOLDER`: makes the images of the documentation from a generated town in FOLDER. Re-run it to resume.
 
-CesiumJS and what makes its tiles are npm packages in bench/viewer; without them the pictures that show it stay as they are, and that is said.
+CesiumJS and the converters of its tiles are npm packages in bench/viewer; without them it skips the images with CesiumJS and prints a warning.
 """
 
 import json
@@ -16,8 +16,8 @@ from PIL import Image
 
 sys.path.append(str(Path(__file__).parents[2]))
 
-from bench.viewer import peers
-from light import side_by_side
+from bench.viewer import peers_installed
+from light_panels import draw_panels
 from sheet import sheet
 from town3d import town_tileset
 
@@ -35,11 +35,11 @@ LIGHT: Final = ("--res", "0.2", "--view", "30/45", "--layers", "picture,sun,ao",
 VIEWS: Final = ("--view", "0/45", "--view", "120/45", "--view", "0/22.5", "--view", "0/10", "--view", "0/90")
 QUALITY: Final = 80
 PHONE_PX: Final = 780
-"""A telephone's picture has three pixels a CSS pixel; two are shown."""
+"""Width of a phone's image: two pixels per CSS pixel, reduced from three."""
 
 
 def prepare(folder: Path) -> Path:
-    """The workspace with the renderings `pictures` and `light` of the town."""
+    """Renders `pictures` and `light` of the town; returns the workspace."""
     workspace = Workspace(folder / "workspace").create()
     where = ("--workspace", str(workspace.root))
     steps = [("make-town", "-o", str(folder / "town"), "--buildings", "300", "--seed", "7")]
@@ -57,20 +57,20 @@ def prepare(folder: Path) -> Path:
     return workspace.root
 
 
-def light(workspace: Path) -> None:
-    """The layers of light around the middle of the town."""
+def draw_light_panels(workspace: Path) -> None:
+    """Draws the light layers around the centre of the town."""
     catalogue = Workspace(workspace).open_catalogue()
     frame = catalogue.rendering("light").frames[0]
     catalogue.close()
-    # The origin of a scene lies near its middle: here the church square.
+    # The origin of the scene is near its centre, the market square.
     u, v = uvd_from_local(frame.axes, (0.0, 0.0, 0.0))[:2]
     pixel_m = frame.pixel_m(frame.zmax)
     with SqliteTileStore(Workspace(workspace).store_path("light", frame.id), read_only=True) as store:
-        side_by_side(store, (round((u - frame.u0_m) / pixel_m), round((frame.v0_m - v) / pixel_m)), HERE / "light.jpg")
+        draw_panels(store, (round((u - frame.u0_m) / pixel_m), round((frame.v0_m - v) / pixel_m)), HERE / "light.jpg")
 
 
 def shoot(workspace: Path, views: list[dict[str, Any]], cesium: Path | None, out: Path) -> None:
-    """PNG files of the views that are not in `out` yet, by map3d.js and, if there is a folder with the town's 3D Tiles, CesiumJS."""
+    """Writes the missing PNG files of the views into `out`, by map3d.js and, with a folder of 3D Tiles, by CesiumJS."""
     out.mkdir(parents=True, exist_ok=True)
     command = [sys.executable, "-m", "map3d", "serve", "--workspace", str(workspace), "--port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"}) as server:
@@ -78,37 +78,37 @@ def shoot(workspace: Path, views: list[dict[str, Any]], cesium: Path | None, out
         try:
             address = next((found[0] for line in server.stdout if (found := re.search(r"http://[^\s/]+", line))), None)
             if address is None:
-                sys.exit("the server ended without an address")
+                sys.exit("the server exited without printing an address")
             where = {"playwright": str(PLAYWRIGHT), "page": f"{address}/view/pictures/", "cesium": cesium and str(cesium), "out": str(out)}
             subprocess.run(["node", str(HERE / "shoot.mjs")], input=json.dumps({"views": views, **where}), text=True, check=True)
         finally:
             server.terminate()
 
 
-def beside(view: dict[str, Any], shots: Path) -> None:
-    """A JPEG of map3d.js, left, and CesiumJS."""
-    panels, words = [], []
+def draw_beside_cesium(view: dict[str, Any], shots: Path) -> None:
+    """Draws a JPEG of map3d.js, left, and CesiumJS."""
+    panels, captions = [], []
     for viewer, title in (("map3d", "map3d.js"), ("cesium", f"CesiumJS {json.loads(CESIUM.read_text())['version']}")):
         with Image.open(shots / f"{view['name']}-{viewer}.png") as shot:
             panel = shot.convert("RGB")
         if "dpr" in view:
             panel = panel.resize((PHONE_PX, PHONE_PX * panel.height // panel.width), Image.Resampling.LANCZOS)
         panels.append(panel)
-        told = json.loads((shots / f"{view['name']}-{viewer}.json").read_text())
-        drawn = f", {told['triangles']:,} triangles drawn" if "triangles" in told else ""
-        words.append(f"{title}: {told['bytes'] / 1e6:.1f} MB fetched{drawn}")
-    sheet(panels, words).save(HERE / f"{view['name']}.jpg", quality=QUALITY)
+        facts = json.loads((shots / f"{view['name']}-{viewer}.json").read_text())
+        drawn = f", {facts['triangles']:,} triangles drawn" if "triangles" in facts else ""
+        captions.append(f"{title}: {facts['bytes'] / 1e6:.1f} MB fetched{drawn}")
+    sheet(panels, captions).save(HERE / f"{view['name']}.jpg", quality=QUALITY)
 
 
 def main(folder: Path) -> None:
     workspace = prepare(folder)
-    light(workspace)
+    draw_light_panels(workspace)
     views = json.loads((HERE / "views.json").read_text())
-    with_cesium = peers()
+    with_cesium = peers_installed()
     if with_cesium:
         town_tileset(Workspace(workspace), "town", folder)
     else:
-        print("docs: pictures beside CesiumJS stay as they are", file=sys.stderr)
+        print("docs: skipped the images with CesiumJS", file=sys.stderr)
         views = [view for view in views if view.get("alone")]
     shots = folder / "shots"
     shoot(workspace, views, folder.absolute() if with_cesium else None, shots.absolute())
@@ -117,8 +117,8 @@ def main(folder: Path) -> None:
             with Image.open(shots / f"{view['name']}-map3d.png") as shot:
                 shot.convert("RGB").save(HERE / f"{view['name']}.jpg", quality=QUALITY)
         else:
-            beside(view, shots)
-    # The next time all of them are taken anew.
+            draw_beside_cesium(view, shots)
+    # The next run takes all screenshots again.
     shutil.rmtree(shots)
 
 

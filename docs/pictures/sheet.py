@@ -1,4 +1,4 @@
-"""Pictures side by side on white, words below."""
+"""Joins images side by side, with captions."""
 
 from collections.abc import Sequence
 from typing import Final
@@ -6,19 +6,19 @@ from typing import Final
 from PIL import Image, ImageDraw, ImageFont
 
 GAP_PX: Final = 8
-WORDS_PX: Final = 16
-INK: Final = (38, 40, 43)
+CAPTION_PX: Final = 16
+TEXT_COLOR: Final = (38, 40, 43)
 
 
-def sheet(panels: Sequence[Image.Image], words: Sequence[str] = ()) -> Image.Image:
-    """Panels of one height from left to right; a line of words below each, if there are any."""
-    height = panels[0].height + (2 * WORDS_PX if words else 0)
+def sheet(panels: Sequence[Image.Image], captions: Sequence[str] = ()) -> Image.Image:
+    """Joins panels of equal height from left to right, each above its caption."""
+    height = panels[0].height + (2 * CAPTION_PX if captions else 0)
     whole = Image.new("RGB", (sum(panel.width + GAP_PX for panel in panels) - GAP_PX, height), "white")
-    draw, font = ImageDraw.Draw(whole), ImageFont.load_default(WORDS_PX)
+    draw, font = ImageDraw.Draw(whole), ImageFont.load_default(CAPTION_PX)
     left_px = 0
     for number, panel in enumerate(panels):
         whole.paste(panel, (left_px, 0))
-        if words:
-            draw.text((left_px + 2, panel.height + WORDS_PX), words[number], INK, font, anchor="lm")
+        if captions:
+            draw.text((left_px + 2, panel.height + CAPTION_PX), captions[number], TEXT_COLOR, font, anchor="lm")
         left_px += panel.width + GAP_PX
     return whole

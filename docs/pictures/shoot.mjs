@@ -1,17 +1,17 @@
-// Opens a served rendering at the places of views.json, and the same town in CesiumJS, and takes a picture of each. Standard input: { playwright: its folder, page:
-// address of the rendering, views: of views.json, cesium: a folder whose 3dtiles/town.json is the town | null, out: folder for the pictures }. What is there stays.
+// Takes screenshots of a served rendering at the positions of views.json, and of the same town in CesiumJS. Standard input: { playwright: folder, page: address of the
+// rendering, views: content of views.json, cesium: folder with 3dtiles/town.json | null, out: output folder }. Keeps existing screenshots.
 import { existsSync, readFileSync, renameSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { bundled, roots } from "../../bench/viewer/cesium.mjs";
+import { buildCesium, roots } from "../../bench/viewer/cesium.mjs";
 import { Server } from "../../bench/viewer/server.mjs";
 import { anyWebGL, launch } from "../../tests/whole/chromium.mjs";
 import { build } from "../../viewer/node_modules/esbuild/lib/main.js";
 
 const { playwright, page, views, cesium, out } = JSON.parse(readFileSync(0, "utf8"));
 const SOURCES = join(import.meta.dirname, "../../viewer/src");
-/** A summer's day, two o'clock by the town's clocks. */
+/** 14:00 local time on a summer day. */
 const [DAY, ZONE] = ["2026-06-21T12:00Z", "Europe/Berlin"];
-/** The viewer's own. */
+/** Background colour of the viewer. */
 const PAPER = "#f2f0eb";
 const TILES_BYTES = 2 ** 31;
 const LIMIT_MS = 240_000;
@@ -25,7 +25,7 @@ async function compiled(contents) {
   return import(`data:text/javascript,${encodeURIComponent(outputFiles[0].text)}`);
 }
 
-/** A fresh browser window, as the first visit has it; `sent`: bytes that came, heads included. */
+/** Opens a new browser context with an empty cache; `sent` returns the received bytes, headers included. */
 async function open({ size: [width, height], dpr }) {
   const context = await browser.newContext({ viewport: { width, height }, deviceScaleFactor: dpr ?? 1, isMobile: dpr !== undefined, hasTouch: dpr !== undefined, colorScheme: "light", timezoneId: ZONE, bypassCSP: true });
   const tab = await context.newPage();
@@ -37,17 +37,17 @@ async function open({ size: [width, height], dpr }) {
   return { context, tab, sent };
 }
 
-/** Waits until pictures have come, none is on its way, and nothing has moved for a while; throws when that never comes. */
+/** Waits until the expected images have arrived and no request was open for two seconds; throws after LIMIT_MS. */
 async function quiet(tab, act) {
   const end = performance.now() + LIMIT_MS;
   let [open, images, last] = [0, 0, performance.now()];
-  const heard = (step) => () => { [open, last] = [open + step, performance.now()]; };
-  const [begun, ended] = [heard(1), heard(-1)];
+  const onRequest = (step) => () => { [open, last] = [open + step, performance.now()]; };
+  const [begun, ended] = [onRequest(1), onRequest(-1)];
   const answered = (response) => { images += Number(response.headers()["content-type"]?.startsWith("image/") ?? false); };
   tab.on("request", begun).on("requestfinished", ended).on("requestfailed", ended).on("response", answered);
-  const pictures = await act();
-  while (open > 0 || images < pictures || performance.now() - last < 2000) {
-    if (performance.now() > end || tab.isClosed()) throw new Error(`${tab.url()}: ${open} requests are still open, ${images} pictures came of ${pictures}`);
+  const expected = await act();
+  while (open > 0 || images < expected || performance.now() - last < 2000) {
+    if (performance.now() > end || tab.isClosed()) throw new Error(`${tab.url()}: ${open} requests are still open, ${images} of ${expected} images arrived`);
     await new Promise((done) => setTimeout(done, 100));
   }
   tab.off("request", begun).off("requestfinished", ended).off("requestfailed", ended).off("response", answered);
@@ -84,20 +84,20 @@ async function theirs(view, path, origin) {
   return { bytes, triangles: about.triangles };
 }
 
-/** Takes a picture unless it is there; what is told of it lies beside it. */
+/** Takes a screenshot unless it exists, and writes its facts into a JSON file next to it. */
 async function take(view, viewer, act) {
   const path = join(out, `${view.name}-${viewer}.png`);
   if (existsSync(path)) return;
   const draft = join(out, `draft-${viewer}.png`);
-  const told = await act(view, draft);
-  writeFileSync(path.replace(/png$/, "json"), JSON.stringify(told));
+  const facts = await act(view, draft);
+  writeFileSync(path.replace(/png$/, "json"), JSON.stringify(facts));
   renameSync(draft, path);
-  console.log(view.name, viewer, JSON.stringify(told));
+  console.log(view.name, viewer, JSON.stringify(facts));
 }
 
 for (const view of views) await take(view, "map3d", ours);
 if (cesium !== null) {
-  await bundled(cesium);
+  await buildCesium(cesium);
   const server = new Server(cesium, roots(cesium));
   await server.listen();
   for (const view of views.filter(({ alone }) => !alone)) await take(view, "cesium", (...given) => theirs(...given, server.origin));

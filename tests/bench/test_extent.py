@@ -1,13 +1,13 @@
-"""The town that grows, very small: which blocks are rendered, what is summed, and all of it once."""
+"""The extent benchmark on tiny towns: choice of blocks, sums, and a whole run."""
 
 import json
 from pathlib import Path
 
 import pytest
 
-pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
+pytest.importorskip("map3d._core", reason="the compiled core is missing", exc_type=ImportError)
 
-from bench.extent_work import RUN, chosen, summed
+from bench.extent_programs import RUN_LENGTH, choose_blocks, sum_statistics
 
 from bench import extent
 from map3d.catalogue import PlannedJob
@@ -19,29 +19,29 @@ def jobs(side: int) -> list[PlannedJob]:
     return [PlannedJob("0-45", BlockId(5, x, y), "base", morton(x, y), "key", None) for x in range(side) for y in range(side)]
 
 
-def test_runs_of_neighbours_are_spread_from_the_first_block_to_the_last() -> None:
-    numbers = [morton(job.block.x, job.block.y) for job in chosen(jobs(16), 40)]
+def test_runs_of_neighbours_span_all_blocks() -> None:
+    numbers = [morton(job.block.x, job.block.y) for job in choose_blocks(jobs(16), 40)]
     assert len(set(numbers)) == 40
     assert (numbers[0], numbers[-1]) == (0, 255)
-    assert all(numbers[start + k] == numbers[start] + k for start in range(0, 40, RUN) for k in range(RUN))
+    assert all(numbers[start + k] == numbers[start] + k for start in range(0, 40, RUN_LENGTH) for k in range(RUN_LENGTH))
 
 
-def test_a_small_town_is_rendered_whole() -> None:
-    assert {job.block for job in chosen(jobs(4), 40)} == {job.block for job in jobs(4)}
+def test_small_town_is_rendered_completely() -> None:
+    assert {job.block for job in choose_blocks(jobs(4), 40)} == {job.block for job in jobs(4)}
 
 
-def test_times_are_those_of_a_tile_and_counts_those_of_all_children() -> None:
+def test_times_are_per_tile_and_counts_are_sums_over_workers() -> None:
     def answer(tiles: float, hits: int) -> dict:
         stats = {"visibility_s": 1.0, "shade_s": 2.0, "encode_s": 3.0, "traced_tiles": tiles}
         return {"wall_s": 2.0, "cpu_s": 1.0, "stats": stats, "scene": {"chunk_hits": hits}}
 
-    total = summed([[answer(10, 5), answer(30, 9)], [answer(20, 7)]])
+    total = sum_statistics([[answer(10, 5), answer(30, 9)], [answer(20, 7)]])
     assert (total["blocks"], total["tiles"], total["chunk_hits"], total["shade_s"]) == (3, 60, 16, 6.0)
     assert (total["wall_tile_ms"], total["cpu_tile_ms"]) == (100.0, 50.0)
 
 
 @pytest.mark.whole
-def test_a_tiny_town_grows(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_extent_benchmark_runs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(extent, "BUILDINGS", 3)
     monkeypatch.setattr(extent, "RES_M", 0.5)
     small, large = extent.measure((0.001, 0.5), tmp_path / "extent", tmp_path / "plots", blocks=5)
@@ -55,7 +55,7 @@ def test_a_tiny_town_grows(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capf
     assert "| triangles, M |" in capfd.readouterr().out
 
 
-def test_a_disk_too_small_is_told_before_anything_is_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_insufficient_disk_space_exits_before_it_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("shutil.disk_usage", lambda _: type("Usage", (), {"free": 1 << 20})())
     with pytest.raises(SystemExit, match="are free"):
         extent.measure((1,), tmp_path)

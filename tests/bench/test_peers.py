@@ -1,4 +1,4 @@
-"""The parts of the benchmarks that can be wrong without anybody noticing: which ground is drawn, which figures are reported, what a copy is."""
+"""Parts of the benchmarks whose errors would go unnoticed: tile squares, ratios, plots, copies."""
 
 import hashlib
 import json
@@ -8,20 +8,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bench.beside import Row, colored, fullest, ratios
-from bench.crew import Crew
-from bench.peers import Missing, wider
-from bench.plot import plot
+from bench.peer_comparison import PeerRow, best_ratios, choose_squares, with_color_format
+from bench.peers import PeerMissing, with_larger_tiles
+from bench.renderer_pool import RendererPool
+from bench.svg_plot import plot
 
 FRAME = {"tile_px": 256, "zmax": 5, "size_m": 320.0, "u0_m": -10.0, "v0_m": 20.0, "look_at_deg": 30.0, "pitch_deg": 45.0}
 
 
 class Counter:
-    """A drawer that fails on demand."""
+    """A renderer that can be missing."""
 
     def __init__(self, missing: bool = False) -> None:
         if missing:
-            raise Missing("not here")
+            raise PeerMissing("not here")
         self.drawn = 0
 
     def draw(self, frame: dict, x: int, y: int) -> None:
@@ -32,48 +32,48 @@ class Counter:
 
 
 @pytest.mark.parametrize("doublings", [1, 2, 3])
-def test_a_wider_tile_shows_the_ground_of_its_tiles_at_the_same_pixels(doublings: int) -> None:
-    pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
-    from bench.peers.parts import square
+def test_larger_tile_covers_its_tiles_at_the_same_resolution(doublings: int) -> None:
+    pytest.importorskip("map3d._core", reason="the compiled core is missing", exc_type=ImportError)
+    from bench.peers.scene_parts import tile_square
 
-    wide = square(wider(FRAME, doublings), 1, 2)
-    first = square(FRAME, 1 << doublings, 2 << doublings)
+    wide = tile_square(with_larger_tiles(FRAME, doublings), 1, 2)
+    first = tile_square(FRAME, 1 << doublings, 2 << doublings)
     assert wide.side_m / wide.px == first.side_m / first.px
     assert wide.u_m - wide.side_m / 2 == pytest.approx(first.u_m - first.side_m / 2)
     assert wide.v_m + wide.side_m / 2 == pytest.approx(first.v_m + first.side_m / 2)
 
 
-def test_the_fullest_squares_come_first() -> None:
+def test_squares_with_most_tiles_come_first() -> None:
     tiles = [(0, 0), (4, 4), (4, 5), (5, 4), (5, 5), (2, 2), (3, 3)]
-    assert fullest(tiles, 1, 2) == [(2, 2), (1, 1)]
-    assert set(fullest(tiles, 0, 7)) == set(tiles)
+    assert choose_squares(tiles, 1, 2) == [(2, 2), (1, 1)]
+    assert set(choose_squares(tiles, 0, 7)) == set(tiles)
 
 
-def test_only_the_colour_layer_changes_its_format() -> None:
+def test_only_the_colour_layer_changes_format() -> None:
     frame = {"layers": [{"kind": "color", "format": "webp"}, {"kind": "id", "format": "png"}]}
-    assert colored(frame, "jpeg")["layers"] == [{"kind": "color", "format": "jpeg"}, {"kind": "id", "format": "png"}]
+    assert with_color_format(frame, "jpeg")["layers"] == [{"kind": "color", "format": "jpeg"}, {"kind": "id", "format": "png"}]
     assert frame["layers"][0]["format"] == "webp"
 
 
 def test_ratios_are_over_the_best_peer() -> None:
     found = (("a", 256, 9.0), ("b", 256, 7.0), ("a", 512, 4.0))
-    rows = [Row(peer, px, 1, 1, 1.0, {}, {"webp": ratio, "jpeg": 2 * ratio}) for peer, px, ratio in found]
-    assert [found["webp"] for found in ratios(rows).values()] == [7.0, 4.0]
-    assert ratios([]) == {}
+    rows = [PeerRow(peer, px, 1, 1, 1.0, {}, {"webp": ratio, "jpeg": 2 * ratio}) for peer, px, ratio in found]
+    assert [found["webp"] for found in best_ratios(rows).values()] == [7.0, 4.0]
+    assert best_ratios([]) == {}
 
 
-def test_a_crew_deals_places_out_to_all_its_processes() -> None:
-    with Crew("counter", Counter, 2) as crew:
-        assert crew.seconds(FRAME, [(0, 0), (1, 0), (2, 0)]) > 0
-        assert crew.ask("count") == 2
+def test_pool_distributes_tiles_to_all_processes() -> None:
+    with RendererPool("counter", Counter, 2) as pool:
+        assert pool.time_draws(FRAME, [(0, 0), (1, 0), (2, 0)]) > 0
+        assert pool.call("count") == 2
 
 
-def test_a_peer_that_cannot_be_had_is_told() -> None:
-    with pytest.raises(Missing, match="not here"):
-        Crew("counter", partial(Counter, True))
+def test_missing_peer_raises() -> None:
+    with pytest.raises(PeerMissing, match="not here"):
+        RendererPool("counter", partial(Counter, True))
 
 
-def test_a_plot_holds_every_point(tmp_path: Path) -> None:
+def test_plot_contains_every_point(tmp_path: Path) -> None:
     plot(tmp_path / "p.svg", "t <", "x", "y", {"a": [(1, 2.0), (10, 4.0), (100, 3.0)], "b": [(1, 1.0)]})
     text = (tmp_path / "p.svg").read_text()
     places = [tuple(map(float, found)) for found in re.findall(r'<circle cx="([\d.]+)" cy="([\d.]+)"', text)]
@@ -85,15 +85,15 @@ def test_a_plot_holds_every_point(tmp_path: Path) -> None:
 
 
 def test_copies_fill_squares() -> None:
-    pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
-    from bench.district import place
+    pytest.importorskip("map3d._core", reason="the compiled core is missing", exc_type=ImportError)
+    from bench.district import copy_position
 
     for side in (1, 2, 3, 10):
-        assert {place(number) for number in range(side * side)} == {(column, row) for column in range(side) for row in range(side)}
+        assert {copy_position(number) for number in range(side * side)} == {(column, row) for column in range(side) for row in range(side)}
 
 
-def test_a_copy_is_moved_whole_and_has_images_of_its_own(tmp_path: Path) -> None:
-    pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
+def test_copy_is_translated_and_has_its_own_images(tmp_path: Path) -> None:
+    pytest.importorskip("map3d._core", reason="the compiled core is missing", exc_type=ImportError)
     from bench.district import copy_asset
     from PIL import Image
 

@@ -1,4 +1,4 @@
-"""The large benchmark, very small: it comes to an end, goes on after a failure, cleans up, and its figures are those of all processes."""
+"""The Rotterdam benchmark on a tiny city: it completes, resumes after a failure, cleans up, and measures all processes."""
 
 import json
 import os
@@ -6,11 +6,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from bench.watch import Figures, family, used_bytes, watched
+from bench.resource_monitor import ResourceUsage, disk_bytes_of, process_tree, run_monitored
 
 from bench import rotterdam
 
-pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
+pytest.importorskip("map3d._core", reason="the compiled core is missing", exc_type=ImportError)
 pytestmark = [pytest.mark.whole, pytest.mark.skipif(not Path("/proc/self/stat").is_file(), reason="needs /proc")]
 
 SCALE = 5000
@@ -24,7 +24,7 @@ def main(monkeypatch: pytest.MonkeyPatch, folder: Path, *options: str) -> None:
     rotterdam.main()
 
 
-def test_a_tiny_city_goes_all_the_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+def test_tiny_city_completes_all_stages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     main(monkeypatch, tmp_path)
     record = json.loads((tmp_path / "figures.json").read_text())
     assert list(record["stages"]) == ["make-town", "create-scene", "add-files", "create-rendering", "render", "publish"]
@@ -35,13 +35,13 @@ def test_a_tiny_city_goes_all_the_way(tmp_path: Path, monkeypatch: pytest.Monkey
     assert "| all |" in capfd.readouterr().out
 
 
-def test_a_run_that_failed_goes_on_where_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    words = rotterdam.view_words
-    monkeypatch.setattr(rotterdam, "view_words", lambda size: [*words(size), "--nonsense"])
+def test_failed_run_resumes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    words = rotterdam.view_options
+    monkeypatch.setattr(rotterdam, "view_options", lambda size: [*words(size), "--nonsense"])
     with pytest.raises(SystemExit, match="create-rendering failed"):
         main(monkeypatch, tmp_path)
     before = json.loads((tmp_path / "figures.json").read_text())
-    monkeypatch.setattr(rotterdam, "view_words", words)
+    monkeypatch.setattr(rotterdam, "view_options", words)
     main(monkeypatch, tmp_path, "--keep")
     after = json.loads((tmp_path / "figures.json").read_text())
     assert after["stages"]["add-files"] == before["stages"]["add-files"]
@@ -49,30 +49,30 @@ def test_a_run_that_failed_goes_on_where_it_was(tmp_path: Path, monkeypatch: pyt
     assert (tmp_path / "published" / "rendering.json").is_file()
 
 
-def test_a_disk_too_small_is_told_before_anything_is_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_insufficient_disk_space_exits_before_it_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("shutil.disk_usage", lambda _: type("Usage", (), {"free": 1 << 20})())
     with pytest.raises(SystemExit, match="are free"):
         main(monkeypatch, tmp_path)
     assert not list(tmp_path.iterdir())
 
 
-def test_memory_is_summed_over_a_process_and_its_children(tmp_path: Path) -> None:
-    figures = Figures()
-    assert watched([sys.executable, "-c", GREEDY], tmp_path, figures) == 0
+def test_memory_includes_child_processes(tmp_path: Path) -> None:
+    figures = ResourceUsage()
+    assert run_monitored([sys.executable, "-c", GREEDY], tmp_path, figures) == 0
     assert figures.memory_bytes > 128 << 20
     assert figures.cpu_s > 0
     assert figures.runs == 1
 
 
-def test_a_family_is_a_process_with_its_descendants() -> None:
-    own = family(os.getpid())
+def test_process_tree_contains_descendants() -> None:
+    own = process_tree(os.getpid())
     assert own[0] == os.getpid()
     assert len(own) == len(set(own))
-    assert os.getpid() in family(os.getppid())
+    assert os.getpid() in process_tree(os.getppid())
 
 
-def test_links_and_what_they_lead_to_are_not_counted_twice(tmp_path: Path) -> None:
+def test_links_do_not_count_twice(tmp_path: Path) -> None:
     (tmp_path / "a").write_bytes(bytes(100_000))
-    once = used_bytes(tmp_path)
+    once = disk_bytes_of(tmp_path)
     (tmp_path / "b").symlink_to(tmp_path)
-    assert once <= used_bytes(tmp_path) < once + 8192
+    assert once <= disk_bytes_of(tmp_path) < once + 8192

@@ -1,4 +1,4 @@
-"""Scenes for the oracles: built by the command line, as a user would."""
+"""Scenes for the oracle, built by the command line."""
 
 import os
 from collections.abc import Callable
@@ -16,22 +16,22 @@ from map3d.geometry.frames import core_frame
 from map3d.tiles.occupancy import xy_from_morton
 from map3d_town import TownSpec, make_town
 
-from .asset import Asset, read_asset
+from .asset_reader import OracleAsset, read_asset
 
-pytest.importorskip("mitsuba", reason="the oracle needs Mitsuba 3: pip install map3d[peers]")
+pytest.importorskip("mitsuba", reason="Mitsuba 3 is not installed: pip install map3d[peers]")
 
 
 @dataclass(frozen=True, eq=False)
-class Built:
+class OracleScene:
     """A built scene and a rendering of it: fields of frames by view id."""
 
     folder: Path
     scene: _core.Scene
-    assets: list[Asset]
+    assets: list[OracleAsset]
     frames: dict[str, dict]
 
-    def texture(self, asset: Asset, material: dict) -> np.ndarray | None:
-        """(H, W, 3) uint8 as the source has it, unused texels filled: bilinear lookups at the border of a used part would else meet them."""
+    def texture(self, asset: OracleAsset, material: dict) -> np.ndarray | None:
+        """Returns (H, W, 3) uint8: the source image with filled unused texels, which bilinear lookups at borders would otherwise read."""
         if material["texture"] is None:
             return None
         return self._filled()[material["texture"]]
@@ -42,13 +42,13 @@ class Built:
         return self._cache
 
     def busiest_tiles(self, view: str, count: int) -> list[tuple[int, int]]:
-        """Base tiles (x, y) with the most objects in them, weighed by how much of them is covered."""
+        """Returns the base tiles (x, y) with the most objects, weighted by coverage."""
         return _busiest(self, view)[:count]
 
 
 @cache
-def _busiest(built: Built, view: str) -> list[tuple[int, int]]:
-    """Of 64 occupied tiles, evenly chosen: enough to find where the town is."""
+def _busiest(built: OracleScene, view: str) -> list[tuple[int, int]]:
+    """Sorts about 64 evenly spaced occupied tiles by number of objects times coverage."""
     frame = core_frame(built.frames[view])
     columns, lines = xy_from_morton(built.scene.occupied(frame, frame.zmax))
     tiles = sorted(zip(lines, columns, strict=True))
@@ -61,7 +61,7 @@ def _busiest(built: Built, view: str) -> list[tuple[int, int]]:
 
 
 def _levels(folder: Path) -> dict[str, np.ndarray]:
-    """Level 0 of each texture by the key of its source image."""
+    """Returns level 0 of each texture by key of its source image."""
     import hashlib
 
     found = {}
@@ -72,14 +72,14 @@ def _levels(folder: Path) -> dict[str, np.ndarray]:
     return found
 
 
-Builder = Callable[..., Built]
+Builder = Callable[..., OracleScene]
 
 
 @pytest.fixture(scope="session")
 def build(tmp_path_factory: pytest.TempPathFactory) -> Builder:
-    """build(name, files, res_m, views) → Built."""
+    """Returns a function build(name, files, res_m, views) → OracleScene."""
 
-    def make(name: str, files: list[Path], res_m: float, views: list[str]) -> Built:
+    def make(name: str, files: list[Path], res_m: float, views: list[str]) -> OracleScene:
         workspace = tmp_path_factory.mktemp(name)
         where = ["-w", str(workspace)]
         commands = [
@@ -91,7 +91,7 @@ def build(tmp_path_factory: pytest.TempPathFactory) -> Builder:
             assert run(command) == 0, command
         folder = workspace / "scenes" / name
         assets = [read_asset(path.parent) for path in sorted(folder.glob("assets/*/mesh.m3a"))]
-        return Built(folder, _core.Scene(str(folder)), assets, _frames(workspace, name))
+        return OracleScene(folder, _core.Scene(str(folder)), assets, _frames(workspace, name))
 
     return make
 
@@ -106,15 +106,15 @@ def _frames(workspace: Path, rendering: str) -> dict[str, dict]:
 
 
 @pytest.fixture(scope="session")
-def town(build: Builder, tmp_path_factory: pytest.TempPathFactory) -> Built:
+def town(build: Builder, tmp_path_factory: pytest.TempPathFactory) -> OracleScene:
     out = tmp_path_factory.mktemp("town-files")
     make_town(out, TownSpec(buildings=40, seed=3, trees=False, terrain=False, texture_px=512), None)
     return build("town", sorted(out.glob("citygml/*.gml")), 0.1, ["30/10", "30/22.5", "30/45", "30/90"])
 
 
 @pytest.fixture(scope="session")
-def ingolstadt(build: Builder) -> Built:
+def ingolstadt(build: Builder) -> OracleScene:
     data = os.environ.get("MAP3D_DATA")
     if not data:
-        pytest.skip("MAP3D_DATA is not set: no real city here")
+        pytest.skip("set MAP3D_DATA for tests with a real city")
     return build("ingolstadt", [Path(data, "citygml-ingolstadt-lod3")], 0.1, ["30/10", "30/22.5", "30/45", "30/90"])

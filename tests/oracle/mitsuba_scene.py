@@ -1,4 +1,4 @@
-"""The same triangles in Mitsuba 3, an independent renderer: depth, normal, triangle at pixel centres; albedo by many samples."""
+"""Renders the same triangles with Mitsuba 3: depth, normal and triangle at pixel centres; albedo with many samples."""
 
 import math
 from collections.abc import Callable
@@ -8,18 +8,18 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from .asset import Asset
+from .asset_reader import OracleAsset
 
 mi.set_variant("llvm_ad_rgb")
 
-Frame = dict
+FrameFields = dict
 """Fields of a `_core.Frame`: look_at_deg, pitch_deg, u0_m, v0_m, d0_m, size_m, tile_px, zmax."""
 
 
 @dataclass(frozen=True)
-class Hits:
-    """At the pixel centres of a tile. depth (H, W) float64 metres from D0, inf where nothing; normal (H, W, 3) of the seen side; id (H, W) uint32;
-    second (H, W) metres between the first surface and the next behind it."""
+class PixelHits:
+    """Hits at the pixel centres of a tile: depth (H, W) float64 metres from D0, inf without hit; normal (H, W, 3) of the visible side; id (H, W)
+    uint32; second (H, W) metres between the first surface and the next behind it."""
 
     depth: NDArray[np.float64]
     normal: NDArray[np.float64]
@@ -27,7 +27,7 @@ class Hits:
     second: NDArray[np.float64]
 
 
-def axes(frame: Frame) -> tuple[NDArray[np.float64], ...]:
+def axes(frame: FrameFields) -> tuple[NDArray[np.float64], ...]:
     a, p = math.radians(frame["look_at_deg"]), math.radians(frame["pitch_deg"])
     right = np.array([math.cos(a), math.sin(a), 0])
     forward = np.array([-math.cos(p) * math.sin(a), math.cos(p) * math.cos(a), -math.sin(p)])
@@ -35,9 +35,9 @@ def axes(frame: Frame) -> tuple[NDArray[np.float64], ...]:
 
 
 class MitsubaScene:
-    """assets: placed triangles only (no prototypes). texture(asset, material) → (H, W, 3) uint8 sRGB or None for the plain diffuse colour."""
+    """A scene of assets without prototypes. `texture(asset, material)` returns (H, W, 3) uint8 sRGB, or None for the diffuse colour."""
 
-    def __init__(self, assets: list[Asset], origin: NDArray[np.float64], texture: Callable[[Asset, dict], NDArray[np.uint8] | None]):
+    def __init__(self, assets: list[OracleAsset], origin: NDArray[np.float64], texture: Callable[[OracleAsset, dict], NDArray[np.uint8] | None]):
         self.triangle_ids: list[NDArray[np.uint32]] = []
         shapes: dict[str, object] = {"type": "scene"}
         count = 0
@@ -54,7 +54,7 @@ class MitsubaScene:
         self.ids = np.concatenate([np.zeros(0, np.uint32), *self.triangle_ids])
         self.scene = mi.load_dict(shapes)
 
-    def hits(self, frame: Frame, x: int, y: int) -> Hits:
+    def hits(self, frame: FrameFields, x: int, y: int) -> PixelHits:
         size = frame["tile_px"]
         forward = axes(frame)[2]
         sensor = self._sensor(frame, x, y, 1)
@@ -73,10 +73,10 @@ class MitsubaScene:
         second = np.where(np.array(beyond.is_valid()), np.array(beyond.t) + 1e-3, np.inf)
         ids = np.where(valid, self.ids[np.clip(triangle, 0, len(self.ids) - 1)], 0).astype(np.uint32)
         shape = (size, size)
-        return Hits(depth.reshape(shape), normal.reshape(*shape, 3), ids.reshape(shape), second.reshape(shape))
+        return PixelHits(depth.reshape(shape), normal.reshape(*shape, 3), ids.reshape(shape), second.reshape(shape))
 
-    def albedo(self, frame: Frame, x: int, y: int, samples: int) -> NDArray[np.float64]:
-        """(H, W, 3) linear light, averaged over each pixel's box; 0 where nothing."""
+    def albedo(self, frame: FrameFields, x: int, y: int, samples: int) -> NDArray[np.float64]:
+        """Returns (H, W, 3) linear light, averaged over each pixel's box; 0 without hit."""
         integrator = mi.load_dict({"type": "aov", "aovs": "albedo:albedo"})
         total, rounds = None, max(1, samples // 256)
         for seed in range(rounds):
@@ -86,19 +86,19 @@ class MitsubaScene:
             total = image if total is None else total + image
         return total[..., -3:] / rounds
 
-    def layers(self, frame: Frame, x: int, y: int, samples: int) -> NDArray[np.float64]:
-        """All that a tile of ours has, in one rendering: albedo, depth, normal, shape; for timing."""
+    def layers(self, frame: FrameFields, x: int, y: int, samples: int) -> NDArray[np.float64]:
+        """Returns albedo, depth, normal and shape in one rendering; for timing."""
         integrator = mi.load_dict({"type": "aov", "aovs": "albedo:albedo,depth:depth,normal:sh_normal,shape:shape_index"})
         return np.array(mi.render(self.scene, sensor=self._sensor(frame, x, y, samples), integrator=integrator, seed=0))
 
-    def _near_plane(self, frame: Frame) -> float:
-        """D of a plane before everything."""
+    def _near_plane(self, frame: FrameFields) -> float:
+        """Returns the depth D of a plane in front of the scene."""
         box = self.scene.bbox()
         lo, hi = np.array(box.min).ravel(), np.array(box.max).ravel()
         corners = np.array([[(lo, hi)[k >> a & 1][a] for a in range(3)] for k in range(8)])
         return float((corners @ axes(frame)[2]).min()) - 1.0
 
-    def _sensor(self, frame: Frame, x: int, y: int, spp: int) -> object:
+    def _sensor(self, frame: FrameFields, x: int, y: int, spp: int) -> object:
         right, up, forward = axes(frame)
         size, tile_m = frame["tile_px"], frame["size_m"] / 2 ** frame["zmax"]
         u = frame["u0_m"] + (x + 0.5) * tile_m
@@ -139,7 +139,7 @@ def _linear(srgb: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _mesh(corners: NDArray[np.float32], uvs: NDArray[np.float32], bsdf: object, numbers: NDArray[np.int64]) -> object:
-    """Corners are not shared, so every triangle keeps its own texture coordinates. Mitsuba's v runs down the image."""
+    """Returns a mesh with separate corners per triangle, so each keeps its texture coordinates. Mitsuba's v points down."""
     props = mi.Properties()
     props["mesh_bsdf"] = bsdf
     mesh = mi.Mesh("mesh", len(corners) * 3, len(corners), props=props, has_vertex_texcoords=True)

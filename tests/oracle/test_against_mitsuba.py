@@ -1,12 +1,12 @@
-"""An independent renderer agrees, at the pixel's centre and over the pixel's box."""
+"""The core agrees with Mitsuba 3 at pixel centres and over pixel boxes."""
 
 import numpy as np
 import pytest
 
 from map3d.geometry.frames import core_frame
 
-from .compare import edges, gradient_energy, psnr, srgb_from_linear
-from .conftest import Built
+from .conftest import OracleScene
+from .image_agreement import edge_mask, gradient_energy, psnr, srgb_from_linear
 from .mitsuba_scene import MitsubaScene
 
 DEPTH_M = 0.005
@@ -15,23 +15,23 @@ VIEWS = ["30-10", "30-22.5", "30-45", "30-90"]
 
 
 @pytest.fixture(scope="session", params=["town", "ingolstadt"])
-def pair(request: pytest.FixtureRequest) -> tuple[Built, MitsubaScene]:
-    built: Built = request.getfixturevalue(request.param)
-    return built, MitsubaScene(built.assets, np.array(built.scene.origin), built.texture)
+def pair(request: pytest.FixtureRequest) -> tuple[OracleScene, MitsubaScene]:
+    oracle: OracleScene = request.getfixturevalue(request.param)
+    return oracle, MitsubaScene(oracle.assets, np.array(oracle.scene.origin), oracle.texture)
 
 
 @pytest.mark.parametrize("view", VIEWS)
-def test_depth_normal_and_id_agree_away_from_edges(pair: tuple[Built, MitsubaScene], view: str) -> None:
-    built, mitsuba = pair
-    frame = built.frames[view]
+def test_depth_normal_and_id_agree_away_from_edges(pair: tuple[OracleScene, MitsubaScene], view: str) -> None:
+    oracle, mitsuba = pair
+    frame = oracle.frames[view]
     good = {"depth": 0, "id": 0, "normal": 0}
     counted = 0
-    for x, y in built.busiest_tiles(view, 4):
-        ours = built.scene.gbuffer(core_frame(frame), x, y)
+    for x, y in oracle.busiest_tiles(view, 4):
+        ours = oracle.scene.gbuffer(core_frame(frame), x, y)
         theirs = mitsuba.hits(frame, x, y)
         theirs_hit = np.isfinite(theirs.depth)
-        grounded = ours["id"] == _ground_id(built)
-        use = ~edges(theirs.id, theirs.normal, theirs.depth) & (theirs.second > COPLANAR_M) & theirs_hit & ~grounded
+        grounded = ours["id"] == _ground_id(oracle)
+        use = ~edge_mask(theirs.id, theirs.normal, theirs.depth) & (theirs.second > COPLANAR_M) & theirs_hit & ~grounded
         counted += use.sum()
         depth = ours["depth"] / 1024.0
         good["depth"] += (np.abs(depth - theirs.depth)[use] <= DEPTH_M).sum()
@@ -45,15 +45,15 @@ def test_depth_normal_and_id_agree_away_from_edges(pair: tuple[Built, MitsubaSce
 
 
 @pytest.mark.parametrize("view", VIEWS)
-def test_colour_is_the_average_over_the_pixels_box(pair: tuple[Built, MitsubaScene], view: str) -> None:
-    built, mitsuba = pair
-    frame = built.frames[view]
-    (tile,) = built.busiest_tiles(view, 1)
-    ours = built.scene.gbuffer(core_frame(frame), *tile)
+def test_colour_is_the_mean_over_the_pixel_box(pair: tuple[OracleScene, MitsubaScene], view: str) -> None:
+    oracle, mitsuba = pair
+    frame = oracle.frames[view]
+    (tile,) = oracle.busiest_tiles(view, 1)
+    ours = oracle.scene.gbuffer(core_frame(frame), *tile)
     theirs = srgb_from_linear(mitsuba.albedo(frame, *tile, samples=1024))
     mine = srgb_from_linear(ours["color"][..., :3] / 65535.0)
     hits = mitsuba.hits(frame, *tile)
-    use = _without_ground(ours["id"] == _ground_id(built)) & (hits.second > COPLANAR_M)
+    use = _without_ground(ours["id"] == _ground_id(oracle)) & (hits.second > COPLANAR_M)
     assert use.mean() > 0.2
     quality = psnr(mine[use], theirs[use])
     blank = np.where(use[..., None], 1.0, 0.0)
@@ -63,22 +63,22 @@ def test_colour_is_the_average_over_the_pixels_box(pair: tuple[Built, MitsubaSce
     assert 0.9 <= sharpness <= 1.1
 
 
-def _ground_id(built: Built) -> int:
-    """The ground plane is ours alone: it is not in the assets."""
-    known = set(np.concatenate([asset.ids for asset in built.assets]).tolist())
+def _ground_id(oracle: OracleScene) -> int:
+    """Returns the id of the ground plane, which only the core has; 0xFFFFFFFF if it is not visible."""
+    known = set(np.concatenate([asset.ids for asset in oracle.assets]).tolist())
     seen = {
         int(i)
         for view in VIEWS
-        for x, y in built.busiest_tiles(view, 1)
-        for i in np.unique(built.scene.gbuffer(core_frame(built.frames[view]), x, y)["id"])
+        for x, y in oracle.busiest_tiles(view, 1)
+        for i in np.unique(oracle.scene.gbuffer(core_frame(oracle.frames[view]), x, y)["id"])
     }
-    strangers = seen - known - {0}
-    assert len(strangers) <= 1
-    return strangers.pop() if strangers else 0xFFFFFFFF
+    unknown = seen - known - {0}
+    assert len(unknown) <= 1
+    return unknown.pop() if unknown else 0xFFFFFFFF
 
 
 def _without_ground(ground: np.ndarray) -> np.ndarray:
-    """Pixels whose 3 × 3 neighbourhood is free of the ground plane: their box holds none of it."""
+    """Returns the pixels without ground plane in their 3 × 3 neighbourhood."""
     wide = np.pad(ground, 1)
     near = np.zeros_like(wide)
     for dy in (-1, 0, 1):

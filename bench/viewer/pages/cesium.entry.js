@@ -1,2 +1,2 @@
-// What the page needs of CesiumJS, so that a bundler can leave out the rest.
+// Exports the classes that the page uses, so the build drops the others.
 export { Camera, Cartesian3, Cesium3DTileset, CesiumWidget, Color, DirectionalLight, OrthographicFrustum, Matrix4, Transforms } from "@cesium/engine";

@@ -1,5 +1,5 @@
-// What all pages share. A page makes `bench.complete` (milliseconds from navigation to the first complete view), `bench.set` (a step of a path) and
-// `bench.quiet` (resolves when nothing is missing in view). A step: { x, y (metres east and north of the scene's origin), mpp (metres a CSS pixel), look (degrees
+// Functions for all pages. A page defines `bench.complete` (promise of the milliseconds from navigation to the first complete view), `bench.set` (shows a step of a
+// path) and `bench.quiet` (resolves when the view is complete). A step: { x, y (metres east and north of the scene's origin), mpp (metres per CSS pixel), look (degrees
 // counter-clockwise from north) }; CesiumJS takes z (metres up) and pitch (degrees below the horizon), too.
 "use strict";
 const asked = new URLSearchParams(location.search);
@@ -7,7 +7,7 @@ const bench = { asked, start: JSON.parse(asked.get("start") ?? "null"), frames: 
 globalThis.bench = bench;
 
 {
-  // Counts the pictures that a page asks for.
+  // Counts the frames that a page requests.
   const plain = globalThis.requestAnimationFrame.bind(globalThis);
   bench.next = () => new Promise(plain);
   globalThis.requestAnimationFrame = (act) => plain((now) => {
@@ -16,10 +16,10 @@ globalThis.bench = bench;
   });
 }
 
-/** How often the page's code was called before a picture; a page that knows its pictures has `bench.pictures`. */
+/** Number of frame callbacks; a page that counts its frames itself defines `bench.pictures`. */
 bench.drawn = () => bench.pictures?.() ?? bench.frames;
 
-/** Goes through a path, a step a picture. Milliseconds between pictures. */
+/** Walks along a path, one step per frame; returns the milliseconds between frames. */
 bench.walk = async (path) => {
   const intervals = [];
   let last = await bench.next();
@@ -33,7 +33,7 @@ bench.walk = async (path) => {
   return intervals;
 };
 
-/** Stops at every few steps until everything is there. */
+/** Shows every `every`-th step until its view is complete. */
 bench.visit = async (path, every) => {
   for (let k = 0; k < path.length; k += every) {
     bench.set(path[k]);
@@ -41,7 +41,7 @@ bench.visit = async (path, every) => {
   }
 };
 
-/** Along a path at the pace of the screen, over and over for some seconds; the browser stays usable meanwhile. */
+/** Walks along a path repeatedly for some seconds, one step per screen frame. */
 bench.stroll = async (path, seconds) => {
   const end = performance.now() + 1000 * seconds;
   while (performance.now() < end) {
@@ -54,7 +54,7 @@ bench.stroll = async (path, seconds) => {
   await bench.quiet();
 };
 
-/** For viewers of pictures: the manifest, the view that looks north, and U and V of a step on the ground (spec/pyramid.md). */
+/** For image viewers: the manifest, the view that looks north, and a function from a step to U and V on the ground (spec/pyramid.md). */
 bench.pyramid = async () => {
   const json = await (await fetch(`${asked.get("base")}/rendering.json`)).json();
   const view = json.views.find(({ look_at_deg }) => look_at_deg === 0);

@@ -207,8 +207,8 @@ def find_street_edge(parcel: Points, outline: Points) -> int:
     ahead = np.concatenate([outline[1:], outline[:1]]) - outline
     ahead /= np.hypot(ahead[:, 0], ahead[:, 1])[:, None]
     away = middle[:, None] - outline
-    beside = np.abs(away[..., 1] * ahead[:, 0] - away[..., 0] * ahead[:, 1]).min(axis=1)
-    lengths = np.where(beside < 0.1, length, 0.0)
+    distance = np.abs(away[..., 1] * ahead[:, 0] - away[..., 0] * ahead[:, 1]).min(axis=1)
+    lengths = np.where(distance < 0.1, length, 0.0)
     best = int(np.argmax(lengths))
     return best if lengths[best] > 6.0 else -1
 

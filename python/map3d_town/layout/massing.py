@@ -92,7 +92,5 @@ def ring_part(polygon: Points, depth_m: float, profile: Profile, part: BuildingP
 
 def part_without_outline(eave_m: float, storeys: int, facade_kind: str, cover: str, overhang_m: float = 0.0, roof_type: str = GABLE) -> BuildingPart:
     """Returns a part without outline, for use with `replace`."""
-    nothing = np.zeros((0, 2))
-    return BuildingPart(
-        nothing, nothing, (), eave_m, storeys=storeys, facade_kind=facade_kind, cover=cover, overhang_m=overhang_m, roof_type=roof_type
-    )
+    empty = np.zeros((0, 2))
+    return BuildingPart(empty, empty, (), eave_m, storeys=storeys, facade_kind=facade_kind, cover=cover, overhang_m=overhang_m, roof_type=roof_type)

@@ -310,8 +310,8 @@ def _make_eaves(part_grid: PartGrid, design: FacadeDesign) -> list[BoundarySurfa
         below = drop_repeated_points([p - drop for p in loop[::-1]])
         surfaces.append(make_untextured(ROOF, below, design.eaves()))
         for j, (dk, di) in enumerate([(0, -1), (1, 0), (0, 1), (-1, 0)]):
-            beside = ((k + dk) % strips if part_grid.part.closed else k + dk, i + di)
-            if beside not in outer and beside not in inside:
+            neighbour = ((k + dk) % strips if part_grid.part.closed else k + dk, i + di)
+            if neighbour not in outer and neighbour not in inside:
                 a, b = loop[j], loop[(j + 1) % 4]
                 rim = drop_repeated_points([a - drop, b - drop, b, a])
                 if len(rim) == 4:

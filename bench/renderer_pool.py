@@ -1,4 +1,4 @@
-"""Processes that hold a scene ready and draw tiles of it when told to, so that renderers can be timed in turns."""
+"""Processes that load a scene once and draw tiles on request, so renderers can be timed in turns."""
 
 import multiprocessing
 import os
@@ -8,23 +8,23 @@ from contextlib import contextmanager
 from multiprocessing.connection import Connection
 from typing import Any, Self
 
-from .peers import Drawer, Frame, Missing
+from .peers import FrameFields, PeerMissing, PeerRenderer
 
-Place = tuple[int, int]
+TilePosition = tuple[int, int]
 
 
-class Crew:
-    """`processes` of one renderer; each makes its own drawer. Raises Missing when that cannot be had."""
+class RendererPool:
+    """A number of processes with a renderer each. Raises PeerMissing if the renderer is not available."""
 
-    def __init__(self, name: str, make: Callable[[], Drawer], processes: int = 1, environment: Mapping[str, str] | None = None) -> None:
+    def __init__(self, name: str, make: Callable[[], PeerRenderer], processes: int = 1, environment: Mapping[str, str] | None = None) -> None:
         self.name = name
         context = multiprocessing.get_context("spawn")
         self._channels: list[Connection] = []
         self._processes = []
-        with _environment(environment or {}):
+        with _with_environment(environment or {}):
             for _ in range(processes):
                 ours, theirs = context.Pipe()
-                process = context.Process(target=_serve, args=(make, theirs), daemon=False)
+                process = context.Process(target=_run_renderer, args=(make, theirs), daemon=False)
                 process.start()
                 theirs.close()
                 self._channels.append(ours)
@@ -32,10 +32,10 @@ class Crew:
         failures = [failure for failure in (self._receive(channel) for channel in self._channels) if failure]
         if failures:
             self.close()
-            raise Missing(failures[0])
+            raise PeerMissing(failures[0])
 
-    def seconds(self, frame: Frame, places: Sequence[Place]) -> float:
-        """Wall time to draw all places, dealt out evenly."""
+    def time_draws(self, frame: FrameFields, places: Sequence[TilePosition]) -> float:
+        """Returns the wall time to draw all tiles, evenly distributed over the processes."""
         shares = [places[k :: len(self._channels)] for k in range(len(self._channels))]
         begun = time.perf_counter()
         for channel, share in zip(self._channels, shares, strict=True):
@@ -44,8 +44,8 @@ class Crew:
             self._receive(channel)
         return time.perf_counter() - begun
 
-    def ask(self, method: str, *arguments: object) -> Any:
-        """Of the first process's drawer."""
+    def call(self, method: str, *arguments: object) -> Any:
+        """Calls a method of the first process's renderer."""
         self._channels[0].send((method, [arguments], True))
         return self._receive(self._channels[0])[0]
 
@@ -67,14 +67,14 @@ class Crew:
         try:
             return channel.recv()
         except EOFError:
-            raise SystemExit(f"bench: a process of {self.name} ended; its message stands above") from None
+            raise SystemExit(f"bench: a process of {self.name} exited; see its message above") from None
 
 
-def _serve(make: Callable[[], Drawer], channel: Connection) -> None:
-    """Answers until the other end is closed. A failure ends the process with its traceback."""
+def _run_renderer(make: Callable[[], PeerRenderer], channel: Connection) -> None:
+    """Runs requests until the other end closes the channel. An exception ends the process with a traceback."""
     try:
-        drawer = make()
-    except Missing as missing:
+        renderer = make()
+    except PeerMissing as missing:
         channel.send(str(missing))
         return
     channel.send(None)
@@ -83,13 +83,13 @@ def _serve(make: Callable[[], Drawer], channel: Connection) -> None:
             method, calls, wanted = channel.recv()
         except EOFError:
             return
-        answers = [getattr(drawer, method)(*call) for call in calls]
+        answers = [getattr(renderer, method)(*call) for call in calls]
         channel.send(answers if wanted else None)
 
 
 @contextmanager
-def _environment(more: Mapping[str, str]) -> Iterator[None]:
-    """What children that start meanwhile see."""
+def _with_environment(more: Mapping[str, str]) -> Iterator[None]:
+    """Sets environment variables for processes that start in this context."""
     before = dict(os.environ)
     os.environ.update(more)
     try:

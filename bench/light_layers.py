@@ -1,4 +1,4 @@
-"""What the layers of light cost: processor time a base tile of their rays, beside the visibility and shading that go before them."""
+"""CPU time per base tile of the rays of the light layers, next to that of visibility and shading."""
 
 import math
 from typing import Any, Final
@@ -12,7 +12,7 @@ from map3d.geometry.frames import core_frame
 from map3d.tiles.naming import block_levels
 from map3d.tiles.occupancy import xy_from_morton
 
-from .scene import prepared
+from .benchmark_scene import prepare_scene
 
 BUILDINGS: Final = 300
 RES_M: Final = 0.2
@@ -24,14 +24,14 @@ SUNS: Final = 16
 
 
 def measure() -> list[dict[str, Any]]:
-    """A row a kind; the table is printed."""
-    folder, frames = prepared(BUILDINGS, RES_M, "webp")
+    """Measures each layer kind and prints the table."""
+    folder, frames = prepare_scene(BUILDINGS, RES_M, "webp")
     fields = next(iter(frames.values()))
     scene = _core.Scene(str(folder))
-    blocks = _full_blocks(scene, core_frame(fields))
-    rows = [_row(scene, kind, core_frame({**fields, "layers": [layer]}), blocks) for kind, layer in layers().items()]
-    table = Table(title=f"layers of light, ms of processor time a base tile, {scene.triangle_count:,} triangles at {RES_M} m a pixel")
-    for column in ("layer", "tiles", "visibility and shading", "rays", "rays, of one sun"):
+    blocks = _fullest_blocks(scene, core_frame(fields))
+    rows = [_measure_layer(scene, kind, core_frame({**fields, "layers": [layer]}), blocks) for kind, layer in layers().items()]
+    table = Table(title=f"layers of light, ms of CPU time per base tile, {scene.triangle_count:,} triangles at {RES_M} m per pixel")
+    for column in ("layer", "tiles", "visibility and shading", "rays", "rays per sun"):
         table.add_column(column, justify="right")
     for row in rows:
         each = f"{row['light_ms'] / row['suns']:.2f}" if row["suns"] else ""
@@ -41,8 +41,8 @@ def measure() -> list[dict[str, Any]]:
 
 
 def layers() -> dict[str, dict[str, Any]]:
-    """Kind → the core's layer."""
-    day = [_sun(40.0 + 280.0 * (k + 0.5) / SUNS, 60.0 * math.sin(math.pi * (k + 0.5) / SUNS)) for k in range(SUNS)]
+    """Returns the core's layers by kind."""
+    day = [_sun_direction(40.0 + 280.0 * (k + 0.5) / SUNS, 60.0 * math.sin(math.pi * (k + 0.5) / SUNS)) for k in range(SUNS)]
     options: dict[str, dict[str, Any]] = {
         "sun": {"suns": [SUN]},
         "sun16": {"suns": day},
@@ -53,8 +53,8 @@ def layers() -> dict[str, dict[str, Any]]:
     return {kind: {"kind": kind, "format": "png", **more} for kind, more in options.items()}
 
 
-def _row(scene: _core.Scene, kind: str, frame: _core.Frame, blocks: list[tuple[int, int, int]]) -> dict[str, Any]:
-    """The least of the rounds, after one that warms the caches."""
+def _measure_layer(scene: _core.Scene, kind: str, frame: _core.Frame, blocks: list[tuple[int, int, int]]) -> dict[str, Any]:
+    """Measures the fastest round after a warm-up round."""
     rounds = []
     for _ in range(ROUNDS + 1):
         stats = [scene.render_block(frame, *block).stats for block in blocks]
@@ -65,8 +65,8 @@ def _row(scene: _core.Scene, kind: str, frame: _core.Frame, blocks: list[tuple[i
     return {"kind": kind, "tiles": int(tiles), "light_ms": light_ms, "before_ms": before_ms, "suns": len(layers()[kind].get("suns", ()))}
 
 
-def _full_blocks(scene: _core.Scene, frame: _core.Frame) -> list[tuple[int, int, int]]:
-    """Base blocks with the most tiles that may have content."""
+def _fullest_blocks(scene: _core.Scene, frame: _core.Frame) -> list[tuple[int, int, int]]:
+    """Returns the base blocks with the most occupied tiles."""
     root = block_levels(frame.zmax)[0].root
     blocks, counts = np.unique(scene.occupied(frame, frame.zmax) >> np.uint64(2 * (frame.zmax - root)), return_counts=True)
     columns, rows = xy_from_morton(blocks)
@@ -74,6 +74,6 @@ def _full_blocks(scene: _core.Scene, frame: _core.Frame) -> list[tuple[int, int,
     return [(root, int(columns[k]), int(rows[k])) for k in order]
 
 
-def _sun(azimuth_deg: float, elevation_deg: float) -> tuple[float, float, float]:
+def _sun_direction(azimuth_deg: float, elevation_deg: float) -> tuple[float, float, float]:
     a, e = math.radians(azimuth_deg), math.radians(elevation_deg)
     return (math.sin(a) * math.cos(e), math.cos(a) * math.cos(e), math.sin(e))

@@ -1,4 +1,4 @@
-"""Plots as small SVG files: measured points joined by lines, both axes from the data."""
+"""Draws line plots as small SVG files."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,7 @@ Point = tuple[float, float]
 
 
 def plot(path: Path, title: str, x_label: str, y_label: str, lines: Mapping[str, Sequence[Point]]) -> None:
-    """x on a logarithmic axis, y from 0."""
+    """Draws a plot with a logarithmic x axis and y from 0."""
     points = [point for line in lines.values() for point in line]
     x_low, x_high = min(x for x, _ in points), max(x for x, _ in points)
     step = _step(max(y for _, y in points))
@@ -43,7 +43,7 @@ def plot(path: Path, title: str, x_label: str, y_label: str, lines: Mapping[str,
 
 
 def _step(high: float) -> float:
-    """1, 2 or 5 times a power of ten, so that there are four to ten steps."""
+    """Returns 1, 2 or 5 times a power of ten, for four to ten steps."""
     power = 10.0 ** math.floor(math.log10(high / 4))
     return max(power * factor for factor in (1, 2, 5) if power * factor <= high / 4)
 

@@ -1,4 +1,4 @@
-"""The triangles of a built scene's assets, one part per material, with the images that the build filled: what every peer is given."""
+"""Reads the input of all peers: the triangles of a built scene, one part per material, with the textures of the build."""
 
 import hashlib
 import json
@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from map3d import _core
 from map3d.geometry.views import Axes, axes
 from map3d.types import ViewAngles
-from tests.oracle.asset import read_asset
+from tests.oracle.asset_reader import read_asset
 
-from . import Frame
+from . import FrameFields
 
 
 @dataclass(frozen=True)
-class Part:
-    """corners (n, 3, 3) local metres; uvs (n, 3, 2), v up; ids (n,) of objects; image (H, W, 3) sRGB or None; diffuse sRGB 0..1."""
+class MaterialPart:
+    """The triangles of a material: corners (n, 3, 3) local; uvs (n, 3, 2), v up; object ids (n,); image (H, W, 3) sRGB or None; diffuse sRGB."""
 
     corners: NDArray[np.float64]
     uvs: NDArray[np.float32]
@@ -32,8 +32,8 @@ class Part:
     repeats: bool
 
 
-def parts(folder: Path) -> Iterator[Part]:
-    """Of all assets; prototypes are left out, so the scene must have no instances."""
+def read_parts(folder: Path) -> Iterator[MaterialPart]:
+    """Yields the parts of all assets without prototypes; the scene must not have instances."""
     origin = np.array(json.loads((folder / "scene.json").read_text())["origin"])
     images = filled_images(folder)
     for path in sorted(folder.glob("assets/*/mesh.m3a")):
@@ -43,10 +43,10 @@ def parts(folder: Path) -> Iterator[Part]:
             if len(chosen) == 0:
                 continue
             corners = asset.positions[asset.triangles[chosen]] - origin
-            yield Part(corners, asset.uvs[chosen], asset.ids[asset.object[chosen]], *_look(material, images))
+            yield MaterialPart(corners, asset.uvs[chosen], asset.ids[asset.object[chosen]], *_read_material(material, images))
 
 
-def _look(material: dict[str, Any], images: dict[str, Path]) -> tuple[NDArray[np.uint8] | None, tuple[float, float, float], bool]:
+def _read_material(material: dict[str, Any], images: dict[str, Path]) -> tuple[NDArray[np.uint8] | None, tuple[float, float, float], bool]:
     key = material["texture"]
     image = None if key is None else np.ascontiguousarray(_core.texture_level(str(images[key]), 0)[..., :3])
     red, green, blue = material["diffuse"][:3]
@@ -55,7 +55,7 @@ def _look(material: dict[str, Any], images: dict[str, Path]) -> tuple[NDArray[np
 
 @cache
 def filled_images(folder: Path) -> dict[str, Path]:
-    """Built textures by the key of their source image."""
+    """Returns the built textures by key of their source image."""
     found = {}
     for path in sorted((folder / "textures").glob("*/*.m3t")):
         data = path.read_bytes()
@@ -65,8 +65,8 @@ def filled_images(folder: Path) -> dict[str, Path]:
 
 
 @dataclass(frozen=True)
-class Square:
-    """What a tile shows: its middle (u, v) and side in metres, its side in pixels, and the axes of the view."""
+class TileSquare:
+    """The square of a tile: centre (u, v) and side in metres, side in pixels, axes of the view."""
 
     u_m: float
     v_m: float
@@ -75,24 +75,24 @@ class Square:
     axes: Axes
 
 
-def square(frame: Frame, x: int, y: int) -> Square:
+def tile_square(frame: FrameFields, x: int, y: int) -> TileSquare:
     side = frame["size_m"] / 2 ** frame["zmax"]
     view = axes(ViewAngles(frame["look_at_deg"], frame["pitch_deg"]))
-    return Square(frame["u0_m"] + (x + 0.5) * side, frame["v0_m"] - (y + 0.5) * side, side, frame["tile_px"], view)
+    return TileSquare(frame["u0_m"] + (x + 0.5) * side, frame["v0_m"] - (y + 0.5) * side, side, frame["tile_px"], view)
 
 
-def depths(lo: NDArray[np.float64], hi: NDArray[np.float64], view: Axes) -> tuple[float, float]:
-    """D of planes before and behind a box, with a metre to spare."""
+def depth_range(lo: NDArray[np.float64], hi: NDArray[np.float64], view: Axes) -> tuple[float, float]:
+    """Returns the depths D of planes in front of and behind a box, with a margin of one metre."""
     centre, half = (lo + hi) / 2, (hi - lo) / 2
     middle, reach = float(centre @ view.forward), float(half @ np.abs(view.forward))
     return math.floor(middle - reach) - 1.0, math.ceil(middle + reach) + 1.0
 
 
-def linear(srgb: NDArray[np.float64]) -> NDArray[np.float64]:
+def linear_from_srgb(srgb: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
 
 
-def srgb_bytes(light: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """sRGB of linear light 0..1."""
+def srgb_bytes_from_linear(light: NDArray[np.floating]) -> NDArray[np.uint8]:
+    """Converts linear light 0..1 to sRGB bytes."""
     light = np.clip(light, 0, 1)
     return np.round(255 * np.where(light <= 0.0031308, light * 12.92, 1.055 * light ** (1 / 2.4) - 0.055)).astype(np.uint8)

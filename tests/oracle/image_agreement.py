@@ -1,4 +1,4 @@
-"""Figures of agreement between two images of a tile."""
+"""Measures the agreement of two images of a tile."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,29 +10,29 @@ def srgb_from_linear(linear: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def psnr(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """Decibels, of values in 0..1."""
+    """Returns the PSNR in decibels of images in 0..1."""
     return float(-10 * np.log10(max(np.mean((a - b) ** 2), 1e-12)))
 
 
 def gradient_energy(image: NDArray[np.float64]) -> float:
-    """Mean squared difference of neighbouring pixels: how sharp an image is."""
+    """Returns the mean squared difference of neighbouring pixels, a measure of sharpness."""
     return float(np.mean(np.diff(image, axis=0) ** 2) + np.mean(np.diff(image, axis=1) ** 2))
 
 
-def edges(ids: NDArray[np.uint32], normal: NDArray[np.float64], depth: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(H, W): within one pixel of a change of object, of normal (more than 2.5°), of surface, or of the tile's border."""
+def edge_mask(ids: NDArray[np.uint32], normal: NDArray[np.float64], depth: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Returns (H, W): pixels within one pixel of the tile's border or of a change of object, normal (more than 2.5°) or surface."""
     seen = np.where(np.isfinite(depth), depth, 1e9)
     change = np.zeros(ids.shape, bool)
     for axis in (0, 1):
         here, there = _pairs(axis)
         differs = (ids[here] != ids[there]) | ((normal[here] * normal[there]).sum(-1) < 0.999)
         step = np.diff(seen, axis=axis)
-        bend = np.abs(np.diff(step, axis=axis)) > 0.02
+        crease = np.abs(np.diff(step, axis=axis)) > 0.02
         change[here] |= differs
         change[there] |= differs
         inner = [slice(None), slice(None)]
         inner[axis] = slice(1, -1)
-        change[tuple(inner)] |= bend
+        change[tuple(inner)] |= crease
     wide = np.pad(change, 1, constant_values=True)
     grown = np.zeros_like(wide)
     for dy in (-1, 0, 1):

@@ -1,4 +1,4 @@
-"""Runs a command and watches what it takes: time, memory of all its processes, room on the disk."""
+"""Runs a command and measures time, memory of all its processes, and disk usage."""
 
 import os
 import signal
@@ -13,9 +13,12 @@ MEMORY_S, DISK_S = 0.2, 20.0
 
 
 @dataclass
-class Figures:
-    """`memory_bytes`: the most that the processes alive at one moment had ever resident, summed over them (VmHWM, mapped files included);
-    `anonymous_bytes`: the most that they had at one moment without mapped files, which the system takes back when it needs room."""
+class ResourceUsage:
+    """Resource usage of a command and its child processes.
+
+    `memory_bytes`: maximum over time of the summed peak resident memory (VmHWM, mapped files included); `anonymous_bytes`: maximum of the summed
+    anonymous memory. The system can reclaim mapped files.
+    """
 
     wall_s: float = 0.0
     cpu_s: float = 0.0
@@ -27,8 +30,8 @@ class Figures:
 
 
 @dataclass
-class Watch:
-    """Samples a process with its descendants, and a folder, until told to stop."""
+class ResourceMonitor:
+    """Samples a process with its descendants, and a folder, until `ended` is set."""
 
     process: int
     folder: Path
@@ -40,19 +43,19 @@ class Watch:
     def run(self) -> None:
         next_disk = 0.0
         while not self.ended.wait(MEMORY_S):
-            members = family(self.process)
-            self.memory_bytes = max(self.memory_bytes, sum(map(high_water, members)))
-            self.anonymous_bytes = max(self.anonymous_bytes, sum(resident(member, "RssAnon:") for member in members))
+            members = process_tree(self.process)
+            self.memory_bytes = max(self.memory_bytes, sum(map(peak_resident, members)))
+            self.anonymous_bytes = max(self.anonymous_bytes, sum(read_status_bytes(member, "RssAnon:") for member in members))
             if time.monotonic() >= next_disk:
-                self.disk_bytes = max(self.disk_bytes, used_bytes(self.folder))
+                self.disk_bytes = max(self.disk_bytes, disk_bytes_of(self.folder))
                 next_disk = time.monotonic() + DISK_S
 
 
-def watched(command: Sequence[str], folder: Path, figures: Figures) -> int:
-    """Runs a command and adds what it took to `figures`; returns its exit status. An interrupt is passed on and raised once it has ended."""
+def run_monitored(command: Sequence[str], folder: Path, figures: ResourceUsage) -> int:
+    """Runs a command, adds its usage to `figures` and returns its exit status. Forwards SIGINT, then raises KeyboardInterrupt."""
     before, begun = os.times(), time.monotonic()
     process = subprocess.Popen(command, start_new_session=True)
-    watch = Watch(process.pid, folder)
+    watch = ResourceMonitor(process.pid, folder)
     thread = threading.Thread(target=watch.run, daemon=True)
     thread.start()
     try:
@@ -69,13 +72,13 @@ def watched(command: Sequence[str], folder: Path, figures: Figures) -> int:
         figures.cpu_s += after.children_user + after.children_system - before.children_user - before.children_system
         figures.memory_bytes = max(figures.memory_bytes, watch.memory_bytes)
         figures.anonymous_bytes = max(figures.anonymous_bytes, watch.anonymous_bytes)
-        figures.disk_bytes = used_bytes(folder)
+        figures.disk_bytes = disk_bytes_of(folder)
         figures.disk_peak_bytes = max(figures.disk_peak_bytes, watch.disk_bytes, figures.disk_bytes)
         figures.runs += 1
 
 
-def family(process: int) -> list[int]:
-    """A process, its children, and theirs."""
+def process_tree(process: int) -> list[int]:
+    """Returns a process and its descendants."""
     children: dict[int, list[int]] = {}
     for entry in os.scandir("/proc"):
         if entry.name.isdigit():
@@ -90,13 +93,13 @@ def family(process: int) -> list[int]:
     return found
 
 
-def high_water(process: int) -> int:
-    """VmHWM in bytes; 0 of a process that has ended."""
-    return resident(process, "VmHWM:")
+def peak_resident(process: int) -> int:
+    """Returns the peak resident memory in bytes; 0 for a process that has exited."""
+    return read_status_bytes(process, "VmHWM:")
 
 
-def resident(process: int, what: str) -> int:
-    """A line of /proc/…/status in bytes; 0 of a process that has ended."""
+def read_status_bytes(process: int, what: str) -> int:
+    """Returns a line of /proc/PID/status in bytes; 0 for a process that has exited."""
     try:
         lines = Path(f"/proc/{process}/status").read_text().splitlines()
     except OSError:
@@ -104,8 +107,8 @@ def resident(process: int, what: str) -> int:
     return next((int(line.split()[1]) << 10 for line in lines if line.startswith(what)), 0)
 
 
-def used_bytes(folder: Path) -> int:
-    """What the files below a folder take on the disk."""
+def disk_bytes_of(folder: Path) -> int:
+    """Returns the disk usage of the files in a folder."""
     total, stack = 0, [str(folder)]
     while stack:
         try:

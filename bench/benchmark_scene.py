@@ -1,22 +1,21 @@
-"""The town that everything is measured on, made once per checkout."""
+"""The town for the benchmarks, generated once per checkout."""
 
 import shutil
 from pathlib import Path
-from typing import Any
 
 from map3d.catalogue import Workspace
 from map3d.cli.app import run
 from map3d.errors import UnknownVersion
 
+from .peers import FrameFields
+
 CACHE = Path(".cache/bench")
-Fields = dict[str, Any]
-"""Fields of a frame: `map3d.geometry.frames.core_frame` makes a `_core.Frame` of them."""
 
 
-def prepared(buildings: int, res_m: float, color: str) -> tuple[Path, dict[str, Fields]]:
-    """The scene's folder, and the fields of the core's frame of each view. `color`: format of the colour layer."""
+def prepare_scene(buildings: int, res_m: float, color: str) -> tuple[Path, dict[str, FrameFields]]:
+    """Returns the scene's folder and the frame fields of each view. `color`: format of the colour layer."""
     folder = CACHE / f"town-{buildings}"
-    workspace = _current(folder / "workspace")
+    workspace = _open_or_recreate(folder / "workspace")
     where = ["-w", str(workspace.root)]
     name = f"{color}-{round(res_m * 1000)}mm"
     catalogue = workspace.open_catalogue()
@@ -24,11 +23,11 @@ def prepared(buildings: int, res_m: float, color: str) -> tuple[Path, dict[str, 
     renderings = {rendering.name for rendering in catalogue.renderings()}
     catalogue.close()
     if "town" not in scenes:
-        _do(["make-town", "-o", str(folder / "town"), "--buildings", str(buildings), "--seed", "7", "--no-trees"])
-        _do(["create-scene", "town", *where])
-        _do(["add-files", "town", str(folder / "town"), *where])
+        run_verb(["make-town", "-o", str(folder / "town"), "--buildings", str(buildings), "--seed", "7", "--no-trees"])
+        run_verb(["create-scene", "town", *where])
+        run_verb(["add-files", "town", str(folder / "town"), *where])
     if name not in renderings:
-        _do(["create-rendering", "town", name, "--res", str(res_m), "--view", "0/45", "--color", color, *where])
+        run_verb(["create-rendering", "town", name, "--res", str(res_m), "--view", "0/45", "--color", color, *where])
     catalogue = workspace.open_catalogue()
     try:
         record = catalogue.rendering(name)
@@ -37,8 +36,8 @@ def prepared(buildings: int, res_m: float, color: str) -> tuple[Path, dict[str, 
         catalogue.close()
 
 
-def _current(folder: Path) -> Workspace:
-    """The workspace, made anew when it is there from an earlier version."""
+def _open_or_recreate(folder: Path) -> Workspace:
+    """Opens the workspace; recreates one of an older version."""
     try:
         workspace = Workspace(folder).create()
         workspace.open_catalogue().close()
@@ -48,6 +47,6 @@ def _current(folder: Path) -> Workspace:
     return workspace
 
 
-def _do(command: list[str]) -> None:
+def run_verb(command: list[str]) -> None:
     if run(command) != 0:
         raise SystemExit(f"bench: map3d {' '.join(command)} failed")

@@ -1,4 +1,4 @@
-"""Reads asset folders (spec/scene.md) with NumPy alone: the oracle's own eyes."""
+"""Reads asset folders (spec/scene.md) with NumPy alone, independently of the core."""
 
 import json
 from dataclasses import dataclass
@@ -20,8 +20,8 @@ SECTIONS = (
 
 
 @dataclass(frozen=True)
-class Asset:
-    """positions (nv, 3) float64 world; triangles (nt, 3); uvs (nt, 3, 2); material, object, prototype (nt,); ids (objects,) of the registry."""
+class OracleAsset:
+    """An asset: positions (nv, 3) world; triangles (nt, 3); uvs (nt, 3, 2); material, object, prototype (nt,); registry ids (objects,)."""
 
     folder: Path
     positions: NDArray[np.float64]
@@ -35,11 +35,11 @@ class Asset:
 
     @property
     def corners(self) -> NDArray[np.float64]:
-        """(nt, 3, 3) world."""
+        """World positions of the corners, (nt, 3, 3)."""
         return self.positions[self.triangles]
 
 
-def read_asset(folder: Path) -> Asset:
+def read_asset(folder: Path) -> OracleAsset:
     data = np.fromfile(folder / "mesh.m3a", np.uint8)
     assert data[:4].tobytes() == b"M3DA"
     nv, nt = (int(v) for v in data[16:32].view("<u8"))
@@ -52,7 +52,7 @@ def read_asset(folder: Path) -> Asset:
         size = count * np.dtype(kind).itemsize
         parts[name] = data[at : at + size].view(kind).reshape(-1, width) if width > 1 else data[at : at + size].view(kind)
         at += -(-size // 64) * 64
-    return Asset(
+    return OracleAsset(
         folder,
         parts["positions"],
         parts["triangles"],
