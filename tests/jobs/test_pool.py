@@ -27,7 +27,7 @@ import sys
 from pathlib import Path
 from tests.jobs.town import open_town
 
-town = open_town(Path(sys.argv[1]))
+town = open_town(Path(sys.argv[1]), float(sys.argv[3]))
 print("started", flush=True)
 statistics, events = town.run(int(sys.argv[2]))
 print(statistics.done, statistics.lost_leases, flush=True)
@@ -44,8 +44,8 @@ def undisturbed(tmp_path: Path, faults: Path) -> str:
     return digest
 
 
-def render_in_process(town: Town, workers: int) -> subprocess.Popen[str]:
-    command = [sys.executable, "-c", RENDER_IN_PROCESS, str(town.workspace.root), str(workers)]
+def render_in_process(town: Town, workers: int, lease_s: float = LEASE_S) -> subprocess.Popen[str]:
+    command = [sys.executable, "-c", RENDER_IN_PROCESS, str(town.workspace.root), str(workers), str(lease_s)]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
     assert process.stdout is not None
@@ -197,6 +197,39 @@ def test_run_resumes_after_being_killed(town: Town, faults: Path, undisturbed: s
     assert town.digest() == undisturbed
 
 
+def test_leases_of_a_killed_run_are_free_at_once_and_cost_no_attempt(town: Town, faults: Path, undisturbed: str) -> None:
+    for _ in range(3):
+        (faults / "slow").write_text("1")
+        process = render_in_process(town, 2, lease_s=30)
+        deadline = time.monotonic() + 60
+        while sum(f".{process.pid}." in str(job.worker) for job in town.catalogue.jobs("town-a", state=State.LEASED)) < 2:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        process.kill()
+        process.communicate()
+    (faults / "slow").unlink()
+    started = time.monotonic()
+    statistics, _ = town.run()
+    assert time.monotonic() - started < 25
+    assert all_done(town)
+    assert statistics.failed_attempts == 0
+    jobs = list(town.catalogue.jobs("town-a"))
+    assert sum(job.expiries for job in jobs) == 6
+    assert all(job.attempts == 1 for job in jobs)
+    assert town.digest() == undisturbed
+
+
+def test_leases_of_a_running_process_stay(town: Town, faults: Path) -> None:
+    (faults / "slow").write_text("1")
+    process = render_in_process(town, 1)
+    wait_for(town, 1)
+    (faults / "slow").unlink()
+    statistics, _ = town.run()
+    output, _ = process.communicate(timeout=60)
+    assert statistics.lost_leases == int(output.split()[1]) == 0
+    assert all_done(town)
+
+
 def test_run_that_waits_for_another_runs_leases_reports_it_once(town: Town, faults: Path) -> None:
     other = town.workspace.open_catalogue(lease_s=60)
     held = other.lease("town-a", "other")
@@ -250,7 +283,7 @@ def test_worker_exits_after_three_failed_jobs(town: Town, faults: Path) -> None:
             (faults / f"{z}-{x}-{y}").write_text("exception")
     statistics, _ = town.run(size=1)
     assert statistics.failed_attempts == 3
-    assert statistics.exit_reasons == ["local-1: failed 3 different jobs"]
+    assert [reason.rpartition(": ")[2] for reason in statistics.exit_reasons] == ["failed 3 different jobs"]
     assert town.count(State.TODO) == JOBS
 
 

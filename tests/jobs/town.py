@@ -78,8 +78,8 @@ def planned(block: BlockId, kind: str, zmax: int) -> PlannedJob:
     return PlannedJob(VIEW, block, "base" if kind == "base" else "reduce", morton(block.x, block.y), f"key {block}", block_above(block, zmax))
 
 
-def open_town(root: Path) -> Town:
+def open_town(root: Path, lease_s: float = LEASE_S) -> Town:
     """Opens the same town from another process."""
     workspace = Workspace(root)
-    catalogue = workspace.open_catalogue(lease_s=LEASE_S)
+    catalogue = workspace.open_catalogue(lease_s=lease_s)
     return Town(workspace, catalogue, catalogue.rendering("town-a"))
