@@ -14,10 +14,13 @@ from pathlib import Path
 
 import pytest
 
-from map3d.catalogue import State
+from map3d.catalogue import JobResult, Lease, State
 from map3d.jobs.events import JobDone, RunEvent, Waiting, WorkerExited
 from map3d.jobs.timeouts import Timeouts
-from tests.jobs.town import BLOCKS, LEASE_S, TIMEOUTS, VIEW, Town, make_town
+from map3d.renderings.render_task import RenderTask
+from map3d.subprocess import Message
+from map3d.tiles.sqlite_store import SqliteTileStore
+from tests.jobs.town import BLOCKS, LEASE_S, TIMEOUTS, VIEW, Town, make_town, planned_jobs
 
 JOBS = BLOCKS * BLOCKS
 FAULTS = ["segfault", "abort", "killed", "hang", "spin", "exception", "exit 0", "memory", "nonsense"]
@@ -34,6 +37,21 @@ print(statistics.done, statistics.lost_leases, flush=True)
 town.close()
 """
 
+SUSPENDED_COMMIT = """
+import os, signal
+from map3d.renderings.render_task import RenderTask
+
+commit, commits = RenderTask.commit, []
+
+def suspend_first(task, lease, response):
+    commits.append(lease)
+    if len(commits) == 1:
+        os.kill(os.getpid(), signal.SIGSTOP)
+    return commit(task, lease, response)
+
+RenderTask.commit = suspend_first
+"""
+
 
 @pytest.fixture
 def undisturbed(tmp_path: Path, faults: Path) -> str:
@@ -44,8 +62,8 @@ def undisturbed(tmp_path: Path, faults: Path) -> str:
     return digest
 
 
-def render_in_process(town: Town, workers: int, lease_s: float = LEASE_S) -> subprocess.Popen[str]:
-    command = [sys.executable, "-c", RENDER_IN_PROCESS, str(town.workspace.root), str(workers), str(lease_s)]
+def render_in_process(town: Town, workers: int, lease_s: float = LEASE_S, before: str = "") -> subprocess.Popen[str]:
+    command = [sys.executable, "-c", before + RENDER_IN_PROCESS, str(town.workspace.root), str(workers), str(lease_s)]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
     assert process.stdout is not None
@@ -274,6 +292,42 @@ def test_worker_suspended_past_its_lease_loses_it(town: Town, faults: Path, undi
     output, _ = process.communicate(timeout=30)
     assert int(output.split()[1]) == 1, "the suspended worker must lose its lease"
     assert town.digest() == undisturbed
+
+
+def test_worker_suspended_before_its_commit_does_not_overwrite_newer_tiles(town: Town, faults: Path) -> None:
+    process = render_in_process(town, 1, before=SUSPENDED_COMMIT)
+    os.waitpid(process.pid, os.WUNTRACED)
+    (faults / "salt").write_text("changed")
+    town.catalogue.plan("town-a", planned_jobs(town.rendering, "changed"))
+    town.run()
+    assert all_done(town)
+    newer = town.digest()
+    os.kill(process.pid, signal.SIGCONT)
+    output, _ = process.communicate(timeout=30)
+    assert output.split() == ["0", "1"], "no block done, one lease lost"
+    assert town.digest() == newer
+    with SqliteTileStore(town.workspace.store_path("town-a", VIEW), read_only=True) as store:
+        assert all(block.key.startswith("changed") for block in store.list_blocks())
+
+
+def test_heartbeats_continue_during_a_long_commit(town: Town, faults: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    commit = RenderTask.commit
+
+    def slow_commit(task: RenderTask, lease: Lease, response: Message) -> JobResult:
+        time.sleep(LEASE_S * 1.5)
+        return commit(task, lease, response)
+
+    monkeypatch.setattr(RenderTask, "commit", slow_commit)
+    pool = town.pool(size=1)
+    events: list[RunEvent] = []
+
+    def on_event(event: RunEvent) -> None:
+        events.append(event)
+        pool.stop()
+
+    pool.run(on_event)
+    town.task.close()
+    assert {type(event) for event in events} == {JobDone, WorkerExited}
 
 
 def test_worker_exits_after_three_failed_jobs(town: Town, faults: Path) -> None:
