@@ -3,7 +3,7 @@
 import os
 import sqlite3
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
@@ -80,18 +80,32 @@ class Connections:
 
 
 class Database(Connections):
-    """A database file with `schema`, written when the file is new. Raises UnknownVersion when the file has another `version`."""
+    """A database file with `schema`, written when the file is new. An older file is brought to `version` by `migrations`: version → statements that
+    lead to it from the version before. Raises UnknownVersion when that is not possible."""
 
-    def __init__(self, path: Path, schema: str, version: int) -> None:
+    def __init__(self, path: Path, schema: str, version: int, migrations: Mapping[int, str] | None = None) -> None:
         super().__init__(path, lambda: _connect(path))
         with self.transaction() as db:
             found = int(db.execute("PRAGMA user_version").fetchone()[0])
-            if found == 0:
-                for statement in schema.split(";"):
-                    db.execute(statement)
-                db.execute(f"PRAGMA user_version = {version}")
-            elif found != version:
+            scripts = [schema] if found == 0 else _scripts(found, version, migrations or {})
+            if scripts is None:
                 raise UnknownVersion(f"{path}: version {found}; this map3d reads version {version}")
+            if scripts:
+                for script in scripts:
+                    run_script(db, script)
+                db.execute(f"PRAGMA user_version = {version}")
+
+
+def _scripts(found: int, version: int, migrations: Mapping[int, str]) -> list[str] | None:
+    """Returns the migrations from version `found` to `version`, in order; None if one is missing or the file is newer."""
+    steps = range(found + 1, version + 1)
+    return [migrations[step] for step in steps] if found <= version and all(step in migrations for step in steps) else None
+
+
+def run_script(db: sqlite3.Connection, script: str) -> None:
+    """Executes statements in the current transaction, which `executescript` would commit."""
+    for statement in script.split(";"):
+        db.execute(statement)
 
 
 def _connect(path: Path) -> sqlite3.Connection:

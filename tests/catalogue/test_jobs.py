@@ -6,7 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from map3d.catalogue import Catalogue, Job, JobResult, Lease, PlannedJob, State
-from map3d.catalogue.states import MAX_ATTEMPTS, TRANSITIONS, JobEvent
+from map3d.catalogue.states import MAX_ATTEMPTS, MAX_EXPIRIES, TRANSITIONS, JobEvent
 from map3d.errors import StaleFence
 from map3d.types import BlockId
 from tests.catalogue.implementations import LEASE_S
@@ -106,8 +106,9 @@ def test_job_of_a_killed_worker_is_leased_again(catalogue: Catalogue) -> None:
     assert catalogue.lease("town-a", "other") is None
     time.sleep(LEASE_S + 0.1)
     second = take(catalogue)
-    assert second.attempt == 2
+    assert second.attempt == 1, "being killed is not failing"
     assert second.fence > first.fence
+    assert only(catalogue).expiries == 1
 
 
 @pytest.mark.parametrize("word", ["heartbeat", "done", "fail", "release"])
@@ -142,13 +143,51 @@ def test_heartbeats_renew_a_lease(catalogue: Catalogue) -> None:
     assert only(catalogue).state is State.DONE
 
 
-def test_lease_that_expires_three_times_quarantines_the_job(catalogue: Catalogue) -> None:
+def test_lease_that_expires_three_times_does_not_quarantine_the_job(catalogue: Catalogue) -> None:
     catalogue.plan("town-a", [base()])
-    for _ in range(MAX_ATTEMPTS):
+    for _ in range(3):
         take(catalogue)
         time.sleep(LEASE_S + 0.1)
+    assert take(catalogue).attempt == 1
+    assert (only(catalogue).attempts, only(catalogue).expiries) == (1, 3)
+
+
+def test_tenth_expired_lease_quarantines_the_job(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [base()])
+    for _ in range(MAX_EXPIRIES):
+        take(catalogue)
+        assert catalogue.expire("town-a", ["w"]) == 1
     assert catalogue.lease("town-a", "w") is None
-    assert "lease expired" in (only(catalogue, State.QUARANTINED).reason or "")
+    assert "lease expired 10 times" in (only(catalogue, State.QUARANTINED).reason or "")
+    assert catalogue.retry("town-a") == 1
+    assert (take(catalogue).attempt, only(catalogue).expiries) == (1, 0)
+
+
+def test_expired_leases_do_not_add_to_failed_attempts(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [base()])
+    for attempt in range(1, MAX_ATTEMPTS + 1):
+        take(catalogue)
+        catalogue.expire("town-a", ["w"])
+        state = catalogue.fail(take(catalogue), f"bad {attempt}")
+    assert state is State.QUARANTINED
+    assert (only(catalogue).attempts, only(catalogue).expiries) == (MAX_ATTEMPTS, MAX_ATTEMPTS)
+
+
+def test_only_leases_of_the_named_workers_expire(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [base(0), base(1)])
+    mine, other = take(catalogue), catalogue.lease("town-a", "other")
+    assert other is not None
+    assert catalogue.expire("town-a", ["w", "unknown"]) == 1
+    with pytest.raises(StaleFence):
+        catalogue.done(mine, RESULT)
+    catalogue.done(other, RESULT)
+
+
+def test_job_whose_lease_expired_goes_to_the_end_of_the_queue(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [base(0), base(1)])
+    take(catalogue)
+    catalogue.expire("town-a", ["w"])
+    assert [take(catalogue).block.x for _ in range(2)] == [1, 0]
 
 
 def test_result_of_a_done_job_is_stored(catalogue: Catalogue) -> None:

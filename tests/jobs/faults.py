@@ -1,7 +1,7 @@
 """A subprocess for tests: makes blocks of pseudo-random bytes that depend only on block and layer kind, and fails on request.
 
 The folder MAP3D_TEST_FAULTS selects the faults: a file `<z>-<x>-<y>` contains the kind of fault of that block, a file `slow` the seconds that each
-block takes, and a file `no-start` makes the start fail.
+block takes, a file `no-start` makes the start fail, and the bytes of all blocks depend on the file `salt`.
 """
 
 import contextlib
@@ -36,8 +36,9 @@ def open_faulty(setup: Mapping[str, Any]) -> Handler:
         tiles = [] if (x + y) % 7 == 6 else list(tiles_of_block(BlockId(z, x, y), frame["zmax"]))
         kinds = [layer["kind"] for layer in frame["layers"]]
         names = [[layer, *tile] for tile in tiles for layer in range(len(kinds))]
-        blobs = [hashlib.sha256(f"{kinds[layer]} {tile}".encode()).digest() * 8 for layer, *tile in names]
-        seam = [f"seam {z}/{x}/{y}".encode()] if tiles else []
+        salt = (folder / "salt").read_text() if (folder / "salt").exists() else ""
+        blobs = [hashlib.sha256(f"{kinds[layer]} {tile}{salt}".encode()).digest() * 8 for layer, *tile in names]
+        seam = [f"seam {z}/{x}/{y}{salt}".encode()] if tiles else []
         return {"tiles": names, "seam": bool(seam), "seconds": 0.01}, blobs + seam
 
     return handle

@@ -14,10 +14,13 @@ from pathlib import Path
 
 import pytest
 
-from map3d.catalogue import State
+from map3d.catalogue import JobResult, Lease, State
 from map3d.jobs.events import JobDone, RunEvent, Waiting, WorkerExited
 from map3d.jobs.timeouts import Timeouts
-from tests.jobs.town import BLOCKS, LEASE_S, TIMEOUTS, VIEW, Town, make_town
+from map3d.renderings.render_task import RenderTask
+from map3d.subprocess import Message
+from map3d.tiles.sqlite_store import SqliteTileStore
+from tests.jobs.town import BLOCKS, LEASE_S, TIMEOUTS, VIEW, Town, make_town, planned_jobs
 
 JOBS = BLOCKS * BLOCKS
 FAULTS = ["segfault", "abort", "killed", "hang", "spin", "exception", "exit 0", "memory", "nonsense"]
@@ -27,11 +30,26 @@ import sys
 from pathlib import Path
 from tests.jobs.town import open_town
 
-town = open_town(Path(sys.argv[1]))
+town = open_town(Path(sys.argv[1]), float(sys.argv[3]))
 print("started", flush=True)
 statistics, events = town.run(int(sys.argv[2]))
 print(statistics.done, statistics.lost_leases, flush=True)
 town.close()
+"""
+
+SUSPENDED_COMMIT = """
+import os, signal
+from map3d.renderings.render_task import RenderTask
+
+commit, commits = RenderTask.commit, []
+
+def suspend_first(task, lease, response):
+    commits.append(lease)
+    if len(commits) == 1:
+        os.kill(os.getpid(), signal.SIGSTOP)
+    return commit(task, lease, response)
+
+RenderTask.commit = suspend_first
 """
 
 
@@ -44,8 +62,8 @@ def undisturbed(tmp_path: Path, faults: Path) -> str:
     return digest
 
 
-def render_in_process(town: Town, workers: int) -> subprocess.Popen[str]:
-    command = [sys.executable, "-c", RENDER_IN_PROCESS, str(town.workspace.root), str(workers)]
+def render_in_process(town: Town, workers: int, lease_s: float = LEASE_S, before: str = "") -> subprocess.Popen[str]:
+    command = [sys.executable, "-c", before + RENDER_IN_PROCESS, str(town.workspace.root), str(workers), str(lease_s)]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
     assert process.stdout is not None
@@ -197,6 +215,39 @@ def test_run_resumes_after_being_killed(town: Town, faults: Path, undisturbed: s
     assert town.digest() == undisturbed
 
 
+def test_leases_of_a_killed_run_are_free_at_once_and_cost_no_attempt(town: Town, faults: Path, undisturbed: str) -> None:
+    for _ in range(3):
+        (faults / "slow").write_text("1")
+        process = render_in_process(town, 2, lease_s=30)
+        deadline = time.monotonic() + 60
+        while sum(f".{process.pid}." in str(job.worker) for job in town.catalogue.jobs("town-a", state=State.LEASED)) < 2:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        process.kill()
+        process.communicate()
+    (faults / "slow").unlink()
+    started = time.monotonic()
+    statistics, _ = town.run()
+    assert time.monotonic() - started < 25
+    assert all_done(town)
+    assert statistics.failed_attempts == 0
+    jobs = list(town.catalogue.jobs("town-a"))
+    assert sum(job.expiries for job in jobs) == 6
+    assert all(job.attempts == 1 for job in jobs)
+    assert town.digest() == undisturbed
+
+
+def test_leases_of_a_running_process_stay(town: Town, faults: Path) -> None:
+    (faults / "slow").write_text("1")
+    process = render_in_process(town, 1)
+    wait_for(town, 1)
+    (faults / "slow").unlink()
+    statistics, _ = town.run()
+    output, _ = process.communicate(timeout=60)
+    assert statistics.lost_leases == int(output.split()[1]) == 0
+    assert all_done(town)
+
+
 def test_run_that_waits_for_another_runs_leases_reports_it_once(town: Town, faults: Path) -> None:
     other = town.workspace.open_catalogue(lease_s=60)
     held = other.lease("town-a", "other")
@@ -243,6 +294,42 @@ def test_worker_suspended_past_its_lease_loses_it(town: Town, faults: Path, undi
     assert town.digest() == undisturbed
 
 
+def test_worker_suspended_before_its_commit_does_not_overwrite_newer_tiles(town: Town, faults: Path) -> None:
+    process = render_in_process(town, 1, before=SUSPENDED_COMMIT)
+    os.waitpid(process.pid, os.WUNTRACED)
+    (faults / "salt").write_text("changed")
+    town.catalogue.plan("town-a", planned_jobs(town.rendering, "changed"))
+    town.run()
+    assert all_done(town)
+    newer = town.digest()
+    os.kill(process.pid, signal.SIGCONT)
+    output, _ = process.communicate(timeout=30)
+    assert output.split() == ["0", "1"], "no block done, one lease lost"
+    assert town.digest() == newer
+    with SqliteTileStore(town.workspace.store_path("town-a", VIEW), read_only=True) as store:
+        assert all(block.key.startswith("changed") for block in store.list_blocks())
+
+
+def test_heartbeats_continue_during_a_long_commit(town: Town, faults: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    commit = RenderTask.commit
+
+    def slow_commit(task: RenderTask, lease: Lease, response: Message) -> JobResult:
+        time.sleep(LEASE_S * 1.5)
+        return commit(task, lease, response)
+
+    monkeypatch.setattr(RenderTask, "commit", slow_commit)
+    pool = town.pool(size=1)
+    events: list[RunEvent] = []
+
+    def on_event(event: RunEvent) -> None:
+        events.append(event)
+        pool.stop()
+
+    pool.run(on_event)
+    town.task.close()
+    assert {type(event) for event in events} == {JobDone, WorkerExited}
+
+
 def test_worker_exits_after_three_failed_jobs(town: Town, faults: Path) -> None:
     z = town.rendering.zmax - 3
     for x in range(BLOCKS):
@@ -250,7 +337,7 @@ def test_worker_exits_after_three_failed_jobs(town: Town, faults: Path) -> None:
             (faults / f"{z}-{x}-{y}").write_text("exception")
     statistics, _ = town.run(size=1)
     assert statistics.failed_attempts == 3
-    assert statistics.exit_reasons == ["local-1: failed 3 different jobs"]
+    assert [reason.rpartition(": ")[2] for reason in statistics.exit_reasons] == ["failed 3 different jobs"]
     assert town.count(State.TODO) == JOBS
 
 

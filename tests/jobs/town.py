@@ -63,23 +63,27 @@ def make_town(root: Path) -> Town:
     frames = tuple(pin(BOX, 256, 0.02, [ViewAngles(0, 45)]))
     rendering = RenderingRecord("town-a", "town", 0.02, (LAYERS,), frames, BOX)
     catalogue.create_rendering(rendering)
-    base = rendering.zmax - 3
-    jobs = [planned(BlockId(base, x, y), "base", rendering.zmax) for x in range(BLOCKS) for y in range(BLOCKS)]
-    above = {job.parent for job in jobs}
-    while above:
-        reduces = [planned(block, "reduce", rendering.zmax) for block in sorted(block for block in above if block is not None)]
-        jobs += reduces
-        above = {job.parent for job in reduces}
-    catalogue.plan("town-a", jobs)
+    catalogue.plan("town-a", planned_jobs(rendering))
     return Town(workspace, catalogue, rendering)
 
 
-def planned(block: BlockId, kind: str, zmax: int) -> PlannedJob:
-    return PlannedJob(VIEW, block, "base" if kind == "base" else "reduce", morton(block.x, block.y), f"key {block}", block_above(block, zmax))
+def planned_jobs(rendering: RenderingRecord, key: str = "key") -> list[PlannedJob]:
+    base = rendering.zmax - 3
+    jobs = [planned(BlockId(base, x, y), "base", rendering.zmax, key) for x in range(BLOCKS) for y in range(BLOCKS)]
+    above = {job.parent for job in jobs}
+    while above:
+        reduces = [planned(block, "reduce", rendering.zmax, key) for block in sorted(block for block in above if block is not None)]
+        jobs += reduces
+        above = {job.parent for job in reduces}
+    return jobs
 
 
-def open_town(root: Path) -> Town:
+def planned(block: BlockId, kind: str, zmax: int, key: str) -> PlannedJob:
+    return PlannedJob(VIEW, block, "base" if kind == "base" else "reduce", morton(block.x, block.y), f"{key} {block}", block_above(block, zmax))
+
+
+def open_town(root: Path, lease_s: float = LEASE_S) -> Town:
     """Opens the same town from another process."""
     workspace = Workspace(root)
-    catalogue = workspace.open_catalogue(lease_s=LEASE_S)
+    catalogue = workspace.open_catalogue(lease_s=lease_s)
     return Town(workspace, catalogue, catalogue.rendering("town-a"))

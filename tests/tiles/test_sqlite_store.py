@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import pytest
 
-from map3d.errors import BadRequest, Corrupt, StoreError, UnknownVersion
+from map3d.errors import BadRequest, Corrupt, StaleFence, StoreError, UnknownVersion
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.tile_store import StoredTile, StoreShape
 from map3d.types import BlockId, Layer, Sun
@@ -50,7 +50,7 @@ def test_the_tables_are_those_of_the_specification(path, store):
     columns = {name: [row[1] for row in rows(path, f"PRAGMA table_info({name})")] for name in ("blob", "tile", "block", "meta")}
     assert columns["blob"] == ["hash", "bytes"]
     assert columns["tile"] == ["layer", "z", "x", "y", "block", "hash"]
-    assert columns["block"] == ["id", "z", "x", "y", "key", "version", "tiles", "seam"]
+    assert columns["block"] == ["id", "z", "x", "y", "key", "version", "tiles", "seam", "fence"]
     assert columns["meta"] == ["key", "value"]
 
 
@@ -118,8 +118,33 @@ def test_another_version_is_refused_with_both_numbers(path, store):
     with sqlite3.connect(path) as db:
         db.execute("UPDATE meta SET value = '99' WHERE key = 'version'")
     db.close()
-    with pytest.raises(UnknownVersion, match=r"99.*1"):
+    with pytest.raises(UnknownVersion, match=r"99.*2"):
         SqliteTileStore(path)
+
+
+def downgrade(path):
+    with sqlite3.connect(path) as db:
+        db.execute("ALTER TABLE block DROP COLUMN fence")
+        db.execute("UPDATE meta SET value = '1' WHERE key = 'version'")
+    db.close()
+
+
+def test_a_store_of_version_1_is_migrated_when_opened_for_writing(path, store):
+    store.put_block(BLOCK, "a", 1, [tile(b"old")], b"s")
+    store.close()
+    downgrade(path)
+    with SqliteTileStore(path, read_only=True) as reader:
+        assert reader.get_tile(0, 0, 0, 0) == b"old"
+        assert reader.list_blocks() == [reader.get_block(BLOCK)]
+    assert rows(path, "SELECT value FROM meta WHERE key = 'version'") == [("1",)]
+    for _ in range(2):
+        with SqliteTileStore(path) as writer:
+            assert writer.get_tile(0, 0, 0, 0) == b"old"
+    with SqliteTileStore(path) as writer:
+        writer.put_block(BLOCK, "b", 2, [tile(b"new")], b"s", fence=1)
+        with pytest.raises(StaleFence):
+            writer.put_block(BLOCK, "a", 1, [tile(b"old")], b"s", fence=0)
+    assert rows(path, "SELECT value FROM meta WHERE key = 'version'") == [("2",)]
 
 
 @pytest.mark.parametrize("data", [b"", b"not a database, but long enough to look like one" * 40])

@@ -5,7 +5,7 @@ import threading
 
 import pytest
 
-from map3d.errors import AlreadyExists, BadRequest, NotFound
+from map3d.errors import AlreadyExists, BadRequest, NotFound, StaleFence
 from map3d.tiles.naming import tiles_of_block
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.tile_store import StoredBlock, StoredTile, StoreShape
@@ -88,6 +88,17 @@ def test_equal_blocks_keep_their_version(store):
     assert store.get_block(BLOCK).key == "b"
     assert store.put_block(BLOCK, "c", 3, tiles, b"other seam").version == 3
     assert store.put_block(BLOCK, "c", 4, tiles[1:], b"other seam").version == 4
+
+
+def test_an_older_fence_is_refused(store):
+    tiles = content(BLOCK)
+    store.put_block(BLOCK, "new", 2, tiles, b"seam", fence=7)
+    with pytest.raises(StaleFence, match=r"fence 6.*fence 7"):
+        store.put_block(BLOCK, "old", 1, content(BLOCK, "old"), b"old", fence=6)
+    assert read(store, tiles) == [tile.data for tile in tiles]
+    assert store.get_block(BLOCK) == StoredBlock(BLOCK, "new", 2, len(tiles))
+    store.put_block(BLOCK, "again", 2, tiles, b"seam", fence=7)
+    store.put_block(BlockId(1, 0, 0), "other", 1, [], None, fence=1)
 
 
 def test_removing_a_block_keeps_equal_tiles_of_other_blocks(store):

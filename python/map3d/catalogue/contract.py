@@ -79,8 +79,8 @@ class Catalogue(Protocol):
     def lease(self, rendering: str, worker: str, start: int = 0) -> Lease | None:
         """Leases the next job in one atomic statement, after expiring overdue leases. Returns None when no job is available now.
 
-        The order is: fewest attempts, lowest level, first track; among these the first job with Morton number `start` or greater, else the first.
-        A worker passes the number of its last block to stay in the same region.
+        The order is: fewest attempts and expired leases, lowest level, first track; among these the first job with Morton number `start` or greater,
+        else the first. A worker passes the number of its last block to stay in the same region.
         """
 
     def heartbeat(self, lease: Lease) -> None:
@@ -95,8 +95,14 @@ class Catalogue(Protocol):
     def release(self, lease: Lease) -> None:
         """Releases a job whose worker stops before finishing it; the attempt does not count. Raises StaleFence."""
 
+    def expire(self, rendering: str, workers: Iterable[str]) -> int:
+        """Expires the leases of workers that no longer run, before their time; returns the number of leases.
+
+        An expired lease does not count as an attempt. The tenth quarantines the job.
+        """
+
     def retry(self, rendering: str, blocks: Iterable[tuple[str, BlockId]] | None = None) -> int:
-        """Reopens quarantined jobs (all, or those of these tracks and blocks) with no attempts; returns their number."""
+        """Reopens quarantined jobs (all, or those of these tracks and blocks) with no attempts and expired leases; returns their number."""
 
     def jobs(self, rendering: str, track: str | None = None, state: State | None = None) -> Iterator[Job]:
         """Returns the jobs, ordered by track, level and Morton number."""

@@ -164,7 +164,8 @@ class JobResult:
 
 @dataclass(frozen=True)
 class Job:
-    """The current state of a job. `expires_s` is on the database's clock; `result` is None until the job was done once."""
+    """The current state of a job. `attempts` failed or are running; `expiries`: number of expired leases. `expires_s` is on the database's clock;
+    `result` is None until the job was done once."""
 
     rendering: str
     track: str
@@ -173,6 +174,7 @@ class Job:
     key: str
     state: State
     attempts: int
+    expiries: int
     fence: int
     worker: str | None
     expires_s: float | None

@@ -10,13 +10,13 @@ from typing import Any, Final
 from map3d.catalogue import codec
 from map3d.catalogue.contract import LEASE_S
 from map3d.catalogue.records import AssetRecord, RenderingRecord, SceneCrs, SceneRecord
-from map3d.catalogue.sqlite_jobs import JOB_SCHEMA, SqliteJobs
+from map3d.catalogue.sqlite_jobs import JOB_NEXT, JOB_SCHEMA, SqliteJobs
 from map3d.database import Database
 from map3d.errors import AlreadyExists, NotFound
 from map3d.geometry.frames import PinnedFrame
 from map3d.types import Layer, Vec3, check_name
 
-VERSION: Final = 2
+VERSION: Final = 3
 
 _SCHEMA: Final = (
     """
@@ -29,13 +29,15 @@ CREATE TABLE rendering(name TEXT PRIMARY KEY, scene TEXT NOT NULL REFERENCES sce
 """
     + JOB_SCHEMA
 )
+_MIGRATIONS: Final = {3: f"ALTER TABLE job ADD COLUMN expiries INTEGER NOT NULL DEFAULT 0; DROP INDEX job_next; {JOB_NEXT}"}
+"""Version → statements that lead to it from the version before."""
 
 
 class SqliteCatalogue(SqliteJobs):
-    """Implements `Catalogue`; creates the file when it does not exist."""
+    """Implements `Catalogue`; creates the file when it does not exist, and migrates an older one."""
 
     def __init__(self, path: Path, *, lease_s: float = LEASE_S) -> None:
-        super().__init__(Database(path, _SCHEMA, VERSION), lease_s)
+        super().__init__(Database(path, _SCHEMA, VERSION, _MIGRATIONS), lease_s)
 
     def close(self) -> None:
         self._database.close()

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 from typing import Any, Final
 
 from map3d.catalogue.records import Job, JobResult, Lease, PlanCounts, PlannedJob
-from map3d.catalogue.states import MAX_ATTEMPTS, OPEN, JobEvent, State, next_state, sources
+from map3d.catalogue.states import MAX_ATTEMPTS, MAX_EXPIRIES, OPEN, JobEvent, State, next_state, sources
 from map3d.database import NOW, Database
 from map3d.errors import NotFound, StaleFence
 from map3d.types import BlockId
@@ -13,12 +13,14 @@ from map3d.types import BlockId
 FENCES_PER_VERSION: Final = 1 << 20
 """New jobs start with this times the content version, so that after --regrid no job gets a fence that an earlier job of the same block had."""
 
-JOB_SCHEMA: Final = """
+JOB_NEXT: Final = "CREATE INDEX job_next ON job(rendering, state, attempts + expiries, z, track, morton)"
+JOB_SCHEMA: Final = f"""
 CREATE TABLE job(rendering TEXT NOT NULL REFERENCES rendering(name), track TEXT NOT NULL, z INTEGER NOT NULL, x INTEGER NOT NULL, y INTEGER NOT NULL,
   kind TEXT NOT NULL, morton INTEGER NOT NULL, key TEXT NOT NULL, parent_z INTEGER, parent_x INTEGER, parent_y INTEGER,
-  state TEXT NOT NULL, attempts INTEGER NOT NULL DEFAULT 0, fence INTEGER NOT NULL DEFAULT 0, worker TEXT, expires REAL, reason TEXT,
+  state TEXT NOT NULL, attempts INTEGER NOT NULL DEFAULT 0, expiries INTEGER NOT NULL DEFAULT 0,
+  fence INTEGER NOT NULL DEFAULT 0, worker TEXT, expires REAL, reason TEXT,
   version INTEGER, empty INTEGER, tiles INTEGER, base_tiles INTEGER, bytes INTEGER, seconds REAL, UNIQUE(rendering, track, z, x, y));
-CREATE INDEX job_next ON job(rendering, state, attempts, z, track, morton);
+{JOB_NEXT};
 CREATE INDEX job_expiry ON job(expires) WHERE state = 'leased';
 CREATE INDEX job_parent ON job(rendering, track, parent_z, parent_x, parent_y)
 """
@@ -27,14 +29,19 @@ _AT: Final = "rendering = :rendering AND track = :track AND z = :z AND x = :x AN
 _ALL_BELOW_DONE: Final = f"""NOT EXISTS (SELECT 1 FROM job AS below WHERE below.rendering = job.rendering AND below.track = job.track
   AND below.parent_z = job.z AND below.parent_x = job.x AND below.parent_y = job.y AND below.state <> '{State.DONE}')"""
 _AFTER_FAILURE: Final = f"CASE WHEN attempts >= {MAX_ATTEMPTS} THEN '{State.QUARANTINED}' ELSE '{next_state(State.LEASED, JobEvent.FAIL)}' END"
-_EXPIRE: Final = f"""UPDATE job SET state = {_AFTER_FAILURE}, worker = NULL, expires = NULL, reason = 'lease expired (worker ' || worker || ')'
-  WHERE state = '{State.LEASED}' AND expires < {NOW}"""
-_NEXT: Final = f"""SELECT {{columns}} FROM job WHERE rendering = :rendering AND state = '{State.TODO}' ORDER BY attempts, z, track, morton LIMIT 1"""
+_AFTER_EXPIRY: Final = f"CASE WHEN expiries + 1 >= {MAX_EXPIRIES} THEN '{State.QUARANTINED}' ELSE '{next_state(State.LEASED, JobEvent.EXPIRE)}' END"
+_EXPIRE: Final = f"""UPDATE job SET state = {_AFTER_EXPIRY}, attempts = attempts - 1, expiries = expiries + 1, worker = NULL, expires = NULL,
+  reason = 'lease expired ' || (expiries + 1) || iif(expiries, ' times', ' time') || ' (last worker: ' || worker || ')'
+  WHERE state = '{State.LEASED}'"""
+_EXPIRE_OVERDUE: Final = f"{_EXPIRE} AND expires < {NOW}"
+_NEXT: Final = (
+    f"""SELECT {{columns}} FROM job WHERE rendering = :rendering AND state = '{State.TODO}' ORDER BY attempts + expiries, z, track, morton LIMIT 1"""
+)
 _LEASE: Final = f"""UPDATE job SET state = '{next_state(State.TODO, JobEvent.LEASE)}', attempts = attempts + 1, fence = fence + 1, worker = :worker,
   expires = {NOW} + :lease_s
   WHERE rowid = coalesce(
     (SELECT rowid FROM job WHERE rendering = :rendering AND state = '{State.TODO}' AND morton >= :start
-      AND (attempts, z, track) = ({_NEXT.format(columns="attempts, z, track")}) ORDER BY morton LIMIT 1),
+      AND (attempts + expiries, z, track) = ({_NEXT.format(columns="attempts + expiries, z, track")}) ORDER BY morton LIMIT 1),
     ({_NEXT.format(columns="rowid")}))
   RETURNING *, (SELECT content_version FROM rendering WHERE name = rendering) AS content_version"""
 _HELD: Final = f"{_AT} AND state = '{State.LEASED}' AND fence = :fence AND expires >= {NOW}"
@@ -69,7 +76,7 @@ class SqliteJobs:
 
     def lease(self, rendering: str, worker: str, start: int = 0) -> Lease | None:
         with self._database.transaction() as db:
-            db.execute(_EXPIRE)
+            db.execute(_EXPIRE_OVERDUE)
             row = db.execute(_LEASE, {"rendering": rendering, "worker": worker, "lease_s": self.lease_s, "start": start}).fetchone()
         return None if row is None else _lease(row)
 
@@ -88,8 +95,12 @@ class SqliteJobs:
     def release(self, lease: Lease) -> None:
         self._move(lease, f"state = '{next_state(State.LEASED, JobEvent.RELEASE)}', attempts = attempts - 1, worker = NULL, expires = NULL")
 
+    def expire(self, rendering: str, workers: Iterable[str]) -> int:
+        with self._database.transaction() as db:
+            return sum(db.execute(f"{_EXPIRE} AND rendering = ? AND worker = ?", (rendering, worker)).rowcount for worker in set(workers))
+
     def retry(self, rendering: str, blocks: Iterable[tuple[str, BlockId]] | None = None) -> int:
-        change = f"UPDATE job SET state = '{State.TODO}', attempts = 0 WHERE state IN ({_quoted(sources(JobEvent.RETRY))})"
+        change = f"UPDATE job SET state = '{State.TODO}', attempts = 0, expiries = 0 WHERE state IN ({_quoted(sources(JobEvent.RETRY))})"
         with self._database.transaction() as db:
             content_version, announced = _versions(db, rendering)
             if blocks is None:
@@ -109,7 +120,7 @@ class SqliteJobs:
     def count_jobs(self, rendering: str) -> dict[State, int]:
         with self._database.transaction() as db:
             _versions(db, rendering)
-            db.execute(_EXPIRE)
+            db.execute(_EXPIRE_OVERDUE)
             rows = db.execute("SELECT state, count(*) FROM job WHERE rendering = ? GROUP BY state", (rendering,)).fetchall()
         found = {row[0]: row[1] for row in rows}
         return {state: found.get(state, 0) for state in State}
@@ -135,7 +146,7 @@ def _add(db: sqlite3.Connection, rows: list[dict[str, Any]]) -> None:
 
 def _reopen(db: sqlite3.Connection, rows: list[dict[str, Any]]) -> None:
     """Increments the fence too, so that a worker that still renders the old state loses its lease."""
-    change = "key = :key, state = :state, attempts = 0, fence = fence + 1, worker = NULL, expires = NULL, reason = NULL"
+    change = "key = :key, state = :state, attempts = 0, expiries = 0, fence = fence + 1, worker = NULL, expires = NULL, reason = NULL"
     db.executemany(f"UPDATE job SET {change} WHERE {_AT}", rows)
 
 
@@ -209,6 +220,7 @@ def _job(row: sqlite3.Row) -> Job:
         key=row["key"],
         state=State(row["state"]),
         attempts=row["attempts"],
+        expiries=row["expiries"],
         fence=row["fence"],
         worker=row["worker"],
         expires_s=row["expires"],

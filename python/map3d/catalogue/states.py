@@ -4,6 +4,8 @@ from enum import StrEnum
 from typing import Final
 
 MAX_ATTEMPTS: Final = 3
+MAX_EXPIRIES: Final = 10
+"""An expired lease says little about the job: its worker was killed or suspended. A job whose leases always expire is quarantined too."""
 
 
 class State(StrEnum):
@@ -46,13 +48,10 @@ TRANSITIONS: Final[dict[tuple[State, JobEvent], State]] = {
 }
 
 
-def next_state(state: State, event: JobEvent, attempts: int = 0) -> State | None:
-    """Returns the state after `event`, None when the event is refused. A third failed attempt quarantines the job. The catalogue itself decides
-    whether a reduce job with a changed key is todo or waits for the blocks below."""
-    after = TRANSITIONS.get((state, event))
-    if event in (JobEvent.FAIL, JobEvent.EXPIRE) and after is not None and attempts >= MAX_ATTEMPTS:
-        return State.QUARANTINED
-    return after
+def next_state(state: State, event: JobEvent) -> State | None:
+    """Returns the state after `event`, None when the event is refused. The catalogue itself quarantines a job after MAX_ATTEMPTS or MAX_EXPIRIES, and
+    decides whether a reduce job with a changed key is todo or waits for the blocks below."""
+    return TRANSITIONS.get((state, event))
 
 
 def sources(event: JobEvent) -> tuple[State, ...]:

@@ -86,7 +86,9 @@ def _work(run: "Run", plan: "RunPlan") -> "RunResult":
                 )
             elif isinstance(event, Waiting):
                 blocks = plural(event.jobs, "block")
-                bar.console.print(f"waiting for {blocks} leased by another run; the leases of a killed run expire within a minute")
+                bar.console.print(
+                    f"waiting for {blocks} leased by another run; leases of a run that was killed on another host expire within a minute"
+                )
             elif isinstance(event, WorkerExited) and event.reason:
                 bar.console.print(f"worker {event.worker} exited: {event.reason}")
 
@@ -103,7 +105,7 @@ def print_result(rendering: str, result: "RunResult") -> None:
         return
     if result.quarantined_jobs:
         click.echo(
-            f"{plural(result.quarantined_jobs, 'block')} failed three times; run map3d show quarantine {rendering} for the reasons, "
+            f"{plural(result.quarantined_jobs, 'block')} are in quarantine; run map3d show quarantine {rendering} for the reasons, "
             f"then map3d retry {rendering}",
             err=True,
         )

@@ -108,8 +108,8 @@ def _jobs(catalogue: Catalogue, name: str, as_json: bool) -> None:
     open_jobs = [job for job in jobs if job.state not in (State.DONE, State.WAITING, State.TODO)]
     if open_jobs:
         print_table(
-            ("track", "block", "kind", "state", "attempts", "worker", "reason"),
-            [(job.track, job.block, job.kind, job.state, job.attempts, job.worker, job.reason) for job in open_jobs],
+            ("track", "block", "kind", "state", "attempts", "expired", "worker", "reason"),
+            [(job.track, job.block, job.kind, job.state, job.attempts, job.expiries, job.worker, job.reason) for job in open_jobs],
         )
 
 

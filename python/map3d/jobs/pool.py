@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from map3d.catalogue import Catalogue, State
+from map3d.jobs.dead_workers import expire_dead_workers, worker_name
 from map3d.jobs.events import JobDone, JobFailed, LeaseLost, RunEvent, Stopping, Waiting, WorkerExited
 from map3d.jobs.timeouts import Timeouts
 from map3d.jobs.worker import Signal, Task, Worker
@@ -51,9 +52,9 @@ class Pool:
     Replaces a worker that exited because of failed jobs as long as the run completes any job: then the jobs are at fault, not the machine.
     """
 
-    def __init__(self, catalogue: Catalogue, rendering: str, task: Task, size: int, timeouts: Timeouts | None = None, host: str = "local") -> None:
+    def __init__(self, catalogue: Catalogue, rendering: str, task: Task, size: int, timeouts: Timeouts | None = None) -> None:
         self._catalogue, self._rendering, self._task, self._timeouts = catalogue, rendering, task, timeouts or Timeouts()
-        self._size, self._host = size, host
+        self._size = size
         self._events: queue.SimpleQueue[RunEvent] = queue.SimpleQueue()
         self._stop, self._stop_now, self._job_ended = threading.Event(), threading.Event(), Signal()
         self._threads: dict[str, threading.Thread] = {}
@@ -80,6 +81,7 @@ class Pool:
 
     def run(self, on_event: Callable[[RunEvent], None]) -> RunStatistics:
         """Blocks until the last worker exits and calls `on_event` in this thread. The first SIGINT or SIGTERM calls `stop`, the second `stop_now`."""
+        expire_dead_workers(self._catalogue, self._rendering)
         self._base_numbers = self._open_base_numbers()
         with _signals(self._on_signal):
             for _ in range(self._size):
@@ -125,7 +127,7 @@ class Pool:
 
     def _start_worker(self) -> None:
         self._started += 1
-        name = f"{self._host}-{self._started}"
+        name = worker_name(self._started)
         worker = Worker(name, self._catalogue, self._rendering, self._task, self._timeouts, self._stop, self._stop_now, self._job_ended)
         if self._base_numbers:
             worker.start = self._base_numbers[(self._started - 1) % self._size * len(self._base_numbers) // self._size]

@@ -1,11 +1,13 @@
 """A worker: leases one job after another, has its subprocess do it and commits the result (spec/catalogue.md).
 
-Commit of a block: the subprocess renders it → checks → `commit` (one transaction of the tile store) → `done` with the fence.
+Commit of a block: the subprocess renders it → checks → `commit` (one transaction of the tile store, with the fence) →
+`done` with the fence.
 """
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from typing import Any, Protocol
 
 from map3d.catalogue import Catalogue, JobResult, Lease, State
@@ -120,8 +122,8 @@ class Worker:
             )
             if isinstance(response, Failure):
                 return self._fail(lease, f"{response.kind}: {response.message}")
-            heartbeat.renew()
-            result = self._task.commit(lease, response)
+            with heartbeat.continued():
+                result = self._task.commit(lease, response)
             self._catalogue.done(lease, result)
             return JobDone(lease, result)
         except StaleFence as error:
@@ -172,7 +174,7 @@ class Worker:
 
 
 class _Heartbeat:
-    """Renews a lease while the subprocess works."""
+    """Renews a lease while the subprocess works and while the block is committed."""
 
     def __init__(self, catalogue: Catalogue, lease: Lease, timeouts: Timeouts, stop_now: threading.Event) -> None:
         self._catalogue, self._lease, self._timeouts, self._stop_now = catalogue, lease, timeouts, stop_now
@@ -184,6 +186,25 @@ class _Heartbeat:
             raise Stopped("stopped by the user")
         if time.monotonic() - self._renewed_s >= self._timeouts.heartbeat_s:
             self.renew()
+
+    @contextmanager
+    def continued(self) -> Iterator[None]:
+        """Renews the lease now, and from a thread of its own while the context lasts. Raises StaleFence when the lease is lost at the start; if it is
+        lost later, the store and the catalogue refuse the fence."""
+        self.renew()
+        over = threading.Event()
+        thread = threading.Thread(target=self._renew_until, args=(over,), name=f"heartbeat of {self._lease.worker}")
+        thread.start()
+        try:
+            yield
+        finally:
+            over.set()
+            thread.join()
+
+    def _renew_until(self, over: threading.Event) -> None:
+        with suppress(Map3dError):
+            while not over.wait(self._timeouts.heartbeat_s):
+                self.renew()
 
     def renew(self) -> None:
         self._catalogue.heartbeat(self._lease)

@@ -43,7 +43,7 @@ class RenderTask:
         tiles = [StoredTile(layer, z, x, y, data) for (layer, z, x, y), data in zip(names, response.blobs, strict=False)]
         seam = response.blobs[len(names)] if response.value["seam"] else None
         check_rendered(store.shape, lease.block, tiles, seam)
-        stored = store.put_block(lease.block, lease.key, lease.content_version, tiles, seam)
+        stored = store.put_block(lease.block, lease.key, lease.content_version, tiles, seam, fence=lease.fence)
         with self._stats_lock:
             self.stats.update(response.value.get("stats", {}))
         return JobResult(

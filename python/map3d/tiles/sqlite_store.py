@@ -11,8 +11,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
 
-from map3d.database import BUSY_TIMEOUT_S, Connections
-from map3d.errors import AlreadyExists, BadRequest, Corrupt, Map3dError, NotFound, StoreError, UnknownVersion
+from map3d.database import BUSY_TIMEOUT_S, Connections, run_script
+from map3d.errors import AlreadyExists, BadRequest, Corrupt, Map3dError, NotFound, StaleFence, StoreError, UnknownVersion
 from map3d.tiles.naming import block_level, morton
 from map3d.tiles.tile_store import FORMAT_VERSION, StoredBlock, StoredTile, StoreShape, check_block, content_hash
 from map3d.types import BlockId, Layer, TileId
@@ -27,16 +27,18 @@ CREATE TABLE blob(hash BLOB PRIMARY KEY, bytes BLOB NOT NULL);
 CREATE TABLE tile(layer INTEGER, z INTEGER, x INTEGER, y INTEGER, block TEXT NOT NULL, hash BLOB NOT NULL, PRIMARY KEY(layer, z, x, y)) WITHOUT ROWID;
 CREATE INDEX tile_hash ON tile(hash);
 CREATE TABLE block(id TEXT PRIMARY KEY, z INTEGER NOT NULL, x INTEGER NOT NULL, y INTEGER NOT NULL, key TEXT NOT NULL,
-  version INTEGER NOT NULL, tiles INTEGER NOT NULL, seam BLOB);
+  version INTEGER NOT NULL, tiles INTEGER NOT NULL, seam BLOB, fence INTEGER NOT NULL DEFAULT 0);
 CREATE TABLE meta(key TEXT PRIMARY KEY, value TEXT NOT NULL);
 """
+_MIGRATIONS: Final = {2: "ALTER TABLE block ADD COLUMN fence INTEGER NOT NULL DEFAULT 0"}
+"""Version → statements that lead to it from the version before. Stores of every version can be read."""
 
 
 class SqliteTileStore:
     """A `TileStore` that threads and forked processes may share; each has its own connection."""
 
     def __init__(self, path: Path, *, read_only: bool = False) -> None:
-        """Opens an existing store. Raises NotFound, UnknownVersion, Corrupt, StoreError."""
+        """Opens an existing store, and migrates an older one unless it is `read_only`. Raises NotFound, UnknownVersion, Corrupt, StoreError."""
         if not path.is_file():
             raise NotFound(f"{path}: no such tile store; render the rendering first")
         self.path = path
@@ -44,6 +46,8 @@ class SqliteTileStore:
         self._connections = Connections(path, lambda: _connect(path, read_only))
         try:
             self._shape = self._read_shape()
+            if not read_only:
+                self._migrate()
         except BaseException:
             self.close()
             raise
@@ -82,11 +86,13 @@ class SqliteTileStore:
     def shape(self) -> StoreShape:
         return self._shape
 
-    def put_block(self, block: BlockId, key: str, version: int, tiles: Sequence[StoredTile], seam: bytes | None) -> StoredBlock:
+    def put_block(self, block: BlockId, key: str, version: int, tiles: Sequence[StoredTile], seam: bytes | None, *, fence: int = 0) -> StoredBlock:
         check_block(self._shape, block, version, tiles)
         hashed = [(tile, content_hash(tile.data)) for tile in tiles]
         with self._transaction() as db:
             old = _block_row(db, block)
+            if old and fence < old["fence"]:
+                raise StaleFence(f"block {block}: fence {fence} is stale; the stored tiles have fence {old['fence']}")
             before = _tile_hashes(db, self._shape, block) if old else {}
             now = {tuple(tile[:4]): digest for tile, digest in hashed}
             if old and before == now and old["seam"] == seam:
@@ -95,7 +101,7 @@ class SqliteTileStore:
                 _delete_tiles(db, before)
                 _insert_tiles(db, block, hashed)
                 _delete_unused_blobs(db, set(before.values()) - set(now.values()))
-            db.execute("INSERT OR REPLACE INTO block VALUES (?, ?, ?, ?, ?, ?, ?, ?)", (str(block), *block, key, version, len(tiles), seam))
+            db.execute("INSERT OR REPLACE INTO block VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", (str(block), *block, key, version, len(tiles), seam, fence))
         return StoredBlock(block, key, version, len(tiles))
 
     def remove_block(self, block: BlockId) -> bool:
@@ -181,13 +187,25 @@ class SqliteTileStore:
             raise StoreError(f"{self.path}: cannot open: {error}") from error
         except (sqlite3.DatabaseError, KeyError, ValueError) as error:
             raise Corrupt(f"{self.path}: not a tile store: {error}") from error
-        if version != FORMAT_VERSION:
+        if not 1 <= version <= FORMAT_VERSION:
             raise UnknownVersion(f"{self.path}: tile store version {version}; this map3d reads version {FORMAT_VERSION}")
         try:
             layers = tuple(Layer.load(row) for row in json.loads(meta["layers"]))
             return StoreShape(int(meta["tile_px"]), int(meta["zmax"]), layers)
         except (KeyError, ValueError, TypeError, Map3dError) as error:
             raise Corrupt(f"{self.path}: invalid tile store metadata: {error}") from error
+
+    def _migrate(self) -> None:
+        if _version(self._connections.current()) == FORMAT_VERSION:
+            return
+        with self._transaction() as db:
+            for version in range(_version(db) + 1, FORMAT_VERSION + 1):
+                run_script(db, _MIGRATIONS[version])
+                db.execute("UPDATE meta SET value = ? WHERE key = 'version'", (version,))
+
+
+def _version(db: sqlite3.Connection) -> int:
+    return int(db.execute("SELECT value FROM meta WHERE key = 'version'").fetchone()[0])
 
 
 def _connect(path: Path, read_only: bool) -> sqlite3.Connection:
@@ -228,8 +246,8 @@ def _write_empty(path: Path, shape: StoreShape) -> None:
 
 
 def _block_row(db: sqlite3.Connection, block: BlockId) -> dict[str, Any] | None:
-    row = db.execute("SELECT version, seam FROM block WHERE id = ?", (str(block),)).fetchone()
-    return None if row is None else {"version": row[0], "seam": row[1]}
+    row = db.execute("SELECT version, seam, fence FROM block WHERE id = ?", (str(block),)).fetchone()
+    return None if row is None else {"version": row[0], "seam": row[1], "fence": row[2]}
 
 
 def _tile_hashes(db: sqlite3.Connection, shape: StoreShape, block: BlockId) -> dict[tuple[int, ...], bytes]:

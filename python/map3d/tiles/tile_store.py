@@ -10,7 +10,7 @@ from map3d.errors import BadRequest, NotFound
 from map3d.tiles.naming import block_level, block_of
 from map3d.types import DEEPEST_LEVEL, BlockId, Layer, TileId
 
-FORMAT_VERSION: Final = 1
+FORMAT_VERSION: Final = 2
 HASH_BYTES: Final = 16
 
 
@@ -60,8 +60,9 @@ class TileStore(Protocol):
     @property
     def shape(self) -> StoreShape: ...
 
-    def put_block(self, block: BlockId, key: str, version: int, tiles: Sequence[StoredTile], seam: bytes | None) -> StoredBlock:
-        """Replaces a block in one transaction, durable on return. Raises BadRequest for tiles of other blocks.
+    def put_block(self, block: BlockId, key: str, version: int, tiles: Sequence[StoredTile], seam: bytes | None, *, fence: int = 0) -> StoredBlock:
+        """Replaces a block in one transaction, durable on return. Raises BadRequest for tiles of other blocks, StaleFence
+        when `fence` is less than that of the stored block: a worker that lost its lease does not overwrite newer tiles.
 
         Returns the block as stored: if tiles and seam are equal to the old ones, it keeps the old version.
         """

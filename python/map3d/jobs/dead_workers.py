@@ -1,0 +1,21 @@
+"""Names of workers, and the leases of workers whose process has ended."""
+
+from map3d.catalogue import Catalogue, State
+from map3d.process_identity import ProcessIdentity
+
+
+def worker_name(number: int) -> str:
+    """Returns the name of a worker of this process."""
+    return f"{ProcessIdentity.current()}.{number}"
+
+
+def expire_dead_workers(catalogue: Catalogue, rendering: str) -> int:
+    """Expires the leases of workers whose process was on this host and has ended, such as those of a killed run; returns their number. The leases of
+    other hosts' workers expire in their own time."""
+    workers = {job.worker for job in catalogue.jobs(rendering, state=State.LEASED) if job.worker is not None}
+    return catalogue.expire(rendering, [worker for worker in workers if _has_ended(worker)])
+
+
+def _has_ended(worker: str) -> bool:
+    identity = ProcessIdentity.parse(worker.rpartition(".")[0])
+    return identity is not None and identity.has_ended()

@@ -1,0 +1,83 @@
+"""Catalogues that an older map3d wrote are migrated when they are opened."""
+
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from map3d.catalogue import SceneRecord, State
+from map3d.catalogue.sqlite import VERSION, SqliteCatalogue
+from map3d.errors import UnknownVersion
+from tests.catalogue.implementations import rendering
+
+VERSION_2 = """
+CREATE TABLE scene(name TEXT PRIMARY KEY, title TEXT NOT NULL, attribution TEXT NOT NULL, crs TEXT, origin TEXT, options TEXT NOT NULL, built TEXT);
+CREATE TABLE asset(scene TEXT NOT NULL REFERENCES scene(name), name TEXT NOT NULL, source TEXT NOT NULL, format TEXT NOT NULL,
+  digest TEXT NOT NULL, source_digest TEXT NOT NULL, report TEXT NOT NULL, PRIMARY KEY(scene, name));
+CREATE TABLE rendering(name TEXT PRIMARY KEY, scene TEXT NOT NULL REFERENCES scene(name), title TEXT NOT NULL, attribution TEXT NOT NULL,
+  res_m REAL NOT NULL, passes TEXT NOT NULL, frames TEXT NOT NULL, box TEXT NOT NULL, options TEXT NOT NULL,
+  content_version INTEGER NOT NULL, announced_version INTEGER NOT NULL);
+CREATE TABLE job(rendering TEXT NOT NULL REFERENCES rendering(name), track TEXT NOT NULL, z INTEGER NOT NULL, x INTEGER NOT NULL, y INTEGER NOT NULL,
+  kind TEXT NOT NULL, morton INTEGER NOT NULL, key TEXT NOT NULL, parent_z INTEGER, parent_x INTEGER, parent_y INTEGER,
+  state TEXT NOT NULL, attempts INTEGER NOT NULL DEFAULT 0, fence INTEGER NOT NULL DEFAULT 0, worker TEXT, expires REAL, reason TEXT,
+  version INTEGER, empty INTEGER, tiles INTEGER, base_tiles INTEGER, bytes INTEGER, seconds REAL, UNIQUE(rendering, track, z, x, y));
+CREATE INDEX job_next ON job(rendering, state, attempts, z, track, morton);
+CREATE INDEX job_expiry ON job(expires) WHERE state = 'leased';
+CREATE INDEX job_parent ON job(rendering, track, parent_z, parent_x, parent_y);
+"""
+JOBS = """
+INSERT INTO job(rendering, track, z, x, y, kind, morton, key, state, attempts, fence) VALUES
+  ('town-a', '0-45', 3, 0, 0, 'base', 0, 'k', 'todo', 2, 1048578), ('town-a', '0-45', 3, 1, 0, 'base', 1, 'k', 'done', 1, 1048577);
+UPDATE job SET version = 1, empty = 0, tiles = 3, base_tiles = 1, bytes = 100, seconds = 0.5 WHERE state = 'done';
+"""
+
+
+def schema(path: Path) -> dict[str, object]:
+    """Returns the columns of every table and the text of every index, without the order of columns."""
+    with closing(sqlite3.connect(path)) as db:
+        indexes = dict(db.execute("SELECT name, sql FROM sqlite_master WHERE type = 'index' AND sql IS NOT NULL"))
+        tables = [row[0] for row in db.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
+        return {name: sql.strip() for name, sql in indexes.items()} | {
+            table: {tuple(row[1:]) for row in db.execute(f"PRAGMA table_info({table})")} for table in tables
+        }
+
+
+@pytest.fixture
+def old(tmp_path: Path) -> Path:
+    """A catalogue of version 2 with a scene, a rendering and two jobs."""
+    path, recent = tmp_path / "catalogue.sqlite", tmp_path / "recent.sqlite"
+    catalogue = SqliteCatalogue(recent)
+    catalogue.create_scene(SceneRecord("town"))
+    catalogue.create_rendering(rendering())
+    catalogue.close()
+    with closing(sqlite3.connect(path)) as db:
+        db.executescript(VERSION_2)
+        db.execute("ATTACH ? AS recent", (str(recent),))
+        for table in ("scene", "rendering"):
+            db.execute(f"INSERT INTO {table} SELECT * FROM recent.{table}")
+        db.commit()
+        db.executescript(JOBS + "PRAGMA user_version = 2;")
+    return path
+
+
+def test_catalogue_of_version_2_is_migrated_and_keeps_its_jobs(old: Path, tmp_path: Path) -> None:
+    for _ in range(2):
+        catalogue = SqliteCatalogue(old)
+        todo, done = catalogue.jobs("town-a")
+        assert (todo.attempts, todo.expiries, done.state) == (2, 0, State.DONE)
+        assert done.result is not None
+        catalogue.close()
+    SqliteCatalogue(tmp_path / "new.sqlite").close()
+    assert schema(old) == schema(tmp_path / "new.sqlite")
+    lease = SqliteCatalogue(old).lease("town-a", "w")
+    assert lease is not None
+    assert (lease.attempt, lease.block) == (3, (3, 0, 0))
+
+
+@pytest.mark.parametrize("version", [1, VERSION + 1])
+def test_catalogue_of_another_version_is_refused(old: Path, version: int) -> None:
+    with closing(sqlite3.connect(old)) as db:
+        db.execute(f"PRAGMA user_version = {version}")
+    with pytest.raises(UnknownVersion, match=rf"version {version}; this map3d reads version {VERSION}"):
+        SqliteCatalogue(old)
