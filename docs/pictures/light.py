@@ -1,4 +1,4 @@
-"""The layers of light side by side, straight from a tile store."""
+"""Shows light layers side by side, read from a tile store."""
 
 import io
 from pathlib import Path
@@ -15,13 +15,13 @@ QUALITY: Final = 88
 
 
 def side_by_side(store: SqliteTileStore, middle_px: tuple[int, int], out: Path) -> None:
-    """A JPEG of all panels around a pixel of level zmax, counted from the top left corner of the square."""
+    """Makes a JPEG of all panels around a pixel of level zmax, counted from the top left corner of the square."""
     left_px, top_px = (at - side // 2 for at, side in zip(middle_px, SIZE_PX, strict=True))
     sheet([_cut(store, name, left_px, top_px) for name in PANELS]).save(out, quality=QUALITY)
 
 
 def _cut(store: SqliteTileStore, name: str, left_px: int, top_px: int) -> Image.Image:
-    """What a layer shows of a rectangle of pixels of level zmax."""
+    """Returns a rectangle of a layer's pixels of level zmax."""
     shape = store.shape
     layer = next(number for number, layer in enumerate(shape.layers) if layer.name == name)
     cut = Image.new("RGB", SIZE_PX, "white")

@@ -1,6 +1,6 @@
-"""`python docs/pictures/make.py FOLDER`: the pictures of the documentation, from a made-up town in FOLDER. Stopped, it goes on where it was.
+"""`python docs/pictures/make.py FOLDER`: makes the pictures of the documentation from a generated town in FOLDER. Re-run it to resume.
 
-CesiumJS and what makes its tiles are npm packages in bench/viewer; without them the pictures that show it stay as they are, and that is said.
+CesiumJS and the converter for its tiles are npm packages in bench/viewer. Without them, the pictures that show CesiumJS are kept, with a message.
 """
 
 import json
@@ -30,16 +30,16 @@ HERE: Final = Path(__file__).parent
 ROOT: Final = HERE.parents[1]
 PLAYWRIGHT: Final = ROOT / "viewer" / "node_modules" / "playwright-core"
 CESIUM: Final = ROOT / "bench" / "viewer" / "node_modules" / "cesium" / "package.json"
-TITLE: Final = ("--title", "A made-up town")
+TITLE: Final = ("--title", "A generated town")
 LIGHT: Final = ("--res", "0.2", "--view", "30/45", "--layers", "picture,sun,ao", "--time", "2026-06-21T17:00+02:00", "--quality", "92")
 VIEWS: Final = ("--view", "0/45", "--view", "120/45", "--view", "0/22.5", "--view", "0/10", "--view", "0/90")
 QUALITY: Final = 80
 PHONE_PX: Final = 780
-"""A telephone's picture has three pixels a CSS pixel; two are shown."""
+"""Phone screenshots have three pixels per CSS pixel and are scaled to two."""
 
 
 def prepare(folder: Path) -> Path:
-    """The workspace with the renderings `pictures` and `light` of the town."""
+    """Returns the workspace with the renderings `pictures` and `light` of the town."""
     workspace = Workspace(folder / "workspace").create()
     where = ("--workspace", str(workspace.root))
     steps = [("make-town", "-o", str(folder / "town"), "--buildings", "300", "--seed", "7")]
@@ -58,11 +58,11 @@ def prepare(folder: Path) -> Path:
 
 
 def light(workspace: Path) -> None:
-    """The layers of light around the middle of the town."""
+    """Makes light.jpg: the light layers around the centre of the town."""
     catalogue = Workspace(workspace).open_catalogue()
     frame = catalogue.rendering("light").frames[0]
     catalogue.close()
-    # The origin of a scene lies near its middle: here the church square.
+    # The origin of a scene is near its centre: here the church square.
     u, v = uvd_from_local(frame.axes, (0.0, 0.0, 0.0))[:2]
     pixel_m = frame.pixel_m(frame.zmax)
     with SqliteTileStore(Workspace(workspace).store_path("light", frame.id), read_only=True) as store:
@@ -70,7 +70,7 @@ def light(workspace: Path) -> None:
 
 
 def shoot(workspace: Path, views: list[dict[str, Any]], cesium: Path | None, out: Path) -> None:
-    """PNG files of the views that are not in `out` yet, by map3d.js and, if there is a folder with the town's 3D Tiles, CesiumJS."""
+    """Takes missing screenshots of the views in map3d.js and, given a folder with the town's 3D Tiles, in CesiumJS. Writes PNG files to `out`."""
     out.mkdir(parents=True, exist_ok=True)
     command = [sys.executable, "-m", "map3d", "serve", "--workspace", str(workspace), "--port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"}) as server:
@@ -86,7 +86,7 @@ def shoot(workspace: Path, views: list[dict[str, Any]], cesium: Path | None, out
 
 
 def beside(view: dict[str, Any], shots: Path) -> None:
-    """A JPEG of map3d.js, left, and CesiumJS."""
+    """Makes a JPEG with map3d.js on the left and CesiumJS on the right."""
     panels, words = [], []
     for viewer, title in (("map3d", "map3d.js"), ("cesium", f"CesiumJS {json.loads(CESIUM.read_text())['version']}")):
         with Image.open(shots / f"{view['name']}-{viewer}.png") as shot:
@@ -108,7 +108,7 @@ def main(folder: Path) -> None:
     if with_cesium:
         town_tileset(Workspace(workspace), "town", folder)
     else:
-        print("docs: pictures beside CesiumJS stay as they are", file=sys.stderr)
+        print("docs: CesiumJS is not installed; its pictures are kept", file=sys.stderr)
         views = [view for view in views if view.get("alone")]
     shots = folder / "shots"
     shoot(workspace, views, folder.absolute() if with_cesium else None, shots.absolute())
@@ -118,7 +118,7 @@ def main(folder: Path) -> None:
                 shot.convert("RGB").save(HERE / f"{view['name']}.jpg", quality=QUALITY)
         else:
             beside(view, shots)
-    # The next time all of them are taken anew.
+    # The next run takes all of them again.
     shutil.rmtree(shots)
 
 

@@ -1,4 +1,4 @@
-"""Pictures side by side on white, words below."""
+"""Combines pictures side by side on white, with captions."""
 
 from collections.abc import Sequence
 from typing import Final
@@ -11,7 +11,7 @@ INK: Final = (38, 40, 43)
 
 
 def sheet(panels: Sequence[Image.Image], words: Sequence[str] = ()) -> Image.Image:
-    """Panels of one height from left to right; a line of words below each, if there are any."""
+    """Returns panels of equal height from left to right, each with its caption, if any."""
     height = panels[0].height + (2 * WORDS_PX if words else 0)
     whole = Image.new("RGB", (sum(panel.width + GAP_PX for panel in panels) - GAP_PX, height), "white")
     draw, font = ImageDraw.Draw(whole), ImageFont.load_default(WORDS_PX)

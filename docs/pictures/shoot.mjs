@@ -1,5 +1,5 @@
-// Opens a served rendering at the places of views.json, and the same town in CesiumJS, and takes a picture of each. Standard input: { playwright: its folder, page:
-// address of the rendering, views: of views.json, cesium: a folder whose 3dtiles/town.json is the town | null, out: folder for the pictures }. What is there stays.
+// Takes screenshots of a served rendering in the views of views.json, and of the same town in CesiumJS. Standard input: { playwright: its folder, page: address of the
+// rendering, views: those of views.json, cesium: folder of the town's 3dtiles/town.json or null, out: folder for the pictures }. Existing pictures are kept.
 import { existsSync, readFileSync, renameSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { bundled, roots } from "../../bench/viewer/cesium.mjs";

@@ -1,7 +1,7 @@
-"""The town of the pictures as 3D Tiles 1.1 for CesiumJS, trees and all: the same triangles, the same textures.
+"""Converts the town of the pictures to 3D Tiles 1.1 for CesiumJS, including trees: the same triangles and textures.
 
-Its atlases are magenta where no facade is. Smaller copies of a texture would mix that into what lies beside it, so it is filled with colours from
-there, as whoever makes such tiles with care does, and as map3d does itself (usage mask, spec/scene.md).
+Unused parts of its atlases are magenta. Mipmaps would mix that into the facades, so unused parts are filled with neighbouring colours, as map3d
+does itself (usage mask, spec/scene.md).
 """
 
 from dataclasses import replace
@@ -17,7 +17,7 @@ from map3d.catalogue import Workspace
 
 
 def town_tileset(workspace: Workspace, scene: str, folder: Path) -> None:
-    """Writes what is missing of `folder`/3dtiles/town.json."""
+    """Writes `folder`/3dtiles/town.json unless it exists."""
     if (folder / "3dtiles" / "town.json").is_file():
         return
     catalogue = workspace.open_catalogue()
@@ -28,7 +28,7 @@ def town_tileset(workspace: Workspace, scene: str, folder: Path) -> None:
 
 
 def _filled(tiles: list[Part], folder: Path) -> list[Part]:
-    """The tiles with copies of their textures in `folder`, atlases filled."""
+    """Copies the textures to `folder` with filled atlases; returns the tiles with these copies."""
     folder.mkdir(parents=True, exist_ok=True)
     uvs: dict[str, list[NDArray[np.float32]]] = {}
     sources: dict[str, tuple[Path, dict[str, Any]]] = {}
@@ -46,7 +46,7 @@ def _filled(tiles: list[Part], folder: Path) -> list[Part]:
 
 
 def fill(image: Image.Image, uvs: NDArray[np.float32]) -> Image.Image:
-    """The image, its sides powers of two, with what the triangles (n, 3, 2) of texture coordinates do not touch in colours of what is near."""
+    """Fills the texels that no triangle (n, 3, 2 texture coordinates) touches with nearby colours. The image's sides must be powers of two."""
     mask = Image.new("1", image.size)
     draw = ImageDraw.Draw(mask)
     for corners in (uvs * [1, -1] + [0, 1]) * image.size:
@@ -56,7 +56,7 @@ def fill(image: Image.Image, uvs: NDArray[np.float32]) -> Image.Image:
 
 
 def _spread(colors: Floats, weights: Floats) -> Floats:
-    """(h, w, 3) with the mean of the nearest block of 2^k × 2^k that has any weight where (h, w, 1) is 0."""
+    """Replaces (h, w, 3) colours whose (h, w, 1) weight is 0 with the mean of the smallest enclosing block of 2^k × 2^k that has any weight."""
     if (weights > 0).all() or len(colors) == 1:
         return colors
     sums, counts = _halved(colors * weights), _halved(weights)
@@ -65,5 +65,5 @@ def _spread(colors: Floats, weights: Floats) -> Floats:
 
 
 def _halved(values: Floats) -> Floats:
-    """Sums over 2 × 2."""
+    """Returns sums over squares of 2 × 2."""
     return values[::2, ::2] + values[1::2, ::2] + values[::2, 1::2] + values[1::2, 1::2]

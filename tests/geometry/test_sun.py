@@ -1,4 +1,4 @@
-"""Where the sun stands, against published values and the Astronomical Almanac's formula."""
+"""Positions of the sun, compared with published values and the Astronomical Almanac's formula."""
 
 import itertools
 import math
@@ -83,7 +83,7 @@ def test_at_solstices_and_equinoxes_it_stands_over_tropics_and_equator(time: str
 
 @pytest.mark.parametrize(("day", "minutes"), [((2024, 2, 11), -14.2), ((2024, 5, 14), 3.65), ((2024, 7, 26), -6.5), ((2024, 11, 3), 16.45)])
 def test_noon_differs_from_the_clocks_by_the_equation_of_time(day: tuple[int, int, int], minutes: float) -> None:
-    """Its four extremes through the year, as published (minutes that the sun is ahead)."""
+    """The four extremes of the equation of time, as published (minutes that the sun is ahead)."""
     noon = datetime(*day, 12, tzinfo=UTC) - timedelta(minutes=minutes)
     assert sun_angles(GREENWICH, noon).azimuth_deg == pytest.approx(180.0, abs=0.05)
 

@@ -1,4 +1,4 @@
-"""Reads asset folders (spec/scene.md) with NumPy alone: the oracle's own eyes."""
+"""Reads asset folders (spec/scene.md) with NumPy alone, independently of the core."""
 
 import json
 from dataclasses import dataclass

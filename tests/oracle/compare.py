@@ -10,12 +10,12 @@ def srgb_from_linear(linear: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def psnr(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """Decibels, of values in 0..1."""
+    """Returns the PSNR in decibels of values in 0..1."""
     return float(-10 * np.log10(max(np.mean((a - b) ** 2), 1e-12)))
 
 
 def gradient_energy(image: NDArray[np.float64]) -> float:
-    """Mean squared difference of neighbouring pixels: how sharp an image is."""
+    """Returns the mean squared difference of neighbouring pixels, a measure of sharpness."""
     return float(np.mean(np.diff(image, axis=0) ** 2) + np.mean(np.diff(image, axis=1) ** 2))
 
 

@@ -42,13 +42,13 @@ class Built:
         return self._cache
 
     def busiest_tiles(self, view: str, count: int) -> list[tuple[int, int]]:
-        """Base tiles (x, y) with the most objects in them, weighed by how much of them is covered."""
+        """Base tiles (x, y) with the most objects in them, weighted by the share that is covered."""
         return _busiest(self, view)[:count]
 
 
 @cache
 def _busiest(built: Built, view: str) -> list[tuple[int, int]]:
-    """Of 64 occupied tiles, evenly chosen: enough to find where the town is."""
+    """Samples 64 evenly spaced occupied tiles, enough to locate the town."""
     frame = core_frame(built.frames[view])
     columns, lines = xy_from_morton(built.scene.occupied(frame, frame.zmax))
     tiles = sorted(zip(lines, columns, strict=True))

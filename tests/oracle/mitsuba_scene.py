@@ -87,12 +87,12 @@ class MitsubaScene:
         return total[..., -3:] / rounds
 
     def layers(self, frame: Frame, x: int, y: int, samples: int) -> NDArray[np.float64]:
-        """All that a tile of ours has, in one rendering: albedo, depth, normal, shape; for timing."""
+        """Renders everything that a map3d tile contains at once: albedo, depth, normal, shape; for timing."""
         integrator = mi.load_dict({"type": "aov", "aovs": "albedo:albedo,depth:depth,normal:sh_normal,shape:shape_index"})
         return np.array(mi.render(self.scene, sensor=self._sensor(frame, x, y, samples), integrator=integrator, seed=0))
 
     def _near_plane(self, frame: Frame) -> float:
-        """D of a plane before everything."""
+        """Returns D of a plane in front of everything."""
         box = self.scene.bbox()
         lo, hi = np.array(box.min).ravel(), np.array(box.max).ravel()
         corners = np.array([[(lo, hi)[k >> a & 1][a] for a in range(3)] for k in range(8)])

@@ -64,7 +64,7 @@ def test_colour_is_the_average_over_the_pixels_box(pair: tuple[Built, MitsubaSce
 
 
 def _ground_id(built: Built) -> int:
-    """The ground plane is ours alone: it is not in the assets."""
+    """Only map3d adds the ground plane: it is not in the assets."""
     known = set(np.concatenate([asset.ids for asset in built.assets]).tolist())
     seen = {
         int(i)
@@ -78,7 +78,7 @@ def _ground_id(built: Built) -> int:
 
 
 def _without_ground(ground: np.ndarray) -> np.ndarray:
-    """Pixels whose 3 × 3 neighbourhood is free of the ground plane: their box holds none of it."""
+    """Returns the pixels without ground plane in their 3 × 3 neighbourhood, and therefore in their box."""
     wide = np.pad(ground, 1)
     near = np.zeros_like(wide)
     for dy in (-1, 0, 1):

@@ -1,4 +1,4 @@
-"""Which blocks are planned, and what their keys follow."""
+"""Which blocks are planned, and what their keys depend on."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-//! Decoding: every format's pixels come through; limits and damage are errors.
+//! Decoding: the pixels of every format are preserved; exceeded limits and damaged files are errors.
 
 mod common;
 

@@ -117,7 +117,7 @@ fn a_seam_whose_arrays_do_not_fit_its_size_is_refused() {
     assert!(read_seam("resized", &bad).is_err());
 }
 
-/// Id, depth and all that rays make.
+/// Id, depth and all layers that rays compute.
 fn light_tile(seed: u64, side: u32) -> GBuffer {
     let mut random = Random(seed);
     let arrays =

@@ -1,4 +1,4 @@
-//! A build after a change reads only what changed and gives the bytes of a build from nothing.
+//! A build after a change reads only what changed and gives the same bytes as a build from scratch.
 
 mod fixture;
 

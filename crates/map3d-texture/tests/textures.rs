@@ -44,7 +44,7 @@ fn a_point_or_sliver_uses_the_texels_it_lies_in() {
     assert_eq!(mask.marked(), 9);
 }
 
-/// Every texel that a random point of a triangle lies in is used; with room to spare none is that lies clear of the triangle.
+/// Every texel that contains a random point of a triangle is used; no texel clearly outside the triangle is.
 #[test]
 fn masks_hold_what_brute_force_finds() {
     let mut random = Random(4);
@@ -161,7 +161,7 @@ fn a_limited_fill_is_the_whole_one_within_its_reach() {
 
 // -- mips
 
-/// The exact mean of a rectangle of texels in linear light, weighed by alpha.
+/// Computes the exact mean of a rectangle of texels in linear light, weighted by alpha.
 fn brute(image: &Raster, x: (f64, f64), y: (f64, f64)) -> [f64; 4] {
     let mut sum = [0.0; 4];
     let mut area = 0.0;
@@ -291,7 +291,7 @@ fn a_grey_image_becomes_alpha() {
     std::fs::remove_dir_all(dir).expect("clean up");
 }
 
-/// The golden atlas: islands of honest colours on magenta. No level shows magenta, nowhere.
+/// An atlas with islands of colour on magenta: no level shows magenta anywhere.
 #[test]
 fn an_atlas_bleeds_no_background_into_any_level() {
     let dir = folder("atlas");

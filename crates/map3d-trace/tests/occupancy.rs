@@ -113,7 +113,7 @@ fn occupancy_works_to_the_deepest_level() {
     soup.quad([[-50.0, -50.0, 0.0], [-49.9, -50.0, 0.0], [-49.9, -49.9, 0.0], [-50.0, -49.9, 0.0]], 0, Rank::Other);
     soup.quad([[50.0, 50.0, 0.0], [50.1, 50.0, 0.0], [50.1, 50.1, 0.0], [50.0, 50.1, 0.0]], 1, Rank::Other);
     let store = build(&folder, &soup);
-    // Tiles of level 20 are 0.01 m wide, so each face covers about 10 × 10 of them; every level above has half of that, at least one a face.
+    // Tiles of level 20 are 0.01 m wide, so each face covers about 10 × 10 of them; every level above has half of that, at least one per face.
     let mut frame = frame(0.0, 90.0, 128.0);
     frame.zmax = 20;
     frame.size_m = 0.01 * f64::from(1 << 20);
