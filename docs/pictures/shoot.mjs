@@ -84,7 +84,7 @@ async function theirs(view, path, origin) {
   return { bytes, triangles: about.triangles };
 }
 
-/** Takes a picture unless it is there; what is told of it lies beside it. */
+/** Takes a screenshot unless it exists; its figures are in the JSON file of the same name. */
 async function take(view, viewer, act) {
   const path = join(out, `${view.name}-${viewer}.png`);
   if (existsSync(path)) return;

@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn leaves_and_nodes_take_at_most_70_bytes_an_item() {
+    fn leaves_and_nodes_take_at_most_70_bytes_per_item() {
         let tree = build(&boxes(100_000));
         let bytes = (tree.nodes.len() * 256 + tree.leaves.len() * 320) as f64 / 100_000.0;
         assert!(bytes <= 70.0, "{bytes} bytes");

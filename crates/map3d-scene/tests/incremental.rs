@@ -62,7 +62,7 @@ fn corrupt_mesh(folder: &Path, number: u32) {
 }
 
 #[test]
-fn changed_added_and_removed_objects_give_the_bytes_of_a_build_from_nothing() {
+fn changed_added_and_removed_objects_give_the_bytes_of_a_build_from_scratch() {
     let folder = new_folder();
     let mut quarters = build_four_quarters(&folder);
     // One tent moves and two are swapped in the order of the file.

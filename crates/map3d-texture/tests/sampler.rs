@@ -76,7 +76,7 @@ fn white_stays_white_and_diffuse_multiplies() {
 }
 
 #[test]
-fn transparent_texels_lend_no_colour() {
+fn transparent_texels_add_no_colour() {
     let image = Raster::new(2, 1, vec![[255, 0, 255, 0], [0, 128, 0, 255]]);
     let sampler = Sampler::new(Arc::new(Level::from_raster(image.clone())), made(&point()), true, &one_to_one(2, 1), Wrap::Clamp, WHITE);
     for x in 140..500 {

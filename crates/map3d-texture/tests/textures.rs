@@ -46,7 +46,7 @@ fn a_point_or_sliver_uses_the_texels_it_lies_in() {
 
 /// Every texel that contains a random point of a triangle is used; no texel clearly outside the triangle is.
 #[test]
-fn masks_hold_what_brute_force_finds() {
+fn masks_equal_brute_force() {
     let mut random = Random(4);
     for wrap in [Wrap::Wrap, Wrap::Mirror, Wrap::Clamp, Wrap::None] {
         for _ in 0..60 {
@@ -99,7 +99,7 @@ fn repeated_and_absurd_coordinates_end_quickly() {
 }
 
 #[test]
-fn runs_come_back() {
+fn runs_round_trip() {
     let mut random = Random(8);
     for (w, h) in [(1, 1), (7, 3), (64, 2), (65, 33), (200, 100)] {
         let mut mask = PixelMask::empty(w, h);
@@ -208,7 +208,7 @@ fn pyramids_end_at_one_texel() {
 }
 
 #[test]
-fn transparent_texels_lend_no_colour() {
+fn transparent_texels_add_no_colour() {
     let image = Raster::new(2, 2, vec![[255, 0, 255, 0], [0, 128, 0, 255], [255, 0, 255, 0], [0, 128, 0, 255]]);
     let LinearRaster { pixels, .. } = first_mip(&image);
     assert_eq!(first_mip(&image).to_raster().pixels[0], [0, 128, 0, 128]);
@@ -472,7 +472,7 @@ fn a_halved_level_is_within_a_step_of_the_mean_light() {
 }
 
 #[test]
-fn many_threads_make_a_level_once() {
+fn many_threads_compute_a_level_once() {
     let dir = folder("cache-threads");
     let image = png(&noise(200, 100, 1));
     stored(&dir, &image, &[], &full(200, 100));

@@ -1,4 +1,4 @@
-//! Occupancy holds every tile with content; a block's key changes just when its content does.
+//! Occupancy holds every tile with content; a block's key changes if and only if its content does.
 
 mod scenes;
 
@@ -166,7 +166,7 @@ fn a_block_key_changes_with_the_content_of_its_block() {
 }
 
 #[test]
-fn a_key_changes_just_when_content_of_its_block_does() {
+fn a_key_changes_if_and_only_if_content_of_its_block_does() {
     let folder = new_folder("keys");
     let mut soup = houses(9);
     build(&folder, &soup);
