@@ -8,7 +8,7 @@ import click
 from map3d.cli.app import VERBS, cli
 
 TARGET: Final = Path(__file__).with_name("cli.md")
-HEAD: Final = "# Command line\n\nWritten by `make docs` from the commands' own help. All verbs take `-h`, `--help`.\n"
+HEAD: Final = "# Command line\n\nWritten by `make docs` from the commands' own help. All commands accept `-h`, `--help`.\n"
 
 
 def reference() -> str:

@@ -220,7 +220,7 @@ def blocks_vectors():
 
 
 def geographic_vectors():
-    """A made-up map with all terms of the second degree: places and what the polynomials give."""
+    """Example polynomials with all terms of the second degree: positions and the values there."""
     row = {
         "local": [5.0, -3.5],
         "lon_lat": [179.9, -18.25],

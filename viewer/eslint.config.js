@@ -2,9 +2,9 @@ import { dirname, relative, resolve } from "node:path";
 import tseslint from "typescript-eslint";
 import { ENTRIES } from "./scripts/entries.mjs";
 
-/** Folders of src from the ground up: a folder may import those of lower ranks, and itself. */
+/** Folders of src from the lowest rank up: a folder may import those of lower ranks, and itself. */
 const RANKS = { core: 0, geo: 1, tiles: 2, draw: 3, overlay: 4, ui: 4, map: 5, map3d: 6, ...Object.fromEntries(Object.keys(ENTRIES).map((name) => [name, 7])) };
-/** Entries of their own see what every page sees, and the ground. */
+/** Entries import the public names, and the two lowest folders. */
 const SEEN_BY_ENTRIES = ["core", "geo", "map3d"];
 const SRC = resolve(import.meta.dirname, "src");
 

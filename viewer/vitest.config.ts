@@ -1,6 +1,6 @@
 import { defineConfig } from "vitest/config";
 
-/** Workers are made by the build; what is tested here starts none. */
+/** The build bundles the workers; these tests start none. */
 const workers = {
   name: "workers",
   resolveId: (id: string) => (id.startsWith("worker:") ? "\0worker" : null),

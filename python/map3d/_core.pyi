@@ -16,16 +16,16 @@ RENDER_FORMAT: int
 # -- limits (spec/limits.json) --------------------------------------------------------------------------------------------------------
 
 TILE_PX: tuple[int, int]
-"""Sides that a tile may have."""
+"""Allowed sides of a tile."""
 DEEPEST_LEVEL: int
 QUALITY: tuple[int, int]
-"""Least and greatest quality of a lossy colour format."""
+"""Minimum and maximum quality of a lossy colour format."""
 MAX_SUNS: int
-"""Of a sun16 layer."""
+"""Maximum number of suns of a sun16 layer."""
 AO_RADIUS_M: tuple[float, float]
-"""Least and greatest radius of ambient occlusion."""
+"""Minimum and maximum radius of ambient occlusion."""
 NAME_PATTERN: str
-"""Of a whole name of a scene, asset, rendering or layer."""
+"""Pattern of a whole name of a scene, asset, rendering or layer."""
 OBJECTS_PER_SHARD: int
 """Objects whose attributes share a file."""
 
@@ -71,7 +71,7 @@ class Reader:
     def __init__(self, path: str, format: str, options: str = "{}") -> None: ...
     @property
     def srs_name(self) -> str | None:
-        """The CRS as the source writes it; known before the first batch if the source names it at its head, else after the last."""
+        """The CRS as the source writes it; known before the first batch if the source names it in its header, else after the last."""
     def __iter__(self) -> Iterator[Batch]: ...
     def __next__(self) -> Batch: ...
     def instances(self) -> NDArray[np.float64]:
@@ -126,10 +126,10 @@ def check_file(path: str) -> None:
 # -- build: assets → chunks and textures (map3d-scene, map3d-image) ---------------------------------------------------------------
 
 Progress = Callable[[str, int, int], bool]
-"""(stage, done, total) → False to stop; the build then raises `Interrupted` and keeps what it has finished."""
+"""(stage, done, total) → False to stop; the build then raises `Interrupted` and keeps finished files."""
 
 class Interrupted(CoreError):
-    """A callback asked to stop; what is finished stays."""
+    """A callback asked to stop; finished files stay."""
 
 def build_scene(folder: str, request: str, progress: Progress | None = None) -> str:
     """Builds chunks/, textures/, instances.m3i and scene.json of a scene folder from its assets; returns the report (JSON). Unchanged chunks and textures are kept.
@@ -213,7 +213,7 @@ class Scene:
         """Triangles of all chunks and prototypes; a prototype counts once."""
     def occupied(self, frame: Frame, level: int, within: tuple[int, NDArray[np.uint32]] | None = None) -> NDArray[np.uint64]:
         """Returns the tiles of a level that may have content, as sorted Morton numbers. `within`: a level above and (n, 2) columns and rows of its
-        blocks; only their tiles are looked at. Time and memory grow with the occupied tiles, not with the level."""
+        blocks; only their tiles are examined. Time and memory grow with the occupied tiles, not with the level."""
     def block_keys(self, frame: Frame, z: int, blocks: NDArray[np.uint32]) -> list[str]:
         """Returns the keys of the blocks of level z at (n, 2) columns and rows: hex hashes over everything that a base block's bytes depend on."""
     def render_block(self, frame: Frame, z: int, x: int, y: int) -> Block:

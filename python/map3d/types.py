@@ -25,7 +25,7 @@ RADIUS_KINDS: Final = ("ao", "picture")
 AO_RADIUS_M: Final = _core.AO_RADIUS_M
 """Least and greatest radius of ambient occlusion (spec/limits.json, like the other limits of the core)."""
 TILE_PX: Final = _core.TILE_PX
-"""Sides that a tile may have."""
+"""Allowed sides of a tile."""
 COLOR_FORMATS: Final = ("webp", "png", "jpeg")
 MEDIA_TYPES: Final = {"webp": "image/webp", "png": "image/png", "jpeg": "image/jpeg"}
 DEPTH_UNIT_M: Final = 2.0**-10

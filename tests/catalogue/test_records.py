@@ -119,7 +119,7 @@ def test_catalogue_of_another_version_is_refused(tmp_path: Path) -> None:
     with home._database.transaction() as db:
         db.execute("PRAGMA user_version = 7")
     home.close()
-    with pytest.raises(UnknownVersion, match="version 7; this map3d reads version 2"):
+    with pytest.raises(UnknownVersion, match="version 7; this map3d reads version 3"):
         SqliteCatalogue(path)
 
 

@@ -1,4 +1,4 @@
-"""Help, errors and listings of the verbs, without a built scene."""
+"""Help, errors and listings of the commands, without a built scene."""
 
 import json
 from pathlib import Path

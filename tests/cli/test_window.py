@@ -1,4 +1,4 @@
-"""Renderings of a window: the tiles equal those of the whole scene, and all verbs work."""
+"""Renderings of a window: the tiles equal those of the whole scene, and all commands work."""
 
 import json
 from pathlib import Path

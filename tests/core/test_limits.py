@@ -54,7 +54,7 @@ def test_limits_of_the_command_line_are_those_of_the_specification() -> None:
 
 
 @pytest.mark.parametrize("name", ["a", "0", "a-b_c", "x" * 64, "", "-a", "A", "a.b", "x" * 65, "a\n"])
-def test_a_name_is_valid_just_when_it_matches_the_pattern(name: str) -> None:
+def test_a_name_is_valid_if_and_only_if_it_matches_the_pattern(name: str) -> None:
     if re.fullmatch(LIMITS["name"], name):
         assert types.check_name(name, "layer") == name
     else:

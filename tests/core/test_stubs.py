@@ -91,7 +91,7 @@ def test_a_class_has_the_members_of_its_stub(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in CLASSES if not is_exception(name)])
-def test_a_class_is_final_and_can_be_made_just_when_its_stub_says_so(name: str) -> None:
+def test_a_class_is_final_and_constructible_as_its_stub_says(name: str) -> None:
     compiled, node = getattr(_core, name), CLASSES[name]
     assert has_decorator(node, "final")
     with pytest.raises(TypeError):

@@ -39,7 +39,7 @@ def test_pixel_centres_follow_the_vectors(row):
 
 
 @pytest.mark.parametrize("row", TILES["rows"])
-def test_a_pixels_centre_lies_in_that_pixel(row):
+def test_a_pixels_centre_is_in_that_pixel(row):
     frame = pinned(FRAMES[0])[TILES["view"]]
     tile = TileId(*row["tile"])
     u, v = frame.uv_from_pixel(tile, *row["pixel"])
@@ -113,7 +113,7 @@ def test_requests_without_meaning_are_refused(tile_px, res_m, views):
 
 
 @pytest.mark.parametrize("box", [((0, 0, 0), (-1, 1, 1)), ((0, 0, math.nan), (1, 1, 1)), ((math.inf,) * 3, (-math.inf,) * 3)])
-def test_a_box_that_is_none_is_refused(box):
+def test_an_invalid_box_is_refused(box):
     with pytest.raises(BadRequest):
         pin(box, 256, 1.0, [ViewAngles(0, 45)])
 
@@ -151,14 +151,14 @@ def test_layers_of_light_reach_the_core_as_directions_and_radius():
 SCENE = ((-800.0, -800.0, 0.0), (800.0, 800.0, 60.0))
 
 
-def test_a_window_is_the_square_that_was_asked_for():
+def test_a_window_is_the_requested_square():
     frame = pin(SCENE, 256, 0.25, [ViewAngles(0, 45)], Window(100.0, -50.0, 512.0))[0]
     assert (frame.size_m, frame.zmax) == (512.0, 3)
     middle = uvd_from_local(frame.axes, (100.0, -50.0, 30.0))
     np.testing.assert_allclose([frame.u0_m + 256, frame.v0_m - 256], middle[:2])
 
 
-def test_a_window_that_is_no_whole_number_of_tiles_grows_to_one():
+def test_a_window_is_enlarged_to_a_whole_number_of_tiles():
     assert pin(SCENE, 256, 0.25, [ViewAngles(0, 45)], Window(0.0, 0.0, 512.1))[0].size_m == 1024.0
 
 
@@ -197,7 +197,7 @@ def test_content_nearer_than_depth_zero_is_refused_inside_a_window_only():
     slanted.check_window(far_behind)
 
 
-def test_what_a_square_shows_of_a_box_lies_in_both():
+def test_the_visible_part_of_a_box_is_inside_the_square_and_the_box():
     frame = pin(SCENE, 256, 0.25, [ViewAngles(33, 40)], Window(200.0, 100.0, 256.0))[0]
     seen = frame.clipped(SCENE)
     assert len(seen) >= 4

@@ -1,4 +1,4 @@
-"""Where the sun stands, against published values and the Astronomical Almanac's formula."""
+"""Positions of the sun, compared with published values and the Astronomical Almanac's formula."""
 
 import itertools
 import math
@@ -60,7 +60,7 @@ def test_the_example_of_the_solar_position_algorithm() -> None:
     st.floats(-180, 180),
     st.datetimes(datetime(1960, 1, 1), datetime(2045, 1, 1), timezones=st.just(UTC)),
 )
-def test_anywhere_at_any_time_it_is_where_the_almanac_says(latitude_deg: float, longitude_deg: float, time: datetime) -> None:
+def test_the_sun_matches_the_almanac_anywhere_at_any_time(latitude_deg: float, longitude_deg: float, time: datetime) -> None:
     place, time = GeographicPosition(latitude_deg, longitude_deg), time.replace(microsecond=0)
     expected = almanac(place, time)
     if expected.elevation_deg > 3:
@@ -74,7 +74,7 @@ def test_anywhere_at_any_time_it_is_where_the_almanac_says(latitude_deg: float, 
     ("time", "latitude_deg"),
     [("2024-06-20T20:51Z", 23.436), ("2024-12-21T09:20Z", -23.436), ("2024-03-20T03:06Z", 0.0), ("2024-09-22T12:44Z", 0.0)],
 )
-def test_at_solstices_and_equinoxes_it_stands_over_tropics_and_equator(time: str, latitude_deg: float) -> None:
+def test_at_solstices_and_equinoxes_the_sun_is_over_tropics_and_equator(time: str, latitude_deg: float) -> None:
     """Times as published for the year 2024, to the minute."""
     moment = datetime.fromisoformat(time)
     highest = max(sun_angles(GeographicPosition(latitude_deg, lon / 4), moment).elevation_deg for lon in range(-720, 720))
@@ -83,12 +83,12 @@ def test_at_solstices_and_equinoxes_it_stands_over_tropics_and_equator(time: str
 
 @pytest.mark.parametrize(("day", "minutes"), [((2024, 2, 11), -14.2), ((2024, 5, 14), 3.65), ((2024, 7, 26), -6.5), ((2024, 11, 3), 16.45)])
 def test_noon_differs_from_the_clocks_by_the_equation_of_time(day: tuple[int, int, int], minutes: float) -> None:
-    """Its four extremes through the year, as published (minutes that the sun is ahead)."""
+    """The four extremes of the equation of time, as published (minutes that the sun is ahead)."""
     noon = datetime(*day, 12, tzinfo=UTC) - timedelta(minutes=minutes)
     assert sun_angles(GREENWICH, noon).azimuth_deg == pytest.approx(180.0, abs=0.05)
 
 
-def test_a_low_sun_is_lifted_by_the_air() -> None:
+def test_refraction_lifts_a_low_sun() -> None:
     """At the published minute of sunrise its upper edge, 16' above its middle, touches the horizon; without air that middle is 50' below it."""
     sunrise = datetime(2024, 3, 20, 6, 2, tzinfo=UTC)
     assert sun_angles(GREENWICH, sunrise).elevation_deg == pytest.approx(-16 / 60, abs=0.1)
@@ -113,6 +113,6 @@ def test_a_day_has_sixteen_full_hours_of_the_longitudes_own_zone(longitude_deg: 
 
 
 @pytest.mark.parametrize("place", [(91, 0), (0, 181), (-90.5, 0), (0, -999), (math.nan, 0)])
-def test_places_that_are_none_are_refused(place: tuple[float, float]) -> None:
+def test_places_that_do_not_exist_are_refused(place: tuple[float, float]) -> None:
     with pytest.raises(BadRequest, match="place"):
         GeographicPosition(*place).checked()

@@ -1,4 +1,4 @@
-"""A scene for planning: cubes in the plane, whose keys are made of what meets a block."""
+"""A scene for planning: cubes in the plane. A block's key depends on the cubes that overlap it."""
 
 import hashlib
 import json

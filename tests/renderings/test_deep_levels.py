@@ -1,4 +1,4 @@
-"""Planning, estimates and manifests work in memory that grows with the content, at levels whose whole grids no memory holds."""
+"""Memory of planning, estimates and manifests grows with the content, even at levels whose full grid would not fit in memory."""
 
 import json
 import resource

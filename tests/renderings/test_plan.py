@@ -1,4 +1,4 @@
-"""Which blocks are planned, and what their keys follow."""
+"""Which blocks are planned, and what their keys depend on."""
 
 from dataclasses import replace
 
@@ -58,7 +58,7 @@ def test_a_block_that_lost_its_content_stays_planned_with_another_key() -> None:
     assert before[known[0]] == after[known[0]]
 
 
-def test_the_same_plan_comes_out_the_same() -> None:
+def test_planning_again_gives_the_same_plan() -> None:
     record = rendering()
     assert plan_jobs(SquareScene(CONTENT), record, {}) == plan_jobs(SquareScene(dict(reversed(CONTENT.items()))), record, {})
 

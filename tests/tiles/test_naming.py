@@ -33,7 +33,7 @@ def test_parent_of_child_is_itself():
         assert [naming.parent(child) for child in naming.children(tile)] == [tile] * 4
 
 
-def test_children_are_sort_by_morton():
+def test_children_are_in_morton_order():
     numbers = [naming.morton(child.x, child.y) for child in naming.children(TileId(5, 17, 3))]
     assert numbers == list(range(4 * naming.morton(17, 3), 4 * naming.morton(17, 3) + 4))
 
@@ -57,7 +57,7 @@ def test_each_tile_is_in_exactly_one_block(zmax):
     assert set(held) == set(all_tiles(zmax))
 
 
-def test_a_base_block_holds_85_tiles_sort_by_morton():
+def test_a_base_block_has_85_tiles_in_morton_order():
     tiles = list(naming.tiles_of_block(BlockId(2, 1, 3), 5))
     assert len(tiles) == 64 + 16 + 4 + 1
     assert tiles == naming.sort_by_morton(tiles)

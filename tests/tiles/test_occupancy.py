@@ -41,7 +41,7 @@ def test_decode_undoes_encode(zmax, share):
     assert occupancy.count(zmax) == grid.sum()
 
 
-def test_a_tile_is_occupied_just_when_a_child_is():
+def test_a_tile_is_occupied_if_and_only_if_a_child_is():
     _, occupancy = random_occupancy(5, 0.03)
     for z in range(5):
         for x in range(2**z):

@@ -1,4 +1,4 @@
-"""What only the SQLite home promises."""
+"""Guarantees that only the SQLite store gives."""
 
 import os
 import signal

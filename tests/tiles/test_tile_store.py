@@ -118,7 +118,7 @@ def test_a_removed_block_is_gone(store):
     assert list(store.list_tiles(0)) == []
 
 
-def test_blocks_are_listed_deepest_first_sort_by_morton(store):
+def test_blocks_are_listed_deepest_first_in_morton_order(store):
     ids = [BlockId(0, 0, 0), BlockId(1, 1, 1), BlockId(1, 0, 1), BlockId(1, 1, 0), BlockId(1, 0, 0)]
     for block in ids:
         store.put_block(block, "k", 1, content(block), b"s")

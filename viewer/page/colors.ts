@@ -8,7 +8,7 @@ import { message } from "./i18n";
 /** Text attributes with more distinct values are not offered. */
 const MAX_VALUES = 60;
 
-/** Colours objects by an attribute that the reader selects. */
+/** Colours objects by an attribute that the user selects. */
 export class Colors {
   readonly #view: map;
   #layer: imageLayer;

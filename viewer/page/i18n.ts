@@ -2,7 +2,7 @@ const EN = {
   incomplete: "This map isn’t fully rendered yet.",
   dataSaver: "Data saver is on. Less detail is shown.",
   search: "Search",
-  searchLabel: "Search by name or permalink",
+  searchLabel: "Search by name or address",
   results: "Search results",
   noResults: "No results",
   searchFailed: "Couldn’t load the search index",

@@ -9,7 +9,7 @@ type Offline = typeof import("./map3d-offline.mjs");
 /** All files that this page loads, at once or on demand. */
 export const PAGE_FILES = ["page.js", "page.css", "map3d.mjs", ...["compare", "controls", "measure", "offline", "orbit", "print", "shade", "theme"].map((name) => `map3d-${name}.mjs`)];
 
-/** Binds the dialog that saves the current view for offline use. Stores nothing until the reader asks for it. */
+/** Binds the dialog that saves the current view for offline use. Stores nothing until the user saves an area. */
 export function bindOffline(view: map, name: string): void {
   if (!isSecureContext || !("serviceWorker" in navigator)) return;
   const [button, dialog, details] = [byId("save-offline"), byId("offline") as HTMLDialogElement, byId("offline-details") as HTMLSelectElement];

@@ -1,4 +1,4 @@
-// Serves the examples with a small made-up town, rendered at start.
+// Serves the examples with a small generated town, rendered at startup.
 import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { dirname, join, resolve } from "node:path";
 import { fileURLToPath, pathToFileURL } from "node:url";

@@ -42,6 +42,6 @@ const total = rows.filter(({ name }) => !scripts.includes(name) && name !== "map
 console.log(`everything     ${String(total).padStart(24)} gz of ${TOTAL * 1024}`);
 if (total > TOTAL * 1024) over.push("everything");
 if (over.length > 0) {
-  console.error(`over budget or without a budget:  ${over.join(", ")}`);
+  console.error(`over budget or without a budget: ${over.join(", ")}`);
   process.exit(1);
 }

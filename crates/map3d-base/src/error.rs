@@ -18,7 +18,7 @@ pub enum Error {
     /// Reading or writing failed.
     #[error("{path}: {source}")]
     Storage { path: PathBuf, source: std::io::Error },
-    /// A callback asked to stop; what is finished stays.
+    /// A callback asked to stop; finished files stay.
     #[error("interrupted; what is finished stays")]
     Interrupted,
 }

@@ -17,7 +17,7 @@ pub fn fill_unmarked(image: &mut Raster, mask: &PixelMask, reach: u32) {
         return;
     }
     let w = image.width as usize;
-    // Stands for any greater distance.
+    // Represents any greater distance.
     let far = reach.min(MAX_SIDE - 1) as i16 + 1;
     let gaps: Vec<Vec<Range<usize>>> = (0..mask.height()).map(|y| mask.gaps(y)).collect();
     let up = rows_up(w, &gaps, far);

@@ -1,4 +1,4 @@
-//! What several tests share.
+//! Functions that several tests share.
 #![allow(dead_code)]
 
 use std::path::PathBuf;
@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use map3d_image::Raster;
 use map3d_image::encode::{Deflate, Filter, encode_png};
 
-/// A fresh folder of this test.
+/// Creates a new folder for this test.
 pub fn folder(name: &str) -> PathBuf {
     let path = std::env::temp_dir().join(format!("map3d-image-{name}-{}", std::process::id()));
     let _ = std::fs::remove_dir_all(&path);
@@ -14,7 +14,7 @@ pub fn folder(name: &str) -> PathBuf {
     path
 }
 
-/// A small generator of numbers, the same everywhere.
+/// A small random generator with the same numbers on every machine.
 pub struct Random(pub u64);
 
 impl Random {

@@ -1,4 +1,4 @@
-//! Decoding: every format's pixels come through; limits and damage are errors.
+//! Decoding: the pixels of every format are preserved; exceeded limits and damaged files are errors.
 
 mod common;
 
@@ -24,7 +24,7 @@ fn gradient(width: u32, height: u32) -> Raster {
 }
 
 #[test]
-fn png_pixels_come_back_exactly() {
+fn png_pixels_round_trip_exactly() {
     for (w, h) in [(1, 1), (3, 5), (64, 64)] {
         let image = noise(w, h, 7);
         assert_eq!(read(&png(&image)).expect("png"), image);
@@ -32,7 +32,7 @@ fn png_pixels_come_back_exactly() {
 }
 
 #[test]
-fn lossy_formats_come_back_closely() {
+fn lossy_formats_decode_to_similar_pixels() {
     let image = gradient(70, 50);
     assert!(mean_error(&read(&encode_jpeg(&image, 95, false).expect("jpeg")).expect("decodes"), &image) < 2.0);
     assert!(mean_error(&read(&encode_webp(&image, 95, false).expect("webp")).expect("decodes"), &image) < 3.0);
@@ -100,7 +100,7 @@ fn damage_is_an_error_or_an_image_and_never_a_panic() {
 
 /// Public malformed files; `MAP3D_DATA` names their folder.
 #[test]
-fn public_malformed_images_are_survived() {
+fn public_malformed_images_never_panic() {
     let Some(data) = std::env::var_os("MAP3D_DATA").map(PathBuf::from) else {
         eprintln!("SKIPPED: MAP3D_DATA is not set");
         return;

@@ -88,7 +88,7 @@ fn opposite_normals_take_the_nearest() {
 }
 
 #[test]
-fn seams_come_back_exactly() {
+fn seams_round_trip_exactly() {
     for g in [random_tile(1, 32), GBuffer::empty(4, 4), random_tile(2, 256)] {
         assert_eq!(read_seam("test", &write_seam(&g)).expect("sound"), g);
     }
@@ -117,7 +117,7 @@ fn a_seam_whose_arrays_do_not_fit_its_size_is_refused() {
     assert!(read_seam("resized", &bad).is_err());
 }
 
-/// Id, depth and all that rays make.
+/// Id, depth and all layers that rays compute.
 fn light_tile(seed: u64, side: u32) -> GBuffer {
     let mut random = Random(seed);
     let arrays =
@@ -134,7 +134,7 @@ fn light_tile(seed: u64, side: u32) -> GBuffer {
 }
 
 #[test]
-fn shades_are_means_of_what_is_there() {
+fn shades_are_means_of_pixels_with_an_id() {
     let mut child = GBuffer::with(2, 2, Arrays::LEAST.and(LayerKind::Sun).and(LayerKind::Ao));
     (child.id, child.depth) = (vec![7, 9, 0, 9], vec![5, 6, DEPTH_NOTHING, 8]);
     (child.sun, child.ao) = (vec![255, 0, 255, 0], vec![10, 20, 255, 31]);
@@ -154,7 +154,7 @@ fn suns_and_second_depths_come_from_the_id_that_wins() {
 }
 
 #[test]
-fn seams_keep_the_arrays_that_there_are() {
+fn seams_keep_the_arrays_that_are_present() {
     for g in [light_tile(8, 32), light_tile(9, 256)] {
         assert_eq!(read_seam("test", &write_seam(&g)).expect("sound"), g);
         let mut some = g.clone();

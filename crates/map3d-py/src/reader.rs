@@ -44,7 +44,7 @@ impl Reader {
         Ok(Self { document: Mutex::new(document) })
     }
 
-    /// The CRS as the source writes it; known before the first batch if the source names it at its head, else after the last.
+    /// The CRS as the source writes it; known before the first batch if the source names it in its header, else after the last.
     #[getter]
     fn srs_name(&self) -> Option<String> {
         self.lock().srs_name().map(str::to_owned)

@@ -43,7 +43,7 @@ impl Scene {
     }
 
     /// Returns the tiles of a level that may have content, as sorted Morton numbers. `within`: a level above and (n, 2) columns and rows of its blocks;
-    /// only their tiles are looked at.
+    /// only their tiles are examined.
     #[pyo3(signature = (frame, level, within=None))]
     fn occupied<'py>(
         &self,

@@ -32,7 +32,7 @@ fn main() {
     );
 }
 
-/// Seconds that this thread has run (Linux).
+/// Returns the CPU seconds of this thread (Linux).
 fn cpu_s() -> f64 {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
     text.split(' ').next().and_then(|ns| ns.parse::<f64>().ok()).unwrap_or(f64::NAN) * 1e-9

@@ -1,5 +1,5 @@
-//! Bounding volume hierarchy: a binary tree by the surface area heuristic, collapsed to eight children a node.
-//! The same input gives the same tree, whatever the machine.
+//! Bounding volume hierarchy: a binary tree by the surface area heuristic, collapsed to eight children per node.
+//! The same input gives the same tree on every machine.
 
 mod binary;
 
@@ -62,7 +62,7 @@ pub fn build(boxes: &[Aabb]) -> Tree {
     let binary = BinaryTree::build(boxes);
     let mut tree = Tree { order: Vec::with_capacity(boxes.len()), ..Tree::default() };
     tree.nodes.push(empty_node());
-    // Depth first, so that a subtree lies together in the file.
+    // Depth first, so that a subtree is contiguous in the file.
     let mut stack = vec![(0u32, 0u32)];
     while let Some((from, to)) = stack.pop() {
         let children = eight_children(&binary, from);
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn leaves_and_nodes_take_at_most_70_bytes_an_item() {
+    fn leaves_and_nodes_take_at_most_70_bytes_per_item() {
         let tree = build(&boxes(100_000));
         let bytes = (tree.nodes.len() * 256 + tree.leaves.len() * 320) as f64 / 100_000.0;
         assert!(bytes <= 70.0, "{bytes} bytes");

@@ -1,4 +1,4 @@
-//! The top-level tree over the parts of a scene: chunks where they lie and prototypes where they are placed.
+//! The top-level tree over the parts of a scene: chunks in place, and prototypes where instances place them.
 
 use map3d_base::Box3;
 

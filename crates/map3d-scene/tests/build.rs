@@ -38,7 +38,7 @@ fn each_optimisation_is_counted_and_can_be_switched_off() {
     let t = world([[0.0; 3], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]]);
     let faces = [
         (t, 0, 0, Rank::Other),
-        // The same face once more, turned, the other way round, and with an equal material.
+        // The same face again: rotated, reversed, and with an equal material.
         ([t[1], t[2], t[0]], 0, 0, Rank::Other),
         ([t[0], t[2], t[1]], 0, 1, Rank::Other),
         // Another object's, and another material's: both stay.

@@ -1,4 +1,4 @@
-//! A build after a change reads only what changed and gives the bytes of a build from nothing.
+//! A build after a change reads only what changed and gives the same bytes as a build from scratch.
 
 mod fixture;
 
@@ -62,7 +62,7 @@ fn corrupt_mesh(folder: &Path, number: u32) {
 }
 
 #[test]
-fn changed_added_and_removed_objects_give_the_bytes_of_a_build_from_nothing() {
+fn changed_added_and_removed_objects_give_the_bytes_of_a_build_from_scratch() {
     let folder = new_folder();
     let mut quarters = build_four_quarters(&folder);
     // One tent moves and two are swapped in the order of the file.

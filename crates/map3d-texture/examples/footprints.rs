@@ -105,7 +105,7 @@ impl Total {
     }
 }
 
-/// Horizontal ground seen at a pitch: `scale` texels of level 0 a pixel across, more down the image; turned by `turn` degrees.
+/// Horizontal ground seen at a pitch: `scale` texels of level 0 per pixel across, more down the image; rotated by `turn` degrees.
 fn uv_map(pitch_deg: f64, scale: f64, turn_deg: f64) -> UvMap {
     let step = scale / f64::from(SIDE);
     let down = step / pitch_deg.to_radians().sin();
@@ -175,7 +175,7 @@ impl Pyramid {
         [0, 1, 2].map(|k| (a[k] * (1.0 - fx) + b[k] * fx) * (1.0 - fy) + (c[k] * (1.0 - fx) + d[k] * fx) * fy)
     }
 
-    /// Mean over the pixel's square, of n × n samples, at least 1,024 and at least three a texel.
+    /// Mean over the pixel's square, of n × n samples, at least 1,024 and at least three per texel.
     fn integrate(&self, uv: &UvMap, i: f64, j: f64) -> [u16; 3] {
         let side = f64::from(SIDE);
         let longest = |d: usize| uv.u[d].hypot(uv.v[d]) * side;
@@ -219,7 +219,7 @@ fn noise(x: u32, y: u32) -> [u8; 3] {
     [0, 1, 2].map(|k| hash(x, y, k))
 }
 
-/// Noise of many sizes, as photographs have.
+/// Noise of many sizes, as in photographs.
 fn smooth(x: u32, y: u32) -> [u8; 3] {
     [0, 1, 2].map(|k| {
         let octave = |shift: u32| {
@@ -232,7 +232,7 @@ fn smooth(x: u32, y: u32) -> [u8; 3] {
     })
 }
 
-/// Bricks under noise, of the kind that the measured town wears.
+/// Bricks with noise, like the textures of the measured town.
 fn town(x: u32, y: u32) -> [u8; 3] {
     let (bh, bw) = (17, 41);
     let shift = y / bh % 2 * (bw / 2);

@@ -1,4 +1,4 @@
-//! What a sample costs: least ns a pixel over many rounds, for runs of several lengths in sub-tiles of 64 × 64 pixels.
+//! Measures the cost of a sample: least ns per pixel over many rounds, for runs of several lengths in sub-tiles of 64 × 64 pixels.
 //!
 //! `cargo run --release -p map3d-texture --example sampling`
 
@@ -31,7 +31,7 @@ fn main() {
     }
 }
 
-/// ns a pixel.
+/// ns per pixel.
 fn round(sampler: &Sampler, run: usize) -> f64 {
     let mut row = [[0u16; 4]; 64];
     let start = Instant::now();

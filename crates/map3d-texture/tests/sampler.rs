@@ -22,7 +22,7 @@ fn made(plan: &Footprint) -> Arc<TapPlan> {
     Arc::new(TapPlan::new(plan))
 }
 
-/// One texel a pixel, v up, the image's upper left corner at the origin.
+/// One texel per pixel, v up, the image's upper left corner at the origin.
 fn one_to_one(w: u32, h: u32) -> UvMap {
     UvMap { u: [0.0, 1.0 / f64::from(w), 0.0], v: [1.0, 0.0, -1.0 / f64::from(h)] }
 }
@@ -76,7 +76,7 @@ fn white_stays_white_and_diffuse_multiplies() {
 }
 
 #[test]
-fn transparent_texels_lend_no_colour() {
+fn transparent_texels_add_no_colour() {
     let image = Raster::new(2, 1, vec![[255, 0, 255, 0], [0, 128, 0, 255]]);
     let sampler = Sampler::new(Arc::new(Level::from_raster(image.clone())), made(&point()), true, &one_to_one(2, 1), Wrap::Clamp, WHITE);
     for x in 140..500 {
@@ -97,7 +97,7 @@ fn coverage_is_alpha_of_a_half() {
 #[test]
 fn samples_of_a_pixel_are_covered_as_one_by_one() {
     let mut random = Random(31);
-    // Patches that are clear or solid, and noise between.
+    // Fully transparent and opaque patches, and noise between them.
     let alpha = |x: usize, y: usize, noise: f64| [0, 255, (noise * 255.0) as u8, 255][(x / 3 + 2 * (y / 4)) % 4];
     let texels = (0..24 * 17).map(|k| [9, 9, 9, alpha(k % 24, k / 24, random.unit())]).collect();
     let level = Arc::new(Level::from_raster(Raster::new(24, 17, texels)));
@@ -137,7 +137,7 @@ fn a_place_is_covered_as_the_origin_of_a_map_that_begins_there() {
     assert!((2_000..8_000).contains(&covered), "{covered}");
 }
 
-/// A box over each pixel, of many bilinear samples, against the taps.
+/// Compares the taps with a box filter of many bilinear samples over each pixel.
 #[test]
 fn samples_come_near_the_exact_integral() {
     let mut random = Random(5);

@@ -44,9 +44,9 @@ fn a_point_or_sliver_uses_the_texels_it_lies_in() {
     assert_eq!(mask.marked(), 9);
 }
 
-/// Every texel that a random point of a triangle lies in is used; with room to spare none is that lies clear of the triangle.
+/// Every texel that contains a random point of a triangle is used; no texel clearly outside the triangle is.
 #[test]
-fn masks_hold_what_brute_force_finds() {
+fn masks_equal_brute_force() {
     let mut random = Random(4);
     for wrap in [Wrap::Wrap, Wrap::Mirror, Wrap::Clamp, Wrap::None] {
         for _ in 0..60 {
@@ -99,7 +99,7 @@ fn repeated_and_absurd_coordinates_end_quickly() {
 }
 
 #[test]
-fn runs_come_back() {
+fn runs_round_trip() {
     let mut random = Random(8);
     for (w, h) in [(1, 1), (7, 3), (64, 2), (65, 33), (200, 100)] {
         let mut mask = PixelMask::empty(w, h);
@@ -161,7 +161,7 @@ fn a_limited_fill_is_the_whole_one_within_its_reach() {
 
 // -- mips
 
-/// The exact mean of a rectangle of texels in linear light, weighed by alpha.
+/// Computes the exact mean of a rectangle of texels in linear light, weighted by alpha.
 fn brute(image: &Raster, x: (f64, f64), y: (f64, f64)) -> [f64; 4] {
     let mut sum = [0.0; 4];
     let mut area = 0.0;
@@ -208,7 +208,7 @@ fn pyramids_end_at_one_texel() {
 }
 
 #[test]
-fn transparent_texels_lend_no_colour() {
+fn transparent_texels_add_no_colour() {
     let image = Raster::new(2, 2, vec![[255, 0, 255, 0], [0, 128, 0, 255], [255, 0, 255, 0], [0, 128, 0, 255]]);
     let LinearRaster { pixels, .. } = first_mip(&image);
     assert_eq!(first_mip(&image).to_raster().pixels[0], [0, 128, 0, 128]);
@@ -291,7 +291,7 @@ fn a_grey_image_becomes_alpha() {
     std::fs::remove_dir_all(dir).expect("clean up");
 }
 
-/// The golden atlas: islands of honest colours on magenta. No level shows magenta, nowhere.
+/// An atlas with islands of colour on magenta: no level shows magenta anywhere.
 #[test]
 fn an_atlas_bleeds_no_background_into_any_level() {
     let dir = folder("atlas");
@@ -472,7 +472,7 @@ fn a_halved_level_is_within_a_step_of_the_mean_light() {
 }
 
 #[test]
-fn many_threads_make_a_level_once() {
+fn many_threads_compute_a_level_once() {
     let dir = folder("cache-threads");
     let image = png(&noise(200, 100, 1));
     stored(&dir, &image, &[], &full(200, 100));

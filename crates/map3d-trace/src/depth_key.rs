@@ -1,5 +1,5 @@
-//! The winner rule (spec/pyramid.md §4): among the surfaces that cover a sample, the least depth key (depth − bias) wins; `TieBreak` decides between equal
-//! keys.
+//! The visibility rule (spec/pyramid.md §4): among the surfaces that cover a sample, the least depth key (depth − bias) wins; `TieBreak` decides
+//! between equal keys.
 
 /// Bias in depth units for each class rank above that of walls and roofs.
 const BIAS_UNITS: f64 = 2.0;

@@ -16,7 +16,7 @@ use map3d_scene::{LazyChunk, Leaf, ScenePart, SceneStore};
 pub use keys::block_keys;
 use tile_set::{TileRange, TileSet};
 
-/// Boxes up to this part of a tile are marked as a whole.
+/// Boxes up to this fraction of a tile are marked as a whole.
 const SMALL_TILES: f64 = 0.25;
 
 /// Returns the tiles of a level that may have content, as sorted Morton numbers. A tile that is not among them has none.
@@ -24,7 +24,7 @@ pub fn occupied(scene: &SceneStore, frame: &Frame, level: u8) -> Result<Vec<u64>
     occupied_within(scene, frame, level, 0, &[[0, 0]])
 }
 
-/// Returns those of `occupied` that lie in some blocks of a level above, (x, y) each; nothing else is looked at.
+/// Returns those of `occupied` that lie in some blocks of a level above, (x, y) each; visits nothing else.
 pub fn occupied_within(scene: &SceneStore, frame: &Frame, level: u8, block_level: u8, blocks: &[[u32; 2]]) -> Result<Vec<u64>> {
     frame.validate()?;
     if level > DEEPEST_LEVEL {

@@ -123,7 +123,7 @@ fn contains_ray(p: &[Vec3; 3]) -> bool {
     inside && edges.iter().any(|s| *s != 0.0)
 }
 
-/// The order of hits in the winner rule; the least wins.
+/// The order of hits in the visibility rule; the least wins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct HitOrder {
     /// depth − bias.
@@ -213,7 +213,7 @@ impl<'a> RayTraversal<'a> {
             return;
         }
 
-        // The winner rule.
+        // The visibility rule.
         let record = &part.chunk.triangles()[triangle as usize];
         let gradient = depth_gradient(pixel).unwrap_or([f64::INFINITY, 0.0]);
         let depth_key = (depth + 0.5).floor() as i64 - depth_bias(gradient, record.rank, DEPTH_UNITS_PER_M);

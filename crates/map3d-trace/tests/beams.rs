@@ -28,7 +28,7 @@ fn beams_find_the_winner_of_each_sample() {
 
 /// The planes of steep triangles extend in front of D0 within the triangle's box.
 #[test]
-fn winner_rule_holds_right_behind_the_plane_d0() {
+fn visibility_rule_holds_just_behind_the_plane_d0() {
     let mut random = Lcg(61);
     let mut soup = Soup::default();
     (0..80).for_each(|k| soup.add([random.point(12.0), random.point(12.0), random.point(12.0)], k, RANKS[k as usize % 6]));
@@ -69,7 +69,7 @@ fn highest_rank_wins_among_coplanar_faces() {
 }
 
 #[test]
-fn winner_rule_holds_for_instances_and_many_chunks() {
+fn visibility_rule_holds_for_instances_and_many_chunks() {
     let mut random = Lcg(99);
     let mut soup = mixed_soup(&mut random, 60);
     // Distant content enlarges the square, so that it has many cells.

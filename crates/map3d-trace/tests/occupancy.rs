@@ -1,4 +1,4 @@
-//! Occupancy holds every tile with content; a block's key changes just when its content does.
+//! Occupancy holds every tile with content; a block's key changes if and only if its content does.
 
 mod scenes;
 
@@ -113,7 +113,7 @@ fn occupancy_works_to_the_deepest_level() {
     soup.quad([[-50.0, -50.0, 0.0], [-49.9, -50.0, 0.0], [-49.9, -49.9, 0.0], [-50.0, -49.9, 0.0]], 0, Rank::Other);
     soup.quad([[50.0, 50.0, 0.0], [50.1, 50.0, 0.0], [50.1, 50.1, 0.0], [50.0, 50.1, 0.0]], 1, Rank::Other);
     let store = build(&folder, &soup);
-    // Tiles of level 20 are 0.01 m wide, so each face covers about 10 × 10 of them; every level above has half of that, at least one a face.
+    // Tiles of level 20 are 0.01 m wide, so each face covers about 10 × 10 of them; every level above has half of that, at least one per face.
     let mut frame = frame(0.0, 90.0, 128.0);
     frame.zmax = 20;
     frame.size_m = 0.01 * f64::from(1 << 20);
@@ -166,7 +166,7 @@ fn a_block_key_changes_with_the_content_of_its_block() {
 }
 
 #[test]
-fn a_key_changes_just_when_content_of_its_block_does() {
+fn a_key_changes_if_and_only_if_content_of_its_block_does() {
     let folder = new_folder("keys");
     let mut soup = houses(9);
     build(&folder, &soup);

@@ -1,4 +1,4 @@
-"""The command line: one file per verb, without logic of its own."""
+"""The command line: one file per command, without logic of its own."""
 
 from map3d.cli.app import cli, main
 

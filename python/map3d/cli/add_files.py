@@ -24,8 +24,8 @@ from map3d.errors import BadRequest, Map3dError, UnknownFormat
 @click.option("--theme", help="CityGML: the appearance theme to use.  [default: the first in the file]")
 @click.option("--lod", help="CityGML: the level of detail to use.  [default: the best of each object]")
 @click.option("--strict", is_flag=True, help="Stop at the first problem instead of skipping and counting it.")
-@click.option("--parse-memory", "parse_memory_bytes", type=Bytes(), help="Memory of the process that reads a file.  [default: 1G; 2G above 100 MB]")
-@click.option("--parse-cpu", "parse_cpu_s", type=click.IntRange(1), help="Seconds of CPU time to read a file.  [default: 60 per 100 MB]")
+@click.option("--parse-memory", "parse_memory_bytes", type=Bytes(), help="Memory limit for reading a file.  [default: 1G; 2G above 100 MB]")
+@click.option("--parse-cpu", "parse_cpu_s", type=click.IntRange(1), help="Limit in CPU seconds for reading a file.  [default: 60 per 100 MB]")
 @json_option
 @workspace_option
 def command(workspace: Workspace, scene: str, files: Sequence[Path], as_json: bool, name: str | None, **options: Any) -> None:

@@ -1,4 +1,4 @@
-"""The group of all verbs, and the handling of errors."""
+"""The group of all commands, and the handling of errors."""
 
 import importlib
 import os
@@ -32,7 +32,7 @@ VERBS: Final = {
 
 
 class Verbs(click.Group):
-    """Loads the module of a verb on first use, and lists the verbs in the order of a typical workflow."""
+    """Loads the module of a command on first use, and lists the commands in the order of a typical workflow."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(VERBS)

@@ -1,4 +1,4 @@
-"""Builds a scene with a progress bar and prints the build report; on standard error, since the build is only one step of a verb."""
+"""Builds a scene with a progress bar and prints the build report; on standard error, since the build is only one step of a command."""
 
 from collections.abc import Mapping
 from typing import Any

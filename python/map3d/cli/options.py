@@ -1,4 +1,4 @@
-"""Options that several verbs share, and the types of their values."""
+"""Options that several commands share, and the types of their values."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""createScene.py, addFilesToScene.py, createRendering.py: three verbs under the names of map3d's predecessor."""
+"""createScene.py, addFilesToScene.py, createRendering.py: three commands under the names of map3d's predecessor."""
 
 import sys
 

@@ -24,7 +24,7 @@ OPTIONS: Final[Mapping[str, Any]] = {
 }
 GROUND: Final = "ground"
 BUILD_BYTES: Final = 2 << 30
-"""Memory of a build unless told otherwise."""
+"""Default memory limit of a build."""
 
 
 def is_stale(workspace: Workspace, catalogue: Catalogue, scene: str) -> bool:
@@ -69,5 +69,5 @@ def scene_digest(catalogue: Catalogue, record: SceneRecord) -> str:
 
 
 def open_scene(workspace: Workspace, scene: str, cache_bytes: int = 64 << 20) -> _core.Scene:
-    """The built scene, for planning and checking."""
+    """Opens the built scene, for planning and checking."""
     return _core.Scene(str(workspace.scene_folder(scene)), cache_bytes=cache_bytes)

@@ -16,7 +16,7 @@ Numbers = NDArray[np.uint64]
 
 
 class Occupancy:
-    """The tiles with content, level by level; a tile is occupied just when one of its children is."""
+    """The tiles with content, level by level; a tile is occupied if and only if one of its children is."""
 
     def __init__(self, zmax: int, base: Numbers) -> None:
         """`base`: Morton numbers of the occupied tiles of level zmax, in any order."""
@@ -29,7 +29,7 @@ class Occupancy:
 
     @classmethod
     def from_tiles(cls, zmax: int, tiles: Iterable[tuple[int, int]]) -> Self:
-        """From (x, y) of level zmax."""
+        """Creates it from (x, y) of level zmax."""
         xy = np.array(list(tiles), dtype=np.int64).reshape(-1, 2)
         if len(xy) and (xy.min() < 0 or xy.max() >= 1 << zmax):
             raise BadRequest(f"occupancy: a column or row is not from 0 to {(1 << zmax) - 1}")
@@ -37,7 +37,7 @@ class Occupancy:
 
     @classmethod
     def decode(cls, zmax: int, text: str) -> Self:
-        """From the manifest's base64; raises Corrupt when it is not an occupancy of that depth."""
+        """Decodes the manifest's base64; raises Corrupt unless it is an occupancy of that depth."""
         bits = _bits(text)
         have = np.arange(int(bits[0]) if len(bits) else 0, dtype=np.uint64)
         used = 1
@@ -58,7 +58,7 @@ class Occupancy:
         return len(self._levels) - 1
 
     def encode(self) -> str:
-        """Base64 as the manifest has it."""
+        """Encodes to the manifest's base64."""
         bits = [np.array([len(self._levels[0]) > 0])]
         for above, below in zip(self._levels, self._levels[1:], strict=False):
             child = np.repeat(above * np.uint64(4), 4) + np.tile(np.arange(4, dtype=np.uint64), len(above))
@@ -66,11 +66,11 @@ class Occupancy:
         return base64.b64encode(np.packbits(np.concatenate(bits), bitorder="little").tobytes()).decode()
 
     def count(self, z: int | None = None) -> int:
-        """Occupied tiles of a level, or of all."""
+        """Returns the number of occupied tiles of a level, or of all."""
         return sum(len(level) for level in self._levels) if z is None else len(self._levels[z])
 
     def numbers(self, z: int) -> Numbers:
-        """Morton numbers of the occupied tiles of level z, sorted."""
+        """Returns the sorted Morton numbers of the occupied tiles of level z."""
         return self._levels[z]
 
     def tiles(self, z: int) -> list[TileId]:
@@ -87,7 +87,7 @@ class Occupancy:
         return place < len(level) and bool(level[place] == number)
 
     def __or__(self, other: Self) -> Self:
-        """The union of two of one depth."""
+        """Returns the union with an occupancy of the same depth."""
         if other.zmax != self.zmax:
             raise BadRequest(f"occupancies of zmax {self.zmax} and {other.zmax} have no union")
         return type(self)(self.zmax, np.concatenate((self._levels[-1], other._levels[-1])))
@@ -100,7 +100,7 @@ class Occupancy:
 
 
 def morton_numbers(x: NDArray[np.integer], y: NDArray[np.integer]) -> Numbers:
-    """(n,) numbers of columns and rows."""
+    """Returns the (n,) Morton numbers of columns and rows."""
     return _spread(x.astype(np.uint64)) | _spread(y.astype(np.uint64)) << np.uint64(1)
 
 
@@ -109,7 +109,7 @@ def xy_from_morton(numbers: Numbers) -> tuple[NDArray[np.int64], NDArray[np.int6
 
 
 def _held(numbers: Numbers, by: Numbers) -> NDArray[np.bool_]:
-    """Which of the numbers are among others, which are sorted."""
+    """Returns which of the numbers are among `others`, which are sorted."""
     if not len(by):
         return np.zeros(len(numbers), bool)
     found: NDArray[np.bool_] = by[np.minimum(np.searchsorted(by, numbers), len(by) - 1)] == numbers
@@ -117,7 +117,7 @@ def _held(numbers: Numbers, by: Numbers) -> NDArray[np.bool_]:
 
 
 def _unique(numbers: Numbers) -> Numbers:
-    """Sorted, each once; np.unique, but for the modules that it loads."""
+    """Sorts and deduplicates, like np.unique, which would load more modules."""
     ordered = np.sort(numbers)
     return ordered[np.append(True, ordered[1:] != ordered[:-1])] if len(ordered) else ordered
 

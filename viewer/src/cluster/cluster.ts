@@ -67,7 +67,7 @@ export class cluster extends MapLayer<map, ClusterEvents> {
     return this.#markers;
   }
 
-  /** Replaces all markers. Call it, too, after markers have moved. */
+  /** Replaces all markers. Call it after markers have moved, too. */
   setMarkers(markers: readonly marker[]): this {
     this.#clear();
     this.#markers = [...markers];

@@ -12,7 +12,7 @@ export interface LocateOptions {
   language?: string;
 }
 
-/** The reader's location. */
+/** The user's location. */
 export interface Located {
   /** World coordinates, on the surface. */
   readonly position: Vec3;
@@ -23,7 +23,7 @@ export interface Located {
 export interface LocateEvents {
   /** The location is known and shown. */
   located: Located;
-  /** The location is unknown. The message is in the reader's language and is shown beside the button, too. */
+  /** The location is unknown. The message is in the user's language and is shown beside the button, too. */
   error: { error: Error };
 }
 
@@ -33,7 +33,7 @@ const TIMEOUT_MS = 15_000;
 /** Largest round-trip error of a conversion to the scene's CRS and back; beyond, the position is outside the range of the conversion. */
 const TOLERANCE_DEG = 1e-5;
 
-/** A button that shows the reader's location: a marker with an accuracy circle. A second press removes them. */
+/** A button that shows the user's location: a marker with an accuracy circle. A second press removes them. */
 export class locate extends MapLayer<map, LocateEvents> {
   readonly options: LocateOptions;
   readonly #status = element("p", "map3d-status", { role: "status" });
@@ -78,7 +78,7 @@ export class locate extends MapLayer<map, LocateEvents> {
     return this;
   }
 
-  /** Takes marker and circle away. */
+  /** Removes the marker and the circle. */
   clear(): this {
     this.#request++;
     this.#button.ariaBusy = "false";
@@ -126,7 +126,7 @@ export class locate extends MapLayer<map, LocateEvents> {
   }
 }
 
-/** Asks the browser for the location. @throws Map3dError with a message in the reader's language */
+/** Asks the browser for the location. @throws Map3dError with a message in the user's language */
 function queryPosition(messages: ControlMessages): Promise<GeolocationPosition> {
   return new Promise((resolve, reject) => {
     navigator.geolocation.getCurrentPosition(resolve, ({ code, PERMISSION_DENIED }) => {

@@ -9,7 +9,7 @@ const STYLES = `
 @media (forced-colors: active) { .map3d-status { border: 1px solid CanvasText; } }
 `;
 
-/** Adds a button above a map's other buttons, with a panel that panel next to it. */
+/** Adds a button above a map's other buttons, with a panel that opens next to it. */
 export function addPanelButton({ controlPane }: { readonly controlPane: HTMLElement }, button: HTMLButtonElement, panel: HTMLElement): HTMLElement {
   adoptStyles(document, STYLES);
   const column = controlPane.querySelector(".map3d-buttons") ?? controlPane.appendChild(element("div", "map3d-buttons"));

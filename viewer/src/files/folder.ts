@@ -5,7 +5,7 @@ export interface Folder {
 }
 
 export const MANIFEST = "rendering.json";
-/** Greatest depth and number of folders that are searched for a manifest: a reader can drop a whole disk. */
+/** Greatest depth and number of folders that are searched for a manifest: a user can drop a whole disk. */
 const [MAX_DEPTH, MAX_FOLDERS] = [3, 1000] as const;
 
 /** Returns the folders that contain a manifest, each "" or ending with a slash. Ignores manifests below another one's folder. */
@@ -26,7 +26,7 @@ export function subfolder(files: ReadonlyMap<string, Blob>, base: string): Folde
 /** Is this the path of a file below the folder, with no way out of it? */
 export const isInside = (path: unknown): path is string => typeof path === "string" && path.split("/").every((part) => part !== "" && part !== "." && part !== ".." && !/[\\:\0]/.test(part));
 
-/** DroppedEntries files and folders. They are read on demand. */
+/** Dropped files and folders, read on demand. */
 export class DroppedEntries {
   readonly #roots: ReadonlyMap<string, FileSystemEntry>;
 

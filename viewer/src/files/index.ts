@@ -1,4 +1,4 @@
-/** map3d-files: shows renderings from the reader's own files, chosen or dropped on the map. */
+/** map3d-files: shows renderings from the user's own files, chosen or dropped on the map. */
 export { filesSource, FilesError } from "./filesSource";
 export type { FilesProblem } from "./i18n";
 export { dropFiles, type DropEvents, type DropOptions } from "./dropFiles";

@@ -2,7 +2,7 @@ import { element } from "../core/dom";
 import type { Vec2 } from "../core/vec";
 import type { PlacedFeature } from "./placedFeature";
 
-/** Most features in the list; zooming in shows the others. */
+/** Maximum number of features in the list; zooming in shows the others. */
 const MAX_FEATURES = 100;
 
 /** A feature in view and its anchor on the screen (CSS pixels). */

@@ -84,7 +84,7 @@ export class FeatureRenderer {
     this.restyle();
   }
 
-  /** Lists the work that is due after a change. @returns the region to compute */
+  /** Lists the work required after a change. @returns the region to compute */
   #findWork(relief: Relief, view: UvRect): UvRect {
     const current = this.#region && relief.level === this.#level && within(view, this.#region) && same(this.#sources, relief.sources(this.#region));
     if (current && this.#region) return this.#region;

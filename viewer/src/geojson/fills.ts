@@ -21,7 +21,7 @@ export interface PolygonCover {
 /** Returns null for a polygon that is seen edge-on. */
 export const coverOf = (polygon: Polygon, relief: Relief): PolygonCover | null => (polygon.draped ? drapedCover(polygon, relief) : planeCover(polygon, relief));
 
-/** Offset of the surface along the line of sight, so that fill a building's outline fills its walls, too. */
+/** Offset of the surface along the line of sight, so that filling a building's outline fills its walls, too. */
 const BEHIND_M = 0.05;
 
 /** Covers the surface whose horizontal position is inside the polygon, walls included. */

@@ -255,7 +255,7 @@ async function fetchJson(url: string, signal: AbortSignal): Promise<unknown> {
   try {
     return JSON.parse(text) as unknown;
   } catch (reason) {
-    throw new UsageError(`${url}: invalid JSON:  ${String(reason)}`);
+    throw new UsageError(`${url}: invalid JSON: ${String(reason)}`);
   }
 }
 

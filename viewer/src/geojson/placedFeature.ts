@@ -148,7 +148,7 @@ export class FeatureDot extends CachedGeometry {
     return !Number.isNaN(this.#height);
   }
 
-  /** Keeps a height that was visible once, when the point is hidden. */
+  /** Keeps the last visible height while the point is hidden. */
   protected compute(relief: Relief, _: UvRect, occlusion: Occlusion): void {
     const [x, y, z] = this.position;
     const height = this.draped ? drapedHeight(relief, x, y) : z;

@@ -23,7 +23,7 @@ export class FrameLoop {
 
   stop(): void {
     this.#cancel();
-    this.#handle = -1; // ignores requests from now on
+    this.#handle = -1; // ignores later requests
   }
 
   #run(now_ms: number): void {

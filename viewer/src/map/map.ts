@@ -49,7 +49,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   #drawnCamera: Camera | undefined;
   #relief: Relief | undefined;
   #lightEstimator: LightEstimator | null = null;
-  /** Whether anything besides the camera has changed since the last frame. */
+  /** Whether anything apart from the camera has changed since the last frame. */
   #dirty = true;
   /** Whether the view has not moved since the last "moveend". */
   #atRest = true;
@@ -247,7 +247,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     return this.#relief ?? null;
   }
 
-  /** @internal Fetches the depths of a rectangle (U and V) from the deepest level where it has at maxTiles `maxTiles` tiles. @param ids reads object ids as well */
+  /** @internal Fetches the depths of a rectangle (U and V) from the deepest level where it has at most `maxTiles` tiles. @param ids reads object ids as well */
   fetchRelief(viewState: ViewState, rect: Rect, maxTiles: number, ids = false): ReturnType<typeof Relief.fetch> {
     return Relief.fetch(this.#layers, viewState, rect, maxTiles, ids);
   }

@@ -90,7 +90,7 @@ export interface MapEvents {
   idle: object;
   /** The view has changed; fires with each frame that shows it. */
   move: object;
-  /** The view has come to rest. */
+  /** The view has stopped moving. */
   moveend: object;
   /** The zoom has changed; fires with "move". */
   zoom: { zoom: number };

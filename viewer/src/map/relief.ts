@@ -16,7 +16,7 @@ const MIN_BIAS_M = 0.05;
 
 /**
  * Depths of the visible surface, read from the tiles in memory for many points of one picture. U, V and D are metres in the camera's frame, from
- * the camera's origin. Of several layers, the nearest surface counts; hidden objects and invisible layers do not.
+ * the camera's origin. With several layers, the nearest surface counts; hidden objects and invisible layers do not.
  */
 export class Relief {
   readonly camera: Camera;

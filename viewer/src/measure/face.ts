@@ -26,7 +26,7 @@ export interface FaceOptions {
   signal?: AbortSignal;
 }
 
-/** Most tiles of 256 × 256 pixels that a face may need. */
+/** Maximum number of tiles of 256 × 256 pixels that a face may need. */
 const MAX_TILES = 36;
 /** A face counts as partly hidden when more than this fraction of its border is. */
 const HIDDEN_FRACTION = 0.05;

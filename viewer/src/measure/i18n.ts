@@ -6,7 +6,7 @@ const TRANSLATIONS = {
   fr: { profile: "Profil altimétrique", partHidden: "en partie masqué", allHidden: "entièrement masqué", hidden: "masqué" },
 };
 
-/** Messages of the measuring tools, and lengths and areas formatted for the reader's language. */
+/** Messages of the measuring tools, and lengths and areas formatted for the user's language. */
 export class MeasureMessages {
   readonly #numbers: (digits: number) => Intl.NumberFormat;
 

@@ -20,7 +20,7 @@ export interface ProfileOptions {
   signal?: AbortSignal;
 }
 
-/** Most depth tiles per part of a line, and the number of parts. */
+/** Maximum number of depth tiles per part of a line, and of parts. */
 const MAX_TILES = 24;
 const PARTS = 8;
 /** Largest change of D between rows on one surface, in pixels. */

@@ -22,7 +22,7 @@ export interface AreaOptions {
 export type FilledArea = Required<AreaOptions>;
 
 /** [[least U, least V], [greatest U, greatest V]], metres. */
-type Rect = readonly [Vec2, Vec2];
+type UvRect = readonly [Vec2, Vec2];
 
 /** Levels up to this one are saved completely, for overviews. */
 const LAST_COMPLETE_LEVEL = 1;
@@ -90,7 +90,7 @@ export function* tilesOf(rendering: Rendering, { bounds, levels, layers, directi
 }
 
 /** Yields the occupied tiles that overlap a rectangle, and all of the first levels; each tile before its children. */
-export function* tilesIn({ frame, occupancy }: Pick<View, "frame" | "occupancy">, [low, high]: Rect, [least, greatest]: readonly [number, number], tile: Tile = { z: 0, x: 0, y: 0 }): Generator<Tile> {
+export function* tilesIn({ frame, occupancy }: Pick<View, "frame" | "occupancy">, [low, high]: UvRect, [least, greatest]: readonly [number, number], tile: Tile = { z: 0, x: 0, y: 0 }): Generator<Tile> {
   if (tile.z > greatest || !occupancy.has(tile)) return;
   const tile_m = frame.size / 2 ** tile.z;
   const overlaps = (at: number, from: number, to: number): boolean => at >= Math.floor(from / tile_m) && at < Math.ceil(to / tile_m);

@@ -15,6 +15,6 @@ export async function registerWorker(url = "map3d-worker.js"): Promise<ServiceWo
     if (!location.href.startsWith(scope)) throw new StorageError(`its scope is ${scope}, which does not contain this page; put it into the page's folder or above`);
     return await navigator.serviceWorker.ready;
   } catch (reason) {
-    throw new StorageError(`cannot register ${url}:  ${asError(reason).message}`);
+    throw new StorageError(`cannot register ${url}: ${asError(reason).message}`);
   }
 }

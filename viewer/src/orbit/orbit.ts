@@ -42,7 +42,7 @@ interface RotateGesture {
 const FADE_MS = 300;
 /** Extra size of the images, for tall buildings. */
 const MARGIN_FACTOR = 1.1;
-/** Most pixels of an image, and of the result. */
+/** Maximum number of pixels of an image, and of the result. */
 const MAX_PX = 1.4e6;
 /** Longest wait at the end of a transition for tiles that are still loading. */
 const MAX_WAIT_MS = 2500;

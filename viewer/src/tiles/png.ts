@@ -33,7 +33,7 @@ export async function decodePng(bytes: Uint8Array<ArrayBuffer>): Promise<Decoded
   const { header, parts } = readChunks(bytes);
   const { width, height, channels } = header;
   const stride = width * channels;
-  // Unfilters in place, since each row ends before the next begins: garbage stays in a worker's memory for long.
+  // Unfilters in place, since each row ends before the next begins: a worker collects garbage late.
   const raw = await inflate(parts, height * (stride + 1));
   for (let row = 0; row < height; row++) unfilter(raw, row, stride, channels);
   return { width, height, channels, data: raw.subarray(0, height * stride) };

@@ -15,14 +15,14 @@ const VIEWPORT = { viewport: { width: 500, height: 420 } };
 type Comparing = Global & { map3d: typeof Compare; later: Global["layer"]; swipe: Compare.swipe; epochs: Compare.epochs };
 
 const WIDE = 500;
-/** Columns from, to (without) of two pictures that differ. */
+/** Counts the pixels of the columns [from, to) that differ between two pictures. */
 function differences(a: Buffer, b: Buffer, from: number, to: number): number {
   let count = 0;
   for (let y = 0; y < 420; y++) for (let x = from; x < to; x++) if (a.readUInt32LE(4 * (WIDE * y + x)) !== b.readUInt32LE(4 * (WIDE * y + x))) count++;
   return count;
 }
 
-/** What each of the two shows alone. */
+/** Takes a picture of each rendering alone. */
 async function alone(rendering: string, drawer: string): Promise<Buffer> {
   const { page } = await bed.start(rendering, { drawer, zoom: 3, center: ORIGIN }, {}, VIEWPORT);
   const shot = await picture(page);

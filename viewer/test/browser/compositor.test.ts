@@ -12,7 +12,7 @@ const QUIET = { drawer: "canvas", zoom: 3, controls: false, attribution: false }
 
 type Counting = Global & { counts: { puts: number; draws: number } };
 
-/** Counts draw calls on the page's canvases from now on. */
+/** Starts to count draw calls on the page's canvases. */
 function count(): void {
   const g = globalThis as Counting;
   g.counts = { puts: 0, draws: 0 };
@@ -57,7 +57,7 @@ test("several layers, translucent and clipped, look the same as on a canvas", as
   const shots: Buffer[] = [];
   for (const preserveDrawingBuffer of [true, false]) {
     const { page, problems } = await bed.start("town", { ...QUIET, preserveDrawingBuffer }, {}, { viewport: { width: 500, height: 400 }, deviceScaleFactor: 2, bypassCSP: true });
-    // Styles of a page for any canvas or block.
+    // Page styles that apply to every canvas and block.
     if (!preserveDrawingBuffer) await page.addStyleTag({ content: "canvas:not(#mapcanvas) { width: 100%; height: 100%; max-width: 90%; margin: 7px; border: 2px solid red; padding: 3px; opacity: 0.5; transition: transform 1s } .map3d-mosaics, .map3d-mosaics div { margin: 9px; padding: 4px; border: 1px solid; transform: scale(0.9) }" });
     await settled(page, (url) => new (globalThis as Global).map3d.imageLayer(url, { mode: "id", opacity: 0.6, combine: false }).addTo((globalThis as Global).map).setClip([0, 0, 0.613, 0.8]), bed.url("later"));
     await settled(page, () => (globalThis as Global).map.setZoom(3.37), null);

@@ -22,7 +22,7 @@ bed.server.pages.set("/wrong", `${HEAD}</head><body><map-3d src="tiles/nowhere">
 
 type Where = Element.mapElement;
 const where = (): Where => document.getElementById("where") as Where;
-/** Tests run these in the page, where functions of this file are not known. */
+/** Functions that run in the page, which cannot access functions of this file. */
 const inPage = `globalThis.where = ${where.toString()}; globalThis.rest = () => new Promise((done) => where().addEventListener("map-idle", done, { once: true }));`;
 declare const rest: () => Promise<void>;
 

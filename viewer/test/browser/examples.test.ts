@@ -14,7 +14,7 @@ const FILES = readdirSync(FOLDER).filter((file) => file.endsWith(".html"));
 const ORDER = ["shortest", "markers", "attributes", "theme", "measure", "sun", "search", "company", "styles", "link", "model", "files"];
 const COLOURS = 24;
 
-/** How many colours a part of the page has: a map that shows something has many. */
+/** Counts the colours in a part of the page: a map that shows something has many. */
 async function colours(page: Page, selector: string): Promise<number> {
   const shot = (await page.locator(selector).first().screenshot()).toString("base64");
   return page.evaluate(async (bytes) => {
@@ -25,7 +25,7 @@ async function colours(page: Page, selector: string): Promise<number> {
   }, shot);
 }
 
-/** Waits until the picture no longer changes; the way of a page whose map is its own. */
+/** Waits until the picture no longer changes, in a page whose map is not a global. */
 async function still(page: Page): Promise<Buffer> {
   await page.waitForLoadState("networkidle");
   for (let before = await page.screenshot(); ;) {
@@ -38,7 +38,7 @@ async function still(page: Page): Promise<Buffer> {
 
 const text = (page: Page, selector: string): Promise<string> => page.locator(selector).first().innerText();
 
-/** What each example is for. */
+/** The expected behaviour of each example. */
 const POINTS: Readonly<Record<string, (page: Page, picture: Buffer) => Promise<void>>> = {
   shortest: async (page) => {
     expect(await page.evaluate("[map.layers.length, map.drawer, layer.rendering.json.name]")).toEqual([1, "webgl", "town"]);

@@ -16,7 +16,7 @@ afterAll(() => { for (const folder of Object.values(FOLDERS)) rmSync(dirname(fol
 
 type Dropping = Global & { map3d: typeof Files; tool: Files.dropFiles; dropped: string[] };
 
-/** An empty map that takes files. */
+/** An empty map that accepts files. */
 async function start(options: { language?: string } = {}, context: object = {}): Promise<{ page: Page; problems: string[] }> {
   const opened = await bed.bare(context);
   opened.page.setDefaultTimeout(20_000);
@@ -40,7 +40,7 @@ const rested = (page: Page, count = 1): Promise<unknown> => page.evaluate((n) =>
   else g.tool.on("dropped", () => { if (g.dropped.length >= n) idle(); });
 }), count);
 
-/** A real drag of files from this machine. */
+/** Drags real files from this machine. */
 async function drag(page: Page, paths: readonly string[], until: "over" | "dropped"): Promise<void> {
   const session = await page.context().newCDPSession(page);
   const data = { items: [], files: [...paths], dragOperationsMask: 1 };
@@ -53,7 +53,7 @@ async function drag(page: Page, paths: readonly string[], until: "over" | "dropp
 const said = (page: Page): Promise<string> => page.locator(".map3d-status").innerText();
 const STATE = "[map.zoom, map.direction, map.layers.length, dropped, errors]";
 
-/** What the same view looks like over HTTP. */
+/** Takes a picture of the same view over HTTP. */
 async function overHttp(): Promise<Buffer> {
   const { page } = await bed.start("town", { language: "en" });
   await page.evaluate(() => new Promise<void>((done) => {

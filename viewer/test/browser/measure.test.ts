@@ -26,7 +26,7 @@ async function measuring(kind: "line" | "area" | "profile"): Promise<{ page: Pag
   return opened;
 }
 
-/** Clicks where local places of the surface are seen. */
+/** Clicks where local positions on the surface are visible. */
 async function clickAll(page: Page, places: readonly Vec3[], before = 0): Promise<void> {
   for (const [k, [x, y, z]] of places.entries()) {
     const at = await page.evaluate((world) => (globalThis as Global).map.project(world) as [number, number], [ORIGIN[0] + x, ORIGIN[1] + y, ORIGIN[2] + z] as const);

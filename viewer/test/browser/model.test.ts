@@ -52,7 +52,7 @@ const addBox = (page: Page, options: object = {}): Promise<void> => settled(page
 
 const frame = makeFrame(town.json.views[0] as (typeof town.json.views)[0], town.json.size_m, town.json.tile_px, town.json.zmax);
 
-/** What the ray through a pixel's middle meets of the town and of the box. */
+/** Finds what the ray through a pixel's centre hits in the town and on the box. */
 async function raysOf(page: Page, dpr = 1): Promise<(x: number, y: number) => { town: Hit | null; box: Hit | null }> {
   const [[x0, y0], px] = await page.evaluate((origin) => [(globalThis as Global).map.project(origin) as [number, number], (globalThis as Global).map.metresPerPixel] as const, ORIGIN);
   return (x, y) => {
@@ -69,7 +69,7 @@ const lambert = (color: Vec3, normal: Vec3, light: Light): number[] =>
 const inTown = (x: number, y: number, z: number): Vec3 => [ORIGIN[0] + x, ORIGIN[1] + y, ORIGIN[2] + z];
 const rgbAt = (shot: Buffer, x: number, y: number, wide = WIDE): number[] => [...shot.subarray(4 * (wide * y + x), 4 * (wide * y + x) + 3)];
 
-/** Pixels around which, as far as `reach`, the same faces are seen: those that show the box wrongly, and how many there are of each kind. */
+/** Checks the pixels within `reach` of which only the same faces are visible: lists those that show the box wrongly, and counts them by kind. */
 async function judged(page: Page, light: Light, { dpr = 1, reach = 1 } = {}): Promise<{ wrong: string[]; before: number; behind: number }> {
   const [shot, raysAt] = [await picture(page), await raysOf(page, dpr)];
   const [wrong, count]: [string[], { before: number; behind: number }] = [[], { before: 0, behind: 0 }];
@@ -83,7 +83,7 @@ async function judged(page: Page, light: Light, { dpr = 1, reach = 1 } = {}): Pr
       const want = lambert(WALL, here.box.normal, light);
       const got = rgbAt(shot, x, y, WIDE * dpr);
       const same = want.every((byte, k) => Math.abs(byte - (got[k] ?? 0)) <= 2);
-      // The town hall's walls have the box's colour and face as its walls do: what is hidden there is told by windows and roof alone.
+      // The town hall's walls have the box's colour and face as its walls do: only windows and roof show what is hidden there.
       const alike = here.town && !seen && String(here.town.normal) === String(here.box.normal);
       if (!alike) count[seen ? "before" : "behind"]++;
       if (!alike && same !== seen) wrong.push(`${String(x)}, ${String(y)}: ${got.join(" ")} for ${want.map(Math.round).join(" ")}, ${seen ? "seen" : "hidden"}`);
@@ -121,7 +121,7 @@ test.each([[1, 2], [1, 3.6], [2, 2.6], [2, 4.3]])("the same at %d device pixels 
   const { page, problems } = await start({ zoom }, { deviceScaleFactor: dpr });
   await addBox(page);
   await page.screenshot({ path: `${OUT}/model-box-${String(dpr)}-${String(zoom)}.png` });
-  // The images' own edges are known to a texel of theirs.
+  // Edges in the images are accurate to one texel.
   const found = await judged(page, DEFAULT_LIGHT, { dpr, reach: 2 * Math.ceil(dpr * 2 ** Math.max(0, zoom - 3)) });
   expect(found.wrong.slice(0, 5)).toEqual([]);
   expect([found.before > 300, found.behind > 100]).toEqual([true, true]);
@@ -172,7 +172,7 @@ const seenAt = async (page: Page, world: Vec3): Promise<number[]> => {
 
 test("a white wall of a model has the brightness of the same wall in the images", async () => {
   const { page, problems } = await start();
-  // The school's south wall, and a model of it beside it, both of one colour.
+  // The school's south wall and a model of it next to it, in the same colour.
   await addBox(page, { position: inTown(31, -62, 0) });
   await settled(page, () => {
     const { model, THREE } = globalThis as Modelling;
@@ -187,7 +187,7 @@ test("a white wall of a model has the brightness of the same wall in the images"
   await page.context().close();
 });
 
-/** Clicks at a world position; what the model and the map say of it. */
+/** Clicks at a world position; returns the events of the model and of the map. */
 async function clicked(page: Page, world: Vec3): Promise<{ model: { object: string; position: Vec3 } | null; id: number }> {
   const [x, y] = await page.evaluate((at) => {
     const g = globalThis as Modelling & { hit: unknown };
@@ -247,10 +247,10 @@ test("removing a model frees all its GPU resources", async () => {
   });
   await settled(page, () => (globalThis as Modelling).model.addTo((globalThis as Global).map), null);
   const alive = (): Promise<Record<string, number>> => page.evaluate(() => (globalThis as unknown as { alive: Record<string, number> }).alive);
-  // Two of three.js, and those of a map that needs depth.
+  // Two of three.js, and those that a map with depth needs.
   expect((await alive())["Renderbuffer"]).toBe(4);
   await settled(page, () => (globalThis as Modelling).model.remove(), null);
-  // three.js leaves four textures of a pixel, and framebuffers without anything.
+  // three.js keeps four textures of one pixel, and empty framebuffers.
   expect(Object.entries(await alive()).filter(([, count]) => count > 0)).toEqual([["Texture", 4], ["Framebuffer", 3]]);
   expect(problems).toEqual([]);
   await page.context().close();
@@ -263,7 +263,7 @@ const moving = (page: Page): Promise<void> => page.evaluate(() => new Promise<vo
   frameEvents.on("draw", () => { if (--left === 0) done(); });
 }));
 
-/** Frames that the map draws in some milliseconds. */
+/** Counts the frames that the map draws in a number of milliseconds. */
 const framesIn = (page: Page, ms: number): Promise<number> => page.evaluate((duration_ms) => new Promise<number>((done) => {
   const { map } = globalThis as Global;
   let count = 0;

@@ -177,7 +177,7 @@ test.each(rows)("the page saves itself and the view for offline use: %s", async 
     for (let last = await shoot(), same = 0, left = 30; ; left--) {
       await page.waitForTimeout(700);
       const next = await shoot();
-      same = next.equals(last) ? same + 1 : 0; // where much else goes on, light that is found from depth may take longer than a pause
+      same = next.equals(last) ? same + 1 : 0; // on a busy machine, light computed from depth may take longer than a pause
       if (same === 3 || left === 0) return next;
       last = next;
     }

@@ -29,7 +29,7 @@ const twist = (page: Page, deg: number): Promise<void> => page.evaluate((angle) 
   (globalThis as Global).map.rotateBy((angle * Math.PI) / 180);
 }, deg);
 
-/** Waits until two frames in a row show the same. */
+/** Waits until two frames in a row are equal. */
 async function steady(page: Page): Promise<Buffer> {
   let [before, now]: [Buffer, Buffer] = [Buffer.alloc(0), await picture(page)];
   while (!before.equals(now)) {
@@ -39,7 +39,7 @@ async function steady(page: Page): Promise<Buffer> {
   return now;
 }
 
-/** Share of the pixels whose colour is that of a ray along the direction of the moment; and of those that show something. */
+/** Fraction of the pixels whose colour is that of a ray along the current direction, and fraction that show something. */
 async function agreement(page: Page, shot: Buffer, lookAt: number): Promise<{ right: number; shown: number }> {
   const [corner, px] = await page.evaluate((origin) => [(globalThis as Global).map.project(origin) as [number, number], (globalThis as Global).map.metresPerPixel] as const, ORIGIN);
   const { json } = town;

@@ -51,7 +51,7 @@ for (const [name, options] of [["desk", DESK], ["phone", PHONE], ["dark", { ...D
 test("the light slider and the display mode change the picture", async () => {
   const { page } = await open(DESK);
   const shots: string[] = [];
-  /** Waits for a picture that has not been there before. */
+  /** Waits for a picture that has not been shown before. */
   const changed = async (name: string): Promise<void> => {
     let shot = "";
     await expect.poll(async () => {
@@ -141,7 +141,7 @@ test("changing the URL fragment changes the view", async () => {
   await page.waitForTimeout(1500);
   const [, direction, x, y, z, zoom] = /^#(.+?)\/(.+?)\/(.+?)\/(.+?)\/(.+?)\//.exec(`${await page.evaluate(() => location.hash)}/`) ?? [];
   expect([direction, zoom]).toEqual(["90-45", "4.00"]);
-  // The surface that is seen in the middle, wherever it lies along the ray: looking west at 45 degrees, x − z stays.
+  // The visible surface at the centre can be anywhere along the ray: looking west at 45 degrees, x − z is constant.
   expect(Number(x) - Number(z)).toBeCloseTo(691_032 - 562, -0.5);
   expect(Number(y)).toBeCloseTo(5_336_026, -0.5);
   expect(problems).toEqual([]);

@@ -42,7 +42,7 @@ test.each(["webgl", "canvas"])("%s: a picture of the screen's size equals the sc
   let most = 0;
   for (let k = 0; k < screen.length; k++) if ((screen[k | 3] ?? 0) === 255) most = Math.max(most, Math.abs((screen[k] ?? 0) - (same.bytes[k] ?? 0)));
   expect(most).toBeLessThanOrEqual(1);
-  // Wider, so that it is made of two pieces: the screen's part of it is the same across their seam.
+  // Wider, so that it consists of two pieces: the part on the screen is the same across their seam.
   const wide = await exported(page, { ...BARE, width_px: 1600, height_px: 500 });
   expect([wide.width, wide.height]).toEqual([1600, 500]);
   let [off, crossed] = [0, 0];
@@ -122,11 +122,11 @@ test.each([["desk", DESK], ["phone", PHONE]] as const)("%s: the page saves and p
   await page.screenshot({ path: `${OUT}/${name}-print.png` });
   const sheet = (await page.locator("#sheet").innerText()).replace(/\s+/g, " ");
   for (const part of ["A small town", "measuredHeight", "62", "Made by hand", "Coordinate system: ETRS89 / UTM zone 32N", String(new Date().getFullYear())]) expect(sheet).toContain(part);
-  // As when paper has been printed, after which the sheet goes.
+  // As after printing, when the sheet is removed.
   await page.pdf({ path: `${OUT}/${name}-print.pdf`, preferCSSPageSize: true, printBackground: false });
   await page.emulateMedia({ media: null });
   expect(await page.locator("#sheet > *").count()).toBe(0);
-  // Stopped half-way: the dialog is closed, nothing is saved, and it can be had again.
+  // Stopped half-way: the dialog is closed, nothing is saved, and the export can be started again.
   await page.locator("#make-picture").click();
   await page.selectOption("#picture-size", { index: 3 });
   await page.locator("#picture-save").click();

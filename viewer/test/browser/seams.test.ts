@@ -60,7 +60,7 @@ async function errorsAt(page: Page, way: Way, dpr: number, zoom: number, middle:
 
 const start = (way: Way, dpr: number): ReturnType<TestBed["start"]> => bed.start("speckled", { ...WAYS[way], light: { lit: false }, controls: false, attribution: false }, {}, { viewport: VIEWPORT, deviceScaleFactor: dpr });
 
-/** Tolerance of a premultiplied byte: rounding and the shader's snapping to pixels; the canvas interpolates bytes, with weights of a few bits. */
+/** Tolerance of a premultiplied byte: rounding and the shader's snapping to pixels; the canvas interpolates bytes, with low-precision weights. */
 const TOLERANCE = { webgl: 1.5, canvas: 4, css: 4 } as const satisfies Record<Way, number>;
 
 test.each((["webgl", "canvas", "css"] as const).flatMap((way) => [1, 1.5, 3].map((dpr) => [way, dpr] as const)))("%s at pixel ratio %d: at twenty zooms the map equals the stitched level, including tile edges", async (way, dpr) => {

@@ -14,7 +14,7 @@ import { TestBed } from "./bed";
 import { OUT } from "./browser";
 import { decoded, Hand, MAX_ACTIONS } from "./hand";
 
-// What people do with a city model on a phone: each in three actions after opening at most.
+// Common tasks with a city model on a phone: each takes at most three actions after opening.
 const [WIDTH, HEIGHT, DENSITY, PIXEL_M] = [390, 844, 3, 0.38];
 const PHONE = { viewport: { width: WIDTH, height: HEIGHT }, deviceScaleFactor: DENSITY, isMobile: true, hasTouch: true, userAgent: devices["iPhone 14"].userAgent, timezoneId: "Europe/Berlin", locale: "en-GB" };
 const YEARS = new Map([[17, 1891], [1025, 1956], [2_000_000_001, 2012], [3_900_000_007, 1723]]);
@@ -24,7 +24,7 @@ const later = renderTown(256, PIXEL_M, { ...TOWN, name: "later", things: [...THI
 const bed = new TestBed({ town: withYears(renderTown(256, PIXEL_M)), later: { ...later, json: { ...later.json, title: "Ten years later" } } });
 const views = framesOf(BOX, 256, PIXEL_M, [0, 90, 180, 270].map((a) => [a, 45] as const)).frames;
 
-/** The same rendering, whose objects have a year. */
+/** The same rendering, with a year for each object. */
 function withYears(fixture: Fixture): Fixture {
   const text = (value: unknown): Uint8Array => new TextEncoder().encode(JSON.stringify(value));
   const list = JSON.parse(new TextDecoder().decode(fixture.files.get("objects/attributes.json"))) as { attributes: unknown[] };
@@ -58,7 +58,7 @@ async function end({ page, problems }: Opened, name: string): Promise<void> {
   await page.context().close();
 }
 
-/** What the address says is seen. */
+/** The view in the address. */
 function cameraOf(page: Page): Camera {
   const [direction, x, y, z, zoom] = new URL(page.url()).hash.slice(1).split("/");
   const frame = views.find(({ id }) => id === direction);
@@ -163,7 +163,7 @@ test("compare two epochs", async () => {
   await page.waitForFunction(() => location.hash.includes("/epoch=1"));
   expect(await slider.getAttribute("aria-valuetext")).toBe("Ten years later");
   await page.waitForTimeout(1500);
-  // The tower has gone, and a school is there that can be chosen.
+  // The tower is gone, and a new school can be selected.
   await hand.tap(placeOf(page, [-10, -20, 24]));
   await page.waitForSelector("#info:not([hidden])");
   expect(await page.locator("#info h2").textContent()).toBe("New school");
@@ -213,7 +213,7 @@ test("colour by year", async () => {
   }));
   expect(classes.map(({ label }) => label)).toEqual([...YEARS.values()].sort((a, b) => a - b).map(String));
   const shot = await decoded(await page.screenshot({ path: `${OUT}/task-colors.png` }));
-  // Each roof has its year's colour, up to the light.
+  // Each roof has the colour of its year, apart from lighting.
   for (const { id, box: [lo, hi] } of THINGS.slice(1)) {
     const seen = pixel(shot, placeOf(page, [(lo[0] + hi[0]) / 2, (lo[1] + hi[1]) / 2, hi[2]]));
     const like = (rgb: readonly number[]): number => Math.hypot(...unit(rgb).map((part, k) => part - (unit(seen)[k] ?? 0)));
@@ -242,7 +242,7 @@ test("see the shadow at 17:00", async () => {
     const ground: Vec3 = [-95 + ((k * 37.7) % 190), -75 + ((k * 61.3) % 150), 0];
     const [u, v, d] = uvdFromLocal(cameraOf(page).frame.axes, ground);
     const hit = trace(cameraOf(page).frame, u, v);
-    // Ground that is seen, not beside an edge, and without the paths.
+    // Visible ground, away from edges and paths.
     if (hit?.id !== 3 || Math.abs(cameraOf(page).frame.d0 + hit.d - d) > 0.01 || Math.abs(ground[0] + 8) < 6 || Math.abs(ground[1] - 26) < 5) continue;
     const around = [[0, 0], [2, 0], [-2, 0], [0, 2], [0, -2]].map(([dx = 0, dy = 0]) => shaded([ground[0] + dx, ground[1] + dy, 0], light));
     const [px, py] = placeOf(page, ground);
@@ -251,7 +251,7 @@ test("see the shadow at 17:00", async () => {
   }
   expect(places.dark.length).toBeGreaterThan(20);
   expect(places.lit.length).toBeGreaterThan(200);
-  // Of the places that rays to the sun say are shaded, the share that is darker than ground in the sun.
+  // Of the positions in shadow according to rays, the fraction that is darker than sunlit ground.
   await expect.poll(async () => {
     const shot = await decoded(await page.screenshot());
     const values = (of: readonly Vec2[]): number[] => of.map((place) => pixel(shot, place).reduce((sum, part) => sum + part, 0));
@@ -290,7 +290,7 @@ test("a fourth action fails", async () => {
   await end(opened, "fourth");
 });
 
-/** Does a box stand between a place and the light? */
+/** Is a box between a position and the light? */
 function shaded(from: Vec3, light: Vec3): boolean {
   return THINGS.slice(1).some(({ box: [lo, hi] }) => {
     let [near, far] = [0.01, Infinity];

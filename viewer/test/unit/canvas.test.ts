@@ -18,7 +18,7 @@ const UP = [128, 128, 255];
 const SOUTH = [128, 0, 128];
 const NOTHING = [0, 0, 0];
 
-/** Share of the sun's light on a stored normal. */
+/** Fraction of sunlight on a stored normal. */
 const strength = (stored: number[]): number => {
   const n = stored.map((byte) => (byte / 255) * 2 - 1);
   const cosine = n.reduce((sum, part, k) => sum + part * (LIGHT.sun[k as 0]), 0) / Math.hypot(...n);

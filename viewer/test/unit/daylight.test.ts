@@ -28,7 +28,7 @@ describe("positions on earth", () => {
   });
 });
 
-/** By PyEphem 4.2, standard atmosphere: [latitude, longitude, time, azimuth, elevation]. */
+/** Computed by PyEphem 4.2, standard atmosphere: [latitude, longitude, time, azimuth, elevation]. */
 const SUNS: [number, number, string, number, number][] = [
   [48.7665, 11.4258, "2026-06-21T13:00:00Z", 228.285057, 57.446563],
   [48.7665, 11.4258, "2026-12-21T15:10:00Z", 232.15772, 0.908969],

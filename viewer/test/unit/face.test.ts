@@ -19,7 +19,7 @@ interface Spot {
   at(s: number, t: number): Vec3;
 }
 
-/** The sides of a box that can be seen in some direction. */
+/** The sides of a box that are visible from some direction. */
 function facesOf([lo, hi]: Box3): Spot[] {
   const [w, l, h] = [hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]];
   const wall = (x0: number, y0: number, x1: number, y1: number, area_m2: number): Spot => ({ area_m2, slope_deg: 90, at: (s, t) => [x0 + (x1 - x0) * s, y0 + (y1 - y0) * s, lo[2] + h * t] });
@@ -33,7 +33,7 @@ function frameAt(lookAt: number, pitch: number, tilePx = 256, px = PX): Frame {
   return framesOf(BOX, tilePx, px, [[lookAt, pitch]]).frames[0] as Frame;
 }
 
-/** What rays meet. */
+/** Finds what rays hit. */
 type Surface = (u: number, v: number) => { readonly id: number; readonly d: number } | null;
 
 const town = (frame: Frame): Surface => (u, v) => {
@@ -41,7 +41,7 @@ const town = (frame: Frame): Surface => (u, v) => {
   return hit && { id: hit.id, d: frame.d0 + Math.round(hit.d * 1024) / 1024 };
 };
 
-/** A map that shows a surface, pixel by pixel; `asked`: how many tiles it was asked for. */
+/** A map that shows a surface, pixel by pixel; `asked`: the number of tiles requested from it. */
 function mapOf(frame: Frame, surface: Surface = town(frame), asked: number[] = []): map {
   return {
     getViewState: () => ({ camera: { frame }, origin: ORIGIN }),
@@ -58,7 +58,7 @@ function mapOf(frame: Frame, surface: Surface = town(frame), asked: number[] = [
   } as unknown as map;
 }
 
-/** Of places all over a face, those that rays reach. */
+/** Returns the positions on a face that rays reach. */
 function seenOf(frame: Frame, spot: Spot): Vec3[] {
   const shares = Array.from({ length: 30 }, (_, k) => (k + 0.5) / 30);
   return shares.flatMap((s) => shares.map((t) => spot.at(s, t))).filter((local) => {

@@ -9,7 +9,7 @@ import { renderTown, type Fixture } from "../fixture/rendering";
 const town = renderTown(32, 1.52);
 const archived = published(town);
 
-/** As a browser gives them for a chosen folder. */
+/** Files as a browser provides them for a chosen folder. */
 function chosen({ json, files }: Fixture, base = "town/"): File[] {
   const all = new Map<string, Uint8Array | string>([["rendering.json", JSON.stringify(json)], ...files]);
   return [...all].map(([path, bytes]) => Object.defineProperty(new File([bytes as BlobPart], path.split("/").at(-1) ?? ""), "webkitRelativePath", { value: base + path }));

@@ -13,7 +13,7 @@ import { Relief } from "../../src/map/relief";
 import { renderTown } from "../fixture/rendering";
 import { ORIGIN, trace } from "../fixture/town";
 
-// Of the viewer, what is read here throws errors only.
+// The tested files need only the errors of the viewer.
 vi.mock("../../src/map3d", () => import("../../src/core/errors"));
 
 const PIXELS = 32;

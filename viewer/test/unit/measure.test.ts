@@ -53,7 +53,7 @@ describe("formats", () => {
   test.each([[3.456, "3.46 m²"], [123.45, "123.5 m²"], [1234, "1,234 m²"], [123_456, "12.35 ha"]])("%d m² is %s", (area, text) => {
     expect(words.area(area)).toBe(text);
   });
-  test("rise and fall in the reader's number format", () => {
+  test("rise and fall in the user's number format", () => {
     expect(words.rise(-2.5)).toBe("↓ 2.50 m");
     expect(new MeasureMessages("de").rise(2.5)).toBe("↑ 2,50 m");
     expect(words.rise(0.004)).toBe("± 0.00 m");

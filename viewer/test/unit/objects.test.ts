@@ -4,7 +4,7 @@ import { Objects } from "../../src/tiles/objects";
 
 const json = { objects: { count: 2, shard_size: 1024, shards: "objects/{shard}.json", search: "objects/search.json", attributes: "objects/attributes.json" } } as ManifestJson;
 
-/** Answers in turn; says what it was asked. */
+/** Returns the responses in order; records the requests. */
 function sourceOf(...answers: unknown[]): { json: (path: string) => Promise<unknown>; asked: string[] } {
   const asked: string[] = [];
   return {

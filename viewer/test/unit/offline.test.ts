@@ -16,7 +16,7 @@ const town = readManifest(renderTown(16, 0.76).json, "town");
 const every = (zmax: number): Tile[] => Array.from({ length: zmax + 1 }, (_, z) => Array.from({ length: 4 ** z }, (__, k) => ({ z, x: k % 2 ** z, y: Math.floor(k / 2 ** z) }))).flat();
 const names = (tiles: Iterable<Tile>): string[] => [...tiles].map(tileName).sort();
 
-/** The same numbers each time. */
+/** Returns the same sequence of numbers each time. */
 function* random(seed: number): Generator<number, never> {
   for (let state = seed; ;) {
     state = (state * 1103515245 + 12345) % 2 ** 31;
@@ -67,7 +67,7 @@ describe("tiles of an area", () => {
     expect(new Set((await planned({})).map((name) => name.split("/").slice(0, 2).join("/"))).size).toBe(16);
     expect((await planned({})).length).toBeLessThan((await planned({ bounds: [[0, 0, 0], [1e7, 1e7, 1e4]] })).length);
     // A point 20 m above the ground at 45 degrees: beside 10 m by 5 m / sin 45°, ground 20 m to each side.
-    // Looking there from the south at the ground, if the surface is not known: 20 m further north, which is looked at from the side, too.
+    // Looking there from the south at the ground, if the surface is not known: 20 m further north, which is seen from the side, too.
     const around = 20 + 2.5 * Math.SQRT2;
     expect((await resolveOptions(shown, {})).bounds.flat().map((part, k) => part - (ORIGIN[k % 3] ?? 0)).map((part) => Number(part.toFixed(3)))).toEqual([-around, -around, -2, around, 25, 62].map((part) => Number(part.toFixed(3))));
     for (const view of views) {

@@ -31,7 +31,7 @@ describe("profile heights agree with rays of every pixel", () => {
         expect(Math.abs(found - top)).toBeLessThan(2 * PX);
       } else if (around.every((behind) => behind < -2.5)) {
         counts.hidden++;
-        // Hidden from above; the vertical may come into sight further down only where it goes through things, which no ray sees.
+        // Hidden from above; further down, the vertical can be visible only inside objects, which no ray sees.
         expect(found).toBeNaN();
       }
     }

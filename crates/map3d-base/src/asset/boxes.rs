@@ -12,9 +12,9 @@ const PIECE: usize = 1 << 20;
 /// Boxes of an asset's geometry; empty without geometry.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshBoxes {
-    /// Of each object, in world coordinates, without placed prototypes.
+    /// Boxes of the objects, in world coordinates, without placed prototypes.
     pub objects: Vec<Box3>,
-    /// Of each prototype, by its number, in its own frame.
+    /// Boxes of the prototypes by number, each in its own frame.
     pub prototypes: BTreeMap<u32, Box3>,
 }
 

@@ -24,7 +24,7 @@ pub struct AssetMesh {
 }
 
 impl AssetMesh {
-    /// Maps and validates a `mesh.m3a`, its checksum too.
+    /// Maps and validates a `mesh.m3a`, including its checksum.
     pub fn open(path: &Path) -> Result<Self> {
         let map = file::map(path)?;
         file::check_mapped(path, &map, MESH_MAGIC, MESH_VERSION)?;

@@ -18,13 +18,13 @@ use crate::file::{HEADER_BYTES, aligned, header_start};
 use crate::vec3::Box3;
 
 /// One growing section.
-struct Part {
+struct SectionFile {
     path: PathBuf,
     file: BufWriter<File>,
     bytes: u64,
 }
 
-impl Part {
+impl SectionFile {
     fn create(path: PathBuf) -> Result<Self> {
         let file = File::options().create(true).truncate(true).read(true).write(true).open(&path).map_err(|e| Error::storage(&path, e))?;
         Ok(Self { path, file: BufWriter::new(file), bytes: 0 })
@@ -40,7 +40,7 @@ impl Part {
 /// Writes `mesh.m3a`, `materials.json`, `objects.jsonl`, `textures/` and `report.json`. Nothing is complete before `finish`.
 pub struct AssetWriter {
     folder: PathBuf,
-    parts: Vec<Part>,
+    parts: Vec<SectionFile>,
     vertices: u64,
     triangles: u64,
     any_normals: bool,
@@ -54,7 +54,7 @@ impl AssetWriter {
     /// Creates the folder if it does not exist.
     pub fn create(folder: &Path) -> Result<Self> {
         fs::create_dir_all(folder.join("textures")).map_err(|e| Error::storage(folder, e))?;
-        let parts = SECTIONS.iter().map(|name| Part::create(folder.join(format!("{name}.part")))).collect::<Result<_>>()?;
+        let parts = SECTIONS.iter().map(|name| SectionFile::create(folder.join(format!("{name}.part")))).collect::<Result<_>>()?;
         Ok(Self {
             folder: folder.to_path_buf(),
             parts,
@@ -199,7 +199,7 @@ impl AssetWriter {
     }
 }
 
-fn copy_part(part: &mut Part, out: &mut impl Write, hash: &mut XxHash3_64) -> Result<()> {
+fn copy_part(part: &mut SectionFile, out: &mut impl Write, hash: &mut XxHash3_64) -> Result<()> {
     let io = |e| Error::storage(&part.path, e);
     part.file.flush().map_err(io)?;
     let file = part.file.get_mut();

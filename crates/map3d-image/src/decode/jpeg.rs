@@ -1,4 +1,4 @@
-//! Decodes JPEG with libjpeg-turbo-rs, which yields the same pixels as libjpeg-turbo, and with zune-jpeg what the former refuses.
+//! Decodes JPEG with libjpeg-turbo-rs, which yields the same pixels as libjpeg-turbo; falls back to zune-jpeg for files that it rejects.
 
 use std::io::Cursor;
 use std::panic::catch_unwind;
@@ -13,7 +13,7 @@ use zune_jpeg::zune_core::options::DecoderOptions;
 use super::damaged;
 use crate::raster::Raster;
 
-/// More scans than any honest progressive JPEG has.
+/// More scans than any legitimate progressive JPEG has.
 const MAX_SCANS: u32 = 200;
 
 pub fn is_jpeg(bytes: &[u8]) -> bool {

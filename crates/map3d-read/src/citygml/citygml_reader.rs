@@ -1,4 +1,4 @@
-//! The second pass: parses and converts one city object after another.
+//! Reads CityGML. `open` runs the first pass (`pre_scan`); this file is the second pass, which parses and converts one city object after another.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! The first pass: collects what must be known before the first city object is converted.
+//! The first of the two passes over a CityGML file: collects what must be known before the first city object is converted.
 //!
 //! Memory: appearances outside city objects in their compact form (about 16 bytes per vertex of a textured ring, limited by
 //! `max_appearance_bytes`), and 8 bytes per id that another city object refers to.

@@ -12,8 +12,8 @@ const NO_PLANE: u32 = u32::MAX;
 /// Points within this distance of a plane belong to it, in metres.
 const TOLERANCE_M: f64 = 1.0 / 64.0;
 
-/// Side of a bucket in quads: the planes of a bucket may share packets. Packets of larger buckets would overlap too many boxes; in smaller ones too few
-/// planes face alike.
+/// Side of a bucket in quads: the planes of a bucket may share packets. Packets of larger buckets would overlap too many boxes; in smaller ones, too few
+/// planes face the same way.
 const BUCKET_QUADS: usize = 16;
 const FACINGS: usize = 6;
 
@@ -78,7 +78,7 @@ impl QuadPlanes {
         number
     }
 
-    /// Returns all planes by bucket, neighbours that face alike together: their rays have similar paths, and a packet sends all of them or none.
+    /// Returns all planes by bucket, neighbours that face the same way together: their rays have similar paths, and a packet sends all of them or none.
     pub fn in_order(&self) -> Vec<BucketEntry> {
         let mut all = Vec::with_capacity(self.all.len());
         for index in 0..QUADS_PER_ROW * QUADS_PER_ROW {

@@ -110,7 +110,7 @@ fn trees() -> Town {
     town
 }
 
-/// IgnoreCutouts letters on nothing.
+/// The atlas with a transparent background.
 fn letters() -> Raster {
     let mut image = atlas();
     image.pixels.iter_mut().filter(|p| p[0] > 200).for_each(|p| p[3] = 0);

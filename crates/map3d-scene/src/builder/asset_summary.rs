@@ -1,4 +1,4 @@
-//! Summaries of assets (spec/scene.md, Survey), so that the next build reads only the assets that changed.
+//! Summaries of assets (spec/scene.md, Asset summary), so that the next build reads only the assets that changed.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -116,7 +116,7 @@ pub(super) fn record_hash(record: &MaterialRecord) -> u64 {
     XxHash3_64::oneshot(bytemuck::bytes_of(record))
 }
 
-/// Hashes all that a chunk holds of a triangle, but no numbers that are valid only within a build.
+/// Hashes everything that a chunk stores of a triangle, except numbers that are valid only within a build.
 fn triangle_hash(t: &BuildTriangle, material: u64) -> u128 {
     let plain = BuildTriangle { material: 0, asset: 0, ..*t };
     XxHash3_128::oneshot_with_seed(material, bytemuck::bytes_of(&plain))

@@ -134,7 +134,7 @@ impl Assets {
     }
 }
 
-/// Hashes all that a summary depends on except the keys of textures; the mesh counts by the checksum in its header.
+/// Hashes everything that a summary depends on except the keys of textures. The checksum in its header represents the mesh.
 fn compute_digest(folder: &Path, request: &BuildRequest) -> Result<String> {
     let mut hash = XxHash3_128::with_seed(u64::from(BUILD_FORMAT));
     let mut write = |bytes: &[u8]| {

@@ -30,7 +30,7 @@ pub(super) struct CellContent {
     triangles: u64,
     /// Sum of the triangles' hashes modulo 2^128.
     sum: u128,
-    /// Hash of all that the chunks of the cell depend on.
+    /// Hash of everything that the chunks of the cell depend on.
     input: [u64; 2],
 }
 

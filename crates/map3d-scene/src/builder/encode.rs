@@ -135,7 +135,7 @@ impl Objects {
     }
 }
 
-/// Hashes all that is visible of the triangles; independent of chunk and file.
+/// Hashes everything visible of the triangles; independent of chunk and file.
 pub(super) fn content_hash(triangles: &[BuildTriangle], materials: &[MaterialRecord]) -> [u64; 2] {
     let mut hash = XxHash3_128::with_seed(0);
     for t in triangles {

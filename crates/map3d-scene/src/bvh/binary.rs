@@ -30,7 +30,7 @@ pub(super) struct BinaryTree {
     pub order: Vec<u32>,
 }
 
-/// A box with its number; moved about while splitting.
+/// A box with its number; moved around during a split.
 #[derive(Clone, Copy)]
 struct Item {
     bounds: Aabb,

@@ -82,7 +82,7 @@ pub trait TapAccumulator: Copy {
     /// Adds the batch to the total; call it after every `BATCH` taps and at the end.
     fn flush(&mut self);
     fn channels(self) -> [u32; 4];
-    /// Finds texels and weights of taps at offsets (right, down) from a centre, in a level that is `width` texels vector.
+    /// Finds texels and weights of taps at offsets (right, down) from a centre, in a level that is `width` texels wide.
     fn resolve(right: &[i32; BATCH], down: &[i32; BATCH], center: [i32; 2], width: i32, out: &mut ResolvedTaps);
 }
 

@@ -236,7 +236,7 @@ impl<'a> TextureBuild<'a> {
         let entry = result.missing.entry(reason.to_owned()).or_default();
         entry.count += 1;
         let example = format!("{name}: {cause}");
-        // The least of the messages, so that the report does not depend on the order of threads.
+        // The first message in alphabetical order, so that the report does not depend on the order of threads.
         if entry.example.is_empty() || example < entry.example {
             entry.example = example;
         }

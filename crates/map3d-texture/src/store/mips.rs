@@ -3,7 +3,7 @@
 use map3d_image::Raster;
 use map3d_image::srgb::{BYTE, LINEAR16};
 
-/// Linear light premultiplied by alpha, 16 bits a channel.
+/// Linear light premultiplied by alpha, 16 bits per channel.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LinearRaster {
     pub width: u32,

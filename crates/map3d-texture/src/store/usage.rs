@@ -109,7 +109,7 @@ fn mark_extent(mask: &mut PixelMask, y: u32, extent: Interval, wrap: Wrap) {
     }
 }
 
-/// Marks the texels that a wrap mode puts at columns of a row: at least one column, and hardly more than a period.
+/// Marks the texels that a wrap mode puts at columns of a row: at least one column, and little more than a period.
 fn mark_columns(mask: &mut PixelMask, y: u32, columns: Range<i64>, wrap: Wrap) {
     let w = i64::from(mask.width());
     let mut mark = |from: i64, end: i64| mask.mark_row(y, from as u32..end as u32);

@@ -73,7 +73,7 @@ impl DepthKeyPlane {
     }
 }
 
-/// The depth of a triangle over pixels, and its bias in the winner rule.
+/// The depth of a triangle over pixels, and its bias in the visibility rule.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TriangleDepth {
     gradient: [f64; 2],

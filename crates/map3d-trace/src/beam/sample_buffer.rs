@@ -134,7 +134,7 @@ impl SampleBuffer {
                 if near > self.group_far[group] {
                     continue;
                 }
-                // A dirty bound may be too high: compute it and compare again.
+                // A stale bound may be too high: compute it and compare again.
                 if self.dirty >> group & 1 != 0 {
                     self.refresh::<L>(group);
                     if near > self.group_far[group] {

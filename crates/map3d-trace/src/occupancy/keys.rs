@@ -12,7 +12,7 @@ use super::reach::Reach;
 use super::{Rect, TileView};
 
 /// Returns the keys of base blocks of one level, (x, y) each: hex hashes over everything that their bytes depend on, which is the format, the frame, and
-/// every object and instance whose box meets the block's beam, throws a shadow into it or occludes ambient light there. Every chunk is opened once.
+/// every object and instance whose box meets the block's beam, casts a shadow into it or occludes ambient light there. Opens every chunk once.
 pub fn block_keys(scene: &SceneStore, frame: &Frame, level: u8, blocks: &[[u32; 2]]) -> Result<Vec<String>> {
     frame.validate()?;
     if let Some([x, y]) = blocks.iter().find(|[x, y]| level > DEEPEST_LEVEL || x >> level != 0 || y >> level != 0) {
@@ -40,7 +40,7 @@ pub fn block_keys(scene: &SceneStore, frame: &Frame, level: u8, blocks: &[[u32; 
     Ok(blocks.iter().zip(&sums.sums).map(|(block, sum)| finish(frame, level, *block, sum)).collect())
 }
 
-/// Per block, the number of contents that meet its beam and the sum of their hashes modulo 2^128, so that their order does not matter.
+/// Per block, the number of objects and instances that meet its beam and the sum of their hashes modulo 2^128, so that their order does not matter.
 struct Sums<'a> {
     view: TileView,
     reach: Reach,
@@ -74,7 +74,7 @@ impl<'a> Sums<'a> {
         any
     }
 
-    /// Adds a content to every block that it reaches. One that reaches a block in several ways counts as often there, always the same number of times.
+    /// Adds an object or instance to every block that it reaches. One that reaches a block in several ways counts several times, always the same number.
     fn add(&mut self, bounds: &Box3, id: u32, content: [u64; 2]) {
         let mut reached = Vec::new();
         self.reach.each(bounds, self.view.rect(bounds), |rect| reached.push(self.tiles(rect)));

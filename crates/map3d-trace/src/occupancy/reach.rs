@@ -10,7 +10,7 @@ const STEPS_MAX: f64 = 64.0;
 
 /// The reach of a pass's layers beyond a beam.
 pub(super) struct Reach {
-    /// Of ambient occlusion, in tiles.
+    /// Radius of ambient occlusion, in tiles.
     radius: f64,
     /// For each sun above the horizon, the shift of a shadow per metre of height, in tiles.
     shadows: Vec<[f64; 2]>,
@@ -30,7 +30,7 @@ impl Reach {
         Self { radius: (radius_m + lift_m) / view.tile_m, shadows: suns.filter(|s| s[2] > 0.0).map(shadow).collect(), floor_m: bounds.lo[2] }
     }
 
-    /// Calls `take` with rectangles that together cover the tiles in which a box is visible, throws a shadow or occludes ambient light. `rect`: where it is
+    /// Calls `take` with rectangles that together cover the tiles in which a box is visible, casts a shadow or occludes ambient light. `rect`: where it is
     /// visible.
     pub fn each(&self, bounds: &Box3, rect: Rect, mut take: impl FnMut(&Rect)) {
         let rect = Rect { lo: rect.lo.map(|v| v - self.radius), hi: rect.hi.map(|v| v + self.radius) };

@@ -140,7 +140,7 @@ impl TileSet {
         }
     }
 
-    /// Marks the tiles of a range that `meets` lets through. What it refuses as a whole, it refuses in every part.
+    /// Marks the tiles of a range that `meets` accepts. If it rejects a range, it rejects every part of it.
     pub fn mark(&mut self, range: &TileRange, meets: impl Fn(&TileRange) -> bool) {
         self.root = self.mark_in(self.root, self.square(), range, &meets);
     }
@@ -192,7 +192,7 @@ impl TileSet {
         }
     }
 
-    /// A square by its height and Morton number in which all but the blocks is marked. `blocks`: those in the square.
+    /// A square by its height and Morton number in which everything except the blocks is marked. `blocks`: those in the square.
     fn close_outside(&mut self, height: u8, number: u64, blocks: &[u64]) -> u32 {
         if blocks.is_empty() {
             return FULL;

@@ -162,7 +162,7 @@ impl ReferenceTriangle {
         })
     }
 
-    /// Orders equal depth keys in the winner rule; the least wins.
+    /// Orders equal depth keys in the visibility rule; the least wins.
     pub fn tie_break(&self) -> (u8, u32, u32) {
         (255 - self.rank, self.object_id, self.source)
     }

@@ -180,7 +180,7 @@ export class CanvasDrawer implements Drawer {
 
 const NEIGHBOURS = [[-1, 0], [1, 0], [0, -1], [0, 1]] as const;
 
-/** The name of a tile's picture, whatever its mode. */
+/** The name of a tile's picture in any mode. */
 const makeName = ({ tiles, mode }: Pass, tile: Tile): string => tiles.key("color", tile) || tiles.key(mode === "lit" ? "color" : mode, tile);
 
 /** Missing pictures come first, then outdated ones (oldest first), then edges; all from the screen's centre outwards. */

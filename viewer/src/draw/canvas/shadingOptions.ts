@@ -17,7 +17,7 @@ export interface TileLight {
   readonly shadow: (Omit<Shadow, "layer"> & { readonly kind: "sun" | "sun16" }) | null;
 }
 
-/** Everything besides the tile's data that determines its picture. */
+/** Everything that determines a tile's picture, apart from its data. */
 export interface ShadingOptions {
   readonly mode: Mode;
   readonly masked: boolean;

@@ -28,7 +28,7 @@ export function computeTileLight(light: TileLight, width: number, height: number
   return spreadLight(own, width, height);
 }
 
-/** Reused for each tile: garbage stays in a worker's memory for long. */
+/** Reused for each tile: a worker collects garbage late. */
 const buffers = [new Float32Array(0), new Float32Array(0)] as [Float32Array, Float32Array];
 
 const resizeBuffer = (buffer: Float32Array, length: number): Float32Array => (buffer.length === length ? buffer : new Float32Array(length));
