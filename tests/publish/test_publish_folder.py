@@ -99,12 +99,16 @@ def test_archives_describe_their_layer(workspace, out):
         assert reader.metadata()["map3d"]["layer"] == layer
 
 
-def test_the_manifest_names_the_archives_and_nothing_else_differs(workspace, out):
+def test_the_manifest_names_the_archives_and_only_versions_differ(workspace, out):
     publish(workspace, "tea", out)
     got, original = (json.loads(path.read_text()) for path in (out / "rendering.json", workspace.manifest_path("tea")))
     for view in got["views"]:
         archives = view.pop("archives")
         assert archives == {layer.name: f"{view['id']}/{layer.name}.pmtiles" for layer in LAYERS}
+        assert (view.pop("version"), view.pop("versions")) == (got["content_version"], {})
+    for view in original["views"]:
+        del view["version"], view["versions"]
+    del got["content_version"], original["content_version"]
     assert got == original
 
 
@@ -213,6 +217,33 @@ def test_a_killed_publish_leaves_no_folder(workspace, out, tmp_path, built_viewe
     reference = out.with_name("reference")
     publish(workspace, "tea", reference)
     assert contents(out) == contents(reference)
+
+
+def test_equal_tiles_give_equal_folders_however_they_were_rendered(workspace, out, tmp_path):
+    """A render that was stopped and resumed has higher versions than one that was not."""
+    publish(workspace, "tea", out)
+    for path in workspace.rendering_folder("tea").glob("*.sqlite"):
+        with SqliteTileStore(path) as store:
+            store.remove_block(BlockId(1, 0, 0))
+            put_block(store, path.stem, BlockId(1, 0, 0), Occupancy.from_tiles(ZMAX, OCCUPIED), version=2)
+    value = json.loads(workspace.manifest_path("tea").read_text())
+    value["content_version"] = 2
+    for view in value["views"]:
+        view["versions"] = {"1/0/0": 2}
+    workspace.manifest_path("tea").write_text(json.dumps(value))
+    publish(workspace, "tea", tmp_path / "resumed")
+    assert contents(out) == contents(tmp_path / "resumed")
+
+
+def test_content_version_of_a_folder_changes_with_its_tiles(workspace, out, tmp_path):
+    publish(workspace, "tea", out)
+    with SqliteTileStore(workspace.store_path("tea", "0-45")) as store:
+        put_block(store, "0-45", BlockId(1, 0, 0), Occupancy.from_tiles(ZMAX, OCCUPIED), salt="new")
+    publish(workspace, "tea", tmp_path / "changed")
+    before, after = (json.loads((folder / "rendering.json").read_text()) for folder in (out, tmp_path / "changed"))
+    assert before["content_version"] != after["content_version"]
+    assert 1 <= after["content_version"] < 2**48
+    assert [view["version"] for view in after["views"]] == [after["content_version"]] * 2
 
 
 def test_archives_of_other_tiles_are_not_reused(workspace, out):

@@ -134,7 +134,7 @@ def test_the_document_matches_the_specification(manifest):
 
 def test_the_schema_lists_every_member(manifest, added):
     archives = {view.frame.id: {"color": f"{view.frame.id}/color.pmtiles"} for view in manifest.views}
-    value = replace(added, geographic=GEOGRAPHIC).with_archives(archives).to_json()
+    value = replace(added, geographic=GEOGRAPHIC).with_archives(archives, 7).to_json()
     schema = SCHEMA["properties"]
     assert set(schema) == set(value) == {*SCHEMA["required"], "geographic"}
     assert set(schema["views"]["items"]["properties"]) == set(value["views"][0])
@@ -154,8 +154,9 @@ def test_the_schema_accepts_manifests(manifest, added):
 
 def test_only_published_folders_have_archives(manifest):
     archives = {view.frame.id: {"color": f"{view.frame.id}/color.pmtiles"} for view in manifest.views}
-    published = Manifest.load(manifest.with_archives(archives).dump())
+    published = Manifest.load(manifest.with_archives(archives, 7).dump())
     assert published.view("45-22.5").archives == {"color": "45-22.5/color.pmtiles"}
+    assert {published.content_version, *published.views[0].versions[0].values()} == {7}
 
 
 def test_a_tile_has_the_version_of_its_block(manifest):

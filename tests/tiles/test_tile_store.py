@@ -90,6 +90,18 @@ def test_equal_blocks_keep_their_version(store):
     assert store.put_block(BLOCK, "c", 4, tiles[1:], b"other seam").version == 4
 
 
+def test_layer_digest_depends_on_tiles_alone(store):
+    other = BlockId(1, 0, 0)
+    store.put_block(BLOCK, "a", 1, content(BLOCK), b"s")
+    store.put_block(other, "a", 1, content(other), b"s")
+    before = [store.layer_digest(layer) for layer in (0, 1)]
+    assert before[0] != before[1]
+    store.remove_block(BLOCK)
+    assert store.layer_digest(0) != before[0]
+    store.put_block(BLOCK, "b", 2, content(BLOCK), b"t")
+    assert [store.layer_digest(layer) for layer in (0, 1)] == before
+
+
 def test_an_older_fence_is_refused(store):
     tiles = content(BLOCK)
     store.put_block(BLOCK, "new", 2, tiles, b"seam", fence=7)

@@ -1,6 +1,5 @@
 """Imports one source document as an asset of a scene: a limited subprocess parses it, and one atomic step puts the asset in place."""
 
-import os
 import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.parser_process import ParserProcess
 from map3d.ingest.scene_crs import LOCAL
 from map3d.ingest.sources import Source, source_digest
+from map3d.ingest.unfinished_imports import draft_path, finish_imports, mark_import, remove_dead_drafts, unmark_import
 from map3d.registry import Registry
 from map3d.subprocess import Failure, Limits
 from map3d.types import Box, Vec3
@@ -61,8 +61,9 @@ def import_file(
     """
     record = catalogue.scene(scene)
     final = workspace.asset_folder(scene, source.name)
-    draft = final.with_name(f".{source.name}.{os.getpid()}.new")
+    draft = draft_path(final)
     digest = source_digest(source)
+    remove_dead_drafts(final.parent)
     shutil.rmtree(draft, ignore_errors=True)
     draft.mkdir(parents=True)
     try:
@@ -72,6 +73,7 @@ def import_file(
         if not report["triangles"]:
             raise ImportFailed(f"{source.paths[0]}: no usable triangle in the file{_list_skipped(report)}")
         with scene_lock(workspace, scene):
+            finish_imports(workspace, catalogue, scene)
             proposed = None if parsed["crs"] is None else SceneCrs(**parsed["crs"])
             return _add_to_scene(workspace, catalogue, record, source, draft, report, proposed, digest)
     finally:
@@ -129,15 +131,17 @@ def _add_to_scene(
     record = _pin_scene(catalogue, before, proposed, boxes)
     assert record.origin is not None, "the scene is pinned"
     _check_distance(source, boxes, record.origin)
+    final, path = workspace.asset_folder(scene, source.name), str(source.paths[0].absolute())
+    mark_import(final, path, source.format, source_digest)
     with Registry(workspace.registry_path(scene)) as registry:
         ids = registry.put_asset(source.name, new_objects(lines, boxes, record.origin))
     write_ids(draft, ids)
     write_report(draft, report)
-    final = workspace.asset_folder(scene, source.name)
     replaced = final.exists()
     digest = asset_digest(draft)
     put_in_place(draft, final)
-    catalogue.put_asset(AssetRecord(scene, source.name, str(source.paths[0].absolute()), source.format, digest, source_digest, report))
+    catalogue.put_asset(AssetRecord(scene, source.name, path, source.format, digest, source_digest, report))
+    unmark_import(final)
     return Imported(source.name, str(source.paths[0]), source.format, len(lines), report["triangles"], replaced, report)
 
 

@@ -30,7 +30,7 @@ CHECKSUMS: Final = "checksums.sha256"
 README: Final = "README.txt"
 ICON: Final = "favicon.ico"
 _ICON_PATH: Final = Path(__file__).parents[1] / "web" / "static" / ICON
-ARCHIVE_VERSION: Final = 1
+ARCHIVE_VERSION: Final = 2
 """Incremented when archives of the same tiles change, so that archives of older drafts are not reused."""
 
 _README_TEXT: Final = """{title}
@@ -98,6 +98,7 @@ class _FolderWriter:
         self.tiles = self.archives = self.kept = self._done = 0
         self._total = sum(view.occupancy.count() for view in manifest.views) * len(manifest.layers)
         self._files: dict[str, str] = {}
+        self._content: list[str] = []
 
     def write(self) -> None:
         archives = {view.frame.id: self._write_view(view) for view in self._manifest.views}
@@ -113,7 +114,7 @@ class _FolderWriter:
         for file in viewer_files():
             self._write_file(file.as_posix(), (viewer_folder() / file).read_bytes())
         self._write_file(README, _readme(self._manifest).encode())
-        self._write_file(FILE_NAME, self._manifest.with_archives(archives).dump())
+        self._write_file(FILE_NAME, self._manifest.with_archives(archives, self._content_version()).dump())
         lines = [f"{digest}  {name}\n" for name, digest in sorted(self._files.items())]
         self._write_file(CHECKSUMS, "".join(lines).encode())
         self._remove_leftovers()
@@ -147,12 +148,17 @@ class _FolderWriter:
                 f"rendering {self._manifest.name}, view {view}: tiles changed during publishing; wait until no render runs, then publish again"
             )
         self.tiles += tiles
+        self._content.append(metadata["map3d"]["content"])
         return tiles
 
+    def _content_version(self) -> int:
+        """Returns a number that depends on the tiles alone, not on how often and in which order they were rendered."""
+        return 1 + int(sha256(json.dumps(self._content).encode()).hexdigest()[:11], 16)
+
     def _metadata(self, store: TileStore, layer: Layer, view: str) -> dict[str, Any]:
-        """Returns the archive's metadata; `content` is the digest of everything that its tiles depend on."""
-        blocks = [(str(block.id), block.key, block.version, block.tiles) for block in store.list_blocks()]
-        content = sha256(json.dumps([ARCHIVE_VERSION, layer.name, layer.format, blocks]).encode()).hexdigest()
+        """Returns the archive's metadata; `content` is the digest of everything that its bytes depend on."""
+        tiles = store.layer_digest(store.shape.layer_number(layer.name))
+        content = sha256(json.dumps([ARCHIVE_VERSION, layer.name, layer.format, tiles]).encode()).hexdigest()
         facts = {"rendering": self._manifest.name, "view": view, "layer": layer.name, "content": content}
         title = self._manifest.title or self._manifest.name
         description = "Oblique image tiles in the view's own plane, not on the globe: see rendering.json."

@@ -9,6 +9,7 @@ from map3d import _core
 from map3d.catalogue import Catalogue, SceneRecord, Workspace
 from map3d.catalogue.scene_lock import scene_lock
 from map3d.errors import BadRequest
+from map3d.ingest.unfinished_imports import finish_imports, unfinished_imports
 from map3d.registry import Registry
 
 BuildProgress = Callable[[str, int, int], bool]
@@ -28,8 +29,10 @@ BUILD_BYTES: Final = 2 << 30
 
 
 def is_stale(workspace: Workspace, catalogue: Catalogue, scene: str) -> bool:
-    """Whether the scene index is missing or older than the assets."""
+    """Whether the scene index is missing or older than the assets, or an import was killed while it changed the scene."""
     record = catalogue.scene(scene)
+    if unfinished_imports(workspace.scene_folder(scene) / "assets"):
+        return True
     return record.built != scene_digest(catalogue, record) or not (workspace.scene_folder(scene) / "scene.json").is_file()
 
 
@@ -38,6 +41,7 @@ def build(
 ) -> dict[str, Any]:
     """Builds what changed and returns the report: counts of each optimisation. Raises BadRequest for a scene without assets."""
     with scene_lock(workspace, scene):
+        finish_imports(workspace, catalogue, scene)
         record = catalogue.scene(scene)
         assets = catalogue.assets(scene)
         if not assets or record.origin is None:

@@ -115,9 +115,17 @@ class Manifest:
     def view(self, view_id: str) -> ManifestView | None:
         return next((view for view in self.views if view.frame.id == view_id), None)
 
-    def with_archives(self, archives: Mapping[str, Mapping[str, str]]) -> Self:
-        """Returns the manifest of a published folder. `archives`: view id → layer → path."""
-        return replace(self, views=tuple(replace(view, archives=archives[view.frame.id]) for view in self.views))
+    def with_archives(self, archives: Mapping[str, Mapping[str, str]], content_version: int) -> Self:
+        """Returns the manifest of a published folder. `archives`: view id → layer → path; `content_version`: also of every block."""
+        views = tuple(
+            replace(
+                view,
+                archives=archives[view.frame.id],
+                versions=tuple(dict.fromkeys(versions, content_version) for versions in view.versions),
+            )
+            for view in self.views
+        )
+        return replace(self, content_version=content_version, views=views)
 
     def to_json(self) -> dict[str, Any]:
         frame = self.views[0].frame

@@ -1,5 +1,6 @@
 """A tile store in SQLite, one file per track (spec/catalogue.md): WAL, synchronous=FULL, one transaction per block."""
 
+import hashlib
 import json
 import os
 import sqlite3
@@ -148,6 +149,13 @@ class SqliteTileStore:
     def list_tile_positions(self, z: int) -> list[tuple[int, int]]:
         with self._reading() as db:
             return db.execute("SELECT x, y FROM tile WHERE layer = 0 AND z = ?", (z,)).fetchall()
+
+    def layer_digest(self, layer: int) -> str:
+        total = hashlib.sha256()
+        with self._reading() as db:
+            for z, x, y, digest in db.execute("SELECT z, x, y, hash FROM tile WHERE layer = ? ORDER BY z, x, y", (layer,)):
+                total.update(b"%d/%d/%d " % (z, x, y) + digest)
+        return total.hexdigest()
 
     def check(self) -> list[str]:
         """Reads the whole file and returns its faults, one line each."""

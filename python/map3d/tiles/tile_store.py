@@ -83,6 +83,9 @@ class TileStore(Protocol):
     def list_tile_positions(self, z: int) -> list[tuple[int, int]]:
         """Returns (column, row) of the stored tiles of a level, in any order. Every tile has all layers."""
 
+    def layer_digest(self, layer: int) -> str:
+        """Returns a digest of the layer's tiles: names and bytes, without keys and versions of their blocks."""
+
     def remove_block(self, block: BlockId) -> bool:
         """Returns False if the block was not stored."""
 

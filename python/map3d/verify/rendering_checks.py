@@ -7,6 +7,8 @@ import numpy as np
 from map3d import _core
 from map3d.catalogue import Catalogue, RenderingRecord, State, Workspace
 from map3d.errors import Map3dError
+from map3d.ingest.asset import asset_digest
+from map3d.ingest.unfinished_imports import unfinished_imports
 from map3d.registry import Registry
 from map3d.renderings.build import is_stale, open_scene
 from map3d.renderings.manifest_writer import current_manifest
@@ -22,8 +24,10 @@ Progress = Callable[[str, int, int], None]
 
 
 def verify_scene(workspace: Workspace, catalogue: Catalogue, scene: str, findings: Findings, progress: Progress) -> None:
-    """Checks the checksums of all files, the scene index, and the ids against the registry."""
+    """Checks the checksums of all files, the scene index, the assets against the catalogue, and the ids against the registry."""
     folder = workspace.scene_folder(scene)
+    for name in unfinished_imports(folder / "assets"):
+        findings.add(f"{folder / 'assets' / name}: its import has not finished; run map3d render, or add its file again with map3d add-files {scene}")
     if not catalogue.assets(scene):
         return
     files = list(binary_files(folder))
@@ -38,6 +42,8 @@ def verify_scene(workspace: Workspace, catalogue: Catalogue, scene: str, finding
             findings.add(line)
     with Registry(workspace.registry_path(scene)) as registry:
         for asset in catalogue.assets(scene):
+            if asset_digest(folder / "assets" / asset.name) != asset.digest:
+                findings.add(f"{folder / 'assets' / asset.name}: differs from the catalogue; run map3d add-files {scene} {asset.source}")
             for line in check_ids(folder, asset.name, registry):
                 findings.add(line)
         findings.count("objects", registry.count())
