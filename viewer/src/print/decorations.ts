@@ -1,6 +1,13 @@
 import { SCALE_BAR_MAX_PX, formatLength, floorToRound } from "../core/lengths";
 import type { map } from "../map3d";
-import type { PictureLegend } from "./picture";
+
+/** A legend; a `theme` has this shape. */
+export interface PictureLegend {
+  readonly title: string;
+  readonly classes: readonly { readonly label: string; readonly color: string }[];
+  /** The classes to show. Default: all. */
+  readonly chosen?: PictureLegend["classes"];
+}
 
 const FONT = "system-ui, sans-serif";
 const [INK, FAINT, PANEL, EDGE] = ["#26282b", "#5d6166", "rgb(255 255 255 / 0.92)", "rgb(38 40 43 / 0.18)"] as const;

@@ -1,14 +1,6 @@
 import { DrawError, UsageError, type map } from "../map3d";
-import { Decorations } from "./decorations";
+import { Decorations, type PictureLegend } from "./decorations";
 import { drawPieces, type PieceOptions } from "./pieces";
-
-/** A legend; a `theme` has this shape. */
-export interface PictureLegend {
-  readonly title: string;
-  readonly classes: readonly { readonly label: string; readonly color: string }[];
-  /** The classes to show. Default: all. */
-  readonly chosen?: PictureLegend["classes"];
-}
 
 export interface PictureOptions extends PieceOptions {
   /** Size in pixels; give one to keep the map's aspect ratio. Default: the map's CSS size times `scale`. The picture contains the whole view; with another aspect ratio it shows more. */
