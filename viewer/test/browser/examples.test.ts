@@ -67,7 +67,7 @@ const POINTS: Readonly<Record<string, (page: Page, picture: Buffer) => Promise<v
       await page.mouse.click(x + (at.startsWith("[690938") ? 2 : -2), y - 2);
       await page.waitForTimeout(400); // two clicks, not a double one
     }
-    await page.waitForFunction(() => /^[\d.]+ m, of which/.test(document.querySelector("output")?.value ?? ""));
+    await page.waitForFunction(() => /^[\d.]+ m, height difference/.test(document.querySelector("output")?.value ?? ""));
     const length = parseFloat(await text(page, "output"));
     expect(length).toBeGreaterThan(28);
     expect(length).toBeLessThan(34.2);
@@ -108,7 +108,7 @@ const POINTS: Readonly<Record<string, (page: Page, picture: Buffer) => Promise<v
     const address = page.url();
     await page.goto("about:blank");
     await page.goto(address);
-    await page.getByText("Die Ansicht dieses Links").waitFor();
+    await page.getByText("Verlinkter Ort").waitFor();
     await still(page);
     const [from, to] = [address, page.url()].map((url) => url.split("/").slice(-4).map(Number)) as [number[], number[]];
     expect(page.url()).toContain("#90-45/");
