@@ -52,6 +52,10 @@ class StaleFence(Map3dError):
     """The lease is no longer held: its fence is older than the job's."""
 
 
+class StalePlan(Map3dError):
+    """The scene has changed since a block was planned; the block has to be planned again."""
+
+
 class SubprocessDied(Map3dError):
     """A subprocess ended or sent an invalid message; the message says how."""
 

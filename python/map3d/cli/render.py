@@ -60,7 +60,7 @@ def render_with_progress(run: "Run") -> "RunResult":
 
 
 def _work(run: "Run", plan: "RunPlan") -> "RunResult":
-    from map3d.jobs.events import JobDone, JobFailed, LeaseLost, Stopping, Waiting, WorkerExited
+    from map3d.jobs.events import JobDone, JobFailed, LeaseLost, SceneChanged, Stopping, Waiting, WorkerExited
 
     log, counts = console(), plan.counts
     log.print(f"blocks: {counts_text({'new': counts.added, 'changed': counts.changed, 'unchanged': counts.kept})}; {plan.open_jobs:,} to render")
@@ -80,6 +80,8 @@ def _work(run: "Run", plan: "RunPlan") -> "RunResult":
                 )
             elif isinstance(event, LeaseLost):
                 bar.console.print(f"{event.lease.track} {event.lease.block}: lease lost: {event.reason}")
+            elif isinstance(event, SceneChanged):
+                bar.console.print("files changed during the render: planning again")
             elif isinstance(event, Stopping):
                 bar.console.print(
                     "stopping: releasing current blocks" if event.at_once else "stopping after the current blocks; press Ctrl-C again to stop at once"

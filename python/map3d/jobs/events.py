@@ -29,6 +29,14 @@ class LeaseLost:
 
 
 @dataclass(frozen=True)
+class SceneChanged:
+    """The scene was rebuilt after the job had been planned. The job was released without losing an attempt; the run plans again."""
+
+    lease: Lease
+    reason: str
+
+
+@dataclass(frozen=True)
 class WorkerExited:
     """A worker exited. `reason` is empty when no jobs were left or the run was stopped; `jobs_failed`: it exited after too many failed jobs;
     `error`: an unexpected exception."""
@@ -53,4 +61,4 @@ class Waiting:
     jobs: int
 
 
-RunEvent = JobDone | JobFailed | LeaseLost | WorkerExited | Stopping | Waiting
+RunEvent = JobDone | JobFailed | LeaseLost | SceneChanged | WorkerExited | Stopping | Waiting

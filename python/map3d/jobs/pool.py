@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from map3d.catalogue import Catalogue, State
 from map3d.jobs.dead_workers import expire_dead_workers, worker_name
-from map3d.jobs.events import JobDone, JobFailed, LeaseLost, RunEvent, Stopping, Waiting, WorkerExited
+from map3d.jobs.events import JobDone, JobFailed, LeaseLost, RunEvent, SceneChanged, Stopping, Waiting, WorkerExited
 from map3d.jobs.timeouts import Timeouts
 from map3d.jobs.worker import Signal, Task, Worker
 from map3d.tiles.naming import morton
@@ -60,13 +60,19 @@ class Pool:
         self._threads: dict[str, threading.Thread] = {}
         self._workers: dict[str, Worker] = {}
         self._started = 0
-        self._waiting_reported = False
+        self._waiting_reported = self._stopped_by_user = False
+        self.scene_changed = False
+        """The plan is stale: the pool stops after the current jobs, and the run plans again."""
         self._base_numbers: list[int] = []
         self._error: BaseException | None = None
         self.statistics = RunStatistics()
 
     def stop(self) -> None:
         """Makes the workers finish their jobs and exit."""
+        self._stopped_by_user = True
+        self._let_workers_exit()
+
+    def _let_workers_exit(self) -> None:
         self._stop.set()
         self._job_ended.notify()
 
@@ -77,7 +83,7 @@ class Pool:
 
     @property
     def stopped(self) -> bool:
-        return self._stop.is_set()
+        return self._stopped_by_user
 
     def run(self, on_event: Callable[[RunEvent], None]) -> RunStatistics:
         """Blocks until the last worker exits and calls `on_event` in this thread. The first SIGINT or SIGTERM calls `stop`, the second `stop_now`."""
@@ -108,11 +114,14 @@ class Pool:
             self._report_waiting(on_event)
             return
         self.statistics.add(event)
+        if isinstance(event, SceneChanged):
+            self.scene_changed = True
+            self._let_workers_exit()
         if isinstance(event, WorkerExited):
             self._error = self._error or event.error
             self._threads.pop(event.worker).join()
             del self._workers[event.worker]
-            if event.jobs_failed and self.statistics.done and not self.stopped:
+            if event.jobs_failed and self.statistics.done and not self._stop.is_set():
                 self._start_worker()
         on_event(event)
 

@@ -1,5 +1,6 @@
 """`map3d render`: plans the jobs, runs the workers, writes the manifest."""
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Final
@@ -7,7 +8,8 @@ from typing import Final
 import numpy as np
 
 from map3d.catalogue import Catalogue, PlanCounts, RenderingRecord, State, Workspace
-from map3d.errors import BadRequest
+from map3d.catalogue.scene_lock import scene_lock
+from map3d.errors import BadRequest, StalePlan
 from map3d.jobs.events import RunEvent
 from map3d.jobs.pool import Pool, RunStatistics
 from map3d.jobs.timeouts import Timeouts
@@ -20,6 +22,8 @@ from map3d.tiles.occupancy import Occupancy, morton_numbers
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.types import BlockId, Box
 
+MAX_PLANS: Final = 10
+"""A run whose scene was rebuilt this often ends."""
 MIN_CACHE_BYTES: Final = 64 << 20
 WORKER_BYTES: Final = 256 << 20
 """Memory of a subprocess without its cache: interpreter, libraries, G-buffers of one block."""
@@ -85,9 +89,11 @@ class Run:
 
     def plan(self, progress: Callable[[int, int], None] | None = None, scene: PlannedScene | None = None) -> RunPlan:
         """Compares the scene with the stored blocks, opens jobs for new and changed blocks, and announces them in the manifest."""
-        opened = scene or open_scene(self._workspace, self.record.scene)
+        self.record = self._catalogue.rendering(self.record.name)
         blocks = _planned_blocks(self._catalogue, self.record)
-        planned = self._catalogue.plan(self.record.name, plan_jobs(opened, self.record, blocks, progress))
+        with scene_lock(self._workspace, self.record.scene):
+            opened = scene or open_scene(self._workspace, self.record.scene)
+            planned = self._catalogue.plan(self.record.name, plan_jobs(opened, self.record, blocks, progress))
         self.record = self._catalogue.rendering(self.record.name)
         self._prune()
         counts = self._catalogue.count_jobs(self.record.name)
@@ -99,16 +105,28 @@ class Run:
         return RunPlan(planned, open_jobs, counts[State.DONE], counts[State.QUARANTINED], box, occupancy)
 
     def work(self, plan: RunPlan, on_event: Callable[[RunEvent], None]) -> RunResult:
-        """Runs the workers until no jobs are left or the user stops them, then writes the manifest."""
+        """Runs the workers until no jobs are left or the user stops them, then writes the manifest. Plans again when the scene is rebuilt meanwhile;
+        raises StalePlan when that happens too often."""
         if not plan.open_jobs:
             return self._finish(plan, RunStatistics(), False)
+        statistics, stats = RunStatistics(), Counter[str]()
+        for _ in range(MAX_PLANS):
+            pool = self._run_pool(statistics, stats, on_event)
+            if pool.stopped or not pool.scene_changed:
+                return self._finish(plan, statistics, pool.stopped, dict(stats))
+            plan = self.plan()
+        raise StalePlan(f"rendering {self.record.name}: its files changed {MAX_PLANS} times during the render; run it again when they stay the same")
+
+    def _run_pool(self, statistics: RunStatistics, stats: Counter[str], on_event: Callable[[RunEvent], None]) -> Pool:
         task = RenderTask(self._workspace, self.record, cache_bytes=self._cache_bytes, entry=self._settings.entry)
         self._pool = Pool(self._catalogue, self.record.name, task, self._settings.workers, self._settings.timeouts)
+        self._pool.statistics = statistics
         try:
-            statistics = self._pool.run(on_event)
+            self._pool.run(on_event)
         finally:
             task.close()
-        return self._finish(plan, statistics, self._pool.stopped, dict(task.stats))
+            stats.update(task.stats)
+        return self._pool
 
     def stop(self) -> None:
         """Makes the workers finish their current blocks and exit."""

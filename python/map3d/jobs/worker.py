@@ -11,8 +11,8 @@ from contextlib import contextmanager, suppress
 from typing import Any, Protocol
 
 from map3d.catalogue import Catalogue, JobResult, Lease, State
-from map3d.errors import Map3dError, StaleFence, Stopped, SubprocessStartFailed
-from map3d.jobs.events import JobDone, JobFailed, LeaseLost, RunEvent, WorkerExited
+from map3d.errors import Map3dError, StaleFence, StalePlan, Stopped, SubprocessStartFailed
+from map3d.jobs.events import JobDone, JobFailed, LeaseLost, RunEvent, SceneChanged, WorkerExited
 from map3d.jobs.timeouts import Timeouts
 from map3d.subprocess import Failure, Message, Subprocess
 from map3d.tiles.naming import morton
@@ -99,8 +99,11 @@ class Worker:
                 self.idle_since = None
                 if lease.kind == "base":
                     self.start = morton(lease.block.x, lease.block.y)
-                report(self._work(process, lease))
+                event = self._work(process, lease)
+                report(event)
                 self._job_ended.notify()
+                if isinstance(event, SceneChanged):
+                    break
             elif self._no_jobs_left():
                 break
             else:
@@ -120,6 +123,9 @@ class Worker:
             response = process.request(
                 self._task.request(lease), wall_s=self._timeouts.block_s, every_s=self._timeouts.tick_s, on_progress=heartbeat.on_progress
             )
+            if isinstance(response, Failure) and response.kind == StalePlan.__name__:
+                self._catalogue.release(lease)
+                return SceneChanged(lease, response.message)
             if isinstance(response, Failure):
                 return self._fail(lease, f"{response.kind}: {response.message}")
             with heartbeat.continued():

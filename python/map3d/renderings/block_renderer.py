@@ -5,8 +5,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from map3d import _core
-from map3d.errors import NotFound
+from map3d.errors import NotFound, StalePlan
 from map3d.geometry.frames import core_frame
 from map3d.subprocess import Handler, ReportProgress
 from map3d.tiles.naming import blocks_below
@@ -15,6 +17,9 @@ from map3d.types import BlockId
 
 COUNTED: Final = ("chunk_hits", "chunk_misses", "texture_hits", "texture_misses", "texture_decoded", "texture_evicted")
 
+REBUILT: Final = "the scene was rebuilt"
+"""In the core's message when a file of the scene is not the one that the open index names."""
+
 
 def open_renderer(setup: Mapping[str, Any]) -> Handler:
     """`setup`: {"scene": folder, "cache_bytes", "frames": {track: frame}, "stores": {track: path}}."""
@@ -22,7 +27,7 @@ def open_renderer(setup: Mapping[str, Any]) -> Handler:
 
     def handle(request: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], Sequence[bytes]]:
         started = time.perf_counter()
-        block = renderer.render(request["track"], BlockId(*request["block"]), request["kind"], request["levels"])
+        block = renderer.render(request["track"], BlockId(*request["block"]), request["kind"], request["levels"], request["key"])
         tiles, seam = block.tiles, block.seam
         stats = {**block.stats, **renderer.take_cache_counts()}
         response = {"tiles": [list(tile[:4]) for tile in tiles], "seam": seam is not None, "stats": stats}
@@ -34,16 +39,39 @@ def open_renderer(setup: Mapping[str, Any]) -> Handler:
 
 class _BlockRenderer:
     def __init__(self, setup: Mapping[str, Any]) -> None:
-        self._scene = _core.Scene(setup["scene"], cache_bytes=setup["cache_bytes"])
+        self._setup = setup
+        self._scene = self._open_scene()
         self._frames = {track: core_frame(frame) for track, frame in setup["frames"].items()}
         self._paths = {track: Path(path) for track, path in setup["stores"].items()}
         self._stores: dict[str, SqliteTileStore] = {}
         self._counted = dict.fromkeys(COUNTED, 0)
 
-    def render(self, track: str, block: BlockId, kind: str, levels: int) -> _core.Block:
+    def render(self, track: str, block: BlockId, kind: str, levels: int, key: str) -> _core.Block:
+        """Renders a block from the scene from which `key` was computed. Raises StalePlan when the scene has changed since."""
         if kind == "base":
-            return self._scene.render_block(self._frames[track], *block)
+            return self._render_current(track, block, key) or self._render_reopened(track, block, key)
         return _core.reduce_block(self._frames[track], *block, levels, self._seams_below(track, block))
+
+    def _render_current(self, track: str, block: BlockId, key: str) -> _core.Block | None:
+        """Renders a base block from the open scene; returns None when that is another scene than the one that was planned."""
+        frame = self._frames[track]
+        try:
+            (found,) = self._scene.block_keys(frame, block.z, np.array([[block.x, block.y]], np.uint32))
+            return self._scene.render_block(frame, *block) if found == key else None
+        except _core.FormatError as error:
+            if REBUILT not in str(error):
+                raise
+            return None
+
+    def _render_reopened(self, track: str, block: BlockId, key: str) -> _core.Block:
+        self._scene, self._counted = self._open_scene(), dict.fromkeys(COUNTED, 0)
+        rendered = self._render_current(track, block, key)
+        if rendered is None:
+            raise StalePlan(f"block {block} of track {track}: the scene has changed since the block was planned")
+        return rendered
+
+    def _open_scene(self) -> _core.Scene:
+        return _core.Scene(self._setup["scene"], cache_bytes=self._setup["cache_bytes"])
 
     def take_cache_counts(self) -> dict[str, int]:
         """Returns the counts of the scene's caches since the previous call."""

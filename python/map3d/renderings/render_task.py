@@ -35,7 +35,8 @@ class RenderTask:
         return Subprocess(self._entry, self._setup)
 
     def request(self, lease: Lease) -> dict[str, Any]:
-        return {"track": lease.track, "block": list(lease.block), "kind": lease.kind, "levels": block_level(lease.block.z, self._zmax).levels}
+        levels = block_level(lease.block.z, self._zmax).levels
+        return {"track": lease.track, "block": list(lease.block), "kind": lease.kind, "levels": levels, "key": lease.key}
 
     def commit(self, lease: Lease, response: Message) -> JobResult:
         store = self._stores[lease.track]
