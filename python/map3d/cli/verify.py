@@ -1,5 +1,6 @@
 """map3d verify."""
 
+import secrets
 from pathlib import Path
 
 import click
@@ -14,9 +15,14 @@ from map3d.cli.progress import progress_bar, show_stage
 @click.command("verify")
 @click.argument("renderings", nargs=-1)
 @click.option("--published", type=click.Path(path_type=Path, exists=True, file_okay=False), help="Verify a published folder instead.")
+@click.option("--sample", type=click.IntRange(1), help="Also render this many blocks of each rendering again and compare their bytes.")
+@click.option("--deep", is_flag=True, help="Also render all blocks again and compare their bytes.")
+@click.option("--seed", type=click.IntRange(0), help="Seed of the choice of --sample.  [default: random; printed]")
 @json_option
 @workspace_option
-def command(workspace: Workspace, renderings: tuple[str, ...], published: Path | None, as_json: bool) -> None:
+def command(
+    workspace: Workspace, renderings: tuple[str, ...], published: Path | None, sample: int | None, deep: bool, seed: int | None, as_json: bool
+) -> None:
     """Verify RENDERINGS, or all renderings and scenes.
 
     Compares files with checksums and blocks with the plan, and checks every tile, seam and id. Lists the problems found and exits with status 1
@@ -26,7 +32,12 @@ def command(workspace: Workspace, renderings: tuple[str, ...], published: Path |
         _verify_published(published, as_json)
         return
     from map3d.verify.findings import Findings
+    from map3d.verify.pixel_checks import verify_pixels
     from map3d.verify.rendering_checks import verify_rendering, verify_scene
+
+    seed = secrets.randbelow(1 << 32) if seed is None else seed
+    if sample and not deep:
+        click.echo(f"choosing {plural(sample, 'block')} with seed {seed}", err=True)
 
     findings = Findings()
     catalogue = workspace.open_catalogue()
@@ -44,6 +55,8 @@ def command(workspace: Workspace, renderings: tuple[str, ...], published: Path |
                 verify_scene(workspace, catalogue, scene, findings, progress)
             for record in chosen:
                 verify_rendering(workspace, catalogue, record.name, findings, progress)
+                if deep or sample:
+                    verify_pixels(workspace, catalogue, record.name, findings, progress, sample=None if deep else sample, seed=seed)
     finally:
         catalogue.close()
     if as_json:
