@@ -2,6 +2,7 @@ import { DrawError, UsageError, type map } from "../map3d";
 import { Decorations, type PictureLegend } from "./decorations";
 import { drawPieces, type PieceOptions } from "./pieces";
 
+/** Options of `exportPicture`. */
 export interface PictureOptions extends PieceOptions {
   /** Size in pixels; give one to keep the map's aspect ratio. Default: the map's CSS size times `scale`. The picture contains the whole view; with another aspect ratio it shows more. */
   width_px?: number;
