@@ -233,7 +233,7 @@ def test_site_of_a_folder_processes_only_changes_when_re_run(run: Run, tmp_path:
     status, text, err = run("site", str(files), "-o", str(out), "--res", "0.2")
     assert status == 0, err
     assert "imported 4 files" in text
-    assert (out / "rendering.json").is_file()
+    first = Manifest.load((out / "rendering.json").read_bytes())
     assert run("verify", "--published", str(out))[0] == 0
     (files / "house-0-0.obj").write_text(house(0.0, 0.0, 9.0))
     (files / "broken.obj").write_text("v 0 0 0\nv nan nan nan\nf 1 2 9\n")
@@ -245,7 +245,7 @@ def test_site_of_a_folder_processes_only_changes_when_re_run(run: Run, tmp_path:
         more.write("f 1 2 99\n")
     status, text, err = run("site", str(files), "-o", str(out), "--res", "0.2")
     assert "skipped 1 element; 0 warnings; map3d show report little-town lists them" in text
-    assert Manifest.load((out / "rendering.json").read_bytes()).content_version == 2
+    assert Manifest.load((out / "rendering.json").read_bytes()).content_version != first.content_version
 
 
 def test_workspace_can_be_moved(run: Run, town: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

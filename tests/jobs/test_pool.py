@@ -296,14 +296,18 @@ def test_worker_suspended_past_its_lease_loses_it(town: Town, faults: Path, undi
 
 def test_worker_suspended_before_its_commit_does_not_overwrite_newer_tiles(town: Town, faults: Path) -> None:
     process = render_in_process(town, 1, before=SUSPENDED_COMMIT)
-    os.waitpid(process.pid, os.WUNTRACED)
-    (faults / "salt").write_text("changed")
-    town.catalogue.plan("town-a", planned_jobs(town.rendering, "changed"))
-    town.run()
-    assert all_done(town)
-    newer = town.digest()
-    os.kill(process.pid, signal.SIGCONT)
-    output, _ = process.communicate(timeout=30)
+    try:
+        os.waitpid(process.pid, os.WUNTRACED)
+        (faults / "salt").write_text("changed")
+        town.catalogue.plan("town-a", planned_jobs(town.rendering, "changed"))
+        town.run(timeouts=replace(TIMEOUTS, block_s=30))
+        assert all_done(town)
+        newer = town.digest()
+        os.kill(process.pid, signal.SIGCONT)
+        output, _ = process.communicate(timeout=30)
+    finally:
+        process.kill()
+        process.communicate()
     assert output.split() == ["0", "1"], "no block done, one lease lost"
     assert town.digest() == newer
     with SqliteTileStore(town.workspace.store_path("town-a", VIEW), read_only=True) as store:

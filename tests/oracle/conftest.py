@@ -18,8 +18,6 @@ from map3d_town import TownSpec, make_town
 
 from .asset_reader import OracleAsset, read_asset
 
-pytest.importorskip("mitsuba", reason="Mitsuba 3 is not installed: pip install map3d[peers]")
-
 
 @dataclass(frozen=True, eq=False)
 class OracleScene:

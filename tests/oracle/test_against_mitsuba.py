@@ -7,7 +7,14 @@ from map3d.geometry.frames import core_frame
 
 from .conftest import OracleScene
 from .image_agreement import edge_mask, gradient_energy, psnr, srgb_from_linear
-from .mitsuba_scene import MitsubaScene
+
+mitsuba = pytest.importorskip("mitsuba", reason="Mitsuba 3 is not installed; pip install -r requirements/peers.lock")
+try:
+    mitsuba.set_variant("llvm_ad_rgb")
+except ImportError:
+    pytest.skip("Mitsuba 3 finds no LLVM library; apt install libllvm15", allow_module_level=True)
+
+from .mitsuba_scene import MitsubaScene  # noqa: E402
 
 DEPTH_M = 0.005
 COPLANAR_M = 0.01

@@ -20,8 +20,8 @@ def test_complete_and_empty_blocks_pass() -> None:
     ("tiles", "seam", "says"),
     [
         (GOOD[:-1], b"s", "has layers"),
-        (GOOD[2:], b"s", "its parent is not"),
-        (GOOD[:2] + GOOD[4:], b"s", "its parent is not"),
+        (GOOD[2:], b"s", "has no parent"),
+        (GOOD[:2] + GOOD[4:], b"s", "has no parent"),
         ([*GOOD, StoredTile(0, 1, 0, 0, b"x"), StoredTile(1, 1, 0, 0, b"x")], b"s", "belongs to another block"),
         ([*GOOD, StoredTile(0, 4, 15, 7, b"")], b"s", "no bytes"),
         (GOOD, None, "no seam"),
