@@ -40,7 +40,9 @@ town.close()
 SUSPENDED_COMMIT = """
 import os, signal
 from map3d.renderings.render_task import RenderTask
+from tests.jobs.town import TIMEOUTS
 
+object.__setattr__(TIMEOUTS, "heartbeat_s", 60.0)  # a heartbeat that is suspended holds the database's lock
 commit, commits = RenderTask.commit, []
 
 def suspend_first(task, lease, response):
@@ -295,7 +297,7 @@ def test_worker_suspended_past_its_lease_loses_it(town: Town, faults: Path, undi
 
 
 def test_worker_suspended_before_its_commit_does_not_overwrite_newer_tiles(town: Town, faults: Path) -> None:
-    process = render_in_process(town, 1, before=SUSPENDED_COMMIT)
+    process = render_in_process(town, 1, lease_s=60.0, before=SUSPENDED_COMMIT)
     try:
         os.waitpid(process.pid, os.WUNTRACED)
         (faults / "salt").write_text("changed")
