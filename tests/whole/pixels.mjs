@@ -9,7 +9,7 @@ await runPage(async (page, { origin, rendering, view, zmax, tiles, targets, pict
     const { layer } = globalThis;
     const answer = {};
     for (const kind of ["id", "depth"]) {
-      const one = async ([x, y]) => layer.tiles.need(layer.rendering.views.get(name), layer.rendering.layers.get(kind), { z, x, y });
+      const one = async ([x, y]) => layer.tiles.fetch(layer.rendering.views.get(name), layer.rendering.layers.get(kind), { z, x, y });
       answer[kind] = await Promise.all(wanted.map(async (tile) => { const data = await one(tile); return data && hex(data.values); }));
     }
     return answer;
