@@ -63,6 +63,6 @@ def _stat(pid: int) -> tuple[str, str]:
     """Returns the state and the start time of a process, "0" when they are unknown."""
     try:
         fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    except FileNotFoundError:
+    except (FileNotFoundError, ProcessLookupError):
         return ("X", _UNKNOWN) if Path("/proc/self/stat").exists() else (_UNKNOWN, _UNKNOWN)
     return fields[_STATE], fields[_START]
