@@ -8,7 +8,7 @@ use map3d_image::encode::{Deflate, Filter, encode_png};
 
 /// Creates a new folder for this test.
 pub fn folder(name: &str) -> PathBuf {
-    let path = std::env::temp_dir().join(format!("map3d-image-{name}-{}", std::process::id()));
+    let path = std::env::temp_dir().join(format!("map3d-{name}-{}", std::process::id()));
     let _ = std::fs::remove_dir_all(&path);
     std::fs::create_dir_all(&path).expect("temporary folder");
     path

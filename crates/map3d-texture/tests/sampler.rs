@@ -1,5 +1,6 @@
 //! Samples of textures: wrap modes, borders, alpha, and the exact integral.
 
+#[path = "../../map3d-image/tests/common.rs"]
 mod common;
 
 use std::sync::Arc;

@@ -1,5 +1,6 @@
 //! Usage masks, filling, mips, texture files, the build and the cache.
 
+#[path = "../../map3d-image/tests/common.rs"]
 mod common;
 
 use std::collections::BTreeMap;
