@@ -38,17 +38,18 @@ town.close()
 """
 
 SUSPENDED_COMMIT = """
-import os, signal
+import os, signal, time
 from map3d.renderings.render_task import RenderTask
 from tests.jobs.town import TIMEOUTS
 
-object.__setattr__(TIMEOUTS, "heartbeat_s", 60.0)  # a heartbeat that is suspended holds the database's lock
+object.__setattr__(TIMEOUTS, "heartbeat_s", 60.0)  # suspended during a heartbeat, the process would hold the database's lock
 commit, commits = RenderTask.commit, []
 
 def suspend_first(task, lease, response):
     commits.append(lease)
     if len(commits) == 1:
         os.kill(os.getpid(), signal.SIGSTOP)
+        time.sleep(0.5)  # another thread may take the signal while this one goes on
     return commit(task, lease, response)
 
 RenderTask.commit = suspend_first
