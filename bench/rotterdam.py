@@ -57,7 +57,7 @@ class CityScale:
 
 
 def stages(size: CityScale) -> dict[str, Callable[[], list[str]]]:
-    """Returns functions that give the command line of each verb; that of create-rendering needs the town."""
+    """Returns functions that give the arguments of each command; that of create-rendering needs the town."""
     spec, folder = size.spec, size.folder
     where = ["-w", str(folder / "workspace")]
     town = ["--buildings", spec.buildings, "--files", spec.files, "--textures", spec.textures, "--texture-px", spec.texture_px]

@@ -5,7 +5,7 @@ from typing import Final
 
 import click
 
-from map3d.cli.app import VERBS, cli
+from map3d.cli.app import COMMANDS, cli
 
 TARGET: Final = Path(__file__).with_name("cli.md")
 HEAD: Final = "# Command line\n\nWritten by `make docs` from the commands' own help. All commands accept `-h`, `--help`.\n"
@@ -14,10 +14,10 @@ HEAD: Final = "# Command line\n\nWritten by `make docs` from the commands' own h
 def reference() -> str:
     parts = [HEAD, section("map3d", cli)]
     with click.Context(cli, info_name="map3d") as context:
-        for verb in VERBS:
-            command = cli.get_command(context, verb)
+        for name in COMMANDS:
+            command = cli.get_command(context, name)
             assert command is not None
-            parts.append(section(f"map3d {verb}", command))
+            parts.append(section(f"map3d {name}", command))
     return "\n".join(parts)
 
 

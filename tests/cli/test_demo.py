@@ -12,7 +12,7 @@ from map3d.errors import NotFound
 from tests.cli.towns import Run, write_town
 
 
-def verbs(workspace: Workspace, folder: Path) -> list[str]:
+def commands(workspace: Workspace, folder: Path) -> list[str]:
     return [arguments[0] for _, arguments in remaining_steps(workspace, folder)]
 
 
@@ -23,13 +23,13 @@ def workspace(tmp_path: Path) -> Workspace:
 
 def test_demo_skips_completed_steps(run: Run, workspace: Workspace, tmp_path: Path) -> None:
     files = write_town(tmp_path / "files", 1)
-    assert verbs(workspace, files) == ["make-town", "create-scene", "add-files", "create-rendering", "render"]
+    assert commands(workspace, files) == ["make-town", "create-scene", "add-files", "create-rendering", "render"]
     run("create-scene", SCENE)
-    assert verbs(workspace, files) == ["make-town", "add-files", "create-rendering", "render"]
+    assert commands(workspace, files) == ["make-town", "add-files", "create-rendering", "render"]
     pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
     run("add-files", SCENE, str(files))
     run("create-rendering", SCENE, NAME, "--res", "1")
-    assert verbs(workspace, files) == ["make-town", "render"]
+    assert commands(workspace, files) == ["make-town", "render"]
 
 
 def test_demo_without_serve_ends_with_a_complete_rendering(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

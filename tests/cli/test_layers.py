@@ -85,8 +85,8 @@ def test_second_layer_of_the_same_kind_has_another_name_and_pass(town: Run) -> N
 )  # fmt: skip
 def test_invalid_layers_are_refused_and_change_nothing(town: Run, options: tuple[str, ...], says: str) -> None:
     before = passes(town, "view")
-    for verb in (("add-layers", "view"), *((NEW,) if options else ())):
-        status, out, err = town(*verb, *options)
+    for command in (("add-layers", "view"), *((NEW,) if options else ())):
+        status, out, err = town(*command, *options)
         assert (status, out) == (2, "")
         assert says in err
     assert passes(town, "view") == before

@@ -13,7 +13,7 @@ from map3d.errors import ImportFailed, LimitExceeded
 from map3d.ingest.import_options import BIG_FILE_BYTES, GIB, ImportOptions
 from map3d.ingest.importing import import_file
 from map3d.ingest.parser_process import ParserProcess
-from map3d.ingest.sources import Source, find_sources
+from map3d.ingest.sources import SourceDocument, find_sources
 from map3d.subprocess import Limits, Message, Subprocess
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
@@ -33,7 +33,7 @@ def catalogue(workspace: Workspace) -> Iterator[Catalogue]:
 
 
 @pytest.fixture
-def source(tmp_path: Path) -> Source:
+def source(tmp_path: Path) -> SourceDocument:
     (tmp_path / "a.obj").write_text(OBJ)
     return find_sources([tmp_path / "a.obj"])[0]
 
@@ -49,7 +49,7 @@ def source(tmp_path: Path) -> Source:
     ],
 )
 def test_a_parser_over_its_limits_is_ended_with_an_explanation(
-    workspace: Workspace, catalogue: Catalogue, source: Source, entry: str, options: ImportOptions, error: type[Exception], says: str
+    workspace: Workspace, catalogue: Catalogue, source: SourceDocument, entry: str, options: ImportOptions, error: type[Exception], says: str
 ) -> None:
     begun = time.monotonic()
     with pytest.raises(error, match=says) as refused:

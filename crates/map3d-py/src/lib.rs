@@ -4,7 +4,7 @@
 mod asset;
 mod batch;
 mod block;
-mod build;
+mod build_scene;
 mod codec;
 mod errors;
 mod files;
@@ -41,7 +41,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<frame::Frame>()?;
     m.add_class::<scene::Scene>()?;
     m.add_class::<block::Block>()?;
-    m.add_function(wrap_pyfunction!(build::build_scene, m)?)?;
+    m.add_function(wrap_pyfunction!(build_scene::build_scene, m)?)?;
     m.add_function(wrap_pyfunction!(block::reduce_block, m)?)?;
     m.add_function(wrap_pyfunction!(block::check_seam, m)?)?;
     m.add_function(wrap_pyfunction!(files::check_file, m)?)?;

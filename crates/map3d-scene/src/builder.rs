@@ -3,7 +3,7 @@
 mod asset_summary;
 mod assets;
 mod buckets;
-mod build;
+mod build_scene;
 mod cells;
 mod chunk_cache;
 mod chunks;
@@ -20,7 +20,7 @@ mod triangle;
 mod triangle_source;
 mod unpack;
 
-pub use build::build_scene;
+pub use build_scene::build_scene;
 pub use encode::{ChunkFile, ChunkInput, encode_chunk};
 pub use report::BuildReport;
 pub use request::{BuildOptions, BuildRequest, GroundPlane};

@@ -71,12 +71,12 @@ struct TileView {
 
 /// A rectangle in tiles, both ends included.
 #[derive(Clone, Copy, Debug)]
-struct Rect {
+struct TileRect {
     pub lo: [f64; 2],
     pub hi: [f64; 2],
 }
 
-impl Rect {
+impl TileRect {
     fn is_small(&self) -> bool {
         (0..2).all(|k| self.hi[k] - self.lo[k] <= SMALL_TILES)
     }
@@ -94,11 +94,11 @@ impl TileView {
         [(u - self.origin[0]) / self.tile_m, (self.origin[1] - v) / self.tile_m]
     }
 
-    pub fn rect(&self, b: &Box3) -> Rect {
+    pub fn rect(&self, b: &Box3) -> TileRect {
         let (center, half) = (self.tiles(b.center()), b.half_extents());
         let spread = |axis: Vec3| (0..3).map(|k| axis[k].abs() * half[k]).sum::<f64>() / self.tile_m * (1.0 + 1e-12) + self.room;
         let spread = [spread(self.axes.right), spread(self.axes.up)];
-        Rect { lo: [0, 1].map(|k| center[k] - spread[k]), hi: [0, 1].map(|k| center[k] + spread[k]) }
+        TileRect { lo: [0, 1].map(|k| center[k] - spread[k]), hi: [0, 1].map(|k| center[k] + spread[k]) }
     }
 }
 
@@ -165,16 +165,16 @@ impl Marker {
         let room = self.view.room;
         let lo = [0, 1].map(|k| c[0][k].min(c[1][k]).min(c[2][k]) - room);
         let hi = [0, 1].map(|k| c[0][k].max(c[1][k]).max(c[2][k]) + room);
-        let Some(range) = self.range(&Rect { lo, hi }) else { return };
+        let Some(range) = self.range(&TileRect { lo, hi }) else { return };
         self.tiles.mark(&range, |tiles| {
             let [lo, hi] = [0, 1].map(|end| [f64::from(tiles.x[end] + end as u32), f64::from(tiles.y[end] + end as u32)]);
-            let rect = Rect { lo: lo.map(|v| v - room), hi: hi.map(|v| v + room) };
+            let rect = TileRect { lo: lo.map(|v| v - room), hi: hi.map(|v| v + room) };
             !(0..3).any(|k| edge_separates(c[k], c[(k + 1) % 3], c[(k + 2) % 3], &rect))
         });
     }
 
     /// The tiles that a rectangle meets; `None` outside the square.
-    fn range(&self, rect: &Rect) -> Option<TileRange> {
+    fn range(&self, rect: &TileRect) -> Option<TileRange> {
         let side = f64::from(self.tiles.side());
         let line = |k: usize| {
             let meets = rect.hi[k] >= 0.0 && rect.lo[k] < side;
@@ -185,7 +185,7 @@ impl Marker {
 }
 
 /// Whether the edge a → b separates a rectangle from the corner c.
-fn edge_separates(a: [f64; 2], b: [f64; 2], c: [f64; 2], rect: &Rect) -> bool {
+fn edge_separates(a: [f64; 2], b: [f64; 2], c: [f64; 2], rect: &TileRect) -> bool {
     let normal = [a[1] - b[1], b[0] - a[0]];
     let side = |p: [f64; 2]| normal[0] * (p[0] - a[0]) + normal[1] * (p[1] - a[1]);
     let sign = if side(c) < 0.0 { -1.0 } else { 1.0 };

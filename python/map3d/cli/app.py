@@ -11,7 +11,7 @@ import click
 from map3d import __version__
 from map3d.errors import Map3dError
 
-VERBS: Final = {
+COMMANDS: Final = {
     "create-scene": "create_scene",
     "add-files": "add_files",
     "create-rendering": "create_rendering",
@@ -31,20 +31,20 @@ VERBS: Final = {
 }
 
 
-class Verbs(click.Group):
+class Commands(click.Group):
     """Loads the module of a command on first use, and lists the commands in the order of a typical workflow."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(VERBS)
+        return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in VERBS:
+        if cmd_name not in COMMANDS:
             return None
-        command: click.Command = importlib.import_module(f"map3d.cli.{VERBS[cmd_name]}").command
+        command: click.Command = importlib.import_module(f"map3d.cli.{COMMANDS[cmd_name]}").command
         return command
 
 
-@click.group(cls=Verbs, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 @click.version_option(__version__, prog_name="map3d")
 def cli() -> None:
     """Turn 3D city models into oblique image tiles that any phone can show.

@@ -14,7 +14,7 @@ from map3d.ingest.asset import asset_digest, new_objects, put_in_place, read_obj
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.parser_process import ParserProcess
 from map3d.ingest.scene_crs import LOCAL
-from map3d.ingest.sources import Source, source_digest
+from map3d.ingest.sources import SourceDocument, source_digest
 from map3d.ingest.unfinished_imports import draft_path, finish_imports, mark_import, remove_dead_drafts, unmark_import
 from map3d.registry import Registry
 from map3d.subprocess import Failure, Limits
@@ -46,7 +46,7 @@ def import_file(
     workspace: Workspace,
     catalogue: Catalogue,
     scene: str,
-    source: Source,
+    source: SourceDocument,
     options: ImportOptions,
     progress: OnProgress | None = None,
     *,
@@ -81,7 +81,7 @@ def import_file(
 
 
 def _parse(
-    record: SceneRecord, source: Source, options: ImportOptions, draft: Path, progress: OnProgress | None, parser: ParserProcess, entry: str
+    record: SceneRecord, source: SourceDocument, options: ImportOptions, draft: Path, progress: OnProgress | None, parser: ParserProcess, entry: str
 ) -> dict[str, Any]:
     limits = options.limits(source.paths, source.format)
     request = {
@@ -120,7 +120,7 @@ def _add_to_scene(
     workspace: Workspace,
     catalogue: Catalogue,
     before: SceneRecord,
-    source: Source,
+    source: SourceDocument,
     draft: Path,
     report: dict[str, Any],
     proposed: SceneCrs | None,
@@ -167,7 +167,7 @@ def _round_to_step(value: float) -> float:
     return round(value / ORIGIN_STEP_M) * ORIGIN_STEP_M + 0.0
 
 
-def _check_distance(source: Source, boxes: list[Box | None], origin: Vec3) -> None:
+def _check_distance(source: SourceDocument, boxes: list[Box | None], origin: Vec3) -> None:
     for box in boxes:
         if box is not None and max(abs(corner[k] - origin[k]) for corner in box for k in range(3)) > MAX_FROM_ORIGIN_M:
             raise LimitExceeded(
@@ -187,7 +187,7 @@ def _list_skipped(report: Mapping[str, Any]) -> str:
     return f" (skipped: {skipped})" if skipped else ""
 
 
-def _parser_error(source: Source, limits: Limits, error: SubprocessDied | LimitExceeded) -> ImportFailed | LimitExceeded:
+def _parser_error(source: SourceDocument, limits: Limits, error: SubprocessDied | LimitExceeded) -> ImportFailed | LimitExceeded:
     if isinstance(error, LimitExceeded):
         return LimitExceeded(f"{source.paths[0]}: {error}; raise the limit with --parse-memory or --parse-cpu")
     if isinstance(error, SubprocessTimedOut) and limits.wall_s is not None:
@@ -195,7 +195,7 @@ def _parser_error(source: Source, limits: Limits, error: SubprocessDied | LimitE
     return ImportFailed(f"{source.paths[0]}: the parser crashed and nothing was imported: {error}")
 
 
-def _failure_error(source: Source, failure: Failure) -> Map3dError:
+def _failure_error(source: SourceDocument, failure: Failure) -> Map3dError:
     kinds: dict[str, type[Map3dError]] = {"CrsError": CrsError, "LimitError": LimitExceeded, "LimitExceeded": LimitExceeded}
     text = failure.message if str(source.paths[0]) in failure.message else f"{source.paths[0]}: {failure.message}"
     if failure.kind in kinds:

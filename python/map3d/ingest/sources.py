@@ -21,7 +21,7 @@ OnUnreadable = Callable[[Path, str], None]
 
 
 @dataclass(frozen=True)
-class Source:
+class SourceDocument:
     """`paths`: the document; for terrain, its rasters."""
 
     name: str
@@ -29,7 +29,7 @@ class Source:
     paths: tuple[Path, ...]
 
 
-def find_sources(paths: Iterable[Path], name: str | None = None, on_unreadable: OnUnreadable | None = None) -> list[Source]:
+def find_sources(paths: Iterable[Path], name: str | None = None, on_unreadable: OnUnreadable | None = None) -> list[SourceDocument]:
     """Returns the given files, and every file of a known format below the given folders, sorted by path. The rasters of a folder are one source.
 
     `on_unreadable` is called for files in folders whose suffix announces a known format that their content is not.
@@ -47,7 +47,7 @@ def find_sources(paths: Iterable[Path], name: str | None = None, on_unreadable: 
     return _name_sources(_group_rasters(found), name)
 
 
-def source_digest(source: Source) -> str:
+def source_digest(source: SourceDocument) -> str:
     """Computes the digest of the document, the files beside it whose names begin with its stem, and the libraries and images that it references."""
     total = hashlib.sha256()
     for path in source.paths:
@@ -87,7 +87,7 @@ def _group_rasters(found: Sequence[tuple[Path, Format]]) -> list[tuple[Format, t
     return groups + [("raster", tuple(paths)) for paths in rasters.values()]
 
 
-def _name_sources(groups: Sequence[tuple[Format, tuple[Path, ...]]], name: str | None) -> list[Source]:
+def _name_sources(groups: Sequence[tuple[Format, tuple[Path, ...]]], name: str | None) -> list[SourceDocument]:
     """Names sources after their files and numbers duplicates."""
     taken: set[str] = set()
     sources = []
@@ -97,7 +97,7 @@ def _name_sources(groups: Sequence[tuple[Format, tuple[Path, ...]]], name: str |
         while unique in taken:
             unique, number = f"{wanted[:58]}-{number}", number + 1
         taken.add(unique)
-        sources.append(Source(unique, format, paths))
+        sources.append(SourceDocument(unique, format, paths))
     return sources
 
 

@@ -11,7 +11,7 @@ from map3d.geometry.frames import pin
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import import_file
 from map3d.ingest.parser_process import ParserProcess
-from map3d.ingest.sources import Source, find_sources, source_digest
+from map3d.ingest.sources import SourceDocument, find_sources, source_digest
 from map3d.renderings.build import open_scene
 from map3d.renderings.create import RenderingRequest, create_rendering
 from map3d.renderings.layers import LayerRequest
@@ -71,7 +71,7 @@ def _import_changed(
     workspace: Workspace,
     catalogue: Catalogue,
     request: SiteRequest,
-    source: Source,
+    source: SourceDocument,
     digests: dict[str, str],
     summary: ImportSummary,
     parser: ParserProcess,

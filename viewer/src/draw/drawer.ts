@@ -36,7 +36,7 @@ export interface TileAccess {
 }
 
 /** One image layer in a frame. */
-export interface Pass {
+export interface LayerPass {
   readonly mode: Mode;
   /** The level whose tile pixels are nearest in size to device pixels; quads are of this level or fall back for it. */
   readonly level: number;
@@ -90,7 +90,7 @@ export interface CustomLayer {
 
 /** Everything that a drawer draws in a frame. */
 export interface FrameContent extends FrameState {
-  readonly passes: readonly Pass[];
+  readonly passes: readonly LayerPass[];
   readonly customLayers: readonly CustomLayer[];
   /** WebGL only: estimates light that was not rendered; while the camera moves, the last estimate is used. */
   readonly lighting?: { readonly estimator: LightEstimator; readonly moving: boolean } | null;

@@ -3,7 +3,7 @@ import { asError, UsageError } from "../core/errors";
 import type { Vec2 } from "../core/vec";
 import { parseColor, type Rgb } from "../draw/color";
 import type { Clip } from "../draw/depthMapping";
-import { listBakedLightKinds, MODES, listRequiredKinds, type BakedLight, type Mode, type Pass, type TileAccess } from "../draw/drawer";
+import { listBakedLightKinds, MODES, listRequiredKinds, type BakedLight, type Mode, type LayerPass, type TileAccess } from "../draw/drawer";
 import type { DrawStyles } from "../draw/drawStyle";
 import type { Frame, Tile } from "../geo/frame";
 import { towardsLight, type Light } from "../geo/light";
@@ -242,7 +242,7 @@ export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
   }
 
   /** @internal Makes its pass of a frame. @param before number of combined layers added before it; null: it is not combined */
-  makePass(plan: LayerPlan, { origin }: ViewState, before: number | null): Pass {
+  makePass(plan: LayerPlan, { origin }: ViewState, before: number | null): LayerPass {
     const rendering = this.#rendering as Rendering;
     return {
       mode: this.#effectiveMode(rendering),

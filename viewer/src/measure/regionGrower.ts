@@ -22,7 +22,7 @@ export interface RegionWindow {
 }
 
 /** Plane D = d + x · columns + y · rows, counted from the start pixel; metres. */
-export interface DepthPlane {
+export interface PixelPlane {
   readonly d: number;
   readonly x: number;
   readonly y: number;
@@ -32,7 +32,7 @@ export interface DepthPlane {
 
 /** The pixels of a planar face. */
 export interface PlanarRegion {
-  readonly plane: DepthPlane;
+  readonly plane: PixelPlane;
   /** Number of pixels, with fractions where the border is a crease. */
   readonly pixels: number;
   /** Fraction of the border where something nearer is in front of the plane. */
@@ -104,8 +104,8 @@ export class RegionGrower {
   }
 
   /** Fits a plane to each block of 3 × 3 pixels that contains the start pixel, and returns the best one, so that the start pixel can be at an edge. */
-  #fitFirstPlane(): DepthPlane | null {
-    let best: DepthPlane | null = null;
+  #fitFirstPlane(): PixelPlane | null {
+    let best: PixelPlane | null = null;
     for (let k = 0; k < 9; k++) {
       this.#count = 0;
       for (let n = 0; n < 9; n++) {
@@ -120,7 +120,7 @@ export class RegionGrower {
   }
 
   /** Flood-fills the mask from the start pixel. @returns true when the region reaches the radius (columns, rows) */
-  #fillMask(plane: DepthPlane, tolerance_m: number, radius: number): boolean {
+  #fillMask(plane: PixelPlane, tolerance_m: number, radius: number): boolean {
     const [width, found, mask, steps, x0, y0] = [this.#width, this.#found, this.#mask, this.#steps, this.#x, this.#y];
     const [right, bottom] = [width - PAD - 1, this.#height - PAD - 1];
     mask.fill(0);
@@ -146,7 +146,7 @@ export class RegionGrower {
   }
 
   /** Fits a plane by least squares; null for fewer than five pixels or collinear ones. @param within leaves out pixels at the border, which can belong to another face */
-  #fitPlane(within = false): DepthPlane | null {
+  #fitPlane(within = false): PixelPlane | null {
     const step = Math.ceil(this.#count / MAX_FITTED);
     const counted: number[] = [];
     for (let k = 0; k < this.#count; k += step) {
@@ -168,7 +168,7 @@ export class RegionGrower {
    * Classifies each border pixel by the two pixels beyond it. If their line meets the plane within a pixel, the border is a crease, and the pixel counts up to
    * there. Otherwise it is a step, which hides the face if the pixels beyond are in front of the plane.
    */
-  #measureBorder(plane: DepthPlane): Pick<PlanarRegion, "pixels" | "hidden"> {
+  #measureBorder(plane: PixelPlane): Pick<PlanarRegion, "pixels" | "hidden"> {
     let [border, covered, pixels] = [0, 0, this.#count];
     for (const at of this.#found.subarray(0, this.#count)) {
       for (const step of this.#steps) {
@@ -184,17 +184,17 @@ export class RegionGrower {
   }
 
   /** Largest distance of a pixel from the plane along the line of sight, metres. */
-  #tolerance(plane: DepthPlane): number {
+  #tolerance(plane: PixelPlane): number {
     return (TOLERANCE_M + TOLERANCE_PX * this.#source.pixel_m) * this.#areaFactor(plane);
   }
 
   /** Area on the plane per area on the screen. */
-  #areaFactor({ x, y }: DepthPlane): number {
+  #areaFactor({ x, y }: PixelPlane): number {
     return Math.hypot(1, x / this.#source.pixel_m, y / this.#source.pixel_m);
   }
 
   /** Distance of a pixel behind the plane, metres. */
-  #distanceBehind({ d, x, y }: DepthPlane, at: number): number {
+  #distanceBehind({ d, x, y }: PixelPlane, at: number): number {
     this.#kind(at);
     return (this.#depths[at] as number) - (d + x * ((at % this.#width) - this.#x) + y * (Math.floor(at / this.#width) - this.#y));
   }

@@ -2,7 +2,7 @@ import { CACHE, RECORD } from "./cacheKeys";
 import { StorageError } from "./offlineCache";
 import type { FilledArea } from "./areaPlan";
 
-/** A saved or incomplete area. Pass it to `downloadArea` to resume or update it. */
+/** A saved or incomplete area. LayerPass it to `downloadArea` to resume or update it. */
 export interface StoredArea extends FilledArea {
   readonly name: string;
   /** Titles of its renderings. */

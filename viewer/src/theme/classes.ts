@@ -30,7 +30,7 @@ export interface ClassOptions {
   readonly otherLabel: string;
 }
 
-type Entry = readonly [id: number, value: AttributeValue];
+type ValueEntry = readonly [id: number, value: AttributeValue];
 
 /** Classifies numbers by range and everything else by value. Text counts as numbers if all values are numeric. */
 export function classify(info: Pick<AttributeInfo, "type">, column: ReadonlyMap<number, AttributeValue>, options: ClassOptions): Classification {
@@ -77,7 +77,7 @@ function numberFormat(sorted: readonly number[], language: string | undefined): 
 }
 
 /** The most frequent values, and one class for the others. */
-function classifyByValue(entries: readonly Entry[], ordered: boolean, { colors, language, otherLabel }: ClassOptions): ThemeClass[] {
+function classifyByValue(entries: readonly ValueEntry[], ordered: boolean, { colors, language, otherLabel }: ClassOptions): ThemeClass[] {
   const groups = new Map<AttributeValue, number[]>();
   for (const [id, value] of entries) {
     const group = groups.get(value);

@@ -1,5 +1,5 @@
 import { describe, expect, test } from "vitest";
-import type { Pass } from "../../src/draw/drawer";
+import type { LayerPass } from "../../src/draw/drawer";
 import { listNeighbourKinds, listKinds, makeShadingOptions, type ShadingOptions, type TileLight } from "../../src/draw/canvas/shadingOptions";
 import { computeTileLight, type LightLayers } from "../../src/draw/canvas/tileLight";
 import type { DrawStyles } from "../../src/draw/drawStyle";
@@ -108,7 +108,7 @@ describe("a shaded tile", () => {
 });
 
 describe("shading options", () => {
-  const pass = { mode: "lit", masked: true, depths: null, clip: null, depthRange: [0, 9], bakedLight: { shadow: null, occlusion: false } } as unknown as Pass;
+  const pass = { mode: "lit", masked: true, depths: null, clip: null, depthRange: [0, 9], bakedLight: { shadow: null, occlusion: false } } as unknown as LayerPass;
   const frame = { width: 1, height: 1, dpr: 1, light: DEFAULT_LIGHT, passes: [] };
 
   test("list the layers that a tile needs, and those that matter beyond its edges", () => {
@@ -130,7 +130,7 @@ test("areas are recovered from their rectangles at any zoom", () => {
     const fallbacks = [{ area: { z: 4, x: 9, y: 3 }, from: { z: 4, x: 9, y: 3 } }, { area: { z: 4, x: 10, y: 3 }, from: { z: 1, x: 1, y: 0 } }, { area: { z: 6, x: 44, y: 15 }, from: { z: 6, x: 44, y: 15 } }];
     const quads = placeQuads(frame, { left: -77.3, top: 41.9, px_m }, fallbacks, 4);
     for (const quad of quads) {
-      const grid = makeGrid({ quads: [quad], level: 4 } as unknown as Pass, 256);
+      const grid = makeGrid({ quads: [quad], level: 4 } as unknown as LayerPass, 256);
       expect(quads.map(({ rect }) => grid && findArea(grid, rect))).toEqual(fallbacks.map(({ area }) => area));
       expect(grid?.px).toBeCloseTo(1024 / 16 / 256 / px_m, 6);
     }

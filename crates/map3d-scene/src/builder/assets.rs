@@ -17,13 +17,13 @@ const FOLDER: &str = "build";
 
 /// The assets of a request, by number.
 pub(super) struct Assets {
-    entries: Vec<Entry>,
+    entries: Vec<AssetEntry>,
     summaries_folder: PathBuf,
     /// Summaries of assets before they changed or were removed.
     previous: Vec<AssetSummary>,
 }
 
-struct Entry {
+struct AssetEntry {
     folder: PathBuf,
     digest: String,
     opened: Option<Asset>,
@@ -45,7 +45,7 @@ impl Assets {
                 summary.as_ref().is_some_and(|s| s.details.digest == digest && s.details.prototypes.iter().all(|p| folder.join(p).exists()));
             let (summary, previous) = if is_valid { (summary, None) } else { (None, summary) };
             out.previous.extend(previous);
-            out.entries.push(Entry { folder: place, digest, opened: None, summary, is_new: false });
+            out.entries.push(AssetEntry { folder: place, digest, opened: None, summary, is_new: false });
         }
         out.previous.extend(out.read_removed(&request.assets)?);
         Ok(out)

@@ -15,7 +15,7 @@ use super::encode::{ChunkInput, encode_chunk};
 use super::files::write_if_changed;
 use super::triangle::BuildTriangle;
 use super::triangle_source::TriangleSource;
-use super::unpack::{MaterialTable, unpack_chunk};
+use super::unpack::{MaterialNumbers, unpack_chunk};
 use super::{BuildReport, BuildRequest, Progress};
 use crate::index::{Cell, ChunkEntry};
 use crate::lattice::snap;
@@ -146,7 +146,7 @@ impl<'a> ChunkWriter<'a> {
             if !progress("chunks", (k * threads) as u64, stale.len() as u64) {
                 return Err(Error::Interrupted);
             }
-            let one = |n: &usize| self.build_cell(*n, MaterialTable::new(materials), changed_objects);
+            let one = |n: &usize| self.build_cell(*n, MaterialNumbers::new(materials), changed_objects);
             let done: Vec<CellChunks> = pool.install(|| batch.par_iter().map(one).collect::<Result<_>>())?;
             out.extend(done);
         }
@@ -165,7 +165,7 @@ impl<'a> ChunkWriter<'a> {
     }
 
     /// Builds the chunks of one sorting cell.
-    fn build_cell(&self, number: usize, mut materials: MaterialTable, changed_objects: &HashSet<u32>) -> Result<CellChunks> {
+    fn build_cell(&self, number: usize, mut materials: MaterialNumbers, changed_objects: &HashSet<u32>) -> Result<CellChunks> {
         let cell = self.tree.sorting_cells()[number];
         let mut triangles = self.buckets.load(cell)?;
         if let CellPlan::Patch(files) = &self.plans[number] {

@@ -61,7 +61,7 @@ impl BuildTriangle {
         let corners = [0, 1, 2].map(|k| t.corner(k));
         let m = [0, 1, 2].map(|k| t.middle(k));
         let count = long.iter().filter(|l| **l).count();
-        let pieces: &[[Corner; 3]] = match count {
+        let pieces: &[[TriangleCorner; 3]] = match count {
             1 => &[[corners[0], m[0], corners[2]], [m[0], corners[1], corners[2]]],
             2 => &[[corners[0], m[0], m[1]], [m[0], corners[1], m[1]], [corners[0], m[1], corners[2]]],
             _ => &[[corners[0], m[0], m[2]], [m[0], corners[1], m[1]], [m[2], m[1], corners[2]], [m[0], m[1], m[2]]],
@@ -73,24 +73,24 @@ impl BuildTriangle {
         self.with(&[0, 1, 2].map(|k| self.corner((start + k) % 3)))
     }
 
-    fn corner(&self, k: usize) -> Corner {
-        Corner { point: self.corners[k], uv: self.uv[k], normal: self.normals[k] }
+    fn corner(&self, k: usize) -> TriangleCorner {
+        TriangleCorner { point: self.corners[k], uv: self.uv[k], normal: self.normals[k] }
     }
 
     /// Returns the middle of the edge from corner k.
-    fn middle(&self, k: usize) -> Corner {
+    fn middle(&self, k: usize) -> TriangleCorner {
         let (a, b) = (self.corner(k), self.corner((k + 1) % 3));
         let normal = [0, 1, 2].map(|i| ((i32::from(a.normal[i]) + i32::from(b.normal[i])) / 2) as i16);
-        Corner { point: midpoint(a.point, b.point), uv: [0, 1].map(|i| (a.uv[i] + b.uv[i]) * 0.5), normal }
+        TriangleCorner { point: midpoint(a.point, b.point), uv: [0, 1].map(|i| (a.uv[i] + b.uv[i]) * 0.5), normal }
     }
 
-    fn with(&self, c: &[Corner; 3]) -> Self {
+    fn with(&self, c: &[TriangleCorner; 3]) -> Self {
         Self { corners: c.map(|c| c.point), uv: c.map(|c| c.uv), normals: c.map(|c| c.normal), ..*self }
     }
 }
 
 #[derive(Clone, Copy)]
-struct Corner {
+struct TriangleCorner {
     point: Point,
     uv: [f32; 2],
     normal: [i16; 3],

@@ -12,12 +12,12 @@ use crate::lattice::{Point, snap};
 use crate::records::MaterialRecord;
 
 /// Material records by number; equal records have one number.
-pub(super) struct MaterialTable {
+pub(super) struct MaterialNumbers {
     pub records: Vec<MaterialRecord>,
     numbers: HashMap<MaterialRecord, u32>,
 }
 
-impl MaterialTable {
+impl MaterialNumbers {
     pub fn new(records: &[MaterialRecord]) -> Self {
         Self { records: records.to_vec(), numbers: records.iter().copied().zip(0..).collect() }
     }
@@ -31,7 +31,7 @@ impl MaterialTable {
 }
 
 /// Appends the triangles of the objects that `wanted` accepts.
-pub(super) fn unpack_chunk(path: &Path, materials: &mut MaterialTable, wanted: impl Fn(u32) -> bool, out: &mut Vec<BuildTriangle>) -> Result<()> {
+pub(super) fn unpack_chunk(path: &Path, materials: &mut MaterialNumbers, wanted: impl Fn(u32) -> bool, out: &mut Vec<BuildTriangle>) -> Result<()> {
     let chunk = Chunk::open(path, true)?;
     let numbers: Vec<u32> = chunk.materials().iter().map(|m| materials.number(m)).collect();
     let objects: Vec<Option<u32>> = chunk.objects().iter().map(|o| Some(o.id).filter(|id| wanted(*id))).collect();

@@ -34,7 +34,7 @@ type Shared<T> = Arc<OnceLock<std::result::Result<Arc<T>, String>>>;
 /// Texture and level.
 type LevelKey = (TextureKey, u32);
 
-struct Entry {
+struct LevelEntry {
     level: Shared<Level>,
     /// 0 until the level is computed.
     bytes: u64,
@@ -43,7 +43,7 @@ struct Entry {
 
 #[derive(Default)]
 struct Levels {
-    entries: HashMap<LevelKey, Entry>,
+    entries: HashMap<LevelKey, LevelEntry>,
     bytes: u64,
     clock: u64,
 }
@@ -118,7 +118,7 @@ impl TextureCache {
         let mut levels = self.levels.lock().expect("no thread panicked");
         levels.clock += 1;
         let clock = levels.clock;
-        let entry = levels.entries.entry(key).or_insert_with(|| Entry { level: Shared::default(), bytes: 0, last_used: 0 });
+        let entry = levels.entries.entry(key).or_insert_with(|| LevelEntry { level: Shared::default(), bytes: 0, last_used: 0 });
         entry.last_used = clock;
         entry.level.clone()
     }

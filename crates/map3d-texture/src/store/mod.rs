@@ -1,6 +1,6 @@
 //! The texture store: turns source images into `.m3t` files, and these into levels ready to sample.
 
-mod build;
+mod build_textures;
 mod cache;
 mod file;
 mod level;
@@ -8,7 +8,9 @@ mod mips;
 mod source;
 mod usage;
 
-pub use build::{MissingImages, Progress, TextureAsset, TextureInfo, TextureKeys, TextureSource, build_textures, prune_textures, texture_source};
+pub use build_textures::{
+    MissingImages, Progress, TextureAsset, TextureInfo, TextureKeys, TextureSource, build_textures, prune_textures, texture_source,
+};
 pub use cache::{CacheStats, LocalTextureCache, Texture, TextureCache};
 pub use file::{TEXTURE_MAGIC, TEXTURE_VERSION, TextureFile, TextureKey, encode_texture, hex, texture_key, texture_path, write_texture};
 pub use level::{AlphaCell, Level};

@@ -9,7 +9,7 @@ use map3d_scene::SceneStore;
 use twox_hash::XxHash3_128;
 
 use super::reach::Reach;
-use super::{Rect, TileView};
+use super::{TileRect, TileView};
 
 /// Returns the keys of base blocks of one level, (x, y) each: hex hashes over everything that their bytes depend on, which is the format, the frame, and
 /// every object and instance whose box meets the block's beam, casts a shadow into it or occludes ambient light there. Opens every chunk once.
@@ -60,7 +60,7 @@ impl<'a> Sums<'a> {
     }
 
     /// Returns the first and last column and row with a block that a rectangle meets.
-    fn tiles(&self, rect: &Rect) -> [[u32; 2]; 2] {
+    fn tiles(&self, rect: &TileRect) -> [[u32; 2]; 2] {
         // A rectangle whose border is that of a tile meets both tiles.
         let first = |k: usize| ((rect.lo[k].ceil() - 1.0).max(0.0) as u32).max(self.span[k][0]);
         let last = |k: usize| if rect.hi[k] < 0.0 { None } else { Some((rect.hi[k] as u32).min(self.span[k][1])) };
@@ -69,7 +69,7 @@ impl<'a> Sums<'a> {
 
     fn meets_any(&self, bounds: &Box3) -> bool {
         let mut any = false;
-        let meets = |rect: &Rect| self.tiles(rect).iter().all(|[first, last]| first <= last);
+        let meets = |rect: &TileRect| self.tiles(rect).iter().all(|[first, last]| first <= last);
         self.reach.each(bounds, self.view.rect(bounds), |rect| any |= meets(rect));
         any
     }

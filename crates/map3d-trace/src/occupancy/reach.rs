@@ -3,7 +3,7 @@
 use map3d_base::vec3::dot;
 use map3d_base::{Box3, Frame, LayerKind, RAY_LIFT_M};
 
-use super::{Rect, TileView};
+use super::{TileRect, TileView};
 
 /// A long shadow is split into at most this number of rectangles.
 const STEPS_MAX: f64 = 64.0;
@@ -32,8 +32,8 @@ impl Reach {
 
     /// Calls `take` with rectangles that together cover the tiles in which a box is visible, casts a shadow or occludes ambient light. `rect`: where it is
     /// visible.
-    pub fn each(&self, bounds: &Box3, rect: Rect, mut take: impl FnMut(&Rect)) {
-        let rect = Rect { lo: rect.lo.map(|v| v - self.radius), hi: rect.hi.map(|v| v + self.radius) };
+    pub fn each(&self, bounds: &Box3, rect: TileRect, mut take: impl FnMut(&TileRect)) {
+        let rect = TileRect { lo: rect.lo.map(|v| v - self.radius), hi: rect.hi.map(|v| v + self.radius) };
         take(&rect);
         let height = (bounds.hi[2] - self.floor_m).max(0.0);
         for shadow in &self.shadows {
@@ -44,7 +44,7 @@ impl Reach {
                 let (from, to) = (f64::from(n) / steps, f64::from(n + 1) / steps);
                 let lo = [0, 1].map(|k| rect.lo[k] + (way[k] * from).min(way[k] * to));
                 let hi = [0, 1].map(|k| rect.hi[k] + (way[k] * from).max(way[k] * to));
-                take(&Rect { lo, hi });
+                take(&TileRect { lo, hi });
             }
         }
     }

@@ -1,7 +1,7 @@
 import type { Tile } from "../../geo/frame";
 import type { LayerKind } from "../../geo/manifest";
 import { findFallbacks } from "../../tiles/cover";
-import { listRequiredKinds, type Drawer, type DrawerEvents, type FrameContent, type Pass, type Quad } from "../drawer";
+import { listRequiredKinds, type Drawer, type DrawerEvents, type FrameContent, type LayerPass, type Quad } from "../drawer";
 import { overlaps } from "../depthMapping";
 import type { DrawStyles } from "../drawStyle";
 import { listNeighbourKinds, listKinds, makeShadingOptions, restrictOptions, type ShadingOptions } from "./shadingOptions";
@@ -11,7 +11,7 @@ import type { ShadeRequest, TileImage } from "./shadeMessages";
 import { findArea, makeGrid, type Grid, type MosaicTile } from "./tileMosaic";
 import { CssCompositor, CanvasCompositor, type Compositor, type ComposedPass } from "./compositor";
 
-type IdValues = Pass["highlight"] | DrawStyles;
+type IdValues = LayerPass["highlight"] | DrawStyles;
 
 /** A visible tile. */
 interface WantedTile {
@@ -80,7 +80,7 @@ export class CanvasDrawer implements Drawer {
   }
 
   /** Sends the worker missing data. @returns the visible tiles by picture name */
-  #uploadPass(frame: FrameContent, pass: Pass): Map<string, WantedTile> {
+  #uploadPass(frame: FrameContent, pass: LayerPass): Map<string, WantedTile> {
     const names = { highlight: pass.highlight.size > 0 ? this.#uploadValues(pass.highlight) : null, styles: pass.drawStyles && this.#uploadValues(pass.drawStyles) };
     const wanted = new Map<string, WantedTile>();
     for (const { from, rect, scale } of pass.quads) {
@@ -95,7 +95,7 @@ export class CanvasDrawer implements Drawer {
   }
 
   /** Sends the worker a tile's data. @returns the names of its layers; null when a required layer is missing */
-  #uploadTile(pass: Pass, options: ShadingOptions, tile: Tile): ShadeRequest["layers"] | null {
+  #uploadTile(pass: LayerPass, options: ShadingOptions, tile: Tile): ShadeRequest["layers"] | null {
     const picture = this.#pictures.getOrCreate(makeName(pass, tile));
     const layers: Partial<Record<LayerKind, string>> = {};
     for (const kind of listKinds(options)) {
@@ -113,7 +113,7 @@ export class CanvasDrawer implements Drawer {
     return listRequiredKinds(options.mode, options.masked, options.combined).every((kind) => layers[kind] !== undefined) ? layers : null;
   }
 
-  #composePass(pass: Pass, wanted: ReadonlyMap<string, WantedTile>): ComposedPass[] {
+  #composePass(pass: LayerPass, wanted: ReadonlyMap<string, WantedTile>): ComposedPass[] {
     const { mode, opacity, clip, quads } = pass;
     const grid = makeGrid(pass, this.#tilePx);
     if (!grid || this.#tilePx === 0) return [];
@@ -122,7 +122,7 @@ export class CanvasDrawer implements Drawer {
   }
 
   /** Finds the pictures that fill a quad: its own, or those of descendants or of an ancestor. */
-  #findMosaicTiles(pass: Pass, grid: Grid, { from, rect }: Quad): MosaicTile[] {
+  #findMosaicTiles(pass: LayerPass, grid: Grid, { from, rect }: Quad): MosaicTile[] {
     const area = findArea(grid, rect);
     const imageOf = (tile: Tile): TileImage | undefined => this.#pictures.get(makeName(pass, tile))?.image;
     const own = imageOf(from);
@@ -132,7 +132,7 @@ export class CanvasDrawer implements Drawer {
   }
 
   /** Makes a request; an up-to-date picture has an empty urgency. */
-  #makeRequest(passes: readonly Pass[], pass: Pass, picture: TilePicture, { from, options, layers, distance }: WantedTile): PictureRequest {
+  #makeRequest(passes: readonly LayerPass[], pass: LayerPass, picture: TilePicture, { from, options, layers, distance }: WantedTile): PictureRequest {
     const { tiles } = pass;
     const restricted = { ...restrictOptions(options, (kind) => layers[kind] !== undefined), masks: this.#findMasks(passes, pass, from) };
     const neighbours: Partial<Record<LayerKind, string[]>> = {};
@@ -147,7 +147,7 @@ export class CanvasDrawer implements Drawer {
   }
 
   /** Finds tiles of other layers that may hide parts of this tile. */
-  #findMasks(passes: readonly Pass[], { depths, clip, tiles }: Pass, from: Tile): Mask[] {
+  #findMasks(passes: readonly LayerPass[], { depths, clip, tiles }: LayerPass, from: Tile): Mask[] {
     if (!depths) return [];
     const others = passes.filter((other) => other.tiles !== tiles && other.depths && other.opacity === 1 && overlaps(clip, other.clip));
     return others.flatMap((other) => {
@@ -169,7 +169,7 @@ export class CanvasDrawer implements Drawer {
     return name;
   }
 
-  #dropUnused(passes: readonly Pass[]): void {
+  #dropUnused(passes: readonly LayerPass[]): void {
     for (const [values, name] of this.#valueNames) {
       if (passes.some(({ highlight, drawStyles }) => highlight === values || drawStyles === values)) continue;
       this.#pictures.drop(name);
@@ -181,7 +181,7 @@ export class CanvasDrawer implements Drawer {
 const NEIGHBOURS = [[-1, 0], [1, 0], [0, -1], [0, 1]] as const;
 
 /** The name of a tile's picture in any mode. */
-const makeName = ({ tiles, mode }: Pass, tile: Tile): string => tiles.key("color", tile) || tiles.key(mode === "lit" ? "color" : mode, tile);
+const makeName = ({ tiles, mode }: LayerPass, tile: Tile): string => tiles.key("color", tile) || tiles.key(mode === "lit" ? "color" : mode, tile);
 
 /** Missing pictures come first, then outdated ones (oldest first), then edges; all from the screen's centre outwards. */
 function computeUrgency(picture: TilePicture, options: string, edges: number, distance: number): number[] {

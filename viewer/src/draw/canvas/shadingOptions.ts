@@ -4,7 +4,7 @@ import type { LayerKind } from "../../geo/manifest";
 import type { Vec2, Vec3 } from "../../core/vec";
 import type { Shadow } from "../../geo/shadows";
 import type { Mask } from "./mask";
-import { listRequiredKinds, type BakedLight, type FrameContent, type Mode, type Pass } from "../drawer";
+import { listRequiredKinds, type BakedLight, type FrameContent, type Mode, type LayerPass } from "../drawer";
 
 /** The light on a tile. */
 export interface TileLight {
@@ -65,7 +65,7 @@ export interface IdTableNames {
 }
 
 /** Makes the options for a tile of a pass. @param scale texels per device pixel */
-export function makeShadingOptions({ light, dpr }: Pick<FrameContent, "light" | "dpr">, pass: Pass, scale: number, { highlight, styles }: IdTableNames): ShadingOptions {
+export function makeShadingOptions({ light, dpr }: Pick<FrameContent, "light" | "dpr">, pass: LayerPass, scale: number, { highlight, styles }: IdTableNames): ShadingOptions {
   const mode = pass.mode === "lit" && !light.lit ? "color" : pass.mode;
   const colored = mode === "lit" || mode === "color" || mode === "picture";
   return {

@@ -1,7 +1,7 @@
 import type { Tile } from "../../geo/frame";
 import type { TileFallback } from "../../tiles/cover";
 import { DrawError } from "../../core/errors";
-import type { Pass, FrameState } from "../drawer";
+import type { LayerPass, FrameState } from "../drawer";
 import type { TileImage } from "./shadeMessages";
 
 /** The position of a level's pixels on the screen. */
@@ -16,7 +16,7 @@ export interface Grid {
 }
 
 /** Computes a pass's grid; null when it has no quads. */
-export function makeGrid({ quads: [quad], level }: Pass, tilePx: number): Grid | null {
+export function makeGrid({ quads: [quad], level }: LayerPass, tilePx: number): Grid | null {
   if (!quad) return null;
   const side = tilePx / quad.scale;
   return { level, tilePx, left: quad.origin[0] - quad.from.x * side, top: quad.origin[1] - quad.from.y * side, px: 2 ** (quad.from.z - level) / quad.scale };

@@ -2,7 +2,7 @@ import { dot, type Vec2, type Vec3 } from "../../core/vec";
 import { cssPixelM, type Camera } from "../../geo/camera";
 import { towardsLight } from "../../geo/light";
 import { joinDepthRanges } from "../depthMapping";
-import type { FrameContent, Pass } from "../drawer";
+import type { FrameContent, LayerPass } from "../drawer";
 import { DepthTarget } from "./depthTarget";
 import { textureUnit, type Program } from "./program";
 
@@ -19,7 +19,7 @@ interface EstimatedLight {
 }
 
 /** Draws a pass into the bound framebuffer, with its depth as a fraction of a range of D. */
-type DrawDepths = (frame: FrameContent, pass: Pass, range: Vec2) => void;
+type DrawDepths = (frame: FrameContent, pass: LayerPass, range: Vec2) => void;
 
 /** Computes screen-space shadows and ambient occlusion (see draw/lightEstimator.ts) and binds them for the shader. */
 export class ScreenSpaceLight {
@@ -46,7 +46,7 @@ export class ScreenSpaceLight {
   }
 
   /** Whether a pass uses the estimate. */
-  appliesTo(frame: FrameContent, pass: Pass): boolean {
+  appliesTo(frame: FrameContent, pass: LayerPass): boolean {
     return this.#result !== null && needsEstimate(frame, pass);
   }
 
@@ -57,7 +57,7 @@ export class ScreenSpaceLight {
   }
 
   /** Sets the program's uniforms, except for those of depth. */
-  bind(program: Program, frame: FrameContent, { bakedLight }: Pass): void {
+  bind(program: Program, frame: FrameContent, { bakedLight }: LayerPass): void {
     const [gl, result] = [this.#gl, this.#result];
     if (!result) return;
     const { texture, camera, step, height, tolerance } = result;
@@ -111,13 +111,13 @@ export const listCustomLayerRanges = ({ customLayers, camera }: FrameContent): V
 const hasShadows = ({ light }: FrameContent): boolean => light.shadows && light.altitude_deg > 0;
 
 /** Whether a pass lacks rendered light that can be estimated. */
-function needsEstimate(frame: FrameContent, { mode, relief, bakedLight }: Pass): boolean {
+function needsEstimate(frame: FrameContent, { mode, relief, bakedLight }: LayerPass): boolean {
   const { light, lighting } = frame;
   return lighting !== undefined && lighting !== null && relief !== null && mode === "lit" && light.lit && ((light.occlusion && !bakedLight.occlusion) || (hasShadows(frame) && !bakedLight.shadow));
 }
 
 /** Makes a pass that draws depths only, with pixels `step` times as large. */
-function makeDepthPass(pass: Pass, step: number): Pass {
+function makeDepthPass(pass: LayerPass, step: number): LayerPass {
   const quads = pass.quads.map(({ from, rect: [left, top, right, bottom], origin: [x, y], scale }) => ({ from, rect: [left / step, top / step, right / step, bottom / step] as const, origin: [x / step, y / step] as const, scale: scale * step }));
   return { ...pass, mode: "depth", quads, highlight: new Map(), depths: pass.relief };
 }

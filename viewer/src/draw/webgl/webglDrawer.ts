@@ -2,7 +2,7 @@ import { DrawError } from "../../core/errors";
 import type { Vec2, Vec3 } from "../../core/vec";
 import { towardsLight } from "../../geo/light";
 import type { LayerKind } from "../../geo/manifest";
-import { listBakedLightKinds, listRequiredKinds, type Drawer, type DrawerEvents, type FrameContent, type Mode, type Pass, type Quad } from "../drawer";
+import { listBakedLightKinds, listRequiredKinds, type Drawer, type DrawerEvents, type FrameContent, type Mode, type LayerPass, type Quad } from "../drawer";
 import { computeDepthAtZero, computeCustomLayerBias, joinDepthRanges, computeMaxStep, type DepthMapping } from "../depthMapping";
 import { packColor, packStyle } from "../drawStyle";
 import { OffscreenTarget } from "./offscreenTarget";
@@ -124,7 +124,7 @@ export class WebGLDrawer implements Drawer {
   }
 
   /** Draws passes and custom layers that hide each other by depth: first all opaque pixels, then edges and translucent passes. */
-  #drawCombined(frame: FrameContent, passes: readonly Pass[], range: Vec2 | null): void {
+  #drawCombined(frame: FrameContent, passes: readonly LayerPass[], range: Vec2 | null): void {
     const gl = this.gl;
     if (!range) return;
     gl.enable(gl.DEPTH_TEST);
@@ -142,7 +142,7 @@ export class WebGLDrawer implements Drawer {
   }
 
   /** @param range minimum and maximum D of the combined passes; null: not combined  @param soft draws only edges and translucent passes */
-  #drawPass(frame: FrameContent, pass: Pass, range: Vec2 | null, soft: boolean): void {
+  #drawPass(frame: FrameContent, pass: LayerPass, range: Vec2 | null, soft: boolean): void {
     this.#setScissor(frame, pass);
     const mode: Mode = pass.mode === "lit" && !frame.light.lit ? "color" : pass.mode;
     const shaded = mode === "lit" && this.#screenSpaceLight.appliesTo(frame, pass);
@@ -166,7 +166,7 @@ export class WebGLDrawer implements Drawer {
     }
   }
 
-  #collectTextures(pass: Pass, mode: Mode, quad: Quad, shaded: boolean): QuadTextures {
+  #collectTextures(pass: LayerPass, mode: Mode, quad: Quad, shaded: boolean): QuadTextures {
     return {
       quad,
       textures: listRequiredKinds(mode, pass.masked, pass.depths !== null).map((kind) => [kind, this.#getTexture(pass, kind, quad)] as const),
@@ -179,7 +179,7 @@ export class WebGLDrawer implements Drawer {
     };
   }
 
-  #getTexture(pass: Pass, kind: LayerKind, { from }: Quad): TileTexture | undefined {
+  #getTexture(pass: LayerPass, kind: LayerKind, { from }: Quad): TileTexture | undefined {
     const key = pass.tiles.key(kind, from);
     const known = this.#textures.get(key);
     if (known) return known;
@@ -197,7 +197,7 @@ export class WebGLDrawer implements Drawer {
     gl.bindTexture(gl.TEXTURE_2D, texture?.texture ?? null);
   }
 
-  #drawQuad(frame: FrameContent, pass: Pass, quad: Quad, program: Program, textures: readonly TileTexture[]): void {
+  #drawQuad(frame: FrameContent, pass: LayerPass, quad: Quad, program: Program, textures: readonly TileTexture[]): void {
     const gl = this.gl;
     const { width, height, light } = frame;
     const [left, top, right, bottom] = quad.rect;
@@ -224,7 +224,7 @@ export class WebGLDrawer implements Drawer {
     this.gl.uniform1i(program.at("u_soft"), Number(soft));
   }
 
-  #setScissor({ width, height }: FrameContent, { clip }: Pass): void {
+  #setScissor({ width, height }: FrameContent, { clip }: LayerPass): void {
     const gl = this.gl;
     if (!clip) {
       gl.disable(gl.SCISSOR_TEST);
@@ -235,7 +235,7 @@ export class WebGLDrawer implements Drawer {
     gl.scissor(left, height - bottom, Math.max(0, right - left), Math.max(0, bottom - top));
   }
 
-  #bindIds(program: Program, { highlight, drawStyles }: Pass, quad: Quad, ids: TileTexture, dpr: number): void {
+  #bindIds(program: Program, { highlight, drawStyles }: LayerPass, quad: Quad, ids: TileTexture, dpr: number): void {
     const gl = this.gl;
     this.#bind("id", ids);
     gl.uniform1f(program.at("u_rim"), Math.max(1, 1.25 * dpr * quad.scale));

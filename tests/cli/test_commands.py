@@ -7,17 +7,17 @@ import click
 import pytest
 
 from map3d import __version__
-from map3d.cli.app import VERBS
+from map3d.cli.app import COMMANDS
 from map3d.cli.options import Bytes, View
 from map3d.types import ViewAngles
 from tests.cli.towns import Run
 
 
-@pytest.mark.parametrize("verb", sorted(VERBS))
-def test_every_verb_and_option_has_a_help_text(run: Run, verb: str) -> None:
-    status, out, err = run(verb, "--help")
+@pytest.mark.parametrize("command", sorted(COMMANDS))
+def test_every_command_and_option_has_a_help_text(run: Run, command: str) -> None:
+    status, out, err = run(command, "--help")
     assert (status, err) == (0, "")
-    assert out.startswith(f"Usage: map3d {verb}")
+    assert out.startswith(f"Usage: map3d {command}")
     assert all(not line.strip().startswith("--") or len(line.split()) > 1 for line in out.splitlines())
 
 
@@ -25,7 +25,7 @@ def test_help_lists_the_verbs_in_the_order_of_use(run: Run) -> None:
     for arguments in ((), ("--help",), ("-h",)):
         status, out, _ = run(*arguments)
         assert status == 0
-        places = [out.rindex(f"\n  {verb} ") for verb in VERBS]
+        places = [out.rindex(f"\n  {command} ") for command in COMMANDS]
         assert places == sorted(places)
 
 
@@ -139,10 +139,10 @@ def test_invalid_view(text: str) -> None:
         View().convert(text, None, None)
 
 
-def test_scripts_run_the_same_verbs(run: Run, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+def test_scripts_run_the_same_commands(run: Run, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     from map3d.cli import scripts
 
-    for function, verb in (
+    for function, command in (
         (scripts.create_scene, "create-scene"),
         (scripts.add_files_to_scene, "add-files"),
         (scripts.create_rendering, "create-rendering"),
@@ -151,4 +151,4 @@ def test_scripts_run_the_same_verbs(run: Run, monkeypatch: pytest.MonkeyPatch, c
         with pytest.raises(SystemExit) as ended:
             function()
         assert ended.value.code == 0
-        assert f"map3d {verb}" in capfd.readouterr().out
+        assert f"map3d {command}" in capfd.readouterr().out
