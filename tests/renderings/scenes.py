@@ -9,6 +9,7 @@ from map3d import _core
 from map3d.catalogue import RenderingRecord
 from map3d.geometry.frames import pin
 from map3d.tiles.naming import morton
+from map3d.tiles.occupancy import morton_numbers
 from map3d.types import Box, Layer, ViewAngles
 
 LAYERS = (Layer("color", "color", "webp", 80), Layer("id", "id", "png"))
@@ -31,6 +32,22 @@ class SquareScene:
     def _block_key(self, frame: str, z: int, x: int, y: int) -> str:
         mine = [name for (u, v), name in sorted(self.content.items()) if (int(u * 2**z), int(v * 2**z)) == (x, y)]
         return hashlib.sha256(json.dumps([frame, z, x, y, mine]).encode()).hexdigest()[:16]
+
+
+class SparseScene:
+    """Content in side × side blocks, `step` blocks apart; keys are cheap. `occupied` takes 8 bytes per block."""
+
+    box: Box = ((0.0, 0.0, 0.0), (100.0, 100.0, 10.0))
+
+    def __init__(self, side: int, step: int) -> None:
+        x, y = np.meshgrid(np.arange(side), np.arange(side))
+        self._numbers = np.sort(morton_numbers(x.ravel() * step, y.ravel() * step))
+
+    def occupied(self, frame: _core.Frame, level: int, within: tuple[int, np.ndarray] | None = None) -> np.ndarray:
+        return self._numbers
+
+    def block_keys(self, frame: _core.Frame, z: int, blocks: np.ndarray) -> list[str]:
+        return [f"{x:016x}{y:016x}" for x, y in blocks.tolist()]
 
 
 def rendering(res_m: float = 0.02, views: tuple[ViewAngles, ...] = (ViewAngles(0, 45), ViewAngles(90, 45))) -> RenderingRecord:

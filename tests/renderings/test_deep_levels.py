@@ -18,7 +18,7 @@ from map3d.geometry.frames import pin
 from map3d.renderings.plan import plan_jobs, planned_occupancy
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.naming import block_levels
-from map3d.tiles.occupancy import Occupancy, xy_from_morton
+from map3d.tiles.occupancy import Occupancy, numbers_of, xy_from_morton
 from map3d.types import DEEPEST_LEVEL, Layer, ViewAngles
 from tests.core.built import House, build_houses
 
@@ -42,7 +42,7 @@ def plan_a_line(folder: str) -> dict[str, object]:
     scene = build_houses(Path(folder), line_of_houses(1000))
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     rendering = record(scene, 0.1, ViewAngles(0, 45), ViewAngles(30, 22.5))
-    jobs = plan_jobs(scene, rendering, {})
+    jobs = list(plan_jobs(scene, rendering, {}))
     plans = [planned_occupancy(scene, frame) for frame in rendering.frames]
     text = [plan.encode() for plan in plans]
     read_back = [Occupancy.decode(rendering.zmax, one) == plan for one, plan in zip(text, plans, strict=True)]
@@ -72,10 +72,10 @@ def test_planning_reaches_the_deepest_level(tmp_path: Path, res_m: float, zmax: 
     plan = planned_occupancy(scene, frame)
     assert 3 * 8**2 <= plan.count(zmax) <= 3 * 10**2, "a roof of 8 × 8 tiles meets at most 10 × 10"
     root = block_levels(zmax)[0].root
-    jobs = plan_jobs(scene, rendering, {})
+    jobs = list(plan_jobs(scene, rendering, {}))
     blocks = [job.block for job in jobs if job.kind == "base"]
     assert {(tile.x, tile.y) for tile in plan.tiles(root)} <= {(block.x, block.y) for block in blocks}
-    assert planned_occupancy(scene, frame, within=blocks) == plan
+    assert planned_occupancy(scene, frame, within=numbers_of((block.x, block.y) for block in blocks)) == plan
     assert len({job.key for job in jobs}) == len(jobs)
     assert Occupancy.decode(zmax, plan.encode()) == plan
 

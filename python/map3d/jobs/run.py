@@ -18,9 +18,9 @@ from map3d.renderings.manifest_writer import Planned, write_manifest
 from map3d.renderings.plan import PlannedScene, plan_jobs, planned_occupancy
 from map3d.renderings.render_task import CACHE_BYTES, RENDER_ENTRY, RenderTask
 from map3d.tiles.naming import block_levels
-from map3d.tiles.occupancy import Occupancy, morton_numbers
+from map3d.tiles.occupancy import Numbers, Occupancy, numbers_of
 from map3d.tiles.sqlite_store import SqliteTileStore
-from map3d.types import BlockId, Box
+from map3d.types import Box
 
 MAX_PLANS: Final = 10
 """A run whose scene was rebuilt this often ends."""
@@ -155,27 +155,23 @@ class Run:
         """Returns, for each view, the base tiles that open blocks of its first pass may fill; later passes fill the same tiles as the first."""
         return {frame.id: planned_occupancy(scene, frame, within=self._open_blocks(frame.id)) for frame in self.record.frames}
 
-    def _open_blocks(self, view: str) -> list[BlockId]:
+    def _open_blocks(self, view: str) -> Numbers:
         """Returns the base blocks of the view's first pass that are not done."""
-        return [job.block for job in self._catalogue.jobs(self.record.name, view) if job.kind == "base" and job.state is not State.DONE]
+        jobs = self._catalogue.jobs(self.record.name, view)
+        return numbers_of((job.block.x, job.block.y) for job in jobs if job.kind == "base" and job.state is not State.DONE)
 
     def _within_open(self, planned: Planned) -> dict[str, Occupancy]:
         """Restricts each view's occupancy to base blocks that are not done now."""
         root = block_levels(self.record.zmax)[0].root
         remaining = {}
         for view, occupancy in planned.items():
-            blocks = self._open_blocks(view)
-            x, y = np.array([block.x for block in blocks], np.int64), np.array([block.y for block in blocks], np.int64)
             base = occupancy.numbers(self.record.zmax)
             above = base >> np.uint64(2 * (self.record.zmax - root))
-            remaining[view] = Occupancy(self.record.zmax, base[np.isin(above, morton_numbers(x, y))])
+            remaining[view] = Occupancy(self.record.zmax, base[np.isin(above, self._open_blocks(view))])
         return remaining
 
 
-def _planned_blocks(catalogue: Catalogue, record: RenderingRecord) -> dict[str, list[BlockId]]:
+def _planned_blocks(catalogue: Catalogue, record: RenderingRecord) -> dict[str, Numbers]:
     """Returns the base blocks with a job, by track."""
-    blocks: dict[str, list[BlockId]] = {track.id: [] for track in record.tracks}
-    for job in catalogue.jobs(record.name):
-        if job.kind == "base" and job.track in blocks:
-            blocks[job.track].append(job.block)
-    return blocks
+    jobs = {track.id: catalogue.jobs(record.name, track.id) for track in record.tracks}
+    return {track: numbers_of((job.block.x, job.block.y) for job in own if job.kind == "base") for track, own in jobs.items()}

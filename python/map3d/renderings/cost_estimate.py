@@ -13,7 +13,7 @@ from map3d.errors import BadRequest
 from map3d.renderings.build import is_stale, open_scene
 from map3d.renderings.plan import PlannedScene, plan_jobs, planned_occupancy, track_frame
 from map3d.tiles.naming import block_levels, morton
-from map3d.tiles.occupancy import Occupancy
+from map3d.tiles.occupancy import Occupancy, numbers_of
 from map3d.types import BlockId
 
 SAMPLE_BLOCKS: Final = 12
@@ -87,13 +87,13 @@ def estimate(workspace: Workspace, catalogue: Catalogue, name: str, workers: int
 
 def open_blocks(scene: PlannedScene, record: RenderingRecord, jobs: Mapping[tuple[str, BlockId], Job]) -> list[PlannedJob]:
     """Returns the base blocks that `map3d render` would render now: new, changed and unfinished ones. `jobs`: by track and block."""
-    blocks: dict[str, list[BlockId]] = {}
+    places: dict[str, list[tuple[int, int]]] = {}
     for (track, block), job in jobs.items():
         if job.kind == "base":
-            blocks.setdefault(track, []).append(block)
-    planned = [job for job in plan_jobs(scene, record, blocks) if job.kind == "base"]
+            places.setdefault(track, []).append((block.x, block.y))
     keys = {place: job.key for place, job in jobs.items() if job.state is State.DONE}
-    return [job for job in planned if keys.get((job.track, job.block)) != job.key]
+    planned = plan_jobs(scene, record, {track: numbers_of(own) for track, own in places.items()})
+    return [job for job in planned if job.kind == "base" and keys.get((job.track, job.block)) != job.key]
 
 
 def _estimate_pass(

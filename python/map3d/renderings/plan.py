@@ -2,8 +2,9 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Collection, Iterable, Mapping
-from typing import Protocol
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +13,12 @@ from map3d import _core
 from map3d.catalogue import PlannedJob, RenderingRecord, Track
 from map3d.errors import OutsideFrame
 from map3d.geometry.frames import PinnedFrame, check_content, core_frame
-from map3d.tiles.naming import block_above, block_level, block_levels, morton
-from map3d.tiles.occupancy import Occupancy
+from map3d.tiles.naming import block_levels
+from map3d.tiles.occupancy import Numbers, Occupancy, xy_from_morton
 from map3d.types import BlockId, Box
+
+KEY_BATCH: Final = 1 << 17
+"""Base blocks whose keys are computed together; each batch visits the chunks that it meets once."""
 
 
 class PlannedScene(Protocol):
@@ -29,22 +33,31 @@ class PlannedScene(Protocol):
 
 
 def plan_jobs(
-    scene: PlannedScene, rendering: RenderingRecord, known: Mapping[str, Collection[BlockId]], progress: Callable[[int, int], None] | None = None
-) -> list[PlannedJob]:
-    """Returns every block that has or had content, of all tracks. `known`: track → base blocks of earlier plans; `progress` counts views.
+    scene: PlannedScene, rendering: RenderingRecord, known: Mapping[str, Numbers], progress: Callable[[int, int], None] | None = None
+) -> Iterator[PlannedJob]:
+    """Yields every block that has or had content, of all tracks; every block comes before the one above it. Memory does not grow with the number of
+    jobs, apart from 8 bytes per base block of one view.
 
-    Raises OutsideFrame when content has left the pinned square.
+    `known`: track → base blocks of earlier plans, looked up once per track; `progress` counts views. Raises OutsideFrame, before the first job, when
+    content has left the pinned square.
     """
-    jobs: list[PlannedJob] = []
+    for frame in rendering.frames:
+        _check_frame(scene, rendering, frame)
+    return _plan_views(scene, rendering, known, progress)
+
+
+def _plan_views(
+    scene: PlannedScene, rendering: RenderingRecord, known: Mapping[str, Numbers], progress: Callable[[int, int], None] | None
+) -> Iterator[PlannedJob]:
     for done, frame in enumerate(rendering.frames):
         if progress is not None:
             progress(done, len(rendering.frames))
-        occupied = _occupied_blocks(scene, rendering, frame)
+        root = block_levels(frame.zmax)[0].root
+        occupied = scene.occupied(core_frame(frame.to_json()), root)
         for track in rendering.tracks_of(frame):
-            blocks = sorted(occupied | set(known.get(track.id, ())), key=lambda block: morton(block.x, block.y))
-            keys = scene.block_keys(track_frame(track), block_levels(frame.zmax)[0].root, _columns_and_rows(blocks))
-            jobs += _with_reduces(track, dict(zip(blocks, keys, strict=True)))
-    return jobs
+            earlier = known.get(track.id)
+            blocks = occupied if earlier is None else np.union1d(occupied, earlier)
+            yield from _with_reduces(track, _base_keys(scene, track, root, blocks))
 
 
 def track_frame(track: Track) -> _core.Frame:
@@ -52,7 +65,7 @@ def track_frame(track: Track) -> _core.Frame:
     return core_frame(track.frame.to_json(track.layers))
 
 
-def planned_occupancy(scene: PlannedScene, frame: PinnedFrame, level: int | None = None, within: Collection[BlockId] | None = None) -> Occupancy:
+def planned_occupancy(scene: PlannedScene, frame: PinnedFrame, level: int | None = None, within: Numbers | None = None) -> Occupancy:
     """Returns, conservatively, every tile that may have content. `level`: the deepest, by default zmax; `within`: only in these base blocks.
 
     Time and memory grow with the occupied tiles, at any level.
@@ -62,9 +75,9 @@ def planned_occupancy(scene: PlannedScene, frame: PinnedFrame, level: int | None
     return Occupancy(depth, scene.occupied(core_frame(frame.to_json()), depth, blocks))
 
 
-def _columns_and_rows(blocks: Iterable[BlockId]) -> NDArray[np.uint32]:
+def _columns_and_rows(numbers: Numbers) -> NDArray[np.uint32]:
     """(n, 2) columns and rows."""
-    return np.array([(block.x, block.y) for block in blocks], np.uint32).reshape(-1, 2)
+    return np.stack(xy_from_morton(numbers), axis=1).astype(np.uint32)
 
 
 def settings_hash(track: Track) -> str:
@@ -73,26 +86,74 @@ def settings_hash(track: Track) -> str:
     return hashlib.sha256(json.dumps([layers, track.frame.tile_px, track.frame.zmax]).encode()).hexdigest()
 
 
-def _occupied_blocks(scene: PlannedScene, rendering: RenderingRecord, frame: PinnedFrame) -> set[BlockId]:
-    """Returns the base blocks that may have content; raises OutsideFrame."""
+def _check_frame(scene: PlannedScene, rendering: RenderingRecord, frame: PinnedFrame) -> None:
     try:
         check_content(frame, scene.box, rendering.window)
     except OutsideFrame as error:
         raise OutsideFrame(f"rendering {rendering.name}: {error}") from error
-    root = block_levels(frame.zmax)[0].root
-    return {BlockId(*tile) for tile in planned_occupancy(scene, frame, root).tiles(root)}
 
 
-def _with_reduces(track: Track, base: Mapping[BlockId, str]) -> list[PlannedJob]:
-    """Returns the base blocks and all reduce blocks above them; a reduce block's key hashes the keys of the blocks below."""
-    jobs: list[PlannedJob] = []
-    keys, settings, zmax = dict(base), settings_hash(track), track.frame.zmax
-    while keys:
-        above: dict[BlockId, list[tuple[BlockId, str]]] = {}
-        for block, key in sorted(keys.items(), key=lambda item: morton(item[0].x, item[0].y)):
-            parent = block_above(block, zmax)
-            jobs.append(PlannedJob(track.id, block, block_level(block.z, zmax).kind, morton(block.x, block.y), key, parent))
-            if parent is not None:
-                above.setdefault(parent, []).append((block, key))
-        keys = {block: hashlib.sha256(json.dumps([settings, below]).encode()).hexdigest()[:32] for block, below in above.items()}
-    return jobs
+def _base_keys(scene: PlannedScene, track: Track, root: int, numbers: Numbers) -> Iterator[tuple[int, BlockId, str]]:
+    """Yields Morton number, block and key of the base blocks, computing the keys of `KEY_BATCH` blocks at a time."""
+    frame = track_frame(track)
+    for start in range(0, len(numbers), KEY_BATCH):
+        batch = numbers[start : start + KEY_BATCH]
+        places = _columns_and_rows(batch)
+        keys = scene.block_keys(frame, root, places)
+        for number, (x, y), key in zip(batch.tolist(), places.tolist(), keys, strict=True):
+            yield number, BlockId(root, x, y), key
+
+
+def _with_reduces(track: Track, base: Iterable[tuple[int, BlockId, str]]) -> Iterator[PlannedJob]:
+    """Yields the base blocks, given in Morton order, and all reduce blocks above them, each as soon as all blocks below it are known."""
+    pyramid = _OpenReduces(track)
+    for number, block, key in base:
+        yield from pyramid.close(number)
+        yield pyramid.add(0, number, block, key)
+    yield from pyramid.close(None)
+
+
+class _OpenReduces:
+    """The reduce blocks of a track whose blocks below are still being collected: at most one per level, since the blocks below one reduce block are
+    consecutive in Morton order. A reduce block's key hashes the keys of the blocks below."""
+
+    def __init__(self, track: Track) -> None:
+        self._track, self._settings = track.id, settings_hash(track)
+        self._levels = block_levels(track.frame.zmax)
+        self._open = [_OpenReduce() for _ in self._levels]
+
+    def add(self, depth: int, number: int, block: BlockId, key: str) -> PlannedJob:
+        """Adds a block of `block_levels(zmax)[depth]` to the reduce block above it and returns its job."""
+        level, parent = self._levels[depth], None
+        if depth + 1 < len(self._levels):
+            above = self._levels[depth + 1]
+            up = level.root - above.root
+            parent = BlockId(above.root, block.x >> up, block.y >> up)
+            self._open[depth + 1].add(number >> 2 * up, parent, (block, key))
+        return PlannedJob(self._track, block, level.kind, number, key, parent)
+
+    def close(self, upcoming: int | None) -> Iterator[PlannedJob]:
+        """Yields, from the deepest level up, the reduce blocks that are not above the base block with Morton number `upcoming`; all for None."""
+        for depth in range(1, len(self._levels)):
+            reduce, up = self._open[depth], self._levels[0].root - self._levels[depth].root
+            if not reduce.below or (upcoming is not None and reduce.number == upcoming >> 2 * up):
+                return
+            key = hashlib.sha256(json.dumps([self._settings, reduce.below]).encode()).hexdigest()[:32]
+            reduce.below = []
+            yield self.add(depth, reduce.number, reduce.block, key)
+
+
+_TOP: Final = BlockId(0, 0, 0)
+
+
+@dataclass
+class _OpenReduce:
+    """`number`: Morton number; `below`: blocks and keys so far, none when it is closed."""
+
+    number: int = 0
+    block: BlockId = _TOP
+    below: list[tuple[BlockId, str]] = field(default_factory=list)
+
+    def add(self, number: int, block: BlockId, below: tuple[BlockId, str]) -> None:
+        self.number, self.block = number, block
+        self.below.append(below)

@@ -3,6 +3,7 @@
 import base64
 import binascii
 from collections.abc import Iterable
+from itertools import chain
 from typing import Self
 
 import numpy as np
@@ -102,6 +103,12 @@ class Occupancy:
 def morton_numbers(x: NDArray[np.integer], y: NDArray[np.integer]) -> Numbers:
     """Returns the (n,) Morton numbers of columns and rows."""
     return _spread(x.astype(np.uint64)) | _spread(y.astype(np.uint64)) << np.uint64(1)
+
+
+def numbers_of(places: Iterable[tuple[int, int]]) -> Numbers:
+    """Returns the sorted, unique Morton numbers of (x, y), in 8 bytes per place while it reads them."""
+    flat = np.fromiter(chain.from_iterable(places), np.uint32).reshape(-1, 2)
+    return _unique(morton_numbers(flat[:, 0], flat[:, 1]))
 
 
 def xy_from_morton(numbers: Numbers) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
