@@ -84,5 +84,9 @@ class StoreError(Map3dError):
     """Stored data could not be read or written; the message names the path and the cause."""
 
 
+class ObjectChanged(Map3dError):
+    """An object was created, replaced or deleted between reading and writing it."""
+
+
 class VerifyFailed(Map3dError):
     """`map3d verify` found differences between stored and expected data."""

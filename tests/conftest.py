@@ -1,0 +1,26 @@
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.object_servers import environment, new_prefix, s3_environment, s3_server
+
+
+@pytest.fixture(scope="session")
+def s3_endpoint() -> Iterator[str]:
+    """The endpoint of an S3 server on loopback."""
+    with s3_server() as endpoint:
+        yield endpoint
+
+
+@pytest.fixture
+def s3_url(s3_endpoint: str) -> Iterator[str]:
+    """The URL of an empty place in a bucket, with the environment that opens it."""
+    with environment(s3_environment(s3_endpoint)):
+        yield new_prefix()
+
+
+@pytest.fixture(params=["file", "s3"])
+def store_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+    """The URL of an empty object store of each type."""
+    return str(request.getfixturevalue("s3_url")) if request.param == "s3" else (tmp_path / "objects").as_uri()
