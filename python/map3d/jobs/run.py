@@ -17,9 +17,9 @@ from map3d.renderings.build import open_scene
 from map3d.renderings.manifest_writer import Planned, write_manifest
 from map3d.renderings.plan import PlannedScene, plan_jobs, planned_occupancy
 from map3d.renderings.render_task import CACHE_BYTES, RENDER_ENTRY, RenderTask
+from map3d.renderings.track_stores import find_track
 from map3d.tiles.naming import block_levels
 from map3d.tiles.occupancy import Numbers, Occupancy, numbers_of
-from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.types import Box
 
 MAX_PLANS: Final = 10
@@ -143,10 +143,9 @@ class Run:
     def _prune(self) -> None:
         """Removes stored blocks without a job, such as those of earlier frames."""
         for track in self.record.tracks:
-            path = self._workspace.store_path(self.record.name, track.id)
-            if path.is_file():
+            if (found := find_track(self._workspace, self.record, track.id, read_only=False)) is not None:
                 jobs = {job.block for job in self._catalogue.jobs(self.record.name, track.id)}
-                with SqliteTileStore(path) as store:
+                with found as store:
                     for block in store.list_blocks():
                         if block.id not in jobs:
                             store.remove_block(block.id)

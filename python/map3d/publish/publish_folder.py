@@ -17,8 +17,8 @@ from map3d.errors import AlreadyExists, BadRequest, Corrupt, NotFound, Stopped, 
 from map3d.geometry.views import track_id
 from map3d.publish.pmtiles_archive import Archive, write_archive
 from map3d.registry import Registry
+from map3d.renderings.track_stores import open_track, rendering_record
 from map3d.tiles.manifest import ATTRIBUTES, COLUMNS, FILE_NAME, SEARCH, SHARDS, Manifest, ManifestView, dump_document
-from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.tile_store import TileStore
 from map3d.tiles.viewer_files import viewer_files, viewer_folder
 from map3d.types import Layer
@@ -95,6 +95,7 @@ class _FolderWriter:
 
     def __init__(self, workspace: Workspace, manifest: Manifest, draft: Path, progress: OnTiles) -> None:
         self._workspace, self._manifest, self._draft, self._progress = workspace, manifest, draft, progress
+        self._record = rendering_record(workspace, manifest.name)
         self.tiles = self.archives = self.kept = self._done = 0
         self._total = sum(view.occupancy.count() for view in manifest.views) * len(manifest.layers)
         self._files: dict[str, str] = {}
@@ -102,8 +103,7 @@ class _FolderWriter:
 
     def write(self) -> None:
         archives = {view.frame.id: self._write_view(view) for view in self._manifest.views}
-        scene = self._find_scene()
-        with Registry(self._workspace.registry_path(scene)) as registry:
+        with Registry(self._workspace.registry_path(self._record.scene)) as registry:
             for shard in registry.shards():
                 self._write_file(SHARDS.format(shard=shard["shard"]), dump_document(shard))
             self._write_file(SEARCH, dump_document(registry.search()))
@@ -123,8 +123,7 @@ class _FolderWriter:
         """Returns the archive path of each layer."""
         paths = {}
         for number, layers in enumerate(self._manifest.passes):
-            track = self._workspace.store_path(self._manifest.name, track_id(view.frame.id, number))
-            with SqliteTileStore(track, read_only=True) as store:
+            with open_track(self._workspace, self._record, track_id(view.frame.id, number)) as store:
                 for layer in layers:
                     name = f"{view.frame.id}/{layer.name}.pmtiles"
                     if self._write_archive(store, layer, view.frame.id, self._draft / name):
@@ -185,13 +184,6 @@ class _FolderWriter:
                 path.unlink()
             elif path.is_dir() and not any(path.iterdir()):
                 path.rmdir()
-
-    def _find_scene(self) -> str:
-        catalogue = self._workspace.open_catalogue()
-        try:
-            return catalogue.rendering(self._manifest.name).scene
-        finally:
-            catalogue.close()
 
 
 def _read_manifest(workspace: Workspace, rendering: str, allow_incomplete: bool) -> Manifest:

@@ -12,6 +12,7 @@ from map3d.geometry.frames import Window, pin, pin_beside
 from map3d.geometry.views import check_angles
 from map3d.renderings.build import is_stale, open_scene
 from map3d.renderings.layers import LayerRequest
+from map3d.renderings.track_stores import remove_tracks
 from map3d.types import Box, ViewAngles, check_name
 
 COARSEST_M: Final = 1e6
@@ -73,7 +74,7 @@ def create_rendering(workspace: Workspace, catalogue: Catalogue, request: Render
     )
     if request.regrid:
         stored = catalogue.regrid(record)
-        _remove_stores(workspace, stored)
+        remove_tracks(workspace, stored)
         return stored
     catalogue.create_rendering(record)
     return record
@@ -145,11 +146,3 @@ def _rounded_up(value: float) -> float:
 def _check_free(catalogue: Catalogue, name: str) -> None:
     if any(record.name == name for record in catalogue.renderings()):
         raise BadRequest(f"rendering {name}: exists already; choose another name, or use --regrid to replace its frames and render everything again")
-
-
-def _remove_stores(workspace: Workspace, record: RenderingRecord) -> None:
-    """Removes all tile stores of the rendering, including those of views and passes that it no longer has."""
-    folder = workspace.rendering_folder(record.name)
-    if folder.is_dir():
-        for path in folder.glob("*.sqlite*"):
-            path.unlink()

@@ -10,9 +10,9 @@ from map3d.errors import BadRequest
 from map3d.geometry.frames import PinnedFrame
 from map3d.registry import Registry
 from map3d.renderings.lon_lat import geographic_of
+from map3d.renderings.track_stores import find_track
 from map3d.tiles.manifest import Manifest, ManifestCrs, ManifestView
 from map3d.tiles.occupancy import Occupancy
-from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.tile_store import TileStore
 from map3d.types import BlockId, Box, Vec3
 
@@ -67,10 +67,9 @@ def _view(workspace: Workspace, record: RenderingRecord, frame: PinnedFrame, pla
     """Takes the occupancy from the first pass, since every pass has the same tiles."""
     occupancy, versions = Occupancy.from_tiles(frame.zmax, ()), []
     for track in record.tracks_of(frame):
-        path = workspace.store_path(record.name, track.id)
         blocks: dict[BlockId, int] = {}
-        if path.is_file():
-            with SqliteTileStore(path, read_only=True) as store:
+        if (found := find_track(workspace, record, track.id)) is not None:
+            with found as store:
                 occupancy = occupancy if track.number else stored_occupancy(store)
                 blocks = {block.id: block.version for block in store.list_blocks()}
         versions.append(blocks)

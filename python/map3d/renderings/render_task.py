@@ -5,12 +5,12 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any, Final
 
-from map3d.catalogue import JobResult, Lease, RenderingRecord, Track, Workspace
+from map3d.catalogue import JobResult, Lease, RenderingRecord, Workspace
 from map3d.renderings.block_check import check_rendered
+from map3d.renderings.track_stores import open_or_create_track
 from map3d.subprocess import Message, Subprocess
 from map3d.tiles.naming import block_level
-from map3d.tiles.sqlite_store import SqliteTileStore
-from map3d.tiles.tile_store import StoredTile, StoreShape, TileStore
+from map3d.tiles.tile_store import StoredTile, TileStore
 
 RENDER_ENTRY: Final = "map3d.renderings.block_renderer:open_renderer"
 CACHE_BYTES: Final = 512 << 20
@@ -29,7 +29,7 @@ class RenderTask:
         self._zmax = rendering.zmax
         self._entry = entry
         self._setup = _setup(workspace, rendering, cache_bytes)
-        self._stores: Mapping[str, TileStore] = {track.id: _open_store(workspace, rendering, track) for track in rendering.tracks}
+        self._stores: Mapping[str, TileStore] = {track.id: open_or_create_track(workspace, rendering, track) for track in rendering.tracks}
 
     def start_subprocess(self) -> Subprocess:
         return Subprocess(self._entry, self._setup)
@@ -59,11 +59,6 @@ class RenderTask:
     def close(self) -> None:
         for store in self._stores.values():
             store.close()
-
-
-def _open_store(workspace: Workspace, rendering: RenderingRecord, track: Track) -> TileStore:
-    shape = StoreShape(rendering.tile_px, rendering.zmax, track.layers)
-    return SqliteTileStore.open_or_create(workspace.store_path(rendering.name, track.id), shape)
 
 
 def _setup(workspace: Workspace, rendering: RenderingRecord, cache_bytes: int) -> dict[str, Any]:

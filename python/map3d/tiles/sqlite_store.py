@@ -43,6 +43,7 @@ class SqliteTileStore:
         if not path.is_file():
             raise NotFound(f"{path}: no such tile store; render the rendering first")
         self.path = path
+        self._identity = _identity(path)
         self._read_only = read_only
         self._connections = Connections(path, lambda: _connect(path, read_only))
         try:
@@ -86,6 +87,10 @@ class SqliteTileStore:
     @property
     def shape(self) -> StoreShape:
         return self._shape
+
+    @property
+    def url(self) -> str:
+        return str(self.path)
 
     def put_block(self, block: BlockId, key: str, version: int, tiles: Sequence[StoredTile], seam: bytes | None, *, fence: int = 0) -> StoredBlock:
         check_block(self._shape, block, version, tiles)
@@ -158,7 +163,6 @@ class SqliteTileStore:
         return total.hexdigest()
 
     def check(self) -> list[str]:
-        """Reads the whole file and returns its faults, one line each."""
         with self._reading() as db:
             wrong = [row[0] for row in db.execute("PRAGMA integrity_check") if row[0] != "ok"]
             lost = db.execute("SELECT count(*) FROM tile WHERE hash NOT IN (SELECT hash FROM blob)").fetchone()[0]
@@ -168,6 +172,9 @@ class SqliteTileStore:
         wrong += [f"{lost} tiles without bytes"] if lost else []
         wrong += [f"{bad} tiles whose bytes do not match their hash"] if bad else []
         return wrong + [f"block {name}: expected {expected} tiles, found {got}" for name, expected, got in miscounted]
+
+    def is_current(self) -> bool:
+        return _identity(self.path) == self._identity
 
     def close(self) -> None:
         """Closes the connections of all threads. The store stays usable."""
@@ -210,6 +217,15 @@ class SqliteTileStore:
             for version in range(_version(db) + 1, FORMAT_VERSION + 1):
                 run_script(db, _MIGRATIONS[version])
                 db.execute("UPDATE meta SET value = ? WHERE key = 'version'", (version,))
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    """Returns device and inode of the file, None if it is missing."""
+    try:
+        stat = path.stat()
+    except OSError:
+        return None
+    return stat.st_dev, stat.st_ino
 
 
 def _version(db: sqlite3.Connection) -> int:

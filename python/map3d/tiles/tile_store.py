@@ -60,6 +60,10 @@ class TileStore(Protocol):
     @property
     def shape(self) -> StoreShape: ...
 
+    @property
+    def url(self) -> str:
+        """The path or URL of the store, for messages."""
+
     def put_block(self, block: BlockId, key: str, version: int, tiles: Sequence[StoredTile], seam: bytes | None, *, fence: int = 0) -> StoredBlock:
         """Replaces a block in one transaction, durable on return. Raises BadRequest for tiles of other blocks, StaleFence
         when `fence` is less than that of the stored block: a worker that lost its lease does not overwrite newer tiles.
@@ -88,6 +92,12 @@ class TileStore(Protocol):
 
     def remove_block(self, block: BlockId) -> bool:
         """Returns False if the block was not stored."""
+
+    def check(self) -> list[str]:
+        """Reads the whole store and returns its faults, one line each."""
+
+    def is_current(self) -> bool:
+        """Whether the store that was opened is still the one at its URL, and not removed or replaced."""
 
     def close(self) -> None: ...
 

@@ -8,8 +8,9 @@ from map3d.catalogue import Catalogue, RenderingRecord, State, Track, Workspace
 from map3d.renderings.build import is_stale, open_scene
 from map3d.renderings.plan import track_frame
 from map3d.renderings.render_task import CACHE_BYTES
+from map3d.renderings.track_stores import open_track
 from map3d.tiles.naming import tiles_of_block
-from map3d.tiles.sqlite_store import SqliteTileStore
+from map3d.tiles.tile_store import TileStore
 from map3d.types import BlockId
 from map3d.verify.findings import Findings
 
@@ -28,7 +29,7 @@ def verify_pixels(
     if sample is not None and sample < len(chosen):
         chosen = random.Random(seed).sample(chosen, sample)
     for done, (track, block) in enumerate(chosen, 1):
-        with SqliteTileStore(workspace.store_path(name, track.id), read_only=True) as store:
+        with open_track(workspace, record, track.id) as store:
             different = _count_differences(scene, store, track, block)
         if different:
             findings.add(f"{name} {track.id} block {block}: {different} images or seams differ from those of a new render")
@@ -40,7 +41,7 @@ def _done_blocks(catalogue: Catalogue, record: RenderingRecord) -> list[tuple[Tr
     return [(track, job.block) for track in record.tracks for job in catalogue.jobs(record.name, track.id, State.DONE) if job.kind == "base"]
 
 
-def _count_differences(scene: _core.Scene, store: SqliteTileStore, track: Track, block: BlockId) -> int:
+def _count_differences(scene: _core.Scene, store: TileStore, track: Track, block: BlockId) -> int:
     rendered = scene.render_block(track_frame(track), *block)
     tiles = {(layer, z, x, y): data for layer, z, x, y, data in rendered.tiles}
     names = [(layer, *tile) for tile in tiles_of_block(block, track.frame.zmax) for layer in range(len(track.layers))]

@@ -12,9 +12,9 @@ from map3d.errors import Corrupt, NotFound, VerifyFailed
 from map3d.geometry.views import track_id
 from map3d.publish.pmtiles_archive import Archive
 from map3d.publish.publish_folder import CHECKSUMS
+from map3d.renderings.track_stores import open_track, rendering_record
 from map3d.tiles.manifest import ATTRIBUTES, FILE_NAME, SEARCH, Manifest, ManifestView
 from map3d.tiles.occupancy import Occupancy
-from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.tile_store import TileStore
 from map3d.tiles.viewer_files import PAGE
 from map3d.types import Layer, TileId
@@ -43,12 +43,16 @@ def verify_published(folder: Path, workspace: Workspace | None = None) -> Verifi
     files, added_problems = _check_sums(folder)
     problems += added_problems
     archives = tiles = 0
+    record = None if workspace is None else rendering_record(workspace, manifest.name)
     for view in manifest.views:
         for number, layers in enumerate(manifest.passes):
-            track = None if workspace is None else workspace.store_path(manifest.name, track_id(view.frame.id, number))
-            for layer in layers:
-                found, added_problems = _check_layer(folder, view, layer, track)
-                archives, tiles, problems = archives + (found > 0), tiles + found, problems + added_problems
+            with ExitStack() as opened:
+                store = None
+                if workspace is not None and record is not None:
+                    store = opened.enter_context(open_track(workspace, record, track_id(view.frame.id, number)))
+                for layer in layers:
+                    found, added_problems = _check_layer(folder, view, layer, store)
+                    archives, tiles, problems = archives + (found > 0), tiles + found, problems + added_problems
     if problems:
         more = f", and {len(problems) - SHOWN} more" if len(problems) > SHOWN else ""
         raise VerifyFailed(f"{folder}: {'; '.join(problems[:SHOWN])}{more}; publish it again")
@@ -69,21 +73,19 @@ def _check_sums(folder: Path) -> tuple[int, list[str]]:
     return len(lines) - len(problems), problems
 
 
-def _check_layer(folder: Path, view: ManifestView, layer: Layer, track: Path | None) -> tuple[int, list[str]]:
-    """Returns the number of tiles and the problems. `track`: the tile store to compare with."""
+def _check_layer(folder: Path, view: ManifestView, layer: Layer, store: TileStore | None) -> tuple[int, list[str]]:
+    """Returns the number of tiles and the problems. `store`: the tile store to compare with."""
     name = (view.archives or {}).get(layer.name)
     if name is None:
         count = view.occupancy.count()
         return 0, [f"view {view.frame.id}: no archive for {count} tiles of layer {layer.name}"] if count else []
-    with ExitStack() as opened:
-        store = None if track is None else opened.enter_context(SqliteTileStore(track, read_only=True))
-        try:
-            archive = Archive(folder / name)
-            problems = [] if archive.has_format_of(layer) else [f"{name}: its tiles are not {layer.format}"]
-            seen: set[TileId] = set()
-            problems += _check_tiles(archive, name, layer, store, seen)
-        except Corrupt as error:
-            return 0, [str(error)]
+    try:
+        archive = Archive(folder / name)
+        problems = [] if archive.has_format_of(layer) else [f"{name}: its tiles are not {layer.format}"]
+        seen: set[TileId] = set()
+        problems += _check_tiles(archive, name, layer, store, seen)
+    except Corrupt as error:
+        return 0, [str(error)]
     return len(seen), problems + _check_occupancy(name, view.occupancy, seen)
 
 

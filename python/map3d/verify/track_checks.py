@@ -10,10 +10,10 @@ from map3d import _core
 from map3d.catalogue import Catalogue, Job, RenderingRecord, State, Track, Workspace
 from map3d.errors import Corrupt, Map3dError
 from map3d.renderings.plan import planned_occupancy, track_frame
+from map3d.renderings.track_stores import find_track, track_url
 from map3d.tiles.naming import block_level, block_of, blocks_below, children, parent
 from map3d.tiles.occupancy import Occupancy
-from map3d.tiles.sqlite_store import SqliteTileStore
-from map3d.tiles.tile_store import StoredBlock
+from map3d.tiles.tile_store import StoredBlock, TileStore
 from map3d.types import BlockId, TileId
 from map3d.verify.decode import decode_tile, ids_of
 from map3d.verify.findings import Findings
@@ -33,15 +33,15 @@ def check_track(
 ) -> set[TileId] | None:
     """Checks one track. `ids`: the sorted ids of all registered objects. Returns the stored tiles, None when no block is done."""
     jobs = {job.block: job for job in catalogue.jobs(record.name, track.id)}
-    path = workspace.store_path(record.name, track.id)
-    if not path.is_file():
+    found = find_track(workspace, record, track.id)
+    if found is None:
         if any(job.state is State.DONE for job in jobs.values()):
-            findings.add(f"{path}: missing, although jobs of this track are done")
+            findings.add(f"{track_url(workspace, record, track.id)}: missing, although jobs of this track are done")
         return None
-    with SqliteTileStore(path, read_only=True) as store:
+    with found as store:
         checker = _TrackChecker(f"{record.name} {track.id}", store, track, jobs, findings, progress)
         for line in store.check():
-            findings.add(f"{path}: {line}")
+            findings.add(f"{store.url}: {line}")
         checker.check_blocks()
         tiles = checker.collect_tiles()
         checker.check_pyramid(tiles, planned_occupancy(scene, track.frame))
@@ -53,7 +53,7 @@ def check_track(
 @dataclass
 class _TrackChecker:
     where: str
-    store: SqliteTileStore
+    store: TileStore
     track: Track
     jobs: Mapping[BlockId, Job]
     findings: Findings

@@ -1,4 +1,4 @@
-"""Opens the tile stores of a workspace on demand, and reopens a store whose file was replaced."""
+"""Opens the tile stores of a workspace on demand, and reopens a store that was replaced."""
 
 import threading
 import time
@@ -8,24 +8,24 @@ from functools import cached_property
 from itertools import count
 from typing import Final
 
-from map3d.catalogue.workspace import Workspace
+from map3d.catalogue import Catalogue, Workspace
 from map3d.errors import BadRequest, NotFound
 from map3d.geometry.views import parse_view_id, track_id
-from map3d.tiles.sqlite_store import SqliteTileStore
+from map3d.renderings.track_stores import open_track
+from map3d.tiles.tile_store import TileStore
 from map3d.types import Layer
 
 RECHECK_S: Final = 1.0
-"""Interval between checks that a store is still the file at its path."""
+"""Interval between checks that a store was not replaced."""
 
 MAX_OPEN: Final = 256
 
 
 @dataclass(eq=False)
 class OpenStore:
-    """An open store and the identity (device, inode) of its file."""
+    """An open store, and when it was last compared with the one at its URL."""
 
-    store: SqliteTileStore
-    identity: tuple[int, int]
+    store: TileStore
     checked_s: float
 
     @cached_property
@@ -34,11 +34,11 @@ class OpenStore:
         return {layer.name: (number, layer) for number, layer in enumerate(self.store.shape.layers)}
 
     def is_current(self, now_s: float) -> bool:
-        """Whether the file at the path is still the one that is open."""
+        """Whether the store at the URL is still the one that is open."""
         if now_s - self.checked_s < RECHECK_S:
             return True
         self.checked_s = now_s
-        return _identity(self.store) == self.identity
+        return self.store.is_current()
 
 
 class OpenStores:
@@ -48,6 +48,7 @@ class OpenStores:
         self._workspace = workspace
         self._open: dict[tuple[str, str], OpenStore] = {}
         self._lock = threading.Lock()
+        self._catalogue: Catalogue | None = None
 
     def stores_of_view(self, rendering: str, view: str) -> Iterator[OpenStore]:
         """Yields the stores of a view's tracks, pass by pass; none if the rendering or the view does not exist."""
@@ -80,24 +81,23 @@ class OpenStores:
         with self._lock:
             while self._open:
                 self._open.popitem()[1].store.close()
+            if self._catalogue is not None:
+                self._catalogue.close()
+                self._catalogue = None
+
+    def _find_catalogue(self) -> Catalogue:
+        """Opens the catalogue on first use. Raises NotFound without a workspace."""
+        self._catalogue = self._catalogue or self._workspace.open_catalogue()
+        return self._catalogue
 
     def _try_open(self, rendering: str, track: str) -> OpenStore | None:
         try:
-            store = SqliteTileStore(self._workspace.store_path(rendering, track), read_only=True)
+            store = open_track(self._workspace, self._find_catalogue().rendering(rendering), track)
         except (NotFound, BadRequest):
             return None
-        identity = _identity(store)
-        return None if identity is None else OpenStore(store, identity, time.monotonic())
+        return OpenStore(store, time.monotonic())
 
     def _evict(self) -> None:
         while len(self._open) >= MAX_OPEN:
             oldest = next(iter(self._open))
             self._open.pop(oldest).store.close()
-
-
-def _identity(store: SqliteTileStore) -> tuple[int, int] | None:
-    try:
-        stat = store.path.stat()
-    except OSError:
-        return None
-    return stat.st_dev, stat.st_ino
