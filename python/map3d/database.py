@@ -103,9 +103,13 @@ def _scripts(found: int, version: int, migrations: Mapping[int, str]) -> list[st
 
 
 def run_script(db: sqlite3.Connection, script: str) -> None:
-    """Executes statements in the current transaction, which `executescript` would commit."""
-    for statement in script.split(";"):
-        db.execute(statement)
+    """Executes statements in the current transaction, which `executescript` would commit. A trigger counts as one statement."""
+    statement = ""
+    for part in script.split(";"):
+        statement += f"{part};"
+        if sqlite3.complete_statement(statement):
+            db.execute(statement)
+            statement = ""
 
 
 def _connect(path: Path) -> sqlite3.Connection:

@@ -100,56 +100,56 @@ def test_failed_jobs_go_to_the_end_of_the_queue(catalogue: Catalogue) -> None:
     assert take(catalogue).block.x == 0
 
 
-def test_job_of_a_killed_worker_is_leased_again(catalogue: Catalogue) -> None:
-    catalogue.plan("town-a", [base()])
-    first = take(catalogue)
-    assert catalogue.lease("town-a", "other") is None
+def test_job_of_a_killed_worker_is_leased_again(brief_catalogue: Catalogue) -> None:
+    brief_catalogue.plan("town-a", [base()])
+    first = take(brief_catalogue)
+    assert brief_catalogue.lease("town-a", "other") is None
     time.sleep(LEASE_S + 0.1)
-    second = take(catalogue)
+    second = take(brief_catalogue)
     assert second.attempt == 1, "being killed is not failing"
     assert second.fence > first.fence
-    assert only(catalogue).expiries == 1
+    assert only(brief_catalogue).expiries == 1
 
 
 @pytest.mark.parametrize("word", ["heartbeat", "done", "fail", "release"])
-def test_stale_fence_is_refused(catalogue: Catalogue, word: str) -> None:
-    catalogue.plan("town-a", [base()])
-    stale = take(catalogue)
+def test_stale_fence_is_refused(brief_catalogue: Catalogue, word: str) -> None:
+    brief_catalogue.plan("town-a", [base()])
+    stale = take(brief_catalogue)
     time.sleep(LEASE_S + 0.1)
-    fresh = take(catalogue)
+    fresh = take(brief_catalogue)
     with pytest.raises(StaleFence, match="no longer held"):
-        say(catalogue, word, stale)
-    catalogue.done(fresh, RESULT)
+        say(brief_catalogue, word, stale)
+    brief_catalogue.done(fresh, RESULT)
     with pytest.raises(StaleFence):
-        say(catalogue, word, fresh)
+        say(brief_catalogue, word, fresh)
 
 
 @pytest.mark.parametrize("word", ["heartbeat", "done", "fail", "release"])
-def test_expired_lease_is_refused_even_when_the_job_is_free(catalogue: Catalogue, word: str) -> None:
-    catalogue.plan("town-a", [base()])
-    lease = take(catalogue)
+def test_expired_lease_is_refused_even_when_the_job_is_free(brief_catalogue: Catalogue, word: str) -> None:
+    brief_catalogue.plan("town-a", [base()])
+    lease = take(brief_catalogue)
     time.sleep(LEASE_S + 0.1)
     with pytest.raises(StaleFence):
-        say(catalogue, word, lease)
+        say(brief_catalogue, word, lease)
 
 
-def test_heartbeats_renew_a_lease(catalogue: Catalogue) -> None:
-    catalogue.plan("town-a", [base()])
-    lease = take(catalogue)
+def test_heartbeats_renew_a_lease(brief_catalogue: Catalogue) -> None:
+    brief_catalogue.plan("town-a", [base()])
+    lease = take(brief_catalogue)
     for _ in range(6):
         time.sleep(LEASE_S / 4)
-        catalogue.heartbeat(lease)
-    catalogue.done(lease, RESULT)
-    assert only(catalogue).state is State.DONE
+        brief_catalogue.heartbeat(lease)
+    brief_catalogue.done(lease, RESULT)
+    assert only(brief_catalogue).state is State.DONE
 
 
-def test_lease_that_expires_three_times_does_not_quarantine_the_job(catalogue: Catalogue) -> None:
-    catalogue.plan("town-a", [base()])
+def test_lease_that_expires_three_times_does_not_quarantine_the_job(brief_catalogue: Catalogue) -> None:
+    brief_catalogue.plan("town-a", [base()])
     for _ in range(3):
-        take(catalogue)
+        take(brief_catalogue)
         time.sleep(LEASE_S + 0.1)
-    assert take(catalogue).attempt == 1
-    assert (only(catalogue).attempts, only(catalogue).expiries) == (1, 3)
+    assert take(brief_catalogue).attempt == 1
+    assert (only(brief_catalogue).attempts, only(brief_catalogue).expiries) == (1, 3)
 
 
 def test_tenth_expired_lease_quarantines_the_job(catalogue: Catalogue) -> None:

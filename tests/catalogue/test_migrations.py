@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from map3d.catalogue import SceneRecord, State
+from map3d.catalogue import JobResult, SceneRecord, State
 from map3d.catalogue.sqlite import VERSION, SqliteCatalogue
 from map3d.errors import UnknownVersion
 from tests.catalogue.implementations import rendering
@@ -26,53 +26,68 @@ CREATE INDEX job_next ON job(rendering, state, attempts, z, track, morton);
 CREATE INDEX job_expiry ON job(expires) WHERE state = 'leased';
 CREATE INDEX job_parent ON job(rendering, track, parent_z, parent_x, parent_y);
 """
+VERSION_3 = """
+ALTER TABLE job ADD COLUMN expiries INTEGER NOT NULL DEFAULT 0;
+DROP INDEX job_next;
+CREATE INDEX job_next ON job(rendering, state, attempts + expiries, z, track, morton);
+"""
+SCHEMAS = {2: VERSION_2, 3: VERSION_2 + VERSION_3}
 JOBS = """
-INSERT INTO job(rendering, track, z, x, y, kind, morton, key, state, attempts, fence) VALUES
-  ('town-a', '0-45', 3, 0, 0, 'base', 0, 'k', 'todo', 2, 1048578), ('town-a', '0-45', 3, 1, 0, 'base', 1, 'k', 'done', 1, 1048577);
+INSERT INTO job(rendering, track, z, x, y, kind, morton, key, parent_z, parent_x, parent_y, state, attempts, fence) VALUES
+  ('town-a', '0-45', 3, 0, 0, 'base', 0, 'k', 0, 0, 0, 'todo', 2, 1048578), ('town-a', '0-45', 3, 1, 0, 'base', 1, 'k', 0, 0, 0, 'done', 1, 1048577),
+  ('town-a', '0-45', 0, 0, 0, 'reduce', 0, 'r', NULL, NULL, NULL, 'waiting', 0, 1048576);
 UPDATE job SET version = 1, empty = 0, tiles = 3, base_tiles = 1, bytes = 100, seconds = 0.5 WHERE state = 'done';
 """
 
 
 def schema(path: Path) -> dict[str, object]:
-    """Returns the columns of every table and the text of every index, without the order of columns."""
+    """Returns the columns of every table and the text of every index and trigger, without the order of columns."""
     with closing(sqlite3.connect(path)) as db:
-        indexes = dict(db.execute("SELECT name, sql FROM sqlite_master WHERE type = 'index' AND sql IS NOT NULL"))
+        texts = dict(db.execute("SELECT name, sql FROM sqlite_master WHERE type IN ('index', 'trigger') AND sql IS NOT NULL"))
         tables = [row[0] for row in db.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
-        return {name: sql.strip() for name, sql in indexes.items()} | {
+        return {name: " ".join(sql.split()) for name, sql in texts.items()} | {
             table: {tuple(row[1:]) for row in db.execute(f"PRAGMA table_info({table})")} for table in tables
         }
 
 
-@pytest.fixture
-def old(tmp_path: Path) -> Path:
-    """A catalogue of version 2 with a scene, a rendering and two jobs."""
+@pytest.fixture(params=sorted(SCHEMAS))
+def old(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    """A catalogue of an older version with a scene, a rendering and three jobs."""
     path, recent = tmp_path / "catalogue.sqlite", tmp_path / "recent.sqlite"
     catalogue = SqliteCatalogue(recent)
     catalogue.create_scene(SceneRecord("town"))
     catalogue.create_rendering(rendering())
     catalogue.close()
     with closing(sqlite3.connect(path)) as db:
-        db.executescript(VERSION_2)
+        db.executescript(SCHEMAS[request.param])
         db.execute("ATTACH ? AS recent", (str(recent),))
         for table in ("scene", "rendering"):
-            db.execute(f"INSERT INTO {table} SELECT * FROM recent.{table}")
+            columns = ", ".join(row[1] for row in db.execute(f"PRAGMA main.table_info({table})"))
+            db.execute(f"INSERT INTO main.{table} SELECT {columns} FROM recent.{table}")
         db.commit()
-        db.executescript(JOBS + "PRAGMA user_version = 2;")
+        db.executescript(f"{JOBS} PRAGMA user_version = {request.param};")
     return path
 
 
-def test_catalogue_of_version_2_is_migrated_and_keeps_its_jobs(old: Path, tmp_path: Path) -> None:
+def test_older_catalogue_is_migrated_and_keeps_its_records_and_jobs(old: Path, tmp_path: Path) -> None:
     for _ in range(2):
         catalogue = SqliteCatalogue(old)
-        todo, done = catalogue.jobs("town-a")
-        assert (todo.attempts, todo.expiries, done.state) == (2, 0, State.DONE)
-        assert done.result is not None
+        above, todo, done = catalogue.jobs("town-a")
+        assert (todo.attempts, todo.expiries, done.state, above.state) == (2, 0, State.DONE, State.WAITING)
+        assert done.result == JobResult(version=1, empty=False, tiles=3, base_tiles=1, bytes=100, seconds=0.5, occupied=None)
+        assert catalogue.rendering("town-a") == rendering()
+        counts = catalogue.count_jobs("town-a")
+        assert {state: count for state, count in counts.items() if count} == {State.TODO: 1, State.DONE: 1, State.WAITING: 1}
         catalogue.close()
     SqliteCatalogue(tmp_path / "new.sqlite").close()
     assert schema(old) == schema(tmp_path / "new.sqlite")
-    lease = SqliteCatalogue(old).lease("town-a", "w")
+    catalogue = SqliteCatalogue(old)
+    lease = catalogue.lease("town-a", "w")
     assert lease is not None
     assert (lease.attempt, lease.block) == (3, (3, 0, 0))
+    catalogue.done(lease, JobResult(1, False, occupied=(1 << 64) - 1))
+    assert catalogue.count_jobs("town-a")[State.TODO] == 1, "the triggers count migrated jobs too"
+    catalogue.close()
 
 
 @pytest.mark.parametrize("version", [1, VERSION + 1])

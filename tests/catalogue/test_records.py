@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from map3d.catalogue import AssetRecord, Catalogue, PlannedJob, SceneCrs, SceneRecord, State, Workspace
+from map3d.catalogue import AssetRecord, Catalogue, JobResult, PlannedJob, SceneCrs, SceneRecord, State, Workspace
 from map3d.catalogue.sqlite import SqliteCatalogue
-from map3d.errors import AlreadyExists, BadName, NotFound, StoreError, UnknownVersion
+from map3d.errors import AlreadyExists, BadName, BadRequest, NotFound, StaleFence, StoreError
 from map3d.types import BlockId, Layer, Sun, ViewAngles
 from tests.catalogue.implementations import rendering
 
@@ -113,14 +113,61 @@ def test_added_layers_are_a_new_pass_and_keep_jobs(catalogue: Catalogue) -> None
         catalogue.add_pass("other", added)
 
 
-def test_catalogue_of_another_version_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "catalogue.sqlite"
-    home = SqliteCatalogue(path)
-    with home._database.transaction() as db:
-        db.execute("PRAGMA user_version = 7")
-    home.close()
-    with pytest.raises(UnknownVersion, match="version 7; this map3d reads version 3"):
-        SqliteCatalogue(path)
+def test_removed_asset_is_gone(catalogue: Catalogue) -> None:
+    for name in ("x", "y"):
+        catalogue.put_asset(AssetRecord("town", name, "", "obj", "", ""))
+    catalogue.remove_asset("town", "x")
+    assert [asset.name for asset in catalogue.assets("town")] == ["y"]
+    with pytest.raises(NotFound, match="no asset 'x'; existing assets: y"):
+        catalogue.remove_asset("town", "x")
+    with pytest.raises(NotFound, match="no scene 'nowhere'"):
+        catalogue.remove_asset("nowhere", "x")
+
+
+def test_scene_with_renderings_is_not_removed(catalogue: Catalogue) -> None:
+    catalogue.put_asset(AssetRecord("town", "x", "", "obj", "", ""))
+    with pytest.raises(BadRequest, match=r"scene town: has renderings \(town-a\)"):
+        catalogue.remove_scene("town")
+    assert len(catalogue.assets("town")) == 1
+    catalogue.remove_rendering("town-a")
+    catalogue.remove_scene("town")
+    assert catalogue.scenes() == []
+    with pytest.raises(NotFound):
+        catalogue.remove_scene("town")
+    catalogue.create_scene(SceneRecord("town"))
+    assert catalogue.assets("town") == []
+
+
+def test_removed_rendering_is_gone_with_its_jobs(catalogue: Catalogue) -> None:
+    jobs = [PlannedJob("0-45", BlockId(4, x, 0), "base", x, "k", None) for x in range(10)]
+    catalogue.create_rendering(rendering("other"))
+    for name in ("town-a", "other"):
+        catalogue.plan(name, jobs)
+    catalogue.remove_rendering("town-a")
+    assert [kept.name for kept in catalogue.renderings()] == ["other"]
+    assert list(catalogue.jobs("town-a")) == []
+    assert len(list(catalogue.jobs("other"))) == catalogue.count_jobs("other")[State.TODO] == 10
+    for call in (catalogue.remove_rendering, catalogue.count_jobs):
+        with pytest.raises(NotFound):
+            call("town-a")
+
+
+def test_rendering_created_again_continues_versions_and_fences(catalogue: Catalogue) -> None:
+    """Otherwise caches would take its tiles for the removed ones, and a worker could commit a block of the removed rendering."""
+    job = PlannedJob("0-45", BlockId(0, 0, 0), "base", 0, "k", None)
+    catalogue.plan("town-a", [job])
+    stale = catalogue.lease("town-a", "w")
+    assert stale is not None
+    catalogue.remove_rendering("town-a")
+    catalogue.create_rendering(rendering())
+    assert catalogue.rendering("town-a").content_version == 2
+    assert sum(catalogue.count_jobs("town-a").values()) == 0
+    catalogue.plan("town-a", [job])
+    fresh = catalogue.lease("town-a", "w")
+    assert fresh is not None
+    assert fresh.fence > stale.fence
+    with pytest.raises(StaleFence):
+        catalogue.done(stale, JobResult(1, False))
 
 
 def test_file_that_is_not_a_catalogue_is_refused(tmp_path: Path) -> None:

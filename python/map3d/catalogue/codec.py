@@ -17,6 +17,26 @@ def dump_crs(crs: SceneCrs | None) -> str | None:
     return None if crs is None else json.dumps(asdict(crs))
 
 
+def dump_or_none(value: Any) -> str | None:
+    return None if value is None else json.dumps(value)
+
+
+def pinned(scene: SceneRecord, crs: SceneCrs | None, origin: Vec3 | None, empty: bool) -> SceneRecord:
+    """Returns the scene with `crs` and `origin` where they are still None. In an empty scene, `crs` may also add a vertical part."""
+    first = scene.crs is None or (empty and _adds_heights(scene.crs, crs))
+    return replace(scene, crs=crs if first else scene.crs, origin=scene.origin or origin)
+
+
+def _adds_heights(before: SceneCrs, crs: SceneCrs | None) -> bool:
+    """Whether `crs` is the same system with a vertical part added."""
+    return crs is not None and before.vertical is None and crs.vertical is not None and (before.epsg, before.name) == (crs.epsg, crs.name)
+
+
+def list_names(names: Sequence[str], limit: int = 20) -> str:
+    """Returns the first names for an error message."""
+    return ", ".join(names[:limit]) + (", …" if len(names) > limit else "") if names else "none"
+
+
 def load_scene(row: RowLike) -> SceneRecord:
     return SceneRecord(
         name=row["name"],
@@ -47,6 +67,7 @@ def dump_rendering(rendering: RenderingRecord) -> tuple[Any, ...]:
         json.dumps(dict(rendering.options)),
         rendering.content_version,
         rendering.announced_version,
+        int(rendering.planning),
     )
 
 
@@ -71,6 +92,7 @@ def load_rendering(row: RowLike) -> RenderingRecord:
         options=json.loads(row["options"]),
         content_version=row["content_version"],
         announced_version=row["announced_version"],
+        planning=bool(row["planning"]),
     )
 
 
@@ -91,4 +113,13 @@ def load_box(value: list[list[float]]) -> Box:
 
 
 def with_versions(rendering: RenderingRecord, content: int, announced: int) -> RenderingRecord:
-    return replace(rendering, content_version=content, announced_version=announced)
+    return replace(rendering, content_version=content, announced_version=announced, planning=False)
+
+
+def dump_bits(bits: int | None) -> int | None:
+    """Returns 64 bits as a signed number, which databases can store."""
+    return bits if bits is None or bits < 1 << 63 else bits - (1 << 64)
+
+
+def load_bits(number: int | None) -> int | None:
+    return None if number is None else number % (1 << 64)

@@ -43,10 +43,17 @@ class Catalogue(Protocol):
     def assets(self, scene: str) -> list[AssetRecord]:
         """Returns the assets of a scene, ordered by name."""
 
+    def remove_asset(self, scene: str, name: str) -> None:
+        """Removes the record of an asset; raises NotFound."""
+
+    def remove_scene(self, name: str) -> None:
+        """Removes the records of a scene and its assets. Raises NotFound, and BadRequest when the scene has renderings, naming them."""
+
     # -- renderings -------------------------------------------------------------------------------------------------------------
 
     def create_rendering(self, rendering: RenderingRecord) -> None:
-        """Raises AlreadyExists, or NotFound when the scene does not exist."""
+        """Raises AlreadyExists, or NotFound when the scene does not exist. After a rendering with the same name was removed, the content version goes
+        on from that of the removed one, so that neither caches of its tiles nor leases of its jobs are mistaken for new ones."""
 
     def rendering(self, name: str) -> RenderingRecord:
         """Returns the rendering. Raises NotFound, naming the existing renderings."""
@@ -67,14 +74,21 @@ class Catalogue(Protocol):
     def announce(self, name: str, version: int) -> None:
         """Records that clients may have seen a manifest with this content version."""
 
+    def remove_rendering(self, name: str) -> None:
+        """Removes the jobs of a rendering, in batches, and then its record; raises NotFound. After a kill it can be repeated."""
+
     # -- jobs -------------------------------------------------------------------------------------------------------------------
 
     def plan(self, rendering: str, jobs: Iterable[PlannedJob]) -> PlanCounts:
-        """Adds jobs, reopens those whose key changed, and leaves the others, in one transaction.
+        """Adds jobs, reopens those whose key changed or that were cancelled, and leaves the others. Expects the jobs below a reduce job before it.
 
-        A base job opens as todo; a reduce job as waiting, or as todo when all blocks below are done. Increments the content version when jobs are
-        open afterwards and the version has been announced.
+        Stores the jobs in batches while it reads them. A base job opens as todo; a reduce job as waiting. Reduce jobs above an opened job wait again,
+        and their leases become stale. A sweep ends the plan. After a kill or an exception of `jobs`, the same plan can be made again and leads to the
+        same jobs. If the content version has been announced, increments it before the first job opens, and when jobs are open at the end.
         """
+
+    def sweep(self, rendering: str) -> int:
+        """Opens waiting reduce jobs whose blocks below are all done; returns their number. Completes a `done` or `plan` that was killed."""
 
     def lease(self, rendering: str, worker: str, start: int = 0) -> Lease | None:
         """Leases the next job in one atomic statement, after expiring overdue leases. Returns None when no job is available now.
@@ -87,7 +101,8 @@ class Catalogue(Protocol):
         """Renews the lease for another `lease_s`; raises StaleFence."""
 
     def done(self, lease: Lease, result: JobResult) -> None:
-        """Marks the job as done, and opens the reduce job above when all blocks below it are done; raises StaleFence."""
+        """Marks the job as done, then opens the reduce job above when all blocks below it are done; raises StaleFence. After a kill between the two
+        steps, `sweep` does the second."""
 
     def fail(self, lease: Lease, reason: str) -> State:
         """Returns the new state: todo, or quarantined after the third attempt. Raises StaleFence."""
@@ -102,10 +117,22 @@ class Catalogue(Protocol):
         """
 
     def retry(self, rendering: str, blocks: Iterable[tuple[str, BlockId]] | None = None) -> int:
-        """Reopens quarantined jobs (all, or those of these tracks and blocks) with no attempts and expired leases; returns their number."""
+        """Reopens quarantined and cancelled jobs (all, or those of these tracks and blocks) with no attempts and expired leases; returns their
+        number."""
+
+    def cancel(self, rendering: str, blocks: Iterable[tuple[str, BlockId]] | None = None) -> int:
+        """Cancels open jobs (all, or those of these tracks and blocks) and makes their leases stale; returns their number. The next `plan` or `retry`
+        reopens them."""
+
+    def reopen(self, rendering: str, blocks: Iterable[tuple[str, BlockId]]) -> int:
+        """Reopens done jobs, and makes the reduce jobs above them wait for them, so that they are done again; returns the number of jobs of both
+        kinds. Jobs that are not done stay as they are."""
 
     def jobs(self, rendering: str, track: str | None = None, state: State | None = None) -> Iterator[Job]:
-        """Returns the jobs, ordered by track, level and Morton number."""
+        """Yields the jobs, ordered by track, level and Morton number. Reads them in pages, each of which shows the state of its moment."""
+
+    def has_open_jobs(self, rendering: str) -> bool:
+        """Returns whether any job is todo or leased, from one index look-up; idle workers ask this."""
 
     def count_jobs(self, rendering: str) -> dict[State, int]:
-        """Returns the number of jobs in every state, after expiring overdue leases."""
+        """Returns the number of jobs in every state. Overdue leases count as leased until a worker asks for a job. Raises NotFound."""

@@ -78,7 +78,7 @@ class RenderingRecord:
     `passes`: the original layers, then the layers of each later addition; names are unique.
 
     `content_version`: version of the next tiles to change. `announced_version`: the last version that a manifest announced to clients, 0 before the
-    first.
+    first. `planning`: a plan has added or changed jobs and has not ended; after a kill, the same plan has to be made again.
     """
 
     name: str
@@ -92,6 +92,7 @@ class RenderingRecord:
     options: Mapping[str, Any] = field(default_factory=dict)
     content_version: int = 1
     announced_version: int = 0
+    planning: bool = False
 
     @property
     def layers(self) -> tuple[Layer, ...]:
@@ -142,7 +143,7 @@ class PlannedJob:
 
 @dataclass(frozen=True)
 class PlanCounts:
-    """The number of jobs that planning added, changed or kept."""
+    """The number of jobs that planning added, changed or kept. A cancelled job that planning reopened counts as changed."""
 
     added: int = 0
     changed: int = 0
@@ -152,7 +153,11 @@ class PlanCounts:
 @dataclass(frozen=True)
 class JobResult:
     """The result of a done job. `version`: the content version in which the block's bytes last changed; `tiles`: number of tiles of all layers;
-    `base_tiles`: of one layer at level zmax; `bytes`: encoded size; `seconds`: time that the subprocess took."""
+    `base_tiles`: of one layer at level zmax; `bytes`: encoded size; `seconds`: time that the subprocess took.
+
+    `occupied`: the base tiles with content as 64 bits, where bit n is the tile with Morton number n within the block; 0 for reduce jobs, None for
+    jobs that an earlier version of map3d did.
+    """
 
     version: int
     empty: bool
@@ -160,6 +165,7 @@ class JobResult:
     base_tiles: int = 0
     bytes: int = 0
     seconds: float = 0.0
+    occupied: int | None = None
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,18 @@ from typing import Any, Final
 from map3d.catalogue import codec
 from map3d.catalogue.contract import LEASE_S
 from map3d.catalogue.records import AssetRecord, RenderingRecord, SceneCrs, SceneRecord
-from map3d.catalogue.sqlite_jobs import JOB_NEXT, JOB_SCHEMA, SqliteJobs
+from map3d.catalogue.sqlite_job_table import JOB_COUNTS, JOB_NEXT, JOB_ORDER, JOB_SCHEMA
+from map3d.catalogue.sqlite_jobs import SqliteJobs
 from map3d.database import Database
-from map3d.errors import AlreadyExists, NotFound
+from map3d.errors import AlreadyExists, BadRequest, NotFound
 from map3d.geometry.frames import PinnedFrame
 from map3d.types import Layer, Vec3, check_name
 
-VERSION: Final = 3
+VERSION: Final = 4
+REMOVE_BATCH: Final = 20_000
+"""Jobs that one transaction removes."""
+
+_REMOVED: Final = "CREATE TABLE removed_rendering(name TEXT PRIMARY KEY, content_version INTEGER NOT NULL)"
 
 _SCHEMA: Final = (
     """
@@ -25,11 +30,16 @@ CREATE TABLE asset(scene TEXT NOT NULL REFERENCES scene(name), name TEXT NOT NUL
   digest TEXT NOT NULL, source_digest TEXT NOT NULL, report TEXT NOT NULL, PRIMARY KEY(scene, name));
 CREATE TABLE rendering(name TEXT PRIMARY KEY, scene TEXT NOT NULL REFERENCES scene(name), title TEXT NOT NULL, attribution TEXT NOT NULL,
   res_m REAL NOT NULL, passes TEXT NOT NULL, frames TEXT NOT NULL, box TEXT NOT NULL, options TEXT NOT NULL,
-  content_version INTEGER NOT NULL, announced_version INTEGER NOT NULL);
+  content_version INTEGER NOT NULL, announced_version INTEGER NOT NULL, planning INTEGER NOT NULL DEFAULT 0);
 """
-    + JOB_SCHEMA
+    + f"{_REMOVED};{JOB_SCHEMA}"
 )
-_MIGRATIONS: Final = {3: f"ALTER TABLE job ADD COLUMN expiries INTEGER NOT NULL DEFAULT 0; DROP INDEX job_next; {JOB_NEXT}"}
+_MIGRATIONS: Final = {
+    3: f"ALTER TABLE job ADD COLUMN expiries INTEGER NOT NULL DEFAULT 0; DROP INDEX job_next; {JOB_NEXT};",
+    4: f"""ALTER TABLE job ADD COLUMN occupied INTEGER; ALTER TABLE rendering ADD COLUMN planning INTEGER NOT NULL DEFAULT 0;
+      {_REMOVED}; {JOB_ORDER}; {JOB_COUNTS};
+      INSERT INTO job_count SELECT rendering, state, count(*) FROM job GROUP BY rendering, state;""",
+}
 """Version → statements that lead to it from the version before."""
 
 
@@ -49,7 +59,7 @@ class SqliteCatalogue(SqliteJobs):
             scene.title,
             scene.attribution,
             codec.dump_crs(scene.crs),
-            _dump_or_none(scene.origin),
+            codec.dump_or_none(scene.origin),
             json.dumps(dict(scene.options)),
             scene.built,
         )
@@ -69,8 +79,8 @@ class SqliteCatalogue(SqliteJobs):
         with self._database.transaction() as db:
             before = _scene(db, name)
             empty = db.execute("SELECT 1 FROM asset WHERE scene = ?", (name,)).fetchone() is None
-            pinned = crs if before.crs is None or (empty and _adds_heights(before.crs, crs)) else before.crs
-            values = (codec.dump_crs(pinned), _dump_or_none(before.origin or origin), name)
+            pinned = codec.pinned(before, crs, origin, empty)
+            values = (codec.dump_crs(pinned.crs), codec.dump_or_none(pinned.origin), name)
             db.execute("UPDATE scene SET crs = ?, origin = ? WHERE name = ?", values)
             return _scene(db, name)
 
@@ -90,12 +100,30 @@ class SqliteCatalogue(SqliteJobs):
             _scene(db, scene)
             return [codec.load_asset(row) for row in db.execute("SELECT * FROM asset WHERE scene = ? ORDER BY name", (scene,))]
 
+    def remove_asset(self, scene: str, name: str) -> None:
+        with self._database.transaction() as db:
+            _scene(db, scene)
+            if db.execute("DELETE FROM asset WHERE scene = ? AND name = ?", (scene, name)).rowcount == 0:
+                names = [row[0] for row in db.execute("SELECT name FROM asset WHERE scene = ? ORDER BY name LIMIT 21", (scene,))]
+                raise NotFound(f"scene {scene}: no asset {name!r}; existing assets: {codec.list_names(names)}")
+
+    def remove_scene(self, name: str) -> None:
+        with self._database.transaction() as db:
+            _scene(db, name)
+            renderings = [row[0] for row in db.execute("SELECT name FROM rendering WHERE scene = ? ORDER BY name", (name,))]
+            if renderings:
+                raise BadRequest(f"scene {name}: has renderings ({', '.join(renderings)}); remove them first with map3d remove-rendering")
+            db.execute("DELETE FROM asset WHERE scene = ?", (name,))
+            db.execute("DELETE FROM scene WHERE name = ?", (name,))
+
     def create_rendering(self, rendering: RenderingRecord) -> None:
         check_name(rendering.name, "rendering")
         with self._database.transaction() as db:
             _scene(db, rendering.scene)
-            row = codec.dump_rendering(rendering)
-            if db.execute("INSERT OR IGNORE INTO rendering VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", row).rowcount == 0:
+            removed = db.execute("SELECT content_version FROM removed_rendering WHERE name = ?", (rendering.name,)).fetchone()
+            version = max(rendering.content_version, removed[0] + 1 if removed else 0)
+            row = codec.dump_rendering(replace(rendering, content_version=version))
+            if db.execute(f"INSERT OR IGNORE INTO rendering VALUES ({_marks(row)})", row).rowcount == 0:
                 raise AlreadyExists(f"rendering {rendering.name}: exists already; choose another name, or use --regrid to replace its frames")
 
     def rendering(self, name: str) -> RenderingRecord:
@@ -113,7 +141,8 @@ class SqliteCatalogue(SqliteJobs):
             db.execute("DELETE FROM job WHERE rendering = ?", (rendering.name,))
             db.execute("DELETE FROM rendering WHERE name = ?", (rendering.name,))
             after = codec.with_versions(rendering, before.content_version + 1, before.announced_version)
-            db.execute("INSERT INTO rendering VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", codec.dump_rendering(after))
+            row = codec.dump_rendering(after)
+            db.execute(f"INSERT INTO rendering VALUES ({_marks(row)})", row)
             return after
 
     def add_frames(self, name: str, frames: Sequence[PinnedFrame]) -> RenderingRecord:
@@ -138,6 +167,18 @@ class SqliteCatalogue(SqliteJobs):
         with self._database.transaction() as db:
             db.execute("UPDATE rendering SET announced_version = max(announced_version, ?) WHERE name = ?", (version, name))
 
+    def remove_rendering(self, name: str) -> None:
+        some_jobs = f"DELETE FROM job WHERE rowid IN (SELECT rowid FROM job WHERE rendering = ? LIMIT {REMOVE_BATCH})"
+        removed = REMOVE_BATCH
+        while removed == REMOVE_BATCH:
+            with self._database.transaction() as db:
+                version = _rendering(db, name).content_version
+                removed = db.execute(some_jobs, (name,)).rowcount
+                if removed < REMOVE_BATCH:
+                    db.execute("INSERT OR REPLACE INTO removed_rendering VALUES (?, ?)", (name, version))
+                    db.execute("DELETE FROM rendering WHERE name = ?", (name,))
+                    db.execute("DELETE FROM job_count WHERE rendering = ?", (name,))
+
 
 def _scene(db: sqlite3.Connection, name: str) -> SceneRecord:
     row = db.execute("SELECT * FROM scene WHERE name = ?", (name,)).fetchone()
@@ -155,13 +196,8 @@ def _rendering(db: sqlite3.Connection, name: str) -> RenderingRecord:
 
 def _names(db: sqlite3.Connection, table: str) -> str:
     names = [row[0] for row in db.execute(f"SELECT name FROM {table} ORDER BY name LIMIT 21")]
-    return ", ".join(names[:20]) + (", …" if len(names) > 20 else "") if names else "none"
+    return codec.list_names(names)
 
 
-def _adds_heights(before: SceneCrs, crs: SceneCrs | None) -> bool:
-    """Whether `crs` is the same system with a vertical part added."""
-    return crs is not None and before.vertical is None and crs.vertical is not None and (before.epsg, before.name) == (crs.epsg, crs.name)
-
-
-def _dump_or_none(value: Any) -> str | None:
-    return None if value is None else json.dumps(value)
+def _marks(row: Sequence[Any]) -> str:
+    return ", ".join("?" * len(row))

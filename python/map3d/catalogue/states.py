@@ -14,6 +14,7 @@ class State(StrEnum):
     LEASED = "leased"
     DONE = "done"
     QUARANTINED = "quarantined"
+    CANCELLED = "cancelled"
 
 
 class JobEvent(StrEnum):
@@ -26,6 +27,10 @@ class JobEvent(StrEnum):
     RELEASE = "release"
     RETRY = "retry"
     KEY_CHANGED = "key changed"
+    PLAN = "plan"
+    CANCEL = "cancel"
+    REOPEN = "reopen"
+    BELOW_REOPENED = "below reopened"
 
 
 OPEN: Final = (State.WAITING, State.TODO, State.LEASED)
@@ -45,12 +50,23 @@ TRANSITIONS: Final[dict[tuple[State, JobEvent], State]] = {
     (State.DONE, JobEvent.KEY_CHANGED): State.TODO,
     (State.QUARANTINED, JobEvent.RETRY): State.TODO,
     (State.QUARANTINED, JobEvent.KEY_CHANGED): State.TODO,
+    (State.CANCELLED, JobEvent.RETRY): State.TODO,
+    (State.CANCELLED, JobEvent.PLAN): State.TODO,
+    (State.CANCELLED, JobEvent.KEY_CHANGED): State.TODO,
+    (State.WAITING, JobEvent.CANCEL): State.CANCELLED,
+    (State.TODO, JobEvent.CANCEL): State.CANCELLED,
+    (State.LEASED, JobEvent.CANCEL): State.CANCELLED,
+    (State.DONE, JobEvent.REOPEN): State.TODO,
+    (State.WAITING, JobEvent.BELOW_REOPENED): State.WAITING,
+    (State.TODO, JobEvent.BELOW_REOPENED): State.WAITING,
+    (State.LEASED, JobEvent.BELOW_REOPENED): State.WAITING,
+    (State.DONE, JobEvent.BELOW_REOPENED): State.WAITING,
 }
 
 
 def next_state(state: State, event: JobEvent) -> State | None:
     """Returns the state after `event`, None when the event is refused. The catalogue itself quarantines a job after MAX_ATTEMPTS or MAX_EXPIRIES, and
-    decides whether a reduce job with a changed key is todo or waits for the blocks below."""
+    makes a reduce job wait for the blocks below after a plan, retry or reopening."""
     return TRANSITIONS.get((state, event))
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, Protocol
 
-from map3d.catalogue import Catalogue, JobResult, Lease, State
+from map3d.catalogue import Catalogue, JobResult, Lease
 from map3d.errors import Map3dError, StaleFence, StalePlan, Stopped, SubprocessStartFailed
 from map3d.jobs.events import JobDone, JobFailed, LeaseLost, RunEvent, SceneChanged, WorkerExited
 from map3d.jobs.timeouts import Timeouts
@@ -114,8 +114,8 @@ class Worker:
         return WorkerExited(self.name)
 
     def _no_jobs_left(self) -> bool:
-        counts = self._catalogue.count_jobs(self._rendering)
-        return counts[State.TODO] + counts[State.LEASED] == 0
+        """Sweeps before it gives up, since a killed process may have left reduce jobs waiting."""
+        return not self._catalogue.has_open_jobs(self._rendering) and self._catalogue.sweep(self._rendering) == 0
 
     def _work(self, process: Subprocess, lease: Lease) -> RunEvent:
         heartbeat = _Heartbeat(self._catalogue, lease, self._timeouts, self._stop_now)

@@ -40,7 +40,7 @@ def current_manifest(workspace: Workspace, catalogue: Catalogue, record: Renderi
         title=record.title or scene.title,
         attribution=record.attribution or scene.attribution,
         content_version=record.content_version,
-        complete=counts[State.DONE] == sum(counts.values()) > 0,
+        complete=counts[State.DONE] == sum(counts.values()) > 0 and not record.planning,
         crs=_crs(scene),
         origin=_origin(scene),
         box=box,
