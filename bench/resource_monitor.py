@@ -52,17 +52,22 @@ class ResourceMonitor:
 
 
 def run_monitored(command: Sequence[str], folder: Path, figures: ResourceUsage) -> int:
-    """Runs a command, adds its usage to `figures` and returns its exit status. Forwards SIGINT, then raises KeyboardInterrupt."""
+    """Runs a command, adds its usage to `figures` and returns its exit status. Forwards SIGINT, then raises KeyboardInterrupt.
+
+    A command that ends between two samples counts with its own peak, which the system reports.
+    """
     before, begun = os.times(), time.monotonic()
     process = subprocess.Popen(command, start_new_session=True)
     watch = ResourceMonitor(process.pid, folder)
     thread = threading.Thread(target=watch.run, daemon=True)
     thread.start()
+    peak_bytes = 0
     try:
-        return process.wait()
+        peak_bytes = _wait(process)
+        return process.returncode
     except KeyboardInterrupt:
         os.killpg(process.pid, signal.SIGINT)
-        process.wait()
+        peak_bytes = _wait(process)
         raise
     finally:
         watch.ended.set()
@@ -70,11 +75,18 @@ def run_monitored(command: Sequence[str], folder: Path, figures: ResourceUsage) 
         after = os.times()
         figures.wall_s += time.monotonic() - begun
         figures.cpu_s += after.children_user + after.children_system - before.children_user - before.children_system
-        figures.memory_bytes = max(figures.memory_bytes, watch.memory_bytes)
+        figures.memory_bytes = max(figures.memory_bytes, watch.memory_bytes, peak_bytes)
         figures.anonymous_bytes = max(figures.anonymous_bytes, watch.anonymous_bytes)
         figures.disk_bytes = disk_bytes_of(folder)
         figures.disk_peak_bytes = max(figures.disk_peak_bytes, watch.disk_bytes, figures.disk_bytes)
         figures.runs += 1
+
+
+def _wait(process: subprocess.Popen[bytes]) -> int:
+    """Waits for the end of a process and returns its peak resident memory in bytes."""
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    return usage.ru_maxrss * 1024
 
 
 def process_tree(process: int) -> list[int]:
