@@ -89,6 +89,9 @@ browser-suite: build
 
 test-all: test ## run slow tests, too (none is marked slow yet)
 
+faults: build ## kill, fill disks, fail system calls: every tile set must equal the undisturbed one (docs/reliability.md): 1 hour
+	$(BIN)/python -m tests.faults
+
 # -- check ---------------------------------------------------------------------------------------------------------------------------
 
 check: check-words check-rust check-python check-viewer ## check words, format, lint, types and sizes

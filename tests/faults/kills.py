@@ -1,0 +1,189 @@
+"""Random SIGKILLs of importer, dispatcher, workers, their subprocesses and server while a street changes from variant to variant."""
+
+import random
+import shutil
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from map3d.catalogue import Workspace
+from tests.faults.processes import Command, kill_child
+from tests.faults.street import RENDERING, SCENE, VARIANTS, Expected, make_workspace, read_result, render_undisturbed, street_file
+from tests.faults.tile_reader import TileReader
+
+DELAYS_S: Final = (0.02, 0.7)
+"""Shortest and longest time between two kills. A command needs about half a second to start."""
+GIVE_UP_S: Final = 300.0
+"""A run that takes longer has hung."""
+QUARANTINE: Final = "in quarantine"
+
+
+@dataclass
+class KillReport:
+    """Counts of one run. `kills`: by victim; `retries`: runs that had to retry jobs whose subprocess was killed three times."""
+
+    seed: int
+    kills: Counter[str] = field(default_factory=Counter)
+    variants: list[int] = field(default_factory=list)
+    retries: int = 0
+    tiles_served: int = 0
+    faults: list[str] = field(default_factory=list)
+    seconds: float = 0.0
+
+    def __str__(self) -> str:
+        counts = ", ".join(f"{count} {victim}" for victim, count in sorted(self.kills.items()))
+        variants = "→".join(map(str, self.variants))
+        outcome = "equal" if not self.faults else "FAULTS: " + "; ".join(self.faults)
+        retries = f", {self.retries} retries" if self.retries else ""
+        return (
+            f"seed {self.seed}: {self.kills.total()} kills ({counts}), variants {variants}{retries}, {self.tiles_served:,} tiles served, "
+            f"{self.seconds:.0f} s: {outcome}"
+        )
+
+
+class Reference:
+    """The undisturbed result of every variant, and a template of the workspace before its first render."""
+
+    def __init__(self, folder: Path, houses: int) -> None:
+        self.houses = houses
+        self.template = folder / "template"
+        make_workspace(self.template, houses)
+        self._folder = folder
+        self._expected: dict[int, Expected] = {}
+
+    def expected(self, variant: int) -> Expected:
+        if variant not in self._expected:
+            workspace = make_workspace(self._folder / f"variant{variant}", self.houses, variant)
+            self._expected[variant] = render_undisturbed(workspace)
+            shutil.rmtree(workspace.root)
+        return self._expected[variant]
+
+    def all_tiles(self) -> frozenset[str]:
+        return frozenset().union(*(self.expected(variant).tiles for variant in range(VARIANTS)))
+
+
+class KillRun:
+    """One run: the same commands are started again after each kill until the last variant is complete."""
+
+    def __init__(self, reference: Reference, root: Path, seed: int, kills: int, environment: Mapping[str, str] | None = None) -> None:
+        self._reference, self._kills = reference, kills
+        self._choose = random.Random(seed)
+        self._workspace = Workspace(root)
+        self._files = root / "files"
+        self.report = KillReport(seed)
+        where = ("-w", root)
+        self._import = Command("import", ["add-files", SCENE, self._files / "street.obj", "--split", "group", *where], environment)
+        self._render = Command("dispatcher", ["render", RENDERING, "--workers", "2", *where], environment)
+        self._work = Command("worker", ["render", RENDERING, "--workers", "1", *where], environment)
+        self._serve = Command("server", ["serve", "--port", "0", *where], environment)
+        self._retry = Command("retry", ["retry", RENDERING, *where], environment)
+
+    def run(self) -> KillReport:
+        started = time.monotonic()
+        reader = TileReader(self._serve, RENDERING, self._reference.all_tiles(), self._choose.randrange(1 << 30))
+        self._serve.start()
+        try:
+            reader.start()
+            self._change(0)
+            while self.report.kills.total() < self._kills:
+                self._change(self._choose.randrange(VARIANTS))
+            self._finish()
+        finally:
+            reader.stop()
+            for command in (self._import, self._render, self._work, self._serve, self._retry):
+                command.end()
+        self.report.tiles_served = reader.tiles
+        self.report.faults += reader.faults
+        self.report.seconds = time.monotonic() - started
+        return self.report
+
+    def _change(self, variant: int) -> None:
+        """Imports and renders a variant under kills."""
+        street_file(self._files, variant, self._reference.houses)
+        self.report.variants.append(variant)
+        self._until_done(self._import)
+        self._work.start()
+        self._until_done(self._render)
+        self._work.kill()
+
+    def _until_done(self, command: Command) -> None:
+        """Starts the command again after each kill until it succeeds."""
+        command.start()
+        deadline = time.monotonic() + GIVE_UP_S
+        while time.monotonic() < deadline:
+            self._pause(command)
+            status = command.status()
+            if status == 0:
+                return
+            if status is not None and status > 0:
+                self._after_failure(command)
+            if self.report.kills.total() < self._kills and status is None:
+                self._kill(command)
+            if command.status() is not None and command.status() != 0:
+                command.start()
+        raise TimeoutError(f"{command.name} has not ended after {GIVE_UP_S:.0f} s; its last output: {command.output()}")
+
+    def _pause(self, command: Command) -> None:
+        """Waits for a random time, or until the command has ended."""
+        end = time.monotonic() + self._choose.uniform(*DELAYS_S)
+        while time.monotonic() < end and command.status() is None:
+            time.sleep(0.005)
+
+    def _after_failure(self, command: Command) -> None:
+        """Allows one kind of failure: jobs whose subprocess was killed three times."""
+        if command is self._render and QUARANTINE in command.output():
+            self.report.retries += 1
+            self._retry.start()
+            self._retry.wait(60)
+        else:
+            raise RuntimeError(f"{command.name} failed with status {command.status()}: {command.output()}")
+
+    def _kill(self, command: Command) -> None:
+        victim = self._choose.choices(("command", "subprocess", "worker", "subprocess of worker", "server"), (30, 30, 15, 15, 10))[0]
+        if victim == "command":
+            command.kill()
+            self.report.kills[command.name] += 1
+        elif victim == "subprocess" and kill_child(command.pid, self._choose):
+            self.report.kills["subprocess"] += 1
+        elif victim == "worker" and command is self._render:
+            self.report.kills["worker"] += self._work.status() is None
+            self._work.kill()
+            self._work.start()
+        elif victim == "subprocess of worker" and command is self._render and self._work.status() is None:
+            self.report.kills["subprocess"] += kill_child(self._work.pid, self._choose)
+        elif victim == "server":
+            self._serve.kill()
+            self._serve.start()
+            self.report.kills["server"] += 1
+        if self._work.starts and self._work.status() is not None and command is self._render:
+            self._work.start()
+
+    def _finish(self) -> None:
+        """Compares the tiles with the undisturbed ones of the last variant, and runs `map3d verify`."""
+        if read_result(self._workspace).digest != self._reference.expected(self.report.variants[-1]).digest:
+            self.report.faults.append("tiles differ from the undisturbed ones")
+        verify = Command("verify", ["verify", "-w", self._workspace.root])
+        verify.start()
+        if verify.wait(GIVE_UP_S):
+            self.report.faults.append(f"verify: {verify.output()}")
+        verify.end()
+
+
+def run_kills(runs: int, kills: int, seed: int, houses: int = 48, show: bool = True) -> list[KillReport]:
+    """Runs `kills` kills in each of `runs` runs; run number i has seed `seed + i`."""
+    reports = []
+    with tempfile.TemporaryDirectory(prefix="map3d-faults-") as folder:
+        reference = Reference(Path(folder), houses)
+        for number in range(runs):
+            root = Path(folder) / f"run{number}"
+            shutil.copytree(reference.template, root)
+            reports.append(KillRun(reference, root, seed + number, kills).run())
+            if show:
+                print(reports[-1], flush=True)
+            if not reports[-1].faults:
+                shutil.rmtree(root)
+    return reports
