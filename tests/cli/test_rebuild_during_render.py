@@ -1,7 +1,6 @@
 """A scene that is rebuilt while it is being rendered: no block has pixels of another scene than that of its key."""
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -14,6 +13,7 @@ from map3d.jobs.run import Run as RenderRun
 from map3d.jobs.run import RunSettings
 from map3d.renderings.build import BUILD_BYTES, build
 from map3d.renderings.render_task import RenderTask
+from map3d.subprocess import Message
 from tests.cli.test_incremental import render_from_scratch
 from tests.cli.test_whole import digest
 from tests.cli.towns import Run, house, write_town
@@ -50,7 +50,7 @@ def test_every_block_equals_a_fresh_render(run: Run, town: Workspace, tmp_path: 
     make_request = RenderTask.request
     leases: list[Lease] = []
 
-    def request(task: RenderTask, lease: Lease) -> dict[str, Any]:
+    def request(task: RenderTask, lease: Lease) -> Message:
         """Changes the scene in the middle of the render, while the worker waits."""
         leases.append(lease)
         if len(leases) == LEASES_BEFORE_THE_CHANGE:

@@ -1,11 +1,12 @@
 """Requests and responses between a process and its subprocess."""
 
 import os
+import signal
 import threading
 
 import pytest
 
-from map3d.errors import Corrupt, SubprocessDied
+from map3d.errors import Corrupt, SubprocessDied, SubprocessTimedOut
 from map3d.subprocess import Channel, Message, Subprocess
 from map3d.subprocess.channel import MAX_JSON_BYTES
 
@@ -82,6 +83,29 @@ def test_subprocess_handles_one_request_after_another() -> None:
         pids.add(response.value["pid"])
     assert pids == {process.pid}
     process.close()
+    process.close()
+
+
+def test_requests_carry_byte_strings() -> None:
+    process = Subprocess(ECHO, {})
+    process.wait_ready(30)
+    for blobs in ([b"one", b""], [os.urandom(9_000_000), b"x"]):
+        response = process.request(Message({"echo": True}, blobs), wall_s=30)
+        assert isinstance(response, Message)
+        assert response.blobs == blobs
+    process.close()
+
+
+def test_a_subprocess_that_does_not_read_its_request_is_killed_in_time() -> None:
+    process = Subprocess(ECHO, {})
+    process.wait_ready(30)
+    os.kill(process.pid, signal.SIGSTOP)
+    reports: list[object] = []
+    with pytest.raises(SubprocessTimedOut, match="did not read"):
+        process.request(Message({}, [bytes(9_000_000)]), wall_s=0.5, every_s=0.05, on_progress=reports.append)
+    assert reports
+    with pytest.raises(SubprocessDied):
+        process.request({}, wall_s=30)
     process.close()
 
 

@@ -57,6 +57,15 @@ def test_stored_tiles_read_back(store):
     assert store.get_block(BLOCK) == StoredBlock(BLOCK, "key", 1, len(tiles))
 
 
+def test_seams_are_read_together(store):
+    blocks = [BlockId(1, x, y) for x in (0, 1) for y in (0, 1)]
+    for block in blocks[:2]:
+        store.put_block(block, "k", 1, content(block), str(block).encode())
+    store.put_block(blocks[2], "k", 1, [], None)
+    assert store.get_seams(blocks) == {block: str(block).encode() for block in blocks[:2]}
+    assert store.get_seams([]) == {}
+
+
 def test_missing_tiles_are_none(store):
     store.put_block(BLOCK, "key", 1, content(BLOCK, layers=[0]), b"seam")
     assert store.get_tile(1, 1, 1, 0) is None

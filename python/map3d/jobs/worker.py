@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import Any, Protocol
+from typing import Protocol
 
 from map3d.catalogue import Catalogue, JobResult, Lease
 from map3d.errors import Map3dError, StaleFence, StalePlan, Stopped, SubprocessStartFailed
@@ -23,7 +23,7 @@ class Task(Protocol):
 
     def start_subprocess(self) -> Subprocess: ...
 
-    def request(self, lease: Lease) -> dict[str, Any]:
+    def request(self, lease: Lease) -> Message:
         """Returns the request for the subprocess."""
 
     def commit(self, lease: Lease, response: Message) -> JobResult:

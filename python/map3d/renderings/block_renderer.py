@@ -2,17 +2,14 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from map3d import _core
-from map3d.errors import NotFound, StalePlan
+from map3d.errors import StalePlan
 from map3d.geometry.frames import core_frame
 from map3d.subprocess import Handler, ReportProgress
-from map3d.tiles.naming import blocks_below
-from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.types import BlockId
 
 COUNTED: Final = ("chunk_hits", "chunk_misses", "texture_hits", "texture_misses", "texture_decoded", "texture_evicted")
@@ -22,12 +19,19 @@ REBUILT: Final = "the scene was rebuilt"
 
 
 def open_renderer(setup: Mapping[str, Any]) -> Handler:
-    """`setup`: {"scene": folder, "cache_bytes", "frames": {track: frame}, "stores": {track: path}}."""
+    """`setup`: {"scene": folder, "cache_bytes", "frames": {track: frame}}.
+
+    A request for a reduce block has the seams of the blocks below as byte strings, and their columns and rows under "below".
+    """
     renderer = _BlockRenderer(setup)
 
-    def handle(request: dict[str, Any], _blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], Sequence[bytes]]:
+    def handle(request: dict[str, Any], blobs: list[bytes], _report: ReportProgress) -> tuple[dict[str, Any], Sequence[bytes]]:
         started = time.perf_counter()
-        block = renderer.render(request["track"], BlockId(*request["block"]), request["kind"], request["levels"], request["key"])
+        if request["kind"] == "base":
+            block = renderer.render(request["track"], BlockId(*request["block"]), request["key"])
+        else:
+            seams = [(x, y, seam) for (x, y), seam in zip(request["below"], blobs, strict=True)]
+            block = renderer.reduce(request["track"], BlockId(*request["block"]), request["levels"], seams)
         tiles, seam = block.tiles, block.seam
         stats = {**block.stats, **renderer.take_cache_counts()}
         response = {"tiles": [list(tile[:4]) for tile in tiles], "seam": seam is not None, "stats": stats}
@@ -42,15 +46,15 @@ class _BlockRenderer:
         self._setup = setup
         self._scene = self._open_scene()
         self._frames = {track: core_frame(frame) for track, frame in setup["frames"].items()}
-        self._paths = {track: Path(path) for track, path in setup["stores"].items()}
-        self._stores: dict[str, SqliteTileStore] = {}
         self._counted = dict.fromkeys(COUNTED, 0)
 
-    def render(self, track: str, block: BlockId, kind: str, levels: int, key: str) -> _core.Block:
-        """Renders a block from the scene from which `key` was computed. Raises StalePlan when the scene has changed since."""
-        if kind == "base":
-            return self._render_current(track, block, key) or self._render_reopened(track, block, key)
-        return _core.reduce_block(self._frames[track], *block, levels, self._seams_below(track, block))
+    def render(self, track: str, block: BlockId, key: str) -> _core.Block:
+        """Renders a base block from the scene from which `key` was computed. Raises StalePlan when the scene has changed since."""
+        return self._render_current(track, block, key) or self._render_reopened(track, block, key)
+
+    def reduce(self, track: str, block: BlockId, levels: int, seams: list[tuple[int, int, bytes]]) -> _core.Block:
+        """Reduces the seams (x, y, bytes) of the blocks below to a reduce block."""
+        return _core.reduce_block(self._frames[track], *block, levels, seams)
 
     def _render_current(self, track: str, block: BlockId, key: str) -> _core.Block | None:
         """Renders a base block from the open scene; returns None when that is another scene than the one that was planned."""
@@ -78,20 +82,3 @@ class _BlockRenderer:
         before, now = self._counted, self._scene.stats()
         self._counted = {name: now[name] for name in COUNTED}
         return {name: self._counted[name] - before[name] for name in COUNTED}
-
-    def _seams_below(self, track: str, block: BlockId) -> list[tuple[int, int, bytes]]:
-        """Returns (x, y, seam) of each block below that has content."""
-        store = self._store(track)
-        seams = []
-        for below in blocks_below(block, self._frames[track].zmax):
-            stored, seam = store.get_block(below), store.get_seam(below)
-            if seam is not None:
-                seams.append((below.x, below.y, seam))
-            elif stored is not None and stored.tiles:
-                raise NotFound(f"block {below} of track {track} has {stored.tiles} tiles but no seam; run map3d verify")
-        return seams
-
-    def _store(self, track: str) -> SqliteTileStore:
-        if track not in self._stores:
-            self._stores[track] = SqliteTileStore(self._paths[track], read_only=True)
-        return self._stores[track]

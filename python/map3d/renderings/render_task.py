@@ -6,11 +6,13 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from map3d.catalogue import JobResult, Lease, RenderingRecord, Workspace
+from map3d.errors import NotFound
 from map3d.renderings.block_check import check_rendered
 from map3d.renderings.track_stores import open_or_create_track
 from map3d.subprocess import Message, Subprocess
-from map3d.tiles.naming import block_level
+from map3d.tiles.naming import block_level, blocks_below
 from map3d.tiles.tile_store import StoredTile, TileStore
+from map3d.types import BlockId
 
 RENDER_ENTRY: Final = "map3d.renderings.block_renderer:open_renderer"
 CACHE_BYTES: Final = 512 << 20
@@ -34,9 +36,24 @@ class RenderTask:
     def start_subprocess(self) -> Subprocess:
         return Subprocess(self._entry, self._setup)
 
-    def request(self, lease: Lease) -> dict[str, Any]:
+    def request(self, lease: Lease) -> Message:
+        """Contains everything that a reduce block depends on, so that the subprocess needs neither stores nor credentials."""
         levels = block_level(lease.block.z, self._zmax).levels
-        return {"track": lease.track, "block": list(lease.block), "kind": lease.kind, "levels": levels, "key": lease.key}
+        value = {"track": lease.track, "block": list(lease.block), "kind": lease.kind, "levels": levels, "key": lease.key}
+        if lease.kind == "base":
+            return Message(value, [])
+        seams = self._seams_below(lease)
+        return Message({**value, "below": [[below.x, below.y] for below in seams]}, list(seams.values()))
+
+    def _seams_below(self, lease: Lease) -> dict[BlockId, bytes]:
+        """Returns the seams of the blocks below that have content."""
+        store, below = self._stores[lease.track], blocks_below(lease.block, self._zmax)
+        seams = store.get_seams(below)
+        for block in below:
+            stored = None if block in seams else store.get_block(block)
+            if stored is not None and stored.tiles:
+                raise NotFound(f"block {block} of track {lease.track} has {stored.tiles} tiles but no seam; run map3d verify")
+        return seams
 
     def commit(self, lease: Lease, response: Message) -> JobResult:
         store = self._stores[lease.track]
@@ -66,5 +83,4 @@ def _setup(workspace: Workspace, rendering: RenderingRecord, cache_bytes: int) -
         "scene": str(workspace.scene_folder(rendering.scene).absolute()),
         "cache_bytes": cache_bytes,
         "frames": {track.id: track.frame.to_json(track.layers) for track in rendering.tracks},
-        "stores": {track.id: str(workspace.store_path(rendering.name, track.id).absolute()) for track in rendering.tracks},
     }

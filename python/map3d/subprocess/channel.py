@@ -9,7 +9,7 @@ import os
 import select
 import struct
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 from map3d.errors import Corrupt
@@ -39,14 +39,22 @@ class Channel:
         """Takes ownership of the two file descriptors."""
         self._read_fd, self._write_fd = read_fd, write_fd
         self._buffer = bytearray()
+        if write_fd >= 0:
+            os.set_blocking(write_fd, False)
 
-    def send(self, value: dict[str, Any], blobs: Sequence[bytes] = ()) -> None:
-        """Blocks until the message is written; raises BrokenPipeError when the other side has closed its pipe."""
+    def send(
+        self, value: Mapping[str, Any], blobs: Sequence[bytes] = (), *, every_s: float | None = None, on_wait: Callable[[], None] | None = None
+    ) -> None:
+        """Blocks until the message is written; calls `on_wait` every `every_s` seconds in which the other side reads nothing, and stops in the middle
+        of the message when that raises. Raises BrokenPipeError when the other side has closed its pipe."""
         text = json.dumps({**value, "blobs": [len(blob) for blob in blobs]}, ensure_ascii=False).encode("utf-8", "replace")
         for part in (_HEAD.pack(len(text), sum(map(len, blobs))) + text, *blobs):
             view = memoryview(part)
             while view:
-                view = view[os.write(self._write_fd, view) :]
+                if select.select([], [self._write_fd], [], every_s)[1]:
+                    view = view[os.write(self._write_fd, view) :]
+                elif on_wait is not None:
+                    on_wait()
 
     def receive(self, timeout_s: float | None = None) -> Message | None:
         """Returns the next message, None when no message is complete within the time. Raises EOFError when the other side has closed its pipe,

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import IO, Any, Final
 
@@ -41,6 +41,7 @@ class Subprocess:
         child_reads, parent_writes = os.pipe()
         parent_reads, child_writes = os.pipe()
         _enlarge(child_writes)
+        _enlarge(parent_writes)
         self._channel = Channel(parent_reads, parent_writes)
         try:
             self._process = subprocess.Popen(
@@ -82,17 +83,30 @@ class Subprocess:
         return ready
 
     def request(
-        self, value: Mapping[str, Any], *, wall_s: float | None, every_s: float = 1.0, on_progress: Callable[[Any], None] | None = None
+        self,
+        value: Mapping[str, Any] | Message,
+        *,
+        wall_s: float | None,
+        every_s: float = 1.0,
+        on_progress: Callable[[Any], None] | None = None,
     ) -> Message | Failure:
-        """Sends a request and waits for the response, or for the exception that the handler raised.
+        """Sends a request, with byte strings if it is a `Message`, and waits for the response, or for the exception that the handler raised.
 
         Calls `on_progress` with each progress report, and with None at least every `every_s` seconds. When it raises, the subprocess is killed and
         the exception propagates. Raises SubprocessDied when the subprocess ends or sends an invalid message, SubprocessTimedOut after `wall_s`,
         LimitExceeded when a limit ended it.
         """
-        self._send({"request": dict(value)})
+        request = value if isinstance(value, Message) else Message(dict(value), [])
         end = None if wall_s is None else time.monotonic() + wall_s
+
+        def on_wait() -> None:
+            if end is not None and time.monotonic() >= end:
+                raise SubprocessTimedOut(f"the subprocess did not read its request within {wall_s:g} s")
+            if on_progress is not None:
+                on_progress(None)
+
         try:
+            self._send({"request": request.value}, request.blobs, every_s=every_s, on_wait=on_wait)
             while True:
                 wait_s = every_s if end is None else min(every_s, max(end - time.monotonic(), 0.0))
                 message = self._receive(wait_s)
@@ -121,9 +135,11 @@ class Subprocess:
         self._channel.close()
         self._stderr.close()
 
-    def _send(self, value: dict[str, Any]) -> None:
+    def _send(
+        self, value: dict[str, Any], blobs: Sequence[bytes] = (), *, every_s: float | None = None, on_wait: Callable[[], None] | None = None
+    ) -> None:
         try:
-            self._channel.send(value)
+            self._channel.send(value, blobs, every_s=every_s, on_wait=on_wait)
         except BrokenPipeError as error:
             raise self._exit_error() from error
 

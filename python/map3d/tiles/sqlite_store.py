@@ -5,7 +5,7 @@ import json
 import os
 import sqlite3
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import asdict
 from pathlib import Path
@@ -133,6 +133,10 @@ class SqliteTileStore:
         with self._reading() as db:
             row = db.execute("SELECT seam FROM block WHERE id = ?", (str(block),)).fetchone()
         return None if row is None or row[0] is None else bytes(row[0])
+
+    def get_seams(self, blocks: Iterable[BlockId]) -> dict[BlockId, bytes]:
+        found = ((block, self.get_seam(block)) for block in blocks)
+        return {block: seam for block, seam in found if seam is not None}
 
     def get_block(self, block: BlockId) -> StoredBlock | None:
         with self._reading() as db:

@@ -1,7 +1,7 @@
 """The interface of a tile store (spec/catalogue.md). A store contains the layers of one track. All implementations pass the same tests."""
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Final, NamedTuple, Protocol, Self
@@ -75,6 +75,9 @@ class TileStore(Protocol):
         """Returns None if the tile is empty or its block is missing."""
 
     def get_seam(self, block: BlockId) -> bytes | None: ...
+
+    def get_seams(self, blocks: Iterable[BlockId]) -> dict[BlockId, bytes]:
+        """Returns the seams of those blocks that have one."""
 
     def get_block(self, block: BlockId) -> StoredBlock | None: ...
 
