@@ -10,7 +10,7 @@ from map3d.ingest.importing import import_file
 from map3d.ingest.sources import find_sources
 from map3d.jobs.events import RunEvent, SceneChanged
 from map3d.jobs.run import Run as RenderRun
-from map3d.jobs.run import RunSettings
+from map3d.jobs.run_settings import RunSettings
 from map3d.renderings.build import BUILD_BYTES, build
 from map3d.renderings.render_task import RenderTask
 from map3d.subprocess import Message

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from map3d.catalogue import JobResult, Lease, State
-from map3d.jobs.events import JobDone, RunEvent, Waiting, WorkerExited
+from map3d.jobs.events import JobDone, Remaining, RunEvent, Stopping, Waiting, WorkerExited
 from map3d.jobs.timeouts import Timeouts
 from map3d.renderings.render_task import RenderTask
 from map3d.subprocess import Message
@@ -330,11 +330,11 @@ def test_heartbeats_continue_during_a_long_commit(town: Town, faults: Path, monk
 
     def on_event(event: RunEvent) -> None:
         events.append(event)
-        pool.stop()
+        pool.stop.finish_jobs()
 
     pool.run(on_event)
     town.task.close()
-    assert {type(event) for event in events} == {JobDone, WorkerExited}
+    assert {type(event) for event in events} - {Stopping, Remaining} == {JobDone, WorkerExited}
 
 
 def test_worker_exits_after_three_failed_jobs(town: Town, faults: Path) -> None:
@@ -363,7 +363,7 @@ def test_stop_finishes_the_current_jobs(town: Town, faults: Path) -> None:
 
     def on_event(event: RunEvent) -> None:
         events.append(event)
-        pool.stop()
+        pool.stop.finish_jobs()
 
     statistics = pool.run(on_event)
     town.task.close()
@@ -374,7 +374,7 @@ def test_stop_finishes_the_current_jobs(town: Town, faults: Path) -> None:
 def test_stop_now_releases_jobs_without_counting_the_attempt(town: Town, faults: Path) -> None:
     (faults / "slow").write_text("60")
     pool = town.pool(timeouts=Timeouts(heartbeat_s=0.5, block_s=100, tick_s=0.1))
-    timer = threading.Timer(1.5, pool.stop_now)
+    timer = threading.Timer(1.5, pool.stop.release_jobs)
     timer.start()
     started = time.monotonic()
     statistics = pool.run(lambda _: None)
@@ -391,11 +391,11 @@ def test_heartbeats_keep_the_lease_of_a_long_block(town: Town, faults: Path) -> 
 
     def on_event(event: RunEvent) -> None:
         kinds.append(type(event))
-        pool.stop()
+        pool.stop.finish_jobs()
 
     pool.run(on_event)
     town.task.close()
-    assert set(kinds) == {JobDone, WorkerExited}
+    assert set(kinds) - {Stopping, Remaining} == {JobDone, WorkerExited}
 
 
 def children_of(pid: int) -> list[int]:

@@ -11,7 +11,8 @@ pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_
 
 from map3d.catalogue import Catalogue, RenderingRecord, SceneCrs, SceneRecord, State, Workspace
 from map3d.errors import BadRequest, OutsideFrame
-from map3d.jobs.run import Run, RunPlan, RunResult, RunSettings
+from map3d.jobs.run import Run, RunPlan, RunResult
+from map3d.jobs.run_settings import RunSettings
 from map3d.jobs.timeouts import Timeouts
 from map3d.renderings.create import add_layers, add_views
 from map3d.renderings.layers import LayerRequest
@@ -50,7 +51,7 @@ def run_all(workspace: Workspace, catalogue: Catalogue, scene: SquareScene, stop
     def on_event(event: object) -> None:
         seen.append(event)
         if stop_after is not None and len(seen) == stop_after:
-            run.stop()
+            run.stop.finish_jobs()
 
     return plan, run.work(plan, on_event)
 

@@ -7,7 +7,8 @@ from pathlib import Path
 from map3d.catalogue import Catalogue, PlannedJob, RenderingRecord, SceneRecord, State, Workspace
 from map3d.geometry.frames import pin
 from map3d.jobs.events import RunEvent
-from map3d.jobs.pool import Pool, RunStatistics
+from map3d.jobs.pool import Pool
+from map3d.jobs.run_statistics import RunStatistics
 from map3d.jobs.timeouts import Timeouts
 from map3d.renderings.render_task import RenderTask
 from map3d.tiles.naming import block_above, morton

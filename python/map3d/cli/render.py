@@ -1,21 +1,19 @@
 """map3d render."""
 
-import time
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import MofNCompleteColumn
 
 from map3d.catalogue import Workspace
 from map3d.cli.building import build_with_progress
 from map3d.cli.options import json_option, max_memory_option, workers_option, workspace_option
-from map3d.cli.output import console, counts_text, plural, print_json, size_text
-from map3d.cli.progress import progress_bar
+from map3d.cli.output import plural, print_json, size_text
 from map3d.cli.render_stats import print_summary, summary
 
 if TYPE_CHECKING:
-    from map3d.jobs.run import Run, RunPlan, RunResult
+    from map3d.jobs.run import Run, RunResult
 
 
 @click.command("render")
@@ -31,7 +29,8 @@ def command(workspace: Workspace, rendering: str, workers: int, max_memory: int 
     You can stop it at any time, even with kill; re-run it to resume. Ctrl-C finishes the current blocks first; a second Ctrl-C releases them
     and stops at once.
     """
-    from map3d.jobs.run import Run, RunSettings
+    from map3d.jobs.run import Run
+    from map3d.jobs.run_settings import RunSettings
 
     catalogue = workspace.open_catalogue()
     try:
@@ -53,48 +52,13 @@ def command(workspace: Workspace, rendering: str, workers: int, max_memory: int 
 
 def render_with_progress(run: "Run") -> "RunResult":
     """Plans and runs the jobs, with a progress bar for each on standard error."""
-    with _bar(MofNCompleteColumn()) as bar:
+    from map3d.cli.run_progress import RunProgress, run_bar
+
+    with run_bar(MofNCompleteColumn()) as bar:
         task = bar.add_task("planning", total=None)
         plan = run.plan(lambda done, total: bar.update(task, completed=done, total=total))
-    return _work(run, plan)
-
-
-def _work(run: "Run", plan: "RunPlan") -> "RunResult":
-    from map3d.jobs.events import JobDone, JobFailed, LeaseLost, SceneChanged, Stopping, Waiting, WorkerExited
-
-    log, counts = console(), plan.counts
-    log.print(f"blocks: {counts_text({'new': counts.added, 'changed': counts.changed, 'unchanged': counts.kept})}; {plan.open_jobs:,} to render")
-    started_s, base_tiles = time.monotonic(), 0
-    with _bar(TextColumn("{task.fields[rate]}")) as bar:
-        task = bar.add_task("rendering", total=plan.open_jobs, rate="")
-
-        def on_event(event: Any) -> None:
-            nonlocal base_tiles
-            if isinstance(event, JobDone):
-                base_tiles += event.result.base_tiles
-                rate = base_tiles / max(time.monotonic() - started_s, 1e-3)
-                bar.update(task, advance=1, rate=f"{rate:,.0f} base tiles/s")
-            elif isinstance(event, JobFailed):
-                bar.console.print(
-                    f"{event.lease.track} {event.lease.block}: attempt {event.lease.attempt} failed ({event.reason}); the block is now {event.state}"
-                )
-            elif isinstance(event, LeaseLost):
-                bar.console.print(f"{event.lease.track} {event.lease.block}: lease lost: {event.reason}")
-            elif isinstance(event, SceneChanged):
-                bar.console.print("files changed during the render: planning again")
-            elif isinstance(event, Stopping):
-                bar.console.print(
-                    "stopping: releasing current blocks" if event.at_once else "stopping after the current blocks; press Ctrl-C again to stop at once"
-                )
-            elif isinstance(event, Waiting):
-                blocks = plural(event.jobs, "block")
-                bar.console.print(
-                    f"waiting for {blocks} leased by another run; leases of a run that was killed on another host expire within a minute"
-                )
-            elif isinstance(event, WorkerExited) and event.reason:
-                bar.console.print(f"worker {event.worker} exited: {event.reason}")
-
-        return run.work(plan, on_event)
+    with RunProgress() as progress:
+        return run.work(plan, progress)
 
 
 def print_result(rendering: str, result: "RunResult") -> None:
@@ -113,8 +77,3 @@ def print_result(rendering: str, result: "RunResult") -> None:
         )
     if result.open_jobs:
         click.echo(f"remaining: {plural(result.open_jobs, 'block')}; resume with map3d render {rendering}", err=True)
-
-
-def _bar(last: Any) -> Progress:
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), last, TimeElapsedColumn(), TimeRemainingColumn())
-    return progress_bar(*columns)

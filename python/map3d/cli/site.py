@@ -48,7 +48,8 @@ def command(
 
     You can stop it at any time; re-run it to resume. Re-run it after files change; only the changes are processed.
     """
-    from map3d.jobs.run import Run, RunSettings
+    from map3d.jobs.run import Run
+    from map3d.jobs.run_settings import RunSettings
     from map3d.renderings.site_steps import create_site_rendering
 
     request = _site_request(folder, views, **options)

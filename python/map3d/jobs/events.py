@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from map3d.catalogue import JobResult, Lease, State
+from map3d.catalogue import JobResult, Lease, PlanCounts, State
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class LeaseLost:
 
 @dataclass(frozen=True)
 class SceneChanged:
-    """The scene was rebuilt after the job had been planned. The job was released without losing an attempt; the run plans again."""
+    """The scene was rebuilt after the job had been planned. The job was released without losing an attempt; a run that plans does so again."""
 
     lease: Lease
     reason: str
@@ -61,4 +61,43 @@ class Waiting:
     jobs: int
 
 
-RunEvent = JobDone | JobFailed | LeaseLost | SceneChanged | WorkerExited | Stopping | Waiting
+@dataclass(frozen=True)
+class Planned:
+    """The run planned the rendering; `open_jobs` are to do, by this run or others."""
+
+    counts: PlanCounts
+    open_jobs: int
+
+
+@dataclass(frozen=True)
+class Remaining:
+    """The number of jobs that are not done now; other runs may do some of them."""
+
+    jobs: int
+
+
+@dataclass(frozen=True)
+class PlanAwaited:
+    """The scene was rebuilt, and this process does not plan: it tries again after a pause, when the rendering may have been planned again."""
+
+    rendering: str
+
+
+@dataclass(frozen=True)
+class RenderingStarted:
+    """`map3d work` starts with a rendering that has `open_jobs`."""
+
+    rendering: str
+    open_jobs: int
+
+
+@dataclass(frozen=True)
+class RenderingLeft:
+    """`map3d work` leaves a rendering: no jobs are left, or the user stopped it. `complete`: all jobs are done and its manifest is written."""
+
+    rendering: str
+    complete: bool
+
+
+JobOutcome = JobDone | JobFailed | LeaseLost | SceneChanged
+RunEvent = JobOutcome | WorkerExited | Stopping | Waiting | Planned | Remaining | PlanAwaited | RenderingStarted | RenderingLeft

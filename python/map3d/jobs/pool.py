@@ -1,96 +1,63 @@
-"""The workers of one `map3d render`: one thread and one subprocess each."""
+"""The workers of one process for one rendering: one thread and one subprocess each."""
 
 import queue
-import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from typing import Protocol
 
 from map3d.catalogue import Catalogue, State
+from map3d.catalogue.states import OPEN
 from map3d.jobs.dead_workers import expire_dead_workers, worker_name
-from map3d.jobs.events import JobDone, JobFailed, LeaseLost, RunEvent, SceneChanged, Stopping, Waiting, WorkerExited
+from map3d.jobs.events import Remaining, RunEvent, SceneChanged, Stopping, Waiting, WorkerExited
+from map3d.jobs.job_runner import JobRunner, Task
+from map3d.jobs.run_statistics import RunStatistics
+from map3d.jobs.stop_request import StopRequest
 from map3d.jobs.timeouts import Timeouts
-from map3d.jobs.worker import Signal, Task, Worker
+from map3d.jobs.worker import Signal, Worker
 from map3d.tiles.naming import morton
 
 _POLL_S = 0.2
 
 
-@dataclass
-class RunStatistics:
-    """Counts of what a run did. `bytes`: encoded; `exit_reasons`: of workers that exited before the run ended."""
+class WorkerPool(Protocol):
+    """Does the jobs of one rendering until none are left or the user stops it."""
 
-    done: int = 0
-    empty: int = 0
-    tiles: int = 0
-    base_tiles: int = 0
-    bytes: int = 0
-    failed_attempts: int = 0
-    lost_leases: int = 0
-    exit_reasons: list[str] = field(default_factory=list)
+    scene_changed: bool
+    """The plan is stale: the pool has stopped after the current jobs, and the rendering has to be planned again."""
 
-    def add(self, event: RunEvent) -> None:
-        if isinstance(event, JobDone):
-            self.done += 1
-            self.empty += event.result.empty
-            self.tiles += event.result.tiles
-            self.base_tiles += event.result.base_tiles
-            self.bytes += event.result.bytes
-        elif isinstance(event, JobFailed):
-            self.failed_attempts += 1
-        elif isinstance(event, LeaseLost):
-            self.lost_leases += 1
-        elif isinstance(event, WorkerExited) and event.reason:
-            self.exit_reasons.append(f"{event.worker}: {event.reason}")
+    def run(self, on_event: Callable[[RunEvent], None]) -> RunStatistics:
+        """Blocks until the last worker exits, and calls `on_event` in this thread."""
 
 
 class Pool:
-    """Runs `size` workers until no jobs are left.
+    """Implements `WorkerPool` with `size` workers in threads of this process.
 
     Replaces a worker that exited because of failed jobs as long as the run completes any job: then the jobs are at fault, not the machine.
     """
 
-    def __init__(self, catalogue: Catalogue, rendering: str, task: Task, size: int, timeouts: Timeouts | None = None) -> None:
+    def __init__(
+        self, catalogue: Catalogue, rendering: str, task: Task, size: int, timeouts: Timeouts | None = None, stop: StopRequest | None = None
+    ) -> None:
         self._catalogue, self._rendering, self._task, self._timeouts = catalogue, rendering, task, timeouts or Timeouts()
-        self._size = size
+        self._size, self.stop = size, stop or StopRequest()
         self._events: queue.SimpleQueue[RunEvent] = queue.SimpleQueue()
         self._stop, self._stop_now, self._job_ended = threading.Event(), threading.Event(), Signal()
         self._threads: dict[str, threading.Thread] = {}
         self._workers: dict[str, Worker] = {}
         self._started = 0
-        self._waiting_reported = self._stopped_by_user = False
+        self._waiting_reported = False
+        self._counted_s = time.monotonic()
         self.scene_changed = False
-        """The plan is stale: the pool stops after the current jobs, and the run plans again."""
         self._base_numbers: list[int] = []
         self._error: BaseException | None = None
         self.statistics = RunStatistics()
 
-    def stop(self) -> None:
-        """Makes the workers finish their jobs and exit."""
-        self._stopped_by_user = True
-        self._let_workers_exit()
-
-    def _let_workers_exit(self) -> None:
-        self._stop.set()
-        self._job_ended.notify()
-
-    def stop_now(self) -> None:
-        """Makes the workers release their jobs and exit."""
-        self._stop_now.set()
-        self.stop()
-
-    @property
-    def stopped(self) -> bool:
-        return self._stopped_by_user
-
     def run(self, on_event: Callable[[RunEvent], None]) -> RunStatistics:
-        """Blocks until the last worker exits and calls `on_event` in this thread. The first SIGINT or SIGTERM calls `stop`, the second `stop_now`."""
         expire_dead_workers(self._catalogue, self._rendering)
         self._base_numbers = self._open_base_numbers()
-        with _signals(self._on_signal):
-            for _ in range(self._size):
+        with self.stop.heard_by(self._events.put):
+            for _ in range(0 if self.stop.is_made else self._size):
                 self._start_worker()
             while self._threads or not self._events.empty():
                 self._handle_next(on_event)
@@ -103,27 +70,39 @@ class Pool:
         jobs = self._catalogue.jobs(self._rendering, state=State.TODO)
         return sorted(morton(job.block.x, job.block.y) for job in jobs if job.kind == "base")
 
-    def _on_signal(self) -> None:
-        self._events.put(Stopping(at_once=self.stopped))
-        self.stop_now() if self.stopped else self.stop()
-
     def _handle_next(self, on_event: Callable[[RunEvent], None]) -> None:
+        self._report_remaining(on_event)
         try:
             event = self._events.get(timeout=_POLL_S)
         except queue.Empty:
             self._report_waiting(on_event)
             return
         self.statistics.add(event)
-        if isinstance(event, SceneChanged):
+        if isinstance(event, Stopping):
+            self._let_workers_exit(at_once=event.at_once)
+        elif isinstance(event, SceneChanged):
             self.scene_changed = True
             self._let_workers_exit()
-        if isinstance(event, WorkerExited):
+        elif isinstance(event, WorkerExited):
             self._error = self._error or event.error
             self._threads.pop(event.worker).join()
             del self._workers[event.worker]
             if event.jobs_failed and self.statistics.done and not self._stop.is_set():
                 self._start_worker()
         on_event(event)
+
+    def _let_workers_exit(self, at_once: bool = False) -> None:
+        if at_once:
+            self._stop_now.set()
+        self._stop.set()
+        self._job_ended.notify()
+
+    def _report_remaining(self, on_event: Callable[[RunEvent], None]) -> None:
+        """Reports `Remaining` once per `count_s`."""
+        now = time.monotonic()
+        if now - self._counted_s >= self._timeouts.count_s:
+            self._counted_s = now
+            on_event(Remaining(count_open(self._catalogue, self._rendering)))
 
     def _report_waiting(self, on_event: Callable[[RunEvent], None]) -> None:
         """Reports `Waiting` once, when all workers have been idle for long enough."""
@@ -137,7 +116,8 @@ class Pool:
     def _start_worker(self) -> None:
         self._started += 1
         name = worker_name(self._started)
-        worker = Worker(name, self._catalogue, self._rendering, self._task, self._timeouts, self._stop, self._stop_now, self._job_ended)
+        runner = JobRunner(self._catalogue, self._task, self._timeouts, self._stop_now)
+        worker = Worker(name, self._catalogue, self._rendering, runner, self._timeouts, self._stop, self._job_ended)
         if self._base_numbers:
             worker.start = self._base_numbers[(self._started - 1) % self._size * len(self._base_numbers) // self._size]
         self._workers[name] = worker
@@ -145,15 +125,7 @@ class Pool:
         self._threads[name].start()
 
 
-@contextmanager
-def _signals(act: Callable[[], None]) -> Iterator[None]:
-    """Makes SIGINT and SIGTERM call `act` instead of raising; outside the main thread, where Python cannot handle signals, changes nothing."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = {number: signal.signal(number, lambda *_: act()) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+def count_open(catalogue: Catalogue, rendering: str) -> int:
+    """Returns the number of jobs that are neither done nor ended in another way."""
+    counts = catalogue.count_jobs(rendering)
+    return sum(counts[state] for state in OPEN)

@@ -19,6 +19,13 @@ class Timeouts:
     """How often a busy worker checks whether to stop."""
     wait_s: float = 3.0
     """When all workers have been idle this long, the user is informed."""
+    count_s: float = 2.0
+    """How often a run counts the remaining jobs, which other runs may do too."""
+    plan_s: float = 1.0
+    """First pause of a process that waits for a new plan; doubled up to `longest_pause_s`."""
+    poll_s: float = 2.0
+    """How often `map3d work --forever` looks for renderings with open jobs."""
+    longest_pause_s: float = 30.0
     failures: int = 3
     """A worker exits when this many different jobs have failed."""
     starts: int = 12

@@ -73,6 +73,13 @@ class RenderTask:
             seconds=float(response.value["seconds"]),
         )
 
+    def take_stats(self) -> dict[str, float]:
+        """Returns `stats` and sets them to zero."""
+        with self._stats_lock:
+            taken: dict[str, float] = dict(self.stats)
+            self.stats.clear()
+        return taken
+
     def close(self) -> None:
         for store in self._stores.values():
             store.close()
