@@ -58,6 +58,17 @@ def test_ranges_are_exact(store: ObjectStore) -> None:
         store.get_range("o", 8, 4)
 
 
+def test_a_range_of_a_replaced_object_is_refused(store: ObjectStore) -> None:
+    first = store.put("o", b"0123456789")
+    assert store.get_range("o", 3, 4, if_match=first) == b"3456"
+    second = store.put("o", b"9876543210")
+    with pytest.raises(ObjectChanged):
+        store.get_range("o", 3, 4, if_match=first)
+    assert store.get_range("o", 3, 4, if_match=second) == b"6543"
+    store.delete("o")
+    assert store.get_range("o", 3, 4, if_match=second) is None
+
+
 def test_a_write_replaces_the_object_and_its_tag(store: ObjectStore) -> None:
     first = store.put("o", b"first")
     second = store.put("o", b"other")

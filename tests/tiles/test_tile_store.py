@@ -2,11 +2,14 @@
 
 import multiprocessing
 import threading
+from pathlib import Path
 
 import pytest
 
 from map3d.errors import AlreadyExists, BadRequest, NotFound, StaleFence
 from map3d.tiles.naming import tiles_of_block
+from map3d.tiles.object_tile_store import ObjectTileStore
+from map3d.tiles.open_store import open_or_create_store, open_store
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.tile_store import StoredBlock, StoredTile, StoreShape
 from map3d.types import BlockId, Layer
@@ -14,17 +17,19 @@ from map3d.types import BlockId, Layer
 LAYERS = (Layer("color", "color", "webp", 80), Layer("normal", "normal", "png"), Layer("id", "id", "png"), Layer("depth", "depth", "png"))
 SHAPE = StoreShape(tile_px=256, zmax=4, layers=LAYERS)
 BLOCK = BlockId(1, 1, 0)
-STORES = {"sqlite": SqliteTileStore}
 
 
-@pytest.fixture(params=sorted(STORES))
-def store_class(request):
-    return STORES[request.param]
+@pytest.fixture(params=["sqlite", "file", "s3"])
+def path(request, tmp_path):
+    """The path or URL of a store of each type."""
+    if request.param == "s3":
+        return request.getfixturevalue("s3_url") + "/0-45"
+    return tmp_path / "0-45.store" if request.param == "sqlite" else (tmp_path / "0-45").as_uri()
 
 
 @pytest.fixture
-def path(tmp_path):
-    return tmp_path / "0-45.store"
+def store_class(path):
+    return SqliteTileStore if isinstance(path, Path) else ObjectTileStore
 
 
 @pytest.fixture
@@ -193,9 +198,30 @@ def test_creating_a_store_twice_or_with_another_shape_fails(store_class, path, s
 
 
 def test_an_absent_store_is_not_found(store_class, path):
+    for open_it in (store_class, open_store):
+        with pytest.raises(NotFound):
+            open_it(path)
     with pytest.raises(NotFound):
         store_class(path)
-    assert not path.exists()
+
+
+def test_a_url_opens_the_store(path):
+    with open_or_create_store(path, SHAPE) as made:
+        made.put_block(BLOCK, "k", 1, content(BLOCK), b"s")
+        assert made.is_current()
+        for again in (open_store(path), open_store(path, read_only=True), open_or_create_store(path, SHAPE), open_store(made.url)):
+            with again:
+                assert type(again) is type(made)
+                assert read(again, content(BLOCK)) == [tile.data for tile in content(BLOCK)]
+                assert again.check() == []
+
+
+def test_stores_of_equal_tiles_have_equal_digests(store, tmp_path):
+    with SqliteTileStore.create(tmp_path / "other.sqlite", SHAPE) as other:
+        for block in (BlockId(0, 0, 0), BLOCK, BlockId(1, 0, 1)):
+            store.put_block(block, "k", 1, content(block), b"s")
+            other.put_block(block, "another key", 2, list(reversed(content(block))), b"another seam")
+        assert [store.layer_digest(layer) for layer in range(4)] == [other.layer_digest(layer) for layer in range(4)]
 
 
 def test_a_read_only_store_refuses_writes(store_class, path, store):

@@ -58,13 +58,18 @@ class CloudStore(ObjectStore):
 
         return self._try(name, read)
 
-    def get_range(self, name: str, start: int, length: int) -> bytes | None:
+    def get_range(self, name: str, start: int, length: int, *, if_match: str | None = None) -> bytes | None:
+        options: Any = {"range": (start, start + length)} | ({} if if_match is None else {"if_match": if_match})
+
         def read() -> bytes:
-            data = bytes(obstore.get_range(self._store, check_object_name(name), start=start, length=length)) if length else b""
+            data = bytes(obstore.get(self._store, check_object_name(name), options=options).bytes()) if length else b""
             _check_length(data, length)
             return data
 
-        return self._try(name, read)
+        try:
+            return self._try(name, read)
+        except PreconditionError as error:
+            raise ObjectChanged(f"{self._url}/{name}: was replaced by another process") from error
 
     def get_start(self, name: str, length: int) -> tuple[bytes, str, int] | None:
         def read() -> tuple[bytes, str, int]:
@@ -133,6 +138,8 @@ class CloudStore(ObjectStore):
                 return request()
             except FileNotFoundError:
                 return None
+            except PreconditionError:
+                raise
             except (PermissionDeniedError, UnauthenticatedError) as error:
                 raise StoreError(f"{self._url}: no permission for {name!r}; check the credentials in the environment (docs/stores.md)") from error
             except (BaseError, OSError, _ShortAnswer) as error:

@@ -31,8 +31,9 @@ class ObjectStore(Protocol):
     def get(self, name: str) -> tuple[bytes, str] | None:
         """Returns the bytes and the entity tag of an object; None if it does not exist."""
 
-    def get_range(self, name: str, start: int, length: int) -> bytes | None:
-        """Returns exactly `length` bytes from `start`; None if the object does not exist. Raises StoreError if it is shorter."""
+    def get_range(self, name: str, start: int, length: int, *, if_match: str | None = None) -> bytes | None:
+        """Returns exactly `length` bytes from `start`; None if the object does not exist. Raises StoreError if it is shorter, ObjectChanged if its
+        entity tag is not `if_match`."""
 
     def get_start(self, name: str, length: int) -> tuple[bytes, str, int] | None:
         """Returns the first `length` bytes, or all of a shorter object, with its entity tag and size; None if it does not exist."""

@@ -36,10 +36,12 @@ class FolderStore(ObjectStore):
         with self._failing(name), self._open(name) as file:
             return None if file is None else (file.read(), _tag(file.fileno()))
 
-    def get_range(self, name: str, start: int, length: int) -> bytes | None:
+    def get_range(self, name: str, start: int, length: int, *, if_match: str | None = None) -> bytes | None:
         with self._failing(name), self._open(name) as file:
             if file is None:
                 return None
+            if if_match is not None and _tag(file.fileno()) != if_match:
+                raise ObjectChanged(f"{self.root / name}: was replaced by another process")
             file.seek(start)
             data = file.read(length)
         if len(data) != length:
