@@ -46,7 +46,7 @@ class SceneRecord:
 
 @dataclass(frozen=True)
 class AssetRecord:
-    """One imported source document. `digest` covers the imported asset, `source_digest` its source files."""
+    """One imported source document. `digest` covers the imported asset, `source_digest` its source files, its options and the reader's version."""
 
     scene: str
     name: str

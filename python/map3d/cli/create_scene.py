@@ -42,11 +42,13 @@ def command(
 ) -> None:
     """Create an empty scene NAME, and the workspace if it does not exist."""
     from map3d.ingest.scene_crs import parse_scene_crs
+    from map3d.renderings.remove_scene import finish_scene_removal
 
     pinned = None if crs is None else parse_scene_crs(crs)
     catalogue = workspace.create().open_catalogue()
     try:
         options = {**switches, "ground_plane": ground_plane}
+        finish_scene_removal(workspace, catalogue, name)
         catalogue.create_scene(SceneRecord(name, title, attribution, crs=pinned, options=options))
         scene = catalogue.scene(name)
     finally:

@@ -41,6 +41,12 @@ def plural(count: int, noun: str) -> str:
     return f"{count:,} {noun}" if count == 1 else f"{count:,} {noun}s"
 
 
+def names_text(names: Sequence[str], limit: int = 8) -> str:
+    """Returns the names as in `a, b, c and 5 more`."""
+    shown, more = names[:limit], len(names) - limit
+    return ", ".join(shown) + (f" and {more:,} more" if more > 0 else "")
+
+
 def size_text(size: float) -> str:
     for unit in ("bytes", "kB", "MB", "GB"):
         if size < 1000:

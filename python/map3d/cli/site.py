@@ -10,13 +10,14 @@ from map3d.catalogue import Catalogue, Workspace
 from map3d.cli.building import build_with_progress
 from map3d.cli.create_rendering import views_around
 from map3d.cli.options import View, max_memory_option, workers_option, workspace_option
-from map3d.cli.output import plural, size_text
+from map3d.cli.output import names_text, plural, size_text
 from map3d.cli.progress import progress_bar
 from map3d.cli.publish import publish_with_progress
 from map3d.cli.render import print_result, render_with_progress
 from map3d.types import COLOR_FORMATS, ViewAngles
 
 if TYPE_CHECKING:
+    from map3d.renderings.site_files import ImportSummary
     from map3d.renderings.site_steps import SiteRequest
 
 
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 @click.option("--crs", help="Coordinate system of the files, where they do not state it.")
 @click.option("--up", type=click.Choice(["y", "z"]), default="z", show_default=True, help="OBJ: the axis that points up.")
 @click.option("--strict", is_flag=True, help="Stop at the first problem instead of skipping it.")
+@click.option("--allow-empty", is_flag=True, help="Remove files from the site even if the folder that they came from is empty now.")
 @workers_option
 @max_memory_option
 @workspace_option
@@ -46,7 +48,8 @@ def command(
 ) -> None:
     """Turn all files in FOLDER into a static web site: import, build, render, publish.
 
-    You can stop it at any time; re-run it to resume. Re-run it after files change; only the changes are processed.
+    You can stop it at any time; re-run it to resume. Re-run it after files change; only the changes are processed. Files that have left FOLDER leave
+    the site; files are imported again when they, the options or the reader change.
     """
     from map3d.jobs.run import Run
     from map3d.jobs.run_settings import RunSettings
@@ -55,7 +58,10 @@ def command(
     request = _site_request(folder, views, **options)
     catalogue = workspace.create().open_catalogue()
     try:
-        _import_files(workspace, catalogue, request)
+        _update_files(workspace, catalogue, request)
+        if not catalogue.assets(request.name):
+            click.echo(f"the scene {request.name} has no files left; {out} stays as it was published")
+            return
         build_with_progress(workspace, catalogue, request.name, threads=workers, max_memory_bytes=max_memory)
         record = create_site_rendering(workspace, catalogue, request)
         click.echo(f"rendering {record.name}: {plural(len(record.frames), 'view')}, {plural(record.zmax + 1, 'level')}, {record.res_m:g} m per pixel")
@@ -84,11 +90,12 @@ def _site_request(folder: Path, views: tuple[ViewAngles, ...], **options: Any) -
         attribution=options["attribution"],
         color=options["color"],
         options=ImportOptions(crs=options["crs"], up=options["up"], strict=options["strict"]),
+        allow_empty=options["allow_empty"],
     )
 
 
-def _import_files(workspace: Workspace, catalogue: Catalogue, request: "SiteRequest") -> None:
-    from map3d.renderings.site_steps import import_changed_files
+def _update_files(workspace: Workspace, catalogue: Catalogue, request: "SiteRequest") -> None:
+    from map3d.renderings.site_files import update_files
 
     with progress_bar(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()) as bar:
         task = bar.add_task("importing", total=None)
@@ -96,11 +103,24 @@ def _import_files(workspace: Workspace, catalogue: Catalogue, request: "SiteRequ
         def report(name: str, done: int, total: int) -> None:
             bar.update(task, description=f"importing {name}", completed=done, total=total)
 
-        summary = import_changed_files(workspace, catalogue, request, report)
-    click.echo(f"imported {plural(len(summary.imported), 'file')}, {len(summary.unchanged)} unchanged, {len(summary.failed)} failed")
+        summary = update_files(workspace, catalogue, request.files, report)
+    _print_summary(summary)
+    _print_problems(catalogue, request.name)
+
+
+def _print_summary(summary: "ImportSummary") -> None:
+    from map3d.renderings.site_files import reasons
+
+    counts = f"{len(summary.unchanged)} unchanged, {len(summary.failed)} failed, {len(summary.removed)} removed"
+    click.echo(f"imported {plural(len(summary.imported), 'file')}, {counts}")
+    for reason, names in reasons(summary.again).items():
+        click.echo(f"imported again because {reason}: {names_text(names)}")
+    if summary.removed:
+        click.echo(f"removed, since no longer in the folder: {names_text(summary.removed)}")
+    if summary.elsewhere:
+        click.echo(f"kept, since not from this folder: {names_text(summary.elsewhere)}; map3d remove-files removes them")
     for _, reason in summary.failed:
         click.echo(f"not imported: {reason}", err=True)
-    _print_problems(catalogue, request.name)
 
 
 def _print_problems(catalogue: Catalogue, scene: str) -> None:

@@ -35,7 +35,7 @@ class ImportOptions:
         options: dict[str, Any] = {"strict": self.strict}
         if format == "obj":
             options |= {"up": self.up, "split": self.split}
-        else:
+        elif format == "citygml":
             options |= {"theme": self.theme, "lod": self.lod}
         if limits.address_space_bytes is not None:
             options |= {"max_object_bytes": limits.address_space_bytes // 4, "max_appearance_bytes": limits.address_space_bytes // 4}

@@ -11,10 +11,11 @@ from map3d.catalogue import AssetRecord, Catalogue, SceneCrs, SceneRecord, Works
 from map3d.catalogue.scene_lock import scene_lock
 from map3d.errors import CrsError, ImportFailed, LimitExceeded, Map3dError, SubprocessDied, SubprocessTimedOut
 from map3d.ingest.asset import asset_digest, new_objects, put_in_place, read_objects, world_boxes, write_ids, write_report
+from map3d.ingest.import_inputs import ImportInputs, import_inputs
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.parser_process import ParserProcess
 from map3d.ingest.scene_crs import LOCAL
-from map3d.ingest.sources import SourceDocument, source_digest
+from map3d.ingest.sources import SourceDocument
 from map3d.ingest.unfinished_imports import draft_path, finish_imports, mark_import, remove_dead_drafts, unmark_import
 from map3d.registry import Registry
 from map3d.subprocess import Failure, Limits
@@ -62,7 +63,7 @@ def import_file(
     record = catalogue.scene(scene)
     final = workspace.asset_folder(scene, source.name)
     draft = draft_path(final)
-    digest = source_digest(source)
+    inputs = import_inputs(source, options)
     remove_dead_drafts(final.parent)
     shutil.rmtree(draft, ignore_errors=True)
     draft.mkdir(parents=True)
@@ -75,7 +76,7 @@ def import_file(
         with scene_lock(workspace, scene):
             finish_imports(workspace, catalogue, scene)
             proposed = None if parsed["crs"] is None else SceneCrs(**parsed["crs"])
-            return _add_to_scene(workspace, catalogue, record, source, draft, report, proposed, digest)
+            return _add_to_scene(workspace, catalogue, record, source, draft, report, proposed, inputs)
     finally:
         shutil.rmtree(draft, ignore_errors=True)
 
@@ -124,7 +125,7 @@ def _add_to_scene(
     draft: Path,
     report: dict[str, Any],
     proposed: SceneCrs | None,
-    source_digest: str,
+    inputs: ImportInputs,
 ) -> Imported:
     scene, lines = before.name, read_objects(draft)
     boxes = world_boxes(draft, len(lines))
@@ -132,15 +133,16 @@ def _add_to_scene(
     assert record.origin is not None, "the scene is pinned"
     _check_distance(source, boxes, record.origin)
     final, path = workspace.asset_folder(scene, source.name), str(source.paths[0].absolute())
-    mark_import(final, path, source.format, source_digest)
+    mark_import(final, path, source.format, inputs.digest)
     with Registry(workspace.registry_path(scene)) as registry:
         ids = registry.put_asset(source.name, new_objects(lines, boxes, record.origin))
     write_ids(draft, ids)
+    report |= inputs.report()
     write_report(draft, report)
     replaced = final.exists()
     digest = asset_digest(draft)
     put_in_place(draft, final)
-    catalogue.put_asset(AssetRecord(scene, source.name, path, source.format, digest, source_digest, report))
+    catalogue.put_asset(AssetRecord(scene, source.name, path, source.format, digest, inputs.digest, report))
     unmark_import(final)
     return Imported(source.name, str(source.paths[0]), source.format, len(lines), report["triangles"], replaced, report)
 

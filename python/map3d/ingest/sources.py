@@ -1,8 +1,9 @@
 """Finds the source documents of an import, names their assets, and detects whether they changed."""
 
 import hashlib
+import os
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -60,7 +61,7 @@ def source_digest(source: SourceDocument) -> str:
 
 def _search_folder(folder: Path, on_unreadable: OnUnreadable) -> list[tuple[Path, Format]]:
     found, unknown = [], []
-    for path in sorted(path for path in folder.rglob("*") if path.is_file() and not path.name.startswith(".")):
+    for path in sorted(path for path in _walk(folder) if path.is_file() and not path.name.startswith(".")):
         if path.suffix.lower() in _COMPANION_SUFFIXES:
             continue
         try:
@@ -74,6 +75,16 @@ def _search_folder(folder: Path, on_unreadable: OnUnreadable) -> list[tuple[Path
         if path.suffix.lower() in _SOURCE_SUFFIXES:
             on_unreadable(path, reason)
     return found
+
+
+def _walk(folder: Path) -> Iterator[Path]:
+    """Yields the files below a folder. Raises NotFound for a folder that cannot be read: its files must not seem to be gone."""
+
+    def refuse(error: OSError) -> None:
+        raise NotFound(f"{error.filename}: cannot read the folder: {error.strerror}") from error
+
+    for place, _, names in os.walk(folder, onerror=refuse):
+        yield from (Path(place, name) for name in names)
 
 
 def _group_rasters(found: Sequence[tuple[Path, Format]]) -> list[tuple[Format, tuple[Path, ...]]]:

@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from map3d.catalogue import AssetRecord, Catalogue, Workspace
 from map3d.ingest.asset import asset_digest, new_objects, read_objects, world_boxes
+from map3d.ingest.asset_removal import finish_removal
 from map3d.process_identity import ProcessIdentity
 from map3d.registry import Registry
 
@@ -29,6 +30,12 @@ def remove_dead_drafts(assets: Path) -> None:
     for path in assets.glob(f".*{_DRAFT}"):
         if _has_ended(path.name.removesuffix(_DRAFT).lstrip(".").partition(".")[2]):
             shutil.rmtree(path, ignore_errors=True)
+
+
+def running_imports(assets: Path) -> list[str]:
+    """Returns the names of the assets that a process is importing now."""
+    owners = {path.name.removesuffix(_DRAFT).lstrip(".") for path in assets.glob(f".*{_DRAFT}")}
+    return sorted({owner.partition(".")[0] for owner in owners if not _has_ended(owner.partition(".")[2])})
 
 
 def mark_import(folder: Path, source: str, format: str, source_digest: str) -> None:
@@ -52,9 +59,10 @@ def unfinished_imports(assets: Path) -> list[str]:
 
 
 def finish_imports(workspace: Workspace, catalogue: Catalogue, scene: str) -> None:
-    """Completes or undoes killed imports and removes drafts of dead processes. The caller holds the scene's lock."""
+    """Completes or undoes killed imports, completes a killed removal, and removes drafts of dead processes. The caller holds the scene's lock."""
     assets = workspace.scene_folder(scene) / "assets"
     remove_dead_drafts(assets)
+    finish_removal(workspace, catalogue, scene)
     for name in unfinished_imports(assets):
         folder = workspace.asset_folder(scene, name)
         mark = _read_mark(folder)

@@ -67,6 +67,14 @@ class Registry:
             _extend_parent_boxes(db, asset)
         return ids
 
+    def remove_assets(self, assets: Sequence[str]) -> None:
+        """Removes the objects of assets for ever and returns their space to the file system. The ids of other objects stay; those of removed ones are
+        never used again."""
+        with self._database.transaction() as db:
+            db.executemany("DELETE FROM object WHERE asset = ?", [(asset,) for asset in assets])
+        with self._database.autocommit() as db:
+            db.execute("VACUUM")
+
     def get_or_create_scene_object(self, name: str, kind: str) -> int:
         """Returns the id of one of the scene's own objects. A new one is not present until `set_scene_object`."""
         with self._database.transaction() as db:

@@ -9,6 +9,7 @@ from map3d import _core
 from map3d.catalogue import Catalogue, SceneRecord, Workspace
 from map3d.catalogue.scene_lock import scene_lock
 from map3d.errors import BadRequest
+from map3d.ingest.asset_removal import is_removing
 from map3d.ingest.unfinished_imports import finish_imports, unfinished_imports
 from map3d.registry import Registry
 
@@ -29,9 +30,9 @@ BUILD_BYTES: Final = 2 << 30
 
 
 def is_stale(workspace: Workspace, catalogue: Catalogue, scene: str) -> bool:
-    """Whether the scene index is missing or older than the assets, or an import was killed while it changed the scene."""
+    """Whether the scene index is missing or older than the assets, or an import or a removal was killed while it changed the scene."""
     record = catalogue.scene(scene)
-    if unfinished_imports(workspace.scene_folder(scene) / "assets"):
+    if unfinished_imports(workspace.scene_folder(scene) / "assets") or is_removing(workspace, scene):
         return True
     return record.built != scene_digest(catalogue, record) or not (workspace.scene_folder(scene) / "scene.json").is_file()
 

@@ -12,6 +12,7 @@ from map3d.geometry.frames import Window, pin, pin_beside
 from map3d.geometry.views import check_angles
 from map3d.renderings.build import is_stale, open_scene
 from map3d.renderings.layers import LayerRequest
+from map3d.renderings.remove_rendering import finish_rendering_removal
 from map3d.renderings.track_stores import remove_tracks
 from map3d.types import Box, ViewAngles, check_name
 
@@ -76,6 +77,7 @@ def create_rendering(workspace: Workspace, catalogue: Catalogue, request: Render
         stored = catalogue.regrid(record)
         remove_tracks(workspace, stored)
         return stored
+    finish_rendering_removal(workspace, record.name)
     catalogue.create_rendering(record)
     return record
 

@@ -8,11 +8,13 @@ from map3d import _core
 from map3d.catalogue import Catalogue, RenderingRecord, State, Workspace
 from map3d.errors import Map3dError
 from map3d.ingest.asset import asset_digest
+from map3d.ingest.asset_removal import is_removing
 from map3d.ingest.unfinished_imports import unfinished_imports
 from map3d.registry import Registry
 from map3d.renderings.build import is_stale, open_scene
 from map3d.renderings.manifest_writer import current_manifest
 from map3d.renderings.plan import plan_jobs
+from map3d.renderings.remove_rendering import is_rendering_removed
 from map3d.renderings.scene_files import binary_files, check_file, check_ids, check_index
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.occupancy import numbers_of
@@ -29,6 +31,8 @@ def verify_scene(workspace: Workspace, catalogue: Catalogue, scene: str, finding
     folder = workspace.scene_folder(scene)
     for name in unfinished_imports(folder / "assets"):
         findings.add(f"{folder / 'assets' / name}: its import has not finished; run map3d render, or add its file again with map3d add-files {scene}")
+    if is_removing(workspace, scene):
+        findings.add(f"scene {scene}: the removal of files has not finished; run map3d remove-files again, or map3d render")
     if not catalogue.assets(scene):
         return
     files = list(binary_files(folder))
@@ -53,6 +57,8 @@ def verify_scene(workspace: Workspace, catalogue: Catalogue, scene: str, finding
 def verify_rendering(workspace: Workspace, catalogue: Catalogue, name: str, findings: Findings, progress: Progress) -> None:
     """Checks jobs against the plan, stored blocks against jobs, every tile, seam and parent, and the manifest."""
     record = catalogue.rendering(name)
+    if is_rendering_removed(workspace, name):
+        findings.add(f"rendering {name}: its removal has not finished; run map3d remove-rendering {name} again")
     if is_stale(workspace, catalogue, record.scene):
         findings.add(f"scene {record.scene}: its files have changed since the last build; run map3d render {name}")
         return

@@ -1,0 +1,68 @@
+"""Removes assets from a scene. A removal that was killed is completed by the next removal, import or build.
+
+While a removal lasts, the file `assets/.removing` lists the assets. Whatever the killed removal had reached, doing all steps again completes it.
+"""
+
+import json
+import os
+import shutil
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Final
+
+from map3d.catalogue import Catalogue, Workspace
+from map3d.errors import NotFound, StoreError
+from map3d.registry import Registry
+
+_MARK: Final = ".removing"
+
+
+def remove_assets(workspace: Workspace, catalogue: Catalogue, scene: str, names: Sequence[str]) -> None:
+    """Removes records, objects and folders of assets; the built files follow with the next build. The caller holds the scene's lock and has finished
+    killed imports and removals."""
+    mark = _mark_path(workspace, scene)
+    draft = mark.with_name(f"{mark.name}.new")
+    with draft.open("w", encoding="utf-8") as file:
+        json.dump(sorted(names), file)
+        file.flush()
+        os.fsync(file.fileno())
+    draft.replace(mark)
+    finish_removal(workspace, catalogue, scene)
+
+
+def finish_removal(workspace: Workspace, catalogue: Catalogue, scene: str) -> list[str]:
+    """Completes a removal and returns the names of its assets, none without one. The caller holds the scene's lock. Raises StoreError."""
+    mark = _mark_path(workspace, scene)
+    try:
+        names: list[str] = json.loads(mark.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return []
+    for name in names:
+        with suppress(NotFound):
+            catalogue.remove_asset(scene, name)
+        remove_folder(workspace.asset_folder(scene, name))
+    with Registry(workspace.registry_path(scene)) as registry:
+        registry.remove_assets(names)
+    mark.unlink()
+    return names
+
+
+def is_removing(workspace: Workspace, scene: str) -> bool:
+    """Whether a removal has begun and not finished."""
+    return _mark_path(workspace, scene).exists()
+
+
+def remove_folder(folder: Path) -> None:
+    """Removes a folder with all files, if it exists. Raises StoreError."""
+    try:
+        shutil.rmtree(folder)
+    except FileNotFoundError:
+        if folder.exists():  # a file in it went away meanwhile
+            remove_folder(folder)
+    except OSError as error:
+        raise StoreError(f"{folder}: cannot remove the folder: {error}; mend the cause and run the command again") from error
+
+
+def _mark_path(workspace: Workspace, scene: str) -> Path:
+    return workspace.scene_folder(scene) / "assets" / _MARK
