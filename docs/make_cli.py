@@ -17,8 +17,20 @@ def reference() -> str:
         for name in COMMANDS:
             command = cli.get_command(context, name)
             assert command is not None
-            parts.append(section(f"map3d {name}", command))
+            parts += sections(f"map3d {name}", command)
     return "\n".join(parts)
+
+
+def sections(name: str, command: click.Command) -> list[str]:
+    """Returns the section of a command, and those of its own commands."""
+    parts = [section(name, command)]
+    if isinstance(command, click.Group):
+        with click.Context(command, info_name=name) as context:
+            for own in command.list_commands(context):
+                found = command.get_command(context, own)
+                assert found is not None
+                parts += sections(f"{name} {own}", found)
+    return parts
 
 
 def section(name: str, command: click.Command) -> str:

@@ -45,6 +45,24 @@ def test_jobs_are_leased_in_morton_order_with_rising_fences(catalogue: Catalogue
     assert again.attempt == 1
 
 
+def test_times_of_a_job_are_on_the_databases_clock(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [base()])
+    assert (only(catalogue).leased_s, only(catalogue).ended_s) == (None, None)
+    before_s = catalogue.clock_s()
+    lease = take(catalogue)
+    leased = only(catalogue)
+    assert leased.leased_s is not None
+    assert leased.expires_s is not None
+    assert before_s <= leased.leased_s <= catalogue.clock_s()
+    assert leased.expires_s - leased.leased_s == pytest.approx(catalogue.lease_s, abs=0.01)
+    catalogue.heartbeat(lease)
+    assert only(catalogue).leased_s == leased.leased_s
+    catalogue.done(lease, RESULT)
+    done = only(catalogue)
+    assert done.ended_s is not None
+    assert leased.leased_s <= done.ended_s <= catalogue.clock_s()
+
+
 def test_reduce_job_waits_for_all_blocks_below(catalogue: Catalogue) -> None:
     catalogue.plan("town-a", [reduce(), base(0), base(1)])
     first, second = take(catalogue), take(catalogue)

@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from map3d.errors import StalePlan
 from map3d.subprocess import Handler, ReportProgress
 from map3d.tiles.naming import tiles_of_block
 from map3d.types import BlockId
@@ -66,6 +67,10 @@ def exception() -> None:
     raise ValueError("faulty block")
 
 
+def stale() -> None:
+    raise StalePlan("the scene has changed since the block was planned")
+
+
 def memory() -> None:
     raise MemoryError("requested")
 
@@ -86,5 +91,6 @@ FAULTS = {
     "exception": exception,
     "exit 0": lambda: os._exit(0),
     "memory": memory,
+    "stale": stale,
     "nonsense": nonsense,
 }

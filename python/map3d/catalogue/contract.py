@@ -131,6 +131,9 @@ class Catalogue(Protocol):
     def jobs(self, rendering: str, track: str | None = None, state: State | None = None) -> Iterator[Job]:
         """Yields the jobs, ordered by track, level and Morton number. Reads them in pages, each of which shows the state of its moment."""
 
+    def clock_s(self) -> float:
+        """Returns the present time on the database's clock, in seconds since 1970."""
+
     def has_open_jobs(self, rendering: str) -> bool:
         """Returns whether any job is todo or leased, from one index look-up; idle workers ask this."""
 

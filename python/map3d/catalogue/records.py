@@ -170,8 +170,9 @@ class JobResult:
 
 @dataclass(frozen=True)
 class Job:
-    """The current state of a job. `attempts` failed or are running; `expiries`: number of expired leases. `expires_s` is on the database's clock;
-    `result` is None until the job was done once."""
+    """The current state of a job. `attempts` failed or are running; `expiries`: number of expired leases. `leased_s` and `expires_s`: when the last
+    lease began, and when the present one ends; `ended_s`: when the job was done last; all on the database's clock, None when unknown. `result` is
+    None until the job was done once."""
 
     rendering: str
     track: str
@@ -186,6 +187,8 @@ class Job:
     expires_s: float | None
     reason: str | None
     result: JobResult | None
+    leased_s: float | None = None
+    ended_s: float | None = None
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from map3d.errors import AlreadyExists, BadRequest, NotFound
 from map3d.geometry.frames import PinnedFrame
 from map3d.types import Layer, Vec3, check_name
 
-VERSION: Final = 4
+VERSION: Final = 5
 REMOVE_BATCH: Final = 20_000
 """Jobs that one transaction removes."""
 
@@ -39,6 +39,7 @@ _MIGRATIONS: Final = {
     4: f"""ALTER TABLE job ADD COLUMN occupied INTEGER; ALTER TABLE rendering ADD COLUMN planning INTEGER NOT NULL DEFAULT 0;
       {_REMOVED}; {JOB_ORDER}; {JOB_COUNTS};
       INSERT INTO job_count SELECT rendering, state, count(*) FROM job GROUP BY rendering, state;""",
+    5: "ALTER TABLE job ADD COLUMN leased REAL; ALTER TABLE job ADD COLUMN ended REAL;",
 }
 """Version → statements that lead to it from the version before."""
 

@@ -26,7 +26,7 @@ JOB_SCHEMA: Final = f"""
 CREATE TABLE job(rendering TEXT NOT NULL REFERENCES rendering(name), track TEXT NOT NULL, z INTEGER NOT NULL, x INTEGER NOT NULL, y INTEGER NOT NULL,
   kind TEXT NOT NULL, morton INTEGER NOT NULL, key TEXT NOT NULL, parent_z INTEGER, parent_x INTEGER, parent_y INTEGER,
   state TEXT NOT NULL, attempts INTEGER NOT NULL DEFAULT 0, expiries INTEGER NOT NULL DEFAULT 0,
-  fence INTEGER NOT NULL DEFAULT 0, worker TEXT, expires REAL, reason TEXT,
+  fence INTEGER NOT NULL DEFAULT 0, worker TEXT, leased REAL, expires REAL, ended REAL, reason TEXT,
   version INTEGER, empty INTEGER, tiles INTEGER, base_tiles INTEGER, bytes INTEGER, seconds REAL, occupied INTEGER,
   UNIQUE(rendering, track, z, x, y));
 {JOB_NEXT};
@@ -90,6 +90,8 @@ def load_job(row: sqlite3.Row) -> Job:
         fence=row["fence"],
         worker=row["worker"],
         expires_s=row["expires"],
+        leased_s=row["leased"],
+        ended_s=row["ended"],
         reason=row["reason"],
         result=None if row["version"] is None else _load_result(row),
     )

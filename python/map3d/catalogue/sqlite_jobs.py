@@ -28,7 +28,7 @@ _NEXT: Final = (
     f"""SELECT {{columns}} FROM job WHERE rendering = :rendering AND state = '{State.TODO}' ORDER BY attempts + expiries, z, track, morton LIMIT 1"""
 )
 _LEASE: Final = f"""UPDATE job SET state = '{next_state(State.TODO, JobEvent.LEASE)}', attempts = attempts + 1, fence = fence + 1, worker = :worker,
-  expires = {NOW} + :lease_s
+  leased = {NOW}, expires = {NOW} + :lease_s
   WHERE rowid = coalesce(
     (SELECT rowid FROM job WHERE rendering = :rendering AND state = '{State.TODO}' AND morton >= :start
       AND (attempts + expiries, z, track) = ({_NEXT.format(columns="attempts + expiries, z, track")}) ORDER BY morton LIMIT 1),
@@ -97,7 +97,7 @@ class SqliteJobs:
             _move(db, lease, f"expires = {NOW} + :lease_s", lease_s=self.lease_s)
 
     def done(self, lease: Lease, result: JobResult) -> None:
-        change = f"state = '{next_state(State.LEASED, JobEvent.DONE)}', worker = NULL, expires = NULL, reason = NULL, "
+        change = f"state = '{next_state(State.LEASED, JobEvent.DONE)}', worker = NULL, expires = NULL, ended = {NOW}, reason = NULL, "
         with self._database.transaction() as db:
             row = _move(db, lease, change + ", ".join(f"{name} = :{name}" for name in RESULT), **result_row(result))
             self._open_above(db, row)
@@ -133,6 +133,10 @@ class SqliteJobs:
     def _rows(self, query: str, values: dict[str, Any]) -> list[sqlite3.Row]:
         with self._database.reading() as db:
             return db.execute(query, values).fetchall()
+
+    def clock_s(self) -> float:
+        with self._database.reading() as db:
+            return float(db.execute(f"SELECT {NOW}").fetchone()[0])
 
     def has_open_jobs(self, rendering: str) -> bool:
         with self._database.reading() as db:

@@ -19,6 +19,8 @@ COMMANDS: Final = {
     "add-layers": "add_layers",
     "estimate": "estimate",
     "render": "render",
+    "work": "work",
+    "jobs": "jobs",
     "retry": "retry",
     "serve": "serve",
     "publish": "publish",

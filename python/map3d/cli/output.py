@@ -21,14 +21,18 @@ def print_json(value: Any) -> None:
 
 def print_table(columns: Sequence[str], rows: Iterable[Sequence[Any]], title: str | None = None) -> None:
     """Prints a table; columns of numbers are right-aligned."""
+    Console(highlight=False, width=None if Console().is_terminal else 160).print(table(columns, rows, title))
+
+
+def table(columns: Sequence[str], rows: Iterable[Sequence[Any]], title: str | None = None) -> Table:
     listed = [list(row) for row in rows]
-    table = Table(*columns, title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
-    for index, column in enumerate(table.columns):
+    made = Table(*columns, title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
+    for index, column in enumerate(made.columns):
         if listed and all(isinstance(row[index], int | float) or row[index] is None for row in listed):
             column.justify = "right"
     for row in listed:
-        table.add_row(*(_text(cell) for cell in row))
-    Console(highlight=False, width=None if Console().is_terminal else 160).print(table)
+        made.add_row(*(_text(cell) for cell in row))
+    return made
 
 
 def counts_text(counts: Mapping[Any, int]) -> str:

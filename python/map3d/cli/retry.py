@@ -12,7 +12,7 @@ from map3d.cli.output import plural, print_json
 @json_option
 @workspace_option
 def command(workspace: Workspace, rendering: str, as_json: bool) -> None:
-    """Allow three more attempts for the quarantined blocks of RENDERING."""
+    """Allow three more attempts for the quarantined blocks of RENDERING, and open its cancelled blocks again."""
     catalogue = workspace.open_catalogue()
     try:
         count = catalogue.retry(rendering)

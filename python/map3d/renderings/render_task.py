@@ -57,9 +57,7 @@ class RenderTask:
 
     def commit(self, lease: Lease, response: Message) -> JobResult:
         store = self._stores[lease.track]
-        names: list[list[int]] = response.value["tiles"]
-        tiles = [StoredTile(layer, z, x, y, data) for (layer, z, x, y), data in zip(names, response.blobs, strict=False)]
-        seam = response.blobs[len(names)] if response.value["seam"] else None
+        tiles, seam = stored_tiles(response)
         check_rendered(store.shape, lease.block, tiles, seam)
         stored = store.put_block(lease.block, lease.key, lease.content_version, tiles, seam, fence=lease.fence)
         with self._stats_lock:
@@ -83,6 +81,13 @@ class RenderTask:
     def close(self) -> None:
         for store in self._stores.values():
             store.close()
+
+
+def stored_tiles(response: Message) -> tuple[list[StoredTile], bytes | None]:
+    """Returns the tiles and the seam of a rendered block."""
+    names: list[list[int]] = response.value["tiles"]
+    tiles = [StoredTile(layer, z, x, y, data) for (layer, z, x, y), data in zip(names, response.blobs, strict=False)]
+    return tiles, response.blobs[len(names)] if response.value["seam"] else None
 
 
 def _setup(workspace: Workspace, rendering: RenderingRecord, cache_bytes: int) -> dict[str, Any]:

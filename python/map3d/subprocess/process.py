@@ -37,6 +37,7 @@ class Subprocess:
 
     def __init__(self, entry: str, setup: Mapping[str, Any], *, limits: Limits | None = None, environment: Mapping[str, str] | None = None) -> None:
         self.limits = limits or Limits()
+        self._was_killed = False
         self._stderr: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 - closed by close()
         child_reads, parent_writes = os.pipe()
         parent_reads, child_writes = os.pipe()
@@ -123,8 +124,20 @@ class Subprocess:
             self.kill()
             raise
 
+    @property
+    def ended_by(self) -> str | None:
+        """The name of the signal that ended the subprocess by itself; None while it runs, after an exit, and after `kill`."""
+        return None if self._was_killed or (self._process.returncode or 0) >= 0 else _signal_name(-self._process.returncode)
+
+    def output_tail(self, lines: int = 20) -> list[str]:
+        """Returns the last lines that the subprocess printed."""
+        size = self._stderr.seek(0, os.SEEK_END)
+        self._stderr.seek(max(size - TAIL_BYTES, 0))
+        return self._stderr.read().decode("utf-8", "replace").strip().splitlines()[-lines:]
+
     def kill(self) -> None:
         """Ends the subprocess at once."""
+        self._was_killed = self._was_killed or self._process.poll() is None
         if self._process.poll() is None:
             self._process.kill()
         self._process.wait()
@@ -172,9 +185,7 @@ class Subprocess:
 
     def _last_output(self) -> str:
         """Returns ": " and the last line that the subprocess printed, or an empty string."""
-        size = self._stderr.seek(0, os.SEEK_END)
-        self._stderr.seek(max(size - TAIL_BYTES, 0))
-        lines = self._stderr.read().decode("utf-8", "replace").strip().splitlines()
+        lines = self.output_tail()
         return f": {lines[-1].strip()}" if lines else ""
 
 
