@@ -245,6 +245,25 @@ def geographic_vectors():
     return {"geographic": row, "points": points}
 
 
+def search_vectors():
+    """Texts and their search words, written by hand."""
+    rows = {
+        "": [],
+        " ,.!? ": [],
+        "DEBY_LOD2_4959457": ["deby", "lod2", "4959457"],
+        "St. Martin (DEBY_1), Marktplatz 1a": ["st", "martin", "deby", "1", "marktplatz", "1a"],
+        "Straße STRASSE ſ": ["strasse", "strasse", "ſ"],
+        "Café Œuvre ÅNGSTRÖM": ["cafe", "œuvre", "angstrom"],
+        "e\u0301cole": ["ecole"],
+        "Rue de l'Église": ["rue", "de", "l", "eglise"],
+        "ΟΔΟΣ Улица Ёлка": ["οδος", "улица", "елка"],
+        "大通り 3-5": ["大通り", "3", "5"],
+        "½ x²": ["½", "x²"],
+        "\U00010400 \U0001f600": ["\U00010428"],
+    }
+    return [{"text": text, "words": words} for text, words in rows.items()]
+
+
 def write(name, value):
     text = json.dumps(value, indent=1)
     (HERE / f"{name}.json").write_text(text + "\n")
@@ -262,6 +281,7 @@ def main():
         "parents": parent_vectors(),
         "blocks": blocks_vectors(),
         "geographic": geographic_vectors(),
+        "search": search_vectors(),
     }.items():
         write(name, value)
 

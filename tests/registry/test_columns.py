@@ -1,5 +1,7 @@
 """Attributes by column: the index and the columns."""
 
+import json
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -7,6 +9,7 @@ from typing import Any
 import pytest
 
 from map3d.registry import NewObject, Registry
+from map3d.registry import column_documents as documents_module
 from map3d.registry import columns as columns_module
 from map3d.registry.columns import column_key
 
@@ -21,9 +24,14 @@ def thing(name: str, attributes: Mapping[str, Any], parent: int | None = None, k
     return NewObject(name, kind, parent=parent, attributes=attributes)
 
 
+def columns_of(registry: Registry) -> dict[str, dict[str, Any]]:
+    """Returns the documents below objects/columns by path without suffix."""
+    below = "objects/columns/"
+    return {name.removeprefix(below).removesuffix(".json"): json.loads(data) for name, data in registry.column_documents() if name.startswith(below)}
+
+
 def column_of(registry: Registry, name: str, of: str = "attributes") -> dict[int, Any]:
-    document = registry.column(column_key(of, name))
-    assert document is not None
+    document = columns_of(registry)[f"{column_key(of, name)}"]
     assert (document["map3d"], document["version"], document["name"], document["of"]) == ("column", 1, name, of)
     assert document["ids"] == sorted(document["ids"])
     return dict(zip(document["ids"], document["values"], strict=True))
@@ -94,22 +102,20 @@ def test_removed_objects_are_in_no_column(registry: Registry) -> None:
     registry.put_asset("a", [thing("x", {"old": 1})])
     registry.put_asset("a", [thing("y", {"new": 1})])
     assert [row["name"] for row in registry.attribute_index()["attributes"]] == ["class", "asset", "new"]
-    assert registry.column(column_key("attributes", "old")) is None
+    assert column_key("attributes", "old") not in columns_of(registry)
 
 
-def test_columns_do_not_depend_on_the_memory_limit(registry: Registry, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_listed_column_is_written_once(registry: Registry) -> None:
     registry.put_asset("a", [thing(str(k), {"b": k, "c": str(k), "d": None if k else 1}) for k in range(5)])
-    whole = dict(registry.columns())
-    assert whole == {row["column"]: registry.column(row["column"]) for row in registry.attribute_index()["attributes"]}
-    monkeypatch.setattr(columns_module, "VALUES_IN_MEMORY", 6)
-    assert dict(registry.columns()) == whole
-    assert len(whole) == 5
+    names = [name for name, _ in registry.column_documents()]
+    assert sorted(names) == sorted(
+        {"objects/attributes.json", *(f"objects/columns/{row['column']}.json" for row in registry.attribute_index()["attributes"])}
+    )
 
 
 def test_an_empty_registry_has_no_columns(registry: Registry) -> None:
     assert registry.attribute_index() == {"map3d": "attributes", "version": 1, "attributes": [], "left_out": 0}
-    assert dict(registry.columns()) == {}
-    assert registry.column("0" * 16) is None
+    assert columns_of(registry) == {}
 
 
 def test_rare_attributes_are_omitted_and_counted(registry: Registry, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -118,4 +124,55 @@ def test_rare_attributes_are_omitted_and_counted(registry: Registry, monkeypatch
     index = registry.attribute_index()
     assert [row["name"] for row in index["attributes"]] == ["class", "asset", "a", "c"]
     assert index["left_out"] == 1
-    assert {document["name"] for _, document in registry.columns()} == {"class", "asset", "a", "c"}
+    assert {document["name"] for document in columns_of(registry).values()} == {"class", "asset", "a", "c"}
+
+
+@pytest.fixture
+def small_shards(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(documents_module, "OBJECTS_PER_COLUMN_SHARD", 8)
+    monkeypatch.setattr(documents_module, "MAX_WHOLE_COLUMN", 20)
+
+
+@pytest.mark.usefixtures("small_shards")
+@pytest.mark.parametrize(("count", "whole"), [(20, True), (21, False), (100, False)])
+def test_the_shards_of_a_large_column_hold_the_values_of_the_whole(registry: Registry, count: int, whole: bool) -> None:
+    values = [(7 * k) % 31 for k in range(count)]
+    ids = registry.put_asset("a", [thing(str(k), {"v": value}) for k, value in enumerate(values)]).tolist()
+    key = column_key("attributes", "v")
+    documents = {name: document for name, document in columns_of(registry).items() if name.startswith(key)}
+    if whole:
+        assert documents.keys() == {key}
+        assert column_of(registry, "v") == dict(zip(ids, values, strict=True))
+        return
+    summary = documents.pop(key)
+    assert (summary["version"], summary["shard_size"], summary["objects"]) == (2, 8, count)
+    assert summary["shards"] == sorted({number // 8 for number in ids})
+    assert documents.keys() == {f"{key}/{shard}" for shard in summary["shards"]}
+    found: dict[int, int] = {}
+    for document in documents.values():
+        assert {number // 8 for number in document["ids"]} == {document["shard"]}
+        found |= dict(zip(document["ids"], document["values"], strict=True))
+    assert found == dict(zip(ids, values, strict=True))
+    assert dict(summary["values"]) == Counter(values)
+    assert [n for _, n in summary["values"]] == sorted(Counter(values).values(), reverse=True)
+
+
+@pytest.mark.usefixtures("small_shards")
+def test_a_summary_samples_numbers_evenly_also_from_text(registry: Registry) -> None:
+    registry.put_asset(
+        "a", [thing(str(k), {"n": k / 2, "t": f" {k} ", "x": "12" if k else "twelve", "b": k % 2 == 0, "e": "1_0"}) for k in range(2001)]
+    )
+    columns = columns_of(registry)
+    numbers = {name: columns[column_key("attributes", name)].get("numbers") for name in "ntxbe"}
+    assert numbers["n"] == list(range(1001))
+    assert numbers["t"] == [2 * k for k in range(1001)]
+    assert (numbers["x"], numbers["b"], numbers["e"]) == (None, None, None)
+
+
+@pytest.mark.usefixtures("small_shards")
+def test_shards_hold_inherited_values_of_far_ancestors(registry: Registry) -> None:
+    registry.put_asset("a", [thing("house", {"year": 1900}), *(thing(str(k), {}, 0) for k in range(40))])
+    columns = columns_of(registry)
+    key = column_key("attributes", "year")
+    assert columns[key]["objects"] == 41
+    assert all(value == 1900 for shard in columns[key]["shards"] for value in columns[f"{key}/{shard}"]["values"])

@@ -18,7 +18,7 @@ from map3d.geometry.views import track_id
 from map3d.publish.pmtiles_archive import Archive, write_archive
 from map3d.registry import Registry
 from map3d.renderings.track_stores import open_track, rendering_record
-from map3d.tiles.manifest import ATTRIBUTES, COLUMNS, FILE_NAME, SEARCH, SHARDS, Manifest, ManifestView, dump_document
+from map3d.tiles.manifest import FILE_NAME, Manifest, ManifestView
 from map3d.tiles.tile_store import TileStore
 from map3d.tiles.viewer_files import viewer_files, viewer_folder
 from map3d.types import Layer
@@ -104,12 +104,8 @@ class _FolderWriter:
     def write(self) -> None:
         archives = {view.frame.id: self._write_view(view) for view in self._manifest.views}
         with Registry(self._workspace.registry_path(self._record.scene)) as registry:
-            for shard in registry.shards():
-                self._write_file(SHARDS.format(shard=shard["shard"]), dump_document(shard))
-            self._write_file(SEARCH, dump_document(registry.search()))
-            self._write_file(ATTRIBUTES, dump_document(registry.attribute_index()))
-            for key, column in registry.columns():
-                self._write_file(COLUMNS.format(column=key), dump_document(column))
+            for name, data in registry.documents():
+                self._write_file(name, data)
         self._write_file(ICON, _ICON_PATH.read_bytes())
         for file in viewer_files():
             self._write_file(file.as_posix(), (viewer_folder() / file).read_bytes())

@@ -1,6 +1,6 @@
-"""Attributes by column (spec/manifest.md): the values of one attribute for all objects, for colouring and filtering."""
+"""The list of attribute columns (spec/manifest.md)."""
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from hashlib import sha256
 from typing import Any, Final
@@ -13,15 +13,11 @@ MAX_COLUMNS: Final = 1000
 MAX_VARIETY: Final = 1000
 """Distinct values are counted up to this number."""
 
-VALUES_IN_MEMORY: Final = 2_000_000
-"""Limit of the values in memory while columns are written."""
-
 OF_OBJECT: Final = "object"
 OF_ATTRIBUTES: Final = "attributes"
 _FIELDS: Final[Mapping[str, Callable[[RegisteredObject], str]]] = {"class": lambda item: item.kind, "asset": lambda item: item.asset}
 """Fields that every object has besides its attributes."""
 
-Objects = Callable[[], Iterable[RegisteredObject]]
 ColumnId = tuple[str, str]
 """OF_OBJECT or OF_ATTRIBUTES, and the name of the field or attribute."""
 
@@ -35,7 +31,7 @@ def attribute_index(objects: Iterable[RegisteredObject]) -> dict[str, Any]:
     """Returns the document that lists the columns: fields first, then attributes by name."""
     found: dict[ColumnId, _ColumnStatistics] = {}
     for item in objects:
-        for column_id, value in _values(item):
+        for column_id, value in object_values(item):
             found.setdefault(column_id, _ColumnStatistics()).count(value)
     fields = [column_id for column_id in found if column_id[0] == OF_OBJECT]
     attributes = sorted(
@@ -43,25 +39,6 @@ def attribute_index(objects: Iterable[RegisteredObject]) -> dict[str, Any]:
     )
     rows = [found[column_id].to_json(column_id) for column_id in [*fields, *sorted(attributes[:MAX_COLUMNS])]]
     return {"map3d": "attributes", "version": 1, "attributes": rows, "left_out": max(len(attributes) - MAX_COLUMNS, 0)}
-
-
-def column(objects: Objects, key: str) -> dict[str, Any] | None:
-    """Returns a column's document; None if no attribute has this key."""
-    column_ids = {column_id for item in objects() for column_id, _ in _values(item) if column_key(*column_id) == key}
-    return next((document for _, document in _columns(objects, column_ids)), None)
-
-
-def columns(objects: Objects) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yields the keys and documents of all listed columns."""
-    batch: list[ColumnId] = []
-    values = 0
-    for row in attribute_index(objects())["attributes"]:
-        if batch and values + row["objects"] > VALUES_IN_MEMORY:
-            yield from _columns(objects, batch)
-            batch, values = [], 0
-        batch.append((row["of"], row["name"]))
-        values += row["objects"]
-    yield from _columns(objects, batch)
 
 
 @dataclass
@@ -91,35 +68,7 @@ class _ColumnStatistics:
         return row | ({"min": self.low, "max": self.high} if kind == "number" else {})
 
 
-def _values(item: RegisteredObject) -> Iterator[tuple[ColumnId, Attribute]]:
+def object_values(item: RegisteredObject) -> Iterator[tuple[ColumnId, Attribute]]:
+    """Yields the object's own values by column."""
     yield from (((OF_OBJECT, name), read(item)) for name, read in _FIELDS.items())
     yield from (((OF_ATTRIBUTES, name), value) for name, value in item.attributes.items() if value is not None)
-
-
-def _columns(objects: Objects, column_ids: Collection[ColumnId]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yields keys and documents. Objects without a value inherit that of the nearest ancestor."""
-    own: dict[ColumnId, dict[int, Attribute]] = {column_id: {} for column_id in column_ids}
-    parents: dict[int, int] = {}
-    for item in objects() if own else ():
-        if item.parent is not None:
-            parents[item.id] = item.parent
-        for column_id, value in _values(item):
-            if column_id in own:
-                own[column_id][item.id] = value
-    for (of, name), values in own.items():
-        every = values | {
-            number: values[above]
-            for number in parents
-            if number not in values and (above := _find_ancestor_with_value(number, parents, values)) in values
-        }
-        ids = sorted(every)
-        yield column_key(of, name), {"map3d": "column", "version": 1, "name": name, "of": of, "ids": ids, "values": [every[number] for number in ids]}
-
-
-def _find_ancestor_with_value(number: int, parents: Mapping[int, int], values: Mapping[int, Attribute]) -> int:
-    """Returns the nearest ancestor that has a value; an ancestor without value if there is none."""
-    seen = {number}
-    while number not in values and parents.get(number, number) not in seen:
-        number = parents[number]
-        seen.add(number)
-    return number

@@ -16,9 +16,12 @@ from numpy.typing import NDArray
 
 from map3d.database import Database
 from map3d.errors import LimitExceeded
-from map3d.registry.columns import attribute_index, column, columns
+from map3d.registry.column_documents import column_documents
+from map3d.registry.columns import attribute_index
+from map3d.registry.documents import ATTRIBUTES, SHARDS, Document, dump_document
 from map3d.registry.object_boxes import include_children
 from map3d.registry.registered_objects import NewObject, RegisteredObject, plain_attributes
+from map3d.registry.search_index import search_documents
 from map3d.types import OBJECTS_PER_SHARD, Box
 
 _PAGE: Final = 4096
@@ -131,23 +134,29 @@ class Registry:
         """Returns all attribute shards with objects."""
         return (self.shard(number) for number in self.shard_numbers())
 
-    def search(self) -> dict[str, Any]:
-        """Returns the search index (spec/manifest.md): every object with a box."""
-        entries = [(item.label, item.id, item.box) for item in self.objects() if item.box is not None]
-        entries.sort(key=lambda entry: entry[:2])
-        return {"map3d": "search", "version": 1, "entries": [[number, label, _top_centre(box)] for label, number, box in entries]}
+    def search_documents(self) -> Iterator[Document]:
+        """Yields the search index (spec/manifest.md)."""
+        return search_documents(self.objects())
 
     def attribute_index(self) -> dict[str, Any]:
         """Returns the list of attribute columns (spec/manifest.md)."""
         return attribute_index(self.objects())
 
-    def column(self, key: str) -> dict[str, Any] | None:
-        """Returns a column; None if no column has this key."""
-        return column(self.objects, key)
+    def attribute_documents(self) -> Iterator[Document]:
+        yield ATTRIBUTES, dump_document(self.attribute_index())
 
-    def columns(self) -> Iterator[tuple[str, dict[str, Any]]]:
-        """Yields the keys and documents of all listed columns."""
-        return columns(self.objects)
+    def column_documents(self) -> Iterator[Document]:
+        """Yields the attribute columns and the list of them (spec/manifest.md)."""
+        index = self.attribute_index()
+        yield ATTRIBUTES, dump_document(index)
+        yield from column_documents(self.objects(), self.get, [(row["of"], row["name"]) for row in index["attributes"]])
+
+    def documents(self) -> Iterator[Document]:
+        """Yields all documents of the objects: attribute shards, search index and columns."""
+        for shard in self.shards():
+            yield SHARDS.format(shard=shard["shard"]), dump_document(shard)
+        yield from self.search_documents()
+        yield from self.column_documents()
 
     def close(self) -> None:
         self._database.close()
@@ -185,8 +194,3 @@ def _box(row: Any) -> Box | None:
 def _to_object(row: Any) -> RegisteredObject:
     texts = {"name": row["name"], "kind": row["class"], "asset": row["asset"], "lod": row["lod"]}
     return RegisteredObject(id=row["id"], parent=row["parent"], attributes=json.loads(row["attributes"]), box=_box(row), **texts)
-
-
-def _top_centre(box: Box) -> list[float]:
-    (x0, y0, _), (x1, y1, z1) = box
-    return [(x0 + x1) / 2, (y0 + y1) / 2, z1]

@@ -9,16 +9,13 @@ from typing import Any, Final, Self
 from map3d.errors import BadRequest, Corrupt, Map3dError, UnknownVersion
 from map3d.geometry.frames import PinnedFrame
 from map3d.geometry.views import parse_view_id
+from map3d.registry.documents import ATTRIBUTES, COLUMNS, SEARCH, SHARDS
 from map3d.tiles.naming import block_level, block_levels, block_of, parse_tile
 from map3d.tiles.occupancy import Occupancy
 from map3d.types import DEPTH_KINDS, DEPTH_UNIT_M, OBJECTS_PER_SHARD, BlockId, Box, Layer, TileId, Vec3, ViewAngles, check_name
 
 VERSION: Final = 1
 FILE_NAME: Final = "rendering.json"
-SHARDS: Final = "objects/{shard}.json"
-SEARCH: Final = "objects/search.json"
-ATTRIBUTES: Final = "objects/attributes.json"
-COLUMNS: Final = "objects/columns/{column}.json"
 
 
 @dataclass(frozen=True)
@@ -295,8 +292,3 @@ def block_version(view: ManifestView, tile: TileId, number: int = 0) -> int:
     """Returns the version for a tile's URL, for a layer of pass `number`."""
     versions = view.versions[number]
     return versions.get(block_of(tile, view.frame.zmax), _most_common_version(versions))
-
-
-def dump_document(document: Mapping[str, Any]) -> bytes:
-    """Serializes a document beside the manifest: compact UTF-8 JSON with a final newline. Raises ValueError for NaN and infinities."""
-    return (json.dumps(document, ensure_ascii=False, separators=(",", ":"), allow_nan=False) + "\n").encode()

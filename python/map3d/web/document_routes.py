@@ -4,7 +4,6 @@ Each is available under /tiles/<rendering>/ and under /view/<rendering>/, where 
 """
 
 import re
-from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 from threading import Lock
@@ -15,20 +14,24 @@ from flask import Blueprint, Response, current_app, request
 from map3d.catalogue import Catalogue, Workspace
 from map3d.errors import NotFound
 from map3d.registry import Registry
-from map3d.tiles.manifest import FILE_NAME, dump_document
+from map3d.registry.documents import dump_document
+from map3d.tiles.manifest import FILE_NAME
 from map3d.types import check_name
 from map3d.web.compression import compress
+from map3d.web.object_documents import Build, ObjectDocuments
 
 documents = Blueprint("documents", __name__)
 _open_lock: Final = Lock()
 
-FileState = tuple[tuple[int, int, int], ...]
-"""(inode, time of change, size) of the database and its write-ahead log."""
-
 _SHARD: Final = re.compile(r"0|[1-9][0-9]{0,6}", re.ASCII)
 """Shard numbers have at most seven digits, because ids have 32 bits."""
 
-_COLUMN: Final = re.compile(r"[0-9a-f]{16}", re.ASCII)
+_BUILDS: Final[dict[re.Pattern[str], Build]] = {
+    re.compile(r"search(/[0-9a-f]{16})?", re.ASCII): Registry.search_documents,
+    re.compile(r"attributes", re.ASCII): Registry.attribute_documents,
+    re.compile(r"columns/[0-9a-f]{16}(/[0-9]{1,7})?", re.ASCII): Registry.column_documents,
+}
+_object_documents: Final = ObjectDocuments()
 
 
 @documents.get(f"/tiles/<rendering>/{FILE_NAME}")
@@ -41,36 +44,26 @@ def manifest(rendering: str) -> Response:
         raise NotFound(f"no rendering {rendering!r}, or it has no tiles yet; run: map3d render {rendering}") from error
 
 
-@documents.get("/tiles/<rendering>/objects/<shard>.json")
-@documents.get("/view/<rendering>/objects/<shard>.json")
 def shard(rendering: str, shard: str) -> Response:
+    """Returns an attribute shard, possibly without objects."""
     if not _SHARD.fullmatch(shard):
         raise NotFound(f"no shard {shard[:64]!r}; shard names are plain numbers")
     with Registry(registry_path(rendering)) as objects:
         return json_response(dump_document(objects.shard(int(shard))))
 
 
-@documents.get("/tiles/<rendering>/objects/search.json")
-@documents.get("/view/<rendering>/objects/search.json")
-def search(rendering: str) -> Response:
-    path = registry_path(rendering)
-    return json_response(_search_bytes(path, _file_state(path)))
-
-
-@documents.get("/tiles/<rendering>/objects/attributes.json")
-@documents.get("/view/<rendering>/objects/attributes.json")
-def attributes(rendering: str) -> Response:
-    path = registry_path(rendering)
-    return json_response(_index_bytes(path, _file_state(path)))
-
-
-@documents.get("/tiles/<rendering>/objects/columns/<column>.json")
-@documents.get("/view/<rendering>/objects/columns/<column>.json")
-def column(rendering: str, column: str) -> Response:
-    path = registry_path(rendering)
-    data = _column_bytes(path, column, _file_state(path)) if _COLUMN.fullmatch(column) else None
+@documents.get("/tiles/<rendering>/objects/<document>.json")
+@documents.get("/view/<rendering>/objects/<document>.json")
+@documents.get("/tiles/<rendering>/objects/<path:document>.json")
+@documents.get("/view/<rendering>/objects/<path:document>.json")
+def object_document(rendering: str, document: str) -> Response:
+    """Returns a document of the search index or of the attribute columns, or an attribute shard."""
+    if document not in ("search", "attributes") and "/" not in document:
+        return shard(rendering, document)
+    build = next((build for pattern, build in _BUILDS.items() if pattern.fullmatch(document)), None)
+    data = None if build is None else _object_documents.get(registry_path(rendering), build, f"objects/{document}.json")
     if data is None:
-        raise NotFound(f"no column {column[:64]!r}; objects/attributes.json lists the columns")
+        raise NotFound(f"no document {document[:64]!r}; search.json and attributes.json in objects/ lead to all others")
     return json_response(data)
 
 
@@ -110,28 +103,3 @@ def json_response(data: bytes) -> Response:
     response.headers["Cache-Control"] = "no-cache"
     response.make_conditional(request)
     return compress(response)
-
-
-@lru_cache(maxsize=4)
-def _search_bytes(path: Path, _state: FileState) -> bytes:
-    with Registry(path) as objects:
-        return dump_document(objects.search())
-
-
-@lru_cache(maxsize=4)
-def _index_bytes(path: Path, _state: FileState) -> bytes:
-    with Registry(path) as objects:
-        return dump_document(objects.attribute_index())
-
-
-@lru_cache(maxsize=4)
-def _column_bytes(path: Path, column: str, _state: FileState) -> bytes | None:
-    with Registry(path) as objects:
-        found = objects.column(column)
-    return None if found is None else dump_document(found)
-
-
-def _file_state(path: Path) -> FileState:
-    """Returns a value that differs after each change of the registry."""
-    log = path.with_name(path.name + "-wal")
-    return tuple((stat.st_ino, stat.st_mtime_ns, stat.st_size) for stat in (one.stat() for one in (path, log) if one.is_file()) if stat.st_size)
