@@ -81,15 +81,20 @@ def test_words_match_the_vectors(row: dict[str, Any]) -> None:
 
 
 @pytest.mark.usefixtures("small_pages")
-@pytest.mark.parametrize(
-    "beginning", ["haupt", "hauptstrasse 1", "markt", "am markt 17", "4000123", "deby lod2 40001", "egl", "大", "17", "zzz", "a", ""]
-)
+@pytest.mark.parametrize("beginning", ["haupt", "hauptstrasse 1", "markt", "am markt 17", "4000123", "deby lod2 40001", "egl", "大", "zzz", "a", ""])
 def test_every_label_with_a_beginning_is_on_the_pages_that_a_reader_chooses(registry: Registry, beginning: str) -> None:
     labels = put(registry, labels_of(500))
     found = Reader(dict(registry.search_documents())).find(beginning)
     expected = {number for number, label in labels.items() if f" {' '.join(search_words(label))}".find(f" {beginning}") >= 0}
     assert expected <= found.keys()
     assert all(labels[number] == label for number, label in found.items())
+
+
+@pytest.mark.usefixtures("small_pages")
+def test_house_numbers_are_no_beginnings_except_at_the_start(registry: Registry) -> None:
+    labels = put(registry, [*(f"Hauptstraße {k % 200}a" for k in range(400)), "17 Columns"])
+    assert {labels[number] for number in Reader(dict(registry.search_documents())).find("17 ")} >= {"17 Columns"}
+    assert "Hauptstraße 17a" in Reader(dict(registry.search_documents())).find("hauptstrasse 17a").values()
 
 
 @pytest.mark.usefixtures("small_pages")

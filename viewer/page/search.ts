@@ -3,30 +3,12 @@ import { byId, inputById, withText } from "./dom";
 import { toast } from "./toast";
 import { message } from "./i18n";
 
-const MAX_RESULTS = 8;
 const ZOOM_BELOW_DEEPEST = 1;
 
-/** Lower case without accents, so that "strasse" matches "Straße" and "cafe" matches "Café". */
-export function normalize(text: string): string {
-  return text.toLowerCase().replaceAll("ß", "ss").normalize("NFD").replace(/\p{M}/gu, "");
-}
-
-/** Returns the first entries that contain all words; those that begin with the first word come first. */
-export function findEntries(entries: readonly SearchEntry[], text: string): SearchEntry[] {
-  const words = normalize(text).split(/\s+/).filter(Boolean);
-  if (words.length === 0) return [];
-  const hits = entries.filter(([, label]) => {
-    const name = normalize(label);
-    return words.every((word) => name.includes(word));
-  });
-  const start = (entry: SearchEntry): number => (normalize(entry[1]).startsWith(words[0] ?? "") ? 0 : 1);
-  return hits.sort((a, b) => start(a) - start(b)).slice(0, MAX_RESULTS);
-}
-
-/** Binds the search box: a combobox over the rendering's search index, which is fetched on first use. */
+/** Binds the search box: a combobox over the rendering's search index, of which the first search fetches a part. */
 export function bindSearch(view: map, layer: () => imageLayer, select: (id: number, position: Vec3) => void): void {
   const [form, query, list] = [byId("search"), inputById("query"), byId("results")];
-  const box = new SearchBox(query, list, () => layer().searchIndex(), (entry) => {
+  const box = new SearchBox(query, list, (text) => layer().search(text), (entry) => {
     go(view, layer(), entry, select);
   });
   form.hidden = false;
@@ -51,13 +33,13 @@ function go(view: map, layer: imageLayer, [id, label, local]: SearchEntry, selec
 class SearchBox {
   readonly #query: HTMLInputElement;
   readonly #list: HTMLElement;
-  readonly #entries: () => Promise<readonly SearchEntry[]>;
+  readonly #find: (text: string) => Promise<readonly SearchEntry[]>;
   readonly #select: (entry: SearchEntry) => void;
-  #hits: SearchEntry[] = [];
+  #hits: readonly SearchEntry[] = [];
   #at = 0;
 
-  constructor(query: HTMLInputElement, list: HTMLElement, entries: () => Promise<readonly SearchEntry[]>, select: (entry: SearchEntry) => void) {
-    [this.#query, this.#list, this.#entries, this.#select] = [query, list, entries, select];
+  constructor(query: HTMLInputElement, list: HTMLElement, find: (text: string) => Promise<readonly SearchEntry[]>, select: (entry: SearchEntry) => void) {
+    [this.#query, this.#list, this.#find, this.#select] = [query, list, find, select];
     query.addEventListener("input", () => void this.#update());
     query.addEventListener("focus", () => void this.#update());
     query.addEventListener("blur", () => {
@@ -78,8 +60,10 @@ class SearchBox {
 
   async #update(): Promise<void> {
     try {
-      const entries = await this.#entries();
-      this.#hits = findEntries(entries, this.#query.value);
+      const text = this.#query.value;
+      const hits = await this.#find(text);
+      if (text !== this.#query.value) return;
+      this.#hits = hits;
       this.#at = 0;
       this.#render();
     } catch (reason) {

@@ -1,6 +1,6 @@
 // Builds dist/: map3d.js (script), map3d.mjs (module), the entries, map3d-full (everything), the service worker, the ready-made page, and type declarations.
 import { execFileSync } from "node:child_process";
-import { cpSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { dirname, join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
 import * as esbuild from "esbuild";
@@ -9,6 +9,7 @@ import { ENTRIES } from "./entries.mjs";
 const root = resolve(dirname(fileURLToPath(import.meta.url)), "..");
 const dist = join(root, "dist");
 const shared = { bundle: true, minify: true, target: "es2022", legalComments: "none", logLevel: "warning" };
+const CSS_TARGET = ["chrome111", "firefox121", "safari16.4"];
 const banner = { js: "/*! map3d, Apache-2.0 */" };
 
 /** Resolves `import code from "worker:./x.ts"` to the bundled source of a worker. */
@@ -31,7 +32,21 @@ const shaders = {
     build.onLoad({ filter: /\/shaders?\.ts$/ }, ({ path }) => ({ contents: readFileSync(path, "utf8").replace(/\/\*[^]*?\*\/|\/\/.*|^[ \t]+/gm, "").replace(/\n{2,}/g, "\n"), loader: "ts" }));
   },
 };
-const plugins = [workers, shaders];
+
+/** Minifies the style sheets in template strings. */
+const styles = {
+  name: "styles",
+  setup(build) {
+    build.onLoad({ filter: /\/(styles|panelButton|elementContent)\.ts$/ }, async ({ path }) => {
+      const text = readFileSync(path, "utf8");
+      const [whole, before, css] = /(STYLES = )`([^`$]*)`/.exec(text) ?? [];
+      if (whole === undefined) throw new Error(`${path}: expected STYLES = \`…\` without expressions`);
+      const { code } = await esbuild.transform(css, { loader: "css", minify: true, target: CSS_TARGET });
+      return { contents: text.replace(whole, () => before + JSON.stringify(code.trim())), loader: "ts" };
+    });
+  },
+};
+const plugins = [workers, shaders, styles];
 
 /** Lets entries import the core's public names: modules from map3d.mjs, scripts from the global `map3d`. */
 const coreAs = (how) => ({
@@ -65,8 +80,8 @@ async function build() {
   await bundleFull("map3d-full.mjs", { format: "esm" });
   await bundleFull("map3d-full.js", { format: "iife", globalName: "map3d" });
   await bundle("page/page.ts", "page.js", { format: "esm", external: ["./map3d.mjs", ...Object.keys(ENTRIES).map((name) => `./map3d-${name}.mjs`)] });
-  await esbuild.build({ ...shared, entryPoints: [join(root, "page/page.css")], outfile: join(dist, "page.css"), target: ["chrome111", "firefox121", "safari16.4"] });
-  cpSync(join(root, "page/index.html"), join(dist, "index.html"));
+  await esbuild.build({ ...shared, entryPoints: [join(root, "page/page.css")], outfile: join(dist, "page.css"), target: CSS_TARGET });
+  writeFileSync(join(dist, "index.html"), readFileSync(join(root, "page/index.html"), "utf8").replace(/^\s+/gm, ""));
   const tsc = join(root, "node_modules/typescript/bin/tsc");
   execFileSync(process.execPath, [tsc, "-p", join(root, "tsconfig.types.json")], { stdio: "inherit" });
   writeDeclarations();

@@ -24,7 +24,7 @@ export type { Tile } from "./geo/frame";
 export { HttpSource, type Source } from "./tiles/source";
 export { Archive, type ReadRange } from "./tiles/pmtiles";
 export type { FetchFunction } from "./tiles/fetch";
-export type { Attribute, AttributeInfo, AttributeValue, ObjectInfo, SearchEntry } from "./tiles/objects";
+export type { Attribute, AttributeInfo, AttributeValue, ColumnSummary, ObjectInfo, SearchEntry } from "./tiles/objects";
 export { chooseUtcOffset } from "./geo/daylight";
 
 /** Version of the viewer, which reads manifests of version 1. */

@@ -6,10 +6,12 @@ tree. Pages end where a hash of the key says so and are named by their content: 
 
 import re
 import sqlite3
+import sys
 import unicodedata
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
+from functools import cache
 from hashlib import sha256
 from itertools import islice
 from typing import Final, NamedTuple
@@ -32,15 +34,22 @@ DIGITS: Final = 2
 """Decimals of a position: centimetres."""
 
 _ASCII_WORD: Final = re.compile(r"[0-9a-z]+")
+_WORD: Final = re.compile(r"[^\W_]+")
+_HOUSE_NUMBER: Final = re.compile(r"[0-9]\w{0,2}")
+"""Short words that begin with a digit. They are found only behind other words, because nearly every label has one."""
 
 
 def search_words(text: str) -> list[str]:
     """Returns the words of a text: letters and digits, in lower case without accents; `Straße` becomes `strasse`."""
     if text.isascii():
         return _ASCII_WORD.findall(text.lower())
-    letters = unicodedata.normalize("NFD", text.lower().replace("ß", "ss"))
-    categories = ((letter, unicodedata.category(letter)[0]) for letter in letters)
-    return "".join(letter if category in "LN" else " " for letter, category in categories if category != "M").split()
+    return _WORD.findall(unicodedata.normalize("NFD", text.lower().replace("ß", "ss")).translate(_marks()))
+
+
+@cache
+def _marks() -> dict[int, None]:
+    """Returns all combining marks, for `str.translate`."""
+    return {code: None for code in range(sys.maxunicode + 1) if unicodedata.category(chr(code))[0] == "M"}
 
 
 def search_documents(objects: Iterable[RegisteredObject]) -> Iterator[Document]:
@@ -74,7 +83,8 @@ def _fill(db: sqlite3.Connection, objects: Iterable[RegisteredObject]) -> int:
 def _keys(label: str) -> list[bytes]:
     """Returns the keys of a label as UTF-16, whose bytes have the order of JavaScript's strings. A label without words has an empty key."""
     words = search_words(label)[: 2 * MAX_WORDS]
-    return [" ".join(words[first:])[:MAX_KEY].encode("utf-16-be", "surrogatepass") for first in range(min(max(len(words), 1), MAX_WORDS))]
+    starts = [0, *(first for first in range(1, min(len(words), MAX_WORDS)) if not _HOUSE_NUMBER.fullmatch(words[first]))]
+    return [" ".join(words[first:])[:MAX_KEY].encode("utf-16-be", "surrogatepass") for first in starts]
 
 
 def _top_centre(box: Box) -> list[float]:

@@ -9,7 +9,7 @@ import type { Frame, Tile } from "../geo/frame";
 import { towardsLight, type Light } from "../geo/light";
 import type { LayerInfo, LayerKind, Rendering, View } from "../geo/manifest";
 import { findShadow } from "../geo/shadows";
-import { Objects, type AttributeInfo, type AttributeValue, type ObjectInfo, type SearchEntry } from "../tiles/objects";
+import { Objects, type AttributeInfo, type AttributeValue, type ColumnSummary, type ObjectInfo, type SearchEntry } from "../tiles/objects";
 import { HttpSource, type Source } from "../tiles/source";
 import { LayerTiles } from "../tiles/layerTiles";
 import { findMatchingView } from "./compatibility";
@@ -162,14 +162,19 @@ export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
     return (await this.#objects?.attributes()) ?? [];
   }
 
-  /** Returns an attribute's values for all objects, by id. */
-  async column({ column }: Pick<AttributeInfo, "column">): Promise<ReadonlyMap<number, AttributeValue>> {
-    return (await this.#objects?.column(column)) ?? new Map<number, AttributeValue>();
+  /** Returns an attribute's values by id: of all objects, or at least of some. @param ids reads only the files of these objects */
+  async column({ column }: Pick<AttributeInfo, "column">, ids?: Iterable<number>): Promise<ReadonlyMap<number, AttributeValue>> {
+    return (await this.#objects?.column(column, ids)) ?? new Map<number, AttributeValue>();
   }
 
-  /** Returns the search index: id, label, local position. */
-  async searchIndex(): Promise<readonly SearchEntry[]> {
-    return (await this.#objects?.search()) ?? [];
+  /** Returns statistics of an attribute; null when its values are one small file. */
+  async columnSummary({ column }: Pick<AttributeInfo, "column">): Promise<ColumnSummary | null> {
+    return (await this.#objects?.summary(column)) ?? null;
+  }
+
+  /** Finds objects by the words of name and address. In a large rendering, reads a few small files. */
+  async search(text: string, limit?: number): Promise<readonly SearchEntry[]> {
+    return (await this.#objects?.search(text, limit)) ?? [];
   }
 
   protected onAdd(map: ImageLayerHost): void {

@@ -217,11 +217,11 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     }
   }
 
-  /** Lists the visible objects of all layers, topmost layer first and the largest of each layer first. Ignores occlusion between layers. */
-  async objectsInView(): Promise<readonly (VisibleObject & { readonly layer: imageLayer })[]> {
+  /** Lists the visible objects of all layers, topmost layer first and the largest of each layer first. Ignores occlusion between layers. @param hidden includes objects that styles hide */
+  async objectsInView(hidden = false): Promise<readonly (VisibleObject & { readonly layer: imageLayer })[]> {
     const viewState = this.getViewState();
     if (!viewState) return [];
-    const found = await Promise.all([...this.#layers].reverse().map(async (layer) => (await findVisibleObjects(layer, viewState)).map((seen) => ({ ...seen, layer }))));
+    const found = await Promise.all([...this.#layers].reverse().map(async (layer) => (await findVisibleObjects(layer, viewState, hidden)).map((seen) => ({ ...seen, layer }))));
     return found.flat();
   }
 

@@ -11,8 +11,8 @@ export interface VisibleObject {
   readonly share: number;
 }
 
-/** Finds the visible objects of a layer, the largest first. Fetches the id tiles of the shown level. @throws the error of a fetch */
-export async function findVisibleObjects(layer: imageLayer, viewState: ViewState): Promise<VisibleObject[]> {
+/** Finds the visible objects of a layer, the largest first. Fetches the id tiles of the shown level. @param hidden includes objects that its style hides  @throws the error of a fetch */
+export async function findVisibleObjects(layer: imageLayer, viewState: ViewState, hidden: boolean): Promise<VisibleObject[]> {
   const { camera, dpr, finer } = viewState;
   const [view, info] = [layer.findView(camera.frame), layer.rendering?.layers.get("id")];
   const { rendering, tiles } = layer;
@@ -34,7 +34,7 @@ export async function findVisibleObjects(layer: imageLayer, viewState: ViewState
     for (let j = j0; j < j1; j++) {
       for (let i = i0; i < i1; i++) {
         const id = data.values[j * data.width + i] as number;
-        if (id !== 0 && !layer.isHidden(id)) counts.set(id, (counts.get(id) ?? 0) + 1);
+        if (id !== 0 && (hidden || !layer.isHidden(id))) counts.set(id, (counts.get(id) ?? 0) + 1);
       }
     }
   }

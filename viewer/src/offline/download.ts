@@ -3,6 +3,7 @@ import { FetchError, HttpSource, UsageError, type AttributeInfo, type map, type 
 import { readArea, storage, writeArea, type StoredArea } from "./areas";
 import { CACHE, RECORD } from "./cacheKeys";
 import { OfflineCache, StorageError } from "./offlineCache";
+import { pathBelow } from "../tiles/objects";
 import { resolveOptions, tilesOf, type AreaOptions, type FilledArea, type PlannedTile } from "./areaPlan";
 
 /** Estimated size of an area. */
@@ -170,15 +171,21 @@ class ShardCollector {
   }
 }
 
-/** Saves the search index, the columns that themes use, and the attributes of the objects in the area. */
+/** Saves the search index, and the attributes of the objects in the area: by object, and in the columns that themes use. */
 async function saveObjects(renderings: readonly OfflineRendering[], collector: ShardCollector, concurrency: number): Promise<void> {
   for (const { source, rendering } of renderings) {
     const { objects } = rendering.json;
     if (!objects) continue;
     const list = objects.attributes === undefined ? null : ((await source.json(objects.attributes)) as { attributes?: readonly AttributeInfo[] } | null);
     const columns = (list?.attributes ?? []).flatMap(({ column }) => objects.columns?.replace("{column}", column) ?? []);
-    const shards = [...collector.shardsOf(rendering)].map((shard) => objects.shards.replace("{shard}", String(shard)));
-    await runParallel([objects.search, ...columns, ...shards].values(), concurrency, async (path) => { await source.json(path); });
+    const numbers = [...collector.shardsOf(rendering)];
+    const shards = numbers.map((shard) => objects.shards.replace("{shard}", String(shard)));
+    const save = async (path: string): Promise<void> => {
+      const file = (await source.json(path)) as { pages?: readonly string[]; shards?: readonly number[]; shard_size?: number } | null;
+      const wanted = new Set(numbers.map((shard) => Math.floor((shard * objects.shard_size) / (file?.shard_size ?? 1))));
+      for (const name of file?.pages ?? file?.shards?.filter((shard) => wanted.has(shard)) ?? []) await save(pathBelow(path, name));
+    };
+    await runParallel([objects.search, ...columns, ...shards].values(), concurrency, save);
   }
 }
 

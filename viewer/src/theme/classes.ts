@@ -1,5 +1,5 @@
 import { floorToRound } from "../core/lengths";
-import type { AttributeInfo, AttributeValue } from "../map3d";
+import type { AttributeInfo, AttributeValue, ColumnSummary } from "../map3d";
 
 /** Objects of one colour. */
 export interface ThemeClass {
@@ -7,6 +7,7 @@ export interface ThemeClass {
   readonly label: string;
   /** #rrggbb */
   readonly color: string;
+  /** Its objects; in a large rendering, those that have been in view. */
   readonly ids: readonly number[];
 }
 
@@ -14,6 +15,8 @@ export interface Classification {
   readonly classes: readonly ThemeClass[];
   /** The classes have an order, such as ranges of numbers. */
   readonly ordered: boolean;
+  /** Adds objects to their classes. */
+  readonly add: (column: ReadonlyMap<number, AttributeValue>) => void;
 }
 
 /** Sequential palette, light to dark; readable in greyscale and with colour blindness. */
@@ -30,29 +33,40 @@ export interface ClassOptions {
   readonly otherLabel: string;
 }
 
-type ValueEntry = readonly [id: number, value: AttributeValue];
+type Summary = Pick<ColumnSummary, "values" | "numbers">;
 
-/** Classifies numbers by range and everything else by value. Text counts as numbers if all values are numeric. */
-export function classify(info: Pick<AttributeInfo, "type">, column: ReadonlyMap<number, AttributeValue>, options: ClassOptions): Classification {
-  const entries = [...column];
-  const variety = new Set(entries.map(([, value]) => value)).size;
-  const numbers = info.type === "boolean" ? null : entries.map(([id, value]) => [id, typeof value === "string" && value.trim() === "" ? NaN : Number(value)] as const);
-  const numeric = numbers?.every(([, value]) => Number.isFinite(value)) === true;
-  if (numeric && variety > options.classes && (info.type === "number" || variety > 12)) return { classes: classifyByRange(numbers, options), ordered: true };
-  const ordered = numeric && info.type === "number";
-  const classes = classifyByValue(entries, ordered, options);
-  return { classes, ordered: ordered && classes.length <= 6 };
+/** Classes without objects, and the class of a value. */
+interface Classes {
+  readonly labels: readonly string[];
+  readonly colors: readonly string[];
+  readonly classOf: (value: AttributeValue) => number;
+}
+
+/** Classifies numbers by range and everything else by value. Text counts as numbers if all values are numeric. @param summary of the whole column; by default, `column` is the whole */
+export function classify({ type }: Pick<AttributeInfo, "type">, column: ReadonlyMap<number, AttributeValue>, options: ClassOptions, summary: Summary = summarize(type, column)): Classification {
+  const { values, numbers } = summary;
+  const ranges = numbers && values.length > options.classes && (type === "number" || values.length > 12);
+  const ordered = numbers !== undefined && type === "number";
+  const { labels, colors, classOf } = ranges ? classifyByRange(numbers, options) : classifyByValue(values, ordered, options);
+  const classes = labels.map((label, k) => ({ label, color: colors[k] as string, ids: [] as number[] }));
+  const add = (more: typeof column): void => { for (const [id, value] of more) classes[classOf(value)]?.ids.push(id); };
+  add(column);
+  return { classes, ordered: ranges ? true : ordered && classes.length <= 6, add };
+}
+
+function summarize(type: AttributeInfo["type"], column: ReadonlyMap<number, AttributeValue>): Summary {
+  const counts = new Map<AttributeValue, number>();
+  for (const value of column.values()) counts.set(value, (counts.get(value) ?? 0) + 1);
+  const numbers = Array.from(column.values(), (value) => (type === "boolean" || (typeof value === "string" && value.trim() === "") ? NaN : Number(value)));
+  return numbers.every(Number.isFinite) ? { values: [...counts], numbers: numbers.sort((a, b) => a - b) } : { values: [...counts] };
 }
 
 /** Classes of about equal counts, with rounded bounds. */
-function classifyByRange(entries: readonly (readonly [number, number])[], { classes, colors, language }: ClassOptions): ThemeClass[] {
-  const sorted = entries.map(([, value]) => value).sort((a, b) => a - b);
+function classifyByRange(sorted: readonly number[], { classes, colors, language }: ClassOptions): Classes {
   const bounds = classBounds(sorted, classes);
   const format = numberFormat(sorted, language);
-  const groups = [...bounds, Infinity].map<number[]>(() => []);
-  for (const [id, value] of entries) groups[bounds.filter((bound) => value >= bound).length]?.push(id);
-  const ramp = interpolateRamp(colors ?? RAMP, groups.length);
-  return groups.map((ids, k) => ({ ids, color: ramp[k] as string, label: rangeLabel(bounds[k - 1], bounds[k], format) }));
+  const labels = [...bounds, Infinity].map((_, k) => rangeLabel(bounds[k - 1], bounds[k], format));
+  return { labels, colors: interpolateRamp(colors ?? RAMP, labels.length), classOf: (value) => bounds.filter((bound) => Number(value) >= bound).length };
 }
 
 /** Returns the lower bounds of all classes but the first. */
@@ -77,19 +91,14 @@ function numberFormat(sorted: readonly number[], language: string | undefined): 
 }
 
 /** The most frequent values, and one class for the others. */
-function classifyByValue(entries: readonly ValueEntry[], ordered: boolean, { colors, language, otherLabel }: ClassOptions): ThemeClass[] {
-  const groups = new Map<AttributeValue, number[]>();
-  for (const [id, value] of entries) {
-    const group = groups.get(value);
-    if (group) group.push(id);
-    else groups.set(value, [id]);
-  }
-  const palette = colors ?? (ordered ? interpolateRamp(RAMP, groups.size) : HUES);
-  const frequent = [...groups].sort((a, b) => b[1].length - a[1].length || compare(a[0], b[0], language));
-  const [kept, others] = frequent.length <= palette.length ? [frequent, []] : [frequent.slice(0, palette.length), frequent.slice(palette.length)];
-  if (ordered) kept.sort((a, b) => compare(a[0], b[0], language));
-  const named = kept.map(([value, ids], k) => ({ ids, color: palette[k] as string, label: String(value) }));
-  return others.length === 0 ? named : [...named, { ids: others.flatMap(([, ids]) => ids), color: OTHER_COLOR, label: otherLabel }];
+function classifyByValue(values: Summary["values"], ordered: boolean, { colors, language, otherLabel }: ClassOptions): Classes {
+  const palette = colors ?? (ordered ? interpolateRamp(RAMP, values.length) : HUES);
+  const frequent = [...values].sort((a, b) => b[1] - a[1] || compare(a[0], b[0], language)).map(([value]) => value);
+  const kept = frequent.slice(0, palette.length);
+  if (ordered) kept.sort((a, b) => compare(a, b, language));
+  const numbers = new Map(kept.map((value, k) => [value, k]));
+  const others = frequent.length > kept.length ? [otherLabel] : [];
+  return { labels: [...kept.map(String), ...others], colors: [...palette.slice(0, kept.length), OTHER_COLOR], classOf: (value) => numbers.get(value) ?? kept.length };
 }
 
 const compare = (a: AttributeValue, b: AttributeValue, language: string | undefined): number =>

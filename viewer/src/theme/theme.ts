@@ -1,5 +1,5 @@
 import { adoptStyles } from "../core/dom";
-import { MapLayer, UsageError, type AttributeInfo, type imageLayer, type map } from "../map3d";
+import { MapLayer, UsageError, type AttributeInfo, type AttributeValue, type ColumnSummary, type imageLayer, type map } from "../map3d";
 import { classify, type Classification, type ThemeClass } from "./classes";
 import { Legend } from "./legend";
 import { STYLES } from "./styles";
@@ -36,6 +36,10 @@ export class theme extends MapLayer<map, ThemeEvents> {
   #legend: Legend | undefined;
   #classes: readonly ThemeClass[] = [];
   #chosen: readonly ThemeClass[] = [];
+  /** Indices of the pressed classes. */
+  #pressed: ReadonlySet<number> = new Set();
+  /** Adds the objects in view, in a large rendering. */
+  #onMoveEnd: (() => void) | undefined;
 
   /** @param attribute its name, or one of the layer's `attributes()` */
   constructor(layer: imageLayer, attribute: string | AttributeInfo, options: ThemeOptions = {}) {
@@ -63,7 +67,21 @@ export class theme extends MapLayer<map, ThemeEvents> {
 
   protected onAdd(map: map): void {
     adoptStyles(document, STYLES);
-    this.#load(map).catch((reason: unknown) => {
+    this.#run(map, this.#load(map));
+  }
+
+  protected onRemove(map: map): void {
+    if (this.#onMoveEnd) map.off("moveend", this.#onMoveEnd);
+    this.#legend?.box.remove();
+    this.#legend = this.#onMoveEnd = undefined;
+    if (this.#classes.length > 0) this.#layer.setStyle({});
+    this.#classes = this.#chosen = [];
+    this.#pressed = new Set();
+  }
+
+  /** Reports the failure of a task. */
+  #run(map: map, task: Promise<void>): void {
+    task.catch((reason: unknown) => {
       if (this.map !== map) return;
       const error = reason instanceof Error ? reason : new Error(String(reason));
       this.fire("error", { error });
@@ -71,22 +89,37 @@ export class theme extends MapLayer<map, ThemeEvents> {
     });
   }
 
-  protected onRemove(): void {
-    this.#legend?.box.remove();
-    this.#legend = undefined;
-    if (this.#classes.length > 0) this.#layer.setStyle({});
-    this.#classes = this.#chosen = [];
-  }
-
   async #load(map: map): Promise<void> {
     if (!this.#layer.rendering) await new Promise((ready) => this.#layer.once("ready", ready));
     const info = this.#info ?? (await this.#findAttribute());
-    const column = await this.#layer.column(info);
+    const summary = await this.#layer.columnSummary(info);
+    const column = summary ? new Map<number, AttributeValue>() : await this.#layer.column(info);
     if (this.map !== map) return;
     const { language = map.language, classes = 5, colors } = this.options;
     const messages = getThemeMessages(language);
-    const classification = classify(info, column, { classes, colors, language, otherLabel: messages.other });
-    this.#show(map, info.type === "boolean" ? { ...classification, classes: classification.classes.map((row) => ({ ...row, label: row.label === "true" ? messages.yes : messages.no })) } : classification);
+    const classification = classify(info, column, { classes, colors, language, otherLabel: messages.other }, summary ?? undefined);
+    if (summary) await this.#follow(map, info, summary, classification);
+    if (this.map === map) this.#show(map, info.type === "boolean" ? { ...classification, classes: classification.classes.map((row) => ({ ...row, label: row.label === "true" ? messages.yes : messages.no })) } : classification);
+  }
+
+  /** Adds the objects in view to the classes, now and after each movement: reads the shards with their values. */
+  async #follow(map: map, info: AttributeInfo, { shard_size, shards }: ColumnSummary, { add }: Classification): Promise<void> {
+    const read = new Set<number>();
+    const follow = async (): Promise<void> => {
+      const seen = new Set((await map.objectsInView(true)).flatMap(({ id, layer }) => (layer === this.#layer ? Math.floor(id / shard_size) : [])));
+      const missing = shards.filter((shard) => seen.has(shard) && !read.has(shard));
+      if (missing.length === 0) return;
+      for (const shard of missing) read.add(shard);
+      try {
+        add(await this.#layer.column(info, missing.map((shard) => shard * shard_size)));
+      } catch (reason) {
+        for (const shard of missing) read.delete(shard);
+        throw reason;
+      }
+      if (this.map === map) this.#applyStyle(this.#pressed);
+    };
+    await follow();
+    if (this.map === map) map.on("moveend", (this.#onMoveEnd = () => { this.#run(map, follow()); }));
   }
 
   async #findAttribute(): Promise<AttributeInfo> {
@@ -98,7 +131,7 @@ export class theme extends MapLayer<map, ThemeEvents> {
 
   #show(map: map, classification: Classification): void {
     this.#classes = classification.classes;
-    this.#applyStyle(new Set());
+    this.#applyStyle(this.#pressed);
     const { legend } = this.options;
     if (legend !== null) {
       this.#legend = new Legend(this.title, classification, (chosen) => { this.#applyStyle(chosen); });
@@ -109,6 +142,7 @@ export class theme extends MapLayer<map, ThemeEvents> {
 
   /** Applies the style. @param chosen indices of the classes to show; all if empty */
   #applyStyle(chosen: ReadonlySet<number>): void {
+    this.#pressed = chosen;
     this.#chosen = this.#classes.filter((_, k) => chosen.size === 0 || chosen.has(k));
     const colors = new Map(this.#chosen.flatMap(({ ids, color }) => ids.map((id) => [id, color] as const)));
     this.#layer.setStyle({ colors, only: colors.keys(), others: this.options.others ?? "dimmed" });

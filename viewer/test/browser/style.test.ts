@@ -8,7 +8,9 @@ import { decodedLevel, placeOf } from "./level";
 import { picture, settled, type Global } from "./page";
 
 const town = renderTown();
-const bed = new TestBed({ town });
+const divided = renderTown();
+const HEIGHTS = divideColumn(divided.files, "measuredHeight");
+const bed = new TestBed({ town, divided });
 type Theming = Global & { map3d: typeof Theme; theme: Theme.theme };
 const [GROUND, HALL, SCHOOL, TOWER, CHAPEL] = [3, 17, 1025, 2_000_000_001, 3_900_000_007] as const;
 const VIEWPORT = { viewport: { width: 500, height: 400 } };
@@ -102,6 +104,32 @@ test("attributes are read by column", async () => {
   await page.context().close();
 });
 
+test("a theme of a divided column reads the values of objects in view, hidden ones included", async () => {
+  const { page, problems } = await bed.start("divided", { zoom: 3 }, {}, VIEWPORT);
+  const asked: string[] = [];
+  page.on("request", (request) => { if (request.url().includes(HEIGHTS)) asked.push(request.url().replace(/^.*columns\//, "")); });
+  await page.addScriptTag({ url: "/map3d-theme.js" });
+  const idsOf = (): Promise<(readonly number[])[]> => page.evaluate(() => (globalThis as unknown as Theming).theme.classes.map(({ ids }) => ids));
+  const near = await page.evaluate(async (tower) => {
+    const g = globalThis as unknown as Theming;
+    await new Promise<void>((done) => { g.map.once("idle", () => { done(); }).setView(tower, 8); });
+    const seen = (await g.map.objectsInView()).map(({ id }) => id);
+    g.theme = new g.map3d.theme(g.layer, "measuredHeight", { language: "en", others: "hidden" }).addTo(g.map);
+    await new Promise<void>((done) => { g.theme.once("ready", () => { done(); }); });
+    return seen;
+  }, [ORIGIN[0] + 32, ORIGIN[1] + 26, ORIGIN[2] + 62] as const);
+  const shardsOf = (ids: readonly number[]): string[] => [...new Set(ids.map((id) => `${HEIGHTS}/${String(Math.floor(id / 1024))}.json`))].sort();
+  expect(near.length).toBeLessThan(5);
+  expect(asked[0]).toBe(`${HEIGHTS}.json`);
+  expect(asked.slice(1).sort()).toEqual(shardsOf(near));
+  expect(await page.locator(".map3d-legend button").count()).toBe(5);
+  await page.evaluate((center) => { (globalThis as Global).map.setView([...center], 3); }, ORIGIN);
+  await expect.poll(idsOf, { timeout: 20_000 }).toEqual([[GROUND], [SCHOOL], [CHAPEL], [HALL], [TOWER]]);
+  expect(asked.length).toBe(new Set(asked).size);
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
+
 test("a theme colours objects, filters by its legend, and restores all; an unknown attribute is an error", async () => {
   const { page, problems } = await bed.start("town", { zoom: 3 }, {}, VIEWPORT);
   const before = await picture(page);
@@ -132,3 +160,20 @@ test("a theme colours objects, filters by its legend, and restores all; an unkno
   expect(problems).toEqual([]);
   await page.context().close();
 });
+
+/** Replaces a column by a summary and shards. Returns its name. */
+function divideColumn(files: Map<string, Uint8Array>, name: string): string {
+  const read = (path: string): unknown => JSON.parse(new TextDecoder().decode(files.get(path)));
+  const write = (path: string, value: unknown): unknown => files.set(path, new TextEncoder().encode(JSON.stringify(value)));
+  const { attributes } = read("objects/attributes.json") as { attributes: { name: string; column: string }[] };
+  const column = attributes.find((row) => row.name === name)?.column ?? "";
+  const whole = read(`objects/columns/${column}.json`) as { ids: number[]; values: number[] };
+  const shards = [...new Set(whole.ids.map((id) => Math.floor(id / 1024)))];
+  for (const shard of shards) {
+    const rows = whole.ids.flatMap((id, k) => (Math.floor(id / 1024) === shard ? [[id, whole.values[k] as number] as const] : []));
+    write(`objects/columns/${column}/${String(shard)}.json`, { map3d: "column", version: 1, name, of: "attributes", shard, ids: rows.map(([id]) => id), values: rows.map(([, value]) => value) });
+  }
+  const numbers = [...whole.values].sort((a, b) => a - b);
+  write(`objects/columns/${column}.json`, { map3d: "column", version: 2, name, of: "attributes", shard_size: 1024, shards, objects: numbers.length, values: numbers.map((value) => [value, 1]), numbers });
+  return column;
+}
