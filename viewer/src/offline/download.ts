@@ -3,7 +3,6 @@ import { FetchError, HttpSource, UsageError, type AttributeInfo, type map, type 
 import { readArea, storage, writeArea, type StoredArea } from "./areas";
 import { CACHE, RECORD } from "./cacheKeys";
 import { OfflineCache, StorageError } from "./offlineCache";
-import { pathBelow } from "../tiles/objects";
 import { resolveOptions, tilesOf, type AreaOptions, type FilledArea, type PlannedTile } from "./areaPlan";
 
 /** Estimated size of an area. */
@@ -183,7 +182,7 @@ async function saveObjects(renderings: readonly OfflineRendering[], collector: S
     const save = async (path: string): Promise<void> => {
       const file = (await source.json(path)) as { pages?: readonly string[]; shards?: readonly number[]; shard_size?: number } | null;
       const wanted = new Set(numbers.map((shard) => Math.floor((shard * objects.shard_size) / (file?.shard_size ?? 1))));
-      for (const name of file?.pages ?? file?.shards?.filter((shard) => wanted.has(shard)) ?? []) await save(pathBelow(path, name));
+      for (const name of file?.pages ?? file?.shards?.filter((shard) => wanted.has(shard)) ?? []) await save(path.replace(/\.json$/, `/${String(name)}.json`));
     };
     await runParallel([objects.search, ...columns, ...shards].values(), concurrency, save);
   }

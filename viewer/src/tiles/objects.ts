@@ -190,4 +190,4 @@ export class Objects {
 }
 
 /** Returns the path of a file in the folder that belongs to a file. */
-export const pathBelow = (path: string, name: string | number): string => path.replace(/\.json$/, `/${String(name)}.json`);
+const pathBelow = (path: string, name: string | number): string => path.replace(/\.json$/, `/${String(name)}.json`);
