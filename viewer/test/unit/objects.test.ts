@@ -52,7 +52,7 @@ function writeIndex(entries: readonly SearchEntry[]): Map<string, unknown> {
   keyed.sort((a, b) => (a.key < b.key ? -1 : a.key > b.key ? 1 : 0));
   const files = new Map<string, unknown>();
   const chunks = <T>(items: readonly T[], size: number): T[][] => Array.from({ length: Math.ceil(items.length / size) }, (_, k) => items.slice(k * size, (k + 1) * size));
-  let level = chunks(keyed, 6).map((rows) => ({ key: rows[0]?.key ?? "", page: { map3d: "search", version: 2, entries: [...new Set(rows.map(({ entry }) => entry))] } }));
+  let level: { key: string; page: object }[] = chunks(keyed, 6).map((rows) => ({ key: rows[0]?.key ?? "", page: { map3d: "search", version: 2, entries: [...new Set(rows.map(({ entry }) => entry))] } }));
   while (level.length > 1) {
     level = chunks(level, 4).map((rows) => ({ key: rows[0]?.key ?? "", page: { map3d: "search", version: 2, keys: rows.map(({ key }) => key), pages: rows.map(({ page }) => {
       const name = String(files.size).padStart(16, "0");
