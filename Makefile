@@ -11,7 +11,7 @@ CACHE := .cache
 RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
 VIEWER := $(shell find viewer/src viewer/page viewer/scripts -type f 2>/dev/null) $(wildcard viewer/*.json viewer/*.ts viewer/*.js viewer/*.mjs)
 
-.PHONY: help demo test test-all test-rust test-python test-viewer test-wheel test-browser browser-suite wheel check check-words check-rust check-python check-viewer bench bench-extent bench-cycles bench-rotterdam bench-viewer peers bless docs reference build clean tools
+.PHONY: help demo test test-all test-rust test-python test-viewer test-wheel test-browser browser-suite wheel check check-words check-rust check-python check-viewer bench bench-extent bench-cycles bench-rotterdam bench-viewer peers faults bless docs reference build clean tools
 
 help: ## list the targets
 	@echo "map3d: 3D city models as oblique image tiles"; echo
