@@ -24,22 +24,30 @@ class Connections:
         self._local = threading.local()
         self._opened: list[tuple[int, sqlite3.Connection]] = []
         self._lock = threading.Lock()
+        self._writer = (os.getpid(), threading.Lock())
 
     @contextmanager
     def transaction(self) -> Iterator[sqlite3.Connection]:
         """Opens a write transaction: commits it at the end, rolls it back on any exception. Raises StoreError."""
         try:
             db = self.current()
-            db.execute("BEGIN IMMEDIATE")
-            try:
-                yield db
-                db.execute("COMMIT")
-            except BaseException:
-                if db.in_transaction:
-                    db.execute("ROLLBACK")
-                raise
+            with self._writer_lock():
+                db.execute("BEGIN IMMEDIATE")
+                try:
+                    yield db
+                    db.execute("COMMIT")
+                except BaseException:
+                    if db.in_transaction:
+                        db.execute("ROLLBACK")
+                    raise
         except sqlite3.Error as error:
             raise StoreError(f"{self.path}: cannot write: {error}") from error
+
+    def _writer_lock(self) -> threading.Lock:
+        """Returns the lock under which the threads of this process write one after another: SQLite would let them poll. A fork starts with its own."""
+        if self._writer[0] != os.getpid():
+            self._writer = (os.getpid(), threading.Lock())
+        return self._writer[1]
 
     @contextmanager
     def reading(self) -> Iterator[sqlite3.Connection]:
