@@ -56,9 +56,7 @@ def measure(catalogue_urls: Sequence[str] = (), workers: int = WORKERS, blocks_s
     for home in ("sqlite", *catalogue_urls):
         for block_s in blocks_s:
             with tempfile.TemporaryDirectory(prefix="map3d-saturation-") as folder:
-                rows.append(
-                    _measure_one(Workspace(Path(folder)), home, workers, block_s)
-                )
+                rows.append(_measure_one(Workspace(Path(folder)), home, workers, block_s))
     table = Table(title=f"{workers:,} simulated workers", title_justify="left")
     for column in ("catalogue", "seconds a block", "blocks/s offered", "blocks/s leased", "workers busy", "catalogue, ms a block", "99 %, ms"):
         table.add_column(column, justify="right")

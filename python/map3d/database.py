@@ -44,7 +44,7 @@ class Connections:
             raise StoreError(f"{self.path}: cannot write: {error}") from error
 
     def _writer_lock(self) -> threading.Lock:
-        """Returns the lock under which the threads of this process write one after another: SQLite would let them poll. A fork starts with its own."""
+        """Returns the lock under which the threads of this process write one after another: SQLite would let them poll. A fork gets its own."""
         if self._writer[0] != os.getpid():
             self._writer = (os.getpid(), threading.Lock())
         return self._writer[1]
