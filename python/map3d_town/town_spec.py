@@ -65,7 +65,7 @@ class TownSpec:
             (self.style in STYLES, "style", self.style, f"one of {', '.join(STYLES)}"),
             (1 <= self.buildings <= MOST_BUILDINGS, "buildings", self.buildings, f"1 to {MOST_BUILDINGS}"),
             (1 <= self.files <= self.buildings, "files", self.files, "1 to the number of buildings"),
-            (bool(self.formats) and set(self.formats) <= set(FORMATS), "formats", self.formats, f"some of {', '.join(FORMATS)}"),
+            (bool(self.formats) and set(self.formats) <= set(FORMATS), "formats", ", ".join(self.formats), f"one or more of {', '.join(FORMATS)}"),
             (64 <= self.atlas_px <= 16384, "texture_px", self.texture_px, "64 to 16384"),
             (self.textures is None or 1 <= self.textures <= self.buildings, "textures", self.textures, "1 to the number of buildings"),
             (self.buildings_per_texture >= 1, "buildings_per_texture", self.buildings_per_texture, "at least 1"),

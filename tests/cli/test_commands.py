@@ -41,7 +41,7 @@ def test_version(run: Run) -> None:
         (("render", "x", "--workers", "0"), 2, "--workers"),
         (("render", "x"), 2, "create-scene"),
         (("show", "scenes"), 2, "create-scene"),
-        (("show", "jobs"), 2, "missing NAME"),
+        (("show", "jobs"), 2, "map3d: show jobs: missing NAME"),
         (("serve",), 2, "create-scene"),
         (("verify",), 2, "create-scene"),
         (("create-scene", "Bad Name"), 2, "scene name"),
@@ -49,6 +49,9 @@ def test_version(run: Run) -> None:
         (("create-scene", "a", "--crs", "nonsense"), 2, "--crs"),
         (("add-files", "a"), 2, "FILES"),
         (("create-rendering", "a", "b", "--view", "north"), 2, "e.g. 45-22.5 or 45/22.5"),
+        (("create-rendering", "a", "b", "--view", "400-45"), 2, "from north). See map3d create-rendering --help."),
+        (("create-rendering", "a", "b", "--window", "0,0"), 2, "691000,5336000,2000. See map3d create-rendering --help."),
+        (("make-town", "-o", "t", "--formats", "shp"), 1, "formats is 'shp', expected one or more of citygml, obj"),
     ],
 )
 def test_error_is_one_line_that_says_what_to_do(run: Run, arguments: tuple[str, ...], status: int, says: str) -> None:
@@ -78,8 +81,11 @@ def test_created_scenes_are_shown(run: Run) -> None:
     assert town["scene"]["crs"]["vertical"] == "DHHN2016 height"
     assert town["scene"]["options"]["merge_faces"] is False
     assert "ETRS89 / UTM zone 32N" in run("show", "scenes")[1]
-    assert run("show", "scene", "town")[0] == run("show", "report", "town")[0] == 0
+    assert run("show", "report", "town")[0] == 0
+    status, out, _ = run("show", "scene", "town")
+    assert (status, "no origin yet" in out, "merge-faces off" in out) == (0, True, True)
     assert json.loads(run("show", "renderings", "--json")[1]) == []
+    assert "map3d create-rendering" in run("show")[1]
 
 
 def test_unknown_name_lists_the_existing_ones(run: Run) -> None:

@@ -35,7 +35,7 @@ LIGHT = {
 
 
 @pytest.mark.parametrize("kind", LIGHT)
-def test_layers_of_light_decode_in_their_own_mode_only(kind: str) -> None:
+def test_light_layers_decode_in_their_own_mode_only(kind: str) -> None:
     layer, mode, channels = LIGHT[kind]
     assert decode_tile(layer, image(mode, 256, "PNG"), 256).shape == (256, 256, channels)
     for other in {"L", "LA", "RGBA"} - {mode}:
@@ -59,7 +59,7 @@ def test_other_bytes_are_corrupt(layer: Layer, data: bytes) -> None:
         decode_tile(layer, data, 256)
 
 
-def test_ids_are_little_endian_and_nothing_is_left_out() -> None:
+def test_ids_are_little_endian_and_id_zero_is_omitted() -> None:
     pixels = np.zeros((2, 2, 4), np.uint8)
     pixels[0, 0] = (4, 3, 2, 1)
     pixels[0, 1] = (7, 0, 0, 0)

@@ -8,6 +8,7 @@ import click
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from map3d.catalogue import Workspace
+from map3d.catalogue.records import LOCAL_CRS_NAME
 from map3d.cli.options import Bytes, json_option, workspace_option
 from map3d.cli.output import print_json, print_table
 from map3d.cli.progress import progress_bar
@@ -24,8 +25,12 @@ from map3d.errors import BadRequest, Map3dError, UnknownFormat
 @click.option("--theme", help="CityGML: the appearance theme to use.  [default: the first in the file]")
 @click.option("--lod", help="CityGML: the level of detail to use.  [default: the best of each object]")
 @click.option("--strict", is_flag=True, help="Stop at the first problem instead of skipping and counting it.")
-@click.option("--parse-memory", "parse_memory_bytes", type=Bytes(), help="Memory limit for reading a file.  [default: 1G; 2G above 100 MB]")
-@click.option("--parse-cpu", "parse_cpu_s", type=click.IntRange(1), help="Limit in CPU seconds for reading a file.  [default: 60 per 100 MB]")
+@click.option(
+    "--parse-memory", "parse_memory_bytes", type=Bytes(), help="Memory limit for reading a file.  [default: 1G; 2G for rasters and above 100 MB]"
+)
+@click.option(
+    "--parse-cpu", "parse_cpu_s", type=click.IntRange(1), help="Limit in CPU seconds for reading a file.  [default: 60 per 100 MB; 600 for rasters]"
+)
 @json_option
 @workspace_option
 def command(workspace: Workspace, scene: str, files: Sequence[Path], as_json: bool, name: str | None, **options: Any) -> None:
@@ -91,8 +96,10 @@ def _print(scene: str, done: Sequence[Any], failed: Sequence[tuple[str, str]]) -
 
 def _placed(report: Mapping[str, Any]) -> str:
     placing = report.get("placing", {})
-    if placing.get("from") == placing.get("to") or "heights" not in placing:
+    if placing.get("from") in (None, placing.get("to")) or "heights" not in placing:
         return str(placing.get("to", ""))
+    if placing["to"] == LOCAL_CRS_NAME:
+        return f"{LOCAL_CRS_NAME} (numbers of {placing['from']}, unchanged)"
     accuracy = placing.get("accuracy_m")
     exact = "ballpark" if placing.get("ballpark") else f"± {accuracy:g} m" if accuracy is not None else "accuracy unknown"
     return f"{placing['from']} → {placing['to']} ({exact}); heights {placing['heights']}"

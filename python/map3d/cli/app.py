@@ -84,7 +84,7 @@ def run(arguments: list[str]) -> int:
         click.echo(error.format_message())
         return 0
     except click.ClickException as error:
-        click.echo(f"map3d: {error.format_message()}{_see(error)}", err=True)
+        click.echo(f"map3d: {_usage_line(error)}", err=True)
         return error.exit_code
     except (click.Abort, KeyboardInterrupt):
         click.echo("map3d: stopped; re-run the command to resume", err=True)
@@ -98,9 +98,10 @@ def run(arguments: list[str]) -> int:
         return error.exit_code if isinstance(error, Map3dError) else 1
 
 
-def _see(error: click.ClickException) -> str:
-    context = error.ctx if isinstance(error, click.UsageError) else None
-    return f" See {context.command_path} --help." if context else ""
+def _usage_line(error: click.ClickException) -> str:
+    """Returns the error as one line that names the command's help."""
+    message, context = error.format_message(), error.ctx if isinstance(error, click.UsageError) else None
+    return f"{message.rstrip('.')}. See {context.command_path} --help." if context else message
 
 
 def _line(error: BaseException) -> str:

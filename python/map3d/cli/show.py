@@ -1,12 +1,15 @@
 """map3d show."""
 
+from typing import Any
+
 import click
 
 from map3d.catalogue import Catalogue, State, Workspace
 from map3d.cli.options import json_option, workspace_option
-from map3d.cli.output import counts_text, print_json, print_table
+from map3d.cli.output import counts_text, plural, print_json, print_table
 from map3d.errors import BadRequest
 from map3d.geometry.views import view_id
+from map3d.types import Vec3
 
 TOPICS = ("scenes", "scene", "renderings", "rendering", "report", "jobs", "quarantine")
 
@@ -27,7 +30,7 @@ def command(workspace: Workspace, topic: str, name: str | None, as_json: bool) -
     quarantine RENDERING        list the blocks that failed three times, with reasons
     """
     if name is None and topic not in ("scenes", "renderings"):
-        raise BadRequest(f"map3d show {topic}: missing NAME; map3d show scenes and map3d show renderings list the names")
+        raise BadRequest(f"show {topic}: missing NAME; map3d show scenes and map3d show renderings list the names")
     catalogue = workspace.open_catalogue()
     try:
         _SHOW[topic](catalogue, name or "", as_json)
@@ -39,6 +42,9 @@ def _scenes(catalogue: Catalogue, _name: str, as_json: bool) -> None:
     scenes = catalogue.scenes()
     if as_json:
         print_json([{"scene": scene, "assets": [asset.name for asset in catalogue.assets(scene.name)]} for scene in scenes])
+        return
+    if not scenes:
+        click.echo("no scenes yet; next: map3d create-scene NAME")
         return
     rows = [
         (scene.name, scene.crs.name if scene.crs else None, len(catalogue.assets(scene.name)), len(catalogue.renderings(scene.name)))
@@ -52,7 +58,8 @@ def _scene(catalogue: Catalogue, name: str, as_json: bool) -> None:
     if as_json:
         print_json({"scene": scene, "assets": assets})
         return
-    click.echo(f"{name}: {scene.crs.name if scene.crs else 'no coordinate system yet'}, origin {scene.origin}, options {dict(scene.options)}")
+    click.echo(f"{name}: {scene.crs.name if scene.crs else 'no coordinate system yet'}, {_origin_text(scene.origin)}")
+    click.echo(f"options: {', '.join(map(_option_text, scene.options.items()))}")
     print_table(
         ("asset", "format", "objects", "triangles", "source"),
         [(asset.name, asset.format, asset.report.get("objects"), asset.report.get("triangles"), asset.source) for asset in assets],
@@ -63,6 +70,9 @@ def _renderings(catalogue: Catalogue, _name: str, as_json: bool) -> None:
     renderings = catalogue.renderings()
     if as_json:
         print_json([{"rendering": item, "jobs": catalogue.count_jobs(item.name)} for item in renderings])
+        return
+    if not renderings:
+        click.echo("no renderings yet; next: map3d create-rendering SCENE NAME --res METRES")
         return
     rows = [(item.name, item.scene, len(item.frames), item.zmax + 1, item.res_m, counts_text(catalogue.count_jobs(item.name))) for item in renderings]
     print_table(("rendering", "scene", "views", "levels", "m per pixel", "blocks"), rows)
@@ -91,7 +101,7 @@ def _report(catalogue: Catalogue, name: str, as_json: bool) -> None:
         return
     for asset in assets:
         report = asset.report
-        click.echo(f"{asset.name} ({asset.format}): {report.get('objects', 0):,} objects, {report.get('triangles', 0):,} triangles")
+        click.echo(f"{asset.name} ({asset.format}): {plural(report.get('objects', 0), 'object')}, {plural(report.get('triangles', 0), 'triangle')}")
         rows = [("skipped", count, reason, "") for reason, count in sorted(report.get("skipped", {}).items())]
         rows += [("warning", item["count"], item["reason"], item["example"]) for item in report.get("warnings", [])]
         if rows:
@@ -124,6 +134,15 @@ def _quarantine(catalogue: Catalogue, name: str, as_json: bool) -> None:
         return
     print_table(("track", "block", "kind", "reason"), [(job.track, job.block, job.kind, job.reason) for job in jobs])
     click.echo(f"to try them again: map3d retry {name} && map3d render {name}")
+
+
+def _origin_text(origin: Vec3 | None) -> str:
+    return "no origin yet" if origin is None else f"origin {', '.join(f'{value:.15g}' for value in origin)}"
+
+
+def _option_text(option: tuple[str, Any]) -> str:
+    name, value = option
+    return f"{name.replace('_', '-')} {value if not isinstance(value, bool) else 'on' if value else 'off'}"
 
 
 _SHOW = {

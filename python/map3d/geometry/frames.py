@@ -136,7 +136,7 @@ class PinnedFrame:
     def _outside(self, box: Box, what: str) -> OutsideFrame:
         return OutsideFrame(
             f"view {self.id}: content in the local box {box[0]} to {box[1]} {what} of side {self.size_m:g} m; "
-            "pass --regrid to pin new frames and render everything again"
+            "run map3d create-rendering with --regrid to pin new frames and render everything again"
         )
 
     def to_json(self, layers: Sequence[Layer] = ()) -> dict[str, Any]:

@@ -27,7 +27,7 @@ pub fn read_address(xml: &mut XmlReader) -> Result<Option<String>> {
     Ok(parts.format())
 }
 
-/// Reads an element that holds text to its end; enters any other.
+/// Reads an element with text up to its end; enters any other element.
 fn read_part(xml: &mut XmlReader, parts: &mut AddressParts) -> Result<()> {
     let slot = match xml.local_name() {
         "ThoroughfareName" | "NameElement" if parts.street.is_empty() => &mut parts.street,

@@ -186,7 +186,7 @@ impl GeometryParser<'_> {
         Ok(valid)
     }
 
-    /// Reads the current element to its end if it holds positions; enters any other.
+    /// Reads the current element up to its end if it contains positions; enters any other element.
     fn read_positions(&mut self, dimension: usize) -> Result<bool> {
         let dimension = self.parse_dimension().unwrap_or(dimension);
         match self.xml.local_name() {

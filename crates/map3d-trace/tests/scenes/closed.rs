@@ -1,4 +1,4 @@
-//! Closed meshes, which no ray or beam passes.
+//! Closed meshes, which no ray or beam passes through.
 
 use map3d_base::Vec3;
 use map3d_base::asset::{Instance, Rank};
@@ -64,8 +64,8 @@ pub fn soup_from(triangles: &[[Vec3; 3]], far: bool) -> Soup {
 /// Returns the mesh as three instances with a common placement that rotates, mirrors and stretches them.
 pub fn as_prototypes(triangles: &[[Vec3; 3]]) -> Soup {
     let mut soup = Soup::default();
-    for (k, half) in triangles.chunks(triangles.len().div_ceil(3)).enumerate() {
-        soup.prototypes.push(half.iter().map(|t| SoupFace::new(*t)).collect());
+    for (k, third) in triangles.chunks(triangles.len().div_ceil(3)).enumerate() {
+        soup.prototypes.push(third.iter().map(|t| SoupFace::new(*t)).collect());
         let transform = [0.96, -0.3, 0.1, 0.2, 0.28, 1.1, 0.0, -0.1, 0.0, 0.2, -1.2, 0.3];
         soup.instances.push(Instance { prototype: k as u32 + 1, object: k as u32, transform });
     }

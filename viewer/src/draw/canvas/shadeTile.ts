@@ -102,8 +102,8 @@ type LightMixer = (sky: number, sun: number) => number;
 
 /** Returns a function that mixes skylight and sunlight in a channel. */
 export function makeLightMixer({ sky, beam }: TileLight, channel: 0 | 1 | 2): LightMixer {
-  const [of, from] = [sky[channel], beam[channel]];
-  return (share, lit) => of * share + from * lit;
+  const [skylight, sunlight] = [sky[channel], beam[channel]];
+  return (skyShare, sunShare) => skylight * skyShare + sunlight * sunShare;
 }
 
 function lightByte(byte: number, strength: number): number {
