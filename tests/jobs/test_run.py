@@ -1,6 +1,7 @@
 """A run from plan to manifest, with a planned scene and a subprocess that invents tiles."""
 
 import dataclasses
+import sqlite3
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from map3d.jobs.run_settings import RunSettings
 from map3d.jobs.timeouts import Timeouts
 from map3d.renderings.create import add_layers, add_views
 from map3d.renderings.layers import LayerRequest
-from map3d.renderings.manifest_writer import stored_occupancy
+from map3d.renderings.manifest_writer import stored_occupancy, write_manifest
 from map3d.renderings.plan import planned_occupancy
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.sqlite_store import SqliteTileStore
@@ -75,6 +76,48 @@ def test_manifest_describes_a_complete_run(workspace: Workspace, catalogue: Cata
         with SqliteTileStore(workspace.store_path("r", view.frame.id), read_only=True) as store:
             assert view.occupancy == stored_occupancy(store)
             assert [set(versions.values()) for versions in view.versions] == [{1}]
+
+
+def from_stores(workspace: Workspace, catalogue: Catalogue) -> bytes:
+    """Returns the manifest with occupancy and versions from the stores instead of the jobs."""
+    views = []
+    for view in manifest(workspace).views:
+        occupancy, versions = view.occupancy, []
+        for track in record(catalogue).tracks_of(view.frame):
+            with SqliteTileStore(workspace.store_path("r", track.id), read_only=True) as store:
+                occupancy = occupancy if track.number else stored_occupancy(store)
+                versions.append({block.id: block.version for block in store.list_blocks()})
+        views.append(dataclasses.replace(view, occupancy=occupancy, versions=tuple(versions)))
+    return dataclasses.replace(manifest(workspace), views=tuple(views)).dump()
+
+
+def test_manifest_from_the_jobs_equals_the_one_from_the_stores(workspace: Workspace, catalogue: Catalogue) -> None:
+    for content in (CONTENT, {**CONTENT, (0.31, 0.9): "one more"}, dict(list(CONTENT.items())[2:])):
+        run_all(workspace, catalogue, SquareScene(content))
+        assert workspace.manifest_path("r").read_bytes() == from_stores(workspace, catalogue)
+    add_layers(catalogue, "r", LayerRequest(("again=normal",)))
+    run_all(workspace, catalogue, SquareScene(CONTENT))
+    assert workspace.manifest_path("r").read_bytes() == from_stores(workspace, catalogue)
+
+
+def test_a_complete_manifest_needs_no_store(workspace: Workspace, catalogue: Catalogue) -> None:
+    run_all(workspace, catalogue, SquareScene(CONTENT))
+    before, box = workspace.manifest_path("r").read_bytes(), manifest(workspace).box
+    for path in workspace.rendering_folder("r").iterdir():
+        path.unlink()
+    write_manifest(workspace, catalogue, "r", box)
+    assert workspace.manifest_path("r").read_bytes() == before
+
+
+def test_jobs_of_earlier_versions_have_their_occupancy_in_the_store(workspace: Workspace, catalogue: Catalogue) -> None:
+    run_all(workspace, catalogue, SquareScene(CONTENT))
+    before, box = workspace.manifest_path("r").read_bytes(), manifest(workspace).box
+    with sqlite3.connect(workspace.catalogue_path) as db:
+        assert db.execute("UPDATE job SET occupied = NULL").rowcount > 0
+    db.close()
+    workspace.manifest_path("r").unlink()
+    write_manifest(workspace, catalogue, "r", box)
+    assert workspace.manifest_path("r").read_bytes() == before
 
 
 def test_second_run_finds_no_jobs(workspace: Workspace, catalogue: Catalogue) -> None:

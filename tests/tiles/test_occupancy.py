@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from map3d.errors import BadRequest, Corrupt
-from map3d.tiles.naming import children, morton, parent
-from map3d.tiles.occupancy import Occupancy, morton_numbers, xy_from_morton
-from map3d.types import TileId
+from map3d.tiles.naming import block_levels, children, morton, parent, tiles_of_block
+from map3d.tiles.occupancy import Occupancy, block_bits, morton_numbers, xy_from_morton
+from map3d.types import BlockId, TileId
 
 VECTORS = json.loads((Path(__file__).parents[2] / "spec" / "vectors" / "occupancy.json").read_text())
 
@@ -39,6 +39,17 @@ def test_decode_undoes_encode(zmax, share):
     grid, occupancy = random_occupancy(zmax, share)
     assert Occupancy.decode(zmax, occupancy.encode()) == occupancy
     assert occupancy.count(zmax) == grid.sum()
+
+
+@pytest.mark.parametrize("zmax", range(8))
+@pytest.mark.parametrize("share", [0.0, 0.02, 0.5, 1.0])
+def test_an_occupancy_is_made_of_its_blocks(zmax, share):
+    _, occupancy = random_occupancy(zmax, share)
+    root = block_levels(zmax)[0].root
+    blocks = [BlockId(root, x, y) for x in range(2**root) for y in range(2**root)]
+    rows = [(block.x, block.y, block_bits(block, zmax, [tile for tile in tiles_of_block(block, zmax) if tile in occupancy])) for block in blocks]
+    assert all(0 <= bits < 2**64 for _, _, bits in rows)
+    assert Occupancy.from_blocks(zmax, rows) == Occupancy.from_blocks(zmax, reversed(rows)) == occupancy
 
 
 def test_a_tile_is_occupied_if_and_only_if_a_child_is():

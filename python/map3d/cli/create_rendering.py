@@ -46,6 +46,12 @@ class WindowText(click.ParamType):  # type: ignore[type-arg]
 @click.option("--tile-size", type=click.Choice(["256", "512"]), default="256", show_default=True, help="Side of a tile in pixels.")
 @click.option("--title", default="", help="Display title.  [default: the scene's]")
 @click.option("--attribution", default="", help="Attribution text.  [default: the scene's]")
+@click.option(
+    "--tiles",
+    metavar="URL",
+    help="Store the tiles in a folder or an object store, as file:///FOLDER or s3://BUCKET/PREFIX; credentials come from the environment.  "
+    "[default: SQLite files in the workspace]",
+)
 @click.option("--regrid", is_flag=True, help="Replace the frames of an existing rendering to fit the current scene; everything is rendered again.")
 @json_option
 @workspace_option

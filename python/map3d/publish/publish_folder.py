@@ -17,7 +17,7 @@ from map3d.errors import AlreadyExists, BadRequest, Corrupt, NotFound, Stopped, 
 from map3d.geometry.views import track_id
 from map3d.publish.pmtiles_archive import Archive, write_archive
 from map3d.registry import Registry
-from map3d.renderings.track_stores import open_track, rendering_record
+from map3d.renderings.track_stores import open_track, read_manifest, rendering_record
 from map3d.tiles.manifest import FILE_NAME, Manifest, ManifestView
 from map3d.tiles.tile_store import TileStore
 from map3d.tiles.viewer_files import viewer_files, viewer_folder
@@ -183,11 +183,10 @@ class _FolderWriter:
 
 
 def _read_manifest(workspace: Workspace, rendering: str, allow_incomplete: bool) -> Manifest:
-    path = workspace.manifest_path(rendering)
-    try:
-        manifest = Manifest.load(path.read_bytes(), str(path))
-    except FileNotFoundError as error:
-        raise NotFound(f"no rendering {rendering!r}, or it has no tiles yet; run: map3d render {rendering}") from error
+    data = read_manifest(workspace, rendering_record(workspace, rendering))
+    if data is None:
+        raise NotFound(f"rendering {rendering!r} has no tiles yet; run: map3d render {rendering}")
+    manifest = Manifest.load(data, str(workspace.manifest_path(rendering)))
     if not manifest.complete and not allow_incomplete:
         raise BadRequest(f"rendering {rendering!r} is incomplete; render it first (map3d render {rendering}), or give --allow-incomplete")
     return manifest

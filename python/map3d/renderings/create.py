@@ -13,7 +13,7 @@ from map3d.geometry.views import check_angles
 from map3d.renderings.build import is_stale, open_scene
 from map3d.renderings.layers import LayerRequest
 from map3d.renderings.remove_rendering import finish_rendering_removal
-from map3d.renderings.track_stores import remove_tracks
+from map3d.renderings.track_stores import TILES, check_tiles_url, remove_tracks
 from map3d.types import Box, ViewAngles, check_name
 
 COARSEST_M: Final = 1e6
@@ -34,6 +34,8 @@ class RenderingRequest:
     attribution: str = ""
     regrid: bool = False
     window: tuple[float, float, float] | None = None
+    tiles: str | None = None
+    """URL of the object store for the tiles; None for SQLite files in the workspace, or with `regrid` for the present one."""
 
     def check(self, catalogue: Catalogue) -> None:
         """Checks everything that does not depend on the built scene; raises BadRequest, NotFound."""
@@ -47,9 +49,13 @@ class RenderingRequest:
             raise BadRequest("missing resolution: give either --res METRES_PER_PIXEL or --levels N")
         if self.regrid:
             catalogue.rendering(self.name)
+            if self.tiles is not None:
+                raise BadRequest(f"rendering {self.name}: --tiles cannot change with --regrid; create another rendering instead")
         else:
             _check_free(catalogue, self.name)
         self.layers.check(scene)
+        if self.tiles is not None:
+            check_tiles_url(self.tiles)
 
 
 def create_rendering(workspace: Workspace, catalogue: Catalogue, request: RenderingRequest) -> RenderingRecord:
@@ -61,7 +67,8 @@ def create_rendering(workspace: Workspace, catalogue: Catalogue, request: Render
     window = _local_window(catalogue, request)
     res_m = choose_res(box, request)
     frames = tuple(pin(box, request.tile_px, res_m, request.views, window))
-    options = {} if window is None else {WINDOW: asdict(window)}
+    tiles = catalogue.rendering(request.name).options.get(TILES) if request.regrid else request.tiles
+    options = ({} if window is None else {WINDOW: asdict(window)}) | ({} if tiles is None else {TILES: check_tiles_url(tiles)})
     record = RenderingRecord(
         request.name,
         request.scene,

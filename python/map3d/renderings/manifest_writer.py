@@ -1,17 +1,18 @@
-"""Writes `rendering.json` from the catalogue, the tile stores and the scene (spec/manifest.md)."""
+"""Writes `rendering.json` from the catalogue and the scene (spec/manifest.md)."""
 
 import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from map3d.catalogue import Catalogue, RenderingRecord, SceneRecord, State, Workspace
+from map3d.catalogue import Catalogue, JobResult, RenderingRecord, SceneRecord, State, Track, Workspace
 from map3d.catalogue.records import LOCAL_CRS_NAME
 from map3d.errors import BadRequest
 from map3d.geometry.frames import PinnedFrame
 from map3d.registry import Registry
 from map3d.renderings.lon_lat import geographic_of
-from map3d.renderings.track_stores import find_track
+from map3d.renderings.track_stores import find_track, share_manifest
 from map3d.tiles.manifest import Manifest, ManifestCrs, ManifestView
+from map3d.tiles.naming import block_levels
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.tile_store import TileStore
 from map3d.types import BlockId, Box, Vec3
@@ -27,6 +28,7 @@ def write_manifest(workspace: Workspace, catalogue: Catalogue, rendering: str, b
     manifest = current_manifest(workspace, catalogue, record, box, planned or {})
     catalogue.announce(rendering, record.content_version)
     _write(workspace.manifest_path(rendering), manifest.dump())
+    share_manifest(record, manifest.dump())
     return manifest
 
 
@@ -45,7 +47,7 @@ def current_manifest(workspace: Workspace, catalogue: Catalogue, record: Renderi
         origin=_origin(scene),
         box=box,
         passes=record.passes,
-        views=tuple(_view(workspace, record, frame, planned.get(frame.id)) for frame in record.frames),
+        views=tuple(_view(workspace, catalogue, record, frame, planned.get(frame.id)) for frame in record.frames),
         objects=objects,
         start=_start(record, box),
         geographic=geographic_of(scene, box),
@@ -63,17 +65,34 @@ def stored_occupancy(store: TileStore) -> Occupancy:
     return Occupancy.from_tiles(store.shape.zmax, store.list_tile_positions(store.shape.zmax))
 
 
-def _view(workspace: Workspace, record: RenderingRecord, frame: PinnedFrame, planned: Occupancy | None) -> ManifestView:
-    """Takes the occupancy from the first pass, since every pass has the same tiles."""
-    occupancy, versions = Occupancy.from_tiles(frame.zmax, ()), []
-    for track in record.tracks_of(frame):
-        blocks: dict[BlockId, int] = {}
-        if (found := find_track(workspace, record, track.id)) is not None:
-            with found as store:
-                occupancy = occupancy if track.number else stored_occupancy(store)
-                blocks = {block.id: block.version for block in store.list_blocks()}
-        versions.append(blocks)
+def _view(workspace: Workspace, catalogue: Catalogue, record: RenderingRecord, frame: PinnedFrame, planned: Occupancy | None) -> ManifestView:
+    """Takes occupancy and versions from the results of the jobs; the occupancy from the first pass, since every pass has the same tiles."""
+    first, *later = record.tracks_of(frame)
+    results = _results(catalogue, record.name, first)
+    occupancy = _occupancy(workspace, record, first, results)
+    versions = [
+        {block: result.version for block, result in each.items()} for each in (results, *(_results(catalogue, record.name, track) for track in later))
+    ]
     return ManifestView(frame, occupancy if planned is None else occupancy | planned, tuple(versions))
+
+
+def _results(catalogue: Catalogue, rendering: str, track: Track) -> dict[BlockId, JobResult]:
+    """Returns the results of all jobs of a track that were done once."""
+    return {job.block: job.result for job in catalogue.jobs(rendering, track.id) if job.result is not None}
+
+
+def _occupancy(workspace: Workspace, record: RenderingRecord, track: Track, results: Mapping[BlockId, JobResult]) -> Occupancy:
+    """Jobs of earlier versions of map3d have no occupancy in their results; the store has it."""
+    root = block_levels(track.frame.zmax)[0].root
+    base = [(block.x, block.y, 0 if result.empty else result.occupied) for block, result in results.items() if block.z == root]
+    known = [(x, y, bits) for x, y, bits in base if bits is not None]
+    if len(known) == len(base):
+        return Occupancy.from_blocks(track.frame.zmax, known)
+    found = find_track(workspace, record, track.id)
+    if found is None:
+        return Occupancy.from_blocks(track.frame.zmax, known)
+    with found as store:
+        return stored_occupancy(store)
 
 
 def _crs(scene: SceneRecord) -> ManifestCrs:

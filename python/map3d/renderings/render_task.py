@@ -11,8 +11,9 @@ from map3d.renderings.block_check import check_rendered
 from map3d.renderings.track_stores import open_or_create_track
 from map3d.subprocess import Message, Subprocess
 from map3d.tiles.naming import block_level, blocks_below
+from map3d.tiles.occupancy import block_bits
 from map3d.tiles.tile_store import StoredTile, TileStore
-from map3d.types import BlockId
+from map3d.types import BlockId, TileId
 
 RENDER_ENTRY: Final = "map3d.renderings.block_renderer:open_renderer"
 CACHE_BYTES: Final = 512 << 20
@@ -69,6 +70,7 @@ class RenderTask:
             base_tiles=sum(tile.layer == 0 and tile.z == self._zmax for tile in tiles),
             bytes=sum(len(tile.data) for tile in tiles),
             seconds=float(response.value["seconds"]),
+            occupied=block_bits(lease.block, self._zmax, (TileId(*tile[1:4]) for tile in tiles)) if lease.kind == "base" else 0,
         )
 
     def take_stats(self) -> dict[str, float]:

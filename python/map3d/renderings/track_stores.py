@@ -1,14 +1,37 @@
-"""The tile stores of a rendering, one per track: SQLite files in the workspace."""
+"""The tile stores and the manifest of a rendering: one store per track, as SQLite files in the workspace or under the URL of `create-rendering
+--tiles`, where the manifest is, too."""
+
+from typing import Final
 
 from map3d.catalogue import RenderingRecord, Track, Workspace
 from map3d.errors import NotFound
+from map3d.object_store import ObjectStore, check_store_url, join_url
+from map3d.tiles.manifest import FILE_NAME
 from map3d.tiles.open_store import open_or_create_store, open_store
 from map3d.tiles.tile_store import StoreShape, TileStore
+
+TILES: Final = "tiles"
+"""Key of the base URL in `RenderingRecord.options`."""
+_MANIFEST_HEADERS: Final = {"Content-Type": "application/json", "Cache-Control": "no-cache"}
+
+
+def check_tiles_url(url: str) -> str:
+    """Returns a base URL for tiles that can be stored. Raises BadRequest for credentials in it or an unknown scheme, StoreError when the store does
+    not answer."""
+    checked = check_store_url(url)
+    ObjectStore.open(checked).exists(FILE_NAME)
+    return checked
+
+
+def tiles_url(record: RenderingRecord) -> str | None:
+    """Returns the URL of a rendering's stores and manifest; None if they are files in the workspace."""
+    return join_url(record.options[TILES], record.name) if TILES in record.options else None
 
 
 def track_url(workspace: Workspace, record: RenderingRecord, track: str) -> str:
     """Returns the URL or path of a track's tile store."""
-    return str(workspace.store_path(record.name, track))
+    base = tiles_url(record)
+    return str(workspace.store_path(record.name, track)) if base is None else join_url(base, track)
 
 
 def open_track(workspace: Workspace, record: RenderingRecord, track: str, *, read_only: bool = True) -> TileStore:
@@ -45,3 +68,34 @@ def remove_tracks(workspace: Workspace, record: RenderingRecord) -> None:
     if folder.is_dir():
         for path in folder.glob("*.sqlite*"):
             path.unlink()
+    base = tiles_url(record)
+    if base is not None:
+        store = ObjectStore.open(base)
+        for name, _ in store.list():
+            if name != FILE_NAME:
+                store.delete(name)
+
+
+def remove_manifest(workspace: Workspace, record: RenderingRecord) -> None:
+    """Removes the manifest, so that no client finds the rendering."""
+    workspace.manifest_path(record.name).unlink(missing_ok=True)
+    base = tiles_url(record)
+    if base is not None:
+        ObjectStore.open(base).delete(FILE_NAME)
+
+
+def read_manifest(workspace: Workspace, record: RenderingRecord) -> bytes | None:
+    """Returns the rendering's manifest, None before it is written."""
+    base = tiles_url(record)
+    if base is not None:
+        found = ObjectStore.open(base).get(FILE_NAME)
+        return None if found is None else found[0]
+    path = workspace.manifest_path(record.name)
+    return path.read_bytes() if path.is_file() else None
+
+
+def share_manifest(record: RenderingRecord, data: bytes) -> None:
+    """Stores the manifest beside the tiles if they are outside the workspace."""
+    base = tiles_url(record)
+    if base is not None:
+        ObjectStore.open(base).put(FILE_NAME, data, headers=_MANIFEST_HEADERS)

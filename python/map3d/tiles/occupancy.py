@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from map3d.errors import BadRequest, Corrupt
-from map3d.types import DEEPEST_LEVEL, TileId
+from map3d.tiles.naming import BLOCK_LEVELS, morton
+from map3d.types import DEEPEST_LEVEL, BlockId, TileId
 
 Numbers = NDArray[np.uint64]
 """Sorted, unique Morton numbers of one level."""
@@ -53,6 +54,15 @@ class Occupancy:
         if len(bits) != (used + 7) // 8 * 8 or bits[used:].any():
             raise Corrupt(f"occupancy has {len(bits)} bits, expected {used} and zeros up to a whole byte")
         return cls(zmax, have)
+
+    @classmethod
+    def from_blocks(cls, zmax: int, blocks: Iterable[tuple[int, int, int]]) -> Self:
+        """Creates it from (column, row, bits) of base blocks, with the bits of `block_bits`."""
+        rows = np.array([(x, y, bits) for x, y, bits in blocks], dtype=np.uint64).reshape(-1, 3)
+        down = min(BLOCK_LEVELS, zmax)
+        flags = np.unpackbits(np.ascontiguousarray(rows[:, 2]).astype("<u8").view(np.uint8), bitorder="little").reshape(-1, 64)
+        block, tile = np.nonzero(flags)
+        return cls(zmax, (morton_numbers(rows[:, 0], rows[:, 1])[block] << np.uint64(2 * down)) + tile.astype(np.uint64))
 
     @property
     def zmax(self) -> int:
@@ -98,6 +108,15 @@ class Occupancy:
 
     def __hash__(self) -> int:
         return hash((self.zmax, self._levels[-1].tobytes()))
+
+
+def block_bits(block: BlockId, zmax: int, tiles: Iterable[TileId]) -> int:
+    """Returns those of the tiles that are base tiles of the block as 64 bits: bit n is the tile with Morton number n within the block."""
+    bits, down = 0, zmax - block.z
+    for tile in tiles:
+        if tile.z == zmax:
+            bits |= 1 << morton(tile.x - (block.x << down), tile.y - (block.y << down))
+    return bits
 
 
 def morton_numbers(x: NDArray[np.integer], y: NDArray[np.integer]) -> Numbers:

@@ -16,6 +16,7 @@ from map3d.renderings.manifest_writer import current_manifest
 from map3d.renderings.plan import plan_jobs
 from map3d.renderings.remove_rendering import is_rendering_removed
 from map3d.renderings.scene_files import binary_files, check_file, check_ids, check_index
+from map3d.renderings.track_stores import read_manifest
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.occupancy import numbers_of
 from map3d.types import TileId
@@ -112,7 +113,11 @@ def _check_manifest(workspace: Workspace, catalogue: Catalogue, record: Renderin
     if not _is_complete(catalogue, record):
         return
     try:
-        found = Manifest.load(path.read_bytes(), str(path)).to_json()
+        data = read_manifest(workspace, record)
+        if data is None:
+            findings.add(f"{path}: missing; run map3d render {record.name}")
+            return
+        found = Manifest.load(data, str(path)).to_json()
     except (OSError, Map3dError) as error:
         findings.add(f"{path}: cannot read the manifest: {error}")
         return

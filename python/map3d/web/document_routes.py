@@ -15,6 +15,7 @@ from map3d.catalogue import Catalogue, Workspace
 from map3d.errors import NotFound
 from map3d.registry import Registry
 from map3d.registry.documents import dump_document
+from map3d.renderings.track_stores import read_manifest
 from map3d.tiles.manifest import FILE_NAME
 from map3d.types import check_name
 from map3d.web.compression import compress
@@ -37,11 +38,10 @@ _object_documents: Final = ObjectDocuments()
 @documents.get(f"/tiles/<rendering>/{FILE_NAME}")
 @documents.get(f"/view/<rendering>/{FILE_NAME}")
 def manifest(rendering: str) -> Response:
-    path = workspace().manifest_path(check_name(rendering, "rendering"))
-    try:
-        return json_response(path.read_bytes())
-    except FileNotFoundError as error:
-        raise NotFound(f"no rendering {rendering!r}, or it has no tiles yet; run: map3d render {rendering}") from error
+    data = read_manifest(workspace(), catalogue().rendering(check_name(rendering, "rendering")))
+    if data is None:
+        raise NotFound(f"rendering {rendering!r} has no tiles yet; run: map3d render {rendering}")
+    return json_response(data)
 
 
 def shard(rendering: str, shard: str) -> Response:

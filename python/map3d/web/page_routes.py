@@ -8,6 +8,7 @@ from werkzeug import Response as WerkzeugResponse
 
 from map3d.catalogue import RenderingRecord
 from map3d.errors import Map3dError
+from map3d.renderings.track_stores import read_manifest, tiles_url
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.preview import Preview, choose_preview
 from map3d.tiles.viewer_files import PAGE, viewer_folder
@@ -23,7 +24,11 @@ ICON_MAX_AGE_S = 86_400
 
 @dataclass(frozen=True)
 class ListedRendering:
-    """A rendering in the list. `state`: complete, incomplete, empty (nothing rendered yet) or unreadable. `changed`: time of the last manifest."""
+    """A rendering in the list. `state`: complete, incomplete, empty (nothing rendered yet) or unreadable.
+
+    `changed`: time of the last manifest that this host wrote.
+    `size` is unknown for tiles outside the workspace.
+    """
 
     name: str
     title: str
@@ -40,7 +45,7 @@ class ListedRendering:
 def home() -> WerkzeugResponse:
     """Redirects to the map if the workspace has exactly one rendering with tiles; otherwise lists the renderings."""
     records = catalogue().renderings()
-    if len(records) == 1 and workspace().manifest_path(records[0].name).is_file():
+    if len(records) == 1 and read_manifest(workspace(), records[0]) is not None:
         return _without_cache(redirect(f"/view/{records[0].name}/"))
     return renderings()
 
@@ -85,11 +90,12 @@ def _describe(record: RenderingRecord) -> ListedRendering:
     name, title, attribution = record.name, record.title or record.name, record.attribution
     path = workspace().manifest_path(name)
     try:
-        manifest = Manifest.load(path.read_bytes(), str(path))
-        changed = datetime.fromtimestamp(path.stat().st_mtime, UTC)
-        size = _size_text(sum(file.stat().st_size for file in path.parent.iterdir() if file.is_file()))
-    except FileNotFoundError:
-        return ListedRendering(name, title, attribution, "empty")
+        data = read_manifest(workspace(), record)
+        if data is None:
+            return ListedRendering(name, title, attribution, "empty")
+        manifest = Manifest.load(data, str(path))
+        changed = datetime.fromtimestamp(path.stat().st_mtime, UTC) if path.is_file() else None
+        size = _size_text(sum(file.stat().st_size for file in path.parent.iterdir() if file.is_file())) if tiles_url(record) is None else ""
     except (Map3dError, OSError) as error:
         status_of(error if isinstance(error, Map3dError) else Map3dError(f"rendering {name}: {error}"))
         return ListedRendering(name, title, attribution, "unreadable")
