@@ -10,6 +10,7 @@ from map3d.errors import Map3dError
 from map3d.renderings.build import open_scene
 from map3d.renderings.manifest_writer import Planned, write_manifest
 from map3d.renderings.plan import PlannedScene, planned_occupancy
+from map3d.renderings.track_stores import read_manifest
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.naming import block_levels
 from map3d.tiles.occupancy import Numbers, Occupancy, numbers_of
@@ -34,8 +35,8 @@ class Extent:
         """Returns the extent that the run announced that planned the rendering. Takes it from the scene when that run was killed before it wrote the
         manifest."""
         try:
-            path = workspace.manifest_path(record.name)
-            manifest = Manifest.load(path.read_bytes(), str(path))
+            data = read_manifest(workspace, record)
+            manifest = None if data is None else Manifest.load(data, str(workspace.manifest_path(record.name)))
         except (OSError, Map3dError):
             manifest = None
         if manifest is None or manifest.content_version != record.content_version:

@@ -76,14 +76,6 @@ def remove_tracks(workspace: Workspace, record: RenderingRecord) -> None:
                 store.delete(name)
 
 
-def remove_manifest(workspace: Workspace, record: RenderingRecord) -> None:
-    """Removes the manifest, so that no client finds the rendering."""
-    workspace.manifest_path(record.name).unlink(missing_ok=True)
-    base = tiles_url(record)
-    if base is not None:
-        ObjectStore.open(base).delete(FILE_NAME)
-
-
 def read_manifest(workspace: Workspace, record: RenderingRecord) -> bytes | None:
     """Returns the rendering's manifest, None before it is written."""
     base = tiles_url(record)
