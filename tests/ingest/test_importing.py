@@ -14,6 +14,7 @@ from map3d.ingest.importing import Imported, import_file
 from map3d.ingest.sources import find_sources
 from map3d.registry import Registry
 from map3d.renderings.scene_files import check_file
+from tests.ingest.terrain.rasters import hills, write
 
 pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
 
@@ -158,6 +159,22 @@ def test_a_local_scene_refuses_georeferenced_files(workspace: Workspace, catalog
     add(workspace, catalogue, tmp_path / "a.obj", BOX_OBJ)
     with pytest.raises(CrsError, match="another scene"):
         add(workspace, catalogue, tmp_path / "b.gml", gml(("B1", UTM_RING, UTM)))
+
+
+def test_a_raster_takes_the_stated_crs(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
+    source = find_sources([write(tmp_path / "dem.tif", hills(4, 4), crs=None)])[0]
+    report = import_file(workspace, catalogue, "town", source, ImportOptions(crs="EPSG:25832")).report
+    crs = catalogue.scene("town").crs
+    assert crs is not None
+    assert (crs.epsg, report["placing"]["from"], report["warnings"]) == (25832, "ETRS89 / UTM zone 32N", [])
+
+
+def test_a_local_scene_refuses_a_raster_with_a_stated_crs(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
+    add(workspace, catalogue, tmp_path / "a.obj", BOX_OBJ)
+    source = find_sources([write(tmp_path / "dem.tif", hills(4, 4))])[0]
+    with pytest.raises(CrsError, match="local metres"):
+        import_file(workspace, catalogue, "town", source, ImportOptions(crs="EPSG:25832"))
+    import_file(workspace, catalogue, "town", source, ImportOptions(crs="local"))
 
 
 def test_files_far_from_the_scene_are_refused(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:

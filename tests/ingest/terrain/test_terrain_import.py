@@ -27,9 +27,9 @@ def folder(tmp_path):
     return tmp_path / "asset"
 
 
-def run(dem, ortho, folder, crs=UTM, **options):
+def run(dem, ortho, folder, scene_crs=UTM, **options):
     writer = RecordingWriter()
-    report = import_terrain(dem, ortho, folder, crs, TerrainOptions(**options), writer=writer)
+    report = import_terrain(dem, ortho, folder, scene_crs, TerrainOptions(**options), writer=writer)
     assert writer.finished
     assert json.loads((folder / "report.json").read_text()) == report
     return writer, report
@@ -325,14 +325,28 @@ def test_a_raster_without_crs_is_assumed_in_the_scenes_with_a_warning(tmp_path, 
     assert report["crs"] is None
 
 
+@pytest.mark.parametrize("own", [None, "EPSG:25833"])
+def test_the_stated_crs_replaces_that_of_both_rasters(tmp_path, folder, own):
+    def rasters(name, crs):
+        (tmp_path / name).mkdir()
+        return write(tmp_path / name / "dem.tif", hills(4, 4), crs=crs), write(tmp_path / name / "ortho.tif", colours(8, 8), 0.5, crs=crs)
+
+    expected, _ = run(*rasters("right", "EPSG:25832"), folder, CRS.from_epsg(25831))
+    got, report = run(*rasters("wrong", own), tmp_path / "stated", CRS.from_epsg(25831), crs="EPSG:25832")
+    assert np.array_equal(got.soup(), expected.soup())
+    assert np.abs(got.soup()[..., 0] - WEST).min() > 100_000, "the coordinates are transformed"
+    assert report["warnings"] == []
+    assert CRS.from_wkt(report["crs"]).to_epsg() == 25832
+
+
 def test_a_local_scene_refuses_degrees(tmp_path, folder):
     dem = write(tmp_path / "dem.tif", hills(4, 4), crs="EPSG:4326", transform=from_bounds(11, 48, 12, 49, 4, 4))
     with pytest.raises(CrsError, match="--crs"):
-        run(dem, None, folder, crs=None)
+        run(dem, None, folder, scene_crs=None)
 
 
 def test_a_local_scene_accepts_metres(tmp_path, folder):
-    writer, _ = run(write(tmp_path / "dem.tif", hills(4, 4)), None, folder, crs=None)
+    writer, _ = run(write(tmp_path / "dem.tif", hills(4, 4)), None, folder, scene_crs=None)
     assert writer.soup()[..., 1].max() == NORTH
 
 
@@ -430,7 +444,7 @@ REAL = {
 @pytest.mark.parametrize("place", REAL)
 def test_real_rasters(folder, place):
     dem, ortho, epsg = REAL[place]
-    writer, report = run(dem and Path(DATA, dem), Path(DATA, ortho), folder, crs=CRS.from_epsg(epsg), max_error_m=0.2)
+    writer, report = run(dem and Path(DATA, dem), Path(DATA, ortho), folder, scene_crs=CRS.from_epsg(epsg), max_error_m=0.2)
     assert report["triangles"] > 0
     assert up_triangles(writer).all()
     assert any(material["texture"] for material in writer.materials)

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from pyproj import CRS
 
-from map3d.errors import ImportFailed
+from map3d.errors import CrsError, ImportFailed
 from map3d.geometry.crs import is_local, parse_crs
 from map3d.ingest.crs_transformer import choose_scene_crs
 from map3d.ingest.scene_crs import LOCAL, to_scene_crs
@@ -30,13 +30,13 @@ def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[
     """`request`: {"paths", "folder", "name", "crs", "scene_crs", "reader"}; the response is that of map3d.ingest.parse_document."""
     rasters, faults = open_rasters([Path(path) for path in request["paths"]], strict=request["reader"]["strict"])
     dem, ortho = classify_rasters(rasters)
-    target = _choose_target(dem or ortho, request["scene_crs"])
+    target = _choose_target(dem or ortho, request["crs"], request["scene_crs"])
 
     def on_tile(_stage: str, done: int, total: int) -> bool:
         report_progress({"done": done, "total": total})
         return True
 
-    terrain = import_terrain(dem, ortho, Path(request["folder"]), target, TerrainOptions(name=request["name"]), on_tile)
+    terrain = import_terrain(dem, ortho, Path(request["folder"]), target, TerrainOptions(name=request["name"], crs=request["crs"]), on_tile)
     proposed = LOCAL if target is None else to_scene_crs(target)
     placing = {"from": terrain["crs"] and CRS.from_user_input(terrain["crs"]).name, "to": proposed.name, **terrain["projection"]}
     if faults:
@@ -71,15 +71,21 @@ def classify_rasters(paths: Sequence[Path]) -> tuple[Path | None, Path | None]:
     return found.get("elevation"), found.get("imagery")
 
 
-def _choose_target(raster: Path | None, scene_crs: str | None) -> CRS | None:
-    """Returns the scene's CRS. If it has none yet: the raster's own if projected in metres, else its UTM zone; None without any CRS."""
+def _choose_target(raster: Path | None, stated_crs: str | None, scene_crs: str | None) -> CRS | None:
+    """Returns the scene's CRS. If it has none yet: the raster's own if projected in metres, else its UTM zone; None without any CRS.
+
+    `stated_crs`: the user's choice for the raster. Raises CrsError if it is incompatible with a scene in local metres.
+    """
+    stated = None if stated_crs is None or is_local(stated_crs) else parse_crs(stated_crs)
     if scene_crs is not None:
+        if stated is not None and is_local(scene_crs):
+            raise CrsError(f"--crs {stated_crs}: the scene is in local metres; add the raster to another scene, or leave the option out")
         return None if is_local(scene_crs) else CRS.from_user_input(scene_crs)
     assert raster is not None, "a source has a path"
     with open_raster(raster) as data:
-        if data.crs is None:
+        if stated is None and (data.crs is None or stated_crs is not None):
             return None
-        own = parse_crs(data.crs.to_wkt())
+        own = parse_crs(data.crs.to_wkt()) if stated is None else stated
         left, bottom, right, top = data.bounds
     corners = np.array([(left, bottom, 0.0), (right, top, 0.0)])
     north_first = own.is_geographic and own.axis_info[0].direction == "north"

@@ -12,7 +12,7 @@ from pyproj.exceptions import CRSError as ProjError
 from rasterio.errors import NotGeoreferencedWarning, RasterioError
 
 from map3d.errors import CrsError, ImportFailed, NotFound
-from map3d.geometry.crs import horizontal_crs
+from map3d.geometry.crs import horizontal_crs, is_local, parse_crs
 
 Array = NDArray[np.float64]
 DRIVERS: Final = {
@@ -59,12 +59,19 @@ def _find_driver(path: Path) -> str:
     )
 
 
-def raster_crs(dataset: Any, scene_crs: CRS | None) -> CRS | None:
-    """Returns the raster's horizontal CRS; the scene's if the raster has none; None in a local scene. Raises CrsError."""
+def own_crs(dataset: Any, stated_crs: str | None = None) -> CRS | None:
+    """Returns the CRS that the user states, else the file's; None for "local" and for a file without one. Raises CrsError."""
+    if stated_crs is not None:
+        return None if is_local(stated_crs) else parse_crs(stated_crs)
     try:
-        own = None if dataset.crs is None else CRS.from_user_input(dataset.crs)
+        return None if dataset.crs is None else CRS.from_user_input(dataset.crs)
     except ProjError as error:
         raise CrsError(f"{dataset.name}: unknown CRS: {error}") from error
+
+
+def raster_crs(dataset: Any, scene_crs: CRS | None, stated_crs: str | None = None) -> CRS | None:
+    """Returns the raster's horizontal CRS; the scene's if the raster has none; None in a local scene. Raises CrsError."""
+    own = own_crs(dataset, stated_crs)
     if scene_crs is None and own is not None and own.is_geographic:
         raise CrsError(
             f"{dataset.name}: the raster is in degrees ({own.name}), but the scene is in local metres; give the scene a projected CRS (--crs)"

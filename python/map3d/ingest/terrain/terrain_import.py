@@ -20,7 +20,7 @@ from map3d.errors import BadRequest, LimitExceeded, Stopped
 from map3d.geometry.crs import vertical_unit_m
 from map3d.ingest.terrain.grid_triangulation import Triangles, compact_vertices, orient_up, triangulate_all, triangulate_sparse
 from map3d.ingest.terrain.orthophoto import ALIGN_PX, MARGIN_PX, Orthophoto, TextureTile
-from map3d.ingest.terrain.raster_georeference import PlaneTransformer, RasterGeoreference, open_raster, raster_crs
+from map3d.ingest.terrain.raster_georeference import PlaneTransformer, RasterGeoreference, open_raster, own_crs, raster_crs
 from map3d.ingest.terrain.vertex_grid import (
     ConstantHeightField,
     GridTile,
@@ -59,7 +59,8 @@ class MeshWriter(Protocol):
 class TerrainOptions:
     """`max_error_m`: greatest height error of the triangles, 0 keeps every height. `height_m`: height of flat terrain without an elevation model.
     `height_unit_m`: metres per unit of the elevation model; None takes the unit from the file, else metres. `stretch`: photo values for black and
-    white; None derives them from the data. `ground`: sRGB colour where there is no photo."""
+    white; None derives them from the data. `ground`: sRGB colour where there is no photo. `crs`: overrides the CRS of both rasters, or supplies a
+    missing one; "local" for plain metres."""
 
     name: str = "terrain"
     max_error_m: float = 0.0
@@ -69,6 +70,7 @@ class TerrainOptions:
     height_unit_m: float | None = None
     ground: tuple[int, int, int] = (146, 146, 136)
     stretch: tuple[float, float] | None = None
+    crs: str | None = None
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.max_error_m) and self.max_error_m >= 0):
@@ -133,13 +135,13 @@ class _TerrainBuilder:
         self._base = ortho if dem is None else dem
         self._flat = dem is None
         self._warnings: list[dict[str, Any]] = []
-        crs = raster_crs(self._base, scene_crs)
+        crs = raster_crs(self._base, scene_crs, options.crs)
         self._georeference = RasterGeoreference(self._base, crs)
         self._scene_from_base = PlaneTransformer(crs, scene_crs)
         self._photo: Orthophoto | None = None
         if ortho is not None:
             self._photo = Orthophoto(ortho, options.ground, options.texture_px, options.stretch)
-            photo_crs = raster_crs(ortho, scene_crs)
+            photo_crs = raster_crs(ortho, scene_crs, options.crs)
             self._photo_georeference = RasterGeoreference(ortho, photo_crs)
             self._photo_from_base = PlaneTransformer(crs, photo_crs)
         self._height_field: HeightField = ConstantHeightField(options.height_m) if self._flat else RasterHeightField(dem, self._height_unit_m(dem))
@@ -168,7 +170,7 @@ class _TerrainBuilder:
             "format": CLASS,
             "skipped": {**counts.get("skipped", {}), **({"no_height": content.gaps} if content.gaps else {})},
             "warnings": warnings,
-            "crs": self._base.crs.to_wkt() if self._base.crs else None,
+            "crs": self._crs_wkt(),
             "projection": {"operation": self._scene_from_base.description, "heights": "unchanged"},
         }
 
@@ -275,7 +277,8 @@ class _TerrainBuilder:
             return self._options.height_unit_m
         unit = (dem.units[0] or "").strip().lower()
         if not unit:
-            return vertical_unit_m(CRS.from_user_input(dem.crs)) if dem.crs else 1.0
+            crs = own_crs(dem, self._options.crs)
+            return 1.0 if crs is None else vertical_unit_m(crs)
         if unit in UNITS_M:
             return UNITS_M[unit]
         if unit in US_UNITS_M:
@@ -283,9 +286,17 @@ class _TerrainBuilder:
         self._warnings.append({"reason": "unknown height unit, assumed metres", "count": 1, "example": unit})
         return 1.0
 
+    def _crs_wkt(self) -> str | None:
+        if self._options.crs is None:
+            return self._base.crs.to_wkt() if self._base.crs else None
+        stated = own_crs(self._base, self._options.crs)
+        return None if stated is None else stated.to_wkt()
+
     def _warn_about_missing_crs(self, dem: Any, ortho: Any, scene_crs: CRS | None) -> None:
+        if scene_crs is None or self._options.crs is not None:
+            return
         for dataset in (dem, ortho):
-            if dataset is not None and dataset.crs is None and scene_crs is not None:
+            if dataset is not None and dataset.crs is None:
                 self._warnings.append({"reason": "raster without CRS, assumed the scene's", "count": 1, "example": Path(dataset.name).name})
 
 
