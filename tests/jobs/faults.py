@@ -1,7 +1,8 @@
 """A subprocess for tests: makes blocks of pseudo-random bytes that depend only on block and layer kind, and fails on request.
 
 The folder MAP3D_TEST_FAULTS selects the faults: a file `<z>-<x>-<y>` contains the kind of fault of that block, a file `slow` the seconds that each
-block takes, a file `no-start` makes the start fail, and the bytes of all blocks depend on the file `salt`.
+block takes, a file `no-start` makes the start fail, a file `log` collects the process id of each request, and the bytes of all
+blocks depend on the file `salt`.
 """
 
 import contextlib
@@ -31,6 +32,9 @@ def open_faulty(setup: Mapping[str, Any]) -> Handler:
         fault = folder / f"{z}-{x}-{y}"
         if fault.exists():
             fail(fault.read_text())
+        if (folder / "log").exists():
+            with (folder / "log").open("a") as log:
+                log.write(f"{os.getpid()}\n")
         slow = folder / "slow"
         if slow.exists():
             time.sleep(float(slow.read_text()))

@@ -1,19 +1,22 @@
 """map3d render."""
 
-from dataclasses import asdict
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
 import click
 from rich.progress import MofNCompleteColumn
 
-from map3d.catalogue import Workspace
+from map3d.catalogue import Catalogue, Workspace
 from map3d.cli.building import build_with_progress
 from map3d.cli.options import json_option, max_memory_option, workers_option, workspace_option
 from map3d.cli.output import plural, print_json, size_text
 from map3d.cli.render_stats import print_summary, summary
 
 if TYPE_CHECKING:
+    from map3d.jobs.dask_pool import DaskPools
     from map3d.jobs.run import Run, RunResult
+    from map3d.jobs.run_settings import RunSettings
 
 
 @click.command("render")
@@ -21,13 +24,27 @@ if TYPE_CHECKING:
 @workers_option
 @max_memory_option
 @click.option("--stats", "with_stats", is_flag=True, help="Print the time spent in each stage and the hit rates of the caches.")
+@click.option("--dask", metavar="ADDRESS", help="Render on the Dask cluster with this scheduler, e.g. tcp://10.0.0.1:8786, instead of here.")
+@click.option("--dask-workspace", metavar="FOLDER", help="Workspace folder on the Dask workers.  [default: the same path as here]")
 @json_option
 @workspace_option
-def command(workspace: Workspace, rendering: str, workers: int, max_memory: int | None, with_stats: bool, as_json: bool) -> None:
+def command(
+    workspace: Workspace,
+    rendering: str,
+    workers: int,
+    max_memory: int | None,
+    with_stats: bool,
+    dask: str | None,
+    dask_workspace: str | None,
+    as_json: bool,
+) -> None:
     """Render the missing and changed tiles of RENDERING.
 
     You can stop it at any time, even with kill; re-run it to resume. Ctrl-C finishes the current blocks first; a second Ctrl-C releases them
-    and stops at once.
+    and stops at once. map3d work helps from other processes and nodes.
+
+    With --dask, the scene is built and the blocks are planned here; every thread of the Dask workers renders with a subprocess of its own. The
+    cluster decides how many there are; --workers and --max-memory apply to the build, and --max-memory to each Dask worker's thread.
     """
     from map3d.jobs.run import Run
     from map3d.jobs.run_settings import RunSettings
@@ -37,7 +54,8 @@ def command(workspace: Workspace, rendering: str, workers: int, max_memory: int 
         settings = RunSettings(workers, max_memory)
         scene = catalogue.rendering(rendering).scene
         built = build_with_progress(workspace, catalogue, scene, threads=workers, max_memory_bytes=max_memory)
-        result = render_with_progress(Run(workspace, catalogue, rendering, settings))
+        with _dask_pools(workspace, catalogue, settings, dask, dask_workspace) as pools:
+            result = render_with_progress(Run(workspace, catalogue, rendering, settings, pools))
     finally:
         catalogue.close()
     if as_json:
@@ -48,6 +66,17 @@ def command(workspace: Workspace, rendering: str, workers: int, max_memory: int 
             print_summary(summary(result.stats))
     if not result.complete:
         raise click.exceptions.Exit(130 if result.stopped else 1)
+
+
+def _dask_pools(
+    workspace: Workspace, catalogue: Catalogue, settings: "RunSettings", address: str | None, folder: str | None
+) -> "AbstractContextManager[DaskPools | None]":
+    """Returns a context without value when there is no `address`."""
+    if address is None:
+        return nullcontext()
+    from map3d.jobs.dask_pool import DaskPools
+
+    return DaskPools(address, catalogue, replace(settings, workers=1), folder or str(workspace.root.absolute()), None)
 
 
 def render_with_progress(run: "Run") -> "RunResult":
