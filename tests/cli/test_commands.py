@@ -29,6 +29,12 @@ def test_help_lists_the_verbs_in_the_order_of_use(run: Run) -> None:
         assert places == sorted(places)
 
 
+def test_help_lists_whole_sentences(run: Run) -> None:
+    commands = run("--help")[1].split("\nCommands:\n")[1]
+    assert "..." not in commands
+    assert "Import FILES into SCENE: CityGML, OBJ, and GeoTIFF rasters of elevation and imagery." in " ".join(commands.split())
+
+
 def test_version(run: Run) -> None:
     assert run("--version")[1].strip() == f"map3d, version {__version__}"
 
@@ -36,7 +42,8 @@ def test_version(run: Run) -> None:
 @pytest.mark.parametrize(
     ("arguments", "status", "says"),
     [
-        (("rendre",), 2, "No such command"),
+        (("rendre",), 2, "No such command 'rendre'. Did you mean render? See map3d --help."),
+        (("publicise-everything",), 2, "No such command 'publicise-everything'. See map3d --help."),
         (("render",), 2, "map3d render --help"),
         (("render", "x", "--workers", "0"), 2, "--workers"),
         (("render", "x"), 2, "create-scene"),

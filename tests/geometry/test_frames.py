@@ -76,8 +76,11 @@ def test_the_square_is_the_smallest_of_its_kind():
 
 def test_content_outside_names_regrid():
     frame = pin(BOX, 256, 0.2, [ViewAngles(0, 45)])[0]
-    with pytest.raises(OutsideFrame, match="--regrid"):
+    with pytest.raises(OutsideFrame, match=r"content leaves the pinned square.*--regrid"):
         frame.check_holds(((-120.0, -80.0, 0.0), (130.0, 9000.0, 22.5)))
+    plan = pin(BOX, 256, 0.2, [ViewAngles(0, 90)])[0]
+    with pytest.raises(OutsideFrame, match=r"content has depths that cannot be stored.*--regrid"):
+        plan.check_holds(((-120.0, -80.0, 0.0), (130.0, 90.0, 9000.0)))
     with pytest.raises(OutsideFrame, match="pinned square"):
         frame.pixel_from_uv(0, frame.u0_m - 1, frame.v0_m - 1)
 

@@ -4,6 +4,7 @@ import importlib
 import os
 import sys
 import traceback
+from difflib import get_close_matches
 from typing import Any, Final
 
 import click
@@ -34,6 +35,7 @@ COMMANDS: Final = {
     "make-town": "make_town",
     "teatime": "teatime",
 }
+_LONGEST_SENTENCE: Final = 200
 
 
 class Commands(click.Group):
@@ -47,6 +49,20 @@ class Commands(click.Group):
             return None
         command: click.Command = importlib.import_module(f"map3d.cli.{COMMANDS[cmd_name]}").command
         return command
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
+        try:
+            return super().resolve_command(ctx, args)
+        except click.UsageError as error:
+            if near := get_close_matches(args[0], COMMANDS, 1):
+                raise click.UsageError(f"{error.message} Did you mean {near[0]}?", ctx) from error
+            raise
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Lists each command with its whole first sentence, which click would cut off at the end of the line."""
+        commands = ((name, self.get_command(ctx, name)) for name in COMMANDS)
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, command.get_short_help_str(_LONGEST_SENTENCE)) for name, command in commands if command is not None])
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
@@ -101,7 +117,9 @@ def run(arguments: list[str]) -> int:
 def _usage_line(error: click.ClickException) -> str:
     """Returns the error as one line that names the command's help."""
     message, context = error.format_message(), error.ctx if isinstance(error, click.UsageError) else None
-    return f"{message.rstrip('.')}. See {context.command_path} --help." if context else message
+    if context is None:
+        return message
+    return f"{message}{'' if message.endswith(('.', '?')) else '.'} See {context.command_path} --help."
 
 
 def _line(error: BaseException) -> str:

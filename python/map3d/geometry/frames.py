@@ -106,8 +106,10 @@ class PinnedFrame:
         uvd = uvd_from_local(self.axes, corners(box))
         low, high = uvd.min(axis=0), uvd.max(axis=0)
         inside = low[0] >= self.u0_m and high[0] <= self.u0_m + self.size_m and low[1] >= self.v0_m - self.size_m and high[1] <= self.v0_m
-        if not (inside and self._holds_depths(uvd)):
-            raise self._outside(box, "leaves the pinned square")
+        if not inside:
+            raise self._outside(box, "content leaves the pinned square")
+        if not self._holds_depths(uvd):
+            raise self._outside(box, "content has depths that cannot be stored")
 
     def check_window(self, box: Box) -> None:
         """As `check_holds`, for the part of the box inside the square only. Raises BadRequest when no part is."""
@@ -115,7 +117,7 @@ class PinnedFrame:
         if not len(uvd):
             raise BadRequest(f"view {self.id}: the window of {self.size_m:g} m does not meet the scene, whose local box is {box[0]} to {box[1]}")
         if not self._holds_depths(uvd):
-            raise self._outside(box, "has depths inside the window that cannot be stored")
+            raise self._outside(box, "content inside the window has depths that cannot be stored")
 
     def clipped(self, box: Box) -> NDArray[np.float64]:
         """Returns (n, 3) UVD corners of the part of a box that projects into the square; none when nothing does."""
@@ -135,7 +137,7 @@ class PinnedFrame:
 
     def _outside(self, box: Box, what: str) -> OutsideFrame:
         return OutsideFrame(
-            f"view {self.id}: content in the local box {box[0]} to {box[1]} {what} of side {self.size_m:g} m; "
+            f"view {self.id}: {what}; the scene's local box is {box[0]} to {box[1]}, the side of the square {self.size_m:g} m; "
             "run map3d create-rendering with --regrid to pin new frames and render everything again"
         )
 
