@@ -69,7 +69,7 @@ def test_second_layer_of_the_same_kind_has_another_name_and_pass(town: Run) -> N
         (("--layers", "sun"), "--time 2026"),
         (("--layers", "sun", "--time", "2026-06-21T15:00", *PLACE), "missing time zone"),
         (("--layers", "sun", "--time", "yesterday"), "not a date and time"),
-        (("--layers", "sun", *TIME), "has local coordinates"),
+        (("--layers", "sun", *TIME), "is in local metres"),
         (("--layers", "sun", "--time", "2026-12-21T02:00+01:00", *PLACE), "below the horizon"),
         (("--layers", "sun", *TIME, "--place", "48.76"), "not LATITUDE,LONGITUDE"),
         (("--layers", "sun", "--sun", "high"), "not AZIMUTH,ELEVATION"),

@@ -18,7 +18,7 @@ from map3d.cli.progress import progress_bar
 @click.option("--buildings", type=click.IntRange(1), default=300, show_default=True, help="Number of buildings.")
 @click.option("--seed", type=int, default=1, show_default=True, help="Seed of the random generator; the same seed gives the same bytes.")
 @click.option("--files", type=click.IntRange(1), default=1, show_default=True, help="Number of CityGML files.")
-@click.option("--texture-px", type=int, help="Side of a texture atlas.  [default: 1024; 512 below 100 buildings]")
+@click.option("--texture-px", type=int, help="Side of a texture atlas in pixels.  [default: 1024; 512 below 100 buildings]")
 @click.option("--textures", type=click.IntRange(1), help="Number of texture atlases.  [default: one per two buildings]")
 @click.option("--ortho-px", type=click.IntRange(1), help="Minimum side of the orthophoto in pixels.  [default: depends on the size of the town]")
 @click.option("--formats", default="citygml", show_default=True, help="citygml, obj, or citygml,obj.")

@@ -19,7 +19,7 @@ RADIUS_M: Final = 20.0
 @dataclass(frozen=True)
 class LightRequest:
     """`time` (with time zone) or `sun` (angles): for the layers sun and picture. `day`: for the layer sun16. `radius_m`: of ambient occlusion, None
-    selects the default. `place`: the position of a scene in local coordinates, whose y axis points north."""
+    selects the default. `place`: the position of a scene in local metres, whose y axis points north."""
 
     time: datetime | None = None
     sun: SunAngles | None = None
@@ -78,7 +78,9 @@ class LightRequest:
             assert scene.crs is not None, "not local"
             raise BadRequest(f"--place: scene {scene.name} is already located by its coordinate system {scene.crs.name}; leave --place out")
         if needed and local and self.place is None:
-            raise BadRequest(f"scene {scene.name} has local coordinates: give its --place LATITUDE,LONGITUDE, or the sun as --sun AZIMUTH,ELEVATION")
+            raise BadRequest(
+                f"scene {scene.name} is in local metres: give its position as --place LATITUDE,LONGITUDE, or the sun as --sun AZIMUTH,ELEVATION"
+            )
 
 
 class SceneLocation:

@@ -11,6 +11,6 @@ export function parseColor(text: string): Rgb {
     return [0, 2, 4].map((at) => parseInt(long.slice(at, at + 2), 16) / 255) as unknown as Rgb;
   }
   const numbers = /^rgb\(\s*(\d+)[\s,]+(\d+)[\s,]+(\d+)\s*\)$/i.exec(text.trim());
-  if (!numbers) throw new UsageError(`invalid color "${text}"; use #rrggbb or rgb(r g b)`);
+  if (!numbers) throw new UsageError(`invalid colour "${text}"; use #rrggbb or rgb(r g b)`);
   return numbers.slice(1, 4).map((part) => Math.min(Number(part), 255) / 255) as unknown as Rgb;
 }
