@@ -11,7 +11,7 @@ CACHE := .cache
 RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
 VIEWER := $(shell find viewer/src viewer/page viewer/scripts -type f 2>/dev/null) $(wildcard viewer/*.json viewer/*.ts viewer/*.js viewer/*.mjs)
 
-.PHONY: help demo test test-all test-rust test-python test-viewer test-wheel test-browser browser-suite wheel check check-words check-rust check-python check-viewer bench bench-extent bench-cycles bench-rotterdam bench-viewer peers faults bless docs reference build clean tools
+.PHONY: help demo test test-all test-rust test-python mongo-server test-viewer test-wheel test-browser browser-suite wheel check check-words check-rust check-python check-viewer bench bench-extent bench-cycles bench-rotterdam bench-viewer peers faults bless docs reference build clean tools
 
 help: ## list the targets
 	@echo "map3d: 3D city models as oblique image tiles"; echo
@@ -70,8 +70,15 @@ test: test-rust test-python test-viewer test-wheel test-browser ## run all tests
 test-rust:
 	cargo test --workspace --locked --exclude map3d-py --lib --tests -q
 
-test-python: build
+test-python: build mongo-server
 	$(BIN)/python -m pytest -q -m "not browser and not slow and not wheel"
+
+MONGO := tests/catalogue/mongo_server
+mongo-server: | $(CACHE) # fetch and compile the server of the MongoDB tests, which are skipped without it
+	@test $(CACHE)/mongo-server/MongoServerMain.class -nt $(MONGO)/MongoServerMain.java || { \
+	mvn -q -B -f $(MONGO)/pom.xml dependency:copy-dependencies -DoutputDirectory=$(CURDIR)/$(CACHE)/mongo-server/jars && \
+	javac -cp '$(CACHE)/mongo-server/jars/*' -d $(CACHE)/mongo-server $(MONGO)/MongoServerMain.java; } || \
+	echo "cannot fetch or compile the test server of MongoDB (apt install maven default-jdk-headless); its tests will be skipped" >&2
 
 test-viewer: $(CACHE)/npm
 	cd viewer && npm test --silent

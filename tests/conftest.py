@@ -3,6 +3,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.catalogue.mongo_process import MongoProcess, Unavailable, build, real_server
 from tests.object_servers import environment, new_prefix, s3_environment, s3_server
 
 
@@ -24,3 +25,18 @@ def s3_url(s3_endpoint: str) -> Iterator[str]:
 def store_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     """The URL of an empty object store of each type."""
     return str(request.getfixturevalue("s3_url")) if request.param == "s3" else (tmp_path / "objects").as_uri()
+
+
+@pytest.fixture(scope="session")
+def mongo_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The URL, without a database, of a MongoDB server that all tests share; each test uses a database of its own."""
+    if (url := real_server()) is not None:
+        yield url
+        return
+    try:
+        build()
+        process = MongoProcess(tmp_path_factory.mktemp("mongodb")).start()
+    except Unavailable as error:
+        pytest.skip(f"MongoDB is not tested: {error}")
+    yield process.url
+    process.stop()

@@ -1,28 +1,19 @@
 """Every test of the contract runs on every implementation."""
 
 from collections.abc import Callable, Iterator
-from itertools import count
 from pathlib import Path
 
 import pytest
 
-from map3d.catalogue import Catalogue, SceneRecord
-from tests.catalogue.implementations import IMPLEMENTATIONS, LEASE_S, rendering
-
-Open = Callable[[float], Catalogue]
+from map3d.catalogue import Catalogue, SceneRecord, open_catalogue
+from tests.catalogue.implementations import IMPLEMENTATIONS, LEASE_S, NewUrl, new_urls, rendering
 
 
-@pytest.fixture(params=sorted(IMPLEMENTATIONS))
-def new_database(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[[], Open]:
-    """Creates an empty database, which the returned function opens any number of times."""
-    numbers = count()
-
-    def new() -> Open:
-        folder = tmp_path / f"database-{next(numbers)}"
-        folder.mkdir()
-        return IMPLEMENTATIONS[request.param](folder)
-
-    return new
+@pytest.fixture(params=IMPLEMENTATIONS)
+def new_url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[NewUrl]:
+    """Returns the URL of another empty catalogue at each call."""
+    with new_urls(request.param, request, tmp_path) as new:
+        yield new
 
 
 @pytest.fixture
@@ -35,35 +26,40 @@ def opened() -> Iterator[list[Catalogue]]:
 
 
 @pytest.fixture
-def open_catalogue(new_database: Callable[[], Open], opened: list[Catalogue]) -> Callable[..., Catalogue]:
+def catalogue_url(new_url: NewUrl) -> str:
+    """The URL of the catalogue that the fixtures `catalogue` and `open_catalogue` open."""
+    return new_url()
+
+
+@pytest.fixture
+def open_at(catalogue_url: str, opened: list[Catalogue]) -> Callable[..., Catalogue]:
     """Opens the same catalogue any number of times, as separate processes would."""
-    database = new_database()
 
     def open_one(lease_s: float = 60.0) -> Catalogue:
-        opened.append(database(lease_s))
+        opened.append(open_catalogue(catalogue_url, lease_s=lease_s))
         return opened[-1]
 
     return open_one
 
 
 @pytest.fixture
-def catalogue(open_catalogue: Callable[..., Catalogue]) -> Catalogue:
+def catalogue(open_at: Callable[..., Catalogue]) -> Catalogue:
     """A catalogue with a scene `town` and its rendering `town-a`, which has one view and no jobs. Leases do not expire during a test."""
-    return _with_rendering(open_catalogue())
+    return _with_rendering(open_at())
 
 
 @pytest.fixture
-def brief_catalogue(open_catalogue: Callable[..., Catalogue]) -> Catalogue:
+def brief_catalogue(open_at: Callable[..., Catalogue]) -> Catalogue:
     """A catalogue like `catalogue`, whose leases expire after LEASE_S."""
-    return _with_rendering(open_catalogue(LEASE_S))
+    return _with_rendering(open_at(LEASE_S))
 
 
 @pytest.fixture
-def make_catalogue(new_database: Callable[[], Open], opened: list[Catalogue]) -> Callable[[], Catalogue]:
+def make_catalogue(new_url: NewUrl, opened: list[Catalogue]) -> Callable[[], Catalogue]:
     """Makes any number of catalogues like `catalogue`."""
 
     def make() -> Catalogue:
-        opened.append(_with_rendering(new_database()(60.0)))
+        opened.append(_with_rendering(open_catalogue(new_url())))
         return opened[-1]
 
     return make

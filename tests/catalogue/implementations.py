@@ -1,10 +1,16 @@
 """The implementations of the catalogue, and a rendering to store in them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from uuid import uuid4
 
-from map3d.catalogue import Catalogue, RenderingRecord
-from map3d.catalogue.sqlite import SqliteCatalogue
+import pytest
+from pymongo import MongoClient
+from pymongo.errors import AutoReconnect
+
+from map3d.catalogue import RenderingRecord, mongodb_connection
+from map3d.catalogue.mongodb_connection import MongoConnection
 from map3d.geometry.frames import pin
 from map3d.types import Layer, ViewAngles
 
@@ -12,11 +18,45 @@ LEASE_S = 0.5
 BOX = ((0.0, 0.0, 0.0), (100.0, 100.0, 10.0))
 
 
-def _sqlite(folder: Path) -> Callable[[float], Catalogue]:
-    return lambda lease_s: SqliteCatalogue(folder / "catalogue.sqlite", lease_s=lease_s)
+IMPLEMENTATIONS = ("mongodb", "mongodb-lost-answers", "sqlite")
+"""The second is a MongoDB whose first answer to every request is lost, so that every request is executed twice."""
+NewUrl = Callable[[], str]
 
 
-IMPLEMENTATIONS = {"sqlite": _sqlite}
+@contextmanager
+def new_urls(implementation: str, request: pytest.FixtureRequest, folder: Path) -> Iterator[NewUrl]:
+    """Gives a function that returns the URL of another empty catalogue at each call."""
+    if implementation == "sqlite":
+        yield lambda: f"sqlite://{folder / uuid4().hex}.sqlite"
+        return
+    if implementation == "mongodb-lost-answers":
+        lose_answers(request.getfixturevalue("monkeypatch"))
+    server, names = request.getfixturevalue("mongo_server"), list[str]()
+
+    def new_url() -> str:
+        names.append(f"test_{uuid4().hex[:12]}")
+        return f"{server}/{names[-1]}"
+
+    yield new_url
+    with MongoClient[dict[str, object]](server) as client:
+        for name in names:
+            client.drop_database(name)
+
+
+def lose_answers(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = MongoConnection.run
+
+    def run_twice(self: MongoConnection, action: Callable[[bool], object], retry_s: float = mongodb_connection.RETRY_S) -> object:
+        def act(repeated: bool) -> object:
+            answer = action(repeated)
+            if not repeated:
+                raise AutoReconnect("the answer was lost")
+            return answer
+
+        return run(self, act, retry_s)
+
+    monkeypatch.setattr(MongoConnection, "run", run_twice)
+    monkeypatch.setattr(mongodb_connection, "_PAUSES_S", (0.0, 0.0))
 
 
 def rendering(name: str = "town-a") -> RenderingRecord:

@@ -1,7 +1,6 @@
 """Laws of jobs: states, leases, fences (spec/catalogue.md)."""
 
 import time
-from collections.abc import Callable
 
 import pytest
 
@@ -268,7 +267,7 @@ def test_content_version_increases_after_it_was_announced(catalogue: Catalogue) 
     assert catalogue.rendering("town-a").content_version == 2
 
 
-def test_events_are_refused_in_states_that_the_table_does_not_list(open_catalogue: Callable[..., Catalogue], catalogue: Catalogue) -> None:
+def test_events_are_refused_in_states_that_the_table_does_not_list(catalogue: Catalogue) -> None:
     """Brings a job into each state and sends each event of a lease holder."""
     words = {"heartbeat": JobEvent.HEARTBEAT, "done": JobEvent.DONE, "fail": JobEvent.FAIL, "release": JobEvent.RELEASE}
     seen: dict[State, set[JobEvent]] = {}

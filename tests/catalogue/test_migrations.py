@@ -31,7 +31,21 @@ ALTER TABLE job ADD COLUMN expiries INTEGER NOT NULL DEFAULT 0;
 DROP INDEX job_next;
 CREATE INDEX job_next ON job(rendering, state, attempts + expiries, z, track, morton);
 """
-SCHEMAS = {2: VERSION_2, 3: VERSION_2 + VERSION_3}
+VERSION_4 = """
+ALTER TABLE job ADD COLUMN occupied INTEGER;
+ALTER TABLE rendering ADD COLUMN planning INTEGER NOT NULL DEFAULT 0;
+CREATE TABLE removed_rendering(name TEXT PRIMARY KEY, content_version INTEGER NOT NULL);
+CREATE INDEX job_order ON job(rendering, track, z, morton, x, y);
+CREATE TABLE job_count(rendering TEXT NOT NULL, state TEXT NOT NULL, jobs INTEGER NOT NULL, PRIMARY KEY(rendering, state)) WITHOUT ROWID;
+CREATE TRIGGER job_added AFTER INSERT ON job
+  BEGIN INSERT INTO job_count VALUES (new.rendering, new.state, 1) ON CONFLICT DO UPDATE SET jobs = jobs + 1; END;
+CREATE TRIGGER job_removed AFTER DELETE ON job
+  BEGIN UPDATE job_count SET jobs = jobs - 1 WHERE rendering = old.rendering AND state = old.state; END;
+CREATE TRIGGER job_moved AFTER UPDATE OF state ON job WHEN old.state <> new.state
+  BEGIN UPDATE job_count SET jobs = jobs - 1 WHERE rendering = old.rendering AND state = old.state;
+  INSERT INTO job_count VALUES (new.rendering, new.state, 1) ON CONFLICT DO UPDATE SET jobs = jobs + 1; END;
+"""
+SCHEMAS = {2: VERSION_2, 3: VERSION_2 + VERSION_3, 4: VERSION_2 + VERSION_3 + VERSION_4}
 JOBS = """
 INSERT INTO job(rendering, track, z, x, y, kind, morton, key, parent_z, parent_x, parent_y, state, attempts, fence) VALUES
   ('town-a', '0-45', 3, 0, 0, 'base', 0, 'k', 0, 0, 0, 'todo', 2, 1048578), ('town-a', '0-45', 3, 1, 0, 'base', 1, 'k', 0, 0, 0, 'done', 1, 1048577),

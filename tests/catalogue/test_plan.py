@@ -6,7 +6,7 @@ from contextlib import suppress
 
 import pytest
 
-from map3d.catalogue import Catalogue, PlanCounts, PlannedJob, State, sqlite_jobs
+from map3d.catalogue import Catalogue, PlanCounts, PlannedJob, State, mongodb_jobs, mongodb_plan, sqlite_jobs
 from map3d.errors import NotFound, StaleFence
 from map3d.types import BlockId
 from tests.catalogue.pyramids import RESULT, TRACKS, described, is_bottom_up, pyramid, states, stop_after, take, work_off
@@ -18,7 +18,7 @@ TOP = BlockId(0, 0, 0)
 @pytest.fixture(autouse=True)
 def _small_batches(monkeypatch: pytest.MonkeyPatch) -> None:
     """Makes every job a batch of its own, so that a plan can stop between any two."""
-    for module in (sqlite_jobs,):
+    for module in (sqlite_jobs, mongodb_plan):
         monkeypatch.setattr(module, "PLAN_BATCH", 1)
 
 
@@ -177,8 +177,8 @@ def test_plan_of_an_unknown_rendering_is_refused(catalogue: Catalogue) -> None:
 
 
 def test_jobs_are_yielded_in_order_across_pages(catalogue: Catalogue, monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (sqlite_jobs,):
-        monkeypatch.setattr(module, "PAGE", 3, raising=False)
+    for module in (sqlite_jobs, mongodb_jobs, mongodb_plan):
+        monkeypatch.setattr(module, "PAGE", 3)
     catalogue.plan("town-a", pyramid())
     catalogue.done(take(catalogue), RESULT)
     jobs = list(catalogue.jobs("town-a"))

@@ -15,12 +15,12 @@ from tests.catalogue.implementations import rendering
 UTM = SceneCrs(25832, "PROJCRS[…]", "ETRS89 / UTM zone 32N", "DHHN2016 height")
 
 
-def test_records_round_trip(catalogue: Catalogue, open_catalogue: Callable[..., Catalogue]) -> None:
+def test_records_round_trip(catalogue: Catalogue, open_at: Callable[..., Catalogue]) -> None:
     scene = SceneRecord("b", "Title", "© someone", UTM, (691000.0, 5336000.125, 0.0), {"merge_faces": False}, "abc")
     asset = AssetRecord("b", "x", "/data/x.gml", "citygml", "d", "s", {"triangles": 5})
     catalogue.create_scene(scene)
     catalogue.put_asset(asset)
-    again = open_catalogue()
+    again = open_at()
     assert again.scene("b") == scene
     assert again.assets("b") == [asset]
     assert again.rendering("town-a") == rendering()

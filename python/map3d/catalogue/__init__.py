@@ -1,6 +1,7 @@
 """The catalogue: scenes, assets, renderings and jobs (spec/catalogue.md). One contract with one or more implementations."""
 
 from map3d.catalogue.contract import HEARTBEAT_S, LEASE_S, Catalogue
+from map3d.catalogue.open_catalogue import open_catalogue
 from map3d.catalogue.records import (
     AssetRecord,
     Job,
@@ -32,4 +33,5 @@ __all__ = [
     "State",
     "Track",
     "Workspace",
+    "open_catalogue",
 ]

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, Final
 
 from map3d.catalogue.states import State
 from map3d.geometry.frames import PinnedFrame, Window
@@ -12,6 +12,8 @@ from map3d.types import BlockId, BlockKind, Box, Layer, Vec3
 
 LOCAL_CRS_NAME = "local metres"
 WINDOW = "window"
+FENCES_PER_VERSION: Final = 1 << 20
+"""New jobs start with this times the content version, so that after --regrid no job gets a fence that an earlier job of the same block had."""
 
 
 @dataclass(frozen=True)
@@ -148,6 +150,9 @@ class PlanCounts:
     added: int = 0
     changed: int = 0
     kept: int = 0
+
+    def __add__(self, other: "PlanCounts") -> "PlanCounts":
+        return PlanCounts(self.added + other.added, self.changed + other.changed, self.kept + other.kept)
 
 
 @dataclass(frozen=True)

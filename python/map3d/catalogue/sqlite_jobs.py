@@ -59,8 +59,7 @@ class SqliteJobs:
         counts, remaining = PlanCounts(), iter(jobs)
         while batch := list(islice(remaining, PLAN_BATCH)):
             with self._database.transaction() as db:
-                each = sqlite_plan.plan_batch(db, rendering, batch)
-            counts = PlanCounts(counts.added + each.added, counts.changed + each.changed, counts.kept + each.kept)
+                counts += sqlite_plan.plan_batch(db, rendering, batch)
         with self._database.transaction() as db:
             sqlite_plan.end_plan(db, rendering)
         return counts

@@ -4,14 +4,11 @@ import sqlite3
 from collections.abc import Iterable
 from typing import Any, Final
 
-from map3d.catalogue.records import PlanCounts, PlannedJob
+from map3d.catalogue.records import FENCES_PER_VERSION, PlanCounts, PlannedJob
 from map3d.catalogue.sqlite_job_table import ALL_BELOW_DONE, AT, place_of, planned_row, quoted
 from map3d.catalogue.states import OPEN, JobEvent, State, next_state, sources
 from map3d.errors import NotFound
 from map3d.types import BlockId
-
-FENCES_PER_VERSION: Final = 1 << 20
-"""New jobs start with this times the content version, so that after --regrid no job gets a fence that an earlier job of the same block had."""
 
 Above = set[tuple[str, int, int, int]]
 """Reduce jobs as (track, z, x, y)."""

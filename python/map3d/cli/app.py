@@ -13,6 +13,7 @@ from map3d import __version__
 from map3d.errors import Map3dError
 
 COMMANDS: Final = {
+    "create-workspace": "create_workspace",
     "create-scene": "create_scene",
     "add-files": "add_files",
     "create-rendering": "create_rendering",

@@ -5,6 +5,8 @@ from functools import lru_cache
 from typing import Final, NamedTuple
 
 from map3d.errors import BadRequest
+from map3d.geometry.morton import from_morton as from_morton
+from map3d.geometry.morton import morton as morton
 from map3d.types import DEEPEST_LEVEL, BlockId, BlockKind, TileId
 
 BLOCK_LEVELS: Final = 3
@@ -52,16 +54,6 @@ def ancestor(tile: TileId, z: int) -> TileId:
     if not 0 <= z <= tile.z:
         raise BadRequest(f"tile {tile.z}/{tile.x}/{tile.y} has no ancestor at level {z}; expected 0 to {tile.z}")
     return TileId(z, tile.x >> (tile.z - z), tile.y >> (tile.z - z))
-
-
-def morton(x: int, y: int) -> int:
-    """Interleaves the bits of x and y, with x in the even bits."""
-    return _spread(x) | _spread(y) << 1
-
-
-def from_morton(number: int) -> tuple[int, int]:
-    """Returns (x, y)."""
-    return _gather(number), _gather(number >> 1)
 
 
 def sort_by_morton(tiles: Iterable[TileId]) -> list[TileId]:
@@ -129,17 +121,3 @@ def _parse_number(text: str, max_digits: int) -> int | None:
     if not (0 < len(text) <= max_digits and text.isascii() and text.isdigit()) or (len(text) > 1 and text[0] == "0"):
         return None
     return int(text)
-
-
-def _spread(value: int) -> int:
-    spread = 0
-    for bit in range(value.bit_length()):
-        spread |= (value >> bit & 1) << (2 * bit)
-    return spread
-
-
-def _gather(value: int) -> int:
-    gathered = 0
-    for bit in range((value.bit_length() + 1) // 2):
-        gathered |= (value >> (2 * bit) & 1) << bit
-    return gathered
