@@ -240,6 +240,25 @@ def test_leases_of_a_killed_run_are_free_at_once_and_cost_no_attempt(town: Town,
     assert town.digest() == undisturbed
 
 
+def test_waiting_run_frees_the_leases_of_a_process_that_is_killed_meanwhile(town: Town, faults: Path) -> None:
+    (faults / "slow").write_text("60")
+    process = render_in_process(town, 1, lease_s=600)
+    deadline = time.monotonic() + 60
+    while town.count(State.LEASED) < 1:
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    (faults / "slow").unlink()
+
+    def on_event(event: RunEvent) -> None:
+        if isinstance(event, Waiting):
+            process.kill()
+            process.communicate()
+
+    town.pool(timeouts=replace(TIMEOUTS, wait_s=0.3)).run(on_event)
+    town.task.close()
+    assert all_done(town)
+
+
 def test_leases_of_a_running_process_stay(town: Town, faults: Path) -> None:
     (faults / "slow").write_text("1")
     process = render_in_process(town, 1)

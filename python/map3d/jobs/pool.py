@@ -47,6 +47,7 @@ class Pool:
         self._workers: dict[str, Worker] = {}
         self._started = 0
         self._waiting_reported = False
+        self._freed_s = 0.0
         self._counted_s = time.monotonic()
         self.scene_changed = False
         self._base_numbers: list[int] = []
@@ -75,7 +76,7 @@ class Pool:
         try:
             event = self._events.get(timeout=_POLL_S)
         except queue.Empty:
-            self._report_waiting(on_event)
+            self._wait_for_others(on_event)
             return
         self.statistics.add(event)
         if isinstance(event, Stopping):
@@ -104,14 +105,18 @@ class Pool:
             self._counted_s = now
             on_event(Remaining(count_open(self._catalogue, self._rendering)))
 
-    def _report_waiting(self, on_event: Callable[[RunEvent], None]) -> None:
-        """Reports `Waiting` once, when all workers have been idle for long enough."""
-        latest = time.monotonic() - self._timeouts.wait_s
+    def _wait_for_others(self, on_event: Callable[[RunEvent], None]) -> None:
+        """While all workers are idle: frees the leases of processes that have ended meanwhile, every `wait_s`, and reports `Waiting` once."""
+        now = time.monotonic()
         idle = [worker.idle_since for worker in self._workers.values()]
-        if self._waiting_reported or not idle or any(since is None or since > latest for since in idle):
+        if not idle or any(since is None or since > now - self._timeouts.wait_s for since in idle) or now - self._freed_s < self._timeouts.wait_s:
             return
-        self._waiting_reported = True
-        on_event(Waiting(self._catalogue.count_jobs(self._rendering)[State.LEASED]))
+        self._freed_s = now
+        if expire_dead_workers(self._catalogue, self._rendering):
+            self._job_ended.notify()
+        elif not self._waiting_reported:
+            self._waiting_reported = True
+            on_event(Waiting(self._catalogue.count_jobs(self._rendering)[State.LEASED]))
 
     def _start_worker(self) -> None:
         self._started += 1
