@@ -17,6 +17,8 @@ from tests.faults.tile_reader import TileReader
 
 DELAYS_S: Final = (0.02, 0.7)
 """Shortest and longest time between two kills. A command needs about half a second to start."""
+IMPORT_KILLS: Final = 0.25
+"""Share of the moments of an import at which a kill happens: an import is short, and most kills shall hit the render."""
 GIVE_UP_S: Final = 300.0
 """A run that takes longer has hung."""
 QUARANTINE: Final = "in quarantine"
@@ -83,8 +85,8 @@ class KillRun:
         self._retry = Command("retry", ["retry", RENDERING, *where], environment)
 
     def run(self) -> KillReport:
-        started = time.monotonic()
         reader = TileReader(self._serve, RENDERING, self._reference.all_tiles(), self._choose.randrange(1 << 30))
+        started = time.monotonic()
         self._serve.start()
         try:
             reader.start()
@@ -121,7 +123,7 @@ class KillRun:
                 return
             if status is not None and status > 0:
                 self._after_failure(command)
-            if self.report.kills.total() < self._kills and status is None:
+            if self.report.kills.total() < self._kills and status is None and (command is self._render or self._choose.random() < IMPORT_KILLS):
                 self._kill(command)
             if command.status() is not None and command.status() != 0:
                 command.start()
