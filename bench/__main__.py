@@ -1,4 +1,4 @@
-"""`python -m bench [PART …] [--json]`; parts: tiles, light, encoding, ingest, incremental (the default), extent, stored, viewer."""
+"""`python -m bench [PART …] [--json]`; parts: tiles, light, encoding, ingest, incremental (the default), extent, planning, stored, viewer."""
 
 import argparse
 import json
@@ -9,11 +9,11 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from . import encoding, extent, incremental, ingest, light_layers, stored, tiles, viewer
+from . import encoding, extent, incremental, ingest, light_layers, planning, stored, tiles, viewer
 from .benchmark_scene import CACHE
 
 PARTS = ("tiles", "light", "encoding", "ingest", "incremental")
-ON_REQUEST = ("extent", "stored", "viewer")
+ON_REQUEST = ("extent", "planning", "stored", "viewer")
 Rows = list[dict[str, Any]]
 
 
@@ -42,6 +42,7 @@ def main() -> None:
         "ingest": ingest.measure,
         "incremental": incremental.measure,
         "extent": lambda: extent.measure(tuple(options.millions), plots=Path("docs/plots")),
+        "planning": planning.measure,
         "stored": lambda: stored.measure(options.folders),
         "viewer": lambda: viewer.measure(options.quick, options.reps, options.work, tuple(options.only) if options.only else None, options.free),
     }

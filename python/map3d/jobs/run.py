@@ -1,7 +1,7 @@
 """`map3d render`: plans the jobs, has workers do them, writes the manifest."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -18,7 +18,7 @@ from map3d.jobs.stop_request import StopRequest
 from map3d.renderings.build import open_scene
 from map3d.renderings.manifest_writer import write_manifest
 from map3d.renderings.plan import PlannedScene, plan_jobs
-from map3d.renderings.track_stores import find_track
+from map3d.renderings.track_stores import find_track, tiles_url
 from map3d.tiles.occupancy import Numbers, numbers_of
 
 MAX_PLANS: Final = 10
@@ -62,12 +62,13 @@ class Run:
     def plan(self, progress: Callable[[int, int], None] | None = None, scene: PlannedScene | None = None) -> RunPlan:
         """Compares the scene with the stored blocks, opens jobs for new and changed blocks, and announces them in the manifest."""
         self.record = self._catalogue.rendering(self.record.name)
-        blocks = _planned_blocks(self._catalogue, self.record)
+        blocks = _PlannedBlocks(self._catalogue, self.record)
         with scene_lock(self._workspace, self.record.scene):
             opened = scene or open_scene(self._workspace, self.record.scene)
             planned = self._catalogue.plan(self.record.name, plan_jobs(opened, self.record, blocks, progress))
         self.record = self._catalogue.rendering(self.record.name)
-        self._prune()
+        if planned.added or tiles_url(self.record) is None:
+            self._prune()
         counts = self._catalogue.count_jobs(self.record.name)
         extent = Extent.of_scene(self._catalogue, self.record, opened, is_complete=counts[State.DONE] == sum(counts.values()))
         if extent.occupancy or planned.added or not self._workspace.manifest_path(self.record.name).is_file():
@@ -94,7 +95,7 @@ class Run:
         return RunResult(statistics, complete, self.stop.is_made, open_jobs, counts[State.QUARANTINED], self.record.content_version, stats)
 
     def _prune(self) -> None:
-        """Removes stored blocks without a job, such as those of earlier frames."""
+        """Removes stored blocks without a job, such as those of earlier frames. Lists the stores, which takes long in an object store."""
         for track in self.record.tracks:
             if (found := find_track(self._workspace, self.record, track.id, read_only=False)) is not None:
                 jobs = {job.block for job in self._catalogue.jobs(self.record.name, track.id)}
@@ -104,7 +105,19 @@ class Run:
                             store.remove_block(block.id)
 
 
-def _planned_blocks(catalogue: Catalogue, record: RenderingRecord) -> dict[str, Numbers]:
-    """Returns the base blocks with a job, by track."""
-    jobs = {track.id: catalogue.jobs(record.name, track.id) for track in record.tracks}
-    return {track: numbers_of((job.block.x, job.block.y) for job in own if job.kind == "base") for track, own in jobs.items()}
+class _PlannedBlocks(Mapping[str, Numbers]):
+    """Track → base blocks with a job. They are read when they are looked up, so that only those of one track are in memory."""
+
+    def __init__(self, catalogue: Catalogue, record: RenderingRecord) -> None:
+        self._catalogue, self._record = catalogue, record
+        self._tracks = [track.id for track in record.tracks]
+
+    def __getitem__(self, track: str) -> Numbers:
+        jobs = self._catalogue.jobs(self._record.name, track)
+        return numbers_of((job.block.x, job.block.y) for job in jobs if job.kind == "base")
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._tracks)
+
+    def __len__(self) -> int:
+        return len(self._tracks)

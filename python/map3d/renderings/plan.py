@@ -17,7 +17,7 @@ from map3d.tiles.naming import block_levels
 from map3d.tiles.occupancy import Numbers, Occupancy, xy_from_morton
 from map3d.types import BlockId, Box
 
-KEY_BATCH: Final = 1 << 17
+KEY_BATCH: Final = 1 << 16
 """Base blocks whose keys are computed together; each batch visits the chunks that it meets once."""
 
 

@@ -4,22 +4,17 @@ name is created.
 The mark states where the tiles are. The record goes before the tiles, so that whatever the catalogue lists is whole.
 """
 
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import islice
-from typing import Final
 
-from map3d.catalogue import Catalogue, RenderingRecord, Workspace
+from map3d.catalogue import Catalogue, Workspace
 from map3d.errors import NotFound
 from map3d.ingest.asset_removal import remove_folder
-from map3d.object_store import ObjectStore, file_path, join_url
+from map3d.object_store import ObjectStore, file_path
 from map3d.renderings.removal_checks import check_idle, folder_bytes, objects_bytes
 from map3d.renderings.removal_mark import read_mark, removal_mark
-
-_DELETING_THREADS: Final = 16
-_DELETED_TOGETHER: Final = 1024
-_TILES: Final = "tiles"
+from map3d.renderings.track_stores import TILES, remove_objects, tiles_url
+from map3d.tiles.manifest import FILE_NAME
 
 
 @dataclass(frozen=True)
@@ -41,10 +36,10 @@ def find_rendering(workspace: Workspace, catalogue: Catalogue, name: str) -> Ren
         mark = read_mark(workspace.rendering_folder(name))
         if mark is None:
             raise
-        scene, tiles = None, mark.get(_TILES)
+        scene, tiles = None, mark.get(TILES)
     else:
         check_idle(catalogue, name)
-        scene, tiles = record.scene, _tiles_url(record)
+        scene, tiles = record.scene, tiles_url(record)
     size = folder_bytes(workspace.rendering_folder(name)) + (0 if tiles is None else objects_bytes(tiles))
     return RenderingRemoval(name, scene, tiles, size)
 
@@ -53,7 +48,7 @@ def remove_rendering(workspace: Workspace, catalogue: Catalogue, removal: Render
     """Removes record, jobs and tiles. Raises BadRequest while the rendering is being rendered or removed; StoreError."""
     if removal.scene is not None:
         check_idle(catalogue, removal.name)
-    with removal_mark(workspace.rendering_folder(removal.name), {_TILES: removal.tiles}):
+    with removal_mark(workspace.rendering_folder(removal.name), {TILES: removal.tiles}):
         with suppress(NotFound):
             catalogue.remove_rendering(removal.name)
         _remove_tiles(workspace, removal.name, removal.tiles)
@@ -65,17 +60,12 @@ def finish_rendering_removal(workspace: Workspace, name: str) -> None:
     mark = read_mark(folder)
     if mark is not None:
         with removal_mark(folder, mark):
-            _remove_tiles(workspace, name, mark.get(_TILES))
+            _remove_tiles(workspace, name, mark.get(TILES))
 
 
 def is_rendering_removed(workspace: Workspace, name: str) -> bool:
     """Whether a removal of the rendering has begun and not finished."""
     return read_mark(workspace.rendering_folder(name)) is not None
-
-
-def _tiles_url(record: RenderingRecord) -> str | None:
-    base = record.options.get("tiles")
-    return None if base is None else join_url(base, record.name)
 
 
 def _remove_tiles(workspace: Workspace, name: str, tiles: str | None) -> None:
@@ -88,9 +78,5 @@ def _remove_tiles(workspace: Workspace, name: str, tiles: str | None) -> None:
     if tiles.startswith("file:"):
         remove_folder(file_path(tiles))
         return
-    store = ObjectStore.open(tiles)
-    store.delete(workspace.manifest_path(name).name)
-    with ThreadPoolExecutor(_DELETING_THREADS) as threads:
-        names = (place for place, _ in store.list())
-        while some := list(islice(names, _DELETED_TOGETHER)):
-            list(threads.map(store.delete, some))
+    ObjectStore.open(tiles).delete(FILE_NAME)
+    remove_objects(tiles)

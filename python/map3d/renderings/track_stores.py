@@ -1,6 +1,8 @@
 """The tile stores and the manifest of a rendering: one store per track, as SQLite files in the workspace or under the URL of `create-rendering
 --tiles`, where the manifest is, too."""
 
+from concurrent.futures import ThreadPoolExecutor
+from itertools import islice
 from typing import Final
 
 from map3d.catalogue import RenderingRecord, Track, Workspace
@@ -12,6 +14,8 @@ from map3d.tiles.tile_store import StoreShape, TileStore
 
 TILES: Final = "tiles"
 """Key of the base URL in `RenderingRecord.options`."""
+_DELETING_THREADS: Final = 16
+_DELETED_TOGETHER: Final = 1024
 _MANIFEST_HEADERS: Final = {"Content-Type": "application/json", "Cache-Control": "no-cache"}
 
 
@@ -70,10 +74,16 @@ def remove_tracks(workspace: Workspace, record: RenderingRecord) -> None:
             path.unlink()
     base = tiles_url(record)
     if base is not None:
-        store = ObjectStore.open(base)
-        for name, _ in store.list():
-            if name != FILE_NAME:
-                store.delete(name)
+        remove_objects(base, except_for=FILE_NAME)
+
+
+def remove_objects(url: str, *, except_for: str | None = None) -> None:
+    """Removes all objects below a URL, but not the one named `except_for`; many at a time, since each takes a request."""
+    store = ObjectStore.open(url)
+    names = (name for name, _ in store.list() if name != except_for)
+    with ThreadPoolExecutor(_DELETING_THREADS) as threads:
+        while some := list(islice(names, _DELETED_TOGETHER)):
+            list(threads.map(store.delete, some))
 
 
 def read_manifest(workspace: Workspace, record: RenderingRecord) -> bytes | None:
