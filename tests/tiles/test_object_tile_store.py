@@ -127,7 +127,7 @@ def test_every_changed_or_cut_byte_is_found(store: ObjectTileStore, store_url: s
         store.get_seam(BLOCK)
     assert store.get_tile(*tiles[0][:4]) == tiles[0].data
     objects.put("blocks/1/0/0.m3b", data)
-    assert any("contains block 1/1/0" in line for line in store.check())
+    assert any("contains block 1/1/0" in fault.text for fault in store.check())
 
 
 def test_a_newer_format_is_refused(store: ObjectTileStore, store_url: str) -> None:

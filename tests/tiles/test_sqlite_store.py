@@ -169,16 +169,16 @@ def test_check_finds_changed_and_lost_bytes(path, store):
     assert store.check() == []
     with sqlite3.connect(path) as db:
         db.execute("UPDATE blob SET bytes = x'00'")
-    assert store.check() == ["1 tiles whose bytes do not match their hash"]
+    assert store.check() == [("1 tiles whose bytes do not match their hash", (BlockId(0, 0, 0),))]
     with db:
         db.execute("DELETE FROM blob")
-    assert store.check() == ["1 tiles without bytes"]
+    assert store.check() == [("1 tiles without bytes", (BlockId(0, 0, 0),))]
     with pytest.raises(Corrupt, match="has no bytes"):
         store.get_tile(0, 0, 0, 0)
     with db:
         db.execute("DELETE FROM tile")
     db.close()
-    assert store.check() == ["block 0/0/0: expected 1 tiles, found 0"]
+    assert store.check() == [("block 0/0/0: expected 1 tiles, found 0", (BlockId(0, 0, 0),))]
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")

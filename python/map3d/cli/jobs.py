@@ -9,6 +9,7 @@ COMMANDS: Final = {
     "show": "jobs_show",
     "retry": "retry",
     "cancel": "jobs_cancel",
+    "repair": "jobs_repair",
     "reproduce": "jobs_reproduce",
 }
 
@@ -33,7 +34,7 @@ class JobCommands(click.Group):
 
 @click.group("jobs", cls=JobCommands, subcommand_metavar="[RENDERING] [OPTIONS] | COMMAND [ARGS]...")
 def command() -> None:
-    """Show progress, workers and failures; retry, cancel and reproduce blocks.
+    """Show progress, workers and failures; retry, cancel, repair and reproduce blocks.
 
     \b
     map3d jobs                   all renderings in one table

@@ -60,7 +60,7 @@ def command(
     finally:
         catalogue.close()
     if as_json:
-        print_json(findings)
+        print_json({"wrong": findings.wrong, "total": findings.total, "counted": findings.counted})
     else:
         click.echo(f"checked {counts_text(findings.counted)}")
         for line in findings.wrong:

@@ -17,7 +17,7 @@ from map3d.object_store import ObjectStore
 from map3d.object_store.folder import FolderStore
 from map3d.tiles.block_object import START_BYTES, BlockIndex, Span, check_object, decode_index, encode_block, index_bytes
 from map3d.tiles.naming import block_levels, block_of, morton
-from map3d.tiles.tile_store import StoredBlock, StoredTile, StoreShape, check_block, content_hash
+from map3d.tiles.tile_store import StoredBlock, StoredTile, StoreFault, StoreShape, check_block, content_hash
 from map3d.types import BlockId, Layer, TileId
 
 SHAPE_NAME: Final = "store.json"
@@ -156,9 +156,9 @@ class ObjectTileStore:
             total.update(b"%d/%d/%d " % tile + digest)
         return total.hexdigest()
 
-    def check(self) -> list[str]:
+    def check(self) -> list[StoreFault]:
         names = [name for name, _ in self._objects.list(BLOCKS)]
-        return [line for line in self._map(self._check_object, names) if line]
+        return [fault for fault in self._map(self._check_object, names) if fault is not None]
 
     def is_current(self) -> bool:
         return self._objects.entity_tag(SHAPE_NAME) == self._shape_tag
@@ -178,14 +178,17 @@ class ObjectTileStore:
         if self._read_only:
             raise BadRequest(f"{self.url}: the store is open for reading only")
 
-    def _check_object(self, name: str) -> str | None:
+    def _check_object(self, name: str) -> StoreFault | None:
         """Returns the fault of a block object, None for a sound one."""
-        found = self._objects.get(name)
+        found, block = self._objects.get(name), _parse_object_name(name)
+        blocks = () if block is None else (block,)
         try:
             index = None if found is None else check_object(found[0], name)
         except Map3dError as error:
-            return str(error)
-        return f"{name}: contains block {index.block.id}" if index is not None and _object_name(index.block.id) != name else None
+            return StoreFault(str(error), blocks)
+        if index is not None and _object_name(index.block.id) != name:
+            return StoreFault(f"{name}: contains block {index.block.id}", blocks)
+        return None
 
     def _read_span(self, block: BlockId, find: Callable[[BlockIndex], Span | None]) -> bytes | None:
         """Reads a part of a block with one request if the cached index is still right. Raises Corrupt if the bytes stay different from their hash."""

@@ -15,7 +15,7 @@ from typing import Any, Final, Self
 from map3d.database import BUSY_TIMEOUT_S, Connections, run_script
 from map3d.errors import AlreadyExists, BadRequest, Corrupt, Map3dError, NotFound, StaleFence, StoreError, UnknownVersion
 from map3d.tiles.naming import block_level, morton
-from map3d.tiles.tile_store import FORMAT_VERSION, StoredBlock, StoredTile, StoreShape, check_block, content_hash
+from map3d.tiles.tile_store import FORMAT_VERSION, StoredBlock, StoredTile, StoreFault, StoreShape, check_block, content_hash
 from map3d.types import BlockId, Layer, TileId
 
 APPLICATION_ID: Final = 0x4D334454  # "M3DT"
@@ -166,16 +166,17 @@ class SqliteTileStore:
                 total.update(b"%d/%d/%d " % (z, x, y) + digest)
         return total.hexdigest()
 
-    def check(self) -> list[str]:
+    def check(self) -> list[StoreFault]:
         with self._reading() as db:
-            wrong = [row[0] for row in db.execute("PRAGMA integrity_check") if row[0] != "ok"]
-            lost = db.execute("SELECT count(*) FROM tile WHERE hash NOT IN (SELECT hash FROM blob)").fetchone()[0]
-            bad = sum(content_hash(data) != digest for digest, data in db.execute("SELECT hash, bytes FROM blob"))
+            faults = [StoreFault(row[0]) for row in db.execute("PRAGMA integrity_check") if row[0] != "ok"]
+            lost = db.execute("SELECT block, count(*) FROM tile WHERE hash NOT IN (SELECT hash FROM blob) GROUP BY block").fetchall()
+            bad = [digest for digest, data in db.execute("SELECT hash, bytes FROM blob") if content_hash(data) != digest]
+            of_bad = {row[0] for digest in bad for row in db.execute("SELECT DISTINCT block FROM tile WHERE hash = ?", (digest,))}
             sums = "SELECT block.id, block.tiles, count(tile.block) FROM block LEFT JOIN tile ON tile.block = block.id GROUP BY block.id"
             miscounted = [row for row in db.execute(sums) if row[1] != row[2]]
-        wrong += [f"{lost} tiles without bytes"] if lost else []
-        wrong += [f"{bad} tiles whose bytes do not match their hash"] if bad else []
-        return wrong + [f"block {name}: expected {expected} tiles, found {got}" for name, expected, got in miscounted]
+        faults += [StoreFault(f"{sum(row[1] for row in lost)} tiles without bytes", _blocks(row[0] for row in lost))] if lost else []
+        faults += [StoreFault(f"{len(bad)} tiles whose bytes do not match their hash", _blocks(of_bad))] if bad else []
+        return faults + [StoreFault(f"block {name}: expected {expected} tiles, found {got}", _blocks([name])) for name, expected, got in miscounted]
 
     def is_current(self) -> bool:
         return _identity(self.path) == self._identity
@@ -271,6 +272,10 @@ def _write_empty(path: Path, shape: StoreShape) -> None:
         connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     finally:
         connection.close()
+
+
+def _blocks(names: Iterable[str]) -> tuple[BlockId, ...]:
+    return tuple(BlockId(*map(int, name.split("/"))) for name in sorted(names))
 
 
 def _block_row(db: sqlite3.Connection, block: BlockId) -> dict[str, Any] | None:

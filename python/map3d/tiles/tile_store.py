@@ -54,6 +54,13 @@ class StoredBlock:
     tiles: int
 
 
+class StoreFault(NamedTuple):
+    """A fault of a store: one line, and the blocks that have to be rendered again, as far as they are known."""
+
+    text: str
+    blocks: tuple[BlockId, ...] = ()
+
+
 class TileStore(Protocol):
     """Readers and writers may be different processes. A reader sees either all tiles of a block or none. Failures raise StoreError."""
 
@@ -96,8 +103,8 @@ class TileStore(Protocol):
     def remove_block(self, block: BlockId) -> bool:
         """Returns False if the block was not stored."""
 
-    def check(self) -> list[str]:
-        """Reads the whole store and returns its faults, one line each."""
+    def check(self) -> list[StoreFault]:
+        """Reads the whole store and returns its faults."""
 
     def is_current(self) -> bool:
         """Whether the store that was opened is still the one at its URL, and not removed or replaced."""

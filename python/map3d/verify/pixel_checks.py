@@ -32,7 +32,7 @@ def verify_pixels(
         with open_track(workspace, record, track.id) as store:
             different = _count_differences(scene, store, track, block)
         if different:
-            findings.add(f"{name} {track.id} block {block}: {different} images or seams differ from those of a new render")
+            findings.add(f"{name} {track.id} block {block}: {different} images or seams differ from those of a new render", track.id, block)
         findings.count("blocks rendered again")
         progress(f"rendering blocks of {name} again", done, len(chosen))
 

@@ -18,6 +18,7 @@ from map3d.renderings.remove_rendering import is_rendering_removed
 from map3d.renderings.scene_files import binary_files, check_file, check_ids, check_index
 from map3d.renderings.track_stores import read_manifest
 from map3d.tiles.manifest import Manifest
+from map3d.tiles.naming import block_of
 from map3d.tiles.occupancy import numbers_of
 from map3d.types import TileId
 from map3d.verify.findings import Findings
@@ -100,7 +101,8 @@ def _check_passes(record: RenderingRecord, found: Mapping[str, set[TileId] | Non
     (first, tiles), *later = found.items()
     for track, others in later:
         for tile in sorted(tiles ^ others) if tiles is not None and others is not None else ():
-            findings.add(f"{record.name} tile {tile.z}/{tile.x}/{tile.y}: exists in only one of the tracks {first} and {track}")
+            block = block_of(tile, record.zmax)
+            findings.add(f"{record.name} tile {tile.z}/{tile.x}/{tile.y}: exists in only one of the tracks {first} and {track}", track, block)
 
 
 def _is_complete(catalogue: Catalogue, record: RenderingRecord) -> bool:
