@@ -29,8 +29,11 @@ SETTINGS = RunSettings(1, timeouts=replace(TIMEOUTS, block_s=60, wait_s=60), ent
 
 
 @pytest.fixture
-def workspace(tmp_path: Path, faults: Path) -> Workspace:
-    return make_workspace(tmp_path / "workspace")
+def workspace(tmp_path: Path, faults: Path, request: pytest.FixtureRequest) -> Workspace:
+    """With an SQLite catalogue; with the parameter "mongodb", with one in MongoDB."""
+    is_mongodb = getattr(request, "param", None) == "mongodb"
+    url = f"{request.getfixturevalue('mongo_server')}/dask_{os.getpid()}_{time.monotonic_ns()}" if is_mongodb else None
+    return make_workspace(tmp_path / "workspace", url=url)
 
 
 @pytest.fixture
@@ -52,7 +55,7 @@ def cluster(workers: int) -> Iterator[Any]:
 
 @contextmanager
 def dask_pools(local: Any, workspace: Workspace, catalogue: Catalogue) -> Iterator[DaskPools]:
-    with DaskPools(local.scheduler_address, catalogue, SETTINGS, str(workspace.root), None) as pools:
+    with DaskPools(local.scheduler_address, workspace, catalogue, SETTINGS) as pools:
         yield pools
 
 
@@ -66,6 +69,7 @@ def processes(events: list[RunEvent]) -> set[int]:
     return {int(event.lease.worker.rsplit(".", 3)[1]) for event in events if isinstance(event, JobDone)}
 
 
+@pytest.mark.parametrize("workspace", ["sqlite", "mongodb"], indirect=True)
 def test_killed_dask_worker_changes_nothing(workspace: Workspace, catalogue: Catalogue, faults: Path, tmp_path: Path) -> None:
     """A worker is killed while it renders, and Dask does not run its task again."""
     expected = undisturbed(tmp_path)
@@ -176,4 +180,4 @@ def test_cluster_that_cannot_work_ends_the_run_with_the_reason(workspace: Worksp
 
 def test_missing_scheduler_is_reported(workspace: Workspace, catalogue: Catalogue) -> None:
     with pytest.raises(BadRequest, match="tcp://HOST:8786"):
-        DaskPools("nonsense://127.0.0.1", catalogue, SETTINGS, str(workspace.root), None)
+        DaskPools("nonsense://127.0.0.1", workspace, catalogue, SETTINGS)

@@ -3,10 +3,12 @@
 import dataclasses
 import os
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -14,8 +16,9 @@ import pytest
 pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
 
 from map3d.catalogue import Catalogue, SceneRecord, State, Workspace
+from map3d.errors import BadRequest
 from map3d.jobs import finish
-from map3d.jobs.events import JobDone, PlanAwaited, RenderingLeft, RunEvent
+from map3d.jobs.events import JobDone, PlanAwaited, RenderingLeft, RenderingSkipped, RunEvent
 from map3d.jobs.run import Run
 from map3d.jobs.run_settings import RunSettings
 from map3d.jobs.timeouts import Timeouts
@@ -62,8 +65,8 @@ def catalogue(workspace: Workspace) -> Iterator[Catalogue]:
     opened.close()
 
 
-def make_workspace(root: Path, *names: str) -> Workspace:
-    workspace = Workspace(root).create()
+def make_workspace(root: Path, *names: str, url: str | None = None) -> Workspace:
+    workspace = Workspace(root, url).create()
     catalogue = workspace.open_catalogue()
     catalogue.create_scene(SceneRecord("town", "A town", origin=(0.0, 0.0, 0.0)))
     workspace.scene_folder("town").mkdir(parents=True)
@@ -143,6 +146,34 @@ def test_work_writes_the_manifest_of_a_run_that_was_killed_before_it_did(workspa
     assert (result.statistics.done, result.incomplete, events) == (0, [], [])
     assert workspace.manifest_path("r").read_bytes() == complete
     assert Manifest.load(complete).complete
+
+
+def test_reduce_jobs_that_a_killed_process_left_waiting_are_done(workspace: Workspace, catalogue: Catalogue) -> None:
+    plan(workspace, catalogue)
+    work(workspace, catalogue)
+    before = stored(workspace)
+    with closing(sqlite3.connect(workspace.catalogue_path)) as db, db:
+        left = db.execute("UPDATE job SET state = 'waiting' WHERE kind = 'reduce'").rowcount
+    result, _ = work(workspace, catalogue)
+    assert (result.statistics.done, result.incomplete) == (left, [])
+    assert stored(workspace) == before
+
+
+@pytest.mark.parametrize("names", [(), ("r",)])
+def test_rendering_with_tiles_in_another_workspace_is_not_worked_on(tmp_path: Path, faults: Path, mongo_server: str, names: tuple[str, ...]) -> None:
+    url = f"{mongo_server}/work_{tmp_path.name.replace('-', '_')[-40:]}"
+    here, there = make_workspace(tmp_path / "here", url=url), Workspace(tmp_path / "there", url).create()
+    catalogue = here.open_catalogue()
+    plan(here, catalogue)
+    events: list[RunEvent] = []
+    if names:
+        with pytest.raises(BadRequest, match="--tiles"):
+            Work(there, catalogue, SETTINGS, names).run(events.append)
+    else:
+        assert Work(there, catalogue, SETTINGS).run(events.append).statistics.done == 0
+        assert [type(event) for event in events] == [RenderingSkipped]
+    assert work(here, catalogue)[0].incomplete == []
+    catalogue.close()
 
 
 def test_work_without_names_does_all_renderings(tmp_path: Path, faults: Path) -> None:

@@ -26,6 +26,11 @@ def open_catalogue(url: str, *, lease_s: float = LEASE_S) -> Catalogue:
     raise BadRequest(f"{redact_url(url)}: is not the URL of a catalogue; write mongodb://HOST[:PORT]/DATABASE or sqlite:///FILE")
 
 
+def is_networked(url: str) -> bool:
+    """Whether several machines can open this catalogue."""
+    return url.partition("://")[0] in MONGODB_SCHEMES
+
+
 def _open_mongodb(url: str, lease_s: float) -> Catalogue:
     try:
         from map3d.catalogue.mongodb import MongoCatalogue

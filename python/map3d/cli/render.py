@@ -76,7 +76,7 @@ def _dask_pools(
         return nullcontext()
     from map3d.jobs.dask_pool import DaskPools
 
-    return DaskPools(address, catalogue, replace(settings, workers=1), folder or str(workspace.root.absolute()), None)
+    return DaskPools(address, workspace, catalogue, replace(settings, workers=1), folder)
 
 
 def render_with_progress(run: "Run") -> "RunResult":

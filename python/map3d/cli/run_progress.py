@@ -80,6 +80,8 @@ def message(event: RunEvent) -> str:
         return "files changed during the render"
     if isinstance(event, events.PlanAwaited):
         return f"{event.rendering}: its scene was rebuilt; waiting until map3d render {event.rendering} plans it again"
+    if isinstance(event, events.RenderingSkipped):
+        return f"skipped: {event.reason}"
     if isinstance(event, events.Stopping):
         return "stopping: releasing current blocks" if event.at_once else "stopping after the current blocks; press Ctrl-C again to stop at once"
     if isinstance(event, events.Waiting):

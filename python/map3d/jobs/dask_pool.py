@@ -14,7 +14,9 @@ from dataclasses import dataclass
 from typing import Any, Final, Self
 
 from map3d import __version__
-from map3d.catalogue import Catalogue, RenderingRecord, State
+from map3d.catalogue import Catalogue, RenderingRecord, State, Workspace
+from map3d.catalogue.catalogue_url import has_password
+from map3d.catalogue.open_catalogue import is_networked
 from map3d.errors import BadRequest, StoreError
 from map3d.jobs import dask_task
 from map3d.jobs.dask_task import SessionSpec, TaskResult
@@ -25,6 +27,7 @@ from map3d.jobs.pool import count_open
 from map3d.jobs.run_settings import RunSettings
 from map3d.jobs.run_statistics import RunStatistics
 from map3d.jobs.stop_request import StopRequest
+from map3d.renderings.track_stores import tiles_url
 
 TASKS_PER_THREAD: Final = 4
 MORE_TASKS: Final = 16
@@ -44,11 +47,10 @@ class _TaskEnded:
 class DaskPools:
     """Implements `PoolRunner` on an existing cluster."""
 
-    def __init__(self, address: str, catalogue: Catalogue, settings: RunSettings, workspace: str, catalogue_url: str | None) -> None:
-        """`workspace`: the folder on the Dask workers; `catalogue_url`: None for the workspace's own. Raises BadRequest when there is no scheduler at
-        `address`."""
-        self._catalogue, self._settings = catalogue, settings
-        self._workspace, self._catalogue_url = workspace, catalogue_url
+    def __init__(self, address: str, workspace: Workspace, catalogue: Catalogue, settings: RunSettings, folder: str | None = None) -> None:
+        """`folder`: the workspace on the Dask workers, None for the same path as here. Raises BadRequest when there is no scheduler at `address`."""
+        self._workspace, self._catalogue, self._settings = workspace, catalogue, settings
+        self._folder = folder or str(workspace.root.absolute())
         self._run, self._plans = secrets.token_hex(8), 0
         self._client = _connect(address)
 
@@ -70,13 +72,17 @@ class DaskPools:
         self.close()
 
     def _spec(self, record: RenderingRecord) -> SessionSpec:
+        url = self._workspace.find_catalogue_url()
+        is_secret = url is not None and has_password(url)
+        is_everywhere = url is not None and is_networked(url) and tiles_url(record) is not None
         return SessionSpec(
             run=self._run,
             plan=self._plans,
             version=__version__,
-            workspace=self._workspace,
-            catalogue=self._catalogue_url,
-            boot=None if self._catalogue_url else dask_task.kernel_boot(),
+            workspace=self._folder,
+            catalogue=None if is_secret else url,
+            from_environment=is_secret,
+            boot=None if is_everywhere else dask_task.kernel_boot(),
             rendering=record.name,
             cache_bytes=self._settings.cache_bytes,
             entry=self._settings.entry,

@@ -3,6 +3,7 @@
 Nothing here imports Dask: a task is a plain function that the Dask worker calls in one of its threads.
 """
 
+import os
 import threading
 import time
 from collections.abc import Iterator, Mapping
@@ -13,6 +14,7 @@ from typing import Final
 
 from map3d import __version__
 from map3d.catalogue import Workspace
+from map3d.catalogue.workspace import CATALOGUE_VARIABLE
 from map3d.errors import BadRequest, Map3dError
 from map3d.jobs.dead_workers import expire_dead_workers, worker_name
 from map3d.jobs.events import JobOutcome
@@ -31,13 +33,15 @@ ERROR_PAUSE_S: Final = 1.0
 @dataclass(frozen=True)
 class SessionSpec:
     """What a Dask worker needs to take part in a run. `plan` counts the plans of the run: each has its own record of the rendering. `workspace`: the
-    folder on the Dask worker; credentials come from its environment. `boot`: of the only machine that can open the catalogue, None if all can."""
+    folder on the Dask worker. `catalogue`: URL without a password; None for the SQLite file in the workspace, or with `from_environment` for the URL
+    in the environment of the Dask worker. `boot`: of the only machine that has the catalogue and the tiles, None if all can open them."""
 
     run: str
     plan: int
     version: str
     workspace: str
     catalogue: str | None
+    from_environment: bool
     boot: str | None
     rendering: str
     cache_bytes: int
@@ -104,8 +108,13 @@ def _check_node(spec: SessionSpec) -> None:
         raise BadRequest(f"this Dask worker has map3d {__version__}, the run has {spec.version}; install the same version on all nodes")
     if spec.boot not in (None, kernel_boot()):
         raise BadRequest(
-            f"this Dask worker is on another machine ({ProcessIdentity.current().host}), and an SQLite catalogue serves one machine only; "
-            "use a MongoDB catalogue (MAP3D_CATALOGUE), see docs/nodes.md"
+            f"this Dask worker is on another machine ({ProcessIdentity.current().host}), and SQLite files serve one machine only; "
+            "use a MongoDB catalogue (MAP3D_CATALOGUE) and create-rendering --tiles URL, see docs/nodes.md"
+        )
+    if spec.from_environment and not os.environ.get(CATALOGUE_VARIABLE):
+        raise BadRequest(
+            f"the environment of this Dask worker on {ProcessIdentity.current().host} has no {CATALOGUE_VARIABLE}; "
+            "set it there to the catalogue's URL, since its password is not sent"
         )
 
 
@@ -117,7 +126,7 @@ class _Session:
         self.users, self.used_s = 0, time.monotonic()
         self._lock = threading.Lock()
         self._runners: dict[int, _ThreadRunner] = {}
-        workspace = Workspace(Path(spec.workspace))
+        workspace = Workspace(Path(spec.workspace), spec.catalogue)
         self._catalogue = workspace.open_catalogue(lease_s=spec.lease_s)
         try:
             expire_dead_workers(self._catalogue, spec.rendering)

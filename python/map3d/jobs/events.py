@@ -92,6 +92,14 @@ class RenderingStarted:
 
 
 @dataclass(frozen=True)
+class RenderingSkipped:
+    """`map3d work` does not work on a rendering."""
+
+    rendering: str
+    reason: str
+
+
+@dataclass(frozen=True)
 class RenderingLeft:
     """`map3d work` leaves a rendering: no jobs are left, or the user stopped it. `complete`: all jobs are done and its manifest is written."""
 
@@ -100,4 +108,4 @@ class RenderingLeft:
 
 
 JobOutcome = JobDone | JobFailed | LeaseLost | SceneChanged
-RunEvent = JobOutcome | WorkerExited | Stopping | Waiting | Planned | Remaining | PlanAwaited | RenderingStarted | RenderingLeft
+RunEvent = JobOutcome | WorkerExited | Stopping | Waiting | Planned | Remaining | PlanAwaited | RenderingStarted | RenderingSkipped | RenderingLeft

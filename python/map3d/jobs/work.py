@@ -7,16 +7,20 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
-from map3d.catalogue import Catalogue, RenderingRecord, Workspace
-from map3d.errors import NotFound
-from map3d.jobs.events import PlanAwaited, RenderingLeft, RenderingStarted, RunEvent
+from map3d.catalogue import Catalogue, RenderingRecord, State, Workspace
+from map3d.catalogue.open_catalogue import is_networked
+from map3d.errors import BadRequest, NotFound
+from map3d.jobs.events import PlanAwaited, RenderingLeft, RenderingSkipped, RenderingStarted, RunEvent
 from map3d.jobs.finish import finish
 from map3d.jobs.local_pool import LocalPools, PoolRunner
 from map3d.jobs.pool import count_open
 from map3d.jobs.run_settings import RunSettings
 from map3d.jobs.run_statistics import RunStatistics
 from map3d.jobs.stop_request import StopRequest
+from map3d.renderings.track_stores import tiles_url
 
+SWEEP_S = 60.0
+"""How often an idle process sweeps a rendering with waiting jobs."""
 MAX_FRUITLESS_RUNS = 3
 """A process without `forever` gives up a rendering after this many runs in which all its workers exited and no job was done."""
 
@@ -41,7 +45,10 @@ class _Pause:
 
 
 class Work:
-    """Does jobs of the named renderings, or of all, oldest first, until none are left, or with `forever` until the user stops it. Never plans."""
+    """Does jobs of the named renderings, or of all in the order of their names, until none are left, or with `forever` until the user stops it.
+
+    Never plans.
+    """
 
     def __init__(
         self,
@@ -59,18 +66,19 @@ class Work:
         self._pauses: dict[str, _Pause] = {}
         self._outcome: dict[str, bool] = {}
         self._given_up: set[str] = set()
+        self._swept_s: dict[str, float] = {}
         self._statistics, self._stats = RunStatistics(), Counter[str]()
         self.stop = StopRequest()
 
     def run(self, on_event: Callable[[RunEvent], None]) -> WorkResult:
-        """Raises NotFound for a name without a rendering."""
+        """Raises NotFound for a name without a rendering, BadRequest when its tiles are files of another workspace."""
         for name in self._names:
-            self._catalogue.rendering(name)
+            check_tiles_are_here(self._workspace, self._catalogue.rendering(name))
             if not self._catalogue.has_open_jobs(name):
                 self._outcome[name] = self._finish(name)
         with self.stop.on_signals():
             while not self.stop.is_made:
-                record, wait_s = self._next()
+                record, wait_s = self._next(on_event)
                 if record is not None:
                     self._work_on(record, on_event)
                 elif wait_s is None:
@@ -80,16 +88,37 @@ class Work:
         incomplete = [] if self.stop.is_made else [name for name, complete in self._outcome.items() if not complete]
         return WorkResult(self._statistics, self.stop.is_made, list(self._outcome), incomplete)
 
-    def _next(self) -> tuple[RenderingRecord | None, float | None]:
+    def _next(self, on_event: Callable[[RunEvent], None]) -> tuple[RenderingRecord | None, float | None]:
         """Returns the next rendering with open jobs; else None and how long to wait, or None and None when nothing is left."""
         now, waits = time.monotonic(), [self._timeouts.poll_s] if self._forever else []
         for record in self._renderings():
-            if record.name not in self._given_up and self._catalogue.has_open_jobs(record.name):
+            if record.name not in self._given_up and self._has_open_jobs(record.name, now):
                 until_s = self._pauses.get(record.name, _Pause()).until_s
+                if not self._has_tiles(record, on_event):
+                    continue
                 if until_s <= now:
                     return record, None
                 waits.append(until_s - now)
         return None, min(waits, default=None)
+
+    def _has_open_jobs(self, name: str, now: float) -> bool:
+        """Sweeps now and then when there are none, since a killed process may have left reduce jobs waiting."""
+        if self._catalogue.has_open_jobs(name):
+            return True
+        if now - self._swept_s.get(name, -SWEEP_S) < SWEEP_S:
+            return False
+        self._swept_s[name] = now
+        return self._catalogue.count_jobs(name)[State.WAITING] > 0 and self._catalogue.sweep(name) > 0
+
+    def _has_tiles(self, record: RenderingRecord, on_event: Callable[[RunEvent], None]) -> bool:
+        """Reports a rendering that is skipped because its tiles are elsewhere, once."""
+        try:
+            check_tiles_are_here(self._workspace, record)
+        except BadRequest as error:
+            self._given_up.add(record.name)
+            on_event(RenderingSkipped(record.name, str(error)))
+            return False
+        return True
 
     def _renderings(self) -> list[RenderingRecord]:
         """A named rendering that was removed meanwhile has no jobs."""
@@ -136,3 +165,14 @@ class Work:
         with self.stop.heard_by(calls.put), suppress(queue.Empty):
             if not self.stop.is_made:
                 calls.get(timeout=seconds)
+
+
+def check_tiles_are_here(workspace: Workspace, record: RenderingRecord) -> None:
+    """Raises BadRequest when the tiles of the rendering are SQLite files in another workspace than this one, which shares only its catalogue. The run
+    that plans writes the manifest beside the tiles."""
+    url = workspace.find_catalogue_url()
+    if url is not None and is_networked(url) and tiles_url(record) is None and not workspace.manifest_path(record.name).is_file():
+        raise BadRequest(
+            f"rendering {record.name}: its tiles are files in the workspace of another node; create the rendering with --tiles URL, "
+            f"or share the folder and name it with --workspace (here: {workspace.root})"
+        )
