@@ -14,7 +14,7 @@ from rich.table import Table
 from map3d import _core
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.parse_document import open_document_parser
-from map3d.ingest.sources import Source, find_sources
+from map3d.ingest.sources import SourceDocument, find_sources
 
 from .benchmark_scene import CACHE, run_verb
 
@@ -65,7 +65,7 @@ def measure_document(path: Path) -> list[IngestRow]:
         shutil.rmtree(scene)
 
 
-def _measure_build(name: str, scene: Path, source: Source) -> list[IngestRow]:
+def _measure_build(name: str, scene: Path, source: SourceDocument) -> list[IngestRow]:
     """Measures the CPU time between the stages that the build reports."""
     asset = scene / "assets" / source.name
     count = sum(1 for _ in (asset / "objects.jsonl").open())
@@ -86,7 +86,7 @@ def _measure_build(name: str, scene: Path, source: Source) -> list[IngestRow]:
     return rows
 
 
-def _parser_request(source: Source, folder: Path) -> dict[str, Any]:
+def _parser_request(source: SourceDocument, folder: Path) -> dict[str, Any]:
     options = ImportOptions(crs="local")
     limits = options.limits(source.paths, source.format)
     place = {"path": str(source.paths[0].absolute()), "format": source.format, "folder": str(folder.absolute()), "name": source.name}

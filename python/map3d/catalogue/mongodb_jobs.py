@@ -3,6 +3,7 @@
 Times are on the server's clock: `renewed` is written by $currentDate and compared with $$NOW.
 """
 
+import math
 import time
 from collections.abc import Iterable, Iterator
 from typing import Any, Final
@@ -17,7 +18,9 @@ from map3d.catalogue.states import MAX_ATTEMPTS, MAX_EXPIRIES, JobEvent, State, 
 from map3d.errors import StaleFence
 
 _EXPIRE_EVERY: Final = 0.25
-"""Share of the lease time after which a process looks for overdue leases again even if there are jobs to do."""
+"""Share of the lease time after which a process looks for overdue leases again."""
+_EXPIRE_IDLE_S: Final = 1.0
+"""The same in seconds when there is no job to do."""
 
 
 class MongoJobs(MongoPlan):
@@ -32,12 +35,10 @@ class MongoJobs(MongoPlan):
 
     def lease(self, rendering: str, worker: str, start: int = 0) -> Lease | None:
         """Expires overdue leases now and then, and when there is no other job: an expired job is the last in the order anyway."""
-        now = time.monotonic()
-        if now - self._expired_s.get(rendering, 0.0) > _EXPIRE_EVERY * self.lease_s:
-            self._expired_s[rendering] = now
-            self._expire_overdue(rendering)
+        every_s = _EXPIRE_EVERY * self.lease_s
+        self._expire_overdue_after(rendering, every_s)
         document = self._lease_next(rendering, worker, start)
-        if document is None and self._expire_overdue(rendering):
+        if document is None and self._expire_overdue_after(rendering, min(_EXPIRE_IDLE_S, every_s)):
             document = self._lease_next(rendering, worker, start)
         if document is None:
             return None
@@ -87,7 +88,12 @@ class MongoJobs(MongoPlan):
         query = {"rendering": rendering, "state": State.LEASED, "worker": {"$in": sorted(set(workers))}}
         return sum(self._expire_one(document, {}) for document in self._find("job", query))
 
-    def _expire_overdue(self, rendering: str) -> int:
+    def _expire_overdue_after(self, rendering: str, seconds: float) -> int:
+        """Expires overdue leases unless this process did so within `seconds`; returns their number."""
+        now = time.monotonic()
+        if now - self._expired_s.get(rendering, -math.inf) < seconds:
+            return 0
+        self._expired_s[rendering] = now
         overdue = self._find("job", {"rendering": rendering, "state": State.LEASED, **OVERDUE})
         return sum(self._expire_one(document, OVERDUE) for document in overdue)
 
