@@ -109,3 +109,29 @@ def test_a_url_with_credentials_is_refused_and_not_repeated(run: Run, tmp_path: 
     assert "environment" in err
     assert "SECRET" not in out + err
     assert "\nview" not in run("show", "renderings")[1]
+
+
+def test_another_node_renders_a_shared_scene(run: Run, embedded: Workspace, tmp_path: Path, store_url: str) -> None:
+    """The other node has the catalogue, and nothing else of the workspace."""
+    host, node = ("--workspace", str(tmp_path / "host")), ("--workspace", str(tmp_path / "node"))
+    files = write_town(tmp_path / "files", side=3)
+    for words in (
+        ("create-scene", "town", "--files", f"{store_url}/scenes"),
+        ("add-files", "town", str(files)),
+        ("create-rendering", "town", "view", *VIEWS, "--tiles", f"{store_url}/tiles"),
+        ("add-layers", "view", "--layers", "again=normal"),
+    ):
+        status, _, err = run(*words, *host)
+        assert status == 0, err
+    (tmp_path / "node").mkdir()
+    (tmp_path / "node" / "catalogue.sqlite").symlink_to(tmp_path / "host" / "catalogue.sqlite")
+    status, _, err = run("render", "view", *node)
+    assert status == 0, err
+    (files / "house-0-0.obj").write_text(house(0.0, 0.0, 11.0))
+    for words in (("add-files", "town", str(files / "house-0-0.obj"), *host), ("render", "view", *host), ("render", "view", *node)):
+        status, _, err = run(*words)
+        assert status == 0, err
+    assert not (tmp_path / "host" / "renderings" / "view" / "0-45.sqlite").exists()
+    assert run("verify", *host)[0] == run("verify", *node)[0] == 0
+    found = published(run, Workspace(tmp_path / "node"), tmp_path / "a")
+    assert found == published(run, Workspace(tmp_path / "host"), tmp_path / "b") == published(run, embedded, tmp_path / "c")

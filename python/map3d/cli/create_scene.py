@@ -34,20 +34,35 @@ def _switches(command: click.decorators.FC) -> click.decorators.FC:
     show_default=True,
     help="Ground plane; auto adds it to scenes without terrain.",
 )
+@click.option(
+    "--files",
+    metavar="URL",
+    help="Share the built scene with other nodes: upload its files to a folder or an object store, as file:///FOLDER or s3://BUCKET/PREFIX.",
+)
 @_switches
 @json_option
 @workspace_option
 def command(
-    workspace: Workspace, name: str, crs: str | None, title: str, attribution: str, ground_plane: str, as_json: bool, **switches: bool
+    workspace: Workspace,
+    name: str,
+    crs: str | None,
+    title: str,
+    attribution: str,
+    ground_plane: str,
+    files: str | None,
+    as_json: bool,
+    **switches: bool,
 ) -> None:
     """Create an empty scene NAME, and the workspace if it does not exist."""
     from map3d.ingest.scene_crs import parse_scene_crs
     from map3d.renderings.remove_scene import finish_scene_removal
+    from map3d.renderings.shared_scene import FILES, check_files_url
 
+    shared = {} if files is None else {FILES: check_files_url(files)}
     pinned = None if crs is None else parse_scene_crs(crs)
     catalogue = workspace.create().open_catalogue()
     try:
-        options = {**switches, "ground_plane": ground_plane}
+        options = {**switches, "ground_plane": ground_plane, **shared}
         finish_scene_removal(workspace, catalogue, name)
         catalogue.create_scene(SceneRecord(name, title, attribution, crs=pinned, options=options))
         scene = catalogue.scene(name)

@@ -17,7 +17,7 @@ from map3d.catalogue import Workspace
 from map3d.catalogue.workspace import CATALOGUE_VARIABLE
 from map3d.errors import BadRequest, Map3dError
 from map3d.jobs.dead_workers import expire_dead_workers, worker_name
-from map3d.jobs.events import JobOutcome
+from map3d.jobs.events import JobOutcome, SceneChanged
 from map3d.jobs.job_runner import JobRunner
 from map3d.jobs.timeouts import Timeouts
 from map3d.process_identity import ProcessIdentity
@@ -131,7 +131,8 @@ class _Session:
         try:
             expire_dead_workers(self._catalogue, spec.rendering)
             record = self._catalogue.rendering(spec.rendering)
-            self._task = RenderTask(workspace, record, cache_bytes=spec.cache_bytes, entry=spec.entry)
+            self._scene = record.scene
+            self._task = RenderTask(workspace, record, cache_bytes=spec.cache_bytes, entry=spec.entry, scene=self._catalogue.scene(record.scene))
         except BaseException:
             self._catalogue.close()
             raise
@@ -145,7 +146,10 @@ class _Session:
             return TaskResult(process)
         if lease.kind == "base":
             own.start = morton(lease.block.x, lease.block.y)
-        return TaskResult(process, own.runner.run(lease), self._task.take_stats())
+        event = own.runner.run(lease)
+        if isinstance(event, SceneChanged):
+            self._task.update_scene(self._catalogue.scene(self._scene))
+        return TaskResult(process, event, self._task.take_stats())
 
     def _runner_of_thread(self) -> "_ThreadRunner":
         with self._lock:

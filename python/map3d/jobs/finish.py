@@ -10,6 +10,7 @@ from map3d.errors import Map3dError
 from map3d.renderings.build import open_scene
 from map3d.renderings.manifest_writer import Planned, write_manifest
 from map3d.renderings.plan import PlannedScene, planned_occupancy
+from map3d.renderings.scene_cache import scene_in_use
 from map3d.renderings.track_stores import read_manifest
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.naming import block_levels
@@ -48,8 +49,9 @@ def finish(workspace: Workspace, catalogue: Catalogue, rendering: str, extent: E
     """Writes the manifest of the rendering's present state; returns whether all its jobs are done. `extent`: None for that of the last plan."""
     record, counts = catalogue.rendering(rendering), catalogue.count_jobs(rendering)
     is_complete = counts[State.DONE] == sum(counts.values())
-    extent = extent or Extent.announced(workspace, catalogue, record)
-    write_manifest(workspace, catalogue, rendering, extent.box, {} if is_complete else _within_open(catalogue, record, extent.occupancy))
+    with scene_in_use(workspace, catalogue.scene(record.scene)):
+        extent = extent or Extent.announced(workspace, catalogue, record)
+        write_manifest(workspace, catalogue, rendering, extent.box, {} if is_complete else _within_open(catalogue, record, extent.occupancy))
     return is_complete
 
 

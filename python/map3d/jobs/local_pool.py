@@ -31,7 +31,13 @@ class LocalPools:
         self._cache_bytes = settings.cache_bytes
 
     def __call__(self, record: RenderingRecord, statistics: RunStatistics, stats: Counter[str], stop: StopRequest, on_event: OnEvent) -> bool:
-        task = RenderTask(self._workspace, record, cache_bytes=self._cache_bytes, entry=self._settings.entry)
+        task = RenderTask(
+            self._workspace,
+            record,
+            cache_bytes=self._cache_bytes,
+            entry=self._settings.entry,
+            scene=self._catalogue.scene(record.scene),
+        )
         pool = Pool(self._catalogue, record.name, task, self._settings.workers, self._settings.timeouts, stop)
         pool.statistics = statistics
         try:

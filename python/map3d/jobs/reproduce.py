@@ -49,7 +49,7 @@ def reproduce(
     """Does the jobs of the block: of `track`, or of all tracks in which it is quarantined, or else of the first track. Raises NotFound."""
     record = catalogue.rendering(rendering)
     jobs = _jobs_of(catalogue, record, block, track)
-    task = RenderTask(workspace, record, cache_bytes=settings.cache_bytes, entry=settings.entry)
+    task = RenderTask(workspace, record, cache_bytes=settings.cache_bytes, entry=settings.entry, scene=catalogue.scene(record.scene))
     try:
         return [_reproduce(task, record, job, settings) for job in jobs]
     finally:

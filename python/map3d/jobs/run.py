@@ -18,6 +18,7 @@ from map3d.jobs.stop_request import StopRequest
 from map3d.renderings.build import open_scene
 from map3d.renderings.manifest_writer import write_manifest
 from map3d.renderings.plan import PlannedScene, plan_jobs
+from map3d.renderings.scene_cache import scene_in_use
 from map3d.renderings.track_stores import find_track, tiles_url
 from map3d.tiles.occupancy import Numbers, numbers_of
 
@@ -61,6 +62,10 @@ class Run:
 
     def plan(self, progress: Callable[[int, int], None] | None = None, scene: PlannedScene | None = None) -> RunPlan:
         """Compares the scene with the stored blocks, opens jobs for new and changed blocks, and announces them in the manifest."""
+        with scene_in_use(self._workspace, self._catalogue.scene(self.record.scene)):
+            return self._plan(progress, scene)
+
+    def _plan(self, progress: Callable[[int, int], None] | None, scene: PlannedScene | None) -> RunPlan:
         self.record = self._catalogue.rendering(self.record.name)
         blocks = _PlannedBlocks(self._catalogue, self.record)
         with scene_lock(self._workspace, self.record.scene):

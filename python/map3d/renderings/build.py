@@ -12,6 +12,8 @@ from map3d.errors import BadRequest
 from map3d.ingest.asset_removal import is_removing
 from map3d.ingest.unfinished_imports import finish_imports, unfinished_imports
 from map3d.registry import Registry
+from map3d.renderings.scene_cache import has_assets
+from map3d.renderings.shared_scene import FILES, share_scene
 
 BuildProgress = Callable[[str, int, int], bool]
 """(stage, done, total) → False to stop."""
@@ -34,13 +36,17 @@ def is_stale(workspace: Workspace, catalogue: Catalogue, scene: str) -> bool:
     record = catalogue.scene(scene)
     if unfinished_imports(workspace.scene_folder(scene) / "assets") or is_removing(workspace, scene):
         return True
-    return record.built != scene_digest(catalogue, record) or not (workspace.scene_folder(scene) / "scene.json").is_file()
+    if record.built != scene_digest(catalogue, record):
+        return True
+    folder = workspace.scene_folder(scene)
+    return (FILES not in record.options or has_assets(folder)) and not (folder / "scene.json").is_file()
 
 
 def build(
     workspace: Workspace, catalogue: Catalogue, scene: str, *, threads: int, max_memory_bytes: int, progress: BuildProgress | None = None
 ) -> dict[str, Any]:
-    """Builds what changed and returns the report: counts of each optimisation. Raises BadRequest for a scene without assets."""
+    """Builds what changed, uploads the files of a shared scene, and returns the report: counts of each optimisation. Raises BadRequest for a scene
+    without assets, or on a node that only has a copy."""
     with scene_lock(workspace, scene):
         finish_imports(workspace, catalogue, scene)
         record = catalogue.scene(scene)
@@ -49,12 +55,14 @@ def build(
             raise BadRequest(f"scene {scene} has no files yet; add some with map3d add-files {scene} FILE…")
         digest = scene_digest(catalogue, record)
         folder = workspace.scene_folder(scene)
+        if not has_assets(folder):
+            raise BadRequest(f"scene {scene}: its files were imported on another host; build it there with map3d render")
         with Registry(workspace.registry_path(scene)) as registry:
             ground = registry.get_or_create_scene_object(GROUND, "terrain")
             request = {
                 "assets": [asset.name for asset in assets],
                 "origin": record.origin,
-                "options": {**OPTIONS, **record.options},
+                "options": _build_options(record),
                 "ground_id": ground,
                 "threads": threads,
                 "max_memory_bytes": max_memory_bytes,
@@ -62,6 +70,8 @@ def build(
             report: dict[str, Any] = json.loads(_core.build_scene(str(folder), json.dumps(request), progress))
             has_ground = report.get("ground_plane_triangles")
             registry.set_scene_object(ground, open_scene(workspace, scene).object_box(ground) if has_ground else None)
+        if FILES in record.options:
+            share_scene(workspace, record, digest)
         catalogue.set_built(scene, digest)
         return report
 
@@ -69,8 +79,13 @@ def build(
 def scene_digest(catalogue: Catalogue, record: SceneRecord) -> str:
     """Returns a digest of everything that a build depends on."""
     assets = [(asset.name, asset.digest) for asset in catalogue.assets(record.name)]
-    text = json.dumps([assets, record.origin, {**OPTIONS, **record.options}, _core.__version__], sort_keys=True)
+    text = json.dumps([assets, record.origin, _build_options(record), _core.__version__], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def _build_options(record: SceneRecord) -> dict[str, Any]:
+    """Returns the options that a build depends on."""
+    return {**OPTIONS, **{name: value for name, value in record.options.items() if name != FILES}}
 
 
 def open_scene(workspace: Workspace, scene: str, cache_bytes: int = 64 << 20) -> _core.Scene:

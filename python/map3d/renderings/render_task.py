@@ -3,11 +3,13 @@
 import threading
 from collections import Counter
 from collections.abc import Mapping
+from contextlib import ExitStack
 from typing import Any, Final
 
-from map3d.catalogue import JobResult, Lease, RenderingRecord, Workspace
+from map3d.catalogue import JobResult, Lease, RenderingRecord, SceneRecord, Workspace
 from map3d.errors import NotFound
 from map3d.renderings.block_check import check_rendered
+from map3d.renderings.scene_cache import scene_in_use
 from map3d.renderings.track_stores import open_or_create_track
 from map3d.subprocess import Message, Subprocess
 from map3d.tiles.naming import block_level, blocks_below
@@ -25,14 +27,29 @@ class RenderTask:
     `stats` sums the statistics of all committed blocks: seconds of each stage, tiles, cache hits and misses.
     """
 
-    def __init__(self, workspace: Workspace, rendering: RenderingRecord, *, cache_bytes: int = CACHE_BYTES, entry: str = RENDER_ENTRY) -> None:
+    def __init__(
+        self,
+        workspace: Workspace,
+        rendering: RenderingRecord,
+        *,
+        cache_bytes: int = CACHE_BYTES,
+        entry: str = RENDER_ENTRY,
+        scene: SceneRecord | None = None,
+    ) -> None:
+        """`scene`: its files are fetched if it is shared and was built on another host, and kept until `close`."""
         workspace.rendering_folder(rendering.name).mkdir(parents=True, exist_ok=True)
+        self._workspace = workspace
         self.stats: Counter[str] = Counter()
         self._stats_lock = threading.Lock()
         self._zmax = rendering.zmax
         self._entry = entry
         self._setup = _setup(workspace, rendering, cache_bytes)
-        self._stores: Mapping[str, TileStore] = {track.id: open_or_create_track(workspace, rendering, track) for track in rendering.tracks}
+        with ExitStack() as opened:
+            if scene is not None:
+                opened.enter_context(scene_in_use(workspace, scene))
+            stores = {track.id: opened.enter_context(open_or_create_track(workspace, rendering, track)) for track in rendering.tracks}
+            self._opened = opened.pop_all()
+        self._stores: Mapping[str, TileStore] = stores
 
     def start_subprocess(self) -> Subprocess:
         return Subprocess(self._entry, self._setup)
@@ -73,6 +90,11 @@ class RenderTask:
             occupied=block_bits(lease.block, self._zmax, (TileId(*tile[1:4]) for tile in tiles)) if lease.kind == "base" else 0,
         )
 
+    def update_scene(self, scene: SceneRecord) -> None:
+        """Fetches the files of a shared scene again if it was built meanwhile; the subprocesses then open it again by themselves."""
+        with scene_in_use(self._workspace, scene):
+            pass
+
     def take_stats(self) -> dict[str, float]:
         """Returns `stats` and sets them to zero."""
         with self._stats_lock:
@@ -81,8 +103,7 @@ class RenderTask:
         return taken
 
     def close(self) -> None:
-        for store in self._stores.values():
-            store.close()
+        self._opened.close()
 
 
 def stored_tiles(response: Message) -> tuple[list[StoredTile], bytes | None]:

@@ -8,6 +8,7 @@ from map3d.catalogue import Catalogue, RenderingRecord, State, Track, Workspace
 from map3d.renderings.build import is_stale, open_scene
 from map3d.renderings.plan import track_frame
 from map3d.renderings.render_task import CACHE_BYTES
+from map3d.renderings.scene_cache import scene_in_use
 from map3d.renderings.track_stores import open_track
 from map3d.tiles.naming import tiles_of_block
 from map3d.tiles.tile_store import TileStore
@@ -24,7 +25,14 @@ def verify_pixels(
     record = catalogue.rendering(name)
     if is_stale(workspace, catalogue, record.scene):
         return
-    scene = open_scene(workspace, record.scene, CACHE_BYTES)
+    with scene_in_use(workspace, catalogue.scene(record.scene)):
+        _verify_blocks(workspace, catalogue, record, findings, progress, sample, seed)
+
+
+def _verify_blocks(
+    workspace: Workspace, catalogue: Catalogue, record: RenderingRecord, findings: Findings, progress: Progress, sample: int | None, seed: int
+) -> None:
+    name, scene = record.name, open_scene(workspace, record.scene, CACHE_BYTES)
     chosen = _done_blocks(catalogue, record)
     if sample is not None and sample < len(chosen):
         chosen = random.Random(seed).sample(chosen, sample)

@@ -15,7 +15,9 @@ from map3d.renderings.build import is_stale, open_scene
 from map3d.renderings.manifest_writer import current_manifest
 from map3d.renderings.plan import plan_jobs
 from map3d.renderings.remove_rendering import is_rendering_removed
+from map3d.renderings.scene_cache import has_assets, scene_in_use
 from map3d.renderings.scene_files import binary_files, check_file, check_ids, check_index
+from map3d.renderings.shared_scene import FILES
 from map3d.renderings.track_stores import read_manifest
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.naming import block_of
@@ -35,7 +37,7 @@ def verify_scene(workspace: Workspace, catalogue: Catalogue, scene: str, finding
         findings.add(f"{folder / 'assets' / name}: its import has not finished; run map3d render, or add its file again with map3d add-files {scene}")
     if is_removing(workspace, scene):
         findings.add(f"scene {scene}: the removal of files has not finished; run map3d remove-files again, or map3d render")
-    if not catalogue.assets(scene):
+    if not catalogue.assets(scene) or (FILES in catalogue.scene(scene).options and not has_assets(folder)):
         return
     files = list(binary_files(folder))
     for done, path in enumerate(files, 1):
@@ -64,6 +66,11 @@ def verify_rendering(workspace: Workspace, catalogue: Catalogue, name: str, find
     if is_stale(workspace, catalogue, record.scene):
         findings.add(f"scene {record.scene}: its files have changed since the last build; run map3d render {name}")
         return
+    with scene_in_use(workspace, catalogue.scene(record.scene)):
+        _verify_tiles(workspace, catalogue, record, findings, progress)
+
+
+def _verify_tiles(workspace: Workspace, catalogue: Catalogue, record: RenderingRecord, findings: Findings, progress: Progress) -> None:
     scene = open_scene(workspace, record.scene)
     _check_plan(catalogue, record, scene, findings)
     with Registry(workspace.registry_path(record.scene)) as registry:
