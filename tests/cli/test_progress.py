@@ -2,9 +2,15 @@
 
 import io
 
+import pytest
 from rich.console import Console
 
+from map3d.catalogue import JobResult, Lease, PlanCounts, State
+from map3d.cli import progress
 from map3d.cli.progress import LoggedProgress, line, show_stage
+from map3d.cli.run_progress import RunProgress
+from map3d.jobs.events import JobDone, JobFailed, Planned, Remaining, SceneChanged
+from map3d.types import BlockId
 
 
 def test_line_shows_count_rate_and_remaining_time() -> None:
@@ -43,3 +49,26 @@ def test_each_stage_has_its_own_rate() -> None:
         bar.tasks[0].start_time = bar.get_time() - 2
         show_stage(bar, task, "chunks", 2, 4)
     assert shown.getvalue().splitlines()[-1] == "chunks: 2 of 4, 1.0/s, 2 s left"
+
+
+def test_bar_of_a_run_counts_again_after_a_new_plan_and_follows_other_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    shown = io.StringIO()
+    monkeypatch.setattr(progress, "console", lambda: Console(file=shown, width=200))
+    monkeypatch.setattr(progress, "LINE_EVERY_S", 0.0)
+    lease = Lease("r", "0-45", BlockId(3, 1, 2), "base", "k", 1, 1, "w", 1)
+    with RunProgress() as run:
+        run(Planned(PlanCounts(10, 0, 0), 10))
+        run(JobDone(lease, JobResult(1, False, base_tiles=4)))
+        assert run.counted == (1, 10)
+        run(Remaining(6))
+        assert run.counted == (4, 10), "another run has done three jobs"
+        run(SceneChanged(lease, "rebuilt"))
+        run(Planned(PlanCounts(2, 3, 5), 25))
+        assert run.counted == (0, 25)
+        run(Remaining(30))
+        assert run.counted == (0, 30), "another run has planned more"
+        run(JobFailed(lease, "it fell", State.TODO))
+    lines = shown.getvalue()
+    assert "blocks: 2 new, 3 changed, 5 unchanged; 25 to render" in lines
+    assert "files changed during the render" in lines
+    assert "0-45 3/1/2: attempt 1 failed (it fell); the block is now todo" in lines

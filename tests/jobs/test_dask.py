@@ -73,7 +73,7 @@ def processes(events: list[RunEvent]) -> set[int]:
 def test_killed_dask_worker_changes_nothing(workspace: Workspace, catalogue: Catalogue, faults: Path, tmp_path: Path) -> None:
     """A worker is killed while it renders, and Dask does not run its task again."""
     expected = undisturbed(tmp_path)
-    (faults / "slow").write_text("0.2")
+    (faults / "slow").write_text("1")
     events: list[RunEvent] = []
     killed: list[int] = []
 
@@ -84,6 +84,7 @@ def test_killed_dask_worker_changes_nothing(workspace: Workspace, catalogue: Cat
             if leased:
                 killed.append(int(str(leased[0].worker).rsplit(".", 3)[1]))
                 os.kill(killed[0], signal.SIGKILL)
+                (faults / "slow").unlink()
 
     with cluster(2) as local, dask_pools(local, workspace, catalogue) as pools:
         result = render(workspace, catalogue, pools, on_event)
@@ -97,7 +98,7 @@ def test_killed_dask_worker_changes_nothing(workspace: Workspace, catalogue: Cat
 
 def test_adaptive_cluster_grows_and_its_new_worker_takes_part(workspace: Workspace, catalogue: Catalogue, faults: Path, tmp_path: Path) -> None:
     expected = undisturbed(tmp_path)
-    (faults / "slow").write_text("0.5")
+    (faults / "slow").write_text("1")
     events: list[RunEvent] = []
 
     def on_event(event: RunEvent) -> None:

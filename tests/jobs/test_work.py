@@ -16,9 +16,9 @@ import pytest
 pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
 
 from map3d.catalogue import Catalogue, SceneRecord, State, Workspace
-from map3d.errors import BadRequest
+from map3d.errors import BadRequest, StoreError
 from map3d.jobs import finish
-from map3d.jobs.events import JobDone, PlanAwaited, RenderingLeft, RenderingSkipped, RunEvent
+from map3d.jobs.events import JobDone, PlanAwaited, RenderingLeft, RenderingSkipped, RunEvent, StoreAwaited
 from map3d.jobs.run import Run
 from map3d.jobs.run_settings import RunSettings
 from map3d.jobs.timeouts import Timeouts
@@ -107,7 +107,7 @@ def undisturbed(tmp_path: Path) -> tuple[bytes, dict[object, object]]:
 
 def test_work_ends_the_run_of_a_killed_planner(workspace: Workspace, catalogue: Catalogue, faults: Path, tmp_path: Path) -> None:
     expected = undisturbed(tmp_path)
-    (faults / "slow").write_text("0.2")
+    (faults / "slow").write_text("1")
     planner = start("render", workspace)
     wait_for_line(planner, JobDone.__name__)
     helper = start("work", workspace)
@@ -123,7 +123,7 @@ def test_work_ends_the_run_of_a_killed_planner(workspace: Workspace, catalogue: 
 
 def test_planner_ends_the_run_of_a_killed_helper(workspace: Workspace, catalogue: Catalogue, faults: Path, tmp_path: Path) -> None:
     expected = undisturbed(tmp_path)
-    (faults / "slow").write_text("0.2")
+    (faults / "slow").write_text("1")
     planner = start("render", workspace)
     wait_for_line(planner, JobDone.__name__)
     helper = start("work", workspace)
@@ -276,3 +276,31 @@ def test_idle_work_that_waits_for_ever_ends_on_a_signal(workspace: Workspace, ca
     process.send_signal(signal.SIGTERM)
     output, _ = process.communicate(timeout=30)
     assert (process.returncode, output.splitlines()[-1]) == (0, "ended True []")
+
+
+def test_database_that_is_away_is_waited_for(workspace: Workspace, catalogue: Catalogue, monkeypatch: pytest.MonkeyPatch) -> None:
+    plan(workspace, catalogue)
+    has_open_jobs, calls = type(catalogue).has_open_jobs, []
+
+    def away_at_first(self: Catalogue, rendering: str) -> bool:
+        calls.append(rendering)
+        if len(calls) <= 2:
+            raise StoreError("the database is away")
+        return bool(has_open_jobs(self, rendering))
+
+    monkeypatch.setattr(type(catalogue), "has_open_jobs", away_at_first)
+    events: list[RunEvent] = []
+    settings = dataclasses.replace(SETTINGS, timeouts=dataclasses.replace(TIMEOUTS, longest_pause_s=0.1))
+    worker = Work(workspace, catalogue, settings, forever=True)
+
+    def on_event(event: RunEvent) -> None:
+        events.append(event)
+        if isinstance(event, RenderingLeft):
+            worker.stop.finish_jobs()
+
+    worker.run(on_event)
+    assert [event for event in events if isinstance(event, StoreAwaited)] == [StoreAwaited("the database is away")] * 2
+    assert RenderingLeft("r", True) in events
+    calls.clear()
+    with pytest.raises(StoreError, match="away"):
+        Work(workspace, catalogue, SETTINGS).run(events.append)

@@ -32,6 +32,12 @@ class RunProgress:
         self._bar.stop()
 
     @property
+    def counted(self) -> tuple[float, float | None]:
+        """Returns the number of done jobs and of all jobs that the bar shows."""
+        shown = self._bar.tasks[self._bar.task_ids.index(self._task)]
+        return shown.completed, shown.total
+
+    @property
     def console(self) -> Console:
         return self._bar.console
 
@@ -59,8 +65,7 @@ class RunProgress:
 
     def _show_remaining(self, jobs: int) -> None:
         """Counts the jobs that other runs did or opened."""
-        shown = self._bar.tasks[self._bar.task_ids.index(self._task)]
-        total = max(shown.total or 0, jobs)
+        total = max(self.counted[1] or 0, jobs)
         self._bar.update(self._task, total=total, completed=total - jobs)
 
 
@@ -80,6 +85,8 @@ def message(event: RunEvent) -> str:
         return "files changed during the render"
     if isinstance(event, events.PlanAwaited):
         return f"{event.rendering}: its scene was rebuilt; waiting until map3d render {event.rendering} plans it again"
+    if isinstance(event, events.StoreAwaited):
+        return f"trying again soon: {event.reason}"
     if isinstance(event, events.RenderingSkipped):
         return f"skipped: {event.reason}"
     if isinstance(event, events.Stopping):

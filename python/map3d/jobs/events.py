@@ -84,6 +84,13 @@ class PlanAwaited:
 
 
 @dataclass(frozen=True)
+class StoreAwaited:
+    """`map3d work --forever` could not reach catalogue or tile store, and tries again after a pause."""
+
+    reason: str
+
+
+@dataclass(frozen=True)
 class RenderingStarted:
     """`map3d work` starts with a rendering that has `open_jobs`."""
 
@@ -108,4 +115,5 @@ class RenderingLeft:
 
 
 JobOutcome = JobDone | JobFailed | LeaseLost | SceneChanged
-RunEvent = JobOutcome | WorkerExited | Stopping | Waiting | Planned | Remaining | PlanAwaited | RenderingStarted | RenderingSkipped | RenderingLeft
+WorkEvent = PlanAwaited | StoreAwaited | RenderingStarted | RenderingSkipped | RenderingLeft
+RunEvent = JobOutcome | WorkerExited | Stopping | Waiting | Planned | Remaining | WorkEvent

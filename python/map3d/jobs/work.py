@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 from map3d.catalogue import Catalogue, RenderingRecord, State, Workspace
 from map3d.catalogue.open_catalogue import is_networked
-from map3d.errors import BadRequest, NotFound
-from map3d.jobs.events import PlanAwaited, RenderingLeft, RenderingSkipped, RenderingStarted, RunEvent
+from map3d.errors import BadRequest, NotFound, StoreError
+from map3d.jobs.events import PlanAwaited, RenderingLeft, RenderingSkipped, RenderingStarted, RunEvent, StoreAwaited
 from map3d.jobs.finish import finish
 from map3d.jobs.local_pool import LocalPools, PoolRunner
 from map3d.jobs.pool import count_open
@@ -77,16 +77,25 @@ class Work:
             if not self._catalogue.has_open_jobs(name):
                 self._outcome[name] = self._finish(name)
         with self.stop.on_signals():
-            while not self.stop.is_made:
-                record, wait_s = self._next(on_event)
-                if record is not None:
-                    self._work_on(record, on_event)
-                elif wait_s is None:
-                    break
-                else:
-                    self._sleep(wait_s)
+            while not self.stop.is_made and self._step(on_event):
+                pass
         incomplete = [] if self.stop.is_made else [name for name, complete in self._outcome.items() if not complete]
         return WorkResult(self._statistics, self.stop.is_made, list(self._outcome), incomplete)
+
+    def _step(self, on_event: Callable[[RunEvent], None]) -> bool:
+        """Works on one rendering, or waits; returns False when nothing is left. With `forever`, also waits for a database that cannot be reached."""
+        try:
+            record, wait_s = self._next(on_event)
+            if record is not None:
+                self._work_on(record, on_event)
+        except StoreError as error:
+            if not self._forever:
+                raise
+            record, wait_s = None, self._timeouts.longest_pause_s
+            on_event(StoreAwaited(str(error)))
+        if record is None and wait_s is not None:
+            self._sleep(wait_s)
+        return record is not None or wait_s is not None
 
     def _next(self, on_event: Callable[[RunEvent], None]) -> tuple[RenderingRecord | None, float | None]:
         """Returns the next rendering with open jobs; else None and how long to wait, or None and None when nothing is left."""
