@@ -1,7 +1,8 @@
-"""A minimal static host with range requests."""
+"""Static hosts with range requests: a minimal one, and public objects of an S3 server."""
 
 import re
 import threading
+import urllib.request
 from contextlib import contextmanager
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
@@ -36,3 +37,15 @@ def static_host(folder):
         finally:
             server.shutdown()
             thread.join()
+
+
+def public_address(endpoint, url, names):
+    """Lets everyone read objects of an S3 server, as on a public web host. Returns their address."""
+    address = f"{endpoint}/{url.removeprefix('s3://')}"
+    for name in names:
+        request = urllib.request.Request(
+            f"{address}/{name}?acl", data=b"", method="PUT", headers={"x-amz-acl": "public-read", "Authorization": "AWS test-key:any"}
+        )
+        with urllib.request.urlopen(request, timeout=30) as answer:
+            assert answer.status == 200
+    return address

@@ -4,10 +4,12 @@ import json
 import os
 import re
 from importlib.resources import files
+from io import BytesIO
 from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
+from PIL import Image
 
 from map3d.catalogue import SceneRecord
 from map3d.errors import AlreadyExists, BadRequest, Corrupt, LimitExceeded, Map3dError, NotFound, StoreError
@@ -311,3 +313,26 @@ def test_a_missing_workspace_is_not_found(tmp_path):
 
 def test_the_served_manifest_is_json(client):
     assert json.loads(client.get("/tiles/tea/rendering.json").text)["name"] == "tea"
+
+
+def test_the_page_of_a_rendering_has_its_title_and_picture(client, built_viewer):
+    (built_viewer / "index.html").write_text("<!doctype html>\n<head>\n<title>map3d</title>\n</head>\n")
+    page = client.get("/view/tea/")
+    assert "<title>Tea &lt;time&gt;</title>" in page.text
+    (picture,) = re.findall(r'<meta property="og:image" content="([^"]*)">', page.text)
+    assert picture.startswith("http")
+    assert '<meta name="twitter:card" content="summary_large_image">' in page.text
+    assert page.headers["cache-control"] == "no-cache"
+    assert client.get("/view/tea/", headers={"if-none-match": page.headers["etag"]}).status_code == 304
+    answer = client.get(picture)
+    assert (answer.status_code, answer.headers["content-type"]) == (200, "image/jpeg")
+    with Image.open(BytesIO(answer.content)) as opened:
+        assert opened.size == (1200, 630)
+    assert client.get(picture, headers={"if-none-match": answer.headers["etag"]}).status_code == 304
+
+
+def test_an_empty_rendering_has_a_page_without_picture(client, workspace, built_viewer):
+    workspace.manifest_path("tea").unlink()
+    page = client.get("/view/tea/")
+    assert (page.status_code, "og:image" in page.text) == (200, False)
+    assert client.get("/view/tea/preview.jpg").status_code == 404

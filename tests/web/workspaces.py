@@ -1,5 +1,9 @@
 """Small workspaces with synthetic tiles, for tests of serving and publishing."""
 
+from io import BytesIO
+
+from PIL import Image
+
 from map3d.catalogue import RenderingRecord, SceneCrs, SceneRecord, Workspace
 from map3d.geometry.frames import pin
 from map3d.registry import NewObject, Registry
@@ -31,11 +35,20 @@ def rendering_record(name="tea"):
     return RenderingRecord(name, "town", 0.1, (LAYERS,), frames, BOX, title="Tea <time>", attribution="© City of Tea")
 
 
-FIRST_BYTES = {"webp": b"RIFF", "png": b"\x89PNG\r\n\x1a\n", "jpeg": b"\xff\xd8\xff"}
+def solid_webp(px=256):
+    """Returns a real picture of one colour."""
+    data = BytesIO()
+    with Image.new("RGB", (px, px), (200, 120, 60)) as picture:
+        picture.save(data, "WEBP", lossless=True)
+    return data.getvalue()
+
+
+FIRST_BYTES = {"webp": solid_webp(), "png": b"\x89PNG\r\n\x1a\n", "jpeg": b"\xff\xd8\xff"}
 
 
 def tile_bytes(view, layer, tile, salt=""):
-    """Returns bytes with the signature of an image. Some tiles are equal, like tiles of plain ground."""
+    """Returns bytes with the signature of an image, or for WebP a real picture and a comment behind it. Some tiles are equal, like tiles of plain
+    ground."""
     kind = next(one.format for one in (*LAYERS, *ADDED) if one.name == layer)
     return FIRST_BYTES[kind] + f"{salt}{view}/{layer}/{tile.z}/{tile.x % 2}/{tile.y}".encode() * (1 + tile.x % 3)
 

@@ -1,43 +1,65 @@
 """map3d publish."""
 
-from pathlib import Path
 from typing import Any
 
 import click
-from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, ProgressColumn, Task, TextColumn, TimeRemainingColumn
+from rich.text import Text
 
 from map3d.catalogue import Workspace
 from map3d.cli.options import json_option, workspace_option
-from map3d.cli.output import plural, print_json, size_text
+from map3d.cli.output import plural, print_json, print_table, size_text
 from map3d.cli.progress import progress_bar, show_stage
 
 
 @click.command("publish")
 @click.argument("rendering")
-@click.option("-o", "--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Output folder.")
-@click.option("--replace", is_flag=True, help="Replace an earlier published folder.")
+@click.option("-o", "--out", metavar="FOLDER|URL", required=True, help="Output folder, or the URL of an object store, e.g. s3://BUCKET/PREFIX.")
+@click.option("--replace", is_flag=True, help="Update an earlier publication: only files whose content changed are written or sent.")
 @click.option("--allow-incomplete", is_flag=True, help="Publish even if blocks are missing.")
+@click.option("--url", metavar="ADDRESS", help="Address of the map's page, which links to it need to show its picture.")
+@click.option("--dry-run", is_flag=True, help="Print what would be written or sent, and its size, without doing so.")
 @json_option
 @workspace_option
-def command(workspace: Workspace, rendering: str, out: Path, replace: bool, allow_incomplete: bool, as_json: bool) -> None:
-    """Publish RENDERING as a folder of static files: tiles, objects, viewer. Copy it to any web server that supports range requests."""
-    done = publish_with_progress(workspace, rendering, out, replace=replace, allow_incomplete=allow_incomplete)
+def command(
+    workspace: Workspace, rendering: str, out: str, replace: bool, allow_incomplete: bool, url: str | None, dry_run: bool, as_json: bool
+) -> None:
+    """Publish RENDERING as static files: tiles, objects, viewer.
+
+    FOLDER can be copied to any web server that supports range requests. URL is a place in an object store; credentials come from the environment
+    (AWS_*, GOOGLE_*, AZURE_*)."""
+    done = publish_with_progress(workspace, rendering, out, replace=replace, allow_incomplete=allow_incomplete, url=url, dry_run=dry_run)
     if as_json:
         print_json(done)
-    else:
-        click.echo(f"published {rendering} to {out}: {plural(done.tiles, 'image')} in {plural(done.archives, 'archive')}, {size_text(done.bytes)}")
+        return
+    rows = [(row.part, row.view or "", row.layer or "", row.files, size_text(row.bytes)) for row in done.sizes]
+    print_table(("part", "view", "layer", "files", "size"), [*rows, ("total", "", "", done.files, size_text(done.bytes))])
+    verb, written, removed = ("would publish", "to write", "to remove") if dry_run else ("published", "written", "removed")
+    about = "about " if dry_run and done.written else ""
+    click.echo(
+        f"{verb} {rendering} to {out}: {plural(done.tiles, 'image')} in {plural(done.archives, 'archive')}, {size_text(done.bytes)}; "
+        f"{written}: {plural(done.written, 'file')}, {about}{size_text(done.written_bytes)}; {removed}: {done.removed:,}"
+    )
 
 
-def publish_with_progress(workspace: Workspace, rendering: str, out: Path, **how: bool) -> Any:
+class Rate(ProgressColumn):
+    """Steps per second."""
+
+    def render(self, task: Task) -> Text:
+        speed = task.finished_speed or task.speed
+        return Text("" if speed is None else f"{speed:,.0f}/s")
+
+
+def publish_with_progress(workspace: Workspace, rendering: str, out: Any, **how: Any) -> Any:
     """Publishes with a progress bar and returns a `Published`."""
     from map3d.publish import publish
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Rate(), TimeRemainingColumn())
     with progress_bar(*columns) as bar:
         task = bar.add_task("publishing", total=None)
 
         def progress(stage: str, done: int, total: int) -> bool:
-            show_stage(bar, task, f"publishing: {stage}", done, total)
+            show_stage(bar, task, "publishing tiles" if stage == "publish" else f"publishing {stage}", done, total or None)
             return True
 
         return publish(workspace, rendering, out, progress=progress, **how)

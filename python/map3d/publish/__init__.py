@@ -1,5 +1,5 @@
-"""A rendering as one folder of static files, to copy anywhere."""
+"""A rendering as static files: in a folder, to copy anywhere, or in an object store."""
 
-from map3d.publish.publish_folder import Published, publish
+from map3d.publish.publish_rendering import Published, publish
 
 __all__ = ["Published", "publish"]

@@ -72,12 +72,20 @@ class Archive:
     def clustered(self) -> bool:
         return bool(self._header["clustered"])
 
+    def count_tiles(self) -> int:
+        """Returns the number of tiles. Raises Corrupt if the length of the file is wrong."""
+        self._check_length()
+        return int(self._header["addressed_tiles_count"])
+
+    def _check_length(self) -> None:
+        end = self._header["tile_data_offset"] + self._header["tile_data_length"]
+        if end != self.path.stat().st_size:
+            raise Corrupt(f"{self.path}: the file has {self.path.stat().st_size} bytes, expected {end}; copy it again")
+
     def tiles(self) -> Iterator[tuple[TileId, bytes]]:
         """Yields the tiles by id. Raises Corrupt if a directory or the length of the file is wrong."""
-        end = self._header["tile_data_offset"] + self._header["tile_data_length"]
         try:
-            if end != self.path.stat().st_size:
-                raise Corrupt(f"{self.path}: the file has {self.path.stat().st_size} bytes, expected {end}; copy it again")
+            self._check_length()
             for (z, x, y), data in _reading.traverse(self._source, self._header, self._header["root_offset"], self._header["root_length"]):
                 yield TileId(z, x, y), data
         except (OSError, EOFError, ValueError, IndexError) as error:

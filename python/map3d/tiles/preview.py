@@ -12,7 +12,7 @@ from map3d.types import COLOR_KINDS, TileId
 
 ASPECT: Final = 1.6
 MIN_WIDTH_PX: Final = 640
-"""The preview takes the first level at which its window is this wide."""
+"""The preview takes the first level at which its window is this wide, unless the caller names another width."""
 GRID_LEVEL: Final = 6
 """Level whose occupied tiles determine the window."""
 COVERED: Final = 0.98
@@ -44,15 +44,16 @@ class Preview:
 
 @dataclass(frozen=True)
 class _Window:
-    """Centre and width in the unit square of a pyramid; y points down."""
+    """Centre and size in the unit square of a pyramid; y points down."""
 
     x: float
     y: float
     width: float
+    aspect: float
 
     @property
     def height(self) -> float:
-        return self.width / ASPECT
+        return self.width / self.aspect
 
     def covered_share(self, grid: NDArray[np.bool_]) -> float:
         """Returns the share of occupied cells; cells outside the grid count as empty."""
@@ -62,15 +63,15 @@ class _Window:
         return float(inside.sum()) / (len(rows) * len(columns))
 
 
-def choose_preview(manifest: Manifest) -> Preview | None:
-    """Returns None while no tile of a colour layer exists."""
+def choose_preview(manifest: Manifest, *, aspect: float = ASPECT, min_width_px: int = MIN_WIDTH_PX) -> Preview | None:
+    """Returns None while no tile of a colour layer exists. `aspect`: width divided by height."""
     view = next((view for view in manifest.views if view.occupancy.count(0)), None)
     found = next(((number, layer) for number, layers in enumerate(manifest.passes) for layer in layers if layer.kind in COLOR_KINDS), None)
     if view is None or found is None:
         return None
     number, layer = found
-    window = _choose_window(_occupied_grid(view.occupancy))
-    z = next((z for z in range(manifest.zmax) if window.width * 2**z * manifest.tile_px >= MIN_WIDTH_PX), manifest.zmax)
+    window = _choose_window(_occupied_grid(view.occupancy), aspect)
+    z = next((z for z in range(manifest.zmax) if window.width * 2**z * manifest.tile_px >= min_width_px), manifest.zmax)
     side_px = 2**z * manifest.tile_px
     pixels = (window.width * side_px, window.height * side_px)
     left, top = window.x * side_px - pixels[0] / 2, window.y * side_px - pixels[1] / 2
@@ -85,14 +86,14 @@ def _occupied_grid(occupancy: Occupancy) -> NDArray[np.bool_]:
     return grid
 
 
-def _choose_window(grid: NDArray[np.bool_]) -> _Window:
+def _choose_window(grid: NDArray[np.bool_], aspect: float) -> _Window:
     """Returns the largest centred window that content covers; if there is none, the window that contains all content."""
     rows, columns = (np.flatnonzero(grid.any(axis=axis)) for axis in (1, 0))
     (top, bottom), (left, right) = ((line[0] / len(grid), (line[-1] + 1) / len(grid)) for line in (rows, columns))
     x, y, width, height = (left + right) / 2, (top + bottom) / 2, right - left, bottom - top
     inner = _erode(grid)
-    crops = (_Window(x, y, min(width, height * ASPECT) * scale) for scale in np.arange(1.0, SMALLEST_CROP, -0.05))
-    return next((crop for crop in crops if crop.covered_share(inner) >= COVERED), _Window(x, y, max(width, height * ASPECT)))
+    crops = (_Window(x, y, min(width, height * aspect) * scale, aspect) for scale in np.arange(1.0, SMALLEST_CROP, -0.05))
+    return next((crop for crop in crops if crop.covered_share(inner) >= COVERED), _Window(x, y, max(width, height * aspect), aspect))
 
 
 def _erode(grid: NDArray[np.bool_]) -> NDArray[np.bool_]:

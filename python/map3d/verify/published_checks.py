@@ -3,15 +3,14 @@
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
-from hashlib import sha256
 from pathlib import Path
 from typing import Final
 
 from map3d.catalogue import Workspace
 from map3d.errors import Corrupt, NotFound, VerifyFailed
 from map3d.geometry.views import track_id
+from map3d.publish.checksums import CHECKSUMS, file_digest, parse_checksums
 from map3d.publish.pmtiles_archive import Archive
-from map3d.publish.publish_folder import CHECKSUMS
 from map3d.registry.documents import ATTRIBUTES, SEARCH
 from map3d.renderings.track_stores import open_track, rendering_record
 from map3d.tiles.manifest import FILE_NAME, Manifest, ManifestView
@@ -62,16 +61,15 @@ def verify_published(folder: Path, workspace: Workspace | None = None) -> Verifi
 
 def _check_sums(folder: Path) -> tuple[int, list[str]]:
     path = folder / CHECKSUMS
-    lines = path.read_text().splitlines() if path.is_file() else []
+    digests = parse_checksums(path.read_bytes() if path.is_file() else None)
     problems = []
-    for line in lines:
-        digest, _, name = line.partition("  ")
+    for name, digest in digests.items():
         file = folder / name
         if not file.is_file():
             problems.append(f"{name} is missing")
-        elif _digest(file) != digest:
+        elif file_digest(file) != digest:
             problems.append(f"{name} has changed since it was published")
-    return len(lines) - len(problems), problems
+    return len(digests) - len(problems), problems
 
 
 def _check_layer(folder: Path, view: ManifestView, layer: Layer, store: TileStore | None) -> tuple[int, list[str]]:
@@ -106,11 +104,3 @@ def _check_occupancy(name: str, occupancy: Occupancy, seen: set[TileId]) -> list
     return ([f"{name}: {len(missing)} tiles are missing"] if missing else []) + (
         [f"{name}: {len(added)} tiles are not in the manifest"] if added else []
     )
-
-
-def _digest(path: Path) -> str:
-    with path.open("rb") as file:
-        digest = sha256()
-        while chunk := file.read(1 << 20):
-            digest.update(chunk)
-    return digest.hexdigest()

@@ -2,12 +2,17 @@
 
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import lru_cache
+from hashlib import sha256
 
-from flask import Blueprint, Response, current_app, redirect, render_template, send_from_directory
+from flask import Blueprint, Response, current_app, redirect, render_template, request, send_from_directory, url_for
 from werkzeug import Response as WerkzeugResponse
 
-from map3d.catalogue import RenderingRecord
-from map3d.errors import Map3dError
+from map3d.catalogue import RenderingRecord, Workspace
+from map3d.errors import Map3dError, NotFound
+from map3d.publish.page_head import describe_page
+from map3d.publish.preview_picture import FILE as PREVIEW
+from map3d.publish.preview_picture import make_preview
 from map3d.renderings.track_stores import read_manifest, tiles_url
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.preview import Preview, choose_preview
@@ -58,8 +63,34 @@ def renderings() -> WerkzeugResponse:
 
 @pages.get("/view/<rendering>/")
 def view(rendering: str) -> Response:
-    catalogue().rendering(check_name(rendering, "rendering"))
-    return compress(send_from_directory(viewer_folder(), PAGE, max_age=0))
+    """Returns the viewer's page; once the rendering has tiles, with its title and picture."""
+    record = catalogue().rendering(check_name(rendering, "rendering"))
+    data = read_manifest(workspace(), record)
+    if data is None:
+        return compress(send_from_directory(viewer_folder(), PAGE, max_age=0))
+    manifest = Manifest.load(data, rendering)
+    picture = url_for("pages.preview", rendering=rendering, _external=True) if choose_preview(manifest) else None
+    page = describe_page((viewer_folder() / PAGE).read_text("utf-8"), manifest, picture, request.base_url)
+    response = Response(page, mimetype="text/html")
+    response.set_etag(sha256(page.encode()).hexdigest()[:32], weak=True)
+    response.headers["Cache-Control"] = "no-cache"
+    response.make_conditional(request)
+    return compress(response)
+
+
+@pages.get(f"/view/<rendering>/{PREVIEW}")
+def preview(rendering: str) -> Response:
+    """Returns a picture of the rendering for links to its page."""
+    record = catalogue().rendering(check_name(rendering, "rendering"))
+    data = read_manifest(workspace(), record)
+    picture = None if data is None else _preview(workspace(), rendering, data)
+    if picture is None:
+        raise NotFound(f"rendering {rendering!r} has no picture yet; run: map3d render {rendering}")
+    response = Response(picture, mimetype="image/jpeg")
+    response.set_etag(sha256(picture).hexdigest()[:32])
+    response.headers["Cache-Control"] = "no-cache"
+    response.make_conditional(request)
+    return response
 
 
 @pages.get("/view/<rendering>/<path:file>")
@@ -84,6 +115,11 @@ def healthz() -> WerkzeugResponse:
 def _without_cache(response: WerkzeugResponse) -> WerkzeugResponse:
     response.headers["Cache-Control"] = "no-store"
     return response
+
+
+@lru_cache(maxsize=16)
+def _preview(home: Workspace, rendering: str, manifest: bytes) -> bytes | None:
+    return make_preview(home, catalogue().rendering(rendering), Manifest.load(manifest, rendering))
 
 
 def _describe(record: RenderingRecord) -> ListedRendering:

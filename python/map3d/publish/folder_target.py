@@ -1,0 +1,124 @@
+"""Publishes to a folder: a draft beside it replaces it in one step. Unchanged archives are linked, not written again."""
+
+import os
+import shutil
+from contextlib import suppress
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from map3d.errors import AlreadyExists, Corrupt
+from map3d.publish.checksums import CHECKSUMS, UNKNOWN, dump_checksums, file_digest, parse_checksums
+from map3d.publish.pmtiles_archive import Archive
+from map3d.publish.target import KeptArchive, Target
+from map3d.tiles.manifest import FILE_NAME
+
+
+class FolderTarget(Target):
+    """The draft has a hidden name. After a stop, the next attempt reuses its finished archives."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(str(folder))
+        self.folder = folder.absolute()
+        self.draft = self.folder.with_name(f".{self.folder.name}.publishing")
+
+    def start(self, replace: bool) -> None:
+        _check_folder(self.folder, replace)
+        if not self.folder.is_dir():
+            return
+        sums = self.folder / CHECKSUMS
+        if sums.is_file():
+            self.old_digests = parse_checksums(sums.read_bytes()) | {CHECKSUMS: file_digest(sums)}
+        self.old_sizes = {path.relative_to(self.folder).as_posix(): path.stat().st_size for path in self.folder.rglob("*") if path.is_file()}
+
+    def find_archive(self, name: str, metadata: dict[str, Any]) -> KeptArchive | None:
+        path = self.draft / name
+        tiles = count_finished_tiles(path, metadata)
+        digest = file_digest(path) if tiles else self.old_digests.get(name, UNKNOWN)
+        if not tiles:
+            tiles = count_finished_tiles(self.folder / name, metadata) if digest != UNKNOWN else 0
+            if not tiles:
+                return None
+            _link(self.folder / name, path)
+        self.record(name, digest, path.stat().st_size, changed=False)
+        self.kept_archives += 1
+        return KeptArchive(tiles)
+
+    def archive_path(self, name: str) -> Path:
+        return self.draft / name
+
+    def add_archive(self, name: str) -> None:
+        path = self.draft / name
+        self.record(name, file_digest(path), path.stat().st_size, changed=True)
+
+    def add(self, name: str, data: bytes) -> None:
+        path = self.draft / name
+        unchanged = self.is_unchanged(name, data) and (self.folder / name).read_bytes() == data
+        if unchanged:
+            _link(self.folder / name, path)
+        else:
+            _write(path, data)
+        self.record(name, sha256(data).hexdigest(), len(data), changed=not unchanged)
+
+    def finish(self) -> None:
+        self.add(CHECKSUMS, dump_checksums(self.digests))
+        self._remove_leftovers()
+        self.removed = sorted(self.old_sizes.keys() - self.digests.keys())
+        _replace_folder(self.draft, self.folder)
+
+    def _remove_leftovers(self) -> None:
+        """Removes the files of earlier attempts that this one did not write."""
+        for path in sorted(self.draft.rglob("*"), reverse=True):
+            if path.is_file() and path.relative_to(self.draft).as_posix() not in self.digests:
+                path.unlink()
+            elif path.is_dir() and not any(path.iterdir()):
+                path.rmdir()
+
+
+def count_finished_tiles(path: Path, metadata: dict[str, Any]) -> int:
+    """Returns the number of tiles in a complete archive with this metadata; 0 without one."""
+    if not path.is_file():
+        return 0
+    try:
+        archive = Archive(path)
+        return archive.count_tiles() if archive.metadata == metadata else 0
+    except Corrupt:
+        return 0
+
+
+def _check_folder(folder: Path, replace: bool) -> None:
+    if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
+        return
+    if not folder.is_dir() or not (folder / FILE_NAME).is_file():
+        raise AlreadyExists(f"{folder}: exists and is not a published rendering; name another folder")
+    if not replace:
+        raise AlreadyExists(f"{folder}: already contains a published rendering; replace it with --replace, or name another folder")
+
+
+def _link(source: Path, path: Path) -> None:
+    """Links a file, or copies it where the file system has no links."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.unlink(missing_ok=True)
+    with suppress(OSError):
+        os.link(source, path)
+        return
+    shutil.copyfile(source, path)
+
+
+def _write(path: Path, data: bytes) -> None:
+    """Writes a new file: an old one of this name may be a link to a published file."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.unlink(missing_ok=True)
+    with path.open("xb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _replace_folder(draft: Path, folder: Path) -> None:
+    old = folder.with_name(f".{folder.name}.old")
+    shutil.rmtree(old, ignore_errors=True)
+    if folder.exists():
+        folder.rename(old)
+    draft.rename(folder)
+    shutil.rmtree(old, ignore_errors=True)

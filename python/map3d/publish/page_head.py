@@ -1,0 +1,46 @@
+"""Head of the viewer's page for one rendering: title, description and picture, which search engines and messengers show for a link."""
+
+import re
+from html import escape
+from typing import Final
+
+from map3d.publish.preview_picture import HEIGHT_PX, WIDTH_PX
+from map3d.tiles.manifest import Manifest
+
+_TITLE: Final = re.compile(r"<title>[^<]*</title>\n?")
+
+
+def describe_page(page: str, manifest: Manifest, picture: str | None, url: str | None = None) -> str:
+    """Returns the page with the rendering's title and metadata. `picture`: URL of the preview, None without one; `url`: the page's own address."""
+    title, description = manifest.title or manifest.name, _description(manifest)
+    rows = [
+        f"<title>{escape(title)}</title>",
+        f'<meta name="description" content="{escape(description)}">',
+        f'<meta property="og:title" content="{escape(title)}">',
+        f'<meta property="og:description" content="{escape(description)}">',
+        '<meta property="og:type" content="website">',
+    ]
+    if url is not None:
+        rows.append(f'<meta property="og:url" content="{escape(url)}">')
+    if picture is not None:
+        rows += [
+            f'<meta property="og:image" content="{escape(picture)}">',
+            f'<meta property="og:image:width" content="{WIDTH_PX}">',
+            f'<meta property="og:image:height" content="{HEIGHT_PX}">',
+            '<meta name="twitter:card" content="summary_large_image">',
+        ]
+    return _insert(_TITLE.sub("", page, count=1), "\n".join(rows) + "\n")
+
+
+def _description(manifest: Manifest) -> str:
+    count = len(manifest.views)
+    return f"Oblique map in {count} {'view' if count == 1 else 'views'}. {manifest.attribution}".strip()
+
+
+def _insert(page: str, rows: str) -> str:
+    """Inserts the rows at the end of the head; without one, behind the doctype."""
+    at = page.find("</head>")
+    if at < 0:
+        doctype = re.match(r"\s*<!doctype[^>]*>\n?", page, re.IGNORECASE)
+        at = doctype.end() if doctype else 0
+    return page[:at] + rows + page[at:]

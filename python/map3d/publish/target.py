@@ -1,0 +1,130 @@
+"""What a rendering is published to, and which files it consists of."""
+
+import re
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, Final
+
+from map3d.publish.checksums import CHECKSUMS, UNKNOWN
+from map3d.tiles.manifest import FILE_NAME
+from map3d.tiles.viewer_files import PAGE
+
+SEARCH_ROOT: Final = "objects/search.json"
+LAST: Final = (SEARCH_ROOT, PAGE, FILE_NAME)
+"""Files that refer to others, and are written after them."""
+
+_NAMED_BY_CONTENT: Final = re.compile(r"objects/search/[0-9a-f]{16}\.json|[^/]+/[a-z0-9_-]+-[0-9a-f]{16}\.pmtiles")
+_DOCUMENT: Final = re.compile(r"objects/[0-9a-z/]+\.json")
+
+
+def is_named_by_content(name: str) -> bool:
+    """Whether a file of this name always has the same bytes."""
+    return _NAMED_BY_CONTENT.fullmatch(name) is not None
+
+
+def is_written_by_publish(name: str) -> bool:
+    """Whether only `map3d publish` writes files of such a name, so that one which is no longer part of the rendering may be deleted."""
+    return is_named_by_content(name) or _DOCUMENT.fullmatch(name) is not None
+
+
+@dataclass(frozen=True)
+class KeptArchive:
+    """An archive that need not be written. `tiles`: None if it was not read."""
+
+    tiles: int | None
+
+
+class Target(ABC):
+    """Receives the files of a publication, then switches to them. Subclasses record in `digests` and `sizes` every file of the new state."""
+
+    dry = False
+
+    def __init__(self, url: str) -> None:
+        self.url = url
+        self.digests: dict[str, str] = {}
+        self.sizes: dict[str, int] = {}
+        self.changed: dict[str, int] = {}
+        """Sizes of the files that were written or sent."""
+        self.removed: list[str] = []
+        self.kept_archives = 0
+        self.old_digests: dict[str, str] = {}
+        self.old_sizes: dict[str, int] = {}
+
+    @abstractmethod
+    def start(self, replace: bool) -> None:
+        """Reads the present state. Raises AlreadyExists for another's files, or for a published rendering without `replace`."""
+
+    @abstractmethod
+    def find_archive(self, name: str, metadata: dict[str, Any]) -> KeptArchive | None:
+        """Keeps a complete archive of this name and metadata; returns None if it has to be written."""
+
+    @abstractmethod
+    def archive_path(self, name: str) -> Path:
+        """Returns the path under which the archive is to be written."""
+
+    @abstractmethod
+    def add_archive(self, name: str) -> None:
+        """Takes the archive at `archive_path`."""
+
+    @abstractmethod
+    def add(self, name: str, data: bytes) -> None:
+        """Takes a file. Files of LAST are visible only after all files before them."""
+
+    @abstractmethod
+    def finish(self) -> None:
+        """Writes the checksums and removes what no longer belongs."""
+
+    def close(self) -> None:  # noqa: B027
+        """Releases what the target holds, also after an error."""
+
+    def record(self, name: str, digest: str, size: int, *, changed: bool) -> None:
+        self.digests[name], self.sizes[name] = digest, size
+        if changed:
+            self.changed[name] = size
+
+    def is_unchanged(self, name: str, data: bytes) -> bool:
+        """Whether the present state has this file with these bytes."""
+        known = self.old_digests.get(name, UNKNOWN)
+        return known != UNKNOWN and self.old_sizes.get(name) == len(data) and sha256(data).hexdigest() == known
+
+
+class DryRun(Target):
+    """Compares with the present state of another target, and writes nothing. Sizes of archives that would be written are estimates."""
+
+    dry = True
+
+    def __init__(self, target: Target) -> None:
+        super().__init__(target.url)
+        self._target = target
+
+    def start(self, replace: bool) -> None:
+        self._target.start(replace)
+        self.old_digests, self.old_sizes = self._target.old_digests, self._target.old_sizes
+
+    def find_archive(self, name: str, metadata: dict[str, Any]) -> KeptArchive | None:
+        if self.old_digests.get(name, UNKNOWN) == UNKNOWN or name not in self.old_sizes:
+            return None
+        self.record(name, self.old_digests[name], self.old_sizes[name], changed=False)
+        self.kept_archives += 1
+        return KeptArchive(None)
+
+    def archive_path(self, name: str) -> Path:
+        raise AssertionError("a dry run writes no archives")
+
+    def add_archive(self, name: str) -> None:
+        raise AssertionError("a dry run writes no archives")
+
+    def estimate_archive(self, name: str, size: int) -> None:
+        self.record(name, UNKNOWN, size, changed=True)
+
+    def add(self, name: str, data: bytes) -> None:
+        self.record(name, sha256(data).hexdigest(), len(data), changed=not self.is_unchanged(name, data))
+
+    def close(self) -> None:
+        self._target.close()
+
+    def finish(self) -> None:
+        present = {*self.old_digests, *(name for name in self.old_sizes if is_written_by_publish(name))} & self.old_sizes.keys()
+        self.removed = sorted(present - self.digests.keys() - {CHECKSUMS})
