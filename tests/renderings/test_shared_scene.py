@@ -19,8 +19,10 @@ from map3d.ingest.importing import import_file
 from map3d.ingest.sources import find_sources
 from map3d.object_store import ObjectStore
 from map3d.registry import Registry
+from map3d.renderings import remove_scene as remove_scene_module
 from map3d.renderings import scene_cache
 from map3d.renderings.build import BUILD_BYTES, build, is_stale, open_scene
+from map3d.renderings.remove_scene import find_scene, finish_scene_removal, remove_scene
 from map3d.renderings.scene_cache import LIMIT_VARIABLE, scene_in_use
 from map3d.renderings.shared_scene import read_shared, remove_shared
 from map3d.types import ViewAngles
@@ -140,6 +142,25 @@ def test_files_of_builds_before_the_previous_one_are_deleted(host: Host, node: W
     assert list(store.list()) == []
     with pytest.raises(NotFound, match="map3d render"):
         read_shared(record)
+
+
+def test_a_removed_scene_leaves_nothing_in_the_object_store(host: Host) -> None:
+    host.build()
+    removal = find_scene(host.workspace, host.catalogue, "town", with_renderings=False)
+    assert removal.shared == f"{host.url}/town"
+    remove_scene(host.workspace, host.catalogue, removal)
+    assert list(ObjectStore.open(host.url).list()) == []
+    assert host.catalogue.scenes() == []
+
+
+def test_a_killed_removal_of_a_shared_scene_is_completed(host: Host, monkeypatch: pytest.MonkeyPatch) -> None:
+    host.build()
+    with monkeypatch.context() as killed:
+        killed.setattr(remove_scene_module, "remove_shared", None)
+        with pytest.raises(TypeError):
+            remove_scene(host.workspace, host.catalogue, find_scene(host.workspace, host.catalogue, "town", with_renderings=False))
+    finish_scene_removal(host.workspace, host.catalogue, "town")
+    assert list(ObjectStore.open(host.url).list()) == []
 
 
 def _fetch_and_log(root: Path, record: SceneRecord, log: Path, start: "multiprocessing.synchronize.Barrier") -> None:

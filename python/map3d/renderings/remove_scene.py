@@ -10,21 +10,24 @@ from map3d.catalogue.scene_lock import scene_lock
 from map3d.errors import BadRequest, NotFound
 from map3d.ingest.asset_removal import remove_folder
 from map3d.ingest.unfinished_imports import running_imports
-from map3d.renderings.removal_checks import folder_bytes
+from map3d.renderings.removal_checks import folder_bytes, objects_bytes
 from map3d.renderings.removal_mark import read_mark, removal_mark
 from map3d.renderings.remove_rendering import RenderingRemoval, find_rendering, is_rendering_removed, remove_rendering
+from map3d.renderings.shared_scene import files_url, remove_shared
 
 _RENDERINGS: Final = "renderings"
+_SHARED: Final = "files"
 
 
 @dataclass(frozen=True)
 class SceneRemoval:
-    """`files`: number of assets; `bytes`: of the scene, without its renderings."""
+    """`files`: number of assets; `bytes`: of the scene, without its renderings; `shared`: URL of the files that other nodes fetch, None without."""
 
     name: str
     files: int
     bytes: int
     renderings: tuple[RenderingRemoval, ...]
+    shared: str | None = None
 
     @property
     def total_bytes(self) -> int:
@@ -40,11 +43,11 @@ def find_scene(workspace: Workspace, catalogue: Catalogue, name: str, *, with_re
     mark = read_mark(folder)
     remains = _remaining_renderings(workspace, catalogue, mark or {})
     try:
-        files, records = len(catalogue.assets(name)), catalogue.renderings(name)
+        files, records, shared = len(catalogue.assets(name)), catalogue.renderings(name), files_url(catalogue.scene(name))
     except NotFound:
         if mark is None:
             raise
-        files, records = 0, []
+        files, records, shared = 0, [], mark.get(_SHARED)
     if records and not with_renderings:
         raise BadRequest(
             f"scene {name}: has renderings ({', '.join(record.name for record in records)}); remove them first with map3d remove-rendering, "
@@ -52,7 +55,8 @@ def find_scene(workspace: Workspace, catalogue: Catalogue, name: str, *, with_re
         )
     _check_imports(workspace, name)
     renderings = tuple(find_rendering(workspace, catalogue, rendering) for rendering in [*(record.name for record in records), *remains])
-    return SceneRemoval(name, files, folder_bytes(folder), renderings)
+    size = folder_bytes(folder) + (0 if shared is None else objects_bytes(shared))
+    return SceneRemoval(name, files, size, renderings, shared)
 
 
 def remove_scene(workspace: Workspace, catalogue: Catalogue, removal: SceneRemoval) -> None:
@@ -60,11 +64,13 @@ def remove_scene(workspace: Workspace, catalogue: Catalogue, removal: SceneRemov
     folder = workspace.scene_folder(removal.name)
     with scene_lock(workspace, removal.name, wait=False):
         _check_imports(workspace, removal.name)
-        with removal_mark(folder, {_RENDERINGS: [rendering.name for rendering in removal.renderings]}):
+        with removal_mark(folder, {_RENDERINGS: [rendering.name for rendering in removal.renderings], _SHARED: removal.shared}):
             for rendering in removal.renderings:
                 remove_rendering(workspace, catalogue, rendering)
             with suppress(NotFound):
                 catalogue.remove_scene(removal.name)
+            if removal.shared is not None:
+                remove_shared(removal.shared)
             remove_folder(folder)
 
 
