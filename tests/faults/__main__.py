@@ -15,7 +15,7 @@ from tests.faults.system_calls import is_strace_usable, run_system_calls
 def kills(options: argparse.Namespace) -> int:
     seed = secrets.randbelow(1 << 31) if options.seed is None else options.seed
     print(f"random kills: {options.runs} runs of {options.kills} kills, seeds {seed} to {seed + options.runs - 1}", flush=True)
-    reports = run_kills(options.runs, options.kills, seed)
+    reports = run_kills(options.runs, options.kills, seed, home=options.home)
     total = sum((report.kills for report in reports), Counter[str]())
     wrong = [report for report in reports if report.faults]
     print(f"random kills: {total.total():,} in {len(reports)} runs: {_counts(total)}; {len(wrong)} runs with faults")
@@ -47,6 +47,7 @@ def main() -> int:
     parser.add_argument("--runs", type=int, default=50, help="number of runs with random kills")
     parser.add_argument("--kills", type=int, default=21, help="kills in each run")
     parser.add_argument("--seed", type=int, help="seed of the first run; default: random")
+    parser.add_argument("--home", choices=("sqlite", "mongodb"), default="sqlite", help="home of the catalogue in the runs with random kills")
     parser.add_argument("--every", type=int, default=1, help="only every Nth failing system call")
     parser.add_argument("--sizes", type=int, default=24, help="number of disk sizes")
     options = parser.parse_args()

@@ -5,18 +5,20 @@ import shutil
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
 from map3d.catalogue import Workspace
+from tests.catalogue.mongo_process import MongoProcess, build
 from tests.faults.processes import Command, kill_child
 from tests.faults.street import RENDERING, SCENE, VARIANTS, Expected, make_workspace, read_result, render_undisturbed, street_file
 from tests.faults.tile_reader import TileReader
 
-DELAYS_S: Final = (0.02, 0.7)
-"""Shortest and longest time between two kills. A command needs about half a second to start."""
+DELAYS_S: Final = (0.05, 2.5)
+"""Shortest and longest time between two kills. A command needs about half a second to start, a render of the street some seconds."""
 IMPORT_KILLS: Final = 0.25
 """Share of the moments of an import at which a kill happens: an import is short, and most kills shall hit the render."""
 GIVE_UP_S: Final = 300.0
@@ -71,10 +73,12 @@ class Reference:
 class KillRun:
     """One run: the same commands are started again after each kill until the last variant is complete."""
 
-    def __init__(self, reference: Reference, root: Path, seed: int, kills: int, environment: Mapping[str, str] | None = None) -> None:
-        self._reference, self._kills = reference, kills
+    def __init__(self, reference: Reference, workspace: Workspace, seed: int, kills: int, mongo: MongoProcess | None = None) -> None:
+        """`mongo`: the server of the workspace's catalogue, which is killed too; None for SQLite."""
+        self._reference, self._kills, self._mongo = reference, kills, mongo
         self._choose = random.Random(seed)
-        self._workspace = Workspace(root)
+        self._workspace, root = workspace, workspace.root
+        environment = {"MAP3D_CATALOGUE": workspace.catalogue_url or ""}
         self._files = root / "files"
         self.report = KillReport(seed)
         where = ("-w", root)
@@ -145,8 +149,14 @@ class KillRun:
             raise RuntimeError(f"{command.name} failed with status {command.status()}: {command.output()}")
 
     def _kill(self, command: Command) -> None:
-        victim = self._choose.choices(("command", "subprocess", "worker", "subprocess of worker", "server"), (30, 30, 15, 15, 10))[0]
-        if victim == "command":
+        victims = {"command": 30, "subprocess": 30, "worker": 15, "subprocess of worker": 15, "server": 10, "catalogue": 15 if self._mongo else 0}
+        victim = self._choose.choices(list(victims), list(victims.values()))[0]
+        if victim == "catalogue" and self._mongo is not None:
+            self._mongo.kill()
+            time.sleep(self._choose.uniform(0, 3))
+            self._mongo.start()
+            self.report.kills["catalogue"] += 1
+        elif victim == "command":
             command.kill()
             self.report.kills[command.name] += 1
         elif victim == "subprocess" and kill_child(command.pid, self._choose):
@@ -168,24 +178,43 @@ class KillRun:
         """Compares the tiles with the undisturbed ones of the last variant, and runs `map3d verify`."""
         if read_result(self._workspace).digest != self._reference.expected(self.report.variants[-1]).digest:
             self.report.faults.append("tiles differ from the undisturbed ones")
-        verify = Command("verify", ["verify", "-w", self._workspace.root])
+        verify = Command("verify", ["verify", "-w", self._workspace.root], {"MAP3D_CATALOGUE": self._workspace.catalogue_url or ""})
         verify.start()
         if verify.wait(GIVE_UP_S):
             self.report.faults.append(f"verify: {verify.output()}")
         verify.end()
 
 
-def run_kills(runs: int, kills: int, seed: int, houses: int = 48, show: bool = True) -> list[KillReport]:
-    """Runs `kills` kills in each of `runs` runs; run number i has seed `seed + i`."""
+def run_kills(runs: int, kills: int, seed: int, houses: int = 48, home: str = "sqlite", show: bool = True) -> list[KillReport]:
+    """Runs `kills` kills in each of `runs` runs; run number i has seed `seed + i`. `home`: of the catalogue, sqlite or mongodb."""
     reports = []
-    with tempfile.TemporaryDirectory(prefix="map3d-faults-") as folder:
+    with tempfile.TemporaryDirectory(prefix="map3d-faults-") as folder, _mongo(home, Path(folder)) as mongo:
         reference = Reference(Path(folder), houses)
         for number in range(runs):
             root = Path(folder) / f"run{number}"
-            shutil.copytree(reference.template, root)
-            reports.append(KillRun(reference, root, seed + number, kills).run())
+            if mongo is None:
+                shutil.copytree(reference.template, root)
+                workspace = Workspace(root)
+            else:
+                workspace = make_workspace(root, houses, catalogue_url=f"{mongo.url}/run{number}")
+            reports.append(KillRun(reference, workspace, seed + number, kills, mongo).run())
             if show:
                 print(reports[-1], flush=True)
             if not reports[-1].faults:
                 shutil.rmtree(root)
     return reports
+
+
+@contextmanager
+def _mongo(home: str, folder: Path) -> Iterator[MongoProcess | None]:
+    """Starts a MongoDB server for the home `mongodb`."""
+    if home == "sqlite":
+        yield None
+        return
+    build()
+    (folder / "mongodb").mkdir()
+    process = MongoProcess(folder / "mongodb").start()
+    try:
+        yield process
+    finally:
+        process.kill()

@@ -13,7 +13,8 @@ from map3d.catalogue import Catalogue, SceneRecord, Workspace
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import import_file
 from map3d.ingest.sources import find_sources
-from map3d.jobs.run import Run, RunSettings
+from map3d.jobs.run import Run
+from map3d.jobs.run_settings import RunSettings
 from map3d.renderings.build import BUILD_BYTES, build
 from map3d.renderings.create import RenderingRequest, create_rendering
 from map3d.renderings.layers import LayerRequest
@@ -63,7 +64,7 @@ def import_variant(workspace: Workspace, catalogue: Catalogue, path: Path) -> No
 
 def make_workspace(root: Path, houses: int, variant: int = 0, catalogue_url: str | None = None) -> Workspace:
     """Creates a workspace with the imported, built street and an unrendered rendering of it."""
-    workspace = Workspace(root).create()
+    workspace = Workspace(root, catalogue_url).create()
     catalogue = workspace.open_catalogue()
     try:
         catalogue.create_scene(SceneRecord(SCENE))
