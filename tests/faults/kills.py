@@ -14,13 +14,15 @@ from typing import Final
 from map3d.catalogue import Workspace
 from tests.catalogue.mongo_process import MongoProcess, build
 from tests.faults.processes import Command, kill_child
-from tests.faults.street import RENDERING, SCENE, VARIANTS, Expected, make_workspace, read_result, render_undisturbed, street_file
+from tests.faults.street import RENDERING, SCENE, VARIANTS, Expected, change_variant, make_workspace, read_result, render_undisturbed, street_file
 from tests.faults.tile_reader import TileReader
 
-DELAYS_S: Final = (0.05, 2.5)
-"""Shortest and longest time between two kills. A command needs about half a second to start, a render of the street some seconds."""
+DELAYS: Final = (0.01, 0.6)
+"""Shortest and longest time between two kills, as shares of the time that an undisturbed `map3d render` takes on this machine now."""
 IMPORT_KILLS: Final = 0.25
 """Share of the moments of an import at which a kill happens: an import is short, and most kills shall hit the render."""
+MAX_SHOWN: Final = 4
+"""Faults of a run that are printed."""
 GIVE_UP_S: Final = 300.0
 """A run that takes longer has hung."""
 QUARANTINE: Final = "in quarantine"
@@ -41,7 +43,7 @@ class KillReport:
     def __str__(self) -> str:
         counts = ", ".join(f"{count} {victim}" for victim, count in sorted(self.kills.items()))
         variants = "→".join(map(str, self.variants))
-        outcome = "equal" if not self.faults else "FAULTS: " + "; ".join(self.faults)
+        outcome = "equal" if not self.faults else "FAULTS: " + "; ".join(self.faults[:MAX_SHOWN])
         retries = f", {self.retries} retries" if self.retries else ""
         return (
             f"seed {self.seed}: {self.kills.total()} kills ({counts}), variants {variants}{retries}, {self.tiles_served:,} tiles served, "
@@ -58,10 +60,25 @@ class Reference:
         make_workspace(self.template, houses)
         self._folder = folder
         self._expected: dict[int, Expected] = {}
+        self.render_s = self._time_render()
+
+    def _time_render(self) -> float:
+        """Returns the time that an undisturbed `map3d render` takes, in seconds."""
+        root = self._folder / "timed"
+        shutil.copytree(self.template, root)
+        render = Command("render", ["render", RENDERING, "--workers", "2", "-w", root])
+        started = time.monotonic()
+        render.start()
+        assert render.wait(GIVE_UP_S) == 0, render.output()
+        render.end()
+        shutil.rmtree(root)
+        return time.monotonic() - started
 
     def expected(self, variant: int) -> Expected:
         if variant not in self._expected:
-            workspace = make_workspace(self._folder / f"variant{variant}", self.houses, variant)
+            workspace = Workspace(self._folder / f"variant{variant}")
+            shutil.copytree(self.template, workspace.root)
+            change_variant(workspace, variant, self.houses)
             self._expected[variant] = render_undisturbed(workspace)
             shutil.rmtree(workspace.root)
         return self._expected[variant]
@@ -135,7 +152,7 @@ class KillRun:
 
     def _pause(self, command: Command) -> None:
         """Waits for a random time, or until the command has ended."""
-        end = time.monotonic() + self._choose.uniform(*DELAYS_S)
+        end = time.monotonic() + self._choose.uniform(*DELAYS) * self._reference.render_s
         while time.monotonic() < end and command.status() is None:
             time.sleep(0.005)
 

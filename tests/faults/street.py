@@ -62,6 +62,16 @@ def import_variant(workspace: Workspace, catalogue: Catalogue, path: Path) -> No
     import_file(workspace, catalogue, SCENE, find_sources([path])[0], ImportOptions(split="group"))
 
 
+def change_variant(workspace: Workspace, variant: int, houses: int) -> None:
+    """Imports and builds another variant; the frames of the rendering stay."""
+    catalogue = workspace.open_catalogue()
+    try:
+        import_variant(workspace, catalogue, street_file(workspace.root / "files", variant, houses))
+        build(workspace, catalogue, SCENE, threads=1, max_memory_bytes=BUILD_BYTES)
+    finally:
+        catalogue.close()
+
+
 def make_workspace(root: Path, houses: int, variant: int = 0, catalogue_url: str | None = None) -> Workspace:
     """Creates a workspace with the imported, built street and an unrendered rendering of it."""
     workspace = Workspace(root, catalogue_url).create()
