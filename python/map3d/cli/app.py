@@ -26,6 +26,7 @@ COMMANDS: Final = {
     "retry": "retry",
     "serve": "serve",
     "publish": "publish",
+    "export": "export",
     "site": "site",
     "verify": "verify",
     "show": "show",
