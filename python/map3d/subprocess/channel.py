@@ -87,9 +87,10 @@ class Channel:
         end = _HEAD.size + json_bytes + blobs_bytes
         if len(self._buffer) < end:
             return None
-        whole = bytes(memoryview(self._buffer)[_HEAD.size : end])
+        with memoryview(self._buffer) as whole, whole[_HEAD.size + json_bytes : end] as rest:
+            message = _parse(bytes(whole[_HEAD.size : _HEAD.size + json_bytes]), rest)
         del self._buffer[:end]
-        return _parse(whole[:json_bytes], memoryview(whole)[json_bytes:])
+        return message
 
 
 def _parse(text: bytes, rest: memoryview) -> Message:
