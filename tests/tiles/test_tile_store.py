@@ -12,7 +12,7 @@ from map3d.tiles.object_tile_store import ObjectTileStore
 from map3d.tiles.open_store import open_or_create_store, open_store
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.tile_store import StoredBlock, StoredTile, StoreShape
-from map3d.types import BlockId, Layer
+from map3d.types import BlockId, Layer, TileId
 
 LAYERS = (Layer("color", "color", "webp", 80), Layer("normal", "normal", "png"), Layer("id", "id", "png"), Layer("depth", "depth", "png"))
 SHAPE = StoreShape(tile_px=256, zmax=4, layers=LAYERS)
@@ -60,6 +60,16 @@ def test_stored_tiles_read_back(store):
     assert read(store, tiles) == [tile.data for tile in tiles]
     assert store.get_seam(BLOCK) == b"seam"
     assert store.get_block(BLOCK) == StoredBlock(BLOCK, "key", 1, len(tiles))
+
+
+def test_many_tiles_are_read_in_their_order(store):
+    blocks = [BlockId(0, 0, 0), BLOCK, BlockId(1, 0, 1)]
+    for block in blocks:
+        store.put_block(block, "k", 1, content(block)[::3], b"s")
+    names = [tile for block in blocks for tile in tiles_of_block(block, SHAPE.zmax)] + [TileId(4, 0, 0), TileId(4, 8, 0)]
+    for order in (names, names[::-1], sorted(names, key=lambda tile: tile.x * 7 % 5), []):
+        for layer in (0, 3):
+            assert list(store.read_tiles(layer, order)) == [store.get_tile(layer, *tile) for tile in order]
 
 
 def test_seams_are_read_together(store):

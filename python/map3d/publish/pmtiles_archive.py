@@ -37,8 +37,9 @@ def write_archive(store: TileStore, layer: int, path: Path, metadata: dict[str, 
     path.parent.mkdir(parents=True, exist_ok=True)
     with draft.open("wb") as file, tempfile.TemporaryFile(dir=path.parent) as data:
         writer = _create_writer(file, data)
-        for done, tile_id in enumerate(ids, 1):
-            _write_tile(writer, tile_id, _read_tile(store, layer, TileId(*tileid_to_zxy(tile_id))))
+        tiles = store.read_tiles(layer, (TileId(*tileid_to_zxy(tile_id)) for tile_id in ids))
+        for done, (tile_id, found) in enumerate(zip(ids, tiles, strict=True), 1):
+            _write_tile(writer, tile_id, _check_tile(layer, tile_id, found))
             if done % TILES_PER_STEP == 0 or done == len(ids):
                 on_tiles_written((done - 1) % TILES_PER_STEP + 1)
         with _small_leaves():
@@ -139,8 +140,8 @@ def _write_tile(writer: Any, tile_id: int, data: bytes) -> None:
     writer.addressed_tiles += 1
 
 
-def _read_tile(store: TileStore, layer: int, tile: TileId) -> bytes:
-    data = store.get_tile(layer, *tile)
+def _check_tile(layer: int, tile_id: int, data: bytes | None) -> bytes:
     if data is None:
+        tile = TileId(*tileid_to_zxy(tile_id))
         raise Corrupt(f"tile {layer}: {tile.z}/{tile.x}/{tile.y} was removed during publishing; publish again")
     return data

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import asdict
-from itertools import islice
+from itertools import groupby, islice
 from types import TracebackType
 from typing import Final, Self, TypeVar
 
@@ -126,6 +126,27 @@ class ObjectTileStore:
         except BadRequest:
             return None
         return self._read_span(block, lambda index: index.find(layer, z, x, y)) if 0 <= layer < len(self._shape.layers) else None
+
+    def read_tiles(self, layer: int, tiles: Iterable[TileId]) -> Iterator[bytes | None]:
+        groups = (list(group) for _, group in groupby(tiles, lambda tile: block_of(tile, self._shape.zmax)))
+        for found in self._map(lambda group: self._read_group(layer, group), groups, CONNECTIONS):
+            yield from found
+
+    def _read_group(self, layer: int, tiles: Sequence[TileId]) -> list[bytes | None]:
+        """Reads tiles of one block with one request; one by one if they are far apart in its object, or if it is replaced meanwhile."""
+        block = block_of(tiles[0], self._shape.zmax)
+        found = self._current_index(block)
+        spans = [None if found is None else found[1].find(layer, *tile) for tile in tiles]
+        known = [span for span in spans if span is not None]
+        if found is not None and len(known) > 1:
+            start, end = min(span.start for span in known), max(span.start + span.length for span in known)
+            if end - start <= 2 * sum(span.length for span in known):
+                with suppress(ObjectChanged):
+                    whole = self._objects.get_range(_object_name(block), start, end - start, if_match=found[0]) or b""
+                    parts = [None if span is None else whole[span.start - start : span.start - start + span.length] for span in spans]
+                    if all(span is None or part is None or content_hash(part) == span.hash for span, part in zip(spans, parts, strict=True)):
+                        return parts
+        return [self.get_tile(layer, *tile) for tile in tiles]
 
     def get_seam(self, block: BlockId) -> bytes | None:
         return self._read_span(block, lambda index: index.seam)
@@ -260,11 +281,11 @@ class ObjectTileStore:
         blocks = (block for block in map(_parse_object_name, names) if block is not None)
         yield from (found[1] for found in self._map(self._read_index, blocks) if found is not None)
 
-    def _map(self, function: Callable[[_Given], _Found], given: Iterable[_Given]) -> Iterator[_Found]:
+    def _map(self, function: Callable[[_Given], _Found], given: Iterable[_Given], batch_size: int = BATCH) -> Iterator[_Found]:
         """Like `map`, with several requests at once."""
         rest = iter(given)
         with ThreadPoolExecutor(CONNECTIONS, thread_name_prefix="objects") as pool:
-            while batch := list(islice(rest, BATCH)):
+            while batch := list(islice(rest, batch_size)):
                 yield from pool.map(function, batch)
 
 

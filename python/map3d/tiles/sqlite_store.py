@@ -129,6 +129,9 @@ class SqliteTileStore:
             raise Corrupt(f"{self.path}: tile {layer}: {z}/{x}/{y} has no bytes; remove the file and render again")
         return None if row is None else bytes(row[0])
 
+    def read_tiles(self, layer: int, tiles: Iterable[TileId]) -> Iterator[bytes | None]:
+        return (self.get_tile(layer, *tile) for tile in tiles)
+
     def get_seam(self, block: BlockId) -> bytes | None:
         with self._reading() as db:
             row = db.execute("SELECT seam FROM block WHERE id = ?", (str(block),)).fetchone()
