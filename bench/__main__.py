@@ -1,5 +1,5 @@
 """`python -m bench [PART …] [--json]`. Parts: tiles, light, encoding, ingest, incremental (the default); extent, planning, stored, viewer,
-catalogue."""
+catalogue, saturation."""
 
 import argparse
 import json
@@ -10,11 +10,11 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from . import catalogue, encoding, extent, incremental, ingest, light_layers, planning, stored, tiles, viewer
+from . import catalogue, encoding, extent, incremental, ingest, light_layers, planning, saturation, stored, tiles, viewer
 from .benchmark_scene import CACHE
 
 PARTS = ("tiles", "light", "encoding", "ingest", "incremental")
-ON_REQUEST = ("extent", "planning", "stored", "viewer", "catalogue")
+ON_REQUEST = ("extent", "planning", "stored", "viewer", "catalogue", "saturation")
 Rows = list[dict[str, Any]]
 
 
@@ -26,8 +26,10 @@ def main() -> None:
     parser.add_argument("--res", type=float, default=0.2, help="tiles: metres per pixel")
     parser.add_argument("--tiles", type=int, default=48, help="tiles: number of tiles")
     parser.add_argument("--folders", type=Path, nargs="+", default=[CACHE], help="stored: folders with renderings or published folders")
-    parser.add_argument("--catalogues", nargs="+", default=[], metavar="URL", help="catalogue: MongoDB servers, without a database")
-    parser.add_argument("--jobs", type=int, nargs="+", default=catalogue.PLANNED_JOBS, help="catalogue: numbers of base blocks to plan")
+    parser.add_argument("--catalogues", nargs="+", default=[], metavar="URL", help="catalogue, saturation: MongoDB servers, without a database")
+    parser.add_argument(
+        "--jobs", type=int, nargs="+", default=catalogue.PLANNED_JOBS, help="catalogue: numbers of base blocks to plan; saturation: the least of them"
+    )
     parser.add_argument("--quick", action="store_true", help="viewer: a small town without peers, as a smoke test")
     parser.add_argument("--reps", type=int, default=5, help="viewer: number of rounds")
     parser.add_argument("--only", nargs="+", help="viewer: measures, e.g. first frames")
@@ -47,6 +49,7 @@ def main() -> None:
         "extent": lambda: extent.measure(tuple(options.millions), plots=Path("docs/plots")),
         "planning": planning.measure,
         "catalogue": lambda: catalogue.measure(options.catalogues, options.jobs),
+        "saturation": lambda: saturation.measure(options.catalogues, min(options.jobs)),
         "stored": lambda: stored.measure(options.folders),
         "viewer": lambda: viewer.measure(options.quick, options.reps, options.work, tuple(options.only) if options.only else None, options.free),
     }

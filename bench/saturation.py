@@ -14,6 +14,7 @@ from dataclasses import asdict, dataclass
 from multiprocessing.queues import Queue
 from pathlib import Path
 from typing import Any, Final
+from uuid import uuid4
 
 from rich.console import Console
 from rich.table import Table
@@ -50,13 +51,15 @@ class SaturationRow:
     p99_ms: float
 
 
-def measure(catalogue_urls: Sequence[str] = (), workers: int = WORKERS, blocks_s: Sequence[float] = BLOCK_S) -> list[dict[str, Any]]:
-    """Measures SQLite in a temporary folder and the catalogues at the URLs, and prints the table."""
+def measure(
+    catalogue_urls: Sequence[str] = (), jobs: int = JOBS, workers: int = WORKERS, blocks_s: Sequence[float] = BLOCK_S
+) -> list[dict[str, Any]]:
+    """Measures SQLite in a temporary folder and the MongoDB servers at the URLs (without a database), and prints the table."""
     rows = []
     for home in ("sqlite", *catalogue_urls):
         for block_s in blocks_s:
             with tempfile.TemporaryDirectory(prefix="map3d-saturation-") as folder:
-                rows.append(_measure_one(Workspace(Path(folder)), home, workers, block_s))
+                rows.append(_measure_one(_workspace(Path(folder), home), home, workers, block_s, jobs))
     table = Table(title=f"{workers:,} simulated workers", title_justify="left")
     for column in ("catalogue", "seconds a block", "blocks/s offered", "blocks/s leased", "workers busy", "catalogue, ms a block", "99 %, ms"):
         table.add_column(column, justify="right")
@@ -74,12 +77,16 @@ def measure(catalogue_urls: Sequence[str] = (), workers: int = WORKERS, blocks_s
     return [asdict(row) for row in rows]
 
 
-def _measure_one(workspace: Workspace, home: str, workers: int, block_s: float) -> SaturationRow:
+def _workspace(folder: Path, home: str) -> Workspace:
+    return Workspace(folder, None if home == "sqlite" else f"{home.rstrip('/')}/saturation{uuid4().hex[:8]}")
+
+
+def _measure_one(workspace: Workspace, home: str, workers: int, block_s: float, jobs: int) -> SaturationRow:
     catalogue = workspace.create().open_catalogue()
     catalogue.create_scene(SceneRecord(NAME))
     frames = tuple(pin(BOX, 256, 1.0, [ViewAngles(0, 45)]))
     catalogue.create_rendering(RenderingRecord(NAME, NAME, 1.0, (LAYERS,), frames, BOX))
-    catalogue.plan(NAME, _jobs(frames[0].zmax))
+    catalogue.plan(NAME, _jobs(frames[0].zmax, jobs))
     catalogue.close()
     results: Queue[list[tuple[float, float]]] = multiprocessing.Queue()
     start = time.time() + 3.0
@@ -97,9 +104,9 @@ def _measure_one(workspace: Workspace, home: str, workers: int, block_s: float) 
     return SaturationRow(home, each * PROCESSES, block_s, offered, leased, min(leased / offered, 1.0), *percentile)
 
 
-def _jobs(zmax: int) -> Iterator[PlannedJob]:
-    level, side = zmax - 3, 1 << (JOBS - 1).bit_length() // 2
-    for number in range(JOBS):
+def _jobs(zmax: int, jobs: int) -> Iterator[PlannedJob]:
+    level, side = zmax - 3, 1 << ((jobs - 1).bit_length() + 1) // 2
+    for number in range(jobs):
         x, y = number % side, number // side
         yield PlannedJob("0-45", BlockId(level, x, y), "base", morton(x, y), f"key {x} {y}", None)
 

@@ -108,6 +108,6 @@ def test_readers_that_make_other_assets_have_another_version(tmp_path: Path) -> 
     write(tmp_path / "c.tif", (np.arange(17 * 17) * 5 % 11).reshape(1, 17, 17).astype(np.float32))
     found = {name: imported(tmp_path, tmp_path / name, ImportOptions(crs="EPSG:25832")).digest for name in ("a.obj", "b.gml", "c.tif")}
     assert (dict(READER_VERSIONS), found) == (
-        {"citygml": 1, "obj": 1, "raster": 1},
+        {"citygml": 1, "obj": 1, "raster": 2},
         {"a.obj": "8d0ceef106fedeffefc608f4ab2e7ffa", "b.gml": "4467c4c4c66fbc7371b6a154b33be1b5", "c.tif": "26cd38ff20b15a122f3df998ba1dd358"},
     )
