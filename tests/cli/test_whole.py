@@ -222,6 +222,15 @@ def test_levels_and_layers_are_as_requested(run: Run, town: Workspace) -> None:
     assert run("verify", "other")[0] == 0
 
 
+def test_site_refuses_a_folder_with_other_files_before_any_work(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "letter.txt").write_text("mine")
+    status, _, err = run("site", str(write_town(tmp_path / "town", 1)), "-o", str(tmp_path / "out"))
+    assert (status, "is not a published rendering" in err) == (1, True)
+    assert not (tmp_path / "workspace" / "scenes").exists()
+    assert (tmp_path / "out" / "letter.txt").read_text() == "mine"
+
+
 def test_site_of_a_folder_processes_only_changes_when_re_run(run: Run, tmp_path: Path) -> None:
     from map3d.tiles.viewer_files import viewer_folder
 

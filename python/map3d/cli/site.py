@@ -53,8 +53,10 @@ def command(
     """
     from map3d.jobs.run import Run
     from map3d.jobs.run_settings import RunSettings
+    from map3d.publish import check_folder
     from map3d.renderings.site_steps import create_site_rendering
 
+    check_folder(out)
     request = _site_request(folder, views, **options)
     catalogue = workspace.create().open_catalogue()
     try:

@@ -127,6 +127,13 @@ def publish(
     )
 
 
+def check_folder(folder: Path) -> None:
+    """Checks before a long render whether a folder can be published to, or published to again. Raises AlreadyExists for another's files, and
+    ViewerMissing."""
+    viewer_folder()
+    FolderTarget(folder).start(replace=True)
+
+
 def _open_target(workspace: Workspace, rendering: str, out: Path | str) -> Target:
     if isinstance(out, Path) or "://" not in out:
         return FolderTarget(Path(out))
