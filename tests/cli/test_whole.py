@@ -226,7 +226,7 @@ def test_site_refuses_a_folder_with_other_files_before_any_work(run: Run, tmp_pa
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "letter.txt").write_text("mine")
     status, _, err = run("site", str(write_town(tmp_path / "town", 1)), "-o", str(tmp_path / "out"))
-    assert (status, "is not a published rendering" in err) == (1, True)
+    assert (status, "is not a published rendering" in err) == (2, True), err
     assert not (tmp_path / "workspace" / "scenes").exists()
     assert (tmp_path / "out" / "letter.txt").read_text() == "mine"
 
