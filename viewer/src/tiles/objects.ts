@@ -101,7 +101,7 @@ export class Objects {
   }
 
   /**
-   * Returns up to `limit` entries that contain all words of the text; those that begin with the first word come first. In a large rendering, the text or one
+   * Returns up to `limit` entries that contain all words of the text; those with the words in a row come first, then those that begin with the first word. In a large rendering, the text or one
    * of its words must be the beginning of a word; the others may be anywhere.
    */
   async search(text: string, limit = 8): Promise<SearchEntry[]> {
@@ -123,7 +123,7 @@ export class Objects {
       };
       await read(path);
     }
-    const rank = (label: string): number => Number(!label.startsWith(words[0] ?? ""));
+    const rank = (label: string): number => 2 * Number(!` ${label}`.includes(` ${words.join(" ")}`)) + Number(!label.startsWith(words[0] ?? ""));
     return [...found.values()].sort(([a], [b]) => rank(a) - rank(b) || (a < b ? -1 : 1)).slice(0, limit).map(([, entry]) => entry);
   }
 

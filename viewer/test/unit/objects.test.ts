@@ -80,6 +80,11 @@ describe("a divided search index", () => {
     expect(files.size).toBeGreaterThan(500);
   });
 
+  test("lists labels with the words in a row before those with the words anywhere", async () => {
+    const [first, second] = await new Objects(folderOf(files), json).search("hauptstrasse 45");
+    expect(labelsOf([first, second] as SearchEntry[]).map((label) => label.split(", ")[1])).toEqual(["Hauptstraße 45", "Hauptstraße 45"]);
+  });
+
   test("finds words in any order by the longest of them", async () => {
     const found = await new Objects(folderOf(files), json).search("4100 markt");
     expect(labelsOf(found)).toEqual(["DEBY_LOD2_4100, Hauptstraße 3"].filter((label) => label.includes("Markt")));
