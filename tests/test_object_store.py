@@ -144,6 +144,41 @@ def test_of_concurrent_writers_each_update_counts_once(store: ObjectStore) -> No
     assert int(found[0].split()[0]) == 20
 
 
+def test_deleting_other_objects_does_not_disturb_conditional_writers(store: ObjectStore) -> None:
+    store.put("one/count", b"0")
+    over = threading.Event()
+
+    def disturb() -> None:
+        while not over.is_set():
+            for name in ("one/other", "two/only"):
+                store.put(name, b"x", if_absent=True)
+                store.delete(name)
+
+    def add() -> None:
+        for _ in range(10):
+            while True:
+                data, tag = store.get("one/count") or (b"", "")
+                store.put("two/more", b"x")
+                store.delete("two/more")
+                try:
+                    store.put("one/count", b"%d %d" % (int(data.split()[0]) + 1, threading.get_ident()), if_match=tag)
+                except ObjectChanged:
+                    continue
+                break
+
+    writers = [threading.Thread(target=add) for _ in range(3)]
+    threads = [*writers, threading.Thread(target=disturb)]
+    for thread in threads:
+        thread.start()
+    for thread in writers:
+        thread.join()
+    over.set()
+    threads[-1].join()
+    found = store.get("one/count")
+    assert found is not None
+    assert int(found[0].split()[0]) == 30
+
+
 @pytest.mark.parametrize("name", ["", "/a", "a/", "a//b", "../a", "a/../b", ".hidden", "a/.lock", "a\\b", "a\x00", "x" * 901])
 def test_names_never_leave_the_store(store: ObjectStore, name: str) -> None:
     with pytest.raises(BadRequest, match="object name"):

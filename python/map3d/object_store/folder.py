@@ -20,6 +20,7 @@ from map3d.object_store.contract import ObjectStore, check_object_name
 
 DRAFT_AGE_S: Final = 86_400.0
 """A draft of this age belongs to a killed process."""
+CREATE_ATTEMPTS: Final = 100
 
 
 class FolderStore(ObjectStore):
@@ -70,7 +71,6 @@ class FolderStore(ObjectStore):
     ) -> str:
         path = self._path(name)
         with self._failing(name):
-            path.parent.mkdir(parents=True, exist_ok=True)
             draft = path.with_name(f".{path.name}.{secrets.token_hex(8)}.new")
             try:
                 tag = _write(draft, data)
@@ -78,7 +78,8 @@ class FolderStore(ObjectStore):
                     draft.replace(path)
                 elif not self._replace_if(draft, path, if_match):
                     return self._own_bytes(name, data)
-                _sync_folder(path.parent)
+                with contextlib.suppress(FileNotFoundError):  # the object and its folder were deleted since
+                    _sync_folder(path.parent)
             finally:
                 draft.unlink(missing_ok=True)
         return tag
@@ -87,11 +88,9 @@ class FolderStore(ObjectStore):
         with self._failing(name):
             path = self._path(name)
             path.unlink(missing_ok=True)
-            with contextlib.suppress(OSError):
-                while path.parent != self.root:
+            with contextlib.suppress(FileNotFoundError):
+                while path.parent != self.root and _remove_if_empty(path.parent):
                     path = path.parent
-                    (path / ".lock").unlink(missing_ok=True)
-                    path.rmdir()
 
     def list(self, prefix: str = "") -> Iterator[tuple[str, int]]:
         with self._failing(prefix):
@@ -123,8 +122,7 @@ class FolderStore(ObjectStore):
 
     def _replace_if(self, draft: Path, path: Path, if_match: str | None) -> bool:
         """Renames the draft if the object is absent, or still has the entity tag."""
-        with (path.parent / ".lock").open("wb") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
+        with _locked(path.parent):
             if self.entity_tag(path.relative_to(self.root).as_posix()) != if_match:
                 return False
             draft.replace(path)
@@ -147,7 +145,7 @@ class FolderStore(ObjectStore):
 
 def _write(draft: Path, data: bytes | Path) -> str:
     """Writes a file durably and returns its entity tag. The time with nanoseconds makes the tag unique even when the inode is used again."""
-    with draft.open("xb") as file:
+    with _create(draft) as file:
         if isinstance(data, bytes):
             file.write(data)
         else:
@@ -158,6 +156,43 @@ def _write(draft: Path, data: bytes | Path) -> str:
         os.utime(file.fileno(), ns=(now, now))
         os.fsync(file.fileno())
         return _tag(file.fileno())
+
+
+def _create(draft: Path) -> IO[bytes]:
+    """Creates the draft and its folder, which a process that deletes the last object may remove in between."""
+    for _ in range(CREATE_ATTEMPTS):
+        with contextlib.suppress(FileNotFoundError, FileExistsError):
+            draft.parent.mkdir(parents=True, exist_ok=True)
+            return draft.open("xb")
+    draft.parent.mkdir(parents=True, exist_ok=True)
+    return draft.open("xb")
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Holds the folder's lock; takes it again if its file was removed with the folder meanwhile. Raises FileNotFoundError without the folder."""
+    path = folder / ".lock"
+    while True:
+        with path.open("ab") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            is_current = False
+            with contextlib.suppress(FileNotFoundError):
+                is_current = os.path.samestat(os.fstat(lock.fileno()), path.stat())
+            if is_current:
+                yield
+                return
+
+
+def _remove_if_empty(folder: Path) -> bool:
+    """Removes a folder that has only its lock."""
+    with _locked(folder):
+        if [path.name for path in folder.iterdir()] != [".lock"]:
+            return False
+        (folder / ".lock").unlink()
+        with contextlib.suppress(OSError):
+            folder.rmdir()
+            return True
+    return False
 
 
 def _tag(descriptor: int) -> str:
