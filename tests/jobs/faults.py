@@ -9,7 +9,9 @@ import contextlib
 import hashlib
 import os
 import random
+import resource
 import signal
+import sys
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -76,7 +78,20 @@ def stale() -> None:
 
 
 def memory() -> None:
-    raise MemoryError("requested")
+    """Fills the memory that a limit leaves."""
+    resource.setrlimit(resource.RLIMIT_AS, (1 << 30, 1 << 30))
+    blocks = []
+    while True:
+        blocks.append(bytearray(64 << 20))
+
+
+def stack_overflow() -> None:
+    """Recurses in C until the stack overflows."""
+    nested: list[object] = []
+    for _ in range(5_000_000):
+        nested = [nested]
+    sys.setrecursionlimit(1 << 30)
+    repr(nested)
 
 
 def nonsense() -> None:
@@ -95,6 +110,7 @@ FAULTS = {
     "exception": exception,
     "exit 0": lambda: os._exit(0),
     "memory": memory,
+    "stack overflow": stack_overflow,
     "stale": stale,
     "nonsense": nonsense,
 }

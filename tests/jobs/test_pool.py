@@ -23,7 +23,7 @@ from map3d.tiles.sqlite_store import SqliteTileStore
 from tests.jobs.town import BLOCKS, LEASE_S, TIMEOUTS, VIEW, Town, make_town, planned_jobs
 
 JOBS = BLOCKS * BLOCKS
-FAULTS = ["segfault", "abort", "killed", "hang", "spin", "exception", "exit 0", "memory", "nonsense"]
+FAULTS = ["segfault", "abort", "killed", "hang", "spin", "exception", "exit 0", "memory", "stack overflow", "nonsense"]
 
 RENDER_IN_PROCESS = """
 import sys
