@@ -8,19 +8,23 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import closing
+import uuid
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from map3d.catalogue import JobResult, Lease, State
+from map3d.catalogue.workspace import CATALOGUE_VARIABLE
+from map3d.errors import StoreError
 from map3d.jobs.events import JobDone, Remaining, RunEvent, Stopping, Waiting, WorkerExited
 from map3d.jobs.timeouts import Timeouts
 from map3d.renderings.render_task import RenderTask
 from map3d.subprocess import Message
 from map3d.tiles.sqlite_store import SqliteTileStore
-from tests.jobs.town import BLOCKS, LEASE_S, TIMEOUTS, VIEW, Town, make_town, planned_jobs
+from tests.jobs.town import BLOCKS, LEASE_S, TIMEOUTS, VIEW, Town, make_town, open_town, planned_jobs
 
 JOBS = BLOCKS * BLOCKS
 FAULTS = ["segfault", "abort", "killed", "hang", "spin", "exception", "exit 0", "memory", "stack overflow", "nonsense"]
@@ -140,7 +144,17 @@ def test_only_the_faulty_block_is_quarantined(town: Town, faults: Path, kind: st
     assert all_done(town)
 
 
-def test_faults_of_every_kind_quarantine_only_the_faulty_blocks(town: Town, faults: Path) -> None:
+@pytest.fixture(params=["sqlite", "mongodb"])
+def town_of_each_home(request: pytest.FixtureRequest, tmp_path: Path, faults: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Town]:
+    if request.param == "mongodb":
+        monkeypatch.setenv(CATALOGUE_VARIABLE, f"{request.getfixturevalue('mongo_server')}/pool{uuid.uuid4().hex[:8]}")
+    made = make_town(tmp_path / "workspace")
+    yield made
+    made.close()
+
+
+def test_faults_of_every_kind_quarantine_only_the_faulty_blocks(town_of_each_home: Town, faults: Path) -> None:
+    town = town_of_each_home
     z = town.rendering.zmax - 3
     for n, kind in enumerate(FAULTS):
         (faults / f"{z}-{n % 8}-{n // 8}").write_text(kind)
@@ -148,6 +162,40 @@ def test_faults_of_every_kind_quarantine_only_the_faulty_blocks(town: Town, faul
     quarantined = {job.block for job in town.catalogue.jobs("town-a", state=State.QUARANTINED)}
     assert quarantined == {(z, n % 8, n // 8) for n in range(len(FAULTS))}
     assert len([job for job in town.catalogue.jobs("town-a", state=State.DONE) if job.kind == "base"]) == JOBS - len(FAULTS)
+
+
+@contextmanager
+def locked(path: Path, seconds: float) -> Iterator[None]:
+    """Holds the write lock of a database from now on, as a stuck process would."""
+    db = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
+    db.execute("BEGIN IMMEDIATE")
+    release = threading.Timer(seconds, lambda: db.execute("ROLLBACK"))
+    release.start()
+    try:
+        yield
+    finally:
+        release.join()
+        db.close()
+
+
+def test_run_waits_while_the_catalogue_is_locked(town: Town, undisturbed: str) -> None:
+    with locked(town.workspace.catalogue_path, 1.5):
+        statistics, _ = town.run()
+    assert all_done(town)
+    assert statistics.failed_attempts == statistics.lost_leases == 0
+    assert town.digest() == undisturbed
+
+
+def test_run_ends_clearly_when_the_catalogue_stays_locked_and_can_be_repeated(town: Town, undisturbed: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("map3d.database.BUSY_TIMEOUT_S", 0.2)
+    impatient = open_town(town.workspace.root, LEASE_S)
+    with locked(town.workspace.catalogue_path, 3.0), pytest.raises(StoreError, match=r"catalogue\.sqlite: cannot write: database is locked"):
+        impatient.run()
+    impatient.task.close()
+    impatient.close()
+    town.run()
+    assert all_done(town)
+    assert town.digest() == undisturbed
 
 
 def test_reason_says_how_the_subprocess_ended(town: Town, faults: Path) -> None:
