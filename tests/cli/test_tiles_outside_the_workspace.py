@@ -134,4 +134,7 @@ def test_another_node_renders_a_shared_scene(run: Run, embedded: Workspace, tmp_
     assert not (tmp_path / "host" / "renderings" / "view" / "0-45.sqlite").exists()
     assert run("verify", *host)[0] == run("verify", *node)[0] == 0
     found = published(run, Workspace(tmp_path / "node"), tmp_path / "a")
+    (tmp_path / "visitor").mkdir()
+    (tmp_path / "visitor" / "catalogue.sqlite").symlink_to(tmp_path / "host" / "catalogue.sqlite")
+    assert found == published(run, Workspace(tmp_path / "visitor"), tmp_path / "d"), "a node that did not render"
     assert found == published(run, Workspace(tmp_path / "host"), tmp_path / "b") == published(run, embedded, tmp_path / "c")

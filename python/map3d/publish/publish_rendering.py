@@ -23,7 +23,7 @@ from map3d.publish.preview_picture import make_preview
 from map3d.publish.size_report import SizeRow, report_sizes
 from map3d.publish.store_target import StoreTarget
 from map3d.publish.target import LAST, DryRun, Target
-from map3d.registry import Registry
+from map3d.renderings.scene_cache import open_registry
 from map3d.renderings.track_stores import open_track, read_manifest, rendering_record
 from map3d.tiles.manifest import FILE_NAME, Manifest, ManifestView
 from map3d.tiles.tile_store import TileStore
@@ -168,7 +168,7 @@ class _Publisher:
 
     def _files(self, url: str | None) -> Iterator[tuple[str, bytes]]:
         """Yields all files apart from archives and manifest."""
-        with Registry(self._workspace.registry_path(self._record.scene)) as registry:
+        with open_registry(self._workspace, self._record.scene) as registry:
             yield from registry.documents()
         picture = make_preview(self._workspace, self._record, self._manifest)
         if picture is not None:

@@ -19,6 +19,7 @@ from typing import Final
 from map3d.catalogue import SceneRecord, Workspace
 from map3d.errors import BadRequest, Corrupt, LimitExceeded, NotFound, ObjectChanged, StoreError
 from map3d.object_store import ObjectStore
+from map3d.registry import Registry
 from map3d.renderings.shared_scene import CONNECTIONS, FILES, INDEX, REGISTRY, SharedFile, SharedScene, files_url, hash_file, object_name, read_shared
 
 LIMIT_VARIABLE: Final = "MAP3D_SCENE_CACHE_GB"
@@ -44,6 +45,18 @@ def scene_in_use(workspace: Workspace, record: SceneRecord) -> Iterator[Path]:
         fcntl.flock(use, fcntl.LOCK_SH)
         fetch_scene(workspace, record)
         yield folder
+
+
+@contextmanager
+def open_registry(workspace: Workspace, scene: str) -> Iterator[Registry]:
+    """Opens the registry of a scene, of a copy that is fetched if another host builds the scene. Raises the errors of `scene_in_use`."""
+    catalogue = workspace.open_catalogue()
+    try:
+        record = catalogue.scene(scene)
+    finally:
+        catalogue.close()
+    with scene_in_use(workspace, record), Registry(workspace.registry_path(scene)) as registry:
+        yield registry
 
 
 def has_assets(folder: Path) -> bool:

@@ -15,6 +15,7 @@ from map3d.catalogue import Catalogue, Workspace
 from map3d.errors import NotFound
 from map3d.registry import Registry
 from map3d.registry.documents import dump_document
+from map3d.renderings.scene_cache import scene_in_use
 from map3d.renderings.track_stores import read_manifest
 from map3d.tiles.manifest import FILE_NAME
 from map3d.types import check_name
@@ -89,8 +90,12 @@ def close() -> None:
 
 
 def registry_path(rendering: str) -> Path:
-    """Returns the registry of the rendering's scene. Raises NotFound."""
-    path = workspace().registry_path(catalogue().rendering(check_name(rendering, "rendering")).scene)
+    """Returns the registry of the rendering's scene, which is fetched first if another host builds the scene. Raises NotFound."""
+    scene = catalogue().scene(catalogue().rendering(check_name(rendering, "rendering")).scene)
+    path = workspace().registry_path(scene.name)
+    if not path.is_file():
+        with scene_in_use(workspace(), scene):
+            pass
     if not path.is_file():
         raise NotFound(f"the scene of rendering {rendering!r} has no objects yet; run: map3d add-files")
     return path
