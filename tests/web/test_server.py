@@ -5,6 +5,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 
 import httpx
 import pytest
@@ -37,6 +38,26 @@ def address(request, finished, tmp_path):
     finally:
         process.kill()
         process.stdout.close()
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_killed_server_leaves_no_process_behind(finished, tmp_path, workers):
+    script = tmp_path / "serve.py"
+    script.write_text(SCRIPT)
+    command = [sys.executable, str(script), str(finished.root), str(workers)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)})
+    address = httpx.URL(process.stdout.readline().strip())
+    process.kill()
+    process.wait()
+    process.stdout.close()
+    deadline_s = time.monotonic() + 20
+    while True:
+        try:
+            socket.create_connection((address.host, address.port), timeout=1).close()
+        except ConnectionRefusedError:
+            break
+        assert time.monotonic() < deadline_s, "a process still listens"
+        time.sleep(0.05)
 
 
 def test_everything_is_served(address):

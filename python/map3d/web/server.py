@@ -1,5 +1,6 @@
 """Runs the app with granian."""
 
+import os
 import socket
 import threading
 import time
@@ -13,6 +14,7 @@ from granian.log import LogLevels
 from granian.server import Server
 
 from map3d.errors import BadRequest
+from map3d.subprocess.limits import die_with_parent
 from map3d.web.asgi_app import App, create_app
 from map3d.web.tile_route import DEFAULT_CACHE_BYTES
 
@@ -49,7 +51,7 @@ def serve(
         workers_kill_timeout=5,
     )
     threading.Thread(target=_announce, args=(host, chosen, on_ready), daemon=True).start()
-    server.serve(target_loader=partial(_load, workspace.absolute(), cache_bytes), wrap_loader=False)
+    server.serve(target_loader=partial(_load, workspace.absolute(), cache_bytes, os.getpid()), wrap_loader=False)
 
 
 def find_port(host: str, port: int) -> int:
@@ -64,7 +66,9 @@ def find_port(host: str, port: int) -> int:
         raise BadRequest(f"cannot listen on {host} port {port}: {error}; choose another port with --port, or 0 for a free one") from error
 
 
-def _load(workspace: Path, cache_bytes: int) -> App:
+def _load(workspace: Path, cache_bytes: int, server_pid: int) -> App:
+    """Runs in each process of the server; they end with it, also when it is killed."""
+    die_with_parent(server_pid)
     return create_app(workspace, cache_bytes=cache_bytes)
 
 
