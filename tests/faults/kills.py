@@ -13,7 +13,7 @@ from typing import Final
 
 from map3d.catalogue import Workspace
 from tests.catalogue.mongo_process import MongoProcess, build
-from tests.faults.processes import Command, kill_child
+from tests.faults.processes import MARK, Command, kill_child, survivors
 from tests.faults.street import RENDERING, SCENE, VARIANTS, Expected, change_variant, make_workspace, read_result, render_undisturbed, street_file
 from tests.faults.tile_reader import TileReader
 
@@ -95,7 +95,7 @@ class KillRun:
         self._reference, self._kills, self._mongo = reference, kills, mongo
         self._choose = random.Random(seed)
         self._workspace, root = workspace, workspace.root
-        environment = {"MAP3D_CATALOGUE": workspace.catalogue_url or ""}
+        environment = {"MAP3D_CATALOGUE": workspace.catalogue_url or "", MARK: str(root)}
         self._files = root / "files"
         self.report = KillReport(seed)
         where = ("-w", root)
@@ -119,6 +119,7 @@ class KillRun:
             reader.stop()
             for command in (self._import, self._render, self._work, self._serve, self._retry):
                 command.end()
+        self.report.faults += [f"still running: {command}" for command in survivors(str(self._workspace.root))]
         self.report.tiles_served = reader.tiles
         self.report.faults += reader.faults
         self.report.seconds = time.monotonic() - started

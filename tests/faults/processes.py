@@ -6,12 +6,15 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import IO, Final
 
 OUTPUT_BYTES: Final = 4_000
+MARK: Final = "MAP3D_FAULTS_RUN"
+"""Environment variable by which the descendants of a run's processes are found."""
 
 
 class Command:
@@ -79,3 +82,20 @@ def kill_child(parent: int, choose: random.Random) -> bool:
     with suppress(ProcessLookupError):
         os.kill(choose.choice(children), signal.SIGKILL)
     return True
+
+
+def survivors(mark: str, wait_s: float = 20.0) -> list[str]:
+    """Returns the command lines of processes with this mark that are still there after `wait_s`."""
+    deadline = time.monotonic() + wait_s
+    while (found := _marked(f"{MARK}={mark}".encode())) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    return found
+
+
+def _marked(entry: bytes) -> list[str]:
+    found = []
+    for path in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            if entry in (path / "environ").read_bytes().split(b"\0"):
+                found.append((path / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace").strip())
+    return [command for command in found if command]
