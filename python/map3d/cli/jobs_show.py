@@ -98,7 +98,7 @@ class _Overview:
     def display(self) -> RenderableType:
         states = [state for state in State if any(counts[state] for _, _, counts in self.rows)]
         rows = [(name, scene, _share(counts), *(counts[state] for state in states)) for name, scene, counts in self.rows]
-        return table(("rendering", "scene", "done", *states), rows)
+        return table(("rendering", "scene", "complete", *states), rows)
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ class _Detail:
             (item.track, item.level, item.kind, _share(item.counts), *(item.counts.get(state, 0) for state in states))
             for item in sorted(levels, key=lambda item: (item.track, -item.level))
         ]
-        return table(("track", "level", "kind", "done", *states), rows)
+        return table(("track", "level", "kind", "complete", *states), rows)
 
     def _leases(self) -> RenderableType:
         leases = sorted(self.report.leases, key=lambda lease: -(lease.seconds or 0.0))
