@@ -1,5 +1,5 @@
 """`python -m bench [PART …] [--json]`. Parts: tiles, light, encoding, ingest, incremental (the default); extent, planning, stored, viewer,
-catalogue, saturation."""
+catalogue, overhead, saturation."""
 
 import argparse
 import json
@@ -10,11 +10,11 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from . import catalogue, encoding, extent, incremental, ingest, light_layers, planning, saturation, stored, tiles, viewer
+from . import catalogue, catalogue_overhead, encoding, extent, incremental, ingest, light_layers, planning, saturation, stored, tiles, viewer
 from .benchmark_scene import CACHE
 
 PARTS = ("tiles", "light", "encoding", "ingest", "incremental")
-ON_REQUEST = ("extent", "planning", "stored", "viewer", "catalogue", "saturation")
+ON_REQUEST = ("extent", "planning", "stored", "viewer", "catalogue", "overhead", "saturation")
 Rows = list[dict[str, Any]]
 
 
@@ -26,7 +26,9 @@ def main() -> None:
     parser.add_argument("--res", type=float, default=0.2, help="tiles: metres per pixel")
     parser.add_argument("--tiles", type=int, default=48, help="tiles: number of tiles")
     parser.add_argument("--folders", type=Path, nargs="+", default=[CACHE], help="stored: folders with renderings or published folders")
-    parser.add_argument("--catalogues", nargs="+", default=[], metavar="URL", help="catalogue, saturation: MongoDB servers, without a database")
+    parser.add_argument(
+        "--catalogues", nargs="+", default=[], metavar="URL", help="catalogue, overhead, saturation: MongoDB servers, without a database"
+    )
     parser.add_argument(
         "--jobs", type=int, nargs="+", default=catalogue.PLANNED_JOBS, help="catalogue: numbers of base blocks to plan; saturation: the least of them"
     )
@@ -49,6 +51,7 @@ def main() -> None:
         "extent": lambda: extent.measure(tuple(options.millions), plots=Path("docs/plots")),
         "planning": planning.measure,
         "catalogue": lambda: catalogue.measure(options.catalogues, options.jobs),
+        "overhead": lambda: catalogue_overhead.measure(options.catalogues),
         "saturation": lambda: saturation.measure(options.catalogues, min(options.jobs)),
         "stored": lambda: stored.measure(options.folders),
         "viewer": lambda: viewer.measure(options.quick, options.reps, options.work, tuple(options.only) if options.only else None, options.free),

@@ -106,7 +106,7 @@ class PlanRow:
 
 def measure(urls: Sequence[str] = (), planned: Sequence[int] = PLANNED_JOBS) -> list[dict[str, Any]]:
     rows: list[OverheadRow | RateRow | PlanRow] = []
-    with _catalogues(urls) as catalogues:
+    with new_catalogues(urls) as catalogues:
         for name, new_url in catalogues.items():
             rows.append(measure_overhead(name, new_url()))
             rows += [measure_rate(name, new_url(), processes) for processes in PROCESSES]
@@ -189,7 +189,7 @@ def _prepared(url: str, bases: int) -> Catalogue:
 
 
 @contextmanager
-def _catalogues(urls: Sequence[str]) -> Iterator[dict[str, Callable[[], str]]]:
+def new_catalogues(urls: Sequence[str]) -> Iterator[dict[str, Callable[[], str]]]:
     """Gives, for each catalogue to measure, its name and a function that returns the URL of an empty one."""
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="bench-")))
