@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from map3d.errors import BadRequest, ObjectChanged, StoreError
-from map3d.object_store import ObjectStore, check_store_url, join_url
+from map3d.object_store import ObjectStore, check_store_url, join_url, open_object_store
 from map3d.object_store.folder import DRAFT_AGE_S, FolderStore
 
 
 @pytest.fixture
 def store(store_url: str) -> ObjectStore:
-    return ObjectStore.open(store_url)
+    return open_object_store(store_url)
 
 
 def test_missing_objects_are_none(store: ObjectStore) -> None:
@@ -200,7 +200,7 @@ def test_names_never_leave_the_store(store: ObjectStore, name: str) -> None:
 )
 def test_invalid_urls_are_refused_without_repeating_secrets(url: str, says: str) -> None:
     with pytest.raises(BadRequest, match=says) as caught:
-        ObjectStore.open(url)
+        open_object_store(url)
     assert "SECRET" not in str(caught.value)
 
 
@@ -212,7 +212,7 @@ def test_urls_are_joined_and_cleaned() -> None:
 
 def test_errors_and_logs_contain_no_credentials(s3_url: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
     monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "very-secret")
-    store = ObjectStore.open("s3://no-such-bucket/x")
+    store = open_object_store("s3://no-such-bucket/x")
     with caplog.at_level(logging.DEBUG), pytest.raises(StoreError, match="s3://no-such-bucket/x") as caught:
         store.put("a", b"x")
     assert "very-secret" not in f"{caught.value} {caught.value.__cause__} {caplog.text} {store.url} {store!r}"

@@ -13,7 +13,7 @@ import pytest
 
 from map3d.catalogue import Workspace
 from map3d.catalogue.scene_lock import scene_lock
-from map3d.object_store import ObjectStore
+from map3d.object_store import open_object_store
 from map3d.registry import Registry
 from tests.cli.test_incremental import keys, render_from_scratch
 from tests.cli.test_whole import digest
@@ -175,17 +175,17 @@ def test_tiles_in_an_object_store_go_too(run: Run, town: Workspace, tmp_path: Pa
     from tests.web.conftest import Client
 
     url = (tmp_path / "tiles").as_uri() if kind == "folder" else request.getfixturevalue("s3_url")
-    ObjectStore.open(url).put("near/rendering.json", b"12345")
+    open_object_store(url).put("near/rendering.json", b"12345")
     assert run("create-rendering", "town", "far", "--res", "1", "--view", "0/45", "--tiles", url)[0] == 0
     assert run("render", "far")[0] == 0
-    size = sum(size for name, size in ObjectStore.open(url).list() if name.startswith("far/"))
+    size = sum(size for name, size in open_object_store(url).list() if name.startswith("far/"))
     client = Client(create_app(town.root))
     addresses = ["/tiles/far/rendering.json", "/tiles/far/0-45/color/0/0/0"]
     assert [client.get(address).status_code for address in addresses] == [200, 200]
     local = sum(files_below(town.rendering_folder("far")).values())
     status, out, err = run("remove-rendering", "far", "--yes", "--json")
     assert (status, f'"bytes": {size + local}' in out) == (0, True), err
-    assert list(ObjectStore.open(url).list()) == [("near/rendering.json", 5)]
+    assert list(open_object_store(url).list()) == [("near/rendering.json", 5)]
     assert not (tmp_path / "tiles" / "far").exists()
     while client.get(addresses[1]).status_code != 404:  # the server looks for a changed store once a second
         pass
@@ -262,7 +262,7 @@ import os, sys
 from map3d.cli import app
 import map3d.ingest.asset_removal as asset_removal, map3d.renderings.remove_rendering as rendering, map3d.renderings.remove_scene as scene
 from map3d.catalogue.sqlite import SqliteCatalogue
-from map3d.object_store import ObjectStore
+from map3d.object_store import open_object_store
 from map3d.registry import Registry
 
 owners = {"asset_removal": asset_removal, "rendering": rendering, "scene": scene, "catalogue": SqliteCatalogue, "registry": Registry}

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from map3d.catalogue import Workspace
-from map3d.object_store import ObjectStore
+from map3d.object_store import open_object_store
 from map3d.renderings.track_stores import open_track, rendering_record
 from map3d.tiles.manifest import Manifest
 from map3d.web.asgi_app import create_app
@@ -76,7 +76,7 @@ def test_tiles_are_published_and_served_like_those_of_sqlite(
     status, out, err = run("verify", "--deep", "--json", *at)
     assert (status, json.loads(out)["wrong"]) == (0, []), err
 
-    shared = ObjectStore.open(f"{store_url}/view").get("rendering.json")
+    shared = open_object_store(f"{store_url}/view").get("rendering.json")
     assert shared is not None
     manifest = Manifest.load(shared[0])
     stored.manifest_path("view").unlink()
@@ -91,10 +91,10 @@ def test_tiles_are_published_and_served_like_those_of_sqlite(
 
 def test_a_regridded_rendering_keeps_its_place_and_loses_its_tiles(run: Run, stored: Workspace, store_url: str) -> None:
     at = ("--workspace", str(stored.root))
-    assert any(name.endswith(".m3b") for name, _ in ObjectStore.open(f"{store_url}/view").list())
+    assert any(name.endswith(".m3b") for name, _ in open_object_store(f"{store_url}/view").list())
     status, _, err = run("create-rendering", "town", "view", *VIEWS, "--regrid", *at)
     assert status == 0, err
-    assert not any(name.endswith(".m3b") for name, _ in ObjectStore.open(f"{store_url}/view").list())
+    assert not any(name.endswith(".m3b") for name, _ in open_object_store(f"{store_url}/view").list())
     assert rendering_record(stored, "view").options["tiles"] == store_url
     assert run("render", "view", *at)[0] == 0
     assert run("verify", *at)[0] == 0

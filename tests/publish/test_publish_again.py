@@ -9,7 +9,7 @@ from hashlib import sha256
 import pytest
 
 from map3d.errors import AlreadyExists, StoreError
-from map3d.object_store import ObjectStore
+from map3d.object_store import ObjectStore, open_object_store
 from map3d.publish import publish, publish_rendering
 from map3d.publish.store_target import IMMUTABLE, REVALIDATED
 from map3d.registry import NewObject, Registry
@@ -73,12 +73,11 @@ def opened(monkeypatch):
     stores = []
 
     def open_store(url):
-        stores.append(Recorder(ObjectStore.open(url), opened_fail["at"]))
+        stores.append(Recorder(open_object_store(url), opened_fail["at"]))
         return stores[-1]
 
     opened_fail = {"at": None}
-    stores_open = type("Opener", (), {"open": staticmethod(open_store)})
-    monkeypatch.setattr(publish_rendering, "ObjectStore", stores_open)
+    monkeypatch.setattr(publish_rendering, "open_object_store", open_store)
     return stores, opened_fail
 
 
@@ -92,7 +91,7 @@ def everything_but_locks(folder):
 
 
 def stored(url):
-    store = ObjectStore.open(url)
+    store = open_object_store(url)
     return {name: store.get(name)[0] for name, _ in store.list()}
 
 
@@ -193,13 +192,13 @@ def test_a_change_that_is_undone_after_a_stop_is_sent(workspace, tmp_path, opene
 def test_files_of_others_stay(workspace, tmp_path):
     url = (tmp_path / "store").as_uri()
     publish(workspace, "tea", url)
-    store = ObjectStore.open(url)
+    store = open_object_store(url)
     store.put("thesis.txt", b"irreplaceable")
     store.put("objects/17.json", b"an old shard")
     publish(workspace, "tea", url, replace=True)
     assert (store.exists("thesis.txt"), store.exists("objects/17.json")) == (True, False)
     other = (tmp_path / "other").as_uri()
-    ObjectStore.open(other).put("thesis.txt", b"irreplaceable")
+    open_object_store(other).put("thesis.txt", b"irreplaceable")
     with pytest.raises(AlreadyExists, match="not a published rendering"):
         publish(workspace, "tea", other, replace=True)
 

@@ -10,7 +10,7 @@ import httpx
 import pytest
 from pmtiles.reader import Reader
 
-from map3d.object_store import ObjectStore
+from map3d.object_store import open_object_store
 from map3d.publish import publish
 from tests.publish.hosts import nginx_host, public_address
 from tests.web.workspaces import LAYERS, ZMAX, every_tile, tile_bytes
@@ -29,7 +29,7 @@ def address(request, workspace, out):
         return
     endpoint, url = request.getfixturevalue("s3_endpoint"), request.getfixturevalue("s3_url")
     publish(workspace, "tea", url)
-    yield public_address(endpoint, url, [name for name, _ in ObjectStore.open(url).list()])
+    yield public_address(endpoint, url, [name for name, _ in open_object_store(url).list()])
 
 
 def archives_of(address):

@@ -17,7 +17,7 @@ from map3d.geometry.frames import core_frame, pin
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import import_file
 from map3d.ingest.sources import find_sources
-from map3d.object_store import ObjectStore
+from map3d.object_store import ObjectStore, open_object_store
 from map3d.registry import Registry
 from map3d.renderings import remove_scene as remove_scene_module
 from map3d.renderings import scene_cache
@@ -108,7 +108,7 @@ def test_a_current_copy_needs_no_object_store(host: Host, node: Workspace, monke
     record = host.build()
     with scene_in_use(node, record):
         pass
-    monkeypatch.setattr(ObjectStore, "open", None)
+    monkeypatch.setattr(scene_cache, "open_object_store", None)
     with scene_in_use(node, record):
         assert built_files(node)
 
@@ -117,7 +117,7 @@ def test_a_new_build_uploads_and_fetches_only_what_changed(host: Host, node: Wor
     first = host.build()
     with scene_in_use(node, first):
         before = {name: node.scene_folder("town").joinpath(name).stat().st_ino for name in built_files(node)}
-    store = ObjectStore.open(f"{host.url}/town")
+    store = open_object_store(f"{host.url}/town")
     stored = {name: store.entity_tag(name) for name, _ in store.list("files")}
     second = host.build(height=14.0)
     assert second.built != first.built
@@ -132,7 +132,7 @@ def test_a_new_build_uploads_and_fetches_only_what_changed(host: Host, node: Wor
 def test_files_of_builds_before_the_previous_one_are_deleted(host: Host, node: Workspace) -> None:
     for height in (6.0, 7.0, 8.0, 9.0, 10.0):
         record = host.build(height=height)
-    store = ObjectStore.open(f"{host.url}/town")
+    store = open_object_store(f"{host.url}/town")
     assert len(list(store.list("builds"))) == 2
     shared = read_shared(record)
     assert len(list(store.list("files"))) <= 2 * len(shared.files)
@@ -149,7 +149,7 @@ def test_a_removed_scene_leaves_nothing_in_the_object_store(host: Host) -> None:
     removal = find_scene(host.workspace, host.catalogue, "town", with_renderings=False)
     assert removal.shared == f"{host.url}/town"
     remove_scene(host.workspace, host.catalogue, removal)
-    assert list(ObjectStore.open(host.url).list()) == []
+    assert list(open_object_store(host.url).list()) == []
     assert host.catalogue.scenes() == []
 
 
@@ -160,7 +160,7 @@ def test_a_killed_removal_of_a_shared_scene_is_completed(host: Host, monkeypatch
         with pytest.raises(TypeError):
             remove_scene(host.workspace, host.catalogue, find_scene(host.workspace, host.catalogue, "town", with_renderings=False))
     finish_scene_removal(host.workspace, host.catalogue, "town")
-    assert list(ObjectStore.open(host.url).list()) == []
+    assert list(open_object_store(host.url).list()) == []
 
 
 def _fetch_and_log(root: Path, record: SceneRecord, log: Path, start: "multiprocessing.synchronize.Barrier") -> None:
@@ -272,7 +272,7 @@ def test_a_scene_larger_than_the_limit_is_refused(host: Host, node: Workspace, m
 @pytest.mark.parametrize("name", ["../../outside", "/etc/passwd", "assets/a/mesh.m3a", "chunks/../../x.m3c", "textures/aa/../x.m3t"])
 def test_an_index_cannot_name_other_files(host: Host, node: Workspace, name: str) -> None:
     record = host.build()
-    store = ObjectStore.open(f"{host.url}/town")
+    store = open_object_store(f"{host.url}/town")
     found = store.get(f"builds/{record.built}.json")
     assert found is not None
     value = json.loads(found[0])

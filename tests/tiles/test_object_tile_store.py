@@ -5,7 +5,7 @@ import json
 import pytest
 
 from map3d.errors import Corrupt, StaleFence, UnknownVersion
-from map3d.object_store import ObjectStore
+from map3d.object_store import open_object_store
 from map3d.tiles.block_object import START_BYTES, check_object, encode_block
 from map3d.tiles.naming import tiles_of_block
 from map3d.tiles.object_tile_store import CACHED_INDEXES, ObjectTileStore
@@ -30,7 +30,7 @@ def content(salt: str = "", layers: int = 12) -> list[StoredTile]:
 def test_an_index_longer_than_the_first_read_is_read_whole(store: ObjectTileStore, store_url: str) -> None:
     tiles = content()
     store.put_block(BLOCK, "k", 1, tiles, b"seam")
-    found = ObjectStore.open(store_url).get(OBJECT)
+    found = open_object_store(store_url).get(OBJECT)
     assert found is not None
     assert check_object(found[0], "").body > START_BYTES
     fresh = ObjectTileStore(store_url, read_only=True)
@@ -112,7 +112,7 @@ def test_every_changed_or_cut_byte_is_found(store: ObjectTileStore, store_url: s
     tiles = content(layers=1)[:2]
     store.put_block(BLOCK, "k", 1, tiles, b"seam")
     assert store.check() == []
-    objects = ObjectStore.open(store_url)
+    objects = open_object_store(store_url)
     found = objects.get(OBJECT)
     assert found is not None
     data = found[0]
@@ -131,7 +131,7 @@ def test_every_changed_or_cut_byte_is_found(store: ObjectTileStore, store_url: s
 
 
 def test_a_newer_format_is_refused(store: ObjectTileStore, store_url: str) -> None:
-    objects = ObjectStore.open(store_url)
+    objects = open_object_store(store_url)
     found = objects.get("store.json")
     assert found is not None
     objects.put("store.json", json.dumps({**json.loads(found[0]), "version": 2}).encode())
@@ -144,7 +144,7 @@ def test_a_newer_format_is_refused(store: ObjectTileStore, store_url: str) -> No
 
 
 def test_foreign_objects_are_ignored(store: ObjectTileStore, store_url: str) -> None:
-    objects = ObjectStore.open(store_url)
+    objects = open_object_store(store_url)
     for name in ("blocks/README.txt", "blocks/1/x/0.m3b", "blocks/01/1/0.m3b", "rendering.json"):
         objects.put(name, b"x")
     assert store.list_blocks() == []

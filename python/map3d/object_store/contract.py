@@ -15,16 +15,6 @@ _SEGMENT: Final = re.compile(r"[^\x00-\x1f\x7f/\\]+")
 class ObjectStore(Protocol):
     """Thread-safe. `url` never contains credentials. Every failure raises StoreError with the URL of the object."""
 
-    @staticmethod
-    def open(url: str) -> "ObjectStore":
-        """Opens the store at a URL without contacting it. Credentials of clouds come from the environment: AWS_*, GOOGLE_*, AZURE_*.
-
-        Raises BadRequest for an invalid URL, or when obstore, the extra `cloud`, is not installed.
-        """
-        from map3d.object_store.store_url import open_store
-
-        return open_store(url)
-
     @property
     def url(self) -> str: ...
 

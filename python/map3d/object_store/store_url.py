@@ -27,8 +27,11 @@ def check_store_url(url: str) -> str:
     return url.rstrip("/") if parts.path.strip("/") or parts.scheme != "file" else "file:///"
 
 
-def open_store(url: str) -> ObjectStore:
-    """Implements `ObjectStore.open`."""
+def open_object_store(url: str) -> ObjectStore:
+    """Opens the store at a URL without contacting it. Credentials of clouds come from the environment: AWS_*, GOOGLE_*, AZURE_*.
+
+    Raises BadRequest for an invalid URL, or when obstore, the extra `cloud`, is not installed.
+    """
     checked = check_store_url(url)
     if checked.startswith("file:"):
         return FolderStore(file_path(checked))

@@ -14,7 +14,7 @@ from typing import Any, Final
 from map3d.catalogue import RenderingRecord, Workspace
 from map3d.errors import BadRequest, Corrupt, NotFound, Stopped, StoreError
 from map3d.geometry.views import track_id
-from map3d.object_store import ObjectStore
+from map3d.object_store import open_object_store
 from map3d.publish.folder_target import FolderTarget
 from map3d.publish.page_head import describe_page
 from map3d.publish.pmtiles_archive import write_archive
@@ -138,7 +138,7 @@ def _open_target(workspace: Workspace, rendering: str, out: Path | str) -> Targe
     if isinstance(out, Path) or "://" not in out:
         return FolderTarget(Path(out))
     staging = workspace.rendering_folder(rendering) / f"publishing-{sha256(out.encode()).hexdigest()[:16]}"
-    return StoreTarget(ObjectStore.open(out), staging)
+    return StoreTarget(open_object_store(out), staging)
 
 
 class _Publisher:

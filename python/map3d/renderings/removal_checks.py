@@ -6,7 +6,7 @@ from pathlib import Path
 
 from map3d.catalogue import Catalogue, State
 from map3d.errors import BadRequest
-from map3d.object_store import ObjectStore
+from map3d.object_store import open_object_store
 
 
 def check_idle(catalogue: Catalogue, rendering: str) -> None:
@@ -35,4 +35,4 @@ def folder_bytes(folder: Path) -> int:
 
 def objects_bytes(url: str) -> int:
     """Returns the size of all objects below a URL. Raises StoreError."""
-    return sum(size for _, size in ObjectStore.open(url).list())
+    return sum(size for _, size in open_object_store(url).list())

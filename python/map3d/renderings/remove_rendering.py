@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from map3d.catalogue import Catalogue, Workspace
 from map3d.errors import NotFound
 from map3d.ingest.asset_removal import remove_folder
-from map3d.object_store import ObjectStore, file_path
+from map3d.object_store import file_path, open_object_store
 from map3d.renderings.removal_checks import check_idle, folder_bytes, objects_bytes
 from map3d.renderings.removal_mark import read_mark, removal_mark
 from map3d.renderings.track_stores import TILES, remove_objects, tiles_url
@@ -78,5 +78,5 @@ def _remove_tiles(workspace: Workspace, name: str, tiles: str | None) -> None:
     if tiles.startswith("file:"):
         remove_folder(file_path(tiles))
         return
-    ObjectStore.open(tiles).delete(FILE_NAME)
+    open_object_store(tiles).delete(FILE_NAME)
     remove_objects(tiles)

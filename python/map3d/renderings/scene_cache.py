@@ -18,7 +18,7 @@ from typing import Final
 
 from map3d.catalogue import SceneRecord, Workspace
 from map3d.errors import BadRequest, Corrupt, LimitExceeded, NotFound, ObjectChanged, StoreError
-from map3d.object_store import ObjectStore
+from map3d.object_store import ObjectStore, open_object_store
 from map3d.registry import Registry
 from map3d.renderings.shared_scene import CONNECTIONS, FILES, INDEX, REGISTRY, SharedFile, SharedScene, files_url, hash_file, object_name, read_shared
 
@@ -109,7 +109,7 @@ def _cached_path(root: Path, file: SharedFile) -> Path:
 def _download_missing(root: Path, record: SceneRecord, shared: SharedScene) -> None:
     url = files_url(record)
     assert url is not None, "read_shared has checked it"
-    store = ObjectStore.open(url)
+    store = open_object_store(url)
     for path in root.glob("*/.*.new"):
         path.unlink()
     missing = {file for file in shared.files.values() if not _cached_path(root, file).is_file()}

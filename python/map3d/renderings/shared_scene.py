@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 
 from map3d.catalogue import SceneRecord, Workspace
 from map3d.errors import BadRequest, Corrupt, NotFound, StoreError
-from map3d.object_store import ObjectStore, check_store_url, join_url
+from map3d.object_store import ObjectStore, check_store_url, join_url, open_object_store
 
 FILES: Final = "files"
 """Key of the base URL in `SceneRecord.options`."""
@@ -69,7 +69,7 @@ def check_files_url(url: str) -> str:
     Raises BadRequest for credentials in it or an unknown scheme, StoreError when the store does not answer.
     """
     checked = check_store_url(url)
-    ObjectStore.open(checked).exists(INDEX)
+    open_object_store(checked).exists(INDEX)
     return checked
 
 
@@ -83,7 +83,7 @@ def read_shared(record: SceneRecord) -> SharedScene:
     url = files_url(record)
     if url is None or record.built is None:
         raise BadRequest(f"scene {record.name} is not shared, or not built yet; build it with map3d render on the host that has its files")
-    found = ObjectStore.open(url).get(_index_name(record.built))
+    found = open_object_store(url).get(_index_name(record.built))
     if found is None:
         raise NotFound(f"{url}: no files of build {record.built} of scene {record.name}; run map3d render on the host that has its files")
     return SharedScene.load(found[0], join_url(url, _index_name(record.built)))
@@ -96,7 +96,7 @@ def share_scene(workspace: Workspace, record: SceneRecord, digest: str) -> int:
     """
     url = files_url(record)
     assert url is not None, "the caller checks that the scene is shared"
-    store, folder = ObjectStore.open(url), workspace.scene_folder(record.name)
+    store, folder = open_object_store(url), workspace.scene_folder(record.name)
     try:
         with TemporaryDirectory(prefix=".sharing-", dir=folder) as draft:
             paths = {name: folder / name for name in _built_files(folder)} | {REGISTRY: _snapshot(folder / REGISTRY, Path(draft) / REGISTRY)}
@@ -114,7 +114,7 @@ def share_scene(workspace: Workspace, record: SceneRecord, digest: str) -> int:
 
 def remove_shared(url: str) -> None:
     """Deletes all shared files of a scene, indexes first. `url`: of `files_url`."""
-    store = ObjectStore.open(url)
+    store = open_object_store(url)
     with ThreadPoolExecutor(CONNECTIONS) as pool:
         for folder in ("builds", "files"):
             list(pool.map(store.delete, [name for name, _ in store.list(folder)]))

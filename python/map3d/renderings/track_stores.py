@@ -7,7 +7,7 @@ from typing import Final
 
 from map3d.catalogue import RenderingRecord, Track, Workspace
 from map3d.errors import NotFound
-from map3d.object_store import ObjectStore, check_store_url, join_url
+from map3d.object_store import check_store_url, join_url, open_object_store
 from map3d.tiles.manifest import FILE_NAME
 from map3d.tiles.open_store import open_or_create_store, open_store
 from map3d.tiles.tile_store import StoreShape, TileStore
@@ -23,7 +23,7 @@ def check_tiles_url(url: str) -> str:
     """Returns a base URL for tiles that can be stored. Raises BadRequest for credentials in it or an unknown scheme, StoreError when the store does
     not answer."""
     checked = check_store_url(url)
-    ObjectStore.open(checked).exists(FILE_NAME)
+    open_object_store(checked).exists(FILE_NAME)
     return checked
 
 
@@ -79,7 +79,7 @@ def remove_tracks(workspace: Workspace, record: RenderingRecord) -> None:
 
 def remove_objects(url: str, *, except_for: str | None = None) -> None:
     """Removes all objects below a URL, but not the one named `except_for`; many at a time, since each takes a request."""
-    store = ObjectStore.open(url)
+    store = open_object_store(url)
     names = (name for name, _ in store.list() if name != except_for)
     with ThreadPoolExecutor(_DELETING_THREADS) as threads:
         while some := list(islice(names, _DELETED_TOGETHER)):
@@ -90,7 +90,7 @@ def read_manifest(workspace: Workspace, record: RenderingRecord) -> bytes | None
     """Returns the rendering's manifest, None before it is written."""
     base = tiles_url(record)
     if base is not None:
-        found = ObjectStore.open(base).get(FILE_NAME)
+        found = open_object_store(base).get(FILE_NAME)
         return None if found is None else found[0]
     path = workspace.manifest_path(record.name)
     return path.read_bytes() if path.is_file() else None
@@ -100,4 +100,4 @@ def share_manifest(record: RenderingRecord, data: bytes) -> None:
     """Stores the manifest beside the tiles if they are outside the workspace."""
     base = tiles_url(record)
     if base is not None:
-        ObjectStore.open(base).put(FILE_NAME, data, headers=_MANIFEST_HEADERS)
+        open_object_store(base).put(FILE_NAME, data, headers=_MANIFEST_HEADERS)

@@ -13,7 +13,7 @@ from types import TracebackType
 from typing import Final, Self, TypeVar
 
 from map3d.errors import AlreadyExists, BadRequest, Corrupt, Map3dError, NotFound, ObjectChanged, StaleFence, StoreError, UnknownVersion
-from map3d.object_store import ObjectStore
+from map3d.object_store import open_object_store
 from map3d.object_store.folder import FolderStore
 from map3d.tiles.block_object import START_BYTES, BlockIndex, Span, check_object, decode_index, encode_block, index_bytes
 from map3d.tiles.naming import block_levels, block_of, morton
@@ -40,7 +40,7 @@ class ObjectTileStore:
 
     def __init__(self, url: str, *, read_only: bool = False) -> None:
         """Opens an existing store. Raises NotFound, UnknownVersion, Corrupt, StoreError."""
-        self._objects = ObjectStore.open(url)
+        self._objects = open_object_store(url)
         self._read_only = read_only
         self._indexes: OrderedDict[BlockId, tuple[str, BlockIndex]] = OrderedDict()
         self._lock = threading.Lock()
@@ -52,7 +52,7 @@ class ObjectTileStore:
     @classmethod
     def create(cls, url: str, shape: StoreShape) -> Self:
         """Creates an empty store. Raises AlreadyExists, StoreError."""
-        objects = ObjectStore.open(url)
+        objects = open_object_store(url)
         if objects.exists(SHAPE_NAME):
             raise AlreadyExists(f"{url}: the tile store already exists")
         value = {"version": FORMAT_VERSION, "tile_px": shape.tile_px, "zmax": shape.zmax, "layers": [asdict(layer) for layer in shape.layers]}
