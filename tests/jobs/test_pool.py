@@ -464,8 +464,8 @@ def test_heartbeats_keep_the_lease_of_a_long_block(town: Town, faults: Path) -> 
 
 
 def children_of(pid: int) -> list[int]:
-    """Excludes the resource tracker of Python's multiprocessing."""
-    return [child for child in all_children_of(pid) if "resource_tracker" not in command_of(child)]
+    """Returns the subprocesses of map3d, not the servers that other tests have started."""
+    return [child for child in all_children_of(pid) if "map3d.subprocess" in command_of(child)]
 
 
 def command_of(pid: int) -> str:
