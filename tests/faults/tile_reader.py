@@ -1,6 +1,7 @@
 """A visitor of the server: reads random tiles all the time, and accepts only tiles of a variant."""
 
 import hashlib
+import http.client
 import json
 import random
 import re
@@ -41,8 +42,8 @@ class TileReader:
                 if error.code not in (404, 503):
                     self.faults.append(f"{error.url}: status {error.code}")
                 error.close()
-            except (OSError, ValueError):
-                continue  # killed, or not yet started
+            except (OSError, ValueError, http.client.HTTPException):
+                continue  # killed, also in the middle of an answer, or not yet started
 
     def _read_one(self) -> None:
         found = re.search(r"http://[^\s/]+", self._server.output())
