@@ -174,11 +174,11 @@ test.each(rows)("the page saves itself and the view for offline use: %s", async 
     await page.waitForTimeout(1500);
     const { width = 0, height = 0 } = options.viewport ?? {};
     const shoot = (): Promise<Buffer> => page.screenshot({ clip: { x: width / 2 - 180, y: height / 2 - 160, width: 360, height: 300 } }); // the map without its controls
-    for (let last = await shoot(), same = 0, left = 30; ; left--) {
+    for (let last = await shoot(), same = 0, left = 40; ; left--) {
       await page.waitForTimeout(700);
       const next = await shoot();
       same = next.equals(last) ? same + 1 : 0; // on a busy machine, light computed from depth may take longer than a pause
-      if (same === 3 || left === 0) return next;
+      if (same === 6 || left === 0) return next;
       last = next;
     }
   };
