@@ -1,6 +1,5 @@
 """The group of all commands, and the handling of errors."""
 
-import importlib
 import os
 import sys
 import traceback
@@ -10,6 +9,7 @@ from typing import Any, Final
 import click
 
 from map3d import __version__
+from map3d.cli.lazy_group import LazyGroup
 from map3d.errors import Map3dError
 
 COMMANDS: Final = {
@@ -40,17 +40,8 @@ COMMANDS: Final = {
 _LONGEST_SENTENCE: Final = 200
 
 
-class Commands(click.Group):
-    """Loads the module of a command on first use, and lists the commands in the order of a typical workflow."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(COMMANDS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in COMMANDS:
-            return None
-        command: click.Command = importlib.import_module(f"map3d.cli.{COMMANDS[cmd_name]}").command
-        return command
+class Commands(LazyGroup):
+    """Lists the commands with whole sentences, and suggests the nearest one for a misspelt command."""
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
         try:
@@ -67,7 +58,7 @@ class Commands(click.Group):
             formatter.write_dl([(name, command.get_short_help_str(_LONGEST_SENTENCE)) for name, command in commands if command is not None])
 
 
-@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.group(cls=Commands, modules=COMMANDS, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 @click.version_option(__version__, prog_name="map3d")
 def cli() -> None:
     """Turn 3D city models into oblique image tiles that any phone can show.
