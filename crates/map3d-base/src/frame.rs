@@ -59,6 +59,15 @@ impl LayerSpec {
         Self { kind, format, quality: default_quality(), small: false, suns: Vec::new(), radius_m: 0.0 }
     }
 
+    /// Fails for layers that cannot be rendered together. `what` has the layers.
+    pub fn validate_all(what: &str, layers: &[Self]) -> Result<()> {
+        let twice = (1..layers.len()).find(|k| layers[..*k].iter().any(|l| l.kind == layers[*k].kind));
+        if let Some(k) = twice {
+            return Err(Error::argument(format!("{what}: two layers are {:?}; a pass has one of a kind", layers[k].kind)));
+        }
+        layers.iter().try_for_each(Self::validate)
+    }
+
     fn validate(&self) -> Result<()> {
         let kind = self.kind;
         let expected = match kind {
@@ -116,11 +125,7 @@ impl Frame {
         if self.zmax > DEEPEST_LEVEL {
             return Err(Error::argument(format!("frame: zmax is {}, expected at most {DEEPEST_LEVEL}", self.zmax)));
         }
-        let twice = (1..self.layers.len()).find(|k| self.layers[..*k].iter().any(|l| l.kind == self.layers[*k].kind));
-        if let Some(k) = twice {
-            return Err(Error::argument(format!("frame: two layers are {:?}; a pass has one of a kind", self.layers[k].kind)));
-        }
-        self.layers.iter().try_for_each(LayerSpec::validate)
+        LayerSpec::validate_all("frame", &self.layers)
     }
 
     /// Returns the layer of a kind.

@@ -2,19 +2,25 @@
 //! The pages of `spec/` are their source; this crate does no tracing and knows no image format.
 
 pub mod asset;
+pub mod camera;
 pub mod error;
+pub mod extent;
 pub mod file;
 pub mod frame;
 pub mod isa;
 pub mod limits;
+pub mod projection;
 pub mod samples;
 pub mod tile;
 pub mod vec3;
 pub mod view;
 
+pub use camera::{Camera, CameraKind, Window};
 pub use error::{Error, Result};
+pub use extent::Extent;
 pub use frame::{Frame, LayerFormat, LayerKind, LayerSpec};
 pub use isa::Isa;
+pub use projection::{ParallelProjection, PerspectiveProjection, Projection};
 pub use vec3::{Box3, Vec3};
 pub use view::ViewAxes;
 
@@ -23,6 +29,6 @@ pub const DEPTH_UNITS_PER_M: f64 = 1024.0;
 /// Stored depth where there is nothing.
 pub const DEPTH_NOTHING: u32 = u32::MAX;
 /// Raised only when rendered bytes change.
-pub const RENDER_FORMAT: u32 = 5;
+pub const RENDER_FORMAT: u32 = 6;
 /// Rays that leave a surface start this far above it, in metres (spec/pyramid.md §10).
 pub const RAY_LIFT_M: f64 = 1.0 / 64.0;

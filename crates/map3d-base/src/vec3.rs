@@ -2,37 +2,45 @@
 
 pub type Vec3 = [f64; 3];
 
+#[inline]
 pub fn dot(a: Vec3, b: Vec3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+#[inline]
 pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
+#[inline]
 pub fn add(a: Vec3, b: Vec3) -> Vec3 {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
+#[inline]
 pub fn sub(a: Vec3, b: Vec3) -> Vec3 {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
+#[inline]
 pub fn scale(a: Vec3, s: f64) -> Vec3 {
     [a[0] * s, a[1] * s, a[2] * s]
 }
 
+#[inline]
 pub fn length(a: Vec3) -> f64 {
     dot(a, a).sqrt()
 }
 
 /// Unit vector, or `None` for a vector without a direction (zero, NaN, infinite).
+#[inline]
 pub fn normalized(a: Vec3) -> Option<Vec3> {
     let l = length(a);
     (l > 0.0 && l.is_finite()).then(|| scale(a, 1.0 / l))
 }
 
 /// Geometric normal of a triangle, not normalised: twice its area long, by the right-hand rule.
+#[inline]
 pub fn triangle_normal(p: [Vec3; 3]) -> Vec3 {
     cross(sub(p[1], p[0]), sub(p[2], p[0]))
 }

@@ -101,12 +101,12 @@ fn boxes_of_a_mesh_are_those_of_its_objects_and_prototypes() {
         corners.for_each(|v| bounds.add_point(mesh.positions()[*v as usize]));
         bounds
     };
-    let found = mesh.boxes(6).expect("boxes");
+    let found = mesh.boxes(6, None).expect("boxes");
     for (object, bounds) in found.objects.iter().enumerate() {
         assert_eq!(*bounds, expected(&|t| mesh.prototypes()[t] == 0 && mesh.objects()[t] as usize == object), "object {object}");
     }
     assert!(found.objects[5].is_empty() && !found.objects[3].is_empty());
     assert_eq!(found.prototypes.into_iter().collect::<Vec<_>>(), [(2, expected(&|t| mesh.prototypes()[t] == 2))]);
-    assert!(mesh.boxes(3).is_err(), "an object beyond the count");
+    assert!(mesh.boxes(3, None).is_err(), "an object beyond the count");
     std::fs::remove_dir_all(dir).expect("clean up");
 }

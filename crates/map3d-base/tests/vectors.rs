@@ -1,7 +1,7 @@
 //! The vectors of `spec/vectors`, read by all three languages.
 
 use map3d_base::tile::{Tile, block_levels, morton};
-use map3d_base::{Frame, ViewAxes};
+use map3d_base::{Camera, CameraKind, Frame, Projection, ViewAxes, Window};
 use serde_json::Value;
 
 fn vectors(name: &str) -> Value {
@@ -27,6 +27,32 @@ fn view_axes_and_coordinates_follow_the_vectors() {
             assert!(close(uvd, vec3(&p["uvd"])), "{uvd:?} {p}");
             let back = axes.local_from_uvd(uvd);
             assert!((0..3).all(|k| (back[k] - vec3(&p["local"])[k]).abs() < 1e-9));
+        }
+    }
+}
+
+#[test]
+fn cameras_follow_the_vectors() {
+    for row in vectors("cameras").as_array().expect("rows") {
+        let given = &row["camera"];
+        let number = |v: &Value| v.as_f64().expect("number");
+        let [left, right, bottom, top] = [0, 1, 2, 3].map(|k| number(&given["window"][k]));
+        let camera = Camera {
+            kind: if given["projection"] == "perspective" { CameraKind::Perspective } else { CameraKind::Orthographic },
+            position: vec3(&given["position"]),
+            axes: ViewAxes { right: vec3(&given["right"]), up: vec3(&given["up"]), forward: vec3(&given["forward"]) },
+            window: Window { left, right, bottom, top },
+            near_m: 0.1,
+            far_m: 1e4,
+            width_px: number(&given["size"][0]) as u32,
+            height_px: number(&given["size"][1]) as u32,
+        };
+        let projection = Projection::of_camera(&camera.validated().expect("valid"), 0.0);
+        for p in row["points"].as_array().expect("points") {
+            let (x, y, depth) = (number(&p["pixel"][0]), number(&p["pixel"][1]), number(&p["depth"]));
+            let [px, py, units] = projection.project(vec3(&p["local"]));
+            assert!((px - x).abs() < 1e-8 && (py - y).abs() < 1e-8 && (units / 1024.0 - depth).abs() < 1e-9, "{px} {py} {units} {p}");
+            assert!(close(projection.unproject([x, y, depth * 1024.0]), vec3(&p["local"])));
         }
     }
 }

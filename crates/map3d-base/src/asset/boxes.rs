@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::AssetMesh;
 use crate::error::{Error, Result};
+use crate::extent::Extent;
 use crate::vec3::Box3;
 
 /// Triangles between two releases of resident pages.
@@ -16,12 +17,15 @@ pub struct MeshBoxes {
     pub objects: Vec<Box3>,
     /// Boxes of the prototypes by number, each in its own frame.
     pub prototypes: BTreeMap<u32, Box3>,
+    /// Triangles of each object that are outside the extent, without placed prototypes.
+    pub outside: Vec<u32>,
 }
 
 impl AssetMesh {
-    /// Computes the boxes of `count` objects and of all prototypes in one pass, in bounded memory. Fails for a triangle of an object ≥ `count`.
-    pub fn boxes(&self, count: usize) -> Result<MeshBoxes> {
-        let mut boxes = MeshBoxes { objects: vec![Box3::EMPTY; count], prototypes: BTreeMap::new() };
+    /// Computes the boxes of `count` objects, of their triangles in `extent` if there is one, and of all prototypes in one pass, in bounded memory.
+    /// Fails for a triangle of an object ≥ `count`.
+    pub fn boxes(&self, count: usize, extent: Option<&Extent>) -> Result<MeshBoxes> {
+        let mut boxes = MeshBoxes { objects: vec![Box3::EMPTY; count], prototypes: BTreeMap::new(), outside: vec![0; count] };
         let (triangles, objects, prototypes, positions) = (self.triangles(), self.objects(), self.prototypes(), self.positions());
         for (t, corners) in triangles.iter().enumerate() {
             let bounds = match prototypes[t] {
@@ -31,7 +35,12 @@ impl AssetMesh {
             let Some(bounds) = bounds else {
                 return Err(Error::format(self.path(), format!("triangle {t} belongs to object {}, of {count}", objects[t])));
             };
-            corners.iter().for_each(|v| bounds.add_point(positions[*v as usize]));
+            let corners = corners.map(|v| positions[v as usize]);
+            if prototypes[t] == 0 && extent.is_some_and(|e| !e.keeps(corners)) {
+                boxes.outside[objects[t] as usize] += 1;
+            } else {
+                corners.iter().for_each(|p| bounds.add_point(*p));
+            }
             if t % PIECE == PIECE - 1 {
                 self.release();
             }

@@ -23,6 +23,34 @@ impl Rank {
     }
 }
 
+/// What a surface without a colour of its own is; a build chooses its colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[repr(u8)]
+pub enum SurfaceClass {
+    Wall = 0,
+    Roof = 1,
+    Ground = 2,
+    Window = 3,
+    Door = 4,
+    Road = 5,
+    Water = 6,
+    Vegetation = 7,
+    Terrain = 8,
+    /// The source does not say.
+    Other = 9,
+}
+
+impl SurfaceClass {
+    pub const ALL: [Self; 10] =
+        [Self::Wall, Self::Roof, Self::Ground, Self::Window, Self::Door, Self::Road, Self::Water, Self::Vegetation, Self::Terrain, Self::Other];
+
+    /// Returns the name of the class in JSON files.
+    pub fn name(self) -> &'static str {
+        ["wall", "roof", "ground", "window", "door", "road", "water", "vegetation", "terrain", "other"][self as usize]
+    }
+}
+
 /// How a texture continues outside [0, 1]; the numbers are the codes of chunk files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -49,6 +77,9 @@ pub struct Material {
     pub name: String,
     /// sRGB and opacity, 0..1.
     pub diffuse: [f32; 4],
+    /// Set where the source gives neither colour nor texture: `diffuse` then means nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub surface: Option<SurfaceClass>,
     pub texture: Option<String>,
     pub alpha: Option<String>,
     pub wrap: Wrap,
@@ -60,7 +91,16 @@ pub struct Material {
 
 impl Default for Material {
     fn default() -> Self {
-        Self { name: String::new(), diffuse: [0.8, 0.8, 0.8, 1.0], texture: None, alpha: None, wrap: Wrap::Wrap, border: [0.0; 4], cutout: false }
+        Self {
+            name: String::new(),
+            diffuse: [0.8, 0.8, 0.8, 1.0],
+            surface: None,
+            texture: None,
+            alpha: None,
+            wrap: Wrap::Wrap,
+            border: [0.0; 4],
+            cutout: false,
+        }
     }
 }
 
@@ -89,12 +129,21 @@ pub struct Object {
     pub attributes: BTreeMap<String, serde_json::Value>,
 }
 
+/// What a warning is about, where that is not one part of the file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum WarningScope {
+    File,
+}
+
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Warning {
     pub reason: String,
     pub count: u64,
     /// The first occurrence: a name, a line, a file.
     pub example: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scope: Option<WarningScope>,
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -122,7 +171,12 @@ impl AssetReport {
     pub fn warn(&mut self, reason: &str, example: impl Into<String>) {
         match self.warnings.iter_mut().find(|w| w.reason == reason) {
             Some(w) => w.count += 1,
-            None => self.warnings.push(Warning { reason: reason.to_owned(), count: 1, example: example.into() }),
+            None => self.warnings.push(Warning { reason: reason.to_owned(), count: 1, example: example.into(), scope: None }),
         }
+    }
+
+    /// Adds a warning about the whole file.
+    pub fn warn_file(&mut self, reason: &str, example: impl Into<String>) {
+        self.warnings.push(Warning { reason: reason.to_owned(), count: 1, example: example.into(), scope: Some(WarningScope::File) });
     }
 }
