@@ -2,12 +2,13 @@
 
 use std::collections::HashMap;
 
-use map3d_base::asset::{Material, Wrap};
+use map3d_base::asset::{Material, SurfaceClass, Wrap};
 
 /// The properties by which two materials are compared: all but the name. Floats are compared by their bits.
 #[derive(Clone, PartialEq, Eq, Hash)]
 struct MaterialKey {
     diffuse: [u32; 4],
+    surface: Option<SurfaceClass>,
     texture: Option<String>,
     alpha: Option<String>,
     wrap: Wrap,
@@ -29,6 +30,7 @@ impl MaterialTable {
     pub fn add(&mut self, material: Material) -> u32 {
         let key = MaterialKey {
             diffuse: material.diffuse.map(f32::to_bits),
+            surface: material.surface,
             texture: material.texture.clone(),
             alpha: material.alpha.clone(),
             wrap: material.wrap,

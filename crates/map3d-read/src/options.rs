@@ -6,6 +6,8 @@ use map3d_base::limits::{MAX_IMAGE_PX, MAX_IMAGE_SIDE_PX};
 use map3d_base::{Error, Result};
 use serde::Deserialize;
 
+use crate::transparency::Transparency;
+
 /// The axis of an OBJ that points up. `Y` turns (x, y, z) into (x, −z, y).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -30,10 +32,13 @@ pub enum Split {
 pub struct ReadOptions {
     pub up: Up,
     pub split: Split,
-    /// CityGML appearance theme; by default, the first in the file.
+    /// CityGML appearance theme; by default, the one with the most textures, of equal ones the first in the file.
     pub theme: Option<String>,
     /// CityGML level of detail, 0 to 4; by default, the finest of each object.
     pub lod: Option<String>,
+    /// Converts rooms and what is in them.
+    pub interiors: bool,
+    pub transparency: Transparency,
     /// Makes the first broken part an error.
     pub strict: bool,
     /// Folder that file names in the document may lead to; by default, the document's own.
@@ -56,6 +61,8 @@ impl Default for ReadOptions {
             split: Split::default(),
             theme: None,
             lod: None,
+            interiors: false,
+            transparency: Transparency::default(),
             strict: false,
             folder: None,
             max_image_side_px: MAX_IMAGE_SIDE_PX,

@@ -69,9 +69,11 @@ impl ReportBuilder {
         Ok(())
     }
 
-    /// Counts a valid part that is left out by design; not an error even with `strict`.
-    pub fn omit(&mut self, reason: &str) {
-        self.report.skip(reason, 1);
+    /// Counts valid parts that are left out by design; not an error even with `strict`.
+    pub fn omit(&mut self, reason: &str, count: u64) {
+        if count > 0 {
+            self.report.skip(reason, count);
+        }
     }
 
     /// Counts a fault that was repaired or worked around.
@@ -86,6 +88,25 @@ impl ReportBuilder {
     /// Counts something worth knowing that is not a fault; not an error even with `strict`.
     pub fn note(&mut self, reason: &str, example: impl Into<String>) {
         self.report.warn(reason, example);
+    }
+
+    /// Notes something about the whole file.
+    pub fn note_file(&mut self, reason: &str, example: impl Into<String>) {
+        self.report.warn_file(reason, example);
+    }
+
+    /// Reports a fault of the whole file that was repaired or worked around.
+    pub fn warn_file(&mut self, reason: &str, example: String) -> Result<()> {
+        if self.strict {
+            return Err(Error::format(&self.path, format!("{reason}: {example}")));
+        }
+        self.report.warn_file(reason, example);
+        Ok(())
+    }
+
+    /// Returns the number of parts left out for a reason.
+    pub fn skipped(&self, reason: &str) -> u64 {
+        self.report.skipped.get(reason).copied().unwrap_or(0)
     }
 
     /// Returns an error if a quantity exceeds its limit.

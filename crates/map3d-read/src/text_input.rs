@@ -2,20 +2,32 @@
 
 use std::borrow::Cow;
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read, Seek};
+use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 use encoding_rs_io::{DecodeReaderBytes, DecodeReaderBytesBuilder};
 use map3d_base::{Error, Result};
+use memchr::{memchr, memchr_iter};
+
+use crate::byte_source::ByteSource;
+use crate::mended_utf8::MendedUtf8;
 
 const HEAD_BYTES: u64 = 4096;
 const BUFFER_BYTES: usize = 1 << 17;
 
 /// A text file, read as it is or decoded to UTF-8.
 pub enum TextInput {
-    Plain(BufReader<File>),
-    Decoded(Box<BufReader<DecodeReaderBytes<File, Vec<u8>>>>),
+    Plain(BufReader<ByteSource>),
+    Decoded(Box<BufReader<DecodeReaderBytes<ByteSource, Vec<u8>>>>),
+    Mended(Box<BufReader<MendedUtf8<ByteSource>>>),
+}
+
+/// Something wrong with the encoding of a document: a reason and an example, as in a report.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EncodingFault {
+    pub reason: &'static str,
+    pub example: String,
 }
 
 impl Read for TextInput {
@@ -23,6 +35,7 @@ impl Read for TextInput {
         match self {
             Self::Plain(input) => input.read(out),
             Self::Decoded(input) => input.read(out),
+            Self::Mended(input) => input.read(out),
         }
     }
 }
@@ -33,6 +46,7 @@ impl BufRead for TextInput {
         match self {
             Self::Plain(input) => input.fill_buf(),
             Self::Decoded(input) => input.fill_buf(),
+            Self::Mended(input) => input.fill_buf(),
         }
     }
 
@@ -41,56 +55,112 @@ impl BufRead for TextInput {
         match self {
             Self::Plain(input) => input.consume(n),
             Self::Decoded(input) => input.consume(n),
+            Self::Mended(input) => input.consume(n),
         }
     }
 }
 
-/// Opens a regular file.
-fn open_file(path: &Path) -> Result<File> {
-    let file = File::open(path).map_err(|e| Error::storage(path, e))?;
-    let is_file = file.metadata().map_err(|e| Error::storage(path, e))?.is_file();
-    if is_file { Ok(file) } else { Err(Error::format(path, "not a regular file")) }
+/// Opens a regular file. Opening a named pipe would wait for its writer.
+fn open_file(path: &Path) -> Result<ByteSource> {
+    if !path.metadata().map_err(|e| Error::storage(path, e))?.is_file() {
+        return Err(Error::format(path, "not a regular file"));
+    }
+    File::open(path).and_then(ByteSource::new).map_err(|e| Error::storage(path, e))
 }
 
 /// Returns the first bytes of a file and rewinds it.
-fn read_head(file: &mut File) -> io::Result<Vec<u8>> {
+fn read_head(file: &mut ByteSource) -> io::Result<Vec<u8>> {
     let mut head = Vec::new();
-    file.by_ref().take(HEAD_BYTES).read_to_end(&mut head)?;
+    let read = file.by_ref().take(HEAD_BYTES).read_to_end(&mut head);
+    // What precedes the damage of a short gzip file is its head.
+    read.or_else(|e| if file.is_gzip() { Ok(0) } else { Err(e) })?;
     file.rewind()?;
     Ok(head)
 }
 
-/// Opens an XML document. The byte order mark or the XML declaration gives the encoding; invalid bytes become U+FFFD.
+/// Opens an XML document. The byte order mark or the XML declaration gives the encoding; bytes that are not UTF-8 in a document that should be
+/// are read as Windows-1252.
 pub fn open_xml(path: &Path) -> Result<TextInput> {
+    Ok(open_checked_xml(path)?.0)
+}
+
+/// Opens an XML document; returns also what is wrong with its encoding.
+pub fn open_checked_xml(path: &Path) -> Result<(TextInput, Vec<EncodingFault>)> {
     let io = |e| Error::storage(path, e);
     let mut file = open_file(path)?;
     let head = read_head(&mut file).map_err(io)?;
-    let encoding = detect_utf16_without_bom(&head).or_else(|| parse_declared_encoding(&head)).unwrap_or(UTF_8);
-    if encoding == UTF_8 && Encoding::for_bom(&head).is_none() && is_utf8(&mut file).map_err(io)? {
-        return Ok(TextInput::Plain(BufReader::with_capacity(BUFFER_BYTES, file)));
+    let mut faults = Vec::new();
+    let declared = find_declared_encoding(&head);
+    let known = declared.as_deref().and_then(|name| Encoding::for_label(name.as_bytes()));
+    if let (Some(name), None) = (declared, known) {
+        faults.push(EncodingFault { reason: "unknown encoding, read as UTF-8", example: name });
     }
-    Ok(decode(file, encoding))
+    let encoding = detect_utf16_without_bom(&head).or(known).unwrap_or(UTF_8);
+    if encoding != UTF_8 || Encoding::for_bom(&head).is_some() {
+        return Ok((decode(file, encoding), faults));
+    }
+    match find_utf8_fault(&mut file).map_err(io)? {
+        None => Ok((TextInput::Plain(BufReader::with_capacity(BUFFER_BYTES, file)), faults)),
+        Some(fault) => {
+            faults.push(fault);
+            Ok((TextInput::Mended(Box::new(BufReader::with_capacity(BUFFER_BYTES, MendedUtf8::new(file)))), faults))
+        }
+    }
 }
 
-/// Returns true if the whole file is valid UTF-8 and needs no decoding. Rewinds the file.
-fn is_utf8(file: &mut File) -> io::Result<bool> {
+/// Returns the number of the line that contains a byte of an XML document.
+pub fn count_lines(path: &Path, byte: u64) -> Result<u64> {
+    let io = |e| Error::storage(path, e);
+    let mut input = open_xml(path)?.take(byte);
+    let mut line = 1;
+    loop {
+        let buffer = input.fill_buf().map_err(io)?;
+        if buffer.is_empty() {
+            return Ok(line);
+        }
+        line += memchr_iter(b'\n', buffer).count() as u64;
+        let n = buffer.len();
+        input.consume(n);
+    }
+}
+
+/// Finds the first byte of the file that is zero or not UTF-8, or that cannot be unpacked: then the file ends there. Rewinds the file.
+fn find_utf8_fault(file: &mut ByteSource) -> io::Result<Option<EncodingFault>> {
     let mut buffer = vec![0; BUFFER_BYTES];
-    let mut kept = 0;
-    let valid = loop {
-        let n = file.read(&mut buffer[kept..])?;
-        match std::str::from_utf8(&buffer[..kept + n]) {
-            Ok(_) if n == 0 => break true,
-            Ok(_) => kept = 0,
+    let (mut kept, mut position) = (0, 0);
+    let fault = loop {
+        let n = match file.read(&mut buffer[kept..]) {
+            Err(_) if file.is_gzip() => {
+                let example = format!("after {} unpacked bytes; what comes before is kept", file.end_at_damage());
+                break Some(EncodingFault { reason: "gzip file cut or damaged", example });
+            }
+            read => read?,
+        };
+        let bytes = &buffer[..kept + n];
+        if let Some(at) = memchr(0, bytes) {
+            break Some(EncodingFault { reason: "zero bytes left out", example: format!("byte {}", position + at as u64) });
+        }
+        match std::str::from_utf8(bytes) {
+            Ok(_) if n == 0 => break None,
+            Ok(_) => {
+                position += bytes.len() as u64;
+                kept = 0;
+            }
             // The end of the buffer may split a character.
             Err(e) if e.error_len().is_none() && n > 0 => {
-                buffer.copy_within(e.valid_up_to()..kept + n, 0);
-                kept = kept + n - e.valid_up_to();
+                let end = kept + n;
+                buffer.copy_within(e.valid_up_to()..end, 0);
+                position += e.valid_up_to() as u64;
+                kept = end - e.valid_up_to();
             }
-            Err(_) => break false,
+            Err(e) => {
+                let example = format!("byte {}", position + e.valid_up_to() as u64);
+                break Some(EncodingFault { reason: "not UTF-8 as declared; other bytes read as Windows-1252", example });
+            }
         }
     };
     file.rewind()?;
-    Ok(valid)
+    Ok(fault)
 }
 
 /// Opens a text file for reading by lines. UTF-16 is decoded; other encodings pass through, without a byte order mark (see `decode_name`).
@@ -120,7 +190,7 @@ pub fn decode_name(bytes: &[u8]) -> Cow<'_, str> {
     }
 }
 
-fn decode(file: File, encoding: &'static Encoding) -> TextInput {
+fn decode(file: ByteSource, encoding: &'static Encoding) -> TextInput {
     let decoder = DecodeReaderBytesBuilder::new().encoding(Some(encoding)).bom_override(true).build(file);
     TextInput::Decoded(Box::new(BufReader::with_capacity(BUFFER_BYTES, decoder)))
 }
@@ -141,11 +211,11 @@ fn detect_utf16_without_bom(head: &[u8]) -> Option<&'static Encoding> {
     }
 }
 
-/// Returns the encoding that the XML declaration names.
-fn parse_declared_encoding(head: &[u8]) -> Option<&'static Encoding> {
+/// Returns the name of the encoding in the XML declaration.
+fn find_declared_encoding(head: &[u8]) -> Option<String> {
     let text = String::from_utf8_lossy(&head[..head.len().min(256)]);
     let declaration = &text[text.find("<?xml")?..text.find("?>")?];
     let value = declaration.split_once("encoding")?.1.trim_start().strip_prefix('=')?.trim_start();
     let quote = value.chars().next().filter(|c| "\"'".contains(*c))?;
-    Encoding::for_label(value[1..].split(quote).next()?.as_bytes())
+    Some(value[1..].split(quote).next()?.to_owned())
 }

@@ -3,6 +3,7 @@
 use earcut::Earcut;
 use map3d_base::Vec3;
 
+use crate::constrained_delaunay;
 use crate::t_junctions::repair_t_junctions;
 
 /// The reason why a polygon has no triangles.
@@ -10,6 +11,10 @@ use crate::t_junctions::repair_t_junctions;
 pub enum PolygonError {
     NoArea,
     NotFinite,
+    /// Its triangulation would take too much memory or time.
+    TooManyVertices,
+    /// Rounding defeated the triangulation.
+    NumericalFailure,
 }
 
 impl PolygonError {
@@ -18,6 +23,8 @@ impl PolygonError {
         match self {
             Self::NoArea => "polygon without area",
             Self::NotFinite => "coordinate is not a finite number",
+            Self::TooManyVertices => "polygon with too many vertices to triangulate",
+            Self::NumericalFailure => "polygon that could not be triangulated",
         }
     }
 }
@@ -32,6 +39,9 @@ pub enum Coverage {
 
 /// Largest relative difference between the area of a polygon and that of its triangles.
 const AREA_TOLERANCE: f64 = 1e-6;
+
+/// Polygons with more vertices are not triangulated by ear clipping, whose time grows with the square of their number and faster.
+const MAX_EAR_CLIPPED_VERTICES: usize = 1_000;
 
 /// Triangulates polygons one after another; reuses its buffers.
 pub struct Triangulator {
@@ -81,11 +91,11 @@ impl Triangulator {
         if points.len() == 4 && ends.len() == 1 && self.split_convex_quad() {
             return Ok(Coverage::Exact);
         }
-        self.holes.clear();
-        self.holes.extend(ends[..ends.len() - 1].iter().map(|e| *e as u32));
-        self.earcut.earcut_slice(&self.projected, &self.holes, &mut self.triangles);
-        repair_t_junctions(&self.projected, &mut self.triangles);
-        self.orient();
+        if points.len() > MAX_EAR_CLIPPED_VERTICES {
+            constrained_delaunay::triangulate(&self.projected, ends, &mut self.triangles)?;
+        } else {
+            self.clip_ears(ends);
+        }
         if self.triangles.is_empty() { Err(PolygonError::NoArea) } else { Ok(self.compute_coverage(ends)) }
     }
 
@@ -106,6 +116,14 @@ impl Triangulator {
         let (first, scale) = (points[0], self.scale);
         self.projected.clear();
         self.projected.extend(points.iter().map(|p| [(p[a] - first[a]) * scale[a], (p[b] - first[b]) * scale[b]]));
+    }
+
+    fn clip_ears(&mut self, ends: &[usize]) {
+        self.holes.clear();
+        self.holes.extend(ends[..ends.len() - 1].iter().map(|e| *e as u32));
+        self.earcut.earcut_slice(&self.projected, &self.holes, &mut self.triangles);
+        repair_t_junctions(&self.projected, &mut self.triangles);
+        self.orient();
     }
 
     /// Splits a convex quadrilateral along its shorter diagonal. Returns false if it is not convex.

@@ -110,6 +110,27 @@ fn first_theme_is_used_unless_another_is_requested() {
 }
 
 #[test]
+fn theme_with_the_most_textures_is_the_default() {
+    let colors = color("1 0 0", &["p"]) + "|" + &color("1 0 0", &["s"]);
+    let photo = texture("", "p", UVS);
+    let shared = member("usage", &photo) + &member("photos", "#tex");
+    for (outside, inside, textured) in [
+        (member("usage", &colors) + &member("photos", &photo), String::new(), true),
+        (String::new(), property("usage", &colors) + &property("photos", &photo), true),
+        (member("usage", &colors), property("photos", &photo), true),
+        (shared, String::new(), true),
+    ] {
+        let document = read_with_defaults(&outside, &inside);
+        assert_eq!(document.material_of(0).texture.is_some(), textured, "{outside}{inside}");
+    }
+    let requested = ReadOptions { theme: Some("usage".into()), ..ReadOptions::default() };
+    let usage = read(&(member("usage", &colors) + &member("photos", &photo)), "", &requested);
+    assert_eq!(diffuse(&usage), RED);
+    let unnamed = format!("<appearance><Appearance><surfaceDataMember>{}</surfaceDataMember></Appearance></appearance>", color("1 0 0", &["p"]));
+    assert_eq!(diffuse(&read_with_defaults("", &unnamed)), RED, "an appearance without a theme");
+}
+
+#[test]
 fn themes_share_surface_data_and_parameterizations_by_xlink() {
     let summer = member(
         "summer",
@@ -131,10 +152,16 @@ fn colours_and_transparency_are_read() {
     let with = |inner: &str| read_with_defaults(&member("a", &format!("<X3DMaterial>{inner}<target>#p</target></X3DMaterial>")), "");
     assert_eq!(diffuse(&with("")), [0.8, 0.8, 0.8, 1.0]);
     assert_eq!(diffuse(&with("<diffuseColor>0.5 2 nan</diffuseColor><transparency>0.25</transparency>")), [0.5, 1.0, 0.0, 0.75]);
-    let invisible = with("<transparency>1</transparency>");
+    let opaque = color("1 0 0", &["other"]);
+    let clear = "<X3DMaterial><transparency>1</transparency><target>#p</target></X3DMaterial>";
+    let invisible = read_with_defaults(&member("a", &format!("{opaque}|{clear}")), "");
     assert_eq!((invisible.count(), invisible.skipped("transparent")), (0, 1));
+    assert_eq!(invisible.warned("fully transparent surfaces are not drawn"), 1);
     let back = with("<diffuseColor>1 0 0</diffuseColor><isFront>false</isFront>");
-    assert_eq!((diffuse(&back), back.warned("back sides")), ([0.8, 0.8, 0.8, 1.0], 1));
+    assert_eq!((diffuse(&back), back.warned("back sides")), (RED, 1), "a surface without a front has the appearance of its back");
+    let both = "<X3DMaterial><diffuseColor>0 0 1</diffuseColor><isFront>false</isFront><target>#p</target></X3DMaterial>|".to_owned()
+        + &color("1 0 0", &["p"]);
+    assert_eq!(diffuse(&read_with_defaults(&member("a", &both), "")), RED);
 }
 
 #[test]

@@ -310,7 +310,7 @@ fn attributes_are_read() {
     let expected = json!({
         "description": "a  house", "name": "Rathaus & Keller", "creationDate": "2020-01-02", "externalReference": "http://sys X7",
         "Code": "007", "count": 7, "volume": 1.5, "area": 42, "day": "2020-02-03", "link": "http://a/b", "set/inner": "v",
-        "class": "1000", "function": "0100, 0200", "usage": "1", "yearOfConstruction": 1985, "roofType": "1030", "measuredHeight": 12.5,
+        "class": "1000", "function": "0100, 0200", "usage": "1", "yearOfConstruction": 1985, "roofType": "gabled roof", "roofType/code": "1030", "measuredHeight": 12.5,
         "storeysAboveGround": 3, "address": "Street 5, 12345 Town",
     });
     assert_eq!(json!(document.objects[0].attributes), expected);

@@ -93,7 +93,7 @@ fn objects_before_malformed_xml_are_read() {
     for text in [whole[..cut].to_owned(), format!("{}wrong{}", &whole[..cut], &whole[cut + 7..]), format!("{}<{}", &whole[..cut], &whole[cut..])] {
         let document = read_text(&text);
         assert_eq!((document.objects.len(), document.count()), (2, 4));
-        assert_eq!(document.warned("malformed document"), 1, "{:?}", document.report);
+        assert_eq!(document.warned("document broken"), 1, "{:?}", document.report);
         assert!(is_format_error(try_text(&text, &strict), "byte"));
     }
 }
@@ -153,12 +153,71 @@ fn documents_in_other_encodings_are_read() {
         "\u{feff}".chars().chain(text.replace("UTF-8", "UTF-16").chars()).collect::<String>().encode_utf16().flat_map(u16::to_le_bytes).collect();
     let mislabelled: Vec<u8> = text.chars().map(|c| c as u8).collect();
     let with_bom = [&[0xEF, 0xBB, 0xBF], text.as_bytes()].concat();
-    for (bytes, name) in
-        [(text.clone().into_bytes(), "Mühle"), (latin, "Mühle"), (utf16, "Mühle"), (with_bom, "Mühle"), (mislabelled, "M\u{fffd}hle")]
+    for (bytes, name) in [(text.clone().into_bytes(), "Mühle"), (latin, "Mühle"), (utf16, "Mühle"), (with_bom, "Mühle"), (mislabelled, "Mühle")]
     {
         let folder = Folder::new("encodings");
         let path = folder.put("a.gml", bytes);
         let document = read_with(&path, Format::CityGml, &ReadOptions::default()).expect("readable");
         assert_eq!(document.objects[0].attributes["name"], json!(name));
+    }
+}
+
+#[test]
+fn complete_polygons_before_the_end_of_a_cut_document_are_read() {
+    let squares: String = (0..30).map(|k| member(&square(&format!("p{k}"), k)) + "\n").collect();
+    let text = building(&format!("<bldg:lod2MultiSurface>{}</bldg:lod2MultiSurface>", multi_surface(&squares)));
+    let polygon = text.find("\"p20\"").expect("the polygon");
+    let cut = polygon + text[polygon..].find("</gml:posList>").expect("its positions");
+    let wrong = format!("{}</gml:wrong>{}", &text[..cut], &text[cut + "</gml:posList>".len()..]);
+    for (broken, what) in [(text[..cut].to_owned(), "the document ends inside"), (wrong, "gml:wrong")] {
+        let document = read_text(&broken);
+        assert_eq!((document.objects.len(), document.count(), document.area()), (1, 40, 80.0));
+        let warning = document.report.warnings.iter().find(|w| w.reason == "document broken").expect("a warning");
+        let line = broken[..cut].matches('\n').count() + 1;
+        assert!(warning.example.contains(&format!(", line {line} (")) && warning.example.contains(what), "{}", warning.example);
+        assert!(warning.example.ends_with("; what comes before is kept"), "{}", warning.example);
+    }
+    let exact = read_text(&text[..cut]).report.warnings[0].example.clone();
+    assert!(exact.starts_with(&format!("at byte {cut}, line")), "{exact}");
+}
+
+#[test]
+fn colours_before_the_end_of_a_cut_document_are_used() {
+    let material = |id: &str| {
+        format!(
+            "<app:surfaceDataMember><app:X3DMaterial><app:diffuseColor>1 0 0</app:diffuseColor><app:target>#{id}</app:target></app:X3DMaterial></app:surfaceDataMember>"
+        )
+    };
+    let appearances = format!("<app:appearanceMember><app:Appearance><app:theme>t</app:theme>{}{}", material("p"), material("other"));
+    let text = building(&at_lod(2, &square("p", 1))).replace("</core:CityModel>", &appearances);
+    for cut in [text.len(), text.len() - 20] {
+        let document = read_text(&text[..cut]);
+        assert_eq!((document.count(), document.material_of(0).diffuse), (2, [1.0, 0.0, 0.0, 1.0]));
+        assert_eq!(document.warned("document broken"), 1);
+    }
+}
+
+#[test]
+fn faults_of_the_encoding_are_reported() {
+    let text = building("<gml:name>Mühle am Bach</gml:name>");
+    let latin: Vec<u8> = text.chars().map(|c| c as u8).collect();
+    let zeros = text.replace("am Bach", "am\0 Bach\0").into_bytes();
+    let unknown = text.replace("UTF-8", "KLINGON").into_bytes();
+    let at = text.find('ü').expect("the letter");
+    for (bytes, reason, example) in [
+        (text.clone().into_bytes(), "", String::new()),
+        (latin, "not UTF-8 as declared; other bytes read as Windows-1252", format!("byte {at}")),
+        (zeros, "zero bytes left out", format!("byte {}", at + "ühle am".len())),
+        (unknown, "unknown encoding, read as UTF-8", "KLINGON".to_owned()),
+    ] {
+        let folder = Folder::new("encodings");
+        let path = folder.put("a.gml", bytes);
+        let document = read_with(&path, Format::CityGml, &ReadOptions::default()).expect("readable");
+        assert_eq!(document.objects[0].attributes["name"], json!("Mühle am Bach"), "{reason}");
+        let found: Vec<(&str, &str)> = document.report.warnings.iter().map(|w| (w.reason.as_str(), w.example.as_str())).collect();
+        let expected: Vec<(&str, &str)> = if reason.is_empty() { vec![] } else { vec![(reason, example.as_str())] };
+        assert_eq!(found, expected);
+        let strict = ReadOptions { strict: true, ..ReadOptions::default() };
+        assert_eq!(read_with(&path, Format::CityGml, &strict).is_ok(), reason.is_empty(), "{reason}");
     }
 }

@@ -183,7 +183,7 @@ fn materials_are_read_from_the_library() {
 
 #[test]
 fn fully_transparent_faces_are_skipped() {
-    let document = read_with_material("invisible", "newmtl m\nd 0\n", "f 1 2 3\n");
+    let document = read_with_material("invisible", "newmtl m\nd 0\nnewmtl other\nd 1\n", "f 1 2 3\n");
     assert_eq!((document.count(), document.skipped("transparent")), (0, 1));
 }
 

@@ -1,17 +1,21 @@
 //! Appearances as parsed: surface data and the ids that they target. Stored compactly, because one file may texture tens of millions of rings.
 
+use std::ops::Range;
+
 use map3d_base::Vec3;
 use map3d_base::asset::Wrap;
 
 use super::geo_transform::GeoTransform;
 use super::ids::{self, Id, IdMap};
+use crate::transparency::TransparencyCounts;
 
 /// The type of a surface data element and its properties.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SurfaceDataKind {
-    /// `diffuse`: sRGB and opacity.
+    /// `color`: sRGB; `transparency`: 0 (opaque) to 1 as written.
     X3DMaterial {
-        diffuse: [f32; 4],
+        color: [f32; 3],
+        transparency: Option<f32>,
     },
     Texture(TextureProperties),
     Unsupported,
@@ -117,14 +121,25 @@ pub struct RingTexCoords {
     pub count: u32,
 }
 
+/// An appearance whose theme may become the selected one.
+pub struct PendingAppearance {
+    pub theme: String,
+    pub surface_data: Range<usize>,
+    pub xlinks: Vec<Id>,
+}
+
 const NO_BINDING: u32 = u32::MAX;
 
 #[derive(Default)]
 pub struct Appearances {
     pub surface_data: Vec<SurfaceData>,
+    /// Some surface data are for back sides.
+    pub has_backs: bool,
     surface_data_by_id: IdMap<u32>,
     /// Surface data that appearances of the selected theme refer to by XLink.
     pub theme_xlinks: Vec<Id>,
+    /// Appearances read before the theme was chosen.
+    pub pending: Vec<PendingAppearance>,
     bindings: Vec<TargetBinding>,
     targets: IdMap<BindingList>,
     pub rings: Vec<RingTexCoords>,
@@ -150,6 +165,7 @@ impl Appearances {
 
     pub fn add_surface_data(&mut self, id: Id, surface_data: SurfaceData) -> u32 {
         let number = self.surface_data.len() as u32;
+        self.has_backs |= !surface_data.is_front;
         self.surface_data.push(surface_data);
         if id != ids::NONE {
             self.surface_data_by_id.entry(id).or_insert(number);
@@ -195,6 +211,40 @@ impl Appearances {
         }
     }
 
+    /// Counts the materials by their transparency.
+    pub fn count_transparency(&self, counts: &mut TransparencyCounts) {
+        for data in &self.surface_data {
+            if let SurfaceDataKind::X3DMaterial { transparency, .. } = data.kind {
+                counts.add(transparency);
+            }
+        }
+    }
+
+    /// Counts the textures of each pending appearance for its theme.
+    pub fn count_textures(&self, theme: &mut ThemeSelection) {
+        let is_texture = |data: &SurfaceData| matches!(data.kind, SurfaceDataKind::Texture(_));
+        for pending in &self.pending {
+            let own = self.surface_data[pending.surface_data.clone()].iter().filter(|d| is_texture(d)).count();
+            let linked = pending.xlinks.iter().filter_map(|id| self.surface_data_by_id.get(id));
+            let linked = linked.filter(|number| is_texture(&self.surface_data[**number as usize])).count();
+            theme.count_textures(&pending.theme, (own + linked) as u64);
+        }
+    }
+
+    /// Marks the surface data of pending appearances of the selected theme. Returns the themes of the others.
+    pub fn resolve_pending(&mut self, selected: Option<&str>) -> Vec<String> {
+        let mut others = Vec::new();
+        for pending in std::mem::take(&mut self.pending) {
+            if selected == Some(&pending.theme) {
+                self.surface_data[pending.surface_data].iter_mut().for_each(|d| d.in_theme = true);
+                self.theme_xlinks.extend(pending.xlinks);
+            } else {
+                others.push(pending.theme);
+            }
+        }
+        others
+    }
+
     /// Iterates over the bindings of a target in the selected theme, in document order.
     pub fn theme_bindings(&self, target: Id) -> impl Iterator<Item = TargetBinding> + '_ {
         let first = self.targets.get(&target).map_or(NO_BINDING, |list| list.first);
@@ -231,25 +281,65 @@ impl Appearances {
     }
 }
 
-/// Selects the appearance theme: the requested one or, by default, the first in the file.
+/// Selects the appearance theme: the requested one or, by default, the one with the most textures; of equal ones, the first in the file.
 #[derive(Clone, Debug, Default)]
 pub struct ThemeSelection {
     pub requested: Option<String>,
-    pub first: Option<String>,
-    /// The file has more than one theme.
-    pub has_several: bool,
+    /// Themes in document order, with their numbers of textures.
+    themes: Vec<(String, u64)>,
+    /// Index into `themes` of the default.
+    default: usize,
+    is_chosen: bool,
+    /// Index of the theme registered last.
+    current: usize,
 }
 
 impl ThemeSelection {
+    pub fn new(requested: Option<String>) -> Self {
+        Self { requested, ..Self::default() }
+    }
+
     /// Registers a theme. Must be called for all themes in document order.
     pub fn register(&mut self, name: &str) {
-        match &self.first {
-            None => self.first = Some(name.to_owned()),
-            Some(first) => self.has_several |= first != name,
+        self.current = self.themes.iter().position(|(known, _)| known == name).unwrap_or_else(|| {
+            self.themes.push((name.to_owned(), 0));
+            self.themes.len() - 1
+        });
+    }
+
+    pub fn count_textures(&mut self, name: &str, count: u64) {
+        self.register(name);
+        self.themes[self.current].1 += count;
+    }
+
+    /// Counts a texture of the theme registered last.
+    pub fn count_texture_of_current(&mut self) {
+        if let Some((_, count)) = self.themes.get_mut(self.current) {
+            *count += 1;
         }
     }
 
+    /// Chooses the default theme; all textures are counted.
+    pub fn choose(&mut self) {
+        let most = self.themes.iter().map(|(_, count)| *count).max();
+        self.default = self.themes.iter().position(|(_, count)| Some(*count) == most).unwrap_or(0);
+        self.is_chosen = true;
+    }
+
+    pub fn is_chosen(&self) -> bool {
+        self.is_chosen
+    }
+
+    pub fn first(&self) -> Option<&str> {
+        self.themes.first().map(|(name, _)| name.as_str())
+    }
+
+    /// The file has more than one theme.
+    pub fn has_several(&self) -> bool {
+        self.themes.len() > 1
+    }
+
     pub fn selected(&self) -> Option<&str> {
-        self.requested.as_deref().or(self.first.as_deref())
+        self.requested.as_deref().or_else(|| self.themes.get(self.default).map(|(name, _)| name.as_str()))
     }
 }

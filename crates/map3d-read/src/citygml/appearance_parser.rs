@@ -6,7 +6,8 @@ use map3d_base::asset::Wrap;
 use map3d_base::{Result, Vec3};
 
 use super::appearance::{
-    Appearances, Parameterization, Resolution, RingTexCoords, SurfaceData, SurfaceDataKind, TexturePlacement, TextureProperties, ThemeSelection,
+    Appearances, Parameterization, PendingAppearance, Resolution, RingTexCoords, SurfaceData, SurfaceDataKind, TexturePlacement, TextureProperties,
+    ThemeSelection,
 };
 use super::coordinates::parse_numbers;
 use super::geo_transform::GeoTransform;
@@ -44,7 +45,7 @@ struct SurfaceDataProperties {
     wrap: Option<Wrap>,
     border: Option<[f32; 4]>,
     diffuse: Option<[f32; 4]>,
-    transparency: f32,
+    transparency: Option<f32>,
     reference_point: Option<Vec3>,
     orientation: Option<[f64; 4]>,
     targets: Vec<SurfaceDataTarget>,
@@ -63,13 +64,19 @@ impl<R: BufRead> AppearanceParser<'_, R> {
         Ok(())
     }
 
+    /// Reads the current appearance. Where the document breaks off in it, the surface data so far are kept.
     fn read_appearance(&mut self) -> Result<()> {
         let first = self.appearances.surface_data.len();
-        let mut xlinks = Vec::new();
-        let mut theme = String::new();
+        let (mut theme, mut xlinks) = (String::new(), Vec::new());
+        let read = self.read_appearance_members(&mut theme, &mut xlinks);
+        self.add_to_theme(theme, first, xlinks);
+        read
+    }
+
+    fn read_appearance_members(&mut self, theme: &mut String, xlinks: &mut Vec<Id>) -> Result<()> {
         while self.xml.next_child()? {
             match self.xml.local_name() {
-                "theme" => theme = self.xml.read_text()?,
+                "theme" => *theme = self.xml.read_text()?,
                 "surfaceDataMember" | "surfaceData" => {
                     if let Some(Reference::Internal(id)) = self.xml.attribute("href").map(|h| parse_reference(&h)) {
                         xlinks.push(id);
@@ -81,14 +88,23 @@ impl<R: BufRead> AppearanceParser<'_, R> {
                 _ => self.xml.skip()?,
             }
         }
+        Ok(())
+    }
+
+    /// Adds the surface data from number `first` on to their theme.
+    fn add_to_theme(&mut self, theme: String, first: usize, xlinks: Vec<Id>) {
         self.theme.register(&theme);
+        if !self.theme.is_chosen() {
+            let surface_data = first..self.appearances.surface_data.len();
+            self.appearances.pending.push(PendingAppearance { theme, surface_data, xlinks });
+            return;
+        }
         if self.theme.selected() == Some(&theme) {
             self.appearances.surface_data[first..].iter_mut().for_each(|d| d.in_theme = true);
             self.appearances.theme_xlinks.extend(xlinks);
         } else {
             self.report.note("appearance of another theme ignored", theme);
         }
-        Ok(())
     }
 
     fn read_surface_data(&mut self) -> Result<()> {
@@ -105,7 +121,7 @@ impl<R: BufRead> AppearanceParser<'_, R> {
             self.report.warn("unsupported surface data", type_name)?;
         }
         if !is_front {
-            self.report.note("appearance of back sides ignored", describe(&kind));
+            self.report.note("appearance of back sides used only for surfaces without one of the front", describe(&kind));
         }
         let number = self.appearances.add_surface_data(id, SurfaceData { kind, is_front, in_theme: false, resolution: Resolution::Unresolved });
         targets.into_iter().for_each(|t| self.appearances.bind(t.target, number, t.parameterization));
@@ -120,7 +136,7 @@ impl<R: BufRead> AppearanceParser<'_, R> {
             "wrapMode" => properties.wrap = self.read_wrap_mode()?,
             "borderColor" => properties.border = self.read_color()?,
             "diffuseColor" => properties.diffuse = self.read_color()?,
-            "transparency" => properties.transparency = self.xml.read_text()?.parse().unwrap_or(0.0),
+            "transparency" => properties.transparency = parse_transparency(&self.xml.read_text()?),
             "referencePoint" => properties.reference_point = read_point(self.xml)?,
             "orientation" => properties.orientation = self.read_numbers()?.and_then(|v| v.try_into().ok()),
             "target" => self.read_target(properties)?,
@@ -267,6 +283,11 @@ impl<R: BufRead> AppearanceParser<'_, R> {
     }
 }
 
+/// Returns a transparency in [0, 1]; `None` for what is not a finite number.
+pub fn parse_transparency(text: &str) -> Option<f32> {
+    text.trim().parse::<f32>().ok().filter(|v| v.is_finite()).map(|v| v.clamp(0.0, 1.0))
+}
+
 /// Describes surface data in the report: the image of a texture, else the type.
 fn describe(kind: &SurfaceDataKind) -> String {
     match kind {
@@ -280,8 +301,7 @@ fn build_kind(type_name: &str, properties: SurfaceDataProperties) -> SurfaceData
     match (type_name, properties.image) {
         ("X3DMaterial", _) => {
             let [r, g, b, _] = properties.diffuse.unwrap_or([DEFAULT_DIFFUSE; 4]);
-            let opacity = if properties.transparency.is_finite() { 1.0 - properties.transparency.clamp(0.0, 1.0) } else { 1.0 };
-            SurfaceDataKind::X3DMaterial { diffuse: [r, g, b, opacity] }
+            SurfaceDataKind::X3DMaterial { color: [r, g, b], transparency: properties.transparency }
         }
         ("ParameterizedTexture" | "GeoreferencedTexture", Some(image)) => SurfaceDataKind::Texture(TextureProperties {
             image,

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use map3d_base::Result;
 use serde_json::Value;
 
-use super::xml_reader::XmlReader;
+use super::xml_reader::{XmlEvent, XmlReader};
 
 /// Attributes of a city object by name.
 pub type Attributes = BTreeMap<String, Value>;
@@ -26,6 +26,12 @@ const NUMERIC_PROPERTIES: [&str; 9] = [
 /// Largest list of values of a repeated property.
 const MAX_LIST_BYTES: usize = 4096;
 
+/// Largest number of data types in a repeated property; further ones are dropped.
+const MAX_REPEATED: usize = 100;
+
+/// Names of the properties that are the value of a data type. Those of PLATEAU's pairs of key and value end in `Value`.
+const VALUE_NAMES: [&str; 8] = ["value", "stringValue", "intValue", "doubleValue", "codeValue", "dateValue", "uriValue", "measuredValue"];
+
 /// Adds a value. Values of a repeated property are joined with commas.
 pub fn add_attribute(attributes: &mut Attributes, name: &str, value: Value) {
     match attributes.get_mut(name) {
@@ -39,13 +45,20 @@ pub fn add_attribute(attributes: &mut Attributes, name: &str, value: Value) {
     }
 }
 
+/// Adds the label of a code, and the code itself as `name/code`.
+pub fn add_code(attributes: &mut Attributes, name: &str, label: String, code: &str) {
+    add_attribute(attributes, name, Value::String(label));
+    add_attribute(attributes, &format!("{name}/code"), Value::from(code));
+}
+
 fn format_value(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
-/// Parses the value of a simple property. Only properties that the standard defines as numeric become numbers: codes have leading zeros.
-pub fn parse_property(local_name: &str, text: &str) -> Value {
-    if NUMERIC_PROPERTIES.contains(&local_name) { parse_number_or_text(text) } else { Value::String(text.to_owned()) }
+/// Parses the value of a simple property. Only measures and properties that the standard defines as numeric become numbers: codes have leading
+/// zeros.
+pub fn parse_property(local_name: &str, is_measure: bool, text: &str) -> Value {
+    if is_measure || NUMERIC_PROPERTIES.contains(&local_name) { parse_number_or_text(text) } else { Value::String(text.to_owned()) }
 }
 
 fn parse_number_or_text(text: &str) -> Value {
@@ -80,36 +93,82 @@ pub fn read_generic_attribute(xml: &mut XmlReader, prefix: &str, attributes: &mu
 pub fn is_generic_attribute_object(local_name: &str) -> bool {
     matches!(
         local_name,
-        "StringAttribute" | "IntAttribute" | "DoubleAttribute" | "DateAttribute" | "UriAttribute" | "MeasureAttribute" | "CodeAttribute"
+        "StringAttribute"
+            | "IntAttribute"
+            | "DoubleAttribute"
+            | "DateAttribute"
+            | "UriAttribute"
+            | "MeasureAttribute"
+            | "CodeAttribute"
+            | "GenericAttributeSet"
     )
 }
 
+/// A generic attribute object of CityGML 3.0, or those of a set.
+#[derive(Default)]
+pub struct GenericAttribute {
+    name: String,
+    /// `None` for a set.
+    value: Option<String>,
+    is_number: bool,
+    code_space: Option<String>,
+    members: Vec<GenericAttribute>,
+}
+
 /// Reads the current generic attribute object.
-pub fn read_generic_attribute_object(xml: &mut XmlReader, attributes: &mut Attributes) -> Result<()> {
+pub fn read_generic_attribute_object(xml: &mut XmlReader) -> Result<GenericAttribute> {
     let is_number = matches!(xml.local_name(), "IntAttribute" | "DoubleAttribute" | "MeasureAttribute");
-    let (mut name, mut value) = (String::new(), String::new());
+    let mut attribute = GenericAttribute { is_number, ..GenericAttribute::default() };
     while xml.next_child()? {
         match xml.local_name() {
-            "name" => name = xml.read_text()?,
-            "value" => value = xml.read_text()?,
+            "name" => attribute.name = xml.read_text()?,
+            "value" => {
+                attribute.code_space = xml.attribute("codeSpace").map(|space| space.into_owned());
+                attribute.value = Some(xml.read_text()?);
+            }
+            "genericAttribute" => {
+                while xml.next_child()? {
+                    attribute.members.push(read_generic_attribute_object(xml)?);
+                }
+            }
             _ => xml.skip()?,
         }
     }
-    add_attribute(attributes, &name, if is_number { parse_number_or_text(&value) } else { Value::String(value) });
-    Ok(())
+    Ok(attribute)
+}
+
+impl GenericAttribute {
+    /// Adds the attribute, or the members of a set as `set/name`. `find_label`: property, code space and code → label.
+    pub fn add_to(self, prefix: &str, attributes: &mut Attributes, find_label: &mut dyn FnMut(&str, &str, &str) -> Option<String>) {
+        let name = format!("{prefix}{}", self.name);
+        let prefix = format!("{name}/");
+        self.members.into_iter().for_each(|member| member.add_to(&prefix, attributes, find_label));
+        let Some(value) = self.value else { return };
+        match self.code_space.and_then(|space| find_label(&self.name, &space, &value)) {
+            Some(label) => add_code(attributes, &name, label, &value),
+            None if self.is_number => add_attribute(attributes, &name, parse_number_or_text(&value)),
+            None => add_attribute(attributes, &name, Value::String(value)),
+        }
+    }
 }
 
 /// Reads the current external reference into the attribute `externalReference`: `system object`.
 pub fn read_external_reference(xml: &mut XmlReader, attributes: &mut Attributes) -> Result<()> {
     let (mut system, mut object) = (String::new(), String::new());
-    while xml.next_child()? {
-        if xml.local_name() == "informationSystem" {
-            system = xml.read_text()?;
-            continue;
-        }
-        while xml.next_child()? {
-            let text = xml.read_text()?;
-            object = if text.is_empty() { object } else { text };
+    let depth = xml.depth();
+    while xml.depth() >= depth {
+        match xml.next_tag()? {
+            XmlEvent::Start => match xml.local_name() {
+                "informationSystem" => system = xml.read_text()?,
+                "name" | "uri" | "targetResource" => {
+                    let text = xml.read_text()?;
+                    object = if text.is_empty() { object } else { text };
+                }
+                "externalObject" | "ExternalReference" => {}
+                _ => xml.skip()?,
+            },
+            XmlEvent::Eof => break,
+            XmlEvent::End | XmlEvent::Text => {}
         }
     }
     let text = [system, object].into_iter().filter(|t| !t.is_empty()).collect::<Vec<_>>().join(" ");
@@ -117,6 +176,47 @@ pub fn read_external_reference(xml: &mut XmlReader, attributes: &mut Attributes)
         add_attribute(attributes, "externalReference", Value::String(text));
     }
     Ok(())
+}
+
+/// Adds the attributes of a data type to those of its owner, named after the property that contains it: `Property/name`. The value of a data
+/// type that has one is that of the property itself. A data type with a key (PLATEAU's `KeyValuePairAttribute`) is named after its key.
+pub fn add_data_type(owner: &mut Attributes, property: &str, type_name: &str, mut values: Attributes) {
+    if values.is_empty() {
+        return;
+    }
+    let mut path = join_path(property, type_name);
+    if let Some(key) = take_key(&mut values) {
+        path = format!("{path}/{key}");
+    } else if has_path(owner, &path) {
+        let Some(free) = (2..=MAX_REPEATED).map(|number| format!("{path}[{number}]")).find(|path| !has_path(owner, path)) else { return };
+        path = free;
+    }
+    for (name, value) in values {
+        let (first, rest) = name.split_once('/').map_or((name.as_str(), ""), |(first, _)| (first, &name[first.len()..]));
+        let is_value = VALUE_NAMES.contains(&first) || first == property || first.strip_suffix("Value") == Some(property);
+        add_attribute(owner, &if is_value { format!("{path}{rest}") } else { format!("{path}/{name}") }, value);
+    }
+}
+
+/// Joins the names of a property and of the data type in it; of two similar names, the first suffices.
+fn join_path(property: &str, type_name: &str) -> String {
+    let (a, b) = (property.to_lowercase(), type_name.to_lowercase());
+    if a.contains(&b) || b.contains(&a) { property.to_owned() } else { format!("{property}/{type_name}") }
+}
+
+fn has_path(attributes: &Attributes, path: &str) -> bool {
+    let below = format!("{path}/");
+    attributes.contains_key(path) || attributes.range(below.clone()..).next().is_some_and(|(name, _)| name.starts_with(&below))
+}
+
+/// Removes and returns the key of a pair of key and value, if the data type is one.
+fn take_key(values: &mut Attributes) -> Option<String> {
+    if !values.keys().any(|name| name != "value" && VALUE_NAMES.contains(&name.as_str())) {
+        return None;
+    }
+    let key = values.remove("key")?;
+    values.remove("key/code");
+    Some(format_value(&key))
 }
 
 #[cfg(test)]
@@ -132,7 +232,7 @@ mod tests {
             ("yearOfConstruction", "1985-01", Value::from("1985-01")),
             ("measuredHeight", "NaN", Value::from("NaN")),
         ] {
-            assert_eq!(parse_property(name, text), expected, "{name}");
+            assert_eq!(parse_property(name, false, text), expected, "{name}");
         }
     }
 

@@ -5,7 +5,7 @@ use map3d_base::asset::Rank;
 use super::appearance::Appearances;
 use super::attributes::Attributes;
 use super::feature_types::FeatureKind;
-use super::geometry_arena::{GeometryArena, NodeId};
+use super::geometry_arena::{GeometryArena, GeometryNode, NodeId, NodeKind};
 use super::ids::{Id, IdMap};
 use super::implicit_geometry::ImplicitGeometry;
 
@@ -36,7 +36,7 @@ pub struct Feature {
     pub kind: FeatureKind,
     pub parent: Option<u32>,
     pub rank: Rank,
-    /// Inside a building; converted only if a feature outside refers to it.
+    /// Inside a building; converted only on request, or if a feature outside refers to it.
     pub is_interior: bool,
     /// Content of a `lod` property of this feature or its parent (relief).
     pub relief_lod: Option<u8>,
@@ -44,6 +44,8 @@ pub struct Feature {
     /// References to other features, such as an opening that a room and a wall share.
     pub xlinks: Vec<Id>,
     pub attributes: Attributes,
+    /// Attributes are kept: those of objects, and those of data types, which go to the object that contains them.
+    pub keeps_attributes: bool,
 }
 
 impl Feature {
@@ -72,6 +74,12 @@ impl CityObject {
         self.appearances.clear();
     }
 
+    /// Returns true if anything could be drawn.
+    pub fn has_geometry(&self) -> bool {
+        let is_polygon = |node: &GeometryNode| matches!(node.kind, NodeKind::Polygon { .. });
+        !self.implicit_geometries.is_empty() || self.geometry.nodes.iter().any(is_polygon)
+    }
+
     /// Iterates over a feature and its ancestors, from the feature up.
     pub fn with_ancestors(&self, feature: u32) -> impl Iterator<Item = u32> + '_ {
         std::iter::successors(Some(feature), |f| self.features[*f as usize].parent)
@@ -85,6 +93,14 @@ impl CityObject {
                 Some(parent) if !f.is_object() => feature = parent,
                 _ => return feature,
             }
+        }
+    }
+
+    /// Marks the descendants of interior features as interior: a feature may say where it is after it has listed its surfaces.
+    pub fn extend_interiors(&mut self) {
+        for f in 0..self.features.len() {
+            let is_inside = self.features[f].parent.is_some_and(|p| self.features[p as usize].is_interior);
+            self.features[f].is_interior |= is_inside;
         }
     }
 

@@ -7,20 +7,23 @@ use super::address::read_address;
 use super::appearance::ThemeSelection;
 use super::appearance_parser::AppearanceParser;
 use super::attributes::{
-    add_attribute, is_generic_attribute, is_generic_attribute_object, parse_property, read_external_reference, read_generic_attribute,
-    read_generic_attribute_object,
+    Attributes, add_attribute, add_code, add_data_type, is_generic_attribute, is_generic_attribute_object, parse_property, read_external_reference,
+    read_generic_attribute, read_generic_attribute_object,
 };
 use super::city_object::{CityObject, Feature, LodRepresentation, Representation};
-use super::feature_types::{FeatureKind, classify_feature, rank_feature, rank_object};
+use super::code_lists::{Code, CodeLists};
+use super::feature_types::{FeatureKind, classify_feature, is_open_space, is_subdivision, rank_feature, rank_object};
 use super::geometry_arena::NO_NODE;
 use super::geometry_parser::{GeometryParser, is_point_or_curve, is_surface};
 use super::ids::{self, Reference, hash_id, parse_reference};
 use super::implicit_geometry::read_implicit_geometry;
+use super::standard_codes::is_adv_code;
 use super::xml_reader::{XmlEvent, XmlReader};
 use crate::options::ReadOptions;
 use crate::report_builder::ReportBuilder;
 
 const DEFAULT_DIMENSION: usize = 3;
+const MAX_LOD: u8 = 4;
 
 pub struct CityObjectParser<'a> {
     pub xml: &'a mut XmlReader,
@@ -28,6 +31,7 @@ pub struct CityObjectParser<'a> {
     pub options: &'a ReadOptions,
     pub city_object: &'a mut CityObject,
     pub theme: &'a mut ThemeSelection,
+    pub code_lists: &'a mut CodeLists,
     /// Buffers for numbers and text.
     pub values: &'a mut Vec<f64>,
     pub text: &'a mut String,
@@ -36,15 +40,28 @@ pub struct CityObjectParser<'a> {
 impl CityObjectParser<'_> {
     /// Reads the current element as a top-level city object.
     pub fn read_city_object(&mut self) -> Result<()> {
-        self.read_feature(classify_feature(self.xml.local_name()), None)
+        let number = self.add_feature(classify_feature(self.xml.local_name()), None);
+        self.read_properties(number)
     }
 
-    fn read_feature(&mut self, kind: FeatureKind, parent: Option<u32>) -> Result<()> {
-        let number = self.add_feature(kind, parent);
+    fn read_properties(&mut self, number: u32) -> Result<()> {
         while self.xml.next_child()? {
             self.read_property(number)?;
         }
         Ok(())
+    }
+
+    /// Adds the attributes of a data type to its owner. `property`: of the owner, which contains the data type.
+    fn finish_data_type(&mut self, number: u32, owner: u32, property: &str) {
+        let Feature { type_name, attributes, .. } = self.feature(number);
+        let (type_name, attributes) = (type_name.clone(), std::mem::take(attributes));
+        let is_known = |feature: &Feature| feature.kind != FeatureKind::Unknown || !feature.representations.is_empty();
+        if self.feature(number).kind == FeatureKind::Unknown && self.city_object.features[number as usize..].iter().any(is_known) {
+            self.report.note("unknown element; features inside it are read", type_name.as_str());
+        }
+        if self.feature(owner).keeps_attributes {
+            add_data_type(&mut self.feature(owner).attributes, property, &type_name, attributes);
+        }
     }
 
     fn add_feature(&mut self, kind: FeatureKind, parent: Option<u32>) -> u32 {
@@ -60,6 +77,8 @@ impl CityObjectParser<'_> {
         let rank = parent_feature.map_or_else(|| rank_object(&type_name), |p| rank_feature(kind, &type_name, p.rank));
         let is_interior = is_interior_kind || parent_feature.is_some_and(|p| p.is_interior);
         let relief_lod = parent_feature.and_then(|p| p.relief_lod);
+        let is_data_type = kind == FeatureKind::Unknown || is_subdivision(&type_name);
+        let keeps_attributes = is_object || (is_data_type && parent_feature.is_some_and(|p| p.keeps_attributes));
         let number = self.city_object.features.len() as u32;
         if id != ids::NONE {
             self.city_object.by_id.entry(id).or_insert(number);
@@ -75,7 +94,8 @@ impl CityObjectParser<'_> {
             relief_lod,
             representations: Vec::new(),
             xlinks: Vec::new(),
-            attributes: Default::default(),
+            attributes: Attributes::default(),
+            keeps_attributes,
         });
         number
     }
@@ -91,6 +111,9 @@ impl CityObjectParser<'_> {
             return self.read_lod_property(number, lod);
         }
         if is_generic_attribute(local_name) {
+            if !self.city_object.features[number as usize].keeps_attributes {
+                return self.xml.skip();
+            }
             return read_generic_attribute(self.xml, "", &mut self.city_object.features[number as usize].attributes);
         }
         match local_name {
@@ -99,21 +122,28 @@ impl CityObjectParser<'_> {
                 let lod = self.feature(number).relief_lod.unwrap_or(0);
                 self.read_surfaces(number, lod, Representation::Surfaces)
             }
-            "address" => {
-                if let Some(text) = read_address(self.xml)? {
-                    add_attribute(&mut self.feature(number).attributes, "address", Value::String(text));
-                }
-                Ok(())
-            }
+            "address" => self.read_address(number),
             "externalReference" => read_external_reference(self.xml, &mut self.city_object.features[number as usize].attributes),
             "lod" => {
                 let lod = self.xml.read_text()?.parse().ok();
-                self.feature(number).relief_lod = lod;
+                self.feature(number).relief_lod = lod.filter(|lod| *lod <= MAX_LOD);
+                Ok(())
+            }
+            "relationToConstruction" => {
+                let is_inside = self.xml.read_text()? == "inside";
+                self.feature(number).is_interior |= is_inside;
                 Ok(())
             }
             "metaDataProperty" | "location" | "extent" => self.xml.skip(),
             _ => self.read_other_property(number),
         }
+    }
+
+    fn read_address(&mut self, number: u32) -> Result<()> {
+        if let Some(text) = read_address(self.xml)? {
+            add_attribute(&mut self.feature(number).attributes, "address", Value::String(text));
+        }
+        Ok(())
     }
 
     /// Reads a property by its content: an XLink, text (an attribute), or objects.
@@ -123,51 +153,96 @@ impl CityObjectParser<'_> {
         if let Some(Reference::Internal(id)) = reference.filter(|_| !local_name.starts_with("interior")) {
             self.feature(number).xlinks.push(id);
         }
+        let code_space = self.xml.attribute("codeSpace").map(|space| space.into_owned());
+        let is_measure = self.xml.attribute("uom").is_some();
         let depth = self.xml.depth();
         let mut text = String::new();
+        // Properties directly inside this one are those of a data type without an element.
+        let mut data_type = None;
         let mut is_simple = true;
         while self.xml.depth() >= depth {
             match self.xml.next_event()? {
+                XmlEvent::Start if self.xml.local_name().starts_with(|c: char| c.is_uppercase()) => {
+                    is_simple = false;
+                    self.read_property_value(number, &local_name)?;
+                }
                 XmlEvent::Start => {
                     is_simple = false;
-                    self.read_property_value(number)?;
+                    let data_type = *data_type.get_or_insert_with(|| self.add_data_type(number, &local_name));
+                    self.read_property(data_type)?;
                 }
                 XmlEvent::Text => text.push_str(self.xml.text()),
                 XmlEvent::End => {}
                 XmlEvent::Eof => break,
             }
         }
+        if let Some(data_type) = data_type {
+            self.finish_data_type(data_type, number, &local_name);
+        }
         let text = text.trim();
-        if is_simple && !text.is_empty() && self.feature(number).is_object() {
-            add_attribute(&mut self.feature(number).attributes, &local_name, parse_property(&local_name, text));
+        if is_simple && !text.is_empty() && self.feature(number).keeps_attributes {
+            self.add_simple_attribute(number, &local_name, code_space.as_deref(), is_measure, text);
         }
         Ok(())
     }
 
+    fn add_data_type(&mut self, owner: u32, property: &str) -> u32 {
+        let number = self.add_feature(FeatureKind::Unknown, Some(owner));
+        self.feature(number).type_name = property.to_owned();
+        number
+    }
+
+    fn add_simple_attribute(&mut self, number: u32, name: &str, code_space: Option<&str>, is_measure: bool, text: &str) {
+        let attributes = &mut self.city_object.features[number as usize].attributes;
+        let is_adv = attributes.get("function/code").and_then(Value::as_str).is_some_and(|code| is_adv_code(code.get(..10).unwrap_or_default()));
+        let code = Code { property: name, space: code_space, text, is_adv };
+        match self.code_lists.find_label(code, self.report) {
+            Some(label) => add_code(attributes, name, label, text),
+            None => add_attribute(attributes, name, parse_property(name, is_measure, text)),
+        }
+    }
+
     /// Reads the current element inside a property.
-    fn read_property_value(&mut self, number: u32) -> Result<()> {
+    fn read_property_value(&mut self, number: u32, property: &str) -> Result<()> {
         let local_name = self.xml.local_name();
-        if local_name == "Envelope" || local_name == "Null" || is_point_or_curve(local_name) {
+        if matches!(local_name, "Envelope" | "Null" | "PointCloud" | "Dynamizer") || is_point_or_curve(local_name) {
             return self.xml.skip();
         }
         if is_surface(local_name) {
-            self.report.note("geometry without a level of detail ignored", local_name);
+            return self.read_geometry(number);
+        }
+        if local_name == "ClearanceSpace" {
+            self.report.omit("solid of an open space", 1);
             return self.xml.skip();
         }
         if is_generic_attribute_object(local_name) {
-            return read_generic_attribute_object(self.xml, &mut self.city_object.features[number as usize].attributes);
+            return self.read_generic_attribute(number);
         }
-        if !local_name.starts_with(|c: char| c.is_uppercase()) {
-            return self.xml.skip();
+        if matches!(local_name, "Address" | "AddressDetails") {
+            return self.read_address(number);
         }
         let kind = classify_feature(local_name);
-        if kind == FeatureKind::Unknown && !matches!(local_name, "Address" | "AddressDetails" | "ExternalReference") {
-            self.report.note("unknown element; features inside it are read", local_name);
+        let feature = self.add_feature(kind, Some(number));
+        self.read_properties(feature)?;
+        if kind == FeatureKind::Unknown || self.feature(feature).keeps_attributes && !self.feature(feature).is_object() {
+            self.finish_data_type(feature, number, property);
         }
-        self.read_feature(kind, Some(number))
+        Ok(())
     }
 
-    fn read_appearance(&mut self) -> Result<()> {
+    fn read_generic_attribute(&mut self, number: u32) -> Result<()> {
+        let Feature { attributes, keeps_attributes, .. } = &mut self.city_object.features[number as usize];
+        if !*keeps_attributes {
+            return self.xml.skip();
+        }
+        let (code_lists, report) = (&mut *self.code_lists, &mut *self.report);
+        let mut find_label =
+            |property: &str, space: &str, text: &str| code_lists.find_label(Code { property, space: Some(space), text, is_adv: false }, report);
+        read_generic_attribute_object(self.xml)?.add_to("", attributes, &mut find_label);
+        Ok(())
+    }
+
+    pub fn read_appearance(&mut self) -> Result<()> {
         AppearanceParser {
             xml: self.xml,
             report: self.report,
@@ -180,7 +255,7 @@ impl CityObjectParser<'_> {
         .read_property()
     }
 
-    fn geometry_parser(&mut self) -> GeometryParser<'_> {
+    pub fn geometry_parser(&mut self) -> GeometryParser<'_> {
         GeometryParser {
             xml: self.xml,
             report: self.report,
@@ -194,22 +269,49 @@ impl CityObjectParser<'_> {
     /// Reads a property whose name begins with `lod0` … `lod4`.
     fn read_lod_property(&mut self, number: u32, lod: u8) -> Result<()> {
         match &self.xml.local_name()["lod0".len()..] {
+            "Solid" if is_open_space(&self.city_object.features[number as usize].type_name) => {
+                self.report.omit("solid of an open space", 1);
+                self.xml.skip()
+            }
             "ImplicitRepresentation" => self.read_implicit_representation(number, lod),
             "RoofEdge" => self.read_surfaces(number, lod, Representation::RoofEdge),
             "TerrainIntersection" | "TerrainIntersectionCurve" | "MultiCurve" | "Network" | "Point" | "MultiPoint" | "PointCloud" => {
-                self.report.omit("points and lines");
+                self.report.omit("points and lines", 1);
                 self.xml.skip()
             }
             _ => self.read_surfaces(number, lod, Representation::Surfaces),
         }
     }
 
+    /// Reads the current geometry in a property that names no level of detail, as extensions have them: it counts as level 0. The geometry of a
+    /// group repeats that of its members.
+    fn read_geometry(&mut self, number: u32) -> Result<()> {
+        if self.feature(number).type_name == "CityObjectGroup" {
+            return self.xml.skip();
+        }
+        self.report.note("geometry without a level of detail read as level 0", self.xml.local_name());
+        let first = self.city_object.geometry.nodes.len() as u32;
+        let read = self.geometry_parser().read_element(NO_NODE, DEFAULT_DIMENSION);
+        self.add_surfaces(number, 0, Representation::Surfaces, first, read)
+    }
+
     fn read_surfaces(&mut self, number: u32, lod: u8, representation: fn(u32) -> Representation) -> Result<()> {
-        let node = self.geometry_parser().read_property(NO_NODE, DEFAULT_DIMENSION)?;
+        let first = self.city_object.geometry.nodes.len() as u32;
+        let read = self.geometry_parser().read_property(NO_NODE, DEFAULT_DIMENSION);
+        self.add_surfaces(number, lod, representation, first, read)
+    }
+
+    /// Adds geometry that was read; `first`: number of the first node in it.
+    fn add_surfaces(&mut self, number: u32, lod: u8, representation: fn(u32) -> Representation, first: u32, read: Result<Option<u32>>) -> Result<()> {
+        // Where the document breaks off, the nodes so far are kept.
+        let node = match &read {
+            Ok(node) => *node,
+            Err(_) => Some(first).filter(|node| (*node as usize) < self.city_object.geometry.nodes.len()),
+        };
         if let Some(node) = node {
             self.feature(number).representations.push(LodRepresentation { lod, representation: representation(node) });
         }
-        Ok(())
+        read.map(|_| ())
     }
 
     fn read_implicit_representation(&mut self, number: u32, lod: u8) -> Result<()> {
@@ -218,7 +320,7 @@ impl CityObjectParser<'_> {
                 self.xml.skip()?;
                 continue;
             }
-            match read_implicit_geometry(&mut self.geometry_parser(), DEFAULT_DIMENSION)? {
+            match read_implicit_geometry(self, DEFAULT_DIMENSION)? {
                 Ok(implicit) => {
                     let index = self.city_object.implicit_geometries.len() as u32;
                     self.city_object.implicit_geometries.push(implicit);

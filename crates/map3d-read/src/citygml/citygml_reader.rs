@@ -8,14 +8,18 @@ use map3d_base::{Error, Result, Vec3};
 use super::appearance::ThemeSelection;
 use super::city_object::CityObject;
 use super::city_object_parser::CityObjectParser;
-use super::converter::FeatureConverter;
+use super::code_lists::CodeLists;
+use super::converter::{FeatureConverter, INTERIOR_POLYGON};
 use super::pre_scan::PreScan;
-use super::xml_reader::{XmlEvent, XmlReader};
+use super::tessellate::INVISIBLE_POLYGON;
+use super::xml_reader::{Malformed, XmlEvent, XmlReader};
 use crate::asset_folder::AssetFolder;
 use crate::document::DocumentReader;
 use crate::image_file::ImageFile;
 use crate::options::ReadOptions;
 use crate::report_builder::ReportBuilder;
+use crate::text_input::count_lines;
+use crate::transparency::report_invisible;
 
 /// Reads CityGML. Memory: the results of the first pass (see `pre_scan`), one city object, and the tables of objects and materials.
 pub struct CityGmlReader {
@@ -27,6 +31,7 @@ pub struct CityGmlReader {
     /// The current city object.
     city_object: CityObject,
     converter: FeatureConverter,
+    code_lists: CodeLists,
     instances: Vec<Instance>,
     /// Buffers for numbers and text.
     values: Vec<f64>,
@@ -34,6 +39,8 @@ pub struct CityGmlReader {
     /// The root element was read.
     has_root: bool,
     at_end: bool,
+    /// The document's transparency is opacity.
+    inverted: bool,
 }
 
 impl CityGmlReader {
@@ -42,9 +49,10 @@ impl CityGmlReader {
         let lod = parse_lod(options)?;
         let folder = AssetFolder::for_document(path, options.folder.as_deref())?;
         let mut report = ReportBuilder::new(path, "citygml", options.strict);
-        let PreScan { srs_name, theme, appearances, referenced_ids } = PreScan::run(path, options, &mut report)?;
+        let PreScan { srs_name, theme, appearances, referenced_ids, transparency } = PreScan::run(path, options, &mut report)?;
         report.set_crs(srs_name.clone());
         report_theme(&theme, &mut report);
+        let inverted = transparency.is_inverted(options.transparency, &mut report);
         let scale = estimate_metres_per_unit(srs_name.as_deref());
         Ok(Self {
             xml: XmlReader::open(path)?,
@@ -53,12 +61,14 @@ impl CityGmlReader {
             srs_name,
             theme,
             city_object: CityObject::default(),
-            converter: FeatureConverter::new(folder, options, scale, lod, appearances, referenced_ids),
+            converter: FeatureConverter::new(folder, options, inverted, scale, lod, appearances, referenced_ids),
+            code_lists: CodeLists::new(AssetFolder::for_document(path, options.folder.as_deref())?),
             instances: Vec::new(),
             values: Vec::new(),
             text: String::new(),
             has_root: false,
             at_end: false,
+            inverted,
         })
     }
 
@@ -87,23 +97,44 @@ impl CityGmlReader {
 
     fn read_city_object(&mut self) -> Result<()> {
         self.city_object.clear();
-        CityObjectParser {
+        let parsed = CityObjectParser {
             xml: &mut self.xml,
             report: &mut self.report,
             options: &self.options,
             city_object: &mut self.city_object,
             theme: &mut self.theme,
+            code_lists: &mut self.code_lists,
             values: &mut self.values,
             text: &mut self.text,
         }
-        .read_city_object()?;
-        self.converter.convert(&mut self.city_object, &mut self.report)
+        .read_city_object();
+        // Of an object that the document breaks off in, the complete polygons are kept.
+        let is_kept = match &parsed {
+            Ok(()) => true,
+            Err(_) => self.xml.is_malformed() && !self.options.strict && self.city_object.has_geometry(),
+        };
+        if is_kept {
+            self.converter.convert(&mut self.city_object, &mut self.report)?;
+        }
+        parsed
+    }
+
+    /// Reports where the document breaks off.
+    fn report_malformed(&mut self) {
+        let Some(Malformed { byte, what }) = self.xml.malformed().cloned() else { return };
+        let line = count_lines(self.report.path(), byte).map_or_else(|_| String::new(), |line| format!(", line {line}"));
+        self.report.note_file("document broken", format!("at byte {byte}{line} ({what}); what comes before is kept"));
     }
 
     fn finish(&mut self) -> Result<()> {
         self.at_end = true;
         self.converter.convert_deferred(&mut self.report)?;
         self.instances = self.converter.finish_instances(&mut self.report)?;
+        let interiors = self.report.skipped(INTERIOR_POLYGON);
+        if interiors > 0 {
+            self.report.note_file("polygons of interiors are not drawn", format!("{interiors}; --interiors draws them"));
+        }
+        report_invisible(self.report.skipped(INVISIBLE_POLYGON), self.inverted, &mut self.report);
         Ok(())
     }
 }
@@ -117,9 +148,9 @@ fn parse_lod(options: &ReadOptions) -> Result<Option<u8>> {
 }
 
 fn report_theme(theme: &ThemeSelection, report: &mut ReportBuilder) {
-    match (&theme.requested, &theme.first) {
-        (None, Some(first)) if theme.has_several => report.note("appearance theme used", first.as_str()),
-        (Some(requested), first) if first.as_ref() != Some(requested) => {
+    match (&theme.requested, theme.selected()) {
+        (None, Some(selected)) if theme.has_several() => report.note("appearance theme used", selected),
+        (Some(requested), _) if theme.first() != Some(requested) => {
             report.note("requested appearance theme is not the first in the document", requested.as_str());
         }
         _ => {}
@@ -153,8 +184,8 @@ impl DocumentReader for CityGmlReader {
             match self.read_member() {
                 Ok(true) => {}
                 Ok(false) => self.finish()?,
-                Err(e) if self.xml.is_malformed() && !self.options.strict => {
-                    self.report.note("malformed document; the rest is ignored", e.to_string());
+                Err(_) if self.xml.is_malformed() && !self.options.strict => {
+                    self.report_malformed();
                     self.finish()?;
                 }
                 Err(e) => return Err(e),

@@ -17,12 +17,16 @@ use super::polygons::{CollectedPolygons, LinkedGeometry, OrientedPolygon, Unreso
 use super::prototype_table::{PrototypePlacement, PrototypeTable, read_library_object};
 use super::shared_geometry::{DeferredXLink, SharedGeometry};
 use super::tessellate::{MaterialSources, Tessellator, ThematicSurface};
+use super::textured_surface::add_own_appearances;
 use crate::asset_folder::AssetFolder;
 use crate::detect::{Format, detect_format};
 use crate::options::ReadOptions;
 use crate::report_builder::{LimitCheck, ReportBuilder};
 
 const BATCH_TRIANGLES: usize = 1 << 14;
+
+/// The reason for polygons left out.
+pub const INTERIOR_POLYGON: &str = "polygon of an interior";
 
 pub struct FeatureConverter {
     pub resolver: MaterialResolver,
@@ -56,17 +60,18 @@ impl ConversionContext<'_> {
 }
 
 impl FeatureConverter {
-    /// `scale`: metres per unit of each axis; `lod`: the requested level of detail.
+    /// `inverted`: the document's transparency is opacity; `scale`: metres per unit of each axis; `lod`: the requested level of detail.
     pub fn new(
         folder: AssetFolder,
         options: &ReadOptions,
+        inverted: bool,
         scale: Vec3,
         lod: Option<u8>,
         document_appearances: Appearances,
         referenced_ids: IdSet,
     ) -> Self {
         Self {
-            resolver: MaterialResolver::new(folder, options.clone()),
+            resolver: MaterialResolver::new(folder, options.clone(), inverted),
             tessellator: Tessellator::new(scale, options.clone()),
             document_appearances,
             referenced_ids,
@@ -85,12 +90,15 @@ impl FeatureConverter {
             return Ok(());
         }
         city_object.appearances.resolve_theme_xlinks();
+        add_own_appearances(&mut city_object.geometry, &mut city_object.appearances);
+        city_object.extend_interiors();
         city_object.expose_shared_interiors();
         let lods = select_lods(city_object, self.lod);
         let object_numbers = self.add_objects(city_object, &lods);
         let xlinks = XLinkIndex::build(&city_object.geometry);
         let visits = vec![VisitState::Unvisited; city_object.geometry.nodes.len()];
         let mut context = ConversionContext { city_object, xlinks, visits, object_numbers };
+        let draws_interiors = self.resolver.options.interiors;
         for objects in [false, true] {
             for (f, lod) in lods.iter().enumerate() {
                 let feature = &context.city_object.features[f];
@@ -98,11 +106,14 @@ impl FeatureConverter {
                     continue;
                 }
                 match *lod {
-                    Some(_) if feature.is_interior => report.omit("interior surfaces of a building"),
+                    Some(_) if feature.is_interior && !draws_interiors => {}
                     Some(lod) => self.convert_feature(&mut context, f as u32, lod, report)?,
                     None => {}
                 }
             }
+        }
+        if !draws_interiors {
+            count_interiors(&context, &lods, report);
         }
         self.shared.copy_referenced(&context.city_object.geometry, &context.visits, &self.referenced_ids);
         self.complete_batch(BATCH_TRIANGLES);
@@ -285,6 +296,29 @@ impl FeatureConverter {
         }
         Ok(instances)
     }
+}
+
+/// Counts the polygons of interiors that are not converted as part of a feature outside.
+fn count_interiors(context: &ConversionContext, lods: &[Option<u8>], report: &mut ReportBuilder) {
+    let CityObject { features, geometry, implicit_geometries, .. } = &*context.city_object;
+    if !features.iter().any(|feature| feature.is_interior) {
+        return;
+    }
+    let mut visits = context.visits.clone();
+    let mut count = 0;
+    for (feature, lod) in features.iter().zip(lods).filter(|(feature, _)| feature.is_interior) {
+        for representation in lod.iter().flat_map(|lod| representations_at(&feature.representations, *lod)) {
+            let node = match representation {
+                Representation::Surfaces(node) | Representation::RoofEdge(node) => node,
+                Representation::Implicit(index) => match implicit_geometries[index as usize].prototype {
+                    PrototypeSource::Geometry(node) => node,
+                    PrototypeSource::Library(_) => continue,
+                },
+            };
+            count += collect_polygons(geometry, &mut visits, node, false).polygons.len() as u64;
+        }
+    }
+    report.omit(INTERIOR_POLYGON, count);
 }
 
 /// Returns the finest level of detail at which an object's features are converted.

@@ -1,6 +1,6 @@
 //! Classifies CityGML feature types (element names): kind, class rank, default colour, class name.
 
-use map3d_base::asset::Rank;
+use map3d_base::asset::{Rank, SurfaceClass};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FeatureKind {
@@ -14,7 +14,7 @@ pub enum FeatureKind {
     Opening,
     /// A balcony, chimney, dormer, …
     Installation,
-    /// Inside a building; not converted.
+    /// Inside a building; converted on request.
     Interior,
     /// Not a CityGML feature type, but may contain features.
     Unknown,
@@ -39,7 +39,11 @@ pub fn classify_feature(type_name: &str) -> FeatureKind {
         | "GenericCityObject"
         | "CityObjectGroup"
         | "ReliefFeature"
-        | "Waterway" => FeatureKind::Object,
+        | "Waterway"
+        | "OtherConstruction"
+        | "GenericOccupiedSpace"
+        | "GenericUnoccupiedSpace"
+        | "GenericLogicalSpace" => FeatureKind::Object,
         "WallSurface"
         | "RoofSurface"
         | "GroundSurface"
@@ -51,14 +55,26 @@ pub fn classify_feature(type_name: &str) -> FeatureKind {
         | "WaterSurface"
         | "WaterGroundSurface"
         | "WaterClosureSurface"
+        | "Section"
+        | "Intersection"
+        | "TrafficSpace"
+        | "AuxiliaryTrafficSpace"
+        | "Marking"
+        | "Hole"
+        | "HoleSurface"
+        | "GenericThematicSurface"
         | "TINRelief"
         | "MassPointRelief"
         | "BreaklineRelief"
         | "RasterRelief" => FeatureKind::Surface,
         "Window" | "Door" | "WindowSurface" | "DoorSurface" => FeatureKind::Opening,
-        "BuildingInstallation" | "BridgeInstallation" | "TunnelInstallation" | "BridgeConstructionElement" | "BuildingConstructiveElement" => {
-            FeatureKind::Installation
-        }
+        "BuildingInstallation"
+        | "BridgeInstallation"
+        | "TunnelInstallation"
+        | "BridgeConstructionElement"
+        | "BuildingConstructiveElement"
+        | "BridgeConstructiveElement"
+        | "TunnelConstructiveElement" => FeatureKind::Installation,
         "Room"
         | "BuildingRoom"
         | "BridgeRoom"
@@ -71,9 +87,21 @@ pub fn classify_feature(type_name: &str) -> FeatureKind {
         | "IntTunnelInstallation"
         | "InteriorWallSurface"
         | "CeilingSurface"
-        | "FloorSurface" => FeatureKind::Interior,
+        | "FloorSurface"
+        | "Storey"
+        | "BuildingUnit" => FeatureKind::Interior,
         _ => FeatureKind::Unknown,
     }
+}
+
+/// Returns true for an open space of CityGML 3.0: its solid is air, only its boundary is there.
+pub fn is_open_space(type_name: &str) -> bool {
+    matches!(type_name, "TrafficSpace" | "AuxiliaryTrafficSpace" | "ClearanceSpace" | "Hole" | "GenericUnoccupiedSpace")
+}
+
+/// Returns true for a part of a building's inside whose attributes are those of the building.
+pub fn is_subdivision(type_name: &str) -> bool {
+    matches!(type_name, "Storey" | "BuildingUnit")
 }
 
 /// Returns the class rank of a city object's surfaces.
@@ -96,25 +124,22 @@ pub fn rank_feature(kind: FeatureKind, type_name: &str, parent: Rank) -> Rank {
     }
 }
 
-/// A material for surfaces without an appearance. `color`: sRGB.
-pub struct DefaultMaterial {
-    pub name: &'static str,
-    pub color: [f32; 3],
-}
-
-pub fn find_default_material(type_name: &str) -> Option<DefaultMaterial> {
-    let (name, color) = match type_name {
-        "RoofSurface" => ("default roof", [0.72, 0.42, 0.35]),
-        "GroundSurface" => ("default ground", [0.6, 0.58, 0.55]),
-        "Window" | "WindowSurface" => ("default window", [0.55, 0.66, 0.76]),
-        "Door" | "DoorSurface" => ("default door", [0.5, 0.38, 0.28]),
-        "Road" | "Square" | "Track" | "TransportationComplex" | "TrafficArea" | "Railway" => ("default road", [0.55, 0.55, 0.56]),
-        "WaterBody" | "WaterSurface" | "Waterway" => ("default water", [0.45, 0.6, 0.75]),
-        "PlantCover" | "SolitaryVegetationObject" | "AuxiliaryTrafficArea" => ("default vegetation", [0.42, 0.58, 0.35]),
-        "LandUse" | "ReliefFeature" | "TINRelief" => ("default terrain", [0.66, 0.68, 0.58]),
+/// Returns the class of the surfaces of a feature, if its type says it.
+pub fn classify_surface(type_name: &str) -> Option<SurfaceClass> {
+    Some(match type_name {
+        "WallSurface" | "InteriorWallSurface" => SurfaceClass::Wall,
+        "RoofSurface" => SurfaceClass::Roof,
+        "GroundSurface" => SurfaceClass::Ground,
+        "Window" | "WindowSurface" => SurfaceClass::Window,
+        "Door" | "DoorSurface" => SurfaceClass::Door,
+        "Road" | "Square" | "Track" | "TransportationComplex" | "TrafficArea" | "TrafficSpace" | "Section" | "Intersection" | "Railway" => {
+            SurfaceClass::Road
+        }
+        "WaterBody" | "WaterSurface" | "Waterway" => SurfaceClass::Water,
+        "PlantCover" | "SolitaryVegetationObject" | "AuxiliaryTrafficArea" => SurfaceClass::Vegetation,
+        "LandUse" | "ReliefFeature" | "TINRelief" => SurfaceClass::Terrain,
         _ => return None,
-    };
-    Some(DefaultMaterial { name, color })
+    })
 }
 
 /// Converts a type name to a class name: `SolitaryVegetationObject` → `solitary_vegetation_object`.

@@ -3,6 +3,7 @@
 use map3d_base::Vec3;
 
 use super::ids::{self, Id, IdMap};
+use super::textured_surface::OwnAppearance;
 
 pub type NodeId = u32;
 pub const NO_NODE: NodeId = NodeId::MAX;
@@ -43,6 +44,8 @@ pub struct GeometryArena {
     pub rings: Vec<Ring>,
     pub points: Vec<Vec3>,
     pub by_id: IdMap<NodeId>,
+    /// Of textured surfaces.
+    pub own_appearances: Vec<OwnAppearance>,
 }
 
 impl GeometryArena {
@@ -51,6 +54,7 @@ impl GeometryArena {
         self.rings.clear();
         self.points.clear();
         self.by_id.clear();
+        self.own_appearances.clear();
     }
 
     /// Returns the memory in use.

@@ -7,6 +7,7 @@ use map3d_base::{Result, Vec3};
 use super::coordinates::{Separators, parse_coordinates, parse_points};
 use super::geometry_arena::{GeometryArena, NodeId, NodeKind, Ring};
 use super::ids::{self, Reference, parse_reference};
+use super::textured_surface::read_own_appearance;
 use super::xml_reader::{XmlEvent, XmlReader};
 use crate::report_builder::{LimitCheck, ReportBuilder};
 
@@ -91,7 +92,7 @@ impl GeometryParser<'_> {
     }
 
     /// Reads the current geometry element.
-    fn read_element(&mut self, parent: NodeId, dimension: usize) -> Result<Option<NodeId>> {
+    pub fn read_element(&mut self, parent: NodeId, dimension: usize) -> Result<Option<NodeId>> {
         let dimension = self.parse_dimension().unwrap_or(dimension);
         let local_name = self.xml.local_name();
         if is_polygon(local_name) {
@@ -100,9 +101,9 @@ impl GeometryParser<'_> {
             self.read_group(parent, dimension).map(Some)
         } else {
             if is_point_or_curve(local_name) {
-                self.report.omit("points and lines");
+                self.report.omit("points and lines", 1);
             } else {
-                self.report.omit("unsupported geometry type");
+                self.report.omit("unsupported geometry type", 1);
                 self.report.note("unsupported geometry element", local_name);
             }
             self.xml.skip()?;
@@ -121,8 +122,8 @@ impl GeometryParser<'_> {
             match self.xml.local_name() {
                 "boundedBy" | "name" | "description" | "metaDataProperty" | "controlPoint" => self.xml.skip()?,
                 "appearance" => {
-                    self.report.note("appearance of a TexturedSurface (CityGML 1.0) ignored", "TexturedSurface");
-                    self.xml.skip()?;
+                    let appearance = read_own_appearance(self.xml, node)?;
+                    self.geometry.own_appearances.extend(appearance);
                 }
                 _ => {
                     self.read_property(node, dimension)?;

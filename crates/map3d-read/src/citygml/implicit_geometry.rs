@@ -2,9 +2,10 @@
 
 use map3d_base::Result;
 
+use super::city_object_parser::CityObjectParser;
 use super::coordinates::parse_numbers;
 use super::geometry_arena::{NO_NODE, NodeId};
-use super::geometry_parser::{GeometryParser, read_point};
+use super::geometry_parser::read_point;
 
 /// Row-major 3 × 4, prototype → world.
 pub type Transform = [f64; 12];
@@ -26,13 +27,14 @@ pub enum PrototypeSource {
 const IDENTITY: Transform = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 
 /// Reads the current ImplicitGeometry element. The inner error is the reason why it cannot be placed.
-pub fn read_implicit_geometry(parser: &mut GeometryParser, dimension: usize) -> Result<std::result::Result<ImplicitGeometry, &'static str>> {
+pub fn read_implicit_geometry(parser: &mut CityObjectParser, dimension: usize) -> Result<std::result::Result<ImplicitGeometry, &'static str>> {
     let (mut node, mut library_object, mut matrix, mut reference) = (None, None, Some(IDENTITY), None);
     while parser.xml.next_child()? {
         match parser.xml.local_name() {
             "transformationMatrix" => matrix = parse_matrix(&parser.xml.read_text()?),
             "libraryObject" => library_object = Some(parser.xml.read_text()?).filter(|name| !name.is_empty()),
-            "relativeGMLGeometry" | "relativeGeometry" => node = parser.read_property(NO_NODE, dimension)?,
+            "relativeGMLGeometry" | "relativeGeometry" => node = parser.geometry_parser().read_property(NO_NODE, dimension)?,
+            "appearance" => parser.read_appearance()?,
             "referencePoint" => reference = read_point(parser.xml)?,
             _ => parser.xml.skip()?,
         }

@@ -2,14 +2,14 @@
 
 use std::fs;
 
-use map3d_base::asset::{Material, Wrap};
+use map3d_base::asset::{Material, SurfaceClass, Wrap};
 use map3d_base::{Result, Vec3};
 
 use super::appearance::{
     Appearances, Parameterization, Resolution, ResolvedMaterial, ResolvedSurfaceData, SurfaceDataKind, TargetBinding, TexCoordRange,
     TexturePlacement, TextureProperties,
 };
-use super::feature_types::{DefaultMaterial, find_default_material};
+use super::feature_types::classify_surface;
 use super::geo_transform::GeoTransform;
 use super::ids::Id;
 use crate::asset_folder::AssetFolder;
@@ -23,6 +23,8 @@ pub struct MaterialResolver {
     pub table: MaterialTable,
     pub folder: AssetFolder,
     pub options: ReadOptions,
+    /// The document's transparency is opacity.
+    inverted: bool,
 }
 
 /// One ring of a polygon as written.
@@ -33,14 +35,30 @@ pub struct RingPoints<'a> {
 }
 
 impl MaterialResolver {
-    pub fn new(folder: AssetFolder, options: ReadOptions) -> Self {
-        Self { images: ImageFiles::default(), table: MaterialTable::default(), folder, options }
+    /// `inverted`: the document's transparency is opacity.
+    pub fn new(folder: AssetFolder, options: ReadOptions, inverted: bool) -> Self {
+        Self { images: ImageFiles::default(), table: MaterialTable::default(), folder, options, inverted }
     }
 
-    /// Finds the nearest usable texture or, without one, the nearest X3DMaterial. `target_ids`: from the polygon up.
-    /// For a texture, fills `uvs` with one pair per point of `rings`.
+    /// Finds the nearest usable texture or, without one, the nearest X3DMaterial; first of those for the front, then of those for the back, since
+    /// both sides of a polygon have one material. `target_ids`: from the polygon up. For a texture, fills `uvs` with one pair per point of `rings`.
     pub fn resolve(
         &mut self,
+        target_ids: &[Id],
+        rings: &[RingPoints],
+        sources: &mut [&mut Appearances],
+        uvs: &mut Vec<[f64; 2]>,
+        report: &mut ReportBuilder,
+    ) -> Result<Option<ResolvedMaterial>> {
+        match self.resolve_side(true, target_ids, rings, sources, uvs, report)? {
+            None if sources.iter().any(|a| a.has_backs) => self.resolve_side(false, target_ids, rings, sources, uvs, report),
+            front => Ok(front),
+        }
+    }
+
+    fn resolve_side(
+        &mut self,
+        is_front: bool,
         target_ids: &[Id],
         rings: &[RingPoints],
         sources: &mut [&mut Appearances],
@@ -50,8 +68,8 @@ impl MaterialResolver {
         let mut untextured = None;
         for id in target_ids {
             for appearances in sources.iter_mut().filter(|a| !a.is_empty()) {
-                let is_front = |b: &TargetBinding| appearances.surface_data[b.surface_data as usize].is_front;
-                let bindings: Vec<TargetBinding> = appearances.theme_bindings(*id).filter(is_front).collect();
+                let is_side = |b: &TargetBinding| appearances.surface_data[b.surface_data as usize].is_front == is_front;
+                let bindings: Vec<TargetBinding> = appearances.theme_bindings(*id).filter(is_side).collect();
                 for binding in bindings {
                     let Some(surface_data) = self.resolve_surface_data(appearances, binding.surface_data, report)? else { continue };
                     if !surface_data.material.textured {
@@ -65,12 +83,10 @@ impl MaterialResolver {
         Ok(untextured)
     }
 
-    /// Returns the default material for a surface without an appearance. `type_names`: of the surface and of its object.
+    /// Returns the material of a surface without an appearance. `type_names`: of the surface and of its object.
     pub fn resolve_default(&mut self, type_names: [&str; 2]) -> ResolvedMaterial {
-        let material = match type_names.into_iter().find_map(find_default_material) {
-            Some(DefaultMaterial { name, color: [r, g, b] }) => Material { name: name.into(), diffuse: [r, g, b, 1.0], ..Material::default() },
-            None => Material { name: "default".into(), ..Material::default() },
-        };
+        let class = type_names.into_iter().find_map(classify_surface).unwrap_or(SurfaceClass::Other);
+        let material = Material { name: format!("default {}", class.name()), surface: Some(class), ..Material::default() };
         ResolvedMaterial { index: self.table.add(material), wrap: Wrap::Wrap, textured: false, invisible: false }
     }
 
@@ -88,14 +104,19 @@ impl MaterialResolver {
         }
         let resolved = match &surface_data.kind {
             SurfaceDataKind::Unsupported => None,
-            SurfaceDataKind::X3DMaterial { diffuse } => Some(self.resolve_x3d_material(*diffuse)),
+            SurfaceDataKind::X3DMaterial { color, transparency } => {
+                let (color, transparency) = (*color, *transparency);
+                Some(self.resolve_x3d_material(color, transparency))
+            }
             SurfaceDataKind::Texture(texture) => self.resolve_texture(texture, report)?,
         };
         surface_data.resolution = resolved.map_or(Resolution::Unusable, Resolution::Resolved);
         Ok(resolved)
     }
 
-    fn resolve_x3d_material(&mut self, diffuse: [f32; 4]) -> ResolvedSurfaceData {
+    fn resolve_x3d_material(&mut self, [r, g, b]: [f32; 3], transparency: Option<f32>) -> ResolvedSurfaceData {
+        let opacity = transparency.map_or(1.0, |t| if self.inverted { t } else { 1.0 - t });
+        let diffuse = [r, g, b, opacity];
         let index = self.table.add(Material { name: "X3DMaterial".into(), diffuse, ..Material::default() });
         let material = ResolvedMaterial { index, wrap: Wrap::Wrap, textured: false, invisible: diffuse[3] <= 0.0 };
         ResolvedSurfaceData { material, geo_transform: None, size_px: [0; 2] }

@@ -1,4 +1,4 @@
-//! Reads CityGML 1.0 and 2.0. Element names are matched without their namespace, so much of 3.0 is read too.
+//! Reads CityGML 0.4 to 3.0. Element names are matched without their namespace.
 //!
 //! The file is read twice. The first pass (`pre_scan`) collects the CRS, the themes, appearances outside city objects, and the ids that other
 //! city objects refer to. The second pass (`citygml_reader`) parses and converts one city object at a time.
@@ -10,6 +10,7 @@ mod attributes;
 mod city_object;
 mod city_object_parser;
 mod citygml_reader;
+mod code_lists;
 mod converter;
 mod coordinates;
 mod feature_types;
@@ -24,8 +25,10 @@ mod polygons;
 mod pre_scan;
 mod prototype_table;
 mod shared_geometry;
+mod standard_codes;
 mod tag_scanner;
 mod tessellate;
+mod textured_surface;
 mod xml_reader;
 
 pub use citygml_reader::CityGmlReader;

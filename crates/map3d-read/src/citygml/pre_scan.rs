@@ -9,13 +9,14 @@ use std::path::Path;
 use map3d_base::{Error, Result};
 
 use super::appearance::{Appearances, ThemeSelection};
-use super::appearance_parser::AppearanceParser;
+use super::appearance_parser::{AppearanceParser, parse_transparency};
 use super::ids::{IdSet, Reference, hash_id, parse_reference};
 use super::tag_scanner::{TagKind, TagScanner};
 use super::xml_reader::{XmlEvent, XmlReader, local_part, parse_attributes, unescape_lossy, unsupported};
 use crate::options::ReadOptions;
 use crate::report_builder::ReportBuilder;
-use crate::text_input::open_xml;
+use crate::text_input::{EncodingFault, open_checked_xml};
+use crate::transparency::TransparencyCounts;
 
 #[derive(Default)]
 pub struct PreScan {
@@ -25,14 +26,20 @@ pub struct PreScan {
     pub appearances: Appearances,
     /// Ids that a city object refers to but does not define.
     pub referenced_ids: IdSet,
+    /// Of all materials, in city objects and outside.
+    pub transparency: TransparencyCounts,
 }
 
 impl PreScan {
     /// Scans the whole document. A truncated document is scanned up to its end.
     pub fn run(path: &Path, options: &ReadOptions, report: &mut ReportBuilder) -> Result<Self> {
         let io = |e| Error::storage(path, e);
-        let mut scan = Self { theme: ThemeSelection { requested: options.theme.clone(), ..ThemeSelection::default() }, ..Self::default() };
-        let mut scanner = TagScanner::new(open_xml(path)?);
+        let mut scan = Self { theme: ThemeSelection::new(options.theme.clone()), ..Self::default() };
+        let (input, faults) = open_checked_xml(path)?;
+        for EncodingFault { reason, example } in faults {
+            report.warn_file(reason, example)?;
+        }
+        let mut scanner = TagScanner::new(input);
         let mut references = ObjectReferences::default();
         let (mut depth, mut has_elements) = (0usize, false);
         while let Some(kind) = scanner.next_tag().map_err(io)? {
@@ -51,6 +58,11 @@ impl PreScan {
                     let parse: Option<Parse> = match (kind, name) {
                         (TagKind::Start, "appearanceMember") if depth == 1 => Some(Self::parse_appearance_member),
                         (TagKind::Start, "theme") => Some(Self::parse_theme),
+                        (TagKind::Start, "X3DMaterial") => Some(Self::parse_material),
+                        (TagKind::Start, "ParameterizedTexture" | "GeoreferencedTexture") => {
+                            scan.theme.count_texture_of_current();
+                            None
+                        }
                         _ => None,
                     };
                     match parse {
@@ -67,6 +79,12 @@ impl PreScan {
             return Err(Error::format(path, "no XML element; expected a CityGML document"));
         }
         references.finish_object(&mut scan.referenced_ids);
+        scan.appearances.count_textures(&mut scan.theme);
+        scan.theme.choose();
+        scan.appearances.count_transparency(&mut scan.transparency);
+        for other in scan.appearances.resolve_pending(scan.theme.selected()) {
+            report.note("appearance of another theme ignored", other);
+        }
         scan.appearances.resolve_theme_xlinks();
         Ok(scan)
     }
@@ -109,6 +127,26 @@ impl PreScan {
             Err(e) if !xml.is_malformed() => Err(e),
             _ => Ok(xml.into_inner()),
         }
+    }
+
+    /// Parses the current material of a city object; the scanner continues after it.
+    fn parse_material(&mut self, scanner: TagScanner, _: &ReadOptions, report: &mut ReportBuilder) -> Result<TagScanner> {
+        let mut xml = XmlReader::new(scanner, report.path());
+        let mut transparency = None;
+        if let Ok(XmlEvent::Start) = xml.next_event() {
+            while let Ok(true) = xml.next_child() {
+                let read = if xml.local_name() == "transparency" {
+                    xml.read_text().map(|text| transparency = parse_transparency(&text))
+                } else {
+                    xml.skip()
+                };
+                if read.is_err() {
+                    break;
+                }
+            }
+            self.transparency.add(transparency);
+        }
+        Ok(xml.into_inner())
     }
 
     /// Parses the current theme; the scanner continues after it.

@@ -13,6 +13,9 @@ use crate::options::ReadOptions;
 use crate::report_builder::{LimitCheck, ReportBuilder};
 use crate::triangulate::{Coverage, Triangulator};
 
+/// The reason for polygons left out.
+pub const INVISIBLE_POLYGON: &str = "fully transparent polygon";
+
 /// The feature that polygons belong to.
 pub struct ThematicSurface<'a> {
     /// Index of the city object in the asset.
@@ -93,7 +96,7 @@ impl Tessellator {
         let rings: Vec<RingPoints> = rings.map(|r| RingPoints { id: r.id, points: arena.ring_points(r) }).collect();
         let material = self.resolve_material(geometry, polygon.node, &rings, surface, sources, report)?;
         if material.invisible {
-            report.omit("fully transparent polygon");
+            report.omit(INVISIBLE_POLYGON, 1);
             return Ok(());
         }
         if !self.assemble_rings(&rings, material.textured, surface, report)? {

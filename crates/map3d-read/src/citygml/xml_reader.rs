@@ -35,7 +35,14 @@ pub struct XmlReader<R = TextInput> {
     local_start: usize,
     text: String,
     depth: usize,
-    malformed: bool,
+    malformed: Option<Malformed>,
+}
+
+/// Where and why a document is not well-formed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Malformed {
+    pub byte: u64,
+    pub what: String,
 }
 
 impl XmlReader {
@@ -58,7 +65,7 @@ impl<R: BufRead> XmlReader<R> {
             local_start: 0,
             text: String::new(),
             depth: 0,
-            malformed: false,
+            malformed: None,
         }
     }
 
@@ -69,7 +76,18 @@ impl<R: BufRead> XmlReader<R> {
 
     /// Returns true if the last error was malformed XML. Everything before that error is valid.
     pub fn is_malformed(&self) -> bool {
-        self.malformed
+        self.malformed.is_some()
+    }
+
+    /// Returns where and why the last error found malformed XML.
+    pub fn malformed(&self) -> Option<&Malformed> {
+        self.malformed.as_ref()
+    }
+
+    fn malformed_error(&mut self, byte: u64, what: String) -> Error {
+        let error = Error::format(&self.path, format!("malformed XML at byte {byte}: {what}"));
+        self.malformed = Some(Malformed { byte, what });
+        error
     }
 
     pub fn depth(&self) -> usize {
@@ -93,8 +111,8 @@ impl<R: BufRead> XmlReader<R> {
                 Ok(event) => event,
                 Err(quick_xml::Error::Io(e)) => return Err(Error::storage(&self.path, std::io::Error::new(e.kind(), e.to_string()))),
                 Err(e) => {
-                    self.malformed = true;
-                    return Err(Error::format(&self.path, format!("malformed XML at byte {}: {e}", self.reader.error_position())));
+                    let what = e.to_string();
+                    return Err(self.malformed_error(self.reader.error_position(), what));
                 }
             };
             match event {
@@ -145,8 +163,8 @@ impl<R: BufRead> XmlReader<R> {
         if self.depth == 0 {
             return Ok(XmlEvent::Eof);
         }
-        self.malformed = true;
-        Err(Error::format(&self.path, format!("truncated: {} elements are still open at byte {}", self.depth, self.position())))
+        let what = format!("the document ends inside {} elements", self.depth);
+        Err(self.malformed_error(self.position(), what))
     }
 
     /// Returns the local name of the last start tag.

@@ -30,11 +30,12 @@ pub fn parse_face(rest: &[u8], counts: ElementCounts, vertices: &mut Vec<FaceVer
 fn parse_vertex(word: &[u8], counts: ElementCounts) -> Option<FaceVertex> {
     let mut parts = word.split(|b| *b == b'/');
     let position = parse_index(parts.next()?, counts.positions)?;
+    // An unreadable one is out of range: the face keeps its geometry.
     let mut other = |count| match parts.next() {
-        None | Some(b"") => Some(None),
-        Some(part) => parse_index(part, count).map(Some),
+        None | Some(b"") => None,
+        Some(part) => Some(parse_index(part, count).unwrap_or(u32::MAX)),
     };
-    Some(FaceVertex { position, uv: other(counts.uvs)?, normal: other(counts.normals)? })
+    Some(FaceVertex { position, uv: other(counts.uvs), normal: other(counts.normals) })
 }
 
 /// 1 is the first element, −1 the last so far. 0 and references before the first become `u32::MAX`, which is always out of range.
@@ -61,6 +62,7 @@ mod tests {
             ("9", vertex(8, None, None)),
             ("0", vertex(u32::MAX, None, None)),
             ("-5", vertex(u32::MAX, None, None)),
+            ("1/x/1", vertex(0, Some(u32::MAX), Some(0))),
             ("a", None),
             ("1.5", None),
             ("99999999999", vertex(u32::MAX, None, None)),

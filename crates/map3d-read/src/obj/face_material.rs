@@ -9,6 +9,7 @@ use crate::image_file::ImageFiles;
 use crate::material_table::MaterialTable;
 use crate::options::ReadOptions;
 use crate::report_builder::ReportBuilder;
+use crate::transparency::Transparency;
 
 /// Diffuse colour of a material without `Kd`.
 const DEFAULT_GREY: f32 = 0.8;
@@ -37,8 +38,8 @@ pub struct FaceMaterialResolver {
 }
 
 impl FaceMaterialResolver {
-    pub fn new(folder: AssetFolder) -> Self {
-        Self { library: MaterialLibrary::default(), images: ImageFiles::default(), table: MaterialTable::default(), folder }
+    pub fn new(folder: AssetFolder, transparency: Transparency) -> Self {
+        Self { library: MaterialLibrary::new(transparency), images: ImageFiles::default(), table: MaterialTable::default(), folder }
     }
 
     /// Resolves a `usemtl` name. A missing or undefined material is grey.

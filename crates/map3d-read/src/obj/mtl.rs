@@ -10,6 +10,7 @@ use super::line_reader::{LineReader, numbers, parse_number, split_word};
 use crate::asset_folder::AssetFolder;
 use crate::report_builder::ReportBuilder;
 use crate::text_input::decode_name;
+use crate::transparency::{Transparency, TransparencyCounts};
 
 /// A `map_…` statement: an image and the transformation of texture coordinates, `scale · uv + offset`.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,9 +35,16 @@ pub struct MtlMaterial {
 #[derive(Default)]
 pub struct MaterialLibrary {
     materials: HashMap<String, MtlMaterial>,
+    transparency: Transparency,
+    /// The transparency of a library is opacity.
+    pub has_inverted: bool,
 }
 
 impl MaterialLibrary {
+    pub fn new(transparency: Transparency) -> Self {
+        Self { transparency, ..Self::default() }
+    }
+
     pub fn get(&self, name: &str) -> Option<&MtlMaterial> {
         self.materials.get(name)
     }
@@ -74,21 +82,31 @@ impl MaterialLibrary {
     /// `prefix`: folder of the library, relative to the document; images are searched there first.
     fn load(&mut self, path: &Path, prefix: &str, folder: &mut AssetFolder, report: &mut ReportBuilder) -> Result<()> {
         let mut lines = LineReader::open(path)?;
-        let mut current: Option<(String, MtlMaterial)> = None;
+        let mut found: Vec<(String, MtlMaterial)> = Vec::new();
         while let Some(line) = lines.next_line()? {
             let (word, rest) = split_word(line);
             if word.eq_ignore_ascii_case(b"newmtl") {
-                self.add(current.replace((decode_name(rest).into_owned(), MtlMaterial::default())), report);
-            } else if let Some((_, material)) = &mut current {
+                found.push((decode_name(rest).into_owned(), MtlMaterial::default()));
+            } else if let Some((_, material)) = found.last_mut() {
                 apply_statement(material, word, rest, prefix, folder);
             }
         }
-        self.add(current, report);
+        self.decide_transparency(&mut found, report);
+        found.into_iter().for_each(|(name, material)| self.add(name, material, report));
         Ok(())
     }
 
-    fn add(&mut self, finished: Option<(String, MtlMaterial)>, report: &mut ReportBuilder) {
-        let Some((name, material)) = finished else { return };
+    /// Inverts the opacity of a library's materials if it is transparency.
+    fn decide_transparency(&mut self, found: &mut [(String, MtlMaterial)], report: &mut ReportBuilder) {
+        let mut counts = TransparencyCounts::default();
+        found.iter().for_each(|(_, material)| counts.add(material.opacity.map(|v| 1.0 - v)));
+        if counts.is_inverted(self.transparency, report) {
+            self.has_inverted = true;
+            found.iter_mut().for_each(|(_, material)| material.opacity = material.opacity.map(|v| 1.0 - v));
+        }
+    }
+
+    fn add(&mut self, name: String, material: MtlMaterial, report: &mut ReportBuilder) {
         match self.materials.entry(name) {
             Entry::Occupied(first) => report.note("material defined more than once; using the first", first.key().as_str()),
             Entry::Vacant(slot) => {

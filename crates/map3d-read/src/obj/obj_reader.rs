@@ -18,8 +18,11 @@ use crate::material_table::shift_uvs;
 use crate::options::{ReadOptions, Split, Up};
 use crate::report_builder::{LimitCheck, ReportBuilder};
 use crate::text_input::decode_name;
+use crate::transparency::report_invisible;
 use crate::triangulate::{Coverage, Triangulator};
 
+/// The reason for faces left out.
+const INVISIBLE_FACE: &str = "fully transparent face";
 const BATCH_TRIANGLES: usize = 1 << 16;
 /// Colour of a vertex without a colour, in a document that has vertex colours.
 const DEFAULT_VERTEX_COLOR: [u8; 3] = [204; 3];
@@ -66,7 +69,7 @@ impl ObjReader {
             lines: LineReader::open(path)?,
             report: ReportBuilder::new(path, "obj", options.strict),
             options: options.clone(),
-            materials: FaceMaterialResolver::new(folder),
+            materials: FaceMaterialResolver::new(folder, options.transparency),
             positions: Vec::new(),
             colors: Vec::new(),
             uvs: Vec::new(),
@@ -115,7 +118,7 @@ impl ObjReader {
             }
             b"mtllib" => self.materials.library.load_statement(rest, &mut self.materials.folder, &mut self.report)?,
             b"o" | b"g" => self.group = decode_name(rest).into_owned(),
-            b"p" | b"l" => self.report.omit("points and lines"),
+            b"p" | b"l" => self.report.omit("points and lines", 1),
             b"curv" | b"surf" | b"curv2" => self.skip("free-form curve or surface")?,
             _ => {}
         }
@@ -161,8 +164,21 @@ impl ObjReader {
     }
 
     fn is_defined(&self, vertex: &FaceVertex) -> bool {
-        let below = |n: Option<u32>, count: usize| n.is_none_or(|n| (n as usize) < count);
-        below(Some(vertex.position), self.positions.len()) && below(vertex.uv, self.uvs.len()) && below(vertex.normal, self.normals.len())
+        (vertex.position as usize) < self.positions.len() && is_below(vertex.uv, self.uvs.len()) && is_below(vertex.normal, self.normals.len())
+    }
+
+    /// Drops references to texture coordinates and normals that the file does not define; the face keeps its geometry.
+    fn drop_undefined(&mut self, line: u64) -> Result<()> {
+        let (uvs, normals) = (self.uvs.len(), self.normals.len());
+        if self.face.iter().any(|v| !is_below(v.uv, uvs)) {
+            self.face.iter_mut().for_each(|v| v.uv = None);
+            self.report.warn("texture index out of range: face without texture", format!("line {line}"))?;
+        }
+        if self.face.iter().any(|v| !is_below(v.normal, normals)) {
+            self.face.iter_mut().for_each(|v| v.normal = None);
+            self.report.warn("normal index out of range: face without normals", format!("line {line}"))?;
+        }
+        Ok(())
     }
 
     /// Returns the object that faces currently belong to; adds it with its first face.
@@ -174,7 +190,9 @@ impl ObjReader {
         if let Some(number) = self.object_numbers.get(name) {
             return *number;
         }
-        let file_stem = || self.report.path().file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let path = self.report.path();
+        let unpacked = if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) { path.with_extension("") } else { path.to_path_buf() };
+        let file_stem = || unpacked.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let display_name = if name.is_empty() { file_stem() } else { name.to_owned() };
         let number = self.objects.len() as u32;
         self.object_numbers.insert(name.to_owned(), number);
@@ -193,7 +211,7 @@ impl ObjReader {
             return self.report.skip("face with fewer than 3 vertices", location);
         }
         if material.invisible {
-            self.report.omit("fully transparent face");
+            self.report.omit(INVISIBLE_FACE, 1);
             return Ok(());
         }
         self.ring.clear();
@@ -240,15 +258,20 @@ impl ObjReader {
     /// Triangulates the deferred faces at the end of the file, when all vertices are defined.
     fn triangulate_deferred(&mut self) -> Result<()> {
         for face in std::mem::take(&mut self.deferred) {
-            if !face.vertices.iter().all(|v| self.is_defined(v)) {
+            if !face.vertices.iter().all(|v| (v.position as usize) < self.positions.len()) {
                 self.report.skip("index out of range", || format!("line {}", face.line))?;
                 continue;
             }
             self.face = face.vertices;
+            self.drop_undefined(face.line)?;
             self.triangulate_face(face.material, face.object, face.line)?;
         }
         Ok(())
     }
+}
+
+fn is_below(index: Option<u32>, count: usize) -> bool {
+    index.is_none_or(|n| (n as usize) < count)
 }
 
 fn convert_to_z_up([x, y, z]: Vec3, up: Up) -> Vec3 {
@@ -264,6 +287,7 @@ impl DocumentReader for ObjReader {
             if !self.read_line()? {
                 self.at_end = true;
                 self.triangulate_deferred()?;
+                report_invisible(self.report.skipped(INVISIBLE_FACE), self.materials.library.has_inverted, &mut self.report);
             }
         }
         Ok((self.batch.triangle_count() > 0).then(|| self.batch.take()))
