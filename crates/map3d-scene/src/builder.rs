@@ -10,6 +10,7 @@ mod chunks;
 mod encode;
 mod files;
 mod ground;
+mod looks;
 mod materials;
 mod prototypes;
 mod report;
@@ -22,6 +23,7 @@ mod unpack;
 
 pub use build_scene::build_scene;
 pub use encode::{ChunkFile, ChunkInput, encode_chunk};
+pub use looks::StyleRule;
 pub use report::BuildReport;
 pub use request::{BuildOptions, BuildRequest, GroundPlane};
 pub use triangle::BuildTriangle;

@@ -115,6 +115,11 @@ impl MaterialRecord {
         self.flags & MATERIAL_TEXTURED != 0
     }
 
+    /// Returns the key of the `.m3t` file; `None` when untextured.
+    pub fn texture_key(&self) -> Option<[u8; 16]> {
+        self.is_textured().then_some(self.texture)
+    }
+
     pub fn is_cutout(&self) -> bool {
         self.flags & MATERIAL_CUTOUT != 0
     }

@@ -183,7 +183,7 @@ impl SceneStore {
     fn check_hash(&self, number: u32, path: PathBuf, checksum: u64) -> Result<()> {
         let (found, expected) = (format!("{checksum:016x}"), &self.entry(number).hash);
         if found != *expected {
-            return Err(Error::format(path, format!("hash {found}, scene.json says {expected}: the scene was rebuilt, open it again")));
+            return Err(Error::Rebuilt { path, found, expected: expected.clone() });
         }
         Ok(())
     }

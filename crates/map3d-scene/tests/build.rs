@@ -188,7 +188,7 @@ fn a_lazy_chunk_rejects_invalid_references() {
     assert!(open_lazily().expect("opens").node(0).is_err());
     for bad in [good[..good.len() - 64].to_vec(), with(8, 7), with(good.len() - 64, 0)] {
         std::fs::write(&path, bad).expect("write");
-        assert!(matches!(open_lazily(), Err(Error::Format { .. })));
+        assert!(matches!(open_lazily(), Err(Error::Format { .. } | Error::Rebuilt { .. })));
     }
 }
 
@@ -221,4 +221,35 @@ fn a_small_capacity_serves_all_chunks() {
     }
     let stats = store.stats();
     assert!(stats.chunks_mapped <= 3 && stats.chunk_misses as usize == 2 * store.parts().len(), "{stats:?}");
+}
+
+/// Two places 3,000 km apart make counting cells of 4 km, one of which has more triangles than are sorted in memory.
+#[test]
+fn a_dense_cell_is_divided_in_files_and_its_chunks_are_found_again() {
+    let folder = new_folder();
+    let mut faces: Vec<Face> = (0..200_000).flat_map(|k| tent(f64::from(k % 500) * 7.0, f64::from(k / 500) * 7.0, k % 100)).collect();
+    faces.extend(tent(3e6, 0.0, 100));
+    write_faces(&folder.0, &faces);
+    let mut request = BuildRequest { max_memory_bytes: 64 << 20, ..request() };
+    assert_eq!(run(&folder, &request).outlier_triangles, 3);
+    request.options.keep_outliers = true;
+    let report = run(&folder, &request);
+    assert_eq!((report.triangles, report.outlier_triangles), (600_003, 0));
+    let store = SceneStore::open(&folder.0, 1 << 20).expect("open");
+    assert!(store.index().chunks.iter().all(|c| c.triangles <= 262_144), "every cell is small");
+    let before = bytes_of(&folder);
+    let again = run(&folder, &request);
+    assert_eq!((again.chunks_kept, again.triangles), (again.chunks, 600_003));
+    assert!(bytes_of(&folder) == before);
+    assert!(!folder.0.join("spill").exists());
+}
+
+#[test]
+fn an_unknown_cluster_is_refused() {
+    let folder = new_folder();
+    write_faces(&folder.0, &tent(0.0, 0.0, 0));
+    let mut request = request();
+    request.options.cluster = 2;
+    let refused = build_scene(&folder.0, &request, &mut |_, _, _| true).expect_err("one cluster");
+    assert!(refused.to_string().contains("cluster 2: the scene has 1 clusters"), "{refused}");
 }

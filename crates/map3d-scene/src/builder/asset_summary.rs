@@ -38,6 +38,9 @@ pub(super) struct AssetDetails {
     pub digest: String,
     /// `GroundLevel` as bits.
     pub level: [u64; 8],
+    /// The level in each region of the extent, if it has several.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub levels: Vec<[u64; 8]>,
     /// This asset's share of the report.
     pub counts: BuildReport,
     pub textures: Vec<SummaryTexture>,

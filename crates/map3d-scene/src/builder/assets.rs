@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use map3d_base::asset::{AssetMesh, Instance, Material, Materials};
-use map3d_base::{Error, Result};
+use map3d_base::{Error, Extent, Result};
 use twox_hash::XxHash3_128;
 
 use super::BuildRequest;
@@ -14,6 +14,9 @@ use super::files::prune;
 /// Incremented when the same assets would yield other summaries or chunks.
 pub(super) const BUILD_FORMAT: u32 = 2;
 const FOLDER: &str = "build";
+const OBJECTS: &str = "objects.jsonl";
+/// In the JSON of a material to which the source gives no colour.
+const SURFACE: &[u8] = b"\"surface\"";
 
 /// The assets of a request, by number.
 pub(super) struct Assets {
@@ -34,12 +37,12 @@ struct AssetEntry {
 
 impl Assets {
     /// Reads the digests of all assets without opening them; an asset whose summary is valid need not be opened.
-    pub fn load(folder: &Path, request: &BuildRequest) -> Result<Self> {
+    pub fn load(folder: &Path, request: &BuildRequest, extent: Option<&Extent>) -> Result<Self> {
         let summaries_folder = folder.join(FOLDER);
         let mut out = Self { entries: Vec::new(), summaries_folder, previous: Vec::new() };
         for name in &request.assets {
             let place = folder.join("assets").join(name);
-            let digest = compute_digest(&place, request)?;
+            let digest = compute_digest(&place, request, extent)?;
             let summary = AssetSummary::read(&out.summary_path(name));
             let is_valid =
                 summary.as_ref().is_some_and(|s| s.details.digest == digest && s.details.prototypes.iter().all(|p| folder.join(p).exists()));
@@ -135,7 +138,7 @@ impl Assets {
 }
 
 /// Hashes everything that a summary depends on except the keys of textures. The checksum in its header represents the mesh.
-fn compute_digest(folder: &Path, request: &BuildRequest) -> Result<String> {
+fn compute_digest(folder: &Path, request: &BuildRequest, extent: Option<&Extent>) -> Result<String> {
     let mut hash = XxHash3_128::with_seed(u64::from(BUILD_FORMAT));
     let mut write = |bytes: &[u8]| {
         hash.write(&(bytes.len() as u64).to_le_bytes());
@@ -144,6 +147,9 @@ fn compute_digest(folder: &Path, request: &BuildRequest) -> Result<String> {
     write(env!("CARGO_PKG_VERSION").as_bytes());
     write(bytemuck::bytes_of(&request.origin));
     write(&serde_json::to_vec(&request.options).expect("options are plain data"));
+    if let Some(extent) = extent {
+        write(&serde_json::to_vec(extent).expect("an extent is plain data"));
+    }
     let mesh = folder.join("mesh.m3a");
     let io = |path: &Path| {
         let path = path.to_path_buf();
@@ -154,9 +160,16 @@ fn compute_digest(folder: &Path, request: &BuildRequest) -> Result<String> {
     write(&file.metadata().map_err(io(&mesh))?.len().to_le_bytes());
     std::io::Read::read_exact(&mut file, &mut head).map_err(|_| Error::format(&mesh, "truncated"))?;
     write(&head);
-    for name in ["materials.json", "ids.u32"] {
+    let mut uncolored = false;
+    for name in ["materials.json", "ids.u32", OBJECTS] {
         let path = folder.join(name);
-        write(&std::fs::read(&path).map_err(io(&path))?);
+        // Only colours that the source does not give depend on objects.
+        if name == OBJECTS && !uncolored {
+            continue;
+        }
+        let bytes = std::fs::read(&path).map_err(io(&path))?;
+        uncolored |= name == "materials.json" && bytes.windows(SURFACE.len()).any(|w| w == SURFACE);
+        write(&bytes);
     }
     Ok(format!("{:032x}", hash.finish_128()))
 }
@@ -181,6 +194,15 @@ impl Asset {
         asset.validate()?;
         asset.mesh.release();
         Ok(asset)
+    }
+
+    /// Whether surfaces have no colour of their own: a build then looks at the objects.
+    pub fn has_uncolored(&self) -> bool {
+        self.materials.iter().any(|m| m.surface.is_some())
+    }
+
+    pub fn objects_path(&self) -> PathBuf {
+        self.folder.join(OBJECTS)
     }
 
     fn validate(&self) -> Result<()> {

@@ -2,13 +2,15 @@
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::Write;
+use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 use map3d_base::{Error, Result};
 
 use super::triangle::BuildTriangle;
 use crate::index::Cell;
+
+const READ_BYTES: usize = 1 << 20;
 
 pub(super) struct TriangleBuckets {
     folder: PathBuf,
@@ -58,14 +60,27 @@ impl TriangleBuckets {
 
     /// Returns all triangles of a cell in the order in which they were pushed.
     pub fn load(&self, cell: Cell) -> Result<Vec<BuildTriangle>> {
-        let path = self.path(cell);
         let mut out = Vec::new();
-        if path.exists() {
-            let bytes = fs::read(&path).map_err(|e| Error::storage(&path, e))?;
-            out.extend(bytes.chunks_exact(size_of::<BuildTriangle>()).map(bytemuck::pod_read_unaligned::<BuildTriangle>));
-        }
-        out.extend_from_slice(self.memory.get(&cell).map_or(&[], Vec::as_slice));
+        self.stream(cell, &mut |t| {
+            out.push(*t);
+            Ok(())
+        })?;
         Ok(out)
+    }
+
+    /// Passes on all triangles of a cell in the order in which they were pushed, in bounded memory.
+    pub fn stream(&self, cell: Cell, out: &mut dyn FnMut(&BuildTriangle) -> Result<()>) -> Result<()> {
+        let path = self.path(cell);
+        if path.exists() {
+            let io = |e| Error::storage(&path, e);
+            let mut file = BufReader::with_capacity(READ_BYTES, File::open(&path).map_err(io)?);
+            let mut bytes = [0; size_of::<BuildTriangle>()];
+            while !file.fill_buf().map_err(io)?.is_empty() {
+                file.read_exact(&mut bytes).map_err(io)?;
+                out(&bytemuck::pod_read_unaligned(&bytes))?;
+            }
+        }
+        self.memory.get(&cell).map_or(&[][..], Vec::as_slice).iter().try_for_each(out)
     }
 }
 

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::path::Path;
 
-use map3d_base::{Error, Result};
+use map3d_base::{Box3, Error, Extent, Result, vec3};
 use map3d_texture::{TextureKeys, prune_textures};
 
 use super::asset_summary::{AssetSummary, CellSum, CellSums, record_hash};
@@ -18,23 +18,29 @@ use super::summarize::summarize_asset;
 use super::triangle::BuildTriangle;
 use super::triangle_source::TriangleSource;
 use super::{BuildReport, BuildRequest, GroundPlane, Progress, prototypes, textures};
+use crate::content::Content;
 use crate::index::{Cell, ChunkEntry, FILE, InstancesEntry, SceneIndex};
 use crate::instances;
-use crate::lattice::metres;
+use crate::lattice::{MAX_EDGE_M, metres};
 use crate::records::InstanceRecord;
 
 const INSTANCES_FILE: &str = "instances.m3i";
+/// Triangles that result from splitting long edges, at most.
+const MAX_SPLIT_TRIANGLES: u64 = 64_000_000;
 
 /// Builds `chunks/`, `textures/`, `instances.m3i` and `scene.json` of a scene's folder from `assets/<name>/`. Reads an unchanged asset only if it shares
 /// a chunk with a changed one; leaves files alone that would not change. Returns `Error::Interrupted` when `progress` returns false; finished files
 /// stay, and the next build continues from them.
 pub fn build_scene(folder: &Path, request: &BuildRequest, progress: Progress) -> Result<BuildReport> {
     request.validate()?;
-    let mut assets = Assets::load(folder, request)?;
+    let content = Content::of_assets(request.asset_folders(folder).iter().map(AsRef::as_ref))?;
+    let extent = content.extent(request.options.choice(), request.origin)?;
+    check_triangle_count(folder, &content, extent.as_ref())?;
+    let mut assets = Assets::load(folder, request, extent.as_ref())?;
     let mut report = BuildReport::default();
     let textures = textures::build_changed(folder, &mut assets, request, &mut report, progress)?;
     let previous = SceneIndex::read(folder).ok().filter(|index| index.origin == request.origin);
-    let mut build = Build { folder, request, textures: &textures, assets, report, progress };
+    let mut build = Build { folder, request, content: &content, extent: extent.as_ref(), textures: &textures, assets, report, progress };
     let index = build.run(previous)?;
     prune_textures(&folder.join("textures"), &textures)?;
     let text = serde_json::to_string_pretty(&index).expect("the index is plain data") + "\n";
@@ -46,6 +52,8 @@ pub fn build_scene(folder: &Path, request: &BuildRequest, progress: Progress) ->
 struct Build<'a> {
     folder: &'a Path,
     request: &'a BuildRequest,
+    content: &'a Content,
+    extent: Option<&'a Extent>,
     textures: &'a TextureKeys,
     assets: Assets,
     report: BuildReport,
@@ -57,7 +65,7 @@ impl Build<'_> {
         let fresh = self.assets.without_summary();
         let mut summaries = self.summarize(&fresh)?;
         let level = self.ground_level(summaries.iter());
-        let ground = self.ground_plane(&level)?;
+        let ground = self.ground_planes(&level, &summaries)?;
         let mut bounds = level.bounds;
         ground.iter().flat_map(|t| t.corners).for_each(|c| bounds.add_point(metres(c)));
         let (square, pinned) =
@@ -77,8 +85,8 @@ impl Build<'_> {
     /// First pass over the assets without a summary: computes counts, boxes and prototypes.
     fn summarize(&mut self, fresh: &[usize]) -> Result<Vec<AssetSummary>> {
         let opened: Vec<&Asset> = open_all(&mut self.assets, fresh)?;
-        let materials = BuildMaterials::new(&opened, self.textures, self.request.options.merge_materials);
-        let source = triangle_source(self.request, &opened, &materials);
+        let materials = BuildMaterials::new(&opened, self.textures, &self.request.options)?;
+        let source = triangle_source(self.request, self.extent, &opened, &materials);
         let total = triangle_count(&opened);
         let (mut out, mut before) = (Vec::new(), 0);
         for number in 0..opened.len() {
@@ -97,25 +105,42 @@ impl Build<'_> {
         out
     }
 
-    fn ground_plane(&mut self, level: &GroundLevel) -> Result<Vec<BuildTriangle>> {
-        let wanted = match self.request.options.ground_plane {
-            GroundPlane::Off => false,
-            GroundPlane::On => true,
-            GroundPlane::Auto => !level.has_terrain,
-        };
-        if !wanted || level.bounds.is_empty() {
-            return Ok(Vec::new());
+    /// Returns the level in each region of the extent, of the whole scene if there is only one.
+    fn ground_levels(&self, whole: GroundLevel, fresh: &[AssetSummary]) -> Vec<GroundLevel> {
+        let regions = self.extent.map_or(1, |e| e.regions.len());
+        if regions < 2 {
+            return vec![whole];
         }
-        let plane = level.plane(u32::MAX, self.request.ground_id, u32::MAX)?;
-        self.report.ground_plane_triangles = plane.len() as u64;
-        Ok(plane)
+        let mut out = vec![GroundLevel::new(); regions];
+        for summary in self.assets.summaries().chain(fresh) {
+            out.iter_mut().zip(&summary.details.levels).for_each(|(level, bits)| level.merge(&GroundLevel::from_bits(*bits)));
+        }
+        out
+    }
+
+    fn ground_planes(&mut self, whole: &GroundLevel, fresh: &[AssetSummary]) -> Result<Vec<BuildTriangle>> {
+        let mut planes = Vec::new();
+        for level in self.ground_levels(*whole, fresh) {
+            let wanted = match self.request.options.ground_plane {
+                GroundPlane::Off => false,
+                GroundPlane::On => true,
+                GroundPlane::Auto => !level.has_terrain,
+            };
+            if wanted && !level.bounds.is_empty() {
+                let origin = self.request.origin;
+                let mut content = self.content.boxes(self.extent).map(|b| Box3 { lo: vec3::sub(b.lo, origin), hi: vec3::sub(b.hi, origin) });
+                level.plane(u32::MAX, self.request.ground_id, &mut content, &mut planes)?;
+            }
+        }
+        self.report.ground_plane_triangles = planes.len() as u64;
+        Ok(planes)
     }
 
     /// Second pass: sums the triangles of each asset by cell. Afterwards every asset has a summary.
     fn sum_cells(&mut self, numbers: &[usize], mut summaries: Vec<AssetSummary>, square: PinnedSquare) -> Result<()> {
         let opened = open_all(&mut self.assets, numbers)?;
-        let materials = BuildMaterials::new(&opened, self.textures, self.request.options.merge_materials);
-        let source = triangle_source(self.request, &opened, &materials);
+        let materials = BuildMaterials::new(&opened, self.textures, &self.request.options)?;
+        let source = triangle_source(self.request, self.extent, &opened, &materials);
         let (total, mut before) = (triangle_count(&opened), 0);
         for (number, summary) in summaries.iter_mut().enumerate() {
             let mut sums = CellSums::default();
@@ -172,9 +197,9 @@ impl Build<'_> {
         let changed: Vec<bool> = numbers.iter().map(|k| self.assets.is_new(*k)).collect();
         let changed_objects = self.changed_objects();
         let opened = open_all(&mut self.assets, &numbers)?;
-        let mut materials = BuildMaterials::new(&opened, self.textures, self.request.options.merge_materials);
+        let mut materials = BuildMaterials::new(&opened, self.textures, &self.request.options)?;
         let ground_material = materials.ground();
-        writer.sort(&triangle_source(self.request, &opened, &materials), &changed, &mut *self.progress)?;
+        writer.sort(&triangle_source(self.request, self.extent, &opened, &materials), &changed, &mut *self.progress)?;
         let mut plane = ground.iter().map(|t| BuildTriangle { material: ground_material, ..*t });
         plane.try_for_each(|t| writer.push(&t, true))?;
         let written = writer.write(&materials.records, &changed_objects, &mut *self.progress)?;
@@ -211,7 +236,7 @@ impl Build<'_> {
             chunks,
             prototypes: entries,
             instances: InstancesEntry { file: INSTANCES_FILE.into(), count: records.len() as u64 },
-            options: serde_json::to_value(self.request.options).expect("options are plain data"),
+            options: serde_json::to_value(&self.request.options).expect("options are plain data"),
             report: self.stable_counts(),
         })
     }
@@ -260,8 +285,26 @@ fn open_all<'a>(assets: &'a mut Assets, numbers: &[usize]) -> Result<Vec<&'a Ass
     Ok(numbers.iter().map(|k| assets.get(*k)).collect())
 }
 
-fn triangle_source<'a>(request: &'a BuildRequest, assets: &'a [&'a Asset], materials: &'a BuildMaterials) -> TriangleSource<'a> {
-    TriangleSource { assets, materials, options: &request.options, origin: request.origin }
+fn triangle_source<'a>(
+    request: &'a BuildRequest,
+    extent: Option<&'a Extent>,
+    assets: &'a [&'a Asset],
+    materials: &'a BuildMaterials,
+) -> TriangleSource<'a> {
+    TriangleSource { assets, materials, options: &request.options, origin: request.origin, extent }
+}
+
+/// Refuses scenes whose large triangles would become more small ones than any city has.
+fn check_triangle_count(folder: &Path, content: &Content, extent: Option<&Extent>) -> Result<()> {
+    let got = content.added_by_splitting(extent, MAX_EDGE_M) as u64;
+    let limit = || Error::Limit {
+        path: folder.into(),
+        what: "the number of triangles after splitting large ones",
+        got,
+        limit: "split_triangles",
+        value: MAX_SPLIT_TRIANGLES,
+    };
+    if got > MAX_SPLIT_TRIANGLES { Err(limit()) } else { Ok(()) }
 }
 
 fn triangle_count(assets: &[&Asset]) -> u64 {

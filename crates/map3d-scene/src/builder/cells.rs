@@ -164,12 +164,23 @@ impl Quadtree {
         self.homes.get(number as usize).filter(|home| **home != u32::MAX).map(|home| *home as usize)
     }
 
+    /// Whether a cell with this number of triangles is not a leaf.
+    pub fn is_split(&self, cell: Cell, count: u64) -> bool {
+        cell[0] < MAX_LEVEL && self.must_split(cell, count)
+    }
+
+    /// Returns the child of a cell that contains a triangle.
+    pub fn child(&self, cell: Cell, t: &BuildTriangle) -> Cell {
+        let home = self.square.cell(cell[0] + 1, t.centroid_m());
+        children(cell)[(home[1] & 1 | (home[2] & 1) << 1) as usize]
+    }
+
     /// Splits a sorting cell's triangles into leaf cells; keeps their order.
     pub fn leaves(&self, cell: Cell, triangles: Vec<BuildTriangle>) -> Vec<(Cell, Vec<BuildTriangle>)> {
         let mut out = Vec::new();
         let mut stack = vec![(cell, triangles)];
         while let Some((cell, triangles)) = stack.pop() {
-            if cell[0] < MAX_LEVEL && self.must_split(cell, triangles.len() as u64) {
+            if self.is_split(cell, triangles.len() as u64) {
                 let mut parts = children(cell).map(|c| (c, Vec::new()));
                 for t in triangles {
                     let home = self.square.cell(cell[0] + 1, t.centroid_m());

@@ -1,6 +1,6 @@
 //! Sorts triangles into the cells to build, and writes their chunks.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 
 use map3d_base::{Error, Result};
@@ -9,7 +9,7 @@ use twox_hash::XxHash3_128;
 
 use super::asset_summary::halves;
 use super::buckets::TriangleBuckets;
-use super::cells::{Quadtree, slab, slab_center};
+use super::cells::{CELL_TRIANGLES, Quadtree, slab, slab_center};
 use super::chunk_cache::{CHUNKS, CachedChunk, ChunkCache};
 use super::encode::{ChunkInput, encode_chunk};
 use super::files::write_if_changed;
@@ -23,6 +23,13 @@ use crate::records::MaterialRecord;
 
 /// Upper bound of the memory that encoding one cell takes.
 const CELL_MEMORY_BYTES: u64 = 160 << 20;
+/// A sorting cell with more triangles is dense: they are sorted into smaller cells in files, so that they are never in memory together.
+const DENSE_TRIANGLES: u64 = 2 * CELL_TRIANGLES;
+/// Memory for sorting the triangles of a dense cell.
+const DENSE_BYTES: u64 = 16 << 20;
+
+/// Folder of triangles that do not fit into memory.
+const SPILL: &str = "spill";
 
 /// The content of a sorting cell.
 #[derive(Clone, Copy, Debug, Default)]
@@ -84,11 +91,12 @@ impl<'a> ChunkWriter<'a> {
     pub fn new(folder: &'a Path, request: &'a BuildRequest, tree: &'a Quadtree, contents: &'a [CellContent], before: &[CellContent]) -> Result<Self> {
         let cache = ChunkCache::scan(folder)?;
         let plan = |((cell, now), before): ((&Cell, &CellContent), &CellContent)| {
-            let patched = || cache.find(*cell, before.input).filter(|_| request.options.merge_materials).map_or(CellPlan::Build, CellPlan::Patch);
+            let can_patch = request.options.merge_materials && now.triangles <= DENSE_TRIANGLES;
+            let patched = || cache.find(*cell, before.input).filter(|_| can_patch).map_or(CellPlan::Build, CellPlan::Patch);
             cache.find(*cell, now.input).map_or_else(patched, CellPlan::Reuse)
         };
         let plans = tree.sorting_cells().iter().zip(contents).zip(before).map(plan).collect();
-        let buckets = TriangleBuckets::new(&folder.join("spill"), request.memory_bytes() / 4)?;
+        let buckets = TriangleBuckets::new(&folder.join(SPILL), request.memory_bytes() / 4)?;
         Ok(Self { folder, request, tree, contents, plans, buckets })
     }
 
@@ -167,6 +175,9 @@ impl<'a> ChunkWriter<'a> {
     /// Builds the chunks of one sorting cell.
     fn build_cell(&self, number: usize, mut materials: MaterialNumbers, changed_objects: &HashSet<u32>) -> Result<CellChunks> {
         let cell = self.tree.sorting_cells()[number];
+        if self.contents[number].triangles > DENSE_TRIANGLES {
+            return self.build_dense_cell(number, &materials.records);
+        }
         let mut triangles = self.buckets.load(cell)?;
         if let CellPlan::Patch(files) = &self.plans[number] {
             for file in files {
@@ -174,9 +185,8 @@ impl<'a> ChunkWriter<'a> {
             }
         }
         let mut groups = Vec::new();
-        for (cell, mut triangles) in self.tree.leaves(cell, triangles) {
-            triangles.sort_by_key(slab);
-            groups.extend(triangles.chunk_by(|a, b| slab(a) == slab(b)).map(|group| (cell, group.to_vec())));
+        for (cell, triangles) in self.tree.leaves(cell, triangles) {
+            groups.extend(slabs(triangles).into_iter().map(|group| (cell, group)));
         }
         let input = ChunkInput { hash: self.contents[number].input, parts: groups.len() as u32 };
         let (mut entries, mut kept) = (Vec::new(), 0);
@@ -187,6 +197,54 @@ impl<'a> ChunkWriter<'a> {
         }
         self.buckets.remove(cell)?;
         Ok(self.cell_chunks(number, kept, entries))
+    }
+
+    /// Builds the chunks of a sorting cell, one leaf cell after the other: first it counts the chunks, which each of them states, then it writes them.
+    fn build_dense_cell(&self, number: usize, materials: &[MaterialRecord]) -> Result<CellChunks> {
+        let (cell, content) = (self.tree.sorting_cells()[number], self.contents[number]);
+        let mut parts = 0;
+        self.visit_leaves(&self.buckets, cell, content.triangles, &mut |_, triangles| {
+            parts += slabs(triangles).len();
+            Ok(())
+        })?;
+        let input = ChunkInput { hash: content.input, parts: parts as u32 };
+        let (mut entries, mut kept) = (Vec::new(), 0);
+        self.visit_leaves(&self.buckets, cell, content.triangles, &mut |leaf, triangles| {
+            for group in slabs(triangles) {
+                let (entry, is_kept) = self.write_chunk(leaf, group, input, materials)?;
+                kept += u64::from(is_kept);
+                entries.push(entry);
+            }
+            Ok(())
+        })?;
+        self.buckets.remove(cell)?;
+        Ok(self.cell_chunks(number, kept, entries))
+    }
+
+    /// Passes on the leaf cells of a cell with their triangles.
+    fn visit_leaves(
+        &self,
+        buckets: &TriangleBuckets,
+        cell: Cell,
+        count: u64,
+        out: &mut dyn FnMut(Cell, Vec<BuildTriangle>) -> Result<()>,
+    ) -> Result<()> {
+        if count <= DENSE_TRIANGLES || !self.tree.is_split(cell, count) {
+            return self.tree.leaves(cell, buckets.load(cell)?).into_iter().try_for_each(|(leaf, triangles)| out(leaf, triangles));
+        }
+        let [level, x, y] = cell;
+        let folder = self.folder.join(SPILL).join(format!("dense_{level}_{x}_{y}"));
+        let (mut below, mut counts) = (TriangleBuckets::new(&folder, DENSE_BYTES)?, BTreeMap::new());
+        buckets.stream(cell, &mut |t| {
+            let child = self.tree.child(cell, t);
+            *counts.entry(child).or_insert(0) += 1;
+            below.push(child, t)
+        })?;
+        for (child, count) in counts {
+            self.visit_leaves(&below, child, count, out)?;
+            below.remove(child)?;
+        }
+        Ok(())
     }
 
     /// Writes a chunk; returns its entry and whether the file already had these bytes.
@@ -209,4 +267,13 @@ impl<'a> ChunkWriter<'a> {
         };
         Ok((entry, is_kept))
     }
+}
+
+/// Divides the triangles of a leaf cell by height.
+fn slabs(mut triangles: Vec<BuildTriangle>) -> Vec<Vec<BuildTriangle>> {
+    triangles.sort_by_key(slab);
+    if !triangles.is_empty() && triangles.first().map(slab) == triangles.last().map(slab) {
+        return vec![triangles];
+    }
+    triangles.chunk_by(|a, b| slab(a) == slab(b)).map(<[BuildTriangle]>::to_vec).collect()
 }

@@ -2,41 +2,67 @@
 
 use std::collections::HashMap;
 
-use map3d_base::asset::Material;
+use map3d_base::Result;
+use map3d_base::asset::{Material, SurfaceClass};
 use map3d_texture::TextureKeys;
 
+use super::BuildOptions;
 use super::asset_summary::record_hash;
 use super::assets::Asset;
+use super::looks::Looks;
 use crate::records::{MATERIAL_CUTOUT, MATERIAL_TEXTURED, MaterialRecord};
 
 pub(super) struct BuildMaterials {
     pub records: Vec<MaterialRecord>,
-    /// Per asset: the asset's material → index into `records`.
-    numbers: Vec<Vec<u32>>,
+    /// Per asset.
+    assets: Vec<AssetMaterials>,
     /// Hash of each record.
     hashes: Vec<u64>,
     /// Per asset: materials that name an image that is missing or broken.
     pub without_their_texture: Vec<u64>,
 }
 
+/// The asset's material → index into the records.
+struct AssetMaterials {
+    numbers: Vec<MaterialNumber>,
+    looks: Looks,
+    /// By look and surface class.
+    colored: Vec<[u32; SurfaceClass::ALL.len()]>,
+}
+
+#[derive(Clone, Copy)]
+enum MaterialNumber {
+    Own(u32),
+    /// The source gives no colour.
+    OfSurface(SurfaceClass),
+}
+
 /// sRGB of the ground plane: light grey.
 const GROUND: [u8; 4] = [200, 198, 192, 255];
 
 impl BuildMaterials {
-    pub fn new(assets: &[&Asset], textures: &TextureKeys, merge: bool) -> Self {
-        let mut out = Self { records: Vec::new(), numbers: Vec::new(), hashes: Vec::new(), without_their_texture: Vec::new() };
+    pub fn new(assets: &[&Asset], textures: &TextureKeys, options: &BuildOptions) -> Result<Self> {
+        let mut out = Self { records: Vec::new(), assets: Vec::new(), hashes: Vec::new(), without_their_texture: Vec::new() };
         let mut known = HashMap::new();
         for asset in assets {
-            let numbers = asset.materials.iter().map(|m| out.add(m, textures, merge, &mut known)).collect();
-            out.numbers.push(numbers);
+            let numbers = asset.materials.iter().map(|m| match m.surface {
+                Some(class) => MaterialNumber::OfSurface(class),
+                None => MaterialNumber::Own(out.add(record_of(m, textures), options.merge_materials, &mut known)),
+            });
+            let numbers = numbers.collect();
+            let looks = if asset.has_uncolored() { Looks::read(&asset.objects_path(), &options.style)? } else { Looks::default() };
+            let colored = (0..looks.len()).map(|look| {
+                SurfaceClass::ALL.map(|class| out.add(plain(looks.color(look, class, &options.style)), options.merge_materials, &mut known))
+            });
+            let colored = colored.collect();
+            out.assets.push(AssetMaterials { numbers, looks, colored });
             let lacks = |m: &&Material| (m.texture.is_some() || m.alpha.is_some()) && textures.get(m).is_none();
             out.without_their_texture.push(asset.materials.iter().filter(lacks).count() as u64);
         }
-        out
+        Ok(out)
     }
 
-    fn add(&mut self, material: &Material, textures: &TextureKeys, merge: bool, known: &mut HashMap<MaterialRecord, u32>) -> u32 {
-        let record = record_of(material, textures);
+    fn add(&mut self, record: MaterialRecord, merge: bool, known: &mut HashMap<MaterialRecord, u32>) -> u32 {
         if let Some(number) = known.get(&record).filter(|_| merge) {
             return *number;
         }
@@ -57,11 +83,19 @@ impl BuildMaterials {
     }
 
     pub fn ground_record() -> MaterialRecord {
-        MaterialRecord { diffuse: GROUND, border: [0; 4], wrap: 0, flags: 0, padding: [0; 6], texture: [0; 16], reserved: [0; 32] }
+        plain(GROUND)
     }
 
-    pub fn number(&self, asset: usize, material: u32) -> u32 {
-        self.numbers[asset][material as usize]
+    /// Returns the number of a triangle's material. `object`: in the asset; none in a prototype. `up`: the z of the triangle's unit normal.
+    pub fn number(&self, asset: usize, material: u32, object: Option<u32>, up: impl FnOnce() -> f64) -> u32 {
+        let asset = &self.assets[asset];
+        match asset.numbers[material as usize] {
+            MaterialNumber::Own(number) => number,
+            MaterialNumber::OfSurface(class) => {
+                let look = asset.looks.of(object);
+                asset.colored[look][asset.looks.class(look, class, up) as usize]
+            }
+        }
     }
 
     /// Hash of a material's record.
@@ -69,9 +103,10 @@ impl BuildMaterials {
         self.hashes[number as usize]
     }
 
-    /// Returns the hashes of an asset's materials.
+    /// Returns the hashes of an asset's materials, without those that depend on the object.
     pub fn hashes_of(&self, asset: usize) -> Vec<u64> {
-        self.numbers[asset].iter().map(|n| self.hash(*n)).collect()
+        let own = |n: &MaterialNumber| if let MaterialNumber::Own(number) = n { Some(self.hash(*number)) } else { None };
+        self.assets[asset].numbers.iter().filter_map(own).collect()
     }
 
     pub fn is_textured(&self, number: u32) -> bool {
@@ -91,6 +126,10 @@ fn record_of(material: &Material, textures: &TextureKeys) -> MaterialRecord {
         texture: texture.map_or([0; 16], |t| t.key),
         reserved: [0; 32],
     }
+}
+
+fn plain(color: [u8; 4]) -> MaterialRecord {
+    MaterialRecord { diffuse: color, border: [0; 4], wrap: 0, flags: 0, padding: [0; 6], texture: [0; 16], reserved: [0; 32] }
 }
 
 /// NaN becomes 0.

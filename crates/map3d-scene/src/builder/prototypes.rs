@@ -55,6 +55,10 @@ pub(super) fn instances(source: &TriangleSource, number: usize, prototypes: &Pro
             report.instances_of_nothing += 1;
             continue;
         };
+        if source.extent.is_some_and(|e| !e.keeps_point([3, 7, 11].map(|k| instance.transform[k]))) {
+            report.outlier_triangles += 1;
+            continue;
+        }
         let transform = to_local(&instance.transform, source.origin);
         let object_id = asset.ids[instance.object as usize];
         let content = instance_hash(content, object_id, &transform);

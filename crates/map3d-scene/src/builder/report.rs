@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// Part of `scene.json`, and returned to the caller; contains every count, even 0.
+/// Part of `scene.json`, and returned to the caller; contains every count, even 0, except for that of outliers.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct BuildReport {
@@ -30,6 +30,9 @@ pub struct BuildReport {
     pub instances: u64,
     /// Instances of prototypes that have no triangles.
     pub instances_of_nothing: u64,
+    /// Triangles and instances far from the rest that were left out.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub outlier_triangles: u64,
     /// By reason, the number of images that failed and an example.
     pub texture_warnings: BTreeMap<String, String>,
 }
@@ -45,6 +48,7 @@ impl BuildReport {
         self.split_triangles += asset.split_triangles;
         self.materials_without_their_texture += asset.materials_without_their_texture;
         self.instances_of_nothing += asset.instances_of_nothing;
+        self.outlier_triangles += asset.outlier_triangles;
     }
 
     /// Returns the counts by name.
@@ -53,4 +57,10 @@ impl BuildReport {
         let object = value.as_object().expect("a struct is an object");
         object.iter().filter_map(|(k, v)| Some((k.clone(), v.as_u64()?))).collect()
     }
+}
+
+// Serde passes a reference.
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_zero(count: &u64) -> bool {
+    *count == 0
 }

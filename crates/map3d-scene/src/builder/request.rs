@@ -1,7 +1,12 @@
 //! The request for a build, in JSON.
 
+use std::path::{Path, PathBuf};
+
 use map3d_base::{Error, Result, Vec3};
 use serde::{Deserialize, Serialize};
+
+use super::looks::StyleRule;
+use crate::content::Choice;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -23,7 +28,7 @@ pub struct BuildRequest {
     pub max_memory_bytes: u64,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct BuildOptions {
     /// Counts equal vertices. (Chunks store positions and no vertex indices.)
@@ -37,6 +42,15 @@ pub struct BuildOptions {
     /// Drops triangles without a texture.
     pub drop_untextured: bool,
     pub ground_plane: GroundPlane,
+    /// Keeps content however far it is from the rest.
+    #[serde(skip_serializing_if = "is_default")]
+    pub keep_outliers: bool,
+    /// The cluster of content to build, counted from 1; 0: the largest.
+    #[serde(skip_serializing_if = "is_default")]
+    pub cluster: u32,
+    /// Colours of surfaces to which the source gives none: the first rule that holds counts.
+    #[serde(skip_serializing_if = "is_default")]
+    pub style: Vec<StyleRule>,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -59,8 +73,26 @@ impl Default for BuildOptions {
             merge_materials: on,
             drop_untextured: false,
             ground_plane: GroundPlane::Auto,
+            keep_outliers: false,
+            cluster: 0,
+            style: Vec::new(),
         }
     }
+}
+
+impl BuildOptions {
+    /// Returns which clusters of content the scene consists of.
+    pub fn choice(&self) -> Choice {
+        match (self.keep_outliers, self.cluster) {
+            (true, _) => Choice::All,
+            (false, 0) => Choice::Largest,
+            (false, number) => Choice::Number(number),
+        }
+    }
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 const DEFAULT_MEMORY_BYTES: u64 = 1 << 30;
@@ -81,6 +113,10 @@ impl BuildRequest {
             Some(name) => Err(Error::argument(format!("build request: {name:?} is not the name of an asset's folder"))),
             None => Ok(()),
         }
+    }
+
+    pub(super) fn asset_folders(&self, folder: &Path) -> Vec<PathBuf> {
+        self.assets.iter().map(|name| folder.join("assets").join(name)).collect()
     }
 
     pub(super) fn memory_bytes(&self) -> u64 {

@@ -27,9 +27,13 @@ pub(super) fn summarize_asset(
 ) -> Result<AssetSummary> {
     let asset = source.assets[number];
     let (mut counts, mut level) = (BuildReport::default(), GroundLevel::new());
+    let several = source.extent.filter(|e| e.regions.len() > 1);
+    let mut levels = vec![GroundLevel::new(); several.map_or(0, |e| e.regions.len())];
     let mut put = |_: u32, t: &BuildTriangle| {
-        t.corners.iter().for_each(|c| level.bounds.add_point(metres(*c)));
-        level.add(t.rank, metres(t.corners.map(|c| c[2])).into_iter().fold(f64::INFINITY, f64::min));
+        level.add_triangle(t);
+        if let Some(extent) = several {
+            levels[extent.region_of(t.corners.map(|c| vec3::add(metres(c), source.origin)))].add_triangle(t);
+        }
     };
     if !source.stream(number, |p| p == 0, &mut counts, &mut put, keep_going) {
         return Err(Error::Interrupted);
@@ -50,7 +54,8 @@ pub(super) fn summarize_asset(
     counts.materials_without_their_texture = source.materials.without_their_texture[number];
     let known = textures::used_sources(asset).into_iter().map(|s| SummaryTexture::new(s.clone(), textures.by_source.get(&s)));
     let (textures, materials) = (known.collect(), source.materials.hashes_of(number));
-    let details = AssetDetails { level: level.to_bits(), counts, textures, materials, prototypes: files, ..AssetDetails::default() };
+    let levels = levels.into_iter().map(GroundLevel::to_bits).collect();
+    let details = AssetDetails { level: level.to_bits(), levels, counts, textures, materials, prototypes: files, ..AssetDetails::default() };
     Ok(AssetSummary { details, cells: Vec::new(), instances, ids: asset.ids.clone() })
 }
 

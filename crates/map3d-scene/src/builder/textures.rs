@@ -6,7 +6,7 @@ use std::sync::mpsc;
 
 use map3d_base::asset::Material;
 use map3d_base::{Error, Result};
-use map3d_texture::{TextureAsset, TextureKeys, TextureSource, build_textures, texture_path, texture_source};
+use map3d_texture::{TextureAsset, TextureFile, TextureKeys, TextureSource, build_textures, texture_path, texture_source};
 
 use super::assets::{Asset, Assets};
 use super::{BuildReport, BuildRequest, Progress};
@@ -38,11 +38,11 @@ pub(super) fn build_changed(
     Ok(keys)
 }
 
-/// Returns the sources whose mask or image may have changed, and those without a file.
+/// Returns the sources whose mask or image may have changed, and those without a file of today's version.
 fn find_stale_sources(assets: &mut Assets, out_dir: &Path) -> Result<BTreeSet<TextureSource>> {
     let mut stale: BTreeSet<TextureSource> =
         assets.previous().flat_map(|s| &s.details.textures).map(super::asset_summary::SummaryTexture::source).collect();
-    let is_there = |key: Option<[u8; 16]>| key.is_some_and(|k| texture_path(out_dir, &k).exists());
+    let is_there = |key: Option<[u8; 16]>| key.is_some_and(|k| TextureFile::open_header(&texture_path(out_dir, &k)).is_ok());
     stale.extend(assets.summaries().flat_map(|s| &s.details.textures).filter(|t| !is_there(t.key)).map(super::asset_summary::SummaryTexture::source));
     for k in assets.without_summary() {
         stale.extend(used_sources(assets.open(k)?));

@@ -2,14 +2,14 @@
 
 use std::collections::HashMap;
 
-use map3d_base::{Vec3, vec3};
+use map3d_base::{Extent, Vec3, vec3};
 
 use super::assets::Asset;
 use super::materials::BuildMaterials;
 use super::report::BuildReport;
 use super::request::BuildOptions;
 use super::triangle::BuildTriangle;
-use crate::lattice::snap;
+use crate::lattice::{Point, snap};
 
 /// Triangles, of about 60 bytes each, after which the resident pages of an asset's mesh are dropped.
 const TRIANGLES_PER_RELEASE: usize = 1 << 20;
@@ -22,6 +22,8 @@ pub(super) struct TriangleSource<'a> {
     pub materials: &'a BuildMaterials,
     pub options: &'a BuildOptions,
     pub origin: Vec3,
+    /// Triangles outside it are left out.
+    pub extent: Option<&'a Extent>,
 }
 
 impl TriangleSource<'_> {
@@ -60,8 +62,14 @@ impl TriangleSource<'_> {
         let asset = self.assets[number];
         let mesh = &asset.mesh;
         let origin = if prototype == 0 { self.origin } else { [0.0; 3] };
-        let corners = mesh.triangles()[i].map(|v| snap(vec3::sub(mesh.positions()[v as usize], origin)));
-        let material = self.materials.number(number, mesh.materials()[i]);
+        let corners = mesh.triangles()[i].map(|v| mesh.positions()[v as usize]);
+        if prototype == 0 && self.extent.is_some_and(|e| !e.keeps(corners)) {
+            report.outlier_triangles += 1;
+            return None;
+        }
+        let corners = corners.map(|p| snap(vec3::sub(p, origin)));
+        let object = mesh.objects()[i];
+        let material = self.materials.number(number, mesh.materials()[i], (prototype == 0).then_some(object), || unit_normal_z(corners));
         if self.options.drop_untextured && !self.materials.is_textured(material) {
             report.untextured_faces += 1;
             return None;
@@ -73,7 +81,7 @@ impl TriangleSource<'_> {
             rank: mesh.ranks()[i].min(5),
             padding: 0,
             material,
-            object_id: if prototype == 0 { asset.ids[mesh.objects()[i] as usize] } else { PROTOTYPE_ID },
+            object_id: if prototype == 0 { asset.ids[object as usize] } else { PROTOTYPE_ID },
             source: 0,
             asset: number as u32,
             padding2: 0,
@@ -102,6 +110,14 @@ impl TriangleCounters {
         *slot += 1;
         *slot - 1
     }
+}
+
+/// Returns the z of the unit normal, 0 for a triangle without area.
+fn unit_normal_z(corners: [Point; 3]) -> f64 {
+    let [a, b, c] = corners.map(|p| p.map(|v| v as f64));
+    let normal = vec3::cross(vec3::sub(b, a), vec3::sub(c, a));
+    let length = vec3::length(normal);
+    if length > 0.0 { normal[2] / length } else { 0.0 }
 }
 
 fn snorm(v: f32) -> i16 {
