@@ -2,11 +2,13 @@
 
 use map3d_base::{DEPTH_NOTHING, LayerKind, LayerSpec};
 
-/// The set of arrays of a G-buffer. Always contains id and depth.
+/// A set of arrays. That of a G-buffer always contains id and depth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Arrays(u32);
 
 impl Arrays {
+    /// No arrays.
+    pub const NONE: Self = Self(0);
     /// Id and depth.
     pub const LEAST: Self = Self(1 << LayerKind::Id as u32 | 1 << LayerKind::Depth as u32);
     /// The arrays of a rendering without further layers.

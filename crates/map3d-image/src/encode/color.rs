@@ -21,6 +21,12 @@ pub fn color_from_linear((width, height): (u32, u32), color: &[[u16; 4]]) -> Ras
     image
 }
 
+/// Converts linear premultiplied 16-bit colour to sRGB bytes with straight alpha; pixels without coverage are 0.
+pub fn bytes_from_linear(color: &[[u16; 4]]) -> Vec<[u8; 4]> {
+    let table: &ToByte = &TO_BYTE;
+    color.iter().map(|p| if p[3] == 65_535 { [table.byte(p[0]), table.byte(p[1]), table.byte(p[2]), 255] } else { straight(table, *p) }).collect()
+}
+
 fn straight(table: &ToByte, p: [u16; 4]) -> [u8; 4] {
     let a = u32::from(p[3]);
     let alpha = ((a + 128) / 257) as u8;

@@ -32,3 +32,20 @@ pub fn bytes_from_u32(values: &[u32]) -> &[u8] {
 pub fn bytes_from_u16(values: &[u16]) -> &[u8] {
     bytemuck::cast_slice(values)
 }
+
+/// Returns channels of pixels of `channels` bytes each, in the given order.
+pub(super) fn reordered(pixels: &[u8], channels: usize, order: &[usize]) -> Vec<u8> {
+    let mut out = vec![0; pixels.len() / channels * order.len()];
+    for (k, from) in order.iter().enumerate() {
+        for (to, pixel) in out.chunks_exact_mut(order.len()).zip(pixels.chunks_exact(channels)) {
+            to[k] = pixel[*from];
+        }
+    }
+    out
+}
+
+/// Returns rows of bits, each padded to whole bytes, the leftmost pixel in the highest bit.
+pub(super) fn packed_rows(bits: &[bool], width: usize) -> Vec<u8> {
+    let byte = |eight: &[bool]| eight.iter().zip(0..).fold(0, |byte, (bit, k)| byte | u8::from(*bit) << (7 - k));
+    bits.chunks_exact(width).flat_map(|row| row.chunks(8).map(byte)).collect()
+}

@@ -9,7 +9,7 @@ mod webp;
 
 use map3d_base::{Error, LayerFormat, LayerKind, LayerSpec, Result};
 
-pub use color::color_from_linear;
+pub use color::{bytes_from_linear, color_from_linear};
 pub use data::{bytes_from_normals, bytes_from_u16, bytes_from_u32};
 pub use jpeg::encode_jpeg;
 pub use png::{Deflate, Filter, PngImage, decode_png, encode_png};
@@ -37,6 +37,25 @@ impl Encoder {
 
     fn png(&mut self, size: (u32, u32), channels: usize, pixels: &[u8], methods: png::MethodPair) -> Vec<u8> {
         self.png.write(size, channels, pixels, if self.small { methods.small } else { methods.quick })
+    }
+
+    /// Encodes channels of pixels of `channels` bytes each, in the given order, by the method of a kind of layer.
+    pub fn channels(&mut self, size: (u32, u32), kind: LayerKind, (channels, pixels): (usize, &[u8]), order: &[usize]) -> Result<Vec<u8>> {
+        if !(1..=4).contains(&order.len()) || order.iter().any(|k| *k >= channels) {
+            return Err(Error::argument(format!("order {order:?}: expected 1 to 4 of the channels 0 to {}", channels.saturating_sub(1))));
+        }
+        check_length(size, pixels.len() / channels)?;
+        let is_same = order.len() == channels && order.iter().enumerate().all(|(k, from)| k == *from);
+        Ok(match is_same {
+            true => self.png(size, channels, pixels, methods_of(kind)),
+            false => self.png(size, order.len(), &data::reordered(pixels, channels, order), methods_of(kind)),
+        })
+    }
+
+    /// Encodes one bit per pixel: true is white.
+    pub fn bits(&mut self, size: (u32, u32), bits: &[bool]) -> Result<Vec<u8>> {
+        check_length(size, bits.len())?;
+        Ok(self.png.write_bits(size, &data::packed_rows(bits, size.0 as usize)))
     }
 
     /// Encodes one layer of a G-buffer.
@@ -110,6 +129,17 @@ impl Encoder {
         only_png("sun16", format)?;
         check_length(size, suns.len())?;
         Ok(self.png(size, 2, bytes_from_u16(suns), png::SUN16))
+    }
+}
+
+fn methods_of(kind: LayerKind) -> png::MethodPair {
+    match kind {
+        LayerKind::Color | LayerKind::Picture => png::COLOR,
+        LayerKind::Normal => png::NORMAL,
+        LayerKind::Id => png::ID,
+        LayerKind::Depth | LayerKind::Depth2 => png::DEPTH,
+        LayerKind::Sun | LayerKind::Ao => png::SHADE,
+        LayerKind::Sun16 => png::SUN16,
     }
 }
 

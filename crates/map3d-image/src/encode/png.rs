@@ -45,6 +45,15 @@ pub const DEPTH: MethodPair = methods((Filter::Sub, Deflate::Matching), (Filter:
 pub const SHADE: MethodPair = methods((Filter::Up, Deflate::Fast), (Filter::Sub, Deflate::Thorough));
 pub const SUN16: MethodPair = methods((Filter::Up, Deflate::Fast), (Filter::None, Deflate::Thorough));
 
+/// Of images of one bit per pixel.
+const BITS: Method = Method { filter: Filter::None, deflate: Deflate::Matching };
+
+/// Bits per sample, and the PNG's colour type.
+struct Samples {
+    depth: u8,
+    color_type: u8,
+}
+
 const SIGNATURE: [u8; 8] = [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1A, b'\n'];
 
 /// Writes PNGs and reuses its buffers.
@@ -59,13 +68,24 @@ impl PngWriter {
     pub fn write(&mut self, size: (u32, u32), channels: usize, pixels: &[u8], method: Method) -> Vec<u8> {
         let row = size.0 as usize * channels;
         assert_eq!(pixels.len(), row * size.1 as usize, "{size:?} × {channels} bytes");
-        filter_rows(&mut self.filtered, pixels, row, channels, method.filter);
+        let color_type = [0, 4, 2, 6][channels - 1];
+        self.write_rows(size, Samples { depth: 8, color_type }, pixels, channels, method)
+    }
+
+    /// Encodes an image of one bit per pixel; 1 is white. `rows`: each padded to whole bytes, the leftmost pixel in the highest bit.
+    pub fn write_bits(&mut self, size: (u32, u32), rows: &[u8]) -> Vec<u8> {
+        assert_eq!(rows.len(), size.0.div_ceil(8) as usize * size.1 as usize, "{size:?} bits");
+        self.write_rows(size, Samples { depth: 1, color_type: 0 }, rows, 1, BITS)
+    }
+
+    /// `step`: bytes per pixel, at least 1.
+    fn write_rows(&mut self, size: (u32, u32), samples: Samples, rows: &[u8], step: usize, method: Method) -> Vec<u8> {
+        filter_rows(&mut self.filtered, rows, rows.len() / size.1 as usize, step, method.filter);
         let body = self.deflater.zlib(&self.filtered, method.deflate);
         let mut header = [0u8; 13];
         header[..4].copy_from_slice(&size.0.to_be_bytes());
         header[4..8].copy_from_slice(&size.1.to_be_bytes());
-        let color_type = [0, 4, 2, 6][channels - 1];
-        header[8..10].copy_from_slice(&[8, color_type]);
+        header[8..10].copy_from_slice(&[samples.depth, samples.color_type]);
         let mut out = Vec::with_capacity(body.len() + 64);
         out.extend_from_slice(&SIGNATURE);
         chunk(&mut out, b"IHDR", &header);
