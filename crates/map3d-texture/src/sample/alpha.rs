@@ -5,7 +5,7 @@ use std::sync::Arc;
 use map3d_base::asset::Wrap;
 use map3d_base::samples::SAMPLES;
 
-use crate::sample::tap::{FULL, TAP_BITS, WEIGHT_BITS, sum_single_tap};
+use crate::sample::tap::{FULL, TAP_BITS, sum_single_tap};
 use crate::sample::texel_map::{TexelMap, TexelPoint};
 use crate::sample::uv_map::{POSITION_BITS, UvMap};
 use crate::store::{AlphaCell, Level, Texture};
@@ -18,8 +18,8 @@ pub struct AlphaSampler {
     map: TexelMap,
     /// From a pixel's origin to its samples.
     sample_offsets: [TexelPoint; 16],
-    /// Alpha outside the texture; `FULL` = 1.
-    outside: u32,
+    /// Whether the surface covers the texels outside the texture.
+    covers_outside: bool,
 }
 
 impl AlphaSampler {
@@ -31,11 +31,11 @@ impl AlphaSampler {
         if side > 1.0 && side.is_finite() { (side.log2().round() as u32).min(file.levels - 1) } else { 0 }
     }
 
-    pub fn new(level: Arc<Level>, uv: &UvMap, wrap: Wrap, border_alpha: u8) -> Self {
-        let alpha = if wrap == Wrap::Border { border_alpha } else { 255 };
+    /// `outside_alpha`: the alpha outside a texture that ends at its edges.
+    pub fn new(level: Arc<Level>, uv: &UvMap, wrap: Wrap, outside_alpha: u8) -> Self {
         let map = TexelMap::new(level, wrap, uv);
         let sample_offsets = SAMPLES.map(|(x, y)| map.change(i32::from(x) * SIXTEENTH, i32::from(y) * SIXTEENTH));
-        Self { map, sample_offsets, outside: (u32::from(alpha) * FULL + 127) / 255 }
+        Self { map, sample_offsets, covers_outside: outside_alpha >= 128 }
     }
 
     /// Whether the surface covers a position in 2^-8 px from the map's origin.
@@ -71,7 +71,9 @@ impl AlphaSampler {
     #[inline(always)]
     fn covers_texel(&self, texel: TexelPoint) -> bool {
         let tap = self.map.tap(texel);
-        let around = (tap.outside * self.outside) >> (2 * WEIGHT_BITS - TAP_BITS);
-        (sum_single_tap(tap.texels, 3, tap.weights) + around) * 2 >= FULL << TAP_BITS
+        match tap.is_outside {
+            true => self.covers_outside,
+            false => sum_single_tap(tap.texels, 3, tap.weights) * 2 >= FULL << TAP_BITS,
+        }
     }
 }

@@ -10,6 +10,8 @@ use crate::sample::tap::{BATCH, FULL, TAP_BITS, TAP_POSITION_BITS};
 
 /// Bits that rounding keeps of a Jacobian's largest component.
 const KEPT_BITS: i32 = 11;
+/// As `KEPT_BITS`, where the Jacobian differs from pixel to pixel.
+const ROUGH_BITS: i32 = 6;
 /// Most plans in the cache.
 const MAX_PLANS: usize = 4096;
 
@@ -83,19 +85,25 @@ fn batch(taps: &[[i32; 2]]) -> TapBatch {
 /// Caches plans: the triangles of a wall, and of walls parallel to it, share one. A plan depends on the rounded Jacobian alone, not on earlier calls.
 pub struct TapPlanCache {
     isa: Isa,
+    kept_bits: i32,
     plans: HashMap<([i32; 5], u32), Arc<TapPlan>>,
 }
 
 impl TapPlanCache {
     pub fn new(isa: Isa) -> Self {
-        Self { isa, plans: HashMap::new() }
+        Self { isa, kept_bits: KEPT_BITS, plans: HashMap::new() }
+    }
+
+    /// Rounds Jacobians to a thirty-second of their largest component, for views in perspective: otherwise hardly two pixels would share a plan.
+    pub fn rough(isa: Isa) -> Self {
+        Self { kept_bits: ROUGH_BITS, ..Self::new(isa) }
     }
 
     /// Returns the plan of a surface. `jacobian`: texels of level 0 (right, down) per pixel to the right and per pixel down; `levels` of the texture, ≥ 1.
     pub fn plan(&mut self, jacobian: [[f64; 2]; 2], levels: u32) -> Arc<TapPlan> {
         let isa = self.isa;
         let compute = |jacobian| Arc::new(TapPlan::with_isa(&compute_footprint(jacobian, levels, &Tuning::default()), isa));
-        let Some((rounded, key)) = round_jacobian(jacobian) else { return compute(jacobian) };
+        let Some((rounded, key)) = round_jacobian(jacobian, self.kept_bits) else { return compute(jacobian) };
         if self.plans.len() >= MAX_PLANS {
             self.plans.clear();
         }
@@ -103,14 +111,14 @@ impl TapPlanCache {
     }
 }
 
-/// Rounds to `KEPT_BITS` of the largest component; the key holds these bits and their exponent. `None` for numbers that are zero, not finite or extreme.
-fn round_jacobian(jacobian: [[f64; 2]; 2]) -> Option<([[f64; 2]; 2], [i32; 5])> {
+/// Rounds to some bits of the largest component; the key holds these bits and their exponent. `None` for numbers that are zero, not finite or extreme.
+fn round_jacobian(jacobian: [[f64; 2]; 2], kept_bits: i32) -> Option<([[f64; 2]; 2], [i32; 5])> {
     let all = jacobian.as_flattened();
     let most = all.iter().fold(0.0f64, |m, c| m.max(c.abs()));
     if !(all.iter().all(|c| c.is_finite()) && (1e-30..1e30).contains(&most)) {
         return None;
     }
-    let exponent = ((most.to_bits() >> 52) as i32) - 1022 - KEPT_BITS;
+    let exponent = ((most.to_bits() >> 52) as i32) - 1022 - kept_bits;
     let unit = 2f64.powi(exponent);
     let kept = jacobian.map(|row| row.map(|c| (c / unit).round()));
     let key = [kept[0][0] as i32, kept[0][1] as i32, kept[1][0] as i32, kept[1][1] as i32, exponent];
@@ -124,12 +132,12 @@ mod tests {
     #[test]
     fn a_jacobian_is_rounded_to_a_thousandth_of_its_largest_component() {
         for jacobian in [[[3.7, 0.2], [-0.001, 5.03]], [[1e-9, 2e-9], [0.0, 3e-9]], [[-700.3, 0.0], [4.0, 812.9]]] {
-            let (got, _) = round_jacobian(jacobian).expect("finite");
+            let (got, _) = round_jacobian(jacobian, KEPT_BITS).expect("finite");
             let most = jacobian.as_flattened().iter().fold(0.0f64, |m, c| m.max(c.abs()));
             assert!((0..4).all(|k| (got.as_flattened()[k] - jacobian.as_flattened()[k]).abs() <= most / 1024.0), "{jacobian:?}: {got:?}");
-            assert_eq!(round_jacobian(got).expect("finite").0, got, "rounding twice changes nothing");
+            assert_eq!(round_jacobian(got, KEPT_BITS).expect("finite").0, got, "rounding twice changes nothing");
         }
-        assert!(round_jacobian([[f64::NAN, 0.0], [0.0, 1.0]]).is_none() && round_jacobian([[0.0; 2]; 2]).is_none());
+        assert!(round_jacobian([[f64::NAN, 0.0], [0.0, 1.0]], KEPT_BITS).is_none() && round_jacobian([[0.0; 2]; 2], KEPT_BITS).is_none());
     }
 
     #[test]

@@ -11,7 +11,7 @@ use map3d_image::srgb::LINEAR16;
 use crate::sample::plan::TapPlan;
 #[cfg(target_arch = "x86_64")]
 use crate::sample::tap::Avx2Accumulator;
-use crate::sample::tap::{FULL, ResolvedTaps, ScalarAccumulator, TAP_BITS, TapAccumulator, WEIGHT_BITS};
+use crate::sample::tap::{FULL, ResolvedTaps, ScalarAccumulator, TAP_BITS, TapAccumulator};
 use crate::sample::texel_map::{TexelMap, TexelPoint};
 use crate::sample::uv_map::{POSITION_BITS, UvMap};
 use crate::store::Level;
@@ -19,9 +19,9 @@ use crate::store::Level;
 /// sRGB colours of a textured surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SurfaceColors {
-    /// Multiplies the texture; with `Wrap::None` also shows outside it.
+    /// Multiplies the texture; with `Wrap::None` also shows at coordinates outside [0,1].
     pub diffuse: [u8; 4],
-    /// Shows outside the texture with `Wrap::Border`.
+    /// Shows at coordinates outside [0,1] with `Wrap::Border`.
     pub border: [u8; 4],
 }
 
@@ -150,7 +150,7 @@ impl Sampler {
             for k in 0..batch.count {
                 let tap = self.map.tap(t.offset_by_tap(batch.x[k], batch.y[k]));
                 sum.add(tap.texels, tap.weights);
-                outside += tap.outside;
+                outside += u32::from(tap.is_outside);
             }
             sum.flush();
         }
@@ -178,10 +178,10 @@ impl Sampler {
         out
     }
 
-    /// Divides a sum by its alpha, with the weight that falls outside the texture.
+    /// Divides a sum by its alpha; `outside`: the number of taps outside the texture, which add the colour there.
     #[inline(never)]
     fn blended_color(&self, channels: [u32; 4], outside: u32) -> [u16; 3] {
-        let around = (u64::from(outside) * u64::from(FULL)) >> (2 * WEIGHT_BITS - TAP_BITS);
+        let around = (u64::from(outside) * u64::from(FULL)) << TAP_BITS;
         let total = u64::from(channels[3]) + around;
         if total == 0 {
             return [0; 3];

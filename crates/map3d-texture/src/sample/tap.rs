@@ -2,6 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::store::StripLayout;
+
 /// Bits of a tap's position within a texel.
 pub const WEIGHT_BITS: u32 = 7;
 /// A whole texel in weights.
@@ -61,6 +63,10 @@ pub struct TexelQuad {
     pub lower: [[u8; 4]; 2],
 }
 
+impl TexelQuad {
+    pub const ZERO: Self = Self { upper: [[0; 4]; 2], lower: [[0; 4]; 2] };
+}
+
 /// Texels and weights of a batch of taps.
 #[derive(Clone, Copy)]
 pub struct ResolvedTaps {
@@ -82,8 +88,8 @@ pub trait TapAccumulator: Copy {
     /// Adds the batch to the total; call it after every `BATCH` taps and at the end.
     fn flush(&mut self);
     fn channels(self) -> [u32; 4];
-    /// Finds texels and weights of taps at offsets (right, down) from a centre, in a level that is `width` texels wide.
-    fn resolve(right: &[i32; BATCH], down: &[i32; BATCH], center: [i32; 2], width: i32, out: &mut ResolvedTaps);
+    /// Finds texels and weights of taps at offsets (right, down) from a centre, in a level with a layout.
+    fn resolve(right: &[i32; BATCH], down: &[i32; BATCH], center: [i32; 2], layout: StripLayout, out: &mut ResolvedTaps);
 }
 
 /// Returns the linear light of a texel's byte in 15 bits.
@@ -147,10 +153,10 @@ impl TapAccumulator for ScalarAccumulator {
     }
 
     #[inline(always)]
-    fn resolve(right: &[i32; BATCH], down: &[i32; BATCH], center: [i32; 2], width: i32, out: &mut ResolvedTaps) {
+    fn resolve(right: &[i32; BATCH], down: &[i32; BATCH], center: [i32; 2], layout: StripLayout, out: &mut ResolvedTaps) {
         for k in 0..BATCH {
             let (x, y) = (center[0].wrapping_add(right[k]), center[1].wrapping_add(down[k]));
-            out.texel[k] = (y >> TAP_POSITION_BITS).wrapping_mul(width).wrapping_add(x >> TAP_POSITION_BITS);
+            out.texel[k] = layout.index(x >> TAP_POSITION_BITS, y >> TAP_POSITION_BITS);
             let fraction = |c: i32| (c >> (TAP_POSITION_BITS - WEIGHT_BITS)) as u32 & (WEIGHT_ONE - 1);
             out.weights[k] = bilinear_weights(fraction(x), fraction(y));
         }
@@ -165,6 +171,7 @@ mod avx2 {
     use std::arch::x86_64::*;
 
     use super::{BATCH, BilinearWeights, DROP, ResolvedTaps, TAP_POSITION_BITS, TapAccumulator, TexelQuad, WEIGHT_BITS, WEIGHT_ONE};
+    use crate::store::{STRIP_BITS, STRIP_PITCH, StripLayout};
 
     /// Works in 256-bit registers. SAFETY, for every block here: needs AVX2; only functions of `Sampler` with that target feature name the type, and
     /// they run after a check of the processor. Pointers reach only the locals that are named.
@@ -205,13 +212,15 @@ mod avx2 {
         }
 
         #[inline(always)]
-        fn resolve(right: &[i32; BATCH], down: &[i32; BATCH], center: [i32; 2], width: i32, out: &mut ResolvedTaps) {
+        fn resolve(right: &[i32; BATCH], down: &[i32; BATCH], center: [i32; 2], layout: StripLayout, out: &mut ResolvedTaps) {
             // SAFETY: see the type; loads and stores go through references to arrays of the bytes they touch.
             unsafe {
                 let x = _mm256_add_epi32(_mm256_set1_epi32(center[0]), _mm256_loadu_si256(right.as_ptr().cast()));
                 let y = _mm256_add_epi32(_mm256_set1_epi32(center[1]), _mm256_loadu_si256(down.as_ptr().cast()));
-                let rows = _mm256_mullo_epi32(_mm256_srai_epi32::<{ TAP_POSITION_BITS as i32 }>(y), _mm256_set1_epi32(width));
-                let at = _mm256_add_epi32(rows, _mm256_srai_epi32::<{ TAP_POSITION_BITS as i32 }>(x));
+                let (column, row) = (_mm256_srai_epi32::<{ TAP_POSITION_BITS as i32 }>(x), _mm256_srai_epi32::<{ TAP_POSITION_BITS as i32 }>(y));
+                let in_strip = _mm256_add_epi32(_mm256_mullo_epi32(row, _mm256_set1_epi32(STRIP_PITCH as i32)), column);
+                let strip = _mm256_srai_epi32::<{ STRIP_BITS as i32 }>(column);
+                let at = _mm256_add_epi32(in_strip, _mm256_mullo_epi32(strip, _mm256_set1_epi32(layout.to_next_strip)));
                 _mm256_storeu_si256(out.texel.as_mut_ptr().cast(), at);
                 let (mask, one) = (_mm256_set1_epi32(WEIGHT_ONE as i32 - 1), _mm256_set1_epi32(WEIGHT_ONE as i32));
                 let fx = _mm256_and_si256(_mm256_srli_epi32::<{ (TAP_POSITION_BITS - WEIGHT_BITS) as i32 }>(x), mask);
@@ -288,8 +297,8 @@ mod tests {
                 let (right, down) = (offsets(), offsets());
                 let center = [1 << 28, 1 << 27].map(|c: i32| c + random(&mut state) as i32);
                 let (mut vector, mut scalar) = (ResolvedTaps::NONE, ResolvedTaps::NONE);
-                Avx2Accumulator::resolve(&right, &down, center, 16_384, &mut vector);
-                ScalarAccumulator::resolve(&right, &down, center, 16_384, &mut scalar);
+                Avx2Accumulator::resolve(&right, &down, center, StripLayout::new(16_384), &mut vector);
+                ScalarAccumulator::resolve(&right, &down, center, StripLayout::new(16_384), &mut scalar);
                 assert_eq!((vector.texel, vector.weights), (scalar.texel, scalar.weights));
             }
         }

@@ -9,13 +9,15 @@ use crate::sample::tap::{
     BATCH, BilinearWeights, ResolvedTaps, TAP_POSITION_BITS, TapAccumulator, TexelQuad, WEIGHT_BITS, WEIGHT_ONE, bilinear_weights,
 };
 use crate::sample::uv_map::{POSITION_BITS, UvMap};
-use crate::store::{AlphaCell, Level};
+use crate::store::{AlphaCell, Level, STRIP_PITCH};
 use crate::wrap::wrap_texel;
 
 /// Fraction bits of texel coordinates.
 const TEXEL_BITS: u32 = 32;
 /// From texel coordinates to positions of taps.
 const TAP_SHIFT: u32 = TEXEL_BITS - TAP_POSITION_BITS;
+/// A tap that lies outside the texture by less than this, in 2^-TEXEL_BITS texel, is inside: an eighth of a texel, far more than float32 noise.
+const EDGE_TOLERANCE: i64 = 1 << (TEXEL_BITS - 3);
 
 /// Texel coordinates in 2^-TEXEL_BITS texel, right and down; whole numbers are texel centres. Also the distance between two points.
 #[derive(Clone, Copy)]
@@ -63,12 +65,12 @@ impl Line {
     }
 }
 
-/// A bilinear tap, which may cross the edges of the texture.
+/// A bilinear tap.
 pub(super) struct Tap {
     pub texels: TexelQuad,
     pub weights: BilinearWeights,
-    /// Weight (of 2^14) that falls outside a texture that does not continue beyond its edges.
-    pub outside: u32,
+    /// Whether the tap lies outside a texture that ends at its edges; its texels are zeros then.
+    pub is_outside: bool,
 }
 
 /// Affine texel coordinates over the pixels of one surface, on one level.
@@ -132,7 +134,7 @@ impl TexelMap {
         let (x, y) = (t.x >> TEXEL_BITS, t.y >> TEXEL_BITS);
         let (w, h) = (i64::from(self.level.width), i64::from(self.level.height));
         let is_inside = (x as u64) < (w - 1) as u64 && (y as u64) < (h - 1) as u64;
-        if is_inside { self.level.alpha_cell((y * w + x) as usize) } else { AlphaCell::Mixed }
+        if is_inside { self.level.alpha_cell(x as i32, y as i32) } else { AlphaCell::Mixed }
     }
 
     /// Whether all taps around a point touch only texels that have a right and a lower neighbour.
@@ -149,7 +151,7 @@ impl TexelMap {
     #[inline(always)]
     pub fn resolve<A: TapAccumulator>(&self, batch: &TapBatch, t: TexelPoint, out: &mut ResolvedTaps) {
         let center = [(t.x >> TAP_SHIFT) as i32, (t.y >> TAP_SHIFT) as i32];
-        A::resolve(&batch.x, &batch.y, center, self.level.width as i32, out);
+        A::resolve(&batch.x, &batch.y, center, self.level.layout, out);
         out.count = batch.count;
     }
 
@@ -168,47 +170,49 @@ impl TexelMap {
         let fraction = |t: i64| (t >> (TEXEL_BITS - WEIGHT_BITS)) as u32 & (WEIGHT_ONE - 1);
         let (fx, fy) = (fraction(t.x), fraction(t.y));
         let (x, y) = (t.x >> TEXEL_BITS, t.y >> TEXEL_BITS);
-        let (texels, outside) = match self.is_inside(t, &TapExtent::POINT) {
-            true => (self.quad(y as usize * self.level.width as usize + x as usize), 0),
-            false => self.edge_quad([x, y], [fx, fy]),
+        let (texels, is_outside) = match self.is_inside(t, &TapExtent::POINT) {
+            true => (self.quad(self.level.layout.index(x as i32, y as i32) as usize), false),
+            false if self.is_beyond_edges(t) => (TexelQuad::ZERO, true),
+            false => (self.edge_quad([x, y]), false),
         };
-        Tap { texels, weights: bilinear_weights(fx, fy), outside }
+        Tap { texels, weights: bilinear_weights(fx, fy), is_outside }
     }
 
     /// Returns a texel with its right and lower neighbours.
     #[inline(always)]
     fn quad(&self, texel: usize) -> TexelQuad {
-        let w = self.level.width as usize;
-        let rows = &self.level.texels[texel..][..w + 2];
-        TexelQuad { upper: [rows[0], rows[1]], lower: [rows[w], rows[w + 1]] }
+        let rows = &self.level.texels[texel..][..STRIP_PITCH + 2];
+        TexelQuad { upper: [rows[0], rows[1]], lower: [rows[STRIP_PITCH], rows[STRIP_PITCH + 1]] }
     }
 
-    /// Returns a texel with its right and lower neighbours as the wrap mode continues the texture, and the weight that falls outside.
+    /// Whether the texture ends at its edges and a point lies beyond them.
     #[inline(never)]
-    fn edge_quad(&self, [ix, iy]: [i64; 2], [fx, fy]: [u32; 2]) -> (TexelQuad, u32) {
+    fn is_beyond_edges(&self, t: TexelPoint) -> bool {
+        let is_beyond = |t: i64, n: u32| {
+            let edges = [-(1 << (TEXEL_BITS - 1)), (i64::from(n) << TEXEL_BITS) - (1 << (TEXEL_BITS - 1))];
+            t < edges[0] - EDGE_TOLERANCE || t > edges[1] + EDGE_TOLERANCE
+        };
+        matches!(self.wrap, Wrap::Border | Wrap::None) && (is_beyond(t.x, self.level.width) || is_beyond(t.y, self.level.height))
+    }
+
+    /// Returns a texel with its right and lower neighbours as the wrap mode continues the texture. Beyond the edges of a texture that ends there, its last texels
+    /// repeat, so that a tap within them takes in nothing from outside.
+    #[inline(never)]
+    fn edge_quad(&self, [ix, iy]: [i64; 2]) -> TexelQuad {
         let (w, h) = (self.level.width, self.level.height);
         let columns = [self.wrapped(ix, w), self.wrapped(ix.saturating_add(1), w)];
         let rows = [self.wrapped(iy, h), self.wrapped(iy.saturating_add(1), h)];
-        let mut outside = 0;
-        let mut texel = |column: usize, row: usize| match (columns[column], rows[row]) {
-            (Some(x), Some(y)) => self.level.texels[y as usize * w as usize + x as usize],
-            _ => {
-                outside += (if column == 0 { WEIGHT_ONE - fx } else { fx }) * (if row == 0 { WEIGHT_ONE - fy } else { fy });
-                [0; 4]
-            }
-        };
-        let quad = TexelQuad { upper: [texel(0, 0), texel(1, 0)], lower: [texel(0, 1), texel(1, 1)] };
-        (quad, outside)
+        let texel = |column: usize, row: usize| self.level.texel(columns[column], rows[row]);
+        TexelQuad { upper: [texel(0, 0), texel(1, 0)], lower: [texel(0, 1), texel(1, 1)] }
     }
 
     /// `wrap_texel` without a division for texels near the texture.
-    fn wrapped(&self, i: i64, n: u32) -> Option<u32> {
+    fn wrapped(&self, i: i64, n: u32) -> u32 {
         let size = i64::from(n);
         match self.wrap {
-            Wrap::Wrap if i < 0 && i >= -size => Some((i + size) as u32),
-            Wrap::Wrap if i >= size && i < 2 * size => Some((i - size) as u32),
-            _ if (0..size).contains(&i) => Some(i as u32),
-            wrap => wrap_texel(i, n, wrap),
+            Wrap::Wrap if i < 0 && i >= -size => (i + size) as u32,
+            Wrap::Wrap if i >= size && i < 2 * size => (i - size) as u32,
+            wrap => wrap_texel(i, n, wrap).unwrap_or(i.clamp(0, size - 1) as u32),
         }
     }
 }

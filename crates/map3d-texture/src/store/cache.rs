@@ -25,7 +25,7 @@ pub struct CacheStats {
     pub bytes: u64,
     pub levels: u64,
     pub evicted: u64,
-    /// Decoded source images (levels 0 and 1).
+    /// Decoded source images (level 0).
     pub decoded: u64,
 }
 
@@ -124,37 +124,11 @@ impl TextureCache {
     }
 
     fn compute(&self, texture: &Texture, level: u32) -> Result<Level> {
-        if level < 2 {
-            self.decoded.fetch_add(1, Ordering::Relaxed);
+        if level > 0 {
+            return texture.file.stored_level(level);
         }
-        match level {
-            0 => {
-                let image = texture.file.level_0()?;
-                if self.has_level_1(texture) {
-                    return Ok(Level::from_raster(image));
-                }
-                let (level_0, level_1) = Level::first_two(image);
-                self.insert_level_1(texture, level_1);
-                Ok(level_0)
-            }
-            1 => Ok(Level::first_two(texture.file.level_0()?).1),
-            _ => Ok(Level::from_raster(texture.file.stored_level(level)?)),
-        }
-    }
-
-    /// Whether level 1 is in the cache already, or does not exist.
-    fn has_level_1(&self, texture: &Texture) -> bool {
-        texture.file.levels == 1 || self.slot((texture.key, 1)).get().is_some()
-    }
-
-    /// Keeps the level 1 that was computed together with level 0: most views need both, and this decodes the source only once.
-    fn insert_level_1(&self, texture: &Texture, level_1: Level) {
-        let key = (texture.key, 1);
-        let level_1 = Arc::new(level_1);
-        let bytes = level_1.bytes();
-        if self.slot(key).set(Ok(level_1)).is_ok() {
-            self.add_bytes(key, bytes);
-        }
+        self.decoded.fetch_add(1, Ordering::Relaxed);
+        Ok(Level::of_image(texture.file.level_0()?, texture.file.has_alpha))
     }
 
     /// Counts the bytes of a new level and drops the least recently used ones over the capacity.

@@ -1,4 +1,4 @@
-//! `.m3t` files (spec/scene.md, Texture): the source bytes, the usage mask, and levels ≥ 2.
+//! `.m3t` files (spec/scene.md, Texture): the source bytes, the usage mask, and the levels from 1 on, packed.
 
 use std::fs::{self, File};
 use std::os::unix::fs::FileExt;
@@ -7,25 +7,27 @@ use std::path::{Path, PathBuf};
 use map3d_base::file::{self, HEADER_BYTES, aligned};
 use map3d_base::{Error, Result};
 
+use crate::store::level::Level;
 use crate::store::mips::{first_mip, level_count, level_size, next_mip};
+use crate::store::packed::{pack, unpack};
 use crate::store::source;
 use map3d_image::ImageLimits;
 use map3d_image::PixelMask;
 use map3d_image::Raster;
 
 pub const TEXTURE_MAGIC: &[u8; 4] = b"M3DT";
-pub const TEXTURE_VERSION: u32 = 1;
+pub const TEXTURE_VERSION: u32 = 2;
 const FLAG_ALPHA: u32 = 1;
 const FLAG_MASK: u32 = 2;
-const SECTIONS: usize = 16;
+const SECTIONS: usize = 17;
 const IMAGE_SECTION: usize = 0;
 const ALPHA_SECTION: usize = 1;
 const MASK_SECTION: usize = 2;
 const TABLE_BYTES: usize = SECTIONS * 16;
-/// The section of level 2.
+/// The section of level 1.
 const FIRST_LEVEL_SECTION: usize = 3;
-/// Greatest distance from a used texel, in texels of level 0, at which levels 0 and 1 are sampled: half a pixel of `MAX_TAPS` texels of level 1 to
-/// the side of the triangle and half a footprint beyond it, both along a diagonal.
+/// Greatest distance from a used texel, in texels, at which level 0 is sampled: half a pixel of `MAX_TAPS` texels of level 1 to the side of the
+/// triangle and half a footprint beyond it, both along a diagonal.
 const SAMPLED_REACH: u32 = 64;
 
 /// Binary key of a texture: xxh3-128.
@@ -57,14 +59,18 @@ pub fn encode_texture(path: &Path, image: &[u8], alpha: &[u8], mask: &PixelMask,
     let masked = !mask.is_full();
     let level_0 = source::decode_level_0(path, image, alpha, masked.then_some((mask, u32::MAX)), limits)?;
     let levels = level_count(level_0.width, level_0.height);
+    let (width, height, has_alpha) = (level_0.width, level_0.height, level_0.has_alpha());
     let mut sections = vec![image.to_vec(), alpha.to_vec(), if masked { mask.to_runs() } else { Vec::new() }];
-    let mut mip = first_mip(&level_0);
-    for _ in 2..levels {
-        mip = next_mip(&mip);
-        sections.push(mip.to_raster().pixels.into_flattened());
+    if levels > 1 {
+        let mut mip = first_mip(&level_0);
+        sections.push(pack(&Level::first_mip_of(level_0, has_alpha), has_alpha));
+        for _ in 2..levels {
+            mip = next_mip(&mip);
+            sections.push(pack(&Level::of_image(mip.to_raster(), has_alpha), has_alpha));
+        }
     }
-    let flags = u32::from(level_0.has_alpha()) * FLAG_ALPHA + u32::from(masked) * FLAG_MASK;
-    Ok(assemble([level_0.width, level_0.height, levels, flags], &sections))
+    let flags = u32::from(has_alpha) * FLAG_ALPHA + u32::from(masked) * FLAG_MASK;
+    Ok(assemble([width, height, levels, flags], &sections))
 }
 
 fn assemble(numbers: [u32; 4], sections: &[Vec<u8>]) -> Vec<u8> {
@@ -132,7 +138,7 @@ impl TextureFile {
         }
         let u32_at = |at: usize| u32::from_le_bytes(head[at..at + 4].try_into().expect("4 bytes"));
         let [width, height, levels, flags] = [16, 20, 24, 28].map(u32_at);
-        if width == 0 || height == 0 || levels != level_count(width, height) || levels as usize > SECTIONS - FIRST_LEVEL_SECTION + 2 {
+        if width == 0 || height == 0 || levels != level_count(width, height) || levels as usize > SECTIONS - FIRST_LEVEL_SECTION + 1 {
             return Err(Error::format(path, format!("{width} × {height} px with {levels} levels")));
         }
         let u64_at = |at: usize| u64::from_le_bytes(head[at..at + 8].try_into().expect("8 bytes"));
@@ -149,43 +155,43 @@ impl TextureFile {
                 return Err(Error::format(&self.path, format!("section {k} ends after the file's {length} bytes")));
             }
         }
-        for level in 2..self.levels {
-            let (w, h) = level_size(self.width, self.height, level);
-            let (got, expected) = (self.sections[FIRST_LEVEL_SECTION + level as usize - 2].1, u64::from(w) * u64::from(h) * 4);
-            if got != expected {
-                return Err(Error::format(&self.path, format!("level {level} has {got} bytes, expected {expected}")));
-            }
-        }
         Ok(())
     }
 
-    /// Reads a level ≥ 2.
-    pub fn stored_level(&self, level: u32) -> Result<Raster> {
-        assert!((2..self.levels).contains(&level), "level {level} is not stored");
-        let bytes = self.section(FIRST_LEVEL_SECTION + level as usize - 2)?;
+    /// Reads a level ≥ 1, ready to sample.
+    pub fn stored_level(&self, level: u32) -> Result<Level> {
+        assert!((1..self.levels).contains(&level), "level {level} is not stored");
+        let frame = self.section(FIRST_LEVEL_SECTION + level as usize - 1)?;
         let (w, h) = level_size(self.width, self.height, level);
-        Ok(Raster::new(w, h, bytemuck::cast_slice(&bytes).to_vec()))
+        unpack(&frame, w, h, self.has_alpha).map_err(|what| Error::format(&self.path, format!("level {level}: {what}")))
     }
 
-    /// Decodes level 0 and fills its unused texels as far as levels 0 and 1 are sampled.
+    /// Decodes level 0 and fills its unused texels as far as it is sampled.
     pub fn level_0(&self) -> Result<Raster> {
+        self.decode(SAMPLED_REACH)
+    }
+
+    /// Computes any level as sRGB bytes from the source image.
+    pub fn level(&self, level: u32) -> Result<Raster> {
+        if level >= self.levels {
+            return Err(Error::argument(format!("level {level} of {}: expected 0 to {}", self.path.display(), self.levels - 1)));
+        }
+        if level == 0 {
+            return self.level_0();
+        }
+        let mip = first_mip(&self.decode(u32::MAX)?);
+        Ok((1..level).fold(mip, |mip, _| next_mip(&mip)).to_raster())
+    }
+
+    /// Decodes the source image and fills its unused texels within a distance of the used ones.
+    fn decode(&self, reach: u32) -> Result<Raster> {
         let (image, alpha) = (self.section(IMAGE_SECTION)?, self.section(ALPHA_SECTION)?);
         let mask = if self.masked { Some(self.mask()?) } else { None };
         let limits = ImageLimits::default();
         if source::probe(&self.path, &image, &alpha, &limits)? != (self.width, self.height) {
             return Err(Error::format(&self.path, "its image and its header differ in size"));
         }
-        source::decode_level_0(&self.path, &image, &alpha, mask.as_ref().map(|m| (m, SAMPLED_REACH)), &limits)
-    }
-
-    /// Returns any level as sRGB bytes.
-    pub fn level(&self, level: u32) -> Result<Raster> {
-        match level {
-            l if l >= self.levels => Err(Error::argument(format!("level {l} of {}: expected 0 to {}", self.path.display(), self.levels - 1))),
-            0 => self.level_0(),
-            1 => Ok(first_mip(&self.level_0()?).to_raster()),
-            _ => self.stored_level(level),
-        }
+        source::decode_level_0(&self.path, &image, &alpha, mask.as_ref().map(|m| (m, reach)), &limits)
     }
 
     fn mask(&self) -> Result<PixelMask> {

@@ -3,8 +3,10 @@
 mod build_textures;
 mod cache;
 mod file;
+mod layout;
 mod level;
 mod mips;
+mod packed;
 mod source;
 mod usage;
 
@@ -13,6 +15,7 @@ pub use build_textures::{
 };
 pub use cache::{CacheStats, LocalTextureCache, Texture, TextureCache};
 pub use file::{TEXTURE_MAGIC, TEXTURE_VERSION, TextureFile, TextureKey, encode_texture, hex, texture_key, texture_path, write_texture};
+pub(crate) use layout::{STRIP_BITS, STRIP_PITCH, StripLayout};
 pub use level::{AlphaCell, Level};
 pub use mips::{LinearRaster, first_mip, level_count, level_size, next_mip, premultiplied};
 pub use usage::mark_triangle;
