@@ -1,9 +1,11 @@
 //! Beams: all samples of a sub-tile at once through the BVHs of all parts that it overlaps, front to back.
 
 mod child_boxes;
+mod clip;
 mod edges;
 mod exact;
 mod key_plane;
+mod perspective_plane;
 mod pixels;
 mod rasterizer;
 mod sample_buffer;
@@ -11,7 +13,7 @@ mod traversal;
 mod vertices;
 mod visbuf;
 
-use map3d_base::{Box3, DEPTH_UNITS_PER_M, Error, Frame, Isa, Result};
+use map3d_base::{Box3, DEPTH_UNITS_PER_M, Error, Frame, Isa, ParallelProjection, PerspectiveProjection, Projection, Result};
 use map3d_scene::SceneStore;
 
 use crate::cutout::Cutout;
@@ -19,20 +21,32 @@ use crate::depth_key::least_depth_key;
 use crate::lanes::{Scalar, dispatch};
 use crate::part::LoadedPart;
 use crate::projection::SubtileProjection;
+pub use clip::ViewClip;
+use key_plane::DepthKeyPlane;
+use perspective_plane::PerspectiveKeyPlane;
 pub use pixels::SUBTILE_PX;
 use rasterizer::Rasterizer;
 use sample_buffer::GroupBox;
 pub use sample_buffer::{MIXED, NOTHING};
 use traversal::{BeamEntry, BeamTraversal};
-pub use visbuf::{Pixel, VisBuf};
+pub use visbuf::{CurvedSurface, Pixel, VisBuf};
 
 /// Traces sub-tiles of one view. Keep one per thread to reuse its buffers.
 pub struct BeamTracer<'s> {
     scene: &'s SceneStore,
     result: VisBuf,
     isa: Isa,
+    clip: Option<ViewClip>,
     candidates: Vec<u32>,
     stack: Vec<BeamEntry>,
+    planes: Planes,
+}
+
+/// Depth keys by slot, of the view's projection.
+#[derive(Default)]
+struct Planes {
+    parallel: Vec<DepthKeyPlane>,
+    perspective: Vec<PerspectiveKeyPlane>,
 }
 
 /// A part whose box overlaps the sub-tile.
@@ -54,15 +68,25 @@ impl<'s> BeamTracer<'s> {
     /// Uses another instruction set than the best; the results are the same.
     pub fn with_isa(scene: &'s SceneStore, frame: &Frame, isa: Isa) -> Result<Self> {
         frame.validate()?;
+        Self::of_view(scene, Projection::of_frame(frame), None, isa)
+    }
+
+    /// Returns a tracer of any view. In perspective, `clip` is needed: it cuts what is nearer than the projection's near distance.
+    pub fn of_view(scene: &'s SceneStore, view: Projection, clip: Option<ViewClip>, isa: Isa) -> Result<Self> {
         if !Isa::available().contains(&isa) {
             return Err(Error::argument(format!("this machine does not support the instruction set {isa:?}; use one of {:?}", Isa::available())));
         }
-        Ok(Self { scene, result: VisBuf::new(frame), isa, candidates: Vec::new(), stack: Vec::new() })
+        if clip.is_none() && matches!(view, Projection::Perspective(_)) {
+            return Err(Error::argument("a beam in perspective needs a clip"));
+        }
+        Ok(Self { scene, result: VisBuf::new(view), isa, clip, candidates: Vec::new(), stack: Vec::new(), planes: Planes::default() })
     }
 
-    /// Traces `SUBTILE_PX`² pixels. The top left pixel is (x_px, y_px) at level zmax, counted from the square's top left corner.
+    /// Traces `SUBTILE_PX`² pixels. The top left pixel is (x_px, y_px), counted from the view's top left corner, at level zmax of a frame.
     pub fn trace(&mut self, x_px: u64, y_px: u64, cutout: &dyn Cutout) -> Result<&VisBuf> {
         self.result.restart([x_px, y_px]);
+        self.planes.parallel.clear();
+        self.planes.perspective.clear();
         for hit in self.find_parts() {
             self.trace_part(&hit, cutout)?;
         }
@@ -82,36 +106,88 @@ impl<'s> BeamTracer<'s> {
 
     /// Opens a part's chunk only if it can still win a sample.
     fn trace_part(&mut self, hit: &PartHit, cutout: &dyn Cutout) -> Result<()> {
-        let VisBuf { samples, triangles, parts, frame, axes, corner_px } = &mut self.result;
+        let VisBuf { samples, triangles, parts, view, corner_px } = &mut self.result;
         if !samples.can_win::<Scalar>(hit.least_key, hit.groups) {
             return Ok(());
         }
+        let clip = match &self.clip {
+            None => None,
+            Some(clip) => match clip.for_part(&self.scene.parts()[hit.part as usize].bounds) {
+                None => return Ok(()),
+                Some(clip) => Some(clip).filter(|clip| !clip.is_trivial()),
+            },
+        };
         parts.push(LoadedPart::load(self.scene, hit.part)?);
         let part_index = parts.len() - 1;
-        let projection = SubtileProjection { frame, axes, corner_px: *corner_px };
-        let rasterizer = Rasterizer { samples, triangles, cutout };
-        dispatch(BeamTraversal::new(&parts[part_index], part_index as u32, projection, rasterizer, &mut self.stack), self.isa);
+        let (part, number, clip, stack) = (&parts[part_index], part_index as u32, clip.as_ref(), &mut self.stack);
+        let projection = SubtileProjection { view, corner_px: *corner_px };
+        match view {
+            Projection::Parallel(_) => {
+                let rasterizer = Rasterizer { samples, triangles, planes: &mut self.planes.parallel, cutout };
+                dispatch(BeamTraversal::new(part, number, projection, rasterizer, stack, clip), self.isa);
+            }
+            Projection::Perspective(_) => {
+                let rasterizer = Rasterizer { samples, triangles, planes: &mut self.planes.perspective, cutout };
+                dispatch(BeamTraversal::new(part, number, projection, rasterizer, stack, clip), self.isa);
+            }
+        }
         Ok(())
     }
 }
 
 /// Returns the least depth key and the pixel groups of a local box, or `None` if it does not overlap the sub-tile. Computes in float64.
 fn hit_box(result: &VisBuf, b: &Box3) -> Option<(i32, GroupBox)> {
-    let (frame, axes, corner_px) = (&result.frame, &result.axes, result.corner_px);
-    let pixel_m = frame.pixel_m(frame.zmax);
+    match &result.view {
+        Projection::Parallel(view) => hit_parallel(view, result.corner_px, b),
+        Projection::Perspective(view) => hit_perspective(view, result.corner_px, b),
+    }
+}
+
+fn hit_parallel(view: &ParallelProjection, corner_px: [u64; 2], b: &Box3) -> Option<(i32, GroupBox)> {
+    let (axes, [width, height]) = (&view.axes, view.pixel_m);
     let (center, half) = (b.center(), b.half_extents());
 
     // The box's centre and half extents in the view, widened for snapping and rounding.
     let half_extent = |axis: [f64; 3]| (0..3).map(|k| axis[k].abs() * half[k]).sum::<f64>() * (1.0 + 1e-12) + 1e-6;
     let [u, v, d] = axes.uvd_from_local(center);
-    let (eu, ev, ed) = (half_extent(axes.right) / pixel_m + 1.0 / 64.0, half_extent(axes.up) / pixel_m + 1.0 / 64.0, half_extent(axes.forward));
-    let x = (u - frame.u0_m) / pixel_m - corner_px[0] as f64;
-    let y = (frame.v0_m - v) / pixel_m - corner_px[1] as f64;
+    let (eu, ev, ed) = (half_extent(axes.right) / width + 1.0 / 64.0, half_extent(axes.up) / height + 1.0 / 64.0, half_extent(axes.forward));
+    let x = (u - view.u0_m) / width - corner_px[0] as f64;
+    let y = (view.v0_m - v) / height - corner_px[1] as f64;
 
     // Overlap with the sub-tile.
+    let near = (d - ed - view.d0_m) * DEPTH_UNITS_PER_M - 2.0;
+    hit_pixels([x - eu, x + eu], [y - ev, y + ev], near)
+}
+
+fn hit_perspective(view: &PerspectiveProjection, corner_px: [u64; 2], b: &Box3) -> Option<(i32, GroupBox)> {
+    // Bounds of affine coordinates over the box, widened for rounding.
+    let (center, half) = (b.center(), b.half_extents());
+    let interval = |[a0, a1, a2, constant]: [f64; 4]| {
+        let middle = a0 * center[0] + a1 * center[1] + a2 * center[2] + constant;
+        let reach = (a0.abs() * half[0] + a1.abs() * half[1] + a2.abs() * half[2]) * (1.0 + 1e-12) + 1e-6;
+        [middle - reach, middle + reach]
+    };
+    let [nearest, last] = interval(view.ahead());
+    if last < view.near_m {
+        return None;
+    }
+
+    // Over the visible depths, tangents relative to the sub-tile's centre are least and greatest at one of both ends.
+    let (first, side) = (nearest.max(view.near_m), SUBTILE_PX as f64);
+    let middle = [view.left + (corner_px[0] as f64 + side / 2.0) * view.pixel[0], view.top - (corner_px[1] as f64 + side / 2.0) * view.pixel[1]];
+    let pixels = |[lo, hi]: [f64; 2], pixel: f64| {
+        let (lo, hi) = ((lo / first).min(lo / last), (hi / first).max(hi / last));
+        [side / 2.0 + lo / pixel - 1.0 / 64.0, side / 2.0 + hi / pixel + 1.0 / 64.0]
+    };
+    let x = pixels(interval(view.beside(middle[0])), view.pixel[0]);
+    let [down, up] = pixels(interval(view.above(middle[1])), view.pixel[1]);
+    hit_pixels(x, [side - up, side - down], first * DEPTH_UNITS_PER_M - 2.0)
+}
+
+/// `near`: the least depth in units.
+fn hit_pixels(x: [f64; 2], y: [f64; 2], near: f64) -> Option<(i32, GroupBox)> {
     let side = SUBTILE_PX as f64;
-    let overlaps = x + eu >= 0.0 && x - eu <= side && y + ev >= 0.0 && y - ev <= side;
-    let near = (d - ed - frame.d0_m) * DEPTH_UNITS_PER_M - 2.0;
-    let groups = GroupBox::new([(x - eu) as f32, (y - ev) as f32, (x + eu) as f32, (y + ev) as f32]);
+    let overlaps = x[1] >= 0.0 && x[0] <= side && y[1] >= 0.0 && y[0] <= side;
+    let groups = GroupBox::new([x[0] as f32, y[0] as f32, x[1] as f32, y[1] as f32]);
     overlaps.then(|| (least_depth_key((near as f32).next_down()), groups))
 }

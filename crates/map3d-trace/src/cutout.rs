@@ -3,9 +3,13 @@
 use std::cell::OnceCell;
 
 use map3d_base::samples::SAMPLES;
+use map3d_base::{Projection, Vec3};
 use map3d_scene::MaterialRecord;
 
-use crate::surface::Affine;
+use crate::part::LoadedPart;
+use crate::perspective::PerspectiveMap;
+use crate::projection::SubtileProjection;
+use crate::surface::{Affine, SurfaceAttributes, perspective_map, texture_at};
 
 /// Texture coordinates of a sample on a surface whose material is a cut-out.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,28 +50,58 @@ impl Cutout for IgnoreCutouts {
     }
 }
 
+/// Texture coordinates over the pixels of a sub-tile.
+pub(crate) enum CutoutMap {
+    Affine([Affine; 2]),
+    /// With the texture coordinates of the corners.
+    Perspective(Box<PerspectiveMap>, [[f32; 2]; 3]),
+}
+
+impl CutoutMap {
+    /// `local`: the corners of a triangle of the part.
+    pub fn new(part: &LoadedPart, triangle: u32, projection: &SubtileProjection, local: [Vec3; 3]) -> Self {
+        let Projection::Perspective(view) = projection.view else {
+            return Self::Affine(SurfaceAttributes::new(part, 0, triangle, &projection.project_triangle(local)).uv);
+        };
+        let uv = part.chunk.triangles()[triangle as usize].uv;
+        match perspective_map(view, projection.corner_px, &local) {
+            None => Self::Affine([0, 1].map(|k| Affine { dx: 0.0, dy: 0.0, at0: uv[0][k] })),
+            Some(map) if map.is_nearly_affine(map.center(), map.half_size()) => Self::Affine(texture_at(&map, &uv, map.center())),
+            Some(map) => Self::Perspective(Box::new(map), uv),
+        }
+    }
+}
+
 /// A triangle whose material is a cut-out; prepared when its first sample is tested.
 pub(crate) struct CutoutTriangle<'a> {
     material: &'a MaterialRecord,
-    uv: [Affine; 2],
+    map: CutoutMap,
     mask: OnceCell<Option<Box<dyn CutoutMask>>>,
 }
 
 impl<'a> CutoutTriangle<'a> {
-    pub fn new(material: &'a MaterialRecord, uv: [Affine; 2]) -> Self {
-        Self { material, uv, mask: OnceCell::new() }
+    pub fn new(material: &'a MaterialRecord, map: CutoutMap) -> Self {
+        Self { material, map, mask: OnceCell::new() }
     }
 
     /// Returns the same as `CutoutMask::covered`.
     pub fn covered(&self, cutout: &dyn Cutout, i: usize, j: usize, candidates: u32) -> u32 {
-        match self.mask.get_or_init(|| cutout.prepare(self.material, &self.uv)) {
-            Some(mask) => mask.covered(i, j, candidates),
-            None => self.test_each(cutout, i, j, candidates),
+        match &self.map {
+            CutoutMap::Affine(uv) => match self.mask.get_or_init(|| cutout.prepare(self.material, uv)) {
+                Some(mask) => mask.covered(i, j, candidates),
+                None => self.test_each(cutout, uv, i, j, candidates),
+            },
+            CutoutMap::Perspective(map, corners) => {
+                let uv = texture_at(map, corners, [i as f64 + 0.5, j as f64 + 0.5]);
+                match cutout.prepare(self.material, &uv) {
+                    Some(mask) => mask.covered(i, j, candidates),
+                    None => self.test_each(cutout, &uv, i, j, candidates),
+                }
+            }
         }
     }
 
-    fn test_each(&self, cutout: &dyn Cutout, i: usize, j: usize, candidates: u32) -> u32 {
-        let [u, v] = &self.uv;
+    fn test_each(&self, cutout: &dyn Cutout, [u, v]: &[Affine; 2], i: usize, j: usize, candidates: u32) -> u32 {
         let covers = |k: usize| {
             let (x, y) = (i as f32 + f32::from(SAMPLES[k].0) / 16.0, j as f32 + f32::from(SAMPLES[k].1) / 16.0);
             cutout.covers(self.material, &CutoutSample { uv: [u.at(x, y), v.at(x, y)], footprint: [[u.dx, v.dx], [u.dy, v.dy]] })

@@ -2,29 +2,30 @@
 //! between equal keys.
 
 /// Bias in depth units for each class rank above that of walls and roofs.
-const BIAS_UNITS: f64 = 2.0;
+pub(crate) const BIAS_UNITS: f64 = 2.0;
 /// Class rank of walls, roofs and unclassified surfaces, which have no bias.
-const UNBIASED_RANK: f64 = 3.0;
+pub(crate) const UNBIASED_RANK: f64 = 3.0;
 /// Limit of 1/|n·d|.
-const STEEPNESS_MAX: f64 = 16.0;
+pub(crate) const STEEPNESS_MAX: f64 = 16.0;
 /// The greatest bias of any surface.
 pub(crate) const BIAS_MAX: i64 = (5 - 3) * 2 * 16;
 
-/// Returns `round((rank − 3)·b/max(|n·d|, 1/16))`. |n·d| follows from the depth gradient; `pixel_units` is the number of depth units in a pixel's side.
+/// Returns `round((rank − 3)·b/max(|n·d|, 1/16))`. |n·d| follows from the depth gradient; `pixel_units` are the numbers of depth units in a
+/// pixel's width and height.
 #[inline(always)]
-pub(crate) fn depth_bias(gradient: [f64; 2], rank: u8, pixel_units: f64) -> i64 {
+pub(crate) fn depth_bias(gradient: [f64; 2], rank: u8, pixel_units: [f64; 2]) -> i64 {
     let above = f64::from(rank) - UNBIASED_RANK;
     if above == 0.0 {
         return 0;
     }
-    let slope = [gradient[0] / pixel_units, gradient[1] / pixel_units];
+    let slope = [gradient[0] / pixel_units[0], gradient[1] / pixel_units[1]];
     let steepness = (1.0 + slope[0] * slope[0] + slope[1] * slope[1]).sqrt().min(STEEPNESS_MAX);
     (above * BIAS_UNITS * steepness + 0.5).floor() as i64
 }
 
 /// Returns the bias of a triangle seen edge-on, whose gradient is not finite.
 pub(crate) fn edge_on_bias(rank: u8) -> i64 {
-    depth_bias([f64::INFINITY, 0.0], rank, 1.0)
+    depth_bias([f64::INFINITY, 0.0], rank, [1.0; 2])
 }
 
 /// Returns a lower bound of the 32-bit depth keys of all surfaces at depth units ≥ `near`. 32-bit keys are depth − bias − 2^31.

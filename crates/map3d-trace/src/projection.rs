@@ -1,26 +1,25 @@
 //! From local positions to pixels of level zmax. All vertices are projected here or, eight at a time, in `beam/vertices.rs` by the same operations in the
 //! same order.
 
-use map3d_base::{DEPTH_NOTHING, Frame, Vec3, ViewAxes};
+use map3d_base::{DEPTH_NOTHING, Projection, Vec3};
 
 /// A view, and the sub-tile from whose top left corner pixels are counted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SubtileProjection<'a> {
-    pub frame: &'a Frame,
-    pub axes: &'a ViewAxes,
-    /// Top left pixel of the sub-tile at level zmax.
+    pub view: &'a Projection,
+    /// Top left pixel of the sub-tile.
     pub corner_px: [u64; 2],
 }
 
 impl SubtileProjection<'_> {
-    /// Returns pixels right and down from the sub-tile's corner, and depth units from D0; not snapped.
+    /// Returns pixels right and down from the sub-tile's corner, and depth units; not snapped.
     pub fn project(&self, local: Vec3) -> Vec3 {
-        let [x, y, d] = self.frame.pixel_from_local(self.axes, local);
+        let [x, y, d] = self.view.project(local);
         [x - self.corner_px[0] as f64, y - self.corner_px[1] as f64, d]
     }
 
     pub fn project_triangle(&self, local: [Vec3; 3]) -> ProjectedTriangle {
-        ProjectedTriangle { local, pixel: local.map(|p| self.project(p)), forward: self.axes.forward }
+        ProjectedTriangle { local, pixel: local.map(|p| self.project(p)), forward: self.view.line_of_sight(local[0]) }
     }
 }
 
@@ -31,8 +30,14 @@ pub(crate) struct ProjectedTriangle {
     pub local: [Vec3; 3],
     /// x and y in pixels from the sub-tile's top left corner, depth in units; not snapped.
     pub pixel: [Vec3; 3],
-    /// Unit vector along the lines of sight, local axes.
+    /// Unit vector along a line of sight to the triangle, local axes.
     pub forward: Vec3,
+}
+
+/// Applies a function to the corners of a triangle. (`array::map` is compiled to a loop over memory here.)
+#[inline(always)]
+pub(crate) fn each_corner<T>(p: &[Vec3; 3], f: impl Fn(Vec3) -> T) -> [T; 3] {
+    [f(p[0]), f(p[1]), f(p[2])]
 }
 
 /// The least and the greatest depth of a triangle's corners.

@@ -43,6 +43,16 @@ pub struct Hit {
     pub instance: Option<u32>,
 }
 
+/// Which hits a query for several returns.
+pub struct HitQuery<'a> {
+    /// Most hits.
+    pub count: usize,
+    /// Growth of the ray's width per metre.
+    pub spread: f64,
+    /// Whether a hit of an object at a local position counts.
+    pub accepts: &'a dyn Fn(u32, Vec3) -> bool,
+}
+
 /// Ray queries on a scene. Among the surfaces on a ray the winner is the same as in a beam: the least depth − bias, with depth in units from the ray's
 /// origin. So a ray along a view's axis that starts on the plane D0 finds the surface that the pixel shows.
 pub struct Rays<'s> {
@@ -56,16 +66,25 @@ impl<'s> Rays<'s> {
 
     /// Returns the winner among the surfaces at distances ≥ 0.
     pub fn closest_hit(&self, ray: &Ray, cutout: &dyn Cutout) -> Result<Option<Hit>> {
-        let mut traversal = RayTraversal::new(ray, cutout, f64::INFINITY, false)?;
-        self.traverse_scene(&mut traversal)?;
-        Ok(traversal.best.map(|ranked| ranked.hit))
+        let query = HitQuery { count: 1, spread: 0.0, accepts: &|_, _| true };
+        Ok(self.first_hits(ray, &query, cutout)?.pop())
+    }
+
+    /// Returns the first surfaces at distances ≥ 0, in the order of the visibility rule.
+    pub fn first_hits(&self, ray: &Ray, query: &HitQuery, cutout: &dyn Cutout) -> Result<Vec<Hit>> {
+        let mut traversal = RayTraversal::new(ray, query, cutout, f64::INFINITY, false)?;
+        if query.count > 0 {
+            self.traverse_scene(&mut traversal)?;
+        }
+        Ok(traversal.best.into_iter().map(|ranked| ranked.hit).collect())
     }
 
     /// Returns whether the ray hits a surface at a distance in (0, max_m].
     pub fn any_hit(&self, ray: &Ray, max_m: f64, cutout: &dyn Cutout) -> Result<bool> {
-        let mut traversal = RayTraversal::new(ray, cutout, max_m, true)?;
+        let query = HitQuery { count: 1, spread: 0.0, accepts: &|_, _| true };
+        let mut traversal = RayTraversal::new(ray, &query, cutout, max_m, true)?;
         self.traverse_scene(&mut traversal)?;
-        Ok(traversal.best.is_some())
+        Ok(traversal.is_finished())
     }
 
     /// Traverses the parts that the ray enters, nearest first.
@@ -144,26 +163,33 @@ struct RayEntry {
 
 struct RayTraversal<'a> {
     ray: RayAxes,
+    query: &'a HitQuery<'a>,
     cutout: &'a dyn Cutout,
     limit_m: f64,
     /// The first hit finishes the ray.
     any: bool,
-    best: Option<RankedHit>,
+    /// In order; at most `query.count`.
+    best: Vec<RankedHit>,
 }
 
 impl<'a> RayTraversal<'a> {
-    fn new(ray: &Ray, cutout: &'a dyn Cutout, limit_m: f64, any: bool) -> Result<Self> {
-        Ok(Self { ray: RayAxes::new(ray)?, cutout, limit_m, any, best: None })
+    fn new(ray: &Ray, query: &'a HitQuery<'a>, cutout: &'a dyn Cutout, limit_m: f64, any: bool) -> Result<Self> {
+        Ok(Self { ray: RayAxes::new(ray)?, query, cutout, limit_m, any, best: Vec::new() })
     }
 
     fn is_finished(&self) -> bool {
-        self.any && self.best.is_some()
+        self.any && !self.best.is_empty()
+    }
+
+    /// Returns the last hit if no more can be kept without dropping it.
+    fn last_kept(&self) -> Option<&HitOrder> {
+        self.best.last().map(|ranked| &ranked.order).filter(|_| self.best.len() >= self.query.count)
     }
 
     /// Returns whether a surface at `t` metres or beyond can still win.
     fn can_win(&self, t: f64) -> bool {
         let least_key = (t * DEPTH_UNITS_PER_M).floor() as i64 - BIAS_MAX - 1;
-        t <= self.limit_m && self.best.as_ref().is_none_or(|best| least_key <= best.order.depth_key)
+        t <= self.limit_m && self.last_kept().is_none_or(|last| least_key <= last.depth_key)
     }
 
     fn traverse_part(&mut self, part: &LoadedPart) {
@@ -216,29 +242,36 @@ impl<'a> RayTraversal<'a> {
         // The visibility rule.
         let record = &part.chunk.triangles()[triangle as usize];
         let gradient = depth_gradient(pixel).unwrap_or([f64::INFINITY, 0.0]);
-        let depth_key = (depth + 0.5).floor() as i64 - depth_bias(gradient, record.rank, DEPTH_UNITS_PER_M);
+        let depth_key = (depth + 0.5).floor() as i64 - depth_bias(gradient, record.rank, [DEPTH_UNITS_PER_M; 2]);
         let object_id = part.object_id(record);
         let order = HitOrder { depth_key, tie_break: TieBreak::new(record.rank, object_id, record.source, part.number, triangle) };
-        if self.best.as_ref().is_some_and(|best| best.order <= order) || !self.is_covered(part, triangle, local) {
+        if self.last_kept().is_some_and(|last| *last <= order) {
+            return;
+        }
+        let position = vec3::add(self.ray.origin, scale(self.ray.axes.forward, distance_m));
+        if !(self.query.accepts)(object_id, position) || !self.is_covered(part, triangle, local, distance_m) {
             return;
         }
 
-        let position = vec3::add(self.ray.origin, scale(self.ray.axes.forward, distance_m));
+        // Keep the hit in its place.
         let normal = visible_normal(local, self.ray.axes.forward);
         let (chunk, instance) = (part.chunk.clone(), part.instance.as_ref().map(|i| i.number));
         let hit = Hit { distance_m, position, object_id, rank: record.rank, normal, chunk, triangle, instance };
-        self.best = Some(RankedHit { order, hit });
+        let at = self.best.partition_point(|ranked| ranked.order <= order);
+        self.best.insert(at, RankedHit { order, hit });
+        self.best.truncate(self.query.count);
     }
 
     /// Returns whether the ray hits a triangle where it is not cut out.
-    fn is_covered(&self, part: &LoadedPart, triangle: u32, local: &[Vec3; 3]) -> bool {
+    fn is_covered(&self, part: &LoadedPart, triangle: u32, local: &[Vec3; 3], distance_m: f64) -> bool {
         let material = &part.chunk.materials()[part.chunk.triangles()[triangle as usize].material as usize];
         if !material.is_cutout() {
             return true;
         }
+        let width_m = self.ray.width_m + self.query.spread * distance_m;
         let pixel = local.map(|p| {
             let [x, y, d] = self.ray.project(p);
-            [x / self.ray.width_m, y / self.ray.width_m, d]
+            [x / width_m, y / width_m, d]
         });
         let projected = ProjectedTriangle { local: *local, pixel, forward: self.ray.axes.forward };
         let [u, v] = SurfaceAttributes::new(part, 0, triangle, &projected).uv;

@@ -1,10 +1,12 @@
 //! Shading attributes of a visible triangle, as affine functions of the pixel coordinates of a sub-tile.
 
 use map3d_base::vec3::{normalized, triangle_normal};
-use map3d_base::{Vec3, vec3};
+use map3d_base::{DEPTH_UNITS_PER_M, PerspectiveProjection, Vec3, vec3};
 use map3d_scene::{Chunk, TriangleRecord};
 
+use crate::beam::SUBTILE_PX;
 use crate::part::LoadedPart;
+use crate::perspective::{PerspectiveMap, homogeneous};
 use crate::projection::ProjectedTriangle;
 
 /// `x·dx + y·dy + at0`: x and y in pixels right and down from the sub-tile's top left corner; pixel centres are at +½.
@@ -28,7 +30,8 @@ impl Affine {
     }
 }
 
-/// One triangle of one part with the attributes that shading needs.
+/// One triangle of one part with the attributes that shading needs. In perspective, `uv` and `weights` are near enough only at the centre of the pixels that
+/// the triangle may cover; `CurvedSurface::map` is exact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceAttributes {
     /// Argument of `VisBuf::chunk`.
@@ -58,6 +61,26 @@ impl SurfaceAttributes {
         let record = &part.chunk.triangles()[triangle as usize];
         let gradients = weight_gradients(&projected.pixel);
         let corner = &projected.pixel[0];
+        let uv = [0, 1].map(|k| texture_coordinate(record, k, gradients, corner));
+        Self::with_maps(part, chunk, triangle, projected, uv, gradients.map(|g| Affine::new(g, corner, 0.0)))
+    }
+
+    /// As `new`, in perspective.
+    pub(crate) fn in_perspective(part: &LoadedPart, chunk: u32, triangle: u32, projected: &ProjectedTriangle, map: Option<&PerspectiveMap>) -> Self {
+        let record = &part.chunk.triangles()[triangle as usize];
+        let (uv, weights) = match map {
+            Some(map) => {
+                let weights = map.affine_weights(map.center());
+                (texture_of(&weights, &record.uv), weights)
+            }
+            None => ([0, 1].map(|k| Affine { dx: 0.0, dy: 0.0, at0: record.uv[0][k] }), [Affine::default(); 2]),
+        };
+        Self::with_maps(part, chunk, triangle, projected, uv, weights)
+    }
+
+    #[inline(always)]
+    fn with_maps(part: &LoadedPart, chunk: u32, triangle: u32, projected: &ProjectedTriangle, uv: [Affine; 2], weights: [Affine; 2]) -> Self {
+        let record = &part.chunk.triangles()[triangle as usize];
         let normal = visible_normal(&projected.local, projected.forward);
         Self {
             chunk,
@@ -67,20 +90,45 @@ impl SurfaceAttributes {
             rank: record.rank,
             material: record.material,
             normal: normal.map(|v| v as f32),
-            uv: [0, 1].map(|k| texture_coordinate(record, k, gradients, corner)),
-            weights: gradients.map(|g| Affine::new(g, corner, 0.0)),
+            uv,
+            weights,
             corner_normals: corner_normals(&part.chunk, triangle, part.transform(), normal),
         }
     }
 
     /// Returns the unit normal of the visible side at pixel coordinates (x, y) of the sub-tile: the shading normal if the source has one.
     pub fn normal_at(&self, x: f32, y: f32) -> [f32; 3] {
+        self.normal_of_weights([self.weights[0].at(x, y), self.weights[1].at(x, y)])
+    }
+
+    /// Returns the unit normal at the weights of corners 1 and 2.
+    pub fn normal_of_weights(&self, weights: [f32; 2]) -> [f32; 3] {
         let Some(corners) = self.corner_normals else { return self.normal };
-        let (b, c) = (self.weights[0].at(x, y).clamp(0.0, 1.0), self.weights[1].at(x, y).clamp(0.0, 1.0));
+        let [b, c] = weights.map(|w| w.clamp(0.0, 1.0));
         let a = (1.0 - b - c).max(0.0);
         let interpolated = [0, 1, 2].map(|k| f64::from(a * corners[0][k] + b * corners[1][k] + c * corners[2][k]));
         normalized(interpolated).map_or(self.normal, |n| n.map(|v| v as f32))
     }
+}
+
+/// Returns the map of a triangle with local corners over a sub-tile; `None` for one seen edge-on.
+pub(crate) fn perspective_map(view: &PerspectiveProjection, corner_px: [u64; 2], local: &[Vec3; 3]) -> Option<PerspectiveMap> {
+    PerspectiveMap::new(&local.map(|p| homogeneous(view, corner_px, p)), view.near_m * DEPTH_UNITS_PER_M, SUBTILE_PX as f64)
+}
+
+/// Returns the affine texture coordinates (u right, v up) that equal those of a map at a pixel position, as do their derivatives.
+pub fn texture_at(map: &PerspectiveMap, corners: &[[f32; 2]; 3], position: [f64; 2]) -> [Affine; 2] {
+    texture_of(&map.affine_weights(position), corners)
+}
+
+/// Returns the texture coordinates of the weights of corners 1 and 2.
+#[inline(always)]
+fn texture_of([b, c]: &[Affine; 2], corners: &[[f32; 2]; 3]) -> [Affine; 2] {
+    let coordinate = |k: usize| {
+        let (d1, d2) = (corners[1][k] - corners[0][k], corners[2][k] - corners[0][k]);
+        Affine { dx: d1 * b.dx + d2 * c.dx, dy: d1 * b.dy + d2 * c.dy, at0: corners[0][k] + d1 * b.at0 + d2 * c.at0 }
+    };
+    [coordinate(0), coordinate(1)]
 }
 
 /// Returns the gradients of the weights of corners 1 and 2 over pixels, `[[d1/dx, d1/dy], [d2/dx, d2/dy]]`; zeros for a triangle seen edge-on.

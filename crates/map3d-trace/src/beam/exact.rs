@@ -4,7 +4,7 @@
 use map3d_base::DEPTH_NOTHING;
 
 use super::edges::{TriangleEdges, covered_samples};
-use super::key_plane::KeyBounds;
+use super::key_plane::DepthKeyPlane;
 use super::pixels::{PixelBox, SUBTILE_PX, SnappedCorners, sample_position};
 use super::rasterizer::{Candidate, Rasterizer};
 use super::sample_buffer::FAR;
@@ -50,11 +50,17 @@ fn is_inside(s: &SnappedCorners, point: [i64; 2]) -> bool {
     })
 }
 
-impl Rasterizer<'_> {
+impl Rasterizer<'_, DepthKeyPlane> {
     /// Draws a triangle sample by sample. `edges`: those of a triangle with near corners, for a fast coverage test.
     #[cold]
     #[inline(never)]
-    pub fn draw_exact<L: Lanes>(&mut self, candidate: &Candidate, pixels: &PixelBox, triangle: &ExactTriangle, edges: Option<&TriangleEdges<L>>) {
+    pub fn draw_exact<L: Lanes>(
+        &mut self,
+        candidate: &Candidate<DepthKeyPlane>,
+        pixels: &PixelBox,
+        triangle: &ExactTriangle,
+        edges: Option<&TriangleEdges<L>>,
+    ) {
         for j in pixels.y0..=pixels.y1 {
             for i in pixels.x0..=pixels.x1 {
                 let covered = match edges {
@@ -72,7 +78,7 @@ impl Rasterizer<'_> {
                     keys[k] = triangle.depth_key(sample_position(i, j, k));
                 }
                 let near = keys.into_iter().fold(FAR, i32::min);
-                self.merge(candidate, j as usize * SUBTILE_PX + i as usize, covered, L::load(&keys), KeyBounds { near, far: FAR });
+                self.merge(candidate, j as usize * SUBTILE_PX + i as usize, covered, L::load(&keys), near);
             }
         }
     }

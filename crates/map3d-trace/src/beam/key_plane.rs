@@ -1,5 +1,6 @@
-//! The depth keys of a triangle as a fixed-point plane over the pixels of a sub-tile.
+//! The depth keys of a triangle over the pixels of a sub-tile: a trait for both projections, and the fixed-point plane of parallel ones.
 
+use super::edges::COLUMNS;
 use super::pixels::{PixelBox, SAMPLE_X, SAMPLE_Y};
 use crate::depth_key::depth_bias;
 use crate::lanes::Lanes;
@@ -18,7 +19,7 @@ pub(crate) struct DepthKeyPlane {
     /// From the pixel's centre to each sample.
     offsets: [i32; 16],
     z0: i32,
-    pub gx: i32,
+    gx: i32,
     gy: i32,
     x0: i32,
     y0: i32,
@@ -27,21 +28,40 @@ pub(crate) struct DepthKeyPlane {
     hi: i32,
     base: i32,
     /// Bounds of `offsets`.
-    pub offset_lo: i32,
-    pub offset_hi: i32,
+    offset_lo: i32,
+    offset_hi: i32,
 }
 
-/// Bounds of the depth keys of a pixel's samples.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct KeyBounds {
-    pub near: i32,
-    pub far: i32,
+/// The depth keys of one surface over pixels. `Values` are numbers of 16 pixels or samples from which the keys follow.
+pub(crate) trait KeyPlane: Copy + Default {
+    type Values<L: Lanes>: Copy;
+
+    /// Returns the change of the values from the first pixel of a span to each of its pixels.
+    fn along<L: Lanes>(&self) -> Self::Values<L>;
+
+    /// Returns the values at the centres of the 16 pixels from (i, j) on.
+    fn span<L: Lanes>(&self, along: Self::Values<L>, i: i32, j: i32) -> Self::Values<L>;
+
+    /// Returns a lower bound of the keys of each pixel's samples.
+    fn least<L: Lanes>(&self, span: Self::Values<L>) -> L;
+
+    /// Returns an upper bound of the keys of each pixel's samples.
+    fn greatest<L: Lanes>(&self, span: Self::Values<L>) -> L;
+
+    /// Returns the keys of the 16 samples of pixel (i, j).
+    fn sample_keys<L: Lanes>(&self, i: i32, j: i32) -> L;
+
+    /// Returns a lower bound of the keys of pixel (i, j).
+    fn near_key(&self, i: i32, j: i32) -> i32;
+
+    /// Returns an upper bound of the keys of pixel (i, j).
+    fn far_key(&self, i: i32, j: i32) -> i32;
 }
 
 impl DepthKeyPlane {
     /// Returns the fixed-point value at the centre of pixel (i, j).
     #[inline(always)]
-    pub fn center(&self, i: i32, j: i32) -> i32 {
+    fn center(&self, i: i32, j: i32) -> i32 {
         let across = self.gx.wrapping_mul(i - self.x0);
         self.z0.wrapping_add(across).wrapping_add(self.gy.wrapping_mul(j - self.y0))
     }
@@ -55,21 +75,47 @@ impl DepthKeyPlane {
 
     /// Converts fixed-point values to keys.
     #[inline(always)]
-    pub fn keys<L: Lanes>(&self, fixed: L) -> L {
+    fn keys<L: Lanes>(&self, fixed: L) -> L {
         fixed.shift_right(self.shift).max(L::splat(self.lo)).min(L::splat(self.hi)).add(L::splat(self.base))
     }
+}
 
-    /// Returns the keys of the 16 samples of pixel (i, j).
+impl KeyPlane for DepthKeyPlane {
+    type Values<L: Lanes> = L;
+
     #[inline(always)]
-    pub fn sample_keys<L: Lanes>(&self, i: i32, j: i32) -> L {
+    fn along<L: Lanes>(&self) -> L {
+        L::load(&COLUMNS).mul(L::splat(self.gx))
+    }
+
+    #[inline(always)]
+    fn span<L: Lanes>(&self, along: L, i: i32, j: i32) -> L {
+        L::splat(self.center(i, j)).add(along)
+    }
+
+    #[inline(always)]
+    fn least<L: Lanes>(&self, span: L) -> L {
+        self.keys(span.add(L::splat(self.offset_lo)))
+    }
+
+    #[inline(always)]
+    fn greatest<L: Lanes>(&self, span: L) -> L {
+        self.keys(span.add(L::splat(self.offset_hi)))
+    }
+
+    #[inline(always)]
+    fn sample_keys<L: Lanes>(&self, i: i32, j: i32) -> L {
         self.keys(L::splat(self.center(i, j)).add(L::load(&self.offsets)))
     }
 
-    /// Returns bounds of the keys of pixel (i, j).
     #[inline(always)]
-    pub fn key_bounds(&self, i: i32, j: i32) -> KeyBounds {
-        let center = self.center(i, j);
-        KeyBounds { near: self.key(center.wrapping_add(self.offset_lo)), far: self.key(center.wrapping_add(self.offset_hi)) }
+    fn near_key(&self, i: i32, j: i32) -> i32 {
+        self.key(self.center(i, j).wrapping_add(self.offset_lo))
+    }
+
+    #[inline(always)]
+    fn far_key(&self, i: i32, j: i32) -> i32 {
+        self.key(self.center(i, j).wrapping_add(self.offset_hi))
     }
 }
 
@@ -82,9 +128,9 @@ pub(crate) struct TriangleDepth {
 }
 
 impl TriangleDepth {
-    /// `pixel_units`: depth units in a pixel's side. Returns `None` for a triangle seen edge-on.
+    /// `pixel_units`: depth units in a pixel's width and height. Returns `None` for a triangle seen edge-on.
     #[inline(always)]
-    pub fn new(pixel: &[[f64; 3]; 3], rank: u8, pixel_units: f64) -> Option<Self> {
+    pub fn new(pixel: &[[f64; 3]; 3], rank: u8, pixel_units: [f64; 2]) -> Option<Self> {
         let gradient = depth_gradient(pixel)?;
         Some(Self { gradient, range: DepthRange::of(pixel), bias: depth_bias(gradient, rank, pixel_units) })
     }

@@ -2,8 +2,8 @@
 
 use std::cell::Cell;
 
-use super::edges::{COLUMNS, CoarseEdge, TriangleEdges, covered_samples, pixels_outside, pixels_partly_outside};
-use super::key_plane::KeyBounds;
+use super::edges::{CoarseEdge, TriangleEdges, covered_samples, pixels_outside, pixels_partly_outside};
+use super::key_plane::KeyPlane;
 use super::pixels::{PixelBox, SUBTILE_PX};
 use super::sample_buffer::{FAR, MIXED, NOTHING, PIXELS, SPANS_PER_ROW, SampleBuffer, VisibleTriangle};
 use crate::cutout::{Cutout, CutoutTriangle};
@@ -13,9 +13,10 @@ use crate::lanes::Lanes;
 const FEW_PIXELS: i32 = 6;
 
 /// A triangle that competes for samples.
-pub(crate) struct Candidate<'a> {
-    /// `triangle.plane` is valid if `has_plane`.
+pub(crate) struct Candidate<'a, P> {
     pub triangle: VisibleTriangle,
+    /// Valid if `has_plane`.
+    pub plane: P,
     pub has_plane: bool,
     /// `NOTHING` until the triangle wins a sample.
     pub slot: Cell<u32>,
@@ -23,17 +24,19 @@ pub(crate) struct Candidate<'a> {
     pub cutout: Option<CutoutTriangle<'a>>,
 }
 
-pub(crate) struct Rasterizer<'a> {
+pub(crate) struct Rasterizer<'a, P> {
     pub samples: &'a mut SampleBuffer,
     /// By slot.
     pub triangles: &'a mut Vec<VisibleTriangle>,
+    /// By slot. A plane is valid if its triangle can cover whole pixels.
+    pub planes: &'a mut Vec<P>,
     pub cutout: &'a dyn Cutout,
 }
 
-impl Rasterizer<'_> {
+impl<P: KeyPlane> Rasterizer<'_, P> {
     /// Draws a triangle with a depth key plane.
     #[inline(always)]
-    pub fn draw<L: Lanes>(&mut self, candidate: &Candidate, pixels: &PixelBox, edges: &TriangleEdges<L>) {
+    pub fn draw<L: Lanes>(&mut self, candidate: &Candidate<P>, pixels: &PixelBox, edges: &TriangleEdges<L>) {
         if pixels.width() * pixels.height() > FEW_PIXELS {
             return self.draw_spans(candidate, pixels, edges);
         }
@@ -46,10 +49,10 @@ impl Rasterizer<'_> {
 
     /// Draws rows in spans of 16 pixels. Whole pixels in front of the buffer's content are set at once.
     #[inline(always)]
-    fn draw_spans<L: Lanes>(&mut self, candidate: &Candidate, pixels: &PixelBox, edges: &TriangleEdges<L>) {
+    fn draw_spans<L: Lanes>(&mut self, candidate: &Candidate<P>, pixels: &PixelBox, edges: &TriangleEdges<L>) {
         let coarse = [CoarseEdge::new(&edges[0]), CoarseEdge::new(&edges[1]), CoarseEdge::new(&edges[2])];
-        let plane = &candidate.triangle.plane;
-        let along = L::load(&COLUMNS).mul(L::splat(plane.gx));
+        let plane = &candidate.plane;
+        let along = plane.along::<L>();
         let allow_whole = if candidate.cutout.is_some() { 0 } else { 0xFFFF };
         for j in pixels.y0..pixels.y1 + 1 {
             for column in pixels.x0 >> 4..(pixels.x1 >> 4) + 1 {
@@ -62,8 +65,8 @@ impl Rasterizer<'_> {
                 }
 
                 // Skip pixels where the triangle is hidden.
-                let fixed = L::splat(plane.center(i, j)).add(along);
-                let lo = plane.keys(fixed.add(L::splat(plane.offset_lo)));
+                let values = plane.span::<L>(along, i, j);
+                let lo = plane.least::<L>(values);
                 let span = (j as usize * SPANS_PER_ROW + column as usize) & (SUBTILE_PX * SPANS_PER_ROW - 1);
                 open &= !L::load(&self.samples.far[span]).less(lo);
                 if open == 0 {
@@ -71,7 +74,7 @@ impl Rasterizer<'_> {
                 }
 
                 // Set the pixels that the triangle covers wholly and in front of all samples.
-                let hi = plane.keys(fixed.add(L::splat(plane.offset_hi)));
+                let hi = plane.greatest::<L>(values);
                 let partly = pixels_partly_outside(&coarse, i, j);
                 let whole = !partly & hi.less(L::load(&self.samples.near[span])) & open & allow_whole;
                 if whole != 0 {
@@ -91,7 +94,7 @@ impl Rasterizer<'_> {
 
     /// Sets whole pixels of a span; `lo` and `hi` bound their depth keys.
     #[inline(always)]
-    fn set_whole_pixels<L: Lanes>(&mut self, candidate: &Candidate, span: usize, whole: u32, lo: L, hi: L) {
+    fn set_whole_pixels<L: Lanes>(&mut self, candidate: &Candidate<P>, span: usize, whole: u32, lo: L, hi: L) {
         let slot = self.slot_of(candidate);
         put_slots::<L>(slot, whole, &mut self.samples.slot[span]);
         lo.put(whole, &mut self.samples.near[span]);
@@ -101,22 +104,22 @@ impl Rasterizer<'_> {
 
     /// Draws one pixel sample by sample.
     #[inline(always)]
-    fn draw_pixel<L: Lanes>(&mut self, candidate: &Candidate, i: i32, j: i32, edges: &TriangleEdges<L>) {
+    fn draw_pixel<L: Lanes>(&mut self, candidate: &Candidate<P>, i: i32, j: i32, edges: &TriangleEdges<L>) {
         let p = (j as usize * SUBTILE_PX + i as usize) & (PIXELS - 1);
-        let bounds = candidate.triangle.plane.key_bounds(i, j);
-        if bounds.near > self.samples.far_of(p) {
+        let near = candidate.plane.near_key(i, j);
+        if near > self.samples.far_of(p) {
             return;
         }
         let covered = covered_samples(edges, i, j);
         if covered != 0 {
-            let keys = candidate.triangle.plane.sample_keys::<L>(i, j);
-            self.merge(candidate, p, covered, keys, bounds);
+            let keys = candidate.plane.sample_keys::<L>(i, j);
+            self.merge(candidate, p, covered, keys, near);
         }
     }
 
-    /// Merges the covered samples of a triangle into a pixel; `bounds` hold all of `keys`.
+    /// Merges the covered samples of a triangle into a pixel; `near` is a lower bound of `keys`.
     #[inline(always)]
-    pub fn merge<L: Lanes>(&mut self, candidate: &Candidate, p: usize, covered: u32, keys: L, bounds: KeyBounds) {
+    pub fn merge<L: Lanes>(&mut self, candidate: &Candidate<P>, p: usize, covered: u32, keys: L, near: i32) {
         // Find the samples that the triangle wins.
         let old = self.keys_of::<L>(p);
         let mut wins = keys.less(old) & covered;
@@ -135,12 +138,12 @@ impl Rasterizer<'_> {
         let slot = self.slot_of(candidate);
         if wins == 0xFFFF && candidate.has_plane {
             self.samples.slot[p >> 4][p & 15] = slot;
-            self.samples.near[p >> 4][p & 15] = bounds.near;
-            self.samples.far[p >> 4][p & 15] = bounds.far;
+            self.samples.near[p >> 4][p & 15] = near;
+            self.samples.far[p >> 4][p & 15] = candidate.plane.far_key((p % SUBTILE_PX) as i32, (p / SUBTILE_PX) as i32);
         } else {
             self.store_samples(p, wins, keys, old, slot);
-            let near = &mut self.samples.near[p >> 4][p & 15];
-            *near = bounds.near.min(*near);
+            let least = &mut self.samples.near[p >> 4][p & 15];
+            *least = near.min(*least);
             self.samples.mark_stale(p);
         }
         self.samples.mark_dirty(p);
@@ -152,7 +155,7 @@ impl Rasterizer<'_> {
         match self.samples.slot_of(p) {
             NOTHING => L::splat(FAR),
             MIXED => L::load(&self.samples.sample_keys[p]),
-            slot => self.triangles[slot as usize].plane.sample_keys((p % SUBTILE_PX) as i32, (p / SUBTILE_PX) as i32),
+            slot => self.planes[slot as usize].sample_keys::<L>((p % SUBTILE_PX) as i32, (p / SUBTILE_PX) as i32),
         }
     }
 
@@ -171,7 +174,7 @@ impl Rasterizer<'_> {
     /// Returns those of the samples with equal keys that the candidate wins.
     #[cold]
     #[inline(never)]
-    fn break_ties(&self, candidate: &Candidate, p: usize, ties: u32) -> u32 {
+    fn break_ties(&self, candidate: &Candidate<P>, p: usize, ties: u32) -> u32 {
         let slot_of_sample = |k: usize| match self.samples.slot_of(p) {
             MIXED => self.samples.sample_slots[p][k],
             slot => slot,
@@ -182,10 +185,11 @@ impl Rasterizer<'_> {
 
     /// Returns the candidate's slot; its first win creates it.
     #[inline(always)]
-    fn slot_of(&mut self, candidate: &Candidate) -> u32 {
+    fn slot_of(&mut self, candidate: &Candidate<P>) -> u32 {
         if candidate.slot.get() == NOTHING {
             candidate.slot.set(self.triangles.len() as u32);
             self.triangles.push(candidate.triangle);
+            self.planes.push(candidate.plane);
         }
         candidate.slot.get()
     }

@@ -1,7 +1,6 @@
 //! The sample buffer of a sub-tile. A pixel whose 16 samples show one surface holds only that surface's slot and bounds of its depth keys; only pixels on
 //! edges hold 16 keys and 16 slots. As in a hierarchical depth buffer, groups of pixels share a bound of their keys.
 
-use super::key_plane::DepthKeyPlane;
 use super::pixels::SUBTILE_PX;
 use crate::depth_key::TieBreak;
 use crate::lanes::Lanes;
@@ -22,8 +21,6 @@ const GROUPS_PER_ROW: usize = SUBTILE_PX / 8;
 /// A triangle that has won a sample.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct VisibleTriangle {
-    /// Valid if the triangle can cover whole pixels.
-    pub plane: DepthKeyPlane,
     /// Index into `VisBuf::parts`.
     pub part: u32,
     /// Index into `Chunk::triangles`.

@@ -1,7 +1,7 @@
 //! The corners of a leaf's eight triangles in pixels of a sub-tile, all lanes at once; the same operations in the same order as
 //! `SubtileProjection::project`.
 
-use map3d_base::DEPTH_UNITS_PER_M;
+use map3d_base::{DEPTH_UNITS_PER_M, ParallelProjection, PerspectiveProjection, Projection, Vec3};
 use map3d_scene::Leaf;
 
 use super::pixels::{STEPS_PER_PX, SUBTILE_PX, SnappedCorners};
@@ -38,20 +38,43 @@ impl ProjectedLeaf {
 
     #[inline(always)]
     fn project_corner(&mut self, corner: usize, p: &[[f64; 8]; 3], projection: &SubtileProjection) {
-        let frame = projection.frame;
-        let pixel_m = frame.pixel_m(frame.zmax);
-        let (r, u, d) = (projection.axes.right, projection.axes.up, projection.axes.forward);
         let left = [projection.corner_px[0] as f64, projection.corner_px[1] as f64];
-        for k in 0..8 {
-            let x = (r[0] * p[0][k] + r[1] * p[1][k] + r[2] * p[2][k] - frame.u0_m) / pixel_m;
-            let y = (frame.v0_m - (u[0] * p[0][k] + u[1] * p[1][k] + u[2] * p[2][k])) / pixel_m;
-            let depth = d[0] * p[0][k] + d[1] * p[1][k] + d[2] * p[2][k];
-            self.pixel[corner * 3][k] = x - left[0];
-            self.pixel[corner * 3 + 1][k] = y - left[1];
-            self.pixel[corner * 3 + 2][k] = (depth - frame.d0_m) * DEPTH_UNITS_PER_M;
-            self.snapped[corner * 2][k] = snap(x) - left[0] * f64::from(STEPS_PER_PX);
-            self.snapped[corner * 2 + 1][k] = snap(y) - left[1] * f64::from(STEPS_PER_PX);
+        match projection.view {
+            Projection::Parallel(view) => self.project_parallel(corner, p, view, left),
+            Projection::Perspective(view) => self.project_perspective(corner, p, view, left),
         }
+    }
+
+    #[inline(always)]
+    fn project_parallel(&mut self, corner: usize, p: &[[f64; 8]; 3], view: &ParallelProjection, left: [f64; 2]) {
+        let (r, u, d) = (view.axes.right, view.axes.up, view.axes.forward);
+        for k in 0..8 {
+            let x = (r[0] * p[0][k] + r[1] * p[1][k] + r[2] * p[2][k] - view.u0_m) / view.pixel_m[0];
+            let y = (view.v0_m - (u[0] * p[0][k] + u[1] * p[1][k] + u[2] * p[2][k])) / view.pixel_m[1];
+            let depth = d[0] * p[0][k] + d[1] * p[1][k] + d[2] * p[2][k];
+            self.set(corner, k, [x, y, (depth - view.d0_m) * DEPTH_UNITS_PER_M], left);
+        }
+    }
+
+    #[inline(always)]
+    fn project_perspective(&mut self, corner: usize, p: &[[f64; 8]; 3], view: &PerspectiveProjection, left: [f64; 2]) {
+        let (r, u, d, o) = (view.axes.right, view.axes.up, view.axes.forward, view.position);
+        for k in 0..8 {
+            let q = [p[0][k] - o[0], p[1][k] - o[1], p[2][k] - o[2]];
+            let z = d[0] * q[0] + d[1] * q[1] + d[2] * q[2];
+            let x = ((r[0] * q[0] + r[1] * q[1] + r[2] * q[2]) / z - view.left) / view.pixel[0];
+            let y = (view.top - (u[0] * q[0] + u[1] * q[1] + u[2] * q[2]) / z) / view.pixel[1];
+            self.set(corner, k, [x, y, z * DEPTH_UNITS_PER_M], left);
+        }
+    }
+
+    #[inline(always)]
+    fn set(&mut self, corner: usize, k: usize, [x, y, depth]: [f64; 3], left: [f64; 2]) {
+        self.pixel[corner * 3][k] = x - left[0];
+        self.pixel[corner * 3 + 1][k] = y - left[1];
+        self.pixel[corner * 3 + 2][k] = depth;
+        self.snapped[corner * 2][k] = snap(x) - left[0] * f64::from(STEPS_PER_PX);
+        self.snapped[corner * 2 + 1][k] = snap(y) - left[1] * f64::from(STEPS_PER_PX);
     }
 
     /// Returns the corners of one triangle, not snapped.
@@ -70,6 +93,17 @@ impl ProjectedLeaf {
     pub fn snapped_corners(&self, lane: usize) -> SnappedCorners {
         let s = &self.snapped;
         [[s[0][lane] as i64, s[1][lane] as i64], [s[2][lane] as i64, s[3][lane] as i64], [s[4][lane] as i64, s[5][lane] as i64]]
+    }
+
+    /// Returns the mask of the lanes with a corner at less than `near` units; their pixels mean nothing.
+    #[inline(always)]
+    pub fn near_lanes(&self, near: f64) -> u32 {
+        let mut mask = 0;
+        for k in 0..8 {
+            let p = &self.pixel;
+            mask |= u32::from((p[2][k] < near) | (p[5][k] < near) | (p[8][k] < near)) << k;
+        }
+        mask
     }
 
     /// Returns the mask of the lanes whose snapped boxes overlap the sub-tile.
@@ -95,6 +129,15 @@ impl ProjectedLeaf {
 fn least(a: f64, b: f64, c: f64) -> f64 {
     let ab = if b < a { b } else { a };
     if c < ab { c } else { ab }
+}
+
+/// Returns the corners of a triangle in pixels of the sub-tile, as they are and snapped.
+pub(crate) fn project_corners(local: [Vec3; 3], projection: &SubtileProjection) -> ([Vec3; 3], SnappedCorners) {
+    let left = projection.corner_px.map(|v| v as f64);
+    let view = local.map(|p| projection.view.project(p));
+    let pixel = view.map(|[x, y, depth]| [x - left[0], y - left[1], depth]);
+    let step = |px: f64, left: f64| (snap(px) - left * f64::from(STEPS_PER_PX)) as i64;
+    (pixel, view.map(|[x, y, _]| [step(x, left[0]), step(y, left[1])]))
 }
 
 /// Returns the lattice step nearest to a pixel coordinate; halves round up.

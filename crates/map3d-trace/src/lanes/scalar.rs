@@ -97,6 +97,16 @@ impl Lanes for Scalar {
     fn greatest(self) -> i32 {
         self.0.into_iter().fold(i32::MIN, i32::max)
     }
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.zip(other, i32::wrapping_sub)
+    }
+
+    #[inline(always)]
+    fn truncated(values: ScalarFloats<16>) -> Self {
+        Self(values.0.map(|v| v as i32))
+    }
 }
 
 impl FloatLanes for Scalar {
@@ -156,6 +166,11 @@ impl<const N: usize> Floats<N> for ScalarFloats<N> {
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
         self.zip(other, |a, b| a * b)
+    }
+
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        self.zip(other, |a, b| a / b)
     }
 
     #[inline(always)]

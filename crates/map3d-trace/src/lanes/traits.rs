@@ -24,6 +24,10 @@ pub(crate) trait Lanes: Copy + FloatLanes {
     /// Stores the lanes that the mask selects.
     fn put(self, mask: u32, to: &mut [i32; 16]);
     fn greatest(self) -> i32;
+    /// Wraps around.
+    fn sub(self, other: Self) -> Self;
+    /// Rounds towards zero. The values must fit int32.
+    fn truncated(values: Self::Floats16) -> Self;
 }
 
 /// `N` float32 lanes. Bit k of a mask belongs to lane k; comparisons with NaN are false.
@@ -34,6 +38,7 @@ pub(crate) trait Floats<const N: usize>: Copy {
     fn add(self, other: Self) -> Self;
     fn sub(self, other: Self) -> Self;
     fn mul(self, other: Self) -> Self;
+    fn div(self, other: Self) -> Self;
     /// `self` where it is less than `other`, else `other`.
     fn min(self, other: Self) -> Self;
     /// `self` where it is greater than `other`, else `other`.

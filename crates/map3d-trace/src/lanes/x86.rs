@@ -7,6 +7,7 @@
 use std::arch::x86_64::*;
 
 use super::traits::Lanes;
+use super::x86_floats::{F32x16, TwoF32x8};
 
 /// See `lanes::equal_lanes`. All x86-64 processors have SSE2.
 #[inline(always)]
@@ -89,6 +90,16 @@ impl Lanes for Avx512 {
     #[inline(always)]
     fn greatest(self) -> i32 {
         unsafe { _mm512_reduce_max_epi32(self.0) }
+    }
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self(unsafe { _mm512_sub_epi32(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn truncated(values: F32x16) -> Self {
+        Self(unsafe { _mm512_cvttps_epi32(values.0) })
     }
 }
 
@@ -186,5 +197,15 @@ impl Lanes for Avx2 {
         let mut lanes = [0; 16];
         self.store(&mut lanes);
         lanes.into_iter().fold(i32::MIN, i32::max)
+    }
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        unsafe { Self(_mm256_sub_epi32(self.0, other.0), _mm256_sub_epi32(self.1, other.1)) }
+    }
+
+    #[inline(always)]
+    fn truncated(values: TwoF32x8) -> Self {
+        unsafe { Self(_mm256_cvttps_epi32(values.0.0), _mm256_cvttps_epi32(values.1.0)) }
     }
 }

@@ -22,7 +22,7 @@ impl FloatLanes for Avx512 {
 
 /// One 256-bit register.
 #[derive(Clone, Copy)]
-pub(crate) struct F32x8(__m256);
+pub(crate) struct F32x8(pub(super) __m256);
 
 impl Floats<8> for F32x8 {
     #[inline(always)]
@@ -53,6 +53,11 @@ impl Floats<8> for F32x8 {
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
         Self(unsafe { _mm256_mul_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        Self(unsafe { _mm256_div_ps(self.0, other.0) })
     }
 
     #[inline(always)]
@@ -105,7 +110,7 @@ impl Floats<8> for F32x8 {
 
 /// Two 256-bit registers.
 #[derive(Clone, Copy)]
-pub(crate) struct TwoF32x8(F32x8, F32x8);
+pub(crate) struct TwoF32x8(pub(super) F32x8, pub(super) F32x8);
 
 #[inline(always)]
 fn halves(from: &[f32; 16]) -> (&[f32; 8], &[f32; 8]) {
@@ -154,6 +159,11 @@ impl Floats<16> for TwoF32x8 {
     }
 
     #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        Self(self.0.div(other.0), self.1.div(other.1))
+    }
+
+    #[inline(always)]
     fn min(self, other: Self) -> Self {
         Self(self.0.min(other.0), self.1.min(other.1))
     }
@@ -193,7 +203,7 @@ impl Floats<16> for TwoF32x8 {
 
 /// One 512-bit register.
 #[derive(Clone, Copy)]
-pub(crate) struct F32x16(__m512);
+pub(crate) struct F32x16(pub(super) __m512);
 
 impl Floats<16> for F32x16 {
     #[inline(always)]
@@ -224,6 +234,11 @@ impl Floats<16> for F32x16 {
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
         Self(unsafe { _mm512_mul_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        Self(unsafe { _mm512_div_ps(self.0, other.0) })
     }
 
     #[inline(always)]

@@ -187,10 +187,10 @@ pub fn new_folder(name: &str) -> TempFolder {
     TempFolder(path)
 }
 
-/// Writes and builds a scene.
+/// Writes and builds a scene; triangles far from the rest stay in it.
 pub fn rebuild(folder: &TempFolder, soup: &Soup) {
     soup.write(folder);
-    let options = BuildOptions { ground_plane: GroundPlane::Off, merge_faces: false, ..BuildOptions::default() };
+    let options = BuildOptions { ground_plane: GroundPlane::Off, merge_faces: false, keep_outliers: true, ..BuildOptions::default() };
     let request = BuildRequest { assets: vec!["soup".into()], origin: [0.0; 3], options, ground_id: 0, threads: 1, max_memory_bytes: 0 };
     build_scene(&folder.0, &request, &mut |_, _, _| true).expect("build");
 }
