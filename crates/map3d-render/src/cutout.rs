@@ -4,6 +4,7 @@ use std::cell::RefCell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use map3d_base::asset::Wrap;
 use map3d_scene::MaterialRecord;
 use map3d_texture::sample::{AlphaSampler, UvMap};
 use map3d_texture::{Level, Texture, TextureCache, TextureKey};
@@ -57,6 +58,11 @@ impl<'a> TextureCutout<'a> {
     }
 }
 
+/// Returns the alpha of a cut-out outside its texture: with `Wrap::None` there is no surface.
+pub(crate) fn outside_alpha(material: &MaterialRecord) -> u8 {
+    if material.wrap_mode() == Wrap::Border { material.border[3] } else { 0 }
+}
+
 fn uv_map(sample: &CutoutSample) -> UvMap {
     let [right, down] = sample.footprint.map(|d| d.map(f64::from));
     UvMap { u: [f64::from(sample.uv[0]), right[0], down[0]], v: [f64::from(sample.uv[1]), right[1], down[1]] }
@@ -68,7 +74,7 @@ impl Cutout for TextureCutout<'_> {
             return true;
         }
         match self.level(material, sample) {
-            Ok(level) => AlphaSampler::new(level, &uv_map(sample), material.wrap_mode(), material.border[3]).covers(0, 0),
+            Ok(level) => AlphaSampler::new(level, &uv_map(sample), material.wrap_mode(), outside_alpha(material)).covers(0, 0),
             Err(_) => {
                 self.failures.fetch_add(1, Ordering::Relaxed);
                 true
@@ -82,7 +88,7 @@ impl Cutout for TextureCutout<'_> {
         }
         let origin = CutoutSample { uv: [u.at0, v.at0], footprint: [[u.dx, v.dx], [u.dy, v.dy]] };
         let level = self.level(material, &origin).ok()?;
-        Some(Box::new(AlphaMask(AlphaSampler::new(level, &uv_map(&origin), material.wrap_mode(), material.border[3]))))
+        Some(Box::new(AlphaMask(AlphaSampler::new(level, &uv_map(&origin), material.wrap_mode(), outside_alpha(material)))))
     }
 }
 

@@ -32,7 +32,7 @@ pub enum RunContent {
 pub struct Fragment {
     /// Centroid of its samples in 1/256 px from the pixel's corner.
     pub centroid: [u8; 2],
-    /// Number of samples that show it.
+    /// Number of the 16 samples that show it; a multiple where a pixel's colour is the mean of fewer.
     pub samples: u8,
     /// Index into the sub-tile's surfaces.
     pub surface: u32,

@@ -1,4 +1,5 @@
-//! Rendering: the visible surfaces of tiles are shaded to G-buffers, reduced and encoded as blocks (spec/pyramid.md §4–§8, §10).
+//! Rendering: the visible surfaces of tiles are shaded to G-buffers, reduced and encoded as blocks (spec/pyramid.md §4–§8, §10), or to images of any view
+//! (spec/cameras.md).
 
 mod block;
 mod clock;
@@ -10,9 +11,11 @@ mod query;
 mod scene;
 mod shade;
 mod tile;
+mod view;
 
 pub use block::{Block, BlockStats, EncodedTile, reduce_block};
 pub use cutout::TextureCutout;
 pub use query::Pick;
 pub use scene::{RenderScene, SceneStats};
 pub use tile::TileRenderer;
+pub use view::{HitSelection, RayHit, Region, ViewImage, ViewRequest, ViewTimes};

@@ -9,7 +9,7 @@ mod ray_origins;
 mod subtile;
 mod unprojection;
 
-use map3d_base::{DEPTH_NOTHING, DEPTH_UNITS_PER_M, Frame, Isa, LayerKind, LayerSpec, RAY_LIFT_M, Result, Vec3, ViewAxes};
+use map3d_base::{DEPTH_NOTHING, DEPTH_UNITS_PER_M, Isa, LayerKind, LayerSpec, Projection, RAY_LIFT_M, Result, Vec3};
 use map3d_image::GBuffer;
 use map3d_scene::SceneStore;
 use map3d_trace::{AmbientOcclusion, Cutout, DepthPlane, PACKET_SIZE, SceneRegion, VisBuf};
@@ -31,9 +31,9 @@ const SECOND_SURFACE_UNITS: u32 = 64;
 /// Traces the light layers of a view's sub-tiles. Keep one per thread to reuse its buffers.
 pub struct LightTracer<'s> {
     scene: &'s SceneStore,
-    frame: Frame,
-    axes: ViewAxes,
-    /// Side of a pixel of level zmax.
+    layers: Vec<LayerSpec>,
+    view: Projection,
+    /// Side of a pixel, at the depths of the current sub-tile.
     pixel_m: f64,
     isa: Isa,
     ao_directions: Vec<Vec3>,
@@ -44,14 +44,14 @@ pub struct LightTracer<'s> {
 }
 
 impl<'s> LightTracer<'s> {
-    /// Returns `None` if no layer of the frame needs rays.
-    pub fn new(scene: &'s SceneStore, frame: &Frame, isa: Isa) -> Option<Self> {
+    /// Returns `None` if no layer needs rays.
+    pub fn new(scene: &'s SceneStore, layers: &[LayerSpec], view: Projection, isa: Isa) -> Option<Self> {
         let needs_rays = |l: &LayerSpec| is_averaged(l.kind) || matches!(l.kind, LayerKind::Sun16 | LayerKind::Depth2);
-        frame.layers.iter().any(needs_rays).then(|| Self {
+        layers.iter().any(needs_rays).then(|| Self {
             scene,
-            frame: frame.clone(),
-            axes: frame.axes(),
-            pixel_m: frame.pixel_m(frame.zmax),
+            layers: layers.to_vec(),
+            view,
+            pixel_m: view.pixel_m(0.0),
             isa,
             ao_directions: even_directions(AO_DIRECTIONS),
             fragments: FragmentOrigins::default(),
@@ -62,11 +62,15 @@ impl<'s> LightTracer<'s> {
 
     /// Fills the light arrays of a sub-tile that has just been shaded.
     pub fn trace_subtile(&mut self, vis: &VisBuf, shader: &Shader, g: &mut GBuffer, position: SubtilePosition, cutout: &dyn Cutout) -> Result<()> {
-        let layers = std::mem::take(&mut self.frame.layers);
-        let unprojection = Unprojection::new(&self.frame, self.axes, position);
+        let layers = std::mem::take(&mut self.layers);
+        let unprojection = Unprojection::new(&self.view, position);
         let (buffer, surfaces) = (shader.fragments(), shader.surfaces());
-        let done = self.trace_layers(&layers, &ShadedSubtile { vis, shader, buffer, surfaces, position, unprojection, cutout }, g);
-        self.frame.layers = layers;
+        let subtile = ShadedSubtile { vis, shader, buffer, surfaces, position, unprojection, cutout };
+        if let Some(depth) = subtile.first_depth() {
+            self.pixel_m = self.view.pixel_m(depth);
+        }
+        let done = self.trace_layers(&layers, &subtile, g);
+        self.layers = layers;
         done
     }
 
@@ -145,13 +149,13 @@ impl<'s> LightTracer<'s> {
         if origins.is_empty() {
             return Ok(());
         }
-        let forward = self.axes.forward;
+        let forward = self.view.axes().forward;
         let region = SceneRegion::open_ahead(self.scene, origins.center, &origins.bounds, forward)?;
         let mut packets = region.packets_along(forward, self.pixel_m, self.isa)?;
         let near_m = (f64::from(SECOND_SURFACE_UNITS) - 0.5) / DEPTH_UNITS_PER_M;
         for (number, packet) in origins.packets().iter().enumerate().filter(|(_, packet)| !packet.is_empty()) {
             let closest = packets.closest_hits(packet, near_m, subtile.cutout);
-            let plane = |t: &[Vec3; 3]| DepthPlane::of_corners(&self.frame, &self.axes, t, subtile.position.in_view);
+            let plane = |t: &[Vec3; 3]| DepthPlane::of_corners(&self.view, t, subtile.position.in_view);
             let planes: Vec<DepthPlane> = closest.triangles.iter().map(plane).collect();
 
             // Store the depths at the pixels' centres.

@@ -1,16 +1,19 @@
 //! A built scene that is open for rendering: geometry and textures, shared by threads.
 
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
 use map3d_base::{Error, Frame, Result};
 use map3d_scene::{SceneStore, StoreStats};
 use map3d_texture::{CacheStats, TextureCache};
 
 use crate::cutout::TextureCutout;
+use crate::view::ViewTimes;
 
 pub struct RenderScene {
     store: SceneStore,
     textures: TextureCache,
+    view_times: Mutex<ViewTimes>,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -23,7 +26,8 @@ impl RenderScene {
     /// Opens a built scene's folder. A quarter of `cache_bytes` bounds the mapped chunks, the rest the texture levels.
     pub fn open(folder: &Path, cache_bytes: u64) -> Result<Self> {
         let store = SceneStore::open(folder, cache_bytes / 4)?;
-        Ok(Self { store, textures: TextureCache::new(folder.join("textures"), cache_bytes - cache_bytes / 4) })
+        let textures = TextureCache::new(folder.join("textures"), cache_bytes - cache_bytes / 4);
+        Ok(Self { store, textures, view_times: Mutex::default() })
     }
 
     pub fn store(&self) -> &SceneStore {
@@ -36,6 +40,15 @@ impl RenderScene {
 
     pub fn stats(&self) -> SceneStats {
         SceneStats { chunks: self.store.stats(), textures: self.textures.stats() }
+    }
+
+    /// Returns the time of all views so far.
+    pub fn view_times(&self) -> ViewTimes {
+        *self.view_times.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(crate) fn add_view_times(&self, times: &ViewTimes) {
+        self.view_times.lock().unwrap_or_else(PoisonError::into_inner).add(times);
     }
 
     /// Returns the tiles of a level that may have content, as sorted Morton numbers.

@@ -4,13 +4,14 @@
 use std::ops::Range;
 
 use map3d_base::samples::SAMPLES;
-use map3d_base::{Error, Isa, Result};
+use map3d_base::{Error, Isa, Projection, Result};
 use map3d_image::GBuffer;
+use map3d_scene::MaterialRecord;
 use map3d_texture::TextureCache;
-use map3d_trace::{MIXED, NOTHING, SUBTILE_PX, VisBuf};
+use map3d_trace::{MIXED, NOTHING, SUBTILE_PX, SurfaceAttributes, VisBuf};
 
 use crate::fragments::{Fragment, FragmentBuffer};
-use crate::material::{MaterialCache, PreparedSurface};
+use crate::material::{MaterialCache, PreparedSurface, clamp_at_edges};
 
 /// Shades sub-tiles. Keep one per thread to reuse its buffers.
 pub struct Shader {
@@ -22,10 +23,28 @@ pub struct Shader {
     surfaces: Vec<PreparedSurface>,
     /// Index into `surfaces` of each slot, or `NOT_PREPARED`.
     surface_of_slot: Vec<u32>,
+    /// Those whose mean is a pixel's colour.
+    samples: SampleSet,
     /// Shaded (pixel, surface) pairs.
     pub shades: u64,
     /// Prepared surfaces.
     pub setups: u64,
+}
+
+/// The samples whose mean is a pixel's colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SampleSet {
+    mask: u32,
+    /// Binary logarithm of their number.
+    bits: u32,
+}
+
+impl SampleSet {
+    pub const ALL: Self = Self { mask: 0xFFFF, bits: 4 };
+    /// One in each quarter of the pixel.
+    pub const FOUR: Self = Self { mask: 1 << 6 | 1 << 8 | 1 << 10 | 1 << 14, bits: 2 };
+    /// The pixel's centre.
+    pub const CENTER: Self = Self { mask: 1, bits: 0 };
 }
 
 const NOT_PREPARED: u32 = u32::MAX;
@@ -50,8 +69,22 @@ impl SubtileTarget<'_> {
 impl Shader {
     /// `keeps_fragments`: the caller needs `fragments`.
     pub fn new(isa: Isa, keeps_fragments: bool) -> Self {
+        Self::with_materials(MaterialCache::new(isa), keeps_fragments, SampleSet::ALL)
+    }
+
+    /// Shades sub-tiles of any view.
+    pub fn of_view(isa: Isa, view: &Projection, keeps_fragments: bool, samples: SampleSet) -> Self {
+        let materials = match view {
+            Projection::Parallel(_) => MaterialCache::new(isa),
+            Projection::Perspective(_) => MaterialCache::in_perspective(isa),
+        };
+        Self::with_materials(materials, keeps_fragments, samples)
+    }
+
+    fn with_materials(materials: MaterialCache, keeps_fragments: bool, samples: SampleSet) -> Self {
         Self {
-            materials: MaterialCache::new(isa),
+            samples,
+            materials,
             fragments: FragmentBuffer::default(),
             keeps_fragments,
             surfaces: Vec::new(),
@@ -96,28 +129,32 @@ impl Shader {
         Ok(())
     }
 
-    /// Returns the prepared surface of a slot.
+    /// Returns the index of a slot's prepared surface.
     #[inline(always)]
-    fn surface(&mut self, target: &SubtileTarget, slot: u32) -> Result<&PreparedSurface> {
+    fn surface(&mut self, target: &SubtileTarget, slot: u32) -> Result<usize> {
         let index = match self.surface_of_slot[slot as usize] {
             NOT_PREPARED => self.prepare(target, slot)?,
             index => index,
         };
-        Ok(&self.surfaces[index as usize])
+        Ok(index as usize)
     }
 
     #[inline(never)]
     fn prepare(&mut self, target: &SubtileTarget, slot: u32) -> Result<u32> {
-        let (surface, depth) = target.vis.surface_and_depth(slot);
-        let chunk = target.vis.chunk(surface.chunk);
-        let material = chunk.materials().get(surface.material as usize);
-        let material = material.ok_or_else(|| {
-            let (number, count) = (surface.material, chunk.materials().len());
-            Error::format(chunk.path(), format!("a triangle has material {number}, but the chunk has {count} materials; rebuild the scene"))
-        })?;
-        let index = self.surfaces.len() as u32;
         let needs_color = !target.g.color.is_empty();
-        self.surfaces.push(PreparedSurface::new(&mut self.materials, target.textures, material, &surface, depth, needs_color)?);
+        let (materials, textures) = (&mut self.materials, target.textures);
+        let prepared = match target.vis.view() {
+            Projection::Parallel(_) => {
+                let (surface, depth) = target.vis.surface_and_depth(slot);
+                PreparedSurface::new(materials, textures, &material_of(target.vis, &surface)?, &surface, depth, needs_color)?
+            }
+            Projection::Perspective(_) => {
+                let surface = target.vis.curved_surface(slot);
+                PreparedSurface::curved(materials, textures, &material_of(target.vis, &surface.attributes)?, surface, needs_color)?
+            }
+        };
+        let index = self.surfaces.len() as u32;
+        self.surfaces.push(prepared);
         self.surface_of_slot[slot as usize] = index;
         self.setups += 1;
         Ok(index)
@@ -127,7 +164,8 @@ impl Shader {
     #[inline(always)]
     fn shade_run(&mut self, target: &mut SubtileTarget, slot: u32, columns: Range<usize>, j: usize) -> Result<()> {
         self.shades += columns.len() as u64;
-        let surface = self.surface(target, slot)?;
+        let index = self.surface(target, slot)?;
+        let surface = &self.surfaces[index];
         let i = columns.start;
         let first = target.index(i, j);
         let pixels = first..first + columns.len();
@@ -137,10 +175,10 @@ impl Shader {
             surface.normals(i, j, &mut target.g.normal[pixels.clone()]);
         }
         if !target.g.color.is_empty() {
-            surface.color.row(i, j, &mut target.g.color[pixels.clone()]);
+            surface.color.row(i, j, &mut target.g.color[pixels.clone()], &mut self.materials, target.textures)?;
         }
         if self.keeps_fragments {
-            self.fragments.push_run(j, i, columns.end, self.surface_of_slot[slot as usize]);
+            self.fragments.push_run(j, i, columns.end, index as u32);
         }
         Ok(())
     }
@@ -154,35 +192,38 @@ impl Shader {
         // Shade each surface at the centroid of its samples.
         let mut sum = [0u32; 4];
         let first = self.fragments.fragments.len();
-        let mut rest = !VisBuf::samples_of(slots, NOTHING) & 0xFFFF;
+        let SampleSet { mask, bits } = self.samples;
+        let mut rest = !VisBuf::samples_of(slots, NOTHING) & mask;
         while rest != 0 {
             let slot = slots[rest.trailing_zeros() as usize & 15];
-            let covered = VisBuf::samples_of(slots, slot);
+            let covered = VisBuf::samples_of(slots, slot) & mask;
             rest &= !covered;
             let (x, y) = centroid(covered);
             self.shades += 1;
-            let surface = self.surface(target, slot)?;
-            let color = surface.color.at((i as i32) << 8 | x, (j as i32) << 8 | y);
+            let index = self.surface(target, slot)?;
+            let color = self.surfaces[index].color.at((i as i32) << 8 | x, (j as i32) << 8 | y, &mut self.materials, target.textures)?;
             let weight = covered.count_ones();
             (0..3).for_each(|c| sum[c] += u32::from(color[c]) * weight);
             sum[3] += 65_535 * weight;
             if self.keeps_fragments {
-                let (centroid, surface) = ([x, y].map(|v| v as u8), self.surface_of_slot[slot as usize]);
-                self.fragments.fragments.push(Fragment { centroid, samples: weight as u8, surface, color });
+                let (centroid, surface) = ([x, y].map(|v| v as u8), index as u32);
+                let samples = (weight << (4 - bits)) as u8;
+                self.fragments.fragments.push(Fragment { centroid, samples, surface, color });
             }
         }
         if self.keeps_fragments {
             self.fragments.finish_pixel(j, i, first);
         }
 
-        // Resolve the colour over all 16 samples.
+        // Resolve the colour over all samples.
         if !target.g.color.is_empty() {
-            target.g.color[at] = sum.map(|c| ((c + 8) >> 4) as u16);
+            target.g.color[at] = sum.map(|c| ((c + (1 << bits >> 1)) >> bits) as u16);
         }
 
         // The other arrays show the pixel's centre.
         if slots[0] != NOTHING {
-            let surface = self.surface(target, slots[0])?;
+            let index = self.surface(target, slots[0])?;
+            let surface = &self.surfaces[index];
             target.g.id[at] = surface.id;
             target.g.depth[at] = surface.depth.units(i, j);
             if !target.g.normal.is_empty() {
@@ -206,6 +247,16 @@ impl Shader {
     pub fn surface_of_slot(&self, slot: u32) -> &PreparedSurface {
         &self.surfaces[self.surface_of_slot[slot as usize] as usize]
     }
+}
+
+/// Returns the material of a surface, with the wrap mode of its colours.
+fn material_of(vis: &VisBuf, surface: &SurfaceAttributes) -> Result<MaterialRecord> {
+    let chunk = vis.chunk(surface.chunk);
+    let material = chunk.materials().get(surface.material as usize).ok_or_else(|| {
+        let (number, count) = (surface.material, chunk.materials().len());
+        Error::format(chunk.path(), format!("a triangle has material {number}, but the chunk has {count} materials; rebuild the scene"))
+    })?;
+    Ok(clamp_at_edges(material, &chunk.triangles()[surface.triangle as usize].uv))
 }
 
 /// Sums of the x and y (in 1/16 px) of the samples of a mask of eight, for the first and for the last eight samples: x | y << 16.

@@ -1,6 +1,6 @@
 //! One base tile: sub-tiles traced and shaded into a G-buffer.
 
-use map3d_base::{Error, Frame, Isa, LayerKind, Result};
+use map3d_base::{Error, Frame, Isa, LayerKind, Projection, Result};
 use map3d_image::{Arrays, GBuffer};
 use map3d_trace::{BeamTracer, SUBTILE_PX};
 
@@ -38,7 +38,7 @@ impl<'s> TileRenderer<'s> {
     pub fn with_isa(scene: &'s RenderScene, frame: &Frame, isa: Isa) -> Result<Self> {
         frame.validate()?;
         let output = Arrays::of(&frame.layers);
-        let light = LightTracer::new(scene.store(), frame, isa);
+        let light = LightTracer::new(scene.store(), &frame.layers, Projection::of_frame(frame), isa);
         let has_picture = output.has(LayerKind::Picture);
         Ok(Self {
             scene,

@@ -26,20 +26,16 @@ fn chequer() -> Raster {
     Raster::new(SIDE as u32, SIDE as u32, (0..SIDE * SIDE).map(|k| [90, 140, 60, alpha(k)]).collect())
 }
 
-/// Returns the alpha of texel (x, y) of a level in a wrap mode. Outside of the texture, `Wrap::Border` is transparent and `Wrap::None` opaque.
+/// Returns the alpha of texel (x, y) of a level in a wrap mode. Textures that end at their edges repeat the last texels there.
 fn texel(wrap: u8, level: u32, x: i64, y: i64) -> f64 {
     let side = SIDE >> level;
     let mirrored = |i: i64| if i.rem_euclid(2 * side) < side { i.rem_euclid(side) } else { side - 1 - i.rem_euclid(side) };
     let fold = |i: i64| match wrap {
         0 => i.rem_euclid(side),
         1 => mirrored(i),
-        2 => i.clamp(0, side - 1),
-        _ => i,
+        _ => i.clamp(0, side - 1),
     };
     let (x, y, size) = (fold(x), fold(y), 1i64 << level);
-    if !(0..side).contains(&x) || !(0..side).contains(&y) {
-        return if wrap == 3 { 0.0 } else { 1.0 };
-    }
     let opaque = (0..size * size).filter(|k| !is_hole(x * size + k % size, y * size + k / size)).count();
     opaque as f64 / (size * size) as f64
 }
@@ -52,6 +48,12 @@ fn hole_state(t: &ReferenceTriangle, point: &TexturePoint) -> HoleState {
     let (level, size) = (wanted.round() as u32, side / wanted.round().exp2());
     if level > 3 {
         return HoleState::Uncertain;
+    }
+    // Outside a texture that ends at its edges there is no surface; an eighth of a texel is still inside.
+    let slack = (point.tolerance[0] + point.tolerance[1]) * size + 1.0 / 64.0;
+    let beyond = point.uv.iter().map(|c| (c - 0.5).abs() - 0.5).fold(f64::MIN, f64::max) * size;
+    if t.material.wrap >= 3 && beyond > -slack {
+        return if beyond > 0.125 + slack { HoleState::Hole } else { HoleState::Uncertain };
     }
     let (x, y) = (point.uv[0] * size - 0.5, (1.0 - point.uv[1]) * size - 0.5);
     let (fx, fy) = (x - x.floor(), y - y.floor());

@@ -48,6 +48,17 @@ impl ShadedSubtile<'_> {
         })
     }
 
+    /// Returns the depth in units of the first point.
+    pub fn first_depth(&self) -> Option<f64> {
+        let run = self.buffer.runs.first()?;
+        let surface = match run.content {
+            RunContent::Surface(surface) => surface,
+            RunContent::Fragments { first, .. } => self.buffer.fragments[first as usize].surface,
+        };
+        let [i, j] = run.pixel();
+        Some(self.surfaces[surface as usize].depth.at(i as f64 + 0.5, j as f64 + 0.5))
+    }
+
     /// Calls `visit` for each run of pixels whose centres show one surface: first pixel (i, j), number of pixels, surface.
     pub fn for_each_center_run(&self, mut visit: impl FnMut([usize; 2], usize, &PreparedSurface)) {
         for j in 0..SUBTILE_PX {

@@ -1,6 +1,6 @@
 //! The position of a sub-tile, and the local points of its pixels.
 
-use map3d_base::{DEPTH_UNITS_PER_M, Frame, Vec3, ViewAxes};
+use map3d_base::{DEPTH_UNITS_PER_M, Projection, Vec3};
 use map3d_trace::{DepthPlane, SUBTILE_PX};
 
 /// A sub-tile's first pixel in its tile and in the view.
@@ -24,26 +24,28 @@ pub(super) type PointRow = [[f64; SUBTILE_PX]; 3];
 
 /// Maps pixels of a sub-tile and depths to local points.
 pub(super) struct Unprojection {
-    axes: ViewAxes,
-    origin_m: [f64; 3],
-    pixel_m: f64,
+    view: Projection,
     corner_px: [f64; 2],
 }
 
 impl Unprojection {
-    pub fn new(frame: &Frame, axes: ViewAxes, position: SubtilePosition) -> Self {
-        let corner_px = position.in_view.map(|v| v as f64);
-        Self { axes, origin_m: [frame.u0_m, frame.v0_m, frame.d0_m], pixel_m: frame.pixel_m(frame.zmax), corner_px }
+    pub fn new(view: &Projection, position: SubtilePosition) -> Self {
+        Self { view: *view, corner_px: position.in_view.map(|v| v as f64) }
     }
 
     /// Returns the local point of a surface at (x, y) in pixels from the sub-tile's corner.
     #[inline(always)]
     pub fn point(&self, x: f64, y: f64, depth: &DepthPlane) -> Vec3 {
-        let u = self.origin_m[0] + (self.corner_px[0] + x) * self.pixel_m;
-        let v = self.origin_m[1] - (self.corner_px[1] + y) * self.pixel_m;
-        let d = self.origin_m[2] + depth.at(x, y) / DEPTH_UNITS_PER_M;
-        let (r, up, f) = (&self.axes.right, &self.axes.up, &self.axes.forward);
-        [r[0] * u + up[0] * v + f[0] * d, r[1] * u + up[1] * v + f[1] * d, r[2] * u + up[2] * v + f[2] * d]
+        match (&self.view, depth) {
+            (Projection::Parallel(view), DepthPlane::Parallel(depth)) => {
+                let u = view.u0_m + (self.corner_px[0] + x) * view.pixel_m[0];
+                let v = view.v0_m - (self.corner_px[1] + y) * view.pixel_m[1];
+                let d = view.d0_m + depth.at(x, y) / DEPTH_UNITS_PER_M;
+                let (r, up, f) = (&view.axes.right, &view.axes.up, &view.axes.forward);
+                [r[0] * u + up[0] * v + f[0] * d, r[1] * u + up[1] * v + f[1] * d, r[2] * u + up[2] * v + f[2] * d]
+            }
+            (view, depth) => view.unproject([self.corner_px[0] + x, self.corner_px[1] + y, depth.at(x, y)]),
+        }
     }
 
     /// Writes the local points of a surface at the centres of `count` pixels of a row that starts at (i, j).
