@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use map3d_base::Extent;
 use map3d_base::asset::{self, AssetReport, Materials, Object, Rank};
 use numpy::ndarray::Array3;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
@@ -116,8 +117,8 @@ fn corners(uvs: &PyReadonlyArray3<f32>, n: usize) -> PyResult<Vec<[[f32; 2]; 3]>
     Ok((0..n).map(|t| [0, 1, 2].map(|c| [uv[[t, c, 0]], uv[[t, c, 1]]])).collect())
 }
 
-/// Boxes of objects, and of prototypes by their numbers.
-type Boxes = (Vec<Option<Corners>>, BTreeMap<u32, Corners>);
+/// Boxes of objects, and of prototypes by their numbers; triangles of each object outside the extent.
+type Boxes = (Vec<Option<Corners>>, BTreeMap<u32, Corners>, Vec<u32>);
 
 /// The mesh of an asset folder, mapped; every index is in range.
 #[pyclass(module = "map3d._core", frozen)]
@@ -168,10 +169,13 @@ impl AssetMesh {
         PyArray1::from_slice(py, self.0.prototypes())
     }
 
-    /// Boxes of `count` objects in world coordinates, without placed prototypes, and of each prototype in its own frame; None without geometry.
-    fn boxes(&self, py: Python<'_>, count: usize) -> PyResult<Boxes> {
-        let boxes = py.detach(|| self.0.boxes(count)).map_err(to_python)?;
+    /// Boxes of `count` objects in world coordinates, without placed prototypes, and of each prototype in its own frame; None without geometry. With
+    /// an extent (JSON of `find_clusters`), boxes of what is in it, and for each object the number of triangles that are not.
+    #[pyo3(signature = (count, extent=None))]
+    fn boxes(&self, py: Python<'_>, count: usize, extent: Option<&str>) -> PyResult<Boxes> {
+        let extent: Option<Extent> = extent.map(serde_json::from_str).transpose().map_err(|e| invalid(format!("extent: {e}")))?;
+        let boxes = py.detach(|| self.0.boxes(count, extent.as_ref())).map_err(to_python)?;
         let prototypes = boxes.prototypes.iter().filter_map(|(k, bounds)| corners_of(bounds).map(|c| (*k, c)));
-        Ok((boxes.objects.iter().map(corners_of).collect(), prototypes.collect()))
+        Ok((boxes.objects.iter().map(corners_of).collect(), prototypes.collect(), boxes.outside))
     }
 }

@@ -31,17 +31,18 @@ pub fn dict_of<'py>(py: Python<'py>, g: GBuffer) -> PyResult<Bound<'py, PyDict>>
     Ok(dict)
 }
 
-const SIZES: &str = "a G-buffer's arrays have its size";
+const SIZES: &str = "an image's arrays have its size";
 
-/// Sets an array unless the G-buffer lacks it.
-fn set2<T: numpy::Element>(dict: &Bound<'_, PyDict>, name: &str, size: (usize, usize), array: Vec<T>) -> PyResult<()> {
+/// Sets an array of a size (height, width) unless it is empty.
+pub fn set2<T: numpy::Element>(dict: &Bound<'_, PyDict>, name: &str, size: (usize, usize), array: Vec<T>) -> PyResult<()> {
     if array.is_empty() {
         return Ok(());
     }
     dict.set_item(name, Array2::from_shape_vec(size, array).expect(SIZES).into_pyarray(dict.py()))
 }
 
-fn set3<T: numpy::Element, const N: usize>(dict: &Bound<'_, PyDict>, name: &str, (h, w): (usize, usize), array: Vec<[T; N]>) -> PyResult<()> {
+/// As `set2`, with `N` numbers per pixel.
+pub fn set3<T: numpy::Element, const N: usize>(dict: &Bound<'_, PyDict>, name: &str, (h, w): (usize, usize), array: Vec<[T; N]>) -> PyResult<()> {
     if array.is_empty() {
         return Ok(());
     }
@@ -90,6 +91,30 @@ pub fn encode_layer<'py>(
     }?
     .map_err(to_python)?;
     Ok(PyBytes::new(py, &bytes))
+}
+
+/// Encodes channels of (H, W, C) bytes, in the given order, as an 8-bit PNG, by the method of a kind of layer.
+#[pyfunction]
+pub fn encode_png<'py>(py: Python<'py>, kind: &str, pixels: PyReadonlyArray3<'py, u8>, order: Vec<usize>) -> PyResult<Bound<'py, PyBytes>> {
+    let kind = parse_kind(kind)?;
+    let array = pixels.as_array();
+    let (h, w, channels) = array.dim();
+    if h == 0 || w == 0 || channels == 0 {
+        return Err(invalid(format!("pixels: shape ({h}, {w}, {channels}), expected no empty axis")));
+    }
+    let flat = array.as_standard_layout();
+    let bytes = flat.as_slice().expect("standard layout");
+    let encode = || Encoder::new().channels((w as u32, h as u32), kind, (channels, bytes), &order);
+    Ok(PyBytes::new(py, &py.detach(encode).map_err(to_python)?))
+}
+
+/// Encodes (H, W) as a PNG of one bit per pixel: true is white.
+#[pyfunction]
+pub fn encode_bits<'py>(py: Python<'py>, bits: PyReadonlyArray2<'py, bool>) -> PyResult<Bound<'py, PyBytes>> {
+    let (h, w) = bits.as_array().dim();
+    let flat: Vec<bool> = bits.as_array().iter().copied().collect();
+    let encode = || Encoder::new().bits((w as u32, h as u32), &flat);
+    Ok(PyBytes::new(py, &py.detach(encode).map_err(to_python)?))
 }
 
 /// Decodes an 8-bit PNG into (H, W, C).

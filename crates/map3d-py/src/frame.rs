@@ -40,18 +40,10 @@ fn name_of(value: impl serde::Serialize) -> String {
     serde_json::to_value(value).ok().and_then(|v| v.as_str().map(str::to_owned)).expect("the variants are names")
 }
 
-/// Rounds a number as serde_json reads it, which may be one unit in the last place off. Block keys hash these bits and were made from frames in JSON, so
-/// exact numbers would make every block of some views stale. To be removed when `RENDER_FORMAT` is raised.
-fn as_read_from_json(number: f64) -> f64 {
-    let text = serde_json::to_string(&number).expect("a number");
-    // JSON has no numbers that are not finite; `validate` refuses them.
-    serde_json::from_str(&text).unwrap_or(number)
-}
-
 /// How a layer is made and encoded.
 #[pyclass(module = "map3d._core", frozen, eq)]
 #[derive(PartialEq)]
-pub struct LayerSpec(map3d_base::LayerSpec);
+pub struct LayerSpec(pub map3d_base::LayerSpec);
 
 #[pymethods]
 impl LayerSpec {
@@ -59,8 +51,7 @@ impl LayerSpec {
     #[pyo3(signature = (kind, format, quality=80, small=false, suns=Vec::new(), radius_m=0.0))]
     fn new(kind: &str, format: &str, quality: u8, small: bool, suns: Vec<Vec3>, radius_m: f64) -> PyResult<Self> {
         let (kind, format) = (parse_kind(kind)?, parse_format(format)?);
-        let suns = suns.into_iter().map(|sun| sun.map(as_read_from_json)).collect();
-        Ok(Self(map3d_base::LayerSpec { kind, format, quality, small, suns, radius_m: as_read_from_json(radius_m) }))
+        Ok(Self(map3d_base::LayerSpec { kind, format, quality, small, suns, radius_m }))
     }
 
     #[getter]
@@ -121,7 +112,6 @@ impl Frame {
         layers: Vec<Bound<'_, LayerSpec>>,
     ) -> PyResult<Self> {
         let layers = layers.iter().map(|l| l.get().0.clone()).collect();
-        let [look_at_deg, pitch_deg, u0_m, v0_m, d0_m, size_m] = [look_at_deg, pitch_deg, u0_m, v0_m, d0_m, size_m].map(as_read_from_json);
         let frame = map3d_base::Frame { look_at_deg, pitch_deg, u0_m, v0_m, d0_m, size_m, tile_px, zmax, layers };
         frame.validate().map_err(to_python)?;
         Ok(Self(frame))

@@ -2,15 +2,20 @@
 
 use std::path::PathBuf;
 
-use map3d_render::RenderScene;
-use numpy::{PyArray1, PyReadonlyArray2};
+use map3d_base::Vec3;
+use map3d_render::{HitSelection, RenderScene, ViewRequest};
+use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::block::Block;
 use crate::codec::dict_of;
 use crate::errors::{invalid, to_python};
-use crate::frame::{Corners, Frame, corners_of, tile_at};
+use crate::frame::{Corners, Frame, LayerSpec, corners_of, tile_at};
+use crate::view::{self, Camera, PickedHit};
+
+/// A one-dimensional numpy array.
+type Values<'py> = Bound<'py, PyArray1<f64>>;
 
 /// A built scene, opened for tracing; may be shared between threads.
 #[pyclass(module = "map3d._core", frozen)]
@@ -40,6 +45,15 @@ impl Scene {
     #[getter]
     fn triangle_count(&self) -> u64 {
         self.0.store().triangle_count()
+    }
+
+    /// Returns the area in square metres and the side of a texel in metres, NaN without a texture, of triangles spread evenly over the scene, without
+    /// those of an object; always the same ones.
+    fn sample_surfaces<'py>(&self, py: Python<'py>, except_object: u32) -> PyResult<(Values<'py>, Values<'py>)> {
+        let samples = py.detach(|| self.0.store().sample_surfaces(except_object)).map_err(to_python)?;
+        let areas = samples.iter().map(|s| s.area_m2).collect();
+        let texels = samples.iter().map(|s| s.texel_m.unwrap_or(f64::NAN)).collect();
+        Ok((PyArray1::from_vec(py, areas), PyArray1::from_vec(py, texels)))
     }
 
     /// Returns the tiles of a level that may have content, as sorted Morton numbers. `within`: a level above and (n, 2) columns and rows of its blocks;
@@ -84,6 +98,53 @@ impl Scene {
         dict_of(py, g)
     }
 
+    /// Renders any view of the scene. Returns the arrays of the layers, color, normal, id and depth for none.
+    #[pyo3(signature = (camera, layers, *, samples=16, threads=1, deadline_s=None, r#box=None, objects=None, region=None))]
+    // A view and what is drawn of it, each by its name.
+    #[allow(clippy::too_many_arguments)]
+    fn render_view<'py>(
+        &self,
+        py: Python<'py>,
+        camera: &Bound<'py, Camera>,
+        layers: Vec<Bound<'py, LayerSpec>>,
+        samples: u32,
+        threads: usize,
+        deadline_s: Option<f64>,
+        r#box: Option<(Vec3, Vec3)>,
+        objects: Option<PyReadonlyArray1<u32>>,
+        region: Option<(u32, u32, u32, u32)>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let request = ViewRequest {
+            camera: camera.get().0,
+            layers: layers.iter().map(|l| l.get().0.clone()).collect(),
+            samples,
+            cut: view::box_of(r#box),
+            objects: objects.map(|ids| ids.as_array().to_vec()),
+            region: view::region_of(region),
+            threads,
+            deadline_s,
+        };
+        view::render_view(py, &self.0, &request)
+    }
+
+    /// Returns the first surfaces on the line of sight through (x, y) in pixels: (id, metres, local position, normal) of each.
+    #[pyo3(signature = (camera, x_px, y_px, count=1, *, r#box=None, objects=None))]
+    // A point of a view and what is drawn of it.
+    #[allow(clippy::too_many_arguments)]
+    fn pick_ray(
+        &self,
+        py: Python<'_>,
+        camera: &Bound<'_, Camera>,
+        x_px: f64,
+        y_px: f64,
+        count: usize,
+        r#box: Option<(Vec3, Vec3)>,
+        objects: Option<PyReadonlyArray1<u32>>,
+    ) -> PyResult<Vec<PickedHit>> {
+        let selection = HitSelection { count, cut: view::box_of(r#box), objects: objects.map(|ids| ids.as_array().to_vec()) };
+        view::pick_ray(py, &self.0, camera.get(), [x_px, y_px], &selection)
+    }
+
     /// Returns the local box of an object; None when the scene does not have it.
     fn object_box(&self, py: Python<'_>, id: u32) -> PyResult<Option<Corners>> {
         let bounds = py.detach(|| self.0.store().object_box(id)).map_err(to_python)?;
@@ -107,6 +168,15 @@ impl Scene {
         ];
         let dict = PyDict::new(py);
         rows.into_iter().try_for_each(|(name, value)| dict.set_item(name, value))?;
+        Ok(dict)
+    }
+
+    /// Seconds of the threads' CPU time that all views so far took, by stage.
+    fn view_times<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let t = self.0.view_times();
+        let rows = [("visibility_s", t.visibility_s), ("shade_s", t.shade_s), ("light_s", t.light_s), ("convert_s", t.convert_s)];
+        let dict = PyDict::new(py);
+        rows.into_iter().try_for_each(|(name, seconds)| dict.set_item(name, seconds))?;
         Ok(dict)
     }
 }
