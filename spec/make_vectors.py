@@ -264,6 +264,30 @@ def search_vectors():
     return [{"text": text, "words": words} for text, words in rows.items()]
 
 
+def cameras_vectors():
+    """Rows: a camera, pixel coordinates with a depth, and the local point there."""
+    rows = []
+    for kind, look_at, pitch, position, window in (
+        ("orthographic", 30, 45, (10.0, 20.0, 300.0), (-64.0, 64.0, -48.0, 48.0)),
+        ("orthographic", 200, 0, (-5.0, 1.5, 2.0), (-10.0, 30.0, -5.0, 25.0)),
+        ("perspective", 0, 0, (0.0, -50.0, 1.7), (-1.0, 1.0, -0.75, 0.75)),
+        ("perspective", 300, -60, (3.0, 4.0, -20.0), (-0.25, 0.5, 0.125, 0.875)),
+    ):
+        right, up, forward = axes(look_at, pitch)
+        left, right_edge, bottom, top = window
+        size = (1024, 768)
+        points = []
+        for x, y, depth in ((0.5, 0.5, 10.0), (512.0, 384.0, 250.0), (1000.25, 3.75, 1234.5)):
+            a = left + x * (right_edge - left) / size[0]
+            b = top - y * (top - bottom) / size[1]
+            scale = depth if kind == "perspective" else 1.0
+            local = [position[k] + (a * right[k] + b * up[k]) * scale + forward[k] * depth for k in range(3)]
+            points.append({"pixel": [x, y], "depth": depth, "local": local})
+        camera = {"projection": kind, "position": position, "right": right, "up": up, "forward": forward, "window": window, "size": size}
+        rows.append({"camera": camera, "points": points})
+    return rows
+
+
 def write(name, value):
     text = json.dumps(value, indent=1)
     (HERE / f"{name}.json").write_text(text + "\n")
@@ -282,6 +306,7 @@ def main():
         "blocks": blocks_vectors(),
         "geographic": geographic_vectors(),
         "search": search_vectors(),
+        "cameras": cameras_vectors(),
     }.items():
         write(name, value)
 
