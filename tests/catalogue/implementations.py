@@ -14,7 +14,7 @@ from map3d.catalogue.mongodb_connection import MongoConnection
 from map3d.geometry.frames import pin
 from map3d.types import Layer, ViewAngles
 
-LEASE_S = 0.5
+LEASE_S = 1.0
 BOX = ((0.0, 0.0, 0.0), (100.0, 100.0, 10.0))
 
 
@@ -57,6 +57,22 @@ def lose_answers(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(MongoConnection, "run", run_twice)
     monkeypatch.setattr(mongodb_connection, "_PAUSES_S", (0.0, 0.0))
+
+
+class Kill:
+    """Replaces `MongoConnection.run`: raises KeyboardInterrupt at request `number`, before or after it is executed."""
+
+    def __init__(self, number: int, executed: bool) -> None:
+        self.remaining, self.executed, self.happened = number, executed, False
+
+    def run(self, action: Callable[[bool], object]) -> object:
+        self.remaining -= 1
+        if self.remaining >= 0:
+            return action(False)
+        self.happened = True
+        if self.executed:
+            action(False)
+        raise KeyboardInterrupt
 
 
 def rendering(name: str = "town-a") -> RenderingRecord:

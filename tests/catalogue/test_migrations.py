@@ -45,7 +45,19 @@ CREATE TRIGGER job_moved AFTER UPDATE OF state ON job WHEN old.state <> new.stat
   BEGIN UPDATE job_count SET jobs = jobs - 1 WHERE rendering = old.rendering AND state = old.state;
   INSERT INTO job_count VALUES (new.rendering, new.state, 1) ON CONFLICT DO UPDATE SET jobs = jobs + 1; END;
 """
-SCHEMAS = {2: VERSION_2, 3: VERSION_2 + VERSION_3, 4: VERSION_2 + VERSION_3 + VERSION_4}
+VERSION_5 = "ALTER TABLE job ADD COLUMN leased REAL; ALTER TABLE job ADD COLUMN ended REAL;"
+VERSION_6 = """
+CREATE TABLE operation(number INTEGER PRIMARY KEY AUTOINCREMENT, kind TEXT NOT NULL, target TEXT NOT NULL, scene TEXT NOT NULL,
+  arguments TEXT NOT NULL, state TEXT NOT NULL, stage TEXT NOT NULL DEFAULT '', done INTEGER NOT NULL DEFAULT 0, total INTEGER NOT NULL DEFAULT 0,
+  message TEXT NOT NULL DEFAULT '', asked_by TEXT NOT NULL, created REAL NOT NULL, started REAL, ended REAL,
+  worker TEXT, fence INTEGER NOT NULL DEFAULT 0, expires REAL, expiries INTEGER NOT NULL DEFAULT 0,
+  cancelling INTEGER NOT NULL DEFAULT 0, lines INTEGER NOT NULL DEFAULT 0);
+CREATE INDEX operation_state ON operation(state, number);
+CREATE UNIQUE INDEX operation_running ON operation(scene) WHERE state = 'running';
+CREATE TABLE operation_log(operation INTEGER NOT NULL, number INTEGER NOT NULL, time REAL NOT NULL, text TEXT NOT NULL,
+  PRIMARY KEY(operation, number)) WITHOUT ROWID;
+"""
+SCHEMAS = {2 + n: "".join((VERSION_2, VERSION_3, VERSION_4, VERSION_5, VERSION_6)[: n + 1]) for n in range(5)}
 JOBS = """
 INSERT INTO job(rendering, track, z, x, y, kind, morton, key, parent_z, parent_x, parent_y, state, attempts, fence) VALUES
   ('town-a', '0-45', 3, 0, 0, 'base', 0, 'k', 0, 0, 0, 'todo', 2, 1048578), ('town-a', '0-45', 3, 1, 0, 'base', 1, 'k', 0, 0, 0, 'done', 1, 1048577),

@@ -14,7 +14,7 @@ from map3d.catalogue import Catalogue, JobResult, PlannedJob, SceneRecord, State
 from map3d.catalogue.mongodb_connection import VERSION, MongoConnection
 from map3d.errors import BadRequest, StaleFence, StoreError, UnknownVersion
 from map3d.types import BlockId
-from tests.catalogue.implementations import NewUrl, new_urls, rendering
+from tests.catalogue.implementations import Kill, NewUrl, new_urls, rendering
 from tests.catalogue.mongo_process import MongoProcess, Unavailable, build
 from tests.catalogue.pyramids import RESULT, TRACKS, pyramid, work_off
 
@@ -89,22 +89,6 @@ def prepared(catalogue: Catalogue) -> Catalogue:
 def final_states(catalogue: Catalogue) -> list[tuple[object, ...]]:
     """Leaves out the number of attempts, which a kill during a lease changes."""
     return [(job.track, job.block, job.key, job.state, job.result) for job in catalogue.jobs("town-a")]
-
-
-class Kill:
-    """Replaces `MongoConnection.run`: raises KeyboardInterrupt at request `number`, before or after it is executed."""
-
-    def __init__(self, number: int, executed: bool) -> None:
-        self.remaining, self.executed, self.happened = number, executed, False
-
-    def run(self, action: Callable[[bool], object]) -> object:
-        self.remaining -= 1
-        if self.remaining >= 0:
-            return action(False)
-        self.happened = True
-        if self.executed:
-            action(False)
-        raise KeyboardInterrupt
 
 
 @pytest.fixture

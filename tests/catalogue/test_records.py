@@ -63,6 +63,14 @@ def test_first_caller_pins_the_scene(catalogue: Catalogue) -> None:
     assert (other.crs, other.origin) == (UTM, (1.0, 2.0, 3.0))
 
 
+def test_options_of_a_scene_are_replaced_as_a_whole(catalogue: Catalogue, open_at: Callable[..., Catalogue]) -> None:
+    catalogue.set_scene_options("town", {"keep_outliers": True, "cluster": 2})
+    catalogue.set_scene_options("town", {"cluster": 3})
+    assert open_at().scene("town").options == {"cluster": 3}
+    with pytest.raises(NotFound):
+        catalogue.set_scene_options("twon", {})
+
+
 def test_asset_with_the_same_name_is_replaced(catalogue: Catalogue) -> None:
     for digest in ("old", "new"):
         catalogue.put_asset(AssetRecord("town", "x", "", "obj", digest, ""))

@@ -48,7 +48,7 @@ def cluster(workers: int) -> Iterator[Any]:
     """Its scheduler blames a task at the first worker that it loses."""
     with (
         dask.config.set({"distributed.scheduler.allowed-failures": 0}),
-        distributed.LocalCluster(n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as local,
+        distributed.LocalCluster(n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0") as local,
     ):
         yield local
 

@@ -19,6 +19,7 @@ from map3d.renderings.create import add_layers, add_views
 from map3d.renderings.layers import LayerRequest
 from map3d.renderings.manifest_writer import stored_occupancy, write_manifest
 from map3d.renderings.plan import planned_occupancy
+from map3d.tiles.block_versions import BlockVersions
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.types import BlockId, TileId, ViewAngles
@@ -75,7 +76,7 @@ def test_manifest_describes_a_complete_run(workspace: Workspace, catalogue: Cata
     for view in found.views:
         with SqliteTileStore(workspace.store_path("r", view.frame.id), read_only=True) as store:
             assert view.occupancy == stored_occupancy(store)
-            assert [set(versions.values()) for versions in view.versions] == [{1}]
+            assert [(versions.common, versions.others) for versions in view.versions] == [(1, {})]
 
 
 def from_stores(workspace: Workspace, catalogue: Catalogue) -> bytes:
@@ -86,7 +87,7 @@ def from_stores(workspace: Workspace, catalogue: Catalogue) -> bytes:
         for track in record(catalogue).tracks_of(view.frame):
             with SqliteTileStore(workspace.store_path("r", track.id), read_only=True) as store:
                 occupancy = occupancy if track.number else stored_occupancy(store)
-                versions.append({block.id: block.version for block in store.list_blocks()})
+                versions.append(BlockVersions.of((block.id, block.version) for block in store.list_blocks()))
         views.append(dataclasses.replace(view, occupancy=occupancy, versions=tuple(versions)))
     return dataclasses.replace(manifest(workspace), views=tuple(views)).dump()
 
@@ -142,7 +143,7 @@ def test_unchanged_bytes_keep_their_version(workspace: Workspace, catalogue: Cat
     run_all(workspace, catalogue, SquareScene(CONTENT))
     run_all(workspace, catalogue, SquareScene({**CONTENT, next(iter(CONTENT)): "another thing"}))
     assert manifest(workspace).content_version == 2
-    assert {version for view in manifest(workspace).views for version in view.versions[0].values()} == {1}
+    assert all(view.versions[0] == BlockVersions(1) for view in manifest(workspace).views)
 
 
 def stored(workspace: Workspace) -> dict[tuple[str, int, TileId], bytes | None]:
@@ -169,7 +170,7 @@ def test_added_layers_render_only_their_own_tracks(workspace: Workspace, catalog
     found = manifest(workspace)
     assert [[layer.name for layer in layers] for layers in found.passes] == [["color", "id"], ["normal", "deep"]]
     for view in found.views:
-        assert [set(versions.values()) for versions in view.versions] == [{1}, {2}]
+        assert list(view.versions) == [BlockVersions(1), BlockVersions(2)]
 
 
 def test_added_view_gets_every_pass(workspace: Workspace, catalogue: Catalogue) -> None:

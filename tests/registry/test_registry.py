@@ -108,6 +108,27 @@ def test_a_shard_matches_the_specification(registry: Registry) -> None:
     }
 
 
+def test_shards_name_the_children_of_objects(registry: Registry) -> None:
+    parts = [NewObject(f"part {k}", "building", parent=0) for k in range(3)]
+    town = [
+        NewObject("hall", "building", box=UNIT),
+        *parts,
+        NewObject("dormer", "building", parent=2),
+        *(NewObject(f"n{k}", "tree") for k in range(1500)),
+    ]
+    ids = registry.put_asset("a", town).tolist()
+    # The last part is new: its id is far from its parent's, in another shard.
+    ids = [*registry.put_asset("a", [*town, NewObject("part 3", "building", parent=0)]).tolist()]
+    for shards in (list(registry.shards()), [registry.shard(number) for number in registry.shard_numbers()]):
+        objects = {int(key): entry for document in shards for key, entry in document["objects"].items()}
+        assert {number: entry["children"] for number, entry in objects.items() if "children" in entry} == {
+            ids[0]: [*ids[1:4], ids[-1]],
+            ids[2]: [ids[4]],
+        }
+        assert all(objects[child]["parent"] == number for number, entry in objects.items() for child in entry.get("children", ()))
+    assert ids[0] // 1024 != ids[-1] // 1024
+
+
 def test_the_search_index_is_sorted_by_label_then_id(registry: Registry) -> None:
     objects = [
         NewObject("b", "building", box=UNIT),

@@ -1,7 +1,9 @@
-"""The catalogue: scenes, assets, renderings and jobs (spec/catalogue.md). One contract with one or more implementations."""
+"""The catalogue: scenes, assets, renderings, jobs and operations (spec/catalogue.md). One contract with one or more implementations."""
 
+from map3d.catalogue.account_records import ROLES, Role, TokenRecord, UserRecord
 from map3d.catalogue.contract import HEARTBEAT_S, LEASE_S, Catalogue
 from map3d.catalogue.open_catalogue import open_catalogue
+from map3d.catalogue.operation_records import LogLine, OperationLease, OperationRecord, OperationState
 from map3d.catalogue.records import (
     AssetRecord,
     Job,
@@ -20,18 +22,26 @@ from map3d.catalogue.workspace import Workspace
 __all__ = [
     "HEARTBEAT_S",
     "LEASE_S",
+    "ROLES",
     "AssetRecord",
     "Catalogue",
     "Job",
     "JobResult",
     "Lease",
+    "LogLine",
+    "OperationLease",
+    "OperationRecord",
+    "OperationState",
     "PlanCounts",
     "PlannedJob",
     "RenderingRecord",
+    "Role",
     "SceneCrs",
     "SceneRecord",
     "State",
+    "TokenRecord",
     "Track",
+    "UserRecord",
     "Workspace",
     "open_catalogue",
 ]

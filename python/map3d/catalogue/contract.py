@@ -1,8 +1,10 @@
-"""The contract of catalogues: scenes, assets, renderings, jobs (spec/catalogue.md). tests/catalogue checks every implementation."""
+"""The contract of catalogues: scenes, assets, renderings, jobs, operations (spec/catalogue.md). tests/catalogue checks every implementation."""
 
-from collections.abc import Iterable, Iterator, Sequence
-from typing import Protocol
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, Protocol
 
+from map3d.catalogue.account_records import TokenRecord, UserRecord
+from map3d.catalogue.operation_contract import OperationCatalogue
 from map3d.catalogue.records import AssetRecord, Job, JobResult, Lease, PlanCounts, PlannedJob, RenderingRecord, SceneCrs, SceneRecord
 from map3d.catalogue.states import State
 from map3d.geometry.frames import PinnedFrame
@@ -12,7 +14,7 @@ LEASE_S = 60.0
 HEARTBEAT_S = 15.0
 
 
-class Catalogue(Protocol):
+class Catalogue(OperationCatalogue, Protocol):
     """Safe to share between threads and between processes. All times are on the database's clock."""
 
     lease_s: float
@@ -36,6 +38,9 @@ class Catalogue(Protocol):
         coordinate system with a vertical part replaces one without."""
 
     def set_built(self, name: str, digest: str) -> None: ...
+
+    def set_scene_options(self, name: str, options: Mapping[str, Any]) -> None:
+        """Replaces the options of a scene. Raises NotFound."""
 
     def put_asset(self, asset: AssetRecord) -> None:
         """Adds an asset, or replaces the asset with the same name."""
@@ -77,6 +82,35 @@ class Catalogue(Protocol):
     def remove_rendering(self, name: str) -> None:
         """Removes the jobs of a rendering, in batches, and then its record; raises NotFound. After a kill it can be repeated."""
 
+    # -- accounts ---------------------------------------------------------------------------------------------------------------
+
+    def create_user(self, user: UserRecord) -> None:
+        """Raises AlreadyExists."""
+
+    def user(self, name: str) -> UserRecord:
+        """Returns the user. Raises NotFound, naming the existing users."""
+
+    def users(self) -> list[UserRecord]:
+        """Returns all users, ordered by name."""
+
+    def update_user(self, user: UserRecord) -> None:
+        """Replaces password and role of the user with the same name; raises NotFound."""
+
+    def remove_user(self, name: str) -> None:
+        """Removes a user and the user's tokens; raises NotFound."""
+
+    def create_token(self, token: TokenRecord) -> None:
+        """Raises NotFound when the user does not exist, AlreadyExists."""
+
+    def tokens(self, user: str | None = None) -> list[TokenRecord]:
+        """Returns the tokens of a user, or all of them, ordered by id."""
+
+    def find_token(self, digest: str) -> TokenRecord | None:
+        """Returns the token with this digest, None without one."""
+
+    def remove_token(self, id: str) -> None:
+        """Raises NotFound, naming the existing tokens."""
+
     # -- jobs -------------------------------------------------------------------------------------------------------------------
 
     def plan(self, rendering: str, jobs: Iterable[PlannedJob]) -> PlanCounts:
@@ -96,6 +130,14 @@ class Catalogue(Protocol):
         The order is: fewest attempts and expired leases, lowest level, first track; among these the first job with Morton number `start` or greater,
         else the first. A worker passes the number of its last block to stay in the same region.
         """
+
+    def lease_block(self, rendering: str, worker: str, track: str, block: BlockId) -> Lease | None:
+        """Leases the job of this block if it is todo, out of turn, after expiring its overdue lease. Returns None otherwise."""
+
+    def evict(self, rendering: str, worker: str, track: str, block: BlockId) -> Lease | None:
+        """Leases the done job of a base block so that its tiles can be removed; `release` then opens the job. Reduce jobs above that are todo or
+        leased wait for it again; done ones stay, since their tiles do not change. Returns None for any other job, and when all jobs of the rendering
+        are done."""
 
     def heartbeat(self, lease: Lease) -> None:
         """Renews the lease for another `lease_s`; raises StaleFence."""
@@ -130,6 +172,12 @@ class Catalogue(Protocol):
 
     def jobs(self, rendering: str, track: str | None = None, state: State | None = None) -> Iterator[Job]:
         """Yields the jobs, ordered by track, level and Morton number. Reads them in pages, each of which shows the state of its moment."""
+
+    def job(self, rendering: str, track: str, block: BlockId) -> Job | None:
+        """Returns the job of a block; None if it is not planned."""
+
+    def jobs_below(self, rendering: str, track: str, block: BlockId) -> list[Job]:
+        """Returns the jobs whose seams a reduce job reads, in Morton order; none for a base block."""
 
     def clock_s(self) -> float:
         """Returns the present time on the database's clock, in seconds since 1970."""

@@ -1,18 +1,19 @@
-"""The catalogue in a MongoDB database: scenes, assets, renderings. Jobs are in mongodb_jobs.py.
+"""The catalogue in a MongoDB database: scenes, assets, renderings. Jobs, operations and accounts are in files of their own.
 
 Records are stored as in SQLite, with nested values as JSON text. A change of a record is repeated if another process changed the record meanwhile.
 """
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
 from map3d.catalogue import codec
 from map3d.catalogue.contract import LEASE_S
+from map3d.catalogue.mongodb_accounts import MongoAccounts
 from map3d.catalogue.mongodb_connection import Document, MongoConnection
 from map3d.catalogue.mongodb_documents import new_call
-from map3d.catalogue.mongodb_jobs import MongoJobs
+from map3d.catalogue.mongodb_operations import MongoOperations
 from map3d.catalogue.records import AssetRecord, RenderingRecord, SceneCrs, SceneRecord
 from map3d.errors import AlreadyExists, BadRequest, NotFound
 from map3d.geometry.frames import PinnedFrame
@@ -35,7 +36,7 @@ _RENDERING: Final = (
 """The order of `codec.dump_rendering`."""
 
 
-class MongoCatalogue(MongoJobs):
+class MongoCatalogue(MongoOperations, MongoAccounts):
     """Implements `Catalogue` in the database that the URL names; creates collections and indexes when they do not exist."""
 
     def __init__(self, url: str, *, lease_s: float = LEASE_S) -> None:
@@ -79,6 +80,10 @@ class MongoCatalogue(MongoJobs):
 
     def set_built(self, name: str, digest: str) -> None:
         self._update_many({"_id": name}, {"$set": {"built": digest}}, "scene")
+
+    def set_scene_options(self, name: str, options: Mapping[str, Any]) -> None:
+        self._record("scene", name)
+        self._update_many({"_id": name}, {"$set": {"options": json.dumps(dict(options))}}, "scene")
 
     def put_asset(self, asset: AssetRecord) -> None:
         check_name(asset.name, "asset")
@@ -182,9 +187,6 @@ class MongoCatalogue(MongoJobs):
             after = change(codec.load_rendering(document))
             if self._update_many({"_id": name, field: document[field]}, {"$set": {field: _dump(after)[field]}}, "rendering"):
                 return after
-
-    def _delete(self, collection: str, query: Document) -> None:
-        self._connection.run(lambda _: self._connection.collection(collection).delete_many(query))
 
 
 def _dump(rendering: RenderingRecord) -> dict[str, Any]:

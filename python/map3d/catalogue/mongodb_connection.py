@@ -35,7 +35,9 @@ _PAUSES_S: Final = (0.05, 2.0)
 _INDEXES: Final[Mapping[str, list[list[tuple[str, int]]]]] = {
     "job": [[(name, 1) for name in ("rendering", "state", "tries", "z", "track", "morton")], [("parent", 1), ("state", 1)]],
     "rendering": [[("scene", 1)]],
+    "token": [[("digest", 1)], [("user", 1)]],
     "asset": [[("scene", 1), ("name", 1)]],
+    "operation": [[("state", 1)]],
 }
 
 

@@ -16,11 +16,14 @@ from map3d.catalogue.mongodb_plan import PAGE, MongoPlan
 from map3d.catalogue.records import Job, JobResult, Lease
 from map3d.catalogue.states import MAX_ATTEMPTS, MAX_EXPIRIES, JobEvent, State, next_state
 from map3d.errors import StaleFence
+from map3d.types import BlockId
 
 _EXPIRE_EVERY: Final = 0.25
 """Share of the lease time after which a process looks for overdue leases again."""
 _EXPIRE_IDLE_S: Final = 1.0
 """The same in seconds when there is no job to do."""
+_ONE_MORE: Final[Document] = {"attempts": 1, "tries": 1, "fence": 1}
+"""What a lease increments."""
 
 
 class MongoJobs(MongoPlan):
@@ -49,7 +52,7 @@ class MongoJobs(MongoPlan):
         todo: Document = {"rendering": rendering, "state": State.TODO}
         change = {
             "$set": {"state": next_state(State.TODO, JobEvent.LEASE), "worker": worker, "lease_ms": int(self.lease_s * 1000), "call": call},
-            "$inc": {"attempts": 1, "tries": 1, "fence": 1},
+            "$inc": _ONE_MORE,
             "$currentDate": {"renewed": True, "leased": True},
         }
 
@@ -65,6 +68,41 @@ class MongoJobs(MongoPlan):
             return jobs.find_one_and_update(todo, change, sort=ORDER, return_document=ReturnDocument.AFTER)
 
         return self._connection.run(act)
+
+    def lease_block(self, rendering: str, worker: str, track: str, block: BlockId) -> Lease | None:
+        self._expire_block(rendering, track, block)
+        return self._lease_one(rendering, track, block, {"state": State.TODO}, self._leased_by(worker) | {"$inc": _ONE_MORE})
+
+    def evict(self, rendering: str, worker: str, track: str, block: BlockId) -> Lease | None:
+        """Makes the job above wait before and after it takes the job, since a sweep may open it in between."""
+        found = self._find("job", {"_id": job_id(rendering, track, block), "state": State.DONE, "kind": "base"}, {"parent": 1})
+        if not found or not self._exists({"rendering": rendering, "state": {"$ne": State.DONE}}):
+            return None
+        change = self._leased_by(worker)
+        change = change | {"$set": {**change["$set"], "attempts": 1, "tries": 1, "expiries": 0}, "$inc": {"fence": 1}}
+        self._wait_above_evicted(found[0]["parent"])
+        lease = self._lease_one(rendering, track, block, {"state": State.DONE}, change)
+        self._wait_above_evicted(found[0]["parent"])
+        return lease
+
+    def _leased_by(self, worker: str) -> Document:
+        leased = {"state": State.LEASED, "worker": worker, "lease_ms": int(self.lease_s * 1000)}
+        return {"$set": leased, "$currentDate": {"renewed": True, "leased": True}}
+
+    def _lease_one(self, rendering: str, track: str, block: BlockId, condition: Document, change: Document) -> Lease | None:
+        name, call, jobs = job_id(rendering, track, block), new_call(), self._connection.collection("job")
+        marked = {**change, "$set": {**change["$set"], "call": call}}
+
+        def act(repeated: bool) -> Document | None:
+            leased = jobs.find_one_and_update({"_id": name, **condition}, marked, return_document=ReturnDocument.AFTER)
+            return leased or (jobs.find_one({"_id": name, "state": State.LEASED, "call": call}) if repeated else None)
+
+        document = self._connection.run(act)
+        return None if document is None else load_lease(document, self._versions(rendering)["content_version"])
+
+    def _expire_block(self, rendering: str, track: str, block: BlockId) -> None:
+        for document in self._find("job", {"_id": job_id(rendering, track, block), "state": State.LEASED, **OVERDUE}):
+            self._expire_one(document, OVERDUE)
 
     def heartbeat(self, lease: Lease) -> None:
         self._move(lease, {"$set": {"lease_ms": int(self.lease_s * 1000)}, "$currentDate": {"renewed": True}})
@@ -142,6 +180,13 @@ class MongoJobs(MongoPlan):
         while page := self._find("job", query | {"_id": {"$gt": after, "$lt": end}}, limit=PAGE):
             yield from map(load_job, page)
             after = page[-1]["_id"]
+
+    def job(self, rendering: str, track: str, block: BlockId) -> Job | None:
+        found = self._find("job", {"_id": job_id(rendering, track, block)})
+        return load_job(found[0]) if found else None
+
+    def jobs_below(self, rendering: str, track: str, block: BlockId) -> list[Job]:
+        return [load_job(document) for document in self._find("job", {"parent": job_id(rendering, track, block)})]
 
     def clock_s(self) -> float:
         return self._connection.run(lambda _: self._connection.clock()).timestamp()

@@ -121,6 +121,13 @@ class MongoPlan:
             ids = {document["parent"] for document in found} - {None}
         return moved
 
+    def _wait_above_evicted(self, above: str | None) -> None:
+        """Makes the reduce job above an evicted block wait unless it is done; no job above that one is open."""
+        if above is not None:
+            self._update_many({"_id": above, "state": State.WAITING}, {"$inc": {"fence": 1}})
+            change = {"$set": {**FORGET, "state": _WAITING}, "$inc": {"fence": 1}}
+            self._update_many({"_id": above, "state": {"$in": [State.TODO, State.LEASED]}}, change)
+
     def _open_unblocked(self, fences: dict[str, int]) -> int:
         """Opens those of the waiting jobs whose blocks below are all done. `fences`: id → fence, read before the blocks below."""
         match = {"parent": {"$in": list(fences)}, "state": {"$ne": State.DONE}}

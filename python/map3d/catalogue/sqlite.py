@@ -1,8 +1,8 @@
-"""The catalogue in one SQLite file: scenes, assets, renderings. Jobs are in sqlite_jobs.py."""
+"""The catalogue in one SQLite file: scenes, assets, renderings. Jobs, operations and accounts are in files of their own."""
 
 import json
 import sqlite3
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -10,14 +10,15 @@ from typing import Any, Final
 from map3d.catalogue import codec
 from map3d.catalogue.contract import LEASE_S
 from map3d.catalogue.records import AssetRecord, RenderingRecord, SceneCrs, SceneRecord
+from map3d.catalogue.sqlite_accounts import ACCOUNT_SCHEMA, SqliteAccounts
 from map3d.catalogue.sqlite_job_table import JOB_COUNTS, JOB_NEXT, JOB_ORDER, JOB_SCHEMA
-from map3d.catalogue.sqlite_jobs import SqliteJobs
+from map3d.catalogue.sqlite_operations import OPERATION_SCHEMA, SqliteOperations
 from map3d.database import Database
 from map3d.errors import AlreadyExists, BadRequest, NotFound
 from map3d.geometry.frames import PinnedFrame
 from map3d.types import Layer, Vec3, check_name
 
-VERSION: Final = 5
+VERSION: Final = 7
 REMOVE_BATCH: Final = 20_000
 """Jobs that one transaction removes."""
 
@@ -32,7 +33,7 @@ CREATE TABLE rendering(name TEXT PRIMARY KEY, scene TEXT NOT NULL REFERENCES sce
   res_m REAL NOT NULL, passes TEXT NOT NULL, frames TEXT NOT NULL, box TEXT NOT NULL, options TEXT NOT NULL,
   content_version INTEGER NOT NULL, announced_version INTEGER NOT NULL, planning INTEGER NOT NULL DEFAULT 0);
 """
-    + f"{_REMOVED};{JOB_SCHEMA}"
+    + f"{_REMOVED};{JOB_SCHEMA}{OPERATION_SCHEMA}{ACCOUNT_SCHEMA}"
 )
 _MIGRATIONS: Final = {
     3: f"ALTER TABLE job ADD COLUMN expiries INTEGER NOT NULL DEFAULT 0; DROP INDEX job_next; {JOB_NEXT};",
@@ -40,11 +41,13 @@ _MIGRATIONS: Final = {
       {_REMOVED}; {JOB_ORDER}; {JOB_COUNTS};
       INSERT INTO job_count SELECT rendering, state, count(*) FROM job GROUP BY rendering, state;""",
     5: "ALTER TABLE job ADD COLUMN leased REAL; ALTER TABLE job ADD COLUMN ended REAL;",
+    6: OPERATION_SCHEMA,
+    7: ACCOUNT_SCHEMA,
 }
 """Version → statements that lead to it from the version before."""
 
 
-class SqliteCatalogue(SqliteJobs):
+class SqliteCatalogue(SqliteOperations, SqliteAccounts):
     """Implements `Catalogue`; creates the file when it does not exist, and migrates an older one."""
 
     def __init__(self, path: Path, *, lease_s: float = LEASE_S) -> None:
@@ -88,6 +91,11 @@ class SqliteCatalogue(SqliteJobs):
     def set_built(self, name: str, digest: str) -> None:
         with self._database.transaction() as db:
             db.execute("UPDATE scene SET built = ? WHERE name = ?", (digest, name))
+
+    def set_scene_options(self, name: str, options: Mapping[str, Any]) -> None:
+        with self._database.transaction() as db:
+            _scene(db, name)
+            db.execute("UPDATE scene SET options = ? WHERE name = ?", (json.dumps(dict(options)), name))
 
     def put_asset(self, asset: AssetRecord) -> None:
         check_name(asset.name, "asset")

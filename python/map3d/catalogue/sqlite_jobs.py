@@ -27,19 +27,28 @@ _EXPIRE_OVERDUE: Final = f"{_EXPIRE} AND expires < {NOW}"
 _NEXT: Final = (
     f"""SELECT {{columns}} FROM job WHERE rendering = :rendering AND state = '{State.TODO}' ORDER BY attempts + expiries, z, track, morton LIMIT 1"""
 )
+_WITH_VERSION: Final = "RETURNING *, (SELECT content_version FROM rendering WHERE name = rendering) AS content_version"
 _LEASE: Final = f"""UPDATE job SET state = '{next_state(State.TODO, JobEvent.LEASE)}', attempts = attempts + 1, fence = fence + 1, worker = :worker,
   leased = {NOW}, expires = {NOW} + :lease_s
   WHERE rowid = coalesce(
     (SELECT rowid FROM job WHERE rendering = :rendering AND state = '{State.TODO}' AND morton >= :start
       AND (attempts + expiries, z, track) = ({_NEXT.format(columns="attempts + expiries, z, track")}) ORDER BY morton LIMIT 1),
     ({_NEXT.format(columns="rowid")}))
-  RETURNING *, (SELECT content_version FROM rendering WHERE name = rendering) AS content_version"""
+  {_WITH_VERSION}"""
+_LEASE_BLOCK: Final = f"""UPDATE job SET state = '{next_state(State.TODO, JobEvent.LEASE)}', attempts = attempts + 1, fence = fence + 1,
+  worker = :worker, leased = {NOW}, expires = {NOW} + :lease_s WHERE {AT} AND state = '{State.TODO}' {_WITH_VERSION}"""
+_EVICT: Final = f"""UPDATE job SET state = '{next_state(State.DONE, JobEvent.EVICT)}', attempts = 1, expiries = 0, fence = fence + 1,
+  worker = :worker, leased = {NOW}, expires = {NOW} + :lease_s WHERE {AT} AND state = '{State.DONE}' AND kind = 'base'
+  AND EXISTS (SELECT 1 FROM job_count AS other WHERE other.rendering = :rendering AND other.state <> '{State.DONE}' AND other.jobs > 0)
+  {_WITH_VERSION}"""
 _HELD: Final = f"{AT} AND state = '{State.LEASED}' AND fence = :fence AND worker = :worker AND expires >= {NOW}"
 _ORDER: Final = "ORDER BY track, z, morton, x, y"
 _PAGE: Final = f"""SELECT * FROM job WHERE rendering = :rendering AND {{after}}
   AND (:state IS NULL OR state = :state) {_ORDER} LIMIT {PAGE}"""
 _PAGE_OF_ALL: Final = _PAGE.format(after="(track, z, morton, x, y) > (:track, :z, :morton, :x, :y)")
 _PAGE_OF_TRACK: Final = _PAGE.format(after="track = :track AND (z, morton, x, y) > (:z, :morton, :x, :y)")
+_BELOW: Final = """SELECT * FROM job WHERE rendering = :rendering AND track = :track
+  AND parent_z = :z AND parent_x = :x AND parent_y = :y ORDER BY morton"""
 _IN_STATE: Final = f"""SELECT * FROM job INDEXED BY job_next WHERE rendering = :rendering AND state = :state
   AND (:track IS NULL OR track = :track) {_ORDER}"""
 
@@ -91,6 +100,22 @@ class SqliteJobs:
             row = db.execute(_LEASE, {"rendering": rendering, "worker": worker, "lease_s": self.lease_s, "start": start}).fetchone()
         return None if row is None else load_lease(row)
 
+    def lease_block(self, rendering: str, worker: str, track: str, block: BlockId) -> Lease | None:
+        with self._database.transaction() as db:
+            db.execute(_EXPIRE_OVERDUE)
+            row = db.execute(_LEASE_BLOCK, self._lease_values(rendering, worker, track, block)).fetchone()
+        return None if row is None else load_lease(row)
+
+    def evict(self, rendering: str, worker: str, track: str, block: BlockId) -> Lease | None:
+        with self._database.transaction() as db:
+            row = db.execute(_EVICT, self._lease_values(rendering, worker, track, block)).fetchone()
+            if row is not None:
+                sqlite_plan.wait_above_evicted(db, row)
+        return None if row is None else load_lease(row)
+
+    def _lease_values(self, rendering: str, worker: str, track: str, block: BlockId) -> dict[str, Any]:
+        return {**place_of(rendering, track, block), "worker": worker, "lease_s": self.lease_s}
+
     def heartbeat(self, lease: Lease) -> None:
         with self._database.transaction() as db:
             _move(db, lease, f"expires = {NOW} + :lease_s", lease_s=self.lease_s)
@@ -128,6 +153,13 @@ class SqliteJobs:
         while rows := self._rows(page, {"rendering": rendering, "state": state, **after}):
             yield from map(load_job, rows)
             after = {name: rows[-1][name] for name in after}
+
+    def job(self, rendering: str, track: str, block: BlockId) -> Job | None:
+        rows = self._rows(f"SELECT * FROM job WHERE {AT}", place_of(rendering, track, block))
+        return load_job(rows[0]) if rows else None
+
+    def jobs_below(self, rendering: str, track: str, block: BlockId) -> list[Job]:
+        return [load_job(row) for row in self._rows(_BELOW, place_of(rendering, track, block))]
 
     def _rows(self, query: str, values: dict[str, Any]) -> list[sqlite3.Row]:
         with self._database.reading() as db:

@@ -59,6 +59,12 @@ def sweep(db: sqlite3.Connection, rendering: str) -> int:
     return db.execute(f"{_OPEN_WAITING} AND rendering = ?", (rendering,)).rowcount
 
 
+def wait_above_evicted(db: sqlite3.Connection, row: sqlite3.Row) -> None:
+    """Makes the reduce job above an evicted block wait unless it is done; no job above that one is open."""
+    place = {"rendering": row["rendering"], "track": row["track"], "z": row["parent_z"], "x": row["parent_x"], "y": row["parent_y"]}
+    db.execute(f"{_WAIT_AGAIN} AND state <> '{State.DONE}'", place)
+
+
 def open_above(db: sqlite3.Connection, row: sqlite3.Row) -> None:
     """Opens the reduce job above a done job when all blocks below it are done."""
     place = {"rendering": row["rendering"], "track": row["track"], "z": row["parent_z"], "x": row["parent_x"], "y": row["parent_y"]}

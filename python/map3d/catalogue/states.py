@@ -31,6 +31,7 @@ class JobEvent(StrEnum):
     CANCEL = "cancel"
     REOPEN = "reopen"
     BELOW_REOPENED = "below reopened"
+    EVICT = "evict"
 
 
 OPEN: Final = (State.WAITING, State.TODO, State.LEASED)
@@ -57,6 +58,7 @@ TRANSITIONS: Final[dict[tuple[State, JobEvent], State]] = {
     (State.TODO, JobEvent.CANCEL): State.CANCELLED,
     (State.LEASED, JobEvent.CANCEL): State.CANCELLED,
     (State.DONE, JobEvent.REOPEN): State.TODO,
+    (State.DONE, JobEvent.EVICT): State.LEASED,
     (State.WAITING, JobEvent.BELOW_REOPENED): State.WAITING,
     (State.TODO, JobEvent.BELOW_REOPENED): State.WAITING,
     (State.LEASED, JobEvent.BELOW_REOPENED): State.WAITING,

@@ -88,10 +88,16 @@ class Workspace:
         draft.replace(self.settings_path)
 
     def open_catalogue(self, *, lease_s: float = LEASE_S) -> Catalogue:
-        """Opens the catalogue. Raises NotFound when neither the workspace nor a URL of its catalogue exists."""
+        """Opens the catalogue. Raises NotFound when neither the workspace nor a URL of its catalogue exists, or when a workspace with scenes or
+        renderings has lost its catalogue."""
         url = self.find_catalogue_url()
         if url is not None:
             return open_catalogue(url, lease_s=lease_s)
         if not self.root.is_dir():
             raise NotFound(f"no workspace at {self.root}: create a scene first with map3d create-scene, or name another folder with --workspace")
+        if not self.catalogue_path.exists() and ((self.root / "scenes").is_dir() or (self.root / "renderings").is_dir()):
+            raise NotFound(
+                f"{self.catalogue_path}: no such file, though the workspace has scenes or renderings; restore it from a backup, "
+                f"or name the catalogue in the environment variable {CATALOGUE_VARIABLE}"
+            )
         return open_catalogue(str(self.catalogue_path), lease_s=lease_s)

@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from typing import Self
 
-import numpy as np
-
 from map3d.catalogue import Catalogue, RenderingRecord, State, Workspace
 from map3d.errors import Map3dError
 from map3d.renderings.build import open_scene
@@ -13,7 +11,6 @@ from map3d.renderings.plan import PlannedScene, planned_occupancy
 from map3d.renderings.scene_cache import scene_in_use
 from map3d.renderings.track_stores import read_manifest
 from map3d.tiles.manifest import Manifest
-from map3d.tiles.naming import block_levels
 from map3d.tiles.occupancy import Numbers, Occupancy, numbers_of
 from map3d.types import Box
 
@@ -63,10 +60,4 @@ def _open_blocks(catalogue: Catalogue, record: RenderingRecord, view: str) -> Nu
 
 def _within_open(catalogue: Catalogue, record: RenderingRecord, planned: Planned) -> dict[str, Occupancy]:
     """Restricts each view's occupancy to base blocks that are not done now."""
-    root = block_levels(record.zmax)[0].root
-    remaining = {}
-    for view, occupancy in planned.items():
-        base = occupancy.numbers(record.zmax)
-        above = base >> np.uint64(2 * (record.zmax - root))
-        remaining[view] = Occupancy(record.zmax, base[np.isin(above, _open_blocks(catalogue, record, view))])
-    return remaining
+    return {view: occupancy.within(_open_blocks(catalogue, record, view)) for view, occupancy in planned.items()}

@@ -1,11 +1,13 @@
 """`map3d render`: plans the jobs, has workers do them, writes the manifest."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from map3d.catalogue import Catalogue, PlanCounts, RenderingRecord, State, Workspace
+import numpy as np
+
+from map3d.catalogue import Catalogue, PlanCounts, State, Track, Workspace
 from map3d.catalogue.scene_lock import scene_lock
 from map3d.catalogue.states import OPEN
 from map3d.errors import StalePlan
@@ -17,10 +19,11 @@ from map3d.jobs.run_statistics import RunStatistics
 from map3d.jobs.stop_request import StopRequest
 from map3d.renderings.build import open_scene
 from map3d.renderings.manifest_writer import write_manifest
-from map3d.renderings.plan import PlannedScene, plan_jobs
+from map3d.renderings.plan import PlannedBlocks, PlannedScene, plan_jobs
 from map3d.renderings.scene_cache import scene_in_use
 from map3d.renderings.track_stores import find_track, tiles_url
-from map3d.tiles.occupancy import Numbers, numbers_of
+from map3d.tiles.naming import morton
+from map3d.types import BlockId
 
 MAX_PLANS: Final = 10
 """A run whose scene was rebuilt this often ends."""
@@ -67,7 +70,7 @@ class Run:
 
     def _plan(self, progress: Callable[[int, int], None] | None, scene: PlannedScene | None) -> RunPlan:
         self.record = self._catalogue.rendering(self.record.name)
-        blocks = _PlannedBlocks(self._catalogue, self.record)
+        blocks = PlannedBlocks(self._catalogue, self.record)
         with scene_lock(self._workspace, self.record.scene):
             opened = scene or open_scene(self._workspace, self.record.scene)
             planned = self._catalogue.plan(self.record.name, plan_jobs(opened, self.record, blocks, progress))
@@ -103,26 +106,17 @@ class Run:
         """Removes stored blocks without a job, such as those of earlier frames. Lists the stores, which takes long in an object store."""
         for track in self.record.tracks:
             if (found := find_track(self._workspace, self.record, track.id, read_only=False)) is not None:
-                jobs = {job.block for job in self._catalogue.jobs(self.record.name, track.id)}
                 with found as store:
-                    for block in store.list_blocks():
-                        if block.id not in jobs:
-                            store.remove_block(block.id)
+                    for block in self._without_job(track, [block.id for block in store.list_blocks()]):
+                        store.remove_block(block)
+
+    def _without_job(self, track: Track, blocks: list[BlockId]) -> list[BlockId]:
+        """Returns the blocks of a track that have no job, from 16 bytes per job."""
+        jobs = np.fromiter((_number(job.block) for job in self._catalogue.jobs(self.record.name, track.id)), np.uint64)
+        has_job = np.isin(np.fromiter(map(_number, blocks), np.uint64), jobs)
+        return [blocks[place] for place in np.flatnonzero(~has_job)]
 
 
-class _PlannedBlocks(Mapping[str, Numbers]):
-    """Track → base blocks with a job. They are read when they are looked up, so that only those of one track are in memory."""
-
-    def __init__(self, catalogue: Catalogue, record: RenderingRecord) -> None:
-        self._catalogue, self._record = catalogue, record
-        self._tracks = [track.id for track in record.tracks]
-
-    def __getitem__(self, track: str) -> Numbers:
-        jobs = self._catalogue.jobs(self._record.name, track)
-        return numbers_of((job.block.x, job.block.y) for job in jobs if job.kind == "base")
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._tracks)
-
-    def __len__(self) -> int:
-        return len(self._tracks)
+def _number(block: BlockId) -> int:
+    """Returns a number of 57 bits that no other block has."""
+    return block.z << 52 | morton(block.x, block.y)

@@ -55,6 +55,15 @@ class RegisteredObject:
         }
 
 
+@dataclass(frozen=True)
+class AssetSummary:
+    """`box`: local, None without any geometry; `lods`: the levels of detail that occur, ordered."""
+
+    count: int
+    box: Box | None
+    lods: tuple[str, ...]
+
+
 def plain_attributes(attributes: Mapping[str, Any]) -> dict[str, Attribute]:
     """Converts attributes to strings, numbers, booleans or null. Other values become JSON text; NaN and infinities become null."""
     return {str(key): _plain(value) for key, value in attributes.items()}
@@ -70,3 +79,13 @@ def _plain(value: Any) -> Attribute:
     if isinstance(value, float):
         return value if value - value == 0 else None
     return json.dumps(value, ensure_ascii=False, sort_keys=True)
+
+
+@dataclass(frozen=True)
+class ObjectKind:
+    """Objects of one class and level of detail. `drawn`: those that have geometry, of their own or of their parts."""
+
+    kind: str
+    lod: str | None
+    count: int
+    drawn: int

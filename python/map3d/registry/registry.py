@@ -6,7 +6,7 @@ that a re-import no longer contains stay with present = 0, so that they get thei
 
 import json
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
@@ -20,7 +20,7 @@ from map3d.registry.column_documents import column_documents
 from map3d.registry.columns import attribute_index
 from map3d.registry.documents import ATTRIBUTES, SHARDS, Document, dump_document
 from map3d.registry.object_boxes import include_children
-from map3d.registry.registered_objects import NewObject, RegisteredObject, plain_attributes
+from map3d.registry.registered_objects import AssetSummary, NewObject, ObjectKind, RegisteredObject, plain_attributes
 from map3d.registry.search_index import search_documents
 from map3d.types import OBJECTS_PER_SHARD, Box
 
@@ -42,6 +42,10 @@ _UPSERT: Final = """INSERT INTO object(asset, name, occurrence, class, lod, attr
   ON CONFLICT(asset, name, occurrence) DO UPDATE SET class = excluded.class, lod = excluded.lod, attributes = excluded.attributes, present = 1,
     parent = NULL, x0 = excluded.x0, y0 = excluded.y0, z0 = excluded.z0, x1 = excluded.x1, y1 = excluded.y1, z1 = excluded.z1
   RETURNING id"""
+
+_CHILDREN_OF: Final = """SELECT parent, id FROM object WHERE present AND asset IN (SELECT DISTINCT asset FROM object WHERE id BETWEEN ? AND ?)
+  AND parent BETWEEN ? AND ? ORDER BY parent, id"""
+"""The children of a range of objects; they are of the same asset as their parents, which has an index."""
 
 
 class Registry:
@@ -69,6 +73,14 @@ class Registry:
             db.executemany("UPDATE object SET parent = ? WHERE id = ?", parents)
             _extend_parent_boxes(db, asset)
         return ids
+
+    def set_boxes(self, asset: str, boxes: Mapping[int, Box | None], absent: Collection[int]) -> None:
+        """Sets the local boxes of an asset's objects by id, without those of their children. `absent`: ids of objects that are not part of the scene;
+        all others are present."""
+        with self._database.transaction() as db:
+            change = "UPDATE object SET present = ?, x0 = ?, y0 = ?, z0 = ?, x1 = ?, y1 = ?, z1 = ? WHERE id = ? AND asset = ?"
+            db.executemany(change, [(number not in absent, *_corners(box), number, asset) for number, box in boxes.items()])
+            _extend_parent_boxes(db, asset)
 
     def remove_assets(self, assets: Sequence[str]) -> None:
         """Removes the objects of assets for ever and returns their space to the file system. The ids of other objects stay; those of removed ones are
@@ -118,6 +130,38 @@ class Registry:
             last = rows[-1]["id"]
             yield from map(_to_object, rows)
 
+    def asset_summaries(self) -> dict[str, AssetSummary]:
+        """Returns count, box and levels of detail of the present objects of each asset."""
+        corners = "min(x0), min(y0), min(z0), max(x1), max(y1), max(z1)"
+        with self._database.reading() as db:
+            rows = db.execute(f"SELECT asset, count(*), {corners} FROM object WHERE present GROUP BY asset").fetchall()
+            lods: dict[str, list[str]] = {}
+            for asset, lod in db.execute("SELECT DISTINCT asset, lod FROM object WHERE present AND lod IS NOT NULL ORDER BY lod"):
+                lods.setdefault(asset, []).append(lod)
+        return {row[0]: AssetSummary(row[1], _box_of(row[2:]), tuple(lods.get(row[0], ()))) for row in rows}
+
+    def asset_kinds(self) -> dict[str, list[ObjectKind]]:
+        """Returns the classes and levels of detail of the present objects of each asset, the most frequent first."""
+        query = "SELECT asset, class, lod, count(*), count(x0) FROM object WHERE present GROUP BY asset, class, lod ORDER BY 4 DESC, class, lod"
+        found: dict[str, list[ObjectKind]] = {}
+        with self._database.reading() as db:
+            for asset, kind, lod, count, drawn in db.execute(query):
+                found.setdefault(asset, []).append(ObjectKind(kind, lod, count, drawn))
+        return found
+
+    def greatest_id(self) -> int:
+        """Returns the greatest id that was ever assigned, 0 before the first."""
+        with self._database.reading() as db:
+            row = db.execute("SELECT seq FROM sqlite_sequence WHERE name = 'object'").fetchone()
+        return 0 if row is None else int(row[0])
+
+    def rows_of(self, assets: Sequence[str]) -> Iterator[tuple[int, int | None, str | None, Box | None]]:
+        """Yields (id, parent, level of detail, box) of the present objects of assets."""
+        with self._database.reading() as db:
+            for asset in assets:
+                for row in db.execute("SELECT id, parent, lod, x0, y0, z0, x1, y1, z1 FROM object WHERE asset = ? AND present", (asset,)):
+                    yield row[0], row[1], row[2], _box(row)
+
     def shard_numbers(self) -> list[int]:
         """Returns the numbers of the shards with objects, ascending."""
         with self._database.reading() as db:
@@ -125,14 +169,31 @@ class Registry:
 
     def shard(self, number: int) -> dict[str, Any]:
         """Returns an attribute shard (spec/manifest.md), possibly without objects."""
+        first = number * OBJECTS_PER_SHARD
+        between = (first, first + OBJECTS_PER_SHARD - 1)
         with self._database.reading() as db:
-            between = (number * OBJECTS_PER_SHARD, (number + 1) * OBJECTS_PER_SHARD - 1)
+            children = _pairs(db.execute(_CHILDREN_OF, (*between, *between)))
+        return self._shard(number, children)
+
+    def _shard(self, number: int, children: NDArray[np.void]) -> dict[str, Any]:
+        """`children`: see `_pairs`."""
+        first = number * OBJECTS_PER_SHARD
+        with self._database.reading() as db:
+            between = (first, first + OBJECTS_PER_SHARD - 1)
             rows = db.execute("SELECT * FROM object WHERE present AND id BETWEEN ? AND ? ORDER BY id", between).fetchall()
-        return {"map3d": "objects", "version": 1, "shard": number, "objects": {str(row["id"]): _to_object(row).to_json() for row in rows}}
+        objects = {str(row["id"]): _to_object(row).to_json() for row in rows}
+        for parent, child in children.tolist():
+            if str(parent) in objects:
+                objects[str(parent)].setdefault("children", []).append(child)
+        return {"map3d": "objects", "version": 1, "shard": number, "objects": objects}
 
     def shards(self) -> Iterator[dict[str, Any]]:
         """Returns all attribute shards with objects."""
-        return (self.shard(number) for number in self.shard_numbers())
+        with self._database.reading() as db:
+            children = _pairs(db.execute("SELECT parent, id FROM object WHERE present AND parent IS NOT NULL ORDER BY parent, id"))
+        for number in self.shard_numbers():
+            start, stop = np.searchsorted(children["parent"], [number * OBJECTS_PER_SHARD, (number + 1) * OBJECTS_PER_SHARD])
+            yield self._shard(number, children[start:stop])
 
     def search_documents(self) -> Iterator[Document]:
         """Yields the search index (spec/manifest.md)."""
@@ -168,6 +229,11 @@ class Registry:
         self.close()
 
 
+def _pairs(rows: Iterable[Any]) -> NDArray[np.void]:
+    """Returns parents and children, (N,) with the uint32 fields `parent` and `id`."""
+    return np.fromiter((tuple(row) for row in rows), dtype=[("parent", np.uint32), ("id", np.uint32)])
+
+
 def _row(asset: str, item: NewObject, occurrence: int) -> dict[str, Any]:
     attributes = json.dumps(plain_attributes(item.attributes), ensure_ascii=False)
     texts = {"asset": asset, "name": item.name, "occurrence": occurrence, "class": item.kind, "lod": item.lod, "attributes": attributes}
@@ -189,6 +255,13 @@ def _extend_parent_boxes(db: Any, asset: str) -> None:
 
 def _box(row: Any) -> Box | None:
     return None if row["x0"] is None else ((row["x0"], row["y0"], row["z0"]), (row["x1"], row["y1"], row["z1"]))
+
+
+def _box_of(corners: Sequence[float | None]) -> Box | None:
+    x0, y0, z0, x1, y1, z1 = corners
+    if x0 is None or y0 is None or z0 is None or x1 is None or y1 is None or z1 is None:
+        return None
+    return ((x0, y0, z0), (x1, y1, z1))
 
 
 def _to_object(row: Any) -> RegisteredObject:
