@@ -28,6 +28,7 @@ from map3d.geometry.crs import horizontal_crs, parse_crs, vertical_crs, vertical
         ("urn:adv:crs:ETRS89_UTM32*DE_DHHN2016_NH", 25832, 7837),
         ("urn:adv:crs:ETRS89_UTM33*DE_DHHN92_NH", 25833, 5783),
         ("urn:adv:crs:DE_DHDN_3GK4*DE_DHHN92_NH", 31468, 5783),
+        ("urn:adv:crs:DE_DHDN_3GK4*DE_DHN92_NH", 31468, 5783),
         ("urn:adv:crs:DHDN_3GK4", 31468, None),
         ("EPSG:5555", 25832, 5783),
         ("EPSG:7415", 28992, 5709),

@@ -24,6 +24,8 @@ OBJ = "# made by hand\nmtllib a.mtl\no thing\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3
         ("dos.obj", OBJ.replace("\n", "\r\n").encode(), "obj"),
         ("a.tif", b"II*\0rest", "raster"),
         ("big.tif", b"MM\0+rest", "raster"),
+        ("a.jp2", b"\0\0\0\x0cjP  \r\n", "raster"),
+        ("a.asc", b"NCOLS 3\nnrows 2\n", "raster"),
     ],
 )
 def test_formats_are_detected_by_content(tmp_path: Path, name: str, content: bytes, format: str) -> None:
@@ -41,6 +43,9 @@ def test_formats_are_detected_by_content(tmp_path: Path, name: str, content: byt
         (b"<html><body/></html>", "XML with root element html"),
         (b"<!-- only a comment -->", "XML without a root"),
         (b"PK\3\4", "ZIP"),
+        (b"\x89PNG\r\n", "a PNG image without a world file"),
+        (b"\xff\xd8\xff\xe0", "a JPEG image without a world file"),
+        (b"<VRTDataset/>", "a virtual raster; convert it with gdal_translate -of COG"),
         (b"just some words\nand more\n", "unknown format"),
         (b"v 0 0 0\0\0\0", "unknown format"),
     ],
@@ -52,6 +57,21 @@ def test_unknown_formats_are_refused_with_the_list_of_readable_ones(tmp_path: Pa
         detect_format(path)
     assert description in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(("image", "world_file"), [("a.jpg", "a.jgw"), ("a.JPG", "a.JGW"), ("a.jpeg", "a.wld"), ("a.png", "a.pgw")])
+def test_an_image_with_a_world_file_is_a_raster(tmp_path: Path, image: str, world_file: str) -> None:
+    path = tmp_path / image
+    path.write_bytes(b"\x89PNG\r\n" if path.suffix == ".png" else b"\xff\xd8\xff\xe0")
+    (tmp_path / world_file).write_text("1\n0\n0\n-1\n0\n0\n")
+    assert detect_format(path) == "raster"
+
+
+@pytest.mark.parametrize(("name", "driver"), [("a.ecw", "ECW"), ("a.sid", "MrSID"), ("a.IMG", "HFA")])
+def test_rasters_that_need_another_driver_name_it_and_the_conversion(tmp_path: Path, name: str, driver: str) -> None:
+    (tmp_path / name).write_bytes(b"e\2\0\0")
+    with pytest.raises(UnknownFormat, match=rf"\(GDAL driver {driver}\); convert it with gdal_translate -of COG"):
+        detect_format(tmp_path / name)
 
 
 def test_a_missing_file_is_not_found(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from map3d.errors import NotFound
 from map3d.ingest.import_inputs import READER_VERSIONS, import_inputs
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import import_file
+from map3d.ingest.referenced_files import find_missing_files
 from map3d.ingest.sources import find_sources, source_digest
 from tests.ingest.terrain.rasters import write
 
@@ -83,6 +84,26 @@ def test_changed_files_and_readers_count(tmp_path: Path, monkeypatch: pytest.Mon
     assert changes(asset, path, ImportOptions(crs="local")) == "the file changed"
 
 
+def test_code_lists_count_as_files(tmp_path: Path) -> None:
+    path, codes = tmp_path / "a.gml", tmp_path / "codes.xml"
+    path.write_text(GML.replace("<bldg:lod1Solid>", '<bldg:usage codeSpace="codes.xml">1</bldg:usage><bldg:lod1Solid>'))
+    codes.write_text("<Dictionary/>")
+    asset = imported(tmp_path, path, ImportOptions(crs="local"))
+    assert changes(asset, path, ImportOptions(crs="local")) is None
+    codes.write_text("<Dictionary><dictionaryEntry/></Dictionary>")
+    assert changes(asset, path, ImportOptions(crs="local")) == "the file changed"
+
+
+def test_textures_of_textured_surfaces_count_as_files(tmp_path: Path) -> None:
+    path, image = tmp_path / "town.gml", tmp_path / "wall.png"
+    path.write_text("<CityModel><tex:textureMap>wall.png</tex:textureMap><tex:textureMap>gone.png</tex:textureMap></CityModel>")
+    before = source_digest(find_sources([path])[0])
+    image.write_bytes(b"1")
+    assert source_digest(find_sources([path])[0]) != before
+    found = find_missing_files(path)
+    assert (found.names, found.images, found.missing_images) == (["gone.png"], 2, 1)
+
+
 def test_an_asset_of_an_earlier_map3d_is_imported_again_once(tmp_path: Path) -> None:
     path = tmp_path / "a.obj"
     path.write_text(OBJ)
@@ -108,6 +129,6 @@ def test_readers_that_make_other_assets_have_another_version(tmp_path: Path) -> 
     write(tmp_path / "c.tif", (np.arange(17 * 17) * 5 % 11).reshape(1, 17, 17).astype(np.float32))
     found = {name: imported(tmp_path, tmp_path / name, ImportOptions(crs="EPSG:25832")).digest for name in ("a.obj", "b.gml", "c.tif")}
     assert (dict(READER_VERSIONS), found) == (
-        {"citygml": 1, "obj": 1, "raster": 2},
-        {"a.obj": "8d0ceef106fedeffefc608f4ab2e7ffa", "b.gml": "4467c4c4c66fbc7371b6a154b33be1b5", "c.tif": "26cd38ff20b15a122f3df998ba1dd358"},
+        {"citygml": 7, "obj": 3, "raster": 3},
+        {"a.obj": "8d0ceef106fedeffefc608f4ab2e7ffa", "b.gml": "ce43c3ba3b9953057ef04c13e472131e", "c.tif": "c5f3a36ca5208765445bbcd024ea08ea"},
     )

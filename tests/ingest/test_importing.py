@@ -191,3 +191,30 @@ def test_importing_into_an_absent_scene_raises_not_found(workspace: Workspace, c
 def test_y_up_files_are_rotated(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
     add(workspace, catalogue, tmp_path / "a.obj", BOX_OBJ, ImportOptions(up="y"))
     assert list(boxes(workspace).values()) == [((0.0, -4.0, 0.0), (2.0, 0.0, 3.0))]
+
+
+def test_rooms_are_drawn_on_request(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
+    surface = BUILDING.partition("<bldg:lod2")[2].partition("</bldg:Building>")[0]
+    room = f"<bldg:interiorRoom><bldg:Room><bldg:lod2{surface}</bldg:Room></bldg:interiorRoom></bldg:Building>"
+    text = gml(("B1", UTM_RING, UTM)).replace("</bldg:Building>", room.format(ring=UTM_RING.replace("691010", "691011"), srs=""))
+    done = add(workspace, catalogue, tmp_path / "a.gml", text)
+    assert (done.triangles, done.report["skipped"]) == (2, {"polygon of an interior": 1})
+    (said,) = [warning for warning in done.report["warnings"] if warning["reason"] == "polygons of interiors are not drawn"]
+    assert (said["example"], said["scope"]) == ("1; --interiors draws them", "file")
+    done = add(workspace, catalogue, tmp_path / "a.gml", text, ImportOptions(interiors=True))
+    assert (done.triangles, done.replaced, done.report["skipped"]) == (4, True, {})
+
+
+def test_codes_have_the_names_of_their_list(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
+    (tmp_path / "city" / "codelists").mkdir(parents=True)
+    entry = "<dictionaryEntry><Definition><description>house</description><name>411</name></Definition></dictionaryEntry>"
+    (tmp_path / "city" / "codelists" / "use.xml").write_text(f"<Dictionary>{entry}</Dictionary>")
+    usage = "<bldg:usage codeSpace='../codelists/use.xml'>411</bldg:usage><bldg:lod2MultiSurface>"
+    (tmp_path / "city" / "udx").mkdir()
+    path = tmp_path / "city" / "udx" / "a.gml"
+    path.write_text(gml(("B1", UTM_RING, UTM)).replace("<bldg:lod2MultiSurface>", usage))
+    for folder, expected in ((path, {"usage": "411"}), (tmp_path / "city", {"usage": "house", "usage/code": "411"})):
+        import_file(workspace, catalogue, "town", find_sources([folder])[0], ImportOptions())
+        with Registry(workspace.registry_path("town")) as registry:
+            (found,) = [item.attributes for item in registry.objects() if item.name == "B1"]
+        assert found == expected

@@ -50,6 +50,22 @@ def test_unreadable_files_with_a_known_suffix_are_reported(tmp_path: Path) -> No
     assert [why.partition(";")[0].rpartition(": ")[2] for _, why in reported] == ["an empty file", "a file of unknown format"]
 
 
+def test_code_lists_that_a_file_names_are_not_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "udx").mkdir()
+    (tmp_path / "codelists").mkdir()
+    uses = "".join(f"<usage codeSpace='../codelists/{name}'>1</usage>" for name in ("used.xml", "Named%20so.gml", "../../outside.xml"))
+    (tmp_path / "udx" / "town.gml").write_text(f"<CityModel>{uses}</CityModel>")
+    for name in ("used.xml", "Named so.gml", "unused.xml"):
+        (tmp_path / "codelists" / name).write_text("<gml:Dictionary/>")
+    reported: list[str] = []
+    report = lambda path, _: reported.append(path.name)  # noqa: E731
+    (found,) = find_sources([tmp_path], None, report, report)
+    assert (found.name, reported) == ("town", ["unused.xml"])
+    before = source_digest(found)
+    (tmp_path / "codelists" / "used.xml").write_text("<gml:Dictionary gml:id='a'/>")
+    assert source_digest(found) != before
+
+
 def test_a_given_file_of_unknown_format_is_refused(tmp_path: Path) -> None:
     fill(tmp_path)
     with pytest.raises(UnknownFormat, match=r"notes\.odt"):

@@ -30,8 +30,17 @@ _ADV_HORIZONTAL: Final = {
     "42-83_3GK4": 2398,
     "42-83_3GK5": 2399,
 }
-_ADV_VERTICAL: Final = {"DHHN85_NOH": 5784, "DHHN92_NH": 5783, "DHHN2016_NH": 7837, "DHHN12_NOH": 7699, "SNN76_NH": 5785, "HN76_NH": 5785}
-"""EPSG codes of the names that the German surveying authorities (AdV) use, as in urn:adv:crs:ETRS89_UTM32*DE_DHHN2016_NH."""
+_ADV_VERTICAL: Final = {
+    "DHHN85_NOH": 5784,
+    "DHHN92_NH": 5783,
+    "DHN92_NH": 5783,
+    "DHHN2016_NH": 7837,
+    "DHHN12_NOH": 7699,
+    "SNN76_NH": 5785,
+    "HN76_NH": 5785,
+}
+"""EPSG codes of the names that the German surveying authorities (AdV) use, as in urn:adv:crs:ETRS89_UTM32*DE_DHHN2016_NH. Bavaria
+also writes DHN92."""
 
 _EPSG_PART: Final = re.compile(r"(?:^|[:/#])EPSG(?::|/)(?:[0-9.]*[:/])?(?::)?([0-9]+)$", re.IGNORECASE)
 _GML_EPSG: Final = re.compile(r"epsg\.xml#([0-9]+)$", re.IGNORECASE)

@@ -5,6 +5,7 @@ Sums are written out term by term, so that the bits do not depend on a linear al
 
 import math
 import re
+from collections.abc import Sequence
 from decimal import Decimal
 from typing import Final, NamedTuple
 
@@ -85,6 +86,11 @@ def view_id(angles: ViewAngles) -> str:
 def track_id(view: str, number: int) -> str:
     """Returns the id of the track of a view and a pass (spec/pyramid.md §8)."""
     return f"{view}+{number}" if number else view
+
+
+def views_around(directions: int, pitches: Sequence[float]) -> tuple[ViewAngles, ...]:
+    """Returns views at evenly spaced look-at angles, counter-clockwise from north; only one at pitch 90, which looks straight down."""
+    return tuple(ViewAngles(360.0 * k / directions, pitch) for pitch in pitches for k in range(1 if pitch == 90 else directions))
 
 
 def parse_view(text: str) -> ViewAngles:

@@ -10,6 +10,7 @@ from pyproj.crs import CompoundCRS
 from map3d.catalogue import SceneCrs
 from map3d.errors import CrsError
 from map3d.geometry.crs import is_local, parse_crs, vertical_crs
+from map3d.ingest.coordinate_check import CoordinateCheck
 from map3d.ingest.crs_transformer import CrsTransformer, Points, choose_scene_crs
 from map3d.ingest.scene_crs import LOCAL, to_scene_crs
 
@@ -19,8 +20,9 @@ _FORMATS_WITHOUT_CRS: Final = ("obj",)
 class AssetReprojector:
     """Transforms the positions of one asset to the scene's CRS. While the scene has none, the first positions determine it."""
 
-    def __init__(self, format: str, asset_crs: str | None, scene_crs: str | None) -> None:
-        """`asset_crs`: the name given by the user or the file, None without one; `scene_crs`: WKT, "local", or None while the scene has no CRS.
+    def __init__(self, format: str, asset_crs: str | None, scene_crs: str | None, *, stated: bool = False) -> None:
+        """`asset_crs`: the name given by the user (`stated`) or the file, None without one; `scene_crs`: WKT, "local", or None while the scene has
+        no CRS.
 
         Raises CrsError if the two are incompatible.
         """
@@ -29,6 +31,7 @@ class AssetReprojector:
         self._target = None if scene_crs is None or self._scene_is_local else CRS.from_user_input(scene_crs)
         self._source = None if asset_crs is None or is_local(asset_crs) else parse_crs(asset_crs)
         self._transformer: CrsTransformer | None = None
+        self._check = None if self._source is None else CoordinateCheck(self._source, asset_crs or "", stated=stated, target=self._target)
         if self._source is not None and self._scene_is_local:
             raise CrsError(
                 f"the file is in {self._source.name}, but the scene is in local metres; "
@@ -37,9 +40,10 @@ class AssetReprojector:
 
     def to_world(self, points: Points) -> Points:
         """Returns (n, 3) world coordinates. Raises CrsError if the CRS of the points is unknown."""
-        if self._source is None:
+        if self._source is None or self._check is None:
             self._check_crs_is_optional()
             return points
+        points = self._check.ordered(np.asarray(points, dtype=np.float64))
         if self._transformer is None:
             self._target = self._target or _with_vertical_crs(choose_scene_crs(self._source, points), self._source)
             self._transformer = CrsTransformer(self._source, self._target)
@@ -47,10 +51,11 @@ class AssetReprojector:
 
     def transforms_to_world(self, transforms: NDArray[np.float64]) -> NDArray[np.float64]:
         """Converts (m, 12) prototype-to-source transforms to prototype-to-world."""
-        if self._source is None:
+        if self._source is None or self._check is None:
             return transforms
         if self._transformer is None and len(transforms):
             self.to_world(transforms.reshape(-1, 3, 4)[:, :, 3])
+        transforms = self._check.ordered_transforms(transforms)
         return transforms if self._transformer is None else self._transformer.transforms_to_world(transforms)
 
     @property
@@ -63,12 +68,18 @@ class AssetReprojector:
     @property
     def report(self) -> dict[str, Any]:
         if self._transformer is not None:
-            return self._transformer.report
+            place = None if self._check is None else self._check.place
+            return self._transformer.report | ({} if place is None else {"place": str(place)})
         return {
             "from": self._asset_crs or "no CRS named",
             "to": self._target.name if self._target is not None else LOCAL.name,
             "operation": "none: coordinates are unchanged",
         }
+
+    @property
+    def warnings(self) -> list[dict[str, Any]]:
+        """Returns what is odd about the coordinates, as warnings of a report."""
+        return [] if self._check is None else self._check.warnings
 
     def _check_crs_is_optional(self) -> None:
         if self._asset_crs is None and self._format not in _FORMATS_WITHOUT_CRS and not self._scene_is_local:

@@ -1,42 +1,93 @@
 """Detects the format of a file from its content, not from its name."""
 
 import re
+import stat
 from pathlib import Path
 from typing import Final, Literal
 
 from map3d.errors import NotFound, UnknownFormat
+from map3d.ingest.gzip_file import is_gzip, unpacked_head
 
 Format = Literal["citygml", "obj", "raster"]
 
-READABLE_FORMATS: Final = "CityGML (.gml, .xml), Wavefront OBJ (.obj), elevation and image rasters (.tif)"
+READABLE_FORMATS: Final = (
+    "CityGML (.gml, .xml), Wavefront OBJ (.obj), elevation and image rasters (.tif, .jp2, .asc; .jpg and .png with a world file)"
+)
 _HEAD_BYTES: Final = 1 << 16
 _OBJ_LINE: Final = re.compile(rb"(v|vt|vn|vp|f|l|p|o|g|s|mtllib|usemtl)(\s|$)")
 _TIFF: Final = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+_JPEG_2000: Final = (b"\0\0\0\x0cjP  ", b"\xffO\xffQ")
+_ASCII_GRID: Final = re.compile(rb"ncols\s+\d", re.IGNORECASE)
+_WORLD_FILES: Final = {b"\xff\xd8\xff": (".jgw", ".jpgw", ".jpegw", ".wld"), b"\x89PNG": (".pgw", ".pngw", ".wld")}
 _BYTE_ORDER_MARKS: Final = ((b"\xef\xbb\xbf", "utf-8"), (b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"))
 _UNREADABLE: Final = {
     b"glTF": "glTF (binary)",
     b"PK\x03\x04": "a ZIP archive",
-    b"\x1f\x8b": "a gzip file",
     b"LASF": "a LAS point cloud",
-    b"\x89PNG": "a PNG image",
+    b"\x89PNG": "a PNG image without a world file",
+    b"\xff\xd8\xff": "a JPEG image without a world file",
+    b"<VRTDataset": "a virtual raster; convert it with gdal_translate -of COG",
 }
+_OTHER_RASTERS: Final = {
+    ".ecw": "an ECW raster (GDAL driver ECW)",
+    ".sid": "a MrSID raster (GDAL driver MrSID)",
+    ".img": "a raster of ERDAS Imagine (GDAL driver HFA)",
+    ".xyz": "a grid of points (GDAL driver XYZ)",
+    ".bil": "an EHdr raster (GDAL driver EHdr)",
+    ".hgt": "an SRTM raster (GDAL driver SRTMHGT)",
+}
+"""Suffixes of rasters that are not read, since they need other drivers or files."""
+_KINDS: Final = {
+    stat.S_IFIFO: "a named pipe",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFDIR: "a folder",
+}
+_BLOCK_BYTES: Final = 512
+_MAX_SPARSE_BYTES: Final = 1 << 30
+_MIN_STORED: Final = 0.01
+"""Share of a large file that is stored. Compressing file systems store at least this."""
+
+
+def check_stored(path: Path) -> None:
+    """Checks that reading the file ends: it is a regular file whose content is stored. Raises UnknownFormat, OSError."""
+    status = path.stat()
+    if not stat.S_ISREG(status.st_mode):
+        raise UnknownFormat(f"{path}: not a file but {_KINDS.get(stat.S_IFMT(status.st_mode), 'something else')}")
+    stored = status.st_blocks * _BLOCK_BYTES
+    if status.st_size > _MAX_SPARSE_BYTES and stored < status.st_size * _MIN_STORED:
+        raise UnknownFormat(f"{path}: a sparse file of {status.st_size:,} bytes, of which only {stored:,} are stored")
 
 
 def detect_format(path: Path) -> Format:
-    """Raises NotFound, or UnknownFormat with the list of readable formats."""
+    """Returns the format of a file, or of what a gzip file holds. Raises NotFound, or UnknownFormat with the list of readable formats."""
     try:
-        with path.open("rb") as file:
-            head = file.read(_HEAD_BYTES)
+        check_stored(path)
+        packed = is_gzip(path)
+        head = unpacked_head(path, _HEAD_BYTES) if packed else _read_head(path)
     except OSError as error:
         raise NotFound(f"{path}: cannot read the file: {error.strerror}") from error
-    format = _detect(head)
-    if format is None:
-        raise UnknownFormat(f"{path}: {_describe_unknown(head)}; map3d reads {READABLE_FORMATS}")
+    format = _detect(path, head)
+    if format is None or (packed and format == "raster"):
+        content = "a raster; unpack it first" if format else _describe_unknown(path, head)
+        raise UnknownFormat(f"{path}: {'a gzip file of ' if packed else ''}{content}; map3d reads {READABLE_FORMATS}")
     return format
 
 
-def _detect(head: bytes) -> Format | None:
-    if head.startswith(_TIFF):
+def has_world_file(path: Path, head: bytes) -> bool:
+    """Whether an image has a world file beside it. `head`: the first bytes of the image."""
+    suffixes = next((suffixes for magic, suffixes in _WORLD_FILES.items() if head.startswith(magic)), ())
+    return any(path.with_suffix(case(suffix)).is_file() for suffix in suffixes for case in (str.lower, str.upper))
+
+
+def _read_head(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(_HEAD_BYTES)
+
+
+def _detect(path: Path, head: bytes) -> Format | None:
+    if head.startswith((*_TIFF, *_JPEG_2000)) or _ASCII_GRID.match(head) or has_world_file(path, head):
         return "raster"
     text = _to_utf8(head).lstrip()
     if text.startswith(b"<"):
@@ -67,9 +118,11 @@ def _looks_like_obj(text: bytes) -> bool:
     return known > 0 and known * 10 >= len(lines) * 9
 
 
-def _describe_unknown(head: bytes) -> str:
+def _describe_unknown(path: Path, head: bytes) -> str:
     if not head:
         return "an empty file"
+    if path.suffix.lower() in _OTHER_RASTERS:
+        return f"{_OTHER_RASTERS[path.suffix.lower()]}; convert it with gdal_translate -of COG"
     for magic, name in _UNREADABLE.items():
         if head.startswith(magic):
             return name

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from map3d.ingest.gzip_file import content_bytes
 from map3d.subprocess import Limits
 
 GIB: Final = 1 << 30
@@ -18,36 +19,43 @@ OPEN_FILES: Final = 256
 @dataclass(frozen=True)
 class ImportOptions:
     """`crs`: overrides the CRS that the file names, or supplies a missing one; "local" for plain metres. `up`, `split`: OBJ only.
-    `theme`, `lod`: CityGML only. A limit of None means its default."""
+    `theme`, `lod`, `interiors` (draws rooms): CityGML only. `transparency` of materials: "as-is", "inverted" (it is opacity), or "auto"
+    (decided for each file). `max_error_m`: greatest height error of the triangles of an elevation model, 0 keeps every height.
+    A limit of None means its default."""
 
     crs: str | None = None
     up: str = "z"
     split: str = "file"
     theme: str | None = None
     lod: str | None = None
+    transparency: str = "auto"
+    max_error_m: float = 0.0
     strict: bool = False
     name: str | None = None
     parse_memory_bytes: int | None = None
     parse_cpu_s: int | None = None
+    interiors: bool = False
 
     def reader_options(self, format: str, limits: Limits) -> dict[str, Any]:
         """Returns the options of the core's Reader."""
         options: dict[str, Any] = {"strict": self.strict}
         if format == "obj":
-            options |= {"up": self.up, "split": self.split}
+            options |= {"up": self.up, "split": self.split, "transparency": self.transparency}
         elif format == "citygml":
-            options |= {"theme": self.theme, "lod": self.lod}
+            options |= {"theme": self.theme, "lod": self.lod, "transparency": self.transparency} | ({"interiors": True} if self.interiors else {})
+        elif format == "raster" and self.max_error_m:
+            options |= {"max_error_m": self.max_error_m}
         if limits.address_space_bytes is not None:
             options |= {"max_object_bytes": limits.address_space_bytes // 4, "max_appearance_bytes": limits.address_space_bytes // 4}
         return options
 
     def limits(self, paths: Sequence[Path], format: str) -> Limits:
-        """Returns the limits for files of this size and format.
+        """Returns the limits for files of this size, unpacked, and format. Raises LimitExceeded for a gzip file that unpacks to too much.
 
         Memory: 1 GiB; 2 GiB for rasters and files over 100 MB. Processor time: 60 s (rasters: 600 s) per 100 MB or part of it. Wall time: four
         times the processor time plus 10 s.
         """
-        size = sum(path.stat().st_size for path in paths)
+        size = sum(map(content_bytes, paths))
         raster = format == "raster"
         cpu_s = self.parse_cpu_s or (CPU_S_PER_BIG_RASTER if raster else CPU_S_PER_BIG_FILE) * max(1, -(-size // BIG_FILE_BYTES))
         memory = self.parse_memory_bytes or (2 * GIB if raster or size > BIG_FILE_BYTES else GIB)

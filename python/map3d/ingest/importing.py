@@ -6,14 +6,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from map3d import errors
+from map3d import _core, errors
 from map3d.catalogue import AssetRecord, Catalogue, SceneCrs, SceneRecord, Workspace
 from map3d.catalogue.scene_lock import scene_lock
 from map3d.errors import CrsError, ImportFailed, LimitExceeded, Map3dError, SubprocessDied, SubprocessTimedOut
 from map3d.ingest.asset import asset_digest, new_objects, put_in_place, read_objects, world_boxes, write_ids, write_report
+from map3d.ingest.content import find_content
 from map3d.ingest.import_inputs import ImportInputs, import_inputs
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.parser_process import ParserProcess
+from map3d.ingest.referenced_files import find_missing_files
 from map3d.ingest.scene_crs import LOCAL
 from map3d.ingest.sources import SourceDocument
 from map3d.ingest.unfinished_imports import draft_path, finish_imports, mark_import, remove_dead_drafts, unmark_import
@@ -24,7 +26,8 @@ from map3d.types import Box, Vec3
 PARSER_ENTRIES: Final = {"raster": "map3d.ingest.terrain.parse_terrain:open_terrain_parser"}
 DOCUMENT_PARSER_ENTRY: Final = "map3d.ingest.parse_document:open_document_parser"
 ORIGIN_STEP_M: Final = 100.0
-MAX_FROM_ORIGIN_M: Final = 1e8
+MAX_MISSING_NAMES: Final = 200
+MAX_FROM_ORIGIN_M: Final = _core.MAX_FROM_ORIGIN_M
 
 OnProgress = Callable[[str], None]
 """Called with the number of triangles or tiles read so far, as text."""
@@ -91,9 +94,10 @@ def _parse(
         "name": source.name,
         "format": source.format,
         "folder": str(draft.absolute()),
-        "reader": options.reader_options(source.format, limits),
+        "reader": options.reader_options(source.format, limits) | _root_option(source),
         "crs": options.crs,
         "scene_crs": _crs_text(record.crs),
+        "scene_origin": record.origin,
     }
     try:
         subprocess, applied = parser.get(entry, limits)
@@ -129,15 +133,17 @@ def _add_to_scene(
 ) -> Imported:
     scene, lines = before.name, read_objects(draft)
     boxes = world_boxes(draft, len(lines))
-    record = _pin_scene(catalogue, before, proposed, boxes)
+    extent = find_content([draft], (0.0, 0.0, 0.0), {}).extent
+    usual = boxes if extent is None else world_boxes(draft, len(lines), extent)
+    record = _pin_scene(catalogue, before, proposed, usual)
     assert record.origin is not None, "the scene is pinned"
-    _check_distance(source, boxes, record.origin)
+    _check_distance(source, usual, record.origin)
     final, path = workspace.asset_folder(scene, source.name), str(source.paths[0].absolute())
     mark_import(final, path, source.format, inputs.digest)
     with Registry(workspace.registry_path(scene)) as registry:
         ids = registry.put_asset(source.name, new_objects(lines, boxes, record.origin))
     write_ids(draft, ids)
-    report |= inputs.report()
+    report |= inputs.report() | _missing_files(source) | {"bytes": sum(path.stat().st_size for path in source.paths)}
     write_report(draft, report)
     replaced = final.exists()
     digest = asset_digest(draft)
@@ -145,6 +151,20 @@ def _add_to_scene(
     catalogue.put_asset(AssetRecord(scene, source.name, path, source.format, digest, inputs.digest, report))
     unmark_import(final)
     return Imported(source.name, str(source.paths[0]), source.format, len(lines), report["triangles"], replaced, report)
+
+
+def _root_option(source: SourceDocument) -> dict[str, str]:
+    """The folder in which the reader opens files that the document names; by default, the document's own."""
+    return {} if source.root is None or source.format == "raster" else {"folder": str(source.root.absolute())}
+
+
+def _missing_files(source: SourceDocument) -> dict[str, Any]:
+    """Returns the first names of missing files, and how many of the images are missing."""
+    if source.format == "raster":
+        return {}
+    found = find_missing_files(source.paths[0], source.root)
+    textures = {"textures": {"images": found.images, "missing": found.missing_images}} if found.images else {}
+    return textures | ({"missing_files": found.names[:MAX_MISSING_NAMES]} if found.names else {})
 
 
 def _pin_scene(catalogue: Catalogue, before: SceneRecord, proposed: SceneCrs | None, boxes: list[Box | None]) -> SceneRecord:

@@ -3,66 +3,103 @@
 import hashlib
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from map3d.errors import NotFound, UnknownFormat
-from map3d.ingest.formats import READABLE_FORMATS, Format, detect_format
-from map3d.ingest.referenced_files import find_referenced_files
+from map3d.ingest.formats import READABLE_FORMATS, Format, check_stored, detect_format, has_world_file
+from map3d.ingest.gzip_file import unpacked_path
+from map3d.ingest.referenced_files import find_code_lists, find_referenced_files
 
 _COMPANION_SUFFIXES = (
-    ".mtl", ".jpg", ".jpeg", ".png", ".bmp", ".gif", ".tga", ".txt", ".md", ".json", ".pdf", ".html", ".prj", ".tfw", ".xsd", ".sqlite",
+    ".mtl", ".jpg", ".jpeg", ".png", ".bmp", ".gif", ".tga", ".txt", ".md", ".json", ".pdf", ".html", ".prj", ".tfw",
+    ".jgw", ".pgw", ".wld", ".xsd", ".sqlite",
 )  # fmt: skip
-_SOURCE_SUFFIXES = (".gml", ".citygml", ".obj", ".tif", ".tiff")
+_DOCUMENT_NAMES = ("license", "licence", "copying", "notice", "readme", "authors", "changelog", "changes")
+"""Files that begin so and have no suffix accompany data, too."""
+_SOURCE_SUFFIXES = (".gml", ".citygml", ".obj", ".tif", ".tiff", ".jp2", ".asc")
 """Files with these suffixes are reported if they are unreadable."""
+_CODE_LIST_SUFFIXES = (".xml", ".gml")
+
+_ORDER: Mapping[Format, int] = {"citygml": 0, "obj": 1, "raster": 2}
+"""CityGML files name the CRS of the scene, which OBJ files and rasters may lack."""
 
 OnUnreadable = Callable[[Path, str], None]
 """Called with an unreadable file of a folder and the reason."""
 
+_HEAD_BYTES = 4096
+
 
 @dataclass(frozen=True)
 class SourceDocument:
-    """`paths`: the document; for terrain, its rasters."""
+    """`paths`: the document; for terrain, its rasters. `root`: the given folder, in which files that the document names may be; None for a document
+    that was given itself, whose files are in its own folder."""
 
     name: str
     format: Format
     paths: tuple[Path, ...]
+    root: Path | None = None
 
 
-def find_sources(paths: Iterable[Path], name: str | None = None, on_unreadable: OnUnreadable | None = None) -> list[SourceDocument]:
-    """Returns the given files, and every file of a known format below the given folders, sorted by path. The rasters of a folder are one source.
+def find_sources(
+    paths: Iterable[Path], name: str | None = None, on_unreadable: OnUnreadable | None = None, on_left_alone: OnUnreadable | None = None
+) -> list[SourceDocument]:
+    """Returns the given files, and every file of a known format below the given folders: CityGML, OBJ, then rasters, each by path.
 
-    `on_unreadable` is called for files in folders whose suffix announces a known format that their content is not.
+    The rasters below a given folder are one source, named after the folder that holds them all; those given one by one are one source, named after
+    the first.
+
+    `on_unreadable` is called for files in folders whose suffix announces a known format that their content is not; `on_left_alone` for other files
+    that hold a city or a raster in a format that map3d does not read, or whose format is unknown.
 
     Raises UnknownFormat for a given file of unknown format and for a folder without any readable file; NotFound.
     """
-    found: list[tuple[Path, Format]] = []
+    documents: list[_Group] = []
+    terrains: list[_Group] = []
+    rasters: list[Path] = []
     for path in paths:
         if path.is_dir():
-            found += _search_folder(path, on_unreadable or (lambda *_: None))
-        elif path.exists():
-            found.append((path, detect_format(path)))
-        else:
+            found = _search_folder(path, on_unreadable or (lambda *_: None), on_left_alone or (lambda *_: None))
+            documents += [_Group(unpacked_path(file).stem, format, (file,), path) for file, format in found if format != "raster"]
+            terrains += _group_rasters([file for file, format in found if format == "raster"])
+        elif not path.exists():
             raise NotFound(f"{path}: no such file or folder")
-    return _name_sources(_group_rasters(found), name)
+        elif (format := detect_format(path)) == "raster":
+            rasters.append(path)
+        else:
+            documents.append(_Group(unpacked_path(path).stem, format, (path,)))
+    if rasters:
+        terrains.append(_Group(rasters[0].stem, "raster", tuple(rasters)))
+    sources = _name_sources([*documents, *terrains], name)
+    return sorted(sources, key=lambda source: _ORDER[source.format])
 
 
 def source_digest(source: SourceDocument) -> str:
-    """Computes the digest of the document, the files beside it whose names begin with its stem, and the libraries and images that it references."""
+    """Computes the digest of the document, the files beside it whose names begin with its stem, and the libraries, images and code lists that it
+    references."""
     total = hashlib.sha256()
     for path in source.paths:
-        for part in [path, *_find_companions(path)]:
+        for part in [path, *_find_companions(path, source.root)]:
+            check_stored(part)
             total.update(part.name.encode())
             with part.open("rb") as file:
                 total.update(hashlib.file_digest(file, "sha256").digest())
     return total.hexdigest()[:32]
 
 
-def _search_folder(folder: Path, on_unreadable: OnUnreadable) -> list[tuple[Path, Format]]:
-    found, unknown = [], []
-    for path in sorted(path for path in _walk(folder) if path.is_file() and not path.name.startswith(".")):
+def _search_folder(folder: Path, on_unreadable: OnUnreadable, on_left_alone: OnUnreadable) -> list[tuple[Path, Format]]:
+    found: list[tuple[Path, Format]] = []
+    unknown: list[tuple[Path, str]] = []
+    for path in sorted(path for path in _walk(folder) if path.exists() and not path.name.startswith(".")):
+        if not path.suffix and path.name.lower().startswith(_DOCUMENT_NAMES):
+            continue
         if path.suffix.lower() in _COMPANION_SUFFIXES:
+            head = _read_head(path) if path.is_file() else b""
+            if has_world_file(path, head):
+                found.append((path, "raster"))
+            elif path.suffix.lower() == ".json" and b'"CityJSON' in head:
+                unknown.append((path, "CityJSON; convert it to CityGML with citygml-tools"))
             continue
         try:
             found.append((path, detect_format(path)))
@@ -71,10 +108,30 @@ def _search_folder(folder: Path, on_unreadable: OnUnreadable) -> list[tuple[Path
     if not found:
         example = f" (found {unknown[0][1].partition(';')[0]})" if unknown else ""
         raise UnknownFormat(f"{folder}: no readable file in this folder{example}; map3d reads {READABLE_FORMATS}")
+    used = _used_code_lists(folder, found, [path for path, _ in unknown])
     for path, reason in unknown:
-        if path.suffix.lower() in _SOURCE_SUFFIXES:
+        if path.resolve() in used:
+            continue
+        if unpacked_path(path).suffix.lower() in _SOURCE_SUFFIXES:
             on_unreadable(path, reason)
+        else:
+            on_left_alone(path, reason.removeprefix(f"{path}: ").partition("; map3d reads")[0])
     return found
+
+
+def _used_code_lists(folder: Path, found: Sequence[tuple[Path, Format]], unknown: Sequence[Path]) -> set[Path]:
+    """Returns the code lists that the CityGML files of a folder name; they are read with these files."""
+    if not any(path.suffix.lower() in _CODE_LIST_SUFFIXES for path in unknown):
+        return set()
+    return {used for path, format in found if format == "citygml" for used in find_code_lists(path, folder)}
+
+
+def _read_head(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            return file.read(_HEAD_BYTES)
+    except OSError as error:
+        raise NotFound(f"{path}: cannot read the file: {error.strerror}") from error
 
 
 def _walk(folder: Path) -> Iterator[Path]:
@@ -87,28 +144,35 @@ def _walk(folder: Path) -> Iterator[Path]:
         yield from (Path(place, name) for name in names)
 
 
-def _group_rasters(found: Sequence[tuple[Path, Format]]) -> list[tuple[Format, tuple[Path, ...]]]:
-    rasters: dict[Path, list[Path]] = {}
-    groups: list[tuple[Format, tuple[Path, ...]]] = []
-    for path, format in found:
-        if format == "raster":
-            rasters.setdefault(path.parent, []).append(path)
-        else:
-            groups.append((format, (path,)))
-    return groups + [("raster", tuple(paths)) for paths in rasters.values()]
+@dataclass(frozen=True)
+class _Group:
+    """Files of one source; `label`: the text from which its name is made."""
+
+    label: str
+    format: Format
+    paths: tuple[Path, ...]
+    root: Path | None = None
 
 
-def _name_sources(groups: Sequence[tuple[Format, tuple[Path, ...]]], name: str | None) -> list[SourceDocument]:
+def _group_rasters(rasters: Sequence[Path]) -> list[_Group]:
+    """Returns the rasters of a folder as one source: an elevation model and a photo belong together, and tiles make a mosaic."""
+    if not rasters:
+        return []
+    folder = Path(os.path.commonpath([path.parent for path in rasters]))
+    return [_Group(rasters[0].stem if len(rasters) == 1 else folder.resolve().name, "raster", tuple(rasters))]
+
+
+def _name_sources(groups: Sequence[_Group], name: str | None) -> list[SourceDocument]:
     """Names sources after their files and numbers duplicates."""
     taken: set[str] = set()
     sources = []
-    for format, paths in groups:
-        wanted = asset_name(name or (paths[0].stem if format != "raster" or len(paths) == 1 else paths[0].parent.name))
+    for group in groups:
+        wanted = asset_name(name or group.label)
         unique, number = wanted, 2
         while unique in taken:
             unique, number = f"{wanted[:58]}-{number}", number + 1
         taken.add(unique)
-        sources.append(SourceDocument(unique, format, paths))
+        sources.append(SourceDocument(unique, group.format, group.paths, group.root))
     return sources
 
 
@@ -118,9 +182,9 @@ def asset_name(text: str) -> str:
     return plain[:64] or "asset"
 
 
-def _find_companions(path: Path) -> list[Path]:
-    beside = {other.resolve() for other in path.parent.glob(f"{_escape_glob(path.stem)}.*") if other.is_file()}
-    return sorted((beside | find_referenced_files(path)) - {path.resolve()})
+def _find_companions(path: Path, root: Path | None) -> list[Path]:
+    beside = {other.resolve() for other in path.parent.glob(f"{_escape_glob(unpacked_path(path).stem)}.*") if other.is_file()}
+    return sorted((beside | find_referenced_files(path, root)) - {path.resolve()})
 
 
 def _escape_glob(stem: str) -> str:

@@ -15,6 +15,7 @@ from rasterio.shutil import copy
 
 from map3d.errors import BadRequest, CrsError, ImportFailed, LimitExceeded, NotFound, Stopped
 from map3d.ingest.terrain import terrain_import
+from map3d.ingest.terrain.height_tint import COLOURS
 from map3d.ingest.terrain.terrain_import import TerrainOptions, import_terrain
 from tests.ingest.terrain.rasters import NORTH, WEST, RecordingWriter, colours, from_bounds, hills, pixel_of, write
 
@@ -94,12 +95,26 @@ def test_objects_are_terrain_tiles_named_by_row_and_column(tmp_path, folder):
     assert "25832" in report["crs"]
 
 
-def test_terrain_without_a_photo_has_one_untextured_material(tmp_path, folder):
-    writer, _ = run(write(tmp_path / "dem.tif", hills(20, 40)), None, folder, tile_cells=16, ground=(255, 0, 51))
-    assert len(writer.materials) == 1
-    assert (writer.materials[0]["texture"], writer.materials[0]["diffuse"]) == (None, [1.0, 0.0, 0.2, 1.0])
-    assert all(uvs is None for _, _, uvs, *_ in writer.meshes)
-    assert list((folder / "textures").iterdir()) == []
+def test_terrain_without_a_photo_has_the_colours_of_its_heights(tmp_path, folder):
+    slope = np.broadcast_to(np.linspace(100.0, 300.0, 201)[None, None, :], (1, 40, 201)).astype(np.float32)
+    writer, _ = run(write(tmp_path / "dem.tif", slope), None, folder, tile_cells=16)
+    (material,) = writer.materials
+    assert [path.stem for path in (folder / "textures").iterdir()] == [material["texture"]]
+    assert (material["diffuse"], material["wrap"]) == ([1.0, 1.0, 1.0, 1.0], "clamp")
+    parts, ramp = [part for part, _ in COLOURS], np.array([colour for _, colour in COLOURS])
+    for positions, triangles, uvs, *_ in writer.meshes:
+        for height, uv in zip(positions[triangles].reshape(-1, 3)[::7, 2], uvs.reshape(-1, 2)[::7], strict=True):
+            expected = [np.interp((height - 101.0) / 198.0, parts, ramp[:, channel]) for channel in range(3)]
+            np.testing.assert_allclose(sample(folder, material, uv), expected, atol=3)
+
+
+def test_flat_terrain_without_a_photo_stays_green_and_gaps_do_not_matter(tmp_path, folder):
+    data = hills(40, 40) * 0 + 7
+    data[0, :, :25] = np.nan
+    writer, _ = run(write(tmp_path / "dem.tif", data), None, folder, tile_cells=16)
+    red, green, blue = sample(folder, writer.materials[0], writer.meshes[0][2].reshape(-1, 2)[0])
+    assert green > red
+    assert green > blue
 
 
 def check_colours(writer, folder, colour_at, tolerance=6):
@@ -199,7 +214,7 @@ def test_gaps_in_the_dem_are_gaps_in_the_terrain(tmp_path, folder, gap):
     columns, rows = (points[:, 0] - WEST).astype(int), (NORTH - points[:, 1]).astype(int)
     assert not hole[np.clip(rows, 0, 29), np.clip(columns, 0, 29)].any()
     assert len(points) == 32 * 32 - 75
-    assert report["skipped"] == {"no_height": 75}
+    assert report["skipped"] == {"grid points without a height": 75}
     assert bool(report["warnings"]) == (gap == "implausible")
 
 
@@ -412,8 +427,9 @@ def test_too_many_triangles_are_refused_with_advice(tmp_path, folder, monkeypatc
         monkeypatch.setattr(terrain_import, "MAX_TRIANGLES", limit)
         run(dem, None, folder)
     monkeypatch.setattr(terrain_import, "MAX_TRIANGLES", triangles - 1)
-    with pytest.raises(LimitExceeded, match="gdal_translate"):
+    with pytest.raises(LimitExceeded, match=r"--max-error 0\.1, or reduce the resolution with gdal_translate"):
         run(dem, None, folder)
+    run(dem, None, folder, max_error_m=0.5)
 
 
 def test_the_user_can_stop_the_import(tmp_path, folder):

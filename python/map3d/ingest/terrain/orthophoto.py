@@ -112,18 +112,31 @@ class Orthophoto:
         return data if len(data) == 3 else np.repeat(data[:1], 3, axis=0)
 
     def _find_stretch(self) -> tuple[float, float]:
-        """Returns the full range for bytes, [0, 1] or [0, 255] for values within; otherwise the 0.5th to the 99.5th percentile of all bands."""
-        if self.dataset.dtypes[self._bands[0] - 1] == "uint8":
-            return 0.0, 255.0
-        shape = (min(self.dataset.height, SAMPLE_PX), min(self.dataset.width, SAMPLE_PX))
-        data = self.dataset.read(self._bands, out_shape=(len(self._bands), *shape), masked=True).astype(np.float64)
-        values = np.ma.masked_invalid(data).compressed()
-        if not len(values):
-            return 0.0, 255.0
-        if values.min() >= 0 and values.max() <= 255:
-            return (0.0, 1.0) if values.max() <= 1.0 else (0.0, 255.0)
-        low, high = (float(value) for value in np.percentile(values, [0.5, 99.5]))
-        return (low, high) if high > low else (low, low + 1.0)
+        """Returns the full range for bytes, otherwise a range that the values suggest."""
+        values = sample_values(self.dataset, 1)
+        return (0.0, 255.0) if values is None else find_stretch(values)
+
+
+def sample_values(dataset: Any, count: int) -> NDArray[np.float64] | None:
+    """Returns values of the colour bands, evenly spread, fewer if this is one of `count` photos; None for bytes."""
+    bands = _find_colour_bands(dataset)
+    if dataset.dtypes[bands[0] - 1] == "uint8":
+        return None
+    side = max(int(SAMPLE_PX / count**0.5), 16)
+    shape = (min(dataset.height, side), min(dataset.width, side))
+    data = dataset.read(bands, out_shape=(len(bands), *shape), masked=True).astype(np.float64)
+    values: NDArray[np.float64] = np.ma.masked_invalid(data).compressed()
+    return values
+
+
+def find_stretch(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Returns [0, 1] or [0, 255] for values within; otherwise the 0.5th to the 99.5th percentile."""
+    if not len(values):
+        return 0.0, 255.0
+    if values.min() >= 0 and values.max() <= 255:
+        return (0.0, 1.0) if values.max() <= 1.0 else (0.0, 255.0)
+    low, high = (float(value) for value in np.percentile(values, [0.5, 99.5]))
+    return (low, high) if high > low else (low, low + 1.0)
 
 
 def _find_colour_bands(dataset: Any) -> list[int]:

@@ -13,6 +13,8 @@ from map3d.geometry.crs import is_local, parse_crs
 from map3d.ingest.crs_transformer import choose_scene_crs
 from map3d.ingest.scene_crs import LOCAL, to_scene_crs
 from map3d.ingest.terrain.raster_georeference import open_raster
+from map3d.ingest.terrain.raster_groups import split_far
+from map3d.ingest.terrain.raster_placement import RasterPlacement
 from map3d.ingest.terrain.terrain_import import TerrainOptions, import_terrain
 from map3d.subprocess import Handler, ReportProgress
 
@@ -27,21 +29,38 @@ def open_terrain_parser(_setup: Mapping[str, Any]) -> Handler:
 
 
 def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
-    """`request`: {"paths", "folder", "name", "crs", "scene_crs", "reader"}; the response is that of map3d.ingest.parse_document."""
+    """`request`: {"paths", "folder", "name", "crs", "scene_crs", "scene_origin", "reader"}; the response is that of map3d.ingest.parse_document."""
     rasters, faults = open_rasters([Path(path) for path in request["paths"]], strict=request["reader"]["strict"])
-    dem, ortho = classify_rasters(rasters)
-    target = _choose_target(dem or ortho, request["crs"], request["scene_crs"])
+    dems, orthos = classify_rasters(rasters)
+    target = _choose_target(next(iter(dems or orthos), None), request["crs"], request["scene_crs"])
+    near, far = split_far(rasters, target, request["crs"])
+    if far and request["scene_crs"] is None:
+        dems, orthos = classify_rasters(near)
+        target = _choose_target(next(iter(dems or orthos), None), request["crs"], None)
+    dems, orthos = ([raster for raster in kind if raster in near] for kind in (dems, orthos))
+    placement = RasterPlacement(request["crs"], request["scene_crs"], request["scene_origin"])
+    for raster in near:
+        placement.check(raster)
 
     def on_tile(_stage: str, done: int, total: int) -> bool:
         report_progress({"done": done, "total": total})
         return True
 
-    terrain = import_terrain(dem, ortho, Path(request["folder"]), target, TerrainOptions(name=request["name"], crs=request["crs"]), on_tile)
+    options = TerrainOptions(name=request["name"], max_error_m=request["reader"].get("max_error_m", 0.0), crs=request["crs"])
+    terrain = import_terrain(dems, orthos, Path(request["folder"]), target, options, on_tile)
     proposed = LOCAL if target is None else to_scene_crs(target)
     placing = {"from": terrain["crs"] and CRS.from_user_input(terrain["crs"]).name, "to": proposed.name, **terrain["projection"]}
+    if placement.place is not None:
+        placing["place"] = str(placement.place)
+    terrain["warnings"] += placement.warnings
+    if far:
+        path, away_m = far[0]
+        example = f"{path.name} lies {away_m / 1000:,.0f} km from the other rasters; its CRS may be wrong, else import it alone"
+        terrain["warnings"].append({"reason": "raster left out, far from the others", "count": len(far), "example": example, "scope": "file"})
     if faults:
         terrain["warnings"].append({"reason": "raster skipped", "count": len(faults), "example": faults[0]})
-    return {"report": {**terrain, "placing": placing}, "crs": asdict(proposed)}
+    counts = {"elevation": len(dems), "imagery": len(orthos)}
+    return {"report": {**terrain, "rasters": counts, "placing": placing}, "crs": asdict(proposed)}
 
 
 def open_rasters(paths: Sequence[Path], *, strict: bool) -> tuple[list[Path], list[str]]:
@@ -59,16 +78,13 @@ def open_rasters(paths: Sequence[Path], *, strict: bool) -> tuple[list[Path], li
     return readable, [str(error) for error in faults]
 
 
-def classify_rasters(paths: Sequence[Path]) -> tuple[Path | None, Path | None]:
-    """Returns (elevation model, imagery). Imagery has three or four bands, or bytes. Raises ImportFailed for two rasters of one kind."""
-    found: dict[str, Path] = {}
+def classify_rasters(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
+    """Returns the elevation models and the imagery. Imagery has three or four bands, or bytes."""
+    found: tuple[list[Path], list[Path]] = ([], [])
     for path in paths:
         with open_raster(path) as raster:
-            kind = "imagery" if raster.count in IMAGE_BANDS or raster.dtypes[0] == "uint8" else "elevation"
-        if kind in found:
-            raise ImportFailed(f"{path}: second {kind} raster after {found[kind].name}; add at most one elevation model and one image at a time")
-        found[kind] = path
-    return found.get("elevation"), found.get("imagery")
+            found[raster.count in IMAGE_BANDS or raster.dtypes[0] == "uint8"].append(path)
+    return found
 
 
 def _choose_target(raster: Path | None, stated_crs: str | None, scene_crs: str | None) -> CRS | None:

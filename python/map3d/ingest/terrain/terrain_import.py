@@ -1,11 +1,11 @@
 """Imports an elevation model and an orthophoto as an asset of textured terrain tiles (spec/scene.md, Asset).
 
-Without an elevation model the terrain is flat, without a photo it has one colour. Rasters are read in windows, never as a whole.
+Without an elevation model the terrain is flat, without a photo it has the colours of its heights. Rasters are read in windows, never as a whole.
 """
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,8 +19,10 @@ from pyproj import CRS
 from map3d.errors import BadRequest, LimitExceeded, Stopped
 from map3d.geometry.crs import vertical_unit_m
 from map3d.ingest.terrain.grid_triangulation import Triangles, compact_vertices, orient_up, triangulate_all, triangulate_sparse
+from map3d.ingest.terrain.height_tint import HeightTint, write_tint
 from map3d.ingest.terrain.orthophoto import ALIGN_PX, MARGIN_PX, Orthophoto, TextureTile
 from map3d.ingest.terrain.raster_georeference import PlaneTransformer, RasterGeoreference, open_raster, own_crs, raster_crs
+from map3d.ingest.terrain.raster_mosaic import MosaicHeightField, MosaicPhoto, RasterMosaic
 from map3d.ingest.terrain.vertex_grid import (
     ConstantHeightField,
     GridTile,
@@ -37,7 +39,8 @@ OnTile = Callable[[str, int, int], bool]
 CLASS: Final = "terrain"
 RANK: Final = 0
 MAX_TRIANGLES: Final = 200_000_000
-REDUCE_RASTER: Final = "split the raster, or reduce its resolution with gdal_translate -tr"
+MAX_TILES: Final = 10_000_000
+REDUCE_RASTER: Final = "allow a height error, such as --max-error 0.1, or reduce the resolution with gdal_translate -tr"
 GDAL_CACHE_MB: Final = 64
 FLAT_TILE_CELLS: Final = 8
 UNITS_M: Final = {"m": 1.0, "metre": 1.0, "meter": 1.0, "metres": 1.0, "meters": 1.0, "ft": 0.3048, "foot": 0.3048, "feet": 0.3048}
@@ -59,7 +62,7 @@ class MeshWriter(Protocol):
 class TerrainOptions:
     """`max_error_m`: greatest height error of the triangles, 0 keeps every height. `height_m`: height of flat terrain without an elevation model.
     `height_unit_m`: metres per unit of the elevation model; None takes the unit from the file, else metres. `stretch`: photo values for black and
-    white; None derives them from the data. `ground`: sRGB colour where there is no photo. `crs`: overrides the CRS of both rasters, or supplies a
+    white; None derives them from the data. `ground`: sRGB colour in gaps of the photo. `crs`: overrides the CRS of both rasters, or supplies a
     missing one; "local" for plain metres."""
 
     name: str = "terrain"
@@ -84,24 +87,27 @@ class TerrainOptions:
 
 
 def import_terrain(
-    dem: Path | None,
-    ortho: Path | None,
+    dem: Path | Sequence[Path] | None,
+    ortho: Path | Sequence[Path] | None,
     asset_folder: Path,
     scene_crs: CRS | None,
     options: TerrainOptions | None = None,
     progress: OnTile | None = None,
     writer: MeshWriter | None = None,
 ) -> dict[str, Any]:
-    """Writes the asset into `asset_folder` and returns its report. With `scene_crs` None the scene is local and coordinates stay unchanged.
+    """Writes the asset into `asset_folder` and returns its report. Several rasters of one kind are a mosaic.
+
+    With `scene_crs` None the scene is local and coordinates stay unchanged.
 
     Raises NotFound, ImportFailed, CrsError, LimitExceeded, BadRequest, Stopped.
     """
     options = options or TerrainOptions()
-    if dem is None and ortho is None:
+    dems, orthos = _paths(dem), _paths(ortho)
+    if not dems and not orthos:
         raise BadRequest("nothing to import; give an elevation model, an orthophoto, or both")
     with rasterio.Env(GDAL_CACHEMAX=GDAL_CACHE_MB), ExitStack() as opened:
-        dem_data = None if dem is None else opened.enter_context(open_raster(dem))
-        ortho_data = None if ortho is None else opened.enter_context(open_raster(ortho))
+        dem_data = opened.enter_context(_open(dems, options, MAX_TRIANGLES / 2 if options.max_error_m == 0 else None)) if dems else None
+        ortho_data = opened.enter_context(_open(orthos, options)) if orthos else None
         builder = _TerrainBuilder(dem_data, ortho_data, scene_crs, options)
         (asset_folder / "textures").mkdir(parents=True, exist_ok=True)
         if writer is None:
@@ -114,6 +120,22 @@ def import_terrain(
     return report
 
 
+def _paths(rasters: Path | Sequence[Path] | None) -> Sequence[Path]:
+    return [] if rasters is None else [rasters] if isinstance(rasters, Path) else rasters
+
+
+def _open(paths: Sequence[Path], options: TerrainOptions, max_pixels: float | None = None) -> Any:
+    """Opens a raster, or a mosaic of several with at most `max_pixels`: if the finest pixels are too many, those of the next raster count."""
+    if len(paths) == 1:
+        return open_raster(paths[0])
+    mosaic = RasterMosaic(paths, options.crs)
+    for pixel in mosaic.pixels[1:]:
+        if max_pixels is None or mosaic.covered_pixels <= max_pixels:
+            break
+        mosaic = RasterMosaic(paths, options.crs, pixel)
+    return mosaic
+
+
 @dataclass
 class _TerrainContent:
     """Materials and objects of the asset, and counts for its report."""
@@ -123,8 +145,10 @@ class _TerrainContent:
     triangles: int = 0
     gaps: int = 0
     untextured_tiles: int = 0
-    untextured_material: int | None = None
-    """Index of the material without a texture."""
+    shared_material: int | None = None
+    """Index of the material of all tiles outside the photo, or of all without a photo."""
+    tint: HeightTint | None = None
+    """Colours of heights, without a photo."""
 
 
 class _TerrainBuilder:
@@ -134,26 +158,37 @@ class _TerrainBuilder:
         self._options = options
         self._base = ortho if dem is None else dem
         self._flat = dem is None
-        self._warnings: list[dict[str, Any]] = []
+        self._warnings: list[dict[str, Any]] = [warning for raster in (dem, ortho) for warning in _mosaic_warnings(raster)]
         crs = raster_crs(self._base, scene_crs, options.crs)
         self._georeference = RasterGeoreference(self._base, crs)
         self._scene_from_base = PlaneTransformer(crs, scene_crs)
         self._photo: Orthophoto | None = None
         if ortho is not None:
-            self._photo = Orthophoto(ortho, options.ground, options.texture_px, options.stretch)
+            photo_type = MosaicPhoto if isinstance(ortho, RasterMosaic) else Orthophoto
+            self._photo = photo_type(ortho, options.ground, options.texture_px, options.stretch)
             photo_crs = raster_crs(ortho, scene_crs, options.crs)
             self._photo_georeference = RasterGeoreference(ortho, photo_crs)
             self._photo_from_base = PlaneTransformer(crs, photo_crs)
-        self._height_field: HeightField = ConstantHeightField(options.height_m) if self._flat else RasterHeightField(dem, self._height_unit_m(dem))
+        self._height_field = self._open_heights(dem)
         self._grid = self._create_grid()
         self._warn_about_missing_crs(dem, ortho, scene_crs)
 
+    def _open_heights(self, dem: Any) -> HeightField:
+        if dem is None:
+            return ConstantHeightField(self._options.height_m)
+        if isinstance(dem, RasterMosaic):
+            return MosaicHeightField(dem, self._height_unit_m)
+        return RasterHeightField(dem, self._height_unit_m(dem))
+
     def write(self, writer: MeshWriter, textures: Path, progress: OnTile) -> _TerrainContent:
         content = _TerrainContent()
+        if self._photo is None:
+            content.tint = write_tint(textures, self._grid, self._height_field, filter(self._is_covered, self._grid.tiles()))
         for done, tile in enumerate(self._grid.tiles()):
             if not progress("terrain", done, self._grid.tile_count):
                 raise Stopped(f"terrain import stopped after {done} of {self._grid.tile_count} tiles; import the file again to start over")
-            self._write_tile(writer, textures, tile, content)
+            if self._is_covered(tile):
+                self._write_tile(writer, textures, tile, content)
         progress("terrain", self._grid.tile_count, self._grid.tile_count)
         writer.set_tables(json.dumps({"materials": content.materials, "instances": []}), json.dumps(content.objects))
         return content
@@ -168,11 +203,16 @@ class _TerrainBuilder:
         return {
             **counts,
             "format": CLASS,
-            "skipped": {**counts.get("skipped", {}), **({"no_height": content.gaps} if content.gaps else {})},
+            "skipped": {**counts.get("skipped", {}), **({"grid points without a height": content.gaps} if content.gaps else {})},
             "warnings": warnings,
             "crs": self._crs_wkt(),
             "projection": {"operation": self._scene_from_base.description, "heights": "unchanged"},
         }
+
+    def _is_covered(self, tile: GridTile) -> bool:
+        """Whether a raster of the mosaic reaches a tile; always true of a single raster."""
+        rows, columns = self._grid.positions(tile)
+        return not isinstance(self._base, RasterMosaic) or self._base.covers(columns[0], rows[0], columns[-1], rows[-1])
 
     def _write_tile(self, writer: MeshWriter, textures: Path, tile: GridTile, content: _TerrainContent) -> None:
         rows, columns = self._grid.positions(tile)
@@ -189,7 +229,8 @@ class _TerrainBuilder:
         if texture is None and self._flat:
             return
         triangles = orient_up(positions, triangles)
-        uvs = None if texture is None else texture.uvs(photo_columns, photo_rows)[triangles]
+        corners = content.tint.uvs(positions[:, 2]) if content.tint else None if texture is None else texture.uvs(photo_columns, photo_rows)
+        uvs = None if corners is None else corners[triangles]
         self._update_counts(content, len(triangles), texture)
         material = self._add_material(content, texture, tile)
         writer.append_mesh(positions, triangles, uvs, material, len(content.objects), RANK)
@@ -223,8 +264,8 @@ class _TerrainBuilder:
         content.untextured_tiles += self._photo is not None and texture is None
 
     def _add_material(self, content: _TerrainContent, texture: TextureTile | None, tile: GridTile) -> int:
-        if texture is None and content.untextured_material is not None:
-            return content.untextured_material
+        if texture is None and content.shared_material is not None:
+            return content.shared_material
         row: dict[str, Any] = {
             "name": self._tile_name(tile) if texture else "ground",
             "diffuse": [1.0, 1.0, 1.0, 1.0],
@@ -233,8 +274,11 @@ class _TerrainBuilder:
         }
         row |= {"wrap": "clamp", "border": [0.0, 0.0, 0.0, 0.0], "cutout": False}
         if texture is None:
-            row["diffuse"] = [*(value / 255 for value in self._options.ground), 1.0]
-            content.untextured_material = len(content.materials)
+            content.shared_material = len(content.materials)
+            if content.tint is None:
+                row["diffuse"] = [*(value / 255 for value in self._options.ground), 1.0]
+            else:
+                row["texture"] = content.tint.key
         else:
             row |= {"texture": texture.key, "cutout": texture.cutout}
         content.materials.append(row)
@@ -252,12 +296,15 @@ class _TerrainBuilder:
             return VertexGrid(regular_positions(height, step), regular_positions(width, step), FLAT_TILE_CELLS)
         cell_px = self._photo_px_per_cell()
         parts = max(1, -(-int(np.ceil(cell_px)) // free_px))
-        cells = self._options.tile_cells
-        while cells > 1 and cells * cell_px / parts > free_px:
-            cells //= 2
-        grid = VertexGrid(pixel_centre_positions(height, parts), pixel_centre_positions(width, parts), cells)
-        if self._options.max_error_m == 0 and 2 * grid.cell_count > MAX_TRIANGLES:
-            raise LimitExceeded(f"{self._base.name}: {2 * grid.cell_count:,} triangles, the limit of an asset is {MAX_TRIANGLES:,}; {REDUCE_RASTER}")
+        side = self._options.tile_cells
+        while side > 1 and side * cell_px / parts > free_px:
+            side //= 2
+        grid = VertexGrid(pixel_centre_positions(height, parts), pixel_centre_positions(width, parts), side)
+        if grid.tile_count > MAX_TILES:
+            raise LimitExceeded(f"{self._base.name}: the rasters lie too far apart for one terrain; import them one by one")
+        cells = self._base.covered_pixels * parts**2 if isinstance(self._base, RasterMosaic) else grid.cell_count
+        if self._options.max_error_m == 0 and 2 * cells > MAX_TRIANGLES:
+            raise LimitExceeded(f"{self._base.name}: {2 * cells:,} triangles, the limit of an asset is {MAX_TRIANGLES:,}; {REDUCE_RASTER}")
         return grid
 
     def _photo_px_per_cell(self) -> float:
@@ -298,6 +345,15 @@ class _TerrainBuilder:
         for dataset in (dem, ortho):
             if dataset is not None and dataset.crs is None:
                 self._warnings.append({"reason": "raster without CRS, assumed the scene's", "count": 1, "example": Path(dataset.name).name})
+
+
+def _mosaic_warnings(raster: Any) -> list[dict[str, Any]]:
+    """Says at which resolution rasters of different ones are read."""
+    if not isinstance(raster, RasterMosaic) or len(raster.pixels) == 1:
+        return []
+    pixels = ", ".join(f"{pixel:.6g}" for pixel in raster.pixels)
+    example = f"{Path(raster.name).name}: pixels of {pixels}; all are read with pixels of {raster.pixel:.6g}"
+    return [{"reason": "rasters of different resolution", "count": 1, "example": example, "scope": "file"}]
 
 
 def _write_report(path: Path, report: dict[str, Any]) -> None:

@@ -91,10 +91,10 @@ class ConstantHeightField:
 class RasterHeightField:
     """Heights of a raster's first band: bilinear between pixel centres, constant from the outermost centres to the edge. Reads windows only."""
 
-    def __init__(self, dataset: Any, metres_per_unit: float) -> None:
+    def __init__(self, dataset: Any, metres_per_unit: float, scale: tuple[float, float] | None = None) -> None:
+        """`scale`: metres per value and metres of the value 0; None takes them from the dataset."""
         self._dataset = dataset
-        self._scale = float(dataset.scales[0]) * metres_per_unit
-        self._offset = float(dataset.offsets[0]) * metres_per_unit
+        self._scale = scale or (float(dataset.scales[0]) * metres_per_unit, float(dataset.offsets[0]) * metres_per_unit)
         self.implausible = 0
         """Number of heights beyond ±100 km, counted once per tile."""
 
@@ -110,16 +110,28 @@ class RasterHeightField:
     def _read(self, top: int, bottom: int, left: int, right: int) -> NDArray[np.float64]:
         """Reads pixels [top, bottom) × [left, right). Beyond the raster it repeats the outermost pixels, whose weight is 0."""
         height, width = min(bottom, self._dataset.height) - top, min(right, self._dataset.width) - left
-        try:
-            band = self._dataset.read(1, window=Window(left, top, width, height), masked=True)
-        except Exception as error:
-            raise ImportFailed(f"{self._dataset.name}: cannot read rows {top} to {bottom}; the file may be damaged: {error}") from error
-        data = np.where(np.ma.getmaskarray(band), np.nan, band.data.astype(np.float64) * self._scale + self._offset)
-        with np.errstate(invalid="ignore"):
-            implausible = np.abs(data) > MAX_HEIGHT_M
-        self.implausible += int(implausible.sum())
-        data[implausible | ~np.isfinite(data)] = np.nan
+        data = self._read_window(Window(left, top, width, height))
         return np.pad(data, ((0, bottom - top - height), (0, right - left - width)), mode="edge")
+
+    def _read_window(self, window: Window) -> NDArray[np.float64]:
+        """Returns metres; NaN in gaps."""
+        data, implausible = read_metres(self._dataset, window, self._scale)
+        self.implausible += implausible
+        return data
+
+
+def read_metres(dataset: Any, window: Window, scale: tuple[float, float]) -> tuple[NDArray[np.float64], int]:
+    """Returns the heights of a window in metres, NaN in gaps, and the number of implausible ones. Raises ImportFailed."""
+    try:
+        band = dataset.read(1, window=window, masked=True)
+    except Exception as error:
+        top = window.row_off
+        raise ImportFailed(f"{dataset.name}: cannot read rows {top} to {top + window.height}; the file may be damaged: {error}") from error
+    data = np.where(np.ma.getmaskarray(band), np.nan, band.data.astype(np.float64) * scale[0] + scale[1])
+    with np.errstate(invalid="ignore"):
+        implausible = np.abs(data) > MAX_HEIGHT_M
+    data[implausible | ~np.isfinite(data)] = np.nan
+    return data, int(implausible.sum())
 
 
 def _locate(positions: NDArray[np.float64], count: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

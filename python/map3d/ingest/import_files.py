@@ -1,0 +1,110 @@
+"""Imports files and folders into a scene, one source document after another; a broken file is reported and skipped."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from map3d.catalogue import AssetRecord, Catalogue, Workspace
+from map3d.catalogue.scene_lock import scene_lock
+from map3d.errors import BadRequest, Map3dError, UnknownFormat
+from map3d.ingest.import_inputs import import_inputs
+from map3d.ingest.import_options import ImportOptions
+from map3d.ingest.importing import Imported, import_file
+from map3d.ingest.parser_process import ParserProcess
+from map3d.ingest.sources import SourceDocument, find_sources
+from map3d.ingest.unfinished_imports import finish_imports
+from map3d.ingest.unpacked_archives import unpacked
+
+OnFile = Callable[[str, int, int, str], None]
+"""Called with the name of the current file, the number of files before it, the number of all files, and what was read of it so far, as text."""
+
+
+@dataclass(frozen=True)
+class FilesImport:
+    """`unchanged`: names of assets that were up to date and not imported again; `failed`: (file, reason); `left_alone`: (file, what it
+    is) for files of the folders that map3d does not read."""
+
+    imported: list[Imported] = field(default_factory=list)
+    unchanged: list[str] = field(default_factory=list)
+    failed: list[tuple[str, str]] = field(default_factory=list)
+    left_alone: list[tuple[str, str]] = field(default_factory=list)
+
+
+def import_files(
+    workspace: Workspace,
+    catalogue: Catalogue,
+    scene: str,
+    files: Sequence[Path],
+    options: ImportOptions,
+    *,
+    name: str | None = None,
+    skip_unchanged: bool = False,
+    progress: OnFile | None = None,
+) -> FilesImport:
+    """Imports the files, and all files in known formats of the folders and ZIP archives.
+
+    `name`: of the only asset; `skip_unchanged`: leaves assets alone whose files, options and reader are the same as at their import.
+
+    Raises NotFound, UnknownFormat, BadRequest; ImportFailed and LimitExceeded for an archive that cannot be unpacked; under `options.strict` and for
+    a single file also the errors of `import_file`.
+    """
+    catalogue.scene(scene)
+    with unpacked(workspace, scene, files, progress or (lambda *_: None)) as found:
+        done = _import_files(workspace, catalogue, scene, found.paths, options, name, skip_unchanged, progress)
+        failed = [(found.original(path), found.original(reason)) for path, reason in done.failed]
+        left_alone = [(found.original(path), found.original(reason)) for path, reason in done.left_alone]
+        return FilesImport(done.imported, done.unchanged, failed, left_alone)
+
+
+def _import_files(
+    workspace: Workspace,
+    catalogue: Catalogue,
+    scene: str,
+    files: Sequence[Path],
+    options: ImportOptions,
+    name: str | None,
+    skip_unchanged: bool,
+    progress: OnFile | None,
+) -> FilesImport:
+    result = FilesImport()
+    sources = find_sources(
+        files,
+        name,
+        lambda path, reason: result.failed.append((str(path), reason)),
+        lambda path, reason: result.left_alone.append((str(path), reason)),
+    )
+    if result.failed and options.strict:
+        raise UnknownFormat(result.failed[0][1])
+    if name is not None and len(sources) > 1:
+        raise BadRequest(f"--name {name}: applies to a single file, got {len(sources)}")
+    is_single = len(sources) + len(result.failed) == 1
+    known = _known_assets(workspace, catalogue, scene) if skip_unchanged else {}
+    with ParserProcess() as parser:
+        for number, source in enumerate(sources):
+            show = _show(progress, source.paths[0].name, number, len(sources))
+            show("")
+            try:
+                if _is_unchanged(known.get(source.name), source, options):
+                    result.unchanged.append(source.name)
+                else:
+                    result.imported.append(import_file(workspace, catalogue, scene, source, options, show, parser=parser))
+            except Map3dError as error:
+                if options.strict or is_single:
+                    raise
+                result.failed.append((str(source.paths[0]), str(error)))
+    return result
+
+
+def _known_assets(workspace: Workspace, catalogue: Catalogue, scene: str) -> dict[str, AssetRecord]:
+    """Returns the assets by name, after completing imports that were killed."""
+    with scene_lock(workspace, scene):
+        finish_imports(workspace, catalogue, scene)
+    return {asset.name: asset for asset in catalogue.assets(scene)}
+
+
+def _is_unchanged(asset: AssetRecord | None, source: SourceDocument, options: ImportOptions) -> bool:
+    return asset is not None and import_inputs(source, options).changes(asset) is None
+
+
+def _show(progress: OnFile | None, name: str, number: int, total: int) -> Callable[[str], None]:
+    return lambda how_far: None if progress is None else progress(name, number, total, how_far)

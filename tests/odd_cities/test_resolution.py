@@ -1,0 +1,64 @@
+"""The default resolution follows the source: pixels are not much finer than texels and triangles; the choice is said with its reason."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from map3d.catalogue import Workspace
+from map3d.renderings.resolution import SurfaceDetail, surface_detail
+from tests.cli.towns import Run
+
+pytestmark = pytest.mark.whole
+
+
+def textured_quad(folder: Path, side_m: float, pixels: int) -> None:
+    """Writes a horizontal square with one texture."""
+    folder.mkdir()
+    noise = np.random.default_rng(1).integers(0, 255, (pixels, pixels, 3), dtype=np.uint8)
+    Image.fromarray(noise).save(folder / "photo.png")
+    (folder / "quad.mtl").write_text("newmtl photo\nmap_Kd photo.png\n")
+    corners = "".join(f"v {x} {y} 0\n" for x, y in ((0, 0), (side_m, 0), (side_m, side_m), (0, side_m)))
+    (folder / "quad.obj").write_text(f"mtllib quad.mtl\n{corners}vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl photo\nf 1/1 2/2 3/3 4/4\n")
+
+
+def test_pixels_are_half_as_large_as_coarse_texels(run: Run, tmp_path: Path) -> None:
+    """A quarter of a square kilometre with texels of 8 m: pixels of 0.1 m would make thousands of tiles of nothing."""
+    textured_quad(tmp_path / "land", 512.0, 64)
+    status, out, err = run("site", "land", "-o", "out", "--view", "0-45")
+    assert status == 0, err
+    why = "the surfaces have texels of about 8 m and triangles of about 362 m, so that finer pixels would show nothing more"
+    assert f"5 m per pixel, since {why}" in out
+    assert Workspace(tmp_path / "workspace").open_catalogue().rendering("land").res_m == 5.0
+    assert "still to render: " in out
+
+
+def test_detail_is_that_of_finer_texels_and_usual_triangles() -> None:
+    areas, texels = np.array([100.0, 100.0, 1.0, 0.0]), np.array([0.2, 0.4, np.nan, 0.001])
+    detail = surface_detail(areas, texels)
+    assert detail == SurfaceDetail(0.2, 10.0)
+    assert detail.pixel_m == 0.1
+
+
+def test_textures_of_few_surfaces_do_not_count() -> None:
+    detail = surface_detail(np.array([100.0, 100.0, 1.0]), np.array([np.nan, np.nan, 0.01]))
+    assert detail == SurfaceDetail(None, 10.0)
+    assert detail.pixel_m == 10.0 / 64
+
+
+def test_nothing_has_no_detail() -> None:
+    assert surface_detail(np.array([]), np.array([])) is None
+    assert surface_detail(np.array([0.0]), np.array([np.nan])) is None
+
+
+def test_face_with_a_bad_texture_index_keeps_its_geometry(run: Run, tmp_path: Path) -> None:
+    textured_quad(tmp_path / "land", 20.0, 16)
+    path = tmp_path / "land" / "quad.obj"
+    path.write_text(path.read_text() + "f 1/1 2/9 3/3\nf 1/1/5 2/2/5 3/3/5\nf 1/x 3/3 4/4\nf 1/1 2/2 9/3\n")
+    run("create-scene", "town")
+    status, out, err = run("add-files", "town", "land/quad.obj")
+    assert status == 0, err
+    assert "2 × texture index out of range: face without texture, e.g. line 12" in out
+    assert "1 × normal index out of range: face without normals, e.g. line 13" in out
+    assert "quad   obj           1          5        1" in out
