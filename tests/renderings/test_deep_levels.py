@@ -97,7 +97,7 @@ def test_a_rendering_of_21_levels_is_estimated_rendered_and_verified(tmp_path: P
     for command in (
         ["create-scene", "line", "--crs", "local", "--ground-plane", "off", *where],
         ["add-files", "line", str(tmp_path / "far.obj"), *where],
-        ["create-rendering", "line", "r", "--levels", "21", "--view", "0-90", "--layers", "color,id,depth", *where],
+        ["create-rendering", "line", "r", "--keep-outliers", "--levels", "21", "--view", "0-90", "--layers", "color,id,depth", *where],
         ["estimate", "r", "--workers", "1", *where],
         ["render", "r", "--workers", "1", *where],
         ["verify", *where],

@@ -6,6 +6,7 @@ import pytest
 
 from map3d.errors import BadName, BadRequest, Corrupt, UnknownVersion
 from map3d.geometry.frames import pin
+from map3d.tiles.block_versions import BlockVersions
 from map3d.tiles.manifest import Geographic, Manifest, ManifestCrs, ManifestView, block_version
 from map3d.tiles.occupancy import Occupancy
 from map3d.types import BlockId, Layer, Sun, TileId, ViewAngles
@@ -31,7 +32,7 @@ def manifest():
         origin=(691000.0, 5336000.0, 500.0),
         box=BOX,
         passes=(LAYERS,),
-        views=tuple(ManifestView(frame, occupancy, (versions,)) for frame in frames),
+        views=tuple(ManifestView(frame, occupancy, (BlockVersions.of(versions.items()),)) for frame in frames),
         objects=54,
     )
 
@@ -66,7 +67,7 @@ LIGHT = (
 @pytest.fixture
 def added(manifest):
     """A manifest with a second, partly rendered pass."""
-    views = tuple(replace(view, versions=(*view.versions, {BlockId(1, 1, 1): 4})) for view in manifest.views)
+    views = tuple(replace(view, versions=(*view.versions, BlockVersions(4))) for view in manifest.views)
     return replace(manifest, passes=(*manifest.passes, LIGHT), views=views)
 
 
@@ -156,7 +157,7 @@ def test_only_published_folders_have_archives(manifest):
     archives = {view.frame.id: {"color": f"{view.frame.id}/color.pmtiles"} for view in manifest.views}
     published = Manifest.load(manifest.with_archives(archives, 7).dump())
     assert published.view("45-22.5").archives == {"color": "45-22.5/color.pmtiles"}
-    assert {published.content_version, *published.views[0].versions[0].values()} == {7}
+    assert (published.content_version, published.views[0].versions[0]) == (7, BlockVersions(7))
 
 
 def test_a_tile_has_the_version_of_its_block(manifest):
@@ -167,7 +168,9 @@ def test_a_tile_has_the_version_of_its_block(manifest):
 
 
 def test_a_rendering_without_tiles_has_a_manifest(manifest):
-    empty = replace(manifest, complete=False, objects=0, views=(ManifestView(manifest.views[0].frame, Occupancy.from_tiles(4, []), ({},)),))
+    empty = replace(
+        manifest, complete=False, objects=0, views=(ManifestView(manifest.views[0].frame, Occupancy.from_tiles(4, []), (BlockVersions(),)),)
+    )
     assert Manifest.load(empty.dump()).views[0].occupancy.count() == 0
 
 

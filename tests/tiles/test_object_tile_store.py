@@ -55,6 +55,32 @@ def test_readers_with_a_cached_index_see_replaced_tiles(store: ObjectTileStore, 
     assert reader.get_block(BLOCK) is None
 
 
+@pytest.mark.parametrize("layers", [1, 12])
+def test_a_block_that_is_replaced_before_each_part_is_read_is_read_whole(
+    layers: int, store: ObjectTileStore, store_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With 12 layers the index, too, needs a second request."""
+    versions = iter(range(2, 1000))
+    store.put_block(BLOCK, "1", 1, content("1/", layers), b"1")
+    reader = ObjectTileStore(store_url, read_only=True)
+    get_range = reader._objects.get_range
+
+    def replaced(*given: object, **options: object) -> bytes | None:
+        version = next(versions)
+        store.put_block(BLOCK, str(version), version, content(f"{version}/", layers), str(version).encode())
+        return get_range(*given, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(reader._objects, "get_range", replaced)
+    for tile in content("", layers)[::200]:
+        before = next(versions)
+        found = reader.get_tile(*tile[:4])
+        assert found is not None
+        version, rest = found.split(b"/", 1)
+        assert rest == tile.data
+        assert before < int(version) < next(versions)
+    assert int(reader.get_seam(BLOCK) or b"0") == next(versions) - 1
+
+
 def test_an_older_fence_never_overwrites_what_was_written_after_it_looked(store_url: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A suspended worker has read the old block; meanwhile another one writes with a newer fence."""
     slow, quick = ObjectTileStore.create(store_url, SHAPE), ObjectTileStore(store_url)

@@ -7,7 +7,7 @@ import pytest
 
 from map3d.errors import BadRequest, Corrupt
 from map3d.tiles.naming import block_levels, children, morton, parent, tiles_of_block
-from map3d.tiles.occupancy import Occupancy, block_bits, morton_numbers, xy_from_morton
+from map3d.tiles.occupancy import Occupancy, block_bits, morton_numbers, union_of, xy_from_morton
 from map3d.types import BlockId, TileId
 
 VECTORS = json.loads((Path(__file__).parents[2] / "spec" / "vectors" / "occupancy.json").read_text())
@@ -109,3 +109,36 @@ def test_what_is_no_occupancy_is_corrupt(zmax, text):
 def test_tiles_outside_are_refused(tiles):
     with pytest.raises(BadRequest):
         Occupancy.from_tiles(2, tiles)
+
+
+@pytest.mark.parametrize("zmax", range(8))
+def test_part_within_blocks_holds_their_tiles(zmax):
+    _, occupancy = random_occupancy(zmax, 0.3)
+    root = block_levels(zmax)[0].root
+    blocks = occupancy.numbers(root)[::2]
+    kept = occupancy.within(blocks)
+    assert set(kept.tiles(zmax)) == {tile for tile in occupancy.tiles(zmax) if morton(tile.x, tile.y) >> 2 * (zmax - root) in set(blocks.tolist())}
+    assert all(kept.count_in(BlockId(root, *xy)) > 0 for xy in np.stack(xy_from_morton(blocks), axis=1).tolist())
+
+
+@pytest.mark.parametrize("zmax", range(8))
+def test_levels_agree_with_the_tiles_above_the_base_tiles(zmax):
+    _, occupancy = random_occupancy(zmax, 0.05)
+    for z in range(zmax + 1):
+        above = sorted({int(number) >> 2 * (zmax - z) for number in occupancy.numbers(zmax)})
+        assert occupancy.numbers(z).tolist() == above
+        assert occupancy.count(z) == len(above)
+
+
+def test_tiles_in_a_block_are_counted():
+    _, occupancy = random_occupancy(6, 0.1)
+    for x in range(8):
+        for y in range(8):
+            expected = sum(tile in occupancy for tile in tiles_of_block(BlockId(3, x, y), 6) if tile.z == 6)
+            assert occupancy.count_in(BlockId(3, x, y)) == expected
+
+
+@pytest.mark.parametrize(("some", "others"), [([], []), ([1, 5], []), ([], [2]), ([1, 5, 9], [0, 5, 7, 9, 11])])
+def test_unions_of_numbers_are_sorted_and_unique(some, others):
+    union = union_of(np.array(some, np.uint64), np.array(others, np.uint64))
+    assert union.tolist() == sorted({*some, *others})

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from map3d.geometry.frames import pin
+from map3d.tiles.block_versions import BlockVersions
 from map3d.tiles.manifest import Manifest, ManifestCrs, ManifestView
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.preview import ASPECT, MIN_WIDTH_PX, choose_preview
-from map3d.types import BlockId, Layer, TileId, ViewAngles
+from map3d.types import Layer, TileId, ViewAngles
 
 BOX = ((0.0, 0.0, 0.0), (1000.0, 1000.0, 20.0))
 FRAME = pin(BOX, 256, 0.1, [ViewAngles(0, 45)])[0]
@@ -19,7 +20,7 @@ SIDE = 2**FRAME.zmax
 def manifest_of(grid):
     rows, columns = np.nonzero(grid)
     occupancy = Occupancy.from_tiles(FRAME.zmax, zip(columns, rows, strict=True))
-    view = ManifestView(FRAME, occupancy, ({BlockId(0, 0, 0): 7},))
+    view = ManifestView(FRAME, occupancy, (BlockVersions(7),))
     layers = (Layer("normal", "normal", "png"), Layer("color", "color", "webp"))
     return Manifest("x", 7, True, ManifestCrs("local metres"), (0.0, 0.0, 0.0), BOX, (layers,), (view,))
 
@@ -69,7 +70,7 @@ def test_a_preview_has_the_tiles_that_its_window_shows():
 
 def test_a_small_rendering_shows_its_deepest_level():
     frame = replace(FRAME, zmax=0)
-    manifest = replace(manifest_of(grid_of("tall")), views=(ManifestView(frame, Occupancy.from_tiles(0, [(0, 0)]), ({BlockId(0, 0, 0): 1},)),))
+    manifest = replace(manifest_of(grid_of("tall")), views=(ManifestView(frame, Occupancy.from_tiles(0, [(0, 0)]), (BlockVersions(),)),))
     assert [tile.tile for tile in choose_preview(manifest).tiles] == [TileId(0, 0, 0)]
 
 

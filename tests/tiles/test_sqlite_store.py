@@ -201,3 +201,14 @@ def test_layers_read_back_with_all_their_properties(tmp_path):
     other = StoreShape(256, 2, (replace(shape.layers[0], radius_m=13.0), shape.layers[1]))
     with pytest.raises(BadRequest, match="--regrid"):
         SqliteTileStore.open_or_create(tmp_path / "light.sqlite", other)
+
+
+def test_a_disk_that_fails_while_a_store_is_opened_is_a_store_error(path, store, monkeypatch):
+    """Found by failing system calls: the format's version could not be read."""
+
+    def fail(_db):
+        raise sqlite3.DatabaseError("database disk image is malformed")
+
+    monkeypatch.setattr("map3d.tiles.sqlite_store._version", fail)
+    with pytest.raises(StoreError, match="cannot read"):
+        SqliteTileStore(path)

@@ -14,9 +14,6 @@ from map3d.types import BlockId
 
 COUNTED: Final = ("chunk_hits", "chunk_misses", "texture_hits", "texture_misses", "texture_decoded", "texture_evicted")
 
-REBUILT: Final = "the scene was rebuilt"
-"""In the core's message when a file of the scene is not the one that the open index names."""
-
 
 def open_renderer(setup: Mapping[str, Any]) -> Handler:
     """`setup`: {"scene": folder, "cache_bytes", "frames": {track: frame}}.
@@ -62,9 +59,7 @@ class _BlockRenderer:
         try:
             (found,) = self._scene.block_keys(frame, block.z, np.array([[block.x, block.y]], np.uint32))
             return self._scene.render_block(frame, *block) if found == key else None
-        except _core.FormatError as error:
-            if REBUILT not in str(error):
-                raise
+        except _core.SceneRebuilt:
             return None
 
     def _render_reopened(self, track: str, block: BlockId, key: str) -> _core.Block:

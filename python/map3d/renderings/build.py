@@ -2,21 +2,23 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any, Final
 
 from map3d import _core
 from map3d.catalogue import Catalogue, SceneRecord, Workspace
 from map3d.catalogue.scene_lock import scene_lock
+from map3d.cores import usable_cores
 from map3d.errors import BadRequest
 from map3d.ingest.asset_removal import is_removing
 from map3d.ingest.unfinished_imports import finish_imports, unfinished_imports
 from map3d.registry import Registry
+from map3d.renderings.build_process import BuildProgress, build_in_subprocess
+from map3d.renderings.outlier_lines import outlier_lines
+from map3d.renderings.outliers import OutlierCheck
 from map3d.renderings.scene_cache import has_assets
 from map3d.renderings.shared_scene import FILES, share_scene
-
-BuildProgress = Callable[[str, int, int], bool]
-"""(stage, done, total) → False to stop."""
 
 OPTIONS: Final[Mapping[str, Any]] = {
     "merge_vertices": True,
@@ -57,29 +59,48 @@ def build(
         folder = workspace.scene_folder(scene)
         if not has_assets(folder):
             raise BadRequest(f"scene {scene}: its files were imported on another host; build it there with map3d render")
+        options = _build_options(record)
+        check = OutlierCheck(workspace, record, assets, options)
         with Registry(workspace.registry_path(scene)) as registry:
             ground = registry.get_or_create_scene_object(GROUND, "terrain")
             request = {
                 "assets": [asset.name for asset in assets],
                 "origin": record.origin,
-                "options": _build_options(record),
+                "options": options,
                 "ground_id": ground,
                 "threads": threads,
-                "max_memory_bytes": max_memory_bytes,
             }
-            report: dict[str, Any] = json.loads(_core.build_scene(str(folder), json.dumps(request), progress))
+            report = build_in_subprocess(scene, folder, request, max_memory_bytes, progress)
+            outliers = check.finish(registry)
             has_ground = report.get("ground_plane_triangles")
             registry.set_scene_object(ground, open_scene(workspace, scene).object_box(ground) if has_ground else None)
         if FILES in record.options:
             share_scene(workspace, record, digest)
         catalogue.set_built(scene, digest)
-        return report
+        lines = outlier_lines(outliers, record.crs)
+        return report | ({"outliers": asdict(outliers), "outlier_lines": lines} if lines else {})
+
+
+def build_if_stale(
+    workspace: Workspace,
+    catalogue: Catalogue,
+    scene: str,
+    *,
+    threads: int | None = None,
+    max_memory_bytes: int | None = None,
+    progress: BuildProgress | None = None,
+) -> dict[str, Any] | None:
+    """Builds the scene if its files have changed, with one thread per core unless given; returns the report, None if the scene is up to date."""
+    if not is_stale(workspace, catalogue, scene):
+        return None
+    memory = max_memory_bytes or BUILD_BYTES
+    return build(workspace, catalogue, scene, threads=threads or usable_cores(), max_memory_bytes=memory, progress=progress)
 
 
 def scene_digest(catalogue: Catalogue, record: SceneRecord) -> str:
     """Returns a digest of everything that a build depends on."""
     assets = [(asset.name, asset.digest) for asset in catalogue.assets(record.name)]
-    text = json.dumps([assets, record.origin, _build_options(record), _core.__version__], sort_keys=True)
+    text = json.dumps([assets, record.origin, _build_options(record), _core.__version__, _core.SCENE_VERSIONS], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 

@@ -2,17 +2,15 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Final
-
-import numpy as np
+from dataclasses import asdict, dataclass
+from typing import Any, Final
 
 from map3d import _core
 from map3d.catalogue import Catalogue, Job, PlannedJob, RenderingRecord, State, Track, Workspace
 from map3d.errors import BadRequest
 from map3d.renderings.build import is_stale, open_scene
 from map3d.renderings.plan import PlannedScene, plan_jobs, planned_occupancy, track_frame
-from map3d.tiles.naming import block_levels, morton
+from map3d.tiles.naming import block_levels
 from map3d.tiles.occupancy import Occupancy, numbers_of
 from map3d.types import BlockId
 
@@ -60,17 +58,28 @@ class _PassEstimate:
     open_tiles: float
 
 
-def estimate(workspace: Workspace, catalogue: Catalogue, name: str, workers: int) -> RenderingEstimate:
-    """Plans the rendering without storing the plan; blocks whose content has changed since they were rendered count as open. Raises BadRequest when
-    the build of the scene is out of date."""
+def estimate(workspace: Workspace, catalogue: Catalogue, name: str, workers: int, sample_s: float = SAMPLE_S) -> RenderingEstimate:
+    """Plans the rendering without storing the plan; blocks whose content has changed since they were rendered count as open. `sample_s`: about how
+    long it may render samples. Raises BadRequest when the build of the scene is out of date."""
     record = catalogue.rendering(name)
     if is_stale(workspace, catalogue, record.scene):
         raise BadRequest(f"scene {record.scene} has changed since its last build; map3d render {name} builds it first")
     scene = open_scene(workspace, record.scene, 256 << 20)
-    plans = {frame.id: planned_occupancy(scene, frame) for frame in record.frames}
     jobs = {(job.track, job.block): job for job in catalogue.jobs(name)}
+    return _estimate(scene, record, jobs, workers, sample_s)
+
+
+def estimate_new(scene: _core.Scene, record: RenderingRecord, workers: int, sample_s: float) -> dict[str, Any]:
+    """Returns the fields of the estimate of a rendering that has no jobs yet. `sample_s`: about how long it may render samples."""
+    return asdict(_estimate(scene, record, {}, workers, sample_s))
+
+
+def _estimate(
+    scene: _core.Scene, record: RenderingRecord, jobs: Mapping[tuple[str, BlockId], Job], workers: int, sample_s: float
+) -> RenderingEstimate:
+    plans = {frame.id: planned_occupancy(scene, frame) for frame in record.frames}
     remaining = open_blocks(scene, record, jobs)
-    passes = [_estimate_pass(scene, tracks, plans, jobs, remaining) for tracks in zip(*map(record.tracks_of, record.frames), strict=True)]
+    passes = [_estimate_pass(scene, tracks, plans, jobs, remaining, sample_s) for tracks in zip(*map(record.tracks_of, record.frames), strict=True)]
     base, planned = passes[0].base_tiles, sum(plan.count(record.zmax) for plan in plans.values())
     tiles = sum(plan.count() for plan in plans.values()) * base / planned if planned else 0.0
     return RenderingEstimate(
@@ -102,11 +111,12 @@ def _estimate_pass(
     plans: Mapping[str, Occupancy],
     jobs: Mapping[tuple[str, BlockId], Job],
     remaining: Sequence[PlannedJob],
+    sample_s: float,
 ) -> _PassEstimate:
     ids = {track.id for track in tracks}
     own_jobs = {place: job for place, job in jobs.items() if place[0] in ids}
     track_plans = {track.id: plans[track.frame.id] for track in tracks}
-    cost = _recorded_cost(list(own_jobs.values()), track_plans) or _sampled_cost(scene, tracks, track_plans)
+    cost = _recorded_cost(list(own_jobs.values()), track_plans) or _sampled_cost(scene, tracks, track_plans, sample_s)
     tiles = _base_tiles(track_plans, own_jobs, cost)
     # A conservatively planned block may have no planned base tile.
     return _PassEstimate(cost, sum(tiles.values()), sum(tiles.get((job.track, job.block), 0.0) for job in remaining if job.track in ids))
@@ -115,7 +125,7 @@ def _estimate_pass(
 def _base_tiles(plans: Mapping[str, Occupancy], jobs: Mapping[tuple[str, BlockId], Job], cost: TileCost) -> dict[tuple[str, BlockId], float]:
     """Returns the number of base tiles with content of every base block: counted when it was rendered, else expected from the plan of its track."""
     expected = {
-        (track, block): _planned_tiles(plan, block) * cost.filled
+        (track, block): plan.count_in(block) * cost.filled
         for track, plan in plans.items()
         for block in (BlockId(*tile) for tile in plan.tiles(block_levels(plan.zmax)[0].root))
     }
@@ -131,12 +141,12 @@ def _recorded_cost(jobs: Sequence[Job], plans: Mapping[str, Occupancy]) -> TileC
         return None
     results = [job.result for job in done if job.result is not None]
     tiles = sum(result.base_tiles for result in results)
-    planned = sum(_planned_tiles(plans[job.track], job.block) for job in done if job.kind == "base")
+    planned = sum(plans[job.track].count_in(job.block) for job in done if job.kind == "base")
     how = f"{len(base)} rendered blocks of this rendering"
     return TileCost(sum(result.bytes for result in results) / tiles, sum(result.seconds for result in results) / tiles, tiles / max(planned, 1), how)
 
 
-def _sampled_cost(scene: _core.Scene, tracks: Sequence[Track], plans: Mapping[str, Occupancy]) -> TileCost:
+def _sampled_cost(scene: _core.Scene, tracks: Sequence[Track], plans: Mapping[str, Occupancy], sample_s: float) -> TileCost:
     """Renders and discards a few blocks, spread over all tracks, and returns their cost."""
     zmax = tracks[0].frame.zmax
     blocks = [(track, BlockId(*tile)) for track in tracks for tile in plans[track.id].tiles(block_levels(zmax)[0].root)]
@@ -146,9 +156,9 @@ def _sampled_cost(scene: _core.Scene, tracks: Sequence[Track], plans: Mapping[st
         rendered = scene.render_block(track_frame(track), *block)
         size += sum(len(tile[4]) for tile in rendered.tiles)
         tiles += sum(tile[0] == 0 and tile[1] == zmax for tile in rendered.tiles)
-        planned += _planned_tiles(plans[track.id], block)
+        planned += plans[track.id].count_in(block)
         count += 1
-        if time.perf_counter() - started > SAMPLE_S:
+        if time.perf_counter() - started > sample_s:
             break
     seconds = time.perf_counter() - started
     if not tiles:
@@ -165,12 +175,3 @@ def _spread(blocks: Sequence[tuple[Track, BlockId]]) -> list[tuple[Track, BlockI
     """Returns evenly spaced entries of the list, always the same ones."""
     count = min(len(blocks), SAMPLE_BLOCKS)
     return [blocks[(2 * k + 1) * len(blocks) // (2 * count)] for k in range(count)]
-
-
-def _planned_tiles(plan: Occupancy, block: BlockId) -> int:
-    """Returns the number of planned base tiles in a base block."""
-    levels = plan.zmax - block_levels(plan.zmax)[0].root
-    first = morton(block.x, block.y) << 2 * levels
-    numbers = plan.numbers(plan.zmax)
-    low, high = np.searchsorted(numbers, np.array([first, first + (1 << 2 * levels)], dtype=np.uint64))
-    return int(high - low)

@@ -10,6 +10,7 @@ from map3d.catalogue.records import WINDOW
 from map3d.errors import BadRequest
 from map3d.geometry.frames import Window, pin, pin_beside
 from map3d.geometry.views import check_angles
+from map3d.renderings.block_limit import check_block_count
 from map3d.renderings.build import is_stale, open_scene
 from map3d.renderings.layers import LayerRequest
 from map3d.renderings.remove_rendering import finish_rendering_removal
@@ -60,16 +61,30 @@ class RenderingRequest:
 
 def create_rendering(workspace: Workspace, catalogue: Catalogue, request: RenderingRequest) -> RenderingRecord:
     """Pins the frames to the box of the scene, whose build must be up to date. Raises BadRequest, NotFound."""
+    record = draft_rendering(workspace, catalogue, request)
+    if request.regrid:
+        stored = catalogue.regrid(record)
+        remove_tracks(workspace, stored)
+        return stored
+    finish_rendering_removal(workspace, record.name)
+    catalogue.create_rendering(record)
+    return record
+
+
+def draft_rendering(workspace: Workspace, catalogue: Catalogue, request: RenderingRequest) -> RenderingRecord:
+    """Returns the rendering that `create_rendering` would store. Raises BadRequest, NotFound."""
     request.check(catalogue)
     if is_stale(workspace, catalogue, request.scene):
         raise BadRequest(f"scene {request.scene} has changed since its last build; build it first")
-    box = open_scene(workspace, request.scene).box
+    scene = open_scene(workspace, request.scene)
+    box = scene.box
     window = _local_window(catalogue, request)
     res_m = choose_res(box, request)
     frames = tuple(pin(box, request.tile_px, res_m, request.views, window))
+    check_block_count(scene, frames, request.name)
     tiles = catalogue.rendering(request.name).options.get(TILES) if request.regrid else request.tiles
     options = ({} if window is None else {WINDOW: asdict(window)}) | ({} if tiles is None else {TILES: check_tiles_url(tiles)})
-    record = RenderingRecord(
+    return RenderingRecord(
         request.name,
         request.scene,
         res_m,
@@ -80,13 +95,6 @@ def create_rendering(workspace: Workspace, catalogue: Catalogue, request: Render
         request.attribution,
         options,
     )
-    if request.regrid:
-        stored = catalogue.regrid(record)
-        remove_tracks(workspace, stored)
-        return stored
-    finish_rendering_removal(workspace, record.name)
-    catalogue.create_rendering(record)
-    return record
 
 
 def add_views(catalogue: Catalogue, name: str, views: Sequence[ViewAngles]) -> RenderingRecord:

@@ -1,7 +1,7 @@
 """Writes `rendering.json` from the catalogue and the scene (spec/manifest.md)."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from map3d.catalogue import Catalogue, JobResult, RenderingRecord, SceneRecord, State, Track, Workspace
@@ -11,6 +11,7 @@ from map3d.geometry.frames import PinnedFrame
 from map3d.registry import Registry
 from map3d.renderings.lon_lat import geographic_of
 from map3d.renderings.track_stores import find_track, share_manifest
+from map3d.tiles.block_versions import BlockVersions
 from map3d.tiles.manifest import Manifest, ManifestCrs, ManifestView
 from map3d.tiles.naming import block_levels
 from map3d.tiles.occupancy import Occupancy
@@ -67,32 +68,40 @@ def stored_occupancy(store: TileStore) -> Occupancy:
 
 def _view(workspace: Workspace, catalogue: Catalogue, record: RenderingRecord, frame: PinnedFrame, planned: Occupancy | None) -> ManifestView:
     """Takes occupancy and versions from the results of the jobs; the occupancy from the first pass, since every pass has the same tiles."""
-    first, *later = record.tracks_of(frame)
-    results = _results(catalogue, record.name, first)
-    occupancy = _occupancy(workspace, record, first, results)
-    versions = [
-        {block: result.version for block, result in each.items()} for each in (results, *(_results(catalogue, record.name, track) for track in later))
-    ]
-    return ManifestView(frame, occupancy if planned is None else occupancy | planned, tuple(versions))
+    tracks = record.tracks_of(frame)
+    occupancy = _occupancy(workspace, catalogue, record, tracks[0])
+    versions = tuple(BlockVersions.of((block, result.version) for block, result in _results(catalogue, record, track)) for track in tracks)
+    return ManifestView(frame, occupancy if planned is None else occupancy | planned, versions)
 
 
-def _results(catalogue: Catalogue, rendering: str, track: Track) -> dict[BlockId, JobResult]:
-    """Returns the results of all jobs of a track that were done once."""
-    return {job.block: job.result for job in catalogue.jobs(rendering, track.id) if job.result is not None}
+def _results(catalogue: Catalogue, record: RenderingRecord, track: Track) -> Iterator[tuple[BlockId, JobResult]]:
+    """Yields the results of all jobs of a track that were done once."""
+    return ((job.block, job.result) for job in catalogue.jobs(record.name, track.id) if job.result is not None)
 
 
-def _occupancy(workspace: Workspace, record: RenderingRecord, track: Track, results: Mapping[BlockId, JobResult]) -> Occupancy:
+def _occupancy(workspace: Workspace, catalogue: Catalogue, record: RenderingRecord, track: Track) -> Occupancy:
     """Jobs of earlier versions of map3d have no occupancy in their results; the store has it."""
-    root = block_levels(track.frame.zmax)[0].root
-    base = [(block.x, block.y, 0 if result.empty else result.occupied) for block, result in results.items() if block.z == root]
-    known = [(x, y, bits) for x, y, bits in base if bits is not None]
-    if len(known) == len(base):
-        return Occupancy.from_blocks(track.frame.zmax, known)
-    found = find_track(workspace, record, track.id)
+    try:
+        return Occupancy.from_blocks(track.frame.zmax, _base_bits(_results(catalogue, record, track), block_levels(track.frame.zmax)[0].root))
+    except _UnknownBits:
+        found = find_track(workspace, record, track.id)
     if found is None:
-        return Occupancy.from_blocks(track.frame.zmax, known)
+        return Occupancy.from_blocks(track.frame.zmax, ())
     with found as store:
         return stored_occupancy(store)
+
+
+class _UnknownBits(Exception):
+    """A block's result has no occupancy."""
+
+
+def _base_bits(results: Iterable[tuple[BlockId, JobResult]], root: int) -> Iterator[tuple[int, int, int]]:
+    """Yields (column, row, bits) of base blocks. Raises _UnknownBits."""
+    for block, result in results:
+        if block.z == root and not result.empty:
+            if result.occupied is None:
+                raise _UnknownBits
+            yield block.x, block.y, result.occupied
 
 
 def _crs(scene: SceneRecord) -> ManifestCrs:

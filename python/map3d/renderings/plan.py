@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from map3d import _core
-from map3d.catalogue import PlannedJob, RenderingRecord, Track
+from map3d.catalogue import Catalogue, PlannedJob, RenderingRecord, Track
 from map3d.errors import OutsideFrame
 from map3d.geometry.frames import PinnedFrame, check_content, core_frame
 from map3d.tiles.naming import block_levels
-from map3d.tiles.occupancy import Numbers, Occupancy, xy_from_morton
+from map3d.tiles.occupancy import Numbers, Occupancy, numbers_of, union_of, xy_from_morton
 from map3d.types import BlockId, Box
 
 KEY_BATCH: Final = 1 << 16
@@ -30,6 +30,24 @@ class PlannedScene(Protocol):
     def occupied(self, frame: _core.Frame, level: int, within: tuple[int, NDArray[np.uint32]] | None = None) -> NDArray[np.uint64]: ...
 
     def block_keys(self, frame: _core.Frame, z: int, blocks: NDArray[np.uint32]) -> list[str]: ...
+
+
+class PlannedBlocks(Mapping[str, Numbers]):
+    """Track → base blocks with a job. They are read when they are looked up, so that only those of one track are in memory."""
+
+    def __init__(self, catalogue: Catalogue, record: RenderingRecord) -> None:
+        self._catalogue, self._record = catalogue, record
+        self._tracks = [track.id for track in record.tracks]
+
+    def __getitem__(self, track: str) -> Numbers:
+        jobs = self._catalogue.jobs(self._record.name, track)
+        return numbers_of((job.block.x, job.block.y) for job in jobs if job.kind == "base")
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._tracks)
+
+    def __len__(self) -> int:
+        return len(self._tracks)
 
 
 def plan_jobs(
@@ -56,7 +74,7 @@ def _plan_views(
         occupied = scene.occupied(core_frame(frame.to_json()), root)
         for track in rendering.tracks_of(frame):
             earlier = known.get(track.id)
-            blocks = occupied if earlier is None else np.union1d(occupied, earlier)
+            blocks = occupied if earlier is None else union_of(occupied, earlier)
             yield from _with_reduces(track, _base_keys(scene, track, root, blocks))
 
 
@@ -65,14 +83,16 @@ def track_frame(track: Track) -> _core.Frame:
     return core_frame(track.frame.to_json(track.layers))
 
 
-def planned_occupancy(scene: PlannedScene, frame: PinnedFrame, level: int | None = None, within: Numbers | None = None) -> Occupancy:
-    """Returns, conservatively, every tile that may have content. `level`: the deepest, by default zmax; `within`: only in these base blocks.
+def planned_occupancy(scene: PlannedScene, frame: PinnedFrame, within: Numbers | None = None) -> Occupancy:
+    """Returns, conservatively, every tile that may have content. `within`: only in these base blocks.
 
-    Time and memory grow with the occupied tiles, at any level.
+    Time and memory grow with the occupied blocks, of which `KEY_BATCH` are examined at a time.
     """
-    depth = frame.zmax if level is None else level
-    blocks = None if within is None else (block_levels(frame.zmax)[0].root, _columns_and_rows(within))
-    return Occupancy(depth, scene.occupied(core_frame(frame.to_json()), depth, blocks))
+    core, root = core_frame(frame.to_json()), block_levels(frame.zmax)[0].root
+    blocks = scene.occupied(core, root) if within is None else within
+    batches = (blocks[start : start + KEY_BATCH] for start in range(0, len(blocks), KEY_BATCH))
+    parts = [Occupancy.from_numbers(frame.zmax, scene.occupied(core, frame.zmax, (root, _columns_and_rows(batch)))) for batch in batches]
+    return Occupancy.union(frame.zmax, parts)
 
 
 def _columns_and_rows(numbers: Numbers) -> NDArray[np.uint32]:

@@ -9,6 +9,7 @@ from map3d.catalogue.scene_lock import scene_lock
 from map3d.errors import BadRequest, NotFound
 from map3d.ingest.asset_removal import finish_removal, remove_assets, remove_folder
 from map3d.ingest.unfinished_imports import finish_imports
+from map3d.renderings.outliers import FILE as OUTLIERS
 from map3d.renderings.removal_checks import check_idle, folder_bytes
 
 
@@ -54,10 +55,15 @@ def remove_files(workspace: Workspace, catalogue: Catalogue, removal: FilesRemov
             remove_built_files(workspace, removal.scene)
 
 
+def is_built(workspace: Workspace, catalogue: Catalogue, scene: str) -> bool:
+    """Whether the scene has files and was built: after a removal it is built again, so that no file of it is left that nothing uses."""
+    return bool(catalogue.assets(scene)) and (workspace.scene_folder(scene) / "scene.json").is_file()
+
+
 def remove_built_files(workspace: Workspace, scene: str) -> None:
     """Removes everything that a build made, the index first, so that the rest is never taken for a built scene. The caller holds the scene's lock."""
     folder = workspace.scene_folder(scene)
-    for name in ("scene.json", "instances.m3i"):
+    for name in ("scene.json", "instances.m3i", OUTLIERS):
         (folder / name).unlink(missing_ok=True)
     for name in ("chunks", "build", "textures"):
         remove_folder(folder / name)

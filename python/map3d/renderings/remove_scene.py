@@ -14,6 +14,7 @@ from map3d.renderings.removal_checks import folder_bytes, objects_bytes
 from map3d.renderings.removal_mark import read_mark, removal_mark
 from map3d.renderings.remove_rendering import RenderingRemoval, find_rendering, is_rendering_removed, remove_rendering
 from map3d.renderings.shared_scene import files_url, remove_shared
+from map3d.renderings.view_store import remove_views
 
 _RENDERINGS: Final = "renderings"
 _SHARED: Final = "files"
@@ -60,7 +61,10 @@ def find_scene(workspace: Workspace, catalogue: Catalogue, name: str, *, with_re
 
 
 def remove_scene(workspace: Workspace, catalogue: Catalogue, removal: SceneRemoval) -> None:
-    """Removes the renderings, then the record, then the files. Raises BadRequest while the scene is being changed or rendered; StoreError."""
+    """Removes the renderings, then the record, then the stored views and the files.
+
+    Raises BadRequest while the scene is being changed or rendered; StoreError.
+    """
     folder = workspace.scene_folder(removal.name)
     with scene_lock(workspace, removal.name, wait=False):
         _check_imports(workspace, removal.name)
@@ -69,6 +73,7 @@ def remove_scene(workspace: Workspace, catalogue: Catalogue, removal: SceneRemov
                 remove_rendering(workspace, catalogue, rendering)
             with suppress(NotFound):
                 catalogue.remove_scene(removal.name)
+            remove_views(workspace, removal.name)
             if removal.shared is not None:
                 remove_shared(removal.shared)
             remove_folder(folder)

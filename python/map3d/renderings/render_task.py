@@ -11,7 +11,7 @@ from map3d.errors import NotFound
 from map3d.renderings.block_check import check_rendered
 from map3d.renderings.scene_cache import scene_in_use
 from map3d.renderings.track_stores import open_or_create_track
-from map3d.subprocess import Message, Subprocess
+from map3d.subprocess import Limits, Message, Subprocess
 from map3d.tiles.naming import block_level, blocks_below
 from map3d.tiles.occupancy import block_bits
 from map3d.tiles.tile_store import StoredTile, TileStore
@@ -35,14 +35,15 @@ class RenderTask:
         cache_bytes: int = CACHE_BYTES,
         entry: str = RENDER_ENTRY,
         scene: SceneRecord | None = None,
+        limits: Limits | None = None,
     ) -> None:
-        """`scene`: its files are fetched if it is shared and was built on another host, and kept until `close`."""
+        """`scene`: its files are fetched if it is shared and was built on another host, and kept until `close`. `limits`: of the subprocesses."""
         workspace.rendering_folder(rendering.name).mkdir(parents=True, exist_ok=True)
         self._workspace = workspace
         self.stats: Counter[str] = Counter()
         self._stats_lock = threading.Lock()
         self._zmax = rendering.zmax
-        self._entry = entry
+        self._entry, self._limits = entry, limits
         self._setup = _setup(workspace, rendering, cache_bytes)
         with ExitStack() as opened:
             if scene is not None:
@@ -52,7 +53,7 @@ class RenderTask:
         self._stores: Mapping[str, TileStore] = stores
 
     def start_subprocess(self) -> Subprocess:
-        return Subprocess(self._entry, self._setup)
+        return Subprocess(self._entry, self._setup, limits=self._limits)
 
     def request(self, lease: Lease) -> Message:
         """Contains everything that a reduce block depends on, so that the subprocess needs neither stores nor credentials."""

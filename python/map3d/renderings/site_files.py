@@ -35,7 +35,7 @@ class SiteFiles:
 @dataclass(frozen=True)
 class ImportSummary:
     """Names of assets. `again`: those of `imported` that existed, with the reason; `failed`: (file, reason); `elsewhere`: assets from other folders,
-    which stay."""
+    which stay; `left_alone`: (file, what it is) for files of the folder that map3d does not read."""
 
     imported: list[str] = field(default_factory=list)
     again: dict[str, str] = field(default_factory=dict)
@@ -43,6 +43,7 @@ class ImportSummary:
     failed: list[tuple[str, str]] = field(default_factory=list)
     removed: list[str] = field(default_factory=list)
     elsewhere: list[str] = field(default_factory=list)
+    left_alone: list[tuple[str, str]] = field(default_factory=list)
 
 
 def update_files(workspace: Workspace, catalogue: Catalogue, files: SiteFiles, report: OnSource) -> ImportSummary:
@@ -82,7 +83,9 @@ class _Update:
 
     def _find_sources(self) -> list[SourceDocument]:
         try:
-            sources = find_sources([self._files.folder], None, lambda path, reason: self._summary.failed.append((str(path), reason)))
+            sources = find_sources(
+                [self._files.folder], None, lambda path, reason: self._summary.failed.append((str(path), reason)), self._leave_alone
+            )
         except UnknownFormat as error:
             from_here = sum(map(self._is_inside, self._assets.values()))
             if not from_here:
@@ -96,6 +99,9 @@ class _Update:
         if self._summary.failed and self._files.options.strict:
             raise UnknownFormat(self._summary.failed[0][1])
         return sources
+
+    def _leave_alone(self, path: Path, reason: str) -> None:
+        self._summary.left_alone.append((str(path.relative_to(self._files.folder)), reason))
 
     def _is_inside(self, asset: AssetRecord) -> bool:
         path = Path(asset.source)

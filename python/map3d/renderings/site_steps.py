@@ -1,30 +1,34 @@
 """`map3d site`: turns a folder of files into a rendering, in steps that can each be repeated."""
 
+import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final
 
+from map3d import _core
 from map3d.catalogue import Catalogue, RenderingRecord, SceneRecord, Workspace
-from map3d.geometry.frames import pin
+from map3d.errors import OutsideFrame
+from map3d.geometry.frames import check_content, pin
 from map3d.ingest.import_options import ImportOptions
-from map3d.renderings.build import open_scene
+from map3d.registry import Registry
+from map3d.renderings.build import GROUND, open_scene
 from map3d.renderings.create import RenderingRequest, create_rendering
+from map3d.renderings.file_contents import Finding, file_contents, union
 from map3d.renderings.layers import LayerRequest
-from map3d.renderings.plan import planned_occupancy
-from map3d.renderings.site_files import SiteFiles
-from map3d.types import ViewAngles
-
-RESOLUTIONS_M: Final = (0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
-MAX_BASE_TILES: Final = 30_000
-"""For all views together: some minutes on a small machine."""
-
-_PROBE_LEVEL: Final = 8
+from map3d.renderings.outlier_lines import outlier_lines, place_text
+from map3d.renderings.outliers import read_outliers
+from map3d.renderings.resolution import Resolution, SurfaceDetail, choose_resolution, surface_detail
+from map3d.renderings.site_files import ImportSummary, SiteFiles
+from map3d.renderings.site_report import SiteReport, read_report, view_names, write_report
+from map3d.renderings.style import Rules
+from map3d.renderings.track_stores import remove_tracks
+from map3d.types import DEFAULT_LAYERS, ViewAngles
 
 
 @dataclass(frozen=True)
 class SiteRequest:
-    """`choose_res` selects the resolution when `res_m` is None."""
+    """`choose_resolution` selects the resolution when `res_m` is None. `cluster`: the group of content to keep, 0 for the largest.
+    `style`: rules of colours. `ao`: ambient occlusion; None for scenes without textures."""
 
     name: str
     sources: Path
@@ -35,35 +39,103 @@ class SiteRequest:
     color: str = "webp"
     options: ImportOptions = field(default_factory=ImportOptions)
     allow_empty: bool = False
+    keep_outliers: bool = False
+    cluster: int = 0
+    style: Rules = field(default_factory=list)
+    ao: bool | None = None
 
     @property
     def files(self) -> SiteFiles:
         return SiteFiles(SceneRecord(self.name, self.title, self.attribution), self.sources, self.options, self.allow_empty)
 
 
-def create_site_rendering(workspace: Workspace, catalogue: Catalogue, request: SiteRequest) -> RenderingRecord:
-    """Returns the rendering of the site, and creates it when it does not exist; its scene must be built."""
+@dataclass(frozen=True)
+class SiteRendering:
+    """`resolution`: None when it was given or the rendering existed; `refitted`: its frames were replaced because the content had left them;
+    `has_chosen_ao`: ambient occlusion was chosen because the scene has no textures."""
+
+    record: RenderingRecord
+    resolution: Resolution | None = None
+    refitted: bool = False
+    has_chosen_ao: bool = False
+
+
+def create_site_rendering(workspace: Workspace, catalogue: Catalogue, request: SiteRequest) -> SiteRendering:
+    """Creates the rendering of the site unless it exists, and replaces its frames when they no longer hold the content; its scene must be built."""
     for record in catalogue.renderings(request.name):
         if record.name == request.name:
-            return record
-    res_m = request.res_m or choose_res(workspace, request)
-    layers = LayerRequest(color=request.color)
+            return _refit(workspace, catalogue, request, record)
+    scene = open_scene(workspace, request.name)
+    detail = _surface_detail(workspace, request.name, scene)
+    resolution = None if request.res_m else choose_resolution(scene, list(request.views), detail)
+    res_m = request.res_m if resolution is None else resolution.res_m
+    has_chosen_ao = request.ao is None and detail is not None and detail.texel_m is None
+    names = (*DEFAULT_LAYERS, "ao") if request.ao or has_chosen_ao else DEFAULT_LAYERS
+    layers = LayerRequest(names, color=request.color)
     rendering = RenderingRequest(
         request.name, request.name, request.views, res_m, layers=layers, title=request.title, attribution=request.attribution
     )
-    return create_rendering(workspace, catalogue, rendering)
+    return SiteRendering(create_rendering(workspace, catalogue, rendering), resolution, has_chosen_ao=has_chosen_ao)
 
 
-def choose_res(workspace: Workspace, request: SiteRequest) -> float:
-    """Returns the finest of RESOLUTIONS_M with at most MAX_BASE_TILES base tiles, estimated from the area that the scene covers in each view."""
-    scene = open_scene(workspace, request.name)
-    box, tile_px, covered_m2 = scene.box, 256, 0.0
-    frames = pin(box, tile_px, RESOLUTIONS_M[0], request.views)
-    for frame in frames:
-        level = min(frame.zmax, _PROBE_LEVEL)
-        side_m = frame.size_m / 2.0**level
-        covered_m2 += planned_occupancy(scene, frame, level).count(level) * side_m**2
-    for res_m in RESOLUTIONS_M:
-        if covered_m2 / (res_m * tile_px) ** 2 <= MAX_BASE_TILES:
-            return res_m
-    return RESOLUTIONS_M[-1]
+def store_report(
+    workspace: Workspace,
+    catalogue: Catalogue,
+    request: SiteRequest,
+    made: SiteRendering,
+    summary: ImportSummary,
+    workers: int,
+    seconds: float | None,
+) -> None:
+    """Stores the report of the site for its publications. `seconds`: that rendering took, None when there was nothing to render."""
+    scene, record = catalogue.scene(request.name), made.record
+    files = tuple(file_contents(workspace, catalogue, request.name))
+    box = union([file.box for file in files])
+    folder = request.sources
+    report = SiteReport(
+        title=record.title or record.name,
+        crs=None if scene.crs is None else scene.crs.name,
+        place="" if box is None else place_text(box, scene.crs),
+        box=box,
+        files=tuple(replace(file, findings=tuple(_published(finding, file.source, folder) for finding in file.findings)) for file in files),
+        failed=tuple((_without_folder(file, folder), _without_folder(reason, folder)) for file, reason in summary.failed),
+        left_alone=tuple(summary.left_alone),
+        left_out=tuple(outlier_lines(read_outliers(workspace, request.name), scene.crs)),
+        views=view_names([frame.angles for frame in record.frames]),
+        res_m=record.res_m,
+        why="" if made.resolution is None else made.resolution.why,
+        workers=workers,
+    )
+    write_report(workspace, record.name, report.with_run(seconds, read_report(workspace, record.name)))
+
+
+def _published(finding: Finding, source: str, folder: Path) -> Finding:
+    return replace(finding, example=_without_folder(finding.example, folder).removeprefix(f"{source}: "))
+
+
+def _without_folder(text: str, folder: Path) -> str:
+    """Returns a text without the path of the folder: a published report does not say where files are on this machine."""
+    for path in {folder.absolute(), folder.resolve()}:
+        if path != path.parent:
+            text = text.replace(f"{path}{os.sep}", "")
+    return text
+
+
+def _refit(workspace: Workspace, catalogue: Catalogue, request: SiteRequest, record: RenderingRecord) -> SiteRendering:
+    """Pins new frames, with the views, layers and resolution of the rendering, when content has left the present ones."""
+    box = open_scene(workspace, request.name).box
+    try:
+        for frame in record.frames:
+            check_content(frame, box, record.window)
+    except OutsideFrame:
+        frames = tuple(pin(box, record.tile_px, record.res_m, [frame.angles for frame in record.frames], record.window))
+        stored = catalogue.regrid(replace(record, frames=frames, box=box))
+        remove_tracks(workspace, stored)
+        return SiteRendering(stored, refitted=True)
+    return SiteRendering(record)
+
+
+def _surface_detail(workspace: Workspace, name: str, scene: _core.Scene) -> SurfaceDetail | None:
+    with Registry(workspace.registry_path(name)) as registry:
+        ground = registry.get_or_create_scene_object(GROUND, "terrain")
+    return surface_detail(*scene.sample_surfaces(ground))

@@ -17,9 +17,13 @@ _CLONE_NEWNET: Final = 0x40000000
 
 @dataclass(frozen=True)
 class Limits:
-    """None means unlimited. `wall_s` and `cpu_s` apply to each request. The parent enforces `wall_s`; the kernel enforces the others."""
+    """None means unlimited. `wall_s` and `cpu_s` apply to each request. The parent enforces `wall_s`; the kernel enforces the others.
+
+    `data_bytes` limits the memory that the process allocates; unlike `address_space_bytes`, it does not count mapped files.
+    """
 
     address_space_bytes: int | None = None
+    data_bytes: int | None = None
     cpu_s: int | None = None
     wall_s: float | None = None
     open_files: int | None = None
@@ -36,7 +40,8 @@ class Limits:
         """Sets the limits of this process, irrevocably. Returns {"network": "cut" | "open"}: "open" where the system does not allow cutting it."""
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         cut = not self.network and _cut_network()
-        for what, value in ((resource.RLIMIT_AS, self.address_space_bytes), (resource.RLIMIT_NOFILE, self.open_files)):
+        limits = ((resource.RLIMIT_AS, self.address_space_bytes), (resource.RLIMIT_DATA, self.data_bytes), (resource.RLIMIT_NOFILE, self.open_files))
+        for what, value in limits:
             if value is not None:
                 _lower(what, value)
         return {"network": "cut" if cut else "open"}

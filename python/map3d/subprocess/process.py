@@ -18,6 +18,8 @@ from map3d.subprocess.limits import Limits
 
 TAIL_BYTES: Final = 2000
 PIPE_BYTES: Final = 1 << 20
+_OUT_OF_MEMORY: Final = ("memory allocation of", "MemoryError", "Cannot allocate memory")
+"""What a process prints when an allocation or the start of a thread fails."""
 _ONE_THREAD: Final = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MALLOC_ARENA_MAX": "2"}
 
 
@@ -178,8 +180,9 @@ class Subprocess:
         output = self._last_output()
         if status == -signal.SIGXCPU:
             return LimitExceeded(f"the subprocess reached its limit of {self.limits.cpu_s} s of CPU time")
-        if self.limits.address_space_bytes is not None and ("memory allocation of" in output or "MemoryError" in output):
-            return LimitExceeded(f"the subprocess reached its limit of {self.limits.address_space_bytes >> 20} MiB of address space{output}")
+        memory, kind = (self.limits.address_space_bytes, "address space") if self.limits.data_bytes is None else (self.limits.data_bytes, "memory")
+        if memory is not None and any(sign in output for sign in _OUT_OF_MEMORY):
+            return LimitExceeded(f"the subprocess reached its limit of {memory >> 20} MiB of {kind}{output}")
         how = f"was ended by {_signal_name(-status)}" if status < 0 else f"ended with exit status {status}"
         return SubprocessDied(f"the subprocess {how} before it responded{output}")
 

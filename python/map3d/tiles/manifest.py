@@ -1,7 +1,6 @@
 """The manifest `rendering.json` (spec/manifest.md). Equal manifests have equal bytes; reading checks the version."""
 
 import json
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Final, Self
@@ -10,7 +9,8 @@ from map3d.errors import BadRequest, Corrupt, Map3dError, UnknownVersion
 from map3d.geometry.frames import PinnedFrame
 from map3d.geometry.views import parse_view_id
 from map3d.registry.documents import ATTRIBUTES, COLUMNS, SEARCH, SHARDS
-from map3d.tiles.naming import block_level, block_levels, block_of, parse_tile
+from map3d.tiles.block_versions import BlockVersions
+from map3d.tiles.naming import block_level, block_of, parse_tile
 from map3d.tiles.occupancy import Occupancy
 from map3d.types import DEPTH_KINDS, DEPTH_UNIT_M, OBJECTS_PER_SHARD, BlockId, Box, Layer, TileId, Vec3, ViewAngles, check_name
 
@@ -59,12 +59,11 @@ class Geographic:
 
 @dataclass(frozen=True)
 class ManifestView:
-    """A view's frame and content. `versions`: for each pass, the version of every block in its store. `archives`: layer → path, only in published
-    folders."""
+    """A view's frame and content. `versions`: for each pass; `archives`: layer → path, only in published folders."""
 
     frame: PinnedFrame
     occupancy: Occupancy
-    versions: tuple[Mapping[BlockId, int], ...]
+    versions: tuple[BlockVersions, ...]
     archives: Mapping[str, str] | None = None
 
 
@@ -114,14 +113,8 @@ class Manifest:
 
     def with_archives(self, archives: Mapping[str, Mapping[str, str]], content_version: int) -> Self:
         """Returns the manifest of a published folder. `archives`: view id → layer → path; `content_version`: also of every block."""
-        views = tuple(
-            replace(
-                view,
-                archives=archives[view.frame.id],
-                versions=tuple(dict.fromkeys(versions, content_version) for versions in view.versions),
-            )
-            for view in self.views
-        )
+        versions = (BlockVersions(content_version),) * len(self.passes)
+        views = tuple(replace(view, archives=archives[view.frame.id], versions=versions) for view in self.views)
         return replace(self, content_version=content_version, views=views)
 
     def to_json(self) -> dict[str, Any]:
@@ -228,15 +221,8 @@ def _view_json(view: ManifestView, passes: Sequence[Sequence[Layer]]) -> dict[st
     return row if view.archives is None else {**row, "archives": dict(view.archives)}
 
 
-def _versions_json(versions: Mapping[BlockId, int]) -> dict[str, Any]:
-    common = _most_common_version(versions)
-    return {"version": common, "versions": {str(block): version for block, version in sorted(versions.items()) if version != common}}
-
-
-def _most_common_version(versions: Mapping[BlockId, int]) -> int:
-    """Returns the greatest of the most common versions; 1 without versions."""
-    counts = Counter(versions.values())
-    return max(counts, key=lambda version: (counts[version], version), default=1)
+def _versions_json(versions: BlockVersions) -> dict[str, Any]:
+    return {"version": versions.common, "versions": {str(block): version for block, version in sorted(versions.others.items())}}
 
 
 def _load_passes(value: Mapping[str, Any]) -> tuple[tuple[Layer, ...], ...]:
@@ -249,7 +235,6 @@ def _load_passes(value: Mapping[str, Any]) -> tuple[tuple[Layer, ...], ...]:
 
 
 def _load_view(row: Mapping[str, Any], shape: Mapping[str, Any], passes: Sequence[Sequence[Layer]]) -> ManifestView:
-    """Gives every block with an occupied root tile a version. The manifest omits other blocks unless it lists their version."""
     angles = ViewAngles(row["look_at_deg"], row["pitch_deg"])
     if parse_view_id(row["id"]) != angles:
         raise Corrupt(f"view {row['id']}: the angles {angles.look_at_deg} and {angles.pitch_deg} do not match its id")
@@ -258,16 +243,11 @@ def _load_view(row: Mapping[str, Any], shape: Mapping[str, Any], passes: Sequenc
     later = row.get("passes", [])
     if [added["layers"] for added in later] != [[layer.name for layer in layers] for layers in passes[1:]]:
         raise Corrupt(f"view {row['id']}: the passes differ from those of the first view")
-    return ManifestView(frame, occupancy, tuple(_load_versions(part, occupancy) for part in (row, *later)), row.get("archives"))
+    return ManifestView(frame, occupancy, tuple(_load_versions(part, frame.zmax) for part in (row, *later)), row.get("archives"))
 
 
-def _load_versions(row: Mapping[str, Any], occupancy: Occupancy) -> dict[BlockId, int]:
-    listed = {_parse_block(text, occupancy.zmax): int(version) for text, version in row["versions"].items()}
-    return {**dict.fromkeys(_occupied_blocks(occupancy), int(row["version"])), **listed}
-
-
-def _occupied_blocks(occupancy: Occupancy) -> list[BlockId]:
-    return [BlockId(*tile) for level in block_levels(occupancy.zmax) for tile in occupancy.tiles(level.root)]
+def _load_versions(row: Mapping[str, Any], zmax: int) -> BlockVersions:
+    return BlockVersions(int(row["version"]), {_parse_block(text, zmax): int(version) for text, version in row["versions"].items()})
 
 
 def _parse_block(text: str, zmax: int) -> BlockId:
@@ -290,5 +270,4 @@ def _parse_vec3(value: Any) -> Vec3:
 
 def block_version(view: ManifestView, tile: TileId, number: int = 0) -> int:
     """Returns the version for a tile's URL, for a layer of pass `number`."""
-    versions = view.versions[number]
-    return versions.get(block_of(tile, view.frame.zmax), _most_common_version(versions))
+    return view.versions[number][block_of(tile, view.frame.zmax)]

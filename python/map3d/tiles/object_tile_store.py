@@ -28,8 +28,10 @@ CACHED_INDEXES: Final = 2048
 """Indexes in memory: 13 KB each with four layers."""
 CONNECTIONS: Final = 16
 BATCH: Final = 256
-ATTEMPTS: Final = 10
-"""Attempts to read a block that is being replaced, or to write one that another worker writes."""
+WRITE_ATTEMPTS: Final = 10
+"""Attempts to write a block that another worker writes."""
+RANGE_ATTEMPTS: Final = 4
+"""Attempts to read a part of a block that is being replaced; then the whole object is read."""
 
 _Given = TypeVar("_Given")
 _Found = TypeVar("_Found")
@@ -86,11 +88,11 @@ class ObjectTileStore:
     def put_block(self, block: BlockId, key: str, version: int, tiles: Sequence[StoredTile], seam: bytes | None, *, fence: int = 0) -> StoredBlock:
         self._check_writable()
         check_block(self._shape, block, version, tiles)
-        for _ in range(ATTEMPTS):
+        for _ in range(WRITE_ATTEMPTS):
             found = self._read_index(block)
             with suppress(ObjectChanged):
                 return self._replace(found, block, key, version, tiles, seam, fence)
-        raise StoreError(f"{self.url}: block {block} was replaced by others {ATTEMPTS} times while it was written")
+        raise StoreError(f"{self.url}: block {block} was replaced by others {WRITE_ATTEMPTS} times while it was written")
 
     def _replace(
         self,
@@ -212,11 +214,12 @@ class ObjectTileStore:
         return None
 
     def _read_span(self, block: BlockId, find: Callable[[BlockIndex], Span | None]) -> bytes | None:
-        """Reads a part of a block with one request if the cached index is still right. Raises Corrupt if the bytes stay different from their hash."""
+        """Reads a part of a block with one request if the cached index is still right; all of a block that is replaced again and again. Raises
+        Corrupt if the bytes stay different from their hash."""
         found = self._cached_index(block)
         if found is None or find(found[1]) is None:
             found = self._current_index(block)
-        for attempt in range(ATTEMPTS):
+        for _ in range(RANGE_ATTEMPTS):
             span = None if found is None else find(found[1])
             if found is None or span is None:
                 return None
@@ -226,10 +229,22 @@ class ObjectTileStore:
                     return None
                 if content_hash(data) == span.hash:
                     return data
-                if attempt == ATTEMPTS - 1:
-                    raise Corrupt(f"{self.url}/{_object_name(block)}: a part does not match its hash; remove the object and render again")
             found = self._read_index(block)
-        raise StoreError(f"{self.url}: block {block} was replaced {ATTEMPTS} times while it was read")
+        return self._read_span_of_whole(block, find)
+
+    def _read_span_of_whole(self, block: BlockId, find: Callable[[BlockIndex], Span | None]) -> bytes | None:
+        """Reads a block object with one request, which no writer can come between, and returns a part of it. Raises Corrupt, UnknownVersion."""
+        where = f"{self.url}/{_object_name(block)}"
+        found = self._objects.get(_object_name(block))
+        if found is None:
+            return None
+        span = find(decode_index(found[0], len(found[0]), where))
+        if span is None:
+            return None
+        data = found[0][span.start : span.start + span.length]
+        if content_hash(data) != span.hash:
+            raise Corrupt(f"{where}: a part does not match its hash; remove the object and render again")
+        return data
 
     def _cached_index(self, block: BlockId) -> tuple[str, BlockIndex] | None:
         with self._lock:
@@ -247,22 +262,23 @@ class ObjectTileStore:
 
     def _read_index(self, block: BlockId) -> tuple[str, BlockIndex] | None:
         """Reads the entity tag and the index; None without the block. Raises Corrupt, UnknownVersion."""
-        where = f"{self.url}/{_object_name(block)}"
-        for _ in range(ATTEMPTS):
-            found = self._objects.get_start(_object_name(block), START_BYTES)
-            if found is None:
-                self._forget(block)
-                return None
+        name, where = _object_name(block), f"{self.url}/{_object_name(block)}"
+        found = self._objects.get_start(name, START_BYTES)
+        if found is not None and len(found[0]) < (need := index_bytes(found[0], where)) <= found[2]:
             start, tag, size = found
-            with suppress(ObjectChanged):
-                need = index_bytes(start, where)
-                if need > len(start) and need <= size:
-                    rest = self._objects.get_range(_object_name(block), len(start), need - len(start), if_match=tag)
-                    start += rest or b""
-                index = decode_index(start, size, where)
-                self._remember(block, tag, index)
-                return tag, index
-        raise StoreError(f"{where}: was replaced {ATTEMPTS} times while it was read")
+            try:
+                rest = self._objects.get_range(name, len(start), need - len(start), if_match=tag)
+                found = None if rest is None else (start + rest, tag, size)
+            except ObjectChanged:
+                whole = self._objects.get(name)
+                found = None if whole is None else (*whole, len(whole[0]))
+        if found is None:
+            self._forget(block)
+            return None
+        start, tag, size = found
+        index = decode_index(start, size, where)
+        self._remember(block, tag, index)
+        return tag, index
 
     def _remember(self, block: BlockId, tag: str, index: BlockIndex) -> None:
         with self._lock:

@@ -219,8 +219,9 @@ class SqliteTileStore:
             raise Corrupt(f"{self.path}: invalid tile store metadata: {error}") from error
 
     def _migrate(self) -> None:
-        if _version(self._connections.current()) == FORMAT_VERSION:
-            return
+        with self._reading() as db:
+            if _version(db) == FORMAT_VERSION:
+                return
         with self._transaction() as db:
             for version in range(_version(db) + 1, FORMAT_VERSION + 1):
                 run_script(db, _MIGRATIONS[version])

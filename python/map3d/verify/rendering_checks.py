@@ -1,11 +1,13 @@
 """`map3d verify`: recomputes everything that can be recomputed, for scenes and renderings."""
 
 from collections.abc import Callable, Mapping
+from itertools import groupby
+from operator import attrgetter
 
 import numpy as np
 
 from map3d import _core
-from map3d.catalogue import Catalogue, RenderingRecord, State, Workspace
+from map3d.catalogue import Catalogue, Job, PlannedJob, RenderingRecord, State, Workspace
 from map3d.errors import Map3dError
 from map3d.ingest.asset import asset_digest
 from map3d.ingest.asset_removal import is_removing
@@ -13,7 +15,7 @@ from map3d.ingest.unfinished_imports import unfinished_imports
 from map3d.registry import Registry
 from map3d.renderings.build import is_stale, open_scene
 from map3d.renderings.manifest_writer import current_manifest
-from map3d.renderings.plan import plan_jobs
+from map3d.renderings.plan import PlannedBlocks, plan_jobs
 from map3d.renderings.remove_rendering import is_rendering_removed
 from map3d.renderings.scene_cache import has_assets, scene_in_use
 from map3d.renderings.scene_files import binary_files, check_file, check_ids, check_index
@@ -21,7 +23,6 @@ from map3d.renderings.shared_scene import FILES
 from map3d.renderings.track_stores import read_manifest
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.naming import block_of
-from map3d.tiles.occupancy import numbers_of
 from map3d.types import TileId
 from map3d.verify.findings import Findings
 from map3d.verify.track_checks import check_track
@@ -83,24 +84,30 @@ def _verify_tiles(workspace: Workspace, catalogue: Catalogue, record: RenderingR
 
 
 def _check_plan(catalogue: Catalogue, record: RenderingRecord, scene: _core.Scene, findings: Findings) -> None:
-    """Checks that every block with content has a job that is done with the current key."""
-    jobs = {(job.track, job.block): job for job in catalogue.jobs(record.name)}
-    places: dict[str, list[tuple[int, int]]] = {}
-    for job in jobs.values():
-        if job.kind == "base":
-            places.setdefault(job.track, []).append((job.block.x, job.block.y))
-    for expected in plan_jobs(scene, record, {track: numbers_of(own) for track, own in places.items()}):
-        findings.count("blocks")
-        found = jobs.pop((expected.track, expected.block), None)
-        if found is None:
-            findings.add(f"{record.name} {expected.track} block {expected.block}: has content but no job")
-        elif found.key != expected.key:
-            findings.add(f"{record.name} {expected.track} block {expected.block}: rendered from an older scene; run map3d render {record.name}")
-        elif found.state is not State.DONE:
-            reason = f" ({found.reason})" if found.reason else ""
-            findings.add(f"{record.name} {expected.track} block {expected.block}: {found.state} instead of done{reason}")
-    for track, block in jobs:
-        findings.add(f"{record.name} {track} block {block}: a job outside the plan")
+    """Checks that every block with content has a job that is done with the current key. Memory holds the jobs of one track."""
+    tracks = set()
+    for track, blocks in groupby(plan_jobs(scene, record, PlannedBlocks(catalogue, record)), attrgetter("track")):
+        tracks.add(track)
+        jobs = {job.block: job for job in catalogue.jobs(record.name, track)}
+        for expected in blocks:
+            findings.count("blocks")
+            if fault := _fault_of(expected, jobs.pop(expected.block, None)):
+                findings.add(f"{record.name} {track} block {expected.block}: {fault}")
+        for block in jobs:
+            findings.add(f"{record.name} {track} block {block}: a job outside the plan")
+    for job in catalogue.jobs(record.name):
+        if job.track not in tracks:
+            findings.add(f"{record.name} {job.track} block {job.block}: a job outside the plan")
+
+
+def _fault_of(expected: PlannedJob, found: Job | None) -> str | None:
+    if found is None:
+        return "has content but no job"
+    if found.key != expected.key:
+        return f"rendered from an older scene; run map3d render {found.rendering}"
+    if found.state is not State.DONE:
+        return f"{found.state} instead of done{f' ({found.reason})' if found.reason else ''}"
+    return None
 
 
 def _check_passes(record: RenderingRecord, found: Mapping[str, set[TileId] | None], findings: Findings) -> None:

@@ -1,0 +1,100 @@
+"""Chooses a resolution: as fine as the surfaces, and coarse enough that rendering takes minutes."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from map3d import _core
+from map3d.geometry.frames import core_frame, pin
+from map3d.types import ViewAngles
+
+RESOLUTIONS_M: Final = (0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
+MAX_BASE_TILES: Final = 30_000
+"""For all views together: some minutes on a small machine."""
+TEXELS_A_PIXEL: Final = 0.5
+"""Finer pixels show no more of a texture."""
+TRIANGLE_PX: Final = 64
+"""Pixels along the side of a usual triangle; more show no more of the shape."""
+TEXTURED: Final = 0.1
+"""The share of textured surfaces from which textures count."""
+FINE: Final = 0.25
+"""The share of the surfaces that may have finer texels than the resolution takes into account."""
+TILE_PX: Final = 256
+
+_PROBE_LEVEL: Final = 8
+
+
+@dataclass(frozen=True)
+class SurfaceDetail:
+    """`texel_m`: side of the finer texels, None without textures; `triangle_m`: side of a square as large as a usual triangle."""
+
+    texel_m: float | None
+    triangle_m: float
+
+    @property
+    def pixel_m(self) -> float:
+        """The size of pixels below which they show nothing more."""
+        by_shape = self.triangle_m / TRIANGLE_PX
+        return by_shape if self.texel_m is None else min(by_shape, self.texel_m * TEXELS_A_PIXEL)
+
+    def text(self) -> str:
+        triangles = f"triangles of about {self.triangle_m:.3g} m"
+        return triangles if self.texel_m is None else f"texels of about {self.texel_m:.3g} m and {triangles}"
+
+
+@dataclass(frozen=True)
+class Resolution:
+    """`why`: the end of the sentence "resolution 0.1 m per pixel, since …"."""
+
+    res_m: float
+    why: str
+
+
+def choose_resolution(scene: _core.Scene, views: list[ViewAngles], detail: SurfaceDetail | None) -> Resolution:
+    """Returns the finest of RESOLUTIONS_M that the surfaces need, or a coarser one when it needs more than MAX_BASE_TILES base tiles."""
+    covered_m2 = _covered_m2(scene, views)
+    for res_m in RESOLUTIONS_M:
+        if covered_m2 / (res_m * TILE_PX) ** 2 > MAX_BASE_TILES:
+            continue
+        if detail is None or res_m * 1.001 >= detail.pixel_m or res_m == RESOLUTIONS_M[-1]:
+            return Resolution(res_m, _why(res_m, covered_m2, detail))
+    return Resolution(RESOLUTIONS_M[-1], "the scene is too large for a finer one")
+
+
+def surface_detail(areas: NDArray[np.float64], texels: NDArray[np.float64]) -> SurfaceDetail | None:
+    """Returns the detail of sampled triangles, None without any. `areas`: square metres; `texels`: sides in metres, NaN without a texture."""
+    textured = np.isfinite(texels) & (areas > 0)
+    seen = areas > 0
+    if not seen.any():
+        return None
+    triangle_m = float(np.sqrt(_quantile(areas[seen], np.ones(int(seen.sum())), 0.5)))
+    if areas[textured].sum() < TEXTURED * areas.sum():
+        return SurfaceDetail(None, triangle_m)
+    return SurfaceDetail(_quantile(texels[textured], areas[textured], FINE), triangle_m)
+
+
+def _why(res_m: float, covered_m2: float, detail: SurfaceDetail | None) -> str:
+    finer = [value for value in RESOLUTIONS_M if value < res_m]
+    if finer and covered_m2 / (finer[-1] * TILE_PX) ** 2 > MAX_BASE_TILES:
+        return f"{finer[-1]:g} m would need more than {MAX_BASE_TILES:,} tiles"
+    if detail is None or (not finer and detail.pixel_m <= res_m):
+        return "it is the finest that is chosen without --res"
+    return f"the surfaces have {detail.text()}, so that finer pixels would show nothing more"
+
+
+def _covered_m2(scene: _core.Scene, views: list[ViewAngles]) -> float:
+    """Returns the area that the scene covers in all views together."""
+    covered_m2 = 0.0
+    for frame in pin(scene.box, TILE_PX, RESOLUTIONS_M[0], views):
+        level = min(frame.zmax, _PROBE_LEVEL)
+        covered_m2 += len(scene.occupied(core_frame(frame.to_json()), level)) * (frame.size_m / 2.0**level) ** 2
+    return covered_m2
+
+
+def _quantile(values: NDArray[np.float64], weights: NDArray[np.float64], share: float) -> float:
+    """Returns the smallest value that this share of the weights does not exceed."""
+    order = np.argsort(values, kind="stable")
+    sums = np.cumsum(weights[order])
+    return float(values[order][int(np.searchsorted(sums, share * sums[-1]))])
