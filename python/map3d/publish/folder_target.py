@@ -20,7 +20,7 @@ class FolderTarget(Target):
     def __init__(self, folder: Path) -> None:
         super().__init__(str(folder))
         self.folder = folder.absolute()
-        self.draft = self.folder.with_name(f".{self.folder.name}.publishing")
+        self.draft = draft_of(self.folder)
 
     def start(self, replace: bool) -> None:
         _check_folder(self.folder, replace)
@@ -75,6 +75,16 @@ class FolderTarget(Target):
                 path.rmdir()
 
 
+def draft_of(folder: Path) -> Path:
+    """Returns the place where a folder is written before it replaces the published one."""
+    return folder.with_name(f".{folder.name}.publishing")
+
+
+def old_of(folder: Path) -> Path:
+    """Returns the place of a folder that was replaced, until it is removed."""
+    return folder.with_name(f".{folder.name}.old")
+
+
 def count_finished_tiles(path: Path, metadata: dict[str, Any]) -> int:
     """Returns the number of tiles in a complete archive with this metadata; 0 without one."""
     if not path.is_file():
@@ -116,7 +126,7 @@ def _write(path: Path, data: bytes) -> None:
 
 
 def _replace_folder(draft: Path, folder: Path) -> None:
-    old = folder.with_name(f".{folder.name}.old")
+    old = old_of(folder)
     shutil.rmtree(old, ignore_errors=True)
     if folder.exists():
         folder.rename(old)

@@ -21,19 +21,21 @@ BACKGROUND: Final = (242, 240, 235)
 
 
 def make_preview(workspace: Workspace, record: RenderingRecord, manifest: Manifest) -> bytes | None:
-    """Returns a JPEG that shows what the rendering contains; None while no tile of a colour layer exists. Raises Corrupt, StoreError."""
+    """Returns a JPEG that shows what the rendering contains; None while no tile of a colour layer is stored. Raises Corrupt, StoreError."""
     chosen = choose_preview(manifest, aspect=WIDTH_PX / HEIGHT_PX, min_width_px=WIDTH_PX)
     if chosen is None:
         return None
     with Image.new("RGB", (WIDTH_PX, HEIGHT_PX), BACKGROUND) as picture:
-        _draw(picture, workspace, record, manifest, chosen)
+        if not _draw(picture, workspace, record, manifest, chosen):
+            return None
         data = io.BytesIO()
         picture.save(data, "JPEG", quality=QUALITY, optimize=True)
     return data.getvalue()
 
 
-def _draw(picture: Image.Image, workspace: Workspace, record: RenderingRecord, manifest: Manifest, chosen: Preview) -> None:
-    """Pastes the tiles at their level's resolution, and scales the window to the picture."""
+def _draw(picture: Image.Image, workspace: Workspace, record: RenderingRecord, manifest: Manifest, chosen: Preview) -> bool:
+    """Pastes the tiles at their level's resolution, and scales the window to the picture. Returns whether there are any."""
+    drawn = False
     left, top, width, height = chosen.window
     number = next(number for number, layers in enumerate(manifest.passes) if any(layer.name == chosen.layer for layer in layers))
     origin_x, origin_y = round(left), round(top)
@@ -46,8 +48,10 @@ def _draw(picture: Image.Image, workspace: Workspace, record: RenderingRecord, m
             try:
                 with Image.open(io.BytesIO(data)) as tile:
                     window.paste(tile.convert("RGBA"), (at.x - origin_x, at.y - origin_y))
+                    drawn = True
             except OSError as error:
                 name = f"{chosen.view}/{chosen.layer}/{at.tile.z}/{at.tile.x}/{at.tile.y}"
                 raise Corrupt(f"{store.url}: tile {name} is not an image: {error}; run: map3d verify") from error
         with window.resize(picture.size, Image.Resampling.LANCZOS) as scaled:
             picture.paste(scaled, mask=scaled)
+    return drawn

@@ -7,7 +7,7 @@ import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from hashlib import sha256
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,24 +15,30 @@ from map3d.catalogue import RenderingRecord, Workspace
 from map3d.errors import BadRequest, Corrupt, NotFound, Stopped, StoreError
 from map3d.geometry.views import track_id
 from map3d.object_store import open_object_store
+from map3d.publish.exports import SUFFIXES
 from map3d.publish.folder_target import FolderTarget
-from map3d.publish.page_head import describe_page
+from map3d.publish.layer_definitions import gdal_wms, qgis_layer, wkt
+from map3d.publish.page_head import add_policy, describe_page
 from map3d.publish.pmtiles_archive import write_archive
 from map3d.publish.preview_picture import FILE as PREVIEW
 from map3d.publish.preview_picture import make_preview
+from map3d.publish.report_page import report_files
 from map3d.publish.size_report import SizeRow, report_sizes
 from map3d.publish.store_target import StoreTarget
 from map3d.publish.target import LAST, DryRun, Target
 from map3d.renderings.scene_cache import open_registry
+from map3d.renderings.site_report import read_report
 from map3d.renderings.track_stores import open_track, read_manifest, rendering_record
 from map3d.tiles.manifest import FILE_NAME, Manifest, ManifestView
 from map3d.tiles.tile_store import TileStore
 from map3d.tiles.viewer_files import PAGE, viewer_files, viewer_folder
-from map3d.types import Layer, TileId
+from map3d.types import COLOR_KINDS, Layer, TileId
 
 OnTiles = Callable[[str, int, int], bool]
 """(stage, done, total) → False to stop. The stage "publish" counts tiles, "files" counts other files; `total` is 0 if it is unknown."""
 
+GIS: Final = "gis"
+"""Folder of the files for GIS software."""
 README: Final = "README.txt"
 ICON: Final = "favicon.ico"
 _ICON_PATH: Final = Path(__file__).parents[1] / "web" / "static" / ICON
@@ -60,6 +66,7 @@ rendering.json               views, layers, levels, coordinate system
 objects/                     attributes of the objects, and the search index
 preview.jpg                  picture for links to the map
 index.html, *.js             the viewer
+report.html                  what the files held from which `map3d site` made the map; absent otherwise
 checksums.sha256             to check a copy, run: sha256sum -c checksums.sha256
 """
 
@@ -91,22 +98,28 @@ def publish(
     allow_incomplete: bool = False,
     dry_run: bool = False,
     url: str | None = None,
+    gis: bool = False,
     progress: OnTiles | None = None,
 ) -> Published:
-    """Publishes to a folder, or to an object store when `out` is a URL such as s3://BUCKET/PREFIX. `replace`: updates an earlier publication;
-    `dry_run`: writes nothing; `url`: address at which people will open the map, for the picture of links to it.
+    """Publishes to a folder, or to an object store when `out` is a URL such as s3://BUCKET/PREFIX.
 
-    Raises NotFound, AlreadyExists, BadRequest (incomplete), Corrupt (tiles changed meanwhile), Stopped, StoreError; ViewerMissing before any work.
+    `replace`: updates an earlier publication; `dry_run`: writes nothing; `url`: address at which people will open the map, for the picture of links;
+    `gis`: also writes colour tiles as files, with layer definitions for QGIS and GDAL, which read no archives. The definitions name the tiles by
+    `url`, else by the path of the folder.
+
+    Raises NotFound, AlreadyExists, BadRequest (incomplete, or `gis` to an object store without `url`), Corrupt (tiles changed meanwhile), Stopped,
+    StoreError; ViewerMissing before any work.
     """
     viewer_folder()
     record = rendering_record(workspace, rendering)
     manifest = _read_manifest(workspace, record, allow_incomplete)
     target = _open_target(workspace, rendering, out)
     target = DryRun(target) if dry_run else target
+    tiles_at = _gis_address(out, url) if gis else None
     publisher = _Publisher(workspace, record, manifest, target, progress or (lambda *_: True))
     try:
         target.start(replace)
-        publisher.write(url)
+        publisher.write(url, tiles_at)
         target.finish()
     except OSError as error:
         raise StoreError(f"{target.url}: cannot write: {error}") from error
@@ -125,6 +138,15 @@ def publish(
         removed=len(target.removed),
         sizes=report_sizes(target.sizes),
     )
+
+
+def _gis_address(out: Path | str, url: str | None) -> str:
+    """Returns the address of the published folder, without a slash at its end."""
+    if url is not None:
+        return url.rstrip("/")
+    if not isinstance(out, Path) and "://" in out:
+        raise BadRequest(f"{out}: layer definitions for GIS software need the address of the tiles; give --url ADDRESS")
+    return Path(out).absolute().as_uri()
 
 
 def check_folder(folder: Path) -> None:
@@ -150,12 +172,13 @@ class _Publisher:
         self._total = sum(view.occupancy.count() for view in manifest.views) * len(manifest.layers)
         self._content: list[str] = []
 
-    def write(self, url: str | None) -> None:
-        """Files that refer to others come last."""
+    def write(self, url: str | None, tiles_at: str | None) -> None:
+        """Files that refer to others come last. `tiles_at`: address of the folder, if it shall have files for GIS software."""
         archives = {view.frame.id: self._write_view(view) for view in self._manifest.views}
         manifest = self._manifest.with_archives(archives, self._content_version())
         last: dict[str, bytes] = {FILE_NAME: manifest.dump()}
-        for count, (name, data) in enumerate(self._files(url), 1):
+        files = chain(self._files(url), () if tiles_at is None else self._gis_files(tiles_at))
+        for count, (name, data) in enumerate(files, 1):
             if name in LAST:
                 last[name] = data
             else:
@@ -174,14 +197,33 @@ class _Publisher:
         if picture is not None:
             yield PREVIEW, picture
         yield ICON, _ICON_PATH.read_bytes()
+        report = read_report(self._workspace, self._record.name)
+        if report is not None:
+            size = sum(size for name, size in self._target.sizes.items() if name.endswith(".pmtiles"))
+            yield from report_files(report, self.tiles, size, None if picture is None else PREVIEW)
         for file in viewer_files():
             data = (viewer_folder() / file).read_bytes()
             yield file.as_posix(), self._describe(data, picture is not None, url) if file.as_posix() == PAGE else data
         yield README, _readme(self._manifest).encode()
 
+    def _gis_files(self, address: str) -> Iterator[tuple[str, bytes]]:
+        """Yields the tiles of the colour layers as files, and layer definitions that name them."""
+        for view in self._manifest.views:
+            yield f"{GIS}/{view.frame.id}.wkt", wkt(self._manifest, view).encode()
+            for number, layers in enumerate(self._manifest.passes):
+                for layer in (layer for layer in layers if layer.kind in COLOR_KINDS):
+                    place, suffix = f"{GIS}/{view.frame.id}/{layer.name}", SUFFIXES[layer.format]
+                    template = f"{address}/{place}/{{z}}/{{x}}/{{y}}.{suffix}"
+                    yield f"{GIS}/{view.frame.id}-{layer.name}.xml", gdal_wms(self._manifest, view, layer, template).encode()
+                    yield f"{GIS}/{view.frame.id}-{layer.name}.qlr", qgis_layer(self._manifest, view, layer, template).encode()
+                    with open_track(self._workspace, self._record, track_id(view.frame.id, number)) as store:
+                        stored = store.shape.layer_number(layer.name)
+                        for tile in store.list_tiles(stored):
+                            yield f"{place}/{tile.z}/{tile.x}/{tile.y}.{suffix}", store.get_tile(stored, *tile) or b""
+
     def _describe(self, page: bytes, has_picture: bool, url: str | None) -> bytes:
         base = "" if url is None else url.rstrip("/") + "/"
-        return describe_page(page.decode(), self._manifest, base + PREVIEW if has_picture else None, base or None).encode()
+        return describe_page(add_policy(page.decode()), self._manifest, base + PREVIEW if has_picture else None, base or None).encode()
 
     def _write_view(self, view: ManifestView) -> dict[str, str]:
         """Returns the archive path of each layer."""

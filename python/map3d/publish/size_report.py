@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class SizeRow:
-    """Files of one part. `part`: tiles, objects, search, columns, viewer or other; `view` and `layer`: of tiles."""
+    """Files of one part. `part`: tiles, objects, search, columns, gis, viewer or other; `view` and `layer`: of tiles."""
 
     part: str
     view: str | None
@@ -29,6 +29,8 @@ def _part_of(name: str) -> tuple[str, str | None, str | None]:
     folder, _, file = name.rpartition("/")
     if name.endswith(".pmtiles"):
         return "tiles", folder, file.rpartition("-")[0]
+    if name.startswith("gis/"):
+        return "gis", None, None
     if name.startswith("objects/search"):
         return "search", None, None
     if name == "objects/attributes.json" or name.startswith("objects/columns/"):

@@ -16,7 +16,7 @@ LAST: Final = (SEARCH_ROOT, PAGE, FILE_NAME)
 """Files that refer to others, and are written after them."""
 
 _NAMED_BY_CONTENT: Final = re.compile(r"objects/search/[0-9a-f]{16}\.json|[^/]+/[a-z0-9_-]+-[0-9a-f]{16}\.pmtiles")
-_DOCUMENT: Final = re.compile(r"objects/[0-9a-z/]+\.json")
+_DOCUMENT: Final = re.compile(r"objects/[0-9a-z/]+\.json|gis/[0-9.]+-[0-9.]+(/[0-9a-z_-]+/[0-9/]+\.(webp|png|jpg)|(-[0-9a-z_-]+)?\.(wkt|xml|qlr))")
 
 
 def is_named_by_content(name: str) -> bool:

@@ -1,0 +1,92 @@
+"""Does the operations import and build."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+from map3d.catalogue import Catalogue, OperationRecord, Workspace
+from map3d.errors import ImportFailed
+from map3d.ingest.import_files import FilesImport, import_files
+from map3d.ingest.import_options import ImportOptions
+from map3d.ingest.importing import Imported
+from map3d.operations.operation_report import OperationReport
+from map3d.operations.uploaded_files import check_host_path, remove_staging, remove_upload, stage
+from map3d.quantities import plural
+from map3d.renderings import build
+from map3d.renderings.outliers import choose_content
+from map3d.renderings.style import check_style, choose_style
+
+MAX_LINES: Final = 200
+
+
+def do_import(workspace: Workspace, catalogue: Catalogue, operation: OperationRecord, report: OperationReport) -> str:
+    """Imports the files; assets that are up to date stay, so that a repeated operation goes on where the first one ended. Uploads are removed once
+    all of them are imported. Raises ImportFailed when a file is broken, after importing the others."""
+    arguments = operation.arguments
+    uploads, options = list(arguments.get("files", ())), dict(arguments.get("options", {}))
+    name = options.pop("name", None)
+    paths = [check_host_path(path) for path in arguments.get("paths", ())]
+    try:
+        if uploads:
+            report.progress("unpacking")
+            folder = stage(
+                workspace, operation.id, uploads, operation.asked_by, lambda file, done, total: report.progress(f"unpacking {file}", done, total)
+            )
+            paths += [folder] if name is None else sorted(folder.iterdir())
+        show = _show(report)
+        done = import_files(workspace, catalogue, operation.target, paths, ImportOptions(**options), name=name, skip_unchanged=True, progress=show)
+    finally:
+        remove_staging(workspace, operation.id)
+    _log(report, done)
+    counts = f"imported {plural(len(done.imported), 'file')}, {len(done.unchanged):,} unchanged"
+    if done.failed:
+        raise ImportFailed(f"{counts}, {len(done.failed):,} failed; the first: {done.failed[0][1]}")
+    for id in uploads:
+        remove_upload(workspace, id, operation.asked_by)
+    return counts
+
+
+def _show(report: OperationReport) -> Any:
+    def show(name: str, number: int, total: int, how_far: str) -> None:
+        report.progress(f"importing {name}" + (f": {how_far}" if how_far else ""), number, total)
+
+    return show
+
+
+def _log(report: OperationReport, done: FilesImport) -> None:
+    report.log_counted((line for item in done.imported for line in _import_lines(item)), MAX_LINES, "lines")
+    report.log_counted((f"not imported: {reason}" for _, reason in done.failed), MAX_LINES, "files were not imported")
+
+
+def _import_lines(item: Imported) -> Iterator[str]:
+    skipped = sum(item.report.get("skipped", {}).values())
+    yield f"{item.asset}: {plural(item.objects, 'object')}, {plural(item.triangles, 'triangle')}" + (
+        f", skipped {plural(skipped, 'element')}" if skipped else ""
+    )
+    for warning in item.report.get("warnings", ())[:20]:
+        yield f"{item.asset}: {warning['count']:,} × {warning['reason']}, e.g. {warning['example']}"
+
+
+def do_build(workspace: Workspace, catalogue: Catalogue, operation: OperationRecord, report: OperationReport) -> str:
+    choose_content(catalogue, operation.target, operation.arguments.get("keep_outliers"), operation.arguments.get("cluster"))
+    style = operation.arguments.get("style")
+    choose_style(catalogue, operation.target, None if style is None else check_style(style))
+    is_built = build_if_stale(workspace, catalogue, operation.target, operation.arguments, report)
+    return f"built scene {operation.target}" if is_built else f"scene {operation.target} is up to date"
+
+
+def build_if_stale(workspace: Workspace, catalogue: Catalogue, scene: str, arguments: Mapping[str, Any], report: OperationReport) -> bool:
+    """Builds the scene if its files have changed; returns whether it did."""
+
+    def progress(stage: str, done: int, total: int) -> bool:
+        report.progress(f"building: {stage}", done, total)
+        return True
+
+    threads, memory = arguments.get("workers"), arguments.get("max_memory_bytes")
+    counts = build.build_if_stale(workspace, catalogue, scene, threads=threads, max_memory_bytes=memory, progress=progress)
+    if counts is None:
+        return False
+    numbers = ", ".join(f"{count:,} {name.replace('_', ' ')}" for name, count in counts.items() if isinstance(count, int) and count)
+    report.log(f"built scene {scene}: {numbers}")
+    report.log_counted(counts.get("outlier_lines", ()), MAX_LINES, "lines")
+    report.log_counted((f"{reason}: {example}" for reason, example in counts.get("texture_warnings", {}).items()), MAX_LINES, "warnings")
+    return True

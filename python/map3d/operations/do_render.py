@@ -1,0 +1,75 @@
+"""Does the operations render and publish."""
+
+from pathlib import Path
+
+from map3d.catalogue import Catalogue, OperationRecord, Workspace
+from map3d.cores import usable_cores
+from map3d.errors import BadRequest
+from map3d.jobs import events
+from map3d.jobs.event_messages import problem_text
+from map3d.jobs.events import RunEvent
+from map3d.jobs.run import Run
+from map3d.jobs.run_counter import RunCounter
+from map3d.jobs.run_settings import RunSettings
+from map3d.operations.do_import import build_if_stale
+from map3d.operations.operation_report import OperationReport
+from map3d.publish import publish
+from map3d.publish.published_folders import FOLDER, published_path
+from map3d.quantities import plural
+
+
+def do_render(workspace: Workspace, catalogue: Catalogue, operation: OperationRecord, report: OperationReport) -> str:
+    """Builds, plans and renders like `map3d render`. Raises BadRequest when blocks are left in quarantine."""
+    name, arguments = operation.target, operation.arguments
+    build_if_stale(workspace, catalogue, catalogue.rendering(name).scene, arguments, report)
+    if arguments.get("retry_quarantined"):
+        catalogue.retry(name)
+    settings = RunSettings(arguments.get("workers", usable_cores()), arguments.get("max_memory_bytes"))
+    run = Run(workspace, catalogue, name, settings)
+    report.progress("planning")
+    plan = run.plan(lambda done, total: report.progress("planning", done, total))
+    counter = RunCounter()
+
+    def on_event(event: RunEvent) -> None:
+        counter(event)
+        if line := event_line(event):
+            report.log(line)
+        report.progress("rendering", counter.done, counter.total)
+
+    result = run.work(plan, on_event)
+    done = result.statistics
+    if not result.complete:
+        raise BadRequest(
+            f"rendering {name} is incomplete: {plural(result.quarantined_jobs, 'block')} in quarantine, {result.open_jobs:,} open; "
+            "see the reasons, then render again with retry_quarantined"
+        )
+    counts = f"{plural(done.done, 'block')}, {plural(done.tiles, 'image')}, {done.bytes / 1e6:,.1f} MB"
+    return f"rendered {counts}; complete (content version {result.content_version})"
+
+
+def event_line(event: RunEvent) -> str:
+    """Returns the log line of an event, empty for events without one."""
+    if isinstance(event, events.Planned):
+        return f"{plural(event.open_jobs, 'block')} to render: {event.counts.added:,} new, {event.counts.changed:,} changed"
+    if isinstance(event, events.Waiting):
+        return f"waiting for {plural(event.jobs, 'block')} that other workers render"
+    return problem_text(event)
+
+
+def published_folder(workspace: Workspace, operation: OperationRecord) -> Path:
+    """Returns the folder that a publication writes."""
+    return published_path(workspace, str(operation.arguments.get("folder", operation.target)))
+
+
+def do_publish(workspace: Workspace, catalogue: Catalogue, operation: OperationRecord, report: OperationReport) -> str:
+    folder, arguments = published_folder(workspace, operation), operation.arguments
+    folder.parent.mkdir(exist_ok=True)
+
+    def progress(stage: str, done: int, total: int) -> bool:
+        report.progress("publishing tiles" if stage == "publish" else f"publishing {stage}", done, total)
+        return True
+
+    url, allow = arguments.get("url"), arguments.get("allow_incomplete", False)
+    done = publish(workspace, operation.target, folder, replace=True, allow_incomplete=allow, url=url, progress=progress)
+    counts = f"{plural(done.files, 'file')}, {done.bytes / 1e6:,.1f} MB; {done.written:,} written, {done.removed:,} removed"
+    return f"published to {FOLDER}/{folder.name}: {counts}"
