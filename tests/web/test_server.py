@@ -65,7 +65,7 @@ def test_everything_is_served(address):
         assert client.get("/healthz").text == "ok\n"
         assert client.get("/tiles/tea/rendering.json").json()["name"] == "tea"
         assert "Tea" in client.get("/renderings").text
-        assert client.get("/").headers["location"] == "/view/tea/"
+        assert client.get("/").headers["location"] == "view/tea/"
         for tile in every_tile():
             path = f"/tiles/tea/0-45/depth/{tile.z}/{tile.x}/{tile.y}"
             assert client.get(path).content == client.get(f"{path}?v=1").content == tile_bytes("0-45", "depth", tile)

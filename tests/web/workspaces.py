@@ -7,6 +7,7 @@ from PIL import Image
 from map3d.catalogue import RenderingRecord, SceneCrs, SceneRecord, Workspace
 from map3d.geometry.frames import pin
 from map3d.registry import NewObject, Registry
+from map3d.tiles.block_versions import BlockVersions
 from map3d.tiles.manifest import Manifest, ManifestCrs, ManifestView
 from map3d.tiles.naming import block_levels, block_of
 from map3d.tiles.occupancy import Occupancy
@@ -102,7 +103,6 @@ def _put_pass(workspace, record, number, version):
 
 def manifest_of(record, occupancy, *versions):
     """`versions`: one for each pass."""
-    blocks = [BlockId(*tile) for level in block_levels(ZMAX) for tile in occupancy.tiles(level.root)]
     return Manifest(
         name=record.name,
         title=record.title,
@@ -113,7 +113,7 @@ def manifest_of(record, occupancy, *versions):
         origin=(691000.0, 5336000.0, 500.0),
         box=BOX,
         passes=record.passes,
-        views=tuple(ManifestView(frame, occupancy, tuple(dict.fromkeys(blocks, version) for version in versions)) for frame in record.frames),
+        views=tuple(ManifestView(frame, occupancy, tuple(BlockVersions(version) for version in versions)) for frame in record.frames),
         objects=3,
     )
 

@@ -24,11 +24,11 @@ def compress(response: Response) -> Response:
     data = response.get_data()
     if len(data) < MIN_BYTES:
         return response
-    response.set_data(_gzip(data))
+    response.set_data(gzip_bytes(data))
     response.headers["Content-Encoding"] = "gzip"
     return response
 
 
 @lru_cache(maxsize=32)
-def _gzip(data: bytes) -> bytes:
+def gzip_bytes(data: bytes) -> bytes:
     return gzip.compress(data, compresslevel=6, mtime=0)

@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import count
@@ -27,14 +27,22 @@ class OpenStore:
 
     store: TileStore
     checked_s: float
+    is_planned_anew: Callable[[], bool] = lambda: False
+    """Whether jobs of the rendering were opened since, so that any of its blocks may be stale. Called often; no I/O."""
 
     @cached_property
     def layers(self) -> dict[str, tuple[int, Layer]]:
         """Layer name → (number, layer)."""
         return {layer.name: (number, layer) for number, layer in enumerate(self.store.shape.layers)}
 
+    def is_fresh(self, now_s: float) -> bool:
+        """Whether the store is current without another look at its URL. No I/O."""
+        return now_s - self.checked_s < RECHECK_S and not self.is_planned_anew()
+
     def is_current(self, now_s: float) -> bool:
         """Whether the store at the URL is still the one that is open."""
+        if self.is_planned_anew():
+            return False
         if now_s - self.checked_s < RECHECK_S:
             return True
         self.checked_s = now_s
@@ -44,8 +52,9 @@ class OpenStore:
 class OpenStores:
     """Thread-safe."""
 
-    def __init__(self, workspace: Workspace) -> None:
-        self._workspace = workspace
+    def __init__(self, workspace: Workspace, epoch: Callable[[str], object] = lambda _rendering: None) -> None:
+        """`epoch` returns a value for a rendering that differs after each plan that opened jobs."""
+        self._workspace, self._epoch = workspace, epoch
         self._open: dict[tuple[str, str], OpenStore] = {}
         self._lock = threading.Lock()
         self._catalogue: Catalogue | None = None
@@ -91,11 +100,12 @@ class OpenStores:
         return self._catalogue
 
     def _try_open(self, rendering: str, track: str) -> OpenStore | None:
+        epoch = self._epoch(rendering)
         try:
             store = open_track(self._workspace, self._find_catalogue().rendering(rendering), track)
         except (NotFound, BadRequest):
             return None
-        return OpenStore(store, time.monotonic())
+        return OpenStore(store, time.monotonic(), lambda: self._epoch(rendering) != epoch)
 
     def _evict(self) -> None:
         while len(self._open) >= MAX_OPEN:

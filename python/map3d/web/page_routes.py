@@ -1,30 +1,41 @@
 """Pages: the list of renderings, the viewer of one rendering, icons, and the health check."""
 
+import json
+import time
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import lru_cache
 from hashlib import sha256
 
-from flask import Blueprint, Response, current_app, redirect, render_template, request, send_from_directory, url_for
+from flask import Blueprint, Response, current_app, redirect, render_template, request, send_from_directory
 from werkzeug import Response as WerkzeugResponse
 
 from map3d.catalogue import RenderingRecord, Workspace
 from map3d.errors import Map3dError, NotFound
-from map3d.publish.page_head import describe_page
+from map3d.publish.page_head import MAX_TITLE, cut, describe_page
 from map3d.publish.preview_picture import FILE as PREVIEW
-from map3d.publish.preview_picture import make_preview
+from map3d.publish.preview_picture import HEIGHT_PX, WIDTH_PX, make_preview
 from map3d.renderings.track_stores import read_manifest, tiles_url
+from map3d.tile_services.picture_request import parse_link
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.preview import Preview, choose_preview
 from map3d.tiles.viewer_files import PAGE, viewer_folder
 from map3d.types import check_name
+from map3d.web import page_formats
 from map3d.web.compression import compress
 from map3d.web.document_routes import catalogue, workspace
+from map3d.web.health import READINESS, check_alive, check_ready
 from map3d.web.http_errors import status_of
+from map3d.web.picture_routes import link_url
+from map3d.web.public_url import public_url
+from map3d.web.settings import ServerSettings
+from map3d.web.share_dialog import add_share_dialog
 
 pages = Blueprint("pages", __name__)
 
 ICON_MAX_AGE_S = 86_400
+ON_DEMAND_PREVIEW_S = 60.0
+"""Age at which a preview is drawn again while tiles are rendered on demand, which does not change the manifest."""
 
 
 @dataclass(frozen=True)
@@ -51,14 +62,18 @@ def home() -> WerkzeugResponse:
     """Redirects to the map if the workspace has exactly one rendering with tiles; otherwise lists the renderings."""
     records = catalogue().renderings()
     if len(records) == 1 and read_manifest(workspace(), records[0]) is not None:
-        return _without_cache(redirect(f"/view/{records[0].name}/"))
+        return _without_cache(redirect(f"view/{records[0].name}/"))
     return renderings()
 
 
 @pages.get("/renderings")
 def renderings() -> WerkzeugResponse:
+    """Lists the renderings. On a server that renders on demand, asking for the tiles of a preview would have them rendered, so the page shows
+    pictures that are made of stored tiles."""
     listed = sorted((_describe(record) for record in catalogue().renderings()), key=lambda item: (item.changed is None, item.title.casefold()))
-    return _without_cache(compress(Response(render_template("renderings.html", renderings=listed), mimetype="text/html")))
+    return _without_cache(
+        compress(Response(render_template("renderings.html", renderings=listed, on_demand=renders_on_demand()), mimetype="text/html"))
+    )
 
 
 @pages.get("/view/<rendering>/")
@@ -69,8 +84,8 @@ def view(rendering: str) -> Response:
     if data is None:
         return compress(send_from_directory(viewer_folder(), PAGE, max_age=0))
     manifest = Manifest.load(data, rendering)
-    picture = url_for("pages.preview", rendering=rendering, _external=True) if choose_preview(manifest) else None
-    page = describe_page((viewer_folder() / PAGE).read_text("utf-8"), manifest, picture, request.base_url)
+    address, picture = _shared_view(rendering, manifest)
+    page = add_share_dialog(describe_page((viewer_folder() / PAGE).read_text("utf-8"), manifest, picture, address))
     response = Response(page, mimetype="text/html")
     response.set_etag(sha256(page.encode()).hexdigest()[:32], weak=True)
     response.headers["Cache-Control"] = "no-cache"
@@ -83,7 +98,8 @@ def preview(rendering: str) -> Response:
     """Returns a picture of the rendering for links to its page."""
     record = catalogue().rendering(check_name(rendering, "rendering"))
     data = read_manifest(workspace(), record)
-    picture = None if data is None else _preview(workspace(), rendering, data)
+    age = int(time.monotonic() / ON_DEMAND_PREVIEW_S) if renders_on_demand() else 0
+    picture = None if data is None else _preview(workspace(), rendering, data, age)
     if picture is None:
         raise NotFound(f"rendering {rendering!r} has no picture yet; run: map3d render {rendering}")
     response = Response(picture, mimetype="image/jpeg")
@@ -107,9 +123,36 @@ def icon(file: str) -> Response:
 
 @pages.get("/healthz")
 def healthz() -> WerkzeugResponse:
-    """Answers 200 while the catalogue is readable."""
-    catalogue().renderings()
+    """Answers 200 while the workspace exists and its catalogue is readable."""
+    check_alive(workspace(), catalogue())
     return _without_cache(Response("ok\n", mimetype="text/plain"))
+
+
+@pages.get("/readyz")
+def readyz() -> WerkzeugResponse:
+    """Answers 200 while the server can do its work, else 503; names the parts that cannot."""
+    state = check_ready(workspace(), catalogue(), writes=renders_on_demand())
+    state |= {name: "ok" if is_alive() else "not running" for name, is_alive in current_app.extensions[READINESS].items()}
+    status = 200 if set(state.values()) == {"ok"} else 503
+    return _without_cache(Response(json.dumps(state, indent=1) + "\n", status, mimetype="application/json"))
+
+
+def renders_on_demand() -> bool:
+    settings: ServerSettings = current_app.config["SETTINGS"]
+    return settings.on_demand is not None
+
+
+def _shared_view(rendering: str, manifest: Manifest) -> tuple[str, str | None]:
+    """Returns the address of the page and of its picture: those of the view that the query names, else those of the whole rendering."""
+    link = request.args.get("view")
+    if link is not None:
+        try:
+            picture = parse_link(manifest, link, (WIDTH_PX, HEIGHT_PX), "image/jpeg")
+            return link_url(rendering, link), public_url(f"pictures/{rendering}/{picture.address}")
+        except Map3dError:
+            pass  # the page itself shows what it can of a broken link
+    address = public_url(f"view/{rendering}/")
+    return address, address + PREVIEW if choose_preview(manifest) else None
 
 
 def _without_cache(response: WerkzeugResponse) -> WerkzeugResponse:
@@ -117,13 +160,13 @@ def _without_cache(response: WerkzeugResponse) -> WerkzeugResponse:
     return response
 
 
-@lru_cache(maxsize=16)
-def _preview(home: Workspace, rendering: str, manifest: bytes) -> bytes | None:
+@lru_cache(maxsize=64)
+def _preview(home: Workspace, rendering: str, manifest: bytes, _age: int) -> bytes | None:
     return make_preview(home, catalogue().rendering(rendering), Manifest.load(manifest, rendering))
 
 
 def _describe(record: RenderingRecord) -> ListedRendering:
-    name, title, attribution = record.name, record.title or record.name, record.attribution
+    name, title, attribution = record.name, cut(record.title or record.name, MAX_TITLE), cut(record.attribution, MAX_TITLE)
     path = workspace().manifest_path(name)
     try:
         data = read_manifest(workspace(), record)
@@ -131,17 +174,9 @@ def _describe(record: RenderingRecord) -> ListedRendering:
             return ListedRendering(name, title, attribution, "empty")
         manifest = Manifest.load(data, str(path))
         changed = datetime.fromtimestamp(path.stat().st_mtime, UTC) if path.is_file() else None
-        size = _size_text(sum(file.stat().st_size for file in path.parent.iterdir() if file.is_file())) if tiles_url(record) is None else ""
+        size = page_formats.size(sum(file.stat().st_size for file in path.parent.iterdir() if file.is_file())) if tiles_url(record) is None else ""
     except (Map3dError, OSError) as error:
         status_of(error if isinstance(error, Map3dError) else Map3dError(f"rendering {name}: {error}"))
         return ListedRendering(name, title, attribution, "unreadable")
     state = "complete" if manifest.complete else "incomplete"
     return ListedRendering(name, title, attribution, state, size, len(manifest.views), len(manifest.layers), changed, choose_preview(manifest))
-
-
-def _size_text(size: float) -> str:
-    for unit in ("kB", "MB", "GB"):
-        size /= 1000
-        if size < 999.5:
-            return f"{size:.0f} {unit}" if size >= 10 or unit == "kB" else f"{size:.1f} {unit}"
-    return f"{size / 1000:.1f} TB"

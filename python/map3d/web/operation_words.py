@@ -1,0 +1,53 @@
+"""Operations as pages show them."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+from map3d.catalogue import OperationRecord
+from map3d.catalogue.operation_records import REPEATABLE, UNENDED
+from map3d.web.host_folders import without_host_folders
+from map3d.web.page_tools import translate as _
+
+N_: Final = str
+KINDS: Final = {"import": N_("Import"), "build": N_("Build"), "render": N_("Render"), "publish": N_("Publish"), "remove": N_("Remove")}
+STATES: Final = {"waiting": N_("Waiting"), "running": N_("Running"), "done": N_("Done"), "failed": N_("Failed"), "cancelled": N_("Cancelled")}
+
+
+@dataclass(frozen=True)
+class ShownOperation:
+    """`percent`: None while it is unknown."""
+
+    id: str
+    title: str
+    state: str
+    state_text: str
+    text: str
+    percent: int | None
+    record: OperationRecord
+
+    @property
+    def is_open(self) -> bool:
+        return self.record.state in UNENDED
+
+    @property
+    def lacks_crs(self) -> bool:
+        """Whether an import failed because its files do not name their coordinate system."""
+        return self.record.kind == "import" and self.can_retry and "--crs" in self.text and bool(self.record.arguments.get("files"))
+
+    @property
+    def can_retry(self) -> bool:
+        return self.record.state in REPEATABLE
+
+
+def show(operation: OperationRecord) -> ShownOperation:
+    state = str(operation.state)
+    state_text = _("Stopping") if operation.cancelling else _(STATES[state])
+    percent = min(100, 100 * operation.done // operation.total) if operation.total and state == "running" else None
+    text = operation.stage if state == "running" else operation.message if state != "waiting" else _("Starts when a worker is free.")
+    text = without_host_folders(text)
+    return ShownOperation(operation.id, f"{_(KINDS[operation.kind])}: {operation.target}", state, state_text, text, percent, operation)
+
+
+def show_all(operations: Iterable[OperationRecord]) -> list[ShownOperation]:
+    return [show(operation) for operation in operations]

@@ -1,0 +1,105 @@
+"""The form of a new rendering, and the query of a preview."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import date, datetime
+from typing import Any, Final
+
+from map3d.catalogue import SceneRecord
+from map3d.errors import BadRequest
+from map3d.geometry.sun import SunAngles
+from map3d.geometry.views import check_angles, views_around
+from map3d.renderings.create import RenderingRequest
+from map3d.renderings.layers import LayerRequest
+from map3d.renderings.sun_layers import ONE_SUN, LightRequest
+from map3d.types import DEFAULT_LAYERS, LAYER_KINDS, TILE_PX, Box, Layer, ViewAngles
+
+DIRECTIONS: Final = (1, 2, 4, 8, 16)
+RESOLUTIONS: Final = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
+_SUN: Final = SunAngles(160.0, 45.0)
+"""Azimuth and elevation of the sun in previews."""
+
+
+@dataclass(frozen=True)
+class RenderingForm:
+    """The fields as the user left them; `request` checks them."""
+
+    name: str
+    title: str
+    directions: int
+    pitch_deg: float
+    res_m: float
+    layers: tuple[str, ...]
+    tile_px: int
+    time: str
+    day: str
+
+    def request(self, scene: str, name: str) -> RenderingRequest:
+        """Raises BadRequest."""
+        views = views_around(self.directions, (self.pitch_deg,))
+        layers = LayerRequest(self.layers, light=self._light())
+        return RenderingRequest(scene, name, views, res_m=self.res_m, layers=layers, tile_px=self.tile_px, title=self.title)
+
+    def _light(self) -> LightRequest:
+        one, whole = any(kind in self.layers for kind in ONE_SUN), "sun16" in self.layers
+        try:
+            time = datetime.fromisoformat(self.time + ("+00:00" if "+" not in self.time and "Z" not in self.time else "")) if one else None
+            day = date.fromisoformat(self.day) if whole else None
+        except ValueError as error:
+            raise BadRequest("the layers sun, picture and sun16 need a date and a time of the sun") from error
+        return LightRequest(time=time, day=day)
+
+
+@dataclass(frozen=True)
+class PreviewQuery:
+    """`res_m`: None for a picture of the whole scene; `at`: centre of the part, as shares of that picture."""
+
+    view: ViewAngles
+    kind: str
+    res_m: float | None
+    at: tuple[float, float] | None
+
+    def layer(self, scene: SceneRecord, box: Box) -> Layer:
+        """Raises BadRequest."""
+        light = LightRequest(sun=_SUN if self.kind in ONE_SUN else None)
+        return LayerRequest((self.kind,), color="webp", light=light).layers(scene, box)[0]
+
+
+def read_form(fields: Any) -> RenderingForm:
+    """Reads a form or query; missing fields get their defaults. Raises BadRequest for numbers that are not."""
+    layers = tuple(kind for kind in LAYER_KINDS if kind in fields.getlist("layer")) or DEFAULT_LAYERS
+    return RenderingForm(
+        name=fields.get("name", "").strip(),
+        title=fields.get("title", "").strip(),
+        directions=round(_number(fields, "directions", 4, 1, 360)),
+        pitch_deg=_number(fields, "pitch", 45, 1, 90),
+        res_m=_number(fields, "res", 0.2, 0.001, 1e6),
+        layers=layers,
+        tile_px=TILE_PX[-1] if fields.get("tile") == str(TILE_PX[-1]) else TILE_PX[0],
+        time=fields.get("time", "").strip(),
+        day=fields.get("day", "").strip(),
+    )
+
+
+def read_preview(fields: Mapping[str, str]) -> PreviewQuery:
+    """Raises BadRequest."""
+    kind = fields.get("kind", "color")
+    if kind not in LAYER_KINDS or kind == "sun16":
+        raise BadRequest(f"layer {kind[:40]!r}: has no preview")
+    view = ViewAngles(_number(fields, "look", 0, 0, 359.999), _number(fields, "pitch", 45, 1, 90))
+    check_angles(view)
+    at = (_number(fields, "x", 0.5, 0, 1), _number(fields, "y", 0.5, 0, 1)) if "x" in fields and "y" in fields else None
+    res_m = _number(fields, "res", 1, 0.001, 1e6) if "res" in fields else None
+    return PreviewQuery(view, kind, res_m, at)
+
+
+def _number(fields: Mapping[str, str], name: str, default: float, least: float, greatest: float) -> float:
+    text = fields.get(name, "").strip()
+    try:
+        value = float(text) if text and text.isascii() else default if not text else math.nan
+    except ValueError:
+        value = math.nan
+    if not least <= value <= greatest:
+        raise BadRequest(f"{name} is {text[:40]!r}, expected a number from {least:g} to {greatest:g}")
+    return value

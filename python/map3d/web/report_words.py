@@ -1,0 +1,93 @@
+"""Import reports in words."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from map3d.catalogue import AssetRecord
+from map3d.web.page_formats import number
+from map3d.web.page_tools import translate as _
+
+N_: Final = str
+"""Marks a text that is translated where it is shown."""
+
+IMAGE_FAULTS: Final[Mapping[str, str]] = {
+    "image: file not found": N_("Textures not found: {count}. Upload them together with the model."),
+    "image: unknown format": N_("Textures in a format that map3d does not read: {count}."),
+    "unusable image": N_("Materials without a usable texture, shown in their colour: {count}."),
+    "georeferenced texture without reference point or world file": N_("Georeferenced textures without a reference point or world file: {count}."),
+}
+FAULTS: Final[Mapping[str, str]] = {
+    **IMAGE_FAULTS,
+    "polygon with crossing rings": N_("Polygons whose rings cross, which may look wrong: {count}."),
+    "ring that is not closed": N_("Rings that are not closed: {count}."),
+    "unresolved reference": N_("References that lead nowhere in the file: {count}."),
+    "reference to another document not followed": N_("References to other documents, which were not followed: {count}."),
+    "material not defined": N_("Materials that are used but not defined: {count}."),
+    "unknown wrap mode": N_("Textures with an unknown wrap mode: {count}."),
+}
+
+
+@dataclass(frozen=True)
+class ReportLine:
+    """`severity`: skipped (something is missing in the map) or note. `example`: where it happened first."""
+
+    severity: str
+    text: str
+    example: str = ""
+
+
+@dataclass(frozen=True)
+class AssetSummary:
+    """An imported file in a list."""
+
+    name: str
+    source: str
+    format: str
+    objects: int
+    triangles: int
+    problems: int
+
+
+def summary_of(asset: AssetRecord) -> AssetSummary:
+    report = asset.report
+    problems = sum(report.get("skipped", {}).values()) + sum(warning["count"] for warning in report.get("warnings", ()))
+    source = asset.source.rsplit("/", 1)[-1]
+    return AssetSummary(asset.name, source, asset.format, report.get("objects", 0), report.get("triangles", 0), problems)
+
+
+def missing_files(asset: AssetRecord) -> list[str]:
+    """Returns the names of the files that the document references and that were not beside it."""
+    return list(asset.report.get("missing_files", ()))
+
+
+def report_lines(asset: AssetRecord) -> list[ReportLine]:
+    """Returns what was skipped, then what was noted; nothing for a file without problems."""
+    return [*_skipped(asset.report), *_warnings(asset.report)]
+
+
+def _skipped(report: Mapping[str, Any]) -> Iterator[ReportLine]:
+    examples = {warning["reason"]: str(warning["example"]) for warning in report.get("warnings", ())}
+    for reason, count in sorted(report.get("skipped", {}).items(), key=lambda item: -item[1]):
+        yield ReportLine("skipped", _("Skipped: {count} × {reason}.", count=number(count), reason=reason), examples.get(f"skipped: {reason}", ""))
+
+
+def _warnings(report: Mapping[str, Any]) -> Iterator[ReportLine]:
+    for warning in report.get("warnings", ()):
+        reason, count = warning["reason"], number(warning["count"])
+        if not reason.startswith("skipped: "):
+            text = _(FAULTS[reason], count=count) if reason in FAULTS else _("{count} × {reason}.", count=count, reason=reason)
+            yield ReportLine("note", text, str(warning["example"]))
+
+
+def placing_words(asset: AssetRecord) -> str:
+    """Returns how the coordinates came into the scene's system."""
+    placing = asset.report.get("placing", {})
+    source, target = placing.get("from"), placing.get("to")
+    if not target:
+        return ""
+    if source in (None, target):
+        return _("Coordinates: {target}, unchanged.", target=target)
+    accuracy = placing.get("accuracy_m")
+    exact = _("accuracy unknown") if accuracy is None or placing.get("ballpark") else _("accurate to {metres} m", metres=f"{accuracy:g}")
+    return _("Coordinates: transformed from {source} to {target} ({exact}).", source=source, target=target, exact=exact)

@@ -1,0 +1,22 @@
+"""Every text of the templates has a translation, and every translation a text."""
+
+import json
+import re
+from pathlib import Path
+
+import map3d.web
+
+FOLDER = Path(map3d.web.__file__).parent
+CALL = re.compile(r"""(?:\b_|\btranslate|\bN_)\(\s*(?:"((?:[^"\\]|\\.)*)"|'((?:[^'\\]|\\.)*)')""")
+FROM_DATA = {"editor", "viewer"}
+"""Texts that templates translate from values."""
+
+
+def test_every_text_is_translated():
+    files = [*FOLDER.glob("templates/**/*.html"), *FOLDER.glob("*.py")]
+    texts = {(one or other).replace('\\"', '"') for file in files for one, other in CALL.findall(file.read_text("utf-8"))} | FROM_DATA
+    german = json.loads((FOLDER / "translations" / "de.json").read_text("utf-8"))
+    assert sorted(texts - set(german)) == []
+    assert sorted(set(german) - texts) == []
+    for text, other in german.items():
+        assert sorted(re.findall(r"{\w+}", text)) == sorted(re.findall(r"{\w+}", other)), text
