@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 __version__: str
 RENDER_FORMAT: int
 """Raised only when rendered bytes change."""
+SCENE_VERSIONS: tuple[int, int]
+"""Versions of the files of a built scene: chunks and instances, textures."""
 
 # -- limits (spec/limits.json) --------------------------------------------------------------------------------------------------------
 
@@ -20,6 +22,8 @@ TILE_PX: tuple[int, int]
 DEEPEST_LEVEL: int
 QUALITY: tuple[int, int]
 """Minimum and maximum quality of a lossy colour format."""
+MAX_FROM_ORIGIN_M: float
+"""Content farther from the scene's origin, along any axis, is never part of a scene."""
 MAX_SUNS: int
 """Maximum number of suns of a sun16 layer."""
 AO_RADIUS_M: tuple[float, float]
@@ -35,6 +39,9 @@ class CoreError(Exception): ...
 
 class FormatError(CoreError):
     """A file is truncated or malformed, or has another magic, version or checksum."""
+
+class SceneRebuilt(FormatError):
+    """A file of a scene is not the one that the opened index names: the scene was rebuilt meanwhile."""
 
 class LimitError(CoreError):
     """The input exceeds a limit; the message names the limit, its value and what was found."""
@@ -65,8 +72,8 @@ class Batch:
 class Reader:
     """One source document, parsed as it is iterated. `format`: "obj" | "citygml".
 
-    options (JSON): {"up": "y"|"z", "split": "file"|"group" (OBJ), "theme": str|null (CityGML appearance theme; null: the first in the file),
-    "lod": str|null (null: best per object), "strict": bool, "max_image_side_px": 16384, … further limits}
+    options (JSON): {"up": "y"|"z", "split": "file"|"group" (OBJ), "theme": str|null (CityGML appearance theme; null: the one with the most textures),
+    "lod": str|null (null: best per object), "transparency": "auto"|"as-is"|"inverted", "strict": bool, "max_image_side_px": 16384, … further limits}
     """
     def __init__(self, path: str, format: str, options: str = "{}") -> None: ...
     @property
@@ -116,9 +123,9 @@ class AssetMesh:
     @property
     def prototypes(self) -> NDArray[np.uint32]:
         """(nt,) numbers of prototypes; 0 for world geometry."""
-    def boxes(self, count: int) -> tuple[list[_Box | None], dict[int, _Box]]:
-        """Returns the boxes of `count` objects in world coordinates, without placed prototypes and None without geometry, and those of prototypes in
-        their own frame."""
+    def boxes(self, count: int, extent: str | None = None) -> tuple[list[_Box | None], dict[int, _Box], list[int]]:
+        """Returns the boxes of `count` objects in world coordinates, without placed prototypes and None without geometry; those of prototypes in
+        their own frame; and for each object the number of triangles outside the extent (JSON of `find_clusters`), which its box does not include."""
 
 def check_file(path: str) -> None:
     """Raises FormatError unless a mesh, chunk, instance or texture file has a known version and the checksum of its header."""
@@ -135,8 +142,13 @@ def build_scene(folder: str, request: str, progress: Progress | None = None) -> 
     """Builds chunks/, textures/, instances.m3i and scene.json of a scene folder from its assets; returns the report (JSON). Unchanged chunks and textures are kept.
 
     request: {"assets": ["name", …], "origin": [x,y,z], "options": {"merge_vertices": true, "merge_faces": true, "drop_degenerate": true,
-    "merge_materials": true, "drop_untextured": false, "ground_plane": "auto"|"on"|"off"}, "ground_id": u32, "threads": n, "max_memory_bytes": n}
+    "merge_materials": true, "drop_untextured": false, "ground_plane": "auto"|"on"|"off", "keep_outliers": false, "cluster": 0}, "ground_id": u32, "threads": n, "max_memory_bytes": n}
     """
+
+def find_clusters(folders: list[str], origin: _Vec3, options: str) -> str:
+    """Returns where the content of asset folders is (JSON): {"clusters": [{"box", "triangles", "objects"}], largest first; "extent" of what a scene
+    with these options and this origin keeps, null for everything; "outside": numbers of the folders with content outside the extent}. Measures
+    folders that have no cells.json, and writes it. Raises InvalidArgument for a cluster that does not exist."""
 
 # -- tracing and blocks (map3d-trace, map3d-render) --------------------------------------------------------------------------------
 
@@ -199,6 +211,52 @@ class Frame:
     def layers(self) -> list[LayerSpec]: ...
 
 @final
+class Camera:
+    """A view of any kind (spec/cameras.md), from any position, direction and roll, also level and from below; valid.
+
+    Local axes and metres. `position`: the point of the camera. `right`, `up`, `forward`: orthonormal to within 1e-6, right × forward = up. `window`: the
+    edges (left, right, bottom, top) of the image in the plane through the point of the camera, from that point: metres in orthographic views, tangents
+    (metres at distance 1 m) in perspective. Only what is between `near_m` and `far_m` along `forward` is drawn; `near_m` may be negative in orthographic
+    views and is at least 0.001 in perspective. Sides of the image: 1 to 4096 px. Raises InvalidArgument for other numbers."""
+    def __init__(
+        self,
+        projection: Literal["orthographic", "perspective"],
+        position: _Vec3 | Sequence[float],
+        right: _Vec3 | Sequence[float],
+        up: _Vec3 | Sequence[float],
+        forward: _Vec3 | Sequence[float],
+        window: tuple[float, float, float, float],
+        near_m: float,
+        far_m: float,
+        width_px: int,
+        height_px: int,
+    ) -> None: ...
+    @property
+    def projection(self) -> Literal["orthographic", "perspective"]: ...
+    @property
+    def position(self) -> _Vec3: ...
+    @property
+    def right(self) -> _Vec3:
+        """Exactly orthonormal, like `up` and `forward`."""
+    @property
+    def up(self) -> _Vec3: ...
+    @property
+    def forward(self) -> _Vec3: ...
+    @property
+    def window(self) -> tuple[float, float, float, float]: ...
+    @property
+    def near_m(self) -> float: ...
+    @property
+    def far_m(self) -> float: ...
+    @property
+    def width_px(self) -> int: ...
+    @property
+    def height_px(self) -> int: ...
+    def line_of_sight(self, x_px: float, y_px: float) -> tuple[_Vec3, _Vec3]:
+        """Returns the line of sight through a point of the image, in pixels right and down from its top left corner: a local point in the camera's plane,
+        and the direction, which advances one metre along `forward`."""
+
+@final
 class Scene:
     """A built scene, opened for tracing: chunks are mapped on demand, textures cached up to `cache_bytes`. Threads may share it."""
     def __init__(self, folder: str, cache_bytes: int = 536870912) -> None: ...
@@ -211,6 +269,9 @@ class Scene:
     @property
     def triangle_count(self) -> int:
         """Triangles of all chunks and prototypes; a prototype counts once."""
+    def sample_surfaces(self, except_object: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Returns the area in square metres and the side of a texel in metres, NaN without a texture, of triangles spread evenly over the scene,
+        without those of an object; always the same ones."""
     def occupied(self, frame: Frame, level: int, within: tuple[int, NDArray[np.uint32]] | None = None) -> NDArray[np.uint64]:
         """Returns the tiles of a level that may have content, as sorted Morton numbers. `within`: a level above and (n, 2) columns and rows of its
         blocks; only their tiles are examined. Time and memory grow with the occupied tiles, not with the level."""
@@ -220,10 +281,48 @@ class Scene:
         """Renders the base block rooted at (z, x, y)."""
     def gbuffer(self, frame: Frame, x: int, y: int) -> dict[str, NDArray[Any]]:
         """Renders one base tile's G-buffer (spec/pyramid.md §5): id, depth and the arrays of the frame's layers; color, normal, id, depth without any."""
+    def render_view(
+        self,
+        camera: Camera,
+        layers: Sequence[LayerSpec],
+        *,
+        samples: int = 16,
+        threads: int = 1,
+        deadline_s: float | None = None,
+        box: _Box | None = None,
+        objects: NDArray[np.uint32] | None = None,
+        region: tuple[int, int, int, int] | None = None,
+    ) -> dict[str, NDArray[Any]]:
+        """Renders any view by the rules of tiles (spec/pyramid.md §4, spec/cameras.md). Returns an array per layer; color, normal, id and depth for none.
+
+        color, picture (h, w, 4) uint8 sRGB with straight alpha, 0 where nothing is; normal (h, w, 3) uint8 as spec/pyramid.md §6 codes it; id (h, w) uint32;
+        depth (h, w) float32, metres along `camera.forward`, NaN where nothing is; sun, ao (h, w) uint8. id, depth and normal are those of the pixel's centre,
+        colours the mean of `samples` (1, 4 or 16) per pixel. Formats and qualities of the layers are ignored; sun16 and depth2 are refused.
+
+        `box`: only geometry inside this local box is drawn, cut at its sides. `objects`: only these ids are drawn. Light (sun, ao, picture) is that of the
+        whole scene in both cases. `region`: (x, y, width, height) of the image, in pixels; the arrays have its size. The bytes are the same for any
+        `threads`. Raises LimitError once `deadline_s` has passed, InvalidArgument for other misuse; signals such as Ctrl-C stop it within about a tenth of a
+        second."""
+    def pick_ray(
+        self,
+        camera: Camera,
+        x_px: float,
+        y_px: float,
+        count: int = 1,
+        *,
+        box: _Box | None = None,
+        objects: NDArray[np.uint32] | None = None,
+    ) -> list[tuple[int, float, _Vec3, _Vec3]]:
+        """Returns the first `count` (at most 10,000) surfaces on the line of sight through a point of the image, in pixels right and down from its top left
+        corner (pixel centres at +½): (id, metres along the line of sight from the camera's plane or, in perspective, its point, local position, unit normal
+        of the visible side) of each, nearest first. Near and far distance, `box` and `objects` limit them as in `render_view`."""
     def object_box(self, id: int) -> _Box | None:
         """Returns the local box of an object; None when the scene does not have it."""
     def stats(self) -> dict[str, int]:
         """Hits, misses and bytes of the caches of chunks and textures."""
+    def view_times(self) -> dict[str, float]:
+        """Returns the seconds of the threads' CPU time that all views so far took, by stage: visibility, shade, light, convert. Opening chunks is part of
+        visibility, reading and decoding textures of shade."""
 
 @final
 class Block:
@@ -248,6 +347,12 @@ def check_seam(frame: Frame, seam: bytes) -> None:
 
 def encode_layer(kind: _Kind, format: _Format, array: NDArray[Any], quality: int = 80, small: bool = False) -> bytes:
     """Encodes one layer of a G-buffer as an image; `small` trades time for fewer bytes."""
+
+def encode_png(kind: _Kind, pixels: NDArray[np.uint8], order: Sequence[int]) -> bytes:
+    """Encodes channels of (H, W, C) bytes, in the given order, as an 8-bit PNG of 1 to 4 channels, with the filter and the compression of a kind of layer."""
+
+def encode_bits(bits: NDArray[np.bool_]) -> bytes:
+    """Encodes (H, W) as a PNG of one bit per pixel: True is white."""
 
 def decode_png(data: bytes) -> NDArray[np.uint8]:
     """Decodes an 8-bit PNG into (H, W, C)."""

@@ -89,10 +89,15 @@ class Connections:
 
 class Database(Connections):
     """A database file with `schema`, written when the file is new. An older file is brought to `version` by `migrations`: version → statements that
-    lead to it from the version before. Raises UnknownVersion when that is not possible."""
+    lead to it from the version before. Raises UnknownVersion when that is not possible.
+
+    Once open, it stays with this file: after the file was removed or replaced, every use raises StoreError, instead of creating an empty file or
+    writing into one that nobody else sees.
+    """
 
     def __init__(self, path: Path, schema: str, version: int, migrations: Mapping[int, str] | None = None) -> None:
         super().__init__(path, lambda: _connect(path))
+        self._file: tuple[int, int] | None = None
         with self.transaction() as db:
             found = int(db.execute("PRAGMA user_version").fetchone()[0])
             scripts = [schema] if found == 0 else _scripts(found, version, migrations or {})
@@ -102,6 +107,21 @@ class Database(Connections):
                 for script in scripts:
                     run_script(db, script)
                 db.execute(f"PRAGMA user_version = {version}")
+        self._file = _identity(path)
+
+    def current(self) -> sqlite3.Connection:
+        if self._file is not None and _identity(self.path) != self._file:
+            raise sqlite3.OperationalError("the file was removed or replaced")
+        return super().current()
+
+
+def _identity(path: Path) -> tuple[int, int]:
+    """Returns device and inode of the file. Raises sqlite3.OperationalError if it is missing."""
+    try:
+        stat = path.stat()
+    except OSError as error:
+        raise sqlite3.OperationalError("the file was removed or replaced") from error
+    return stat.st_dev, stat.st_ino
 
 
 def _scripts(found: int, version: int, migrations: Mapping[int, str]) -> list[str] | None:

@@ -28,6 +28,14 @@ class BadName(BadRequest):
     """The name of a scene, rendering or layer does not match `[a-z0-9][a-z0-9_-]{0,63}`."""
 
 
+class SignInRequired(Map3dError):
+    """The request needs a signed-in user or a token."""
+
+
+class Forbidden(Map3dError):
+    """The user may not do this, or the request does not carry the value that proves that a page of this server sent it."""
+
+
 class UnknownFormat(BadRequest):
     """The file has a format that map3d does not read."""
 
@@ -70,6 +78,14 @@ class SubprocessTimedOut(SubprocessDied):
 
 class Stopped(Map3dError):
     """The user stopped the work; the message says how to resume it."""
+
+
+class Unavailable(Map3dError):
+    """The request cannot be answered now; the message says why, and `retry_s` when to try again."""
+
+    def __init__(self, message: str, retry_s: int) -> None:
+        super().__init__(message)
+        self.retry_s = retry_s
 
 
 class UnknownVersion(Map3dError):

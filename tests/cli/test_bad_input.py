@@ -1,6 +1,7 @@
 """Bad input on the command line: error messages, skipped parts, and the rendering of all usable parts."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +34,7 @@ def run(run: Run) -> Run:
     ("name", "data", "status", "says"),
     [
         ("model.skp", b"\xff\xfe\xff\x0eSketchUp", 2, ("model.skp: a file of unknown format", "CityGML", "OBJ")),
-        ("a.zip", b"PK\x03\x04", 2, ("a.zip: a ZIP archive", "map3d reads")),
+        ("a.zip", b"PK\x03\x04", 1, ("a.zip: cannot be unpacked: File is not a zip file",)),
         ("a.gml", b"<html></html>", 2, ("a.gml: XML with root element html", "CityGML")),
         ("empty.gml", b"", 2, ("empty.gml: an empty file", "CityGML")),
         ("empty.obj", b"", 2, ("empty.obj: an empty file", "OBJ")),
@@ -85,8 +86,7 @@ def test_truncated_document_is_read_up_to_the_cut(run: Run, tmp_path: Path) -> N
     (tmp_path / "a.gml").write_text(truncated())
     status, out, err = run("add-files", "town", "a.gml", "--crs", "local")
     assert (status, err) == (0, "")
-    assert "malformed document; the rest is ignored, e.g. " in out
-    assert "at byte" in out
+    assert re.search(r"a: document broken: at byte \d+, line \d+ \(.*\); what comes before is kept\n", out)
     with Registry(Workspace(tmp_path / "workspace").registry_path("town")) as registry:
         assert {"one", "two"} <= {item.name for item in registry.objects()}
 

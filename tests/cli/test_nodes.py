@@ -66,7 +66,7 @@ def test_nodes_give_the_published_folder_of_one_machine(
         status, _, err = run(*words, "--workspace", str(planner.root))
         assert status == 0, err
     with ExitStack() as stack:
-        cluster = stack.enter_context(distributed.LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None))
+        cluster = stack.enter_context(distributed.LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0"))
         lost, kept = (stack.enter_context(worker(tmp_path / name, catalogue)) for name in ("lost", "kept"))
         over = threading.Event()
         killer = threading.Thread(target=kill_when_it_renders, args=(lost, planner, over))

@@ -1,5 +1,6 @@
 """Removing files, renderings and scenes: everything that is theirs goes, everything else stays, and a kill at any point is healed by repeating."""
 
+import json
 import os
 import shutil
 import signal
@@ -167,6 +168,24 @@ def test_removed_rendering_leaves_nothing_and_the_other_stays(run: Run, town: Wo
     assert run("create-rendering", "town", "view", "--res", "1", "--view", "0/45")[0] == 0
     assert run("render", "view")[0] == 0
     assert run("verify")[0] == 0
+
+
+@pytest.mark.parametrize("command", [("remove-rendering", "view"), ("remove-scene", "town", "--with-renderings")])
+def test_published_folders_stay_and_are_named(run: Run, town: Workspace, command: tuple[str, ...]) -> None:
+    for folder in (town.root / "published" / "shown", town.root.parent / "elsewhere"):
+        status, _, err = run("publish", "view", "--out", str(folder))
+        assert status == 0, err
+    before = files_below(town.root / "published")
+    status, out, err = run(*command, "--yes")
+    assert (status, f"published files of view stay in {town.root / 'published' / 'shown'}, " in out) == (0, True), err
+    assert out.count("published files") == 1
+    assert files_below(town.root / "published") == before
+
+
+def test_published_folders_that_stay_are_in_the_json(run: Run, town: Workspace) -> None:
+    assert run("publish", "view", "--out", str(town.root / "published" / "shown"))[0] == 0
+    assert json.loads(run("remove-rendering", "other", "--yes", "--json")[1])["published"] == []
+    assert json.loads(run("remove-rendering", "view", "--yes", "--json")[1])["published"] == ["shown"]
 
 
 @pytest.mark.parametrize("kind", ["folder", "s3"])

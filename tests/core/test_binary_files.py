@@ -49,7 +49,7 @@ def test_a_mesh_has_the_arrays_of_its_asset(folder: Path) -> None:
 
 def test_boxes_of_a_mesh_are_those_of_its_objects(folder: Path) -> None:
     mesh = _core.AssetMesh(str(folder / "assets" / "houses" / "mesh.m3a"))
-    assert mesh.boxes(3) == ([((0.0, 0.0, 0.0), (10.0, 10.0, 6.0)), ((20.0, 0.0, 0.0), (28.0, 8.0, 4.0)), None], {})
+    assert mesh.boxes(3) == ([((0.0, 0.0, 0.0), (10.0, 10.0, 6.0)), ((20.0, 0.0, 0.0), (28.0, 8.0, 4.0)), None], {}, [0, 0, 0])
     with pytest.raises(_core.FormatError, match="object 1"):
         mesh.boxes(1)
 

@@ -17,8 +17,8 @@ PLAIN_TYPES = {"str": str, "int": int, "float": float}
 PROTOCOL = {"__iter__", "__next__"}
 ANY_DEFAULT = "..."
 
-Parameter = tuple[str, object]
-"""Name, and the default: `inspect.Parameter.empty` without one, ANY_DEFAULT for one that the stub does not spell out."""
+Parameter = tuple[str, object, bool]
+"""Name; default: `inspect.Parameter.empty` without one, ANY_DEFAULT for one that the stub does not spell out; whether it is passed by name only."""
 
 
 def is_exception(name: str) -> bool:
@@ -32,22 +32,31 @@ def has_decorator(node: ast.FunctionDef | ast.ClassDef, name: str) -> bool:
 def declared_parameters(node: ast.FunctionDef) -> list[Parameter]:
     """Returns the parameters of a stub's function without `self`."""
     arguments = node.args
-    assert not any((arguments.vararg, arguments.kwarg, arguments.kwonlyargs, arguments.posonlyargs)), f"{node.name}: plain parameters only"
+    assert not any((arguments.vararg, arguments.kwarg, arguments.posonlyargs)), f"{node.name}: plain parameters only"
     names = [argument.arg for argument in arguments.args]
-    defaults = [ANY_DEFAULT if ast.unparse(value) == ANY_DEFAULT else ast.literal_eval(value) for value in arguments.defaults]
-    rows = list(zip(names, [inspect.Parameter.empty] * (len(names) - len(defaults)) + defaults, strict=True))
+    defaults = [declared_default(value) for value in arguments.defaults]
+    plain = zip(names, [inspect.Parameter.empty] * (len(names) - len(defaults)) + defaults, strict=True)
+    named = zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True)
+    rows = [(name, default, False) for name, default in plain] + [(argument.arg, declared_default(value), True) for argument, value in named]
     return [row for row in rows if row[0] != "self"]
+
+
+def declared_default(value: ast.expr | None) -> object:
+    if value is None:
+        return inspect.Parameter.empty
+    return ANY_DEFAULT if ast.unparse(value) == ANY_DEFAULT else ast.literal_eval(value)
 
 
 def compiled_parameters(callable_: object) -> list[Parameter]:
     signature = inspect.signature(callable_)  # type: ignore[arg-type]
-    return [(name, parameter.default) for name, parameter in signature.parameters.items() if name != "self"]
+    by_name = inspect.Parameter.KEYWORD_ONLY
+    return [(name, parameter.default, parameter.kind is by_name) for name, parameter in signature.parameters.items() if name != "self"]
 
 
 def check_parameters(node: ast.FunctionDef, compiled: object) -> None:
     declared, found = declared_parameters(node), compiled_parameters(compiled)
-    assert [name for name, _ in declared] == [name for name, _ in found]
-    for (name, expected), (_, default) in zip(declared, found, strict=True):
+    assert [(name, by_name) for name, _, by_name in declared] == [(name, by_name) for name, _, by_name in found]
+    for (name, expected, _), (_, default, _) in zip(declared, found, strict=True):
         if expected == ANY_DEFAULT:
             assert default is not inspect.Parameter.empty, f"{name} has no default"
         else:

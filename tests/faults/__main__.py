@@ -1,4 +1,4 @@
-"""`make faults`: runs every fault many times (docs/reliability.md). Seeds are printed; `--only kills --runs 1 --seed SEED` repeats one run."""
+"""`make faults`: runs every fault many times (docs/reliability.md). Seeds are printed; `--only kills --way WAY --runs 1 --seed SEED` repeats one."""
 
 import argparse
 import secrets
@@ -8,17 +8,21 @@ from collections.abc import Callable
 from typing import Final
 
 from tests.faults.disk_full import can_mount, run_disk_full
-from tests.faults.kills import run_kills
+from tests.faults.kills import WAYS, run_kills
 from tests.faults.system_calls import is_strace_usable, run_system_calls
 
 
 def kills(options: argparse.Namespace) -> int:
+    return sum(_kills_of(way, options) for way in options.way or WAYS)
+
+
+def _kills_of(way: str, options: argparse.Namespace) -> int:
     seed = secrets.randbelow(1 << 31) if options.seed is None else options.seed
-    print(f"random kills: {options.runs} runs of {options.kills} kills, seeds {seed} to {seed + options.runs - 1}", flush=True)
-    reports = run_kills(options.runs, options.kills, seed, home=options.home)
+    print(f"random kills ({WAYS[way]}): {options.runs} runs of {options.kills} kills, seeds {seed} to {seed + options.runs - 1}", flush=True)
+    reports = run_kills(options.runs, options.kills, seed, way=way)
     total = sum((report.kills for report in reports), Counter[str]())
     wrong = [report for report in reports if report.faults]
-    print(f"random kills: {total.total():,} in {len(reports)} runs: {_counts(total)}; {len(wrong)} runs with faults")
+    print(f"random kills ({WAYS[way]}): {total.total():,} in {len(reports)} runs: {_counts(total)}; {len(wrong)} runs with faults", flush=True)
     return len(wrong)
 
 
@@ -47,7 +51,7 @@ def main() -> int:
     parser.add_argument("--runs", type=int, default=50, help="number of runs with random kills")
     parser.add_argument("--kills", type=int, default=21, help="kills in each run")
     parser.add_argument("--seed", type=int, help="seed of the first run; default: random")
-    parser.add_argument("--home", choices=("sqlite", "mongodb"), default="sqlite", help="home of the catalogue in the runs with random kills")
+    parser.add_argument("--way", choices=sorted(WAYS), action="append", help="only this way of random kills; repeatable")
     parser.add_argument("--every", type=int, default=1, help="only every Nth failing system call")
     parser.add_argument("--sizes", type=int, default=24, help="number of disk sizes")
     options = parser.parse_args()

@@ -1,4 +1,4 @@
-"""Random SIGKILLs of importer, dispatcher, workers, their subprocesses and server while a street changes from variant to variant."""
+"""Random SIGKILLs while a street changes from variant to variant: of importer, dispatcher, workers, Dask workers, their subprocesses and server."""
 
 import random
 import shutil
@@ -12,8 +12,10 @@ from pathlib import Path
 from typing import Final
 
 from map3d.catalogue import Workspace
+from map3d.catalogue.mongodb_connection import CONNECT_S
 from tests.catalogue.mongo_process import MongoProcess, build
 from tests.faults.processes import MARK, Command, kill_child, survivors
+from tests.faults.render_workers import DaskCluster, RenderWorkers, WorkProcess
 from tests.faults.street import RENDERING, SCENE, VARIANTS, Expected, change_variant, make_workspace, read_result, render_undisturbed, street_file
 from tests.faults.tile_reader import TileReader
 
@@ -26,11 +28,17 @@ MAX_SHOWN: Final = 4
 GIVE_UP_S: Final = 300.0
 """A run that takes longer has hung."""
 QUARANTINE: Final = "in quarantine"
+UNREACHABLE: Final = f"cannot reach the MongoDB server for {CONNECT_S:.0f} s"
+WAYS: Final = {
+    "sqlite": "catalogue in SQLite, map3d work",
+    "mongodb": "catalogue in MongoDB, map3d work",
+    "dask": "catalogue in SQLite, Dask workers",
+}
 
 
 @dataclass
 class KillReport:
-    """Counts of one run. `kills`: by victim; `retries`: runs that had to retry jobs whose subprocess was killed three times."""
+    """Counts of one run. `kills`: by victim; `retries`: failures that `_after_failure` allows, after which the command was started again."""
 
     seed: int
     kills: Counter[str] = field(default_factory=Counter)
@@ -90,8 +98,10 @@ class Reference:
 class KillRun:
     """One run: the same commands are started again after each kill until the last variant is complete."""
 
-    def __init__(self, reference: Reference, workspace: Workspace, seed: int, kills: int, mongo: MongoProcess | None = None) -> None:
-        """`mongo`: the server of the workspace's catalogue, which is killed too; None for SQLite."""
+    def __init__(
+        self, reference: Reference, workspace: Workspace, seed: int, kills: int, mongo: MongoProcess | None = None, is_dask: bool = False
+    ) -> None:
+        """`mongo`: the server of the workspace's catalogue, which is killed too; None for SQLite. `is_dask`: Dask workers render."""
         self._reference, self._kills, self._mongo = reference, kills, mongo
         self._choose = random.Random(seed)
         self._workspace, root = workspace, workspace.root
@@ -100,8 +110,8 @@ class KillRun:
         self.report = KillReport(seed)
         where = ("-w", root)
         self._import = Command("import", ["add-files", SCENE, self._files / "street.obj", "--split", "group", *where], environment)
-        self._render = Command("dispatcher", ["render", RENDERING, "--workers", "2", *where], environment)
-        self._work = Command("worker", ["work", RENDERING, "--workers", "1", "--forever", *where], environment)
+        self._workers: RenderWorkers = DaskCluster(root, environment) if is_dask else WorkProcess(RENDERING, root, environment)
+        self._render = Command("dispatcher", ["render", RENDERING, *self._workers.render_options, *where], environment)
         self._serve = Command("server", ["serve", "--port", "0", *where], environment)
         self._retry = Command("retry", ["retry", RENDERING, *where], environment)
 
@@ -117,8 +127,8 @@ class KillRun:
             self._finish()
         finally:
             reader.stop()
-            for command in (self._import, self._render, self._work, self._serve, self._retry):
-                command.end()
+            for process in (self._import, self._render, self._workers, self._serve, self._retry):
+                process.end()
         self.report.faults += [f"still running: {command}" for command in survivors(str(self._workspace.root))]
         self.report.tiles_served = reader.tiles
         self.report.faults += reader.faults
@@ -130,9 +140,9 @@ class KillRun:
         street_file(self._files, variant, self._reference.houses)
         self.report.variants.append(variant)
         self._until_done(self._import)
-        self._work.start()
+        self._workers.start()
         self._until_done(self._render)
-        self._work.kill()
+        self._workers.pause()
 
     def _until_done(self, command: Command) -> None:
         """Starts the command again after each kill until it succeeds."""
@@ -158,11 +168,14 @@ class KillRun:
             time.sleep(0.005)
 
     def _after_failure(self, command: Command) -> None:
-        """Allows two kinds of failure: an import whose parser was killed, and jobs whose subprocess was killed three times."""
+        """Allows three kinds of failure: an import whose parser was killed, jobs whose subprocess was killed three times, and a command that
+        could not connect to the catalogue's server in time."""
         if command is self._render and QUARANTINE in command.output():
             self.report.retries += 1
             self._retry.start()
             self._retry.wait(60)
+        elif self._mongo is not None and UNREACHABLE in command.output():
+            self.report.retries += 1
         elif command is not self._import or "SIGKILL" not in command.output():
             raise RuntimeError(f"{command.name} failed with status {command.status()}: {command.output()}")
 
@@ -180,17 +193,15 @@ class KillRun:
         elif victim == "subprocess" and kill_child(command.pid, self._choose):
             self.report.kills["subprocess"] += 1
         elif victim == "worker" and command is self._render:
-            self.report.kills["worker"] += self._work.status() is None
-            self._work.kill()
-            self._work.start()
-        elif victim == "subprocess of worker" and command is self._render and self._work.status() is None:
-            self.report.kills["subprocess"] += kill_child(self._work.pid, self._choose)
+            self.report.kills["worker"] += self._workers.kill_one(self._choose)
+        elif victim == "subprocess of worker" and command is self._render:
+            self.report.kills["subprocess"] += self._workers.kill_subprocess(self._choose)
         elif victim == "server":
             self._serve.kill()
             self._serve.start()
             self.report.kills["server"] += 1
-        if self._work.starts and self._work.status() is not None and command is self._render:
-            self._work.start()
+        if command is self._render:
+            self._workers.start()
 
     def _finish(self) -> None:
         """Compares the tiles with the undisturbed ones of the last variant, and runs `map3d verify`."""
@@ -203,10 +214,10 @@ class KillRun:
         verify.end()
 
 
-def run_kills(runs: int, kills: int, seed: int, houses: int = 48, home: str = "sqlite", show: bool = True) -> list[KillReport]:
-    """Runs `kills` kills in each of `runs` runs; run number i has seed `seed + i`. `home`: of the catalogue, sqlite or mongodb."""
+def run_kills(runs: int, kills: int, seed: int, houses: int = 48, way: str = "sqlite", show: bool = True) -> list[KillReport]:
+    """Runs `kills` kills in each of `runs` runs; run number i has seed `seed + i`. `way`: one of WAYS."""
     reports = []
-    with tempfile.TemporaryDirectory(prefix="map3d-faults-") as folder, _mongo(home, Path(folder)) as mongo:
+    with tempfile.TemporaryDirectory(prefix="map3d-faults-") as folder, _mongo(way, Path(folder)) as mongo:
         reference = Reference(Path(folder), houses)
         for number in range(runs):
             root = Path(folder) / f"run{number}"
@@ -215,7 +226,7 @@ def run_kills(runs: int, kills: int, seed: int, houses: int = 48, home: str = "s
                 workspace = Workspace(root)
             else:
                 workspace = make_workspace(root, houses, catalogue_url=f"{mongo.url}/run{number}")
-            reports.append(KillRun(reference, workspace, seed + number, kills, mongo).run())
+            reports.append(KillRun(reference, workspace, seed + number, kills, mongo, is_dask=way == "dask").run())
             if show:
                 print(reports[-1], flush=True)
             if not reports[-1].faults:
@@ -224,9 +235,9 @@ def run_kills(runs: int, kills: int, seed: int, houses: int = 48, home: str = "s
 
 
 @contextmanager
-def _mongo(home: str, folder: Path) -> Iterator[MongoProcess | None]:
-    """Starts a MongoDB server for the home `mongodb`."""
-    if home == "sqlite":
+def _mongo(way: str, folder: Path) -> Iterator[MongoProcess | None]:
+    """Starts a MongoDB server for the way `mongodb`."""
+    if way != "mongodb":
         yield None
         return
     build()

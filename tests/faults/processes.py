@@ -18,11 +18,12 @@ MARK: Final = "MAP3D_FAULTS_RUN"
 
 
 class Command:
-    """A `map3d` command that can be started again after it has ended. Its output goes to a file, of which `output` is the end."""
+    """A command that can be started again after it has ended. Its output goes to a file, of which `output` is the end."""
 
-    def __init__(self, name: str, arguments: Sequence[str | Path], environment: Mapping[str, str] | None = None) -> None:
+    def __init__(self, name: str, arguments: Sequence[object], environment: Mapping[str, str] | None = None, module: str = "map3d") -> None:
+        """`module`: the Python module that is run with the arguments."""
         self.name = name
-        self._arguments = [sys.executable, "-m", "map3d", *map(str, arguments)]
+        self._arguments = [sys.executable, "-m", module, *map(str, arguments)]
         self._environment = {**os.environ, "PYTHONUNBUFFERED": "1", **(environment or {})}
         self._process: subprocess.Popen[bytes] | None = None
         self._output: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 (closed by `end`)
@@ -45,6 +46,9 @@ class Command:
         """Returns the exit status; None while the process runs."""
         assert self._process is not None, "started"
         return self._process.poll()
+
+    def is_running(self) -> bool:
+        return self._process is not None and self._process.poll() is None
 
     def wait(self, timeout_s: float) -> int:
         assert self._process is not None, "started"

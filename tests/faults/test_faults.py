@@ -1,4 +1,4 @@
-"""A short version of `make faults`; the long one runs for an hour."""
+"""A short version of `make faults`; the long one runs for two hours."""
 
 import pytest
 

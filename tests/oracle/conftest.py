@@ -80,8 +80,11 @@ def build(tmp_path_factory: pytest.TempPathFactory) -> Builder:
     def make(name: str, files: list[Path], res_m: float, views: list[str]) -> OracleScene:
         workspace = tmp_path_factory.mktemp(name)
         where = ["-w", str(workspace)]
+        # The oracle knows the colours of materials.json alone, in which surfaces without a colour have this grey.
+        style = workspace / "style.json"
+        style.write_text('{"rules": [{"color": "#cccccc"}]}')
         commands = [
-            ["create-scene", name, *where],
+            ["create-scene", name, "--style", str(style), *where],
             ["add-files", name, *map(str, files), *where],
             ["create-rendering", name, name, "--res", str(res_m), *[part for view in views for part in ("--view", view)], *where],
         ]

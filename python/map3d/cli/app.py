@@ -15,6 +15,7 @@ from map3d.errors import Map3dError
 COMMANDS: Final = {
     "create-workspace": "create_workspace",
     "create-scene": "create_scene",
+    "inspect": "inspect",
     "add-files": "add_files",
     "create-rendering": "create_rendering",
     "add-views": "add_views",
@@ -24,7 +25,10 @@ COMMANDS: Final = {
     "work": "work",
     "jobs": "jobs",
     "retry": "retry",
+    "operations": "operations",
     "serve": "serve",
+    "users": "users",
+    "tokens": "tokens",
     "publish": "publish",
     "export": "export",
     "site": "site",

@@ -1,17 +1,22 @@
 """map3d create-rendering."""
 
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from map3d.catalogue import Workspace
 from map3d.cli.building import build_with_progress
 from map3d.cli.layer_options import layer_options
-from map3d.cli.options import View, cores, json_option, workspace_option
+from map3d.cli.options import View, json_option, max_memory_option, outlier_options, style_option, workspace_option
 from map3d.cli.output import plural, print_json
+from map3d.cores import usable_cores
 from map3d.errors import BadRequest
+from map3d.geometry.views import views_around
 from map3d.types import ViewAngles
+
+if TYPE_CHECKING:
+    from map3d.renderings.style import Rules
 
 
 class WindowText(click.ParamType):  # type: ignore[type-arg]
@@ -53,10 +58,23 @@ class WindowText(click.ParamType):  # type: ignore[type-arg]
     "[default: SQLite files in the workspace]",
 )
 @click.option("--regrid", is_flag=True, help="Replace the frames of an existing rendering to fit the current scene; everything is rendered again.")
+@outlier_options
+@style_option
+@max_memory_option
 @json_option
 @workspace_option
 def command(
-    workspace: Workspace, scene: str, name: str, views: tuple[ViewAngles, ...], directions: int | None, as_json: bool, **options: Any
+    workspace: Workspace,
+    scene: str,
+    name: str,
+    views: tuple[ViewAngles, ...],
+    directions: int | None,
+    keep_outliers: bool | None,
+    cluster: int | None,
+    style: "Rules | None",
+    max_memory: int | None,
+    as_json: bool,
+    **options: Any,
 ) -> None:
     """Create the rendering NAME of SCENE with its views, layers and resolution. Run map3d render afterwards.
 
@@ -64,6 +82,8 @@ def command(
     later additions do not renumber any tile.
     """
     from map3d.renderings.create import RenderingRequest, create_rendering
+    from map3d.renderings.outliers import choose_content
+    from map3d.renderings.style import choose_style
 
     if views and (directions or options["pitch"]):
         raise BadRequest("give either --view, or --directions and --pitch")
@@ -73,7 +93,9 @@ def command(
     catalogue = workspace.open_catalogue()
     try:
         request.check(catalogue)
-        built = build_with_progress(workspace, catalogue, scene, threads=cores())
+        choose_content(catalogue, scene, keep_outliers, cluster)
+        choose_style(catalogue, scene, style)
+        built = build_with_progress(workspace, catalogue, scene, threads=usable_cores(), max_memory_bytes=max_memory)
         record = create_rendering(workspace, catalogue, request)
     finally:
         catalogue.close()
@@ -84,8 +106,3 @@ def command(
     shape = f"{plural(len(record.frames), 'view')}, {plural(levels, 'level')}"
     click.echo(f"rendering {name}: {shape}, {record.res_m:g} m per pixel, {side:,} px wide at the deepest level")
     click.echo(f"next: map3d estimate {name}, or map3d render {name}")
-
-
-def views_around(directions: int, pitches: tuple[float, ...]) -> tuple[ViewAngles, ...]:
-    """Returns views at evenly spaced look-at angles, counter-clockwise from north; only one at pitch 90, which looks straight down."""
-    return tuple(ViewAngles(360.0 * k / directions, pitch) for pitch in pitches for k in range(1 if pitch == 90 else directions))

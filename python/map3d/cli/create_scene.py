@@ -1,10 +1,15 @@
 """map3d create-scene."""
 
+from typing import TYPE_CHECKING
+
 import click
 
-from map3d.catalogue import SceneRecord, Workspace
-from map3d.cli.options import json_option, workspace_option
+from map3d.catalogue import Workspace
+from map3d.cli.options import json_option, outlier_options, style_option, workspace_option
 from map3d.cli.output import print_json
+
+if TYPE_CHECKING:
+    from map3d.renderings.style import Rules
 
 SWITCHES = {
     "merge-vertices": "merge duplicate vertices",
@@ -39,6 +44,8 @@ def _switches(command: click.decorators.FC) -> click.decorators.FC:
     metavar="URL",
     help="Share the built scene with other nodes: upload its files to a folder or an object store, as file:///FOLDER or s3://BUCKET/PREFIX.",
 )
+@outlier_options
+@style_option
 @_switches
 @json_option
 @workspace_option
@@ -50,22 +57,20 @@ def command(
     attribution: str,
     ground_plane: str,
     files: str | None,
+    keep_outliers: bool | None,
+    cluster: int | None,
+    style: "Rules | None",
     as_json: bool,
     **switches: bool,
 ) -> None:
     """Create an empty scene NAME, and the workspace if it does not exist."""
-    from map3d.ingest.scene_crs import parse_scene_crs
-    from map3d.renderings.remove_scene import finish_scene_removal
-    from map3d.renderings.shared_scene import FILES, check_files_url
+    from map3d.renderings.create_scene import SceneRequest, create_scene
 
-    shared = {} if files is None else {FILES: check_files_url(files)}
-    pinned = None if crs is None else parse_scene_crs(crs)
+    request = SceneRequest(name, title, attribution, crs, ground_plane, files, switches, bool(keep_outliers), cluster or 0, style or [])
+    request.check()
     catalogue = workspace.create().open_catalogue()
     try:
-        options = {**switches, "ground_plane": ground_plane, **shared}
-        finish_scene_removal(workspace, catalogue, name)
-        catalogue.create_scene(SceneRecord(name, title, attribution, crs=pinned, options=options))
-        scene = catalogue.scene(name)
+        scene = create_scene(workspace, catalogue, request)
     finally:
         catalogue.close()
     if as_json:

@@ -6,16 +6,17 @@ import click
 
 from map3d.catalogue import Workspace
 from map3d.cli.building import build_with_progress
-from map3d.cli.options import json_option, workers_option, workspace_option
+from map3d.cli.options import json_option, max_memory_option, workers_option, workspace_option
 from map3d.cli.output import plural, print_json, size_text, time_text
 
 
 @click.command("estimate")
 @click.argument("rendering")
 @workers_option
+@max_memory_option
 @json_option
 @workspace_option
-def command(workspace: Workspace, rendering: str, workers: int, as_json: bool) -> None:
+def command(workspace: Workspace, rendering: str, workers: int, max_memory: int | None, as_json: bool) -> None:
     """Estimate the tiles, bytes and minutes of RENDERING before it is rendered.
 
     Missing and changed blocks count as still to render. Builds the scene first if its files have changed.
@@ -24,7 +25,7 @@ def command(workspace: Workspace, rendering: str, workers: int, as_json: bool) -
 
     catalogue = workspace.open_catalogue()
     try:
-        built = build_with_progress(workspace, catalogue, catalogue.rendering(rendering).scene, threads=workers)
+        built = build_with_progress(workspace, catalogue, catalogue.rendering(rendering).scene, threads=workers, max_memory_bytes=max_memory)
         found = estimate(workspace, catalogue, rendering, workers)
     finally:
         catalogue.close()

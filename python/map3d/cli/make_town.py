@@ -7,9 +7,10 @@ from typing import Any
 import click
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
-from map3d.cli.options import cores, json_option
+from map3d.cli.options import json_option
 from map3d.cli.output import print_json, size_text
 from map3d.cli.progress import progress_bar
+from map3d.cores import usable_cores
 
 
 @click.command("make-town")
@@ -25,7 +26,7 @@ from map3d.cli.progress import progress_bar
 @click.option("--terrain/--no-terrain", default=True, show_default=True, help="Write elevation and orthophoto.")
 @click.option("--trees/--no-trees", default=True, show_default=True, help="Write trees.")
 @click.option("--crs", default="EPSG:25832", show_default=True, help="Coordinate system of the files.")
-@click.option("--workers", type=click.IntRange(1), default=cores, show_default="one per core", help="Number of parallel processes.")
+@click.option("--workers", type=click.IntRange(1), default=usable_cores, show_default="one per core", help="Number of parallel processes.")
 @click.option("--estimate", is_flag=True, help="Only print the disk space that the town needs, within about 15 %; write nothing.")
 @json_option
 def command(out: Path, formats: str, workers: int, estimate: bool, as_json: bool, **spec: Any) -> None:

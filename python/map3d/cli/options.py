@@ -1,6 +1,5 @@
 """Options that several commands share, and the types of their values."""
 
-import os
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Any, Final, TypeVar
 import click
 
 from map3d.catalogue import Workspace
+from map3d.cores import usable_cores
 from map3d.errors import BadRequest
 from map3d.geometry.views import parse_view
 from map3d.types import ViewAngles
@@ -35,6 +35,36 @@ def workspace_option(command: Command) -> Command:
 
 def json_option(command: Command) -> Command:
     return click.option("--json", "as_json", is_flag=True, help="Print one JSON document instead of text.")(command)
+
+
+def format_options(command: Command) -> Command:
+    """Adds what to read of a format: `--up` and `--split` of OBJ, `--theme`, `--lod` and `--interiors` of CityGML, `--transparency`, `--max-error` of
+    rasters."""
+    for option in (
+        click.option(
+            "--max-error",
+            "max_error_m",
+            type=click.FloatRange(0.0),
+            default=0.0,
+            help="Elevation models: greatest height error in metres of the triangles; 0 keeps every height.  [default: 0]",
+        ),
+        click.option(
+            "--transparency",
+            type=click.Choice(["auto", "as-is", "inverted"]),
+            default="auto",
+            show_default=True,
+            help="How transparency of materials is read; auto: as opacity in files whose materials would all be faint and some invisible.",
+        ),
+        click.option("--interiors", is_flag=True, help="CityGML: draw rooms and what is in them.  [default: leave them out]"),
+        click.option("--lod", help="CityGML: the level of detail to use.  [default: the best of each object]"),
+        click.option("--theme", help="CityGML: the appearance theme to use.  [default: the one with the most textures]"),
+        click.option(
+            "--split", type=click.Choice(["file", "group"]), default="file", show_default=True, help="OBJ: the part that becomes one object."
+        ),
+        click.option("--up", type=click.Choice(["y", "z"]), default="z", show_default=True, help="OBJ: the axis that points up."),
+    ):
+        command = option(command)
+    return command
 
 
 class Bytes(click.ParamType):  # type: ignore[type-arg]
@@ -65,14 +95,40 @@ class View(click.ParamType):  # type: ignore[type-arg]
             self.fail(str(error), param, ctx)
 
 
-def cores() -> int:
-    """Returns the number of CPU cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def workers_option(command: Command) -> Command:
     return click.option(
-        "--workers", type=click.IntRange(1, 512), default=cores, show_default="one per core", help="Number of parallel render processes."
+        "--workers", type=click.IntRange(1, 512), default=usable_cores, show_default="one per core", help="Number of parallel render processes."
+    )(command)
+
+
+def outlier_options(command: Command) -> Command:
+    """Adds `--keep-outliers` and `--cluster`: None where they are not given."""
+    cluster = click.option(
+        "--cluster",
+        type=click.IntRange(0),
+        help="Of files in places far from each other, build the place with this number; 0 is the largest.  [default: the largest]",
+    )
+    keep = click.option("--keep-outliers/--no-keep-outliers", default=None, help="Keep content far from the rest.  [default: leave it out]")
+    return keep(cluster(command))
+
+
+class Style(click.ParamType[Any]):
+    """A style file, or "none": the rules."""
+
+    name = "FILE"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        from map3d.renderings.style import read_style
+
+        return value if isinstance(value, list) else [] if value == "none" else read_style(Path(value))
+
+
+def style_option(command: Command) -> Command:
+    """Adds `--style`: None where it is not given."""
+    return click.option(
+        "--style",
+        type=Style(),
+        help="JSON file with colours for surfaces that have none of their own; 'none' for the built-in ones.",
     )(command)
 
 

@@ -9,6 +9,10 @@ import click
 from rich.console import Console
 from rich.table import Table
 
+from map3d.quantities import names_text, plural, size_text, time_text
+
+__all__ = ["console", "counts_text", "names_text", "plural", "print_json", "print_table", "size_text", "table", "time_text"]
+
 
 def console() -> Console:
     """Returns the console for progress and messages: standard error, so that standard output can be piped."""
@@ -38,31 +42,6 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[Any]], title: str | No
 def counts_text(counts: Mapping[Any, int]) -> str:
     """Returns the counts as in `12 done, 3 todo`, without zeros."""
     return ", ".join(f"{count:,} {name}" for name, count in counts.items() if count) or "none"
-
-
-def plural(count: int, noun: str) -> str:
-    """Returns the count with its noun: `1 file`, `2 files`."""
-    return f"{count:,} {noun}" if count == 1 else f"{count:,} {noun}s"
-
-
-def names_text(names: Sequence[str], limit: int = 8) -> str:
-    """Returns the names as in `a, b, c and 5 more`."""
-    shown, more = names[:limit], len(names) - limit
-    return ", ".join(shown) + (f" and {more:,} more" if more > 0 else "")
-
-
-def size_text(size: float) -> str:
-    for unit in ("bytes", "kB", "MB", "GB"):
-        if size < 1000:
-            return f"{size:.0f} {unit}" if unit == "bytes" else f"{size:.1f} {unit}"
-        size /= 1000
-    return f"{size:.1f} TB"
-
-
-def time_text(seconds: float) -> str:
-    if seconds < 90:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
 
 
 def _text(cell: Any) -> str:

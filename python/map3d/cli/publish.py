@@ -18,17 +18,26 @@ from map3d.cli.progress import progress_bar, show_stage
 @click.option("--replace", is_flag=True, help="Update an earlier publication: only files whose content changed are written or sent.")
 @click.option("--allow-incomplete", is_flag=True, help="Publish even if blocks are missing.")
 @click.option("--url", metavar="ADDRESS", help="Address of the map's page, which links to it need to show its picture.")
+@click.option("--gis", is_flag=True, help="Also write colour tiles as files, with layer definitions for QGIS and GDAL in the folder gis.")
 @click.option("--dry-run", is_flag=True, help="Print what would be written or sent, and its size, without doing so.")
 @json_option
 @workspace_option
 def command(
-    workspace: Workspace, rendering: str, out: str, replace: bool, allow_incomplete: bool, url: str | None, dry_run: bool, as_json: bool
+    workspace: Workspace,
+    rendering: str,
+    out: str,
+    replace: bool,
+    allow_incomplete: bool,
+    url: str | None,
+    gis: bool,
+    dry_run: bool,
+    as_json: bool,
 ) -> None:
     """Publish RENDERING as static files: tiles, objects, viewer.
 
     FOLDER can be copied to any web server that supports range requests. URL is a place in an object store; credentials come from the environment
     (AWS_*, GOOGLE_*, AZURE_*)."""
-    done = publish_with_progress(workspace, rendering, out, replace=replace, allow_incomplete=allow_incomplete, url=url, dry_run=dry_run)
+    done = publish_with_progress(workspace, rendering, out, replace=replace, allow_incomplete=allow_incomplete, url=url, gis=gis, dry_run=dry_run)
     if as_json:
         print_json(done)
         return
@@ -40,6 +49,10 @@ def command(
         f"{verb} {rendering} to {out}: {plural(done.tiles, 'image')} in {plural(done.archives, 'archive')}, {size_text(done.bytes)}; "
         f"{written}: {plural(done.written, 'file')}, {about}{size_text(done.written_bytes)}; {removed}: {done.removed:,}"
     )
+    if gis:
+        files = next((row for row in done.sizes if row.part == "gis"), None)
+        count, size = (0, 0) if files is None else (files.files, files.bytes)
+        click.echo(f"for GIS software: {plural(count, 'file')} in the folder gis, {size_text(size)}")
 
 
 class Rate(ProgressColumn):

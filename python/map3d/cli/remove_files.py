@@ -4,11 +4,12 @@ from collections.abc import Sequence
 
 import click
 
-from map3d.catalogue import Catalogue, Workspace
+from map3d.catalogue import Workspace
 from map3d.cli.building import build_with_progress
 from map3d.cli.confirmation import confirm, yes_option
-from map3d.cli.options import cores, json_option, workspace_option
+from map3d.cli.options import json_option, workspace_option
 from map3d.cli.output import names_text, plural, print_json, size_text
+from map3d.cores import usable_cores
 
 
 @click.command("remove-files")
@@ -25,7 +26,7 @@ def command(workspace: Workspace, scene: str, names: Sequence[str], yes: bool, a
     """
     from map3d.jobs.dead_workers import expire_dead_workers
     from map3d.renderings.removal_checks import folder_bytes
-    from map3d.renderings.remove_files import find_files, remove_files
+    from map3d.renderings.remove_files import find_files, is_built, remove_files
 
     catalogue = workspace.open_catalogue()
     try:
@@ -37,7 +38,8 @@ def command(workspace: Workspace, scene: str, names: Sequence[str], yes: bool, a
             files = f"{plural(len(found.names), 'file')} ({names_text(found.names)})"
             confirm(f"this removes {files} from the scene {scene}, {size_text(found.bytes)} and the built files that only they use", yes=yes)
         remove_files(workspace, catalogue, found)
-        _build(workspace, catalogue, scene)
+        if is_built(workspace, catalogue, scene):
+            build_with_progress(workspace, catalogue, scene, threads=usable_cores())
         freed = max(before - folder_bytes(workspace.scene_folder(scene)), 0)
     finally:
         catalogue.close()
@@ -48,9 +50,3 @@ def command(workspace: Workspace, scene: str, names: Sequence[str], yes: bool, a
     click.echo(f"removed {plural(len(removed), 'file')} from {scene}; {size_text(freed)} freed")
     for rendering in found.renderings:
         click.echo(f"next: map3d render {rendering}")
-
-
-def _build(workspace: Workspace, catalogue: Catalogue, scene: str) -> None:
-    """Builds a scene that was built before, so that no file of it is left that nothing uses."""
-    if catalogue.assets(scene) and (workspace.scene_folder(scene) / "scene.json").is_file():
-        build_with_progress(workspace, catalogue, scene, threads=cores())

@@ -4,6 +4,7 @@ import click
 
 from map3d.catalogue import Workspace
 from map3d.cli.confirmation import confirm, yes_option
+from map3d.cli.folders_that_stay import print_folders_that_stay, published_names
 from map3d.cli.options import json_option, workspace_option
 from map3d.cli.output import names_text, plural, print_json, size_text
 
@@ -15,11 +16,13 @@ from map3d.cli.output import names_text, plural, print_json, size_text
 @json_option
 @workspace_option
 def command(workspace: Workspace, scene: str, with_renderings: bool, yes: bool, as_json: bool) -> None:
-    """Remove SCENE with everything imported into it. The source files and published folders stay.
+    """Remove SCENE with everything imported into it. The source files and published folders stay;
+    those in the workspace are listed.
 
     If the removal is interrupted, run the command again to complete it.
     """
     from map3d.jobs.dead_workers import expire_dead_workers
+    from map3d.publish.published_folders import folders_of
     from map3d.renderings.remove_scene import find_scene, remove_scene
 
     catalogue = workspace.open_catalogue()
@@ -33,7 +36,9 @@ def command(workspace: Workspace, scene: str, with_renderings: bool, yes: bool, 
         remove_scene(workspace, catalogue, found)
     finally:
         catalogue.close()
+    folders = folders_of(workspace, names)
     if as_json:
-        print_json({"scene": scene, "renderings": names, "bytes": found.total_bytes})
+        print_json({"scene": scene, "renderings": names, "bytes": found.total_bytes, "published": published_names(folders)})
     else:
         click.echo(f"removed scene {scene}{renderings}; {size_text(found.total_bytes)} freed")
+        print_folders_that_stay(workspace, folders)

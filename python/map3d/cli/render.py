@@ -15,7 +15,7 @@ from map3d.cli.render_stats import print_summary, summary
 
 if TYPE_CHECKING:
     from map3d.jobs.dask_pool import DaskPools
-    from map3d.jobs.run import Run, RunResult
+    from map3d.jobs.run import Run, RunPlan, RunResult
     from map3d.jobs.run_settings import RunSettings
 
 
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 @click.option("--stats", "with_stats", is_flag=True, help="Print the time spent in each stage and the hit rates of the caches.")
 @click.option("--dask", metavar="ADDRESS", help="Render on the Dask cluster with this scheduler, e.g. tcp://10.0.0.1:8786, instead of here.")
 @click.option("--dask-workspace", metavar="FOLDER", help="Workspace folder on the Dask workers.  [default: the same path as here]")
+@click.option("--plan-only", is_flag=True, help="Build the scene and plan the blocks, but render none.")
 @json_option
 @workspace_option
 def command(
@@ -36,6 +37,7 @@ def command(
     with_stats: bool,
     dask: str | None,
     dask_workspace: str | None,
+    plan_only: bool,
     as_json: bool,
 ) -> None:
     """Render the missing and changed tiles of RENDERING.
@@ -45,6 +47,8 @@ def command(
 
     With --dask, the scene is built and the blocks are planned here; every thread of the Dask workers renders with a subprocess of its own. The
     cluster decides how many there are; --workers and --max-memory apply to the build, and --max-memory to each Dask worker's thread.
+
+    With --plan-only, the blocks are left to map3d work, or to map3d serve --on-demand, which renders those that are looked at.
     """
     from map3d.jobs.run import Run
     from map3d.jobs.run_settings import RunSettings
@@ -54,6 +58,10 @@ def command(
         settings = RunSettings(workers, max_memory)
         scene = catalogue.rendering(rendering).scene
         built = build_with_progress(workspace, catalogue, scene, threads=workers, max_memory_bytes=max_memory)
+        if plan_only:
+            plan = plan_with_progress(Run(workspace, catalogue, rendering, settings))
+            print_plan(rendering, plan, as_json)
+            return
         with _dask_pools(workspace, catalogue, settings, dask, dask_workspace) as pools:
             result = render_with_progress(Run(workspace, catalogue, rendering, settings, pools))
     finally:
@@ -81,13 +89,30 @@ def _dask_pools(
 
 def render_with_progress(run: "Run") -> "RunResult":
     """Plans and runs the jobs, with a progress bar for each on standard error."""
-    from map3d.cli.run_progress import RunProgress, run_bar
+    from map3d.cli.run_progress import RunProgress
+
+    plan = plan_with_progress(run)
+    with RunProgress() as progress:
+        return run.work(plan, progress)
+
+
+def plan_with_progress(run: "Run") -> "RunPlan":
+    from map3d.cli.run_progress import run_bar
 
     with run_bar(MofNCompleteColumn()) as bar:
         task = bar.add_task("planning", total=None)
-        plan = run.plan(lambda done, total: bar.update(task, completed=done, total=total))
-    with RunProgress() as progress:
-        return run.work(plan, progress)
+        return run.plan(lambda done, total: bar.update(task, completed=done, total=total))
+
+
+def print_plan(rendering: str, plan: "RunPlan", as_json: bool) -> None:
+    if as_json:
+        print_json(
+            {"counts": asdict(plan.counts), "open_jobs": plan.open_jobs, "done_jobs": plan.done_jobs, "quarantined_jobs": plan.quarantined_jobs}
+        )
+        return
+    click.echo(f"planned {rendering}: {plural(plan.open_jobs, 'block')} to render, {plural(plan.done_jobs, 'block')} done")
+    if plan.open_jobs:
+        click.echo(f"next: map3d serve {rendering} --on-demand, or map3d render {rendering}")
 
 
 def print_result(rendering: str, result: "RunResult") -> None:

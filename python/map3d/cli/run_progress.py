@@ -9,6 +9,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from map3d.cli.output import counts_text, plural
 from map3d.cli.progress import progress_bar
 from map3d.jobs import events
+from map3d.jobs.event_messages import problem_text
 from map3d.jobs.events import RunEvent
 
 
@@ -76,13 +77,6 @@ def plan_text(plan: events.Planned) -> str:
 
 def message(event: RunEvent) -> str:
     """Returns the line that reports an event, empty for events without one."""
-    if isinstance(event, events.JobFailed):
-        lease = event.lease
-        return f"{lease.track} {lease.block}: attempt {lease.attempt} failed ({event.reason}); the block is now {event.state}"
-    if isinstance(event, events.LeaseLost):
-        return f"{event.lease.track} {event.lease.block}: lease lost: {event.reason}"
-    if isinstance(event, events.SceneChanged):
-        return "files changed during the render"
     if isinstance(event, events.PlanAwaited):
         return f"{event.rendering}: its scene was rebuilt; waiting until map3d render {event.rendering} plans it again"
     if isinstance(event, events.StoreAwaited):
@@ -94,8 +88,6 @@ def message(event: RunEvent) -> str:
     if isinstance(event, events.Waiting):
         blocks = plural(event.jobs, "block")
         return f"waiting for {blocks} leased by another run; leases of a run that was killed on another host expire within a minute"
-    if isinstance(event, events.WorkerExited) and event.reason:
-        return f"worker {event.worker} exited: {event.reason}"
     if isinstance(event, events.RenderingLeft):
         return f"{event.rendering} is complete" if event.complete else f"{event.rendering} is incomplete; see map3d jobs {event.rendering}"
-    return ""
+    return problem_text(event)

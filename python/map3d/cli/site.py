@@ -1,6 +1,7 @@
 """map3d site."""
 
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -8,12 +9,13 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 
 from map3d.catalogue import Catalogue, Workspace
 from map3d.cli.building import build_with_progress
-from map3d.cli.create_rendering import views_around
-from map3d.cli.options import View, max_memory_option, workers_option, workspace_option
+from map3d.cli.import_reports import left_alone_lines, missing_textures_line, place_line, warning_lines
+from map3d.cli.options import View, format_options, max_memory_option, outlier_options, style_option, workers_option, workspace_option
 from map3d.cli.output import names_text, plural, size_text
 from map3d.cli.progress import progress_bar
 from map3d.cli.publish import publish_with_progress
 from map3d.cli.render import print_result, render_with_progress
+from map3d.geometry.views import views_around
 from map3d.types import COLOR_FORMATS, ViewAngles
 
 if TYPE_CHECKING:
@@ -34,12 +36,20 @@ if TYPE_CHECKING:
     multiple=True,
     help="Look-at angle and pitch, e.g. 45-22.5; repeatable.  [default: 4 angles, pitch 45]",
 )
-@click.option("--res", "res_m", type=float, help="Metres per pixel.  [default: depends on the size of the scene, so that rendering takes minutes]")
+@click.option(
+    "--res",
+    "res_m",
+    type=float,
+    help="Metres per pixel.  [default: as fine as textures and triangles, coarser for large scenes, so that rendering takes minutes]",
+)
 @click.option("--color", type=click.Choice(list(COLOR_FORMATS)), default="webp", show_default=True, help="Image format of the layer color.")
-@click.option("--crs", help="Coordinate system of the files, where they do not state it.")
-@click.option("--up", type=click.Choice(["y", "z"]), default="z", show_default=True, help="OBJ: the axis that points up.")
+@click.option("--crs", help="Coordinate system of the files, where they do not state it or state it wrongly; 'local' for local metres.")
+@format_options
 @click.option("--strict", is_flag=True, help="Stop at the first problem instead of skipping it.")
 @click.option("--allow-empty", is_flag=True, help="Remove files from the site even if the folder that they came from is empty now.")
+@outlier_options
+@style_option
+@click.option("--ao/--no-ao", default=None, help="Render ambient occlusion.  [default: where there are no textures]")
 @workers_option
 @max_memory_option
 @workspace_option
@@ -51,23 +61,35 @@ def command(
     You can stop it at any time; re-run it to resume. Re-run it after files change; only the changes are processed. Files that have left FOLDER leave
     the site; files are imported again when they, the options or the reader change.
     """
+    from map3d.cli.site_extents import print_estimate, print_extents, print_rendering
     from map3d.jobs.run import Run
     from map3d.jobs.run_settings import RunSettings
     from map3d.publish import check_folder
-    from map3d.renderings.site_steps import create_site_rendering
+    from map3d.publish.report_page import REPORT_PAGE
+    from map3d.renderings.outliers import choose_content
+    from map3d.renderings.site_steps import create_site_rendering, store_report
+    from map3d.renderings.style import choose_style
 
     check_folder(out)
     request = _site_request(folder, views, **options)
     catalogue = workspace.create().open_catalogue()
     try:
-        _update_files(workspace, catalogue, request)
+        summary = _update_files(workspace, catalogue, request)
         if not catalogue.assets(request.name):
             click.echo(f"the scene {request.name} has no files left; {out} stays as it was published")
             return
-        build_with_progress(workspace, catalogue, request.name, threads=workers, max_memory_bytes=max_memory)
-        record = create_site_rendering(workspace, catalogue, request)
-        click.echo(f"rendering {record.name}: {plural(len(record.frames), 'view')}, {plural(record.zmax + 1, 'level')}, {record.res_m:g} m per pixel")
+        choose_content(catalogue, request.name, request.keep_outliers, request.cluster)
+        choose_style(catalogue, request.name, request.style)
+        built = build_with_progress(workspace, catalogue, request.name, threads=workers, max_memory_bytes=max_memory)
+        print_extents(workspace, catalogue, request.name, was_built=built is not None)
+        made = create_site_rendering(workspace, catalogue, request)
+        record = made.record
+        print_rendering(made)
+        print_estimate(workspace, catalogue, record.name, workers)
+        started = monotonic()
         result = render_with_progress(Run(workspace, catalogue, record.name, RunSettings(workers, max_memory)))
+        seconds = monotonic() - started if result.statistics.done else None
+        store_report(workspace, catalogue, request, made, summary, workers, seconds)
     finally:
         catalogue.close()
     print_result(record.name, result)
@@ -75,6 +97,7 @@ def command(
         raise click.exceptions.Exit(130 if result.stopped else 1)
     done = publish_with_progress(workspace, record.name, out, replace=True)
     click.echo(f"wrote the site to {out}, {size_text(done.bytes)}; copy it to any web server that supports range requests")
+    click.echo(f"report: {out / REPORT_PAGE} says what the files hold and what was skipped")
 
 
 def _site_request(folder: Path, views: tuple[ViewAngles, ...], **options: Any) -> "SiteRequest":
@@ -91,12 +114,18 @@ def _site_request(folder: Path, views: tuple[ViewAngles, ...], **options: Any) -
         title=options["title"] or folder_name,
         attribution=options["attribution"],
         color=options["color"],
-        options=ImportOptions(crs=options["crs"], up=options["up"], strict=options["strict"]),
+        options=ImportOptions(
+            **{name: options[name] for name in ("crs", "up", "split", "theme", "lod", "interiors", "transparency", "max_error_m", "strict")},
+        ),
         allow_empty=options["allow_empty"],
+        keep_outliers=bool(options["keep_outliers"]),
+        cluster=options["cluster"] or 0,
+        style=options["style"] or [],
+        ao=options["ao"],
     )
 
 
-def _update_files(workspace: Workspace, catalogue: Catalogue, request: "SiteRequest") -> None:
+def _update_files(workspace: Workspace, catalogue: Catalogue, request: "SiteRequest") -> "ImportSummary":
     from map3d.renderings.site_files import update_files
 
     with progress_bar(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()) as bar:
@@ -107,7 +136,8 @@ def _update_files(workspace: Workspace, catalogue: Catalogue, request: "SiteRequ
 
         summary = update_files(workspace, catalogue, request.files, report)
     _print_summary(summary)
-    _print_problems(catalogue, request.name)
+    _print_problems(workspace, catalogue, request.name)
+    return summary
 
 
 def _print_summary(summary: "ImportSummary") -> None:
@@ -121,13 +151,22 @@ def _print_summary(summary: "ImportSummary") -> None:
         click.echo(f"removed, since no longer in the folder: {names_text(summary.removed)}")
     if summary.elsewhere:
         click.echo(f"kept, since not from this folder: {names_text(summary.elsewhere)}; map3d remove-files removes them")
+    for line in left_alone_lines(summary.left_alone):
+        click.echo(line)
     for _, reason in summary.failed:
         click.echo(f"not imported: {reason}", err=True)
 
 
-def _print_problems(catalogue: Catalogue, scene: str) -> None:
-    """Prints how many elements were skipped, and the number of warnings."""
-    reports = [asset.report for asset in catalogue.assets(scene)]
+def _print_problems(workspace: Workspace, catalogue: Catalogue, scene: str) -> None:
+    """Prints where the scene is, each kind of warning, how many elements were skipped, and the number of warnings."""
+    by_asset = {asset.name: asset.report for asset in catalogue.assets(scene)}
+    if by_asset and (place := place_line(workspace, catalogue, scene)) is not None:
+        click.echo(place)
+    if (line := missing_textures_line(by_asset)) is not None:
+        click.echo(line)
+    for line in warning_lines(by_asset):
+        click.echo(line)
+    reports = list(by_asset.values())
     skipped = sum(sum(report.get("skipped", {}).values()) for report in reports)
     warnings = sum(warning["count"] for report in reports for warning in report.get("warnings", []) if not warning["reason"].startswith("skipped: "))
     if skipped or warnings:

@@ -1,0 +1,73 @@
+"""Lines about imports, for people: what the import reports of a scene warn about, and where on Earth the scene is."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final
+
+from map3d.catalogue import Catalogue, Workspace
+from map3d.cli.output import names_text
+
+MAX_LINES: Final = 20
+FILE: Final = "file"
+"""The scope of a warning about a whole file; its count is the number of files."""
+
+
+def warning_lines(reports: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
+    """Yields a line for each reason in the reports (asset → report): what is said of whole files first, then by count."""
+    found: dict[str, dict[str, Any]] = {}
+    for asset, report in reports.items():
+        for warning in report.get("warnings", []):
+            first = found.setdefault(warning["reason"], {**warning, "count": 0, "example": f"{asset}: {warning['example']}"})
+            first["count"] += warning["count"]
+    ordered = sorted(found.values(), key=lambda item: (item.get("scope") != FILE, -item["count"], item["reason"]))
+    yield from map(_line, ordered[:MAX_LINES])
+    if len(ordered) > MAX_LINES:
+        yield f"{len(ordered) - MAX_LINES} more kinds of warnings"
+
+
+def missing_textures_line(reports: Mapping[str, Mapping[str, Any]]) -> str | None:
+    """Returns e.g. "646 of 646 textures missing, e.g. town: ../textures/a.jpg"; None if none is missing."""
+    counts = {asset: report["textures"] for asset, report in reports.items() if report.get("textures", {}).get("missing")}
+    if not counts:
+        return None
+    missing = sum(count["missing"] for count in counts.values())
+    images = sum(report.get("textures", {}).get("images", 0) for report in reports.values())
+    asset = next(iter(counts))
+    example = next(iter(reports[asset].get("missing_files", [])), "")
+    return f"{missing:,} of {images:,} textures missing, e.g. {asset}: {example}; they must be in the given folder or below"
+
+
+def left_alone_lines(left_alone: Sequence[tuple[str, str]]) -> Iterator[str]:
+    """Yields a line for each kind of file that map3d does not read."""
+    by_reason: dict[str, list[str]] = {}
+    for file, reason in left_alone:
+        by_reason.setdefault(reason, []).append(file)
+    for reason, files in sorted(by_reason.items()):
+        yield f"left alone, since map3d does not read it: {names_text(files)} ({reason})"
+
+
+def asset_warning_lines(asset: str, report: Mapping[str, Any], limit: int = 8) -> Iterator[str]:
+    """Yields a line for each of the first warnings of one report; what is said of the whole file comes first."""
+    if (line := missing_textures_line({asset: report})) is not None:
+        yield line
+    for warning in sorted(report.get("warnings", []), key=lambda item: item.get("scope") != FILE)[:limit]:
+        yield f"{asset}: {_line(warning)}"
+
+
+def place_line(workspace: Workspace, catalogue: Catalogue, name: str) -> str | None:
+    """Returns where the content of a scene is, e.g. "place: near Munich, Germany (48.137° N, 11.575° E), ETRS89 / UTM zone 32N"; None for a scene
+    without any coordinates."""
+    from map3d.ingest.content import content_centre
+    from map3d.ingest.scene_crs import scene_place
+
+    scene = catalogue.scene(name)
+    if scene.crs is None:
+        return None
+    place = scene_place(scene, content_centre(workspace, catalogue, name))
+    return f"place: unknown; coordinates in {scene.crs.name}" if place is None else f"place: {place}, {scene.crs.name}"
+
+
+def _line(warning: Mapping[str, Any]) -> str:
+    count, reason, example = warning["count"], warning["reason"], warning["example"]
+    if warning.get("scope") != FILE:
+        return f"{count:,} × {reason}, e.g. {example}"
+    return f"{reason}: {example}" if count == 1 else f"{reason} ({count:,} files), e.g. {example}"
