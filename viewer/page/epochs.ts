@@ -1,10 +1,10 @@
 import { imageLayer, type map } from "./map3d.mjs";
 import { byId } from "./dom";
+import { requestedUrls } from "./requested";
 
 /** Base URLs of the other epochs: `?with=`, which can be repeated. A name without a slash is a sibling folder of the first rendering. */
 export function otherEpochs(base: string): string[] {
-  const requested = new URLSearchParams(location.search).getAll("with").filter((url) => url !== "");
-  return requested.map((url) => (url.includes("/") ? url : `${base.replace(/\/+$/, "")}/../${url}`));
+  return requestedUrls("with").map((url) => (url.includes("/") ? url : `${base.replace(/\/+$/, "")}/../${url}`));
 }
 
 /** Adds a slider over all epochs. Skips renderings that cannot be loaded; the map reports why. @param initial index of the epoch to show first  @param onChange called with the newly shown layer */

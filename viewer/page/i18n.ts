@@ -1,6 +1,7 @@
 const EN = {
   incomplete: "This map isn’t fully rendered yet.",
   dataSaver: "Data saver is on. Less detail is shown.",
+  foreign: "Show %?",
   search: "Search",
   searchLabel: "Search by name or address",
   results: "Search results",
@@ -78,6 +79,7 @@ type Messages = typeof EN;
 const DE: Messages = {
   incomplete: "Diese Karte ist noch nicht vollständig berechnet.",
   dataSaver: "Der Datensparmodus ist an. Es werden weniger Details angezeigt.",
+  foreign: "% anzeigen?",
   search: "Suchen",
   searchLabel: "Nach Name oder Adresse suchen",
   results: "Suchergebnisse",
@@ -153,6 +155,7 @@ const DE: Messages = {
 const FR: Messages = {
   incomplete: "Le rendu de cette carte n’est pas encore terminé.",
   dataSaver: "L’économiseur de données est activé. L’affichage est moins détaillé.",
+  foreign: "Afficher % ?",
   search: "Rechercher",
   searchLabel: "Rechercher un nom ou une adresse",
   results: "Résultats de la recherche",
@@ -250,7 +253,7 @@ export function translatePage(page: ParentNode = document): void {
   each("i18n", (element, text) => { element.textContent = text; });
   each("i18n-label", (element, text) => {
     element.setAttribute("aria-label", text);
-    if (element.title !== "") element.title = text;
+    if (element.hasAttribute("title")) element.title = text;
   });
   each("i18n-placeholder", (element, text) => { element.setAttribute("placeholder", text); });
 }

@@ -1,7 +1,7 @@
 import type { imageLayer, map } from "./map3d.mjs";
 import { byId, withText } from "./dom";
 import { message } from "./i18n";
-import { toast } from "./toast";
+import { report } from "./toast";
 
 const MAX_ROWS = 30;
 
@@ -19,7 +19,7 @@ export function bindInViewList(view: map, layer: () => imageLayer, select: (id: 
       box.hidden = false;
       button.setAttribute("aria-expanded", "true");
       (box.querySelector("button") ?? box).focus();
-    }, (reason: unknown) => { toast(String(reason)); });
+    }, (reason: unknown) => { report(reason); });
   });
   box.addEventListener("keydown", (event) => {
     if (event.key !== "Escape") return;

@@ -23,7 +23,8 @@ export class InfoPanel {
 
   /** @param showBack shows the object from behind */
   show(event: ClickEvent, showBack?: () => void): void {
-    const rows = [...this.#positionRows(event), ...Object.entries(event.attributes ?? {}).map(([name, value]) => [name, formatValue(value)] as const)];
+    const attributes = Object.entries(event.attributes ?? {}).map(([name, value]) => [name, formatValue(value)] as const);
+    const rows = [...this.#positionRows(event), ...attributes.filter(([, text]) => text !== "")];
     const list = document.createElement("dl");
     for (const [name, value] of rows) list.append(withText("dt", name), withText("dd", value));
     const kind = [event.class, event.id > 0 ? `id ${String(event.id)}` : "", event.approximate ? message("approximate") : ""];

@@ -12,15 +12,19 @@ import { bindPicture } from "./picture";
 import { bindInViewList } from "./inViewList";
 import { Selection } from "./selection";
 import { bindShare } from "./share";
-import { showFailure, toast } from "./toast";
+import { bindNetwork, report, showFailure } from "./toast";
 import { byId } from "./dom";
+import { requestedUrls } from "./requested";
 import { message, translatePage } from "./i18n";
 
 /** Base URLs of the rendering: `?rendering=` (repeat it for further hosts of the same tiles), `data-base` on `<html>`, or this folder. */
 function baseUrls(): string[] {
-  const requested = new URLSearchParams(location.search).getAll("rendering").filter((url) => url !== "");
+  const requested = requestedUrls("rendering");
   return requested.length > 0 ? requested : [document.documentElement.dataset["base"] ?? "."];
 }
+
+/** Characters. A longer title is cut. */
+const MAX_TITLE = 200;
 
 function open(): void {
   const { time, id, by, epoch = 0, ...start } = readPermalink(location.hash);
@@ -31,8 +35,11 @@ function open(): void {
   const permalink = new Permalink(view);
   const selection = new Selection(view, layer, info, permalink);
   view.on("error", ({ error }) => {
-    if (layer.rendering) toast(navigator.onLine ? error.message : message("offline"));
-    else showFailure(message("mapFailed"), error.message);
+    if (layer.rendering) report(error);
+    else {
+      showFailure(message("mapFailed"), error.message);
+      if (!navigator.onLine) addEventListener("online", () => { location.reload(); });
+    }
   });
   let tools: Tools | undefined;
   view.on("click", (event) => {
@@ -45,23 +52,23 @@ function open(): void {
     const colors = new Colors(view, layer, permalink);
     if (layer.rendering) bindPicture({ view, json: layer.rendering.json, legend: () => colors.theme });
     if (layer.rendering) bindOffline(view, layer.rendering.json.name);
-    colors.open().catch((reason: unknown) => { toast(String(reason)); });
+    colors.open().catch((reason: unknown) => { report(reason); });
     import("./map3d-controls.mjs").then(({ locate, overview }) => {
       if (layer.rendering?.json.geographic) new locate().addTo(view);
       new overview().addTo(view);
-    }, (reason: unknown) => { toast(String(reason)); });
+    }, (reason: unknown) => { report(reason); });
     if (layer.rendering?.layers.has("depth") && !view.options.dataSaver) {
-      import("./map3d-shade.mjs").then(({ shade }) => new shade().addTo(view), (reason: unknown) => { toast(String(reason)); });
-      import("./map3d-orbit.mjs").then(({ orbit }) => new orbit().addTo(view), (reason: unknown) => { toast(String(reason)); });
+      import("./map3d-shade.mjs").then(({ shade }) => new shade().addTo(view), (reason: unknown) => { report(reason); });
+      import("./map3d-orbit.mjs").then(({ orbit }) => new orbit().addTo(view), (reason: unknown) => { report(reason); });
     }
     bindEpochs(view, layer, otherEpochs(urls[0] ?? "."), epoch, (shown, index) => {
       permalink.epoch = index;
       selection.setLayer(shown);
-      colors.setLayer(shown).catch((reason: unknown) => { toast(String(reason)); });
+      colors.setLayer(shown).catch((reason: unknown) => { report(reason); });
       permalink.write();
     }).then(() => {
       if (id !== undefined) void selection.selectId(id, null, false);
-    }, (reason: unknown) => { toast(String(reason)); });
+    }, (reason: unknown) => { report(reason); });
     if (layer.rendering?.layers.has("depth")) tools = new Tools(view);
   });
   layer.addTo(view);
@@ -71,8 +78,7 @@ function open(): void {
 function bindPage(view: map, layer: imageLayer, info: InfoPanel, selection: Selection, time: Date | undefined): void {
   const json = layer.rendering?.json;
   if (!json) return;
-  document.title = json.title || json.name;
-  byId("title").textContent = json.title || json.name;
+  document.title = byId("title").textContent = (json.title || json.name).slice(0, MAX_TITLE);
   byId("incomplete").hidden = json.complete;
   byId("data-saver").hidden = !view.options.dataSaver;
   byId("settings").hidden = byId("tools").hidden = false;
@@ -91,6 +97,7 @@ function bindPage(view: map, layer: imageLayer, info: InfoPanel, selection: Sele
 
 try {
   translatePage();
+  bindNetwork();
   open();
 } catch (reason) {
   showFailure(message("pageFailed"), reason instanceof Map3dError ? reason.message : String(reason));

@@ -1,16 +1,21 @@
 import type { ClickEvent, imageLayer, map, Vec3 } from "./map3d.mjs";
 import type { InfoPanel } from "./info";
-import { toast } from "./toast";
+import { report } from "./toast";
 import { readPermalink, type Permalink } from "./permalink";
 
-
 const NOT_HIGHLIGHTED = new Set(["terrain", "ground"]);
+
+type Attributes = NonNullable<ClickEvent["attributes"]>;
+/** Returns the attributes that another object lacks. */
+const without = (attributes: Attributes = {}, other: Attributes): Attributes => Object.fromEntries(Object.entries(attributes).filter(([name]) => !Object.hasOwn(other, name)));
+
 /** The selected object: highlighted, described in the info panel and kept in the permalink. The back button returns to the previous selection. */
 export class Selection {
   readonly #view: map;
   #layer: imageLayer;
   readonly #info: InfoPanel;
   readonly #permalink: Permalink;
+  #clicks = 0;
 
   constructor(view: map, layer: imageLayer, info: InfoPanel, permalink: Permalink) {
     [this.#view, this.#layer, this.#info, this.#permalink] = [view, layer, info, permalink];
@@ -28,11 +33,31 @@ export class Selection {
     this.#layer = layer;
   }
 
-  /** Selects a clicked object. */
+  /** Selects a clicked object, or the building that it is a part of. */
   select(event: ClickEvent): void {
-    const changed = event.id !== this.#permalink.id;
-    this.#show(event);
-    this.#permalink.write(changed);
+    const number = ++this.#clicks;
+    this.#climb(event).catch((reason: unknown) => {
+      report(reason);
+      return event;
+    }).then((whole) => {
+      if (number !== this.#clicks) return;
+      const changed = whole.id !== this.#permalink.id;
+      this.#show(whole);
+      this.#permalink.write(changed);
+    }, report);
+  }
+
+  /** Returns the event for the outermost object that contains the clicked one; attributes that only the part has are added. */
+  async #climb(event: ClickEvent): Promise<ClickEvent> {
+    const above = new Set<number>([event.id]);
+    let [whole, object] = [event, await this.#layer.object(event.id)];
+    while (object && object.parent !== null && !above.has(object.parent)) {
+      const id = object.parent;
+      above.add(id);
+      object = await this.#layer.object(id);
+      if (object) whole = { ...event, id, name: object.name, class: object.class, attributes: { ...object.attributes, ...without(whole.attributes, object.attributes) } };
+    }
+    return whole;
   }
 
   /** Selects an object by its id. @param position default: the top of its bounding box  @param push adds a history entry */
@@ -40,7 +65,7 @@ export class Selection {
     const changed = id !== this.#permalink.id;
     this.#permalink.id = id;
     const object = await this.#layer.object(id).catch((reason: unknown) => {
-      toast(String(reason));
+      report(reason);
       return null;
     });
     if (this.#permalink.id !== id) return;
@@ -82,7 +107,7 @@ export class Selection {
         const middle = low && high && origin ? ([0, 1, 2] as const).map((k) => origin[k] + (low[k] + high[k]) / 2) as unknown as Vec3 : position;
         this.#view.setDirection(opposite.id);
         if (middle) this.#view.setView(middle);
-      }, (reason: unknown) => { toast(String(reason)); });
+      }, (reason: unknown) => { report(reason); });
     });
   }
 

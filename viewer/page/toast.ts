@@ -22,6 +22,27 @@ export function toast(text: string): void {
   }, DURATION_MS);
 }
 
+/** Causes of errors that have been shown. */
+const shown = new Set<string>();
+
+/** The messages of one cause differ by URL. */
+const causeOf = (text: string): string => text.replace(/\S*\/\S*/g, "");
+
+/** Shows an error, once for each cause; while the device is offline, says so instead. */
+export function report(reason: unknown): void {
+  const text = navigator.onLine ? (reason instanceof Error ? reason.message : String(reason)) : message("offline");
+  const cause = causeOf(text);
+  if (shown.has(cause)) return;
+  shown.add(cause);
+  toast(text);
+}
+
+/** Says once when the network goes, and again the next time. */
+export function bindNetwork(): void {
+  addEventListener("offline", report);
+  addEventListener("online", () => { shown.clear(); });
+}
+
 /** Shows an error in place of the map. */
 export function showFailure(title: string, reason: string): void {
   document.querySelector(".failed")?.remove();

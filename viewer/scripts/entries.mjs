@@ -10,6 +10,7 @@ export const ENTRIES = {
   model: "src/model/index.ts",
   offline: "src/offline/index.ts",
   orbit: "src/orbit/index.ts",
+  portrayal: "src/portrayal/index.ts",
   print: "src/print/index.ts",
   shade: "src/shade/index.ts",
   theme: "src/theme/index.ts",

@@ -1,3 +1,5 @@
+import { UsageError } from "./errors";
+
 /** The argument of a listener: the event's fields, its type and its source. */
 export type FiredEvent<T> = T & { type: string; target: unknown };
 /** A function that receives events. */
@@ -7,7 +9,12 @@ export type Listener<T> = (event: FiredEvent<T>) => void;
 export class Evented<E extends object> {
   readonly #listeners = new Map<keyof E, Map<unknown, Listener<never>>>();
 
-  /** Adds a listener for a type of event; adding it again has no effect. */
+  /** Its types of events; null: any. */
+  protected get eventTypes(): readonly (keyof E)[] | null {
+    return null;
+  }
+
+  /** Adds a listener for a type of event; adding it again has no effect. @throws UsageError for an unknown type */
   on<K extends keyof E>(type: K, listener: Listener<E[K]>): this {
     return this.#add(type, listener, listener);
   }
@@ -40,6 +47,9 @@ export class Evented<E extends object> {
   }
 
   #add<K extends keyof E>(type: K, handle: unknown, call: Listener<E[K]>): this {
+    const known = this.eventTypes;
+    if (known && !known.includes(type)) throw new UsageError(`unknown event "${String(type)}"; use ${known.join(", ")}`);
+    if (typeof handle !== "function") throw new UsageError(`on("${String(type)}"): expected a function as listener`);
     const listeners = this.#listeners.get(type) ?? new Map<unknown, Listener<never>>();
     this.#listeners.set(type, listeners.set(handle, call));
     return this;

@@ -1,3 +1,4 @@
+import { checkOptions, checkVector } from "../core/check";
 import { clamp, type Vec3 } from "../core/vec";
 
 /** Lambertian light: directional sunlight and ambient skylight. */
@@ -30,8 +31,11 @@ export function towardsLight({ azimuth_deg, altitude_deg }: Pick<Light, "azimuth
   return [Math.sin(azimuth) * Math.cos(altitude), Math.cos(azimuth) * Math.cos(altitude), Math.sin(altitude)];
 }
 
-/** Clamps a light's numbers to their ranges. */
+/** Clamps a light's numbers to their ranges. @throws UsageError for unknown names, and for anything but finite numbers */
 export function clampLight(light: Light): Light {
+  checkOptions(light, Object.keys(DEFAULT_LIGHT));
+  for (const name of ["azimuth_deg", "altitude_deg", "ambient", "diffuse"] as const) checkVector([light[name]], name, "a number", 1);
+  for (const name of ["sun_rgb", "sky_rgb"] as const) checkVector(light[name], name, "three numbers");
   return {
     lit: light.lit,
     azimuth_deg: ((light.azimuth_deg % 360) + 360) % 360,

@@ -4,6 +4,7 @@ import type { GeographicJson } from "./geographic";
 import { DEEPEST_LEVEL, blockRoot, makeFrame, tileName, type Frame, type FrameJson, type Tile } from "./frame";
 import { Occupancy } from "./occupancy";
 
+/** What a layer shows: spec/pyramid.md §6. */
 export type LayerKind = "color" | "normal" | "id" | "depth" | "sun" | "sun16" | "ao" | "depth2" | "picture";
 
 /** A layer listed in the manifest, such as colour. */
@@ -22,7 +23,7 @@ export interface LayerInfo {
 export interface SunJson {
   /** ISO 8601 in UTC; null when the sun was given by angles. */
   readonly time: string | null;
-  /** Clockwise from true north. */
+  /** Clockwise from true north; from grid north for an image layer of a 3D Portrayal Service. */
   readonly azimuth_deg: number;
   readonly elevation_deg: number;
   /** Unit vector towards the sun, local axes. */
@@ -72,14 +73,14 @@ export interface ManifestJson {
   size_m: number;
   layers: LayerInfo[];
   views: ViewJson[];
-  objects?: { count: number; shard_size: number; shards: string; search: string; attributes?: string; columns?: string };
+  objects?: { count: number; shard_size: number; shards: string; search?: string; attributes?: string; columns?: string };
 }
 
 /** A view of a rendering: its frame, its occupied tiles and the versions of its blocks. */
 export interface View {
   readonly id: string;
   readonly frame: Frame;
-  readonly occupancy: Occupancy;
+  readonly occupancy: Pick<Occupancy, "has">;
   readonly archives: Readonly<Record<string, string>> | undefined;
   /** Returns the version of the block that holds a layer's tile. */
   versionOf(tile: Tile, layer: LayerInfo): number;

@@ -1,3 +1,4 @@
+import { checkNumber, checkVector } from "../core/check";
 import { asError, UsageError } from "../core/errors";
 import { Evented } from "../core/events";
 import { add, clamp, dot, boxCenter, sub, type Box3, type Vec2, type Vec3 } from "../core/vec";
@@ -9,7 +10,7 @@ import { findIncompatibility } from "./compatibility";
 import { findNeighbourView, findTiltedView } from "./neighbourViews";
 import { limitCamera, computeZoomLimits } from "./limits";
 import { Motion } from "./motion";
-import type { FilledOptions, MapEvents } from "./options";
+import { EVENTS, type FilledOptions, type MapEvents } from "./options";
 import type { ViewState } from "./layerContext";
 import type { ViewTransition } from "./viewTransition";
 import type { Size } from "./viewport";
@@ -50,6 +51,10 @@ export abstract class CameraController extends Evented<MapEvents> {
   /** Finds the world position of the surface at the screen's centre, if it is in memory. */
   protected abstract findCenterSurface(viewState: ViewState): Vec3 | null;
 
+  protected override get eventTypes(): readonly (keyof MapEvents)[] {
+    return EVENTS;
+  }
+
   /** World position of the surface at the screen's centre if known, else of the ground there; null before "ready". */
   get center(): Vec3 | null {
     const viewState = this.getViewState();
@@ -86,23 +91,28 @@ export abstract class CameraController extends Evented<MapEvents> {
     return [...(this.reference?.views.values() ?? [])].map(({ frame }) => frame);
   }
 
-  /** Centres the map on a world position, at once. */
+  /** Centres the map on a world position, at once. @throws UsageError for anything but three numbers, and a number */
   setView(position: Vec3, zoom?: number): this {
+    checkView(position, zoom);
     return this.#moveTo((camera, rendering) => centerCamera(camera, rendering, position, zoom), 0);
   }
 
   /** Flies to a world position; jumps there if the user prefers reduced motion. */
   flyTo(position: Vec3, zoom?: number, { duration_ms = FLIGHT_MS }: { duration_ms?: number } = {}): this {
+    checkView(position, zoom);
     return this.#moveTo((camera, rendering) => centerCamera(camera, rendering, position, zoom), duration_ms);
   }
 
   /** Fits a box of world coordinates into the map. */
   fitBounds([low, high]: Box3, { padding_px = 24, duration_ms = 0, maxZoom = Infinity }: FitOptions = {}): this {
+    for (const corner of [low, high]) checkVector(corner, "fitBounds");
+    for (const number of [padding_px, maxZoom]) checkNumber(number, "fitBounds");
     return this.#moveTo((camera, { json: { origin } }) => fitCamera(camera, [sub(low, origin), sub(high, origin)], padding_px, maxZoom), duration_ms);
   }
 
   /** Sets the zoom at once, about the screen's centre and within `zoomLimits`. */
   setZoom(zoom: number): this {
+    checkVector([zoom], "zoom", "a number", 1);
     return this.#moveTo((camera) => ({ ...camera, zoom }), 0);
   }
 
@@ -118,6 +128,7 @@ export abstract class CameraController extends Evented<MapEvents> {
 
   /** Zooms smoothly by levels about a point of the screen; default: its centre. */
   zoomBy(delta: number, anchor: Vec2 = this.screenCenter()): this {
+    checkVector([delta, ...anchor], "zoomBy", "levels, and [x, y] in CSS pixels");
     const camera = this.camera;
     if (!camera) return this;
     if (prefersReducedMotion()) return this.setCamera(zoomedAt(camera, clamp(camera.zoom + delta, ...this.zoomLimits), anchor));
@@ -133,6 +144,7 @@ export abstract class CameraController extends Evented<MapEvents> {
 
   /** Moves the picture by CSS pixels, at once or smoothly. */
   panBy(dx: number, dy: number, { smooth = false }: { smooth?: boolean } = {}): this {
+    checkVector([dx, dy], "panBy", "two numbers of CSS pixels", 2);
     return this.camera ? this.#moveTo((camera) => panCamera(camera, dx, dy), smooth ? STEP_MS : 0, smooth) : this;
   }
 
@@ -160,11 +172,13 @@ export abstract class CameraController extends Evented<MapEvents> {
 
   /** Projects a world position to CSS pixels; null before "ready". */
   project(world: Vec3): Vec2 | null {
+    checkVector(world, "project");
     return this.camera && this.reference ? screenFromLocal(this.transitionCamera ?? this.camera, sub(world, this.reference.json.origin)) : null;
   }
 
   /** Returns the world position under CSS pixels on the ground (the height of the content's lowest point); null in level views. */
   unproject(point: Vec2): Vec3 | null {
+    checkVector(point, "unproject", "[x, y] in CSS pixels", 2);
     return this.camera && this.reference ? findGround(this.camera, this.reference, point) : null;
   }
 
@@ -176,6 +190,7 @@ export abstract class CameraController extends Evented<MapEvents> {
 
   /** Converts longitude and latitude to world x and y; null as with lonLat. */
   fromLonLat(lonLat: Vec2): Vec2 | null {
+    checkVector(lonLat, "fromLonLat", "[longitude, latitude] in degrees", 2);
     const json = this.reference?.json;
     if (!json?.geographic) return null;
     const [x, y] = localFromLonLat(json.geographic, lonLat);
@@ -329,6 +344,11 @@ export abstract class CameraController extends Evented<MapEvents> {
     this.transition?.start(camera, center ? sub(center, rendering.json.origin) : boxCenter(rendering.json.box));
     this.fire("directionchange", { direction: view.id });
   }
+}
+
+function checkView(position: Vec3, zoom: number | undefined): void {
+  checkVector(position, "setView");
+  checkNumber(zoom, "zoom");
 }
 
 /** Whether the user prefers reduced motion. */

@@ -1,3 +1,4 @@
+import { checkNumber, checkOptions } from "../core/check";
 import { MapLayer } from "../core/mapLayer";
 import { asError, UsageError } from "../core/errors";
 import type { Vec2 } from "../core/vec";
@@ -14,7 +15,7 @@ import { HttpSource, type Source } from "../tiles/source";
 import { LayerTiles } from "../tiles/layerTiles";
 import { findMatchingView } from "./compatibility";
 import { computeDepthRange, makeDepthMapping, planLayer, type LayerPlan } from "./layerPlan";
-import { makeDrawStyles, isHidden, type ObjectStyle } from "./objectStyle";
+import { inherit, makeDrawStyles, isHidden, listStyledIds, type ObjectStyle } from "./objectStyle";
 import type { ImageLayerHost, LayerContext, ViewState } from "./layerContext";
 
 /** Options of an image layer. */
@@ -51,26 +52,36 @@ export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
   #rendering: Rendering | undefined;
   #objects: Objects | undefined;
   #colors: ReadonlyMap<number, Rgb> = new Map();
+  #style: ObjectStyle = {};
   #drawStyles: DrawStyles | null = null;
-  /** The colours of #colors whose objects are not hidden. */
+  /** Descendants of the objects in #colors and #style; none while they are loading. */
+  #descendants = new Map<number, readonly number[]>();
+  /** The colours of #colors and their descendants, without hidden objects. */
   #shownColors: ReadonlyMap<number, Rgb> = new Map();
   #clip: Clip | null = null;
   /** Whether loading the manifest has failed. */
   #failed = false;
 
-  /** @param urls base URLs, or another source  @throws UsageError without a URL, or for an unknown mode */
+  /** @param urls base URLs, or another source  @throws UsageError without a URL, or for an unknown option or mode */
   constructor(urls: string | readonly string[] | Source, options: ImageLayerOptions = {}) {
     super();
+    checkOptions(options, ["mode", "opacity", "highlightColor", "attribution", "combine"]);
+    checkNumber(options.opacity, "opacity");
     this.options = { mode: "lit", opacity: 1, highlightColor: "#e4572e", combine: true, ...options };
     this.#mode = checkMode(this.options.mode);
-    this.source = typeof urls === "object" && "tile" in urls ? urls : new HttpSource(urls);
+    this.source = typeof urls === "object" && "tile" in ((urls as object | null) ?? {}) ? urls as Source : new HttpSource(urls as string);
   }
 
   /** @internal Makes a layer of the same rendering with the same styles, for another map. */
   copy(): imageLayer {
     const copy = new imageLayer(this.source, { ...this.options, mode: this.#mode });
-    copy.#drawStyles = this.#drawStyles;
+    copy.#style = this.#style;
+    copy.#descendants = new Map(this.#descendants);
     return copy.#setColors(this.#colors);
+  }
+
+  protected override get eventTypes(): readonly (keyof ImageLayerEvents)[] {
+    return ["ready", "error"];
   }
 
   /** The checked manifest; undefined until it has loaded. */
@@ -97,7 +108,7 @@ export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
 
   /** Sets the opacity, 0 to 1. */
   setOpacity(opacity: number): this {
-    this.options.opacity = Math.min(Math.max(opacity, 0), 1);
+    this.options.opacity = Math.min(Math.max(checkNumber(opacity, "opacity"), 0), 1);
     return this.#redraw();
   }
 
@@ -117,7 +128,7 @@ export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
     return this.#clip;
   }
 
-  /** Highlights objects in a colour (#rrggbb), in addition to those already highlighted. */
+  /** Highlights objects and their descendants in a colour (#rrggbb), in addition to those already highlighted. */
   highlight(ids: number | Iterable<number>, { color = this.options.highlightColor }: { color?: string } = {}): this {
     const rgb = parseColor(color);
     const colors = new Map(this.#colors);
@@ -138,7 +149,9 @@ export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
 
   /** Tints, dims and hides objects; replaces the previous style. {} resets all. @throws UsageError for an invalid colour */
   setStyle(style: ObjectStyle): this {
-    this.#drawStyles = makeDrawStyles(style);
+    const kept = { ...style, ...(style.only && { only: [...style.only] }), ...(style.hidden && { hidden: [...style.hidden] }) };
+    makeDrawStyles(kept); // fails before anything changes
+    this.#style = kept;
     return this.#setColors(this.#colors);
   }
 
@@ -268,14 +281,44 @@ export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
 
   #setColors(colors: ReadonlyMap<number, Rgb>): this {
     this.#colors = colors;
-    this.#shownColors = new Map([...colors].filter(([id]) => !this.isHidden(id)));
+    this.#findDescendants();
+    return this.#applyStyle();
+  }
+
+  #applyStyle(): this {
+    this.#drawStyles = makeDrawStyles(this.#style, this.#descendants);
+    const all = new Map(this.#colors);
+    inherit(all, this.#descendants);
+    this.#shownColors = new Map([...all].filter(([id]) => !this.isHidden(id)));
     return this.#redraw();
+  }
+
+  /** Fetches the descendants of highlighted and styled objects, once, and shows them when they are known. */
+  #findDescendants(): void {
+    const [objects, known] = [this.#objects, this.#descendants];
+    const missing = [...new Set([...this.#colors.keys(), ...listStyledIds(this.#style)])].filter((id) => !known.has(id)).sort((a, b) => a - b);
+    if (!objects || missing.length === 0) return;
+    for (const id of missing) known.set(id, []);
+    const find = async (): Promise<void> => {
+      const found = [];
+      for (const id of missing) {
+        const below = await objects.descendants(id);
+        if (below.length > 0) found.push([id, below] as const);
+      }
+      for (const [id, below] of found) known.set(id, below);
+      if (found.length > 0) this.#applyStyle();
+    };
+    find().catch((reason: unknown) => {
+      for (const id of missing) known.delete(id);
+      this.#context?.report(asError(reason));
+    });
   }
 
   #start(rendering: Rendering, context: LayerContext): void {
     context.checkCompatible(rendering);
     this.#rendering = rendering;
     this.#objects = new Objects(this.source, rendering.json);
+    this.#findDescendants();
     context.onManifest(rendering);
     this.#checkLayers();
     this.fire("ready", { rendering });

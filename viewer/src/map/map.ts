@@ -1,3 +1,4 @@
+import { checkNumber, checkOptions, checkVector } from "../core/check";
 import { adoptStyles, element } from "../core/dom";
 import { asError, UsageError } from "../core/errors";
 import { Evented } from "../core/events";
@@ -22,7 +23,7 @@ import { Gestures, type GestureTarget } from "./gestures";
 import { imageLayer } from "./imageLayer";
 import { findVisibleObjects, type VisibleObject } from "./visibleObjects";
 import { listenToKeys } from "./keyboard";
-import { DEFAULTS, savesData, type ClickEvent, type FilledOptions, type MapOptions } from "./options";
+import { DEFAULTS, OPTIONS, savesData, type ClickEvent, type FilledOptions, type MapOptions } from "./options";
 import { FrameRenderer } from "./frameRenderer";
 import { EMPTY_PICK, pickExactly, pickLoaded, type Pick } from "./picker";
 import { Relief } from "./relief";
@@ -58,9 +59,12 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   #nameCount = 0;
   #hoverPoint: Vec2 | null = null;
 
-  /** @param target the id of a canvas, or an element  @throws UsageError when there is none */
+  /** @param target the id of a canvas, or an element  @throws UsageError when there is none, when it has a map already, and for unknown or wrong options */
   constructor(target: string | HTMLElement, options: MapOptions = {}) {
     super();
+    checkOptions(options, OPTIONS);
+    if (options.center) checkVector(options.center, "center");
+    for (const name of ["zoom", "pixelRatio", "maxPixelRatio", "cacheBytes", "concurrency", "workers"] as const) checkNumber(options[name], name);
     const { dataSaver = DEFAULTS.dataSaver } = options;
     this.options = { ...DEFAULTS, ...options, dataSaver: dataSaver === "auto" ? savesData() : dataSaver };
     const withoutShadows = this.options.dataSaver ? { shadows: false, occlusion: false } : {};
@@ -172,6 +176,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
 
   /** Sets the light to a time at the scene's position: the colours of the day, and shadows where the rendering has them. */
   setTime(time: Date): this {
+    checkVector([time instanceof Date ? time.getTime() : NaN], "setTime", "a valid Date", 1);
     return this.whenReady((_, { json }) => {
       if (!json.geographic) throw new UsageError(`cannot locate rendering "${json.name}" on earth, so the sun's position is unknown; use setLight instead`);
       this.#time = time;

@@ -61,6 +61,11 @@ export const DEFAULTS: Required<Omit<MapOptions, WithoutDefault>> = {
   finer: 0,
 };
 
+export const OPTIONS: readonly string[] = [...Object.keys(DEFAULTS), "center", "zoom", "direction", "light", "background", "language", "pixelRatio", "cacheBytes"];
+
+/** Types of a map's events. */
+export const EVENTS: readonly (keyof MapEvents)[] = ["ready", "load", "idle", "move", "moveend", "zoom", "directionchange", "lightchange", "preclick", "click", "mousemove", "select", "resize", "error", "contextlost", "contextrestored", "remove"];
+
 /** Whether the user wants to save data (Save-Data, or prefers-reduced-data). */
 export const savesData = (): boolean =>
   (navigator as { connection?: { saveData?: boolean } }).connection?.saveData === true || matchMedia("(prefers-reduced-data: reduce)").matches;

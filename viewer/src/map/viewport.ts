@@ -9,6 +9,8 @@ export interface Size {
   readonly dpr: number;
 }
 
+/** Containers of maps. */
+const containers = new WeakSet<Element>();
 const LAYOUT_PROPERTIES = ["top", "right", "bottom", "left", "z-index", "flex-grow", "flex-shrink", "flex-basis", "align-self", "justify-self", "grid-area", "order"];
 
 /** The map in the page: the canvas, wrapped in a container that replaces it in the layout. */
@@ -23,9 +25,11 @@ export class Viewport {
 
   /** @param target a canvas or another element, or its id  @throws UsageError */
   constructor(target: string | HTMLElement, resized: () => void) {
-    const found = typeof target === "string" ? document.getElementById(target) : target;
-    if (!found) throw new UsageError(`no element has the id "${typeof target === "string" ? target : ""}"; pass the id of a <canvas> in the page`);
+    const found = (typeof target === "string" ? document.getElementById(target) : target) as HTMLElement;
+    if (!(found as Partial<Node> | null)?.nodeType) throw new UsageError(`${typeof target === "string" ? `no element has the id "${target}"` : "not an element"}; pass a <canvas> of the page, or its id`);
+    if (containers.has(found) || (found instanceof HTMLCanvasElement && found.parentElement && containers.has(found.parentElement))) throw new UsageError(`the element "${found.id}" has a map already; call its remove() first, or use another element`);
     ({ container: this.container, canvas: this.#canvas, unwrap: this.#unwrap } = found instanceof HTMLCanvasElement ? wrapCanvas(found) : fillElement(found));
+    containers.add(this.container);
     this.container.append(this.overlayPane, this.controlPane);
     this.#size = this.#measure();
     this.#observer = new ResizeObserver(() => {
@@ -62,6 +66,7 @@ export class Viewport {
 
   destroy(): void {
     this.#observer.disconnect();
+    containers.delete(this.container);
     this.overlayPane.remove();
     this.controlPane.remove();
     this.#unwrap(this.#canvas);

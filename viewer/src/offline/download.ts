@@ -96,7 +96,7 @@ export async function downloadArea(shown: map, options: DownloadOptions = {}): P
 /** Opens the map's renderings and reads their current manifests. */
 async function openRenderings(shown: map, cache?: OfflineCache): Promise<OfflineRendering[]> {
   return Promise.all(shown.layers.filter(({ rendering }) => rendering).map(async ({ source: original }) => {
-    if (!(original instanceof HttpSource)) throw new UsageError("only renderings from URLs can be saved; this one comes from local files");
+    if (!(original instanceof HttpSource)) throw new UsageError("only renderings from URLs can be saved; this layer has another source");
     const source = new HttpSource(original.bases, cache?.fetch);
     return { source, rendering: await source.manifest() };
   }));
@@ -184,7 +184,7 @@ async function saveObjects(renderings: readonly OfflineRendering[], collector: S
       const wanted = new Set(numbers.map((shard) => Math.floor((shard * objects.shard_size) / (file?.shard_size ?? 1))));
       for (const name of file?.pages ?? file?.shards?.filter((shard) => wanted.has(shard)) ?? []) await save(path.replace(/\.json$/, `/${String(name)}.json`));
     };
-    await runParallel([objects.search, ...columns, ...shards].values(), concurrency, save);
+    await runParallel([...(objects.search === undefined ? [] : [objects.search]), ...columns, ...shards].values(), concurrency, save);
   }
 }
 

@@ -1,3 +1,4 @@
+import { checkOptions } from "../core/check";
 import { element } from "../core/dom";
 import type { OverlayHost } from "../core/overlayHost";
 import type { Vec2, Vec3 } from "../core/vec";
@@ -41,11 +42,17 @@ export class marker extends PositionedLayer<MarkerEvents> {
   #popup: popup | undefined;
   #selected = false;
 
+  /** @throws UsageError for a position that is not three numbers, or an unknown option */
   constructor(label: string, position: Vec3, options: MarkerOptions = {}) {
     super(position);
+    checkOptions(options, ["color", "showLabel", "icon", "occlusion", "draggable"]);
     this.options = { showLabel: true, occlusion: "none", draggable: false, ...options };
     this.needs = this.options.draggable || this.options.occlusion !== "none" ? ["depth"] : [];
     this.#label = label;
+  }
+
+  protected override get eventTypes(): readonly (keyof MarkerEvents)[] {
+    return ["click", "select", "deselect", "dragstart", "drag", "dragend"];
   }
 
   /** Label text. */
@@ -67,8 +74,9 @@ export class marker extends PositionedLayer<MarkerEvents> {
 
   /** Sets the position (world coordinates); its popup follows. */
   override setPosition(position: Vec3): this {
+    super.setPosition(position);
     this.#popup?.setPosition(position);
-    return super.setPosition(position);
+    return this;
   }
 
   /** @internal Shows it this many CSS pixels away from its position. */

@@ -1,3 +1,4 @@
+import { checkOptions } from "../core/check";
 import { element, iconButton } from "../core/dom";
 import { getMapMessages } from "../core/i18n";
 import type { OverlayHost } from "../core/overlayHost";
@@ -30,11 +31,16 @@ export class popup extends PositionedLayer<PopupEvents> {
 
   constructor(content: string | Node, position: Vec3 = [0, 0, 0], options: PopupOptions = {}) {
     super(position);
+    checkOptions(options, ["offset_px", "closeButton"]);
     this.options = { offset_px: 14, closeButton: true, ...options };
     this.#body = element("div", "map3d-popup-body");
     this.#box = element("div", "map3d-popup", { role: "dialog" }, this.#body);
     if (this.options.closeButton) this.#addCloseButton();
     this.setContent(content);
+  }
+
+  protected override get eventTypes(): readonly (keyof PopupEvents)[] {
+    return ["open", "close"];
   }
 
   /** Whether it is on a map. */

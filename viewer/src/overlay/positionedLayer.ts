@@ -1,3 +1,4 @@
+import { checkVector } from "../core/check";
 import { MapLayer } from "../core/mapLayer";
 import type { OverlayEvents, OverlayHost } from "../core/overlayHost";
 import type { Vec3 } from "../core/vec";
@@ -11,7 +12,7 @@ export abstract class PositionedLayer<E extends object> extends MapLayer<Overlay
 
   constructor(position: Vec3) {
     super();
-    this.#position = position;
+    this.#position = checkVector(position, "position");
   }
 
   /** World coordinates. */
@@ -19,9 +20,9 @@ export abstract class PositionedLayer<E extends object> extends MapLayer<Overlay
     return this.#position;
   }
 
-  /** World coordinates. */
+  /** World coordinates. @throws UsageError for anything but three numbers */
   setPosition(position: Vec3): this {
-    this.#position = position;
+    this.#position = checkVector(position, "setPosition");
     this.#update();
     return this;
   }

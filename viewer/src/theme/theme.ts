@@ -145,6 +145,6 @@ export class theme extends MapLayer<map, ThemeEvents> {
     this.#pressed = chosen;
     this.#chosen = this.#classes.filter((_, k) => chosen.size === 0 || chosen.has(k));
     const colors = new Map(this.#chosen.flatMap(({ ids, color }) => ids.map((id) => [id, color] as const)));
-    this.#layer.setStyle({ colors, only: colors.keys(), others: this.options.others ?? "dimmed" });
+    this.#layer.setStyle({ colors, only: colors.keys(), others: this.options.others ?? "dimmed", descendants: false }); // its values are inherited already
   }
 }

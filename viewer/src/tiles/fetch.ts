@@ -1,37 +1,30 @@
 import { FetchError } from "../core/errors";
+import { FailedAttempt, isTransientStatus, retry, type RetryOptions } from "../core/retry";
 
 /** The browser's fetch, or a replacement for it. */
 export type FetchFunction = (url: string, init: RequestInit) => Promise<Response>;
 
-export interface FetchOptions {
-  signal?: AbortSignal | undefined;
+export interface FetchOptions extends RetryOptions {
   /** First byte and number of bytes. */
   range?: readonly [number, number] | undefined;
-  /** Maximum number of attempts. Default 4. */
-  attempts?: number | undefined;
-  /** Wait before the second attempt; doubles each time. Default 250. */
-  backoff_ms?: number | undefined;
   /** Default: the browser's fetch. */
   fetch?: FetchFunction | undefined;
 }
 
 /**
- * Fetches bytes; null for 204 (no content). Retries network errors, 429 and 5xx with growing waits, each time at the next
- * of `urls`.
+ * Fetches bytes; null for 204 (no content). Retries network errors, 429 and 5xx other than 501 with growing waits, each time at the next
+ * of `urls`. Without a network there is one attempt, which a cache may answer.
  * @throws FetchError with the status; the signal's reason when aborted.
  */
-export async function fetchBytes(urls: readonly string[], options: FetchOptions = {}): Promise<ArrayBuffer | null> {
-  const { attempts = 4, backoff_ms = 250 } = options;
-  for (let attempt = 0; ; attempt++) {
-    const url = urls[attempt % urls.length] ?? "";
+export function fetchBytes(urls: readonly string[], options: FetchOptions = {}): Promise<ArrayBuffer | null> {
+  return retry(async (failed) => {
     try {
-      return await fetchOnce(url, options);
+      return await fetchOnce(urls[failed % urls.length] ?? "", options);
     } catch (reason) {
       options.signal?.throwIfAborted();
-      if (attempt + 1 >= attempts || !isTransient(reason)) throw reason;
+      return new FailedAttempt(reason, isTransient(reason));
     }
-    await wait(backoff_ms * 2 ** attempt, options.signal);
-  }
+  }, options);
 }
 
 export async function fetchJson(urls: readonly string[], options: FetchOptions = {}): Promise<unknown> {
@@ -60,19 +53,5 @@ async function fetchOnce(url: string, { signal, range, fetch: request = fetch }:
 
 function isTransient(reason: unknown): boolean {
   const status = reason instanceof FetchError ? reason.status : 0;
-  return status === 0 || status === 429 || status >= 500;
-}
-
-function wait(ms: number, signal: AbortSignal | undefined): Promise<void> {
-  return new Promise((resolve, reject) => {
-    const stop = (): void => {
-      clearTimeout(timer);
-      reject(signal?.reason as Error);
-    };
-    const timer = setTimeout(() => {
-      signal?.removeEventListener("abort", stop);
-      resolve();
-    }, ms);
-    signal?.addEventListener("abort", stop, { once: true });
-  });
+  return status === 0 || isTransientStatus(status);
 }

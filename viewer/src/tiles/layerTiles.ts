@@ -1,4 +1,5 @@
 import { asError, DecodeError, FetchError } from "../core/errors";
+import { hasServiceWorker, isOffline } from "../core/network";
 import { tileName, type Tile } from "../geo/frame";
 import type { LayerInfo, View } from "../geo/manifest";
 import type { Cache } from "./cache";
@@ -11,7 +12,7 @@ import { computeBytes, type TileData } from "./tileData";
 export interface CachedTile {
   data: TileData | null;
   readonly empty: boolean;
-  /** Bytes received, and when (performance.now). */
+  /** Bytes received (0 if the source decodes), and when (performance.now). */
   readonly transfer: { readonly bytes: number; readonly at_ms: number };
 }
 
@@ -21,17 +22,35 @@ export interface TileResources {
   readonly decoder: Decoder;
 }
 
-const RETRY_AFTER_MS = 15_000;
+/** Waits before a failed tile is requested again, and before a server that does not answer is: the first, doubled with each failure, and the longest. */
+const [TILE_WAIT_MS, SERVER_WAIT_MS, LONGEST_WAIT_MS] = [15_000, 1000, 240_000];
+
+/** A failed tile. */
+interface Failure {
+  readonly error: Error;
+  readonly count: number;
+  /** When it may be requested again, performance.now. */
+  readonly retry_ms: number;
+}
+
+/** Computes when to try again after a number of failures; without a network, never: see `clearFailures`. */
+const computeRetry = (first_ms: number, count: number): number => (isOffline() ? Infinity : performance.now() + Math.min(first_ms * 2 ** (count - 1), LONGEST_WAIT_MS));
 
 /** Fetches, decodes and keeps the tiles of one image layer. */
 export class LayerTiles {
   readonly #name: string;
   readonly #source: Source;
   readonly #resources: TileResources;
-  readonly #failed = new Map<string, { readonly at_ms: number; readonly error: Error }>();
+  readonly #failed = new Map<string, Failure>();
+  /** Causes that have been reported. */
+  readonly #reported = new Set<string>();
+  /** Keys of the tiles that are being fetched. */
+  readonly #loading = new Set<string>();
+  /** While the server does not answer: the number of tries in a row, and when the next is due. */
+  #silence = { tries: 0, retry_ms: 0 };
   readonly #onArrival: (error: Error | null) => void;
 
-  /** @param name unique on the map  @param onArrival called after each tile, with the error if it failed */
+  /** @param name unique on the map  @param onArrival called when a frame may show more, with the error if a tile failed for a new reason */
   constructor(name: string, source: Source, resources: TileResources, onArrival: (error: Error | null) => void) {
     this.#name = name;
     this.#source = source;
@@ -61,15 +80,21 @@ export class LayerTiles {
     loaded.data = null;
   }
 
-  /** Whether fetching a tile failed a short time ago. */
+  /** Whether a tile is not requested now, since it failed a short time ago, or the server does not answer. */
   hasFailed(view: View, layer: LayerInfo, tile: Tile): boolean {
-    const failure = this.#failed.get(this.key(view, layer, tile));
-    return failure !== undefined && performance.now() - failure.at_ms < RETRY_AFTER_MS;
+    const key = this.key(view, layer, tile);
+    return !this.#loading.has(key) && (this.#isSilent || performance.now() < (this.#failed.get(key)?.retry_ms ?? 0));
   }
 
   /** Forgets failures, so that their tiles are requested again. */
   clearFailures(): void {
     this.#failed.clear();
+    this.#reported.clear();
+    this.#silence = { tries: 0, retry_ms: 0 };
+  }
+
+  get #isSilent(): boolean {
+    return performance.now() < this.#silence.retry_ms;
   }
 
   makeRequest(view: View, layer: LayerInfo, tile: Tile): TileRequest {
@@ -82,6 +107,7 @@ export class LayerTiles {
     if (!view.occupancy.has(tile)) return null;
     const cached = this.get(view, layer, tile);
     if (cached && (cached.data || cached.empty)) return cached.data;
+    if (this.#isSilent) throw new FetchError(`${this.key(view, layer, tile)}: the server does not answer`);
     await this.#resources.queue.runNow(this.makeRequest(view, layer, tile));
     const loaded = this.get(view, layer, tile);
     if (!loaded) throw this.#failed.get(this.key(view, layer, tile))?.error ?? new FetchError(`${this.key(view, layer, tile)}: the request was aborted`);
@@ -89,23 +115,44 @@ export class LayerTiles {
   }
 
   async #load(key: string, view: View, layer: LayerInfo, tile: Tile, signal: AbortSignal): Promise<void> {
+    if (this.#isSilent) return;
+    const { tries } = this.#silence;
+    if (tries > 0) this.#waitForServer(tries); // the first request alone finds out whether the server answers again
+    this.#loading.add(key);
     try {
-      const bytes = await this.#source.tile(view, layer, tile, signal);
+      const found = await this.#source.tile(view, layer, tile, signal);
+      const [bytes, decoded] = found && "kind" in found ? [null, found] : [found, null];
       const transfer = { bytes: bytes?.byteLength ?? 0, at_ms: performance.now() }; // the bytes move to another thread
-      const data = bytes && (await this.#resources.decoder.decode(layer.kind, layer.media_type, bytes));
+      const data = bytes ? await this.#resources.decoder.decode(layer.kind, layer.media_type, bytes) : decoded;
       if (signal.aborted) {
         if (data && "bitmap" in data) data.bitmap.close();
         return;
       }
       this.#resources.cache.set(key, { data, empty: !data, transfer }, data ? computeBytes(data) * (data.kind === "id" || data.kind === "depth" ? 2 : 1) : 64);
       this.#failed.delete(key);
+      this.#silence = { tries: 0, retry_ms: 0 };
       this.#onArrival(null);
     } catch (reason) {
       if (signal.aborted) return;
       const name = `tile ${view.id}/${layer.name}/${tileName(tile)}`;
       const error = reason instanceof DecodeError ? new DecodeError(`${name}: ${reason.message}`) : asError(reason);
-      this.#failed.set(key, { at_ms: performance.now(), error });
-      this.#onArrival(error);
+      const count = (this.#failed.get(key)?.count ?? 0) + 1;
+      this.#failed.set(key, { error, count, retry_ms: computeRetry(TILE_WAIT_MS, count) });
+      if (error instanceof FetchError && error.status === 0 && !hasServiceWorker() && tries === this.#silence.tries) this.#waitForServer(tries + 1);
+      // The same cause has many messages, which differ by URL.
+      const cause = error.name + error.message.replace(/\S*\/\S*/g, "");
+      const known = this.#reported.has(cause);
+      this.#reported.add(cause);
+      this.#onArrival(known ? null : error);
+    } finally {
+      this.#loading.delete(key);
     }
+  }
+
+  /** Requests nothing for a while, which is longer after each try. */
+  #waitForServer(tries: number): void {
+    const retry_ms = computeRetry(SERVER_WAIT_MS, tries);
+    this.#silence = { tries, retry_ms };
+    if (retry_ms < Infinity) setTimeout(() => { this.#onArrival(null); }, retry_ms - performance.now());
   }
 }

@@ -12,6 +12,8 @@ export interface ObjectInfo {
   readonly class: string;
   /** Id of the object that contains it. */
   readonly parent: number | null;
+  /** Ids of the objects that it contains, such as a building's parts. */
+  readonly children?: readonly number[];
   /** The asset that it comes from. */
   readonly asset?: string;
   /** Local coordinates. */
@@ -98,6 +100,14 @@ export class Objects {
     if (!objects || id <= 0) return null;
     const shard = await this.#fetchShard(Math.floor(id / objects.shard_size), objects.shards);
     return Object.hasOwn(shard, String(id)) ? (shard[String(id)] ?? null) : null;
+  }
+
+  /** Returns the objects that an object contains, and those that they contain. */
+  async descendants(id: number): Promise<number[]> {
+    const found = new Set([id]);
+    for (const known of found) for (const child of (await this.find(known))?.children ?? []) found.add(child);
+    found.delete(id);
+    return [...found];
   }
 
   /**

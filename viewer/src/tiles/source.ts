@@ -3,6 +3,7 @@ import type { Tile } from "../geo/frame";
 import { readManifest, type LayerInfo, type Rendering, type View } from "../geo/manifest";
 import { fetchBytes, fetchJson, type FetchFunction, type FetchOptions } from "./fetch";
 import { Archive } from "./pmtiles";
+import type { TileData } from "./tileData";
 import { normalizeBaseUrl, tileUrls } from "./url";
 
 /** The origin of a rendering: its manifest, the files next to it, and its encoded tiles. Several layers may share one. */
@@ -11,8 +12,8 @@ export interface Source {
   manifest(signal?: AbortSignal): Promise<Rendering>;
   /** Returns a parsed file from the manifest's folder; null when it does not exist. @throws FetchError */
   json(path: string): Promise<unknown>;
-  /** Returns the encoded tile, owned by the caller; null when it is empty. @throws FetchError, or the signal's reason */
-  tile(view: View, layer: LayerInfo, tile: Tile, signal?: AbortSignal): Promise<ArrayBuffer | null>;
+  /** Returns the tile, encoded or decoded, owned by the caller; null when it is empty. @throws FetchError, or the signal's reason */
+  tile(view: View, layer: LayerInfo, tile: Tile, signal?: AbortSignal): Promise<ArrayBuffer | TileData | null>;
 }
 
 /** Reads a rendering over HTTP: tiles spread over several hosts, or archives if the manifest lists them. */
@@ -24,8 +25,8 @@ export class HttpSource implements Source {
 
   /** @param fetch replaces the browser's fetch  @throws UsageError without a URL */
   constructor(urls: string | readonly string[], fetch?: FetchFunction) {
-    const list = typeof urls === "string" ? [urls] : urls;
-    if (list.length === 0) throw new UsageError("an imageLayer needs at least one base URL, e.g. \"https://host/tiles/teatime\"");
+    const list = (typeof urls === "string" ? [urls] : Array.isArray(urls) ? urls : []) as string[];
+    if (list.length === 0 || !list.every((url) => typeof url === "string" && url !== "")) throw new UsageError("an imageLayer needs at least one base URL, e.g. \"https://host/tiles/teatime\"");
     this.bases = list.map((url) => normalizeBaseUrl(url, document.baseURI));
     this.#fetch = fetch;
   }

@@ -1,5 +1,5 @@
 import { DecodeError } from "../core/errors";
-import { decodePng } from "./png";
+import { decodePng } from "../core/png";
 
 /** A decoded tile; rows from the top. */
 export type TileData =

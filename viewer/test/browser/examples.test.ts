@@ -11,7 +11,7 @@ import { VIEWER } from "./package";
 const bed = new TestBed({ town: renderTown() });
 const FOLDER = join(VIEWER, "examples");
 const FILES = readdirSync(FOLDER).filter((file) => file.endsWith(".html"));
-const ORDER = ["shortest", "markers", "attributes", "theme", "measure", "sun", "search", "company", "styles", "link", "model", "files"];
+const ORDER = ["shortest", "markers", "attributes", "theme", "measure", "sun", "search", "company", "styles", "link", "model", "files", "portrayal"];
 const COLOURS = 24;
 
 /** Counts the colours in a part of the page: a map that shows something has many. */
@@ -122,6 +122,16 @@ const POINTS: Readonly<Record<string, (page: Page, picture: Buffer) => Promise<v
     expect(standing.equals(await page.screenshot())).toBe(false);
     await page.getByRole("button", { name: "Stop the crane" }).click();
     await still(page);
+  },
+  portrayal: async (page) => {
+    expect(await text(page, "#panel")).toMatch(/^A small town\s+Click a building\.$/);
+    const [x, y] = await page.evaluate<[number, number]>("map.project([691032, 5336026, 562])");
+    await page.mouse.click(x, y);
+    await page.getByRole("heading", { name: "Tower" }).waitFor();
+    expect(await text(page, "dl")).toContain("<img src=x onerror=alert(1)>");
+    await still(page);
+    expect(await page.evaluate("[layer.highlighted, source.missing, map.layers.length]")).toEqual([[2_000_000_001], [], 1]);
+    await page.screenshot({ path: `${OUT}/example-portrayal-click.png` });
   },
   files: async (page, before) => {
     const folder = writeFolder(published(renderTown(64, 0.76)), "mine");

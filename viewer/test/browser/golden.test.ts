@@ -4,7 +4,7 @@ import { expect, test } from "vitest";
 import type { BrowserContextOptions, Page } from "playwright-core";
 import type * as Controls from "../../src/controls";
 import type * as Theme from "../../src/theme";
-import { decodePng } from "../../src/tiles/png";
+import { decodePng } from "../../src/core/png";
 import { renderTown } from "../fixture/rendering";
 import { differ, compareWithGolden, TOLERANCE } from "../fixture/golden";
 import { ORIGIN, type Place } from "../fixture/town";

@@ -1,6 +1,6 @@
 import type { Page } from "playwright-core";
 import type { Vec2 } from "../../src/core/vec";
-import { decodePng, type DecodedPng } from "../../src/tiles/png";
+import { decodePng, type DecodedPng } from "../../src/core/png";
 
 /** Maximum number of actions of a task after opening. */
 export const MAX_ACTIONS = 3;

@@ -29,12 +29,14 @@ const twist = (page: Page, deg: number): Promise<void> => page.evaluate((angle) 
   (globalThis as Global).map.rotateBy((angle * Math.PI) / 180);
 }, deg);
 
-/** Waits until two frames in a row are equal. */
+/** Waits until the picture has been still for a second: the tiles of the other view have arrived by then. */
 async function steady(page: Page): Promise<Buffer> {
-  let [before, now]: [Buffer, Buffer] = [Buffer.alloc(0), await picture(page)];
-  while (!before.equals(now)) {
-    await page.evaluate(() => new Promise((done) => { requestAnimationFrame(() => requestAnimationFrame(done)); }));
-    [before, now] = [now, await picture(page)];
+  let [still, now] = [0, await picture(page)];
+  while (still < 6) {
+    await page.waitForTimeout(170);
+    const next = await picture(page);
+    still = next.equals(now) ? still + 1 : 0;
+    now = next;
   }
   return now;
 }

@@ -251,3 +251,27 @@ test("objects in view can be listed and selected with the keyboard alone", async
   expect(problems).toEqual([]);
   await page.context().close();
 });
+
+test("a rendering of another origin is shown only with the user's consent", async () => {
+  const other = bed.url("town").replace("127.0.0.1", "other.test");
+  for (const consents of [true, false]) {
+    for (const query of [`rendering=${other}`, `rendering=${bed.url("town")}&rendering=${other}`, `rendering=${bed.url("town")}&with=${other}`]) {
+      const { page } = await bed.openPage(DESK);
+      await page.route("http://other.test:*/**", async (route) => {
+        await route.fulfill({ response: await route.fetch({ url: route.request().url().replace("other.test", "127.0.0.1") }) });
+      });
+      const asked: string[] = [], fetched: string[] = [];
+      page.on("request", (request) => { if (new URL(request.url()).hostname === "other.test") fetched.push(request.url()); });
+      page.on("dialog", (dialog) => {
+        asked.push(dialog.message());
+        void (consents ? dialog.accept() : dialog.dismiss());
+      });
+      await page.goto(`${bed.server.origin}/?${query}`);
+      await page.waitForFunction((isShown) => (isShown ? location.hash.length > 5 : document.querySelector(".failed") !== null), consents || query.includes("with="));
+      await page.waitForLoadState("networkidle");
+      expect(asked).toEqual([`Show ${other}?`]);
+      expect(fetched.length > 0).toBe(consents);
+      await page.context().close();
+    }
+  }
+});

@@ -7,7 +7,7 @@ import { uvdFromLocal } from "../../src/geo/axes";
 import { screenFromLocal, type Camera } from "../../src/geo/camera";
 import { computeDaylight } from "../../src/geo/daylight";
 import { towardsLight } from "../../src/geo/light";
-import type { DecodedPng } from "../../src/tiles/png";
+import type { DecodedPng } from "../../src/core/png";
 import { renderTown, type Fixture } from "../fixture/rendering";
 import { BOX, framesOf, ORIGIN, PLACE, THINGS, TOWN, trace, type Thing } from "../fixture/town";
 import { TestBed } from "./bed";

@@ -1,4 +1,4 @@
-import { decodePng } from "../../src/tiles/png";
+import { decodePng } from "../../src/core/png";
 
 /** An input source and its actions, as in WebDriver and WebDriver BiDi. */
 export type Input =

@@ -27,7 +27,7 @@ describe.each([["loose tiles", town], ["archives", archived]])("a folder of %s",
     for (const view of views.values()) {
       for (const layer of json.layers) {
         for (const tile of levels(json.zmax).filter((each) => view.occupancy.has(each))) {
-          const bytes = await source.tile(view, layer, tile);
+          const bytes = (await source.tile(view, layer, tile)) as ArrayBuffer | null;
           expect(Buffer.from(bytes ?? new ArrayBuffer(0)).equals(town.files.get(`${view.id}/${layer.name}/${tileName(tile)}`) as Uint8Array)).toBe(true);
           tiles++;
         }
@@ -58,7 +58,7 @@ test("only the bytes of the tile and the directories are read", async () => {
   const { views, json } = await source.manifest();
   const [view, layer] = [[...views.values()][0], json.layers[0]];
   if (!view || !layer) throw new Error("the town has no views");
-  const bytes = await source.tile(view, layer, { z: 0, x: 0, y: 0 });
+  const bytes = (await source.tile(view, layer, { z: 0, x: 0, y: 0 })) as ArrayBuffer | null;
   expect(read).toEqual([16384, bytes?.byteLength]);
 });
 

@@ -21,6 +21,16 @@ describe("an object style", () => {
     expect(Object.fromEntries(found?.byId ?? [])).toEqual(byId);
   });
 
+  const below = new Map([[5, [6, 7, 8]], [6, [8]], [9, []]]);
+  test.each([
+    ["descendants have the style of the object above", { colors: new Map([[5, "#ff0000"]]) }, { 5: RED, 6: RED, 7: RED, 8: RED }],
+    ["that of the nearest one", { colors: new Map([[5, "#ff0000"]]), hidden: [6] }, { 5: RED, 6: "hidden", 7: RED, 8: "hidden" }],
+    ["or their own", { only: [5, 8], colors: new Map([[8, "#ff0000"]]) }, { 5: "plain", 6: "plain", 7: "plain", 8: RED }],
+    ["or none, if the style says so", { hidden: [5], descendants: false }, { 5: "hidden" }],
+  ])("%s", (_, style: ObjectStyle, byId) => {
+    expect(Object.fromEntries(makeDrawStyles(style, below)?.byId ?? [])).toEqual(byId);
+  });
+
   test("is null when it is empty", () => {
     expect(makeDrawStyles({})).toBe(null);
     expect(makeDrawStyles({ colors: new Map() })).toBe(null);

@@ -34,6 +34,19 @@ test("a file of another type or version is refused by name; a missing file is em
   expect(await new Objects(sourceOf({ map3d: "objects", version: 1, objects: {} }), json).find(5)).toBeNull();
 });
 
+test("descendants are found through all levels and shards; a cycle ends", async () => {
+  const entry = (parent: number | null, children?: number[]): object => ({ name: "", class: "building", parent, attributes: {}, ...(children && { children }) });
+  const shards = new Map<string, unknown>([
+    ["objects/0.json", { map3d: "objects", version: 1, objects: { 1: entry(null, [2, 1030]), 2: entry(1), 3: entry(4, [4]), 4: entry(3, [3]) } }],
+    ["objects/1.json", { map3d: "objects", version: 1, objects: { 1030: entry(1, [1031]), 1031: entry(1030) } }],
+  ]);
+  const objects = new Objects(folderOf(shards), json);
+  expect(await objects.descendants(1)).toEqual([2, 1030, 1031]);
+  expect(await objects.descendants(2)).toEqual([]);
+  expect(await objects.descendants(3)).toEqual([4]);
+  expect(await objects.descendants(77)).toEqual([]);
+});
+
 const vectors = JSON.parse(readFileSync(resolve(import.meta.dirname, "../../../spec/vectors/search.json"), "utf8")) as { text: string; words: string[] }[];
 
 test.each(vectors)("the words of $text match the vectors", ({ text, words }) => {

@@ -2,7 +2,7 @@ import { readFileSync } from "node:fs";
 import { resolve } from "node:path";
 import { deflateSync } from "node:zlib";
 import { describe, expect, test } from "vitest";
-import { decodePng } from "../../src/tiles/png";
+import { decodePng } from "../../src/core/png";
 import { decodeTile } from "../../src/tiles/tileData";
 import { DecodeError } from "../../src/core/errors";
 import { encodePng } from "../fixture/encodePng";

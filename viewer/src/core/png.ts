@@ -1,4 +1,4 @@
-import { DecodeError } from "../core/errors";
+import { DecodeError } from "./errors";
 
 /** Bytes per pixel. */
 type Channels = 1 | 2 | 3 | 4;

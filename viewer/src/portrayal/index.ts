@@ -1,0 +1,3 @@
+export { portrayalSource, type PortrayalSource } from "./portrayalSource";
+export { PortrayalError } from "./portrayalError";
+export type { PortrayalOptions, SunDirection } from "./options";
