@@ -19,7 +19,7 @@ CHROMIUM = Path(os.environ.get("CHROMIUM", "/usr/bin/chromium"))
 SCRIPT_S = 120
 
 
-def browse(script: str, **asked: Any) -> dict[str, Any]:
+def browse(script: str, *, limit_s: float = SCRIPT_S, **asked: Any) -> dict[str, Any]:
     """Runs a script of this folder and returns its result."""
     if not CHROMIUM.exists() and not os.environ.get("MAP3D_REQUIRE_BROWSERS"):
         pytest.skip(f"{CHROMIUM} is not installed; apt install chromium, or set CHROMIUM")
@@ -27,7 +27,7 @@ def browse(script: str, **asked: Any) -> dict[str, Any]:
     assert node, "Node.js is missing"
     assert PLAYWRIGHT.is_dir(), "playwright-core is missing; run make .cache/npm"
     command = [node, str(Path(__file__).with_name(script)), str(PLAYWRIGHT), json.dumps(asked)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=SCRIPT_S, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=limit_s, check=False)
     if done.returncode:
         pytest.fail(f"{script} failed:\n{done.stderr[-2000:]}")
     answer: dict[str, Any] = json.loads(done.stdout)
@@ -47,10 +47,10 @@ def command(*arguments: str | Path) -> list[str]:
 
 
 @contextmanager
-def served(workspace: Path) -> Iterator[str]:
+def served(workspace: Path, *options: str) -> Iterator[str]:
     """Yields the address of `map3d serve`."""
     server = subprocess.Popen(
-        command("serve", "-w", workspace, "--port", "0"), stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"}
+        command("serve", "-w", workspace, "--port", "0", *options), stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"}
     )
     assert server.stdout is not None
     try:

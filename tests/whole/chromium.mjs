@@ -24,13 +24,13 @@ export function anyWebGL() {
   };
 }
 
-/** Calls `act(page, parameters)`. `parameters.hosts`: host name → address with port; `parameters.size`: size of the window. */
+/** Calls `act(page, parameters)`. `parameters.hosts`: host name → address with port; `parameters.size`: size of the window; `parameters.state`: cookies of an earlier page. */
 export async function runPage(act) {
   const parameters = JSON.parse(parametersJson);
   const browser = await launch(folder, parameters.hosts);
   try {
     const [width, height] = parameters.size ?? [1000, 700];
-    const context = await browser.newContext({ viewport: { width, height }, reducedMotion: "reduce" });
+    const context = await browser.newContext({ viewport: { width, height }, reducedMotion: "reduce", storageState: parameters.state });
     await context.addInitScript(anyWebGL);
     const page = await context.newPage();
     page.setDefaultTimeout(60_000);
