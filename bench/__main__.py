@@ -1,5 +1,5 @@
 """`python -m bench [PART …] [--json]`. Parts: tiles, light, encoding, ingest, incremental (the default); extent, planning, stored, viewer,
-catalogue, overhead, saturation."""
+catalogue, overhead, saturation, view."""
 
 import argparse
 import json
@@ -10,18 +10,18 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from . import catalogue, catalogue_overhead, encoding, extent, incremental, ingest, light_layers, planning, saturation, stored, tiles, viewer
+from . import catalogue, catalogue_overhead, encoding, extent, incremental, ingest, light_layers, planning, saturation, stored, tiles, view, viewer
 from .benchmark_scene import CACHE
 
 PARTS = ("tiles", "light", "encoding", "ingest", "incremental")
-ON_REQUEST = ("extent", "planning", "stored", "viewer", "catalogue", "overhead", "saturation")
+ON_REQUEST = ("extent", "planning", "stored", "viewer", "catalogue", "overhead", "saturation", "view")
 Rows = list[dict[str, Any]]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="bench", description="Measures speed, with peers in the same run.")
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"{', '.join(PARTS)} (default: these), {', '.join(ON_REQUEST)}")
-    parser.add_argument("--millions", type=float, nargs="+", default=extent.MILLIONS, help="extent: sizes in million triangles")
+    parser.add_argument("--millions", type=float, nargs="+", help="extent, view: sizes in million triangles (1 3 10, 1 10)")
     parser.add_argument("--buildings", type=int, default=300, help="tiles: number of buildings of the town")
     parser.add_argument("--res", type=float, default=0.2, help="tiles: metres per pixel")
     parser.add_argument("--tiles", type=int, default=48, help="tiles: number of tiles")
@@ -32,11 +32,11 @@ def main() -> None:
     parser.add_argument(
         "--jobs", type=int, nargs="+", default=catalogue.PLANNED_JOBS, help="catalogue: numbers of base blocks to plan; saturation: the least of them"
     )
-    parser.add_argument("--quick", action="store_true", help="viewer: a small town without peers, as a smoke test")
-    parser.add_argument("--reps", type=int, default=5, help="viewer: number of rounds")
+    parser.add_argument("--quick", action="store_true", help="viewer: a small town without peers, as a smoke test; view: without Mitsuba")
+    parser.add_argument("--reps", type=int, default=5, help="viewer, view: number of rounds")
     parser.add_argument("--only", nargs="+", help="viewer: measures, e.g. first frames")
     parser.add_argument("--free", action="store_true", help="viewer: disable vsync, for browsers with a GPU")
-    parser.add_argument("--work", type=Path, default=CACHE / "viewer", help="viewer: folder for cities and samples; needs 9 GB")
+    parser.add_argument("--work", type=Path, help="viewer: folder for cities and samples, needs 9 GB; view: folder for towns, needs 5 GB")
     parser.add_argument("--json", action="store_true", help="print one JSON document after the tables")
     options = parser.parse_args()
     unknown = [part for part in options.parts if part not in PARTS + ON_REQUEST]
@@ -48,13 +48,16 @@ def main() -> None:
         "encoding": encoding.measure,
         "ingest": ingest.measure,
         "incremental": incremental.measure,
-        "extent": lambda: extent.measure(tuple(options.millions), plots=Path("docs/plots")),
+        "extent": lambda: extent.measure(tuple(options.millions or extent.MILLIONS), plots=Path("docs/plots")),
         "planning": planning.measure,
         "catalogue": lambda: catalogue.measure(options.catalogues, options.jobs),
         "overhead": lambda: catalogue_overhead.measure(options.catalogues),
         "saturation": lambda: saturation.measure(options.catalogues, min(options.jobs)),
+        "view": lambda: view.measure(tuple(options.millions or (1, 10)), options.work or CACHE / "view", options.reps, not options.quick),
         "stored": lambda: stored.measure(options.folders),
-        "viewer": lambda: viewer.measure(options.quick, options.reps, options.work, tuple(options.only) if options.only else None, options.free),
+        "viewer": lambda: viewer.measure(
+            options.quick, options.reps, options.work or CACHE / "viewer", tuple(options.only) if options.only else None, options.free
+        ),
     }
     rows = {part: measures[part]() for part in options.parts or PARTS}
     if options.json:

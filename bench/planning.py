@@ -1,7 +1,8 @@
 """Time and memory of planning a country: `python -m bench planning`. Each row is a process of its own.
 
 Rows "jobs": only making the jobs, from a synthetic scene whose keys cost nothing. Rows "core": the same with a built scene of houses on a ground
-plane, so with the real occupancy and keys. Rows "catalogue": planning into an empty SQLite catalogue, then again with nothing changed.
+plane, so with the real occupancy and keys; then the occupancy of base tiles that a render announces in the manifest, encoded. Rows "catalogue":
+planning into an empty SQLite catalogue, then again with nothing changed.
 """
 
 import json
@@ -25,12 +26,11 @@ from map3d.catalogue import PlannedJob, RenderingRecord, SceneRecord, Workspace
 from map3d.cli import app
 from map3d.geometry.frames import pin
 from map3d.renderings.build import BUILD_BYTES, build, open_scene
-from map3d.renderings.plan import PlannedScene, plan_jobs
+from map3d.renderings.plan import PlannedScene, plan_jobs, planned_occupancy
 from map3d.tiles.occupancy import Numbers, morton_numbers, numbers_of
 from map3d.types import Box, Layer, ViewAngles
 
 SIZES = (1_000_000, 10_000_000)
-IN_CATALOGUE = 1_000_000
 LAYERS = (Layer("color", "color", "webp", 80), Layer("id", "id", "png"))
 RES_M, BLOCK_PX = 0.05, 2048
 HOUSES = 100
@@ -68,10 +68,9 @@ class SyntheticScene:
         return [f"{x:016x}{y:016x}" for x, y in blocks.tolist()]
 
 
-def measure(sizes: Iterable[int] = SIZES, in_catalogue: int = IN_CATALOGUE) -> list[dict[str, Any]]:
+def measure(sizes: Iterable[int] = SIZES) -> list[dict[str, Any]]:
     """Measures and prints the table."""
-    calls = [("jobs", size) for size in sizes] + [("core", size) for size in sizes] + [("catalogue", in_catalogue)]
-    rows = [row for what, size in calls for row in _in_process(what, size)]
+    rows = [row for what in _MEASURES for size in sizes for row in _in_process(what, size)]
     table = Table(title="planning, one view", title_justify="left")
     for column in ("", "base blocks", "jobs", "s", "CPU s", "CPU µs a job", "MB before", "MB at most"):
         table.add_column(column, justify="right" if column else "left")
@@ -107,7 +106,9 @@ def measure_core(count: int) -> list[PlanningRow]:
         build(workspace, catalogue, "town", threads=2, max_memory_bytes=BUILD_BYTES)
         catalogue.close()
         scene = open_scene(workspace, "town")
-        return [_plan("core", scene, _record(scene.box, ViewAngles(0, 90)), count)]
+        record = _record(scene.box, ViewAngles(0, 90))
+        planned = _plan("core", scene, record, count)
+        return [planned, _announce(scene, record, planned)]
 
 
 def measure_catalogue(count: int) -> list[PlanningRow]:
@@ -138,6 +139,13 @@ def _plan(what: str, scene: PlannedScene, record: RenderingRecord, count: int) -
     if base < 0.9 * count:
         raise SystemExit(f"bench: planned {base} base blocks instead of {count}")
     return PlanningRow(what, base, jobs, time.perf_counter() - begun, time.process_time() - cpu, start, _peak())
+
+
+def _announce(scene: PlannedScene, record: RenderingRecord, planned: PlanningRow) -> PlanningRow:
+    start, begun, cpu = _peak(), time.perf_counter(), time.process_time()
+    planned_occupancy(scene, record.frames[0]).encode()
+    spent = time.perf_counter() - begun, time.process_time() - cpu
+    return PlanningRow("core, announced", planned.base_blocks, planned.jobs, *spent, start, _peak())
 
 
 def _record(box: Box, view: ViewAngles) -> RenderingRecord:

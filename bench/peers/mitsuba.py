@@ -17,7 +17,8 @@ VARIABLES = "albedo:albedo,depth:depth,normal:sh_normal,triangle:prim_index"
 
 
 class Mitsuba:
-    def __init__(self, folder: Path, samples: int = 16) -> None:
+    def __init__(self, folder: Path, samples: int = 16, texture_level: int = 0) -> None:
+        """`texture_level`: mip level of the textures."""
         try:
             import mitsuba
 
@@ -28,10 +29,15 @@ class Mitsuba:
         images = filled_images(folder)
         assets = [read_asset(path.parent) for path in sorted(folder.glob("assets/*/mesh.m3a"))]
         origin = np.array(json.loads((folder / "scene.json").read_text())["origin"])
-        self._scene = MitsubaScene(assets, origin, lambda _, material: _image(images, material))
+        self._scene = MitsubaScene(assets, origin, lambda _, material: _image(images, material, texture_level))
         self._integrator = mitsuba.load_dict({"type": "aov", "aovs": VARIABLES})
         self._samples = samples
         self._cameras: dict[int, tuple[Any, Any]] = {}
+
+    @property
+    def mitsuba_scene(self) -> Any:
+        """The scene, for other cameras."""
+        return self._scene
 
     def draw(self, frame: FrameFields, x: int, y: int) -> NDArray[np.float32]:
         """Returns (H, W, channels)."""
@@ -55,7 +61,7 @@ class Mitsuba:
         return srgb_bytes_from_linear(self._scene.albedo(frame, x, y, self._samples))
 
 
-def _image(images: dict[str, Path], material: dict[str, Any]) -> NDArray[np.uint8] | None:
+def _image(images: dict[str, Path], material: dict[str, Any], level: int) -> NDArray[np.uint8] | None:
     if material["texture"] is None:
         return None
-    return np.ascontiguousarray(_core.texture_level(str(images[material["texture"]]), 0)[..., :3])
+    return np.ascontiguousarray(_core.texture_level(str(images[material["texture"]]), level)[..., :3])
