@@ -11,7 +11,7 @@ CACHE := .cache
 RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
 VIEWER := $(shell find viewer/src viewer/page viewer/scripts -type f 2>/dev/null) $(wildcard viewer/*.json viewer/*.ts viewer/*.js viewer/*.mjs)
 
-.PHONY: help demo test test-all test-rust test-python mongo-server test-viewer test-wheel test-browser browser-suite wheel check check-words check-rust check-python check-viewer bench bench-extent bench-cycles bench-rotterdam bench-viewer peers faults bless docs reference build clean tools
+.PHONY: help demo test test-all test-rust test-python mongo-server test-viewer test-wheel test-browser browser-suite wheel check check-words check-rust check-python check-viewer bench bench-extent bench-cycles bench-rotterdam bench-viewer bench-serve peers faults bless docs reference build clean tools
 
 help: ## list the targets
 	@echo "map3d: 3D city models as oblique image tiles"; echo
@@ -96,7 +96,7 @@ browser-suite: build
 
 test-all: test ## run slow tests, too (none is marked slow yet)
 
-faults: build ## kill, fill disks, fail system calls: every tile set must equal the undisturbed one (docs/reliability.md): 1 hour
+faults: build ## kill, fill disks, fail system calls: every tile set must equal the undisturbed one (docs/reliability.md): 2 hours
 	$(BIN)/python -m tests.faults
 
 # -- check ---------------------------------------------------------------------------------------------------------------------------
@@ -131,6 +131,9 @@ bench-extent: build ## measure towns of up to 75 million triangles within a fixe
 bench-cycles: requirements/cycles.lock | $(CACHE) ## install Blender (350 MB) in its own Python environment, as another peer of `make bench`
 	$(PYTHON) -m venv $(CACHE)/cycles
 	$(CACHE)/cycles/bin/python -m pip install -q --disable-pip-version-check -r requirements/cycles.lock
+
+bench-serve: build ## measure served tiles beside nginx and during a flood of views (apt install nginx-light wrk): 6 minutes
+	$(BIN)/python -m bench.serve
 
 bench-viewer: build peers ## measure map3d.js beside CesiumJS, OpenSeadragon and Leaflet (npm, 230 MB): 2 hours, 9 GB of disk
 	$(BIN)/python -m bench viewer
