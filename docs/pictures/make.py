@@ -6,9 +6,12 @@ CesiumJS and the converters of its tiles are npm packages in bench/viewer; witho
 import json
 import os
 import re
+import secrets
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,6 +24,7 @@ from light_panels import draw_panels
 from sheet import sheet
 from town3d import town_tileset
 
+from map3d.accounts import Accounts
 from map3d.catalogue import Workspace
 from map3d.cli.app import run
 from map3d.geometry.views import uvd_from_local
@@ -72,6 +76,14 @@ def draw_light_panels(workspace: Path) -> None:
 def shoot(workspace: Path, views: list[dict[str, Any]], cesium: Path | None, out: Path) -> None:
     """Writes the missing PNG files of the views into `out`, by map3d.js and, with a folder of 3D Tiles, by CesiumJS."""
     out.mkdir(parents=True, exist_ok=True)
+    with serving(workspace) as address:
+        where = {"playwright": str(PLAYWRIGHT), "page": f"{address}/view/pictures/", "cesium": cesium and str(cesium), "out": str(out)}
+        subprocess.run(["node", str(HERE / "shoot.mjs")], input=json.dumps({"views": views, **where}), text=True, check=True)
+
+
+@contextmanager
+def serving(workspace: Path) -> Iterator[str]:
+    """Serves a workspace; yields the address, without a slash at its end."""
     command = [sys.executable, "-m", "map3d", "serve", "--workspace", str(workspace), "--port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"}) as server:
         assert server.stdout is not None
@@ -79,10 +91,33 @@ def shoot(workspace: Path, views: list[dict[str, Any]], cesium: Path | None, out
             address = next((found[0] for line in server.stdout if (found := re.search(r"http://[^\s/]+", line))), None)
             if address is None:
                 sys.exit("the server exited without printing an address")
-            where = {"playwright": str(PLAYWRIGHT), "page": f"{address}/view/pictures/", "cesium": cesium and str(cesium), "out": str(out)}
-            subprocess.run(["node", str(HERE / "shoot.mjs")], input=json.dumps({"views": views, **where}), text=True, check=True)
+            yield address
         finally:
             server.terminate()
+
+
+def shoot_studio(folder: Path) -> None:
+    """Writes the images of the web interface, which imports, renders and publishes a small town in a workspace of its own."""
+    town, shots = folder / "small-town", folder / "studio-shots"
+    if status := run(["make-town", "-o", str(town), "--buildings", "40", "--seed", "7"]):
+        sys.exit(status)
+    archive = shutil.make_archive(str(folder / "old-town"), "zip", town)
+    workspace = Workspace(folder / "studio").create()
+    password = secrets.token_urlsafe()
+    try:
+        with closing(workspace.open_catalogue()) as catalogue:
+            Accounts(catalogue).add_user("anna", password, "editor")
+        shots.mkdir(exist_ok=True)
+        with serving(workspace.root) as address:
+            where = {"playwright": str(PLAYWRIGHT), "address": address, "archive": archive, "out": str(shots)}
+            who = {"user": "anna", "password": password, "title": "Old town"}
+            subprocess.run(["node", str(HERE / "studio.mjs")], input=json.dumps({**where, **who}), text=True, check=True)
+        for path in sorted(shots.glob("*.png")):
+            with Image.open(path) as shot:
+                shot.convert("RGB").save(HERE / f"{path.stem}.jpg", quality=QUALITY)
+    finally:
+        shutil.rmtree(workspace.root)
+        shutil.rmtree(shots, ignore_errors=True)
 
 
 def draw_beside_cesium(view: dict[str, Any], shots: Path) -> None:
@@ -120,6 +155,7 @@ def main(folder: Path) -> None:
             draw_beside_cesium(view, shots)
     # The next run takes all screenshots again.
     shutil.rmtree(shots)
+    shoot_studio(folder.absolute())
 
 
 if __name__ == "__main__":
