@@ -3,9 +3,13 @@
 from pathlib import Path
 
 import pytest
+from rasterio.shutil import copy
 
 from map3d.errors import NotFound, UnknownFormat
-from map3d.ingest.formats import detect_format
+from map3d.ingest.formats import RASTER_FORMATS, RasterFormat, detect_format, find_raster_format
+from map3d.ingest.sources import find_sources
+from map3d.ingest.terrain.raster_georeference import open_raster
+from tests.ingest.terrain.rasters import colours, hills, write
 
 CITY = '<?xml version="1.0"?>\n<!-- a <b> comment -->\n<core:CityModel xmlns:core="http://www.opengis.net/citygml/2.0"/>'
 OBJ = "# made by hand\nmtllib a.mtl\no thing\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
@@ -65,6 +69,39 @@ def test_an_image_with_a_world_file_is_a_raster(tmp_path: Path, image: str, worl
     path.write_bytes(b"\x89PNG\r\n" if path.suffix == ".png" else b"\xff\xd8\xff\xe0")
     (tmp_path / world_file).write_text("1\n0\n0\n-1\n0\n0\n")
     assert detect_format(path) == "raster"
+
+
+@pytest.mark.parametrize("format", RASTER_FORMATS, ids=lambda format: format.driver)
+def test_what_gdal_writes_as_a_raster_is_opened_with_the_same_driver(tmp_path: Path, format: RasterFormat) -> None:
+    source = write(tmp_path / "source.tif", hills(12, 10) if format.driver == "AAIGrid" else colours(12, 10))
+    path = tmp_path / "raster.any"
+    copy(source, path, driver=format.driver, WORLDFILE="YES")
+    assert find_raster_format(path.read_bytes()) is format
+    assert detect_format(path) == "raster"
+    with open_raster(path) as raster:
+        assert (raster.driver, raster.width, raster.height) == (format.driver, 10, 12)
+    if format.is_image:
+        path.with_suffix(".wld").unlink()
+        with pytest.raises(UnknownFormat, match=f"a {format.driver} image without a world file"):
+            detect_format(path)
+
+
+def test_an_ascii_grid_may_have_wide_columns(tmp_path: Path) -> None:
+    path = tmp_path / "dem.asc"
+    heads = {"ncols": 2, "nrows": 2, "xllcorner": 0, "yllcorner": 0, "cellsize": 1}
+    path.write_text("".join(f"{name:<30}{value}\n" for name, value in heads.items()) + "1 2\n3 4\n")
+    assert detect_format(path) == "raster"
+    with open_raster(path) as raster:
+        assert raster.read(1).tolist() == [[1, 2], [3, 4]]
+
+
+@pytest.mark.parametrize("suffix", sorted({suffix for format in RASTER_FORMATS for suffix in format.world_files}))
+def test_world_files_are_not_listed_as_left_alone(tmp_path: Path, suffix: str) -> None:
+    write(tmp_path / "dem.tif", hills(4, 4))
+    (tmp_path / f"dem{suffix}").write_text("1\n0\n0\n-1\n0\n0\n")
+    left_alone: list[Path] = []
+    find_sources([tmp_path], on_left_alone=lambda path, _: left_alone.append(path))
+    assert left_alone == []
 
 
 @pytest.mark.parametrize(("name", "driver"), [("a.ecw", "ECW"), ("a.sid", "MrSID"), ("a.IMG", "HFA")])

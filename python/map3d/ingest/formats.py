@@ -2,6 +2,7 @@
 
 import re
 import stat
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
 
@@ -15,17 +16,11 @@ READABLE_FORMATS: Final = (
 )
 _HEAD_BYTES: Final = 1 << 16
 _OBJ_LINE: Final = re.compile(rb"(v|vt|vn|vp|f|l|p|o|g|s|mtllib|usemtl)(\s|$)")
-_TIFF: Final = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
-_JPEG_2000: Final = (b"\0\0\0\x0cjP  ", b"\xffO\xffQ")
-_ASCII_GRID: Final = re.compile(rb"ncols\s+\d", re.IGNORECASE)
-_WORLD_FILES: Final = {b"\xff\xd8\xff": (".jgw", ".jpgw", ".jpegw", ".wld"), b"\x89PNG": (".pgw", ".pngw", ".wld")}
 _BYTE_ORDER_MARKS: Final = ((b"\xef\xbb\xbf", "utf-8"), (b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"))
 _UNREADABLE: Final = {
     b"glTF": "glTF (binary)",
     b"PK\x03\x04": "a ZIP archive",
     b"LASF": "a LAS point cloud",
-    b"\x89PNG": "a PNG image without a world file",
-    b"\xff\xd8\xff": "a JPEG image without a world file",
     b"<VRTDataset": "a virtual raster; convert it with gdal_translate -of COG",
 }
 _OTHER_RASTERS: Final = {
@@ -48,6 +43,33 @@ _BLOCK_BYTES: Final = 512
 _MAX_SPARSE_BYTES: Final = 1 << 30
 _MIN_STORED: Final = 0.01
 """Share of a large file that is stored. Compressing file systems store at least this."""
+
+
+@dataclass(frozen=True)
+class RasterFormat:
+    """`driver`: the one of GDAL. `signature`: the first bytes of a file. `suffixes`: those that announce a raster. `is_image`: a file is a raster
+    only with a world file beside it."""
+
+    driver: str
+    signature: re.Pattern[bytes]
+    suffixes: tuple[str, ...] = ()
+    world_files: tuple[str, ...] = ()
+    is_image: bool = False
+
+
+RASTER_FORMATS: Final = (
+    RasterFormat("GTiff", re.compile(rb"II[*+]\0|MM\0[*+]"), (".tif", ".tiff"), (".tfw", ".tifw", ".tiffw", ".wld")),
+    RasterFormat("JP2OpenJPEG", re.compile(rb"\0\0\0\x0cjP  |\xffO\xffQ"), (".jp2",), (".j2w", ".jp2w", ".wld")),
+    RasterFormat("AAIGrid", re.compile(rb"ncols\s+\d", re.IGNORECASE), (".asc",)),
+    RasterFormat("JPEG", re.compile(rb"\xff\xd8\xff"), world_files=(".jgw", ".jpgw", ".jpegw", ".wld"), is_image=True),
+    RasterFormat("PNG", re.compile(rb"\x89PNG"), world_files=(".pgw", ".pngw", ".wld"), is_image=True),
+)
+"""Rasters that are read. Formats that reference other files are not among them: a virtual raster could read any file."""
+
+
+def find_raster_format(head: bytes) -> RasterFormat | None:
+    """Returns the format of a raster or an image. `head`: the first bytes of a file."""
+    return next((format for format in RASTER_FORMATS if format.signature.match(head)), None)
 
 
 def check_stored(path: Path) -> None:
@@ -77,8 +99,10 @@ def detect_format(path: Path) -> Format:
 
 def has_world_file(path: Path, head: bytes) -> bool:
     """Whether an image has a world file beside it. `head`: the first bytes of the image."""
-    suffixes = next((suffixes for magic, suffixes in _WORLD_FILES.items() if head.startswith(magic)), ())
-    return any(path.with_suffix(case(suffix)).is_file() for suffix in suffixes for case in (str.lower, str.upper))
+    format = find_raster_format(head)
+    if format is None or not format.is_image:
+        return False
+    return any(path.with_suffix(case(suffix)).is_file() for suffix in format.world_files for case in (str.lower, str.upper))
 
 
 def _read_head(path: Path) -> bytes:
@@ -87,8 +111,9 @@ def _read_head(path: Path) -> bytes:
 
 
 def _detect(path: Path, head: bytes) -> Format | None:
-    if head.startswith((*_TIFF, *_JPEG_2000)) or _ASCII_GRID.match(head) or has_world_file(path, head):
-        return "raster"
+    raster = find_raster_format(head)
+    if raster is not None:
+        return None if raster.is_image and not has_world_file(path, head) else "raster"
     text = _to_utf8(head).lstrip()
     if text.startswith(b"<"):
         return "citygml" if _find_root_element(text) == b"CityModel" else None
@@ -123,6 +148,8 @@ def _describe_unknown(path: Path, head: bytes) -> str:
         return "an empty file"
     if path.suffix.lower() in _OTHER_RASTERS:
         return f"{_OTHER_RASTERS[path.suffix.lower()]}; convert it with gdal_translate -of COG"
+    if (raster := find_raster_format(head)) is not None:
+        return f"a {raster.driver} image without a world file"
     for magic, name in _UNREADABLE.items():
         if head.startswith(magic):
             return name

@@ -8,17 +8,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from map3d.errors import NotFound, UnknownFormat
-from map3d.ingest.formats import READABLE_FORMATS, Format, check_stored, detect_format, has_world_file
+from map3d.ingest.formats import RASTER_FORMATS, READABLE_FORMATS, Format, check_stored, detect_format, has_world_file
 from map3d.ingest.gzip_file import unpacked_path
 from map3d.ingest.referenced_files import find_code_lists, find_referenced_files
 
 _COMPANION_SUFFIXES = (
-    ".mtl", ".jpg", ".jpeg", ".png", ".bmp", ".gif", ".tga", ".txt", ".md", ".json", ".pdf", ".html", ".prj", ".tfw",
-    ".jgw", ".pgw", ".wld", ".xsd", ".sqlite",
+    ".mtl", ".jpg", ".jpeg", ".png", ".bmp", ".gif", ".tga", ".txt", ".md", ".json", ".pdf", ".html", ".prj", ".xsd", ".sqlite",
+    *(suffix for format in RASTER_FORMATS for suffix in format.world_files),
 )  # fmt: skip
 _DOCUMENT_NAMES = ("license", "licence", "copying", "notice", "readme", "authors", "changelog", "changes")
 """Files that begin so and have no suffix accompany data, too."""
-_SOURCE_SUFFIXES = (".gml", ".citygml", ".obj", ".tif", ".tiff", ".jp2", ".asc")
+_SOURCE_SUFFIXES = (".gml", ".citygml", ".obj", *(suffix for format in RASTER_FORMATS for suffix in format.suffixes))
 """Files with these suffixes are reported if they are unreadable."""
 _CODE_LIST_SUFFIXES = (".xml", ".gml")
 

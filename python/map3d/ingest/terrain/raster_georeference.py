@@ -13,20 +13,10 @@ from rasterio.errors import NotGeoreferencedWarning, RasterioError
 
 from map3d.errors import CrsError, ImportFailed, NotFound
 from map3d.geometry.crs import horizontal_crs, is_local, parse_crs
+from map3d.ingest.formats import RASTER_FORMATS, find_raster_format
 
 Array = NDArray[np.float64]
-DRIVERS: Final = {
-    b"II*\0": "GTiff",
-    b"MM\0*": "GTiff",
-    b"II+\0": "GTiff",
-    b"MM\0+": "GTiff",
-    b"\0\0\0\x0cjP  ": "JP2OpenJPEG",
-    b"\xffO\xffQ": "JP2OpenJPEG",
-    b"\x89PNG\r\n\x1a\n": "PNG",
-    b"\xff\xd8\xff": "JPEG",
-    b"ncols": "AAIGrid",
-}
-"""First bytes → GDAL driver. Formats that reference other files are excluded: a virtual raster could read any file."""
+_HEAD_BYTES: Final = 4096
 
 
 def open_raster(path: Path) -> Any:
@@ -50,13 +40,12 @@ def open_raster(path: Path) -> Any:
 
 def _find_driver(path: Path) -> str:
     with path.open("rb") as file:
-        head = file.read(16)
-    for magic, driver in DRIVERS.items():
-        if head.lower().startswith(magic) if magic.isalpha() else head.startswith(magic):
-            return driver
-    raise ImportFailed(
-        f"{path}: unknown raster format; map3d reads {', '.join(sorted(set(DRIVERS.values())))}; convert it with gdal_translate -of COG"
-    )
+        head = file.read(_HEAD_BYTES)
+    format = find_raster_format(head)
+    if format is None:
+        names = ", ".join(sorted(format.driver for format in RASTER_FORMATS))
+        raise ImportFailed(f"{path}: unknown raster format; map3d reads {names}; convert it with gdal_translate -of COG")
+    return format.driver
 
 
 def own_crs(dataset: Any, stated_crs: str | None = None) -> CRS | None:
