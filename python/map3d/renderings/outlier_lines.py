@@ -7,7 +7,7 @@ from pyproj import Transformer
 
 from map3d.catalogue import SceneCrs
 from map3d.geometry.crs import horizontal_crs, parse_crs
-from map3d.geometry.places import find_place
+from map3d.geometry.places import Place, find_place
 from map3d.renderings.outliers import FileOutliers, Outliers
 from map3d.types import Box
 
@@ -27,13 +27,21 @@ def outlier_lines(outliers: Outliers, crs: SceneCrs | None) -> list[str]:
 
 def place_text(box: Box, crs: SceneCrs | None) -> str:
     """Returns the middle of a box in world coordinates, and where on Earth that is if the CRS says so."""
-    x, y = ((box[0][k] + box[1][k]) / 2 for k in (0, 1))
-    text = f"{x:,.0f}, {y:,.0f}"
+    x, y = middle(box)
+    place = find_middle(box, crs)
+    return f"{x:,.0f}, {y:,.0f}" if place is None else f"{x:,.0f}, {y:,.0f}, {place}"
+
+
+def middle(box: Box) -> tuple[float, float]:
+    return (box[0][0] + box[1][0]) / 2, (box[0][1] + box[1][1]) / 2
+
+
+def find_middle(box: Box, crs: SceneCrs | None) -> Place | None:
+    """Returns where on Earth the middle of a box in world coordinates is, None if the CRS does not say so."""
     if crs is None or crs.wkt is None:
-        return text
-    lon, lat = Transformer.from_crs(horizontal_crs(parse_crs(crs.wkt)), "EPSG:4326", always_xy=True).transform(x, y)
-    is_on_earth = -180 <= lon <= 180 and -90 <= lat <= 90
-    return f"{text}, {find_place(lon, lat)}" if is_on_earth else text
+        return None
+    lon, lat = Transformer.from_crs(horizontal_crs(parse_crs(crs.wkt)), "EPSG:4326", always_xy=True).transform(*middle(box))
+    return find_place(lon, lat) if -180 <= lon <= 180 and -90 <= lat <= 90 else None
 
 
 def extent_text(box: Box) -> str:

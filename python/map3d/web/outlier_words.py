@@ -5,10 +5,12 @@ from dataclasses import dataclass
 from typing import Final
 
 from map3d.catalogue import SceneCrs, SceneRecord
+from map3d.geometry import places
 from map3d.ingest.content import CLUSTER, KEEP_OUTLIERS, Cluster
-from map3d.renderings.outlier_lines import extent_text, length_text, place_text
+from map3d.renderings.outlier_lines import find_middle, middle
 from map3d.renderings.outliers import FileOutliers, Outliers
-from map3d.web.page_formats import number
+from map3d.types import Box
+from map3d.web.page_formats import decimal, distance
 from map3d.web.page_tools import translate as _
 
 MAX_FILES: Final = 5
@@ -55,8 +57,8 @@ def outlier_words(outliers: Outliers, scene: SceneRecord) -> OutlierWords | None
 
 
 def _file_text(file: FileOutliers) -> str:
-    triangles = _("1 triangle") if file.triangles == 1 else _("{count} triangles", count=number(file.triangles))
-    values = {"file": file.source, "triangles": triangles, "distance": length_text(file.distance_m), "name": file.examples[0].name}
+    triangles = _("1 triangle") if file.triangles == 1 else _("{count} triangles", count=file.triangles)
+    values = {"file": file.source, "triangles": triangles, "distance": distance(file.distance_m), "name": file.examples[0].name}
     return _("{file}: {triangles}, up to {distance} away, e.g. of {name}", **values)
 
 
@@ -65,5 +67,29 @@ def _places(clusters: Sequence[Cluster], kept: Sequence[int], crs: SceneCrs | No
 
 
 def _place_text(cluster: Cluster, crs: SceneCrs | None) -> str:
-    objects = _("1 object") if cluster.objects == 1 else _("{count} objects", count=number(cluster.objects))
-    return _("{objects}, {extent} around {place}", objects=objects, extent=extent_text(cluster.box), place=place_text(cluster.box, crs))
+    objects = _("1 object") if cluster.objects == 1 else _("{count} objects", count=cluster.objects)
+    return _("{objects}, {extent} around {place}", objects=objects, extent=_extent(cluster.box), place=_middle_text(cluster.box, crs))
+
+
+def _extent(box: Box) -> str:
+    return " × ".join(distance(box[1][k] - box[0][k]) for k in (0, 1))
+
+
+def _middle_text(box: Box, crs: SceneCrs | None) -> str:
+    x, y = middle(box)
+    place = find_middle(box, crs)
+    return ", ".join([decimal(x, 0), decimal(y, 0), *([] if place is None else [_town_text(place)])])
+
+
+def _town_text(place: places.Place) -> str:
+    town = f"{place.town.name}, {place.town.country}" if place.town.name != place.town.country else place.town.name
+    if place.distance_km <= places.NEAR_KM:
+        return _("near {town} ({position})", town=town, position=_position(place))
+    return _("at {position}, {distance} from {town}", position=_position(place), distance=distance(place.distance_km * 1000), town=town)
+
+
+def _position(place: places.Place) -> str:
+    lat, lon = decimal(abs(place.lat), 3), decimal(abs(place.lon), 3)
+    north = _("{degrees}° S", degrees=lat) if place.lat < 0 else _("{degrees}° N", degrees=lat)
+    east = _("{degrees}° W", degrees=lon) if place.lon < 0 else _("{degrees}° E", degrees=lon)
+    return f"{north}, {east}"

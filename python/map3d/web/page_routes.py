@@ -21,7 +21,6 @@ from map3d.tiles.manifest import Manifest
 from map3d.tiles.preview import Preview, choose_preview
 from map3d.tiles.viewer_files import PAGE, viewer_folder
 from map3d.types import check_name
-from map3d.web import page_formats
 from map3d.web.compression import compress
 from map3d.web.document_routes import catalogue, workspace
 from map3d.web.health import READINESS, check_alive, check_ready
@@ -43,14 +42,14 @@ class ListedRendering:
     """A rendering in the list. `state`: complete, incomplete, empty (nothing rendered yet) or unreadable.
 
     `changed`: time of the last manifest that this host wrote.
-    `size` is unknown for tiles outside the workspace.
+    `bytes` is unknown for tiles outside the workspace.
     """
 
     name: str
     title: str
     attribution: str
     state: str
-    size: str = ""
+    bytes: int | None = None
     views: int = 0
     layers: int = 0
     changed: datetime | None = None
@@ -174,7 +173,7 @@ def _describe(record: RenderingRecord) -> ListedRendering:
             return ListedRendering(name, title, attribution, "empty")
         manifest = Manifest.load(data, str(path))
         changed = datetime.fromtimestamp(path.stat().st_mtime, UTC) if path.is_file() else None
-        size = page_formats.size(sum(file.stat().st_size for file in path.parent.iterdir() if file.is_file())) if tiles_url(record) is None else ""
+        size = sum(file.stat().st_size for file in path.parent.iterdir() if file.is_file()) if tiles_url(record) is None else None
     except (Map3dError, OSError) as error:
         status_of(error if isinstance(error, Map3dError) else Map3dError(f"rendering {name}: {error}"))
         return ListedRendering(name, title, attribution, "unreadable")

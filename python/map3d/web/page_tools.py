@@ -11,10 +11,10 @@ from markupsafe import Markup
 from map3d.accounts import Session
 from map3d.web.access import COOKIE, CSRF_FIELD, access, current_caller
 from map3d.web.host_folders import without_host_folders
-from map3d.web.page_formats import FILTERS
+from map3d.web.page_formats import FILTERS, number
+from map3d.web.page_language import language
 from map3d.web.session_cookie import set_session
 
-LANGUAGES: Final = ("en", "de")
 _TRANSLATIONS: Final = Path(__file__).parent / "translations"
 
 
@@ -32,17 +32,15 @@ def relative(path: str) -> str:
     return "../" * up + path.lstrip("/") or "./"
 
 
-def language() -> str:
-    """Returns the first language of the browser that pages are written in, else English."""
-    requested = (name[:2].lower() for name in request.accept_languages.values())
-    return next((name for name in requested if name in LANGUAGES), "en")
-
-
 def translate(text: str, **values: Any) -> str:
-    """Returns the text in the language of the request, with `values` in place of {names}."""
+    """Returns the text in the language of the request, with `values` in place of {names}; numbers among them as this language writes them."""
     wanted = language()
     found = text if wanted == "en" else translations(wanted).get(text, text)
-    return found.format(**values) if values else found
+    return found.format(**{name: _written(value) for name, value in values.items()}) if values else found
+
+
+def _written(value: Any) -> Any:
+    return number(value) if isinstance(value, int | float) else value
 
 
 @cache

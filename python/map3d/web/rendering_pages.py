@@ -19,7 +19,7 @@ from map3d.types import check_name
 from map3d.web.access import requires
 from map3d.web.document_routes import catalogue, workspace
 from map3d.web.operation_words import show_all
-from map3d.web.page_formats import duration, number, size
+from map3d.web.page_formats import duration, size
 from map3d.web.page_tools import translate
 from map3d.web.rendering_form import RenderingForm, read_form, read_preview
 from map3d.web.scene_pages import name_from
@@ -170,7 +170,7 @@ def _form_page(scene: str, form: RenderingForm, problem: str, status: int = 200)
 def _estimate_words(scene: str, form: RenderingForm) -> dict[str, str]:
     found = previews().estimate(catalogue(), form.request(scene, "estimate-of-a-new-rendering"), usable_cores())
     return {
-        "tiles": translate("{tiles} tiles in {images} images", tiles=number(found["tiles"]), images=number(found["images"])),
+        "tiles": translate("{tiles} tiles in {images} images", tiles=found["tiles"], images=found["images"]),
         "size": size(found["bytes"]),
         "time": translate("about {time} on this server", time=duration(found["seconds"])),
     }

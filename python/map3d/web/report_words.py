@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from map3d.catalogue import AssetRecord
-from map3d.web.page_formats import number
 from map3d.web.page_tools import translate as _
 
 N_: Final = str
@@ -69,12 +68,12 @@ def report_lines(asset: AssetRecord) -> list[ReportLine]:
 def _skipped(report: Mapping[str, Any]) -> Iterator[ReportLine]:
     examples = {warning["reason"]: str(warning["example"]) for warning in report.get("warnings", ())}
     for reason, count in sorted(report.get("skipped", {}).items(), key=lambda item: -item[1]):
-        yield ReportLine("skipped", _("Skipped: {count} × {reason}.", count=number(count), reason=reason), examples.get(f"skipped: {reason}", ""))
+        yield ReportLine("skipped", _("Skipped: {count} × {reason}.", count=count, reason=reason), examples.get(f"skipped: {reason}", ""))
 
 
 def _warnings(report: Mapping[str, Any]) -> Iterator[ReportLine]:
     for warning in report.get("warnings", ()):
-        reason, count = warning["reason"], number(warning["count"])
+        reason, count = warning["reason"], warning["count"]
         if not reason.startswith("skipped: "):
             text = _(FAULTS[reason], count=count) if reason in FAULTS else _("{count} × {reason}.", count=count, reason=reason)
             yield ReportLine("note", text, str(warning["example"]))
@@ -89,5 +88,5 @@ def placing_words(asset: AssetRecord) -> str:
     if source in (None, target):
         return _("Coordinates: {target}, unchanged.", target=target)
     accuracy = placing.get("accuracy_m")
-    exact = _("accuracy unknown") if accuracy is None or placing.get("ballpark") else _("accurate to {metres} m", metres=f"{accuracy:g}")
+    exact = _("accuracy unknown") if accuracy is None or placing.get("ballpark") else _("accurate to {metres} m", metres=accuracy)
     return _("Coordinates: transformed from {source} to {target} ({exact}).", source=source, target=target, exact=exact)

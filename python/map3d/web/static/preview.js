@@ -61,7 +61,7 @@ if (form) {
   const soonBoth = later(200, showBoth), soonDetail = later(200, showDetail), soonEstimate = later(700, showEstimate);
   form.addEventListener("input", (event) => {
     const { name, value } = event.target;
-    if (name === "pitch") document.getElementById("pitch-text").textContent = `${value}°`;
+    if (name === "pitch") document.getElementById("pitch-text").textContent = `${numberText(Number(value))}°`;
     if (name === "look") at = null;
     if (["pitch", "look", "kind"].includes(name)) soonBoth();
     if (name === "res") soonDetail();

@@ -35,20 +35,6 @@ function remember(key, url) {
   }
 }
 
-function sizeText(bytes) {
-  let value = bytes;
-  for (const unit of ["bytes", "kB", "MB", "GB"]) {
-    if (value < 999.5) return `${unit === "bytes" || value >= 100 ? Math.round(value) : value.toPrecision(3)} ${unit}`;
-    value /= 1000;
-  }
-  return `${value.toFixed(2)} TB`;
-}
-
-function timeText(seconds) {
-  if (seconds < 90) return `${Math.max(1, Math.round(seconds))} s`;
-  return seconds < 5400 ? `${Math.round(seconds / 60)} min` : `${(seconds / 3600).toFixed(1)} h`;
-}
-
 function base64(text) {
   return btoa(String.fromCharCode(...new TextEncoder().encode(text)));
 }
@@ -113,7 +99,7 @@ function Uploader(place) {
       item.row.state.textContent = item.note ? `${detail} · ${item.note}` : detail;
       item.row.line.dataset.state = item.state;
     }
-    find("total").textContent = `${items.length === 1 ? items[0].path : text("files", { count: items.length })} · ${text("of", { done: sizeText(sent), total: sizeText(total) })}`;
+    find("total").textContent = `${items.length === 1 ? items[0].path : text("files", { count: numberText(items.length) })} · ${text("of", { done: sizeText(sent), total: sizeText(total) })}`;
     find("all").max = Math.max(1, total);
     find("all").value = sent;
     find("rate").textContent = going && !paused ? rateText(sent, total) : paused ? texts.paused : "";
