@@ -88,8 +88,8 @@ def pages(filled):
 
 
 IN_PAGES = {
-    "en": ("1,234,567 triangles", "2,345 ×", "accurate to 0.25 m", "1.4 GB", "23 November 2026, 14:05 UTC", "0.1 m"),
-    "de": ("1.234.567 Dreiecke", "2.345 ×", "auf 0,25 m genau", f"1,4{NO_BREAK}GB", "23. Nov. 2026, 14:05 UTC", f"0,1{NO_BREAK}m"),
+    "en": ("1,234,567 triangles", "area, left out: 2,345.", "accurate to 0.25 m", "1.4 GB", "23 November 2026, 14:05 UTC", "0.1 m"),
+    "de": ("1.234.567 Dreiecke", "ohne Fläche: 2.345.", "auf 0,25 m genau", f"1,4{NO_BREAK}GB", "23. Nov. 2026, 14:05 UTC", f"0,1{NO_BREAK}m"),
 }
 
 

@@ -2,29 +2,11 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 from map3d.catalogue import AssetRecord
 from map3d.web.page_tools import translate as _
-
-N_: Final = str
-"""Marks a text that is translated where it is shown."""
-
-IMAGE_FAULTS: Final[Mapping[str, str]] = {
-    "image: file not found": N_("Textures not found: {count}. Upload them together with the model."),
-    "image: unknown format": N_("Textures in a format that map3d does not read: {count}."),
-    "unusable image": N_("Materials without a usable texture, shown in their colour: {count}."),
-    "georeferenced texture without reference point or world file": N_("Georeferenced textures without a reference point or world file: {count}."),
-}
-FAULTS: Final[Mapping[str, str]] = {
-    **IMAGE_FAULTS,
-    "polygon with crossing rings": N_("Polygons whose rings cross, which may look wrong: {count}."),
-    "ring that is not closed": N_("Rings that are not closed: {count}."),
-    "unresolved reference": N_("References that lead nowhere in the file: {count}."),
-    "reference to another document not followed": N_("References to other documents, which were not followed: {count}."),
-    "material not defined": N_("Materials that are used but not defined: {count}."),
-    "unknown wrap mode": N_("Textures with an unknown wrap mode: {count}."),
-}
+from map3d.web.report_sentences import FAULTS, SKIPPED, SKIPPED_BY_LIMIT
 
 
 @dataclass(frozen=True)
@@ -68,7 +50,16 @@ def report_lines(asset: AssetRecord) -> list[ReportLine]:
 def _skipped(report: Mapping[str, Any]) -> Iterator[ReportLine]:
     examples = {warning["reason"]: str(warning["example"]) for warning in report.get("warnings", ())}
     for reason, count in sorted(report.get("skipped", {}).items(), key=lambda item: -item[1]):
-        yield ReportLine("skipped", _("Skipped: {count} × {reason}.", count=count, reason=reason), examples.get(f"skipped: {reason}", ""))
+        yield ReportLine("skipped", _skipped_text(reason, count), examples.get(f"skipped: {reason}", ""))
+
+
+def _skipped_text(reason: str, count: int) -> str:
+    if reason in SKIPPED:
+        return _(SKIPPED[reason], count=count)
+    text, _equals, limit = reason.partition(" = ")
+    if text in SKIPPED_BY_LIMIT and limit.isdecimal():
+        return _(SKIPPED_BY_LIMIT[text], count=count, limit=int(limit))
+    return _("Skipped: {count} × {reason}.", count=count, reason=reason)
 
 
 def _warnings(report: Mapping[str, Any]) -> Iterator[ReportLine]:

@@ -1,0 +1,59 @@
+"""What import reports name, as sentences of pages: reason → text, translated where it is shown."""
+
+from collections.abc import Mapping
+from typing import Final
+
+N_: Final = str
+"""Marks a text that is translated where it is shown."""
+
+IMAGE_FAULTS: Final[Mapping[str, str]] = {
+    "image: file not found": N_("Textures not found: {count}. Upload them together with the model."),
+    "image: unknown format": N_("Textures in a format that map3d does not read: {count}."),
+    "unusable image": N_("Materials without a usable texture, shown in their colour: {count}."),
+    "georeferenced texture without reference point or world file": N_("Georeferenced textures without a reference point or world file: {count}."),
+}
+FAULTS: Final[Mapping[str, str]] = {
+    **IMAGE_FAULTS,
+    "polygon with crossing rings": N_("Polygons whose rings cross, which may look wrong: {count}."),
+    "ring that is not closed": N_("Rings that are not closed: {count}."),
+    "unresolved reference": N_("References that lead nowhere in the file: {count}."),
+    "reference to another document not followed": N_("References to other documents, which were not followed: {count}."),
+    "material not defined": N_("Materials that are used but not defined: {count}."),
+    "unknown wrap mode": N_("Textures with an unknown wrap mode: {count}."),
+}
+SKIPPED: Final[Mapping[str, str]] = {
+    "coordinate is not a finite number": N_("Skipped polygons and triangles with coordinates that are not finite numbers: {count}."),
+    "coordinate too far from the origin": N_("Skipped triangles too far from the origin: {count}."),
+    "face with fewer than 3 vertices": N_("Skipped faces with fewer than 3 vertices: {count}."),
+    "free-form curve or surface": N_("Skipped free-form curves and surfaces: {count}."),
+    "fully transparent face": N_("Fully transparent faces, left out: {count}."),
+    "fully transparent polygon": N_("Fully transparent polygons, left out: {count}."),
+    "geometry that refers to itself": N_("Skipped geometry that refers to itself: {count}."),
+    "grid points without a height": N_("Grid points without a height, left out: {count}."),
+    "implicit geometry with an invalid transformation matrix": N_("Skipped implicit geometry with an invalid transformation matrix: {count}."),
+    "implicit geometry without a prototype": N_("Skipped implicit geometry without a prototype: {count}."),
+    "implicit geometry without a reference point": N_("Skipped implicit geometry without a reference point: {count}."),
+    "index out of range": N_("Skipped triangles and faces that refer to missing vertices: {count}."),
+    "points and lines": N_("Points and lines, left out: {count}."),
+    "polygon of an interior": N_("Polygons of rooms, left out: {count}. The option “CityGML: rooms” draws them."),
+    "polygon that could not be triangulated": N_("Skipped polygons that could not be divided into triangles: {count}."),
+    "polygon with too many vertices to triangulate": N_(
+        "Skipped polygons with too many vertices and crossing edges to be divided into triangles: {count}."
+    ),
+    "polygon with unreadable coordinates": N_("Skipped polygons with unreadable coordinates: {count}."),
+    "polygon without area": N_("Skipped polygons without area: {count}."),
+    "polygon without rings": N_("Skipped polygons without rings: {count}."),
+    "ring with fewer than 3 points": N_("Skipped rings with fewer than 3 points: {count}."),
+    "solid of an open space": N_("Solids of open spaces, left out: {count}."),
+    "texture coordinate is not a finite number": N_("Texture coordinates that are not finite numbers, left out: {count}."),
+    "unreadable face": N_("Skipped unreadable faces: {count}."),
+    "unreadable vertex": N_("Skipped unreadable vertices: {count}."),
+    "unsupported geometry type": N_("Geometry of types that map3d does not read, left out: {count}."),
+    "zero area": N_("Triangles without area, left out: {count}."),
+}
+"""What is not in the map: skipped since it is broken, or left out by design."""
+SKIPPED_BY_LIMIT: Final[Mapping[str, str]] = {
+    "face over the limit max_ring_vertices": N_("Skipped faces with more than {limit} vertices: {count}."),
+    "ring over the limit max_ring_vertices": N_("Skipped rings with more than {limit} points: {count}."),
+}
+"""Reasons that end with ` = ` and the limit."""
