@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 import map3d.web
-from map3d.catalogue import AssetRecord, PlannedJob
+from map3d.catalogue import AssetRecord, PlannedJob, SceneCrs, SceneRecord
+from map3d.catalogue.records import LOCAL_CRS_NAME
 from map3d.operations.request_operation import request_operation
 from map3d.types import BlockId
 from map3d.web import create_app, page_formats
@@ -104,6 +105,22 @@ def test_pages_write_numbers_sizes_and_dates_in_their_language(pages, language):
     for path in ("/studio/renderings/tea/remove", "/studio/scenes/town/remove", "/studio/renderings/tea/published/shown/remove"):
         assert size in get(path, language), path
     assert changed in get("/renderings", language)
+
+
+def test_the_list_of_renderings_errors_and_local_scenes_are_german(pages, filled):
+    _, get = pages
+    listed = get("/renderings", "de")
+    assert "2 Ansichten · 4 Ebenen · " in listed
+    assert "Vollständig" in listed
+    assert 'title="Letzte Änderung: 23. Nov. 2026, 14:05 UTC">23. Nov. 2026<' in listed
+    assert "nicht gefunden" in get("/studio/scenes/nothing", "de")
+    filled.manifest_path("tea").unlink()
+    assert "Noch nicht gerendert" in get("/renderings", "de")
+    catalogue = filled.open_catalogue()
+    catalogue.create_scene(SceneRecord("here", crs=SceneCrs(None, None, LOCAL_CRS_NAME)))
+    catalogue.close()
+    assert "lokale Meter" in get("/studio/scenes/here", "de")
+    assert "lokale Meter" in get("/studio/", "de")
 
 
 PATHS = (

@@ -11,7 +11,7 @@ from map3d.catalogue import AssetRecord
 from map3d.web import page_tools
 from map3d.web.page_language import LANGUAGES
 from map3d.web.report_sentences import FAULTS, SKIPPED, SKIPPED_BY_LIMIT
-from map3d.web.report_words import report_lines
+from map3d.web.report_words import report_lines, summary_of
 
 ROOT = Path(__file__).parents[2]
 CALLS = re.compile(r"""\b(?:report|self)\.(?:skip|skip_many|omit)\(\s*(?:&format!\()?("[^"]*"|[A-Z_]{2,}|[a-z_.&()]+)""")
@@ -74,3 +74,8 @@ def test_an_unknown_reason_is_shown_as_it_is(monkeypatch):
         monkeypatch.setattr(module, "language", lambda: "de")
     (line,) = report_lines(AssetRecord("town", "a", "a.gml", "citygml", "d", "s", {"skipped": {"something = new": 3}}))
     assert line.text == "Übersprungen: 3 × something = new."
+
+
+def test_what_is_skipped_counts_once():
+    report = {"skipped": {"zero area": 3}, "warnings": [{"reason": "skipped: zero area", "count": 3}, {"reason": "unknown wrap mode", "count": 2}]}
+    assert summary_of(AssetRecord("town", "a", "a.gml", "citygml", "d", "s", report)).problems == 5

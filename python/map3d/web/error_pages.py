@@ -10,7 +10,7 @@ from map3d.web.api_document import problem_response
 from map3d.web.api_route import PREFIX as API
 from map3d.web.host_folders import without_host_folders
 from map3d.web.http_errors import retry_headers, status_of
-from map3d.web.page_tools import relative
+from map3d.web.page_tools import relative, translate
 
 
 def error_response(error: Exception) -> Response:
@@ -53,7 +53,9 @@ def _page(error: Exception, status: int, text: str, plain: Response) -> Response
     if isinstance(error, SignInRequired) and request.method == "GET":
         back = request.full_path.rstrip("?")
         return Response(status=303, headers={"Location": relative(url_for("accounts.sign_in", next=back))})
-    response = Response(render_template("error.html", status=status, text=text), status, mimetype="text/html")
+    response = Response(
+        render_template("error.html", status=status, text=translate("not found") if text == "not found" else text), status, mimetype="text/html"
+    )
     if "Allow" in plain.headers:
         response.headers["Allow"] = plain.headers["Allow"]
     return response

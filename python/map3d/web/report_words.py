@@ -32,7 +32,8 @@ class AssetSummary:
 
 def summary_of(asset: AssetRecord) -> AssetSummary:
     report = asset.report
-    problems = sum(report.get("skipped", {}).values()) + sum(warning["count"] for warning in report.get("warnings", ()))
+    noted = sum(warning["count"] for warning in report.get("warnings", ()) if not warning["reason"].startswith("skipped: "))
+    problems = sum(report.get("skipped", {}).values()) + noted
     source = asset.source.rsplit("/", 1)[-1]
     return AssetSummary(asset.name, source, asset.format, report.get("objects", 0), report.get("triangles", 0), problems)
 
