@@ -274,5 +274,7 @@ def test_content_outside_the_frame_stops_before_any_change(workspace: Workspace,
 def test_workers_share_memory_and_too_little_is_refused() -> None:
     assert RunSettings(2).cache_bytes == 512 << 20
     assert RunSettings(2, 2 << 30).cache_bytes == (1 << 30) - (256 << 20)
-    with pytest.raises(BadRequest, match="640 MiB"):
-        _ = dataclasses.replace(RunSettings(2), max_memory_bytes=500 << 20).cache_bytes
+    with pytest.raises(BadRequest, match="500 MiB is too small for 2 workers: give at least 640 MiB"):
+        dataclasses.replace(RunSettings(2), max_memory_bytes=500 << 20).check()
+    with pytest.raises(BadRequest, match="too small for 1 worker: "):
+        RunSettings(1, 256 << 20).check()

@@ -71,6 +71,8 @@ def command(
     from map3d.renderings.style import choose_style
 
     check_folder(out)
+    settings = RunSettings(workers, max_memory)
+    settings.check()
     request = _site_request(folder, views, **options)
     catalogue = workspace.create().open_catalogue()
     try:
@@ -87,7 +89,7 @@ def command(
         print_rendering(made)
         print_estimate(workspace, catalogue, record.name, workers)
         started = monotonic()
-        result = render_with_progress(Run(workspace, catalogue, record.name, RunSettings(workers, max_memory)))
+        result = render_with_progress(Run(workspace, catalogue, record.name, settings))
         seconds = monotonic() - started if result.statistics.done else None
         store_report(workspace, catalogue, request, made, summary, workers, seconds)
     finally:

@@ -5,6 +5,7 @@ from typing import Final
 
 from map3d.errors import BadRequest
 from map3d.jobs.timeouts import Timeouts
+from map3d.quantities import plural
 from map3d.renderings.render_task import CACHE_BYTES, RENDER_ENTRY
 
 MIN_CACHE_BYTES: Final = 64 << 20
@@ -21,6 +22,10 @@ class RunSettings:
     timeouts: Timeouts = field(default_factory=Timeouts)
     entry: str = RENDER_ENTRY
 
+    def check(self) -> None:
+        """Raises BadRequest when the memory is too small for the workers."""
+        _ = self.cache_bytes
+
     @property
     def cache_bytes(self) -> int:
         """Cache size of one subprocess. Raises BadRequest when the memory is too small for the workers."""
@@ -30,7 +35,7 @@ class RunSettings:
         if each < MIN_CACHE_BYTES:
             need = self.workers * (MIN_CACHE_BYTES + WORKER_BYTES)
             raise BadRequest(
-                f"--max-memory {self.max_memory_bytes >> 20} MiB is too small for {self.workers} workers: "
+                f"--max-memory {self.max_memory_bytes >> 20} MiB is too small for {plural(self.workers, 'worker')}: "
                 f"give at least {need >> 20} MiB, or fewer --workers"
             )
         return each
