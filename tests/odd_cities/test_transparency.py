@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from tests.cli.towns import Run
-from tests.odd_cities.towns import houses, write_citygml
+from tests.odd_cities.appearances import add_transparency
+from tests.odd_cities.towns import write_citygml
 
 pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
 
@@ -16,16 +17,7 @@ OPACITY_LINE = "transparency read as opacity: town: 1 of 2 materials would be in
 
 def write_town(folder: Path, walls: str, roofs: str) -> Path:
     """Writes a town whose walls and roofs have these transparencies."""
-    path = write_citygml(folder / "town.gml", None, lambda corners: corners)
-    materials = "".join(
-        f"<app:surfaceDataMember><app:X3DMaterial><app:transparency>{value}</app:transparency>"
-        + "".join(f"<app:target>#{name}-{k}</app:target>" for name, faces in houses() for k in range(len(faces)) if (k < 2) == is_roof)
-        + "</app:X3DMaterial></app:surfaceDataMember>"
-        for value, is_roof in ((walls, False), (roofs, True))
-    )
-    appearance = f"<app:appearanceMember><app:Appearance><app:theme>t</app:theme>{materials}</app:Appearance></app:appearanceMember>"
-    path.write_text(path.read_text().replace("</core:CityModel>", f"{appearance}</core:CityModel>"))
-    return path
+    return add_transparency(write_citygml(folder / "town.gml", None, lambda corners: corners), walls, roofs)
 
 
 @pytest.mark.parametrize(
