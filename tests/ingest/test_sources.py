@@ -30,6 +30,40 @@ def test_a_folder_yields_every_readable_file_once_in_order(tmp_path: Path) -> No
     assert find_sources([tmp_path]) == found
 
 
+def names(folder: Path, known: dict[str, Path] | None = None) -> dict[str, str]:
+    """Returns relative path → name."""
+    return {str(source.paths[0].relative_to(folder)): source.name for source in find_sources([folder], known=known)}
+
+
+@pytest.mark.parametrize("added", ["a/town.obj", "a/TOWN.obj", "a.obj", "town.obj", "b/c/town.obj"])
+def test_known_files_keep_their_names_when_others_are_added(tmp_path: Path, added: str) -> None:
+    for path in ("b/town.obj", "c/town.obj", added):
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+    for path in ("b/town.obj", "c/town.obj"):
+        (tmp_path / path).write_text(OBJ)
+    before = names(tmp_path)
+    assert before == {"b/town.obj": "town", "c/town.obj": "town-2"}
+    known = {name: tmp_path / path for path, name in before.items()}
+    (tmp_path / added).write_text(OBJ)
+    after = names(tmp_path, known)
+    assert after == before | {added: "a" if added == "a.obj" else "town-3"}
+
+    moved = tmp_path.with_name(f"{tmp_path.name}-moved")
+    tmp_path.rename(moved)
+    assert names(moved, {name: tmp_path / path for path, name in after.items()}) == after
+    (moved / "b/town.obj").unlink()
+    assert names(moved, {name: moved / path for path, name in after.items()}) == {path: name for path, name in after.items() if path != "b/town.obj"}
+
+
+def test_a_file_of_a_numbered_asset_given_alone_is_that_asset(tmp_path: Path) -> None:
+    known = {"town": tmp_path / "b" / "town.obj", "town-2": tmp_path / "c" / "town.obj"}
+    for path in known.values():
+        path.parent.mkdir()
+        path.write_text(OBJ)
+    assert [source.name for source in find_sources([known["town-2"]], known=known)] == ["town-2"]
+    assert [source.name for source in find_sources([known["town-2"]], "town", known=known)] == ["town"]
+
+
 def test_a_folder_without_a_readable_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("v 1 2 3")
     with pytest.raises(UnknownFormat, match="no readable file in this folder;"):

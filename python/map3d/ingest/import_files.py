@@ -72,6 +72,7 @@ def _import_files(
         name,
         lambda path, reason: result.failed.append((str(path), reason)),
         lambda path, reason: result.left_alone.append((str(path), reason)),
+        {asset.name: Path(asset.source) for asset in catalogue.assets(scene)},
     )
     if result.failed and options.strict:
         raise UnknownFormat(result.failed[0][1])

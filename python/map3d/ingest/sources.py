@@ -5,6 +5,7 @@ import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import count, takewhile
 from pathlib import Path
 
 from map3d.errors import NotFound, UnknownFormat
@@ -43,7 +44,11 @@ class SourceDocument:
 
 
 def find_sources(
-    paths: Iterable[Path], name: str | None = None, on_unreadable: OnUnreadable | None = None, on_left_alone: OnUnreadable | None = None
+    paths: Iterable[Path],
+    name: str | None = None,
+    on_unreadable: OnUnreadable | None = None,
+    on_left_alone: OnUnreadable | None = None,
+    known: Mapping[str, Path] | None = None,
 ) -> list[SourceDocument]:
     """Returns the given files, and every file of a known format below the given folders: CityGML, OBJ, then rasters, each by path.
 
@@ -51,7 +56,8 @@ def find_sources(
     the first.
 
     `on_unreadable` is called for files in folders whose suffix announces a known format that their content is not; `on_left_alone` for other files
-    that hold a city or a raster in a format that map3d does not read, or whose format is unknown.
+    that hold a city or a raster in a format that map3d does not read, or whose format is unknown. `known`: the files of assets by name; a file whose
+    name is needed for several keeps the one that it has there.
 
     Raises UnknownFormat for a given file of unknown format and for a folder without any readable file; NotFound.
     """
@@ -71,7 +77,7 @@ def find_sources(
             documents.append(_Group(unpacked_path(path).stem, format, (path,)))
     if rasters:
         terrains.append(_Group(rasters[0].stem, "raster", tuple(rasters)))
-    sources = _name_sources([*documents, *terrains], name)
+    sources = _name_sources([*documents, *terrains], name, known or {})
     return sorted(sources, key=lambda source: _ORDER[source.format])
 
 
@@ -162,18 +168,50 @@ def _group_rasters(rasters: Sequence[Path]) -> list[_Group]:
     return [_Group(rasters[0].stem if len(rasters) == 1 else folder.resolve().name, "raster", tuple(rasters))]
 
 
-def _name_sources(groups: Sequence[_Group], name: str | None) -> list[SourceDocument]:
-    """Names sources after their files and numbers duplicates."""
-    taken: set[str] = set()
+def _name_sources(groups: Sequence[_Group], name: str | None, known: Mapping[str, Path]) -> list[SourceDocument]:
+    """Names sources after their files and numbers duplicates, without changing the names of known ones."""
+    wanted = [asset_name(name or group.label) for group in groups]
+    kept = {} if name else _kept_names(groups, wanted, known)
+    taken = set(kept.values())
     sources = []
-    for group in groups:
-        wanted = asset_name(name or group.label)
-        unique, number = wanted, 2
-        while unique in taken:
-            unique, number = f"{wanted[:58]}-{number}", number + 1
+    for position, group in enumerate(groups):
+        unique = kept.get(position) or next(text for text in _numbered(wanted[position]) if text not in taken)
         taken.add(unique)
         sources.append(SourceDocument(unique, group.format, group.paths, group.root))
     return sources
+
+
+def _kept_names(groups: Sequence[_Group], wanted: Sequence[str], known: Mapping[str, Path]) -> dict[int, str]:
+    """Returns position → known name. A terrain has that of its raster. Where several documents may have a name, the one whose path agrees with the
+    known one in more parts from the end has it, also after their folder was moved."""
+    places: dict[str, list[tuple[str, Path]]] = {}
+    for known_name, path in known.items():
+        places.setdefault(asset_name(unpacked_path(path).stem), []).append((known_name, path))
+    pairs = [
+        (-_equal_parts(group.paths[0], path), position, known_name)
+        for position, group in enumerate(groups)
+        for known_name, path in places.get(wanted[position], ())
+        if known_name == wanted[position] or known_name.startswith(f"{wanted[position][:58]}-")
+    ]
+    rasters = {path.absolute(): position for position, group in enumerate(groups) if group.format == "raster" for path in group.paths}
+    pairs += [(-len(path.parts), rasters[path], known_name) for known_name, path in known.items() if path in rasters]
+    kept: dict[int, str] = {}
+    for equal, position, known_name in sorted(pairs):
+        if equal and position not in kept and known_name not in kept.values():
+            kept[position] = known_name
+    return kept
+
+
+def _equal_parts(one: Path, other: Path) -> int:
+    """Returns the number of equal parts of two paths, counted from the end."""
+    pairs = zip(reversed(one.absolute().parts), reversed(other.absolute().parts), strict=False)
+    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
+
+
+def _numbered(name: str) -> Iterator[str]:
+    """Yields the name, and the name with numbers from 2 on."""
+    yield name
+    yield from (f"{name[:58]}-{number}" for number in count(2))
 
 
 def asset_name(text: str) -> str:

@@ -84,7 +84,11 @@ class _Update:
     def _find_sources(self) -> list[SourceDocument]:
         try:
             sources = find_sources(
-                [self._files.folder], None, lambda path, reason: self._summary.failed.append((str(path), reason)), self._leave_alone
+                [self._files.folder],
+                None,
+                lambda path, reason: self._summary.failed.append((str(path), reason)),
+                self._leave_alone,
+                {name: Path(asset.source) for name, asset in self._assets.items()},
             )
         except UnknownFormat as error:
             from_here = sum(map(self._is_inside, self._assets.values()))

@@ -1,0 +1,89 @@
+"""Files with equal names in several folders: adding one never changes the names and object ids of those that are there."""
+
+from pathlib import Path
+
+import pytest
+
+from map3d.catalogue import SceneRecord, Workspace
+from map3d.ingest.import_files import import_files
+from map3d.ingest.import_options import ImportOptions
+from map3d.registry import Registry
+from map3d.renderings.site_files import ImportSummary, SiteFiles, update_files
+from tests.ingest.terrain.rasters import colours, hills
+from tests.ingest.terrain.rasters import write as write_raster
+from tests.odd_cities.towns import write_citygml
+
+pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
+
+OPTIONS = ImportOptions(crs="local")
+
+
+def write(city: Path, name: str) -> None:
+    """Writes a file whose gml:ids begin with its path."""
+    write_citygml(city / name, None, lambda corners: corners, side=1, prefix=name.replace("/", "-").replace(".", "-") + "-")
+
+
+def ids(workspace: Workspace) -> dict[str, tuple[str, int]]:
+    """Returns gml:id → asset and object id."""
+    with Registry(workspace.registry_path("town")) as registry:
+        return {item.name: (item.asset, item.id) for item in registry.objects()}
+
+
+def update(workspace: Workspace, city: Path) -> ImportSummary:
+    catalogue = workspace.open_catalogue()
+    try:
+        return update_files(workspace, catalogue, SiteFiles(SceneRecord("town"), city, OPTIONS), lambda *_: None)
+    finally:
+        catalogue.close()
+
+
+@pytest.mark.parametrize("added", ["a/town.gml", "a.gml", "a/TOWN.gml"])
+def test_a_file_added_to_a_site_changes_no_ids(tmp_path: Path, added: str) -> None:
+    workspace, city = Workspace(tmp_path / "workspace").create(), tmp_path / "city"
+    for name in ("b/town.gml", "c/town.gml"):
+        write(city, name)
+    assert update(workspace, city).imported == ["town", "town-2"]
+    before = ids(workspace)
+    write(city, added)
+    summary = update(workspace, city)
+    assert len(summary.imported) == 1
+    assert (sorted(summary.unchanged), summary.again, summary.removed) == (["town", "town-2"], {}, [])
+    after = ids(workspace)
+    assert before.items() < after.items()
+
+    (city / "b" / "town.gml").unlink()
+    (city / "b").rmdir()
+    assert update(workspace, city).removed == ["town"]
+    rest = {name: place for name, place in after.items() if not name.startswith("b-")}
+    assert ids(workspace) == rest
+    write(city, "b/town.gml")
+    assert update(workspace, city).imported == ["town"]
+    assert rest.items() < ids(workspace).items()
+
+
+@pytest.mark.parametrize("added", ["a.tif", "photo.tif"])
+def test_a_raster_added_to_a_terrain_changes_no_ids(tmp_path: Path, added: str) -> None:
+    workspace, city = Workspace(tmp_path / "workspace").create(), tmp_path / "city"
+    city.mkdir()
+    write_raster(city / "dem.tif", hills(8, 8))
+    assert update(workspace, city).imported == ["dem"]
+    before = ids(workspace)
+    write_raster(city / added, colours(16, 16), 0.5)
+    summary = update(workspace, city)
+    assert (summary.imported, summary.removed) == (["dem"], [])
+    assert ids(workspace) == before
+
+
+def test_a_file_added_by_hand_changes_no_ids(tmp_path: Path) -> None:
+    workspace, city = Workspace(tmp_path / "workspace").create(), tmp_path / "city"
+    write(city, "b/town.gml")
+    catalogue = workspace.open_catalogue()
+    catalogue.create_scene(SceneRecord("town"))
+    import_files(workspace, catalogue, "town", [city], OPTIONS)
+    before = ids(workspace)
+    write(city, "a/town.gml")
+    import_files(workspace, catalogue, "town", [city], OPTIONS)
+    catalogue.close()
+    after = ids(workspace)
+    assert before.items() < after.items()
+    assert {asset for asset, _ in after.values()} == {"town", "town-2"}
