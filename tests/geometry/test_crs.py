@@ -17,6 +17,8 @@ from map3d.geometry.crs import horizontal_crs, parse_crs, vertical_crs, vertical
         ("http://www.opengis.net/gml/srs/epsg.xml#31467", 31467, None),
         ("urn:ogc:def:crs,crs:EPSG::25832,crs:EPSG::5783", 25832, 5783),
         ("urn:ogc:def:crs,crs:EPSG:6.12:31256,crs:EPSG:6.12:5778", 31256, 5778),
+        ("urn:ogc:def:crs:EPSG:25832, crs:EPSG:5783", 25832, 5783),
+        ("urn:ogc:def:crs, crs:EPSG::25832, crs:EPSG::5783", 25832, 5783),
         ("EPSG:25832+5783", 25832, 5783),
         ("EPSG::25832*EPSG::5783", 25832, 5783),
         (
@@ -48,6 +50,12 @@ def test_names_have_a_horizontal_and_a_vertical_part(name: str, horizontal: int,
 )
 def test_unknown_names_say_what_to_do(name: str) -> None:
     with pytest.raises(CrsError, match="--crs"):
+        parse_crs(name)
+
+
+@pytest.mark.parametrize("name", ["EPSG:5783", "urn:ogc:def:crs:EPSG::7837"])
+def test_heights_alone_are_not_a_crs_of_positions(name: str) -> None:
+    with pytest.raises(CrsError, match=r"has heights alone; name the whole with --crs"):
         parse_crs(name)
 
 

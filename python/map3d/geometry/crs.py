@@ -51,9 +51,12 @@ def parse_crs(name: str) -> CRS:
     """Parses an EPSG code, OGC URN or URL (also compound), AdV URN, WKT or PROJ string. Raises CrsError."""
     text = name.strip()
     try:
-        return _parse_adv(text) or _parse_compound(text) or _parse_epsg(text) or CRS.from_user_input(text)
+        crs = _parse_adv(text) or _parse_compound(text) or _parse_epsg(text) or CRS.from_user_input(text)
     except (CRSError, ValueError) as error:
         raise CrsError(f"unknown CRS {name[:200]!r}; name the right one with --crs, e.g. --crs EPSG:25832") from error
+    if (crs.sub_crs_list or [crs])[0].is_vertical:
+        raise CrsError(f"CRS {name[:200]!r} ({crs.name}) has heights alone; name the whole with --crs, e.g. --crs EPSG:25832+5783")
+    return crs
 
 
 def is_local(name: str) -> bool:
@@ -105,11 +108,12 @@ def _parse_adv(text: str) -> CRS | None:
 
 
 def _parse_compound(text: str) -> CRS | None:
-    """Parses `urn:ogc:def:crs,crs:EPSG::25832,crs:EPSG::5783`, `EPSG:25832+5783`, `…/crs-compound?1=…&2=…`, `EPSG::25832*EPSG::5783`."""
+    """Parses `urn:ogc:def:crs,crs:EPSG::25832,crs:EPSG::5783`, `EPSG:25832+5783`, `…/crs-compound?1=…&2=…`, `EPSG::25832*EPSG::5783`,
+    and `urn:ogc:def:crs:EPSG:25832, crs:EPSG:5783`, as in examples of the OGC."""
     if "crs-compound?" in text:
         parts = [part.partition("=")[2] for part in text.partition("?")[2].split("&")]
-    elif text.lower().startswith("urn:ogc:def:crs,"):
-        parts = text.split(",")[1:]
+    elif text.lower().startswith("urn:ogc:def:crs") and "," in text:
+        parts = [part.strip() for part in text.split(",") if part.strip().lower() != "urn:ogc:def:crs"]
     elif re.search(r"EPSG\S*[+*]", text, re.IGNORECASE):
         parts = [part if "epsg" in part.lower() else f"EPSG:{part}" for part in re.split(r"[+*]", text)]
     else:
