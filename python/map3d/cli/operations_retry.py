@@ -1,24 +1,10 @@
 """map3d operations retry."""
 
-import click
-
-from map3d.catalogue import Workspace
-from map3d.cli.options import json_option, workspace_option
-from map3d.cli.output import print_json
+from map3d.catalogue import Catalogue, OperationRecord
+from map3d.cli.operation_command import operation_command
 
 
-@click.command("retry")
-@click.argument("id")
-@json_option
-@workspace_option
-def command(workspace: Workspace, id: str, as_json: bool) -> None:
+@operation_command("retry")
+def command(catalogue: Catalogue, id: str) -> tuple[OperationRecord, list[str]]:
     """Do a failed or cancelled operation again; it goes on where it ended."""
-    catalogue = workspace.open_catalogue()
-    try:
-        operation = catalogue.retry_operation(id)
-    finally:
-        catalogue.close()
-    if as_json:
-        print_json(operation)
-    else:
-        click.echo(f"operation {id} waits for an operation worker: map3d serve, or map3d work --operations")
+    return catalogue.retry_operation(id), [f"operation {id} waits for an operation worker: map3d serve, or map3d work --operations"]
