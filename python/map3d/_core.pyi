@@ -66,6 +66,9 @@ class Batch:
     def prototype(self) -> bool:
         """True: the positions are in a prototype's own frame, not in the source's CRS."""
     @property
+    def crs(self) -> int:
+        """Index of the coordinate system of the positions among `Reader.crs_names`."""
+    @property
     def triangle_count(self) -> int: ...
 
 @final
@@ -83,7 +86,13 @@ class Reader:
     def __next__(self) -> Batch: ...
     def instances(self) -> NDArray[np.float64]:
         """Returns (m, 12) transforms of the instances, row-major 3 × 4, prototype → source CRS; complete after the last batch."""
-    def set_instances(self, transforms: NDArray[np.float64]) -> None: ...
+    def instance_crs(self) -> NDArray[np.uint16]:
+        """Returns the (m,) indices of the instances' coordinate systems among `crs_names`, before `set_instances`; complete after the last batch."""
+    def crs_names(self) -> list[str | None]:
+        """Returns the coordinate systems that parts of the document are in, as it writes them; the first is the document's. Known for each batch when
+        it is returned."""
+    def set_instances(self, transforms: NDArray[np.float64]) -> int:
+        """Replaces all transforms; removes the instances whose transforms are not finite and returns their number."""
     def report(self) -> str:
         """Returns report.json so far (spec/scene.md)."""
 

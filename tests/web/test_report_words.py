@@ -10,7 +10,7 @@ import map3d.web
 from map3d.catalogue import AssetRecord
 from map3d.web import page_tools
 from map3d.web.page_language import LANGUAGES
-from map3d.web.report_sentences import FAULTS, SKIPPED, SKIPPED_BY_LIMIT
+from map3d.web.report_sentences import FAULTS, SKIPPED, SKIPPED_BY_LIMIT, SKIPPED_BY_NAME
 from map3d.web.report_words import report_lines, summary_of
 
 ROOT = Path(__file__).parents[2]
@@ -31,7 +31,8 @@ def skip_reasons():
                 found |= set(re.findall(rf'const {call}: &str = "([^"]*)"', "\n".join(sources.values())))
             else:
                 assert call in OF_VALUES or "skip" in call, call
-    return {reason.replace(" = {limit}", "") for reason in found | reasons_of_functions(sources)} | {"grid points without a height"}
+    of_python = {"grid points without a height", "implicit geometry without a place in the scene's coordinate system"}
+    return {reason.replace(" = {limit}", "") for reason in found | reasons_of_functions(sources)} | of_python
 
 
 def reasons_of_functions(sources):
@@ -40,8 +41,9 @@ def reasons_of_functions(sources):
     geometry = re.findall(r'^ +\("([^"]*)", self\.\w+\),$', texts["validation.rs"], re.MULTILINE)
     implicit = re.findall(r'Err\("([^"]*)"\)', texts["implicit_geometry.rs"])
     rings = re.findall(r'"(ring [^"]*)"(?:\.to_owned\(\)|\))', texts["tessellate.rs"])
-    assert min(map(len, (triangulation, geometry, implicit, rings))) >= 2
-    return {*triangulation, *geometry, *implicit, *rings} - {"ring that is not closed"}
+    polygons = re.findall(r'=> Some\("([^"]*)"\)', texts["geometry_parser.rs"])
+    assert min(map(len, (triangulation, geometry, implicit, rings, polygons))) >= 2
+    return {*triangulation, *geometry, *implicit, *rings, *polygons} - {"ring that is not closed"}
 
 
 def test_every_skip_reason_has_a_sentence():
@@ -53,13 +55,17 @@ def test_every_skip_reason_has_a_sentence():
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_every_reason_is_said_in_every_language(monkeypatch, language):
-    texts = {**FAULTS, **SKIPPED, **SKIPPED_BY_LIMIT}
+    texts = {**FAULTS, **SKIPPED, **SKIPPED_BY_LIMIT, **SKIPPED_BY_NAME}
     translated = {} if language == "en" else json.loads((Path(map3d.web.__file__).parent / f"translations/{language}.json").read_text("utf-8"))
     assert language == "en" or sorted(set(texts.values()) - set(translated)) == []
     for module in (page_tools, map3d.web.page_formats):
         monkeypatch.setattr(module, "language", lambda: language)
     report = {
-        "skipped": {**dict.fromkeys(SKIPPED, 1234), **{f"{reason} = 200000": 2 for reason in SKIPPED_BY_LIMIT}},
+        "skipped": {
+            **dict.fromkeys(SKIPPED, 1234),
+            **{f"{reason} = 200000": 2 for reason in SKIPPED_BY_LIMIT},
+            **{f"{reason} = EPSG:1234": 1234 for reason in SKIPPED_BY_NAME},
+        },
         "warnings": [{"reason": reason, "count": 1234, "example": "b"} for reason in FAULTS],
     }
     lines = [line.text for line in report_lines(AssetRecord("town", "a", "a.gml", "citygml", "d", "s", report))]

@@ -35,6 +35,12 @@ impl Batch {
         self.0.prototype > 0
     }
 
+    /// Index of the coordinate system of the positions among `Reader.crs_names`.
+    #[getter]
+    fn crs(&self) -> u16 {
+        self.0.crs
+    }
+
     #[getter]
     fn triangle_count(&self) -> usize {
         self.0.triangles.len()

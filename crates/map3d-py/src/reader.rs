@@ -5,7 +5,7 @@ use std::sync::Mutex;
 
 use map3d_base::asset::{AssetReport, AssetWriter};
 use map3d_read::{DocumentReader, Format, ReadOptions, open, write_tables};
-use numpy::{PyArray2, PyReadonlyArray2};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use crate::batch::{Batch, rows};
@@ -59,13 +59,27 @@ impl Reader {
         Ok(batch.map(Batch))
     }
 
+    /// Coordinate systems that parts of the document are in, as it writes them; the first is the document's. Known for each batch when it is returned.
+    fn crs_names(&self) -> Vec<Option<String>> {
+        self.lock().crs_names().into_iter().map(|name| name.map(str::to_owned)).collect()
+    }
+
+    /// (m,) indices of the instances' coordinate systems among `crs_names`, before `set_instances`; complete after the last batch.
+    fn instance_crs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u16>> {
+        let document = self.lock();
+        let mut numbers = document.instance_crs().to_vec();
+        numbers.resize(document.instances().len(), 0);
+        PyArray1::from_vec(py, numbers)
+    }
+
     /// (m, 12) transforms of the instances, row-major 3 × 4, prototype → source CRS; complete after the last batch.
     fn instances<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         let transforms: Vec<[f64; 12]> = self.lock().instances().iter().map(|i| i.transform).collect();
         rows(py, &transforms)
     }
 
-    fn set_instances(&self, transforms: PyReadonlyArray2<f64>) -> PyResult<()> {
+    /// Replaces all transforms; removes the instances whose transforms are not finite and returns their number.
+    fn set_instances(&self, transforms: PyReadonlyArray2<f64>) -> PyResult<usize> {
         let array = transforms.as_array();
         if array.ncols() != 12 {
             return Err(invalid(format!("transforms: shape {:?}, expected (m, 12)", array.shape())));

@@ -11,16 +11,26 @@ pub trait DocumentReader {
     fn next_batch(&mut self) -> Result<Option<Batch>>;
     /// The CRS as the source writes it; `None` if the source states no CRS. Known before the first batch.
     fn srs_name(&self) -> Option<&str>;
+    /// Coordinate systems that parts of the document are in, as it writes them; batches and instances have indices into them. The first is the
+    /// document's. Complete after the last batch, and known for each batch when it is returned.
+    fn crs_names(&self) -> Vec<Option<&str>> {
+        vec![self.srs_name()]
+    }
+    /// Coordinate systems of the instances before `set_instances`, as indices into `crs_names`; empty if all are in the document's.
+    fn instance_crs(&self) -> &[u16] {
+        &[]
+    }
     fn materials(&self) -> &[Material];
     fn objects(&self) -> &[Object];
     fn instances(&self) -> &[Instance];
-    fn instances_mut(&mut self) -> &mut [Instance];
+    fn instances_mut(&mut self) -> &mut Vec<Instance>;
     /// Images that the materials refer to, to be copied into the asset.
     fn textures(&self) -> &[ImageFile];
     fn report(&self) -> &AssetReport;
 
-    /// Replaces the transforms of all instances, for example by reprojected ones. Takes one transform per instance, in order.
-    fn set_instances(&mut self, transforms: &[[f64; 12]]) -> Result<()> {
+    /// Replaces the transforms of all instances, for example by reprojected ones. Takes one transform per instance, in order. Removes the instances
+    /// whose transforms are not finite; returns their number.
+    fn set_instances(&mut self, transforms: &[[f64; 12]]) -> Result<usize> {
         let instances = self.instances_mut();
         if instances.len() != transforms.len() {
             return Err(Error::argument(format!(
@@ -32,6 +42,7 @@ pub trait DocumentReader {
         for (instance, transform) in instances.iter_mut().zip(transforms) {
             instance.transform = *transform;
         }
-        Ok(())
+        instances.retain(|instance| instance.transform.iter().all(|v| v.is_finite()));
+        Ok(transforms.len() - instances.len())
     }
 }

@@ -66,6 +66,11 @@ impl Triangulator {
         Self { earcut: Earcut::new(), scale, projected: Vec::new(), holes: Vec::new(), triangles: Vec::new() }
     }
 
+    /// Sets the metres per unit of each axis for the next polygons.
+    pub fn set_scale(&mut self, scale: Vec3) {
+        self.scale = scale;
+    }
+
     /// Returns the triangles of the last polygon, three indices each, oriented like its exterior ring.
     pub fn triangles(&self) -> &[u32] {
         &self.triangles

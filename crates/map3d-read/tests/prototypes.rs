@@ -96,6 +96,8 @@ fn set_instances_needs_one_transform_per_instance() {
     let mut reader = open(&path, Format::CityGml, &ReadOptions::default()).expect("readable");
     while reader.next_batch().expect("readable").is_some() {}
     assert!(reader.set_instances(&[]).is_err());
-    reader.set_instances(&[[3.0; 12]]).expect("one transform");
+    assert_eq!(reader.set_instances(&[[3.0; 12]]).expect("one transform"), 0);
     assert_eq!(reader.instances()[0].transform, [3.0; 12]);
+    assert_eq!(reader.set_instances(&[[f64::NAN; 12]]).expect("one transform"), 1);
+    assert!(reader.instances().is_empty(), "what has no place is removed");
 }

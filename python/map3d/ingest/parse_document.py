@@ -6,12 +6,12 @@ from dataclasses import asdict
 from typing import Any, Final
 
 from map3d import _core
-from map3d.errors import CrsError
-from map3d.ingest.asset_reprojector import AssetReprojector
+from map3d.ingest.document_reprojector import DocumentReprojector
 from map3d.ingest.upright_check import Extent
 from map3d.subprocess import Handler, ReportProgress
 
 _REPORT_EVERY_TRIANGLES: Final = 50_000
+_UNPLACED: Final = "implicit geometry without a place in the scene's coordinate system"
 
 
 def open_document_parser(_setup: Mapping[str, Any]) -> Handler:
@@ -25,12 +25,15 @@ def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[
     """`request`: {"path", "format", "folder", "reader": options of the core's Reader, "crs": the user's choice or None, "scene_crs": WKT, "local",
     or None while the scene has no CRS}. Returns {"report", "crs": the CRS proposed for the scene, None if nothing determines it}."""
     reader = _core.Reader(request["path"], request["format"], json.dumps(request["reader"]))
-    reprojector = AssetReprojector(request["format"], request["crs"] or reader.srs_name, request["scene_crs"], stated=bool(request["crs"]))
+    strict = bool(request["reader"].get("strict"))
+    reprojector = DocumentReprojector(request["format"], reader.srs_name, request["scene_crs"], stated=request["crs"], strict=strict)
     writer = _core.AssetWriter(request["folder"])
     extent, triangles, reported = Extent(), 0, 0
     for batch in reader:
         if not batch.prototype:
-            positions = reprojector.to_world(batch.positions)
+            positions = reprojector.to_world(batch.positions, reader.crs_names()[batch.crs], batch.triangle_count)
+            if positions is None:
+                continue
             extent.add(positions)
             batch.set_positions(positions)
         writer.append(batch)
@@ -38,13 +41,14 @@ def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[
         if triangles - reported >= _REPORT_EVERY_TRIANGLES:
             reported = triangles
             report_progress({"triangles": triangles})
-    transforms = reader.instances()
+    transforms, unplaced = reader.instances(), 0
     if len(transforms):
-        reader.set_instances(reprojector.transforms_to_world(transforms))
+        unplaced = reader.set_instances(reprojector.transforms_to_world(transforms, reader.crs_names(), reader.instance_crs()))
     counts = json.loads(writer.finish(reader))
+    if unplaced:
+        counts["skipped"] = {**counts.get("skipped", {}), _UNPLACED: unplaced}
     hints = extent.hints(request["path"]) if request["format"] == "obj" and request["reader"].get("up") == "z" else []
-    counts["warnings"] = [*counts.get("warnings", []), *reprojector.warnings, *hints]
-    if reprojector.warnings and request["reader"].get("strict"):
-        raise CrsError("{reason}: {example}".format_map(reprojector.warnings[0]))
+    report = reprojector.report(counts)
+    report["warnings"] += hints
     proposed = reprojector.proposed_crs
-    return {"report": {**counts, "placing": reprojector.report}, "crs": None if proposed is None else asdict(proposed)}
+    return {"report": report, "crs": None if proposed is None else asdict(proposed)}

@@ -18,6 +18,12 @@ FAULTS: Final[Mapping[str, str]] = {
     "ring that is not closed": N_("Rings that are not closed: {count}."),
     "unresolved reference": N_("References that lead nowhere in the file: {count}."),
     "reference to another document not followed": N_("References to other documents, which were not followed: {count}."),
+    "parts in another coordinate system than the rest of the file, transformed": N_(
+        "Triangles and placements in another coordinate system than the rest of the file, transformed: {count}."
+    ),
+    "the file names more than one coordinate system; all parts are read in the one given": N_(
+        "Coordinate systems that the file names, all read as the one given: {count}."
+    ),
     "material not defined": N_("Materials that are used but not defined: {count}."),
     "unknown wrap mode": N_("Textures with an unknown wrap mode: {count}."),
 }
@@ -30,11 +36,17 @@ SKIPPED: Final[Mapping[str, str]] = {
     "fully transparent polygon": N_("Fully transparent polygons, left out: {count}."),
     "geometry that refers to itself": N_("Skipped geometry that refers to itself: {count}."),
     "grid points without a height": N_("Grid points without a height, left out: {count}."),
+    "implicit geometry in one of too many coordinate systems": N_("Skipped implicit geometry in one of too many coordinate systems: {count}."),
     "implicit geometry with an invalid transformation matrix": N_("Skipped implicit geometry with an invalid transformation matrix: {count}."),
     "implicit geometry without a prototype": N_("Skipped implicit geometry without a prototype: {count}."),
     "implicit geometry without a reference point": N_("Skipped implicit geometry without a reference point: {count}."),
+    "implicit geometry without a place in the scene's coordinate system": N_(
+        "Skipped implicit geometry without a place in the coordinate system of the scene: {count}."
+    ),
     "index out of range": N_("Skipped triangles and faces that refer to missing vertices: {count}."),
     "points and lines": N_("Points and lines, left out: {count}."),
+    "polygon in more than one coordinate system": N_("Skipped polygons in more than one coordinate system: {count}."),
+    "polygon in one of too many coordinate systems": N_("Skipped polygons in one of too many coordinate systems: {count}."),
     "polygon of an interior": N_("Polygons of rooms, left out: {count}. The option “CityGML: rooms” draws them."),
     "polygon that could not be triangulated": N_("Skipped polygons that could not be divided into triangles: {count}."),
     "polygon with too many vertices to triangulate": N_(
@@ -57,3 +69,7 @@ SKIPPED_BY_LIMIT: Final[Mapping[str, str]] = {
     "ring over the limit max_ring_vertices": N_("Skipped rings with more than {limit} points: {count}."),
 }
 """Reasons that end with ` = ` and the limit."""
+SKIPPED_BY_NAME: Final[Mapping[str, str]] = {
+    "part in an unusable coordinate system": N_("Skipped triangles and placements in the coordinate system {name}, which is not usable: {count}."),
+}
+"""Reasons that end with ` = ` and a name of the file."""

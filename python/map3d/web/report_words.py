@@ -6,7 +6,7 @@ from typing import Any
 
 from map3d.catalogue import AssetRecord
 from map3d.web.page_tools import translate as _
-from map3d.web.report_sentences import FAULTS, SKIPPED, SKIPPED_BY_LIMIT
+from map3d.web.report_sentences import FAULTS, SKIPPED, SKIPPED_BY_LIMIT, SKIPPED_BY_NAME
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,8 @@ def _skipped_text(reason: str, count: int) -> str:
     text, _equals, limit = reason.partition(" = ")
     if text in SKIPPED_BY_LIMIT and limit.isdecimal():
         return _(SKIPPED_BY_LIMIT[text], count=count, limit=int(limit))
+    if text in SKIPPED_BY_NAME:
+        return _(SKIPPED_BY_NAME[text], count=count, name=limit)
     return _("Skipped: {count} × {reason}.", count=count, reason=reason)
 
 

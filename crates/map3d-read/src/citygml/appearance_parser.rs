@@ -137,7 +137,7 @@ impl<R: BufRead> AppearanceParser<'_, R> {
             "borderColor" => properties.border = self.read_color()?,
             "diffuseColor" => properties.diffuse = self.read_color()?,
             "transparency" => properties.transparency = parse_transparency(&self.xml.read_text()?),
-            "referencePoint" => properties.reference_point = read_point(self.xml)?,
+            "referencePoint" => properties.reference_point = read_point(self.xml)?.map(|named| named.point),
             "orientation" => properties.orientation = self.read_numbers()?.and_then(|v| v.try_into().ok()),
             "target" => self.read_target(properties)?,
             "textureParameterization" => self.read_texture_association(properties)?,

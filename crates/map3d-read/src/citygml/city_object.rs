@@ -4,6 +4,7 @@ use map3d_base::asset::Rank;
 
 use super::appearance::Appearances;
 use super::attributes::Attributes;
+use super::crs_table::CrsNumber;
 use super::feature_types::FeatureKind;
 use super::geometry_arena::{GeometryArena, GeometryNode, NodeId, NodeKind};
 use super::ids::{Id, IdMap};
@@ -38,6 +39,8 @@ pub struct Feature {
     pub rank: Rank,
     /// Inside a building; converted only on request, or if a feature outside refers to it.
     pub is_interior: bool,
+    /// Coordinate system of geometry that names none: that of the nearest envelope.
+    pub crs: CrsNumber,
     /// Content of a `lod` property of this feature or its parent (relief).
     pub relief_lod: Option<u8>,
     pub representations: Vec<LodRepresentation>,

@@ -12,9 +12,10 @@ use super::attributes::{
 };
 use super::city_object::{CityObject, Feature, LodRepresentation, Representation};
 use super::code_lists::{Code, CodeLists};
+use super::crs_table::{CrsNumber, CrsTable};
 use super::feature_types::{FeatureKind, classify_feature, is_open_space, is_subdivision, rank_feature, rank_object};
 use super::geometry_arena::NO_NODE;
-use super::geometry_parser::{GeometryParser, is_point_or_curve, is_surface};
+use super::geometry_parser::{GeometryParser, PositionFormat, is_point_or_curve, is_surface};
 use super::ids::{self, Reference, hash_id, parse_reference};
 use super::implicit_geometry::read_implicit_geometry;
 use super::standard_codes::is_adv_code;
@@ -22,7 +23,6 @@ use super::xml_reader::{XmlEvent, XmlReader};
 use crate::options::ReadOptions;
 use crate::report_builder::ReportBuilder;
 
-const DEFAULT_DIMENSION: usize = 3;
 const MAX_LOD: u8 = 4;
 
 pub struct CityObjectParser<'a> {
@@ -32,6 +32,9 @@ pub struct CityObjectParser<'a> {
     pub city_object: &'a mut CityObject,
     pub theme: &'a mut ThemeSelection,
     pub code_lists: &'a mut CodeLists,
+    pub crs_table: &'a mut CrsTable,
+    /// Coordinate system of the model that has the city object.
+    pub crs: CrsNumber,
     /// Buffers for numbers and text.
     pub values: &'a mut Vec<f64>,
     pub text: &'a mut String,
@@ -76,6 +79,7 @@ impl CityObjectParser<'_> {
         let parent_feature = parent.map(|p| &self.city_object.features[p as usize]);
         let rank = parent_feature.map_or_else(|| rank_object(&type_name), |p| rank_feature(kind, &type_name, p.rank));
         let is_interior = is_interior_kind || parent_feature.is_some_and(|p| p.is_interior);
+        let crs = parent_feature.map_or(self.crs, |p| p.crs);
         let relief_lod = parent_feature.and_then(|p| p.relief_lod);
         let is_data_type = kind == FeatureKind::Unknown || is_subdivision(&type_name);
         let keeps_attributes = is_object || (is_data_type && parent_feature.is_some_and(|p| p.keeps_attributes));
@@ -91,6 +95,7 @@ impl CityObjectParser<'_> {
             parent,
             rank,
             is_interior,
+            crs,
             relief_lod,
             representations: Vec::new(),
             xlinks: Vec::new(),
@@ -205,6 +210,12 @@ impl CityObjectParser<'_> {
     /// Reads the current element inside a property.
     fn read_property_value(&mut self, number: u32, property: &str) -> Result<()> {
         let local_name = self.xml.local_name();
+        if local_name == "Envelope"
+            && let Some(crs) = self.xml.attribute("srsName").and_then(|name| self.crs_table.find(&name))
+        {
+            self.feature(number).crs = crs;
+        }
+        let local_name = self.xml.local_name();
         if matches!(local_name, "Envelope" | "Null" | "PointCloud" | "Dynamizer") || is_point_or_curve(local_name) {
             return self.xml.skip();
         }
@@ -260,6 +271,7 @@ impl CityObjectParser<'_> {
             xml: self.xml,
             report: self.report,
             geometry: &mut self.city_object.geometry,
+            crs_table: self.crs_table,
             max_bytes: self.options.max_object_bytes,
             values: self.values,
             text: self.text,
@@ -291,13 +303,15 @@ impl CityObjectParser<'_> {
         }
         self.report.note("geometry without a level of detail read as level 0", self.xml.local_name());
         let first = self.city_object.geometry.nodes.len() as u32;
-        let read = self.geometry_parser().read_element(NO_NODE, DEFAULT_DIMENSION);
+        let format = PositionFormat::new(self.feature(number).crs);
+        let read = self.geometry_parser().read_element(NO_NODE, format);
         self.add_surfaces(number, 0, Representation::Surfaces, first, read)
     }
 
     fn read_surfaces(&mut self, number: u32, lod: u8, representation: fn(u32) -> Representation) -> Result<()> {
         let first = self.city_object.geometry.nodes.len() as u32;
-        let read = self.geometry_parser().read_property(NO_NODE, DEFAULT_DIMENSION);
+        let format = PositionFormat::new(self.feature(number).crs);
+        let read = self.geometry_parser().read_property(NO_NODE, format);
         self.add_surfaces(number, lod, representation, first, read)
     }
 
@@ -320,7 +334,8 @@ impl CityObjectParser<'_> {
                 self.xml.skip()?;
                 continue;
             }
-            match read_implicit_geometry(self, DEFAULT_DIMENSION)? {
+            let crs = self.feature(number).crs;
+            match read_implicit_geometry(self, crs)? {
                 Ok(implicit) => {
                     let index = self.city_object.implicit_geometries.len() as u32;
                     self.city_object.implicit_geometries.push(implicit);

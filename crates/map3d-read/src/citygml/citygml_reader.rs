@@ -3,13 +3,14 @@
 use std::path::Path;
 
 use map3d_base::asset::{AssetReport, Batch, Instance, Material, Object};
-use map3d_base::{Error, Result, Vec3};
+use map3d_base::{Error, Result};
 
 use super::appearance::ThemeSelection;
 use super::city_object::CityObject;
 use super::city_object_parser::CityObjectParser;
 use super::code_lists::CodeLists;
 use super::converter::{FeatureConverter, INTERIOR_POLYGON};
+use super::crs_table::{CrsNumber, CrsTable, DOCUMENT_CRS};
 use super::pre_scan::PreScan;
 use super::tessellate::INVISIBLE_POLYGON;
 use super::xml_reader::{Malformed, XmlEvent, XmlReader};
@@ -26,7 +27,9 @@ pub struct CityGmlReader {
     xml: XmlReader,
     report: ReportBuilder,
     options: ReadOptions,
-    srs_name: Option<String>,
+    crs_table: CrsTable,
+    /// Coordinate system of the model's envelope.
+    crs: CrsNumber,
     theme: ThemeSelection,
     /// The current city object.
     city_object: CityObject,
@@ -53,15 +56,15 @@ impl CityGmlReader {
         report.set_crs(srs_name.clone());
         report_theme(&theme, &mut report);
         let inverted = transparency.is_inverted(options.transparency, &mut report);
-        let scale = estimate_metres_per_unit(srs_name.as_deref());
         Ok(Self {
             xml: XmlReader::open(path)?,
             report,
             options: options.clone(),
-            srs_name,
+            crs_table: CrsTable::new(srs_name),
+            crs: DOCUMENT_CRS,
             theme,
             city_object: CityObject::default(),
-            converter: FeatureConverter::new(folder, options, inverted, scale, lod, appearances, referenced_ids),
+            converter: FeatureConverter::new(folder, options, inverted, lod, appearances, referenced_ids),
             code_lists: CodeLists::new(AssetFolder::for_document(path, options.folder.as_deref())?),
             instances: Vec::new(),
             values: Vec::new(),
@@ -90,9 +93,21 @@ impl CityGmlReader {
                     self.read_city_object()?;
                 }
             }
+            "boundedBy" => self.read_envelope()?,
             _ => self.xml.skip()?,
         }
         Ok(true)
+    }
+
+    /// Reads the model's envelope, in whose coordinate system is what names none.
+    fn read_envelope(&mut self) -> Result<()> {
+        while self.xml.next_child()? {
+            if let Some(crs) = self.xml.attribute("srsName").and_then(|name| self.crs_table.find(&name)) {
+                self.crs = crs;
+            }
+            self.xml.skip()?;
+        }
+        Ok(())
     }
 
     fn read_city_object(&mut self) -> Result<()> {
@@ -104,6 +119,8 @@ impl CityGmlReader {
             city_object: &mut self.city_object,
             theme: &mut self.theme,
             code_lists: &mut self.code_lists,
+            crs_table: &mut self.crs_table,
+            crs: self.crs,
             values: &mut self.values,
             text: &mut self.text,
         }
@@ -114,6 +131,7 @@ impl CityGmlReader {
             Err(_) => self.xml.is_malformed() && !self.options.strict && self.city_object.has_geometry(),
         };
         if is_kept {
+            self.converter.set_coordinate_systems(self.crs_table.names());
             self.converter.convert(&mut self.city_object, &mut self.report)?;
         }
         parsed
@@ -157,21 +175,6 @@ fn report_theme(theme: &ThemeSelection, report: &mut ReportBuilder) {
     }
 }
 
-/// Returns the approximate metres per unit of each axis: geographic systems have degrees in the horizontal.
-fn estimate_metres_per_unit(srs_name: Option<&str>) -> Vec3 {
-    const METRES_PER_DEGREE: f64 = 111_320.0;
-    if srs_name.is_some_and(is_geographic) { [METRES_PER_DEGREE, METRES_PER_DEGREE, 1.0] } else { [1.0; 3] }
-}
-
-/// Returns true for the EPSG codes of geographic systems: 4001 to 4999 without geocentric ones, and some newer codes; also for CRS84.
-fn is_geographic(srs_name: &str) -> bool {
-    const NEWER: [u32; 14] = [6318, 6319, 6668, 6697, 6783, 7843, 7844, 7912, 8999, 9000, 9057, 9755, 10_176, 10_299];
-    const GEOCENTRIC: [u32; 6] = [4328, 4936, 4978, 4896, 4910, 4911];
-    let code = srs_name.split(|c: char| !c.is_ascii_alphanumeric()).find_map(|word| word.parse::<u32>().ok().filter(|n| *n > 1000));
-    let is_crs84 = srs_name.to_ascii_uppercase().contains("CRS84");
-    is_crs84 || code.is_some_and(|code| NEWER.contains(&code) || ((4001..=4999).contains(&code) && !GEOCENTRIC.contains(&code)))
-}
-
 impl DocumentReader for CityGmlReader {
     fn next_batch(&mut self) -> Result<Option<Batch>> {
         loop {
@@ -194,7 +197,15 @@ impl DocumentReader for CityGmlReader {
     }
 
     fn srs_name(&self) -> Option<&str> {
-        self.srs_name.as_deref()
+        self.crs_table.names()[0].as_deref()
+    }
+
+    fn crs_names(&self) -> Vec<Option<&str>> {
+        self.crs_table.names().iter().map(Option::as_deref).collect()
+    }
+
+    fn instance_crs(&self) -> &[CrsNumber] {
+        &self.converter.instance_crs
     }
 
     fn materials(&self) -> &[Material] {
@@ -209,7 +220,7 @@ impl DocumentReader for CityGmlReader {
         &self.instances
     }
 
-    fn instances_mut(&mut self) -> &mut [Instance] {
+    fn instances_mut(&mut self) -> &mut Vec<Instance> {
         &mut self.instances
     }
 
@@ -219,21 +230,5 @@ impl DocumentReader for CityGmlReader {
 
     fn report(&self) -> &AssetReport {
         self.report.report()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::is_geographic;
-
-    #[test]
-    fn geographic_systems_are_recognized_by_their_epsg_code() {
-        for name in ["EPSG:4326", "http://www.opengis.net/def/crs/EPSG/0/6697", "urn:ogc:def:crs:EPSG::4979", "urn:ogc:def:crs:OGC:1.3:CRS84"] {
-            assert!(is_geographic(name), "{name}");
-        }
-        for name in ["EPSG:25832+5783", "urn:adv:crs:DE_DHDN_3GK4*DE_DHN92_NH", "urn:ogc:def:crs,crs:EPSG:6.12:3068,crs:EPSG:6.12:5783", "EPSG:4978"]
-        {
-            assert!(!is_geographic(name), "{name}");
-        }
     }
 }

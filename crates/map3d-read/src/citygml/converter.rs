@@ -2,11 +2,12 @@
 
 use std::collections::VecDeque;
 
+use map3d_base::Result;
 use map3d_base::asset::{Batch, Instance, Object, Rank};
-use map3d_base::{Result, Vec3};
 
 use super::appearance::Appearances;
 use super::city_object::{CityObject, Representation};
+use super::crs_table::CrsNumber;
 use super::feature_types::to_class_name;
 use super::geometry_arena::NodeId;
 use super::ids::{self, Id, IdSet};
@@ -38,6 +39,8 @@ pub struct FeatureConverter {
     lod: Option<u8>,
     shared: SharedGeometry,
     pub objects: Vec<Object>,
+    /// Coordinate systems of the instances.
+    pub instance_crs: Vec<CrsNumber>,
     prototypes: PrototypeTable,
     /// Completed batches.
     pub batches: VecDeque<Batch>,
@@ -60,27 +63,32 @@ impl ConversionContext<'_> {
 }
 
 impl FeatureConverter {
-    /// `inverted`: the document's transparency is opacity; `scale`: metres per unit of each axis; `lod`: the requested level of detail.
+    /// `inverted`: the document's transparency is opacity; `lod`: the requested level of detail.
     pub fn new(
         folder: AssetFolder,
         options: &ReadOptions,
         inverted: bool,
-        scale: Vec3,
         lod: Option<u8>,
         document_appearances: Appearances,
         referenced_ids: IdSet,
     ) -> Self {
         Self {
             resolver: MaterialResolver::new(folder, options.clone(), inverted),
-            tessellator: Tessellator::new(scale, options.clone()),
+            tessellator: Tessellator::new(options.clone()),
             document_appearances,
             referenced_ids,
             lod,
             shared: SharedGeometry::default(),
             objects: Vec::new(),
+            instance_crs: Vec::new(),
             prototypes: PrototypeTable::default(),
             batches: VecDeque::new(),
         }
+    }
+
+    /// Adds the coordinate systems that are new.
+    pub fn set_coordinate_systems(&mut self, names: &[Option<String>]) {
+        self.tessellator.set_coordinate_systems(names);
     }
 
     /// Converts a city object at its selected level of detail. Surfaces, openings and installations come before objects and parts: a polygon that
@@ -210,11 +218,9 @@ impl FeatureConverter {
         polygons.iter().try_for_each(|polygon| self.tessellator.add_polygon(geometry, *polygon, &surface, &mut sources, report))
     }
 
-    /// Queues the current batch if it has at least `min_triangles`, and at least one.
+    /// Queues the batches that have at least `min_triangles`, and at least one.
     fn complete_batch(&mut self, min_triangles: usize) {
-        if self.tessellator.triangle_count() >= min_triangles.max(1) {
-            self.batches.push_back(self.tessellator.take());
-        }
+        self.batches.extend(self.tessellator.take(min_triangles));
     }
 
     /// Adds a placement; converts its prototype if that is new and available now.
@@ -223,7 +229,7 @@ impl FeatureConverter {
         let object = context.object_number(f);
         let key = self.prototypes.build_key(&implicit, &context.city_object.geometry);
         let instance = Instance { prototype: 0, object, transform: implicit.transform };
-        self.prototypes.placements.push(PrototypePlacement { key, instance });
+        self.prototypes.placements.push(PrototypePlacement { key, instance, crs: implicit.crs });
         let (got, value) = (self.prototypes.placements.len() as u64, self.resolver.options.max_instances);
         report.check_limit(LimitCheck { what: "number of instances", got, limit: "max_instances", value })?;
         if self.prototypes.find(key).is_some() {
@@ -242,8 +248,9 @@ impl FeatureConverter {
         let geometry = &context.city_object.geometry;
         let CollectedPolygons { polygons, .. } = collect_polygons(geometry, &mut vec![VisitState::Unvisited; geometry.nodes.len()], node, false);
         self.complete_batch(1);
+        self.tessellator.begin_prototype();
         self.tessellate_feature(context, f, &polygons, report)?;
-        let prototype = self.tessellator.take();
+        let prototype = self.tessellator.take_prototype();
         self.add_prototype(key, vec![prototype]);
         Ok(())
     }
@@ -252,8 +259,9 @@ impl FeatureConverter {
         let geometry = &self.shared.geometry;
         let CollectedPolygons { polygons, .. } = collect_polygons(geometry, &mut vec![VisitState::Unvisited; geometry.nodes.len()], node, false);
         self.complete_batch(1);
+        self.tessellator.begin_prototype();
         self.tessellate_shared(&polygons, object, Rank::Other, report)?;
-        let prototype = self.tessellator.take();
+        let prototype = self.tessellator.take_prototype();
         self.add_prototype(key, vec![prototype]);
         Ok(())
     }
@@ -281,16 +289,19 @@ impl FeatureConverter {
     /// numbers.
     pub fn finish_instances(&mut self, report: &mut ReportBuilder) -> Result<Vec<Instance>> {
         let placements = std::mem::take(&mut self.prototypes.placements);
-        for PrototypePlacement { key, instance } in &placements {
+        for PrototypePlacement { key, instance, .. } in &placements {
             let node = self.shared.geometry.by_id.get(key).copied();
             if let (Some(node), None) = (node, self.prototypes.find(*key)) {
                 self.convert_shared_prototype(*key, node, instance.object, report)?;
             }
         }
         let mut instances = Vec::with_capacity(placements.len());
-        for PrototypePlacement { key, instance } in placements {
+        for PrototypePlacement { key, instance, crs } in placements {
             match self.prototypes.find(key) {
-                Some(prototype) => instances.push(Instance { prototype, ..instance }),
+                Some(prototype) => {
+                    instances.push(Instance { prototype, ..instance });
+                    self.instance_crs.push(crs);
+                }
                 None => report.skip("implicit geometry without a prototype", || self.objects[instance.object as usize].name.clone())?,
             }
         }

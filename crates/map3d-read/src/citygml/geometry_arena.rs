@@ -2,6 +2,7 @@
 
 use map3d_base::Vec3;
 
+use super::crs_table::{CrsNumber, DOCUMENT_CRS};
 use super::ids::{self, Id, IdMap};
 use super::textured_surface::OwnAppearance;
 
@@ -28,6 +29,8 @@ pub struct GeometryNode {
     pub kind: NodeKind,
     /// An OrientableSurface with orientation `-`: the back of its base surface is its front.
     pub reversed: bool,
+    /// Coordinate system of a polygon.
+    pub crs: CrsNumber,
 }
 
 /// A ring as written: range of `points`; the first and last points are usually equal.
@@ -65,7 +68,8 @@ impl GeometryArena {
     /// Adds a node. A duplicate id keeps referring to its first node.
     pub fn add(&mut self, id: Id, parent: NodeId, kind: NodeKind) -> NodeId {
         let number = self.nodes.len() as NodeId;
-        self.nodes.push(GeometryNode { id, parent, first_child: NO_NODE, last_child: NO_NODE, next_sibling: NO_NODE, kind, reversed: false });
+        let (first_child, last_child, next_sibling) = (NO_NODE, NO_NODE, NO_NODE);
+        self.nodes.push(GeometryNode { id, parent, first_child, last_child, next_sibling, kind, reversed: false, crs: DOCUMENT_CRS });
         if id != ids::NONE {
             self.by_id.entry(id).or_insert(number);
         }

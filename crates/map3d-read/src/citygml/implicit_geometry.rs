@@ -4,8 +4,9 @@ use map3d_base::Result;
 
 use super::city_object_parser::CityObjectParser;
 use super::coordinates::parse_numbers;
+use super::crs_table::{CrsNumber, DOCUMENT_CRS, TOO_MANY};
 use super::geometry_arena::{NO_NODE, NodeId};
-use super::geometry_parser::read_point;
+use super::geometry_parser::{NamedPoint, PositionFormat, read_point};
 
 /// Row-major 3 × 4, prototype → world.
 pub type Transform = [f64; 12];
@@ -14,6 +15,8 @@ pub type Transform = [f64; 12];
 pub struct ImplicitGeometry {
     pub prototype: PrototypeSource,
     pub transform: Transform,
+    /// Coordinate system of the reference point.
+    pub crs: CrsNumber,
 }
 
 #[derive(Clone, Debug)]
@@ -26,21 +29,28 @@ pub enum PrototypeSource {
 
 const IDENTITY: Transform = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 
-/// Reads the current ImplicitGeometry element. The inner error is the reason why it cannot be placed.
-pub fn read_implicit_geometry(parser: &mut CityObjectParser, dimension: usize) -> Result<std::result::Result<ImplicitGeometry, &'static str>> {
+/// Reads the current ImplicitGeometry element. The inner error is the reason why it cannot be placed. `crs`: of the feature that has it.
+pub fn read_implicit_geometry(parser: &mut CityObjectParser, crs: CrsNumber) -> Result<std::result::Result<ImplicitGeometry, &'static str>> {
     let (mut node, mut library_object, mut matrix, mut reference) = (None, None, Some(IDENTITY), None);
     while parser.xml.next_child()? {
         match parser.xml.local_name() {
             "transformationMatrix" => matrix = parse_matrix(&parser.xml.read_text()?),
             "libraryObject" => library_object = Some(parser.xml.read_text()?).filter(|name| !name.is_empty()),
-            "relativeGMLGeometry" | "relativeGeometry" => node = parser.geometry_parser().read_property(NO_NODE, dimension)?,
+            "relativeGMLGeometry" | "relativeGeometry" => {
+                // A prototype is in a frame of its own.
+                node = parser.geometry_parser().read_property(NO_NODE, PositionFormat::new(DOCUMENT_CRS))?;
+            }
             "appearance" => parser.read_appearance()?,
             "referencePoint" => reference = read_point(parser.xml)?,
             _ => parser.xml.skip()?,
         }
     }
     let Some(mut transform) = matrix else { return Ok(Err("implicit geometry with an invalid transformation matrix")) };
-    let Some(reference) = reference else { return Ok(Err("implicit geometry without a reference point")) };
+    let Some(NamedPoint { point: reference, srs_name }) = reference else { return Ok(Err("implicit geometry without a reference point")) };
+    let crs = srs_name.and_then(|name| parser.crs_table.find(&name)).unwrap_or(crs);
+    if crs == TOO_MANY {
+        return Ok(Err("implicit geometry in one of too many coordinate systems"));
+    }
     (0..3).for_each(|k| transform[4 * k + 3] += reference[k]);
     if !transform.iter().all(|v| v.is_finite()) {
         return Ok(Err("implicit geometry with an invalid transformation matrix"));
@@ -50,7 +60,7 @@ pub fn read_implicit_geometry(parser: &mut CityObjectParser, dimension: usize) -
         (None, Some(name)) => PrototypeSource::Library(name),
         (None, None) => return Ok(Err("implicit geometry without a prototype")),
     };
-    Ok(Ok(ImplicitGeometry { prototype, transform }))
+    Ok(Ok(ImplicitGeometry { prototype, transform, crs }))
 }
 
 /// Parses 16 numbers, row-major. The last row must be 0 0 0 w; the other rows are divided by w.

@@ -13,6 +13,7 @@ mod citygml_reader;
 mod code_lists;
 mod converter;
 mod coordinates;
+mod crs_table;
 mod feature_types;
 mod geo_transform;
 mod geometry_arena;

@@ -20,6 +20,7 @@ use crate::transparency::TransparencyCounts;
 
 #[derive(Default)]
 pub struct PreScan {
+    /// The first coordinate system that any element names.
     pub srs_name: Option<String>,
     pub theme: ThemeSelection,
     /// Appearances outside city objects.
@@ -54,7 +55,7 @@ impl PreScan {
                     if depth == 0 && name != "CityModel" {
                         return Err(Error::format(path, format!("the root element is {name:?}; expected CityModel")));
                     }
-                    scan.scan_attributes(attributes, &mut references, report);
+                    scan.scan_attributes(attributes, &mut references);
                     let parse: Option<Parse> = match (kind, name) {
                         (TagKind::Start, "appearanceMember") if depth == 1 => Some(Self::parse_appearance_member),
                         (TagKind::Start, "theme") => Some(Self::parse_theme),
@@ -89,7 +90,7 @@ impl PreScan {
         Ok(scan)
     }
 
-    fn scan_attributes(&mut self, attributes: &str, references: &mut ObjectReferences, report: &mut ReportBuilder) {
+    fn scan_attributes(&mut self, attributes: &str, references: &mut ObjectReferences) {
         for (name, value) in parse_attributes(attributes) {
             match name {
                 "id" => {
@@ -100,17 +101,11 @@ impl PreScan {
                         references.targets.push(id);
                     }
                 }
-                "srsName" => self.register_srs_name(&unescape_lossy(value), report),
+                "srsName" if self.srs_name.is_none() => {
+                    self.srs_name = Some(unescape_lossy(value).into_owned()).filter(|name| !name.trim().is_empty())
+                }
                 _ => {}
             }
-        }
-    }
-
-    fn register_srs_name(&mut self, name: &str, report: &mut ReportBuilder) {
-        match &self.srs_name {
-            None if !name.trim().is_empty() => self.srs_name = Some(name.to_owned()),
-            Some(first) if first.trim() != name.trim() => report.note("more than one coordinate system; using the first", name),
-            _ => {}
         }
     }
 

@@ -6,6 +6,7 @@ use std::path::Path;
 use map3d_base::Result;
 use map3d_base::asset::{Batch, Instance, Rank};
 
+use super::crs_table::CrsNumber;
 use super::geometry_arena::{GeometryArena, NodeKind};
 use super::ids::{self, Id, hash_id};
 use super::implicit_geometry::{ImplicitGeometry, PrototypeSource};
@@ -17,6 +18,7 @@ use crate::obj::ObjReader;
 pub struct PrototypePlacement {
     pub key: Id,
     pub instance: Instance,
+    pub crs: CrsNumber,
 }
 
 #[derive(Default)]

@@ -53,7 +53,8 @@ impl SharedGeometry {
             other => other,
         };
         let copy = self.geometry.add(node.id, parent, kind);
-        self.geometry.nodes[copy as usize].reversed = node.reversed;
+        let copied = &mut self.geometry.nodes[copy as usize];
+        (copied.reversed, copied.crs) = (node.reversed, node.crs);
         let is_converted = matches!(kind, NodeKind::Polygon { .. }) && visits.get(number as usize) == Some(&VisitState::Done);
         self.visits.push(if is_converted { VisitState::Done } else { VisitState::Unvisited });
         if depth > MAX_DEPTH {

@@ -4,6 +4,7 @@ use map3d_base::asset::{Batch, Rank};
 use map3d_base::{Result, Vec3};
 
 use super::appearance::{Appearances, ResolvedMaterial};
+use super::crs_table::{CrsNumber, DOCUMENT_CRS, estimate_metres_per_unit};
 use super::geometry_arena::NodeId;
 use super::ids::{self, Id};
 use super::material_resolver::{MaterialResolver, RingPoints};
@@ -35,11 +36,30 @@ pub struct MaterialSources<'a> {
     pub appearances: [&'a mut Appearances; 2],
 }
 
-/// Collects triangles in a batch. Buffers are reused from polygon to polygon.
-pub struct Tessellator {
-    triangulator: Triangulator,
+/// A batch that grows.
+struct OpenBatch {
     batch: Batch,
     has_uvs: bool,
+}
+
+impl OpenBatch {
+    fn finish(mut self) -> Batch {
+        if !self.has_uvs {
+            self.batch.uvs.clear();
+        }
+        self.batch.uvs_shifted = true;
+        self.batch
+    }
+}
+
+/// Collects triangles in batches, one for each coordinate system. Buffers are reused from polygon to polygon.
+pub struct Tessellator {
+    triangulator: Triangulator,
+    open: Vec<OpenBatch>,
+    /// Metres per unit of the axes of each coordinate system.
+    scales: Vec<Vec3>,
+    /// Polygons are those of a prototype, in a frame of its own in metres.
+    is_prototype: bool,
     options: ReadOptions,
     /// Number of triangles of the whole document.
     triangles: u64,
@@ -52,12 +72,12 @@ pub struct Tessellator {
 }
 
 impl Tessellator {
-    /// `scale`: metres per unit of each axis.
-    pub fn new(scale: Vec3, options: ReadOptions) -> Self {
+    pub fn new(options: ReadOptions) -> Self {
         Self {
-            triangulator: Triangulator::new(scale),
-            batch: Batch::default(),
-            has_uvs: false,
+            triangulator: Triangulator::default(),
+            open: Vec::new(),
+            scales: Vec::new(),
+            is_prototype: false,
             options,
             triangles: 0,
             points: Vec::new(),
@@ -68,18 +88,27 @@ impl Tessellator {
         }
     }
 
-    pub fn triangle_count(&self) -> usize {
-        self.batch.triangles.len()
+    /// Adds the coordinate systems that are new.
+    pub fn set_coordinate_systems(&mut self, names: &[Option<String>]) {
+        let added = names.iter().skip(self.scales.len()).map(|name| estimate_metres_per_unit(name.as_deref()));
+        self.scales.extend(added);
     }
 
-    /// Returns the batch so far and starts a new one.
-    pub fn take(&mut self) -> Batch {
-        let mut batch = std::mem::take(&mut self.batch);
-        if !std::mem::take(&mut self.has_uvs) {
-            batch.uvs.clear();
-        }
-        batch.uvs_shifted = true;
-        batch
+    /// Returns the batches with at least `min_triangles`, and at least one. Others keep growing.
+    pub fn take(&mut self, min_triangles: usize) -> Vec<Batch> {
+        let is_complete = |open: &OpenBatch| open.batch.triangles.len() >= min_triangles.max(1);
+        self.open.extract_if(.., |open| is_complete(open)).map(OpenBatch::finish).collect()
+    }
+
+    /// Begins a prototype. All batches before it must be taken.
+    pub fn begin_prototype(&mut self) {
+        self.is_prototype = true;
+    }
+
+    /// Returns the batch of the prototype.
+    pub fn take_prototype(&mut self) -> Batch {
+        self.is_prototype = false;
+        self.open.pop().map(OpenBatch::finish).unwrap_or_default()
     }
 
     /// Tessellates a polygon, or skips and counts it.
@@ -102,12 +131,15 @@ impl Tessellator {
         if !self.assemble_rings(&rings, material.textured, surface, report)? {
             return Ok(());
         }
+        let crs = if self.is_prototype { DOCUMENT_CRS } else { arena.node(polygon.node).crs };
+        let scale = self.scales.get(crs as usize).filter(|_| !self.is_prototype);
+        self.triangulator.set_scale(scale.copied().unwrap_or([1.0; 3]));
         match self.triangulator.triangulate(&self.points, &self.ring_ends) {
             Err(error) => return report.skip(error.reason(), || surface.object_name.to_owned()),
             Ok(Coverage::Inexact) => report.warn("polygon with crossing rings", surface.object_name)?,
             Ok(Coverage::Exact) => {}
         }
-        self.push_triangles(polygon.reversed, surface, material);
+        self.push_triangles(crs, polygon.reversed, surface, material);
         report.check_limit(LimitCheck::triangles(self.triangles, &self.options))
     }
 
@@ -167,11 +199,11 @@ impl Tessellator {
         Ok(!rings.is_empty())
     }
 
-    fn push_triangles(&mut self, reversed: bool, surface: &ThematicSurface, material: ResolvedMaterial) {
-        let batch = &mut self.batch;
+    fn push_triangles(&mut self, crs: CrsNumber, reversed: bool, surface: &ThematicSurface, material: ResolvedMaterial) {
+        let OpenBatch { batch, has_uvs } = find_open(&mut self.open, crs);
         let base = batch.positions.len() as u32;
         batch.positions.extend_from_slice(&self.points);
-        self.has_uvs |= material.textured;
+        *has_uvs |= material.textured;
         let triangles = self.triangulator.triangles().as_chunks::<3>().0;
         for t in triangles {
             let [a, b, c] = *t;
@@ -185,6 +217,15 @@ impl Tessellator {
         }
         self.triangles += triangles.len() as u64;
     }
+}
+
+/// Returns the batch for a coordinate system.
+fn find_open(open: &mut Vec<OpenBatch>, crs: CrsNumber) -> &mut OpenBatch {
+    let at = open.iter().position(|open| open.batch.crs == crs).unwrap_or_else(|| {
+        open.push(OpenBatch { batch: Batch { crs, ..Batch::default() }, has_uvs: false });
+        open.len() - 1
+    });
+    &mut open[at]
 }
 
 /// Appends a ring without repeated points and without its closing point.

@@ -57,6 +57,8 @@ pub struct ObjReader {
     objects: Vec<Object>,
     object_numbers: HashMap<String, u32>,
     group: String,
+    /// None: OBJ has no instances.
+    instances: Vec<Instance>,
     triangles: u64,
     at_end: bool,
 }
@@ -84,6 +86,7 @@ impl ObjReader {
             objects: Vec::new(),
             object_numbers: HashMap::new(),
             group: String::new(),
+            instances: Vec::new(),
             triangles: 0,
             at_end: false,
         })
@@ -306,11 +309,11 @@ impl DocumentReader for ObjReader {
     }
 
     fn instances(&self) -> &[Instance] {
-        &[]
+        &self.instances
     }
 
-    fn instances_mut(&mut self) -> &mut [Instance] {
-        &mut []
+    fn instances_mut(&mut self) -> &mut Vec<Instance> {
+        &mut self.instances
     }
 
     fn textures(&self) -> &[ImageFile] {

@@ -65,6 +65,8 @@ pub struct ParsedDocument {
     pub instances: Vec<Instance>,
     pub textures: Vec<ImageFile>,
     pub srs_name: Option<String>,
+    pub crs_names: Vec<Option<String>>,
+    pub instance_crs: Vec<u16>,
     pub report: AssetReport,
 }
 
@@ -94,6 +96,8 @@ pub fn read_with(path: &Path, format: Format, options: &ReadOptions) -> Result<P
         instances: reader.instances().to_vec(),
         textures: reader.textures().to_vec(),
         srs_name: reader.srs_name().map(str::to_owned),
+        crs_names: reader.crs_names().into_iter().map(|name| name.map(str::to_owned)).collect(),
+        instance_crs: reader.instance_crs().to_vec(),
         report: reader.report().clone(),
     };
     document.check_indices();
@@ -114,6 +118,7 @@ impl ParsedDocument {
         for batch in &self.batches {
             assert!(batch.materials.iter().all(|m| (*m as usize) < self.materials.len()), "materials exist");
             assert!(batch.objects.iter().all(|o| (*o as usize) < self.objects.len()), "objects exist");
+            assert!((batch.crs as usize) < self.crs_names.len(), "coordinate systems exist");
         }
         let prototypes: Vec<u32> = self.batches.iter().map(|b| b.prototype).collect();
         for instance in &self.instances {
