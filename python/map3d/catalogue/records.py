@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from map3d.catalogue.states import State
 from map3d.geometry.frames import PinnedFrame, Window
+from map3d.geometry.heights import Heights, find_vertical_epsg, heights_of
 from map3d.geometry.views import track_id
 from map3d.types import BlockId, BlockKind, Box, Layer, Vec3
 
@@ -28,6 +29,21 @@ class SceneCrs:
     @property
     def is_local(self) -> bool:
         return self.wkt is None
+
+    @property
+    def heights(self) -> Heights:
+        return heights_of(self.vertical)
+
+    @property
+    def vertical_epsg(self) -> int | None:
+        return find_vertical_epsg(self.wkt) if self.heights == "geoid" else None
+
+    @property
+    def heights_text(self) -> str:
+        """Returns e.g. "DHHN2016 height (EPSG:7837)"."""
+        if self.vertical is None:
+            return "of an unknown height system"
+        return self.vertical if self.vertical_epsg is None else f"{self.vertical} (EPSG:{self.vertical_epsg})"
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from map3d.cli.output import plural, print_json, size_text
 from map3d.cli.progress import progress_bar
 
 if TYPE_CHECKING:
+    from map3d.catalogue import SceneCrs
     from map3d.ingest.import_files import OnFile
     from map3d.renderings.file_contents import FileContents
     from map3d.renderings.inspection import Inspection
@@ -58,7 +59,7 @@ def _show(bar: Progress, task: Any) -> "OnFile":
 
 def _print(found: "Inspection") -> None:
     if len(found.files) == 1:
-        _print_one(found.files[0])
+        _print_one(found.files[0], found.crs)
     elif found.files:
         print_files(found.files)
         _print_rows(_summary(found))
@@ -70,12 +71,13 @@ def _print(found: "Inspection") -> None:
         click.echo(f"not readable: {reason}", err=True)
 
 
-def _print_one(file: "FileContents") -> None:
+def _print_one(file: "FileContents", crs: "SceneCrs | None") -> None:
     from map3d.renderings.outlier_lines import box_text
 
     rows = [
         ("file", f"{file.source}, {file.format}, {size_text(file.bytes)}"),
         ("coordinates", file.crs),
+        ("heights", None if crs is None else crs.heights_text),
         ("place", file.place),
         ("extent", file.box and box_text(file.box)),
         ("objects", kinds_text(file.kinds)),
@@ -94,6 +96,7 @@ def _summary(found: "Inspection") -> Iterator[tuple[str, str | None]]:
 
     yield "all", f"{plural(len(found.files), 'file')}, {size_text(sum(file.bytes for file in found.files))}"
     yield "coordinates", None if found.crs is None else f"{found.crs.name}{'' if found.crs.epsg is None else f' (EPSG:{found.crs.epsg})'}"
+    yield "heights", None if found.crs is None else found.crs.heights_text
     if found.box is not None:
         yield "extent", f"{box_text(found.box)}, around {place_text(found.box, found.crs)}"
     yield "objects", kinds_text(sum_kinds(found.files))

@@ -9,6 +9,7 @@ from pyproj.crs import CompoundCRS
 from pyproj.exceptions import CRSError
 
 from map3d.errors import CrsError
+from map3d.geometry.heights import ELLIPSOIDAL
 
 network.set_network_enabled(False)  # type: ignore[attr-defined]
 
@@ -82,7 +83,12 @@ def vertical_crs_name(crs: CRS) -> str | None:
     part = vertical_crs(crs)
     if part is not None:
         return str(part.name)
-    return f"ellipsoidal height ({crs.geodetic_crs.name})" if len(crs.axis_info) == 3 and crs.geodetic_crs is not None else None
+    return f"{ELLIPSOIDAL} ({crs.geodetic_crs.name})" if len(crs.axis_info) == 3 and crs.geodetic_crs is not None else None
+
+
+def has_ellipsoidal_heights(crs: CRS) -> bool:
+    """Whether heights are above the ellipsoid: a system of three axes without a vertical part."""
+    return len(crs.axis_info) == 3 and not crs.is_compound
 
 
 def vertical_unit_m(crs: CRS) -> float:

@@ -1,5 +1,6 @@
 """Determines the CRS of an asset's coordinates and transforms them to the scene's."""
 
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -9,7 +10,7 @@ from pyproj.crs import CompoundCRS
 
 from map3d.catalogue import SceneCrs
 from map3d.errors import CrsError
-from map3d.geometry.crs import is_local, parse_crs, vertical_crs
+from map3d.geometry.crs import has_ellipsoidal_heights, is_local, parse_crs, vertical_crs, vertical_crs_name
 from map3d.ingest.coordinate_check import CoordinateCheck
 from map3d.ingest.crs_transformer import CrsTransformer, Points, choose_scene_crs
 from map3d.ingest.scene_crs import LOCAL, to_scene_crs
@@ -62,7 +63,9 @@ class AssetReprojector:
     def proposed_crs(self) -> SceneCrs | None:
         """The CRS for a scene that has none; None before any position was transformed."""
         if self._target is not None:
-            return to_scene_crs(self._target)
+            proposed = to_scene_crs(self._target)
+            is_ellipsoidal = self._source is not None and proposed.vertical is None and has_ellipsoidal_heights(self._source)
+            return replace(proposed, vertical=vertical_crs_name(self._source)) if self._source is not None and is_ellipsoidal else proposed
         return LOCAL if self._source is None else None
 
     @property

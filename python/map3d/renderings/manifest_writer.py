@@ -106,7 +106,7 @@ def _base_bits(results: Iterable[tuple[BlockId, JobResult]], root: int) -> Itera
 
 def _crs(scene: SceneRecord) -> ManifestCrs:
     crs = scene.crs
-    return ManifestCrs(LOCAL_CRS_NAME) if crs is None else ManifestCrs(crs.name, crs.epsg, crs.wkt, crs.vertical)
+    return ManifestCrs(LOCAL_CRS_NAME) if crs is None else ManifestCrs(crs.name, crs.epsg, crs.wkt, crs.vertical, crs.heights, crs.vertical_epsg)
 
 
 def _origin(record: SceneRecord) -> Vec3:

@@ -20,12 +20,15 @@ FILE_NAME: Final = "rendering.json"
 
 @dataclass(frozen=True)
 class ManifestCrs:
-    """The scene's CRS. `epsg` and `vertical` are None if unknown, `wkt` is None for a local CRS."""
+    """The scene's CRS. `epsg` and `vertical` are None if unknown, `wkt` is None for a local CRS. `heights`: "geoid", "ellipsoid" or "unknown";
+    `vertical_epsg`: code of the vertical CRS, if it has one."""
 
     name: str
     epsg: int | None = None
     wkt: str | None = None
     vertical: str | None = None
+    heights: str = "unknown"
+    vertical_epsg: int | None = None
 
 
 @dataclass(frozen=True)
@@ -128,7 +131,7 @@ class Manifest:
             "attribution": self.attribution,
             "content_version": self.content_version,
             "complete": self.complete,
-            "crs": {"epsg": self.crs.epsg, "wkt": self.crs.wkt, "name": self.crs.name, "vertical": self.crs.vertical},
+            "crs": {key: getattr(self.crs, key) for key in ("epsg", "wkt", "name", "vertical", "heights", "vertical_epsg")},
             **({} if self.geographic is None else {"geographic": asdict(self.geographic)}),
             "origin": list(self.origin),
             "box": [list(corner) for corner in self.box],
@@ -164,7 +167,10 @@ class Manifest:
                 name=value["name"],
                 content_version=int(value["content_version"]),
                 complete=bool(value["complete"]),
-                crs=ManifestCrs(**{key: value["crs"][key] for key in ("name", "epsg", "wkt", "vertical")}),
+                crs=ManifestCrs(
+                    **{key: value["crs"][key] for key in ("name", "epsg", "wkt", "vertical")},
+                    **{key: value["crs"][key] for key in ("heights", "vertical_epsg") if key in value["crs"]},
+                ),
                 origin=_parse_vec3(value["origin"]),
                 box=(_parse_vec3(value["box"][0]), _parse_vec3(value["box"][1])),
                 passes=passes,

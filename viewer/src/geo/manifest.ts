@@ -58,7 +58,9 @@ export interface ManifestJson {
   content_version: number;
   /** Whether all tiles have been rendered. */
   complete: boolean;
-  crs: { epsg: number | null; wkt: string | null; name: string; vertical: string | null };
+  crs: { epsg: number | null; wkt: string | null; name: string; vertical: string | null;
+    /** What heights refer to; absent in older manifests. */
+    heights?: "geoid" | "ellipsoid" | "unknown"; vertical_epsg?: number | null };
   /** Position on earth; absent when unknown. */
   geographic?: GeographicJson;
   /** World coordinates of the local origin, metres. */
