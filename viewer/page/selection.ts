@@ -105,8 +105,8 @@ export class Selection {
       this.#layer.object(id).then((object) => {
         const [low, high] = object?.box ?? [];
         const middle = low && high && origin ? ([0, 1, 2] as const).map((k) => origin[k] + (low[k] + high[k]) / 2) as unknown as Vec3 : position;
-        this.#view.setDirection(opposite.id);
         if (middle) this.#view.setView(middle);
+        this.#view.setDirection(opposite.id);
       }, (reason: unknown) => { report(reason); });
     });
   }

@@ -42,11 +42,26 @@ const workers = {
 /** Removes comments, indentation and the spaces around operators from a line of a shader; a macro keeps its spaces. */
 const shortenLine = (line) => (line.startsWith("#") || line.includes('"') ? line : line.replace(/ *([=*/<>,;?:{}()&|]|[-+]=) */g, "$1").replace(/(?<=[\w)\]]) ([-+]) (?=[\w(])/g, "$1"));
 
+/** Names of functions and variables that a shader declares; not those of uniforms and outputs (u_…, o_…), which TypeScript code knows, and not those that hide a function of GLSL. */
+const DECLARED = /\b(?:void|bool|u?int|float|[biu]?vec[234]|mat[234])\s+(?![a-z]_|main\b|step\b|distance\b|length\b|texture\b)([A-Za-z]\w+)/g;
+
+/** Gives the names that shaders declare one or two letters each; texts in `code` between backticks are shaders. */
+function shortenNames(code) {
+  const parts = code.split("`");
+  const shaders = parts.filter((_, k) => k % 2 === 1).join("\n").replace(/\$\{[^}]*\}/g, "");
+  const taken = new Set(["do", "if", "in", ...(shaders.match(/\b[A-Za-z]\w?\b/g) ?? [])]);
+  const free = [..."abcdefghijklmnopqrstuvwxyz"].flatMap((letter, _, all) => [letter, ...all.map((second) => letter + second)]).sort((a, b) => a.length - b.length);
+  const names = new Map();
+  for (const [, name] of shaders.matchAll(DECLARED)) if (!names.has(name)) names.set(name, free.find((short) => !taken.has(short) && taken.add(short)));
+  const rename = (text) => text.replace(/(\$\{[^}]*\})|(?<![.\w])[A-Za-z]\w+/g, (word, inserted) => (inserted === undefined ? names.get(word) ?? word : word));
+  return parts.map((part, k) => (k % 2 === 1 ? rename(part) : part)).join("`");
+}
+
 /** Shortens shaders. */
 const shaders = {
   name: "shaders",
   setup(build) {
-    build.onLoad({ filter: /\/shaders?\.ts$/ }, ({ path }) => ({ contents: readFileSync(path, "utf8").replace(/\/\*[^]*?\*\/|\/\/.*|^[ \t]+/gm, "").replace(/\n{2,}/g, "\n").split("\n").map(shortenLine).join("\n"), loader: "ts" }));
+    build.onLoad({ filter: /\/shaders?\.ts$/ }, ({ path }) => ({ contents: shortenNames(readFileSync(path, "utf8").replace(/\/\*[^]*?\*\/|\/\/.*|^[ \t]+/gm, "").replace(/\n{2,}/g, "\n").split("\n").map(shortenLine).join("\n")), loader: "ts" }));
   },
 };
 

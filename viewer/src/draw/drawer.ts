@@ -114,6 +114,8 @@ export interface Drawer {
   readonly element: HTMLElement;
   /** Whether the last frame is incomplete; `changed` fires when more is ready. */
   readonly busy: boolean;
+  /** Whether the picture is still that of the previous view, since nothing of the current one is ready. */
+  readonly showsPreviousView: boolean;
   /** null when it does not use WebGL. */
   readonly gl: WebGL2RenderingContext | null;
   /** A note for the debug overlay; usually empty. */

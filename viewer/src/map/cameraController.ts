@@ -1,5 +1,5 @@
 import { checkNumber, checkVector } from "../core/check";
-import { asError, UsageError } from "../core/errors";
+import { asError, FetchError, UsageError } from "../core/errors";
 import { Evented } from "../core/events";
 import { add, clamp, dot, boxCenter, sub, type Box3, type Vec2, type Vec3 } from "../core/vec";
 import { depthAtHeight, localFromUvd, uvdFromLocal } from "../geo/axes";
@@ -8,6 +8,7 @@ import { localFromLonLat, lonLatFromLocal } from "../geo/geographic";
 import type { Rendering, View } from "../geo/manifest";
 import { findIncompatibility } from "./compatibility";
 import { findNeighbourView, findTiltedView } from "./neighbourViews";
+import { COARSE_STEPS, type LayerPlan } from "./layerPlan";
 import { limitCamera, computeZoomLimits } from "./limits";
 import { Motion } from "./motion";
 import { EVENTS, type FilledOptions, type MapEvents } from "./options";
@@ -41,6 +42,8 @@ export abstract class CameraController extends Evented<MapEvents> {
   protected transition: ViewTransition | null = null;
   /** The camera of a running view transition. */
   protected transitionCamera: Camera | null = null;
+  /** The view that replaces the current one once its tiles cover the screen; null: none. */
+  protected nextView: View | null = null;
   #pending: (() => void)[] = [];
   /** Clockwise rotation since the last switch of views. */
   #rotation_rad = 0;
@@ -48,6 +51,8 @@ export abstract class CameraController extends Evented<MapEvents> {
   protected abstract get size(): Size;
   protected abstract requestFrame(): void;
   protected abstract report(error: Error): void;
+  /** Whether tiles in memory, of whatever level, cover what a camera shows. */
+  protected abstract isCovered(camera: Camera): boolean;
   /** Finds the world position of the surface at the screen's centre, if it is in memory. */
   protected abstract findCenterSurface(viewState: ViewState): Vec3 | null;
 
@@ -94,20 +99,20 @@ export abstract class CameraController extends Evented<MapEvents> {
   /** Centres the map on a world position, at once. @throws UsageError for anything but three numbers, and a number */
   setView(position: Vec3, zoom?: number): this {
     checkView(position, zoom);
-    return this.#moveTo((camera, rendering) => centerCamera(camera, rendering, position, zoom), 0);
+    return this.whenReady(() => { this.#switchView(); }).#moveTo((camera, rendering) => centerCamera(camera, rendering, position, zoom), 0);
   }
 
   /** Flies to a world position; jumps there if the user prefers reduced motion. */
   flyTo(position: Vec3, zoom?: number, { duration_ms = FLIGHT_MS }: { duration_ms?: number } = {}): this {
     checkView(position, zoom);
-    return this.#moveTo((camera, rendering) => centerCamera(camera, rendering, position, zoom), duration_ms);
+    return this.whenReady(() => { this.#switchView(); }).#moveTo((camera, rendering) => centerCamera(camera, rendering, position, zoom), duration_ms);
   }
 
   /** Fits a box of world coordinates into the map. */
   fitBounds([low, high]: Box3, { padding_px = 24, duration_ms = 0, maxZoom = Infinity }: FitOptions = {}): this {
     for (const corner of [low, high]) checkVector(corner, "fitBounds");
     for (const number of [padding_px, maxZoom]) checkNumber(number, "fitBounds");
-    return this.#moveTo((camera, { json: { origin } }) => fitCamera(camera, [sub(low, origin), sub(high, origin)], padding_px, maxZoom), duration_ms);
+    return this.whenReady(() => { this.#switchView(); }).#moveTo((camera, { json: { origin } }) => fitCamera(camera, [sub(low, origin), sub(high, origin)], padding_px, maxZoom), duration_ms);
   }
 
   /** Sets the zoom at once, about the screen's centre and within `zoomLimits`. */
@@ -148,24 +153,30 @@ export abstract class CameraController extends Evented<MapEvents> {
     return this.camera ? this.#moveTo((camera) => panCamera(camera, dx, dy), smooth ? STEP_MS : 0, smooth) : this;
   }
 
-  /** Switches to another view of the rendering; the point at the centre stays there. @throws UsageError for an unknown view */
+  /**
+   * Switches to another view of the rendering; the point at the centre stays there. The current view stays until tiles of the other one cover the screen, if
+   * only coarsely ("directionchange" tells when), or until a call sets the position; if they cannot be fetched, it remains and "error" tells why.
+   * @throws UsageError for an unknown view
+   */
   setDirection(direction: string): this {
     return this.whenReady((camera, rendering) => {
       const view = rendering.views.get(direction);
       if (!view) throw new UsageError(`unknown view "${direction}"; the rendering has ${[...rendering.views.keys()].join(", ")}`);
-      if (view.frame !== camera.frame) this.#switchView(view, camera, rendering);
+      this.nextView = view.frame === camera.frame ? null : view;
+      if (!this.isCovered(camera) || this.isCovered(this.#turn(view, camera))) this.#switchView();
+      this.requestFrame();
     });
   }
 
   /** Switches to the next direction of the same pitch, +1 counter-clockwise. */
   rotate(step: number): this {
-    return this.whenReady((camera, rendering) => this.setDirection(findNeighbourView(rendering, camera.frame, step)));
+    return this.whenReady((camera, rendering) => this.setDirection(findNeighbourView(rendering, (this.nextView ?? camera).frame, step)));
   }
 
   /** Switches to the next pitch in the nearest direction, +1 steeper; does nothing if there is none. */
   tilt(step: number): this {
     return this.whenReady((camera, rendering) => {
-      const view = findTiltedView(rendering, camera.frame, step);
+      const view = findTiltedView(rendering, (this.nextView ?? camera).frame, step);
       if (view !== null) this.setDirection(view);
     });
   }
@@ -219,6 +230,11 @@ export abstract class CameraController extends Evented<MapEvents> {
     return this.transitionCamera !== null;
   }
 
+  /** @internal Whether a view waits for its tiles. */
+  get isTurning(): boolean {
+    return this.nextView !== null;
+  }
+
   /** @internal Requests a frame for a view transition. */
   requestTransitionFrame(): void {
     this.requestFrame();
@@ -261,6 +277,7 @@ export abstract class CameraController extends Evented<MapEvents> {
   /** @internal Lets the next manifest set the view, as the first one did. */
   resetView(): void {
     this.motion.stop();
+    this.nextView = null;
     this.camera = this.reference = undefined;
   }
 
@@ -336,13 +353,45 @@ export abstract class CameraController extends Evented<MapEvents> {
     });
   }
 
-  #switchView(view: View, camera: Camera, rendering: Rendering): void {
-    const center = this.center;
-    const target = { ...camera, frame: view.frame };
+  /** The camera of the view that waits for its tiles; null: none waits. */
+  protected get nextCamera(): Camera | null {
+    return this.nextView && this.camera ? this.#turn(this.nextView, this.camera) : null;
+  }
+
+  /** Shows the view that waits as soon as its tiles cover the screen, or keeps the current one when most of them are unavailable. */
+  protected continueTurn(plans: readonly LayerPlan[]): void {
+    const unavailable = plans.every(({ complete }) => complete);
+    if (plans.every(({ uncovered, cover }) => uncovered <= (unavailable ? cover.length / 2 : 0))) this.#switchView();
+    else if (unavailable) {
+      this.report(new FetchError(`view "${this.nextView?.id ?? ""}" cannot be shown: its tiles are not available`));
+      this.nextView = null;
+    }
+  }
+
+  /** Lists the views that the next turn may show, as coarse as its first picture; none if the user saves data. */
+  protected listViewsAhead(viewState: ViewState): ViewState[] {
+    const { camera, reference } = this;
+    if (!camera || !reference || this.options.dataSaver) return [];
+    const views = [1, -1].map((step) => reference.views.get(findNeighbourView(reference, camera.frame, step)) as View);
+    return [...new Set(views)].filter(({ frame }) => frame !== camera.frame).map((view) => ({ ...viewState, finer: viewState.finer - COARSE_STEPS, camera: this.#turn(view, camera) }));
+  }
+
+  /** Computes the camera of another view with the same place at the centre. */
+  #turn({ frame }: View, camera: Camera): Camera {
+    const { center, reference } = this;
+    const [target, rendering] = [{ ...camera, frame }, reference as Rendering];
+    return limitCamera(center ? centerCamera(target, rendering, center) : fitCamera(target, rendering.json.box, 0, camera.zoom), rendering.json.box);
+  }
+
+  /** Shows the view that waits for its tiles, if one does. */
+  #switchView(): void {
+    const { nextView, nextCamera, camera, center, reference } = this;
+    if (!nextView || !nextCamera || !camera || !reference) return;
+    this.nextView = null;
     this.motion.stop();
-    this.setCamera(center ? centerCamera(target, rendering, center) : fitCamera(target, rendering.json.box, 0, camera.zoom));
-    this.transition?.start(camera, center ? sub(center, rendering.json.origin) : boxCenter(rendering.json.box));
-    this.fire("directionchange", { direction: view.id });
+    this.setCamera(nextCamera);
+    this.transition?.start(camera, center ? sub(center, reference.json.origin) : boxCenter(reference.json.box));
+    this.fire("directionchange", { direction: nextView.id });
   }
 }
 

@@ -7,7 +7,7 @@ import type { LayerKind } from "../geo/manifest";
 import { Cache } from "../tiles/cache";
 import { DENSE_DPR } from "../tiles/cover";
 import { Decoder } from "../tiles/decoder";
-import { RequestQueue } from "../tiles/queue";
+import { RequestQueue, type TileRequest } from "../tiles/queue";
 import type { TileResources, CachedTile } from "../tiles/layerTiles";
 import { findCombinedLayers } from "./depthGroups";
 import type { imageLayer } from "./imageLayer";
@@ -38,19 +38,31 @@ export interface FrameResult {
   readonly plans: readonly LayerPlan[];
   /** Whether nothing is missing in view. */
   readonly complete: boolean;
+  /** The plans of the view that waits for its tiles; null: none waits. */
+  readonly next: readonly LayerPlan[] | null;
 }
 
-/** The input of a frame. */
-export interface FrameInput {
+/** What is shown, wherever the camera is. */
+export interface PlanInput {
   readonly layers: readonly imageLayer[];
   readonly light: Readonly<Light>;
   /** Kinds of tiles to fetch in addition to those shown. */
   readonly requiredKinds: readonly LayerKind[];
+}
+
+/** The input of a frame. */
+export interface FrameInput extends PlanInput {
   /** Estimates light that was not rendered. */
   readonly lightEstimator: LightEstimator | null;
   /** Whether the view is moving, so that costly parts may be approximate. */
   readonly moving: boolean;
+  /** A view whose tiles are fetched before all others. */
+  readonly next: ViewState | null;
+  /** Views whose tiles are fetched after all others. */
+  readonly ahead: readonly ViewState[];
 }
+
+const listRequests = (plans: readonly LayerPlan[]): TileRequest[] => plans.flatMap(({ requests }) => requests);
 
 /** Renders frames: plans each layer, requests its tiles, and lets the drawer draw. Owns tiles and drawer. */
 export class FrameRenderer {
@@ -87,7 +99,7 @@ export class FrameRenderer {
     return this.#queue.busy || this.#drawer.busy;
   }
 
-  get drawer(): Pick<Drawer, "name" | "note" | "element"> {
+  get drawer(): Pick<Drawer, "name" | "note" | "element" | "showsPreviousView"> {
     return this.#drawer;
   }
 
@@ -97,7 +109,7 @@ export class FrameRenderer {
 
   /** Renders a frame. @param transition draws a view transition instead, where WebGL is available */
   render(viewState: ViewState, input: FrameInput, transition: ((scene: TransitionScene) => void) | null): FrameResult {
-    const { layers, light, requiredKinds, lightEstimator, moving } = input;
+    const { layers, light, lightEstimator, moving } = input;
     this.#viewport.fitCanvas(viewState.dpr);
     const { width, height } = this.#viewport.canvas;
     this.#cache.setLimit(this.#options.cacheBytes ?? Math.max(MIN_BYTES, (viewState.dpr >= DENSE_DPR ? DENSE_PIXEL_BYTES : PIXEL_BYTES) * width * height));
@@ -106,12 +118,11 @@ export class FrameRenderer {
     this.#showsCustomLayers &&= this.customLayers.size > 0 && gl !== null;
     const customLayers = this.#showsCustomLayers ? [...this.customLayers] : [];
     const combined = findCombinedLayers(layers, this.#showsCustomLayers);
-    const planned = layers.flatMap((layer) => {
-      const plan = layer.plan(viewState, light, requiredKinds, combined.includes(layer));
-      return plan ? [{ layer, plan }] : [];
-    });
+    const planned = this.#plan(viewState, input);
+    const next = input.next && this.plan(input.next, input);
     const before = (layer: imageLayer): number | null => (combined.includes(layer) ? combined.indexOf(layer) : null);
-    this.#queue.setRequests(planned.flatMap(({ plan }) => plan.requests));
+    const plans = planned.map(({ plan }) => plan);
+    this.#queue.setRequests(listRequests([...(next ?? []), ...plans]), listRequests(input.ahead.flatMap((each) => this.plan(each, input))));
     const complete = !layers.some((layer) => layer.isLoading) && planned.every(({ plan }) => plan.complete);
     if (transition && gl) transition({ gl, width, height, complete, getDepthRange: (frame) => computeSceneDepthRange(viewState, frame, layers, customLayers), drawView: (camera, range, framebuffer) => { this.#drawView({ ...viewState, camera, dpr: 1 }, input, customLayers, { range, framebuffer }); } });
     else this.#drawer.draw({ camera: viewState.camera, width, height, dpr: viewState.dpr, light, customLayers, lighting: lightEstimator && { estimator: lightEstimator, moving }, passes: planned.map(({ layer, plan }) => layer.makePass(plan, viewState, before(layer))) });
@@ -119,7 +130,20 @@ export class FrameRenderer {
       this.#showsCustomLayers = true;
       this.#events.changed();
     }
-    return { plans: planned.map(({ plan }) => plan), complete: complete && !this.#drawer.busy };
+    return { plans, complete: complete && !next && !this.#drawer.busy, next };
+  }
+
+  /** Plans what the layers show in a view. */
+  plan(viewState: ViewState, input: PlanInput): LayerPlan[] {
+    return this.#plan(viewState, input).map(({ plan }) => plan);
+  }
+
+  #plan(viewState: ViewState, { layers, light, requiredKinds }: PlanInput): { layer: imageLayer; plan: LayerPlan }[] {
+    const combined = findCombinedLayers(layers, this.#showsCustomLayers);
+    return layers.flatMap((layer) => {
+      const plan = layer.plan(viewState, light, requiredKinds, combined.includes(layer));
+      return plan ? [{ layer, plan }] : [];
+    });
   }
 
   /** Draws a view from the tiles in memory, with the depth of all layers that have any. */

@@ -25,13 +25,15 @@ export interface LayerPlan {
   readonly tiles: LayerTiles;
   /** Whether all tiles in view are in memory or known to be unavailable. */
   readonly complete: boolean;
+  /** Tiles of the cover of which nothing is in memory, not even coarsely. */
+  readonly uncovered: number;
 }
 
 /** Default unit of depth values. */
 export const DEPTH_UNIT_M = 2 ** -10;
 
 /** Tiles this many levels above the shown one are fetched first, so that something is visible soon. */
-const COARSE_STEPS = 3;
+export const COARSE_STEPS = 3;
 
 /** Computes U and V of the screen's centre in the layer's frame. */
 export function computeCenter(frame: Frame, { camera, origin }: ViewState, rendering: Rendering): Vec2 {
@@ -59,14 +61,15 @@ export function planLayer(viewState: ViewState, rendering: Rendering, view: View
   const inMemory = (kind: LayerKind, tile: Tile): boolean => isInMemory(layers, layerTiles, view, kind, tile);
   const ready = (tile: Tile): boolean => needed.every((kind) => inMemory(kind, tile));
   const screen = { left: rect[0][0], top: rect[1][1], px_m: px / dpr };
-  const quads = placeQuads(frame, screen, cover.flatMap((tile) => findFallbacks(tile, ready, occupied)), level);
+  const fallbacks = cover.map((tile) => findFallbacks(tile, ready, occupied));
+  const quads = placeQuads(frame, screen, fallbacks.flat(), level);
   const ordered = sortFromCenter(frame, cover, rect);
   const requests = [
     ...listRequests(layers, layerTiles, view, needed, findAncestors(ordered)),
     ...listRequests(layers, layerTiles, view, needed, ordered),
     ...listRequests(layers, layerTiles, view, extra, ordered),
   ];
-  return { view, bakedLight, layers, tiles: layerTiles, level, cover, quads, requests, complete: requests.length === 0 };
+  return { view, bakedLight, layers, tiles: layerTiles, level, cover, quads, requests, complete: requests.length === 0, uncovered: fallbacks.filter(({ length }) => length === 0).length };
 }
 
 /** Computes the minimum and maximum depth value of the rendering's box in a view. */

@@ -24,7 +24,7 @@ import { imageLayer } from "./imageLayer";
 import { findVisibleObjects, type VisibleObject } from "./visibleObjects";
 import { listenToKeys } from "./keyboard";
 import { DEFAULTS, OPTIONS, savesData, type ClickEvent, type FilledOptions, type MapOptions } from "./options";
-import { FrameRenderer } from "./frameRenderer";
+import { FrameRenderer, type PlanInput } from "./frameRenderer";
 import { EMPTY_PICK, pickExactly, pickLoaded, type Pick } from "./picker";
 import { Relief } from "./relief";
 import type { ViewState, LayerContext } from "./layerContext";
@@ -55,6 +55,8 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   /** Whether the view has not moved since the last "moveend". */
   #atRest = true;
   #loaded = false;
+  /** Whether the map has been at rest since it moved last, so that tiles of other views are fetched. */
+  #fetchesAhead = false;
   #clickCount = 0;
   #nameCount = 0;
   #hoverPoint: Vec2 | null = null;
@@ -136,6 +138,11 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   /** The current drawer: "webgl" or "canvas"; null when the browser supports neither. */
   get drawer(): "webgl" | "canvas" | null {
     return this.#renderer?.drawer.name ?? null;
+  }
+
+  /** @internal Whether the picture is still that of the previous view. */
+  get showsPreviousView(): boolean {
+    return this.#renderer?.drawer.showsPreviousView === true;
   }
 
   /** @internal The element that shows the picture: the canvas, or an element below it; null when nothing can be drawn. */
@@ -324,7 +331,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     this.advanceCamera(now);
     if (this.#hoverPoint) this.#fireHover(this.#hoverPoint);
     try {
-      if (this.#dirty || this.camera !== this.#drawnCamera || wasInTransition || this.transitionCamera) this.#draw(wasInTransition || this.transitionCamera !== null);
+      if (this.#dirty || this.isTurning || this.camera !== this.#drawnCamera || wasInTransition || this.transitionCamera) this.#draw(wasInTransition || this.transitionCamera !== null);
       else this.#comeToRest();
     } catch (reason) {
       this.report(asError(reason));
@@ -338,13 +345,25 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     const [lastCamera, tilesChanged] = [this.#drawnCamera, this.#dirty];
     [this.#drawnCamera, this.#dirty, this.#relief] = [viewState.camera, false, undefined];
     const moving = lastCamera !== undefined && lastCamera !== viewState.camera;
-    const { plans, complete } = this.#renderer.render(viewState, { layers: this.#layers, light: this.#light, requiredKinds: this.#findRequiredKinds(), lightEstimator: this.#lightEstimator, moving }, this.transitionCamera && ((scene) => { this.transition?.draw({ ...scene, camera: viewState.camera, tilesChanged }); }));
+    this.#fetchesAhead &&= !moving;
+    const input = { ...this.#planInput, lightEstimator: this.#lightEstimator, moving, next: this.nextCamera && { ...viewState, camera: this.nextCamera }, ahead: this.#fetchesAhead ? this.listViewsAhead(viewState) : [] };
+    const { plans, complete, next } = this.#renderer.render(viewState, input, this.transitionCamera && ((scene) => { this.transition?.draw({ ...scene, camera: viewState.camera, tilesChanged }); }));
     this.#debug.update(plans, viewState.dpr, this.#renderer.drawer);
     if (lastCamera !== viewState.camera || inTransition) this.#fireMove(lastCamera, viewState.camera);
     this.frameEvents.fire("draw", {});
     if (this.#lightEstimator && moving) this.#redraw();
     if (this.moving || !this.#atRest || complete) this.#loop.request();
     if (complete) this.#fireLoad();
+    if (next) this.continueTurn(next);
+  }
+
+  get #planInput(): PlanInput {
+    return { layers: this.#layers, light: this.#light, requiredKinds: this.#findRequiredKinds() };
+  }
+
+  protected isCovered(camera: Camera): boolean {
+    const viewState = this.getViewState();
+    return viewState !== null && this.#renderer?.plan({ ...viewState, camera }, this.#planInput).every(({ uncovered }) => uncovered === 0) === true;
   }
 
   /** Lists kinds of tiles that are read, in addition to those shown. */
@@ -373,7 +392,9 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     }
     if (!this.#atRest) this.fire("moveend", {});
     this.#atRest = true;
-    if (!this.#renderer?.busy && this.#loaded) this.fire("idle", {});
+    if (this.#renderer?.busy !== false || !this.#loaded) return;
+    if (!this.#fetchesAhead) this.#redraw().#fetchesAhead = true;
+    this.fire("idle", {});
   }
 
   #redraw(): this {

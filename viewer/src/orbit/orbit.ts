@@ -61,7 +61,11 @@ const angularDistance = (a: ViewAngles, b: ViewAngles): number => Math.hypot(ang
  * `prefers-reduced-motion` they switch at once. Reads depth tiles.
  */
 export class orbit extends MapLayer<map, object> implements ViewTransition {
-  readonly needs = ["depth"] as const;
+  /** The 2D canvas cross-fades without depth. */
+  get needs(): readonly "depth"[] {
+    return this.map?.drawer === "webgl" ? ["depth"] : [];
+  }
+
   readonly #duration_ms: number;
   #warp: Warp | undefined;
   #transition: TransitionState | null = null;
@@ -83,10 +87,10 @@ export class orbit extends MapLayer<map, object> implements ViewTransition {
 
   /** @internal */
   start(from: Camera, pivot: Vec3): void {
-    const { drawer, drawerElement } = this.map ?? {};
-    if (reducedMotion() || !drawer) return;
-    if (drawer === "canvas") {
-      if (drawerElement) fadeOut(drawerElement, FADE_MS);
+    const { map } = this;
+    if (reducedMotion() || !map?.drawer) return;
+    if (map.drawer === "canvas") {
+      if (map.drawerElement) fadeOut(map.drawerElement, FADE_MS, () => map.showsPreviousView);
       return;
     }
     const start = this.#transition?.current ?? anglesOf(from.frame);
@@ -104,7 +108,7 @@ export class orbit extends MapLayer<map, object> implements ViewTransition {
     const beyond = angleBetween(map.lookAt_deg, lookAt);
     const back = this.#transition ? angleBetween(map.lookAt_deg, this.#transition.from.frame.lookAtDeg) : 0;
     const between = this.#transition && Math.sign(beyond) === Math.sign(back) && Math.abs(beyond) <= Math.abs(back);
-    if (!between && Math.abs(beyond) > MIN_GESTURE_DEG) map.rotate(Math.sign(beyond));
+    if (!between && !map.isTurning && Math.abs(beyond) > MIN_GESTURE_DEG) map.rotate(Math.sign(beyond));
     if (this.#transition) this.#transition.current = { ...this.#transition.current, lookAt };
     map.requestTransitionFrame();
     return true;

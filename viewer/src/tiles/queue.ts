@@ -8,6 +8,8 @@ interface RunningRequest {
   readonly done: Promise<void>;
   /** A caller waits for it: it is not aborted when it leaves the view. */
   pinned: boolean;
+  /** Nobody waits for it yet. */
+  ahead: boolean;
 }
 
 /** Runs the wanted requests, at most `limit` at once, and aborts those that are no longer wanted. */
@@ -15,24 +17,29 @@ export class RequestQueue {
   readonly #running = new Map<string, RunningRequest>();
   readonly #limit: number;
   #waiting: TileRequest[] = [];
+  /** Waiting requests that run when there are no others. */
+  #ahead: TileRequest[] = [];
 
   constructor(limit: number) {
     this.#limit = limit;
   }
 
+  /** Whether requests are running or waiting, apart from those ahead. */
   get busy(): boolean {
-    return this.#running.size + this.#waiting.length > 0;
+    return this.#waiting.length > 0 || [...this.#running.values()].some(({ ahead }) => !ahead);
   }
 
-  /** Replaces the wanted requests, most urgent first. */
-  setRequests(requests: readonly TileRequest[]): void {
-    const keys = new Map([...requests].reverse().map((request) => [request.key, request]));
+  /** Replaces the wanted requests, most urgent first. @param ahead requests that run when there are no others */
+  setRequests(requests: readonly TileRequest[], ahead: readonly TileRequest[] = []): void {
+    const keys = new Map([...requests, ...ahead].reverse().map((request) => [request.key, request]));
+    const [wanted, later] = [requests, ahead].map((list) => list.filter((request) => keys.get(request.key) === request)) as [TileRequest[], TileRequest[]];
     for (const [key, running] of [...this.#running]) {
+      running.ahead = later.some((request) => request.key === key);
       if (keys.has(key) || running.pinned) continue;
       this.#running.delete(key);
       running.abort.abort();
     }
-    this.#waiting = requests.filter((request) => keys.get(request.key) === request && !this.#running.has(request.key));
+    [this.#waiting, this.#ahead] = [wanted, later].map((list) => list.filter(({ key }) => !this.#running.has(key))) as [TileRequest[], TileRequest[]];
     this.#fill();
   }
 
@@ -40,25 +47,27 @@ export class RequestQueue {
   runNow(request: TileRequest): Promise<void> {
     const running = this.#running.get(request.key) ?? this.#start(request);
     this.#waiting = this.#waiting.filter((other) => other.key !== request.key);
-    running.pinned = true;
+    this.#ahead = this.#ahead.filter((other) => other.key !== request.key);
+    Object.assign(running, { pinned: true, ahead: false });
     return running.done;
   }
 
   #fill(): void {
     while (this.#running.size < this.#limit) {
       const request = this.#waiting.shift();
-      if (!request) return;
-      this.#start(request);
+      const next = request ?? this.#ahead.shift();
+      if (!next) return;
+      this.#start(next, !request);
     }
   }
 
-  #start(request: TileRequest): RunningRequest {
+  #start(request: TileRequest, ahead = false): RunningRequest {
     const abort = new AbortController();
     const done = request.run(abort.signal).finally(() => {
       if (this.#running.get(request.key) === running) this.#running.delete(request.key);
       this.#fill();
     });
-    const running: RunningRequest = { abort, done, pinned: false };
+    const running: RunningRequest = { abort, done, pinned: false, ahead };
     this.#running.set(request.key, running);
     return running;
   }

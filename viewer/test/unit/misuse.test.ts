@@ -24,6 +24,7 @@ class Controller extends CameraController {
   protected requestFrame(): void { /* nothing is drawn */ }
   protected report(error: Error): void { throw error; }
   protected findCenterSurface(): Vec3 | null { return null; }
+  protected isCovered(): boolean { return true; }
   start(): this {
     this.initializeView(RENDERING);
     return this;

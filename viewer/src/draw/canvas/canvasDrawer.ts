@@ -34,6 +34,9 @@ export class CanvasDrawer implements Drawer {
   readonly #valueNames = new Map<IdValues, string>();
   #tilePx = 0;
   #nameCount = 0;
+  /** Id of the view in the picture. */
+  #shownView: string | undefined;
+  showsPreviousView = false;
 
   /** @param preserve draws on the canvas itself, so that its pixels can be read  @throws DrawError when the canvas has another context, or the browser has no 2D canvas */
   constructor(canvas: HTMLCanvasElement, preserve: boolean, events: DrawerEvents) {
@@ -55,9 +58,12 @@ export class CanvasDrawer implements Drawer {
 
   draw(frame: FrameContent): void {
     const wanted = frame.passes.map((pass) => [pass, this.#uploadPass(frame, pass)] as const);
-    this.#compositor.show(frame, wanted.flatMap(([pass, tiles]) => this.#composePass(pass, tiles)));
     const requests = wanted.flatMap(([pass, tiles]) => [...tiles].map(([name, tile]) => this.#makeRequest(frame.passes, pass, this.#pictures.getOrCreate(name), tile)));
     this.#pictures.setRequests(requests.filter(({ urgency }) => urgency.length > 0));
+    const view = frame.camera.frame.id;
+    this.showsPreviousView = view !== (this.#shownView ??= view) && this.busy && !frame.passes.every((pass) => this.#isCovered(pass));
+    if (!this.showsPreviousView) this.#compositor.show(frame, wanted.flatMap(([pass, tiles]) => this.#composePass(pass, tiles)));
+    if (!this.showsPreviousView) this.#shownView = view;
     this.#dropUnused(frame.passes);
     if (this.busy) return;
     const [seen, current] = [new Set(requests.map(({ picture }) => picture)), new Set(requests.map(({ options }) => options))];
@@ -119,6 +125,12 @@ export class CanvasDrawer implements Drawer {
     if (!grid || this.#tilePx === 0) return [];
     const mosaic = quads.filter(({ from }) => wanted.has(makeName(pass, from))).flatMap((quad) => this.#findMosaicTiles(pass, grid, quad));
     return mosaic.length > 0 ? [{ grid, tiles: mosaic, smooth: mode === "lit" || mode === "color" || mode === "picture", opacity, clip }] : [];
+  }
+
+  /** Whether there are pictures for all quads of a pass, if only coarse ones. */
+  #isCovered(pass: LayerPass): boolean {
+    const grid = makeGrid(pass, this.#tilePx);
+    return !grid || pass.quads.every((quad) => this.#findMosaicTiles(pass, grid, quad).length > 0);
   }
 
   /** Finds the pictures that fill a quad: its own, or those of descendants or of an ancestor. */

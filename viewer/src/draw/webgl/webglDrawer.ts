@@ -38,6 +38,7 @@ export interface WebGLOptions {
 export class WebGLDrawer implements Drawer {
   readonly name = "webgl";
   readonly busy = false;
+  readonly showsPreviousView = false;
   readonly note = "";
   readonly gl: WebGL2RenderingContext;
   readonly #canvas: HTMLCanvasElement;
