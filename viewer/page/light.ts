@@ -1,6 +1,11 @@
 import { chooseUtcOffset, type imageLayer, type Light, type map, type Rendering } from "./map3d.mjs";
 import { byId, inputById } from "./dom";
 
+/** Hour of the first picture: long light, and one side of most buildings in the sun. */
+export const FIRST_HOUR = 8;
+/** Sine of the sun's altitude of the first picture where suns are rendered. */
+const FIRST_HEIGHT = 0.5;
+
 /** A summer sun for scenes of unknown location: from east over south to west, highest at 13:00. */
 export function lightAt(hour: number): Pick<Light, "azimuth_deg" | "altitude_deg"> {
   const day = (hour - 6) / 14;
@@ -38,8 +43,7 @@ function bindDay(view: map, rendering: Rendering, requested: Date | undefined): 
   // The local date there can be the day before or after.
   const local = new Date(first.getTime() + zone() * 3_600_000);
   day.value = local.toISOString().slice(0, 10);
-  const known = requested !== undefined || rendering.json.layers.some(({ suns }) => suns?.[0]?.time);
-  time.valueAsNumber = known ? local.getUTCHours() + local.getUTCMinutes() / 60 : 14;
+  time.valueAsNumber = local.getUTCHours() + local.getUTCMinutes() / 60;
   let dragged = false;
   time.addEventListener("pointerdown", () => { dragged = true; });
   time.addEventListener("keydown", () => { dragged = false; });
@@ -52,11 +56,14 @@ function bindDay(view: map, rendering: Rendering, requested: Date | undefined): 
   show();
 }
 
-/** A time for which the rendering has shadows; now if it has none. */
+/** A morning for which the rendering has shadows; a summer morning if it has none. */
 function firstMoment({ json }: Rendering): Date {
-  const suns = [...json.layers].sort((a, b) => Number(b.kind === "sun") - Number(a.kind === "sun")).flatMap(({ suns: of }) => of ?? []);
-  const times = suns.flatMap(({ time }) => (time === null ? [] : [new Date(time)])).filter((time) => !Number.isNaN(time.getTime()));
-  return times[Math.floor(times.length * 0.6)] ?? new Date();
+  const all = [...json.layers].sort((a, b) => Number(b.kind === "sun") - Number(a.kind === "sun")).flatMap(({ suns }) => suns ?? []);
+  const suns = all.filter(({ time }) => !Number.isNaN(Date.parse(time ?? "")));
+  const sun = suns.find(({ direction }) => direction[2] >= FIRST_HEIGHT) ?? suns[0];
+  if (sun?.time) return new Date(sun.time);
+  const [lon, lat] = json.geographic?.lon_lat ?? [0, 0];
+  return new Date(Date.UTC(new Date().getFullYear(), lat < 0 ? 11 : 5, 21) + (FIRST_HOUR - lon / 15) * 3_600_000);
 }
 
 function bindShadows(view: map, { layers }: Rendering): void {

@@ -1,9 +1,10 @@
 import { imageLayer, map, Map3dError } from "./map3d.mjs";
+import type { overview as Overview } from "./map3d-controls.mjs";
 import { Permalink, readPermalink } from "./permalink";
 import { Colors } from "./colors";
 import { bindEpochs, otherEpochs } from "./epochs";
 import { InfoPanel } from "./info";
-import { bindLight, lightAt } from "./light";
+import { bindLight, FIRST_HOUR, lightAt } from "./light";
 import { Tools } from "./tools";
 import { bindModes } from "./modes";
 import { bindSearch } from "./search";
@@ -28,7 +29,7 @@ const MAX_TITLE = 200;
 
 function open(): void {
   const { time, id, by, epoch = 0, ...start } = readPermalink(location.hash);
-  const view = new map("mapcanvas", { light: lightAt(14), ...start });
+  const view = new map("mapcanvas", { cover: true, light: lightAt(FIRST_HOUR), ...start });
   const urls = baseUrls();
   const layer = new imageLayer(urls);
   const info = new InfoPanel(byId("info"), () => { selection.clear(); });
@@ -55,7 +56,7 @@ function open(): void {
     colors.open().catch((reason: unknown) => { report(reason); });
     import("./map3d-controls.mjs").then(({ locate, overview }) => {
       if (layer.rendering?.json.geographic) new locate().addTo(view);
-      new overview().addTo(view);
+      bindOverview(view, new overview({ collapsed: true }).addTo(view));
     }, (reason: unknown) => { report(reason); });
     if (layer.rendering?.layers.has("depth") && !view.options.dataSaver) {
       import("./map3d-shade.mjs").then(({ shade }) => new shade().addTo(view), (reason: unknown) => { report(reason); });
@@ -72,6 +73,21 @@ function open(): void {
     if (layer.rendering?.layers.has("depth")) tools = new Tools(view);
   });
   layer.addTo(view);
+}
+
+/** Zoom levels above the lowest from which on the overview opens, on wide screens: about one quarter of the scene is in view then. */
+const OVERVIEW_ZOOM = 2.4;
+const WIDE = "(min-width: 640px)";
+
+/** Opens the overview once, when a small part of the scene is in view. */
+function bindOverview(view: map, small: Overview): void {
+  const open = (): void => {
+    if (view.zoom < view.zoomLimits[0] + OVERVIEW_ZOOM || !matchMedia(WIDE).matches) return;
+    view.off("zoom", open);
+    small.toggle(true);
+  };
+  view.on("zoom", open);
+  open();
 }
 
 /** Fills in and binds the page's controls, once the map is ready. */

@@ -105,8 +105,7 @@ export class Selection {
       this.#layer.object(id).then((object) => {
         const [low, high] = object?.box ?? [];
         const middle = low && high && origin ? ([0, 1, 2] as const).map((k) => origin[k] + (low[k] + high[k]) / 2) as unknown as Vec3 : position;
-        if (middle) this.#view.setView(middle);
-        this.#view.setDirection(opposite.id);
+        this.#view.setDirection(opposite.id, middle);
       }, (reason: unknown) => { report(reason); });
     });
   }

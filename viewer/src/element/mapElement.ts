@@ -179,6 +179,7 @@ export class mapElement extends PageElement implements ElementHost {
       zoom: saved.zoom ?? this.#try(() => number(this, "zoom")),
       direction: saved.direction ?? this.getAttribute("direction") ?? undefined,
       light: saved.light ?? this.#try(() => light(this)),
+      cover: true,
       drawer: drawer as MapOptions["drawer"],
       controls: isOn(this, "controls"),
       attribution: isOn(this, "attribution"),

@@ -9,7 +9,7 @@ import type { Rendering, View } from "../geo/manifest";
 import { findIncompatibility } from "./compatibility";
 import { findNeighbourView, findTiltedView } from "./neighbourViews";
 import { COARSE_STEPS, type LayerPlan } from "./layerPlan";
-import { limitCamera, computeZoomLimits } from "./limits";
+import { limitCamera, computeZoomLimits, fillScreen } from "./limits";
 import { Motion } from "./motion";
 import { EVENTS, type FilledOptions, type MapEvents } from "./options";
 import type { ViewState } from "./layerContext";
@@ -44,6 +44,8 @@ export abstract class CameraController extends Evented<MapEvents> {
   protected transitionCamera: Camera | null = null;
   /** The view that replaces the current one once its tiles cover the screen; null: none. */
   protected nextView: View | null = null;
+  /** What the next view has at its centre; null: what the current one has. */
+  #nextCenter: Vec3 | null = null;
   #pending: (() => void)[] = [];
   /** Clockwise rotation since the last switch of views. */
   #rotation_rad = 0;
@@ -154,16 +156,18 @@ export abstract class CameraController extends Evented<MapEvents> {
   }
 
   /**
-   * Switches to another view of the rendering; the point at the centre stays there. The current view stays until tiles of the other one cover the screen, if
-   * only coarsely ("directionchange" tells when), or until a call sets the position; if they cannot be fetched, it remains and "error" tells why.
-   * @throws UsageError for an unknown view
+   * Switches to another view of the rendering; the point at the centre stays there, or another comes there. The current view stays until tiles of the other
+   * one cover the screen, if only coarsely ("directionchange" tells when), or until a call sets the position; if they cannot be fetched, it remains and "error"
+   * tells why. @param center world position at the centre afterwards  @throws UsageError for an unknown view
    */
-  setDirection(direction: string): this {
+  setDirection(direction: string, center: Vec3 | null = null): this {
+    if (center) checkVector(center, "setDirection");
     return this.whenReady((camera, rendering) => {
       const view = rendering.views.get(direction);
       if (!view) throw new UsageError(`unknown view "${direction}"; the rendering has ${[...rendering.views.keys()].join(", ")}`);
       this.nextView = view.frame === camera.frame ? null : view;
-      if (!this.isCovered(camera) || this.isCovered(this.#turn(view, camera))) this.#switchView();
+      this.#nextCenter = center;
+      if (this.nextCamera && (!this.isCovered(camera) || this.isCovered(this.nextCamera))) this.#switchView();
       this.requestFrame();
     });
   }
@@ -313,12 +317,13 @@ export abstract class CameraController extends Evented<MapEvents> {
   protected initializeView(rendering: Rendering): void {
     const { width, height } = this.size;
     const { json, views } = rendering;
-    const { direction, center, zoom } = this.options;
+    const { direction, center, zoom, cover } = this.options;
     const view = views.get(direction ?? "") ?? [...views.values()][0];
     if (!view) return;
     if (direction !== undefined && !views.has(direction)) this.report(new UsageError(`unknown view "${direction}"; the rendering has ${[...views.keys()].join(", ")}`));
     this.reference = rendering;
-    const fitted = fitCamera({ frame: view.frame, u: 0, v: 0, zoom: 0, width, height }, json.box, Math.min(width, height) * 0.04, json.zmax);
+    const whole = fitCamera({ frame: view.frame, u: 0, v: 0, zoom: 0, width, height }, json.box, Math.min(width, height) * 0.04, json.zmax);
+    const fitted = cover ? fillScreen(whole, view, json.box) : whole;
     const start = center ?? (json.start && add(json.origin, json.start.local));
     this.setCamera(start ? centerCamera(fitted, rendering, start, zoom) : { ...fitted, zoom: zoom ?? fitted.zoom });
     for (const action of this.#pending.splice(0)) this.#runPending(action);
@@ -378,15 +383,17 @@ export abstract class CameraController extends Evented<MapEvents> {
 
   /** Computes the camera of another view with the same place at the centre. */
   #turn({ frame }: View, camera: Camera): Camera {
-    const { center, reference } = this;
+    const { reference } = this;
+    const center = (this.nextView ? this.#nextCenter : null) ?? this.center;
     const [target, rendering] = [{ ...camera, frame }, reference as Rendering];
     return limitCamera(center ? centerCamera(target, rendering, center) : fitCamera(target, rendering.json.box, 0, camera.zoom), rendering.json.box);
   }
 
   /** Shows the view that waits for its tiles, if one does. */
   #switchView(): void {
-    const { nextView, nextCamera, camera, center, reference } = this;
+    const { nextView, nextCamera, camera, reference } = this;
     if (!nextView || !nextCamera || !camera || !reference) return;
+    const center = this.#nextCenter ?? this.center;
     this.nextView = null;
     this.motion.stop();
     this.setCamera(nextCamera);

@@ -1,5 +1,7 @@
 import { clamp, type Box3 } from "../core/vec";
-import { projectedBox, zoomToFit, type Camera } from "../geo/camera";
+import { uvdFromLocal } from "../geo/axes";
+import { projectedBox, uvFromScreen, zoomToFit, type Camera } from "../geo/camera";
+import type { View } from "../geo/manifest";
 
 /** The zoom goes this far below the one that fits everything. */
 const OUT = 1.2;
@@ -19,4 +21,26 @@ export function limitCamera(camera: Camera, box: Box3): Camera {
   const [low, high] = projectedBox(camera.frame, box);
   const zoom = clamp(camera.zoom, ...computeZoomLimits(camera, box));
   return { ...camera, zoom, u: clamp(camera.u, low[0], high[0]), v: clamp(camera.v, low[1], high[1]) };
+}
+
+/** Content higher than this share of its width is an object, not a landscape, and is shown whole. */
+const FLAT = 0.3;
+/** Share of the screen that a landscape fills, measured at so many points along each side, and the most levels that it is enlarged for that. */
+const [FILLED, POINTS, ENLARGED] = [0.98, 12, 2];
+
+/** Enlarges the view of a landscape, with its ground at the centre, until it fills the screen; returns the same camera where that does not help. */
+export function fillScreen(camera: Camera, { frame, occupancy }: View, [low, high]: Box3): Camera {
+  if (high[2] - low[2] > FLAT * Math.max(high[0] - low[0], high[1] - low[1])) return camera;
+  const [centerU, centerV] = uvdFromLocal(frame.axes, [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]);
+  const count = 2 ** frame.zmax;
+  const hasContent = (at: Camera, k: number): boolean => {
+    const [u, v] = uvFromScreen(at, [((k % POINTS) + 0.5) * (at.width / POINTS), (Math.floor(k / POINTS) + 0.5) * (at.height / POINTS)]);
+    const [x, y] = [Math.floor(((u - frame.u0) / frame.size) * count), Math.floor(((frame.v0 - v) / frame.size) * count)];
+    return Math.min(x, y) >= 0 && Math.max(x, y) < count && occupancy.has({ z: frame.zmax, x, y });
+  };
+  for (let step = 0; step <= 10 * ENLARGED; step++) {
+    const larger = { ...camera, u: centerU, v: centerV, zoom: camera.zoom + step / 10 };
+    if (Array.from({ length: POINTS ** 2 }).filter((_, k) => hasContent(larger, k)).length >= FILLED * POINTS ** 2) return larger;
+  }
+  return camera;
 }

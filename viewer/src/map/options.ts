@@ -8,8 +8,10 @@ import type { marker } from "../overlay/marker";
 export interface MapOptions {
   /** Initial centre, world coordinates. Default: the rendering's start. */
   center?: Vec3;
-  /** Initial zoom. Default: fits everything. */
+  /** Initial zoom. Default: fits everything, or see `cover`. */
   zoom?: number;
+  /** Without a zoom, enlarges a landscape at first until it fills the map; objects that are high for their width stay whole. Default false; the ready-made page and `<map-3d>` do it. */
+  cover?: boolean;
   /** Id of the initial view, such as "45-22.5". Default: the manifest's first view. */
   direction?: string;
   /** Default: from the south-west, 48° above the horizon. */
@@ -51,6 +53,7 @@ export type FilledOptions = MapOptions & Required<Omit<MapOptions, WithoutDefaul
 export const DEFAULTS: Required<Omit<MapOptions, WithoutDefault>> = {
   controls: true,
   attribution: true,
+  cover: false,
   hover: false,
   concurrency: 12,
   workers: 2,

@@ -99,7 +99,7 @@ export class LayerTiles {
 
   makeRequest(view: View, layer: LayerInfo, tile: Tile): TileRequest {
     const key = this.key(view, layer, tile);
-    return { key, run: (signal) => this.#load(key, view, layer, tile, signal) };
+    return { key, run: (signal, isAhead) => this.#load(key, view, layer, tile, signal, isAhead) };
   }
 
   /** Returns a decoded tile, fetched if it is not in memory; null when it is empty. @throws the error of the fetch */
@@ -114,7 +114,7 @@ export class LayerTiles {
     return loaded.data;
   }
 
-  async #load(key: string, view: View, layer: LayerInfo, tile: Tile, signal: AbortSignal): Promise<void> {
+  async #load(key: string, view: View, layer: LayerInfo, tile: Tile, signal: AbortSignal, isAhead: () => boolean): Promise<void> {
     if (this.#isSilent) return;
     const { tries } = this.#silence;
     if (tries > 0) this.#waitForServer(tries); // the first request alone finds out whether the server answers again
@@ -131,7 +131,7 @@ export class LayerTiles {
       this.#resources.cache.set(key, { data, empty: !data, transfer }, data ? computeBytes(data) * (data.kind === "id" || data.kind === "depth" ? 2 : 1) : 64);
       this.#failed.delete(key);
       this.#silence = { tries: 0, retry_ms: 0 };
-      this.#onArrival(null);
+      if (!isAhead()) this.#onArrival(null);
     } catch (reason) {
       if (signal.aborted) return;
       const name = `tile ${view.id}/${layer.name}/${tileName(tile)}`;
@@ -141,9 +141,9 @@ export class LayerTiles {
       if (error instanceof FetchError && error.status === 0 && !hasServiceWorker() && tries === this.#silence.tries) this.#waitForServer(tries + 1);
       // The same cause has many messages, which differ by URL.
       const cause = error.name + error.message.replace(/\S*\/\S*/g, "");
-      const known = this.#reported.has(cause);
-      this.#reported.add(cause);
-      this.#onArrival(known ? null : error);
+      const silent = isAhead() || this.#reported.has(cause);
+      if (!silent) this.#reported.add(cause);
+      this.#onArrival(silent ? null : error);
     } finally {
       this.#loading.delete(key);
     }

@@ -1,6 +1,7 @@
 export interface TileRequest {
   readonly key: string;
-  run(signal: AbortSignal): Promise<void>;
+  /** @param isAhead whether nobody waits for it yet */
+  run(signal: AbortSignal, isAhead: () => boolean): Promise<void>;
 }
 
 interface RunningRequest {
@@ -63,7 +64,7 @@ export class RequestQueue {
 
   #start(request: TileRequest, ahead = false): RunningRequest {
     const abort = new AbortController();
-    const done = request.run(abort.signal).finally(() => {
+    const done = request.run(abort.signal, () => running.ahead).finally(() => {
       if (this.#running.get(request.key) === running) this.#running.delete(request.key);
       this.#fill();
     });

@@ -240,7 +240,7 @@ test("picks are exact", async () => {
 });
 
 test("an idle map draws no frames and sends no messages to workers", async () => {
-  const { page } = await bed.start("town", { drawer: "canvas" });
+  const { page } = await bed.start("town", { drawer: "canvas", dataSaver: true });
   const counts = await page.evaluate(() => new Promise<{ resting: number; moving: number }>((done) => {
     let count = 0;
     const [request, post] = [globalThis.requestAnimationFrame.bind(globalThis), Object.getOwnPropertyDescriptor(Worker.prototype, "postMessage")?.value as Worker["postMessage"]];

@@ -64,6 +64,7 @@ test("the light slider and the display mode change the picture", async () => {
   await page.locator("#time").fill("19");
   expect(await page.locator("#clock").textContent()).toBe("19:00");
   await changed("mode-evening");
+  await page.locator("#more").click();
   for (const mode of ["color", "normal", "id", "depth"]) {
     await page.locator(`#modes input[value=${mode}]`).check({ force: true });
     await changed(`mode-${mode}`);
