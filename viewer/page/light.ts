@@ -1,10 +1,9 @@
 import { chooseUtcOffset, type imageLayer, type Light, type map, type Rendering } from "./map3d.mjs";
+import { findFirstSun } from "../src/geo/firstSun";
 import { byId, inputById } from "./dom";
 
 /** Hour of the first picture: long light, and one side of most buildings in the sun. */
 export const FIRST_HOUR = 8;
-/** Sine of the sun's altitude of the first picture where suns are rendered. */
-const FIRST_HEIGHT = 0.5;
 
 /** A summer sun for scenes of unknown location: from east over south to west, highest at 13:00. */
 export function lightAt(hour: number): Pick<Light, "azimuth_deg" | "altitude_deg"> {
@@ -58,9 +57,7 @@ function bindDay(view: map, rendering: Rendering, requested: Date | undefined): 
 
 /** A morning for which the rendering has shadows; a summer morning if it has none. */
 function firstMoment({ json }: Rendering): Date {
-  const all = [...json.layers].sort((a, b) => Number(b.kind === "sun") - Number(a.kind === "sun")).flatMap(({ suns }) => suns ?? []);
-  const suns = all.filter(({ time }) => !Number.isNaN(Date.parse(time ?? "")));
-  const sun = suns.find(({ direction }) => direction[2] >= FIRST_HEIGHT) ?? suns[0];
+  const sun = findFirstSun(json.layers.map((layer) => ({ ...layer, suns: layer.suns?.filter(({ time }) => !Number.isNaN(Date.parse(time ?? ""))) ?? [] })));
   if (sun?.time) return new Date(sun.time);
   const [lon, lat] = json.geographic?.lon_lat ?? [0, 0];
   return new Date(Date.UTC(new Date().getFullYear(), lat < 0 ? 11 : 5, 21) + (FIRST_HOUR - lon / 15) * 3_600_000);

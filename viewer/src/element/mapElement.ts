@@ -1,4 +1,5 @@
 import { map, type Addable, type imageLayer, type Light, type MapEvents, type MapOptions, type Vec3 } from "../map3d";
+import { findFirstSun } from "../geo/firstSun";
 import { isOn, light, number, PageElement, position, time, words } from "./attributes";
 import { ElementContent } from "./elementContent";
 import { updateLayer, createLayer } from "./layerElement";
@@ -204,6 +205,17 @@ export class mapElement extends PageElement implements ElementHost {
     else if (name === "time") ifDefined(time(this), (time) => map.setTime(time));
   }
 
+  /** Sets the light of the attributes, else that of rendered shadows. @throws UsageError */
+  #startLight(): void {
+    const [map, rendering] = [this.#map as map, this.#base?.rendering];
+    if (this.hasAttribute("time")) this.#apply("time");
+    const sun = this.hasAttribute("time") || this.hasAttribute("light") ? undefined : findFirstSun(rendering?.json.layers ?? []);
+    if (!sun) return;
+    const [east, north, up] = sun.direction;
+    if (sun.time !== null && rendering?.json.geographic) map.setTime(new Date(sun.time));
+    else map.setLight({ azimuth_deg: (Math.atan2(east, north) * 180) / Math.PI, altitude_deg: (Math.asin(up) * 180) / Math.PI });
+  }
+
   #try<T>(action: () => T): T | undefined {
     try {
       return action();
@@ -227,7 +239,7 @@ export class mapElement extends PageElement implements ElementHost {
     this.#ready = true;
     const { light: savedLight, time: savedTime } = this.#saved;
     if (savedTime) this.#try(() => this.#map?.setTime(savedTime));
-    else if (!savedLight) this.#try(() => { this.#apply("time"); });
+    else if (!savedLight) this.#try(() => { this.#startLight(); });
     this.#saved = {};
     this.#updateContent();
   }

@@ -1,5 +1,5 @@
 import { clamp, type Box3 } from "../core/vec";
-import { uvdFromLocal } from "../geo/axes";
+import { depthAtHeight, localFromUvd, uvdFromLocal } from "../geo/axes";
 import { projectedBox, uvFromScreen, zoomToFit, type Camera } from "../geo/camera";
 import type { View } from "../geo/manifest";
 
@@ -26,7 +26,7 @@ export function limitCamera(camera: Camera, box: Box3): Camera {
 /** Content higher than this share of its width is an object, not a landscape, and is shown whole. */
 const FLAT = 0.3;
 /** Share of the screen that a landscape fills, measured at so many points along each side, and the most levels that it is enlarged for that. */
-const [FILLED, POINTS, ENLARGED] = [0.98, 12, 2];
+const [FILLED, POINTS, ENLARGED] = [0.97, 12, 3];
 
 /** Enlarges the view of a landscape, with its ground at the centre, until it fills the screen; returns the same camera where that does not help. */
 export function fillScreen(camera: Camera, { frame, occupancy }: View, [low, high]: Box3): Camera {
@@ -34,7 +34,10 @@ export function fillScreen(camera: Camera, { frame, occupancy }: View, [low, hig
   const [centerU, centerV] = uvdFromLocal(frame.axes, [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]);
   const count = 2 ** frame.zmax;
   const hasContent = (at: Camera, k: number): boolean => {
-    const [u, v] = uvFromScreen(at, [((k % POINTS) + 0.5) * (at.width / POINTS), (Math.floor(k / POINTS) + 0.5) * (at.height / POINTS)]);
+    const [u, v] = uvFromScreen(at, [((k % POINTS) * at.width) / (POINTS - 1), (Math.floor(k / POINTS) * at.height) / (POINTS - 1)]);
+    // Tiles at the edge have content in a part of them only: the ground of the box ends there.
+    const d = depthAtHeight(frame.axes, v, low[2]);
+    if (d !== null && localFromUvd(frame.axes, [u, v, d]).some((at, axis) => axis < 2 && (at < low[axis as 0] || at > high[axis as 0]))) return false;
     const [x, y] = [Math.floor(((u - frame.u0) / frame.size) * count), Math.floor(((frame.v0 - v) / frame.size) * count)];
     return Math.min(x, y) >= 0 && Math.max(x, y) < count && occupancy.has({ z: frame.zmax, x, y });
   };
