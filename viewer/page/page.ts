@@ -75,7 +75,7 @@ function open(): void {
   layer.addTo(view);
 }
 
-/** Zoom levels above the lowest from which on the overview opens, on wide screens: about one quarter of the scene is in view then. */
+/** Zoom levels above the lowest at which the overview opens, on wide screens: about one quarter of the scene is in view. */
 const OVERVIEW_ZOOM = 2.4;
 const WIDE = "(min-width: 640px)";
 

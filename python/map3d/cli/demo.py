@@ -12,8 +12,8 @@ from map3d.cli.app import run
 
 TOWN: Final = ("--buildings", "120", "--seed", "7")
 RES_M: Final = "0.15"
-LIGHT: Final = ("--layers", "color,normal,id,depth,sun16,ao", "--date", "2026-06-21")
-"""Shadows of a summer's day, and ambient occlusion."""
+OPTIONS: Final = ("--directions", "4", "--res", RES_M, "--layers", "color,normal,id,depth,sun16,ao", "--date", "2026-06-21")
+"""Of the rendering: with the shadows of a summer's day, and ambient occlusion."""
 TITLE: Final = ("--title", "A generated town")
 NAME: Final = "demo"
 SCENE: Final = "town"
@@ -52,7 +52,7 @@ def remaining_steps(workspace: Workspace, files: Path) -> Iterator[tuple[str, li
     if not assets.get(SCENE):
         yield "importing the town's files", ["add-files", SCENE, str(files), *where]
     if NAME not in renderings:
-        yield "building the scene and creating a rendering", ["create-rendering", SCENE, NAME, "--directions", "4", "--res", RES_M, *LIGHT, *TITLE, *where]
+        yield "building the scene and creating a rendering", ["create-rendering", SCENE, NAME, *OPTIONS, *TITLE, *where]
     yield "rendering the tiles", ["render", NAME, *where]
 
 

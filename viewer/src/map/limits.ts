@@ -25,7 +25,7 @@ export function limitCamera(camera: Camera, box: Box3): Camera {
 
 /** Content higher than this share of its width is an object, not a landscape, and is shown whole. */
 const FLAT = 0.3;
-/** Share of the screen that a landscape fills, measured at so many points along each side, and the most levels that it is enlarged for that. */
+/** Share of the screen that a landscape fills, number of points along each side where that is measured, and the most levels that it is enlarged. */
 const [FILLED, POINTS, ENLARGED] = [0.97, 12, 3];
 
 /** Enlarges the view of a landscape, with its ground at the centre, until it fills the screen; returns the same camera where that does not help. */
