@@ -3,7 +3,10 @@
 //!
 //! `golden/<scene>-<look at>-<pitch>.png` has four quarters of 128 × 128 pixels from the middle of a tile: colours and normals as sent; below them ids
 //! (a colour per id) and depths (red in steps of 1/4 m, green of 2^-10 m). `golden/digests.txt` has a checksum of all bits of each G-buffer.
+//! `golden/camera-<scene>-<view>.png` shows the same of views that no pyramid has.
 
+#[path = "golden/cameras.rs"]
+mod cameras;
 #[path = "golden/pictures.rs"]
 mod pictures;
 mod town;
@@ -11,11 +14,12 @@ mod town;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use cameras::CAMERAS;
 use map3d_base::file::checksum;
-use map3d_base::{DEPTH_NOTHING, Frame, Isa};
+use map3d_base::{DEPTH_NOTHING, DEPTH_UNITS_PER_M, Frame, Isa};
 use map3d_image::encode::{Deflate, Filter, bytes_from_normals, color_from_linear, decode_png, encode_png};
 use map3d_image::{GBuffer, Raster};
-use map3d_render::{RenderScene, TileRenderer};
+use map3d_render::{RenderScene, TileRenderer, ViewImage};
 use pictures::PICTURES;
 use town::{frame, new_folder};
 
@@ -59,22 +63,47 @@ fn depth_color(depth: u32) -> [u8; 4] {
     [middle, low, high, 255]
 }
 
-fn quarters(g: &GBuffer) -> Raster {
-    let color = color_from_linear((g.width, g.height), &g.color);
-    let bytes = bytes_from_normals(&g.normal);
-    let normal = |p: usize| [bytes[3 * p], bytes[3 * p + 1], bytes[3 * p + 2], 255];
-    let pixel = |k: usize| {
-        let (x, y) = (k % (2 * SIDE), k / (2 * SIDE));
-        let p = y % SIDE * SIDE + x % SIDE;
-        match (x / SIDE, y / SIDE) {
-            (0, 0) if color.pixels[p][3] == 0 => [0; 4],
-            (0, 0) => color.pixels[p],
-            (_, 0) => normal(p),
-            (0, _) => id_color(g.id[p]),
-            _ => depth_color(g.depth[p]),
-        }
-    };
-    Raster::new(2 * SIDE as u32, 2 * SIDE as u32, (0..4 * SIDE * SIDE).map(pixel).collect())
+/// The layers of a picture as they are shown.
+struct Shown {
+    color: Vec<[u8; 4]>,
+    normal: Vec<[u8; 3]>,
+    id: Vec<u32>,
+    depth: Vec<u32>,
+}
+
+impl Shown {
+    fn of_tile(g: &GBuffer) -> Self {
+        let color = color_from_linear((g.width, g.height), &g.color).pixels;
+        let normal = bytes_from_normals(&g.normal).as_chunks::<3>().0.to_vec();
+        Self { color, normal, id: g.id.clone(), depth: g.depth.clone() }
+    }
+
+    fn of_view(view: &ViewImage) -> Self {
+        let units = |m: &f32| if m.is_nan() { DEPTH_NOTHING } else { (f64::from(*m) * DEPTH_UNITS_PER_M).round() as u32 };
+        Self { color: view.color.clone(), normal: view.normal.clone(), id: view.id.clone(), depth: view.depth.iter().map(units).collect() }
+    }
+
+    fn quarters(&self) -> Raster {
+        let pixel = |k: usize| {
+            let (x, y) = (k % (2 * SIDE), k / (2 * SIDE));
+            let p = y % SIDE * SIDE + x % SIDE;
+            match (x / SIDE, y / SIDE) {
+                (0, 0) if self.color[p][3] == 0 => [0; 4],
+                (0, 0) => self.color[p],
+                (_, 0) => [self.normal[p][0], self.normal[p][1], self.normal[p][2], 255],
+                (0, _) => id_color(self.id[p]),
+                _ => depth_color(self.depth[p]),
+            }
+        };
+        Raster::new(2 * SIDE as u32, 2 * SIDE as u32, (0..4 * SIDE * SIDE).map(pixel).collect())
+    }
+}
+
+/// Returns a checksum of all bits.
+fn view_digest(view: &ViewImage) -> String {
+    let bytes = view.color.iter().flatten().chain(view.normal.iter().flatten()).copied();
+    let numbers = view.id.iter().copied().chain(view.depth.iter().map(|m| m.to_bits())).flat_map(u32::to_le_bytes);
+    format!("{:016x}", checksum(&bytes.chain(numbers).collect::<Vec<u8>>()))
 }
 
 /// Returns all pictures by name, with their digests.
@@ -86,8 +115,17 @@ fn render_all() -> BTreeMap<String, (Raster, String)> {
         for &(look_at, pitch) in picture.views {
             let f = Frame { d0_m: -40.0, ..frame(look_at, pitch, 2.0 * picture.metres, 0) };
             let g = middle(&render_with_all_isas(&scene, &f));
-            out.insert(format!("{}-{look_at}-{pitch}", picture.name), (quarters(&g), digest(&g)));
+            out.insert(format!("{}-{look_at}-{pitch}", picture.name), (Shown::of_tile(&g).quarters(), digest(&g)));
         }
+    }
+    for camera in CAMERAS {
+        let (folder, town) = (new_folder(camera.name), (camera.scene)());
+        let scene = town.open(&folder);
+        let view = camera.render(&scene, Isa::Scalar);
+        for isa in Isa::available() {
+            assert!(view_digest(&camera.render(&scene, isa)) == view_digest(&view), "{}: {isa:?} differs from scalar", camera.name);
+        }
+        out.insert(format!("camera-{}", camera.name), (Shown::of_view(&view).quarters(), view_digest(&view)));
     }
     out
 }

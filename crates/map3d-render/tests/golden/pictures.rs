@@ -49,7 +49,7 @@ fn atlas() -> Raster {
     Raster::new(64, 64, (0..4096).map(pixel).collect())
 }
 
-fn atlas_cube() -> Town {
+pub fn atlas_cube() -> Town {
     let mut town = Town::default();
     let material = town.textured(atlas(), Wrap::Clamp);
     let h = 3.0;
@@ -94,7 +94,7 @@ fn tree(trunk: u32, crown: u32) -> Vec<SoupFace> {
 }
 
 /// Three trees: one unchanged, one rotated by 30° and small, one mirrored and stretched.
-fn trees() -> Town {
+pub fn trees() -> Town {
     let mut town = Town::default();
     let (grass, trunk, crown) = (town.flat([0.45, 0.62, 0.35]), town.flat([0.36, 0.25, 0.18]), town.textured(leaves(), Wrap::Clamp));
     let z = -2.0;
@@ -118,7 +118,7 @@ fn letters() -> Raster {
 }
 
 /// A wall with a door, signs with holes over both, and a road on the ground: coplanar faces that differ in rank.
-fn signs() -> Town {
+pub fn signs() -> Town {
     let mut town = Town::default();
     let colors = [[0.85, 0.8, 0.7], [0.45, 0.25, 0.15], [0.5, 0.6, 0.4], [0.35, 0.35, 0.38]];
     let [wall, door, earth, asphalt] = colors.map(|c| town.flat(c));
@@ -143,7 +143,7 @@ fn signs() -> Town {
 }
 
 /// A pavement with a wall at its end.
-fn brick_court() -> Town {
+pub fn brick_court() -> Town {
     let mut town = Town::default();
     let brick = town.textured(bricks(64), Wrap::Wrap);
     town.ground(7.0, 5.0, brick, 0);
@@ -169,7 +169,7 @@ fn ball(is_smooth: bool) -> Vec<SoupFace> {
 }
 
 /// A smooth ball, a faceted one, and the smooth one mirrored and flattened.
-fn balls() -> Town {
+pub fn balls() -> Town {
     let mut town = Town::default();
     town.flat([0.75, 0.72, 0.7]);
     town.prototypes = vec![ball(true), ball(false)];
@@ -180,7 +180,7 @@ fn balls() -> Town {
 }
 
 /// Walls, gables and a roof 20 cm above the walls, without textures; the floor shows through a hole in one slope.
-fn gabled_house() -> Town {
+pub fn gabled_house() -> Town {
     let mut town = Town::default();
     let colors = [[0.5, 0.58, 0.42], [0.86, 0.83, 0.76], [0.62, 0.24, 0.18], [0.3, 0.5, 0.75]];
     let [grass, wall, roof, floor] = colors.map(|c| town.flat(c));
