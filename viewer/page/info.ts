@@ -1,6 +1,6 @@
 import type { Attribute, ClickEvent } from "./map3d.mjs";
 import { withText } from "./dom";
-import { message } from "./i18n";
+import { language, message } from "./i18n";
 
 /** Shows the selected object's name, position and attributes, as text. */
 export class InfoPanel {
@@ -36,10 +36,10 @@ export class InfoPanel {
 
   #positionRows({ position }: ClickEvent): (readonly [string, string])[] {
     if (!position) return [];
-    const [x, y, z] = position.map((part) => part.toFixed(2));
+    const [x, y, z] = position.map((part) => part.toLocaleString(language, { ...PLAIN, minimumFractionDigits: 2, maximumFractionDigits: 2 }));
     const height = this.units.vertical ? ` (${this.units.vertical})` : "";
     return [
-      [message("position"), `${x ?? ""}, ${y ?? ""}`],
+      [message("position"), `${x ?? ""}${(x ?? "").includes(",") ? ";" : ","} ${y ?? ""}`],
       [message("height"), `${z ?? ""} m${height}`],
     ];
   }
@@ -68,7 +68,11 @@ function behindButton(showBack: () => void): HTMLButtonElement {
   return button;
 }
 
+/** Years and numbers of houses have no separators of thousands. */
+const PLAIN = { useGrouping: false, maximumFractionDigits: 12 } as const;
+
 function formatValue(value: Attribute): string {
   if (value === null) return "–";
-  return typeof value === "boolean" ? message(value ? "yes" : "no") : String(value);
+  if (typeof value === "number") return value.toLocaleString(language, PLAIN);
+  return typeof value === "boolean" ? message(value ? "yes" : "no") : value;
 }

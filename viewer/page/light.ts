@@ -36,7 +36,7 @@ function bindDay(view: map, rendering: Rendering, requested: Date | undefined): 
     view.setTime(moment(time.valueAsNumber));
   };
   [time.min, time.max, time.step] = ["0", "24", String(1 / 12)];
-  byId("days").hidden = false;
+  byId("days").hidden = day.hidden = false;
   const first = requested ?? firstMoment(rendering);
   day.value = first.toISOString().slice(0, 10);
   // The local date there can be the day before or after.
@@ -63,10 +63,15 @@ function firstMoment({ json }: Rendering): Date {
   return new Date(Date.UTC(new Date().getFullYear(), lat < 0 ? 11 : 5, 21) + (FIRST_HOUR - lon / 15) * 3_600_000);
 }
 
+/** Shows the switch of shadows and occlusion, rendered or found from depth. */
+export function showShadowSwitch(): void {
+  byId("days").hidden = byId("shading").hidden = false;
+}
+
 function bindShadows(view: map, { layers }: Rendering): void {
   const box = inputById("shadows");
   box.checked = view.light.shadows;
-  byId("shading").hidden = !["sun", "sun16", "ao"].some((kind) => layers.has(kind));
+  if (["sun", "sun16", "ao"].some((kind) => layers.has(kind))) showShadowSwitch();
   box.addEventListener("change", () => view.setLight({ shadows: box.checked, occlusion: box.checked }));
 }
 

@@ -4,7 +4,7 @@ import { Permalink, readPermalink } from "./permalink";
 import { Colors } from "./colors";
 import { bindEpochs, otherEpochs } from "./epochs";
 import { InfoPanel } from "./info";
-import { bindLight, FIRST_HOUR, lightAt } from "./light";
+import { bindLight, FIRST_HOUR, lightAt, showShadowSwitch } from "./light";
 import { Tools } from "./tools";
 import { bindModes } from "./modes";
 import { bindSearch } from "./search";
@@ -59,7 +59,10 @@ function open(): void {
       bindOverview(view, new overview({ collapsed: true }).addTo(view));
     }, (reason: unknown) => { report(reason); });
     if (layer.rendering?.layers.has("depth") && !view.options.dataSaver) {
-      import("./map3d-shade.mjs").then(({ shade }) => new shade().addTo(view), (reason: unknown) => { report(reason); });
+      import("./map3d-shade.mjs").then(({ shade }) => {
+        new shade().addTo(view);
+        if (view.drawer === "webgl") showShadowSwitch();
+      }, (reason: unknown) => { report(reason); });
       import("./map3d-orbit.mjs").then(({ orbit }) => new orbit().addTo(view), (reason: unknown) => { report(reason); });
     }
     bindEpochs(view, layer, otherEpochs(urls[0] ?? "."), epoch, (shown, index) => {
@@ -107,7 +110,7 @@ function bindPage(view: map, layer: imageLayer, info: InfoPanel, selection: Sele
   bindModes(layer);
   if (json.objects) {
     bindInViewList(view, () => selection.layer, (id) => void selection.selectId(id));
-    bindSearch(view, () => selection.layer, (id, position) => void selection.selectId(id, position));
+    bindSearch(view, () => selection.layer, (id, position, label) => void selection.selectId(id, position, true, label));
   }
 }
 

@@ -1,4 +1,4 @@
-import { marker, type imageLayer, type map, type SearchEntry, type Vec3 } from "./map3d.mjs";
+import type { imageLayer, map, SearchEntry, Vec3 } from "./map3d.mjs";
 import { byId, inputById, withText } from "./dom";
 import { toast } from "./toast";
 import { message } from "./i18n";
@@ -6,7 +6,7 @@ import { message } from "./i18n";
 const ZOOM_BELOW_DEEPEST = 1;
 
 /** Binds the search box: a combobox over the rendering's search index, of which the first search fetches a part. */
-export function bindSearch(view: map, layer: () => imageLayer, select: (id: number, position: Vec3) => void): void {
+export function bindSearch(view: map, layer: () => imageLayer, select: (id: number, position: Vec3, label: string) => void): void {
   const [form, query, list] = [byId("search"), inputById("query"), byId("results")];
   const box = new SearchBox(query, list, (text) => layer().search(text), (entry) => {
     go(view, layer(), entry, select);
@@ -18,15 +18,11 @@ export function bindSearch(view: map, layer: () => imageLayer, select: (id: numb
   });
 }
 
-let pin: marker | undefined;
-
-function go(view: map, layer: imageLayer, [id, label, local]: SearchEntry, select: (id: number, position: Vec3) => void): void {
+function go(view: map, layer: imageLayer, [id, label, local]: SearchEntry, select: (id: number, position: Vec3, label: string) => void): void {
   const json = layer.rendering?.json;
   if (!json) return;
   const world = [json.origin[0] + local[0], json.origin[1] + local[1], json.origin[2] + local[2]] as const satisfies Vec3;
-  pin?.remove();
-  pin = new marker(label, world).addTo(view).select();
-  select(id, world);
+  select(id, world, label);
   view.flyTo(world, Math.max(view.zoom, json.zmax - ZOOM_BELOW_DEEPEST));
 }
 

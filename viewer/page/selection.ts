@@ -1,4 +1,4 @@
-import type { ClickEvent, imageLayer, map, Vec3 } from "./map3d.mjs";
+import { marker, type ClickEvent, type imageLayer, type map, type Vec3 } from "./map3d.mjs";
 import type { InfoPanel } from "./info";
 import { report } from "./toast";
 import { readPermalink, type Permalink } from "./permalink";
@@ -16,6 +16,8 @@ export class Selection {
   readonly #info: InfoPanel;
   readonly #permalink: Permalink;
   #clicks = 0;
+  /** The marker of the search result that is selected. */
+  #pin: marker | undefined;
 
   constructor(view: map, layer: imageLayer, info: InfoPanel, permalink: Permalink) {
     [this.#view, this.#layer, this.#info, this.#permalink] = [view, layer, info, permalink];
@@ -60,8 +62,8 @@ export class Selection {
     return whole;
   }
 
-  /** Selects an object by its id. @param position default: the top of its bounding box  @param push adds a history entry */
-  async selectId(id: number, position: Vec3 | null = null, push = true): Promise<void> {
+  /** Selects an object by its id. @param position default: the top of its bounding box  @param push adds a history entry  @param label of a marker there */
+  async selectId(id: number, position: Vec3 | null = null, push = true, label = ""): Promise<void> {
     const changed = id !== this.#permalink.id;
     this.#permalink.id = id;
     const object = await this.#layer.object(id).catch((reason: unknown) => {
@@ -74,17 +76,20 @@ export class Selection {
     const top: Vec3 | null = low && high && origin ? [origin[0] + (low[0] + high[0]) / 2, origin[1] + (low[1] + high[1]) / 2, origin[2] + high[2]] : null;
     const event: ClickEvent = { id, position: position ?? top, approximate: false, layer: this.#layer, point: [0, 0], ...(object ?? {}) };
     this.#show(event);
+    if (label !== "" && event.position) this.#pin = new marker(label, event.position).addTo(this.#view).select();
     if (push) this.#permalink.write(changed);
   }
 
   /** Clears the selection. */
   clear(): void {
     this.#permalink.id = 0;
+    this.#pin?.remove();
     this.#layer.clearHighlight();
     this.#permalink.write();
   }
 
   #show(event: ClickEvent): void {
+    this.#pin?.remove();
     this.#layer.clearHighlight();
     this.#permalink.id = event.id;
     if (event.id === 0 && !event.position) {

@@ -34,7 +34,9 @@ for (const [name, options] of [["desk", DESK], ["phone", PHONE], ["dark", { ...D
     await page.screenshot({ path: `${OUT}/${name}-info.png` });
     expect(await page.locator("#info h2").textContent()).toBe("School <b>old</b>");
     expect(await page.locator("#info img").count()).toBe(0);
+    expect(await page.locator(".map3d-marker").allTextContents()).toEqual([expect.stringContaining("School <b>old</b>")]);
     await page.locator("#info .close").click();
+    expect(await page.locator(".map3d-marker").count()).toBe(0);
     const { width, height } = options.viewport;
     await page.mouse.click(width / 2 - 60, height / 2 + 60);
     await page.waitForSelector("#info:not([hidden])");
@@ -70,6 +72,16 @@ test("the light slider and the display mode change the picture", async () => {
     await changed(`mode-${mode}`);
   }
   expect(await page.locator("#time").isDisabled()).toBe(true);
+  await page.context().close();
+});
+
+test("shadows that are found from depth can be switched off", async () => {
+  const { page } = await open(DESK);
+  await page.waitForSelector("#shadows");
+  const [lit, box] = [await page.locator("#mapcanvas").screenshot(), page.locator("#shadows")];
+  await box.uncheck();
+  await expect.poll(async () => (await page.locator("#mapcanvas").screenshot()).equals(lit), { timeout: 20_000 }).toBe(false);
+  expect(await box.isChecked()).toBe(false);
   await page.context().close();
 });
 
@@ -222,6 +234,11 @@ test.each([
   expect(await page.locator("#modes label").first().textContent()).toBe(lit);
   expect(await page.locator("#measure-line").getAttribute("title")).toBe(line);
   await page.screenshot({ path: `${OUT}/page-${locale}.png` });
+  await page.fill("#query", "Tower");
+  await page.waitForSelector("#results li");
+  await page.keyboard.press("Enter");
+  await page.waitForSelector("#info:not([hidden])");
+  expect(await page.locator("#info dd").first().textContent()).toMatch(locale === "fr-FR" ? /^6910\d\d,\d\d; 53360\d\d,\d\d$/ : /^6910\d\d\.\d\d, 53360\d\d\.\d\d$/);
   const english = await page.evaluate(() => [...document.querySelectorAll<HTMLElement>("button, input, select, [role]")].map((found) => found.getAttribute("aria-label") ?? "").filter((label) => /\b(the|of|view|search|look|light)\b/i.test(label)));
   expect(english).toEqual([]);
   expect(problems).toEqual([]);
