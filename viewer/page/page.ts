@@ -6,6 +6,7 @@ import { bindEpochs, otherEpochs } from "./epochs";
 import { InfoPanel } from "./info";
 import { bindLight, FIRST_HOUR, lightAt, showShadowSwitch } from "./light";
 import { Tools } from "./tools";
+import { bindLoading } from "./loading";
 import { bindModes } from "./modes";
 import { bindSearch } from "./search";
 import { bindOffline } from "./offline";
@@ -76,6 +77,7 @@ function open(): void {
     if (layer.rendering?.layers.has("depth")) tools = new Tools(view);
   });
   layer.addTo(view);
+  bindLoading(view);
 }
 
 /** Zoom levels above the lowest at which the overview opens, on wide screens: about one quarter of the scene is in view. */

@@ -85,6 +85,25 @@ test("shadows that are found from depth can be switched off", async () => {
   await page.context().close();
 });
 
+test("a bar shows that a turn waits for its tiles", async () => {
+  const { page } = await open({ ...DESK, reducedMotion: "reduce" });
+  await page.waitForSelector("#loading", { state: "hidden" });
+  const release = bed.server.hold("/180-45/");
+  try {
+    await page.evaluate(() => { document.querySelector<HTMLElement>("#mapcanvas")?.focus(); });
+    await page.evaluate(() => { location.hash = location.hash.replace("0-45", "90-45"); });
+    await page.waitForSelector("#loading", { state: "hidden" });
+    await page.getByRole("button", { name: "Turn view counter-clockwise" }).click();
+    await page.waitForSelector("#loading", { state: "visible" });
+    await page.screenshot({ path: `${OUT}/page-loading.png` });
+  } finally {
+    release();
+  }
+  await page.waitForSelector("#loading", { state: "hidden" });
+  await page.waitForFunction(() => location.hash.startsWith("#180-45/"));
+  await page.context().close();
+});
+
 test("a missing rendering shows a message", async () => {
   const { page } = await bed.openPage(PHONE);
   await page.goto(`${bed.server.origin}/?rendering=/tiles/nowhere`);

@@ -1,0 +1,17 @@
+import type { map } from "./map3d.mjs";
+import { byId } from "./dom";
+
+/** Shorter waits are not shown, ms. */
+const DELAY_MS = 400;
+
+/** Shows a bar at the top while tiles in view are missing, or a turn waits for its tiles. */
+export function bindLoading(view: map): void {
+  let since_ms: number | null = performance.now();
+  view.on("move", () => { since_ms ??= performance.now(); });
+  view.on("idle", () => { since_ms = null; });
+  setInterval(() => {
+    if (view.isTurning) since_ms ??= performance.now();
+    const waits = since_ms !== null && performance.now() - since_ms >= DELAY_MS && navigator.onLine;
+    byId("loading").hidden = !waits || document.querySelector(".failed") !== null;
+  }, DELAY_MS / 2);
+}
