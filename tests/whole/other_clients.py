@@ -36,13 +36,21 @@ class Clicked:
     rows: tuple[tuple[str, str], ...]
 
 
+def panel_name(panel: str) -> str:
+    """Returns the object's name in the data: below all data where the title is another."""
+    found = re.search(r"gml:id\s+(\S.*)", panel)
+    return found[1] if found else panel.splitlines()[0]
+
+
 def clicked(panel: str, url: str) -> Clicked:
     east, north = re.search(r"Position\s+(-?[\d.]+),\s+(-?[\d.]+)", panel).groups()  # type: ignore[union-attr]
     height = re.search(r"Elevation\s+(-?[\d.]+) m", panel)[1]  # type: ignore[index]
     link = url.partition("#")[2]
-    attributes = panel.partition("Elevation\n")[2].splitlines()[1:]
-    id, place = int(re.search(r"id (\d+)", panel)[1]), (float(east), float(north), float(height))  # type: ignore[index]
-    found = Clicked(id, panel.splitlines()[0], place, link.split("/")[0], link, tuple(zip(attributes[::2], attributes[1::2], strict=True)))
+    lines = panel.partition("All data\n")[2].partition("\nCopy")[0].splitlines()
+    details = tuple(zip(lines[::2], lines[1::2], strict=True))
+    id, place = int(dict(details)["id"]), (float(east), float(north), float(height))
+    rows = tuple(row for row in details if row[0] not in ("Position", "id", "gml:id"))
+    found = Clicked(id, panel_name(panel), place, link.split("/")[0], link, rows)
     assert found.rows, panel
     assert f"/id={found.id}" in link
     return found

@@ -20,7 +20,8 @@ async function panel(page) {
   const [keys, values] = await Promise.all(["#info dt", "#info dd"].map((place) => page.locator(place).allTextContents()));
   const [box, buttons] = await Promise.all(["#info", ".map3d-buttons"].map((place) => page.locator(place).boundingBox()));
   const covers = box.y + box.height > buttons.y && box.x + box.width > buttons.x;
-  return { name, note, covers, attributes: Object.fromEntries(keys.map((key, k) => [key, values[k]])) };
+  const attributes = Object.fromEntries(keys.map((key, k) => [key, values[k]]));
+  return { name: attributes["gml:id"] ?? name, note, covers, attributes };
 }
 
 await runPage(async (page, { address, direction, position, zoom, label, picture, size }) => {

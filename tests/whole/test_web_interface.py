@@ -16,7 +16,7 @@ from map3d.catalogue import Workspace
 from map3d_town import TownSpec, make_town
 from tests.tile_services.qgis_process import qgis_version
 from tests.whole.browsing import browse, picture, served
-from tests.whole.other_clients import check_portrayal, check_preview, check_qgis, clicked
+from tests.whole.other_clients import check_portrayal, check_preview, check_qgis, clicked, panel_name
 
 pytestmark = pytest.mark.browser
 
@@ -59,7 +59,7 @@ def tell(workspace: Path, archive: Path, label: str, window: str, system: str, *
             shutil.copy(check_qgis(origin, workspace, STORY, building, workspace.parent), pictures / f"web-interface-{label}-qgis.png")
         check_preview(str(found["link"]), building)
         end = browse("web_interface_end.mjs", origin=origin, link=found["link"], name=STORY, state=found["cookies"], **asked)
-    assert str(end["linked"]).splitlines()[0] == building.name
+    assert panel_name(str(end["linked"])) == building.name
     both = {key: [*found[key], *end[key]] for key in ("problems", "failed", "overflow")}  # type: ignore[misc]
     return {**found, **end, **both}
 

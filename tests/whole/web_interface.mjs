@@ -76,7 +76,7 @@ await runPage(async (page, { origin, name, password, archive, pictures, label, c
     const angle = 2.4 * tries, radius = 0.03 * Math.sqrt(tries) * Math.min(width, height);
     await page.mouse.click(width / 2 + radius * Math.cos(angle), height / 2 + radius * Math.sin(angle));
     await page.waitForTimeout(300);
-    building = await page.evaluate(() => { const info = document.getElementById("info"); return info.hidden || !/building|roof|wall/i.test(info.innerText) ? "" : info.innerText; });
+    building = await page.evaluate(() => { const info = document.getElementById("info"); if (info.hidden || !/building|roof|wall/i.test(info.innerText)) return ""; info.querySelector("details").open = true; return info.innerText; });
   }
   await settled();
   await look("map");

@@ -9,6 +9,7 @@ await runPage(async (page, { origin, link, name, pictures, label }) => {
   // The link shows the same object.
   await page.goto(link);
   await page.waitForSelector("#info:not([hidden])");
+  await page.click("#info summary");
   const linked = await text("#info");
   await settled();
   await look("link", false);

@@ -1,10 +1,14 @@
-import type { Attribute, ClickEvent } from "./map3d.mjs";
+import type { ClickEvent, Vec3 } from "./map3d.mjs";
+import { describe, type Card, type Units } from "./card";
 import { withText } from "./dom";
-import { language, message } from "./i18n";
+import { message } from "./i18n";
+import { report, toast } from "./toast";
 
 /** Shows the selected object's name, position and attributes, as text. */
 export class InfoPanel {
-  units: { crs: string; vertical: string | null } = { crs: "", vertical: null };
+  units: Units = { crs: "", vertical: null };
+  /** Returns longitude and latitude of a world position, where known. */
+  lonLat: (position: Vec3) => readonly [number, number] | null = () => null;
   readonly #box: HTMLElement;
   readonly #onClose: () => void;
 
@@ -23,25 +27,12 @@ export class InfoPanel {
 
   /** @param showBack shows the object from behind */
   show(event: ClickEvent, showBack?: () => void): void {
-    const attributes = Object.entries(event.attributes ?? {}).map(([name, value]) => [name, formatValue(value)] as const);
-    const rows = [...this.#positionRows(event), ...attributes.filter(([, text]) => text !== "")];
-    const list = document.createElement("dl");
-    for (const [name, value] of rows) list.append(withText("dt", name), withText("dd", value));
-    const kind = [event.class, event.id > 0 ? `id ${String(event.id)}` : "", event.approximate ? message("approximate") : ""];
-    const title = withText("h2", event.name ?? (event.id > 0 ? `${message("object")} ${String(event.id)}` : message("point")));
-    this.#box.replaceChildren(title, ...(showBack ? [behindButton(showBack)] : []), withText("p", kind.filter(Boolean).join(" · "), "note"), list, this.#closeButton());
+    const card = describe(event, this.units, event.position && this.lonLat(event.position));
+    const all = withText("details", "");
+    all.append(withText("summary", message("allData")), listOf(card.details), copyButton(card));
+    this.#box.replaceChildren(withText("h2", card.title), ...(showBack ? [behindButton(showBack)] : []), withText("p", card.note, "note"), listOf(card.rows), all, this.#closeButton());
     this.#box.hidden = false;
     this.#box.scrollTop = 0;
-  }
-
-  #positionRows({ position }: ClickEvent): (readonly [string, string])[] {
-    if (!position) return [];
-    const [x, y, z] = position.map((part) => part.toLocaleString(language, { ...PLAIN, minimumFractionDigits: 2, maximumFractionDigits: 2 }));
-    const height = this.units.vertical ? ` (${this.units.vertical})` : "";
-    return [
-      [message("position"), `${x ?? ""}${(x ?? "").includes(",") ? ";" : ","} ${y ?? ""}`],
-      [message("height"), `${z ?? ""} m${height}`],
-    ];
   }
 
   #closeButton(): HTMLButtonElement {
@@ -68,11 +59,19 @@ function behindButton(showBack: () => void): HTMLButtonElement {
   return button;
 }
 
-/** Years and numbers of houses have no separators of thousands. */
-const PLAIN = { useGrouping: false, maximumFractionDigits: 12 } as const;
+function listOf(rows: Card["rows"]): HTMLElement {
+  const list = document.createElement("dl");
+  for (const [name, value] of rows) list.append(withText("dt", name), withText("dd", value));
+  return list;
+}
 
-function formatValue(value: Attribute): string {
-  if (value === null) return "–";
-  if (typeof value === "number") return value.toLocaleString(language, PLAIN);
-  return typeof value === "boolean" ? message(value ? "yes" : "no") : value;
+/** A button that copies the card as text, a line for each row. */
+function copyButton({ title, rows, details }: Card): HTMLButtonElement {
+  const button = withText("button", message("copy"), "behind");
+  button.type = "button";
+  button.addEventListener("click", () => {
+    const text = [title, ...[...rows, ...details].map(([name, value]) => `${name}\t${value}`)].join("\n");
+    navigator.clipboard.writeText(text).then(() => { toast(message("copied")); }, (reason: unknown) => { report(reason); });
+  });
+  return button;
 }

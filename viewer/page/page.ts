@@ -107,6 +107,7 @@ function bindPage(view: map, layer: imageLayer, info: InfoPanel, selection: Sele
     const more = currentTarget as HTMLElement;
     more.setAttribute("aria-expanded", String(more.getAttribute("aria-expanded") !== "true"));
   });
+  info.lonLat = (position) => view.lonLat(position);
   info.units = { crs: json.crs.name, vertical: json.crs.vertical };
   bindLight(view, layer, time);
   bindModes(layer);

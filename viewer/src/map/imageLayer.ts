@@ -24,7 +24,7 @@ export interface ImageLayerOptions {
   mode?: Mode;
   /** Opacity, 0 to 1. Default 1. */
   opacity?: number;
-  /** Default colour of highlights. Default "#e4572e". */
+  /** Default colour of highlights. Default "#19b5e0". */
   highlightColor?: string;
   /** Overrides the manifest's attribution. */
   attribution?: string;
@@ -67,7 +67,7 @@ export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
     super();
     checkOptions(options, ["mode", "opacity", "highlightColor", "attribution", "combine"]);
     checkNumber(options.opacity, "opacity");
-    this.options = { mode: "lit", opacity: 1, highlightColor: "#e4572e", combine: true, ...options };
+    this.options = { mode: "lit", opacity: 1, highlightColor: "#19b5e0", combine: true, ...options };
     this.#mode = checkMode(this.options.mode);
     this.source = typeof urls === "object" && "tile" in ((urls as object | null) ?? {}) ? urls as Source : new HttpSource(urls as string);
   }

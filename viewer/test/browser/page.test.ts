@@ -42,7 +42,7 @@ for (const [name, options] of [["desk", DESK], ["phone", PHONE], ["dark", { ...D
     await page.waitForSelector("#info:not([hidden])");
     await page.waitForTimeout(800);
     await page.screenshot({ path: `${OUT}/${name}-click.png` });
-    expect(await page.locator("#info dd").count()).toBe(7);
+    expect(await page.locator("#info details dd").count()).toBe(7);
     await page.keyboard.press("Escape");
     expect(await page.locator("#info").isHidden()).toBe(true);
     expect(problems).toEqual([]);
@@ -257,7 +257,7 @@ test.each([
   await page.waitForSelector("#results li");
   await page.keyboard.press("Enter");
   await page.waitForSelector("#info:not([hidden])");
-  expect(await page.locator("#info dd").first().textContent()).toMatch(locale === "fr-FR" ? /^6910\d\d,\d\d; 53360\d\d,\d\d$/ : /^6910\d\d\.\d\d, 53360\d\d\.\d\d$/);
+  expect(await page.locator("#info details dd").first().textContent()).toMatch(locale === "fr-FR" ? /^6910\d\d,\d\d; 53360\d\d,\d\d$/ : /^6910\d\d\.\d\d, 53360\d\d\.\d\d$/);
   const english = await page.evaluate(() => [...document.querySelectorAll<HTMLElement>("button, input, select, [role]")].map((found) => found.getAttribute("aria-label") ?? "").filter((label) => /\b(the|of|view|search|look|light)\b/i.test(label)));
   expect(english).toEqual([]);
   expect(problems).toEqual([]);

@@ -194,8 +194,11 @@ test("read an attribute", async () => {
   const { page, hand } = opened;
   await hand.tap(placeOf(page, [-45, -4, 34]));
   await page.waitForSelector("#info:not([hidden])");
-  const rows = await page.locator("#info dl").evaluate((list) => Object.fromEntries([...list.querySelectorAll("dt")].map((name) => [name.textContent, name.nextElementSibling?.textContent])));
-  expect(rows).toMatchObject({ measuredHeight: "34", roofType: "3100", listed: "Yes" });
+  const rows = (number: number): Promise<Record<string, string | null | undefined>> => page.locator("#info dl").nth(number).evaluate((list) => Object.fromEntries([...list.querySelectorAll("dt")].map((name) => [name.textContent, name.nextElementSibling?.textContent])));
+  expect(await rows(0)).toMatchObject({ Height: "34 m" });
+  await hand.tap("#info summary");
+  expect(await rows(1)).toMatchObject({ measuredHeight: "34", roofType: "3100", listed: "Yes" });
+  await page.locator("#info dd").last().scrollIntoViewIfNeeded();
   expect(await page.locator("#info dd").last().isVisible()).toBe(true);
   await end(opened, "attribute");
 });

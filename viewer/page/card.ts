@@ -1,0 +1,67 @@
+import type { Attribute, ClickEvent } from "./map3d.mjs";
+import { language, message, type MessageKey } from "./i18n";
+
+type Row = readonly [name: string, value: string];
+
+/** What a card says of an object, or of a point on the ground. */
+export interface Card {
+  readonly title: string;
+  /** Kind, and address unless it is the title. */
+  readonly note: string;
+  /** What most people want to know, in words. */
+  readonly rows: readonly Row[];
+  /** Ids, coordinates and attributes as the data names them. */
+  readonly details: readonly Row[];
+}
+
+/** The coordinate systems of positions. */
+export interface Units {
+  readonly crs: string;
+  readonly vertical: string | null;
+}
+
+/** Years and numbers of houses have no separators of thousands. */
+const PLAIN = { useGrouping: false, maximumFractionDigits: 12 } as const;
+const CLASSES: Readonly<Record<string, MessageKey>> = { building: "building", building_part: "buildingPart", terrain: "terrain", ground: "terrain", tinrelief: "terrain", solitary_vegetation_object: "tree", plant_cover: "vegetation", vegetation: "vegetation", water_body: "water", road: "road", bridge: "bridge", tunnel: "tunnel", city_furniture: "furniture", land_use: "landUse" };
+
+const format = (value: number, digits?: number): string => value.toLocaleString(language, digits === undefined ? PLAIN : { ...PLAIN, minimumFractionDigits: digits, maximumFractionDigits: digits });
+const isNumber = (value: Attribute | undefined): value is number => typeof value === "number" && Number.isFinite(value) && value > -999;
+/** Text that is not a code. */
+const isWords = (value: Attribute | undefined): value is string => typeof value === "string" && /\p{L}{3}/u.test(value);
+/** An id of the data, such as a gml:id: one word with several digits in a row, or with an underscore. */
+const isId = (name: string): boolean => /^\S*(?:\d{3}|_)\S*$/.test(name);
+
+/** Describes a picked object. @param lonLat of its position, where known */
+export function describe({ id, name, class: type = "", attributes = {}, position, approximate }: Pick<ClickEvent, "id" | "name" | "class" | "attributes" | "position" | "approximate">, units: Units, lonLat: readonly [number, number] | null): Card {
+  const text = (key: string): string => (isWords(attributes[key]) ? attributes[key] : "");
+  const year = attributes["yearOfConstruction"];
+  const known = CLASSES[type];
+  const kind = known ? message(known) : isWords(type) ? type.replaceAll("_", " ") : "";
+  const proper = [text("name"), name ?? ""].find((each) => each !== "" && !isId(each));
+  const address = text("address");
+  const titles = [proper ?? "", address, [text("function") || kind, isNumber(year) ? format(year) : ""].filter(Boolean).join(", ")];
+  const title = id > 0 ? titles.find(Boolean) ?? `${message("object")} ${String(id)}` : message("point");
+  const rows: Row[] = [];
+  const add = (key: MessageKey, value: string): unknown => value !== "" && rows.push([message(key), value]);
+  add("use", [text("function"), text("usage")].find((each) => each !== "" && each !== title) ?? "");
+  add("built", isNumber(year) && !title.endsWith(format(year)) ? format(year) : "");
+  add("measuredHeight", isNumber(attributes["measuredHeight"]) ? `${format(attributes["measuredHeight"])} m` : "");
+  add("storeys", isNumber(attributes["storeysAboveGround"]) ? format(attributes["storeysAboveGround"]) : "");
+  add("roof", text("roofType"));
+  if (position) add("height", `${format(position[2], 2)} m${units.vertical ? ` (${units.vertical})` : ""}`);
+  const separator = format(0.5).includes(",") ? "; " : ", ";
+  if (lonLat) add("coordinates", lonLat.map((part) => `${format(part, 5)}°`).reverse().join(separator));
+  const details: Row[] = [
+    ...(position ? [[message("position"), position.slice(0, 2).map((part) => format(part, 2)).join(separator)] as const] : []),
+    ...(id > 0 ? [["id", String(id)] as const] : []),
+    ...(name !== undefined && name !== title ? [["gml:id", name] as const] : []),
+    ...Object.entries(attributes).map(([key, value]) => [key, formatValue(value)] as const).filter(([, value]) => value !== ""),
+  ];
+  return { title, note: [title === kind ? "" : kind, title === address ? "" : address, approximate ? message("approximate") : ""].filter(Boolean).join(" · "), rows, details };
+}
+
+function formatValue(value: Attribute): string {
+  if (value === null) return "–";
+  if (typeof value === "number") return format(value);
+  return typeof value === "boolean" ? message(value ? "yes" : "no") : value;
+}
