@@ -30,7 +30,7 @@ const WHITE: Vec3 = [1, 1, 1];
 /** Factors of the diffuse light, by altitude. */
 const SUN: readonly ColorStop[] = [[-1, [0, 0, 0]], [0.5, [0.42, 0.17, 0.06]], [4, [0.92, 0.58, 0.3]], [12, [1.04, 0.88, 0.68]], [30, WHITE]];
 /** Factors of the ambient light, by altitude. */
-const SKY: readonly ColorStop[] = [[-12, [0.48, 0.55, 0.8]], [-6, [0.5, 0.57, 0.8]], [0, [0.6, 0.62, 0.74]], [8, [0.9, 0.93, 1]], [30, WHITE]];
+const SKY: readonly ColorStop[] = [[-12, [0.44, 0.5, 0.7]], [-6, [0.48, 0.54, 0.72]], [0, [0.6, 0.62, 0.74]], [8, [0.9, 0.93, 1]], [30, WHITE]];
 
 /** Returns the UTC offset, in hours, for clocks at a longitude: the browser's own if it is plausible there, else the offset of solar time. */
 export function chooseUtcOffset(lon: number, browser_h: number): number {
