@@ -20,7 +20,7 @@ WHITE: Final = (1.0, 1.0, 1.0)
 ColorStops = tuple[tuple[float, Vec3], ...]
 """Colours by the sun's altitude in degrees, ascending; linear in between."""
 SUN: Final[ColorStops] = ((-1, (0, 0, 0)), (0.5, (0.42, 0.17, 0.06)), (4, (0.92, 0.58, 0.3)), (12, (1.04, 0.88, 0.68)), (30, WHITE))
-SKY: Final[ColorStops] = ((-12, (0.14, 0.18, 0.31)), (-6, (0.22, 0.28, 0.46)), (0, (0.6, 0.62, 0.74)), (8, (0.9, 0.93, 1)), (30, WHITE))
+SKY: Final[ColorStops] = ((-12, (0.44, 0.5, 0.7)), (-6, (0.48, 0.54, 0.72)), (0, (0.6, 0.62, 0.74)), (8, (0.9, 0.93, 1)), (30, WHITE))
 """Those of the viewer: viewer/src/geo/daylight.ts."""
 
 
