@@ -2,7 +2,7 @@ import { describe as group, expect, test } from "vitest";
 import { describe, type Card } from "../../page/card";
 
 const UNITS = { crs: "ETRS89 / UTM zone 32N", vertical: "DHHN2016" };
-const card = (event: object): Card => describe({ id: 7, position: [691032.126, 5336026, 562.5], approximate: false, ...event } as Parameters<typeof describe>[0], UNITS, [11.570123, 48.140456]);
+const card = (event: object): Card => describe({ id: 7, position: [691032.126, 5336026, 562.5], approximate: false, ...event }, UNITS, [11.570123, 48.140456]);
 const rows = (made: Card): Record<string, string> => Object.fromEntries(made.rows);
 
 group("a card", () => {
