@@ -67,7 +67,7 @@ function listOf(rows: Card["rows"]): HTMLElement {
 
 /** A button that copies the card as text, a line for each row. */
 function copyButton({ title, rows, details }: Card): HTMLButtonElement {
-  const button = withText("button", message("copy"), "behind");
+  const button = withText("button", message("copy"), "copy");
   button.type = "button";
   button.addEventListener("click", () => {
     const text = [title, ...[...rows, ...details].map(([name, value]) => `${name}\t${value}`)].join("\n");
