@@ -87,13 +87,13 @@ def test_renamed_file_is_not_drawn_twice(site: Site, folder: Path) -> None:
     assert site.drawn() == {"b", "c", "z"}
 
 
-def test_file_that_gets_the_name_of_one_that_left_is_drawn_once(site: Site, folder: Path) -> None:
+def test_file_keeps_its_number_when_the_one_before_it_leaves(site: Site, folder: Path) -> None:
     shutil.copy(folder / "north" / "b.obj", folder / "north" / "a.obj")
     assert site.update(folder).imported == ["a", "a-2", "b", "c"]
     (folder / "a.obj").unlink()
     summary = site.update(folder)
-    assert (summary.imported, summary.removed) == (["a"], ["a-2"])
-    assert site.drawn() == {"a", "b", "c"}
+    assert (summary.imported, summary.removed) == ([], ["a"])
+    assert site.drawn() == {"a-2", "b", "c"}
 
 
 def test_changed_options_import_again(site: Site, folder: Path) -> None:
