@@ -65,9 +65,9 @@ test("keys pan, zoom and rotate while the map has the focus", async () => {
   await page.keyboard.press("+");
   await page.waitForFunction((zoom) => (globalThis as Global).map.zoom > zoom + 0.95, first.zoom);
   await page.keyboard.press("q");
-  expect((await state()).direction).toBe("90-45");
+  await expect.poll(async () => (await state()).direction, { timeout: 20_000 }).toBe("90-45");
   await page.keyboard.press("e");
-  expect((await state()).direction).toBe("0-45");
+  await expect.poll(async () => (await state()).direction, { timeout: 20_000 }).toBe("0-45");
   await page.context().close();
 });
 
@@ -78,9 +78,9 @@ test("a double click zooms at the pointer; the buttons zoom and rotate", async (
   await page.getByRole("button", { name: "Zoom out" }).click();
   await page.waitForFunction(() => (globalThis as Global).map.zoom < 3.85);
   await page.getByRole("button", { name: "Turn view clockwise", exact: true }).click();
-  expect(await page.evaluate(() => (globalThis as Global).map.direction)).toBe("270-45");
+  await page.waitForFunction(() => (globalThis as Global).map.direction === "270-45");
   await page.getByRole("button", { name: /reset to north/ }).click();
-  expect(await page.evaluate(() => (globalThis as Global).map.direction)).toBe("0-45");
+  await page.waitForFunction(() => (globalThis as Global).map.direction === "0-45");
   await page.context().close();
 });
 

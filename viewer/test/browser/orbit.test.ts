@@ -111,11 +111,10 @@ test("a transition ends in the picture of an immediate change; markers move alon
   await page.context().close();
 
   const { page: flat, problems: none } = await start({ drawer: "canvas" });
-  expect(await flat.evaluate(() => {
+  expect(await flat.evaluate(() => new Promise((done) => {
     const { map } = globalThis as Global;
-    map.setDirection("90-45");
-    return map.container.querySelectorAll("canvas").length;
-  })).toBe(2);
+    map.once("directionchange", () => { done(map.container.querySelectorAll("canvas").length); }).setDirection("90-45");
+  }))).toBe(2);
   await flat.waitForFunction(() => document.querySelectorAll("canvas").length === 1);
   expect(none).toEqual([]);
   await flat.context().close();
