@@ -23,10 +23,10 @@ const STEPS_PER_CROSSED_EDGE: u64 = 8;
 /// Edges that cross a new edge of a ring are flipped, each up to as often as there are others.
 const FLIPS_PER_STEP: u64 = 8;
 
-struct Vertex {
-    position: Point2<f64>,
+pub struct Vertex {
+    pub position: Point2<f64>,
     /// Index among the points of the polygon.
-    index: u32,
+    pub index: u32,
 }
 
 impl HasPosition for Vertex {
@@ -39,17 +39,21 @@ impl HasPosition for Vertex {
 
 /// How many edges of rings lie on an edge: even or odd.
 #[derive(Clone, Copy, Default)]
-struct Parity(bool);
+pub struct Parity(bool);
 
-type Cdt = ConstrainedDelaunayTriangulation<Vertex, (), Parity, (), HierarchyHintGenerator<f64>>;
+pub type Cdt = ConstrainedDelaunayTriangulation<Vertex, (), Parity, (), HierarchyHintGenerator<f64>>;
 
 /// Steps that a polygon may still take.
-struct Budget {
+pub struct Budget {
     left: u64,
 }
 
 impl Budget {
-    fn spend(&mut self, steps: u64) -> Result<(), PolygonError> {
+    pub fn for_vertices(count: usize) -> Self {
+        Self { left: count as u64 * STEPS_PER_VERTEX }
+    }
+
+    pub fn spend(&mut self, steps: u64) -> Result<(), PolygonError> {
         self.left = self.left.checked_sub(steps).ok_or(PolygonError::TooManyVertices)?;
         Ok(())
     }
@@ -63,7 +67,7 @@ pub fn triangulate(points: &[[f64; 2]], ends: &[usize], triangles: &mut Vec<u32>
     if points.len() > MAX_VERTICES {
         return Err(PolygonError::TooManyVertices);
     }
-    let mut budget = Budget { left: points.len() as u64 * STEPS_PER_VERTEX };
+    let mut budget = Budget::for_vertices(points.len());
     // The library panics where rounding defeats it. That costs this polygon, not the document.
     let run = AssertUnwindSafe(|| triangulate_within(points, ends, &mut budget));
     triangles.extend(catch_unwind(run).unwrap_or(Err(PolygonError::NumericalFailure))?.as_flattened());
@@ -88,12 +92,12 @@ fn triangulate_within(points: &[[f64; 2]], ends: &[usize], budget: &mut Budget) 
     Ok(faces.map(|face| face.vertices().map(|v| v.data().index)).collect())
 }
 
-fn place([x, y]: [f64; 2]) -> Point2<f64> {
+pub fn place([x, y]: [f64; 2]) -> Point2<f64> {
     mitigate_underflow(Point2::new(x, y))
 }
 
 /// Returns for each point the first point in the same place.
-fn find_distinct_points(points: &[[f64; 2]]) -> Vec<u32> {
+pub fn find_distinct_points(points: &[[f64; 2]]) -> Vec<u32> {
     let placed = |k: u32| place(points[k as usize]);
     let mut order: Vec<u32> = (0..points.len() as u32).collect();
     // Adding zero makes zeros of both signs equal.
@@ -111,7 +115,7 @@ fn find_distinct_points(points: &[[f64; 2]]) -> Vec<u32> {
 
 /// Returns the points in rounds, each about twice as large as the one before, chosen by a hash; in a round, along a Z-order curve. In such an order
 /// an incremental Delaunay triangulation takes n log n steps whatever the points (Amenta, Choi, Rote: Incremental constructions con BRIO, 2003).
-fn choose_insertion_order(points: &[[f64; 2]]) -> Vec<u32> {
+pub fn choose_insertion_order(points: &[[f64; 2]]) -> Vec<u32> {
     let low = points.iter().fold([f64::MAX; 2], |low, p| [low[0].min(p[0]), low[1].min(p[1])]);
     let high = points.iter().fold([f64::MIN; 2], |high, p| [high[0].max(p[0]), high[1].max(p[1])]);
     let cell = |k: u32, axis: usize| {
@@ -140,7 +144,7 @@ fn ring_edges(ends: &[usize]) -> impl Iterator<Item = [usize; 2]> + '_ {
 }
 
 /// Makes an edge of a ring an edge of the triangulation. Returns false if it crosses an edge of a ring, and leaves it out.
-fn add_ring_edge(cdt: &mut Cdt, from: FixedVertexHandle, to: FixedVertexHandle, budget: &mut Budget) -> Result<bool, PolygonError> {
+pub fn add_ring_edge(cdt: &mut Cdt, from: FixedVertexHandle, to: FixedVertexHandle, budget: &mut Budget) -> Result<bool, PolygonError> {
     let mut count = 0u64;
     for crossed in LineIntersectionIterator::new_from_handles(cdt, from, to) {
         budget.spend(STEPS_PER_CROSSED_EDGE)?;
@@ -176,7 +180,7 @@ fn fill_from_outside(cdt: &Cdt) -> Vec<bool> {
 }
 
 /// Returns for each face whether its centroid is inside: a line from there to the right crosses an odd number of ring edges.
-fn locate_centroids(cdt: &Cdt, points: &[[f64; 2]], ends: &[usize], budget: &mut Budget) -> Result<Vec<bool>, PolygonError> {
+pub fn locate_centroids(cdt: &Cdt, points: &[[f64; 2]], ends: &[usize], budget: &mut Budget) -> Result<Vec<bool>, PolygonError> {
     let mut centroids: Vec<(Point2<f64>, usize)> = cdt.inner_faces().map(|face| (face.center(), face.index())).collect();
     centroids.sort_unstable_by(|a, b| a.0.y.total_cmp(&b.0.y).then(a.1.cmp(&b.1)));
     let mut inside = vec![false; cdt.num_all_faces()];

@@ -17,6 +17,7 @@ mod options;
 mod report_builder;
 mod t_junctions;
 mod text_input;
+mod tin;
 mod transparency;
 mod triangulate;
 

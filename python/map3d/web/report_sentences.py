@@ -25,6 +25,8 @@ FAULTS: Final[Mapping[str, str]] = {
         "Coordinate systems that the file names, all read as the one given: {count}."
     ),
     "material not defined": N_("Materials that are used but not defined: {count}."),
+    "Tin: maxLength that is not a length": N_("TINs whose limit for the sides of triangles is not a length; all triangles are kept: {count}."),
+    "Tin: points in one place with different heights": N_("TINs with points in one place that differ in height; the first is used: {count}."),
     "unknown wrap mode": N_("Textures with an unknown wrap mode: {count}."),
 }
 SKIPPED: Final[Mapping[str, str]] = {
@@ -58,6 +60,17 @@ SKIPPED: Final[Mapping[str, str]] = {
     "ring with fewer than 3 points": N_("Skipped rings with fewer than 3 points: {count}."),
     "solid of an open space": N_("Solids of open spaces, left out: {count}."),
     "texture coordinate is not a finite number": N_("Texture coordinates that are not finite numbers, left out: {count}."),
+    "Tin: break line that crosses another one": N_("Pieces of break lines of TINs that cross another break line, left out: {count}."),
+    "Tin: control points on a line": N_("Skipped TINs whose control points are on one line: {count}."),
+    "Tin: could not be triangulated": N_("Skipped TINs that could not be divided into triangles: {count}."),
+    "Tin: fewer than 3 control points": N_("Skipped TINs with fewer than 3 control points: {count}."),
+    "Tin: point whose coordinates are not finite numbers": N_("Points of TINs with coordinates that are not finite numbers, left out: {count}."),
+    "Tin: points in more than one coordinate system": N_("Skipped TINs with points in more than one coordinate system: {count}."),
+    "Tin: points in one of too many coordinate systems": N_("Skipped TINs in one of too many coordinate systems: {count}."),
+    "Tin: too many points or crossing lines": N_("Skipped TINs with too many points or crossing lines: {count}."),
+    "Tin: triangle at a stop line": N_("Triangles of TINs at stop lines, left out: {count}."),
+    "Tin: triangle with a side over maxLength": N_("Triangles of TINs with a side over the longest that the file allows, left out: {count}."),
+    "Tin: unreadable coordinates": N_("Skipped TINs with unreadable coordinates: {count}."),
     "unreadable face": N_("Skipped unreadable faces: {count}."),
     "unreadable vertex": N_("Skipped unreadable vertices: {count}."),
     "unsupported geometry type": N_("Geometry of types that map3d does not read, left out: {count}."),

@@ -9,6 +9,7 @@ use super::crs_table::{CrsNumber, CrsTable, TOO_MANY};
 use super::geometry_arena::{GeometryArena, NodeId, NodeKind, Ring};
 use super::ids::{self, Reference, parse_reference};
 use super::textured_surface::read_own_appearance;
+use super::tin_parser::TinParts;
 use super::xml_reader::{XmlEvent, XmlReader};
 use crate::report_builder::{LimitCheck, ReportBuilder};
 
@@ -79,16 +80,22 @@ impl PositionFormat {
     }
 }
 
-/// What was read of a polygon's rings.
-struct RingsRead {
-    valid: bool,
+/// What was read of the positions of a polygon or a TIN.
+pub struct PositionsRead {
+    pub valid: bool,
     /// Coordinate system of the first positions.
-    crs: Option<CrsNumber>,
+    pub crs: Option<CrsNumber>,
     /// Other positions are in another one.
-    is_mixed: bool,
+    pub is_mixed: bool,
 }
 
-impl RingsRead {
+impl Default for PositionsRead {
+    fn default() -> Self {
+        Self { valid: true, crs: None, is_mixed: false }
+    }
+}
+
+impl PositionsRead {
     fn add_positions(&mut self, crs: CrsNumber, valid: bool) {
         self.valid &= valid;
         self.is_mixed |= *self.crs.get_or_insert(crs) != crs;
@@ -162,9 +169,15 @@ impl GeometryParser<'_> {
     }
 
     fn read_group(&mut self, parent: NodeId, format: PositionFormat) -> Result<NodeId> {
+        let mut tin = (self.xml.local_name() == "Tin").then(TinParts::default);
         let node = self.geometry.add(self.xml.gml_id(), parent, NodeKind::Group);
         self.geometry.nodes[node as usize].reversed = self.xml.attribute("orientation").is_some_and(|o| o.trim() == "-");
         while self.xml.next_child()? {
+            if let Some(tin) = &mut tin
+                && self.read_tin_property(format, tin)?
+            {
+                continue;
+            }
             match self.xml.local_name() {
                 "boundedBy" | "name" | "description" | "metaDataProperty" | "controlPoint" => self.xml.skip()?,
                 "appearance" => {
@@ -176,13 +189,16 @@ impl GeometryParser<'_> {
                 }
             }
         }
+        if let Some(tin) = tin {
+            self.add_tin(node, tin)?;
+        }
         Ok(node)
     }
 
     fn read_polygon(&mut self, parent: NodeId, format: PositionFormat) -> Result<NodeId> {
         let id = self.xml.gml_id();
         let first_ring = self.geometry.rings.len() as u32;
-        let mut read = RingsRead { valid: true, crs: None, is_mixed: false };
+        let mut read = PositionsRead::default();
         while self.xml.next_child()? {
             match self.xml.local_name() {
                 "exterior" | "interior" | "outerBoundaryIs" | "innerBoundaryIs" => self.read_boundary(format, &mut read)?,
@@ -203,12 +219,17 @@ impl GeometryParser<'_> {
     }
 
     fn check_size(&self) -> Result<()> {
-        let got = self.geometry.byte_count();
+        self.check_size_with(0)
+    }
+
+    /// `added_bytes`: memory of what is not in the arena yet.
+    pub fn check_size_with(&self, added_bytes: u64) -> Result<()> {
+        let got = self.geometry.byte_count() + added_bytes;
         self.report.check_limit(LimitCheck { what: "geometry of one city object, bytes", got, limit: "max_object_bytes", value: self.max_bytes })
     }
 
     /// Reads the current exterior or interior: a LinearRing, or a Ring of curves.
-    fn read_boundary(&mut self, format: PositionFormat, read: &mut RingsRead) -> Result<()> {
+    fn read_boundary(&mut self, format: PositionFormat, read: &mut PositionsRead) -> Result<()> {
         while self.xml.next_child()? {
             let id = self.xml.gml_id();
             let start = self.geometry.points.len() as u32;
@@ -221,7 +242,7 @@ impl GeometryParser<'_> {
     }
 
     /// Reads all positions in the current element, at any depth.
-    fn read_ring_points(&mut self, format: PositionFormat, read: &mut RingsRead) -> Result<()> {
+    pub fn read_ring_points(&mut self, format: PositionFormat, read: &mut PositionsRead) -> Result<()> {
         let depth = self.xml.depth();
         // Of the elements around the current position that say how positions are read: their depths and what they say.
         let mut formats = vec![(depth, format)];
@@ -245,7 +266,7 @@ impl GeometryParser<'_> {
     }
 
     /// Reads the current element up to its end if it contains positions; enters any other element.
-    fn read_positions(&mut self, format: PositionFormat, read: &mut RingsRead) -> Result<()> {
+    fn read_positions(&mut self, format: PositionFormat, read: &mut PositionsRead) -> Result<()> {
         let valid = match self.xml.local_name() {
             "posList" | "pos" => {
                 self.text.clear();

@@ -30,6 +30,7 @@ mod standard_codes;
 mod tag_scanner;
 mod tessellate;
 mod textured_surface;
+mod tin_parser;
 mod xml_reader;
 
 pub use citygml_reader::CityGmlReader;
