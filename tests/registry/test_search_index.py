@@ -9,7 +9,9 @@ from typing import Any
 import pytest
 
 from map3d.registry import NewObject, Registry, search_index
-from map3d.registry.search_index import MAX_PAGE_BYTES, search_words
+from map3d.registry.kinds import kind_words
+from map3d.registry.search_index import MAX_PAGE_BYTES
+from map3d.registry.words import search_words
 from map3d.types import Box
 
 UNIT: Box = ((0.0, 0.0, 0.0), (2.0, 4.0, 6.0))
@@ -59,7 +61,7 @@ class Reader:
         page: dict[str, Any] = json.loads(self._documents[name])
         assert page["map3d"] == "search"
         if "entries" in page:
-            return {number: label for number, label, _ in page["entries"]}
+            return {number: label for number, label, *_ in page["entries"]}
         keys = [utf16(key) for key in page["keys"]]
         sought = utf16(beginning)
         assert keys == sorted(keys)
@@ -135,7 +137,7 @@ def test_an_index_of_one_page_is_one_document_of_version_1(registry: Registry) -
     ((name, data),) = registry.search_documents()
     document = json.loads(data)
     assert (name, document["version"]) == ("objects/search.json", 1)
-    assert [label for _, label, _ in document["entries"]] == sorted(labels_of(300))
+    assert [label for _, label, *_ in document["entries"]] == sorted(labels_of(300))
 
 
 def test_pages_are_bounded_and_named_by_their_content(registry: Registry) -> None:
@@ -156,3 +158,60 @@ def test_a_changed_label_changes_few_pages(registry: Registry, change: Callable[
     assert len(before) > 20
     assert len(after.keys() - before.keys()) <= 5 * 2
     assert all(before[name] == after[name] for name in before.keys() & after.keys() if name != "objects/search.json")
+
+
+def entries_of(registry: Registry) -> dict[int, list[Any]]:
+    ((_, data),) = registry.search_documents()
+    return {entry[0]: entry for entry in json.loads(data)["entries"]}
+
+
+@pytest.mark.parametrize(
+    ("name", "attributes", "label"),
+    [
+        ("DEBY_LOD2_4959323", {"name": "Dom", "address": "Platz 1"}, "Dom, Platz 1"),
+        ("DEBY_LOD2_4959323", {"address": "Platz 1"}, "Platz 1"),
+        ("UUID_d281adfc-4901", {"function": "Kirche", "name": "b_77"}, "Kirche"),
+        ("UUID_d281adfc-4901", {"function": "1000"}, "building"),
+        ("Town hall 100", {}, "Town hall 100"),
+    ],
+)
+def test_a_label_is_what_people_say_and_never_an_identifier(registry: Registry, name: str, attributes: dict[str, Any], label: str) -> None:
+    (number,) = registry.put_asset("a", [NewObject(name, "building", attributes=attributes, box=UNIT)]).tolist()
+    entry = entries_of(registry)[number]
+    assert entry[1] == label
+    assert set(search_words(name)) <= {word for text in (entry[1], *entry[3:]) for word in search_words(text)}
+
+
+@pytest.mark.parametrize("function", ["church", "Kirchengebäude", "église", "Pfarrkirche"])
+def test_a_kind_is_found_in_three_languages(registry: Registry, function: str) -> None:
+    (number,) = registry.put_asset("a", [NewObject("x_1", "building", attributes={"function": function}, box=UNIT)]).tolist()
+    assert {"church", "kirche", "eglise"} <= {
+        word for text in (entries_of(registry)[number][1], entries_of(registry)[number][3]) for word in search_words(text)
+    }
+
+
+@pytest.mark.parametrize("function", ["sports hall", "bus station", "Bürgerhaus", "31001_1000", "tourism"])
+def test_words_of_other_kinds_mean_no_kind(function: str) -> None:
+    assert not {"town", "gare", "castle", "tower"} & set(kind_words("building", {"function": function}))
+
+
+@pytest.mark.usefixtures("small_pages")
+def test_the_names_of_parts_lead_to_their_building(registry: Registry) -> None:
+    put(registry, labels_of(400))
+    building = NewObject("b_1", "building", box=UNIT)
+    parts = [
+        NewObject("p_1", "building_part", parent=0, attributes={"name": "Nordturm"}, box=UNIT),
+        NewObject("w_1", "window", parent=1, attributes={"name": "Rose"}, box=UNIT),
+    ]
+    number, *inner = registry.put_asset("b", [building, *parts]).tolist()
+    for beginning in ("nordturm", "rose", "p 1"):
+        found = Reader(dict(registry.search_documents())).find(beginning)
+        assert found[number] == "Nordturm"
+        assert not found.keys() & set(inner)
+
+
+def test_an_object_with_countless_parts_has_an_entry_of_bounded_size(registry: Registry) -> None:
+    parts = [NewObject(f"part{k}_x", "building_part", parent=0, box=UNIT) for k in range(2000)]
+    registry.put_asset("a", [NewObject("Whole", "building", box=UNIT), *parts])
+    (entry,) = entries_of(registry).values()
+    assert len(entry[3]) < 200

@@ -1,4 +1,5 @@
 import type { Attribute, ClickEvent } from "./map3d.mjs";
+import type { Described } from "./whole";
 import { language, message, type MessageKey } from "./i18n";
 
 type Row = readonly [name: string, value: string];
@@ -24,6 +25,15 @@ export interface Units {
 const PLAIN = { useGrouping: false, maximumFractionDigits: 12 } as const;
 const CLASSES: Readonly<Record<string, MessageKey>> = { building: "building", building_part: "buildingPart", terrain: "terrain", ground: "terrain", tinrelief: "terrain", solitary_vegetation_object: "tree", plant_cover: "vegetation", vegetation: "vegetation", water_body: "water", road: "road", bridge: "bridge", tunnel: "tunnel", city_furniture: "furniture", land_use: "landUse" };
 
+/** Classes of the ground, which is not marked and not listed. */
+export const NOT_HIGHLIGHTED: ReadonlySet<string> = new Set(["terrain", "ground", "tinrelief"]);
+
+/** Returns what a class is called; "" for a code. */
+export function kindOf(type: string): string {
+  const known = CLASSES[type];
+  return known ? message(known) : isWords(type) ? type.replaceAll("_", " ") : "";
+}
+
 const format = (value: number, digits?: number): string => value.toLocaleString(language, digits === undefined ? PLAIN : { ...PLAIN, minimumFractionDigits: digits, maximumFractionDigits: digits });
 const isNumber = (value: Attribute | undefined): value is number => typeof value === "number" && Number.isFinite(value) && value > -999;
 /** Text that is not a code. */
@@ -31,12 +41,18 @@ const isWords = (value: Attribute | undefined): value is string => typeof value 
 /** An id of the data, such as a gml:id: one word with several digits in a row, or with an underscore. */
 const isId = (name: string): boolean => /^\S*(?:\d{3}|_)\S*$/.test(name);
 
+/** Returns what a search result is called: its label, which is a class if there is nothing better. Older indexes have identifiers in labels. */
+export function nameOfResult(label: string): string {
+  const known = CLASSES[label];
+  if (known) return message(known);
+  return label.replace(/^\S*(?:\d{3}|_)\S*(?:, |$)/, "") || (/\d/.test(label) ? message("object") : label.replaceAll("_", " "));
+}
+
 /** Describes a picked object. @param lonLat of its position, where known */
-export function describe({ id, name, class: type = "", attributes = {}, position, approximate }: Pick<ClickEvent, "id" | "name" | "class" | "attributes" | "position" | "approximate">, units: Units, lonLat: readonly [number, number] | null): Card {
+export function describe({ id, name, class: type = "", attributes = {}, position = null, approximate = false }: Described & Partial<Pick<ClickEvent, "position" | "approximate">>, units: Units = { crs: "", vertical: null }, lonLat: readonly [number, number] | null = null): Card {
   const text = (key: string): string => (isWords(attributes[key]) ? attributes[key] : "");
   const year = attributes["yearOfConstruction"];
-  const known = CLASSES[type];
-  const kind = known ? message(known) : isWords(type) ? type.replaceAll("_", " ") : "";
+  const kind = kindOf(type);
   const proper = [text("name"), name ?? ""].find((each) => each !== "" && !isId(each));
   const address = text("address");
   const titles = [proper ?? "", address, [text("function") || kind, isNumber(year) ? format(year) : ""].filter(Boolean).join(", ")];

@@ -1,9 +1,13 @@
 import type { imageLayer, map } from "./map3d.mjs";
+import { describe, NOT_HIGHLIGHTED } from "./card";
 import { byId, withText } from "./dom";
 import { message } from "./i18n";
 import { report } from "./toast";
+import { findWhole, type Described } from "./whole";
 
 const MAX_ROWS = 30;
+/** Visible objects, parts included, that are read. */
+const MAX_PARTS = 200;
 
 /** Binds the list of objects in view, largest first: for screen readers and keyboards. */
 export function bindInViewList(view: map, layer: () => imageLayer, select: (id: number) => void): void {
@@ -31,9 +35,12 @@ export function bindInViewList(view: map, layer: () => imageLayer, select: (id: 
 
 type Row = readonly [id: number, name: string];
 
+/** Lists the largest objects, each with all its parts once, without the ground. */
 async function objectsInView(view: map, layer: imageLayer): Promise<Row[]> {
-  const visible = (await view.objectsInView()).filter((object) => object.layer === layer).slice(0, MAX_ROWS);
-  return Promise.all(visible.map(async ({ id }) => [id, (await layer.object(id))?.name ?? `${message("object")} ${String(id)}`] as const));
+  const visible = (await view.objectsInView()).filter((object) => object.layer === layer).slice(0, MAX_PARTS);
+  const wholes = await Promise.all(visible.map(({ id }) => findWhole<Described>(layer, { id })));
+  const named = wholes.filter((whole) => !NOT_HIGHLIGHTED.has(whole.class ?? "")).map((whole) => [whole.id, describe(whole).title] as const);
+  return [...new Map(named)].slice(0, MAX_ROWS);
 }
 
 function listOf(rows: readonly Row[], select: (id: number) => void): HTMLElement {

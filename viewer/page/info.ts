@@ -25,14 +25,15 @@ export class InfoPanel {
     this.#onClose();
   }
 
-  /** @param showBack shows the object from behind */
-  show(event: ClickEvent, showBack?: () => void): void {
+  /** Returns the title. @param showBack shows the object from behind */
+  show(event: ClickEvent, showBack?: () => void): string {
     const card = describe(event, this.units, event.position && this.lonLat(event.position));
     const all = withText("details", "");
     all.append(withText("summary", message("allData")), listOf(card.details), copyButton(card));
     this.#box.replaceChildren(withText("h2", card.title), ...(showBack ? [behindButton(showBack)] : []), withText("p", card.note, "note"), listOf(card.rows), all, this.#closeButton());
     this.#box.hidden = false;
     this.#box.scrollTop = 0;
+    return card.title;
   }
 
   #closeButton(): HTMLButtonElement {

@@ -113,7 +113,7 @@ function bindPage(view: map, layer: imageLayer, info: InfoPanel, selection: Sele
   bindModes(layer);
   if (json.objects) {
     bindInViewList(view, () => selection.layer, (id) => void selection.selectId(id));
-    bindSearch(view, () => selection.layer, (id, position, label) => void selection.selectId(id, position, true, label));
+    bindSearch(view, () => selection.layer, (id, position) => void selection.selectId(id, position, true, true));
   }
 }
 

@@ -1,4 +1,5 @@
 import type { imageLayer, map, SearchEntry, Vec3 } from "./map3d.mjs";
+import { nameOfResult } from "./card";
 import { byId, inputById, withText } from "./dom";
 import { toast } from "./toast";
 import { message } from "./i18n";
@@ -6,7 +7,7 @@ import { message } from "./i18n";
 const ZOOM_BELOW_DEEPEST = 1;
 
 /** Binds the search box: a combobox over the rendering's search index, of which the first search fetches a part. */
-export function bindSearch(view: map, layer: () => imageLayer, select: (id: number, position: Vec3, label: string) => void): void {
+export function bindSearch(view: map, layer: () => imageLayer, select: (id: number, position: Vec3) => void): void {
   const [form, query, list] = [byId("search"), inputById("query"), byId("results")];
   const box = new SearchBox(query, list, (text) => layer().search(text), (entry) => {
     go(view, layer(), entry, select);
@@ -18,11 +19,11 @@ export function bindSearch(view: map, layer: () => imageLayer, select: (id: numb
   });
 }
 
-function go(view: map, layer: imageLayer, [id, label, local]: SearchEntry, select: (id: number, position: Vec3, label: string) => void): void {
+function go(view: map, layer: imageLayer, [id, , local]: SearchEntry, select: (id: number, position: Vec3) => void): void {
   const json = layer.rendering?.json;
   if (!json) return;
   const world = [json.origin[0] + local[0], json.origin[1] + local[1], json.origin[2] + local[2]] as const satisfies Vec3;
-  select(id, world, label);
+  select(id, world);
   view.flyTo(world, Math.max(view.zoom, json.zmax - ZOOM_BELOW_DEEPEST));
 }
 
@@ -49,7 +50,7 @@ class SearchBox {
   choose(at = this.#at): void {
     const hit = this.#hits[at];
     if (!hit) return;
-    this.#query.value = hit[1];
+    this.#query.value = nameOfResult(hit[1]);
     this.#query.blur();
     this.#select(hit);
   }
@@ -74,7 +75,7 @@ class SearchBox {
   }
 
   #row([, label]: SearchEntry, k: number): HTMLElement {
-    const row = withText("li", label);
+    const row = withText("li", nameOfResult(label));
     row.id = `result-${String(k)}`;
     row.setAttribute("role", "option");
     row.setAttribute("aria-selected", String(k === this.#at));

@@ -1,13 +1,9 @@
 import { marker, type ClickEvent, type imageLayer, type map, type Vec3 } from "./map3d.mjs";
 import type { InfoPanel } from "./info";
+import { NOT_HIGHLIGHTED } from "./card";
+import { findWhole } from "./whole";
 import { report } from "./toast";
 import { readPermalink, type Permalink } from "./permalink";
-
-const NOT_HIGHLIGHTED = new Set(["terrain", "ground"]);
-
-type Attributes = NonNullable<ClickEvent["attributes"]>;
-/** Returns the attributes that another object lacks. */
-const without = (attributes: Attributes = {}, other: Attributes): Attributes => Object.fromEntries(Object.entries(attributes).filter(([name]) => !Object.hasOwn(other, name)));
 
 /** The selected object: highlighted, described in the info panel and kept in the permalink. The back button returns to the previous selection. */
 export class Selection {
@@ -38,7 +34,7 @@ export class Selection {
   /** Selects a clicked object, or the building that it is a part of. */
   select(event: ClickEvent): void {
     const number = ++this.#clicks;
-    this.#climb(event).catch((reason: unknown) => {
+    findWhole(this.#layer, event).catch((reason: unknown) => {
       report(reason);
       return event;
     }).then((whole) => {
@@ -49,21 +45,8 @@ export class Selection {
     }, report);
   }
 
-  /** Returns the event for the outermost object that contains the clicked one; attributes that only the part has are added. */
-  async #climb(event: ClickEvent): Promise<ClickEvent> {
-    const above = new Set<number>([event.id]);
-    let [whole, object] = [event, await this.#layer.object(event.id)];
-    while (object && object.parent !== null && !above.has(object.parent)) {
-      const id = object.parent;
-      above.add(id);
-      object = await this.#layer.object(id);
-      if (object) whole = { ...event, id, name: object.name, class: object.class, attributes: { ...object.attributes, ...without(whole.attributes, object.attributes) } };
-    }
-    return whole;
-  }
-
-  /** Selects an object by its id. @param position default: the top of its bounding box  @param push adds a history entry  @param label of a marker there */
-  async selectId(id: number, position: Vec3 | null = null, push = true, label = ""): Promise<void> {
+  /** Selects an object by its id. @param position default: the top of its bounding box  @param push adds a history entry  @param pin adds a marker with its title */
+  async selectId(id: number, position: Vec3 | null = null, push = true, pin = false): Promise<void> {
     const changed = id !== this.#permalink.id;
     this.#permalink.id = id;
     const object = await this.#layer.object(id).catch((reason: unknown) => {
@@ -75,8 +58,8 @@ export class Selection {
     const origin = this.#layer.rendering?.json.origin;
     const top: Vec3 | null = low && high && origin ? [origin[0] + (low[0] + high[0]) / 2, origin[1] + (low[1] + high[1]) / 2, origin[2] + high[2]] : null;
     const event: ClickEvent = { id, position: position ?? top, approximate: false, layer: this.#layer, point: [0, 0], ...(object ?? {}) };
-    this.#show(event);
-    if (label !== "" && event.position) this.#pin = new marker(label, event.position).addTo(this.#view).select();
+    const title = this.#show(event);
+    if (pin && event.position) this.#pin = new marker(title, event.position).addTo(this.#view).select();
     if (push) this.#permalink.write(changed);
   }
 
@@ -88,16 +71,17 @@ export class Selection {
     this.#permalink.write();
   }
 
-  #show(event: ClickEvent): void {
+  /** Returns the title of the card. */
+  #show(event: ClickEvent): string {
     this.#pin?.remove();
     this.#layer.clearHighlight();
     this.#permalink.id = event.id;
     if (event.id === 0 && !event.position) {
       this.#info.close();
-      return;
+      return "";
     }
     if (event.id > 0 && !NOT_HIGHLIGHTED.has(event.class ?? "")) this.#layer.highlight(event.id);
-    this.#info.show(event, event.id > 0 && !NOT_HIGHLIGHTED.has(event.class ?? "") ? this.#showBack(event) : undefined);
+    return this.#info.show(event, event.id > 0 && !NOT_HIGHLIGHTED.has(event.class ?? "") ? this.#showBack(event) : undefined);
   }
 
   /** Returns an action that shows the object from behind; undefined when no view has the opposite direction. */

@@ -78,7 +78,26 @@ const tables = {
     build.onLoad({ filter: /\/suncalc\/index\.js$/ }, ({ path }) => ({ contents: readFileSync(path, "utf8").replaceAll("new Int32Array(", "/* @__PURE__ */ new Int32Array("), loader: "js" }));
   },
 };
-const plugins = [workers, shaders, styles, tables];
+/** Writes the keys of the page's messages once for all languages. */
+const messages = {
+  name: "messages",
+  setup(build) {
+    build.onLoad({ filter: /\/page\/i18n\.ts$/ }, ({ path }) => {
+      const join = (texts) => {
+        if (texts.some((text) => text.includes("|"))) throw new Error(`${path}: a message contains "|"`);
+        return JSON.stringify(texts.join("|"));
+      };
+      const [text, keys] = [readFileSync(path, "utf8"), []];
+      const contents = text.replace(/^(const (?:EN|DE|FR)(?:: Messages)? = )(\{[^]*?^\});/gm, (_, before, body) => {
+        const table = new Function(`return ${body}`)();
+        if (keys.length === 0) keys.push(...Object.keys(table));
+        return `${before}readMessages(${join(keys.map((key) => table[key]))});`;
+      });
+      return { contents: `const KEYS = ${join(keys)}.split("|");\nconst readMessages = (texts) => Object.fromEntries(texts.split("|").map((text, k) => [KEYS[k], text]));\n${contents}`, loader: "ts" };
+    });
+  },
+};
+const plugins = [workers, shaders, styles, tables, messages];
 
 /** Lets entries import the core's public names: modules from map3d.mjs, scripts from the global `map3d`. */
 const coreAs = (how) => ({
@@ -124,9 +143,10 @@ async function build() {
   writeDeclarations();
 }
 
-/** Removes indentation, line ends before blocks, and the end tags and quotation marks that HTML does not need. */
+/** Removes the English texts that the script replaces, indentation, line ends before blocks, and the end tags and quotation marks that HTML does not need. */
 function minifyHtml(page) {
-  const blocks = page.replace(/^\s+/gm, "").replace(/>\n(?=<(?:meta|link|title|script|p|div|form|dialog|ul|header|main|aside|section|h1|h2)\b)/g, ">").replace(/<\/(?:li|option)>/g, "");
+  const untranslated = page.replace(/(<[^>]* data-i18n="[^>]*>)[^<]+/g, "$1").replace(/<[^>]* data-i18n-(?:label|placeholder)="[^>]*>/g, (tag) => tag.replace(/ (?:aria-label|placeholder)="[^"]*"/g, ""));
+  const blocks = untranslated.replace(/^\s+/gm, "").replace(/>\n(?=<(?:meta|link|title|script|p|div|form|dialog|ul|header|main|aside|section|h1|h2)\b)/g, ">").replace(/<\/(?:li|option)>/g, "");
   return blocks.replace(/<[^>]*>/g, (tag) => tag.replace(/="([\w.#-]+)"(?=[ >])/g, "=$1"));
 }
 

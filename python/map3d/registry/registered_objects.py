@@ -1,11 +1,16 @@
 """Objects before and after registration."""
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 
+from map3d.registry.kinds import decoded_kind
 from map3d.types import Box
+
+_IDENTIFIER: Final = re.compile(r"\S*([0-9]{3}|_)\S*\Z")
+"""One word with three digits in a row, or with an underscore."""
 
 Attribute = str | float | int | bool | None
 
@@ -37,11 +42,16 @@ class RegisteredObject:
     box: Box | None
 
     @property
+    def proper_name(self) -> str:
+        """The name that people use; empty if there is only an identifier of the data, such as a gml:id."""
+        names = (_text(self.attributes.get("name")), self.name.strip())
+        return next((name for name in names if name and not _IDENTIFIER.match(name)), "")
+
+    @property
     def label(self) -> str:
-        """Name and address for the search index, common name first: `St. Martin (DEBY_LOD2_1), Marktplatz 1`."""
-        common_name, address = (_text(self.attributes.get(key)) for key in ("name", "address"))
-        name = f"{common_name} ({self.name})" if common_name and common_name != self.name else self.name
-        return f"{name}, {address}" if address else name
+        """Name and address; without both, the decoded function; empty if the data has nothing that people would say."""
+        named = ", ".join(filter(None, (self.proper_name, _text(self.attributes.get("address")))))
+        return named or decoded_kind(self.attributes)
 
     def to_json(self) -> dict[str, Any]:
         """Returns the object's entry in an attribute shard."""

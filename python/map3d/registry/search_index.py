@@ -1,24 +1,27 @@
 """The search index (spec/manifest.md): a B-tree of small documents over the words of all labels.
 
-Each label is stored under the text that begins at each of its words, so that a search for the beginning of one or several words reads one path of the
-tree. Pages end where a hash of the key says so and are named by their content: a changed label changes only the pages on its paths.
+An entry is an outermost object, such as a building; its parts have none, and lead to it. It is stored under the text that begins at each word of
+its label, and of the other words by which it is found (identifier, kind, names of parts), so that a search for the beginning of one or several words
+reads one path of the tree. Pages end where a hash of the key says so and are named by their content: a changed label changes only the pages on its
+paths.
 """
 
+import json
 import re
 import sqlite3
-import sys
-import unicodedata
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
-from functools import cache
 from hashlib import sha256
-from itertools import islice
+from itertools import groupby, islice
+from operator import itemgetter
 from typing import Final, NamedTuple
 from zlib import crc32
 
 from map3d.registry.documents import SEARCH, SEARCH_PAGES, Document, dump_document, dump_json
+from map3d.registry.kinds import kind_words
 from map3d.registry.registered_objects import RegisteredObject
+from map3d.registry.words import search_words
 from map3d.types import Box
 
 MIN_PAGE_BYTES: Final = 24 << 10
@@ -28,28 +31,17 @@ CUT_EVERY: Final = 64
 """A page that has reached its least size ends at the next key whose hash is a multiple of this number."""
 MAX_WORDS: Final = 16
 """Number of words of a label that can be found by their beginning."""
+MAX_OTHER_WORDS: Final = 16
+"""Number of words besides the label by which an object can be found."""
+MAX_PARTS: Final = 64
+"""Number of objects of a family whose words are read."""
 MAX_KEY: Final = 48
 """Characters of a key."""
 DIGITS: Final = 2
 """Decimals of a position: centimetres."""
 
-_ASCII_WORD: Final = re.compile(r"[0-9a-z]+")
-_WORD: Final = re.compile(r"[^\W_]+")
 _HOUSE_NUMBER: Final = re.compile(r"[0-9]\w{0,2}")
 """Short words that begin with a digit. They are found only behind other words, because nearly every label has one."""
-
-
-def search_words(text: str) -> list[str]:
-    """Returns the words of a text: letters and digits, in lower case without accents; `Straße` becomes `strasse`."""
-    if text.isascii():
-        return _ASCII_WORD.findall(text.lower())
-    return _WORD.findall(unicodedata.normalize("NFD", text.lower().replace("ß", "ss")).translate(_marks()))
-
-
-@cache
-def _marks() -> dict[int, None]:
-    """Returns all combining marks, for `str.translate`."""
-    return {code: None for code in range(sys.maxunicode + 1) if unicodedata.category(chr(code))[0] == "M"}
 
 
 def search_documents(objects: Iterable[RegisteredObject]) -> Iterator[Document]:
@@ -67,23 +59,72 @@ def search_documents(objects: Iterable[RegisteredObject]) -> Iterator[Document]:
 def _fill(db: sqlite3.Connection, objects: Iterable[RegisteredObject]) -> int:
     """Inserts the entries under each of their keys. Returns the size of all entries, each counted once."""
     size = 0
-    entries = ((item.id, item.label, item.box) for item in objects if item.box is not None)
+    entries = _outermost(db, objects)
     while batch := list(islice(entries, 4096)):
         rows = []
-        for number, label, box in batch:
-            text = dump_json([number, label, _top_centre(box)])
+        for entry in batch:
+            text = dump_json([entry.number, entry.label, entry.place, *([" ".join(entry.words)] if entry.words else [])])
             size += len(text.encode()) + 1
-            rows += [(key, label, number, text) for key in _keys(label)]
+            keys = dict.fromkeys([*_keys(search_words(entry.label) if entry.keyed else []), *_keys(entry.words)])
+            rows += [(key, entry.label, entry.number, text) for key in list(keys) or [b""]]
         db.execute("BEGIN")
         db.executemany("INSERT INTO entry VALUES (?, ?, ?, ?)", rows)
         db.execute("COMMIT")
     return size
 
 
-def _keys(label: str) -> list[bytes]:
-    """Returns the keys of a label as UTF-16, whose bytes have the order of JavaScript's strings. A label without words has an empty key."""
-    words = search_words(label)[: 2 * MAX_WORDS]
-    starts = [0, *(first for first in range(1, min(len(words), MAX_WORDS)) if not _HOUSE_NUMBER.fullmatch(words[first]))]
+@dataclass
+class _Entry:
+    """An outermost object. `words`: of its identifier, its kind and its parts, without those of the label. `keyed`: the label begins keys, too."""
+
+    number: int
+    label: str
+    place: list[float]
+    words: list[str]
+    keyed: bool = True
+
+
+def _outermost(db: sqlite3.Connection, objects: Iterable[RegisteredObject]) -> Iterator[_Entry]:
+    """Yields the objects with a box that belong to no other, each with the words of all its parts."""
+    db.execute("CREATE TABLE object(id INTEGER PRIMARY KEY, parent INTEGER, class TEXT, label TEXT, words TEXT, place TEXT)")
+    boxed = ((item, item.box) for item in objects if item.box is not None)
+    while batch := list(islice(boxed, 4096)):
+        rows = [(item.id, item.parent, item.kind, item.label, _words_of(item), dump_json(_top_centre(box))) for item, box in batch]
+        db.execute("BEGIN")
+        db.executemany("INSERT INTO object VALUES (?, ?, ?, ?, ?, ?)", rows)
+        db.execute("COMMIT")
+    db.execute("CREATE INDEX child ON object(parent) WHERE parent IS NOT NULL")
+    for root, members in groupby(db.execute(_FAMILIES), key=itemgetter(0)):
+        yield _entry(root, list(islice(members, MAX_PARTS)))
+
+
+_FAMILIES: Final = """WITH RECURSIVE
+  outer(id) AS (SELECT id FROM object WHERE parent IS NULL OR parent NOT IN (SELECT id FROM object)),
+  part(root, id) AS (SELECT parent, object.id FROM object JOIN outer ON object.parent = outer.id
+    UNION ALL SELECT root, object.id FROM part JOIN object ON object.parent = part.id)
+  SELECT root, class, label, words, place FROM (SELECT id AS root, id FROM outer UNION ALL SELECT root, id FROM part) JOIN object USING (id)
+  ORDER BY root, id <> root, id"""
+
+
+def _entry(number: int, family: Sequence[tuple[int, str, str, str, str]]) -> _Entry:
+    """Returns the entry of an object. `family`: root, class, label, words and place of the object, then of its parts. The first label counts."""
+    _, kind, _, own_words, place = family[0]
+    labels = [label for _, _, label, _, _ in family if label]
+    shown = set(search_words(labels[0])) if labels else set()
+    others = " ".join([own_words, *labels[1:], *(words for _, _, _, words, _ in family[1:])])
+    words = [word for word in dict.fromkeys(search_words(others)) if word not in shown][:MAX_OTHER_WORDS]
+    return _Entry(number, labels[0] if labels else kind, json.loads(place), words, keyed=bool(labels))
+
+
+def _words_of(item: RegisteredObject) -> str:
+    """Returns the words by which an object is found besides its label."""
+    return " ".join([*kind_words(item.kind, item.attributes), item.name])
+
+
+def _keys(words: Sequence[str]) -> list[bytes]:
+    """Returns the keys of words as UTF-16, whose bytes have the order of JavaScript's strings."""
+    words = words[: 2 * MAX_WORDS]
+    starts = [first for first in range(min(len(words), MAX_WORDS)) if first == 0 or not _HOUSE_NUMBER.fullmatch(words[first])]
     return [" ".join(words[first:])[:MAX_KEY].encode("utf-16-be", "surrogatepass") for first in starts]
 
 

@@ -14,17 +14,19 @@ const ZOOM: Record<string, number> = { "+": 1, "=": 1, "-": -1, _: -1 };
 const TURN: Record<string, number> = { "[": 1, "]": -1, q: 1, e: -1 };
 const TILT: Record<string, number> = { PageUp: 1, PageDown: -1 };
 
-/** Handles keys while the map itself has the focus: arrows pan, + and − zoom, q and e (or [ and ]) rotate, Page Up and Page Down change the pitch. */
+/** Handles keys while the map itself has the focus: arrows pan, + and − zoom, q and e (or [ and ]) rotate, Page Up and Page Down change the pitch, Enter clicks the centre. */
 export function listenToKeys(map: KeyboardTarget, signal: AbortSignal): void {
   const { container } = map;
   container.tabIndex = 0;
   const onKey = (event: KeyboardEvent): void => {
     if (event.target !== container || event.ctrlKey || event.metaKey || event.altKey) return;
     const [pan, zoom, rotation, tilt] = [PAN[event.key], ZOOM[event.key], TURN[event.key], TILT[event.key]];
+    const centre = [container.clientWidth / 2, container.clientHeight / 2] as const;
     if (pan) map.panBy(pan[0] * STEP_PX, pan[1] * STEP_PX, { smooth: true });
-    else if (zoom !== undefined) map.zoomBy(zoom, [container.clientWidth / 2, container.clientHeight / 2]);
+    else if (zoom !== undefined) map.zoomBy(zoom, centre);
     else if (rotation !== undefined) map.rotate(rotation);
     else if (tilt !== undefined) map.tilt(tilt);
+    else if (event.key === "Enter") map.tap(centre);
     else return;
     event.preventDefault();
   };

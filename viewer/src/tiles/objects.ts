@@ -21,8 +21,8 @@ export interface ObjectInfo {
   readonly attributes: Readonly<Record<string, Attribute>>;
 }
 
-/** Id, label and local position. */
-export type SearchEntry = readonly [number, string, Vec3];
+/** Id, label, local position, and other words by which it is found. */
+export type SearchEntry = readonly [id: number, label: string, position: Vec3, words?: string];
 
 /** The value of an attribute that is present. */
 export type AttributeValue = Exclude<Attribute, null>;
@@ -124,7 +124,7 @@ export class Objects {
       const read = async (name: string): Promise<void> => {
         const { entries, keys = [], pages = [] } = (await this.#fetchOnce<SearchPage>(name, "search", 2)) ?? {};
         for (const entry of entries ?? []) {
-          const label = searchWords(entry[1]).join(" ");
+          const label = searchWords(`${entry[1]} ${entry[3] ?? ""}`).join(" ");
           if (words.every((word) => label.includes(word))) found.set(entry[0], [label, entry]);
         }
         if (entries) count++;

@@ -1,11 +1,28 @@
 import { expect, test } from "vitest";
 import { devices, type Page } from "playwright-core";
-import { renderTown } from "../fixture/rendering";
+import { renderTown, type Fixture } from "../fixture/rendering";
 import { TestBed } from "./bed";
 import { OUT } from "./browser";
 
 
-const bed = new TestBed({ town: renderTown(256, 0.38) });
+const bed = new TestBed({ town: renderTown(256, 0.38), unnamed: withoutNames(renderTown(256, 0.38)) });
+
+/** The same rendering: the tower has an address, the chapel a function, and the school is a part of the town hall. */
+function withoutNames(fixture: Fixture): Fixture {
+  const edit = (path: string, change: (json: { objects: Record<string, Record<string, unknown>>; entries: unknown[] }) => void): void => {
+    const json = JSON.parse(new TextDecoder().decode(fixture.files.get(path))) as Parameters<typeof change>[0];
+    change(json);
+    fixture.files.set(path, new TextEncoder().encode(JSON.stringify(json)));
+  };
+  const put = (id: number, change: object): void => { edit(`objects/${String(Math.floor(id / 1024))}.json`, ({ objects }) => { Object.assign(objects[String(id)] as object, change); }); };
+  put(2_000_000_001, { name: "DEBY_LOD2_4959323", attributes: { address: "Marktplatz 1" } });
+  put(3_900_000_007, { name: "UUID_77", attributes: { function: "Kirche" } });
+  put(1025, { parent: 17 });
+  edit("objects/search.json", (json) => {
+    json.entries = [[3_900_000_007, "Kirche", [-28, 47, 20], "uuid 77 church eglise"], [2_000_000_001, "Marktplatz 1", [32, 26, 62], "deby lod2 4959323"], [17, "building", [-45, -4, 34], "school old"]];
+  });
+  return fixture;
+}
 
 const PHONE = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 3, isMobile: true, hasTouch: true, userAgent: devices["iPhone 14"].userAgent };
 const DESK = { viewport: { width: 1280, height: 800 } };
@@ -274,8 +291,7 @@ test("objects in view can be listed and selected with the keyboard alone", async
   await page.waitForSelector("#in-view li");
   await page.screenshot({ path: `${OUT}/desk-seen.png` });
   const names = await page.locator("#in-view button").allTextContents();
-  expect([...names].sort()).toEqual(["Chapel", "Ground", "School <b>old</b>", "Tower", "Town hall"]);
-  expect(names[0]).toBe("Ground");
+  expect([...names].sort()).toEqual(["Chapel", "School <b>old</b>", "Tower", "Town hall"]);
   await page.keyboard.press("Escape");
   expect(await page.locator("#in-view").isHidden()).toBe(true);
   expect(await page.evaluate(() => document.activeElement?.id)).toBe("list-in-view");
@@ -285,6 +301,38 @@ test("objects in view can be listed and selected with the keyboard alone", async
   await page.keyboard.press("Enter");
   await page.waitForSelector("#info:not([hidden])");
   expect(await page.locator("#info h2").textContent()).toBe("Tower");
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
+
+test("Enter picks what is at the centre of the map", async () => {
+  const { page, problems } = await open(DESK, `rendering=${bed.url("town")}#0-45/691032.0/5336026.0/562.0/2.50`);
+  await page.locator(".map3d").focus();
+  await page.keyboard.press("Enter");
+  await page.waitForSelector("#info:not([hidden])");
+  expect(await page.locator("#info h2").textContent()).toBe("Tower");
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
+
+test("search, pins and the list show what people say, and never an identifier", async () => {
+  const { page, problems } = await open(DESK, `rendering=${bed.url("unnamed")}`);
+  for (const [text, result, pin] of [["église", "Kirche", "Kirche"], ["4959323", "Marktplatz 1", "Marktplatz 1"], ["school", "Building", "Town hall"]] as const) {
+    await page.fill("#query", text);
+    await page.waitForFunction((label) => document.querySelector("#results li")?.textContent === label, result);
+    await page.keyboard.press("Enter");
+    await page.waitForSelector(".map3d-marker");
+    expect(await page.locator(".map3d-marker").textContent()).toBe(pin);
+    expect(await page.locator("#info h2").textContent()).toBe(pin);
+    expect(await page.inputValue("#query")).toBe(result);
+    await page.locator("#info .close").click();
+  }
+  await page.goto(`${bed.server.origin}/?rendering=${bed.url("unnamed")}`);
+  await page.waitForTimeout(1500);
+  await page.locator("#list-in-view").focus();
+  await page.keyboard.press("Enter");
+  await page.waitForSelector("#in-view li");
+  expect((await page.locator("#in-view button").allTextContents()).sort()).toEqual(["Kirche", "Marktplatz 1", "Town hall"]);
   expect(problems).toEqual([]);
   await page.context().close();
 });

@@ -1,5 +1,5 @@
 import { describe as group, expect, test } from "vitest";
-import { describe, type Card } from "../../page/card";
+import { describe, nameOfResult, type Card } from "../../page/card";
 
 const UNITS = { crs: "ETRS89 / UTM zone 32N", vertical: "DHHN2016" };
 const card = (event: object): Card => describe({ id: 7, position: [691032.126, 5336026, 562.5], approximate: false, ...event }, UNITS, [11.570123, 48.140456]);
@@ -40,4 +40,15 @@ group("a card", () => {
   test("without a position has no coordinates", () => {
     expect(describe({ id: 7, class: "building", position: null, approximate: false }, UNITS, null).rows).toEqual([]);
   });
+});
+
+test.each([
+  ["Town hall, Marktplatz 1", "Town hall, Marktplatz 1"],
+  ["Marktplatz 1", "Marktplatz 1"],
+  ["building", "Building"],
+  ["flood_zone", "flood zone"],
+  ["DEBY_LOD2_4959323, Marktplatz 1", "Marktplatz 1"],
+  ["DEBY_LOD2_4959323", "Object"],
+])("the search result %s is called %s", (label, name) => {
+  expect(nameOfResult(label)).toBe(name);
 });

@@ -28,6 +28,14 @@ test("failed files are fetched again; fetched files are kept", async () => {
   expect(source.asked).toEqual(["objects/search.json", "objects/search.json"]);
 });
 
+test("an entry is found by its other words, too; those of the label come first", async () => {
+  const entries: SearchEntry[] = [[7, "Hall", [0, 0, 0], "b 4711 church eglise"], [8, "Church lane 1", [0, 0, 0]]];
+  const objects = new Objects(sourceOf({ map3d: "search", version: 1, entries }), json);
+  expect((await objects.search("église")).map(([id]) => id)).toEqual([7]);
+  expect((await objects.search("hall 4711")).map(([id]) => id)).toEqual([7]);
+  expect((await objects.search("church")).map(([id]) => id)).toEqual([8, 7]);
+});
+
 test("a file of another type or version is refused by name; a missing file is empty", async () => {
   await expect(new Objects(sourceOf({ map3d: "search", version: 3, entries: [] }), json).search("hall", 8)).rejects.toThrow('objects/search.json: expected map3d "search" version 2, got "search" version 3');
   expect(await new Objects(sourceOf(null), json).attributes()).toEqual([]);
