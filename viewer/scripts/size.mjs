@@ -21,7 +21,7 @@ const BUDGET = {
   orbit: 7,
   portrayal: 14,
   print: 5,
-  shade: 4,
+  shade: 5,
   theme: 4,
   full: 130,
 };

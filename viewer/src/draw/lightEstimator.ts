@@ -1,27 +1,26 @@
-import type { Vec2, Vec3 } from "../core/vec";
+import type { Vec2 } from "../core/vec";
+import type { FrameContent, LayerPass } from "./drawer";
 
-/** The visible surfaces as a depth image. */
-export interface DepthImage {
-  readonly gl: WebGL2RenderingContext;
-  /** Depth of each pixel as a fraction of `range`; 1 where there is no surface. A depth texture, bottom row first. */
-  readonly depth: WebGLTexture;
-  readonly width: number;
-  readonly height: number;
-  /** Metres per pixel. */
-  readonly px_m: number;
-  /** Minimum and maximum D, metres. */
-  readonly range: Vec2;
-  /** Unit vector towards the sun along the view's right, up and forward axes; null: estimate no shadows. */
-  readonly sun: Vec3 | null;
-  /** Whether to estimate ambient occlusion. */
-  readonly occlusion: boolean;
+/** A linked program and the locations of its uniforms; null, which WebGL ignores, for unused ones. */
+export interface Program {
+  readonly handle: WebGLProgram;
+  /** Returns the location of a uniform. */
+  at(uniform: string): WebGLUniformLocation | null;
 }
 
-/** Estimates from depths how much light reaches the visible surfaces. */
+/** Draws a pass into the bound framebuffer, with its depth as a fraction of a range of D. */
+export type DrawDepths = (frame: FrameContent, pass: LayerPass, range: Vec2) => void;
+
+/** Estimates from depths how much light reaches the visible surfaces. It belongs to one map. */
 export interface LightEstimator {
-  /**
-   * Returns an RGBA8 texture of the size of the depth image: red is the fraction of skylight, green of sunlight; blue and alpha are the
-   * high and low byte of the pixel's depth. Valid until the next call.
-   */
-  estimateLight(depths: DepthImage): WebGLTexture;
+  /** GLSL that declares `vec2 e_read(float depth)`: the fractions of skylight and sunlight at a pixel. Its functions begin with `e_`. */
+  readonly shader: string;
+  /** Range of D of the depths that the shader receives; null when nothing was estimated. */
+  readonly range: Vec2 | null;
+  /** Estimates a frame's light, unless all of it was rendered. @param getRange returns the minimum and maximum D of the frame's content */
+  update(gl: WebGL2RenderingContext, frame: FrameContent, getRange: () => Vec2, draw: DrawDepths): void;
+  /** Whether a pass uses the estimate. */
+  appliesTo(frame: FrameContent, pass: LayerPass): boolean;
+  /** Sets the uniforms of the shader. */
+  bind(gl: WebGL2RenderingContext, program: Program, frame: FrameContent, pass: LayerPass): void;
 }

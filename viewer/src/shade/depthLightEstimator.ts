@@ -1,6 +1,23 @@
 import { linkProgram, makeTexture } from "../core/gl";
-import type { DepthImage, LightEstimator } from "../map3d";
+import type { Vec2, Vec3 } from "../core/vec";
 import { SHARES, SMOOTH, VERTEX } from "./shaders";
+
+/** The visible surfaces as a depth image. */
+export interface DepthImage {
+  readonly gl: WebGL2RenderingContext;
+  /** Depth of each pixel as a fraction of `range`; 1 where there is no surface. A depth texture, bottom row first. */
+  readonly depth: WebGLTexture;
+  readonly width: number;
+  readonly height: number;
+  /** Metres per pixel. */
+  readonly px_m: number;
+  /** Minimum and maximum D, metres. */
+  readonly range: Vec2;
+  /** Unit vector towards the sun along the view's right, up and forward axes; null: estimate no shadows. */
+  readonly sun: Vec3 | null;
+  /** Whether to estimate ambient occlusion. */
+  readonly occlusion: boolean;
+}
 
 interface ShadeTarget {
   readonly framebuffer: WebGLFramebuffer;
@@ -21,7 +38,7 @@ interface ShadeResources {
 const MAX_STEP_PX = 3;
 
 /** Estimates shadows and ambient occlusion from a depth image, with WebGL. */
-export class DepthLightEstimator implements LightEstimator {
+export class DepthLightEstimator {
   readonly radius_m: number;
   readonly thickness_m: number;
   #resources: ShadeResources | undefined;
@@ -32,6 +49,10 @@ export class DepthLightEstimator implements LightEstimator {
     this.thickness_m = thickness_m;
   }
 
+  /**
+   * Returns an RGBA8 texture of the size of the depth image: red is the fraction of skylight, green of sunlight; blue and alpha are the
+   * high and low byte of the pixel's depth. Valid until the next call.
+   */
   estimateLight(image: DepthImage): WebGLTexture {
     const { gl, width, height, px_m } = image;
     const span = image.range[1] - image.range[0];
@@ -68,7 +89,7 @@ export class DepthLightEstimator implements LightEstimator {
 
   #prepare({ gl, width, height }: DepthImage): ShadeResources {
     const resources = this.#resources;
-    if (resources?.gl === gl && resources.width === width && resources.height === height && gl.isProgram(resources.shares)) return resources;
+    if (resources?.gl === gl && resources.width === width && resources.height === height) return resources;
     this.free();
     return (this.#resources = { gl, width, height, shares: linkProgram(gl, "shares", VERTEX, SHARES), smooth: linkProgram(gl, "smooth", VERTEX, SMOOTH), targets: [target(gl, width, height), target(gl, width, height)] });
   }

@@ -1,5 +1,6 @@
 import { MapLayer, type imageLayer, type Light, type map } from "../map3d";
 import { DepthLightEstimator } from "./depthLightEstimator";
+import { ScreenSpaceLight } from "./screenSpaceLight";
 
 /** Options of `shade`. */
 export interface ShadeOptions {
@@ -14,11 +15,12 @@ export interface ShadeOptions {
  * outside the screen or behind others cast no shadow. Needs WebGL; the canvas drawer shows the light without shadows. Reads depth tiles.
  */
 export class shade extends MapLayer<map, object> {
-  readonly #estimator: DepthLightEstimator;
+  readonly #light: ScreenSpaceLight;
+  readonly #free = (): void => { this.#light.free(); };
 
   constructor({ radius_m = 20, thickness_m = 6 }: ShadeOptions = {}) {
     super();
-    this.#estimator = new DepthLightEstimator(radius_m, thickness_m);
+    this.#light = new ScreenSpaceLight(new DepthLightEstimator(radius_m, thickness_m));
   }
 
   /** Depth, unless all layers have rendered shadows and occlusion, or the map does not draw with WebGL. */
@@ -28,12 +30,12 @@ export class shade extends MapLayer<map, object> {
   }
 
   protected onAdd(map: map): void {
-    map.setLightEstimator(this.#estimator);
+    map.setLightEstimator(this.#light).on("contextlost", this.#free);
   }
 
   protected onRemove(map: map): void {
-    map.setLightEstimator(null);
-    this.#estimator.free();
+    map.setLightEstimator(null).off("contextlost", this.#free);
+    this.#free();
   }
 }
 

@@ -102,3 +102,37 @@ void main() {
   }
   o_shares = vec4(sum / weights, own.ba);
 }`;
+
+/**
+ * Reads the light estimated per CSS pixel from the four nearest estimates, weighted by likeness of depth.
+ * Like light itself, half comes from the pixel and an eighth from each neighbour: colours at edges are mixed.
+ */
+export const READ = `
+uniform sampler2D u_estimate;
+uniform vec4 u_estimateMap;      // scale to the estimate's pixels, top left corner in them, their height
+uniform float u_tolerance;     // fraction of the range that counts as the same depth
+uniform bvec2 u_estimated;    // whether skylight and sunlight are estimated
+
+vec2 e_nearest(vec2 at, vec2 pixels) {
+  return texelFetch(u_estimate, clamp(ivec2(round(at + pixels * u_estimateMap.x)), ivec2(0), textureSize(u_estimate, 0) - 1), 0).rg;
+}
+
+vec2 e_read(float depth) {
+  vec2 down = vec2(gl_FragCoord.x, u_height - gl_FragCoord.y) * u_estimateMap.x + u_estimateMap.yz;
+  vec2 at = vec2(down.x, u_estimateMap.w - down.y) - 0.5;
+  ivec2 corner = ivec2(floor(at)), last = textureSize(u_estimate, 0) - 1;
+  if (any(lessThan(at, vec2(-1.0))) || any(greaterThan(at, vec2(last + 1)))) return vec2(1.0);
+  vec2 f = at - vec2(corner), sum = vec2(0.0);
+  float weights = 0.0;
+  for (int k = 0; k < 4; k++) {
+    ivec2 step = ivec2(k & 1, k >> 1);
+    vec4 estimate = texelFetch(u_estimate, clamp(corner + step, ivec2(0), last), 0);
+    float difference = abs((estimate.b * 65280.0 + estimate.a * 255.0) / 65535.0 - depth) / u_tolerance;
+    float weight = (step.x == 1 ? f.x : 1.0 - f.x) * (step.y == 1 ? f.y : 1.0 - f.y) / (0.01 + difference * difference) + 1e-9;
+    sum += weight * estimate.rg;
+    weights += weight;
+  }
+  vec2 around = e_nearest(at, vec2(1.0, 0.0)) + e_nearest(at, vec2(-1.0, 0.0)) + e_nearest(at, vec2(0.0, 1.0)) + e_nearest(at, vec2(0.0, -1.0));
+  return mix(vec2(1.0), 0.5 * sum / weights + 0.125 * around, vec2(u_estimated));
+}
+`;

@@ -1,5 +1,6 @@
 import { buildIdTable, computeTextureSize, type IdTable } from "./idTable";
-import { textureUnit, type Program } from "./program";
+import type { Program } from "../lightEstimator";
+import { textureUnit } from "./program";
 import { SPARE_UNIT } from "./textures";
 
 type Values = ReadonlyMap<number, unknown>;

@@ -1,14 +1,9 @@
 import { linkProgram } from "../../core/gl";
 import { RECT_VERTEX } from "../../core/shaders";
+import type { Program } from "../lightEstimator";
 import { makeFragmentShader, variantName, type ShaderVariant } from "./shader";
 
-/** A linked program and the locations of its uniforms; null, which WebGL ignores, for unused ones. */
-export interface Program {
-  readonly handle: WebGLProgram;
-  at(uniform: string): WebGLUniformLocation | null;
-}
-
-const UNITS = ["u_color", "u_normal", "u_id", "u_depth", "u_table", "u_ao", "u_shadow", "u_styles", "u_estimate"] as const;
+const UNITS = ["u_color", "u_normal", "u_id", "u_depth", "u_table", "u_ao", "u_shadow", "u_styles"] as const;
 
 /** Returns the texture unit of a sampler. */
 export const textureUnit = (sampler: (typeof UNITS)[number]): number => UNITS.indexOf(sampler);

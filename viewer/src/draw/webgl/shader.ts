@@ -14,17 +14,17 @@ export interface ShaderVariant {
   readonly occlusion: boolean;
   /** Whether the pass is combined with others by depth. */
   readonly combined: boolean;
-  /** Whether light comes from the screen-space estimate. */
-  readonly estimatedLight: boolean;
+  /** GLSL that reads estimated light (see `LightEstimator`); empty: all light was rendered. */
+  readonly estimate: string;
 }
 
 export const variantName = (v: ShaderVariant): string =>
-  [v.mode, v.masked && "masked", v.highlight && "highlight", v.styled && "styled", v.shadow, v.occlusion && "ao", v.combined && "combined", v.estimatedLight && "estimated"].filter(Boolean).join("+");
+  [v.mode, v.masked && "masked", v.highlight && "highlight", v.styled && "styled", v.shadow, v.occlusion && "ao", v.combined && "combined", v.estimate && "estimated"].filter(Boolean).join("+");
 
-export function makeFragmentShader({ mode, masked, highlight, styled, shadow, occlusion, combined, estimatedLight }: ShaderVariant): string {
-  const names = [`MODE_${mode === "picture" ? "COLOR" : mode.toUpperCase()}`, masked && "MASKED", highlight && "HIGHLIGHT", styled && "STYLED", shadow && `SHADOW_${shadow.toUpperCase()}`, occlusion && "OCCLUSION", combined && "COMBINED", estimatedLight && "ESTIMATED"];
+export function makeFragmentShader({ mode, masked, highlight, styled, shadow, occlusion, combined, estimate }: ShaderVariant): string {
+  const names = [`MODE_${mode === "picture" ? "COLOR" : mode.toUpperCase()}`, masked && "MASKED", highlight && "HIGHLIGHT", styled && "STYLED", shadow && `SHADOW_${shadow.toUpperCase()}`, occlusion && "OCCLUSION", combined && "COMBINED", estimate && "ESTIMATED"];
   const defines = names.filter(Boolean).map((name) => `#define ${String(name)}`);
-  return ["#version 300 es", ...defines, HEAD, ID_LOOKUP, DEPTH, ESTIMATED, COLOR, FALSE_COLOR, HIGHLIGHT, COMBINED, MAIN].join("\n");
+  return ["#version 300 es", ...defines, HEAD, ID_LOOKUP, DEPTH, estimate, COLOR, FALSE_COLOR, HIGHLIGHT, COMBINED, MAIN].join("\n");
 }
 
 const HEAD = `
@@ -119,43 +119,6 @@ float depthFraction(vec2 texel) {
 `;
 
 /**
- * Reads the light estimated per CSS pixel (see draw/lightEstimator.ts) from the four nearest estimates, weighted by likeness of depth.
- * Like light itself, half comes from the pixel and an eighth from each neighbour: colours at edges are mixed.
- */
-const ESTIMATED = `
-#ifdef ESTIMATED
-uniform sampler2D u_estimate;
-uniform vec4 u_estimateMap;      // scale to the estimate's pixels, top left corner in them, their height
-uniform float u_tolerance;     // fraction of the range that counts as the same depth
-uniform bvec2 u_estimated;    // whether skylight and sunlight are estimated
-vec2 g_estimate;
-
-vec2 nearest(vec2 at, vec2 pixels) {
-  return texelFetch(u_estimate, clamp(ivec2(round(at + pixels * u_estimateMap.x)), ivec2(0), textureSize(u_estimate, 0) - 1), 0).rg;
-}
-
-vec2 readEstimate(float depth) {
-  vec2 down = vec2(gl_FragCoord.x, u_height - gl_FragCoord.y) * u_estimateMap.x + u_estimateMap.yz;
-  vec2 at = vec2(down.x, u_estimateMap.w - down.y) - 0.5;
-  ivec2 corner = ivec2(floor(at)), last = textureSize(u_estimate, 0) - 1;
-  if (any(lessThan(at, vec2(-1.0))) || any(greaterThan(at, vec2(last + 1)))) return vec2(1.0);
-  vec2 f = at - vec2(corner), sum = vec2(0.0);
-  float weights = 0.0;
-  for (int k = 0; k < 4; k++) {
-    ivec2 step = ivec2(k & 1, k >> 1);
-    vec4 estimate = texelFetch(u_estimate, clamp(corner + step, ivec2(0), last), 0);
-    float difference = abs((estimate.b * 65280.0 + estimate.a * 255.0) / 65535.0 - depth) / u_tolerance;
-    float weight = (step.x == 1 ? f.x : 1.0 - f.x) * (step.y == 1 ? f.y : 1.0 - f.y) / (0.01 + difference * difference) + 1e-9;
-    sum += weight * estimate.rg;
-    weights += weight;
-  }
-  vec2 around = nearest(at, vec2(1.0, 0.0)) + nearest(at, vec2(-1.0, 0.0)) + nearest(at, vec2(0.0, 1.0)) + nearest(at, vec2(0.0, -1.0));
-  return mix(vec2(1.0), 0.5 * sum / weights + 0.125 * around, vec2(u_estimated));
-}
-#endif
-`;
-
-/**
  * Averages colour premultiplied, and in linear light when lit: shades first, filters then.
  *
  * A tile's colours are averages over pixels, but its normals are those of the pixels' centres: lit by its own normal
@@ -194,6 +157,10 @@ float sunFraction(ivec2 at) {
   uvec2 lit = uvec2(texelFetch(u_shadow, at, 0).r) >> u_suns & uvec2(1u);
   return mix(float(lit.x), float(lit.y), u_share);
 }
+#endif
+
+#ifdef ESTIMATED
+vec2 g_estimate;
 #endif
 
 /** Fractions of skylight and sunlight; negative where there is no normal. */
@@ -351,7 +318,7 @@ const MAIN = `
 void main() {
   vec2 texel = (vec2(gl_FragCoord.x, u_height - gl_FragCoord.y) - u_origin) * u_scale;
 #ifdef ESTIMATED
-  g_estimate = readEstimate(depthFraction(texel));
+  g_estimate = e_read(depthFraction(texel));
 #endif
 #ifdef COMBINED
   bool opaque = u_opacity == 1.0;

@@ -5,9 +5,9 @@ import type { LayerKind } from "../../geo/manifest";
 import { listBakedLightKinds, listRequiredKinds, type Drawer, type DrawerEvents, type FrameContent, type Mode, type LayerPass, type Quad } from "../drawer";
 import { computeDepthAtZero, computeCustomLayerBias, joinDepthRanges, computeMaxStep, type DepthMapping } from "../depthMapping";
 import { packColor, packStyle } from "../drawStyle";
+import type { Program } from "../lightEstimator";
 import { OffscreenTarget } from "./offscreenTarget";
-import { ScreenSpaceLight, listCustomLayerRanges } from "./screenSpaceLight";
-import { Programs, textureUnit, type Program } from "./program";
+import { Programs, textureUnit } from "./program";
 import { IdTextures } from "./idTextures";
 import { computeReadableBounds, TileTextures, type TileTexture } from "./textures";
 
@@ -46,7 +46,6 @@ export class WebGLDrawer implements Drawer {
   #programs: Programs;
   #textures: TileTextures;
   #idTextures: IdTextures;
-  #screenSpaceLight: ScreenSpaceLight;
   #offscreen: OffscreenTarget | undefined;
 
   /** @throws DrawError when the browser has no WebGL2, or none on a GPU where that is required */
@@ -63,7 +62,6 @@ export class WebGLDrawer implements Drawer {
     this.#programs = new Programs(gl);
     this.#textures = new TileTextures(gl);
     this.#idTextures = new IdTextures(gl);
-    this.#screenSpaceLight = new ScreenSpaceLight(gl);
     this.#listen(events);
   }
 
@@ -75,9 +73,11 @@ export class WebGLDrawer implements Drawer {
     const gl = this.gl;
     if (gl.isContextLost()) return;
     gl.disable(gl.CULL_FACE);
-    this.#screenSpaceLight.update(frame, (coarse, pass, range) => { this.#drawPass(coarse, pass, range, false); });
+    const join = (depths: readonly DepthMapping[]): Vec2 | null => joinDepthRanges(depths, listCustomLayerRanges(frame));
+    const estimator = frame.lighting?.estimator;
+    estimator?.update(gl, frame, () => join(frame.passes.flatMap(({ relief }) => relief ?? [])) as Vec2, (coarse, pass, range) => { this.#drawPass(coarse, pass, range, false); });
     const combined = frame.passes.filter(({ depths }) => depths);
-    const range = frame.target?.range ?? this.#screenSpaceLight.range ?? joinDepthRanges(combined.flatMap(({ depths }) => depths ?? []), listCustomLayerRanges(frame));
+    const range = frame.target?.range ?? estimator?.range ?? join(combined.flatMap(({ depths }) => depths ?? []));
     const bias = Math.max(0, ...combined.map(({ depths, level }) => (depths ? computeCustomLayerBias(depths.frame, level) : 0)));
     if (range) for (const layer of frame.customLayers) layer.prerender(gl, frame, [range[0] + bias, range[1] + bias]);
     const offscreen = this.#getOffscreen(frame, combined.length + frame.customLayers.length > 0);
@@ -100,7 +100,6 @@ export class WebGLDrawer implements Drawer {
     this.#listeners.abort();
     this.#textures.clear();
     this.#idTextures.freeAllBut(new Set());
-    this.#screenSpaceLight.free();
     this.#offscreen?.free();
   }
 
@@ -144,22 +143,23 @@ export class WebGLDrawer implements Drawer {
 
   /** @param range minimum and maximum D of the combined passes; null: not combined  @param soft draws only edges and translucent passes */
   #drawPass(frame: FrameContent, pass: LayerPass, range: Vec2 | null, soft: boolean): void {
+    const gl = this.gl;
     this.#setScissor(frame, pass);
     const mode: Mode = pass.mode === "lit" && !frame.light.lit ? "color" : pass.mode;
-    const shaded = mode === "lit" && this.#screenSpaceLight.appliesTo(frame, pass);
+    const estimator = mode === "lit" && frame.lighting?.estimator.appliesTo(frame, pass) ? frame.lighting.estimator : null;
     // Uploads all before drawing the first, so that gutters have their neighbours' pixels.
-    for (const ready of pass.quads.map((quad) => this.#collectTextures(pass, mode, quad, shaded))) {
+    for (const ready of pass.quads.map((quad) => this.#collectTextures(pass, mode, quad, estimator !== null))) {
       const { quad, textures, bakedLight, ids, depth } = ready;
       if (textures.some(([, texture]) => !texture)) continue;
       const has = (kind: LayerKind): boolean => bakedLight.some(([other]) => other === kind);
       const shadow = has("sun") ? "sun" : has("sun16") ? "sun16" : null;
       const styled = ids !== undefined && pass.drawStyles !== null;
-      const program = this.#programs.use({ mode, masked: pass.masked, highlight: ids !== undefined && pass.highlight.size > 0, styled, shadow, occlusion: has("ao"), combined: range !== null, estimatedLight: depth !== undefined });
+      const program = this.#programs.use({ mode, masked: pass.masked, highlight: ids !== undefined && pass.highlight.size > 0, styled, shadow, occlusion: has("ao"), combined: range !== null, estimate: (depth && estimator?.shader) ?? "" });
       for (const [kind, texture] of [...textures, ...bakedLight]) this.#bind(kind, texture);
-      if (depth && pass.relief && this.#screenSpaceLight.range) {
+      if (depth && pass.relief && estimator?.range) {
         this.#bind("depth", depth);
-        this.#setDepths(program, pass.relief, quad, this.#screenSpaceLight.range, false);
-        this.#screenSpaceLight.bind(program, frame, pass);
+        this.#setDepths(program, pass.relief, quad, estimator.range, false);
+        estimator.bind(gl, program, frame, pass);
       }
       if (range && pass.depths) this.#setDepths(program, pass.depths, quad, range, soft);
       if (ids) this.#bindIds(program, pass, quad, ids, frame.dpr);
@@ -256,7 +256,6 @@ export class WebGLDrawer implements Drawer {
       this.#programs = new Programs(this.gl);
       this.#textures = new TileTextures(this.gl);
       this.#idTextures = new IdTextures(this.gl);
-      this.#screenSpaceLight = new ScreenSpaceLight(this.gl);
       this.#offscreen = undefined;
       events.restored();
     };
@@ -272,5 +271,11 @@ function isSoftware(gl: WebGL2RenderingContext): boolean {
   const debugInfo = renderer === "WebKit WebGL" ? gl.getExtension("WEBGL_debug_renderer_info") : null;
   return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(debugInfo ? String(gl.getParameter(debugInfo.UNMASKED_RENDERER_WEBGL)) : renderer);
 }
+
+/** Lists the ranges of D of a frame's custom layers. */
+const listCustomLayerRanges = ({ customLayers, camera }: FrameContent): Vec2[] => customLayers.flatMap((layer) => {
+  const range = layer.getDepthRange(camera.frame);
+  return range ? [range] : [];
+});
 
 const scaled = ([x, y, z]: Vec3, by: number): Vec3 => [x * by, y * by, z * by];

@@ -1,10 +1,13 @@
-import { dot, type Vec2, type Vec3 } from "../../core/vec";
-import { cssPixelM, type Camera } from "../../geo/camera";
-import { towardsLight } from "../../geo/light";
-import { joinDepthRanges } from "../depthMapping";
-import type { FrameContent, LayerPass } from "../drawer";
+import { dot, type Vec2, type Vec3 } from "../core/vec";
+import { cssPixelM, type Camera } from "../geo/camera";
+import { towardsLight } from "../geo/light";
+import type { DrawDepths, FrameContent, LayerPass, LightEstimator, Program } from "../map3d";
+import type { DepthLightEstimator } from "./depthLightEstimator";
 import { DepthTarget } from "./depthTarget";
-import { textureUnit, type Program } from "./program";
+import { READ } from "./shaders";
+
+/** The texture unit of the estimate, beyond those of the drawer. */
+const UNIT = 8;
 
 /** The light estimated for a frame. */
 interface EstimatedLight {
@@ -18,31 +21,27 @@ interface EstimatedLight {
   readonly tolerance: number;
 }
 
-/** Draws a pass into the bound framebuffer, with its depth as a fraction of a range of D. */
-type DrawDepths = (frame: FrameContent, pass: LayerPass, range: Vec2) => void;
-
-/** Computes screen-space shadows and ambient occlusion (see draw/lightEstimator.ts) and binds them for the shader. */
-export class ScreenSpaceLight {
-  readonly #gl: WebGL2RenderingContext;
+/** Computes screen-space shadows and ambient occlusion of a map and binds them for the drawer's shader. */
+export class ScreenSpaceLight implements LightEstimator {
+  readonly shader = READ;
+  readonly #estimator: DepthLightEstimator;
   #depthTarget: DepthTarget | undefined;
   #result: EstimatedLight | null = null;
 
-  constructor(gl: WebGL2RenderingContext) {
-    this.#gl = gl;
+  constructor(estimator: DepthLightEstimator) {
+    this.#estimator = estimator;
   }
 
-  /** Range of D of the frame's depths; null when nothing was estimated. */
   get range(): Vec2 | null {
     return this.#result?.range ?? null;
   }
 
-  /** Estimates the frame's light unless all of it was rendered. */
-  update(frame: FrameContent, draw: DrawDepths): void {
+  update(gl: WebGL2RenderingContext, frame: FrameContent, getRange: () => Vec2, draw: DrawDepths): void {
     const { lighting, camera } = frame;
     const step = Math.max(1, frame.dpr);
     const last = this.#result;
-    if (!lighting || !frame.passes.some((pass) => needsEstimate(frame, pass))) this.#result = null;
-    else if (!lighting.moving || frame.target || last?.camera.frame !== camera.frame || last.step !== step) this.#result = this.#estimate(frame, lighting, step, draw);
+    if (!frame.passes.some((pass) => needsEstimate(frame, pass))) this.#result = null;
+    else if (!lighting?.moving || frame.target || last?.camera.frame !== camera.frame || last.step !== step) this.#result = this.#estimate(gl, frame, step, frame.target?.range ?? getRange(), draw);
   }
 
   /** Whether a pass uses the estimate. */
@@ -50,18 +49,19 @@ export class ScreenSpaceLight {
     return this.#result !== null && needsEstimate(frame, pass);
   }
 
+  /** Frees its GPU resources. */
   free(): void {
+    this.#estimator.free();
     this.#depthTarget?.free();
     this.#depthTarget = undefined;
     this.#result = null;
   }
 
-  /** Sets the program's uniforms, except for those of depth. */
-  bind(program: Program, frame: FrameContent, { bakedLight }: LayerPass): void {
-    const [gl, result] = [this.#gl, this.#result];
-    if (!result) return;
-    const { texture, camera, step, height, tolerance } = result;
-    gl.activeTexture(gl.TEXTURE0 + textureUnit("u_estimate"));
+  bind(gl: WebGL2RenderingContext, program: Program, frame: FrameContent, { bakedLight }: LayerPass): void {
+    if (!this.#result) return;
+    const { texture, camera, step, height, tolerance } = this.#result;
+    gl.uniform1i(program.at("u_estimate"), UNIT);
+    gl.activeTexture(gl.TEXTURE0 + UNIT);
     gl.bindTexture(gl.TEXTURE_2D, texture);
     const now = frame.camera;
     const [px, scale] = [cssPixelM(camera), frame.dpr / step];
@@ -72,13 +72,11 @@ export class ScreenSpaceLight {
     gl.uniform2i(program.at("u_estimated"), Number(frame.light.occlusion && !bakedLight.occlusion), Number(hasShadows(frame) && !bakedLight.shadow));
   }
 
-  #estimate(frame: FrameContent, { estimator }: NonNullable<FrameContent["lighting"]>, step: number, draw: DrawDepths): EstimatedLight {
-    const gl = this.#gl;
+  #estimate(gl: WebGL2RenderingContext, frame: FrameContent, step: number, range: Vec2, draw: DrawDepths): EstimatedLight {
     const { light, camera } = frame;
     const [width, height] = [Math.ceil(frame.width / step), Math.ceil(frame.height / step)];
-    const range = frame.target?.range ?? (joinDepthRanges(frame.passes.flatMap(({ relief }) => relief ?? []), listCustomLayerRanges(frame)) as Vec2);
     const px_m = (cssPixelM(camera) * step) / frame.dpr;
-    const picture = this.#getDepthTarget(width, height);
+    const picture = this.#getDepthTarget(gl, width, height);
     gl.bindFramebuffer(gl.FRAMEBUFFER, picture.framebuffer);
     gl.viewport(0, 0, width, height);
     gl.depthMask(true);
@@ -90,30 +88,25 @@ export class ScreenSpaceLight {
     const { right, up, forward } = camera.frame.axes;
     const towards = towardsLight(light);
     const sun: Vec3 | null = hasShadows(frame) ? [dot(right, towards), dot(up, towards), dot(forward, towards)] : null;
-    const texture = estimator.estimateLight({ gl, depth: picture.texture, width, height, px_m, range, sun, occlusion: light.occlusion });
+    const texture = this.#estimator.estimateLight({ gl, depth: picture.texture, width, height, px_m, range, sun, occlusion: light.occlusion });
     gl.disable(gl.DEPTH_TEST);
     return { texture, range, camera, step, height, tolerance: (2 * px_m) / (range[1] - range[0]) + 1 / 65535 };
   }
 
-  #getDepthTarget(width: number, height: number): DepthTarget {
-    if (this.#depthTarget?.width === width && this.#depthTarget.height === height) return this.#depthTarget;
-    this.#depthTarget?.free();
-    return (this.#depthTarget = new DepthTarget(this.#gl, width, height));
+  #getDepthTarget(gl: WebGL2RenderingContext, width: number, height: number): DepthTarget {
+    const target = this.#depthTarget;
+    if (target?.width === width && target.height === height) return target;
+    target?.free();
+    return (this.#depthTarget = new DepthTarget(gl, width, height));
   }
 }
-
-/** Lists the ranges of D of a frame's custom layers. */
-export const listCustomLayerRanges = ({ customLayers, camera }: FrameContent): Vec2[] => customLayers.flatMap((layer) => {
-  const range = layer.getDepthRange(camera.frame);
-  return range ? [range] : [];
-});
 
 const hasShadows = ({ light }: FrameContent): boolean => light.shadows && light.altitude_deg > 0;
 
 /** Whether a pass lacks rendered light that can be estimated. */
 function needsEstimate(frame: FrameContent, { mode, relief, bakedLight }: LayerPass): boolean {
-  const { light, lighting } = frame;
-  return lighting !== undefined && lighting !== null && relief !== null && mode === "lit" && light.lit && ((light.occlusion && !bakedLight.occlusion) || (hasShadows(frame) && !bakedLight.shadow));
+  const { light } = frame;
+  return relief !== null && mode === "lit" && light.lit && ((light.occlusion && !bakedLight.occlusion) || (hasShadows(frame) && !bakedLight.shadow));
 }
 
 /** Makes a pass that draws depths only, with pixels `step` times as large. */

@@ -1,4 +1,4 @@
-import { makeTexture } from "../../core/gl";
+import { makeTexture } from "../core/gl";
 
 /** A framebuffer with a depth texture only. */
 export class DepthTarget {
