@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bench.peer_comparison import PeerRow, best_ratios, choose_squares, with_color_format
+from bench.peer_comparison import PeerRow, best_ratios, choose_squares, judged, print_tables, with_color_format
 from bench.peers import PeerMissing, with_larger_tiles
 from bench.renderer_pool import RendererPool
 from bench.svg_plot import plot
@@ -60,6 +60,17 @@ def test_ratios_are_over_the_best_peer() -> None:
     rows = [PeerRow(peer, px, 1, 1, 1.0, {}, {"webp": ratio, "jpeg": 2 * ratio}) for peer, px, ratio in found]
     assert [found["webp"] for found in best_ratios(rows).values()] == [7.0, 4.0]
     assert best_ratios([]) == {}
+
+
+def test_every_ratio_is_printed_with_its_goal(capsys: pytest.CaptureFixture[str]) -> None:
+    rates = {"webp": 50.0, "jpeg": 60.0}
+    rows = [PeerRow("a", 256, 1, 1, 3.0, rates, {"webp": 14.9, "jpeg": 15.0}), PeerRow("b", 512, 1, 1, 9.0, rates, {"webp": 5.1, "jpeg": 5.2})]
+    print_tables(rows, [])
+    printed = capsys.readouterr().out
+    goals = {name: next(line.split("│")[-2].strip() for line in printed.splitlines() if line.startswith(f"│ {name} ")) for name in "ab"}
+    assert goals == {"a": "15 ×", "b": "5 ×"}
+    assert "best size: webp 5.1 × (met), jpeg 5.2 × (met); goal 5 ×" in printed
+    assert judged(14.9, 15.0) == "14.9 × (missed)"
 
 
 def test_pool_distributes_tiles_to_all_processes() -> None:
