@@ -6,19 +6,16 @@ import { fileURLToPath } from "node:url";
 import * as esbuild from "esbuild";
 import { minify } from "terser";
 import { ENTRIES } from "./entries.mjs";
-import { INTERNAL_NAMES } from "./internalNames.mjs";
 
 const root = resolve(dirname(fileURLToPath(import.meta.url)), "..");
 const dist = join(root, "dist");
-/** Names beginning with an underscore, which no others do. */
-const short = { mangleProps: new RegExp(`^(${INTERNAL_NAMES.join("|")})$`), mangleCache: Object.fromEntries(INTERNAL_NAMES.map((name, k) => [name, `_${k.toString(36)}`])) };
-const shared = { ...short, bundle: true, minify: true, target: "es2022", legalComments: "none", logLevel: "warning" };
+const shared = { bundle: true, minify: true, target: "es2022", legalComments: "none", logLevel: "warning" };
 const CSS_TARGET = ["chrome111", "firefox121", "safari16.4"];
 const banner = { js: "/*! map3d, Apache-2.0 */" };
 
 /** Shortens a bundle of esbuild by another 2 %. The result is ASCII: a page or server that declares no encoding reads the same texts. */
 async function shorten(code, module) {
-  const { code: shorter } = await minify(code, { ecma: 2022, module, compress: { passes: 3, keep_fargs: false, pure_getters: true, unsafe: true, unsafe_arrows: true, unsafe_methods: true }, format: { ascii_only: true } });
+  const { code: shorter } = await minify(code, { ecma: 2022, module, compress: { passes: 3, keep_fargs: false }, format: { ascii_only: true } });
   return shorter;
 }
 
@@ -74,6 +71,13 @@ const styles = {
     });
   },
 };
+/** Lets unused tables of suncalc, those of the moon, be dropped. */
+const tables = {
+  name: "tables",
+  setup(build) {
+    build.onLoad({ filter: /\/suncalc\/index\.js$/ }, ({ path }) => ({ contents: readFileSync(path, "utf8").replaceAll("new Int32Array(", "/* @__PURE__ */ new Int32Array("), loader: "js" }));
+  },
+};
 /** Writes the keys of the page's messages once for all languages. */
 const messages = {
   name: "messages",
@@ -93,7 +97,7 @@ const messages = {
     });
   },
 };
-const plugins = [workers, shaders, styles, messages];
+const plugins = [workers, shaders, styles, tables, messages];
 
 /** Lets entries import the core's public names: modules from map3d.mjs, scripts from the global `map3d`. */
 const coreAs = (how) => ({
