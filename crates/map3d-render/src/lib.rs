@@ -4,12 +4,14 @@
 mod block;
 mod clock;
 mod cutout;
+mod edge_samples;
 mod fragments;
 mod light;
 mod material;
 mod query;
 mod scene;
 mod shade;
+mod surface_order;
 mod tile;
 mod view;
 

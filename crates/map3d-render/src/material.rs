@@ -12,21 +12,35 @@ use map3d_texture::{LocalTextureCache, Texture, TextureCache};
 use crate::cutout::outside_alpha;
 use map3d_trace::{Affine, CurvedSurface, DepthPlane, PerspectiveMap, SurfaceAttributes, texture_at};
 
-/// Textures and sampling plans that the surfaces of a sub-tile share.
+/// Sub-tiles for which textures are held: those of a tile of 256 px. Longer, and the shared cache would drop textures that are in use as not used.
+const HELD_SUBTILES: u32 = 16;
+
+/// Textures and sampling plans that surfaces share.
 pub struct MaterialCache {
-    pub held: LocalTextureCache,
+    held: LocalTextureCache,
+    /// Sub-tiles since the textures are held.
+    subtiles: u32,
     plans: TapPlanCache,
 }
 
 impl MaterialCache {
     /// `isa`: an instruction set that this machine supports.
     pub fn new(isa: Isa) -> Self {
-        Self { held: LocalTextureCache::default(), plans: TapPlanCache::new(isa) }
+        Self { held: LocalTextureCache::default(), subtiles: 0, plans: TapPlanCache::new(isa) }
     }
 
     /// As `new`, for views in perspective.
     pub fn in_perspective(isa: Isa) -> Self {
-        Self { held: LocalTextureCache::default(), plans: TapPlanCache::rough(isa) }
+        Self { plans: TapPlanCache::rough(isa), ..Self::new(isa) }
+    }
+
+    /// Drops the textures after some sub-tiles.
+    pub fn finish_subtile(&mut self) {
+        self.subtiles += 1;
+        if self.subtiles == HELD_SUBTILES {
+            self.held.clear();
+            self.subtiles = 0;
+        }
     }
 }
 
@@ -52,15 +66,19 @@ impl DiffuseColor {
         Ok(Self::Textured(sampler(materials, textures, material, &texture, uv)?))
     }
 
-    /// Returns the colour at a position in 2^-8 px from the sub-tile's corner.
-    #[inline(always)]
-    pub fn at(&self, x: i32, y: i32, materials: &mut MaterialCache, textures: &TextureCache) -> Result<[u16; 3]> {
+    /// Writes the colours at positions in 2^-8 px from the sub-tile's corner.
+    pub fn each(&self, positions: &[[i32; 2]], out: &mut [[u16; 3]], materials: &mut MaterialCache, textures: &TextureCache) -> Result<()> {
         match self {
-            Self::Unused => Ok([0; 3]),
-            Self::Constant(color) => Ok(*color),
-            Self::Textured(sampler) => Ok(sampler.sample(x, y)),
-            Self::Curved(texture) => texture.at(x, y, materials, textures),
+            Self::Unused => out.fill([0; 3]),
+            Self::Constant(color) => out.fill(*color),
+            Self::Textured(sampler) => sampler.sample_each(positions, out),
+            Self::Curved(texture) => {
+                for ([x, y], color) in positions.iter().zip(out) {
+                    *color = texture.at(*x, *y, materials, textures)?;
+                }
+            }
         }
+        Ok(())
     }
 
     /// Writes whole pixels of a row that starts at (i, j), with full coverage.

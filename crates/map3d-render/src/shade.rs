@@ -10,8 +10,10 @@ use map3d_scene::MaterialRecord;
 use map3d_texture::TextureCache;
 use map3d_trace::{MIXED, NOTHING, SUBTILE_PX, SurfaceAttributes, VisBuf};
 
+use crate::edge_samples::EdgeSamples;
 use crate::fragments::{Fragment, FragmentBuffer};
 use crate::material::{MaterialCache, PreparedSurface, clamp_at_edges};
+use crate::surface_order::SurfaceOrder;
 
 /// Shades sub-tiles. Keep one per thread to reuse its buffers.
 pub struct Shader {
@@ -19,6 +21,10 @@ pub struct Shader {
     /// Fragments of the current sub-tile; empty unless `keeps_fragments`.
     fragments: FragmentBuffer,
     keeps_fragments: bool,
+    /// Of the current sub-tile, row by row.
+    runs: Vec<SurfaceRun>,
+    order: SurfaceOrder,
+    edges: EdgeSamples,
     /// Prepared surfaces of the current sub-tile.
     surfaces: Vec<PreparedSurface>,
     /// Index into `surfaces` of each slot, or `NOT_PREPARED`.
@@ -45,6 +51,16 @@ impl SampleSet {
     pub const FOUR: Self = Self { mask: 1 << 6 | 1 << 8 | 1 << 10 | 1 << 14, bits: 2 };
     /// The pixel's centre.
     pub const CENTER: Self = Self { mask: 1, bits: 0 };
+}
+
+/// Pixels of a row whose samples all show one surface.
+#[derive(Clone, Copy)]
+struct SurfaceRun {
+    /// Index into the sub-tile's surfaces.
+    surface: u32,
+    row: u8,
+    first: u8,
+    end: u8,
 }
 
 const NOT_PREPARED: u32 = u32::MAX;
@@ -87,6 +103,9 @@ impl Shader {
             materials,
             fragments: FragmentBuffer::default(),
             keeps_fragments,
+            runs: Vec::new(),
+            order: SurfaceOrder::default(),
+            edges: EdgeSamples::default(),
             surfaces: Vec::new(),
             surface_of_slot: Vec::new(),
             shades: 0,
@@ -98,15 +117,18 @@ impl Shader {
     pub fn shade_subtile(&mut self, vis: &VisBuf, textures: &TextureCache, g: &mut GBuffer, corner: (usize, usize)) -> Result<()> {
         self.surfaces.clear();
         self.fragments.clear();
+        self.runs.clear();
+        self.edges.clear();
         self.surface_of_slot.clear();
         self.surface_of_slot.resize(vis.slot_count(), NOT_PREPARED);
-        let done = self.shade_rows(&mut SubtileTarget { vis, textures, g, corner });
-        self.materials.held.clear();
+        let mut target = SubtileTarget { vis, textures, g, corner };
+        let done = self.split_rows(&mut target).and_then(|()| self.shade_surfaces(&mut target));
+        self.materials.finish_subtile();
         done
     }
 
     /// Splits each row into runs of pixels with one slot, and pixels with several.
-    fn shade_rows(&mut self, target: &mut SubtileTarget) -> Result<()> {
+    fn split_rows(&mut self, target: &mut SubtileTarget) -> Result<()> {
         for j in 0..SUBTILE_PX {
             let row = target.vis.row(j);
             let mut i = 0;
@@ -120,7 +142,7 @@ impl Shader {
                         end += 1;
                     }
                     if slot != NOTHING {
-                        self.shade_run(target, slot, i..end, j)?;
+                        self.add_run(target, slot, i..end, j)?;
                     }
                 }
                 i = end;
@@ -160,65 +182,45 @@ impl Shader {
         Ok(index)
     }
 
-    /// Shades pixels of row j whose samples all show one surface.
+    /// Adds pixels of row j whose samples all show one surface.
     #[inline(always)]
-    fn shade_run(&mut self, target: &mut SubtileTarget, slot: u32, columns: Range<usize>, j: usize) -> Result<()> {
+    fn add_run(&mut self, target: &SubtileTarget, slot: u32, columns: Range<usize>, j: usize) -> Result<()> {
         self.shades += columns.len() as u64;
-        let index = self.surface(target, slot)?;
-        let surface = &self.surfaces[index];
-        let i = columns.start;
-        let first = target.index(i, j);
-        let pixels = first..first + columns.len();
-        surface.depth.row(i, j, &mut target.g.depth[pixels.clone()]);
-        target.g.id[pixels.clone()].fill(surface.id);
-        if !target.g.normal.is_empty() {
-            surface.normals(i, j, &mut target.g.normal[pixels.clone()]);
-        }
-        if !target.g.color.is_empty() {
-            surface.color.row(i, j, &mut target.g.color[pixels.clone()], &mut self.materials, target.textures)?;
-        }
+        let surface = self.surface(target, slot)? as u32;
+        self.runs.push(SurfaceRun { surface, row: j as u8, first: columns.start as u8, end: columns.end as u8 });
         if self.keeps_fragments {
-            self.fragments.push_run(j, i, columns.end, index as u32);
+            self.fragments.push_run(j, columns.start, columns.end, surface);
         }
         Ok(())
     }
 
-    /// Shades a pixel on an edge: the mean of the surfaces' colours, weighted by their samples; id, normal and depth of sample 0.
+    /// Shades what the rows were split into, surface by surface: a sampler is faster where it stays with one texture.
+    fn shade_surfaces(&mut self, target: &mut SubtileTarget) -> Result<()> {
+        let has_color = !target.g.color.is_empty();
+        let Self { surfaces, materials, runs, order, edges, fragments, .. } = self;
+        order.sort(surfaces.len(), runs.iter().map(|run| run.surface));
+        edges.sort(surfaces.len());
+        for (number, surface) in surfaces.iter().enumerate() {
+            for run in order.of(number) {
+                shade_run(surface, runs[*run as usize], target, materials)?;
+            }
+            if has_color {
+                edges.shade(number, surface, materials, target.textures, &mut fragments.fragments)?;
+            }
+        }
+        if has_color {
+            edges.resolve(self.samples.bits, &mut target.g.color);
+        }
+        Ok(())
+    }
+
+    /// Resolves a pixel on an edge: id, normal and depth of sample 0. Its colour is the mean of the surfaces' colours, weighted by their samples; `shade_surfaces`
+    /// computes it.
     #[inline(always)]
     fn shade_mixed_pixel(&mut self, target: &mut SubtileTarget, i: usize, j: usize) -> Result<()> {
         let slots = target.vis.mixed(i, j);
         let at = target.index(i, j);
-
-        // Shade each surface at the centroid of its samples.
-        let mut sum = [0u32; 4];
-        let first = self.fragments.fragments.len();
-        let SampleSet { mask, bits } = self.samples;
-        let mut rest = !VisBuf::samples_of(slots, NOTHING) & mask;
-        while rest != 0 {
-            let slot = slots[rest.trailing_zeros() as usize & 15];
-            let covered = VisBuf::samples_of(slots, slot) & mask;
-            rest &= !covered;
-            let (x, y) = centroid(covered);
-            self.shades += 1;
-            let index = self.surface(target, slot)?;
-            let color = self.surfaces[index].color.at((i as i32) << 8 | x, (j as i32) << 8 | y, &mut self.materials, target.textures)?;
-            let weight = covered.count_ones();
-            (0..3).for_each(|c| sum[c] += u32::from(color[c]) * weight);
-            sum[3] += 65_535 * weight;
-            if self.keeps_fragments {
-                let (centroid, surface) = ([x, y].map(|v| v as u8), index as u32);
-                let samples = (weight << (4 - bits)) as u8;
-                self.fragments.fragments.push(Fragment { centroid, samples, surface, color });
-            }
-        }
-        if self.keeps_fragments {
-            self.fragments.finish_pixel(j, i, first);
-        }
-
-        // Resolve the colour over all samples.
-        if !target.g.color.is_empty() {
-            target.g.color[at] = sum.map(|c| ((c + (1 << bits >> 1)) >> bits) as u16);
-        }
+        self.add_edge_samples(target, slots, [i, j])?;
 
         // The other arrays show the pixel's centre.
         if slots[0] != NOTHING {
@@ -229,6 +231,35 @@ impl Shader {
             if !target.g.normal.is_empty() {
                 target.g.normal[at] = surface.normal_at(i, j);
             }
+        }
+        Ok(())
+    }
+
+    /// Adds the surfaces of a pixel, each at the centroid of its samples.
+    #[inline(always)]
+    fn add_edge_samples(&mut self, target: &SubtileTarget, slots: &[u32; 16], [i, j]: [usize; 2]) -> Result<()> {
+        self.edges.begin_pixel(target.index(i, j));
+        let first = self.fragments.fragments.len();
+        let SampleSet { mask, bits } = self.samples;
+        let mut rest = !VisBuf::samples_of(slots, NOTHING) & mask;
+        while rest != 0 {
+            let slot = slots[rest.trailing_zeros() as usize & 15];
+            let covered = VisBuf::samples_of(slots, slot) & mask;
+            rest &= !covered;
+            let (x, y) = centroid(covered);
+            self.shades += 1;
+            let index = self.surface(target, slot)?;
+            let weight = covered.count_ones();
+            self.edges.push([(i as i32) << 8 | x, (j as i32) << 8 | y], weight, index);
+            if self.keeps_fragments {
+                let (centroid, surface) = ([x, y].map(|v| v as u8), index as u32);
+                let samples = (weight << (4 - bits)) as u8;
+                self.fragments.fragments.push(Fragment { centroid, samples, surface, color: [0; 3] });
+            }
+        }
+        if self.keeps_fragments {
+            self.fragments.finish_pixel(j, i, first);
+            self.edges.link_fragments(first, self.fragments.fragments.len() - first);
         }
         Ok(())
     }
@@ -247,6 +278,23 @@ impl Shader {
     pub fn surface_of_slot(&self, slot: u32) -> &PreparedSurface {
         &self.surfaces[self.surface_of_slot[slot as usize] as usize]
     }
+}
+
+/// Shades whole pixels.
+#[inline(always)]
+fn shade_run(surface: &PreparedSurface, run: SurfaceRun, target: &mut SubtileTarget, materials: &mut MaterialCache) -> Result<()> {
+    let (i, j) = (usize::from(run.first), usize::from(run.row));
+    let first = target.index(i, j);
+    let pixels = first..first + usize::from(run.end - run.first);
+    surface.depth.row(i, j, &mut target.g.depth[pixels.clone()]);
+    target.g.id[pixels.clone()].fill(surface.id);
+    if !target.g.normal.is_empty() {
+        surface.normals(i, j, &mut target.g.normal[pixels.clone()]);
+    }
+    if !target.g.color.is_empty() {
+        surface.color.row(i, j, &mut target.g.color[pixels], materials, target.textures)?;
+    }
+    Ok(())
 }
 
 /// Returns the material of a surface, with the wrap mode of its colours.

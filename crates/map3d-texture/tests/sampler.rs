@@ -6,6 +6,7 @@ mod common;
 use std::sync::Arc;
 
 use common::{Random, noise};
+use map3d_base::Isa;
 use map3d_base::asset::Wrap;
 use map3d_base::samples::SAMPLES;
 use map3d_image::Raster;
@@ -60,6 +61,29 @@ fn fold(i: i32, n: u32, wrap: Wrap) -> Option<u32> {
         Wrap::Mirror => Some(if i.rem_euclid(2 * n) < n { i.rem_euclid(n) } else { n - 1 - i.rem_euclid(n) } as u32),
         Wrap::Clamp => Some(i.clamp(0, n - 1) as u32),
         _ => (0..n).contains(&i).then_some(i as u32),
+    }
+}
+
+#[test]
+fn samples_together_equal_samples_one_by_one() {
+    let mut random = Random(12);
+    for (wrap, has_alpha) in [(Wrap::Wrap, false), (Wrap::Mirror, true), (Wrap::Clamp, false), (Wrap::Border, true), (Wrap::None, false)] {
+        let level = Arc::new(Level::from_raster(noise(48, 37, 4)));
+        for (right, down) in [(0.3, 0.4), (2.1, 3.4), (4.8, 1.2)] {
+            let uv = UvMap { u: [0.2, right / 48.0, 0.01], v: [0.9, -0.02, -down / 37.0] };
+            let plan = compute_footprint(uv.jacobian(48, 37), 1, &Tuning::default());
+            let positions: Vec<[i32; 2]> = (0..300).map(|_| [0, 1].map(|_| (random.unit() * 64.0 * 256.0) as i32)).collect();
+            let mut all = Vec::new();
+            for isa in Isa::available() {
+                let sampler = Sampler::new(level.clone(), Arc::new(TapPlan::with_isa(&plan, isa)), has_alpha, &uv, wrap, WHITE);
+                let mut colors = vec![[0; 3]; positions.len()];
+                sampler.sample_each(&positions, &mut colors);
+                assert!(positions.iter().zip(&colors).all(|([x, y], color)| sampler.sample(*x, *y) == *color), "{isa:?} {wrap:?}");
+                sampler.sample_each(&[], &mut []);
+                all.push(colors);
+            }
+            assert!(all.windows(2).all(|pair| pair[0] == pair[1]), "{wrap:?}");
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! Prepares footprints for the sampler: tap offsets in fixed point, in batches; a cache returns the plans of known footprints.
 
 use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
 use std::sync::Arc;
 
 use map3d_base::Isa;
@@ -12,8 +13,8 @@ use crate::sample::tap::{BATCH, FULL, TAP_BITS, TAP_POSITION_BITS};
 const KEPT_BITS: i32 = 11;
 /// As `KEPT_BITS`, where the Jacobian differs from pixel to pixel.
 const ROUGH_BITS: i32 = 6;
-/// Most plans in the cache.
-const MAX_PLANS: usize = 4096;
+/// Plans after which the cache drops those not used since it last did.
+const GENERATION: usize = 4096;
 
 /// Up to `BATCH` taps: offsets from the pixel's centre in 2^-TAP_POSITION_BITS texel.
 #[derive(Clone, Debug, Default)]
@@ -82,16 +83,22 @@ fn batch(taps: &[[i32; 2]]) -> TapBatch {
     out
 }
 
+/// The bits that rounding keeps of a Jacobian, their exponent, and the number of levels.
+type PlanKey = ([i32; 5], u32);
+type Plans = HashMap<PlanKey, Arc<TapPlan>, BuildHasherDefault<PlanHasher>>;
+
 /// Caches plans: the triangles of a wall, and of walls parallel to it, share one. A plan depends on the rounded Jacobian alone, not on earlier calls.
 pub struct TapPlanCache {
     isa: Isa,
     kept_bits: i32,
-    plans: HashMap<([i32; 5], u32), Arc<TapPlan>>,
+    plans: Plans,
+    /// Those of the generation before; one that is asked for moves to `plans`.
+    older: Plans,
 }
 
 impl TapPlanCache {
     pub fn new(isa: Isa) -> Self {
-        Self { isa, kept_bits: KEPT_BITS, plans: HashMap::new() }
+        Self { isa, kept_bits: KEPT_BITS, plans: Plans::default(), older: Plans::default() }
     }
 
     /// Rounds Jacobians to a thirty-second of their largest component, for views in perspective: otherwise hardly two pixels would share a plan.
@@ -103,12 +110,44 @@ impl TapPlanCache {
     pub fn plan(&mut self, jacobian: [[f64; 2]; 2], levels: u32) -> Arc<TapPlan> {
         let isa = self.isa;
         let compute = |jacobian| Arc::new(TapPlan::with_isa(&compute_footprint(jacobian, levels, &Tuning::default()), isa));
-        let Some((rounded, key)) = round_jacobian(jacobian, self.kept_bits) else { return compute(jacobian) };
-        if self.plans.len() >= MAX_PLANS {
+        let Some((rounded, kept)) = round_jacobian(jacobian, self.kept_bits) else { return compute(jacobian) };
+        let key = (kept, levels);
+        if let Some(plan) = self.plans.get(&key) {
+            return plan.clone();
+        }
+        let plan = self.older.remove(&key).unwrap_or_else(|| compute(rounded));
+        self.insert(key, plan.clone());
+        plan
+    }
+
+    fn insert(&mut self, key: PlanKey, plan: Arc<TapPlan>) {
+        if self.plans.len() >= GENERATION {
+            std::mem::swap(&mut self.plans, &mut self.older);
             self.plans.clear();
         }
-        self.plans.entry((key, levels)).or_insert_with(|| compute(rounded)).clone()
+        self.plans.insert(key, plan);
     }
+}
+
+/// Multiplies and rotates the numbers of a key.
+#[derive(Default)]
+struct PlanHasher(u64);
+
+impl Hasher for PlanHasher {
+    fn finish(&self) -> u64 {
+        // The table takes the uppermost and the lowest bits.
+        self.0 ^ self.0 >> 32
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.as_chunks().0.iter().for_each(|word| self.write_u32(u32::from_le_bytes(*word)));
+    }
+
+    fn write_u32(&mut self, number: u32) {
+        self.0 = (self.0.rotate_left(5) ^ u64::from(number)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    }
+
+    fn write_usize(&mut self, _length: usize) {}
 }
 
 /// Rounds to some bits of the largest component; the key holds these bits and their exponent. `None` for numbers that are zero, not finite or extreme.
@@ -143,8 +182,9 @@ mod tests {
     #[test]
     fn a_cached_plan_equals_a_fresh_one() {
         let mut plans = TapPlanCache::new(Isa::Scalar);
-        for k in 0..5000 {
-            let t = f64::from(k) * 0.37;
+        for k in 0..10_000 {
+            // Every third one was asked for before.
+            let t = f64::from(if k % 3 == 2 { k - 7 } else { k }) * 0.37;
             let jacobian = [[1.0 + 3.0 * t.sin(), t.cos()], [-0.4 * t.cos(), 2.0 + t.sin()]];
             let (got, fresh) = (plans.plan(jacobian, 11), TapPlanCache::new(Isa::Scalar).plan(jacobian, 11));
             assert_eq!((got.level, got.tap_count(), got.extent), (fresh.level, fresh.tap_count(), fresh.extent));

@@ -159,7 +159,7 @@ impl TextureCache {
     }
 }
 
-/// The texture cache of one thread while it shades a sub-tile: asks the shared cache once per texture and level. Levels stay alive here even when the shared
+/// The texture cache of one thread while it shades some sub-tiles: asks the shared cache once per texture and level. Levels stay alive here even when the shared
 /// cache drops them.
 #[derive(Default)]
 pub struct LocalTextureCache {
