@@ -5,6 +5,7 @@ more for shading the reading and decoding of textures.
 """
 
 import json
+import os
 import statistics
 import subprocess
 import sys
@@ -57,7 +58,9 @@ def measure_view(scene: Path, name: str, reps: int) -> Row:
 
 def run_program(scene: Path, name: str, rounds: int) -> Row:
     words = [sys.executable, "-m", "bench.view_program", str(scene), name, str(rounds)]
-    answer: Row = json.loads(subprocess.run(words, check=True, capture_output=True, text=True).stdout)
+    # Otherwise the idle threads of NumPy's linear algebra count as CPU time of the first view.
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    answer: Row = json.loads(subprocess.run(words, check=True, capture_output=True, text=True, env=environment).stdout)
     return answer
 
 
