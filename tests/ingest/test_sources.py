@@ -64,46 +64,6 @@ def test_a_file_of_a_numbered_asset_given_alone_is_that_asset(tmp_path: Path) ->
     assert [source.name for source in find_sources([known["town-2"]], "town", known=known)] == ["town"]
 
 
-def given(path: Path, known: dict[str, Path]) -> str:
-    """Returns the name of a document that is given itself."""
-    (source,) = find_sources([path], known=known)
-    return source.name
-
-
-def test_a_given_file_of_another_folder_has_a_name_of_its_own_and_keeps_it(tmp_path: Path) -> None:
-    paths = [tmp_path / folder / "town.obj" for folder in ("b", "c", "x/c", "y/x/c")]
-    known: dict[str, Path] = {}
-    for path, name in zip(paths, ("town", "c-town", "x-c-town", "y-x-c-town"), strict=True):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(OBJ)
-        assert given(path, known) == name
-        known[name] = path
-    assert [given(path, known) for path in paths] == list(known)
-    (tmp_path / "link").symlink_to(tmp_path / "c")
-    assert given(tmp_path / "link" / "town.obj", known) == "c-town", "the same file by another path"
-    assert [source.name for source in find_sources(list(reversed(paths)), known=known)] == list(reversed(known))
-
-
-def test_a_given_file_that_was_moved_is_the_known_one(tmp_path: Path) -> None:
-    moved = tmp_path / "there" / "town.obj"
-    moved.parent.mkdir()
-    moved.write_text(OBJ)
-    assert given(moved, {"town": tmp_path / "here" / "town.obj"}) == "town"
-
-
-def test_names_of_deep_folders_stay_within_the_longest_name(tmp_path: Path) -> None:
-    known: dict[str, Path] = {}
-    for folder in ("first", "f" * 70, "g" * 70):
-        path = tmp_path / folder / f"{'t' * 50}.obj"
-        path.parent.mkdir()
-        path.write_text(OBJ)
-        name = given(path, known)
-        assert len(name) <= 64
-        assert name not in known
-        known[name] = path
-    assert list(known) == ["t" * 50, f"{'t' * 50}-2", f"{'t' * 50}-3"]
-
-
 def test_a_folder_without_a_readable_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("v 1 2 3")
     with pytest.raises(UnknownFormat, match="no readable file in this folder;"):

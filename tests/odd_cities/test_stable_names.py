@@ -87,18 +87,3 @@ def test_a_file_added_by_hand_changes_no_ids(tmp_path: Path) -> None:
     after = ids(workspace)
     assert before.items() < after.items()
     assert {asset for asset, _ in after.values()} == {"town", "town-2"}
-
-
-def test_a_given_file_of_another_folder_replaces_nothing(tmp_path: Path) -> None:
-    workspace, city = Workspace(tmp_path / "workspace").create(), tmp_path / "city"
-    catalogue = workspace.open_catalogue()
-    catalogue.create_scene(SceneRecord("town"))
-    for name in ("a/town.gml", "b/town.gml"):
-        write(city, name)
-        import_files(workspace, catalogue, "town", [city / name], OPTIONS)
-    before = ids(workspace)
-    assert {asset for asset, _ in before.values()} == {"town", "b-town"}
-    (again,) = import_files(workspace, catalogue, "town", [city / "b" / "town.gml"], OPTIONS).imported
-    assert (again.asset, again.replaced) == ("b-town", True)
-    assert ids(workspace) == before
-    catalogue.close()

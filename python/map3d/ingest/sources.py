@@ -5,7 +5,7 @@ import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import count, islice, takewhile
+from itertools import count, takewhile
 from pathlib import Path
 
 from map3d.errors import NotFound, UnknownFormat
@@ -30,7 +30,6 @@ OnUnreadable = Callable[[Path, str], None]
 """Called with an unreadable file of a folder and the reason."""
 
 _HEAD_BYTES = 4096
-_MAX_NAME_CHARS = 64
 
 
 @dataclass(frozen=True)
@@ -58,8 +57,7 @@ def find_sources(
 
     `on_unreadable` is called for files in folders whose suffix announces a known format that their content is not; `on_left_alone` for other files
     that hold a city or a raster in a format that map3d does not read, or whose format is unknown. `known`: the files of assets by name; a file whose
-    name is needed for several keeps the one that it has there. A document that was given itself never takes the name of another file that is still
-    there: it is named after its folders and itself.
+    name is needed for several keeps the one that it has there.
 
     Raises UnknownFormat for a given file of unknown format and for a folder without any readable file; NotFound.
     """
@@ -175,11 +173,9 @@ def _name_sources(groups: Sequence[_Group], name: str | None, known: Mapping[str
     wanted = [asset_name(name or group.label) for group in groups]
     kept = {} if name else _kept_names(groups, wanted, known)
     taken = set(kept.values())
-    present = set() if name else {known_name for known_name, path in known.items() if path.is_file()}
     sources = []
     for position, group in enumerate(groups):
-        refused = taken | (present if _is_given(group) else set())
-        unique = kept.get(position) or next(text for text in _possible_names(group, wanted[position]) if text not in refused)
+        unique = kept.get(position) or next(text for text in _numbered(wanted[position]) if text not in taken)
         taken.add(unique)
         sources.append(SourceDocument(unique, group.format, group.paths, group.root))
     return sources
@@ -195,8 +191,7 @@ def _kept_names(groups: Sequence[_Group], wanted: Sequence[str], known: Mapping[
         (-_equal_parts(group.paths[0], path), position, known_name)
         for position, group in enumerate(groups)
         for known_name, path in places.get(wanted[position], ())
-        if known_name == wanted[position] or known_name.startswith(f"{wanted[position][:58]}-") or known_name.endswith(f"-{wanted[position]}")
-        if not (_is_given(group) and _is_other_file(path, group.paths[0]))
+        if known_name == wanted[position] or known_name.startswith(f"{wanted[position][:58]}-")
     ]
     rasters = {path.absolute(): position for position, group in enumerate(groups) if group.format == "raster" for path in group.paths}
     pairs += [(-len(path.parts), rasters[path], known_name) for known_name, path in known.items() if path in rasters]
@@ -205,26 +200,6 @@ def _kept_names(groups: Sequence[_Group], wanted: Sequence[str], known: Mapping[
         if equal and position not in kept and known_name not in kept.values():
             kept[position] = known_name
     return kept
-
-
-def _is_given(group: _Group) -> bool:
-    """Whether the group is a document that was given itself, not found in a folder."""
-    return group.root is None and group.format != "raster"
-
-
-def _is_other_file(known: Path, path: Path) -> bool:
-    """Whether the known file is still there and is not this one. One that is not there was moved."""
-    return known.is_file() and not known.samefile(path)
-
-
-def _possible_names(group: _Group, wanted: str) -> Iterator[str]:
-    """Yields the name; for a given document, also with the names of its folders, the nearest first; then with numbers from 2 on."""
-    yield wanted
-    if _is_given(group):
-        words = [asset_name(part) for part in reversed(group.paths[0].absolute().parent.parts[1:])]
-        longer = ["-".join([*reversed(words[:count]), wanted]) for count in range(1, len(words) + 1)]
-        yield from (text for text in longer if len(text) <= _MAX_NAME_CHARS)
-    yield from islice(_numbered(wanted), 1, None)
 
 
 def _equal_parts(one: Path, other: Path) -> int:
@@ -242,7 +217,7 @@ def _numbered(name: str) -> Iterator[str]:
 def asset_name(text: str) -> str:
     """Converts text to a valid name: lower case, any other character becomes a dash."""
     plain = re.sub(r"[^a-z0-9_-]+", "-", text.lower()).strip("-_")
-    return plain[:_MAX_NAME_CHARS] or "asset"
+    return plain[:64] or "asset"
 
 
 def _find_companions(path: Path, root: Path | None) -> list[Path]:
