@@ -61,7 +61,7 @@ def test_a_style_colours_surfaces_by_class_and_attribute_without_importing_again
     write_town(tmp_path / "city")
     status, out, err = run("site", "city", *SITE)
     assert status == 0, err
-    assert "ambient occlusion is rendered, since the scene has no textures" in out
+    assert "ambient occlusion is rendered, since textures cover less than a tenth of the surfaces" in out
     workspace = Workspace(tmp_path / "workspace")
     plain = colors(workspace)
     roofs = {max(plain[name]) for name in plain if name.startswith("house")}

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 @click.option("--allow-empty", is_flag=True, help="Remove files from the site even if the folder that they came from is empty now.")
 @outlier_options
 @style_option
-@click.option("--ao/--no-ao", default=None, help="Render ambient occlusion.  [default: where there are no textures]")
+@click.option("--ao/--no-ao", default=None, help="Render ambient occlusion.  [default: where textures cover less than a tenth]")
 @workers_option
 @max_memory_option
 @workspace_option

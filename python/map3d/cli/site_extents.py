@@ -34,7 +34,7 @@ def print_rendering(made: SiteRendering) -> None:
         f"rendering {record.name}: {plural(len(record.frames), 'view')}, {plural(record.zmax + 1, 'level')}, {record.res_m:g} m per pixel{why}"
     )
     if made.has_chosen_ao:
-        click.echo("ambient occlusion is rendered, since the scene has no textures; --no-ao leaves it out")
+        click.echo("ambient occlusion is rendered, since textures cover less than a tenth of the surfaces; --no-ao leaves it out")
     if made.refitted:
         click.echo("the content has outgrown the frames of the views, so that everything is rendered again")
 

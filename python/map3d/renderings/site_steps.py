@@ -28,7 +28,7 @@ from map3d.types import DEFAULT_LAYERS, ViewAngles
 @dataclass(frozen=True)
 class SiteRequest:
     """`choose_resolution` selects the resolution when `res_m` is None. `cluster`: the group of content to keep, 0 for the largest.
-    `style`: rules of colours. `ao`: ambient occlusion; None for scenes without textures."""
+    `style`: rules of colours. `ao`: ambient occlusion; None for scenes with few textures."""
 
     name: str
     sources: Path
@@ -52,7 +52,7 @@ class SiteRequest:
 @dataclass(frozen=True)
 class SiteRendering:
     """`resolution`: None when it was given or the rendering existed; `refitted`: its frames were replaced because the content had left them;
-    `has_chosen_ao`: ambient occlusion was chosen because the scene has no textures."""
+    `has_chosen_ao`: ambient occlusion was chosen because textures cover less than a tenth of its surfaces."""
 
     record: RenderingRecord
     resolution: Resolution | None = None
