@@ -13,9 +13,9 @@ import pytest
 from map3d.errors import BadRequest
 from map3d.geometry.crs import parse_crs
 from map3d.tile_services import daylight
-from map3d.tile_services.daylight import DEFAULT_LIGHT, PictureLight, light_at, parse_time
-from map3d.tile_services.picture import light_colors
+from map3d.tile_services.daylight import light_at, parse_time
 from map3d.tile_services.picture_request import parse_link, parse_picture
+from map3d.tiles.light_colors import DEFAULT_LIGHT, PictureLight, light_colors
 from map3d.tiles.manifest import Geographic
 from map3d.types import Layer
 from tests.tile_services.test_picture import MANIFEST, SIZE, WHERE

@@ -13,9 +13,10 @@ from PIL import Image
 from map3d.catalogue import Workspace
 from map3d.errors import BadRequest, LimitExceeded
 from map3d.geometry.views import local_from_uvd
-from map3d.tile_services.picture import draw_picture, level_of, light_colors
+from map3d.tile_services.picture import draw_picture, level_of
 from map3d.tile_services.picture_request import MAX_SIDE_PX, parse_link, parse_picture
 from map3d.tile_services.tiled_view import NotOffered
+from map3d.tiles.light_colors import light_colors
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.types import Layer

@@ -206,12 +206,10 @@ def test_an_incomplete_rendering_is_marked(client, workspace):
     assert ">Incomplete<" in client.get("/renderings").text
 
 
-def test_all_tiles_of_a_preview_are_served_as_immutable(client):
-    tiles = re.findall('<image href="([^"]+)"', client.get("/renderings").text)
-    assert tiles
-    for tile in tiles:
-        response = client.get(html.unescape(tile))
-        assert (response.status_code, "immutable" in response.headers["cache-control"]) == (200, True)
+def test_the_list_shows_a_picture_of_each_rendering_with_tiles(client):
+    (picture,) = re.findall('<img class="preview" src="([^"]+)"', client.get("/renderings").text)
+    response = client.get(f"/{html.unescape(picture)}")
+    assert (response.status_code, response.headers["content-type"]) == (200, "image/jpeg")
 
 
 @pytest.mark.parametrize(("file", "media_type"), [("favicon.svg", "image/svg+xml"), ("favicon.ico", "image/")])

@@ -36,19 +36,20 @@ def rendering_record(name="tea"):
     return RenderingRecord(name, "town", 0.1, (LAYERS,), frames, BOX, title="Tea <time>", attribution="© City of Tea")
 
 
-def solid_webp(px=256):
+def solid_image(kind, color, px=256):
     """Returns a real picture of one colour."""
     data = BytesIO()
-    with Image.new("RGB", (px, px), (200, 120, 60)) as picture:
-        picture.save(data, "WEBP", lossless=True)
+    with Image.new("RGB", (px, px), color) as picture:
+        picture.save(data, kind, lossless=True)
     return data.getvalue()
 
 
-FIRST_BYTES = {"webp": solid_webp(), "png": b"\x89PNG\r\n\x1a\n", "jpeg": b"\xff\xd8\xff"}
+FIRST_BYTES = {"webp": solid_image("WEBP", (200, 120, 60)), "png": solid_image("PNG", (128, 128, 255)), "jpeg": b"\xff\xd8\xff"}
+"""The colour of the PNG is that of normals that point up."""
 
 
 def tile_bytes(view, layer, tile, salt=""):
-    """Returns bytes with the signature of an image, or for WebP a real picture and a comment behind it. Some tiles are equal, like tiles of plain
+    """Returns a real picture and a comment behind it, for JPEG only its signature. Some tiles are equal, like tiles of plain
     ground."""
     kind = next(one.format for one in (*LAYERS, *ADDED) if one.name == layer)
     return FIRST_BYTES[kind] + f"{salt}{view}/{layer}/{tile.z}/{tile.x % 2}/{tile.y}".encode() * (1 + tile.x % 3)

@@ -10,9 +10,13 @@ from map3d import _core
 from map3d.geometry.frames import core_frame, pin
 from map3d.types import ViewAngles
 
-RESOLUTIONS_M: Final = (0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
+RESOLUTIONS_M: Final = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 MAX_BASE_TILES: Final = 30_000
 """For all views together: some minutes on a small machine."""
+CITY_PIXEL_M: Final = 0.05
+"""Smaller pixels are for single buildings and finds."""
+MAX_SMALL_BASE_TILES: Final = 2_000
+"""As MAX_BASE_TILES, for pixels smaller than CITY_PIXEL_M: some screens."""
 TEXELS_A_PIXEL: Final = 0.5
 """Finer pixels show no more of a texture."""
 TRIANGLE_PX: Final = 64
@@ -53,10 +57,10 @@ class Resolution:
 
 
 def choose_resolution(scene: _core.Scene, views: list[ViewAngles], detail: SurfaceDetail | None) -> Resolution:
-    """Returns the finest of RESOLUTIONS_M that the surfaces need, or a coarser one when it needs more than MAX_BASE_TILES base tiles."""
+    """Returns the finest of RESOLUTIONS_M that the surfaces need, or a coarser one when it needs too many base tiles."""
     covered_m2 = _covered_m2(scene, views)
     for res_m in RESOLUTIONS_M:
-        if covered_m2 / (res_m * TILE_PX) ** 2 > MAX_BASE_TILES:
+        if _needs_too_many_tiles(res_m, covered_m2):
             continue
         if detail is None or res_m * 1.001 >= detail.pixel_m or res_m == RESOLUTIONS_M[-1]:
             return Resolution(res_m, _why(res_m, covered_m2, detail))
@@ -77,11 +81,19 @@ def surface_detail(areas: NDArray[np.float64], texels: NDArray[np.float64]) -> S
 
 def _why(res_m: float, covered_m2: float, detail: SurfaceDetail | None) -> str:
     finer = [value for value in RESOLUTIONS_M if value < res_m]
-    if finer and covered_m2 / (finer[-1] * TILE_PX) ** 2 > MAX_BASE_TILES:
-        return f"{finer[-1]:g} m would need more than {MAX_BASE_TILES:,} tiles"
+    if finer and _needs_too_many_tiles(finer[-1], covered_m2):
+        return f"{finer[-1]:g} m would need more than {_max_base_tiles(finer[-1]):,} tiles"
     if detail is None or (not finer and detail.pixel_m <= res_m):
         return "it is the finest that is chosen without --res"
     return f"the surfaces have {detail.text()}, so that finer pixels would show nothing more"
+
+
+def _needs_too_many_tiles(res_m: float, covered_m2: float) -> bool:
+    return covered_m2 / (res_m * TILE_PX) ** 2 > _max_base_tiles(res_m)
+
+
+def _max_base_tiles(res_m: float) -> int:
+    return MAX_BASE_TILES if res_m >= CITY_PIXEL_M else MAX_SMALL_BASE_TILES
 
 
 def _covered_m2(scene: _core.Scene, views: list[ViewAngles]) -> float:

@@ -4,6 +4,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Final
 
 from map3d import _core
 from map3d.catalogue import Catalogue, RenderingRecord, SceneRecord, Workspace
@@ -21,8 +22,12 @@ from map3d.renderings.resolution import Resolution, SurfaceDetail, choose_resolu
 from map3d.renderings.site_files import ImportSummary, SiteFiles
 from map3d.renderings.site_report import SiteReport, read_report, view_names, write_report
 from map3d.renderings.style import Rules
+from map3d.renderings.sun_layers import RADIUS_M, LightRequest
 from map3d.renderings.track_stores import remove_tracks
-from map3d.types import DEFAULT_LAYERS, ViewAngles
+from map3d.types import AO_RADIUS_M, DEFAULT_LAYERS, ViewAngles
+
+AO_RADIUS_SHARE: Final = 0.25
+"""Greatest radius of ambient occlusion as a share of the scene's longest side."""
 
 
 @dataclass(frozen=True)
@@ -71,11 +76,19 @@ def create_site_rendering(workspace: Workspace, catalogue: Catalogue, request: S
     res_m = request.res_m if resolution is None else resolution.res_m
     has_chosen_ao = request.ao is None and detail is not None and detail.texel_m is None
     names = (*DEFAULT_LAYERS, "ao") if request.ao or has_chosen_ao else DEFAULT_LAYERS
-    layers = LayerRequest(names, color=request.color)
+    light = LightRequest(radius_m=_ao_radius_m(scene) if "ao" in names else None)
+    layers = LayerRequest(names, color=request.color, light=light)
     rendering = RenderingRequest(
         request.name, request.name, request.views, res_m, layers=layers, title=request.title, attribution=request.attribution
     )
     return SiteRendering(create_rendering(workspace, catalogue, rendering), resolution, has_chosen_ao=has_chosen_ao)
+
+
+def _ao_radius_m(scene: _core.Scene) -> float:
+    """Returns the radius of ambient occlusion: a smaller one for single buildings and finds, which would be dark all over."""
+    lo, hi = scene.box
+    longest_m = max(high - low for low, high in zip(lo, hi, strict=True))
+    return max(min(RADIUS_M, AO_RADIUS_SHARE * longest_m), AO_RADIUS_M[0])
 
 
 def store_report(

@@ -1,8 +1,6 @@
 """The light of a picture: the viewer's default light, or sun and sky at a time and place, with the viewer's colours."""
 
-import math
 import re
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import pairwise
 from typing import Final
@@ -10,37 +8,18 @@ from typing import Final
 from map3d.errors import BadRequest
 from map3d.geometry.sun import sun_angles
 from map3d.renderings.grid_north import GridNorth
+from map3d.tiles.light_colors import WHITE, PictureLight, direction
 from map3d.tiles.manifest import Manifest
 from map3d.types import Vec3
 
 _TIME: Final = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}T[0-9]{2}:[0-9]{2}Z", re.ASCII)
 _YEARS: Final = range(1900, 2101)
-WHITE: Final = (1.0, 1.0, 1.0)
 
 ColorStops = tuple[tuple[float, Vec3], ...]
 """Colours by the sun's altitude in degrees, ascending; linear in between."""
 SUN: Final[ColorStops] = ((-1, (0, 0, 0)), (0.5, (0.42, 0.17, 0.06)), (4, (0.92, 0.58, 0.3)), (12, (1.04, 0.88, 0.68)), (30, WHITE))
 SKY: Final[ColorStops] = ((-12, (0.44, 0.5, 0.7)), (-6, (0.48, 0.54, 0.72)), (0, (0.6, 0.62, 0.74)), (8, (0.9, 0.93, 1)), (30, WHITE))
 """Those of the viewer: viewer/src/geo/daylight.ts."""
-
-
-@dataclass(frozen=True)
-class PictureLight:
-    """`towards`: unit vector to the sun in local axes; `sun_rgb`, `sky_rgb`: factors of direct and ambient light."""
-
-    towards: Vec3
-    sun_rgb: Vec3 = WHITE
-    sky_rgb: Vec3 = WHITE
-
-
-def direction(azimuth_deg: float, altitude_deg: float) -> Vec3:
-    """Returns the unit vector of an azimuth clockwise from the local y axis and an altitude."""
-    azimuth, altitude = math.radians(azimuth_deg), math.radians(altitude_deg)
-    return (math.sin(azimuth) * math.cos(altitude), math.cos(azimuth) * math.cos(altitude), math.sin(altitude))
-
-
-DEFAULT_LIGHT: Final = PictureLight(direction(215.0, 48.0))
-"""The viewer's default light."""
 
 
 def parse_time(text: str) -> datetime:

@@ -3,15 +3,16 @@
 import io
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
 from map3d.errors import Corrupt
-from map3d.tile_services.daylight import DEFAULT_LIGHT, PictureLight, light_at
+from map3d.tile_services.daylight import light_at
 from map3d.tile_services.picture_request import LIT, PictureRequest
+from map3d.tiles.light_colors import DEFAULT_LIGHT, PictureLight, Pixels, light_colors
 from map3d.tiles.manifest import Manifest
 from map3d.types import TileId
 
@@ -25,22 +26,26 @@ BAND_PX: Final = 256
 """Rows that are drawn at a time, which bounds the memory."""
 MARGIN_PX: Final = 4
 """Pixels around a band that resampling reads."""
-AMBIENT: Final = 0.42
-DIFFUSE: Final = 0.76
-"""Of the viewer's light."""
 
-Pixels = NDArray[np.uint8]
+
+@dataclass(frozen=True)
+class _Lighting:
+    """`openness`: the name of the layer of ambient occlusion, None without one."""
+
+    light: PictureLight
+    openness: str | None
 
 
 def draw_picture(manifest: Manifest, request: PictureRequest, get_tile: GetTile) -> bytes:
     """Returns an encoded image. Raises Corrupt for a tile that is not an image, StoreError."""
     width, height = request.pixels
-    light = DEFAULT_LIGHT if request.time is None else light_at(manifest, request.time)
+    openness = next((layer.name for layers in manifest.passes for layer in layers if layer.kind == "ao"), None)
+    lighting = _Lighting(DEFAULT_LIGHT if request.time is None else light_at(manifest, request.time), openness)
     mode, color = ("RGB", BACKGROUND) if request.media_type == "image/jpeg" else ("RGBA", (0, 0, 0, 0))
     with Image.new(mode, (width, height), color) as picture:
         for top in range(0, height, BAND_PX):
             rows = min(BAND_PX, height - top)
-            band = _draw_band(manifest, request, get_tile, light, top, rows)
+            band = _draw_band(manifest, request, get_tile, lighting, top, rows)
             if band is not None:
                 picture.paste(band, (0, top), band if mode == "RGB" else None)
         return _encode(picture, request.media_type)
@@ -52,7 +57,7 @@ def level_of(manifest: Manifest, request: PictureRequest) -> int:
     return min(max(math.ceil(zoom - 1e-6), 0), manifest.zmax)
 
 
-def _draw_band(manifest: Manifest, request: PictureRequest, get_tile: GetTile, light: PictureLight, top: int, rows: int) -> Image.Image | None:
+def _draw_band(manifest: Manifest, request: PictureRequest, get_tile: GetTile, lighting: _Lighting, top: int, rows: int) -> Image.Image | None:
     """Returns rows of the picture as RGBA; None where nothing is."""
     frame, z = request.view.frame, level_of(manifest, request)
     u, v = request.centre_uv(manifest)
@@ -61,7 +66,7 @@ def _draw_band(manifest: Manifest, request: PictureRequest, get_tile: GetTile, l
     ratio = request.pixel_m / frame.pixel_m(z)
     left, upper, right, lower = float(px), float(py), float(px) + width * ratio, float(py) + rows * ratio
     window = (math.floor(left) - MARGIN_PX, math.floor(upper) - MARGIN_PX, math.ceil(right) + MARGIN_PX, math.ceil(lower) + MARGIN_PX)
-    pixels = _read_window(request, get_tile, light, z, window)
+    pixels = _read_window(request, get_tile, lighting, z, window)
     if pixels is None:
         return None
     with Image.fromarray(pixels, "RGBA") as source:
@@ -72,7 +77,7 @@ def _draw_band(manifest: Manifest, request: PictureRequest, get_tile: GetTile, l
         return source.resize((width, rows), Image.Resampling.LANCZOS if ratio > 1 else Image.Resampling.BICUBIC, box)
 
 
-def _read_window(request: PictureRequest, get_tile: GetTile, light: PictureLight, z: int, window: tuple[int, int, int, int]) -> Pixels | None:
+def _read_window(request: PictureRequest, get_tile: GetTile, lighting: _Lighting, z: int, window: tuple[int, int, int, int]) -> Pixels | None:
     """Returns (H, W, 4) straight RGBA of a window of a level; None where no tile has content."""
     layer = "color" if request.style == LIT else request.style
     color = _Mosaic(request, z, window, 4)
@@ -81,17 +86,26 @@ def _read_window(request: PictureRequest, get_tile: GetTile, light: PictureLight
     if request.style == LIT:
         normal = _Mosaic(request, z, window, 3)
         normal.fill(get_tile, "normal")
-        color.pixels[..., :3] = light_colors(color.pixels[..., :3], normal.pixels, light)
+        openness = None
+        if lighting.openness is not None:
+            openness = _Mosaic(request, z, window, 1)
+            openness.fill(get_tile, lighting.openness)
+        color.pixels[..., :3] = light_colors(
+            color.pixels[..., :3], normal.pixels, lighting.light, None if openness is None else openness.pixels[..., 0]
+        )
     return color.pixels
 
 
 class _Mosaic:
-    """The tiles of one layer in a window of a level: left, top, right and bottom in pixels of the level."""
+    """The tiles of one layer in a window of a level: left, top, right and bottom in pixels of the level.
+
+    `channels`: 1, 3 or 4; with one, nothing is 255, else 0.
+    """
 
     def __init__(self, request: PictureRequest, z: int, window: tuple[int, int, int, int], channels: int) -> None:
         self._request, self._z = request, z
         self._left, self._top, right, bottom = window
-        self.pixels: Pixels = np.zeros((bottom - self._top, right - self._left, channels), np.uint8)
+        self.pixels: Pixels = np.full((bottom - self._top, right - self._left, channels), 255 if channels == 1 else 0, np.uint8)
 
     def fill(self, get_tile: GetTile, layer: str) -> bool:
         """Returns whether any tile has content."""
@@ -119,48 +133,10 @@ def _tiles(start: int, size: int, side: int, z: int) -> range:
 def _decode(data: bytes, channels: int, layer: str, tile: TileId) -> Pixels:
     try:
         with Image.open(io.BytesIO(data)) as image:
-            return np.asarray(image.convert("RGBA" if channels == 4 else "RGB"))
+            pixels = np.asarray(image.convert({1: "L", 3: "RGB", 4: "RGBA"}[channels]))
+            return pixels.reshape(*pixels.shape[:2], channels)
     except (OSError, ValueError) as error:
         raise Corrupt(f"tile {layer}/{tile.z}/{tile.x}/{tile.y} is not an image: {error}; run: map3d verify") from error
-
-
-def light_colors(rgb: Pixels, normals: Pixels, light: PictureLight = DEFAULT_LIGHT) -> Pixels:
-    """Returns sRGB colours in a light of the viewer. Half of a pixel's light is its own, an eighth comes from each neighbour, because colours
-    along edges are mixtures. Pixels without a normal have skylight and half of the sunlight."""
-    has_normal = normals.any(axis=-1)
-    unit = normals.astype(np.float32) / 127.5 - 1
-    unit /= np.maximum(np.linalg.norm(unit, axis=-1, keepdims=True), 1e-6)
-    own = np.where(has_normal, np.maximum(unit @ np.array(light.towards, np.float32), 0), np.nan)
-    beam = np.where(has_normal, _spread(own), 0.5)[..., None].astype(np.float32)
-    factors = np.array(light.sky_rgb, np.float32) * np.float32(AMBIENT) + np.array(light.sun_rgb, np.float32) * np.float32(DIFFUSE) * beam
-    linear = _LINEAR[rgb] * factors
-    index = np.rint(np.clip(linear, 0, 1) * (len(_SRGB) - 1)).astype(np.uint16)
-    lit: Pixels = _SRGB[index]
-    return lit
-
-
-def _spread(own: NDArray[np.float32]) -> NDArray[np.float32]:
-    padded = np.pad(own, 1, mode="edge")
-    neighbours = (padded[1:-1, :-2], padded[1:-1, 2:], padded[:-2, 1:-1], padded[2:, 1:-1])
-    return 0.5 * own + 0.125 * sum(np.where(np.isnan(one), own, one) for one in neighbours)
-
-
-def _linear_table() -> NDArray[np.float32]:
-    """Returns the linear light of each sRGB byte (IEC 61966-2-1)."""
-    c = np.arange(256) / 255
-    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4).astype(np.float32)
-
-
-def _srgb_table() -> Pixels:
-    """Returns the sRGB byte of each of 4,096 evenly spaced steps of linear light."""
-    c = np.arange(4096) / 4095
-    srgb = np.where(c <= 0.0031308, c * 12.92, 1.055 * c ** (1 / 2.4) - 0.055)
-    table: Pixels = np.rint(255 * srgb).astype(np.uint8)
-    return table
-
-
-_LINEAR: Final = _linear_table()
-_SRGB: Final = _srgb_table()
 
 
 def _encode(picture: Image.Image, media_type: str) -> bytes:

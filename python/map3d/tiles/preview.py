@@ -1,4 +1,4 @@
-"""Chooses a preview of a rendering: a window of one view's colour layer that the content fills, and the tiles that it shows."""
+"""Chooses a preview of a rendering: a window of one view that the content fills, and the tiles that it shows."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -6,9 +6,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from map3d.tiles.manifest import Manifest, ManifestView, block_version
+from map3d.tiles.manifest import Manifest, ManifestView
 from map3d.tiles.occupancy import Occupancy
-from map3d.types import COLOR_KINDS, TileId
+from map3d.types import COLOR_KINDS, Layer, TileId
 
 ASPECT: Final = 1.6
 MIN_WIDTH_PX: Final = 640
@@ -19,27 +19,18 @@ COVERED: Final = 0.98
 """Share of inner cells in a window that content covers."""
 SMALLEST_CROP: Final = 0.4
 """Narrowest window, as a share of the widest one."""
-
-
-@dataclass(frozen=True)
-class PreviewTile:
-    """A tile at pixel (x, y) of its level; `version` is that of its block."""
-
-    tile: TileId
-    x: int
-    y: int
-    version: int
+CROPPED_M: Final = 300.0
+"""Content less wide, such as a single building, is shown whole."""
 
 
 @dataclass(frozen=True)
 class Preview:
-    """`window`: (left, top, width, height) in pixels of the tiles' level."""
+    """`layer`: of colours, lit or not; `window`: (left, top, width, height) in pixels of the tiles' level."""
 
     view: str
-    layer: str
-    tile_px: int
+    layer: Layer
     window: tuple[float, float, float, float]
-    tiles: tuple[PreviewTile, ...]
+    tiles: tuple[TileId, ...]
 
 
 @dataclass(frozen=True)
@@ -66,16 +57,15 @@ class _Window:
 def choose_preview(manifest: Manifest, *, aspect: float = ASPECT, min_width_px: int = MIN_WIDTH_PX) -> Preview | None:
     """Returns None while no tile of a colour layer exists. `aspect`: width divided by height."""
     view = next((view for view in manifest.views if view.occupancy.count(0)), None)
-    found = next(((number, layer) for number, layers in enumerate(manifest.passes) for layer in layers if layer.kind in COLOR_KINDS), None)
-    if view is None or found is None:
+    layer = next((layer for layers in manifest.passes for layer in layers if layer.kind in COLOR_KINDS), None)
+    if view is None or layer is None:
         return None
-    number, layer = found
-    window = _choose_window(_occupied_grid(view.occupancy), aspect)
+    window = _choose_window(_occupied_grid(view.occupancy), aspect, CROPPED_M / view.frame.size_m)
     z = next((z for z in range(manifest.zmax) if window.width * 2**z * manifest.tile_px >= min_width_px), manifest.zmax)
     side_px = 2**z * manifest.tile_px
     pixels = (window.width * side_px, window.height * side_px)
     left, top = window.x * side_px - pixels[0] / 2, window.y * side_px - pixels[1] / 2
-    return Preview(view.frame.id, layer.name, manifest.tile_px, (left, top, *pixels), _find_tiles(view, number, z, window, manifest.tile_px))
+    return Preview(view.frame.id, layer, (left, top, *pixels), _find_tiles(view, z, window))
 
 
 def _occupied_grid(occupancy: Occupancy) -> NDArray[np.bool_]:
@@ -86,14 +76,18 @@ def _occupied_grid(occupancy: Occupancy) -> NDArray[np.bool_]:
     return grid
 
 
-def _choose_window(grid: NDArray[np.bool_], aspect: float) -> _Window:
-    """Returns the largest centred window that content covers; if there is none, the window that contains all content."""
+def _choose_window(grid: NDArray[np.bool_], aspect: float, least_cropped: float) -> _Window:
+    """Returns the largest centred window that content covers. If there is none, and for content less wide than `least_cropped`, returns the window
+    that contains all content."""
     rows, columns = (np.flatnonzero(grid.any(axis=axis)) for axis in (1, 0))
     (top, bottom), (left, right) = ((line[0] / len(grid), (line[-1] + 1) / len(grid)) for line in (rows, columns))
     x, y, width, height = (left + right) / 2, (top + bottom) / 2, right - left, bottom - top
+    whole = _Window(x, y, max(width, height * aspect), aspect)
+    if width < least_cropped:
+        return whole
     inner = _erode(grid)
     crops = (_Window(x, y, min(width, height * aspect) * scale, aspect) for scale in np.arange(1.0, SMALLEST_CROP, -0.05))
-    return next((crop for crop in crops if crop.covered_share(inner) >= COVERED), _Window(x, y, max(width, height * aspect), aspect))
+    return next((crop for crop in crops if crop.covered_share(inner) >= COVERED), whole)
 
 
 def _erode(grid: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -107,10 +101,10 @@ def _erode(grid: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return inner
 
 
-def _find_tiles(view: ManifestView, number: int, z: int, window: _Window, tile_px: int) -> tuple[PreviewTile, ...]:
+def _find_tiles(view: ManifestView, z: int, window: _Window) -> tuple[TileId, ...]:
     columns, rows = (_cells(centre, size, 2**z) for centre, size in ((window.x, window.width), (window.y, window.height)))
     tiles = (TileId(z, x, y) for y in rows for x in columns)
-    return tuple(PreviewTile(tile, tile.x * tile_px, tile.y * tile_px, block_version(view, tile, number)) for tile in tiles if tile in view.occupancy)
+    return tuple(tile for tile in tiles if tile in view.occupancy)
 
 
 def _cells(centre: float, size: float, count: int) -> range:

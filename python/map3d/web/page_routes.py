@@ -18,7 +18,7 @@ from map3d.publish.preview_picture import HEIGHT_PX, WIDTH_PX, make_preview
 from map3d.renderings.track_stores import read_manifest, tiles_url
 from map3d.tile_services.picture_request import parse_link
 from map3d.tiles.manifest import Manifest
-from map3d.tiles.preview import Preview, choose_preview
+from map3d.tiles.preview import choose_preview
 from map3d.tiles.viewer_files import PAGE, viewer_folder
 from map3d.types import check_name
 from map3d.web.compression import compress
@@ -53,7 +53,7 @@ class ListedRendering:
     views: int = 0
     layers: int = 0
     changed: datetime | None = None
-    preview: Preview | None = None
+    has_picture: bool = False
 
 
 @pages.get("/")
@@ -67,12 +67,9 @@ def home() -> WerkzeugResponse:
 
 @pages.get("/renderings")
 def renderings() -> WerkzeugResponse:
-    """Lists the renderings. On a server that renders on demand, asking for the tiles of a preview would have them rendered, so the page shows
-    pictures that are made of stored tiles."""
+    """Lists the renderings with pictures that are made of stored tiles."""
     listed = sorted((_describe(record) for record in catalogue().renderings()), key=lambda item: (item.changed is None, item.title.casefold()))
-    return _without_cache(
-        compress(Response(render_template("renderings.html", renderings=listed, on_demand=renders_on_demand()), mimetype="text/html"))
-    )
+    return _without_cache(compress(Response(render_template("renderings.html", renderings=listed), mimetype="text/html")))
 
 
 @pages.get("/view/<rendering>/")
@@ -178,4 +175,6 @@ def _describe(record: RenderingRecord) -> ListedRendering:
         status_of(error if isinstance(error, Map3dError) else Map3dError(f"rendering {name}: {error}"))
         return ListedRendering(name, title, attribution, "unreadable")
     state = "complete" if manifest.complete else "incomplete"
-    return ListedRendering(name, title, attribution, state, size, len(manifest.views), len(manifest.layers), changed, choose_preview(manifest))
+    return ListedRendering(
+        name, title, attribution, state, size, len(manifest.views), len(manifest.layers), changed, choose_preview(manifest) is not None
+    )

@@ -14,6 +14,8 @@ use crate::lattice::{Point, metres, snap};
 const GRID_M: f64 = 700.0;
 const MARGIN: f64 = 0.05;
 const MIN_MARGIN_M: f64 = 10.0;
+/// Content smaller than some houses, such as a find, has a margin of this share of its longer side instead of the least one.
+const SMALL_MARGIN: f64 = 0.25;
 /// Squares of a plane under the whole box; with more, only those near content remain.
 const MAX_SQUARES: f64 = 65_536.0;
 /// Squares of all planes.
@@ -82,7 +84,8 @@ impl GroundLevel {
 
     fn grid(&self, axis: usize) -> GridAxis {
         let (lo, hi) = (self.bounds.lo[axis], self.bounds.hi[axis]);
-        let margin = ((hi - lo) * MARGIN).max(MIN_MARGIN_M);
+        let longer = (0..3).map(|k| self.bounds.hi[k] - self.bounds.lo[k]).fold(0.0, f64::max);
+        let margin = ((hi - lo) * MARGIN).max((longer * SMALL_MARGIN).min(MIN_MARGIN_M));
         let (lo, hi) = (lo - margin, hi + margin);
         GridAxis { lo, hi, count: ((hi - lo) / GRID_M).ceil() }
     }
