@@ -13,8 +13,9 @@ from map3d.types import COLOR_KINDS, Layer, TileId
 ASPECT: Final = 1.6
 MIN_WIDTH_PX: Final = 640
 """The preview takes the first level at which its window is this wide, unless the caller names another width."""
-GRID_LEVEL: Final = 6
-"""Level whose occupied tiles determine the window."""
+GRID_LEVELS: Final = range(6, 12)
+"""Levels whose occupied tiles may determine the window: the first one at which content has enough columns."""
+GRID_COLUMNS: Final = 16
 COVERED: Final = 0.98
 """Share of inner cells in a window that content covers."""
 SMALLEST_CROP: Final = 0.4
@@ -69,10 +70,13 @@ def choose_preview(manifest: Manifest, *, aspect: float = ASPECT, min_width_px: 
 
 
 def _occupied_grid(occupancy: Occupancy) -> NDArray[np.bool_]:
-    z = min(occupancy.zmax, GRID_LEVEL)
+    for level in GRID_LEVELS:
+        z = min(occupancy.zmax, level)
+        columns, rows = (np.array(line, np.int64) for line in zip(*((tile.x, tile.y) for tile in occupancy.tiles(z)), strict=True))
+        if z < level or np.ptp(columns) >= GRID_COLUMNS:
+            break
     grid = np.zeros((2**z, 2**z), dtype=bool)
-    for tile in occupancy.tiles(z):
-        grid[tile.y, tile.x] = True
+    grid[rows, columns] = True
     return grid
 
 
