@@ -9,7 +9,8 @@ from PIL import Image
 from pyproj import CRS, Transformer
 
 from map3d.ingest.sources import find_sources
-from map3d.ingest.terrain.terrain_import import TerrainOptions, import_terrain
+from map3d.ingest.terrain.terrain_import import import_terrain
+from map3d.ingest.terrain.terrain_options import TerrainOptions
 from tests.cli.towns import Run
 from tests.ingest.terrain.rasters import NORTH, WEST, RecordingWriter, colours, from_bounds, hills, write
 from tests.odd_cities.test_axis_order import add

@@ -46,7 +46,7 @@ def command(workspace: Workspace, scene: str, files: Sequence[Path], as_json: bo
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     try:
         with progress_bar(*columns) as bar:
-            show = _show(bar, bar.add_task("importing"))
+            show = _show(bar, bar.add_task("importing", total=None))
             result = import_files(workspace, catalogue, scene, files, ImportOptions(**options), name=name, progress=show)
         place = place_line(workspace, catalogue, scene)
     finally:

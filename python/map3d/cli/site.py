@@ -133,8 +133,8 @@ def _update_files(workspace: Workspace, catalogue: Catalogue, request: "SiteRequ
     with progress_bar(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()) as bar:
         task = bar.add_task("importing", total=None)
 
-        def report(name: str, done: int, total: int) -> None:
-            bar.update(task, description=f"importing {name}", completed=done, total=total)
+        def report(name: str, done: int, total: int, how_far: str) -> None:
+            bar.update(task, description=f"importing {name}: {how_far}" if how_far else f"importing {name}", completed=done, total=total)
 
         summary = update_files(workspace, catalogue, request.files, report)
     _print_summary(summary)

@@ -2,6 +2,7 @@
 
 import shutil
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -9,11 +10,14 @@ from typing import Any, Final
 from map3d import _core, errors
 from map3d.catalogue import AssetRecord, Catalogue, SceneCrs, SceneRecord, Workspace
 from map3d.catalogue.scene_lock import scene_lock
+from map3d.cores import usable_cores
 from map3d.errors import CrsError, ImportFailed, LimitExceeded, Map3dError, SubprocessDied, SubprocessTimedOut
 from map3d.ingest.asset import asset_digest, new_objects, put_in_place, read_objects, world_boxes, write_ids, write_report
 from map3d.ingest.content import find_content
 from map3d.ingest.import_inputs import ImportInputs, import_inputs
 from map3d.ingest.import_options import ImportOptions
+from map3d.ingest.import_pieces import import_pieces, pieces_key
+from map3d.ingest.import_progress import ImportProgress
 from map3d.ingest.parser_process import ParserProcess
 from map3d.ingest.referenced_files import find_missing_files
 from map3d.ingest.scene_crs import LOCAL
@@ -28,6 +32,9 @@ DOCUMENT_PARSER_ENTRY: Final = "map3d.ingest.parse_document:open_document_parser
 ORIGIN_STEP_M: Final = 100.0
 MAX_MISSING_NAMES: Final = 200
 MAX_FROM_ORIGIN_M: Final = _core.MAX_FROM_ORIGIN_M
+
+_NOT_IN_PIECES: Final = ("strict", "max_object_bytes", "max_appearance_bytes")
+"""Options on which the pieces of a terrain do not depend."""
 
 OnProgress = Callable[[str], None]
 """Called with the number of triangles or tiles read so far, as text."""
@@ -71,21 +78,40 @@ def import_file(
     shutil.rmtree(draft, ignore_errors=True)
     draft.mkdir(parents=True)
     try:
-        with parser or ParserProcess() as running:
-            parsed = _parse(record, source, options, draft, progress, running, entry or PARSER_ENTRIES.get(source.format, DOCUMENT_PARSER_ENTRY))
-        report = parsed["report"]
-        if not report["triangles"]:
-            raise ImportFailed(f"{source.paths[0]}: no usable triangle in the file{_list_skipped(report)}")
-        with scene_lock(workspace, scene):
-            finish_imports(workspace, catalogue, scene)
-            proposed = None if parsed["crs"] is None else SceneCrs(**parsed["crs"])
-            return _add_to_scene(workspace, catalogue, record, source, draft, report, proposed, inputs)
+        with _pieces(record, source, final, inputs) as pieces:
+            with parser or ParserProcess() as running:
+                parser_entry = entry or PARSER_ENTRIES.get(source.format, DOCUMENT_PARSER_ENTRY)
+                parsed = _parse(record, source, options, draft, pieces, progress, running, parser_entry)
+            report = parsed["report"]
+            if not report["triangles"]:
+                raise ImportFailed(f"{source.paths[0]}: no usable triangle in the file{_list_skipped(report)}")
+            with scene_lock(workspace, scene):
+                finish_imports(workspace, catalogue, scene)
+                proposed = None if parsed["crs"] is None else SceneCrs(**parsed["crs"])
+                return _add_to_scene(workspace, catalogue, record, source, draft, report, proposed, inputs)
     finally:
         shutil.rmtree(draft, ignore_errors=True)
 
 
+def _pieces(record: SceneRecord, source: SourceDocument, final: Path, inputs: ImportInputs) -> AbstractContextManager[Path | None]:
+    """Returns the folder for the pieces of an import of rasters; None for other formats."""
+    if source.format != "raster":
+        return nullcontext()
+    options = {name: value for name, value in inputs.options.items() if name not in _NOT_IN_PIECES}
+    paths = [str(path.absolute()) for path in source.paths]
+    key = {"files": inputs.files, "paths": paths, "options": options, "reader": inputs.reader, "scene_crs": _crs_text(record.crs)}
+    return import_pieces(final, pieces_key(key))
+
+
 def _parse(
-    record: SceneRecord, source: SourceDocument, options: ImportOptions, draft: Path, progress: OnProgress | None, parser: ParserProcess, entry: str
+    record: SceneRecord,
+    source: SourceDocument,
+    options: ImportOptions,
+    draft: Path,
+    pieces: Path | None,
+    progress: OnProgress | None,
+    parser: ParserProcess,
+    entry: str,
 ) -> dict[str, Any]:
     limits = options.limits(source.paths, source.format)
     request = {
@@ -98,12 +124,13 @@ def _parse(
         "crs": options.crs,
         "scene_crs": _crs_text(record.crs),
         "scene_origin": record.origin,
+        "pieces": None if pieces is None else str(pieces.absolute()),
+        "cores": usable_cores(),
     }
+    shown = ImportProgress()
     try:
         subprocess, applied = parser.get(entry, limits)
-        message = subprocess.request(
-            request, wall_s=limits.wall_s, on_progress=lambda counts: counts and progress and progress(_progress_text(counts))
-        )
+        message = subprocess.request(request, wall_s=limits.wall_s, on_progress=lambda counts: counts and progress and progress(shown.text(counts)))
     except (SubprocessDied, LimitExceeded) as error:
         parser.stop()
         raise _parser_error(source, limits, error) from error
@@ -115,10 +142,6 @@ def _parse(
     response: dict[str, Any] = message.value
     response["report"]["parser"] = {**applied, "address_space_bytes": limits.address_space_bytes, "cpu_s": limits.cpu_s}
     return response
-
-
-def _progress_text(done: Mapping[str, int]) -> str:
-    return f"{done['triangles']:,} triangles" if "triangles" in done else f"{done['done']} of {done['total']} tiles"
 
 
 def _add_to_scene(

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 from map3d.catalogue import AssetRecord, Catalogue, SceneRecord, Workspace
@@ -11,15 +12,15 @@ from map3d.errors import BadRequest, Map3dError, UnknownFormat
 from map3d.ingest.asset_removal import remove_assets
 from map3d.ingest.import_inputs import import_inputs
 from map3d.ingest.import_options import ImportOptions
-from map3d.ingest.importing import import_file
+from map3d.ingest.importing import OnProgress, import_file
 from map3d.ingest.parser_process import ParserProcess
 from map3d.ingest.sources import SourceDocument, find_sources
 from map3d.ingest.unfinished_imports import finish_imports
 from map3d.renderings.remove_files import remove_built_files
 from map3d.renderings.remove_scene import finish_scene_removal
 
-OnSource = Callable[[str, int, int], None]
-"""Called with the name of the next file, the number of files done, and of all."""
+OnSource = Callable[[str, int, int, str], None]
+"""Called with the name of the current file, the number of files done, and of all, and what was read of the file so far, as text."""
 
 
 @dataclass(frozen=True)
@@ -74,8 +75,9 @@ class _Update:
         self._summary.elsewhere.extend(name for name, asset in self._assets.items() if not self._is_inside(asset) and name not in _names(sources))
         with ParserProcess() as parser:
             for number, source in enumerate(sources):
-                report(source.paths[0].name, number, len(sources))
-                self._import_if_changed(source, parser)
+                show = partial(report, source.paths[0].name, number, len(sources))
+                show("")
+                self._import_if_changed(source, parser, show)
         if sources and not self._summary.imported and not self._summary.unchanged:
             raise BadRequest(f"{self._files.folder}: none of its {len(sources)} files is usable; first error: {self._summary.failed[0][1]}")
         self._remove([asset.name for asset in leaving])
@@ -132,7 +134,7 @@ class _Update:
                     "If they are gone for good, remove the empty folder or run again with --allow-empty"
                 )
 
-    def _import_if_changed(self, source: SourceDocument, parser: ParserProcess) -> None:
+    def _import_if_changed(self, source: SourceDocument, parser: ParserProcess, show: OnProgress) -> None:
         asset = self._assets.get(source.name)
         try:
             reason = None
@@ -141,7 +143,7 @@ class _Update:
                 if reason is None:
                     self._keep(asset, source)
                     return
-            import_file(self._workspace, self._catalogue, self._files.scene.name, source, self._files.options, parser=parser)
+            import_file(self._workspace, self._catalogue, self._files.scene.name, source, self._files.options, show, parser=parser)
         except Map3dError as error:
             if self._files.options.strict:
                 raise

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from pyproj import CRS
 
-from map3d.ingest.terrain.terrain_import import TerrainOptions, import_terrain
+from map3d.ingest.terrain.terrain_import import import_terrain
+from map3d.ingest.terrain.terrain_options import TerrainOptions
 from tests.ingest.terrain.rasters import NORTH, WEST, colours, hills, write
 
 pytest.importorskip("map3d._core", reason="the compiled core is not built")

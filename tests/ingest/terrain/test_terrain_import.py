@@ -14,9 +14,10 @@ from rasterio.enums import ColorInterp
 from rasterio.shutil import copy
 
 from map3d.errors import BadRequest, CrsError, ImportFailed, LimitExceeded, NotFound, Stopped
-from map3d.ingest.terrain import terrain_import
+from map3d.ingest.terrain import terrain_rasters
 from map3d.ingest.terrain.height_tint import COLOURS
-from map3d.ingest.terrain.terrain_import import TerrainOptions, import_terrain
+from map3d.ingest.terrain.terrain_import import import_terrain
+from map3d.ingest.terrain.terrain_options import TerrainOptions
 from tests.ingest.terrain.rasters import NORTH, WEST, RecordingWriter, colours, from_bounds, hills, pixel_of, write
 
 UTM = CRS.from_epsg(25832)
@@ -424,9 +425,9 @@ def test_too_many_triangles_are_refused_with_advice(tmp_path, folder, monkeypatc
     dem = write(tmp_path / "dem.tif", hills(20, 20))
     triangles = 2 * 21 * 21
     for limit in (triangles, triangles + 1):
-        monkeypatch.setattr(terrain_import, "MAX_TRIANGLES", limit)
+        monkeypatch.setattr(terrain_rasters, "MAX_TRIANGLES", limit)
         run(dem, None, folder)
-    monkeypatch.setattr(terrain_import, "MAX_TRIANGLES", triangles - 1)
+    monkeypatch.setattr(terrain_rasters, "MAX_TRIANGLES", triangles - 1)
     with pytest.raises(LimitExceeded, match=r"--max-error 0\.1, or reduce the resolution with gdal_translate"):
         run(dem, None, folder)
     run(dem, None, folder, max_error_m=0.5)

@@ -1,6 +1,7 @@
 """Cuts texture tiles from an orthophoto, window by window: 8-bit RGB. Gaps get the ground colour or become transparent."""
 
 import io
+import threading
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -13,6 +14,7 @@ from rasterio.enums import ColorInterp, MaskFlags, Resampling
 from rasterio.windows import Window
 
 from map3d.errors import ImportFailed
+from map3d.ingest.terrain.stored_blocks import StoredBlocks
 
 MARGIN_PX: Final = 8
 ALIGN_PX: Final = 8
@@ -20,6 +22,7 @@ EXTEND_PX: Final = MARGIN_PX + ALIGN_PX
 """Distance by which colours extend into gaps, so that filtering at the edge of a gap does not mix in the ground colour."""
 
 JPEG_QUALITY: Final = 90
+PLAIN_PX: Final = 8
 SAMPLE_PX: Final = 1024
 """Side of the overview that determines the range of values."""
 
@@ -39,6 +42,10 @@ class TextureTile:
     size_px: tuple[int, int]
     cutout: bool
 
+    @property
+    def file_name(self) -> str:
+        return f"{self.key}.{'png' if self.cutout else 'jpg'}"
+
     def uvs(self, columns: NDArray[np.float64], rows: NDArray[np.float64]) -> NDArray[np.float32]:
         """Returns (n, 2) texture coordinates of photo positions: (0, 0) is the lower left corner, texel centres are at (i + ½)/size."""
         u = (columns - self.left) * self.scale[0] / self.size_px[0]
@@ -54,6 +61,7 @@ class Orthophoto:
         self._ground = np.array(ground, dtype=np.uint8)
         self._max_side_px = max_side_px
         self._bands = _find_colour_bands(dataset)
+        self._blocks = StoredBlocks(dataset, self._bands)
         self._has_no_gaps = all(flags == [MaskFlags.all_valid] for flags in dataset.mask_flag_enums)
         self._palette = _read_palette(dataset) if len(self._bands) == 1 else None
         self.stretch = (0.0, 255.0) if self._palette is not None else stretch or self._find_stretch()
@@ -61,7 +69,8 @@ class Orthophoto:
     def cut(self, box: tuple[float, float, float, float], folder: Path, *, cutout: bool) -> TextureTile | None:
         """Writes the texture of photo positions (left, top, right, bottom) into `folder`; returns None if the photo has no pixel there.
 
-        `cutout`: gaps become transparent; otherwise they get the ground colour. Near photo pixels, gaps get the colour of the nearest one.
+        `cutout`: gaps become transparent; otherwise they get the ground colour. Near photo pixels, gaps get the colour of the nearest one. A texture
+        of one colour has PLAIN_PX texels along a side.
         """
         left, top, right, bottom = _align(box)
         width, height = self._image_side(right - left), self._image_side(bottom - top)
@@ -69,10 +78,14 @@ class Orthophoto:
         if not covered.any():
             return None
         transparent = cutout and not covered.all()
+        if not transparent and (colour == colour[0, 0]).all():
+            colour = colour[:PLAIN_PX, :PLAIN_PX]
+            height, width = colour.shape[:2]
         data = _encode_png(colour, covered) if transparent else _encode_jpeg(colour)
         key = sha256(data).hexdigest()[:32]
-        (folder / f"{key}.{'png' if transparent else 'jpg'}").write_bytes(data)
-        return TextureTile(key, left, top, (width / (right - left), height / (bottom - top)), (width, height), transparent)
+        tile = TextureTile(key, left, top, (width / (right - left), height / (bottom - top)), (width, height), transparent)
+        _write_image(folder / tile.file_name, data)
+        return tile
 
     def _image_side(self, pixels: int) -> int:
         return min(pixels, self._max_side_px)
@@ -81,14 +94,20 @@ class Orthophoto:
         """Returns (h, w, 3) colours of a window and the (h, w) mask of covered pixels. Outside the photo, edge pixels repeat and count as covered."""
         x0, y0 = max(left, 0), max(top, 0)
         x1, y1 = min(left + width, self.dataset.width), min(top + height, self.dataset.height)
+        nothing = np.zeros((out_height, out_width, 3), dtype=np.uint8), np.zeros((out_height, out_width), dtype=bool)
         if x0 >= x1 or y0 >= y1:
-            return np.zeros((out_height, out_width, 3), dtype=np.uint8), np.zeros((out_height, out_width), dtype=bool)
+            return nothing
         columns = _to_image_pixels(x0 - left, x1 - left, out_width / width, out_width)
         rows = _to_image_pixels(y0 - top, y1 - top, out_height / height, out_height)
         colour, covered = self._read_inside(Window(x0, y0, x1 - x0, y1 - y0), len(rows), len(columns))
+        if not covered.any():
+            return nothing
         return _pad(_fill_gaps(colour, covered, self._ground), covered, rows, columns, (out_height, out_width), self._ground)
 
     def _read_inside(self, window: Window, rows: int, columns: int) -> tuple[Colours, Mask]:
+        stored = self._blocks.mask(window, rows, columns)
+        if stored is not None and not stored.any():
+            return np.zeros((rows, columns, 3), dtype=np.uint8), stored
         resampling = Resampling.nearest if self._palette is not None else Resampling.average
         try:
             data = self.dataset.read(self._bands, window=window, out_shape=(len(self._bands), rows, columns), resampling=resampling)
@@ -98,6 +117,8 @@ class Orthophoto:
         covered = np.ones((rows, columns), dtype=bool) if mask is None else mask > 0
         if data.dtype.kind == "f":
             covered &= np.isfinite(data).all(axis=0)
+        if stored is not None:
+            covered &= stored
         return np.moveaxis(self._to_bytes(data), 0, -1), covered
 
     def _to_bytes(self, data: NDArray[Any]) -> Colours:
@@ -206,6 +227,13 @@ def _pad(colour: Colours, covered: Mask, rows: range, columns: range, shape: tup
     known = np.ones(shape, dtype=bool) if covered.any() else np.zeros(shape, dtype=bool)
     known[rows.start : rows.stop, columns.start : columns.stop] = covered
     return padded, known
+
+
+def _write_image(path: Path, data: bytes) -> None:
+    """Writes a file named after its content, in one step: other threads may write the same."""
+    draft = path.with_name(f"{path.name}.{threading.get_ident()}.new")
+    draft.write_bytes(data)
+    draft.replace(path)
 
 
 def _encode_jpeg(colour: Colours) -> bytes:

@@ -1,7 +1,9 @@
 """Entry point of the limited subprocess that imports terrain: classifies the rasters, determines the scene's CRS, writes the asset folder."""
 
+import math
+import resource
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,10 +17,18 @@ from map3d.ingest.scene_crs import LOCAL, to_scene_crs
 from map3d.ingest.terrain.raster_georeference import open_raster
 from map3d.ingest.terrain.raster_groups import split_far
 from map3d.ingest.terrain.raster_placement import RasterPlacement
-from map3d.ingest.terrain.terrain_import import TerrainOptions, import_terrain
+from map3d.ingest.terrain.terrain_import import import_terrain
+from map3d.ingest.terrain.terrain_options import MAX_WORKERS, TerrainOptions
+from map3d.ingest.terrain.terrain_pieces import GDAL_CACHE_MB
 from map3d.subprocess import Handler, ReportProgress
 
 IMAGE_BANDS: Final = (3, 4)
+WORKER_BYTES: Final = 64 << 20
+BYTES_PER_PX: Final = 40
+"""Memory for a pixel of a texture while it is cut from a photo of bytes."""
+
+CONVERTED_BYTES_PER_PX: Final = 100
+"""The same for a photo of other values."""
 
 
 def open_terrain_parser(_setup: Mapping[str, Any]) -> Handler:
@@ -29,7 +39,10 @@ def open_terrain_parser(_setup: Mapping[str, Any]) -> Handler:
 
 
 def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
-    """`request`: {"paths", "folder", "name", "crs", "scene_crs", "scene_origin", "reader"}; the response is that of map3d.ingest.parse_document."""
+    """`request`: {"paths", "folder", "name", "crs", "scene_crs", "scene_origin", "reader", "pieces": folder or None, "cores"}.
+
+    Returns what map3d.ingest.parse_document returns.
+    """
     rasters, faults = open_rasters([Path(path) for path in request["paths"]], strict=request["reader"]["strict"])
     dems, orthos = classify_rasters(rasters)
     target = _choose_target(next(iter(dems or orthos), None), request["crs"], request["scene_crs"])
@@ -47,7 +60,9 @@ def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[
         return True
 
     options = TerrainOptions(name=request["name"], max_error_m=request["reader"].get("max_error_m", 0.0), crs=request["crs"])
-    terrain = import_terrain(dems, orthos, Path(request["folder"]), target, options, on_tile)
+    options = replace(options, workers=worker_count(request["cores"], _free_bytes(), options.texture_px, orthos))
+    pieces = request["pieces"] and Path(request["pieces"])
+    terrain = import_terrain(dems, orthos, Path(request["folder"]), target, options, on_tile, pieces=pieces)
     proposed = LOCAL if target is None else to_scene_crs(target)
     placing = {"from": terrain["crs"] and CRS.from_user_input(terrain["crs"]).name, "to": proposed.name, **terrain["projection"]}
     if placement.place is not None:
@@ -85,6 +100,27 @@ def classify_rasters(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
         with open_raster(path) as raster:
             found[raster.count in IMAGE_BANDS or raster.dtypes[0] == "uint8"].append(path)
     return found
+
+
+def worker_count(cores: int, free_bytes: float, texture_px: int, orthos: Sequence[Path]) -> int:
+    """Returns the number of threads that may build tiles at once: one per core, as far as the memory suffices."""
+    is_bytes = all(_has_bytes(path) for path in orthos)
+    each = WORKER_BYTES + texture_px**2 * (BYTES_PER_PX if is_bytes else CONVERTED_BYTES_PER_PX)
+    return max(1, min(cores, MAX_WORKERS, int(min(free_bytes / each, MAX_WORKERS))))
+
+
+def _has_bytes(path: Path) -> bool:
+    with open_raster(path) as raster:
+        return bool(raster.dtypes[0] == "uint8")
+
+
+def _free_bytes() -> float:
+    """Returns how much of the address space that this process may have is free."""
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit == resource.RLIM_INFINITY:
+        return math.inf
+    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize() if Path("/proc/self/statm").exists() else 0
+    return float(limit - used - (GDAL_CACHE_MB << 20))
 
 
 def _choose_target(raster: Path | None, stated_crs: str | None, scene_crs: str | None) -> CRS | None:

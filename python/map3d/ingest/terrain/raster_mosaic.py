@@ -7,6 +7,7 @@ import math
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Self
@@ -125,6 +126,12 @@ class RasterMosaic:
         """Returns the dataset of a part as it is in the file."""
         self.open(part)
         return self._opened[part.path][0]
+
+    def reopen(self) -> Self:
+        """Returns the same mosaic for another thread: it opens rasters of its own."""
+        other = copy(self)
+        other._opened = OrderedDict()
+        return other
 
     def __enter__(self) -> Self:
         return self

@@ -1,0 +1,74 @@
+"""Pieces of long imports: what is finished before all is. They outlive a killed import and serve the next one of the same inputs.
+
+The folder `.NAME.KEY.pieces` lies beside the asset; KEY is the digest of everything that the pieces depend on. Pieces of other inputs are removed.
+"""
+
+import fcntl
+import hashlib
+import json
+import os
+import shutil
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+_SUFFIX: Final = ".pieces"
+_LOCK: Final = "lock"
+KEEP_S: Final = 7 * 86_400.0
+"""Pieces of an asset that is not imported again are removed after a week."""
+
+
+def pieces_key(inputs: Mapping[str, Any]) -> str:
+    """`inputs`: JSON values on which the pieces depend."""
+    return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()[:32]
+
+
+@contextmanager
+def import_pieces(asset: Path, key: str) -> Iterator[Path | None]:
+    """Yields the folder for the pieces of an asset, locked; None while another process imports the same. Removes it unless an exception leaves the
+    block: then the next import may go on with it."""
+    _remove_others(asset.parent, asset.name, key)
+    folder = asset.with_name(f".{asset.name}.{key}{_SUFFIX}")
+    folder.mkdir(parents=True, exist_ok=True)
+    lock = _lock(folder)
+    if lock is None:
+        yield None
+        return
+    try:
+        os.utime(folder)
+        yield folder
+        shutil.rmtree(folder, ignore_errors=True)
+    finally:
+        os.close(lock)
+
+
+def remove_pieces(asset: Path) -> None:
+    """Removes the pieces of an asset, unless a process uses them."""
+    _remove_others(asset.parent, asset.name, None)
+
+
+def _remove_others(assets: Path, name: str, key: str | None) -> None:
+    """Removes the asset's pieces of other inputs, and old pieces of any asset."""
+    for path in assets.glob(f".*{_SUFFIX}"):
+        owner, _, found = path.name.removesuffix(_SUFFIX).removeprefix(".").partition(".")
+        if (owner == name and found != key) or (owner != name and time.time() - path.stat().st_mtime > KEEP_S):
+            lock = _lock(path)
+            if lock is not None:
+                shutil.rmtree(path, ignore_errors=True)
+                os.close(lock)
+
+
+def _lock(folder: Path) -> int | None:
+    """Returns a descriptor that holds the folder's lock; None while another process holds it."""
+    try:
+        descriptor = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT, 0o666)
+    except FileNotFoundError:
+        return None
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(descriptor)
+        return None
+    return descriptor
