@@ -49,7 +49,10 @@ def test_formats_are_detected_by_content(tmp_path: Path, name: str, content: byt
         (b"PK\3\4", "ZIP"),
         (b"\x89PNG\r\n", "a PNG image without a world file"),
         (b"\xff\xd8\xff\xe0", "a JPEG image without a world file"),
-        (b"<VRTDataset/>", "a virtual raster; convert it with gdal_translate -of COG"),
+        (
+            b"<VRTDataset/>",
+            "a virtual raster, which map3d reads only on its own command line (map3d add-files); convert it with gdal_translate -of COG",
+        ),
         (b"just some words\nand more\n", "unknown format"),
         (b"v 0 0 0\0\0\0", "unknown format"),
     ],

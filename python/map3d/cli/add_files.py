@@ -47,7 +47,7 @@ def command(workspace: Workspace, scene: str, files: Sequence[Path], as_json: bo
     try:
         with progress_bar(*columns) as bar:
             show = _show(bar, bar.add_task("importing", total=None))
-            result = import_files(workspace, catalogue, scene, files, ImportOptions(**options), name=name, progress=show)
+            result = import_files(workspace, catalogue, scene, files, ImportOptions(**options, virtual_rasters=True), name=name, progress=show)
         place = place_line(workspace, catalogue, scene)
     finally:
         catalogue.close()

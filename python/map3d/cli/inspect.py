@@ -41,7 +41,7 @@ def command(files: Sequence[Path], as_json: bool, **options: Any) -> None:
 
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     with progress_bar(*columns) as bar:
-        found = inspect_files(files, ImportOptions(**options), _show(bar, bar.add_task("reading")))
+        found = inspect_files(files, ImportOptions(**options, virtual_rasters=True), _show(bar, bar.add_task("reading")))
     if as_json:
         print_json(found)
     else:

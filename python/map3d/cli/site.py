@@ -118,6 +118,7 @@ def _site_request(folder: Path, views: tuple[ViewAngles, ...], **options: Any) -
         color=options["color"],
         options=ImportOptions(
             **{name: options[name] for name in ("crs", "up", "split", "theme", "lod", "interiors", "transparency", "max_error_m", "strict")},
+            virtual_rasters=True,
         ),
         allow_empty=options["allow_empty"],
         keep_outliers=bool(options["keep_outliers"]),

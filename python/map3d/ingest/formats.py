@@ -21,7 +21,6 @@ _UNREADABLE: Final = {
     b"glTF": "glTF (binary)",
     b"PK\x03\x04": "a ZIP archive",
     b"LASF": "a LAS point cloud",
-    b"<VRTDataset": "a virtual raster; convert it with gdal_translate -of COG",
 }
 _OTHER_RASTERS: Final = {
     ".ecw": "an ECW raster (GDAL driver ECW)",
@@ -64,12 +63,21 @@ RASTER_FORMATS: Final = (
     RasterFormat("JPEG", re.compile(rb"\xff\xd8\xff"), world_files=(".jgw", ".jpgw", ".jpegw", ".wld"), is_image=True),
     RasterFormat("PNG", re.compile(rb"\x89PNG"), world_files=(".pgw", ".pngw", ".wld"), is_image=True),
 )
-"""Rasters that are read. Formats that reference other files are not among them: a virtual raster could read any file."""
+"""Rasters that are read from any place. Virtual rasters are not among them, since they could read any file: see map3d.ingest.virtual_raster."""
+
+VIRTUAL_DRIVER: Final = "VRT"
+VIRTUAL_REFUSED: Final = "a virtual raster, which map3d reads only on its own command line (map3d add-files); convert it with gdal_translate -of COG"
 
 
 def find_raster_format(head: bytes) -> RasterFormat | None:
     """Returns the format of a raster or an image. `head`: the first bytes of a file."""
     return next((format for format in RASTER_FORMATS if format.signature.match(head)), None)
+
+
+def is_virtual_raster(head: bytes) -> bool:
+    """`head`: the first bytes of a file."""
+    text = _to_utf8(head).lstrip()
+    return text.startswith(b"<") and _find_root_element(text) == b"VRTDataset"
 
 
 def check_stored(path: Path) -> None:
@@ -82,14 +90,19 @@ def check_stored(path: Path) -> None:
         raise UnknownFormat(f"{path}: a sparse file of {status.st_size:,} bytes, of which only {stored:,} are stored")
 
 
-def detect_format(path: Path) -> Format:
-    """Returns the format of a file, or of what a gzip file holds. Raises NotFound, or UnknownFormat with the list of readable formats."""
+def detect_format(path: Path, *, virtual: bool = False) -> Format:
+    """Returns the format of a file, or of what a gzip file holds. `virtual`: virtual rasters are rasters, too.
+
+    Raises NotFound, or UnknownFormat with the list of readable formats.
+    """
     try:
         check_stored(path)
         packed = is_gzip(path)
         head = unpacked_head(path, _HEAD_BYTES) if packed else _read_head(path)
     except OSError as error:
         raise NotFound(f"{path}: cannot read the file: {error.strerror}") from error
+    if virtual and not packed and is_virtual_raster(head):
+        return "raster"
     format = _detect(path, head)
     if format is None or (packed and format == "raster"):
         content = "a raster; unpack it first" if format else _describe_unknown(path, head)
@@ -156,6 +169,8 @@ def _describe_unknown(path: Path, head: bytes) -> str:
     text = _to_utf8(head).lstrip()
     if text.startswith(b"<"):
         root = _find_root_element(text)
+        if root == b"VRTDataset":
+            return VIRTUAL_REFUSED
         return f"XML with root element {root.decode('utf-8', 'replace')}" if root else "XML without a root element"
     if text.startswith(b"{"):
         return "JSON"

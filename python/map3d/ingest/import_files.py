@@ -50,7 +50,9 @@ def import_files(
     """
     catalogue.scene(scene)
     with unpacked(workspace, scene, files, progress or (lambda *_: None)) as found:
-        done = _import_files(workspace, catalogue, scene, found.paths, options, name, skip_unchanged, progress)
+        archives = {folder for folder, _ in found.archives}
+        virtual = [path for path in found.paths if options.virtual_rasters and path not in archives]
+        done = _import_files(workspace, catalogue, scene, found.paths, virtual, options, name, skip_unchanged, progress)
         failed = [(found.original(path), found.original(reason)) for path, reason in done.failed]
         left_alone = [(found.original(path), found.original(reason)) for path, reason in done.left_alone]
         return FilesImport(done.imported, done.unchanged, failed, left_alone)
@@ -61,6 +63,7 @@ def _import_files(
     catalogue: Catalogue,
     scene: str,
     files: Sequence[Path],
+    virtual: Sequence[Path],
     options: ImportOptions,
     name: str | None,
     skip_unchanged: bool,
@@ -73,6 +76,7 @@ def _import_files(
         lambda path, reason: result.failed.append((str(path), reason)),
         lambda path, reason: result.left_alone.append((str(path), reason)),
         {asset.name: Path(asset.source) for asset in catalogue.assets(scene)},
+        virtual,
     )
     if result.failed and options.strict:
         raise UnknownFormat(result.failed[0][1])

@@ -58,7 +58,7 @@ def import_inputs(source: SourceDocument, options: ImportOptions) -> ImportInput
     """Reads the source files. Raises NotFound for an unreadable one."""
     try:
         files = source_digest(source)
-        limits = options.limits(source.paths, source.format)
+        limits = options.limits(source.data_paths, source.format)
     except OSError as error:
         raise NotFound(f"{error.filename or source.paths[0]}: cannot read the file: {error.strerror or error}") from error
     return ImportInputs(files, {"crs": options.crs, **options.reader_options(source.format, limits)}, READER_VERSIONS[source.format])

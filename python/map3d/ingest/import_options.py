@@ -21,7 +21,8 @@ class ImportOptions:
     """`crs`: overrides the CRS that the file names, or supplies a missing one; "local" for plain metres. `up`, `split`: OBJ only.
     `theme`, `lod`, `interiors` (draws rooms): CityGML only. `transparency` of materials: "as-is", "inverted" (it is opacity), or "auto"
     (decided for each file). `max_error_m`: greatest height error of the triangles of an elevation model, 0 keeps every height.
-    A limit of None means its default."""
+    A limit of None means its default. `virtual_rasters`: reads virtual rasters (VRT), which name other files; only for paths that the operator of
+    this host gave."""
 
     crs: str | None = None
     up: str = "z"
@@ -35,6 +36,7 @@ class ImportOptions:
     parse_memory_bytes: int | None = None
     parse_cpu_s: int | None = None
     interiors: bool = False
+    virtual_rasters: bool = False
 
     def reader_options(self, format: str, limits: Limits) -> dict[str, Any]:
         """Returns the options of the core's Reader."""

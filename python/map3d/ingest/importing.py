@@ -113,7 +113,7 @@ def _parse(
     parser: ParserProcess,
     entry: str,
 ) -> dict[str, Any]:
-    limits = options.limits(source.paths, source.format)
+    limits = options.limits(source.data_paths, source.format)
     request = {
         "path": str(source.paths[0].absolute()),
         "paths": [str(path.absolute()) for path in source.paths],
@@ -126,6 +126,7 @@ def _parse(
         "scene_origin": record.origin,
         "pieces": None if pieces is None else str(pieces.absolute()),
         "cores": usable_cores(),
+        "virtual": {str(path.absolute()): str(folder.absolute()) for path, folder in source.virtual_folders.items()},
     }
     shown = ImportProgress()
     try:
@@ -166,7 +167,7 @@ def _add_to_scene(
     with Registry(workspace.registry_path(scene)) as registry:
         ids = registry.put_asset(source.name, new_objects(lines, boxes, record.origin))
     write_ids(draft, ids)
-    report |= inputs.report() | _missing_files(source) | {"bytes": sum(path.stat().st_size for path in source.paths)}
+    report |= inputs.report() | _missing_files(source) | {"bytes": sum(path.stat().st_size for path in source.data_paths)}
     write_report(draft, report)
     replaced = final.exists()
     digest = asset_digest(draft)

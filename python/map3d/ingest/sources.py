@@ -3,7 +3,7 @@
 import hashlib
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count, takewhile
 from pathlib import Path
@@ -12,6 +12,7 @@ from map3d.errors import NotFound, UnknownFormat
 from map3d.ingest.formats import RASTER_FORMATS, READABLE_FORMATS, Format, check_stored, detect_format, has_world_file
 from map3d.ingest.gzip_file import unpacked_path
 from map3d.ingest.referenced_files import find_code_lists, find_referenced_files
+from map3d.ingest.virtual_raster import find_virtual_sources, is_virtual
 
 _COMPANION_SUFFIXES = (
     ".mtl", ".jpg", ".jpeg", ".png", ".bmp", ".gif", ".tga", ".txt", ".md", ".json", ".pdf", ".html", ".prj", ".xsd", ".sqlite",
@@ -35,12 +36,24 @@ _HEAD_BYTES = 4096
 @dataclass(frozen=True)
 class SourceDocument:
     """`paths`: the document; for terrain, its rasters. `root`: the given folder, in which files that the document names may be; None for a document
-    that was given itself, whose files are in its own folder."""
+    that was given itself, whose files are in its own folder. `virtual`: a virtual raster may be among the rasters."""
 
     name: str
     format: Format
     paths: tuple[Path, ...]
     root: Path | None = None
+    virtual: bool = False
+
+    @property
+    def virtual_folders(self) -> dict[Path, Path]:
+        """The virtual rasters, and the folders in which the rasters that they name must be."""
+        return {path: self.root or path.parent for path in self.paths if is_virtual(path)} if self.virtual else {}
+
+    @property
+    def data_paths(self) -> tuple[Path, ...]:
+        """The files with the data: the rasters, those that virtual ones name included."""
+        named = [find_virtual_sources(path, folder) for path, folder in self.virtual_folders.items()]
+        return (*self.paths, *sorted({path for paths in named for path in paths} - {path.resolve() for path in self.paths}))
 
 
 def find_sources(
@@ -49,6 +62,7 @@ def find_sources(
     on_unreadable: OnUnreadable | None = None,
     on_left_alone: OnUnreadable | None = None,
     known: Mapping[str, Path] | None = None,
+    virtual: Collection[Path] = (),
 ) -> list[SourceDocument]:
     """Returns the given files, and every file of a known format below the given folders: CityGML, OBJ, then rasters, each by path.
 
@@ -57,7 +71,8 @@ def find_sources(
 
     `on_unreadable` is called for files in folders whose suffix announces a known format that their content is not; `on_left_alone` for other files
     that hold a city or a raster in a format that map3d does not read, or whose format is unknown. `known`: the files of assets by name; a file whose
-    name is needed for several keeps the one that it has there.
+    name is needed for several keeps the one that it has there. `virtual`: those of the paths at which virtual rasters are read; the rasters that
+    one in a folder names are not read a second time.
 
     Raises UnknownFormat for a given file of unknown format and for a folder without any readable file; NotFound.
     """
@@ -66,17 +81,17 @@ def find_sources(
     rasters: list[Path] = []
     for path in paths:
         if path.is_dir():
-            found = _search_folder(path, on_unreadable or (lambda *_: None), on_left_alone or (lambda *_: None))
+            found = _search_folder(path, on_unreadable or (lambda *_: None), on_left_alone or (lambda *_: None), virtual=path in virtual)
             documents += [_Group(unpacked_path(file).stem, format, (file,), path) for file, format in found if format != "raster"]
-            terrains += _group_rasters([file for file, format in found if format == "raster"])
+            terrains += _group_rasters([file for file, format in found if format == "raster"], path if path in virtual else None)
         elif not path.exists():
             raise NotFound(f"{path}: no such file or folder")
-        elif (format := detect_format(path)) == "raster":
+        elif (format := detect_format(path, virtual=path in virtual)) == "raster":
             rasters.append(path)
         else:
             documents.append(_Group(unpacked_path(path).stem, format, (path,)))
     if rasters:
-        terrains.append(_Group(rasters[0].stem, "raster", tuple(rasters)))
+        terrains.append(_Group(rasters[0].stem, "raster", tuple(rasters), virtual=any(path in virtual for path in rasters)))
     sources = _name_sources([*documents, *terrains], name, known or {})
     return sorted(sources, key=lambda source: _ORDER[source.format])
 
@@ -85,7 +100,7 @@ def source_digest(source: SourceDocument) -> str:
     """Computes the digest of the document, the files beside it whose names begin with its stem, and the libraries, images and code lists that it
     references."""
     total = hashlib.sha256()
-    for path in source.paths:
+    for path in source.data_paths:
         for part in [path, *_find_companions(path, source.root)]:
             check_stored(part)
             total.update(part.name.encode())
@@ -94,7 +109,7 @@ def source_digest(source: SourceDocument) -> str:
     return total.hexdigest()[:32]
 
 
-def _search_folder(folder: Path, on_unreadable: OnUnreadable, on_left_alone: OnUnreadable) -> list[tuple[Path, Format]]:
+def _search_folder(folder: Path, on_unreadable: OnUnreadable, on_left_alone: OnUnreadable, *, virtual: bool = False) -> list[tuple[Path, Format]]:
     found: list[tuple[Path, Format]] = []
     unknown: list[tuple[Path, str]] = []
     for path in sorted(path for path in _walk(folder) if path.exists() and not path.name.startswith(".")):
@@ -108,7 +123,7 @@ def _search_folder(folder: Path, on_unreadable: OnUnreadable, on_left_alone: OnU
                 unknown.append((path, "CityJSON; convert it to CityGML with citygml-tools"))
             continue
         try:
-            found.append((path, detect_format(path)))
+            found.append((path, detect_format(path, virtual=virtual)))
         except UnknownFormat as error:
             unknown.append((path, str(error)))
     if not found:
@@ -122,7 +137,13 @@ def _search_folder(folder: Path, on_unreadable: OnUnreadable, on_left_alone: OnU
             on_unreadable(path, reason)
         else:
             on_left_alone(path, reason.removeprefix(f"{path}: ").partition("; map3d reads")[0])
-    return found
+    return _without_named(found, folder) if virtual else found
+
+
+def _without_named(found: Sequence[tuple[Path, Format]], folder: Path) -> list[tuple[Path, Format]]:
+    """Leaves out the rasters that a virtual raster of the folder names."""
+    named = {source for path, format in found if format == "raster" for source in find_virtual_sources(path, folder)}
+    return [(path, format) for path, format in found if format != "raster" or path.resolve() not in named]
 
 
 def _used_code_lists(folder: Path, found: Sequence[tuple[Path, Format]], unknown: Sequence[Path]) -> set[Path]:
@@ -158,14 +179,16 @@ class _Group:
     format: Format
     paths: tuple[Path, ...]
     root: Path | None = None
+    virtual: bool = False
 
 
-def _group_rasters(rasters: Sequence[Path]) -> list[_Group]:
-    """Returns the rasters of a folder as one source: an elevation model and a photo belong together, and tiles make a mosaic."""
+def _group_rasters(rasters: Sequence[Path], virtual: Path | None) -> list[_Group]:
+    """Returns the rasters of a folder as one source: an elevation model and a photo belong together, and tiles make a mosaic. `virtual`: the folder,
+    if virtual rasters are read."""
     if not rasters:
         return []
     folder = Path(os.path.commonpath([path.parent for path in rasters]))
-    return [_Group(rasters[0].stem if len(rasters) == 1 else folder.resolve().name, "raster", tuple(rasters))]
+    return [_Group(rasters[0].stem if len(rasters) == 1 else folder.resolve().name, "raster", tuple(rasters), virtual, virtual is not None)]
 
 
 def _name_sources(groups: Sequence[_Group], name: str | None, known: Mapping[str, Path]) -> list[SourceDocument]:
@@ -177,7 +200,7 @@ def _name_sources(groups: Sequence[_Group], name: str | None, known: Mapping[str
     for position, group in enumerate(groups):
         unique = kept.get(position) or next(text for text in _numbered(wanted[position]) if text not in taken)
         taken.add(unique)
-        sources.append(SourceDocument(unique, group.format, group.paths, group.root))
+        sources.append(SourceDocument(unique, group.format, group.paths, group.root, group.virtual))
     return sources
 
 

@@ -69,7 +69,7 @@ class LibraryScene:
 
         Raises NotFound, UnknownFormat, BadRequest; for a single file, and with `strict`, also ImportFailed, LimitExceeded, CrsError.
         """
-        options = ImportOptions(crs, up, split, theme, lod, transparency, max_error_m, strict, None, parse_memory_bytes, parse_cpu_s, interiors)
+        options = ImportOptions(crs, up, split, theme, lod, transparency, max_error_m, strict, None, parse_memory_bytes, parse_cpu_s, interiors, True)
 
         def show(file: str, number: int, total: int, how_far: str) -> None:
             if progress is not None:

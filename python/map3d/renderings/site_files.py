@@ -91,6 +91,7 @@ class _Update:
                 lambda path, reason: self._summary.failed.append((str(path), reason)),
                 self._leave_alone,
                 {name: Path(asset.source) for name, asset in self._assets.items()},
+                [self._files.folder] if self._files.options.virtual_rasters else (),
             )
         except UnknownFormat as error:
             from_here = sum(map(self._is_inside, self._assets.values()))

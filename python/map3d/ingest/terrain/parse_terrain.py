@@ -20,6 +20,7 @@ from map3d.ingest.terrain.raster_placement import RasterPlacement
 from map3d.ingest.terrain.terrain_import import import_terrain
 from map3d.ingest.terrain.terrain_options import MAX_WORKERS, TerrainOptions
 from map3d.ingest.terrain.terrain_pieces import GDAL_CACHE_MB
+from map3d.ingest.virtual_raster import check_virtual_raster
 from map3d.subprocess import Handler, ReportProgress
 
 IMAGE_BANDS: Final = (3, 4)
@@ -39,11 +40,12 @@ def open_terrain_parser(_setup: Mapping[str, Any]) -> Handler:
 
 
 def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
-    """`request`: {"paths", "folder", "name", "crs", "scene_crs", "scene_origin", "reader", "pieces": folder or None, "cores"}.
+    """`request`: {"paths", "folder", "name", "crs", "scene_crs", "scene_origin", "reader", "pieces": folder or None, "cores",
+    "virtual": the virtual rasters that may be read, and the folders in which the rasters that they name must be}.
 
     Returns what map3d.ingest.parse_document returns.
     """
-    rasters, faults = open_rasters([Path(path) for path in request["paths"]], strict=request["reader"]["strict"])
+    rasters, faults = open_rasters([Path(path) for path in request["paths"]], request["virtual"], strict=request["reader"]["strict"])
     dems, orthos = classify_rasters(rasters)
     target = _choose_target(next(iter(dems or orthos), None), request["crs"], request["scene_crs"])
     near, far = split_far(rasters, target, request["crs"])
@@ -78,12 +80,17 @@ def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[
     return {"report": {**terrain, "rasters": counts, "placing": placing}, "crs": asdict(proposed)}
 
 
-def open_rasters(paths: Sequence[Path], *, strict: bool) -> tuple[list[Path], list[str]]:
-    """Returns the readable rasters, and the faults of the others. Raises ImportFailed if none is readable, or at the first fault under `strict`."""
+def open_rasters(paths: Sequence[Path], virtual: Mapping[str, str], *, strict: bool) -> tuple[list[Path], list[str]]:
+    """Returns the readable rasters, and the faults of the others. `virtual`: virtual rasters → where the rasters that they name must be.
+
+    Raises ImportFailed if none is readable, or at the first fault under `strict`.
+    """
     readable: list[Path] = []
     faults: list[ImportFailed] = []
     for path in paths:
         try:
+            if str(path) in virtual:
+                check_virtual_raster(path, Path(virtual[str(path)]))
             open_raster(path).close()
             readable.append(path)
         except ImportFailed as error:

@@ -13,14 +13,15 @@ from rasterio.errors import NotGeoreferencedWarning, RasterioError
 
 from map3d.errors import CrsError, ImportFailed, NotFound
 from map3d.geometry.crs import horizontal_crs, is_local, parse_crs
-from map3d.ingest.formats import RASTER_FORMATS, find_raster_format
+from map3d.ingest.formats import RASTER_FORMATS, VIRTUAL_DRIVER, VIRTUAL_REFUSED, find_raster_format, is_virtual_raster
+from map3d.ingest.virtual_raster import is_checked
 
 Array = NDArray[np.float64]
 _HEAD_BYTES: Final = 4096
 
 
 def open_raster(path: Path) -> Any:
-    """Opens a georeferenced raster with rasterio. Raises NotFound, ImportFailed."""
+    """Opens a georeferenced raster with rasterio; of virtual ones those that this process has checked. Raises NotFound, ImportFailed."""
     if not path.is_file():
         raise NotFound(f"{path}: no such raster")
     driver = _find_driver(path)
@@ -41,6 +42,10 @@ def open_raster(path: Path) -> Any:
 def _find_driver(path: Path) -> str:
     with path.open("rb") as file:
         head = file.read(_HEAD_BYTES)
+    if is_virtual_raster(head):
+        if not is_checked(path):
+            raise ImportFailed(f"{path}: {VIRTUAL_REFUSED}")
+        return VIRTUAL_DRIVER
     format = find_raster_format(head)
     if format is None:
         names = ", ".join(sorted(format.driver for format in RASTER_FORMATS))

@@ -1,7 +1,7 @@
 """Pieces of a terrain: runs of tiles that threads build and store, each in one file, until the asset is written.
 
 A piece is renamed into place when it is complete. An import that was killed uses the pieces that it finds; the folder belongs to one set of rasters
-and options (map3d.ingest.import_pieces), so that others start anew.
+and options (map3d.ingest.import_pieces), so that others start from scratch.
 """
 
 import json
