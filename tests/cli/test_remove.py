@@ -102,15 +102,20 @@ def test_removing_frees_the_built_files_that_nothing_else_uses(run: Run, town: W
         assert run(*command)[0] == 0
 
 
-def test_file_that_is_added_again_gets_ids_that_were_never_used(run: Run, town: Workspace, tmp_path: Path) -> None:
-    before = ids(town)
+def test_file_that_returns_gets_its_ids_back_and_its_tiles_are_the_same(run: Run, town: Workspace, tmp_path: Path) -> None:
+    known, tiles = ids(town), digest(town)
     assert run("remove-files", "town", "house-0-1.obj", "--yes")[0] == 0
+    assert run("render", "view")[0] == 0
+    assert digest(town) != tiles
+    stranger = tmp_path / "stranger.obj"
+    stranger.write_text("o hut\nv 200 0 0\nv 202 0 0\nv 202 3 9\nf 1 2 3\n")
+    assert run("add-files", "town", str(stranger))[0] == 0
+    assert not set(known.values()) & {number for place, number in ids(town).items() if place[0] == "stranger"}
+    assert run("remove-files", "town", "stranger", "--yes")[0] == 0
     assert run("add-files", "town", str(tmp_path / "files" / "house-0-1.obj"))[0] == 0
-    after = ids(town)
-    assert {place: number for place, number in after.items() if place[0] != "house-0-1"} == {
-        place: number for place, number in before.items() if place[0] != "house-0-1"
-    }
-    assert min(number for place, number in after.items() if place[0] == "house-0-1") > max(before.values())
+    assert ids(town) == known
+    assert run("render", "view")[0] == 0
+    assert digest(town) == tiles
 
 
 def test_unknown_files_are_refused_before_anything_is_removed(run: Run, town: Workspace) -> None:

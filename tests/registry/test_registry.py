@@ -50,6 +50,28 @@ def test_ids_survive_reimports_in_any_order(registry: Registry) -> None:
     assert registry.count() == 3
 
 
+def test_an_object_of_a_removed_asset_keeps_nothing_but_its_name_and_id(registry: Registry) -> None:
+    parent, child = (int(number) for number in registry.put_asset("a", [*things("x"), NewObject("y", "part", parent=0, attributes={"owner": "Ada"})]))
+    registry.remove_assets(["a"])
+    registry.remove_assets(["a"])
+    assert registry.count() == 0
+    assert registry.get(parent) is None
+    assert list(registry.shards()) == []
+    with registry._database.reading() as db:
+        rows = [tuple(row) for row in db.execute("SELECT id, asset, name, occurrence, class, parent, lod, attributes, present, x0 FROM object")]
+    assert rows == [(parent, "a", "x", 0, "", None, None, "{}", 0, None), (child, "a", "y", 0, "", None, None, "{}", 0, None)]
+
+
+def test_objects_of_a_removed_asset_that_return_get_their_ids_back_and_others_do_not(registry: Registry) -> None:
+    before = registry.put_asset("a", things("x", "x", "y")).tolist()
+    registry.remove_assets(["a"])
+    other = registry.put_asset("b", things("x", "x", "y")).tolist()
+    after = registry.put_asset("a", things("new", "y", "x", "x")).tolist()
+    assert after[1:] == [before[2], before[0], before[1]]
+    assert len({*before, *other, after[0]}) == 7
+    assert registry.get(before[0]) == registry.get(after[2])
+
+
 def test_an_object_that_returns_gets_its_id_back(registry: Registry) -> None:
     (first,) = registry.put_asset("a", things("x"))
     registry.put_asset("a", [])

@@ -22,7 +22,7 @@ def command(workspace: Workspace, scene: str, names: Sequence[str], yes: bool, a
     """Remove imported files from SCENE, by the names that map3d show scene SCENE lists or by file name. The source files stay.
 
     The scene is built again, so that the space of its meshes and textures is freed; the next map3d render removes the objects from the tiles. The ids
-    of other objects stay; the ids of the removed ones are never used again. If the removal is interrupted, run the command again.
+    of other objects stay; an object of a removed file that returns gets its id back. If the removal is interrupted, run the command again.
     """
     from map3d.jobs.dead_workers import expire_dead_workers
     from map3d.renderings.removal_checks import folder_bytes

@@ -1,7 +1,7 @@
 """registry.sqlite of a scene: assigns ids that survive re-imports, and returns objects by shard, by column and for searching.
 
-`object.id` is AUTOINCREMENT: ids are never reused. An object is identified by asset, name and, for duplicate names, its occurrence. Objects
-that a re-import no longer contains stay with present = 0, so that they get their id back if they return.
+`object.id` is AUTOINCREMENT: an id is never given to another object. An object is identified by asset, name and, for duplicate names, its occurrence.
+Objects that a re-import no longer contains, and those of removed assets, stay with present = 0, so that they get their id back if they return.
 """
 
 import json
@@ -43,6 +43,9 @@ _UPSERT: Final = """INSERT INTO object(asset, name, occurrence, class, lod, attr
     parent = NULL, x0 = excluded.x0, y0 = excluded.y0, z0 = excluded.z0, x1 = excluded.x1, y1 = excluded.y1, z1 = excluded.z1
   RETURNING id"""
 
+_RETIRE: Final = """UPDATE object SET present = 0, class = '', parent = NULL, lod = NULL, attributes = '{}',
+  x0 = NULL, y0 = NULL, z0 = NULL, x1 = NULL, y1 = NULL, z1 = NULL WHERE asset = ?"""
+
 _CHILDREN_OF: Final = """SELECT parent, id FROM object WHERE present AND asset IN (SELECT DISTINCT asset FROM object WHERE id BETWEEN ? AND ?)
   AND parent BETWEEN ? AND ? ORDER BY parent, id"""
 """The children of a range of objects; they are of the same asset as their parents, which has an index."""
@@ -65,7 +68,7 @@ class Registry:
                 (number,) = db.execute(_UPSERT, _row(asset, item, seen[item.name])).fetchone()
                 if number > MAX_ID:
                     raise LimitExceeded(
-                        f"asset {asset}: object {index} needs id {number}, but ids end at {MAX_ID} and are never reused; start a new scene"
+                        f"asset {asset}: object {index} needs id {number}, but ids end at {MAX_ID} and stay with their objects; start a new scene"
                     )
                 seen[item.name] += 1
                 ids[index] = number
@@ -83,10 +86,10 @@ class Registry:
             _extend_parent_boxes(db, asset)
 
     def remove_assets(self, assets: Sequence[str]) -> None:
-        """Removes the objects of assets for ever and returns their space to the file system. The ids of other objects stay; those of removed ones are
-        never used again."""
+        """Removes the objects of assets and returns the space of their attributes to the file system. Names and ids stay, so that an object that
+        returns gets its id back and no other one gets it."""
         with self._database.transaction() as db:
-            db.executemany("DELETE FROM object WHERE asset = ?", [(asset,) for asset in assets])
+            db.executemany(_RETIRE, [(asset,) for asset in assets])
         with self._database.autocommit() as db:
             db.execute("VACUUM")
 
