@@ -59,7 +59,7 @@ def test_polygon_at_0_0_0_is_left_out_of_its_building(site: Site) -> None:
     assert "town.gml: 1 triangle, up to 5,33" in err
     assert "house-1-2 (in part)" in err
     assert "--keep-outliers keeps everything" in err
-    assert "(options of map3d site and map3d create-rendering)\n" in err
+    assert "(options of map3d site and create-rendering)\n" in err
     assert max(site.extent_m()) < 300
     assert index["report"]["ground_plane_triangles"] == 2
     box = world_boxes(site.workspace, "town")["house-1-2"]

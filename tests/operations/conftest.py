@@ -3,6 +3,8 @@ from pathlib import Path
 
 import pytest
 
+from map3d.catalogue import OperationState
+from map3d.web.operation_sentences import find_sentence
 from tests.operations.scenario import STARTED, Scenario, kill, open_scenario, published, run_all, town_zip
 
 
@@ -16,7 +18,19 @@ def scenario(tmp_path: Path) -> Iterator[Scenario]:
     """A workspace with an empty scene `town`."""
     opened = open_scenario(tmp_path / "ws")
     yield opened
+    unknown = texts_without_sentence(opened)
     opened.catalogue.close()
+    assert unknown == [], "map3d.web.operation_sentences has every text, so that pages can translate it"
+
+
+def texts_without_sentence(scenario: Scenario) -> list[str]:
+    """Returns the stages, messages and log lines of operations that pages cannot translate; the reasons of errors are not among them."""
+    found = []
+    for operation in scenario.catalogue.operations():
+        ends = [] if operation.state is OperationState.FAILED else [operation.message]
+        lines = [line.text for line in scenario.catalogue.operation_log(operation.id)]
+        found += [text for text in (operation.stage, *ends, *lines) if text and find_sentence(text) is None]
+    return found
 
 
 @pytest.fixture(scope="session")

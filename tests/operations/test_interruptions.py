@@ -4,11 +4,15 @@ import os
 import shutil
 import signal
 import subprocess
+import threading
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from map3d.catalogue import OperationRecord, OperationState, State
+from map3d.errors import StoreError
+from tests.cli.towns import write_town
 from tests.operations.scenario import (
     Scenario,
     files_below,
@@ -149,3 +153,32 @@ def test_progress_and_log_are_seen_while_the_operation_runs(
     assert f".{worker.pid}." in running.worker
     assert os.getpid() != worker.pid
     kill(worker)
+
+
+def test_operation_that_waits_behind_one_of_another_worker_is_done(scenario: Scenario, tmp_path: Path) -> None:
+    path = next(write_town(tmp_path / "town", 1).iterdir())
+    first, second = (scenario.ask("import", files=[scenario.upload(path, name)]) for name in ("a.obj", "b.obj"))
+    lease = scenario.catalogue.lease_operation("elsewhere.00000000.1.1/0")
+    assert lease is not None
+    assert lease.operation.id == first.id
+    ending = threading.Timer(1.0, lambda: scenario.catalogue.end_operation(lease, OperationState.DONE, "imported 1 file, 0 unchanged"))
+    ending.start()
+    scenario.work()
+    ending.join()
+    assert scenario.catalogue.operation(second.id).state is OperationState.DONE
+
+
+def test_operation_whose_end_could_not_be_stored_is_done_again(scenario: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = next(write_town(tmp_path / "town", 1).iterdir())
+    first, second = (scenario.ask("import", files=[scenario.upload(path, name)]) for name in ("a.obj", "b.obj"))
+    original, failures = type(scenario.catalogue).end_operation, [StoreError("database is locked")]
+
+    def end(*arguments: Any) -> None:
+        if failures:
+            raise failures.pop()
+        original(*arguments)
+
+    monkeypatch.setattr(type(scenario.catalogue), "end_operation", end)
+    scenario.work()
+    assert failures == []
+    assert [scenario.catalogue.operation(one.id).state for one in (first, second)] == [OperationState.DONE] * 2

@@ -9,7 +9,7 @@ from map3d.ingest.import_files import FilesImport, import_files
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import Imported
 from map3d.operations.operation_report import OperationReport
-from map3d.operations.uploaded_files import check_host_path, remove_staging, remove_upload, stage
+from map3d.operations.uploaded_files import check_host_path, remove_staging, stage
 from map3d.quantities import plural
 from map3d.renderings import build
 from map3d.renderings.outliers import choose_content
@@ -19,8 +19,8 @@ MAX_LINES: Final = 200
 
 
 def do_import(workspace: Workspace, catalogue: Catalogue, operation: OperationRecord, report: OperationReport) -> str:
-    """Imports the files; assets that are up to date stay, so that a repeated operation goes on where the first one ended. Uploads are removed once
-    all of them are imported. Raises ImportFailed when a file is broken, after importing the others."""
+    """Imports the files; assets that are up to date stay, so that a repeated operation goes on where the first one ended. The worker removes the
+    uploads once the operation is done. Raises ImportFailed when a file is broken, after importing the others."""
     arguments = operation.arguments
     uploads, options = list(arguments.get("files", ())), dict(arguments.get("options", {}))
     name = options.pop("name", None)
@@ -37,17 +37,15 @@ def do_import(workspace: Workspace, catalogue: Catalogue, operation: OperationRe
     finally:
         remove_staging(workspace, operation.id)
     _log(report, done)
-    counts = f"imported {plural(len(done.imported), 'file')}, {len(done.unchanged):,} unchanged"
+    files, unchanged = plural(len(done.imported), "file"), len(done.unchanged)
     if done.failed:
-        raise ImportFailed(f"{counts}, {len(done.failed):,} failed; the first: {done.failed[0][1]}")
-    for id in uploads:
-        remove_upload(workspace, id, operation.asked_by)
-    return counts
+        raise ImportFailed(f"imported {files}, {unchanged:,} unchanged, {len(done.failed):,} failed; the first: {done.failed[0][1]}")
+    return f"imported {files}, {unchanged:,} unchanged"
 
 
 def _show(report: OperationReport) -> Any:
     def show(name: str, number: int, total: int, how_far: str) -> None:
-        report.progress(f"importing {name}" + (f": {how_far}" if how_far else ""), number, total)
+        report.progress(f"importing {name}: {how_far}" if how_far else f"importing {name}", number, total)
 
     return show
 
@@ -58,10 +56,11 @@ def _log(report: OperationReport, done: FilesImport) -> None:
 
 
 def _import_lines(item: Imported) -> Iterator[str]:
-    skipped = sum(item.report.get("skipped", {}).values())
-    yield f"{item.asset}: {plural(item.objects, 'object')}, {plural(item.triangles, 'triangle')}" + (
-        f", skipped {plural(skipped, 'element')}" if skipped else ""
-    )
+    skipped, objects, triangles = sum(item.report.get("skipped", {}).values()), plural(item.objects, "object"), plural(item.triangles, "triangle")
+    if skipped:
+        yield f"{item.asset}: {objects}, {triangles}, skipped {plural(skipped, 'element')}"
+    else:
+        yield f"{item.asset}: {objects}, {triangles}"
     for warning in item.report.get("warnings", ())[:20]:
         yield f"{item.asset}: {warning['count']:,} × {warning['reason']}, e.g. {warning['example']}"
 
@@ -88,5 +87,5 @@ def build_if_stale(workspace: Workspace, catalogue: Catalogue, scene: str, argum
     numbers = ", ".join(f"{count:,} {name.replace('_', ' ')}" for name, count in counts.items() if isinstance(count, int) and count)
     report.log(f"built scene {scene}: {numbers}")
     report.log_counted(counts.get("outlier_lines", ()), MAX_LINES, "lines")
-    report.log_counted((f"{reason}: {example}" for reason, example in counts.get("texture_warnings", {}).items()), MAX_LINES, "warnings")
+    report.log_counted((f"texture: {reason}: {example}" for reason, example in counts.get("texture_warnings", {}).items()), MAX_LINES, "warnings")
     return True

@@ -49,8 +49,10 @@ def _remove_rendering(workspace: Workspace, catalogue: Catalogue, operation: Ope
     folders = operation.arguments.get("folders", ())
     published = remove_with_renderings(workspace, [found.name], folders)
     remove_rendering(workspace, catalogue, found)
-    names = f" with {names_text([f'{FOLDER}/{name}' for name in folders])}" if folders else ""
-    return f"removed rendering {found.name}{names}, {(found.bytes + published) / 1e6:,.1f} MB"
+    size = (found.bytes + published) / 1e6
+    if folders:
+        return f"removed rendering {found.name} with {names_text([f'{FOLDER}/{name}' for name in folders])}, {size:,.1f} MB"
+    return f"removed rendering {found.name}, {size:,.1f} MB"
 
 
 def _remove_files(workspace: Workspace, catalogue: Catalogue, operation: OperationRecord, report: OperationReport) -> str:
@@ -67,9 +69,9 @@ def _remove_files(workspace: Workspace, catalogue: Catalogue, operation: Operati
 
 
 def _remove_published(workspace: Workspace, _: Catalogue, operation: OperationRecord, __: OperationReport) -> str:
-    folder = operation.arguments["folder"]
-    size = remove_published(workspace, operation.target, folder)
-    return f"removed {FOLDER}/{folder}, {size / 1e6:,.1f} MB"
+    name = operation.arguments["folder"]
+    size, folder = remove_published(workspace, operation.target, name), f"{FOLDER}/{name}"
+    return f"removed {folder}, {size / 1e6:,.1f} MB"
 
 
 _REMOVE: Final = {"scene": _remove_scene, "rendering": _remove_rendering, "files": _remove_files, "published": _remove_published}

@@ -43,8 +43,8 @@ def do_render(workspace: Workspace, catalogue: Catalogue, operation: OperationRe
             f"rendering {name} is incomplete: {plural(result.quarantined_jobs, 'block')} in quarantine, {result.open_jobs:,} open; "
             "see the reasons, then render again with retry_quarantined"
         )
-    counts = f"{plural(done.done, 'block')}, {plural(done.tiles, 'image')}, {done.bytes / 1e6:,.1f} MB"
-    return f"rendered {counts}; complete (content version {result.content_version})"
+    blocks, images = plural(done.done, "block"), plural(done.tiles, "image")
+    return f"rendered {blocks}, {images}, {done.bytes / 1e6:,.1f} MB; complete (content version {result.content_version})"
 
 
 def event_line(event: RunEvent) -> str:
@@ -71,5 +71,5 @@ def do_publish(workspace: Workspace, catalogue: Catalogue, operation: OperationR
 
     url, allow = arguments.get("url"), arguments.get("allow_incomplete", False)
     done = publish(workspace, operation.target, folder, replace=True, allow_incomplete=allow, url=url, progress=progress)
-    counts = f"{plural(done.files, 'file')}, {done.bytes / 1e6:,.1f} MB; {done.written:,} written, {done.removed:,} removed"
-    return f"published to {FOLDER}/{folder.name}: {counts}"
+    files, size, shown = plural(done.files, "file"), done.bytes / 1e6, f"{FOLDER}/{folder.name}"
+    return f"published to {shown}: {files}, {size:,.1f} MB; {done.written:,} written, {done.removed:,} removed"

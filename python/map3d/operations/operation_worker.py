@@ -1,17 +1,17 @@
 """The operation worker: leases operations and has a subprocess do each, so that a crash costs the operation alone."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any, Final
 
 from map3d import errors
-from map3d.catalogue import Catalogue, OperationLease, OperationState, Workspace
+from map3d.catalogue import Catalogue, OperationLease, OperationRecord, OperationState, Workspace
 from map3d.errors import Map3dError, NotFound, StaleFence, StoreError
 from map3d.jobs.dead_workers import expire_dead_workers, process_of, worker_name
 from map3d.jobs.stop_request import StopRequest
 from map3d.operations.do_operation import request_of
-from map3d.operations.uploaded_files import remove_staging
+from map3d.operations.uploaded_files import remove_staging, remove_upload
 from map3d.process_identity import ProcessIdentity
 from map3d.subprocess import Failure, Subprocess
 
@@ -50,21 +50,23 @@ class OperationWorker:
         self._name = worker_name(0)
 
     def run(self, *, forever: bool = True) -> int:
-        """Does operations until SIGINT or SIGTERM, which releases the current one; without `forever`, until none waits. Returns the number of
-        operations that ended. Waits while the catalogue cannot be reached."""
-        ended = 0
+        """Does operations until SIGINT or SIGTERM, which releases the current one; without `forever`, until none waits, also behind one that another
+        worker does. Returns the number of operations that ended. Waits while the catalogue cannot be reached."""
+        ended, has_failed = 0, False
         with self.stop.on_signals():
             while not self.stop.is_made:
+                lease = None
                 try:
-                    expire_dead_operations(self.catalogue)
+                    expire_dead_operations(self.catalogue, [self._name] if has_failed else [])
+                    has_failed = False
                     lease = self.catalogue.lease_operation(self._name)
                     if lease is not None:
                         ended += self._do(lease)
-                    elif not forever:
+                    elif not forever and not self.catalogue.operations(states=[OperationState.WAITING], limit=1):
                         break
                 except (StoreError, StaleFence) as error:
                     self.on_operation(f"trying again soon: {error}")
-                    lease = None
+                    lease, has_failed = None, True
                 if lease is None:
                     self._sleep(self.poll_s)
         return ended
@@ -94,6 +96,8 @@ class OperationWorker:
         self._clean_up(lease)
         self.catalogue.append_log(lease, [message if state is OperationState.CANCELLED else f"{state}: {message}"])
         self.catalogue.end_operation(lease, state, message)
+        if state is OperationState.DONE and operation.kind == "import":
+            self._remove_uploads(operation)
         self.on_operation(f"{name} is {state}: {message}")
         return True
 
@@ -110,6 +114,11 @@ class OperationWorker:
         if isinstance(answer, Failure):
             raise _error(answer)
         return str(answer.value["message"])
+
+    def _remove_uploads(self, operation: OperationRecord) -> None:
+        """Removes the uploads of an import whose end is stored: before that, a repetition needs them."""
+        for id in operation.arguments.get("files", ()):
+            remove_upload(self.workspace, id, operation.asked_by)
 
     def _clean_up(self, lease: OperationLease) -> None:
         """Removes what a killed subprocess left: arranged uploads, and leases of jobs that would keep others waiting."""
@@ -161,10 +170,11 @@ class _Heart:
             raise _Cancelled if cancelling else _Interrupted
 
 
-def expire_dead_operations(catalogue: Catalogue) -> int:
-    """Expires the leases of operation workers whose process was on this host and has ended; returns their number."""
-    running = catalogue.operations(states=[OperationState.RUNNING], limit=1000)
-    return catalogue.expire_operations([item.worker for item in running if item.worker is not None and _has_ended(item.worker)])
+def expire_dead_operations(catalogue: Catalogue, dropped: Collection[str] = ()) -> int:
+    """Expires the leases of operation workers whose process was on this host and has ended; returns their number. `dropped`: workers that do nothing,
+    although their process runs."""
+    running = [item.worker for item in catalogue.operations(states=[OperationState.RUNNING], limit=1000) if item.worker is not None]
+    return catalogue.expire_operations([worker for worker in running if worker in dropped or _has_ended(worker)])
 
 
 def _has_ended(worker: str) -> bool:

@@ -80,16 +80,15 @@ def _choices(outliers: Outliers, crs: SceneCrs | None) -> Iterator[str]:
     if others:
         yield f"the files lie in {len(outliers.clusters):,} places far from each other:"
         yield from _cluster_lines(outliers, crs)
-    option = "--keep-outliers keeps everything" + (f"; --cluster {others[0]} builds the place with that number instead" if others else "")
-    option += " (options of map3d site and map3d create-rendering)"
-    yield option
+    instead = f"; --cluster {others[0]} builds the place with that number instead" if others else ""
+    yield f"--keep-outliers keeps everything{instead} (options of map3d site and create-rendering)"
 
 
 def _cluster_lines(outliers: Outliers, crs: SceneCrs | None) -> Iterator[str]:
     for cluster in outliers.clusters[:MAX_CLUSTERS]:
-        kept = "kept" if cluster.number in outliers.kept else "left out"
         counts = f"{_count(cluster.objects, 'object')}, {_count(cluster.triangles, 'triangle')}"
-        yield f"  {cluster.number}: {counts}, {extent_text(cluster.box)} around {place_text(cluster.box, crs)}; {kept}"
+        kept = cluster.number in outliers.kept
+        yield f"  {cluster.number}: {counts}, {extent_text(cluster.box)} around {place_text(cluster.box, crs)}; {'kept' if kept else 'left out'}"
     if len(outliers.clusters) > MAX_CLUSTERS:
         yield f"  and {_count(len(outliers.clusters) - MAX_CLUSTERS, 'more place')}"
 

@@ -17,6 +17,7 @@ from map3d.web.document_routes import documents
 from map3d.web.error_pages import error_response
 from map3d.web.open_stores import OpenStores
 from map3d.web.operation_pages import operation_pages
+from map3d.web.operation_sentences import operation_text
 from map3d.web.page_routes import pages
 from map3d.web.page_tools import add_page_tools
 from map3d.web.picture_routes import STORES, pictures
@@ -64,6 +65,7 @@ def create_flask_app(workspace: Workspace, settings: ServerSettings, access: Acc
         app.register_blueprint(blueprint)
     app.extensions[PREVIEWS] = PreviewPool(workspace)
     add_page_tools(app)
+    app.jinja_env.filters["operation_text"] = operation_text
     app.register_error_handler(Exception, error_response)
     app.after_request(_make_redirect_relative)
     app.after_request(_add_security_headers)

@@ -9,6 +9,7 @@ from map3d.errors import BadRequest
 from map3d.web.access import requires
 from map3d.web.document_routes import catalogue
 from map3d.web.host_folders import without_host_folders
+from map3d.web.operation_sentences import operation_text
 from map3d.web.operation_words import show, show_all
 from map3d.web.studio import ask, go_to, page
 
@@ -28,7 +29,7 @@ def operations() -> Response:
 @requires("viewer")
 def operation(id: str) -> Response:
     shown = show(catalogue().operation(id))
-    log = [without_host_folders(line.text) for line in catalogue().operation_log(id)]
+    log = [operation_text(without_host_folders(line.text)) for line in catalogue().operation_log(id)]
     return page("operation.html", operation=shown, log=log, running=shown.is_open)
 
 

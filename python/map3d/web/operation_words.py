@@ -7,6 +7,7 @@ from typing import Final
 from map3d.catalogue import OperationRecord
 from map3d.catalogue.operation_records import REPEATABLE, UNENDED
 from map3d.web.host_folders import without_host_folders
+from map3d.web.operation_sentences import operation_text
 from map3d.web.page_tools import translate as _
 
 N_: Final = str
@@ -33,7 +34,7 @@ class ShownOperation:
     @property
     def lacks_crs(self) -> bool:
         """Whether an import failed because its files do not name their coordinate system."""
-        return self.record.kind == "import" and self.can_retry and "--crs" in self.text and bool(self.record.arguments.get("files"))
+        return self.record.kind == "import" and self.can_retry and "--crs" in self.record.message and bool(self.record.arguments.get("files"))
 
     @property
     def can_retry(self) -> bool:
@@ -44,8 +45,8 @@ def show(operation: OperationRecord) -> ShownOperation:
     state = str(operation.state)
     state_text = _("Stopping") if operation.cancelling else _(STATES[state])
     percent = min(100, 100 * operation.done // operation.total) if operation.total and state == "running" else None
-    text = operation.stage if state == "running" else operation.message if state != "waiting" else _("Starts when a worker is free.")
-    text = without_host_folders(text)
+    said = operation.stage if state == "running" else operation.message
+    text = _("Starts when a worker is free.") if state == "waiting" else operation_text(without_host_folders(said))
     return ShownOperation(operation.id, f"{_(KINDS[operation.kind])}: {operation.target}", state, state_text, text, percent, operation)
 
 

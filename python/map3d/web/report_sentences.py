@@ -28,6 +28,18 @@ FAULTS: Final[Mapping[str, str]] = {
     "Tin: maxLength that is not a length": N_("TINs whose limit for the sides of triangles is not a length; all triangles are kept: {count}."),
     "Tin: points in one place with different heights": N_("TINs with points in one place that differ in height; the first is used: {count}."),
     "unknown wrap mode": N_("Textures with an unknown wrap mode: {count}."),
+    "tiles outside the photo": N_("Parts of the terrain outside the orthophoto or without data in it, in a plain colour: {count}."),
+    "heights beyond ±100 km count as gaps": N_("Heights beyond ±100 km, read as gaps: {count}."),
+    "unknown height unit, assumed metres": N_("Elevation models in an unknown unit of height, read as metres: {count}."),
+    "raster without CRS, assumed the scene's": N_("Rasters without a coordinate system, read in that of the scene: {count}."),
+    "raster without CRS, read as local metres": N_("Rasters without a coordinate system, read as local metres: {count}."),
+    "raster's CRS not used, because the scene is in local metres": N_(
+        "Rasters whose coordinate system is not used, since the scene is in local metres: {count}."
+    ),
+    "raster far from the scene's content": N_("Rasters far from the rest of the scene: {count}."),
+    "raster left out, far from the others": N_("Rasters far from the others, left out: {count}."),
+    "raster skipped": N_("Rasters that cannot be read, left out: {count}."),
+    "rasters of different resolution": N_("Mosaics of rasters of different resolutions: {count}."),
 }
 SKIPPED: Final[Mapping[str, str]] = {
     "coordinate is not a finite number": N_("Skipped polygons and triangles with coordinates that are not finite numbers: {count}."),
