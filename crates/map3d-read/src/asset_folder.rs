@@ -87,6 +87,11 @@ impl AssetFolder {
         Ok(LocatedFile { path: self.canonicalize_inside(&path)?, oddity: Some("file name with different case") })
     }
 
+    /// Returns true for a canonical path of a regular file under the root.
+    pub fn contains(&self, path: &Path) -> bool {
+        path.starts_with(&self.root) && path.is_file()
+    }
+
     /// Returns the canonical path of a regular file under the root.
     fn canonicalize_inside(&self, path: &Path) -> std::result::Result<PathBuf, FileError> {
         let Ok(path) = fs::canonicalize(path) else {

@@ -43,6 +43,8 @@ pub struct ReadOptions {
     pub strict: bool,
     /// Folder that file names in the document may lead to; by default, the document's own.
     pub folder: Option<PathBuf>,
+    /// Other CityGML files in that folder whose appearances target surfaces of the document.
+    pub appearance_files: Vec<PathBuf>,
     pub max_image_side_px: u64,
     pub max_image_px: u64,
     pub max_ring_vertices: u64,
@@ -65,6 +67,7 @@ impl Default for ReadOptions {
             transparency: Transparency::default(),
             strict: false,
             folder: None,
+            appearance_files: Vec::new(),
             max_image_side_px: MAX_IMAGE_SIDE_PX,
             max_image_px: MAX_IMAGE_PX,
             max_ring_vertices: 1_000_000,

@@ -45,7 +45,7 @@ fn unresolved_and_external_references_are_reported() {
         ))
     };
     assert_eq!(read_text(&body("#nothing")).warned("unresolved reference"), 1);
-    assert_eq!(read_text(&body("other.gml#a")).warned("another document"), 1);
+    assert_eq!(read_text(&body("other.gml#a")).warned("into another file: file not found"), 1);
 }
 
 #[test]

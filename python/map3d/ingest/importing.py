@@ -120,7 +120,7 @@ def _parse(
         "name": source.name,
         "format": source.format,
         "folder": str(draft.absolute()),
-        "reader": options.reader_options(source.format, limits) | _root_option(source),
+        "reader": options.reader_options(source.format, limits) | _folder_options(source),
         "crs": options.crs,
         "scene_crs": _crs_text(record.crs),
         "scene_origin": record.origin,
@@ -177,9 +177,11 @@ def _add_to_scene(
     return Imported(source.name, str(source.paths[0]), source.format, len(lines), report["triangles"], replaced, report)
 
 
-def _root_option(source: SourceDocument) -> dict[str, str]:
-    """The folder in which the reader opens files that the document names; by default, the document's own."""
-    return {} if source.root is None or source.format == "raster" else {"folder": str(source.root.absolute())}
+def _folder_options(source: SourceDocument) -> dict[str, Any]:
+    """Returns the folder in which the reader opens files that the document names, by default the document's own, and the files in it that have
+    appearances for the document."""
+    folder = {} if source.root is None or source.format == "raster" else {"folder": str(source.root.absolute())}
+    return folder | ({"appearance_files": [str(path.absolute()) for path in source.appearances]} if source.appearances else {})
 
 
 def _missing_files(source: SourceDocument) -> dict[str, Any]:

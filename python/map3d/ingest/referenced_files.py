@@ -28,7 +28,7 @@ FindNames = Callable[[mmap.mmap | bytes], Iterator[bytes]]
 
 def find_referenced_files(path: Path, root: Path | None = None) -> set[Path]:
     """Returns the referenced files that exist inside `root`, by default the document's folder."""
-    folder = _Folder.of(path, root)
+    folder = FileNames.of(path, root)
     if unpacked_path(path).suffix.lower() != ".obj":
         return set(_existing_files(path, _find_elements, [folder])) | find_code_lists(path, root)
     libraries = set(_existing_files(path, _match(_OBJ_LIBRARY), [folder]))
@@ -37,7 +37,7 @@ def find_referenced_files(path: Path, root: Path | None = None) -> set[Path]:
 
 def find_code_lists(path: Path, root: Path | None = None) -> set[Path]:
     """Returns the dictionaries of codes that a CityGML document names and that exist inside `root`, by default the document's folder."""
-    return set(_existing_files(path, _match(_CODE_LIST), [_Folder.of(path, root)]))
+    return set(_existing_files(path, _match(_CODE_LIST), [FileNames.of(path, root)]))
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class MissingFiles:
 
 def find_missing_files(path: Path, root: Path | None = None) -> MissingFiles:
     """Finds the referenced files that are not inside `root`, by default the document's folder; references to the web are not files."""
-    folder = _Folder.of(path, root)
+    folder = FileNames.of(path, root)
     if unpacked_path(path).suffix.lower() != ".obj":
         images, missing_images = _names(path, _find_images), _missing(path, _find_images, [folder])
         return MissingFiles(sorted(_missing(path, _find_elements, [folder])), len(images), len(missing_images))
@@ -64,8 +64,8 @@ def find_missing_files(path: Path, root: Path | None = None) -> MissingFiles:
 
 
 @dataclass(frozen=True)
-class _Folder:
-    """A folder to which names are relative, and the folder in which the files must be; without links."""
+class FileNames:
+    """Resolves names of files. `base`: the folder to which they are relative; `root`: that in which the files must be; both without links."""
 
     base: Path
     root: Path
@@ -75,8 +75,19 @@ class _Folder:
         base = document.parent.resolve()
         return cls(base, base if root is None else root.resolve())
 
-    def beside(self, file: Path) -> "_Folder":
-        return _Folder(file.parent, self.root)
+    def beside(self, file: Path) -> "FileNames":
+        return FileNames(file.parent, self.root)
+
+    def find(self, text: str) -> Iterator[Path]:
+        """Tries the name as written, URL-decoded, and word by word (the first words of an MTL statement may be options)."""
+        plain = unescape(text).replace("\\", "/")
+        for name in {plain, unquote(plain), *plain.split(maxsplit=16)}:
+            try:
+                path = (self.base / name).resolve()
+                if path.is_relative_to(self.root) and path.is_file():
+                    yield path
+            except (OSError, ValueError):
+                continue
 
 
 def _find_names(path: Path, find_names: FindNames) -> set[bytes]:
@@ -93,8 +104,8 @@ def _names(path: Path, find_names: FindNames) -> set[str]:
     return {name for name in names if name and "://" not in name}
 
 
-def _missing(path: Path, find_names: FindNames, folders: Sequence[_Folder]) -> set[str]:
-    return {name for name in _names(path, find_names) if not any(found for folder in folders for found in _resolve(folder, name))}
+def _missing(path: Path, find_names: FindNames, folders: Sequence[FileNames]) -> set[str]:
+    return {name for name in _names(path, find_names) if not any(found for folder in folders for found in folder.find(name))}
 
 
 def _match(pattern: re.Pattern[bytes]) -> FindNames:
@@ -117,19 +128,7 @@ def _find_elements(text: mmap.mmap | bytes, tags: Sequence[bytes] = _CITYGML_TAG
             at = text.find(tag, start)
 
 
-def _existing_files(path: Path, find_names: FindNames, folders: Sequence[_Folder]) -> Iterator[Path]:
+def _existing_files(path: Path, find_names: FindNames, folders: Sequence[FileNames]) -> Iterator[Path]:
     for name in _find_names(path, find_names):
         for folder in folders:
-            yield from _resolve(folder, name.decode("utf-8", "replace"))
-
-
-def _resolve(folder: _Folder, text: str) -> Iterator[Path]:
-    """Tries the name as written, URL-decoded, and word by word (the first words of an MTL statement may be options)."""
-    plain = unescape(text).replace("\\", "/")
-    for name in {plain, unquote(plain), *plain.split(maxsplit=16)}:
-        try:
-            path = (folder.base / name).resolve()
-            if path.is_relative_to(folder.root) and path.is_file():
-                yield path
-        except (OSError, ValueError):
-            continue
+            yield from folder.find(name.decode("utf-8", "replace"))

@@ -4,11 +4,12 @@ import hashlib
 import os
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count, takewhile
 from pathlib import Path
 
 from map3d.errors import NotFound, UnknownFormat
+from map3d.ingest.document_links import DocumentLinks, find_document_links, find_geometry_documents
 from map3d.ingest.formats import RASTER_FORMATS, READABLE_FORMATS, Format, check_stored, detect_format, has_world_file
 from map3d.ingest.gzip_file import unpacked_path
 from map3d.ingest.referenced_files import find_code_lists, find_referenced_files
@@ -24,6 +25,8 @@ _SOURCE_SUFFIXES = (".gml", ".citygml", ".obj", *(suffix for format in RASTER_FO
 """Files with these suffixes are reported if they are unreadable."""
 _CODE_LIST_SUFFIXES = (".xml", ".gml")
 
+_NO_LINKS = DocumentLinks(frozenset(), frozenset(), has_objects=True)
+
 _ORDER: Mapping[Format, int] = {"citygml": 0, "obj": 1, "raster": 2}
 """CityGML files name the CRS of the scene, which OBJ files and rasters may lack."""
 
@@ -36,13 +39,15 @@ _HEAD_BYTES = 4096
 @dataclass(frozen=True)
 class SourceDocument:
     """`paths`: the document; for terrain, its rasters. `root`: the given folder, in which files that the document names may be; None for a document
-    that was given itself, whose files are in its own folder. `virtual`: a virtual raster may be among the rasters."""
+    that was given itself, whose files are in its own folder. `virtual`: a virtual raster may be among the rasters. `appearances`: CityGML files
+    given with it whose appearances target its surfaces."""
 
     name: str
     format: Format
     paths: tuple[Path, ...]
     root: Path | None = None
     virtual: bool = False
+    appearances: tuple[Path, ...] = ()
 
     @property
     def virtual_folders(self) -> dict[Path, Path]:
@@ -74,6 +79,8 @@ def find_sources(
     name is needed for several keeps the one that it has there. `virtual`: those of the paths at which virtual rasters are read; the rasters that
     one in a folder names are not read a second time.
 
+    CityGML files of a folder that have no city objects of their own, but geometry or appearances of others, are read with these.
+
     Raises UnknownFormat for a given file of unknown format and for a folder without any readable file; NotFound.
     """
     documents: list[_Group] = []
@@ -92,16 +99,16 @@ def find_sources(
             documents.append(_Group(unpacked_path(path).stem, format, (path,)))
     if rasters:
         terrains.append(_Group(rasters[0].stem, "raster", tuple(rasters), virtual=any(path in virtual for path in rasters)))
-    sources = _name_sources([*documents, *terrains], name, known or {})
+    sources = _name_sources([*_link(documents), *terrains], name, known or {})
     return sorted(sources, key=lambda source: _ORDER[source.format])
 
 
 def source_digest(source: SourceDocument) -> str:
-    """Computes the digest of the document, the files beside it whose names begin with its stem, and the libraries, images and code lists that it
-    references."""
+    """Computes the digest of the document, the files beside it whose names begin with its stem, the libraries, images and code lists that it
+    references, and the CityGML files whose geometry or appearances it has, with their images."""
     total = hashlib.sha256()
     for path in source.data_paths:
-        for part in [path, *_find_companions(path, source.root)]:
+        for part in [path, *_find_companions(path, source)]:
             check_stored(part)
             total.update(part.name.encode())
             with part.open("rb") as file:
@@ -129,7 +136,7 @@ def _search_folder(folder: Path, on_unreadable: OnUnreadable, on_left_alone: OnU
     if not found:
         example = f" (found {unknown[0][1].partition(';')[0]})" if unknown else ""
         raise UnknownFormat(f"{folder}: no readable file in this folder{example}; map3d reads {READABLE_FORMATS}")
-    used = _used_code_lists(folder, found, [path for path, _ in unknown])
+    used = _used_documents(folder, found, [path for path, _ in unknown])
     for path, reason in unknown:
         if path.resolve() in used:
             continue
@@ -146,11 +153,12 @@ def _without_named(found: Sequence[tuple[Path, Format]], folder: Path) -> list[t
     return [(path, format) for path, format in found if format != "raster" or path.resolve() not in named]
 
 
-def _used_code_lists(folder: Path, found: Sequence[tuple[Path, Format]], unknown: Sequence[Path]) -> set[Path]:
-    """Returns the code lists that the CityGML files of a folder name; they are read with these files."""
+def _used_documents(folder: Path, found: Sequence[tuple[Path, Format]], unknown: Sequence[Path]) -> set[Path]:
+    """Returns the code lists and libraries of geometry that the CityGML files of a folder name; they are read with these files."""
     if not any(path.suffix.lower() in _CODE_LIST_SUFFIXES for path in unknown):
         return set()
-    return {used for path, format in found if format == "citygml" for used in find_code_lists(path, folder)}
+    documents = [path for path, format in found if format == "citygml"]
+    return {used for path in documents for used in find_code_lists(path, folder) | find_document_links(path, folder).geometry}
 
 
 def _read_head(path: Path) -> bytes:
@@ -180,6 +188,28 @@ class _Group:
     paths: tuple[Path, ...]
     root: Path | None = None
     virtual: bool = False
+    appearances: tuple[Path, ...] = ()
+
+
+def _link(documents: Sequence[_Group]) -> list[_Group]:
+    """Gives CityGML files the appearances that others have for them; leaves out files of folders that only serve others."""
+    links = {group.paths[0]: find_document_links(group.paths[0], group.root) for group in documents if group.format == "citygml"}
+    if not any(found.geometry or found.targets for found in links.values()):
+        return list(documents)
+    used = {path for found in links.values() for path in found.geometry | found.targets}
+    appearances: dict[Path, list[Path]] = {}
+    for path, found in links.items():
+        for target in found.targets:
+            appearances.setdefault(target, []).append(path)
+    linked = []
+    for group in documents:
+        path = group.paths[0].resolve()
+        found = links.get(group.paths[0], _NO_LINKS)
+        if found.has_objects or group.root is None or not (found.targets or path in used):
+            folder = (group.root or path.parent).resolve()
+            inside = [other for other in appearances.get(path, ()) if other.resolve().is_relative_to(folder)]
+            linked.append(replace(group, appearances=tuple(sorted(inside))))
+    return linked
 
 
 def _group_rasters(rasters: Sequence[Path], virtual: Path | None) -> list[_Group]:
@@ -200,7 +230,7 @@ def _name_sources(groups: Sequence[_Group], name: str | None, known: Mapping[str
     for position, group in enumerate(groups):
         unique = kept.get(position) or next(text for text in _numbered(wanted[position]) if text not in taken)
         taken.add(unique)
-        sources.append(SourceDocument(unique, group.format, group.paths, group.root, group.virtual))
+        sources.append(SourceDocument(unique, group.format, group.paths, group.root, group.virtual, group.appearances))
     return sources
 
 
@@ -243,9 +273,14 @@ def asset_name(text: str) -> str:
     return plain[:64] or "asset"
 
 
-def _find_companions(path: Path, root: Path | None) -> list[Path]:
+def _find_companions(path: Path, source: SourceDocument) -> list[Path]:
     beside = {other.resolve() for other in path.parent.glob(f"{_escape_glob(unpacked_path(path).stem)}.*") if other.is_file()}
-    return sorted((beside | find_referenced_files(path, root)) - {path.resolve()})
+    documents = {other.resolve() for other in source.appearances}
+    if source.format == "citygml":
+        documents |= find_geometry_documents(path, source.root)
+    folder = path.parent if source.root is None else source.root
+    referenced = {file for other in documents for file in find_referenced_files(other, folder)}
+    return sorted((beside | find_referenced_files(path, source.root) | documents | referenced) - {path.resolve()})
 
 
 def _escape_glob(stem: str) -> str:

@@ -17,7 +17,28 @@ FAULTS: Final[Mapping[str, str]] = {
     "polygon with crossing rings": N_("Polygons whose rings cross, which may look wrong: {count}."),
     "ring that is not closed": N_("Rings that are not closed: {count}."),
     "unresolved reference": N_("References that lead nowhere in the file: {count}."),
-    "reference to another document not followed": N_("References to other documents, which were not followed: {count}."),
+    "reference into another file: file not found": N_("References to other files that are not there: {count}."),
+    "reference into another file: file outside the given folder not read": N_(
+        "References to files outside the given folder, which are not read: {count}."
+    ),
+    "reference into another file: URL not fetched": N_("References to files on the web, which are not fetched: {count}."),
+    "reference into another file: not a regular file": N_("References to something that is not a file: {count}."),
+    "reference into another file: invalid file name": N_("References to other files with an invalid name: {count}."),
+    "reference into another file: no geometry with this id": N_("References to geometry that the other file does not have: {count}."),
+    "reference into another file: chain of more than 16 references": N_(
+        "References at the end of a chain of more than 16, which were not followed: {count}."
+    ),
+    "reference into another file: more than 1 GiB of other files": N_(
+        "References not followed, since more than 1 GiB of other files would be read: {count}."
+    ),
+    "reference into another file: too many references": N_("References to other files beyond the limit, which were not followed: {count}."),
+    "another file that this one refers to is broken or too large; what was read of it is kept": N_(
+        "Other files that this one refers to are broken or too large; what was read of them is kept: {count}."
+    ),
+    "appearance in another file: no surface with this id": N_("Appearances in other files for surfaces that this file does not have: {count}."),
+    "appearance for surfaces of another file, used where both are imported together": N_(
+        "Appearances for surfaces of other files; they are used where both files are imported together: {count}."
+    ),
     "parts in another coordinate system than the rest of the file, transformed": N_(
         "Triangles and placements in another coordinate system than the rest of the file, transformed: {count}."
     ),

@@ -12,7 +12,8 @@ use super::appearance::{
 use super::coordinates::parse_numbers;
 use super::geo_transform::GeoTransform;
 use super::geometry_parser::read_point;
-use super::ids::{self, Id, Reference, parse_reference};
+use super::ids::{self, Id};
+use super::references::{DocumentNumber, OWN_DOCUMENT, References, Target};
 use super::xml_reader::XmlReader;
 use crate::report_builder::{LimitCheck, ReportBuilder};
 
@@ -24,11 +25,22 @@ pub struct AppearanceParser<'a, R> {
     pub report: &'a mut ReportBuilder,
     pub appearances: &'a mut Appearances,
     pub theme: &'a mut ThemeSelection,
+    pub references: &'a mut References,
+    pub scope: AppearanceScope,
     /// Limit on the memory of `appearances`.
     pub max_bytes: u64,
     /// Buffers for numbers and text.
     pub values: &'a mut Vec<f64>,
     pub text: &'a mut String,
+}
+
+/// Which targets are kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AppearanceScope {
+    /// All: the appearances are of the document that is read, or of one that it takes geometry from.
+    Document,
+    /// Those in the document that is read: the appearances are of another document.
+    OwnTargets,
 }
 
 /// A target of surface data and its parameterization.
@@ -64,8 +76,8 @@ impl<R: BufRead> AppearanceParser<'_, R> {
         Ok(())
     }
 
-    /// Reads the current appearance. Where the document breaks off in it, the surface data so far are kept.
-    fn read_appearance(&mut self) -> Result<()> {
+    /// Reads the current appearance element. Where the document breaks off in it, the surface data so far are kept.
+    pub fn read_appearance(&mut self) -> Result<()> {
         let first = self.appearances.surface_data.len();
         let (mut theme, mut xlinks) = (String::new(), Vec::new());
         let read = self.read_appearance_members(&mut theme, &mut xlinks);
@@ -78,8 +90,8 @@ impl<R: BufRead> AppearanceParser<'_, R> {
             match self.xml.local_name() {
                 "theme" => *theme = self.xml.read_text()?,
                 "surfaceDataMember" | "surfaceData" => {
-                    if let Some(Reference::Internal(id)) = self.xml.attribute("href").map(|h| parse_reference(&h)) {
-                        xlinks.push(id);
+                    if let Some(Ok(target)) = self.xml.attribute("href").map(|href| self.references.resolve(&href)) {
+                        xlinks.push(target.id);
                     }
                     while self.xml.next_child()? {
                         self.read_surface_data()?;
@@ -93,6 +105,10 @@ impl<R: BufRead> AppearanceParser<'_, R> {
 
     /// Adds the surface data from number `first` on to their theme.
     fn add_to_theme(&mut self, theme: String, first: usize, xlinks: Vec<Id>) {
+        let is_empty = first == self.appearances.surface_data.len() && xlinks.is_empty();
+        if is_empty && self.scope == AppearanceScope::OwnTargets {
+            return;
+        }
         self.theme.register(&theme);
         if !self.theme.is_chosen() {
             let surface_data = first..self.appearances.surface_data.len();
@@ -115,6 +131,9 @@ impl<R: BufRead> AppearanceParser<'_, R> {
             self.read_surface_data_property(&mut properties)?;
         }
         let targets = std::mem::take(&mut properties.targets);
+        if targets.is_empty() && self.scope == AppearanceScope::OwnTargets {
+            return self.check_size();
+        }
         let is_front = !properties.is_back;
         let kind = build_kind(&type_name, properties);
         if kind == SurfaceDataKind::Unsupported {
@@ -125,6 +144,10 @@ impl<R: BufRead> AppearanceParser<'_, R> {
         }
         let number = self.appearances.add_surface_data(id, SurfaceData { kind, is_front, in_theme: false, resolution: Resolution::Unresolved });
         targets.into_iter().for_each(|t| self.appearances.bind(t.target, number, t.parameterization));
+        self.check_size()
+    }
+
+    fn check_size(&self) -> Result<()> {
         let got = self.appearances.byte_count();
         self.report.check_limit(LimitCheck { what: "appearances, bytes", got, limit: "max_appearance_bytes", value: self.max_bytes })
     }
@@ -132,7 +155,10 @@ impl<R: BufRead> AppearanceParser<'_, R> {
     fn read_surface_data_property(&mut self, properties: &mut SurfaceDataProperties) -> Result<()> {
         match self.xml.local_name() {
             "isFront" => properties.is_back = matches!(self.xml.read_text()?.as_str(), "false" | "0"),
-            "imageURI" => properties.image = Some(self.xml.read_text()?).filter(|name| !name.is_empty()),
+            "imageURI" => {
+                let name = Some(self.xml.read_text()?).filter(|name| !name.is_empty());
+                properties.image = name.map(|name| self.references.relocate(name));
+            }
             "wrapMode" => properties.wrap = self.read_wrap_mode()?,
             "borderColor" => properties.border = self.read_color()?,
             "diffuseColor" => properties.diffuse = self.read_color()?,
@@ -175,31 +201,44 @@ impl<R: BufRead> AppearanceParser<'_, R> {
 
     /// Reads `<target uri="#a">parameterization</target>` or `<target>#a</target>`.
     fn read_target(&mut self, properties: &mut SurfaceDataProperties) -> Result<()> {
-        let uri = self.xml.attribute("uri").map(|uri| parse_reference(&uri));
-        let xlink = self.xml.attribute("href").map(|href| parse_reference(&href));
-        if uri.is_none() {
+        let Some(uri) = self.xml.attribute("uri").map(|uri| uri.into_owned()) else {
             let text = self.xml.read_text()?;
-            return self.add_target(Some(parse_reference(&text)).filter(|_| !text.is_empty()), Parameterization::None, properties);
-        }
+            let target = if text.is_empty() { None } else { self.resolve_target(&text)? };
+            self.add_target(target, Parameterization::None, properties);
+            return Ok(());
+        };
+        let xlink = self.xml.attribute("href").map(|href| self.references.resolve(&href));
+        let target = self.resolve_target(&uri)?;
         let mut parameterization = match xlink {
-            Some(Reference::Internal(id)) => Parameterization::XLink(id),
+            Some(Ok(target)) => Parameterization::XLink(target.id),
             _ => Parameterization::None,
         };
         while self.xml.next_child()? {
-            parameterization = self.read_parameterization()?;
+            parameterization = self.read_parameterization(target)?;
         }
-        self.add_target(uri, parameterization, properties)
+        self.add_target(target, parameterization, properties);
+        Ok(())
     }
 
-    fn add_target(&mut self, target: Option<Reference>, parameterization: Parameterization, properties: &mut SurfaceDataProperties) -> Result<()> {
-        match target {
-            Some(Reference::Internal(target)) => {
-                properties.targets.push(SurfaceDataTarget { target, parameterization });
-                Ok(())
+    /// Returns what a reference leads to; `None`, after a warning, if that is nothing.
+    fn resolve_target(&mut self, href: &str) -> Result<Option<Target>> {
+        match self.references.resolve(href) {
+            Ok(target) => {
+                if target.document == OWN_DOCUMENT && self.scope == AppearanceScope::OwnTargets {
+                    self.references.add_own_target(target.id, href);
+                }
+                if target.document != OWN_DOCUMENT && !self.references.is_in_other_document() {
+                    self.report.note("appearance for surfaces of another file, used where both are imported together", href);
+                }
+                Ok(Some(target))
             }
-            Some(Reference::External) => self.report.warn("appearance target in another document", "target"),
-            None => Ok(()),
+            Err(reason) => self.report.warn(reason, href).map(|()| None),
         }
+    }
+
+    fn add_target(&self, target: Option<Target>, parameterization: Parameterization, properties: &mut SurfaceDataProperties) {
+        let is_kept = |target: &Target| self.scope == AppearanceScope::Document || target.document == OWN_DOCUMENT;
+        properties.targets.extend(target.filter(is_kept).map(|target| SurfaceDataTarget { target: target.id, parameterization }));
     }
 
     /// Reads a TextureAssociation of CityGML 3.0: target and parameterization are siblings.
@@ -208,22 +247,24 @@ impl<R: BufRead> AppearanceParser<'_, R> {
             let (mut target, mut parameterization) = (None, Parameterization::None);
             while self.xml.next_child()? {
                 if self.xml.local_name() == "target" {
-                    target = Some(parse_reference(&self.xml.read_text()?));
+                    let href = self.xml.read_text()?;
+                    target = self.resolve_target(&href)?;
                     continue;
                 }
                 while self.xml.next_child()? {
-                    parameterization = self.read_parameterization()?;
+                    parameterization = self.read_parameterization(target)?;
                 }
             }
-            self.add_target(target, parameterization, properties)?;
+            self.add_target(target, parameterization, properties);
         }
         Ok(())
     }
 
-    fn read_parameterization(&mut self) -> Result<Parameterization> {
+    /// Reads the current parameterization. Rings without the name of a file are in the document of the target.
+    fn read_parameterization(&mut self, target: Option<Target>) -> Result<Parameterization> {
         let id = self.xml.gml_id();
         let parameterization = match self.xml.local_name() {
-            "TexCoordList" => self.read_tex_coord_list()?,
+            "TexCoordList" => self.read_tex_coord_list(target)?,
             "TexCoordGen" => self.read_tex_coord_gen()?,
             other => {
                 self.report.warn("unknown texture parameterization", other)?;
@@ -235,23 +276,22 @@ impl<R: BufRead> AppearanceParser<'_, R> {
         Ok(parameterization)
     }
 
-    fn read_tex_coord_list(&mut self) -> Result<Parameterization> {
+    fn read_tex_coord_list(&mut self, target: Option<Target>) -> Result<Parameterization> {
         let first = self.appearances.rings.len();
+        let document = target.map(|target| target.document);
         // In CityGML 3.0, `ring` elements follow the coordinates in the same order.
         let mut next_ring = first;
         while self.xml.next_child()? {
             if self.xml.local_name() == "ring" {
-                let ring = self.xml.read_text()?;
-                if let (Reference::Internal(id), Some(entry)) = (parse_reference(&ring), self.appearances.rings.get_mut(next_ring)) {
-                    entry.ring = id;
+                let href = self.xml.read_text()?;
+                let ring = resolve_ring(self.references, &href, document);
+                if let Some(entry) = self.appearances.rings.get_mut(next_ring) {
+                    entry.ring = ring;
                 }
                 next_ring += 1;
                 continue;
             }
-            let ring = match self.xml.attribute("ring").map(|ring| parse_reference(&ring)) {
-                Some(Reference::Internal(id)) => id,
-                _ => ids::NONE,
-            };
+            let ring = self.xml.attribute("ring").map_or(ids::NONE, |href| resolve_ring(self.references, &href, document));
             self.read_tex_coords(ring)?;
         }
         Ok(self.appearances.finish_tex_coord_list(first))
@@ -281,6 +321,15 @@ impl<R: BufRead> AppearanceParser<'_, R> {
         }
         Ok(parameterization)
     }
+}
+
+/// Returns the id of a ring; `document`: of a ring without the name of a file, by default the current one.
+fn resolve_ring(references: &mut References, href: &str, document: Option<DocumentNumber>) -> Id {
+    let target = match document {
+        Some(document) => references.resolve_within(href, document),
+        None => references.resolve(href),
+    };
+    target.map_or(ids::NONE, |target| target.id)
 }
 
 /// Returns a transparency in [0, 1]; `None` for what is not a finite number.

@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use super::address::read_address;
 use super::appearance::ThemeSelection;
-use super::appearance_parser::AppearanceParser;
+use super::appearance_parser::{AppearanceParser, AppearanceScope};
 use super::attributes::{
     Attributes, add_attribute, add_code, add_data_type, is_generic_attribute, is_generic_attribute_object, parse_property, read_external_reference,
     read_generic_attribute, read_generic_attribute_object,
@@ -16,8 +16,9 @@ use super::crs_table::{CrsNumber, CrsTable};
 use super::feature_types::{FeatureKind, classify_feature, is_open_space, is_subdivision, rank_feature, rank_object};
 use super::geometry_arena::NO_NODE;
 use super::geometry_parser::{GeometryParser, PositionFormat, is_point_or_curve, is_surface};
-use super::ids::{self, Reference, hash_id, parse_reference};
+use super::ids::{self, hash_id};
 use super::implicit_geometry::read_implicit_geometry;
+use super::references::References;
 use super::standard_codes::is_adv_code;
 use super::xml_reader::{XmlEvent, XmlReader};
 use crate::options::ReadOptions;
@@ -33,6 +34,7 @@ pub struct CityObjectParser<'a> {
     pub theme: &'a mut ThemeSelection,
     pub code_lists: &'a mut CodeLists,
     pub crs_table: &'a mut CrsTable,
+    pub references: &'a mut References,
     /// Coordinate system of the model that has the city object.
     pub crs: CrsNumber,
     /// Buffers for numbers and text.
@@ -154,8 +156,8 @@ impl CityObjectParser<'_> {
     /// Reads a property by its content: an XLink, text (an attribute), or objects.
     fn read_other_property(&mut self, number: u32) -> Result<()> {
         let local_name = self.xml.local_name().to_owned();
-        let reference = self.xml.attribute("href").map(|href| parse_reference(&href));
-        if let Some(Reference::Internal(id)) = reference.filter(|_| !local_name.starts_with("interior")) {
+        let reference = self.xml.attribute("href").and_then(|href| self.references.find_own_id(&href));
+        if let Some(id) = reference.filter(|_| !local_name.starts_with("interior")) {
             self.feature(number).xlinks.push(id);
         }
         let code_space = self.xml.attribute("codeSpace").map(|space| space.into_owned());
@@ -259,6 +261,8 @@ impl CityObjectParser<'_> {
             report: self.report,
             appearances: &mut self.city_object.appearances,
             theme: self.theme,
+            references: self.references,
+            scope: AppearanceScope::Document,
             max_bytes: self.options.max_appearance_bytes,
             values: self.values,
             text: self.text,
@@ -272,6 +276,7 @@ impl CityObjectParser<'_> {
             report: self.report,
             geometry: &mut self.city_object.geometry,
             crs_table: self.crs_table,
+            references: self.references,
             max_bytes: self.options.max_object_bytes,
             values: self.values,
             text: self.text,

@@ -11,7 +11,9 @@ use super::city_object_parser::CityObjectParser;
 use super::code_lists::CodeLists;
 use super::converter::{FeatureConverter, INTERIOR_POLYGON};
 use super::crs_table::{CrsNumber, CrsTable, DOCUMENT_CRS};
+use super::other_documents::OtherDocuments;
 use super::pre_scan::PreScan;
+use super::references::References;
 use super::tessellate::INVISIBLE_POLYGON;
 use super::xml_reader::{Malformed, XmlEvent, XmlReader};
 use crate::asset_folder::AssetFolder;
@@ -30,6 +32,7 @@ pub struct CityGmlReader {
     crs_table: CrsTable,
     /// Coordinate system of the model's envelope.
     crs: CrsNumber,
+    references: References,
     theme: ThemeSelection,
     /// The current city object.
     city_object: CityObject,
@@ -52,7 +55,8 @@ impl CityGmlReader {
         let lod = parse_lod(options)?;
         let folder = AssetFolder::for_document(path, options.folder.as_deref())?;
         let mut report = ReportBuilder::new(path, "citygml", options.strict);
-        let PreScan { srs_name, theme, appearances, referenced_ids, transparency } = PreScan::run(path, options, &mut report)?;
+        let mut references = References::new(path, options.folder.as_deref())?;
+        let PreScan { srs_name, theme, appearances, referenced_ids, transparency } = PreScan::run(path, options, &mut references, &mut report)?;
         report.set_crs(srs_name.clone());
         report_theme(&theme, &mut report);
         let inverted = transparency.is_inverted(options.transparency, &mut report);
@@ -62,6 +66,7 @@ impl CityGmlReader {
             options: options.clone(),
             crs_table: CrsTable::new(srs_name),
             crs: DOCUMENT_CRS,
+            references,
             theme,
             city_object: CityObject::default(),
             converter: FeatureConverter::new(folder, options, inverted, lod, appearances, referenced_ids),
@@ -120,6 +125,7 @@ impl CityGmlReader {
             theme: &mut self.theme,
             code_lists: &mut self.code_lists,
             crs_table: &mut self.crs_table,
+            references: &mut self.references,
             crs: self.crs,
             values: &mut self.values,
             text: &mut self.text,
@@ -144,10 +150,28 @@ impl CityGmlReader {
         self.report.note_file("document broken", format!("at byte {byte}{line} ({what}); what comes before is kept"));
     }
 
+    /// Reads the geometry that is in other documents of the folder.
+    fn read_other_documents(&mut self) -> Result<()> {
+        let (geometry, appearances) = self.converter.other_geometry();
+        OtherDocuments {
+            references: &mut self.references,
+            geometry,
+            appearances,
+            theme: &mut self.theme,
+            crs_table: &mut self.crs_table,
+            options: &self.options,
+            report: &mut self.report,
+        }
+        .read_wanted()?;
+        self.converter.set_coordinate_systems(self.crs_table.names());
+        Ok(())
+    }
+
     fn finish(&mut self) -> Result<()> {
         self.at_end = true;
-        self.converter.convert_deferred(&mut self.report)?;
-        self.instances = self.converter.finish_instances(&mut self.report)?;
+        self.read_other_documents()?;
+        self.converter.convert_deferred(&self.references, &mut self.report)?;
+        self.instances = self.converter.finish_instances(&self.references, &mut self.report)?;
         let interiors = self.report.skipped(INTERIOR_POLYGON);
         if interiors > 0 {
             self.report.note_file("polygons of interiors are not drawn", format!("{interiors}; --interiors draws them"));

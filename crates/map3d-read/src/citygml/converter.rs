@@ -9,13 +9,14 @@ use super::appearance::Appearances;
 use super::city_object::{CityObject, Representation};
 use super::crs_table::CrsNumber;
 use super::feature_types::to_class_name;
-use super::geometry_arena::NodeId;
+use super::geometry_arena::{GeometryArena, NodeId};
 use super::ids::{self, Id, IdSet};
 use super::implicit_geometry::PrototypeSource;
 use super::lod_selection::{representations_at, select_lods};
 use super::material_resolver::MaterialResolver;
 use super::polygons::{CollectedPolygons, LinkedGeometry, OrientedPolygon, UnresolvedXLink, VisitState, XLinkIndex, collect_polygons};
 use super::prototype_table::{PrototypePlacement, PrototypeTable, read_library_object};
+use super::references::References;
 use super::shared_geometry::{DeferredXLink, SharedGeometry};
 use super::tessellate::{MaterialSources, Tessellator, ThematicSurface};
 use super::textured_surface::add_own_appearances;
@@ -34,6 +35,8 @@ pub struct FeatureConverter {
     tessellator: Tessellator,
     /// Appearances outside city objects.
     document_appearances: Appearances,
+    /// Appearances of other documents that have geometry of this one.
+    other_appearances: Appearances,
     /// Ids that other city objects refer to.
     referenced_ids: IdSet,
     lod: Option<u8>,
@@ -76,6 +79,7 @@ impl FeatureConverter {
             resolver: MaterialResolver::new(folder, options.clone(), inverted),
             tessellator: Tessellator::new(options.clone()),
             document_appearances,
+            other_appearances: Appearances::default(),
             referenced_ids,
             lod,
             shared: SharedGeometry::default(),
@@ -195,25 +199,42 @@ impl FeatureConverter {
         self.shared.deferred.extend(unresolved.iter().map(defer));
     }
 
-    /// After the last city object: converts geometry that other city objects refer to and that its owner did not convert.
-    pub fn convert_deferred(&mut self, report: &mut ReportBuilder) -> Result<()> {
+    /// Where geometry of other documents is to be added, and the appearances of these documents.
+    pub fn other_geometry(&mut self) -> (&mut GeometryArena, &mut Appearances) {
+        (&mut self.shared.geometry, &mut self.other_appearances)
+    }
+
+    /// After the last city object: converts geometry that other city objects refer to and that its owner did not convert, and that of other documents.
+    pub fn convert_deferred(&mut self, references: &References, report: &mut ReportBuilder) -> Result<()> {
+        self.shared.add_unvisited();
         for link in std::mem::take(&mut self.shared.deferred) {
             let Some(node) = self.shared.geometry.by_id.get(&link.target).copied() else {
-                report.warn("unresolved reference", self.objects[link.object as usize].name.as_str())?;
+                self.report_unresolved(link.target, link.object, references, report)?;
                 continue;
             };
             let collected = collect_polygons(&self.shared.geometry, &mut self.shared.visits, node, link.reversed);
+            report.skip_many("geometry that refers to itself", collected.cycles, || self.objects[link.object as usize].name.clone())?;
+            for unresolved in &collected.unresolved {
+                self.report_unresolved(unresolved.target, link.object, references, report)?;
+            }
             self.tessellate_shared(&collected.polygons, link.object, link.rank, report)?;
         }
         self.complete_batch(1);
         Ok(())
     }
 
+    fn report_unresolved(&self, target: Id, object: u32, references: &References, report: &mut ReportBuilder) -> Result<()> {
+        match references.find_failure(target) {
+            Some((reason, href)) => report.warn(reason, href),
+            None => report.warn("unresolved reference", self.objects[object as usize].name.as_str()),
+        }
+    }
+
     fn tessellate_shared(&mut self, polygons: &[OrientedPolygon], object: u32, rank: Rank, report: &mut ReportBuilder) -> Result<()> {
         let object_name = &self.objects[object as usize].name;
         let surface = ThematicSurface { object, rank, type_names: ["", ""], feature_ids: &[ids::NONE], object_name };
-        let mut no_appearances = Appearances::default();
-        let mut sources = MaterialSources { resolver: &mut self.resolver, appearances: [&mut no_appearances, &mut self.document_appearances] };
+        let appearances = [&mut self.document_appearances, &mut self.other_appearances];
+        let mut sources = MaterialSources { resolver: &mut self.resolver, appearances };
         let geometry = LinkedGeometry { geometry: &self.shared.geometry, xlinks: &XLinkIndex::default() };
         polygons.iter().try_for_each(|polygon| self.tessellator.add_polygon(geometry, *polygon, &surface, &mut sources, report))
     }
@@ -287,7 +308,7 @@ impl FeatureConverter {
 
     /// After the last city object: converts prototypes that are defined in other city objects, then returns the instances with their prototypes'
     /// numbers.
-    pub fn finish_instances(&mut self, report: &mut ReportBuilder) -> Result<Vec<Instance>> {
+    pub fn finish_instances(&mut self, references: &References, report: &mut ReportBuilder) -> Result<Vec<Instance>> {
         let placements = std::mem::take(&mut self.prototypes.placements);
         for PrototypePlacement { key, instance, .. } in &placements {
             let node = self.shared.geometry.by_id.get(key).copied();
@@ -302,7 +323,12 @@ impl FeatureConverter {
                     instances.push(Instance { prototype, ..instance });
                     self.instance_crs.push(crs);
                 }
-                None => report.skip("implicit geometry without a prototype", || self.objects[instance.object as usize].name.clone())?,
+                None => {
+                    if let Some((reason, href)) = references.find_failure(key) {
+                        report.warn(reason, href)?;
+                    }
+                    report.skip("implicit geometry without a prototype", || self.objects[instance.object as usize].name.clone())?;
+                }
             }
         }
         Ok(instances)

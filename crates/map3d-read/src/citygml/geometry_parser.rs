@@ -7,7 +7,8 @@ use map3d_base::{Result, Vec3};
 use super::coordinates::{Separators, parse_coordinates, parse_points};
 use super::crs_table::{CrsNumber, CrsTable, TOO_MANY};
 use super::geometry_arena::{GeometryArena, NodeId, NodeKind, Ring};
-use super::ids::{self, Reference, parse_reference};
+use super::ids;
+use super::references::References;
 use super::textured_surface::read_own_appearance;
 use super::tin_parser::TinParts;
 use super::xml_reader::{XmlEvent, XmlReader};
@@ -118,6 +119,7 @@ pub struct GeometryParser<'a> {
     pub report: &'a mut ReportBuilder,
     pub geometry: &'a mut GeometryArena,
     pub crs_table: &'a mut CrsTable,
+    pub references: &'a mut References,
     /// Limit on the memory of `geometry`.
     pub max_bytes: u64,
     /// Buffers for numbers and text.
@@ -138,11 +140,11 @@ impl GeometryParser<'_> {
 
     fn read_xlink(&mut self, parent: NodeId) -> Result<Option<NodeId>> {
         let Some(href) = self.xml.attribute("href") else { return Ok(None) };
-        match parse_reference(&href) {
-            Reference::Internal(id) => Ok(Some(self.geometry.add(ids::NONE, parent, NodeKind::XLink(id)))),
-            Reference::External => {
+        match self.references.resolve_geometry(&href) {
+            Ok(id) => Ok(Some(self.geometry.add(ids::NONE, parent, NodeKind::XLink(id)))),
+            Err(reason) => {
                 let href = href.into_owned();
-                self.report.warn("reference to another document not followed", href)?;
+                self.report.warn(reason, href)?;
                 Ok(None)
             }
         }

@@ -9,8 +9,12 @@ use std::path::Path;
 use map3d_base::{Error, Result};
 
 use super::appearance::{Appearances, ThemeSelection};
-use super::appearance_parser::{AppearanceParser, parse_transparency};
-use super::ids::{IdSet, Reference, hash_id, parse_reference};
+use super::appearance_parser::{AppearanceParser, AppearanceScope, parse_transparency};
+use super::crs_table::CrsTable;
+use super::geometry_arena::GeometryArena;
+use super::ids::{IdSet, hash_id};
+use super::other_documents::OtherDocuments;
+use super::references::References;
 use super::tag_scanner::{TagKind, TagScanner};
 use super::xml_reader::{XmlEvent, XmlReader, local_part, parse_attributes, unescape_lossy, unsupported};
 use crate::options::ReadOptions;
@@ -32,8 +36,8 @@ pub struct PreScan {
 }
 
 impl PreScan {
-    /// Scans the whole document. A truncated document is scanned up to its end.
-    pub fn run(path: &Path, options: &ReadOptions, report: &mut ReportBuilder) -> Result<Self> {
+    /// Scans the whole document, then the appearances that other documents have for it. A truncated document is scanned up to its end.
+    pub fn run(path: &Path, options: &ReadOptions, references: &mut References, report: &mut ReportBuilder) -> Result<Self> {
         let io = |e| Error::storage(path, e);
         let mut scan = Self { theme: ThemeSelection::new(options.theme.clone()), ..Self::default() };
         let (input, faults) = open_checked_xml(path)?;
@@ -41,7 +45,7 @@ impl PreScan {
             report.warn_file(reason, example)?;
         }
         let mut scanner = TagScanner::new(input);
-        let mut references = ObjectReferences::default();
+        let mut links = ObjectReferences::default();
         let (mut depth, mut has_elements) = (0usize, false);
         while let Some(kind) = scanner.next_tag().map_err(io)? {
             match kind {
@@ -55,7 +59,7 @@ impl PreScan {
                     if depth == 0 && name != "CityModel" {
                         return Err(Error::format(path, format!("the root element is {name:?}; expected CityModel")));
                     }
-                    scan.scan_attributes(attributes, &mut references);
+                    scan.scan_attributes(attributes, references, &mut links);
                     let parse: Option<Parse> = match (kind, name) {
                         (TagKind::Start, "appearanceMember") if depth == 1 => Some(Self::parse_appearance_member),
                         (TagKind::Start, "theme") => Some(Self::parse_theme),
@@ -67,19 +71,20 @@ impl PreScan {
                         _ => None,
                     };
                     match parse {
-                        Some(parse) => scanner = parse(&mut scan, scanner, options, report)?,
+                        Some(parse) => scanner = parse(&mut scan, scanner, options, references, report)?,
                         None => depth += usize::from(kind == TagKind::Start),
                     }
                 }
             }
             if depth <= 1 {
-                references.finish_object(&mut scan.referenced_ids);
+                links.finish_object(&mut scan.referenced_ids);
             }
         }
         if !has_elements {
             return Err(Error::format(path, "no XML element; expected a CityGML document"));
         }
-        references.finish_object(&mut scan.referenced_ids);
+        links.finish_object(&mut scan.referenced_ids);
+        scan.read_other_appearances(options, references, report)?;
         scan.appearances.count_textures(&mut scan.theme);
         scan.theme.choose();
         scan.appearances.count_transparency(&mut scan.transparency);
@@ -90,15 +95,15 @@ impl PreScan {
         Ok(scan)
     }
 
-    fn scan_attributes(&mut self, attributes: &str, references: &mut ObjectReferences) {
+    fn scan_attributes(&mut self, attributes: &str, references: &References, links: &mut ObjectReferences) {
         for (name, value) in parse_attributes(attributes) {
             match name {
                 "id" => {
-                    references.ids.insert(hash_id(&unescape_lossy(value)));
+                    links.ids.insert(hash_id(&unescape_lossy(value)));
                 }
                 "href" => {
-                    if let Reference::Internal(id) = parse_reference(&unescape_lossy(value)) {
-                        references.targets.push(id);
+                    if let Some(id) = references.find_own_id(&unescape_lossy(value)) {
+                        links.targets.push(id);
                     }
                 }
                 "srsName" if self.srs_name.is_none() => {
@@ -109,14 +114,37 @@ impl PreScan {
         }
     }
 
+    /// Reads the appearances that other documents have for surfaces of this one.
+    fn read_other_appearances(&mut self, options: &ReadOptions, references: &mut References, report: &mut ReportBuilder) -> Result<()> {
+        if options.appearance_files.is_empty() {
+            return Ok(());
+        }
+        OtherDocuments {
+            references,
+            geometry: &mut GeometryArena::default(),
+            appearances: &mut self.appearances,
+            theme: &mut self.theme,
+            crs_table: &mut CrsTable::new(self.srs_name.clone()),
+            options,
+            report,
+        }
+        .read_appearances(&options.appearance_files)
+    }
+
     /// Parses the current appearanceMember; the scanner continues after it. The second pass reports a malformed one.
-    fn parse_appearance_member(&mut self, scanner: TagScanner, options: &ReadOptions, report: &mut ReportBuilder) -> Result<TagScanner> {
+    fn parse_appearance_member(
+        &mut self,
+        scanner: TagScanner,
+        options: &ReadOptions,
+        references: &mut References,
+        report: &mut ReportBuilder,
+    ) -> Result<TagScanner> {
         let mut xml = XmlReader::new(scanner, report.path());
         let max_bytes = options.max_appearance_bytes;
         let (values, text) = (&mut Vec::new(), &mut String::new());
         let parsed = xml.next_event().and_then(|_| {
-            AppearanceParser { xml: &mut xml, report, appearances: &mut self.appearances, theme: &mut self.theme, max_bytes, values, text }
-                .read_property()
+            let (appearances, theme, scope) = (&mut self.appearances, &mut self.theme, AppearanceScope::Document);
+            AppearanceParser { xml: &mut xml, report, appearances, theme, references, scope, max_bytes, values, text }.read_property()
         });
         match parsed {
             Err(e) if !xml.is_malformed() => Err(e),
@@ -125,7 +153,7 @@ impl PreScan {
     }
 
     /// Parses the current material of a city object; the scanner continues after it.
-    fn parse_material(&mut self, scanner: TagScanner, _: &ReadOptions, report: &mut ReportBuilder) -> Result<TagScanner> {
+    fn parse_material(&mut self, scanner: TagScanner, _: &ReadOptions, _: &mut References, report: &mut ReportBuilder) -> Result<TagScanner> {
         let mut xml = XmlReader::new(scanner, report.path());
         let mut transparency = None;
         if let Ok(XmlEvent::Start) = xml.next_event() {
@@ -145,7 +173,7 @@ impl PreScan {
     }
 
     /// Parses the current theme; the scanner continues after it.
-    fn parse_theme(&mut self, scanner: TagScanner, _: &ReadOptions, report: &mut ReportBuilder) -> Result<TagScanner> {
+    fn parse_theme(&mut self, scanner: TagScanner, _: &ReadOptions, _: &mut References, report: &mut ReportBuilder) -> Result<TagScanner> {
         let mut xml = XmlReader::new(scanner, report.path());
         if let Ok(XmlEvent::Start) = xml.next_event()
             && let Ok(name) = xml.read_text()
@@ -157,7 +185,7 @@ impl PreScan {
 }
 
 /// Parses the current element instead of scanning it.
-type Parse = fn(&mut PreScan, TagScanner, &ReadOptions, &mut ReportBuilder) -> Result<TagScanner>;
+type Parse = fn(&mut PreScan, TagScanner, &ReadOptions, &mut References, &mut ReportBuilder) -> Result<TagScanner>;
 
 /// Ids and references in the current city object.
 #[derive(Default)]

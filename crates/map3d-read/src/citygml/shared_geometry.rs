@@ -37,6 +37,11 @@ impl SharedGeometry {
         }
     }
 
+    /// Gives each new node a state.
+    pub fn add_unvisited(&mut self) {
+        self.visits.resize(self.geometry.nodes.len(), VisitState::Unvisited);
+    }
+
     /// Copies a node, its descendants and the targets of their XLinks.
     fn copy_node(&mut self, from: &GeometryArena, visits: &[VisitState], number: NodeId, parent: NodeId, depth: usize) {
         let node = from.node(number);

@@ -11,6 +11,7 @@ use quick_xml::escape::unescape;
 use quick_xml::events::{BytesRef, Event};
 
 use super::ids::{self, Id, hash_id};
+use super::references::mix_id;
 use crate::text_input::{TextInput, open_xml};
 
 pub const MAX_DEPTH: usize = 256;
@@ -36,6 +37,8 @@ pub struct XmlReader<R = TextInput> {
     text: String,
     depth: usize,
     malformed: Option<Malformed>,
+    /// Mixed with the ids; see `references`.
+    document_key: Id,
 }
 
 /// Where and why a document is not well-formed.
@@ -66,7 +69,13 @@ impl<R: BufRead> XmlReader<R> {
             text: String::new(),
             depth: 0,
             malformed: None,
+            document_key: 0,
         }
+    }
+
+    /// Mixes the ids with the key of their document.
+    pub fn set_document_key(&mut self, key: Id) {
+        self.document_key = key;
     }
 
     /// Returns the rest of the input.
@@ -179,7 +188,7 @@ impl<R: BufRead> XmlReader<R> {
 
     /// Returns the hashed gml:id of the last start tag, or `ids::NONE`.
     pub fn gml_id(&self) -> Id {
-        self.attribute("id").map_or(ids::NONE, |id| hash_id(&id))
+        self.attribute("id").map_or(ids::NONE, |id| mix_id(hash_id(&id), self.document_key))
     }
 
     /// Iterates over the attributes of the last start tag; see `parse_attributes`.
