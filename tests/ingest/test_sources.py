@@ -64,6 +64,41 @@ def test_a_file_of_a_numbered_asset_given_alone_is_that_asset(tmp_path: Path) ->
     assert [source.name for source in find_sources([known["town-2"]], "town", known=known)] == ["town"]
 
 
+def given(path: Path, known: dict[str, Path]) -> str:
+    """Returns the name of a document that is given itself, where all known names are taken."""
+    (source,) = find_sources([path], known=known, taken=list(known))
+    return source.name
+
+
+def test_a_given_file_of_another_folder_has_a_name_of_its_own_and_keeps_it(tmp_path: Path) -> None:
+    paths = [tmp_path / folder / "town.obj" for folder in ("b", "c", "x/c", "y/x/c")]
+    known: dict[str, Path] = {}
+    for path, name in zip(paths, ("town", "c-town", "x-c-town", "y-x-c-town"), strict=True):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(OBJ)
+        assert given(path, known) == name
+        known[name] = path
+    assert [given(path, known) for path in paths] == list(known)
+    (tmp_path / "link").symlink_to(tmp_path / "c")
+    assert given(tmp_path / "link" / "town.obj", known) == "c-town", "the same file by another path"
+    assert [source.name for source in find_sources(list(reversed(paths)), known=known, taken=list(known))] == list(reversed(known))
+    assert [source.name for source in find_sources([paths[1]], known={"town": paths[0]})] == ["town"], "a name that is not taken"
+    assert [source.name for source in find_sources([paths[1]], "town", known=known, taken=list(known))] == ["town"], "--name"
+
+
+def test_names_of_deep_folders_stay_within_the_longest_name(tmp_path: Path) -> None:
+    known: dict[str, Path] = {}
+    for folder in ("first", "f" * 70, "g" * 70):
+        path = tmp_path / folder / f"{'t' * 50}.obj"
+        path.parent.mkdir()
+        path.write_text(OBJ)
+        name = given(path, known)
+        assert len(name) <= 64
+        assert name not in known
+        known[name] = path
+    assert list(known) == ["t" * 50, f"{'t' * 50}-2", f"{'t' * 50}-3"]
+
+
 def test_a_folder_without_a_readable_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("v 1 2 3")
     with pytest.raises(UnknownFormat, match="no readable file in this folder;"):

@@ -1,5 +1,6 @@
 """Files with equal names in several folders: adding one never changes the names and object ids of those that are there."""
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -87,3 +88,59 @@ def test_a_file_added_by_hand_changes_no_ids(tmp_path: Path) -> None:
     after = ids(workspace)
     assert before.items() < after.items()
     assert {asset for asset, _ in after.values()} == {"town", "town-2"}
+
+
+def add(workspace: Workspace, path: Path) -> tuple[str, bool]:
+    """Imports one file; returns the name of the asset, and whether it replaced one."""
+    catalogue = workspace.open_catalogue()
+    if not catalogue.scenes():
+        catalogue.create_scene(SceneRecord("town"))
+    (done,) = import_files(workspace, catalogue, "town", [path], OPTIONS).imported
+    catalogue.close()
+    return done.asset, done.replaced
+
+
+def test_a_given_file_of_another_folder_replaces_nothing(tmp_path: Path) -> None:
+    workspace, city = Workspace(tmp_path / "workspace").create(), tmp_path / "city"
+    for name in ("a/town.gml", "b/town.gml"):
+        write(city, name)
+    assert [add(workspace, city / name) for name in ("a/town.gml", "b/town.gml")] == [("town", False), ("b-town", False)]
+    before = ids(workspace)
+    assert {asset for asset, _ in before.values()} == {"town", "b-town"}
+    assert [add(workspace, city / name) for name in ("b/town.gml", "a/town.gml")] == [("b-town", True), ("town", True)]
+    assert ids(workspace) == before
+
+
+def test_a_moved_file_keeps_its_name_and_ids(tmp_path: Path) -> None:
+    workspace, city = Workspace(tmp_path / "workspace").create(), tmp_path / "city"
+    write(city, "a/town.gml")
+    assert add(workspace, city / "a" / "town.gml") == ("town", False)
+    before = ids(workspace)
+    city.rename(tmp_path / "moved")
+    assert add(workspace, tmp_path / "moved" / "a" / "town.gml") == ("town", True)
+    assert ids(workspace) == before
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_copies_of_a_folder_and_its_workspace_have_equal_names_and_ids(tmp_path: Path, inside: bool) -> None:
+    files = "workspace/files" if inside else "files"
+    workspace = Workspace(tmp_path / "one" / "workspace").create()
+    write(tmp_path / "one" / files, "town.gml")
+    add(workspace, tmp_path / "one" / files / "town.gml")
+    shutil.copytree(tmp_path / "one", tmp_path / "two")
+    copy = Workspace(tmp_path / "two" / "workspace")
+    assert add(copy, tmp_path / "two" / files / "town.gml") == ("town", True), "although the first one is still there"
+    assert ids(copy) == ids(workspace)
+    fresh = Workspace(tmp_path / "three").create()
+    assert add(fresh, tmp_path / "two" / files / "town.gml") == ("town", False)
+    assert ids(fresh) == ids(workspace)
+
+
+def test_a_file_in_the_workspace_replaces_its_name(tmp_path: Path) -> None:
+    """Uploads of one name come in folders of their own."""
+    workspace, city = Workspace(tmp_path / "workspace").create(), tmp_path / "city"
+    write(city, "town.gml")
+    add(workspace, city / "town.gml")
+    for upload in ("1", "2"):
+        write(workspace.root / "uploads" / upload, "town.gml")
+        assert add(workspace, workspace.root / "uploads" / upload / "town.gml") == ("town", True)

@@ -37,7 +37,8 @@ def command(workspace: Workspace, scene: str, files: Sequence[Path], as_json: bo
     """Import FILES into SCENE: CityGML, OBJ, and GeoTIFF rasters of elevation and imagery. For a folder or a ZIP
     archive, import every file in a known format.
 
-    A file with the name of an existing asset replaces that asset; its objects keep their ids.
+    A file that is in the scene already replaces its asset; its objects keep their ids. A file with the same name
+    from another folder is an asset of its own, unless the first one is gone. --name NAME replaces the asset NAME.
     """
     from map3d.ingest.import_files import import_files
     from map3d.ingest.import_options import ImportOptions

@@ -9,7 +9,7 @@ from map3d.catalogue.scene_lock import scene_lock
 from map3d.errors import BadRequest, Map3dError, UnknownFormat
 from map3d.ingest.import_inputs import import_inputs
 from map3d.ingest.import_options import ImportOptions
-from map3d.ingest.importing import Imported, import_file
+from map3d.ingest.importing import Imported, import_file, workspace_key
 from map3d.ingest.parser_process import ParserProcess
 from map3d.ingest.sources import SourceDocument, find_sources
 from map3d.ingest.unfinished_imports import finish_imports
@@ -70,13 +70,15 @@ def _import_files(
     progress: OnFile | None,
 ) -> FilesImport:
     result = FilesImport()
+    assets = catalogue.assets(scene)
     sources = find_sources(
         files,
         name,
         lambda path, reason: result.failed.append((str(path), reason)),
         lambda path, reason: result.left_alone.append((str(path), reason)),
-        {asset.name: Path(asset.source) for asset in catalogue.assets(scene)},
+        {asset.name: Path(asset.source) for asset in assets},
         virtual,
+        _taken_names(workspace, assets, files),
     )
     if result.failed and options.strict:
         raise UnknownFormat(result.failed[0][1])
@@ -98,6 +100,17 @@ def _import_files(
                     raise
                 result.failed.append((str(source.paths[0]), str(error)))
     return result
+
+
+def _taken_names(workspace: Workspace, assets: Sequence[AssetRecord], files: Sequence[Path]) -> set[str]:
+    """Returns the names of assets whose files this workspace imported from outside of itself and that are still there. A workspace that is a copy
+    has no such names, since its assets are those of the other one; nor has an import of files inside the workspace, such as uploads."""
+    root = workspace.root.resolve()
+    if any(path.resolve().is_relative_to(root) for path in files):
+        return set()
+    imported_here = (asset for asset in assets if asset.report.get("workspace") == workspace_key(workspace))
+    sources = {asset.name: Path(asset.source) for asset in imported_here}
+    return {name for name, path in sources.items() if path.is_file() and not path.resolve().is_relative_to(root)}
 
 
 def _known_assets(workspace: Workspace, catalogue: Catalogue, scene: str) -> dict[str, AssetRecord]:

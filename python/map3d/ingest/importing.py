@@ -1,5 +1,6 @@
 """Imports one source document as an asset of a scene: a limited subprocess parses it, and one atomic step puts the asset in place."""
 
+import hashlib
 import shutil
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
@@ -168,6 +169,7 @@ def _add_to_scene(
         ids = registry.put_asset(source.name, new_objects(lines, boxes, record.origin))
     write_ids(draft, ids)
     report |= inputs.report() | _missing_files(source) | {"bytes": sum(path.stat().st_size for path in source.data_paths)}
+    report["workspace"] = workspace_key(workspace)
     write_report(draft, report)
     replaced = final.exists()
     digest = asset_digest(draft)
@@ -175,6 +177,11 @@ def _add_to_scene(
     catalogue.put_asset(AssetRecord(scene, source.name, path, source.format, digest, inputs.digest, report))
     unmark_import(final)
     return Imported(source.name, str(source.paths[0]), source.format, len(lines), report["triangles"], replaced, report)
+
+
+def workspace_key(workspace: Workspace) -> str:
+    """Returns what tells this workspace from a copy of it: a hash of its place."""
+    return hashlib.sha256(str(workspace.root.resolve()).encode()).hexdigest()[:16]
 
 
 def _folder_options(source: SourceDocument) -> dict[str, Any]:

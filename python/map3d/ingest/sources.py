@@ -5,7 +5,7 @@ import os
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import count, takewhile
+from itertools import count, islice, takewhile
 from pathlib import Path
 
 from map3d.errors import NotFound, UnknownFormat
@@ -34,6 +34,7 @@ OnUnreadable = Callable[[Path, str], None]
 """Called with an unreadable file of a folder and the reason."""
 
 _HEAD_BYTES = 4096
+_MAX_NAME_CHARS = 64
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,7 @@ def find_sources(
     on_left_alone: OnUnreadable | None = None,
     known: Mapping[str, Path] | None = None,
     virtual: Collection[Path] = (),
+    taken: Collection[str] = (),
 ) -> list[SourceDocument]:
     """Returns the given files, and every file of a known format below the given folders: CityGML, OBJ, then rasters, each by path.
 
@@ -77,7 +79,8 @@ def find_sources(
     `on_unreadable` is called for files in folders whose suffix announces a known format that their content is not; `on_left_alone` for other files
     that hold a city or a raster in a format that map3d does not read, or whose format is unknown. `known`: the files of assets by name; a file whose
     name is needed for several keeps the one that it has there. `virtual`: those of the paths at which virtual rasters are read; the rasters that
-    one in a folder names are not read a second time.
+    one in a folder names are not read a second time. `taken`: known names that a document which was given itself has only if it is the file of that
+    asset; else it is named after its folders and itself.
 
     CityGML files of a folder that have no city objects of their own, but geometry or appearances of others, are read with these.
 
@@ -99,7 +102,7 @@ def find_sources(
             documents.append(_Group(unpacked_path(path).stem, format, (path,)))
     if rasters:
         terrains.append(_Group(rasters[0].stem, "raster", tuple(rasters), virtual=any(path in virtual for path in rasters)))
-    sources = _name_sources([*_link(documents), *terrains], name, known or {})
+    sources = _name_sources([*_link(documents), *terrains], name, known or {}, taken)
     return sorted(sources, key=lambda source: _ORDER[source.format])
 
 
@@ -221,22 +224,46 @@ def _group_rasters(rasters: Sequence[Path], virtual: Path | None) -> list[_Group
     return [_Group(rasters[0].stem if len(rasters) == 1 else folder.resolve().name, "raster", tuple(rasters), virtual, virtual is not None)]
 
 
-def _name_sources(groups: Sequence[_Group], name: str | None, known: Mapping[str, Path]) -> list[SourceDocument]:
+def _name_sources(groups: Sequence[_Group], name: str | None, known: Mapping[str, Path], taken: Collection[str]) -> list[SourceDocument]:
     """Names sources after their files and numbers duplicates, without changing the names of known ones."""
     wanted = [asset_name(name or group.label) for group in groups]
-    kept = {} if name else _kept_names(groups, wanted, known)
-    taken = set(kept.values())
+    others = [set[str]() if name else _names_of_other_files(group, known, taken) for group in groups]
+    kept = {} if name else _kept_names(groups, wanted, known, others)
+    used = set(kept.values())
     sources = []
     for position, group in enumerate(groups):
-        unique = kept.get(position) or next(text for text in _numbered(wanted[position]) if text not in taken)
-        taken.add(unique)
+        refused = used | others[position]
+        unique = kept.get(position) or next(text for text in _possible_names(group, wanted[position]) if text not in refused)
+        used.add(unique)
         sources.append(SourceDocument(unique, group.format, group.paths, group.root, group.virtual, group.appearances))
     return sources
 
 
-def _kept_names(groups: Sequence[_Group], wanted: Sequence[str], known: Mapping[str, Path]) -> dict[int, str]:
-    """Returns position → known name. A terrain has that of its raster. Where several documents may have a name, the one whose path agrees with the
-    known one in more parts from the end has it, also after their folder was moved."""
+def _is_given(group: _Group) -> bool:
+    """Returns whether the group is a document that was given itself."""
+    return group.root is None and group.format != "raster"
+
+
+def _names_of_other_files(group: _Group, known: Mapping[str, Path], taken: Collection[str]) -> set[str]:
+    """Returns the taken names that a document must not have, since they belong to other files."""
+    if not _is_given(group):
+        return set()
+    return {known_name for known_name in taken if not known[known_name].samefile(group.paths[0])}
+
+
+def _possible_names(group: _Group, wanted: str) -> Iterator[str]:
+    """Yields the name; for a given document, also with the names of its folders, the nearest first; then with numbers from 2 on."""
+    yield wanted
+    if _is_given(group):
+        words = [asset_name(part) for part in reversed(group.paths[0].absolute().parent.parts[1:])]
+        longer = ["-".join([*reversed(words[:depth]), wanted]) for depth in range(1, len(words) + 1)]
+        yield from (text for text in longer if len(text) <= _MAX_NAME_CHARS)
+    yield from islice(_numbered(wanted), 1, None)
+
+
+def _kept_names(groups: Sequence[_Group], wanted: Sequence[str], known: Mapping[str, Path], others: Sequence[set[str]]) -> dict[int, str]:
+    """Returns position → known name; `others`: names that each must not have. A terrain has the name of its raster. Where several documents may have
+    a name, the one whose path agrees with the known one in more parts from the end has it, also after their folder was moved."""
     places: dict[str, list[tuple[str, Path]]] = {}
     for known_name, path in known.items():
         places.setdefault(asset_name(unpacked_path(path).stem), []).append((known_name, path))
@@ -244,7 +271,8 @@ def _kept_names(groups: Sequence[_Group], wanted: Sequence[str], known: Mapping[
         (-_equal_parts(group.paths[0], path), position, known_name)
         for position, group in enumerate(groups)
         for known_name, path in places.get(wanted[position], ())
-        if known_name == wanted[position] or known_name.startswith(f"{wanted[position][:58]}-")
+        if known_name == wanted[position] or known_name.startswith(f"{wanted[position][:58]}-") or known_name.endswith(f"-{wanted[position]}")
+        if known_name not in others[position]
     ]
     rasters = {path.absolute(): position for position, group in enumerate(groups) if group.format == "raster" for path in group.paths}
     pairs += [(-len(path.parts), rasters[path], known_name) for known_name, path in known.items() if path in rasters]
@@ -270,7 +298,7 @@ def _numbered(name: str) -> Iterator[str]:
 def asset_name(text: str) -> str:
     """Converts text to a valid name: lower case, any other character becomes a dash."""
     plain = re.sub(r"[^a-z0-9_-]+", "-", text.lower()).strip("-_")
-    return plain[:64] or "asset"
+    return plain[:_MAX_NAME_CHARS] or "asset"
 
 
 def _find_companions(path: Path, source: SourceDocument) -> list[Path]:
