@@ -113,7 +113,8 @@ pub fn find_distinct_points(points: &[[f64; 2]]) -> Vec<u32> {
     first
 }
 
-/// Returns the points in rounds, each about twice as large as the one before, chosen by a hash; in a round, along a Z-order curve. In such an order
+/// Returns the corners of a large triangle first: as long as all points are on one line, each new one takes as many steps as there are. Then the points
+/// in rounds, each about twice as large as the one before, chosen by a hash; in a round, along a Z-order curve. In such an order
 /// an incremental Delaunay triangulation takes n log n steps whatever the points (Amenta, Choi, Rote: Incremental constructions con BRIO, 2003).
 pub fn choose_insertion_order(points: &[[f64; 2]]) -> Vec<u32> {
     let low = points.iter().fold([f64::MAX; 2], |low, p| [low[0].min(p[0]), low[1].min(p[1])]);
@@ -124,8 +125,23 @@ pub fn choose_insertion_order(points: &[[f64; 2]]) -> Vec<u32> {
     };
     let round = |k: u32| 64 - XxHash3_64::oneshot(&k.to_le_bytes()).trailing_zeros();
     let mut order: Vec<u32> = (0..points.len() as u32).collect();
-    order.sort_by_cached_key(|k| (round(*k), cell(*k, 0) | cell(*k, 1) << 1));
+    let corners = find_wide_triangle(points);
+    order.sort_by_cached_key(|k| (!corners.contains(k), round(*k), cell(*k, 0) | cell(*k, 1) << 1));
     order
+}
+
+/// Returns the first point, the one farthest from it, and the one farthest from the line through both.
+fn find_wide_triangle(points: &[[f64; 2]]) -> [u32; 3] {
+    let Some(first) = points.first() else { return [0; 3] };
+    let offset = |p: &[f64; 2]| [p[0] - first[0], p[1] - first[1]];
+    let find_greatest = |size: &dyn Fn(&[f64; 2]) -> f64| {
+        let greatest = points.iter().enumerate().max_by(|a, b| size(a.1).total_cmp(&size(b.1)));
+        greatest.map_or(0, |(number, _)| number)
+    };
+    let second = find_greatest(&|p| offset(p)[0].hypot(offset(p)[1]));
+    let along = offset(&points[second]);
+    let third = find_greatest(&|p| (along[0] * offset(p)[1] - along[1] * offset(p)[0]).abs());
+    [0, second as u32, third as u32]
 }
 
 /// Moves bit k to bit 2k.

@@ -1,14 +1,12 @@
 //! Repairs T-junctions. Ear clipping drops vertices that are collinear with their neighbours. An adjacent polygon or triangle that has a corner
 //! at such a vertex would show a crack, so the vertices are inserted again.
 
-/// Polygons with more points × triangle indices than this are not repaired.
-const MAX_PAIRS: usize = 20_000_000;
-
-/// Re-inserts dropped vertices: splits triangles so that no vertex is inside an edge. `points`: all vertices of the polygon.
+/// Re-inserts dropped vertices: splits triangles so that no vertex is inside an edge. `points`: all vertices of the polygon, which has few, because the
+/// time grows with the square of their number.
 pub fn repair_t_junctions(points: &[[f64; 2]], triangles: &mut Vec<u32>) {
     let mut used = vec![false; points.len()];
     triangles.iter().for_each(|v| used[*v as usize] = true);
-    if used.iter().all(|u| *u) || points.len().saturating_mul(triangles.len()) > MAX_PAIRS {
+    if used.iter().all(|u| *u) {
         return;
     }
     let size = points.as_flattened().iter().fold(0.0f64, |size, c| size.max(c.abs()));

@@ -115,6 +115,16 @@ fn other_large_polygons_are_covered() {
 }
 
 #[test]
+fn an_edge_may_have_very_many_vertices_on_or_near_it() {
+    let mut random = Random(23);
+    for (count, deviation) in [(900, 0.0), (900, 1e-6), (10_000, 0.0), (10_000, 1e-6), (100_000, 0.0), (100_000, 1e-6)] {
+        let edge = (0..count).map(|k| [100.0 * f64::from(k) / f64::from(count), deviation * (random.next_f64() - 0.5)]);
+        let ring: Ring = edge.chain([[100.0, 0.0], [100.0, 50.0], [0.0, 50.0]]).collect();
+        assert_covered(&format!("{count} vertices within {deviation} m"), &[ring]);
+    }
+}
+
+#[test]
 fn large_and_small_polygons_have_the_same_area() {
     let mut random = Random(17);
     for n in [997, 998, 999, 1_000, 1_001, 1_002, 1_003] {

@@ -59,11 +59,8 @@ struct Look {
 #[derive(Default)]
 pub(super) struct Looks {
     looks: Vec<Look>,
-    by_object: Vec<u16>,
+    by_object: Vec<u32>,
 }
-
-/// Greatest number of looks of an asset; further objects have the first one.
-const MAX_LOOKS: usize = u16::MAX as usize;
 
 impl Looks {
     /// Reads an asset's `objects.jsonl`.
@@ -80,18 +77,15 @@ impl Looks {
 
     fn of_objects(objects: &[ObjectFacts], rules: &[StyleRule]) -> Self {
         let mut looks = vec![Look { rules: unconditional(rules), ..Look::default() }];
-        let mut known: HashMap<Look, u16> = HashMap::from([(looks[0].clone(), 0)]);
+        let mut known: HashMap<Look, u32> = HashMap::from([(looks[0].clone(), 0)]);
         let by_object = (0..objects.len()).map(|number| {
             let look = look_of(objects, number, rules);
             if let Some(known) = known.get(&look) {
                 return *known;
             }
-            if looks.len() >= MAX_LOOKS {
-                return 0;
-            }
-            known.insert(look.clone(), looks.len() as u16);
+            known.insert(look.clone(), looks.len() as u32);
             looks.push(look);
-            looks.len() as u16 - 1
+            looks.len() as u32 - 1
         });
         let by_object = by_object.collect();
         Self { looks, by_object }
@@ -103,7 +97,7 @@ impl Looks {
 
     /// Returns the look of an object; of a prototype without one.
     pub fn of(&self, object: Option<u32>) -> usize {
-        object.and_then(|o| self.by_object.get(o as usize)).map_or(0, |look| usize::from(*look))
+        object.and_then(|o| self.by_object.get(o as usize)).map_or(0, |look| *look as usize)
     }
 
     /// Returns the colour of a surface as sRGB and opacity.
@@ -244,6 +238,26 @@ mod tests {
         assert_eq!([class(0, 0.8), class(0, 0.0), class(0, -1.0)], [SurfaceClass::Roof, SurfaceClass::Wall, SurfaceClass::Wall]);
         assert_eq!(class(1, 0.8), SurfaceClass::Other);
         assert_eq!(looks.class(looks.of(Some(0)), SurfaceClass::Wall, || 0.8), SurfaceClass::Wall, "what the source says stays");
+    }
+
+    #[test]
+    fn more_objects_than_65535_may_all_look_different() {
+        const BITS: usize = 17;
+        let bit = |k: usize| format!("bit {k}");
+        let rules: Vec<_> = (0..BITS).map(|k| StyleRule { attributes: BTreeMap::from([(bit(k), "1".into())]), ..rule(k as u8) }).collect();
+        let facts: Vec<_> = (0..70_000usize)
+            .map(|number| {
+                let attributes: Vec<_> = (0..BITS).filter(|k| number >> k & 1 == 1).map(|k| (bit(k), 1.into())).collect();
+                let attributes: Vec<_> =
+                    attributes.iter().map(|(name, value): &(String, serde_json::Value)| (name.as_str(), value.clone())).collect();
+                ObjectFacts::new(&object("a", "bridge", None, &attributes), number, &rules)
+            })
+            .collect();
+        let looks = Looks::of_objects(&facts, &rules);
+        assert_eq!(looks.len(), facts.len());
+        for number in 1..facts.len() as u32 {
+            assert_eq!(looks.color(looks.of(Some(number)), SurfaceClass::Wall, &rules)[0], number.trailing_zeros() as u8, "{number}");
+        }
     }
 
     #[test]
