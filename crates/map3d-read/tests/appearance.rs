@@ -246,6 +246,27 @@ fn georeferenced_textures_use_reference_point_or_world_file() {
 }
 
 #[test]
+fn a_reference_point_in_another_system_is_used_only_where_the_places_agree() {
+    let texture = |name: &str, at: &str| {
+        let point = format!("<referencePoint><gml:Point srsName='{name}'><gml:pos>{at}</gml:pos></gml:Point></referencePoint>");
+        let data = format!("<imageURI>u.png</imageURI><wrapMode>none</wrapMode>{point}<orientation>0.5 0 0 -0.5</orientation><target>#p</target>");
+        let envelope = "<boundedBy><gml:Envelope srsName='EPSG:25832+5783'/></boundedBy>";
+        read_with_defaults(&(member("a", &format!("<GeoreferencedTexture>{data}</GeoreferencedTexture>")) + envelope), "")
+    };
+    for (name, at, used) in [
+        ("EPSG:25832", "0.25 1.75", true),
+        ("urn:ogc:def:crs:EPSG::25832", "9000 1.75", true),
+        ("EPSG:5555", "0.25 1.75", true),
+        ("EPSG:25833", "-430000 1.75", false),
+        ("EPSG:25833", "0.25 90000", false),
+    ] {
+        let document = texture(name, at);
+        assert_eq!((document.material_of(0).texture.is_some(), document.count()), (used, 2), "{name} {at}");
+        assert_eq!(document.warned("georeferenced texture in another coordinate system"), u64::from(!used), "{name} {at}");
+    }
+}
+
+#[test]
 fn texture_coordinates_of_polygons_with_holes_stay_with_their_points() {
     let folder = Folder::new("holes");
     folder.put_png("t.png", 8, 8, [1, 1, 1, 255]);

@@ -11,6 +11,9 @@ IMAGE_FAULTS: Final[Mapping[str, str]] = {
     "image: unknown format": N_("Textures in a format that map3d does not read: {count}."),
     "unusable image": N_("Materials without a usable texture, shown in their colour: {count}."),
     "georeferenced texture without reference point or world file": N_("Georeferenced textures without a reference point or world file: {count}."),
+    "georeferenced texture in another coordinate system than the surface, not used": N_(
+        "Georeferenced textures in another coordinate system than their surfaces, not used: {count}."
+    ),
 }
 FAULTS: Final[Mapping[str, str]] = {
     **IMAGE_FAULTS,

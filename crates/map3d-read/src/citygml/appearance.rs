@@ -5,6 +5,7 @@ use std::ops::Range;
 use map3d_base::Vec3;
 use map3d_base::asset::Wrap;
 
+use super::crs_table::HorizontalKey;
 use super::geo_transform::GeoTransform;
 use super::ids::{self, Id, IdMap};
 use crate::transparency::TransparencyCounts;
@@ -36,7 +37,8 @@ pub struct TextureProperties {
 pub enum TexturePlacement {
     /// Each target has a parameterization.
     Parameterized,
-    Georeferenced(GeoTransform),
+    /// `crs`: the one that the reference point names.
+    Georeferenced { transform: GeoTransform, crs: Option<HorizontalKey> },
     /// A world file next to the image.
     WorldFile,
 }
@@ -65,6 +67,8 @@ pub struct ResolvedSurfaceData {
     pub material: ResolvedMaterial,
     /// Set for georeferenced textures.
     pub geo_transform: Option<GeoTransform>,
+    /// Coordinate system of that transformation; none if it is that of the surfaces.
+    pub crs: Option<HorizontalKey>,
     /// Width and height of the image.
     pub size_px: [u32; 2],
 }

@@ -2,16 +2,17 @@
 
 use std::io::BufRead;
 
+use map3d_base::Result;
 use map3d_base::asset::Wrap;
-use map3d_base::{Result, Vec3};
 
 use super::appearance::{
     Appearances, Parameterization, PendingAppearance, Resolution, RingTexCoords, SurfaceData, SurfaceDataKind, TexturePlacement, TextureProperties,
     ThemeSelection,
 };
 use super::coordinates::parse_numbers;
+use super::crs_table::horizontal_key;
 use super::geo_transform::GeoTransform;
-use super::geometry_parser::read_point;
+use super::geometry_parser::{NamedPoint, read_point};
 use super::ids::{self, Id};
 use super::references::{DocumentNumber, OWN_DOCUMENT, References, Target};
 use super::xml_reader::XmlReader;
@@ -58,7 +59,7 @@ struct SurfaceDataProperties {
     border: Option<[f32; 4]>,
     diffuse: Option<[f32; 4]>,
     transparency: Option<f32>,
-    reference_point: Option<Vec3>,
+    reference_point: Option<NamedPoint>,
     orientation: Option<[f64; 4]>,
     targets: Vec<SurfaceDataTarget>,
 }
@@ -163,7 +164,7 @@ impl<R: BufRead> AppearanceParser<'_, R> {
             "borderColor" => properties.border = self.read_color()?,
             "diffuseColor" => properties.diffuse = self.read_color()?,
             "transparency" => properties.transparency = parse_transparency(&self.xml.read_text()?),
-            "referencePoint" => properties.reference_point = read_point(self.xml)?.map(|named| named.point),
+            "referencePoint" => properties.reference_point = read_point(self.xml)?,
             "orientation" => properties.orientation = self.read_numbers()?.and_then(|v| v.try_into().ok()),
             "target" => self.read_target(properties)?,
             "textureParameterization" => self.read_texture_association(properties)?,
@@ -367,6 +368,9 @@ fn choose_placement(type_name: &str, properties: &SurfaceDataProperties) -> Text
     if type_name != "GeoreferencedTexture" {
         return TexturePlacement::Parameterized;
     }
-    let geo_transform = properties.reference_point.zip(properties.orientation).and_then(|(point, orientation)| GeoTransform::new(point, orientation));
-    geo_transform.map_or(TexturePlacement::WorldFile, TexturePlacement::Georeferenced)
+    let (Some(NamedPoint { point, srs_name }), Some(orientation)) = (&properties.reference_point, properties.orientation) else {
+        return TexturePlacement::WorldFile;
+    };
+    let crs = srs_name.as_deref().filter(|name| !name.trim().is_empty()).map(horizontal_key);
+    GeoTransform::new(*point, orientation).map_or(TexturePlacement::WorldFile, |transform| TexturePlacement::Georeferenced { transform, crs })
 }

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use map3d_base::Vec3;
+use twox_hash::XxHash3_64;
 
 /// Index into the table.
 pub type CrsNumber = u16;
@@ -61,6 +62,14 @@ impl CrsTable {
         self.numbers.insert(unified, number);
         number
     }
+}
+
+/// Stands for the horizontal part of a coordinate system; equivalent spellings have one key.
+pub type HorizontalKey = u64;
+
+pub fn horizontal_key(name: &str) -> HorizontalKey {
+    let unified = unify(name);
+    XxHash3_64::oneshot(unified.split(['+', '*']).next().unwrap_or_default().as_bytes())
 }
 
 /// Returns the same text for names that differ only in how they are written: the EPSG codes if there is nothing else, or the name itself.
@@ -135,6 +144,18 @@ mod tests {
         assert_eq!(others.map(|name| table.find(name)), [Some(2), Some(3), Some(4), Some(5), Some(6)]);
         assert_eq!(table.find(" "), None);
         assert_eq!(table.names()[1].as_deref(), Some("EPSG:25832+5783"));
+    }
+
+    #[test]
+    fn systems_that_differ_in_heights_have_one_horizontal_key() {
+        let key = horizontal_key("EPSG:25832");
+        for name in
+            ["urn:ogc:def:crs,crs:EPSG:6.12:25832,crs:EPSG:6.12:5783", "EPSG::25832*EPSG::5783", "http://www.opengis.net/def/crs/EPSG/0/25832"]
+        {
+            assert_eq!(horizontal_key(name), key, "{name}");
+        }
+        assert_eq!(horizontal_key("urn:adv:crs:ETRS89_UTM32*DE_DHHN92_NH"), horizontal_key("urn:adv:crs:ETRS89_UTM32"));
+        assert_ne!(horizontal_key("EPSG:25833"), key);
     }
 
     #[test]

@@ -9,6 +9,7 @@ use super::appearance::{
     Appearances, Parameterization, Resolution, ResolvedMaterial, ResolvedSurfaceData, SurfaceDataKind, TargetBinding, TexCoordRange,
     TexturePlacement, TextureProperties,
 };
+use super::crs_table::HorizontalKey;
 use super::feature_types::classify_surface;
 use super::geo_transform::GeoTransform;
 use super::ids::Id;
@@ -17,6 +18,8 @@ use crate::image_file::ImageFiles;
 use crate::material_table::MaterialTable;
 use crate::options::ReadOptions;
 use crate::report_builder::ReportBuilder;
+
+const OTHER_SYSTEM: &str = "georeferenced texture in another coordinate system than the surface, not used";
 
 pub struct MaterialResolver {
     pub images: ImageFiles,
@@ -32,6 +35,8 @@ pub struct MaterialResolver {
 pub struct RingPoints<'a> {
     pub id: Id,
     pub points: &'a [Vec3],
+    /// Coordinate system of the points, if it has a name.
+    pub crs: Option<HorizontalKey>,
 }
 
 impl MaterialResolver {
@@ -119,18 +124,18 @@ impl MaterialResolver {
         let diffuse = [r, g, b, opacity];
         let index = self.table.add(Material { name: "X3DMaterial".into(), diffuse, ..Material::default() });
         let material = ResolvedMaterial { index, wrap: Wrap::Wrap, textured: false, invisible: diffuse[3] <= 0.0 };
-        ResolvedSurfaceData { material, geo_transform: None, size_px: [0; 2] }
+        ResolvedSurfaceData { material, geo_transform: None, crs: None, size_px: [0; 2] }
     }
 
     fn resolve_texture(&mut self, texture: &TextureProperties, report: &mut ReportBuilder) -> Result<Option<ResolvedSurfaceData>> {
         let TextureProperties { image: name, wrap, border, placement } = texture;
         let Some(image) = self.images.get(name, &mut self.folder, &self.options, report)?.cloned() else { return Ok(None) };
-        let geo_transform = match placement {
-            TexturePlacement::Parameterized => None,
-            TexturePlacement::Georeferenced(geo_transform) => Some(*geo_transform),
+        let (geo_transform, crs) = match placement {
+            TexturePlacement::Parameterized => (None, None),
+            TexturePlacement::Georeferenced { transform, crs } => (Some(*transform), *crs),
             TexturePlacement::WorldFile => match self.read_world_file(name, report)? {
                 None => return Ok(None),
-                found => found,
+                found => (found, None),
             },
         };
         let border = if *wrap == Wrap::Border { *border } else { [0.0; 4] };
@@ -144,7 +149,7 @@ impl MaterialResolver {
             ..Material::default()
         });
         let material = ResolvedMaterial { index, wrap: *wrap, textured: true, invisible: false };
-        Ok(Some(ResolvedSurfaceData { material, geo_transform, size_px: [image.width_px, image.height_px] }))
+        Ok(Some(ResolvedSurfaceData { material, geo_transform, crs, size_px: [image.width_px, image.height_px] }))
     }
 
     /// Reads the world file of an image: `a.tfw`, `a.tifw` or `a.wld` for `a.tif`.
@@ -175,7 +180,7 @@ fn compute_uvs(
     let points = || rings.iter().flat_map(|r| r.points);
     if let Some(geo_transform) = surface_data.geo_transform {
         uvs.extend(points().map(|p| geo_transform.compute_uv(*p, surface_data.size_px)));
-        return Ok(true);
+        return check_place(surface_data, rings, uvs, report);
     }
     match appearances.resolve_parameterization(parameterization) {
         Parameterization::TexCoordGen(matrix) => {
@@ -188,6 +193,19 @@ fn compute_uvs(
             Ok(false)
         }
     }
+}
+
+/// Returns false, after a warning, for a texture whose reference point names another coordinate system and that lies elsewhere: equal places
+/// show that the two are the same by another name.
+fn check_place(surface_data: &ResolvedSurfaceData, rings: &[RingPoints], uvs: &[[f64; 2]], report: &mut ReportBuilder) -> Result<bool> {
+    let crs = rings.first().and_then(|ring| ring.crs);
+    let is_other = surface_data.crs.is_some_and(|texture| crs.is_some_and(|surface| surface != texture));
+    let overlaps = |axis: usize| uvs.iter().any(|uv| uv[axis] <= 1.0) && uvs.iter().any(|uv| uv[axis] >= 0.0);
+    if is_other && !(overlaps(0) && overlaps(1)) {
+        report.warn(OTHER_SYSTEM, String::new())?;
+        return Ok(false);
+    }
+    Ok(true)
 }
 
 fn copy_listed_uvs(

@@ -4,7 +4,7 @@ use map3d_base::asset::{Batch, Rank};
 use map3d_base::{Result, Vec3};
 
 use super::appearance::{Appearances, ResolvedMaterial};
-use super::crs_table::{CrsNumber, DOCUMENT_CRS, estimate_metres_per_unit};
+use super::crs_table::{CrsNumber, DOCUMENT_CRS, HorizontalKey, estimate_metres_per_unit, horizontal_key};
 use super::geometry_arena::NodeId;
 use super::ids::{self, Id};
 use super::material_resolver::{MaterialResolver, RingPoints};
@@ -58,6 +58,8 @@ pub struct Tessellator {
     open: Vec<OpenBatch>,
     /// Metres per unit of the axes of each coordinate system.
     scales: Vec<Vec3>,
+    /// Of each coordinate system that has a name.
+    keys: Vec<Option<HorizontalKey>>,
     /// Polygons are those of a prototype, in a frame of its own in metres.
     is_prototype: bool,
     options: ReadOptions,
@@ -77,6 +79,7 @@ impl Tessellator {
             triangulator: Triangulator::default(),
             open: Vec::new(),
             scales: Vec::new(),
+            keys: Vec::new(),
             is_prototype: false,
             options,
             triangles: 0,
@@ -92,6 +95,8 @@ impl Tessellator {
     pub fn set_coordinate_systems(&mut self, names: &[Option<String>]) {
         let added = names.iter().skip(self.scales.len()).map(|name| estimate_metres_per_unit(name.as_deref()));
         self.scales.extend(added);
+        let added = names.iter().skip(self.keys.len()).map(|name| name.as_deref().map(horizontal_key));
+        self.keys.extend(added);
     }
 
     /// Returns the batches with at least `min_triangles`, and at least one. Others keep growing.
@@ -122,7 +127,8 @@ impl Tessellator {
     ) -> Result<()> {
         let arena = geometry.geometry;
         let rings = arena.polygon_rings(arena.node(polygon.node).kind).iter();
-        let rings: Vec<RingPoints> = rings.map(|r| RingPoints { id: r.id, points: arena.ring_points(r) }).collect();
+        let key = self.keys.get(arena.node(polygon.node).crs as usize).copied().flatten().filter(|_| !self.is_prototype);
+        let rings: Vec<RingPoints> = rings.map(|r| RingPoints { id: r.id, points: arena.ring_points(r), crs: key }).collect();
         let material = self.resolve_material(geometry, polygon.node, &rings, surface, sources, report)?;
         if material.invisible {
             report.omit(INVISIBLE_POLYGON, 1);
