@@ -52,7 +52,8 @@ export abstract class CameraController extends Evented<MapEvents> {
 
   protected abstract get size(): Size;
   protected abstract requestFrame(): void;
-  protected abstract report(error: Error): void;
+  /** @internal */
+  abstract report(error: Error): void;
   /** Whether tiles in memory, of whatever level, cover what a camera shows. */
   protected abstract isCovered(camera: Camera): boolean;
   /** Finds the world position of the surface at the screen's centre, if it is in memory. */

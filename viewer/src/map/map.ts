@@ -1,6 +1,6 @@
 import { checkNumber, checkOptions, checkVector } from "../core/check";
 import { adoptStyles, element } from "../core/dom";
-import { asError, UsageError } from "../core/errors";
+import { asError } from "../core/errors";
 import { Evented } from "../core/events";
 import type { Addable, LayerHost } from "../core/mapLayer";
 import type { OverlayHost, OverlayEvents } from "../core/overlayHost";
@@ -8,11 +8,10 @@ import type { Vec2, Vec3 } from "../core/vec";
 import { findLanguage } from "../core/i18n";
 import type { CustomLayer } from "../draw/drawer";
 import type { Camera } from "../geo/camera";
-import { computeDaylight } from "../geo/daylight";
-import { DEFAULT_LIGHT, clampLight, type Light } from "../geo/light";
+import type { Light } from "../geo/light";
 import type { LightEstimator } from "../draw/lightEstimator";
 import type { LayerKind } from "../geo/manifest";
-import { marker } from "../overlay/marker";
+import type { marker } from "../overlay/marker";
 import { createAttribution } from "../ui/attribution";
 import { createControls } from "../ui/controls";
 import { createScaleBar } from "../ui/scaleBar";
@@ -20,12 +19,15 @@ import { DebugTiles } from "../ui/debugTiles";
 import { STYLES } from "../ui/styles";
 import { FrameLoop } from "./frameLoop";
 import { Gestures, type GestureTarget } from "./gestures";
-import { imageLayer } from "./imageLayer";
+import type { imageLayer } from "./imageLayer";
 import { findVisibleObjects, type VisibleObject } from "./visibleObjects";
 import { listenToKeys } from "./keyboard";
-import { DEFAULTS, OPTIONS, savesData, type ClickEvent, type FilledOptions, type MapOptions } from "./options";
+import { MapItems } from "./mapItems";
+import { MapLight, checkTime } from "./mapLight";
+import { DEFAULTS, OPTIONS, savesData, type FilledOptions, type MapOptions } from "./options";
 import { FrameRenderer, type PlanInput } from "./frameRenderer";
 import { EMPTY_PICK, pickExactly, pickLoaded, type Pick } from "./picker";
+import { PointerEvents } from "./pointerEvents";
 import { Relief } from "./relief";
 import type { ViewState, LayerContext } from "./layerContext";
 import { CameraController } from "./cameraController";
@@ -40,13 +42,12 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   readonly #viewport: Viewport;
   readonly #renderer: FrameRenderer | null;
   readonly #loop = new FrameLoop((now) => { this.#frame(now); });
-  readonly #items = new Set<Addable<map>>();
+  readonly #items = new MapItems<map>((selected) => this.fire("select", { marker: selected }));
+  readonly #light: MapLight;
+  readonly #pointer = new PointerEvents(this);
   readonly #abort = new AbortController();
   readonly #debug = new DebugTiles();
   #gestures: Gestures | undefined;
-  #layers: imageLayer[] = [];
-  #light: Readonly<Light>;
-  #time: Date | null = null;
   #drawnCamera: Camera | undefined;
   #relief: Relief | undefined;
   #lightEstimator: LightEstimator | null = null;
@@ -57,9 +58,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   #loaded = false;
   /** Whether the map has been at rest since it moved last, so that tiles of other views are fetched. */
   #fetchesAhead = false;
-  #clickCount = 0;
   #nameCount = 0;
-  #hoverPoint: Vec2 | null = null;
 
   /** @param target the id of a canvas, or an element  @throws UsageError when there is none, when it has a map already, and for unknown or wrong options */
   constructor(target: string | HTMLElement, options: MapOptions = {}) {
@@ -70,7 +69,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     const { dataSaver = DEFAULTS.dataSaver } = options;
     this.options = { ...DEFAULTS, ...options, dataSaver: dataSaver === "auto" ? savesData() : dataSaver };
     const withoutShadows = this.options.dataSaver ? { shadows: false, occlusion: false } : {};
-    this.#light = clampLight({ ...DEFAULT_LIGHT, ...withoutShadows, ...options.light });
+    this.#light = new MapLight({ ...withoutShadows, ...options.light });
     adoptStyles(document, STYLES);
     this.#viewport = new Viewport(target, () => { this.#onResize(); });
     if (options.background !== undefined) this.setBackground(options.background);
@@ -83,10 +82,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
 
   /** Adds a layer, marker or popup. */
   add(item: Addable<map>): this {
-    if (this.#items.has(item)) return this;
-    this.#items.add(item);
-    if (item instanceof imageLayer) this.#layers = [...this.#layers, item];
-    if (item instanceof marker) item.on("select", this.#onMarkerSelect);
+    if (!this.#items.add(item)) return this;
     item.attachTo(this);
     return this.#redraw();
   }
@@ -94,8 +90,6 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   /** Removes a layer, marker or popup. */
   discard(item: Addable<map>): this {
     if (!this.#items.delete(item)) return this;
-    this.#layers = this.#layers.filter((layer) => layer !== item);
-    if (item instanceof marker) item.off("select", this.#onMarkerSelect);
     item.detachFrom(this);
     return this.#redraw();
   }
@@ -104,7 +98,8 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   remove(): this {
     this.#loop.stop();
     this.#abort.abort();
-    for (const item of [...this.#items]) this.discard(item);
+    this.#pointer.stop();
+    for (const item of this.#items.all) this.discard(item);
     this.#renderer?.destroy();
     this.#viewport.destroy();
     return this.fire("remove", {});
@@ -112,17 +107,17 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
 
   /** The map's image layers, lowest first. */
   get layers(): readonly imageLayer[] {
-    return this.#layers;
+    return this.#items.layers;
   }
 
   /** Attribution texts of all layers. */
   get attributions(): readonly string[] {
-    return [...new Set(this.#layers.map(({ attribution }) => attribution).filter((text) => text !== ""))];
+    return this.#items.attributions;
   }
 
   /** @internal */
   get markers(): readonly marker[] {
-    return [...this.#items].filter((item) => item instanceof marker);
+    return this.#items.markers;
   }
 
   /** The element that contains the canvas, markers, popups and controls. */
@@ -167,27 +162,26 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
 
   /** The current light. */
   get light(): Readonly<Light> {
-    return this.#light;
+    return this.#light.current;
   }
 
   /** Changes properties of the light; clamps numbers to their ranges. Setting azimuth or altitude ends the light of `setTime`. */
   setLight(light: Partial<Light>): this {
-    if (light.azimuth_deg !== undefined || light.altitude_deg !== undefined) this.#time = null;
-    return this.#updateLight(light);
+    this.#light.set(light);
+    return this.#fireLight();
   }
 
   /** The time of the light; null when it was not set by `setTime`. */
   get time(): Date | null {
-    return this.#time;
+    return this.#light.time;
   }
 
   /** Sets the light to a time at the scene's position: the colours of the day, and shadows where the rendering has them. */
   setTime(time: Date): this {
-    checkVector([time instanceof Date ? time.getTime() : NaN], "setTime", "a valid Date", 1);
-    return this.whenReady((_, { json }) => {
-      if (!json.geographic) throw new UsageError(`cannot locate rendering "${json.name}" on earth, so the sun's position is unknown; use setLight instead`);
-      this.#time = time;
-      this.#updateLight(computeDaylight(time, json.geographic));
+    checkTime(time);
+    return this.whenReady((_, rendering) => {
+      this.#light.setTime(time, rendering);
+      this.#fireLight();
     });
   }
 
@@ -209,10 +203,8 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     return this.#redraw();
   }
 
-  #updateLight(light: Partial<Light>): this {
-    this.#light = clampLight({ ...this.#light, ...light });
-    this.fire("lightchange", { light: this.#light });
-    return this.#redraw();
+  #fireLight(): this {
+    return this.fire("lightchange", { light: this.light }).#redraw();
   }
 
   // Queries
@@ -222,10 +214,10 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     const viewState = this.getViewState();
     if (!viewState) return EMPTY_PICK;
     try {
-      return await pickExactly(this.#layers, viewState, point);
+      return await pickExactly(this.layers, viewState, point);
     } catch {
       // The tile's error was reported when it failed.
-      return { ...(pickLoaded(this.#layers, viewState, point) ?? EMPTY_PICK), approximate: true };
+      return { ...(pickLoaded(this.layers, viewState, point) ?? EMPTY_PICK), approximate: true };
     }
   }
 
@@ -233,14 +225,14 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   async objectsInView(hidden = false): Promise<readonly (VisibleObject & { readonly layer: imageLayer })[]> {
     const viewState = this.getViewState();
     if (!viewState) return [];
-    const found = await Promise.all([...this.#layers].reverse().map(async (layer) => (await findVisibleObjects(layer, viewState, hidden)).map((seen) => ({ ...seen, layer }))));
+    const found = await Promise.all([...this.layers].reverse().map(async (layer) => (await findVisibleObjects(layer, viewState, hidden)).map((seen) => ({ ...seen, layer }))));
     return found.flat();
   }
 
   /** Picks from the tiles in memory; null when none covers the point. */
   pickLoaded(point: Vec2): Pick | null {
     const viewState = this.getViewState();
-    return viewState && pickLoaded(this.#layers, viewState, point);
+    return viewState && pickLoaded(this.layers, viewState, point);
   }
 
   isOccluded(world: Vec3): boolean {
@@ -255,13 +247,13 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   get relief(): Relief | null {
     const viewState = this.getViewState();
     if (this.#relief?.camera !== viewState?.camera) this.#relief = undefined;
-    this.#relief ??= viewState ? new Relief(this.#layers, viewState) : undefined;
+    this.#relief ??= viewState ? new Relief(this.layers, viewState) : undefined;
     return this.#relief ?? null;
   }
 
   /** @internal Fetches the depths of a rectangle (U and V) from the deepest level where it has at most `maxTiles` tiles. @param ids reads object ids as well */
   fetchRelief(viewState: ViewState, rect: Rect, maxTiles: number, ids = false): ReturnType<typeof Relief.fetch> {
-    return Relief.fetch(this.#layers, viewState, rect, maxTiles, ids);
+    return Relief.fetch(this.layers, viewState, rect, maxTiles, ids);
   }
 
   /** Size of the decoded tiles in memory, bytes. */
@@ -273,14 +265,14 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
 
   /** @internal */
   tap(point: Vec2): void {
-    this.#deselectMarkers();
-    void this.#fireClick(point);
+    this.#items.deselectMarkers();
+    void this.#pointer.click(point);
   }
 
   /** @internal */
   hover(point: Vec2): void {
     if (!this.listens("mousemove")) return;
-    this.#hoverPoint = point;
+    this.#pointer.hover(point);
     this.#loop.request();
   }
 
@@ -316,10 +308,11 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   }
 
   protected findCenterSurface(viewState: ViewState): Vec3 | null {
-    return pickLoaded(this.#layers, viewState, this.screenCenter())?.position ?? null;
+    return pickLoaded(this.layers, viewState, this.screenCenter())?.position ?? null;
   }
 
-  protected report(error: Error): void {
+  /** @internal */
+  report(error: Error): void {
     if (this.listens("error")) this.fire("error", { error });
     else console.warn(`map3d: ${error.message}`);
   }
@@ -329,7 +322,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   #frame(now: number): void {
     const wasInTransition = this.transitionCamera !== null;
     this.advanceCamera(now);
-    if (this.#hoverPoint) this.#fireHover(this.#hoverPoint);
+    this.#pointer.flush();
     try {
       if (this.#dirty || this.isTurning || this.camera !== this.#drawnCamera || wasInTransition || this.transitionCamera) this.#draw(wasInTransition || this.transitionCamera !== null);
       else this.#comeToRest();
@@ -358,7 +351,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   }
 
   get #planInput(): PlanInput {
-    return { layers: this.#layers, light: this.#light, requiredKinds: this.#findRequiredKinds() };
+    return { layers: this.layers, light: this.light, requiredKinds: this.#findRequiredKinds() };
   }
 
   protected isCovered(camera: Camera): boolean {
@@ -368,7 +361,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
 
   /** Lists kinds of tiles that are read, in addition to those shown. */
   #findRequiredKinds(): LayerKind[] {
-    return [...new Set([...(this.options.hover && !this.options.dataSaver ? ["id" as const] : []), ...[...this.#items].flatMap(({ needs }) => needs ?? [])])];
+    return [...new Set([...(this.options.hover && !this.options.dataSaver ? ["id" as const] : []), ...this.#items.needs])];
   }
 
   #fireMove(lastCamera: Camera | undefined, { zoom }: Camera): void {
@@ -455,41 +448,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   }
 
   #retryFailedTiles(): void {
-    for (const layer of this.#layers) layer.tiles?.clearFailures();
+    for (const layer of this.layers) layer.tiles?.clearFailures();
     this.#redraw();
-  }
-
-  // Events
-
-  #deselectMarkers(except?: marker): void {
-    for (const item of this.#items) if (item instanceof marker && item !== except) item.select(false);
-  }
-
-  readonly #onMarkerSelect = ({ marker: selected }: { marker: marker }): void => {
-    this.#deselectMarkers(selected);
-    this.fire("select", { marker: selected });
-  };
-
-  #fireHover(point: Vec2): void {
-    this.#hoverPoint = null;
-    this.fire("mousemove", { ...(this.pickLoaded(point) ?? EMPTY_PICK), point });
-  }
-
-  async #fireClick(point: Vec2): Promise<void> {
-    const clickNumber = ++this.#clickCount;
-    this.fire("preclick", { ...(this.pickLoaded(point) ?? { ...EMPTY_PICK, approximate: true }), point });
-    const pick = await this.pick(point);
-    const event = await this.#addAttributes({ ...pick, point });
-    if (clickNumber === this.#clickCount && !this.#abort.signal.aborted) this.fire("click", event);
-  }
-
-  async #addAttributes(event: ClickEvent): Promise<ClickEvent> {
-    try {
-      const object = await event.layer?.object(event.id);
-      return object ? { ...event, name: object.name, class: object.class, attributes: object.attributes } : event;
-    } catch (reason) {
-      this.report(asError(reason));
-      return event;
-    }
   }
 }

@@ -22,7 +22,7 @@ class Controller extends CameraController {
   readonly options = { ...DEFAULTS, dataSaver: false };
   protected readonly size = { width: 800, height: 600, dpr: 1 };
   protected requestFrame(): void { /* nothing is drawn */ }
-  protected report(error: Error): void { throw error; }
+  report(error: Error): void { throw error; }
   protected findCenterSurface(): Vec3 | null { return null; }
   protected isCovered(): boolean { return true; }
   start(): this {

@@ -1,0 +1,62 @@
+import type { Addable } from "../core/mapLayer";
+import type { LayerKind } from "../geo/manifest";
+import { marker } from "../overlay/marker";
+import { imageLayer } from "./imageLayer";
+
+/** What is on a map: image layers, markers, popups and others. */
+export class MapItems<M> {
+  /** Image layers, lowest first. */
+  layers: readonly imageLayer[] = [];
+  readonly #all = new Set<Addable<M>>();
+  readonly #onSelect: (selected: marker) => void;
+
+  /** @param onSelect called when a marker is selected; the others are deselected */
+  constructor(onSelect: (selected: marker) => void) {
+    this.#onSelect = onSelect;
+  }
+
+  get all(): readonly Addable<M>[] {
+    return [...this.#all];
+  }
+
+  get markers(): readonly marker[] {
+    return this.all.filter((item) => item instanceof marker);
+  }
+
+  /** Attribution texts of all layers. */
+  get attributions(): readonly string[] {
+    return [...new Set(this.layers.map(({ attribution }) => attribution).filter((text) => text !== ""))];
+  }
+
+  /** Kinds of tiles that the items read, in addition to those shown. */
+  get needs(): readonly LayerKind[] {
+    return this.all.flatMap(({ needs }) => needs ?? []);
+  }
+
+  /** @returns false when the item is on the map already */
+  add(item: Addable<M>): boolean {
+    if (this.#all.has(item)) return false;
+    this.#all.add(item);
+    if (item instanceof imageLayer) this.layers = [...this.layers, item];
+    if (item instanceof marker) item.on("select", this.#select);
+    return true;
+  }
+
+  /** @returns false when the item is not on the map */
+  delete(item: Addable<M>): boolean {
+    if (!this.#all.delete(item)) return false;
+    this.layers = this.layers.filter((layer) => layer !== item);
+    if (item instanceof marker) item.off("select", this.#select);
+    return true;
+  }
+
+  /** Deselects all markers but one. */
+  deselectMarkers(except?: marker): void {
+    for (const each of this.markers) if (each !== except) each.select(false);
+  }
+
+  readonly #select = ({ marker: selected }: { marker: marker }): void => {
+    this.deselectMarkers(selected);
+    this.#onSelect(selected);
+  };
+}
