@@ -71,13 +71,6 @@ const styles = {
     });
   },
 };
-/** Lets unused tables of suncalc, those of the moon, be dropped. */
-const tables = {
-  name: "tables",
-  setup(build) {
-    build.onLoad({ filter: /\/suncalc\/index\.js$/ }, ({ path }) => ({ contents: readFileSync(path, "utf8").replaceAll("new Int32Array(", "/* @__PURE__ */ new Int32Array("), loader: "js" }));
-  },
-};
 /** Writes the keys of the page's messages once for all languages. */
 const messages = {
   name: "messages",
@@ -97,7 +90,7 @@ const messages = {
     });
   },
 };
-const plugins = [workers, shaders, styles, tables, messages];
+const plugins = [workers, shaders, styles, messages];
 
 /** Lets entries import the core's public names: modules from map3d.mjs, scripts from the global `map3d`. */
 const coreAs = (how) => ({

@@ -3,6 +3,7 @@ export const ENTRIES = {
   cluster: "src/cluster/index.ts",
   compare: "src/compare/index.ts",
   controls: "src/controls/index.ts",
+  debug: "src/debug/index.ts",
   element: "src/element/index.ts",
   files: "src/files/index.ts",
   geojson: "src/geojson/index.ts",

@@ -12,6 +12,7 @@ const BUDGET = {
   cluster: 4,
   compare: 4,
   controls: 6,
+  debug: 2,
   element: 4,
   files: 5,
   geojson: 12,

@@ -15,13 +15,13 @@ import type { marker } from "../overlay/marker";
 import { createAttribution } from "../ui/attribution";
 import { createControls } from "../ui/controls";
 import { createScaleBar } from "../ui/scaleBar";
-import { DebugTiles } from "../ui/debugTiles";
 import { STYLES } from "../ui/styles";
 import { FrameLoop } from "./frameLoop";
 import { Gestures, type GestureTarget } from "./gestures";
 import type { imageLayer } from "./imageLayer";
 import { findVisibleObjects, type VisibleObject } from "./visibleObjects";
 import { listenToKeys } from "./keyboard";
+import type { LayerPlan } from "./layerPlan";
 import { MapItems } from "./mapItems";
 import { MapLight, checkTime } from "./mapLight";
 import { DEFAULTS, OPTIONS, savesData, type FilledOptions, type MapOptions } from "./options";
@@ -46,10 +46,10 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   readonly #light: MapLight;
   readonly #pointer = new PointerEvents(this);
   readonly #abort = new AbortController();
-  readonly #debug = new DebugTiles();
   #gestures: Gestures | undefined;
   #drawnCamera: Camera | undefined;
   #relief: Relief | undefined;
+  #plans: readonly LayerPlan[] = [];
   #lightEstimator: LightEstimator | null = null;
   /** Whether anything apart from the camera has changed since the last frame. */
   #dirty = true;
@@ -135,6 +135,16 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     return this.#renderer?.drawer.name ?? null;
   }
 
+  /** @internal What the drawer says about itself, for developers. */
+  get drawerNote(): string | undefined {
+    return this.#renderer?.drawer.note;
+  }
+
+  /** @internal What the last frame shows of each layer. */
+  get plans(): readonly LayerPlan[] {
+    return this.#plans;
+  }
+
   /** @internal Whether the picture is still that of the previous view. */
   get showsPreviousView(): boolean {
     return this.#renderer?.drawer.showsPreviousView === true;
@@ -195,12 +205,6 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   setBackground(background: string): this {
     this.container.style.setProperty("--map3d-background", background);
     return this;
-  }
-
-  /** Shows outlines and names of the drawn tiles. */
-  debug(on = true): this {
-    this.#debug.show(on);
-    return this.#redraw();
   }
 
   #fireLight(): this {
@@ -341,7 +345,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     this.#fetchesAhead &&= !moving;
     const input = { ...this.#planInput, lightEstimator: this.#lightEstimator, moving, next: this.nextCamera && { ...viewState, camera: this.nextCamera }, ahead: this.#fetchesAhead ? this.listViewsAhead(viewState) : [] };
     const { plans, complete, next } = this.#renderer.render(viewState, input, this.transitionCamera && ((scene) => { this.transition?.draw({ ...scene, camera: viewState.camera, tilesChanged }); }));
-    this.#debug.update(plans, viewState.dpr, this.#renderer.drawer);
+    this.#plans = plans;
     if (lastCamera !== viewState.camera || inTransition) this.#fireMove(lastCamera, viewState.camera);
     this.frameEvents.fire("draw", {});
     if (this.#lightEstimator && moving) this.#redraw();
@@ -427,8 +431,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   }
 
   #addControls(): void {
-    const { controlPane, overlayPane } = this.#viewport;
-    overlayPane.append(this.#debug.pane);
+    const { controlPane } = this.#viewport;
     if (this.options.controls) controlPane.append(createControls(this), createScaleBar(this));
     if (this.options.attribution) controlPane.append(createAttribution(this));
   }

@@ -82,10 +82,6 @@ export const STYLES = `
 .map3d-popup-close { position: absolute; right: 0; top: -2px; width: 44px; height: 44px; padding: 0; border: 0; background: none; color: var(--map3d-faint) !important; }
 .map3d-popup-close svg { width: 16px; height: 16px; }
 
-.map3d-debug { position: absolute; inset: 0; font: 11px/1.2 ui-monospace, monospace; }
-.map3d-debug > div { position: absolute; box-sizing: border-box; padding: 3px; border: 1px solid rgb(200 30 90 / 0.7); color: rgb(170 10 70); overflow: hidden; white-space: pre; }
-.map3d-debug > p { position: absolute; top: 4px; left: 4px; margin: 0; padding: 2px 6px; background: var(--map3d-panel); }
-
 @media (prefers-contrast: more), (forced-colors: active) {
   .map3d-scale, .map3d-attribution { background: var(--map3d-panel); }
   .map3d-group button:disabled { opacity: 0.55; }

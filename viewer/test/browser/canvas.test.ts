@@ -302,8 +302,10 @@ test("if pixels cannot be read exactly, compositing lights nearly the same", asy
     const g = globalThis as Global;
     g.map = new g.map3d.map("mapcanvas", { ...options, drawer: "canvas", preserveDrawingBuffer: true });
     g.layer = new g.map3d.imageLayer(base).addTo(g.map);
-    g.map.once("idle", () => { done(); }).debug();
+    g.map.once("idle", () => { done(); });
   }), [bed.url("town"), options] as const);
+  await page.addScriptTag({ url: `${bed.server.origin}/map3d-debug.js` });
+  await settled(page, () => { new (globalThis as Global & { map3d: { debugTiles: new () => { addTo(map: Global["map"]): unknown } } }).map3d.debugTiles().addTo((globalThis as Global).map); }, null);
   expect(await page.locator(".map3d-debug > p").textContent()).toMatch(/^canvas: lighting by compositing/);
   const lit = differenceOf(await picture(plain), await picture(page));
   await page.screenshot({ path: `${OUT}/canvas-composed.png` });

@@ -7,6 +7,7 @@ import { serve, TestBed } from "./bed";
 import { OUT } from "./browser";
 import { pixels, settled, type Global } from "./page";
 
+interface Addable { addTo(map: Global["map"]): unknown }
 const town = renderTown(64, 0.76);
 
 const bed = new TestBed({ town, ramp: renderRamp(), published: published(town) });
@@ -113,7 +114,8 @@ test("hovering reports the object under the pointer", async () => {
 
 test("the debug overlay labels tiles with their names and their layers' bytes and ages", async () => {
   const { page } = await bed.start("town", { zoom: 4 });
-  await settled(page, () => (globalThis as Global).map.debug(true), null);
+  await page.addScriptTag({ url: `${bed.server.origin}/map3d-debug.js` });
+  await settled(page, () => { new (globalThis as Global & { map3d: { debugTiles: new () => Addable } }).map3d.debugTiles().addTo((globalThis as Global).map); }, null);
   await page.screenshot({ path: `${OUT}/debug.png` });
   expect(await page.locator(".map3d-debug > div").first().textContent()).toMatch(/^3\/\d\/\d × 2\.00\nnormal [1-9]*\d\.\d kB, \d s\ncolor [1-9]*\d\.\d kB, \d s$/);
   expect(await page.locator(".map3d-debug > div").allTextContents()).not.toEqual(expect.arrayContaining([expect.stringMatching(/ 0\.0 kB/)]));

@@ -1,0 +1,43 @@
+import { adoptStyles, element } from "../core/dom";
+import { tileName } from "../geo/frame";
+import { MapLayer, type map } from "../map3d";
+import { STYLES } from "./styles";
+
+type Plan = map["plans"][number];
+
+/**
+ * Outlines the drawn tiles and labels them with their names and, for each layer, the bytes received and how long ago. A fallback shows the
+ * source tile's figures. A corner names the drawer.
+ */
+export class debugTiles extends MapLayer<map, object> {
+  readonly #pane = element("div", "map3d-debug", { "aria-hidden": "true" });
+  readonly #update = (): void => {
+    const { plans, drawer, drawerNote } = this.map as map;
+    const boxes = plans.flatMap((plan) => plan.quads.map((quad) => outline(plan, quad, (this.map as map).getViewState()?.dpr ?? 1)));
+    this.#pane.replaceChildren(...boxes, element("p", "", {}, drawerNote ? `${String(drawer)}: ${drawerNote}` : String(drawer)));
+  };
+
+  protected onAdd(map: map): void {
+    adoptStyles(document, STYLES);
+    map.overlayPane.append(this.#pane);
+    map.frameEvents.on("draw", this.#update);
+  }
+
+  protected onRemove(map: map): void {
+    map.frameEvents.off("draw", this.#update);
+    this.#pane.remove();
+  }
+}
+
+function outline({ view, layers, tiles }: Plan, { from, rect: [left, top, right, bottom], scale }: Plan["quads"][number], dpr: number): HTMLElement {
+  const now = performance.now();
+  const lines = [...layers.values()].flatMap((layer) => {
+    const sent = tiles.getTransfer(view, layer, from);
+    return sent ? [`${layer.name} ${(sent.bytes / 1000).toFixed(1)} kB, ${((now - sent.at_ms) / 1000).toFixed(0)} s`] : [];
+  });
+  const box = element("div", "", {}, [`${tileName(from)} × ${(1 / scale).toFixed(2)}`, ...lines].join("\n"));
+  box.style.transform = `translate(${String(left / dpr)}px, ${String(top / dpr)}px)`;
+  box.style.width = `${String((right - left) / dpr)}px`;
+  box.style.height = `${String((bottom - top) / dpr)}px`;
+  return box;
+}
