@@ -4,6 +4,7 @@ export const ENTRIES = {
   compare: "src/compare/index.ts",
   controls: "src/controls/index.ts",
   debug: "src/debug/index.ts",
+  drag: "src/drag/index.ts",
   element: "src/element/index.ts",
   files: "src/files/index.ts",
   geojson: "src/geojson/index.ts",
@@ -15,4 +16,5 @@ export const ENTRIES = {
   print: "src/print/index.ts",
   shade: "src/shade/index.ts",
   theme: "src/theme/index.ts",
+  tooltip: "src/tooltip/index.ts",
 };

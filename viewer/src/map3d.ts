@@ -1,19 +1,25 @@
 /** map3d: shows renderings of 3D city models. See README.md. */
-export { map } from "./map/map";
-export { imageLayer, type ImageLayerEvents, type ImageLayerOptions } from "./map/imageLayer";
-export { marker, type MarkerEvents, type MarkerOptions } from "./overlay/marker";
-export { popup, type PopupEvents, type PopupOptions } from "./overlay/popup";
+export { map, map as Map, map as Map3D } from "./map/map";
+export { imageLayer, imageLayer as ImageLayer, type ImageLayerEvents, type ImageLayerOptions } from "./map/imageLayer";
+export { marker, marker as Marker, type MarkerEvents, type MarkerOptions } from "./overlay/marker";
+export { popup, popup as Popup, type PopupEvents, type PopupOptions } from "./overlay/popup";
+/** @internal */
+export { features } from "./core/features";
+export type { TooltipContent } from "./map/options";
+export type { Corner } from "./core/corner";
 export { MapLayer, type Addable, type LayerHost } from "./core/mapLayer";
 export { Evented, type FiredEvent, type Listener } from "./core/events";
 export { DecodeError, DrawError, FetchError, ManifestError, Map3dError, UsageError } from "./core/errors";
 export type { ClickEvent, HoverEvent, MapEvents, MapOptions } from "./map/options";
 export type { FitOptions } from "./map/cameraController";
+export type { Bounds } from "./map/cameras";
+export type { AnyPosition, GroundPosition, ObjectPosition, Position } from "./core/position";
 export type { ObjectStyle } from "./map/objectStyle";
 export type { VisibleObject } from "./map/visibleObjects";
 export type { Pick } from "./map/picker";
 export type { TransitionFrame, ViewTransition } from "./map/viewTransition";
 export type { Relief } from "./map/relief";
-export type { OverlayHost } from "./core/overlayHost";
+export type { EnableDragging, OverlayHost } from "./core/overlayHost";
 export type { Box3, Vec2, Vec3 } from "./core/vec";
 export type { Clip } from "./draw/depthMapping";
 export type { BakedLight, CustomLayer, FrameContent, FrameState, LayerPass, Mode, Quad, TileAccess } from "./draw/drawer";

@@ -59,7 +59,7 @@ export class cluster extends MapLayer<map, ClusterEvents> {
     super();
     this.options = { radius_px: 56, ...options };
     if (!(this.options.radius_px > 0)) throw new UsageError(`radius_px must be greater than 0, got ${String(this.options.radius_px)}`);
-    this.#markers = [...markers];
+    this.#markers = checkMarkers(markers);
   }
 
   /** All markers, in the given order. */
@@ -69,8 +69,9 @@ export class cluster extends MapLayer<map, ClusterEvents> {
 
   /** Replaces all markers. Call it after markers have moved, too. */
   setMarkers(markers: readonly marker[]): this {
+    const checked = checkMarkers(markers);
     this.#clear();
-    this.#markers = [...markers];
+    this.#markers = checked;
     this.#view = "";
     this.map?.layerContext?.requestFrame();
     return this;
@@ -119,7 +120,7 @@ export class cluster extends MapLayer<map, ClusterEvents> {
     this.#view = view;
     this.#groups.clear();
     this.#uv = new Float64Array(2 * this.#markers.length);
-    this.#markers.forEach(({ position }, k) => { this.#uv.set(uvdFromLocal(camera.frame.axes, sub(position, origin)).slice(0, 2), 2 * k); });
+    this.#markers.forEach((one, k) => { this.#uv.set(uvdFromLocal(camera.frame.axes, sub(positionOf(one), origin)).slice(0, 2), 2 * k); });
   }
 
   #groupsAt(relief: Relief, level: number): MarkerGroup[] {
@@ -144,7 +145,7 @@ export class cluster extends MapLayer<map, ClusterEvents> {
   #clusterMarker(map: map, key: string, group: MarkerGroup, markers: readonly marker[]): marker {
     const { label, color } = this.options;
     const count = markers.length.toLocaleString(map.language);
-    const position = [0, 1, 2].map((k) => markers.reduce((sum, one) => sum + (one.position[k] as number), 0) / markers.length) as unknown as Vec3;
+    const position = [0, 1, 2].map((k) => markers.reduce((sum, one) => sum + (positionOf(one)[k] as number), 0) / markers.length) as unknown as Vec3;
     const item = new marker(label?.(markers) ?? selectTranslation(MESSAGES, map.language)(count), position, { showLabel: false, icon: element("span", "map3d-cluster", {}, count), ...(color !== undefined && { color }) });
     return item.on("click", () => {
       item.select(false);
@@ -175,8 +176,8 @@ export class cluster extends MapLayer<map, ClusterEvents> {
     legs.append(...markers.map(() => document.createElementNS(SVG, "line")));
     map.overlayPane.prepend(legs);
     const offsets = spiderOffsets(markers.length, SPREAD_PX);
-    const shifts = markers.map(({ position }, k): Vec2 => {
-      const [[dx, dy], at] = [offsets[k] ?? [0, 0], map.project(position) ?? [x, y]];
+    const shifts = markers.map((one, k): Vec2 => {
+      const [[dx, dy], at] = [offsets[k] ?? [0, 0], map.project(positionOf(one)) ?? [x, y]];
       return [x + dx - at[0], y + dy - at[1]];
     });
     this.#spread = { key, markers, shifts, legs, zoom: map.zoom };
@@ -188,8 +189,8 @@ export class cluster extends MapLayer<map, ClusterEvents> {
   #drawLegs(): void {
     if (!this.#spread || !this.map) return;
     const { markers, shifts, legs } = this.#spread;
-    markers.forEach(({ position }, k) => {
-      const [at, [dx, dy]] = [this.map?.project(position) ?? [0, 0], shifts[k] ?? [0, 0]];
+    markers.forEach((one, k) => {
+      const [at, [dx, dy]] = [this.map?.project(positionOf(one)) ?? [0, 0], shifts[k] ?? [0, 0]];
       Object.entries({ x1: at[0], y1: at[1], x2: at[0] + dx, y2: at[1] + dy }).forEach(([name, value]) => legs.children[k]?.setAttribute(name, value.toFixed(1)));
     });
   }
@@ -212,6 +213,17 @@ export class cluster extends MapLayer<map, ClusterEvents> {
     for (const { item } of this.#shown.values()) this.map?.discard(item);
     this.#shown.clear();
   }
+}
+
+/** @throws UsageError for a marker whose position is not known yet */
+function positionOf({ label, position }: marker): Vec3 {
+  if (!position) throw new UsageError(`the position of the marker "${label}" is not known: give [x, y, z], or those that map.findPosition finds`);
+  return position;
+}
+
+function checkMarkers(markers: readonly marker[]): readonly marker[] {
+  markers.forEach(positionOf);
+  return [...markers];
 }
 
 /** Metres per CSS pixel at a zoom level. */

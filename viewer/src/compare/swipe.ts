@@ -8,7 +8,7 @@ import { getCompareMessages } from "./i18n";
 export interface SwipeOptions {
   /** Position of the divider: 0 is the left edge, 1 the right. Default 0.5. */
   at?: number;
-  /** Labels left and right of the divider. */
+  /** Labels left and right of the divider. Default: none. */
   names?: readonly [left: string, right: string];
 }
 

@@ -7,6 +7,7 @@ import { STYLES } from "./styles";
 import { findSurface } from "./findSurface";
 import { getControlMessages, type ControlMessages } from "./i18n";
 
+/** Options of `locate`. */
 export interface LocateOptions {
   /** BCP 47 tag. Default: the map's. */
   language?: string;
@@ -20,6 +21,7 @@ export interface Located {
   readonly accuracy_m: number;
 }
 
+/** Events of `locate`. */
 export interface LocateEvents {
   /** The location is known and shown. */
   located: Located;

@@ -16,4 +16,13 @@ export const STYLES = `
   .map3d-group :is([aria-pressed="true"], [aria-expanded="true"]) { forced-color-adjust: none; background: Highlight; color: HighlightText; }
   .map3d-overview-frame, .map3d-accuracy { forced-color-adjust: none; }
 }
+.map3d-corner { position: absolute; display: grid; gap: 10px; pointer-events: none; }
+.map3d .map3d-corner > * { position: relative; inset: auto; pointer-events: auto; }
+.map3d .map3d-corner > .map3d-buttons { display: grid; height: auto; }
+.map3d-topleft, .map3d-topright { top: max(12px, env(safe-area-inset-top)); }
+.map3d-bottomleft, .map3d-bottomright { bottom: calc(34px + env(safe-area-inset-bottom)); }
+.map3d-topleft, .map3d-bottomleft { left: max(12px, env(safe-area-inset-left)); justify-items: start; }
+.map3d-topright, .map3d-bottomright { right: max(12px, env(safe-area-inset-right)); justify-items: end; }
+.map3d .map3d-topleft .map3d-panel-button > :not(.map3d-group), .map3d .map3d-bottomleft .map3d-panel-button > :not(.map3d-group) { right: auto; left: calc(100% + 10px); }
+.map3d .map3d-topleft .map3d-panel-button > :not(.map3d-group), .map3d .map3d-topright .map3d-panel-button > :not(.map3d-group) { top: 0; bottom: auto; }
 `;

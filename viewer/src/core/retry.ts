@@ -18,6 +18,7 @@ export interface RetryOptions {
   attempts?: number | undefined;
   /** Wait before the second attempt; doubles each time. Default 250. */
   backoff_ms?: number | undefined;
+  /** Ends the waits. Default: none. */
   signal?: AbortSignal | undefined;
 }
 

@@ -16,7 +16,7 @@ export interface DropOptions {
   button?: boolean;
   /** Element that accepts drops. Default: the map. */
   target?: HTMLElement;
-  /** Options of the new layer. */
+  /** Options of the new layer. Default: those of an image layer. */
   layer?: ImageLayerOptions;
   /** Layer that the first opened folder replaces. Default: none, so that the folder is added to the map's layers. */
   instead?: imageLayer;

@@ -12,13 +12,13 @@ import { STYLES } from "./styles";
 import { getGeojsonMessages } from "./i18n";
 
 export interface GeojsonOptions {
-  /** Style of all features, or a function of the feature. */
+  /** Style of all features, or a function of the feature. Default: see the fields of the style. */
   style?: FeatureStyle | ((feature: Feature) => FeatureStyle);
   /** Returns a marker for a point, or null for a dot. Default: dots. */
   pointToMarker?: (feature: Feature, position: Vec3) => marker | null;
-  /** Returns false for features to leave out. */
+  /** Returns false for features to leave out. Default: all are shown. */
   filter?: (feature: Feature) => boolean;
-  /** Called for each feature that is shown. */
+  /** Called for each feature that is shown. Default: none. */
   onEachFeature?: (feature: Feature) => void;
   /** Parts behind buildings: hidden, pale and dashed, or drawn as if nothing covered them. Default "fade". */
   occlusion?: Occlusion;

@@ -1,15 +1,17 @@
 import { checkNumber, checkVector } from "../core/check";
 import { asError, FetchError, UsageError } from "../core/errors";
 import { Evented } from "../core/events";
-import { add, clamp, dot, boxCenter, sub, type Box3, type Vec2, type Vec3 } from "../core/vec";
-import { depthAtHeight, localFromUvd, uvdFromLocal } from "../geo/axes";
-import { cssPixelM, projectedBox, screenFromLocal, uvFromScreen, zoomedAt, zoomToFit, type Camera } from "../geo/camera";
+import { checkPosition, isVector, type AnyPosition, type Position } from "../core/position";
+import { add, clamp, dot, boxCenter, sub, type Vec2, type Vec3 } from "../core/vec";
+import { cssPixelM, screenFromLocal, uvFromScreen, zoomedAt, type Camera } from "../geo/camera";
 import { localFromLonLat, lonLatFromLocal } from "../geo/geographic";
 import type { Rendering, View } from "../geo/manifest";
+import { worldPosition } from "../geo/position";
 import { findIncompatibility } from "./compatibility";
 import { findNeighbourView, findTiltedView } from "./neighbourViews";
+import { centerCamera, checkBounds, findGround, fitCamera, localBox, panCamera, type Bounds } from "./cameras";
 import { COARSE_STEPS, type LayerPlan } from "./layerPlan";
-import { limitCamera, computeZoomLimits, fillScreen } from "./limits";
+import { limitCamera, computeZoomLimits, fillScreen, panSoftly, type Limits } from "./limits";
 import { Motion } from "./motion";
 import { EVENTS, type FilledOptions, type MapEvents } from "./options";
 import type { ViewState } from "./layerContext";
@@ -34,7 +36,7 @@ export interface FitOptions {
 /** The map's camera and everything that moves it. Calls before the first manifest has loaded wait for it. */
 export abstract class CameraController extends Evented<MapEvents> {
   abstract readonly options: FilledOptions;
-  protected readonly motion = new Motion(() => { this.requestFrame(); });
+  protected readonly motion = new Motion(() => { this.requestFrame(); }, (camera) => this.#limit(camera));
   protected camera: Camera | undefined;
   /** The first layer's rendering, whose origin the camera uses. */
   protected reference: Rendering | undefined;
@@ -47,6 +49,9 @@ export abstract class CameraController extends Evented<MapEvents> {
   /** What the next view has at its centre; null: what the current one has. */
   #nextCenter: Vec3 | null = null;
   #pending: (() => void)[] = [];
+  #limits: Limits | undefined;
+  /** Number of movements so far: a later one replaces one that waits for its position. */
+  #moves = 0;
   /** Clockwise rotation since the last switch of views. */
   #rotation_rad = 0;
 
@@ -56,6 +61,8 @@ export abstract class CameraController extends Evented<MapEvents> {
   abstract report(error: Error): void;
   /** Whether tiles in memory, of whatever level, cover what a camera shows. */
   protected abstract isCovered(camera: Camera): boolean;
+  /** Finds the world coordinates of a position. */
+  abstract findPosition(position: AnyPosition): Promise<Vec3>;
   /** Finds the world position of the surface at the screen's centre, if it is in memory. */
   protected abstract findCenterSurface(viewState: ViewState): Vec3 | null;
 
@@ -81,7 +88,7 @@ export abstract class CameraController extends Evented<MapEvents> {
 
   /** Minimum and maximum zoom. */
   get zoomLimits(): [number, number] {
-    return this.camera && this.reference ? computeZoomLimits(this.camera, this.reference.json.box) : [0, 0];
+    return this.camera && this.#limits ? computeZoomLimits(this.camera, this.#limits) : [0, 0];
   }
 
   /** Id of the current view, e.g. "45-22.5". */
@@ -99,23 +106,43 @@ export abstract class CameraController extends Evented<MapEvents> {
     return [...(this.reference?.views.values() ?? [])].map(({ frame }) => frame);
   }
 
-  /** Centres the map on a world position, at once. @throws UsageError for anything but three numbers, and a number */
-  setView(position: Vec3, zoom?: number): this {
-    checkView(position, zoom);
-    return this.whenReady(() => { this.#switchView(); }).#moveTo((camera, rendering) => centerCamera(camera, rendering, position, zoom), 0);
+  /** Centres the map on a position, at once. @throws UsageError for anything but a position, and a number */
+  setView(position: AnyPosition, zoom?: number): this {
+    return this.#centerOn(position, zoom, 0);
   }
 
-  /** Flies to a world position; jumps there if the user prefers reduced motion. */
-  flyTo(position: Vec3, zoom?: number, { duration_ms = FLIGHT_MS }: { duration_ms?: number } = {}): this {
-    checkView(position, zoom);
-    return this.whenReady(() => { this.#switchView(); }).#moveTo((camera, rendering) => centerCamera(camera, rendering, position, zoom), duration_ms);
+  /** Flies to a position; jumps there if the user prefers reduced motion. */
+  flyTo(position: AnyPosition, zoom?: number, { duration_ms = FLIGHT_MS }: { duration_ms?: number } = {}): this {
+    return this.#centerOn(position, zoom, duration_ms);
   }
 
-  /** Fits a box of world coordinates into the map. */
-  fitBounds([low, high]: Box3, { padding_px = 24, duration_ms = 0, maxZoom = Infinity }: FitOptions = {}): this {
-    for (const corner of [low, high]) checkVector(corner, "fitBounds");
+  /** Moves smoothly to a position, at the same zoom. */
+  panTo(position: AnyPosition, { duration_ms = STEP_MS }: { duration_ms?: number } = {}): this {
+    return this.#centerOn(position, undefined, duration_ms);
+  }
+
+  /** Fits a box, given by two opposite corners, into the map. */
+  fitBounds(bounds: Bounds, { padding_px = 24, duration_ms = 0, maxZoom = Infinity }: FitOptions = {}): this {
+    checkBounds(bounds, "fitBounds");
     for (const number of [padding_px, maxZoom]) checkNumber(number, "fitBounds");
-    return this.whenReady(() => { this.#switchView(); }).#moveTo((camera, { json: { origin } }) => fitCamera(camera, [sub(low, origin), sub(high, origin)], padding_px, maxZoom), duration_ms);
+    return this.whenReady(() => { this.#switchView(); }).#moveTo((camera, rendering) => fitCamera(camera, localBox(bounds, rendering), padding_px, maxZoom), duration_ms);
+  }
+
+  /** Sets the box that the map's centre stays in, by two opposite corners; null: the content's. */
+  setMaxBounds(bounds: Bounds | null): this {
+    if (bounds) checkBounds(bounds, "maxBounds");
+    return this.whenReady((camera, rendering) => {
+      if (this.#limits) this.#limits = { ...this.#limits, bounds: bounds ? localBox(bounds, rendering) : rendering.json.box };
+      this.setCamera(camera);
+    });
+  }
+
+  /** @internal Zooms to a rectangle of the screen, by two opposite corners. */
+  zoomToRect([x0, y0]: Vec2, [x1, y1]: Vec2): void {
+    this.#moveTo((camera) => {
+      const [u, v] = uvFromScreen(camera, [(x0 + x1) / 2, (y0 + y1) / 2]);
+      return { ...camera, u, v, zoom: camera.zoom + Math.log2(Math.min(camera.width / Math.abs(x1 - x0), camera.height / Math.abs(y1 - y0))) };
+    }, FLIGHT_MS);
   }
 
   /** Sets the zoom at once, about the screen's centre and within `zoomLimits`. */
@@ -186,10 +213,10 @@ export abstract class CameraController extends Evented<MapEvents> {
     });
   }
 
-  /** Projects a world position to CSS pixels; null before "ready". */
-  project(world: Vec3): Vec2 | null {
-    checkVector(world, "project");
-    return this.camera && this.reference ? screenFromLocal(this.transitionCamera ?? this.camera, sub(world, this.reference.json.origin)) : null;
+  /** Projects a position to CSS pixels; null before "ready". "ground" is the height of the content's lowest point. */
+  project(position: Position): Vec2 | null {
+    checkPosition(position, "project");
+    return this.camera && this.reference ? screenFromLocal(this.transitionCamera ?? this.camera, sub(worldPosition(position, this.reference), this.reference.json.origin)) : null;
   }
 
   /** Returns the world position under CSS pixels on the ground (the height of the content's lowest point); null in level views. */
@@ -245,20 +272,29 @@ export abstract class CameraController extends Evented<MapEvents> {
     this.requestFrame();
   }
 
+  /** @internal Moves the picture with a pointer: beyond the bounds with resistance. */
+  dragBy(dx: number, dy: number): void {
+    if (this.camera) this.camera = this.#panSoftly(this.camera, dx, dy);
+    this.requestFrame();
+  }
+
   /** @internal */
   endGesture(): void {
     this.#rotation_rad = 0;
     this.transition?.endGesture();
+    this.startInertia([0, 0]);
   }
 
   /** @internal */
   startGesture(): void {
+    this.#moves++;
     this.motion.stop();
   }
 
-  /** @internal */
+  /** @internal Continues a drag with inertia, and returns from beyond the bounds. */
   startInertia(velocity: Vec2): void {
-    if (!prefersReducedMotion()) this.motion.startInertia(velocity);
+    if (!prefersReducedMotion()) this.motion.startInertia(velocity, (camera, dx, dy) => this.#panSoftly(camera, dx, dy));
+    else if (this.camera) this.setCamera(this.camera);
   }
 
   /** @internal */
@@ -295,16 +331,24 @@ export abstract class CameraController extends Evented<MapEvents> {
   }
 
   protected setCamera(camera: Camera): this {
-    this.camera = this.reference ? limitCamera(camera, this.reference.json.box) : camera;
+    this.camera = this.#limit(camera);
     this.requestFrame();
     return this;
+  }
+
+  #limit(camera: Camera): Camera {
+    return this.#limits ? limitCamera(camera, this.#limits) : camera;
+  }
+
+  #panSoftly(camera: Camera, dx: number, dy: number): Camera {
+    return this.#limits ? panSoftly(camera, dx, dy, this.#limits) : camera;
   }
 
   /** Advances animation and view transition to a time. */
   protected advanceCamera(now_ms: number): void {
     const camera = this.camera;
     const next = camera && this.motion.step(now_ms, camera);
-    if (next && next !== camera) this.camera = this.reference ? limitCamera(next, this.reference.json.box) : next;
+    if (next && next !== camera) this.camera = next;
     this.transitionCamera = (this.camera && this.transition?.step(now_ms, this.camera)) ?? null;
   }
 
@@ -318,15 +362,18 @@ export abstract class CameraController extends Evented<MapEvents> {
   protected initializeView(rendering: Rendering): void {
     const { width, height } = this.size;
     const { json, views } = rendering;
-    const { direction, center, zoom, cover } = this.options;
+    const { direction, center, zoom, cover, minZoom, maxZoom, maxBounds } = this.options;
     const view = views.get(direction ?? "") ?? [...views.values()][0];
     if (!view) return;
     if (direction !== undefined && !views.has(direction)) this.report(new UsageError(`unknown view "${direction}"; the rendering has ${[...views.keys()].join(", ")}`));
     this.reference = rendering;
+    this.#limits = { box: json.box, bounds: json.box, minZoom, maxZoom };
     const whole = fitCamera({ frame: view.frame, u: 0, v: 0, zoom: 0, width, height }, json.box, Math.min(width, height) * 0.04, json.zmax);
     const fitted = cover ? fillScreen(whole, view, json.box) : whole;
-    const start = center ?? (json.start && add(json.origin, json.start.local));
+    const start = center && isVector(center) ? center : json.start && add(json.origin, json.start.local);
     this.setCamera(start ? centerCamera(fitted, rendering, start, zoom) : { ...fitted, zoom: zoom ?? fitted.zoom });
+    if (maxBounds) this.#pending.unshift(() => { this.setMaxBounds(maxBounds); });
+    if (center && !isVector(center)) this.#pending.unshift(() => { this.setView(center, zoom); });
     for (const action of this.#pending.splice(0)) this.#runPending(action);
     this.fire("ready", {});
     this.fire("directionchange", { direction: this.direction });
@@ -341,7 +388,8 @@ export abstract class CameraController extends Evented<MapEvents> {
     }
   }
 
-  protected whenReady(action: (camera: Camera, rendering: Rendering) => void): this {
+  /** Calls a function once the map has a view: at once if it has one. */
+  whenReady(action: (camera: Camera, rendering: Rendering) => void): this {
     const run = (): void => {
       if (this.camera && this.reference) action(this.camera, this.reference);
     };
@@ -350,9 +398,21 @@ export abstract class CameraController extends Evented<MapEvents> {
     return this;
   }
 
+  #centerOn(position: AnyPosition, zoom: number | undefined, duration_ms: number): this {
+    checkPosition(position, "setView");
+    checkNumber(zoom, "zoom");
+    if (isVector(position)) return this.whenReady(() => { this.#switchView(); }).#moveTo((camera, rendering) => centerCamera(camera, rendering, position, zoom), duration_ms);
+    const move = ++this.#moves;
+    this.findPosition(position).then((found) => {
+      if (move === this.#moves) this.#centerOn(found, zoom, duration_ms);
+    }).catch((reason: unknown) => { this.report(asError(reason)); });
+    return this;
+  }
+
   #moveTo(to: (camera: Camera, rendering: Rendering) => Camera, duration_ms: number, stops = true): this {
+    this.#moves++;
     return this.whenReady((camera, rendering) => {
-      const target = limitCamera(to(camera, rendering), rendering.json.box);
+      const target = this.#limit(to(camera, rendering));
       if (stops) this.motion.stop();
       if (duration_ms <= 0 || prefersReducedMotion()) this.setCamera(target);
       else this.motion.fly(camera, target, duration_ms);
@@ -387,7 +447,7 @@ export abstract class CameraController extends Evented<MapEvents> {
     const { reference } = this;
     const center = (this.nextView ? this.#nextCenter : null) ?? this.center;
     const [target, rendering] = [{ ...camera, frame }, reference as Rendering];
-    return limitCamera(center ? centerCamera(target, rendering, center) : fitCamera(target, rendering.json.box, 0, camera.zoom), rendering.json.box);
+    return this.#limit(center ? centerCamera(target, rendering, center) : fitCamera(target, rendering.json.box, 0, camera.zoom));
   }
 
   /** Shows the view that waits for its tiles, if one does. */
@@ -403,33 +463,5 @@ export abstract class CameraController extends Evented<MapEvents> {
   }
 }
 
-function checkView(position: Vec3, zoom: number | undefined): void {
-  checkVector(position, "setView");
-  checkNumber(zoom, "zoom");
-}
-
 /** Whether the user prefers reduced motion. */
 const prefersReducedMotion = (): boolean => matchMedia("(prefers-reduced-motion: reduce)").matches;
-
-function centerCamera(camera: Camera, { json }: Rendering, position: Vec3, zoom = camera.zoom): Camera {
-  const [u, v] = uvdFromLocal(camera.frame.axes, sub(position, json.origin));
-  return { ...camera, u, v, zoom };
-}
-
-function panCamera(camera: Camera, dx: number, dy: number): Camera {
-  const px = cssPixelM(camera);
-  return { ...camera, u: camera.u - dx * px, v: camera.v + dy * px };
-}
-
-/** Fits a local box into the camera. */
-function fitCamera(camera: Camera, box: Box3, padding: number, maxZoom: number): Camera {
-  const [low, high] = projectedBox(camera.frame, box);
-  const [u, v] = uvdFromLocal(camera.frame.axes, boxCenter(box));
-  return { ...camera, u, v, zoom: Math.min(zoomToFit(camera, high[0] - low[0], high[1] - low[1], padding), maxZoom) };
-}
-
-function findGround(camera: Camera, { json }: Rendering, point: Vec2): Vec3 | null {
-  const [u, v] = uvFromScreen(camera, point);
-  const d = depthAtHeight(camera.frame.axes, v, json.box[0][2]);
-  return d === null ? null : add(json.origin, localFromUvd(camera.frame.axes, [u, v, d]));
-}

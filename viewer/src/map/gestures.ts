@@ -1,3 +1,4 @@
+import { element } from "../core/dom";
 import type { Vec2 } from "../core/vec";
 
 /** A map as controlled by gestures. Screen positions are CSS pixels from the container's top left corner. */
@@ -6,6 +7,11 @@ export interface GestureTarget {
   /** A gesture has started: stops movements. */
   startGesture(): void;
   panBy(dx: number, dy: number): unknown;
+  /** Moves the picture with a pointer. */
+  dragBy(dx: number, dy: number): void;
+  /** Whether a drag with Shift draws a rectangle to zoom to. */
+  readonly options: { readonly boxZoom: boolean };
+  zoomToRect(from: Vec2, to: Vec2): void;
   startInertia(velocity: Vec2): void;
   /** Zooms at once, without animation. */
   pinch(factor: number, anchor: Vec2): unknown;
@@ -15,7 +21,8 @@ export interface GestureTarget {
   /** The last pointer was released. */
   endGesture(): void;
   tap(at: Vec2): void;
-  hover(at: Vec2): void;
+  /** The pointer moves without a button; null: it leaves the map. */
+  hover(at: Vec2 | null): void;
 }
 
 interface Pointer {
@@ -30,7 +37,7 @@ const VELOCITY_MS = 90;
 /** Rotation per pixel of a drag with the right button. */
 const ROTATION_RAD_PER_PX = (0.4 * Math.PI) / 180;
 
-/** Handles mouse, touch and pen on the canvas: drag, pinch, wheel, tap, double tap. */
+/** Handles mouse, touch and pen on the canvas: drag, pinch, wheel, tap, double tap, and a rectangle drawn with Shift. */
 export class Gestures {
   readonly #map: GestureTarget;
   readonly #canvas: HTMLCanvasElement;
@@ -40,6 +47,8 @@ export class Gestures {
   #moved = false;
   /** Last position of a drag with the right button. */
   #rotatingFrom: Vec2 | null = null;
+  /** The rectangle that is drawn, from the press of the button on. */
+  #box: HTMLElement | null = null;
   #lastTap: { at: Vec2; ms: number } | null = null;
 
   constructor(map: GestureTarget, canvas: HTMLCanvasElement) {
@@ -50,6 +59,7 @@ export class Gestures {
     canvas.addEventListener("pointermove", (event) => { this.#move(event); }, { signal });
     canvas.addEventListener("pointerup", (event) => { this.#up(event, true); }, { signal });
     canvas.addEventListener("pointercancel", (event) => { this.#up(event, false); }, { signal });
+    canvas.addEventListener("pointerleave", () => { this.#map.hover(null); }, { signal });
     canvas.addEventListener("contextmenu", (event) => { event.preventDefault(); }, { signal });
     canvas.addEventListener("wheel", (event) => { this.#wheel(event); }, { signal, passive: false });
   }
@@ -70,8 +80,8 @@ export class Gestures {
     this.#canvas.setPointerCapture(event.pointerId);
     if (this.#rotatingFrom) return;
     this.#map.startGesture();
-    if (this.#pointers.size === 0) this.#moved = false;
-    else this.#moved = true;
+    this.#moved = this.#pointers.size > 0;
+    if (event.shiftKey && event.pointerType === "mouse" && this.#map.options.boxZoom) this.#box = element("div", "map3d-box");
     this.#pointers.set(event.pointerId, { at, start: at });
     this.#recentPoints = [];
   }
@@ -90,7 +100,8 @@ export class Gestures {
     }
     if (!this.#moved && Math.hypot(at[0] - pointer.start[0], at[1] - pointer.start[1]) < TAP_PX) return;
     this.#moved = true;
-    this.#map.container.classList.add("map3d-dragging");
+    if (this.#box) this.#map.container.append(this.#box);
+    else this.#map.container.classList.add("map3d-dragging");
     const other = [...this.#pointers].find(([id]) => id !== event.pointerId)?.[1];
     if (other) this.#pinch(pointer, other, at);
     else this.#drag(pointer, at, event);
@@ -98,7 +109,11 @@ export class Gestures {
   }
 
   #drag(pointer: Pointer, at: Vec2, event: PointerEvent): void {
-    this.#map.panBy(at[0] - pointer.at[0], at[1] - pointer.at[1]);
+    if (this.#box) {
+      drawBox(this.#box, pointer.start, at);
+      return;
+    }
+    this.#map.dragBy(at[0] - pointer.at[0], at[1] - pointer.at[1]);
     // When frames are slow, one event combines several: their own positions and times give the pointer's speed.
     const all = "getCoalescedEvents" in event ? event.getCoalescedEvents() : [];
     const points = (all.length > 0 ? all : [event]).map((each) => ({ at: this.#toScreen(each), ms: each.timeStamp }));
@@ -130,8 +145,12 @@ export class Gestures {
     if (this.#pointers.size > 0) return;
     this.#map.endGesture();
     this.#map.container.classList.remove("map3d-dragging");
+    const box = this.#box;
+    this.#box = null;
+    box?.remove();
     if (!completed) return;
-    if (this.#moved) this.#glide(event.timeStamp);
+    if (this.#moved && box) this.#map.zoomToRect(pointer.start, pointer.at);
+    else if (this.#moved) this.#glide(event.timeStamp);
     else this.#tap(pointer.at, event.timeStamp);
   }
 
@@ -158,4 +177,8 @@ export class Gestures {
     const pixels = Math.max(-240, Math.min(240, event.deltaY * lines));
     this.#map.zoomBy(-pixels / (event.ctrlKey ? 80 : 260), this.#toScreen(event));
   }
+}
+
+function drawBox({ style }: HTMLElement, [x0, y0]: Vec2, [x1, y1]: Vec2): void {
+  Object.assign(style, { left: `${String(Math.min(x0, x1))}px`, top: `${String(Math.min(y0, y1))}px`, width: `${String(Math.abs(x1 - x0))}px`, height: `${String(Math.abs(y1 - y0))}px` });
 }

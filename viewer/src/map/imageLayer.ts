@@ -1,4 +1,5 @@
 import { checkNumber, checkOptions } from "../core/check";
+import { getFeature } from "../core/features";
 import { MapLayer } from "../core/mapLayer";
 import { asError, UsageError } from "../core/errors";
 import type { Vec2 } from "../core/vec";
@@ -14,9 +15,17 @@ import { Objects, type AttributeInfo, type AttributeValue, type ColumnSummary, t
 import { HttpSource, type Source } from "../tiles/source";
 import { LayerTiles } from "../tiles/layerTiles";
 import { findMatchingView } from "./compatibility";
+import { noObject } from "./findPosition";
 import { computeDepthRange, makeDepthMapping, planLayer, type LayerPlan } from "./layerPlan";
 import { inherit, makeDrawStyles, isHidden, listStyledIds, type ObjectStyle } from "./objectStyle";
 import type { ImageLayerHost, LayerContext, ViewState } from "./layerContext";
+import type { ClickEvent, HoverEvent, TooltipContent } from "./options";
+
+/** Most objects that are looked at for a name. */
+const MOST_NAMESAKES = 32;
+const HOVER_EVENTS = ["mouseover", "mouseout", "mousemove"] as const;
+
+type BindTooltip = (layer: imageLayer, content: TooltipContent, getPane: () => HTMLElement | undefined) => () => void;
 
 /** Options of an image layer. */
 export interface ImageLayerOptions {
@@ -26,7 +35,7 @@ export interface ImageLayerOptions {
   opacity?: number;
   /** Default colour of highlights. Default "#19b5e0". */
   highlightColor?: string;
-  /** Overrides the manifest's attribution. */
+  /** Attribution text. Default: the manifest's. */
   attribution?: string;
   /** Combines the layer with others by depth, so that the nearest surface is visible. false: draws it over earlier layers. Default true. */
   combine?: boolean;
@@ -38,6 +47,14 @@ export interface ImageLayerEvents {
   ready: { rendering: Rendering };
   /** An error, which the map's "error" reports as well. */
   error: { error: Error };
+  /** One of its objects was clicked or tapped; fires after the map's "click", with the same fields. */
+  click: ClickEvent;
+  /** The pointer has come over one of its objects. Listening to this, or to the other events of the pointer, fetches the ids of everything in view. */
+  mouseover: HoverEvent;
+  /** The pointer has left the object of the last "mouseover", whose fields it has. */
+  mouseout: HoverEvent;
+  /** The pointer moves over one of its objects. */
+  mousemove: HoverEvent;
 }
 
 /** A rendering on the map, from base URLs or another source. Several base URLs are hosts with the same tiles; requests are spread over them by tile. */
@@ -59,6 +76,7 @@ export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
   /** The colours of #colors and their descendants, without hidden objects. */
   #shownColors: ReadonlyMap<number, Rgb> = new Map();
   #clip: Clip | null = null;
+  #unbindTooltip: (() => void) | undefined;
   /** Whether loading the manifest has failed. */
   #failed = false;
 
@@ -81,7 +99,24 @@ export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
   }
 
   protected override get eventTypes(): readonly (keyof ImageLayerEvents)[] {
-    return ["ready", "error"];
+    return ["ready", "error", "click", ...HOVER_EVENTS];
+  }
+
+  /** @internal Whether anything listens to the pointer over its objects. */
+  get hovers(): boolean {
+    return HOVER_EVENTS.some((type) => this.listens(type));
+  }
+
+  /** @internal */
+  get needs(): readonly "id"[] {
+    return this.hovers ? ["id"] : [];
+  }
+
+  /** Shows text beside the pointer while it is over an object; a function gets the object. Replaces the previous tooltip; null removes it. @throws UsageError without the entry `tooltip` */
+  bindTooltip(content: TooltipContent | null): this {
+    this.#unbindTooltip?.();
+    this.#unbindTooltip = content === null ? undefined : (getFeature("tooltip", "bindTooltip") as BindTooltip)(this, content, () => this.map?.overlayPane);
+    return this.#redraw();
   }
 
   /** The checked manifest; undefined until it has loaded. */
@@ -188,6 +223,27 @@ export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
   /** Finds objects by the words of name and address. In a large rendering, reads a few small files. */
   async search(text: string, limit?: number): Promise<readonly SearchEntry[]> {
     return (await this.#objects?.search(text, limit)) ?? [];
+  }
+
+  /** Finds objects by their name, such as a gml:id, or their label, as a whole; parts by their name. Returns their ids; none before "ready". */
+  async findByName(name: string): Promise<number[]> {
+    const objects = this.#objects;
+    const entries = (await objects?.search(name, MOST_NAMESAKES)) ?? [];
+    const found = await Promise.all(entries.map(async ([id, label]) => {
+      if (label === name) return [id];
+      const all = [id, ...((await objects?.descendants(id)) ?? [])];
+      const named = await Promise.all(all.map(async (each) => (await objects?.find(each))?.name === name));
+      return all.filter((_, k) => named[k]);
+    }));
+    return found.flat();
+  }
+
+  /** Highlights the objects with a name (see `findByName`). Returns their ids. @throws UsageError when there are none */
+  async highlightByName(name: string, options: { color?: string } = {}): Promise<number[]> {
+    const ids = await this.findByName(name);
+    if (ids.length === 0) throw new UsageError(noObject(name));
+    this.highlight(ids, options);
+    return ids;
   }
 
   protected onAdd(map: ImageLayerHost): void {

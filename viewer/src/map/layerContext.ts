@@ -23,6 +23,7 @@ export interface LayerContext {
 export interface ImageLayerHost extends LayerHost<ImageLayerHost> {
   /** undefined when the map cannot draw. */
   readonly layerContext: LayerContext | undefined;
+  readonly overlayPane: HTMLElement;
 }
 
 /** The camera with the origin of its U and V, and the screen's resolution. */

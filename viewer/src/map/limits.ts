@@ -1,6 +1,6 @@
 import { clamp, type Box3 } from "../core/vec";
 import { depthAtHeight, localFromUvd, uvdFromLocal } from "../geo/axes";
-import { projectedBox, uvFromScreen, zoomToFit, type Camera } from "../geo/camera";
+import { cssPixelM, projectedBox, uvFromScreen, zoomToFit, type Camera } from "../geo/camera";
 import type { View } from "../geo/manifest";
 
 /** The zoom goes this far below the one that fits everything. */
@@ -8,19 +8,48 @@ const OUT = 1.2;
 /** The zoom goes this far beyond the deepest level. */
 const IN = 2;
 
-/** Computes the zoom limits: everything small in the middle; a tile pixel four CSS pixels wide. */
-export function computeZoomLimits(camera: Camera, box: Box3): [number, number] {
-  const [low, high] = projectedBox(camera.frame, box);
-  const all = zoomToFit(camera, high[0] - low[0], high[1] - low[1], 0);
-  const deepest = camera.frame.zmax + IN;
-  return [Math.min(all - OUT, deepest), deepest];
+/** A drag goes beyond the bounds by at most this share of the screen. */
+const SOFT = 0.25;
+
+/** Limits of a camera; boxes are local. */
+export interface Limits {
+  /** The content. */
+  readonly box: Box3;
+  /** Where the screen's centre may be. */
+  readonly bounds: Box3;
+  readonly minZoom: number | undefined;
+  readonly maxZoom: number | undefined;
 }
 
-/** Limits the camera's zoom, and keeps the screen's centre over the content. */
-export function limitCamera(camera: Camera, box: Box3): Camera {
+/** Computes the zoom limits. Without options: everything small in the middle; a tile pixel four CSS pixels wide. */
+export function computeZoomLimits(camera: Camera, { box, minZoom, maxZoom }: Limits): [number, number] {
   const [low, high] = projectedBox(camera.frame, box);
-  const zoom = clamp(camera.zoom, ...computeZoomLimits(camera, box));
+  const all = zoomToFit(camera, high[0] - low[0], high[1] - low[1], 0);
+  const most = maxZoom ?? camera.frame.zmax + IN;
+  const least = minZoom ?? Math.min(all - OUT, most);
+  return [least, Math.max(least, most)];
+}
+
+/** Limits the camera's zoom, and keeps the screen's centre within the bounds. */
+export function limitCamera(camera: Camera, limits: Limits): Camera {
+  const [low, high] = projectedBox(camera.frame, limits.bounds);
+  const zoom = clamp(camera.zoom, ...computeZoomLimits(camera, limits));
   return { ...camera, zoom, u: clamp(camera.u, low[0], high[0]), v: clamp(camera.v, low[1], high[1]) };
+}
+
+/** Moves the picture by CSS pixels; beyond the bounds with growing resistance, as on a spring. */
+export function panSoftly(camera: Camera, dx: number, dy: number, { bounds }: Limits): Camera {
+  const [low, high] = projectedBox(camera.frame, bounds);
+  const px = cssPixelM(camera);
+  const u = resist(camera.u, camera.u - dx * px, low[0], high[0], SOFT * camera.width * px);
+  return { ...camera, u, v: resist(camera.v, camera.v + dy * px, low[1], high[1], SOFT * camera.height * px) };
+}
+
+function resist(from: number, to: number, low: number, high: number, most: number): number {
+  const inside = clamp(to, low, high);
+  const [before, after] = [from - clamp(from, low, high), to - inside];
+  if (Math.abs(after) <= Math.abs(before)) return to;
+  return inside + clamp(before + (after - before) * Math.max(1 - Math.abs(before) / most, 0) ** 2, -most, most);
 }
 
 /** Content higher than this share of its width is an object, not a landscape, and is shown whole. */

@@ -1,8 +1,11 @@
-import { checkNumber, checkOptions, checkVector } from "../core/check";
+import { checkNumber, checkOptions } from "../core/check";
+import type { AddToCorner, Corner } from "../core/corner";
 import { adoptStyles, element } from "../core/dom";
 import { asError } from "../core/errors";
 import { Evented } from "../core/events";
+import { getFeature } from "../core/features";
 import type { Addable, LayerHost } from "../core/mapLayer";
+import { checkPosition, type AnyPosition } from "../core/position";
 import type { OverlayHost, OverlayEvents } from "../core/overlayHost";
 import type { Vec2, Vec3 } from "../core/vec";
 import { findLanguage } from "../core/i18n";
@@ -10,7 +13,7 @@ import type { CustomLayer } from "../draw/drawer";
 import type { Camera } from "../geo/camera";
 import type { Light } from "../geo/light";
 import type { LightEstimator } from "../draw/lightEstimator";
-import type { LayerKind } from "../geo/manifest";
+import type { LayerKind, Rendering } from "../geo/manifest";
 import type { marker } from "../overlay/marker";
 import { createAttribution } from "../ui/attribution";
 import { createControls } from "../ui/controls";
@@ -29,8 +32,10 @@ import { FrameRenderer, type PlanInput } from "./frameRenderer";
 import { EMPTY_PICK, pickExactly, pickLoaded, type Pick } from "./picker";
 import { PointerEvents } from "./pointerEvents";
 import { Relief } from "./relief";
+import { findPosition } from "./findPosition";
 import type { ViewState, LayerContext } from "./layerContext";
 import { CameraController } from "./cameraController";
+import { checkBounds } from "./cameras";
 import { Viewport, type Size } from "./viewport";
 import type { Rect } from "../tiles/cover";
 
@@ -56,6 +61,8 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   /** Whether the view has not moved since the last "moveend". */
   #atRest = true;
   #loaded = false;
+  /** Whether the last frame shows everything in view. */
+  #complete = false;
   /** Whether the map has been at rest since it moved last, so that tiles of other views are fetched. */
   #fetchesAhead = false;
   #nameCount = 0;
@@ -64,8 +71,9 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   constructor(target: string | HTMLElement, options: MapOptions = {}) {
     super();
     checkOptions(options, OPTIONS);
-    if (options.center) checkVector(options.center, "center");
-    for (const name of ["zoom", "pixelRatio", "maxPixelRatio", "cacheBytes", "concurrency", "workers"] as const) checkNumber(options[name], name);
+    if (options.center) checkPosition(options.center, "center");
+    if (options.maxBounds) checkBounds(options.maxBounds, "maxBounds");
+    for (const name of ["zoom", "minZoom", "maxZoom", "pixelRatio", "maxPixelRatio", "cacheBytes", "concurrency", "workers"] as const) checkNumber(options[name], name);
     const { dataSaver = DEFAULTS.dataSaver } = options;
     this.options = { ...DEFAULTS, ...options, dataSaver: dataSaver === "auto" ? savesData() : dataSaver };
     const withoutShadows = this.options.dataSaver ? { shadows: false, occlusion: false } : {};
@@ -92,6 +100,16 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     if (!this.#items.delete(item)) return this;
     item.detachFrom(this);
     return this.#redraw();
+  }
+
+  /** The same as `add`. */
+  addLayer(item: Addable<map>): this {
+    return this.add(item);
+  }
+
+  /** The same as `discard`. */
+  removeLayer(item: Addable<map>): this {
+    return this.discard(item);
   }
 
   /** Removes the map; the canvas is left in the page as it was before. */
@@ -239,6 +257,21 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     return viewState && pickLoaded(this.layers, viewState, point);
   }
 
+  /**
+   * Finds the world coordinates of a position, once the map has a view: on the "ground" those of the highest surface that is visible in some direction, of an
+   * object the top of its box. Fetches a few tiles or files. @throws UsageError when there is no such object, or the scene's position on earth is unknown
+   */
+  async findPosition(position: AnyPosition): Promise<Vec3> {
+    checkPosition(position, "findPosition");
+    const rendering = await new Promise<Rendering>((ready) => { this.whenReady((_, rendering) => { ready(rendering); }); });
+    return findPosition(position, this.layers, this.getViewState() as ViewState, rendering);
+  }
+
+  /** Whether everything in view is drawn, and nothing moves. */
+  loaded(): boolean {
+    return this.#complete && this.camera === this.#drawnCamera && !this.moving;
+  }
+
   isOccluded(world: Vec3): boolean {
     return this.relief?.isPositionOccluded(world) ?? false;
   }
@@ -274,8 +307,8 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   }
 
   /** @internal */
-  hover(point: Vec2): void {
-    if (!this.listens("mousemove")) return;
+  hover(point: Vec2 | null): void {
+    if (!this.listens("mousemove") && !this.layers.some((layer) => layer.hovers)) return;
     this.#pointer.hover(point);
     this.#loop.request();
   }
@@ -345,7 +378,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     this.#fetchesAhead &&= !moving;
     const input = { ...this.#planInput, lightEstimator: this.#lightEstimator, moving, next: this.nextCamera && { ...viewState, camera: this.nextCamera }, ahead: this.#fetchesAhead ? this.listViewsAhead(viewState) : [] };
     const { plans, complete, next } = this.#renderer.render(viewState, input, this.transitionCamera && ((scene) => { this.transition?.draw({ ...scene, camera: viewState.camera, tilesChanged }); }));
-    this.#plans = plans;
+    [this.#plans, this.#complete] = [plans, complete];
     if (lastCamera !== viewState.camera || inTransition) this.#fireMove(lastCamera, viewState.camera);
     this.frameEvents.fire("draw", {});
     if (this.#lightEstimator && moving) this.#redraw();
@@ -390,12 +423,16 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     if (!this.#atRest) this.fire("moveend", {});
     this.#atRest = true;
     if (this.#renderer?.busy !== false || !this.#loaded) return;
-    if (!this.#fetchesAhead) this.#redraw().#fetchesAhead = true;
+    if (!this.#fetchesAhead) {
+      this.#fetchesAhead = this.#dirty = true;
+      this.#loop.request();
+    }
     this.fire("idle", {});
   }
 
   #redraw(): this {
     this.#dirty = true;
+    this.#complete = false;
     // The first picture shows tiles as soon as they arrive. WebGL must not run ahead of the GPU.
     this.#loop.request(!this.#loaded && this.drawer === "canvas" && !document.hidden);
     return this;
@@ -431,9 +468,14 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   }
 
   #addControls(): void {
-    const { controlPane } = this.#viewport;
-    if (this.options.controls) controlPane.append(createControls(this), createScaleBar(this));
-    if (this.options.attribution) controlPane.append(createAttribution(this));
+    const { controls, attribution, scaleBar = controls !== false } = this.options;
+    const add = (control: HTMLElement, corner: Corner | true): void => {
+      if (corner === true) this.controlPane.append(control);
+      else (getFeature("controls", `"${corner}"`) as AddToCorner)(this.controlPane, control, corner);
+    };
+    if (controls) add(createControls(this), controls);
+    if (scaleBar) add(createScaleBar(this), scaleBar);
+    if (attribution) add(createAttribution(this), attribution);
   }
 
   #addListeners(): void {

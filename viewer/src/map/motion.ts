@@ -6,6 +6,8 @@ type CameraAnimation = (now_ms: number, camera: Camera) => Camera | null;
 
 const FRICTION_MS = 260;
 const WHEEL_MS = 70;
+/** Beyond the bounds, movements slow down and return at this pace. */
+const SPRING_MS = 80;
 
 /** Animates the camera: flights, wheel zoom, inertia. A new animation replaces the current one. */
 export class Motion {
@@ -13,9 +15,11 @@ export class Motion {
   #wheel: { zoom: number; anchor: Vec2 } | null = null;
   readonly #changed: () => void;
 
-  /** @param changed called when frames are needed */
-  constructor(changed: () => void) {
-    this.#changed = changed;
+  readonly #limit: (camera: Camera) => Camera;
+
+  /** @param changed called when frames are needed  @param limit keeps a camera within the map's limits */
+  constructor(changed: () => void, limit: (camera: Camera) => Camera) {
+    [this.#changed, this.#limit] = [changed, limit];
   }
 
   get moving(): boolean {
@@ -53,23 +57,27 @@ export class Motion {
       const share = 1 - Math.exp(-Math.max(now - last, 4) / WHEEL_MS);
       last = now;
       const remaining = zoom - at.zoom;
-      if (Math.abs(remaining) < 0.002) return at.zoom === zoom ? null : zoomedAt(at, zoom, anchor);
-      return zoomedAt(at, at.zoom + remaining * share, anchor);
+      if (Math.abs(remaining) < 0.002) return at.zoom === zoom ? null : this.#limit(zoomedAt(at, zoom, anchor));
+      return this.#limit(zoomedAt(at, at.zoom + remaining * share, anchor));
     });
   }
 
-  /** Continues a drag with inertia. Velocity in CSS pixels per millisecond. */
-  startInertia(velocity: Vec2): void {
+  /** Continues a drag with inertia, and returns from beyond the bounds. Velocity in CSS pixels per millisecond. @param pan moves a camera by CSS pixels */
+  startInertia(velocity: Vec2, pan: (camera: Camera, dx: number, dy: number) => Camera): void {
     let last = performance.now();
     let [vx, vy] = velocity;
     this.#run((now, camera) => {
       const dt = Math.min(Math.max(now - last, 1), 64);
       last = now;
-      const px = cssPixelM(camera);
-      const next = { ...camera, u: camera.u - vx * dt * px, v: camera.v + vy * dt * px };
-      const decay = Math.exp(-dt / FRICTION_MS);
-      [vx, vy] = [vx * decay, vy * decay];
-      return Math.hypot(vx, vy) < 0.02 ? null : next;
+      const next = pan(camera, vx * dt, vy * dt);
+      const inside = this.#limit(next);
+      const back = Math.exp(-dt / SPRING_MS);
+      const [du, dv] = [next.u - inside.u, next.v - inside.v];
+      const isOutside = Math.hypot(du, dv) > cssPixelM(camera) / 2;
+      const decay = isOutside ? back : Math.exp(-dt / FRICTION_MS);
+      [vx, vy] = Math.hypot(vx, vy) < 0.02 ? [0, 0] : [vx * decay, vy * decay];
+      if (isOutside) return { ...next, u: inside.u + du * back, v: inside.v + dv * back };
+      return inside.u === camera.u && inside.v === camera.v ? null : inside;
     });
   }
 

@@ -1,27 +1,39 @@
 import type { Light } from "../geo/light";
-import type { Vec3 } from "../core/vec";
+import type { Corner } from "../core/corner";
+import type { AnyPosition } from "../core/position";
+import type { Bounds } from "./cameras";
 import type { Pick } from "./picker";
-import type { Attribute } from "../tiles/objects";
+import type { Attribute, ObjectInfo } from "../tiles/objects";
 import type { marker } from "../overlay/marker";
 
 /** Options of a map. */
 export interface MapOptions {
-  /** Initial centre, world coordinates. Default: the rendering's start. */
-  center?: Vec3;
+  /** Initial centre. Default: the rendering's start. */
+  center?: AnyPosition;
   /** Initial zoom. Default: fits everything, or see `cover`. */
   zoom?: number;
+  /** Lowest zoom. Default: 1.2 levels below the one that shows everything. */
+  minZoom?: number;
+  /** Highest zoom. Default: two levels beyond the deepest one, where a tile pixel is four CSS pixels wide. */
+  maxZoom?: number;
+  /** Box that the map's centre stays in, by two opposite corners. A drag goes a quarter of the screen beyond, with growing resistance, and springs back. Default: the scene's content. */
+  maxBounds?: Bounds;
+  /** A drag with Shift zooms to a rectangle. Default true. */
+  boxZoom?: boolean;
   /** Without a zoom, enlarges a landscape at first until it fills the map; objects that are high for their width stay whole. Default false; the ready-made page and `<map-3d>` do it. */
   cover?: boolean;
   /** Id of the initial view, such as "45-22.5". Default: the manifest's first view. */
   direction?: string;
-  /** Default: from the south-west, 48° above the horizon. */
+  /** Light at first; the parts that are left out are those of `DEFAULT_LIGHT`. Default: `{ lit: true, azimuth_deg: 215, altitude_deg: 48, ambient: 0.42, diffuse: 0.76, sun_rgb: [1, 1, 1], sky_rgb: [1, 1, 1], shadows: true, occlusion: true }`, from the south-west. */
   light?: Partial<Light>;
   /** CSS background behind the model. Default: the style sheet's, light or dark. */
   background?: string;
-  /** Shows buttons and compass. Default true. */
-  controls?: boolean;
-  /** Shows the attribution. Default true. */
-  attribution?: boolean;
+  /** Shows buttons and compass: true, at the lower right, or a corner (needs the entry `controls`). Default true. */
+  controls?: boolean | Corner;
+  /** Shows the scale bar: true, at the lower left, or a corner. Default: true if there are buttons. */
+  scaleBar?: boolean | Corner;
+  /** Shows the attribution: true, along the lower edge, or a corner. Default true. */
+  attribution?: boolean | Corner;
   /** Fetches the ids of everything in view, so that "mousemove" reports the object under the pointer. Default false. */
   hover?: boolean;
   /** Size of the cache of decoded tiles. Tiles in view are always kept. Default: 60 bytes per device pixel of the map, 20 on dense screens, whose tiles have fewer pixels; at least 24 MB. */
@@ -34,7 +46,7 @@ export interface MapOptions {
   maxPixelRatio?: number;
   /** Device pixels per CSS pixel. Default: those of the screen, up to `maxPixelRatio`. */
   pixelRatio?: number;
-  /** Saves data: coarser tiles on dense screens, no ids for hovering, shadows and occlusion only on request. "auto": if the user has enabled it in the browser. Default "auto". */
+  /** Saves data: tiles one level coarser on dense screens, no ids for hovering, no tiles of the neighbouring directions while the map is at rest, shadows and occlusion only on request. "auto": if the user has enabled it in the browser. Default "auto". */
   dataSaver?: boolean | "auto";
   /** @internal Shows tiles of this many levels more. Default 0. */
   finer?: number;
@@ -47,13 +59,14 @@ export interface MapOptions {
 }
 
 /** Options without a fixed default. */
-type WithoutDefault = "center" | "zoom" | "direction" | "light" | "background" | "language" | "pixelRatio" | "cacheBytes";
+type WithoutDefault = "center" | "zoom" | "minZoom" | "maxZoom" | "maxBounds" | "scaleBar" | "direction" | "light" | "background" | "language" | "pixelRatio" | "cacheBytes";
 export type FilledOptions = MapOptions & Required<Omit<MapOptions, WithoutDefault | "dataSaver">> & { dataSaver: boolean };
 
 export const DEFAULTS: Required<Omit<MapOptions, WithoutDefault>> = {
   controls: true,
   attribution: true,
   cover: false,
+  boxZoom: true,
   hover: false,
   concurrency: 12,
   workers: 2,
@@ -64,7 +77,7 @@ export const DEFAULTS: Required<Omit<MapOptions, WithoutDefault>> = {
   finer: 0,
 };
 
-export const OPTIONS: readonly string[] = [...Object.keys(DEFAULTS), "center", "zoom", "direction", "light", "background", "language", "pixelRatio", "cacheBytes"];
+export const OPTIONS: readonly string[] = [...Object.keys(DEFAULTS), "center", "zoom", "minZoom", "maxZoom", "maxBounds", "scaleBar", "direction", "light", "background", "language", "pixelRatio", "cacheBytes"];
 
 /** Types of a map's events. */
 export const EVENTS: readonly (keyof MapEvents)[] = ["ready", "load", "idle", "move", "moveend", "zoom", "directionchange", "lightchange", "preclick", "click", "mousemove", "select", "resize", "error", "contextlost", "contextrestored", "remove"];
@@ -125,3 +138,6 @@ export interface MapEvents {
   /** The map has been removed. */
   remove: object;
 }
+
+/** Text of a tooltip, or a function that returns it for an object, or null for none. Strings are shown as text. */
+export type TooltipContent = string | ((object: ObjectInfo, id: number) => string | Node | null);

@@ -1,6 +1,6 @@
 import { asError } from "../core/errors";
 import type { Vec2 } from "../core/vec";
-import type { ClickEvent, MapEvents } from "./options";
+import type { ClickEvent, HoverEvent, MapEvents } from "./options";
 import { EMPTY_PICK, type Pick } from "./picker";
 
 /** A map as seen by its pointer events. */
@@ -11,26 +11,37 @@ export interface PickedMap {
   report(error: Error): void;
 }
 
-/** Turns taps and movements of the pointer into a map's events, with the object under them. */
+/** Turns taps and movements of the pointer into events of a map and of its layers, with the object under them. */
 export class PointerEvents {
   readonly #map: PickedMap;
   #clickCount = 0;
-  #hoverPoint: Vec2 | null = null;
+  /** Position of the pointer since the last frame; null: it has left the map. */
+  #point: Vec2 | null | undefined;
+  /** What is under the pointer. */
+  #hovered: HoverEvent | undefined;
 
   constructor(map: PickedMap) {
     this.#map = map;
   }
 
-  /** Remembers a position of the pointer for the next frame. */
-  hover(point: Vec2): void {
-    this.#hoverPoint = point;
+  /** Remembers a position of the pointer for the next frame; null: it has left the map. */
+  hover(point: Vec2 | null): void {
+    this.#point = point;
   }
 
-  /** Fires the event of the last position. */
+  /** Fires the events of the last position. */
   flush(): void {
-    const point = this.#hoverPoint;
-    this.#hoverPoint = null;
-    if (point) this.#map.fire("mousemove", { ...(this.#map.pickLoaded(point) ?? EMPTY_PICK), point });
+    const [point, before] = [this.#point, this.#hovered];
+    if (point === undefined) return;
+    const event = { ...((point && this.#map.pickLoaded(point)) ?? EMPTY_PICK), point: point ?? [0, 0] } as const;
+    this.#point = undefined;
+    this.#hovered = event;
+    if (point) this.#map.fire("mousemove", event);
+    if (before?.layer !== event.layer || before.id !== event.id) {
+      if (before?.id) before.layer?.fire("mouseout", before);
+      if (event.id) event.layer?.fire("mouseover", event);
+    }
+    if (event.id) event.layer?.fire("mousemove", event);
   }
 
   /** Ends clicks whose values are being fetched. */
@@ -43,7 +54,9 @@ export class PointerEvents {
     this.#map.fire("preclick", { ...(this.#map.pickLoaded(point) ?? { ...EMPTY_PICK, approximate: true }), point });
     const pick = await this.#map.pick(point);
     const event = await this.#addAttributes({ ...pick, point });
-    if (clickNumber === this.#clickCount) this.#map.fire("click", event);
+    if (clickNumber !== this.#clickCount) return;
+    this.#map.fire("click", event);
+    if (event.id) event.layer?.fire("click", event);
   }
 
   async #addAttributes(event: ClickEvent): Promise<ClickEvent> {

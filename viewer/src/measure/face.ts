@@ -22,7 +22,7 @@ export interface Face {
 
 /** Options of `measureFace`. */
 export interface FaceOptions {
-  /** Aborts the measurement. */
+  /** Aborts the measurement. Default: none. */
   signal?: AbortSignal;
 }
 

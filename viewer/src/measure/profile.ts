@@ -16,7 +16,7 @@ export interface Profile {
 export interface ProfileOptions {
   /** Number of samples along the line, 2 to 10,000. Default 400. */
   samples?: number;
-  /** Aborts the measurement. */
+  /** Aborts the measurement. Default: none. */
   signal?: AbortSignal;
 }
 

@@ -14,7 +14,7 @@ export interface ModelLayerOptions {
   scale?: number;
   /** The model's up axis; "y" in glTF. Default "y". */
   up?: "y" | "z";
-  /** Loader for a URL, such as three.js's GLTFLoader: the class or an instance. `loadAsync` must return an Object3D or `{ scene, animations }`. */
+  /** Loader for a URL, such as three.js's GLTFLoader: the class or an instance. `loadAsync` must return an Object3D or `{ scene, animations }`. Default: none, which suffices for a model without a URL. */
   loader?: ModelLoader | (new () => ModelLoader);
   /** Animations that play at once, by name; true for all. None play under `prefers-reduced-motion`. Default true. */
   play?: boolean | string | readonly string[];

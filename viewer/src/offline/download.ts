@@ -30,9 +30,9 @@ export interface DownloadOptions extends AreaOptions {
   files?: readonly string[];
   /** Number of parallel requests. Default 6. */
   concurrency?: number;
-  /** Aborts the download; the promise rejects with the signal's reason. Saved tiles stay, so that the download can be resumed. */
+  /** Aborts the download; the promise rejects with the signal's reason. Saved tiles stay, so that the download can be resumed. Default: none. */
   signal?: AbortSignal;
-  /** Called after each tile. */
+  /** Called after each tile. Default: none. */
   onProgress?: (progress: AreaProgress) => void;
 }
 

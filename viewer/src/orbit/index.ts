@@ -1,2 +1,6 @@
 /** map3d-orbit: animates changes of the view. */
-export { orbit, type OrbitOptions } from "./orbit";
+import { features } from "../map3d";
+import { orbit } from "./orbit";
+
+features["orbit"] = orbit;
+export { orbit, orbit as Orbit, type OrbitOptions } from "./orbit";

@@ -6,6 +6,7 @@ import { MapLayer, type TransitionFrame, type map, type ViewTransition } from ".
 import { fadeOut } from "./fade";
 import { Warp, type RgbdImage } from "./warp";
 
+/** Options of `orbit`. */
 export interface OrbitOptions {
   /** Duration of a rotation by 90°; others are scaled. Default 750. */
   duration_ms?: number;

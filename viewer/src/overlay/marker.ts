@@ -1,8 +1,9 @@
 import { checkOptions } from "../core/check";
 import { element } from "../core/dom";
-import type { OverlayHost } from "../core/overlayHost";
+import { getFeature } from "../core/features";
+import type { EnableDragging, OverlayHost } from "../core/overlayHost";
+import type { AnyPosition } from "../core/position";
 import type { Vec2, Vec3 } from "../core/vec";
-import { enableDragging } from "./drag";
 import { popup, type PopupOptions } from "./popup";
 import { PositionedLayer } from "./positionedLayer";
 
@@ -12,11 +13,11 @@ export interface MarkerOptions {
   color?: string;
   /** false: the label shows only while the marker is hovered or focused. Default true. */
   showLabel?: boolean;
-  /** Replaces the dot, centred on the position. Strings are shown as text. */
+  /** Replaces the dot, centred on the position. Strings are shown as text. Default: a dot. */
   icon?: string | Node;
   /** What happens while the marker is behind a building: nothing, it fades, or it hides. Default "none". */
   occlusion?: "none" | "fade" | "hide";
-  /** Can be dragged over the surface or, while focused, moved with the arrow keys (with Shift in small steps). Default false. */
+  /** Can be dragged over the surface or, while focused, moved with the arrow keys (with Shift in small steps); needs the entry `drag`. Default false. */
   draggable?: boolean;
 }
 
@@ -32,23 +33,25 @@ export interface MarkerEvents {
   dragend: { marker: marker; position: Vec3 };
 }
 
-/** A labelled 3D position (coordinates of the scene's CRS). */
+/** A labelled position. */
 export class marker extends PositionedLayer<MarkerEvents> {
   readonly options: Required<Omit<MarkerOptions, "color" | "icon">> & Pick<MarkerOptions, "color" | "icon">;
   readonly needs: readonly "depth"[];
   #button: HTMLButtonElement | undefined;
   #label: string;
+  #place: AnyPosition;
   #offset: Vec2 = [0, 0];
   #popup: popup | undefined;
   #selected = false;
 
-  /** @throws UsageError for a position that is not three numbers, or an unknown option */
-  constructor(label: string, position: Vec3, options: MarkerOptions = {}) {
+  /** @throws UsageError for anything but a position, or an unknown option */
+  constructor(label: string, position: AnyPosition, options: MarkerOptions = {}) {
     super(position);
     checkOptions(options, ["color", "showLabel", "icon", "occlusion", "draggable"]);
     this.options = { showLabel: true, occlusion: "none", draggable: false, ...options };
+    if (this.options.draggable) getFeature("drag", "draggable");
     this.needs = this.options.draggable || this.options.occlusion !== "none" ? ["depth"] : [];
-    this.#label = label;
+    [this.#label, this.#place] = [label, position];
   }
 
   protected override get eventTypes(): readonly (keyof MarkerEvents)[] {
@@ -72,9 +75,10 @@ export class marker extends PositionedLayer<MarkerEvents> {
     return this;
   }
 
-  /** Sets the position (world coordinates); its popup follows. */
-  override setPosition(position: Vec3): this {
+  /** Sets the position; its popup follows. */
+  override setPosition(position: AnyPosition): this {
     super.setPosition(position);
+    this.#place = position;
     this.#popup?.setPosition(position);
     return this;
   }
@@ -82,13 +86,13 @@ export class marker extends PositionedLayer<MarkerEvents> {
   /** @internal Shows it this many CSS pixels away from its position. */
   setOffset(offset: Vec2): this {
     this.#offset = offset;
-    return this.setPosition(this.position);
+    return this.setPosition(this.#place);
   }
 
   /** Opens a popup with this content above the marker when it is clicked. */
   bindPopup(content: string | Node, options: PopupOptions = {}): this {
     this.#popup?.remove();
-    this.#popup = new popup(content, this.position, { offset_px: this.options.showLabel ? 58 : 14, ...options });
+    this.#popup = new popup(content, this.#place, { offset_px: this.options.showLabel ? 58 : 14, ...options });
     return this;
   }
 
@@ -125,10 +129,10 @@ export class marker extends PositionedLayer<MarkerEvents> {
     this.#button = undefined;
   }
 
-  protected placeElement(map: OverlayHost): void {
-    const [button, at] = [this.#button, map.project(this.position)];
+  protected placeElement(map: OverlayHost, position: Vec3 | null): void {
+    const [button, at] = [this.#button, position && map.project(position)];
     if (!button) return;
-    const occluded = this.options.occlusion !== "none" && map.isOccluded(this.position);
+    const occluded = this.options.occlusion !== "none" && position !== null && map.isOccluded(position);
     const { clientWidth, clientHeight } = map.container;
     const inView = at && at[0] > -80 && at[1] > -10 && at[0] < clientWidth + 80 && at[1] < clientHeight + 80;
     button.hidden = !inView || (occluded && this.options.occlusion === "hide");
@@ -142,7 +146,7 @@ export class marker extends PositionedLayer<MarkerEvents> {
     button.classList.toggle("map3d-marker-hover-label", !showLabel);
     if (color !== undefined) button.style.setProperty("--map3d-marker", color);
     button.addEventListener("click", () => { this.#onClick(); });
-    if (draggable) enableDragging(button, map, () => this.position, (type, position) => { this.#onDrag(type, position); });
+    if (draggable) (getFeature("drag", "draggable") as EnableDragging)(button, map, () => this.position, (type, position) => { this.#onDrag(type, position); });
     return button;
   }
 

@@ -2,6 +2,7 @@ import { checkOptions } from "../core/check";
 import { element, iconButton } from "../core/dom";
 import { getMapMessages } from "../core/i18n";
 import type { OverlayHost } from "../core/overlayHost";
+import type { AnyPosition } from "../core/position";
 import type { Vec3 } from "../core/vec";
 import { PositionedLayer } from "./positionedLayer";
 
@@ -29,7 +30,7 @@ export class popup extends PositionedLayer<PopupEvents> {
   readonly #box: HTMLElement;
   readonly #body: HTMLElement;
 
-  constructor(content: string | Node, position: Vec3 = [0, 0, 0], options: PopupOptions = {}) {
+  constructor(content: string | Node, position: AnyPosition = [0, 0, 0], options: PopupOptions = {}) {
     super(position);
     checkOptions(options, ["offset_px", "closeButton"]);
     this.options = { offset_px: 14, closeButton: true, ...options };
@@ -74,8 +75,8 @@ export class popup extends PositionedLayer<PopupEvents> {
     this.#box.remove();
   }
 
-  protected placeElement(map: OverlayHost): void {
-    const at = map.project(this.position);
+  protected placeElement(map: OverlayHost, position: Vec3 | null): void {
+    const at = position && map.project(position);
     this.#box.hidden = !at;
     if (at) this.#box.style.transform = `translate(${at[0].toFixed(1)}px, ${(at[1] - this.options.offset_px).toFixed(1)}px) translate(-50%, -100%)`;
   }

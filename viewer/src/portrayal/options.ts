@@ -38,7 +38,7 @@ export interface PortrayalOptions {
   multipart?: boolean;
   /** Attribution text. Default: that of the rendering, or the service's provider. */
   attribution?: string;
-  /** Replaces the browser's fetch, for example to send credentials. */
+  /** Replaces the browser's fetch, for example to send credentials. Default: the browser's. */
   fetch?: FetchFunction;
 }
 

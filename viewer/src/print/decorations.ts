@@ -42,7 +42,7 @@ export class Decorations {
     const accent = getComputedStyle(map.container).getPropertyValue("--map3d-accent") || INK;
     const toPicture = (at: number, mapSize: number, pictureSize: number): number => ((at - mapSize / 2) * scale) / unit + pictureSize / 2;
     this.#markers = map.markers.flatMap(({ label, position, options: { color = accent, showLabel } }) => {
-      const at = map.project(position);
+      const at = position && map.project(position);
       return at ? [{ x: toPicture(at[0], map.canvas.clientWidth, this.#width), y: toPicture(at[1], map.canvas.clientHeight, this.#height), label: showLabel ? label : "", color }] : [];
     });
   }

@@ -6,6 +6,7 @@ import { drawPieces, type PieceOptions } from "./pieces";
 export interface PictureOptions extends PieceOptions {
   /** Size in pixels; give one to keep the map's aspect ratio. Default: the map's CSS size times `scale`. The picture contains the whole view; with another aspect ratio it shows more. */
   width_px?: number;
+  /** Height. Default: from the width and the aspect ratio of the map. */
   height_px?: number;
   /** Picture pixels per CSS pixel of the map, if no size is given. Default 2. */
   scale?: number;
@@ -25,9 +26,9 @@ export interface PictureOptions extends PieceOptions {
   background?: string;
   /** Picture pixels per CSS pixel of text; 3.125 for 300 dpi. Default: the scale of the map. */
   textScale?: number;
-  /** Aborts the export; the promise rejects with the signal's reason. */
+  /** Aborts the export; the promise rejects with the signal's reason. Default: none. */
   signal?: AbortSignal;
-  /** Called after each piece with the number of finished pieces and their total. */
+  /** Called after each piece with the number of finished pieces and their total. Default: none. */
   progress?: (done: number, total: number) => void;
 }
 

@@ -11,8 +11,9 @@ export interface PictureExtent {
 }
 
 export interface PieceOptions {
+  /** Aborts the rendering. Default: none. */
   readonly signal?: AbortSignal | undefined;
-  /** Called after each piece. */
+  /** Called after each piece. Default: none. */
   readonly progress?: ((done: number, total: number) => void) | undefined;
 }
 

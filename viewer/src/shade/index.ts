@@ -1,2 +1,6 @@
 /** map3d-shade: screen-space shadows and ambient occlusion. */
-export { shade, type ShadeOptions } from "./shade";
+import { features } from "../map3d";
+import { shade } from "./shade";
+
+features["shade"] = shade;
+export { shade, shade as Shade, type ShadeOptions } from "./shade";

@@ -10,7 +10,7 @@ export interface ThemeOptions {
   title?: string;
   /** Number of classes for numbers. Default 5. */
   classes?: number;
-  /** Colours as #rrggbb: a ramp from the lowest to the highest number, else one per value. */
+  /** Colours as #rrggbb: a ramp from the lowest to the highest number, else one per value. Default: a palette. */
   colors?: readonly string[];
   /** How objects without a value, or of classes not pressed in the legend, are shown. Default "dimmed". */
   others?: "dimmed" | "hidden";

@@ -5,7 +5,7 @@ import { FailedAttempt, isTransientStatus, retry, type RetryOptions } from "../c
 export type FetchFunction = (url: string, init: RequestInit) => Promise<Response>;
 
 export interface FetchOptions extends RetryOptions {
-  /** First byte and number of bytes. */
+  /** First byte and number of bytes. Default: the whole file. */
   range?: readonly [number, number] | undefined;
   /** Default: the browser's fetch. */
   fetch?: FetchFunction | undefined;

@@ -30,6 +30,7 @@ export const STYLES = `
 }
 .map3d > canvas { touch-action: none; cursor: grab; user-select: none; -webkit-user-select: none; }
 .map3d-dragging > canvas { cursor: grabbing; }
+.map3d-box { position: absolute; box-sizing: border-box; border: 2px solid var(--map3d-accent); background: var(--map3d-line); pointer-events: none; }
 .map3d:focus-visible::after { content: ""; position: absolute; inset: 0; border: 3px solid var(--map3d-accent); pointer-events: none; z-index: 5; }
 .map3d-overlay, .map3d-controls { position: absolute; inset: 0; pointer-events: none; overflow: hidden; }
 .map3d-controls > * { pointer-events: auto; }

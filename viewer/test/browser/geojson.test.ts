@@ -113,6 +113,7 @@ test("features fire events for pointer and keyboard; names are text; removing th
 
 test("a dragged marker stays on the surface; a marker behind a building is pale", async () => {
   const { page, problems } = await bed.start("town", { zoom: 3 }, {}, VIEWPORT);
+  await page.addScriptTag({ url: "/map3d-drag.js" });
   await settled(page, ([from, behind]) => {
     const g = globalThis as unknown as Featured;
     g.told = [];
@@ -127,13 +128,13 @@ test("a dragged marker stays on the surface; a marker behind a building is pale"
   await page.mouse.move(from[0] + 20, from[1] - 10, { steps: 3 });
   await page.mouse.move(...to, { steps: 4 });
   await page.mouse.up();
-  const landed = await page.evaluate(() => (globalThis as unknown as Featured).pin.position);
+  const landed = await page.evaluate(() => (globalThis as unknown as Featured).pin.position as Vec3);
   world(-45, -4, 34).forEach((value, k) => { expect(Math.abs((landed[k] ?? 0) - value)).toBeLessThan(0.6); });
   const told = await page.evaluate(() => (globalThis as unknown as Featured).told);
   expect([told[0], told.at(-1), new Set(told).size]).toEqual(["dragstart", "dragend", 3]);
   await page.locator(".map3d-marker[aria-label=Pin]").focus();
   await page.keyboard.press("ArrowRight");
-  expect((await page.evaluate(() => (globalThis as unknown as Featured).pin.position))[0] - landed[0]).toBeCloseTo(3.8, 1);
+  expect((await page.evaluate(() => (globalThis as unknown as Featured).pin.position as Vec3))[0] - landed[0]).toBeCloseTo(3.8, 1);
   expect(problems).toEqual([]);
   await page.context().close();
 });

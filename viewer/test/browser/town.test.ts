@@ -42,7 +42,7 @@ test("README's example runs unchanged; markers are at their 3D positions", async
     await new Promise((done) => map.once("idle", done));
     const button = [...document.querySelectorAll<HTMLElement>(".map3d-marker")].find((found) => found.getAttribute("aria-label") === "Town hall") as HTMLElement;
     const box = button.getBoundingClientRect();
-    const at = map.project(hall.position) as [number, number];
+    const at = map.project(hall.position as [number, number, number]) as [number, number];
     chapel.select().openPopup();
     return { dx: box.x + box.width / 2 - at[0], dy: box.y + box.height / 2 - at[1], popup: document.querySelector(".map3d-popup-body")?.textContent };
   }, bed.url("town"));

@@ -25,6 +25,7 @@ class Controller extends CameraController {
   report(error: Error): void { throw error; }
   protected findCenterSurface(): Vec3 | null { return null; }
   protected isCovered(): boolean { return true; }
+  findPosition(): Promise<Vec3> { return Promise.resolve([50, 50, 5]); }
   start(): this {
     this.initializeView(RENDERING);
     return this;
@@ -50,6 +51,11 @@ describe("a camera", () => {
     ["setView", [[1, 2, 3], "4"], /zoom: expected a number, got "4"/],
     ["setView", [[1, 2, 3], NaN], /zoom: expected a number, got "NaN"/],
     ["flyTo", [{ x: 1 }], /expected \[x, y, z\].*got \{"x":1\}/],
+    ["setView", [{ lonLat: [11] }], /setView: expected lonLat: \[longitude, latitude\] in degrees, got \[11\]/],
+    ["panTo", [{ xy: [1, 2], height: "roof" }], /setView: expected height: metres, or "ground", got \["roof"\]/],
+    ["project", [{ lonLat: [11, 48] }], /cannot locate rendering "town" on earth: give positions as \[x, y, z\]/],
+    ["setMaxBounds", [[[0, 0, 0]]], /maxBounds: expected \[x, y, z\].*got undefined/],
+    ["setMaxBounds", [7], /maxBounds: expected \[x, y, z\]/],
     ["setZoom", ["3"], /zoom: expected a number, got \["3"\]/],
     ["setZoom", [], /zoom: expected a number/],
     ["zoomBy", [NaN], /zoomBy: expected levels/],
@@ -85,6 +91,7 @@ describe("markers and layers", () => {
     [["Town hall"], /position: expected \[x, y, z\].*got undefined/],
     [["Town hall", [1, 2]], /position: expected \[x, y, z\].*got \[1,2\]/],
     [["Town hall", [1, 2, "3"]], /got \[1,2,"3"\]/],
+    [["Town hall", [1, 2, 3], { draggable: true }], /draggable needs the entry drag: load map3d-drag.js after map3d.js/],
     [["Town hall", [1, 2, 3], { colour: "red" }], /unknown option "colour"; use color, showLabel/],
   ])("a marker of %j is refused", (given, message) => {
     expect(make(given)).toThrow(expect.objectContaining({ name: "UsageError", message: expect.stringMatching(message) as string }));
@@ -104,7 +111,8 @@ describe("markers and layers", () => {
     for (const urls of [undefined, null, "", [], [undefined], 3]) expect(layer(urls)).toThrow(/needs at least one base URL/);
     expect(layer("town", { opactiy: 0.5 })).toThrow('unknown option "opactiy"; use mode, opacity, highlightColor, attribution, combine');
     expect(layer("town", { opacity: "0.5" })).toThrow('opacity: expected a number, got "0.5"');
-    expect(() => (new imageLayer("town") as unknown as Loose)["on"]?.("load", () => undefined)).toThrow('unknown event "load"; use ready, error');
+    expect(() => (new imageLayer("town") as unknown as Loose)["on"]?.("load", () => undefined)).toThrow('unknown event "load"; use ready, error, click, mouseover, mouseout, mousemove');
+    expect(() => new imageLayer("town").bindTooltip("a")).toThrow('bindTooltip needs the entry tooltip: load map3d-tooltip.js after map3d.js, or import "map3d/tooltip"');
     expect(() => new imageLayer("town").setOpacity(NaN)).toThrow(UsageError);
   });
 });

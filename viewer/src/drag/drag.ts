@@ -1,12 +1,12 @@
-import type { OverlayHost } from "../core/overlayHost";
-import type { Vec2, Vec3 } from "../core/vec";
+import type { EnableDragging } from "../core/overlayHost";
+import type { Vec2 } from "../core/vec";
 
 const START_PX = 4;
 const STEP_PX = 10;
 const KEYS: Readonly<Record<string, Vec2>> = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
 /** Lets the user drag a positioned element over the surface, with the pointer or the arrow keys. It stays where it is where no surface is known. */
-export function enableDragging(handle: HTMLElement, map: OverlayHost, position: () => Vec3, onDrag: (type: "dragstart" | "drag" | "dragend", position: Vec3) => void): void {
+export const enableDragging: EnableDragging = (handle, map, position, onDrag) => {
   let drag: { readonly id: number; readonly from: Vec2; readonly offset: Vec2; moved: boolean } | undefined;
   const moveTo = (x: number, y: number): void => {
     const surface = map.findSurfaceAt([x, y]);
@@ -15,7 +15,8 @@ export function enableDragging(handle: HTMLElement, map: OverlayHost, position: 
   handle.classList.add("map3d-marker-draggable");
   handle.setAttribute("aria-keyshortcuts", Object.keys(KEYS).join(" "));
   handle.addEventListener("pointerdown", (event) => {
-    const at = map.project(position());
+    const start = position();
+    const at = start && map.project(start);
     if (drag || event.button !== 0 || !at) return;
     handle.setPointerCapture(event.pointerId);
     drag = { id: event.pointerId, from: [event.clientX, event.clientY], offset: [at[0] - event.clientX, at[1] - event.clientY], moved: false };
@@ -23,14 +24,16 @@ export function enableDragging(handle: HTMLElement, map: OverlayHost, position: 
   handle.addEventListener("pointermove", (event) => {
     if (drag?.id !== event.pointerId) return;
     if (!drag.moved && Math.hypot(event.clientX - drag.from[0], event.clientY - drag.from[1]) < START_PX) return;
-    if (!drag.moved) onDrag("dragstart", position());
+    const start = position();
+    if (!drag.moved && start) onDrag("dragstart", start);
     drag.moved = true;
     moveTo(event.clientX + drag.offset[0], event.clientY + drag.offset[1]);
   });
   const ended = (event: PointerEvent): void => {
     if (drag?.id !== event.pointerId) return;
-    if (drag.moved) {
-      onDrag("dragend", position());
+    const end = position();
+    if (drag.moved && end) {
+      onDrag("dragend", end);
       // Suppresses the click that follows a drag.
       const suppress = (click: Event): void => { click.stopImmediatePropagation(); };
       handle.addEventListener("click", suppress, { capture: true, once: true });
@@ -41,12 +44,13 @@ export function enableDragging(handle: HTMLElement, map: OverlayHost, position: 
   handle.addEventListener("pointerup", ended);
   handle.addEventListener("pointercancel", ended);
   handle.addEventListener("keydown", (event) => {
-    const [step, at] = [KEYS[event.key], map.project(position())];
+    const [step, start] = [KEYS[event.key], position()];
+    const at = start && map.project(start);
     if (!step || !at || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
     const step_px = event.shiftKey ? 1 : STEP_PX;
-    onDrag("dragstart", position());
+    onDrag("dragstart", start);
     moveTo(at[0] + step_px * step[0], at[1] + step_px * step[1]);
-    onDrag("dragend", position());
+    onDrag("dragend", position() ?? start);
   });
-}
+};
