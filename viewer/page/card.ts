@@ -56,7 +56,8 @@ export function describe({ id, name, class: type = "", attributes = {}, position
   const proper = [text("name"), name ?? ""].find((each) => each !== "" && !isId(each));
   const address = text("address");
   const titles = [proper ?? "", address, [text("function") || kind, isNumber(year) ? format(year) : ""].filter(Boolean).join(", ")];
-  const title = id > 0 ? titles.find(Boolean) ?? `${message("object")} ${String(id)}` : message("point");
+  const isGround = id === 0 || NOT_HIGHLIGHTED.has(type);
+  const title = id > 0 && isGround ? kind : id > 0 ? titles.find(Boolean) ?? `${message("object")} ${String(id)}` : message("point");
   const rows: Row[] = [];
   const add = (key: MessageKey, value: string): unknown => value !== "" && rows.push([message(key), value]);
   add("use", [text("function"), text("usage")].find((each) => each !== "" && each !== title) ?? "");
@@ -67,8 +68,10 @@ export function describe({ id, name, class: type = "", attributes = {}, position
   if (position) add("height", `${format(position[2], 2)} m${units.vertical ? ` (${units.vertical})` : ""}`);
   const separator = format(0.5).includes(",") ? "; " : ", ";
   if (lonLat) add("coordinates", lonLat.map((part) => `${format(part, 5)}°`).reverse().join(separator));
+  const place: Row[] = position ? [[message("position"), position.slice(0, 2).map((part) => format(part, 2)).join(separator)]] : [];
+  if (isGround) rows.push(...place);
   const details: Row[] = [
-    ...(position ? [[message("position"), position.slice(0, 2).map((part) => format(part, 2)).join(separator)] as const] : []),
+    ...(isGround ? [] : place),
     ...(id > 0 ? [["id", String(id)] as const] : []),
     ...(name !== undefined && name !== title ? [["gml:id", name] as const] : []),
     ...Object.entries(attributes).map(([key, value]) => [key, formatValue(value)] as const).filter(([, value]) => value !== ""),

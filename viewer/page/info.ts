@@ -20,6 +20,11 @@ export class InfoPanel {
     });
   }
 
+  /** Its place on the screen, CSS pixels. */
+  get bounds(): DOMRect {
+    return this.#box.getBoundingClientRect();
+  }
+
   close(): void {
     this.#box.hidden = true;
     this.#onClose();

@@ -1,6 +1,9 @@
-import { chooseUtcOffset, type imageLayer, type Light, type map, type Rendering } from "./map3d.mjs";
+import { chooseUtcOffset, computeDaylight, type imageLayer, type Light, type map, type Rendering } from "./map3d.mjs";
 import { findFirstSun } from "../src/geo/firstSun";
+import { findDay } from "./day";
 import { byId, inputById } from "./dom";
+import { message } from "./i18n";
+import { bindPlay } from "./playSun";
 
 /** Hour of the first picture: long light, and one side of most buildings in the sun. */
 export const FIRST_HOUR = 8;
@@ -19,10 +22,11 @@ export function bindLight(view: map, layer: imageLayer, first?: Date): void {
   if (rendering.json.geographic) bindDay(view, rendering, first);
   else time.addEventListener("input", () => { showClock(time.valueAsNumber); view.setLight(lightAt(time.valueAsNumber)); });
   bindShadows(view, rendering);
+  bindPlay(time);
   byId("modes").addEventListener("change", () => {
     const off = layer.mode !== "lit";
     sun.toggleAttribute("data-off", off);
-    time.disabled = off;
+    time.disabled = (byId("play") as HTMLButtonElement).disabled = off;
   });
 }
 
@@ -35,24 +39,41 @@ function bindDay(view: map, rendering: Rendering, requested: Date | undefined): 
     showClock(time.valueAsNumber);
     view.setTime(moment(time.valueAsNumber));
   };
-  [time.min, time.max, time.step] = ["0", "24", String(1 / 12)];
+  const setDay = (hour: number): void => {
+    if (day.value !== "") showDay(time, rendering, moment);
+    time.valueAsNumber = hour;
+    show();
+  };
   byId("days").hidden = day.hidden = false;
   const first = requested ?? firstMoment(rendering);
   day.value = first.toISOString().slice(0, 10);
   // The local date there can be the day before or after.
   const local = new Date(first.getTime() + zone() * 3_600_000);
   day.value = local.toISOString().slice(0, 10);
-  time.valueAsNumber = local.getUTCHours() + local.getUTCMinutes() / 60;
   let dragged = false;
   time.addEventListener("pointerdown", () => { dragged = true; });
   time.addEventListener("keydown", () => { dragged = false; });
-  // Dragging moves in steps of 15 minutes, keys in steps of 5 minutes.
-  time.addEventListener("input", () => {
-    if (dragged) time.valueAsNumber = Math.round(4 * time.valueAsNumber) / 4;
+  // Dragging moves in steps of 15 minutes, keys and playing in steps of 5 minutes.
+  time.addEventListener("input", ({ isTrusted }) => {
+    if (dragged && isTrusted) time.valueAsNumber = Math.round(4 * time.valueAsNumber) / 4;
     show();
   });
-  day.addEventListener("input", show);
-  show();
+  day.addEventListener("input", () => { setDay(time.valueAsNumber); });
+  setDay(local.getUTCHours() + local.getUTCMinutes() / 60);
+}
+
+/** Makes the slider last from dawn to dusk, and marks sunrise and sunset. */
+function showDay(time: HTMLInputElement, { json: { geographic } }: Rendering, moment: (hour: number) => Date): void {
+  if (!geographic) return;
+  const { dawn, dusk, ...sun } = findDay((hour) => computeDaylight(moment(hour), geographic).altitude_deg);
+  [time.min, time.max, time.step] = [dawn, dusk, 1 / 12].map(String) as [string, string, string];
+  byId("daylight").classList.toggle("located", sun.sunrise !== null && sun.sunset !== null);
+  for (const name of ["sunrise", "sunset"] as const) {
+    const hour = sun[name];
+    byId(name).hidden = hour === null;
+    byId(name).title = `${message(name)}: ${clockOf(hour ?? 0)}`;
+    byId("daylight").style.setProperty(name === "sunrise" ? "--rise" : "--set", String(((hour ?? 0) - dawn) / (dusk - dawn)));
+  }
 }
 
 /** A morning for which the rendering has shadows; a summer morning if it has none. */

@@ -5,6 +5,9 @@ import { findWhole } from "./whole";
 import { report } from "./toast";
 import { readPermalink, type Permalink } from "./permalink";
 
+/** Least distance of the selection from the card, CSS pixels. */
+const CLEAR_PX = 40;
+
 /** The selected object: highlighted, described in the info panel and kept in the permalink. The back button returns to the previous selection. */
 export class Selection {
   readonly #view: map;
@@ -12,7 +15,7 @@ export class Selection {
   readonly #info: InfoPanel;
   readonly #permalink: Permalink;
   #clicks = 0;
-  /** The marker of the search result that is selected. */
+  /** The marker of the search result that is selected, or of a spot on the ground. */
   #pin: marker | undefined;
 
   constructor(view: map, layer: imageLayer, info: InfoPanel, permalink: Permalink) {
@@ -80,8 +83,21 @@ export class Selection {
       this.#info.close();
       return "";
     }
-    if (event.id > 0 && !NOT_HIGHLIGHTED.has(event.class ?? "")) this.#layer.highlight(event.id);
-    return this.#info.show(event, event.id > 0 && !NOT_HIGHLIGHTED.has(event.class ?? "") ? this.#showBack(event) : undefined);
+    const isObject = event.id > 0 && !NOT_HIGHLIGHTED.has(event.class ?? "");
+    if (isObject) this.#layer.highlight(event.id);
+    const title = this.#info.show(event, isObject ? this.#showBack(event) : undefined);
+    if (!isObject && event.position) this.#pin = new marker(title, event.position, { showLabel: false }).addTo(this.#view);
+    if (event.position) this.#moveClear(event.position);
+    return title;
+  }
+
+  /** Moves the map until a position is clear of the card: upwards on a phone, whose card is at the bottom, else to the left. */
+  #moveClear(position: Vec3): void {
+    const at = this.#view.project(position);
+    const { left, top, bottom } = this.#info.bounds;
+    if (!at || at[0] < left - CLEAR_PX || at[1] > bottom + CLEAR_PX || at[1] < top - CLEAR_PX) return;
+    if (left > 0) this.#view.panBy(left - CLEAR_PX - at[0], 0, { smooth: true });
+    else this.#view.panBy(0, top - CLEAR_PX - at[1], { smooth: true });
   }
 
   /** Returns an action that shows the object from behind; undefined when no view has the opposite direction. */

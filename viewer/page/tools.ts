@@ -1,46 +1,93 @@
 import type { map } from "./map3d.mjs";
 import type { measure } from "./map3d-measure.mjs";
-import { byId } from "./dom";
+import { byId, withText } from "./dom";
 import { toast } from "./toast";
 import { message } from "./i18n";
 
-const HINTS = { line: "lineHint", area: "areaHint", profile: "profileHint" } as const;
+const HINTS = { line: ["lineHint", "lineTapHint"], height: ["heightHint", "heightTapHint"], area: ["areaHint", "areaTapHint"], profile: ["profileHint", "profileTapHint"] } as const;
 type Kind = keyof typeof HINTS;
 
-/** Measuring tools, one active at a time. A second press on its button closes the active tool. */
+/** True on devices that are used with fingers. */
+const isTouched = (): boolean => matchMedia("(pointer: coarse)").matches;
+
+/** The measuring tool: a button that opens it, the kinds, the results, and buttons that add a point, undo, clear and finish. */
 export class Tools {
   readonly #view: map;
   readonly #buttons: ReadonlyMap<Kind, HTMLElement>;
   #tool: measure | undefined;
   #kind: Kind | null = null;
+  /** The kind that is chosen first. */
+  #last: Kind = "line";
 
   constructor(view: map) {
     this.#view = view;
     this.#buttons = new Map((Object.keys(HINTS) as Kind[]).map((kind) => [kind, byId(`measure-${kind}`)]));
-    for (const [kind, button] of this.#buttons) {
-      button.addEventListener("click", () => void this.#activate(this.#kind === kind ? null : kind));
-      button.hidden = false;
-    }
+    for (const [kind, button] of this.#buttons) button.addEventListener("click", () => void this.#activate(kind));
+    byId("measure").hidden = false;
+    const actions = { measure: () => void this.#activate(this.#last), "measure-add": () => { this.#addPoint(); }, "measure-undo": () => this.#tool?.undo(), "measure-clear": () => this.#tool?.clear(), "measure-finish": () => { this.#finish(); } };
+    for (const [id, act] of Object.entries(actions)) byId(id).addEventListener("click", act);
+    // Before the tool's own listener, which would only clear the points.
+    addEventListener("keydown", (event) => {
+      if (event.key !== "Escape" || !this.active || document.querySelector("dialog[open]")) return;
+      event.stopPropagation();
+      this.#finish();
+    }, true);
   }
 
-  /** True while clicks on the map belong to a tool. */
+  /** True while clicks on the map belong to the tool. */
   get active(): boolean {
     return this.#kind !== null;
   }
 
   async #activate(kind: Kind | null): Promise<void> {
+    if (kind !== null && kind === this.#kind) return;
     this.#kind = kind;
     this.#tool?.remove();
     this.#tool = undefined;
-    for (const [buttonKind, button] of this.#buttons) button.setAttribute("aria-pressed", String(buttonKind === kind));
-    byId("hint").hidden = kind === null;
+    this.#show();
     if (kind === null) return;
-    byId("hint").textContent = message(HINTS[kind]);
+    this.#last = kind;
     try {
       const entry = await import("./map3d-measure.mjs");
-      if (this.#kind === kind) this.#tool = new entry.measure({ kind }).addTo(this.#view);
+      if (this.#kind !== kind) return;
+      const showResults = (): void => { this.#showResults(); };
+      this.#tool = new entry.measure({ kind }).on("change", showResults).on("face", showResults).on("profile", showResults).addTo(this.#view);
     } catch (reason) {
       toast(`${message("toolFailed")}: ${String(reason)}`);
     }
+  }
+
+  #finish(): void {
+    void this.#activate(null);
+    byId("measure").focus();
+  }
+
+  /** Adds the point under the cross in the middle of the map. */
+  #addPoint(): void {
+    const { clientWidth, clientHeight } = this.#view.container;
+    this.#view.tap([clientWidth / 2, clientHeight / 2]);
+  }
+
+  #show(): void {
+    const kind = this.#kind;
+    byId("measuring").hidden = kind === null;
+    byId("measure").setAttribute("aria-expanded", String(kind !== null));
+    document.body.classList.toggle("measures", kind !== null);
+    for (const [buttonKind, button] of this.#buttons) button.setAttribute("aria-pressed", String(buttonKind === kind));
+    if (kind !== null) byId("hint").textContent = message(HINTS[kind][isTouched() ? 1 : 0]);
+    this.#showResults();
+  }
+
+  /** Shows the results in place of the hint, as soon as there are any. */
+  #showResults(): void {
+    const results = this.#tool?.results ?? [];
+    byId("measured").replaceChildren(...results.map(([name, value]) => {
+      const row = document.createElement("div");
+      row.append(withText("dt", name), withText("dd", value));
+      return row;
+    }));
+    byId("measured").hidden = results.length === 0;
+    byId("hint").hidden = results.length > 0;
+    for (const id of ["measure-undo", "measure-clear"]) (byId(id) as HTMLButtonElement).disabled = (this.#tool?.corners.length ?? 0) === 0;
   }
 }

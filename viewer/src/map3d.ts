@@ -32,7 +32,7 @@ export type { TileData } from "./tiles/tileData";
 export { Archive, type ReadRange } from "./tiles/pmtiles";
 export type { FetchFunction } from "./tiles/fetch";
 export type { Attribute, AttributeInfo, AttributeValue, ColumnSummary, ObjectInfo, SearchEntry } from "./tiles/objects";
-export { chooseUtcOffset } from "./geo/daylight";
+export { chooseUtcOffset, computeDaylight } from "./geo/daylight";
 
 /** Version of the viewer, which reads manifests of version 1. */
 export const version = "0.1.0";

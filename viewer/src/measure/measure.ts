@@ -11,8 +11,8 @@ import { STYLES } from "./styles";
 import { MeasureMessages } from "./i18n";
 
 export interface MeasureOptions {
-  /** "line" measures a polyline, "area" a face (one corner) or a polygon, "profile" the heights along a line. Default "line". */
-  kind?: "line" | "area" | "profile";
+  /** "line" measures a polyline, "height" the height difference of two points, "area" a face (one corner) or a polygon, "profile" the heights along a line. Default "line". */
+  kind?: "line" | "height" | "area" | "profile";
   /** BCP 47 tag for numbers. Default: the map's. */
   language?: string;
 }
@@ -79,6 +79,17 @@ export class measure extends MapLayer<map, MeasureEvents> {
     return this.#face;
   }
 
+  /** What is measured, as labels and values in the user's language; empty until there are enough corners. */
+  get results(): readonly (readonly [label: string, value: string])[] {
+    const { options: { kind }, line, area } = this;
+    const count = this.#corners.length;
+    if (kind === "profile") return this.#profile ? this.#messages.describeProfile(line.horizontal_m, this.#profile.heights_m, this.#profile.approximate) : [];
+    const prefix = this.#prefix();
+    if (kind !== "area") return count < 2 ? [] : this.#messages.describeLine(line, kind === "height", prefix);
+    if (this.#face) return this.#messages.describeArea(this.#face, `${this.#face.approximate ? "≈ " : prefix}${this.#face.hidden ? "≥ " : ""}`);
+    return count < 3 ? [] : this.#messages.describeArea(area, prefix);
+  }
+
   /** Replaces all corners. */
   setCorners(corners: readonly Corner[]): this {
     [this.#corners, this.#face] = [corners, null];
@@ -120,7 +131,9 @@ export class measure extends MapLayer<map, MeasureEvents> {
   }
 
   readonly #onClick = ({ position, approximate }: ClickEvent): void => {
-    if (position) this.setCorners([...this.#corners, { position, approximate }]);
+    if (!position) return;
+    const kept = this.options.kind === "height" && this.#corners.length > 1 ? [] : this.#corners;
+    this.setCorners([...kept, { position, approximate }]);
   };
 
   readonly #onKeyDown = ({ key }: KeyboardEvent): void => {
@@ -195,7 +208,11 @@ export class measure extends MapLayer<map, MeasureEvents> {
 
   #draw(): void {
     const points = this.#points();
-    this.#overlay.set(points, this.options.kind === "area", this.options.kind === "area" ? this.#areaLabels(points) : this.#lineLabels(points));
+    const { kind } = this.options;
+    this.#overlay.set(points, kind === "area", kind === "area" ? this.#areaLabels(points) : this.#lineLabels(points));
+    const [from, to] = points;
+    // A plumb line from the lower point, then a level line.
+    if (kind === "height" && from && to) this.#overlay.setCourse(from[2] < to[2] ? [from, [from[0], from[1], to[2]], to] : [to, [to[0], to[1], from[2]], from]);
     if (this.#face) this.#overlay.setCourse(this.#face.outline.flatMap((loop) => [...loop, loop[0] as Vec3, null]));
     this.#updateOverlay();
   }
@@ -205,7 +222,8 @@ export class measure extends MapLayer<map, MeasureEvents> {
     if (!last || points.length < 2) return [];
     const { length_m, rise_m, steps_m } = this.line;
     const steps = steps_m.length < 2 ? [] : steps_m.map((step, k) => ({ at: mix(points[k] as Vec3, points[k + 1] as Vec3), text: this.#messages.length(step), main: false }));
-    return [...steps, { at: last, text: `${this.#prefix()}${this.#messages.length(length_m)}  ${this.#messages.rise(rise_m)}`, main: true }];
+    const length = this.options.kind === "height" ? "" : `${this.#messages.length(length_m)}  `;
+    return [...steps, { at: last, text: `${this.#prefix()}${length}${this.#messages.rise(rise_m)}`, main: true }];
   }
 
   #areaLabels(points: readonly Vec3[]): MeasureLabel[] {

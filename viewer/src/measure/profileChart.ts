@@ -28,7 +28,7 @@ export class ProfileChart {
     this.#svg.setAttribute("viewBox", `0 0 ${String(WIDTH)} ${String(HEIGHT)}`);
     this.#svg.setAttribute("preserveAspectRatio", "none");
     this.#svg.setAttribute("aria-hidden", "true");
-    const field = element("div", "map3d-profile-field", {}, this.#svg, this.#heights, this.#cursor);
+    const field = element("div", "map3d-profile-field", {}, element("div", "map3d-profile-plot", {}, this.#svg, this.#cursor), this.#heights);
     this.box.append(field, this.#readout);
     this.box.addEventListener("pointermove", ({ clientX }) => { this.#moveTo(clientX); });
     this.box.addEventListener("pointerdown", ({ clientX }) => { this.#moveTo(clientX); });

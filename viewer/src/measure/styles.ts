@@ -12,14 +12,15 @@ export const STYLES = `
 .map3d-measure span[hidden] { display: none; }
 .map3d-profile { position: absolute; left: 50%; bottom: max(12px, env(safe-area-inset-bottom)); transform: translateX(-50%); width: min(440px, 100% - 24px); box-sizing: border-box; padding: 10px 12px 8px; border-radius: 14px; background: var(--map3d-panel); color: var(--map3d-ink); box-shadow: var(--map3d-shadow); pointer-events: auto; touch-action: none; cursor: crosshair; z-index: 2; }
 .map3d-profile:focus-visible { outline: 2px solid var(--map3d-accent); outline-offset: 2px; }
-.map3d-profile-field { position: relative; height: 96px; }
+.map3d-profile-field { position: relative; height: 96px; margin-top: 4px; }
+.map3d-profile-plot { position: absolute; inset: 0 50px 0 0; }
 .map3d-profile svg { position: absolute; inset: 0; width: 100%; height: 100%; overflow: visible; }
 .map3d-profile path { fill: none; vector-effect: non-scaling-stroke; }
 .map3d-profile-line { stroke: var(--map3d-accent); stroke-width: 2; stroke-linejoin: round; }
 .map3d-profile path.map3d-profile-fill { fill: var(--map3d-accent); fill-opacity: 0.16; }
 .map3d-profile-grid { stroke: var(--map3d-faint); stroke-opacity: 0.3; stroke-width: 1; stroke-dasharray: 2 3; }
-.map3d-profile-heights span { position: absolute; right: 0; transform: translateY(-100%); font-size: 11px; font-variant-numeric: tabular-nums; color: var(--map3d-faint); pointer-events: none; }
+.map3d-profile-heights span { position: absolute; right: 0; transform: translateY(-50%); font-size: 11px; font-variant-numeric: tabular-nums; color: var(--map3d-faint); pointer-events: none; }
 .map3d-profile-cursor { position: absolute; top: 0; bottom: 0; width: 0; border-left: 1.5px solid var(--map3d-ink); pointer-events: none; }
-.map3d-profile-readout { margin-top: 4px; font-size: 13px; font-weight: 600; white-space: pre; font-variant-numeric: tabular-nums; overflow: hidden; text-overflow: ellipsis; }
+.map3d-profile-readout { margin-top: 4px; font-size: 13px; font-weight: 600; white-space: pre-wrap; font-variant-numeric: tabular-nums; }
 @media (forced-colors: active) { .map3d-measure path, .map3d-measure circle { forced-color-adjust: none; } .map3d-measure span { border: 1px solid CanvasText; } }
 `;

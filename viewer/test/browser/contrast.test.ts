@@ -16,9 +16,10 @@ test.each([
   await page.goto(`${bed.server.origin}/?rendering=${bed.url("town")}`);
   await page.waitForFunction(() => location.hash.length > 5);
   await page.waitForSelector(".map3d-overview-map", { state: "attached" });
-  await page.locator("#measure-line").focus();
+  await page.locator("#measure").focus();
   await page.keyboard.press("Enter");
   await page.waitForSelector(".map3d-measure", { state: "attached" });
+  await page.locator("#measure-height").focus();
   await page.keyboard.press("Tab");
   await page.waitForTimeout(1500);
   await page.screenshot({ path: `${OUT}/${name}.png` });

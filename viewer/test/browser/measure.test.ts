@@ -16,7 +16,7 @@ type Measuring = Global & { map3d: typeof Measure; tool: Measure.measure };
 const APART_MS = 600;
 const PIXEL_M = 0.38;
 
-async function measuring(kind: "line" | "area" | "profile"): Promise<{ page: Page; problems: string[] }> {
+async function measuring(kind: "line" | "height" | "area" | "profile"): Promise<{ page: Page; problems: string[] }> {
   const opened = await bed.start("town");
   await opened.page.addScriptTag({ url: "/map3d-measure.js" });
   await opened.page.evaluate((chosen) => {
@@ -55,6 +55,19 @@ test("a line from roof to roof has the length of the model, exact at every zoom,
   await page.evaluate(() => { (globalThis as Global).map.panBy(50, 0); });
   await page.waitForTimeout(300);
   expect(await dot() - before).toBeCloseTo(50, 0);
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
+
+test("a height is the difference of two points; a third click starts anew", async () => {
+  const { page, problems } = await measuring("height");
+  await clickAll(page, [[-45, -30, 0], [-45, -4, 34]]);
+  expect(await labels(page)).toEqual([expect.stringMatching(/^↑ 3[34]\.\d\d m$/)]);
+  const results = (): Promise<(readonly [string, string])[]> => page.evaluate(() => [...(globalThis as unknown as Measuring).tool.results]);
+  expect((await results()).map(([label]) => label)).toEqual(["Height difference", "Horizontal"]);
+  expect(Math.abs(parseFloat((await results())[0]?.[1].slice(2) ?? "") - 34)).toBeLessThan(PIXEL_M);
+  await clickAll(page, [[32, -32, 16]]);
+  expect(await results()).toEqual([]);
   expect(problems).toEqual([]);
   await page.context().close();
 });

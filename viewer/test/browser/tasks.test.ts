@@ -91,7 +91,7 @@ test("find an address", async () => {
 test("the height of a roof above the ground", async () => {
   const opened = await open();
   const { page, hand } = opened;
-  await hand.tap("#measure-line");
+  await hand.tap("#measure");
   await hand.tap(placeOf(page, [-45, -30, 0]));
   await hand.tap(placeOf(page, [-45, -4, 34]));
   const [, rise = ""] = (await measured(page)).split("↑");
@@ -102,6 +102,7 @@ test("the height of a roof above the ground", async () => {
 test("the area of a facade", async () => {
   const opened = await open();
   const { page, hand } = opened;
+  await hand.tap("#measure");
   await hand.tap("#measure-area");
   await hand.tap(placeOf(page, [31, -46, 8]));
   const text = await measured(page);
@@ -235,7 +236,8 @@ test("see the shadow at 17:00", async () => {
   expect(await page.locator("#clock").textContent()).toBe("12:00");
   const { x, y, width, height } = (await slider.boundingBox()) as { x: number; y: number; width: number; height: number };
   const THUMB_PX = 22;
-  const at = (hour: number): Vec2 => [x + THUMB_PX / 2 + ((width - THUMB_PX) * hour) / 24, y + height / 2];
+  const [dawn, dusk] = await slider.evaluate((input) => [Number((input as HTMLInputElement).min), Number((input as HTMLInputElement).max)] as const);
+  const at = (hour: number): Vec2 => [x + THUMB_PX / 2 + ((width - THUMB_PX) * (hour - dawn)) / (dusk - dawn), y + height / 2];
   await hand.drag(at(12), at(17));
   expect(await page.locator("#clock").textContent()).toBe("17:00");
   await page.waitForFunction(() => location.hash.includes("/t=2026-06-21T15:00Z"));

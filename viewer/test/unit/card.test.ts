@@ -34,7 +34,13 @@ group("a card", () => {
   test("of a point on nothing has its place alone", () => {
     const made = card({ id: 0, approximate: true });
     expect([made.title, made.note]).toEqual(["Point", "approximate"]);
-    expect(made.details).toEqual([["Position", "691032.13, 5336026.00"]]);
+    expect(rows(made)).toEqual({ Elevation: "562.50 m (DHHN2016)", Coordinates: "48.14046°, 11.57012°", Position: "691032.13, 5336026.00" });
+    expect(made.details).toEqual([]);
+  });
+
+  test("of the ground says where the spot is, without unfolding anything", () => {
+    expect(card({ id: 3, name: "terrain-2-1", class: "terrain" }).title).toBe("Ground");
+    expect(rows(card({ id: 3, class: "terrain" }))).toEqual({ Elevation: "562.50 m (DHHN2016)", Coordinates: "48.14046°, 11.57012°", Position: "691032.13, 5336026.00" });
   });
 
   test("without a position has no coordinates", () => {
