@@ -7,6 +7,7 @@ import { InfoPanel } from "./info";
 import { bindLight, FIRST_HOUR, lightAt, showShadowSwitch } from "./light";
 import { Tools } from "./tools";
 import { bindLoading } from "./loading";
+import { Haze } from "./haze";
 import { bindModes } from "./modes";
 import { bindSearch } from "./search";
 import { bindOffline } from "./offline";
@@ -75,6 +76,8 @@ function open(): void {
       if (id !== undefined) void selection.selectId(id, null, false);
     }, (reason: unknown) => { report(reason); });
     if (layer.rendering?.layers.has("depth")) tools = new Tools(view);
+    // Epochs can end elsewhere.
+    if (otherEpochs(urls[0] ?? ".").length === 0) new Haze(view, layer);
   });
   layer.addTo(view);
   bindLoading(view);

@@ -59,7 +59,7 @@ test("a line from roof to roof has the length of the model, exact at every zoom,
   await page.context().close();
 });
 
-test("a height is the difference of two points; a third click starts anew", async () => {
+test("a height is the difference of two points; a third click starts again", async () => {
   const { page, problems } = await measuring("height");
   await clickAll(page, [[-45, -30, 0], [-45, -4, 34]]);
   expect(await labels(page)).toEqual([expect.stringMatching(/^↑ 3[34]\.\d\d m$/)]);
