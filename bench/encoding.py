@@ -45,6 +45,7 @@ def measure(buildings: int = 300, res_m: float = 0.2, count: int = 48, rounds: i
     scene = _core.Scene(str(folder), 1 << 30)
     buffers = [scene.gbuffer(frame, *tile) for tile in choose_tiles(scene, frame, count)]
     rows = [row for layer in ("color", *DATA) for row in measure_layer(layer, buffers, rounds)]
+    rows += measure_data_tiles(buffers, rounds)
     _print(rows, len(buffers))
     return [asdict(row) for row in rows]
 
@@ -64,6 +65,32 @@ def measure_layer(layer: str, buffers: list[dict[str, NDArray[Any]]], rounds: in
             EncodingRow(layer, name, float(np.mean([len(data) for data in done])), 1000 * spent[name] / len(done), quality and float(quality))
         )
     return rows
+
+
+def measure_data_tiles(buffers: list[dict[str, NDArray[Any]]], rounds: int) -> list[EncodingRow]:
+    """Measures normal, id and depth together: as one data tile, and as three PNGs."""
+
+    def data_tile(number: int, small: bool = False) -> bytes:
+        return _core.encode_data_tile(*(buffers[number][layer] for layer in DATA), small)
+
+    def pngs(number: int) -> bytes:
+        return b"".join(_core.encode_layer(layer, "png", buffers[number][layer]) for layer in DATA)
+
+    tiles = [data_tile(number) for number in range(len(buffers))]
+
+    def decode(number: int) -> bytes:
+        _core.decode_data_tile(tiles[number])
+        return tiles[number]
+
+    works: dict[str, Encode] = {
+        "core data tile": data_tile,
+        "core data tile, small": lambda number: data_tile(number, small=True),
+        "core, three PNGs": pngs,
+        "core data tile, decoding": decode,
+    }
+    spent = {name: min(times) for name, times in _time_encoders(works, range(len(buffers)), rounds).items()}
+    sizes = {name: float(np.mean([len(work(number)) for number in range(len(buffers))])) for name, work in works.items()}
+    return [EncodingRow("normal, id, depth", name, sizes[name], 1000 * spent[name] / len(buffers), None) for name in works]
 
 
 def _time_encoders(encoders: dict[str, Encode], numbers: range, rounds: int) -> dict[str, list[float]]:

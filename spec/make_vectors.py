@@ -3,7 +3,11 @@
 import base64
 import json
 import math
+import random
+import struct
 from pathlib import Path
+
+import data_tile
 
 HERE = Path(__file__).parent / "vectors"
 EXACT = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)}
@@ -165,6 +169,122 @@ def data_vectors():
     }
 
 
+def slanted(width, height, faces, right, down):
+    """Columns of `faces` objects in turn, each on a plane of its own; the last one has no surface."""
+    tile = {"width": width, "height": height, "normal": [], "id": [], "depth": []}
+    for y in range(height):
+        for x in range(width):
+            k = x * faces // width
+            is_empty = k == faces - 1
+            tile["normal"].append(0 if is_empty else (0x80FF80, 0x8080FF)[k % 2])
+            tile["id"].append(0 if is_empty else 1000 + k // 2)
+            tile["depth"].append(0xFFFFFFFF if is_empty else 70000 * (k + 1) + (right * x + down * y) // 7)
+    return tile
+
+
+def noisy(width, height, seed, limit):
+    """Random pixels with ids below 3 and depths below `limit`; some have no depth."""
+    draw = random.Random(seed)
+    count = width * height
+    depths = [draw.choice((0xFFFFFFFF, draw.randrange(limit))) for _ in range(count)]
+    return {
+        "width": width,
+        "height": height,
+        "normal": [draw.choice((0, 0xFF8080, 0xFFFFFF)) for _ in range(count)],
+        "id": [draw.choice((0, 1, 0xFFFFFFFF)) for _ in range(count)],
+        "depth": depths,
+    }
+
+
+def filled(width, height, normal, id_, depth):
+    values = {"normal": normal, "id": id_, "depth": depth}
+    return {"width": width, "height": height, **{key: [value] * (width * height) for key, value in values.items()}}
+
+
+def data_tile_vectors():
+    """Tiles with their pixels, and bytes that readers refuse."""
+    bumpy = slanted(20, 12, 3, -90, 333)
+    bumpy["depth"] = [depth if depth == 0xFFFFFFFF else depth + k * k % 5 for k, depth in enumerate(bumpy["depth"])]
+    tiles = {
+        "one pixel": data_tile.encode(filled(1, 1, 0x8080FF, 7, 123456)),
+        "nothing": data_tile.encode(filled(5, 3, 0, 0, 0xFFFFFFFF)),
+        "planes": data_tile.encode(slanted(33, 9, 6, 700, -55)),
+        "planes without slopes": data_tile.encode(slanted(8, 9, 3, 30, 2), flat=True),
+        "bumps on planes": data_tile.encode(bumpy),
+        "bumps, rough": data_tile.encode(bumpy, rough=True),
+        "noise": data_tile.encode(noisy(11, 7, 1, 0xFFFFFFFF)),
+        "small noise, rough": data_tile.encode(noisy(9, 9, 2, 300), rough=True, flat=True),
+        "long runs": data_tile.encode(slanted(700, 2, 2, 70, 9)),
+        "largest numbers": data_tile.encode(filled(3, 2, 0xFFFFFF, 0xFFFFFFFF, 0xFFFFFFFE)),
+    }
+    rows = [{"name": name, "base64": text64(data), **data_tile.decode(data)} for name, data in tiles.items()]
+    return {"tiles": rows, "refused": [{"why": why, "base64": text64(data)} for why, data in refused_data_tiles(tiles).items()]}
+
+
+def refused_data_tiles(tiles):
+    """Bytes that break one rule of spec/data-tile.md each."""
+    one, planes = tiles["one pixel"], tiles["planes"]
+
+    def tile(codes, lengths=(), labels=1, shapes=(1,), starts=(2 << 14,), fours=b"", residuals=0, rest=b"", width=2, height=1):
+        label_columns = bytes(4 * labels) + bytes(3 * labels) + bytes(shapes)
+        body = bytes(codes) + data_tile.column(lengths, 2) + label_columns + data_tile.column(starts, 6) + fours + rest
+        return data_tile.pack(width, height, body, len(codes), labels, residuals)
+
+    data_tile.decode(tile([6], [4]))
+    data_tile.decode(tile([6, 0], [4], height=2))
+    rows = {
+        "no bytes": b"",
+        "half a header": one[:20],
+        "another magic": b"N" + one[1:],
+        "version 2": one[:3] + b"\x02" + one[4:],
+        "no width": one[:4] + b"\0\0" + one[6:],
+        "too high": one[:6] + struct.pack("<H", 1025) + one[8:],
+        "a body too large": one[:8] + struct.pack("<I", 32) + one[12:],
+        "more runs than pixels": one[:12] + struct.pack("<I", 2) + one[16:],
+        "no labels": one[:16] + struct.pack("<I", 0) + one[20:],
+        "more residuals than pixels": one[:20] + struct.pack("<I", 2) + one[24:],
+        "no stream": one[:24],
+        "a truncated stream": planes[:-9],
+        "a wrong checksum": planes[:-1] + bytes([planes[-1] ^ 1]),
+        "a body longer than the header says": one[:8] + struct.pack("<I", struct.unpack("<I", one[8:12])[0] - 1) + one[12:],
+        "a body shorter than the header says": one[:8] + struct.pack("<I", struct.unpack("<I", one[8:12])[0] + 1) + one[12:],
+        "an unknown bit in a code": tile([22], [4]),
+        "source 3": tile([7], [4]),
+        "no run above": tile([0]),
+        "no second run above": tile([6, 1], [4], height=2),
+        "a run without pixels": tile([6, 6], [0, 4], 2, (1, 1), (0, 0)),
+        "a run before its start": tile([6], [3]),
+        "a run beyond its row": tile([6], [6]),
+        "too few runs": tile([6], [2]),
+        "too many runs": tile([6, 6], [4, 4], 2, (1, 1), (0, 0)),
+        "too few labels": tile([6, 6], [2, 2]),
+        "too many labels": tile([6, 0], [4], 2, (1, 1), (0, 0), height=2),
+        "an unknown shape": tile([6], [4], shapes=(9,)),
+        "rough without depths": tile([6], [4], shapes=(4,)),
+        "no slopes to share": tile([6], [4], shapes=(3,)),
+        "a start below 0": tile([6], [4], starts=(1,)),
+        "a start too large": tile([6], [4], starts=(1 << 47,)),
+        "residuals without depths": tile([14], [4], shapes=(0,), starts=(), fours=b"\x11", residuals=2),
+        "too few residuals": tile([14], [4], fours=b"\x01", residuals=1),
+        "too many residuals": tile([6], [4], fours=b"\x01", residuals=1),
+        "four bits too many": tile([14, 6], [2, 2], 2, (1, 1), (0, 0), fours=b"\x11", residuals=1),
+        "bytes too many": tile([6], [4], rest=b"\0"),
+        "a residual without its byte": tile([14], [4], fours=b"\x1f", residuals=2),
+        "a residual without its four bytes": tile([14], [4], fours=b"\x1f", residuals=2, rest=b"\xff\0\0\0"),
+    }
+    for why, data in rows.items():
+        try:
+            data_tile.decode(data)
+        except ValueError:
+            continue
+        raise AssertionError(f"the reference reads a tile with {why}")
+    return rows
+
+
+def text64(data):
+    return base64.b64encode(data).decode()
+
+
 def depth_key(bits):
     return bits[3]
 
@@ -289,7 +409,7 @@ def cameras_vectors():
 
 
 def write(name, value):
-    text = json.dumps(value, indent=1)
+    text = json.dumps(value, indent=None if name == "data-tiles" else 1)
     (HERE / f"{name}.json").write_text(text + "\n")
 
 
@@ -302,6 +422,7 @@ def main():
         "tiles": tiles_vectors(),
         "occupancy": occupancy_vectors(),
         "data": data_vectors(),
+        "data-tiles": data_tile_vectors(),
         "parents": parent_vectors(),
         "blocks": blocks_vectors(),
         "geographic": geographic_vectors(),

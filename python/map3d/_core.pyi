@@ -366,5 +366,11 @@ def encode_bits(bits: NDArray[np.bool_]) -> bytes:
 def decode_png(data: bytes) -> NDArray[np.uint8]:
     """Decodes an 8-bit PNG into (H, W, C)."""
 
+def encode_data_tile(normal: NDArray[np.int16], id: NDArray[np.uint32], depth: NDArray[np.uint32], small: bool = False) -> bytes:
+    """Encodes normal (H, W, 3), id and depth (H, W) of a G-buffer as one data tile (spec/data-tile.md); `small` trades time for fewer bytes."""
+
+def decode_data_tile(data: bytes) -> dict[str, NDArray[Any]]:
+    """Decodes a data tile into normal (H, W, 3) uint8, id and depth (H, W) uint32. Raises FormatError for everything that readers refuse."""
+
 def texture_level(path: str, level: int) -> NDArray[np.uint8]:
     """Decodes a level of a .m3t file into (H, W, 4), sRGB with straight alpha, unused texels filled."""

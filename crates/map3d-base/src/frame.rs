@@ -20,6 +20,8 @@ pub enum LayerKind {
     Ao,
     Depth2,
     Picture,
+    /// Normal, id and depth in one tile.
+    Data,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -28,6 +30,8 @@ pub enum LayerFormat {
     Webp,
     Png,
     Jpeg,
+    /// The data tile (spec/data-tile.md).
+    M3d,
 }
 
 /// How a layer is made and sent (spec/pyramid.md §6, §10).
@@ -70,6 +74,9 @@ impl LayerSpec {
 
     fn validate(&self) -> Result<()> {
         let kind = self.kind;
+        if (kind == LayerKind::Data) != (self.format == LayerFormat::M3d) {
+            return Err(Error::argument(format!("layer {kind:?}: its format is {:?}; M3d is the format of Data, and of no other kind", self.format)));
+        }
         let expected = match kind {
             LayerKind::Sun | LayerKind::Picture => 1..=1,
             LayerKind::Sun16 => 1..=MAX_SUNS,

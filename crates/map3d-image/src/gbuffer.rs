@@ -19,9 +19,12 @@ impl Arrays {
         if layers.is_empty() { Self::STANDARD } else { layers.iter().fold(Self::LEAST, |all, l| all.and(l.kind)) }
     }
 
-    /// Adds one array.
+    /// Adds the arrays of a kind of layer.
     pub const fn and(self, kind: LayerKind) -> Self {
-        Self(self.0 | 1 << kind as u32)
+        match kind {
+            LayerKind::Data => Self(self.0 | Self::LEAST.0 | 1 << LayerKind::Normal as u32),
+            _ => Self(self.0 | 1 << kind as u32),
+        }
     }
 
     pub const fn has(self, kind: LayerKind) -> bool {

@@ -1,5 +1,6 @@
 //! Images without geometry: decoding, encoding, G-buffers, reduction to the next level, seams. Knows no assets and no textures.
 
+pub mod data_tile;
 pub mod decode;
 pub mod encode;
 mod fill;

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use map3d_base::LayerKind;
-use map3d_image::GBuffer;
 use map3d_image::encode::{self, Encoder};
+use map3d_image::{GBuffer, data_tile};
 use map3d_texture::TextureFile;
 use numpy::ndarray::{Array2, Array3};
 use numpy::{IntoPyArray, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
@@ -88,9 +88,39 @@ pub fn encode_layer<'py>(
         LayerKind::Depth | LayerKind::Depth2 => rows2(array, "depth").map(|(size, a)| encoder.depth(size, &a, format)),
         LayerKind::Sun | LayerKind::Ao => rows2(array, "shades").map(|(size, a)| encoder.shade(size, &a, format)),
         LayerKind::Sun16 => rows2(array, "sun16").map(|(size, a)| encoder.sun16(size, &a, format)),
+        LayerKind::Data => return Err(invalid("layer data: call encode_data_tile")),
     }?
     .map_err(to_python)?;
     Ok(PyBytes::new(py, &bytes))
+}
+
+/// Encodes normal (H, W, 3) int16, id and depth (H, W) uint32 as one data tile.
+#[pyfunction]
+#[pyo3(signature = (normal, id, depth, small=false))]
+pub fn encode_data_tile<'py>(
+    py: Python<'py>,
+    normal: &Bound<'py, PyAny>,
+    id: &Bound<'py, PyAny>,
+    depth: &Bound<'py, PyAny>,
+    small: bool,
+) -> PyResult<Bound<'py, PyBytes>> {
+    let (size, normals) = rows3(normal, "normal")?;
+    let ((_, ids), (_, depths)) = (rows2(id, "id")?, rows2(depth, "depth")?);
+    let mut encoder = if small { Encoder::small() } else { Encoder::new() };
+    let bytes = py.detach(|| encoder.data_tile(size, &normals, &ids, &depths)).map_err(to_python)?;
+    Ok(PyBytes::new(py, &bytes))
+}
+
+/// Decodes a data tile into normal (H, W, 3) uint8, id and depth (H, W) uint32.
+#[pyfunction]
+pub fn decode_data_tile<'py>(py: Python<'py>, data: &[u8]) -> PyResult<Bound<'py, PyDict>> {
+    let tile = py.detach(|| data_tile::decode_data_tile(data)).map_err(to_python)?;
+    let size = (tile.height as usize, tile.width as usize);
+    let dict = PyDict::new(py);
+    set3(&dict, "normal", size, tile.normals)?;
+    set2(&dict, "id", size, tile.ids)?;
+    set2(&dict, "depth", size, tile.depths)?;
+    Ok(dict)
 }
 
 /// Encodes channels of (H, W, C) bytes, in the given order, as an 8-bit PNG, by the method of a kind of layer.

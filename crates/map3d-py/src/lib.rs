@@ -56,6 +56,8 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(codec::encode_png, m)?)?;
     m.add_function(wrap_pyfunction!(codec::encode_bits, m)?)?;
     m.add_function(wrap_pyfunction!(codec::decode_png, m)?)?;
+    m.add_function(wrap_pyfunction!(codec::encode_data_tile, m)?)?;
+    m.add_function(wrap_pyfunction!(codec::decode_data_tile, m)?)?;
     m.add_function(wrap_pyfunction!(codec::texture_level, m)?)?;
     Ok(())
 }

@@ -102,7 +102,7 @@ impl<'s> LightTracer<'s> {
                 }
                 LayerKind::Sun16 => self.fill_sun16(subtile, &layer.suns, g)?,
                 LayerKind::Depth2 => self.fill_second_surface(subtile, g)?,
-                LayerKind::Color | LayerKind::Normal | LayerKind::Id | LayerKind::Depth => {}
+                LayerKind::Color | LayerKind::Normal | LayerKind::Id | LayerKind::Depth | LayerKind::Data => {}
             }
         }
         Ok(())

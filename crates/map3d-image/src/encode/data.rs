@@ -23,6 +23,14 @@ pub fn bytes_from_normals(normals: &[[i16; 3]]) -> Vec<u8> {
     out
 }
 
+/// Returns 0xBBGGRR of each normal; 0 for none.
+pub(super) fn packed_normals(normals: &[[i16; 3]]) -> Vec<u32> {
+    let table: &[u8; 65_536] = &NORMAL_BYTE;
+    let byte = |n: i16| table[n as u16 as usize];
+    let pack = |n: &[i16; 3]| if *n == [0; 3] { 0 } else { u32::from_le_bytes([byte(n[0]), byte(n[1]), byte(n[2]), 0]) };
+    normals.iter().map(pack).collect()
+}
+
 /// Returns R, G, B, A of each value; R is the least significant byte.
 pub fn bytes_from_u32(values: &[u32]) -> &[u8] {
     bytemuck::cast_slice(values)

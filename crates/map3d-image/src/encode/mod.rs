@@ -11,10 +11,12 @@ use map3d_base::{Error, LayerFormat, LayerKind, LayerSpec, Result};
 
 pub use color::{bytes_from_linear, color_from_linear};
 pub use data::{bytes_from_normals, bytes_from_u16, bytes_from_u32};
+pub(crate) use deflate::Deflater;
 pub use jpeg::encode_jpeg;
 pub use png::{Deflate, Filter, PngImage, decode_png, encode_png};
 pub use webp::encode_webp;
 
+use crate::data_tile::DataTileEncoder;
 use crate::gbuffer::GBuffer;
 use crate::raster::Raster;
 
@@ -22,6 +24,7 @@ use crate::raster::Raster;
 #[derive(Default)]
 pub struct Encoder {
     png: png::PngWriter,
+    data: DataTileEncoder,
     small: bool,
 }
 
@@ -46,9 +49,10 @@ impl Encoder {
         }
         check_length(size, pixels.len() / channels)?;
         let is_same = order.len() == channels && order.iter().enumerate().all(|(k, from)| k == *from);
+        let methods = methods_of(kind)?;
         Ok(match is_same {
-            true => self.png(size, channels, pixels, methods_of(kind)),
-            false => self.png(size, order.len(), &data::reordered(pixels, channels, order), methods_of(kind)),
+            true => self.png(size, channels, pixels, methods),
+            false => self.png(size, order.len(), &data::reordered(pixels, channels, order), methods),
         })
     }
 
@@ -72,6 +76,7 @@ impl Encoder {
             LayerKind::Ao => self.shade(size, &g.ao, spec.format),
             LayerKind::Depth2 => self.depth(size, &g.depth2, spec.format),
             LayerKind::Picture => self.color(size, &g.picture, spec.format, spec.quality),
+            LayerKind::Data => self.data_tile(size, &g.normal, &g.id, &g.depth),
         }
     }
 
@@ -86,6 +91,7 @@ impl Encoder {
             LayerFormat::Webp => encode_webp(&image, quality, self.small),
             LayerFormat::Jpeg => encode_jpeg(&image, quality, self.small),
             LayerFormat::Png => Ok(self.color_png(&image)),
+            LayerFormat::M3d => Err(Error::argument("a data tile holds no colour")),
         }
     }
 
@@ -117,6 +123,12 @@ impl Encoder {
         Ok(self.png(size, 4, bytes_from_u32(depths), png::DEPTH))
     }
 
+    /// Encodes normal, id and depth as one data tile.
+    pub fn data_tile(&mut self, size: (u32, u32), normals: &[[i16; 3]], ids: &[u32], depths: &[u32]) -> Result<Vec<u8>> {
+        let deflate = if self.small { Deflate::Thorough } else { Deflate::Matching };
+        self.data.encode(size, &data::packed_normals(normals), ids, depths, deflate)
+    }
+
     /// Encodes one byte per pixel: sun, ambient occlusion.
     pub fn shade(&mut self, size: (u32, u32), shades: &[u8], format: LayerFormat) -> Result<Vec<u8>> {
         only_png("sun or ao", format)?;
@@ -132,15 +144,16 @@ impl Encoder {
     }
 }
 
-fn methods_of(kind: LayerKind) -> png::MethodPair {
-    match kind {
+fn methods_of(kind: LayerKind) -> Result<png::MethodPair> {
+    Ok(match kind {
         LayerKind::Color | LayerKind::Picture => png::COLOR,
         LayerKind::Normal => png::NORMAL,
         LayerKind::Id => png::ID,
         LayerKind::Depth | LayerKind::Depth2 => png::DEPTH,
         LayerKind::Sun | LayerKind::Ao => png::SHADE,
         LayerKind::Sun16 => png::SUN16,
-    }
+        LayerKind::Data => return Err(Error::argument("a data tile is no PNG")),
+    })
 }
 
 fn only_png(layer: &str, format: LayerFormat) -> Result<()> {

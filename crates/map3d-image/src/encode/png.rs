@@ -6,8 +6,7 @@ use std::path::Path;
 
 use map3d_base::{Error, Result};
 
-pub use crate::encode::deflate::Deflate;
-use crate::encode::deflate::Deflater;
+pub use crate::encode::deflate::{Deflate, Deflater};
 
 /// The filter of all rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

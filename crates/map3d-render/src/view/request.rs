@@ -43,7 +43,7 @@ pub struct ViewRequest {
 impl ViewRequest {
     pub(super) fn check(&self) -> Result<()> {
         LayerSpec::validate_all("view", &self.layers)?;
-        if let Some(layer) = self.layers.iter().find(|l| matches!(l.kind, LayerKind::Sun16 | LayerKind::Depth2)) {
+        if let Some(layer) = self.layers.iter().find(|l| matches!(l.kind, LayerKind::Sun16 | LayerKind::Depth2 | LayerKind::Data)) {
             return Err(Error::argument(format!(
                 "view: layer {:?} exists only in pyramids; a view has color, normal, id, depth, sun, ao, picture",
                 layer.kind
