@@ -161,8 +161,9 @@ def find_clusters(folders: list[str], origin: _Vec3, options: str) -> str:
 
 # -- tracing and blocks (map3d-trace, map3d-render) --------------------------------------------------------------------------------
 
-_Kind = Literal["color", "normal", "id", "depth", "sun", "sun16", "ao", "depth2", "picture"]
-_Format = Literal["webp", "png", "jpeg"]
+_Kind = Literal["color", "normal", "id", "depth", "sun", "sun16", "ao", "depth2", "picture", "data"]
+_Format = Literal["webp", "png", "jpeg", "m3d"]
+"""m3d: the data tile, for the kind data, which holds normal, id and depth."""
 _Vec3 = tuple[float, float, float]
 _Box = tuple[_Vec3, _Vec3]
 

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from map3d import _core
 
+from .built import build_houses
+
 SPEC = Path(__file__).parents[2] / "spec"
 VECTORS = json.loads((SPEC / "vectors" / "data-tiles.json").read_text())
 Pixels = tuple[NDArray[np.int16], NDArray[np.uint32], NDArray[np.uint32]]
@@ -80,6 +82,36 @@ def test_a_data_tile_has_a_fraction_of_the_bytes_of_three_pngs() -> None:
     normal, ids, depth = roofs(256, 256, 1)
     pngs = sum(len(_core.encode_layer(kind, "png", array)) for kind, array in (("normal", normal), ("id", ids), ("depth", depth)))
     assert len(_core.encode_data_tile(normal, ids, depth)) < pngs / 2
+
+
+def render(scene: _core.Scene, *layers: tuple[Any, Any]) -> _core.Block:
+    numbers: dict[str, Any] = {"look_at_deg": 45.0, "pitch_deg": 45.0, "u0_m": -51.2, "v0_m": 51.2, "d0_m": -1000.0, "size_m": 102.4}
+    frame = _core.Frame(**numbers, tile_px=256, zmax=2, layers=[_core.LayerSpec(*layer) for layer in layers])
+    return scene.render_block(frame, 0, 0, 0)
+
+
+def test_a_block_with_a_data_layer_has_the_pixels_of_the_png_layers(tmp_path: Path) -> None:
+    scene = build_houses(tmp_path, [(-30.0, -10.0, 12.0, 9.0), (-5.0, 0.0, 8.0, 20.0), (10.0, -15.0, 17.0, 4.0)])
+    pngs = render(scene, ("color", "png"), ("normal", "png"), ("id", "png"), ("depth", "png"))
+    tiles = render(scene, ("color", "png"), ("data", "m3d"))
+    layers = {(layer, *tile): data for layer, *tile, data in pngs.tiles}
+    assert len(tiles.tiles) == len(layers) / 2 >= 6
+    for layer, *tile, data in tiles.tiles:
+        if layer == 0:
+            assert data == layers[0, *tile]
+            continue
+        decoded = _core.decode_data_tile(data)
+        normal, ids, depth = (_core.decode_png(layers[number, *tile]) for number in (1, 2, 3))
+        assert np.array_equal(decoded["normal"], normal)
+        assert np.array_equal(decoded["id"], ids.view("<u4")[..., 0])
+        assert np.array_equal(decoded["depth"], depth.view("<u4")[..., 0])
+    assert tiles.seam == pngs.seam
+
+
+@pytest.mark.parametrize("layer", [("data", "png"), ("depth", "m3d"), ("color", "m3d")])
+def test_the_data_tile_is_the_format_of_data_alone(layer: tuple[Any, Any]) -> None:
+    with pytest.raises(_core.InvalidArgument, match="M3d is the format of Data"):
+        _core.Frame(0.0, 45.0, 0.0, 0.0, 0.0, 102.4, 256, 2, [_core.LayerSpec(*layer)])
 
 
 def test_arrays_of_different_sizes_are_refused() -> None:
