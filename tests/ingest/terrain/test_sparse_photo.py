@@ -25,14 +25,17 @@ WIDTH, HEIGHT = 62_000, 24_869
 Place = tuple[int, int]
 
 
-def write_sparse(path: Path, width: int, height: int, filled: list[Place], pixel_m: float = PIXEL_M, interleave: str = "pixel") -> Path:
-    """Writes a photo of which only some blocks, given as (column, row), are stored."""
-    shape = {"width": width, "height": height, "count": 3, "dtype": "uint8", "tiled": True, "blockxsize": BLOCK, "blockysize": BLOCK}
+def write_sparse(
+    path: Path, width: int, height: int, filled: list[Place], pixel_m: float = PIXEL_M, interleave: str = "pixel", dtype: str = "uint8"
+) -> Path:
+    """Writes a photo of which only some blocks, given as (column, row), are stored. Values are those of bytes, times 16 in other types."""
+    shape = {"width": width, "height": height, "count": 3, "dtype": dtype, "tiled": True, "blockxsize": BLOCK, "blockysize": BLOCK}
     place = {"crs": "EPSG:25832", "transform": Affine(pixel_m, 0, WEST, 0, -pixel_m, NORTH)}
     layout = {"compress": "deflate", "BIGTIFF": "YES", "SPARSE_OK": True, "photometric": "RGB", "interleave": interleave}
     with rasterio.open(path, "w", driver="GTiff", **shape, **place, **layout) as photo:
         for column, row in filled:
-            photo.write(colours(BLOCK, BLOCK), window=Window(column * BLOCK, row * BLOCK, BLOCK, BLOCK))
+            values = colours(BLOCK, BLOCK).astype(dtype) * (1 if dtype == "uint8" else 16)
+            photo.write(values, window=Window(column * BLOCK, row * BLOCK, BLOCK, BLOCK))
     return path
 
 
@@ -89,3 +92,23 @@ def test_a_photo_of_one_colour_has_one_small_image(tmp_path: Path) -> None:
     uvs = np.concatenate([mesh[2] for mesh in writer.meshes if writer.materials[mesh[3]]["texture"] == plain[0].stem])
     assert uvs.min() >= 0
     assert uvs.max() <= 1
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(4, 4), (40, 20)])
+def test_the_range_of_values_is_that_of_the_stored_blocks(tmp_path: Path, columns: int, rows: int) -> None:
+    """A mean over absent blocks would be black, and one over a few bytes white."""
+    path = write_sparse(tmp_path / "ortho.tif", columns * BLOCK, rows * BLOCK, [(columns - 1, rows - 2)], dtype="uint16")
+    with rasterio.open(path) as dataset:
+        low, high = Orthophoto(dataset, (10, 20, 30), 2048).stretch
+    assert 0 <= low < 16 * 16
+    assert 16 * 240 < high <= 16 * 255
+
+
+@pytest.mark.parametrize("layout", [{"tiled": True, "blockxsize": 256, "blockysize": 256}, {"tiled": False, "blockysize": 1}])
+def test_windows_of_a_large_photo_give_its_range_of_values(tmp_path: Path, layout: dict[str, object], monkeypatch: pytest.MonkeyPatch) -> None:
+    ramp = np.broadcast_to(np.arange(3000, dtype=np.uint16), (3, 1000, 3000)).copy()
+    with rasterio.open(write(tmp_path / "ortho.tif", ramp, 0.5, **layout)) as dataset:
+        whole = Orthophoto(dataset, (10, 20, 30), 2048).stretch
+        monkeypatch.setattr("map3d.ingest.terrain.orthophoto.WHOLE_SAMPLE_PX", 1)
+        windows = Orthophoto(dataset, (10, 20, 30), 2048).stretch
+    np.testing.assert_allclose(windows, whole, atol=100)

@@ -26,6 +26,13 @@ PLAIN_PX: Final = 8
 SAMPLE_PX: Final = 1024
 """Side of the overview that determines the range of values."""
 
+WHOLE_SAMPLE_PX: Final = 1 << 24
+"""Of a larger raster without overviews, only windows are read for that."""
+
+SAMPLE_WINDOWS: Final = 256
+SAMPLE_WINDOW_PX: Final = 64
+"""Side of these windows."""
+
 Colours = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
 
@@ -144,9 +151,20 @@ def sample_values(dataset: Any, count: int) -> NDArray[np.float64] | None:
     if dataset.dtypes[bands[0] - 1] == "uint8":
         return None
     side = max(int(SAMPLE_PX / count**0.5), 16)
+    blocks = StoredBlocks(dataset, bands)
+    if dataset.width * dataset.height > WHOLE_SAMPLE_PX and not dataset.overviews(bands[0]):
+        windows = blocks.spread(max(SAMPLE_WINDOWS // count, 1), SAMPLE_WINDOW_PX)
+        return np.concatenate([_known_values(dataset, bands, window, (int(window.height), int(window.width)), blocks) for window in windows])
     shape = (min(dataset.height, side), min(dataset.width, side))
-    data = dataset.read(bands, out_shape=(len(bands), *shape), masked=True).astype(np.float64)
-    values: NDArray[np.float64] = np.ma.masked_invalid(data).compressed()
+    return _known_values(dataset, bands, Window(0, 0, dataset.width, dataset.height), shape, blocks)
+
+
+def _known_values(dataset: Any, bands: list[int], window: Window, shape: tuple[int, int], blocks: StoredBlocks) -> NDArray[np.float64]:
+    """Returns the values of a window, read at `shape`, that are there and finite."""
+    data = dataset.read(bands, window=window, out_shape=(len(bands), *shape), masked=True).astype(np.float64)
+    stored = blocks.mask(window, *shape)
+    known = np.ma.masked_invalid(data if stored is None else np.ma.masked_where(np.broadcast_to(~stored, data.shape), data))
+    values: NDArray[np.float64] = known.compressed()
     return values
 
 
