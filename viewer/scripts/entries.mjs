@@ -7,6 +7,7 @@ export const ENTRIES = {
   drag: "src/drag/index.ts",
   element: "src/element/index.ts",
   files: "src/files/index.ts",
+  filter: "src/filter/index.ts",
   geojson: "src/geojson/index.ts",
   measure: "src/measure/index.ts",
   model: "src/model/index.ts",

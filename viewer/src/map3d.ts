@@ -4,7 +4,9 @@ export { imageLayer, imageLayer as ImageLayer, type ImageLayerEvents, type Image
 export { marker, marker as Marker, type MarkerEvents, type MarkerOptions } from "./overlay/marker";
 export { popup, popup as Popup, type PopupEvents, type PopupOptions } from "./overlay/popup";
 /** @internal */
-export { features } from "./core/features";
+export { findHeight } from "./map/findPosition";
+/** @internal */
+export { features, getFeature } from "./core/features";
 export type { TooltipContent } from "./map/options";
 export type { Corner } from "./core/corner";
 export { MapLayer, type Addable, type LayerHost } from "./core/mapLayer";

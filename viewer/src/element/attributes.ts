@@ -1,4 +1,4 @@
-import { UsageError, type Light, type Mode, type Vec3 } from "../map3d";
+import { UsageError, type AnyPosition, type Light, type Mode, type Vec3 } from "../map3d";
 
 /** Base class of the elements. Without a DOM, such as in server-side rendering, the classes can be imported but not used. */
 export const PageElement = (globalThis as Partial<typeof globalThis>).HTMLElement ?? (class {} as typeof HTMLElement);
@@ -8,6 +8,12 @@ export const words = (element: Element, name: string): string[] => (element.getA
 
 /** Parses a position in the scene's CRS, metres. @throws UsageError */
 export const position = (element: Element, name: string): Vec3 | undefined => numbers(element, name, 3, "three numbers such as \"691000 5336000 520\"") as Vec3 | undefined;
+
+/** Parses the place of an element: `lonlat` (degrees) on the ground, or coordinates of the scene's CRS. @param name attribute of the coordinates  @throws UsageError */
+export function place(element: Element, name: string): AnyPosition | undefined {
+  const lonLat = numbers(element, "lonlat", 2, "longitude and latitude in degrees, such as \"11.42 48.76\"") as [number, number] | undefined;
+  return lonLat ? { lonLat } : position(element, name);
+}
 
 /** Parses a number. @throws UsageError */
 export const number = (element: Element, name: string): number | undefined => numbers(element, name, 1, "a number")?.[0];

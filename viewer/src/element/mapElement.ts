@@ -1,6 +1,6 @@
-import { map, type Addable, type imageLayer, type Light, type MapEvents, type MapOptions, type Vec3 } from "../map3d";
+import { features, getFeature, map, type Addable, type AnyPosition, type imageLayer, type Light, type MapEvents, type MapOptions } from "../map3d";
 import { findFirstSun } from "../geo/firstSun";
-import { isOn, light, number, PageElement, position, time, words } from "./attributes";
+import { isOn, light, number, PageElement, place, time, words } from "./attributes";
 import { ElementContent } from "./elementContent";
 import { updateLayer, createLayer } from "./layerElement";
 import type { part, ElementHost } from "./part";
@@ -12,17 +12,19 @@ type FireEvent = <K extends keyof MapEvents>(type: K, fields: MapEvents[K]) => v
 
 /** State of a removed map, restored by the next one. Attributes that change in between take precedence. */
 interface SavedState {
-  center?: Vec3 | undefined;
+  center?: AnyPosition | undefined;
   zoom?: number | undefined;
   direction?: string | undefined;
   light?: Partial<Light> | undefined;
   time?: Date | undefined;
 }
 
+/** Attributes that add an entry of the same name to the map. */
+const FEATURES = ["orbit", "shade"];
 /** Changes of these attributes create a new map. */
-const RECREATING: ReadonlySet<string> = new Set(["src", "language", "label", "controls", "attribution", "drawer", "hover"]);
+const RECREATING: ReadonlySet<string> = new Set(["src", "language", "label", "controls", "attribution", "drawer", "hover", ...FEATURES]);
 /** Changes of these attributes are applied to the map. */
-const APPLIED = ["direction", "center", "zoom", "light", "time", "mode", "opacity", "background"];
+const APPLIED = ["direction", "center", "lonlat", "zoom", "light", "time", "mode", "opacity", "background"];
 
 /** A map that forwards its events to its element. */
 class forwardingMap extends map {
@@ -55,6 +57,7 @@ export class mapElement extends PageElement implements ElementHost {
   #map: map | null = null;
   #base: imageLayer | null = null;
   #failed = new WeakSet<imageLayer>();
+  readonly #added = new Set<string>();
   #drawn = false;
   /** True once the map has a view. */
   #ready = false;
@@ -131,6 +134,19 @@ export class mapElement extends PageElement implements ElementHost {
     if (this.#base) this.watch(this.#base);
     for (const each of this.#parts("map-3d-layer")) each.enter(this);
     this.#updateContent();
+    this.#addFeatures();
+  }
+
+  /** Adds the entries that attributes ask for, as soon as their scripts have run. */
+  #addFeatures(): void {
+    for (const name of FEATURES.filter((each) => isOn(this, each) && !this.#added.has(each))) {
+      if (!(name in features) && document.readyState !== "complete") {
+        window.addEventListener("load", () => { this.#addFeatures(); }, { once: true });
+        return;
+      }
+      this.#try(() => this.#map?.add(new (getFeature(name, `<map-3d ${name}>`) as new () => Addable<map>)()));
+      this.#added.add(name);
+    }
   }
 
   #destroy(): void {
@@ -141,6 +157,7 @@ export class mapElement extends PageElement implements ElementHost {
     map.remove();
     this.#content?.clear();
     this.#map = this.#base = null;
+    this.#added.clear();
     this.#ready = this.#drawn = false;
   }
 
@@ -176,7 +193,7 @@ export class mapElement extends PageElement implements ElementHost {
     const saved = this.#saved;
     const [language, drawer, background] = ["language", "drawer", "background"].map((name) => this.getAttribute(name) ?? undefined);
     const all = {
-      center: saved.center ?? this.#try(() => position(this, "center")),
+      center: saved.center ?? this.#try(() => place(this, "center")),
       zoom: saved.zoom ?? this.#try(() => number(this, "zoom")),
       direction: saved.direction ?? this.getAttribute("direction") ?? undefined,
       light: saved.light ?? this.#try(() => light(this)),
@@ -200,7 +217,7 @@ export class mapElement extends PageElement implements ElementHost {
     else if (name === "direction") map.setDirection(value);
     else if (name === "background") map.setBackground(value);
     else if (name === "zoom") map.setZoom(number(this, name) ?? map.zoom);
-    else if (name === "center") ifDefined(position(this, name), (center) => map.setView(center));
+    else if (name === "center" || name === "lonlat") ifDefined(place(this, "center"), (center) => map.setView(center));
     else if (name === "light") ifDefined(light(this), (part) => map.setLight(part));
     else if (name === "time") ifDefined(time(this), (time) => map.setTime(time));
   }

@@ -1,14 +1,14 @@
-import { marker, UsageError } from "../map3d";
-import { position } from "./attributes";
+import { marker, UsageError, type AnyPosition } from "../map3d";
+import { place } from "./attributes";
 import { part, type ElementHost } from "./part";
 
 /**
- * `<map-3d-marker position="x y z" label="…" color="…" open>` inside `<map-3d>`: a labelled position in the scene's CRS, metres. Its content is shown in a
+ * `<map-3d-marker position="x y z" label="…" color="…" open>` inside `<map-3d>`: a labelled position in the scene's CRS, metres; or with `lonlat="longitude latitude"`, or `object="gml:id"`. Its content is shown in a
  * popup, which `open` opens at once. The content is moved to the popup, not copied, and moves back when the marker leaves the map.
  */
 export class markerElement extends part<marker> {
   /** @internal */
-  static readonly observedAttributes = ["position", "label", "color", "open"];
+  static readonly observedAttributes = ["position", "lonlat", "object", "label", "color", "open"];
   #body: HTMLElement | null = null;
   #observer: MutationObserver | null = null;
 
@@ -18,20 +18,25 @@ export class markerElement extends part<marker> {
   }
 
   protected create(): marker {
-    const [label, at, color] = [this.getAttribute("label")?.trim() ?? "", position(this, "position"), this.getAttribute("color")];
+    const [label, at, color] = [this.getAttribute("label")?.trim() ?? "", this.#place, this.getAttribute("color")];
     if (label === "") throw new UsageError("<map-3d-marker> needs the attribute label, its visible and accessible name");
-    if (!at) throw new UsageError(`<map-3d-marker label="${label}"> needs the attribute position: x, y and z in the scene's CRS, such as "691000 5336000 520"`);
+    if (!at) throw new UsageError(`<map-3d-marker label="${label}"> needs the attribute position: x, y and z in the scene's CRS, such as "691000 5336000 520"; or lonlat, such as "11.42 48.76"; or object, such as a gml:id`);
     return new marker(label, at, color === null ? {} : { color });
   }
 
   protected update(item: marker, name: string): boolean {
-    const [label, at] = [this.getAttribute("label")?.trim() ?? "", position(this, "position")];
+    const [label, at] = [this.getAttribute("label")?.trim() ?? "", this.#place];
     if (label === "" || !at || name === "color") return false;
     if (name === "label") item.setLabel(label);
-    else if (name === "position") item.setPosition(at);
+    else if (name !== "open") item.setPosition(at);
     else if (this.hasAttribute("open")) item.openPopup();
     else item.closePopup();
     return true;
+  }
+
+  get #place(): AnyPosition | undefined {
+    const object = this.getAttribute("object")?.trim() ?? "";
+    return object === "" ? place(this, "position") : { object };
   }
 
   protected override isReady(host: ElementHost): boolean {

@@ -35,16 +35,25 @@ async function findSurface(layers: readonly imageLayer[], view: ViewState, [x, y
   const [lowest, highest] = new Relief(layers, view).heights;
   const [low, high] = [uvdFromLocal(axes, [x, y, lowest]), uvdFromLocal(axes, [x, y, highest])];
   const { relief } = await Relief.fetch(layers, view, [[low[0] - 1, low[1] - 1], [high[0] + 1, high[1] + 1]], TILES);
+  const z = findHeight(relief, x, y);
+  return Number.isNaN(z) ? null : z;
+}
+
+/** @internal Returns the local height of the highest visible surface at x and y, to a pixel; null where it is hidden or missing, NaN where depths are not in memory. */
+export function findHeight(relief: Relief, x: number, y: number): number | null {
+  const { axes } = relief.camera.frame;
+  const [lowest, highest] = relief.heights;
   const step = relief.pixel_m;
-  let before = Infinity;
+  let [before, known] = [Infinity, true];
   for (let z = highest + step; z >= lowest - step; z -= step) {
     const [u, v, d] = uvdFromLocal(axes, [x, y, z]);
     const above = relief.depthAt(u, v) - d;
+    known &&= !Number.isNaN(above);
     // From above the surface to below it in one step: the surface is here; or it jumps, since something in front hides the point.
     if (above <= 0) return above > -MAX_STEP * step ? z + (before > above && before < Infinity ? (step * -above) / (before - above) : 0) : null;
     before = above;
   }
-  return null;
+  return known ? null : NaN;
 }
 
 /** @throws UsageError when no layer has the object */

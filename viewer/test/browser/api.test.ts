@@ -4,6 +4,7 @@ import { renderTown } from "../fixture/rendering";
 import { ORIGIN, PLACE, THINGS } from "../fixture/town";
 import { lonLatFromLocal } from "../../src/geo/geographic";
 import type { Vec2, Vec3 } from "../../src/core/vec";
+import type * as Filters from "../../src/filter";
 import { TestBed } from "./bed";
 import { OUT } from "./browser";
 import { settled, type Global } from "./page";
@@ -197,6 +198,27 @@ test("controls stand in the corners that are asked for", async () => {
     }
   });
   expect(refused).toBe('UsageError: unknown position "middle"; use topleft, topright, bottomleft, bottomright');
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
+
+test("a filter shows the objects that fulfil an expression; objects in view and chosen ones are written as a table", async () => {
+  const { page, problems } = await bed.start("town", { zoom: 3 });
+  await addEntry(page, "filter");
+  const found = await page.evaluate(async () => {
+    const { map, layer, map3d } = globalThis as Global & { map3d: typeof Filters };
+    const high = await map3d.findObjects(layer, ["all", [">", "measuredHeight", 20], ["==", "class", "building"]]);
+    const shown = new map3d.Filter(layer, [">=", "measuredHeight", 34], { others: "hidden" });
+    const { ids } = await new Promise<{ ids: readonly number[] }>((done) => { shown.on("change", done); map.add(shown); });
+    await new Promise((done) => map.once("idle", done));
+    const [all, one] = [await map3d.exportCsv(map), await map3d.exportCsv(map, { layer, ids: [1025] })];
+    const missing = await map3d.findObjects(layer, [">", "storeys", 3]).catch((reason: unknown) => String(reason));
+    return { high, ids, hidden: [17, 1025].map((id) => layer.isHidden(id)), all, one, missing };
+  });
+  expect([found.high, found.ids, found.hidden]).toEqual([[17, 2_000_000_001], [17, 2_000_000_001], [false, true]]);
+  expect(found.all.split("\r\n")).toEqual(["id,name,class,architect,listed,measuredHeight,note,roofType", "17,Town hall,building,,true,34,<img src=x onerror=alert(1)>,3100", "2000000001,Tower,building,,true,62,<img src=x onerror=alert(1)>,1000", ""]);
+  expect(found.one).toContain("1025,School <b>old</b>,building,,true,16,");
+  expect(found.missing).toBe('UsageError: no attribute "storeys"; the rendering has class, listed, measuredHeight, note, roofType');
   expect(problems).toEqual([]);
   await page.context().close();
 });

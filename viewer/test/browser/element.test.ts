@@ -2,7 +2,8 @@ import { expect, test } from "vitest";
 import type { Page } from "playwright-core";
 import type * as Element from "../../src/element";
 import { renderTown } from "../fixture/rendering";
-import { ORIGIN } from "../fixture/town";
+import { lonLatFromLocal } from "../../src/geo/geographic";
+import { ORIGIN, PLACE } from "../fixture/town";
 import { TestBed } from "./bed";
 import { OUT } from "./browser";
 
@@ -19,6 +20,9 @@ bed.server.pages.set("/element.css", "map-3d { height: 400px; width: 600px; } p 
 bed.server.pages.set("/before", `${HEAD}${SCRIPTS}</head><body><main>${MAP}</main></body></html>`);
 bed.server.pages.set("/after", `${HEAD}</head><body><main>${MAP}</main>${SCRIPTS}</body></html>`);
 bed.server.pages.set("/wrong", `${HEAD}</head><body><map-3d src="tiles/nowhere"> Unsere Anschrift: <map-3d-marker position="1 2 3" label="Rathaus">Marktplatz 1</map-3d-marker></map-3d><map-3d src="tiles/nowhere" lang="fr"></map-3d>${SCRIPTS}</body></html>`);
+
+bed.server.pages.set("/features", `${HEAD}</head><body><map-3d id="where" src="tiles/town" orbit shade zoom="3"><map-3d-marker lonlat="${lonLatFromLocal(PLACE, [-45, -4]).join(" ")}" label="Rathaus"></map-3d-marker>
+  <map-3d-marker object="Tower" label="Turm"></map-3d-marker></map-3d>${SCRIPTS}<script src="/map3d-orbit.js"></script></body></html>`);
 
 type Where = Element.mapElement;
 const where = (): Where => document.getElementById("where") as Where;
@@ -148,4 +152,19 @@ test("without a drawable map the fallback content or a message is shown; another
   await bare.page.getByText("Unsere Anschrift").waitFor();
   expect(await bare.page.locator("map-3d").innerText()).toContain("Offen bis 17 Uhr");
   await bare.page.context().close();
+});
+
+test("markers stand at longitude and latitude or on an object; orbit is added, and a missing script is told", async () => {
+  const { page, problems } = await open("/features");
+  await page.waitForFunction(() => where().map?.markers.every(({ position }) => position) === true && where().map?.markers.length === 2);
+  const places = await page.evaluate(() => where().map?.markers.map(({ label, position }) => [label, ...(position ?? [])]) ?? []);
+  for (const [label, x, y, z] of [["Rathaus", -45, -4, 34], ["Turm", 32, 26, 62]] as const) {
+    const [, ...found] = places.find(([name]) => name === label) ?? [];
+    [x, y, z].forEach((part, k) => { expect(Math.abs(Number(found[k]) - (ORIGIN[k as 0] + part))).toBeLessThan(0.6); });
+  }
+  await page.waitForLoadState("load");
+  await expect.poll(() => problems.join()).toBe("map3d: <map-3d shade> needs the entry shade: load map3d-shade.js after map3d.js, or import \"map3d/shade\"");
+  await page.evaluate(() => new Promise((done) => { where().map?.once("idle", done).rotate(1); }));
+  expect(await page.evaluate(() => (where().map as unknown as { transition: unknown }).transition !== null)).toBe(true);
+  await page.context().close();
 });
