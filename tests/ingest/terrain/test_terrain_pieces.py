@@ -1,6 +1,7 @@
 """Terrain is the same whatever the number of threads, and an import that was killed goes on with its finished pieces."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -191,12 +192,15 @@ def import_into(root: Path, folder: Path) -> Path:
 def test_an_import_into_a_scene_goes_on_after_it_was_killed(tmp_path: Path) -> None:
     write(tmp_path / "dem.tif", hills(200, 200), 10.0)
     write(tmp_path / "ortho.tif", colours(4000, 4000), 0.5)
-    expected = read_files(import_into(tmp_path / "undisturbed", tmp_path))
-    command = [sys.executable, "-c", KILLED_IMPORT, str(tmp_path / "killed"), str(tmp_path)]
+    # In the same place, because reports know their workspace.
+    root = tmp_path / "workspace"
+    expected = read_files(import_into(root, tmp_path))
+    shutil.rmtree(root)
+    command = [sys.executable, "-c", KILLED_IMPORT, str(root), str(tmp_path)]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)}
     assert subprocess.run(command, check=False, env=environment, timeout=120).returncode == -signal.SIGKILL
-    assert len(list((tmp_path / "killed" / "scenes" / "town" / "assets").glob(".dem.*.pieces/*.zip"))) >= 5
-    assets = import_into(tmp_path / "killed", tmp_path)
+    assert len(list((root / "scenes" / "town" / "assets").glob(".dem.*.pieces/*.zip"))) >= 5
+    assets = import_into(root, tmp_path)
     assert read_files(assets) == expected
     assert [path.name for path in assets.iterdir()] == ["dem"]
 
