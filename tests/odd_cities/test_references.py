@@ -1,5 +1,6 @@
 """References between the CityGML files of a folder: geometry, prototypes, appearances."""
 
+import gzip
 import os
 from pathlib import Path
 
@@ -86,6 +87,20 @@ def test_a_folder_is_imported_with_the_geometry_and_appearances_that_its_files_s
     (missing,) = (one.report["warnings"] for one in done.imported if one.asset == "b")
     assert [(one["reason"], one["count"], one["example"]) for one in missing] == [("reference into another file: file not found", 1, "c.gml#gone")]
     assert "warnings" not in done.imported[0].report or not done.imported[0].report["warnings"]
+
+
+def test_libraries_may_be_packed_and_refer_to_others(tmp_path: Path, workspace: Workspace) -> None:
+    city = write_city(tmp_path / "city")
+    shapes, tile = city / "library" / "shapes.xml", city / "tiles" / "a.gml"
+    more = shapes.read_text().replace('"shape"', '"more"').replace('"s"', '"t"')
+    (city / "library" / "more.gml").write_text(more)
+    link = '<gml:surfaceMember xmlns:xlink="http://www.w3.org/1999/xlink" xlink:href="more.gml#more"/></gml:MultiSurface>'
+    (city / "library" / "shapes.gml.gz").write_bytes(gzip.compress(shapes.read_text().replace("</gml:MultiSurface>", link).encode()))
+    shapes.unlink()
+    tile.write_text(tile.read_text().replace("shapes.xml#", "shapes.gml.gz#"))
+    done = add(workspace, city)
+    assert {one.asset: one.triangles for one in done.imported} == {"a": 6, "b": 2}
+    assert (done.failed, done.left_alone) == ([], [])
 
 
 @pytest.mark.parametrize(

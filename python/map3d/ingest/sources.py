@@ -158,10 +158,10 @@ def _without_named(found: Sequence[tuple[Path, Format]], folder: Path) -> list[t
 
 def _used_documents(folder: Path, found: Sequence[tuple[Path, Format]], unknown: Sequence[Path]) -> set[Path]:
     """Returns the code lists and libraries of geometry that the CityGML files of a folder name; they are read with these files."""
-    if not any(path.suffix.lower() in _CODE_LIST_SUFFIXES for path in unknown):
+    if not any(unpacked_path(path).suffix.lower() in _CODE_LIST_SUFFIXES for path in unknown):
         return set()
     documents = [path for path, format in found if format == "citygml"]
-    return {used for path in documents for used in find_code_lists(path, folder) | find_document_links(path, folder).geometry}
+    return {used for path in documents for used in find_code_lists(path, folder) | find_geometry_documents(path, folder)}
 
 
 def _read_head(path: Path) -> bytes:
