@@ -184,6 +184,19 @@ fn chains_have_a_limit() {
 }
 
 #[test]
+fn very_long_references_are_shortened() {
+    let folder = Folder::new("references");
+    folder.put("b.gml", model(""));
+    let long = "x".repeat(1 << 20);
+    folder.put("a.gml", model(&building("a", &(square("p", 0) + &link(&format!("b.gml#{long}")) + &link(&format!("{long}.gml#p"))))));
+    let document = read_in(&folder, "a.gml");
+    let found: Vec<_> = document.report.warnings.iter().map(|w| (w.reason.as_str(), w.example.len() <= 256)).collect();
+    assert_eq!(document.count(), 2);
+    assert!(found.contains(&("reference into another file: no geometry with this id", true)), "{found:?}");
+    assert!(found.iter().any(|(reason, _)| reason.contains("invalid file name")), "{found:?}");
+}
+
+#[test]
 fn a_reference_to_the_file_itself_by_its_name_is_one_inside_it() {
     let folder = Folder::new("references");
     folder

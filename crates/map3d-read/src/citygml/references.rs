@@ -20,6 +20,10 @@ pub const OWN_DOCUMENT: DocumentNumber = 0;
 const MAX_DOCUMENTS: usize = 4096;
 const MAX_NAMES: usize = 1 << 16;
 const MAX_WANTED: usize = 1_000_000;
+/// Of a reference that is kept for the report.
+const MAX_REFERENCE_CHARS: usize = 200;
+/// Of a name that is kept; a longer one is no name of a file.
+const MAX_NAME_BYTES: usize = 1024;
 
 const NO_SUCH_FILE: &str = "reference into another file: file not found";
 const TOO_MANY: &str = "reference into another file: too many references";
@@ -122,8 +126,8 @@ impl References {
     /// Returns a reference as the report names it: a bare one of another document with the name of that document.
     fn describe(&self, href: &str) -> String {
         match split_reference(href) {
-            ("", id) => format!("{}#{id}", self.file_name(self.current)),
-            _ => href.trim().to_owned(),
+            ("", id) => format!("{}#{}", self.file_name(self.current), shorten(id)),
+            _ => shorten(href),
         }
     }
 
@@ -175,7 +179,7 @@ impl References {
     /// Keeps the target of an appearance of another document, as written.
     pub fn add_own_target(&mut self, id: Id, href: &str) {
         if self.own_targets.len() < MAX_WANTED {
-            self.own_targets.entry(id).or_insert_with(|| href.trim().to_owned());
+            self.own_targets.entry(id).or_insert_with(|| shorten(href));
         }
     }
 
@@ -201,7 +205,7 @@ impl References {
         }
         let file = self.documents[self.current].folder.find(name);
         let found = file.map_err(explain).and_then(|file| self.number_of(&file.path));
-        if self.by_name.len() < MAX_NAMES {
+        if self.by_name.len() < MAX_NAMES && name.len() <= MAX_NAME_BYTES {
             self.by_name.insert(key, found);
         }
         found
@@ -239,6 +243,10 @@ impl References {
 
 fn canonicalize(path: &Path) -> PathBuf {
     std::fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf())
+}
+
+fn shorten(href: &str) -> String {
+    href.trim().chars().take(MAX_REFERENCE_CHARS).collect()
 }
 
 /// Splits `file#id`. Some writers produce a bare `id`; a URL without a fragment is a file.
