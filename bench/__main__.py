@@ -1,5 +1,5 @@
 """`python -m bench [PART …] [--json]`. Parts: tiles, light, encoding, ingest, incremental (the default); extent, planning, stored, viewer,
-catalogue, overhead, saturation, view."""
+catalogue, overhead, saturation, view, large."""
 
 import argparse
 import json
@@ -10,11 +10,26 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from . import catalogue, catalogue_overhead, encoding, extent, incremental, ingest, light_layers, planning, saturation, stored, tiles, view, viewer
+from . import (
+    catalogue,
+    catalogue_overhead,
+    encoding,
+    extent,
+    incremental,
+    ingest,
+    large_citygml,
+    light_layers,
+    planning,
+    saturation,
+    stored,
+    tiles,
+    view,
+    viewer,
+)
 from .benchmark_scene import CACHE
 
 PARTS = ("tiles", "light", "encoding", "ingest", "incremental")
-ON_REQUEST = ("extent", "planning", "stored", "viewer", "catalogue", "overhead", "saturation", "view")
+ON_REQUEST = ("extent", "planning", "stored", "viewer", "catalogue", "overhead", "saturation", "view", "large")
 Rows = list[dict[str, Any]]
 
 
@@ -22,6 +37,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="bench", description="Measures speed, with peers in the same run.")
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"{', '.join(PARTS)} (default: these), {', '.join(ON_REQUEST)}")
     parser.add_argument("--millions", type=float, nargs="+", help="extent, view: sizes in million triangles (1 3 10, 1 10)")
+    parser.add_argument("--megabytes", type=float, nargs="+", help="large: sizes of the CityGML files (50 200 1000)")
     parser.add_argument("--buildings", type=int, default=300, help="tiles: number of buildings of the town")
     parser.add_argument("--res", type=float, default=0.2, help="tiles: metres per pixel")
     parser.add_argument("--tiles", type=int, default=48, help="tiles: number of tiles")
@@ -49,6 +65,7 @@ def main() -> None:
         "ingest": ingest.measure,
         "incremental": incremental.measure,
         "extent": lambda: extent.measure(tuple(options.millions or extent.MILLIONS), plots=Path("docs/plots")),
+        "large": lambda: large_citygml.measure(options.megabytes or large_citygml.MEGABYTES),
         "planning": planning.measure,
         "catalogue": lambda: catalogue.measure(options.catalogues, options.jobs),
         "overhead": lambda: catalogue_overhead.measure(options.catalogues),
