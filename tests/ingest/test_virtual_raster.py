@@ -19,6 +19,7 @@ from map3d.ingest.import_inputs import import_inputs
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.sources import find_sources
 from map3d.ingest.virtual_raster import check_virtual_raster, find_virtual_sources, is_checked
+from map3d.renderings.site_files import SiteFiles, update_files
 from tests.ingest.terrain.rasters import hills, write
 
 OPERATOR = ImportOptions(virtual_rasters=True)
@@ -190,6 +191,16 @@ def test_one_in_an_archive_is_refused_even_if_the_operator_gives_it(workspace: W
     done = add(workspace, catalogue, city.parent / "city.zip")
     assert [item.source.endswith("dem.tif") for item in done.imported] == [True]
     assert len(done.left_alone) == 1
+
+
+def test_a_site_reads_one_and_notices_changed_tiles(workspace: Workspace, catalogue: Catalogue, city: Path) -> None:
+    write_virtual(city / "dem.vrt", "tiles/dem.tif")
+    site = SiteFiles(SceneRecord("town"), city, OPERATOR)
+    assert update_files(workspace, catalogue, site, lambda *_: None).imported == ["dem"]
+    assert update_files(workspace, catalogue, site, lambda *_: None).unchanged == ["dem"]
+    write(city / "tiles" / "dem.tif", hills(20, 20) + 1)
+    assert update_files(workspace, catalogue, site, lambda *_: None).again == {"dem": "the file changed"}
+    assert [asset.source for asset in catalogue.assets("town")] == [str(city / "dem.vrt")]
 
 
 def test_the_library_reads_one(city: Path, tmp_path: Path) -> None:

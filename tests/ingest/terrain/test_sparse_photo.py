@@ -12,6 +12,8 @@ from rasterio.windows import Window
 
 pytest.importorskip("map3d._core", reason="the compiled core is not built")
 
+from map3d.errors import LimitExceeded
+from map3d.ingest.terrain import terrain_rasters
 from map3d.ingest.terrain.orthophoto import Orthophoto
 from map3d.ingest.terrain.terrain_import import import_terrain
 from map3d.ingest.terrain.terrain_options import TerrainOptions
@@ -65,6 +67,16 @@ def test_a_huge_sparse_photo_has_images_only_where_it_has_blocks(tmp_path: Path,
     assert tiles == (32 * 13 if with_dem else len(images(tmp_path / "asset")))
     outside = [warning["count"] for warning in report["warnings"] if warning["reason"] == "tiles outside the photo"]  # type: ignore[attr-defined]
     assert outside == ([tiles - len(images(tmp_path / "asset"))] if with_dem else [])
+
+
+@pytest.mark.parametrize("with_dem", [True, False])
+def test_too_many_tiles_are_refused_with_advice(tmp_path: Path, with_dem: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    ortho = write_sparse(tmp_path / "ortho.tif", WIDTH, HEIGHT, [(3, 2)])
+    dem = write(tmp_path / "dem.tif", hills(101, 249), 25.0) if with_dem else None
+    tiles = 32 * 13 if with_dem else 31 * 13
+    monkeypatch.setattr(terrain_rasters, "MAX_TILES", tiles - 1)
+    with pytest.raises(LimitExceeded, match=rf"{tiles} tiles of terrain, the limit is {tiles - 1}; reduce the resolution"):
+        run(dem, ortho, tmp_path / "asset")
 
 
 @pytest.mark.parametrize("interleave", ["pixel", "band"])
