@@ -1,4 +1,5 @@
 import { DecodeError } from "./errors";
+import { inflate } from "./inflate";
 
 /** Bytes per pixel. */
 type Channels = 1 | 2 | 3 | 4;
@@ -69,28 +70,6 @@ function readHeader(view: DataView, at: number, length: number): PngHeader {
     throw new DecodeError(`PNG of ${String(width)} × ${String(height)} pixels; expected 1 to ${String(SIDE_LIMIT)} on each side`);
   }
   return { width, height, channels };
-}
-
-/** Inflates exactly `size` bytes or fails; does not read a longer stream to its end. */
-async function inflate(parts: Uint8Array<ArrayBuffer>[], size: number): Promise<Uint8Array<ArrayBuffer>> {
-  const out = new Uint8Array(size);
-  const reader = new Blob(parts).stream().pipeThrough(new DecompressionStream("deflate")).getReader();
-  let at = 0;
-  try {
-    for (let step = await reader.read(); !step.done; step = await reader.read()) {
-      if (at + step.value.length > size) break;
-      out.set(step.value, at);
-      at += step.value.length;
-      if (at === size) at += (await reader.read()).value?.length ?? 0;
-    }
-  } catch (reason) {
-    throw new DecodeError(`PNG's zlib stream is broken: ${String(reason)}`);
-  }
-  if (at !== size) {
-    reader.cancel().catch(() => undefined);
-    throw new DecodeError(`PNG's pixel data does not have the ${String(size)} bytes that its header specifies`);
-  }
-  return out;
 }
 
 function unfilter(bytes: Uint8Array, row: number, stride: number, channels: number): void {

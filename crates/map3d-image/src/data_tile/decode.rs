@@ -25,7 +25,7 @@ pub fn decode_data_tile(bytes: &[u8]) -> Result<DataTile> {
     let refuse = |what: &str| Error::format(Path::new("data tile"), what);
     let header = Header::read(bytes).map_err(|what| refuse(&what))?;
     let body = inflate(&bytes[HEADER_BYTES..], header.body_bytes).ok_or_else(|| refuse("the zlib stream is damaged or has another size"))?;
-    Painter::new(&header, &body).and_then(|painter| painter.paint(&header)).ok_or_else(|| refuse("its columns contradict each other"))
+    DataTileReader::new(&header, &body).and_then(|reader| reader.read(&header)).ok_or_else(|| refuse("its columns contradict each other"))
 }
 
 struct Header {
@@ -102,7 +102,7 @@ impl<'a> Column<'a> {
     }
 }
 
-/// A label while its runs are painted.
+/// A label while its runs are read.
 struct Label {
     id: u32,
     normal: [u8; 3],
@@ -123,7 +123,7 @@ struct Above {
     label: usize,
 }
 
-struct Painter<'a> {
+struct DataTileReader<'a> {
     codes: std::slice::Iter<'a, u8>,
     lengths: std::vec::IntoIter<u64>,
     labels: Vec<Label>,
@@ -132,7 +132,7 @@ struct Painter<'a> {
     tile: DataTile,
 }
 
-impl<'a> Painter<'a> {
+impl<'a> DataTileReader<'a> {
     /// Reads the columns; `None` if they contradict the header or each other.
     fn new(header: &Header, mut body: &'a [u8]) -> Option<Self> {
         let codes = Column::take(&mut body, header.runs, 1)?.bytes;
@@ -148,10 +148,10 @@ impl<'a> Painter<'a> {
         Some(Self { codes: codes.iter(), lengths: lengths.numbers().collect::<Vec<_>>().into_iter(), labels, begun: 0, residuals, tile })
     }
 
-    fn paint(mut self, header: &Header) -> Option<DataTile> {
+    fn read(mut self, header: &Header) -> Option<DataTile> {
         let (mut above, mut row) = (Vec::new(), Vec::new());
         for y in 0..header.height {
-            self.paint_row(y, &above, &mut row)?;
+            self.read_row(y, &above, &mut row)?;
             std::mem::swap(&mut above, &mut row);
             row.clear();
         }
@@ -159,7 +159,7 @@ impl<'a> Painter<'a> {
         is_done.then_some(self.tile)
     }
 
-    fn paint_row(&mut self, y: u32, above: &[Above], row: &mut Vec<Above>) -> Option<()> {
+    fn read_row(&mut self, y: u32, above: &[Above], row: &mut Vec<Above>) -> Option<()> {
         let (mut x, mut at) = (0, 0);
         while x < self.tile.width {
             let code = *self.codes.next()?;
@@ -175,7 +175,7 @@ impl<'a> Painter<'a> {
             if end <= x || end > self.tile.width {
                 return None;
             }
-            self.paint_run(run.label, y, x, end, code & WITH_RESIDUALS != 0)?;
+            self.fill_run(run.label, y, x, end, code & WITH_RESIDUALS != 0)?;
             row.push(Above { end, ..run });
             x = end;
         }
@@ -198,7 +198,7 @@ impl<'a> Painter<'a> {
         (label.shape == NO_DEPTHS || (0..MAX_START).contains(&label.start)).then_some(number)
     }
 
-    fn paint_run(&mut self, label: usize, y: u32, x: u32, end: u32, has_residuals: bool) -> Option<()> {
+    fn fill_run(&mut self, label: usize, y: u32, x: u32, end: u32, has_residuals: bool) -> Option<()> {
         let Self { labels, residuals, tile, .. } = self;
         let label = &mut labels[label];
         let row = y as usize * tile.width as usize;

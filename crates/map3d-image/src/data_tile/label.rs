@@ -12,7 +12,7 @@ const MAX_SLOPE: f64 = 100_000.0;
 /// Slopes of another label are used when its plane differs by less than this, in units.
 const SLOPE_TOLERANCE: f64 = 0.35;
 
-/// Of the pixels of a plane, at most one in so many is off it.
+/// At most one in this number of pixels of a plane is off it.
 const OFF_SHARE: i64 = 3;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

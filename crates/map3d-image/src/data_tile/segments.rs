@@ -77,8 +77,7 @@ impl Segments {
             let at = start.max(run.start as usize);
             let (depth, depth_above) = (pixels.depths[from + at], pixels.depths[from - pixels.width + at]);
             if label.is_like(pixels.ids[from + start], pixels.normals[from + start], depth) && label.takes_step(depth.wrapping_sub(depth_above)) {
-                let numbers = [row, start, end].map(|n| n as u32);
-                let [row, start, end] = numbers;
+                let [row, start, end] = [row, start, end].map(|n| n as u32);
                 return Some(Run { row, start, end, label: run.label, source, expected_end: run.end, has_residuals: false });
             }
         }
