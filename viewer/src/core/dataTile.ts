@@ -40,7 +40,7 @@ const unfold = (n: number): number => (n % 2 ? -(n + 1) : n) / 2;
 type Columns = readonly [codes: Float64Array, lengths: Float64Array, ids: Float64Array, normals: Float64Array, shapes: Float64Array,
   right: Float64Array, down: Float64Array, starts: Float64Array, residual: () => number, isDone: () => boolean];
 
-/** What lies beyond the end of a body reads as NaN or 0; `isDone` is then false. */
+/** Bytes beyond the end of a body read as NaN or 0; `isDone` is then false. */
 function readColumns(body: Uint8Array, runs: number, labels: number, residuals: number): Columns {
   let [at, read] = [0, 0];
   const readByte = (): number => body[at++] as number;

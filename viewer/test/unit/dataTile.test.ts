@@ -19,7 +19,7 @@ const vectors = JSON.parse(readFileSync(resolve(import.meta.dirname, "../../../s
 
 const bytesOf = (base64: string): Uint8Array<ArrayBuffer> => new Uint8Array(Buffer.from(base64, "base64"));
 
-/** Deflates a changed body anew. */
+/** Changes a body and deflates it again. */
 const packed = (tile: Uint8Array, change: (body: Uint8Array) => void): Uint8Array<ArrayBuffer> => {
   const body = new Uint8Array(inflateSync(tile.subarray(24)));
   change(body);
