@@ -9,6 +9,7 @@ export const ENTRIES = {
   files: "src/files/index.ts",
   filter: "src/filter/index.ts",
   geojson: "src/geojson/index.ts",
+  labels: "src/labels/index.ts",
   measure: "src/measure/index.ts",
   model: "src/model/index.ts",
   offline: "src/offline/index.ts",

@@ -11,7 +11,7 @@ import { VIEWER } from "./package";
 const bed = new TestBed({ town: renderTown() });
 const FOLDER = join(VIEWER, "examples");
 const FILES = readdirSync(FOLDER).filter((file) => file.endsWith(".html"));
-const ORDER = ["shortest", "markers", "attributes", "theme", "measure", "sun", "search", "company", "styles", "link", "model", "files", "portrayal"];
+const ORDER = ["shortest", "markers", "attributes", "theme", "labels", "measure", "sun", "search", "company", "styles", "link", "model", "files", "portrayal"];
 const COLOURS = 24;
 
 /** Counts the colours in a part of the page: a map that shows something has many. */
@@ -60,6 +60,13 @@ const POINTS: Readonly<Record<string, (page: Page, picture: Buffer) => Promise<v
     await page.getByLabel("Colour by").selectOption({ label: "class" });
     await page.locator(".map3d-legend button", { hasText: "terrain" }).waitFor();
     expect(before.equals(await still(page))).toBe(false);
+  },
+  labels: async (page) => {
+    await page.locator(".map3d-label-shown", { hasText: "Tower" }).waitFor();
+    await page.locator(".map3d-label-shown", { hasText: "Street" }).first().waitFor();
+    await page.screenshot({ path: `${OUT}/example-labels-names.png` });
+    await page.getByRole("button", { name: "Names on the map" }).click();
+    expect(await page.evaluate("[buildings.visible, streets.visible]")).toEqual([[], []]);
   },
   measure: async (page) => {
     for (const at of ["[690938, 5335978, 534]", "[690972, 5335978, 534]"]) {
