@@ -12,6 +12,15 @@ export async function launch(library, hosts = {}) {
   return chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args });
 }
 
+/** Makes the viewer's page open at once, as in a session that has seen its opening. */
+function skipOpening() {
+  try {
+    sessionStorage.setItem("map3d-opening", "");
+  } catch {
+    // A page without storage, such as about:blank.
+  }
+}
+
 /** For use in a page: makes maps draw with WebGL even without a GPU. */
 export function anyWebGL() {
   const getContext = HTMLCanvasElement.prototype.getContext;
@@ -32,6 +41,7 @@ export async function runPage(act) {
     const [width, height] = parameters.size ?? [1000, 700];
     const context = await browser.newContext({ viewport: { width, height }, reducedMotion: "reduce", storageState: parameters.state });
     await context.addInitScript(anyWebGL);
+    await context.addInitScript(skipOpening);
     const page = await context.newPage();
     page.setDefaultTimeout(60_000);
     const problems = [];

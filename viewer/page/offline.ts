@@ -7,7 +7,7 @@ import { language, message } from "./i18n";
 type Offline = typeof import("./map3d-offline.mjs");
 
 /** All files that this page loads, at once or on demand. */
-export const PAGE_FILES = ["page.js", "page.css", "map3d.mjs", ...["compare", "controls", "measure", "offline", "orbit", "print", "shade", "theme"].map((name) => `map3d-${name}.mjs`)];
+export const PAGE_FILES = ["page.js", "page-share.js", "page.css", "map3d.mjs", ...["compare", "controls", "measure", "offline", "orbit", "print", "shade", "theme"].map((name) => `map3d-${name}.mjs`)];
 
 /** Binds the dialog that saves the current view for offline use. Stores nothing until the user saves an area. */
 export function bindOffline(view: map, name: string): void {

@@ -15,6 +15,7 @@ import { bindPicture } from "./picture";
 import { bindInViewList } from "./inViewList";
 import { Selection } from "./selection";
 import { bindShare } from "./share";
+import { bindOpening } from "./opening";
 import { bindNetwork, report, showFailure } from "./toast";
 import { byId } from "./dom";
 import { requestedUrls } from "./requested";
@@ -30,6 +31,7 @@ function baseUrls(): string[] {
 const MAX_TITLE = 200;
 
 function open(): void {
+  const isFresh = location.hash === "";
   const { time, id, by, epoch = 0, ...start } = readPermalink(location.hash);
   const view = new map("mapcanvas", { cover: true, light: lightAt(FIRST_HOUR), ...start });
   const urls = baseUrls();
@@ -65,7 +67,10 @@ function open(): void {
         new shade().addTo(view);
         if (view.drawer === "webgl") showShadowSwitch();
       }, (reason: unknown) => { report(reason); });
-      import("./map3d-orbit.mjs").then(({ orbit }) => new orbit().addTo(view), (reason: unknown) => { report(reason); });
+      import("./map3d-orbit.mjs").then(({ orbit }) => {
+        const turn = new orbit().addTo(view);
+        if (isFresh) bindOpening(view, turn);
+      }).catch((reason: unknown) => { report(reason); });
     }
     bindEpochs(view, layer, otherEpochs(urls[0] ?? "."), epoch, (shown, index) => {
       permalink.epoch = index;

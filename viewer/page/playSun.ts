@@ -27,7 +27,7 @@ export function bindPlay(time: HTMLInputElement): void {
       toggle(false);
       return;
     }
-    hour += (HOURS_PER_S * Math.min(Math.max(now - last, 0), LONGEST_FRAME_MS)) / 1000;
+    hour += (HOURS_PER_S * Math.min(now - last, LONGEST_FRAME_MS)) / 1000;
     last = now;
     const before = time.value;
     time.valueAsNumber = hour;

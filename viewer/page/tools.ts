@@ -4,11 +4,11 @@ import { byId, withText } from "./dom";
 import { toast } from "./toast";
 import { message } from "./i18n";
 
-const HINTS = { line: ["lineHint", "lineTapHint"], height: ["heightHint", "heightTapHint"], area: ["areaHint", "areaTapHint"], profile: ["profileHint", "profileTapHint"] } as const;
-type Kind = keyof typeof HINTS;
+const KINDS = ["line", "height", "area", "profile"] as const;
+type Kind = (typeof KINDS)[number];
 
-/** True on devices that are used with fingers. */
-const isTouched = (): boolean => matchMedia("(pointer: coarse)").matches;
+/** Fingers tap, a mouse clicks. */
+const hintOf = (kind: Kind): string => message(`${kind}Hint`).replace("%", message(matchMedia("(pointer: coarse)").matches ? "tapOn" : "clickOn"));
 
 /** The measuring tool: a button that opens it, the kinds, the results, and buttons that add a point, undo, clear and finish. */
 export class Tools {
@@ -21,7 +21,7 @@ export class Tools {
 
   constructor(view: map) {
     this.#view = view;
-    this.#buttons = new Map((Object.keys(HINTS) as Kind[]).map((kind) => [kind, byId(`measure-${kind}`)]));
+    this.#buttons = new Map(KINDS.map((kind) => [kind, byId(`measure-${kind}`)]));
     for (const [kind, button] of this.#buttons) button.addEventListener("click", () => void this.#activate(kind));
     byId("measure").hidden = false;
     const actions = { measure: () => void this.#activate(this.#last), "measure-add": () => { this.#addPoint(); }, "measure-undo": () => this.#tool?.undo(), "measure-clear": () => this.#tool?.clear(), "measure-finish": () => { this.#finish(); } };
@@ -74,7 +74,7 @@ export class Tools {
     byId("measure").setAttribute("aria-expanded", String(kind !== null));
     document.body.classList.toggle("measures", kind !== null);
     for (const [buttonKind, button] of this.#buttons) button.setAttribute("aria-pressed", String(buttonKind === kind));
-    if (kind !== null) byId("hint").textContent = message(HINTS[kind][isTouched() ? 1 : 0]);
+    if (kind !== null) byId("hint").textContent = hintOf(kind);
     this.#showResults();
   }
 

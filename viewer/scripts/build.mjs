@@ -128,7 +128,8 @@ async function build() {
   await bundle("src/offline/worker.ts", "map3d-worker.js", { format: "iife" });
   await bundleFull("map3d-full.mjs", { format: "esm" });
   await bundleFull("map3d-full.js", { format: "iife", globalName: "map3d" });
-  await bundle("page/page.ts", "page.js", { format: "esm", external: ["./map3d.mjs", ...Object.keys(ENTRIES).map((name) => `./map3d-${name}.mjs`)] });
+  await bundle("page/page-share.ts", "page-share.js", { format: "esm" });
+  await bundle("page/page.ts", "page.js", { format: "esm", external: ["./map3d.mjs", "./page-share.js", ...Object.keys(ENTRIES).map((name) => `./map3d-${name}.mjs`)] });
   await esbuild.build({ ...shared, entryPoints: [join(root, "page/page.css")], outfile: join(dist, "page.css"), target: CSS_TARGET });
   writeFileSync(join(dist, "index.html"), minifyHtml(readFileSync(join(root, "page/index.html"), "utf8")));
   const tsc = join(root, "node_modules/typescript/bin/tsc");

@@ -18,6 +18,7 @@ const BUDGET = {
   files: 5,
   filter: 3,
   geojson: 12,
+  labels: 5,
   measure: 10,
   model: 6,
   offline: 6,

@@ -35,8 +35,9 @@ export class TestBed {
     return `${this.server.origin}/tiles/${rendering}`;
   }
 
-  openPage(context: BrowserContextOptions = {}): Opened {
-    return openPage(this.#browser as Browser, context);
+  /** @param opening plays the opening of the ready-made page */
+  openPage(context: BrowserContextOptions = {}, opening = false): Opened {
+    return openPage(this.#browser as Browser, context, opening);
   }
 
   /** Opens the bare page, without a map. */

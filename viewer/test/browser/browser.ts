@@ -23,10 +23,20 @@ function anyWebGL(): void {
   };
 }
 
-/** Opens a page and collects its errors and console errors. */
-export async function openPage(browser: Browser, options: BrowserContextOptions = {}): Promise<{ page: Page; problems: string[] }> {
+/** Makes the ready-made page open at once, as in a session that has seen its opening. */
+function skipOpening(): void {
+  try {
+    sessionStorage.setItem("map3d-opening", "");
+  } catch {
+    // A page without storage, such as about:blank.
+  }
+}
+
+/** Opens a page and collects its errors and console errors. @param opening plays the opening of the ready-made page */
+export async function openPage(browser: Browser, options: BrowserContextOptions = {}, opening = false): Promise<{ page: Page; problems: string[] }> {
   const context = await browser.newContext({ viewport: { width: 800, height: 600 }, ...options });
   await context.addInitScript(anyWebGL);
+  if (!opening) await context.addInitScript(skipOpening);
   const page = await context.newPage();
   const problems: string[] = [];
   page.on("pageerror", (error) => problems.push(String(error)));

@@ -137,8 +137,11 @@ test("share a view", async () => {
   await hand.tap(placeOf(page, [32, 26, 62]));
   await page.waitForSelector("#info:not([hidden])");
   await hand.tap("#share");
-  await page.waitForSelector(".toast");
-  expect(await page.locator(".toast p").textContent()).toBe("Link copied to clipboard.");
+  await page.waitForSelector("dialog[open] .share-qr");
+  await page.screenshot({ path: `${OUT}/task-share-dialog.png` });
+  await hand.tap("#share-link-copy");
+  expect(await page.locator("#share-link-copy").textContent()).toBe("Copied");
+  expect(await page.inputValue("#share-embed")).toContain(`<iframe src="${page.url().replaceAll("&", "&amp;")}"`);
   const link = await page.evaluate(() => navigator.clipboard.readText());
   expect(link).toBe(page.url());
   const { page: other } = await bed.openPage(PHONE);

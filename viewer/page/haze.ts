@@ -1,0 +1,85 @@
+import type { imageLayer, map, View } from "./map3d.mjs";
+import { computeHaze } from "./hazeMask";
+
+/** Pixels of the mask along each side; it covers the square of a view. */
+const SIDE_PX = 128;
+
+/** Lets the content fade into the background towards its edge, over both drawers, and colours the background by the light of the sky. */
+export class Haze {
+  readonly #view: map;
+  readonly #layer: imageLayer;
+  readonly #canvas = document.createElement("canvas");
+  readonly #masks = new Map<string, Promise<Uint8ClampedArray | null>>();
+  #mask: Uint8ClampedArray | null = null;
+  #direction = "";
+
+  /** @param layer one whose manifest has loaded */
+  constructor(view: map, layer: imageLayer) {
+    [this.#view, this.#layer] = [view, layer];
+    [this.#canvas.width, this.#canvas.height, this.#canvas.className] = [SIDE_PX, SIDE_PX, "haze"];
+    this.#canvas.setAttribute("aria-hidden", "true");
+    view.canvas.after(this.#canvas);
+    view.frameEvents.on("move", () => { this.#place(); });
+    view.on("idle", () => { void this.#update(); });
+    view.on("lightchange", () => { this.#color(); });
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { this.#color(); });
+    this.#color();
+  }
+
+  /** Follows the map; hides while the view turns. */
+  #place(): void {
+    const camera = this.#view.getViewState()?.camera;
+    if (!camera) return;
+    if (this.#view.direction !== this.#direction) this.#canvas.classList.remove("shown");
+    const { u0, v0, size } = camera.frame;
+    const px_m = this.#view.metresPerPixel;
+    const [x, y] = [(u0 - camera.u) / px_m + camera.width / 2, (camera.v - v0) / px_m + camera.height / 2];
+    this.#canvas.style.transform = `translate(${x.toFixed(2)}px, ${y.toFixed(2)}px) scale(${(size / px_m / SIDE_PX).toFixed(5)})`;
+  }
+
+  /** Shows the haze of the current view once its mask is known. Without one, as offline, there is no haze. */
+  async #update(): Promise<void> {
+    const { direction } = this.#view;
+    if (direction === this.#direction && this.#canvas.classList.contains("shown")) return;
+    const view = this.#layer.rendering?.views.get(direction);
+    if (!view) return;
+    const made = this.#masks.get(direction) ?? this.#makeMask(view);
+    this.#masks.set(direction, made);
+    const mask = await made.catch(() => null);
+    if (direction !== this.#view.direction) return;
+    [this.#mask, this.#direction] = [mask, direction];
+    this.#color();
+    this.#place();
+    this.#canvas.classList.toggle("shown", mask !== null);
+  }
+
+  /** Reads where the content ends from the tile of the whole view. */
+  async #makeMask(view: View): Promise<Uint8ClampedArray | null> {
+    const color = this.#layer.rendering?.layers.get("color");
+    if (!color || color.format === "jpeg") return null;
+    const data = await this.#layer.source.tile(view, color, { z: 0, x: 0, y: 0 });
+    if (data === null) return null;
+    const bitmap = data instanceof ArrayBuffer ? await createImageBitmap(new Blob([data], { type: color.media_type })) : "bitmap" in data ? data.bitmap : null;
+    const context = Object.assign(document.createElement("canvas"), { width: SIDE_PX, height: SIDE_PX }).getContext("2d", { willReadFrequently: true });
+    if (!bitmap || !context) return null;
+    context.drawImage(bitmap, 0, 0, SIDE_PX, SIDE_PX);
+    bitmap.close();
+    const { data: pixels } = context.getImageData(0, 0, SIDE_PX, SIDE_PX);
+    return computeHaze(Uint8Array.from({ length: SIDE_PX * SIDE_PX }, (_, k) => (pixels[4 * k + 3] ?? 0) > 127 ? 1 : 0), SIDE_PX);
+  }
+
+  /** Colours background and haze: the page's paper in the light of the sky. High contrast keeps its own colours. */
+  #color(): void {
+    const plain = matchMedia("(prefers-contrast: more), (forced-colors: active)").matches;
+    const paper = (getComputedStyle(document.documentElement).getPropertyValue("--paper").trim().match(/[0-9a-f]{2}/gi) ?? []).map((part) => parseInt(part, 16));
+    const rgb = paper.map((part, k) => Math.round(part * Math.min(this.#view.light.sky_rgb[k as 0], 1) ** 2));
+    this.#canvas.hidden = plain || rgb.length < 3;
+    if (this.#canvas.hidden) return;
+    this.#view.setBackground(`rgb(${rgb.join(" ")})`);
+    const context = this.#canvas.getContext("2d");
+    if (!context || !this.#mask) return;
+    const image = context.createImageData(SIDE_PX, SIDE_PX);
+    this.#mask.forEach((alpha, k) => { image.data.set([...rgb, alpha], 4 * k); });
+    context.putImageData(image, 0, 0);
+  }
+}

@@ -1,0 +1,51 @@
+/** Width of the haze as a share of the greatest distance from the edge, and as a share of the side at most. */
+const [WIDTH, MAX_WIDTH] = [0.22, 0.05];
+/** Content that is narrower than this share of the side, such as buildings without ground, has no haze. */
+const NARROW = 0.05;
+
+/** Computes the opacity of the haze (0 to 255): full outside the content and at its edge, none far inside. Holes in the content have no haze. @param inside 1 for content, row by row; changed  @returns null where all content is narrow */
+export function computeHaze(inside: Uint8Array, side: number): Uint8ClampedArray | null {
+  const outside = findOutside(inside, side);
+  const distances = computeDistances(outside, side);
+  const greatest = distances.reduce((most, distance) => Math.max(most, distance), 0);
+  if (greatest < NARROW * side) return null;
+  const width = Math.min(WIDTH * greatest, MAX_WIDTH * side);
+  return Uint8ClampedArray.from(distances, (distance) => {
+    const share = Math.min(Math.max((distance - 1) / width, 0), 1);
+    return 255 * (1 - share * share * (3 - 2 * share));
+  });
+}
+
+/** Finds what is connected to the border without content. */
+function findOutside(inside: Uint8Array, side: number): Uint8Array {
+  const outside = new Uint8Array(inside.length);
+  const open: number[] = [];
+  const visit = (x: number, y: number): void => {
+    const at = y * side + x;
+    if (x < 0 || y < 0 || x >= side || y >= side || inside[at] === 1 || outside[at] === 1) return;
+    outside[at] = 1;
+    open.push(at);
+  };
+  for (let k = 0; k < side; k++) for (const [x, y] of [[k, 0], [k, side - 1], [0, k], [side - 1, k]] as const) visit(x, y);
+  for (let at = open.pop(); at !== undefined; at = open.pop()) {
+    const [x, y] = [at % side, Math.floor(at / side)];
+    for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]] as const) visit(x + dx, y + dy);
+  }
+  return outside;
+}
+
+/** Computes distances from the outside and from the border, in pixels, by a chamfer of two passes. */
+function computeDistances(outside: Uint8Array, side: number): Float32Array {
+  const distances = Float32Array.from(outside, (is) => (is === 1 ? 0 : Infinity));
+  const at = (x: number, y: number): number => (x < 0 || y < 0 || x >= side || y >= side ? 0 : distances[y * side + x] ?? 0);
+  for (const step of [1, -1]) {
+    for (let k = 0; k < distances.length; k++) {
+      const index = step > 0 ? k : distances.length - 1 - k;
+      const [x, y] = [index % side, Math.floor(index / side)];
+      const near = Math.min(at(x - step, y), at(x, y - step)) + 1;
+      const diagonal = Math.min(at(x - step, y - step), at(x + step, y - step)) + Math.SQRT2;
+      distances[index] = Math.min(distances[index] ?? 0, near, diagonal);
+    }
+  }
+  return distances;
+}

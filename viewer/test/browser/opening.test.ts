@@ -1,0 +1,48 @@
+import { expect, test } from "vitest";
+import type { Page } from "playwright-core";
+import { renderTown } from "../fixture/rendering";
+import { TestBed } from "./bed";
+import { OUT } from "./browser";
+
+const bed = new TestBed({ town: renderTown(256, 0.76) });
+const DESK = { viewport: { width: 640, height: 400 } };
+const directionOf = (page: Page): Promise<string> => page.evaluate(() => location.hash.slice(1).split("/")[0] ?? "");
+
+async function open(options: object, hash = ""): Promise<{ page: Page; problems: string[] }> {
+  const opened = await bed.openPage({ ...DESK, ...options }, true);
+  await opened.page.goto(`${bed.server.origin}/?rendering=${bed.url("town")}${hash}`);
+  await opened.page.waitForFunction(() => location.hash.length > 5);
+  return opened;
+}
+
+test("the page opens with a slow turn, which ends at the first touch and is shown once in a session", async () => {
+  const { page, problems } = await open({});
+  const first = await directionOf(page);
+  await page.waitForFunction((start) => !location.hash.startsWith(`#${start}/`), first);
+  await page.screenshot({ path: `${OUT}/opening.png` });
+  await page.mouse.move(320, 200);
+  await page.mouse.down();
+  await page.mouse.up();
+  await page.waitForTimeout(3000);
+  const stopped = await directionOf(page);
+  await page.waitForTimeout(6000);
+  expect(await directionOf(page)).toBe(stopped);
+  await page.goto(`${bed.server.origin}/?rendering=${bed.url("town")}&again`);
+  await page.waitForFunction(() => location.hash.length > 5);
+  await page.waitForTimeout(6000);
+  expect(await directionOf(page)).toBe(first);
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
+
+test.each([
+  ["with reduced motion", { reducedMotion: "reduce" }, ""],
+  ["when the link has a view", {}, "#90-45/691000.0/5336000.0/500.0/1.00"],
+] as const)("it does not turn %s", async (_, options, hash) => {
+  const { page, problems } = await open(options, hash);
+  const first = await directionOf(page);
+  await page.waitForTimeout(7000);
+  expect(await directionOf(page)).toBe(first);
+  expect(problems).toEqual([]);
+  await page.context().close();
+});

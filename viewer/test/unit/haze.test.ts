@@ -1,0 +1,27 @@
+import { expect, test } from "vitest";
+import { computeHaze } from "../../page/hazeMask";
+
+const SIDE = 64;
+const grid = (isInside: (x: number, y: number) => boolean): Uint8Array => Uint8Array.from({ length: SIDE * SIDE }, (_, k) => (isInside(k % SIDE, Math.floor(k / SIDE)) ? 1 : 0));
+const square = (x: number, y: number): boolean => x >= 8 && x < 56 && y >= 8 && y < 56;
+
+test("the haze is full outside the content and at its edge, none in the middle, and decreases inwards", () => {
+  const haze = computeHaze(grid(square), SIDE) ?? new Uint8ClampedArray();
+  const row = Array.from({ length: 32 }, (_, x) => haze[32 * SIDE + x] ?? -1);
+  expect(row.slice(0, 9)).toEqual(new Array(9).fill(255));
+  expect(row.slice(16)).toEqual(new Array(16).fill(0));
+  row.slice(1).forEach((value, k) => { expect(value).toBeLessThanOrEqual(row[k] ?? 0); });
+  expect(haze[8 * SIDE + 8]).toBe(255);
+});
+
+test("a hole in the content has no haze", () => {
+  const haze = computeHaze(grid((x, y) => square(x, y) && !(Math.abs(x - 32) < 3 && Math.abs(y - 32) < 3)), SIDE);
+  expect(haze?.[32 * SIDE + 32]).toBe(0);
+  expect(haze?.[32 * SIDE + 28]).toBe(0);
+});
+
+test("content up to the border fades there, too; narrow content has no haze", () => {
+  expect(computeHaze(grid(() => true), SIDE)?.[0]).toBe(255);
+  expect(computeHaze(grid((x) => x % 8 < 4), SIDE)).toBeNull();
+  expect(computeHaze(grid(() => false), SIDE)).toBeNull();
+});
