@@ -10,7 +10,7 @@ const dist = resolve(dirname(fileURLToPath(import.meta.url)), "../dist");
 const BUDGET = {
   core: 50,
   cluster: 4,
-  compare: 4,
+  compare: 5,
   controls: 6,
   debug: 2,
   drag: 2,

@@ -159,7 +159,7 @@ export class labels extends MapLayer<map, LabelsEvents> {
     this.#draw();
   }
 
-  /** At rest, everything in view is known exactly: reads names and judges all places anew. */
+  /** At rest, everything in view is known exactly: reads names and judges all places again. */
   readonly #rest = (): void => {
     const [map, objects] = [this.map, this.#objects];
     if (!map || !this.#shown) return;
@@ -181,8 +181,8 @@ export class labels extends MapLayer<map, LabelsEvents> {
     }
   };
 
-  /** Chooses the labels to show. @param anew judges places again that are known from coarser tiles */
-  #layOut(map: map, anew: boolean): void {
+  /** Chooses the labels to show. @param again judges places again that are known from coarser tiles */
+  #layOut(map: map, again: boolean): void {
     const relief = map.relief;
     if (!relief || map.inTransition) return;
     if (map.direction !== this.#direction) for (const each of this.#placed.values()) each.place = undefined;
@@ -190,7 +190,7 @@ export class labels extends MapLayer<map, LabelsEvents> {
     const near: { each: Placed; at: Vec2 }[] = [];
     for (const each of this.#placed.values()) {
       const at = this.#findOnScreen(map, each.place ?? each.label.positions[0]);
-      const judged = at && (anew || each.place === undefined) ? judgeAll(relief, each.label.positions) : undefined;
+      const judged = at && (again || each.place === undefined) ? judgeAll(relief, each.label.positions) : undefined;
       if (judged !== undefined) each.place = judged;
       if (at && each.place) near.push({ each, at: map.project(each.place) ?? at });
       else this.#show(each, false);

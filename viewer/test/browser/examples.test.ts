@@ -11,7 +11,7 @@ import { VIEWER } from "./package";
 const bed = new TestBed({ town: renderTown() });
 const FOLDER = join(VIEWER, "examples");
 const FILES = readdirSync(FOLDER).filter((file) => file.endsWith(".html"));
-const ORDER = ["shortest", "markers", "attributes", "theme", "labels", "measure", "sun", "search", "company", "styles", "link", "model", "files", "portrayal"];
+const ORDER = ["shortest", "markers", "attributes", "theme", "labels", "measure", "sun", "search", "company", "sync", "styles", "link", "model", "files", "portrayal"];
 const COLOURS = 24;
 
 /** Counts the colours in a part of the page: a map that shows something has many. */
@@ -97,6 +97,22 @@ const POINTS: Readonly<Record<string, (page: Page, picture: Buffer) => Promise<v
     expect(await page.locator("map-3d").innerText()).not.toContain("needs a browser");
     const embed = /<!-- From here[^]*all that the map needs/.exec(readFileSync(join(FOLDER, "company.html"), "utf8"))?.[0] ?? "";
     expect(embed.split("\n").length).toBeLessThanOrEqual(24);
+  },
+  sync: async (page) => {
+    await page.mouse.move(200, 300);
+    await page.mouse.down();
+    await page.mouse.move(260, 330, { steps: 6 });
+    await page.waitForTimeout(200); // without inertia
+    await page.mouse.up();
+    await still(page);
+    await page.screenshot({ path: `${OUT}/example-sync-moved.png` });
+    const [north, south] = await page.evaluate<{ direction: string; zoom: number; at: [number, number] }[]>(`(async () => {
+      const { clientWidth, clientHeight } = maps[0].container;
+      const place = (await maps[0].pick([clientWidth / 2, clientHeight / 2])).position;
+      return maps.map((map) => ({ direction: map.direction, zoom: map.zoom, at: map.project(place).map((part, k) => part - [map.container.clientWidth, map.container.clientHeight][k] / 2) }));
+    })()`);
+    expect([north?.direction, south?.direction, south?.zoom]).toEqual(["0-45", "180-45", north?.zoom]);
+    for (const part of south?.at ?? [NaN]) expect(Math.abs(part)).toBeLessThan(1.5);
   },
   styles: async (page) => {
     for (const mode of ["normal", "depth"]) expect(await colours(page, `[data-mode=${mode}]`)).toBeGreaterThan(COLOURS / 4);
