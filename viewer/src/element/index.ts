@@ -5,6 +5,7 @@ import { markerElement } from "./markerElement";
 
 export { layerElement, mapElement, markerElement, type MapElementEvents };
 export type { part, ElementHost } from "./part";
+export { embedCode, type EmbedOptions } from "./embedCode";
 
 const ELEMENTS = { "map-3d": mapElement, "map-3d-layer": layerElement, "map-3d-marker": markerElement };
 
