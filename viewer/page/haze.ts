@@ -17,7 +17,6 @@ export class Haze {
   constructor(view: map, layer: imageLayer) {
     [this.#view, this.#layer] = [view, layer];
     [this.#canvas.width, this.#canvas.height, this.#canvas.className] = [SIDE_PX, SIDE_PX, "haze"];
-    this.#canvas.setAttribute("aria-hidden", "true");
     view.canvas.after(this.#canvas);
     view.frameEvents.on("move", () => { this.#place(); });
     view.on("idle", () => { void this.#update(); });

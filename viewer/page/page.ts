@@ -62,7 +62,8 @@ function open(): void {
       if (layer.rendering?.json.geographic) new locate().addTo(view);
       bindOverview(view, new overview({ collapsed: true }).addTo(view));
     }, (reason: unknown) => { report(reason); });
-    if (layer.rendering?.layers.has("depth") && !view.options.dataSaver) {
+    // Depth is as large as colours and normals: it loads after the first picture.
+    if (layer.rendering?.layers.has("depth") && !view.options.dataSaver) view.once("load", () => {
       import("./map3d-shade.mjs").then(({ shade }) => {
         new shade().addTo(view);
         if (view.drawer === "webgl") showShadowSwitch();
@@ -71,7 +72,7 @@ function open(): void {
         const turn = new orbit().addTo(view);
         if (isFresh) bindOpening(view, turn);
       }).catch((reason: unknown) => { report(reason); });
-    }
+    });
     bindEpochs(view, layer, otherEpochs(urls[0] ?? "."), epoch, (shown, index) => {
       permalink.epoch = index;
       selection.setLayer(shown);

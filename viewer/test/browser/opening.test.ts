@@ -46,3 +46,19 @@ test.each([
   expect(problems).toEqual([]);
   await page.context().close();
 });
+
+test("depth loads after the first picture", async () => {
+  const release = bed.server.hold("/normal/");
+  bed.server.requests.length = 0;
+  const depths = (): number => bed.server.requests.filter((url) => url.includes("/depth/")).length;
+  const { page } = await open({ reducedMotion: "reduce" });
+  try {
+    await page.waitForTimeout(3000);
+    expect(bed.server.requests.filter((url) => url.includes("/color/")).length).toBeGreaterThan(0);
+    expect(depths()).toBe(0);
+  } finally {
+    release();
+  }
+  await expect.poll(depths, { timeout: 20_000 }).toBeGreaterThan(0);
+  await page.context().close();
+});
