@@ -73,7 +73,8 @@ function open(): void {
         if (isFresh) bindOpening(view, turn);
       }).catch((reason: unknown) => { report(reason); });
     });
-    bindEpochs(view, layer, otherEpochs(urls[0] ?? "."), epoch, (shown, index) => {
+    const others = otherEpochs(urls[0] ?? ".");
+    bindEpochs(view, layer, others, epoch, (shown, index) => {
       permalink.epoch = index;
       selection.setLayer(shown);
       colors.setLayer(shown).catch((reason: unknown) => { report(reason); });
@@ -83,7 +84,7 @@ function open(): void {
     }, (reason: unknown) => { report(reason); });
     if (layer.rendering?.layers.has("depth")) tools = new Tools(view);
     // Epochs can end elsewhere.
-    if (otherEpochs(urls[0] ?? ".").length === 0) new Haze(view, layer);
+    if (others.length === 0) new Haze(view, layer);
   });
   layer.addTo(view);
   bindLoading(view);
