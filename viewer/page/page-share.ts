@@ -22,7 +22,7 @@ export function openShareDialog(message: Message): void {
   if ("share" in navigator) actions.append(button(message("send"), () => { navigator.share({ title: document.title, url: link }).catch(() => undefined); }));
   const close = withText("button", message("close"), "main");
   actions.append(close);
-  form.append(title, copyable(message, "link", "share-link", link), copyable(message, "embedCode", "share-embed", embedCode(link)), createQr(link, message("qrCode")), actions);
+  form.append(title, copyable(message, "link", "share-link", link), copyable(message, "embedCode", "share-embed", iframeCode(link)), createQr(link, message("qrCode")), actions);
   dialog.append(form);
   dialog.addEventListener("close", () => { dialog.remove(); });
   document.body.append(dialog);
@@ -31,7 +31,7 @@ export function openShareDialog(message: Message): void {
 
 const escaped = (text: string): string => text.replaceAll("&", "&amp;").replaceAll('"', "&quot;").replaceAll("<", "&lt;");
 
-const embedCode = (link: string): string => `<iframe src="${escaped(link)}" title="${escaped(document.title)}" width="800" height="500" style="border:0" loading="lazy" allowfullscreen></iframe>`;
+const iframeCode = (link: string): string => `<iframe src="${escaped(link)}" title="${escaped(document.title)}" width="800" height="500" style="border:0" loading="lazy" allowfullscreen></iframe>`;
 
 function button(text: string, act: () => void): HTMLButtonElement {
   const created = withText("button", text);

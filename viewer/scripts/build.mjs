@@ -15,7 +15,7 @@ const banner = { js: "/*! map3d, Apache-2.0 */" };
 
 /** Shortens a bundle of esbuild by another 2 %. The result is ASCII: a page or server that declares no encoding reads the same texts. */
 async function shorten(code, module) {
-  const { code: shorter } = await minify(code, { ecma: 2022, module, compress: { passes: 3, keep_fargs: false, unsafe: true, unsafe_arrows: true }, format: { ascii_only: true } });
+  const { code: shorter } = await minify(code, { ecma: 2022, module, compress: { passes: 3, keep_fargs: false, unsafe: true, unsafe_arrows: true, pure_getters: true, inline: 1 }, format: { ascii_only: true } });
   return shorter;
 }
 
@@ -71,6 +71,13 @@ const styles = {
     });
   },
 };
+/** Lets unused tables of suncalc, those of the moon, be dropped. */
+const tables = {
+  name: "tables",
+  setup(build) {
+    build.onLoad({ filter: /\/suncalc\/index\.js$/ }, ({ path }) => ({ contents: readFileSync(path, "utf8").replaceAll("new Int32Array(", "/* @__PURE__ */ new Int32Array("), loader: "js" }));
+  },
+};
 /** Writes the keys of the page's messages once for all languages. */
 const messages = {
   name: "messages",
@@ -90,7 +97,7 @@ const messages = {
     });
   },
 };
-const plugins = [workers, shaders, styles, messages];
+const plugins = [workers, shaders, styles, tables, messages];
 
 /** Lets entries import the core's public names: modules from map3d.mjs, scripts from the global `map3d`. */
 const coreAs = (how) => ({

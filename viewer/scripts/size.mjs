@@ -33,7 +33,7 @@ const BUDGET = {
 /** Budget of the service worker, `map3d-worker.js`. */
 const WORKER = 2;
 /** Budget of the core, all entries and the page together. */
-const TOTAL = 160;
+const TOTAL = 164;
 
 const bundles = new Map(["core", ...Object.keys(ENTRIES), "full"].flatMap((name) => ["mjs", "js"].map((end) => [name === "core" ? `map3d.${end}` : `map3d-${name}.${end}`, BUDGET[name] * 1024])));
 bundles.set("map3d-worker.js", WORKER * 1024);

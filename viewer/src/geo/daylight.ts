@@ -1,12 +1,13 @@
+import { getPosition } from "suncalc";
 import { clamp, type Vec3 } from "../core/vec";
 import { localAzimuth, type GeographicJson } from "./geographic";
 import type { Light } from "./light";
-import { computeSunPosition } from "./sun";
 
 /** Computes sun and sky for a time at the scene's centre. */
 export function computeDaylight(time: Date, geographic: GeographicJson): Pick<Light, "azimuth_deg" | "altitude_deg" | "sun_rgb" | "sky_rgb"> {
-  const { azimuth_deg, altitude_deg } = computeSunPosition(time, geographic.lon_lat);
-  return { azimuth_deg: localAzimuth(geographic, geographic.lon_lat, azimuth_deg), altitude_deg, ...computeSkyColors(altitude_deg) };
+  const [lon, lat] = geographic.lon_lat;
+  const { azimuth, altitude } = getPosition(time, lat, lon);
+  return { azimuth_deg: localAzimuth(geographic, [lon, lat], azimuth), altitude_deg: altitude, ...computeSkyColors(altitude) };
 }
 
 /**

@@ -55,7 +55,7 @@ function makeBitReader(base64: string): () => number {
   const bytes = atob(base64);
   let at = 0;
   return () => {
-    if (at >= bytes.length * 8) throw new ManifestError(`occupancy ends after ${String(bytes.length)} bytes, before its quadtree is complete; write rendering.json again`);
+    if (at >= bytes.length * 8) throw new ManifestError(`occupancy ends after ${String(bytes.length)} bytes; write rendering.json again`);
     const bit = (bytes.charCodeAt(at >> 3) >> (at & 7)) & 1;
     at++;
     return bit;

@@ -10,7 +10,7 @@ export function worldPosition(position: Position, { json }: Pick<Rendering, "jso
   const { lonLat, xy, height } = position;
   const z = typeof height === "number" ? height : json.origin[2] + json.box[0][2];
   if (!lonLat) return [...(xy as Vec2), z];
-  if (!json.geographic) throw new UsageError(`cannot locate rendering "${json.name}" on earth: give positions as [x, y, z] of its CRS in place of lonLat`);
+  if (!json.geographic) throw new UsageError(`cannot locate rendering "${json.name}" on earth; use [x, y, z] instead of lonLat`);
   const [x, y] = localFromLonLat(json.geographic, lonLat);
   return [json.origin[0] + x, json.origin[1] + y, z];
 }

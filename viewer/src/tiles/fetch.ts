@@ -47,7 +47,7 @@ async function fetchOnce(url: string, { signal, range, fetch: request = fetch }:
   }
   if (response.status === 204) return null;
   if (!response.ok) throw new FetchError(`${url}: HTTP ${String(response.status)}`, response.status);
-  if (range && response.status !== 206) throw new FetchError(`${url}: the server ignores range requests (HTTP ${String(response.status)}, expected 206); use one that supports them, such as nginx, Apache or Caddy`, response.status);
+  if (range && response.status !== 206) throw new FetchError(`${url}: the server ignores range requests (HTTP ${String(response.status)}, expected 206); use nginx, Apache or Caddy, for example`, response.status);
   return response.arrayBuffer();
 }
 

@@ -53,7 +53,7 @@ describe("a camera", () => {
     ["flyTo", [{ x: 1 }], /expected \[x, y, z\].*got \{"x":1\}/],
     ["setView", [{ lonLat: [11] }], /setView: expected lonLat: \[longitude, latitude\] in degrees, got \[11\]/],
     ["panTo", [{ xy: [1, 2], height: "roof" }], /setView: expected height: metres, or "ground", got \["roof"\]/],
-    ["project", [{ lonLat: [11, 48] }], /cannot locate rendering "town" on earth: give positions as \[x, y, z\]/],
+    ["project", [{ lonLat: [11, 48] }], /cannot locate rendering "town" on earth; use \[x, y, z\]/],
     ["setMaxBounds", [[[0, 0, 0]]], /maxBounds: expected \[x, y, z\].*got undefined/],
     ["setMaxBounds", [7], /maxBounds: expected \[x, y, z\]/],
     ["setZoom", ["3"], /zoom: expected a number, got \["3"\]/],

@@ -172,7 +172,7 @@ function makeCanvas(image: ImageData): OffscreenCanvas {
 /** Returns a canvas's 2D context. @throws DrawError when the canvas has another context, or the browser has no 2D canvas */
 export function getContext2d(canvas: HTMLCanvasElement): CanvasRenderingContext2D {
   const context = canvas.getContext("2d");
-  if (!context) throw new DrawError("this browser supports neither WebGL2 nor the 2D canvas, and the map needs one of them; update the browser");
+  if (!context) throw new DrawError("this browser supports neither WebGL2 nor the 2D canvas; update it");
   return context;
 }
 

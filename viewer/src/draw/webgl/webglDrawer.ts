@@ -52,7 +52,7 @@ export class WebGLDrawer implements Drawer {
   constructor(canvas: HTMLCanvasElement, options: WebGLOptions, events: DrawerEvents) {
     const settings: WebGLContextAttributes = { alpha: true, premultipliedAlpha: true, antialias: false, depth: false, stencil: false, preserveDrawingBuffer: options.preserve, failIfMajorPerformanceCaveat: options.requireGpu };
     const gl = canvas.getContext("webgl2", settings);
-    if (!gl) throw new DrawError("this browser does not support WebGL2, which the map needs; update it or enable hardware acceleration");
+    if (!gl) throw new DrawError("this browser does not support WebGL2; update it or enable hardware acceleration");
     if (options.requireGpu && isSoftware(gl)) {
       gl.getExtension("WEBGL_lose_context")?.loseContext();
       throw new DrawError("this browser draws WebGL2 without a GPU");
