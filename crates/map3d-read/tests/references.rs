@@ -204,3 +204,16 @@ fn a_reference_to_the_file_itself_by_its_name_is_one_inside_it() {
     let document = read_in(&folder, "a.gml");
     assert_eq!((document.count(), document.report.warnings.len()), (2, 0), "{:?}", document.report.warnings);
 }
+
+#[test]
+fn a_part_in_another_file_is_counted_and_other_references_are_not() {
+    let folder = Folder::new("references-parts");
+    let part = "<boundedBy xlink:href='walls.gml#w1'/><boundedBy xlink:href='#w2'/><externalLink xlink:href='other.gml#x'/>";
+    let body = building("a", &square("p", 0)).replace("</Building>", &format!("{part}</Building>"));
+    folder.put("a.gml", model(&body));
+    folder.put("walls.gml", model(&building("w", &square("w1", 10))));
+    let document = read_in(&folder, "a.gml");
+    assert_eq!(document.count(), 2);
+    let counted = document.report.warnings.iter().find(|w| w.reason == "part of an object in another file, not followed").expect("counted");
+    assert_eq!((counted.count, counted.example.as_str()), (1, "walls.gml#w1"));
+}

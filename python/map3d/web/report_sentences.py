@@ -20,6 +20,7 @@ FAULTS: Final[Mapping[str, str]] = {
     "polygon with crossing rings": N_("Polygons whose rings cross, which may look wrong: {count}."),
     "ring that is not closed": N_("Rings that are not closed: {count}."),
     "unresolved reference": N_("References that lead nowhere in the file: {count}."),
+    "part of an object in another file, not followed": N_("Parts of objects that are in other files, which are not read: {count}."),
     "reference into another file: file not found": N_("References to other files that are not there: {count}."),
     "reference into another file: file outside the given folder not read": N_(
         "References to files outside the given folder, which are not read: {count}."

@@ -1,5 +1,7 @@
 //! Parses one top-level city object. GML alternates: an object (upper case) contains properties (lower case), a property contains objects.
 
+use std::borrow::Cow;
+
 use map3d_base::Result;
 use serde_json::Value;
 
@@ -25,6 +27,7 @@ use crate::options::ReadOptions;
 use crate::report_builder::ReportBuilder;
 
 const MAX_LOD: u8 = 4;
+const PART_OF_OTHER_FILE: &str = "part of an object in another file, not followed";
 
 pub struct CityObjectParser<'a> {
     pub xml: &'a mut XmlReader,
@@ -156,9 +159,12 @@ impl CityObjectParser<'_> {
     /// Reads a property by its content: an XLink, text (an attribute), or objects.
     fn read_other_property(&mut self, number: u32) -> Result<()> {
         let local_name = self.xml.local_name().to_owned();
-        let reference = self.xml.attribute("href").and_then(|href| self.references.find_own_id(&href));
-        if let Some(id) = reference.filter(|_| !local_name.starts_with("interior")) {
-            self.feature(number).xlinks.push(id);
+        if let Some(href) = self.xml.attribute("href").map(Cow::into_owned) {
+            match self.references.find_own_id(&href) {
+                Some(id) if !local_name.starts_with("interior") => self.feature(number).xlinks.push(id),
+                None if holds_parts(&local_name) => self.report.warn(PART_OF_OTHER_FILE, href)?,
+                _ => {}
+            }
         }
         let code_space = self.xml.attribute("codeSpace").map(|space| space.into_owned());
         let is_measure = self.xml.attribute("uom").is_some();
@@ -354,6 +360,24 @@ impl CityObjectParser<'_> {
         }
         Ok(())
     }
+}
+
+/// Returns whether a property holds parts of an object that are drawn.
+fn holds_parts(property: &str) -> bool {
+    const PARTS: [&str; 11] = [
+        "boundedBy",
+        "boundary",
+        "opening",
+        "fillingSurface",
+        "filling",
+        "consistsOfBuildingPart",
+        "buildingPart",
+        "outerBuildingInstallation",
+        "buildingInstallation",
+        "outerConstruction",
+        "trafficArea",
+    ];
+    PARTS.contains(&property)
 }
 
 /// Returns the level of detail of a property name that begins with `lod0` … `lod4` and continues in upper case.
