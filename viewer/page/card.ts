@@ -1,6 +1,7 @@
 import type { Attribute, ClickEvent } from "./map3d.mjs";
 import type { Described } from "./whole";
 import { language, message, type MessageKey } from "./i18n";
+import { roofInWords } from "./roofs";
 
 type Row = readonly [name: string, value: string];
 
@@ -64,7 +65,7 @@ export function describe({ id, name, class: type = "", attributes = {}, position
   add("built", isNumber(year) && !title.endsWith(format(year)) ? format(year) : "");
   add("measuredHeight", isNumber(attributes["measuredHeight"]) ? `${format(attributes["measuredHeight"])} m` : "");
   add("storeys", isNumber(attributes["storeysAboveGround"]) ? format(attributes["storeysAboveGround"]) : "");
-  add("roof", text("roofType"));
+  add("roof", roofInWords(text("roofType")));
   if (position) add("height", `${format(position[2], 2)} m${units.vertical ? ` (${units.vertical})` : ""}`);
   const separator = format(0.5).includes(",") ? "; " : ", ";
   if (lonLat) add("coordinates", lonLat.map((part) => `${format(part, 5)}°`).reverse().join(separator));
