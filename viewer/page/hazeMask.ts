@@ -3,17 +3,35 @@ const [WIDTH, MAX_WIDTH] = [0.22, 0.05];
 /** Content that is narrower than this share of the side, such as buildings without ground, has no haze. */
 const NARROW = 0.05;
 
-/** Computes the opacity of the haze (0 to 255): full outside the content and at its edge, none far inside. Holes in the content have no haze. @param inside 1 for content, row by row; changed  @returns null where all content is narrow */
+/** Computes the opacity of the haze (0 to 255): full outside the content and at its edge, none far inside. Holes in the content and towers that rise above its edge have no haze. @param inside 1 for content, row by row; changed  @returns null where all content is narrow */
 export function computeHaze(inside: Uint8Array, side: number): Uint8ClampedArray | null {
   const outside = findOutside(inside, side);
   const distances = computeDistances(outside, side);
   const greatest = distances.reduce((most, distance) => Math.max(most, distance), 0);
   if (greatest < NARROW * side) return null;
   const width = Math.min(WIDTH * greatest, MAX_WIDTH * side);
-  return Uint8ClampedArray.from(distances, (distance) => {
+  const haze = Uint8ClampedArray.from(distances, (distance) => {
     const share = Math.min(Math.max((distance - 1) / width, 0), 1);
     return 255 * (1 - share * share * (3 - 2 * share));
   });
+  clearTowers(haze, outside, side, 2 * Math.ceil(width) + 1);
+  return haze;
+}
+
+/** Clears the haze over what rises above the upper edge of the content and is narrower than `window` pixels, with the edge below it and a pixel on each side. */
+function clearTowers(haze: Uint8ClampedArray, outside: Uint8Array, side: number, window: number): void {
+  const columns = Array.from({ length: side }, (_, x) => x);
+  const tops = columns.map((x) => columns.find((y) => outside[y * side + x] === 0) ?? side);
+  // The upper edge without towers: the highest row at which a whole window is below it (a morphological opening).
+  const lowest = (x: number): number => Math.max(...Array.from({ length: window }, (_, k) => tops[x + k] ?? side));
+  const edges = columns.map((x) => Math.min(...Array.from({ length: window }, (_, k) => lowest(x - k))));
+  const cleared = haze.slice();
+  for (const x of columns) {
+    const top = tops[x] ?? side;
+    if (top >= (edges[x] ?? 0)) continue;
+    for (let y = top; y < side && (haze[y * side + x] ?? 0) > 0; y++) for (const near of [x - 1, x, x + 1]) if (near >= 0 && near < side) cleared[y * side + near] = 0;
+  }
+  haze.set(cleared);
 }
 
 /** Finds what is connected to the border without content. */

@@ -25,3 +25,16 @@ test("content up to the border fades there, too; narrow content has no haze", ()
   expect(computeHaze(grid((x) => x % 8 < 4), SIDE)).toBeNull();
   expect(computeHaze(grid(() => false), SIDE)).toBeNull();
 });
+
+test("a tower that rises above the edge has no haze, nor has the ground at its foot", () => {
+  const low = (x: number, y: number): boolean => x >= 8 && x < 56 && y >= 24 && y < 56;
+  const tower = (x: number, y: number): boolean => Math.abs(x - 40) < 2 && y >= 10 && y < 32;
+  const haze = computeHaze(grid((x, y) => low(x, y) || tower(x, y)), SIDE) ?? new Uint8ClampedArray();
+  for (let y = 10; y < 32; y++) expect(haze[y * SIDE + 40]).toBe(0);
+  expect(haze[24 * SIDE + 20]).toBe(255);
+});
+
+test("the upper edges of a diamond fade", () => {
+  const haze = computeHaze(grid((x, y) => Math.abs(x - 32) + Math.abs(y - 32) < 24), SIDE) ?? new Uint8ClampedArray();
+  for (const x of [18, 22, 42, 46]) expect(haze[(32 - 23 + Math.abs(x - 32)) * SIDE + x]).toBe(255);
+});
