@@ -1,5 +1,5 @@
 // Opens the list of renderings. Parameters: origin, path, size, pictures: file names for the light and the dark scheme.
-// Result: url, titles, images: whether each preview tile decodes, overflow: whether the page is wider than the window, requests: paths of failed requests.
+// Result: url, titles, images: whether each preview is loaded, overflow: whether the page is wider than the window, requests: paths of failed requests.
 import { runPage } from "./chromium.mjs";
 
 await runPage(async (page, { origin, path, pictures }) => {
@@ -10,13 +10,10 @@ await runPage(async (page, { origin, path, pictures }) => {
     await page.emulateMedia({ colorScheme: scheme });
     await page.screenshot({ path: picture });
   }
-  const found = await page.evaluate(async () => ({
+  const found = await page.evaluate(() => ({
     url: location.pathname,
     titles: [...document.querySelectorAll("h2")].map((title) => title.textContent),
-    images: await Promise.all([...document.querySelectorAll("image")].map(async (image) => {
-      const response = await fetch(image.href.baseVal);
-      return (await createImageBitmap(await response.blob())).width > 0;
-    })),
+    images: [...document.querySelectorAll("img.preview")].map((image) => image.complete && image.naturalWidth === 1200),
     overflow: document.documentElement.scrollWidth > innerWidth,
   }));
   return { ...found, requests };
