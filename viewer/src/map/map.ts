@@ -423,7 +423,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     if (!this.#atRest) this.fire("moveend", {});
     this.#atRest = true;
     if (this.#renderer?.busy !== false || !this.#loaded) return;
-    if (!this.#fetchesAhead) {
+    if (!this.#fetchesAhead && !this.options.dataSaver) {
       this.#fetchesAhead = this.#dirty = true;
       this.#loop.request();
     }
