@@ -105,7 +105,8 @@ fn a_ground_plane_lies_under_scenes_without_terrain() {
     auto.ground_id = 77;
     assert_eq!(run(&folder, &auto).ground_plane_triangles, 2);
     let store = SceneStore::open(&folder.0, 1 << 20).expect("open");
-    assert_eq!((store.bounds().lo, store.bounds().hi), ([-10.0, -10.0, 0.0], [16.0, 15.0, 7.0]));
+    // A quarter of the longest side, the height, on each side.
+    assert_eq!((store.bounds().lo, store.bounds().hi), ([-1.75, -1.75, 0.0], [7.75, 6.75, 7.0]));
     assert!(store.chunk(0).expect("chunk").objects().iter().any(|o| o.id == 77 && o.rank == 0));
     let mut faces = tent(0.0, 0.0, 0);
     faces.push((world([[0.0; 3], [9.0, 0.0, 0.0], [0.0, 9.0, 0.0]]), 1, 0, Rank::Terrain));
