@@ -358,7 +358,7 @@ def check_seam(frame: Frame, seam: bytes) -> None:
 def encode_layer(kind: _Kind, format: _Format, array: NDArray[Any], quality: int = 80, small: bool = False) -> bytes:
     """Encodes one layer of a G-buffer as an image; `small` trades time for fewer bytes."""
 
-def encode_png(kind: _Kind, pixels: NDArray[np.uint8], order: Sequence[int]) -> bytes:
+def encode_png(kind: _Kind, pixels: NDArray[np.uint8], order: Sequence[int], small: bool = False) -> bytes:
     """Encodes channels of (H, W, C) bytes, in the given order, as an 8-bit PNG of 1 to 4 channels, with the filter and the compression of a kind of layer."""
 
 def encode_bits(bits: NDArray[np.bool_]) -> bytes:

@@ -12,13 +12,19 @@ Vec3 = tuple[float, float, float]
 Box = tuple[Vec3, Vec3]
 """(least corner, greatest corner), metres, in the frame that the name says."""
 
-LayerKind = Literal["color", "normal", "id", "depth", "sun", "sun16", "ao", "depth2", "picture"]
+LayerKind = Literal["color", "normal", "id", "depth", "data", "sun", "sun16", "ao", "depth2", "picture"]
 BlockKind = Literal["base", "reduce"]
+DataEncoding = Literal["png", "tile"]
+"""How a rendering stores normal, id and depth: as three PNG layers, or as one layer of data tiles."""
 
-LAYER_KINDS: Final[tuple[LayerKind, ...]] = ("color", "normal", "id", "depth", "sun", "sun16", "ao", "depth2", "picture")
-DEFAULT_LAYERS: Final[tuple[LayerKind, ...]] = ("color", "normal", "id", "depth")
+LAYER_KINDS: Final[tuple[LayerKind, ...]] = ("color", "normal", "id", "depth", "data", "sun", "sun16", "ao", "depth2", "picture")
+DATA_TILE_KINDS: Final[tuple[LayerKind, ...]] = ("normal", "id", "depth")
+"""The kinds of pixels in a data tile (spec/data-tile.md)."""
+LAYERS_BY_DATA: Final[Mapping[DataEncoding, tuple[LayerKind, ...]]] = {"png": ("color", *DATA_TILE_KINDS), "tile": ("color", "data")}
+DEFAULT_DATA: Final[DataEncoding] = "png"
+DEFAULT_LAYERS: Final[tuple[LayerKind, ...]] = LAYERS_BY_DATA[DEFAULT_DATA]
 COLOR_KINDS: Final = ("color", "picture")
-DEPTH_KINDS: Final = ("depth", "depth2")
+DEPTH_KINDS: Final = ("depth", "depth2", "data")
 SUNS: Final = {"sun": (1, 1), "sun16": (1, _core.MAX_SUNS), "picture": (1, 1)}
 """Least and greatest number of suns of a layer of these kinds; others have none."""
 RADIUS_KINDS: Final = ("ao", "picture")
@@ -27,7 +33,8 @@ AO_RADIUS_M: Final = _core.AO_RADIUS_M
 TILE_PX: Final = _core.TILE_PX
 """Allowed sides of a tile."""
 COLOR_FORMATS: Final = ("webp", "png", "jpeg")
-MEDIA_TYPES: Final = {"webp": "image/webp", "png": "image/png", "jpeg": "image/jpeg"}
+MEDIA_TYPES: Final = {"webp": "image/webp", "png": "image/png", "jpeg": "image/jpeg", "m3d": "application/vnd.map3d.data"}
+FILE_SUFFIXES: Final = {"webp": "webp", "png": "png", "jpeg": "jpg", "m3d": "m3d"}
 DEPTH_UNIT_M: Final = 2.0**-10
 DEEPEST_LEVEL: Final = _core.DEEPEST_LEVEL
 OBJECTS_PER_SHARD: Final = _core.OBJECTS_PER_SHARD
@@ -94,7 +101,7 @@ class Layer:
 
     def __post_init__(self) -> None:
         check_name(self.name, "layer")
-        allowed = COLOR_FORMATS if self.kind in COLOR_KINDS else ("png",)
+        allowed = COLOR_FORMATS if self.kind in COLOR_KINDS else (format_of(self.kind),)
         if self.format not in allowed:
             raise BadRequest(f"layer {self.name}: format {self.format!r} cannot hold {self.kind}; use {' or '.join(allowed)}")
         least, most = SUNS.get(self.kind, (0, 0))
@@ -116,6 +123,11 @@ class Layer:
     @property
     def media_type(self) -> str:
         return MEDIA_TYPES[self.format]
+
+
+def format_of(kind: LayerKind) -> str:
+    """Returns the format of a lossless kind."""
+    return "m3d" if kind == "data" else "png"
 
 
 def _vec3(value: Sequence[float]) -> Vec3:

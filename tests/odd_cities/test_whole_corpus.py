@@ -13,8 +13,8 @@ import pytest
 
 from map3d.catalogue import Workspace
 from map3d.registry import Registry
+from map3d.tiles.decode_tile import decode_tile, layer_with
 from map3d.tiles.open_store import open_store
-from map3d.verify.decode import decode_tile
 from tests.cli.towns import Run
 from tests.odd_cities.corpus import PACKED_MIB, SPARSE_BYTES, SPIRAL_CORNERS, write_corpus
 from tests.odd_cities.towns import world_boxes
@@ -162,9 +162,10 @@ def tile_pixels(path: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yields the ids, (n,), and colours, (n, 3), of the pixels of each finest tile."""
     with open_store(path, read_only=True) as store:
         shape = store.shape
+        layers = {kind: layer for kind in ("id", "color") if (layer := layer_with(shape.layers, kind)) is not None}
         for x, y in store.list_tile_positions(shape.zmax):
             ids, colours = (
-                decode_tile(shape.layers[layer], store.get_tile(layer, shape.zmax, x, y) or b"", shape.tile_px)
-                for layer in map(shape.layer_number, ("id", "color"))
+                decode_tile(layer, store.get_tile(shape.layer_number(layer.name), shape.zmax, x, y) or b"", shape.tile_px)[kind]
+                for kind, layer in layers.items()
             )
-            yield np.ascontiguousarray(ids).view("<u4").ravel(), colours[..., :3].reshape(-1, 3)
+            yield ids.ravel(), colours[..., :3].reshape(-1, 3)

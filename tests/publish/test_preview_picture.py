@@ -45,7 +45,7 @@ def test_a_tile_that_is_no_image_is_named(workspace):
         for block in store.list_blocks():
             tiles = [StoredTile(0, *tile, b"RIFFnonsense") for tile in store.list_tiles(0) if block_holds(store, block, tile)]
             store.put_block(block.id, "bad", 2, tiles, None)
-    with pytest.raises(Corrupt, match=r"tile 0-45/color/.* is not an image.*map3d verify"):
+    with pytest.raises(Corrupt, match=r"tile 0-45/color/.*: not a webp image.*map3d verify"):
         picture_of(workspace)
 
 

@@ -134,7 +134,7 @@ def reader(town, pixels):
 
     def get_tile(layer, tile):
         with SqliteTileStore(path, read_only=True) as store:
-            return store.get_tile(store.shape.layer_number(layer), *tile)
+            return store.get_tile(store.shape.layer_number(layer.name), *tile)
 
     return get_tile
 

@@ -125,7 +125,14 @@ pub fn decode_data_tile<'py>(py: Python<'py>, data: &[u8]) -> PyResult<Bound<'py
 
 /// Encodes channels of (H, W, C) bytes, in the given order, as an 8-bit PNG, by the method of a kind of layer.
 #[pyfunction]
-pub fn encode_png<'py>(py: Python<'py>, kind: &str, pixels: PyReadonlyArray3<'py, u8>, order: Vec<usize>) -> PyResult<Bound<'py, PyBytes>> {
+#[pyo3(signature = (kind, pixels, order, small=false))]
+pub fn encode_png<'py>(
+    py: Python<'py>,
+    kind: &str,
+    pixels: PyReadonlyArray3<'py, u8>,
+    order: Vec<usize>,
+    small: bool,
+) -> PyResult<Bound<'py, PyBytes>> {
     let kind = parse_kind(kind)?;
     let array = pixels.as_array();
     let (h, w, channels) = array.dim();
@@ -134,7 +141,8 @@ pub fn encode_png<'py>(py: Python<'py>, kind: &str, pixels: PyReadonlyArray3<'py
     }
     let flat = array.as_standard_layout();
     let bytes = flat.as_slice().expect("standard layout");
-    let encode = || Encoder::new().channels((w as u32, h as u32), kind, (channels, bytes), &order);
+    let mut encoder = if small { Encoder::small() } else { Encoder::new() };
+    let encode = || encoder.channels((w as u32, h as u32), kind, (channels, bytes), &order);
     Ok(PyBytes::new(py, &py.detach(encode).map_err(to_python)?))
 }
 

@@ -11,7 +11,7 @@ from map3d.renderings.layers import LayerRequest
 
 @click.command("add-layers")
 @click.argument("rendering")
-@layer_options(default=())
+@layer_options(required=True)
 @json_option
 @workspace_option
 def command(workspace: Workspace, rendering: str, layers: LayerRequest, as_json: bool) -> None:

@@ -9,11 +9,13 @@ import click
 
 from map3d.catalogue import Workspace
 from map3d.cli.app import run
+from map3d.types import DEFAULT_DATA, LAYERS_BY_DATA, DataEncoding
 
 TOWN: Final = ("--buildings", "120", "--seed", "7")
 RES_M: Final = "0.15"
-OPTIONS: Final = ("--directions", "4", "--res", RES_M, "--layers", "color,normal,id,depth,sun16,ao", "--date", "2026-06-21")
-"""Of the rendering: with the shadows of a summer's day, and ambient occlusion."""
+OPTIONS: Final = ("--directions", "4", "--res", RES_M, "--date", "2026-06-21")
+LIGHT: Final = ("sun16", "ao")
+"""Layers besides the usual ones: the shadows of a summer's day, and ambient occlusion."""
 TITLE: Final = ("--title", "A generated town")
 NAME: Final = "demo"
 SCENE: Final = "town"
@@ -23,13 +25,20 @@ SCENE: Final = "town"
 @click.option("--folder", type=click.Path(path_type=Path, file_okay=False), default=Path("map3d-demo"), show_default=True, help="Output folder.")
 @click.option("--port", type=click.IntRange(0, 65535), default=0, show_default="a free port", help="Port to listen on.")
 @click.option("--no-serve", is_flag=True, help="Stop after rendering.")
-def command(folder: Path, port: int, no_serve: bool) -> None:
+@click.option(
+    "--data",
+    type=click.Choice(list(LAYERS_BY_DATA)),
+    default=DEFAULT_DATA,
+    show_default=True,
+    help="Store normal, id and depth as three PNG layers (png), or in a third of the bytes as one layer of data tiles (tile).",
+)
+def command(folder: Path, port: int, no_serve: bool, data: DataEncoding) -> None:
     """Generate a town, render it, serve it and print the address of its map.
 
     You can stop it at any time; re-run it to resume.
     """
     workspace = Workspace(folder / "workspace").create()
-    for title, arguments in remaining_steps(workspace, folder / "town"):
+    for title, arguments in remaining_steps(workspace, folder / "town", data):
         _run(title, arguments)
     if no_serve:
         click.echo(f"next: map3d serve {NAME} --workspace {workspace.root}")
@@ -37,7 +46,7 @@ def command(folder: Path, port: int, no_serve: bool) -> None:
         _run("serving the map; press Ctrl-C to stop", ["serve", NAME, "--port", str(port), "--workspace", str(workspace.root)])
 
 
-def remaining_steps(workspace: Workspace, files: Path) -> Iterator[tuple[str, list[str]]]:
+def remaining_steps(workspace: Workspace, files: Path, data: DataEncoding = DEFAULT_DATA) -> Iterator[tuple[str, list[str]]]:
     """Yields (description, command line) of each step up to rendering, without the steps that an earlier run has completed."""
     where = ["--workspace", str(workspace.root)]
     yield f"generating a town in {files}", ["make-town", "-o", str(files), *TOWN]
@@ -52,7 +61,8 @@ def remaining_steps(workspace: Workspace, files: Path) -> Iterator[tuple[str, li
     if not assets.get(SCENE):
         yield "importing the town's files", ["add-files", SCENE, str(files), *where]
     if NAME not in renderings:
-        yield "building the scene and creating a rendering", ["create-rendering", SCENE, NAME, *OPTIONS, *TITLE, *where]
+        layers = ["--layers", ",".join((*LAYERS_BY_DATA[data], *LIGHT))]
+        yield "building the scene and creating a rendering", ["create-rendering", SCENE, NAME, *OPTIONS, *layers, *TITLE, *where]
     yield "rendering the tiles", ["render", NAME, *where]
 
 

@@ -1,18 +1,18 @@
 """The options that select layers, shared by create-rendering and add-layers."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from datetime import date, datetime
 from functools import wraps
-from typing import Any, cast
+from typing import Any, Final, cast
 
 import click
 
 from map3d.cli.options import Command
 from map3d.geometry.sun import GeographicPosition, SunAngles
-from map3d.renderings.layers import LayerRequest
+from map3d.renderings.layers import LayerRequest, choose_layers
 from map3d.renderings.sun_layers import RADIUS_M as DEFAULT_RADIUS_M
 from map3d.renderings.sun_layers import LightRequest
-from map3d.types import AO_RADIUS_M, COLOR_FORMATS, DEFAULT_LAYERS, LAYER_KINDS
+from map3d.types import AO_RADIUS_M, COLOR_FORMATS, DEFAULT_DATA, LAYER_KINDS, LAYERS_BY_DATA, DataEncoding
 
 
 class IsoTime(click.ParamType):  # type: ignore[type-arg]
@@ -55,28 +55,35 @@ class Pair(click.ParamType):  # type: ignore[type-arg]
         return self._of(first, second)
 
 
-def layer_options(*, default: Sequence[str] = DEFAULT_LAYERS) -> Callable[[Command], Command]:
-    """Adds `--layers` and its related options, passed together as a LayerRequest `layers`. Without a `default`, `--layers` is required."""
+def layer_options(*, required: bool = False) -> Callable[[Command], Command]:
+    """Adds `--layers` and its related options, passed together as a LayerRequest `layers`. Unless `--layers` is required, also `--data`."""
 
     def add(command: Command) -> Command:
         @wraps(command)
-        def gathered(*args: Any, layers: str, color: str, quality: int, small: bool, **rest: Any) -> Any:
-            names = tuple(part.strip() for part in layers.split(",") if part.strip())
+        def gathered(*args: Any, layers: str | None, color: str, quality: int, small: bool, data: DataEncoding | None = None, **rest: Any) -> Any:
+            given = None if layers is None else tuple(part.strip() for part in layers.split(",") if part.strip())
+            names = choose_layers(given, data)
             light = LightRequest(**{name: rest.pop(name) for name in ("time", "sun", "day", "radius_m", "place")})
             return command(*args, layers=LayerRequest(names, color, quality, light, small), **rest)
 
-        for option in reversed([_layers_option(default), *_OPTIONS]):
+        for option in reversed([_layers_option(required=required), *([] if required else [data_option]), *_OPTIONS]):
             gathered = option(gathered)
         return cast(Command, gathered)
 
     return add
 
 
-def _layers_option(default: Sequence[str]) -> Callable[[Any], Any]:
-    settings: dict[str, Any] = {"default": ",".join(default), "show_default": True} if default else {"required": True}
+def _layers_option(*, required: bool) -> Callable[[Any], Any]:
     text = f"Comma-separated layers, each KIND or NAME=KIND. Kinds: {', '.join(LAYER_KINDS)}."
-    return click.option("--layers", help=text, **settings)
+    return click.option("--layers", required=required, help=text if required else f"{text}  [default: {','.join(LAYERS_BY_DATA[DEFAULT_DATA])}]")
 
+
+data_option: Final[Callable[[Any], Any]] = click.option(
+    "--data",
+    type=click.Choice(list(LAYERS_BY_DATA)),
+    help="Instead of --layers: store normal, id and depth as three PNG layers (png), or in a third of the bytes as one layer of data tiles (tile)."
+    f"  [default: {DEFAULT_DATA}]",
+)
 
 _OPTIONS: list[Callable[[Any], Any]] = [
     click.option(

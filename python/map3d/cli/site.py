@@ -16,7 +16,7 @@ from map3d.cli.progress import progress_bar
 from map3d.cli.publish import publish_with_progress
 from map3d.cli.render import print_result, render_with_progress
 from map3d.geometry.views import views_around
-from map3d.types import COLOR_FORMATS, ViewAngles
+from map3d.types import COLOR_FORMATS, DEFAULT_DATA, LAYERS_BY_DATA, ViewAngles
 
 if TYPE_CHECKING:
     from map3d.renderings.site_files import ImportSummary
@@ -43,6 +43,13 @@ if TYPE_CHECKING:
     help="Metres per pixel.  [default: as fine as textures and triangles, coarser for large scenes, so that rendering takes minutes]",
 )
 @click.option("--color", type=click.Choice(list(COLOR_FORMATS)), default="webp", show_default=True, help="Image format of the layer color.")
+@click.option(
+    "--data",
+    type=click.Choice(list(LAYERS_BY_DATA)),
+    default=DEFAULT_DATA,
+    show_default=True,
+    help="Store normal, id and depth as three PNG layers (png), or in a third of the bytes as one layer of data tiles (tile).",
+)
 @click.option("--crs", help="Coordinate system of the files, where they do not state it or state it wrongly; 'local' for local metres.")
 @format_options
 @click.option("--strict", is_flag=True, help="Stop at the first problem instead of skipping it.")
@@ -116,6 +123,7 @@ def _site_request(folder: Path, views: tuple[ViewAngles, ...], **options: Any) -
         title=options["title"] or folder_name,
         attribution=options["attribution"],
         color=options["color"],
+        data=options["data"],
         options=ImportOptions(
             **{name: options[name] for name in ("crs", "up", "split", "theme", "lod", "interiors", "transparency", "max_error_m", "strict")},
             virtual_rasters=True,

@@ -16,6 +16,7 @@ from map3d.jobs.demands import Demand, Demands
 from map3d.jobs.finish_process import finish_in_subprocess
 from map3d.jobs.on_demand_cache import OnDemandCache, Place
 from map3d.jobs.on_demand_worker import OnDemandSettings, OnDemandWorker, check_can_be_done, find_job
+from map3d.tiles.decode_tile import find_layer
 from map3d.types import BlockId
 
 POLL_S: Final = 0.25
@@ -62,7 +63,8 @@ class OnDemand:
         frame = None if record is None else record.frame(view)
         if record is None or frame is None:
             return None
-        return next(((record, track) for track in record.tracks_of(frame) if any(one.name == layer for one in track.layers)), None)
+        found = find_layer(record.layers, layer)
+        return None if found is None else next((record, track) for track in record.tracks_of(frame) if found[1] in track.layers)
 
     def open_job(self, rendering: str, track: str, block: BlockId) -> Job | None:
         """Returns the block's job if it is planned and not done."""

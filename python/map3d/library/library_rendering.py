@@ -19,10 +19,10 @@ from map3d.publish import Published, publish
 from map3d.renderings.build import build_if_stale
 from map3d.renderings.cost_estimate import RenderingEstimate, estimate
 from map3d.renderings.create import add_layers, add_views
-from map3d.renderings.layers import LayerRequest
+from map3d.renderings.layers import LayerRequest, choose_layers
 from map3d.renderings.remove_rendering import find_rendering, remove_rendering
 from map3d.renderings.sun_layers import LightRequest
-from map3d.types import DEFAULT_LAYERS, ViewAngles
+from map3d.types import DataEncoding, ViewAngles
 
 
 class LibraryRendering:
@@ -114,8 +114,9 @@ class LibraryRendering:
 
 
 def layer_request(
-    layers: Sequence[str] = DEFAULT_LAYERS,
+    layers: Sequence[str] | None = None,
     *,
+    data: DataEncoding | None = None,
     color: str = "webp",
     quality: int = 80,
     small: bool = False,
@@ -128,7 +129,7 @@ def layer_request(
     angles = None if sun is None else SunAngles(*sun)
     position = None if place is None else GeographicPosition(*place)
     light = LightRequest(time=time, sun=angles, day=day, radius_m=radius_m, place=position)
-    return LayerRequest(tuple(layers), color, quality, light, small)
+    return LayerRequest(tuple(choose_layers(layers, data)), color, quality, light, small)
 
 
 def _show(progress: OnProgress | None, stage: str, done: int, total: int) -> None:

@@ -19,7 +19,7 @@ from map3d.renderings.outliers import Outliers, choose_content, read_outliers
 from map3d.renderings.remove_files import find_files, is_built, remove_files
 from map3d.renderings.remove_scene import find_scene, remove_scene
 from map3d.renderings.style import check_style, choose_style
-from map3d.types import DEFAULT_LAYERS, ViewAngles
+from map3d.types import DataEncoding, ViewAngles
 
 View = tuple[float, float] | str
 """(look-at angle, pitch) in degrees, or a view as text, such as "45-22.5"."""
@@ -120,7 +120,8 @@ class LibraryScene:
         pitch: float = DEFAULT_PITCH_DEG,
         res_m: float | None = None,
         levels: int | None = None,
-        layers: Sequence[str] = DEFAULT_LAYERS,
+        layers: Sequence[str] | None = None,
+        data: DataEncoding | None = None,
         tile_px: int = 256,
         title: str = "",
         attribution: str = "",
@@ -131,17 +132,17 @@ class LibraryScene:
         **layer_options: Any,
     ) -> LibraryRendering:
         """Builds the scene if its files have changed, and creates a rendering of it. `views`, or `directions` evenly spaced look-at angles (4 by
-        default) at `pitch`; `res_m` metres per pixel, or a number of `levels`. `layer_options`: color, quality, small, time, sun, day, radius_m,
-        place (`LibraryRendering.add_layers`). The others are those of `map3d create-rendering`.
+        default) at `pitch`; `res_m` metres per pixel, or a number of `levels`. `layers`: each KIND or NAME=KIND; without them, color with normal, id
+        and depth, as PNG layers for the `data` "png", as one layer of data tiles for "tile". `layer_options`: color, quality, small, time, sun, day,
+        radius_m, place (`LibraryRendering.add_layers`). The others are those of `map3d create-rendering`.
 
         Raises AlreadyExists, BadName, BadRequest.
         """
         if views is not None and directions is not None:
             raise BadRequest(f"rendering {name}: give either views or directions")
         angles = views_around(directions or 4, [pitch]) if views is None else [view_angles(view) for view in views]
-        request = RenderingRequest(
-            self.name, name, angles, res_m, levels, layer_request(layers, **layer_options), tile_px, title, attribution, regrid, window, tiles
-        )
+        chosen = layer_request(layers, data=data, **layer_options)
+        request = RenderingRequest(self.name, name, angles, res_m, levels, chosen, tile_px, title, attribution, regrid, window, tiles)
         request.check(self._catalogue)
         self.build(progress=progress)
         record = create_rendering(self._workspace, self._catalogue, request)

@@ -1,25 +1,23 @@
 """Answers views from the tiles of a rendering when they lie on its pixel grid: same direction, same size of pixels, same scene, nothing clipped."""
 
-import io
 import math
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from map3d.catalogue import Catalogue, RenderingRecord, Workspace
-from map3d.errors import Corrupt, Map3dError
+from map3d.errors import Map3dError
 from map3d.geometry.frames import NO_DEPTH, PinnedFrame, corners
 from map3d.geometry.views import Axes, track_id, uvd_from_local
 from map3d.portrayal.cameras import ViewCamera
 from map3d.portrayal.selection import Selection
 from map3d.renderings.track_stores import open_track, read_manifest
+from map3d.tiles.decode_tile import decode_tile, layer_with, paste, with_alpha
 from map3d.tiles.manifest import Manifest
-from map3d.types import DEPTH_UNIT_M, Box, TileId
+from map3d.types import DEPTH_UNIT_M, Box, Layer, TileId
 
 ALIGNED_PX: Final = 0.02
 """Greatest deviation of a view's borders from the pixel grid."""
@@ -68,7 +66,7 @@ class PyramidViews:
         if camera.near_m > depths.min() or camera.far_m < depths.max():
             return None
         for rendering in self._catalogue.renderings(scene):
-            if set(kinds) <= {layer.kind for layer in rendering.layers}:
+            if all(layer_with(rendering.layers, kind) is not None for kind in kinds):
                 found = next((place for frame in rendering.frames if (place := _align(rendering, frame, camera)) is not None), None)
                 if found is not None and self._is_current(rendering):
                     return found
@@ -104,18 +102,18 @@ class PyramidViews:
 
     def _read(self, view: AlignedView, kinds: Sequence[str]) -> Arrays:
         arrays = {kind: _empty(kind, view) for kind in kinds}
-        with ExitStack() as opened:
-            for number, layers in enumerate(view.rendering.passes):
-                wanted = {layer.kind: layer for layer in reversed(layers) if layer.kind in kinds and layer.kind not in _done(view, kinds, number)}
-                if not wanted:
-                    continue
-                store = opened.enter_context(open_track(self._workspace, view.rendering, track_id(view.frame.id, number)))
-                for kind, layer in wanted.items():
+        places = list(view.tiles())
+        for number, layers in enumerate(view.rendering.passes):
+            wanted = _wanted(view, kinds, layers)
+            if not wanted:
+                continue
+            with open_track(self._workspace, view.rendering, track_id(view.frame.id, number)) as store:
+                for layer, own in wanted.items():
                     index = store.shape.layer_number(layer.name)
-                    places = list(view.tiles())
                     for (_, x, y), data in zip(places, store.read_tiles(index, [tile for tile, _, _ in places]), strict=True):
-                        if data is not None:
-                            _paste(arrays[kind], _decode(kind, data, view.frame.tile_px), x, y)
+                        pixels = {} if data is None else decode_tile(layer, data, view.frame.tile_px)
+                        for kind in own if pixels else ():
+                            paste(arrays[kind], with_alpha(pixels[kind]) if kind == "color" else pixels[kind], x, y)
         if "depth" in arrays:
             arrays["depth"] = _metres(arrays["depth"], view)
         return arrays
@@ -143,9 +141,14 @@ def _align(rendering: RenderingRecord, frame: PinnedFrame, camera: ViewCamera) -
     return AlignedView(rendering, frame, z, column, row, camera.width_px, camera.height_px, camera.depth_zero_m)
 
 
-def _done(view: AlignedView, kinds: Sequence[str], number: int) -> set[str]:
-    """Returns the kinds that an earlier pass has."""
-    return {layer.kind for layers in view.rendering.passes[:number] for layer in layers if layer.kind in kinds}
+def _wanted(view: AlignedView, kinds: Sequence[str], layers: Sequence[Layer]) -> dict[Layer, list[str]]:
+    """Returns the layers of a pass to read, each with its kinds: a kind is read from the first layer of the rendering that has it."""
+    wanted: dict[Layer, list[str]] = {}
+    for kind in kinds:
+        layer = layer_with(view.rendering.layers, kind)
+        if layer is not None and layer in layers:
+            wanted.setdefault(layer, []).append(kind)
+    return wanted
 
 
 def _empty(kind: str, view: AlignedView) -> NDArray[Any]:
@@ -159,26 +162,6 @@ def _empty(kind: str, view: AlignedView) -> NDArray[Any]:
             return np.zeros(shape, np.uint32)
         case _:
             return np.full(shape, NO_DEPTH, np.uint32)
-
-
-def _decode(kind: str, data: bytes, tile_px: int) -> NDArray[Any]:
-    """Raises Corrupt."""
-    try:
-        with Image.open(io.BytesIO(data)) as image:
-            pixels = np.asarray(image.convert("RGBA") if kind == "color" else image)
-    except (OSError, ValueError) as error:
-        raise Corrupt(f"a tile of layer {kind} is not an image: {error}") from error
-    expected = (tile_px, tile_px, 3 if kind == "normal" else 4)
-    if pixels.shape != expected:
-        raise Corrupt(f"a tile of layer {kind} has shape {pixels.shape}, expected {expected}")
-    return np.ascontiguousarray(pixels).view("<u4")[..., 0] if kind in ("id", "depth") else pixels
-
-
-def _paste(into: NDArray[Any], tile: NDArray[Any], x: int, y: int) -> None:
-    """Copies the part of a tile that the view shows; (x, y): the tile's corner in the view."""
-    height, width = into.shape[:2]
-    left, top, right, bottom = max(x, 0), max(y, 0), min(x + tile.shape[1], width), min(y + tile.shape[0], height)
-    into[top:bottom, left:right] = tile[top - y : bottom - y, left - x : right - x]
 
 
 def _metres(units: NDArray[np.uint32], view: AlignedView) -> NDArray[np.float32]:

@@ -1,4 +1,4 @@
-"""GetResourceById: stored tiles and manifests of renderings, as they are.
+"""GetResourceById: manifests and tiles of renderings as stored, and PNG tiles of normal, id and depth from data tiles.
 
 Resource ids are `tiles/<rendering>/rendering.json` and `tiles/<rendering>/<view>/<layer>/<z>/<x>/<y>`, the paths of the same files on this server.
 """
@@ -12,6 +12,7 @@ from map3d.portrayal.answers import REVALIDATE, Answer
 from map3d.portrayal.parameters import Parameters
 from map3d.portrayal.service_exception import ServiceException, invalid, quote
 from map3d.renderings.track_stores import open_track, read_manifest
+from map3d.tiles.decode_tile import as_layer, find_layer
 from map3d.tiles.manifest import FILE_NAME
 from map3d.tiles.naming import parse_tile
 from map3d.types import TileId, check_name
@@ -58,17 +59,18 @@ class Resources:
     def _tile(self, record: RenderingRecord, view: str, layer: str, z: str, x: str, y: str) -> tuple[str, bytes] | None:
         """Returns the media type and the bytes; None for a tile without content."""
         tile, frame = parse_tile(z, x, y), record.frame(view)
-        for number, layers in enumerate(record.passes if tile is not None and frame is not None else ()):
-            known = next((one for one in layers if one.name == layer), None)
-            if known is not None:
-                data = self._read(record, track_id(view, number), layer, tile)
-                return None if data is None else (known.media_type, data)
-        return None
+        found = find_layer(record.layers, layer)
+        if tile is None or frame is None or found is None:
+            return None
+        asked, stored = found
+        number = next(number for number, layers in enumerate(record.passes) if stored in layers)
+        data = self._read(record, track_id(view, number), stored.name, tile)
+        return None if data is None else (asked.media_type, as_layer(asked, stored, data, frame.tile_px))
 
-    def _read(self, record: RenderingRecord, track: str, layer: str, tile: TileId | None) -> bytes | None:
+    def _read(self, record: RenderingRecord, track: str, layer: str, tile: TileId) -> bytes | None:
         try:
             with open_track(self._workspace, record, track) as store:
-                return None if tile is None or tile.z > store.shape.zmax else store.get_tile(store.shape.layer_number(layer), *tile)
+                return None if tile.z > store.shape.zmax else store.get_tile(store.shape.layer_number(layer), *tile)
         except NotFound:
             return None
 

@@ -1,4 +1,5 @@
-"""Exports one view and layer for other software: MBTiles, a folder of z/x/y files, or a Deep Zoom Image. Tiles keep their bytes.
+"""Exports one view and layer for other software: MBTiles, a folder of z/x/y files, or a Deep Zoom Image. Tiles keep their bytes; normal, id and depth
+of data tiles become PNG.
 
 Every target appears only once it is complete. A stopped export of files goes on where it stopped, unless the tiles have changed.
 """
@@ -21,15 +22,17 @@ from map3d.catalogue import Workspace
 from map3d.errors import AlreadyExists, BadRequest, Corrupt, NotFound, Stopped, StoreError
 from map3d.geometry.views import track_id
 from map3d.renderings.track_stores import open_track, read_manifest, rendering_record
+from map3d.tiles.decode_tile import as_layer, decode_channels, find_layer, layer_names
 from map3d.tiles.manifest import Manifest, ManifestView
 from map3d.tiles.tile_store import TileStore
-from map3d.types import COLOR_KINDS, Layer, TileId
+from map3d.types import COLOR_KINDS, DATA_TILE_KINDS, FILE_SUFFIXES, Layer, TileId
 
 Format = Literal["mbtiles", "xyz", "dzi"]
 FORMATS: Final[tuple[Format, ...]] = ("mbtiles", "xyz", "dzi")
-SUFFIXES: Final = {"webp": "webp", "png": "png", "jpeg": "jpg"}
 TILES_PER_STEP: Final = 256
 _NAMESPACE: Final = "http://schemas.microsoft.com/deepzoom/2008"
+_MBTILES_FORMATS: Final = ("webp", "png", "jpeg")
+"""Formats that MBTiles 1.3 names by suffix, others by media type."""
 MARKER: Final = ".map3d-export.json"
 NOTE: Final = "Oblique image tiles in the view's own plane, not on the globe: positions have no longitude and latitude."
 
@@ -46,15 +49,28 @@ class Exported:
 
 @dataclass(frozen=True)
 class _Source:
+    """`layer`: as exported; `stored`: the layer of the store that has its pixels, with `number`."""
+
     manifest: Manifest
     view: ManifestView
     layer: Layer
+    stored: Layer
     number: int
     store: TileStore
 
     @property
     def suffix(self) -> str:
-        return SUFFIXES[self.layer.format]
+        return FILE_SUFFIXES[self.layer.format]
+
+    def read(self, tile: TileId) -> bytes:
+        """Raises Corrupt."""
+        data = self.store.get_tile(self.number, *tile)
+        if data is None:
+            raise Corrupt(f"tile {tile.z}/{tile.x}/{tile.y} was removed during the export; export again")
+        try:
+            return as_layer(self.layer, self.stored, data, self.manifest.tile_px)
+        except Corrupt as error:
+            raise Corrupt(f"{self.store.url}: tile {self.stored.name}/{tile.z}/{tile.x}/{tile.y}: {error}; run: map3d verify") from error
 
     def identity(self) -> str:
         """Returns a text that differs for other tiles."""
@@ -77,11 +93,14 @@ def export(
     found = manifest.view(view)
     if found is None:
         raise NotFound(f"rendering {rendering!r} has no view {view!r}; its views are {', '.join(one.frame.id for one in manifest.views)}")
-    number = next((number for number, layers in enumerate(manifest.passes) if layer in [one.name for one in layers]), None)
-    if number is None:
-        raise NotFound(f"rendering {rendering!r} has no layer {layer!r}; its layers are {', '.join(one.name for one in manifest.layers)}")
+    holder = find_layer(manifest.layers, layer)
+    if holder is None:
+        raise NotFound(f"rendering {rendering!r} has no layer {layer!r}; its layers are {', '.join(layer_names(manifest.layers))}")
+    number = next(number for number, layers in enumerate(manifest.passes) if holder[1] in layers)
     with open_track(workspace, record, track_id(view, number)) as store:
-        source = _Source(manifest, found, store.shape.layers[store.shape.layer_number(layer)], store.shape.layer_number(layer), store)
+        chosen = find_layer(store.shape.layers, layer)
+        assert chosen is not None, "the store has the layers of the manifest"
+        source = _Source(manifest, found, *chosen, store.shape.layer_number(chosen[1].name), store)
         try:
             return _export(source, _WRITERS[to](source, out), progress or (lambda *_: True))
         except (OSError, sqlite3.Error) as error:
@@ -94,9 +113,7 @@ def _export(source: _Source, writer: "_Writer", progress: OnTiles) -> Exported:
     writer.start(before)
     done = 0
     for done, tile in enumerate(source.store.list_tiles(source.number), 1):
-        data = source.store.get_tile(source.number, *tile)
-        if data is None:
-            raise Corrupt(f"tile {tile.z}/{tile.x}/{tile.y} was removed during the export; export again")
+        data = source.read(tile)
         size += len(data)
         writer.add(tile, data)
         if done % TILES_PER_STEP == 0 and not progress(done, max(total, done)):
@@ -147,7 +164,7 @@ class _MbtilesWriter(_Writer):
         manifest, view, layer = self.source.manifest, self.source.view, self.source.layer
         return {
             "name": f"{manifest.title or manifest.name}: {view.frame.id}, {layer.name}",
-            "format": SUFFIXES[layer.format],
+            "format": self.source.suffix if layer.format in _MBTILES_FORMATS else layer.media_type,
             "minzoom": "0",
             "maxzoom": str(manifest.zmax),
             "type": "baselayer",
@@ -220,6 +237,8 @@ class _DziWriter(_FilesWriter):
     def _target(self) -> Path:
         if self.out.suffix != ".dzi":
             raise BadRequest(f"{self.out}: the name of a Deep Zoom Image ends with .dzi")
+        if self.source.layer.kind == "data":
+            raise BadRequest(f"layer {self.source.layer.name}: data tiles are no images; export {', '.join(DATA_TILE_KINDS)}, or to mbtiles or xyz")
         return self.out.with_name(f"{self.out.stem}_files")
 
     def _first_level(self) -> int:
@@ -235,8 +254,8 @@ class _DziWriter(_FilesWriter):
 
     def _shrink(self, data: bytes) -> None:
         method = Image.Resampling.BOX if self.source.layer.kind in COLOR_KINDS else Image.Resampling.NEAREST
-        with Image.open(io.BytesIO(data)) as whole:
-            whole.load()
+        pixels = decode_channels(self.source.layer, data, self.source.manifest.tile_px)
+        with Image.fromarray(pixels.squeeze(axis=2) if pixels.shape[2] == 1 else pixels) as whole:
             for level in range(self._first_level()):
                 shrunk = io.BytesIO()
                 with whole.resize((1 << level, 1 << level), method) as small:

@@ -19,7 +19,7 @@ from map3d.types import Layer, TileId
 _reading: Any = pmtiles.reader
 _writing: Any = pmtiles.writer
 
-TILE_TYPES: Final = {"webp": TileType.WEBP, "png": TileType.PNG, "jpeg": TileType.JPEG}
+TILE_TYPES: Final = {"webp": TileType.WEBP, "png": TileType.PNG, "jpeg": TileType.JPEG, "m3d": TileType.UNKNOWN}
 TILES_PER_STEP: Final = 256
 LEAF_ENTRIES: Final = 256
 """Tiles per leaf directory, about 0.9 kB. A client that shows one area of a large pyramid reads four or five. Doubled until the root fits."""

@@ -11,10 +11,11 @@ from map3d.catalogue import RenderingRecord, Workspace
 from map3d.errors import Corrupt
 from map3d.geometry.views import track_id
 from map3d.renderings.track_stores import open_track
+from map3d.tiles.decode_tile import decode_tile, layer_with, paste, with_alpha
 from map3d.tiles.light_colors import DEFAULT_LIGHT, Pixels, light_colors
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.preview import Preview, choose_preview
-from map3d.types import Layer, TileId
+from map3d.types import COLOR_KINDS, Layer, TileId
 
 FILE: Final = "preview.jpg"
 WIDTH_PX: Final = 1200
@@ -22,6 +23,8 @@ HEIGHT_PX: Final = 630
 QUALITY: Final = 82
 BACKGROUND: Final = (242, 240, 235)
 """Colour of the viewer's page around the model."""
+_SHAPES: Final[dict[str, tuple[int, ...]]] = {"color": (4,), "picture": (4,), "normal": (3,), "ao": ()}
+"""Channels of a pixel by kind."""
 
 
 def make_preview(workspace: Workspace, record: RenderingRecord, manifest: Manifest) -> bytes | None:
@@ -31,7 +34,7 @@ def make_preview(workspace: Workspace, record: RenderingRecord, manifest: Manife
     if chosen is None:
         return None
     window = _PreviewWindow(workspace, record, manifest, chosen)
-    colors = window.read(chosen.layer, "RGBA")
+    colors = window.read(chosen.layer, chosen.layer.kind)
     if colors is None:
         return None
     if chosen.layer.kind == "color":
@@ -46,7 +49,7 @@ def make_preview(workspace: Workspace, record: RenderingRecord, manifest: Manife
 
 def _light(window: "_PreviewWindow", rgb: Pixels) -> Pixels:
     """Lights colours by the layers that the rendering has."""
-    normals, openness = window.read_kind("normal", "RGB"), window.read_kind("ao", "L")
+    normals, openness = window.read_kind("normal"), window.read_kind("ao")
     return rgb if normals is None else light_colors(rgb, normals, DEFAULT_LIGHT, openness)
 
 
@@ -57,34 +60,30 @@ class _PreviewWindow:
     manifest: Manifest
     preview: Preview
 
-    def read_kind(self, kind: str, mode: str) -> Pixels | None:
-        layer = next((layer for layers in self.manifest.passes for layer in layers if layer.kind == kind), None)
-        return None if layer is None else self.read(layer, mode)
+    def read_kind(self, kind: str) -> Pixels | None:
+        layer = layer_with(self.manifest.layers, kind)
+        return None if layer is None else self.read(layer, kind)
 
-    def read(self, layer: Layer, mode: str) -> Pixels | None:
-        """Returns the pixels of a layer, (H, W) or (H, W, C); None if no tile is stored. Nothing is 0, or 255 in grey layers."""
+    def read(self, layer: Layer, kind: str) -> Pixels | None:
+        """Returns the pixels of a kind that a layer holds: RGBA of colours, (H, W, 3) of normals, (H, W) of ao; None if no tile is stored. Nothing is
+        0, in ao 255."""
         left, top, width, height = self.preview.window
-        origin_x, origin_y, side = round(left), round(top), self.manifest.tile_px
         number = next(number for number, layers in enumerate(self.manifest.passes) if layer in layers)
+        window: Pixels = np.full((round(height), round(width), *_SHAPES[kind]), 255 if kind == "ao" else 0, np.uint8)
         drawn = False
-        with (
-            Image.new(mode, (round(width), round(height)), 255 if mode == "L" else 0) as window,
-            open_track(self.workspace, self.record, track_id(self.preview.view, number)) as store,
-        ):
+        with open_track(self.workspace, self.record, track_id(self.preview.view, number)) as store:
             for tile in self.preview.tiles:
                 data = store.get_tile(store.shape.layer_number(layer.name), *tile)
                 if data is not None:
-                    window.paste(
-                        _decode(data, mode, f"{self.preview.view}/{layer.name}", tile, store.url),
-                        (tile.x * side - origin_x, tile.y * side - origin_y),
-                    )
+                    pixels = self._decode(layer, kind, data, tile, store.url)
+                    paste(window, pixels, tile.x * self.manifest.tile_px - round(left), tile.y * self.manifest.tile_px - round(top))
                     drawn = True
-            return np.array(window) if drawn else None
+        return window if drawn else None
 
-
-def _decode(data: bytes, mode: str, path: str, tile: TileId, url: str) -> Image.Image:
-    try:
-        with Image.open(io.BytesIO(data)) as image:
-            return image.convert(mode)
-    except OSError as error:
-        raise Corrupt(f"{url}: tile {path}/{tile.z}/{tile.x}/{tile.y} is not an image: {error}; run: map3d verify") from error
+    def _decode(self, layer: Layer, kind: str, data: bytes, tile: TileId, url: str) -> Pixels:
+        try:
+            pixels = decode_tile(layer, data, self.manifest.tile_px)[kind]
+        except Corrupt as error:
+            path = f"{self.preview.view}/{layer.name}/{tile.z}/{tile.x}/{tile.y}"
+            raise Corrupt(f"{url}: tile {path}: {error}; run: map3d verify") from error
+        return with_alpha(pixels) if kind in COLOR_KINDS else pixels

@@ -15,7 +15,6 @@ from map3d.catalogue import RenderingRecord, Workspace
 from map3d.errors import BadRequest, Corrupt, NotFound, Stopped, StoreError
 from map3d.geometry.views import track_id
 from map3d.object_store import open_object_store
-from map3d.publish.exports import SUFFIXES
 from map3d.publish.folder_target import FolderTarget
 from map3d.publish.layer_definitions import gdal_wms, qgis_layer, wkt
 from map3d.publish.page_head import add_policy, describe_page
@@ -32,7 +31,7 @@ from map3d.renderings.track_stores import open_track, read_manifest, rendering_r
 from map3d.tiles.manifest import FILE_NAME, Manifest, ManifestView
 from map3d.tiles.tile_store import TileStore
 from map3d.tiles.viewer_files import PAGE, viewer_files, viewer_folder
-from map3d.types import COLOR_KINDS, Layer, TileId
+from map3d.types import COLOR_KINDS, FILE_SUFFIXES, Layer, TileId
 
 OnTiles = Callable[[str, int, int], bool]
 """(stage, done, total) → False to stop. The stage "publish" counts tiles, "files" counts other files; `total` is 0 if it is unknown."""
@@ -212,7 +211,7 @@ class _Publisher:
             yield f"{GIS}/{view.frame.id}.wkt", wkt(self._manifest, view).encode()
             for number, layers in enumerate(self._manifest.passes):
                 for layer in (layer for layer in layers if layer.kind in COLOR_KINDS):
-                    place, suffix = f"{GIS}/{view.frame.id}/{layer.name}", SUFFIXES[layer.format]
+                    place, suffix = f"{GIS}/{view.frame.id}/{layer.name}", FILE_SUFFIXES[layer.format]
                     template = f"{address}/{place}/{{z}}/{{x}}/{{y}}.{suffix}"
                     yield f"{GIS}/{view.frame.id}-{layer.name}.xml", gdal_wms(self._manifest, view, layer, template).encode()
                     yield f"{GIS}/{view.frame.id}-{layer.name}.qlr", qgis_layer(self._manifest, view, layer, template).encode()

@@ -7,7 +7,7 @@ from typing import Final
 from map3d.catalogue import SceneRecord
 from map3d.errors import BadRequest
 from map3d.renderings.sun_layers import LightRequest
-from map3d.types import COLOR_KINDS, DEFAULT_LAYERS, LAYER_KINDS, Box, Layer, LayerKind
+from map3d.types import COLOR_KINDS, DEFAULT_DATA, DEFAULT_LAYERS, LAYER_KINDS, LAYERS_BY_DATA, Box, DataEncoding, Layer, LayerKind, format_of
 
 LOSSY: Final = ("webp", "jpeg")
 
@@ -43,7 +43,16 @@ class LayerRequest:
         suns, radius_m = self.light.suns(kind, scene, box), self.light.radius_of(kind)
         if kind in COLOR_KINDS:
             return Layer(name, kind, self.color, self.quality if self.color in LOSSY else None, suns, radius_m, self.small)
-        return Layer(name, kind, "png", suns=suns, radius_m=radius_m, small=self.small)
+        return Layer(name, kind, format_of(kind), suns=suns, radius_m=radius_m, small=self.small)
+
+
+def choose_layers(names: Sequence[str] | None, data: DataEncoding | None) -> Sequence[str]:
+    """Returns `names`; without them, color with normal, id and depth as `data` says. Raises BadRequest for both."""
+    if names is None:
+        return LAYERS_BY_DATA[data or DEFAULT_DATA]
+    if data is not None:
+        raise BadRequest("give either --layers or --data; in --layers, the kind data is the data tile and normal, id and depth are PNG layers")
+    return names
 
 
 def _name_and_kind(text: str) -> tuple[str, LayerKind]:

@@ -24,7 +24,7 @@ from map3d.renderings.site_report import SiteReport, read_report, view_names, wr
 from map3d.renderings.style import Rules
 from map3d.renderings.sun_layers import RADIUS_M, LightRequest
 from map3d.renderings.track_stores import remove_tracks
-from map3d.types import AO_RADIUS_M, DEFAULT_LAYERS, ViewAngles
+from map3d.types import AO_RADIUS_M, DEFAULT_DATA, LAYERS_BY_DATA, DataEncoding, ViewAngles
 
 AO_RADIUS_SHARE: Final = 0.25
 """Greatest radius of ambient occlusion as a share of the scene's longest side."""
@@ -42,6 +42,7 @@ class SiteRequest:
     title: str = ""
     attribution: str = ""
     color: str = "webp"
+    data: DataEncoding = DEFAULT_DATA
     options: ImportOptions = field(default_factory=ImportOptions)
     allow_empty: bool = False
     keep_outliers: bool = False
@@ -75,7 +76,7 @@ def create_site_rendering(workspace: Workspace, catalogue: Catalogue, request: S
     resolution = None if request.res_m else choose_resolution(scene, list(request.views), detail)
     res_m = request.res_m if resolution is None else resolution.res_m
     has_chosen_ao = request.ao is None and detail is not None and detail.texel_m is None
-    names = (*DEFAULT_LAYERS, "ao") if request.ao or has_chosen_ao else DEFAULT_LAYERS
+    names = LAYERS_BY_DATA[request.data] + (("ao",) if request.ao or has_chosen_ao else ())
     light = LightRequest(radius_m=_ao_radius_m(scene) if "ao" in names else None)
     layers = LayerRequest(names, color=request.color, light=light)
     rendering = RenderingRequest(

@@ -14,6 +14,7 @@ from map3d.geometry.views import uvd_from_local, view_id
 from map3d.tile_services.daylight import light_at, parse_time, time_text
 from map3d.tile_services.tile_formats import parse_suffix, suffix_of
 from map3d.tile_services.tiled_view import NotOffered
+from map3d.tiles.decode_tile import layer_with
 from map3d.tiles.manifest import Manifest, ManifestView
 from map3d.tiles.view_plane import reference_height_m
 from map3d.types import COLOR_KINDS, ViewAngles
@@ -162,7 +163,7 @@ def _choose_style(manifest: Manifest, style: str | None) -> str:
     names = [layer.name for layer in manifest.layers if layer.kind in COLOR_KINDS]
     if not names:
         raise NotOffered(f"rendering {manifest.name!r} has no colour layer")
-    can_be_lit = {"color", "normal"} <= {layer.name for layer in manifest.layers}
+    can_be_lit = "color" in names and layer_with(manifest.layers, "normal") is not None
     styles = [LIT, *names] if can_be_lit else names
     if style is None:
         return LIT if can_be_lit else names[0]

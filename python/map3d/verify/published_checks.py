@@ -19,7 +19,7 @@ from map3d.tiles.tile_store import TileStore
 from map3d.tiles.viewer_files import PAGE
 from map3d.types import Layer, TileId
 
-FIRST_BYTES: Final = {"png": b"\x89PNG\r\n\x1a\n", "jpeg": b"\xff\xd8\xff", "webp": b"RIFF"}
+FIRST_BYTES: Final = {"png": b"\x89PNG\r\n\x1a\n", "jpeg": b"\xff\xd8\xff", "webp": b"RIFF", "m3d": b"M3D\x01"}
 SHOWN: Final = 10
 
 

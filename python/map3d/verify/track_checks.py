@@ -11,11 +11,11 @@ from map3d.catalogue import Catalogue, Job, RenderingRecord, State, Track, Works
 from map3d.errors import Corrupt, Map3dError, StoreError
 from map3d.renderings.plan import planned_occupancy, track_frame
 from map3d.renderings.track_stores import find_track, track_url
+from map3d.tiles.decode_tile import decode_tile
 from map3d.tiles.naming import block_level, block_of, blocks_below, children, parent
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.tile_store import StoredBlock, TileStore
 from map3d.types import BlockId, TileId
-from map3d.verify.decode import decode_tile, ids_of
 from map3d.verify.findings import Findings
 
 Progress = Callable[[str, int, int], None]
@@ -114,7 +114,7 @@ class _TrackChecker:
                 self._add(f"{_name(tile)}: has content where the scene has none", self._block_of(tile))
 
     def check_images(self, tiles: set[TileId], ids: NDArray[np.uint32]) -> None:
-        """Checks that every image decodes to its size and that every id is registered."""
+        """Checks that every tile of every layer decodes to its size and that every id is registered."""
         for done, tile in enumerate(sorted(tiles), 1):
             for number, layer in enumerate(self.track.layers):
                 data = self.store.get_tile(number, *tile)
@@ -125,8 +125,8 @@ class _TrackChecker:
                 except Corrupt as error:
                     self._add(f"{_name(tile)} {layer.name}: {error}", self._block_of(tile))
                     continue
-                if layer.kind == "id" and tile.z == self.track.frame.zmax:
-                    self._check_ids(tile, np.setdiff1d(ids_of(pixels), ids))
+                if "id" in pixels and tile.z == self.track.frame.zmax:
+                    self._check_ids(tile, np.setdiff1d(pixels["id"][pixels["id"] != 0], ids))
             if done % 64 == 0 or done == len(tiles):
                 self.progress(f"tiles of {self.where}", done, len(tiles))
         self.findings.count("tiles", len(tiles))

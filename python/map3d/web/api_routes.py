@@ -12,7 +12,7 @@ from map3d.operations.estimating import estimate_apart
 from map3d.operations.request_operation import request_operation
 from map3d.renderings.create import RenderingRequest, create_rendering
 from map3d.renderings.create_scene import SceneRequest, create_scene
-from map3d.types import DEFAULT_LAYERS, ViewAngles
+from map3d.types import ViewAngles
 from map3d.web.access import require
 from map3d.web.api_document import openapi_document
 from map3d.web.api_route import LIMIT, MAX_PAGE, Query, api, route
@@ -22,7 +22,7 @@ from map3d.web.document_routes import catalogue, workspace
 PAGE: Final = 100
 ESTIMATE_AGAIN_S: Final = 10
 _AFTER: Final = Query("after", "Name after which the page begins.")
-_LAYER_OPTIONS: Final = ("color", "quality", "small", "radius_m")
+_LAYER_OPTIONS: Final = ("data", "color", "quality", "small", "radius_m")
 _estimating: Final = Lock()
 __all__ = ["api"]
 
@@ -208,7 +208,7 @@ def _rendering_request(body: dict[str, Any]) -> RenderingRequest:
         body["scene"],
         body["name"],
         views or views_around(body.get("directions", 4), [body.get("pitch", DEFAULT_PITCH_DEG)]),
-        layers=layer_request(body.get("layers", DEFAULT_LAYERS), **options),
+        layers=layer_request(body.get("layers"), **options),
         window=tuple(body["window"]) if "window" in body else None,
         **{name: body[name] for name in names if name in body},
     )

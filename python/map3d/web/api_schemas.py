@@ -6,7 +6,7 @@ from typing import Any, Final
 from map3d.catalogue import OperationState, State
 from map3d.catalogue.operation_records import OPERATION_KINDS
 from map3d.operations.arguments import ARGUMENTS
-from map3d.types import COLOR_FORMATS, LAYER_KINDS, TILE_PX
+from map3d.types import COLOR_FORMATS, LAYER_KINDS, LAYERS_BY_DATA, TILE_PX
 
 Schema = Mapping[str, Any]
 
@@ -113,6 +113,11 @@ SCHEMAS: Final[dict[str, Schema]] = {
             "tile_px": {"type": "integer", "enum": list(TILE_PX)},
             "window": _array(_NUMBER, 3, description="x, y of the centre and the side of the square to render, metres."),
             "layers": _array(TEXT, minItems=1, description="KIND or NAME=KIND each."),
+            "data": {
+                "type": "string",
+                "enum": list(LAYERS_BY_DATA),
+                "description": "Instead of layers: normal, id and depth as three PNG layers, or as one layer of data tiles.",
+            },
             "color": {"type": "string", "enum": list(COLOR_FORMATS)},
             "quality": {"type": "integer", "minimum": 1, "maximum": 100},
             "small": _FLAG,

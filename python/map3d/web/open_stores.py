@@ -12,6 +12,7 @@ from map3d.catalogue import Catalogue, Workspace
 from map3d.errors import BadRequest, NotFound
 from map3d.geometry.views import parse_view_id, track_id
 from map3d.renderings.track_stores import open_track
+from map3d.tiles.decode_tile import find_layer, layer_names
 from map3d.tiles.tile_store import TileStore
 from map3d.types import Layer
 
@@ -49,6 +50,16 @@ class OpenStore:
         return self.store.is_current()
 
 
+@dataclass(frozen=True)
+class FoundLayer:
+    """`asked`: the layer that a request names; `stored`: the one that has its pixels (map3d.tiles.decode_tile), `number` in the store."""
+
+    opened: OpenStore
+    number: int
+    asked: Layer
+    stored: Layer
+
+
 class OpenStores:
     """Thread-safe."""
 
@@ -70,6 +81,24 @@ class OpenStores:
             if opened is None:
                 return
             yield opened
+
+    def find_layer(self, rendering: str, view: str, layer: str) -> FoundLayer | None:
+        """Returns the layer of a name; None if the rendering, the view or the layer does not exist."""
+        others = []
+        for opened in self.stores_of_view(rendering, view):
+            if layer in opened.layers:
+                number, stored = opened.layers[layer]
+                return FoundLayer(opened, number, stored, stored)
+            others.append(opened)
+        for opened in others:
+            found = find_layer(opened.store.shape.layers, layer)
+            if found is not None:
+                return FoundLayer(opened, opened.layers[found[1].name][0], *found)
+        return None
+
+    def layer_names(self, rendering: str, view: str) -> list[str]:
+        """Returns the names of the layers that `find_layer` finds."""
+        return layer_names(stored for opened in self.stores_of_view(rendering, view) for stored in opened.store.shape.layers)
 
     def _get(self, rendering: str, track: str) -> OpenStore | None:
         """Returns None without a store. Checks the file at most every RECHECK_S."""

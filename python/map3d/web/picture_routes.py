@@ -14,7 +14,7 @@ from map3d.renderings.track_stores import read_manifest
 from map3d.tile_services.picture import draw_picture
 from map3d.tile_services.picture_request import PictureRequest, parse_link, parse_picture
 from map3d.tiles.manifest import Manifest
-from map3d.types import TileId, check_name
+from map3d.types import Layer, TileId, check_name
 from map3d.web.byte_lru import ByteLru
 from map3d.web.document_routes import catalogue, workspace
 from map3d.web.open_stores import OpenStores
@@ -108,8 +108,8 @@ class _TileReader:
             for name, (number, _) in opened.layers.items()
         }
 
-    def __call__(self, layer: str, tile: TileId) -> bytes | None:
-        if layer not in self._layers:
-            raise BadRequest(f"no layer {layer!r}")
-        store, number = self._layers[layer]
+    def __call__(self, layer: Layer, tile: TileId) -> bytes | None:
+        if layer.name not in self._layers:
+            raise BadRequest(f"no layer {layer.name!r}")
+        store, number = self._layers[layer.name]
         return store.get_tile(number, *tile)

@@ -16,12 +16,13 @@ from map3d.catalogue import Job, Workspace
 from map3d.errors import Unavailable
 from map3d.jobs.demands import BUSY_RETRY_S
 from map3d.jobs.on_demand import OnDemand
+from map3d.tiles.decode_tile import as_layer
 from map3d.tiles.naming import block_of, parse_tile
 from map3d.tiles.tile_store import StoredBlock, content_hash
 from map3d.types import TileId
 from map3d.web.byte_lru import ByteLru
 from map3d.web.http_errors import retry_headers, status_of
-from map3d.web.open_stores import OpenStore, OpenStores
+from map3d.web.open_stores import FoundLayer, OpenStore, OpenStores
 from map3d.web.settings import DEFAULT_CACHE_BYTES
 
 Scope = MutableMapping[str, Any]
@@ -221,34 +222,32 @@ class TileRoute:
 
     def _read_stale(self, url: TileUrl) -> TileResponse | None:
         """Returns a tile that clients revalidate each time; None if its block is not stored."""
-        for opened in self.stores.stores_of_view(url.rendering, url.view):
-            if url.layer in opened.layers:
-                response = _read_from(opened, url, is_stale=True)
-                return response if response.is_stored else None
-        return None
+        found = self.stores.find_layer(url.rendering, url.view, url.layer)
+        response = None if found is None else _read_from(found, url, is_stale=True)
+        return response if response is not None and response.is_stored else None
 
     def _read_stored(self, url: TileUrl) -> TileResponse:
-        names: list[str] = []
-        for opened in self.stores.stores_of_view(url.rendering, url.view):
-            if url.layer in opened.layers:
-                return _read_from(opened, url)
-            names += opened.layers
+        found = self.stores.find_layer(url.rendering, url.view, url.layer)
+        if found is not None:
+            return _read_from(found, url)
+        names = self.stores.layer_names(url.rendering, url.view)
         if names:
             return _error(404, f"no layer {url.layer[:64]!r}; the layers are {', '.join(names)}")
         return _error(404, f"no rendering {url.rendering[:64]!r} with view {url.view[:64]!r}")
 
 
-def _read_from(opened: OpenStore, url: TileUrl, *, is_stale: bool = False) -> TileResponse:
-    number, layer = opened.layers[url.layer]
-    shape = opened.store.shape
+def _read_from(found: FoundLayer, url: TileUrl, *, is_stale: bool = False) -> TileResponse:
+    opened, shape = found.opened, found.opened.store.shape
     if url.tile.z > shape.zmax:
         return _error(404, f"no level {url.tile.z}; the deepest level is {shape.zmax}")
     root = block_of(url.tile, shape.zmax)
     before = opened.store.get_block(root)
-    data = opened.store.get_tile(number, *url.tile)
+    data = opened.store.get_tile(found.number, *url.tile)
     caching = _cache_control(before, opened.store.get_block(root), None if is_stale else url.version)
     source = opened if caching is IMMUTABLE else None
-    return _empty_response(caching, source) if data is None else _tile_response(data, layer.media_type, caching, source)
+    if data is None:
+        return _empty_response(caching, source)
+    return _tile_response(as_layer(found.asked, found.stored, data, shape.tile_px), found.asked.media_type, caching, source)
 
 
 def _cache_control(before: StoredBlock | None, after: StoredBlock | None, version: int | None) -> bytes:
