@@ -9,13 +9,16 @@ from urllib.parse import urljoin
 
 import pytest
 from PIL import Image
+from werkzeug.datastructures import MultiDict
 
 from map3d.catalogue import OperationState, Workspace
 from map3d.operations.operation_worker import OperationWorker
 from map3d.renderings import preview_pool
 from map3d.renderings.preview_pool import PreviewPool
+from map3d.types import DEFAULT_DATA
 from map3d.uploads import Uploads
 from map3d.web import create_app
+from map3d.web.rendering_form import read_form
 from tests.cli.towns import house
 from tests.operations.archives import write_zip
 from tests.web.accounts import add_token, add_user
@@ -200,7 +203,7 @@ def test_preview_shows_the_scene_from_every_direction_and_layer(town):
 
 HOSTILE = [
     {"pitch": "nan"}, {"pitch": "0"}, {"pitch": "-5"}, {"pitch": "91"}, {"pitch": "٤٥"}, {"look": "360"}, {"look": "inf"}, {"res": "0"},
-    {"res": "1e9"}, {"kind": "sun16"}, {"kind": "../x"}, {"x": "2", "y": "0"}, {"x": "", "y": "nan"}, {"res": "9" * 400},
+    {"res": "1e9"}, {"kind": "sun16"}, {"kind": "data"}, {"kind": "../x"}, {"x": "2", "y": "0"}, {"x": "", "y": "nan"}, {"res": "9" * 400},
 ]  # fmt: skip
 
 
@@ -250,6 +253,37 @@ def test_estimate_says_tiles_bytes_and_time(town):
     assert (refused.status_code, "res is '-1'" in refused.json()["problem"]) == (400, True)
     without_script = town.get("/studio/scenes/town/renderings/new?res=0.5&estimate=1").text
     assert found["size"].split()[1] in without_script
+
+
+def test_the_form_stores_data_tiles_in_place_of_png_layers(town):
+    page = town.get("/studio/scenes/town/renderings/new").text
+    assert f'name="data" value="{DEFAULT_DATA}" checked' in page
+    sizes = {}
+    for data in ("png", "tile"):
+        query = f"directions=1&pitch=45&res=0.5&layer=color&layer=normal&layer=id&layer=depth&data={data}"
+        found = town.get(f"/studio/scenes/town/estimate.json?{query}").json()
+        tiles, images = (int(number.replace(",", "")) for number in re.findall(r"[\d,]+", found["tiles"]))
+        assert images == {"png": 4, "tile": 2}[data] * tiles
+        sizes[data] = found["size"]
+        fields = {"name": data, "directions": "1", "res": "0.5", "layer": ["color", "normal", "id", "depth", "ao"], "data": data}
+        assert town.post("/studio/scenes/town/renderings/new", **fields).status_code == 303
+    assert sizes["png"] != sizes["tile"]
+    catalogue = town.workspace.open_catalogue()
+    layers = {data: [layer.name for layer in catalogue.rendering(data).layers] for data in ("png", "tile")}
+    catalogue.close()
+    assert layers == {"png": ["color", "normal", "id", "depth", "ao"], "tile": ["color", "data", "ao"]}
+
+
+@pytest.mark.parametrize(
+    ("chosen", "stored"), [(["color"], ["color"]), (["id", "sun"], ["data", "sun"]), ([], ["color", "data"]), (["data"], ["color", "data"])]
+)
+def test_only_chosen_data_is_stored(chosen, stored):
+    form = read_form(MultiDict([("data", "tile"), *(("layer", kind) for kind in chosen)]))
+    assert list(form.stored_layers) == stored
+
+
+def test_an_unknown_data_is_the_default():
+    assert read_form(MultiDict([("data", "zip")])).data == read_form(MultiDict()).data
 
 
 def test_rendering_from_the_form_to_the_map_and_away(town):

@@ -13,7 +13,7 @@ from map3d.geometry.views import check_angles, views_around
 from map3d.renderings.create import RenderingRequest
 from map3d.renderings.layers import LayerRequest
 from map3d.renderings.sun_layers import ONE_SUN, LightRequest
-from map3d.types import DEFAULT_LAYERS, LAYER_KINDS, TILE_PX, Box, Layer, ViewAngles
+from map3d.types import DATA_TILE_KINDS, DEFAULT_DATA, LAYER_KINDS, LAYERS_BY_DATA, TILE_PX, Box, DataEncoding, Layer, LayerKind, ViewAngles
 
 DIRECTIONS: Final = (1, 2, 4, 8, 16)
 RESOLUTIONS: Final = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
@@ -23,14 +23,15 @@ _SUN: Final = SunAngles(160.0, 45.0)
 
 @dataclass(frozen=True)
 class RenderingForm:
-    """The fields as the user left them; `request` checks them."""
+    """The fields as the user left them; `request` checks them. `layers` never has the kind data: `data` says how normal, id and depth are stored."""
 
     name: str
     title: str
     directions: int
     pitch_deg: float
     res_m: float
-    layers: tuple[str, ...]
+    layers: tuple[LayerKind, ...]
+    data: DataEncoding
     tile_px: int
     time: str
     day: str
@@ -38,8 +39,15 @@ class RenderingForm:
     def request(self, scene: str, name: str) -> RenderingRequest:
         """Raises BadRequest."""
         views = views_around(self.directions, (self.pitch_deg,))
-        layers = LayerRequest(self.layers, light=self._light())
+        layers = LayerRequest(self.stored_layers, light=self._light())
         return RenderingRequest(scene, name, views, res_m=self.res_m, layers=layers, tile_px=self.tile_px, title=self.title)
+
+    @property
+    def stored_layers(self) -> tuple[LayerKind, ...]:
+        """The kinds to render: one layer of data tiles for those of normal, id and depth that are chosen, if `data` says so."""
+        if self.data == "png":
+            return self.layers
+        return tuple(dict.fromkeys("data" if kind in DATA_TILE_KINDS else kind for kind in self.layers))
 
     def _light(self) -> LightRequest:
         one, whole = any(kind in self.layers for kind in ONE_SUN), "sun16" in self.layers
@@ -68,7 +76,8 @@ class PreviewQuery:
 
 def read_form(fields: Any) -> RenderingForm:
     """Reads a form or query; missing fields get their defaults. Raises BadRequest for numbers that are not."""
-    layers = tuple(kind for kind in LAYER_KINDS if kind in fields.getlist("layer")) or DEFAULT_LAYERS
+    layers = tuple(kind for kind in LAYER_KINDS if kind in fields.getlist("layer") and kind != "data") or LAYERS_BY_DATA["png"]
+    data = fields.get("data")
     return RenderingForm(
         name=fields.get("name", "").strip(),
         title=fields.get("title", "").strip(),
@@ -76,6 +85,7 @@ def read_form(fields: Any) -> RenderingForm:
         pitch_deg=_number(fields, "pitch", 45, 1, 90),
         res_m=_number(fields, "res", 0.2, 0.001, 1e6),
         layers=layers,
+        data=data if data in LAYERS_BY_DATA else DEFAULT_DATA,
         tile_px=TILE_PX[-1] if fields.get("tile") == str(TILE_PX[-1]) else TILE_PX[0],
         time=fields.get("time", "").strip(),
         day=fields.get("day", "").strip(),
@@ -85,7 +95,7 @@ def read_form(fields: Any) -> RenderingForm:
 def read_preview(fields: Mapping[str, str]) -> PreviewQuery:
     """Raises BadRequest."""
     kind = fields.get("kind", "color")
-    if kind not in LAYER_KINDS or kind == "sun16":
+    if kind not in LAYER_KINDS or kind in ("data", "sun16"):
         raise BadRequest(f"layer {kind[:40]!r}: has no preview")
     view = ViewAngles(_number(fields, "look", 0, 0, 359.999), _number(fields, "pitch", 45, 1, 90))
     check_angles(view)
