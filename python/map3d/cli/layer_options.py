@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from datetime import date, datetime
 from functools import wraps
-from typing import Any, Final, cast
+from typing import Any, cast
 
 import click
 
@@ -66,7 +66,7 @@ def layer_options(*, required: bool = False) -> Callable[[Command], Command]:
             light = LightRequest(**{name: rest.pop(name) for name in ("time", "sun", "day", "radius_m", "place")})
             return command(*args, layers=LayerRequest(names, color, quality, light, small), **rest)
 
-        for option in reversed([_layers_option(required=required), *([] if required else [data_option]), *_OPTIONS]):
+        for option in reversed([_layers_option(required=required), *([] if required else [data_option(beside_layers=True)]), *_OPTIONS]):
             gathered = option(gathered)
         return cast(Command, gathered)
 
@@ -78,12 +78,13 @@ def _layers_option(*, required: bool) -> Callable[[Any], Any]:
     return click.option("--layers", required=required, help=text if required else f"{text}  [default: {','.join(LAYERS_BY_DATA[DEFAULT_DATA])}]")
 
 
-data_option: Final[Callable[[Any], Any]] = click.option(
-    "--data",
-    type=click.Choice(list(LAYERS_BY_DATA)),
-    help="Instead of --layers: store normal, id and depth as three PNG layers (png), or in a third of the bytes as one layer of data tiles (tile)."
-    f"  [default: {DEFAULT_DATA}]",
-)
+def data_option(*, beside_layers: bool = False) -> Callable[[Any], Any]:
+    """Adds `--data`; None unless it is given, if it stands beside `--layers`, else by default DEFAULT_DATA."""
+    stores = "tore normal, id and depth as three PNG layers (png), or as one layer of data tiles in less than half of the bytes (tile)."
+    text = f"Instead of --layers: s{stores}  [default: {DEFAULT_DATA}]" if beside_layers else f"S{stores}"
+    settings: dict[str, Any] = {} if beside_layers else {"default": DEFAULT_DATA, "show_default": True}
+    return click.option("--data", type=click.Choice(list(LAYERS_BY_DATA)), help=text, **settings)
+
 
 _OPTIONS: list[Callable[[Any], Any]] = [
     click.option(

@@ -10,13 +10,14 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from map3d.catalogue import Catalogue, Workspace
 from map3d.cli.building import build_with_progress
 from map3d.cli.import_reports import left_alone_lines, missing_textures_line, place_line, warning_lines
+from map3d.cli.layer_options import data_option
 from map3d.cli.options import View, format_options, max_memory_option, outlier_options, style_option, workers_option, workspace_option
 from map3d.cli.output import names_text, plural, size_text
 from map3d.cli.progress import progress_bar
 from map3d.cli.publish import publish_with_progress
 from map3d.cli.render import print_result, render_with_progress
 from map3d.geometry.views import views_around
-from map3d.types import COLOR_FORMATS, DEFAULT_DATA, LAYERS_BY_DATA, ViewAngles
+from map3d.types import COLOR_FORMATS, ViewAngles
 
 if TYPE_CHECKING:
     from map3d.renderings.site_files import ImportSummary
@@ -43,13 +44,7 @@ if TYPE_CHECKING:
     help="Metres per pixel.  [default: as fine as textures and triangles, coarser for large scenes, so that rendering takes minutes]",
 )
 @click.option("--color", type=click.Choice(list(COLOR_FORMATS)), default="webp", show_default=True, help="Image format of the layer color.")
-@click.option(
-    "--data",
-    type=click.Choice(list(LAYERS_BY_DATA)),
-    default=DEFAULT_DATA,
-    show_default=True,
-    help="Store normal, id and depth as three PNG layers (png), or in a third of the bytes as one layer of data tiles (tile).",
-)
+@data_option()
 @click.option("--crs", help="Coordinate system of the files, where they do not state it or state it wrongly; 'local' for local metres.")
 @format_options
 @click.option("--strict", is_flag=True, help="Stop at the first problem instead of skipping it.")
