@@ -57,13 +57,18 @@ def test_layers_that_neither_exist_nor_can_be_made_are_not_found(client: Client)
     assert client.get(url("png", "data", (0, 0, 0))).status_code == 404
 
 
-def test_a_damaged_data_tile_is_refused_as_png_and_as_picture(workspace: Workspace, client: Client) -> None:
+def test_a_damaged_data_tile_is_refused_as_png(workspace: Workspace, client: Client, caplog: pytest.LogCaptureFixture) -> None:
     tile = damage(workspace, "tile", "data", b"M3D\1" + bytes(20))
     for layer in KINDS:
         response = client.get(url("tile", layer, tile))
         assert (response.status_code, response.text) == (500, "the server's data is damaged; see the server log\n")
         assert response.headers["cache-control"] == "no-store"
         assert client.get(url("tile", layer, (0, 0, 0))).status_code == 200, "other tiles stay"
+        answer = client.get(f"{RESOURCE}/tile/{VIEW}/{layer}/{tile.z}/{tile.x}/{tile.y}&outputFormat=image/png")
+        assert (answer.status_code, str(workspace.root) in answer.text) == (500, False)
+        assert f"tile data/{tile.z}/{tile.x}/{tile.y}: data tile: " in caplog.text
+        assert f"tile {VIEW}/data/{tile.z}/{tile.x}/{tile.y}: data tile: " in caplog.text
+        caplog.clear()
 
 
 @pytest.mark.parametrize("path", ["/tilejson/{}/35-40.json", "/ogc/collections/{}:35-40/styles", "/wmts?service=WMTS&request=GetCapabilities"])

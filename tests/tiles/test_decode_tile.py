@@ -126,14 +126,21 @@ def test_layers_made_of_a_data_tile_have_the_bytes_of_the_png_layers(kind: str, 
     asked, stored = found
     assert (asked.name, asked.kind, asked.media_type, stored.name) == (kind, kind, "image/png", "data")
     png = _core.encode_layer(asked.kind, "png", surfaces()[kind], small=small)
-    assert as_layer(asked, stored, data_tile(small=small), 256) == png
+    assert as_layer(asked, stored, data_tile(small=small), 256, "here") == png
     assert np.array_equal(decode_tile(asked, png, 256)[kind], decode_tile(stored, data_tile(), 256)[kind])
 
 
 def test_stored_layers_are_sent_as_they_are() -> None:
     found = find_layer((COLOR, DATA), "data")
     assert found == (DATA, DATA)
-    assert as_layer(*found, b"bytes", 256) == b"bytes"
+    assert as_layer(*found, b"bytes", 256, "here") == b"bytes"
+
+
+def test_a_damaged_data_tile_is_named() -> None:
+    found = find_layer((COLOR, DATA), "id")
+    assert found is not None
+    with pytest.raises(Corrupt, match=r"^town/data/0/0/0: data tile: .*; run: map3d verify$"):
+        as_layer(*found, b"M3D\1", 256, "town/data/0/0/0")
 
 
 def test_a_stored_layer_precedes_the_one_made_of_a_data_tile() -> None:

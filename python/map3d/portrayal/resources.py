@@ -65,7 +65,8 @@ class Resources:
         asked, stored = found
         number = next(number for number, layers in enumerate(record.passes) if stored in layers)
         data = self._read(record, track_id(view, number), stored.name, tile)
-        return None if data is None else (asked.media_type, as_layer(asked, stored, data, frame.tile_px))
+        where = f"rendering {record.name}, tile {view}/{stored.name}/{z}/{x}/{y}"
+        return None if data is None else (asked.media_type, as_layer(asked, stored, data, frame.tile_px, where))
 
     def _read(self, record: RenderingRecord, track: str, layer: str, tile: TileId) -> bytes | None:
         try:

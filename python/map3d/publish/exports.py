@@ -67,10 +67,8 @@ class _Source:
         data = self.store.get_tile(self.number, *tile)
         if data is None:
             raise Corrupt(f"tile {tile.z}/{tile.x}/{tile.y} was removed during the export; export again")
-        try:
-            return as_layer(self.layer, self.stored, data, self.manifest.tile_px)
-        except Corrupt as error:
-            raise Corrupt(f"{self.store.url}: tile {self.stored.name}/{tile.z}/{tile.x}/{tile.y}: {error}; run: map3d verify") from error
+        where = f"{self.store.url}: tile {self.stored.name}/{tile.z}/{tile.x}/{tile.y}"
+        return as_layer(self.layer, self.stored, data, self.manifest.tile_px, where)
 
     def identity(self) -> str:
         """Returns a text that differs for other tiles."""

@@ -76,9 +76,16 @@ def decode_channels(layer: Layer, data: bytes, tile_px: int) -> NDArray[np.uint8
         raise Corrupt(f"not a {layer.format} image: {error}") from error
 
 
-def as_layer(asked: Layer, stored: Layer, data: bytes, tile_px: int) -> bytes:
-    """Returns a tile of `stored` as one of `asked`, as `find_layer` returned them: the same bytes as where that layer is stored. Raises Corrupt."""
-    return data if asked is stored else _encode_png(asked, decode_tile(stored, data, tile_px)[asked.kind])
+def as_layer(asked: Layer, stored: Layer, data: bytes, tile_px: int, where: str) -> bytes:
+    """Returns a tile of `stored` as one of `asked`, as `find_layer` returned them: the same bytes as where that layer is stored. Raises Corrupt, with
+    `where` in the message."""
+    if asked is stored:
+        return data
+    try:
+        pixels = decode_tile(stored, data, tile_px)[asked.kind]
+    except Corrupt as error:
+        raise Corrupt(f"{where}: {error}; run: map3d verify") from error
+    return _encode_png(asked, pixels)
 
 
 def with_alpha(color: NDArray[np.uint8]) -> NDArray[np.uint8]:

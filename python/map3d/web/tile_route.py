@@ -247,7 +247,8 @@ def _read_from(found: FoundLayer, url: TileUrl, *, is_stale: bool = False) -> Ti
     source = opened if caching is IMMUTABLE else None
     if data is None:
         return _empty_response(caching, source)
-    return _tile_response(as_layer(found.asked, found.stored, data, shape.tile_px), found.asked.media_type, caching, source)
+    where = f"{opened.store.url}: tile {found.stored.name}/{url.tile.z}/{url.tile.x}/{url.tile.y}"
+    return _tile_response(as_layer(found.asked, found.stored, data, shape.tile_px, where), found.asked.media_type, caching, source)
 
 
 def _cache_control(before: StoredBlock | None, after: StoredBlock | None, version: int | None) -> bytes:
