@@ -5,6 +5,7 @@ import re
 from contextlib import closing
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 
@@ -54,6 +55,9 @@ def test_the_manifest_lists_the_data_layer(rendered: Workspace) -> None:
         "media_type": "application/vnd.map3d.data",
         "unit_m": 0.0009765625,
     }
+    jsonschema.validate(
+        json.loads(rendered.manifest_path("tile").read_text()), json.loads((Path(__file__).parents[2] / "spec" / "manifest.schema.json").read_text())
+    )
     assert [view["occupancy"] for view in png["views"]] == [view["occupancy"] for view in tile["views"]]
 
 

@@ -133,6 +133,14 @@ def test_the_document_matches_the_specification(manifest):
     assert value["objects"] == {"count": 54, "shard_size": 1024} | files
 
 
+@pytest.mark.parametrize(("kind", "format"), [("data", "png"), ("data", "webp"), ("normal", "m3d"), ("color", "m3d")])
+def test_data_tiles_are_the_format_of_the_data_layer_alone(manifest, kind, format):
+    value = json.loads(manifest.dump())
+    value["layers"][0] |= {"kind": kind, "format": format}
+    with pytest.raises(Corrupt, match=f"format '{format}' cannot hold {kind}"):
+        Manifest.load(json.dumps(value))
+
+
 def test_the_schema_lists_every_member(manifest, added):
     archives = {view.frame.id: {"color": f"{view.frame.id}/color.pmtiles"} for view in manifest.views}
     value = replace(added, geographic=GEOGRAPHIC).with_archives(archives, 7).to_json()
