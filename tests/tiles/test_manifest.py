@@ -7,13 +7,15 @@ import pytest
 from map3d.errors import BadName, BadRequest, Corrupt, UnknownVersion
 from map3d.geometry.frames import pin
 from map3d.tiles.block_versions import BlockVersions
-from map3d.tiles.manifest import Geographic, Manifest, ManifestCrs, ManifestView, block_version
+from map3d.tiles.manifest import Geographic, Manifest, ManifestCrs, ManifestView, Thumbnail, block_version
 from map3d.tiles.occupancy import Occupancy
 from map3d.types import BlockId, Layer, Sun, TileId, ViewAngles
 
 SCHEMA = json.loads((Path(__file__).parents[2] / "spec" / "manifest.schema.json").read_text())
 BOX = ((-120.0, -80.0, 0.0), (130.0, 90.0, 22.5))
 LAYERS = (Layer("color", "color", "webp"), Layer("normal", "normal", "png"), Layer("id", "id", "png"), Layer("depth", "depth", "png"))
+
+THUMBNAIL = Thumbnail((76.0, 95.0, 102.0, 70.5), "UklGRg==")
 
 
 @pytest.fixture
@@ -46,6 +48,14 @@ def test_a_manifest_reads_back(manifest):
 GEOGRAPHIC = Geographic(
     (5.0, 5.0), (11.5, 48.1), 656.25, 0.0087, 1, ((0.0, 0.0087, 0.0001), (0.0, 0.0001, 0.0058)), ((0.0, 650.0, 1.0), (0.0, 1.0, 970.0)), 0.01
 )
+
+
+def test_thumbnails_read_back(manifest):
+    first, *others = manifest.views
+    shown = replace(manifest, views=(replace(first, thumbnail=THUMBNAIL), *others))
+    assert Manifest.load(shown.dump()).views[0].thumbnail == shown.views[0].thumbnail
+    pytest.importorskip("jsonschema").validate(shown.to_json(), SCHEMA)
+    assert b"thumbnail" not in manifest.dump()
 
 
 def test_the_geographic_position_reads_back(manifest):
@@ -143,7 +153,8 @@ def test_data_tiles_are_the_format_of_the_data_layer_alone(manifest, kind, forma
 
 def test_the_schema_lists_every_member(manifest, added):
     archives = {view.frame.id: {"color": f"{view.frame.id}/color.pmtiles"} for view in manifest.views}
-    value = replace(added, geographic=GEOGRAPHIC).with_archives(archives, 7).to_json()
+    shown = tuple(replace(view, thumbnail=THUMBNAIL) for view in added.views)
+    value = replace(added, geographic=GEOGRAPHIC, views=shown).with_archives(archives, 7).to_json()
     schema = SCHEMA["properties"]
     assert set(schema) == set(value) == {*SCHEMA["required"], "geographic"}
     assert set(schema["views"]["items"]["properties"]) == set(value["views"][0])

@@ -10,6 +10,7 @@ from map3d.errors import BadRequest
 from map3d.geometry.frames import PinnedFrame
 from map3d.registry import Registry
 from map3d.renderings.lon_lat import geographic_of
+from map3d.renderings.thumbnail import make_thumbnail
 from map3d.renderings.track_stores import find_track, share_manifest
 from map3d.tiles.block_versions import BlockVersions
 from map3d.tiles.manifest import Manifest, ManifestCrs, ManifestView
@@ -71,7 +72,15 @@ def _view(workspace: Workspace, catalogue: Catalogue, record: RenderingRecord, f
     tracks = record.tracks_of(frame)
     occupancy = _occupancy(workspace, catalogue, record, tracks[0])
     versions = tuple(BlockVersions.of((block, result.version) for block, result in _results(catalogue, record, track)) for track in tracks)
-    return ManifestView(frame, occupancy if planned is None else occupancy | planned, versions)
+    return ManifestView(frame, occupancy if planned is None else occupancy | planned, versions, thumbnail=_thumbnail(workspace, record, tracks[0]))
+
+
+def _thumbnail(workspace: Workspace, record: RenderingRecord, track: Track) -> str | None:
+    found = find_track(workspace, record, track.id)
+    if found is None:
+        return None
+    with found as store:
+        return make_thumbnail(store)
 
 
 def _results(catalogue: Catalogue, record: RenderingRecord, track: Track) -> Iterator[tuple[BlockId, JobResult]]:

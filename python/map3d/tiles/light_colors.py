@@ -61,10 +61,10 @@ def _spread(own: NDArray[np.float32]) -> NDArray[np.float32]:
     return 0.5 * own + 0.125 * sum(np.where(np.isnan(one), own, one) for one in neighbours)
 
 
-def _linear_table() -> NDArray[np.float32]:
+def linear_table() -> NDArray[np.float64]:
     """Returns the linear light of each sRGB byte (IEC 61966-2-1)."""
     c = np.arange(256) / 255
-    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
 
 
 def _srgb_table() -> Pixels:
@@ -75,5 +75,5 @@ def _srgb_table() -> Pixels:
     return table
 
 
-_LINEAR: Final = _linear_table()
+_LINEAR: Final = linear_table().astype(np.float32)
 _SRGB: Final = _srgb_table()

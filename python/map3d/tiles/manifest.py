@@ -61,13 +61,23 @@ class Geographic:
 
 
 @dataclass(frozen=True)
+class Thumbnail:
+    """A picture of a view's content. `window`: (left, top, width, height) in pixels of level 0; `webp`: the image in base64."""
+
+    window: tuple[float, float, float, float]
+    webp: str
+
+
+@dataclass(frozen=True)
 class ManifestView:
-    """A view's frame and content. `versions`: for each pass; `archives`: layer → path, only in published folders."""
+    """A view's frame and content. `versions`: for each pass; `archives`: layer → path, only in published folders; `thumbnail`:
+    None while its tiles do not exist."""
 
     frame: PinnedFrame
     occupancy: Occupancy
     versions: tuple[BlockVersions, ...]
     archives: Mapping[str, str] | None = None
+    thumbnail: Thumbnail | None = None
 
 
 @dataclass(frozen=True)
@@ -224,7 +234,11 @@ def _view_json(view: ManifestView, passes: Sequence[Sequence[Layer]]) -> dict[st
     if later:
         added = zip(passes[1:], later, strict=True)
         row["passes"] = [{"layers": [layer.name for layer in layers], **_versions_json(versions)} for layers, versions in added]
-    return row if view.archives is None else {**row, "archives": dict(view.archives)}
+    if view.archives is not None:
+        row["archives"] = dict(view.archives)
+    if view.thumbnail is not None:
+        row["thumbnail"] = {"window": list(view.thumbnail.window), "webp": view.thumbnail.webp}
+    return row
 
 
 def _versions_json(versions: BlockVersions) -> dict[str, Any]:
@@ -249,7 +263,15 @@ def _load_view(row: Mapping[str, Any], shape: Mapping[str, Any], passes: Sequenc
     later = row.get("passes", [])
     if [added["layers"] for added in later] != [[layer.name for layer in layers] for layers in passes[1:]]:
         raise Corrupt(f"view {row['id']}: the passes differ from those of the first view")
-    return ManifestView(frame, occupancy, tuple(_load_versions(part, frame.zmax) for part in (row, *later)), row.get("archives"))
+    versions = tuple(_load_versions(part, frame.zmax) for part in (row, *later))
+    return ManifestView(frame, occupancy, versions, row.get("archives"), _load_thumbnail(row.get("thumbnail")))
+
+
+def _load_thumbnail(row: Mapping[str, Any] | None) -> Thumbnail | None:
+    if row is None:
+        return None
+    left, top, width, height = (float(number) for number in row["window"])
+    return Thumbnail((left, top, width, height), str(row["webp"]))
 
 
 def _load_versions(row: Mapping[str, Any], zmax: int) -> BlockVersions:
