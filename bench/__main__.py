@@ -1,5 +1,5 @@
 """`python -m bench [PART …] [--json]`. Parts: tiles, light, encoding, ingest, incremental (the default); extent, planning, stored, viewer,
-catalogue, overhead, saturation, view, large."""
+catalogue, overhead, saturation, view, large, render."""
 
 import argparse
 import json
@@ -20,6 +20,7 @@ from . import (
     large_citygml,
     light_layers,
     planning,
+    render_pairs,
     saturation,
     stored,
     tiles,
@@ -29,7 +30,7 @@ from . import (
 from .benchmark_scene import CACHE
 
 PARTS = ("tiles", "light", "encoding", "ingest", "incremental")
-ON_REQUEST = ("extent", "planning", "stored", "viewer", "catalogue", "overhead", "saturation", "view", "large")
+ON_REQUEST = ("extent", "planning", "stored", "viewer", "catalogue", "overhead", "saturation", "view", "large", "render")
 Rows = list[dict[str, Any]]
 
 
@@ -38,8 +39,9 @@ def main() -> None:
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"{', '.join(PARTS)} (default: these), {', '.join(ON_REQUEST)}")
     parser.add_argument("--millions", type=float, nargs="+", help="extent, view: sizes in million triangles (1 3 10, 1 10)")
     parser.add_argument("--megabytes", type=float, nargs="+", help="large: sizes of the CityGML files (50 200 1000)")
-    parser.add_argument("--buildings", type=int, default=300, help="tiles: number of buildings of the town")
+    parser.add_argument("--buildings", type=int, default=300, help="tiles, render: number of buildings of the town")
     parser.add_argument("--res", type=float, default=0.2, help="tiles: metres per pixel")
+    parser.add_argument("--render-res", type=float, default=0.1, help="render: metres per pixel")
     parser.add_argument("--tiles", type=int, default=48, help="tiles: number of tiles")
     parser.add_argument("--folders", type=Path, nargs="+", default=[CACHE], help="stored: folders with renderings or published folders")
     parser.add_argument(
@@ -53,6 +55,11 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", help="viewer: measures, e.g. first frames")
     parser.add_argument("--free", action="store_true", help="viewer: disable vsync, for browsers with a GPU")
     parser.add_argument("--work", type=Path, help="viewer: folder for cities and samples, needs 9 GB; view: folder for towns, needs 5 GB")
+    parser.add_argument("--against", type=Path, metavar="FOLDER", help="render: another checkout with a compiled core, to compare with")
+    parser.add_argument("--pairs", type=int, default=5, help="render: number of renders of each version")
+    parser.add_argument("--directions", type=int, default=1, help="render: number of views")
+    parser.add_argument("--color", choices=("webp", "png", "jpeg"), default="webp", help="render: format of the colour layer")
+    parser.add_argument("--workers", type=int, default=2, help="render: number of worker processes")
     parser.add_argument("--json", action="store_true", help="print one JSON document after the tables")
     options = parser.parse_args()
     unknown = [part for part in options.parts if part not in PARTS + ON_REQUEST]
@@ -71,6 +78,11 @@ def main() -> None:
         "overhead": lambda: catalogue_overhead.measure(options.catalogues),
         "saturation": lambda: saturation.measure(options.catalogues, min(options.jobs)),
         "view": lambda: view.measure(tuple(options.millions or (1, 10)), options.work or CACHE / "view", options.reps, not options.quick),
+        "render": lambda: render_pairs.measure(
+            options.against,
+            options.pairs,
+            render_pairs.RenderOptions(options.buildings, options.render_res, options.directions, options.color, options.workers),
+        ),
         "stored": lambda: stored.measure(options.folders),
         "viewer": lambda: viewer.measure(
             options.quick, options.reps, options.work or CACHE / "viewer", tuple(options.only) if options.only else None, options.free
