@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.table import Table
 
 from map3d import _core
-from map3d.geometry.frames import core_frame
+from map3d.geometry.core_frame import core_frame
 
 from .benchmark_scene import prepare_scene
 from .tiles import choose_tiles

@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from map3d import _core
-from map3d.geometry.frames import core_frame
+from map3d.geometry.core_frame import core_frame
 from map3d.tiles.naming import block_levels
 from map3d.tiles.occupancy import xy_from_morton
 

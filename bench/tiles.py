@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from map3d import _core
-from map3d.geometry.frames import core_frame
+from map3d.geometry.core_frame import core_frame
 from map3d.tiles.occupancy import xy_from_morton
 
 from . import peer_comparison

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from map3d import _core
-from map3d.geometry.frames import core_frame
+from map3d.geometry.core_frame import core_frame
 
 from . import FrameFields
 from .scene_parts import srgb_bytes_from_linear

@@ -287,6 +287,8 @@ class Scene:
         blocks; only their tiles are examined. Time and memory grow with the occupied tiles, not with the level."""
     def block_keys(self, frame: Frame, z: int, blocks: NDArray[np.uint32]) -> list[str]:
         """Returns the keys of the blocks of level z at (n, 2) columns and rows: hex hashes over everything that a base block's bytes depend on."""
+    def block_key(self, frame: Frame, z: int, x: int, y: int) -> str:
+        """Returns the key of the block at (z, x, y)."""
     def render_block(self, frame: Frame, z: int, x: int, y: int) -> Block:
         """Renders the base block rooted at (z, x, y)."""
     def gbuffer(self, frame: Frame, x: int, y: int) -> dict[str, NDArray[Any]]:

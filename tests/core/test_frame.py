@@ -5,7 +5,8 @@ from typing import Any
 import pytest
 
 from map3d import _core
-from map3d.geometry.frames import core_frame, pin
+from map3d.geometry.core_frame import core_frame
+from map3d.geometry.frames import pin
 from map3d.types import Layer, Sun, ViewAngles
 
 NUMBERS: dict[str, Any] = {"look_at_deg": 45.0, "pitch_deg": 22.5, "u0_m": -51.2, "v0_m": 51.2, "d0_m": -1000.0, "size_m": 102.4}

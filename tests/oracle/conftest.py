@@ -12,7 +12,7 @@ import pytest
 from map3d import _core
 from map3d.catalogue import Workspace
 from map3d.cli.app import run
-from map3d.geometry.frames import core_frame
+from map3d.geometry.core_frame import core_frame
 from map3d.tiles.occupancy import xy_from_morton
 from map3d_town import TownSpec, make_town
 

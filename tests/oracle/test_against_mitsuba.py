@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from map3d.geometry.frames import core_frame
+from map3d.geometry.core_frame import core_frame
 
 from .conftest import OracleScene
 from .image_agreement import edge_mask, gradient_energy, psnr, srgb_from_linear

@@ -9,7 +9,8 @@ pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_
 
 from map3d.cli.app import run
 from map3d.errors import BadRequest
-from map3d.geometry.frames import core_frame, pin
+from map3d.geometry.core_frame import core_frame
+from map3d.geometry.frames import pin
 from map3d.renderings import block_limit
 from map3d.renderings.block_limit import MOST_BASE_BLOCKS, check_block_count, estimate_blocks
 from map3d.tiles.naming import block_levels

@@ -13,7 +13,8 @@ pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_
 
 from map3d.catalogue import Catalogue, SceneRecord, Workspace
 from map3d.errors import BadRequest, Corrupt, LimitExceeded, NotFound
-from map3d.geometry.frames import core_frame, pin
+from map3d.geometry.core_frame import core_frame
+from map3d.geometry.frames import pin
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import import_file
 from map3d.ingest.sources import find_sources

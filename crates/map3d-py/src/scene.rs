@@ -84,6 +84,12 @@ impl Scene {
         py.detach(|| self.0.block_keys(frame, z, &blocks)).map_err(to_python)
     }
 
+    /// Returns the key of the block at (z, x, y).
+    fn block_key(&self, py: Python<'_>, frame: &Bound<'_, Frame>, z: u8, x: u32, y: u32) -> PyResult<String> {
+        let frame = &frame.get().0;
+        py.detach(|| self.0.block_keys(frame, z, &[[x, y]])).map(|keys| keys.concat()).map_err(to_python)
+    }
+
     /// Renders the base block rooted at (z, x, y).
     fn render_block(&self, py: Python<'_>, frame: &Bound<'_, Frame>, z: u8, x: u32, y: u32) -> PyResult<Block> {
         let (frame, root) = (&frame.get().0, tile_at(z, x, y)?);

@@ -1,7 +1,7 @@
 """Pinned frames: the square of a view's plane that the pyramid covers; pixels, view and local coordinates (spec/pyramid.md §2–3)."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from map3d import _core
 from map3d.errors import BadRequest, LimitExceeded, OutsideFrame
 from map3d.geometry.views import Axes, axes, check_angles, cos_sin, dot, local_from_uvd, uvd_from_local, view_id
 from map3d.types import DEEPEST_LEVEL, DEPTH_UNIT_M, TILE_PX, Box, Layer, TileId, Vec3, ViewAngles
@@ -154,11 +153,6 @@ class PinnedFrame:
             "zmax": self.zmax,
             "layers": [_layer_json(layer) for layer in layers],
         }
-
-
-def core_frame(fields: Mapping[str, Any]) -> _core.Frame:
-    """Returns the core's frame of the fields that `PinnedFrame.to_json` returned."""
-    return _core.Frame(**{**fields, "layers": [_core.LayerSpec(**layer) for layer in fields["layers"]]})
 
 
 def pin(box: Box, tile_px: int, res_m: float, views: Iterable[ViewAngles], window: Window | None = None) -> list[PinnedFrame]:

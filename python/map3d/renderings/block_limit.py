@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from typing import Final
 
 from map3d.errors import BadRequest
-from map3d.geometry.frames import PinnedFrame, core_frame
+from map3d.geometry.core_frame import core_frame
+from map3d.geometry.frames import PinnedFrame
 from map3d.renderings.plan import PlannedScene
 from map3d.tiles.naming import block_levels
 

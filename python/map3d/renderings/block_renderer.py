@@ -1,14 +1,15 @@
-"""The subprocess of a render worker: renders base blocks of the scene and reduces seams to reduce blocks. Keeps the scene open between requests."""
+"""The subprocess of a render worker: renders base blocks of the scene and reduces seams to reduce blocks. Keeps the scene open between requests.
+
+Imports no NumPy, which would take most of the time to start.
+"""
 
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-import numpy as np
-
 from map3d import _core
 from map3d.errors import StalePlan
-from map3d.geometry.frames import core_frame
+from map3d.geometry.core_frame import core_frame
 from map3d.subprocess import Handler, ReportProgress
 from map3d.types import BlockId
 
@@ -57,8 +58,7 @@ class _BlockRenderer:
         """Renders a base block from the open scene; returns None when that is another scene than the one that was planned."""
         frame = self._frames[track]
         try:
-            (found,) = self._scene.block_keys(frame, block.z, np.array([[block.x, block.y]], np.uint32))
-            return self._scene.render_block(frame, *block) if found == key else None
+            return self._scene.render_block(frame, *block) if self._scene.block_key(frame, *block) == key else None
         except _core.SceneRebuilt:
             return None
 

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from map3d import _core
 from map3d.catalogue import Catalogue, PlannedJob, RenderingRecord, Track
 from map3d.errors import OutsideFrame
-from map3d.geometry.frames import PinnedFrame, check_content, core_frame
+from map3d.geometry.core_frame import core_frame
+from map3d.geometry.frames import PinnedFrame, check_content
 from map3d.tiles.naming import block_levels
 from map3d.tiles.occupancy import Numbers, Occupancy, numbers_of, union_of, xy_from_morton
 from map3d.types import BlockId, Box

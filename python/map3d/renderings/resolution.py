@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from map3d import _core
-from map3d.geometry.frames import core_frame, pin
+from map3d.geometry.core_frame import core_frame
+from map3d.geometry.frames import pin
 from map3d.types import ViewAngles
 
 RESOLUTIONS_M: Final = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)

@@ -13,7 +13,8 @@ from PIL import Image
 
 from map3d import _core
 from map3d.catalogue import codec
-from map3d.geometry.frames import NO_DEPTH, PinnedFrame, core_frame, corners
+from map3d.geometry.core_frame import core_frame
+from map3d.geometry.frames import NO_DEPTH, PinnedFrame, corners
 from map3d.geometry.views import axes, check_angles, uvd_from_local
 from map3d.renderings.cost_estimate import estimate_new
 from map3d.subprocess import Handler, ReportProgress
