@@ -11,41 +11,79 @@ const MAX_SIDE: u32 = i16::MAX as u32 - 1;
 
 /// Fills in place. An empty or full mask changes nothing. Pixels farther than `reach` from every marked one may keep their colour.
 pub fn fill_unmarked(image: &mut Raster, mask: &PixelMask, reach: u32) {
-    assert_eq!((image.width, image.height), (mask.width(), mask.height()), "mask and image differ in size");
-    assert!(image.width.max(image.height) <= MAX_SIDE, "{} × {} px", image.width, image.height);
-    if mask.is_full() || mask.marked() == 0 {
-        return;
+    Filler::default().fill_unmarked(image, mask, reach);
+}
+
+/// Fills images one after another and reuses its buffers. One per thread.
+#[derive(Default)]
+pub struct Filler {
+    /// The unmarked runs of all rows, and the end of each row's runs.
+    gaps: Vec<Range<usize>>,
+    row_ends: Vec<usize>,
+    /// For each pixel the distance up to the nearest marked one in its column, at most `far`; 0 for a marked pixel.
+    up: Vec<i16>,
+    down: Vec<i16>,
+    offsets: Vec<i16>,
+    envelope: Vec<Parabola>,
+}
+
+impl Filler {
+    /// See the function of this name.
+    pub fn fill_unmarked(&mut self, image: &mut Raster, mask: &PixelMask, reach: u32) {
+        assert_eq!((image.width, image.height), (mask.width(), mask.height()), "mask and image differ in size");
+        assert!(image.width.max(image.height) <= MAX_SIDE, "{} × {} px", image.width, image.height);
+        if mask.is_full() || mask.marked() == 0 {
+            return;
+        }
+        let w = image.width as usize;
+        // Represents any greater distance.
+        let far = reach.min(MAX_SIDE - 1) as i16 + 1;
+        self.find_gaps(mask);
+        self.find_up(w, far);
+        let Self { gaps, row_ends, up, down, offsets, envelope } = self;
+        down.clear();
+        down.resize(w, far);
+        offsets.clear();
+        offsets.resize(w, 0);
+        for y in (0..row_ends.len()).rev() {
+            let row = row_of(gaps, row_ends, y);
+            step_down(down, offsets, &up[y * w..][..w], row, far);
+            for gap in row {
+                lower_envelope(envelope, offsets, gap.start.saturating_sub(1), (gap.end + 1).min(w), far);
+                copy_nearest(image, y, gap, offsets, envelope, far);
+            }
+        }
     }
-    let w = image.width as usize;
-    // Represents any greater distance.
-    let far = reach.min(MAX_SIDE - 1) as i16 + 1;
-    let gaps: Vec<Vec<Range<usize>>> = (0..mask.height()).map(|y| mask.gaps(y)).collect();
-    let up = rows_up(w, &gaps, far);
-    let mut down = vec![far; w];
-    let mut offsets = vec![0; w];
-    let mut envelope = Vec::new();
-    for (y, row) in gaps.iter().enumerate().rev() {
-        step_down(&mut down, &mut offsets, &up[y * w..][..w], row, far);
-        for gap in row {
-            lower_envelope(&mut envelope, &offsets, gap.start.saturating_sub(1), (gap.end + 1).min(w), far);
-            copy_nearest(image, y, gap, &offsets, &envelope, far);
+
+    fn find_gaps(&mut self, mask: &PixelMask) {
+        self.gaps.clear();
+        self.row_ends.clear();
+        for y in 0..mask.height() {
+            self.gaps.extend(mask.gaps(y));
+            self.row_ends.push(self.gaps.len());
+        }
+    }
+
+    fn find_up(&mut self, w: usize, far: i16) {
+        let Self { gaps, row_ends, up, .. } = self;
+        up.clear();
+        for y in 0..row_ends.len() {
+            for gap in row_of(gaps, row_ends, y) {
+                up.resize(y * w + gap.start, 0);
+                match y {
+                    0 => up.resize(gap.end, far),
+                    _ => up.extend_from_within((y - 1) * w + gap.start..(y - 1) * w + gap.end),
+                }
+                up[y * w + gap.start..].iter_mut().for_each(|distance| *distance = (*distance + 1).min(far));
+            }
+            up.resize((y + 1) * w, 0);
         }
     }
 }
 
-/// Returns for each pixel the distance up to the nearest marked one in its column, at most `far`; 0 for a marked pixel.
-fn rows_up(w: usize, gaps: &[Vec<Range<usize>>], far: i16) -> Vec<i16> {
-    let mut up = vec![0; w * gaps.len()];
-    for (y, row) in gaps.iter().enumerate() {
-        let (before, own) = up.split_at_mut(y * w);
-        for gap in row {
-            match y {
-                0 => own[gap.clone()].fill(far),
-                _ => own[gap.clone()].iter_mut().zip(&before[(y - 1) * w..][gap.clone()]).for_each(|(o, a)| *o = (a + 1).min(far)),
-            }
-        }
-    }
-    up
+/// Returns the unmarked runs of a row.
+fn row_of<'a>(gaps: &'a [Range<usize>], row_ends: &[usize], y: usize) -> &'a [Range<usize>] {
+    &gaps[if y == 0 { 0 } else { row_ends[y - 1] }..row_ends[y]]
 }
 
 /// Updates the distances down from those of the row below; `offsets` receives the offset to the nearer of both, negative upwards. `far` or `-far`:

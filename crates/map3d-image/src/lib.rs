@@ -12,7 +12,7 @@ pub mod seam;
 pub mod srgb;
 
 pub use decode::ImageLimits;
-pub use fill::fill_unmarked;
+pub use fill::{Filler, fill_unmarked};
 pub use gbuffer::{Arrays, GBuffer};
 pub use mask::PixelMask;
 pub use raster::Raster;

@@ -39,17 +39,19 @@ impl PixelMask {
     }
 
     /// Returns the runs of unmarked pixels of a row as columns.
-    pub fn gaps(&self, y: u32) -> Vec<Range<usize>> {
+    pub fn gaps(&self, y: u32) -> impl Iterator<Item = Range<usize>> {
         let start = u64::from(y) * u64::from(self.width);
         let end = start + u64::from(self.width);
-        let mut out = Vec::new();
         let mut at = self.run_end(start, true, end);
-        while at < end {
-            let stop = self.run_end(at, false, end);
-            out.push((at - start) as usize..(stop - start) as usize);
+        std::iter::from_fn(move || {
+            let from = at;
+            if from >= end {
+                return None;
+            }
+            let stop = self.run_end(from, false, end);
             at = self.run_end(stop, true, end);
-        }
-        out
+            Some((from - start) as usize..(stop - start) as usize)
+        })
     }
 
     /// Marks columns of a row; none when the range is empty.

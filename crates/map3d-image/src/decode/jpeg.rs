@@ -28,16 +28,16 @@ pub fn size(path: &Path, bytes: &[u8]) -> Result<(u32, u32)> {
     Ok((u32::from(info.width), u32::from(info.height)))
 }
 
-/// Decodes a JPEG whose header states `width` × `height`. A panic on damaged bytes counts as a refusal.
-pub fn decode(path: &Path, bytes: &[u8], width: u32, height: u32) -> Result<Raster> {
-    match catch_unwind(|| decode_sound(bytes, width, height)) {
+/// Decodes a JPEG whose header states `size` (width, height) into the memory of `spare`. A panic on damaged bytes counts as a refusal.
+pub fn decode(path: &Path, bytes: &[u8], size: (u32, u32), spare: Vec<[u8; 4]>) -> Result<Raster> {
+    match catch_unwind(|| decode_sound(bytes, size, spare)) {
         Ok(Some(raster)) => Ok(raster),
         _ => decode_lenient(path, bytes),
     }
 }
 
 /// Decodes grey and YCbCr images of 8 bits; `None` for anything else, CMYK among them.
-fn decode_sound(bytes: &[u8], width: u32, height: u32) -> Option<Raster> {
+fn decode_sound(bytes: &[u8], (width, height): (u32, u32), spare: Vec<[u8; 4]>) -> Option<Raster> {
     let mut decoder = Decoder::new(bytes).ok()?;
     decoder.set_scan_limit(MAX_SCANS);
     decoder.set_output_format(PixelFormat::Rgba);
@@ -46,9 +46,18 @@ fn decode_sound(bytes: &[u8], width: u32, height: u32) -> Option<Raster> {
     if !is_expected || header.precision != 8 || header.components.len() > 3 {
         return None;
     }
-    let mut pixels = vec![[0u8; 4]; width as usize * height as usize];
-    decoder.decode_image_into(pixels.as_flattened_mut()).ok()?;
-    Some(Raster::new(width, height, pixels))
+    let mut pixels = resized(spare, width as usize * height as usize);
+    let written = decoder.decode_image_into(pixels.as_flattened_mut()).ok()?.bytes_written;
+    (written == 4 * pixels.len()).then(|| Raster::new(width, height, pixels))
+}
+
+/// Returns some pixels in the memory of `spare` if it is large enough. Their values are arbitrary.
+fn resized(mut spare: Vec<[u8; 4]>, count: usize) -> Vec<[u8; 4]> {
+    if spare.capacity() < count {
+        return vec![[0; 4]; count];
+    }
+    spare.resize(count, [0; 4]);
+    spare
 }
 
 fn decode_lenient(path: &Path, bytes: &[u8]) -> Result<Raster> {

@@ -35,8 +35,16 @@ pub fn probe(path: &Path, bytes: &[u8], limits: &ImageLimits) -> Result<(u32, u3
 
 /// Decodes JPEG, PNG, GIF (first frame), BMP, TIFF, WebP or TGA, which it recognises by the first bytes.
 pub fn decode(path: &Path, bytes: &[u8], limits: &ImageLimits) -> Result<Raster> {
+    decode_reusing(path, bytes, limits, Vec::new())
+}
+
+/// As `decode`; a JPEG's pixels take the memory of `spare`, whatever it contains.
+pub fn decode_reusing(path: &Path, bytes: &[u8], limits: &ImageLimits, spare: Vec<[u8; 4]>) -> Result<Raster> {
     let (width, height) = probe(path, bytes, limits)?;
-    let raster = guarded(path, || if jpeg::is_jpeg(bytes) { jpeg::decode(path, bytes, width, height) } else { decode_other(path, bytes, limits) })?;
+    let raster = guarded(path, || match jpeg::is_jpeg(bytes) {
+        true => jpeg::decode(path, bytes, (width, height), spare),
+        false => decode_other(path, bytes, limits),
+    })?;
     if (raster.width, raster.height) != (width, height) {
         return Err(Error::format(path, format!("decodes to {} × {} px, its header says {width} × {height}", raster.width, raster.height)));
     }

@@ -18,6 +18,8 @@ pub struct AlphaSampler {
     map: TexelMap,
     /// From a pixel's origin to its samples.
     sample_offsets: [TexelPoint; 16],
+    /// The least and the greatest of them in each axis.
+    extent: [TexelPoint; 2],
     /// Whether the surface covers the texels outside the texture.
     covers_outside: bool,
 }
@@ -35,7 +37,12 @@ impl AlphaSampler {
     pub fn new(level: Arc<Level>, uv: &UvMap, wrap: Wrap, outside_alpha: u8) -> Self {
         let map = TexelMap::new(level, wrap, uv);
         let sample_offsets = SAMPLES.map(|(x, y)| map.change(i32::from(x) * SIXTEENTH, i32::from(y) * SIXTEENTH));
-        Self { map, sample_offsets, covers_outside: outside_alpha >= 128 }
+        let extreme = |of: fn(i64, i64) -> i64| {
+            let join = |a: TexelPoint, b: &TexelPoint| TexelPoint { x: of(a.x, b.x), y: of(a.y, b.y) };
+            sample_offsets.iter().fold(sample_offsets[0], join)
+        };
+        let extent = [extreme(i64::min), extreme(i64::max)];
+        Self { map, sample_offsets, extent, covers_outside: outside_alpha >= 128 }
     }
 
     /// Whether the surface covers a position in 2^-8 px from the map's origin.
@@ -52,6 +59,12 @@ impl AlphaSampler {
     /// Returns those of the given samples of pixel (i, j) that the surface covers; bit k is sample k.
     pub fn covered_samples(&self, i: i32, j: i32, samples: u32) -> u32 {
         let origin = self.map.unwrapped_at(i << POSITION_BITS, j << POSITION_BITS);
+        // Most pixels lie within the leaves or beside them.
+        match self.map.common_alpha_cell(self.map.reduce_to_first_period(origin), self.extent) {
+            AlphaCell::Transparent => return 0,
+            AlphaCell::Opaque => return samples & 0xFFFF,
+            AlphaCell::Mixed => {}
+        }
         let mut rest = samples & 0xFFFF;
         let mut covered = 0;
         while rest != 0 {

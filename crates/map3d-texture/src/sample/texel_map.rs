@@ -137,6 +137,19 @@ impl TexelMap {
         if is_inside { self.level.alpha_cell(x as i32, y as i32) } else { AlphaCell::Mixed }
     }
 
+    /// Returns the alpha that all bilinear taps between two corners of a rectangle find, where they have it in common and lie inside the texture; else
+    /// `Mixed`. The corners are relative to a point of the first period.
+    #[inline(always)]
+    pub fn common_alpha_cell(&self, t: TexelPoint, [low, high]: [TexelPoint; 2]) -> AlphaCell {
+        let (low, high) = (t.offset(low), t.offset(high));
+        let (x, y) = ([low.x, high.x].map(|c| c >> TEXEL_BITS), [low.y, high.y].map(|c| c >> TEXEL_BITS));
+        let is_inside = |[low, high]: [i64; 2], n: u32| low >= 0 && low <= high && high < i64::from(n) - 1;
+        match is_inside(x, self.level.width) && is_inside(y, self.level.height) {
+            true => self.level.common_alpha_cell(x.map(|c| c as i32), y.map(|c| c as i32)),
+            false => AlphaCell::Mixed,
+        }
+    }
+
     /// Whether all taps around a point touch only texels that have a right and a lower neighbour.
     #[inline(always)]
     pub fn is_inside(&self, t: TexelPoint, taps: &TapExtent) -> bool {

@@ -128,7 +128,7 @@ impl TextureCache {
             return texture.file.stored_level(level);
         }
         self.decoded.fetch_add(1, Ordering::Relaxed);
-        Ok(Level::of_image(texture.file.level_0()?, texture.file.has_alpha))
+        texture.file.decoded_level_0()
     }
 
     /// Counts the bytes of a new level and drops the least recently used ones over the capacity.

@@ -1,6 +1,8 @@
 //! `.m3t` files (spec/scene.md, Texture): the source bytes, the usage mask, and the levels from 1 on, packed.
 
+use std::cell::RefCell;
 use std::fs::{self, File};
+use std::io::Read;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
@@ -10,7 +12,7 @@ use map3d_base::{Error, Result};
 use crate::store::level::Level;
 use crate::store::mips::{first_mip, level_count, level_size, next_mip};
 use crate::store::packed::{pack, unpack};
-use crate::store::source;
+use crate::store::source::{self, Level0Decoder};
 use map3d_image::ImageLimits;
 use map3d_image::PixelMask;
 use map3d_image::Raster;
@@ -57,16 +59,16 @@ pub fn texture_key(image: &[u8], alpha: &[u8], runs: &[u8]) -> TextureKey {
 /// Decodes a texture and returns its file's bytes.
 pub fn encode_texture(path: &Path, image: &[u8], alpha: &[u8], mask: &PixelMask, limits: &ImageLimits) -> Result<Vec<u8>> {
     let masked = !mask.is_full();
-    let level_0 = source::decode_level_0(path, image, alpha, masked.then_some((mask, u32::MAX)), limits)?;
+    let level_0 = Level0Decoder::default().decode(path, image, alpha, masked.then_some((mask, u32::MAX)), limits)?;
     let levels = level_count(level_0.width, level_0.height);
     let (width, height, has_alpha) = (level_0.width, level_0.height, level_0.has_alpha());
     let mut sections = vec![image.to_vec(), alpha.to_vec(), if masked { mask.to_runs() } else { Vec::new() }];
     if levels > 1 {
         let mut mip = first_mip(&level_0);
-        sections.push(pack(&Level::first_mip_of(level_0, has_alpha), has_alpha));
+        sections.push(pack(&Level::first_mip_of(&level_0, has_alpha), has_alpha));
         for _ in 2..levels {
             mip = next_mip(&mip);
-            sections.push(pack(&Level::of_image(mip.to_raster(), has_alpha), has_alpha));
+            sections.push(pack(&Level::of_image(&mip.to_raster(), has_alpha), has_alpha));
         }
     }
     let flags = u32::from(has_alpha) * FLAG_ALPHA + u32::from(masked) * FLAG_MASK;
@@ -117,9 +119,16 @@ pub struct TextureFile {
 impl TextureFile {
     /// Opens a file and verifies its checksum.
     pub fn open(path: &Path) -> Result<Self> {
-        let bytes = fs::read(path).map_err(|e| Error::storage(path, e))?;
-        file::check_header(path, &bytes, TEXTURE_MAGIC, TEXTURE_VERSION, true)?;
-        Self::parse(path, &bytes, bytes.len() as u64)
+        READER.with_borrow_mut(|Reader { bytes, .. }| {
+            bytes.clear();
+            File::open(path).and_then(|mut file| file.read_to_end(bytes)).map_err(|e| Error::storage(path, e))?;
+            file::check_header(path, bytes, TEXTURE_MAGIC, TEXTURE_VERSION, true)?;
+            let texture = Self::parse(path, bytes, bytes.len() as u64);
+            if bytes.capacity() > KEPT_BYTES {
+                *bytes = Vec::new();
+            }
+            texture
+        })
     }
 
     /// Opens a file without reading its sections or verifying the checksum.
@@ -161,14 +170,21 @@ impl TextureFile {
     /// Reads a level ≥ 1, ready to sample.
     pub fn stored_level(&self, level: u32) -> Result<Level> {
         assert!((1..self.levels).contains(&level), "level {level} is not stored");
-        let frame = self.section(FIRST_LEVEL_SECTION + level as usize - 1)?;
-        let (w, h) = level_size(self.width, self.height, level);
-        unpack(&frame, w, h, self.has_alpha).map_err(|what| Error::format(&self.path, format!("level {level}: {what}")))
+        READER.with_borrow_mut(|Reader { bytes: frame, .. }| {
+            self.read_section(FIRST_LEVEL_SECTION + level as usize - 1, frame)?;
+            let (w, h) = level_size(self.width, self.height, level);
+            unpack(frame, w, h, self.has_alpha).map_err(|what| Error::format(&self.path, format!("level {level}: {what}")))
+        })
     }
 
-    /// Decodes level 0 and fills its unused texels as far as it is sampled.
-    pub fn level_0(&self) -> Result<Raster> {
-        self.decode(SAMPLED_REACH)
+    /// Decodes level 0, ready to sample.
+    pub(super) fn decoded_level_0(&self) -> Result<Level> {
+        READER.with_borrow_mut(|reader| {
+            let image = self.decode(reader, SAMPLED_REACH)?;
+            let level = Level::of_image(&image, self.has_alpha);
+            reader.decoder.recycle(image);
+            Ok(level)
+        })
     }
 
     /// Computes any level as sRGB bytes from the source image.
@@ -176,22 +192,25 @@ impl TextureFile {
         if level >= self.levels {
             return Err(Error::argument(format!("level {level} of {}: expected 0 to {}", self.path.display(), self.levels - 1)));
         }
+        let mut reader = Reader::default();
         if level == 0 {
-            return self.level_0();
+            return self.decode(&mut reader, SAMPLED_REACH);
         }
-        let mip = first_mip(&self.decode(u32::MAX)?);
+        let mip = first_mip(&self.decode(&mut reader, u32::MAX)?);
         Ok((1..level).fold(mip, |mip, _| next_mip(&mip)).to_raster())
     }
 
     /// Decodes the source image and fills its unused texels within a distance of the used ones.
-    fn decode(&self, reach: u32) -> Result<Raster> {
-        let (image, alpha) = (self.section(IMAGE_SECTION)?, self.section(ALPHA_SECTION)?);
+    fn decode(&self, reader: &mut Reader, reach: u32) -> Result<Raster> {
+        let Reader { decoder, bytes: image } = reader;
+        self.read_section(IMAGE_SECTION, image)?;
+        let alpha = self.section(ALPHA_SECTION)?;
         let mask = if self.masked { Some(self.mask()?) } else { None };
         let limits = ImageLimits::default();
-        if source::probe(&self.path, &image, &alpha, &limits)? != (self.width, self.height) {
+        if source::probe(&self.path, image, &alpha, &limits)? != (self.width, self.height) {
             return Err(Error::format(&self.path, "its image and its header differ in size"));
         }
-        source::decode_level_0(&self.path, &image, &alpha, mask.as_ref().map(|m| (m, reach)), &limits)
+        decoder.decode(&self.path, image, &alpha, mask.as_ref().map(|m| (m, reach)), &limits)
     }
 
     fn mask(&self) -> Result<PixelMask> {
@@ -201,10 +220,30 @@ impl TextureFile {
     }
 
     fn section(&self, k: usize) -> Result<Vec<u8>> {
-        let (offset, length) = self.sections[k];
-        let mut bytes = vec![0; length as usize];
-        let file = File::open(&self.path).map_err(|e| Error::storage(&self.path, e))?;
-        file.read_exact_at(&mut bytes, offset).map_err(|e| Error::storage(&self.path, e))?;
+        let mut bytes = Vec::new();
+        self.read_section(k, &mut bytes)?;
         Ok(bytes)
     }
+
+    fn read_section(&self, k: usize, bytes: &mut Vec<u8>) -> Result<()> {
+        let (offset, length) = self.sections[k];
+        bytes.resize(length as usize, 0);
+        let file = File::open(&self.path).map_err(|e| Error::storage(&self.path, e))?;
+        file.read_exact_at(bytes, offset).map_err(|e| Error::storage(&self.path, e))
+    }
 }
+
+thread_local! {
+    /// Buffers for the files that a thread reads one after another: new pages for each would take a third of the time.
+    static READER: RefCell<Reader> = RefCell::default();
+}
+
+#[derive(Default)]
+struct Reader {
+    decoder: Level0Decoder,
+    /// Of a file, or of one of its sections.
+    bytes: Vec<u8>,
+}
+
+/// Files are read into a buffer that is kept up to this size.
+const KEPT_BYTES: usize = 4 << 20;

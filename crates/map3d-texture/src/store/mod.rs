@@ -7,6 +7,7 @@ mod layout;
 mod level;
 mod mips;
 mod packed;
+mod roots;
 mod source;
 mod usage;
 

@@ -101,7 +101,7 @@ mod tests {
             let [r, g, b, a] = (k.wrapping_mul(0x9E37_79B1) ^ k >> 3).to_le_bytes();
             [r, g, b, if has_alpha { a } else { 255 }]
         };
-        Level::of_image(Raster::new(width, height, (0..width * height).map(texel).collect()), has_alpha)
+        Level::of_image(&Raster::new(width, height, (0..width * height).map(texel).collect()), has_alpha)
     }
 
     #[test]
@@ -130,7 +130,7 @@ mod tests {
     #[test]
     fn what_changes_little_from_row_to_row_becomes_small() {
         let rows = (0..256 * 256u32).map(|k| [(k % 256) as u8, (k % 199) as u8, 40, 255]).map(|[r, _, b, a]| [r, r / 2, b, a]).collect();
-        let level = Level::of_image(Raster::new(256, 256, rows), false);
+        let level = Level::of_image(&Raster::new(256, 256, rows), false);
         assert!(pack(&level, false).len() < 256 * 256 / 50);
     }
 }
