@@ -1,9 +1,13 @@
 //! Reduces four children to their parent (spec/pyramid.md §7), from unencoded pixels.
 
+use std::ops::Range;
+
 use map3d_base::DEPTH_NOTHING;
 
 use crate::gbuffer::{Arrays, GBuffer, normal_from_vector};
 
+/// Pixels of a row that are reduced together.
+const PIECE: usize = 64;
 /// A shorter mean normal has no direction.
 const MIN_MEAN: f64 = 1e-6;
 
@@ -41,10 +45,15 @@ struct Rows {
 }
 
 impl Rows {
-    /// Returns the squares of 2 × 2 pixels, each in the order TL, TR, BL, BR.
-    fn squares<'a, T: Copy>(&self, array: &'a [T]) -> impl Iterator<Item = [T; 4]> + use<'a, T> {
-        let w = self.width;
-        pairs(&array[2 * self.y * w..(2 * self.y + 1) * w], &array[(2 * self.y + 1) * w..(2 * self.y + 2) * w])
+    /// Returns the squares of 2 × 2 pixels of some columns of the half row, each in the order TL, TR, BL, BR.
+    fn squares<'a, T: Copy>(&self, array: &'a [T], columns: &Range<usize>) -> impl Iterator<Item = [T; 4]> + use<'a, T> {
+        let (upper, lower) = (2 * self.y * self.width, (2 * self.y + 1) * self.width);
+        let of_row = |row: usize| &array[row + 2 * columns.start..row + 2 * columns.end];
+        pairs(of_row(upper), of_row(lower))
+    }
+
+    fn all_squares<'a, T: Copy>(&self, array: &'a [T]) -> impl Iterator<Item = [T; 4]> + use<'a, T> {
+        self.squares(array, &(0..self.width / 2))
     }
 
     /// Returns the square of pixel x of the half row.
@@ -54,48 +63,84 @@ impl Rows {
     }
 
     fn ids(&self, child: &GBuffer, parent: &mut GBuffer) {
-        let is_plain = child.sun16.is_empty() && child.depth2.is_empty();
-        for (x, (ids, depths)) in self.squares(&child.id).zip(self.squares(&child.depth)).enumerate() {
-            let to = self.at + x;
-            // Most squares show one object, so there is no choice to make.
-            if is_plain && ids == [ids[0]; 4] {
-                if ids[0] != 0 {
-                    (parent.id[to], parent.depth[to]) = (ids[0], depths[0].min(depths[1]).min(depths[2].min(depths[3])));
-                    if !child.normal.is_empty() {
-                        parent.normal[to] = normal_of_one(self.square(&child.normal, x), depths);
-                    }
-                }
-                continue;
+        if child.sun16.is_empty() && child.depth2.is_empty() {
+            return self.plain_ids(child, parent);
+        }
+        for x in 0..self.width / 2 {
+            self.choose_id(x, self.square(&child.id, x), self.square(&child.depth, x), child, parent);
+        }
+    }
+
+    /// Reduces id, depth and normal. Most squares show one object with one normal, so there is no choice to make: all are reduced as if they did, then the
+    /// others again.
+    fn plain_ids(&self, child: &GBuffer, parent: &mut GBuffer) {
+        let mut again = [false; PIECE];
+        for first in (0..self.width / 2).step_by(PIECE) {
+            let columns = first..(first + PIECE).min(self.width / 2);
+            let to = self.at + columns.start..self.at + columns.end;
+            let (ids, depths) = (&mut parent.id[to.clone()], &mut parent.depth[to.clone()]);
+            let squares = self.squares(&child.id, &columns).zip(self.squares(&child.depth, &columns));
+            for (((id, depth), again), (of_ids, of_depths)) in ids.iter_mut().zip(depths).zip(&mut again).zip(squares) {
+                *again = differ(of_ids);
+                *id = of_ids[0];
+                *depth = if of_ids[0] == 0 { DEPTH_NOTHING } else { of_depths[0].min(of_depths[1]).min(of_depths[2].min(of_depths[3])) };
             }
-            let id = most_frequent_id(ids, depths);
-            if id == 0 {
-                continue;
-            }
-            let of_id = [0, 1, 2, 3].map(|k| ids[k] == id);
-            let (nearest, depth) = nearest(of_id, depths);
-            (parent.id[to], parent.depth[to]) = (id, depth);
             if !child.normal.is_empty() {
-                parent.normal[to] = mean_normal(of_id, self.square(&child.normal, x), nearest);
+                let normals = parent.normal[to].iter_mut().zip(&mut again).zip(&*ids);
+                for (((normal, again), id), of_normals) in normals.zip(self.squares(&child.normal, &columns)) {
+                    *again |= *id != 0 && normals_differ(of_normals);
+                    *normal = if *id == 0 { [0; 3] } else { of_normals[0] };
+                }
             }
-            if !child.sun16.is_empty() {
-                parent.sun16[to] = self.square(&child.sun16, x)[nearest];
-            }
-            if !child.depth2.is_empty() {
-                let second = self.square(&child.depth2, x);
-                parent.depth2[to] = (0..4).filter(|k| of_id[*k]).map(|k| second[k]).min().expect("the nearest is of the id");
-            }
+            columns.clone().filter(|x| again[x - first]).for_each(|x| self.reduce_mixed(x, child, parent));
+        }
+    }
+
+    /// Reduces a square of several objects or several normals.
+    #[inline(never)]
+    fn reduce_mixed(&self, x: usize, child: &GBuffer, parent: &mut GBuffer) {
+        let (to, ids, depths) = (self.at + x, self.square(&child.id, x), self.square(&child.depth, x));
+        if !differ(ids) {
+            parent.normal[to] = normal_of_one(self.square(&child.normal, x), depths);
+            return;
+        }
+        (parent.id[to], parent.depth[to]) = (0, DEPTH_NOTHING);
+        if !child.normal.is_empty() {
+            parent.normal[to] = [0; 3];
+        }
+        self.choose_id(x, ids, depths, child, parent);
+    }
+
+    /// Reduces a square to one of its ids; leaves the parent's pixel empty if that is 0.
+    fn choose_id(&self, x: usize, ids: [u32; 4], depths: [u32; 4], child: &GBuffer, parent: &mut GBuffer) {
+        let (to, id) = (self.at + x, most_frequent_id(ids, depths));
+        if id == 0 {
+            return;
+        }
+        let of_id = [0, 1, 2, 3].map(|k| ids[k] == id);
+        let (nearest, depth) = nearest(of_id, depths);
+        (parent.id[to], parent.depth[to]) = (id, depth);
+        if !child.normal.is_empty() {
+            parent.normal[to] = mean_normal(of_id, self.square(&child.normal, x), nearest);
+        }
+        if !child.sun16.is_empty() {
+            parent.sun16[to] = self.square(&child.sun16, x)[nearest];
+        }
+        if !child.depth2.is_empty() {
+            let second = self.square(&child.depth2, x);
+            parent.depth2[to] = (0..4).filter(|k| of_id[*k]).map(|k| second[k]).min().expect("the nearest is of the id");
         }
     }
 
     fn colors(&self, child: &[[u16; 4]], parent: &mut [[u16; 4]]) {
         if !child.is_empty() {
-            parent[self.at..][..self.width / 2].iter_mut().zip(self.squares(child)).for_each(|(to, four)| *to = mean_color(four));
+            parent[self.at..][..self.width / 2].iter_mut().zip(self.all_squares(child)).for_each(|(to, four)| *to = mean_color(four));
         }
     }
 
     fn shades(&self, child: &GBuffer, array: &[u8], parent: &mut [u8]) {
         if !array.is_empty() {
-            let fours = self.squares(array).zip(self.squares(&child.id));
+            let fours = self.all_squares(array).zip(self.all_squares(&child.id));
             parent[self.at..][..self.width / 2].iter_mut().zip(fours).for_each(|(to, (four, ids))| *to = mean_shade(four, ids));
         }
     }
@@ -112,6 +157,17 @@ fn mean_shade(four: [u8; 4], ids: [u32; 4]) -> u8 {
 fn pairs<'a, T: Copy>(upper: &'a [T], lower: &'a [T]) -> impl Iterator<Item = [T; 4]> + 'a {
     let squares = upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0);
     squares.map(|(u, l)| [u[0], u[1], l[0], l[1]])
+}
+
+/// Whether a square shows several ids.
+#[inline(always)]
+fn differ(ids: [u32; 4]) -> bool {
+    (ids[0] ^ ids[1]) | (ids[0] ^ ids[2]) | (ids[0] ^ ids[3]) != 0
+}
+
+#[inline(always)]
+fn normals_differ([a, b, c, d]: [[i16; 3]; 4]) -> bool {
+    (0..3).fold(0, |all, k| all | (a[k] ^ b[k]) | (a[k] ^ c[k]) | (a[k] ^ d[k])) != 0
 }
 
 #[inline(always)]
