@@ -12,7 +12,7 @@ from typing import Final
 
 from map3d.web.page_language import language
 from map3d.web.page_tools import translate as _
-from map3d.web.report_sentences import FAULTS, SKIPPED
+from map3d.web.report_sentences import fault_sentence, skip_sentence
 
 N_: Final = str
 """Marks a text that is translated where it is shown."""
@@ -207,7 +207,8 @@ def _value(name: str, text: str) -> str | int | float:
 def _skipped(text: str) -> str:
     """Returns a sentence for a count and a reason, as in `3 × zero area`."""
     count, _times, reason = text.partition(" × ")
-    return _(SKIPPED[reason], count=_number(count)) if reason in SKIPPED else f"{text}."
+    sentence = skip_sentence(reason)
+    return f"{text}." if sentence is None else _(sentence[0], count=_number(count), **sentence[1])
 
 
 def _number(text: str) -> int | float:
@@ -218,7 +219,9 @@ def _number(text: str) -> int | float:
 def _warning(values: Mapping[str, str]) -> str:
     """Returns the sentence of an import report for a known reason."""
     reason, count = values["reason"], _number(values["count"])
-    known = SKIPPED.get(reason.removeprefix("skipped: ")) if reason.startswith("skipped: ") else FAULTS.get(reason)
+    known = skip_sentence(reason.removeprefix("skipped: ")) if reason.startswith("skipped: ") else fault_sentence(reason)
     if known is None:
         return _(WARNING, **{**values, "count": count})
-    return _("{asset}: {sentence} Example: {example}", asset=values["asset"], sentence=_(known, count=count), example=values["example"])
+    return _(
+        "{asset}: {sentence} Example: {example}", asset=values["asset"], sentence=_(known[0], count=count, **known[1]), example=values["example"]
+    )

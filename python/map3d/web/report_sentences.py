@@ -9,6 +9,13 @@ N_: Final = str
 IMAGE_FAULTS: Final[Mapping[str, str]] = {
     "image: file not found": N_("Textures not found: {count}. Upload them together with the model."),
     "image: unknown format": N_("Textures in a format that map3d does not read: {count}."),
+    "image: file outside the asset's folder not read": N_("Textures outside the given folder, which are not read: {count}."),
+    "image: URL not fetched": N_("Textures on the web, which are not fetched: {count}."),
+    "image: not a regular file": N_("Textures whose name leads to something that is not a file: {count}."),
+    "image: invalid file name": N_("Textures with an invalid file name: {count}."),
+    "image: unsupported format": N_("Textures in an image format that map3d does not read: {count}."),
+    "image: invalid header": N_("Textures with a damaged header: {count}."),
+    "image: no pixels": N_("Textures without pixels: {count}."),
     "unusable image": N_("Materials without a usable texture, shown in their colour: {count}."),
     "georeferenced texture without reference point or world file": N_("Georeferenced textures without a reference point or world file: {count}."),
     "georeferenced texture in another coordinate system than the surface, not used": N_(
@@ -65,7 +72,74 @@ FAULTS: Final[Mapping[str, str]] = {
     "raster left out, far from the others": N_("Rasters far from the others, left out: {count}."),
     "raster skipped": N_("Rasters that cannot be read, left out: {count}."),
     "rasters of different resolution": N_("Mosaics of rasters of different resolutions: {count}."),
+    "library object: file not found": N_("Files with shared shapes, such as trees, that are not there: {count}."),
+    "library object: file outside the asset's folder not read": N_("Files with shared shapes outside the given folder, which are not read: {count}."),
+    "library object: URL not fetched": N_("Shared shapes on the web, which are not fetched: {count}."),
+    "library object: not a regular file": N_("Shared shapes whose name leads to something that is not a file: {count}."),
+    "library object: invalid file name": N_("Shared shapes with an invalid file name: {count}."),
+    "library object: unsupported format": N_("Files with shared shapes that are not OBJ files, which map3d does not read: {count}."),
+    "material library: file not found": N_("Material libraries (.mtl) not found: {count}. Upload them together with the model."),
+    "material library: file outside the asset's folder not read": N_("Material libraries outside the given folder, which are not read: {count}."),
+    "material library: URL not fetched": N_("Material libraries on the web, which are not fetched: {count}."),
+    "material library: not a regular file": N_("Material libraries whose name leads to something that is not a file: {count}."),
+    "material library: invalid file name": N_("Material libraries with an invalid file name: {count}."),
+    "mtllib without a file name": N_("Statements that name a material library without a file name: {count}."),
+    "material defined more than once; using the first": N_("Materials that are defined more than once; the first definition is used: {count}."),
+    "map_d without map_Kd ignored": N_("Materials with an alpha map but no texture, drawn without the alpha map: {count}."),
+    "black Kd with map_Kd treated as white": N_("Materials with a texture and the colour black, drawn as white so that the texture shows: {count}."),
+    "texture index out of range: face without texture": N_("Faces that refer to missing texture coordinates, drawn without a texture: {count}."),
+    "normal index out of range: face without normals": N_("Faces that refer to missing normals, which are computed instead: {count}."),
+    "self-intersecting face": N_("Faces whose edges cross, which may look wrong: {count}."),
+    "the model seems to lie on its side": N_(
+        "Models that seem to lie on their side: {count}. Choose “y” as the axis that points up if they should stand."
+    ),
+    "backslashes in a file name": N_("Names of files with backslashes, read as slashes: {count}."),
+    "percent-encoded file name": N_("Names of files that are encoded as in web addresses, read decoded: {count}."),
+    "file name with different case": N_("Names of files found in other upper and lower case: {count}."),
+    "transparency read as opacity": N_("Files whose transparency is read as opacity, since all would be invisible otherwise: {count}."),
+    "fully transparent surfaces are not drawn": N_("Files with fully transparent surfaces, which are not drawn: {count}."),
+    "polygons of interiors are not drawn": N_("Files with rooms, which are not drawn: {count}. The option “CityGML: rooms” draws them."),
+    "document broken": N_("Files that break off; what comes before is kept: {count}."),
+    "unknown encoding, read as UTF-8": N_("Files in an unknown encoding of text, read as UTF-8: {count}."),
+    "not UTF-8 as declared; other bytes read as Windows-1252": N_(
+        "Files that are not in UTF-8 as they claim; other bytes are read as Windows-1252: {count}."
+    ),
+    "zero bytes left out": N_("Files with zero bytes in their text, which are left out: {count}."),
+    "gzip file cut or damaged": N_("Packed files that are cut off or damaged; what could be unpacked is kept: {count}."),
+    "appearance theme used": N_("Files with several themes of appearances, of which one is used: {count}."),
+    "requested appearance theme is not the first in the document": N_("Files in which the chosen theme of appearances is not the first: {count}."),
+    "appearance of another theme ignored": N_("Appearances of other themes, not used: {count}."),
+    "appearance of back sides used only for surfaces without one of the front": N_(
+        "Appearances of back sides, used only for surfaces without one of the front: {count}."
+    ),
+    "unsupported surface data": N_("Appearances of kinds that map3d does not read: {count}."),
+    "texture without a parameterization": N_("Polygons with a texture but no place in it: {count}."),
+    "texture without coordinates for an interior ring": N_("Polygons whose holes have no texture coordinates, drawn without the texture: {count}."),
+    "fewer texture coordinates than points": N_("Polygons with fewer texture coordinates than points, drawn without the texture: {count}."),
+    "unknown texture parameterization": N_("Textures placed in a way that map3d does not read: {count}."),
+    "unreadable texture coordinates": N_("Lists of texture coordinates that are unreadable: {count}."),
+    "unreadable worldToTexture matrix": N_("Textures with an unreadable projection matrix: {count}."),
+    "unsupported geometry element": N_("Geometry elements that map3d does not read, left out: {count}."),
+    "unknown element; features inside it are read": N_("Elements that map3d does not know; what is inside them is read: {count}."),
+    "geometry without a level of detail read as level 0": N_("Geometry without a level of detail, read as level 0: {count}."),
+    "code list not read; its codes are kept as they are": N_("Code lists that are missing or unreadable; their codes stay as they are: {count}."),
+    "axes swapped, so the file is read as northing, easting": N_("Files with swapped axes, read as northing, easting: {count}."),
+    "axes swapped, so the file is read as longitude, latitude": N_("Files with swapped axes, read as longitude, latitude: {count}."),
+    "axes swapped, so the file is read as latitude, longitude": N_("Files with swapped axes, read as latitude, longitude: {count}."),
 }
+FAULTS_BY_LIMIT: Final[Mapping[str, str]] = {
+    "image: side over the limit max_image_side_px": N_("Textures with a side of more than {limit} pixels: {count}."),
+    "image: pixels over the limit max_image_px": N_("Textures of more than {limit} pixels: {count}."),
+}
+"""Reasons that end with ` = ` and the limit."""
+FAULTS_BY_NAME: Final[Mapping[str, str]] = {
+    "image: unreadable": N_("Textures that cannot be read {name}: {count}."),
+    "points outside the area of use of": N_("Points outside the area that the coordinate system {name} is meant for: {count}."),
+    "corners of the raster outside the area of use of": N_(
+        "Corners of rasters outside the area that the coordinate system {name} is meant for: {count}."
+    ),
+}
+"""Reasons that end with a name or words in brackets."""
 SKIPPED: Final[Mapping[str, str]] = {
     "coordinate is not a finite number": N_("Skipped polygons and triangles with coordinates that are not finite numbers: {count}."),
     "coordinate too far from the origin": N_("Skipped triangles too far from the origin: {count}."),
@@ -123,3 +197,30 @@ SKIPPED_BY_NAME: Final[Mapping[str, str]] = {
     "part in an unusable coordinate system": N_("Skipped triangles and placements in the coordinate system {name}, which is not usable: {count}."),
 }
 """Reasons that end with ` = ` and a name of the file."""
+
+
+Sentence = tuple[str, dict[str, int | str]]
+"""A text, and its values besides the count."""
+
+
+def fault_sentence(reason: str) -> Sentence | None:
+    """Returns the sentence of a warning; None for an unknown reason."""
+    if reason in FAULTS:
+        return FAULTS[reason], {}
+    for start, text in FAULTS_BY_NAME.items():
+        if reason.startswith(f"{start} "):
+            return text, {"name": reason.removeprefix(f"{start} ")}
+    return _limited(reason, FAULTS_BY_LIMIT)
+
+
+def skip_sentence(reason: str) -> Sentence | None:
+    """Returns the sentence of something that is not in the map; None for an unknown reason."""
+    if reason in SKIPPED:
+        return SKIPPED[reason], {}
+    start, _equals, name = reason.partition(" = ")
+    return (SKIPPED_BY_NAME[start], {"name": name}) if start in SKIPPED_BY_NAME else _limited(reason, SKIPPED_BY_LIMIT)
+
+
+def _limited(reason: str, texts: Mapping[str, str]) -> Sentence | None:
+    start, _equals, limit = reason.partition(" = ")
+    return (texts[start], {"limit": int(limit)}) if start in texts and limit.isdecimal() else None

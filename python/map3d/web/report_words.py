@@ -6,7 +6,7 @@ from typing import Any
 
 from map3d.catalogue import AssetRecord
 from map3d.web.page_tools import translate as _
-from map3d.web.report_sentences import FAULTS, SKIPPED, SKIPPED_BY_LIMIT, SKIPPED_BY_NAME
+from map3d.web.report_sentences import fault_sentence, skip_sentence
 
 
 @dataclass(frozen=True)
@@ -55,13 +55,8 @@ def _skipped(report: Mapping[str, Any]) -> Iterator[ReportLine]:
 
 
 def _skipped_text(reason: str, count: int) -> str:
-    if reason in SKIPPED:
-        return _(SKIPPED[reason], count=count)
-    text, _equals, limit = reason.partition(" = ")
-    if text in SKIPPED_BY_LIMIT and limit.isdecimal():
-        return _(SKIPPED_BY_LIMIT[text], count=count, limit=int(limit))
-    if text in SKIPPED_BY_NAME:
-        return _(SKIPPED_BY_NAME[text], count=count, name=limit)
+    if (sentence := skip_sentence(reason)) is not None:
+        return _(sentence[0], count=count, **sentence[1])
     return _("Skipped: {count} × {reason}.", count=count, reason=reason)
 
 
@@ -69,8 +64,13 @@ def _warnings(report: Mapping[str, Any]) -> Iterator[ReportLine]:
     for warning in report.get("warnings", ()):
         reason, count = warning["reason"], warning["count"]
         if not reason.startswith("skipped: "):
-            text = _(FAULTS[reason], count=count) if reason in FAULTS else _("{count} × {reason}.", count=count, reason=reason)
-            yield ReportLine("note", text, str(warning["example"]))
+            yield ReportLine("note", _warning_text(reason, count), str(warning["example"]))
+
+
+def _warning_text(reason: str, count: int) -> str:
+    if (sentence := fault_sentence(reason)) is not None:
+        return _(sentence[0], count=count, **sentence[1])
+    return _("{count} × {reason}.", count=count, reason=reason)
 
 
 def placing_words(asset: AssetRecord) -> str:
