@@ -144,3 +144,83 @@ def test_a_file_in_the_workspace_replaces_its_name(tmp_path: Path) -> None:
     for upload in ("1", "2"):
         write(workspace.root / "uploads" / upload, "town.gml")
         assert add(workspace, workspace.root / "uploads" / upload / "town.gml") == ("town", True)
+
+
+def add_folder(workspace: Workspace, folder: Path) -> dict[str, bool]:
+    """Imports the files of a folder; returns the names of their assets, and whether they replaced one."""
+    catalogue = workspace.open_catalogue()
+    if not catalogue.scenes():
+        catalogue.create_scene(SceneRecord("town"))
+    done = import_files(workspace, catalogue, "town", [folder], OPTIONS)
+    catalogue.close()
+    return {item.asset: item.replaced for item in done.imported}
+
+
+def test_a_second_folder_with_equal_names_replaces_nothing(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path / "workspace").create()
+    for name in ("a/town.gml", "a/sub/town.gml", "a/mill.gml", "b/town.gml", "b/sub/town.gml", "b/other.gml"):
+        write(tmp_path, name)
+    for folder in ("a", "b"):
+        write_raster(tmp_path / folder / "dem.tif", hills(8, 8))
+    first = add_folder(workspace, tmp_path / "a")
+    assert first == {"mill": False, "town": False, "town-2": False, "dem": False}
+    before = ids(workspace)
+    second = add_folder(workspace, tmp_path / "b")
+    assert second == {"other": False, "sub-town": False, "b-town": False, "b-dem": False}
+    after = ids(workspace)
+    assert before.items() < after.items()
+    for folder, names in (("b", second), ("a", first)):
+        assert add_folder(workspace, tmp_path / folder) == dict.fromkeys(names, True)
+    assert ids(workspace) == after
+
+    (tmp_path / "a").rename(tmp_path / "c")
+    assert add_folder(workspace, tmp_path / "c") == dict.fromkeys(first, True), "the folder was moved"
+    assert ids(workspace) == after
+
+
+def test_a_file_of_another_folder_is_not_taken_for_a_removed_numbered_one(tmp_path: Path) -> None:
+    workspace, city = Workspace(tmp_path / "workspace").create(), tmp_path / "city"
+    for name in ("b/town.gml", "c/town.gml"):
+        write(city, name)
+    update(workspace, city)
+    before = ids(workspace)
+    shutil.rmtree(city / "c")
+    assert update(workspace, city).removed == ["town-2"]
+    write(city, "d/town.gml")
+    assert update(workspace, city).imported == ["town-3"]
+    write(city, "c/town.gml")
+    assert update(workspace, city).imported == ["town-2"]
+    assert before.items() < ids(workspace).items()
+
+
+@pytest.mark.parametrize("moved", [False, True])
+def test_a_numbered_file_that_returns_alone_has_its_name_and_ids_back(tmp_path: Path, moved: bool) -> None:
+    workspace, city = Workspace(tmp_path / "workspace").create(), tmp_path / "city"
+    for name in ("b/town.gml", "c/town.gml", "mill.gml"):
+        write(city, name)
+    assert update(workspace, city).imported == ["town", "town-2", "mill"]
+    before = ids(workspace)
+    for folder in ("b", "c"):
+        shutil.rmtree(city / folder)
+    assert sorted(update(workspace, city).removed) == ["town", "town-2"]
+    if moved:
+        city = city.rename(tmp_path / "elsewhere")
+    write(city, "c/town.gml")
+    assert update(workspace, city).imported == ["town-2"]
+    mine = {name: place for name, place in before.items() if not name.startswith("b-")}
+    assert ids(workspace) == mine
+    write(city, "b/town.gml")
+    assert update(workspace, city).imported == ["town"]
+    assert ids(workspace) == before
+
+
+def test_a_removal_of_an_earlier_version_is_completed(tmp_path: Path) -> None:
+    """It listed the names of the assets alone."""
+    workspace, city = Workspace(tmp_path / "workspace").create(), tmp_path / "city"
+    for name in ("town.gml", "mill.gml"):
+        write(city, name)
+    update(workspace, city)
+    (workspace.scene_folder("town") / "assets" / ".removing").write_text('["mill"]')
+    (city / "mill.gml").unlink()
+    assert update(workspace, city).removed == []
+    assert {asset for asset, _ in ids(workspace).values()} == {"town"}

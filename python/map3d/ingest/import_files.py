@@ -7,6 +7,7 @@ from pathlib import Path
 from map3d.catalogue import AssetRecord, Catalogue, Workspace
 from map3d.catalogue.scene_lock import scene_lock
 from map3d.errors import BadRequest, Map3dError, UnknownFormat
+from map3d.ingest.asset_removal import removed_files
 from map3d.ingest.import_inputs import import_inputs
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import Imported, import_file, workspace_key
@@ -79,6 +80,7 @@ def _import_files(
         {asset.name: Path(asset.source) for asset in assets},
         virtual,
         _taken_names(workspace, assets, files),
+        removed_files(workspace, scene),
     )
     if result.failed and options.strict:
         raise UnknownFormat(result.failed[0][1])

@@ -35,6 +35,8 @@ OnUnreadable = Callable[[Path, str], None]
 
 _HEAD_BYTES = 4096
 _MAX_NAME_CHARS = 64
+_REMOVED_PARTS = 2
+"""Equal parts of two paths, from the end, for which a file is the one of a removed asset: its name and that of its folder."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,7 @@ def find_sources(
     known: Mapping[str, Path] | None = None,
     virtual: Collection[Path] = (),
     taken: Collection[str] = (),
+    removed: Mapping[str, Path] | None = None,
 ) -> list[SourceDocument]:
     """Returns the given files, and every file of a known format below the given folders: CityGML, OBJ, then rasters, each by path.
 
@@ -79,8 +82,8 @@ def find_sources(
     `on_unreadable` is called for files in folders whose suffix announces a known format that their content is not; `on_left_alone` for other files
     that hold a city or a raster in a format that map3d does not read, or whose format is unknown. `known`: the files of assets by name; a file whose
     name is needed for several keeps the one that it has there. `virtual`: those of the paths at which virtual rasters are read; the rasters that
-    one in a folder names are not read a second time. `taken`: known names that a document which was given itself has only if it is the file of that
-    asset; else it is named after its folders and itself.
+    one in a folder names are not read a second time. `taken`: known names that a source has only if it is the file of that
+    asset; else it is named after its folders and itself. `removed`: the files of removed assets by name; one that returns has its name back.
 
     CityGML files of a folder that have no city objects of their own, but geometry or appearances of others, are read with these.
 
@@ -102,7 +105,7 @@ def find_sources(
             documents.append(_Group(unpacked_path(path).stem, format, (path,)))
     if rasters:
         terrains.append(_Group(rasters[0].stem, "raster", tuple(rasters), virtual=any(path in virtual for path in rasters)))
-    sources = _name_sources([*_link(documents), *terrains], name, known or {}, taken)
+    sources = _name_sources([*_link(documents), *terrains], name, _AssetNames(known or {}, taken, removed or {}))
     return sorted(sources, key=lambda source: _ORDER[source.format])
 
 
@@ -224,19 +227,53 @@ def _group_rasters(rasters: Sequence[Path], virtual: Path | None) -> list[_Group
     return [_Group(rasters[0].stem if len(rasters) == 1 else folder.resolve().name, "raster", tuple(rasters), virtual, virtual is not None)]
 
 
-def _name_sources(groups: Sequence[_Group], name: str | None, known: Mapping[str, Path], taken: Collection[str]) -> list[SourceDocument]:
+class _AssetNames:
+    """The names that assets have, and those that removed ones had."""
+
+    def __init__(self, known: Mapping[str, Path], taken: Collection[str], removed: Mapping[str, Path]) -> None:
+        """`known`: the files of assets by name; `taken`: known names that only these files have; `removed`: the files of removed assets by name."""
+        self.known = known
+        self.removed = {name: path for name, path in removed.items() if name not in known}
+        self._taken = frozenset(taken)
+        self._names: dict[tuple[int, int], set[str]] = {}
+        for name in self._taken:
+            self._names.setdefault(_identity(known[name]), set()).add(name)
+
+    def of_others(self, group: _Group) -> frozenset[str]:
+        """Returns the taken names of files that are not the group's."""
+        own = {name for path in group.paths for name in self._names.get(_identity(path), ())} if self._names else set()
+        return self._taken - own if own else self._taken
+
+    def of_absent(self, groups: Sequence[_Group]) -> frozenset[str]:
+        """Returns the taken names of files that no group has."""
+        return self._taken - {name for group in groups for path in group.paths for name in self._names.get(_identity(path), ())}
+
+
+def _identity(path: Path) -> tuple[int, int]:
+    status = path.stat()
+    return status.st_dev, status.st_ino
+
+
+def _name_sources(groups: Sequence[_Group], name: str | None, names: _AssetNames) -> list[SourceDocument]:
     """Names sources after their files and numbers duplicates, without changing the names of known ones."""
     wanted = [asset_name(name or group.label) for group in groups]
-    others = [set[str]() if name else _names_of_other_files(group, known, taken) for group in groups]
-    kept = {} if name else _kept_names(groups, wanted, known, others)
+    kept = {} if name else _kept_names(groups, wanted, names)
     used = set(kept.values())
+    absent = names.of_absent(groups)
     sources = []
     for position, group in enumerate(groups):
-        refused = used | others[position]
-        unique = kept.get(position) or next(text for text in _possible_names(group, wanted[position]) if text not in refused)
+        possible = _possible_names(group, wanted[position], with_folders=_is_given(group) or wanted[position] in absent)
+        unique = kept.get(position) or next(_free(possible, wanted[position], used, group, None if name else names))
         used.add(unique)
         sources.append(SourceDocument(unique, group.format, group.paths, group.root, group.virtual, group.appearances))
     return sources
+
+
+def _free(possible: Iterator[str], wanted: str, used: Collection[str], group: _Group, names: _AssetNames | None) -> Iterator[str]:
+    """Yields the names that no other file has. A removed asset keeps a longer name than the wanted one for its file."""
+    others = names.of_others(group) if names else frozenset()
+    removed = names.removed if names else {}
+    return (text for text in possible if text not in used and text not in others and (text == wanted or text not in removed))
 
 
 def _is_given(group: _Group) -> bool:
@@ -244,41 +281,45 @@ def _is_given(group: _Group) -> bool:
     return group.root is None and group.format != "raster"
 
 
-def _names_of_other_files(group: _Group, known: Mapping[str, Path], taken: Collection[str]) -> set[str]:
-    """Returns the taken names that a document must not have, since they belong to other files."""
-    if not _is_given(group):
-        return set()
-    return {known_name for known_name in taken if not known[known_name].samefile(group.paths[0])}
-
-
-def _possible_names(group: _Group, wanted: str) -> Iterator[str]:
-    """Yields the name; for a given document, also with the names of its folders, the nearest first; then with numbers from 2 on."""
+def _possible_names(group: _Group, wanted: str, *, with_folders: bool) -> Iterator[str]:
+    """Yields the name; `with_folders`: also with the names of its folders, the nearest first; then with numbers from 2 on."""
     yield wanted
-    if _is_given(group):
-        words = [asset_name(part) for part in reversed(group.paths[0].absolute().parent.parts[1:])]
+    if with_folders:
+        words = [asset_name(part) for part in reversed(_folder_of(group).parts[1:])]
         longer = ["-".join([*reversed(words[:depth]), wanted]) for depth in range(1, len(words) + 1)]
         yield from (text for text in longer if len(text) <= _MAX_NAME_CHARS)
     yield from islice(_numbered(wanted), 1, None)
 
 
-def _kept_names(groups: Sequence[_Group], wanted: Sequence[str], known: Mapping[str, Path], others: Sequence[set[str]]) -> dict[int, str]:
-    """Returns position → known name; `others`: names that each must not have. A terrain has the name of its raster. Where several documents may have
-    a name, the one whose path agrees with the known one in more parts from the end has it, also after their folder was moved."""
+def _folder_of(group: _Group) -> Path:
+    """Returns the folder that holds the file or, of rasters that are named after their folder, that folder."""
+    folder = group.paths[0].absolute().parent
+    if group.label == group.paths[0].stem or group.format != "raster":
+        return folder
+    return Path(os.path.commonpath([path.absolute().parent for path in group.paths])).parent
+
+
+def _kept_names(groups: Sequence[_Group], wanted: Sequence[str], names: _AssetNames) -> dict[int, str]:
+    """Returns position → known name. A terrain has the name of its raster. Where several documents may have
+    a name, the one whose path agrees with the known one in more parts from the end has it, also after their folder was moved. A removed name goes to
+    a file in a folder of the same name."""
+    removed = names.removed
     places: dict[str, list[tuple[str, Path]]] = {}
-    for known_name, path in known.items():
+    for known_name, path in {**removed, **names.known}.items():
         places.setdefault(asset_name(unpacked_path(path).stem), []).append((known_name, path))
     pairs = [
-        (-_equal_parts(group.paths[0], path), position, known_name)
+        (-equal, known_name in removed, position, known_name)
         for position, group in enumerate(groups)
         for known_name, path in places.get(wanted[position], ())
         if known_name == wanted[position] or known_name.startswith(f"{wanted[position][:58]}-") or known_name.endswith(f"-{wanted[position]}")
-        if known_name not in others[position]
+        if known_name not in names.of_others(group)
+        if (equal := _equal_parts(group.paths[0], path)) >= (_REMOVED_PARTS if known_name in removed else 1)
     ]
     rasters = {path.absolute(): position for position, group in enumerate(groups) if group.format == "raster" for path in group.paths}
-    pairs += [(-len(path.parts), rasters[path], known_name) for known_name, path in known.items() if path in rasters]
+    pairs += [(-len(path.parts), False, rasters[path], known_name) for known_name, path in names.known.items() if path in rasters]
     kept: dict[int, str] = {}
-    for equal, position, known_name in sorted(pairs):
-        if equal and position not in kept and known_name not in kept.values():
+    for _, _, position, known_name in sorted(pairs):
+        if position not in kept and known_name not in kept.values():
             kept[position] = known_name
     return kept
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from map3d.catalogue import AssetRecord, Catalogue, SceneRecord, Workspace
 from map3d.catalogue.scene_lock import scene_lock
 from map3d.errors import BadRequest, Map3dError, UnknownFormat
-from map3d.ingest.asset_removal import remove_assets
+from map3d.ingest.asset_removal import remove_assets, removed_files
 from map3d.ingest.import_inputs import import_inputs
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import OnProgress, import_file
@@ -92,6 +92,7 @@ class _Update:
                 self._leave_alone,
                 {name: Path(asset.source) for name, asset in self._assets.items()},
                 [self._files.folder] if self._files.options.virtual_rasters else (),
+                removed=removed_files(self._workspace, self._files.scene.name),
             )
         except UnknownFormat as error:
             from_here = sum(map(self._is_inside, self._assets.values()))
