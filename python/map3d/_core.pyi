@@ -77,8 +77,16 @@ class Reader:
 
     options (JSON): {"up": "y"|"z", "split": "file"|"group" (OBJ), "theme": str|null (CityGML appearance theme; null: the one with the most textures),
     "lod": str|null (null: best per object), "transparency": "auto"|"as-is"|"inverted", "strict": bool, "max_image_side_px": 16384, … further limits}
+    transform: (source, target, [(x, y), …]) → [(x, y), …] from one coordinate system to another, both as documents write them; None without a
+    transformation. It places textures that are in another one than their surfaces.
     """
-    def __init__(self, path: str, format: str, options: str = "{}") -> None: ...
+    def __init__(
+        self,
+        path: str,
+        format: str,
+        options: str = "{}",
+        transform: Callable[[str, str, list[list[float]]], list[tuple[float, float]] | None] | None = None,
+    ) -> None: ...
     @property
     def srs_name(self) -> str | None:
         """The CRS as the source writes it; known before the first batch if the source names it in its header, else after the last."""
@@ -91,6 +99,9 @@ class Reader:
     def crs_names(self) -> list[str | None]:
         """Returns the coordinate systems that parts of the document are in, as it writes them; the first is the document's. Known for each batch when
         it is returned."""
+    def grids(self) -> str:
+        """Returns the raster files with the heights of reliefs (JSON); complete after the last batch. A list of {"object": str, "file": path, "columns",
+        "rows", "first": [x, y], "column_step": [dx, dy], "row_step": [dx, dy], "crs": str|null}, in the order of axes of the document."""
     def set_instances(self, transforms: NDArray[np.float64]) -> int:
         """Replaces all transforms; removes the instances whose transforms are not finite and returns their number."""
     def report(self) -> str:

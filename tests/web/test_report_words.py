@@ -33,7 +33,8 @@ def skip_reasons():
             else:
                 assert call in OF_VALUES or "skip" in call, call
     of_python = {"grid points without a height", "implicit geometry without a place in the scene's coordinate system"}
-    return {reason.replace(" = {limit}", "") for reason in found | reasons_of_functions(sources)} | of_python
+    reasons = (found | reasons_of_functions(sources)) - {"RasterRelief: {}"}
+    return {reason.replace(" = {limit}", "") for reason in reasons} | of_python
 
 
 def reasons_of_functions(sources):
@@ -44,14 +45,16 @@ def reasons_of_functions(sources):
     rings = re.findall(r'"(ring [^"]*)"(?:\.to_owned\(\)|\))', texts["tessellate.rs"])
     polygons = re.findall(r'=> Some\("([^"]*)"\)', texts["geometry_parser.rs"])
     tins = re.findall(r'Self::\w+ => "([^"]*)"', texts["tin.rs"])
-    assert min(map(len, (triangulation, geometry, implicit, rings, polygons, tins))) >= 2
-    return {*triangulation, *geometry, *implicit, *rings, *polygons, *tins} - {"ring that is not closed"}
+    grids = re.findall(r'(?:Err|ok_or)\("(RasterRelief: [^"]*)"\)', texts["grid_parser.rs"])
+    files = {f"RasterRelief: {reason}" for reason in re.findall(r'Self::\w+ => "([^"]*)"', texts["asset_folder.rs"])}
+    assert min(map(len, (triangulation, geometry, implicit, rings, polygons, tins, grids, files))) >= 2
+    return {*triangulation, *geometry, *implicit, *rings, *polygons, *tins, *grids, *files} - {"ring that is not closed"}
 
 
 WARNING = re.compile(r"""\b(?:report|self)\.(?:warn|note|warn_file|note_file)\(\s*(?:&format!\()?("[^"]*"|[A-Z_]{2,}|[a-z_.&()]+)""")
 WARNING_VALUES = {
     "reason": {"references.rs", "other_documents.rs", "text_input.rs", "geometry_parser.rs", "appearance_parser.rs", "converter.rs", "pre_scan.rs"},
-    "oddity": {"image_file.rs", "mtl.rs"},
+    "oddity": {"image_file.rs", "mtl.rs", "grid_parser.rs"},
 }
 """Variables that hold a reason, and the files that pass them on; `warning_reasons_of_functions` finds their values."""
 PYTHON_VARIABLES = {
@@ -122,7 +125,7 @@ def texts_of(value, tree, file):
     loops = [node.iter for node in ast.walk(tree) if isinstance(node, ast.For) and value.id in ast.unparse(node.target).strip("()").split(", ")]
     texts = [part for node in loops for part in ast.walk(node) if isinstance(part, ast.Constant) and isinstance(part.value, str)]
     assert assigned or texts or (file, value.id) in PYTHON_VARIABLES, f"{file}, line {value.lineno}: where does {value.id} come from?"
-    calls = [node.value for node in assigned if not isinstance(node.value, ast.Call)]
+    calls = [node.value for node in assigned if not isinstance(node.value, ast.Call | ast.Subscript | ast.Attribute)]
     return {text for part in [*calls, *texts] for text in texts_of(part, tree, file)}
 
 

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 
 use map3d_base::asset::{AssetReport, AssetWriter};
-use map3d_read::{DocumentReader, Format, ReadOptions, open, write_tables};
+use map3d_read::{DocumentReader, Format, PositionTransformer, ReadOptions, open, write_tables};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 
@@ -28,18 +28,26 @@ impl Reader {
     }
 }
 
+/// Calls a Python function that transforms positions.
+fn call(function: &Py<PyAny>, source: &str, target: &str, positions: &[[f64; 2]]) -> map3d_base::Result<Option<Vec<[f64; 2]>>> {
+    let called = Python::attach(|py| function.call1(py, (source, target, positions.to_vec()))?.extract::<Option<Vec<[f64; 2]>>>(py));
+    called.map_err(|error| map3d_base::Error::argument(format!("transformation from {source} to {target}: {error}")))
+}
+
 #[pymethods]
 impl Reader {
-    /// `format`: "obj" or "citygml"; `options`: JSON.
+    /// `format`: "obj" or "citygml"; `options`: JSON; `transform`: positions in one coordinate system from those in another.
     #[new]
-    #[pyo3(signature = (path, format, options="{}"))]
-    fn new(py: Python<'_>, path: PathBuf, format: &str, options: &str) -> PyResult<Self> {
+    #[pyo3(signature = (path, format, options="{}", transform=None))]
+    fn new(py: Python<'_>, path: PathBuf, format: &str, options: &str, transform: Option<Py<PyAny>>) -> PyResult<Self> {
         let format = match format {
             "obj" => Format::Obj,
             "citygml" => Format::CityGml,
             other => return Err(invalid(format!("format: {other:?}, expected \"obj\" or \"citygml\""))),
         };
-        let options = ReadOptions::from_json(options).map_err(to_python)?;
+        let mut options = ReadOptions::from_json(options).map_err(to_python)?;
+        options.transform =
+            transform.map(|function| PositionTransformer::new(move |source, target, positions| call(&function, source, target, positions)));
         let document = py.detach(|| open(&path, format, &options)).map_err(to_python)?;
         Ok(Self { document: Mutex::new(document) })
     }
@@ -86,6 +94,11 @@ impl Reader {
         }
         let rows: Vec<[f64; 12]> = array.rows().into_iter().map(|r| std::array::from_fn(|k| r[k])).collect();
         self.lock().set_instances(&rows).map_err(to_python)
+    }
+
+    /// Rasters with the heights of reliefs, as JSON; complete after the last batch.
+    fn grids(&self) -> String {
+        serde_json::to_string(self.lock().grids()).expect("grids are plain data")
     }
 
     /// report.json so far (spec/scene.md).

@@ -1,9 +1,29 @@
 //! The interface of all readers.
 
+use std::path::PathBuf;
+
 use map3d_base::asset::{AssetReport, Batch, Instance, Material, Object};
 use map3d_base::{Error, Result};
+use serde::Serialize;
 
 use crate::image_file::ImageFile;
+
+/// A raster file with the heights of a relief. The value at (column, row) is at first + column · column_step + row · row_step, in the order of axes
+/// of the document.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ReliefGrid {
+    /// Name of the city object, empty without one.
+    pub object: String,
+    /// Inside the folder of the document.
+    pub file: PathBuf,
+    pub columns: u64,
+    pub rows: u64,
+    pub first: [f64; 2],
+    pub column_step: [f64; 2],
+    pub row_step: [f64; 2],
+    /// As the document writes it.
+    pub crs: Option<String>,
+}
 
 /// One source document, parsed as it is read. The tables are complete after the last batch; indices in earlier batches stay valid.
 pub trait DocumentReader {
@@ -18,6 +38,10 @@ pub trait DocumentReader {
     }
     /// Coordinate systems of the instances before `set_instances`, as indices into `crs_names`; empty if all are in the document's.
     fn instance_crs(&self) -> &[u16] {
+        &[]
+    }
+    /// Rasters with the heights of reliefs; complete after the last batch.
+    fn grids(&self) -> &[ReliefGrid] {
         &[]
     }
     fn materials(&self) -> &[Material];

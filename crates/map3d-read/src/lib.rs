@@ -23,9 +23,9 @@ mod triangulate;
 
 pub use asset_folder::{AssetFolder, FileError, LocatedFile};
 pub use detect::{Format, detect_format};
-pub use document::DocumentReader;
+pub use document::{DocumentReader, ReliefGrid};
 pub use image_file::ImageFile;
 pub use open::{open, write_tables};
-pub use options::{ReadOptions, Split, Up};
+pub use options::{PositionTransformer, ReadOptions, Split, Up};
 pub use transparency::Transparency;
 pub use triangulate::{Coverage, PolygonError, Triangulator};

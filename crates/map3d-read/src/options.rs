@@ -1,6 +1,8 @@
 //! Options and limits for reading one document.
 
+use std::fmt;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use map3d_base::limits::{MAX_IMAGE_PX, MAX_IMAGE_SIDE_PX};
 use map3d_base::{Error, Result};
@@ -26,6 +28,32 @@ pub enum Split {
     Group,
 }
 
+/// Positions in one coordinate system, from those in another: (source, target, x and y as documents write them) → x and y, or `None` if no transformation
+/// is known.
+type Transform = dyn Fn(&str, &str, &[[f64; 2]]) -> Result<Option<Vec<[f64; 2]>>> + Send + Sync;
+
+/// Transforms positions between coordinate systems. The core knows none.
+#[derive(Clone)]
+pub struct PositionTransformer(Arc<Transform>);
+
+impl PositionTransformer {
+    pub fn new(transform: impl Fn(&str, &str, &[[f64; 2]]) -> Result<Option<Vec<[f64; 2]>>> + Send + Sync + 'static) -> Self {
+        Self(Arc::new(transform))
+    }
+
+    /// Returns `None` if no transformation is known.
+    pub fn transform(&self, source: &str, target: &str, positions: &[[f64; 2]]) -> Result<Option<Vec<[f64; 2]>>> {
+        let found = (self.0)(source, target, positions)?;
+        Ok(found.filter(|found| found.len() == positions.len()))
+    }
+}
+
+impl fmt::Debug for PositionTransformer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("PositionTransformer")
+    }
+}
+
 /// Options for one document. The limits guard against hostile input; raise one by its name for large data.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -45,6 +73,9 @@ pub struct ReadOptions {
     pub folder: Option<PathBuf>,
     /// Other CityGML files in that folder whose appearances target surfaces of the document.
     pub appearance_files: Vec<PathBuf>,
+    /// Transforms the place of textures to the coordinate system of surfaces.
+    #[serde(skip)]
+    pub transform: Option<PositionTransformer>,
     pub max_image_side_px: u64,
     pub max_image_px: u64,
     pub max_ring_vertices: u64,
@@ -68,6 +99,7 @@ impl Default for ReadOptions {
             strict: false,
             folder: None,
             appearance_files: Vec::new(),
+            transform: None,
             max_image_side_px: MAX_IMAGE_SIDE_PX,
             max_image_px: MAX_IMAGE_PX,
             max_ring_vertices: 1_000_000,

@@ -4,7 +4,7 @@ mod documents;
 
 use documents::{Folder, ParsedDocument, read_with};
 use map3d_base::asset::Wrap;
-use map3d_read::{Format, ReadOptions};
+use map3d_read::{Format, PositionTransformer, ReadOptions};
 
 /// Reads a building `b` with one square from (0 0) to (2 2): polygon `p` in the MultiSurface `s` of the wall `w`.
 /// `outside` and `inside`: appearances in the model and in the building.
@@ -264,6 +264,35 @@ fn a_reference_point_in_another_system_is_used_only_where_the_places_agree() {
         assert_eq!((document.material_of(0).texture.is_some(), document.count()), (used, 2), "{name} {at}");
         assert_eq!(document.warned("georeferenced texture in another coordinate system"), u64::from(!used), "{name} {at}");
     }
+}
+
+#[test]
+fn a_texture_in_another_system_is_transformed_to_that_of_the_surface() {
+    // Surfaces at x, y; the other system has 1000 + 2 y, 500 - x, bent by `bend`.
+    let read = |name: &str, bend: f64| {
+        let point = format!("<referencePoint><gml:Point srsName='{name}'><gml:pos>1003.5 499.75</gml:pos></gml:Point></referencePoint>");
+        let data = format!("<imageURI>u.png</imageURI><wrapMode>none</wrapMode>{point}<orientation>0 -1 -0.5 0</orientation><target>#p</target>");
+        let envelope = "<boundedBy><gml:Envelope srsName='EPSG:25832+5783'/></boundedBy>";
+        let convert = move |source: &str, target: &str, positions: &[[f64; 2]]| {
+            assert_eq!(target, "EPSG:25832+5783");
+            let known = source == "EPSG:31468";
+            Ok(known.then(|| positions.iter().map(|[x, y]| [500.0 - y + bend * (x - 1002.0).powi(2), (x - 1000.0) / 2.0]).collect()))
+        };
+        let options = ReadOptions { transform: Some(PositionTransformer::new(convert)), ..ReadOptions::default() };
+        read(&(member("a", &format!("<GeoreferencedTexture>{data}</GeoreferencedTexture>")) + envelope), "", &options)
+    };
+    let exact = read("EPSG:31468", 0.0);
+    assert_eq!(exact.triangles()[0].uvs, Some([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]));
+    assert!(exact.report.warnings.is_empty(), "{:?}", exact.report.warnings);
+    let nearly = read("EPSG:31468", 0.01).triangles()[0].uvs.expect("textured");
+    assert!(nearly.as_flattened().iter().zip([0.0, 0.0, 1.0, 0.0, 1.0, 1.0]).all(|(got, expected)| (got - expected).abs() < 0.1), "{nearly:?}");
+    for bend in [1.0, f64::NAN] {
+        let bent = read("EPSG:31468", bend);
+        assert!(bent.material_of(0).texture.is_none(), "{bend}");
+        assert_eq!(bent.warned("georeferenced texture in another coordinate system that no affine map"), 1, "{bend}");
+    }
+    let unknown = read("EPSG:9999", 0.0);
+    assert_eq!((unknown.material_of(0).texture.is_some(), unknown.warned("than the surface, not used") > 0), (false, true));
 }
 
 #[test]

@@ -10,8 +10,9 @@ from map3d.errors import BadRequest, Map3dError, UnknownFormat
 from map3d.ingest.asset_removal import removed_files
 from map3d.ingest.import_inputs import import_inputs
 from map3d.ingest.import_options import ImportOptions
-from map3d.ingest.importing import Imported, import_file, workspace_key
+from map3d.ingest.importing import Imported, OnlyGrids, import_file, workspace_key
 from map3d.ingest.parser_process import ParserProcess
+from map3d.ingest.relief_grids import AS_TERRAIN, ReliefGrids
 from map3d.ingest.sources import SourceDocument, find_sources
 from map3d.ingest.unfinished_imports import finish_imports
 from map3d.ingest.unpacked_archives import unpacked
@@ -88,17 +89,32 @@ def _import_files(
         raise BadRequest(f"--name {name}: applies to a single file, got {len(sources)}")
     is_single = len(sources) + len(result.failed) == 1
     known = _known_assets(workspace, catalogue, scene) if skip_unchanged else {}
+    grids = ReliefGrids()
+    waiting, number = list(sources), 0
     with ParserProcess() as parser:
-        for number, source in enumerate(sources):
-            show = _show(progress, source.paths[0].name, number, len(sources))
+        while waiting or grids.is_waiting:
+            if grids.is_waiting and (not waiting or waiting[0].format == "raster"):
+                names = {asset.name: Path(asset.source) for asset in catalogue.assets(scene)}
+                waiting, failed = grids.place(waiting, names)
+                result.failed.extend(failed)
+                continue
+            source = waiting.pop(0)
+            show = _show(progress, source.paths[0].name, number, number + len(waiting) + 1)
             show("")
+            number += 1
             try:
                 if _is_unchanged(known.get(source.name), source, options):
                     result.unchanged.append(source.name)
+                    grids.collect(known[source.name].report.get("grids", ()))
                 else:
-                    result.imported.append(import_file(workspace, catalogue, scene, source, options, show, parser=parser))
+                    done = import_file(workspace, catalogue, scene, source, options, show, parser=parser)
+                    result.imported.append(done)
+                    grids.collect(done.report.get("grids", ()))
+            except OnlyGrids as found:
+                grids.collect(found.grids)
+                result.left_alone.append((str(source.paths[0]), AS_TERRAIN))
             except Map3dError as error:
-                if options.strict or is_single:
+                if options.strict or (is_single and not result.imported and not result.unchanged):
                     raise
                 result.failed.append((str(source.paths[0]), str(error)))
     return result

@@ -12,7 +12,7 @@ from map3d.ingest.formats import Format
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.sources import SourceDocument, source_digest
 
-READER_VERSIONS: Final[Mapping[Format, int]] = {"citygml": 10, "obj": 4, "raster": 4}
+READER_VERSIONS: Final[Mapping[Format, int]] = {"citygml": 11, "obj": 4, "raster": 4}
 """Raised when a reader makes another asset of the same file, so that existing scenes get the better one (tests/ingest/test_import_inputs.py)."""
 
 _REPORT_KEY: Final = "inputs"

@@ -2,7 +2,7 @@
 
 import hashlib
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +21,7 @@ from map3d.ingest.import_pieces import import_pieces, pieces_key
 from map3d.ingest.import_progress import ImportProgress
 from map3d.ingest.parser_process import ParserProcess
 from map3d.ingest.referenced_files import find_missing_files
+from map3d.ingest.relief_grids import AS_TERRAIN, Grid
 from map3d.ingest.scene_crs import LOCAL
 from map3d.ingest.sources import SourceDocument
 from map3d.ingest.unfinished_imports import draft_path, finish_imports, mark_import, remove_dead_drafts, unmark_import
@@ -54,6 +55,14 @@ class Imported:
     report: Mapping[str, Any]
 
 
+class OnlyGrids(ImportFailed):
+    """The document has nothing to draw but rasters of reliefs, which are imported as terrain; it is no asset."""
+
+    def __init__(self, message: str, grids: Sequence[Grid]) -> None:
+        super().__init__(message)
+        self.grids = grids
+
+
 def import_file(
     workspace: Workspace,
     catalogue: Catalogue,
@@ -69,7 +78,8 @@ def import_file(
 
     `parser`: a subprocess to reuse for many files; by default a new one parses this file.
 
-    Raises ImportFailed (nothing usable, or the first fault under `strict`), LimitExceeded, CrsError. Until the last step the scene is unchanged.
+    Raises ImportFailed (nothing usable, or the first fault under `strict`), OnlyGrids, LimitExceeded, CrsError. Until the last step the scene is
+    unchanged.
     """
     record = catalogue.scene(scene)
     final = workspace.asset_folder(scene, source.name)
@@ -84,6 +94,8 @@ def import_file(
                 parser_entry = entry or PARSER_ENTRIES.get(source.format, DOCUMENT_PARSER_ENTRY)
                 parsed = _parse(record, source, options, draft, pieces, progress, running, parser_entry)
             report = parsed["report"]
+            if not report["triangles"] and report.get("grids"):
+                raise OnlyGrids(f"{source.paths[0]}: {AS_TERRAIN}", report["grids"])
             if not report["triangles"]:
                 raise ImportFailed(f"{source.paths[0]}: no usable triangle in the file{_list_skipped(report)}")
             with scene_lock(workspace, scene):
@@ -127,6 +139,7 @@ def _parse(
         "scene_origin": record.origin,
         "pieces": None if pieces is None else str(pieces.absolute()),
         "cores": usable_cores(),
+        "grids": {str(path.absolute()): grid for path, grid in source.grids.items()},
         "virtual": {str(path.absolute()): str(folder.absolute()) for path, folder in source.virtual_folders.items()},
     }
     shown = ImportProgress()
@@ -238,7 +251,9 @@ def _crs_text(crs: SceneCrs | None) -> str | None:
 
 
 def _list_skipped(report: Mapping[str, Any]) -> str:
-    skipped = ", ".join(f"{count} × {reason}" for reason, count in sorted(report.get("skipped", {}).items()))
+    examples = {warning["reason"]: f" ({warning['example']})" for warning in report.get("warnings", ()) if ": RasterRelief: " in warning["reason"]}
+    counts = sorted(report.get("skipped", {}).items())
+    skipped = ", ".join(f"{count} × {reason}{examples.get(f'skipped: {reason}', '')}" for reason, count in counts)
     return f" (skipped: {skipped})" if skipped else ""
 
 

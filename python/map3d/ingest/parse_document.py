@@ -3,14 +3,17 @@
 import json
 from collections.abc import Mapping
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any, Final
 
 from map3d import _core
 from map3d.ingest.document_reprojector import DocumentReprojector
+from map3d.ingest.texture_places import transform_positions
 from map3d.ingest.upright_check import Extent
 from map3d.subprocess import Handler, ReportProgress
 
 _REPORT_EVERY_TRIANGLES: Final = 50_000
+_MAX_NAMES: Final = 5
 _UNPLACED: Final = "implicit geometry without a place in the scene's coordinate system"
 
 
@@ -24,7 +27,9 @@ def open_document_parser(_setup: Mapping[str, Any]) -> Handler:
 def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
     """`request`: {"path", "format", "folder", "reader": options of the core's Reader, "crs": the user's choice or None, "scene_crs": WKT, "local",
     or None while the scene has no CRS}. Returns {"report", "crs": the CRS proposed for the scene, None if nothing determines it}."""
-    reader = _core.Reader(request["path"], request["format"], json.dumps(request["reader"]))
+    # Where the user states the CRS of all parts, textures are in that one, too.
+    transform = None if request["crs"] else transform_positions
+    reader = _core.Reader(request["path"], request["format"], json.dumps(request["reader"]), transform)
     strict = bool(request["reader"].get("strict"))
     reprojector = DocumentReprojector(request["format"], reader.srs_name, request["scene_crs"], stated=request["crs"], strict=strict)
     writer = _core.AssetWriter(request["folder"])
@@ -50,5 +55,10 @@ def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[
     hints = extent.hints(request["path"]) if request["format"] == "obj" and request["reader"].get("up") == "z" else []
     report = reprojector.report(counts)
     report["warnings"] += hints
+    grids = json.loads(reader.grids())
+    if grids:
+        report["grids"] = grids
+        names = ", ".join(sorted({Path(grid["file"]).name for grid in grids})[:_MAX_NAMES])
+        report["warnings"].append({"reason": "RasterRelief: raster read as terrain", "count": len(grids), "example": names})
     proposed = reprojector.proposed_crs
     return {"report": report, "crs": None if proposed is None else asdict(proposed)}

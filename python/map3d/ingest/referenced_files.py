@@ -15,7 +15,7 @@ from urllib.parse import unquote
 from map3d.ingest.gzip_file import content_windows, is_gzip, unpacked_path
 
 # Every pattern is bounded or excludes what follows it, so that a hostile file costs no more than its length.
-_CITYGML_TAGS: Final = (b"imageURI>", b"textureMap>", b"libraryObject>")
+_CITYGML_TAGS: Final = (b"imageURI>", b"textureMap>", b"libraryObject>", b"fileName>", b"fileReference>")
 _IMAGE_TAGS: Final = _CITYGML_TAGS[:2]
 _MAX_NAME_BYTES: Final = 4096
 _CODE_LIST: Final = re.compile(rb"""codeSpace=["']([^"'<>]{1,4096}\.(?:xml|gml))["']""", re.IGNORECASE)

@@ -1,12 +1,14 @@
 """Finds the source documents of an import, names their assets, and detects whether they changed."""
 
 import hashlib
+import json
 import os
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import count, islice, takewhile
 from pathlib import Path
+from typing import Any
 
 from map3d.errors import NotFound, UnknownFormat
 from map3d.ingest.document_links import DocumentLinks, find_document_links, find_geometry_documents
@@ -43,7 +45,7 @@ _REMOVED_PARTS = 2
 class SourceDocument:
     """`paths`: the document; for terrain, its rasters. `root`: the given folder, in which files that the document names may be; None for a document
     that was given itself, whose files are in its own folder. `virtual`: a virtual raster may be among the rasters. `appearances`: CityGML files
-    given with it whose appearances target its surfaces."""
+    given with it whose appearances target its surfaces. `grids`: rasters that RasterReliefs name, and where these say that they are."""
 
     name: str
     format: Format
@@ -51,6 +53,7 @@ class SourceDocument:
     root: Path | None = None
     virtual: bool = False
     appearances: tuple[Path, ...] = ()
+    grids: Mapping[Path, Mapping[str, Any]] = field(default_factory=dict)
 
     @property
     def virtual_folders(self) -> dict[Path, Path]:
@@ -119,6 +122,8 @@ def source_digest(source: SourceDocument) -> str:
             total.update(part.name.encode())
             with part.open("rb") as file:
                 total.update(hashlib.file_digest(file, "sha256").digest())
+    for path, grid in sorted(source.grids.items()):
+        total.update(json.dumps([path.name, {**grid, "file": path.name}], sort_keys=True).encode())
     return total.hexdigest()[:32]
 
 

@@ -12,8 +12,9 @@ from map3d.errors import BadRequest, Map3dError, UnknownFormat
 from map3d.ingest.asset_removal import remove_assets, removed_files
 from map3d.ingest.import_inputs import import_inputs
 from map3d.ingest.import_options import ImportOptions
-from map3d.ingest.importing import OnProgress, import_file
+from map3d.ingest.importing import OnlyGrids, OnProgress, import_file
 from map3d.ingest.parser_process import ParserProcess
+from map3d.ingest.relief_grids import AS_TERRAIN, ReliefGrids
 from map3d.ingest.sources import SourceDocument, find_sources
 from map3d.ingest.unfinished_imports import finish_imports
 from map3d.renderings.remove_files import remove_built_files
@@ -67,6 +68,7 @@ class _Update:
         self._assets = {asset.name: asset for asset in catalogue.assets(files.scene.name)}
         self._root = files.folder.resolve()
         self._summary = ImportSummary()
+        self._grids = ReliefGrids()
 
     def run(self, report: OnSource) -> ImportSummary:
         sources = self._find_sources()
@@ -74,7 +76,8 @@ class _Update:
         self._check_vanished(leaving)
         self._summary.elsewhere.extend(name for name, asset in self._assets.items() if not self._is_inside(asset) and name not in _names(sources))
         with ParserProcess() as parser:
-            for number, source in enumerate(sources):
+            for number, found in enumerate(sources):
+                source = self._with_grids(found) if found.format == "raster" and self._grids.is_waiting else found
                 show = partial(report, source.paths[0].name, number, len(sources))
                 show("")
                 self._import_if_changed(source, parser, show)
@@ -144,8 +147,14 @@ class _Update:
                 reason = import_inputs(source, self._files.options).changes(asset)
                 if reason is None:
                     self._keep(asset, source)
+                    self._grids.collect(asset.report.get("grids", ()))
                     return
-            import_file(self._workspace, self._catalogue, self._files.scene.name, source, self._files.options, show, parser=parser)
+            done = import_file(self._workspace, self._catalogue, self._files.scene.name, source, self._files.options, show, parser=parser)
+            self._grids.collect(done.report.get("grids", ()))
+        except OnlyGrids as found:
+            self._grids.collect(found.grids)
+            self._leave_alone(source.paths[0], AS_TERRAIN)
+            return
         except Map3dError as error:
             if self._files.options.strict:
                 raise
@@ -154,6 +163,12 @@ class _Update:
         self._summary.imported.append(source.name)
         if reason is not None:
             self._summary.again[source.name] = reason
+
+    def _with_grids(self, terrain: SourceDocument) -> SourceDocument:
+        """Places the rasters of the folder, which are one terrain, where the documents say."""
+        (placed,), failed = self._grids.place([terrain], {})
+        self._summary.failed.extend(failed)
+        return placed
 
     def _keep(self, asset: AssetRecord, source: SourceDocument) -> None:
         """Records where the file is now, so that its leaving is noticed even after the folder was moved."""

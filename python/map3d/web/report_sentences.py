@@ -126,6 +126,17 @@ FAULTS: Final[Mapping[str, str]] = {
     "axes swapped, so the file is read as northing, easting": N_("Files with swapped axes, read as northing, easting: {count}."),
     "axes swapped, so the file is read as longitude, latitude": N_("Files with swapped axes, read as longitude, latitude: {count}."),
     "axes swapped, so the file is read as latitude, longitude": N_("Files with swapped axes, read as latitude, longitude: {count}."),
+    "georeferenced texture in another coordinate system that no affine map reaches within half a pixel, not used": N_(
+        "Georeferenced textures in another coordinate system, which would be more than half a pixel out of place and are not used: {count}."
+    ),
+    "RasterRelief: grid in another place, not followed": N_("References to grids of heights in other places, not followed: {count}."),
+    "RasterRelief: extent not applied to its raster": N_(
+        "Rasters of heights whose extent in the model is not applied; they are read as a whole: {count}."
+    ),
+    "RasterRelief: raster read as terrain": N_("Rasters of heights that the model names, read as terrain: {count}."),
+    "RasterRelief: raster in another place than its grid, read in its own": N_(
+        "Rasters of heights that lie elsewhere than the model says, read where they say themselves: {count}."
+    ),
 }
 FAULTS_BY_LIMIT: Final[Mapping[str, str]] = {
     "image: side over the limit max_image_side_px": N_("Textures with a side of more than {limit} pixels: {count}."),
@@ -186,6 +197,25 @@ SKIPPED: Final[Mapping[str, str]] = {
     "unreadable vertex": N_("Skipped unreadable vertices: {count}."),
     "unsupported geometry type": N_("Geometry of types that map3d does not read, left out: {count}."),
     "zero area": N_("Triangles without area, left out: {count}."),
+    "RasterRelief: grid without heights": N_("Skipped grids of heights without heights: {count}."),
+    "RasterRelief: grid without a place in the world": N_("Skipped grids of heights without a place in the world: {count}."),
+    "RasterRelief: grid without limits, origin or two offset vectors": N_(
+        "Skipped grids of heights without limits, origin or two offset vectors: {count}."
+    ),
+    "RasterRelief: grid with fewer than 2 × 2 points": N_("Skipped grids of heights with fewer than 2 points in a direction: {count}."),
+    "RasterRelief: order of values that map3d does not read": N_("Skipped grids of heights in an order that map3d does not read: {count}."),
+    "RasterRelief: offset vectors that span no area": N_("Skipped grids of heights whose points lie on a line: {count}."),
+    "RasterRelief: grid in one of too many coordinate systems": N_("Skipped grids of heights in one of too many coordinate systems: {count}."),
+    "RasterRelief: number of heights that does not fit the grid": N_("Skipped grids with more or fewer heights than points: {count}."),
+    "RasterRelief: too many heights in the document": N_(
+        "Skipped grids with too many heights in the file itself: {count}. A raster file may have more."
+    ),
+    "RasterRelief: triangle outside the extent": N_("Triangles of grids of heights outside their extent, left out: {count}."),
+    "RasterRelief: file not found": N_("Rasters of heights not found: {count}. Upload them together with the model."),
+    "RasterRelief: file outside the asset's folder not read": N_("Rasters of heights outside the given folder, which are not read: {count}."),
+    "RasterRelief: URL not fetched": N_("Rasters of heights on the web, which are not fetched: {count}."),
+    "RasterRelief: not a regular file": N_("Rasters of heights whose name leads to something that is not a file: {count}."),
+    "RasterRelief: invalid file name": N_("Rasters of heights with an invalid file name: {count}."),
 }
 """What is not in the map: skipped since it is broken, or left out by design."""
 SKIPPED_BY_LIMIT: Final[Mapping[str, str]] = {

@@ -30,6 +30,8 @@ pub struct TextureProperties {
     /// sRGB and opacity.
     pub border: [f32; 4],
     pub placement: TexturePlacement,
+    /// Name of the coordinate system of the reference point.
+    pub crs_name: Option<String>,
 }
 
 /// The source of a texture's coordinates.
@@ -37,8 +39,7 @@ pub struct TextureProperties {
 pub enum TexturePlacement {
     /// Each target has a parameterization.
     Parameterized,
-    /// `crs`: the one that the reference point names.
-    Georeferenced { transform: GeoTransform, crs: Option<HorizontalKey> },
+    Georeferenced(GeoTransform),
     /// A world file next to the image.
     WorldFile,
 }

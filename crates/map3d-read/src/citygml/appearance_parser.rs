@@ -10,7 +10,6 @@ use super::appearance::{
     ThemeSelection,
 };
 use super::coordinates::parse_numbers;
-use super::crs_table::horizontal_key;
 use super::geo_transform::GeoTransform;
 use super::geometry_parser::{NamedPoint, read_point};
 use super::ids::{self, Id};
@@ -358,6 +357,7 @@ fn build_kind(type_name: &str, properties: SurfaceDataProperties) -> SurfaceData
             wrap: properties.wrap.unwrap_or_default(),
             border: properties.border.unwrap_or([0.0; 4]),
             placement,
+            crs_name: properties.reference_point.and_then(|point| point.srs_name).filter(|name| !name.trim().is_empty()),
         }),
         _ => SurfaceDataKind::Unsupported,
     }
@@ -368,9 +368,8 @@ fn choose_placement(type_name: &str, properties: &SurfaceDataProperties) -> Text
     if type_name != "GeoreferencedTexture" {
         return TexturePlacement::Parameterized;
     }
-    let (Some(NamedPoint { point, srs_name }), Some(orientation)) = (&properties.reference_point, properties.orientation) else {
+    let (Some(NamedPoint { point, .. }), Some(orientation)) = (&properties.reference_point, properties.orientation) else {
         return TexturePlacement::WorldFile;
     };
-    let crs = srs_name.as_deref().filter(|name| !name.trim().is_empty()).map(horizontal_key);
-    GeoTransform::new(*point, orientation).map_or(TexturePlacement::WorldFile, |transform| TexturePlacement::Georeferenced { transform, crs })
+    GeoTransform::new(*point, orientation).map_or(TexturePlacement::WorldFile, TexturePlacement::Georeferenced)
 }

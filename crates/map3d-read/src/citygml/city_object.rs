@@ -9,6 +9,7 @@ use super::feature_types::FeatureKind;
 use super::geometry_arena::{GeometryArena, GeometryNode, NodeId, NodeKind};
 use super::ids::{Id, IdMap};
 use super::implicit_geometry::ImplicitGeometry;
+use crate::document::ReliefGrid;
 
 /// A geometry property of a feature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,6 +19,8 @@ pub enum Representation {
     RoofEdge(NodeId),
     /// Index into `CityObject::implicit_geometries`.
     Implicit(u32),
+    /// Index into `CityObject::grids`.
+    Raster(u32),
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -43,6 +46,8 @@ pub struct Feature {
     pub crs: CrsNumber,
     /// Content of a `lod` property of this feature or its parent (relief).
     pub relief_lod: Option<u8>,
+    /// Nodes of the polygons outside of which a relief is not valid: the first, and the one after the last.
+    pub extent: Option<(NodeId, NodeId)>,
     pub representations: Vec<LodRepresentation>,
     /// References to other features, such as an opening that a room and a wall share.
     pub xlinks: Vec<Id>,
@@ -65,6 +70,7 @@ pub struct CityObject {
     pub by_id: IdMap<u32>,
     pub geometry: GeometryArena,
     pub implicit_geometries: Vec<ImplicitGeometry>,
+    pub grids: Vec<ReliefGrid>,
     pub appearances: Appearances,
 }
 
@@ -74,13 +80,14 @@ impl CityObject {
         self.by_id.clear();
         self.geometry.clear();
         self.implicit_geometries.clear();
+        self.grids.clear();
         self.appearances.clear();
     }
 
     /// Returns true if anything could be drawn.
     pub fn has_geometry(&self) -> bool {
         let is_polygon = |node: &GeometryNode| matches!(node.kind, NodeKind::Polygon { .. });
-        !self.implicit_geometries.is_empty() || self.geometry.nodes.iter().any(is_polygon)
+        !self.implicit_geometries.is_empty() || !self.grids.is_empty() || self.geometry.nodes.iter().any(is_polygon)
     }
 
     /// Iterates over a feature and its ancestors, from the feature up.

@@ -23,6 +23,7 @@ use super::implicit_geometry::read_implicit_geometry;
 use super::references::References;
 use super::standard_codes::is_adv_code;
 use super::xml_reader::{XmlEvent, XmlReader};
+use crate::asset_folder::AssetFolder;
 use crate::options::ReadOptions;
 use crate::report_builder::ReportBuilder;
 
@@ -38,6 +39,8 @@ pub struct CityObjectParser<'a> {
     pub code_lists: &'a mut CodeLists,
     pub crs_table: &'a mut CrsTable,
     pub references: &'a mut References,
+    /// Folder of the files that the document names.
+    pub folder: &'a mut AssetFolder,
     /// Coordinate system of the model that has the city object.
     pub crs: CrsNumber,
     /// Buffers for numbers and text.
@@ -102,6 +105,7 @@ impl CityObjectParser<'_> {
             is_interior,
             crs,
             relief_lod,
+            extent: None,
             representations: Vec::new(),
             xlinks: Vec::new(),
             attributes: Attributes::default(),
@@ -116,6 +120,7 @@ impl CityObjectParser<'_> {
 
     /// Reads the current property of a feature.
     fn read_property(&mut self, number: u32) -> Result<()> {
+        let is_raster_relief = self.feature(number).type_name == "RasterRelief";
         let local_name = self.xml.local_name();
         if let Some(lod) = parse_lod_prefix(local_name) {
             return self.read_lod_property(number, lod);
@@ -144,6 +149,8 @@ impl CityObjectParser<'_> {
                 self.feature(number).is_interior |= is_inside;
                 Ok(())
             }
+            "grid" if is_raster_relief => self.read_grid(number),
+            "extent" if is_raster_relief => self.read_extent(number),
             "metaDataProperty" | "location" | "extent" => self.xml.skip(),
             _ => self.read_other_property(number),
         }

@@ -17,7 +17,7 @@ use super::references::References;
 use super::tessellate::INVISIBLE_POLYGON;
 use super::xml_reader::{Malformed, XmlEvent, XmlReader};
 use crate::asset_folder::AssetFolder;
-use crate::document::DocumentReader;
+use crate::document::{DocumentReader, ReliefGrid};
 use crate::image_file::ImageFile;
 use crate::options::ReadOptions;
 use crate::report_builder::ReportBuilder;
@@ -126,6 +126,7 @@ impl CityGmlReader {
             code_lists: &mut self.code_lists,
             crs_table: &mut self.crs_table,
             references: &mut self.references,
+            folder: &mut self.converter.resolver.folder,
             crs: self.crs,
             values: &mut self.values,
             text: &mut self.text,
@@ -230,6 +231,10 @@ impl DocumentReader for CityGmlReader {
 
     fn instance_crs(&self) -> &[CrsNumber] {
         &self.converter.instance_crs
+    }
+
+    fn grids(&self) -> &[ReliefGrid] {
+        &self.converter.grids
     }
 
     fn materials(&self) -> &[Material] {

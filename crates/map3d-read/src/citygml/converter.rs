@@ -22,6 +22,7 @@ use super::tessellate::{MaterialSources, Tessellator, ThematicSurface};
 use super::textured_surface::add_own_appearances;
 use crate::asset_folder::AssetFolder;
 use crate::detect::{Format, detect_format};
+use crate::document::ReliefGrid;
 use crate::options::ReadOptions;
 use crate::report_builder::{LimitCheck, ReportBuilder};
 
@@ -42,6 +43,8 @@ pub struct FeatureConverter {
     lod: Option<u8>,
     shared: SharedGeometry,
     pub objects: Vec<Object>,
+    /// Rasters of reliefs.
+    pub grids: Vec<ReliefGrid>,
     /// Coordinate systems of the instances.
     pub instance_crs: Vec<CrsNumber>,
     prototypes: PrototypeTable,
@@ -84,6 +87,7 @@ impl FeatureConverter {
             lod,
             shared: SharedGeometry::default(),
             objects: Vec::new(),
+            grids: Vec::new(),
             instance_crs: Vec::new(),
             prototypes: PrototypeTable::default(),
             batches: VecDeque::new(),
@@ -92,6 +96,9 @@ impl FeatureConverter {
 
     /// Adds the coordinate systems that are new.
     pub fn set_coordinate_systems(&mut self, names: &[Option<String>]) {
+        for name in names.iter().flatten() {
+            self.resolver.add_crs(name);
+        }
         self.tessellator.set_coordinate_systems(names);
     }
 
@@ -163,9 +170,18 @@ impl FeatureConverter {
                     self.defer_xlinks(context, f, &collected.unresolved);
                 }
                 Representation::Implicit(index) => self.convert_implicit_geometry(context, f, index, report)?,
+                Representation::Raster(index) => self.add_grid(context, index),
             }
         }
         Ok(())
+    }
+
+    /// Adds the raster of a relief, up to a limit that no document reaches in earnest.
+    fn add_grid(&mut self, context: &ConversionContext, index: u32) {
+        const MAX_GRIDS: usize = 10_000;
+        if self.grids.len() < MAX_GRIDS {
+            self.grids.push(context.city_object.grids[index as usize].clone());
+        }
     }
 
     fn tessellate_feature(
@@ -351,6 +367,7 @@ fn count_interiors(context: &ConversionContext, lods: &[Option<u8>], report: &mu
                     PrototypeSource::Geometry(node) => node,
                     PrototypeSource::Library(_) => continue,
                 },
+                Representation::Raster(_) => continue,
             };
             count += collect_polygons(geometry, &mut visits, node, false).polygons.len() as u64;
         }

@@ -108,7 +108,7 @@ pub fn is_subdivision(type_name: &str) -> bool {
 pub fn rank_object(type_name: &str) -> Rank {
     match type_name {
         "Road" | "Railway" | "Track" | "Square" | "TransportationComplex" | "WaterBody" | "Waterway" => Rank::Road,
-        "LandUse" | "ReliefFeature" => Rank::Terrain,
+        "LandUse" | "ReliefFeature" | "RasterRelief" => Rank::Terrain,
         _ => Rank::Other,
     }
 }
@@ -137,7 +137,7 @@ pub fn classify_surface(type_name: &str) -> Option<SurfaceClass> {
         }
         "WaterBody" | "WaterSurface" | "Waterway" => SurfaceClass::Water,
         "PlantCover" | "SolitaryVegetationObject" | "AuxiliaryTrafficArea" => SurfaceClass::Vegetation,
-        "LandUse" | "ReliefFeature" | "TINRelief" => SurfaceClass::Terrain,
+        "LandUse" | "ReliefFeature" | "TINRelief" | "RasterRelief" => SurfaceClass::Terrain,
         _ => return None,
     })
 }

@@ -54,7 +54,7 @@ fn read_texture(xml: &mut XmlReader) -> Result<(Option<SurfaceDataKind>, Vec<f64
             _ => xml.skip()?,
         }
     }
-    let properties = TextureProperties { image, wrap, border: [0.0; 4], placement: TexturePlacement::Parameterized };
+    let properties = TextureProperties { image, wrap, border: [0.0; 4], placement: TexturePlacement::Parameterized, crs_name: None };
     Ok((Some(SurfaceDataKind::Texture(properties)).filter(|_| !uvs.is_empty()), uvs))
 }
 

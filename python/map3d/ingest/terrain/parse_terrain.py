@@ -9,11 +9,13 @@ from typing import Any, Final
 
 import numpy as np
 from pyproj import CRS
+from rasterio.errors import RasterioError
 
 from map3d.errors import CrsError, ImportFailed
 from map3d.geometry.crs import is_local, parse_crs
 from map3d.ingest.crs_transformer import choose_scene_crs
 from map3d.ingest.scene_crs import LOCAL, to_scene_crs
+from map3d.ingest.terrain.placed_rasters import PlacedRasters
 from map3d.ingest.terrain.raster_georeference import open_raster
 from map3d.ingest.terrain.raster_groups import split_far
 from map3d.ingest.terrain.raster_placement import RasterPlacement
@@ -41,11 +43,17 @@ def open_terrain_parser(_setup: Mapping[str, Any]) -> Handler:
 
 def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
     """`request`: {"paths", "folder", "name", "crs", "scene_crs", "scene_origin", "reader", "pieces": folder or None, "cores",
-    "virtual": the virtual rasters that may be read, and the folders in which the rasters that they name must be}.
+    "virtual": the virtual rasters that may be read, and the folders in which the rasters that they name must be,
+    "grids": the rasters that RasterReliefs name, and their grids}.
 
     Returns what map3d.ingest.parse_document returns.
     """
-    rasters, faults = open_rasters([Path(path) for path in request["paths"]], request["virtual"], strict=request["reader"]["strict"])
+    with PlacedRasters(Path(request["folder"]) / "placed", request["grids"], request["crs"]) as placed:
+        return _parse_placed(request, placed, report_progress)
+
+
+def _parse_placed(request: Mapping[str, Any], placed: PlacedRasters, report_progress: ReportProgress) -> dict[str, Any]:
+    rasters, faults = open_rasters([Path(path) for path in request["paths"]], request["virtual"], placed, strict=request["reader"]["strict"])
     dems, orthos = classify_rasters(rasters)
     target = _choose_target(next(iter(dems or orthos), None), request["crs"], request["scene_crs"])
     near, far = split_far(rasters, target, request["crs"])
@@ -69,7 +77,7 @@ def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[
     placing = {"from": terrain["crs"] and CRS.from_user_input(terrain["crs"]).name, "to": proposed.name, **terrain["projection"]}
     if placement.place is not None:
         placing["place"] = str(placement.place)
-    terrain["warnings"] += placement.warnings
+    terrain["warnings"] += [*placement.warnings, *placed.warnings]
     if far:
         path, away_m = far[0]
         example = f"{path.name} lies {away_m / 1000:,.0f} km from the other rasters; its CRS may be wrong, else import it alone"
@@ -80,8 +88,9 @@ def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[
     return {"report": {**terrain, "rasters": counts, "placing": placing}, "crs": asdict(proposed)}
 
 
-def open_rasters(paths: Sequence[Path], virtual: Mapping[str, str], *, strict: bool) -> tuple[list[Path], list[str]]:
-    """Returns the readable rasters, and the faults of the others. `virtual`: virtual rasters → where the rasters that they name must be.
+def open_rasters(paths: Sequence[Path], virtual: Mapping[str, str], placed: PlacedRasters, *, strict: bool) -> tuple[list[Path], list[str]]:
+    """Returns the paths at which readable rasters are read, and the faults of the others. `virtual`: virtual rasters → where the rasters that they
+    name must be.
 
     Raises ImportFailed if none is readable, or at the first fault under `strict`.
     """
@@ -91,10 +100,13 @@ def open_rasters(paths: Sequence[Path], virtual: Mapping[str, str], *, strict: b
         try:
             if str(path) in virtual:
                 check_virtual_raster(path, Path(virtual[str(path)]))
-            open_raster(path).close()
-            readable.append(path)
+            place = placed.place(path)
+            open_raster(place).close()
+            readable.append(place)
         except ImportFailed as error:
             faults.append(error)
+        except (RasterioError, OSError) as error:
+            faults.append(ImportFailed(f"{path}: not a valid raster: {error}"))
     if faults and (strict or not readable):
         raise faults[0]
     return readable, [str(error) for error in faults]

@@ -24,7 +24,7 @@ def open_raster(path: Path) -> Any:
     """Opens a georeferenced raster with rasterio; of virtual ones those that this process has checked. Raises NotFound, ImportFailed."""
     if not path.is_file():
         raise NotFound(f"{path}: no such raster")
-    driver = _find_driver(path)
+    driver = find_driver(path)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", NotGeoreferencedWarning)
@@ -39,7 +39,8 @@ def open_raster(path: Path) -> Any:
     return dataset
 
 
-def _find_driver(path: Path) -> str:
+def find_driver(path: Path) -> str:
+    """Returns GDAL's driver for a raster that may be read. Raises ImportFailed."""
     with path.open("rb") as file:
         head = file.read(_HEAD_BYTES)
     if is_virtual_raster(head):
