@@ -97,7 +97,7 @@ def test_removing_frees_the_built_files_that_nothing_else_uses(run: Run, town: W
     assert f'"bytes": {before - sum(files_below(folder).values())}' in out
     assert not list((folder / "build").glob("house-*"))
     assert run("remove-files", "town", "ground", "--yes")[0] == 0
-    assert set(files_below(folder)) == {".lock", "registry.sqlite", "assets/.removed"}
+    assert set(files_below(folder)) == {".lock", "registry.sqlite", "removed-assets.json"}
     for command in (["show"], ["show", "scene", "town"], ["show", "rendering", "view"]):
         assert run(*command)[0] == 0
 

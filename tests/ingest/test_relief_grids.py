@@ -143,7 +143,7 @@ def test_a_document_of_heights_alone_is_terrain(tmp_path: Path) -> None:
     write_raster(city / "dem.tif")
     done, boxes = add(tmp_path, [write_model(city / "town.gml", house="")])
     assert [item.asset for item in done.imported] == ["dem"]
-    assert done.left_alone == [(str(city / "town.gml"), "heights alone, which are read as terrain")]
+    assert done.left_alone == [(str(city / "town.gml"), "a grid of heights alone, which is read as terrain")]
     assert np.array_equal(boxes["dem"], GRID_BOX)
 
 
@@ -180,6 +180,20 @@ def test_rasters_that_do_not_fit_are_named(tmp_path: Path) -> None:
     assert [(Path(file).name, "a file of unknown format" in reason) for file, reason in done.failed] == [("dem.tif", True)]
 
 
+def test_a_site_names_an_image_that_is_no_raster(tmp_path: Path) -> None:
+    workspace, city = Workspace(tmp_path / "workspace").create(), tmp_path / "city"
+    write_model(city / "town.gml", file="dem.png")
+    (city / "dem.png").write_bytes(b"\x89PNG")
+    summary = update(workspace, city)
+    assert summary.imported == ["town"]
+    assert [(Path(file).name, "a PNG image without a world file" in reason) for file, reason in summary.failed] == [("dem.png", True)]
+
+    write_raster(city / ".hidden" / "dem.tif")
+    write_model(city / "town.gml", file=".hidden/dem.tif")
+    assert update(workspace, city).imported == ["town", "dem"]
+    assert update(workspace, city).unchanged == ["town", "dem"]
+
+
 def update(workspace: Workspace, city: Path) -> ImportSummary:
     catalogue = workspace.open_catalogue()
     try:
@@ -205,4 +219,4 @@ def test_a_site_imports_the_raster_again_when_its_grid_changes(tmp_path: Path) -
     write_model(city / "town.gml", house="", origin=(EAST + 100.0, NORTH))
     summary = update(workspace, city)
     assert summary.unchanged == ["dem"]
-    assert summary.left_alone == [("town.gml", "heights alone, which are read as terrain")]
+    assert summary.left_alone == [("town.gml", "a grid of heights alone, which is read as terrain")]

@@ -5,6 +5,7 @@ from typing import Any, Final
 
 from map3d.catalogue import Catalogue, Workspace
 from map3d.cli.output import names_text
+from map3d.ingest.relief_grids import AS_TERRAIN
 
 MAX_LINES: Final = 20
 FILE: Final = "file"
@@ -37,12 +38,15 @@ def missing_textures_line(reports: Mapping[str, Mapping[str, Any]]) -> str | Non
 
 
 def left_alone_lines(left_alone: Sequence[tuple[str, str]]) -> Iterator[str]:
-    """Yields a line for each kind of file that map3d does not read."""
+    """Yields a line for each kind of file that map3d does not read, and for files that are terrain alone."""
     by_reason: dict[str, list[str]] = {}
     for file, reason in left_alone:
         by_reason.setdefault(reason, []).append(file)
     for reason, files in sorted(by_reason.items()):
-        yield f"left alone, since map3d does not read it: {names_text(files)} ({reason})"
+        if reason == AS_TERRAIN:
+            yield f"no objects in {names_text(files)}: {reason}"
+        else:
+            yield f"left alone, since map3d does not read it: {names_text(files)} ({reason})"
 
 
 def asset_warning_lines(asset: str, report: Mapping[str, Any], limit: int = 8) -> Iterator[str]:

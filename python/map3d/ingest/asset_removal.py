@@ -1,7 +1,7 @@
 """Removes assets from a scene. A removal that was killed is completed by the next removal, import or build.
 
 While a removal lasts, the file `assets/.removing` lists the assets and their files. Whatever the killed removal had reached, doing all steps again
-completes it. The file `assets/.removed` keeps which file each removed asset was of: a file that returns has its name, and with it its ids, back.
+completes it. The file `removed-assets.json` keeps which file each removed asset was of: a file that returns has its name, and with it its ids, back.
 """
 
 import json
@@ -18,7 +18,7 @@ from map3d.ingest.import_pieces import remove_pieces
 from map3d.registry import Registry
 
 _MARK: Final = ".removing"
-_REMOVED: Final = ".removed"
+_REMOVED: Final = "removed-assets.json"
 
 
 def remove_assets(workspace: Workspace, catalogue: Catalogue, scene: str, names: Sequence[str]) -> None:
@@ -92,7 +92,7 @@ def _store(path: Path, files: Mapping[str, str | None]) -> None:
 
 
 def _removed_path(workspace: Workspace, scene: str) -> Path:
-    return workspace.scene_folder(scene) / "assets" / _REMOVED
+    return workspace.scene_folder(scene) / _REMOVED
 
 
 def _mark_path(workspace: Workspace, scene: str) -> Path:

@@ -165,7 +165,7 @@ def _describe_unknown(path: Path, head: bytes) -> str:
         return f"a {raster.driver} image without a world file"
     for magic, name in _UNREADABLE.items():
         if head.startswith(magic):
-            return name
+            return f"{name}; unpack it first" if path.suffix.lower() == ".zip" else name
     text = _to_utf8(head).lstrip()
     if text.startswith(b"<"):
         root = _find_root_element(text)

@@ -12,7 +12,7 @@ from map3d.ingest.sources import SourceDocument, find_sources
 Grid = Mapping[str, Any]
 """Where a raster is, as its RasterRelief says; see `grids` in map3d._core.Reader."""
 
-AS_TERRAIN = "heights alone, which are read as terrain"
+AS_TERRAIN = "a grid of heights alone, which is read as terrain"
 """What a document is that has rasters of reliefs and nothing to draw."""
 
 

@@ -70,7 +70,11 @@ def _figures(report: SiteReport, images: int, size: int) -> str:
     missing = sum(textures.missing for textures in named)
     skipped = sum(file.skipped for file in report.files)
     cells = [
-        ("files imported", f"{len(report.files):,}", f"{len(report.failed):,} not imported" if report.failed else ""),
+        (
+            "file imported" if len(report.files) == 1 else "files imported",
+            f"{len(report.files):,}",
+            f"{len(report.failed):,} not imported" if report.failed else "",
+        ),
         ("objects", f"{sum(file.objects for file in report.files):,}", ""),
         ("triangles", f"{sum(file.triangles for file in report.files):,}", f"{plural(skipped, 'element')} skipped" if skipped else ""),
         ("textures", f"{sum(textures.images for textures in named):,}", f"{missing:,} missing" if missing else ""),

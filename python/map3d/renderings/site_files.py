@@ -81,8 +81,10 @@ class _Update:
                 show = partial(report, source.paths[0].name, number, len(sources))
                 show("")
                 self._import_if_changed(source, parser, show)
+            self._import_other_rasters(parser, report)
         if sources and not self._summary.imported and not self._summary.unchanged:
-            raise BadRequest(f"{self._files.folder}: none of its {len(sources)} files is usable; first error: {self._summary.failed[0][1]}")
+            files = "its only file is not usable" if len(sources) == 1 else f"none of its {len(sources)} files is usable; first error"
+            raise BadRequest(f"{self._files.folder}: {files}: {self._summary.failed[0][1]}")
         self._remove([asset.name for asset in leaving])
         return self._summary
 
@@ -169,6 +171,15 @@ class _Update:
         (placed,), failed = self._grids.place([terrain], {})
         self._summary.failed.extend(failed)
         return placed
+
+    def _import_other_rasters(self, parser: ParserProcess, report: OnSource) -> None:
+        """Imports the rasters that the documents name and that are no files of the folder's own terrain, such as those of hidden folders."""
+        if not self._grids.is_waiting:
+            return
+        terrains, failed = self._grids.place([], {name: Path(asset.source) for name, asset in self._assets.items()})
+        self._summary.failed.extend(failed)
+        for terrain in terrains:
+            self._import_if_changed(terrain, parser, partial(report, terrain.paths[0].name, 0, len(terrains)))
 
     def _keep(self, asset: AssetRecord, source: SourceDocument) -> None:
         """Records where the file is now, so that its leaving is noticed even after the folder was moved."""
