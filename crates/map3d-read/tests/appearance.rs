@@ -330,3 +330,14 @@ fn appearances_over_the_limit_are_an_error() {
     let options = ReadOptions { max_appearance_bytes: 10, ..ReadOptions::default() };
     assert!(documents::is_limit_error(read_with(&path, Format::CityGml, &options), "max_appearance_bytes"));
 }
+
+#[test]
+fn a_theme_that_the_document_does_not_have_is_named_with_those_that_it_has() {
+    let themes = member("summer", &color("1 0 0", &["p"])) + &member("winter", &color("0 1 0", &["p"]));
+    let said = |theme: &str, outside: &str| {
+        let document = read(outside, "", &ReadOptions { theme: Some(theme.to_owned()), ..ReadOptions::default() });
+        document.report.warnings.into_iter().find(|w| w.reason == "requested appearance theme is not in the file").map(|w| w.example)
+    };
+    assert_eq!(said("autumn", &themes).as_deref(), Some("autumn; the file has summer, winter"));
+    assert_eq!((said("winter", &themes), said("autumn", "")), (None, None), "a document without themes has nothing to choose");
+}

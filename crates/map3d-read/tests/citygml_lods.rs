@@ -161,3 +161,13 @@ fn attributes_of_storeys_and_units_are_those_of_their_building() {
     let names: Vec<&str> = document.objects[0].attributes.keys().map(String::as_str).collect();
     assert_eq!(names, ["buildingSubdivision/BuildingUnit/owner"]);
 }
+
+#[test]
+fn a_document_with_nothing_at_the_requested_level_says_what_it_has() {
+    let text = building(&(at_lod(1, &square("a", 0)) + &at_lod(3, &square("b", 1))));
+    for (lod, expected) in [("2", Some("2; the file has 1, 3")), ("1", None), ("3", None)] {
+        let document = try_text(&text, &ReadOptions { lod: Some(lod.to_owned()), ..ReadOptions::default() }).expect("readable");
+        let said = document.report.warnings.iter().find(|w| w.reason == "nothing at the requested level of detail").map(|w| w.example.as_str());
+        assert_eq!((said, document.count()), (expected, if expected.is_some() { 0 } else { 2 }), "{lod}");
+    }
+}

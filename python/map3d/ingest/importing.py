@@ -33,6 +33,7 @@ PARSER_ENTRIES: Final = {"raster": "map3d.ingest.terrain.parse_terrain:open_terr
 DOCUMENT_PARSER_ENTRY: Final = "map3d.ingest.parse_document:open_document_parser"
 ORIGIN_STEP_M: Final = 100.0
 MAX_MISSING_NAMES: Final = 200
+OTHER_LODS: Final = "nothing at the requested level of detail"
 MAX_FROM_ORIGIN_M: Final = _core.MAX_FROM_ORIGIN_M
 
 _NOT_IN_PIECES: Final = ("strict", "max_object_bytes", "max_appearance_bytes")
@@ -254,7 +255,8 @@ def _list_skipped(report: Mapping[str, Any]) -> str:
     examples = {warning["reason"]: f" ({warning['example']})" for warning in report.get("warnings", ()) if ": RasterRelief: " in warning["reason"]}
     counts = sorted(report.get("skipped", {}).items())
     skipped = ", ".join(f"{count} × {reason}{examples.get(f'skipped: {reason}', '')}" for reason, count in counts)
-    return f" (skipped: {skipped})" if skipped else ""
+    said = [f" ({warning['reason']}: {warning['example']})" for warning in report.get("warnings", ()) if warning["reason"] == OTHER_LODS]
+    return (f" (skipped: {skipped})" if skipped else "") + "".join(said)
 
 
 def _parser_error(source: SourceDocument, limits: Limits, error: SubprocessDied | LimitExceeded) -> ImportFailed | LimitExceeded:

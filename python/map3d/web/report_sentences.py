@@ -106,8 +106,9 @@ FAULTS: Final[Mapping[str, str]] = {
     ),
     "zero bytes left out": N_("Files with zero bytes in their text, which are left out: {count}."),
     "gzip file cut or damaged": N_("Packed files that are cut off or damaged; what could be unpacked is kept: {count}."),
+    "nothing at the requested level of detail": N_("Files with nothing at the chosen level of detail: {count}."),
     "appearance theme used": N_("Files with several themes of appearances, of which one is used: {count}."),
-    "requested appearance theme is not the first in the document": N_("Files in which the chosen theme of appearances is not the first: {count}."),
+    "requested appearance theme is not in the file": N_("Files without the chosen theme of appearances: {count}."),
     "appearance of another theme ignored": N_("Appearances of other themes, not used: {count}."),
     "appearance of back sides used only for surfaces without one of the front": N_(
         "Appearances of back sides, used only for surfaces without one of the front: {count}."

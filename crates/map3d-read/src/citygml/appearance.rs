@@ -335,8 +335,9 @@ impl ThemeSelection {
         self.is_chosen
     }
 
-    pub fn first(&self) -> Option<&str> {
-        self.themes.first().map(|(name, _)| name.as_str())
+    /// Returns the themes of the file, in document order.
+    pub fn names(&self) -> Vec<&str> {
+        self.themes.iter().map(|(name, _)| name.as_str()).collect()
     }
 
     /// The file has more than one theme.

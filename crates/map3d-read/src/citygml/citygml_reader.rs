@@ -177,10 +177,16 @@ impl CityGmlReader {
         if interiors > 0 {
             self.report.note_file("polygons of interiors are not drawn", format!("{interiors}; --interiors draws them"));
         }
+        if let Some(found) = self.converter.other_lods() {
+            self.report.note_file("nothing at the requested level of detail", found);
+        }
         report_invisible(self.report.skipped(INVISIBLE_POLYGON), self.inverted, &mut self.report);
         Ok(())
     }
 }
+
+/// Themes that the report names.
+const MAX_NAMED_THEMES: usize = 5;
 
 fn parse_lod(options: &ReadOptions) -> Result<Option<u8>> {
     let Some(text) = &options.lod else { return Ok(None) };
@@ -193,8 +199,9 @@ fn parse_lod(options: &ReadOptions) -> Result<Option<u8>> {
 fn report_theme(theme: &ThemeSelection, report: &mut ReportBuilder) {
     match (&theme.requested, theme.selected()) {
         (None, Some(selected)) if theme.has_several() => report.note("appearance theme used", selected),
-        (Some(requested), _) if theme.first() != Some(requested) => {
-            report.note("requested appearance theme is not the first in the document", requested.as_str());
+        (Some(requested), _) if !theme.names().is_empty() && !theme.names().contains(&requested.as_str()) => {
+            let names = theme.names().into_iter().take(MAX_NAMED_THEMES).collect::<Vec<_>>().join(", ");
+            report.note("requested appearance theme is not in the file", format!("{requested}; the file has {names}"));
         }
         _ => {}
     }

@@ -41,6 +41,8 @@ pub struct FeatureConverter {
     /// Ids that other city objects refer to.
     referenced_ids: IdSet,
     lod: Option<u8>,
+    /// Levels of detail of the document: bit n is level n.
+    levels: u8,
     shared: SharedGeometry,
     pub objects: Vec<Object>,
     /// Rasters of reliefs.
@@ -85,6 +87,7 @@ impl FeatureConverter {
             other_appearances: Appearances::default(),
             referenced_ids,
             lod,
+            levels: 0,
             shared: SharedGeometry::default(),
             objects: Vec::new(),
             grids: Vec::new(),
@@ -113,6 +116,7 @@ impl FeatureConverter {
         city_object.extend_interiors();
         city_object.expose_shared_interiors();
         let lods = select_lods(city_object, self.lod);
+        self.levels |= city_object.features.iter().flat_map(|f| &f.representations).fold(0, |levels, r| levels | 1 << r.lod);
         let object_numbers = self.add_objects(city_object, &lods);
         let xlinks = XLinkIndex::build(&city_object.geometry);
         let visits = vec![VisitState::Unvisited; city_object.geometry.nodes.len()];
@@ -174,6 +178,13 @@ impl FeatureConverter {
             }
         }
         Ok(())
+    }
+
+    /// Returns the requested level of detail and those that the document has, if it has others only.
+    pub fn other_lods(&self) -> Option<String> {
+        let requested = self.lod.filter(|lod| self.levels != 0 && self.levels >> lod & 1 == 0)?;
+        let levels: Vec<String> = (0..8).filter(|lod| self.levels >> lod & 1 == 1).map(|lod: u8| lod.to_string()).collect();
+        Some(format!("{requested}; the file has {}", levels.join(", ")))
     }
 
     /// Adds the raster of a relief, up to a limit that no document reaches in earnest.
