@@ -87,7 +87,7 @@ fn undamaged_documents_are_read_completely() {
     folder.put("lamp.obj", "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n");
     folder.put("all_statements.mtl", LIBRARY);
     let city = read_with(&folder.put("a.gml", CITY), Format::CityGml, &ReadOptions { strict: true, ..ReadOptions::default() }).expect("no fault");
-    assert_eq!((city.objects.len(), city.instances.len(), city.count()), (5, 3, 16));
+    assert_eq!((city.objects.len(), city.instances.len(), city.count()), (6, 3, 20));
     let house = read_with(&folder.put("a.obj", HOUSE), Format::Obj, &ReadOptions { strict: true, ..ReadOptions::default() }).expect("no fault");
     assert_eq!((house.count(), house.materials.len()), (10, 5));
 }

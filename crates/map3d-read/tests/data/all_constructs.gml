@@ -27,4 +27,10 @@
   <app:surfaceDataMember><app:GeoreferencedTexture><app:imageURI>t.png</app:imageURI><app:referencePoint><gml:Point><gml:pos>0 4</gml:pos></gml:Point></app:referencePoint><app:orientation>1 0 0 -1</app:orientation><app:target>#turned</app:target></app:GeoreferencedTexture></app:surfaceDataMember>
   <app:surfaceDataMember xlink:href="#red"/>
 </app:Appearance></app:appearanceMember>
+<core:cityObjectMember><dem:ReliefFeature xmlns:dem="http://www.opengis.net/citygml/relief/2.0" gml:id="relief"><dem:lod>2</dem:lod><dem:reliefComponent><dem:RasterRelief><dem:lod>2</dem:lod>
+  <dem:extent><gml:Polygon><gml:exterior><gml:LinearRing><gml:posList>-1 -1 0 9 -1 0 9 9 0 -1 9 0 -1 -1 0</gml:posList></gml:LinearRing></gml:exterior></gml:Polygon></dem:extent>
+  <dem:grid><gml:RectifiedGridCoverage><gml:rectifiedGridDomain><gml:RectifiedGrid dimension="2"><gml:limits><gml:GridEnvelope><gml:low>0 0</gml:low><gml:high>2 1</gml:high></gml:GridEnvelope></gml:limits>
+  <gml:axisName>x</gml:axisName><gml:axisName>y</gml:axisName><gml:origin><gml:Point><gml:pos>0 0</gml:pos></gml:Point></gml:origin><gml:offsetVector>4 0</gml:offsetVector><gml:offsetVector>0 8</gml:offsetVector></gml:RectifiedGrid></gml:rectifiedGridDomain>
+  <gml:rangeSet><gml:DataBlock><gml:rangeParameters/><gml:tupleList decimal="." cs="," ts=" ">1 2,0 3 4 5 6</gml:tupleList></gml:DataBlock></gml:rangeSet>
+  <gml:coverageFunction><gml:GridFunction><gml:sequenceRule order="+x-y">Linear</gml:sequenceRule></gml:GridFunction></gml:coverageFunction></gml:RectifiedGridCoverage></dem:grid></dem:RasterRelief></dem:reliefComponent></dem:ReliefFeature></core:cityObjectMember>
 </core:CityModel>
