@@ -4,7 +4,10 @@ import type { Attribute, imageLayer, map, ObjectInfo } from "../map3d";
 const AT_ONCE = 32;
 const FIXED = ["id", "name", "class"] as const;
 
-/** Writes objects as CSV (RFC 4180, UTF-8): one row each, with id, name, class and all their attributes, whose values stay as they are stored. */
+/**
+ * Writes objects as CSV (RFC 4180, UTF-8): one row each, with id, name, class and all their attributes. Values stay as they are stored, except that an apostrophe
+ * precedes a text that a spreadsheet would run as a formula.
+ */
 export function toCsv(objects: readonly (readonly [id: number, object: ObjectInfo])[]): string {
   const names = [...new Set(objects.flatMap(([, { attributes }]) => Object.keys(attributes)))].sort();
   const rows = objects.map(([id, object]) => [id, object.name, object.class, ...names.map((name) => object.attributes[name] ?? null)]);
@@ -32,7 +35,11 @@ export interface CsvOptions {
   ids?: readonly number[];
 }
 
+/** What a spreadsheet may take for a formula (OWASP, "CSV Injection"): these characters at the beginning, unless the whole text is a number. */
+const FORMULA = /^(?![+-]?\d+(?:\.\d+)?$)[=+\-@\t\r\n\uff1d\uff0b\uff0d\uff20]/;
+
 function toField(value: Attribute): string {
-  const text = value === null ? "" : String(value);
+  const plain = value === null ? "" : String(value);
+  const text = typeof value === "string" && FORMULA.test(plain) ? `'${plain}` : plain;
   return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
 }

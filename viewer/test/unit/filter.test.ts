@@ -36,6 +36,17 @@ describe("CSV", () => {
     expect(text).toBe('id,name,class,height,listed,attribute:name,note\r\n17,"The ""Hall"", old",building,34.5,true,,"a\r\nb"\r\n18,Tower,building,,,T,\r\n');
   });
 
+  test.each([
+    ["=1+1", "'=1+1"], ["+cmd|x", "'+cmd|x"], ["-2+3", "'-2+3"], ["@SUM(A1)", "'@SUM(A1)"], ["\t=1", "'\t=1"], ["\r=1", '"\'\r=1"'], ["\n=1", '"\'\n=1"'], ["＝1+1", "'＝1+1"], ['=HYPERLINK("x")', `"'=HYPERLINK(""x"")"`],
+    ["a=b", "a=b"], ["'=1", "'=1"], ["-12.5", "-12.5"], ["+3", "+3"], [-12.5, "-12.5"], [true, "true"], ["", ""],
+  ])("never starts a formula: %j is written as %j", (value, field) => {
+    expect(toCsv([[1, object("T", { value })]])).toBe(`id,name,class,value\r\n1,T,building,${field}\r\n`);
+  });
+
+  test("never starts a formula in names and headers either", () => {
+    expect(toCsv([[1, object("=N", { "@a": 1 })]])).toBe("id,name,class,'@a\r\n1,'=N,building,1\r\n");
+  });
+
   test("of no object is the header", () => {
     expect(toCsv([])).toBe("id,name,class\r\n");
   });
