@@ -4,6 +4,9 @@ import { computeHaze } from "./hazeMask";
 /** Pixels of the mask along each side; it covers the square of a view. */
 const SIDE_PX = 128;
 
+type Rgb = readonly number[];
+type Draw = (context: CanvasRenderingContext2D) => void;
+
 /** Lets the content fade into the background towards its edge, over both drawers, and colours the background by the light of the sky. */
 export class Haze {
   readonly #view: map;
@@ -11,6 +14,7 @@ export class Haze {
   readonly #canvas = document.createElement("canvas");
   readonly #masks = new Map<string, Promise<Uint8ClampedArray | null>>();
   #mask: Uint8ClampedArray | null = null;
+  #rgb: Rgb = [];
   #direction = "";
 
   /** @param layer one whose manifest has loaded */
@@ -27,13 +31,30 @@ export class Haze {
 
   /** Follows the map; hides while the view turns. */
   #place(): void {
-    const camera = this.#view.getViewState()?.camera;
-    if (!camera) return;
+    const square = this.#findSquare();
+    if (!square) return;
     if (this.#view.direction !== this.#direction) this.#canvas.classList.remove("shown");
+    const [x, y, size] = square;
+    this.#canvas.style.transform = `translate(${x.toFixed(2)}px, ${y.toFixed(2)}px) scale(${(size / SIDE_PX).toFixed(5)})`;
+  }
+
+  /** Returns left, top and side of the view's square, CSS pixels of the map. */
+  #findSquare(): readonly [x: number, y: number, size: number] | null {
+    const camera = this.#view.getViewState()?.camera;
+    if (!camera) return null;
     const { u0, v0, size } = camera.frame;
     const px_m = this.#view.metresPerPixel;
-    const [x, y] = [(u0 - camera.u) / px_m + camera.width / 2, (camera.v - v0) / px_m + camera.height / 2];
-    this.#canvas.style.transform = `translate(${x.toFixed(2)}px, ${y.toFixed(2)}px) scale(${(size / px_m / SIDE_PX).toFixed(5)})`;
+    return [(u0 - camera.u) / px_m + camera.width / 2, (camera.v - v0) / px_m + camera.height / 2, size / px_m];
+  }
+
+  /** Returns a function that draws the present haze over a picture of the map; undefined without haze. @param paper the picture's background, if it is not that of the map */
+  capture(paper?: Rgb): Draw | undefined {
+    const [square, mask] = [this.#findSquare(), this.#mask];
+    if (!square || !mask || this.#canvas.hidden || !this.#canvas.classList.contains("shown")) return undefined;
+    const [x, y, size] = square;
+    const canvas = this.#canvas.cloneNode() as HTMLCanvasElement;
+    fill(canvas, mask, paper ?? this.#rgb);
+    return (context) => { context.drawImage(canvas, x, y, size, size); };
   }
 
   /** Shows the haze of the current view once its mask is known. Without one, as offline, there is no haze. */
@@ -71,14 +92,17 @@ export class Haze {
   #color(): void {
     const plain = matchMedia("(prefers-contrast: more), (forced-colors: active)").matches;
     const paper = (getComputedStyle(document.documentElement).getPropertyValue("--paper").trim().match(/[0-9a-f]{2}/gi) ?? []).map((part) => parseInt(part, 16));
-    const rgb = paper.map((part, k) => Math.round(part * Math.min(this.#view.light.sky_rgb[k as 0], 1) ** 2));
-    this.#canvas.hidden = plain || rgb.length < 3;
+    this.#rgb = paper.map((part, k) => Math.round(part * Math.min(this.#view.light.sky_rgb[k as 0], 1) ** 2));
+    this.#canvas.hidden = plain || paper.length < 3;
     if (this.#canvas.hidden) return;
-    this.#view.setBackground(`rgb(${rgb.join(" ")})`);
-    const context = this.#canvas.getContext("2d");
-    if (!context || !this.#mask) return;
-    const image = context.createImageData(SIDE_PX, SIDE_PX);
-    this.#mask.forEach((alpha, k) => { image.data.set([...rgb, alpha], 4 * k); });
-    context.putImageData(image, 0, 0);
+    this.#view.setBackground(`rgb(${this.#rgb.join(" ")})`);
+    if (this.#mask) fill(this.#canvas, this.#mask, this.#rgb);
   }
+}
+
+/** Fills a canvas with a colour of the opacity of a mask. */
+function fill(canvas: HTMLCanvasElement, mask: Uint8ClampedArray, rgb: Rgb): void {
+  const image = new ImageData(SIDE_PX, SIDE_PX);
+  mask.forEach((alpha, k) => { image.data.set([...rgb, alpha], 4 * k); });
+  canvas.getContext("2d")?.putImageData(image, 0, 0);
 }

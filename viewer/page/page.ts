@@ -2,6 +2,7 @@ import { imageLayer, map, Map3dError } from "./map3d.mjs";
 import type { overview as Overview } from "./map3d-controls.mjs";
 import { Permalink, readPermalink } from "./permalink";
 import { Colors } from "./colors";
+import { Compare } from "./compare";
 import { bindEpochs, otherEpochs } from "./epochs";
 import { InfoPanel } from "./info";
 import { bindLight, FIRST_HOUR, lightAt, showShadowSwitch } from "./light";
@@ -39,13 +40,7 @@ function open(): void {
   const info = new InfoPanel(byId("info"), () => { selection.clear(); });
   const permalink = new Permalink(view);
   const selection = new Selection(view, layer, info, permalink);
-  view.on("error", ({ error }) => {
-    if (layer.rendering) report(error);
-    else {
-      showFailure(message("mapFailed"), error.message);
-      if (!navigator.onLine) addEventListener("online", () => { location.reload(); });
-    }
-  });
+  view.on("error", ({ error }) => { showError(layer, error); });
   let tools: Tools | undefined;
   view.on("click", (event) => {
     if (!tools?.active) selection.select(event);
@@ -55,7 +50,8 @@ function open(): void {
     bindShare(permalink);
     permalink.by = by ?? "";
     const colors = new Colors(view, layer, permalink);
-    if (layer.rendering) bindPicture({ view, json: layer.rendering.json, legend: () => colors.theme });
+    let haze: Haze | undefined;
+    if (layer.rendering) bindPicture({ view, json: layer.rendering.json, legend: () => colors.theme, overlay: (paper) => haze?.capture(paper) });
     if (layer.rendering) bindOffline(view, layer.rendering.json.name);
     colors.open().catch((reason: unknown) => { report(reason); });
     import("./map3d-controls.mjs").then(({ locate, overview }) => {
@@ -84,10 +80,22 @@ function open(): void {
     }, (reason: unknown) => { report(reason); });
     if (layer.rendering?.layers.has("depth")) tools = new Tools(view);
     // Epochs can end elsewhere.
-    if (others.length === 0) new Haze(view, layer);
+    if (others.length === 0) haze = new Haze(view, layer);
+    const compare = new Compare({ view, hasHaze: others.length === 0, onClick: (event) => { selection.select(event); } });
+    selection.onChange = () => { compare.highlight(); };
   });
   layer.addTo(view);
   bindLoading(view);
+}
+
+/** Reports an error; without a map, in place of the page. */
+function showError(layer: imageLayer, error: Error): void {
+  if (layer.rendering) {
+    report(error);
+    return;
+  }
+  showFailure(message("mapFailed"), error.message);
+  if (!navigator.onLine) addEventListener("online", () => { location.reload(); });
 }
 
 /** Zoom levels above the lowest at which the overview opens, on wide screens: about one quarter of the scene is in view. */

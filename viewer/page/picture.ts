@@ -17,6 +17,8 @@ export interface PictureContext {
   readonly json: ManifestJson;
   /** The active theme's legend, if any. */
   legend(): PictureLegend | undefined;
+  /** Draws what the page shows over the map. @param paper colour of the background, if it is not that of the map */
+  readonly overlay: (paper?: readonly number[]) => PictureOptions["overlay"];
 }
 
 interface PictureSize {
@@ -85,9 +87,10 @@ function showProgress(fraction: number): void {
   byId("picture-percent").textContent = fraction.toLocaleString(language, { style: "percent" });
 }
 
-async function createPicture({ view }: PictureContext, { width_px, height_px, textScale }: PictureSize, signal: AbortSignal, more: PictureOptions): Promise<Blob> {
+async function createPicture({ view, overlay }: PictureContext, { width_px, height_px, textScale }: PictureSize, signal: AbortSignal, more: PictureOptions, paper?: readonly number[]): Promise<Blob> {
+  const draw = overlay(paper);
   const { exportPicture } = await import("./map3d-print.mjs");
-  return exportPicture(view, { width_px, height_px, textScale, signal, progress: (done, total) => { showProgress(done / total); }, ...more });
+  return exportPicture(view, { width_px, height_px, textScale, signal, ...(draw && { overlay: draw }), progress: (done, total) => { showProgress(done / total); }, ...more });
 }
 
 async function save(context: PictureContext, size: PictureSize, signal: AbortSignal): Promise<void> {
@@ -102,7 +105,7 @@ async function save(context: PictureContext, size: PictureSize, signal: AbortSig
 
 /** Prints the picture with title, legend and attribution on a print-only sheet. */
 async function print(context: PictureContext, size: PictureSize, signal: AbortSignal): Promise<void> {
-  const blob = await createPicture(context, size, signal, { attribution: "", background: "#fff" });
+  const blob = await createPicture(context, size, signal, { attribution: "", background: "#fff" }, [255, 255, 255]);
   const picture = new Image();
   picture.src = URL.createObjectURL(blob);
   picture.alt = titleOf(context);

@@ -15,6 +15,8 @@ export class Selection {
   readonly #info: InfoPanel;
   readonly #permalink: Permalink;
   #clicks = 0;
+  /** Called after the highlights have changed. */
+  onChange = (): void => undefined;
   /** The marker of the search result that is selected, or of a spot on the ground. */
   #pin: marker | undefined;
 
@@ -71,6 +73,7 @@ export class Selection {
     this.#permalink.id = 0;
     this.#pin?.remove();
     this.#layer.clearHighlight();
+    this.onChange();
     this.#permalink.write();
   }
 
@@ -85,6 +88,7 @@ export class Selection {
     }
     const isObject = event.id > 0 && !NOT_HIGHLIGHTED.has(event.class ?? "");
     if (isObject) this.#layer.highlight(event.id);
+    this.onChange();
     const title = this.#info.show(event, isObject ? this.#showBack(event) : undefined);
     if (!isObject && event.position) this.#pin = new marker(title, event.position, { showLabel: false }).addTo(this.#view);
     if (event.position) this.#moveClear(event.position);

@@ -4,12 +4,21 @@ interface CompareMessages {
   /** Accessible name of the swipe divider. */
   readonly divider: string;
   readonly time: string;
+  readonly facing: (wind: string) => string;
+  /** Counter-clockwise from north, in steps of 45°. */
+  readonly winds: readonly string[];
 }
 
 const MESSAGES = {
-  en: { divider: "Drag to compare", time: "Time" },
-  de: { divider: "Zum Vergleichen ziehen", time: "Zeitpunkt" },
-  fr: { divider: "Faites glisser pour comparer", time: "Époque" },
+  en: { divider: "Drag to compare", time: "Time", facing: (wind) => `Facing ${wind}`, winds: ["north", "north-west", "west", "south-west", "south", "south-east", "east", "north-east"] },
+  de: { divider: "Zum Vergleichen ziehen", time: "Zeitpunkt", facing: (wind) => `Blick nach ${wind}`, winds: ["Norden", "Nordwesten", "Westen", "Südwesten", "Süden", "Südosten", "Osten", "Nordosten"] },
+  fr: { divider: "Faites glisser pour comparer", time: "Époque", facing: (wind) => `Vue vers ${wind}`, winds: ["le nord", "le nord-ouest", "l’ouest", "le sud-ouest", "le sud", "le sud-est", "l’est", "le nord-est"] },
 } satisfies Record<string, CompareMessages>;
 
 export const getCompareMessages = (language: string): CompareMessages => selectTranslation<CompareMessages>(MESSAGES, language);
+
+/** Describes a look-at angle in words. */
+export function describeDirection(lookAt_deg: number, language: string): string {
+  const { facing, winds } = getCompareMessages(language);
+  return facing(winds[((Math.round(lookAt_deg / 45) % 8) + 8) % 8] ?? "");
+}

@@ -1,9 +1,14 @@
+import { adoptStyles, element } from "../core/dom";
 import { Evented, UsageError, type map, type Vec3 } from "../map3d";
+import { describeDirection } from "./i18n";
+import { STYLES } from "./styles";
 
 /** Options of `sync`. */
 export interface SyncOptions {
   /** For each map, how far its direction is turned from that of the first one, degrees counter-clockwise; the nearest direction of its rendering is shown. Default: 0 for all. */
   turns_deg?: readonly number[];
+  /** Write on each map where it looks, such as "Facing north". Default false. */
+  captions?: boolean;
 }
 
 /** Events of `sync`. */
@@ -21,18 +26,23 @@ export class sync extends Evented<SyncEvents> {
   readonly #maps: readonly map[];
   readonly #turns: readonly number[];
   readonly #abort = new AbortController();
+  readonly #captions = new Map<map, HTMLElement>();
   #leader: map;
   /** Height of the surface at the centre, world; null until it is known. */
   #height: number | null = null;
 
   /** @throws UsageError for fewer than two maps, the same map twice, or turns that are not one number per map */
-  constructor(maps: readonly map[], { turns_deg = maps.map(() => 0) }: SyncOptions = {}) {
+  constructor(maps: readonly map[], { turns_deg = maps.map(() => 0), captions = false }: SyncOptions = {}) {
     super();
     const [first] = maps;
     if (!first || maps.length < 2 || new Set(maps).size < maps.length) throw new UsageError(`sync needs at least two different maps, got ${String(maps.length)}`);
     if (turns_deg.length !== maps.length || !turns_deg.every(Number.isFinite)) throw new UsageError(`sync: turns_deg must be a number of degrees for each of the ${String(maps.length)} maps`);
     [this.#maps, this.#turns, this.#leader] = [[...maps], turns_deg, first];
-    for (const each of maps) this.#listen(each);
+    if (captions) adoptStyles(document, STYLES);
+    for (const each of maps) {
+      if (captions) this.#captions.set(each, each.overlayPane.appendChild(element("div", "map3d-facing")));
+      this.#listen(each);
+    }
   }
 
   protected override get eventTypes(): readonly (keyof SyncEvents)[] {
@@ -56,7 +66,8 @@ export class sync extends Evented<SyncEvents> {
   /** Ends the connection; the maps stay where they are. */
   remove(): this {
     this.#abort.abort();
-    for (const each of this.#maps) each.off("move", this.#follow).off("idle", this.#settle).off("directionchange", this.#follow).off("ready", this.#follow);
+    for (const each of this.#maps) each.off("move", this.#follow).off("idle", this.#settle).off("directionchange", this.#follow).off("ready", this.#follow).off("directionchange", this.#describe).off("ready", this.#describe);
+    for (const caption of this.#captions.values()) caption.remove();
     return this;
   }
 
@@ -64,9 +75,16 @@ export class sync extends Evented<SyncEvents> {
     const { signal } = this.#abort;
     for (const type of TOUCHES) map.container.addEventListener(type, () => { this.lead(map); }, { capture: true, passive: true, signal });
     map.on("move", this.#follow).on("directionchange", this.#follow).on("ready", this.#follow).on("idle", this.#settle);
-    map.on("remove", () => this.remove());
+    map.on("directionchange", this.#describe).on("ready", this.#describe).on("remove", () => this.remove());
+    if (map.getViewState()) this.#describe({ target: map });
     this.#follow({ target: map });
   }
+
+  readonly #describe = ({ target }: { target: unknown }): void => {
+    const shown = target as map;
+    const caption = this.#captions.get(shown);
+    if (caption) caption.textContent = describeDirection(shown.lookAt_deg, shown.language);
+  };
 
   /** At rest, reads the height of the surface at the centre, so that hills and roofs have the same place at all centres. */
   readonly #settle = ({ target }: { target: unknown }): void => {

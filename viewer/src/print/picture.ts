@@ -22,6 +22,8 @@ export interface PictureOptions extends PieceOptions {
   northArrow?: boolean;
   /** Draw the map's markers and labels. Default true. */
   markers?: boolean;
+  /** Draws over the map, below markers and texts. The unit is a CSS pixel of the map, from its top left corner. Default: nothing. */
+  overlay?: (context: CanvasRenderingContext2D) => void;
   /** Any CSS colour, "transparent" for none. Default: that of the map. */
   background?: string;
   /** Picture pixels per CSS pixel of text; 3.125 for 300 dpi. Default: the scale of the map. */
@@ -51,6 +53,7 @@ export async function exportPicture(shown: map, options: PictureOptions = {}): P
   const decorations = new Decorations(shown, context, scale, options.textScale ?? scale);
   const attribution = options.attribution ?? shown.attributions.join(" · ");
   await drawPieces(shown, { width, height, scale }, context, options);
+  drawOverlay(context, { clientWidth, clientHeight }, scale, options.overlay);
   decorations.begin();
   if (options.markers ?? true) decorations.markers();
   if (options.northArrow ?? true) decorations.northArrow();
@@ -78,6 +81,14 @@ function fillBackground(context: CanvasRenderingContext2D, color: string): void 
   if (!CSS.supports("color", color)) throw new UsageError(`background must be a CSS colour, got "${color}"`);
   context.fillStyle = color;
   context.fillRect(0, 0, context.canvas.width, context.canvas.height);
+}
+
+/** Draws over the map, which is in the middle of the picture. */
+function drawOverlay(context: CanvasRenderingContext2D, { clientWidth, clientHeight }: Pick<Element, "clientWidth" | "clientHeight">, scale: number, draw: PictureOptions["overlay"]): void {
+  context.save();
+  context.setTransform(scale, 0, 0, scale, (context.canvas.width - clientWidth * scale) / 2, (context.canvas.height - clientHeight * scale) / 2);
+  draw?.(context);
+  context.restore();
 }
 
 function encodePng(canvas: HTMLCanvasElement): Promise<Blob> {

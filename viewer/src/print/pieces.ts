@@ -54,8 +54,8 @@ export async function drawPieces(shown: map, { width, height, scale }: PictureEx
 
 /** Creates an invisible, inert element of a size. */
 function createBox(width: number, height: number): HTMLElement {
-  const box = element("div", "", { "aria-offscreen": "true", inert: "" });
-  Object.assign(box.style, { position: "fixed", left: "0", top: "0", width: `${String(width)}px`, height: `${String(height)}px`, visibility: "offscreen", contain: "strict", zIndex: "-1" });
+  const box = element("div", "", { "aria-hidden": "true", inert: "" });
+  Object.assign(box.style, { position: "fixed", left: "0", top: "0", width: `${String(width)}px`, height: `${String(height)}px`, visibility: "hidden", contain: "strict", zIndex: "-1" });
   document.body.append(box);
   return box;
 }

@@ -1,16 +1,14 @@
 import { expect, test } from "vitest";
 import type { Page } from "playwright-core";
 import type * as Compare from "../../src/compare";
+import { renderLater } from "../fixture/later";
 import { renderTown } from "../fixture/rendering";
-import { ORIGIN, THINGS, TOWN, type Thing } from "../fixture/town";
+import { ORIGIN } from "../fixture/town";
 import { TestBed } from "./bed";
 import { OUT } from "./browser";
 import { picture, settled, type Global } from "./page";
 
-/** Ten years later: the tower has gone, a school has been built. */
-const SCHOOL: Thing = { id: 99, name: "New school", box: [[-20, -60, 0], [0, 20, 24]], wall: [230, 226, 216], roof: [88, 130, 96] };
-const later = renderTown(128, 0.38, { ...TOWN, name: "later", things: [...THINGS.filter(({ name }) => name !== "Tower"), SCHOOL] });
-const bed = new TestBed({ town: renderTown(), later });
+const bed = new TestBed({ town: renderTown(), later: renderLater() });
 const VIEWPORT = { viewport: { width: 500, height: 420 } };
 type Comparing = Global & { map3d: typeof Compare; later: Global["layer"]; swipe: Compare.swipe; epochs: Compare.epochs };
 

@@ -3,15 +3,16 @@ import { dirname, join } from "node:path";
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { published, writeFolder } from "../fixture/folder";
+import { renderLater } from "../fixture/later";
 import { renderTown } from "../fixture/rendering";
 import { TestBed } from "./bed";
 import { OUT } from "./browser";
 import { VIEWER } from "./package";
 
-const bed = new TestBed({ town: renderTown() });
+const bed = new TestBed({ town: renderTown(), later: renderLater() });
 const FOLDER = join(VIEWER, "examples");
 const FILES = readdirSync(FOLDER).filter((file) => file.endsWith(".html"));
-const ORDER = ["shortest", "markers", "attributes", "theme", "labels", "measure", "sun", "search", "company", "sync", "styles", "link", "model", "files", "portrayal"];
+const ORDER = ["shortest", "markers", "attributes", "theme", "labels", "measure", "sun", "search", "company", "directions", "times", "styles", "link", "model", "files", "portrayal"];
 const COLOURS = 24;
 
 /** Counts the colours in a part of the page: a map that shows something has many. */
@@ -98,21 +99,45 @@ const POINTS: Readonly<Record<string, (page: Page, picture: Buffer) => Promise<v
     const embed = /<!-- From here[^]*all that the map needs/.exec(readFileSync(join(FOLDER, "company.html"), "utf8"))?.[0] ?? "";
     expect(embed.split("\n").length).toBeLessThanOrEqual(24);
   },
-  sync: async (page) => {
-    await page.mouse.move(200, 300);
+  directions: async (page) => {
+    await page.mouse.move(200, 200);
     await page.mouse.down();
-    await page.mouse.move(260, 330, { steps: 6 });
+    await page.mouse.move(230, 215, { steps: 6 });
     await page.waitForTimeout(200); // without inertia
     await page.mouse.up();
     await still(page);
-    await page.screenshot({ path: `${OUT}/example-sync-moved.png` });
-    const [north, south] = await page.evaluate<{ direction: string; zoom: number; at: [number, number] }[]>(`(async () => {
-      const { clientWidth, clientHeight } = maps[0].container;
-      const place = (await maps[0].pick([clientWidth / 2, clientHeight / 2])).position;
+    await page.screenshot({ path: `${OUT}/example-directions-moved.png` });
+    const centres = `(async () => {
+      const { clientWidth, clientHeight } = sync.leader.container;
+      const place = (await sync.leader.pick([clientWidth / 2, clientHeight / 2])).position;
       return maps.map((map) => ({ direction: map.direction, zoom: map.zoom, at: map.project(place).map((part, k) => part - [map.container.clientWidth, map.container.clientHeight][k] / 2) }));
-    })()`);
-    expect([north?.direction, south?.direction, south?.zoom]).toEqual(["0-45", "180-45", north?.zoom]);
-    for (const part of south?.at ?? [NaN]) expect(Math.abs(part)).toBeLessThan(1.5);
+    })()`;
+    const found = await page.evaluate<{ direction: string; zoom: number; at: [number, number] }[]>(centres);
+    expect(found.map(({ direction }) => direction)).toEqual(["0-45", "270-45", "180-45", "90-45"]);
+    expect(new Set(found.map(({ zoom }) => zoom)).size).toBe(1);
+    for (const part of found.flatMap(({ at }) => at)) expect(Math.abs(part)).toBeLessThan(1.5);
+    const captions = (): Promise<string[]> => page.locator(".map3d-facing").allTextContents();
+    expect(await captions()).toEqual(["Facing north", "Facing east", "Facing south", "Facing west"]);
+    // A turn of one map turns all of them, each with its own caption.
+    await page.getByRole("button", { name: "Turn view clockwise", exact: true }).click();
+    await expect.poll(captions, { timeout: 20_000 }).toEqual(["Facing east", "Facing south", "Facing west", "Facing north"]);
+    await still(page);
+    const [x, y] = await page.evaluate<[number, number]>("maps[0].project([691032, 5336026, 562])");
+    await page.mouse.click(x, y);
+    await page.waitForFunction("maps.every(({ layers: [layer] }) => layer.highlighted.join() === '2000000001')");
+  },
+  times: async (page, swiped) => {
+    expect(await page.locator(".map3d-swipe-name").allTextContents()).toEqual(["Then", "Now"]);
+    await page.getByRole("slider", { name: "Drag to compare" }).press("End");
+    expect((await still(page)).equals(swiped)).toBe(false);
+    await page.getByRole("button", { name: "Side by side" }).click();
+    await still(page);
+    await page.screenshot({ path: `${OUT}/example-times-side-by-side.png` });
+    expect(await page.evaluate("[map, right].map((each) => [each.layers.length, each.layers[0].rendering.json.name, each.direction, each.zoom])")).toEqual([[1, "town", "0-45", 2.6], [1, "later", "0-45", 2.6]]);
+    expect(await page.evaluate("[before.clip, after.clip]")).toEqual([null, null]);
+    await page.getByRole("button", { name: "One map" }).click();
+    await still(page);
+    expect(await page.evaluate("[map.layers.length, before.clip, after.clip, map.zoom, right.container.isConnected && !box.hidden]")).toEqual([2, [0, 0, 0.5, 1], [0.5, 0, 1, 1], 2.6, false]);
   },
   styles: async (page) => {
     for (const mode of ["normal", "depth"]) expect(await colours(page, `[data-mode=${mode}]`)).toBeGreaterThan(COLOURS / 4);

@@ -3,6 +3,7 @@ import { expect, test } from "vitest";
 import type { Page } from "playwright-core";
 import type * as Print from "../../src/print";
 import { renderTown } from "../fixture/rendering";
+import { decodePng, type DecodedPng } from "../../src/core/png";
 import { ORIGIN } from "../fixture/town";
 import { TestBed } from "./bed";
 import { OUT } from "./browser";
@@ -94,6 +95,26 @@ test("title, legend, markers, scale bar and attribution are drawn; invalid optio
   await page.context().close();
 });
 
+test("an overlay is drawn over the map and below the texts, in CSS pixels of the map", async () => {
+  const { page } = await bed.start("town", { zoom: 1.4 }, {}, { viewport: { width: 200, height: 100 } });
+  await page.addScriptTag({ url: "/map3d-print.js" });
+  const found = await page.evaluate(async (bare) => {
+    const g = globalThis as unknown as Printing;
+    const overlay = (context: CanvasRenderingContext2D): void => {
+      context.fillStyle = "#ff00ff";
+      context.globalAlpha = 1;
+      context.fillRect(10, 20, 30, 40);
+    };
+    // Twice as large, and 300 pixels wider than the map.
+    const bitmap = await createImageBitmap(await g.map3d.exportPicture(g.map, { ...bare, width_px: 700, height_px: 200, overlay }));
+    const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d") as OffscreenCanvasRenderingContext2D;
+    context.drawImage(bitmap, 0, 0);
+    return [[170, 40], [229, 119], [169, 40], [230, 119], [170, 39], [229, 120]].map(([x = 0, y = 0]) => context.getImageData(x, y, 1, 1).data.join() === "255,0,255,255");
+  }, BARE);
+  expect(found).toEqual([true, true, false, false, false, false]);
+  await page.context().close();
+});
+
 const DESK = { viewport: { width: 1280, height: 800 } };
 const PHONE = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 3, isMobile: true, hasTouch: true };
 
@@ -115,6 +136,15 @@ test.each([["desk", DESK], ["phone", PHONE]] as const)("%s: the page saves and p
   await download.saveAs(`${OUT}/${name}-saved.png`);
   expect(readFileSync(`${OUT}/${name}-saved.png`).readUInt32BE(16)).toBe(name === "desk" ? 1280 : 780);
   await page.waitForSelector("#picture", { state: "hidden" });
+  if (name === "desk") {
+    // The saved picture fades towards the edge as the screen does.
+    const [saved, screen] = [await decodePng(Uint8Array.from(readFileSync(`${OUT}/desk-saved.png`))), await decodePng(Uint8Array.from(await page.screenshot()))];
+    const row = ({ width, channels, data }: DecodedPng): number[] => Array.from({ length: 70 }, (_, k) => data[channels * (450 * width + 850 + k)] ?? NaN);
+    const [a, b] = [row(saved), row(screen)];
+    expect(a.filter((value, k) => Math.abs(value - (b[k] ?? NaN)) <= 4).length).toBeGreaterThan(0.95 * a.length);
+    expect(new Set(a).size).toBeGreaterThan(8);
+    expect(await page.locator(".haze.shown").count()).toBe(1);
+  }
   await page.locator("#make-picture").click();
   await page.locator("#picture-print").click();
   await page.waitForFunction(() => document.title === "printed");

@@ -8,8 +8,9 @@ import { screenFromLocal, type Camera } from "../../src/geo/camera";
 import { computeDaylight } from "../../src/geo/daylight";
 import { towardsLight } from "../../src/geo/light";
 import type { DecodedPng } from "../../src/core/png";
+import { renderLater } from "../fixture/later";
 import { renderTown, type Fixture } from "../fixture/rendering";
-import { BOX, framesOf, ORIGIN, PLACE, THINGS, TOWN, trace, type Thing } from "../fixture/town";
+import { BOX, framesOf, ORIGIN, PLACE, THINGS, trace } from "../fixture/town";
 import { TestBed } from "./bed";
 import { OUT } from "./browser";
 import { decoded, Hand, MAX_ACTIONS } from "./hand";
@@ -18,10 +19,8 @@ import { decoded, Hand, MAX_ACTIONS } from "./hand";
 const [WIDTH, HEIGHT, DENSITY, PIXEL_M] = [390, 844, 3, 0.38];
 const PHONE = { viewport: { width: WIDTH, height: HEIGHT }, deviceScaleFactor: DENSITY, isMobile: true, hasTouch: true, userAgent: devices["iPhone 14"].userAgent, timezoneId: "Europe/Berlin", locale: "en-GB" };
 const YEARS = new Map([[17, 1891], [1025, 1956], [2_000_000_001, 2012], [3_900_000_007, 1723]]);
-const SCHOOL: Thing = { id: 99, name: "New school", box: [[-20, -60, 0], [0, 20, 24]], wall: [230, 226, 216], roof: [88, 130, 96] };
 
-const later = renderTown(256, PIXEL_M, { ...TOWN, name: "later", things: [...THINGS.filter(({ name }) => name !== "Tower"), SCHOOL] });
-const bed = new TestBed({ town: withYears(renderTown(256, PIXEL_M)), later: { ...later, json: { ...later.json, title: "Ten years later" } } });
+const bed = new TestBed({ town: withYears(renderTown(256, PIXEL_M)), later: renderLater(256, PIXEL_M) });
 const views = framesOf(BOX, 256, PIXEL_M, [0, 90, 180, 270].map((a) => [a, 45] as const)).frames;
 
 /** The same rendering, with a year for each object. */
@@ -181,6 +180,32 @@ test("compare two epochs", async () => {
   expect(await other.locator("#epochs input").getAttribute("aria-valuetext")).toBe("Ten years later");
   await other.context().close();
   await end(opened, "epochs");
+});
+
+test("compare four directions", async () => {
+  const opened = await open();
+  const { page, hand } = opened;
+  const { zoom } = cameraOf(page);
+  const windows = (): Promise<number> => page.locator(".map3d").count();
+  await hand.tap("#compare");
+  await expect.poll(() => page.locator(".map3d-facing").allTextContents(), { timeout: 20_000 }).toEqual(["Facing north", "Facing east", "Facing south", "Facing west"]);
+  await page.waitForTimeout(2500);
+  await page.screenshot({ path: `${OUT}/task-four.png` });
+  expect(await windows()).toBe(4);
+  // The four quarters differ, and nothing covers their captions.
+  for (const caption of await page.locator(".map3d-facing").all()) {
+    const { x, y, width, height } = (await caption.boundingBox()) as { x: number; y: number; width: number; height: number };
+    expect(await page.evaluate(([cx, cy]) => document.elementsFromPoint(cx, cy).some((node) => node.matches(".card, .end-compare")), [x + width / 2, y + height / 2] as const)).toBe(false);
+  }
+  // A tap in one of the maps selects; the others highlight the same object.
+  await hand.tap([WIDTH * 0.75, HEIGHT * 0.27]);
+  await page.waitForSelector("#info:not([hidden])");
+  await page.screenshot({ path: `${OUT}/task-four-selected.png` });
+  await page.locator("#info .close").tap();
+  await hand.tap("#end-compare");
+  expect([await windows(), await page.locator(".map3d-facing").count()]).toEqual([1, 0]);
+  await expect.poll(() => cameraOf(page).zoom, { timeout: 20_000 }).toBeCloseTo(zoom, 2);
+  await end(opened, "four-closed");
 });
 
 test("a missing epoch shows a message, and the page works without it", async () => {

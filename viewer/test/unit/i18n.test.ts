@@ -3,6 +3,7 @@ import { resolve } from "node:path";
 import { expect, test } from "vitest";
 import { chooseLanguage, MESSAGE_KEYS } from "../../page/i18n";
 import { getMapMessages } from "../../src/core/i18n";
+import { describeDirection } from "../../src/compare/i18n";
 import { computeWind } from "../../src/ui/controls";
 
 test.each([
@@ -28,6 +29,11 @@ test.each(["en", "de", "fr", "de-AT", "it", ""])("%s: every control has a name, 
   expect(new Set(winds).size).toBe(8);
   for (const wind of winds) expect(facing(wind)).toContain(wind);
   expect(scale("20 m")).toContain("20 m");
+});
+
+test.each(["en", "de", "fr"])("%s: the captions of synchronized maps say what the compass says", (language) => {
+  const { facing, winds } = getMapMessages(language);
+  for (const deg of [0, 44, 45, 90, 200, 270, 350, -90, 720]) expect(facing(winds[computeWind(deg)] ?? "").startsWith(describeDirection(deg, language))).toBe(true);
 });
 
 test("winds count counter-clockwise", () => {
