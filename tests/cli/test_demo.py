@@ -41,6 +41,10 @@ def test_demo_without_serve_ends_with_a_complete_rendering(run: Run, tmp_path: P
     assert status == 0, err
     assert "== rendering the tiles: map3d render demo" in out
     assert "demo is complete" in out
+    catalogue = Workspace(tmp_path / "demo" / "workspace").open_catalogue()
+    views = [frame.id for frame in catalogue.rendering(NAME).frames]
+    catalogue.close()
+    assert views == ["0-45", "45-45", "90-45", "135-45", "180-45", "225-45", "270-45", "315-45", "0-90"]
     status, out, err = run("demo", "--folder", str(tmp_path / "demo"), "--no-serve")
     assert (status, "rendered 0 blocks" in out) == (0, True), err
 

@@ -14,7 +14,9 @@ from map3d.types import DEFAULT_DATA, LAYERS_BY_DATA, DataEncoding
 
 TOWN: Final = ("--buildings", "120", "--seed", "7")
 RES_M: Final = "0.15"
-OPTIONS: Final = ("--directions", "4", "--res", RES_M, "--date", "2026-06-21")
+VIEWS: Final = (*(f"{look_at}/45" for look_at in range(0, 360, 45)), "0/90")
+"""Eight directions, and straight down."""
+OPTIONS: Final = ("--date", "2026-06-21", *(f"--view={view}" for view in VIEWS))
 LIGHT: Final = ("sun16", "ao")
 """Layers besides the usual ones: the shadows of a summer's day, and ambient occlusion."""
 TITLE: Final = ("--title", "A generated town")
@@ -57,7 +59,7 @@ def remaining_steps(workspace: Workspace, files: Path, data: DataEncoding = DEFA
         yield "importing the town's files", ["add-files", SCENE, str(files), *where]
     if NAME not in renderings:
         layers = ["--layers", ",".join((*LAYERS_BY_DATA[data], *LIGHT))]
-        yield "building the scene and creating a rendering", ["create-rendering", SCENE, NAME, *OPTIONS, *layers, *TITLE, *where]
+        yield "building the scene and creating a rendering", ["create-rendering", SCENE, NAME, "--res", RES_M, *OPTIONS, *layers, *TITLE, *where]
     yield "rendering the tiles", ["render", NAME, *where]
 
 
