@@ -17,7 +17,7 @@ const TILES_BYTES = 2 ** 31;
 const LIMIT_MS = 240_000;
 
 const manifest = await (await fetch(`${page}rendering.json`.replace("/view/", "/tiles/"))).json();
-const { DEFAULT_LIGHT, daylightAt } = await compiled('export { daylightAt } from "./geo/daylight"; export { DEFAULT_LIGHT } from "./geo/light";');
+const { DEFAULT_LIGHT, computeDaylight } = await compiled('export { computeDaylight } from "./geo/daylight"; export { DEFAULT_LIGHT } from "./geo/light";');
 const browser = await launch(playwright);
 
 async function compiled(contents) {
@@ -73,7 +73,7 @@ async function theirs(view, path, origin) {
   const [look, pitch] = view.view.split("-").map(Number);
   const [x, y, z] = view.at;
   const start = { x, y, z, mpp: manifest.size_m / (manifest.tile_px * 2 ** view.zoom), look, pitch };
-  const light = { ...DEFAULT_LIGHT, ...daylightAt(new Date(view.time ?? DAY), manifest.geographic) };
+  const light = { ...DEFAULT_LIGHT, ...computeDaylight(new Date(view.time ?? DAY), manifest.geographic) };
   const asked = { base: "/3dtiles/town.json", start: JSON.stringify(start), light: JSON.stringify(light), paper: PAPER, resolution: "device", onrequest: "1", cache: TILES_BYTES };
   await tab.goto(`${origin}/pages/cesium.html?${new URLSearchParams(asked)}`);
   await tab.evaluate(() => globalThis.bench.complete);

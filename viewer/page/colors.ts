@@ -3,7 +3,7 @@ import type { theme } from "./map3d-theme.mjs";
 import type { Permalink } from "./permalink";
 import { byId } from "./dom";
 import { toast } from "./toast";
-import { message } from "./i18n";
+import { introduce, message } from "./i18n";
 
 /** Text attributes with more distinct values are not offered. */
 const MAX_VALUES = 60;
@@ -63,7 +63,7 @@ export class Colors {
       this.#theme?.remove();
       this.#theme = new entry.theme(layer, info, { legend: byId("legend"), title: info.name }).addTo(this.#view);
     } catch (reason) {
-      toast(`${message("colorsFailed")}: ${String(reason)}`);
+      toast(introduce("colorsFailed", reason));
     }
   }
 }

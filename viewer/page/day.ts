@@ -1,6 +1,6 @@
 /** Hours of a day, in clock time. */
 export interface Day {
-  /** When the sun is 6° below the horizon: before dawn and after dusk there is nothing to see. 0 and 24 where it never gets as dark, or never brighter. */
+  /** When the sun is 6° below the horizon: between dusk and dawn the light hardly changes. 0 and 24 where it never gets as dark, or never brighter. */
   readonly dawn: number;
   readonly dusk: number;
   /** null when the sun does not rise, or does not set. */

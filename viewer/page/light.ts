@@ -2,7 +2,7 @@ import { chooseUtcOffset, computeDaylight, type imageLayer, type Light, type map
 import { findFirstSun } from "../src/geo/firstSun";
 import { findDay } from "./day";
 import { byId, inputById } from "./dom";
-import { message } from "./i18n";
+import { introduce } from "./i18n";
 import { bindPlay } from "./playSun";
 
 /** Hour of the first picture: long light, and one side of most buildings in the sun. */
@@ -34,15 +34,14 @@ function bindDay(view: map, rendering: Rendering, requested: Date | undefined): 
   const [time, day] = [inputById("time"), inputById("day")];
   const zone = (): number => chooseUtcOffset(rendering.json.geographic?.lon_lat[0] ?? 0, -new Date(`${day.value}T12:00`).getTimezoneOffset() / 60);
   const moment = (hour: number): Date => new Date(Date.parse(`${day.value}T00:00Z`) + (hour - zone()) * 3_600_000);
-  const show = (): void => {
+  const show = (hour = time.valueAsNumber): void => {
     if (day.value === "") return;
-    showClock(time.valueAsNumber);
-    view.setTime(moment(time.valueAsNumber));
+    showClock(hour);
+    view.setTime(moment(hour));
   };
   const setDay = (hour: number): void => {
     if (day.value !== "") showDay(time, rendering, moment);
     time.valueAsNumber = hour;
-    show();
   };
   byId("days").hidden = day.hidden = false;
   const first = requested ?? firstMoment(rendering);
@@ -58,8 +57,14 @@ function bindDay(view: map, rendering: Rendering, requested: Date | undefined): 
     if (dragged && isTrusted) time.valueAsNumber = Math.round(4 * time.valueAsNumber) / 4;
     show();
   });
-  day.addEventListener("input", () => { setDay(time.valueAsNumber); });
-  setDay(local.getUTCHours() + local.getUTCMinutes() / 60);
+  day.addEventListener("input", () => {
+    setDay(time.valueAsNumber);
+    show();
+  });
+  // The time of a link can be at night, beyond the ends of the slider: the map shows it until the slider moves.
+  const hour = local.getUTCHours() + local.getUTCMinutes() / 60;
+  setDay(hour);
+  show(hour);
 }
 
 /** Makes the slider last from dawn to dusk, and marks sunrise and sunset. */
@@ -67,11 +72,11 @@ function showDay(time: HTMLInputElement, { json: { geographic } }: Rendering, mo
   if (!geographic) return;
   const { dawn, dusk, ...sun } = findDay((hour) => computeDaylight(moment(hour), geographic).altitude_deg);
   [time.min, time.max, time.step] = [dawn, dusk, 1 / 12].map(String) as [string, string, string];
-  byId("daylight").classList.toggle("located", sun.sunrise !== null && sun.sunset !== null);
+  byId("daylight").classList.toggle("located", sun.sunrise !== null && sun.sunset !== null && sun.sunrise < sun.sunset);
   for (const name of ["sunrise", "sunset"] as const) {
     const hour = sun[name];
     byId(name).hidden = hour === null;
-    byId(name).title = `${message(name)}: ${clockOf(hour ?? 0)}`;
+    byId(name).title = introduce(name, clockOf(hour ?? 0));
     byId("daylight").style.setProperty(name === "sunrise" ? "--rise" : "--set", String(((hour ?? 0) - dawn) / (dusk - dawn)));
   }
 }

@@ -2,7 +2,7 @@ import type { map } from "./map3d.mjs";
 import type { AreaProgress, DownloadOptions, StoredArea } from "./map3d-offline.mjs";
 import { byId, withText } from "./dom";
 import { toast } from "./toast";
-import { language, message } from "./i18n";
+import { language, introduce, message } from "./i18n";
 
 type Offline = typeof import("./map3d-offline.mjs");
 
@@ -18,7 +18,7 @@ export function bindOffline(view: map, name: string): void {
     import("./map3d-offline.mjs").then((offline) => {
       opened ??= new OfflineDialog(view, name, offline, dialog, details);
       opened.open();
-    }, (reason: unknown) => { toast(`${message("toolFailed")}: ${String(reason)}`); });
+    }, (reason: unknown) => { toast(introduce("toolFailed", reason)); });
   });
   let opened: OfflineDialog | undefined;
 }
@@ -68,7 +68,7 @@ class OfflineDialog {
     } catch (reason) {
       if (request !== this.#request) return;
       note.textContent = "";
-      this.#showError(`${message("saveFailed")}: ${reason instanceof Error ? reason.message : String(reason)}`);
+      this.#showError(introduce("saveFailed", reason));
     }
   }
 
@@ -82,7 +82,7 @@ class OfflineDialog {
       toast(message("saved"));
       this.#dialog.close();
     } catch (reason) {
-      if (!signal.aborted) this.#showError(`${message("saveFailed")}: ${reason instanceof Error ? reason.message : String(reason)}`);
+      if (!signal.aborted) this.#showError(introduce("saveFailed", reason));
     }
     this.#setBusy(false);
     await this.#list();
@@ -99,8 +99,8 @@ class OfflineDialog {
     const title = withText("span", area.title);
     title.append(withText("small", `${date} · ${area.complete ? size(area.bytes) : message("partial")}`));
     row.append(title);
-    if (!area.complete) row.append(action(message("resume"), `${message("resume")}: ${date}`, () => void this.#save(area)));
-    row.append(action(message("delete"), `${message("delete")}: ${date}`, () => void this.#remove(area.name)));
+    if (!area.complete) row.append(action(message("resume"), introduce("resume", date), () => void this.#save(area)));
+    row.append(action(message("delete"), introduce("delete", date), () => void this.#remove(area.name)));
     return row;
   }
 

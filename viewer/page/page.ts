@@ -118,6 +118,8 @@ function bindPage(view: map, layer: imageLayer, info: InfoPanel, selection: Sele
   const json = layer.rendering?.json;
   if (!json) return;
   document.title = byId("title").textContent = (json.title || json.name).slice(0, MAX_TITLE);
+  view.container.setAttribute("role", "group");
+  view.container.setAttribute("aria-label", document.title);
   byId("incomplete").hidden = json.complete;
   byId("data-saver").hidden = !view.options.dataSaver;
   byId("settings").hidden = byId("tools").hidden = false;

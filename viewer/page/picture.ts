@@ -1,7 +1,7 @@
 import type { map, ManifestJson } from "./map3d.mjs";
 import type { PictureLegend, PictureOptions } from "./map3d-print.mjs";
 import { byId, withText } from "./dom";
-import { language, message } from "./i18n";
+import { language, introduce, message } from "./i18n";
 
 type PaperSize = readonly [long: number, short: number];
 
@@ -45,7 +45,7 @@ export function bindPicture(context: PictureContext): void {
     showError("");
     setBusy(true);
     task(size, signal).then(() => { dialog.close(); }, (reason: unknown) => {
-      if (!signal.aborted) showError(`${message("imageFailed")}: ${reason instanceof Error ? reason.message : String(reason)}`);
+      if (!signal.aborted) showError(introduce("imageFailed", reason));
     }).finally(() => { setBusy(false); });
   };
   button.addEventListener("click", () => {
@@ -148,5 +148,5 @@ function legendOf(legend: PictureLegend | undefined): HTMLElement[] {
 
 function footOf({ view, json }: PictureContext): HTMLElement {
   const crs = [json.crs.name, json.crs.vertical].filter(Boolean).join(", ");
-  return withText("footer", [...view.attributions, crs && `${message("crs")}: ${crs}`].filter(Boolean).join(" · "));
+  return withText("footer", [...view.attributions, crs && introduce("crs", crs)].filter(Boolean).join(" · "));
 }

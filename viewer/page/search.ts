@@ -2,7 +2,7 @@ import type { imageLayer, map, SearchEntry, Vec3 } from "./map3d.mjs";
 import { nameOfResult } from "./card";
 import { byId, inputById, withText } from "./dom";
 import { toast } from "./toast";
-import { message } from "./i18n";
+import { introduce, message } from "./i18n";
 
 const ZOOM_BELOW_DEEPEST = 1;
 
@@ -64,7 +64,7 @@ class SearchBox {
       this.#at = 0;
       this.#render();
     } catch (reason) {
-      toast(`${message("searchFailed")}: ${reason instanceof Error ? reason.message : String(reason)}`);
+      toast(introduce("searchFailed", reason));
     }
   }
 

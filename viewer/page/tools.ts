@@ -2,7 +2,7 @@ import type { map } from "./map3d.mjs";
 import type { measure } from "./map3d-measure.mjs";
 import { byId, withText } from "./dom";
 import { toast } from "./toast";
-import { message } from "./i18n";
+import { introduce, message } from "./i18n";
 
 const KINDS = ["line", "height", "area", "profile"] as const;
 type Kind = (typeof KINDS)[number];
@@ -53,7 +53,7 @@ export class Tools {
       const showResults = (): void => { this.#showResults(); };
       this.#tool = new entry.measure({ kind }).on("change", showResults).on("face", showResults).on("profile", showResults).addTo(this.#view);
     } catch (reason) {
-      toast(`${message("toolFailed")}: ${String(reason)}`);
+      toast(introduce("toolFailed", reason));
     }
   }
 

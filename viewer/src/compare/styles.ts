@@ -1,6 +1,6 @@
 /** Styles of the swipe divider, the epochs slider and the names of directions; colours come from the map. */
 export const STYLES = `
-.map3d-facing { position: absolute; top: 12px; left: 0; right: 0; width: fit-content; max-width: calc(100% - 24px); margin: auto; box-sizing: border-box; padding: 3px 10px; border-radius: 999px; font-size: 13px; font-weight: 550; background: var(--map3d-panel); box-shadow: var(--map3d-shadow); text-align: center; }
+.map3d-facing { position: absolute; top: 12px; left: 0; right: 0; width: fit-content; max-width: calc(100% - 8px); margin: auto; box-sizing: border-box; padding: 3px 10px; border-radius: 999px; font-size: 13px; font-weight: 550; background: var(--map3d-panel); box-shadow: var(--map3d-shadow); text-align: center; }
 .map3d-swipe { position: absolute; top: 0; bottom: 0; width: 44px; margin-left: -22px; padding: 0; border: 0; background: none; cursor: ew-resize; pointer-events: auto; touch-action: none; outline: none; }
 .map3d-swipe::before { content: ""; position: absolute; left: 20.5px; top: 0; bottom: 0; width: 3px; background: #fff; box-shadow: 0 0 0 1px rgb(0 0 0 / 0.22), 0 0 10px rgb(0 0 0 / 0.25); }
 .map3d-swipe::after { content: ""; position: absolute; left: 0; top: calc(50% - 22px); width: 44px; height: 44px; border-radius: 50%; background: var(--map3d-panel); box-shadow: var(--map3d-shadow); }

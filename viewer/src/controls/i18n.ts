@@ -45,7 +45,7 @@ const FR: ControlMessages = {
   outside: "Votre position est en dehors de cette carte.",
   notGeoreferenced: "Votre position ne peut pas être affichée, car cette carte n’a pas de coordonnées géographiques.",
   overview: "Carte d’aperçu",
-  move: "Carte d’aperçu : utilisez les touches fléchées pour déplacer la vue",
+  move: "Carte d’aperçu\u00a0: utilisez les touches fléchées pour déplacer la vue",
 };
 
 export const getControlMessages = (language: string): ControlMessages => selectTranslation({ en: EN, de: DE, fr: FR }, language);

@@ -33,9 +33,9 @@ const FR: FilesMessages = {
   open: "Ouvrir un dossier de carte",
   drop: "Déposez un dossier de carte ici pour l’ouvrir",
   failed: "Impossible d’ouvrir la carte",
-  none: () => "Ce n’est pas un dossier de carte : le fichier rendering.json manque. Choisissez le dossier complet d’une carte publiée.",
-  several: (paths) => `Ce dossier contient plusieurs cartes : ${paths}. Choisissez le dossier d’une seule carte.`,
-  missing: (paths) => `Des fichiers de cette carte manquent : ${paths}. Choisissez le dossier complet.`,
+  none: () => "Ce n’est pas un dossier de carte\u00a0: le fichier rendering.json manque. Choisissez le dossier complet d’une carte publiée.",
+  several: (paths) => `Ce dossier contient plusieurs cartes\u00a0: ${paths}. Choisissez le dossier d’une seule carte.`,
+  missing: (paths) => `Des fichiers de cette carte manquent\u00a0: ${paths}. Choisissez le dossier complet.`,
   changed: (paths) => `Le fichier ${paths} a été modifié ou déplacé. Ouvrez de nouveau le dossier.`,
 };
 

@@ -76,7 +76,7 @@ test("the sun moves through the day from dawn to dusk; sunrise and sunset are ma
   expect(await page.locator("#play").getAttribute("aria-label")).toBe("Pause");
   await expect.poll(clock, { timeout: 20_000 }).not.toBe(before);
   await page.locator("#play").click();
-  expect(await page.locator("#play").getAttribute("aria-label")).toBe("Play the day");
+  expect(await page.locator("#play").getAttribute("aria-label")).toBe("Play through the day");
   const stopped = await clock();
   await page.waitForTimeout(500);
   expect(await clock()).toBe(stopped);
@@ -89,6 +89,22 @@ test("the sun moves through the day from dawn to dusk; sunrise and sunset are ma
   expect(middle.reduce((sum, value) => sum + value, 0) / middle.length).toBeGreaterThan(30);
   await page.locator("#play").click();
   await expect.poll(async () => Number(await page.locator("#time").inputValue()), { timeout: 20_000 }).toBeLessThan(12);
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
+
+test("a link's time at night is shown as it is, until the slider moves, and is not black", async () => {
+  const { page, problems } = await open({ ...DESK, timezoneId: "Europe/Berlin" }, `rendering=${bed.url("town")}#0-45/691000.0/5336000.0/500.0/1.60/t=2026-06-21T22:47Z`);
+  const clock = (): Promise<string | null> => page.locator("#clock").textContent();
+  expect(await clock()).toBe("0:47");
+  expect(await page.locator("#time").getAttribute("aria-valuetext")).toBe("0:47");
+  await page.waitForTimeout(1000);
+  const { width, height, channels, data } = await decodePng(Uint8Array.from(await page.locator("#mapcanvas").screenshot({ path: `${OUT}/page-night.png` })));
+  const middle = [...data.subarray(channels * (width * Math.floor(height / 2) + 450), channels * (width * Math.floor(height / 2) + 750))];
+  expect(middle.reduce((sum, value) => sum + value, 0) / middle.length).toBeGreaterThan(30);
+  await page.locator("#time").focus();
+  await page.keyboard.press("ArrowRight");
+  expect(Number((await clock())?.split(":")[0])).toBeGreaterThan(3);
   expect(problems).toEqual([]);
   await page.context().close();
 });
@@ -174,6 +190,7 @@ test.each(["en-GB", "de-DE", "fr-FR"])("at 320 pixels in %s, nothing overlaps an
     expect(wrong, state).toEqual([]);
   };
   await check("start");
+  expect(await page.evaluate(() => [...document.querySelectorAll(".card")].map((card) => card.getBoundingClientRect()).reduce((sum, { width, height }) => sum + width * height, 0) / (innerWidth * innerHeight))).toBeLessThan(0.25);
   await page.locator("#more").tap();
   await page.selectOption("#color-by", { index: 2 });
   await page.waitForSelector("#legend button");

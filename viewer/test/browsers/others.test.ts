@@ -3,6 +3,7 @@ import { afterAll, beforeAll, describe, expect, test } from "vitest";
 import { OUT } from "../browser/browser";
 import { serve } from "../browser/bed";
 import { begin, type Global } from "../browser/page";
+import { renderLater } from "../fixture/later";
 import { renderNoise, renderTown } from "../fixture/rendering";
 import { ORIGIN, type Place } from "../fixture/town";
 import { OTHER_BROWSERS } from "./browsers";
@@ -14,7 +15,7 @@ import { difference, takeScreenshots } from "./scenes";
 
 const PLAN: Place = { name: "plan", origin: [ORIGIN[0] + 13.7, ORIGIN[1] - 8.3, ORIGIN[2] + 1.5], box: [[-130, -30, -3], [20, 40, 30]], things: [{ id: 77, name: "Planned house", box: [[-130, -20, -3], [6, 30, 26]], wall: [240, 120, 30], roof: [250, 60, 60] }] };
 const [town, noise] = [renderTown(), renderNoise(11)];
-const server = serve({ town, noise, plan: renderTown(128, 0.29, PLAN) });
+const server = serve({ town, noise, later: renderLater(), plan: renderTown(128, 0.29, PLAN) });
 watchedPage(server);
 const url = (name: string): string => `${server.origin}/tiles/${name}`;
 
@@ -22,6 +23,13 @@ const DRAWERS = ["webgl", "canvas"] as const;
 const BARE = { zoom: 3, controls: false, attribution: false, pixelRatio: 1 };
 const inTown = (x: number, y: number, z: number): [number, number, number] => [ORIGIN[0] + x, ORIGIN[1] + y, ORIGIN[2] + z];
 const ROOF = inTown(-45, -4, 34);
+
+/** Variables of the examples' pages. */
+declare const maps: readonly Global["map"][];
+declare const map: Global["map"];
+declare const before: Global["layer"];
+declare const after: Global["layer"];
+declare const right: Global["map"];
 
 /** A page with a map at rest. */
 async function started(driver: Driver, rendering: string, options: object): Promise<void> {
@@ -121,6 +129,27 @@ for (const { name, perturbs, start, missing } of OTHER_BROWSERS) {
       await its().key("q");
       await its().until(() => (globalThis as Global).map.direction === "90-45", null);
       expect(await complaints()).toEqual([]);
+    });
+
+    test("the examples show four directions, and then and now", async () => {
+      const keep = async (example: string): Promise<Screenshot> => {
+        const shot = await its().shot();
+        writeFileSync(`${OUT}/${name.toLowerCase().replaceAll(" ", "-")}-${example}.png`, shot.png);
+        return shot;
+      };
+      const colours = ({ rgb }: Screenshot): number => new Set(Array.from({ length: rgb.length / 3 }, (_, k) => rgb.subarray(3 * k, 3 * k + 3).join())).size;
+      await its().open(`${server.origin}/examples/directions.html`);
+      await its().until(() => maps.every((each) => each.loaded()), null);
+      expect(await its().evaluate(() => [...document.querySelectorAll(".map3d-facing")].map((caption) => caption.textContent.replace(/.* /, "")), null)).toEqual(["north", "east", "south", "west"]);
+      expect(await its().evaluate(() => maps.map((each) => each.direction), null)).toEqual(["0-45", "270-45", "180-45", "90-45"]);
+      expect(colours(await keep("directions"))).toBeGreaterThan(24);
+      await its().open(`${server.origin}/examples/times.html`);
+      await its().until(() => map.loaded() && map.layers.length === 2, null);
+      expect(colours(await keep("times"))).toBeGreaterThan(24);
+      await its().evaluate(() => { document.getElementById("switch")?.click(); }, null);
+      await its().until(() => map.loaded() && map.layers.length === 1 && right.loaded(), null);
+      expect(await its().evaluate(() => [before, after].map(({ rendering }) => rendering?.json.name), null)).toEqual(["town", "later"]);
+      await keep("side-by-side");
     });
 
     test("a marker is at its position, and its popup opens; buttons are inside the map", async () => {

@@ -18,3 +18,15 @@ test("where the sun does not set, or does not rise, the day has all hours and no
   expect(dayOf(75, "2026-06-21", 1)).toEqual({ dawn: 0, dusk: 24, sunrise: null, sunset: null });
   expect(dayOf(80, "2026-12-21", 1)).toEqual({ dawn: 0, dusk: 24, sunrise: null, sunset: null });
 });
+
+test("in polar twilight the day lasts as long as it is light, without a sunrise; in white nights all hours are light", () => {
+  const twilight = dayOf(70, "2026-12-21", 1);
+  expect([twilight.sunrise, twilight.sunset]).toEqual([null, null]);
+  expect(twilight.dawn).toBeGreaterThan(7);
+  expect(twilight.dusk).toBeLessThan(17);
+  expect(twilight.dusk - twilight.dawn).toBeGreaterThan(2);
+  const white = dayOf(63, "2026-06-21", 2);
+  expect([white.dawn, white.dusk]).toEqual([0, 24]);
+  expect(white.sunrise).toBeGreaterThan(2);
+  expect(white.sunset).not.toBeNull();
+});

@@ -2,8 +2,8 @@
 
 const TEXTS = {
   en: { title: "Share view", link: "Link", embed: "Embed code", picture: "Image", qr: "QR code", copy: "Copy", copied: "Copied", open: "Open", save: "Save", close: "Close", send: "Send…" },
-  de: { title: "Ansicht teilen", link: "Link", embed: "Code zum Einbetten", picture: "Bild", qr: "QR-Code", copy: "Kopieren", copied: "Kopiert", open: "Öffnen", save: "Speichern", close: "Schließen", send: "Senden…" },
-  fr: { title: "Partager la vue", link: "Lien", embed: "Code à intégrer", picture: "Image", qr: "Code QR", copy: "Copier", copied: "Copié", open: "Ouvrir", save: "Enregistrer", close: "Fermer", send: "Envoyer…" },
+  de: { title: "Ansicht teilen", link: "Link", embed: "Code zum Einbetten", picture: "Bild", qr: "QR-Code", copy: "Kopieren", copied: "Kopiert", open: "Öffnen", save: "Speichern", close: "Schließen", send: "Senden\u00a0…" },
+  fr: { title: "Partager la vue", link: "Lien", embed: "Code d’intégration", picture: "Image", qr: "Code QR", copy: "Copier", copied: "Copié", open: "Ouvrir", save: "Enregistrer", close: "Fermer", send: "Envoyer…" },
 };
 let texts = TEXTS.en;
 const COPIED_MS = 2000;
