@@ -53,6 +53,17 @@ async function quiet(tab, act) {
   tab.off("request", begun).off("requestfinished", ended).off("requestfailed", ended).off("response", answered);
 }
 
+/** Waits until the page shows everything, shadows from depth included: nothing loads and two screenshots are equal. */
+async function still(tab) {
+  await tab.waitForFunction(() => document.getElementById("loading").hidden);
+  for (let before = await tab.screenshot(), equal = 0; equal < 2;) {
+    await new Promise((done) => setTimeout(done, 700));
+    const now = await tab.screenshot();
+    equal = now.equals(before) ? equal + 1 : 0;
+    before = now;
+  }
+}
+
 async function ours(view, path) {
   const { context, tab, sent } = await open(view);
   await context.addInitScript(anyWebGL);
@@ -60,6 +71,7 @@ async function ours(view, path) {
     await tab.goto(`${page}#${[view.view, ...view.at.map((part, k) => part + manifest.origin[k]), view.zoom, `t=${view.time ?? DAY}`].join("/")}`);
     return 8;
   });
+  await still(tab);
   const bytes = await sent();
   if (view.click) await quiet(tab, async () => { await tab.touchscreen.tap(view.click[0], view.click[1]); return 0; });
   if (view.bare) await tab.addStyleTag({ content: ".card, .map3d-controls { display: none }" });
