@@ -64,7 +64,7 @@ function bindDay(view: map, rendering: Rendering, requested: Date | undefined): 
   // The time of a link can be at night, beyond the ends of the slider: the map shows it until the slider moves.
   const hour = local.getUTCHours() + local.getUTCMinutes() / 60;
   setDay(hour);
-  show(hour);
+  show(requested && hour);
 }
 
 /** Makes the slider last from dawn to dusk, and marks sunrise and sunset. */
