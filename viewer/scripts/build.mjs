@@ -13,9 +13,20 @@ const shared = { bundle: true, minify: true, target: "es2022", legalComments: "n
 const CSS_TARGET = ["chrome111", "firefox121", "safari16.4"];
 const banner = { js: "/*! map3d, Apache-2.0 */" };
 
+/** Names of lower-case letters and digits only: texts with fewer different characters compress better. */
+const lowerCaseNames = {
+  get(n) {
+    const letters = "ietanorslcdupmhfgbvywkxqjz";
+    const rest = `${letters}0123456789`;
+    let name = letters[n % letters.length];
+    for (let k = Math.floor(n / letters.length); k > 0; k = Math.floor((k - 1) / rest.length)) name += rest[(k - 1) % rest.length];
+    return name;
+  },
+};
+
 /** Shortens a bundle of esbuild by another 2 %. The result is ASCII: a page or server that declares no encoding reads the same texts. */
 async function shorten(code, module) {
-  const { code: shorter } = await minify(code, { ecma: 2022, module, compress: { passes: 3, keep_fargs: false, unsafe: true, unsafe_arrows: true, pure_getters: true, inline: 1 }, format: { ascii_only: true } });
+  const { code: shorter } = await minify(code, { ecma: 2022, module, compress: { passes: 3, keep_fargs: false, unsafe: true, unsafe_arrows: true, pure_getters: true, inline: 1 }, mangle: { nth_identifier: lowerCaseNames }, format: { ascii_only: true } });
   return shorter;
 }
 
@@ -117,6 +128,15 @@ async function write(options) {
   writeFileSync(options.outfile, `${banner.js}\n${(await shorten(file.text, options.format === "esm")).replace(banner.js, "").trim()}\n`);
 }
 
+/** Writes a script that assigns the exports of a module to the global `map3d`, without the code that esbuild adds for live bindings. @param file the module, which imports nothing */
+function writeScript(file, name) {
+  const module = readFileSync(join(dist, file), "utf8").replace(banner.js, "").trim();
+  const [end, list] = /export\{([^}]*)\};?\s*$/.exec(module) ?? [];
+  if (end === undefined || module.startsWith("import")) throw new Error(`${file}: expected a module without imports that ends with its exports`);
+  const exports = list.split(",").map((entry) => entry.split(" as ").reverse().join(":"));
+  writeFileSync(join(dist, name), `${banner.js}\nvar map3d=(()=>{"use strict";${module.slice(0, -end.length)}return{${exports.join(",")}}})();\n`);
+}
+
 /** Builds one file with the core and all entries. */
 async function bundleFull(name, options) {
   const contents = ["src/map3d.ts", ...Object.values(ENTRIES)].map((file) => `export * from "./${file}";\n`).join("");
@@ -127,14 +147,14 @@ async function build() {
   rmSync(dist, { recursive: true, force: true });
   mkdirSync(dist, { recursive: true });
   await bundle("src/map3d.ts", "map3d.mjs", { format: "esm" });
-  await bundle("src/map3d.ts", "map3d.js", { format: "iife", globalName: "map3d" });
+  writeScript("map3d.mjs", "map3d.js");
   for (const [name, entry] of Object.entries(ENTRIES)) {
     await bundle(entry, `map3d-${name}.mjs`, { format: "esm", plugins: [coreAs("module"), ...plugins] });
     await bundle(entry, `map3d-${name}.js`, { format: "iife", plugins: [coreAs("global"), ...plugins], globalName: "entry", banner: { js: `${banner.js}\n(() => {` }, footer: { js: "Object.assign(map3d, entry);\n})();" } });
   }
   await bundle("src/offline/worker.ts", "map3d-worker.js", { format: "iife" });
   await bundleFull("map3d-full.mjs", { format: "esm" });
-  await bundleFull("map3d-full.js", { format: "iife", globalName: "map3d" });
+  writeScript("map3d-full.mjs", "map3d-full.js");
   await bundle("page/page-share.ts", "page-share.js", { format: "esm" });
   await bundle("page/page.ts", "page.js", { format: "esm", external: ["./map3d.mjs", "./page-share.js", ...Object.keys(ENTRIES).map((name) => `./map3d-${name}.mjs`)] });
   await esbuild.build({ ...shared, entryPoints: [join(root, "page/page.css")], outfile: join(dist, "page.css"), target: CSS_TARGET });
