@@ -299,10 +299,10 @@ export abstract class CameraController extends Evented<MapEvents> {
 
   /** @internal */
   getViewState(): ViewState | null {
-    const { pixelRatio, maxPixelRatio, finer, dataSaver } = this.options;
+    const { pixelRatio, maxPixelRatio, maxTileRatio, finer, dataSaver } = this.options;
     const dpr = pixelRatio ?? Math.min(this.size.dpr, maxPixelRatio);
     const coarser = dataSaver && dpr >= 1.5 ? 1 : 0;
-    return this.camera && this.reference ? { camera: this.camera, origin: this.reference.json.origin, dpr, finer: finer - coarser } : null;
+    return this.camera && this.reference ? { camera: this.camera, origin: this.reference.json.origin, dpr, finer: finer - coarser + Math.min(0, Math.log2(maxTileRatio / dpr)) } : null;
   }
 
   /** @internal Sets the camera to another map's, with its origin, without limits. */

@@ -30,7 +30,7 @@ export type TransitionScene = Omit<TransitionFrame, "camera" | "tilesChanged">;
 
 /** A context that is not restored by then is lost for good. */
 const RESTORE_MS = 5000;
-/** Default cache size: bytes per device pixel, on dense screens (whose tiles have fewer pixels, see `computeLevel`), and the minimum. */
+/** Default cache size: bytes per device pixel, on dense screens (whose tiles have fewer pixels, see `computeLevel`), and the minimum. Coarser tiles need less. */
 const [PIXEL_BYTES, DENSE_PIXEL_BYTES, MIN_BYTES] = [60, 20, 24e6];
 
 /** The result of a frame. */
@@ -112,7 +112,7 @@ export class FrameRenderer {
     const { layers, light, lightEstimator, moving } = input;
     this.#viewport.fitCanvas(viewState.dpr);
     const { width, height } = this.#viewport.canvas;
-    this.#cache.setLimit(this.#options.cacheBytes ?? Math.max(MIN_BYTES, (viewState.dpr >= DENSE_DPR ? DENSE_PIXEL_BYTES : PIXEL_BYTES) * width * height));
+    this.#cache.setLimit(this.#options.cacheBytes ?? Math.max(MIN_BYTES, (viewState.dpr >= DENSE_DPR ? DENSE_PIXEL_BYTES : PIXEL_BYTES) * width * height * 4 ** Math.min(0, viewState.finer)));
     this.#cache.startTick();
     const { gl } = this.#drawer;
     this.#showsCustomLayers &&= this.customLayers.size > 0 && gl !== null;

@@ -73,7 +73,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     checkOptions(options, OPTIONS);
     if (options.center) checkPosition(options.center, "center");
     if (options.maxBounds) checkBounds(options.maxBounds, "maxBounds");
-    for (const name of ["zoom", "minZoom", "maxZoom", "pixelRatio", "maxPixelRatio", "cacheBytes", "concurrency", "workers"] as const) checkNumber(options[name], name);
+    for (const name of ["zoom", "minZoom", "maxZoom", "pixelRatio", "maxPixelRatio", "maxTileRatio", "cacheBytes", "concurrency", "workers"] as const) checkNumber(options[name], name);
     const { dataSaver = DEFAULTS.dataSaver } = options;
     this.options = { ...DEFAULTS, ...options, dataSaver: dataSaver === "auto" ? savesData() : dataSaver };
     const withoutShadows = this.options.dataSaver ? { shadows: false, occlusion: false } : {};

@@ -36,7 +36,7 @@ export interface MapOptions {
   attribution?: boolean | Corner;
   /** Fetches the ids of everything in view, so that "mousemove" reports the object under the pointer. Default false. */
   hover?: boolean;
-  /** Size of the cache of decoded tiles. Tiles in view are always kept. Default: 60 bytes per device pixel of the map, 20 on dense screens, whose tiles have fewer pixels; at least 24 MB. */
+  /** Size of the cache of decoded tiles. Tiles in view are always kept. Default: 60 bytes per device pixel of the map, 20 on dense screens, whose tiles have fewer pixels, and less as `maxTileRatio` and `dataSaver` make tiles coarser; at least 24 MB. */
   cacheBytes?: number;
   /** Maximum number of concurrent tile requests. Default 12. */
   concurrency?: number;
@@ -44,6 +44,8 @@ export interface MapOptions {
   workers?: number;
   /** Upper limit of device pixels per CSS pixel. Default 3. */
   maxPixelRatio?: number;
+  /** Upper limit of tile pixels per CSS pixel: finer tiles cost bytes that few can see. Default 2, so that a tile pixel covers half a CSS pixel to a whole one on screens of any density from 2 on. */
+  maxTileRatio?: number;
   /** Device pixels per CSS pixel. Default: those of the screen, up to `maxPixelRatio`. */
   pixelRatio?: number;
   /** Saves data: tiles one level coarser on dense screens, no ids for hovering, no tiles of the neighbouring directions while the map is at rest, shadows and occlusion only on request. "auto": if the user has enabled it in the browser. Default "auto". */
@@ -71,6 +73,7 @@ export const DEFAULTS: Required<Omit<MapOptions, WithoutDefault>> = {
   concurrency: 12,
   workers: 2,
   maxPixelRatio: 3,
+  maxTileRatio: 2,
   drawer: "auto",
   preserveDrawingBuffer: false,
   dataSaver: "auto",

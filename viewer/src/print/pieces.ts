@@ -73,7 +73,7 @@ class OffscreenMap {
     const { light, drawer, options } = shown;
     this.map = new map(box, {
       light, ...(drawer && { drawer }), direction: shown.direction, concurrency: options.concurrency, ...(options.cacheBytes !== undefined && { cacheBytes: options.cacheBytes }), workers: options.workers,
-      dataSaver: false, pixelRatio: scale, finer: scale >= 1.5 ? 0.5 : 0, controls: false, attribution: false, preserveDrawingBuffer: true,
+      dataSaver: false, pixelRatio: scale, maxTileRatio: Infinity, finer: scale >= 1.5 ? 0.5 : 0, controls: false, attribution: false, preserveDrawingBuffer: true,
     });
     this.#failed = new Promise((_, reject) => {
       this.map.on("error", ({ error }) => {

@@ -54,7 +54,7 @@ async function errorsAt(page: Page, way: Way, dpr: number, zoom: number, middle:
   }, [zoom, middle as [number, number, number]] as const);
   expect(await page.evaluate(() => (globalThis as Global).map.zoom)).toBe(zoom);
   const [x, y] = await cornerOf(page);
-  const level = computeLevel(frame, frame.size / (TILE * 2 ** zoom) / dpr, dpr);
+  const level = computeLevel(frame, frame.size / (TILE * 2 ** zoom) / dpr, dpr, Math.min(0, Math.log2(2 / dpr)));
   return compareTo(levels[level] as (typeof levels)[0], { left: x * dpr, top: y * dpr, px: dpr * 2 ** (zoom - level) }, await seen(page, way), VIEWPORT.width * dpr);
 }
 
