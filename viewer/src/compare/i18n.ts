@@ -6,19 +6,19 @@ interface CompareMessages {
   readonly time: string;
   readonly facing: (wind: string) => string;
   /** Counter-clockwise from north, in steps of 45°. */
-  readonly winds: readonly string[];
+  readonly headings: readonly string[];
 }
 
 const MESSAGES = {
-  en: { divider: "Drag to compare", time: "Time", facing: (wind) => `Facing ${wind}`, winds: ["north", "north-west", "west", "south-west", "south", "south-east", "east", "north-east"] },
-  de: { divider: "Zum Vergleichen ziehen", time: "Zeitpunkt", facing: (wind) => `Blick nach ${wind}`, winds: ["Norden", "Nordwesten", "Westen", "Südwesten", "Süden", "Südosten", "Osten", "Nordosten"] },
-  fr: { divider: "Faites glisser pour comparer", time: "Époque", facing: (wind) => `Vue vers ${wind}`, winds: ["le nord", "le nord-ouest", "l’ouest", "le sud-ouest", "le sud", "le sud-est", "l’est", "le nord-est"] },
+  en: { divider: "Drag to compare", time: "Time", facing: (wind) => `Facing ${wind}`, headings: ["north", "north-west", "west", "south-west", "south", "south-east", "east", "north-east"] },
+  de: { divider: "Zum Vergleichen ziehen", time: "Zeitpunkt", facing: (wind) => `Blick nach ${wind}`, headings: ["Norden", "Nordwesten", "Westen", "Südwesten", "Süden", "Südosten", "Osten", "Nordosten"] },
+  fr: { divider: "Faites glisser pour comparer", time: "Époque", facing: (wind) => `Vue vers ${wind}`, headings: ["le nord", "le nord-ouest", "l’ouest", "le sud-ouest", "le sud", "le sud-est", "l’est", "le nord-est"] },
 } satisfies Record<string, CompareMessages>;
 
 export const getCompareMessages = (language: string): CompareMessages => selectTranslation<CompareMessages>(MESSAGES, language);
 
 /** Describes a look-at angle in words. */
 export function describeDirection(lookAt_deg: number, language: string): string {
-  const { facing, winds } = getCompareMessages(language);
-  return facing(winds[((Math.round(lookAt_deg / 45) % 8) + 8) % 8] ?? "");
+  const { facing, headings } = getCompareMessages(language);
+  return facing(headings[((Math.round(lookAt_deg / 45) % 8) + 8) % 8] ?? "");
 }
