@@ -13,7 +13,7 @@ from map3d.renderings.lon_lat import geographic_of
 from map3d.renderings.thumbnail import make_thumbnail
 from map3d.renderings.track_stores import find_track, share_manifest
 from map3d.tiles.block_versions import BlockVersions
-from map3d.tiles.manifest import Manifest, ManifestCrs, ManifestView
+from map3d.tiles.manifest import Manifest, ManifestCrs, ManifestView, Thumbnail
 from map3d.tiles.naming import block_levels
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.tile_store import TileStore
@@ -75,7 +75,7 @@ def _view(workspace: Workspace, catalogue: Catalogue, record: RenderingRecord, f
     return ManifestView(frame, occupancy if planned is None else occupancy | planned, versions, thumbnail=_thumbnail(workspace, record, tracks[0]))
 
 
-def _thumbnail(workspace: Workspace, record: RenderingRecord, track: Track) -> str | None:
+def _thumbnail(workspace: Workspace, record: RenderingRecord, track: Track) -> Thumbnail | None:
     found = find_track(workspace, record, track.id)
     if found is None:
         return None

@@ -5,6 +5,7 @@ library return is rounded first, and the rest are single operations on float64.
 """
 
 import base64
+from functools import reduce
 from itertools import product
 from typing import Any, Final
 
@@ -102,6 +103,6 @@ def _encode(colors: NDArray[np.uint8], light: NDArray[np.float64], step: int) ->
     alpha = colors[..., 3:] / 255
     linear = np.minimum(_LINEAR[colors[..., :3]] * light[..., None], 65535) * alpha
     premultiplied = np.concatenate([linear, alpha * 65535], axis=-1)
-    rows = sum(premultiplied[k::step] for k in range(step))
-    cells = sum(rows[:, k::step] for k in range(step)) / step**2
+    rows = reduce(np.add, (premultiplied[k::step] for k in range(step)))
+    cells = reduce(np.add, (rows[:, k::step] for k in range(step))) / step**2
     return _core.encode_layer("color", "webp", np.rint(cells).astype(np.uint16), QUALITY)
