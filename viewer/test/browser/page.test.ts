@@ -232,7 +232,7 @@ for (const [name, options] of [["desk", DESK], ["phone", PHONE]] as const) {
 
 test.each([
   ["de-CH", ["Suchen", "Vergrößern", "Licht", "Messen"]],
-  ["fr-FR", ["Rechercher", "Zoom avant", "Éclairé", "Mesurer"]],
+  ["fr-FR", ["Rechercher", "Zoom avant", "Lumière", "Mesurer"]],
 ])("the page uses the language and number format of %s", async (locale, [search, zoomIn, lit, line]) => {
   const { page, problems } = await open({ ...DESK, locale });
   expect(await page.evaluate(() => document.documentElement.lang)).toBe(locale);
@@ -325,7 +325,7 @@ test("a rendering of another origin is shown only with the user's consent", asyn
       await page.goto(`${bed.server.origin}/?${query}`);
       await page.waitForFunction((isShown) => (isShown ? location.hash.length > 5 : document.querySelector(".failed") !== null), consents || query.includes("with="));
       await page.waitForLoadState("networkidle");
-      expect(asked).toEqual([`Show ${other}?`]);
+      expect(asked).toEqual([`Show the map at ${other}?`]);
       expect(fetched.length > 0).toBe(consents);
       await page.context().close();
     }
