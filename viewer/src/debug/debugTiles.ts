@@ -35,8 +35,7 @@ function outline({ view, layers, tiles }: Plan, { from, rect: [left, top, right,
     const sent = tiles.getTransfer(view, layer, from);
     return sent ? [`${layer.name} ${(sent.bytes / 1000).toFixed(1)} kB, ${((now - sent.at_ms) / 1000).toFixed(0)} s`] : [];
   });
-  // The kinds of a data tile share one line.
-  const box = element("div", "", {}, [`${tileName(from)} × ${(1 / scale).toFixed(2)}`, ...new Set(lines)].join("\n"));
+  const box = element("div", "", {}, [`${tileName(from)} × ${(1 / scale).toFixed(2)}`, ...lines].join("\n"));
   box.style.transform = `translate(${String(left / dpr)}px, ${String(top / dpr)}px)`;
   box.style.width = `${String((right - left) / dpr)}px`;
   box.style.height = `${String((bottom - top) / dpr)}px`;

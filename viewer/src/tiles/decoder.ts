@@ -24,15 +24,14 @@ export class Decoder {
     this.#size = Math.max(1, workers);
   }
 
-  /** @param keep leaves the bytes to the caller; else they move to the worker */
-  decode(kind: string, mediaType: string, bytes: ArrayBuffer, keep = false): Promise<TileData> {
+  decode(kind: string, mediaType: string, bytes: ArrayBuffer): Promise<TileData> {
     const id = this.#requestCount++;
     const worker = this.#workers[id % this.#size] ?? this.#startWorker();
     clearTimeout(this.#idleTimer);
     return new Promise((resolve, reject) => {
       this.#pending.set(id, { resolve, reject });
       const request: DecodeRequest = { id, kind, mediaType, bytes };
-      worker.postMessage(request, keep ? [] : [bytes]);
+      worker.postMessage(request, [bytes]);
     });
   }
 
