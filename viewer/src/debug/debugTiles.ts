@@ -12,9 +12,9 @@ type Plan = map["plans"][number];
 export class debugTiles extends MapLayer<map, object> {
   readonly #pane = element("div", "map3d-debug", { "aria-hidden": "true" });
   readonly #update = (): void => {
-    const { plans, drawer } = this.map as map;
+    const { plans, drawer, drawerNote } = this.map as map;
     const boxes = plans.flatMap((plan) => plan.quads.map((quad) => outline(plan, quad, (this.map as map).getViewState()?.dpr ?? 1)));
-    this.#pane.replaceChildren(...boxes, element("p", "", {}, String(drawer)));
+    this.#pane.replaceChildren(...boxes, element("p", "", {}, drawerNote ? `${String(drawer)}: ${drawerNote}` : String(drawer)));
   };
 
   protected onAdd(map: map): void {

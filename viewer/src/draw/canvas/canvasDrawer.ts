@@ -7,7 +7,7 @@ import type { DrawStyles } from "../drawStyle";
 import { listNeighbourKinds, listKinds, makeShadingOptions, restrictOptions, type ShadingOptions } from "./shadingOptions";
 import { makeMask, type Mask } from "./mask";
 import { TilePictures, type TilePicture, type PictureRequest } from "./tilePictures";
-import type { ShadeRequest } from "./shadeMessages";
+import type { ShadeRequest, TileImage } from "./shadeMessages";
 import { findArea, makeGrid, type Grid, type MosaicTile } from "./tileMosaic";
 import { CssCompositor, CanvasCompositor, type Compositor, type ComposedPass } from "./compositor";
 
@@ -46,6 +46,10 @@ export class CanvasDrawer implements Drawer {
 
   get busy(): boolean {
     return this.#pictures.busy;
+  }
+
+  get note(): string {
+    return this.#pictures.usesCompositing ? "lighting by compositing: this browser alters pixels on readback" : "";
   }
 
   get element(): HTMLElement {
@@ -132,11 +136,11 @@ export class CanvasDrawer implements Drawer {
   /** Finds the pictures that fill a quad: its own, or those of descendants or of an ancestor. */
   #findMosaicTiles(pass: LayerPass, grid: Grid, { from, rect }: Quad): MosaicTile[] {
     const area = findArea(grid, rect);
-    const imageOf = (tile: Tile): ImageData | undefined => this.#pictures.get(makeName(pass, tile))?.image;
+    const imageOf = (tile: Tile): TileImage | undefined => this.#pictures.get(makeName(pass, tile))?.image;
     const own = imageOf(from);
     if (own) return [{ area, from, image: own }];
     const fallbacks = findFallbacks(area, (tile) => imageOf(tile) !== undefined, () => true, area.z > grid.level ? 0 : 2);
-    return fallbacks.map((fallback) => ({ ...fallback, image: imageOf(fallback.from) as ImageData }));
+    return fallbacks.map((fallback) => ({ ...fallback, image: imageOf(fallback.from) as TileImage }));
   }
 
   /** Makes a request; an up-to-date picture has an empty urgency. */

@@ -4,6 +4,9 @@ import type { Rgb } from "../color";
 import type { DrawStyles } from "../drawStyle";
 import type { ShadingOptions } from "./shadingOptions";
 
+/** A shaded tile: pixels, or a bitmap where the browser does not allow exact readback. */
+export type TileImage = ImageData | ImageBitmap;
+
 /** A value that the worker stores under a name: one layer of a tile, highlight colours by id, or styles. */
 export type WorkerValue = TileData | ReadonlyMap<number, Rgb> | DrawStyles;
 
@@ -19,5 +22,7 @@ export interface ShadeRequest {
 export type ShadeMessage = { readonly put: string; readonly value: WorkerValue } | { readonly drop: string } | ShadeRequest;
 
 export type ShadeResponse =
-  | { readonly ticket: number; readonly picture: ImageData }
+  /** Sent once: whether the browser returns pixels exactly as drawn. */
+  | { readonly readsExactly: boolean }
+  | { readonly ticket: number; readonly picture: TileImage }
   | { readonly ticket: number; readonly error: string };

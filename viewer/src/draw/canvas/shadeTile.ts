@@ -89,7 +89,7 @@ function applyStyles(out: Bytes, id: Uint32Array, styles: DrawStyles): void {
 }
 
 /** Calls `act` with the index and packed style of each pixel whose object is not plain. */
-function forEachStyled(id: Uint32Array, { byId, others }: DrawStyles, act: (at: number, word: number) => void): void {
+export function forEachStyled(id: Uint32Array, { byId, others }: DrawStyles, act: (at: number, word: number) => void): void {
   let [last, word] = [0, 0];
   for (let at = 0; at < id.length; at++) {
     const own = id[at] as number;
@@ -101,7 +101,7 @@ function forEachStyled(id: Uint32Array, { byId, others }: DrawStyles, act: (at: 
 type LightMixer = (sky: number, sun: number) => number;
 
 /** Returns a function that mixes skylight and sunlight in a channel. */
-function makeLightMixer({ sky, beam }: TileLight, channel: 0 | 1 | 2): LightMixer {
+export function makeLightMixer({ sky, beam }: TileLight, channel: 0 | 1 | 2): LightMixer {
   const [skylight, sunlight] = [sky[channel], beam[channel]];
   return (skyShare, sunShare) => skylight * skyShare + sunlight * sunShare;
 }
@@ -172,7 +172,7 @@ function paintHighlights(out: Bytes, options: ShadingOptions, layers: TileLayers
 }
 
 /** Calls `act` for each highlighted pixel with its index, its colour, and whether it is near another object. */
-function forEachHighlighted(options: ShadingOptions, layers: TileLayers, neighbours: TileNeighbours, colors: ReadonlyMap<number, Rgb>, act: (at: number, tint: Rgb, rim: boolean) => void): void {
+export function forEachHighlighted(options: ShadingOptions, layers: TileLayers, neighbours: TileNeighbours, colors: ReadonlyMap<number, Rgb>, act: (at: number, tint: Rgb, rim: boolean) => void): void {
   const { width, height, id } = layers;
   if (!id) return;
   const idAt = makeIdReader(width, height, id, neighbours.id);
@@ -204,6 +204,6 @@ function makeIdReader(width: number, height: number, id: Uint32Array, [left, rig
 }
 
 /** Packs an opaque colour as little-endian RGBA. */
-function packRgba([r, g, b]: Rgb): number {
+export function packRgba([r, g, b]: Rgb): number {
   return (Math.round(255 * r) | (Math.round(255 * g) << 8) | (Math.round(255 * b) << 16) | (255 << 24)) >>> 0;
 }

@@ -4,8 +4,9 @@ import type { DrawStyles } from "../drawStyle";
 import type { ShadingOptions } from "./shadingOptions";
 import type { LightLayers } from "./tileLight";
 import type { Mask, MaskLayers } from "./mask";
-import type { ShadeMessage, ShadeRequest, ShadeResponse, WorkerValue } from "./shadeMessages";
+import type { ShadeMessage, ShadeRequest, ShadeResponse, TileImage, WorkerValue } from "./shadeMessages";
 import { shadeTile, type TileNeighbours, type TileLayers } from "./shadeTile";
+import { composeTile } from "./composeTile";
 
 const scope = self as unknown as { onmessage: (event: MessageEvent<ShadeMessage>) => void; postMessage: (response: ShadeResponse, transfer?: Transferable[]) => void };
 
@@ -15,11 +16,12 @@ const pixelCache = new Map<string, Uint8ClampedArray>();
 
 const reader = new OffscreenCanvas(64, 64).getContext("2d", { willReadFrequently: true }) as OffscreenCanvasRenderingContext2D;
 const readsExactly = testReadback();
+scope.postMessage({ readsExactly });
 
 scope.onmessage = ({ data: message }) => {
   if ("put" in message) values.set(message.put, message.value);
   else if ("drop" in message) drop(message.drop);
-  else void answer(message);
+  else answer(message);
 };
 
 /** Tests whether the browser returns the pixels that were drawn; some alter them against fingerprinting. */
@@ -37,17 +39,16 @@ function drop(name: string): void {
   pixelCache.delete(name);
 }
 
-async function answer({ ticket, options, layers, neighbours }: ShadeRequest): Promise<void> {
+function answer({ ticket, options, layers, neighbours }: ShadeRequest): void {
   try {
-    if (!readsExactly) await Promise.all([layers.color ?? layers.picture, ...options.masks.map(({ color }) => color)].map(readFrame));
     const picture = paint(options, layers, neighbours);
-    scope.postMessage({ ticket, picture }, [picture.data.buffer]);
+    scope.postMessage({ ticket, picture }, ["data" in picture ? picture.data.buffer : picture]);
   } catch (reason) {
     scope.postMessage({ ticket, error: String(reason) });
   }
 }
 
-function paint(options: ShadingOptions, names: ShadeRequest["layers"], neighbourNames: ShadeRequest["neighbours"]): ImageData {
+function paint(options: ShadingOptions, names: ShadeRequest["layers"], neighbourNames: ShadeRequest["neighbours"]): TileImage {
   const pictured = names.color ?? names.picture;
   const color = findTile(pictured);
   const { width, height } = [color, findTile(names.normal), findTile(names.id), findTile(names.depth)].find((value) => value !== undefined) ?? { width: 0, height: 0 };
@@ -56,7 +57,7 @@ function paint(options: ShadingOptions, names: ShadeRequest["layers"], neighbour
   const layers: TileLayers = {
     width,
     height,
-    color: bitmap && pictured !== undefined ? readPixels(pictured, bitmap) : undefined,
+    color: readsExactly && bitmap && pictured !== undefined ? readPixels(pictured, bitmap) : undefined,
     lightLayers,
     id: loadValues(names.id),
     depth: loadValues(names.depth),
@@ -65,13 +66,14 @@ function paint(options: ShadingOptions, names: ShadeRequest["layers"], neighbour
   const neighbours: TileNeighbours = { lightLayers: (neighbourNames.normal ?? []).map((name, k) => loadLightLayers(options, name, neighbourNames.ao?.[k], shadow?.[k])), id: (neighbourNames.id ?? []).map(loadValues), masks: options.masks.flatMap(loadMask) };
   const colors = options.highlight === null ? undefined : (values.get(options.highlight) as ReadonlyMap<number, Rgb> | undefined);
   const styles = options.styles === null ? undefined : (values.get(options.styles) as DrawStyles | undefined);
+  if (bitmap && !readsExactly && options.mode !== "id" && options.mode !== "normal" && options.mode !== "depth") return composeTile(options, bitmap, layers, neighbours, { colors, styles });
   return new ImageData(shadeTile(options, layers, neighbours, { colors, styles }), width, height);
 }
 
 function loadMask(mask: Mask): MaskLayers[] {
   const [data, color] = [findTile(mask.depth), findTile(mask.color ?? undefined)];
   if (data?.kind !== "depth") return [];
-  const pixels = mask.color !== null && color && "bitmap" in color ? readPixels(mask.color, color.bitmap) : undefined;
+  const pixels = readsExactly && mask.color !== null && color && "bitmap" in color ? readPixels(mask.color, color.bitmap) : undefined;
   return [{ mask, width: data.width, height: data.height, depth: data.values, color: pixels }];
 }
 
@@ -90,20 +92,6 @@ function loadLightLayers({ light }: ShadingOptions, normal: string | undefined, 
 function loadValues(name: string | undefined): Uint32Array | undefined {
   const data = findTile(name);
   return data?.kind === "id" || data?.kind === "depth" ? data.values : undefined;
-}
-
-/** Reads the pixels of a tile from a video frame, whose bytes browsers do not alter. @throws Error where there are no video frames */
-async function readFrame(name: string | null | undefined): Promise<void> {
-  const value = findTile(name ?? undefined);
-  if (typeof name !== "string" || !value || !("bitmap" in value) || pixelCache.has(name)) return;
-  if (!("VideoFrame" in self)) throw new Error("this browser alters the pixels that a page reads from a canvas; allow this page to read them, or to use WebGL");
-  const frame = new VideoFrame(value.bitmap, { timestamp: 0 });
-  const [pixels, swapped] = [new Uint8ClampedArray(4 * value.width * value.height), frame.format?.startsWith("B")];
-  await frame.copyTo(pixels);
-  frame.close();
-  value.bitmap.close();
-  for (let k = 0; swapped && k < pixels.length; k += 4) [pixels[k], pixels[k + 2]] = [pixels[k + 2] as number, pixels[k] as number];
-  if (values.get(name) === value) pixelCache.set(name, pixels);
 }
 
 function readPixels(name: string, bitmap: ImageBitmap): Uint8ClampedArray {

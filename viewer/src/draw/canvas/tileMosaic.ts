@@ -2,6 +2,7 @@ import type { Tile } from "../../geo/frame";
 import type { TileFallback } from "../../tiles/cover";
 import { DrawError } from "../../core/errors";
 import type { LayerPass, FrameState } from "../drawer";
+import type { TileImage } from "./shadeMessages";
 
 /** The position of a level's pixels on the screen. */
 export interface Grid {
@@ -34,7 +35,7 @@ function computeWindow({ level, tilePx }: Grid, { z, x, y }: Tile): PixelWindow 
 }
 
 export interface MosaicTile extends TileFallback {
-  readonly image: ImageData;
+  readonly image: TileImage;
 }
 
 /** Left, top, right and bottom in pixels of a level. */
@@ -126,7 +127,7 @@ export class TileMosaic {
 
   #drawTile(grid: Grid, [left, top]: PixelWindow, { area, from, image }: MosaicTile, drawables: Drawables): void {
     const [x0, y0, x1, y1] = computeWindow(grid, area);
-    if (from.z === area.z && image.width === x1 - x0) {
+    if (from.z === area.z && "data" in image && image.width === x1 - x0) {
       this.#context.putImageData(image, x0 - left, y0 - top);
       return;
     }
@@ -136,7 +137,7 @@ export class TileMosaic {
   }
 
   /** Draws part of an ancestor, with a margin of pixels, so that it joins its neighbours smoothly. */
-  #drawAncestorPart(area: Tile, from: Tile, image: OffscreenCanvas, [x0, y0, x1, y1]: PixelWindow): void {
+  #drawAncestorPart(area: Tile, from: Tile, image: ImageBitmap | OffscreenCanvas, [x0, y0, x1, y1]: PixelWindow): void {
     const context = this.#context;
     const parts = 2 ** (area.z - from.z);
     const side = image.width / parts;
@@ -153,11 +154,11 @@ export class TileMosaic {
   }
 }
 
-type Drawables = Map<ImageData, OffscreenCanvas>;
+type Drawables = Map<TileImage, ImageBitmap | OffscreenCanvas>;
 
 /** Converts an image to a form that can be drawn scaled. @param known earlier conversions: one tile may fill many areas */
-function toDrawable(image: ImageData, known: Drawables): OffscreenCanvas {
-  const made = known.get(image) ?? makeCanvas(image);
+function toDrawable(image: TileImage, known: Drawables): ImageBitmap | OffscreenCanvas {
+  const made = known.get(image) ?? ("data" in image ? makeCanvas(image) : image);
   known.set(image, made);
   return made;
 }

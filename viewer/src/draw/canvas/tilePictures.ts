@@ -1,13 +1,17 @@
 import workerCode from "worker:./shadeTile.worker.ts";
 import { DrawError } from "../../core/errors";
-import type { ShadeMessage, ShadeRequest, ShadeResponse, WorkerValue } from "./shadeMessages";
+import type { ShadeMessage, ShadeRequest, ShadeResponse, TileImage, WorkerValue } from "./shadeMessages";
+
+const close = (image: TileImage | undefined): void => {
+  if (image && "close" in image) image.close();
+};
 
 /** The picture of a tile; `image` is undefined until it is first shaded. */
 export interface TilePicture {
   readonly name: string;
   /** Names of its data in the worker. */
   readonly inputs: Set<string>;
-  image: ImageData | undefined;
+  image: TileImage | undefined;
   /** The options of the last image, or of the last attempt. */
   options: string;
   /** A bit for each neighbouring tile that it used. */
@@ -43,6 +47,7 @@ export class TilePictures {
   #waiting: PictureRequest[] = [];
   #tickets = 0;
   #stopped = false;
+  #readsExactly: boolean | undefined;
 
   constructor(events: TilePicturesEvents) {
     this.#events = events;
@@ -51,6 +56,11 @@ export class TilePictures {
   /** Whether requests are running or waiting. */
   get busy(): boolean {
     return this.#running.size + this.#waiting.length > 0;
+  }
+
+  /** Whether colours are lit by compositing, because the browser does not return pixels exactly. */
+  get usesCompositing(): boolean {
+    return this.#readsExactly === false;
   }
 
   get(name: string): TilePicture | undefined {
@@ -82,6 +92,7 @@ export class TilePictures {
   }
 
   forget(name: string): void {
+    close(this.#pictures.get(name)?.image);
     this.#pictures.delete(name);
     this.#waiting = this.#waiting.filter(({ picture }) => picture.name !== name);
   }
@@ -90,6 +101,7 @@ export class TilePictures {
   prune(stale: (picture: TilePicture) => boolean): void {
     for (const picture of this.#pictures.values()) {
       if (!picture.image || !stale(picture)) continue;
+      close(picture.image);
       Object.assign(picture, { image: undefined, options: "" });
     }
   }
@@ -123,7 +135,8 @@ export class TilePictures {
     const url = URL.createObjectURL(new Blob([workerCode], { type: "text/javascript" }));
     const worker = new Worker(url, { name: "map3d canvas" });
     worker.onmessage = ({ data }: MessageEvent<ShadeResponse>) => {
-      this.#settle(data);
+      if ("readsExactly" in data) this.#readsExactly = data.readsExactly;
+      else this.#settle(data);
     };
     worker.onerror = (event) => {
       this.stop();
@@ -132,7 +145,7 @@ export class TilePictures {
     return worker;
   }
 
-  #settle(response: ShadeResponse): void {
+  #settle(response: Exclude<ShadeResponse, { readsExactly: boolean }>): void {
     const request = this.#running.get(response.ticket);
     this.#running.delete(response.ticket);
     if (request) this.#store(request, response);
@@ -140,11 +153,17 @@ export class TilePictures {
     this.#events.made();
   }
 
-  #store({ picture, options, edges }: PictureRequest, response: ShadeResponse): void {
+  #store({ picture, options, edges }: PictureRequest, response: Exclude<ShadeResponse, { readsExactly: boolean }>): void {
     if ("error" in response) this.#events.failed(new DrawError(`tile ${picture.name}: ${response.error}`));
     const image = "picture" in response ? response.picture : undefined;
-    if (this.#pictures.get(picture.name) !== picture) return;
-    if (image) picture.image = image;
+    if (this.#pictures.get(picture.name) !== picture) {
+      close(image);
+      return;
+    }
+    if (image) {
+      close(picture.image);
+      picture.image = image;
+    }
     Object.assign(picture, { options, edges, ticket: response.ticket });
   }
 }
