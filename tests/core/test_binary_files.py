@@ -63,21 +63,29 @@ def test_a_scene_has_the_box_of_each_object(folder: Path) -> None:
 
 def frame(kinds: tuple[str, ...], tile_px: int = 256) -> _core.Frame:
     layers = [
-        _core.LayerSpec(kind, "png", suns=[(0.0, 0.0, 1.0)] * SUNS.get(kind, 0), radius_m=5.0 if kind in ("ao", "picture") else 0.0)  # type: ignore[arg-type]
+        _core.LayerSpec(
+            kind, "m3d" if kind == "data" else "png", suns=[(0.0, 0.0, 1.0)] * SUNS.get(kind, 0), radius_m=5.0 if kind in ("ao", "picture") else 0.0
+        )  # type: ignore[arg-type]
         for kind in kinds
     ]
     return _core.Frame(0.0, 90.0, -16.0, 40.0, -1000.0, 64.0, tile_px, 1, layers)
 
 
+def list_arrays(kinds: tuple[str, ...]) -> set[str]:
+    """Returns the arrays of a pass of these layers; a data tile holds three kinds."""
+    return {"id", "depth"} | {array for kind in kinds for array in (("normal",) if kind == "data" else (kind,))}
+
+
 @pytest.mark.parametrize(
-    "kinds", [("color", "normal", "id", "depth"), ("normal",), ("sun",), ("sun16", "ao"), ("depth2",), ("picture", "color"), ("id",)]
+    "kinds",
+    [("color", "normal", "id", "depth"), ("normal",), ("color", "data"), ("sun",), ("sun16", "ao"), ("depth2",), ("picture", "color"), ("id",)],
 )
 def test_a_seam_is_valid_for_passes_of_its_arrays_alone(folder: Path, kinds: tuple[str, ...]) -> None:
     seam = _core.Scene(str(folder)).render_block(frame(kinds), 0, 0, 0).seam
     assert seam is not None
-    arrays = {*kinds, "id", "depth"}
+    arrays = list_arrays(kinds)
     for other in [(kind,) for kind in LAYER_KINDS] + [kinds, ("color", "normal")]:
-        if {*other, "id", "depth"} == arrays:
+        if list_arrays(other) == arrays:
             _core.check_seam(frame(other), seam)
         else:
             with pytest.raises(_core.FormatError, match="arrays"):
