@@ -290,9 +290,9 @@ class Scene:
     @property
     def triangle_count(self) -> int:
         """Triangles of all chunks and prototypes; a prototype counts once."""
-    def sample_surfaces(self, except_object: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Returns the area in square metres and the side of a texel in metres, NaN without a texture, of triangles spread evenly over the scene,
-        without those of an object; always the same ones."""
+    def sample_surfaces(self) -> tuple[NDArray[np.uint32], NDArray[np.float64], NDArray[np.float64]]:
+        """Returns the object, the area in square metres and the side of a texel in metres, NaN without a texture, of triangles spread evenly over the
+        scene; always the same ones."""
     def occupied(self, frame: Frame, level: int, within: tuple[int, NDArray[np.uint32]] | None = None) -> NDArray[np.uint64]:
         """Returns the tiles of a level that may have content, as sorted Morton numbers. `within`: a level above and (n, 2) columns and rows of its
         blocks; only their tiles are examined. Time and memory grow with the occupied tiles, not with the level."""

@@ -34,22 +34,33 @@ def test_pixels_are_half_as_large_as_coarse_texels(run: Run, tmp_path: Path) -> 
     assert "still to render: " in out
 
 
+NOT_TERRAIN = np.zeros(4, bool)
+
+
+def test_triangles_of_terrain_count_only_without_others() -> None:
+    areas, texels, terrain = np.array([12.5, 12.5, 12.5, 64.0]), np.full(4, np.nan), np.array([True, True, True, False])
+    assert surface_detail(areas, texels, terrain) == SurfaceDetail(None, 8.0)
+    bare = surface_detail(areas[:3], texels[:3], terrain[:3])
+    assert bare == SurfaceDetail(None, 12.5**0.5, 16)
+    assert bare.pixel_m == pytest.approx(0.22, abs=0.001)
+
+
 def test_detail_is_that_of_finer_texels_and_usual_triangles() -> None:
     areas, texels = np.array([100.0, 100.0, 1.0, 0.0]), np.array([0.2, 0.4, np.nan, 0.001])
-    detail = surface_detail(areas, texels)
+    detail = surface_detail(areas, texels, NOT_TERRAIN[:4])
     assert detail == SurfaceDetail(0.2, 10.0)
     assert detail.pixel_m == 0.1
 
 
 def test_textures_of_few_surfaces_do_not_count() -> None:
-    detail = surface_detail(np.array([100.0, 100.0, 1.0]), np.array([np.nan, np.nan, 0.01]))
+    detail = surface_detail(np.array([100.0, 100.0, 1.0]), np.array([np.nan, np.nan, 0.01]), NOT_TERRAIN[:3])
     assert detail == SurfaceDetail(None, 10.0)
     assert detail.pixel_m == 10.0 / 64
 
 
 def test_nothing_has_no_detail() -> None:
-    assert surface_detail(np.array([]), np.array([])) is None
-    assert surface_detail(np.array([0.0]), np.array([np.nan])) is None
+    assert surface_detail(np.array([]), np.array([]), NOT_TERRAIN[:0]) is None
+    assert surface_detail(np.array([0.0]), np.array([np.nan]), NOT_TERRAIN[:1]) is None
 
 
 def test_face_with_a_bad_texture_index_keeps_its_geometry(run: Run, tmp_path: Path) -> None:

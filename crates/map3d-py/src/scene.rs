@@ -47,13 +47,14 @@ impl Scene {
         self.0.store().triangle_count()
     }
 
-    /// Returns the area in square metres and the side of a texel in metres, NaN without a texture, of triangles spread evenly over the scene, without
-    /// those of an object; always the same ones.
-    fn sample_surfaces<'py>(&self, py: Python<'py>, except_object: u32) -> PyResult<(Values<'py>, Values<'py>)> {
-        let samples = py.detach(|| self.0.store().sample_surfaces(except_object)).map_err(to_python)?;
+    /// Returns the object, the area in square metres and the side of a texel in metres, NaN without a texture, of triangles spread evenly over the
+    /// scene; always the same ones.
+    fn sample_surfaces<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyArray1<u32>>, Values<'py>, Values<'py>)> {
+        let samples = py.detach(|| self.0.store().sample_surfaces()).map_err(to_python)?;
+        let objects = samples.iter().map(|s| s.object).collect();
         let areas = samples.iter().map(|s| s.area_m2).collect();
         let texels = samples.iter().map(|s| s.texel_m.unwrap_or(f64::NAN)).collect();
-        Ok((PyArray1::from_vec(py, areas), PyArray1::from_vec(py, texels)))
+        Ok((PyArray1::from_vec(py, objects), PyArray1::from_vec(py, areas), PyArray1::from_vec(py, texels)))
     }
 
     /// Returns the tiles of a level that may have content, as sorted Morton numbers. `within`: a level above and (n, 2) columns and rows of its blocks;

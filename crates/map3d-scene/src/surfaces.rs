@@ -15,35 +15,34 @@ const LEAVES_OF_A_PART: usize = 512;
 /// A sampled triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceSample {
+    /// Id of the object.
+    pub object: u32,
     pub area_m2: f64,
     /// Side of a texel; `None` without a texture.
     pub texel_m: Option<f64>,
 }
 
 impl SceneStore {
-    /// Returns triangles evenly spread over all chunks and prototypes, without those of an object; always the same ones. At most 262,144.
-    pub fn sample_surfaces(&self, except_object: u32) -> Result<Vec<SurfaceSample>> {
+    /// Returns triangles evenly spread over all chunks and prototypes; always the same ones. At most 262,144.
+    pub fn sample_surfaces(&self) -> Result<Vec<SurfaceSample>> {
         let (mut out, mut sizes) = (Vec::new(), HashMap::new());
         let count = self.index().chunks.len() + self.index().prototypes.len();
         for number in (0..count).step_by(count.div_ceil(PARTS).max(1)) {
-            self.sample_chunk(&*self.chunk(number as u32)?, except_object, &mut sizes, &mut out);
+            self.sample_chunk(&*self.chunk(number as u32)?, &mut sizes, &mut out);
         }
         Ok(out)
     }
 
-    fn sample_chunk(&self, chunk: &Chunk, except_object: u32, sizes: &mut HashMap<[u8; 16], Option<[f64; 2]>>, out: &mut Vec<SurfaceSample>) {
+    fn sample_chunk(&self, chunk: &Chunk, sizes: &mut HashMap<[u8; 16], Option<[f64; 2]>>, out: &mut Vec<SurfaceSample>) {
         let leaves = chunk.leaves();
         for leaf in leaves.iter().step_by(leaves.len().div_ceil(LEAVES_OF_A_PART).max(1)) {
             for lane in (0..8).filter(|lane| (leaf.triangle[*lane] as usize) < chunk.triangles().len()) {
                 let record = &chunk.triangles()[leaf.triangle[lane] as usize];
-                if chunk.objects()[record.object as usize].id == except_object {
-                    continue;
-                }
                 let corners = [0, 1, 2].map(|c| [0, 1, 2].map(|k| f64::from(leaf.corners[3 * c + k][lane])));
                 let area_m2 = vec3::length(vec3::triangle_normal(corners)) / 2.0;
                 let size = self.texture_size(&chunk.materials()[record.material as usize], sizes);
                 let texel_m = size.and_then(|size| texel_m(area_m2, record.uv, size));
-                out.push(SurfaceSample { area_m2, texel_m });
+                out.push(SurfaceSample { object: chunk.objects()[record.object as usize].id, area_m2, texel_m });
             }
         }
     }

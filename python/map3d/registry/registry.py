@@ -122,6 +122,12 @@ class Registry:
         with self._database.reading() as db:
             return int(db.execute("SELECT count(*) FROM object WHERE present").fetchone()[0])
 
+    def ids_of_classes(self, classes: Sequence[str]) -> list[int]:
+        """Returns the ids of the present objects of classes, ascending."""
+        query = f"SELECT id FROM object WHERE present AND class IN ({','.join('?' * len(classes))}) ORDER BY id"
+        with self._database.reading() as db:
+            return [int(row["id"]) for row in db.execute(query, tuple(classes))]
+
     def objects(self) -> Iterator[RegisteredObject]:
         """Yields all present objects by id. Reads in pages, so that no transaction stays open in between."""
         last = 0

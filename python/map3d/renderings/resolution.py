@@ -22,6 +22,10 @@ TEXELS_A_PIXEL: Final = 0.5
 """Finer pixels show no more of a texture."""
 TRIANGLE_PX: Final = 64
 """Pixels along the side of a usual triangle; more show no more of the shape."""
+TERRAIN_TRIANGLE_PX: Final = 16
+"""As TRIANGLE_PX, for terrain, whose triangles have no sharp edges between them."""
+TERRAIN_CLASSES: Final = ("terrain", "tinrelief", "relief_feature", "raster_relief")
+"""Classes of the objects that are terrain."""
 TEXTURED: Final = 0.1
 """The share of textured surfaces from which textures count."""
 FINE: Final = 0.25
@@ -33,15 +37,17 @@ _PROBE_LEVEL: Final = 8
 
 @dataclass(frozen=True)
 class SurfaceDetail:
-    """`texel_m`: side of the finer texels, None without textures; `triangle_m`: side of a square as large as a usual triangle."""
+    """`texel_m`: side of the finer texels, None without textures; `triangle_m`: side of a square as large as a usual triangle, which is `triangle_px`
+    pixels long at the finest resolution that shows more of the shape."""
 
     texel_m: float | None
     triangle_m: float
+    triangle_px: int = TRIANGLE_PX
 
     @property
     def pixel_m(self) -> float:
         """The size of pixels below which they show nothing more."""
-        by_shape = self.triangle_m / TRIANGLE_PX
+        by_shape = self.triangle_m / self.triangle_px
         return by_shape if self.texel_m is None else min(by_shape, self.texel_m * TEXELS_A_PIXEL)
 
     def text(self) -> str:
@@ -68,16 +74,19 @@ def choose_resolution(scene: _core.Scene, views: list[ViewAngles], detail: Surfa
     return Resolution(RESOLUTIONS_M[-1], "the scene is too large for a finer one")
 
 
-def surface_detail(areas: NDArray[np.float64], texels: NDArray[np.float64]) -> SurfaceDetail | None:
-    """Returns the detail of sampled triangles, None without any. `areas`: square metres; `texels`: sides in metres, NaN without a texture."""
+def surface_detail(areas: NDArray[np.float64], texels: NDArray[np.float64], terrain: NDArray[np.bool_]) -> SurfaceDetail | None:
+    """Returns the detail of sampled triangles, None without any. `areas`: square metres; `texels`: sides in metres, NaN without a texture. The usual
+    triangle is one of terrain only where there is nothing else."""
     textured = np.isfinite(texels) & (areas > 0)
     seen = areas > 0
     if not seen.any():
         return None
-    triangle_m = float(np.sqrt(_quantile(areas[seen], np.ones(int(seen.sum())), 0.5)))
-    if areas[textured].sum() < TEXTURED * areas.sum():
-        return SurfaceDetail(None, triangle_m)
-    return SurfaceDetail(_quantile(texels[textured], areas[textured], FINE), triangle_m)
+    bare = not (seen & ~terrain).any()
+    usual = areas[seen] if bare else areas[seen & ~terrain]
+    triangle_m = float(np.sqrt(_quantile(usual, np.ones(len(usual)), 0.5)))
+    has_textures = areas[textured].sum() >= TEXTURED * areas.sum()
+    texel_m = _quantile(texels[textured], areas[textured], FINE) if has_textures else None
+    return SurfaceDetail(texel_m, triangle_m, TERRAIN_TRIANGLE_PX if bare else TRIANGLE_PX)
 
 
 def _why(res_m: float, covered_m2: float, detail: SurfaceDetail | None) -> str:

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from map3d import _core
 from map3d.catalogue import Catalogue, RenderingRecord, SceneRecord, Workspace
 from map3d.errors import OutsideFrame
@@ -18,7 +20,7 @@ from map3d.renderings.file_contents import Finding, file_contents, union
 from map3d.renderings.layers import LayerRequest
 from map3d.renderings.outlier_lines import outlier_lines, place_text
 from map3d.renderings.outliers import read_outliers
-from map3d.renderings.resolution import Resolution, SurfaceDetail, choose_resolution, surface_detail
+from map3d.renderings.resolution import TERRAIN_CLASSES, Resolution, SurfaceDetail, choose_resolution, surface_detail
 from map3d.renderings.site_files import ImportSummary, SiteFiles
 from map3d.renderings.site_report import SiteReport, read_report, view_names, write_report
 from map3d.renderings.style import Rules
@@ -151,5 +153,7 @@ def _refit(workspace: Workspace, catalogue: Catalogue, request: SiteRequest, rec
 
 def _surface_detail(workspace: Workspace, name: str, scene: _core.Scene) -> SurfaceDetail | None:
     with Registry(workspace.registry_path(name)) as registry:
-        ground = registry.get_or_create_scene_object(GROUND, "terrain")
-    return surface_detail(*scene.sample_surfaces(ground))
+        ground, terrain = registry.get_or_create_scene_object(GROUND, "terrain"), registry.ids_of_classes(TERRAIN_CLASSES)
+    objects, areas_m2, texels_m = scene.sample_surfaces()
+    own = objects != ground
+    return surface_detail(areas_m2[own], texels_m[own], np.isin(objects[own], terrain))
