@@ -9,7 +9,16 @@ import { ENTRIES } from "./entries.mjs";
 
 const root = resolve(dirname(fileURLToPath(import.meta.url)), "..");
 const dist = join(root, "dist");
-const shared = { bundle: true, minify: true, target: "es2022", legalComments: "none", logLevel: "warning" };
+/** Names of members that only the core uses, and no public type has: bundles have short ones in their place. `checkInternalNames` fails where another file uses one. */
+const INTERNAL_NAMES = `
+  advanceCamera backoff_ms checkCompatible clearFailures clearPatches continueTurn copyToCanvas createName deselectMarkers dragBy dropTiles
+  enterFullScreen exitFullScreen findCenterSurface findView fitCanvas forget freeAllBut fullScreen getOrCreate hasFailed initializeView isCombinable
+  isCovered isLoaded isLoading lightLayers listViewsAhead makePass makeRequest nextCamera nextView onManifest onUploaded peek pinned placeElement
+  probes prune releaseData replaceCanvas requiredKinds requireGpu retry_ms retryAfter_ms rotateLeft rotateRight runNow screenCenter setCamera setLimit
+  setRequests showElement showsAt slots startInertia startTick transitionCamera urgency usesCompositing winds zoomToRect
+`.trim().split(/\s+/);
+const mangleCache = Object.fromEntries(INTERNAL_NAMES.map((name, k) => [name, `_${k.toString(36)}`]));
+const shared = { mangleProps: new RegExp(`^(?:${INTERNAL_NAMES.join("|")})$`), mangleCache, bundle: true, minify: true, target: "es2022", legalComments: "none", logLevel: "warning" };
 const CSS_TARGET = ["chrome111", "firefox121", "safari16.4"];
 const banner = { js: "/*! map3d, Apache-2.0 */" };
 
@@ -28,6 +37,19 @@ const lowerCaseNames = {
 async function shorten(code, module) {
   const { code: shorter } = await minify(code, { ecma: 2022, module, compress: { passes: 3, keep_fargs: false, unsafe: true, unsafe_arrows: true, pure_getters: true, inline: 1 }, mangle: { nth_identifier: lowerCaseNames }, format: { ascii_only: true } });
   return shorter;
+}
+
+/** Folders of the core below src. */
+const CORE = ["core", "geo", "tiles", "draw", "map", "overlay", "ui"];
+
+/** @throws Error when an entry or the page uses an internal name of the core */
+function checkInternalNames() {
+  for (const folder of ["src", "page"]) {
+    for (const file of readdirSync(join(root, folder), { recursive: true }).filter((name) => name.endsWith(".ts") && !(folder === "src" && CORE.includes(name.split(/[/\\]/)[0])))) {
+      const found = readFileSync(join(root, folder, file), "utf8").match(/\w+/g)?.find((word) => Object.hasOwn(mangleCache, word));
+      if (found !== undefined) throw new Error(`${folder}/${file}: uses "${found}", which is an internal name of the core; remove it from INTERNAL_NAMES in scripts/build.mjs`);
+    }
+  }
 }
 
 /** Resolves `import code from "worker:./x.ts"` to the bundled source of a worker. */
@@ -146,6 +168,7 @@ async function bundleFull(name, options) {
 async function build() {
   rmSync(dist, { recursive: true, force: true });
   mkdirSync(dist, { recursive: true });
+  checkInternalNames();
   await bundle("src/map3d.ts", "map3d.mjs", { format: "esm" });
   writeScript("map3d.mjs", "map3d.js");
   for (const [name, entry] of Object.entries(ENTRIES)) {

@@ -6,8 +6,6 @@ export interface IdTable {
   readonly mask: number;
   /** Length of the longest search. */
   readonly probes: number;
-  /** The entry if existing is just one; else zeros. */
-  readonly single: readonly [number, number];
 }
 
 export function buildIdTable<T>(values: ReadonlyMap<number, T>, pack: (value: T) => number): IdTable {
@@ -16,8 +14,7 @@ export function buildIdTable<T>(values: ReadonlyMap<number, T>, pack: (value: T)
   const slots = new Uint32Array(size * 2);
   let probes = 1;
   for (const [id, value] of ids) probes = Math.max(probes, insert(slots, size - 1, id, pack(value)));
-  const first = ids.length === 1 ? ids[0] : undefined;
-  return { slots, mask: size - 1, probes: probes + 1, single: first ? [first[0], pack(first[1])] : [0, 0] };
+  return { slots, mask: size - 1, probes: probes + 1 };
 }
 
 /** Computes width and height of the texture for a table. */

@@ -14,15 +14,14 @@ export class IdTextures {
     this.#gl = gl;
   }
 
-  /** Binds a table, made from the values if it is new. @param uniforms sampler, mask, probes and the single entry  @param pack converts a value to uint32 */
-  bind<V>(program: Program, [sampler, mask, probes, single]: readonly ["u_table" | "u_styles", string, string, string], values: ReadonlyMap<number, V>, pack: (value: V) => number): void {
+  /** Binds a table, made from the values if it is new. @param uniforms sampler, mask and probes  @param pack converts a value to uint32 */
+  bind<V>(program: Program, [sampler, mask, probes]: readonly ["u_table" | "u_styles", string, string], values: ReadonlyMap<number, V>, pack: (value: V) => number): void {
     const gl = this.#gl;
     const { table, texture } = this.#known.get(values) ?? this.#upload(values, buildIdTable(values, pack));
     gl.activeTexture(gl.TEXTURE0 + textureUnit(sampler));
     gl.bindTexture(gl.TEXTURE_2D, texture);
     gl.uniform1ui(program.at(mask), table.mask);
     gl.uniform1i(program.at(probes), table.probes);
-    gl.uniform2ui(program.at(single), ...table.single);
   }
 
   /** Frees the tables of all other maps. */

@@ -57,10 +57,9 @@ ivec2 clampToTile(ivec2 at) { return clamp(at, ivec2(0), ivec2(u_size - 1)) + GU
 /** Lookup in tables of ids with open addressing: R is the id, G its value; an empty slot ends the search. */
 const ID_LOOKUP = `
 #if defined(HIGHLIGHT) || defined(STYLED)
-/** single: the only id and its value; id 0: search the table. mask: number of slots − 1. */
-uint find(usampler2D table, uint id, uint mask, int probes, uvec2 single) {
+/** mask: number of slots − 1. */
+uint find(usampler2D table, uint id, uint mask, int probes) {
   if (id == 0u) return 0u;
-  if (single.x != 0u) return single.x == id ? single.y : 0u;
   uint width = uint(textureSize(table, 0).x);
   uint slot = (id * 2654435769u >> 7) & mask;
   for (int k = 0; k < probes; k++) {
@@ -79,11 +78,10 @@ vec3 rgbOf(uint word) { return vec3(uvec3(word, word >> 8, word >> 16) & 255u) /
 uniform usampler2D u_styles;
 uniform uint u_styleMask;
 uniform int u_styleProbes;
-uniform uvec2 u_styleSingle;
 uniform uint u_others;    // style of ids that are not in the table
 
 vec4 applyStyle(vec4 c, uint id) {
-  uint word = find(u_styles, id, u_styleMask, u_styleProbes, u_styleSingle);
+  uint word = find(u_styles, id, u_styleMask, u_styleProbes);
   uint kind = (word == 0u && id != 0u ? u_others : word) >> 24;
   if (kind == 1u) c.rgb = mix(c.rgb, rgbOf(word), ${String(TINT_OPACITY)});
   else if (kind == 3u) c.rgb = mix(vec3(dot(c.rgb, vec3(0.2126, 0.7152, 0.0722))), vec3(${String(DIM_GREY[0])}), ${String(DIM_GREY[1])});
@@ -274,7 +272,6 @@ const HIGHLIGHT = `
 uniform usampler2D u_table;
 uniform uint u_mask;
 uniform int u_probes;
-uniform uvec2 u_single;
 uniform float u_rim;      // texels
 
 uint idAt(vec2 texel) {
@@ -284,7 +281,7 @@ uint idAt(vec2 texel) {
 
 vec4 highlighted(vec4 color, vec2 texel) {
   uint id = texelFetch(u_id, clampToTile(ivec2(floor(texel))), 0).r;
-  uint packed = find(u_table, id, u_mask, u_probes, u_single);
+  uint packed = find(u_table, id, u_mask, u_probes);
   if (packed == 0u) return color;
   vec3 tint = rgbOf(packed);
   float grey = dot(color.rgb, vec3(0.2126, 0.7152, 0.0722));

@@ -240,9 +240,9 @@ export class WebGLDrawer implements Drawer {
     const gl = this.gl;
     this.#bind("id", ids);
     gl.uniform1f(program.at("u_rim"), Math.max(1, 1.25 * dpr * quad.scale));
-    if (highlight.size > 0) this.#idTextures.bind(program, ["u_table", "u_mask", "u_probes", "u_single"], highlight, packColor);
+    if (highlight.size > 0) this.#idTextures.bind(program, ["u_table", "u_mask", "u_probes"], highlight, packColor);
     if (!drawStyles) return;
-    this.#idTextures.bind(program, ["u_styles", "u_styleMask", "u_styleProbes", "u_styleSingle"], drawStyles.byId, packStyle);
+    this.#idTextures.bind(program, ["u_styles", "u_styleMask", "u_styleProbes"], drawStyles.byId, packStyle);
     gl.uniform1ui(program.at("u_others"), packStyle(drawStyles.others));
   }
 
