@@ -6,6 +6,7 @@ import { fileURLToPath } from "node:url";
 import * as esbuild from "esbuild";
 import { minify } from "terser";
 import { ENTRIES } from "./entries.mjs";
+import { MODULE_ORDER } from "./moduleOrder.mjs";
 
 const root = resolve(dirname(fileURLToPath(import.meta.url)), "..");
 const dist = join(root, "dist");
@@ -15,7 +16,7 @@ const INTERNAL_NAMES = `
   enterFullScreen exitFullScreen findCenterSurface findView fitCanvas forget freeAllBut fullScreen getOrCreate hasFailed initializeView isCombinable
   isCovered isLoaded isLoading lightLayers listViewsAhead makePass makeRequest nextCamera nextView onManifest onUploaded peek pinned placeElement
   probes prune releaseData replaceCanvas requiredKinds requireGpu retry_ms retryAfter_ms rotateLeft rotateRight runNow screenCenter setCamera setLimit
-  setRequests showElement showsAt slots startInertia startTick transitionCamera urgency usesCompositing winds zoomToRect
+  setRequests showElement showsAt slots startInertia startTick transitionCamera urgency winds zoomToRect
 `.trim().split(/\s+/);
 const mangleCache = Object.fromEntries(INTERNAL_NAMES.map((name, k) => [name, `_${k.toString(36)}`]));
 const shared = { mangleProps: new RegExp(`^(?:${INTERNAL_NAMES.join("|")})$`), mangleCache, bundle: true, minify: true, target: "es2022", legalComments: "none", logLevel: "warning" };
@@ -169,7 +170,8 @@ async function build() {
   rmSync(dist, { recursive: true, force: true });
   mkdirSync(dist, { recursive: true });
   checkInternalNames();
-  await bundle("src/map3d.ts", "map3d.mjs", { format: "esm" });
+  const core = [...MODULE_ORDER.map((file) => `import "./src/${file}";\n`), 'export * from "./src/map3d.ts";\n'].join("");
+  await write({ ...shared, banner, stdin: { contents: core, resolveDir: root }, outfile: join(dist, "map3d.mjs"), plugins, format: "esm" });
   writeScript("map3d.mjs", "map3d.js");
   for (const [name, entry] of Object.entries(ENTRIES)) {
     await bundle(entry, `map3d-${name}.mjs`, { format: "esm", plugins: [coreAs("module"), ...plugins] });

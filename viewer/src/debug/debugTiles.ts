@@ -12,9 +12,9 @@ type Plan = map["plans"][number];
 export class debugTiles extends MapLayer<map, object> {
   readonly #pane = element("div", "map3d-debug", { "aria-hidden": "true" });
   readonly #update = (): void => {
-    const { plans, drawer, drawerNote } = this.map as map;
+    const { plans, drawer } = this.map as map;
     const boxes = plans.flatMap((plan) => plan.quads.map((quad) => outline(plan, quad, (this.map as map).getViewState()?.dpr ?? 1)));
-    this.#pane.replaceChildren(...boxes, element("p", "", {}, drawerNote ? `${String(drawer)}: ${drawerNote}` : String(drawer)));
+    this.#pane.replaceChildren(...boxes, element("p", "", {}, String(drawer)));
   };
 
   protected onAdd(map: map): void {
@@ -35,7 +35,8 @@ function outline({ view, layers, tiles }: Plan, { from, rect: [left, top, right,
     const sent = tiles.getTransfer(view, layer, from);
     return sent ? [`${layer.name} ${(sent.bytes / 1000).toFixed(1)} kB, ${((now - sent.at_ms) / 1000).toFixed(0)} s`] : [];
   });
-  const box = element("div", "", {}, [`${tileName(from)} × ${(1 / scale).toFixed(2)}`, ...lines].join("\n"));
+  // The kinds of a data tile share one line.
+  const box = element("div", "", {}, [`${tileName(from)} × ${(1 / scale).toFixed(2)}`, ...new Set(lines)].join("\n"));
   box.style.transform = `translate(${String(left / dpr)}px, ${String(top / dpr)}px)`;
   box.style.width = `${String((right - left) / dpr)}px`;
   box.style.height = `${String((bottom - top) / dpr)}px`;

@@ -118,8 +118,6 @@ export interface Drawer {
   readonly showsPreviousView: boolean;
   /** null when it does not use WebGL. */
   readonly gl: WebGL2RenderingContext | null;
-  /** A note for the debug overlay; usually empty. */
-  readonly note: string;
   draw(frame: FrameContent): void;
   /** Called when a tile has left the cache. */
   release(key: string): void;

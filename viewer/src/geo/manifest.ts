@@ -92,17 +92,19 @@ export interface View {
 export interface Rendering {
   readonly json: ManifestJson;
   readonly views: ReadonlyMap<string, View>;
-  /** The first layer of each kind. */
+  /** The first layer of each kind; a layer of data tiles counts as one of normals, one of ids and one of depths. */
   readonly layers: ReadonlyMap<string, LayerInfo>;
 }
 
 const SUPPORTED_VERSION = 1;
+/** The kinds that a layer of data tiles (spec/data-tile.md) stands for. */
+export const DATA_KINDS: readonly LayerKind[] = ["normal", "id", "depth"];
 
 /** Checks a parsed manifest. @throws ManifestError with the file, what was expected and what it contains */
 export function readManifest(value: unknown, where: string): Rendering {
   const json = checkManifest(value, where);
   const views = new Map(json.views.map((view) => [view.id, makeView(view, json)]));
-  const layers = new Map([...json.layers].reverse().map((layer) => [layer.kind, layer]));
+  const layers = new Map(json.layers.flatMap((layer) => (layer.kind === "data" ? DATA_KINDS.map((kind) => ({ ...layer, kind })) : [layer])).reverse().map((layer) => [layer.kind, layer]));
   return { json, views, layers };
 }
 

@@ -99,7 +99,7 @@ export class FrameRenderer {
     return this.#queue.busy || this.#drawer.busy;
   }
 
-  get drawer(): Pick<Drawer, "name" | "note" | "element" | "showsPreviousView"> {
+  get drawer(): Pick<Drawer, "name" | "element" | "showsPreviousView"> {
     return this.#drawer;
   }
 

@@ -153,11 +153,6 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     return this.#renderer?.drawer.name ?? null;
   }
 
-  /** @internal What the drawer says about itself, for developers. */
-  get drawerNote(): string | undefined {
-    return this.#renderer?.drawer.note;
-  }
-
   /** @internal What the last frame shows of each layer. */
   get plans(): readonly LayerPlan[] {
     return this.#plans;

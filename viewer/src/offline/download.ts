@@ -154,7 +154,7 @@ class ShardCollector {
 
   async add({ rendering, layer, tile }: { rendering: Rendering; layer: LayerInfo; tile: Tile; view: View }, bytes: ArrayBuffer): Promise<void> {
     const { objects, zmax } = rendering.json;
-    if (!objects || layer.kind !== "id" || tile.z !== Math.min(this.#last, zmax)) return;
+    if (!objects || (layer.kind !== "id" && layer.kind !== "data") || tile.z !== Math.min(this.#last, zmax)) return;
     const data = await this.#shown.layerContext?.tileResources.decoder.decode("id", layer.media_type, bytes);
     if (data?.kind !== "id") return;
     const shards = this.#shards.get(rendering);

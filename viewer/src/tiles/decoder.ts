@@ -24,14 +24,15 @@ export class Decoder {
     this.#size = Math.max(1, workers);
   }
 
-  decode(kind: string, mediaType: string, bytes: ArrayBuffer): Promise<TileData> {
+  /** @param keep leaves the bytes to the caller; else they move to the worker */
+  decode(kind: string, mediaType: string, bytes: ArrayBuffer, keep = false): Promise<TileData> {
     const id = this.#requestCount++;
     const worker = this.#workers[id % this.#size] ?? this.#startWorker();
     clearTimeout(this.#idleTimer);
     return new Promise((resolve, reject) => {
       this.#pending.set(id, { resolve, reject });
       const request: DecodeRequest = { id, kind, mediaType, bytes };
-      worker.postMessage(request, [bytes]);
+      worker.postMessage(request, keep ? [] : [bytes]);
     });
   }
 

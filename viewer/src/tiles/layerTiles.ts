@@ -1,12 +1,12 @@
 import { asError, DecodeError, FetchError } from "../core/errors";
 import { hasServiceWorker, isOffline } from "../core/network";
 import { tileName, type Tile } from "../geo/frame";
-import type { LayerInfo, View } from "../geo/manifest";
+import { DATA_KINDS, type LayerInfo, type View } from "../geo/manifest";
 import type { Cache } from "./cache";
 import type { Decoder } from "./decoder";
 import type { TileRequest, RequestQueue } from "./queue";
 import type { Source } from "./source";
-import { computeBytes, type TileData } from "./tileData";
+import { computeBytes, DATA_TYPE, type TileData } from "./tileData";
 
 /** A tile in memory. `data` is null when the tile is empty, or when only the drawer has it. */
 export interface CachedTile {
@@ -14,6 +14,8 @@ export interface CachedTile {
   readonly empty: boolean;
   /** Bytes received (0 if the source decodes), and when (performance.now). */
   readonly transfer: { readonly bytes: number; readonly at_ms: number };
+  /** The bytes of a data tile, from which its other kinds are decoded without a request. */
+  readonly packed?: ArrayBuffer | undefined;
 }
 
 export interface TileResources {
@@ -46,6 +48,8 @@ export class LayerTiles {
   readonly #reported = new Set<string>();
   /** Keys of the tiles that are being fetched. */
   readonly #loading = new Set<string>();
+  /** Data tiles that are being fetched, which requests for their kinds share. */
+  readonly #fetching = new Map<string, ReturnType<Source["tile"]>>();
   /** While the server does not answer: the number of tries in a row, and when the next is due. */
   #silence = { tries: 0, retry_ms: 0 };
   readonly #onArrival: (error: Error | null) => void;
@@ -59,7 +63,7 @@ export class LayerTiles {
   }
 
   key(view: View, layer: LayerInfo, tile: Tile): string {
-    return `${this.#name}/${view.id}/${layer.name}/${tileName(tile)}`;
+    return `${this.#name}/${view.id}/${layer.name}/${layer.media_type === DATA_TYPE ? `${layer.kind}/` : ""}${tileName(tile)}`;
   }
 
   /** Returns a tile in memory and counts it as used. */
@@ -120,15 +124,17 @@ export class LayerTiles {
     if (tries > 0) this.#waitForServer(tries); // the first request alone finds out whether the server answers again
     this.#loading.add(key);
     try {
-      const found = await this.#source.tile(view, layer, tile, signal);
+      const known = this.#findPacked(view, layer, tile);
+      const found = known?.packed ?? (await this.#fetch(view, layer, tile, signal));
       const [bytes, decoded] = found && "kind" in found ? [null, found] : [found, null];
-      const transfer = { bytes: bytes?.byteLength ?? 0, at_ms: performance.now() }; // the bytes move to another thread
-      const data = bytes ? await this.#resources.decoder.decode(layer.kind, layer.media_type, bytes) : decoded;
+      const transfer = known?.transfer ?? { bytes: bytes?.byteLength ?? 0, at_ms: performance.now() }; // the bytes move to another thread
+      const packed = bytes && layer.media_type === DATA_TYPE ? bytes : undefined;
+      const data = bytes ? await this.#resources.decoder.decode(layer.kind, layer.media_type, bytes, packed !== undefined) : decoded;
       if (signal.aborted) {
         if (data && "bitmap" in data) data.bitmap.close();
         return;
       }
-      this.#resources.cache.set(key, { data, empty: !data, transfer }, data ? computeBytes(data) * (data.kind === "id" || data.kind === "depth" ? 2 : 1) : 64);
+      this.#resources.cache.set(key, { data, empty: !data, transfer, packed }, data ? computeBytes(data) * (data.kind === "id" || data.kind === "depth" ? 2 : 1) + (packed?.byteLength ?? 0) : 64);
       this.#failed.delete(key);
       this.#silence = { tries: 0, retry_ms: 0 };
       if (!isAhead()) this.#onArrival(null);
@@ -147,6 +153,29 @@ export class LayerTiles {
     } finally {
       this.#loading.delete(key);
     }
+  }
+
+  /** Finds the tile of another kind that keeps the bytes of a data tile. */
+  #findPacked(view: View, layer: LayerInfo, tile: Tile): CachedTile | undefined {
+    if (layer.media_type !== DATA_TYPE) return undefined;
+    return DATA_KINDS.map((kind) => this.#resources.cache.peek(this.key(view, { ...layer, kind }, tile))).find((known) => known?.packed);
+  }
+
+  /** Fetches a tile; a data tile once for all its kinds. */
+  async #fetch(view: View, layer: LayerInfo, tile: Tile, signal: AbortSignal): ReturnType<Source["tile"]> {
+    if (layer.media_type !== DATA_TYPE) return this.#source.tile(view, layer, tile, signal);
+    const key = this.key(view, { ...layer, kind: "data" }, tile);
+    for (let shared = this.#fetching.get(key); shared; shared = this.#fetching.get(key)) {
+      try {
+        return await shared;
+      } catch (reason) {
+        // The other request may be unwanted by now, and this one not.
+        if (signal.aborted || asError(reason).name !== "AbortError") throw reason;
+      }
+    }
+    const own = this.#source.tile(view, layer, tile, signal).finally(() => { this.#fetching.delete(key); });
+    this.#fetching.set(key, own);
+    return own;
   }
 
   /** Requests nothing for a while, which is longer after each try. */

@@ -1,4 +1,5 @@
 import { DecodeError } from "../core/errors";
+import { decodeDataTile } from "../core/dataTile";
 import { decodePng } from "../core/png";
 
 /** A decoded tile; rows from the top. */
@@ -19,10 +20,14 @@ const CHANNELS: Readonly<Record<TileKind, number>> = { color: 0, picture: 0, nor
 
 export const NO_DEPTH = 0xffffffff;
 
-/** @throws DecodeError */
+/** Media type of a tile with normals, ids and depths. */
+export const DATA_TYPE = "application/vnd.map3d.data";
+
+/** Decodes a tile, or the pixels of one kind from a data tile. @throws DecodeError */
 export async function decodeTile(kind: string, mediaType: string, bytes: ArrayBuffer): Promise<TileData> {
   if (!isKind(kind)) throw new DecodeError(`unknown layer kind "${kind}"`);
   if (kind === "color" || kind === "picture") return decodeColor(kind, mediaType, bytes);
+  if (mediaType === DATA_TYPE) return (await decodeDataTile(new Uint8Array(bytes))).find((part) => part.kind === kind) as TileData;
   const { width, height, channels, data } = await decodePng(new Uint8Array(bytes));
   if (channels !== CHANNELS[kind]) throw new DecodeError(`${kind} tiles have ${String(CHANNELS[kind])} bytes per pixel, got ${String(channels)}`);
   // The values are little-endian, as memory is on every machine that runs a browser.

@@ -52,4 +52,11 @@ describe("layers", () => {
     expect([...rendering.layers.keys()].sort()).toEqual(["ao", "color", "depth", "id", "moonlight", "sun"]);
     expect(rendering.layers.get("color")?.name).toBe("color");
   });
+
+  test("a layer of data tiles stands for normals, ids and depths", () => {
+    const data = { ...layer("data", "data"), format: "m3d", media_type: "application/vnd.map3d.data", unit_m: 2 ** -10 };
+    const { layers } = read({ ...document(), layers: [layer("color"), data] });
+    expect([...layers.keys()].sort()).toEqual(["color", "depth", "id", "normal"]);
+    expect(layers.get("depth")).toEqual({ ...data, kind: "depth" });
+  });
 });

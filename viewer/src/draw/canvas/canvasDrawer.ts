@@ -48,10 +48,6 @@ export class CanvasDrawer implements Drawer {
     return this.#pictures.busy;
   }
 
-  get note(): string {
-    return this.#pictures.usesCompositing ? "lighting by compositing: this browser alters pixels on readback" : "";
-  }
-
   get element(): HTMLElement {
     return this.#compositor.element;
   }

@@ -23,6 +23,5 @@ export type ShadeMessage = { readonly put: string; readonly value: WorkerValue }
 
 export type ShadeResponse =
   /** Sent once: whether the browser returns pixels exactly as drawn. */
-  | { readonly readsExactly: boolean }
   | { readonly ticket: number; readonly picture: TileImage }
   | { readonly ticket: number; readonly error: string };

@@ -16,7 +16,6 @@ const pixelCache = new Map<string, Uint8ClampedArray>();
 
 const reader = new OffscreenCanvas(64, 64).getContext("2d", { willReadFrequently: true }) as OffscreenCanvasRenderingContext2D;
 const readsExactly = testReadback();
-scope.postMessage({ readsExactly });
 
 scope.onmessage = ({ data: message }) => {
   if ("put" in message) values.set(message.put, message.value);

@@ -47,7 +47,6 @@ export class TilePictures {
   #waiting: PictureRequest[] = [];
   #tickets = 0;
   #stopped = false;
-  #readsExactly: boolean | undefined;
 
   constructor(events: TilePicturesEvents) {
     this.#events = events;
@@ -56,11 +55,6 @@ export class TilePictures {
   /** Whether requests are running or waiting. */
   get busy(): boolean {
     return this.#running.size + this.#waiting.length > 0;
-  }
-
-  /** Whether colours are lit by compositing, because the browser does not return pixels exactly. */
-  get usesCompositing(): boolean {
-    return this.#readsExactly === false;
   }
 
   get(name: string): TilePicture | undefined {
@@ -135,8 +129,7 @@ export class TilePictures {
     const url = URL.createObjectURL(new Blob([workerCode], { type: "text/javascript" }));
     const worker = new Worker(url, { name: "map3d canvas" });
     worker.onmessage = ({ data }: MessageEvent<ShadeResponse>) => {
-      if ("readsExactly" in data) this.#readsExactly = data.readsExactly;
-      else this.#settle(data);
+      this.#settle(data);
     };
     worker.onerror = (event) => {
       this.stop();
@@ -145,7 +138,7 @@ export class TilePictures {
     return worker;
   }
 
-  #settle(response: Exclude<ShadeResponse, { readsExactly: boolean }>): void {
+  #settle(response: ShadeResponse): void {
     const request = this.#running.get(response.ticket);
     this.#running.delete(response.ticket);
     if (request) this.#store(request, response);
@@ -153,7 +146,7 @@ export class TilePictures {
     this.#events.made();
   }
 
-  #store({ picture, options, edges }: PictureRequest, response: Exclude<ShadeResponse, { readsExactly: boolean }>): void {
+  #store({ picture, options, edges }: PictureRequest, response: ShadeResponse): void {
     if ("error" in response) this.#events.failed(new DrawError(`tile ${picture.name}: ${response.error}`));
     const image = "picture" in response ? response.picture : undefined;
     if (this.#pictures.get(picture.name) !== picture) {

@@ -39,7 +39,6 @@ export class WebGLDrawer implements Drawer {
   readonly name = "webgl";
   readonly busy = false;
   readonly showsPreviousView = false;
-  readonly note = "";
   readonly gl: WebGL2RenderingContext;
   readonly #canvas: HTMLCanvasElement;
   readonly #listeners = new AbortController();
