@@ -1,5 +1,5 @@
 """`python -m bench [PART …] [--json]`. Parts: tiles, light, encoding, ingest, incremental (the default); extent, planning, stored, viewer,
-catalogue, overhead, saturation, view, large, render."""
+catalogue, overhead, saturation, view, large, render, formats."""
 
 import argparse
 import json
@@ -13,6 +13,7 @@ from rich.table import Table
 from . import (
     catalogue,
     catalogue_overhead,
+    color_formats,
     encoding,
     extent,
     incremental,
@@ -30,7 +31,7 @@ from . import (
 from .benchmark_scene import CACHE
 
 PARTS = ("tiles", "light", "encoding", "ingest", "incremental")
-ON_REQUEST = ("extent", "planning", "stored", "viewer", "catalogue", "overhead", "saturation", "view", "large", "render")
+ON_REQUEST = ("extent", "planning", "stored", "viewer", "catalogue", "overhead", "saturation", "view", "large", "render", "formats")
 Rows = list[dict[str, Any]]
 
 
@@ -39,10 +40,10 @@ def main() -> None:
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"{', '.join(PARTS)} (default: these), {', '.join(ON_REQUEST)}")
     parser.add_argument("--millions", type=float, nargs="+", help="extent, view: sizes in million triangles (1 3 10, 1 10)")
     parser.add_argument("--megabytes", type=float, nargs="+", help="large: sizes of the CityGML files (50 200 1000)")
-    parser.add_argument("--buildings", type=int, default=300, help="tiles, render: number of buildings of the town")
-    parser.add_argument("--res", type=float, default=0.2, help="tiles: metres per pixel")
+    parser.add_argument("--buildings", type=int, default=300, help="tiles, render, formats: number of buildings of the town")
+    parser.add_argument("--res", type=float, default=0.2, help="tiles, formats: metres per pixel")
     parser.add_argument("--render-res", type=float, default=0.1, help="render: metres per pixel")
-    parser.add_argument("--tiles", type=int, default=48, help="tiles: number of tiles")
+    parser.add_argument("--tiles", type=int, default=48, help="tiles, formats: number of tiles")
     parser.add_argument("--folders", type=Path, nargs="+", default=[CACHE], help="stored: folders with renderings or published folders")
     parser.add_argument(
         "--catalogues", nargs="+", default=[], metavar="URL", help="catalogue, overhead, saturation: MongoDB servers, without a database"
@@ -83,6 +84,7 @@ def main() -> None:
             options.pairs,
             render_pairs.RenderOptions(options.buildings, options.render_res, options.directions, options.color, options.workers),
         ),
+        "formats": lambda: color_formats.measure(options.buildings, options.res, options.tiles),
         "stored": lambda: stored.measure(options.folders),
         "viewer": lambda: viewer.measure(
             options.quick, options.reps, options.work or CACHE / "viewer", tuple(options.only) if options.only else None, options.free
