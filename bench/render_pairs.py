@@ -1,8 +1,10 @@
 """Whole renders of a town beside those of another version of map3d: `python -m bench render --against FOLDER`.
 
-FOLDER is a checkout with a compiled core (`make build`), or one of its copies. Both versions render the same scene in turn; their tiles are compared.
+FOLDER is a checkout with a compiled core (`make build`), or one of its copies. Both versions import and render the same town in turn, each in a
+workspace of its own, since a newer version migrates the catalogue; their tiles are compared.
 """
 
+import hashlib
 import json
 import os
 import statistics
@@ -11,7 +13,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
-from contextlib import closing
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -65,15 +66,15 @@ class RenderOptions:
 
 def measure(against: Path | None, pairs: int, options: RenderOptions) -> list[dict[str, Any]]:
     """Renders the town `pairs` times with each version in turn and prints medians and ranges. Fails when their tiles differ."""
-    bench = RenderBenchmark(options)
-    versions = {"now": HERE} if against is None else {"before": against.resolve(), "now": HERE}
-    for name, root in versions.items():
-        bench.render(root, f"warm-{name}")
+    roots = {"now": HERE} if against is None else {"before": against.resolve(), "now": HERE}
+    versions = {name: RenderBenchmark(root, options) for name, root in roots.items()}
+    for name, bench in versions.items():
+        bench.render(f"warm-{name}")
     costs: dict[str, list[RenderCost]] = {name: [] for name in versions}
     tiles: dict[str, dict[str, str]] = {}
     for _ in range(pairs):
-        for name, root in versions.items():
-            cost, found = bench.render(root, name)
+        for name, bench in versions.items():
+            cost, found = bench.render(name)
             costs[name].append(cost)
             tiles.setdefault(name, found)
     equal = all(found == tiles["now"] for found in tiles.values())
@@ -84,32 +85,32 @@ def measure(against: Path | None, pairs: int, options: RenderOptions) -> list[di
 
 
 class RenderBenchmark:
-    """The town and its scene, made once per checkout."""
+    """The town, and its scene in a workspace of the version in `root`, made once."""
 
-    def __init__(self, options: RenderOptions) -> None:
-        self._options = options
+    def __init__(self, root: Path, options: RenderOptions) -> None:
+        self._root, self._options = root, options
         folder = CACHE / f"render-{options.buildings}"
-        self._workspace = Workspace(folder / "workspace").create()
-        self._where = ["-w", str(self._workspace.root.absolute())]
-        with closing(self._workspace.open_catalogue()) as catalogue:
-            is_made = "town" in {scene.name for scene in catalogue.scenes()}
-        if not is_made:
+        if not (folder / "town").is_dir():
             run_verb(["make-town", "-o", str(folder / "town"), "--buildings", str(options.buildings), "--seed", "7"])
-            run_verb(["create-scene", "town", *self._where])
-            run_verb(["add-files", "town", str(folder / "town"), *self._where])
+        self._workspace = Workspace(folder / f"workspace-{hashlib.sha256(str(root).encode()).hexdigest()[:8]}")
+        self._where = ["-w", str(self._workspace.root.absolute())]
+        if not self._workspace.root.is_dir():
+            self._run(["create-workspace", *self._where])
+            self._run(["create-scene", "town", *self._where])
+            self._run(["add-files", "town", str((folder / "town").absolute()), *self._where])
 
-    def render(self, root: Path, name: str) -> tuple[RenderCost, dict[str, str]]:
-        """Renders with the version in `root`; returns the cost, and the hash of each tile by store, layer and number."""
+    def render(self, name: str) -> tuple[RenderCost, dict[str, str]]:
+        """Returns the cost of a render, and the hash of each tile by store, layer and number."""
         view = ["--view", "0/45"] if self._options.directions == 1 else ["--directions", str(self._options.directions)]
         color = ["--color", self._options.color, "--res", str(self._options.res_m)]
-        self._run(root, ["create-rendering", "town", name, *view, *color, *self._where])
+        self._run(["create-rendering", "town", name, *view, *color, *self._where])
         workers = ["--workers", str(self._options.workers)]
         begun = time.perf_counter()
-        output, usage = self._run(root, ["render", name, "--json", "--stats", *workers, *self._where])
+        output, usage = self._run(["render", name, "--json", "--stats", *workers, *self._where])
         wall_s = time.perf_counter() - begun
         report = json.loads(output)
         tiles = _hashes(self._workspace.rendering_folder(name))
-        self._run(root, ["remove-rendering", name, "--yes", *self._where])
+        self._run(["remove-rendering", name, "--yes", *self._where])
         cost = RenderCost(
             cpu_s=usage.ru_utime + usage.ru_stime,
             user_s=usage.ru_utime,
@@ -120,9 +121,9 @@ class RenderBenchmark:
         )
         return cost, tiles
 
-    def _run(self, root: Path, arguments: Sequence[str]) -> tuple[str, Any]:
+    def _run(self, arguments: Sequence[str]) -> tuple[str, Any]:
         """Returns the output of a verb and the resource usage of its whole process tree."""
-        environment = os.environ | {"PYTHONPATH": str(root / "python")}
+        environment = os.environ | {"PYTHONPATH": str(self._root / "python")}
         with tempfile.TemporaryFile() as out:
             process = subprocess.Popen([sys.executable, "-c", _MAP3D, *arguments], stdout=out, stderr=subprocess.DEVNULL, env=environment)
             _, status, usage = os.wait4(process.pid, 0)
@@ -130,7 +131,7 @@ class RenderBenchmark:
             out.seek(0)
             text = out.read().decode()
         if process.returncode != 0:
-            raise SystemExit(f"bench: map3d {' '.join(arguments)} with {root} failed: {text[-500:]}")
+            raise SystemExit(f"bench: map3d {' '.join(arguments)} with {self._root} failed: {text[-500:]}")
         return text, usage
 
 
