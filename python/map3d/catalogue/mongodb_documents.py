@@ -14,7 +14,7 @@ from map3d.types import BlockId
 
 Document = dict[str, Any]
 
-ORDER: Final = [("tries", 1), ("z", 1), ("ground", 1), ("track", 1), ("morton", 1)]
+ORDER: Final = [("tries", 1), ("z", 1), ("track", 1), ("morton", 1)]
 """The order in which jobs are leased. `tries`: attempts and expired leases."""
 EXPIRES: Final = {"$add": ["$renewed", "$lease_ms"]}
 HELD: Final = {"$expr": {"$gte": [EXPIRES, "$$NOW"]}}
@@ -60,7 +60,7 @@ def job_document(rendering: str, job: PlannedJob, fence: int) -> Document:
 
 def planned_fields(job: PlannedJob) -> Document:
     """Returns the fields that a plan sets. A reduce job waits until a sweep finds all blocks below it done."""
-    return {"key": job.key, "ground": job.ground, "state": State.TODO if job.kind == "base" else State.WAITING, **FORGET}
+    return {"key": job.key, "state": State.TODO if job.kind == "base" else State.WAITING, **FORGET}
 
 
 def parent_id(rendering: str, job: PlannedJob) -> str | None:
@@ -86,7 +86,6 @@ def load_lease(document: Document, content_version: int) -> Lease:
         attempt=document["attempts"],
         worker=document["worker"],
         content_version=content_version,
-        ground=document["ground"],
     )
 
 
@@ -98,7 +97,6 @@ def load_job(document: Document) -> Job:
         block=_block(document),
         state=state,
         expires_s=_expires_s(document) if state is State.LEASED else None,
-        ground=document["ground"],
         leased_s=_seconds(document["leased"]),
         ended_s=_seconds(document["ended"]),
         result=None if document["result"] is None else _load_result(document["result"]),

@@ -149,8 +149,7 @@ class RenderingRecord:
 @dataclass(frozen=True)
 class PlannedJob:
     """A block that should exist. `order`: Morton number of its root tile. `parent`: the reduce block that takes its seam, None at the top.
-    `key`: hash of everything that its bytes depend on. `ground`: its ground number, in whose order jobs are leased; a reduce block has that of its
-    first base block."""
+    `key`: hash of everything that its bytes depend on."""
 
     track: str
     block: BlockId
@@ -158,7 +157,6 @@ class PlannedJob:
     order: int
     key: str
     parent: BlockId | None
-    ground: int = 0
 
 
 @dataclass(frozen=True)
@@ -210,14 +208,13 @@ class Job:
     expires_s: float | None
     reason: str | None
     result: JobResult | None
-    ground: int = 0
     leased_s: float | None = None
     ended_s: float | None = None
 
 
 @dataclass(frozen=True)
 class Lease:
-    """A worker's claim on a job. Every later call about the job passes `fence`; changed tiles get `content_version`. `ground`: as in `PlannedJob`."""
+    """A worker's claim on a job. Every later call about the job passes `fence`; changed tiles get `content_version`."""
 
     rendering: str
     track: str
@@ -228,4 +225,3 @@ class Lease:
     attempt: int
     worker: str
     content_version: int
-    ground: int = 0
