@@ -22,6 +22,5 @@ export interface ShadeRequest {
 export type ShadeMessage = { readonly put: string; readonly value: WorkerValue } | { readonly drop: string } | ShadeRequest;
 
 export type ShadeResponse =
-  /** Sent once: whether the browser returns pixels exactly as drawn. */
   | { readonly ticket: number; readonly picture: TileImage }
   | { readonly ticket: number; readonly error: string };
