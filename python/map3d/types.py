@@ -21,7 +21,7 @@ LAYER_KINDS: Final[tuple[LayerKind, ...]] = ("color", "normal", "id", "depth", "
 DATA_TILE_KINDS: Final[tuple[LayerKind, ...]] = ("normal", "id", "depth")
 """The kinds of pixels in a data tile (spec/data-tile.md)."""
 LAYERS_BY_DATA: Final[Mapping[DataEncoding, tuple[LayerKind, ...]]] = {"png": ("color", *DATA_TILE_KINDS), "tile": ("color", "data")}
-DEFAULT_DATA: Final[DataEncoding] = "png"
+DEFAULT_DATA: Final[DataEncoding] = "tile"
 DEFAULT_LAYERS: Final[tuple[LayerKind, ...]] = LAYERS_BY_DATA[DEFAULT_DATA]
 COLOR_KINDS: Final = ("color", "picture")
 DEPTH_KINDS: Final = ("depth", "depth2", "data")

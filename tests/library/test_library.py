@@ -75,7 +75,7 @@ def test_scenes_and_renderings_are_listed_found_and_removed(tmp_path: Path, file
         assert [frame.id for frame in rendering.record.frames] == ["0-30", "180-30"]
         rendering.add_views((90, 45))
         rendering.add_layers("noon=picture", sun=(195, 60))
-        assert [layer.name for layer in rendering.record.layers] == ["color", "normal", "id", "depth", "noon"]
+        assert [layer.name for layer in rendering.record.layers] == ["color", "data", "noon"]
         assert [one.name for one in scene.renderings()] == [one.name for one in workspace.renderings()] == ["town"]
         assert scene.remove_files("hut") == ["hut"]
         assert scene.build() is None, "it was built again"

@@ -16,6 +16,7 @@ from map3d.portrayal.answers import BOUNDARY, Answer
 from map3d.portrayal.service import PortrayalService, ServiceRequest
 from map3d.portrayal.tracer_pool import TracerPool
 from map3d.renderings.track_stores import open_track
+from map3d.tiles.decode_tile import as_layer, find_layer
 from tests.portrayal.conftest import ENDPOINT, FAKE, Ask
 from tests.portrayal.fake_tracer import CRASH_PX, SLOW_PX, STUCK_PX
 from tests.portrayal.queries import ORTHOGRAPHIC, PERSPECTIVE, get_view
@@ -166,11 +167,15 @@ def stored_pixels(service: PortrayalService, layer: str, left: int, top: int, wi
     frame = record.frames[0]
     whole = np.zeros((frame.tile_px << frame.zmax, frame.tile_px << frame.zmax, 4), np.uint8)
     with open_track(service.views.workspace, record, frame.id) as store:
-        number = store.shape.layer_number(layer)
+        found = find_layer(record.layers, layer)
+        assert found is not None
+        asked, stored = found
+        number = store.shape.layer_number(stored.name)
         for tile in store.list_tiles(number):
             if tile.z == frame.zmax:
                 x, y = tile.x * frame.tile_px, tile.y * frame.tile_px
-                whole[y : y + frame.tile_px, x : x + frame.tile_px] = np.asarray(Image.open(io.BytesIO(store.get_tile(number, *tile))))
+                data = as_layer(asked, stored, store.get_tile(number, *tile), frame.tile_px, str(tile))
+                whole[y : y + frame.tile_px, x : x + frame.tile_px] = np.asarray(Image.open(io.BytesIO(data)))
     return whole[top : top + height, left : left + width]
 
 

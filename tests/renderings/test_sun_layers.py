@@ -132,7 +132,7 @@ def test_layers_have_the_parameters_of_their_kinds_in_the_order_of_kinds() -> No
         ("picture", "picture", "jpeg", 70, 1, 7.5),
     ]
     assert only(LayerRequest(("ao",)).layers(LOCAL_SCENE, BOX)).radius_m == 20.0
-    assert [layer.kind for layer in LayerRequest().layers(LOCAL_SCENE, BOX)] == ["color", "normal", "id", "depth"]
+    assert [layer.kind for layer in LayerRequest().layers(LOCAL_SCENE, BOX)] == ["color", "data"]
 
 
 @pytest.mark.parametrize(

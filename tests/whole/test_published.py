@@ -89,7 +89,7 @@ def test_stopped_and_killed_site_resumes_and_has_the_same_tiles(teatime: Path, u
     subprocess.run(site(teatime, tmp_path), check=True)
     assert run(["verify", "--published", str(tmp_path / "out")]) == 0
     expected, got = tiles_of(undisturbed / "out"), tiles_of(tmp_path / "out")
-    assert len(expected) == 20, "four views, five layers"
+    assert len(expected) == 12, "four views, three layers"
     assert [name for name in expected | got if expected.get(name) != got.get(name)] == []
 
 

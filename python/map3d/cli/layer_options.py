@@ -80,7 +80,8 @@ def _layers_option(*, required: bool) -> Callable[[Any], Any]:
 
 def data_option(*, beside_layers: bool = False) -> Callable[[Any], Any]:
     """Adds `--data`; None unless it is given, if it stands beside `--layers`, else by default DEFAULT_DATA."""
-    stores = "tore normal, id and depth as three PNG layers (png), or as one layer of data tiles in less than half of the bytes (tile)."
+    stores = "tore normal, id and depth as one layer of data tiles (tile), or in more than twice the bytes as three PNG layers, which any program"
+    stores += " reads (png)."
     text = f"Instead of --layers: s{stores}  [default: {DEFAULT_DATA}]" if beside_layers else f"S{stores}"
     settings: dict[str, Any] = {} if beside_layers else {"default": DEFAULT_DATA, "show_default": True}
     return click.option("--data", type=click.Choice(list(LAYERS_BY_DATA)), help=text, **settings)
