@@ -4,16 +4,14 @@ import json
 import re
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from map3d.catalogue import Workspace
 from map3d.registry import Registry
-from map3d.tiles.sqlite_store import SqliteTileStore
 from tests.cli.bad_files import BAD_LINES, DAMAGED_IMAGES, USELESS_FILES, citygml, elevation, house_with, jpeg, textured, truncated
+from tests.cli.tile_ids import ids_in_tiles
 from tests.cli.towns import Run, house
 
-core = pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
 pytestmark = pytest.mark.whole
 
 
@@ -106,18 +104,6 @@ def messy(tmp_path: Path) -> Path:
     (folder / "truncated.gml").write_text(truncated())
     elevation(folder / "plain.tif")
     return folder
-
-
-def ids_in_tiles(workspace: Workspace) -> set[int]:
-    """Returns the object ids in the tiles of the deepest level."""
-    seen: set[int] = set()
-    with SqliteTileStore(workspace.store_path("view", "0-45"), read_only=True) as store:
-        number = [layer.kind for layer in store.shape.layers].index("id")
-        for tile in store.list_tiles(number):
-            data = store.get_tile(number, *tile) if tile.z == store.shape.zmax else None
-            if data is not None:
-                seen |= set(np.unique(np.ascontiguousarray(core.decode_png(data)).view("<u4")).tolist())
-    return seen
 
 
 def test_all_usable_parts_of_a_messy_folder_are_rendered(run: Run, tmp_path: Path, messy: Path) -> None:

@@ -51,9 +51,9 @@ def test_second_layer_of_the_same_kind_has_another_name_and_pass(town: Run) -> N
     assert town("add-layers", "view", "--layers", "sun,depth2", *TIME, *PLACE)[0] == 0
     assert town("add-layers", "view", "--layers", "sun", "--sun", "280,12")[0] == 2, "the name is taken"
     status, out, err = town("add-layers", "view", "--layers", "evening=sun", "--sun", "280,12")
-    assert (status, out) == (0, "rendering view: 7 layers; next: map3d render view\n"), err
+    assert (status, out) == (0, "rendering view: 5 layers; next: map3d render view\n"), err
     assert [[layer["name"] for layer in layers] for layers in passes(town, "view")] == [
-        ["color", "normal", "id", "depth"],
+        ["color", "data"],
         ["sun", "depth2"],
         ["evening"],
     ]

@@ -24,7 +24,7 @@ PLACE = ("--place", "48.76,11.42")
 DAY = ("--date", "2026-06-21", *PLACE)
 HEIGHT_M = 10.0
 NOTHING = 0xFFFFFFFF
-LAYERS = "color,normal,id,depth,sun,sun16,ao,depth2,picture"
+LAYERS = "color,data,sun,sun16,ao,depth2,picture"
 
 
 @dataclass

@@ -11,16 +11,15 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from map3d.catalogue import State, Workspace
 from map3d.registry import Registry
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.sqlite_store import SqliteTileStore
+from tests.cli.tile_ids import ids_in_tiles
 from tests.cli.towns import Run, house, write_town
 
-core = pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
 pytestmark = pytest.mark.whole
 
 VIEWS = ("--view", "0/45", "--view", "90/30")
@@ -68,15 +67,9 @@ def test_files_become_tiles_that_verify(run: Run, town: Workspace) -> None:
 
 def test_ids_in_tiles_are_those_of_the_registry(run: Run, town: Workspace) -> None:
     run("render", "view")
-    with Registry(town.registry_path("town")) as registry, SqliteTileStore(town.store_path("view", "0-45"), read_only=True) as store:
+    seen = ids_in_tiles(town)
+    with Registry(town.registry_path("town")) as registry:
         known = {item.id: item.name for item in registry.objects()}
-        seen: set[int] = set()
-        number = [layer.kind for layer in store.shape.layers].index("id")
-        for tile in store.list_tiles(number):
-            if tile.z == store.shape.zmax:
-                data = store.get_tile(number, *tile)
-                assert data is not None
-                seen |= set(np.unique(np.ascontiguousarray(core.decode_png(data)).view("<u4")).tolist())
     houses = {number for number, name in known.items() if name.startswith("house")}
     assert len(houses) == 16
     assert houses <= seen
