@@ -1,10 +1,15 @@
 """Laws of jobs: states, leases, fences (spec/catalogue.md)."""
 
+import sqlite3
 import time
+from contextlib import closing
+from pathlib import Path
 
 import pytest
 
 from map3d.catalogue import Catalogue, Job, JobResult, Lease, PlannedJob, State
+from map3d.catalogue.sqlite import SqliteCatalogue
+from map3d.catalogue.sqlite_jobs import _LEASE
 from map3d.catalogue.states import MAX_ATTEMPTS, MAX_EXPIRIES, TRANSITIONS, JobEvent
 from map3d.errors import StaleFence
 from map3d.types import BlockId
@@ -14,8 +19,8 @@ TOP = BlockId(0, 0, 0)
 RESULT = JobResult(version=1, empty=False, tiles=3, base_tiles=1, bytes=100, seconds=0.5)
 
 
-def base(x: int = 0, key: str = "k", above: BlockId | None = TOP) -> PlannedJob:
-    return PlannedJob("0-45", BlockId(3, x, 0), "base", x, key, above)
+def base(x: int = 0, key: str = "k", above: BlockId | None = TOP, track: str = "0-45", ground: int = 0) -> PlannedJob:
+    return PlannedJob(track, BlockId(3, x, 0), "base", x, key, above, ground)
 
 
 def reduce(key: str = "r") -> PlannedJob:
@@ -33,7 +38,7 @@ def only(catalogue: Catalogue, state: State | None = None) -> Job:
     return job
 
 
-def test_jobs_are_leased_in_morton_order_with_rising_fences(catalogue: Catalogue) -> None:
+def test_jobs_of_equal_ground_are_leased_in_morton_order_with_rising_fences(catalogue: Catalogue) -> None:
     catalogue.plan("town-a", [base(2), base(0), base(1)])
     leases = [take(catalogue) for _ in range(3)]
     assert [lease.block.x for lease in leases] == [0, 1, 2]
@@ -85,8 +90,37 @@ def test_quarantined_block_keeps_its_reduce_job_waiting(catalogue: Catalogue) ->
     assert (counts[State.WAITING], counts[State.QUARANTINED]) == (1, 1)
 
 
-def test_lease_starts_at_a_morton_number_and_wraps_around(catalogue: Catalogue) -> None:
-    catalogue.plan("town-a", [reduce(), *map(base, range(4))])
+def test_jobs_of_all_tracks_are_leased_along_the_ground(catalogue: Catalogue) -> None:
+    grounds = {("0-45", 0): 5, ("0-45", 1): 2, ("0-45", 2): 7, ("90-45", 0): 2, ("90-45", 1): 1 << 40, ("90-45", 2): 6}
+    catalogue.plan("town-a", [base(x, above=None, track=track, ground=ground) for (track, x), ground in grounds.items()])
+    for start, expected in ((0, [2, 2, 5, 6, 7, 1 << 40]), (6, [6, 7, 1 << 40, 2, 2, 5])):
+        leases = [lease for _ in grounds if (lease := catalogue.lease("town-a", "w", start)) is not None]
+        assert [lease.ground for lease in leases] == expected
+        assert all(grounds[lease.track, lease.block.x] == lease.ground for lease in leases)
+        assert [lease.track for lease in leases if lease.ground == 2] == ["0-45", "90-45"]
+        for lease in leases:
+            catalogue.release(lease)
+    assert {(job.track, job.block.x): job.ground for job in catalogue.jobs("town-a")} == grounds
+
+
+def test_a_changed_block_takes_the_ground_number_of_the_new_plan(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [base(ground=3)])
+    catalogue.plan("town-a", [base(key="changed", ground=4)])
+    assert only(catalogue).ground == 4
+
+
+def test_reduce_jobs_come_before_base_jobs_of_any_ground(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [base(0, ground=9), base(0, track="90-45", above=None), reduce()])
+    first = catalogue.lease("town-a", "w", 9)
+    assert first is not None
+    catalogue.done(first, RESULT)
+    second = catalogue.lease("town-a", "w", 9)
+    assert second is not None
+    assert (second.kind, second.block) == ("reduce", TOP)
+
+
+def test_lease_starts_at_a_ground_number_and_wraps_around(catalogue: Catalogue) -> None:
+    catalogue.plan("town-a", [reduce(), *(base(x, ground=x) for x in range(4))])
     third = 2
     taken = [catalogue.lease("town-a", "w", third) for _ in range(4)]
     assert [lease.block.x for lease in taken if lease is not None] == [2, 3, 0, 1]
@@ -305,3 +339,14 @@ def say(catalogue: Catalogue, word: str, lease: Lease) -> None:
         catalogue.release(lease)
     else:
         catalogue.heartbeat(lease)
+
+
+def test_a_lease_in_sqlite_finds_its_job_in_an_index_without_sorting(tmp_path: Path) -> None:
+    path = tmp_path / "catalogue.sqlite"
+    SqliteCatalogue(path).close()
+    with closing(sqlite3.connect(path)) as db:
+        steps = [row[3] for row in db.execute(f"EXPLAIN QUERY PLAN {_LEASE}", {"rendering": "r", "worker": "w", "lease_s": 1, "start": 5})]
+    found = [step for step in steps if "job_next" in step]
+    assert len(found) == 3
+    assert any(step.endswith("z=? AND ground>?)") for step in found)
+    assert not any("TEMP B-TREE" in step or step.startswith("SCAN") for step in steps)

@@ -57,7 +57,12 @@ CREATE UNIQUE INDEX operation_running ON operation(scene) WHERE state = 'running
 CREATE TABLE operation_log(operation INTEGER NOT NULL, number INTEGER NOT NULL, time REAL NOT NULL, text TEXT NOT NULL,
   PRIMARY KEY(operation, number)) WITHOUT ROWID;
 """
-SCHEMAS = {2 + n: "".join((VERSION_2, VERSION_3, VERSION_4, VERSION_5, VERSION_6)[: n + 1]) for n in range(5)}
+VERSION_7 = """
+CREATE TABLE user(name TEXT PRIMARY KEY, password_hash TEXT NOT NULL, role TEXT NOT NULL, created_s REAL NOT NULL);
+CREATE TABLE token(id TEXT PRIMARY KEY, user TEXT NOT NULL REFERENCES user(name), title TEXT NOT NULL, role TEXT NOT NULL,
+  digest TEXT NOT NULL UNIQUE, created_s REAL NOT NULL);
+"""
+SCHEMAS = {2 + n: "".join((VERSION_2, VERSION_3, VERSION_4, VERSION_5, VERSION_6, VERSION_7)[: n + 1]) for n in range(6)}
 JOBS = """
 INSERT INTO job(rendering, track, z, x, y, kind, morton, key, parent_z, parent_x, parent_y, state, attempts, fence) VALUES
   ('town-a', '0-45', 3, 0, 0, 'base', 0, 'k', 0, 0, 0, 'todo', 2, 1048578), ('town-a', '0-45', 3, 1, 0, 'base', 1, 'k', 0, 0, 0, 'done', 1, 1048577),
@@ -101,6 +106,7 @@ def test_older_catalogue_is_migrated_and_keeps_its_records_and_jobs(old: Path, t
         above, todo, done = catalogue.jobs("town-a")
         assert (todo.attempts, todo.expiries, done.state, above.state) == (2, 0, State.DONE, State.WAITING)
         assert done.result == JobResult(version=1, empty=False, tiles=3, base_tiles=1, bytes=100, seconds=0.5, occupied=None)
+        assert [job.ground for job in (above, todo, done)] == [0, 0, 1], "the Morton number, as it was leased before"
         assert catalogue.rendering("town-a") == rendering()
         counts = catalogue.count_jobs("town-a")
         assert {state: count for state, count in counts.items() if count} == {State.TODO: 1, State.DONE: 1, State.WAITING: 1}

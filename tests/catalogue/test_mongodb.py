@@ -16,7 +16,7 @@ from map3d.errors import BadRequest, StaleFence, StoreError, UnknownVersion
 from map3d.types import BlockId
 from tests.catalogue.implementations import Kill, NewUrl, new_urls, rendering
 from tests.catalogue.mongo_process import MongoProcess, Unavailable, build
-from tests.catalogue.pyramids import RESULT, TRACKS, pyramid, work_off
+from tests.catalogue.pyramids import RESULT, TRACKS, described, pyramid, work_off
 
 TRACK = TRACKS[:1]
 BLOCK = (TRACKS[0], BlockId(6, 4, 0))
@@ -176,6 +176,36 @@ def test_catalogue_of_a_newer_version_is_refused(new_url: NewUrl, mongo_server: 
         open_catalogue(url)
 
 
+def test_an_unfinished_rendering_of_version_1_goes_on(new_url: NewUrl, mongo_server: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Version 1 had no ground numbers. The migration is repeated, as after a kill."""
+    monkeypatch.setattr(mongodb_connection, "MIGRATED_BATCH", 3)
+    url = new_url()
+    catalogue = open_catalogue(url)
+    catalogue.create_scene(SceneRecord("town"))
+    catalogue.create_rendering(rendering())
+    catalogue.plan("town-a", pyramid())
+    lease = catalogue.lease("town-a", "w")
+    assert lease is not None
+    catalogue.done(lease, RESULT)
+    before = described(catalogue)
+    catalogue.close()
+    former = ["rendering", "state", "tries", "z", "track", "morton"]
+    with MongoClient[dict[str, object]](mongo_server) as client:
+        database = client[url.rpartition("/")[2]]
+        database["job"].update_many({}, {"$unset": {"ground": ""}})
+        database["job"].create_index([(name, 1) for name in former])
+        for _ in range(2):
+            database["meta"].update_one({"_id": "schema"}, {"$set": {"version": 1}})
+            open_catalogue(url).close()
+        assert former not in [list(index["key"]) for index in database["job"].list_indexes()]
+    catalogue = open_catalogue(url)
+    assert described(catalogue) == before
+    assert {job.block.x: job.ground for job in catalogue.jobs("town-a", TRACKS[0]) if job.kind == "base"} == {0: 0, 4: 16, 8: 32, 12: 48}
+    work_off(catalogue)
+    assert set(catalogue.count_jobs("town-a").items()) >= {(State.DONE, len(before)), (State.TODO, 0), (State.WAITING, 0)}
+    catalogue.close()
+
+
 def test_older_catalogue_is_migrated_once(new_url: NewUrl, monkeypatch: pytest.MonkeyPatch) -> None:
     url, migrated = new_url(), []
     open_catalogue(url).close()
@@ -194,7 +224,7 @@ def test_indexes_support_the_frequent_queries(new_url: NewUrl, mongo_server: str
     open_catalogue(url).close()
     with MongoClient[dict[str, object]](mongo_server) as client:
         found = [list(index["key"]) for index in client[url.rpartition("/")[2]]["job"].list_indexes()]
-    assert ["rendering", "state", "tries", "z", "track", "morton"] in found
+    assert ["rendering", "state", "tries", "z", "ground", "track", "morton"] in found
     assert ["parent", "state"] in found
 
 

@@ -80,7 +80,8 @@ def planned_jobs(rendering: RenderingRecord, key: str = "key") -> list[PlannedJo
 
 
 def planned(block: BlockId, kind: str, zmax: int, key: str) -> PlannedJob:
-    return PlannedJob(VIEW, block, "base" if kind == "base" else "reduce", morton(block.x, block.y), f"{key} {block}", block_above(block, zmax))
+    number, above = morton(block.x, block.y), block_above(block, zmax)
+    return PlannedJob(VIEW, block, "base" if kind == "base" else "reduce", number, f"{key} {block}", above, number)
 
 
 def open_town(root: Path, lease_s: float = LEASE_S) -> Town:

@@ -5,9 +5,10 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from datetime import datetime
+from itertools import islice
 from typing import Any, Final, TypeVar
 
-from pymongo import MongoClient, WriteConcern
+from pymongo import MongoClient, UpdateOne, WriteConcern
 from pymongo.collection import Collection
 from pymongo.database import Database
 from pymongo.errors import AutoReconnect, ConfigurationError, DuplicateKeyError, InvalidURI, OperationFailure, PyMongoError
@@ -19,8 +20,23 @@ from map3d.errors import BadRequest, StoreError, UnknownVersion
 Document = dict[str, Any]
 Result = TypeVar("Result")
 
-VERSION: Final = 1
-MIGRATIONS: Final[Mapping[int, Callable[[Database[Document]], None]]] = {}
+VERSION: Final = 2
+MIGRATED_BATCH: Final = 1_000
+"""Documents that a migration changes with one request."""
+
+
+def _add_ground(database: Database[Document]) -> None:
+    """Gives every job a ground number. The index over the former order of leases goes."""
+    jobs = database["job"]
+    without = jobs.find({"ground": {"$exists": False}}, {"morton": 1})
+    while updates := [UpdateOne({"_id": job["_id"]}, {"$set": {"ground": job["morton"]}}) for job in islice(without, MIGRATED_BATCH)]:
+        jobs.bulk_write(updates, ordered=False)
+    for name, index in jobs.index_information().items():
+        if [field for field, _ in index["key"]] == ["rendering", "state", "tries", "z", "track", "morton"]:
+            jobs.drop_index(name)
+
+
+MIGRATIONS: Final[Mapping[int, Callable[[Database[Document]], None]]] = {2: _add_ground}
 """Version → function that leads to it from the version before. It must be repeatable."""
 CONNECT_S: Final = 10.0
 """How long the first connection may take."""
@@ -33,7 +49,7 @@ _PAUSES_S: Final = (0.05, 2.0)
 """First and longest pause between two attempts."""
 
 _INDEXES: Final[Mapping[str, list[list[tuple[str, int]]]]] = {
-    "job": [[(name, 1) for name in ("rendering", "state", "tries", "z", "track", "morton")], [("parent", 1), ("state", 1)]],
+    "job": [[(name, 1) for name in ("rendering", "state", "tries", "z", "ground", "track", "morton")], [("parent", 1), ("state", 1)]],
     "rendering": [[("scene", 1)]],
     "token": [[("digest", 1)], [("user", 1)]],
     "asset": [[("scene", 1), ("name", 1)]],

@@ -14,7 +14,7 @@ from map3d.types import BlockId
 
 Document = dict[str, Any]
 
-ORDER: Final = [("tries", 1), ("z", 1), ("track", 1), ("morton", 1)]
+ORDER: Final = [("tries", 1), ("z", 1), ("ground", 1), ("track", 1), ("morton", 1)]
 """The order in which jobs are leased. `tries`: attempts and expired leases."""
 EXPIRES: Final = {"$add": ["$renewed", "$lease_ms"]}
 HELD: Final = {"$expr": {"$gte": [EXPIRES, "$$NOW"]}}
@@ -60,7 +60,7 @@ def job_document(rendering: str, job: PlannedJob, fence: int) -> Document:
 
 def planned_fields(job: PlannedJob) -> Document:
     """Returns the fields that a plan sets. A reduce job waits until a sweep finds all blocks below it done."""
-    return {"key": job.key, "state": State.TODO if job.kind == "base" else State.WAITING, **FORGET}
+    return {"key": job.key, "ground": job.ground, "state": State.TODO if job.kind == "base" else State.WAITING, **FORGET}
 
 
 def parent_id(rendering: str, job: PlannedJob) -> str | None:
@@ -75,6 +75,12 @@ def dump_result(result: JobResult) -> Document:
     return asdict(result) | {"occupied": dump_bits(result.occupied)}
 
 
+def _ground(document: Document) -> int:
+    """A program of catalogue version 1 that still runs beside a newer one plans jobs without a ground number."""
+    ground: int = document["ground" if "ground" in document else "morton"]
+    return ground
+
+
 def load_lease(document: Document, content_version: int) -> Lease:
     return Lease(
         rendering=document["rendering"],
@@ -86,6 +92,7 @@ def load_lease(document: Document, content_version: int) -> Lease:
         attempt=document["attempts"],
         worker=document["worker"],
         content_version=content_version,
+        ground=_ground(document),
     )
 
 
@@ -97,6 +104,7 @@ def load_job(document: Document) -> Job:
         block=_block(document),
         state=state,
         expires_s=_expires_s(document) if state is State.LEASED else None,
+        ground=_ground(document),
         leased_s=_seconds(document["leased"]),
         ended_s=_seconds(document["ended"]),
         result=None if document["result"] is None else _load_result(document["result"]),

@@ -59,10 +59,10 @@ class MongoJobs(MongoPlan):
         def act(repeated: bool) -> Document | None:
             if repeated and (mine := jobs.find_one({"rendering": rendering, "state": State.LEASED, "worker": worker, "call": call})):
                 return mine
-            first = jobs.find_one(todo, {"tries": 1, "z": 1, "track": 1}, sort=ORDER) if start else None
+            first = jobs.find_one(todo, {"tries": 1, "z": 1}, sort=ORDER) if start else None
             if first is not None:
-                group = todo | {name: first[name] for name in ("tries", "z", "track")} | {"morton": {"$gte": start}}
-                found = jobs.find_one_and_update(group, change, sort=[("morton", 1)], return_document=ReturnDocument.AFTER)
+                group = todo | {name: first[name] for name in ("tries", "z")} | {"ground": {"$gte": start}}
+                found = jobs.find_one_and_update(group, change, sort=ORDER, return_document=ReturnDocument.AFTER)
                 if found is not None:
                     return found
             return jobs.find_one_and_update(todo, change, sort=ORDER, return_document=ReturnDocument.AFTER)

@@ -149,7 +149,8 @@ class RenderingRecord:
 @dataclass(frozen=True)
 class PlannedJob:
     """A block that should exist. `order`: Morton number of its root tile. `parent`: the reduce block that takes its seam, None at the top.
-    `key`: hash of everything that its bytes depend on."""
+    `key`: hash of everything that its bytes depend on. `ground`: its ground number, in whose order jobs are leased; a reduce block has that of its
+    first base block."""
 
     track: str
     block: BlockId
@@ -157,6 +158,7 @@ class PlannedJob:
     order: int
     key: str
     parent: BlockId | None
+    ground: int = 0
 
 
 @dataclass(frozen=True)
@@ -208,13 +210,14 @@ class Job:
     expires_s: float | None
     reason: str | None
     result: JobResult | None
+    ground: int = 0
     leased_s: float | None = None
     ended_s: float | None = None
 
 
 @dataclass(frozen=True)
 class Lease:
-    """A worker's claim on a job. Every later call about the job passes `fence`; changed tiles get `content_version`."""
+    """A worker's claim on a job. Every later call about the job passes `fence`; changed tiles get `content_version`. `ground`: as in `PlannedJob`."""
 
     rendering: str
     track: str
@@ -225,3 +228,4 @@ class Lease:
     attempt: int
     worker: str
     content_version: int
+    ground: int = 0

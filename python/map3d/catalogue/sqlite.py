@@ -18,11 +18,13 @@ from map3d.errors import AlreadyExists, BadRequest, NotFound
 from map3d.geometry.frames import PinnedFrame
 from map3d.types import Layer, Vec3, check_name
 
-VERSION: Final = 7
+VERSION: Final = 8
 REMOVE_BATCH: Final = 20_000
 """Jobs that one transaction removes."""
 
 _REMOVED: Final = "CREATE TABLE removed_rendering(name TEXT PRIMARY KEY, content_version INTEGER NOT NULL)"
+
+_JOB_NEXT_3: Final = "CREATE INDEX job_next ON job(rendering, state, attempts + expiries, z, track, morton)"
 
 _SCHEMA: Final = (
     """
@@ -36,13 +38,14 @@ CREATE TABLE rendering(name TEXT PRIMARY KEY, scene TEXT NOT NULL REFERENCES sce
     + f"{_REMOVED};{JOB_SCHEMA}{OPERATION_SCHEMA}{ACCOUNT_SCHEMA}"
 )
 _MIGRATIONS: Final = {
-    3: f"ALTER TABLE job ADD COLUMN expiries INTEGER NOT NULL DEFAULT 0; DROP INDEX job_next; {JOB_NEXT};",
+    3: f"ALTER TABLE job ADD COLUMN expiries INTEGER NOT NULL DEFAULT 0; DROP INDEX job_next; {_JOB_NEXT_3};",
     4: f"""ALTER TABLE job ADD COLUMN occupied INTEGER; ALTER TABLE rendering ADD COLUMN planning INTEGER NOT NULL DEFAULT 0;
       {_REMOVED}; {JOB_ORDER}; {JOB_COUNTS};
       INSERT INTO job_count SELECT rendering, state, count(*) FROM job GROUP BY rendering, state;""",
     5: "ALTER TABLE job ADD COLUMN leased REAL; ALTER TABLE job ADD COLUMN ended REAL;",
     6: OPERATION_SCHEMA,
     7: ACCOUNT_SCHEMA,
+    8: f"ALTER TABLE job ADD COLUMN ground INTEGER NOT NULL DEFAULT 0; UPDATE job SET ground = morton; DROP INDEX job_next; {JOB_NEXT};",
 }
 """Version → statements that lead to it from the version before."""
 

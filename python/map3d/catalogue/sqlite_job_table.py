@@ -9,7 +9,7 @@ from map3d.catalogue.records import Job, JobResult, Lease, PlannedJob
 from map3d.catalogue.states import State
 from map3d.types import BlockId
 
-JOB_NEXT: Final = "CREATE INDEX job_next ON job(rendering, state, attempts + expiries, z, track, morton)"
+JOB_NEXT: Final = "CREATE INDEX job_next ON job(rendering, state, attempts + expiries, z, ground, track, morton)"
 JOB_ORDER: Final = "CREATE INDEX job_order ON job(rendering, track, z, morton, x, y)"
 _COUNT: Final = "INSERT INTO job_count VALUES ({row}.rendering, {row}.state, 1) ON CONFLICT DO UPDATE SET jobs = jobs + 1"
 _DISCOUNT: Final = "UPDATE job_count SET jobs = jobs - 1 WHERE rendering = {row}.rendering AND state = {row}.state"
@@ -28,6 +28,7 @@ CREATE TABLE job(rendering TEXT NOT NULL REFERENCES rendering(name), track TEXT 
   state TEXT NOT NULL, attempts INTEGER NOT NULL DEFAULT 0, expiries INTEGER NOT NULL DEFAULT 0,
   fence INTEGER NOT NULL DEFAULT 0, worker TEXT, leased REAL, expires REAL, ended REAL, reason TEXT,
   version INTEGER, empty INTEGER, tiles INTEGER, base_tiles INTEGER, bytes INTEGER, seconds REAL, occupied INTEGER,
+  ground INTEGER NOT NULL DEFAULT 0,
   UNIQUE(rendering, track, z, x, y));
 {JOB_NEXT};
 {JOB_ORDER};
@@ -50,7 +51,7 @@ def place_of(rendering: str, track: str, block: BlockId) -> dict[str, Any]:
 def planned_row(rendering: str, job: PlannedJob) -> dict[str, Any]:
     """Returns the row of a planned job without its fence. A reduce job waits until a sweep finds all blocks below it done."""
     above = job.parent or (None, None, None)
-    row = {**place_of(rendering, job.track, job.block), "kind": job.kind, "morton": job.order, "key": job.key}
+    row = {**place_of(rendering, job.track, job.block), "kind": job.kind, "morton": job.order, "key": job.key, "ground": job.ground}
     row |= {"parent_z": above[0], "parent_x": above[1], "parent_y": above[2]}
     return {**row, "state": State.TODO if job.kind == "base" else State.WAITING}
 
@@ -74,6 +75,7 @@ def load_lease(row: sqlite3.Row) -> Lease:
         attempt=row["attempts"],
         worker=row["worker"],
         content_version=row["content_version"],
+        ground=row["ground"],
     )
 
 
@@ -94,6 +96,7 @@ def load_job(row: sqlite3.Row) -> Job:
         ended_s=row["ended"],
         reason=row["reason"],
         result=None if row["version"] is None else _load_result(row),
+        ground=row["ground"],
     )
 
 

@@ -24,15 +24,14 @@ _EXPIRE: Final = f"""UPDATE job SET state = {_AFTER_EXPIRY}, attempts = attempts
   reason = 'lease expired ' || (expiries + 1) || iif(expiries, ' times', ' time') || ' (last worker: ' || worker || ')'
   WHERE state = '{State.LEASED}'"""
 _EXPIRE_OVERDUE: Final = f"{_EXPIRE} AND expires < {NOW}"
-_NEXT: Final = (
-    f"""SELECT {{columns}} FROM job WHERE rendering = :rendering AND state = '{State.TODO}' ORDER BY attempts + expiries, z, track, morton LIMIT 1"""
-)
+_NEXT: Final = f"""SELECT {{columns}} FROM job WHERE rendering = :rendering AND state = '{State.TODO}'
+  ORDER BY attempts + expiries, z, ground, track, morton LIMIT 1"""
 _WITH_VERSION: Final = "RETURNING *, (SELECT content_version FROM rendering WHERE name = rendering) AS content_version"
 _LEASE: Final = f"""UPDATE job SET state = '{next_state(State.TODO, JobEvent.LEASE)}', attempts = attempts + 1, fence = fence + 1, worker = :worker,
   leased = {NOW}, expires = {NOW} + :lease_s
   WHERE rowid = coalesce(
-    (SELECT rowid FROM job WHERE rendering = :rendering AND state = '{State.TODO}' AND morton >= :start
-      AND (attempts + expiries, z, track) = ({_NEXT.format(columns="attempts + expiries, z, track")}) ORDER BY morton LIMIT 1),
+    (SELECT rowid FROM job WHERE rendering = :rendering AND state = '{State.TODO}' AND ground >= :start
+      AND (attempts + expiries, z) = ({_NEXT.format(columns="attempts + expiries, z")}) ORDER BY ground, track, morton LIMIT 1),
     ({_NEXT.format(columns="rowid")}))
   {_WITH_VERSION}"""
 _LEASE_BLOCK: Final = f"""UPDATE job SET state = '{next_state(State.TODO, JobEvent.LEASE)}', attempts = attempts + 1, fence = fence + 1,

@@ -13,10 +13,10 @@ from map3d.types import BlockId
 Above = set[tuple[str, int, int, int]]
 """Reduce jobs as (track, z, x, y)."""
 
-_INSERTED: Final = ("rendering", "track", "z", "x", "y", "kind", "morton", "key", "parent_z", "parent_x", "parent_y", "state", "fence")
+_INSERTED: Final = ("rendering", "track", "z", "x", "y", "kind", "morton", "key", "parent_z", "parent_x", "parent_y", "state", "fence", "ground")
 _INSERT: Final = f"INSERT INTO job({', '.join(_INSERTED)}) VALUES ({', '.join(f':{name}' for name in _INSERTED)})"
 _FORGET: Final = "attempts = 0, expiries = 0, worker = NULL, expires = NULL, reason = NULL"
-_CHANGE: Final = f"UPDATE job SET key = :key, state = :state, fence = fence + 1, {_FORGET} WHERE {AT}"
+_CHANGE: Final = f"UPDATE job SET key = :key, state = :state, ground = :ground, fence = fence + 1, {_FORGET} WHERE {AT}"
 """Increments the fence too, so that a worker that still renders the old state loses its lease."""
 _TODO_OR_WAITING: Final = f"iif(kind = 'base', '{State.TODO}', '{State.WAITING}')"
 _WAIT_AGAIN: Final = f"""UPDATE job SET state = '{next_state(State.DONE, JobEvent.BELOW_REOPENED)}', fence = fence + 1, {_FORGET}

@@ -22,7 +22,6 @@ from map3d.jobs.job_runner import JobRunner
 from map3d.jobs.timeouts import Timeouts
 from map3d.process_identity import ProcessIdentity
 from map3d.renderings.render_task import RenderTask
-from map3d.tiles.naming import morton
 
 IDLE_S: Final = 120.0
 """A Dask worker that gets no task for this long, such as one whose client was killed, ends its subprocesses."""
@@ -145,7 +144,7 @@ class _Session:
         if lease is None:
             return TaskResult(process)
         if lease.kind == "base":
-            own.start = morton(lease.block.x, lease.block.y)
+            own.start = lease.ground
         event = own.runner.run(lease)
         if isinstance(event, SceneChanged):
             self._task.update_scene(self._catalogue.scene(self._scene))

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from map3d.catalogue import Catalogue, State
 from map3d.catalogue.states import OPEN
@@ -17,7 +18,6 @@ from map3d.jobs.run_statistics import RunStatistics
 from map3d.jobs.stop_request import StopRequest
 from map3d.jobs.timeouts import Timeouts
 from map3d.jobs.worker import Signal, Worker
-from map3d.tiles.occupancy import Numbers, numbers_of
 
 _POLL_S = 0.2
 
@@ -52,13 +52,13 @@ class Pool:
         self._freed_s = 0.0
         self._counted_s = time.monotonic()
         self.scene_changed = False
-        self._base_numbers: Numbers = np.zeros(0, np.uint64)
+        self._ground: NDArray[np.int64] = np.zeros(0, np.int64)
         self._error: BaseException | None = None
         self.statistics = RunStatistics()
 
     def run(self, on_event: Callable[[RunEvent], None]) -> RunStatistics:
         expire_dead_workers(self._catalogue, self._rendering)
-        self._base_numbers = self._open_base_numbers()
+        self._ground = self._open_ground()
         with self.stop.heard_by(self._events.put):
             for _ in range(0 if self.stop.is_made else self._size):
                 self._start_worker()
@@ -68,10 +68,10 @@ class Pool:
             raise self._error
         return self.statistics
 
-    def _open_base_numbers(self) -> Numbers:
-        """Returns the Morton numbers of the base blocks to do, of all views together."""
+    def _open_ground(self) -> NDArray[np.int64]:
+        """Returns the ground numbers of the base blocks to do, of all views together, in ascending order."""
         jobs = self._catalogue.jobs(self._rendering, state=State.TODO)
-        return numbers_of((job.block.x, job.block.y) for job in jobs if job.kind == "base")
+        return np.sort(np.fromiter((job.ground for job in jobs if job.kind == "base"), np.int64))
 
     def _handle_next(self, on_event: Callable[[RunEvent], None]) -> None:
         self._report_remaining(on_event)
@@ -125,8 +125,8 @@ class Pool:
         name = worker_name(self._started)
         runner = JobRunner(self._catalogue, self._task, self._timeouts, self._stop_now)
         worker = Worker(name, self._catalogue, self._rendering, runner, self._timeouts, self._stop, self._job_ended)
-        if len(self._base_numbers):
-            worker.start = int(self._base_numbers[(self._started - 1) % self._size * len(self._base_numbers) // self._size])
+        if len(self._ground):
+            worker.start = int(self._ground[(self._started - 1) % self._size * len(self._ground) // self._size])
         self._workers[name] = worker
         self._threads[name] = threading.Thread(target=worker.run, args=(self._events.put,), name=name)
         self._threads[name].start()

@@ -9,7 +9,6 @@ from map3d.errors import Map3dError
 from map3d.jobs.events import JobFailed, JobOutcome, RunEvent, SceneChanged, WorkerExited
 from map3d.jobs.job_runner import JobRunner
 from map3d.jobs.timeouts import Timeouts
-from map3d.tiles.naming import morton
 
 
 class Signal:
@@ -43,7 +42,7 @@ class Worker:
         self._timeouts, self._stop, self._job_ended = timeouts, stop, job_ended
         self._failed: set[tuple[str, str]] = set()
         self.start = 0
-        """Morton number from which the worker takes its next base block: neighbours share chunks and textures."""
+        """Ground number from which the worker takes its next base block: blocks of the same ground share chunks and textures."""
         self.idle_since: float | None = None
         """Monotonic seconds; None while the worker has a job or starts a subprocess."""
 
@@ -85,7 +84,7 @@ class Worker:
             return None
         self.idle_since = None
         if lease.kind == "base":
-            self.start = morton(lease.block.x, lease.block.y)
+            self.start = lease.ground
         event = self._runner.run(lease)
         if isinstance(event, JobFailed):
             self._failed.add((lease.track, str(lease.block)))

@@ -14,6 +14,7 @@ from map3d.catalogue import Catalogue, PlannedJob, RenderingRecord, Track
 from map3d.errors import OutsideFrame
 from map3d.geometry.core_frame import core_frame
 from map3d.geometry.frames import PinnedFrame, check_content
+from map3d.renderings.ground_numbers import GroundNumbers
 from map3d.tiles.naming import block_levels
 from map3d.tiles.occupancy import Numbers, Occupancy, numbers_of, union_of, xy_from_morton
 from map3d.types import BlockId, Box
@@ -68,6 +69,7 @@ def plan_jobs(
 def _plan_views(
     scene: PlannedScene, rendering: RenderingRecord, known: Mapping[str, Numbers], progress: Callable[[int, int], None] | None
 ) -> Iterator[PlannedJob]:
+    ground = GroundNumbers(rendering)
     for done, frame in enumerate(rendering.frames):
         if progress is not None:
             progress(done, len(rendering.frames))
@@ -76,7 +78,7 @@ def _plan_views(
         for track in rendering.tracks_of(frame):
             earlier = known.get(track.id)
             blocks = occupied if earlier is None else union_of(occupied, earlier)
-            yield from _with_reduces(track, _base_keys(scene, track, root, blocks))
+            yield from _with_reduces(track, _base_blocks(scene, track, root, blocks, ground))
 
 
 def track_frame(track: Track) -> _core.Frame:
@@ -114,23 +116,34 @@ def _check_frame(scene: PlannedScene, rendering: RenderingRecord, frame: PinnedF
         raise OutsideFrame(f"rendering {rendering.name}: {error}") from error
 
 
-def _base_keys(scene: PlannedScene, track: Track, root: int, numbers: Numbers) -> Iterator[tuple[int, BlockId, str]]:
-    """Yields Morton number, block and key of the base blocks, computing the keys of `KEY_BATCH` blocks at a time."""
+@dataclass(frozen=True)
+class _Block:
+    """`number`: Morton number; `ground`: ground number."""
+
+    number: int
+    id: BlockId
+    key: str
+    ground: int
+
+
+def _base_blocks(scene: PlannedScene, track: Track, root: int, numbers: Numbers, ground: GroundNumbers) -> Iterator[_Block]:
+    """Yields the base blocks, computing the keys of `KEY_BATCH` blocks at a time."""
     frame = track_frame(track)
     for start in range(0, len(numbers), KEY_BATCH):
         batch = numbers[start : start + KEY_BATCH]
         places = _columns_and_rows(batch)
         keys = scene.block_keys(frame, root, places)
-        for number, (x, y), key in zip(batch.tolist(), places.tolist(), keys, strict=True):
-            yield number, BlockId(root, x, y), key
+        on_ground = ground.of(track.frame, root, places).tolist()
+        for number, (x, y), key, own_ground in zip(batch.tolist(), places.tolist(), keys, on_ground, strict=True):
+            yield _Block(number, BlockId(root, x, y), key, own_ground)
 
 
-def _with_reduces(track: Track, base: Iterable[tuple[int, BlockId, str]]) -> Iterator[PlannedJob]:
+def _with_reduces(track: Track, base: Iterable[_Block]) -> Iterator[PlannedJob]:
     """Yields the base blocks, given in Morton order, and all reduce blocks above them, each as soon as all blocks below it are known."""
     pyramid = _OpenReduces(track)
-    for number, block, key in base:
-        yield from pyramid.close(number)
-        yield pyramid.add(0, number, block, key)
+    for block in base:
+        yield from pyramid.close(block.number)
+        yield pyramid.add(0, block)
     yield from pyramid.close(None)
 
 
@@ -143,15 +156,15 @@ class _OpenReduces:
         self._levels = block_levels(track.frame.zmax)
         self._open = [_OpenReduce() for _ in self._levels]
 
-    def add(self, depth: int, number: int, block: BlockId, key: str) -> PlannedJob:
+    def add(self, depth: int, block: _Block) -> PlannedJob:
         """Adds a block of `block_levels(zmax)[depth]` to the reduce block above it and returns its job."""
         level, parent = self._levels[depth], None
         if depth + 1 < len(self._levels):
             above = self._levels[depth + 1]
             up = level.root - above.root
-            parent = BlockId(above.root, block.x >> up, block.y >> up)
-            self._open[depth + 1].add(number >> 2 * up, parent, (block, key))
-        return PlannedJob(self._track, block, level.kind, number, key, parent)
+            parent = BlockId(above.root, block.id.x >> up, block.id.y >> up)
+            self._open[depth + 1].add(block.number >> 2 * up, parent, block)
+        return PlannedJob(self._track, block.id, level.kind, block.number, block.key, parent, block.ground)
 
     def close(self, upcoming: int | None) -> Iterator[PlannedJob]:
         """Yields, from the deepest level up, the reduce blocks that are not above the base block with Morton number `upcoming`; all for None."""
@@ -159,9 +172,11 @@ class _OpenReduces:
             reduce, up = self._open[depth], self._levels[0].root - self._levels[depth].root
             if not reduce.below or (upcoming is not None and reduce.number == upcoming >> 2 * up):
                 return
-            key = hashlib.sha256(json.dumps([self._settings, reduce.below]).encode()).hexdigest()[:32]
+            below = [(block.id, block.key) for block in reduce.below]
+            key = hashlib.sha256(json.dumps([self._settings, below]).encode()).hexdigest()[:32]
+            closed = _Block(reduce.number, reduce.block, key, reduce.below[0].ground)
             reduce.below = []
-            yield self.add(depth, reduce.number, reduce.block, key)
+            yield self.add(depth, closed)
 
 
 _TOP: Final = BlockId(0, 0, 0)
@@ -169,12 +184,12 @@ _TOP: Final = BlockId(0, 0, 0)
 
 @dataclass
 class _OpenReduce:
-    """`number`: Morton number; `below`: blocks and keys so far, none when it is closed."""
+    """`number`: Morton number; `below`: the blocks so far, none when it is closed."""
 
     number: int = 0
     block: BlockId = _TOP
-    below: list[tuple[BlockId, str]] = field(default_factory=list)
+    below: list[_Block] = field(default_factory=list)
 
-    def add(self, number: int, block: BlockId, below: tuple[BlockId, str]) -> None:
+    def add(self, number: int, block: BlockId, below: _Block) -> None:
         self.number, self.block = number, block
         self.below.append(below)
