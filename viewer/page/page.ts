@@ -17,6 +17,7 @@ import { bindInViewList } from "./inViewList";
 import { Selection } from "./selection";
 import { bindShare } from "./share";
 import { bindOpening } from "./opening";
+import { showThumbnail } from "../src/element/thumbnail";
 import { bindNetwork, report, showFailure } from "./toast";
 import { byId } from "./dom";
 import { requestedUrls } from "./requested";
@@ -84,6 +85,7 @@ function open(): void {
     const compare = new Compare({ view, hasHaze: others.length === 0, onClick: (event) => { selection.select(event); } });
     selection.onChange = () => { compare.highlight(); };
   });
+  showThumbnail(view, layer);
   layer.addTo(view);
   bindLoading(view);
 }

@@ -4,6 +4,7 @@ import { isOn, light, number, PageElement, place, time, words } from "./attribut
 import { ElementContent } from "./elementContent";
 import { updateLayer, createLayer } from "./layerElement";
 import type { part, ElementHost } from "./part";
+import { showThumbnail } from "./thumbnail";
 
 /** Events of the element: the map's events with the prefix `map-` and their fields in `detail`. They bubble. */
 export type MapElementEvents = { [K in keyof MapEvents as `map-${K}`]: CustomEvent<MapEvents[K]> };
@@ -128,10 +129,14 @@ export class mapElement extends PageElement implements ElementHost {
     this.#srcChanged = false;
     this.#content ??= new ElementContent(this);
     const options = this.#options();
-    this.#map = new forwardingMap(this.#content.createContainer(options.language), options, this.#dispatch);
-    if (words(this, "src").length > 0) this.#try(() => { this.#base = createLayer(this); });
-    if (this.#base) this.#map.add(this.#base);
-    if (this.#base) this.watch(this.#base);
+    const map = new forwardingMap(this.#content.createContainer(options.language), options, this.#dispatch);
+    this.#map = map;
+    const base = words(this, "src").length > 0 && this.#try(() => createLayer(this));
+    if (base) {
+      this.#base = base.addTo(map);
+      this.watch(base);
+      showThumbnail(map, base);
+    }
     for (const each of this.#parts("map-3d-layer")) each.enter(this);
     this.#updateContent();
     this.#addFeatures();

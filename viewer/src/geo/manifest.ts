@@ -40,10 +40,20 @@ interface PassJson extends BlockVersions {
   layers: string[];
 }
 
+/** A picture of a view in a few hundred bytes: spec/manifest.md. */
+interface ThumbnailJson {
+  /** Left, top, width and height of the part of the view that it shows, pixels of level 0. */
+  window: number[];
+  /** A WebP image in base64. */
+  webp: string;
+}
+
 interface ViewJson extends FrameJson, BlockVersions {
   occupancy: string;
   passes?: PassJson[];
   archives?: Record<string, string>;
+  /** Not checked here: a malformed one is not shown. */
+  thumbnail?: ThumbnailJson | null;
 }
 
 /** The content of rendering.json: spec/manifest.md. */
