@@ -109,6 +109,8 @@ export interface Rendering {
 const SUPPORTED_VERSION = 1;
 /** The kinds that a layer of data tiles (spec/data-tile.md) stands for. */
 export const DATA_KINDS: readonly LayerKind[] = ["normal", "id", "depth"];
+/** The kinds of rendered light. */
+export const LIGHT_KINDS: readonly string[] = ["sun", "sun16", "ao"];
 
 /** Checks a parsed manifest. @throws ManifestError with the file, what was expected and what it contains */
 export function readManifest(value: unknown, where: string): Rendering {

@@ -3,8 +3,8 @@ import { decodeTile, listTransferables } from "./tileData";
 
 const scope = self as unknown as { onmessage: (event: MessageEvent<DecodeRequest>) => void; postMessage: (response: DecodeResponse, transfer: Transferable[]) => void };
 
-scope.onmessage = ({ data: { id, kind, mediaType, bytes } }) => {
-  decodeTile(kind, mediaType, bytes).then(
+scope.onmessage = ({ data: { id, kind, mediaType, bytes, below } }) => {
+  decodeTile(kind, mediaType, bytes, below).then(
     (data) => {
       scope.postMessage({ id, data }, listTransferables(data));
       if ("bitmap" in data) data.bitmap.close();

@@ -1,3 +1,4 @@
+import type { Tile } from "../geo/frame";
 import type { TileData } from "./tileData";
 
 export interface DecodeRequest {
@@ -5,6 +6,8 @@ export interface DecodeRequest {
   readonly kind: string;
   readonly mediaType: string;
   readonly bytes: ArrayBuffer;
+  /** Bytes of light are those of the tile above this one. */
+  readonly below: Tile | undefined;
 }
 
 export type DecodeResponse = { readonly id: number; readonly data: TileData } | { readonly id: number; readonly error: string };

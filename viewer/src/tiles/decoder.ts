@@ -1,5 +1,6 @@
 import workerCode from "worker:./decode.worker.ts";
 import { DecodeError } from "../core/errors";
+import type { Tile } from "../geo/frame";
 import type { DecodeResponse, DecodeRequest } from "./decodeMessages";
 import type { TileData } from "./tileData";
 
@@ -24,14 +25,14 @@ export class Decoder {
     this.#size = Math.max(1, workers);
   }
 
-  /** @param keep leaves the bytes to the caller; else they move to the worker */
-  decode(kind: string, mediaType: string, bytes: ArrayBuffer, keep = false): Promise<TileData> {
+  /** @param keep leaves the bytes to the caller; else they move to the worker  @param below the bytes are those of the tile of light above this one */
+  decode(kind: string, mediaType: string, bytes: ArrayBuffer, keep = false, below?: Tile): Promise<TileData> {
     const id = this.#requestCount++;
     const worker = this.#workers[id % this.#size] ?? this.#startWorker();
     clearTimeout(this.#idleTimer);
     return new Promise((resolve, reject) => {
       this.#pending.set(id, { resolve, reject });
-      const request: DecodeRequest = { id, kind, mediaType, bytes };
+      const request: DecodeRequest = { id, kind, mediaType, bytes, below };
       worker.postMessage(request, keep ? [] : [bytes]);
     });
   }

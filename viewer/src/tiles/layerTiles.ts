@@ -1,8 +1,9 @@
 import { asError, DecodeError, FetchError } from "../core/errors";
 import { hasServiceWorker, isOffline } from "../core/network";
-import { tileName, type Tile } from "../geo/frame";
-import { DATA_KINDS, type LayerInfo, type View } from "../geo/manifest";
+import { ancestor, childrenOf, tileName, type Tile } from "../geo/frame";
+import { DATA_KINDS, LIGHT_KINDS, type LayerInfo, type View } from "../geo/manifest";
 import type { Cache } from "./cache";
+import { DENSE_DPR } from "./cover";
 import type { Decoder } from "./decoder";
 import type { TileRequest, RequestQueue } from "./queue";
 import type { Source } from "./source";
@@ -14,7 +15,7 @@ export interface CachedTile {
   readonly empty: boolean;
   /** Bytes received (0 if the source decodes), and when (performance.now). */
   readonly transfer: { readonly bytes: number; readonly at_ms: number };
-  /** The bytes of a data tile, from which its other kinds are decoded without a request. */
+  /** Bytes from which other tiles are decoded without a request: those of a data tile, or of the tile above. */
   readonly packed?: ArrayBuffer | undefined;
 }
 
@@ -48,7 +49,7 @@ export class LayerTiles {
   readonly #reported = new Set<string>();
   /** Keys of the tiles that are being fetched. */
   readonly #loading = new Set<string>();
-  /** Data tiles that are being fetched, which requests for their kinds share. */
+  /** Bytes that are being fetched, which requests share. */
   readonly #fetching = new Map<string, ReturnType<Source["tile"]>>();
   /** While the server does not answer: the number of tries in a row, and when the next is due. */
   #silence = { tries: 0, retry_ms: 0 };
@@ -124,12 +125,14 @@ export class LayerTiles {
     if (tries > 0) this.#waitForServer(tries); // the first request alone finds out whether the server answers again
     this.#loading.add(key);
     try {
-      const known = this.#findPacked(view, layer, tile);
-      const found = known?.packed ?? (await this.#fetch(view, layer, tile, signal));
+      const source = findSource(layer, tile);
+      const known = this.#findPacked(view, layer, tile, source);
+      const found = known?.packed ?? (await this.#fetch(view, layer, source, signal));
       const [bytes, decoded] = found && "kind" in found ? [null, found] : [found, null];
       const transfer = known?.transfer ?? { bytes: bytes?.byteLength ?? 0, at_ms: performance.now() }; // the bytes move to another thread
-      const packed = bytes && layer.media_type === DATA_TYPE ? bytes : undefined;
-      const data = bytes ? await this.#resources.decoder.decode(layer.kind, layer.media_type, bytes, packed !== undefined) : decoded;
+      const below = source === tile ? undefined : tile;
+      const packed = bytes && (below ?? layer.media_type === DATA_TYPE) ? bytes : undefined;
+      const data = bytes ? await this.#resources.decoder.decode(layer.kind, layer.media_type, bytes, packed !== undefined, below) : decoded;
       if (signal.aborted) {
         if (data && "bitmap" in data) data.bitmap.close();
         return;
@@ -155,15 +158,14 @@ export class LayerTiles {
     }
   }
 
-  /** Finds the tile of another kind that keeps the bytes of a data tile. */
-  #findPacked(view: View, layer: LayerInfo, tile: Tile): CachedTile | undefined {
-    if (layer.media_type !== DATA_TYPE) return undefined;
-    return DATA_KINDS.map((kind) => this.#resources.cache.peek(this.key(view, { ...layer, kind }, tile))).find((known) => known?.packed);
+  /** Finds a tile that keeps the bytes of `source`. */
+  #findPacked(view: View, layer: LayerInfo, tile: Tile, source: Tile): CachedTile | undefined {
+    const keys = source === tile ? DATA_KINDS.map((kind) => this.key(view, { ...layer, kind }, tile)) : childrenOf(source).map((child) => this.key(view, layer, child));
+    return keys.map((key) => this.#resources.cache.peek(key)).find((known) => known?.packed);
   }
 
-  /** Fetches a tile; a data tile once for all its kinds. */
+  /** Fetches the bytes of a tile, once for all who need them. */
   async #fetch(view: View, layer: LayerInfo, tile: Tile, signal: AbortSignal): ReturnType<Source["tile"]> {
-    if (layer.media_type !== DATA_TYPE) return this.#source.tile(view, layer, tile, signal);
     const key = this.key(view, { ...layer, kind: "data" }, tile);
     for (let shared = this.#fetching.get(key); shared; shared = this.#fetching.get(key)) {
       try {
@@ -185,3 +187,6 @@ export class LayerTiles {
     if (retry_ms < Infinity) setTimeout(() => { this.#onArrival(null); }, retry_ms - performance.now());
   }
 }
+
+/** Finds the tile whose bytes are fetched: on dense screens, light is shown from the tile above, which has a quarter of the bytes for the same area. */
+const findSource = ({ kind }: LayerInfo, tile: Tile): Tile => (LIGHT_KINDS.includes(kind) && tile.z > 0 && devicePixelRatio >= DENSE_DPR ? ancestor(tile, 1) : tile);

@@ -120,3 +120,25 @@ test("positions convert to longitude and latitude, and back", async () => {
   expect(back?.[1]).toBeCloseTo(5335950, 3);
   await page.context().close();
 });
+
+test.each(["webgl", "canvas"])("%s: on a dense screen, light comes from the level above, in fewer requests, and looks the same from afar", async (drawer) => {
+  const pictures: Uint8ClampedArray[] = [];
+  const counts: number[] = [];
+  for (const deviceScaleFactor of [1, 2]) {
+    bed.server.requests.length = 0;
+    const { page, problems } = await bed.start("town", { zoom: deviceScaleFactor === 1 ? 3 : 2, light: { azimuth_deg: 110, altitude_deg: 33, shadows: false }, drawer }, {}, { viewport: { width: 800 / deviceScaleFactor, height: 600 / deviceScaleFactor }, deviceScaleFactor });
+    const levels = (layer: string): Set<string> => new Set(bed.server.requests.flatMap((url) => new RegExp(`/town/[^/]+/${layer}/(\\d+)/`).exec(url)?.[1] ?? []));
+    const deepest = Math.max(...[...levels("color")].map(Number));
+    expect(Math.max(...[...levels("ao")].map(Number))).toBe(deviceScaleFactor === 1 ? deepest : deepest - 1);
+    const light = bed.server.requests.filter((url) => url.includes("/ao/"));
+    expect(new Set(light).size).toBe(light.length);
+    counts.push(light.length);
+    pictures.push(Uint8ClampedArray.from(await pixels(page)));
+    expect(problems).toEqual([]);
+    await page.context().close();
+  }
+  expect(counts[1]).toBeLessThan((counts[0] ?? 0) / 2);
+  const mean = (data: Uint8ClampedArray): number => data.reduce((sum, value) => sum + value, 0) / data.length;
+  expect(pictures[0]?.length).toBe(pictures[1]?.length);
+  expect(Math.abs(mean(pictures[0] as Uint8ClampedArray) - mean(pictures[1] as Uint8ClampedArray))).toBeLessThan(2);
+});
