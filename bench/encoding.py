@@ -45,7 +45,7 @@ def measure(buildings: int = 300, res_m: float = 0.2, count: int = 48, rounds: i
     scene = _core.Scene(str(folder), 1 << 30)
     buffers = [scene.gbuffer(frame, *tile) for tile in choose_tiles(scene, frame, count)]
     rows = [row for layer in ("color", *DATA) for row in measure_layer(layer, buffers, rounds)]
-    rows += measure_data_tiles(buffers, rounds)
+    rows += measure_data_tiles(buffers, rounds) + measure_whole_tiles(buffers, rounds)
     _print(rows, len(buffers))
     return [asdict(row) for row in rows]
 
@@ -70,27 +70,46 @@ def measure_layer(layer: str, buffers: list[dict[str, NDArray[Any]]], rounds: in
 def measure_data_tiles(buffers: list[dict[str, NDArray[Any]]], rounds: int) -> list[EncodingRow]:
     """Measures normal, id and depth together: as one data tile, and as three PNGs."""
 
-    def data_tile(number: int, small: bool = False) -> bytes:
-        return _core.encode_data_tile(*(buffers[number][layer] for layer in DATA), small)
-
-    def pngs(number: int) -> bytes:
-        return b"".join(_core.encode_layer(layer, "png", buffers[number][layer]) for layer in DATA)
-
-    tiles = [data_tile(number) for number in range(len(buffers))]
+    tiles = [_encode_data_tile(buffer) for buffer in buffers]
 
     def decode(number: int) -> bytes:
         _core.decode_data_tile(tiles[number])
         return tiles[number]
 
     works: dict[str, Encode] = {
-        "core data tile": data_tile,
-        "core data tile, small": lambda number: data_tile(number, small=True),
-        "core, three PNGs": pngs,
+        "core data tile": lambda number: _encode_data_tile(buffers[number]),
+        "core data tile, small": lambda number: _encode_data_tile(buffers[number], small=True),
+        "core, three PNGs": lambda number: _encode_pngs(buffers[number]),
         "core data tile, decoding": decode,
     }
-    spent = {name: min(times) for name, times in _time_encoders(works, range(len(buffers)), rounds).items()}
-    sizes = {name: float(np.mean([len(work(number)) for number in range(len(buffers))])) for name, work in works.items()}
-    return [EncodingRow("normal, id, depth", name, sizes[name], 1000 * spent[name] / len(buffers), None) for name in works]
+    return _measure_works("normal, id, depth", works, len(buffers), rounds)
+
+
+def measure_whole_tiles(buffers: list[dict[str, NDArray[Any]]], rounds: int) -> list[EncodingRow]:
+    """Measures the four layers of a tile: the default, and what it was before data tiles."""
+
+    def color(number: int) -> bytes:
+        return _core.encode_layer("color", "webp", buffers[number]["color"], 80)
+
+    works: dict[str, Encode] = {
+        "core webp q80 and data tile": lambda number: color(number) + _encode_data_tile(buffers[number]),
+        "core webp q80 and three PNGs": lambda number: color(number) + _encode_pngs(buffers[number]),
+    }
+    return _measure_works("all four", works, len(buffers), rounds)
+
+
+def _encode_data_tile(buffer: dict[str, NDArray[Any]], small: bool = False) -> bytes:
+    return _core.encode_data_tile(*(buffer[layer] for layer in DATA), small)
+
+
+def _encode_pngs(buffer: dict[str, NDArray[Any]]) -> bytes:
+    return b"".join(_core.encode_layer(layer, "png", buffer[layer]) for layer in DATA)
+
+
+def _measure_works(layer: str, works: dict[str, Encode], count: int, rounds: int) -> list[EncodingRow]:
+    spent = {name: min(times) for name, times in _time_encoders(works, range(count), rounds).items()}
+    sizes = {name: float(np.mean([len(work(number)) for number in range(count)])) for name, work in works.items()}
+    return [EncodingRow(layer, name, sizes[name], 1000 * spent[name] / count, None) for name in works]
 
 
 def _time_encoders(encoders: dict[str, Encode], numbers: range, rounds: int) -> dict[str, list[float]]:
