@@ -297,6 +297,7 @@ def test_rendering_from_the_form_to_the_map_and_away(town):
     assert "100 %" in page
     assert "data-poll" not in page
     assert "Open map" in page
+    assert all(f"<li>{name}</li>" in page for name in ("Colour", "Surface directions", "Objects", "Depth")), "not: color, data"
     assert "Files have changed" not in page
     assert town.get("/view/my-map/rendering.json").json()["complete"] is True
     assert town.get("/tiles/my-map/rendering.json").json()["views"][0]["id"] == "0-60"
