@@ -24,7 +24,8 @@ await runPage(async (page, { origin, rendering, view, screenshot }) => {
   await page.waitForSelector("#share", { state: "visible" });
   const again = page.url();
   await page.waitForLoadState("networkidle"); // requests of a page that is replaced would fail
-  // The map's page, whose policy allows no style attribute, stands for the page of another author.
+  // A page without a map, whose policy allows no style attribute, stands for the page of another author.
+  await page.goto(`${origin}/studio/`);
   await page.setContent(`<!doctype html>${seen.embed.replace(/ style="[^"]*"/, "")}`);
   const frame = page.frameLocator("iframe");
   await frame.locator("#share").waitFor({ state: "visible" });
