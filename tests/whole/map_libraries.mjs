@@ -32,8 +32,17 @@ const DRAW = {
     const source = new ol.source.OGCMapTile({ url: `${address}/ogc/collections/${view}/map/tiles/${view}`, projection: plane });
     const map = new ol.Map({ target: "map", controls: [], layers: [new ol.layer.Tile({ source })], view: new ol.View({ projection: plane, center, resolution: pixel_m }) });
     await new Promise((done, fail) => {
-      source.on("change", () => { if (source.getState() === "error") fail(source.getError?.() ?? new Error("the source has an error")); });
-      map.once("rendercomplete", () => { if (source.getState() === "ready") done(); else map.once("rendercomplete", done); });
+      const check = () => {
+        if (source.getState() === "ready") done();
+        else if (source.getState() === "error") fail(source.getError?.() ?? new Error("the source has an error"));
+      };
+      source.on("change", check);
+      check();
+    });
+    // Frames before that were complete without tiles.
+    await new Promise((done) => {
+      map.once("rendercomplete", done);
+      map.render();
     });
   },
   async leaflet({ address, rendering, view_id, center, square, zmax }) {
