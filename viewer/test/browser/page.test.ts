@@ -327,6 +327,7 @@ test("a rendering of another origin is shown only with the user's consent", asyn
       await page.waitForLoadState("networkidle");
       expect(asked).toEqual([`Show the map at ${other}?`]);
       expect(fetched.length > 0).toBe(consents);
+      await page.unrouteAll({ behavior: "ignoreErrors" });  // tiles may still be on their way
       await page.context().close();
     }
   }
