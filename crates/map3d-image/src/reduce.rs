@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use map3d_base::DEPTH_NOTHING;
 
-use crate::gbuffer::{Arrays, GBuffer, normal_from_vector};
+use crate::gbuffer::{Arrays, GBuffer};
 
 /// Pixels of a row that are reduced together.
 const PIECE: usize = 64;
@@ -216,27 +216,42 @@ fn nearest(of_id: [bool; 4], depths: [u32; 4]) -> (usize, u32) {
 /// Returns the normal of a square that shows one object.
 #[inline(always)]
 fn normal_of_one(normals: [[i16; 3]; 4], depths: [u32; 4]) -> [i16; 3] {
-    match normals == [normals[0]; 4] {
-        true => normals[0],
-        false => mean_normal([true; 4], normals, nearest([true; 4], depths).0),
-    }
-}
-
-#[inline(never)]
-fn mean_normal(of_id: [bool; 4], normals: [[i16; 3]; 4], nearest: usize) -> [i16; 3] {
-    if of_id == [true; 4] && normals == [normals[0]; 4] {
+    if !normals_differ(normals) {
         return normals[0];
     }
-    let chosen = || (0..4).filter(|k| of_id[*k]).map(|k| normals[k]);
+    mean_direction(sum_of(normals), 4).unwrap_or_else(|| normals[nearest([true; 4], depths).0])
+}
+
+fn mean_normal(of_id: [bool; 4], normals: [[i16; 3]; 4], nearest: usize) -> [i16; 3] {
     let first = normals[nearest];
-    if chosen().all(|n| n == first) {
+    let chosen = [0, 1, 2, 3].map(|k| if of_id[k] { normals[k] } else { first });
+    if !normals_differ(chosen) {
         return first;
     }
-    let count = chosen().count() as f64;
-    let sum = chosen().fold([0.0; 3], |s, n| [0, 1, 2].map(|c| s[c] + f64::from(n[c])));
-    let mean = sum.map(|c| c / (count * 32_767.0));
-    if map3d_base::vec3::length(mean) < MIN_MEAN {
-        return first;
+    let (sum, others) = (sum_of(chosen), of_id.iter().filter(|is_chosen| !**is_chosen).count() as i32);
+    mean_direction([0, 1, 2].map(|c| sum[c] - others * i32::from(first[c])), 4 - others).unwrap_or(first)
+}
+
+fn sum_of(normals: [[i16; 3]; 4]) -> [i32; 3] {
+    [0, 1, 2].map(|c| normals.iter().map(|n| i32::from(n[c])).sum())
+}
+
+/// Returns the stored normal in the direction of a sum of `count` stored normals; `None` if their mean is too short.
+#[inline(always)]
+fn mean_direction(sum: [i32; 3], count: i32) -> Option<[i16; 3]> {
+    let sum = sum.map(f64::from);
+    let length = map3d_base::vec3::length(sum);
+    if length < MIN_MEAN * 32_767.0 * f64::from(count) {
+        return None;
     }
-    normal_from_vector(mean).unwrap_or(first)
+    let scale = 32_767.0 / length;
+    Some(sum.map(|c| round_to_i16(c * scale)))
+}
+
+/// Rounds to the nearest, halves away from zero, as `f64::round` does, which is a call of the library where the processor's own rounding is not assumed.
+#[inline(always)]
+fn round_to_i16(x: f64) -> i16 {
+    let whole = x as i32;
+    let rest = x - f64::from(whole);
+    (whole + i32::from(rest >= 0.5) - i32::from(rest <= -0.5)) as i16
 }

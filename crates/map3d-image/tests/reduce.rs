@@ -87,6 +87,27 @@ fn opposite_normals_take_the_nearest() {
     assert_eq!(reduce([Some(&child), None, None, None], 2).normal[0], [-32_767, 0, 0]);
 }
 
+/// Of one object, from opposite ones to those of a curved surface; the oracle adds in float64 as spec/pyramid.md section 7 says.
+#[test]
+fn normals_are_normalised_means_rounded_half_away_from_zero() {
+    let mut random = Random(11);
+    for spread in [0.0001, 0.01, 0.3, 2.0] {
+        let mut child = GBuffer::empty(64, 64);
+        child.id.fill(7);
+        for normal in &mut child.normal {
+            let near = [0.3, -0.2, 0.9].map(|c| c + spread * (random.unit() - 0.5));
+            *normal = map3d_image::gbuffer::normal_from_vector(near).expect("has a direction");
+        }
+        let parent = reduce([Some(&child), None, None, None], 64);
+        for (y, x) in (0..32).flat_map(|y| (0..32).map(move |x| (y, x))) {
+            let four = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(b, a)| child.normal[(2 * y + b) * 64 + 2 * x + a]);
+            let mean = [0, 1, 2].map(|c| four.iter().map(|n| f64::from(n[c])).sum::<f64>() / (4.0 * 32_767.0));
+            let expected = if four == [four[0]; 4] { four[0] } else { map3d_image::gbuffer::normal_from_vector(mean).expect("has a direction") };
+            assert_eq!(parent.normal[y * 64 + x], expected, "{four:?}");
+        }
+    }
+}
+
 #[test]
 fn seams_round_trip_exactly() {
     for g in [random_tile(1, 32), GBuffer::empty(4, 4), random_tile(2, 256)] {
