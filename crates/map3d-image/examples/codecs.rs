@@ -1,7 +1,8 @@
 //! Measures codecs: milliseconds of CPU time and bytes per tile and layer for the G-buffers in seam files; nanoseconds per pixel to decode any other
 //! file.
 //!
-//! `cargo run --release -p map3d-image --example codecs -- tiles/*.seam textures/*.jpg` (`map3d-render`'s example `tiles` writes seams with `--save`).
+//! `cargo run --release -p map3d-image --example codecs -- [--only NAME] tiles/*.seam textures/*.jpg` (`map3d-render`'s example `tiles` writes seams with
+//! `--save`; NAME is part of a codec's name).
 
 use std::path::Path;
 
@@ -15,17 +16,19 @@ use map3d_image::{GBuffer, ImageLimits};
 type Codec = (String, Box<dyn Fn(&GBuffer) -> Vec<u8>>);
 
 fn main() {
-    let (seams, images): (Vec<_>, Vec<_>) = std::env::args().skip(1).partition(|path| path.ends_with(".seam"));
+    let mut args: Vec<String> = std::env::args().skip(1).collect();
+    let only = if args.first().is_some_and(|arg| arg == "--only") { args.drain(..2).nth(1).expect("a name") } else { String::new() };
+    let (seams, images): (Vec<_>, Vec<_>) = args.into_iter().partition(|path| path.ends_with(".seam"));
     assert!(!seams.is_empty() || !images.is_empty(), "give seam files or images");
-    measure_encoding(&seams);
+    measure_encoding(&seams, &only);
     measure_decoding(&images);
 }
 
-fn measure_encoding(seams: &[String]) {
+fn measure_encoding(seams: &[String], only: &str) {
     let tiles: Vec<GBuffer> = seams.iter().map(|path| read_seam(path, &std::fs::read(path).expect("readable")).expect("a seam")).collect();
     let Some(first) = tiles.first() else { return };
     println!("{} tiles of {} px", tiles.len(), first.width);
-    for (name, codec) in codecs() {
+    for (name, codec) in codecs().into_iter().filter(|(name, _)| name.contains(only)) {
         let (seconds, bytes) = best_of_five(|| tiles.iter().map(|g| codec(g).len()).sum::<usize>());
         let n = tiles.len() as f64;
         println!("{name:42} {:8.3} ms {:9.1} KB", seconds * 1e3 / n, bytes as f64 / n / 1e3);
@@ -85,8 +88,13 @@ fn codecs() -> Vec<Codec> {
             out.push((name("depth"), Box::new(move |g| png(g, 4, bytes_from_u32(&g.depth)))));
         }
     }
-    for kind in [LayerKind::Color, LayerKind::Normal, LayerKind::Id, LayerKind::Depth] {
-        let spec = LayerSpec::new(kind, if kind == LayerKind::Color { LayerFormat::Webp } else { LayerFormat::Png });
+    for kind in [LayerKind::Color, LayerKind::Normal, LayerKind::Id, LayerKind::Depth, LayerKind::Data] {
+        let format = match kind {
+            LayerKind::Color => LayerFormat::Webp,
+            LayerKind::Data => LayerFormat::M3d,
+            _ => LayerFormat::Png,
+        };
+        let spec = LayerSpec::new(kind, format);
         let encoder = std::cell::RefCell::new(Encoder::new());
         out.push((format!("{kind:?} as shipped"), Box::new(move |g| encoder.borrow_mut().layer(g, &spec).expect("encodes"))));
     }

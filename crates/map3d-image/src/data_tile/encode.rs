@@ -15,6 +15,7 @@ pub struct DataTileEncoder {
     segments: Segments,
     residuals: ResidualWriter,
     body: Vec<u8>,
+    column: Column,
     deflater: Deflater,
 }
 
@@ -74,34 +75,39 @@ impl DataTileEncoder {
     }
 
     fn write_body(&mut self, pixels: Pixels) {
-        let Self { segments: Segments { runs, labels }, residuals, body, .. } = self;
+        let Self { segments: Segments { runs, labels }, residuals, body, column, .. } = self;
         body.clear();
         body.extend(runs.iter().map(code_of));
-        write_column(body, 2, runs.iter().filter(|run| has_length(run)).map(|run| u64::from(fold(run.end.wrapping_sub(run.expected_end)))));
+        column.write(body, 2, runs.iter().filter(|run| has_length(run)).map(|run| u64::from(fold(run.end.wrapping_sub(run.expected_end)))));
         let ids_before = std::iter::once(0).chain(labels.iter().map(|label| label.id));
-        write_column(body, 4, labels.iter().zip(ids_before).map(|(label, before)| u64::from(label.id ^ before)));
-        write_column(body, 3, labels.iter().map(|label| u64::from(label.normal)));
+        column.write(body, 4, labels.iter().zip(ids_before).map(|(label, before)| u64::from(label.id ^ before)));
+        column.write(body, 3, labels.iter().map(|label| u64::from(label.normal)));
         let own = write_shapes(body, labels);
-        write_column(body, 4, own.iter().map(|slopes| u64::from(fold(slopes.right as u32))));
-        write_column(body, 4, own.iter().map(|slopes| u64::from(fold(slopes.down as u32))));
+        column.write(body, 4, own.iter().map(|slopes| u64::from(fold(slopes.right as u32))));
+        column.write(body, 4, own.iter().map(|slopes| u64::from(fold(slopes.down as u32))));
         let with_depths = labels.iter().filter(|label| label.shape != Shape::Nothing);
-        write_column(body, 6, with_depths.map(|label| fold_long(label.start - start_near(pixels, label))));
+        column.write(body, 6, with_depths.map(|label| fold_long(label.start - start_near(pixels, label))));
         residuals.write(body);
     }
 }
 
 /// Adds the residuals of a run of a rough label, none if all are 0.
 fn add_rough(label: &mut Label, slopes: Slopes, run: &mut Run, depths: &[u32], residuals: &mut ResidualWriter) {
-    let mut before = label.offset;
-    run.has_residuals = label.offsets(slopes, run, depths).any(|offset| offset != before);
-    if !run.has_residuals {
-        return;
-    }
-    for offset in label.offsets(slopes, run, depths) {
+    let (count, mut before) = (residuals.count(), label.offset);
+    let mut offsets = label.offsets(slopes, run, depths);
+    let first = offsets.next().unwrap_or(before);
+    residuals.push(first.wrapping_sub(before));
+    before = first;
+    run.has_residuals = first != label.offset;
+    for offset in offsets {
         residuals.push(offset.wrapping_sub(before));
+        run.has_residuals |= offset != before;
         before = offset;
     }
-    label.offset = label.offsets(slopes, run, depths).next().unwrap_or_default();
+    match run.has_residuals {
+        true => label.offset = first,
+        false => residuals.drop_zeros(count),
+    }
 }
 
 /// Appends the shapes; returns the slopes of the labels that have their own.
@@ -178,10 +184,18 @@ fn code_of(run: &Run) -> u8 {
     run.source | if has_length(run) { WITH_LENGTH } else { 0 } | if run.has_residuals { WITH_RESIDUALS } else { 0 }
 }
 
-/// Appends numbers as planes of bytes, the lowest first.
-fn write_column(body: &mut Vec<u8>, bytes: u32, numbers: impl Iterator<Item = u64> + Clone) {
-    for k in 0..bytes {
-        body.extend(numbers.clone().map(|n| (n >> (8 * k)) as u8));
+/// The numbers of a column, kept for its memory.
+#[derive(Default)]
+struct Column(Vec<u64>);
+
+impl Column {
+    /// Appends numbers as planes of bytes, the lowest first.
+    fn write(&mut self, body: &mut Vec<u8>, bytes: u32, numbers: impl Iterator<Item = u64>) {
+        self.0.clear();
+        self.0.extend(numbers);
+        for k in 0..bytes {
+            body.extend(self.0.iter().map(|n| (n >> (8 * k)) as u8));
+        }
     }
 }
 

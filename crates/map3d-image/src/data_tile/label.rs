@@ -145,9 +145,14 @@ impl Label {
 
     /// Returns the differences between the depths of a run and those of the plane.
     pub fn offsets<'d>(&self, slopes: Slopes, run: &Run, depths: &'d [u32]) -> impl Iterator<Item = u32> + use<'d> {
-        let first = self.at(slopes, run);
-        let right = i64::from(slopes.right);
-        depths.iter().zip(0..).map(move |(depth, k)| depth.wrapping_sub(((first + right * k) >> FRACTION_BITS) as u32))
+        let right = i64::from(slopes.right) as u64;
+        let mut plane = self.at(slopes, run) as u64;
+        // The 32 bits that are kept are the same for both kinds of shift; vectors have only the unsigned one.
+        depths.iter().map(move |depth| {
+            let offset = depth.wrapping_sub((plane >> FRACTION_BITS) as u32);
+            plane = plane.wrapping_add(right);
+            offset
+        })
     }
 
     /// Turns a plane that more than a third of the pixels are off into a rough one, with slopes in whole units, which repeat more.

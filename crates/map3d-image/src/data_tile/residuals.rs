@@ -23,6 +23,12 @@ impl ResidualWriter {
         self.fours.len()
     }
 
+    /// Drops all residuals but the first `count`. The dropped ones are 0.
+    pub fn drop_zeros(&mut self, count: usize) {
+        self.fours.truncate(count);
+    }
+
+    #[inline(always)]
     pub fn push(&mut self, residual: u32) {
         let folded = fold(residual);
         self.fours.push(folded.min(MORE_THAN_FOUR_BITS) as u8);
@@ -31,6 +37,7 @@ impl ResidualWriter {
         }
     }
 
+    #[inline(never)]
     fn push_rest(&mut self, rest: u32) {
         self.rest.push(rest.min(MORE_THAN_A_BYTE) as u8);
         if rest >= MORE_THAN_A_BYTE {

@@ -96,31 +96,28 @@ impl Segments {
 
 /// Finds the end of the run that starts at a pixel of the row that begins at `from`.
 fn find_end(pixels: Pixels, from: usize, start: usize) -> usize {
-    let ids = &pixels.ids[from..from + pixels.width];
-    let normals = &pixels.normals[from..from + pixels.width];
-    let depths = &pixels.depths[from..from + pixels.width];
-    let (id, normal) = (ids[start], normals[start]);
-    let is_same = |k: usize| ids[k] == id && normals[k] == normal;
-    let mut end = start + 1;
-    if depths[start] == DEPTH_NOTHING {
-        while end < pixels.width && is_same(end) && depths[end] == DEPTH_NOTHING {
-            end += 1;
-        }
-        return end;
-    }
-    let mut expected = None;
-    while end < pixels.width && is_same(end) && depths[end] != DEPTH_NOTHING {
-        let step = depths[end].wrapping_sub(depths[end - 1]);
-        if !is_step_like(step, expected) {
-            break;
-        }
-        expected = Some(step);
-        end += 1;
-    }
-    end
+    let rest = from + start..from + pixels.width;
+    let (ids, normals, depths) = (&pixels.ids[rest.clone()], &pixels.normals[rest.clone()], &pixels.depths[rest]);
+    let (id, normal, first) = (ids[0], normals[0], depths[0]);
+    let others = ids.iter().zip(normals).zip(depths).skip(1);
+    let is_other = |i: u32, n: u32| (i ^ id) | (n ^ normal) != 0;
+    let length = if first == DEPTH_NOTHING {
+        others.take_while(|((i, n), depth)| !is_other(**i, **n) && **depth == DEPTH_NOTHING).count()
+    } else {
+        let (mut before, mut expected) = (first, None);
+        let continues = |((i, n), depth): &((&u32, &u32), &u32)| {
+            let step = depth.wrapping_sub(before);
+            let continues = !is_other(**i, **n) & (**depth != DEPTH_NOTHING) & is_step_like(step, expected);
+            (before, expected) = (**depth, Some(step));
+            continues
+        };
+        others.take_while(continues).count()
+    };
+    start + 1 + length
 }
 
 /// Whether a step continues a plane whose last step was `expected`, if it had one.
+#[inline(always)]
 pub fn is_step_like(step: u32, expected: Option<u32>) -> bool {
     match expected {
         Some(expected) => (step.wrapping_sub(expected) as i32).unsigned_abs() <= STEP_TOLERANCE,

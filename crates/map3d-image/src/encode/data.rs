@@ -27,7 +27,16 @@ pub fn bytes_from_normals(normals: &[[i16; 3]]) -> Vec<u8> {
 pub(super) fn packed_normals(normals: &[[i16; 3]]) -> Vec<u32> {
     let table: &[u8; 65_536] = &NORMAL_BYTE;
     let byte = |n: i16| table[n as u16 as usize];
-    let pack = |n: &[i16; 3]| if *n == [0; 3] { 0 } else { u32::from_le_bytes([byte(n[0]), byte(n[1]), byte(n[2]), 0]) };
+    let bits = |n: &[i16; 3]| u64::from(n[0] as u16) | u64::from(n[1] as u16) << 16 | u64::from(n[2] as u16) << 32;
+    let (mut last, mut packed) = (0, 0);
+    let pack = |n: &[i16; 3]| {
+        // Neighbours are mostly equal.
+        if bits(n) != last {
+            last = bits(n);
+            packed = if *n == [0; 3] { 0 } else { u32::from_le_bytes([byte(n[0]), byte(n[1]), byte(n[2]), 0]) };
+        }
+        packed
+    };
     normals.iter().map(pack).collect()
 }
 
