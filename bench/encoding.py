@@ -133,7 +133,7 @@ def _color_encoders(arrays: list[NDArray[Any]], pixels: list[TilePixels]) -> dic
     for form in ("webp", "jpeg"):
         for quality in QUALITIES:
             found[f"core {form} q{quality}"] = lambda k, form=form, quality=quality: _core.encode_layer("color", form, arrays[k], quality)
-        found[f"core {form} q80 small"] = lambda k, form=form: _core.encode_layer("color", form, arrays[k], 80, True)
+    found["core webp q80 small"] = lambda k: _core.encode_layer("color", "webp", arrays[k], 80, True)
     found["core png"] = lambda k: _core.encode_layer("color", "png", arrays[k])
     for method in (0, 4, 6):
         found[f"Pillow webp q80 method {method}"] = lambda k, method=method: _encode_with_pillow(images[k], "WEBP", quality=80, method=method)

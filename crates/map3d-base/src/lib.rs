@@ -29,6 +29,6 @@ pub const DEPTH_UNITS_PER_M: f64 = 1024.0;
 /// Stored depth where there is nothing.
 pub const DEPTH_NOTHING: u32 = u32::MAX;
 /// Raised only when rendered bytes change.
-pub const RENDER_FORMAT: u32 = 6;
+pub const RENDER_FORMAT: u32 = 7;
 /// Rays that leave a surface start this far above it, in metres (spec/pyramid.md §10).
 pub const RAY_LIFT_M: f64 = 1.0 / 64.0;

@@ -66,12 +66,7 @@ fn codecs() -> Vec<Codec> {
             Box::new(move |g| encode_webp(&color_from_linear((g.width, g.height), &g.color), quality, false).expect("webp")),
         ));
     }
-    for small in [false, true] {
-        out.push((
-            format!("color jpeg q85{}", if small { " small" } else { "" }),
-            Box::new(move |g| encode_jpeg(&color_from_linear((g.width, g.height), &g.color), 85, small).expect("jpeg")),
-        ));
-    }
+    out.push(("color jpeg q85".into(), Box::new(|g| encode_jpeg(&color_from_linear((g.width, g.height), &g.color), 85).expect("jpeg"))));
     for filter in [Filter::None, Filter::Sub, Filter::Up, Filter::Average, Filter::Paeth] {
         for deflate in [Deflate::Fast, Deflate::Matching, Deflate::Thorough] {
             let png = move |g: &GBuffer, channels, bytes: &[u8]| encode_png((g.width, g.height), channels, bytes, filter, deflate);

@@ -60,7 +60,7 @@ fn textures(writer: &mut AssetWriter) -> Vec<Material> {
         Raster::new(1024, 1024, (0..1 << 20).map(pixel).collect())
     };
     let material = |k| {
-        let key = writer.add_texture(&encode_jpeg(&image(k), 90, false).expect("jpeg"), "jpg").expect("stored");
+        let key = writer.add_texture(&encode_jpeg(&image(k), 90).expect("jpeg"), "jpg").expect("stored");
         Material { name: format!("{k}"), texture: Some(key), diffuse: [1.0; 4], ..Material::default() }
     };
     (0..TEXTURES).map(material).collect()

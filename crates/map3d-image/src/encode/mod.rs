@@ -89,7 +89,7 @@ impl Encoder {
         let image = color_from_linear(size, color);
         match format {
             LayerFormat::Webp => encode_webp(&image, quality, self.small),
-            LayerFormat::Jpeg => encode_jpeg(&image, quality, self.small),
+            LayerFormat::Jpeg => encode_jpeg(&image, quality),
             LayerFormat::Png => Ok(self.color_png(&image)),
             LayerFormat::M3d => Err(Error::argument("a data tile holds no colour")),
         }
