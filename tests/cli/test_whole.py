@@ -250,6 +250,22 @@ def test_site_of_a_folder_processes_only_changes_when_re_run(run: Run, tmp_path:
     assert Manifest.load((out / "rendering.json").read_bytes()).content_version != first.content_version
 
 
+def test_site_with_small_tiles(run: Run, tmp_path: Path) -> None:
+    from map3d.tiles.viewer_files import viewer_folder
+
+    try:
+        viewer_folder()
+    except Exception as error:
+        pytest.skip(f"the viewer is not built: {error}")
+    town, options = write_town(tmp_path / "town", 1), ("--res", "0.1", "--view", "0-45", "--workers", "1")
+    tiles_bytes = []
+    for number, small in enumerate(((), ("--small",))):
+        status, _, err = run("site", str(town), "-o", str(tmp_path / f"site-{number}"), *options, *small, "-w", str(tmp_path / f"work-{number}"))
+        assert status == 0, err
+        tiles_bytes.append(sum(path.stat().st_size for path in (tmp_path / f"site-{number}").rglob("*.pmtiles")))
+    assert tiles_bytes[1] < 0.9 * tiles_bytes[0]
+
+
 def test_workspace_can_be_moved(run: Run, town: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run("render", "view")
     moved = tmp_path / "elsewhere"

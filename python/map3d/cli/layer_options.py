@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from datetime import date, datetime
 from functools import wraps
-from typing import Any, cast
+from typing import Any, Final, cast
 
 import click
 
@@ -87,12 +87,14 @@ def data_option(*, beside_layers: bool = False) -> Callable[[Any], Any]:
     return click.option("--data", type=click.Choice(list(LAYERS_BY_DATA)), help=text, **settings)
 
 
+small_option: Final = click.option("--small", is_flag=True, help="Encode for size: about 30 % fewer bytes, in three times the encoding time.")
+
 _OPTIONS: list[Callable[[Any], Any]] = [
     click.option(
         "--color", type=click.Choice(list(COLOR_FORMATS)), default="webp", show_default=True, help="Image format of the layers color and picture."
     ),
     click.option("--quality", type=click.IntRange(1, 100), default=80, show_default=True, help="Quality of webp and jpeg."),
-    click.option("--small", is_flag=True, help="Encode about 40 % smaller, in three times the time; the pixels are the same."),
+    small_option,
     click.option("--time", type=IsoTime(), help="Layers sun and picture: date and time with time zone, e.g. 2026-06-21T15:00+02:00."),
     click.option(
         "--sun",

@@ -10,7 +10,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from map3d.catalogue import Catalogue, Workspace
 from map3d.cli.building import build_with_progress
 from map3d.cli.import_reports import left_alone_lines, missing_textures_line, place_line, warning_lines
-from map3d.cli.layer_options import data_option
+from map3d.cli.layer_options import data_option, small_option
 from map3d.cli.options import View, format_options, max_memory_option, outlier_options, style_option, workers_option, workspace_option
 from map3d.cli.output import names_text, plural, size_text
 from map3d.cli.progress import progress_bar
@@ -45,6 +45,7 @@ if TYPE_CHECKING:
 )
 @click.option("--color", type=click.Choice(list(COLOR_FORMATS)), default="webp", show_default=True, help="Image format of the layer color.")
 @data_option()
+@small_option
 @click.option("--crs", help="Coordinate system of the files, where they do not state it or state it wrongly; 'local' for local metres.")
 @format_options
 @click.option("--strict", is_flag=True, help="Stop at the first problem instead of skipping it.")
@@ -119,6 +120,7 @@ def _site_request(folder: Path, views: tuple[ViewAngles, ...], **options: Any) -
         attribution=options["attribution"],
         color=options["color"],
         data=options["data"],
+        small=options["small"],
         options=ImportOptions(
             **{name: options[name] for name in ("crs", "up", "split", "theme", "lod", "interiors", "transparency", "max_error_m", "strict")},
             virtual_rasters=True,

@@ -45,6 +45,7 @@ class SiteRequest:
     attribution: str = ""
     color: str = "webp"
     data: DataEncoding = DEFAULT_DATA
+    small: bool = False
     options: ImportOptions = field(default_factory=ImportOptions)
     allow_empty: bool = False
     keep_outliers: bool = False
@@ -80,7 +81,7 @@ def create_site_rendering(workspace: Workspace, catalogue: Catalogue, request: S
     has_chosen_ao = request.ao is None and detail is not None and detail.texel_m is None
     names = LAYERS_BY_DATA[request.data] + (("ao",) if request.ao or has_chosen_ao else ())
     light = LightRequest(radius_m=_ao_radius_m(scene) if "ao" in names else None)
-    layers = LayerRequest(names, color=request.color, light=light)
+    layers = LayerRequest(names, color=request.color, light=light, small=request.small)
     rendering = RenderingRequest(
         request.name, request.name, request.views, res_m, layers=layers, title=request.title, attribution=request.attribution
     )
