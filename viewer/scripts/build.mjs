@@ -72,16 +72,20 @@ const shortenLine = (line) => (line.startsWith("#") || line.includes('"') ? line
 /** Names of functions and variables that a shader declares; not those of uniforms and outputs (u_…, o_…), which TypeScript code knows, and not those that hide a function of GLSL. */
 const DECLARED = /\b(?:void|bool|u?int|float|[biu]?vec[234]|mat[234])\s+(?![a-z]_|main\b|step\b|distance\b|length\b|texture\b)([A-Za-z]\w+)/g;
 
-/** Gives the names that shaders declare one or two letters each; texts in `code` between backticks are shaders. */
+/** Further names of a declaration with several variables. */
+const ALSO_DECLARED = /(?<=\b(?:float|int|[biu]?vec[234]) [^;{}]*, ?)(?!step\b|distance\b|length\b|texture\b)([A-Za-z]\w+)(?= ?=[^=])/g;
+
+/** Gives the names that shaders declare one or two letters each, and joins lines after statements; texts in `code` between backticks are shaders. */
 function shortenNames(code) {
   const parts = code.split("`");
   const shaders = parts.filter((_, k) => k % 2 === 1).join("\n").replace(/\$\{[^}]*\}/g, "");
   const taken = new Set(["do", "if", "in", ...(shaders.match(/\b[A-Za-z]\w?\b/g) ?? [])]);
   const free = [..."abcdefghijklmnopqrstuvwxyz"].flatMap((letter, _, all) => [letter, ...all.map((second) => letter + second)]).sort((a, b) => a.length - b.length);
   const names = new Map();
-  for (const [, name] of shaders.matchAll(DECLARED)) if (!names.has(name)) names.set(name, free.find((short) => !taken.has(short) && taken.add(short)));
+  const declared = [...shaders.matchAll(DECLARED), ...shaders.matchAll(ALSO_DECLARED)].map(([, name]) => name);
+  for (const name of declared) if (!names.has(name)) names.set(name, free.find((short) => !taken.has(short) && taken.add(short)));
   const rename = (text) => text.replace(/(\$\{[^}]*\})|(?<![.\w])[A-Za-z]\w+/g, (word, inserted) => (inserted === undefined ? names.get(word) ?? word : word));
-  return parts.map((part, k) => (k % 2 === 1 ? rename(part) : part)).join("`");
+  return parts.map((part, k) => (k % 2 === 1 ? rename(part).replace(/^(?!#)(.*[;{}])\n(?!#)/gm, "$1") : part)).join("`");
 }
 
 /** Shortens shaders. */
@@ -112,22 +116,30 @@ const tables = {
     build.onLoad({ filter: /\/suncalc\/index\.js$/ }, ({ path }) => ({ contents: readFileSync(path, "utf8").replaceAll("new Int32Array(", "/* @__PURE__ */ new Int32Array("), loader: "js" }));
   },
 };
-/** Writes the keys of the page's messages once for all languages. */
+/** Reads a table of messages in page/i18n.ts: the text of an object. */
+const readTable = (body) => new Function(`return ${body}`)();
+const pageMessages = readFileSync(join(root, "page/i18n.ts"), "utf8");
+/** Short names of keys of messages in mixed case, which are nothing else where they stand in quotation marks; not those that the page puts together, or reads from data. */
+const SHORT_KEYS = new Map(Object.keys(readTable(/^const EN = (\{[^]*?^\});/m.exec(pageMessages)[1])).filter((key) => /[A-Z]/.test(key) && !/Hint$|^measuredHeight$/.test(key)).map((key, k) => [key, k.toString(36)]));
+const shortenKeys = (text) => text.replace(/"(\w+)"/g, (whole, key) => (SHORT_KEYS.has(key) ? `"${SHORT_KEYS.get(key)}"` : whole));
+
+/** Writes the keys of the page's messages once for all languages, and shortens them. */
 const messages = {
   name: "messages",
   setup(build) {
-    build.onLoad({ filter: /\/page\/i18n\.ts$/ }, ({ path }) => {
+    build.onLoad({ filter: /\/page\/[\w-]+\.ts$/ }, ({ path }) => {
+      if (!path.endsWith("/i18n.ts")) return { contents: shortenKeys(readFileSync(path, "utf8")), loader: "ts" };
       const join = (texts) => {
         if (texts.some((text) => text.includes("|"))) throw new Error(`${path}: a message contains "|"`);
         return JSON.stringify(texts.join("|"));
       };
-      const [text, keys] = [readFileSync(path, "utf8"), []];
-      const contents = text.replace(/^(const (?:EN|DE|FR)(?:: Messages)? = )(\{[^]*?^\});/gm, (_, before, body) => {
-        const table = new Function(`return ${body}`)();
+      const keys = [];
+      const contents = pageMessages.replace(/^(const (?:EN|DE|FR)(?:: Messages)? = )(\{[^]*?^\});/gm, (_, before, body) => {
+        const table = readTable(body);
         if (keys.length === 0) keys.push(...Object.keys(table));
         return `${before}readMessages(${join(keys.map((key) => table[key]))});`;
       });
-      return { contents: `const KEYS = ${join(keys)}.split("|");\nconst readMessages = (texts) => Object.fromEntries(texts.split("|").map((text, k) => [KEYS[k], text]));\n${contents}`, loader: "ts" };
+      return { contents: `const KEYS = ${join(keys.map((key) => SHORT_KEYS.get(key) ?? key))}.split("|");\nconst readMessages = (texts) => Object.fromEntries(texts.split("|").map((text, k) => [KEYS[k], text]));\n${contents}`, loader: "ts" };
     });
   },
 };
@@ -191,7 +203,7 @@ async function build() {
 
 /** Removes the English texts that the script replaces, indentation, line ends before blocks, and the end tags and quotation marks that HTML does not need. */
 function minifyHtml(page) {
-  const untranslated = page.replace(/(<[^>]* data-i18n="[^>]*>)[^<]+/g, "$1").replace(/<[^>]* data-i18n-(?:label|placeholder)="[^>]*>/g, (tag) => tag.replace(/ (?:aria-label|placeholder)="[^"]*"/g, ""));
+  const untranslated = page.replace(/(?<= data-i18n(?:-\w+)?=)"\w+"/g, shortenKeys).replace(/(<[^>]* data-i18n="[^>]*>)[^<]+/g, "$1").replace(/<[^>]* data-i18n-(?:label|placeholder)="[^>]*>/g, (tag) => tag.replace(/ (?:aria-label|placeholder)="[^"]*"/g, ""));
   const blocks = untranslated.replace(/^\s+/gm, "").replace(/>\n(?=<(?:meta|link|title|script|p|div|form|dialog|ul|header|main|aside|section|h1|h2)\b)/g, ">").replace(/<\/(?:li|option)>/g, "");
   return blocks.replace(/<[^>]*>/g, (tag) => tag.replace(/="([\w.#-]+)"(?=[ >])/g, "=$1"));
 }

@@ -1,3 +1,4 @@
+import type { Addable } from "../core/mapLayer";
 import type { Vec2 } from "../core/vec";
 import type { FrameContent, LayerPass } from "./drawer";
 
@@ -17,10 +18,14 @@ export interface LightEstimator {
   readonly shader: string;
   /** Range of D of the depths that the shader receives; null when nothing was estimated. */
   readonly range: Vec2 | null;
+  /** Whether it keeps its last estimate, wherever the camera is; for the pieces of a picture. */
+  held?: boolean;
   /** Estimates a frame's light, unless all of it was rendered. @param getRange returns the minimum and maximum D of the frame's content */
   update(gl: WebGL2RenderingContext, frame: FrameContent, getRange: () => Vec2, draw: DrawDepths): void;
   /** Whether a pass uses the estimate. */
   appliesTo(frame: FrameContent, pass: LayerPass): boolean;
   /** Sets the uniforms of the shader. */
   bind(gl: WebGL2RenderingContext, program: Program, frame: FrameContent, pass: LayerPass): void;
+  /** Makes what adds the same estimator to another map. Without it, exported pictures have no estimated light. */
+  copy?(): Addable<never>;
 }

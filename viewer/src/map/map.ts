@@ -55,7 +55,8 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   #drawnCamera: Camera | undefined;
   #relief: Relief | undefined;
   #plans: readonly LayerPlan[] = [];
-  #lightEstimator: LightEstimator | null = null;
+  /** @internal Estimates light that was not rendered. */
+  lightEstimator: LightEstimator | null = null;
   /** Whether anything apart from the camera has changed since the last frame. */
   #dirty = true;
   /** Whether the view has not moved since the last "moveend". */
@@ -210,7 +211,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
 
   /** @internal Sets the estimator of light that was not rendered. */
   setLightEstimator(shade: LightEstimator | null): this {
-    this.#lightEstimator = shade;
+    this.lightEstimator = shade;
     return this.#redraw();
   }
 
@@ -371,12 +372,12 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     [this.#drawnCamera, this.#dirty, this.#relief] = [viewState.camera, false, undefined];
     const moving = lastCamera !== undefined && lastCamera !== viewState.camera;
     this.#fetchesAhead &&= !moving;
-    const input = { ...this.#planInput, lightEstimator: this.#lightEstimator, moving, next: this.nextCamera && { ...viewState, camera: this.nextCamera }, ahead: this.#fetchesAhead ? this.listViewsAhead(viewState) : [] };
+    const input = { ...this.#planInput, lightEstimator: this.lightEstimator, moving, next: this.nextCamera && { ...viewState, camera: this.nextCamera }, ahead: this.#fetchesAhead ? this.listViewsAhead(viewState) : [] };
     const { plans, complete, next } = this.#renderer.render(viewState, input, this.transitionCamera && ((scene) => { this.transition?.draw({ ...scene, camera: viewState.camera, tilesChanged }); }));
     [this.#plans, this.#complete] = [plans, complete];
     if (lastCamera !== viewState.camera || inTransition) this.#fireMove(lastCamera, viewState.camera);
     this.frameEvents.fire("draw", {});
-    if (this.#lightEstimator && moving) this.#redraw();
+    if (this.lightEstimator && moving) this.#redraw();
     if (this.moving || !this.#atRest || complete) this.#loop.request();
     if (complete) this.#fireLoad();
     if (next) this.continueTurn(next);

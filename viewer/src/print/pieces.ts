@@ -1,5 +1,7 @@
 import { element } from "../core/dom";
-import { DecodeError, DrawError, FetchError, map, UsageError, type imageLayer } from "../map3d";
+import type { Vec3 } from "../core/vec";
+import type { Camera } from "../geo/camera";
+import { DecodeError, DrawError, FetchError, map, UsageError, type Addable, type imageLayer } from "../map3d";
 
 /** Size and scale of the picture. */
 export interface PictureExtent {
@@ -37,6 +39,7 @@ export async function drawPieces(shown: map, { width, height, scale }: PictureEx
   const offscreen = new OffscreenMap(shown, box, scale);
   try {
     await offscreen.ready(signal);
+    await offscreen.estimateLight({ ...camera, width: Math.round(width / scale), height: Math.round(height / scale) }, origin, signal);
     for (let k = 0; k < across * down; k++) {
       const [x, y] = [(k % across) * side.width, Math.floor(k / across) * side.height];
       const middle = { x: x + (box.clientWidth * scale) / 2, y: y + (box.clientHeight * scale) / 2 };
@@ -67,6 +70,8 @@ class OffscreenMap {
   readonly #layers: readonly imageLayer[];
   readonly #shown: readonly imageLayer[];
   readonly #failed: Promise<never>;
+  /** Estimates light as on the map; undefined: nothing does. */
+  readonly #shade: Addable<never> | undefined;
 
   constructor(shown: map, box: HTMLElement, scale: number) {
     this.#box = box;
@@ -84,6 +89,8 @@ class OffscreenMap {
     this.#failed.catch(() => undefined);
     this.#shown = shown.layers.filter(({ rendering }) => rendering);
     this.#layers = this.#shown.map((layer) => layer.copy());
+    this.#shade = shown.lightEstimator?.copy?.();
+    if (this.#shade) this.map.add(this.#shade);
   }
 
   /** Adds the layers and waits for their manifests. */
@@ -91,6 +98,27 @@ class OffscreenMap {
     const ready = this.#layers.map((layer) => new Promise((done) => layer.once("ready", done)));
     for (const layer of this.#layers) layer.addTo(this.map);
     await this.#orFail(Promise.all(ready), signal);
+  }
+
+  /** Estimates the light of the whole picture at the resolution of CSS pixels, as on the screen, and keeps it for the pieces. */
+  async estimateLight(camera: Camera, origin: Vec3, signal: AbortSignal | undefined): Promise<void> {
+    const { map: { lightEstimator, options } } = this;
+    const { pixelRatio } = options;
+    if (!lightEstimator || !this.#shade?.needs?.length || !pixelRatio) return;
+    const { clientWidth, clientHeight } = this.#box;
+    options.pixelRatio = 1;
+    await this.#resize(camera.width, camera.height);
+    this.map.syncCamera(camera, origin);
+    await this.complete(signal);
+    lightEstimator.held = true;
+    options.pixelRatio = pixelRatio;
+    await this.#resize(clientWidth, clientHeight);
+  }
+
+  /** Resizes the map, which learns of it before a later observer does. */
+  async #resize(width: number, height: number): Promise<void> {
+    Object.assign(this.#box.style, { width: `${String(width)}px`, height: `${String(height)}px` });
+    await new Promise((done) => { new ResizeObserver(done).observe(this.map.canvas); });
   }
 
   /** Clips the layers like those of the map. @param corner, size the piece, as fractions of the map */

@@ -1,7 +1,7 @@
 import { dot, type Vec2, type Vec3 } from "../core/vec";
 import { cssPixelM, type Camera } from "../geo/camera";
 import { towardsLight } from "../geo/light";
-import type { DrawDepths, FrameContent, LayerPass, LightEstimator, Program } from "../map3d";
+import type { Addable, DrawDepths, FrameContent, LayerPass, LightEstimator, Program } from "../map3d";
 import type { DepthLightEstimator } from "./depthLightEstimator";
 import { DepthTarget } from "./depthTarget";
 import { READ } from "./shaders";
@@ -13,9 +13,10 @@ const UNIT = 8;
 interface EstimatedLight {
   readonly texture: WebGLTexture;
   readonly range: Vec2;
-  /** The frame's camera, and device pixels per pixel of the estimate. */
+  /** The frame's camera, device pixels per pixel of the estimate, and its pixels per CSS pixel. */
   readonly camera: Camera;
   readonly step: number;
+  readonly scale: number;
   readonly height: number;
   /** Fraction of the range that counts as the same depth. */
   readonly tolerance: number;
@@ -24,12 +25,15 @@ interface EstimatedLight {
 /** Computes screen-space shadows and ambient occlusion of a map and binds them for the drawer's shader. */
 export class ScreenSpaceLight implements LightEstimator {
   readonly shader = READ;
+  readonly copy: () => Addable<never>;
+  held = false;
   readonly #estimator: DepthLightEstimator;
   #depthTarget: DepthTarget | undefined;
   #result: EstimatedLight | null = null;
 
-  constructor(estimator: DepthLightEstimator) {
+  constructor(estimator: DepthLightEstimator, copy: () => Addable<never>) {
     this.#estimator = estimator;
+    this.copy = copy;
   }
 
   get range(): Vec2 | null {
@@ -37,6 +41,7 @@ export class ScreenSpaceLight implements LightEstimator {
   }
 
   update(gl: WebGL2RenderingContext, frame: FrameContent, getRange: () => Vec2, draw: DrawDepths): void {
+    if (this.held) return;
     const { lighting, camera } = frame;
     const step = Math.max(1, frame.dpr);
     const last = this.#result;
@@ -59,15 +64,15 @@ export class ScreenSpaceLight implements LightEstimator {
 
   bind(gl: WebGL2RenderingContext, program: Program, frame: FrameContent, { bakedLight }: LayerPass): void {
     if (!this.#result) return;
-    const { texture, camera, step, height, tolerance } = this.#result;
+    const { texture, camera, scale, height, tolerance } = this.#result;
     gl.uniform1i(program.at("u_estimate"), UNIT);
     gl.activeTexture(gl.TEXTURE0 + UNIT);
     gl.bindTexture(gl.TEXTURE_2D, texture);
     const now = frame.camera;
-    const [px, scale] = [cssPixelM(camera), frame.dpr / step];
+    const px = cssPixelM(camera);
     const zoomRatio = cssPixelM(now) / px;
     const [x, y] = [(now.u - camera.u) / px + camera.width / 2 - (zoomRatio * now.width) / 2, (camera.v - now.v) / px + camera.height / 2 - (zoomRatio * now.height) / 2];
-    gl.uniform4f(program.at("u_estimateMap"), zoomRatio / step, x * scale, y * scale, height);
+    gl.uniform4f(program.at("u_estimateMap"), (zoomRatio * scale) / frame.dpr, x * scale, y * scale, height);
     gl.uniform1f(program.at("u_tolerance"), tolerance);
     gl.uniform2i(program.at("u_estimated"), Number(frame.light.occlusion && !bakedLight.occlusion), Number(hasShadows(frame) && !bakedLight.shadow));
   }
@@ -90,7 +95,7 @@ export class ScreenSpaceLight implements LightEstimator {
     const sun: Vec3 | null = hasShadows(frame) ? [dot(right, towards), dot(up, towards), dot(forward, towards)] : null;
     const texture = this.#estimator.estimateLight({ gl, depth: picture.texture, width, height, px_m, range, sun, occlusion: light.occlusion });
     gl.disable(gl.DEPTH_TEST);
-    return { texture, range, camera, step, height, tolerance: (2 * px_m) / (range[1] - range[0]) + 1 / 65535 };
+    return { texture, range, camera, step, scale: frame.dpr / step, height, tolerance: (2 * px_m) / (range[1] - range[0]) + 1 / 65535 };
   }
 
   #getDepthTarget(gl: WebGL2RenderingContext, width: number, height: number): DepthTarget {

@@ -20,7 +20,7 @@ export class shade extends MapLayer<map, object> {
 
   constructor({ radius_m = 20, thickness_m = 6 }: ShadeOptions = {}) {
     super();
-    this.#light = new ScreenSpaceLight(new DepthLightEstimator(radius_m, thickness_m));
+    this.#light = new ScreenSpaceLight(new DepthLightEstimator(radius_m, thickness_m), () => new shade({ radius_m, thickness_m }));
   }
 
   /** Depth, unless all layers have rendered shadows and occlusion, or the map does not draw with WebGL. */

@@ -1,4 +1,5 @@
 import type { Page } from "playwright-core";
+import type * as Print from "../../src/print";
 import { expect, test } from "vitest";
 import { dot, type Vec3 } from "../../src/core/vec";
 import { computeAxes, localFromUvd, uvdFromLocal } from "../../src/geo/axes";
@@ -125,6 +126,50 @@ test("after a movement the picture equals that of a map opened there and rests; 
   expect(frames).toBe(0);
   await settled(page, () => (globalThis as Global & { shade: { remove(): void } }).shade.remove(), null);
   expect(Buffer.compare(await picture(page), bare)).toBe(0);
+  await page.context().close();
+});
+
+test("an exported picture of several pieces has the shadows of the screen, at its resolution and at twice of it", async () => {
+  const [width, height] = [1100, 260];
+  const { page, problems } = await start({ light: { ...SUN, occlusion: true }, zoom: 2.6 }, "town", { viewport: { width, height } });
+  await page.addScriptTag({ url: "/map3d-print.js" });
+  const bare = await picture(page);
+  await settled(page, addShade, {});
+  const screen = await picture(page);
+  /** The exported picture, averaged to the pixels of the screen. */
+  const exported = (scale: number): Promise<number[]> => page.evaluate(async (scale) => {
+    const g = globalThis as unknown as Global & { map3d: typeof Print };
+    const bitmap = await createImageBitmap(await g.map3d.exportPicture(g.map, { scale, scaleBar: false, northArrow: false, attribution: "", background: "transparent", markers: false }), { premultiplyAlpha: "none" });
+    const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d") as OffscreenCanvasRenderingContext2D;
+    context.drawImage(bitmap, 0, 0);
+    const { data } = context.getImageData(0, 0, bitmap.width, bitmap.height);
+    const [columns, rows] = [bitmap.width / scale, bitmap.height / scale];
+    return Array.from({ length: columns * rows * 4 }, (_, k) => {
+      const [x, y] = [((k >> 2) % columns) * scale, Math.floor((k >> 2) / columns) * scale];
+      let sum = 0;
+      for (let j = 0; j < scale * scale; j++) sum += data[4 * ((y + Math.floor(j / scale)) * bitmap.width + x + (j % scale)) + (k & 3)] ?? 0;
+      return sum / scale ** 2;
+    });
+  }, scale);
+  const difference = (a: ArrayLike<number>, b: ArrayLike<number>): { mean: number; most: number } => {
+    let [sum, count, most] = [0, 0, 0];
+    for (let k = 0; k < screen.length; k += 4) {
+      if (screen[k + 3] !== 255) continue;
+      const off = Math.abs((a[k] ?? 0) - (b[k] ?? 0));
+      [sum, count, most] = [sum + off, count + 1, Math.max(most, off)];
+    }
+    return { mean: sum / count, most };
+  };
+  const shaded = difference(screen, bare);
+  expect(shaded.mean).toBeGreaterThan(5);
+  expect(difference(await exported(1), screen).most).toBeLessThanOrEqual(1);
+  const double = difference(await exported(2), screen);
+  console.log("shadows on the screen, and its difference from a picture of twice the resolution:", shaded.mean.toFixed(2), double.mean.toFixed(2));
+  expect(double.mean).toBeLessThan(0.25 * shaded.mean);
+  // Without shadows from depth, there are none in the picture.
+  await settled(page, () => (globalThis as Global & { shade: { remove(): void } }).shade.remove(), null);
+  expect(difference(await exported(1), bare).most).toBeLessThanOrEqual(1);
+  expect(problems).toEqual([]);
   await page.context().close();
 });
 
