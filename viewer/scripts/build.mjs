@@ -14,9 +14,9 @@ const dist = join(root, "dist");
 const INTERNAL_NAMES = `
   advanceCamera backoff_ms checkCompatible clearFailures clearPatches continueTurn copyToCanvas createName deselectMarkers dragBy dropTiles
   enterFullScreen exitFullScreen findCenterSurface findView fitCanvas forget freeAllBut fullScreen getOrCreate hasFailed initializeView isCombinable
-  isCovered isLoaded isLoading lightLayers listViewsAhead makePass makeRequest nextCamera nextView onManifest onUploaded peek pinned placeElement
-  probes prune releaseData replaceCanvas requiredKinds requireGpu retry_ms retryAfter_ms rotateLeft rotateRight runNow screenCenter setCamera setLimit
-  setRequests showElement showsAt slots startInertia startTick transitionCamera urgency winds zoomToRect
+  hovers isCovered isLoaded isLoading isPositionOccluded lightLayers listViewsAhead makePass makeRequest nextCamera nextView onManifest onUploaded peek pinned placeElement positionAt
+  probes prune releaseData replaceCanvas requiredKinds requireGpu resizeCamera retry_ms retryAfter_ms rotateLeft rotateRight runNow screenCenter setCamera setLimit
+  setRequests showElement showsAt slots startInertia startTick transient transitionCamera urgency winds zoomToRect
 `.trim().split(/\s+/);
 const mangleCache = Object.fromEntries(INTERNAL_NAMES.map((name, k) => [name, `_${k.toString(36)}`]));
 const shared = { mangleProps: new RegExp(`^(?:${INTERNAL_NAMES.join("|")})$`), mangleCache, bundle: true, minify: true, target: "es2022", legalComments: "none", logLevel: "warning" };

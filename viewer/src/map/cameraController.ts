@@ -50,6 +50,8 @@ export abstract class CameraController extends Evented<MapEvents> {
   #nextCenter: Vec3 | null = null;
   #pending: (() => void)[] = [];
   #limits: Limits | undefined;
+  /** The first camera of a map whose element has had no size so far. */
+  #unsized: Camera | undefined;
   /** Number of movements so far: a later one replaces one that waits for its position. */
   #moves = 0;
   /** Clockwise rotation since the last switch of views. */
@@ -360,23 +362,46 @@ export abstract class CameraController extends Evented<MapEvents> {
 
   /** Sets the initial view from the first manifest. */
   protected initializeView(rendering: Rendering): void {
-    const { width, height } = this.size;
     const { json, views } = rendering;
-    const { direction, center, zoom, cover, minZoom, maxZoom, maxBounds } = this.options;
+    const { direction, center, zoom, minZoom, maxZoom, maxBounds } = this.options;
     const view = views.get(direction ?? "") ?? [...views.values()][0];
     if (!view) return;
     if (direction !== undefined && !views.has(direction)) this.report(new UsageError(`unknown view "${direction}"; the rendering has ${[...views.keys()].join(", ")}`));
     this.reference = rendering;
     this.#limits = { box: json.box, bounds: json.box, minZoom, maxZoom };
-    const whole = fitCamera({ frame: view.frame, u: 0, v: 0, zoom: 0, width, height }, json.box, Math.min(width, height) * 0.04, json.zmax);
-    const fitted = cover ? fillScreen(whole, view, json.box) : whole;
-    const start = center && isVector(center) ? center : json.start && add(json.origin, json.start.local);
-    this.setCamera(start ? centerCamera(fitted, rendering, start, zoom) : { ...fitted, zoom: zoom ?? fitted.zoom });
+    this.setCamera(this.#makeFirstCamera(rendering, view));
+    this.#unsized = this.size.width * this.size.height > 0 ? undefined : this.camera;
     if (maxBounds) this.#pending.unshift(() => { this.setMaxBounds(maxBounds); });
     if (center && !isVector(center)) this.#pending.unshift(() => { this.setView(center, zoom); });
     for (const action of this.#pending.splice(0)) this.#runPending(action);
     this.fire("ready", {});
     this.fire("directionchange", { direction: this.direction });
+  }
+
+  /** Makes the camera of the first picture. */
+  #makeFirstCamera(rendering: Rendering, { frame }: Pick<View, "frame">): Camera {
+    const { width, height } = this.size;
+    const { json } = rendering;
+    const { center, zoom, cover } = this.options;
+    const whole = fitCamera({ frame, u: 0, v: 0, zoom: 0, width, height }, json.box, Math.min(width, height) * 0.04, json.zmax);
+    const fitted = cover ? fillScreen(whole, rendering.views.get(frame.id) as View, json.box) : whole;
+    const start = center && isVector(center) ? center : json.start && add(json.origin, json.start.local);
+    return start ? centerCamera(fitted, rendering, start, zoom) : { ...fitted, zoom: zoom ?? fitted.zoom };
+  }
+
+  /** Gives the camera the map's size. The first size sets what nothing else has set before: the zoom, and the position. */
+  protected resizeCamera({ width, height }: Size): void {
+    const { camera, reference } = this;
+    if (!camera || (camera.width === width && camera.height === height)) return;
+    const before = this.#unsized;
+    let { u, v, zoom } = camera;
+    if (before && width * height > 0) {
+      this.#unsized = undefined;
+      const first = this.#makeFirstCamera(reference as Rendering, camera);
+      if (u === before.u && v === before.v) ({ u, v } = first);
+      if (zoom === before.zoom) ({ zoom } = first);
+    }
+    this.setCamera({ ...camera, width, height, u, v, zoom });
   }
 
   /** Runs a call that waited for the manifest; its errors are reported by the map. */

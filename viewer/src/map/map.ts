@@ -436,7 +436,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
 
   #onResize(): void {
     const { width, height } = this.size;
-    if (this.camera && (this.camera.width !== width || this.camera.height !== height)) this.setCamera({ ...this.camera, width, height });
+    this.resizeCamera(this.size);
     this.fire("resize", { width, height });
     this.#redraw();
   }
