@@ -14,12 +14,18 @@ const dist = join(root, "dist");
 const INTERNAL_NAMES = `
   advanceCamera backoff_ms checkCompatible clearFailures clearPatches continueTurn copyToCanvas createName deselectMarkers dragBy dropTiles
   enterFullScreen exitFullScreen findCenterSurface findView fitCanvas forget freeAllBut fullScreen getOrCreate hasFailed initializeView isCombinable
-  hovers isCovered isLoaded isLoading isPositionOccluded lightLayers listViewsAhead makePass makeRequest nextCamera nextView onManifest onUploaded peek pinned placeElement positionAt
+  hovers isCovered isLoaded isLoading isPositionOccluded lightLayers listViewsAhead loadError makePass makeRequest nextCamera nextView onLoadError onManifest onUploaded peek pinned placeElement positionAt
   probes prune releaseData replaceCanvas requiredKinds requireGpu resizeCamera retry_ms retryAfter_ms rotateLeft rotateRight runNow screenCenter setCamera setLimit
-  setRequests showElement showsAt slots startInertia startTick transient transitionCamera urgency winds zoomToRect
+  setRequests showElement showsAt slots startInertia startTick transient transitionCamera uncovered urgency winds zoomToRect
 `.trim().split(/\s+/);
-const mangleCache = Object.fromEntries(INTERNAL_NAMES.map((name, k) => [name, `_${k.toString(36)}`]));
-const shared = { mangleProps: new RegExp(`^(?:${INTERNAL_NAMES.join("|")})$`), mangleCache, bundle: true, minify: true, target: "es2022", legalComments: "none", logLevel: "warning" };
+/** Names of members that only one entry, or the page, uses, and no public type has: they get short names, too. `checkOwnNames` fails where another folder uses one. */
+const OWN_NAMES = `
+  allHidden boxIn createContainer createTarget describeArea describeLine describeProfile fillIn findFolders formatSample hasHaze headings insecure
+  isReady isStale notGeoreferenced partHidden restyle savePage selectId setCourse setFocus setLayer updateHeight
+`.trim().split(/\s+/);
+const MANGLED = [...INTERNAL_NAMES, ...OWN_NAMES];
+const mangleCache = Object.fromEntries(MANGLED.map((name, k) => [name, `_${k.toString(36)}`]));
+const shared = { mangleProps: new RegExp(`^(?:${MANGLED.join("|")})$`), mangleCache, bundle: true, minify: true, target: "es2022", legalComments: "none", logLevel: "warning" };
 const CSS_TARGET = ["chrome111", "firefox121", "safari16.4"];
 const banner = { js: "/*! map3d, Apache-2.0 */" };
 
@@ -47,9 +53,18 @@ const CORE = ["core", "geo", "tiles", "draw", "map", "overlay", "ui"];
 function checkInternalNames() {
   for (const folder of ["src", "page"]) {
     for (const file of readdirSync(join(root, folder), { recursive: true }).filter((name) => name.endsWith(".ts") && !(folder === "src" && CORE.includes(name.split(/[/\\]/)[0])))) {
-      const found = readFileSync(join(root, folder, file), "utf8").match(/\w+/g)?.find((word) => Object.hasOwn(mangleCache, word));
+      const found = readFileSync(join(root, folder, file), "utf8").match(/\w+/g)?.find((word) => INTERNAL_NAMES.includes(word));
       if (found !== undefined) throw new Error(`${folder}/${file}: uses "${found}", which is an internal name of the core; remove it from INTERNAL_NAMES in scripts/build.mjs`);
     }
+  }
+}
+
+/** @throws Error when two folders use an own name of one of them */
+function checkOwnNames() {
+  const files = ["src", "page"].flatMap((folder) => readdirSync(join(root, folder), { recursive: true }).filter((name) => name.endsWith(".ts")).map((name) => join(folder, name)));
+  for (const name of OWN_NAMES) {
+    const users = new Set(files.filter((file) => new RegExp(`\\b${name}\\b`).test(readFileSync(join(root, file), "utf8"))).map((file) => file.split(/[/\\]/).slice(0, file.startsWith("page") ? 1 : 2).join("/")));
+    if (users.size > 1) throw new Error(`${[...users].join(", ")}: use "${name}", which is to be a name of one of them; remove it from OWN_NAMES in scripts/build.mjs`);
   }
 }
 
@@ -182,6 +197,7 @@ async function build() {
   rmSync(dist, { recursive: true, force: true });
   mkdirSync(dist, { recursive: true });
   checkInternalNames();
+  checkOwnNames();
   const core = [...MODULE_ORDER.map((file) => `import "./src/${file}";\n`), 'export * from "./src/map3d.ts";\n'].join("");
   await write({ ...shared, banner, stdin: { contents: core, resolveDir: root }, outfile: join(dist, "map3d.mjs"), plugins, format: "esm" });
   writeScript("map3d.mjs", "map3d.js");

@@ -77,8 +77,8 @@ export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
   #shownColors: ReadonlyMap<number, Rgb> = new Map();
   #clip: Clip | null = null;
   #unbindTooltip: (() => void) | undefined;
-  /** Whether loading the manifest has failed. */
-  #failed = false;
+  /** @internal Why the manifest could not be loaded. */
+  loadError: Error | undefined;
 
   /** @param urls base URLs, or another source  @throws UsageError without a URL, or for an unknown option or mode */
   constructor(urls: string | readonly string[] | Source, options: ImageLayerOptions = {}) {
@@ -253,7 +253,7 @@ export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
     this.#name = context.createName();
     const failed = (error: Error): void => {
       if (this.#context !== context) return;
-      this.#failed = !this.#rendering;
+      if (!this.#rendering) this.loadError = error;
       this.fire("error", { error });
       context.report(error);
     };
@@ -268,7 +268,7 @@ export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
 
   protected onRemove(): void {
     this.#context?.dropTiles(this.#name);
-    this.#context = this.#tiles = this.#rendering = this.#objects = undefined;
+    this.#context = this.#tiles = this.#rendering = this.#objects = this.loadError = undefined;
   }
 
   /** @internal Finds the layer's view with a frame's look-at angle and pitch. */
@@ -278,7 +278,7 @@ export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
 
   /** @internal Whether its manifest is loading. */
   get isLoading(): boolean {
-    return !this.#rendering && !this.#failed;
+    return !this.#rendering && !this.loadError;
   }
 
   /** @internal Returns the rendered light that it shows for a light; null before its manifest has loaded. */

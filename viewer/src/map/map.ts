@@ -67,6 +67,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   /** Whether the map has been at rest since it moved last, so that tiles of other views are fetched. */
   #fetchesAhead = false;
   #nameCount = 0;
+  #lastError: Error | undefined;
 
   /** @param target the id of a canvas, or an element  @throws UsageError when there is none, when it has a map already, and for unknown or wrong options */
   constructor(target: string | HTMLElement, options: MapOptions = {}) {
@@ -255,11 +256,12 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
 
   /**
    * Finds the world coordinates of a position, once the map has a view: on the "ground" those of the highest surface that is visible in some direction, of an
-   * object the top of its box. Fetches a few tiles or files. @throws UsageError when there is no such object, or the scene's position on earth is unknown
+   * object the top of its box. Fetches a few tiles or files. @throws UsageError when there is no such object, or the scene's position on earth is unknown; or why
+   * no rendering could be loaded
    */
   async findPosition(position: AnyPosition): Promise<Vec3> {
     checkPosition(position, "findPosition");
-    const rendering = await new Promise<Rendering>((ready) => { this.whenReady((_, rendering) => { ready(rendering); }); });
+    const rendering = await new Promise<Rendering>((ready, fail) => { this.whenReady((_, found) => { ready(found); }).#items.onLoadError(fail); });
     return findPosition(position, this.layers, this.getViewState() as ViewState, rendering);
   }
 
@@ -346,6 +348,9 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
 
   /** @internal */
   report(error: Error): void {
+    if (error === this.#lastError) return;
+    this.#lastError = error;
+    this.#items.onLoadError();
     if (this.listens("error")) this.fire("error", { error });
     else console.warn(`map3d: ${error.message}`);
   }

@@ -8,6 +8,7 @@ export class MapItems<M> {
   /** Image layers, lowest first. */
   layers: readonly imageLayer[] = [];
   readonly #all = new Set<Addable<M>>();
+  #onLoadError: ((error: Error) => void)[] = [];
   readonly #onSelect: (selected: marker) => void;
 
   /** @param onSelect called when a marker is selected; the others are deselected */
@@ -21,6 +22,13 @@ export class MapItems<M> {
 
   get markers(): readonly marker[] {
     return this.all.filter((item) => item instanceof marker);
+  }
+
+  /** Calls functions, once, as soon as no rendering could be loaded, and tells them why. */
+  onLoadError(...more: ((error: Error) => void)[]): void {
+    this.#onLoadError.push(...more);
+    const error = this.layers[0]?.loadError;
+    if (error && this.layers.every(({ loadError }) => loadError)) for (const call of this.#onLoadError.splice(0)) call(error);
   }
 
   /** Attribution texts of all layers. */

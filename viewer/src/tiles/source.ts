@@ -43,7 +43,12 @@ export class HttpSource implements Source {
 
   async manifest(signal?: AbortSignal): Promise<Rendering> {
     const urls = this.#urls("rendering.json");
-    return readManifest(await fetchJson(urls, this.#withFetch({ signal, attempts: Math.max(3, urls.length) })), urls[0] ?? "");
+    try {
+      return readManifest(await fetchJson(urls, this.#withFetch({ signal, attempts: Math.max(3, urls.length) })), urls[0] ?? "");
+    } catch (reason) {
+      if (reason instanceof FetchError && reason.status === 404) reason.message += "; pass the URL of the folder of rendering.json";
+      throw reason;
+    }
   }
 
   tile(view: View, layer: LayerInfo, tile: Tile, signal?: AbortSignal): Promise<ArrayBuffer | null> {
