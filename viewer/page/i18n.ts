@@ -237,7 +237,7 @@ const DE: Messages = {
 const FR: Messages = {
   incomplete: "Le rendu de cette carte n’est pas encore terminé.",
   dataSaver: "L’économiseur de données est activé. L’affichage est moins détaillé.",
-  foreign: "Afficher la carte de %\u00a0?",
+  foreign: "Afficher la carte de %\u202f?",
   search: "Rechercher",
   searchLabel: "Rechercher un nom ou une adresse",
   results: "Résultats de la recherche",

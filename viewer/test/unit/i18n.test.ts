@@ -1,4 +1,4 @@
-import { readFileSync } from "node:fs";
+import { readdirSync, readFileSync } from "node:fs";
 import { resolve } from "node:path";
 import { expect, test } from "vitest";
 import { chooseLanguage, MESSAGE_KEYS } from "../../page/i18n";
@@ -39,4 +39,26 @@ test.each(["en", "de", "fr"])("%s: the captions of synchronized maps say what th
 test("winds count counter-clockwise", () => {
   const { winds } = getMapMessages("en");
   expect([0, 45, 90, 179, 270, 340, -90, 720].map((deg) => winds[computeWind(deg)])).toEqual(["north", "north-west", "west", "south", "east", "north", "east", "north"]);
+});
+
+/** All strings of the French tables of the viewer and the page, by file, without what is inserted into them. */
+function frenchTexts(): [file: string, text: string][] {
+  const root = resolve(import.meta.dirname, "../..");
+  return ["src", "page"].flatMap((folder) => readdirSync(resolve(root, folder), { recursive: true, encoding: "utf8" }).filter((name) => name.endsWith(".ts")).flatMap((name) => {
+    const code = readFileSync(resolve(root, folder, name), "utf8");
+    const tables = [...code.matchAll(/^const FR\b[^]*?^\};|\bfr: .*/gm)].map(([table]) => table);
+    return tables.flatMap((table) => [...table.matchAll(/"([^"]*)"|`([^`]*)`/g)].map(([, quoted, template]): [string, string] => {
+      const text = (quoted ?? template ?? "").replace(/\$\{[^}]*\}/g, "x");
+      return [`${folder}/${name}`, text.replace(/\\u([0-9a-f]{4})/g, (_, code: string) => String.fromCharCode(parseInt(code, 16)))];
+    }));
+  }));
+}
+
+test("in French, a narrow no-break space is before ; ! ? and a no-break space before :, so that no line begins with them", () => {
+  const texts = frenchTexts();
+  expect(new Set(texts.map(([file]) => file)).size).toBeGreaterThanOrEqual(9);
+  expect(texts.length).toBeGreaterThan(150);
+  expect(texts.filter(([, text]) => /(?:^|[^\u202f])[;!?]|(?:^|[^\u00a0]):/.test(text))).toEqual([]);
+  // What such a test finds.
+  expect(texts.filter(([, text]) => /[;!?:]/.test(text)).length).toBeGreaterThanOrEqual(6);
 });
