@@ -32,7 +32,7 @@ const banner = { js: "/*! map3d, Apache-2.0 */" };
 /** Names of lower-case letters and digits only: texts with fewer different characters compress better. */
 const lowerCaseNames = {
   get(n) {
-    const letters = "ietanorslcdupmhfgbvywkxqjz";
+    const letters = "etianorsdlcpmuhfgbvywkxqjz";
     const rest = `${letters}0123456789`;
     let name = letters[n % letters.length];
     for (let k = Math.floor(n / letters.length); k > 0; k = Math.floor((k - 1) / rest.length)) name += rest[(k - 1) % rest.length];
@@ -42,7 +42,7 @@ const lowerCaseNames = {
 
 /** Shortens a bundle of esbuild by another 2 %. The result is ASCII: a page or server that declares no encoding reads the same texts. */
 async function shorten(code, module) {
-  const { code: shorter } = await minify(code, { ecma: 2022, module, compress: { passes: 3, keep_fargs: false, unsafe: true, unsafe_arrows: true, pure_getters: true, inline: 1 }, mangle: { nth_identifier: lowerCaseNames }, format: { ascii_only: true } });
+  const { code: shorter } = await minify(code, { ecma: 2022, module, compress: { passes: 5, keep_fargs: false, unsafe: true, unsafe_arrows: true, pure_getters: true, inline: 1 }, mangle: { nth_identifier: lowerCaseNames }, format: { ascii_only: true } });
   return shorter;
 }
 

@@ -62,7 +62,7 @@ const FR: MapMessages = {
   rotateLeft: "Faire pivoter la vue dans le sens antihoraire",
   rotateRight: "Faire pivoter la vue dans le sens horaire",
   north: "Orienter vers le nord",
-  facing: (wind) => `Vue vers ${wind}\u202f; orienter vers le nord`,
+  facing: (wind) => `Vue vers ${wind}. Orienter vers le nord`,
   winds: ["le nord", "le nord-ouest", "l’ouest", "le sud-ouest", "le sud", "le sud-est", "l’est", "le nord-est"],
   fullScreen: "Plein écran",
   enterFullScreen: "Passer en plein écran",

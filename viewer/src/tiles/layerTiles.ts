@@ -125,14 +125,13 @@ export class LayerTiles {
     if (tries > 0) this.#waitForServer(tries); // the first request alone finds out whether the server answers again
     this.#loading.add(key);
     try {
-      const source = findSource(layer, tile);
-      const known = this.#findPacked(view, layer, tile, source);
-      const found = known?.packed ?? (await this.#fetch(view, layer, source, signal));
+      const above = findAbove(layer, tile);
+      const known = this.#findPacked(view, layer, tile, above);
+      const found = known?.packed ?? (await this.#fetch(view, layer, above ?? tile, signal));
       const [bytes, decoded] = found && "kind" in found ? [null, found] : [found, null];
       const transfer = known?.transfer ?? { bytes: bytes?.byteLength ?? 0, at_ms: performance.now() }; // the bytes move to another thread
-      const below = source === tile ? undefined : tile;
-      const packed = bytes && (below ?? layer.media_type === DATA_TYPE) ? bytes : undefined;
-      const data = bytes ? await this.#resources.decoder.decode(layer.kind, layer.media_type, bytes, packed !== undefined, below) : decoded;
+      const packed = bytes && (above ?? layer.media_type === DATA_TYPE) ? bytes : undefined;
+      const data = bytes ? await this.#resources.decoder.decode(layer.kind, layer.media_type, bytes, packed !== undefined, above && tile) : decoded;
       if (signal.aborted) {
         if (data && "bitmap" in data) data.bitmap.close();
         return;
@@ -158,9 +157,9 @@ export class LayerTiles {
     }
   }
 
-  /** Finds a tile that keeps the bytes of `source`. */
-  #findPacked(view: View, layer: LayerInfo, tile: Tile, source: Tile): CachedTile | undefined {
-    const keys = source === tile ? DATA_KINDS.map((kind) => this.key(view, { ...layer, kind }, tile)) : childrenOf(source).map((child) => this.key(view, layer, child));
+  /** Finds a tile that keeps the bytes of `tile`, or of the one above it that is fetched in its place. */
+  #findPacked(view: View, layer: LayerInfo, tile: Tile, above: Tile | undefined): CachedTile | undefined {
+    const keys = above ? childrenOf(above).map((child) => this.key(view, layer, child)) : DATA_KINDS.flatMap((kind) => (findAbove({ ...layer, kind }, tile) ? [] : this.key(view, { ...layer, kind }, tile)));
     return keys.map((key) => this.#resources.cache.peek(key)).find((known) => known?.packed);
   }
 
@@ -188,5 +187,5 @@ export class LayerTiles {
   }
 }
 
-/** Finds the tile whose bytes are fetched: on dense screens, light is shown from the tile above, which has a quarter of the bytes for the same area. */
-const findSource = ({ kind }: LayerInfo, tile: Tile): Tile => (LIGHT_KINDS.includes(kind) && tile.z > 0 && devicePixelRatio >= DENSE_DPR ? ancestor(tile, 1) : tile);
+/** Finds the tile above that is fetched in place of a tile: on dense screens, that of light and of the normals of data tiles, which has fewer bytes for the same area. */
+const findAbove = ({ kind, media_type }: LayerInfo, tile: Tile): Tile | undefined => (devicePixelRatio >= DENSE_DPR && tile.z > 0 && (kind === "normal" ? media_type === DATA_TYPE : LIGHT_KINDS.includes(kind)) ? ancestor(tile, 1) : undefined);

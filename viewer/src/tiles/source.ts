@@ -46,7 +46,7 @@ export class HttpSource implements Source {
     try {
       return readManifest(await fetchJson(urls, this.#withFetch({ signal, attempts: Math.max(3, urls.length) })), urls[0] ?? "");
     } catch (reason) {
-      if (reason instanceof FetchError && reason.status === 404) reason.message += "; pass the URL of the folder of rendering.json";
+      if (reason instanceof FetchError && reason.status === 404) reason.message += "; pass the URL of its folder";
       throw reason;
     }
   }

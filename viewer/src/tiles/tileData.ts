@@ -2,7 +2,7 @@ import { DecodeError } from "../core/errors";
 import { decodeDataTile } from "../core/dataTile";
 import { decodePng } from "../core/png";
 import type { Tile } from "../geo/frame";
-import { enlargeQuarter } from "./enlargeQuarter";
+import { enlargeQuarter, type EnlargedData } from "./enlargeQuarter";
 
 /** A decoded tile; rows from the top. */
 export type TileData =
@@ -25,18 +25,22 @@ export const NO_DEPTH = 0xffffffff;
 /** Media type of a tile with normals, ids and depths. */
 export const DATA_TYPE = "application/vnd.map3d.data";
 
-/** Decodes a tile, or the pixels of one kind from a data tile. @param below the bytes are those of the tile of light above this one  @throws DecodeError */
+/** Decodes a tile, or the pixels of one kind from a data tile. @param below the bytes are those of the tile above this one, of light or normals  @throws DecodeError */
 export async function decodeTile(kind: string, mediaType: string, bytes: ArrayBuffer, below?: Tile): Promise<TileData> {
+  const data = await decodeWhole(kind, mediaType, bytes);
+  return below ? enlargeQuarter(data as EnlargedData, below) : data;
+}
+
+async function decodeWhole(kind: string, mediaType: string, bytes: ArrayBuffer): Promise<TileData> {
   if (!isKind(kind)) throw new DecodeError(`unknown layer kind "${kind}"`);
   if (kind === "color" || kind === "picture") return decodeColor(kind, mediaType, bytes);
   if (mediaType === DATA_TYPE) return (await decodeDataTile(new Uint8Array(bytes))).find((part) => part.kind === kind) as TileData;
   const { width, height, channels, data } = await decodePng(new Uint8Array(bytes));
   if (channels !== CHANNELS[kind]) throw new DecodeError(`${kind} tiles have ${String(CHANNELS[kind])} bytes per pixel, got ${String(channels)}`);
   // The values are little-endian, as memory is on every machine that runs a browser.
-  const enlarge = <Values extends Uint8Array<ArrayBuffer> | Uint16Array<ArrayBuffer>>(values: Values): Values => (below ? enlargeQuarter(values, width, height, below, kind === "sun16") : values);
-  if (kind === "sun16") return { kind, width, height, values: enlarge(new Uint16Array(data.buffer, data.byteOffset, data.byteLength / 2)) };
-  if (kind === "normal" || kind === "sun" || kind === "ao") return { kind, width, height, values: enlarge(data) };
-  return { kind, width, height, values: new Uint32Array(data.buffer, data.byteOffset, data.byteLength / 4) };
+  const { buffer, byteOffset, byteLength } = data;
+  const values = channels > 3 ? new Uint32Array(buffer, byteOffset, byteLength / 4) : channels === 2 ? new Uint16Array(buffer, byteOffset, byteLength / 2) : data;
+  return { kind, width, height, values } as TileData;
 }
 
 const isKind = (kind: string): kind is TileKind => Object.hasOwn(CHANNELS, kind);

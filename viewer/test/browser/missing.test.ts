@@ -31,7 +31,7 @@ test("a rendering that is missing is one error that says what to do; promises re
     await new Promise((done) => map.once("idle", done));
     return { ...before, found, after: { ready, loaded: map.loaded(), errors: errors.length } };
   }, [bed.url("nowhere"), bed.url("town"), ORIGIN] as const);
-  const message = `FetchError: ${bed.url("nowhere")}/rendering.json: HTTP 404; pass the URL of the folder of rendering.json`;
+  const message = `FetchError: ${bed.url("nowhere")}/rendering.json: HTTP 404; pass the URL of its folder`;
   expect(told).toEqual({ errors: [message], rejected: [message, message], ready: 0, loaded: false, picked: 0, inView: 0, found: [ORIGIN[0], ORIGIN[1], 503], after: { ready: 1, loaded: true, errors: 1 } });
   await page.context().close();
 });
@@ -47,6 +47,6 @@ test("without a listener, the console has the message, once", async () => {
     await new Promise((done) => layer.once("error", done));
     await new Promise((done) => setTimeout(done, 100));
   }, bed.url("nowhere"));
-  expect(warnings).toEqual([`map3d: ${bed.url("nowhere")}/rendering.json: HTTP 404; pass the URL of the folder of rendering.json`]);
+  expect(warnings).toEqual([`map3d: ${bed.url("nowhere")}/rendering.json: HTTP 404; pass the URL of its folder`]);
   await page.context().close();
 });
