@@ -159,7 +159,7 @@ export class LayerTiles {
 
   /** Finds a tile that keeps the bytes of `tile`, or of the one above it that is fetched in its place. */
   #findPacked(view: View, layer: LayerInfo, tile: Tile, above: Tile | undefined): CachedTile | undefined {
-    const keys = above ? childrenOf(above).map((child) => this.key(view, layer, child)) : DATA_KINDS.flatMap((kind) => (findAbove({ ...layer, kind }, tile) ? [] : this.key(view, { ...layer, kind }, tile)));
+    const keys = above ? childrenOf(above).map((child) => this.key(view, layer, child)) : DATA_KINDS.map((kind) => this.key(view, { ...layer, kind }, tile));
     return keys.map((key) => this.#resources.cache.peek(key)).find((known) => known?.packed);
   }
 
@@ -187,5 +187,5 @@ export class LayerTiles {
   }
 }
 
-/** Finds the tile above that is fetched in place of a tile: on dense screens, that of light and of the normals of data tiles, which has fewer bytes for the same area. */
-const findAbove = ({ kind, media_type }: LayerInfo, tile: Tile): Tile | undefined => (devicePixelRatio >= DENSE_DPR && tile.z > 0 && (kind === "normal" ? media_type === DATA_TYPE : LIGHT_KINDS.includes(kind)) ? ancestor(tile, 1) : undefined);
+/** Finds the tile above that is fetched in place of a tile: on dense screens, that of light, which has a quarter of the bytes for the same area. */
+const findAbove = ({ kind }: LayerInfo, tile: Tile): Tile | undefined => (LIGHT_KINDS.includes(kind) && tile.z > 0 && devicePixelRatio >= DENSE_DPR ? ancestor(tile, 1) : undefined);

@@ -25,7 +25,7 @@ export const NO_DEPTH = 0xffffffff;
 /** Media type of a tile with normals, ids and depths. */
 export const DATA_TYPE = "application/vnd.map3d.data";
 
-/** Decodes a tile, or the pixels of one kind from a data tile. @param below the bytes are those of the tile above this one, of light or normals  @throws DecodeError */
+/** Decodes a tile, or the pixels of one kind from a data tile. @param below the bytes are those of the tile of light above this one  @throws DecodeError */
 export async function decodeTile(kind: string, mediaType: string, bytes: ArrayBuffer, below?: Tile): Promise<TileData> {
   const data = await decodeWhole(kind, mediaType, bytes);
   return below ? enlargeQuarter(data as EnlargedData, below) : data;

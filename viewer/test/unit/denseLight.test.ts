@@ -7,7 +7,6 @@ import { enlargeQuarter } from "../../src/tiles/enlargeQuarter";
 import { LayerTiles, type CachedTile } from "../../src/tiles/layerTiles";
 import { RequestQueue } from "../../src/tiles/queue";
 import type { Source } from "../../src/tiles/source";
-import { DATA_TYPE } from "../../src/tiles/tileData";
 
 const SIDE = 8;
 const QUARTERS: readonly Tile[] = [{ z: 3, x: 4, y: 6 }, { z: 3, x: 5, y: 6 }, { z: 3, x: 4, y: 7 }, { z: 3, x: 5, y: 7 }];
@@ -19,7 +18,7 @@ const enlargeBits = (rows: readonly string[], tile: Tile): string[] => {
 };
 const [TOP_LEFT, , , BOTTOM_RIGHT] = QUARTERS as [Tile, Tile, Tile, Tile];
 
-describe("a quarter of a tile, enlarged", () => {
+describe("a quarter of a tile of light, enlarged", () => {
   test.each(QUARTERS)("has interpolated shares of light: %o", (tile) => {
     const values = Uint8Array.from({ length: SIDE * SIDE }, (_, at) => (at * 89 + 7 * (at % 5)) % 256);
     const found = enlarge(values, tile);
@@ -35,16 +34,6 @@ describe("a quarter of a tile, enlarged", () => {
     }
   });
 
-  test.each(QUARTERS)("has the normals of the nearest pixels: %o", (tile) => {
-    const values = Uint8Array.from({ length: 3 * SIDE * SIDE }, (_, at) => at);
-    const found = enlargeQuarter({ kind: "normal", width: SIDE, height: SIDE, values }, tile).values;
-    for (let at = 0; at < SIDE * SIDE; at++) {
-      const [x, y] = [(at % SIDE) + (tile.x - 4) * SIDE, Math.floor(at / SIDE) + (tile.y - 6) * SIDE];
-      const above = Math.floor(y / 2) * SIDE + Math.floor(x / 2);
-      expect([...found.subarray(3 * at, 3 * at + 3)]).toEqual([...values.subarray(3 * above, 3 * above + 3)]);
-    }
-  });
-
   test("keeps straight edges and thin lines", () => {
     expect(enlargeBits(["##......", "##......", "........", "........", "........", "......#.", "......#.", "......#."], TOP_LEFT).slice(0, 3)).toEqual(["####....", "####....", "####...."]);
     expect(enlargeBits(["........", "........", "........", "......#.", "......#.", "......#.", "......#.", "......#."], BOTTOM_RIGHT)).toEqual(new Array(SIDE).fill("....##.."));
@@ -57,7 +46,6 @@ describe("a quarter of a tile, enlarged", () => {
 
 const VIEW = { id: "0-45", occupancy: { has: () => true } } as unknown as View;
 const layerOf = (kind: string): LayerInfo => ({ name: kind, kind, format: "png", media_type: "image/png" });
-const dataOf = (kind: string): LayerInfo => ({ name: "data", kind, format: "m3d", media_type: DATA_TYPE });
 
 /** Tiles that are fetched from a source which notes what it is asked for. */
 function open(): { tiles: LayerTiles; asked: string[]; decoded: string[] } {
@@ -87,15 +75,6 @@ describe("on a dense screen", () => {
     expect(decoded.sort()).toEqual(["sun16 9 true 3/4/6", "sun16 9 true 3/4/7", "sun16 9 true 3/5/6", "sun16 9 true 3/5/7"]);
   });
 
-  test("normals are made from the data tile above, ids and depths from the tile's own", async () => {
-    const { tiles, asked, decoded } = open();
-    for (const tile of QUARTERS) await tiles.fetch(VIEW, dataOf("normal"), tile);
-    expect(asked).toEqual(["normal 2/2/3"]);
-    for (const kind of ["id", "depth"]) await tiles.fetch(VIEW, dataOf(kind), TOP_LEFT);
-    expect(asked).toEqual(["normal 2/2/3", "id 3/4/6"]);
-    expect(decoded).toEqual([...QUARTERS.map(({ z, x, y }) => `normal 9 true ${[z, x, y].join("/")}`), "id 9 true ", "depth 9 true "]);
-  });
-
   test("the whole of a pyramid's top, and tiles of other kinds, are shown as they are", async () => {
     const { tiles, asked, decoded } = open();
     await tiles.fetch(VIEW, layerOf("ao"), { z: 0, x: 0, y: 0 });
@@ -105,11 +84,10 @@ describe("on a dense screen", () => {
   });
 });
 
-test("on other screens, light and normals are shown as they are", async () => {
+test("on other screens, light is shown as it is", async () => {
   vi.stubGlobal("devicePixelRatio", 1.25);
   const { tiles, asked } = open();
   for (const kind of ["ao", "sun", "sun16"]) await tiles.fetch(VIEW, layerOf(kind), TOP_LEFT);
-  for (const kind of ["normal", "id"]) await tiles.fetch(VIEW, dataOf(kind), TOP_LEFT);
-  expect(asked).toEqual(["ao 3/4/6", "sun 3/4/6", "sun16 3/4/6", "normal 3/4/6"]);
+  expect(asked).toEqual(["ao 3/4/6", "sun 3/4/6", "sun16 3/4/6"]);
   vi.unstubAllGlobals();
 });

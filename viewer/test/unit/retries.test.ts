@@ -45,7 +45,6 @@ describe("when the network goes", () => {
   beforeEach(() => {
     vi.useFakeTimers();
     vi.stubGlobal("document", { baseURI: "http://host/" });
-    vi.stubGlobal("devicePixelRatio", 1);
   });
   afterEach(() => {
     vi.unstubAllGlobals();

@@ -1,4 +1,4 @@
-import { beforeAll, describe, expect, test, vi } from "vitest";
+import { describe, expect, test } from "vitest";
 import type { LayerInfo, View } from "../../src/geo/manifest";
 import { Cache } from "../../src/tiles/cache";
 import type { Decoder } from "../../src/tiles/decoder";
@@ -10,8 +10,6 @@ import { DATA_TYPE } from "../../src/tiles/tileData";
 const VIEW = { id: "0-45", occupancy: { has: () => true } } as unknown as View;
 const TILE = { z: 1, x: 0, y: 1 };
 const [NORMAL, ID, DEPTH] = ["normal", "id", "depth"].map((kind): LayerInfo => ({ name: "data", kind, format: "m3d", media_type: DATA_TYPE })) as [LayerInfo, LayerInfo, LayerInfo];
-
-beforeAll(() => { vi.stubGlobal("devicePixelRatio", 1); });
 
 /** Tiles whose source answers when told; the decoder says what it was given. */
 function open(): { layer: LayerTiles; queue: RequestQueue; answers: ((bytes: ArrayBuffer | Error | null) => void)[]; decoded: string[]; errors: Error[] } {
