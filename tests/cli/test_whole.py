@@ -36,6 +36,16 @@ def town(run: Run, tmp_path: Path) -> Workspace:
     return Workspace(tmp_path / "workspace")
 
 
+def need_viewer() -> None:
+    """Skips a test that publishes while the viewer is not built."""
+    from map3d.tiles.viewer_files import viewer_folder
+
+    try:
+        viewer_folder()
+    except Exception as error:
+        pytest.skip(f"the viewer is not built: {error}")
+
+
 def digest(workspace: Workspace, rendering: str = "view") -> dict[str, str]:
     """Returns view → hash over every tile and seam."""
     found = {}
@@ -225,12 +235,7 @@ def test_site_refuses_a_folder_with_other_files_before_any_work(run: Run, tmp_pa
 
 
 def test_site_of_a_folder_processes_only_changes_when_re_run(run: Run, tmp_path: Path) -> None:
-    from map3d.tiles.viewer_files import viewer_folder
-
-    try:
-        viewer_folder()
-    except Exception as error:
-        pytest.skip(f"the viewer is not built: {error}")
+    need_viewer()
     files, out = write_town(tmp_path / "Little Town", 2), tmp_path / "site"
     status, text, err = run("site", str(files), "-o", str(out), "--res", "0.2")
     assert status == 0, err
@@ -251,12 +256,7 @@ def test_site_of_a_folder_processes_only_changes_when_re_run(run: Run, tmp_path:
 
 
 def test_site_with_small_tiles(run: Run, tmp_path: Path) -> None:
-    from map3d.tiles.viewer_files import viewer_folder
-
-    try:
-        viewer_folder()
-    except Exception as error:
-        pytest.skip(f"the viewer is not built: {error}")
+    need_viewer()
     town, options = write_town(tmp_path / "town", 1), ("--res", "0.1", "--view", "0-45", "--workers", "1")
     tiles_bytes = []
     for number, small in enumerate(((), ("--small",))):

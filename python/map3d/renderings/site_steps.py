@@ -35,7 +35,7 @@ AO_RADIUS_SHARE: Final = 0.25
 @dataclass(frozen=True)
 class SiteRequest:
     """`choose_resolution` selects the resolution when `res_m` is None. `cluster`: the group of content to keep, 0 for the largest.
-    `style`: rules of colours. `ao`: ambient occlusion; None for scenes with few textures."""
+    `small`: encodes for size. `style`: rules of colours. `ao`: ambient occlusion; None for scenes with few textures."""
 
     name: str
     sources: Path
