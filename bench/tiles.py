@@ -16,6 +16,7 @@ from map3d.tiles.occupancy import xy_from_morton
 
 from . import peer_comparison
 from .benchmark_scene import CACHE, FrameFields, prepare_scene
+from .peers.map3d_peer import encode_tile
 
 Tile = tuple[int, int]
 
@@ -54,9 +55,7 @@ def trace(scene: _core.Scene, frame: _core.Frame, tiles: list[Tile]) -> None:
 
 def trace_and_encode(scene: _core.Scene, frame: _core.Frame, tiles: list[Tile]) -> None:
     for tile in tiles:
-        buffer = scene.gbuffer(frame, *tile)
-        for layer in frame.layers:
-            _core.encode_layer(layer.kind, layer.format, buffer[layer.kind], layer.quality)
+        encode_tile(frame.layers, scene.gbuffer(frame, *tile))
 
 
 def _worker(folder: str, fields: FrameFields, tiles: list[Tile], ready: Any, go: Any, done: Any) -> None:

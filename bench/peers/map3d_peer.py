@@ -1,6 +1,8 @@
 """map3d as a peer; unlike the others it encodes its tiles."""
 
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +14,24 @@ from . import FrameFields
 from .scene_parts import srgb_bytes_from_linear
 
 
+def encode_tile(layers: Iterable[_core.LayerSpec], buffer: dict[str, NDArray[Any]]) -> list[bytes]:
+    """Encodes the layers of a tile from its G-buffer."""
+    return [
+        _core.encode_data_tile(buffer["normal"], buffer["id"], buffer["depth"])
+        if layer.kind == "data"
+        else _core.encode_layer(layer.kind, layer.format, buffer[layer.kind], layer.quality)
+        for layer in layers
+    ]
+
+
 class Map3dRenderer:
     def __init__(self, folder: Path, cache_bytes: int = 1 << 30) -> None:
         self._scene = _core.Scene(str(folder), cache_bytes)
 
     def draw(self, frame: FrameFields, x: int, y: int) -> list[bytes]:
         """Returns all layers of the frame, encoded."""
-        buffer = self._scene.gbuffer(core_frame(frame), x, y)
-        return [_core.encode_layer(layer["kind"], layer["format"], buffer[layer["kind"]], layer.get("quality", 80)) for layer in frame["layers"]]
+        drawn = core_frame(frame)
+        return encode_tile(drawn.layers, self._scene.gbuffer(drawn, x, y))
 
     def centres(self, frame: FrameFields, x: int, y: int) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
         buffer = self._scene.gbuffer(core_frame(frame), x, y)

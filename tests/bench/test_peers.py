@@ -129,3 +129,20 @@ def test_copy_is_translated_and_has_its_own_images(tmp_path: Path) -> None:
     assert other.stem != key
     assert json.loads((tmp_path / "copy" / "materials.json").read_text())["materials"][0]["texture"] == other.stem
     assert np.array_equal(np.array(Image.open(other)), np.array(Image.open(source / "textures" / f"{key}.jpg")))
+
+
+@pytest.mark.parametrize("kinds", [("color", "data"), ("color", "normal", "id", "depth")])
+def test_own_renderer_encodes_the_layers_of_every_profile(kinds: tuple[str, ...]) -> None:
+    core = pytest.importorskip("map3d._core", reason="the compiled core is missing", exc_type=ImportError)
+    from bench.peers.map3d_peer import encode_tile
+
+    buffer = {
+        "color": np.full((8, 8, 4), 65535, np.uint16),
+        "normal": np.tile(np.array([0, 0, 32767], np.int16), (8, 8, 1)),
+        "id": np.full((8, 8), 17, np.uint32),
+        "depth": np.full((8, 8), 2048, np.uint32),
+    }
+    encoded = encode_tile([core.LayerSpec(kind, {"color": "webp", "data": "m3d"}.get(kind, "png")) for kind in kinds], buffer)
+    assert len(encoded) == len(kinds)
+    decoded = core.decode_data_tile(encoded[1])["id"] if "data" in kinds else core.decode_png(encoded[2])[..., 0]
+    assert (decoded == 17).all()

@@ -1,6 +1,7 @@
 import { expect, test } from "vitest";
 import { devices, type BrowserContextOptions, type Page } from "playwright-core";
 import type * as Offline from "../../src/offline";
+import { withDataTiles } from "../fixture/encodeDataTile";
 import { published } from "../fixture/folder";
 import { renderTown } from "../fixture/rendering";
 import { TestBed } from "./bed";
@@ -8,7 +9,7 @@ import { OUT } from "./browser";
 import { pixels, type Global } from "./page";
 
 const town = renderTown(128, 0.38);
-const bed = new TestBed({ town, published: published(town) });
+const bed = new TestBed({ town, published: published(town), packed: withDataTiles(town, "packed") });
 const CSP = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src *; worker-src 'self' blob:";
 for (const path of ["/", "/bare"]) bed.server.policies.set(path, CSP);
 
@@ -65,7 +66,7 @@ async function offline(page: Page, act: () => Promise<void>): Promise<void> {
 
 const tilesAsked = (): string[] => bed.server.requests.filter((url) => /\/tiles\/\w+\/\d/.test(url));
 
-test.each(["town", "published"])("an area of %s can be interrupted, resumed, opened offline and deleted", async (rendering) => {
+test.each(["town", "published", "packed"])("an area of %s can be interrupted, resumed, opened offline and deleted", async (rendering) => {
   const { page, problems } = await bed.openPage({ viewport: { width: 240, height: 180 } });
   await start(page, rendering);
   const wanted = await pixels(page);
@@ -81,7 +82,7 @@ test.each(["town", "published"])("an area of %s can be interrupted, resumed, ope
 
   bed.server.requests.length = 0;
   const { area, progress } = await download(page);
-  expect(area).toMatchObject({ name: "tower", complete: true, tiles: estimate.tiles, directions: ["0-45", "90-45", "180-45", "270-45"], layers: ["color", "normal", "id", "depth"] });
+  expect(area).toMatchObject({ name: "tower", complete: true, tiles: estimate.tiles, directions: ["0-45", "90-45", "180-45", "270-45"], layers: rendering === "packed" ? ["color", "data"] : ["color", "normal", "id", "depth"] });
   expect(progress.at(-1)).toMatchObject({ done: estimate.tiles, total: estimate.tiles });
   const archives = rendering === "published" ? 16 * 16384 : 0; // their first reads, which outweigh tiles as small as these
   expect(Math.abs(((progress.at(-1)?.bytes ?? 0) - archives) / estimate.bytes - 1)).toBeLessThan(0.4);

@@ -13,9 +13,10 @@ import { renderTown, type Fixture } from "../fixture/rendering";
 import { BOX, framesOf, ORIGIN, PLACE, THINGS, trace } from "../fixture/town";
 import { TestBed } from "./bed";
 import { OUT } from "./browser";
-import { decoded, Hand, MAX_ACTIONS } from "./hand";
+import { decoded, Hand, MAX_ACTIONS, throttle } from "./hand";
 
-// Common tasks with a city model on a phone: each takes at most three actions after opening.
+// Common tasks with a city model on a phone: each takes at most three actions after opening. MAP3D_CLOCK=1 slows the phone down and prints times.
+const CLOCK = process.env.MAP3D_CLOCK === "1";
 const [WIDTH, HEIGHT, DENSITY, PIXEL_M] = [390, 844, 3, 0.38];
 const PHONE = { viewport: { width: WIDTH, height: HEIGHT }, deviceScaleFactor: DENSITY, isMobile: true, hasTouch: true, userAgent: devices["iPhone 14"].userAgent, timezoneId: "Europe/Berlin", locale: "en-GB" };
 const YEARS = new Map([[17, 1891], [1025, 1956], [2_000_000_001, 2012], [3_900_000_007, 1723]]);
@@ -38,6 +39,8 @@ interface Opened {
   readonly page: Page;
   readonly hand: Hand;
   readonly problems: string[];
+  /** Time until the tools can be used, ms. */
+  readonly opened: number;
 }
 
 /** Opens the page with the town and waits until it is idle; `hash`: the fragment of a shared link. */
@@ -45,13 +48,18 @@ async function open(query = "", hash = ""): Promise<Opened> {
   const { page, problems } = await bed.openPage(PHONE);
   await page.context().grantPermissions(["clipboard-read", "clipboard-write"]);
   await page.addInitScript(() => { window.print = () => { document.title = "printed"; }; });
+  if (CLOCK) await throttle(page);
+  const begun = performance.now();
   await page.goto(`${bed.server.origin}/?rendering=${bed.url("town")}${query}${hash}`);
   await page.waitForFunction(() => location.hash.length > 5 && document.querySelector("#tools:not([hidden])"));
+  const opened = performance.now() - begun;
   await page.waitForTimeout(1500);
-  return { page, hand: new Hand(page), problems };
+  return { page, hand: new Hand(page), problems, opened };
 }
 
-async function end({ page, problems }: Opened, name: string): Promise<void> {
+async function end({ page, hand, problems, opened }: Opened, name: string): Promise<void> {
+  const seconds = (ms: number): string => `${(ms / 1000).toFixed(1)} s`;
+  if (CLOCK && hand.begun !== undefined) console.info(`${name}: opened in ${seconds(opened)}, ${String(hand.count)} actions in ${seconds(performance.now() - hand.begun)}`);
   await page.screenshot({ path: `${OUT}/task-${name}.png` });
   expect(problems).toEqual([]);
   await page.context().close();
