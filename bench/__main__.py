@@ -98,7 +98,7 @@ def main() -> None:
 def measure_tiles(buildings: int, res_m: float, count: int) -> Rows:
     """Measures both colour formats and prints the table; returns its rows and those of the peers."""
     rows = [tiles.measure(buildings, res_m, count, color) for color in ("webp", "jpeg")]
-    table = Table(title=f"base tiles per second, 256 px, 16 samples, four layers, {buildings} buildings at {res_m} m per pixel")
+    table = Table(title=f"base tiles per second, 256 px, 16 samples, colour and data tiles, {buildings} buildings at {res_m} m per pixel")
     for column in ("triangles", "tiles", "colour", "one core", "one core, encoded", "all cores, encoded"):
         table.add_column(column, justify="right")
     for row in rows:

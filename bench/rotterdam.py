@@ -1,7 +1,8 @@
 """`python -m bench.rotterdam [--scale N]`: a city of the Rotterdam class, from generation to a published folder, with the time of each stage.
 
 At scale 1: 62,000 buildings in 90 CityGML files, 26,474 textures of 1024², an orthophoto of 65,536², one view at 45 degrees with nine levels
-(87,381 tiles in four layers). Scale N divides buildings, files, textures and orthophoto pixels by N, and base tiles by the nearest power of four.
+(87,381 tiles of colour and of data). Scale N divides buildings, files, textures and orthophoto pixels by N, and base tiles by the nearest power of
+four.
 Imported files of the town are deleted. Re-run it to resume an interrupted run.
 """
 

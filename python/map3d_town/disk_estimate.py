@@ -42,11 +42,11 @@ def check_disk_space(town: TownFolder) -> None:
 def estimate_from_sample(town: TownFolder) -> TownEstimate:
     """Estimates within 15 % from a sample of atlases, buildings and orthophoto tiles generated in memory."""
     rough, spec = town.spec.estimate(), town.spec
-    groups = [group for file in range(spec.files) for group in atlas_groups(town, file)]
+    groups = [group for file in range(spec.files) for group in atlas_groups(town.plan, spec, file)]
     size = SHARED_BYTES + len(groups) * float(np.mean([_atlas_group_bytes(town, group) for group in sample_evenly(groups, GROUPS)]))
     if "citygml" in spec.formats and spec.trees:
         size += BYTES_PER_TREE * len(town.plan.trees)
-    px_m, side_px = orthophoto_size(town)
+    px_m, side_px = orthophoto_size(spec, town.plan)
     if spec.terrain:
         size += (2 * town.plan.radius_m / spec.dem_pixel_m(2 * town.plan.radius_m)) ** 2 * BYTES_PER_DEM_PX
         size += _orthophoto_bytes(town, px_m, side_px)

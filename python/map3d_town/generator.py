@@ -49,7 +49,7 @@ def make_town(out: Path, spec: TownSpec, progress: ProgressCallback | None = Non
             written += len(result.written)
             files |= result.written | result.kept
             if progress:
-                progress(result.job.kind, count, len(jobs))
+                progress(result.kind, count, len(jobs))
         finish_town(out, spec, town.plan, files)
     textures = sum("/textures/a" in name and not name.startswith("obj/") for name in files)
     return TownReport(len(town.plan.buildings), len(town.plan.trees), textures, written, len(files) - written, sum(files.values()))

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing.synchronize import Event
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +26,7 @@ class ProductionInterrupted(Exception):
 
 
 class TownFolder:
-    """A town's plan and output folder. Workers get a copy; `stop` asks them to end.
+    """A town's plan and output folder. Workers get a copy without the plan, of which each job brings its part; `stop` asks them to end.
 
     `completed`: name and size of the files of earlier runs. `written`, `kept`: those that the current job wrote, or found complete.
     """
@@ -36,6 +37,9 @@ class TownFolder:
         self.crs_offset = np.array([spec.east_m, spec.north_m, 0.0])
         self.written: dict[str, int] = {}
         self.kept: dict[str, int] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "plan": TownPlan(radius_m=self.plan.radius_m)}
 
     def needs(self, name: str) -> bool:
         """Returns whether a file must be written; otherwise adds it to `kept`. A complete file is in the journal with its current size."""

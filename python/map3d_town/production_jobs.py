@@ -1,11 +1,11 @@
 """The jobs that produce a town: orthophoto, elevation, shared files, buildings with their atlases, trees."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from map3d_town.layout.town_plan import BuildingPlan
+from map3d_town.layout.town_plan import BuildingPlan, PlannedTree, TownPlan
 from map3d_town.models.building_attributes import describe_building
 from map3d_town.models.building_geometry import build_model
 from map3d_town.models.building_model import AtlasTexture, BuildingModel
@@ -14,6 +14,7 @@ from map3d_town.polygons_2d import Points
 from map3d_town.textures.shared_materials import REPEATING_TEXTURES, draw_repeating_texture
 from map3d_town.textures.texture_atlas import TextureAtlas, draw_atlas, encode_jpeg, encode_png, pack_atlas
 from map3d_town.textures.tree_textures import draw_leaf_texture
+from map3d_town.town_spec import TownSpec
 from map3d_town.writers.citygml_writer import BuildingWriter, SharedAppearance, write_foot, write_head
 from map3d_town.writers.ground_rasters import write_dem, write_ortho
 from map3d_town.writers.obj_writer import mtl_text, obj_text
@@ -24,86 +25,94 @@ TREES_PER_FILE = 20_000
 
 @dataclass(frozen=True)
 class ProductionJob:
-    """A job that writes some files. `kind`: "buildings", "trees", "ortho", "dem" or "shared"; `number`: of the CityGML file."""
+    """A job that writes some files.
+
+    `kind`: "buildings", "trees", "ortho", "dem" or "shared"; `number`: of the CityGML file; `plan`: the part of the town's plan that the job
+    needs, so that no worker has to hold all of it.
+    """
 
     kind: str
     number: int
+    plan: TownPlan
 
 
 @dataclass(frozen=True)
 class JobFiles:
-    """The files of a finished job by name, with their sizes: those that it wrote, and those that were complete already."""
+    """The files of a finished job by name, with their sizes: those that it wrote, and those that were complete already. `kind`: that of the job."""
 
-    job: ProductionJob
+    kind: str
     written: dict[str, int]
     kept: dict[str, int]
 
 
 def list_jobs(town: TownFolder) -> Iterator[ProductionJob]:
     """Yields all jobs of a town, the longest first."""
-    if town.spec.terrain:
-        yield ProductionJob("ortho", 0)
-        yield ProductionJob("dem", 0)
-    yield ProductionJob("shared", 0)
-    for number in range(town.spec.files):
-        yield ProductionJob("buildings", number)
-    if town.spec.trees and "citygml" in town.spec.formats:
-        for number in range(-(-len(town.plan.trees) // TREES_PER_FILE)):
-            yield ProductionJob("trees", number)
+    spec, plan = town.spec, town.plan
+    none = TownPlan(radius_m=plan.radius_m)
+    if spec.terrain:
+        yield ProductionJob("ortho", 0, replace(none, patches=plan.patches, trees=plan.trees))
+        yield ProductionJob("dem", 0, none)
+    species = {tree.species: tree for tree in plan.trees}.values()
+    yield ProductionJob("shared", 0, replace(none, buildings=plan.buildings if "obj" in spec.formats else [], trees=list(species)))
+    for number in range(spec.files):
+        yield ProductionJob("buildings", number, replace(none, buildings=buildings_of_file(plan, spec, number)))
+    if spec.trees and "citygml" in spec.formats:
+        for number, first in enumerate(range(0, len(plan.trees), TREES_PER_FILE)):
+            yield ProductionJob("trees", number, replace(none, trees=plan.trees[first : first + TREES_PER_FILE]))
 
 
 def run_job(town: TownFolder, job: ProductionJob) -> JobFiles:
     town.written, town.kept = {}, {}
     match job.kind:
         case "ortho":
-            _write_orthophoto(town)
+            _write_orthophoto(town, job.plan)
         case "dem":
-            _write_elevation(town)
+            _write_elevation(town, job.plan)
         case "shared":
-            _write_shared_files(town)
+            _write_shared_files(town, job.plan)
         case "buildings":
-            _write_buildings(town, job.number)
+            _write_buildings(town, job.number, job.plan.buildings)
         case "trees":
-            _write_trees(town, job.number)
-    return JobFiles(job, town.written, town.kept)
+            _write_trees(town, job.number, job.plan.trees)
+    return JobFiles(job.kind, town.written, town.kept)
 
 
-def _write_orthophoto(town: TownFolder) -> None:
-    spec, (px_m, side_px) = town.spec, orthophoto_size(town)
+def _write_orthophoto(town: TownFolder, plan: TownPlan) -> None:
+    spec, (px_m, side_px) = town.spec, orthophoto_size(town.spec, plan)
     if town.needs("terrain/ortho.tif"):
         with town.open_pending("terrain/ortho.tif") as pending:
-            write_ortho(pending.path, town.plan, px_m, side_px, spec.projected_epsg, spec.east_m, spec.north_m, town.raise_if_interrupted)
+            write_ortho(pending.path, plan, px_m, side_px, spec.projected_epsg, spec.east_m, spec.north_m, town.raise_if_interrupted)
 
 
-def orthophoto_size(town: TownFolder) -> tuple[float, int]:
+def orthophoto_size(spec: TownSpec, plan: TownPlan) -> tuple[float, int]:
     """Returns (pixel size in metres, side in pixels)."""
-    side_m = 2 * town.plan.radius_m
-    side_px = int(np.ceil(side_m / town.spec.ortho_pixel_m(side_m)))
+    side_m = 2 * plan.radius_m
+    side_px = int(np.ceil(side_m / spec.ortho_pixel_m(side_m)))
     return side_m / side_px, side_px
 
 
-def _write_elevation(town: TownFolder) -> None:
+def _write_elevation(town: TownFolder, plan: TownPlan) -> None:
     spec = town.spec
     if town.needs("terrain/dem.tif"):
         with town.open_pending("terrain/dem.tif") as pending:
-            pixel = spec.dem_pixel_m(2 * town.plan.radius_m)
-            write_dem(pending.path, town.ground, town.plan.radius_m, pixel, spec.crs, spec.east_m, spec.north_m)
+            pixel = spec.dem_pixel_m(2 * plan.radius_m)
+            write_dem(pending.path, town.ground, plan.radius_m, pixel, spec.crs, spec.east_m, spec.north_m)
 
 
-def _write_shared_files(town: TownFolder) -> None:
+def _write_shared_files(town: TownFolder, plan: TownPlan) -> None:
     """Writes the repeating textures, the leaf textures and the MTL file."""
     for folder in town.spec.formats:
         for name in REPEATING_TEXTURES:
             if town.needs(f"{folder}/textures/{name}.jpg"):
                 town.write(f"{folder}/textures/{name}.jpg", encode_jpeg(draw_repeating_texture(name)))
     if "citygml" in town.spec.formats and town.spec.trees:
-        for species in sorted({tree.species for tree in town.plan.trees}):
+        for species in sorted({tree.species for tree in plan.trees}):
             for view in ("side", "top"):
                 name = f"citygml/textures/{species}_{view}.png"
                 if town.needs(name):
                     town.write(name, encode_png(draw_leaf_texture(f"{species}_{view}")))
     if "obj" in town.spec.formats and town.needs("obj/town.mtl"):
-        names = [atlas_name(f, g) for f in range(town.spec.files) for g, _ in enumerate(atlas_groups(town, f))]
+        names = [atlas_name(file, group) for file in range(town.spec.files) for group, _ in enumerate(atlas_groups(plan, town.spec, file))]
         town.write("obj/town.mtl", mtl_text(names).encode())
 
 
@@ -111,35 +120,40 @@ def atlas_name(file: int, group: int) -> str:
     return f"a{file:03d}_{group:05d}"
 
 
-def buildings_of_file(town: TownFolder, file: int) -> list[BuildingPlan]:
-    """Returns the buildings of a CityGML file, neighbours in the order of the plan."""
-    buildings, files = town.plan.buildings, town.spec.files
+def buildings_of_file(plan: TownPlan, spec: TownSpec, file: int) -> list[BuildingPlan]:
+    """Returns the buildings of a CityGML file of the whole plan, neighbours in the order of the plan."""
+    buildings, files = plan.buildings, spec.files
     return buildings[len(buildings) * file // files : len(buildings) * (file + 1) // files]
 
 
-def atlas_groups(town: TownFolder, file: int) -> list[list[BuildingPlan]]:
+def atlas_groups(plan: TownPlan, spec: TownSpec, file: int) -> list[list[BuildingPlan]]:
+    """Splits the buildings of a file of the whole plan into groups that share an atlas."""
+    return split_by_atlas(buildings_of_file(plan, spec, file), spec, file)
+
+
+def split_by_atlas(buildings: list[BuildingPlan], spec: TownSpec, file: int) -> list[list[BuildingPlan]]:
     """Splits the buildings of a file into groups that share an atlas."""
-    buildings, spec = buildings_of_file(town, file), town.spec
     count = spec.texture_count * (file + 1) // spec.files - spec.texture_count * file // spec.files
     count = max(1, min(count, len(buildings)))
     return [buildings[len(buildings) * g // count : len(buildings) * (g + 1) // count] for g in range(count)]
 
 
-def _write_buildings(town: TownFolder, file: int) -> None:
-    """Writes a CityGML file with its atlases, and its buildings as OBJ files."""
+def _write_buildings(town: TownFolder, file: int, buildings: list[BuildingPlan]) -> None:
+    """Writes a CityGML file of these buildings with its atlases, and the buildings as OBJ files."""
     spec = town.spec
+    groups = split_by_atlas(buildings, spec, file)
     name = f"citygml/buildings_{file:03d}.gml"
     if "citygml" not in spec.formats or not town.needs(name):
-        for group, buildings in enumerate(atlas_groups(town, file)):
-            _write_atlas_group(town, buildings, atlas_name(file, group), None)
+        for number, group in enumerate(groups):
+            _write_atlas_group(town, group, atlas_name(file, number), None)
         return
     with town.open_pending(name) as pending, pending.path.open("w", encoding="utf-8", newline="\n") as out:
         shared = SharedAppearance()
         writer = BuildingWriter(out, town.crs_offset, shared)
-        low, high = _bounding_box(town, buildings_of_file(town, file))
+        low, high = _bounding_box(town, buildings)
         write_head(out, f"{spec.name} {file}", spec.srs_name, low, high, ("building", "appearance", "generics"))
-        for group, buildings in enumerate(atlas_groups(town, file)):
-            _write_atlas_group(town, buildings, atlas_name(file, group), writer)
+        for number, group in enumerate(groups):
+            _write_atlas_group(town, group, atlas_name(file, number), writer)
         write_foot(out, shared)
 
 
@@ -196,12 +210,10 @@ def _bounding_box(town: TownFolder, buildings: list[BuildingPlan]) -> tuple[Poin
     return low + town.crs_offset, high + town.crs_offset
 
 
-def _write_trees(town: TownFolder, number: int) -> None:
+def _write_trees(town: TownFolder, number: int, trees: list[PlannedTree]) -> None:
     name = f"citygml/trees_{number:03d}.gml"
     if not town.needs(name):
         return
-    first = number * TREES_PER_FILE
-    trees = town.plan.trees[first : first + TREES_PER_FILE]
     plan = np.array([(t.x, t.y) for t in trees])
     heights = town.ground.height(plan[:, 0], plan[:, 1])
     low = np.array([*(plan.min(axis=0) - 8), heights.min() - 1]) + town.crs_offset
@@ -213,6 +225,6 @@ def _write_trees(town: TownFolder, number: int) -> None:
         for i, tree in enumerate(trees):
             if i % 1000 == 0:
                 town.raise_if_interrupted()
-            writer.write(tree, first + i, float(heights[i]))
+            writer.write(tree, number * TREES_PER_FILE + i, float(heights[i]))
         writer.write_leaf_textures()
         write_foot(out, shared)

@@ -10,7 +10,7 @@ from map3d_town.polygons_2d import Points
 PlannedInstallations = tuple[tuple[str, tuple[float, ...]], ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class BuildingPart:
     """A body whose side lines run from front[k] to back[k], with one roof profile along all of them.
 
@@ -41,7 +41,7 @@ class BuildingPart:
         return self.front if self.closed else np.concatenate([self.front, self.back[::-1]])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class BuildingPlan:
     """The parts and address of one building.
 
@@ -58,7 +58,7 @@ class BuildingPlan:
     installations: PlannedInstallations = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class GroundPatch:
     """A polygon of one ground material in the orthophoto. Patches with a higher `order` cover lower ones."""
 
@@ -67,7 +67,7 @@ class GroundPatch:
     order: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class PlannedTree:
     """A tree at (x, y); `turn` is its rotation in radians."""
 
