@@ -1,15 +1,16 @@
 import { DecodeError } from "./errors";
 import { inflate } from "./inflate";
 
-interface Part<K, V> {
-  readonly kind: K;
+/** What a data tile has for each pixel. */
+export type DataKind = "normal" | "id" | "depth";
+
+/** Pixels of one kind by rows from the top; normals: three bytes each. */
+export interface DataTile {
+  readonly kind: DataKind;
   readonly width: number;
   readonly height: number;
-  readonly values: V;
+  readonly values: Uint8Array<ArrayBuffer> | Uint32Array<ArrayBuffer>;
 }
-
-/** Pixels by rows from the top; normals: three bytes each. */
-export type DataTile = readonly [Part<"normal", Uint8Array<ArrayBuffer>>, Part<"id", Uint32Array<ArrayBuffer>>, Part<"depth", Uint32Array<ArrayBuffer>>];
 
 /** "M3D" and the version. */
 const MAGIC = 0x4d334401;
@@ -18,19 +19,19 @@ const SIDE_LIMIT = 1024;
 const BODY_BYTES_PER_PX = 31;
 const NO_DEPTH = 0xffffffff;
 
-/** Decodes a data tile (spec/data-tile.md). @throws DecodeError */
-export async function decodeDataTile(bytes: Uint8Array<ArrayBuffer>): Promise<DataTile> {
+/** Decodes the pixels of one kind from a data tile (spec/data-tile.md). Residuals are read, and checked, for depths only. @throws DecodeError */
+export async function decodeDataTile(bytes: Uint8Array<ArrayBuffer>, kind: DataKind): Promise<DataTile> {
   const header = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
-  check(bytes.length >= HEADER_BYTES && header.getUint32(0) === MAGIC, `expected a data tile of version 1, got version ${String(bytes[3])}`);
+  check(bytes.length >= HEADER_BYTES && header.getUint32(0) === MAGIC, `expected a data tile of version 1, not ${String(bytes[3])}`);
   const [sizes = 0, size = 0, runs = 0, labels = 0, residuals = 0] = [4, 8, 12, 16, 20].map((at) => header.getUint32(at, true));
   const [width, height] = [sizes & 0xffff, sizes >>> 16];
   const px = width * height;
   // Other rules of the header follow from what is read.
   check(px > 0 && width <= SIDE_LIMIT && height <= SIDE_LIMIT && size <= BODY_BYTES_PER_PX * px && runs <= px && labels <= px);
-  return paint(width, height, labels, readColumns(await inflate([bytes.subarray(HEADER_BYTES)], size), runs, labels, residuals));
+  return paint(kind, width, height, labels, readColumns(await inflate([bytes.subarray(HEADER_BYTES)], size), runs, labels, residuals));
 }
 
-function check(ok: boolean, message = "the data tile contradicts itself"): void {
+function check(ok: boolean, message = "the data tile is broken"): void {
   if (!ok) throw new DecodeError(message);
 }
 
@@ -81,8 +82,8 @@ function readColumns(body: Uint8Array, runs: number, labels: number, residuals: 
   return [codes, lengths, ids, normals, shapes, right, down, starts, readResidual, () => read === residuals && at === body.length];
 }
 
-function paint(width: number, height: number, labels: number, [codes, lengths, ids, normals, shapes, right, down, starts, readResidual, isDone]: Columns): DataTile {
-  const [normal, id, depth] = [new Uint8Array(3 * width * height), new Uint32Array(width * height), new Uint32Array(width * height)];
+function paint(kind: DataKind, width: number, height: number, labels: number, [codes, lengths, ids, normals, shapes, right, down, starts, readResidual, isDone]: Columns): DataTile {
+  const values = kind === "normal" ? new Uint8Array(3 * width * height) : new Uint32Array(width * height);
   // Of labels: the plane's depth at (0, 0), and the offset of the first pixel of the last run.
   const [zeros, offsets] = [ids.slice(), new Int32Array(labels)];
   let [run, begun, started, length] = [0, 0, 0, 0];
@@ -99,30 +100,37 @@ function paint(width: number, height: number, labels: number, [codes, lengths, i
       const label = isNew ? begun++ : (owners[j + source] as number);
       const end = (isNew ? x : (ends[j + source] as number)) + (code & 4 ? (lengths[length++] as number) : 0);
       const [shape, color, slope] = [shapes[label] as number, normals[label] as number, right[label] as number];
-      const rise = slope * x + (down[label] as number) * y;
       check(code < 16 && source < 3 && label < labels && end > x && end <= width && (shape > 0 || code < 8));
-      if (isNew && shape) {
-        const near = from > 0 ? (depth[x > 0 ? from - 1 : from - width] as number) : 0;
-        const start = (starts[started++] as number) + (near === NO_DEPTH ? 0 : near);
-        check(start >= 0 && start < 2 ** 32);
-        zeros[label] = start - rise;
+      const to = from + end - x;
+      if (kind === "id") values.fill(ids[label] as number, from, to);
+      else if (kind === "normal") {
+        for (let i = 3 * from; i < 3 * to; ) {
+          values[i++] = color;
+          values[i++] = color >> 8;
+          values[i++] = color >> 16;
+        }
+      } else {
+        const rise = slope * x + (down[label] as number) * y;
+        if (isNew && shape) {
+          const near = values[x > 0 ? from - 1 : from - width] ?? 0;
+          const start = (starts[started++] as number) + (near === NO_DEPTH ? 0 : near);
+          check(start >= 0 && start < 2 ** 32);
+          zeros[label] = start - rise;
+        }
+        let value = (zeros[label] as number) + rise;
+        let offset = offsets[label] as number;
+        for (let i = from; i < to; i++, value += slope) {
+          offset = ((shape & 4 ? offset : 0) + (code & 8 ? readResidual() : 0)) | 0;
+          if (i === from) offsets[label] = offset;
+          values[i] = shape ? Math.floor(value) + offset : NO_DEPTH;
+        }
       }
-      let value = (zeros[label] as number) + rise;
-      let offset = offsets[label] as number;
-      for (let i = from; x < end; x++, i++, value += slope) {
-        id[i] = ids[label] as number;
-        normal[3 * i] = color;
-        normal[3 * i + 1] = color >> 8;
-        normal[3 * i + 2] = color >> 16;
-        offset = ((shape & 4 ? offset : 0) + (code & 8 ? readResidual() : 0)) | 0;
-        if (i === from) offsets[label] = offset;
-        depth[i] = shape ? Math.floor(value) + offset : NO_DEPTH;
-      }
+      x = end;
       rowEnds.push(end);
       rowOwners.push(label);
     }
     [ends, owners] = [rowEnds, rowOwners];
   }
-  check(run === codes.length && begun === labels && isDone());
-  return [{ kind: "normal", width, height, values: normal }, { kind: "id", width, height, values: id }, { kind: "depth", width, height, values: depth }];
+  check(run === codes.length && begun === labels && (kind !== "depth" || isDone()));
+  return { kind, width, height, values };
 }

@@ -13,13 +13,13 @@ export interface FetchOptions extends RetryOptions {
 
 /**
  * Fetches bytes; null for 204 (no content). Retries network errors, 429 and 5xx other than 501 with growing waits, each time at the next
- * of `urls`. Without a network there is one attempt, which a cache may answer.
+ * of `urls`, and past the browser's cache. Without a network there is one attempt, which a cache may answer.
  * @throws FetchError with the status; the signal's reason when aborted.
  */
 export function fetchBytes(urls: readonly string[], options: FetchOptions = {}): Promise<ArrayBuffer | null> {
   return retry(async (failed) => {
     try {
-      return await fetchOnce(urls[failed % urls.length] ?? "", options);
+      return await fetchOnce(urls[failed % urls.length] ?? "", options, failed > 0);
     } catch (reason) {
       options.signal?.throwIfAborted();
       return new FailedAttempt(reason, isTransient(reason));
@@ -37,18 +37,22 @@ export async function fetchJson(urls: readonly string[], options: FetchOptions =
   }
 }
 
-async function fetchOnce(url: string, { signal, range, fetch: request = fetch }: FetchOptions): Promise<ArrayBuffer | null> {
-  const headers = range ? { Range: `bytes=${String(range[0])}-${String(range[0] + range[1] - 1)}` } : undefined;
+/** @param anew not from the browser's cache, which may be what failed */
+async function fetchOnce(url: string, { signal, range, fetch: request = fetch }: FetchOptions, anew: boolean): Promise<ArrayBuffer | null> {
+  const headers: HeadersInit = range ? { Range: `bytes=${String(range[0])}-${String(range[0] + range[1] - 1)}` } : {};
   let response: Response;
   try {
-    response = await request(url, { ...(signal && { signal }), ...(headers && { headers }) });
+    response = await request(url, { signal: signal ?? null, headers, cache: anew ? "reload" : "default" });
   } catch (reason) {
     throw new FetchError(`${url}: no response (${reason instanceof Error ? reason.message : String(reason)})`);
   }
   if (response.status === 204) return null;
   if (!response.ok) throw new FetchError(`${url}: HTTP ${String(response.status)}`, response.status);
-  if (range && response.status !== 206) throw new FetchError(`${url}: the server ignores range requests (HTTP ${String(response.status)}, expected 206); use nginx, Apache or Caddy, for example`, response.status);
-  return response.arrayBuffer();
+  if (range && response.status !== 206) throw new FetchError(`${url}: the server ignores range requests (HTTP ${String(response.status)}, expected 206); use nginx, Apache or Caddy`, response.status);
+  const bytes = await response.arrayBuffer();
+  // Chromium's cache may end a range early, after another request for it was aborted. The first range may be longer than the file.
+  if (range?.[0] && bytes.byteLength !== range[1]) throw new FetchError(`${url}: ${String(bytes.byteLength)} of ${String(range[1])} bytes`);
+  return bytes;
 }
 
 function isTransient(reason: unknown): boolean {

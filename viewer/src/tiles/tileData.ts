@@ -1,5 +1,5 @@
 import { DecodeError } from "../core/errors";
-import { decodeDataTile } from "../core/dataTile";
+import { decodeDataTile, type DataKind } from "../core/dataTile";
 import { decodePng } from "../core/png";
 import type { Tile } from "../geo/frame";
 import { enlargeQuarter, type EnlargedData } from "./enlargeQuarter";
@@ -34,7 +34,7 @@ export async function decodeTile(kind: string, mediaType: string, bytes: ArrayBu
 async function decodeWhole(kind: string, mediaType: string, bytes: ArrayBuffer): Promise<TileData> {
   if (!isKind(kind)) throw new DecodeError(`unknown layer kind "${kind}"`);
   if (kind === "color" || kind === "picture") return decodeColor(kind, mediaType, bytes);
-  if (mediaType === DATA_TYPE) return (await decodeDataTile(new Uint8Array(bytes))).find((part) => part.kind === kind) as TileData;
+  if (mediaType === DATA_TYPE) return (await decodeDataTile(new Uint8Array(bytes), kind as DataKind)) as TileData;
   const { width, height, channels, data } = await decodePng(new Uint8Array(bytes));
   if (channels !== CHANNELS[kind]) throw new DecodeError(`${kind} tiles have ${String(CHANNELS[kind])} bytes per pixel, got ${String(channels)}`);
   // The values are little-endian, as memory is on every machine that runs a browser.

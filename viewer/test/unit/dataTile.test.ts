@@ -2,7 +2,7 @@ import { readFileSync } from "node:fs";
 import { resolve } from "node:path";
 import { deflateSync, inflateSync } from "node:zlib";
 import { describe, expect, test } from "vitest";
-import { decodeDataTile } from "../../src/core/dataTile";
+import { decodeDataTile, type DataTile } from "../../src/core/dataTile";
 import { DecodeError } from "../../src/core/errors";
 
 interface TileVector {
@@ -19,6 +19,9 @@ const vectors = JSON.parse(readFileSync(resolve(import.meta.dirname, "../../../s
 
 const bytesOf = (base64: string): Uint8Array<ArrayBuffer> => new Uint8Array(Buffer.from(base64, "base64"));
 
+const KINDS = ["normal", "id", "depth"] as const;
+const decodeAll = async (bytes: Uint8Array<ArrayBuffer>): Promise<DataTile[]> => [await decodeDataTile(bytes, KINDS[0]), await decodeDataTile(bytes, KINDS[1]), await decodeDataTile(bytes, KINDS[2])];
+
 /** Changes a body and deflates it again. */
 const packed = (tile: Uint8Array, change: (body: Uint8Array) => void): Uint8Array<ArrayBuffer> => {
   const body = new Uint8Array(inflateSync(tile.subarray(24)));
@@ -30,25 +33,25 @@ describe("data tile", () => {
   for (const { name, base64, width, height, normal, id, depth } of vectors.tiles) {
     test(`${name}: decodes to the pixels of the specification`, async () => {
       for (const bytes of [bytesOf(base64), packed(bytesOf(base64), () => undefined)]) {
-        const tile = await decodeDataTile(bytes);
+        const tile = await decodeAll(bytes);
         for (const part of tile) expect([part.width, part.height]).toEqual([width, height]);
         expect(tile.map(({ kind }) => kind)).toEqual(["normal", "id", "depth"]);
-        expect([...tile[1].values]).toEqual(id);
-        expect([...tile[2].values]).toEqual(depth);
-        expect([...tile[0].values]).toEqual(normal.flatMap((n) => [n & 255, (n >> 8) & 255, n >> 16]));
+        expect([...(tile[1]?.values ?? [])]).toEqual(id);
+        expect([...(tile[2]?.values ?? [])]).toEqual(depth);
+        expect([...(tile[0]?.values ?? [])]).toEqual(normal.flatMap((n) => [n & 255, (n >> 8) & 255, n >> 16]));
       }
     });
   }
 
   for (const { why, base64 } of vectors.refused) {
     test(`${why}: is refused`, async () => {
-      await expect(decodeDataTile(bytesOf(base64))).rejects.toThrow(DecodeError);
+      await expect(decodeAll(bytesOf(base64))).rejects.toThrow(DecodeError);
     });
   }
 
   test("another version is refused with both numbers", async () => {
     const bytes = bytesOf(vectors.refused.find(({ why }) => why === "version 2")?.base64 ?? "");
-    await expect(decodeDataTile(bytes)).rejects.toThrow(/version 1.*version 2/);
+    await expect(decodeAll(bytes)).rejects.toThrow(/version 1, not 2/);
   });
 
   test("changed bytes are refused or give a tile of the same size", async () => {
@@ -61,7 +64,7 @@ describe("data tile", () => {
       });
       if (k % 4 === 0) bytes[8 + draw(16)] = draw(256);
       try {
-        const tile = await decodeDataTile(bytes);
+        const tile = await decodeAll(bytes);
         read++;
         expect(tile.map(({ values }) => values.length)).toEqual([3 * width * height, width * height, width * height]);
       } catch (reason) {

@@ -4,7 +4,7 @@ import { gzipSync } from "node:zlib";
 import { makeFrame, type Tile } from "../../src/geo/frame";
 import { Cache } from "../../src/tiles/cache";
 import { findCover, sortFromCenter, computeLevel, findFallbacks, type Rect } from "../../src/tiles/cover";
-import { fetchBytes } from "../../src/tiles/fetch";
+import { fetchBytes, type FetchFunction } from "../../src/tiles/fetch";
 import { Archive, tileId } from "../../src/tiles/pmtiles";
 import { RequestQueue, type TileRequest } from "../../src/tiles/queue";
 import { normalizeBaseUrl, chooseHost, tileUrl, tileUrls } from "../../src/tiles/url";
@@ -200,6 +200,19 @@ describe("fetch", () => {
   test("a server that ignores range requests is reported", async () => {
     answers(200);
     await expect(fetchBytes(["a"], { range: [0, 5] })).rejects.toThrow(/ignores range/);
+  });
+
+  test("a range that ends early is requested again, past the browser's cache; the first may be longer than the file", async () => {
+    const caches: (RequestCache | undefined)[] = [];
+    const lengths = [3, 5, 3];
+    const request: FetchFunction = (_, { cache }) => {
+      caches.push(cache);
+      return Promise.resolve(new Response(new Uint8Array(lengths.shift() ?? 0), { status: 206 }));
+    };
+    expect((await fetchBytes(["a"], { range: [7, 5], backoff_ms: 1, fetch: request }))?.byteLength).toBe(5);
+    expect(caches).toEqual(["default", "reload"]);
+    expect((await fetchBytes(["a"], { range: [0, 5], fetch: request }))?.byteLength).toBe(3);
+    await expect(fetchBytes(["a"], { range: [7, 5], backoff_ms: 1, attempts: 2, fetch: request })).rejects.toThrow("a: 0 of 5 bytes");
   });
 });
 
