@@ -30,8 +30,8 @@ export type TransitionScene = Omit<TransitionFrame, "camera" | "tilesChanged">;
 
 /** A context that is not restored by then is lost for good. */
 const RESTORE_MS = 5000;
-/** Default cache size: bytes per device pixel, on dense screens (whose tiles have fewer pixels, see `computeLevel`), and the minimum. Coarser tiles need less. */
-const [PIXEL_BYTES, DENSE_PIXEL_BYTES, MIN_BYTES] = [60, 20, 24e6];
+/** Default cache size: bytes per device pixel, on dense screens (whose tiles have fewer pixels, see `computeLevel`), and the minimum. Coarser tiles need less. A cache that does not hold the tiles of a few views makes more garbage than it saves. */
+const [PIXEL_BYTES, DENSE_PIXEL_BYTES, MIN_BYTES] = [60, 45, 24e6];
 
 /** The result of a frame. */
 export interface FrameResult {

@@ -36,7 +36,7 @@ export interface MapOptions {
   attribution?: boolean | Corner;
   /** Fetches the ids of everything in view, so that "mousemove" reports the object under the pointer. Default false. */
   hover?: boolean;
-  /** Size of the cache of decoded tiles. Tiles in view are always kept. Default: 60 bytes per device pixel of the map, 20 on dense screens, whose tiles have fewer pixels, and less as `maxTileRatio` and `dataSaver` make tiles coarser; at least 24 MB. */
+  /** Size of the cache of decoded tiles. Tiles in view are always kept. Default: 60 bytes per device pixel of the map, 45 on dense screens, whose tiles have fewer pixels, and less as `maxTileRatio` and `dataSaver` make tiles coarser; at least 24 MB. */
   cacheBytes?: number;
   /** Maximum number of concurrent tile requests. Default 12. */
   concurrency?: number;
