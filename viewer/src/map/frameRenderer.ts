@@ -4,8 +4,7 @@ import type { LightEstimator } from "../draw/lightEstimator";
 import { WebGLDrawer } from "../draw/webgl/webglDrawer";
 import type { Light } from "../geo/light";
 import type { LayerKind } from "../geo/manifest";
-import { Cache } from "../tiles/cache";
-import { DENSE_DPR } from "../tiles/cover";
+import { Cache, computeCacheBytes, MIN_CACHE_BYTES } from "../tiles/cache";
 import { Decoder } from "../tiles/decoder";
 import { RequestQueue, type TileRequest } from "../tiles/queue";
 import type { TileResources, CachedTile } from "../tiles/layerTiles";
@@ -30,8 +29,6 @@ export type TransitionScene = Omit<TransitionFrame, "camera" | "tilesChanged">;
 
 /** A context that is not restored by then is lost for good. */
 const RESTORE_MS = 5000;
-/** Default cache size: bytes per device pixel, on dense screens (whose tiles have fewer pixels, see `computeLevel`), and the minimum. Coarser tiles need less. A cache that does not hold the tiles of a few views makes more garbage than it saves. */
-const [PIXEL_BYTES, DENSE_PIXEL_BYTES, MIN_BYTES] = [60, 45, 24e6];
 
 /** The result of a frame. */
 export interface FrameResult {
@@ -86,7 +83,7 @@ export class FrameRenderer {
     this.#options = options;
     this.#events = events;
     this.#drawer = this.#createDrawer(options.drawer);
-    this.#cache = new Cache<CachedTile>(options.cacheBytes ?? MIN_BYTES, (key, { data }) => {
+    this.#cache = new Cache<CachedTile>(options.cacheBytes ?? MIN_CACHE_BYTES, (key, { data }) => {
       if (data && "bitmap" in data) data.bitmap.close();
       this.#drawer.release(key);
     });
@@ -112,7 +109,7 @@ export class FrameRenderer {
     const { layers, light, lightEstimator, moving } = input;
     this.#viewport.fitCanvas(viewState.dpr);
     const { width, height } = this.#viewport.canvas;
-    this.#cache.setLimit(this.#options.cacheBytes ?? Math.max(MIN_BYTES, (viewState.dpr >= DENSE_DPR ? DENSE_PIXEL_BYTES : PIXEL_BYTES) * width * height * 4 ** Math.min(0, viewState.finer)));
+    this.#cache.setLimit(this.#options.cacheBytes ?? computeCacheBytes(viewState, width * height));
     this.#cache.startTick();
     const { gl } = this.#drawer;
     this.#showsCustomLayers &&= this.customLayers.size > 0 && gl !== null;

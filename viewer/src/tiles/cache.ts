@@ -1,3 +1,18 @@
+import { DENSE_DPR } from "./cover";
+
+/** Minimum size of the cache. */
+export const MIN_CACHE_BYTES = 24e6;
+/** Bytes per device pixel, and on dense screens, whose tiles have fewer pixels. */
+const [PIXEL_BYTES, DENSE_PIXEL_BYTES] = [60, 45];
+
+/**
+ * Computes the default size of the cache of a map with so many device pixels. Coarser tiles need less. It holds the tiles of some views: a smaller one
+ * takes more memory, since the garbage of tiles that are decoded again and again is larger than the tiles.
+ * @param finer additional levels of the tiles shown
+ */
+export const computeCacheBytes = ({ dpr, finer }: { readonly dpr: number; readonly finer: number }, pixels: number): number =>
+  Math.max(MIN_CACHE_BYTES, (dpr >= DENSE_DPR ? DENSE_PIXEL_BYTES : PIXEL_BYTES) * pixels * 4 ** Math.min(0, finer));
+
 interface CacheEntry<V> {
   readonly value: V;
   readonly bytes: number;

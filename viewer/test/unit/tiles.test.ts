@@ -2,7 +2,8 @@ import { afterEach, describe, expect, test, vi } from "vitest";
 import { PMTiles, zxyToTileId, type Source as PmSource } from "pmtiles";
 import { gzipSync } from "node:zlib";
 import { makeFrame, type Tile } from "../../src/geo/frame";
-import { Cache } from "../../src/tiles/cache";
+import { DEFAULTS } from "../../src/map/options";
+import { Cache, computeCacheBytes } from "../../src/tiles/cache";
 import { findCover, sortFromCenter, computeLevel, findFallbacks, type Rect } from "../../src/tiles/cover";
 import { fetchBytes, type FetchFunction } from "../../src/tiles/fetch";
 import { Archive, tileId } from "../../src/tiles/pmtiles";
@@ -155,6 +156,15 @@ describe("URLs", () => {
     expect(chooseHost({ z: 5, x: 2, y: 9 }, 4)).toBe(hosts[2]);
     expect(chooseHost({ z: 5, x: 2, y: 10 }, 4)).not.toBe(hosts[2]);
     expect(new Set(tileUrls(["http://a", "http://b"], "0-45", "id", { z: 0, x: 0, y: 0 }, 1)).size).toBe(2);
+  });
+});
+
+describe("cache size", () => {
+  test.each([["a phone", 390, 844, 3], ["a phone", 390, 844, 2], ["a tablet", 820, 1180, 2], ["a laptop", 1440, 900, 2], ["a desk", 1920, 1080, 1]])("the cache of %s, %i × %i at %i, holds the tiles of three views", (_, width, height, dpr) => {
+    const finer = Math.min(0, Math.log2(DEFAULTS.maxTileRatio / dpr));
+    const finest = dpr > 1 ? dpr * 2 ** finer : Math.SQRT2; // tile pixels per CSS pixel: see computeLevel
+    const view_bytes = (width * finest + 256) * (height * finest + 256) * 7; // colours and normals
+    expect(computeCacheBytes({ dpr, finer }, width * height * dpr ** 2)).toBeGreaterThan(3 * view_bytes);
   });
 });
 
