@@ -6,7 +6,7 @@ export const MIN_CACHE_BYTES = 24e6;
 const [PIXEL_BYTES, DENSE_PIXEL_BYTES] = [60, 45];
 
 /**
- * Computes the default size of the cache of a map with so many device pixels. Coarser tiles need less. It holds the tiles of some views: a smaller one
+ * Computes the default size of a map's cache from the map's device pixels. Coarser tiles need less. It holds the tiles of some views: a smaller one
  * takes more memory, since the garbage of tiles that are decoded again and again is larger than the tiles.
  * @param finer additional levels of the tiles shown
  */

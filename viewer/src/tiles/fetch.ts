@@ -37,12 +37,12 @@ export async function fetchJson(urls: readonly string[], options: FetchOptions =
   }
 }
 
-/** @param anew not from the browser's cache, which may be what failed */
-async function fetchOnce(url: string, { signal, range, fetch: request = fetch }: FetchOptions, anew: boolean): Promise<ArrayBuffer | null> {
+/** @param reload bypasses the browser's cache, which may be the cause of the failure */
+async function fetchOnce(url: string, { signal, range, fetch: request = fetch }: FetchOptions, reload: boolean): Promise<ArrayBuffer | null> {
   const headers: HeadersInit = range ? { Range: `bytes=${String(range[0])}-${String(range[0] + range[1] - 1)}` } : {};
   let response: Response;
   try {
-    response = await request(url, { signal: signal ?? null, headers, cache: anew ? "reload" : "default" });
+    response = await request(url, { signal: signal ?? null, headers, cache: reload ? "reload" : "default" });
   } catch (reason) {
     throw new FetchError(`${url}: no response (${reason instanceof Error ? reason.message : String(reason)})`);
   }
