@@ -1,5 +1,5 @@
 """`python -m bench [PART …] [--json]`. Parts: tiles, light, encoding, ingest, incremental (the default); extent, planning, stored, viewer,
-catalogue, overhead, saturation, view, large, render, formats."""
+catalogue, overhead, saturation, view, large, render, formats, stages."""
 
 import argparse
 import json
@@ -23,6 +23,7 @@ from . import (
     planning,
     render_pairs,
     saturation,
+    stages,
     stored,
     tiles,
     view,
@@ -31,7 +32,7 @@ from . import (
 from .benchmark_scene import CACHE
 
 PARTS = ("tiles", "light", "encoding", "ingest", "incremental")
-ON_REQUEST = ("extent", "planning", "stored", "viewer", "catalogue", "overhead", "saturation", "view", "large", "render", "formats")
+ON_REQUEST = ("extent", "planning", "stored", "viewer", "catalogue", "overhead", "saturation", "view", "large", "render", "formats", "stages")
 Rows = list[dict[str, Any]]
 
 
@@ -84,6 +85,7 @@ def main() -> None:
             options.pairs,
             render_pairs.RenderOptions(options.buildings, options.render_res, options.directions, options.color, options.workers),
         ),
+        "stages": stages.measure,
         "formats": lambda: color_formats.measure(options.buildings, options.res, options.tiles),
         "stored": lambda: stored.measure(options.folders),
         "viewer": lambda: viewer.measure(

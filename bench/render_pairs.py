@@ -12,7 +12,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,7 @@ from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.tile_store import content_hash
 
 from .benchmark_scene import CACHE, run_verb
+from .peers import FrameFields
 
 HERE = Path(__file__).parents[1]
 GOAL = 2.5
@@ -62,6 +64,8 @@ class RenderOptions:
     directions: int = 1
     color: str = "webp"
     workers: int = 2
+    trees: bool = True
+    pitch_deg: float = 45.0
 
 
 def measure(against: Path | None, pairs: int, options: RenderOptions) -> list[dict[str, Any]]:
@@ -89,9 +93,10 @@ class RenderBenchmark:
 
     def __init__(self, root: Path, options: RenderOptions) -> None:
         self._root, self._options = root, options
-        folder = CACHE / f"render-{options.buildings}"
+        folder = CACHE / f"render-{options.buildings}{'' if options.trees else '-bare'}"
         if not (folder / "town").is_dir():
-            run_verb(["make-town", "-o", str(folder / "town"), "--buildings", str(options.buildings), "--seed", "7"])
+            trees = [] if options.trees else ["--no-trees"]
+            run_verb(["make-town", "-o", str(folder / "town"), "--buildings", str(options.buildings), "--seed", "7", *trees])
         self._workspace = Workspace(folder / f"workspace-{hashlib.sha256(str(root).encode()).hexdigest()[:8]}")
         self._where = ["-w", str(self._workspace.root.absolute())]
         if not self._workspace.root.is_dir():
@@ -99,18 +104,38 @@ class RenderBenchmark:
             self._run(["create-scene", "town", *self._where])
             self._run(["add-files", "town", str((folder / "town").absolute()), *self._where])
 
-    def render(self, name: str) -> tuple[RenderCost, dict[str, str]]:
-        """Returns the cost of a render, and the hash of each tile by store, layer and number."""
-        view = ["--view", "0/45"] if self._options.directions == 1 else ["--directions", str(self._options.directions)]
+    @contextmanager
+    def rendering(self, name: str) -> Iterator[None]:
+        """Creates a rendering, and removes it at the end."""
+        view = ["--view", f"0/{self._options.pitch_deg:g}"] if self._options.directions == 1 else ["--directions", str(self._options.directions)]
         color = ["--color", self._options.color, "--res", str(self._options.res_m)]
         self._run(["create-rendering", "town", name, *view, *color, *self._where])
+        try:
+            yield
+        finally:
+            self._run(["remove-rendering", name, "--yes", *self._where])
+
+    def frame(self, name: str) -> tuple[Path, FrameFields]:
+        """Returns the scene's folder and the fields of the frame of a rendering's first view."""
+        catalogue = self._workspace.open_catalogue()
+        try:
+            track = catalogue.rendering(name).tracks[0]
+            return self._workspace.root / "scenes" / "town", track.frame.to_json(track.layers)
+        finally:
+            catalogue.close()
+
+    def render(self, name: str) -> tuple[RenderCost, dict[str, str]]:
+        """Returns the cost of a render, and the hash of each tile by store, layer and number."""
+        with self.rendering(name):
+            return self._render(name)
+
+    def _render(self, name: str) -> tuple[RenderCost, dict[str, str]]:
         workers = ["--workers", str(self._options.workers)]
         begun = time.perf_counter()
         output, usage = self._run(["render", name, "--json", "--stats", *workers, *self._where])
         wall_s = time.perf_counter() - begun
         report = json.loads(output)
         tiles = _hashes(self._workspace.rendering_folder(name))
-        self._run(["remove-rendering", name, "--yes", *self._where])
         cost = RenderCost(
             cpu_s=usage.ru_utime + usage.ru_stime,
             user_s=usage.ru_utime,
