@@ -3,13 +3,19 @@
 import shutil
 from pathlib import Path
 
+import numpy as np
+
+from map3d import _core
 from map3d.catalogue import Workspace
 from map3d.cli.app import run
 from map3d.errors import UnknownVersion
+from map3d.tiles.naming import block_levels
+from map3d.tiles.occupancy import xy_from_morton
 
 from .peers import FrameFields
 
 CACHE = Path(".cache/bench")
+Block = tuple[int, int, int]
 
 
 def prepare_scene(buildings: int, res_m: float, color: str) -> tuple[Path, dict[str, FrameFields]]:
@@ -34,6 +40,14 @@ def prepare_scene(buildings: int, res_m: float, color: str) -> tuple[Path, dict[
         return workspace.root / "scenes" / "town", {track.id: track.frame.to_json(track.layers) for track in record.tracks}
     finally:
         catalogue.close()
+
+
+def fullest_blocks(scene: _core.Scene, frame: _core.Frame) -> list[tuple[Block, int]]:
+    """Returns the base blocks as (z, x, y), each with its number of occupied base tiles, those with the most first."""
+    root = block_levels(frame.zmax)[0].root
+    numbers, counts = np.unique(scene.occupied(frame, frame.zmax) >> np.uint64(2 * (frame.zmax - root)), return_counts=True)
+    columns, rows = xy_from_morton(numbers)
+    return [((root, int(columns[k]), int(rows[k])), int(counts[k])) for k in np.lexsort((columns, rows, -counts))]
 
 
 def _open_or_recreate(folder: Path) -> Workspace:

@@ -3,16 +3,13 @@
 import math
 from typing import Any, Final
 
-import numpy as np
 from rich.console import Console
 from rich.table import Table
 
 from map3d import _core
 from map3d.geometry.core_frame import core_frame
-from map3d.tiles.naming import block_levels
-from map3d.tiles.occupancy import xy_from_morton
 
-from .benchmark_scene import prepare_scene
+from .benchmark_scene import fullest_blocks, prepare_scene
 
 BUILDINGS: Final = 300
 RES_M: Final = 0.2
@@ -28,7 +25,7 @@ def measure() -> list[dict[str, Any]]:
     folder, frames = prepare_scene(BUILDINGS, RES_M, "webp")
     fields = next(iter(frames.values()))
     scene = _core.Scene(str(folder))
-    blocks = _fullest_blocks(scene, core_frame(fields))
+    blocks = [block for block, _ in fullest_blocks(scene, core_frame(fields))[:BLOCKS]]
     rows = [_measure_layer(scene, kind, core_frame({**fields, "layers": [layer]}), blocks) for kind, layer in layers().items()]
     table = Table(title=f"layers of light, ms of CPU time per base tile, {scene.triangle_count:,} triangles at {RES_M} m per pixel")
     for column in ("layer", "tiles", "visibility and shading", "rays", "rays per sun"):
@@ -63,15 +60,6 @@ def _measure_layer(scene: _core.Scene, kind: str, frame: _core.Frame, blocks: li
         rounds.append((sum(one["light_s"] for one in stats) / tiles * 1e3, before / tiles * 1e3, tiles))
     light_ms, before_ms, tiles = min(rounds[1:])
     return {"kind": kind, "tiles": int(tiles), "light_ms": light_ms, "before_ms": before_ms, "suns": len(layers()[kind].get("suns", ()))}
-
-
-def _fullest_blocks(scene: _core.Scene, frame: _core.Frame) -> list[tuple[int, int, int]]:
-    """Returns the base blocks with the most occupied tiles."""
-    root = block_levels(frame.zmax)[0].root
-    blocks, counts = np.unique(scene.occupied(frame, frame.zmax) >> np.uint64(2 * (frame.zmax - root)), return_counts=True)
-    columns, rows = xy_from_morton(blocks)
-    order = np.lexsort((columns, rows, -counts))[:BLOCKS]
-    return [(root, int(columns[k]), int(rows[k])) for k in order]
 
 
 def _sun_direction(azimuth_deg: float, elevation_deg: float) -> tuple[float, float, float]:

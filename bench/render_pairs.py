@@ -59,6 +59,8 @@ class RenderCost:
 
 @dataclass(frozen=True)
 class RenderOptions:
+    """The town and the rendering. `res_m`: metres per pixel; `pitch_deg`: of the view if there is one direction, which looks north."""
+
     buildings: int = 300
     res_m: float = 0.1
     directions: int = 1

@@ -10,9 +10,9 @@ from rich.table import Table
 
 from map3d import _core
 from map3d.geometry.core_frame import core_frame
-from map3d.tiles.naming import block_levels
 from map3d.tiles.occupancy import xy_from_morton
 
+from .benchmark_scene import Block, fullest_blocks
 from .render_pairs import HERE, RenderBenchmark, RenderOptions
 
 RES_M: Final = 0.2
@@ -82,17 +82,16 @@ def _measure(town: str, bench: RenderBenchmark, options: RenderOptions) -> Stage
     )
 
 
-def _blocks(scene: _core.Scene, frame: _core.Frame) -> Iterator[tuple[int, int, int]]:
-    """Yields the base blocks with the most tiles, until they have enough."""
-    root = block_levels(frame.zmax)[0].root
-    numbers, counts = np.unique(scene.occupied(frame, frame.zmax) >> np.uint64(2 * (frame.zmax - root)), return_counts=True)
-    order = np.argsort(-counts, kind="stable")
-    columns, rows = xy_from_morton(numbers)
-    chosen = np.searchsorted(np.cumsum(counts[order]), TILES) + 1
-    yield from ((root, int(columns[k]), int(rows[k])) for k in order[:chosen])
+def _blocks(scene: _core.Scene, frame: _core.Frame) -> Iterator[Block]:
+    """Yields the blocks with the most tiles, until they have enough."""
+    tiles = 0
+    for block, count in fullest_blocks(scene, frame):
+        if tiles < TILES:
+            yield block
+        tiles += count
 
 
-def _round(scene: _core.Scene, frame: _core.Frame, blocks: list[tuple[int, int, int]]) -> tuple[dict[str, float], int]:
+def _round(scene: _core.Scene, frame: _core.Frame, blocks: list[Block]) -> tuple[dict[str, float], int]:
     """Renders the blocks; returns the CPU ms per base tile by stage, and the number of base tiles with content."""
     found = [scene.render_block(frame, *block).stats for block in blocks]
     tiles = sum(one["traced_tiles"] for one in found)
