@@ -96,7 +96,7 @@ test-browser: build ## test in Chromium, Firefox and WebKitGTK; skips browsers t
 	case $$status in 0) $(MAKE) --no-print-directory browser-suite;; 3) ;; *) exit $$status;; esac
 
 browser-suite: build
-	cd viewer && npm run --silent test:browser
+	cd viewer && npx --no-install vitest run --config vitest.browser.config.ts
 	$(BIN)/python -m pytest -q -m browser
 
 test-all: test ## run slow tests, too (none is marked slow yet)
@@ -158,7 +158,7 @@ reference: $(CACHE)/npm ## write the viewer's reference to viewer/reference/
 
 bless: $(CACHE)/venv $(CACHE)/npm ## regenerate test vectors and golden pictures; look at them and say why in the commit
 	$(BIN)/python spec/make_vectors.py
-	MAP3D_BLESS=1 cargo test --locked -q -p map3d-render --test golden
+	MAP3D_BLESS=1 cargo test --locked -q -p map3d-render --test all golden
 	cd viewer && npm run --silent bless
 
 clean: ## remove all build output

@@ -1,8 +1,6 @@
 //! Data tiles: equal pixels after encoding and decoding, the specification's vectors, and refusals of hostile bytes.
 
-mod common;
-
-use common::Random;
+use crate::common::Random;
 use map3d_base::DEPTH_NOTHING;
 use map3d_image::data_tile::{DataTile, DataTileEncoder, MAX_DATA_TILE_PX, decode_data_tile};
 use map3d_image::encode::{Deflate, Encoder, bytes_from_normals};

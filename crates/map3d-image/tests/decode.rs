@@ -1,10 +1,8 @@
 //! Decoding: the pixels of every format are preserved; exceeded limits and damaged files are errors.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 
-use common::{Random, noise, png};
+use crate::common::{Random, noise, png};
 use map3d_base::Error;
 use map3d_image::decode::{decode, probe};
 use map3d_image::encode::{encode_jpeg, encode_webp};

@@ -1,8 +1,6 @@
 //! Layers as sent (spec/pyramid.md §6).
 
-mod common;
-
-use common::{Random, noise};
+use crate::common::{Random, noise};
 use map3d_base::{LayerFormat, LayerKind, LayerSpec};
 use map3d_image::decode::decode;
 use map3d_image::encode::{Deflate, Encoder, Filter, bytes_from_normals, bytes_from_u32, color_from_linear, decode_png, encode_png};

@@ -1,10 +1,8 @@
 //! JPEG pixels and bytes are those of libjpeg-turbo 3, whose digests are recorded here.
 
-mod common;
-
 use std::path::Path;
 
-use common::noise;
+use crate::common::noise;
 use map3d_image::decode::decode;
 use map3d_image::encode::encode_jpeg;
 use map3d_image::{ImageLimits, Raster};

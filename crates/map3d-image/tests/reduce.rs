@@ -1,8 +1,6 @@
 //! Parents and seams (spec/pyramid.md §7, §8).
 
-mod common;
-
-use common::Random;
+use crate::common::Random;
 use map3d_base::{DEPTH_NOTHING, LayerKind};
 use map3d_image::seam::{read_seam, write_seam};
 use map3d_image::{Arrays, GBuffer, reduce};

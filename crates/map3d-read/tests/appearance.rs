@@ -1,8 +1,6 @@
 //! CityGML appearances: themes, materials, all types of textures, and inheritance.
 
-mod documents;
-
-use documents::{Folder, ParsedDocument, read_with};
+use crate::documents::{Folder, ParsedDocument, read_with};
 use map3d_base::asset::Wrap;
 use map3d_read::{Format, PositionTransformer, ReadOptions};
 
@@ -328,7 +326,7 @@ fn appearances_over_the_limit_are_an_error() {
     let folder = Folder::new("limit");
     let path = folder.put("a.gml", format!("<CityModel>{}</CityModel>", member("a", &texture("", "p", UVS))));
     let options = ReadOptions { max_appearance_bytes: 10, ..ReadOptions::default() };
-    assert!(documents::is_limit_error(read_with(&path, Format::CityGml, &options), "max_appearance_bytes"));
+    assert!(crate::documents::is_limit_error(read_with(&path, Format::CityGml, &options), "max_appearance_bytes"));
 }
 
 #[test]

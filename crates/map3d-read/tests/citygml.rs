@@ -1,8 +1,6 @@
 //! CityGML constructs.
 
-mod documents;
-
-use documents::city_model::{at_lod, building, member, model, multi_surface, polygon, read_text, ring, square, surface, try_text};
+use crate::documents::city_model::{at_lod, building, member, model, multi_surface, polygon, read_text, ring, square, surface, try_text};
 use map3d_base::asset::Rank;
 use map3d_base::vec3::triangle_normal;
 use map3d_read::ReadOptions;

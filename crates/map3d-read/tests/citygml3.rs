@@ -1,9 +1,7 @@
 //! Every theme of CityGML 3.0, with counts.
 
-mod documents;
-
-use documents::city_model::{building, member, multi_surface, polygon, read_text, square};
-use documents::{Folder, ParsedDocument, read_with};
+use crate::documents::city_model::{building, member, multi_surface, polygon, read_text, square};
+use crate::documents::{Folder, ParsedDocument, read_with};
 use map3d_base::asset::Rank;
 use map3d_read::{Format, ReadOptions};
 

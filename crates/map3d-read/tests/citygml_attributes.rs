@@ -1,9 +1,7 @@
 //! Attributes of CityGML objects: extensions (ADE), code lists, addresses, references, heights.
 
-mod documents;
-
-use documents::city_model::{at_lod, building, member, multi_surface, read_text, square, surface};
-use documents::{Folder, ParsedDocument, read_with};
+use crate::documents::city_model::{at_lod, building, member, multi_surface, read_text, square, surface};
+use crate::documents::{Folder, ParsedDocument, read_with};
 use map3d_read::{Format, ReadOptions};
 use serde_json::{Value, json};
 

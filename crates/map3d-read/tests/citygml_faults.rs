@@ -1,9 +1,7 @@
 //! Broken, hostile or too large CityGML: the fault is counted or an error, everything else is read.
 
-mod documents;
-
-use documents::city_model::{at_lod, building, member, model, multi_surface, polygon, read_text, square, try_text};
-use documents::{Folder, is_format_error, is_limit_error, read_with};
+use crate::documents::city_model::{at_lod, building, member, model, multi_surface, polygon, read_text, square, try_text};
+use crate::documents::{Folder, is_format_error, is_limit_error, read_with};
 use map3d_read::{Format, ReadOptions};
 use serde_json::json;
 

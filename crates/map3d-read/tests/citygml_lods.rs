@@ -1,9 +1,7 @@
 //! Levels of detail that do not mix, and interiors.
 
-mod documents;
-
-use documents::ParsedDocument;
-use documents::city_model::{at_lod, building, member, multi_surface, polygon, read_text, square, surface, try_text};
+use crate::documents::ParsedDocument;
+use crate::documents::city_model::{at_lod, building, member, multi_surface, polygon, read_text, square, surface, try_text};
 use map3d_base::asset::Rank;
 use map3d_read::ReadOptions;
 
@@ -21,7 +19,7 @@ fn window(inner: &str) -> String {
 }
 
 fn area_of(document: &ParsedDocument, rank: Rank) -> f64 {
-    document.triangles().iter().filter(|t| t.rank == rank).map(|t| documents::compute_area(t.corners)).sum()
+    document.triangles().iter().filter(|t| t.rank == rank).map(|t| crate::documents::compute_area(t.corners)).sum()
 }
 
 #[test]

@@ -1,9 +1,7 @@
 //! Each geometry is in the coordinate system that the nearest element above it names.
 
-mod documents;
-
-use documents::ParsedDocument;
-use documents::city_model::{model, read_text};
+use crate::documents::ParsedDocument;
+use crate::documents::city_model::{model, read_text};
 
 fn member(body: &str) -> String {
     format!(r#"<core:cityObjectMember><bldg:Building gml:id="b">{body}</bldg:Building></core:cityObjectMember>"#)

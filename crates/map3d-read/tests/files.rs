@@ -1,8 +1,6 @@
 //! File names in user data resolve only inside the asset's folder; image headers are checked before the image is used.
 
-mod documents;
-
-use documents::{Folder, ParsedDocument, encode_png, read_with};
+use crate::documents::{Folder, ParsedDocument, encode_png, read_with};
 use map3d_read::{AssetFolder, FileError, Format, ReadOptions, detect_format};
 
 #[test]

@@ -1,12 +1,10 @@
 //! Gzip files are read like their content; of a cut one, what comes before the cut.
 
-mod documents;
-
 use std::io::Write;
 
-use documents::city_model::{member, model, multi_surface, square};
-use documents::random::Random;
-use documents::{Folder, ParsedDocument, is_format_error, read_with};
+use crate::documents::city_model::{member, model, multi_surface, square};
+use crate::documents::random::Random;
+use crate::documents::{Folder, ParsedDocument, is_format_error, read_with};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use map3d_base::Error;

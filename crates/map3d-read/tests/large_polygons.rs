@@ -1,11 +1,9 @@
 //! Laws of polygons with very many vertices: they are triangulated exactly, in bounded time, and a hopeless one is skipped alone.
 
-mod documents;
-
 use std::f64::consts::TAU;
 
-use documents::city_model::{building, member, multi_surface, polygon, read_text, square};
-use documents::random::Random;
+use crate::documents::city_model::{building, member, multi_surface, polygon, read_text, square};
+use crate::documents::random::Random;
 use map3d_base::Vec3;
 use map3d_read::{Coverage, PolygonError, Triangulator};
 

@@ -1,11 +1,9 @@
 //! Randomly damaged documents give an error or a document, never a panic.
 
-mod documents;
-
 use std::time::Instant;
 
-use documents::random::Random;
-use documents::{Folder, read_with};
+use crate::documents::random::Random;
+use crate::documents::{Folder, read_with};
 use map3d_read::{Format, ReadOptions, Split};
 
 const CITY: &str = include_str!("data/all_constructs.gml");
@@ -72,7 +70,7 @@ fn damaged_images_never_panic() {
     let folder = Folder::new("mutated-image");
     folder.put("a.mtl", "newmtl m\nmap_Kd t.png\n");
     let path = folder.put("a.obj", "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n");
-    let image = documents::encode_png(16, 16, [1, 2, 3, 4]);
+    let image = crate::documents::encode_png(16, 16, [1, 2, 3, 4]);
     let mut random = Random(3);
     for _ in 0..200 {
         folder.put("t.png", damage(&image, &mut random));

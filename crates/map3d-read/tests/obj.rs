@@ -1,8 +1,6 @@
 //! OBJ and MTL statements, encodings and degenerate cases.
 
-mod documents;
-
-use documents::{Folder, ParsedDocument, is_format_error, is_limit_error, read_with};
+use crate::documents::{Folder, ParsedDocument, is_format_error, is_limit_error, read_with};
 use map3d_base::asset::Wrap;
 use map3d_base::vec3::triangle_normal;
 use map3d_read::{Format, ReadOptions, Split, Up};

@@ -1,8 +1,6 @@
 //! Implicit geometry: prototypes and placements.
 
-mod documents;
-
-use documents::{Folder, ParsedDocument, is_limit_error, read_with};
+use crate::documents::{Folder, ParsedDocument, is_limit_error, read_with};
 use map3d_read::{Format, ReadOptions, open};
 
 fn tree(id: &str, matrix: &str, geometry: &str, reference: &str) -> String {

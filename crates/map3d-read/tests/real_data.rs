@@ -1,11 +1,9 @@
 //! Real documents from `MAP3D_DATA`, a folder of data sets: nothing panics or hangs, and counts match the sources.
 
-mod documents;
-
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use documents::{Folder, ParsedDocument, read_with};
+use crate::documents::{Folder, ParsedDocument, read_with};
 use map3d_base::asset::{AssetMesh, AssetWriter};
 use map3d_read::{Format, ReadOptions, detect_format, open, write_tables};
 

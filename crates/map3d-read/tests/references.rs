@@ -1,11 +1,9 @@
 //! References between the files of a folder: geometry, prototypes and appearances.
 
-mod documents;
-
 use std::fs;
 use std::path::Path;
 
-use documents::{Folder, ParsedDocument, is_format_error, read_with};
+use crate::documents::{Folder, ParsedDocument, is_format_error, read_with};
 use map3d_read::{Format, ReadOptions};
 
 fn read(path: &Path, options: &ReadOptions) -> ParsedDocument {

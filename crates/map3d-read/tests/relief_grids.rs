@@ -1,10 +1,8 @@
 //! Laws of RasterReliefs: heights in the document are triangles at the grid's points; a raster file is handed on with its place; nothing is lost
 //! without a word.
 
-mod documents;
-
-use documents::Folder;
-use documents::city_model::{model, read_text, try_text};
+use crate::documents::Folder;
+use crate::documents::city_model::{model, read_text, try_text};
 use map3d_read::{Format, ReadOptions, open};
 
 const DOMAIN: &str = "<gml:limits><gml:GridEnvelope><gml:low>0 0</gml:low><gml:high>2 1</gml:high></gml:GridEnvelope></gml:limits>\

@@ -1,9 +1,7 @@
 //! Laws of `gml:Tin`: one without triangles is the Delaunay triangulation of its control points; one with triangles is what it says.
 
-mod documents;
-
-use documents::city_model::{model, read_text, try_text};
-use documents::is_limit_error;
+use crate::documents::city_model::{model, read_text, try_text};
+use crate::documents::is_limit_error;
 use map3d_read::ReadOptions;
 
 const CORNERS: &str = "0 0 0 10 0 1 10 10 2 0 10 3";

@@ -1,9 +1,7 @@
 //! Files that write opacity where the format wants transparency: decided for the whole file, and said.
 
-mod documents;
-
-use documents::city_model::{at_lod, building, square, try_text};
-use documents::{Folder, ParsedDocument, read_with};
+use crate::documents::city_model::{at_lod, building, square, try_text};
+use crate::documents::{Folder, ParsedDocument, read_with};
 use map3d_read::{Format, ReadOptions, Transparency};
 
 /// Reads a building with two squares; `values`: the transparency of their materials, empty for none.

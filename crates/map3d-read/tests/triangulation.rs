@@ -1,10 +1,8 @@
 //! Laws of triangulation: the triangles cover the polygon in any plane and keep its orientation.
 
-mod documents;
-
 use std::f64::consts::TAU;
 
-use documents::random::Random;
+use crate::documents::random::Random;
 use map3d_base::Vec3;
 use map3d_base::vec3::{add, cross, dot, normalized, scale, triangle_normal};
 use map3d_read::{Coverage, PolygonError, Triangulator};

@@ -1,9 +1,8 @@
 //! Blocks: pixels do not depend on tiling, reduction does not depend on blocks, bytes do not depend on threads.
 
-mod town;
-
 use std::collections::BTreeMap;
 
+use crate::town::{TempFolder, Town, all_layers, bricks, frame, new_folder};
 use map3d_base::asset::Wrap;
 use map3d_base::tile::Tile;
 use map3d_base::{Frame, LayerFormat, LayerKind};
@@ -11,7 +10,6 @@ use map3d_image::GBuffer;
 use map3d_image::encode::{bytes_from_u32, decode_png};
 use map3d_image::seam::read_seam;
 use map3d_render::{Block, RenderScene, TileRenderer, reduce_block};
-use town::{TempFolder, Town, all_layers, bricks, frame, new_folder};
 
 fn scene(name: &str) -> (TempFolder, RenderScene) {
     let mut town = Town::default();

@@ -1,15 +1,13 @@
 //! Cut-outs by the alpha of a texture against brute force, which filters the same alpha in float64.
 
-mod town;
-
+use crate::town::reference::comparison::{BeamComparison, HoleState};
+use crate::town::reference::{ReferenceTriangle, TexturePoint};
+use crate::town::scenes::RANKS;
+use crate::town::{Town, frame, new_folder};
 use map3d_base::Vec3;
 use map3d_base::asset::Wrap;
 use map3d_image::Raster;
 use map3d_render::TextureCutout;
-use town::reference::comparison::{BeamComparison, HoleState};
-use town::reference::{ReferenceTriangle, TexturePoint};
-use town::scenes::RANKS;
-use town::{Town, frame, new_folder};
 
 const SIDE: i64 = 64;
 /// Side of a chequer cell in texels.
@@ -73,7 +71,7 @@ fn screens(wrap: Wrap, [least, most]: [f64; 2]) -> Town {
     let mut town = Town::default();
     let (grey, cut) = (town.flat([0.6; 3]), town.textured(chequer(), wrap));
     town.panel([[-30.0, -30.0, -9.0], [30.0, -30.0, -9.0], [30.0, 30.0, -9.0], [-30.0, 30.0, -9.0]], [[0.0; 2]; 4], grey, 0);
-    let mut random = town::scenes::Lcg(17);
+    let mut random = crate::town::scenes::Lcg(17);
     for k in 1..14u32 {
         let (at, size, repeats) = (random.point(7.0), random.between(5.0, 9.0), random.between(least, most));
         let (a, b) = (random.point(1.0), random.point(1.0));

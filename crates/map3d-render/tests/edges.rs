@@ -1,12 +1,10 @@
 //! Edges of textures that end there (`Wrap::None`, `Wrap::Border`): at coordinates within [0,1], no pixel takes in a colour from outside the image.
 
-mod town;
-
+use crate::town::{Town, frame, new_folder};
 use map3d_base::asset::Wrap;
 use map3d_image::srgb::LINEAR16;
 use map3d_image::{GBuffer, Raster};
 use map3d_render::TileRenderer;
-use town::{Town, frame, new_folder};
 
 const SIDE: usize = 64;
 /// Brightest byte of both textures; the colours outside them are much brighter.

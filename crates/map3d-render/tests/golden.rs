@@ -1,27 +1,24 @@
-//! Golden pictures: tiny scenes are compared to the last bit. After an intended change, `MAP3D_BLESS=1 cargo test -p map3d-render --test golden` stores the
+//! Golden pictures: tiny scenes are compared to the last bit. After an intended change, `MAP3D_BLESS=1 cargo test -p map3d-render --test all golden` stores the
 //! new pictures; check them and give the reason in the commit.
 //!
 //! `golden/<scene>-<look at>-<pitch>.png` has four quarters of 128 × 128 pixels from the middle of a tile: colours and normals as sent; below them ids
 //! (a colour per id) and depths (red in steps of 1/4 m, green of 2^-10 m). `golden/digests.txt` has a checksum of all bits of each G-buffer.
 //! `golden/camera-<scene>-<view>.png` shows the same of views that no pyramid has.
 
-#[path = "golden/cameras.rs"]
 mod cameras;
-#[path = "golden/pictures.rs"]
 mod pictures;
-mod town;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use cameras::CAMERAS;
+use self::cameras::CAMERAS;
+use self::pictures::PICTURES;
+use crate::town::{frame, new_folder};
 use map3d_base::file::checksum;
 use map3d_base::{DEPTH_NOTHING, DEPTH_UNITS_PER_M, Frame, Isa};
 use map3d_image::encode::{Deflate, Filter, bytes_from_normals, color_from_linear, decode_png, encode_png};
 use map3d_image::{GBuffer, Raster};
 use map3d_render::{RenderScene, TileRenderer, ViewImage};
-use pictures::PICTURES;
-use town::{frame, new_folder};
 
 const SIDE: usize = 128;
 const QUARTERS: [&str; 4] = ["colour", "normal", "id", "depth"];
@@ -220,7 +217,7 @@ fn tiny_scenes_match_their_golden_pictures() {
     failures.extend(golden_pictures().into_iter().filter(|n| !rendered.contains_key(n)).map(|n| format!("{n}: golden picture without a scene")));
     assert!(
         failures.is_empty(),
-        "\n{}\nIf the change is intended: MAP3D_BLESS=1 cargo test -p map3d-render --test golden, then check the pictures.",
+        "\n{}\nIf the change is intended: MAP3D_BLESS=1 cargo test -p map3d-render --test all golden, then check the pictures.",
         failures.join("\n")
     );
 }

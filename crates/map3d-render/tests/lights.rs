@@ -1,12 +1,10 @@
 //! Suns, ambient occlusion, second surfaces and pictures (spec/pyramid.md §10): against single rays, and laws of their own.
 
-mod town;
-
+use crate::town::{TempFolder, Town, frame, new_folder, waves};
 use map3d_base::vec3::{dot, normalized, scale};
 use map3d_base::{DEPTH_NOTHING, DEPTH_UNITS_PER_M, Frame, Isa, LayerFormat, LayerKind, LayerSpec, RAY_LIFT_M, Vec3, vec3};
 use map3d_image::{Arrays, GBuffer};
 use map3d_render::{RenderScene, TileRenderer};
-use town::{TempFolder, Town, frame, new_folder, waves};
 
 const AFTERNOON: Vec3 = [0.6, -0.48, 0.64];
 const RADIUS_M: f64 = 12.0;

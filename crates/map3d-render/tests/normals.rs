@@ -1,15 +1,13 @@
 //! Normals of instances against the inverse transpose in float64, within the rounding of int16 (spec/pyramid.md §5).
 
-mod town;
-
 use std::f64::consts::{PI, TAU};
 
+use crate::town::reference::{ReferenceTriangle, ReferenceView};
+use crate::town::scenes::Lcg;
+use crate::town::{SoupFace, Town, frame, new_folder};
 use map3d_base::Vec3;
 use map3d_base::asset::Instance;
 use map3d_base::vec3::{cross, dot, normalized, scale, triangle_normal};
-use town::reference::{ReferenceTriangle, ReferenceView};
-use town::scenes::Lcg;
-use town::{SoupFace, Town, frame, new_folder};
 
 /// Returns a hemisphere, open below, with the normals of a sphere; every second face has the opposite winding.
 fn hemisphere() -> Vec<SoupFace> {

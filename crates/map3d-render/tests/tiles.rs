@@ -1,13 +1,11 @@
 //! Base tiles against the reference renderer.
 
-mod town;
-
+use crate::town::reference_renderer::{ReferenceRenderer, SampleHit};
+use crate::town::{Town, bricks, frame, new_folder, waves};
 use map3d_base::asset::{Rank, Wrap};
 use map3d_base::{DEPTH_NOTHING, Frame};
 use map3d_image::srgb::BYTE;
 use map3d_image::{GBuffer, Raster};
-use town::reference_renderer::{ReferenceRenderer, SampleHit};
-use town::{Town, bricks, frame, new_folder, waves};
 
 const VIEWS: [(f64, f64); 5] = [(0.0, 45.0), (45.0, 22.5), (117.3, 10.0), (200.0, 90.0), (290.0, 60.0)];
 

@@ -1,8 +1,6 @@
 //! Builds convert assets to chunks; the same assets give the same bytes.
 
-mod fixture;
-
-use fixture::{Face, batch, bytes_of, new_folder, request, run, tent, tent_grid, world, write_asset, write_faces};
+use crate::fixture::{Face, batch, bytes_of, new_folder, request, run, tent, tent_grid, world, write_asset, write_faces};
 use map3d_base::Error;
 use map3d_base::asset::{Instance, Material, Materials, Rank};
 use map3d_scene::builder::{BuildOptions, BuildRequest, GroundPlane, build_scene};

@@ -1,11 +1,9 @@
 //! A build after a change reads only what changed and gives the same bytes as a build from scratch.
 
-mod fixture;
-
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use fixture::{Face, Folder, batch, bytes_of, new_folder, request, run, tent, write_asset};
+use crate::fixture::{Face, Folder, batch, bytes_of, new_folder, request, run, tent, write_asset};
 use map3d_base::asset::{Instance, Material, Materials, Rank};
 use map3d_image::encode::{Deflate, Filter, encode_png};
 use map3d_scene::SceneStore;

@@ -1,11 +1,8 @@
 //! Samples of textures: wrap modes, borders, alpha, and the exact integral.
 
-#[path = "../../map3d-image/tests/common.rs"]
-mod common;
-
 use std::sync::Arc;
 
-use common::{Random, noise};
+use crate::common::{Random, noise};
 use map3d_base::Isa;
 use map3d_base::asset::Wrap;
 use map3d_base::samples::SAMPLES;

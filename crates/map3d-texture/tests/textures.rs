@@ -1,13 +1,10 @@
 //! Usage masks, filling, mips, texture files, the build and the cache.
 
-#[path = "../../map3d-image/tests/common.rs"]
-mod common;
-
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use common::{Random, folder, noise, png};
+use crate::common::{Random, folder, noise, png};
 use map3d_base::asset::{AssetMesh, AssetReport, AssetWriter, Batch, Material, Materials, Rank, Wrap};
 use map3d_image::{ImageLimits, PixelMask, Raster, fill_unmarked};
 use map3d_texture::{

@@ -1,14 +1,11 @@
 //! Beams against brute force: each sample of each pixel against all triangles.
 
-mod reference;
-mod scenes;
-
+use crate::reference::ReferenceView;
+use crate::reference::comparison::{BeamComparison, HoleState, SampleCounts};
+use crate::scenes::{Lcg, RANKS, Soup, SoupFace, build, frame, mixed_soup, new_folder};
 use map3d_base::Frame;
 use map3d_scene::SceneStore;
 use map3d_trace::{BeamTracer, IgnoreCutouts, Isa, Pixel, SUBTILE_PX};
-use reference::ReferenceView;
-use reference::comparison::{BeamComparison, HoleState, SampleCounts};
-use scenes::{Lcg, RANKS, Soup, SoupFace, build, frame, mixed_soup, new_folder};
 
 fn compare(store: &SceneStore, frame: &Frame) -> SampleCounts {
     BeamComparison { store, frame, cutout: &IgnoreCutouts, hole_state: &|_, _| HoleState::Covered }.run()

@@ -1,11 +1,11 @@
 //! Cut-outs against brute force, which evaluates the same holes in float64.
 
-mod reference;
-mod scenes;
-
 use std::cell::RefCell;
 use std::f64::consts::TAU;
 
+use crate::reference::comparison::{BeamComparison, HoleState, SampleCounts};
+use crate::reference::{ReferenceTriangle, ReferenceView, TexturePoint};
+use crate::scenes::{Lcg, RANKS, Soup, SoupFace, build, frame, mixed_soup, new_folder};
 use map3d_base::asset::{Instance, Material, Rank};
 use map3d_base::vec3::{add, scale, sub};
 use map3d_base::{Frame, Vec3};
@@ -14,9 +14,6 @@ use map3d_scene::{MaterialRecord, SceneStore};
 use map3d_trace::{
     Affine, BeamTracer, Cutout, CutoutMask, CutoutSample, IgnoreCutouts, Isa, PACKET_SIZE, PacketOrigins, Ray, Rays, SUBTILE_PX, SceneRegion,
 };
-use reference::comparison::{BeamComparison, HoleState, SampleCounts};
-use reference::{ReferenceTriangle, ReferenceView, TexturePoint};
-use scenes::{Lcg, RANKS, Soup, SoupFace, build, frame, mixed_soup, new_folder};
 
 const CHEQUERED: u32 = 1;
 const DOTTED: u32 = 2;

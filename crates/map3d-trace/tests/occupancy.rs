@@ -1,15 +1,13 @@
 //! Occupancy holds every tile with content; a block's key changes if and only if its content does.
 
-mod scenes;
-
 use std::collections::HashSet;
 
+use crate::scenes::{Lcg, Soup, build, frame, new_folder, open, rebuild};
 use map3d_base::Frame;
 use map3d_base::asset::Rank;
 use map3d_base::tile::morton;
 use map3d_scene::SceneStore;
 use map3d_trace::{BeamTracer, IgnoreCutouts, SUBTILE_PX, block_keys, occupied, occupied_within};
-use scenes::{Lcg, Soup, build, frame, new_folder, open, rebuild};
 
 fn houses(seed: u64) -> Soup {
     let mut dice = Lcg(seed);

@@ -1,14 +1,12 @@
 //! Ray packets against single rays, and laws of their own.
 
-mod scenes;
-
+use crate::scenes::closed::{as_prototypes, box_mesh, soup_from, sphere_mesh};
+use crate::scenes::{Lcg, Soup, build, mixed_soup, new_folder};
 use map3d_base::asset::Rank;
 use map3d_base::vec3::{add, normalized, scale, sub};
 use map3d_base::{Vec3, vec3};
 use map3d_scene::SceneStore;
 use map3d_trace::{AmbientOcclusion, IgnoreCutouts, Isa, PACKET_SIZE, PacketOrigins, Ray, Rays, SceneRegion};
-use scenes::closed::{as_prototypes, box_mesh, soup_from, sphere_mesh};
-use scenes::{Lcg, Soup, build, mixed_soup, new_folder};
 
 fn direction(random: &mut Lcg) -> Vec3 {
     loop {

@@ -1,14 +1,12 @@
 //! Shared edges have neither cracks nor double hits, also across chunks and instances.
 
-mod scenes;
-
+use crate::scenes::closed::{as_prototypes, box_mesh, soup_from, sphere_mesh};
+use crate::scenes::{Lcg, Soup, build, frame, new_folder};
 use map3d_base::ViewAxes;
 use map3d_base::asset::Rank;
 use map3d_base::vec3::{normalized, scale};
 use map3d_scene::SceneStore;
 use map3d_trace::{BeamTracer, IgnoreCutouts, NOTHING, Pixel, Ray, Rays, SUBTILE_PX};
-use scenes::closed::{as_prototypes, box_mesh, soup_from, sphere_mesh};
-use scenes::{Lcg, Soup, build, frame, new_folder};
 
 /// Returns look-at angles and pitches: along axes and diagonals, straight down, steep and grazing; then random ones.
 fn directions(random: &mut Lcg) -> Vec<(f64, f64)> {
@@ -129,7 +127,7 @@ fn rays_agree_with_beams_away_from_edges() {
             let e = random.point(7.0);
             [at[0] + e[0], at[1] + e[1], at[2] + e[2]]
         };
-        soup.add([corner(&mut random), corner(&mut random), corner(&mut random)], k, scenes::RANKS[k as usize % 6]);
+        soup.add([corner(&mut random), corner(&mut random), corner(&mut random)], k, crate::scenes::RANKS[k as usize % 6]);
     }
     let folder = new_folder("agree");
     let store = build(&folder, &soup);

@@ -1,5 +1,4 @@
 //! Writes documents to temporary folders and reads them completely.
-#![allow(dead_code)]
 
 pub mod city_model;
 pub mod random;

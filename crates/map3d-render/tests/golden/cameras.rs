@@ -4,8 +4,8 @@ use map3d_base::vec3::{cross, normalized};
 use map3d_base::{Camera, CameraKind, Isa, LayerFormat, LayerKind, LayerSpec, Vec3, ViewAxes, Window};
 use map3d_render::{RenderScene, ViewImage, ViewRequest};
 
-use crate::SIDE;
-use crate::pictures::{atlas_cube, balls, brick_court, gabled_house, signs, trees};
+use super::SIDE;
+use super::pictures::{atlas_cube, balls, brick_court, gabled_house, signs, trees};
 use crate::town::Town;
 
 pub struct GoldenCamera {

@@ -1,5 +1,4 @@
 //! Small scenes with materials and textures, built by the same code as real ones, and a brute-force renderer in float64.
-#![allow(dead_code)]
 
 #[path = "../../../map3d-trace/tests/reference/mod.rs"]
 pub mod reference;

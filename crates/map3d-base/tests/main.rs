@@ -1,0 +1,5 @@
+//! All tests of assets, limits and test vectors in one program, which is linked once.
+
+mod asset;
+mod limits;
+mod vectors;
