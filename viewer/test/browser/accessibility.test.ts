@@ -12,7 +12,7 @@ const bed = new TestBed({ town: renderTown(256, 0.38) });
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const DEVICES = {
   desk: { viewport: { width: 1280, height: 800 } },
-  phone: { viewport: { width: 390, height: 844 }, deviceScaleFactor: 3, isMobile: true, hasTouch: true },
+  phone: { viewport: { width: 390, height: 844 }, deviceScaleFactor: 1, isMobile: true, hasTouch: true },
 };
 
 /** The violations of WCAG 2 A and AA that axe-core finds: the rule, and the elements. */

@@ -163,7 +163,7 @@ test("full storage, a missing worker and an unreachable host are errors", async 
   await page.context().close();
 });
 
-const PHONE = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 3, isMobile: true, hasTouch: true, userAgent: devices["iPhone 14"].userAgent };
+const PHONE = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 2, isMobile: true, hasTouch: true, userAgent: devices["iPhone 14"].userAgent };
 const rows: [string, BrowserContextOptions][] = [["desk", { viewport: { width: 1280, height: 800 } }], ["phone", { ...PHONE, locale: "de-DE" }], ["dark", { ...PHONE, colorScheme: "dark", locale: "fr-FR" }]];
 
 test.each(rows)("the page saves itself and the view for offline use: %s", async (name, options) => {

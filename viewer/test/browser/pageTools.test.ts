@@ -7,7 +7,7 @@ import { OUT } from "./browser";
 
 // The page's tools, light and layout.
 const bed = new TestBed({ town: renderTown(256, 0.38) });
-const PHONE = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 3, isMobile: true, hasTouch: true, userAgent: devices["iPhone 14"].userAgent };
+const PHONE = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 2, isMobile: true, hasTouch: true, userAgent: devices["iPhone 14"].userAgent };
 const DESK = { viewport: { width: 1280, height: 800 } };
 
 /** The page with the town, at rest. */

@@ -116,7 +116,7 @@ test("an overlay is drawn over the map and below the texts, in CSS pixels of the
 });
 
 const DESK = { viewport: { width: 1280, height: 800 } };
-const PHONE = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 3, isMobile: true, hasTouch: true };
+const PHONE = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 2, isMobile: true, hasTouch: true };
 
 test.each([["desk", DESK], ["phone", PHONE]] as const)("%s: the page saves and prints the view with title, legend and attribution", async (name, options) => {
   const { page, problems } = await bed.openPage({ ...options, acceptDownloads: true });
