@@ -70,13 +70,13 @@ test: test-rust test-python test-viewer test-wheel test-browser ## run all tests
 test-rust:
 	cargo test --workspace --locked --exclude map3d-py --lib --tests -q
 
-# Folders of tests that run two at a time, a file on one worker. The others count processes, kill them or need the machine for themselves.
-TWO := ingest library odd_cities operations portrayal publish registry renderings tile_services tiles uploads web
+# Tests that count processes, kill them or need the machine for themselves. The others run two at a time, a file on one worker.
+ALONE := bench faults jobs subprocess test_process_identity.py
 PLAIN := not browser and not slow and not wheel
 
 test-python: build mongo-server
-	$(BIN)/python -m pytest -q -m "$(PLAIN)" -n 2 --dist loadfile $(TWO:%=tests/%)
-	$(BIN)/python -m pytest -q -m "$(PLAIN)" $(TWO:%=--ignore=tests/%)
+	$(BIN)/python -m pytest -q -m "$(PLAIN)" -n 2 --dist loadfile $(ALONE:%=--ignore=tests/%)
+	$(BIN)/python -m pytest -q -m "$(PLAIN)" $(ALONE:%=tests/%)
 
 MONGO := tests/catalogue/mongo_server
 mongo-server: | $(CACHE) # fetch and compile the server of the MongoDB tests, which are skipped without it
