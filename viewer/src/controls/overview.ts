@@ -81,7 +81,7 @@ export class overview extends MapLayer<map, object> {
     const shown = this.map;
     if (!shown?.getViewState() || this.#small || !this.open) return;
     const box = this.#pane.appendChild(element("div", ""));
-    const small = new map(box, { controls: false, attribution: false, direction: shown.direction, light: shown.light, cacheBytes: 16e6, workers: 1, maxPixelRatio: 2, ...(shown.drawer && { drawer: shown.drawer }) });
+    const small = new map(box, { controls: false, attribution: false, direction: shown.direction, light: shown.light, cacheBytes: 16e6, workers: 1, ...(shown.drawer && { drawer: shown.drawer }) });
     [box.inert, box.tabIndex] = [true, -1];
     this.#pane.append(this.#pad);
     this.#small = small;

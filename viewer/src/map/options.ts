@@ -42,7 +42,7 @@ export interface MapOptions {
   concurrency?: number;
   /** Number of decoding threads. Default 2. */
   workers?: number;
-  /** Upper limit of device pixels per CSS pixel. Default 3. */
+  /** Upper limit of device pixels per CSS pixel. Default 2, as many as tiles have (`maxTileRatio`): on denser screens, the browser enlarges the picture, which spares more than half of the work and memory for pixels. */
   maxPixelRatio?: number;
   /** Upper limit of tile pixels per CSS pixel: finer tiles cost bytes that few can see. Default 2, so that a tile pixel covers half a CSS pixel to a whole one on screens of any density from 2 on. */
   maxTileRatio?: number;
@@ -72,7 +72,7 @@ export const DEFAULTS: Required<Omit<MapOptions, WithoutDefault>> = {
   hover: false,
   concurrency: 12,
   workers: 2,
-  maxPixelRatio: 3,
+  maxPixelRatio: 2,
   maxTileRatio: 2,
   drawer: "auto",
   preserveDrawingBuffer: false,

@@ -48,7 +48,7 @@ function differenceOf(a: Buffer, b: Buffer): Difference {
 async function both(name: string, options: object = {}, layer: object = {}, deviceScaleFactor = 1): Promise<{ pages: Page[]; close: () => Promise<void> }> {
   const pages: Page[] = [];
   for (const drawer of ["webgl", "canvas"]) {
-    const { page, problems } = await bed.start(name, { zoom: 3, drawer, ...options }, layer, { deviceScaleFactor, viewport: VIEWPORT });
+    const { page, problems } = await bed.start(name, { zoom: 3, drawer, maxPixelRatio: deviceScaleFactor, ...options }, layer, { deviceScaleFactor, viewport: VIEWPORT });
     expect(problems).toEqual([]);
     expect(await page.evaluate(() => (globalThis as Global).map.drawer)).toBe(drawer);
     pages.push(page);
@@ -126,7 +126,7 @@ describe("at fractional zooms", () => {
   });
 
   test.each([[4, 1, 2.4], [3.37, 1, 3.4], [2.5, 1, 6.2], [2.71, 2, 4], [3.9, 3, 2]])("at zoom %d and pixel ratio %i no seam is visible between tiles", async (zoom, dpr, most) => {
-    const { page } = await bed.start("ramp", { zoom, light: { lit: false }, drawer: "canvas" }, {}, { deviceScaleFactor: dpr });
+    const { page } = await bed.start("ramp", { zoom, light: { lit: false }, drawer: "canvas", maxPixelRatio: dpr }, {}, { deviceScaleFactor: dpr });
     const got = await picture(page);
     const width = 800 * dpr;
     let steepest = 0;

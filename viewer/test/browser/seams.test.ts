@@ -58,7 +58,7 @@ async function errorsAt(page: Page, way: Way, dpr: number, zoom: number, middle:
   return compareTo(levels[level] as (typeof levels)[0], { left: x * dpr, top: y * dpr, px: dpr * 2 ** (zoom - level) }, await seen(page, way), VIEWPORT.width * dpr);
 }
 
-const start = (way: Way, dpr: number): ReturnType<TestBed["start"]> => bed.start("speckled", { ...WAYS[way], light: { lit: false }, controls: false, attribution: false }, {}, { viewport: VIEWPORT, deviceScaleFactor: dpr });
+const start = (way: Way, dpr: number): ReturnType<TestBed["start"]> => bed.start("speckled", { ...WAYS[way], light: { lit: false }, maxPixelRatio: dpr, controls: false, attribution: false }, {}, { viewport: VIEWPORT, deviceScaleFactor: dpr });
 
 /** Tolerance of a premultiplied byte: rounding and the shader's snapping to pixels; the canvas interpolates bytes, with low-precision weights. */
 const TOLERANCE = { webgl: 1.5, canvas: 4, css: 4 } as const satisfies Record<Way, number>;
