@@ -38,3 +38,21 @@ test("the upper edges of a diamond fade", () => {
   const haze = computeHaze(grid((x, y) => Math.abs(x - 32) + Math.abs(y - 32) < 24), SIDE) ?? new Uint8ClampedArray();
   for (const x of [18, 22, 42, 46]) expect(haze[(32 - 23 + Math.abs(x - 32)) * SIDE + x]).toBe(255);
 });
+
+test("a corner that is higher than the rest of the upper edge fades, and so does the side below it", () => {
+  const haze = computeHaze(grid((x, y) => x >= 8 && x < 56 && y >= (x < 13 ? 8 : 9) && y < 56), SIDE) ?? new Uint8ClampedArray();
+  for (let y = 8; y < 56; y++) expect(haze[y * SIDE + 8]).toBe(255);
+  for (let x = 8; x < 56; x++) expect(haze[9 * SIDE + x]).toBeGreaterThan(150);
+});
+
+test("the upper corner of a diamond fades", () => {
+  const haze = computeHaze(grid((x, y) => Math.abs(x - 32) + Math.abs(y - 32) < 24), SIDE) ?? new Uint8ClampedArray();
+  expect(haze[9 * SIDE + 32]).toBe(255);
+  expect(haze[12 * SIDE + 32]).toBeGreaterThan(0);
+});
+
+test("a tower at a corner has no haze, but the side below it fades", () => {
+  const haze = computeHaze(grid((x, y) => x >= 8 && x < 56 && y >= (x < 12 ? 10 : 24) && y < 56), SIDE) ?? new Uint8ClampedArray();
+  expect(haze[14 * SIDE + 10]).toBe(0);
+  expect(haze[48 * SIDE + 8]).toBe(255);
+});
