@@ -2,8 +2,8 @@
 const [WIDTH, MAX_WIDTH] = [0.22, 0.05];
 /** Content that is narrower than this share of the side, such as buildings without ground, has no haze. */
 const NARROW = 0.05;
-/** The sides of a tower are steeper than this, and it rises above the edge by at least some pixels. */
-const [MAX_SLOPE, MIN_RISE] = [1, 2];
+/** Pixels from one column to the next that make the side of a tower. */
+const MIN_RISE = 3;
 
 /** Computes the opacity of the haze (0 to 255): full outside the content and at its edge, none far inside. Holes in the content and towers that rise above its edge have no haze. @param inside 1 for content, row by row; changed  @returns null where all content is narrow */
 export function computeHaze(inside: Uint8Array, side: number): Uint8ClampedArray | null {
@@ -20,18 +20,22 @@ export function computeHaze(inside: Uint8Array, side: number): Uint8ClampedArray
   return haze;
 }
 
-/** Clears the haze over towers: what rises steeply above the upper edge of the content and is narrower than `window` pixels, with the edge at its foot and a pixel on each side. */
+/** Clears the haze over towers: what rises steeply above the upper edge of the content and is narrower than `window` pixels, with the edge at its foot and a pixel on each side. Corners are no towers: at most one of their sides is steep. */
 function clearTowers(haze: Uint8ClampedArray, outside: Uint8Array, side: number, window: number): void {
   const columns = Array.from({ length: side }, (_, x) => x);
   const tops = columns.map((x) => columns.find((y) => outside[y * side + x] === 0) ?? side);
-  const steps = Array.from({ length: window }, (_, k) => k);
-  // The upper edge without towers: in one of the windows around a column, no top is higher (a morphological opening). Slopes, such as those to the corner of a square, are no towers.
-  const edges = columns.map((x) => Math.min(...steps.map((k) => Math.max(...steps.map((n) => (tops[x - k + n] ?? side) - MAX_SLOPE * Math.abs(n - k))))));
+  const topAt = (x: number): number => tops[x] ?? side;
   const cleared = haze.slice();
   for (const x of columns) {
-    const [top, edge] = [tops[x] ?? side, edges[x] ?? 0];
-    if (top > edge - MIN_RISE) continue;
-    for (let y = top; y < edge + window && (haze[y * side + x] ?? 0) > 0; y++) for (const near of [x - 1, x, x + 1]) if (near >= 0 && near < side) cleared[y * side + near] = 0;
+    // The nearest columns on both sides that are clearly lower.
+    const [left, right] = [-1, 1].map((step) => {
+      let at = x + step;
+      while (Math.abs(at - x) < window && topAt(at) < topAt(x) + MIN_RISE) at += step;
+      return topAt(at) - topAt(at - step) < MIN_RISE ? null : at;
+    }) as [number | null, number | null];
+    if (left === null || right === null || right - left > window) continue;
+    const edge = Math.min(topAt(left), topAt(right));
+    for (let y = topAt(x); y < edge + window && (haze[y * side + x] ?? 0) > 0; y++) for (const near of [x - 1, x, x + 1]) if (near >= 0 && near < side) cleared[y * side + near] = 0;
   }
   haze.set(cleared);
 }

@@ -56,3 +56,11 @@ test("a tower at a corner has no haze, but the side below it fades", () => {
   expect(haze[14 * SIDE + 10]).toBe(0);
   expect(haze[48 * SIDE + 8]).toBe(255);
 });
+
+test("a broad low tower with a spire on one side has no haze", () => {
+  const low = (x: number, y: number): boolean => x >= 4 && x < 60 && y >= 24 && y < 60;
+  const tower = (x: number, y: number): boolean => (x >= 40 && x < 46 && y >= 19 && y < 30) || (x >= 41 && x < 43 && y >= 10 && y < 30);
+  const haze = computeHaze(grid((x, y) => low(x, y) || tower(x, y)), SIDE) ?? new Uint8ClampedArray();
+  for (let x = 40; x < 46; x++) for (let y = 19; y < 26; y++) expect(haze[y * SIDE + x], `${String(x)}, ${String(y)}`).toBe(0);
+  expect([haze[12 * SIDE + 41], haze[24 * SIDE + 30], haze[24 * SIDE + 52]]).toEqual([0, 255, 255]);
+});
