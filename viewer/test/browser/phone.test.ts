@@ -62,9 +62,9 @@ test.each(["webgl", "canvas"])("%s: on a slow phone the map opens; fingers drag,
     g.map.on("click", (event) => g.clicks.push(event)).once("idle", () => { done(); });
   }), [bed.url("town"), drawer] as const);
   const hand = new Hand(page, session);
-  expect(await page.evaluate(() => [(globalThis as Global).map.drawer, (globalThis as Global).map.canvas.width, (globalThis as Global).map.canvas.height])).toEqual([drawer, 1170, 2532]);
+  expect(await page.evaluate(() => [(globalThis as Global).map.drawer, (globalThis as Global).map.canvas.width, (globalThis as Global).map.canvas.height])).toEqual([drawer, 780, 1688]);
   const shown = await picture(page);
-  expect(shown.filter((value, k) => k % 4 === 3 && value === 255).length / (1170 * 2532)).toBeGreaterThan(0.15);
+  expect(shown.filter((value, k) => k % 4 === 3 && value === 255).length / (780 * 1688)).toBeGreaterThan(0.15);
   await page.screenshot({ path: `${OUT}/phone-${drawer}.png` });
 
   // A drag that rests before the finger is lifted: the ground stays under it.
