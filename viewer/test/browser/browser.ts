@@ -7,7 +7,7 @@ mkdirSync(OUT, { recursive: true });
 
 /** Opens Chromium with software WebGL2. Path: CHROMIUM, else Debian's. @param env additional environment variables */
 export async function openBrowser(env: Record<string, string> = {}): Promise<Browser> {
-  const args = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-gpu-rasterization"];
+  const args = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"];
   return chromium.launch({ executablePath: process.env["CHROMIUM"] ?? "/usr/bin/chromium", headless: true, args, env: { ...process.env, ...env } });
 }
 
