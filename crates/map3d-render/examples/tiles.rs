@@ -1,7 +1,7 @@
 //! Measures milliseconds per tile by stage and bytes per layer, on a built scene.
 //!
 //! `cargo run --release -p map3d-render --example tiles -- <scene folder> [--look-at 45] [--pitch 45] [--res 0.2] [--tiles 400] [--color webp|png|jpeg]
-//! [--layers color,normal,id,depth,sun,sun16,ao,depth2,picture] [--rounds 3] [--save folder]`. Times are CPU times of one thread. Prints the median and the fastest round.
+//! [--layers color,data,normal,id,depth,sun,sun16,ao,depth2,picture] [--rounds 3] [--save folder]`. Times are CPU times of one thread. Prints the median and the fastest round.
 
 use std::path::PathBuf;
 
@@ -24,13 +24,13 @@ fn main() {
         Some("jpeg") => LayerFormat::Jpeg,
         _ => LayerFormat::Webp,
     };
-    let quality = if color == LayerFormat::Jpeg { 85 } else { 80 };
+    let quality = 80;
     let f = pinned_frame(
         &scene.store().bounds(),
         number("--look-at", 45.0),
         number("--pitch", 45.0),
         number("--res", 0.2),
-        layers(&option("--layers").unwrap_or_else(|| "color,normal,id,depth".into()), color, quality),
+        layers(&option("--layers").unwrap_or_else(|| "color,data".into()), color, quality),
     );
     let tiles = middle_tiles(&scene, &f, number("--tiles", 400.0) as usize);
     println!("{} triangles, zmax {}, {} tiles, color {color:?} q{quality}", scene.store().triangle_count(), f.zmax, tiles.len());
@@ -61,6 +61,7 @@ fn layers(names: &str, color: LayerFormat, quality: u8) -> Vec<LayerSpec> {
     let afternoon = vec![[0.6, -0.48, 0.64]];
     let layer = |name: &str| match name {
         "color" => LayerSpec { quality, ..LayerSpec::new(LayerKind::Color, color) },
+        "data" => LayerSpec::new(LayerKind::Data, LayerFormat::M3d),
         "normal" => LayerSpec::new(LayerKind::Normal, LayerFormat::Png),
         "id" => LayerSpec::new(LayerKind::Id, LayerFormat::Png),
         "depth" => LayerSpec::new(LayerKind::Depth, LayerFormat::Png),
