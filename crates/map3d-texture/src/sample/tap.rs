@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::store::StripLayout;
+use crate::store::{STRIP_PITCH, StripLayout};
 
 /// Bits of a tap's position within a texel.
 pub const WEIGHT_BITS: u32 = 7;
@@ -65,10 +65,21 @@ pub struct TexelQuad {
 
 impl TexelQuad {
     pub const ZERO: Self = Self { upper: [[0; 4]; 2], lower: [[0; 4]; 2] };
+
+    /// Returns a texel of a level with its right and lower neighbours. Panics if the level does not have them.
+    #[inline(always)]
+    pub fn at(texels: &[[u8; 4]], texel: usize) -> Self {
+        let rows = &texels[texel..][..QUAD_REACH];
+        Self { upper: [rows[0], rows[1]], lower: [rows[STRIP_PITCH], rows[STRIP_PITCH + 1]] }
+    }
 }
+
+/// Texels from the upper left one of a tap to its lower right one, both included.
+const QUAD_REACH: usize = STRIP_PITCH + 2;
 
 /// Texels and weights of a batch of taps.
 #[derive(Clone, Copy)]
+#[repr(align(64))]
 pub struct ResolvedTaps {
     /// Numbers of the upper left texels.
     pub texel: [i32; BATCH],
@@ -85,6 +96,8 @@ pub trait TapAccumulator: Copy {
     fn new() -> Self;
     /// Adds a bilinear tap.
     fn add(&mut self, texels: TexelQuad, weights: BilinearWeights);
+    /// Adds resolved taps. Panics if one lies outside the level.
+    fn add_batch(&mut self, texels: &[[u8; 4]], taps: &ResolvedTaps);
     /// Adds the batch to the total; call it after every `BATCH` taps and at the end.
     fn flush(&mut self);
     fn channels(self) -> [u32; 4];
@@ -140,6 +153,13 @@ impl TapAccumulator for ScalarAccumulator {
     }
 
     #[inline(always)]
+    fn add_batch(&mut self, texels: &[[u8; 4]], taps: &ResolvedTaps) {
+        for k in 0..taps.count.min(BATCH) {
+            self.add(TexelQuad::at(texels, taps.texel[k] as usize), taps.weights[k]);
+        }
+    }
+
+    #[inline(always)]
     fn flush(&mut self) {
         for c in 0..4 {
             self.total[c] += (self.left[c] >> DROP) + (self.right[c] >> DROP);
@@ -170,7 +190,7 @@ pub use avx2::Avx2Accumulator;
 mod avx2 {
     use std::arch::x86_64::*;
 
-    use super::{BATCH, BilinearWeights, DROP, ResolvedTaps, TAP_POSITION_BITS, TapAccumulator, TexelQuad, WEIGHT_BITS, WEIGHT_ONE};
+    use super::{BATCH, BilinearWeights, DROP, QUAD_REACH, ResolvedTaps, TAP_POSITION_BITS, TapAccumulator, TexelQuad, WEIGHT_BITS, WEIGHT_ONE};
     use crate::store::{STRIP_BITS, STRIP_PITCH, StripLayout};
 
     /// Works in 256-bit registers. SAFETY, for every block here: needs AVX2; only functions of `Sampler` with that target feature name the type, and
@@ -180,6 +200,26 @@ mod avx2 {
         /// Channels 0 to 3 of the batch, for each the sum of the left and of the right texels.
         batch: __m256i,
         total: __m256i,
+    }
+
+    impl Avx2Accumulator {
+        /// Adds a bilinear tap: the upper texels four times, and the lower ones.
+        #[inline(always)]
+        fn add_rows(&mut self, upper: __m256i, lower: __m256i, weights: BilinearWeights) {
+            // SAFETY: see the type.
+            unsafe {
+                // 16-bit numbers: channel by channel the texels TL, BL, TR, BR.
+                let rows = _mm256_blend_epi32::<0b1100_1100>(upper, lower);
+                let q = _mm256_shuffle_epi8(
+                    rows,
+                    _mm256_setr_epi8(
+                        0, -1, 8, -1, 4, -1, 12, -1, 1, -1, 9, -1, 5, -1, 13, -1, 2, -1, 10, -1, 6, -1, 14, -1, 3, -1, 11, -1, 7, -1, 15, -1,
+                    ),
+                );
+                let linear = _mm256_srli_epi16::<1>(_mm256_mullo_epi16(q, q));
+                self.batch = _mm256_add_epi32(self.batch, _mm256_madd_epi16(linear, _mm256_set1_epi64x(bytemuck::cast(weights))));
+            }
+        }
     }
 
     impl TapAccumulator for Avx2Accumulator {
@@ -192,13 +232,28 @@ mod avx2 {
         #[inline(always)]
         fn add(&mut self, texels: TexelQuad, weights: BilinearWeights) {
             // SAFETY: see the type.
-            unsafe {
-                // Bytes: channel by channel the texels TL, BL, TR, BR.
-                let order = _mm_setr_epi8(0, 8, 4, 12, 1, 9, 5, 13, 2, 10, 6, 14, 3, 11, 7, 15);
-                let rows = _mm_set_epi64x(bytemuck::cast(texels.lower), bytemuck::cast(texels.upper));
-                let q = _mm256_cvtepu8_epi16(_mm_shuffle_epi8(rows, order));
-                let linear = _mm256_srli_epi16::<1>(_mm256_mullo_epi16(q, q));
-                self.batch = _mm256_add_epi32(self.batch, _mm256_madd_epi16(linear, _mm256_set1_epi64x(bytemuck::cast(weights))));
+            let [upper, lower] = [texels.upper, texels.lower].map(|pair| unsafe { _mm256_set1_epi64x(bytemuck::cast(pair)) });
+            self.add_rows(upper, lower, weights);
+        }
+
+        /// Compares all texels of the batch with the end of the level at once.
+        #[inline(always)]
+        fn add_batch(&mut self, texels: &[[u8; 4]], taps: &ResolvedTaps) {
+            let last = texels.len().checked_sub(QUAD_REACH).map_or(-1, |last| i32::try_from(last).unwrap_or(i32::MAX));
+            // SAFETY: see the type.
+            let are_inside = unsafe {
+                let at = _mm256_loadu_si256(taps.texel.as_ptr().cast());
+                let outside = _mm256_or_si256(_mm256_cmpgt_epi32(at, _mm256_set1_epi32(last)), at);
+                _mm256_movemask_ps(_mm256_castsi256_ps(outside)) == 0
+            };
+            assert!(are_inside, "a tap outside the level");
+            for k in 0..taps.count.min(BATCH) {
+                // SAFETY: see the type. All of `taps.texel` are at least 0 and at most `last`, so both pairs of texels lie in `texels`.
+                let [upper, lower] = unsafe {
+                    let texel = texels.as_ptr().add(taps.texel[k] as usize);
+                    [texel, texel.add(STRIP_PITCH)].map(|pair| _mm256_set1_epi64x(pair.cast::<i64>().read_unaligned()))
+                };
+                self.add_rows(upper, lower, taps.weights[k]);
             }
         }
 
@@ -305,6 +360,50 @@ mod tests {
         if is_x86_feature_detected!("avx2") {
             // SAFETY: checked above.
             unsafe { compare() }
+        }
+    }
+
+    #[test]
+    #[cfg(target_arch = "x86_64")]
+    fn vector_batches_equal_scalar_batches() {
+        #[target_feature(enable = "avx2")]
+        fn compare() {
+            let mut state = 3;
+            let texels: Vec<[u8; 4]> = (0..500).map(|_| [(); 4].map(|()| random(&mut state) as u8)).collect();
+            for count in 0..=BATCH {
+                let mut taps = ResolvedTaps { count, ..ResolvedTaps::NONE };
+                taps.texel = taps.texel.map(|_| (random(&mut state) % 466) as i32);
+                taps.texel[0] = 500 - QUAD_REACH as i32;
+                taps.weights = taps.weights.map(|_| bilinear_weights(random(&mut state) % WEIGHT_ONE, random(&mut state) % WEIGHT_ONE));
+                let (mut vector, mut scalar) = (Avx2Accumulator::new(), ScalarAccumulator::new());
+                vector.add_batch(&texels, &taps);
+                scalar.add_batch(&texels, &taps);
+                vector.flush();
+                scalar.flush();
+                assert_eq!(vector.channels(), scalar.channels(), "{count} taps");
+            }
+        }
+        if is_x86_feature_detected!("avx2") {
+            // SAFETY: checked above.
+            unsafe { compare() }
+        }
+    }
+
+    #[test]
+    #[cfg(target_arch = "x86_64")]
+    fn a_batch_outside_the_level_panics() {
+        #[target_feature(enable = "avx2")]
+        fn add(texels: &[[u8; 4]], texel: i32) {
+            let mut taps = ResolvedTaps { count: 1, ..ResolvedTaps::NONE };
+            taps.texel[0] = texel;
+            Avx2Accumulator::new().add_batch(texels, &taps);
+        }
+        if is_x86_feature_detected!("avx2") {
+            for (length, texel) in [(500, 501 - QUAD_REACH as i32), (500, -1), (500, i32::MIN), (QUAD_REACH - 1, 0), (0, 0)] {
+                // SAFETY: checked above.
+                let result = std::panic::catch_unwind(|| unsafe { add(&vec![[0; 4]; length], texel) });
+                assert!(result.is_err(), "texel {texel} of {length}");
+            }
         }
     }
 

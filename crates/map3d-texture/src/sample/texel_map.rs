@@ -5,11 +5,9 @@ use std::sync::Arc;
 use map3d_base::asset::Wrap;
 
 use crate::sample::plan::{TapBatch, TapExtent};
-use crate::sample::tap::{
-    BATCH, BilinearWeights, ResolvedTaps, TAP_POSITION_BITS, TapAccumulator, TexelQuad, WEIGHT_BITS, WEIGHT_ONE, bilinear_weights,
-};
+use crate::sample::tap::{BilinearWeights, ResolvedTaps, TAP_POSITION_BITS, TapAccumulator, TexelQuad, WEIGHT_BITS, WEIGHT_ONE, bilinear_weights};
 use crate::sample::uv_map::{POSITION_BITS, UvMap};
-use crate::store::{AlphaCell, Level, STRIP_PITCH};
+use crate::store::{AlphaCell, Level};
 use crate::wrap::wrap_texel;
 
 /// Fraction bits of texel coordinates.
@@ -171,9 +169,7 @@ impl TexelMap {
     /// Adds a batch of resolved taps.
     #[inline(always)]
     pub fn accumulate<A: TapAccumulator>(&self, taps: &ResolvedTaps, sum: &mut A) {
-        for k in 0..taps.count.min(BATCH) {
-            sum.add(self.quad(taps.texel[k] as usize), taps.weights[k]);
-        }
+        sum.add_batch(&self.level.texels, taps);
         sum.flush();
     }
 
@@ -184,18 +180,11 @@ impl TexelMap {
         let (fx, fy) = (fraction(t.x), fraction(t.y));
         let (x, y) = (t.x >> TEXEL_BITS, t.y >> TEXEL_BITS);
         let (texels, is_outside) = match self.is_inside(t, &TapExtent::POINT) {
-            true => (self.quad(self.level.layout.index(x as i32, y as i32) as usize), false),
+            true => (TexelQuad::at(&self.level.texels, self.level.layout.index(x as i32, y as i32) as usize), false),
             false if self.is_beyond_edges(t) => (TexelQuad::ZERO, true),
             false => (self.edge_quad([x, y]), false),
         };
         Tap { texels, weights: bilinear_weights(fx, fy), is_outside }
-    }
-
-    /// Returns a texel with its right and lower neighbours.
-    #[inline(always)]
-    fn quad(&self, texel: usize) -> TexelQuad {
-        let rows = &self.level.texels[texel..][..STRIP_PITCH + 2];
-        TexelQuad { upper: [rows[0], rows[1]], lower: [rows[STRIP_PITCH], rows[STRIP_PITCH + 1]] }
     }
 
     /// Whether the texture ends at its edges and a point lies beyond them.
