@@ -17,7 +17,7 @@ import { decoded, Hand, MAX_ACTIONS, throttle } from "./hand";
 
 // Common tasks with a city model on a phone: each takes at most three actions after opening. MAP3D_CLOCK=1 takes a dense screen, slows the phone down and prints times.
 const CLOCK = process.env.MAP3D_CLOCK === "1";
-const [WIDTH, HEIGHT, DENSITY, PIXEL_M] = [390, 844, CLOCK ? 3 : 2, 0.38];
+const [WIDTH, HEIGHT, DENSITY, PIXEL_M] = [390, 844, CLOCK ? 3 : 1, 0.38];
 const PHONE = { viewport: { width: WIDTH, height: HEIGHT }, deviceScaleFactor: DENSITY, isMobile: true, hasTouch: true, userAgent: devices["iPhone 14"].userAgent, timezoneId: "Europe/Berlin", locale: "en-GB" };
 const YEARS = new Map([[17, 1891], [1025, 1956], [2_000_000_001, 2012], [3_900_000_007, 1723]]);
 
