@@ -15,11 +15,11 @@ pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_
 from map3d.catalogue import Catalogue, State, Workspace
 from map3d.errors import BadRequest
 from map3d.jobs.dask_pool import DaskPools
-from map3d.jobs.events import JobDone, RunEvent, WorkerExited
+from map3d.jobs.events import JobDone, Planned, RunEvent, WorkerExited
 from map3d.jobs.run import Run, RunResult
 from map3d.jobs.run_settings import RunSettings
 from tests.jobs.stored import stored
-from tests.jobs.test_work import CONTENT, TIMEOUTS, make_workspace, undisturbed
+from tests.jobs.test_work import CONTENT, TIMEOUTS, leave_reduce_jobs_waiting, make_workspace, undisturbed, work
 from tests.renderings.scenes import SquareScene
 
 dask = pytest.importorskip("dask", reason="install map3d[dask]")
@@ -93,6 +93,21 @@ def test_killed_dask_worker_changes_nothing(workspace: Workspace, catalogue: Cat
     jobs = list(catalogue.jobs("r"))
     assert sum(job.expiries for job in jobs) <= 1
     assert all(job.attempts == 1 for job in jobs)
+    assert (workspace.manifest_path("r").read_bytes(), stored(workspace)) == expected
+
+
+def test_reduce_jobs_that_a_killed_process_left_waiting_are_done(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
+    """Another process does the jobs, and is killed before it opens the ones above."""
+    expected = undisturbed(tmp_path)
+
+    def on_event(event: RunEvent) -> None:
+        if isinstance(event, Planned):
+            work(workspace, catalogue)
+            leave_reduce_jobs_waiting(workspace)
+
+    with cluster(1) as local, dask_pools(local, workspace, catalogue) as pools:
+        result = render(workspace, catalogue, pools, on_event)
+    assert (result.complete, result.statistics.done) == (True, len([job for job in catalogue.jobs("r") if job.kind == "reduce"]))
     assert (workspace.manifest_path("r").read_bytes(), stored(workspace)) == expected
 
 

@@ -85,6 +85,12 @@ def work(workspace: Workspace, catalogue: Catalogue, *names: str) -> tuple[WorkR
     return Work(workspace, catalogue, SETTINGS, names).run(events.append), events
 
 
+def leave_reduce_jobs_waiting(workspace: Workspace) -> int:
+    """Makes all reduce jobs wait above done blocks, as a process that is killed between the two steps of `done` does. Returns their number."""
+    with closing(sqlite3.connect(workspace.catalogue_path)) as db, db:
+        return db.execute("UPDATE job SET state = 'waiting' WHERE kind = 'reduce'").rowcount
+
+
 def start(what: str, workspace: Workspace) -> subprocess.Popen[str]:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     return subprocess.Popen([sys.executable, "-c", PROCESS, what, str(workspace.root)], stdout=subprocess.PIPE, text=True, env=environment)
@@ -152,8 +158,7 @@ def test_reduce_jobs_that_a_killed_process_left_waiting_are_done(workspace: Work
     plan(workspace, catalogue)
     work(workspace, catalogue)
     before = stored(workspace)
-    with closing(sqlite3.connect(workspace.catalogue_path)) as db, db:
-        left = db.execute("UPDATE job SET state = 'waiting' WHERE kind = 'reduce'").rowcount
+    left = leave_reduce_jobs_waiting(workspace)
     result, _ = work(workspace, catalogue)
     assert (result.statistics.done, result.incomplete) == (left, [])
     assert stored(workspace) == before

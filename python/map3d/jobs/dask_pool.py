@@ -23,7 +23,7 @@ from map3d.jobs.dask_task import SessionSpec, TaskResult
 from map3d.jobs.dead_workers import expire_dead_workers, expire_workers_of
 from map3d.jobs.events import Remaining, RunEvent, SceneChanged, Stopping, Waiting, WorkerExited
 from map3d.jobs.local_pool import OnEvent
-from map3d.jobs.pool import count_open
+from map3d.jobs.open_jobs import count_open, has_jobs_left
 from map3d.jobs.run_settings import RunSettings
 from map3d.jobs.run_statistics import RunStatistics
 from map3d.jobs.stop_request import StopRequest
@@ -117,7 +117,7 @@ class _DaskPool:
         return self._scene_changed
 
     def _has_more(self) -> bool:
-        return bool(self._tasks) or not (self._is_ending or not self._catalogue.has_open_jobs(self._spec.rendering))
+        return bool(self._tasks) or not (self._is_ending or not has_jobs_left(self._catalogue, self._spec.rendering))
 
     def _release_leases_of_lost_nodes(self) -> None:
         lost = self._nodes.update()

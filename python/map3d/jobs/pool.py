@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from map3d.catalogue import Catalogue, State
-from map3d.catalogue.states import OPEN
 from map3d.jobs.dead_workers import expire_dead_workers, worker_name
 from map3d.jobs.events import Remaining, RunEvent, SceneChanged, Stopping, Waiting, WorkerExited
 from map3d.jobs.job_runner import JobRunner, Task
+from map3d.jobs.open_jobs import count_open
 from map3d.jobs.run_statistics import RunStatistics
 from map3d.jobs.stop_request import StopRequest
 from map3d.jobs.timeouts import Timeouts
@@ -130,9 +130,3 @@ class Pool:
         self._workers[name] = worker
         self._threads[name] = threading.Thread(target=worker.run, args=(self._events.put,), name=name)
         self._threads[name].start()
-
-
-def count_open(catalogue: Catalogue, rendering: str) -> int:
-    """Returns the number of jobs that are neither done nor ended in another way."""
-    counts = catalogue.count_jobs(rendering)
-    return sum(counts[state] for state in OPEN)

@@ -13,7 +13,7 @@ from map3d.errors import BadRequest, NotFound, StoreError
 from map3d.jobs.events import PlanAwaited, RenderingLeft, RenderingSkipped, RenderingStarted, RunEvent, StoreAwaited
 from map3d.jobs.finish import finish
 from map3d.jobs.local_pool import LocalPools, PoolRunner
-from map3d.jobs.pool import count_open
+from map3d.jobs.open_jobs import count_open
 from map3d.jobs.run_settings import RunSettings
 from map3d.jobs.run_statistics import RunStatistics
 from map3d.jobs.stop_request import StopRequest

@@ -8,6 +8,7 @@ from map3d.catalogue import Catalogue
 from map3d.errors import Map3dError
 from map3d.jobs.events import JobFailed, JobOutcome, RunEvent, SceneChanged, WorkerExited
 from map3d.jobs.job_runner import JobRunner
+from map3d.jobs.open_jobs import has_jobs_left
 from map3d.jobs.timeouts import Timeouts
 
 
@@ -66,7 +67,7 @@ class Worker:
             if event is not None:
                 report(event)
                 self._job_ended.notify()
-            elif self._no_jobs_left():
+            elif not has_jobs_left(self._catalogue, self._rendering):
                 break
             else:
                 self.idle_since = self.idle_since or time.monotonic()
@@ -89,7 +90,3 @@ class Worker:
         if isinstance(event, JobFailed):
             self._failed.add((lease.track, str(lease.block)))
         return event
-
-    def _no_jobs_left(self) -> bool:
-        """Sweeps before it gives up, since a killed process may have left reduce jobs waiting."""
-        return not self._catalogue.has_open_jobs(self._rendering) and self._catalogue.sweep(self._rendering) == 0
