@@ -19,6 +19,7 @@ from map3d.catalogue import Catalogue, SceneRecord, State, Workspace
 from map3d.errors import BadRequest, StoreError
 from map3d.jobs import finish
 from map3d.jobs.events import JobDone, PlanAwaited, RenderingLeft, RenderingSkipped, RunEvent, StoreAwaited
+from map3d.jobs.open_jobs import has_jobs_left
 from map3d.jobs.run import Run
 from map3d.jobs.run_settings import RunSettings
 from map3d.jobs.timeouts import Timeouts
@@ -162,6 +163,24 @@ def test_reduce_jobs_that_a_killed_process_left_waiting_are_done(workspace: Work
     result, _ = work(workspace, catalogue)
     assert (result.statistics.done, result.incomplete) == (left, [])
     assert stored(workspace) == before
+
+
+def test_jobs_that_another_process_opens_before_the_sweep_are_left(
+    workspace: Workspace, catalogue: Catalogue, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan(workspace, catalogue)
+    work(workspace, catalogue)
+    assert not has_jobs_left(catalogue, "r")
+    leave_reduce_jobs_waiting(workspace)
+    sweep = type(catalogue).sweep
+
+    def sweep_second(self: Catalogue, rendering: str) -> int:
+        assert sweep(self, rendering) > 0
+        return sweep(self, rendering)
+
+    monkeypatch.setattr(type(catalogue), "sweep", sweep_second)
+    assert not catalogue.has_open_jobs("r")
+    assert has_jobs_left(catalogue, "r")
 
 
 @pytest.mark.parametrize("names", [(), ("r",)])

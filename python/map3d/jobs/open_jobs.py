@@ -11,6 +11,9 @@ def count_open(catalogue: Catalogue, rendering: str) -> int:
 
 
 def has_jobs_left(catalogue: Catalogue, rendering: str) -> bool:
-    """Returns whether any job is todo or leased. Sweeps before it says no: another process may be between the end of a job and the opening of the job
-    above, or may have been killed there. Asks again after the sweep, since that process may have opened the job meanwhile."""
+    """Returns whether any job is todo or leased, or can be opened.
+
+    Sweeps before it says no: another process may be between the end of a job and the opening of the job above, or may have been killed there. Looks
+    once more after the sweep, since that process may have opened the job meanwhile.
+    """
     return catalogue.has_open_jobs(rendering) or catalogue.sweep(rendering) > 0 or catalogue.has_open_jobs(rendering)

@@ -13,7 +13,7 @@ from map3d.errors import BadRequest, NotFound, StoreError
 from map3d.jobs.events import PlanAwaited, RenderingLeft, RenderingSkipped, RenderingStarted, RunEvent, StoreAwaited
 from map3d.jobs.finish import finish
 from map3d.jobs.local_pool import LocalPools, PoolRunner
-from map3d.jobs.open_jobs import count_open
+from map3d.jobs.open_jobs import count_open, has_jobs_left
 from map3d.jobs.run_settings import RunSettings
 from map3d.jobs.run_statistics import RunStatistics
 from map3d.jobs.stop_request import StopRequest
@@ -117,7 +117,7 @@ class Work:
         if now - self._swept_s.get(name, -SWEEP_S) < SWEEP_S:
             return False
         self._swept_s[name] = now
-        return self._catalogue.count_jobs(name)[State.WAITING] > 0 and self._catalogue.sweep(name) > 0
+        return self._catalogue.count_jobs(name)[State.WAITING] > 0 and has_jobs_left(self._catalogue, name)
 
     def _has_tiles(self, record: RenderingRecord, on_event: Callable[[RunEvent], None]) -> bool:
         """Reports a rendering that is skipped because its tiles are elsewhere, once."""
