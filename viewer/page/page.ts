@@ -135,7 +135,7 @@ function bindPage(view: map, layer: imageLayer, info: InfoPanel, selection: Sele
   bindModes(layer);
   if (json.objects) {
     bindInViewList(view, () => selection.layer, (id) => void selection.selectId(id));
-    bindSearch(view, () => selection.layer, (id, position) => void selection.selectId(id, position, true, true));
+    bindSearch(view, () => selection.layer, (id, position, zoom) => void selection.goTo(id, position, zoom));
   }
 }
 

@@ -6,11 +6,11 @@ import { introduce, message } from "./i18n";
 
 const ZOOM_BELOW_DEEPEST = 1;
 
-/** Binds the search box: a combobox over the rendering's search index, of which the first search fetches a part. */
-export function bindSearch(view: map, layer: () => imageLayer, select: (id: number, position: Vec3) => void): void {
+/** Binds the search box: a combobox over the rendering's search index, of which the first search fetches a part. @param goTo selects the object that the user chooses and flies there */
+export function bindSearch(view: map, layer: () => imageLayer, goTo: (id: number, position: Vec3, zoom: number) => void): void {
   const [form, query, list] = [byId("search"), inputById("query"), byId("results")];
   const box = new SearchBox(query, list, (text) => layer().search(text), (entry) => {
-    go(view, layer(), entry, select);
+    go(view, layer(), entry, goTo);
   });
   form.hidden = false;
   form.addEventListener("submit", (event) => {
@@ -19,12 +19,11 @@ export function bindSearch(view: map, layer: () => imageLayer, select: (id: numb
   });
 }
 
-function go(view: map, layer: imageLayer, [id, , local]: SearchEntry, select: (id: number, position: Vec3) => void): void {
+function go(view: map, layer: imageLayer, [id, , local]: SearchEntry, goTo: (id: number, position: Vec3, zoom: number) => void): void {
   const json = layer.rendering?.json;
   if (!json) return;
   const world = [json.origin[0] + local[0], json.origin[1] + local[1], json.origin[2] + local[2]] as const satisfies Vec3;
-  select(id, world);
-  view.flyTo(world, Math.max(view.zoom, json.zmax - ZOOM_BELOW_DEEPEST));
+  goTo(id, world, Math.max(view.zoom, json.zmax - ZOOM_BELOW_DEEPEST));
 }
 
 class SearchBox {

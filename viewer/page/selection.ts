@@ -8,6 +8,9 @@ import { readPermalink, type Permalink } from "./permalink";
 /** Least distance of the selection from the card, CSS pixels. */
 const CLEAR_PX = 40;
 
+/** Gestures that end a flight to a search result. */
+const GESTURES = ["pointerdown", "wheel", "keydown"] as const;
+
 /** The selected object: highlighted, described in the info panel and kept in the permalink. The back button returns to the previous selection. */
 export class Selection {
   readonly #view: map;
@@ -50,8 +53,18 @@ export class Selection {
     }, report);
   }
 
-  /** Selects an object by its id. @param position default: the top of its bounding box  @param push adds a history entry  @param pin adds a marker with its title */
-  async selectId(id: number, position: Vec3 | null = null, push = true, pin = false): Promise<void> {
+  /** Selects an object found by a search and flies there: at once, and beside the card as soon as that is shown. */
+  async goTo(id: number, position: Vec3, zoom: number): Promise<void> {
+    const approach = new AbortController();
+    for (const type of GESTURES) addEventListener(type, () => { approach.abort(); }, { once: true, capture: true, signal: approach.signal });
+    this.#view.flyTo(position, zoom);
+    await this.selectId(id, position, true, true, true);
+    if (!approach.signal.aborted && this.#permalink.id === id) this.#flyClear(position, zoom);
+    approach.abort();
+  }
+
+  /** Selects an object by its id. @param position default: the top of its bounding box  @param push adds a history entry  @param pin adds a marker with its title  @param keepsView leaves the map where it is */
+  async selectId(id: number, position: Vec3 | null = null, push = true, pin = false, keepsView = false): Promise<void> {
     const changed = id !== this.#permalink.id;
     this.#permalink.id = id;
     const object = await this.#layer.object(id).catch((reason: unknown) => {
@@ -63,7 +76,7 @@ export class Selection {
     const origin = this.#layer.rendering?.json.origin;
     const top: Vec3 | null = low && high && origin ? [origin[0] + (low[0] + high[0]) / 2, origin[1] + (low[1] + high[1]) / 2, origin[2] + high[2]] : null;
     const event: ClickEvent = { id, position: position ?? top, approximate: false, layer: this.#layer, point: [0, 0], ...(object ?? {}) };
-    const title = this.#show(event);
+    const title = this.#show(event, keepsView);
     if (pin && event.position) this.#pin = new marker(title, event.position).addTo(this.#view).select();
     if (push) this.#permalink.write(changed);
   }
@@ -78,7 +91,7 @@ export class Selection {
   }
 
   /** Returns the title of the card. */
-  #show(event: ClickEvent): string {
+  #show(event: ClickEvent, keepsView = false): string {
     this.#pin?.remove();
     this.#layer.clearHighlight();
     this.#permalink.id = event.id;
@@ -91,7 +104,7 @@ export class Selection {
     this.onChange();
     const title = this.#info.show(event, isObject ? this.#showBack(event) : undefined);
     if (!isObject && event.position) this.#pin = new marker(title, event.position, { showLabel: false }).addTo(this.#view);
-    if (event.position) this.#moveClear(event.position);
+    if (event.position && !keepsView) this.#moveClear(event.position);
     return title;
   }
 
@@ -102,6 +115,16 @@ export class Selection {
     if (!at || at[0] < left - CLEAR_PX || at[1] > bottom + CLEAR_PX || at[1] < top - CLEAR_PX) return;
     if (left > 0) this.#view.panBy(left - CLEAR_PX - at[0], 0, { smooth: true });
     else this.#view.panBy(0, top - CLEAR_PX - at[1], { smooth: true });
+  }
+
+  /** Flies until a position is in the middle of what the card leaves free; in level views, in the middle of the map. */
+  #flyClear(position: Vec3, zoom: number): void {
+    const at = this.#view.project(position);
+    const { left, top } = this.#info.bounds;
+    const { clientWidth: width, clientHeight: height } = this.#view.container;
+    const [x, y] = left > 0 ? [left / 2, height / 2] : [width / 2, top / 2];
+    const scale = 2 ** (this.#view.zoom - Math.min(zoom, this.#view.zoomLimits[1]));
+    this.#view.flyTo((at && this.#view.unproject([at[0] + (width / 2 - x) * scale, at[1] + (height / 2 - y) * scale])) ?? position, zoom);
   }
 
   /** Returns an action that shows the object from behind; undefined when no view has the opposite direction. */

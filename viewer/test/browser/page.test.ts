@@ -309,6 +309,53 @@ test("search, pins and the list show what people say, and never an identifier", 
   await page.context().close();
 });
 
+/** Left, top, right and bottom of what the header and the card leave free, and the point that a marker stands on, once it rests. */
+const landing = (page: Page): Promise<{ free: readonly [number, number, number, number]; at: readonly [number, number] }> => page.evaluate(async () => {
+  const tip = (): readonly [number, number] => {
+    const { left, right, bottom } = (document.querySelector(".map3d-marker") as Element).getBoundingClientRect();
+    return [(left + right) / 2, bottom];
+  };
+  for (let last = "", rests = 0; rests < 10; rests = last === String(tip()) ? rests + 1 : 0) {
+    last = String(tip());
+    await new Promise(requestAnimationFrame);
+  }
+  const card = (document.querySelector("#info") as Element).getBoundingClientRect();
+  return { free: card.left > 0 ? [0, 0, card.left, innerHeight] : [0, 0, innerWidth, card.top], at: tip() };
+});
+
+test.each([["desk", DESK], ["phone", PHONE]] as const)("%s: every pick of a search ends at what it found, beside its card", async (_name, options) => {
+  const { page, problems } = await open(options, `rendering=${bed.url("unnamed")}`);
+  for (const text of ["église", "4959323", "school", "4959323", "église"]) {
+    await page.fill("#query", text);
+    await page.waitForSelector("#results li");
+    await page.keyboard.press("Enter");
+    await page.waitForSelector("#info:not([hidden])");
+    const { free, at } = await landing(page);
+    expect([Math.abs(at[0] / (free[0] + free[2]) - 0.5), Math.abs(at[1] / (free[1] + free[3]) - 0.5)].map((off) => off < 0.1), `${text}: ${String(at)} in ${String(free)}`).toEqual([true, true]);
+  }
+  expect(problems).toEqual([]);
+  await page.context().close();
+});
+
+test("a gesture ends the flight to what a search found", async () => {
+  const { page } = await open(DESK, `rendering=${bed.url("unnamed")}`);
+  await page.route("**/objects/*.json", async (route) => {
+    await page.mouse.move(300, 600);
+    await page.mouse.down();
+    await page.mouse.move(340, 600);
+    await page.mouse.up();
+    await route.continue();
+  });
+  await page.fill("#query", "school");
+  await page.waitForSelector("#results li");
+  const before = await page.evaluate(() => location.hash);
+  await page.keyboard.press("Enter");
+  await page.waitForSelector("#info:not([hidden])");
+  const { free, at } = await landing(page);
+  expect(Math.hypot(at[0] - free[2] / 2, at[1] - free[3] / 2), before).toBeGreaterThan(30);
+  await page.context().close();
+});
+
 test("a rendering of another origin is shown only with the user's consent", async () => {
   const other = bed.url("town").replace("127.0.0.1", "other.test");
   for (const consents of [true, false]) {
