@@ -43,6 +43,7 @@ def test_the_folder_is_complete(workspace, out):
     names = {
         "rendering.json",
         "README.txt",
+        "web.config",
         "preview.jpg",
         "favicon.ico",
         "checksums.sha256",

@@ -1,4 +1,4 @@
-"""Publications on nginx and on an S3 server, read over HTTP by the reference readers of PMTiles in Python and JavaScript."""
+"""Publications on web servers as installed and on an S3 server, read over HTTP by the reference readers of PMTiles in Python and JavaScript."""
 
 import json
 import shutil
@@ -12,19 +12,21 @@ from pmtiles.reader import Reader
 
 from map3d.object_store import open_object_store
 from map3d.publish import publish
-from tests.publish.hosts import nginx_host, public_address
+from tests.publish.hosts import PROGRAMS, public_address, web_host
 from tests.web.workspaces import LAYERS, ZMAX, every_tile, tile_bytes
 
 JAVASCRIPT_READER = Path(__file__).parents[2] / "viewer" / "node_modules" / "pmtiles" / "dist" / "esm" / "index.js"
+MEDIA_TYPES = {".html": ["text/html"], ".css": ["text/css"], ".js": ["text/javascript", "application/javascript"], ".jpg": ["image/jpeg"]}
+"""Suffix → media types that browsers accept. They read other files as bytes."""
 EMPTY = [(ZMAX, 15, 0), (ZMAX + 1, 0, 0)]
 
 
-@pytest.fixture(params=["nginx", "s3"])
+@pytest.fixture(params=[*PROGRAMS, "s3"])
 def address(request, workspace, out):
     """The address of the published workspace on a static host."""
-    if request.param == "nginx":
+    if request.param in PROGRAMS:
         publish(workspace, "tea", out)
-        with nginx_host(out) as host:
+        with web_host(request.param, out) as host:
             yield host
         return
     endpoint, url = request.getfixturevalue("s3_endpoint"), request.getfixturevalue("s3_url")
@@ -46,6 +48,8 @@ def test_every_file_is_served_as_published(address):
             digest, name = line.split("  ")
             answer = client.get(f"/{name}")
             assert (answer.status_code, sha256(answer.content).hexdigest()) == (200, digest)
+            wanted = MEDIA_TYPES.get(Path(name).suffix)
+            assert wanted is None or answer.headers["content-type"].split(";")[0] in wanted, name
 
 
 def test_a_part_of_an_archive_is_served(address):

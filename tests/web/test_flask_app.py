@@ -102,22 +102,22 @@ def test_large_documents_are_compressed_on_request(client, workspace):
 
 
 def test_modules_have_a_javascript_media_type(client, built_viewer):
-    (built_viewer / "map3d.mjs").write_text("export {}")
-    assert "javascript" in client.get("/view/tea/map3d.mjs").headers["content-type"]
-    assert client.get("/view/none/map3d.mjs").status_code == 404
+    (built_viewer / "map3d.module.js").write_text("export {}")
+    assert "javascript" in client.get("/view/tea/map3d.module.js").headers["content-type"]
+    assert client.get("/view/none/map3d.module.js").status_code == 404
 
 
 def test_the_viewers_files_are_compressed_on_request(client, built_viewer):
     text = "export const a = 1;\n" * 500
-    (built_viewer / "map3d.mjs").write_text(text)
-    plain, packed = (client.get("/view/tea/map3d.mjs", headers={"accept-encoding": name}) for name in ("identity", "gzip"))
+    (built_viewer / "map3d.module.js").write_text(text)
+    plain, packed = (client.get("/view/tea/map3d.module.js", headers={"accept-encoding": name}) for name in ("identity", "gzip"))
     assert plain.text == packed.text == text
     assert "content-encoding" not in plain.headers
     assert packed.headers["content-encoding"] == "gzip"
     assert int(packed.headers["content-length"]) < len(text) / 20
     assert plain.headers["vary"] == packed.headers["vary"] == "Accept-Encoding"
     for response in (plain, packed):
-        again = client.get("/view/tea/map3d.mjs", headers={"if-none-match": response.headers["etag"]})
+        again = client.get("/view/tea/map3d.module.js", headers={"if-none-match": response.headers["etag"]})
         assert (again.status_code, again.content) == (304, b"")
 
 

@@ -1,4 +1,4 @@
-import type { Attribute, ClickEvent } from "./map3d.mjs";
+import type { Attribute, ClickEvent } from "./map3d.module.js";
 import type { Described } from "./whole";
 import { language, message, type MessageKey } from "./i18n";
 import { roofInWords } from "./roofs";

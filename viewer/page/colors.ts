@@ -1,5 +1,5 @@
-import type { AttributeInfo, imageLayer, map } from "./map3d.mjs";
-import type { theme } from "./map3d-theme.mjs";
+import type { AttributeInfo, imageLayer, map } from "./map3d.module.js";
+import type { theme } from "./map3d-theme.module.js";
 import type { Permalink } from "./permalink";
 import { byId } from "./dom";
 import { toast } from "./toast";
@@ -58,7 +58,7 @@ export class Colors {
     const layer = this.#layer;
     if (!info) return;
     try {
-      const entry = await import("./map3d-theme.mjs");
+      const entry = await import("./map3d-theme.module.js");
       if (this.#permalink.by !== keyOf(info) || this.#layer !== layer) return;
       this.#theme?.remove();
       this.#theme = new entry.theme(layer, info, { legend: byId("legend"), title: info.name }).addTo(this.#view);

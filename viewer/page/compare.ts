@@ -1,4 +1,4 @@
-import { map, type ClickEvent, type imageLayer } from "./map3d.mjs";
+import { map, type ClickEvent, type imageLayer } from "./map3d.module.js";
 import { Haze } from "./haze";
 import { byId } from "./dom";
 import { report } from "./toast";
@@ -44,7 +44,7 @@ export class Compare {
 
   async #open(): Promise<void> {
     const { view } = this.#context;
-    const { sync } = await import("./map3d-compare.mjs");
+    const { sync } = await import("./map3d-compare.module.js");
     if (this.#end) return;
     document.body.classList.add("compares");
     const shown = view.directions.find(({ id }) => id === view.direction);
@@ -93,7 +93,7 @@ export class Compare {
     const [first] = other.layers;
     other.whenReady(() => {
       if (hasHaze && first) new Haze(other, first);
-      if (first?.rendering?.layers.has("depth") && !options.dataSaver) import("./map3d-shade.mjs").then(({ shade }) => { new shade().addTo(other); }, report);
+      if (first?.rendering?.layers.has("depth") && !options.dataSaver) import("./map3d-shade.module.js").then(({ shade }) => { new shade().addTo(other); }, report);
     });
     return other;
   }

@@ -1,4 +1,4 @@
-import { imageLayer, type map } from "./map3d.mjs";
+import { imageLayer, type map } from "./map3d.module.js";
 import { byId } from "./dom";
 import { requestedUrls } from "./requested";
 
@@ -12,7 +12,7 @@ export async function bindEpochs(view: map, first: imageLayer, others: readonly 
   const results = await Promise.allSettled(others.map((url) => addLayer(view, url)));
   const layers = [first, ...results.flatMap((result) => (result.status === "fulfilled" ? [result.value] : []))];
   if (layers.length < 2) return;
-  const { epochs } = await import("./map3d-compare.mjs");
+  const { epochs } = await import("./map3d-compare.module.js");
   const shown = initial < layers.length ? initial : 0;
   byId("epochs").hidden = false;
   new epochs(layers.map((layer) => ({ layer, label: labelOf(layer, layers) })), { shown, container: byId("epochs") })

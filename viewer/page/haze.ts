@@ -1,4 +1,4 @@
-import type { imageLayer, map, View } from "./map3d.mjs";
+import type { imageLayer, map, View } from "./map3d.module.js";
 import { computeHaze } from "./hazeMask";
 
 /** Pixels of the mask along each side; it covers the square of a view. */

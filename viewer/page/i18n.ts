@@ -111,6 +111,7 @@ const EN = {
   no: "No",
   close: "Close",
   mapFailed: "Couldn’t open this map",
+  noRanges: "This web server sends files only as a whole. The map needs one that serves range requests, such as nginx, Apache, Caddy or IIS.",
   pageFailed: "Couldn’t open this page",
 };
 
@@ -231,6 +232,7 @@ const DE: Messages = {
   no: "Nein",
   close: "Schließen",
   mapFailed: "Diese Karte konnte nicht geöffnet werden",
+  noRanges: "Dieser Webserver sendet Dateien nur als Ganzes. Die Karte benötigt einen mit Range-Anfragen, etwa nginx, Apache, Caddy oder IIS.",
   pageFailed: "Diese Seite konnte nicht geöffnet werden",
 };
 
@@ -347,6 +349,7 @@ const FR: Messages = {
   no: "Non",
   close: "Fermer",
   mapFailed: "Impossible d’ouvrir cette carte",
+  noRanges: "Ce serveur web n’envoie que des fichiers entiers. La carte a besoin de requêtes partielles (Range), comme avec nginx, Apache, Caddy ou IIS.",
   pageFailed: "Impossible d’ouvrir cette page",
 };
 

@@ -1,4 +1,4 @@
-import type { imageLayer, map } from "./map3d.mjs";
+import type { imageLayer, map } from "./map3d.module.js";
 import { describe, NOT_HIGHLIGHTED } from "./card";
 import { byId, withText } from "./dom";
 import { message } from "./i18n";

@@ -1,4 +1,4 @@
-import type { ClickEvent, Vec3 } from "./map3d.mjs";
+import type { ClickEvent, Vec3 } from "./map3d.module.js";
 import { describe, type Card, type Units } from "./card";
 import { withText } from "./dom";
 import { message } from "./i18n";

@@ -1,4 +1,4 @@
-import { chooseUtcOffset, computeDaylight, type imageLayer, type Light, type map, type Rendering } from "./map3d.mjs";
+import { chooseUtcOffset, computeDaylight, type imageLayer, type Light, type map, type Rendering } from "./map3d.module.js";
 import { findFirstSun } from "../src/geo/firstSun";
 import { findDay } from "./day";
 import { byId, inputById } from "./dom";

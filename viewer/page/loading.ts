@@ -1,4 +1,4 @@
-import type { map } from "./map3d.mjs";
+import type { map } from "./map3d.module.js";
 import { byId } from "./dom";
 
 /** Shorter waits are not shown, ms. */

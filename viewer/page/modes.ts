@@ -1,4 +1,4 @@
-import type { imageLayer, Mode } from "./map3d.mjs";
+import type { imageLayer, Mode } from "./map3d.module.js";
 import { byId } from "./dom";
 import { message } from "./i18n";
 

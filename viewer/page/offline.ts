@@ -1,13 +1,13 @@
-import type { map } from "./map3d.mjs";
-import type { AreaProgress, DownloadOptions, StoredArea } from "./map3d-offline.mjs";
+import type { map } from "./map3d.module.js";
+import type { AreaProgress, DownloadOptions, StoredArea } from "./map3d-offline.module.js";
 import { byId, withText } from "./dom";
 import { toast } from "./toast";
 import { language, introduce, message } from "./i18n";
 
-type Offline = typeof import("./map3d-offline.mjs");
+type Offline = typeof import("./map3d-offline.module.js");
 
 /** All files that this page loads, at once or on demand. */
-export const PAGE_FILES = ["page.js", "page-share.js", "page.css", "map3d.mjs", ...["compare", "controls", "measure", "offline", "orbit", "print", "shade", "theme"].map((name) => `map3d-${name}.mjs`)];
+export const PAGE_FILES = ["start.js", "page.js", "page-share.js", "page.css", "map3d.module.js", ...["compare", "controls", "measure", "offline", "orbit", "print", "shade", "theme"].map((name) => `map3d-${name}.module.js`)];
 
 /** Binds the dialog that saves the current view for offline use. Stores nothing until the user saves an area. */
 export function bindOffline(view: map, name: string): void {
@@ -15,7 +15,7 @@ export function bindOffline(view: map, name: string): void {
   const [button, dialog, details] = [byId("save-offline"), byId("offline") as HTMLDialogElement, byId("offline-details") as HTMLSelectElement];
   button.hidden = false;
   button.addEventListener("click", () => {
-    import("./map3d-offline.mjs").then((offline) => {
+    import("./map3d-offline.module.js").then((offline) => {
       opened ??= new OfflineDialog(view, name, offline, dialog, details);
       opened.open();
     }, (reason: unknown) => { toast(introduce("toolFailed", reason)); });

@@ -1,5 +1,5 @@
-import type { map } from "./map3d.mjs";
-import type { orbit } from "./map3d-orbit.mjs";
+import type { map } from "./map3d.module.js";
+import type { orbit } from "./map3d-orbit.module.js";
 
 /** A round takes 14 seconds. */
 const RAD_PER_S = (2 * Math.PI) / 14;

@@ -1,5 +1,5 @@
-import { imageLayer, map, Map3dError } from "./map3d.mjs";
-import type { overview as Overview } from "./map3d-controls.mjs";
+import { FetchError, imageLayer, map, Map3dError } from "./map3d.module.js";
+import type { overview as Overview } from "./map3d-controls.module.js";
 import { Permalink, readPermalink } from "./permalink";
 import { Colors } from "./colors";
 import { Compare } from "./compare";
@@ -55,17 +55,17 @@ function open(): void {
     if (layer.rendering) bindPicture({ view, json: layer.rendering.json, legend: () => colors.theme, overlay: (paper) => haze?.capture(paper) });
     if (layer.rendering) bindOffline(view, layer.rendering.json.name);
     colors.open().catch((reason: unknown) => { report(reason); });
-    import("./map3d-controls.mjs").then(({ locate, overview }) => {
+    import("./map3d-controls.module.js").then(({ locate, overview }) => {
       if (layer.rendering?.json.geographic) new locate().addTo(view);
       bindOverview(view, new overview({ collapsed: true }).addTo(view));
     }, (reason: unknown) => { report(reason); });
     // Depth is as large as colours and normals: it loads after the first picture.
     if (layer.rendering?.layers.has("depth") && !view.options.dataSaver) view.once("load", () => {
-      import("./map3d-shade.mjs").then(({ shade }) => {
+      import("./map3d-shade.module.js").then(({ shade }) => {
         new shade().addTo(view);
         if (view.drawer === "webgl") showShadowSwitch();
       }, (reason: unknown) => { report(reason); });
-      import("./map3d-orbit.mjs").then(({ orbit }) => {
+      import("./map3d-orbit.module.js").then(({ orbit }) => {
         const turn = new orbit().addTo(view);
         if (isFresh) bindOpening(view, turn);
       }).catch((reason: unknown) => { report(reason); });
@@ -90,13 +90,15 @@ function open(): void {
   bindLoading(view);
 }
 
-/** Reports an error; without a map, in place of the page. */
+/** Reports an error; without a map, or without a way to its tiles, in place of the page. */
 function showError(layer: imageLayer, error: Error): void {
-  if (layer.rendering) {
+  // Archives are requested in parts.
+  const ignoresRanges = layer.rendering && error instanceof FetchError && error.status === 200;
+  if (layer.rendering && !ignoresRanges) {
     report(error);
     return;
   }
-  showFailure(message("mapFailed"), error.message);
+  showFailure(message("mapFailed"), ignoresRanges ? message("noRanges") : error.message);
   if (!navigator.onLine) addEventListener("online", () => { location.reload(); });
 }
 

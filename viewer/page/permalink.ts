@@ -1,4 +1,4 @@
-import type { map, Vec3 } from "./map3d.mjs";
+import type { map, Vec3 } from "./map3d.module.js";
 
 /** The state that the page's URL fragment holds. */
 export interface PermalinkState {

@@ -1,5 +1,5 @@
-import type { map, ManifestJson } from "./map3d.mjs";
-import type { PictureLegend, PictureOptions } from "./map3d-print.mjs";
+import type { map, ManifestJson } from "./map3d.module.js";
+import type { PictureLegend, PictureOptions } from "./map3d-print.module.js";
 import { byId, withText } from "./dom";
 import { language, introduce, message } from "./i18n";
 
@@ -89,7 +89,7 @@ function showProgress(fraction: number): void {
 
 async function createPicture({ view, overlay }: PictureContext, { width_px, height_px, textScale }: PictureSize, signal: AbortSignal, more: PictureOptions, paper?: readonly number[]): Promise<Blob> {
   const draw = overlay(paper);
-  const { exportPicture } = await import("./map3d-print.mjs");
+  const { exportPicture } = await import("./map3d-print.module.js");
   return exportPicture(view, { width_px, height_px, textScale, signal, ...(draw && { overlay: draw }), progress: (done, total) => { showProgress(done / total); }, ...more });
 }
 

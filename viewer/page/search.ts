@@ -1,4 +1,4 @@
-import type { imageLayer, map, SearchEntry, Vec3 } from "./map3d.mjs";
+import type { imageLayer, map, SearchEntry, Vec3 } from "./map3d.module.js";
 import { nameOfResult } from "./card";
 import { byId, inputById, withText } from "./dom";
 import { toast } from "./toast";

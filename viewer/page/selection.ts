@@ -1,4 +1,4 @@
-import { marker, type ClickEvent, type imageLayer, type map, type Vec3 } from "./map3d.mjs";
+import { marker, type ClickEvent, type imageLayer, type map, type Vec3 } from "./map3d.module.js";
 import type { InfoPanel } from "./info";
 import { NOT_HIGHLIGHTED } from "./card";
 import { findWhole } from "./whole";

@@ -1,5 +1,5 @@
-import type { map } from "./map3d.mjs";
-import type { measure } from "./map3d-measure.mjs";
+import type { map } from "./map3d.module.js";
+import type { measure } from "./map3d-measure.module.js";
 import { byId, withText } from "./dom";
 import { toast } from "./toast";
 import { introduce, message } from "./i18n";
@@ -48,7 +48,7 @@ export class Tools {
     if (kind === null) return;
     this.#last = kind;
     try {
-      const entry = await import("./map3d-measure.mjs");
+      const entry = await import("./map3d-measure.module.js");
       if (this.#kind !== kind) return;
       const showResults = (): void => { this.#showResults(); };
       this.#tool = new entry.measure({ kind }).on("change", showResults).on("face", showResults).on("profile", showResults).addTo(this.#view);

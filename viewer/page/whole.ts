@@ -1,4 +1,4 @@
-import type { ClickEvent, imageLayer } from "./map3d.mjs";
+import type { ClickEvent, imageLayer } from "./map3d.module.js";
 
 type Attributes = NonNullable<ClickEvent["attributes"]>;
 /** An object with what is known of it. */

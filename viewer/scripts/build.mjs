@@ -1,4 +1,4 @@
-// Builds dist/: map3d.js (script), map3d.mjs (module), the entries, map3d-full (everything), the service worker, the ready-made page, and type declarations.
+// Builds dist/: map3d.js (script), map3d.module.js (module), the entries, map3d-full (everything), the service worker, the ready-made page, and type declarations.
 import { execFileSync } from "node:child_process";
 import { mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { dirname, join, resolve } from "node:path";
@@ -160,11 +160,11 @@ const messages = {
 };
 const plugins = [workers, shaders, styles, tables, messages];
 
-/** Lets entries import the core's public names: modules from map3d.mjs, scripts from the global `map3d`. */
+/** Lets entries import the core's public names: modules from map3d.module.js, scripts from the global `map3d`. */
 const coreAs = (how) => ({
   name: "core",
   setup(build) {
-    build.onResolve({ filter: /\/map3d$/ }, () => (how === "module" ? { path: "./map3d.mjs", external: true } : { path: "map3d", namespace: "global" }));
+    build.onResolve({ filter: /\/map3d$/ }, () => (how === "module" ? { path: "./map3d.module.js", external: true } : { path: "map3d", namespace: "global" }));
     build.onLoad({ filter: /.*/, namespace: "global" }, () => ({ contents: "module.exports = map3d;", loader: "js" }));
   },
 });
@@ -199,17 +199,18 @@ async function build() {
   checkInternalNames();
   checkOwnNames();
   const core = [...MODULE_ORDER.map((file) => `import "./src/${file}";\n`), 'export * from "./src/map3d.ts";\n'].join("");
-  await write({ ...shared, banner, stdin: { contents: core, resolveDir: root }, outfile: join(dist, "map3d.mjs"), plugins, format: "esm" });
-  writeScript("map3d.mjs", "map3d.js");
+  await write({ ...shared, banner, stdin: { contents: core, resolveDir: root }, outfile: join(dist, "map3d.module.js"), plugins, format: "esm" });
+  writeScript("map3d.module.js", "map3d.js");
   for (const [name, entry] of Object.entries(ENTRIES)) {
-    await bundle(entry, `map3d-${name}.mjs`, { format: "esm", plugins: [coreAs("module"), ...plugins] });
+    await bundle(entry, `map3d-${name}.module.js`, { format: "esm", plugins: [coreAs("module"), ...plugins] });
     await bundle(entry, `map3d-${name}.js`, { format: "iife", plugins: [coreAs("global"), ...plugins], globalName: "entry", banner: { js: `${banner.js}\n(() => {` }, footer: { js: "Object.assign(map3d, entry);\n})();" } });
   }
   await bundle("src/offline/worker.ts", "map3d-worker.js", { format: "iife" });
-  await bundleFull("map3d-full.mjs", { format: "esm" });
-  writeScript("map3d-full.mjs", "map3d-full.js");
+  await bundleFull("map3d-full.module.js", { format: "esm" });
+  writeScript("map3d-full.module.js", "map3d-full.js");
   await bundle("page/page-share.ts", "page-share.js", { format: "esm" });
-  await bundle("page/page.ts", "page.js", { format: "esm", external: ["./map3d.mjs", "./page-share.js", ...Object.keys(ENTRIES).map((name) => `./map3d-${name}.mjs`)] });
+  await bundle("page/page.ts", "page.js", { format: "esm", external: ["./map3d.module.js", "./page-share.js", ...Object.keys(ENTRIES).map((name) => `./map3d-${name}.module.js`)] });
+  await esbuild.build({ ...shared, entryPoints: [join(root, "page/start.js")], outfile: join(dist, "start.js"), target: "es5", charset: "ascii" });
   await esbuild.build({ ...shared, entryPoints: [join(root, "page/page.css")], outfile: join(dist, "page.css"), target: CSS_TARGET });
   writeFileSync(join(dist, "index.html"), minifyHtml(readFileSync(join(root, "page/index.html"), "utf8")));
   const tsc = join(root, "node_modules/typescript/bin/tsc");
@@ -234,10 +235,10 @@ function writeDeclarations() {
   const lines = Object.keys(ENTRIES).map((name) => `export * from "./types/${name}/index.js";\n`);
   const core = 'export * from "./types/map3d.js";\n';
   const global = "export as namespace map3d;\n";
-  Object.keys(ENTRIES).forEach((name, k) => { writeFileSync(join(dist, `map3d-${name}.d.mts`), lines[k]); });
-  writeFileSync(join(dist, "map3d.d.mts"), core);
+  Object.keys(ENTRIES).forEach((name, k) => { writeFileSync(join(dist, `map3d-${name}.module.d.ts`), lines[k]); });
+  writeFileSync(join(dist, "map3d.module.d.ts"), core);
   writeFileSync(join(dist, "map3d.d.ts"), core + global);
-  writeFileSync(join(dist, "map3d-full.d.mts"), core + lines.join(""));
+  writeFileSync(join(dist, "map3d-full.module.d.ts"), core + lines.join(""));
   writeFileSync(join(dist, "map3d-full.d.ts"), core + lines.join("") + global);
 }
 

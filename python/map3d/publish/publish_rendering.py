@@ -39,6 +39,7 @@ OnTiles = Callable[[str, int, int], bool]
 GIS: Final = "gis"
 """Folder of the files for GIS software."""
 README: Final = "README.txt"
+IIS_SETTINGS: Final = "web.config"
 ICON: Final = "favicon.ico"
 _ICON_PATH: Final = Path(__file__).parents[1] / "web" / "static" / ICON
 ARCHIVE_VERSION: Final = 2
@@ -47,12 +48,25 @@ SAMPLED_TILES: Final = 256
 """Tiles from which a dry run estimates the size of an archive."""
 FILES_PER_STEP: Final = 100
 
+_IIS: Final = b"""<?xml version="1.0" encoding="UTF-8"?>
+<configuration>
+  <system.webServer>
+    <staticContent>
+      <remove fileExtension=".pmtiles" />
+      <mimeMap fileExtension=".pmtiles" mimeType="application/vnd.pmtiles" />
+    </staticContent>
+  </system.webServer>
+</configuration>
+"""
+"""IIS sends no file whose extension it does not know. Other web servers ignore this file."""
+
 _README_TEXT: Final = """{title}
 {attribution}
 This folder is a self-contained map of oblique views, rendered with map3d. Copy it to any web host and open index.html there.
 
 The host must
-- serve range requests (HTTP "Range"). nginx, Apache, Caddy and S3-compatible hosts do; `python -m http.server` does not, so the map stays empty.
+- serve range requests (HTTP "Range"). nginx, Apache, Caddy, lighttpd, IIS and S3-compatible hosts do; `python -m http.server` does not, and the map
+  says so.
   To view the map on your own machine: `caddy file-server --listen :8000`, or nginx with `root` set to this folder.
 - send *.pmtiles uncompressed: they contain compressed images.
 To use the tiles from pages on other hosts, send `Access-Control-Allow-Origin: *` and allow the request header `Range`.
@@ -65,6 +79,7 @@ rendering.json               views, layers, levels, coordinate system
 objects/                     attributes of the objects, and the search index
 preview.jpg                  picture for links to the map
 index.html, *.js             the viewer
+web.config                   lets IIS send *.pmtiles; other web servers ignore it
 report.html                  what the files held from which `map3d site` made the map; absent otherwise
 checksums.sha256             to check a copy, run: sha256sum -c checksums.sha256
 """
@@ -204,6 +219,7 @@ class _Publisher:
             data = (viewer_folder() / file).read_bytes()
             yield file.as_posix(), self._describe(data, picture is not None, url) if file.as_posix() == PAGE else data
         yield README, _readme(self._manifest).encode()
+        yield IIS_SETTINGS, _IIS
 
     def _gis_files(self, address: str) -> Iterator[tuple[str, bytes]]:
         """Yields the tiles of the colour layers as files, and layer definitions that name them."""

@@ -29,7 +29,6 @@ REVALIDATED: Final = "no-cache"
 _TYPES: Final = {
     ".html": "text/html; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
-    ".mjs": "text/javascript; charset=utf-8",
     ".css": "text/css; charset=utf-8",
     ".json": "application/json",
     ".pmtiles": "application/vnd.pmtiles",

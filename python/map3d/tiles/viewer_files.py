@@ -7,7 +7,7 @@ from typing import Final
 from map3d.errors import Map3dError
 
 PAGE: Final = "index.html"
-TYPE_DECLARATIONS: Final = (".d.ts", ".d.mts")
+TYPE_DECLARATIONS: Final = ".d.ts"
 
 
 class ViewerMissing(Map3dError):

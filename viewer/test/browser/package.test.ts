@@ -56,7 +56,7 @@ afterAll(() => { installed.remove(); });
 
 test("the package has what it names, and nothing else", () => {
   const names = ["map3d", "map3d-full", ...Object.keys(ENTRIES).map((name) => `map3d-${name}`)];
-  const wanted = ["LICENSE", "README.md", "package.json", ...["index.html", "page.js", "page-share.js", "page.css", "map3d-worker.js", "map3d.d.ts", "map3d-full.d.ts", ...names.flatMap((name) => [`${name}.js`, `${name}.mjs`, `${name}.d.mts`])].map((file) => `dist/${file}`)];
+  const wanted = ["LICENSE", "README.md", "package.json", ...["index.html", "start.js", "page.js", "page-share.js", "page.css", "map3d-worker.js", "map3d.d.ts", "map3d-full.d.ts", ...names.flatMap((name) => [`${name}.js`, `${name}.module.js`, `${name}.module.d.ts`])].map((file) => `dist/${file}`)];
   expect(installed.files.filter((file) => !file.startsWith("dist/types/")).sort()).toEqual(wanted.sort());
   expect(installed.files.filter((file) => file.startsWith("dist/types/") && !file.endsWith(".d.ts"))).toEqual([]);
   expect(readFileSync(join(VIEWER, "LICENSE"), "utf8")).toBe(readFileSync(join(VIEWER, "../LICENSE"), "utf8"));

@@ -95,8 +95,8 @@ describe("tiles of an area", () => {
 
 test("the page saves all modules that it imports", () => {
   const folder = join(import.meta.dirname, "../../page");
-  const imported = readdirSync(folder).filter((file) => file.endsWith(".ts")).flatMap((file) => [...readFileSync(join(folder, file), "utf8").matchAll(/import (?!type)[^;]*?"\.\/(map3d[\w-]*\.mjs)"|import\("\.\/([\w-]*\.m?js)"\)/g)].map(([, fixed, later]) => fixed ?? later));
-  const links = [...readFileSync(join(folder, "index.html"), "utf8").matchAll(/(?:href|src)="([\w.-]+)"/g)].map(([, file]) => file);
+  const imported = readdirSync(folder).filter((file) => file.endsWith(".ts")).flatMap((file) => [...readFileSync(join(folder, file), "utf8").matchAll(/import (?!type)[^;]*?"\.\/(map3d[\w-]*\.module\.js)"|import\("\.\/([\w-]*(?:\.module)?\.js)"\)/g)].map(([, fixed, later]) => fixed ?? later));
+  const links = [...readFileSync(join(folder, "index.html"), "utf8").matchAll(/(?:href|src)="([\w.-]+\.(?:js|css))"/g)].map(([, file]) => file);
   expect([...PAGE_FILES].sort()).toEqual([...new Set([...imported, ...links])].sort());
 });
 
