@@ -4,7 +4,22 @@ from pathlib import Path
 import pytest
 
 from tests.catalogue.mongo_process import MongoProcess, Unavailable, build, real_server
+from tests.leftovers import nothing_is_left, own_temporary_folder, session_processes
 from tests.object_servers import environment, new_prefix, s3_environment, s3_server
+
+
+@pytest.fixture(scope="session")
+def temporary_folder() -> Iterator[Path]:
+    """The folder of temporary files of this process and those that it starts."""
+    with own_temporary_folder() as folder:
+        yield folder
+
+
+@pytest.fixture(scope="module", autouse=True)
+def leftovers(temporary_folder: Path) -> Iterator[None]:
+    """Fails the last test of a file whose tests leave processes, temporary files or open sockets."""
+    with nothing_is_left(temporary_folder):
+        yield
 
 
 @pytest.fixture(scope="session")
@@ -38,5 +53,6 @@ def mongo_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         process = MongoProcess(tmp_path_factory.mktemp("mongodb")).start()
     except Unavailable as error:
         pytest.skip(f"MongoDB is not tested: {error}")
+    session_processes.add(process.pid)
     yield process.url
     process.stop()

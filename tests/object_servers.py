@@ -11,6 +11,8 @@ from contextlib import contextmanager
 
 import pytest
 
+from tests.leftovers import session_processes
+
 _SERVER = """
 import threading
 from moto.moto_server.werkzeug_app import DomainDispatcherApplication, create_backend_app
@@ -38,6 +40,7 @@ def s3_server() -> Iterator[str]:
     pytest.importorskip("obstore", reason="obstore is not installed: pip install 'map3d[cloud]'")
     pytest.importorskip("moto.server", reason="the S3 server moto is not installed: pip install -r requirements/test.lock")
     process = subprocess.Popen([sys.executable, "-c", _SERVER], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    session_processes.add(process.pid)
     try:
         assert process.stdout is not None
         endpoint = f"http://127.0.0.1:{int(process.stdout.readline())}"

@@ -3,6 +3,7 @@
 import asyncio
 import socket
 import threading
+from contextlib import ExitStack
 
 import httpx
 import pytest
@@ -63,9 +64,6 @@ def test_slow_clients_hold_no_thread(served):
     """Twenty forms that never end, against the eight threads of Flask; meanwhile a user signs in through the real server."""
     fields = f"Host: {served.address.host}\r\nContent-Length: 100\r\nContent-Type: application/x-www-form-urlencoded"
     head = f"POST /sign-in HTTP/1.1\r\n{fields}\r\n\r\nname="
-    slow = [socket.create_connection((served.address.host, served.address.port), timeout=10) for _ in range(20)]
-    for connection in slow:
-        connection.sendall(head.encode())
     answers = []
 
     def sign_in():
@@ -74,9 +72,11 @@ def test_slow_clients_hold_no_thread(served):
             answers.append(client.post("/sign-in", data=form).status_code)
 
     thread = threading.Thread(target=sign_in)
-    thread.start()
-    thread.join(25)
-    for connection in slow:
-        connection.close()
+    with ExitStack() as stack:
+        for _ in range(20):
+            slow = stack.enter_context(socket.create_connection((served.address.host, served.address.port), timeout=10))
+            slow.sendall(head.encode())
+        thread.start()
+        thread.join(25)
     thread.join()
     assert answers == [303]
