@@ -13,7 +13,7 @@ CACHE := .cache
 RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
 VIEWER := $(shell find viewer/src viewer/page viewer/scripts -type f 2>/dev/null) $(wildcard viewer/*.json viewer/*.ts viewer/*.js viewer/*.mjs)
 
-.PHONY: help demo test test-all test-rust test-python mongo-server test-viewer test-wheel test-browser browser-suite wheel check check-words check-rust check-python check-viewer bench bench-extent bench-cycles bench-rotterdam bench-viewer bench-serve peers faults bless docs reference build clean tools
+.PHONY: help demo test test-all test-rust test-python mongo-server test-viewer test-wheel test-browser browser-suite test-more test-more-python wheel check check-words check-rust check-python check-viewer bench bench-extent bench-cycles bench-rotterdam bench-viewer bench-serve peers faults bless docs reference build clean tools
 
 help: ## list the targets
 	@echo "map3d: 3D city models as oblique image tiles"; echo
@@ -67,18 +67,16 @@ demo: build ## generate a town, render it, serve it on a free port and print the
 
 # -- test ----------------------------------------------------------------------------------------------------------------------------
 
-test: test-rust test-python test-viewer test-wheel test-browser ## run all tests, including those in real browsers
+test: test-rust test-python test-viewer test-browser ## run the tests that guard map3d's own laws, including those in a browser
 
 test-rust:
 	cargo test --workspace --locked --exclude map3d-py --lib --tests -q
 
-# Tests that count processes, kill them or need the machine for themselves. The others run two at a time, a file on one worker.
-ALONE := bench faults jobs subprocess test_process_identity.py
-PLAIN := not browser and not slow and not wheel
+# Two files at a time; tests/conftest.py names those that never run at the same time.
+PYTEST := $(BIN)/python -m pytest -q -n 2 --dist loadgroup
 
 test-python: build mongo-server
-	$(BIN)/python -m pytest -q -m "$(PLAIN)" -n 2 --dist loadfile $(ALONE:%=--ignore=tests/%)
-	$(BIN)/python -m pytest -q -m "$(PLAIN)" $(ALONE:%=tests/%)
+	$(PYTEST) -m "not browser and not wheel and not third_party and not endurance"
 
 MONGO := tests/catalogue/mongo_server
 mongo-server: | $(CACHE) # fetch and compile the server of the MongoDB tests, which are skipped without it
@@ -101,14 +99,20 @@ browser-suite: build
 	cd viewer && npx --no-install vitest run --config vitest.browser.config.ts
 	$(BIN)/python -m pytest -q -m browser
 
-test-all: test ## run slow tests, too (none is marked slow yet)
+test-all: test test-more ## run all tests: also agreement with programs of others, endurance and the wheel
+
+test-more: test-more-python test-wheel # what test-all runs beyond test
+
+test-more-python: build mongo-server
+	$(PYTEST) -m "(third_party or endurance) and not browser"
 
 faults: build ## kill, fill disks, fail system calls: every tile set must equal the undisturbed one (docs/reliability.md): 2 hours
 	$(BIN)/python -m tests.faults
 
 # -- check ---------------------------------------------------------------------------------------------------------------------------
 
-check: check-words check-rust check-python check-viewer ## check words, format, lint, types and sizes
+check: build ## check words, format, lint, types and sizes, two parts at a time
+	@$(MAKE) --no-print-directory -j 2 --output-sync=target check-rust check-python check-viewer check-words
 
 check-words: $(CACHE)/venv
 	$(BIN)/python docs/check_words.py

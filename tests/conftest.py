@@ -2,15 +2,33 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from xdist.scheduler import LoadScopeScheduling
 
 from tests.catalogue.mongo_process import MongoProcess, Unavailable, build, real_server
 from tests.leftovers import nothing_is_left, own_temporary_folder, session_processes
 from tests.object_servers import environment, new_prefix, s3_environment, s3_server
 
+ALONE = ("bench", "faults", "jobs", "subprocess", "test_process_identity.py")
+"""Folders and files whose tests measure or kill processes: one worker runs all of them, so that they do not disturb each other."""
+
+
+class FileScheduling(LoadScopeScheduling):
+    """Gives a worker whole files, and those of ALONE as one."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        file = nodeid.partition("::")[0]
+        return "alone" if file.split("/")[1] in ALONE else file
+
+
+@pytest.hookimpl
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> FileScheduling | None:
+    return FileScheduling(config, log) if config.getvalue("dist") == "loadgroup" else None
+
 
 @pytest.fixture(scope="session")
-def temporary_folder() -> Iterator[Path]:
-    """The folder of temporary files of this process and those that it starts."""
+def temporary_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """The folder of temporary files of this process and those that it starts; pytest's own are elsewhere."""
+    tmp_path_factory.getbasetemp()
     with own_temporary_folder() as folder:
         yield folder
 

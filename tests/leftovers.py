@@ -64,7 +64,9 @@ def _processes(folder: Path) -> dict[int, str]:
     for process in Path("/proc").glob("[0-9]*"):
         try:
             if int(process.name) != os.getpid() and variable in (process / "environ").read_bytes().split(b"\0"):
-                found[int(process.name)] = (process / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace").strip()
+                command = (process / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace").strip()
+                if "multiprocessing.resource_tracker" not in command:  # ends with the process that started it
+                    found[int(process.name)] = command
         except OSError:  # another user's, or ended
             continue
     return found

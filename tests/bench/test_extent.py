@@ -41,6 +41,7 @@ def test_times_are_per_tile_and_counts_are_sums_over_workers() -> None:
 
 
 @pytest.mark.whole
+@pytest.mark.endurance
 def test_extent_benchmark_runs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(extent, "BUILDINGS", 3)
     monkeypatch.setattr(extent, "RES_M", 0.5)

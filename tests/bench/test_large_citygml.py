@@ -11,7 +11,7 @@ from bench.large_citygml import WALLS, read_in_process, write_citygml
 MIB = 1 << 20
 
 
-@pytest.mark.parametrize("textured", [False, True])
+@pytest.mark.parametrize("textured", [pytest.param(False, marks=pytest.mark.endurance), True])
 def test_memory_is_flat_in_the_size_of_the_file(tmp_path: Path, textured: bool) -> None:
     small, large = (read_in_process(write_citygml(tmp_path / f"{size}.gml", size * MIB, textured)) for size in (4, 48))
     assert large.triangles % (2 * WALLS) == 0

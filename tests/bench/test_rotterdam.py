@@ -24,6 +24,7 @@ def main(monkeypatch: pytest.MonkeyPatch, folder: Path, *options: str) -> None:
     rotterdam.main()
 
 
+@pytest.mark.endurance
 def test_tiny_city_completes_all_stages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     main(monkeypatch, tmp_path)
     record = json.loads((tmp_path / "figures.json").read_text())
@@ -35,6 +36,7 @@ def test_tiny_city_completes_all_stages(tmp_path: Path, monkeypatch: pytest.Monk
     assert "| all |" in capfd.readouterr().out
 
 
+@pytest.mark.endurance
 def test_failed_run_resumes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     words = rotterdam.view_options
     monkeypatch.setattr(rotterdam, "view_options", lambda size: [*words(size), "--nonsense"])

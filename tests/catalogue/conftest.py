@@ -9,6 +9,15 @@ from map3d.catalogue import Catalogue, SceneRecord, open_catalogue
 from tests.catalogue.implementations import IMPLEMENTATIONS, LEASE_S, NewUrl, new_urls, rendering
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Marks the slow tests with lost answers: those that wait for leases or make many catalogues. Others do the same changes."""
+    for item in items:
+        given = getattr(item, "callspec", None)
+        loses_answers = given is not None and given.params.get("new_url") == "mongodb-lost-answers"
+        if loses_answers and {"brief_catalogue", "make_catalogue"} & set(item.fixturenames):  # type: ignore[attr-defined]
+            item.add_marker(pytest.mark.endurance)
+
+
 @pytest.fixture(params=IMPLEMENTATIONS)
 def new_url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[NewUrl]:
     """Returns the URL of another empty catalogue at each call."""

@@ -15,11 +15,14 @@ distributed = pytest.importorskip("distributed", reason="install map3d[dask]")
 pytestmark = pytest.mark.whole
 
 
+@pytest.mark.third_party
 def test_dask_cluster_renders_the_same_tiles(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert run("create-scene", "town")[0] == 0
     assert run("add-files", "town", str(write_town(tmp_path / "files")))[0] == 0
     assert run("create-rendering", "town", "view", "--res", "0.05", "--view", "0/45", "--data", "tile")[0] == 0
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0") as cluster:
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0", local_directory=tmp_path / "scratch"
+    ) as cluster:
         status, out, err = run("render", "view", "--dask", cluster.scheduler_address, "--json", "--stats")
     assert status == 0, err
     result = json.loads(out)

@@ -18,7 +18,7 @@ from tests.cli.towns import Run, write_town
 
 pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
 distributed = pytest.importorskip("distributed", reason="install map3d[dask]")
-pytestmark = pytest.mark.whole
+pytestmark = [pytest.mark.whole, pytest.mark.endurance]
 
 VIEWS = ("--res", "0.03", "--view", "0/45", "--view", "90/30", "--view", "180/45")
 
@@ -66,7 +66,8 @@ def test_nodes_give_the_published_folder_of_one_machine(
         status, _, err = run(*words, "--workspace", str(planner.root))
         assert status == 0, err
     with ExitStack() as stack:
-        cluster = stack.enter_context(distributed.LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0"))
+        options = {"host": "127.0.0.1", "dashboard_address": "127.0.0.1:0", "local_directory": tmp_path / "scratch"}
+        cluster = stack.enter_context(distributed.LocalCluster(n_workers=2, threads_per_worker=1, **options))
         lost, kept = (stack.enter_context(worker(tmp_path / name, catalogue)) for name in ("lost", "kept"))
         over = threading.Event()
         killer = threading.Thread(target=kill_when_it_renders, args=(lost, planner, over))

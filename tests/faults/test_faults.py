@@ -9,6 +9,7 @@ from tests.faults.kills import run_kills
 from tests.faults.system_calls import is_strace_usable, run_system_calls
 
 
+@pytest.mark.endurance
 def test_killed_processes_lose_no_tile() -> None:
     (report,) = run_kills(runs=1, kills=8, seed=20, houses=24)
     assert report.kills.total() >= 8

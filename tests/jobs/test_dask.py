@@ -2,6 +2,7 @@
 
 import os
 import signal
+import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -48,7 +49,10 @@ def cluster(workers: int) -> Iterator[Any]:
     """Its scheduler blames a task at the first worker that it loses."""
     with (
         dask.config.set({"distributed.scheduler.allowed-failures": 0}),
-        distributed.LocalCluster(n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0") as local,
+        tempfile.TemporaryDirectory() as scratch,
+        distributed.LocalCluster(
+            n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0", local_directory=scratch
+        ) as local,
     ):
         yield local
 
@@ -69,7 +73,7 @@ def processes(events: list[RunEvent]) -> set[int]:
     return {int(event.lease.worker.rsplit(".", 3)[1]) for event in events if isinstance(event, JobDone)}
 
 
-@pytest.mark.parametrize("workspace", ["sqlite", "mongodb"], indirect=True)
+@pytest.mark.parametrize("workspace", ["sqlite", pytest.param("mongodb", marks=pytest.mark.third_party)], indirect=True)
 def test_killed_dask_worker_changes_nothing(workspace: Workspace, catalogue: Catalogue, faults: Path, tmp_path: Path) -> None:
     """A worker is killed while it renders, and Dask does not run its task again."""
     expected = undisturbed(tmp_path)
@@ -111,6 +115,7 @@ def test_reduce_jobs_that_a_killed_process_left_waiting_are_done(workspace: Work
     assert (workspace.manifest_path("r").read_bytes(), stored(workspace)) == expected
 
 
+@pytest.mark.third_party
 def test_adaptive_cluster_grows_and_its_new_worker_takes_part(workspace: Workspace, catalogue: Catalogue, faults: Path, tmp_path: Path) -> None:
     expected = undisturbed(tmp_path)
     (faults / "slow").write_text("1")
@@ -130,6 +135,7 @@ def test_adaptive_cluster_grows_and_its_new_worker_takes_part(workspace: Workspa
     assert (workspace.manifest_path("r").read_bytes(), stored(workspace)) == expected
 
 
+@pytest.mark.third_party
 def test_faulty_block_is_quarantined_and_a_resident_subprocess_does_the_others(workspace: Workspace, catalogue: Catalogue, faults: Path) -> None:
     (faults / "log").touch()
     with cluster(1) as local, dask_pools(local, workspace, catalogue) as pools:
@@ -147,6 +153,7 @@ def test_faulty_block_is_quarantined_and_a_resident_subprocess_does_the_others(w
         assert len(set((faults / "log").read_text().split())) == 1, "one subprocess does all jobs of a Dask worker"
 
 
+@pytest.mark.third_party
 def test_stop_finishes_current_blocks_and_ends_the_subprocesses(workspace: Workspace, catalogue: Catalogue, faults: Path) -> None:
     (faults / "slow").write_text("0.2")
     (faults / "log").touch()
@@ -165,6 +172,7 @@ def test_stop_finishes_current_blocks_and_ends_the_subprocesses(workspace: Works
             time.sleep(0.05)
 
 
+@pytest.mark.third_party
 def test_second_stop_releases_the_blocks(workspace: Workspace, catalogue: Catalogue, faults: Path) -> None:
     (faults / "slow").write_text("50")
     (faults / "log").touch()

@@ -34,7 +34,7 @@ def test_faulty_block_tells_how_it_failed(town: Town, faults: Path, kind: str) -
     block = BlockId(town.rendering.zmax - 3, 3, 5)
     (faults / f"{block.z}-3-5").write_text(kind)
     before = list(town.catalogue.jobs("town-a"))
-    found = try_block(town, block)
+    found = try_block(town, block, timeouts=TIMEOUTS if kind == "hang" else replace(TIMEOUTS, block_s=60))
     outcome, signal, reason = OUTCOMES[kind]
     assert (found.outcome, found.signal, found.tiles) == (outcome, signal, {})
     assert reason in found.reason

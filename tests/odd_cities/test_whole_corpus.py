@@ -21,7 +21,7 @@ from tests.odd_cities.towns import world_boxes
 from tests.publish.test_report_page import Elements
 
 pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
-pytestmark = pytest.mark.whole
+pytestmark = [pytest.mark.whole, pytest.mark.endurance]
 
 MIB = 1 << 20
 LIMIT_MIB = 320

@@ -18,10 +18,10 @@ from .mitsuba_scene import MitsubaScene  # noqa: E402
 
 DEPTH_M = 0.005
 COPLANAR_M = 0.01
-VIEWS = ["30-10", "30-22.5", "30-45", "30-90"]
+VIEWS = ["30-45", *(pytest.param(view, marks=pytest.mark.third_party) for view in ("30-10", "30-22.5", "30-90"))]
 
 
-@pytest.fixture(scope="session", params=["town", "ingolstadt"])
+@pytest.fixture(scope="session", params=["town", pytest.param("ingolstadt", marks=pytest.mark.third_party)])
 def pair(request: pytest.FixtureRequest) -> tuple[OracleScene, MitsubaScene]:
     oracle: OracleScene = request.getfixturevalue(request.param)
     return oracle, MitsubaScene(oracle.assets, np.array(oracle.scene.origin), oracle.texture)

@@ -20,7 +20,8 @@ from .mitsuba_scene import MitsubaScene  # noqa: E402
 
 LAYERS = [_core.LayerSpec(kind, "png") for kind in ("color", "normal", "id", "depth")]
 SIZE = (320, 240)
-VIEWS = ["perspective-air", "perspective-street", "perspective-below", "perspective-rolled", "orthographic-level", "orthographic-below"]
+OTHERS = ("perspective-street", "perspective-below", "perspective-rolled", "orthographic-level", "orthographic-below")
+VIEWS = ["perspective-air", *(pytest.param(view, marks=pytest.mark.third_party) for view in OTHERS)]
 COPLANAR_M = 0.01
 
 

@@ -21,7 +21,7 @@ MEDIA_TYPES = {".html": ["text/html"], ".css": ["text/css"], ".js": ["text/javas
 EMPTY = [(ZMAX, 15, 0), (ZMAX + 1, 0, 0)]
 
 
-@pytest.fixture(params=[*PROGRAMS, "s3"])
+@pytest.fixture(params=["nginx", "s3", *(pytest.param(name, marks=pytest.mark.third_party) for name in PROGRAMS if name != "nginx")])
 def address(request, workspace, out):
     """The address of the published workspace on a static host."""
     if request.param in PROGRAMS:

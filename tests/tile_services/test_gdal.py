@@ -10,7 +10,10 @@ from PIL import Image
 
 from tests.tile_services.pyramid_pixels import difference
 
-pytestmark = pytest.mark.skipif(shutil.which("gdalinfo") is None, reason="GDAL is not installed: apt install gdal-bin")
+pytestmark = [
+    pytest.mark.third_party,
+    pytest.mark.skipif(shutil.which("gdalinfo") is None, reason="GDAL is not installed: apt install gdal-bin"),
+]
 
 
 def wmts(address, layer="lit:35-40"):

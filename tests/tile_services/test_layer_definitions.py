@@ -37,16 +37,19 @@ def check_qgis(pixels, tmp_path, definition):
     assert difference(got, over_magenta(pixels.level("picture", zmax)[900:1200, 900:1300])) < 0.01
 
 
+@pytest.mark.third_party
 def test_qgis_opens_a_published_folder(pixels, folder, tmp_path):
     check_qgis(pixels, tmp_path, folder / "gis" / "35-40-picture.qlr")
 
 
+@pytest.mark.third_party
 def test_qgis_opens_the_definition_of_the_server(pixels, address, tmp_path):
     (tmp_path / "layer.qlr").write_bytes(httpx.get(f"{address}/gis/lit/35-40.qlr").content)
     check_qgis(pixels, tmp_path, tmp_path / "layer.qlr")
 
 
 @pytest.mark.skipif(shutil.which("gdal_translate") is None, reason="GDAL is not installed: apt install gdal-bin")
+@pytest.mark.third_party
 @pytest.mark.parametrize("source", ["folder", "server"])
 def test_gdal_reads_the_same_pixels(pixels, folder, address, tmp_path, source):
     text = (folder / "gis" / "35-40-picture.xml").read_bytes() if source == "folder" else httpx.get(f"{address}/gis/lit/35-40.xml").content

@@ -7,6 +7,7 @@ import pytest
 from PIL import Image
 
 owslib = pytest.importorskip("owslib", reason="OWSLib is not installed: pip install owslib")
+pytestmark = pytest.mark.third_party
 
 
 def test_wmts(address, pixels):

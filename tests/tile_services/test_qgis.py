@@ -11,6 +11,8 @@ from map3d.tiles.view_plane import plane_crs
 from tests.tile_services.pyramid_pixels import difference, over_magenta
 from tests.tile_services.qgis_process import qgis
 
+pytestmark = pytest.mark.third_party
+
 
 def picture(seen):
     with Image.open(seen["out"]) as image:

@@ -23,7 +23,7 @@ def content(block: BlockId, salt: int) -> list[StoredTile]:
     return [StoredTile(layer, *tile, f"{salt} {layer} {tile}".encode() * 20) for layer in (0, 1) for tile in tiles_of_block(block, SHAPE.zmax)]
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.endurance)])
 def test_tiles_are_right_whatever_happens_to_requests(s3_endpoint: str, tmp_path: Path, seed: int) -> None:
     with faulty_proxy(s3_endpoint, seed, SHARE) as (endpoint, counts), environment(s3_environment(endpoint)):
         url = new_prefix()

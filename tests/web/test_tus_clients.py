@@ -15,6 +15,7 @@ import pytest
 from tests.web.accounts import add_token, add_user
 from tests.web.test_upload_route import Served
 
+pytestmark = pytest.mark.third_party
 SIZE = 20_000_000
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "viewer" / "node_modules" / "tus-js-client"
