@@ -34,12 +34,9 @@ def prepare_scene(buildings: int, res_m: float, color: str) -> tuple[Path, dict[
         run_verb(["add-files", "town", str(folder / "town"), *where])
     if name not in renderings:
         run_verb(["create-rendering", "town", name, "--res", str(res_m), "--view", "0/45", "--color", color, *where])
-    catalogue = workspace.open_catalogue()
-    try:
+    with workspace.open_catalogue() as catalogue:
         record = catalogue.rendering(name)
         return workspace.root / "scenes" / "town", {track.id: track.frame.to_json(track.layers) for track in record.tracks}
-    finally:
-        catalogue.close()
 
 
 def fullest_blocks(scene: _core.Scene, frame: _core.Frame) -> list[tuple[Block, int]]:

@@ -89,11 +89,8 @@ def import_district(folder: Path, kind: str) -> tuple[Workspace, str]:
 def assets_of(folder: Path, kind: str) -> list[Path]:
     """Returns the asset folders of a kind of district."""
     workspace, scene = import_district(folder, kind)
-    catalogue = workspace.open_catalogue()
-    try:
+    with workspace.open_catalogue() as catalogue:
         return [workspace.asset_folder(scene, asset.name) for asset in catalogue.assets(scene)]
-    finally:
-        catalogue.close()
 
 
 def city_centre(kind: str = "plain") -> tuple[float, float]:
@@ -129,8 +126,7 @@ def _publish(city: City) -> None:
 
 def _add_missing_cells(city: City, workspace: Workspace, scene: str) -> int:
     """Adds the missing cells to the city's scene; returns its number of triangles."""
-    catalogue = workspace.open_catalogue()
-    try:
+    with workspace.open_catalogue() as catalogue:
         there = {asset.name for asset in catalogue.assets(scene)}
         each = {kind: catalogue.assets(kind) for kind in set(city.cells.values())}
         total = sum(sum(asset.report["triangles"] for asset in each[kind]) for kind in city.cells.values())
@@ -141,8 +137,6 @@ def _add_missing_cells(city: City, workspace: Workspace, scene: str) -> int:
             offset = np.array([*(CELL_M * step for step in at), 0.0])
             DistrictCopier(workspace, kind, scene, CELL_M).add_copy_at(catalogue, number, offset)
         return total
-    finally:
-        catalogue.close()
 
 
 def _log(what: Any) -> None:

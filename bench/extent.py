@@ -73,16 +73,13 @@ def _create_district(workspace: Workspace, folder: Path) -> None:
 def _measure_size(workspace: Workspace, folder: Path, millions: float, blocks: int) -> Row:
     pitch_m = json.loads((folder / "town" / "town.json").read_text())["extent_m"]
     copies = DistrictCopier(workspace, "district", "extent", pitch_m)
-    catalogue = workspace.open_catalogue()
-    try:
+    with workspace.open_catalogue() as catalogue:
         each = sum(asset.report["triangles"] for asset in catalogue.assets("district"))
         copied = len(catalogue.assets("extent")) // len(catalogue.assets("district"))
         count = max(1, round(millions * 1e6 / each))
         for number in range(copied, count):
             copies.add_copy(catalogue, number)
         _delete_build(workspace, catalogue)
-    finally:
-        catalogue.close()
     name, out, program = f"size-{count}", folder / "answer.json", ["-m", "bench.extent_programs"]
     built = _run_monitored([*program, "build", str(workspace.root), "extent"], folder)
     run_verb(["create-rendering", "extent", name, "--res", str(RES_M), "--view", "0/45", "--color", "jpeg", "-w", str(workspace.root)])

@@ -50,21 +50,15 @@ def memory_usage() -> dict[str, int]:
 
 def run_build(root: Path, scene: str) -> None:
     workspace = Workspace(root)
-    catalogue = workspace.open_catalogue()
-    try:
+    with workspace.open_catalogue() as catalogue:
         build(workspace, catalogue, scene, threads=WORKERS, max_memory_bytes=MAX_MEMORY_BYTES)
-    finally:
-        catalogue.close()
 
 
 def run_render(root: Path, rendering: str, blocks: int) -> dict[str, Any]:
     """Returns seconds per step and the summed responses of the workers."""
     workspace = Workspace(root)
-    catalogue = workspace.open_catalogue()
-    try:
+    with workspace.open_catalogue() as catalogue:
         record = catalogue.rendering(rendering)
-    finally:
-        catalogue.close()
     begun = time.perf_counter()
     scene = open_scene(workspace, record.scene)
     opened = time.perf_counter()

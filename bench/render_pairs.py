@@ -119,12 +119,9 @@ class RenderBenchmark:
 
     def frame(self, name: str) -> tuple[Path, FrameFields]:
         """Returns the scene's folder and the fields of the frame of a rendering's first view."""
-        catalogue = self._workspace.open_catalogue()
-        try:
+        with self._workspace.open_catalogue() as catalogue:
             track = catalogue.rendering(name).tracks[0]
             return self._workspace.root / "scenes" / "town", track.frame.to_json(track.layers)
-        finally:
-            catalogue.close()
 
     def render(self, name: str) -> tuple[RenderCost, dict[str, str]]:
         """Returns the cost of a render, and the hash of each tile by store, layer and number."""

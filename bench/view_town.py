@@ -18,8 +18,7 @@ def prepare_town(folder: Path, millions: float) -> Path:
     """Returns the folder of a built scene of about `millions` million triangles; keeps what earlier runs made in `folder`."""
     workspace = Workspace(folder / "workspace").create()
     pitch_m = _prepare_district(workspace, folder)
-    catalogue = workspace.open_catalogue()
-    try:
+    with workspace.open_catalogue() as catalogue:
         district = catalogue.assets("district")
         each = sum(asset.report["triangles"] for asset in district)
         count = max(1, round(millions * 1e6 / each))
@@ -35,8 +34,6 @@ def prepare_town(folder: Path, millions: float) -> Path:
         if missing or not (workspace.scene_folder(scene) / "scene.json").is_file():
             build(workspace, catalogue, scene, threads=1, max_memory_bytes=MAX_MEMORY_BYTES)
         return workspace.scene_folder(scene)
-    finally:
-        catalogue.close()
 
 
 def _prepare_district(workspace: Workspace, folder: Path) -> float:

@@ -11,7 +11,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
@@ -105,7 +105,7 @@ def shoot_studio(folder: Path) -> None:
     workspace = Workspace(folder / "studio").create()
     password = secrets.token_urlsafe()
     try:
-        with closing(workspace.open_catalogue()) as catalogue:
+        with workspace.open_catalogue() as catalogue:
             Accounts(catalogue).add_user("anna", password, "editor")
         shots.mkdir(exist_ok=True)
         with serving(workspace.root) as address:

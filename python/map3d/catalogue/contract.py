@@ -1,7 +1,7 @@
 """The contract of catalogues: scenes, assets, renderings, jobs, operations (spec/catalogue.md). tests/catalogue checks every implementation."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 from map3d.catalogue.account_records import TokenRecord, UserRecord
 from map3d.catalogue.operation_contract import OperationCatalogue
@@ -21,6 +21,11 @@ class Catalogue(OperationCatalogue, Protocol):
     """Seconds after which a lease expires unless a heartbeat renews it."""
 
     def close(self) -> None: ...
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, *_: object) -> None:
+        """Closes the catalogue."""
 
     # -- scenes and assets ------------------------------------------------------------------------------------------------------
 

@@ -6,7 +6,7 @@ Records are stored as in SQLite, with nested values as JSON text. A change of a 
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any, Final, Self
 
 from map3d.catalogue import codec
 from map3d.catalogue.contract import LEASE_S
@@ -44,6 +44,12 @@ class MongoCatalogue(MongoOperations, MongoAccounts):
 
     def close(self) -> None:
         self._connection.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     # -- scenes and assets ------------------------------------------------------------------------------------------------------
 

@@ -5,7 +5,7 @@ import sqlite3
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Self
 
 from map3d.catalogue import codec
 from map3d.catalogue.contract import LEASE_S
@@ -58,6 +58,12 @@ class SqliteCatalogue(SqliteOperations, SqliteAccounts):
 
     def close(self) -> None:
         self._database.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def create_scene(self, scene: SceneRecord) -> None:
         check_name(scene.name, "scene")

@@ -21,11 +21,8 @@ def role_option(command: Command) -> Command:
 @contextmanager
 def opened_accounts(workspace: Workspace, *, create: bool = False) -> Iterator[Accounts]:
     """Opens the accounts of a workspace, which is created if `create` is set."""
-    catalogue = (workspace.create() if create else workspace).open_catalogue()
-    try:
+    with (workspace.create() if create else workspace).open_catalogue() as catalogue:
         yield Accounts(catalogue)
-    finally:
-        catalogue.close()
 
 
 def read_password(user: str) -> str:

@@ -43,15 +43,12 @@ def command(workspace: Workspace, scene: str, files: Sequence[Path], as_json: bo
     from map3d.ingest.import_files import import_files
     from map3d.ingest.import_options import ImportOptions
 
-    catalogue = workspace.open_catalogue()
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    try:
+    with workspace.open_catalogue() as catalogue:
         with progress_bar(*columns) as bar:
             show = _show(bar, bar.add_task("importing", total=None))
             result = import_files(workspace, catalogue, scene, files, ImportOptions(**options, virtual_rasters=True), name=name, progress=show)
         place = place_line(workspace, catalogue, scene)
-    finally:
-        catalogue.close()
     done, failed = result.imported, result.failed
     if as_json:
         print_json({"imported": done, "failed": [{"source": path, "error": text} for path, text in failed]})

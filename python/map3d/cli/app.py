@@ -1,5 +1,6 @@
 """The group of all commands, and the handling of errors."""
 
+import importlib
 import os
 import sys
 import traceback
@@ -9,7 +10,6 @@ from typing import Any, Final
 import click
 
 from map3d import __version__
-from map3d.cli.lazy_group import LazyGroup
 from map3d.errors import Map3dError
 
 COMMANDS: Final = {
@@ -18,13 +18,13 @@ COMMANDS: Final = {
     "inspect": "inspect",
     "add-files": "add_files",
     "create-rendering": "create_rendering",
-    "add-views": "add_views",
-    "add-layers": "add_layers",
+    "add-views": "add_to_rendering:add_views",
+    "add-layers": "add_to_rendering:add_layers",
     "estimate": "estimate",
     "render": "render",
     "work": "work",
     "jobs": "jobs",
-    "retry": "retry",
+    "retry": "jobs:retry",
     "operations": "operations",
     "serve": "serve",
     "users": "users",
@@ -34,18 +34,29 @@ COMMANDS: Final = {
     "site": "site",
     "verify": "verify",
     "show": "show",
-    "remove-files": "remove_files",
-    "remove-rendering": "remove_rendering",
-    "remove-scene": "remove_scene",
+    "remove-files": "remove:remove_files",
+    "remove-rendering": "remove:remove_rendering",
+    "remove-scene": "remove:remove_scene",
     "demo": "demo",
     "make-town": "make_town",
-    "teatime": "teatime",
+    "teatime": "make_town:teatime",
 }
+"""Command → module of map3d.cli, and the name that the command has there unless it is `command`; in the order of the help."""
 _LONGEST_SENTENCE: Final = 200
 
 
-class Commands(LazyGroup):
-    """Lists the commands with whole sentences, and suggests the nearest one for a misspelt command."""
+class Commands(click.Group):
+    """Loads the module of a command on first use, lists the commands with whole sentences, and suggests the nearest one for a misspelt command."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        module, _, name = COMMANDS[cmd_name].partition(":")
+        command: click.Command = getattr(importlib.import_module(f"map3d.cli.{module}"), name or "command")
+        return command
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
         try:
@@ -62,7 +73,7 @@ class Commands(LazyGroup):
             formatter.write_dl([(name, command.get_short_help_str(_LONGEST_SENTENCE)) for name, command in commands if command is not None])
 
 
-@click.group(cls=Commands, modules=COMMANDS, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 @click.version_option(__version__, prog_name="map3d")
 def cli() -> None:
     """Turn 3D city models into oblique image tiles that any phone can show.

@@ -90,15 +90,12 @@ def command(
     chosen = views or views_around(directions or 4, options.pop("pitch") or (45.0,))
     options.pop("pitch", None)
     request = RenderingRequest(scene, name, chosen, tile_px=int(options.pop("tile_size")), **options)
-    catalogue = workspace.open_catalogue()
-    try:
+    with workspace.open_catalogue() as catalogue:
         request.check(catalogue)
         choose_content(catalogue, scene, keep_outliers, cluster)
         choose_style(catalogue, scene, style)
         built = build_with_progress(workspace, catalogue, scene, threads=usable_cores(), max_memory_bytes=max_memory)
         record = create_rendering(workspace, catalogue, request)
-    finally:
-        catalogue.close()
     if as_json:
         print_json({**asdict(record), "build": built})
         return

@@ -68,11 +68,8 @@ def command(
 
     request = SceneRequest(name, title, attribution, crs, ground_plane, files, switches, bool(keep_outliers), cluster or 0, style or [])
     request.check()
-    catalogue = workspace.create().open_catalogue()
-    try:
+    with workspace.create().open_catalogue() as catalogue:
         scene = create_scene(workspace, catalogue, request)
-    finally:
-        catalogue.close()
     if as_json:
         print_json(scene)
     else:

@@ -48,12 +48,9 @@ def remaining_steps(workspace: Workspace, files: Path, data: DataEncoding = DEFA
     """Yields (description, command line) of each step up to rendering, without the steps that an earlier run has completed."""
     where = ["--workspace", str(workspace.root)]
     yield f"generating a town in {files}", ["make-town", "-o", str(files), *TOWN]
-    catalogue = workspace.open_catalogue()
-    try:
+    with workspace.open_catalogue() as catalogue:
         assets = {scene.name: catalogue.assets(scene.name) for scene in catalogue.scenes()}
         renderings = {rendering.name for rendering in catalogue.renderings()}
-    finally:
-        catalogue.close()
     if SCENE not in assets:
         yield "creating a scene", ["create-scene", SCENE, *TITLE, *where]
     if not assets.get(SCENE):

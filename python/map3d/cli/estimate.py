@@ -23,12 +23,9 @@ def command(workspace: Workspace, rendering: str, workers: int, max_memory: int 
     """
     from map3d.renderings.cost_estimate import estimate
 
-    catalogue = workspace.open_catalogue()
-    try:
+    with workspace.open_catalogue() as catalogue:
         built = build_with_progress(workspace, catalogue, catalogue.rendering(rendering).scene, threads=workers, max_memory_bytes=max_memory)
         found = estimate(workspace, catalogue, rendering, workers)
-    finally:
-        catalogue.close()
     if as_json:
         print_json({**asdict(found), "build": built})
         return

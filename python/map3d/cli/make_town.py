@@ -1,4 +1,4 @@
-"""map3d make-town."""
+"""map3d make-town and teatime: scenes for trying map3d."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -51,3 +51,13 @@ def command(out: Path, formats: str, workers: int, estimate: bool, as_json: bool
     else:
         click.echo(f"{report.buildings:,} buildings, {report.trees:,} trees, {report.textures:,} textures, {size_text(report.disk_bytes)} in {out}")
         click.echo(f"next: map3d site {out} -o SITE")
+
+
+@click.command("teatime")
+@click.option("-o", "--out", type=click.Path(path_type=Path), default=Path("teatime"), show_default=True, help="Output folder.")
+def teatime(out: Path) -> None:
+    """Write the teatime scene as OBJ files: a teapot at the origin and a cube next to it."""
+    from map3d_town.teatime import write_teatime
+
+    write_teatime(out)
+    click.echo(f"wrote {out}; next: map3d site {out} -o teatime-site")

@@ -53,8 +53,7 @@ def command(
     from map3d.jobs.run import Run
     from map3d.jobs.run_settings import RunSettings
 
-    catalogue = workspace.open_catalogue()
-    try:
+    with workspace.open_catalogue() as catalogue:
         settings = RunSettings(workers, max_memory)
         scene = catalogue.rendering(rendering).scene
         built = build_with_progress(workspace, catalogue, scene, threads=workers, max_memory_bytes=max_memory)
@@ -64,8 +63,6 @@ def command(
             return
         with _dask_pools(workspace, catalogue, settings, dask, dask_workspace) as pools:
             result = render_with_progress(Run(workspace, catalogue, rendering, settings, pools))
-    finally:
-        catalogue.close()
     if as_json:
         print_json({**asdict(result), "stats": summary(result.stats) if with_stats else None, "build": built})
     else:

@@ -61,9 +61,6 @@ def command(
 
 def page_path(workspace: Workspace, rendering: str | None) -> str:
     """Returns the path of the rendering's map relative to the server's address; empty for the list of renderings. Raises NotFound."""
-    catalogue = workspace.open_catalogue()
-    try:
+    with workspace.open_catalogue() as catalogue:
         names = [catalogue.rendering(rendering).name] if rendering is not None else [record.name for record in catalogue.renderings()]
-    finally:
-        catalogue.close()
     return f"view/{names[0]}/" if len(names) == 1 else ""

@@ -31,11 +31,8 @@ def command(workspace: Workspace, topic: str, name: str | None, as_json: bool) -
     """
     if name is None and topic not in ("scenes", "renderings"):
         raise BadRequest(f"show {topic}: missing NAME; map3d show scenes and map3d show renderings list the names")
-    catalogue = workspace.open_catalogue()
-    try:
+    with workspace.open_catalogue() as catalogue:
         _SHOW[topic](catalogue, name or "", as_json)
-    finally:
-        catalogue.close()
 
 
 def _scenes(catalogue: Catalogue, _name: str, as_json: bool) -> None:

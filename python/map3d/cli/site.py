@@ -77,8 +77,7 @@ def command(
     settings = RunSettings(workers, max_memory)
     settings.check()
     request = _site_request(folder, views, **options)
-    catalogue = workspace.create().open_catalogue()
-    try:
+    with workspace.create().open_catalogue() as catalogue:
         summary = _update_files(workspace, catalogue, request)
         if not catalogue.assets(request.name):
             click.echo(f"the scene {request.name} has no files left; {out} stays as it was published")
@@ -95,8 +94,6 @@ def command(
         result = render_with_progress(Run(workspace, catalogue, record.name, settings))
         seconds = monotonic() - started if result.statistics.done else None
         store_report(workspace, catalogue, request, made, summary, workers, seconds)
-    finally:
-        catalogue.close()
     print_result(record.name, result)
     if not result.complete:
         raise click.exceptions.Exit(130 if result.stopped else 1)

@@ -40,8 +40,7 @@ def command(
         click.echo(f"choosing {plural(sample, 'block')} with seed {seed}", err=True)
 
     findings = Findings()
-    catalogue = workspace.open_catalogue()
-    try:
+    with workspace.open_catalogue() as catalogue:
         chosen = [catalogue.rendering(name) for name in renderings] or catalogue.renderings()
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
         with progress_bar(*columns) as bar:
@@ -57,8 +56,6 @@ def command(
                 verify_rendering(workspace, catalogue, record.name, findings, progress)
                 if deep or sample:
                     verify_pixels(workspace, catalogue, record.name, findings, progress, sample=None if deep else sample, seed=seed)
-    finally:
-        catalogue.close()
     if as_json:
         print_json({"wrong": findings.wrong, "total": findings.total, "counted": findings.counted})
     else:

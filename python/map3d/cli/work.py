@@ -37,12 +37,8 @@ def command(
     from map3d.jobs.run_settings import RunSettings
     from map3d.jobs.work import Work
 
-    catalogue = workspace.open_catalogue()
-    try:
-        with RunProgress() as progress:
-            result = Work(workspace, catalogue, RunSettings(workers, max_memory), renderings, forever=forever).run(progress)
-    finally:
-        catalogue.close()
+    with workspace.open_catalogue() as catalogue, RunProgress() as progress:
+        result = Work(workspace, catalogue, RunSettings(workers, max_memory), renderings, forever=forever).run(progress)
     if as_json:
         print_json(asdict(result))
     else:
@@ -60,11 +56,8 @@ def do_operations(workspace: Workspace, renderings: tuple[str, ...], *, forever:
 
     if renderings:
         raise BadRequest(f"--operations takes no renderings, got {', '.join(renderings)}")
-    catalogue = workspace.open_catalogue()
-    try:
+    with workspace.open_catalogue() as catalogue:
         ended = OperationWorker(workspace, catalogue, on_operation=lambda line: click.echo(line, err=True)).run(forever=forever)
-    finally:
-        catalogue.close()
     if as_json:
         print_json({"operations": ended})
     else:

@@ -34,12 +34,11 @@ def open_operation(setup: dict[str, Any]) -> Handler:
 
     def handle(request: dict[str, Any], _blobs: list[bytes], send: Callable[[Any], None]) -> tuple[dict[str, Any], Sequence[bytes]]:
         operation, report = _load(request), OperationReport(send)
-        catalogue = workspace.open_catalogue()
-        try:
-            return {"message": DO[operation.kind](workspace, catalogue, operation, report)}, []
-        finally:
-            report.flush()
-            catalogue.close()
+        with workspace.open_catalogue() as catalogue:
+            try:
+                return {"message": DO[operation.kind](workspace, catalogue, operation, report)}, []
+            finally:
+                report.flush()
 
     return handle
 

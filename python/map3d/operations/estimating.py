@@ -35,10 +35,7 @@ def open_estimator(setup: dict[str, Any]) -> Handler:
     workspace = Workspace(Path(setup["workspace"]), setup["catalogue"])
 
     def handle(request: dict[str, Any], _blobs: list[bytes], _report: Callable[[Any], None]) -> tuple[dict[str, Any], Sequence[bytes]]:
-        catalogue = workspace.open_catalogue()
-        try:
+        with workspace.open_catalogue() as catalogue:
             return asdict(estimate(workspace, catalogue, request["rendering"], request["workers"])), []
-        finally:
-            catalogue.close()
 
     return handle

@@ -36,15 +36,12 @@ def inspect_files(paths: Sequence[Path], options: ImportOptions, progress: OnFil
     """
     with TemporaryDirectory(prefix="map3d-inspect-") as folder:
         workspace = Workspace(Path(folder), catalogue_url=str(Path(folder) / "catalogue.sqlite"))
-        catalogue = workspace.open_catalogue()
-        try:
+        with workspace.open_catalogue() as catalogue:
             catalogue.create_scene(SceneRecord(_SCENE))
             imported = import_files(workspace, catalogue, _SCENE, paths, options, progress=progress)
             files = tuple(file_contents(workspace, catalogue, _SCENE))
             clusters = _clusters(workspace, catalogue)
             crs = catalogue.scene(_SCENE).crs
-        finally:
-            catalogue.close()
     return Inspection(crs, union([file.box for file in files]), files, clusters, tuple(imported.failed), tuple(imported.left_alone))
 
 

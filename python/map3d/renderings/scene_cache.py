@@ -50,11 +50,8 @@ def scene_in_use(workspace: Workspace, record: SceneRecord) -> Iterator[Path]:
 @contextmanager
 def open_registry(workspace: Workspace, scene: str) -> Iterator[Registry]:
     """Opens the registry of a scene, of a copy that is fetched if another host builds the scene. Raises the errors of `scene_in_use`."""
-    catalogue = workspace.open_catalogue()
-    try:
+    with workspace.open_catalogue() as catalogue:
         record = catalogue.scene(scene)
-    finally:
-        catalogue.close()
     with scene_in_use(workspace, record), Registry(workspace.registry_path(scene)) as registry:
         yield registry
 

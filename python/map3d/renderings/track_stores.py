@@ -45,11 +45,8 @@ def open_track(workspace: Workspace, record: RenderingRecord, track: str, *, rea
 
 def rendering_record(workspace: Workspace, rendering: str) -> RenderingRecord:
     """Reads a rendering's record from the catalogue. Raises NotFound."""
-    catalogue = workspace.open_catalogue()
-    try:
+    with workspace.open_catalogue() as catalogue:
         return catalogue.rendering(rendering)
-    finally:
-        catalogue.close()
 
 
 def find_track(workspace: Workspace, record: RenderingRecord, track: str, *, read_only: bool = True) -> TileStore | None:

@@ -1,78 +1,27 @@
-"""map3d jobs show."""
+"""What map3d jobs shows: the progress of all renderings or of one, as a document, a line or tables."""
 
-import json
-import time
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-import click
-from rich.console import Console, Group, RenderableType
-from rich.live import Live
+from rich.console import Group, RenderableType
 from rich.text import Text
 
-from map3d.catalogue import Catalogue, State, Workspace
-from map3d.cli.options import json_option, workspace_option
-from map3d.cli.output import counts_text, plural, print_json, size_text, table, time_text
+from map3d.catalogue import Catalogue, State
+from map3d.cli.output import counts_text, plural, size_text, table, time_text
 
 if TYPE_CHECKING:
     from map3d.jobs.progress_report import ProgressReport
 
 MAX_ROWS: Final = 20
 """Leases and failing blocks that are listed; --json lists more."""
-_WIDTH: Final = 160
-"""Of tables in a pipe."""
 
 
-@click.command("show")
-@click.argument("rendering", required=False)
-@click.option("--watch", is_flag=True, help="Refresh until no block is left to render; in a pipe, print one line per refresh.")
-@click.option("--every", type=click.FloatRange(min=0.1), default=2.0, show_default=True, help="Seconds between refreshes of --watch.")
-@json_option
-@workspace_option
-def command(workspace: Workspace, rendering: str | None, watch: bool, every: float, as_json: bool) -> None:
-    """Show the progress of RENDERING, its workers and its failures; without RENDERING, all renderings in one table."""
-    catalogue = workspace.open_catalogue()
-    try:
-        if watch:
-            _watch(catalogue, rendering, every, as_json)
-            return
-        view = _load(catalogue, rendering)
-        if as_json:
-            print_json(view.document())
-        else:
-            _console().print(view.display())
-    finally:
-        catalogue.close()
-
-
-def _watch(catalogue: Catalogue, rendering: str | None, every_s: float, as_json: bool) -> None:
-    if as_json or not Console().is_terminal:
-        for view in _refreshes(catalogue, rendering, every_s):
-            click.echo(json.dumps(view.document(), default=str) if as_json else view.line())
-        return
-    with Live(console=_console(), auto_refresh=False) as live:
-        for view in _refreshes(catalogue, rendering, every_s):
-            live.update(view.display(), refresh=True)
-
-
-def _refreshes(catalogue: Catalogue, rendering: str | None, every_s: float) -> "Iterator[_Overview | _Detail]":
-    """Yields the state until nothing is left to render. Reading it takes at most a tenth of the time, however many blocks there are."""
-    while True:
-        started_s = time.monotonic()
-        view = _load(catalogue, rendering)
-        yield view
-        if not view.has_open_jobs:
-            return
-        time.sleep(max(every_s, 9 * (time.monotonic() - started_s)))
-
-
-def _load(catalogue: Catalogue, rendering: str | None) -> "_Overview | _Detail":
+def load_progress(catalogue: Catalogue, rendering: str | None) -> "Overview | Detail":
     if rendering is None:
-        return _Overview([(item.name, item.scene, catalogue.count_jobs(item.name)) for item in catalogue.renderings()])
+        return Overview([(item.name, item.scene, catalogue.count_jobs(item.name)) for item in catalogue.renderings()])
     from map3d.jobs.progress_report import report_progress
 
-    return _Detail(report_progress(catalogue, rendering))
+    return Detail(report_progress(catalogue, rendering))
 
 
 def _has_open_jobs(counts: dict[State, int]) -> bool:
@@ -80,7 +29,7 @@ def _has_open_jobs(counts: dict[State, int]) -> bool:
 
 
 @dataclass(frozen=True)
-class _Overview:
+class Overview:
     """All renderings: name, scene, counts."""
 
     rows: list[tuple[str, str, dict[State, int]]]
@@ -102,7 +51,7 @@ class _Overview:
 
 
 @dataclass(frozen=True)
-class _Detail:
+class Detail:
     """One rendering."""
 
     report: "ProgressReport"
@@ -172,7 +121,3 @@ def _share(counts: dict[State, int]) -> str:
     total = sum(counts.values())
     done = counts.get(State.DONE, 0)
     return "–" if not total else f"{100 * done // total} %"
-
-
-def _console() -> Console:
-    return Console(highlight=False, width=None if Console().is_terminal else _WIDTH)
