@@ -3,7 +3,7 @@ import { resolve } from "node:path";
 import { expect, test } from "vitest";
 import { roofInWords } from "../../page/roofs";
 
-const LIST = resolve(import.meta.dirname, "../../../crates/map3d-read/src/citygml/code_lists/sig3d_roof_type.txt");
+const LIST = resolve(import.meta.dirname, "../../../crates/map3d-read/src/city_model/code_lists/sig3d_roof_type.txt");
 
 test("every roof of the SIG3D list has a name in German and French", () => {
   const names = readFileSync(LIST, "utf8").split("\n").filter((line) => line && !line.startsWith("#")).map((line) => line.split("\t")[1] ?? "");

@@ -1,0 +1,6 @@
+//! Triangulates polygons with holes, and TINs of control points.
+
+pub mod constrained_delaunay;
+mod t_junctions;
+pub mod tin;
+pub mod triangulate;
