@@ -39,11 +39,11 @@ def skip_reasons():
 
 def reasons_of_functions(sources):
     texts = {path.name: text for path, text in sources.items()}
-    triangulation = re.findall(r'Self::\w+ => "([^"]*)"', texts["triangulate.rs"])
+    triangulation = re.findall(r'Self::\w+ => "([^"]*)"', texts["polygon_error.rs"])
     geometry = re.findall(r'^ +\("([^"]*)", self\.\w+\),$', texts["validation.rs"], re.MULTILINE)
-    implicit = re.findall(r'Err\("([^"]*)"\)', texts["implicit_geometry.rs"])
+    implicit = re.findall(r'Err\("([^"]*)"\)', texts["implicit_geometry_parser.rs"])
     rings = re.findall(r'"(ring [^"]*)"(?:\.to_owned\(\)|\))', texts["tessellate.rs"])
-    polygons = re.findall(r'=> Some\("([^"]*)"\)', texts["geometry_parser.rs"])
+    polygons = re.findall(r'=> Some\("([^"]*)"\)', texts["positions.rs"])
     tins = re.findall(r'Self::\w+ => "([^"]*)"', texts["tin.rs"])
     grids = re.findall(r'(?:Err|ok_or)\("(RasterRelief: [^"]*)"\)', texts["grid_parser.rs"])
     files = {f"RasterRelief: {reason}" for reason in re.findall(r'Self::\w+ => "([^"]*)"', texts["asset_folder.rs"])}

@@ -14,4 +14,5 @@ pub use document::transparency::Transparency;
 pub use document::{DocumentReader, ReliefGrid};
 pub use formats::detect::{Format, detect_format};
 pub use formats::open::{open, write_tables};
-pub use triangulation::triangulate::{Coverage, PolygonError, Triangulator};
+pub use triangulation::polygon_error::PolygonError;
+pub use triangulation::triangulate::{Coverage, Triangulator};

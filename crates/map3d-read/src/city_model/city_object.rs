@@ -3,13 +3,13 @@
 use map3d_base::asset::Rank;
 
 use super::appearance::Appearances;
+use super::attributes::Attributes;
 use super::crs_table::CrsNumber;
 use super::feature_types::FeatureKind;
 use super::geometry_arena::{GeometryArena, GeometryNode, NodeId, NodeKind};
 use super::ids::{Id, IdMap};
+use super::implicit_geometry::ImplicitGeometry;
 use crate::document::ReliefGrid;
-use crate::formats::citygml::attributes::Attributes;
-use crate::formats::citygml::implicit_geometry::ImplicitGeometry;
 
 /// A geometry property of a feature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -11,19 +11,18 @@ use super::crs_table::CrsNumber;
 use super::feature_types::to_class_name;
 use super::geometry_arena::{GeometryArena, NodeId};
 use super::ids::{self, Id, IdSet};
+use super::implicit_geometry::PrototypeSource;
 use super::lod_selection::{representations_at, select_lods};
 use super::material_resolver::MaterialResolver;
+use super::own_appearance::add_own_appearances;
 use super::polygons::{CollectedPolygons, LinkedGeometry, OrientedPolygon, UnresolvedXLink, VisitState, XLinkIndex, collect_polygons};
 use super::prototype_table::{PrototypePlacement, PrototypeTable, read_library_object};
-use super::shared_geometry::{DeferredXLink, SharedGeometry};
+use super::shared_geometry::{DeferredXLink, MissingGeometry, SharedGeometry};
 use super::tessellate::{MaterialSources, Tessellator, ThematicSurface};
 use crate::document::ReliefGrid;
 use crate::document::asset_folder::AssetFolder;
 use crate::document::options::ReadOptions;
 use crate::document::report_builder::{LimitCheck, ReportBuilder};
-use crate::formats::citygml::implicit_geometry::PrototypeSource;
-use crate::formats::citygml::references::References;
-use crate::formats::citygml::textured_surface::add_own_appearances;
 use crate::formats::detect::{Format, detect_format};
 
 const BATCH_TRIANGLES: usize = 1 << 14;
@@ -232,17 +231,17 @@ impl FeatureConverter {
     }
 
     /// After the last city object: converts geometry that other city objects refer to and that its owner did not convert, and that of other documents.
-    pub fn convert_deferred(&mut self, references: &References, report: &mut ReportBuilder) -> Result<()> {
+    pub fn convert_deferred(&mut self, missing: &MissingGeometry, report: &mut ReportBuilder) -> Result<()> {
         self.shared.add_unvisited();
         for link in std::mem::take(&mut self.shared.deferred) {
             let Some(node) = self.shared.geometry.by_id.get(&link.target).copied() else {
-                self.report_unresolved(link.target, link.object, references, report)?;
+                self.report_unresolved(link.target, link.object, missing, report)?;
                 continue;
             };
             let collected = collect_polygons(&self.shared.geometry, &mut self.shared.visits, node, link.reversed);
             report.skip_many("geometry that refers to itself", collected.cycles, || self.objects[link.object as usize].name.clone())?;
             for unresolved in &collected.unresolved {
-                self.report_unresolved(unresolved.target, link.object, references, report)?;
+                self.report_unresolved(unresolved.target, link.object, missing, report)?;
             }
             self.tessellate_shared(&collected.polygons, link.object, link.rank, report)?;
         }
@@ -250,8 +249,8 @@ impl FeatureConverter {
         Ok(())
     }
 
-    fn report_unresolved(&self, target: Id, object: u32, references: &References, report: &mut ReportBuilder) -> Result<()> {
-        match references.find_failure(target) {
+    fn report_unresolved(&self, target: Id, object: u32, missing: &MissingGeometry, report: &mut ReportBuilder) -> Result<()> {
+        match missing.get(&target) {
             Some((reason, href)) => report.warn(reason, href),
             None => report.warn("unresolved reference", self.objects[object as usize].name.as_str()),
         }
@@ -335,7 +334,7 @@ impl FeatureConverter {
 
     /// After the last city object: converts prototypes that are defined in other city objects, then returns the instances with their prototypes'
     /// numbers.
-    pub fn finish_instances(&mut self, references: &References, report: &mut ReportBuilder) -> Result<Vec<Instance>> {
+    pub fn finish_instances(&mut self, missing: &MissingGeometry, report: &mut ReportBuilder) -> Result<Vec<Instance>> {
         let placements = std::mem::take(&mut self.prototypes.placements);
         for PrototypePlacement { key, instance, .. } in &placements {
             let node = self.shared.geometry.by_id.get(key).copied();
@@ -351,7 +350,7 @@ impl FeatureConverter {
                     self.instance_crs.push(crs);
                 }
                 None => {
-                    if let Some((reason, href)) = references.find_failure(key) {
+                    if let Some((reason, href)) = missing.get(&key) {
                         report.warn(reason, href)?;
                     }
                     report.skip("implicit geometry without a prototype", || self.objects[instance.object as usize].name.clone())?;

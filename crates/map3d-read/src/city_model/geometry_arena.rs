@@ -2,12 +2,14 @@
 
 use map3d_base::Vec3;
 
+use super::appearance::SurfaceDataKind;
 use super::crs_table::{CrsNumber, DOCUMENT_CRS};
 use super::ids::{self, Id, IdMap};
-use crate::formats::citygml::textured_surface::OwnAppearance;
 
 pub type NodeId = u32;
 pub const NO_NODE: NodeId = NodeId::MAX;
+/// Largest depth of geometry in geometry, and of the elements of a document.
+pub const MAX_DEPTH: usize = 256;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NodeKind {
@@ -39,6 +41,16 @@ pub struct Ring {
     pub id: Id,
     pub start: u32,
     pub end: u32,
+}
+
+/// The appearance inside a textured surface.
+pub struct OwnAppearance {
+    /// The textured surface.
+    pub node: NodeId,
+    pub is_front: bool,
+    pub kind: SurfaceDataKind,
+    /// One pair per point of the rings, in their order.
+    pub uvs: Vec<f64>,
 }
 
 #[derive(Default)]

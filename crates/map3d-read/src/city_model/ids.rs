@@ -16,6 +16,11 @@ pub fn hash_id(text: &str) -> Id {
     XxHash3_64::oneshot(text.trim().as_bytes()).max(1)
 }
 
+/// Mixes the id of an element with the key of its document, 0 for the document that is read.
+pub fn mix_id(id: Id, document_key: Id) -> Id {
+    if id == NONE { id } else { (id ^ document_key).max(1) }
+}
+
 /// Returns ids unchanged: they are hashes already.
 #[derive(Default)]
 pub struct IdentityHasher(u64);
@@ -31,5 +36,19 @@ impl Hasher for IdentityHasher {
 
     fn write_u64(&mut self, value: u64) {
         self.0 = value;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ids_of_two_documents_differ() {
+        let id = hash_id("a");
+        assert_eq!(mix_id(id, 0), id);
+        assert_eq!(mix_id(NONE, 7), NONE);
+        assert_ne!(mix_id(id, 7), id);
+        assert_ne!(mix_id(id, id), NONE);
     }
 }

@@ -9,9 +9,9 @@ use map3d_base::asset::{Batch, Instance, Rank};
 use super::crs_table::CrsNumber;
 use super::geometry_arena::{GeometryArena, NodeKind};
 use super::ids::{self, Id, hash_id};
+use super::implicit_geometry::{ImplicitGeometry, PrototypeSource};
 use super::material_resolver::MaterialResolver;
 use crate::document::DocumentReader;
-use crate::formats::citygml::implicit_geometry::{ImplicitGeometry, PrototypeSource};
 use crate::formats::obj::ObjReader;
 
 /// A placement and the key of its prototype. The prototype's number is known at the end of the document.

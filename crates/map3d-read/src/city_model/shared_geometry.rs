@@ -2,10 +2,9 @@
 
 use map3d_base::asset::Rank;
 
-use super::geometry_arena::{GeometryArena, NO_NODE, NodeId, NodeKind, Ring};
-use super::ids::{self, Id, IdSet};
+use super::geometry_arena::{GeometryArena, MAX_DEPTH, NO_NODE, NodeId, NodeKind, Ring};
+use super::ids::{self, Id, IdMap, IdSet};
 use super::polygons::VisitState;
-use crate::formats::citygml::xml_reader::MAX_DEPTH;
 
 /// An XLink to geometry of another city object, resolved at the end of the document. Applies only if the owner did not convert that geometry.
 #[derive(Clone, Copy, Debug)]
@@ -15,6 +14,9 @@ pub struct DeferredXLink {
     pub object: u32,
     pub rank: Rank,
 }
+
+/// Geometry that a reference names and that was not found: the reason, and the reference as written.
+pub type MissingGeometry = IdMap<(&'static str, String)>;
 
 #[derive(Default)]
 pub struct SharedGeometry {

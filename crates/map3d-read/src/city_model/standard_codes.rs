@@ -4,7 +4,16 @@
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
-use super::code_lists::Code;
+/// A code as the document writes it.
+#[derive(Clone, Copy, Debug)]
+pub struct Code<'a> {
+    /// Local name of the property that has it.
+    pub property: &'a str,
+    pub space: Option<&'a str>,
+    pub text: &'a str,
+    /// The object has codes of the German cadastre.
+    pub is_adv: bool,
+}
 
 /// Labels by code.
 type StandardList = LazyLock<HashMap<&'static str, &'static str>>;

@@ -146,7 +146,7 @@ impl Tessellator {
             Ok(Coverage::Exact) => {}
         }
         self.push_triangles(crs, polygon.reversed, surface, material);
-        report.check_limit(LimitCheck::triangles(self.triangles, &self.options))
+        report.check_limit(LimitCheck::triangles(self.triangles, self.options.max_triangles))
     }
 
     fn resolve_material(

@@ -5,8 +5,6 @@ use std::path::{Path, PathBuf};
 use map3d_base::asset::AssetReport;
 use map3d_base::{Error, Result};
 
-use super::options::ReadOptions;
-
 pub struct ReportBuilder {
     report: AssetReport,
     path: PathBuf,
@@ -24,8 +22,8 @@ pub struct LimitCheck {
 
 impl LimitCheck {
     #[inline]
-    pub fn triangles(got: u64, options: &ReadOptions) -> Self {
-        Self { what: "number of triangles", got, limit: "max_triangles", value: options.max_triangles }
+    pub fn triangles(got: u64, value: u64) -> Self {
+        Self { what: "number of triangles", got, limit: "max_triangles", value }
     }
 }
 

@@ -12,7 +12,7 @@ use spade::{
 };
 use twox_hash::XxHash3_64;
 
-use super::triangulate::PolygonError;
+use super::polygon_error::PolygonError;
 
 /// A polygon with more vertices has no triangles; its triangulation would take more memory than a parser has.
 pub const MAX_VERTICES: usize = 1_000_000;

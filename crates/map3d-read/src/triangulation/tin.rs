@@ -11,7 +11,7 @@ use spade::{Intersection, LineIntersectionIterator, PositionInTriangulation, Tri
 use super::constrained_delaunay::{
     Budget, Cdt, MAX_VERTICES, Vertex, add_ring_edge, choose_insertion_order, find_distinct_points, locate_centroids, place,
 };
-use super::triangulate::PolygonError;
+use super::polygon_error::PolygonError;
 
 /// A stop line that comes no further into a triangle touches it.
 const TOUCH_M: f64 = 1e-6;

@@ -4,30 +4,8 @@ use earcut::Earcut;
 use map3d_base::Vec3;
 
 use super::constrained_delaunay;
+use super::polygon_error::PolygonError;
 use super::t_junctions::repair_t_junctions;
-
-/// The reason why a polygon has no triangles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PolygonError {
-    NoArea,
-    NotFinite,
-    /// Its triangulation would take too much memory or time.
-    TooManyVertices,
-    /// Rounding defeated the triangulation.
-    NumericalFailure,
-}
-
-impl PolygonError {
-    /// Returns the reason as written to reports.
-    pub fn reason(self) -> &'static str {
-        match self {
-            Self::NoArea => "polygon without area",
-            Self::NotFinite => "coordinate is not a finite number",
-            Self::TooManyVertices => "polygon with too many vertices to triangulate",
-            Self::NumericalFailure => "polygon that could not be triangulated",
-        }
-    }
-}
 
 /// Whether the triangles cover the polygon's area.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,7 +6,7 @@ use map3d_base::Result;
 use map3d_base::asset::Wrap;
 
 use super::coordinates::parse_numbers;
-use super::geometry_parser::{NamedPoint, read_point};
+use super::positions::{NamedPoint, read_point};
 use super::references::{DocumentNumber, OWN_DOCUMENT, References, Target};
 use super::xml_reader::XmlReader;
 use crate::city_model::appearance::{

@@ -7,22 +7,22 @@ use serde_json::Value;
 
 use super::address::read_address;
 use super::appearance_parser::{AppearanceParser, AppearanceScope};
-use super::attributes::{
-    Attributes, add_attribute, add_code, add_data_type, is_generic_attribute, is_generic_attribute_object, parse_property, read_external_reference,
-    read_generic_attribute, read_generic_attribute_object,
+use super::attribute_parser::{
+    is_generic_attribute, is_generic_attribute_object, read_external_reference, read_generic_attribute, read_generic_attribute_object,
 };
-use super::geometry_parser::{GeometryParser, PositionFormat, is_point_or_curve, is_surface};
-use super::implicit_geometry::read_implicit_geometry;
+use super::geometry_parser::{GeometryParser, is_point_or_curve, is_surface};
+use super::positions::PositionFormat;
 use super::references::References;
 use super::xml_reader::{XmlEvent, XmlReader};
 use crate::city_model::appearance::ThemeSelection;
+use crate::city_model::attributes::{Attributes, add_attribute, add_code, add_data_type, parse_property};
 use crate::city_model::city_object::{CityObject, Feature, LodRepresentation, Representation};
-use crate::city_model::code_lists::{Code, CodeLists};
+use crate::city_model::code_lists::CodeLists;
 use crate::city_model::crs_table::{CrsNumber, CrsTable};
 use crate::city_model::feature_types::{FeatureKind, classify_feature, is_open_space, is_subdivision, rank_feature, rank_object};
 use crate::city_model::geometry_arena::NO_NODE;
 use crate::city_model::ids::{self, hash_id};
-use crate::city_model::standard_codes::is_adv_code;
+use crate::city_model::standard_codes::{Code, is_adv_code};
 use crate::document::asset_folder::AssetFolder;
 use crate::document::options::ReadOptions;
 use crate::document::report_builder::ReportBuilder;
@@ -353,7 +353,7 @@ impl CityObjectParser<'_> {
                 continue;
             }
             let crs = self.feature(number).crs;
-            match read_implicit_geometry(self, crs)? {
+            match self.read_implicit_geometry(crs)? {
                 Ok(implicit) => {
                     let index = self.city_object.implicit_geometries.len() as u32;
                     self.city_object.implicit_geometries.push(implicit);

@@ -6,6 +6,7 @@ use map3d_base::asset::{AssetReport, Batch, Instance, Material, Object};
 use map3d_base::{Error, Result};
 
 use super::city_object_parser::CityObjectParser;
+use super::dictionary_parser::read_dictionary;
 use super::other_documents::OtherDocuments;
 use super::pre_scan::PreScan;
 use super::references::References;
@@ -70,7 +71,7 @@ impl CityGmlReader {
             theme,
             city_object: CityObject::default(),
             converter: FeatureConverter::new(folder, options, inverted, lod, appearances, referenced_ids),
-            code_lists: CodeLists::new(AssetFolder::for_document(path, options.folder.as_deref())?),
+            code_lists: CodeLists::new(AssetFolder::for_document(path, options.folder.as_deref())?, read_dictionary),
             instances: Vec::new(),
             values: Vec::new(),
             text: String::new(),
@@ -171,8 +172,8 @@ impl CityGmlReader {
     fn finish(&mut self) -> Result<()> {
         self.at_end = true;
         self.read_other_documents()?;
-        self.converter.convert_deferred(&self.references, &mut self.report)?;
-        self.instances = self.converter.finish_instances(&self.references, &mut self.report)?;
+        self.converter.convert_deferred(self.references.missing(), &mut self.report)?;
+        self.instances = self.converter.finish_instances(self.references.missing(), &mut self.report)?;
         let interiors = self.report.skipped(INTERIOR_POLYGON);
         if interiors > 0 {
             self.report.note_file("polygons of interiors are not drawn", format!("{interiors}; --interiors draws them"));

@@ -4,8 +4,8 @@ use map3d_base::Result;
 
 use super::city_object_parser::CityObjectParser;
 use super::coordinates::parse_numbers;
-use super::geometry_parser::PositionFormat;
 use super::grid_values::{GridValues, ValueOrder, ValueSeparators};
+use super::positions::PositionFormat;
 use super::relief_extent::ReliefExtent;
 use super::xml_reader::XmlEvent;
 use crate::city_model::city_object::{LodRepresentation, Representation};

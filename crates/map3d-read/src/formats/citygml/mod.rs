@@ -5,21 +5,24 @@
 
 mod address;
 mod appearance_parser;
-pub mod attributes;
+mod attribute_parser;
 mod city_object_parser;
 mod citygml_reader;
 mod coordinates;
+mod dictionary_parser;
 mod geometry_parser;
 mod grid_parser;
 mod grid_values;
-pub mod implicit_geometry;
+mod implicit_geometry_parser;
 mod other_documents;
+mod positions;
 mod pre_scan;
-pub mod references;
+mod references;
 mod relief_extent;
 mod tag_scanner;
-pub mod textured_surface;
+mod textured_surface_parser;
 mod tin_parser;
-pub mod xml_reader;
+mod tin_parts;
+mod xml_reader;
 
 pub use citygml_reader::CityGmlReader;

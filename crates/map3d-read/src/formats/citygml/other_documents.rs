@@ -6,15 +6,16 @@ use std::path::Path;
 use map3d_base::{Error, Result};
 
 use super::appearance_parser::{AppearanceParser, AppearanceScope};
-use super::geometry_parser::{GeometryParser, PositionFormat, is_surface};
+use super::geometry_parser::{GeometryParser, is_surface};
+use super::positions::PositionFormat;
 use super::references::{DocumentNumber, References, WantedElements};
 use super::tag_scanner::{TagKind, TagScanner};
-use super::textured_surface::add_own_appearances;
 use super::xml_reader::{XmlEvent, XmlReader, parse_attributes, unescape_lossy};
 use crate::city_model::appearance::{Appearances, ThemeSelection};
 use crate::city_model::crs_table::{CrsTable, DOCUMENT_CRS};
 use crate::city_model::geometry_arena::{GeometryArena, NO_NODE};
 use crate::city_model::ids::hash_id;
+use crate::city_model::own_appearance::add_own_appearances;
 use crate::document::options::ReadOptions;
 use crate::document::report_builder::ReportBuilder;
 use crate::document::text_input::open_xml;

@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 
 use map3d_base::Result;
 
-use crate::city_model::ids::{self, Id, IdMap, IdSet, hash_id};
+use crate::city_model::ids::{Id, IdMap, IdSet, hash_id, mix_id};
+use crate::city_model::shared_geometry::MissingGeometry;
 use crate::document::asset_folder::{AssetFolder, FileError};
 
 /// Index of a document in `References`.
@@ -27,11 +28,6 @@ const MAX_NAME_BYTES: usize = 1024;
 
 const NO_SUCH_FILE: &str = "reference into another file: file not found";
 const TOO_MANY: &str = "reference into another file: too many references";
-
-/// Mixes the id of an element with the key of its document.
-pub fn mix_id(id: Id, document_key: Id) -> Id {
-    if id == ids::NONE { id } else { (id ^ document_key).max(1) }
-}
 
 /// A document, and its ids in those of `References`.
 struct Document {
@@ -65,8 +61,7 @@ pub struct References {
     requested: IdSet,
     /// Elements of the document itself that appearances of other documents target.
     own_targets: WantedElements,
-    /// Geometry that was not found: the reason and the reference.
-    failed: IdMap<(&'static str, String)>,
+    missing: MissingGeometry,
 }
 
 impl References {
@@ -82,7 +77,7 @@ impl References {
             wanted: BTreeMap::new(),
             requested: IdSet::default(),
             own_targets: WantedElements::default(),
-            failed: IdMap::default(),
+            missing: MissingGeometry::default(),
         })
     }
 
@@ -190,12 +185,12 @@ impl References {
 
     /// Records why geometry is not there.
     pub fn fail(&mut self, wanted: WantedElements, reason: &'static str) {
-        self.failed.extend(wanted.into_iter().map(|(id, href)| (id, (reason, href))));
+        self.missing.extend(wanted.into_iter().map(|(id, href)| (id, (reason, href))));
     }
 
-    /// Returns why geometry of another document is not there, and the reference to it.
-    pub fn find_failure(&self, id: Id) -> Option<(&'static str, &str)> {
-        self.failed.get(&id).map(|(reason, href)| (*reason, href.as_str()))
+    /// Geometry of other documents that is not there.
+    pub fn missing(&self) -> &MissingGeometry {
+        &self.missing
     }
 
     fn find_document(&mut self, name: &str) -> std::result::Result<DocumentNumber, &'static str> {
@@ -292,15 +287,6 @@ mod tests {
         ] {
             assert_eq!(split_reference(href), expected, "{href}");
         }
-    }
-
-    #[test]
-    fn ids_of_two_documents_differ() {
-        let id = hash_id("a");
-        assert_eq!(mix_id(id, 0), id);
-        assert_eq!(mix_id(ids::NONE, 7), ids::NONE);
-        assert_ne!(mix_id(id, 7), id);
-        assert_ne!(mix_id(id, id), ids::NONE);
     }
 
     #[test]

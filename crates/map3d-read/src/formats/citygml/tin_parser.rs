@@ -2,40 +2,13 @@
 
 use map3d_base::{Result, Vec3};
 
-use super::geometry_parser::{GeometryParser, PositionFormat, PositionsRead};
-use crate::city_model::crs_table::{DOCUMENT_CRS, TOO_MANY, estimate_metres_per_unit};
+use super::geometry_parser::GeometryParser;
+use super::positions::PositionFormat;
+use super::tin_parts::{PreparedTin, TinParts};
+use crate::city_model::crs_table::{DOCUMENT_CRS, estimate_metres_per_unit};
 use crate::city_model::geometry_arena::{GeometryNode, NO_NODE, NodeId, NodeKind, Ring};
 use crate::city_model::ids;
-use crate::triangulation::tin::{TinError, TinSource, TinTriangles, triangulate_tin};
-
-/// What a Tin says besides its triangles, in source coordinates.
-#[derive(Default)]
-pub struct TinParts {
-    control_points: Vec<Vec3>,
-    break_lines: Vec<Vec<Vec3>>,
-    stop_lines: Vec<Vec<Vec3>>,
-    max_length: Option<f64>,
-    read: PositionsRead,
-}
-
-impl TinParts {
-    fn byte_count(&self) -> u64 {
-        let lines = || self.break_lines.iter().chain(&self.stop_lines);
-        let points = self.control_points.len() + lines().map(Vec::len).sum::<usize>();
-        (points * size_of::<Vec3>() + lines().count() * size_of::<Vec<Vec3>>()) as u64
-    }
-
-    /// Returns why no triangulation is tried.
-    fn fault(&self) -> Option<TinError> {
-        match self.read {
-            PositionsRead { valid: false, .. } => Some(TinError::Unreadable),
-            PositionsRead { is_mixed: true, .. } => Some(TinError::MixedCrs),
-            PositionsRead { crs: Some(TOO_MANY), .. } => Some(TinError::TooManyCrs),
-            _ if self.control_points.is_empty() => Some(TinError::TooFewPoints),
-            _ => None,
-        }
-    }
-}
+use crate::triangulation::tin::{TinTriangles, triangulate_tin};
 
 impl GeometryParser<'_> {
     /// Reads the current property of a Tin. Returns false, and reads nothing, if it is another one.
@@ -139,49 +112,6 @@ impl GeometryParser<'_> {
         }
         Ok(())
     }
-}
-
-/// Control points and vertices of break lines, in source coordinates and in metres from the first.
-struct PreparedTin {
-    points: Vec<Vec3>,
-    source: TinSource,
-    /// Points left out.
-    not_finite: u64,
-}
-
-impl PreparedTin {
-    fn new(tin: &TinParts, scale: Vec3) -> Self {
-        let mut prepared = Self { points: Vec::new(), source: TinSource { max_length: tin.max_length, ..TinSource::default() }, not_finite: 0 };
-        tin.control_points.iter().for_each(|point| _ = prepared.add_point(*point));
-        for line in &tin.break_lines {
-            let numbers: Vec<Option<u32>> = line.iter().map(|point| prepared.add_point(*point)).collect();
-            let edges = numbers.windows(2).filter_map(|pair| Some([pair[0]?, pair[1]?]));
-            prepared.source.break_edges.extend(edges);
-        }
-        let origin = prepared.points.first().copied().unwrap_or_default();
-        let local = |p: &Vec3| std::array::from_fn(|k| (p[k] - origin[k]) * scale[k]);
-        prepared.source.points = prepared.points.iter().map(local).collect();
-        for line in &tin.stop_lines {
-            prepared.not_finite += line.iter().filter(|p| !is_finite(p)).count() as u64;
-            let parts = line.split(|p| !is_finite(p)).map(|part| part.iter().map(local).collect());
-            prepared.source.stop_lines.extend(parts);
-        }
-        prepared
-    }
-
-    /// Returns the number of the point; `None` if it is left out.
-    fn add_point(&mut self, point: Vec3) -> Option<u32> {
-        if !is_finite(&point) {
-            self.not_finite += 1;
-            return None;
-        }
-        self.points.push(point);
-        Some(self.points.len() as u32 - 1)
-    }
-}
-
-fn is_finite(point: &Vec3) -> bool {
-    point.iter().all(|v| v.is_finite())
 }
 
 /// Returns the metres of a unit of length, by its symbol, name or EPSG code.

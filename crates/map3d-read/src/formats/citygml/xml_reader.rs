@@ -10,11 +10,9 @@ use quick_xml::Reader;
 use quick_xml::escape::unescape;
 use quick_xml::events::{BytesRef, Event};
 
-use super::references::mix_id;
-use crate::city_model::ids::{self, Id, hash_id};
+use crate::city_model::geometry_arena::MAX_DEPTH;
+use crate::city_model::ids::{self, Id, hash_id, mix_id};
 use crate::document::text_input::{TextInput, open_xml};
-
-pub const MAX_DEPTH: usize = 256;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum XmlEvent {

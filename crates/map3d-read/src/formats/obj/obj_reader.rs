@@ -247,7 +247,7 @@ impl ObjReader {
             self.batch.push(&self.positions, FaceTriangle { vertices: corners.map(|c| c.position), material, object, uvs, normals });
         }
         self.triangles += self.triangulator.triangles().len() as u64 / 3;
-        self.report.check_limit(LimitCheck::triangles(self.triangles, &self.options))
+        self.report.check_limit(LimitCheck::triangles(self.triangles, self.options.max_triangles))
     }
 
     /// Drops vertices that repeat the one before, and last ones that repeat the first.
