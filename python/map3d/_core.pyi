@@ -32,6 +32,10 @@ NAME_PATTERN: str
 """Pattern of a whole name of a scene, asset, rendering or layer."""
 OBJECTS_PER_SHARD: int
 """Objects whose attributes share a file."""
+HEAD_BYTES: int
+"""Length of the beginning of a file by which its format is detected."""
+READER_VERSIONS: dict[str, int]
+"""Versions of the readers by the names of their formats; raised when a reader makes another asset of the same file."""
 
 # -- errors ---------------------------------------------------------------------------------------------------------------------------
 
@@ -73,10 +77,11 @@ class Batch:
 
 @final
 class Reader:
-    """One source document, parsed as it is iterated. `format`: "obj" | "citygml".
+    """One source document, parsed as it is iterated. `format`: a name in READER_VERSIONS.
 
-    options (JSON): {"up": "y"|"z", "split": "file"|"group" (OBJ), "theme": str|null (CityGML appearance theme; null: the one with the most textures),
-    "lod": str|null (null: best per object), "transparency": "auto"|"as-is"|"inverted", "strict": bool, "max_image_side_px": 16384, … further limits}
+    options (JSON): {"transparency": "auto"|"as-is"|"inverted", "strict": bool, "max_image_side_px": 16384, … further limits}, of OBJ also
+    {"up": "y"|"z", "split": "file"|"group"}, of CityGML {"theme": str|null (null: the one with the most textures), "lod": str|null (null: best per
+    object), "interiors": bool, "appearance_files": [path, …]}; those of another format raise InvalidArgument
     transform: (source, target, [(x, y), …]) → [(x, y), …] from one coordinate system to another, both as documents write them; None without a
     transformation. It places textures that are in another one than their surfaces.
     """
@@ -146,6 +151,12 @@ class AssetMesh:
     def boxes(self, count: int, extent: str | None = None) -> tuple[list[_Box | None], dict[int, _Box], list[int]]:
         """Returns the boxes of `count` objects in world coordinates, without placed prototypes and None without geometry; those of prototypes in
         their own frame; and for each object the number of triangles outside the extent (JSON of `find_clusters`), which its box does not include."""
+
+def detect_format(head: bytes) -> str | None:
+    """Returns the name of the format of the document that begins so. `head`: the first HEAD_BYTES of the file, unpacked, or all."""
+
+def xml_root(head: bytes) -> str | None:
+    """Returns the local name of the first element of XML, empty without one; None for anything else."""
 
 def check_file(path: str) -> None:
     """Raises FormatError unless a mesh, chunk, instance or texture file has a known version and the checksum of its header."""

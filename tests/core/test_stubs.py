@@ -82,6 +82,8 @@ def test_a_constant_has_its_type(name: str) -> None:
     value, annotation = getattr(_core, name), ast.unparse(CONSTANTS[name])
     if annotation.startswith("tuple["):
         assert annotation == f"tuple[{', '.join(type(item).__name__ for item in value)}]"
+    elif annotation.startswith("dict["):
+        assert {annotation} == {f"dict[{type(key).__name__}, {type(item).__name__}]" for key, item in value.items()}
     else:
         assert type(value) is PLAIN_TYPES[annotation]
 

@@ -9,6 +9,7 @@ mod codec;
 mod content;
 mod errors;
 mod files;
+mod formats;
 mod frame;
 mod reader;
 mod scene;
@@ -31,6 +32,8 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("AO_RADIUS_M", (limits::AO_RADIUS_M[0], limits::AO_RADIUS_M[1]))?;
     m.add("NAME_PATTERN", limits::NAME_PATTERN)?;
     m.add("OBJECTS_PER_SHARD", limits::OBJECTS_PER_SHARD)?;
+    m.add("HEAD_BYTES", map3d_read::HEAD_BYTES)?;
+    m.add("READER_VERSIONS", formats::reader_versions(py)?)?;
     m.add("CoreError", py.get_type::<errors::CoreError>())?;
     m.add("FormatError", py.get_type::<errors::FormatError>())?;
     m.add("SceneRebuilt", py.get_type::<errors::SceneRebuilt>())?;
@@ -52,6 +55,8 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(block::reduce_block, m)?)?;
     m.add_function(wrap_pyfunction!(block::check_seam, m)?)?;
     m.add_function(wrap_pyfunction!(files::check_file, m)?)?;
+    m.add_function(wrap_pyfunction!(formats::detect_format, m)?)?;
+    m.add_function(wrap_pyfunction!(formats::xml_root, m)?)?;
     m.add_function(wrap_pyfunction!(codec::encode_layer, m)?)?;
     m.add_function(wrap_pyfunction!(codec::encode_png, m)?)?;
     m.add_function(wrap_pyfunction!(codec::encode_bits, m)?)?;

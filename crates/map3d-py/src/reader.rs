@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 
 use map3d_base::asset::{AssetReport, AssetWriter};
-use map3d_read::{DocumentReader, Format, PositionTransformer, ReadOptions, open, write_tables};
+use map3d_read::{DocumentReader, FORMATS, PositionTransformer, ReadOptions, SourceFormat, open, write_tables};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 
@@ -28,6 +28,13 @@ impl Reader {
     }
 }
 
+fn find_format(name: &str) -> PyResult<&'static SourceFormat> {
+    FORMATS.iter().find(|format| format.name == name).ok_or_else(|| {
+        let names: Vec<&str> = FORMATS.iter().map(|format| format.name).collect();
+        invalid(format!("format: {name:?}, expected {}", names.join(" or ")))
+    })
+}
+
 /// Calls a Python function that transforms positions.
 fn call(function: &Py<PyAny>, source: &str, target: &str, positions: &[[f64; 2]]) -> map3d_base::Result<Option<Vec<[f64; 2]>>> {
     let called = Python::attach(|py| function.call1(py, (source, target, positions.to_vec()))?.extract::<Option<Vec<[f64; 2]>>>(py));
@@ -36,15 +43,11 @@ fn call(function: &Py<PyAny>, source: &str, target: &str, positions: &[[f64; 2]]
 
 #[pymethods]
 impl Reader {
-    /// `format`: "obj" or "citygml"; `options`: JSON; `transform`: positions in one coordinate system from those in another.
+    /// `format`: its name; `options`: JSON; `transform`: positions in one coordinate system from those in another.
     #[new]
     #[pyo3(signature = (path, format, options="{}", transform=None))]
     fn new(py: Python<'_>, path: PathBuf, format: &str, options: &str, transform: Option<Py<PyAny>>) -> PyResult<Self> {
-        let format = match format {
-            "obj" => Format::Obj,
-            "citygml" => Format::CityGml,
-            other => return Err(invalid(format!("format: {other:?}, expected \"obj\" or \"citygml\""))),
-        };
+        let format = find_format(format)?;
         let mut options = ReadOptions::from_json(options).map_err(to_python)?;
         options.transform =
             transform.map(|function| PositionTransformer::new(move |source, target, positions| call(&function, source, target, positions)));

@@ -1,8 +1,9 @@
 //! CityGML appearances: themes, materials, all types of textures, and inheritance.
 
-use crate::documents::{Folder, ParsedDocument, read_with};
+use crate::documents::{Folder, ParsedDocument, of_format, read_with};
 use map3d_base::asset::Wrap;
-use map3d_read::{Format, PositionTransformer, ReadOptions};
+use map3d_read::{CITYGML, PositionTransformer, ReadOptions};
+use serde_json::json;
 
 /// Reads a building `b` with one square from (0 0) to (2 2): polygon `p` in the MultiSurface `s` of the wall `w`.
 /// `outside` and `inside`: appearances in the model and in the building.
@@ -21,7 +22,7 @@ fn read(outside: &str, inside: &str, options: &ReadOptions) -> ParsedDocument {
         </Building></cityObjectMember>{outside}</CityModel>"##
     );
     let path = folder.put("a.gml", text);
-    read_with(&path, Format::CityGml, options).expect("readable")
+    read_with(&path, &CITYGML, options).expect("readable")
 }
 
 fn appearance(theme: &str, data: &str) -> String {
@@ -91,7 +92,7 @@ fn nearest_appearance_wins_and_textures_win_over_colours() {
 #[test]
 fn first_theme_is_used_unless_another_is_requested() {
     let two = member("summer", &color("1 0 0", &["p"])) + &member("winter", &color("0 1 0", &["p"]));
-    let read_theme = |theme: Option<&str>| read(&two, "", &ReadOptions { theme: theme.map(str::to_owned), ..ReadOptions::default() });
+    let read_theme = |theme: Option<&str>| read(&two, "", &of_format(json!({"theme": theme})));
     assert_eq!(diffuse(&read_theme(None)), RED);
     assert_eq!(diffuse(&read_theme(Some("summer"))), RED);
     assert_eq!(diffuse(&read_theme(Some("winter"))), GREEN);
@@ -121,7 +122,7 @@ fn theme_with_the_most_textures_is_the_default() {
         let document = read_with_defaults(&outside, &inside);
         assert_eq!(document.material_of(0).texture.is_some(), textured, "{outside}{inside}");
     }
-    let requested = ReadOptions { theme: Some("usage".into()), ..ReadOptions::default() };
+    let requested = of_format(json!({"theme": "usage"}));
     let usage = read(&(member("usage", &colors) + &member("photos", &photo)), "", &requested);
     assert_eq!(diffuse(&usage), RED);
     let unnamed = format!("<appearance><Appearance><surfaceDataMember>{}</surfaceDataMember></Appearance></appearance>", color("1 0 0", &["p"]));
@@ -137,7 +138,7 @@ fn themes_share_surface_data_and_parameterizations_by_xlink() {
             + &texture("", "other", UVS)),
     );
     let winter = |data: &str| member("winter", data);
-    let options = ReadOptions { theme: Some("winter".into()), ..ReadOptions::default() };
+    let options = of_format(json!({"theme": "winter"}));
     assert_eq!(diffuse(&read(&(summer.clone() + &winter("#m")), "", &options)), RED);
     assert_eq!(diffuse(&read(&(winter("#m") + &summer), "", &options)), RED);
     let sharing = "<ParameterizedTexture><imageURI>u.png</imageURI><target uri='#p' xlink:href='#list'/></ParameterizedTexture>";
@@ -312,7 +313,7 @@ fn texture_coordinates_of_polygons_with_holes_stay_with_their_points() {
         tenth(outer),
     );
     let path = folder.put("a.gml", text);
-    let document = read_with(&path, Format::CityGml, &ReadOptions::default()).expect("readable");
+    let document = read_with(&path, &CITYGML, &ReadOptions::default()).expect("readable");
     assert_eq!((document.count(), document.area()), (8, 91.0));
     for t in document.triangles() {
         for (corner, uv) in t.corners.iter().zip(t.uvs.expect("textured")) {
@@ -326,14 +327,14 @@ fn appearances_over_the_limit_are_an_error() {
     let folder = Folder::new("limit");
     let path = folder.put("a.gml", format!("<CityModel>{}</CityModel>", member("a", &texture("", "p", UVS))));
     let options = ReadOptions { max_appearance_bytes: 10, ..ReadOptions::default() };
-    assert!(crate::documents::is_limit_error(read_with(&path, Format::CityGml, &options), "max_appearance_bytes"));
+    assert!(crate::documents::is_limit_error(read_with(&path, &CITYGML, &options), "max_appearance_bytes"));
 }
 
 #[test]
 fn a_theme_that_the_document_does_not_have_is_named_with_those_that_it_has() {
     let themes = member("summer", &color("1 0 0", &["p"])) + &member("winter", &color("0 1 0", &["p"]));
     let said = |theme: &str, outside: &str| {
-        let document = read(outside, "", &ReadOptions { theme: Some(theme.to_owned()), ..ReadOptions::default() });
+        let document = read(outside, "", &of_format(json!({"theme": theme})));
         document.report.warnings.into_iter().find(|w| w.reason == "requested appearance theme is not in the file").map(|w| w.example)
     };
     assert_eq!(said("autumn", &themes).as_deref(), Some("autumn; the file has summer, winter"));

@@ -1,9 +1,9 @@
 //! CityGML constructs.
 
 use crate::documents::city_model::{at_lod, building, member, model, multi_surface, polygon, read_text, ring, square, surface, try_text};
+use crate::documents::of_format;
 use map3d_base::asset::Rank;
 use map3d_base::vec3::triangle_normal;
-use map3d_read::ReadOptions;
 use serde_json::json;
 
 #[test]
@@ -189,11 +189,11 @@ fn relief_has_the_rank_of_terrain() {
 fn finest_level_of_detail_is_converted_unless_one_is_requested() {
     let body = at_lod(1, &square("one", 1)) + &surface("RoofSurface", &at_lod(2, &polygon("two", "0 0 0 1 0 0 0 1 0 0 0 0")));
     for (lod, area, converted) in [(None, 0.5, Some("2")), (Some("1"), 4.0, Some("1")), (Some("2"), 0.5, Some("2")), (Some("4"), 0.0, None)] {
-        let options = ReadOptions { lod: lod.map(str::to_owned), ..ReadOptions::default() };
+        let options = of_format(json!({"lod": lod}));
         let document = try_text(&building(&body), &options).expect("readable");
         assert_eq!((document.area(), document.objects[0].lod.as_deref()), (area, converted), "{lod:?}");
     }
-    let nonsense = ReadOptions { lod: Some("high".into()), ..ReadOptions::default() };
+    let nonsense = of_format(json!({"lod": "high"}));
     assert!(matches!(try_text(&building(&body), &nonsense), Err(map3d_base::Error::Argument(_))));
 }
 

@@ -3,7 +3,7 @@
 use crate::documents::city_model::{building, member, multi_surface, polygon, read_text, square};
 use crate::documents::{Folder, ParsedDocument, read_with};
 use map3d_base::asset::Rank;
-use map3d_read::{Format, ReadOptions};
+use map3d_read::{CITYGML, ReadOptions};
 
 fn model(body: &str) -> String {
     format!(
@@ -167,7 +167,7 @@ fn read_textured(namespace: &str, orientation: &str, appearance: &str, polygon: 
         <gml:surfaceMember><gml:Polygon><gml:exterior><gml:LinearRing><gml:posList>0 0 5 1 0 5 0 1 5 0 0 5</gml:posList></gml:LinearRing></gml:exterior></gml:Polygon></gml:surfaceMember>
         </gml:CompositeSurface></gml:exterior></gml:Solid></lod2Solid></Building></cityObjectMember></CityModel>"
     );
-    read_with(&folder.put("a.gml", text), Format::CityGml, &ReadOptions::default()).expect("readable")
+    read_with(&folder.put("a.gml", text), &CITYGML, &ReadOptions::default()).expect("readable")
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use crate::documents::city_model::{at_lod, building, member, multi_surface, read_text, square, surface};
 use crate::documents::{Folder, ParsedDocument, read_with};
-use map3d_read::{Format, ReadOptions};
+use map3d_read::{CITYGML, ReadOptions};
 use serde_json::{Value, json};
 
 fn attributes(document: &ParsedDocument) -> Value {
@@ -84,7 +84,7 @@ fn definition(inner: &str) -> String {
 /// Reads `udx/town.gml` of a folder with code lists.
 fn read_in(folder: &Folder, body: &str, options: &ReadOptions) -> ParsedDocument {
     let path = folder.put("udx/town.gml", building(body));
-    read_with(&path, Format::CityGml, options).expect("readable")
+    read_with(&path, &CITYGML, options).expect("readable")
 }
 
 #[test]

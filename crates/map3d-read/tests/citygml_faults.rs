@@ -2,7 +2,7 @@
 
 use crate::documents::city_model::{at_lod, building, member, model, multi_surface, polygon, read_text, square, try_text};
 use crate::documents::{Folder, is_format_error, is_limit_error, read_with};
-use map3d_read::{Format, ReadOptions};
+use map3d_read::{CITYGML, ReadOptions};
 use serde_json::json;
 
 #[test]
@@ -155,7 +155,7 @@ fn documents_in_other_encodings_are_read() {
     {
         let folder = Folder::new("encodings");
         let path = folder.put("a.gml", bytes);
-        let document = read_with(&path, Format::CityGml, &ReadOptions::default()).expect("readable");
+        let document = read_with(&path, &CITYGML, &ReadOptions::default()).expect("readable");
         assert_eq!(document.objects[0].attributes["name"], json!(name));
     }
 }
@@ -210,12 +210,12 @@ fn faults_of_the_encoding_are_reported() {
     ] {
         let folder = Folder::new("encodings");
         let path = folder.put("a.gml", bytes);
-        let document = read_with(&path, Format::CityGml, &ReadOptions::default()).expect("readable");
+        let document = read_with(&path, &CITYGML, &ReadOptions::default()).expect("readable");
         assert_eq!(document.objects[0].attributes["name"], json!("Mühle am Bach"), "{reason}");
         let found: Vec<(&str, &str)> = document.report.warnings.iter().map(|w| (w.reason.as_str(), w.example.as_str())).collect();
         let expected: Vec<(&str, &str)> = if reason.is_empty() { vec![] } else { vec![(reason, example.as_str())] };
         assert_eq!(found, expected);
         let strict = ReadOptions { strict: true, ..ReadOptions::default() };
-        assert_eq!(read_with(&path, Format::CityGml, &strict).is_ok(), reason.is_empty(), "{reason}");
+        assert_eq!(read_with(&path, &CITYGML, &strict).is_ok(), reason.is_empty(), "{reason}");
     }
 }

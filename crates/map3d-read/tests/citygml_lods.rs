@@ -1,9 +1,9 @@
 //! Levels of detail that do not mix, and interiors.
 
-use crate::documents::ParsedDocument;
 use crate::documents::city_model::{at_lod, building, member, multi_surface, polygon, read_text, square, surface, try_text};
+use crate::documents::{ParsedDocument, of_format};
 use map3d_base::asset::Rank;
-use map3d_read::ReadOptions;
+use serde_json::json;
 
 /// Returns a triangle of area 0.5 at height z.
 fn half(id: &str, z: u32) -> String {
@@ -84,13 +84,13 @@ fn an_object_replaced_by_finer_parts_keeps_no_coarser_installations() {
 fn a_requested_level_is_that_of_every_feature() {
     let body = at_lod(2, &square("w2", 1)) + &at_lod(3, &half("w3", 1)) + &installation(&at_lod(3, &half("i", 5)));
     for (lod, expected) in [("2", 4.0), ("3", 1.0), ("1", 0.0)] {
-        let options = ReadOptions { lod: Some(lod.into()), ..ReadOptions::default() };
+        let options = of_format(json!({"lod": lod}));
         assert_eq!(try_text(&building(&body), &options).expect("readable").area(), expected);
     }
 }
 
 fn with_interiors(text: &str) -> ParsedDocument {
-    try_text(text, &ReadOptions { interiors: true, ..ReadOptions::default() }).expect("readable")
+    try_text(text, &of_format(json!({"interiors": true}))).expect("readable")
 }
 
 #[test]
@@ -164,7 +164,7 @@ fn attributes_of_storeys_and_units_are_those_of_their_building() {
 fn a_document_with_nothing_at_the_requested_level_says_what_it_has() {
     let text = building(&(at_lod(1, &square("a", 0)) + &at_lod(3, &square("b", 1))));
     for (lod, expected) in [("2", Some("2; the file has 1, 3")), ("1", None), ("3", None)] {
-        let document = try_text(&text, &ReadOptions { lod: Some(lod.to_owned()), ..ReadOptions::default() }).expect("readable");
+        let document = try_text(&text, &of_format(json!({"lod": lod}))).expect("readable");
         let said = document.report.warnings.iter().find(|w| w.reason == "nothing at the requested level of detail").map(|w| w.example.as_str());
         assert_eq!((said, document.count()), (expected, if expected.is_some() { 0 } else { 2 }), "{lod}");
     }

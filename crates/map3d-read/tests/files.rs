@@ -1,7 +1,7 @@
 //! File names in user data resolve only inside the asset's folder; image headers are checked before the image is used.
 
-use crate::documents::{Folder, ParsedDocument, encode_png, read_with};
-use map3d_read::{AssetFolder, FileError, Format, ReadOptions, detect_format};
+use crate::documents::{Folder, ParsedDocument, detect_file, encode_png, read_with};
+use map3d_read::{AssetFolder, FileError, FileHead, HEAD_BYTES, OBJ, ReadOptions, detect};
 
 #[test]
 fn names_resolve_only_inside_the_folder() {
@@ -82,7 +82,7 @@ fn read_with_image(bytes: &[u8], options: &ReadOptions) -> ParsedDocument {
     folder.put("t.png", bytes);
     folder.put("a.mtl", "newmtl m\nmap_Kd t.png\n");
     let path = folder.put("a.obj", "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n");
-    read_with(&path, Format::Obj, options).expect("readable")
+    read_with(&path, &OBJ, options).expect("readable")
 }
 
 #[test]
@@ -122,24 +122,46 @@ fn image_extension_follows_the_content() {
 
 #[test]
 fn formats_are_detected_by_content() {
-    let folder = Folder::new("detect");
-    let utf16: Vec<u8> = "\u{feff}v 0 0 0\nf 1 1 1\n".encode_utf16().flat_map(u16::to_be_bytes).collect();
+    let utf16 = |text: &str, bytes: fn(u16) -> [u8; 2]| text.encode_utf16().flat_map(bytes).collect::<Vec<u8>>();
+    let cut = [b"v 0 0 0\n".repeat(HEAD_BYTES / 8 - 1), b"unknown ".to_vec()].concat();
     for (bytes, expected) in [
-        (&b"v 0 0 0\nv 1 0 0\n"[..], Some(Format::Obj)),
-        (b"# by hand\n\nmtllib a.mtl\n", Some(Format::Obj)),
-        (&utf16, Some(Format::Obj)),
-        (b"<?xml version='1.0'?><!-- <a> --><core:CityModel xmlns:core='x'/>", Some(Format::CityGml)),
-        (b"\xEF\xBB\xBF<CityModel/>", Some(Format::CityGml)),
+        (&b"v 0 0 0\nv 1 0 0\n"[..], Some("obj")),
+        (b"# by hand\n\nmtllib a.mtl\n", Some("obj")),
+        (b"v 0 0 0", Some("obj")),
+        (b"\r\r\nv 0 0 0\rf 1 1 1\r", Some("obj")),
+        (b"  call a.obj\nusemap t\nvp 1 2\n", Some("obj")),
+        (&[&b"v 0 0 0\n".repeat(9)[..], b"unknown\n"].concat(), Some("obj")),
+        (&[&b"v 0 0 0\n".repeat(8)[..], b"unknown\n"].concat(), None),
+        (b"v 0 0 0\nunknown", None),
+        (&cut, Some("obj")),
+        (&utf16("\u{feff}v 0 0 0\nf 1 1 1\n", u16::to_be_bytes), Some("obj")),
+        (&utf16("v 0 0 0\nf 1 1 1\n", u16::to_le_bytes), Some("obj")),
+        (b"v 0 0 0\0\n", None),
+        (b"<?xml version='1.0'?><!-- <a> --><core:CityModel xmlns:core='x'/>", Some("citygml")),
+        (b"\xEF\xBB\xBF<CityModel/>", Some("citygml")),
+        (b"\n <CityModel\n>", Some("citygml")),
+        (b"<!DOCTYPE CityModel><CityModel>", Some("citygml")),
+        (b"<?xml version='1.0' encoding='utf-16'?><CityModel>", Some("citygml")),
+        (&utf16("\u{feff}<CityModel/>", u16::to_le_bytes), Some("citygml")),
+        (&utf16("<?xml version='1.0'?><CityModel/>", u16::to_be_bytes), Some("citygml")),
         (b"<html></html>", None),
+        (b"<CityModel2/>", None),
+        (b"<!-- <CityModel> ", None),
         (b"<?xml version='1.0'?>", None),
         (b"{\"type\":\"CityJSON\"}", None),
         (b"", None),
         (b"\x89PNG\r\n\x1a\n", None),
         (b"a plain text\nof two lines\n", None),
     ] {
-        let path = folder.put("document", bytes);
-        assert_eq!(detect_format(&path).ok(), expected, "{:?}", String::from_utf8_lossy(bytes));
+        let found = detect(&FileHead::new(bytes.to_vec())).map(|format| format.name);
+        assert_eq!(found, expected, "{:?}", String::from_utf8_lossy(&bytes[..bytes.len().min(80)]));
     }
-    assert!(detect_format(&folder.0).is_err(), "a folder");
-    assert!(detect_format(&folder.0.join("missing")).is_err());
+}
+
+#[test]
+fn the_beginning_is_that_of_a_regular_file() {
+    let folder = Folder::new("detect");
+    assert!(detect_file(&folder.put("document", "<CityModel/>")).is_some_and(|format| format.name == "citygml"));
+    assert!(detect_file(&folder.0).is_none(), "a folder");
+    assert!(detect_file(&folder.0.join("missing")).is_none());
 }

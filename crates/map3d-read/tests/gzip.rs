@@ -4,11 +4,11 @@ use std::io::Write;
 
 use crate::documents::city_model::{member, model, multi_surface, square};
 use crate::documents::random::Random;
-use crate::documents::{Folder, ParsedDocument, is_format_error, read_with};
+use crate::documents::{Folder, ParsedDocument, detect_file, is_format_error, read_with};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use map3d_base::Error;
-use map3d_read::{Format, ReadOptions, detect_format};
+use map3d_read::{CITYGML, OBJ, ReadOptions};
 
 fn pack(content: &[u8]) -> Vec<u8> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
@@ -18,7 +18,7 @@ fn pack(content: &[u8]) -> Vec<u8> {
 
 fn read(packed: &[u8], strict: bool) -> Result<ParsedDocument, Error> {
     let folder = Folder::new("gzip");
-    read_with(&folder.put("town.gml.gz", packed), Format::CityGml, &ReadOptions { strict, ..ReadOptions::default() })
+    read_with(&folder.put("town.gml.gz", packed), &CITYGML, &ReadOptions { strict, ..ReadOptions::default() })
 }
 
 /// Returns a town of 500 houses, each two triangles, with ids that hardly compress.
@@ -84,9 +84,9 @@ fn a_packed_obj_is_read_and_a_cut_one_is_an_error() {
     let packed = pack(format!("{vertices}f 1 2 3\n").as_bytes());
     let folder = Folder::new("gzip");
     let path = folder.put("a.obj.gz", &packed);
-    assert_eq!(detect_format(&path).expect("known"), Format::Obj);
-    assert_eq!(read_with(&path, Format::Obj, &ReadOptions::default()).expect("readable").count(), 1);
+    assert!(detect_file(&path).is_some_and(|format| format.name == OBJ.name));
+    assert_eq!(read_with(&path, &OBJ, &ReadOptions::default()).expect("readable").count(), 1);
     let cut = folder.put("b.obj.gz", &packed[..packed.len() / 2]);
-    let error = read_with(&cut, Format::Obj, &ReadOptions::default()).expect_err("cut").to_string();
+    let error = read_with(&cut, &OBJ, &ReadOptions::default()).expect_err("cut").to_string();
     assert!(error.contains("b.obj.gz") && error.contains("gzip file cut or damaged after"), "{error}");
 }

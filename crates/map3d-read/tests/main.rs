@@ -11,6 +11,7 @@ mod documents;
 mod files;
 mod gzip;
 mod large_polygons;
+mod made_up_format;
 mod mutation;
 mod obj;
 mod prototypes;

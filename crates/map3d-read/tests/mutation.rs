@@ -3,8 +3,9 @@
 use std::time::Instant;
 
 use crate::documents::random::Random;
-use crate::documents::{Folder, read_with};
-use map3d_read::{Format, ReadOptions, Split};
+use crate::documents::{Folder, of_format, read_with};
+use map3d_read::{CITYGML, OBJ, ReadOptions, SourceFormat};
+use serde_json::json;
 
 const CITY: &str = include_str!("data/all_constructs.gml");
 const HOUSE: &str = include_str!("data/all_statements.obj");
@@ -34,7 +35,7 @@ fn damage(text: &[u8], random: &mut Random) -> Vec<u8> {
     bytes
 }
 
-fn read_quickly(path: &std::path::Path, format: Format, options: &ReadOptions) {
+fn read_quickly(path: &std::path::Path, format: &SourceFormat, options: &ReadOptions) {
     let start = Instant::now();
     let _ = read_with(path, format, options);
     assert!(start.elapsed().as_secs() < 10, "{}", path.display());
@@ -48,7 +49,7 @@ fn damaged_city_models_never_panic() {
     let mut random = Random(1);
     for case in 0..500 {
         let path = folder.put("a.gml", damage(CITY.as_bytes(), &mut random));
-        read_quickly(&path, Format::CityGml, &ReadOptions { strict: case % 10 == 0, ..ReadOptions::default() });
+        read_quickly(&path, &CITYGML, &ReadOptions { strict: case % 10 == 0, ..ReadOptions::default() });
     }
 }
 
@@ -60,8 +61,8 @@ fn damaged_objs_never_panic() {
     for case in 0..500 {
         folder.put("all_statements.mtl", damage(LIBRARY.as_bytes(), &mut random));
         let path = folder.put("a.obj", damage(HOUSE.as_bytes(), &mut random));
-        let split = if case % 2 == 0 { Split::File } else { Split::Group };
-        read_quickly(&path, Format::Obj, &ReadOptions { split, strict: case % 10 == 0, ..ReadOptions::default() });
+        let split = of_format(json!({"split": if case % 2 == 0 { "file" } else { "group" }}));
+        read_quickly(&path, &OBJ, &ReadOptions { strict: case % 10 == 0, ..split });
     }
 }
 
@@ -74,7 +75,7 @@ fn damaged_images_never_panic() {
     let mut random = Random(3);
     for _ in 0..200 {
         folder.put("t.png", damage(&image, &mut random));
-        read_quickly(&path, Format::Obj, &ReadOptions::default());
+        read_quickly(&path, &OBJ, &ReadOptions::default());
     }
 }
 
@@ -84,8 +85,8 @@ fn undamaged_documents_are_read_completely() {
     folder.put_png("t.png", 4, 4, [1, 2, 3, 200]);
     folder.put("lamp.obj", "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n");
     folder.put("all_statements.mtl", LIBRARY);
-    let city = read_with(&folder.put("a.gml", CITY), Format::CityGml, &ReadOptions { strict: true, ..ReadOptions::default() }).expect("no fault");
+    let city = read_with(&folder.put("a.gml", CITY), &CITYGML, &ReadOptions { strict: true, ..ReadOptions::default() }).expect("no fault");
     assert_eq!((city.objects.len(), city.instances.len(), city.count()), (6, 3, 20));
-    let house = read_with(&folder.put("a.obj", HOUSE), Format::Obj, &ReadOptions { strict: true, ..ReadOptions::default() }).expect("no fault");
+    let house = read_with(&folder.put("a.obj", HOUSE), &OBJ, &ReadOptions { strict: true, ..ReadOptions::default() }).expect("no fault");
     assert_eq!((house.count(), house.materials.len()), (10, 5));
 }

@@ -1,14 +1,15 @@
 //! OBJ and MTL statements, encodings and degenerate cases.
 
-use crate::documents::{Folder, ParsedDocument, is_format_error, is_limit_error, read_with};
+use crate::documents::{Folder, ParsedDocument, is_format_error, is_limit_error, of_format, read_with};
 use map3d_base::asset::Wrap;
 use map3d_base::vec3::triangle_normal;
-use map3d_read::{Format, ReadOptions, Split, Up};
+use map3d_read::{OBJ, ReadOptions};
+use serde_json::json;
 
 fn read_text(name: &str, text: impl AsRef<[u8]>) -> ParsedDocument {
     let folder = Folder::new(name);
     let path = folder.put("house.obj", text);
-    read_with(&path, Format::Obj, &ReadOptions::default()).expect("readable")
+    read_with(&path, &OBJ, &ReadOptions::default()).expect("readable")
 }
 
 const SQUARE: &str = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\n";
@@ -61,7 +62,7 @@ fn first_fault_is_an_error_with_strict() {
     let folder = Folder::new("strict");
     let path = folder.put("a.obj", format!("{SQUARE}f 1 2\n"));
     let strict = ReadOptions { strict: true, ..ReadOptions::default() };
-    assert!(is_format_error(read_with(&path, Format::Obj, &strict), "line 5"));
+    assert!(is_format_error(read_with(&path, &OBJ, &strict), "line 5"));
 }
 
 #[test]
@@ -83,8 +84,8 @@ fn concave_polygons_keep_area_and_orientation() {
 fn y_up_is_converted_to_z_up() {
     let folder = Folder::new("up");
     let path = folder.put("a.obj", "v 0 0 0\nv 1 0 0\nv 0 2 0\nvn 0 0 1\nf 1//1 2//1 3//1\n");
-    let up = ReadOptions { up: Up::Y, ..ReadOptions::default() };
-    let document = read_with(&path, Format::Obj, &up).expect("readable");
+    let up = of_format(json!({"up": "y"}));
+    let document = read_with(&path, &OBJ, &up).expect("readable");
     assert_eq!(document.triangles()[0].corners, [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 2.0]]);
     assert_eq!(document.batches[0].normals[0], [[0.0, -1.0, 0.0]; 3]);
 }
@@ -103,12 +104,12 @@ fn split_makes_one_object_per_file_or_group() {
     let folder = Folder::new("split");
     let text = format!("{SQUARE}f 1 2 3\ng a\nf 1 2 3\no b c\nf 1 2 3\ng a\nf 1 3 4\ng unused\n");
     let path = folder.put("my house.obj", text);
-    let whole = read_with(&path, Format::Obj, &ReadOptions::default()).expect("readable");
+    let whole = read_with(&path, &OBJ, &ReadOptions::default()).expect("readable");
     let names = |r: &ParsedDocument| r.objects.iter().map(|o| o.name.clone()).collect::<Vec<_>>();
     assert_eq!(names(&whole), ["my house"]);
     assert_eq!(whole.objects[0].class, "generic");
-    let split = ReadOptions { split: Split::Group, ..ReadOptions::default() };
-    let groups = read_with(&path, Format::Obj, &split).expect("readable");
+    let split = of_format(json!({"split": "group"}));
+    let groups = read_with(&path, &OBJ, &split).expect("readable");
     assert_eq!(names(&groups), ["my house", "a", "b c"]);
     assert_eq!(groups.triangles().iter().map(|t| t.object).collect::<Vec<_>>(), [0, 1, 2, 1]);
 }
@@ -144,7 +145,7 @@ fn text_is_read_in_every_encoding() {
         let folder = Folder::new("encoding");
         folder.put("ä.mtl", encode(mtl));
         let path = folder.put("a.obj", encode(&text));
-        let document = read_with(&path, Format::Obj, &ReadOptions::default()).expect("readable");
+        let document = read_with(&path, &OBJ, &ReadOptions::default()).expect("readable");
         assert_eq!(document.count(), 2, "{name}");
         assert_eq!(document.material_of(0).diffuse, [1.0, 0.5, 0.0, 1.0], "{name}: {:?}", document.report);
     }
@@ -157,7 +158,7 @@ fn read_with_material(name: &str, mtl: &str, faces: &str) -> ParsedDocument {
     folder.put_png("t x.png", 4, 2, [9, 8, 7, 0]);
     folder.put_png("deep/t.png", 2, 2, [1, 1, 1, 255]);
     let path = folder.put("a.obj", format!("mtllib a.mtl\n{SQUARE}vt 0 0\nvt 1 0\nvt 1 1\nvt -3.25 5.5\nusemtl m\n{faces}"));
-    read_with(&path, Format::Obj, &ReadOptions::default()).expect("readable")
+    read_with(&path, &OBJ, &ReadOptions::default()).expect("readable")
 }
 
 #[test]
@@ -230,7 +231,7 @@ fn missing_files_are_reported_and_the_geometry_is_read() {
     let folder = Folder::new("missing");
     folder.put("b.mtl", "newmtl m\nKd 1 0 0\nmap_Kd nowhere.png\n");
     let path = folder.put("a.obj", format!("mtllib nowhere.mtl b.mtl\n{SQUARE}vt 0 0\nusemtl m\nf 1/1 2/1 3/1\nusemtl unknown\nf 1/1 3/1 4/1\n"));
-    let document = read_with(&path, Format::Obj, &ReadOptions::default()).expect("readable");
+    let document = read_with(&path, &OBJ, &ReadOptions::default()).expect("readable");
     assert_eq!(document.count(), 2);
     assert_eq!(document.warned("material library: file not found"), 1);
     assert_eq!(document.warned("image: file not found"), 1);
@@ -248,7 +249,7 @@ fn library_names_may_contain_spaces_and_folders() {
         "a.obj",
         format!("mtllib my lib.mtl\nmtllib sub\\TWO.mtl\n{SQUARE}vt 0 0\nvt 1 0\nvt 0 1\nusemtl a\nf 1 2 3\nusemtl b\nf 1/1 2/2 3/3\n"),
     );
-    let document = read_with(&path, Format::Obj, &ReadOptions::default()).expect("readable");
+    let document = read_with(&path, &OBJ, &ReadOptions::default()).expect("readable");
     assert_eq!(document.material_of(0).diffuse, [1.0, 0.0, 0.0, 1.0]);
     assert!(document.material_of(1).texture.is_some(), "{:?}", document.report);
 }
@@ -296,13 +297,13 @@ fn limits_are_inclusive() {
     let path = folder.put("a.obj", format!("{SQUARE}f 1 2 3 4\nf 1 2 3\n"));
     for (limit, is_ok) in [(3, true), (2, false)] {
         let options = ReadOptions { max_triangles: limit, ..ReadOptions::default() };
-        let result = read_with(&path, Format::Obj, &options);
+        let result = read_with(&path, &OBJ, &options);
         assert_eq!(result.is_ok(), is_ok);
         assert!(is_ok || is_limit_error(result, "max_triangles"));
     }
     for (limit, triangles) in [(4, 3), (3, 1)] {
         let options = ReadOptions { max_ring_vertices: limit, ..ReadOptions::default() };
-        let document = read_with(&path, Format::Obj, &options).expect("readable");
+        let document = read_with(&path, &OBJ, &options).expect("readable");
         assert_eq!(document.count(), triangles);
         assert_eq!(document.skipped("max_ring_vertices"), u64::from(triangles == 1));
     }

@@ -1,7 +1,7 @@
 //! Implicit geometry: prototypes and placements.
 
 use crate::documents::{Folder, ParsedDocument, is_limit_error, read_with};
-use map3d_read::{Format, ReadOptions, open};
+use map3d_read::{CITYGML, ReadOptions, open};
 
 fn tree(id: &str, matrix: &str, geometry: &str, reference: &str) -> String {
     format!(
@@ -20,7 +20,7 @@ fn read(members: &str, options: &ReadOptions) -> map3d_base::Result<ParsedDocume
     folder.put("lamp.mtl", "newmtl m\nKd 1 1 0\n");
     folder.put("lamp.wrl", "#VRML V2.0 utf8\n");
     let path = folder.put("a.gml", format!("<CityModel xmlns:gml='g' xmlns:xlink='x'>{members}</CityModel>"));
-    read_with(&path, Format::CityGml, options)
+    read_with(&path, &CITYGML, options)
 }
 
 fn read_with_defaults(members: &str) -> ParsedDocument {
@@ -91,7 +91,7 @@ fn instances_over_the_limit_are_an_error() {
 fn set_instances_needs_one_transform_per_instance() {
     let folder = Folder::new("replace");
     let path = folder.put("a.gml", format!("<CityModel xmlns:gml='g'>{}</CityModel>", tree("a", "", SHAPE, "7 8 9")));
-    let mut reader = open(&path, Format::CityGml, &ReadOptions::default()).expect("readable");
+    let mut reader = open(&path, &CITYGML, &ReadOptions::default()).expect("readable");
     while reader.next_batch().expect("readable").is_some() {}
     assert!(reader.set_instances(&[]).is_err());
     assert_eq!(reader.set_instances(&[[3.0; 12]]).expect("one transform"), 0);

@@ -3,11 +3,12 @@
 use std::fs;
 use std::path::Path;
 
-use crate::documents::{Folder, ParsedDocument, is_format_error, read_with};
-use map3d_read::{Format, ReadOptions};
+use crate::documents::{Folder, ParsedDocument, is_format_error, of_format, read_with};
+use map3d_read::{CITYGML, ReadOptions};
+use serde_json::json;
 
 fn read(path: &Path, options: &ReadOptions) -> ParsedDocument {
-    read_with(path, Format::CityGml, options).expect("readable")
+    read_with(path, &CITYGML, options).expect("readable")
 }
 
 fn read_in(folder: &Folder, name: &str) -> ParsedDocument {
@@ -103,7 +104,7 @@ fn appearances_of_another_file_texture_the_surfaces_they_target() {
     let nowhere = texture("../images/red.png", "../tiles/a.gml#nowhere", "#r") + &texture("../images/red.png", "b.gml#p", "#r");
     for (k, photo) in photos.iter().enumerate() {
         let photos = folder.put(&format!("photos/{k}.gml"), model(&(photo.clone() + &nowhere)));
-        let options = ReadOptions { folder: Some(folder.0.clone()), appearance_files: vec![photos, a.clone()], ..ReadOptions::default() };
+        let options = ReadOptions { folder: Some(folder.0.clone()), ..of_format(json!({"appearance_files": [photos, a]})) };
         let document = read(&a, &options);
         let red = Some("../photos/../images/red.png");
         assert_eq!((0..4).map(|t| texture_of(&document, t)).collect::<Vec<_>>(), [red, red, None, None]);
@@ -149,7 +150,7 @@ fn references_that_lead_nowhere_are_counted_by_name() {
         assert!(document.report.warnings.iter().any(|w| w.reason.contains(reason) && w.example == named), "{href}: {:?}", document.report.warnings);
         assert_eq!(document.warned("broken or too large"), u64::from(href.starts_with(['b', 'd']) && !href.starts_with("b.gml")), "{href}");
         let strict = ReadOptions { strict: true, ..options };
-        assert!(is_format_error(read_with(&path, Format::CityGml, &strict), ""), "{href}");
+        assert!(is_format_error(read_with(&path, &CITYGML, &strict), ""), "{href}");
     }
 }
 

@@ -1,9 +1,10 @@
 //! Laws of RasterReliefs: heights in the document are triangles at the grid's points; a raster file is handed on with its place; nothing is lost
 //! without a word.
 
-use crate::documents::Folder;
 use crate::documents::city_model::{model, read_text, try_text};
-use map3d_read::{Format, ReadOptions, open};
+use crate::documents::{Folder, of_format};
+use map3d_read::{CITYGML, ReadOptions, open};
+use serde_json::json;
 
 const DOMAIN: &str = "<gml:limits><gml:GridEnvelope><gml:low>0 0</gml:low><gml:high>2 1</gml:high></gml:GridEnvelope></gml:limits>\
      <gml:axisName>x</gml:axisName><gml:axisName>y</gml:axisName><gml:origin><gml:Point srsName='EPSG:25832'><gml:pos>100 200</gml:pos></gml:Point></gml:origin>\
@@ -116,7 +117,7 @@ fn a_raster_file_is_handed_on_with_its_place() {
         relief(&DOMAIN.replace("<gml:low>0 0", "<gml:low>0 -1"), &(file("DEM.tif") + "<gml:sequenceRule order='+x-y'>Linear</gml:sequenceRule>"), "")
             .as_bytes(),
     );
-    let mut document = open(&path, Format::CityGml, &ReadOptions::default()).expect("a document");
+    let mut document = open(&path, &CITYGML, &ReadOptions::default()).expect("a document");
     while document.next_batch().expect("readable").is_some() {}
     let [grid] = document.grids() else { panic!("one grid") };
     assert_eq!((grid.object.as_str(), grid.columns, grid.rows, grid.crs.as_deref()), ("r", 3, 3, Some("EPSG:25832")));
@@ -137,8 +138,8 @@ fn only_the_raster_of_the_selected_level_is_handed_on() {
     let both = both.replace("<gml:RectifiedGrid/>", &format!("<gml:RectifiedGrid>{DOMAIN}</gml:RectifiedGrid>{}", inline("1 2 3 4 5 6")));
     let path = folder.put("town.gml", both.as_bytes());
     for (lod, grids) in [(None, 0), (Some("2"), 1), (Some("3"), 0)] {
-        let options = ReadOptions { lod: lod.map(str::to_owned), ..ReadOptions::default() };
-        let mut document = open(&path, Format::CityGml, &options).expect("a document");
+        let options = of_format(json!({"lod": lod}));
+        let mut document = open(&path, &CITYGML, &options).expect("a document");
         while document.next_batch().expect("readable").is_some() {}
         assert_eq!(document.grids().len(), grids, "{lod:?}");
     }

@@ -2,7 +2,7 @@
 
 use crate::documents::city_model::{at_lod, building, square, try_text};
 use crate::documents::{Folder, ParsedDocument, read_with};
-use map3d_read::{Format, ReadOptions, Transparency};
+use map3d_read::{OBJ, ReadOptions, Transparency};
 
 /// Reads a building with two squares; `values`: the transparency of their materials, empty for none.
 fn read_city(values: [&str; 2], transparency: Transparency, outside: bool) -> ParsedDocument {
@@ -80,7 +80,7 @@ fn transparency_of_a_material_library_is_decided_for_the_whole_library() {
         folder.put("m.mtl", library);
         let text = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nusemtl a\nf 1 2 3 4\nusemtl b\nf 4 3 2 1\n";
         let path = folder.put("a.obj", text);
-        let document = read_with(&path, Format::Obj, &ReadOptions { transparency: option, ..ReadOptions::default() }).expect("readable");
+        let document = read_with(&path, &OBJ, &ReadOptions { transparency: option, ..ReadOptions::default() }).expect("readable");
         assert_eq!(opacities(&document), expected, "{library} {option:?}");
         assert_eq!(document.warned("transparency read as opacity"), u64::from(option == Auto && expected.len() == 2), "{library}");
         assert_eq!(document.skipped("fully transparent"), 2 - expected.len() as u64, "{library}");

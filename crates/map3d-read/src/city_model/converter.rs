@@ -21,14 +21,28 @@ use super::shared_geometry::{DeferredXLink, MissingGeometry, SharedGeometry};
 use super::tessellate::{MaterialSources, Tessellator, ThematicSurface};
 use crate::document::ReliefGrid;
 use crate::document::asset_folder::AssetFolder;
+use crate::document::file_head::FileHead;
 use crate::document::options::ReadOptions;
 use crate::document::report_builder::{LimitCheck, ReportBuilder};
-use crate::formats::detect::{Format, detect_format};
+use crate::document::source_format::SourceFormat;
 
 const BATCH_TRIANGLES: usize = 1 << 14;
 
 /// The reason for polygons left out.
 pub const INTERIOR_POLYGON: &str = "polygon of an interior";
+
+/// What of a document is converted, and how.
+#[derive(Clone, Copy)]
+pub struct Conversion {
+    /// The requested level of detail; by default, the finest of each object.
+    pub lod: Option<u8>,
+    /// Rooms and what is in them are converted.
+    pub interiors: bool,
+    /// The document's transparency is opacity.
+    pub inverted: bool,
+    /// Formats of the files that the document may name.
+    pub formats: &'static [SourceFormat],
+}
 
 pub struct FeatureConverter {
     pub resolver: MaterialResolver,
@@ -39,7 +53,7 @@ pub struct FeatureConverter {
     other_appearances: Appearances,
     /// Ids that other city objects refer to.
     referenced_ids: IdSet,
-    lod: Option<u8>,
+    conversion: Conversion,
     /// Levels of detail of the document: bit n is level n.
     levels: u8,
     shared: SharedGeometry,
@@ -70,22 +84,14 @@ impl ConversionContext<'_> {
 }
 
 impl FeatureConverter {
-    /// `inverted`: the document's transparency is opacity; `lod`: the requested level of detail.
-    pub fn new(
-        folder: AssetFolder,
-        options: &ReadOptions,
-        inverted: bool,
-        lod: Option<u8>,
-        document_appearances: Appearances,
-        referenced_ids: IdSet,
-    ) -> Self {
+    pub fn new(folder: AssetFolder, options: &ReadOptions, conversion: Conversion, document_appearances: Appearances, referenced_ids: IdSet) -> Self {
         Self {
-            resolver: MaterialResolver::new(folder, options.clone(), inverted),
+            resolver: MaterialResolver::new(folder, options.clone(), conversion.inverted),
             tessellator: Tessellator::new(options.clone()),
             document_appearances,
             other_appearances: Appearances::default(),
             referenced_ids,
-            lod,
+            conversion,
             levels: 0,
             shared: SharedGeometry::default(),
             objects: Vec::new(),
@@ -114,13 +120,13 @@ impl FeatureConverter {
         add_own_appearances(&mut city_object.geometry, &mut city_object.appearances);
         city_object.extend_interiors();
         city_object.expose_shared_interiors();
-        let lods = select_lods(city_object, self.lod);
+        let lods = select_lods(city_object, self.conversion.lod);
         self.levels |= city_object.features.iter().flat_map(|f| &f.representations).fold(0, |levels, r| levels | 1 << r.lod);
         let object_numbers = self.add_objects(city_object, &lods);
         let xlinks = XLinkIndex::build(&city_object.geometry);
         let visits = vec![VisitState::Unvisited; city_object.geometry.nodes.len()];
         let mut context = ConversionContext { city_object, xlinks, visits, object_numbers };
-        let draws_interiors = self.resolver.options.interiors;
+        let draws_interiors = self.conversion.interiors;
         for objects in [false, true] {
             for (f, lod) in lods.iter().enumerate() {
                 let feature = &context.city_object.features[f];
@@ -181,7 +187,7 @@ impl FeatureConverter {
 
     /// Returns the requested level of detail and those that the document has, if it has others only.
     pub fn other_lods(&self) -> Option<String> {
-        let requested = self.lod.filter(|lod| self.levels != 0 && self.levels >> lod & 1 == 0)?;
+        let requested = self.conversion.lod.filter(|lod| self.levels != 0 && self.levels >> lod & 1 == 0)?;
         let levels: Vec<String> = (0..8).filter(|lod| self.levels >> lod & 1 == 1).map(|lod: u8| lod.to_string()).collect();
         Some(format!("{requested}; the file has {}", levels.join(", ")))
     }
@@ -313,16 +319,19 @@ impl FeatureConverter {
         Ok(())
     }
 
-    /// Converts a prototype in its own file; only OBJ is supported.
+    /// Converts a prototype in its own file.
     fn convert_library_object(&mut self, name: &str, object: u32, key: Id, report: &mut ReportBuilder) -> Result<()> {
         let file = match self.resolver.folder.find(name) {
             Ok(file) => file,
             Err(error) => return report.warn(&format!("library object: {}", error.reason()), name),
         };
-        if !matches!(detect_format(&file.path), Ok(Format::Obj)) {
+        let head = FileHead::read(&file.path);
+        let has_format = |format: &&SourceFormat| format.is_library_object && head.as_ref().is_ok_and(|head| (format.detect)(head));
+        let Some(format) = self.conversion.formats.iter().find(has_format) else {
             return report.warn("library object: unsupported format", name);
-        }
-        let batches = read_library_object(&file.path, object, &mut self.resolver)?;
+        };
+        let mut document = (format.open)(&file.path, &self.resolver.options.without_format(), self.conversion.formats)?;
+        let batches = read_library_object(document.as_mut(), object, &mut self.resolver)?;
         self.add_prototype(key, batches);
         Ok(())
     }

@@ -15,7 +15,7 @@ use super::feature_types::classify_surface;
 use super::geo_transform::GeoTransform;
 use super::ids::Id;
 use crate::document::asset_folder::AssetFolder;
-use crate::document::image_file::ImageFiles;
+use crate::document::images::DocumentImages;
 use crate::document::material_table::MaterialTable;
 use crate::document::options::ReadOptions;
 use crate::document::report_builder::ReportBuilder;
@@ -27,7 +27,7 @@ const FIT_SAMPLES: usize = 9;
 const MAX_FIT_ERROR_PX: f64 = 0.5;
 
 pub struct MaterialResolver {
-    pub images: ImageFiles,
+    pub images: DocumentImages,
     pub table: MaterialTable,
     pub folder: AssetFolder,
     pub options: ReadOptions,
@@ -62,7 +62,7 @@ impl MaterialResolver {
     /// `inverted`: the document's transparency is opacity.
     pub fn new(folder: AssetFolder, options: ReadOptions, inverted: bool) -> Self {
         Self {
-            images: ImageFiles::default(),
+            images: DocumentImages::default(),
             table: MaterialTable::default(),
             folder,
             options,

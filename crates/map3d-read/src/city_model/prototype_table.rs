@@ -1,7 +1,6 @@
 //! Prototypes of implicit geometry, each converted once, and their placements.
 
 use std::collections::HashMap;
-use std::path::Path;
 
 use map3d_base::Result;
 use map3d_base::asset::{Batch, Instance, Rank};
@@ -12,7 +11,6 @@ use super::ids::{self, Id, hash_id};
 use super::implicit_geometry::{ImplicitGeometry, PrototypeSource};
 use super::material_resolver::MaterialResolver;
 use crate::document::DocumentReader;
-use crate::formats::obj::ObjReader;
 
 /// A placement and the key of its prototype. The prototype's number is known at the end of the document.
 pub struct PrototypePlacement {
@@ -58,9 +56,8 @@ impl PrototypeTable {
     }
 }
 
-/// Reads a prototype from an OBJ file. Its materials and images move into the resolver's tables.
-pub fn read_library_object(path: &Path, object: u32, resolver: &mut MaterialResolver) -> Result<Vec<Batch>> {
-    let mut reader = ObjReader::open(path, &resolver.options)?;
+/// Reads a prototype from a document of its own. Its materials and images move into the resolver's tables.
+pub fn read_library_object(reader: &mut dyn DocumentReader, object: u32, resolver: &mut MaterialResolver) -> Result<Vec<Batch>> {
     let mut batches = Vec::new();
     while let Some(batch) = reader.next_batch()? {
         batches.push(batch);

@@ -2,13 +2,16 @@
 
 pub mod asset_folder;
 mod byte_source;
-pub mod image_file;
+pub mod file_head;
+pub mod images;
 pub mod material_table;
 mod mended_utf8;
 pub mod options;
 pub mod report_builder;
+pub mod source_format;
 pub mod text_input;
 pub mod transparency;
+pub mod write_tables;
 
 use std::path::PathBuf;
 
@@ -16,7 +19,7 @@ use map3d_base::asset::{AssetReport, Batch, Instance, Material, Object};
 use map3d_base::{Error, Result};
 use serde::Serialize;
 
-use self::image_file::ImageFile;
+use self::images::DocumentImage;
 
 /// A raster file with the heights of a relief. The value at (column, row) is at first + column · column_step + row · row_step, in the order of axes
 /// of the document.
@@ -58,8 +61,8 @@ pub trait DocumentReader {
     fn objects(&self) -> &[Object];
     fn instances(&self) -> &[Instance];
     fn instances_mut(&mut self) -> &mut Vec<Instance>;
-    /// Images that the materials refer to, to be copied into the asset.
-    fn textures(&self) -> &[ImageFile];
+    /// Images that the materials refer to, to be copied into the asset; complete after the last batch.
+    fn textures(&self) -> &[DocumentImage];
     fn report(&self) -> &AssetReport;
 
     /// Replaces the transforms of all instances, for example by reprojected ones. Takes one transform per instance, in order. Removes the instances

@@ -7,26 +7,10 @@ use std::sync::Arc;
 use map3d_base::limits::{MAX_IMAGE_PX, MAX_IMAGE_SIDE_PX};
 use map3d_base::{Error, Result};
 use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
 
 use super::transparency::Transparency;
-
-/// The axis of an OBJ that points up. `Y` turns (x, y, z) into (x, −z, y).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Up {
-    Y,
-    #[default]
-    Z,
-}
-
-/// The part of an OBJ that becomes one object.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Split {
-    #[default]
-    File,
-    Group,
-}
 
 /// Positions in one coordinate system, from those in another: (source, target, x and y as documents write them) → x and y, or `None` if no transformation
 /// is known.
@@ -56,23 +40,13 @@ impl fmt::Debug for PositionTransformer {
 
 /// Options for one document. The limits guard against hostile input; raise one by its name for large data.
 #[derive(Clone, Debug, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[serde(default)]
 pub struct ReadOptions {
-    pub up: Up,
-    pub split: Split,
-    /// CityGML appearance theme; by default, the one with the most textures, of equal ones the first in the file.
-    pub theme: Option<String>,
-    /// CityGML level of detail, 0 to 4; by default, the finest of each object.
-    pub lod: Option<String>,
-    /// Converts rooms and what is in them.
-    pub interiors: bool,
     pub transparency: Transparency,
     /// Makes the first broken part an error.
     pub strict: bool,
     /// Folder that file names in the document may lead to; by default, the document's own.
     pub folder: Option<PathBuf>,
-    /// Other CityGML files in that folder whose appearances target surfaces of the document.
-    pub appearance_files: Vec<PathBuf>,
     /// Transforms the place of textures to the coordinate system of surfaces.
     #[serde(skip)]
     pub transform: Option<PositionTransformer>,
@@ -85,20 +59,17 @@ pub struct ReadOptions {
     pub max_appearance_bytes: u64,
     /// Memory for the geometry of one city object.
     pub max_object_bytes: u64,
+    /// Options that only the format has: all other members.
+    #[serde(flatten)]
+    pub of_format: Map<String, Value>,
 }
 
 impl Default for ReadOptions {
     fn default() -> Self {
         Self {
-            up: Up::default(),
-            split: Split::default(),
-            theme: None,
-            lod: None,
-            interiors: false,
             transparency: Transparency::default(),
             strict: false,
             folder: None,
-            appearance_files: Vec::new(),
             transform: None,
             max_image_side_px: MAX_IMAGE_SIDE_PX,
             max_image_px: MAX_IMAGE_PX,
@@ -107,13 +78,24 @@ impl Default for ReadOptions {
             max_instances: 10_000_000,
             max_appearance_bytes: 1 << 30,
             max_object_bytes: 1 << 30,
+            of_format: Map::new(),
         }
     }
 }
 
 impl ReadOptions {
-    /// Parses options from JSON. Absent members have their defaults; unknown members are an error.
+    /// Parses options from JSON. Absent members have their defaults; members that only one format has are checked when a document is opened.
     pub fn from_json(text: &str) -> Result<Self> {
         serde_json::from_str(text).map_err(|e| Error::argument(format!("reader options: {e}")))
+    }
+
+    /// Parses the options that only the format has; unknown members are an error.
+    pub fn parse_of_format<T: DeserializeOwned>(&self) -> Result<T> {
+        serde_json::from_value(Value::Object(self.of_format.clone())).map_err(|e| Error::argument(format!("reader options: {e}")))
+    }
+
+    /// Returns the options for a document in another format that this one names.
+    pub fn without_format(&self) -> Self {
+        Self { of_format: Map::new(), ..self.clone() }
     }
 }

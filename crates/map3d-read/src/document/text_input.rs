@@ -13,7 +13,7 @@ use memchr::{memchr, memchr_iter};
 use super::byte_source::ByteSource;
 use super::mended_utf8::MendedUtf8;
 
-const HEAD_BYTES: u64 = 4096;
+const ENCODING_BYTES: usize = 4096;
 const BUFFER_BYTES: usize = 1 << 17;
 
 /// A text file, read as it is or decoded to UTF-8.
@@ -68,10 +68,15 @@ fn open_file(path: &Path) -> Result<ByteSource> {
     File::open(path).and_then(ByteSource::new).map_err(|e| Error::storage(path, e))
 }
 
+/// Returns the first bytes of a file or, if it is packed, of its content.
+pub fn read_file_head(path: &Path, size: usize) -> Result<Vec<u8>> {
+    read_head(&mut open_file(path)?, size).map_err(|e| Error::storage(path, e))
+}
+
 /// Returns the first bytes of a file and rewinds it.
-fn read_head(file: &mut ByteSource) -> io::Result<Vec<u8>> {
+fn read_head(file: &mut ByteSource, size: usize) -> io::Result<Vec<u8>> {
     let mut head = Vec::new();
-    let read = file.by_ref().take(HEAD_BYTES).read_to_end(&mut head);
+    let read = file.by_ref().take(size as u64).read_to_end(&mut head);
     // What precedes the damage of a short gzip file is its head.
     read.or_else(|e| if file.is_gzip() { Ok(0) } else { Err(e) })?;
     file.rewind()?;
@@ -88,7 +93,7 @@ pub fn open_xml(path: &Path) -> Result<TextInput> {
 pub fn open_checked_xml(path: &Path) -> Result<(TextInput, Vec<EncodingFault>)> {
     let io = |e| Error::storage(path, e);
     let mut file = open_file(path)?;
-    let head = read_head(&mut file).map_err(io)?;
+    let head = read_head(&mut file, ENCODING_BYTES).map_err(io)?;
     let mut faults = Vec::new();
     let declared = find_declared_encoding(&head);
     let known = declared.as_deref().and_then(|name| Encoding::for_label(name.as_bytes()));
@@ -166,16 +171,12 @@ fn find_utf8_fault(file: &mut ByteSource) -> io::Result<Option<EncodingFault>> {
 /// Opens a text file for reading by lines. UTF-16 is decoded; other encodings pass through, without a byte order mark (see `decode_name`).
 pub fn open_lines(path: &Path) -> Result<TextInput> {
     let mut file = open_file(path)?;
-    let head = read_head(&mut file).map_err(|e| Error::storage(path, e))?;
-    let bom_encoding = Encoding::for_bom(&head).map(|(encoding, _)| encoding);
-    if bom_encoding == Some(UTF_16LE) || bom_encoding == Some(UTF_16BE) {
-        return Ok(decode(file, UTF_8));
-    }
-    if let Some(encoding) = detect_utf16_without_bom(&head) {
+    let head = read_head(&mut file, ENCODING_BYTES).map_err(|e| Error::storage(path, e))?;
+    if let Some(encoding) = find_utf16(&head) {
         return Ok(decode(file, encoding));
     }
     let mut input = BufReader::with_capacity(BUFFER_BYTES, file);
-    if bom_encoding.is_some() {
+    if Encoding::for_bom(&head).is_some() {
         input.fill_buf().map_err(|e| Error::storage(path, e))?;
         input.consume(3);
     }
@@ -193,6 +194,12 @@ pub fn decode_name(bytes: &[u8]) -> Cow<'_, str> {
 fn decode(file: ByteSource, encoding: &'static Encoding) -> TextInput {
     let decoder = DecodeReaderBytesBuilder::new().encoding(Some(encoding)).bom_override(true).build(file);
     TextInput::Decoded(Box::new(BufReader::with_capacity(BUFFER_BYTES, decoder)))
+}
+
+/// Returns the UTF-16 that a byte order mark or zeros announce.
+pub fn find_utf16(head: &[u8]) -> Option<&'static Encoding> {
+    let marked = Encoding::for_bom(head).map(|(encoding, _)| encoding).filter(|encoding| *encoding != UTF_8);
+    marked.or_else(|| detect_utf16_without_bom(head))
 }
 
 /// Detects UTF-16 by its zeros: text of mostly ASCII characters has one in every other byte.

@@ -1,6 +1,6 @@
 //! Builds small city models.
 
-use map3d_read::{Format, ReadOptions};
+use map3d_read::{CITYGML, ReadOptions};
 
 use super::{Folder, ParsedDocument, read_with};
 
@@ -23,7 +23,7 @@ pub fn building(body: &str) -> String {
 pub fn try_text(text: &str, options: &ReadOptions) -> map3d_base::Result<ParsedDocument> {
     let folder = Folder::new("citygml");
     let path = folder.put("town.gml", text);
-    read_with(&path, Format::CityGml, options)
+    read_with(&path, &CITYGML, options)
 }
 
 pub fn read_text(text: &str) -> ParsedDocument {

@@ -10,7 +10,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use map3d_base::asset::{AssetReport, Batch, Instance, Material, Object, Rank};
 use map3d_base::vec3::{length, triangle_normal};
 use map3d_base::{Error, Result, Vec3};
-use map3d_read::{Format, ImageFile, ReadOptions, open};
+use map3d_read::{DocumentImage, FileHead, ReadOptions, SourceFormat, detect, open};
+use serde_json::Value;
 
 /// A temporary folder, removed when dropped.
 pub struct Folder(pub PathBuf);
@@ -62,11 +63,21 @@ pub struct ParsedDocument {
     pub objects: Vec<Object>,
     pub materials: Vec<Material>,
     pub instances: Vec<Instance>,
-    pub textures: Vec<ImageFile>,
+    pub textures: Vec<DocumentImage>,
     pub srs_name: Option<String>,
     pub crs_names: Vec<Option<String>>,
     pub instance_crs: Vec<u16>,
     pub report: AssetReport,
+}
+
+/// Returns options that only one format has.
+pub fn of_format(options: Value) -> ReadOptions {
+    ReadOptions::from_json(&options.to_string()).expect("valid options")
+}
+
+/// Returns the format in which a file is.
+pub fn detect_file(path: &Path) -> Option<&'static SourceFormat> {
+    FileHead::read(path).ok().and_then(|head| detect(&head))
 }
 
 /// One triangle and its attributes.
@@ -80,7 +91,7 @@ pub struct Triangle {
     pub prototype: u32,
 }
 
-pub fn read_with(path: &Path, format: Format, options: &ReadOptions) -> Result<ParsedDocument> {
+pub fn read_with(path: &Path, format: &SourceFormat, options: &ReadOptions) -> Result<ParsedDocument> {
     let mut reader = open(path, format, options)?;
     let mut batches = Vec::new();
     while let Some(batch) = reader.next_batch()? {

@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
+use map3d_base::Result;
 use map3d_base::asset::{AssetReport, Batch, Instance, Material, Object};
-use map3d_base::{Error, Result};
 
 use super::city_object_parser::CityObjectParser;
 use super::dictionary_parser::read_dictionary;
+use super::options::CityGmlOptions;
 use super::other_documents::OtherDocuments;
 use super::pre_scan::PreScan;
 use super::references::References;
@@ -14,16 +15,19 @@ use super::xml_reader::{Malformed, XmlEvent, XmlReader};
 use crate::city_model::appearance::ThemeSelection;
 use crate::city_model::city_object::CityObject;
 use crate::city_model::code_lists::CodeLists;
-use crate::city_model::converter::{FeatureConverter, INTERIOR_POLYGON};
+use crate::city_model::converter::{Conversion, FeatureConverter, INTERIOR_POLYGON};
 use crate::city_model::crs_table::{CrsNumber, CrsTable, DOCUMENT_CRS};
 use crate::city_model::tessellate::INVISIBLE_POLYGON;
 use crate::document::asset_folder::AssetFolder;
-use crate::document::image_file::ImageFile;
+use crate::document::images::DocumentImage;
 use crate::document::options::ReadOptions;
 use crate::document::report_builder::ReportBuilder;
+use crate::document::source_format::SourceFormat;
 use crate::document::text_input::count_lines;
 use crate::document::transparency::report_invisible;
 use crate::document::{DocumentReader, ReliefGrid};
+
+pub const NAME: &str = "citygml";
 
 /// Reads CityGML. Memory: the results of the first pass (see `pre_scan`), one city object, and the tables of objects and materials.
 pub struct CityGmlReader {
@@ -52,15 +56,18 @@ pub struct CityGmlReader {
 
 impl CityGmlReader {
     /// Opens a document and runs the first pass. File names in the document are resolved inside its folder, or inside `options.folder`.
-    pub fn open(path: &Path, options: &ReadOptions) -> Result<Self> {
-        let lod = parse_lod(options)?;
+    pub fn open(path: &Path, options: &ReadOptions, formats: &'static [SourceFormat]) -> Result<Self> {
+        let of_format: CityGmlOptions = options.parse_of_format()?;
+        let lod = of_format.parse_lod()?;
         let folder = AssetFolder::for_document(path, options.folder.as_deref())?;
-        let mut report = ReportBuilder::new(path, "citygml", options.strict);
+        let mut report = ReportBuilder::new(path, NAME, options.strict);
         let mut references = References::new(path, options.folder.as_deref())?;
-        let PreScan { srs_name, theme, appearances, referenced_ids, transparency } = PreScan::run(path, options, &mut references, &mut report)?;
+        let PreScan { srs_name, theme, appearances, referenced_ids, transparency } =
+            PreScan::run(path, options, &of_format, &mut references, &mut report)?;
         report.set_crs(srs_name.clone());
         report_theme(&theme, &mut report);
         let inverted = transparency.is_inverted(options.transparency, &mut report);
+        let conversion = Conversion { lod, interiors: of_format.interiors, inverted, formats };
         Ok(Self {
             xml: XmlReader::open(path)?,
             report,
@@ -70,7 +77,7 @@ impl CityGmlReader {
             references,
             theme,
             city_object: CityObject::default(),
-            converter: FeatureConverter::new(folder, options, inverted, lod, appearances, referenced_ids),
+            converter: FeatureConverter::new(folder, options, conversion, appearances, referenced_ids),
             code_lists: CodeLists::new(AssetFolder::for_document(path, options.folder.as_deref())?, read_dictionary),
             instances: Vec::new(),
             values: Vec::new(),
@@ -189,14 +196,6 @@ impl CityGmlReader {
 /// Themes that the report names.
 const MAX_NAMED_THEMES: usize = 5;
 
-fn parse_lod(options: &ReadOptions) -> Result<Option<u8>> {
-    let Some(text) = &options.lod else { return Ok(None) };
-    match text.as_bytes() {
-        [digit @ b'0'..=b'4'] | [digit @ b'0'..=b'4', b'.', _] => Ok(Some(digit - b'0')),
-        _ => Err(Error::argument(format!("lod {text:?}: expected 0, 1, 2, 3 or 4"))),
-    }
-}
-
 fn report_theme(theme: &ThemeSelection, report: &mut ReportBuilder) {
     match (&theme.requested, theme.selected()) {
         (None, Some(selected)) if theme.has_several() => report.note("appearance theme used", selected),
@@ -261,7 +260,7 @@ impl DocumentReader for CityGmlReader {
         &mut self.instances
     }
 
-    fn textures(&self) -> &[ImageFile] {
+    fn textures(&self) -> &[DocumentImage] {
         self.converter.resolver.images.files()
     }
 

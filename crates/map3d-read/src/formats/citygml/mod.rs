@@ -14,6 +14,7 @@ mod geometry_parser;
 mod grid_parser;
 mod grid_values;
 mod implicit_geometry_parser;
+mod options;
 mod other_documents;
 mod positions;
 mod pre_scan;
@@ -25,4 +26,13 @@ mod tin_parser;
 mod tin_parts;
 mod xml_reader;
 
-pub use citygml_reader::CityGmlReader;
+use self::citygml_reader::{CityGmlReader, NAME};
+use crate::document::source_format::SourceFormat;
+
+pub const CITYGML: SourceFormat = SourceFormat {
+    name: NAME,
+    version: 11,
+    is_library_object: false,
+    detect: |head| head.xml_root() == Some("CityModel"),
+    open: |path, options, formats| Ok(Box::new(CityGmlReader::open(path, options, formats)?)),
+};

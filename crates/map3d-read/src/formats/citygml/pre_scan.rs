@@ -4,11 +4,12 @@
 //! `max_appearance_bytes`), and 8 bytes per id that another city object refers to.
 
 use std::borrow::Cow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use map3d_base::{Error, Result};
 
 use super::appearance_parser::{AppearanceParser, AppearanceScope, parse_transparency};
+use super::options::CityGmlOptions;
 use super::other_documents::OtherDocuments;
 use super::references::References;
 use super::tag_scanner::{TagKind, TagScanner};
@@ -37,9 +38,15 @@ pub struct PreScan {
 
 impl PreScan {
     /// Scans the whole document, then the appearances that other documents have for it. A truncated document is scanned up to its end.
-    pub fn run(path: &Path, options: &ReadOptions, references: &mut References, report: &mut ReportBuilder) -> Result<Self> {
+    pub fn run(
+        path: &Path,
+        options: &ReadOptions,
+        of_format: &CityGmlOptions,
+        references: &mut References,
+        report: &mut ReportBuilder,
+    ) -> Result<Self> {
         let io = |e| Error::storage(path, e);
-        let mut scan = Self { theme: ThemeSelection::new(options.theme.clone()), ..Self::default() };
+        let mut scan = Self { theme: ThemeSelection::new(of_format.theme.clone()), ..Self::default() };
         let (input, faults) = open_checked_xml(path)?;
         for EncodingFault { reason, example } in faults {
             report.warn_file(reason, example)?;
@@ -84,7 +91,7 @@ impl PreScan {
             return Err(Error::format(path, "no XML element; expected a CityGML document"));
         }
         links.finish_object(&mut scan.referenced_ids);
-        scan.read_other_appearances(options, references, report)?;
+        scan.read_other_appearances(options, &of_format.appearance_files, references, report)?;
         scan.appearances.count_textures(&mut scan.theme);
         scan.theme.choose();
         scan.appearances.count_transparency(&mut scan.transparency);
@@ -115,8 +122,14 @@ impl PreScan {
     }
 
     /// Reads the appearances that other documents have for surfaces of this one.
-    fn read_other_appearances(&mut self, options: &ReadOptions, references: &mut References, report: &mut ReportBuilder) -> Result<()> {
-        if options.appearance_files.is_empty() {
+    fn read_other_appearances(
+        &mut self,
+        options: &ReadOptions,
+        files: &[PathBuf],
+        references: &mut References,
+        report: &mut ReportBuilder,
+    ) -> Result<()> {
+        if files.is_empty() {
             return Ok(());
         }
         OtherDocuments {
@@ -128,7 +141,7 @@ impl PreScan {
             options,
             report,
         }
-        .read_appearances(&options.appearance_files)
+        .read_appearances(files)
     }
 
     /// Parses the current appearanceMember; the scanner continues after it. The second pass reports a malformed one.

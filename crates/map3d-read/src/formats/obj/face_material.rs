@@ -5,7 +5,7 @@ use map3d_base::asset::{Material, Wrap};
 
 use super::mtl::{MaterialLibrary, MtlMaterial};
 use crate::document::asset_folder::AssetFolder;
-use crate::document::image_file::ImageFiles;
+use crate::document::images::DocumentImages;
 use crate::document::material_table::MaterialTable;
 use crate::document::options::ReadOptions;
 use crate::document::report_builder::ReportBuilder;
@@ -32,14 +32,14 @@ pub struct FaceMaterial {
 
 pub struct FaceMaterialResolver {
     pub library: MaterialLibrary,
-    pub images: ImageFiles,
+    pub images: DocumentImages,
     pub table: MaterialTable,
     pub folder: AssetFolder,
 }
 
 impl FaceMaterialResolver {
     pub fn new(folder: AssetFolder, transparency: Transparency) -> Self {
-        Self { library: MaterialLibrary::new(transparency), images: ImageFiles::default(), table: MaterialTable::default(), folder }
+        Self { library: MaterialLibrary::new(transparency), images: DocumentImages::default(), table: MaterialTable::default(), folder }
     }
 
     /// Resolves a `usemtl` name. A missing or undefined material is grey.

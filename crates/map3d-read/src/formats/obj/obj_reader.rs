@@ -11,16 +11,18 @@ use super::batch_builder::{BatchBuilder, FaceTriangle};
 use super::face::{ElementCounts, FaceVertex, parse_face};
 use super::face_material::{FaceMaterial, FaceMaterialResolver};
 use super::line_reader::{LineReader, numbers, split_word};
+use super::options::{ObjOptions, Split, Up};
 use crate::document::DocumentReader;
 use crate::document::asset_folder::AssetFolder;
-use crate::document::image_file::ImageFile;
+use crate::document::images::DocumentImage;
 use crate::document::material_table::shift_uvs;
-use crate::document::options::{ReadOptions, Split, Up};
+use crate::document::options::ReadOptions;
 use crate::document::report_builder::{LimitCheck, ReportBuilder};
 use crate::document::text_input::decode_name;
 use crate::document::transparency::report_invisible;
 use crate::triangulation::triangulate::{Coverage, Triangulator};
 
+pub const NAME: &str = "obj";
 /// The reason for faces left out.
 const INVISIBLE_FACE: &str = "fully transparent face";
 const BATCH_TRIANGLES: usize = 1 << 16;
@@ -40,6 +42,7 @@ pub struct ObjReader {
     lines: LineReader,
     report: ReportBuilder,
     options: ReadOptions,
+    of_format: ObjOptions,
     materials: FaceMaterialResolver,
     positions: Vec<Vec3>,
     colors: Vec<[u8; 3]>,
@@ -69,8 +72,9 @@ impl ObjReader {
         let folder = AssetFolder::for_document(path, options.folder.as_deref())?;
         Ok(Self {
             lines: LineReader::open(path)?,
-            report: ReportBuilder::new(path, "obj", options.strict),
+            report: ReportBuilder::new(path, NAME, options.strict),
             options: options.clone(),
+            of_format: options.parse_of_format()?,
             materials: FaceMaterialResolver::new(folder, options.transparency),
             positions: Vec::new(),
             colors: Vec::new(),
@@ -109,7 +113,7 @@ impl ObjReader {
             b"vn" => {
                 let mut values = numbers(rest);
                 let n = [0; 3].map(|_| values.next().unwrap_or(0.0));
-                self.normals.push(normalized(convert_to_z_up(n, self.options.up)).unwrap_or_default().map(|v| v as f32));
+                self.normals.push(normalized(convert_to_z_up(n, self.of_format.up)).unwrap_or_default().map(|v| v as f32));
             }
             b"f" | b"fo" => match parse_face(rest, counts, &mut self.face) {
                 Some(()) => self.add_face()?,
@@ -136,7 +140,7 @@ impl ObjReader {
     /// Adds a vertex from `x y z [w]` or `x y z [w] r g b`.
     fn add_vertex(&mut self, values: &[f64]) -> Result<()> {
         let position = match *values {
-            [x, y, z, ..] => convert_to_z_up([x, y, z], self.options.up),
+            [x, y, z, ..] => convert_to_z_up([x, y, z], self.of_format.up),
             _ => {
                 self.skip("unreadable vertex")?;
                 [f64::NAN; 3]
@@ -186,7 +190,7 @@ impl ObjReader {
 
     /// Returns the object that faces currently belong to; adds it with its first face.
     fn current_object(&mut self) -> u32 {
-        let name = match self.options.split {
+        let name = match self.of_format.split {
             Split::Group if !self.group.is_empty() => self.group.as_str(),
             _ => "",
         };
@@ -316,7 +320,7 @@ impl DocumentReader for ObjReader {
         &mut self.instances
     }
 
-    fn textures(&self) -> &[ImageFile] {
+    fn textures(&self) -> &[DocumentImage] {
         self.materials.images.files()
     }
 

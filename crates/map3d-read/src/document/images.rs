@@ -1,9 +1,10 @@
-//! Image files of a document: located, checked by their header, and identified by the hash of their bytes.
+//! Images of a document: located, checked by their header, and identified by the hash of their bytes.
 
 use std::collections::HashMap;
 use std::fs::File;
-use std::io::{BufReader, Read};
-use std::path::{Path, PathBuf};
+use std::io::{self, BufRead, BufReader, Cursor, Read, Seek};
+use std::path::PathBuf;
+use std::sync::Arc;
 
 use imagesize::ImageType;
 use map3d_base::Result;
@@ -13,13 +14,32 @@ use super::asset_folder::AssetFolder;
 use super::options::ReadOptions;
 use super::report_builder::ReportBuilder;
 
+/// Where an image is: in a file of its own, or in the document.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum ImageSource {
+    File(PathBuf),
+    Bytes(Arc<[u8]>),
+}
+
+trait ImageInput: BufRead + Seek {}
+impl<T: BufRead + Seek> ImageInput for T {}
+
+impl ImageSource {
+    fn open(&self) -> io::Result<Box<dyn ImageInput + '_>> {
+        Ok(match self {
+            Self::File(path) => Box::new(BufReader::new(File::open(path)?)),
+            Self::Bytes(bytes) => Box::new(Cursor::new(&**bytes)),
+        })
+    }
+}
+
 /// An image to be copied into the asset.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ImageFile {
-    pub path: PathBuf,
-    /// File extension for the detected image type; may differ from the extension of `path`.
+pub struct DocumentImage {
+    pub source: ImageSource,
+    /// File extension for the detected image type; may differ from the extension of its file.
     pub extension: &'static str,
-    /// The first 32 hex digits of the SHA-256 of the file's bytes.
+    /// The first 32 hex digits of the SHA-256 of the bytes.
     pub key: String,
     pub width_px: u32,
     pub height_px: u32,
@@ -29,20 +49,20 @@ pub struct ImageFile {
 
 /// All images of one document, each stored once.
 #[derive(Default)]
-pub struct ImageFiles {
-    files: Vec<ImageFile>,
+pub struct DocumentImages {
+    files: Vec<DocumentImage>,
     /// Index into `files` by name in the document; `None` for unusable images.
     by_name: HashMap<String, Option<usize>>,
     by_key: HashMap<String, usize>,
 }
 
-impl ImageFiles {
-    pub fn files(&self) -> &[ImageFile] {
+impl DocumentImages {
+    pub fn files(&self) -> &[DocumentImage] {
         &self.files
     }
 
     /// Returns the image that a name in the document refers to. Returns `None` after a warning if the image is unusable.
-    pub fn get(&mut self, name: &str, folder: &mut AssetFolder, options: &ReadOptions, report: &mut ReportBuilder) -> Result<Option<&ImageFile>> {
+    pub fn get(&mut self, name: &str, folder: &mut AssetFolder, options: &ReadOptions, report: &mut ReportBuilder) -> Result<Option<&DocumentImage>> {
         if !self.by_name.contains_key(name) {
             let index = self.load(name, folder, options, report)?;
             self.by_name.insert(name.to_owned(), index);
@@ -63,7 +83,7 @@ impl ImageFiles {
         if let Some(oddity) = file.oddity {
             report.note(oddity, name);
         }
-        match inspect(&file.path, options) {
+        match DocumentImage::inspect(ImageSource::File(file.path), options) {
             Ok(image) => Ok(Some(self.add(image))),
             Err(reason) => {
                 report.warn(&format!("image: {reason}"), name)?;
@@ -73,7 +93,7 @@ impl ImageFiles {
     }
 
     /// Adds an image unless one with the same bytes exists. Returns its index.
-    pub fn add(&mut self, image: ImageFile) -> usize {
+    pub fn add(&mut self, image: DocumentImage) -> usize {
         *self.by_key.entry(image.key.clone()).or_insert_with(|| {
             self.files.push(image);
             self.files.len() - 1
@@ -81,31 +101,29 @@ impl ImageFiles {
     }
 }
 
-/// Reads and checks the header, then hashes the file. The error is the reason for the report.
-fn inspect(path: &Path, options: &ReadOptions) -> std::result::Result<ImageFile, String> {
-    let unreadable = |e: std::io::Error| format!("unreadable ({})", e.kind());
-    let mut file = BufReader::new(File::open(path).map_err(unreadable)?);
-    let kind = imagesize::reader_type(&mut file).map_err(|_| "unknown format")?;
-    let extension = extension_for(kind).ok_or("unsupported format")?;
-    let size = kind.reader_size(&mut file).map_err(|_| "invalid header")?;
-    let (width, height) = (size.width as u64, size.height as u64);
-    if width == 0 || height == 0 {
-        return Err("no pixels".into());
+impl DocumentImage {
+    /// Reads and checks the header, then hashes the bytes. The error is the reason for the report.
+    pub fn inspect(source: ImageSource, options: &ReadOptions) -> std::result::Result<Self, String> {
+        let unreadable = |e: io::Error| format!("unreadable ({})", e.kind());
+        let mut input = source.open().map_err(unreadable)?;
+        let kind = imagesize::reader_type(&mut input).map_err(|_| "unknown format")?;
+        let extension = extension_for(kind).ok_or("unsupported format")?;
+        let size = kind.reader_size(&mut input).map_err(|_| "invalid header")?;
+        drop(input);
+        let (width, height) = (size.width as u64, size.height as u64);
+        if width == 0 || height == 0 {
+            return Err("no pixels".into());
+        }
+        if width.max(height) > options.max_image_side_px {
+            return Err(format!("side over the limit max_image_side_px = {}", options.max_image_side_px));
+        }
+        if width * height > options.max_image_px {
+            return Err(format!("pixels over the limit max_image_px = {}", options.max_image_px));
+        }
+        let key = compute_key(&source).map_err(unreadable)?;
+        let transparent = extension == "png" && is_png_transparent(&source);
+        Ok(Self { source, extension, key, width_px: width as u32, height_px: height as u32, transparent })
     }
-    if width.max(height) > options.max_image_side_px {
-        return Err(format!("side over the limit max_image_side_px = {}", options.max_image_side_px));
-    }
-    if width * height > options.max_image_px {
-        return Err(format!("pixels over the limit max_image_px = {}", options.max_image_px));
-    }
-    Ok(ImageFile {
-        path: path.to_path_buf(),
-        extension,
-        key: compute_key(path).map_err(unreadable)?,
-        width_px: width as u32,
-        height_px: height as u32,
-        transparent: extension == "png" && is_png_transparent(path),
-    })
 }
 
 fn extension_for(kind: ImageType) -> Option<&'static str> {
@@ -121,12 +139,12 @@ fn extension_for(kind: ImageType) -> Option<&'static str> {
     })
 }
 
-fn compute_key(path: &Path) -> std::io::Result<String> {
-    let mut file = File::open(path)?;
+fn compute_key(source: &ImageSource) -> io::Result<String> {
+    let mut input = source.open()?;
     let mut digest = Sha256::new();
     let mut buffer = vec![0; 1 << 16];
     loop {
-        match file.read(&mut buffer)? {
+        match input.read(&mut buffer)? {
             0 => return Ok(digest.finalize().iter().take(16).map(|b| format!("{b:02x}")).collect()),
             n => digest.update(&buffer[..n]),
         }
@@ -134,9 +152,9 @@ fn compute_key(path: &Path) -> std::io::Result<String> {
 }
 
 /// Returns true if any texel of a PNG is not opaque. Reads row by row. Treats a damaged image as opaque: the scene build reports it when it decodes it.
-fn is_png_transparent(path: &Path) -> bool {
-    let Ok(file) = File::open(path) else { return false };
-    let mut decoder = png::Decoder::new(BufReader::new(file));
+fn is_png_transparent(source: &ImageSource) -> bool {
+    let Ok(input) = source.open() else { return false };
+    let mut decoder = png::Decoder::new(input);
     decoder.set_transformations(png::Transformations::normalize_to_color8() | png::Transformations::ALPHA);
     let Ok(mut reader) = decoder.read_info() else { return false };
     let info = reader.info();

@@ -1,0 +1,30 @@
+//! Options that only CityGML has.
+
+use std::path::PathBuf;
+
+use map3d_base::{Error, Result};
+use serde::Deserialize;
+
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CityGmlOptions {
+    /// Appearance theme; by default, the one with the most textures, of equal ones the first in the file.
+    pub theme: Option<String>,
+    /// Level of detail, 0 to 4; by default, the finest of each object.
+    pub lod: Option<String>,
+    /// Converts rooms and what is in them.
+    pub interiors: bool,
+    /// Other files in the folder of the document whose appearances target surfaces of it.
+    pub appearance_files: Vec<PathBuf>,
+}
+
+impl CityGmlOptions {
+    /// Returns the requested level of detail.
+    pub fn parse_lod(&self) -> Result<Option<u8>> {
+        let Some(text) = &self.lod else { return Ok(None) };
+        match text.as_bytes() {
+            [digit @ b'0'..=b'4'] | [digit @ b'0'..=b'4', b'.', _] => Ok(Some(digit - b'0')),
+            _ => Err(Error::argument(format!("lod {text:?}: expected 0, 1, 2, 3 or 4"))),
+        }
+    }
+}
