@@ -1,9 +1,12 @@
-"""Writes spec/vectors/*.json from the formulas of the spec's pages and nothing else. Deterministic; run by `make bless`."""
+"""Writes spec/vectors/*.json from the formulas of the spec's pages and nothing else, and the kinds of layers into the manifest's schema.
+
+Deterministic; run by `make bless`."""
 
 import base64
 import json
 import math
 import random
+import re
 import struct
 from pathlib import Path
 
@@ -413,8 +416,20 @@ def write(name, value):
     (HERE / f"{name}.json").write_text(text + "\n")
 
 
+def write_layers_of_schema():
+    """Writes the kinds and formats of spec/layers.json into the manifest's schema."""
+    path = HERE.parent / "manifest.schema.json"
+    rows = json.loads((HERE.parent / "layers.json").read_text())
+    formats = dict.fromkeys(one for row in rows for one in row["formats"])
+    text = path.read_text()
+    for field, values in [("kind", [row["kind"] for row in rows]), ("format", list(formats))]:
+        text = re.sub(rf'"{field}": {{"enum": \[.*?\]}}', f'"{field}": {{"enum": {json.dumps(values)}}}', text)
+    path.write_text(text)
+
+
 def main():
     HERE.mkdir(exist_ok=True)
+    write_layers_of_schema()
     for name, value in {
         "views": views_vectors(),
         "frames": frames_vectors(),

@@ -26,6 +26,8 @@ MAX_FROM_ORIGIN_M: float
 """Content farther from the scene's origin, along any axis, is never part of a scene."""
 MAX_SUNS: int
 """Maximum number of suns of a sun16 layer."""
+LAYERS: str
+"""The table of spec/layers.json (JSON), in its order."""
 AO_RADIUS_M: tuple[float, float]
 """Minimum and maximum radius of ambient occlusion."""
 NAME_PATTERN: str
@@ -183,7 +185,6 @@ def find_clusters(folders: list[str], origin: _Vec3, options: str) -> str:
 
 # -- tracing and blocks (map3d-trace, map3d-render) --------------------------------------------------------------------------------
 
-_Kind = Literal["color", "normal", "id", "depth", "sun", "sun16", "ao", "depth2", "picture", "data"]
 _Format = Literal["webp", "png", "jpeg", "m3d"]
 """m3d: the data tile, for the kind data, which holds normal, id and depth."""
 _Vec3 = tuple[float, float, float]
@@ -191,12 +192,12 @@ _Box = tuple[_Vec3, _Vec3]
 
 @final
 class LayerSpec:
-    """How a layer is made and encoded. `suns`: unit vectors towards the suns of sun, sun16, picture; `radius_m`: of ambient occlusion, in ao, picture."""
+    """How a layer is made and encoded. `suns`: unit vectors towards the suns; `radius_m`: of ambient occlusion."""
     def __init__(
-        self, kind: _Kind, format: _Format, quality: int = 80, small: bool = False, suns: Sequence[Sequence[float]] = ..., radius_m: float = 0.0
+        self, kind: str, format: _Format, quality: int = 80, small: bool = False, suns: Sequence[Sequence[float]] = ..., radius_m: float = 0.0
     ) -> None: ...
     @property
-    def kind(self) -> _Kind: ...
+    def kind(self) -> str: ...
     @property
     def format(self) -> _Format: ...
     @property
@@ -331,7 +332,7 @@ class Scene:
 
         color, picture (h, w, 4) uint8 sRGB with straight alpha, 0 where nothing is; normal (h, w, 3) uint8 as spec/pyramid.md §6 codes it; id (h, w) uint32;
         depth (h, w) float32, metres along `camera.forward`, NaN where nothing is; sun, ao (h, w) uint8. id, depth and normal are those of the pixel's centre,
-        colours the mean of `samples` (1, 4 or 16) per pixel. Formats and qualities of the layers are ignored; sun16 and depth2 are refused.
+        colours the mean of `samples` (1, 4 or 16) per pixel. Formats and qualities of the layers are ignored; kinds that no view has are refused.
 
         `box`: only geometry inside this local box is drawn, cut at its sides. `objects`: only these ids are drawn. Light (sun, ao, picture) is that of the
         whole scene in both cases. `region`: (x, y, width, height) of the image, in pixels; the arrays have its size. The bytes are the same for any
@@ -379,10 +380,10 @@ def check_seam(frame: Frame, seam: bytes) -> None:
 
 # -- images, for tests and tools ------------------------------------------------------------------------------------------------------
 
-def encode_layer(kind: _Kind, format: _Format, array: NDArray[Any], quality: int = 80, small: bool = False) -> bytes:
+def encode_layer(kind: str, format: _Format, array: NDArray[Any], quality: int = 80, small: bool = False) -> bytes:
     """Encodes one layer of a G-buffer as an image; `small` trades time for fewer bytes."""
 
-def encode_png(kind: _Kind, pixels: NDArray[np.uint8], order: Sequence[int], small: bool = False) -> bytes:
+def encode_png(kind: str, pixels: NDArray[np.uint8], order: Sequence[int], small: bool = False) -> bytes:
     """Encodes channels of (H, W, C) bytes, in the given order, as an 8-bit PNG of 1 to 4 channels, with the filter and the compression of a kind of layer."""
 
 def encode_bits(bits: NDArray[np.bool_]) -> bytes:

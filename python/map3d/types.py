@@ -1,5 +1,6 @@
 """Small values that all parts exchange. No I/O, and no logic but their own checks."""
 
+import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,27 +13,59 @@ Vec3 = tuple[float, float, float]
 Box = tuple[Vec3, Vec3]
 """(least corner, greatest corner), metres, in the frame that the name says."""
 
-LayerKind = Literal["color", "normal", "id", "depth", "data", "sun", "sun16", "ao", "depth2", "picture"]
+LayerKind = str
+"""A key of LAYERS."""
 BlockKind = Literal["base", "reduce"]
 DataEncoding = Literal["png", "tile"]
 """How a rendering stores normal, id and depth: as three PNG layers, or as one layer of data tiles."""
 
-LAYER_KINDS: Final[tuple[LayerKind, ...]] = ("color", "normal", "id", "depth", "data", "sun", "sun16", "ao", "depth2", "picture")
-DATA_TILE_KINDS: Final[tuple[LayerKind, ...]] = ("normal", "id", "depth")
+
+@dataclass(frozen=True)
+class LayerArray:
+    """An array of a G-buffer. `pixel`: uint8, uint16, uint32, int16x3 or uint16x4; `nothing`: each channel where there is no surface; `reduction`:
+    how a parent's pixel follows from its children (spec/pyramid.md §7)."""
+
+    pixel: str
+    nothing: int
+    reduction: str
+
+
+@dataclass(frozen=True)
+class LayerRow:
+    """What all layers of a kind have in common: a row of spec/layers.json, which spec/README.md explains."""
+
+    kind: LayerKind
+    code: int
+    array: LayerArray | None
+    formats: tuple[str, ...]
+    suns: tuple[int, int]
+    radius: bool
+    traced: bool
+    view: bool
+    unit_m: float | None
+    holds: tuple[LayerKind, ...]
+
+    @classmethod
+    def load(cls, row: Mapping[str, Any]) -> "LayerRow":
+        lists = {key: tuple(value) for key, value in row.items() if isinstance(value, list)}
+        return cls(**{**row, **lists, "array": row["array"] and LayerArray(**row["array"])})
+
+
+LAYERS: Final[Mapping[LayerKind, LayerRow]] = {row["kind"]: LayerRow.load(row) for row in json.loads(_core.LAYERS)}
+"""All kinds of layers, in the order of the layers of a rendering."""
+LAYER_KINDS: Final = tuple(LAYERS)
+DATA_TILE_KINDS: Final = LAYERS["data"].holds
 """The kinds of pixels in a data tile (spec/data-tile.md)."""
 LAYERS_BY_DATA: Final[Mapping[DataEncoding, tuple[LayerKind, ...]]] = {"png": ("color", *DATA_TILE_KINDS), "tile": ("color", "data")}
 DEFAULT_DATA: Final[DataEncoding] = "tile"
-DEFAULT_LAYERS: Final[tuple[LayerKind, ...]] = LAYERS_BY_DATA[DEFAULT_DATA]
-COLOR_KINDS: Final = ("color", "picture")
-DEPTH_KINDS: Final = ("depth", "depth2", "data")
-SUNS: Final = {"sun": (1, 1), "sun16": (1, _core.MAX_SUNS), "picture": (1, 1)}
-"""Least and greatest number of suns of a layer of these kinds; others have none."""
-RADIUS_KINDS: Final = ("ao", "picture")
+DEFAULT_LAYERS: Final = LAYERS_BY_DATA[DEFAULT_DATA]
+COLOR_KINDS: Final = tuple(kind for kind, row in LAYERS.items() if row.array is not None and row.array.pixel == "uint16x4")
+RADIUS_KINDS: Final = tuple(kind for kind, row in LAYERS.items() if row.radius)
 AO_RADIUS_M: Final = _core.AO_RADIUS_M
 """Least and greatest radius of ambient occlusion (spec/limits.json, like the other limits of the core)."""
 TILE_PX: Final = _core.TILE_PX
 """Allowed sides of a tile."""
-COLOR_FORMATS: Final = ("webp", "png", "jpeg")
+COLOR_FORMATS: Final = LAYERS["color"].formats
 MEDIA_TYPES: Final = {"webp": "image/webp", "png": "image/png", "jpeg": "image/jpeg", "m3d": "application/vnd.map3d.data"}
 FILE_SUFFIXES: Final = {"webp": "webp", "png": "png", "jpeg": "jpg", "m3d": "m3d"}
 DEPTH_UNIT_M: Final = 2.0**-10
@@ -88,8 +121,8 @@ class Sun:
 
 @dataclass(frozen=True)
 class Layer:
-    """One layer of a rendering as sent. `quality` (1..100) is for lossy colour formats, `suns` for sun, sun16 and picture, `radius_m`, the radius of
-    ambient occlusion, for ao and picture; `small` trades encoding time for fewer bytes."""
+    """One layer of a rendering as sent. `quality` (1..100) is for lossy colour formats, `suns` and `radius_m`, the radius of ambient
+    occlusion, for the kinds whose rows say so; `small` trades encoding time for fewer bytes."""
 
     name: str
     kind: LayerKind
@@ -101,14 +134,14 @@ class Layer:
 
     def __post_init__(self) -> None:
         check_name(self.name, "layer")
-        allowed = COLOR_FORMATS if self.kind in COLOR_KINDS else (format_of(self.kind),)
-        if self.format not in allowed:
-            raise BadRequest(f"layer {self.name}: format {self.format!r} cannot hold {self.kind}; use {' or '.join(allowed)}")
-        least, most = SUNS.get(self.kind, (0, 0))
+        row = LAYERS[self.kind]
+        if self.format not in row.formats:
+            raise BadRequest(f"layer {self.name}: format {self.format!r} cannot hold {self.kind}; use {' or '.join(row.formats)}")
+        least, most = row.suns
         if not least <= len(self.suns) <= most:
             expected = f"{least} to {most}" if least < most else f"{most or 'none'}"
             raise BadRequest(f"layer {self.name}: got {len(self.suns)} suns, expected {expected} for kind {self.kind}")
-        if (self.kind in RADIUS_KINDS) != (self.radius_m is not None):
+        if row.radius != (self.radius_m is not None):
             raise BadRequest(f"layer {self.name}: radius is {self.radius_m}; only the kinds {' and '.join(RADIUS_KINDS)} take one")
         low, high = AO_RADIUS_M
         if self.radius_m is not None and not low <= self.radius_m <= high:
@@ -123,11 +156,6 @@ class Layer:
     @property
     def media_type(self) -> str:
         return MEDIA_TYPES[self.format]
-
-
-def format_of(kind: LayerKind) -> str:
-    """Returns the format of a lossless kind."""
-    return "m3d" if kind == "data" else "png"
 
 
 def _vec3(value: Sequence[float]) -> Vec3:

@@ -3,36 +3,11 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::limits::{AO_RADIUS_M, DEEPEST_LEVEL, MAX_SUNS, QUALITY, TILE_PX};
+use crate::layers::{LayerFormat, LayerKind};
+use crate::limits::{AO_RADIUS_M, DEEPEST_LEVEL, QUALITY, TILE_PX};
 use crate::tile::Tile;
 use crate::vec3::{Vec3, length};
 use crate::view::ViewAxes;
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum LayerKind {
-    Color,
-    Normal,
-    Id,
-    Depth,
-    Sun,
-    Sun16,
-    Ao,
-    Depth2,
-    Picture,
-    /// Normal, id and depth in one tile.
-    Data,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum LayerFormat {
-    Webp,
-    Png,
-    Jpeg,
-    /// The data tile (spec/data-tile.md).
-    M3d,
-}
 
 /// How a layer is made and sent (spec/pyramid.md §6, §10).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -45,10 +20,10 @@ pub struct LayerSpec {
     /// Trades encoding time for fewer bytes.
     #[serde(default)]
     pub small: bool,
-    /// Unit vectors towards the suns, local axes: one for `Sun` and `Picture`, up to 16 for `Sun16`.
+    /// Unit vectors towards the suns, local axes; as many as the kind's row says.
     #[serde(default)]
     pub suns: Vec<Vec3>,
-    /// Radius of ambient occlusion, for `Ao` and `Picture`.
+    /// Radius of ambient occlusion, for the kinds that have one.
     #[serde(default)]
     pub radius_m: f64,
 }
@@ -74,24 +49,20 @@ impl LayerSpec {
 
     fn validate(&self) -> Result<()> {
         let kind = self.kind;
-        if (kind == LayerKind::Data) != (self.format == LayerFormat::M3d) {
-            return Err(Error::argument(format!("layer {kind:?}: its format is {:?}; M3d is the format of Data, and of no other kind", self.format)));
+        let row = kind.row();
+        if !row.formats.contains(&self.format) {
+            return Err(Error::argument(format!("layer {kind:?}: its format is {:?}, expected one of {:?}", self.format, row.formats)));
         }
-        let expected = match kind {
-            LayerKind::Sun | LayerKind::Picture => 1..=1,
-            LayerKind::Sun16 => 1..=MAX_SUNS,
-            _ => 0..=0,
-        };
-        if !expected.contains(&self.suns.len()) {
-            return Err(Error::argument(format!("layer {kind:?}: {} suns, expected {} to {}", self.suns.len(), expected.start(), expected.end())));
+        let [least, most] = row.suns;
+        if !(least..=most).contains(&self.suns.len()) {
+            return Err(Error::argument(format!("layer {kind:?}: {} suns, expected {least} to {most}", self.suns.len())));
         }
         let is_unit = |v: &Vec3| (length(*v) - 1.0).abs() < 1e-6;
         if let Some(sun) = self.suns.iter().find(|s| !is_unit(s)) {
             return Err(Error::argument(format!("layer {kind:?}: {sun:?} is not a unit vector")));
         }
         let [least, most] = AO_RADIUS_M;
-        let has_radius = matches!(kind, LayerKind::Ao | LayerKind::Picture);
-        if has_radius && !(least..=most).contains(&self.radius_m) {
+        if row.radius && !(least..=most).contains(&self.radius_m) {
             return Err(Error::argument(format!("layer {kind:?}: radius_m is {}, expected {least} to {most}", self.radius_m)));
         }
         let [least, most] = QUALITY;

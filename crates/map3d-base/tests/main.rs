@@ -1,5 +1,6 @@
 //! All tests of assets, limits and test vectors in one program, which is linked once.
 
 mod asset;
+mod layers;
 mod limits;
 mod vectors;

@@ -6,6 +6,7 @@
 
 use std::path::Path;
 
+use map3d_base::layers::{COLOR, DEPTH, ID, NORMAL};
 use map3d_base::{LayerFormat, LayerKind, LayerSpec};
 use map3d_image::decode::decode;
 use map3d_image::encode::{Deflate, Encoder, Filter, bytes_from_normals, bytes_from_u32, color_from_linear, encode_jpeg, encode_png, encode_webp};
@@ -59,14 +60,14 @@ fn best_of_five(work: impl Fn() -> usize) -> (f64, usize) {
 
 fn codecs() -> Vec<Codec> {
     let mut out: Vec<Codec> =
-        vec![("color to sRGB only".into(), Box::new(|g| color_from_linear((g.width, g.height), &g.color).pixels.into_flattened()))];
+        vec![("color to sRGB only".into(), Box::new(|g| color_from_linear((g.width, g.height), &g[COLOR]).pixels.into_flattened()))];
     for quality in [80, 90] {
         out.push((
             format!("color webp q{quality}"),
-            Box::new(move |g| encode_webp(&color_from_linear((g.width, g.height), &g.color), quality, false).expect("webp")),
+            Box::new(move |g| encode_webp(&color_from_linear((g.width, g.height), &g[COLOR]), quality, false).expect("webp")),
         ));
     }
-    out.push(("color jpeg q85".into(), Box::new(|g| encode_jpeg(&color_from_linear((g.width, g.height), &g.color), 85).expect("jpeg"))));
+    out.push(("color jpeg q85".into(), Box::new(|g| encode_jpeg(&color_from_linear((g.width, g.height), &g[COLOR]), 85).expect("jpeg"))));
     for filter in [Filter::None, Filter::Sub, Filter::Up, Filter::Average, Filter::Paeth] {
         for deflate in [Deflate::Fast, Deflate::Matching, Deflate::Thorough] {
             let png = move |g: &GBuffer, channels, bytes: &[u8]| encode_png((g.width, g.height), channels, bytes, filter, deflate);
@@ -74,13 +75,13 @@ fn codecs() -> Vec<Codec> {
             out.push((
                 name("color"),
                 Box::new(move |g| {
-                    let rgb: Vec<u8> = color_from_linear((g.width, g.height), &g.color).pixels.iter().flat_map(|p| [p[0], p[1], p[2]]).collect();
+                    let rgb: Vec<u8> = color_from_linear((g.width, g.height), &g[COLOR]).pixels.iter().flat_map(|p| [p[0], p[1], p[2]]).collect();
                     png(g, 3, &rgb)
                 }),
             ));
-            out.push((name("normal"), Box::new(move |g| png(g, 3, &bytes_from_normals(&g.normal)))));
-            out.push((name("id"), Box::new(move |g| png(g, 4, bytes_from_u32(&g.id)))));
-            out.push((name("depth"), Box::new(move |g| png(g, 4, bytes_from_u32(&g.depth)))));
+            out.push((name("normal"), Box::new(move |g| png(g, 3, &bytes_from_normals(&g[NORMAL])))));
+            out.push((name("id"), Box::new(move |g| png(g, 4, bytes_from_u32(&g[ID])))));
+            out.push((name("depth"), Box::new(move |g| png(g, 4, bytes_from_u32(&g[DEPTH])))));
         }
     }
     for kind in [LayerKind::Color, LayerKind::Normal, LayerKind::Id, LayerKind::Depth, LayerKind::Data] {

@@ -6,6 +6,7 @@ pub mod encode;
 mod fill;
 pub mod gbuffer;
 mod mask;
+pub mod pixel_array;
 pub mod raster;
 pub mod reduce;
 pub mod seam;
@@ -13,7 +14,8 @@ pub mod srgb;
 
 pub use decode::ImageLimits;
 pub use fill::{Filler, fill_unmarked};
-pub use gbuffer::{Arrays, GBuffer};
+pub use gbuffer::{Arrays, GBuffer, SurfaceArrays};
 pub use mask::PixelMask;
+pub use pixel_array::PixelArray;
 pub use raster::Raster;
 pub use reduce::reduce;

@@ -3,8 +3,10 @@
 use std::ops::Range;
 
 use map3d_base::DEPTH_NOTHING;
+use map3d_base::layers::{DEPTH, ID, LAYERS, NORMAL, Reduction};
 
-use crate::gbuffer::{Arrays, GBuffer};
+use crate::gbuffer::{Arrays, GBuffer, SurfaceArrays};
+use crate::pixel_array::PixelArray;
 
 /// Pixels of a row that are reduced together.
 const PIECE: usize = 64;
@@ -16,6 +18,7 @@ const MIN_MEAN: f64 = 1e-6;
 pub fn reduce(children: [Option<&GBuffer>; 4], side: u32) -> GBuffer {
     assert!(side.is_multiple_of(2), "a tile's side is even, not {side}");
     let arrays = children.iter().flatten().next().map_or(Arrays::STANDARD, |c| c.arrays());
+    let (means, followers) = (ReducedArray::means(arrays), ReducedArray::followers(arrays));
     let mut parent = GBuffer::with(side, side, arrays);
     for (number, child) in children.into_iter().enumerate() {
         let Some(child) = child else { continue };
@@ -24,14 +27,38 @@ pub fn reduce(children: [Option<&GBuffer>; 4], side: u32) -> GBuffer {
         let (left, top) = (number % 2 * half, number / 2 * half);
         for y in 0..half {
             let rows = Rows { width: side as usize, y, at: (top + y) * side as usize + left };
-            rows.ids(child, &mut parent);
-            rows.colors(&child.color, &mut parent.color);
-            rows.colors(&child.picture, &mut parent.picture);
-            rows.shades(child, &child.sun, &mut parent.sun);
-            rows.shades(child, &child.ao, &mut parent.ao);
+            rows.ids(child, &mut parent, &followers);
+            for mean in &means {
+                rows.mean(mean.reduction, &child.by_code()[mean.code], &child[ID], &mut parent.by_code_mut()[mean.code]);
+            }
         }
     }
     parent
+}
+
+/// An array and how it is reduced.
+struct ReducedArray {
+    code: usize,
+    reduction: Reduction,
+}
+
+impl ReducedArray {
+    /// Returns the arrays that are reduced one by one.
+    fn means(arrays: Arrays) -> Vec<Self> {
+        Self::chosen(arrays, |reduction| matches!(reduction, Reduction::Mean | Reduction::MeanOfCovered))
+    }
+
+    /// Returns the arrays besides id, depth and normal that follow the children with the parent's id.
+    fn followers(arrays: Arrays) -> Vec<Self> {
+        let mut all = Self::chosen(arrays, |reduction| matches!(reduction, Reduction::Least | Reduction::Nearest));
+        all.retain(|array| array.code != DEPTH.kind as usize);
+        all
+    }
+
+    fn chosen(arrays: Arrays, is_chosen: impl Fn(Reduction) -> bool) -> Vec<Self> {
+        let rows = LAYERS.iter().filter(|row| arrays.has(row.kind)).filter_map(|row| Some((row.code, row.array?.reduction)));
+        rows.filter(|(_, reduction)| is_chosen(*reduction)).map(|(code, reduction)| Self { code: code.into(), reduction }).collect()
+    }
 }
 
 /// Two rows of a child and the half row of the parent to which they reduce.
@@ -62,32 +89,37 @@ impl Rows {
         [array[upper], array[upper + 1], array[lower], array[lower + 1]]
     }
 
-    fn ids(&self, child: &GBuffer, parent: &mut GBuffer) {
-        if child.sun16.is_empty() && child.depth2.is_empty() {
-            return self.plain_ids(child, parent);
+    fn ids(&self, child: &GBuffer, parent: &mut GBuffer, followers: &[ReducedArray]) {
+        if followers.is_empty() {
+            return self.plain_ids(child, &mut parent.surface_arrays());
         }
         for x in 0..self.width / 2 {
-            self.choose_id(x, self.square(&child.id, x), self.square(&child.depth, x), child, parent);
+            let (ids, depths) = (self.square(&child[ID], x), self.square(&child[DEPTH], x));
+            let Some(choice) = self.choose_id(x, ids, depths, child, &mut parent.surface_arrays()) else { continue };
+            for follower in followers {
+                self.follow(x, &choice, follower.reduction, &child.by_code()[follower.code], &mut parent.by_code_mut()[follower.code]);
+            }
         }
     }
 
     /// Reduces id, depth and normal. Most squares show one object with one normal, so there is no choice to make: all are reduced as if they did, then the
     /// others again.
-    fn plain_ids(&self, child: &GBuffer, parent: &mut GBuffer) {
+    fn plain_ids(&self, child: &GBuffer, parent: &mut SurfaceArrays) {
+        let (child_ids, child_depths, child_normals) = (&child[ID], &child[DEPTH], &child[NORMAL]);
         let mut again = [false; PIECE];
         for first in (0..self.width / 2).step_by(PIECE) {
             let columns = first..(first + PIECE).min(self.width / 2);
             let to = self.at + columns.start..self.at + columns.end;
             let (ids, depths) = (&mut parent.id[to.clone()], &mut parent.depth[to.clone()]);
-            let squares = self.squares(&child.id, &columns).zip(self.squares(&child.depth, &columns));
+            let squares = self.squares(child_ids, &columns).zip(self.squares(child_depths, &columns));
             for (((id, depth), again), (of_ids, of_depths)) in ids.iter_mut().zip(depths).zip(&mut again).zip(squares) {
                 *again = differ(of_ids);
                 *id = of_ids[0];
                 *depth = if of_ids[0] == 0 { DEPTH_NOTHING } else { of_depths[0].min(of_depths[1]).min(of_depths[2].min(of_depths[3])) };
             }
-            if !child.normal.is_empty() {
+            if !child_normals.is_empty() {
                 let normals = parent.normal[to].iter_mut().zip(&mut again).zip(&*ids);
-                for (((normal, again), id), of_normals) in normals.zip(self.squares(&child.normal, &columns)) {
+                for (((normal, again), id), of_normals) in normals.zip(self.squares(child_normals, &columns)) {
                     *again |= *id != 0 && normals_differ(of_normals);
                     *normal = if *id == 0 { [0; 3] } else { of_normals[0] };
                 }
@@ -98,52 +130,69 @@ impl Rows {
 
     /// Reduces a square of several objects or several normals.
     #[inline(never)]
-    fn reduce_mixed(&self, x: usize, child: &GBuffer, parent: &mut GBuffer) {
-        let (to, ids, depths) = (self.at + x, self.square(&child.id, x), self.square(&child.depth, x));
+    fn reduce_mixed(&self, x: usize, child: &GBuffer, parent: &mut SurfaceArrays) {
+        let (to, ids, depths) = (self.at + x, self.square(&child[ID], x), self.square(&child[DEPTH], x));
         if !differ(ids) {
-            parent.normal[to] = normal_of_one(self.square(&child.normal, x), depths);
+            parent.normal[to] = normal_of_one(self.square(&child[NORMAL], x), depths);
             return;
         }
         (parent.id[to], parent.depth[to]) = (0, DEPTH_NOTHING);
-        if !child.normal.is_empty() {
+        if !parent.normal.is_empty() {
             parent.normal[to] = [0; 3];
         }
         self.choose_id(x, ids, depths, child, parent);
     }
 
-    /// Reduces a square to one of its ids; leaves the parent's pixel empty if that is 0.
-    fn choose_id(&self, x: usize, ids: [u32; 4], depths: [u32; 4], child: &GBuffer, parent: &mut GBuffer) {
+    /// Reduces a square to one of its ids; returns `None` and leaves the parent's pixel empty if that is 0.
+    fn choose_id(&self, x: usize, ids: [u32; 4], depths: [u32; 4], child: &GBuffer, parent: &mut SurfaceArrays) -> Option<Choice> {
         let (to, id) = (self.at + x, most_frequent_id(ids, depths));
         if id == 0 {
-            return;
+            return None;
         }
         let of_id = [0, 1, 2, 3].map(|k| ids[k] == id);
         let (nearest, depth) = nearest(of_id, depths);
         (parent.id[to], parent.depth[to]) = (id, depth);
-        if !child.normal.is_empty() {
-            parent.normal[to] = mean_normal(of_id, self.square(&child.normal, x), nearest);
+        if !parent.normal.is_empty() {
+            parent.normal[to] = mean_normal(of_id, self.square(&child[NORMAL], x), nearest);
         }
-        if !child.sun16.is_empty() {
-            parent.sun16[to] = self.square(&child.sun16, x)[nearest];
-        }
-        if !child.depth2.is_empty() {
-            let second = self.square(&child.depth2, x);
-            parent.depth2[to] = (0..4).filter(|k| of_id[*k]).map(|k| second[k]).min().expect("the nearest is of the id");
+        Some(Choice { of_id, nearest })
+    }
+
+    /// Reduces a pixel of an array by the children with the parent's id.
+    fn follow(&self, x: usize, choice: &Choice, reduction: Reduction, from: &PixelArray, to: &mut PixelArray) {
+        let at = self.at + x;
+        match (reduction, from, to) {
+            (Reduction::Least, PixelArray::U32(from), PixelArray::U32(to)) => {
+                let square = self.square(from, x);
+                to[at] = (0..4).filter(|k| choice.of_id[*k]).map(|k| square[k]).min().expect("the nearest is of the id");
+            }
+            (Reduction::Nearest, PixelArray::U8(from), PixelArray::U8(to)) => to[at] = self.square(from, x)[choice.nearest],
+            (Reduction::Nearest, PixelArray::U16(from), PixelArray::U16(to)) => to[at] = self.square(from, x)[choice.nearest],
+            (Reduction::Nearest, PixelArray::U32(from), PixelArray::U32(to)) => to[at] = self.square(from, x)[choice.nearest],
+            (reduction, ..) => unreachable!("{reduction:?} of such pixels"),
         }
     }
 
-    fn colors(&self, child: &[[u16; 4]], parent: &mut [[u16; 4]]) {
-        if !child.is_empty() {
-            parent[self.at..][..self.width / 2].iter_mut().zip(self.all_squares(child)).for_each(|(to, four)| *to = mean_color(four));
+    /// Reduces a row of an array to means.
+    fn mean(&self, reduction: Reduction, from: &PixelArray, ids: &[u32], to: &mut PixelArray) {
+        let half = self.at..self.at + self.width / 2;
+        match (reduction, from, to) {
+            (Reduction::Mean, PixelArray::U16x4(from), PixelArray::U16x4(to)) => {
+                to[half].iter_mut().zip(self.all_squares(from)).for_each(|(to, four)| *to = mean_color(four));
+            }
+            (Reduction::MeanOfCovered, PixelArray::U8(from), PixelArray::U8(to)) => {
+                let fours = self.all_squares(from).zip(self.all_squares(ids));
+                to[half].iter_mut().zip(fours).for_each(|(to, (four, ids))| *to = mean_shade(four, ids));
+            }
+            (reduction, ..) => unreachable!("{reduction:?} of such pixels"),
         }
     }
+}
 
-    fn shades(&self, child: &GBuffer, array: &[u8], parent: &mut [u8]) {
-        if !array.is_empty() {
-            let fours = self.all_squares(array).zip(self.all_squares(&child.id));
-            parent[self.at..][..self.width / 2].iter_mut().zip(fours).for_each(|(to, (four, ids))| *to = mean_shade(four, ids));
-        }
-    }
+/// The children of a square that show the parent's id, and the nearest of them.
+struct Choice {
+    of_id: [bool; 4],
+    nearest: usize,
 }
 
 /// Returns the mean of the children that have an id, rounded half up; 255 when none has.

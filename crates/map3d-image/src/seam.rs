@@ -2,11 +2,11 @@
 
 use std::io::Read;
 
-use bytemuck::Pod;
 use map3d_base::{Error, Result};
 use twox_hash::XxHash3_64;
 
 use crate::gbuffer::{Arrays, GBuffer};
+use crate::pixel_array::PixelArray;
 
 const MAGIC: &[u8; 4] = b"M3DG";
 const VERSION: u32 = 2;
@@ -21,9 +21,7 @@ pub fn write_seam(g: &GBuffer) -> Vec<u8> {
     for n in [VERSION, g.width, g.height, g.arrays().bits()] {
         out.extend_from_slice(&n.to_le_bytes());
     }
-    let standard = [little_endian(&g.color), little_endian(&g.normal), little_endian(&g.id), little_endian(&g.depth)];
-    let further = [&g.sun, little_endian(&g.sun16), &g.ao, little_endian(&g.depth2), little_endian(&g.picture)];
-    for bytes in standard.into_iter().chain(further).filter(|b| !b.is_empty()) {
+    for bytes in g.by_code().iter().map(PixelArray::bytes).filter(|bytes| !bytes.is_empty()) {
         let frame = zstd::bulk::compress(bytes, ZSTD_LEVEL).expect("memory to memory");
         out.extend_from_slice(&(frame.len() as u32).to_le_bytes());
         out.extend_from_slice(&frame);
@@ -57,15 +55,9 @@ pub fn read_seam(name: &str, bytes: &[u8]) -> Result<GBuffer> {
     };
     let mut g = GBuffer::with(width, height, arrays);
     let mut rest = &body[HEADER_BYTES..];
-    fill(&mut g.color, &mut rest).map_err(&refuse)?;
-    fill(&mut g.normal, &mut rest).map_err(&refuse)?;
-    fill(&mut g.id, &mut rest).map_err(&refuse)?;
-    fill(&mut g.depth, &mut rest).map_err(&refuse)?;
-    fill(&mut g.sun, &mut rest).map_err(&refuse)?;
-    fill(&mut g.sun16, &mut rest).map_err(&refuse)?;
-    fill(&mut g.ao, &mut rest).map_err(&refuse)?;
-    fill(&mut g.depth2, &mut rest).map_err(&refuse)?;
-    fill(&mut g.picture, &mut rest).map_err(&refuse)?;
+    for array in g.by_code_mut() {
+        fill(array.bytes_mut(), &mut rest).map_err(&refuse)?;
+    }
     if !rest.is_empty() {
         return Err(refuse(format!("{} bytes after the last array", rest.len())));
     }
@@ -75,20 +67,15 @@ pub fn read_seam(name: &str, bytes: &[u8]) -> Result<GBuffer> {
 #[cfg(target_endian = "big")]
 compile_error!("seams and textures have the byte order of memory: little-endian machines only");
 
-fn little_endian<T: Pod>(array: &[T]) -> &[u8] {
-    bytemuck::cast_slice(array)
-}
-
 /// Reads one array (length, zstd frame) unless it is empty; the frame must have exactly its length.
-fn fill<T: Pod>(array: &mut [T], rest: &mut &[u8]) -> std::result::Result<(), String> {
-    if array.is_empty() {
+fn fill(into: &mut [u8], rest: &mut &[u8]) -> std::result::Result<(), String> {
+    if into.is_empty() {
         return Ok(());
     }
     let (length, tail) = rest.split_first_chunk::<4>().ok_or("truncated")?;
     let length = u32::from_le_bytes(*length) as usize;
     let frame = tail.get(..length).ok_or("truncated")?;
     *rest = &tail[length..];
-    let into: &mut [u8] = bytemuck::cast_slice_mut(array);
     let mut decoder = zstd::stream::read::Decoder::with_buffer(frame).map_err(|e| e.to_string())?;
     decoder.read_exact(into).map_err(|e| format!("array of {} bytes: {e}", into.len()))?;
     match decoder.read(&mut [0]).map_err(|e| e.to_string())? {

@@ -1,6 +1,7 @@
 //! Layers as sent (spec/pyramid.md §6).
 
 use crate::common::{Random, noise};
+use map3d_base::layers::{AO, COLOR, DEPTH, DEPTH2, ID, NORMAL, SUN, SUN16};
 use map3d_base::{LayerFormat, LayerKind, LayerSpec};
 use map3d_image::decode::decode;
 use map3d_image::encode::{Deflate, Encoder, Filter, bytes_from_normals, bytes_from_u32, color_from_linear, decode_png, encode_png};
@@ -53,9 +54,9 @@ fn png_round_trips_with_every_filter_and_deflate() {
 fn data_layers_are_lossless() {
     let mut random = Random(3);
     let mut g = GBuffer::empty(256, 256);
-    g.id.iter_mut().for_each(|v| *v = random.bits() << 1);
-    g.depth.iter_mut().enumerate().for_each(|(i, v)| *v = 1_000_000 + (i as u32 % 256) * 37 + (i as u32 / 256) * 91);
-    g.normal.iter_mut().for_each(|v| *v = normal_from_vector([random.unit(), random.unit(), 0.1]).expect("has a direction"));
+    g[ID].iter_mut().for_each(|v| *v = random.bits() << 1);
+    g[DEPTH].iter_mut().enumerate().for_each(|(i, v)| *v = 1_000_000 + (i as u32 % 256) * 37 + (i as u32 / 256) * 91);
+    g[NORMAL].iter_mut().for_each(|v| *v = normal_from_vector([random.unit(), random.unit(), 0.1]).expect("has a direction"));
     let mut encoder = Encoder::new();
     let mut layer = |kind| {
         let spec = LayerSpec::new(kind, LayerFormat::Png);
@@ -63,9 +64,9 @@ fn data_layers_are_lossless() {
         assert_eq!(&bytes[24..29], &[8, if kind == LayerKind::Normal { 2 } else { 6 }, 0, 0, 0], "8 bit, colour type, not interlaced");
         decode_png(&bytes).expect("sound").pixels
     };
-    assert_eq!(layer(LayerKind::Id), bytes_from_u32(&g.id));
-    assert_eq!(layer(LayerKind::Depth), bytes_from_u32(&g.depth));
-    assert_eq!(layer(LayerKind::Normal), bytes_from_normals(&g.normal));
+    assert_eq!(layer(LayerKind::Id), bytes_from_u32(&g[ID]));
+    assert_eq!(layer(LayerKind::Depth), bytes_from_u32(&g[DEPTH]));
+    assert_eq!(layer(LayerKind::Normal), bytes_from_normals(&g[NORMAL]));
 }
 
 #[test]
@@ -73,19 +74,19 @@ fn shades_and_suns_are_lossless() {
     let mut random = Random(4);
     let arrays = [LayerKind::Sun, LayerKind::Sun16, LayerKind::Ao, LayerKind::Depth2].into_iter().fold(Arrays::LEAST, Arrays::and);
     let mut g = GBuffer::with(64, 64, arrays);
-    g.sun.iter_mut().for_each(|v| *v = random.bits() as u8);
-    g.ao.iter_mut().for_each(|v| *v = random.bits() as u8);
-    g.sun16.iter_mut().for_each(|v| *v = random.bits() as u16);
-    g.depth2.iter_mut().for_each(|v| *v = random.bits());
+    g[SUN].iter_mut().for_each(|v| *v = random.bits() as u8);
+    g[AO].iter_mut().for_each(|v| *v = random.bits() as u8);
+    g[SUN16].iter_mut().for_each(|v| *v = random.bits() as u16);
+    g[DEPTH2].iter_mut().for_each(|v| *v = random.bits());
     let layer = |kind, color_type: u8| {
         let bytes = Encoder::new().layer(&g, &LayerSpec::new(kind, LayerFormat::Png)).expect("encodes");
         assert_eq!(&bytes[24..26], &[8, color_type]);
         decode_png(&bytes).expect("sound").pixels
     };
-    assert_eq!(layer(LayerKind::Sun, 0), g.sun);
-    assert_eq!(layer(LayerKind::Ao, 0), g.ao);
-    assert_eq!(layer(LayerKind::Sun16, 4), g.sun16.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>());
-    assert_eq!(layer(LayerKind::Depth2, 6), bytes_from_u32(&g.depth2));
+    assert_eq!(layer(LayerKind::Sun, 0), g[SUN]);
+    assert_eq!(layer(LayerKind::Ao, 0), g[AO]);
+    assert_eq!(layer(LayerKind::Sun16, 4), g[SUN16].iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>());
+    assert_eq!(layer(LayerKind::Depth2, 6), bytes_from_u32(&g[DEPTH2]));
     assert!(Encoder::new().layer(&g, &LayerSpec::new(LayerKind::Color, LayerFormat::Png)).is_err(), "an array that is not there");
 }
 
@@ -98,7 +99,7 @@ fn data_layers_refuse_lossy_formats() {
         }
     }
     assert!(Encoder::new().layer(&g, &LayerSpec { quality: 0, ..LayerSpec::new(LayerKind::Color, LayerFormat::Jpeg) }).is_err());
-    assert!(Encoder::new().color((4, 5), &g.color, LayerFormat::Png, 80).is_err());
+    assert!(Encoder::new().color((4, 5), &g[COLOR], LayerFormat::Png, 80).is_err());
 }
 
 #[test]
@@ -125,7 +126,7 @@ fn uncovered_pixels_take_the_nearest_covered_colour() {
 #[test]
 fn colour_formats_keep_coverage_where_they_have_alpha() {
     let mut g = GBuffer::empty(64, 64);
-    for (i, c) in g.color.iter_mut().enumerate() {
+    for (i, c) in g[COLOR].iter_mut().enumerate() {
         if i % 64 < 40 {
             *c = [30_000, 20_000, 10_000, 65_535];
         }
@@ -144,15 +145,15 @@ fn small_tiles_take_fewer_bytes_and_show_the_same() {
     let mut random = Random(29);
     let arrays = [LayerKind::Color, LayerKind::Normal, LayerKind::Sun, LayerKind::Ao, LayerKind::Sun16].into_iter().fold(Arrays::LEAST, Arrays::and);
     let mut g = GBuffer::with(256, 256, arrays);
-    for i in 0..g.id.len() {
+    for i in 0..g[ID].len() {
         let (x, y) = (i as u32 % 256, i as u32 / 256);
         let house = x / 40 + y / 24 * 7;
-        g.id[i] = 1000 + house;
-        g.depth[i] = 900_000 + 117 * x + (house * 7919 % 31) * y;
-        g.normal[i] = normal_from_vector([f64::from(house % 5) - 2.0, f64::from(house % 3) - 1.0, 1.0]).expect("has a direction");
+        g[ID][i] = 1000 + house;
+        g[DEPTH][i] = 900_000 + 117 * x + (house * 7919 % 31) * y;
+        g[NORMAL][i] = normal_from_vector([f64::from(house % 5) - 2.0, f64::from(house % 3) - 1.0, 1.0]).expect("has a direction");
         let light = 20_000 + (house * 911 % 29_000) as u16 + random.below(3000) as u16;
-        g.color[i] = [light, light / 2, light / 3, 65_535];
-        (g.sun[i], g.ao[i], g.sun16[i]) = (if x > y { 255 } else { 0 }, (x / 2 + house) as u8, house as u16);
+        g[COLOR][i] = [light, light / 2, light / 3, 65_535];
+        (g[SUN][i], g[AO][i], g[SUN16][i]) = (if x > y { 255 } else { 0 }, (x / 2 + house) as u8, house as u16);
     }
     let tile = |kind, format, small| Encoder::new().layer(&g, &LayerSpec { small, ..LayerSpec::new(kind, format) }).expect("encodes");
     for kind in [LayerKind::Color, LayerKind::Normal, LayerKind::Id, LayerKind::Depth, LayerKind::Sun, LayerKind::Ao, LayerKind::Sun16] {
@@ -174,7 +175,7 @@ fn small_tiles_take_fewer_bytes_and_show_the_same() {
 fn encoded_bytes_are_the_same_again() {
     let mut random = Random(17);
     let mut g = GBuffer::empty(64, 64);
-    g.color.iter_mut().for_each(|c| *c = [random.below(65_536) as u16, 5, 9, 65_535]);
+    g[COLOR].iter_mut().for_each(|c| *c = [random.below(65_536) as u16, 5, 9, 65_535]);
     let mut reused = Encoder::new();
     for format in [LayerFormat::Png, LayerFormat::Webp, LayerFormat::Jpeg] {
         let spec = LayerSpec::new(LayerKind::Color, format);

@@ -5,4 +5,5 @@ mod data_tile;
 mod decode;
 mod encode;
 mod jpeg;
+mod layers;
 mod reduce;

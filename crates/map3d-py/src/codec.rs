@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use map3d_base::LayerKind;
+use map3d_base::layers::PixelType;
 use map3d_image::encode::{self, Encoder};
-use map3d_image::{GBuffer, data_tile};
+use map3d_image::{GBuffer, PixelArray, data_tile};
 use map3d_texture::TextureFile;
 use numpy::ndarray::{Array2, Array3};
 use numpy::{IntoPyArray, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
@@ -12,22 +12,22 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
 use crate::errors::{invalid, to_python};
-use crate::frame::{parse_format, parse_kind};
+use crate::frame::{name_of, parse_format, parse_kind};
 
-/// Returns the arrays that a G-buffer has: color, picture (H, W, 4) uint16, normal (H, W, 3) int16, id, depth, depth2 (H, W) uint32, sun, ao (H, W) uint8, sun16
-/// (H, W) uint16.
+/// Returns the arrays that a G-buffer has, by kind, with the types of spec/layers.json: (H, W), or (H, W, C) for several channels.
 pub fn dict_of<'py>(py: Python<'py>, g: GBuffer) -> PyResult<Bound<'py, PyDict>> {
     let size = (g.height as usize, g.width as usize);
     let dict = PyDict::new(py);
-    set3(&dict, "color", size, g.color)?;
-    set3(&dict, "normal", size, g.normal)?;
-    set2(&dict, "id", size, g.id)?;
-    set2(&dict, "depth", size, g.depth)?;
-    set2(&dict, "sun", size, g.sun)?;
-    set2(&dict, "sun16", size, g.sun16)?;
-    set2(&dict, "ao", size, g.ao)?;
-    set2(&dict, "depth2", size, g.depth2)?;
-    set3(&dict, "picture", size, g.picture)?;
+    for (kind, array) in g.into_arrays() {
+        let name = name_of(kind);
+        match array {
+            PixelArray::U8(pixels) => set2(&dict, &name, size, pixels),
+            PixelArray::U16(pixels) => set2(&dict, &name, size, pixels),
+            PixelArray::U32(pixels) => set2(&dict, &name, size, pixels),
+            PixelArray::I16x3(pixels) => set3(&dict, &name, size, pixels),
+            PixelArray::U16x4(pixels) => set3(&dict, &name, size, pixels),
+        }?;
+    }
     Ok(dict)
 }
 
@@ -81,16 +81,15 @@ pub fn encode_layer<'py>(
 ) -> PyResult<Bound<'py, PyBytes>> {
     let (kind, format) = (parse_kind(kind)?, parse_format(format)?);
     let mut encoder = if small { Encoder::small() } else { Encoder::new() };
-    let bytes = match kind {
-        LayerKind::Color | LayerKind::Picture => rows3(array, "color").map(|(size, a)| encoder.color(size, &a, format, quality)),
-        LayerKind::Normal => rows3(array, "normal").map(|(size, a)| encoder.normal(size, &a, format)),
-        LayerKind::Id => rows2(array, "id").map(|(size, a)| encoder.id(size, &a, format)),
-        LayerKind::Depth | LayerKind::Depth2 => rows2(array, "depth").map(|(size, a)| encoder.depth(size, &a, format)),
-        LayerKind::Sun | LayerKind::Ao => rows2(array, "shades").map(|(size, a)| encoder.shade(size, &a, format)),
-        LayerKind::Sun16 => rows2(array, "sun16").map(|(size, a)| encoder.sun16(size, &a, format)),
-        LayerKind::Data => return Err(invalid("layer data: call encode_data_tile")),
-    }?
-    .map_err(to_python)?;
+    let Some(row) = kind.row().array else { return Err(invalid("layer data: call encode_data_tile")) };
+    let (size, array) = match row.pixel {
+        PixelType::U8 => rows2(array, &name_of(kind)).map(|(size, pixels)| (size, PixelArray::U8(pixels))),
+        PixelType::U16 => rows2(array, &name_of(kind)).map(|(size, pixels)| (size, PixelArray::U16(pixels))),
+        PixelType::U32 => rows2(array, &name_of(kind)).map(|(size, pixels)| (size, PixelArray::U32(pixels))),
+        PixelType::I16x3 => rows3(array, &name_of(kind)).map(|(size, pixels)| (size, PixelArray::I16x3(pixels))),
+        PixelType::U16x4 => rows3(array, &name_of(kind)).map(|(size, pixels)| (size, PixelArray::U16x4(pixels))),
+    }?;
+    let bytes = encoder.array(size, kind, &array, format, quality).map_err(to_python)?;
     Ok(PyBytes::new(py, &bytes))
 }
 

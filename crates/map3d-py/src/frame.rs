@@ -36,7 +36,7 @@ fn parse<T: DeserializeOwned>(what: &str, name: &str) -> PyResult<T> {
     serde_json::from_value(serde_json::Value::String(name.to_owned())).map_err(|e| invalid(format!("{what}: {e}")))
 }
 
-fn name_of(value: impl serde::Serialize) -> String {
+pub fn name_of(value: impl serde::Serialize) -> String {
     serde_json::to_value(value).ok().and_then(|v| v.as_str().map(str::to_owned)).expect("the variants are names")
 }
 

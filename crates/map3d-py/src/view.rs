@@ -3,12 +3,13 @@
 use std::time::{Duration, Instant};
 
 use map3d_base::{Box3, CameraKind, Vec3, ViewAxes, Window};
-use map3d_render::{HitSelection, Region, RenderScene, ViewImage, ViewRequest};
+use map3d_render::{HitSelection, Region, RenderScene, ViewImage, ViewPixels, ViewRequest};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::codec::{set2, set3};
 use crate::errors::{invalid, to_python};
+use crate::frame::name_of;
 
 /// Time between two checks for signals: each takes the GIL.
 const SIGNAL_CHECK: Duration = Duration::from_millis(50);
@@ -162,12 +163,15 @@ pub fn pick_ray(py: Python<'_>, scene: &RenderScene, camera: &Camera, at: [f64; 
 fn dict_of<'py>(py: Python<'py>, image: ViewImage) -> PyResult<Bound<'py, PyDict>> {
     let size = (image.height, image.width);
     let dict = PyDict::new(py);
-    set3(&dict, "color", size, image.color)?;
-    set3(&dict, "normal", size, image.normal)?;
-    set2(&dict, "id", size, image.id)?;
-    set2(&dict, "depth", size, image.depth)?;
-    set2(&dict, "sun", size, image.sun)?;
-    set2(&dict, "ao", size, image.ao)?;
-    set3(&dict, "picture", size, image.picture)?;
+    for (kind, pixels) in image.layers {
+        let name = name_of(kind);
+        match pixels {
+            ViewPixels::Color(pixels) => set3(&dict, &name, size, pixels),
+            ViewPixels::Normal(pixels) => set3(&dict, &name, size, pixels),
+            ViewPixels::Metres(pixels) => set2(&dict, &name, size, pixels),
+            ViewPixels::Numbers(pixels) => set2(&dict, &name, size, pixels),
+            ViewPixels::Shades(pixels) => set2(&dict, &name, size, pixels),
+        }?;
+    }
     Ok(dict)
 }

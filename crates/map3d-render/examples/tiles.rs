@@ -6,7 +6,8 @@
 use std::path::PathBuf;
 
 use map3d_base::tile::Tile;
-use map3d_base::{Box3, Frame, LayerFormat, LayerKind, LayerSpec, Vec3};
+use map3d_base::layers::{LAYERS, LayerRow};
+use map3d_base::{Box3, Frame, LayerFormat, LayerSpec, Vec3};
 use map3d_image::GBuffer;
 use map3d_image::encode::Encoder;
 use map3d_image::reduce;
@@ -59,18 +60,16 @@ fn suns(count: usize) -> Vec<Vec3> {
 
 fn layers(names: &str, color: LayerFormat, quality: u8) -> Vec<LayerSpec> {
     let afternoon = vec![[0.6, -0.48, 0.64]];
-    let layer = |name: &str| match name {
-        "color" => LayerSpec { quality, ..LayerSpec::new(LayerKind::Color, color) },
-        "data" => LayerSpec::new(LayerKind::Data, LayerFormat::M3d),
-        "normal" => LayerSpec::new(LayerKind::Normal, LayerFormat::Png),
-        "id" => LayerSpec::new(LayerKind::Id, LayerFormat::Png),
-        "depth" => LayerSpec::new(LayerKind::Depth, LayerFormat::Png),
-        "sun" => LayerSpec { suns: afternoon.clone(), ..LayerSpec::new(LayerKind::Sun, LayerFormat::Png) },
-        "sun16" => LayerSpec { suns: suns(16), ..LayerSpec::new(LayerKind::Sun16, LayerFormat::Png) },
-        "ao" => LayerSpec { radius_m: 20.0, ..LayerSpec::new(LayerKind::Ao, LayerFormat::Png) },
-        "depth2" => LayerSpec::new(LayerKind::Depth2, LayerFormat::Png),
-        "picture" => LayerSpec { quality, suns: afternoon.clone(), radius_m: 20.0, ..LayerSpec::new(LayerKind::Picture, color) },
-        other => panic!("unknown layer {other}"),
+    let layer = |name: &str| {
+        let is_named = |row: &&LayerRow| format!("{:?}", row.kind).to_lowercase() == name;
+        let row = LAYERS.iter().find(is_named).unwrap_or_else(|| panic!("unknown layer {name}"));
+        let format = if row.formats.contains(&color) { color } else { row.formats[0] };
+        let suns = match row.suns[1] {
+            0 => Vec::new(),
+            1 => afternoon.clone(),
+            most => suns(most),
+        };
+        LayerSpec { quality, suns, radius_m: if row.radius { 20.0 } else { 0.0 }, ..LayerSpec::new(row.kind, format) }
     };
     names.split(',').map(layer).collect()
 }

@@ -20,4 +20,4 @@ pub use cutout::TextureCutout;
 pub use query::Pick;
 pub use scene::{RenderScene, SceneStats};
 pub use tile::TileRenderer;
-pub use view::{HitSelection, RayHit, Region, ViewImage, ViewRequest, ViewTimes};
+pub use view::{HitSelection, RayHit, Region, ViewImage, ViewPixels, ViewRequest, ViewTimes};

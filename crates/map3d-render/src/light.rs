@@ -9,6 +9,7 @@ mod ray_origins;
 mod subtile;
 mod unprojection;
 
+use map3d_base::layers::{AO, DEPTH, DEPTH2, Reduction, SUN, SUN16};
 use map3d_base::{DEPTH_NOTHING, DEPTH_UNITS_PER_M, Isa, LayerKind, LayerSpec, Projection, RAY_LIFT_M, Result, Vec3};
 use map3d_image::GBuffer;
 use map3d_scene::SceneStore;
@@ -46,8 +47,7 @@ pub struct LightTracer<'s> {
 impl<'s> LightTracer<'s> {
     /// Returns `None` if no layer needs rays.
     pub fn new(scene: &'s SceneStore, layers: &[LayerSpec], view: Projection, isa: Isa) -> Option<Self> {
-        let needs_rays = |l: &LayerSpec| is_averaged(l.kind) || matches!(l.kind, LayerKind::Sun16 | LayerKind::Depth2);
-        layers.iter().any(needs_rays).then(|| Self {
+        layers.iter().any(|l| l.kind.row().traced).then(|| Self {
             scene,
             layers: layers.to_vec(),
             view,
@@ -112,13 +112,15 @@ impl<'s> LightTracer<'s> {
         let value = |origin: usize| if is_lit(lit, origin) { 1.0 } else { 0.0 };
         let values =
             LightValues { pixel: |i, j| value(pixel_index([i, j])), fragment: |k: usize| value(self.fragments.origin_of_fragment[k] as usize) };
-        average(subtile.buffer, values, &mut g.sun, g.width, subtile.position);
+        let width = g.width;
+        average(subtile.buffer, values, &mut g[SUN], width, subtile.position);
     }
 
     fn fill_ao(&self, subtile: &ShadedSubtile, ambient: &[f32], g: &mut GBuffer) {
         let points = &self.ao_points;
         let values = LightValues { pixel: |i, j| ambient[points.plane_of_pixel(i, j)], fragment: |k| ambient[points.plane_of_fragment(k)] };
-        average(subtile.buffer, values, &mut g.ao, g.width, subtile.position);
+        let width = g.width;
+        average(subtile.buffer, values, &mut g[AO], width, subtile.position);
     }
 
     fn fill_picture(&self, subtile: &ShadedSubtile, sun: Vec3, lit: &[u64], ambient: &[f32], g: &mut GBuffer) {
@@ -136,7 +138,8 @@ impl<'s> LightTracer<'s> {
             let lit = self.trace_sun(&self.centers, *sun, subtile.cutout)?;
             for origin in set_bits(&lit) {
                 let [i, j] = pixel_of_index(origin);
-                g.sun16[subtile.position.index(g.width, i, j)] |= 1 << bit;
+                let at = subtile.position.index(g.width, i, j);
+                g[SUN16][at] |= 1 << bit;
             }
         }
         Ok(())
@@ -163,8 +166,8 @@ impl<'s> LightTracer<'s> {
                 let Some(triangle) = triangle else { continue };
                 let [i, j] = pixel_of_index(number * PACKET_SIZE + k);
                 let at = subtile.position.index(g.width, i, j);
-                let least = g.depth[at].saturating_add(SECOND_SURFACE_UNITS).min(DEPTH_NOTHING - 1);
-                g.depth2[at] = planes[*triangle as usize].units(i, j).max(least);
+                let least = g[DEPTH][at].saturating_add(SECOND_SURFACE_UNITS).min(DEPTH_NOTHING - 1);
+                g[DEPTH2][at] = planes[*triangle as usize].units(i, j).max(least);
             }
         }
         Ok(())
@@ -245,7 +248,7 @@ impl<K: Copy + PartialEq, T> Memo<K, T> {
 
 /// Returns whether the layer's values are means over a pixel's samples, as colours are.
 fn is_averaged(kind: LayerKind) -> bool {
-    matches!(kind, LayerKind::Sun | LayerKind::Ao | LayerKind::Picture)
+    kind.row().array.is_some_and(|array| matches!(array.reduction, Reduction::Mean | Reduction::MeanOfCovered))
 }
 
 /// Returns directions that are even over the sphere: a spiral from pole to pole that turns by the golden angle.

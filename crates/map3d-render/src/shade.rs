@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use map3d_base::samples::SAMPLES;
 use map3d_base::{Error, Isa, Projection, Result};
-use map3d_image::GBuffer;
+use map3d_image::{GBuffer, SurfaceArrays};
 use map3d_scene::MaterialRecord;
 use map3d_texture::TextureCache;
 use map3d_trace::{MIXED, NOTHING, SUBTILE_PX, SurfaceAttributes, VisBuf};
@@ -69,7 +69,9 @@ const NOT_PREPARED: u32 = u32::MAX;
 struct SubtileTarget<'a> {
     vis: &'a VisBuf,
     textures: &'a TextureCache,
-    g: &'a mut GBuffer,
+    g: SurfaceArrays<'a>,
+    /// Width of the G-buffer.
+    width: usize,
     /// The sub-tile's first pixel in the G-buffer: left, top.
     corner: (usize, usize),
 }
@@ -78,7 +80,7 @@ impl SubtileTarget<'_> {
     /// Returns the index of pixel (i, j) in the G-buffer.
     #[inline(always)]
     fn index(&self, i: usize, j: usize) -> usize {
-        (self.corner.1 + j) * self.g.width as usize + self.corner.0 + i
+        (self.corner.1 + j) * self.width + self.corner.0 + i
     }
 }
 
@@ -121,7 +123,7 @@ impl Shader {
         self.edges.clear();
         self.surface_of_slot.clear();
         self.surface_of_slot.resize(vis.slot_count(), NOT_PREPARED);
-        let mut target = SubtileTarget { vis, textures, g, corner };
+        let mut target = SubtileTarget { vis, textures, width: g.width as usize, g: g.surface_arrays(), corner };
         let done = self.split_rows(&mut target).and_then(|()| self.shade_surfaces(&mut target));
         self.materials.finish_subtile();
         done
@@ -209,7 +211,7 @@ impl Shader {
             }
         }
         if has_color {
-            edges.resolve(self.samples.bits, &mut target.g.color);
+            edges.resolve(self.samples.bits, target.g.color);
         }
         Ok(())
     }

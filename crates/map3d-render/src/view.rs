@@ -6,7 +6,7 @@ mod renderer;
 mod request;
 mod times;
 
-pub use image::ViewImage;
+pub use image::{ViewImage, ViewPixels};
 pub use pick::{HitSelection, RayHit};
 pub use request::{Region, ViewRequest};
 pub use times::ViewTimes;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use crate::town::{TempFolder, Town, all_layers, bricks, frame, new_folder};
 use map3d_base::asset::Wrap;
 use map3d_base::tile::Tile;
+use map3d_base::layers::{COLOR, DEPTH, ID, NORMAL};
 use map3d_base::{Frame, LayerFormat, LayerKind};
 use map3d_image::GBuffer;
 use map3d_image::encode::{bytes_from_u32, decode_png};
@@ -58,10 +59,10 @@ fn crop(g: &GBuffer, left: u32, top: u32) -> GBuffer {
     let mut out = GBuffer::empty(256, 256);
     for y in 0..256usize {
         let (from, to) = ((y + top as usize) * g.width as usize + left as usize, y * 256);
-        out.color[to..to + 256].copy_from_slice(&g.color[from..from + 256]);
-        out.normal[to..to + 256].copy_from_slice(&g.normal[from..from + 256]);
-        out.id[to..to + 256].copy_from_slice(&g.id[from..from + 256]);
-        out.depth[to..to + 256].copy_from_slice(&g.depth[from..from + 256]);
+        out[COLOR][to..to + 256].copy_from_slice(&g[COLOR][from..from + 256]);
+        out[NORMAL][to..to + 256].copy_from_slice(&g[NORMAL][from..from + 256]);
+        out[ID][to..to + 256].copy_from_slice(&g[ID][from..from + 256]);
+        out[DEPTH][to..to + 256].copy_from_slice(&g[DEPTH][from..from + 256]);
     }
     out
 }
@@ -83,13 +84,13 @@ fn block_has_its_tiles_in_all_layers_and_a_seam() {
             let id = tile_of(&block, 2, tile);
             assert_eq!(g.is_some(), id.is_some(), "{tile:?}");
             if let (Some(g), Some(id)) = (g, id) {
-                assert_eq!(decode_png(id).expect("sound").pixels, bytes_from_u32(&g.id));
+                assert_eq!(decode_png(id).expect("sound").pixels, bytes_from_u32(&g[ID]));
             }
         }
     }
     assert!(tiles.contains_key(&ROOT));
     let seam = read_seam("root", block.seam.as_deref().expect("has content")).expect("sound");
-    assert_eq!(decode_png(tile_of(&block, 3, ROOT).expect("root")).expect("sound").pixels, bytes_from_u32(&seam.depth));
+    assert_eq!(decode_png(tile_of(&block, 3, ROOT).expect("root")).expect("sound").pixels, bytes_from_u32(&seam[DEPTH]));
 }
 
 /// A reduce block of four base blocks gives the same root as reducing their seams directly.

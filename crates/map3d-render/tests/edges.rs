@@ -2,6 +2,7 @@
 
 use crate::town::{Town, frame, new_folder};
 use map3d_base::asset::Wrap;
+use map3d_base::layers::COLOR;
 use map3d_image::srgb::LINEAR16;
 use map3d_image::{GBuffer, Raster};
 use map3d_render::TileRenderer;
@@ -48,7 +49,7 @@ fn panels(image: Raster, wrap: Wrap) -> Town {
 
 /// Returns the greatest linear light of the covered part of any pixel, and the number of covered pixels.
 fn brightest(g: &GBuffer) -> (f64, usize) {
-    let covered = g.color.iter().filter(|c| c[3] > 0);
+    let covered = g[COLOR].iter().filter(|c| c[3] > 0);
     let light = |c: &[u16; 4]| f64::from(*c[..3].iter().max().expect("three")) * 65_535.0 / f64::from(c[3]);
     covered.fold((0.0, 0), |(most, count), c| (light(c).max(most), count + 1))
 }
@@ -101,16 +102,16 @@ fn outside_the_image_an_opaque_texture_shows_the_diffuse_or_the_border_colour() 
     for (wrap, expected) in [(Wrap::None, [0, 65_535, 65_535, 65_535]), (Wrap::Border, [65_535, 0, 65_535, 65_535])] {
         let g = wide_wall(facade(), wrap);
         for (x, y) in OUTSIDE {
-            assert_eq!(g.color[y * 256 + x], expected, "{wrap:?} ({x}, {y})");
+            assert_eq!(g[COLOR][y * 256 + x], expected, "{wrap:?} ({x}, {y})");
         }
-        let inside = g.color[180 * 256 + 64];
+        let inside = g[COLOR][180 * 256 + 64];
         assert!(inside[0] == 0 && inside[1] < 20_000, "{wrap:?}: {inside:?}");
     }
 }
 
 #[test]
 fn outside_the_image_a_cut_out_has_no_surface_unless_its_border_is_opaque() {
-    let coverage = |g: &GBuffer, (x, y): (usize, usize)| g.color[y * 256 + x][3];
+    let coverage = |g: &GBuffer, (x, y): (usize, usize)| g[COLOR][y * 256 + x][3];
     let (none, border) = (wide_wall(leaves(), Wrap::None), wide_wall(leaves(), Wrap::Border));
     for at in OUTSIDE {
         assert_eq!(coverage(&none, at), 0, "{at:?}");

@@ -15,10 +15,11 @@ use self::cameras::CAMERAS;
 use self::pictures::PICTURES;
 use crate::town::{frame, new_folder};
 use map3d_base::file::checksum;
-use map3d_base::{DEPTH_NOTHING, DEPTH_UNITS_PER_M, Frame, Isa};
+use map3d_base::layers::{COLOR, DEPTH, ID, NORMAL};
+use map3d_base::{DEPTH_NOTHING, DEPTH_UNITS_PER_M, Frame, Isa, LayerKind};
 use map3d_image::encode::{Deflate, Filter, bytes_from_normals, color_from_linear, decode_png, encode_png};
 use map3d_image::{GBuffer, Raster};
-use map3d_render::{RenderScene, TileRenderer, ViewImage};
+use map3d_render::{RenderScene, TileRenderer, ViewImage, ViewPixels};
 
 const SIDE: usize = 128;
 const QUARTERS: [&str; 4] = ["colour", "normal", "id", "depth"];
@@ -28,19 +29,19 @@ fn middle(g: &GBuffer) -> GBuffer {
     let mut out = GBuffer::empty(SIDE as u32, SIDE as u32);
     for y in 0..SIDE {
         let (from, to) = ((y + 64) * 256 + 64, y * SIDE);
-        out.color[to..to + SIDE].copy_from_slice(&g.color[from..from + SIDE]);
-        out.normal[to..to + SIDE].copy_from_slice(&g.normal[from..from + SIDE]);
-        out.id[to..to + SIDE].copy_from_slice(&g.id[from..from + SIDE]);
-        out.depth[to..to + SIDE].copy_from_slice(&g.depth[from..from + SIDE]);
+        out[COLOR][to..to + SIDE].copy_from_slice(&g[COLOR][from..from + SIDE]);
+        out[NORMAL][to..to + SIDE].copy_from_slice(&g[NORMAL][from..from + SIDE]);
+        out[ID][to..to + SIDE].copy_from_slice(&g[ID][from..from + SIDE]);
+        out[DEPTH][to..to + SIDE].copy_from_slice(&g[DEPTH][from..from + SIDE]);
     }
     out
 }
 
 /// Returns a checksum of all bits.
 fn digest(g: &GBuffer) -> String {
-    let color = g.color.iter().flatten().flat_map(|v| v.to_le_bytes());
-    let normal = g.normal.iter().flatten().flat_map(|v| v.to_le_bytes());
-    let numbers = g.id.iter().chain(&g.depth).flat_map(|v| v.to_le_bytes());
+    let color = g[COLOR].iter().flatten().flat_map(|v| v.to_le_bytes());
+    let normal = g[NORMAL].iter().flatten().flat_map(|v| v.to_le_bytes());
+    let numbers = g[ID].iter().chain(&g[DEPTH]).flat_map(|v| v.to_le_bytes());
     format!("{:016x}", checksum(&color.chain(normal).chain(numbers).collect::<Vec<u8>>()))
 }
 
@@ -70,14 +71,15 @@ struct Shown {
 
 impl Shown {
     fn of_tile(g: &GBuffer) -> Self {
-        let color = color_from_linear((g.width, g.height), &g.color).pixels;
-        let normal = bytes_from_normals(&g.normal).as_chunks::<3>().0.to_vec();
-        Self { color, normal, id: g.id.clone(), depth: g.depth.clone() }
+        let color = color_from_linear((g.width, g.height), &g[COLOR]).pixels;
+        let normal = bytes_from_normals(&g[NORMAL]).as_chunks::<3>().0.to_vec();
+        Self { color, normal, id: g[ID].to_vec(), depth: g[DEPTH].to_vec() }
     }
 
     fn of_view(view: &ViewImage) -> Self {
         let units = |m: &f32| if m.is_nan() { DEPTH_NOTHING } else { (f64::from(*m) * DEPTH_UNITS_PER_M).round() as u32 };
-        Self { color: view.color.clone(), normal: view.normal.clone(), id: view.id.clone(), depth: view.depth.iter().map(units).collect() }
+        let (color, normal, id, metres) = layers_of(view);
+        Self { color: color.to_vec(), normal: normal.to_vec(), id: id.to_vec(), depth: metres.iter().map(units).collect() }
     }
 
     fn quarters(&self) -> Raster {
@@ -96,10 +98,24 @@ impl Shown {
     }
 }
 
+/// Colour, normal, id and depth.
+type Layers<'a> = (&'a [[u8; 4]], &'a [[u8; 3]], &'a [u32], &'a [f32]);
+
+fn layers_of(view: &ViewImage) -> Layers<'_> {
+    let layers = [LayerKind::Color, LayerKind::Normal, LayerKind::Id, LayerKind::Depth].map(|kind| view.layer(kind));
+    match layers {
+        [Some(ViewPixels::Color(color)), Some(ViewPixels::Normal(normal)), Some(ViewPixels::Numbers(id)), Some(ViewPixels::Metres(depth))] => {
+            (color, normal, id, depth)
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
 /// Returns a checksum of all bits.
 fn view_digest(view: &ViewImage) -> String {
-    let bytes = view.color.iter().flatten().chain(view.normal.iter().flatten()).copied();
-    let numbers = view.id.iter().copied().chain(view.depth.iter().map(|m| m.to_bits())).flat_map(u32::to_le_bytes);
+    let (color, normal, id, depth) = layers_of(view);
+    let bytes = color.iter().flatten().chain(normal.iter().flatten()).copied();
+    let numbers = id.iter().copied().chain(depth.iter().map(|m| m.to_bits())).flat_map(u32::to_le_bytes);
     format!("{:016x}", checksum(&bytes.chain(numbers).collect::<Vec<u8>>()))
 }
 

@@ -2,6 +2,7 @@
 
 use crate::town::{TempFolder, Town, frame, new_folder, waves};
 use map3d_base::vec3::{dot, normalized, scale};
+use map3d_base::layers::{AO, COLOR, DEPTH, DEPTH2, ID, NORMAL, PICTURE, SUN, SUN16};
 use map3d_base::{DEPTH_NOTHING, DEPTH_UNITS_PER_M, Frame, Isa, LayerFormat, LayerKind, LayerSpec, RAY_LIFT_M, Vec3, vec3};
 use map3d_image::{Arrays, GBuffer};
 use map3d_render::{RenderScene, TileRenderer};
@@ -57,17 +58,17 @@ const ALL: [LayerKind; 9] = [
 /// Returns the pixels whose neighbours show the same object.
 fn inner(g: &GBuffer) -> impl Iterator<Item = usize> {
     let w = g.width as usize;
-    let same = move |p: usize, q: usize| g.id[p] == g.id[q];
-    let all = (0..g.id.len()).filter(move |p| p % w > 1 && p % w + 2 < w && p / w > 1 && p / w + 2 < w);
-    all.filter(move |p| g.id[*p] != 0 && [1, 2, w, 2 * w].iter().all(|d| same(*p, p - d) && same(*p, p + d)))
+    let same = move |p: usize, q: usize| g[ID][p] == g[ID][q];
+    let all = (0..g[ID].len()).filter(move |p| p % w > 1 && p % w + 2 < w && p / w > 1 && p / w + 2 < w);
+    all.filter(move |p| g[ID][*p] != 0 && [1, 2, w, 2 * w].iter().all(|d| same(*p, p - d) && same(*p, p + d)))
 }
 
 /// Returns the local point and the geometric normal of a pixel; the faces of this town have no shading normals.
 fn point(f: &Frame, g: &GBuffer, p: usize) -> (Vec3, Vec3) {
     let tile = map3d_base::tile::Tile { z: 0, x: 0, y: 0 };
     let (u, v) = f.uv_of_pixel(tile, p as u32 % g.width, p as u32 / g.width);
-    let at = f.axes().local_from_uvd([u, v, f.d0_m + f64::from(g.depth[p]) / DEPTH_UNITS_PER_M]);
-    (at, normalized(g.normal[p].map(f64::from)).expect("a normal"))
+    let at = f.axes().local_from_uvd([u, v, f.d0_m + f64::from(g[DEPTH][p]) / DEPTH_UNITS_PER_M]);
+    (at, normalized(g[NORMAL][p].map(f64::from)).expect("a normal"))
 }
 
 fn lifted((at, n): (Vec3, Vec3)) -> Vec3 {
@@ -96,20 +97,20 @@ fn suns_light_the_points_from_which_single_rays_reach_them() {
         for p in inner(&g).step_by(7) {
             let at = point(&f, &g, p);
             if let Some(lit) = is_lit(&scene, at, AFTERNOON) {
-                assert_eq!(g.sun[p], if lit { 255 } else { 0 }, "pixel {p} of {look_at}/{pitch}");
+                assert_eq!(g[SUN][p], if lit { 255 } else { 0 }, "pixel {p} of {look_at}/{pitch}");
                 checked += 1;
                 dark += usize::from(!lit);
             }
             for k in [0, 5, 8, 15] {
                 if let Some(lit) = is_lit(&scene, at, suns[k]) {
-                    assert_eq!(g.sun16[p] >> k & 1 == 1, lit, "sun {k}, pixel {p} of {look_at}/{pitch}");
+                    assert_eq!(g[SUN16][p] >> k & 1 == 1, lit, "sun {k}, pixel {p} of {look_at}/{pitch}");
                 }
             }
         }
         assert!(checked > 2_000 && dark > 200 && checked - dark > 200, "{dark} of {checked} dark");
         let night = suns.iter().map(|s| u16::from(s[2] <= 0.0)).enumerate().fold(0, |mask, (k, n)| mask | n << k);
-        assert!(night != 0 && g.sun16.iter().all(|bits| bits & night == 0), "suns below the horizon");
-        assert!(g.color.iter().zip(&g.sun).all(|(c, sun)| c[3] != 0 || *sun == 255), "empty pixels are lit");
+        assert!(night != 0 && g[SUN16].iter().all(|bits| bits & night == 0), "suns below the horizon");
+        assert!(g[COLOR].iter().zip(&g[SUN]).all(|(c, sun)| c[3] != 0 || *sun == 255), "empty pixels are lit");
     }
 }
 
@@ -136,8 +137,8 @@ fn ambient_occlusion_is_the_mean_visibility() {
             let distance = hit.map_or(1.0, |h| (h.distance_m / RADIUS_M).min(1.0));
             (visible, total) = (visible + dot(*d, n) * distance * distance, total + dot(*d, n));
         }
-        let error = (f64::from(g.ao[p]) / 255.0 - visible / total).abs();
-        (worst, sum, count, darkest) = (worst.max(error), sum + error, count + 1, darkest.min(g.ao[p]));
+        let error = (f64::from(g[AO][p]) / 255.0 - visible / total).abs();
+        (worst, sum, count, darkest) = (worst.max(error), sum + error, count + 1, darkest.min(g[AO][p]));
     }
     assert!(count > 60 && darkest < 190, "{count} points, the darkest {darkest}");
     assert!(worst < 0.09 && sum / f64::from(count) < 0.02, "worst {worst}, mean {}", sum / f64::from(count));
@@ -157,13 +158,13 @@ fn second_surface_is_the_next_hit_of_a_single_ray() {
         let hit = rays.closest_hit(&ray(0.0635), &map3d_trace::IgnoreCutouts).expect("ray");
         match hit {
             None => {
-                assert_eq!(g.depth2[p], DEPTH_NOTHING, "pixel {p}");
+                assert_eq!(g[DEPTH2][p], DEPTH_NOTHING, "pixel {p}");
                 nothing += 1;
             }
             Some(h) => {
-                let expected = f64::from(g.depth[p]) + (0.0635 + h.distance_m) * DEPTH_UNITS_PER_M;
+                let expected = f64::from(g[DEPTH][p]) + (0.0635 + h.distance_m) * DEPTH_UNITS_PER_M;
                 // Single rays start at a rounded depth.
-                if (f64::from(g.depth2[p]) - expected).abs() <= 2.0 {
+                if (f64::from(g[DEPTH2][p]) - expected).abs() <= 2.0 {
                     found += 1;
                 } else {
                     let side = rays.closest_hit(
@@ -171,7 +172,7 @@ fn second_surface_is_the_next_hit_of_a_single_ray() {
                         &map3d_trace::IgnoreCutouts,
                     );
                     let shifted = side.expect("ray").map_or(f64::INFINITY, |s| s.distance_m);
-                    assert!((shifted - h.distance_m).abs() > 0.5, "pixel {p}: {} for {expected}", g.depth2[p]);
+                    assert!((shifted - h.distance_m).abs() > 0.5, "pixel {p}: {} for {expected}", g[DEPTH2][p]);
                 }
             }
         }
@@ -187,19 +188,19 @@ fn picture_is_colour_times_light() {
     let mut count = 0;
     for p in inner(&g) {
         let (_, n) = point(&f, &g, p);
-        let light = 0.42 * f64::from(g.ao[p]) / 255.0 + 0.76 * dot(n, AFTERNOON).max(0.0) * f64::from(g.sun[p]) / 255.0;
+        let light = 0.42 * f64::from(g[AO][p]) / 255.0 + 0.76 * dot(n, AFTERNOON).max(0.0) * f64::from(g[SUN][p]) / 255.0;
         for c in 0..3 {
-            let expected = (f64::from(g.color[p][c]) * light).min(65_535.0);
+            let expected = (f64::from(g[COLOR][p][c]) * light).min(65_535.0);
             assert!(
-                (f64::from(g.picture[p][c]) - expected).abs() < 0.003 * f64::from(g.color[p][c]) + 2.0,
+                (f64::from(g[PICTURE][p][c]) - expected).abs() < 0.003 * f64::from(g[COLOR][p][c]) + 2.0,
                 "pixel {p}: {:?}, light {light}",
-                g.picture[p]
+                g[PICTURE][p]
             );
         }
         count += 1;
     }
     assert!(count > 10_000);
-    assert!(g.color.iter().zip(&g.picture).all(|(a, b)| a[3] == b[3]), "coverage");
+    assert!(g[COLOR].iter().zip(&g[PICTURE]).all(|(a, b)| a[3] == b[3]), "coverage");
 }
 
 /// Suns and ambient occlusion are means over a pixel's samples, so a pixel on an edge is neither darker nor lighter than its surfaces.
@@ -210,11 +211,11 @@ fn edge_pixels_are_between_their_neighbours() {
     let g = scene.gbuffer(&f, 0, 0).expect("renders");
     let w = g.width as usize;
     let mut mixed = 0;
-    for p in (w + 1..g.sun.len() - w - 1).filter(|p| g.sun[*p] != 0 && g.sun[*p] != 255) {
-        let around = [p - w - 1, p - w, p - w + 1, p - 1, p + 1, p + w - 1, p + w, p + w + 1].map(|q| g.sun[q]);
+    for p in (w + 1..g[SUN].len() - w - 1).filter(|p| g[SUN][*p] != 0 && g[SUN][*p] != 255) {
+        let around = [p - w - 1, p - w, p - w + 1, p - 1, p + 1, p + w - 1, p + w, p + w + 1].map(|q| g[SUN][q]);
         let sides = (around.iter().min().expect("eight"), around.iter().max().expect("eight"));
-        mixed += usize::from(*sides.0 <= g.sun[p] && g.sun[p] <= *sides.1);
-        assert!(g.color[p][3] > 0);
+        mixed += usize::from(*sides.0 <= g[SUN][p] && g[SUN][p] <= *sides.1);
+        assert!(g[COLOR][p][3] > 0);
     }
     assert!(mixed > 30, "{mixed} pixels are partly lit");
 }
@@ -257,8 +258,8 @@ fn light_does_not_depend_on_tiling() {
         for p in 0..256 * 256 {
             let q = (p / 256 + k / 2 * 256) * 512 + p % 256 + k % 2 * 256;
             assert_eq!(
-                (g.sun[p], g.sun16[p], g.ao[p], g.depth2[p], g.picture[p]),
-                (big.sun[q], big.sun16[q], big.ao[q], big.depth2[q], big.picture[q])
+                (g[SUN][p], g[SUN16][p], g[AO][p], g[DEPTH2][p], g[PICTURE][p]),
+                (big[SUN][q], big[SUN16][q], big[AO][q], big[DEPTH2][q], big[PICTURE][q])
             );
         }
     }

@@ -7,6 +7,7 @@ use crate::town::scenes::Lcg;
 use crate::town::{SoupFace, Town, frame, new_folder};
 use map3d_base::Vec3;
 use map3d_base::asset::Instance;
+use map3d_base::layers::NORMAL;
 use map3d_base::vec3::{cross, dot, normalized, scale, triangle_normal};
 
 /// Returns a hemisphere, open below, with the normals of a sphere; every second face has the opposite winding.
@@ -103,13 +104,13 @@ fn compare(town: &Town, look_at: f64, pitch: f64) -> [u32; 3] {
             triangles.iter().filter(|t| t.covers(at)).map(|t| (t.depth_key(view.depth(t, at)), t)).collect();
         found.sort_by_key(|r| r.0);
         let Some(&(key, t)) = found.first() else {
-            assert_eq!(g.normal[p], [0; 3]);
+            assert_eq!(g[NORMAL][p], [0; 3]);
             continue;
         };
         let source = faces[town.face_number(t.object_id, t.source, t.transform.is_some())];
         let Some(n) = expected(&view, t, source, at).filter(|_| found.get(1).is_none_or(|second| second.0 > key + 2)) else { continue };
         // The rounding of the stored normal, which the placement at most doubles, that of the result, and float32 in between.
-        let got = g.normal[p].map(f64::from);
+        let got = g[NORMAL][p].map(f64::from);
         assert!((0..3).all(|k| (got[k] - n[k]).abs() <= 3.0), "pixel {p} from {look_at} / {pitch}: {got:?}, expected {n:?} of {source:?}");
         let is_turned = |given: [[f32; 3]; 3]| {
             let plain = |n: [f32; 3]| t.transform.map_or(n.map(f64::from), |m| transposed_times(&inverse(&m), n.map(f64::from)));

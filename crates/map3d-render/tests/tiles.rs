@@ -3,6 +3,7 @@
 use crate::town::reference_renderer::{ReferenceRenderer, SampleHit};
 use crate::town::{Town, bricks, frame, new_folder, waves};
 use map3d_base::asset::{Rank, Wrap};
+use map3d_base::layers::{COLOR, DEPTH, ID, NORMAL};
 use map3d_base::{DEPTH_NOTHING, Frame};
 use map3d_image::srgb::BYTE;
 use map3d_image::{GBuffer, Raster};
@@ -31,12 +32,12 @@ fn at(i: u32, j: u32) -> usize {
 fn assert_same_center(g: &GBuffer, hit: Option<&SampleHit>, (i, j): (u32, u32)) {
     let p = at(i, j);
     let Some(hit) = hit else {
-        assert_eq!((g.id[p], g.depth[p], g.normal[p]), (0, DEPTH_NOTHING, [0; 3]), "({i}, {j})");
+        assert_eq!((g[ID][p], g[DEPTH][p], g[NORMAL][p]), (0, DEPTH_NOTHING, [0; 3]), "({i}, {j})");
         return;
     };
-    assert_eq!(g.id[p], hit.id, "({i}, {j}): {hit:?}");
-    assert!(g.depth[p].abs_diff(hit.depth) <= 1, "({i}, {j}): {} {hit:?}", g.depth[p]);
-    assert!((0..3).all(|k| (f64::from(g.normal[p][k]) - hit.normal[k] * 32_767.0).abs() <= 2.0), "({i}, {j}): {:?} {hit:?}", g.normal[p]);
+    assert_eq!(g[ID][p], hit.id, "({i}, {j}): {hit:?}");
+    assert!(g[DEPTH][p].abs_diff(hit.depth) <= 1, "({i}, {j}): {} {hit:?}", g[DEPTH][p]);
+    assert!((0..3).all(|k| (f64::from(g[NORMAL][p][k]) - hit.normal[k] * 32_767.0).abs() <= 2.0), "({i}, {j}): {:?} {hit:?}", g[NORMAL][p]);
 }
 
 #[test]
@@ -75,7 +76,7 @@ fn constant_colours_are_the_mean_of_the_samples() {
             let hits = samples.iter().flatten().count();
             edges += usize::from(hits > 0 && hits < 16);
             let sum = samples.iter().flatten().map(|m| reference.color(m)).fold([0.0; 3], |s, c| [0, 1, 2].map(|k| s[k] + c[k]));
-            let got = g.color[at(i, j)];
+            let got = g[COLOR][at(i, j)];
             assert!((0..3).all(|c| (f64::from(got[c]) - sum[c] / 16.0).abs() <= 1.0), "({i}, {j}): {got:?} {sum:?}");
             assert_eq!(got[3], ((65_535 * hits + 8) / 16) as u16);
         }
@@ -92,7 +93,7 @@ fn compare(g: &GBuffer, reference: &ReferenceRenderer, side: u32, n: i128) -> (f
         for i in 0..side {
             let (i, j) = (i + (256 - side) / 2, j + (256 - side) / 2);
             let (exact, cover) = reference.mean(i, j, n);
-            let got = g.color[at(i, j)];
+            let got = g[COLOR][at(i, j)];
             let now = (cover == 1.0 && got[3] == 65_535).then(|| [[0, 1, 2].map(|c| byte(f64::from(got[c]))), exact.map(byte)]);
             let x = (i - (256 - side) / 2) as usize;
             if let Some([got, exact]) = now {
@@ -151,7 +152,7 @@ fn atlas_background_never_shows() {
     for size in [6.0, 40.0, 100.0, 600.0, 3000.0] {
         for (look_at, pitch) in VIEWS {
             let g = scene.gbuffer(&frame(look_at, pitch, size, 0), 0, 0).expect("renders");
-            for c in g.color.iter().filter(|c| c[3] > 0) {
+            for c in g[COLOR].iter().filter(|c| c[3] > 0) {
                 assert!(c[1] > c[0] && c[1] > c[2], "{c:?} at size {size}, {look_at} {pitch}");
             }
         }
@@ -173,10 +174,10 @@ fn cutout_shows_the_surface_behind_its_hole() {
     let scene = town.open(&folder);
     let f = frame(0.0, 90.0, 32.0, 0);
     let g = scene.gbuffer(&f, 0, 0).expect("renders");
-    assert_eq!((g.id[at(128, 128)], g.id[at(80, 128)]), (2, 1));
-    let through = g.id.iter().filter(|id| **id == 2).count();
+    assert_eq!((g[ID][at(128, 128)], g[ID][at(80, 128)]), (2, 1));
+    let through = g[ID].iter().filter(|id| **id == 2).count();
     assert!((3900..4300).contains(&through), "a quarter of the leaf is a hole: {through} of 16,384 px");
-    let edge = g.color[at(128, 100)];
+    let edge = g[COLOR][at(128, 100)];
     assert!(edge[0] > edge[1], "the wall does not show: {edge:?}");
     let pick = scene.pick(&f, 0.0, 0.0).expect("a ray").expect("a hit");
     assert_eq!(pick.id, 2);
@@ -194,9 +195,9 @@ fn shading_normals_are_interpolated_and_face_the_viewer() {
     town.faces[1].normals = Some([[0.0, 0.0, -1.0]; 3]);
     let folder = new_folder("normals");
     let g = town.open(&folder).gbuffer(&frame(0.0, 90.0, 64.0, 0), 0, 0).expect("renders");
-    let (left, middle, right) = (g.normal[at(92, 166)], g.normal[at(128, 128)], g.normal[at(163, 166)]);
+    let (left, middle, right) = (g[NORMAL][at(92, 166)], g[NORMAL][at(128, 128)], g[NORMAL][at(163, 166)]);
     assert!(left[0] < -12_000 && middle[0].abs() < 300 && right[0] > 12_000, "{left:?} {middle:?} {right:?}");
-    let backwards = g.normal[at(128, 75)];
+    let backwards = g[NORMAL][at(128, 75)];
     assert!(backwards[2] > 32_000, "not turned to the visible side: {backwards:?}");
 }
 
@@ -246,12 +247,12 @@ fn pick_agrees_with_pixels() {
     for (i, j) in sampled_pixels(331) {
         let (u, v) = f.uv_of_pixel(map3d_base::tile::Tile { z: 0, x: 0, y: 0 }, i, j);
         match scene.pick(&f, u, v).expect("a ray") {
-            None => assert_eq!(g.id[at(i, j)], 0, "({i}, {j})"),
+            None => assert_eq!(g[ID][at(i, j)], 0, "({i}, {j})"),
             Some(pick) => {
                 hits += 1;
-                assert_eq!(g.id[at(i, j)], pick.id, "({i}, {j})");
+                assert_eq!(g[ID][at(i, j)], pick.id, "({i}, {j})");
                 let depth = (pick.d_m - f.d0_m) * 1024.0;
-                assert!((depth - f64::from(g.depth[at(i, j)])).abs() <= 2.0, "({i}, {j}): {depth} {}", g.depth[at(i, j)]);
+                assert!((depth - f64::from(g[DEPTH][at(i, j)])).abs() <= 2.0, "({i}, {j}): {depth} {}", g[DEPTH][at(i, j)]);
             }
         }
     }

@@ -7,7 +7,19 @@ from typing import Final
 from map3d.catalogue import SceneRecord
 from map3d.errors import BadRequest
 from map3d.renderings.sun_layers import LightRequest
-from map3d.types import COLOR_KINDS, DEFAULT_DATA, DEFAULT_LAYERS, LAYER_KINDS, LAYERS_BY_DATA, Box, DataEncoding, Layer, LayerKind, format_of
+from map3d.types import (
+    COLOR_FORMATS,
+    COLOR_KINDS,
+    DEFAULT_DATA,
+    DEFAULT_LAYERS,
+    LAYER_KINDS,
+    LAYERS,
+    LAYERS_BY_DATA,
+    Box,
+    DataEncoding,
+    Layer,
+    LayerKind,
+)
 
 LOSSY: Final = ("webp", "jpeg")
 
@@ -18,7 +30,7 @@ class LayerRequest:
     layers; `small`: spends more time on encoding to save bytes."""
 
     names: Sequence[str] = DEFAULT_LAYERS
-    color: str = "webp"
+    color: str = COLOR_FORMATS[0]
     quality: int = 80
     light: LightRequest = field(default_factory=LightRequest)
     small: bool = False
@@ -43,7 +55,7 @@ class LayerRequest:
         suns, radius_m = self.light.suns(kind, scene, box), self.light.radius_of(kind)
         if kind in COLOR_KINDS:
             return Layer(name, kind, self.color, self.quality if self.color in LOSSY else None, suns, radius_m, self.small)
-        return Layer(name, kind, format_of(kind), suns=suns, radius_m=radius_m, small=self.small)
+        return Layer(name, kind, LAYERS[kind].formats[0], suns=suns, radius_m=radius_m, small=self.small)
 
 
 def choose_layers(names: Sequence[str] | None, data: DataEncoding | None) -> Sequence[str]:
@@ -57,7 +69,6 @@ def choose_layers(names: Sequence[str] | None, data: DataEncoding | None) -> Seq
 
 def _name_and_kind(text: str) -> tuple[str, LayerKind]:
     name, _, kind = text.rpartition("=")
-    for valid in LAYER_KINDS:
-        if kind == valid:
-            return (name if "=" in text else valid), valid
+    if kind in LAYERS:
+        return (name if "=" in text else kind), kind
     raise BadRequest(f"unknown layer {text!r}; write KIND or NAME=KIND, with one of {', '.join(LAYER_KINDS)}")

@@ -9,10 +9,11 @@ from typing import Final
 from map3d.catalogue import SceneRecord
 from map3d.errors import BadRequest
 from map3d.geometry.sun import GeographicPosition, SunAngles, hours_of, sun_angles, time_text
-from map3d.types import RADIUS_KINDS, Box, Sun, Vec3
+from map3d.types import LAYERS, RADIUS_KINDS, Box, Sun, Vec3
 
-ONE_SUN: Final = ("sun", "picture")
-DAY: Final = "sun16"
+ONE_SUN: Final = tuple(kind for kind, row in LAYERS.items() if row.suns == (1, 1))
+DAY: Final = tuple(kind for kind, row in LAYERS.items() if row.suns[1] > 1)
+"""Kinds with the suns of a day."""
 RADIUS_M: Final = 20.0
 
 
@@ -29,16 +30,16 @@ class LightRequest:
 
     def check(self, kinds: Collection[str], scene: SceneRecord) -> None:
         """Raises BadRequest for missing options and for options that no layer of `kinds` uses."""
-        one, day, radius = any(kind in kinds for kind in ONE_SUN), DAY in kinds, any(kind in kinds for kind in RADIUS_KINDS)
+        one, day, radius = (any(kind in kinds for kind in those) for those in (ONE_SUN, DAY, RADIUS_KINDS))
         if one and (self.time is None) == (self.sun is None):
             raise BadRequest(f"{_named(ONE_SUN, kinds)}: give the sun either as --time 2026-06-21T15:00+02:00 or as --sun AZIMUTH,ELEVATION")
         if day and self.day is None:
-            raise BadRequest("layer sun16: missing day; give it as in --date 2026-06-21")
+            raise BadRequest(f"{_named(DAY, kinds)}: missing day; give it as in --date 2026-06-21")
         if self.time is not None and self.time.tzinfo is None:
             raise BadRequest(f"time {self.time.isoformat()}: missing time zone; write e.g. {self.time.isoformat()}+02:00, or Z for UTC")
         for given, used, option, kind in (
             (self.time or self.sun, one, "--time and --sun", ONE_SUN),
-            (self.day, day, "--date", (DAY,)),
+            (self.day, day, "--date", DAY),
             (self.radius_m, radius, "--ao-radius", RADIUS_KINDS),
         ):
             if given is not None and not used:
@@ -48,10 +49,10 @@ class LightRequest:
 
     def suns(self, kind: str, scene: SceneRecord, box: Box) -> tuple[Sun, ...]:
         """Returns the suns of a layer of this kind, for the centre of the scene's local box. Raises BadRequest for a sun below the horizon."""
-        if kind not in (*ONE_SUN, DAY):
+        if kind not in (*ONE_SUN, *DAY):
             return ()
         location = SceneLocation(scene, box, self.place)
-        if kind == DAY:
+        if kind in DAY:
             assert self.day is not None, "checked"
             return tuple(location.sun_at(time) for time in hours_of(location.place, self.day))
         sun = location.sun(self.sun) if self.sun is not None else location.sun_at(self._whole_second())

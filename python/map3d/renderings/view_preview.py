@@ -18,7 +18,7 @@ from map3d.geometry.frames import NO_DEPTH, PinnedFrame, corners
 from map3d.geometry.views import axes, check_angles, uvd_from_local
 from map3d.renderings.cost_estimate import estimate_new
 from map3d.subprocess import Handler, ReportProgress
-from map3d.types import Box, Layer, ViewAngles
+from map3d.types import LAYERS, Box, Layer, ViewAngles
 
 PREVIEW_PX: Final = 512
 SAMPLE_S: Final = 3.0
@@ -126,12 +126,12 @@ def _plain(kind: str, buffer: Mapping[str, NDArray[Any]], empty: NDArray[np.bool
     if kind == "id":
         mixed = buffer["id"].astype(np.uint32) * np.uint32(2654435761)
         return np.stack([64 + (mixed >> shift) % 176 for shift in (8, 16, 24)], axis=-1).astype(np.float32)
-    if kind in ("depth", "depth2"):
+    if LAYERS[kind].unit_m is not None:
         values = buffer[kind].astype(np.float64)
         none = empty | (buffer[kind] == NO_DEPTH)
         low, high = (values[~none].min(), values[~none].max()) if not none.all() else (0.0, 1.0)
         grey = 235 - 205 * np.clip((values - low) / max(high - low, 1.0), 0, 1)
-    elif kind == "sun16":
+    elif buffer[kind].dtype == np.uint16:
         grey = sum(((buffer[kind] >> hour) & 1).astype(np.float64) for hour in range(16)) / 16 * 255
     else:
         grey = buffer[kind].astype(np.float64)

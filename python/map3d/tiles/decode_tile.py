@@ -10,20 +10,20 @@ from PIL import Image
 
 from map3d import _core
 from map3d.errors import Corrupt
-from map3d.types import COLOR_KINDS, DATA_TILE_KINDS, Layer
+from map3d.types import DATA_TILE_KINDS, LAYERS, Layer
 
 Arrays = Mapping[str, NDArray[Any]]
 
 _FORMATS: Final = {"webp": "WEBP", "png": "PNG", "jpeg": "JPEG"}
-_COLOR_MODES: Final = ("RGB", "RGBA")
-_MODES: Final = {"normal": ("RGB",), "id": ("RGBA",), "depth": ("RGBA",), "depth2": ("RGBA",), "sun": ("L",), "ao": ("L",), "sun16": ("LA",)}
-_NUMBERS: Final = {"id": "<u4", "depth": "<u4", "depth2": "<u4", "sun16": "<u2"}
-"""Kinds whose channels are the bytes of a number."""
+_MODES: Final = {"uint16x4": ("RGB", "RGBA"), "int16x3": ("RGB",), "uint32": ("RGBA",), "uint16": ("LA",), "uint8": ("L",)}
+"""Modes of the images of arrays, by the type of their pixels."""
+_NUMBERS: Final = {"uint32": "<u4", "uint16": "<u2"}
+"""Types whose channels are the bytes of a number."""
 
 
 def kinds_of(layer: Layer) -> tuple[str, ...]:
     """Returns the kinds of pixels that the tiles of a layer hold."""
-    return DATA_TILE_KINDS if layer.kind == "data" else (layer.kind,)
+    return LAYERS[layer.kind].holds or (layer.kind,)
 
 
 def layer_with(layers: Iterable[Layer], kind: str) -> Layer | None:
@@ -52,12 +52,12 @@ def layer_names(layers: Iterable[Layer]) -> list[str]:
 
 
 def decode_tile(layer: Layer, data: bytes, tile_px: int) -> Arrays:
-    """Returns an array for each of the layer's kinds of pixels, of tile_px × tile_px: color, picture (H, W, 3 or 4) uint8, normal (H, W, 3) uint8,
-    id, depth, depth2 (H, W) uint32, sun, ao (H, W) uint8, sun16 (H, W) uint16. Raises Corrupt unless the bytes are a tile of the layer's format, mode
-    and size."""
+    """Returns an array for each of the layer's kinds of pixels, of tile_px × tile_px: (H, W, 3 or 4) uint8 for colours,
+    (H, W, 3) uint8 for normals, (H, W) of the type in spec/layers.json for the others. Raises Corrupt unless the bytes are a tile of the layer's
+    format, mode and size."""
     if layer.kind == "data":
         return _decode_data(data, tile_px)
-    channels, number = decode_channels(layer, data, tile_px), _NUMBERS.get(layer.kind)
+    channels, number = decode_channels(layer, data, tile_px), _NUMBERS.get(_pixel(layer))
     if number is not None:
         return {layer.kind: channels.view(number)[..., 0]}
     return {layer.kind: channels[..., 0] if channels.shape[2] == 1 else channels}
@@ -65,7 +65,7 @@ def decode_tile(layer: Layer, data: bytes, tile_px: int) -> Arrays:
 
 def decode_channels(layer: Layer, data: bytes, tile_px: int) -> NDArray[np.uint8]:
     """Returns the bytes of an image's channels, (H, W, C). Raises Corrupt as `decode_tile` does."""
-    modes = _COLOR_MODES if layer.kind in COLOR_KINDS else _MODES[layer.kind]
+    modes = _MODES[_pixel(layer)]
     try:
         with Image.open(io.BytesIO(data), formats=[_FORMATS[layer.format]]) as image:
             if image.size != (tile_px, tile_px) or image.mode not in modes:
@@ -101,7 +101,13 @@ def paste(into: NDArray[Any], tile: NDArray[Any], x: int, y: int) -> None:
 
 
 def _png_layer(holder: Layer, name: str) -> Layer:
-    return Layer(name, next(kind for kind in DATA_TILE_KINDS if kind == name), "png", small=holder.small)
+    return Layer(name, name, "png", small=holder.small)
+
+
+def _pixel(layer: Layer) -> str:
+    array = LAYERS[layer.kind].array
+    assert array is not None, "a layer with an array of its own"
+    return array.pixel
 
 
 def _decode_data(data: bytes, tile_px: int) -> Arrays:
@@ -116,5 +122,5 @@ def _decode_data(data: bytes, tile_px: int) -> Arrays:
 
 
 def _encode_png(layer: Layer, pixels: NDArray[Any]) -> bytes:
-    channels = np.ascontiguousarray(pixels[..., None]).view(np.uint8) if layer.kind in _NUMBERS else np.ascontiguousarray(pixels)
+    channels = np.ascontiguousarray(pixels[..., None]).view(np.uint8) if _pixel(layer) in _NUMBERS else np.ascontiguousarray(pixels)
     return _core.encode_png(layer.kind, channels, range(channels.shape[2]), layer.small)

@@ -12,7 +12,7 @@ from map3d.registry.documents import ATTRIBUTES, COLUMNS, SEARCH, SHARDS
 from map3d.tiles.block_versions import BlockVersions
 from map3d.tiles.naming import block_level, block_of, parse_tile
 from map3d.tiles.occupancy import Occupancy
-from map3d.types import DEPTH_KINDS, DEPTH_UNIT_M, OBJECTS_PER_SHARD, BlockId, Box, Layer, TileId, Vec3, ViewAngles, check_name
+from map3d.types import LAYERS, OBJECTS_PER_SHARD, BlockId, Box, Layer, TileId, Vec3, ViewAngles, check_name
 
 VERSION: Final = 1
 FILE_NAME: Final = "rendering.json"
@@ -210,8 +210,8 @@ def _parse_document(data: bytes | str, where: str) -> dict[str, Any]:
 
 def _layer_json(layer: Layer) -> dict[str, Any]:
     row: dict[str, Any] = {"name": layer.name, "kind": layer.kind, "format": layer.format, "media_type": layer.media_type}
-    if layer.kind in DEPTH_KINDS:
-        row["unit_m"] = DEPTH_UNIT_M
+    if (unit_m := LAYERS[layer.kind].unit_m) is not None:
+        row["unit_m"] = unit_m
     if layer.suns:
         row["suns"] = [{**asdict(sun), "direction": list(sun.direction)} for sun in layer.suns]
     if layer.radius_m is not None:

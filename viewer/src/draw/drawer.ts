@@ -1,10 +1,9 @@
 import type { Vec2 } from "../core/vec";
 import type { Camera } from "../geo/camera";
 import type { Frame, Tile } from "../geo/frame";
-import type { LayerKind } from "../geo/manifest";
 import type { Light } from "../geo/light";
 import type { Shadow } from "../geo/shadows";
-import type { TileData } from "../tiles/tileData";
+import type { LayerKind, TileData } from "../tiles/tileData";
 import type { Rgb } from "./color";
 import type { Clip, DepthMapping } from "./depthMapping";
 import type { DrawStyles } from "./drawStyle";

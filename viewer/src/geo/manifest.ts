@@ -1,11 +1,9 @@
+import type { DataKind } from "../core/dataTile";
 import { ManifestError } from "../core/errors";
 import type { Box3, Vec3 } from "../core/vec";
 import type { GeographicJson } from "./geographic";
 import { DEEPEST_LEVEL, blockRoot, makeFrame, tileName, type Frame, type FrameJson, type Tile } from "./frame";
 import { Occupancy } from "./occupancy";
-
-/** What a layer shows: spec/pyramid.md §6. */
-export type LayerKind = "color" | "normal" | "id" | "depth" | "sun" | "sun16" | "ao" | "depth2" | "picture";
 
 /** A layer listed in the manifest, such as colour. */
 export interface LayerInfo {
@@ -108,7 +106,7 @@ export interface Rendering {
 
 const SUPPORTED_VERSION = 1;
 /** The kinds that a layer of data tiles (spec/data-tile.md) stands for. */
-export const DATA_KINDS: readonly LayerKind[] = ["normal", "id", "depth"];
+export const DATA_KINDS: readonly DataKind[] = ["normal", "id", "depth"];
 /** The kinds of rendered light. */
 export const LIGHT_KINDS: readonly string[] = ["sun", "sun16", "ao"];
 

@@ -3,7 +3,7 @@ import type { Drawer, DrawerEvents, FrameContent, CustomLayer } from "../draw/dr
 import type { LightEstimator } from "../draw/lightEstimator";
 import { WebGLDrawer } from "../draw/webgl/webglDrawer";
 import type { Light } from "../geo/light";
-import type { LayerKind } from "../geo/manifest";
+import type { LayerKind } from "../tiles/tileData";
 import { Cache, computeCacheBytes, MIN_CACHE_BYTES } from "../tiles/cache";
 import { Decoder } from "../tiles/decoder";
 import { RequestQueue, type TileRequest } from "../tiles/queue";

@@ -9,7 +9,8 @@ import { listBakedLightKinds, MODES, listRequiredKinds, type BakedLight, type Mo
 import type { DrawStyles } from "../draw/drawStyle";
 import type { Frame, Tile } from "../geo/frame";
 import { towardsLight, type Light } from "../geo/light";
-import type { LayerInfo, LayerKind, Rendering, View } from "../geo/manifest";
+import type { LayerInfo, Rendering, View } from "../geo/manifest";
+import type { LayerKind } from "../tiles/tileData";
 import { findShadow } from "../geo/shadows";
 import { Objects, type AttributeInfo, type AttributeValue, type ColumnSummary, type ObjectInfo, type SearchEntry } from "../tiles/objects";
 import { HttpSource, type Source } from "../tiles/source";

@@ -13,7 +13,7 @@ import type { CustomLayer } from "../draw/drawer";
 import type { Camera } from "../geo/camera";
 import type { Light } from "../geo/light";
 import type { LightEstimator } from "../draw/lightEstimator";
-import type { LayerKind, Rendering } from "../geo/manifest";
+import type { Rendering } from "../geo/manifest";
 import type { marker } from "../overlay/marker";
 import { createAttribution } from "../ui/attribution";
 import { createControls } from "../ui/controls";
@@ -398,7 +398,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   }
 
   /** Lists kinds of tiles that are read, in addition to those shown. */
-  #findRequiredKinds(): LayerKind[] {
+  #findRequiredKinds(): PlanInput["requiredKinds"] {
     return [...new Set([...(this.options.hover && !this.options.dataSaver ? ["id" as const] : []), ...this.#items.needs])];
   }
 

@@ -1,5 +1,5 @@
 import type { Addable } from "../core/mapLayer";
-import type { LayerKind } from "../geo/manifest";
+import type { LayerKind } from "../tiles/tileData";
 import { marker } from "../overlay/marker";
 import { imageLayer } from "./imageLayer";
 

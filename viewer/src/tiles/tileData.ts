@@ -16,9 +16,11 @@ export type TileData =
   /** Values: one bit per sun. */
   | { readonly kind: "sun16"; readonly width: number; readonly height: number; readonly values: Uint16Array<ArrayBuffer> };
 
-type TileKind = TileData["kind"];
-/** Bytes per pixel in a layer's PNG; 0 for pictures that the browser decodes. */
-const CHANNELS: Readonly<Record<TileKind, number>> = { color: 0, picture: 0, normal: 3, id: 4, depth: 4, depth2: 4, sun: 1, ao: 1, sun16: 2 };
+/** Bytes per pixel in the PNG of each kind of layer (spec/layers.json); 0 for pictures that the browser decodes. */
+export const CHANNELS = { color: 0, picture: 0, normal: 3, id: 4, depth: 4, depth2: 4, sun: 1, ao: 1, sun16: 2 } as const;
+
+/** What a layer shows: spec/pyramid.md §6. */
+export type LayerKind = keyof typeof CHANNELS;
 
 export const NO_DEPTH = 0xffffffff;
 
@@ -33,7 +35,7 @@ export async function decodeTile(kind: string, mediaType: string, bytes: ArrayBu
 
 async function decodeWhole(kind: string, mediaType: string, bytes: ArrayBuffer): Promise<TileData> {
   if (!isKind(kind)) throw new DecodeError(`unknown layer kind "${kind}"`);
-  if (kind === "color" || kind === "picture") return decodeColor(kind, mediaType, bytes);
+  if (!CHANNELS[kind]) return decodeColor(kind as "color" | "picture", mediaType, bytes);
   if (mediaType === DATA_TYPE) return (await decodeDataTile(new Uint8Array(bytes), kind as DataKind)) as TileData;
   const { width, height, channels, data } = await decodePng(new Uint8Array(bytes));
   if (channels !== CHANNELS[kind]) throw new DecodeError(`${kind} tiles have ${String(CHANNELS[kind])} bytes per pixel, got ${String(channels)}`);
@@ -43,7 +45,7 @@ async function decodeWhole(kind: string, mediaType: string, bytes: ArrayBuffer):
   return { kind, width, height, values } as TileData;
 }
 
-const isKind = (kind: string): kind is TileKind => Object.hasOwn(CHANNELS, kind);
+const isKind = (kind: string): kind is LayerKind => Object.hasOwn(CHANNELS, kind);
 
 /**
  * Lists the parts of a tile to transfer to another thread. Bitmaps are copied: WebKitGTK 2.50 uploads nothing to WebGL from a transferred one.

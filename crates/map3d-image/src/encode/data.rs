@@ -45,11 +45,6 @@ pub fn bytes_from_u32(values: &[u32]) -> &[u8] {
     bytemuck::cast_slice(values)
 }
 
-/// Returns grey and alpha of each value; grey is the less significant byte.
-pub fn bytes_from_u16(values: &[u16]) -> &[u8] {
-    bytemuck::cast_slice(values)
-}
-
 /// Returns channels of pixels of `channels` bytes each, in the given order.
 pub(super) fn reordered(pixels: &[u8], channels: usize, order: &[usize]) -> Vec<u8> {
     let mut out = vec![0; pixels.len() / channels * order.len()];

@@ -7,10 +7,11 @@ mod jpeg;
 mod png;
 mod webp;
 
+use map3d_base::layers::{DEPTH, ID, NORMAL, PixelType};
 use map3d_base::{Error, LayerFormat, LayerKind, LayerSpec, Result};
 
 pub use color::{bytes_from_linear, color_from_linear};
-pub use data::{bytes_from_normals, bytes_from_u16, bytes_from_u32};
+pub use data::{bytes_from_normals, bytes_from_u32};
 pub(crate) use deflate::Deflater;
 pub use jpeg::encode_jpeg;
 pub use png::{Deflate, Filter, PngImage, decode_png, encode_png};
@@ -18,6 +19,7 @@ pub use webp::encode_webp;
 
 use crate::data_tile::DataTileEncoder;
 use crate::gbuffer::GBuffer;
+use crate::pixel_array::PixelArray;
 use crate::raster::Raster;
 
 /// Encodes layers one after another and reuses its buffers. One per thread.
@@ -67,16 +69,23 @@ impl Encoder {
         let size = (g.width, g.height);
         self.small = spec.small;
         match spec.kind {
-            LayerKind::Color => self.color(size, &g.color, spec.format, spec.quality),
-            LayerKind::Normal => self.normal(size, &g.normal, spec.format),
-            LayerKind::Id => self.id(size, &g.id, spec.format),
-            LayerKind::Depth => self.depth(size, &g.depth, spec.format),
-            LayerKind::Sun => self.shade(size, &g.sun, spec.format),
-            LayerKind::Sun16 => self.sun16(size, &g.sun16, spec.format),
-            LayerKind::Ao => self.shade(size, &g.ao, spec.format),
-            LayerKind::Depth2 => self.depth(size, &g.depth2, spec.format),
-            LayerKind::Picture => self.color(size, &g.picture, spec.format, spec.quality),
-            LayerKind::Data => self.data_tile(size, &g.normal, &g.id, &g.depth),
+            LayerKind::Data => {
+                check_format(spec.kind, spec.format)?;
+                self.data_tile(size, &g[NORMAL], &g[ID], &g[DEPTH])
+            }
+            kind => self.array(size, kind, &g.by_code()[kind as usize], spec.format, spec.quality),
+        }
+    }
+
+    /// Encodes the array of a kind of layer; `quality` 1..=100 for lossy formats.
+    pub fn array(&mut self, size: (u32, u32), kind: LayerKind, array: &PixelArray, format: LayerFormat, quality: u8) -> Result<Vec<u8>> {
+        check_format(kind, format)?;
+        check_length(size, array.len())?;
+        let methods = methods_of(kind)?;
+        match array {
+            PixelArray::U16x4(color) => self.color(size, color, format, quality),
+            PixelArray::I16x3(normals) => Ok(self.png(size, 3, &bytes_from_normals(normals), methods)),
+            _ => Ok(self.png(size, array.bytes().len() / array.len(), array.bytes(), methods)),
         }
     }
 
@@ -105,61 +114,31 @@ impl Encoder {
         self.png(size, 3, &rgb, png::COLOR)
     }
 
-    pub fn normal(&mut self, size: (u32, u32), normals: &[[i16; 3]], format: LayerFormat) -> Result<Vec<u8>> {
-        only_png("normal", format)?;
-        check_length(size, normals.len())?;
-        Ok(self.png(size, 3, &bytes_from_normals(normals), png::NORMAL))
-    }
-
-    pub fn id(&mut self, size: (u32, u32), ids: &[u32], format: LayerFormat) -> Result<Vec<u8>> {
-        only_png("id", format)?;
-        check_length(size, ids.len())?;
-        Ok(self.png(size, 4, bytes_from_u32(ids), png::ID))
-    }
-
-    pub fn depth(&mut self, size: (u32, u32), depths: &[u32], format: LayerFormat) -> Result<Vec<u8>> {
-        only_png("depth", format)?;
-        check_length(size, depths.len())?;
-        Ok(self.png(size, 4, bytes_from_u32(depths), png::DEPTH))
-    }
-
     /// Encodes normal, id and depth as one data tile.
     pub fn data_tile(&mut self, size: (u32, u32), normals: &[[i16; 3]], ids: &[u32], depths: &[u32]) -> Result<Vec<u8>> {
         let deflate = if self.small { Deflate::Thorough } else { Deflate::Matching };
         self.data.encode(size, &data::packed_normals(normals), ids, depths, deflate)
     }
-
-    /// Encodes one byte per pixel: sun, ambient occlusion.
-    pub fn shade(&mut self, size: (u32, u32), shades: &[u8], format: LayerFormat) -> Result<Vec<u8>> {
-        only_png("sun or ao", format)?;
-        check_length(size, shades.len())?;
-        Ok(self.png(size, 1, shades, png::SHADE))
-    }
-
-    /// Encodes one bit per sun.
-    pub fn sun16(&mut self, size: (u32, u32), suns: &[u16], format: LayerFormat) -> Result<Vec<u8>> {
-        only_png("sun16", format)?;
-        check_length(size, suns.len())?;
-        Ok(self.png(size, 2, bytes_from_u16(suns), png::SUN16))
-    }
 }
 
 fn methods_of(kind: LayerKind) -> Result<png::MethodPair> {
-    Ok(match kind {
-        LayerKind::Color | LayerKind::Picture => png::COLOR,
-        LayerKind::Normal => png::NORMAL,
-        LayerKind::Id => png::ID,
-        LayerKind::Depth | LayerKind::Depth2 => png::DEPTH,
-        LayerKind::Sun | LayerKind::Ao => png::SHADE,
-        LayerKind::Sun16 => png::SUN16,
-        LayerKind::Data => return Err(Error::argument("a data tile is no PNG")),
+    let row = kind.row();
+    let array = row.array.ok_or_else(|| Error::argument(format!("layer {kind:?} is no PNG")))?;
+    Ok(match array.pixel {
+        PixelType::U16x4 => png::COLOR,
+        PixelType::I16x3 => png::NORMAL,
+        PixelType::U32 if row.unit_m.is_some() => png::DEPTH,
+        PixelType::U32 => png::ID,
+        PixelType::U8 => png::SHADE,
+        PixelType::U16 => png::SUN16,
     })
 }
 
-fn only_png(layer: &str, format: LayerFormat) -> Result<()> {
-    match format {
-        LayerFormat::Png => Ok(()),
-        _ => Err(Error::argument(format!("layer {layer} is lossless: its format is png, not {format:?}"))),
+fn check_format(kind: LayerKind, format: LayerFormat) -> Result<()> {
+    let formats = kind.row().formats;
+    match formats.contains(&format) {
+        true => Ok(()),
+        false => Err(Error::argument(format!("layer {kind:?}: its format is {format:?}, expected one of {formats:?}"))),
     }
 }
 

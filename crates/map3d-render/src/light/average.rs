@@ -1,6 +1,7 @@
 //! Averages of light over the covered samples of each pixel.
 
 use map3d_base::Vec3;
+use map3d_base::layers::{COLOR, PICTURE};
 use map3d_image::GBuffer;
 
 use super::unprojection::SubtilePosition;
@@ -75,9 +76,9 @@ pub(super) fn light_picture<P, F>(
         match run.content {
             RunContent::Surface(surface) => {
                 for (at, i) in (first..).zip(run.columns()) {
-                    let [r, green, b, _] = g.color[at];
+                    let [r, green, b, _] = g[COLOR][at];
                     let [r, green, b] = multiply([r, green, b], light(i, surface, (values.pixel)(i, j)));
-                    g.picture[at] = [r as u16, green as u16, b as u16, 65_535];
+                    g[PICTURE][at] = [r as u16, green as u16, b as u16, 65_535];
                 }
             }
             RunContent::Fragments { first: start, end } => {
@@ -88,7 +89,7 @@ pub(super) fn light_picture<P, F>(
                     (0..3).for_each(|c| sum[c] += color[c] * u64::from(samples));
                     sum[3] += 65_535 * u64::from(samples);
                 }
-                g.picture[first] = sum.map(|c| ((c + 8) >> 4) as u16);
+                g[PICTURE][first] = sum.map(|c| ((c + 8) >> 4) as u16);
             }
         }
     }

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use map3d_base::{Box3, Camera, CameraKind, DEPTH_UNITS_PER_M, Error, LayerKind, LayerSpec, Projection, Result, vec3};
+use map3d_base::layers::LAYERS;
+use map3d_base::{Box3, Camera, CameraKind, DEPTH_UNITS_PER_M, Error, LayerSpec, Projection, Result, vec3};
 use map3d_trace::ViewClip;
 
 use crate::shade::SampleSet;
@@ -43,11 +44,9 @@ pub struct ViewRequest {
 impl ViewRequest {
     pub(super) fn check(&self) -> Result<()> {
         LayerSpec::validate_all("view", &self.layers)?;
-        if let Some(layer) = self.layers.iter().find(|l| matches!(l.kind, LayerKind::Sun16 | LayerKind::Depth2 | LayerKind::Data)) {
-            return Err(Error::argument(format!(
-                "view: layer {:?} exists only in pyramids; a view has color, normal, id, depth, sun, ao, picture",
-                layer.kind
-            )));
+        if let Some(layer) = self.layers.iter().find(|l| !l.kind.row().view) {
+            let kinds: Vec<_> = LAYERS.iter().filter(|row| row.view).map(|row| row.kind).collect();
+            return Err(Error::argument(format!("view: layer {:?} exists only in pyramids; a view has {kinds:?}", layer.kind)));
         }
         if !(1..=THREADS_MAX).contains(&self.threads) {
             return Err(Error::argument(format!("view: threads is {}, expected 1 to {THREADS_MAX}", self.threads)));

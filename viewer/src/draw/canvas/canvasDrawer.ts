@@ -1,5 +1,5 @@
 import type { Tile } from "../../geo/frame";
-import type { LayerKind } from "../../geo/manifest";
+import type { LayerKind } from "../../tiles/tileData";
 import { findFallbacks } from "../../tiles/cover";
 import { listRequiredKinds, type Drawer, type DrawerEvents, type FrameContent, type LayerPass, type Quad } from "../drawer";
 import { overlaps } from "../depthMapping";

@@ -1,5 +1,4 @@
-import type { LayerKind } from "../../geo/manifest";
-import type { TileData } from "../../tiles/tileData";
+import type { LayerKind, TileData } from "../../tiles/tileData";
 import type { Rgb } from "../color";
 import type { DrawStyles } from "../drawStyle";
 import type { ShadingOptions } from "./shadingOptions";

@@ -1,6 +1,6 @@
 import type { Light } from "../../geo/light";
 import { towardsLight } from "../../geo/light";
-import type { LayerKind } from "../../geo/manifest";
+import type { LayerKind } from "../../tiles/tileData";
 import type { Vec2, Vec3 } from "../../core/vec";
 import type { Shadow } from "../../geo/shadows";
 import type { Mask } from "./mask";

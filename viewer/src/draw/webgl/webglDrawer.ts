@@ -1,7 +1,7 @@
 import { DrawError } from "../../core/errors";
 import type { Vec2, Vec3 } from "../../core/vec";
 import { towardsLight } from "../../geo/light";
-import type { LayerKind } from "../../geo/manifest";
+import type { LayerKind } from "../../tiles/tileData";
 import { listBakedLightKinds, listRequiredKinds, type Drawer, type DrawerEvents, type FrameContent, type Mode, type LayerPass, type Quad } from "../drawer";
 import { computeDepthAtZero, computeCustomLayerBias, joinDepthRanges, computeMaxStep, type DepthMapping } from "../depthMapping";
 import { packColor, packStyle } from "../drawStyle";
